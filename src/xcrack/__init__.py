@@ -1,0 +1,72 @@
+"""xcrack: fatigue crack growth by extended finite elements, with contact of the lips.
+
+Importing it loads neither gmsh, pyvista, meshio, matplotlib nor numba; each is loaded where it
+is first used.
+"""
+
+from importlib import import_module
+from typing import Any
+
+__version__ = "0.1.0"
+
+_HOME = {
+    "Mesh": "mesh",
+    "box": "mesh",
+    "read_mesh": "mesh_io",
+    "write_mesh": "mesh_io",
+    "plate": "meshes",
+    "plate_with_hole": "meshes",
+    "Isotropic": "material",
+    "Crack": "crack",
+    "line_crack": "crack",
+    "fix": "conditions",
+    "displacement": "conditions",
+    "traction": "conditions",
+    "pressure": "conditions",
+    "point_force": "conditions",
+    "body_force": "conditions",
+    "crack_pressure": "conditions",
+    "initial_stress": "conditions",
+    "Problem": "problem",
+    "Numerics": "numerics",
+    "solve": "solving",
+    "Solution": "solution",
+    "energy_error": "norms",
+    "stress_intensity": "interaction",
+    "SIF": "interaction",
+    "max_hoop_stress": "criteria",
+    "mean_reference": "criteria",
+    "weighted_angle": "criteria",
+    "equivalent_K": "criteria",
+    "paris": "laws",
+    "elber": "laws",
+    "walker": "laws",
+    "Cycle": "growth",
+    "Step": "growth",
+    "grow": "growth",
+    "History": "history",
+    "collect": "history",
+    "resume": "history",
+    "write": "export",
+    "plot": "plotting",
+    "inf_sup": "infsup",
+    "plan": "planning",
+    "XcrackError": "errors",
+    "XcrackWarning": "errors",
+    "MeshError": "errors",
+    "GeometryError": "errors",
+    "ProblemError": "errors",
+    "ConvergenceError": "errors",
+}
+
+__all__ = sorted(_HOME)
+
+
+def __getattr__(name: str) -> Any:
+    if name in _HOME:
+        return getattr(import_module(f"xcrack.{_HOME[name]}"), name)
+    raise AttributeError(f"module 'xcrack' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return [*__all__, "__version__"]

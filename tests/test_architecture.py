@@ -1,0 +1,140 @@
+"""The shape of the code: short files, one-way imports, late heavy imports, documented names."""
+
+from __future__ import annotations
+
+import ast
+import inspect
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import xcrack
+
+ROOT = Path(__file__).resolve().parent.parent
+SOURCE = ROOT / "src" / "xcrack"
+FILES = sorted(SOURCE.rglob("*.py"))
+KERNELS = sorted((SOURCE / "kernels").glob("*.py"))
+LONGEST_FILE = 420
+HEAVY = ("numba", "gmsh", "meshio", "pyvista", "vtk", "vtkmodules", "matplotlib", "pyamg")
+
+
+def label(path: Path) -> str:
+    return path.relative_to(SOURCE).as_posix()
+
+
+@pytest.mark.parametrize("path", FILES, ids=label)
+def test_file_is_short(path: Path) -> None:
+    assert len(path.read_text().splitlines()) <= LONGEST_FILE
+
+
+def test_import_loads_nothing_heavy() -> None:
+    code = f"import sys, xcrack; print([name for name in {HEAVY} if name in sys.modules])"
+    run = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=False
+    )
+    assert run.returncode == 0, run.stderr
+    assert run.stdout.strip() == "[]"
+
+
+def test_layers_are_one_way() -> None:
+    program = "from importlinter.cli import lint_imports_command as run; run()"
+    run = subprocess.run(
+        [sys.executable, "-c", program, "--no-cache"],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert run.returncode == 0, run.stdout + run.stderr
+    assert "1 kept, 0 broken" in run.stdout
+
+
+def imported(tree: ast.AST) -> set[str]:
+    """Top names of all that a file imports; "." for a relative import."""
+    names: set[str] = set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            names |= {alias.name.partition(".")[0] for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            names.add("." if node.level else (node.module or "").partition(".")[0])
+    return names
+
+
+@pytest.mark.parametrize("path", KERNELS, ids=label)
+def test_kernels_know_arrays_only(path: Path) -> None:
+    # not even each other: numba does not notice that a helper in another file has changed
+    allowed = {"__future__", "collections", "math", "numba", "numpy", "typing"}
+    assert imported(ast.parse(path.read_text())) <= allowed
+
+
+def compiled(tree: ast.Module) -> list[ast.FunctionDef]:
+    """Functions of a file that carry a numba decorator."""
+    return [
+        node
+        for node in ast.walk(tree)
+        if isinstance(node, ast.FunctionDef)
+        and any("jit" in ast.unparse(decorator) for decorator in node.decorator_list)
+    ]
+
+
+@pytest.mark.parametrize("path", KERNELS, ids=label)
+def test_kernels_are_cached(path: Path) -> None:
+    for function in compiled(ast.parse(path.read_text())):
+        decorators = " ".join(map(ast.unparse, function.decorator_list))
+        assert "cache=True" in decorators or "inline" in decorators, function.name
+
+
+def documented(text: str) -> set[str]:
+    """Names that a numpydoc string describes in Parameters or Attributes."""
+    found: set[str] = set()
+    sections = re.split(r"^([A-Z][A-Za-z ]+)\n-{3,}\n", inspect.cleandoc(text), flags=re.MULTILINE)
+    for title, body in zip(sections[1::2], sections[2::2], strict=True):
+        if title in {"Parameters", "Other Parameters", "Attributes"}:
+            for line in body.splitlines():
+                entry = re.match(r"([*\w, ]+?)\s*(:.*)?$", line)
+                if entry and not line.startswith(" "):
+                    found |= {name.strip(" *") for name in entry[1].split(",")}
+    return found
+
+
+def test_documented_reads_numpydoc() -> None:
+    text = """One sentence.
+
+    Parameters
+    ----------
+    points : (n, d), length
+        Where.
+    a, b : float
+        Half axes.
+    *rest
+        More.
+
+    Returns
+    -------
+    value : float
+    """
+    assert documented(text) == {"points", "a", "b", "rest"}
+
+
+@pytest.mark.parametrize("name", sorted(xcrack.__all__))
+def test_public_name_is_documented(name: str) -> None:
+    value = getattr(xcrack, name)
+    if not callable(value):
+        return
+    assert inspect.getdoc(value), f"{name} has no docstring"
+    if inspect.isclass(value):
+        fields = getattr(value, "__dataclass_fields__", {})
+        wanted = {key for key, field in fields.items() if field.init and not key.startswith("_")}
+    else:
+        wanted = set(inspect.signature(value).parameters)
+    assert wanted <= documented(value.__doc__ or ""), f"{name}: parameters without a description"
+
+
+def test_plane_and_space_are_one_code_path() -> None:
+    """Branches on the dimension are few: it is an array shape."""
+    branch = re.compile(r"\b(dim|d)\s*(==|!=)\s*[23]\b")
+    count = sum(len(branch.findall(path.read_text())) for path in FILES)
+    assert count <= 25, f"{count} branches on the dimension"
