@@ -1,0 +1,117 @@
+"""Make the meshes of the examples with gmsh.
+
+The files lie beside this script, so that the examples run where gmsh does not.
+Run `python examples/meshes/make.py` to make them anew.
+"""
+
+from pathlib import Path
+
+import numpy as np
+
+from xcrack.gmsh_session import session
+from xcrack.grading import graded_size
+from xcrack.mesh import Mesh
+from xcrack.mesh_io import write_mesh
+from xcrack.meshes import mesh_model, plate, plate_with_hole
+
+HERE = Path(__file__).parent
+
+# Where the two cracks of two_holes.py are expected to run; the second is the first one turned.
+TURN = np.array([20.0, 10.0])
+PATH = np.array([(0.0, 2.85), (4.0, 2.85), (8.5, 2.75), (12.8, 2.3)])
+PATHS = (PATH, TURN - PATH)
+HOLES = (((3.0, 7.0), 2.0), ((17.0, 3.0), 2.0))
+
+
+def short(mesh: Mesh) -> Mesh:
+    """Round coordinates to 6 decimals, so that the files are short and still exact."""
+    return Mesh(np.round(mesh.points, 6), mesh.cells, mesh.facet_sets, mesh.cell_sets)
+
+
+def infinite_plate(parts: int) -> Mesh:
+    """Hole of radius 1 in [-4, 4]^2, cells of 1/parts at the hole and on the crack's line.
+
+    Band and transition are the same in all of them: every cell shrinks with h, as rates need.
+    """
+    h = 1.0 / parts
+    return plate_with_hole(
+        width=8.0, height=8.0, radius=1.0, size=3 * h, size_near=h,
+        along=[(1.0, 0.0), (3.0, 0.0)], band=0.1, transition=1.25,
+    )  # fmt: skip
+
+
+def half_of_two_holes() -> tuple[np.ndarray, np.ndarray, dict[str, np.ndarray]]:
+    """Left half (x <= 10) of the plate; its cut nodes are symmetric about (10, 5)."""
+    length = graded_size([(x, y, r) for (x, y), r in HOLES], PATHS, 0.6, 0.25, 0.5, 1.2)
+    with session() as gmsh:
+        geo = gmsh.model.geo
+        corners = [(0, 0), (10, 0), (10, 5), (10, 10), (0, 10)]
+        p = [geo.addPoint(x, y, 0) for x, y in corners]
+        side = [geo.addLine(p[i], p[(i + 1) % 5]) for i in range(5)]
+        (x, y), r = HOLES[0]
+        middle = geo.addPoint(x, y, 0)
+        rim = [geo.addPoint(x + r * c, y + r * s, 0) for c, s in [(1, 0), (0, 1), (-1, 0), (0, -1)]]
+        arc = [geo.addCircleArc(rim[i], middle, rim[(i + 1) % 4]) for i in range(4)]
+        geo.addPlaneSurface([geo.addCurveLoop(side), geo.addCurveLoop(arc)])
+        geo.synchronize()
+        half_turn = [-1, 0, 0, 20, 0, -1, 0, 10, 0, 0, 1, 0, 0, 0, 0, 1]
+        gmsh.model.mesh.setPeriodic(1, [side[2]], [side[1]], half_turn)
+        bottom, low, high, top, left = side
+        curves = {"left": [left], "bottom": [bottom], "top": [top], "hole_0": arc}
+        return mesh_model(gmsh, {**curves, "low": [low], "high": [high]}, length)
+
+
+def two_holes() -> Mesh:
+    """Mesh that a half turn about (10, 5) maps onto itself, to the last bit.
+
+    Coordinates are multiples of 2^-13: such numbers, and 20 - x and 10 - y, have no round-off.
+    """
+    points, cells, facets = half_of_two_holes()
+    points = np.round(points * 2.0**13) / 2.0**13
+    low, high = np.unique(facets.pop("low")), np.unique(facets.pop("high"))
+    points[low, 0] = points[high, 0] = 10.0
+    points[high[np.argsort(points[high, 1])]] = TURN - points[low[np.argsort(-points[low, 1])]]
+    cut = {points[i].tobytes(): i for i in np.union1d(low, high)}
+    turned = TURN - points
+    new = np.full(len(points), -1)
+    for i in np.union1d(low, high):
+        new[i] = cut[turned[i].tobytes()]
+    free = new < 0
+    new[free] = len(points) + np.arange(free.sum())
+    sets = {
+        "left": facets["left"],
+        "right": new[facets["left"]],
+        "bottom": np.concatenate([facets["bottom"], new[facets["top"]]]),
+        "top": np.concatenate([facets["top"], new[facets["bottom"]]]),
+        "hole_0": facets["hole_0"],
+        "hole_1": new[facets["hole_0"]],
+    }
+    return Mesh(np.concatenate([points, turned[free]]), np.concatenate([cells, new[cells]]), sets)
+
+
+def meshes() -> dict[str, Mesh]:
+    """All meshes by the name of their file."""
+    made = {f"plate_with_hole_{n:02d}": infinite_plate(n) for n in (5, 10, 20, 40)}
+    made["finite_plate"] = plate_with_hole(
+        width=100.0, height=100.0, radius=5.0, size=4.0, size_near=0.25,
+        along=[(5.0, 0.0), (12.0, 0.0)], band=1.0, transition=12.5,
+    )  # fmt: skip
+    made["edge_crack"] = plate(
+        50.0, 100.0, lower=(0.0, -50.0), size=5.0, size_near=1.0,
+        along=[(0.0, 0.0), (50.0, 0.0)], band=2.0, transition=20.0,
+    )  # fmt: skip
+    made["two_holes_free"] = plate(
+        20.0, 10.0, holes=HOLES, size=0.6, size_near=0.25, along=PATHS, band=0.5, transition=1.2
+    )
+    made["turning_load"] = plate(
+        40.0, 40.0, lower=(-20.0, -20.0), size=4.0, size_near=0.5,
+        along=[(-5.0, 0.0), (5.0, 0.0)], band=4.0, transition=14.0,
+    )  # fmt: skip
+    return {**{name: short(mesh) for name, mesh in made.items()}, "two_holes": two_holes()}
+
+
+if __name__ == "__main__":
+    for name, mesh in meshes().items():
+        path = HERE / f"{name}.msh"
+        write_mesh(path, mesh)
+        print(f"{path.name:24} {path.stat().st_size / 1e3:6.0f} kB  {mesh}")

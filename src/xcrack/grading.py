@@ -1,0 +1,96 @@
+"""Cell sizes that follow holes and the paths of cracks."""
+
+from collections.abc import Callable, Sequence
+from math import hypot
+from typing import Any
+
+import numpy as np
+
+from xcrack.arrays import Floats
+from xcrack.errors import GeometryError
+
+
+def graded_size(
+    holes: Sequence[tuple[float, float, float]],
+    paths: Sequence[Floats],
+    far: float,
+    near: float,
+    band: float,
+    transition: float,
+) -> Callable[[float, float], float]:
+    """Cell size as a function of the place: `near` up to `band`, `far` from a transition on.
+
+    Parameters
+    ----------
+    holes : sequence of (x, y, radius), length
+        Round holes.
+    paths : sequence of (k, 2) arrays, length
+        Polylines.
+    far, near : float, length
+        Sizes far from all holes and paths, and near them.
+    band, transition : float, length
+        Where `near` holds, and over what distance the size then grows to `far`.
+
+    Returns
+    -------
+    callable
+        Maps x, y to a size; plain floats, since gmsh asks point by point.
+    """
+    segments = []
+    for path in paths:
+        if len(path) == 1:
+            path = np.repeat(path, 2, axis=0)
+        for (ax, ay), (bx, by) in zip(path[:-1].tolist(), path[1:].tolist(), strict=True):
+            square = (bx - ax) ** 2 + (by - ay) ** 2
+            segments.append((ax, ay, bx - ax, by - ay, square or 1.0))
+    if not holes and not segments:
+        return lambda x, y: far
+    ramp = max(transition, 1e-9 * far)
+
+    def length(x: float, y: float) -> float:
+        distance = min((hypot(x - cx, y - cy) - r for cx, cy, r in holes), default=1e300)
+        for ax, ay, tx, ty, square in segments:
+            s = min(1.0, max(0.0, ((x - ax) * tx + (y - ay) * ty) / square))
+            distance = min(distance, hypot(x - ax - s * tx, y - ay - s * ty))
+        return near + (far - near) * min(1.0, max(0.0, (distance - band) / ramp))
+
+    return length
+
+
+def polylines(along: Any) -> list[Floats]:
+    """Bring one polyline, several or none into one form.
+
+    Parameters
+    ----------
+    along : (k, 2) points, a sequence of such, or None, length
+        What the user gave.
+
+    Returns
+    -------
+    list of (k, 2) array, length
+        The polylines.
+
+    Raises
+    ------
+    GeometryError
+        Anything else, or coordinates that are not finite.
+
+    Examples
+    --------
+    >>> [path.tolist() for path in polylines([(0, 0), (1, 0)])]
+    [[[0.0, 0.0], [1.0, 0.0]]]
+    """
+    if along is None:
+        return []
+    try:
+        many = bool(np.ndim(along[0][0]))
+        paths = [np.array(path, dtype=np.float64) for path in (along if many else [along])]
+        bad = any(p.ndim != 2 or p.shape[1] != 2 or not np.isfinite(p).all() for p in paths)
+    except (TypeError, ValueError, IndexError, KeyError):
+        bad = True
+    if bad:
+        raise GeometryError(
+            f"along = {along!r} must be points of a polyline, [(x0, y0), (x1, y1), ...], or a "
+            "list of such polylines, with finite coordinates."
+        )
+    return paths
