@@ -1,0 +1,85 @@
+"""Which node carries which function, and how far the tip functions reach."""
+
+import numpy as np
+
+from xcrack.arrays import Bools, Floats, Ints
+from xcrack.crack import Crack, crack_length, front
+from xcrack.cut import Cut
+from xcrack.locate import nearest_boundary
+from xcrack.mesh import Mesh
+from xcrack.simplex import cell_nodes, facet_nodes
+
+_SHARE = {1: 0.3, 2: 0.4}  # of the free length around a tip, measured best for K at each order
+
+
+def leg_size(mesh: Mesh, cells: Ints) -> float:
+    """Size of the simplex with right angles that has the mean volume of the cells, length."""
+    factor = 2.0 if mesh.dim == 2 else 6.0
+    return float((factor * mesh.volume[cells].mean()) ** (1 / mesh.dim))
+
+
+def tip_radii(
+    mesh: Mesh, cracks: tuple[Crack, ...], cuts: tuple[Cut, ...], order: int, wanted: float | None
+) -> list[tuple[float, ...]]:
+    """Radius of the enriched disc at each tip of each crack, length.
+
+    Without a wanted radius: a share (0.3 at order 1, 0.4 at order 2) of the smallest of crack
+    length, distance to the boundary and distance to another tip. A wanted radius is kept, and
+    shrunk only where the body or another tip demands. Never below two cells.
+    """
+    tips = [front(crack)[0] for crack in cracks]
+    every = np.concatenate(tips) if tips else np.zeros((0, mesh.dim))
+    radii = []
+    for crack, cut, own in zip(cracks, cuts, tips, strict=True):
+        length = crack_length(crack) / max(len(own), 1)
+        row = []
+        for k, x in enumerate(own):
+            to_boundary, _ = nearest_boundary(mesh, x)
+            apart = np.linalg.norm(every - x, axis=1)
+            to_tip = float(np.min(apart[apart > 0], initial=np.inf))
+            least = 2.0 * leg_size(mesh, cut.level_set.tip_cells[k])
+            if wanted is None:
+                radius = _SHARE[order] * min(length, to_boundary, to_tip)
+            else:
+                radius = min(wanted, 0.8 * to_boundary, 0.45 * to_tip)
+            row.append(max(radius, least))
+        radii.append(tuple(row))
+    return radii
+
+
+def heaviside_nodes(mesh: Mesh, order: int, cut: Cut) -> Bools:
+    """Nodes whose support the crack splits, without those of the tip cells `(n_nodes,)`.
+
+    Nodes of cells that are cut from side to side, and, where the crack lies on mesh lines, the
+    nodes of the facets under it: without the latter such a crack would vanish.
+    """
+    nodes = cell_nodes(mesh, order)
+    n_nodes = mesh.n_points + (len(mesh.edges) if order == 2 else 0)
+    flag = np.zeros(n_nodes, dtype=bool)
+    flag[nodes[cut.cells]] = True
+    on_facets = cut.lip_cell[:, 0] != cut.lip_cell[:, 1]
+    if on_facets.any():
+        shared = [np.intersect1d(mesh.cells[a], mesh.cells[b]) for a, b in cut.lip_cell[on_facets]]
+        facets = np.array(shared, dtype=np.int64)
+        flag[facet_nodes(mesh, order, facets)] = True
+    for cells in cut.level_set.tip_cells:
+        flag[nodes[cells]] = False
+    return flag
+
+
+def tip_points(mesh: Mesh, cut: Cut, k: int, radius: float, kind: str) -> Bools:
+    """Mesh points that carry the functions of tip k `(n,)`."""
+    flag = np.zeros(mesh.n_points, dtype=bool)
+    flag[mesh.cells[cut.level_set.tip_cells[k]]] = True
+    if kind == "geometric":
+        # Points on the rim count whatever their round-off: the set is symmetric where the mesh is.
+        distance = np.linalg.norm(mesh.points - cut.level_set.tip[k], axis=1)
+        flag |= distance <= radius * (1 + 1e-9)
+    return flag
+
+
+def node_level(mesh: Mesh, order: int, phi: Floats) -> Floats:
+    """The linear level set at the nodes `(n_nodes,)`."""
+    if order == 1:
+        return phi
+    return np.concatenate([phi, phi[mesh.edges].mean(axis=1)])

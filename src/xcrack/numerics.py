@@ -1,0 +1,78 @@
+"""Everything that is method, not scene, in one place."""
+
+from dataclasses import dataclass
+
+from xcrack.errors import ProblemError
+
+
+@dataclass(frozen=True)
+class Numerics:
+    """Choices of method, with the reason of each default (numbers in docs/theory.md).
+
+    Parameters
+    ----------
+    enrichment : {"geometric", "topological"}
+        Tip functions on all nodes within a fixed radius, or on the nodes of the tip's cell only.
+        Geometric: energy rate 1 (order 1) or 2 (order 2) instead of about 0.5.
+    radius : float, length, optional
+        Radius of the enriched disc. None: 0.3 (order 1) or 0.4 (order 2) of the smallest of crack
+        length, distance to the boundary and to another tip, never below two cells.
+    functions : {4, 2}
+        Tip functions; two (those of the modes' leading angular terms) cost accuracy.
+    multipliers : {"reduced", "naive"}
+        Space of the contact multipliers. Reduced: inf-sup stable for any cut. Naive: one unknown
+        for each node, for comparison only; it oscillates.
+    consistent : bool
+        Correct the gradients of the tip functions so that linear stress fields pass the patch
+        test to round-off whatever the quadrature (variationally consistent integration).
+    orthonormal : {"star", "node", "none"}
+        Change of basis before the solver. Star: the unknowns of a node, and the Heaviside
+        unknowns of the cut edges whose far end it is, are made orthonormal in energy, so that the
+        condition number does not depend on the cut. Node: without those of the edges. None: only
+        scaled by the diagonal.
+    patch : bool
+        Make tip functions orthogonal to the standard and Heaviside functions around them: a
+        condition number that grows like h^-2 for iterative solvers. A direct solver needs it not.
+    points : int
+        Conical Gauss points a direction in a sub-cell with tip functions.
+    domain : float, length, optional
+        Outer radius of the first domain of the interaction integral. None: twice the enriched
+        radius, as far as body and other tips allow.
+    initial_set : {"closed", "open"}
+        State of the lips that the contact iteration starts from where nothing is known.
+
+    Raises
+    ------
+    ProblemError
+        A word or number that is not one of these.
+    """
+
+    enrichment: str = "geometric"
+    radius: float | None = None
+    functions: int = 4
+    multipliers: str = "reduced"
+    consistent: bool = True
+    orthonormal: str = "star"
+    patch: bool = False
+    points: int = 4
+    domain: float | None = None
+    initial_set: str = "closed"
+
+    def __post_init__(self) -> None:
+        choices: dict[str, tuple[object, ...]] = {
+            "enrichment": ("geometric", "topological"),
+            "functions": (4, 2),
+            "multipliers": ("reduced", "naive"),
+            "orthonormal": ("star", "node", "none"),
+            "initial_set": ("closed", "open"),
+        }
+        for name, allowed in choices.items():
+            if getattr(self, name) not in allowed:
+                words = " or ".join(repr(a) for a in allowed)
+                raise ProblemError(f"Numerics({name}={getattr(self, name)!r}): give {words}.")
+        for name in ("radius", "domain"):
+            value = getattr(self, name)
+            if value is not None and not (value > 0 and value < float("inf")):
+                raise ProblemError(f"Numerics({name}={value}): a length must be positive.")
+        if not 2 <= self.points <= 32:
+            raise ProblemError(f"Numerics(points={self.points}): give 2 to 32 points a direction.")

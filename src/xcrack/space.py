@@ -1,0 +1,269 @@
+"""The approximation space: standard, Heaviside and tip functions, numbered and tabulated.
+
+Every scalar function has a number; unknown `d * function + component` is its coefficient in one
+direction. All enriched functions are shifted, N_i (H - H_i) and N_i (F - F(x_i)), so that the
+standard unknown of a node is the displacement there.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from xcrack.arrays import Bools, Floats, Ints, lock
+from xcrack.crack import Crack, front
+from xcrack.cut import Cut
+from xcrack.enrichment import heaviside_nodes, node_level, tip_points, tip_radii
+from xcrack.mesh import Mesh
+from xcrack.numerics import Numerics
+from xcrack.simplex import cell_nodes, n_shapes, node_points, shape_derivatives, shape_values
+from xcrack.williams import polar, tip_derivatives, tip_values
+
+
+@dataclass(frozen=True, eq=False)
+class Tip:
+    """One tip and the functions around it.
+
+    Attributes
+    ----------
+    crack, number : int
+        Which tip of which crack.
+    x, frame : (d,) and (d, d) arrays
+        Position and rows (ahead, normal).
+    radius : float, length
+    functions : int
+        Tip functions a point.
+    point_to_function : (n,) array of int
+        First of its functions at each mesh point, or -1.
+    """
+
+    crack: int
+    number: int
+    x: Floats
+    frame: Floats
+    radius: float
+    functions: int
+    point_to_function: Ints
+
+
+@dataclass(frozen=True, eq=False)
+class Batch:
+    """Cells on which the same kinds of functions act.
+
+    Attributes
+    ----------
+    cells : (m,) array of int
+    cracks, tips : tuple of int
+        Cracks whose Heaviside functions, and tips whose functions act here.
+    functions : (m, n) array of int
+        Scalar function numbers, -1 where a place is empty.
+    """
+
+    cells: Ints
+    cracks: tuple[int, ...]
+    tips: tuple[int, ...]
+    functions: Ints
+
+
+@dataclass(frozen=True, eq=False)
+class Space:
+    """Functions on a mesh with cracks.
+
+    Attributes
+    ----------
+    mesh : Mesh
+    order : int
+        Degree of the standard and Heaviside functions.
+    cracks : tuple of Crack
+        Placed cracks.
+    cuts : tuple of Cut
+    heaviside : tuple of (n_nodes,) arrays of int
+        Heaviside function of each node for each crack, or -1.
+    tips : tuple of Tip
+    n_nodes, n_functions : int
+    """
+
+    mesh: Mesh
+    order: int
+    cracks: tuple[Crack, ...]
+    cuts: tuple[Cut, ...]
+    heaviside: tuple[Ints, ...]
+    tips: tuple[Tip, ...]
+    n_nodes: int
+    n_functions: int
+
+    @property
+    def dim(self) -> int:
+        """Number of space dimensions."""
+        return self.mesh.dim
+
+    @property
+    def n_dof(self) -> int:
+        """Number of unknowns."""
+        return self.n_functions * self.dim
+
+    @property
+    def radius(self) -> Floats:
+        """Radius of the enriched disc of each tip, length."""
+        return np.array([tip.radius for tip in self.tips])
+
+    @cached_property
+    def cell_nodes(self) -> Ints:
+        """Nodes of each cell `(m, n_shapes)`."""
+        return lock(np.ascontiguousarray(cell_nodes(self.mesh, self.order)))
+
+    @cached_property
+    def node_points(self) -> Floats:
+        """Coordinates of the nodes."""
+        return lock(np.array(node_points(self.mesh, self.order)))
+
+    @cached_property
+    def node_side(self) -> tuple[Ints, ...]:
+        """Side +1 or -1 of each node for each crack; a node on a lip counts as +."""
+        levels = [node_level(self.mesh, self.order, cut.level_set.phi) for cut in self.cuts]
+        return tuple(lock(np.where(phi >= 0, 1, -1).astype(np.int64)) for phi in levels)
+
+    @cached_property
+    def signature(self) -> Ints:
+        """Bit mask of what acts on each cell: cracks first, then tips; 0 for a plain cell."""
+        mask = np.zeros(len(self.mesh.cells), dtype=np.int64)
+        for c, cut in enumerate(self.cuts):
+            carries = self.heaviside[c][self.cell_nodes] >= 0
+            differs = self.node_side[c][self.cell_nodes] == -cut.side[:, None]
+            acts = (carries & (differs | cut.is_cut[:, None])).any(axis=1)
+            mask |= acts.astype(np.int64) << c
+        for t, tip in enumerate(self.tips):
+            acts = (tip.point_to_function[self.mesh.cells] >= 0).any(axis=1)
+            mask |= acts.astype(np.int64) << (len(self.cuts) + t)
+        return lock(mask)
+
+    @cached_property
+    def enriched(self) -> Ints:
+        """Cells that are not plain."""
+        return lock(np.nonzero(self.signature)[0])
+
+    @cached_property
+    def has_tip(self) -> Bools:
+        """Cells on which a tip function acts."""
+        return lock((self.signature >> len(self.cuts)) > 0)
+
+    def batches(self, cells: Ints) -> list[tuple[Batch, Ints]]:
+        """Group cells by what acts on them; with each batch the positions in `cells`."""
+        signature = self.signature[cells]
+        groups = []
+        for value in np.unique(signature):
+            rows = np.nonzero(signature == value)[0]
+            bits = [b for b in range(len(self.cuts) + len(self.tips)) if value >> b & 1]
+            cracks = tuple(b for b in bits if b < len(self.cuts))
+            tips = tuple(b - len(self.cuts) for b in bits if b >= len(self.cuts))
+            groups.append((self._batch(cells[rows], cracks, tips), rows))
+        return groups
+
+    def _batch(self, cells: Ints, cracks: tuple[int, ...], tips: tuple[int, ...]) -> Batch:
+        nodes = self.cell_nodes[cells]
+        columns = [nodes]
+        columns.extend(self.heaviside[c][nodes] for c in cracks)
+        for t in tips:
+            tip = self.tips[t]
+            first = tip.point_to_function[self.mesh.cells[cells]]
+            each = first[:, :, None] + np.arange(tip.functions)
+            columns.append(np.where(first[:, :, None] >= 0, each, -1).reshape(len(cells), -1))
+        return Batch(cells, cracks, tips, np.ascontiguousarray(np.concatenate(columns, axis=1)))
+
+    def tabulate(
+        self, batch: Batch, row: Ints, bary: Floats, side: Ints
+    ) -> tuple[Floats, Floats]:
+        """Values `(q, n)` and gradients `(q, n, d)` of a batch's functions at points.
+
+        Parameters
+        ----------
+        batch : Batch
+        row : (q,) array of int
+            Position in the batch of the cell of each point.
+        bary : (q, d + 1) array
+        side : (q, cracks) array
+            Side of each crack on which the point lies: +1, -1, or 0 where that means nothing.
+        """
+        cell = batch.cells[row]
+        gradient = self.mesh.gradient[cell]
+        N = shape_values(self.order, bary)
+        dN = np.einsum("qnb,qbd->qnd", shape_derivatives(self.order, bary), gradient)
+        values, gradients = [N], [dN]
+        for c in batch.cracks:
+            nodes = self.cell_nodes[cell]
+            jump = side[:, c, None] - self.node_side[c][nodes]
+            jump = np.where(self.heaviside[c][nodes] >= 0, jump, 0.0)
+            values.append(N * jump)
+            gradients.append(dN * jump[..., None])
+        for t in batch.tips:
+            F, dF = self._tip_products(t, cell, bary, gradient, side)
+            values.append(F)
+            gradients.append(dF)
+        return np.concatenate(values, axis=1), np.concatenate(gradients, axis=1)
+
+    def _tip_products(
+        self, t: int, cell: Ints, bary: Floats, gradient: Floats, side: Ints
+    ) -> tuple[Floats, Floats]:
+        tip = self.tips[t]
+        levels = self.cuts[tip.crack].level_set
+        nodes = self.mesh.cells[cell]
+        phi, psi = levels.phi[nodes], levels.psi[tip.number][nodes]
+        active = tip.point_to_function[nodes] >= 0
+        r, theta = polar(
+            np.einsum("qb,qb->q", psi, bary), np.einsum("qb,qb->q", phi, bary), side[:, tip.crack]
+        )
+        F = tip_values(r, theta, tip.functions)
+        ahead, normal = tip_derivatives(r, theta, tip.functions)
+        dF = (
+            ahead[:, :, None] * np.einsum("qb,qbd->qd", psi, gradient)[:, None]
+            + normal[:, :, None] * np.einsum("qb,qbd->qd", phi, gradient)[:, None]
+        )
+        shifted = F[:, None] - self.tip_shift[t][nodes]
+        shifted = np.where(active[:, :, None], shifted, 0.0)
+        hat = np.where(active, bary, 0.0)
+        value = hat[:, :, None] * shifted
+        slope = shifted[..., None] * gradient[:, :, None] + hat[:, :, None, None] * dF[:, None]
+        q = len(cell)
+        return value.reshape(q, -1), slope.reshape(q, -1, self.dim)
+
+    @cached_property
+    def tip_shift(self) -> tuple[Floats, ...]:
+        """Tip functions at the mesh points, from the + lip where a point lies on it `(n, k)`."""
+        shifts = []
+        for tip in self.tips:
+            levels = self.cuts[tip.crack].level_set
+            phi = levels.phi
+            r, theta = polar(levels.psi[tip.number], phi, np.where(phi == 0, 1, 0))
+            shifts.append(lock(tip_values(r, theta, tip.functions)))
+        return tuple(shifts)
+
+
+def space(
+    mesh: Mesh, order: int, cracks: tuple[Crack, ...], cuts: tuple[Cut, ...], numerics: Numerics
+) -> Space:
+    """Number the functions: standard ones first, then Heaviside by crack, then tips."""
+    n_nodes = mesh.n_points + (len(mesh.edges) if order == 2 else 0)
+    count = n_nodes
+    heaviside = []
+    for cut in cuts:
+        flag = heaviside_nodes(mesh, order, cut)
+        number = np.full(n_nodes, -1, dtype=np.int64)
+        number[flag] = count + np.arange(int(flag.sum()))
+        heaviside.append(lock(number))
+        count += int(flag.sum())
+    radii = tip_radii(mesh, cracks, cuts, order, numerics.radius)
+    tips = []
+    for c, cut in enumerate(cuts):
+        x, frame = front(cracks[c])
+        for k in range(cut.n_tips):
+            flag = tip_points(mesh, cut, k, radii[c][k], numerics.enrichment)
+            number = np.full(mesh.n_points, -1, dtype=np.int64)
+            number[flag] = count + numerics.functions * np.arange(int(flag.sum()))
+            count += numerics.functions * int(flag.sum())
+            tips.append(Tip(c, k, x[k], frame[k], radii[c][k], numerics.functions, lock(number)))
+    return Space(mesh, order, cracks, cuts, tuple(heaviside), tuple(tips), n_nodes, count)
+
+
+def n_standard_shapes(space_: Space) -> int:
+    """Number of standard shape functions of a cell."""
+    return n_shapes(space_.order, space_.dim)
