@@ -1,0 +1,125 @@
+"""Stiffness: the uncracked body once a mesh, enriched cells once a crack."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+
+from xcrack.arrays import Floats, Ints
+from xcrack.consistent import boundary_points, corrected
+from xcrack.lip_points import LipPoints
+from xcrack.material import Isotropic
+from xcrack.mesh import Mesh
+from xcrack.numerics import Numerics
+from xcrack.quadrature import Points, cell_points
+from xcrack.simplex import cell_nodes, shape_derivatives, simplex_rule
+from xcrack.space import Space
+
+_CHUNK = 60_000  # integration points tabulated at once; bounds the memory
+
+
+@dataclass(frozen=True, eq=False)
+class Bulk:
+    """Stiffness of the uncracked body; the same for every crack in a mesh.
+
+    Attributes
+    ----------
+    mesh : Mesh
+    material : Isotropic
+    order : int
+    matrix : sparse matrix (n, n), stress · length^(d - 2)
+        Node blocks, BSR.
+    """
+
+    mesh: Mesh
+    material: Isotropic
+    order: int
+    matrix: sp.bsr_matrix
+
+
+def bulk(mesh: Mesh, material: Isotropic, order: int) -> Bulk:
+    """Stiffness of the uncracked body."""
+    from xcrack.kernels.bulk import block_pattern, block_stiffness
+
+    nodes = np.ascontiguousarray(cell_nodes(mesh, order))
+    n_nodes = mesh.n_points + (len(mesh.edges) if order == 2 else 0)
+    indptr, indices, slot = block_pattern(nodes, n_nodes)
+    bary, weight = simplex_rule(mesh.dim, 2 * (order - 1))
+    data = block_stiffness(
+        slot,
+        len(indices),
+        mesh.gradient,
+        mesh.volume,
+        shape_derivatives(order, bary),
+        weight,
+        material.lam,
+        material.mu,
+    )
+    size = n_nodes * mesh.dim
+    return Bulk(mesh, material, order, sp.bsr_matrix((data, indices, indptr), shape=(size, size)))
+
+
+def enriched_stiffness(
+    space: Space, material: Isotropic, numerics: Numerics, lips: tuple[LipPoints, ...]
+) -> tuple[sp.csr_matrix, int]:
+    """Entries with an enriched function, as a matrix of all unknowns, and the points used.
+
+    Entries of two standard functions are left out: they are those of the uncracked body.
+    """
+    from xcrack.kernels.enriched import stiffness_triplets
+
+    cells = space.enriched
+    n = space.n_dof
+    if not len(cells):
+        return sp.csr_matrix((n, n)), 0
+    points = cell_points(space, cells, numerics.points, 2 * (space.order - 1))
+    with_tip = cells[space.has_tip[cells]]
+    boundary = None
+    if numerics.consistent and len(with_tip):
+        boundary = boundary_points(space, with_tip, lips)
+    rows, columns, values = [], [], []
+    for part in _chunks(space, points, cells):
+        for batch, _ in space.batches(part):
+            number, row, first = points.of_cells(batch.cells)
+            bary, weight = points.bary[number], points.weight[number]
+            side = points.side[number]
+            N, G = space.tabulate(batch, row, bary, side)
+            if batch.tips and boundary is not None:
+                G = corrected(space, batch, (row, bary, weight, side), N, G, boundary)
+            r, c, v = stiffness_triplets(
+                batch.functions, first, weight, G, space.n_nodes, material.lam, material.mu
+            )
+            rows.append(r)
+            columns.append(c)
+            values.append(v)
+    triplets = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
+    return sp.csr_matrix(triplets, shape=(n, n)), len(points.weight)
+
+
+def _chunks(space: Space, points: Points, cells: Ints) -> list[Ints]:
+    counts = np.searchsorted(points.cell, cells, side="right") - np.searchsorted(points.cell, cells)
+    group = np.cumsum(counts) // _CHUNK
+    return [cells[group == g] for g in np.unique(group)]
+
+
+def total_stiffness(bulk_: Bulk, enriched: sp.csr_matrix) -> sp.csr_matrix:
+    """Stiffness of all unknowns."""
+    n, m = enriched.shape[0], bulk_.matrix.shape[0]
+    plain = bulk_.matrix.tocsr()
+    indptr = np.concatenate([plain.indptr, np.full(n - m, plain.indptr[-1], plain.indptr.dtype)])
+    padded = sp.csr_matrix((plain.data, plain.indices, indptr), shape=(n, n))
+    return (padded + enriched).tocsr()
+
+
+def rigid_modes(x: Floats) -> Floats:
+    """Rigid motions of points `(n, d)`: `(n d, 3)` in the plane, `(n d, 6)` in space."""
+    n, d = x.shape
+    centre = x.mean(axis=0)
+    y = x - centre
+    modes = [np.tile(np.eye(d)[i], n) for i in range(d)]
+    for i in range(d):
+        for j in range(i + 1, d):
+            turn = np.zeros((n, d))
+            turn[:, i], turn[:, j] = -y[:, j], y[:, i]
+            modes.append(turn.ravel())
+    return np.stack(modes, axis=1)

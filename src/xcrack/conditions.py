@@ -1,0 +1,315 @@
+"""Supports and loads as values; they know neither mesh nor crack."""
+
+import inspect
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from xcrack.arrays import Floats, frozen
+from xcrack.errors import ProblemError
+
+Value = Any  # vector, f(x) or f(x, normal)
+Where = Any  # name of a facet set, or a point
+
+
+@dataclass(frozen=True, eq=False)
+class Fix:
+    """Zero displacement of a set or point, in one direction or in all."""
+
+    where: Where
+    axis: int | None
+
+
+@dataclass(frozen=True, eq=False)
+class Displacement:
+    """Imposed displacement of a set or point."""
+
+    where: Where
+    value: Value
+
+
+@dataclass(frozen=True, eq=False)
+class Traction:
+    """Force per area on a facet set."""
+
+    where: str
+    value: Value
+
+
+@dataclass(frozen=True, eq=False)
+class Pressure:
+    """Pressure on a facet set, positive towards the body."""
+
+    where: str
+    value: Any
+
+
+@dataclass(frozen=True, eq=False)
+class PointForce:
+    """Force at a mesh point."""
+
+    x: Floats
+    force: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class BodyForce:
+    """Force per volume."""
+
+    value: Value
+
+
+@dataclass(frozen=True, eq=False)
+class CrackPressure:
+    """Pressure on the lips of a crack, positive where it opens it."""
+
+    value: Any
+    crack: int | None
+
+
+@dataclass(frozen=True, eq=False)
+class InitialStress:
+    """Stress of the undeformed body; it is not scaled by a load state."""
+
+    value: Any
+
+
+Load = Displacement | Traction | Pressure | PointForce | BodyForce | CrackPressure | InitialStress
+Support = Fix | Displacement
+
+
+def fix(where: Where, axis: int | None = None) -> Fix:
+    """Hold a facet set or a point, in one direction or in all.
+
+    Parameters
+    ----------
+    where : str or (d,) array
+        Name of a facet set, or a point (the nearest mesh point is held).
+    axis : int, optional
+        Direction 0, 1 (, 2); all where it is left out.
+
+    Returns
+    -------
+    Fix
+    """
+    if axis is not None and axis not in (0, 1, 2):
+        raise ProblemError(f"fix({where!r}, axis={axis!r}): axis is 0, 1 or 2.")
+    return Fix(_where(where, "fix"), axis)
+
+
+def displacement(where: Where, value: Value) -> Displacement:
+    """Impose a displacement on a facet set or a point.
+
+    Parameters
+    ----------
+    where : str or (d,) array
+        Name of a facet set, or a point (the nearest mesh point).
+    value : (d,) array or callable, length
+        Vector, whose entries may be None where a direction stays free, or f(x) -> (n, d), called
+        with arrays (n, d). It is never called on a lip.
+
+    Returns
+    -------
+    Displacement
+    """
+    return Displacement(_where(where, "displacement"), _value(value, "displacement", none=True))
+
+
+def traction(where: str, value: Value) -> Traction:
+    """Force per area on a facet set.
+
+    Parameters
+    ----------
+    where : str
+        Name of a facet set.
+    value : (d,) array or callable, stress
+        Vector, f(x) -> (n, d) or f(x, normal) -> (n, d), called with arrays (n, d).
+
+    Returns
+    -------
+    Traction
+    """
+    return Traction(where, _value(value, "traction"))
+
+
+def pressure(where: str, p: float | Callable[..., ArrayLike]) -> Pressure:
+    """Pressure on a facet set, positive towards the body.
+
+    Parameters
+    ----------
+    where : str
+        Name of a facet set.
+    p : float or callable, stress
+        Number, or f(x) -> (n,).
+
+    Returns
+    -------
+    Pressure
+    """
+    return Pressure(where, _scalar(p, "pressure"))
+
+
+def point_force(x: ArrayLike, f: ArrayLike) -> PointForce:
+    """Force at a point (the nearest mesh point takes it).
+
+    Parameters
+    ----------
+    x : (d,) array, length
+    f : (d,) array, force (per thickness in the plane)
+
+    Returns
+    -------
+    PointForce
+    """
+    place, force = np.asarray(x, dtype=float), _value(f, "point_force")
+    if place.shape != np.shape(force):
+        raise ProblemError(f"point_force: x {place.tolist()} and f {force} differ in dimension.")
+    return PointForce(frozen(place), force)
+
+
+def body_force(b: Value) -> BodyForce:
+    """Force per volume on the whole body.
+
+    Parameters
+    ----------
+    b : (d,) array or callable, stress / length
+        Vector or f(x) -> (n, d).
+
+    Returns
+    -------
+    BodyForce
+    """
+    return BodyForce(_value(b, "body_force"))
+
+
+def crack_pressure(p: float | Callable[..., ArrayLike], crack: int | None = None) -> CrackPressure:
+    """Pressure on both lips, positive where it opens the crack.
+
+    Parameters
+    ----------
+    p : float or callable, stress
+        Number, or f(x) -> (n,).
+    crack : int, optional
+        One crack; all where it is left out.
+
+    Returns
+    -------
+    CrackPressure
+    """
+    return CrackPressure(_scalar(p, "crack_pressure"), crack)
+
+
+def initial_stress(f: Any) -> InitialStress:
+    """Stress of the undeformed body; a load state does not scale it.
+
+    Parameters
+    ----------
+    f : (d, d) array or callable, stress
+        Symmetric stress, or f(x) -> (n, d, d).
+
+    Returns
+    -------
+    InitialStress
+    """
+    if callable(f):
+        return InitialStress(f)
+    sigma = np.asarray(f, dtype=float)
+    if sigma.ndim != 2 or sigma.shape[0] != sigma.shape[1] or not np.isfinite(sigma).all():
+        raise ProblemError(f"initial_stress: give a finite (d, d) array, not {f!r}.")
+    if not np.allclose(sigma, sigma.T):
+        raise ProblemError(f"initial_stress: {sigma.tolist()} is not symmetric.")
+    return InitialStress(frozen(sigma))
+
+
+def evaluate(value: Value, x: Floats, what: str, normal: Floats | None = None) -> Floats:
+    """Value of a vector, f(x) or f(x, normal) at points `(n, d)`, checked."""
+    n, d = x.shape
+    if callable(value):
+        two = normal is not None and _n_positional(value) >= 2
+        result = np.asarray(value(x, normal) if two else value(x), dtype=float)
+    else:
+        result = np.broadcast_to(np.asarray(value, dtype=float), (n, d))
+    if result.shape != (n, d):
+        raise ProblemError(
+            f"{what}: the value has shape {result.shape}, wanted {(n, d)} for {n} points in "
+            f"{d} dimensions; give a vector of length {d} or a function that returns (n, {d})."
+        )
+    _finite(result, x, what)
+    return result
+
+
+def evaluate_scalar(value: Any, x: Floats, what: str) -> Floats:
+    """Value of a number or f(x) at points `(n, d)`, checked `(n,)`."""
+    given = value(x) if callable(value) else value
+    result = np.broadcast_to(np.asarray(given, dtype=float), (len(x),))
+    _finite(result, x, what)
+    return result
+
+
+def evaluate_stress(value: Any, x: Floats) -> Floats:
+    """Initial stress at points, checked `(n, d, d)`."""
+    d = x.shape[1]
+    result = np.asarray(value(x) if callable(value) else value, dtype=float)
+    if result.shape not in ((d, d), (len(x), d, d)):
+        raise ProblemError(f"initial_stress: shape {result.shape}, wanted {(len(x), d, d)}.")
+    result = np.broadcast_to(result, (len(x), d, d))
+    _finite(result, x, "initial_stress")
+    return result
+
+
+def _finite(result: Floats, x: Floats, what: str) -> None:
+    bad = ~np.isfinite(result.reshape(len(x), -1)).all(axis=1)
+    if bad.any():
+        where = x[np.argmax(bad)]
+        raise ProblemError(
+            f"{what}: the value at {np.round(where, 9).tolist()} is "
+            f"{result[np.argmax(bad)].tolist()}: every value must be finite."
+        )
+
+
+def _n_positional(function: Callable[..., Any]) -> int:
+    try:
+        parameters = inspect.signature(function).parameters.values()
+    except (TypeError, ValueError):
+        return 1
+    kinds = (inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD)
+    if any(p.kind == inspect.Parameter.VAR_POSITIONAL for p in parameters):
+        return 2
+    return sum(p.kind in kinds and p.default is inspect.Parameter.empty for p in parameters)
+
+
+def _where(where: Where, what: str) -> Where:
+    if isinstance(where, str):
+        return where
+    point = np.asarray(where, dtype=float)
+    if point.ndim != 1 or not np.isfinite(point).all():
+        raise ProblemError(f"{what}: {where!r} is neither the name of a set nor a point.")
+    return frozen(point)
+
+
+def _value(value: Value, what: str, none: bool = False) -> Value:
+    if callable(value):
+        return value
+    if none and isinstance(value, Sequence) and any(v is None for v in value):
+        for v in value:
+            if v is not None and not np.isfinite(v):
+                raise ProblemError(f"{what}: the value {value!r} is not finite.")
+        return tuple(value)
+    vector = np.asarray(value, dtype=float)
+    if vector.ndim != 1 or len(vector) not in (2, 3):
+        raise ProblemError(f"{what}: give a vector of 2 or 3 numbers or a function, not {value!r}.")
+    if not np.isfinite(vector).all():
+        raise ProblemError(f"{what}: the value {vector.tolist()} is not finite.")
+    return frozen(vector)
+
+
+def _scalar(value: Any, what: str) -> Any:
+    if callable(value):
+        return value
+    number = np.asarray(value, dtype=float)
+    if number.ndim != 0 or not np.isfinite(number):
+        raise ProblemError(f"{what}: give a finite number or a function f(x), not {value!r}.")
+    return float(number)

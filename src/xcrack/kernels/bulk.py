@@ -1,0 +1,123 @@
+"""Sparsity pattern and stiffness of plain cells."""
+
+import numba
+import numpy as np
+
+
+@numba.njit(cache=True, error_model="numpy")
+def block_pattern(nodes, n_nodes):  # type: ignore[no-untyped-def]
+    """Pattern of node blocks and the slot of each cell's pairs in it.
+
+    Parameters
+    ----------
+    nodes : (m, n) array of int
+        Nodes of each cell.
+    n_nodes : int
+
+    Returns
+    -------
+    indptr : (n_nodes + 1,) array of int32
+    indices : (k,) array of int32
+        Sorted in each row.
+    slot : (m, n, n) array of int32
+    """
+    m, n = nodes.shape
+    count = np.zeros(n_nodes + 1, np.int64)
+    for e in range(m):
+        for a in range(n):
+            count[nodes[e, a] + 1] += 1
+    for i in range(n_nodes):
+        count[i + 1] += count[i]
+    around = np.empty(count[n_nodes], np.int64)
+    fill = count[:-1].copy()
+    for e in range(m):
+        for a in range(n):
+            node = nodes[e, a]
+            around[fill[node]] = e
+            fill[node] += 1
+    mark = np.full(n_nodes, -1, np.int64)
+    indptr = np.zeros(n_nodes + 1, np.int32)
+    for i in range(n_nodes):
+        found = 0
+        for k in range(count[i], count[i + 1]):
+            e = around[k]
+            for a in range(n):
+                if mark[nodes[e, a]] != i:
+                    mark[nodes[e, a]] = i
+                    found += 1
+        indptr[i + 1] = indptr[i] + found
+    indices = np.empty(indptr[n_nodes], np.int32)
+    mark[:] = -1
+    for i in range(n_nodes):
+        place = indptr[i]
+        for k in range(count[i], count[i + 1]):
+            e = around[k]
+            for a in range(n):
+                node = nodes[e, a]
+                if mark[node] != i:
+                    mark[node] = i
+                    indices[place] = node
+                    place += 1
+        indices[indptr[i] : place].sort()
+    slot = np.empty((m, n, n), np.int32)
+    for e in range(m):
+        for a in range(n):
+            i = nodes[e, a]
+            for b in range(n):
+                low, high = indptr[i], indptr[i + 1] - 1
+                node = nodes[e, b]
+                while low < high:
+                    middle = (low + high) // 2
+                    if indices[middle] < node:
+                        low = middle + 1
+                    else:
+                        high = middle
+                slot[e, a, b] = low
+    return indptr, indices, slot
+
+
+@numba.njit(cache=True, error_model="numpy")
+def block_stiffness(slot, n_blocks, gradient, volume, derivative, weight, lam, mu):  # type: ignore[no-untyped-def]
+    """Elastic stiffness of plain cells, summed into node blocks.
+
+    Parameters
+    ----------
+    slot : (m, n, n) array of int
+    n_blocks : int
+    gradient : (m, d + 1, d) array
+        Gradients of the barycentric coordinates.
+    volume : (m,) array
+    derivative : (q, n, d + 1) array
+        Shape derivatives at the integration points.
+    weight : (q,) array
+    lam, mu : float
+
+    Returns
+    -------
+    (n_blocks, d, d) array
+    """
+    m, n, _ = slot.shape
+    d = gradient.shape[2]
+    data = np.zeros((n_blocks, d, d))
+    G = np.empty((n, d))
+    for e in range(m):
+        for q in range(len(weight)):
+            w = weight[q] * volume[e]
+            for a in range(n):
+                for i in range(d):
+                    total = 0.0
+                    for k in range(d + 1):
+                        total += derivative[q, a, k] * gradient[e, k, i]
+                    G[a, i] = total
+            for a in range(n):
+                for b in range(n):
+                    block = data[slot[e, a, b]]
+                    dot = 0.0
+                    for i in range(d):
+                        dot += G[a, i] * G[b, i]
+                    dot *= w * mu
+                    for i in range(d):
+                        for j in range(d):
+                            block[i, j] += w * (lam * G[a, i] * G[b, j] + mu * G[a, j] * G[b, i])
+                        block[i, i] += dot
+    return data

@@ -1,0 +1,195 @@
+"""Load vectors: every load is tested with every function, enriched ones included."""
+
+import numpy as np
+
+from xcrack.arrays import Floats, Ints
+from xcrack.conditions import (
+    BodyForce,
+    CrackPressure,
+    InitialStress,
+    Load,
+    PointForce,
+    Pressure,
+    Traction,
+    evaluate,
+    evaluate_scalar,
+    evaluate_stress,
+)
+from xcrack.consistent import split_facets
+from xcrack.errors import ProblemError
+from xcrack.lip_points import LipPoints
+from xcrack.mesh import Mesh
+from xcrack.quadrature import Points, cell_points, cell_side, segment_points
+from xcrack.space import Space
+
+
+def facet_set(mesh: Mesh, name: str, what: str) -> Ints:
+    """Facets of a set by name; an error lists the known names."""
+    if name not in mesh.facet_sets:
+        known = ", ".join(repr(n) for n in mesh.facet_sets)
+        raise ProblemError(f"{what}: the mesh has no facet set {name!r}; it has {known}.")
+    return mesh.facet_sets[name]
+
+
+def nearest_point(mesh: Mesh, x: Floats, what: str) -> int:
+    """Number of the mesh point nearest to x; an error where x is not in or at the body."""
+    if len(x) != mesh.dim:
+        raise ProblemError(f"{what}: the point {x.tolist()} needs {mesh.dim} coordinates.")
+    distance = np.linalg.norm(mesh.points - x, axis=1)
+    best = int(np.argmin(distance))
+    if distance[best] > mesh.cell_size.max():
+        raise ProblemError(
+            f"{what}: {x.tolist()} is {distance[best]:.4g} away from the nearest mesh point "
+            f"{mesh.points[best].tolist()}: give a point of the body."
+        )
+    return best
+
+
+def load_vector(space: Space, loads: tuple[Load, ...], lips: tuple[LipPoints, ...]) -> Floats:
+    """Sum of the given loads, tested with every function `(n_dof,)`; displacements are skipped."""
+    f = np.zeros((space.n_functions, space.dim))
+    for load in loads:
+        if isinstance(load, Traction | Pressure):
+            _add_traction(f, space, load)
+        elif isinstance(load, PointForce):
+            point = nearest_point(space.mesh, load.x, "point_force")
+            f[point] += load.force
+        elif isinstance(load, BodyForce):
+            points = _body_points(space)
+            b = evaluate(load.value, position(space, points.cell, points.bary), "body_force")
+            _add(f, space, points, b)
+        elif isinstance(load, InitialStress):
+            _add_initial_stress(f, space, load)
+        elif isinstance(load, CrackPressure):
+            for c, points_on_lip in enumerate(lips):
+                if load.crack is None or load.crack == c:
+                    p = evaluate_scalar(load.value, points_on_lip.x, "crack_pressure")
+                    f += lip_force(space, c, points_on_lip, p[:, None] * points_on_lip.normal)
+    return f.ravel()
+
+
+def position(space: Space, cell: Ints, bary: Floats) -> Floats:
+    """Coordinates of points given by cell and barycentric coordinates."""
+    return np.einsum("qb,qbd->qd", bary, space.mesh.points[space.mesh.cells[cell]])
+
+
+def _add(f: Floats, space: Space, points: Points, density: Floats) -> None:
+    """Add the integral of density . v over the points."""
+    cells = np.unique(points.cell)
+    for batch, _ in space.batches(cells):
+        number, row, _ = points.of_cells(batch.cells)
+        N, _ = space.tabulate(batch, row, points.bary[number], points.side[number])
+        force = N[:, :, None] * (points.weight[number, None] * density[number])[:, None]
+        _scatter(f, batch.functions[row], force)
+
+
+def _scatter(f: Floats, functions: Ints, force: Floats) -> None:
+    active = functions >= 0
+    np.add.at(f, functions[active], force[active])
+
+
+def _body_points(space: Space) -> Points:
+    cells = np.arange(len(space.mesh.cells))
+    return cell_points(space, cells, 4, space.order + 2)
+
+
+def facet_points(space: Space, facets: Ints, n: int = 6) -> tuple[Points, Floats]:
+    """Points on boundary facets with their outward normals; weights are lengths or areas."""
+    mesh = space.mesh
+    number = mesh.facet_numbers(facets)
+    cell = mesh.facet_to_cell[number, 0]
+    part, begin, end, sides = split_facets(space, facets)
+    x = mesh.points[facets]
+    first = (1 - begin)[:, None] * x[part, 0] + begin[:, None] * x[part, 1]
+    last = (1 - end)[:, None] * x[part, 0] + end[:, None] * x[part, 1]
+    rule = segment_points(space, first, last, n)
+    k = rule.segment
+    t = begin[k] + (end - begin)[k] * rule.position
+    owner = part[k]
+    c = cell[owner]
+    # Local places of the facet's points in its cell.
+    local = (mesh.cells[c][:, :, None] == facets[owner][:, None, :]).argmax(axis=1)
+    bary = np.zeros((len(t), mesh.dim + 1))
+    rows = np.arange(len(t))
+    bary[rows, local[:, 0]] = 1 - t
+    bary[rows, local[:, 1]] = t
+    opposite = (~(mesh.cells[c][:, :, None] == facets[owner][:, None, :]).any(axis=2)).argmax(
+        axis=1
+    )
+    inward = mesh.gradient[c, opposite]
+    normal = -inward / np.linalg.norm(inward, axis=1, keepdims=True)
+    length = np.linalg.norm(last - first, axis=1)
+    side = cell_side(space, c)
+    for i, cut in enumerate(space.cuts):
+        crossed = cut.is_cut[c] | (cut.is_tip[c] & (side[:, i] == 0))
+        side[crossed, i] = sides[k, i][crossed]
+    order = np.argsort(c, kind="stable")
+    weight = length[k] * rule.weight
+    return Points(c[order], bary[order], weight[order], side[order]), normal[order]
+
+
+def _add_traction(f: Floats, space: Space, load: Traction | Pressure) -> None:
+    what = f"{type(load).__name__.lower()}({load.where!r})"
+    facets = facet_set(space.mesh, load.where, what)
+    inner = space.mesh.facet_to_cell[space.mesh.facet_numbers(facets), 1] >= 0
+    if inner.any():
+        raise ProblemError(
+            f"{what}: {int(inner.sum())} of its facets lie inside the body; loads act on the "
+            "boundary only."
+        )
+    points, normal = facet_points(space, facets)
+    x = position(space, points.cell, points.bary)
+    if isinstance(load, Pressure):
+        density = -evaluate_scalar(load.value, x, what)[:, None] * normal
+    else:
+        density = evaluate(load.value, x, what, normal)
+    _add(f, space, points, density)
+
+
+def _add_initial_stress(f: Floats, space: Space, load: InitialStress) -> None:
+    """Subtract the integral of sigma0 : grad v."""
+    points = _body_points(space)
+    sigma = evaluate_stress(load.value, position(space, points.cell, points.bary))
+    for batch, _ in space.batches(np.unique(points.cell)):
+        number, row, _ = points.of_cells(batch.cells)
+        _, G = space.tabulate(batch, row, points.bary[number], points.side[number])
+        force = -np.einsum("q,qij,qnj->qni", points.weight[number], sigma[number], G)
+        _scatter(f, batch.functions[row], force)
+
+
+def lip_force(space: Space, c: int, lips: LipPoints, force: Floats) -> Floats:
+    """Integral of force . [[v]] over the lips of crack c `(n_functions, d)`.
+
+    Parameters
+    ----------
+    force : (q, d) array, stress
+        On lip +; the opposite acts on lip -.
+    """
+    f = np.zeros((space.n_functions, space.dim))
+    for functions, number, N in jump_values(space, c, lips):
+        _scatter(f, functions, N[:, :, None] * (lips.weight[number, None] * force[number])[:, None])
+    return f
+
+
+def jump_values(space: Space, c: int, lips: LipPoints) -> list[tuple[Ints, Ints, Floats]]:
+    """Signed traces of the functions on both lips: + lip minus - lip.
+
+    Returns
+    -------
+    list of (functions (k, n), numbers of the points (k,), values (k, n))
+        For each lip and batch; the jump at a point is the sum over all entries of the point.
+    """
+    result = []
+    for s, sign in ((0, -1), (1, 1)):
+        cell = lips.cell[:, s]
+        side = cell_side(space, cell)
+        side[:, c] = sign
+        cells, inverse = np.unique(cell, return_inverse=True)
+        for batch, rows in space.batches(cells):
+            place = np.full(len(cells), -1, dtype=np.int64)
+            place[rows] = np.arange(len(rows))
+            number = np.nonzero(place[inverse] >= 0)[0]
+            row = place[inverse][number]
+            N, _ = space.tabulate(batch, row, lips.bary[number, s], side[number])
+            result.append((batch.functions[row], number, sign * N))
+    return result
