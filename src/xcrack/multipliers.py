@@ -1,0 +1,202 @@
+"""Contact multipliers: the nodes of the cells along the lips, tied into stable groups.
+
+Groups are the stars of a minimal cover of the cut edges ("vital edges", Béchet, Moës and
+Wohlmuth, 2009); a node without a cut edge of its own joins the group with which its trace
+overlaps most, so that no small group is left at a tip. A group's function is the sum of its
+hats' traces: positive, and all of them sum to one. Order 2 in the plane uses hats along the
+crack instead, with knots at the groups' centres: as many unknowns, one order more in pressure.
+"""
+
+import heapq
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+
+from xcrack.arrays import Floats, Ints
+from xcrack.lip_points import LipPoints
+from xcrack.loads import jump_values
+from xcrack.space import Space
+
+
+@dataclass(frozen=True, eq=False)
+class Multipliers:
+    """Multiplier space on the lips of one crack.
+
+    Attributes
+    ----------
+    crack : int
+    values : sparse matrix (q, g)
+        Each function at the lip points.
+    measure : (g,) array, length^(d - 1)
+        Integral of each function.
+    centre : (g, d) array, length
+        Where each function sits; carries states from step to step.
+    """
+
+    crack: int
+    values: sp.csr_matrix
+    measure: Floats
+    centre: Floats
+
+
+def multipliers(space: Space, c: int, lips: LipPoints, kind: str) -> Multipliers:
+    """Multiplier space of crack c: "reduced" or "naive"."""
+    nodes, traces = _traces(space, lips)
+    if kind == "naive":
+        group = np.arange(len(nodes))
+    else:
+        group = _groups(space, c, nodes, traces, lips.weight)
+    n_groups = int(group.max(initial=-1)) + 1
+    gather = sp.csr_matrix(
+        (np.ones(len(nodes)), (np.arange(len(nodes)), group)), shape=(len(nodes), n_groups)
+    )
+    values = sp.csr_matrix(traces @ gather)
+    if kind == "reduced" and space.order == 2 and space.dim == 2 and n_groups > 1:
+        values = _hats(values, lips)
+    measure = np.asarray(values.T @ lips.weight).ravel()
+    keep = measure > 1e-14 * measure.max(initial=0.0)
+    values = sp.csr_matrix(values[:, np.nonzero(keep)[0]])
+    centre = np.asarray(values.T @ (lips.weight[:, None] * lips.x)) / measure[keep][:, None]
+    return Multipliers(c, values, measure[keep], centre)
+
+
+def _traces(space: Space, lips: LipPoints) -> tuple[Ints, sp.csr_matrix]:
+    """Mesh points whose hats reach the lips, and the hats at the lip points `(q, k)`."""
+    cell = lips.cell[:, 1]
+    corners = space.mesh.cells[cell]
+    nodes, place = np.unique(corners.ravel(), return_inverse=True)
+    row = np.repeat(np.arange(len(cell)), corners.shape[1])
+    entry = lips.bary[:, 1].ravel()
+    acts = np.abs(entry) > 1e-13
+    matrix = sp.csr_matrix((entry[acts], (row[acts], place[acts])), shape=(len(cell), len(nodes)))
+    reached = np.asarray((matrix != 0).sum(axis=0)).ravel() > 0
+    return nodes[reached], sp.csr_matrix(matrix[:, np.nonzero(reached)[0]])
+
+
+def _groups(space: Space, c: int, nodes: Ints, traces: sp.csr_matrix, weight: Floats) -> Ints:
+    """Group number of each node."""
+    mesh, cut = space.mesh, space.cuts[c]
+    edges = np.nonzero(~np.isnan(cut.cut_edge))[0]
+    pairs = mesh.edges[edges]
+    kept = vital_edges(
+        pairs, np.linalg.norm(mesh.points[pairs[:, 0]] - mesh.points[pairs[:, 1]], axis=1)
+    )
+    place = {int(n): i for i, n in enumerate(nodes)}
+    parent = np.arange(len(nodes))
+    covered = np.zeros(len(nodes), dtype=bool)
+
+    def root(i: int) -> int:
+        while parent[i] != i:
+            parent[i] = parent[parent[i]]
+            i = int(parent[i])
+        return i
+
+    for a, b in pairs[kept]:
+        # An end of a cut edge at a sliver may have no trace that is seen; its star keeps the rest.
+        i, j = place.get(int(a)), place.get(int(b))
+        for k in (i, j):
+            if k is not None:
+                covered[k] = True
+        if i is not None and j is not None:
+            parent[root(i)] = root(j)
+    on_crack = cut.level_set.phi[nodes] == 0
+    inside = cut.level_set.inside[nodes] < 0
+    # Nodes on the crack carry a group of their own, unless the tip lies on them.
+    own = on_crack & inside & ~covered
+    covered |= own
+    if covered.any() and not covered.all():
+        overlap = (traces.T @ sp.diags(weight) @ traces).toarray()
+        choices = np.nonzero(covered)[0]
+        for k in np.nonzero(~covered)[0]:
+            parent[k] = root(int(choices[np.argmax(overlap[k, choices])]))
+    roots = np.array([root(i) for i in range(len(nodes))])
+    return np.unique(roots, return_inverse=True)[1]
+
+
+def vital_edges(pairs: Ints, length: Floats) -> Ints:
+    """Minimal cover of the ends of edges by edges: what remains are stars.
+
+    Edges are removed as long as both their ends keep another one, those with the best-connected
+    weaker end first, longer ones first among equals.
+
+    Parameters
+    ----------
+    pairs : (e, 2) array of int
+    length : (e,) array
+
+    Returns
+    -------
+    (k,) array of int
+        Rows of `pairs` that are kept.
+    """
+    degree: dict[int, int] = {}
+    for a, b in pairs.tolist():
+        degree[a] = degree.get(a, 0) + 1
+        degree[b] = degree.get(b, 0) + 1
+
+    def entry(e: int) -> tuple[int, float, int, int, int]:
+        a, b = pairs[e].tolist()
+        return (-min(degree[a], degree[b]), -float(length[e]), min(a, b), max(a, b), e)
+
+    heap = [entry(e) for e in range(len(pairs))]
+    heapq.heapify(heap)
+    kept = np.ones(len(pairs), dtype=bool)
+    while heap:
+        top = heapq.heappop(heap)
+        e = top[-1]
+        now = entry(e)
+        if now[0] != top[0]:
+            heapq.heappush(heap, now)
+            continue
+        if now[0] >= -1:
+            break
+        kept[e] = False
+        for end in pairs[e].tolist():
+            degree[end] -= 1
+    return np.nonzero(kept)[0]
+
+
+def _hats(values: sp.csr_matrix, lips: LipPoints) -> sp.csr_matrix:
+    """Piecewise linear hats along the crack, with knots at the groups' centres.
+
+    The first and last knots move to the ends of the crack, so that linear pressures are exact.
+    """
+    mass = np.asarray(values.T @ lips.weight).ravel()
+    centre = np.asarray(values.T @ (lips.weight * lips.s)).ravel() / np.maximum(mass, 1e-300)
+    knots = np.unique(centre[mass > 1e-14 * mass.max()])
+    ends = lips.s.min(), lips.s.max()
+    knots[0], knots[-1] = ends
+    place = np.clip(np.searchsorted(knots, lips.s, side="right") - 1, 0, len(knots) - 2)
+    t = (lips.s - knots[place]) / (knots[place + 1] - knots[place])
+    row = np.arange(len(lips.s))
+    return sp.csr_matrix(
+        (
+            np.concatenate([1 - t, t]),
+            (np.concatenate([row, row]), np.concatenate([place, place + 1])),
+        ),
+        shape=(len(row), len(knots)),
+    )
+
+
+def gap_rows(space: Space, lips: LipPoints, space_of: Multipliers) -> sp.csr_matrix:
+    """Rows N of the weak gaps `(g, n_dof)`: N u is the integral of mu n . [[u]]."""
+    jump = jump_matrix(space, space_of.crack, lips)
+    return sp.csr_matrix(space_of.values.T @ sp.diags(lips.weight) @ jump)
+
+
+def jump_matrix(space: Space, c: int, lips: LipPoints) -> sp.csr_matrix:
+    """Normal jump n . [[u]] at the lip points `(q, n_dof)`."""
+    d = space.dim
+    rows, columns, values = [], [], []
+    for functions, number, N in jump_values(space, c, lips):
+        acts = (functions >= 0) & (N != 0)
+        point = np.broadcast_to(number[:, None], functions.shape)[acts]
+        for i in range(d):
+            rows.append(point)
+            columns.append(functions[acts] * d + i)
+            values.append(N[acts] * lips.normal[point, i])
+    triplets = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
+    matrix = sp.csr_matrix(triplets, shape=(len(lips), space.n_dof))
+    matrix.sum_duplicates()
+    return matrix

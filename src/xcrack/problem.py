@@ -1,0 +1,153 @@
+"""The scene: body, cracks, supports and loads, checked before anything is built."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
+
+from xcrack.conditions import (
+    BodyForce,
+    CrackPressure,
+    Displacement,
+    Fix,
+    InitialStress,
+    Load,
+    PointForce,
+    Pressure,
+    Support,
+    Traction,
+)
+from xcrack.crack import Crack, check_cracks, place
+from xcrack.errors import ProblemError
+from xcrack.loads import facet_set
+from xcrack.material import Isotropic
+from xcrack.mesh import Mesh
+from xcrack.numerics import Numerics
+
+_LOADS = (Traction, Pressure, PointForce, BodyForce, CrackPressure, InitialStress, Displacement)
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """A body with cracks, supports and loads.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    material : Isotropic
+    cracks : sequence of Crack
+    supports : sequence of fix(...) and displacement(...)
+        None are needed for loads in equilibrium: rigid motion is removed.
+    loads : sequence of loads
+    contact : {"auto", "on", "off"}
+        auto: a crack whose lips would overlap gets multipliers, others get none.
+    order : {1, 2}, optional
+        Degree of the standard and Heaviside functions; 2 in the plane where it is left out.
+    numerics : Numerics
+
+    Raises
+    ------
+    ProblemError, GeometryError
+        A scene that is not well posed; the message names object, value and remedy.
+    """
+
+    mesh: Mesh
+    material: Isotropic
+    cracks: Sequence[Crack] = ()
+    supports: Sequence[Support] = ()
+    loads: Sequence[Load] = ()
+    contact: str = "auto"
+    order: int | None = None
+    numerics: Numerics = field(default_factory=Numerics)
+
+    def __post_init__(self) -> None:
+        for name, kind in (("mesh", Mesh), ("material", Isotropic), ("numerics", Numerics)):
+            if not isinstance(getattr(self, name), kind):
+                raise ProblemError(
+                    f"Problem({name}=...) must be a {kind.__name__}, "
+                    f"not {type(getattr(self, name)).__name__}."
+                )
+        for name in ("cracks", "supports", "loads"):
+            object.__setattr__(self, name, tuple(getattr(self, name)))
+        if self.mesh.dim == 3:
+            raise ProblemError(
+                "the mesh has tetrahedra: this version solves plane bodies; give a mesh of "
+                "triangles (read_mesh drops a constant z)."
+            )
+        if self.material.plane is None:
+            raise ProblemError(
+                'a plane body needs Isotropic(..., plane="strain") or plane="stress": the two '
+                "differ by up to 1/(1 - nu²) in stiffness, so there is no default."
+            )
+        if self.order is None:
+            object.__setattr__(self, "order", 2)
+        if self.order not in (1, 2):
+            raise ProblemError(f"order = {self.order!r}: give 1 or 2.")
+        if self.contact not in ("auto", "on", "off"):
+            raise ProblemError(f'contact = {self.contact!r}: give "auto", "on" or "off".')
+        self._check_members()
+        check_cracks(self.placed, self.mesh)
+
+    @cached_property
+    def placed(self) -> tuple[Crack, ...]:
+        """The cracks with tips and mouths decided in this mesh."""
+        return tuple(place(crack, self.mesh) for crack in self.cracks)
+
+    def with_cracks(self, cracks: Sequence[Crack]) -> "Problem":
+        """The same scene with other cracks."""
+        return replace(self, cracks=tuple(cracks))
+
+    def state(self, state: Any) -> tuple[tuple[Load, ...], float]:
+        """Loads and factor of a load state: a number, or a list of loads."""
+        if state is None:
+            return tuple(self.loads), 1.0
+        if isinstance(state, int | float):
+            if not abs(state) < float("inf"):
+                raise ProblemError(f"load state {state}: give a finite number.")
+            return tuple(self.loads), float(state)
+        loads = tuple(state)
+        for load in loads:
+            self._check_load(load)
+        body = tuple(load for load in self.loads if isinstance(load, InitialStress))
+        return loads + tuple(b for b in body if b not in loads), 1.0
+
+    def _check_members(self) -> None:
+        for crack in self.cracks:
+            if not isinstance(crack, Crack):
+                raise ProblemError(f"cracks: {crack!r} is no crack; make one by line_crack(...).")
+        for support in self.supports:
+            if not isinstance(support, Fix | Displacement):
+                raise ProblemError(
+                    f"supports: {type(support).__name__} is no support; give fix(...) or "
+                    "displacement(...), and put forces into loads."
+                )
+            if isinstance(support.where, str):
+                facet_set(self.mesh, support.where, type(support).__name__.lower())
+        for load in self.loads:
+            self._check_load(load)
+
+    def _check_load(self, load: Any) -> None:
+        if not isinstance(load, _LOADS):
+            raise ProblemError(f"loads: {load!r} is no load; see traction(...), pressure(...).")
+        where = getattr(load, "where", None)
+        if isinstance(where, str):
+            facet_set(self.mesh, where, type(load).__name__.lower())
+        if isinstance(load, Displacement):
+            held = [s.where for s in self.supports]
+            if not any(_same(where, h) for h in held):
+                raise ProblemError(
+                    f"displacement({where!r}) among the loads gives a new value to a support, but "
+                    "nothing is supported there: put it into supports first."
+                )
+        if isinstance(load, CrackPressure) and load.crack is not None:
+            if not 0 <= load.crack < len(self.cracks):
+                raise ProblemError(
+                    f"crack_pressure(crack={load.crack}): the problem has {len(self.cracks)} "
+                    "crack(s), numbered from 0."
+                )
+
+
+def _same(a: Any, b: Any) -> bool:
+    if isinstance(a, str) or isinstance(b, str):
+        return bool(isinstance(a, str) and isinstance(b, str) and a == b)
+    return bool(len(a) == len(b) and (a == b).all())

@@ -1,0 +1,213 @@
+"""What a solve returns: displacements, stresses, openings and contact, anywhere in the body."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from xcrack.arrays import Bools, Floats, Ints, lock
+from xcrack.conditions import InitialStress, Load, evaluate_stress
+from xcrack.errors import GeometryError
+from xcrack.lip_points import LipPoints
+from xcrack.loads import jump_values, position
+from xcrack.locate import locate
+from xcrack.problem import Problem
+from xcrack.quadrature import cell_side
+from xcrack.space import Space
+
+if TYPE_CHECKING:
+    from xcrack.assembly import Bulk
+    from xcrack.planning import Report
+    from xcrack.warm import Warm
+
+
+@dataclass(frozen=True, eq=False)
+class Contact:
+    """Contact on the whole lip of one crack, at its integration points.
+
+    Attributes
+    ----------
+    points : (q, d) array, length
+    normal : (q, d) array
+        From lip - to lip +.
+    measure : (q,) array, length^(d - 1)
+        Weight of each point: sums are integrals along the lip.
+    pressure : (q,) array, stress
+        The multiplier field, 0 where open.
+    gap : (q,) array, length
+        Normal opening n . [[u]].
+    closed : (q,) array of bool
+    s : (q,) array, length
+        Position along the crack.
+    """
+
+    points: Floats
+    normal: Floats
+    measure: Floats
+    pressure: Floats
+    gap: Floats
+    closed: Bools
+    s: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """Solution of one load state.
+
+    Attributes
+    ----------
+    problem : Problem
+    state : object
+        The load state as it was given.
+    loads : tuple of loads
+        Loads of this state, before they were scaled.
+    factor : float
+        Scale of the loads (not of an initial stress).
+    space : Space
+    u : (n_dof,) array, length
+        Unknowns: standard, Heaviside, tip functions.
+    lips : tuple of LipPoints
+        Integration points on the lips of each crack.
+    contact : tuple
+        One entry a crack: Contact, or None where it has no multipliers.
+    energy : float
+        Strain energy, u K u / 2.
+    report : Report
+        What was modelled, what was left out, and why.
+    bulk : Bulk
+        Stiffness of the uncracked body, for the next crack in the same mesh.
+    warm : Warm
+        Closed sets, for the next solve.
+    """
+
+    problem: Problem
+    state: object
+    loads: tuple[Load, ...]
+    factor: float
+    space: Space
+    u: Floats
+    lips: tuple[LipPoints, ...]
+    contact: tuple[Contact | None, ...]
+    energy: float
+    report: "Report"
+    bulk: "Bulk"
+    warm: "Warm"
+
+    def __repr__(self) -> str:
+        return f"Solution(state={self.state!r}, n_dof={self.n_dof}, energy={self.energy:.6g})"
+
+    @property
+    def n_dof(self) -> int:
+        """Number of unknowns, without multipliers."""
+        return self.space.n_dof
+
+    @cached_property
+    def coefficients(self) -> Floats:
+        """Unknowns by function, with a last row of zeros for empty places `(n + 1, d)`."""
+        d = self.space.dim
+        return lock(np.concatenate([self.u.reshape(-1, d), np.zeros((1, d))]))
+
+    def at(self, cell: Ints, bary: Floats, side: Ints) -> tuple[Floats, Floats]:
+        """Displacement `(q, d)` and gradient `(q, d, d)` at points given by cell.
+
+        The gradient's rows are components, its columns directions.
+        """
+        u = np.zeros((len(cell), self.space.dim))
+        gradient = np.zeros((len(cell), self.space.dim, self.space.dim))
+        cells, inverse = np.unique(cell, return_inverse=True)
+        for batch, rows in self.space.batches(cells):
+            place = np.full(len(cells), -1, dtype=np.int64)
+            place[rows] = np.arange(len(rows))
+            number = np.nonzero(place[inverse] >= 0)[0]
+            row = place[inverse][number]
+            N, G = self.space.tabulate(batch, row, bary[number], side[number])
+            a = self.coefficients[batch.functions[row]]
+            u[number] = np.einsum("qn,qni->qi", N, a)
+            gradient[number] = np.einsum("qnj,qni->qij", G, a)
+        return u, gradient
+
+    def displacement(self, x: ArrayLike, side: int = 0) -> Floats:
+        """Displacement at points.
+
+        Parameters
+        ----------
+        x : (n, d) array, length
+        side : {0, 1, -1}
+            Lip on which points that lie on a crack are taken; 0: lip +.
+
+        Returns
+        -------
+        (n, d) array, length
+        """
+        cell, bary, sides, single = self._where(x, side)
+        u = self.at(cell, bary, sides)[0]
+        return u[0] if single else u
+
+    def stress(self, x: ArrayLike, side: int = 0) -> Floats:
+        """Stress at points `(n, d, d)`, initial stress included.
+
+        Parameters
+        ----------
+        x : (n, d) array, length
+        side : {0, 1, -1}
+            Lip on which points that lie on a crack are taken; 0: lip +.
+
+        Returns
+        -------
+        (n, d, d) array, stress
+        """
+        cell, bary, sides, single = self._where(x, side)
+        sigma = self.stress_at(cell, bary, sides)
+        return sigma[0] if single else sigma
+
+    def stress_at(self, cell: Ints, bary: Floats, side: Ints) -> Floats:
+        """Stress at points given by cell `(q, d, d)`."""
+        sigma = self.problem.material.stress(self.at(cell, bary, side)[1])
+        return sigma + self.initial_stress(position(self.space, cell, bary))
+
+    def initial_stress(self, x: Floats) -> Floats:
+        """Sum of the initial stresses at points `(q, d, d)`."""
+        total = np.zeros((len(x), self.space.dim, self.space.dim))
+        for load in self.loads:
+            if isinstance(load, InitialStress):
+                total = total + evaluate_stress(load.value, x)
+        return total
+
+    def opening(self, crack: int = 0) -> Floats:
+        """Normal opening n . [[u]] `(q,)` at the points `lips[crack].x`, length."""
+        return np.einsum("qd,qd->q", self.jump(crack), self.lips[crack].normal)
+
+    def jump(self, crack: int = 0) -> Floats:
+        """Displacement of lip + minus that of lip - `(q, d)` at `lips[crack].x`, length."""
+        lips = self.lips[crack]
+        jump = np.zeros((len(lips), self.space.dim))
+        for functions, number, N in jump_values(self.space, crack, lips):
+            jump[number] += np.einsum("qn,qni->qi", N, self.coefficients[functions])
+        return jump
+
+    def _where(self, x: ArrayLike, side: int) -> tuple[Ints, Floats, Ints, bool]:
+        points = np.asarray(x, dtype=float)
+        single = points.ndim == 1
+        points = np.atleast_2d(points)
+        cell, bary = locate(self.space.mesh, points)
+        if (cell < 0).any():
+            outside = points[np.argmax(cell < 0)]
+            raise GeometryError(
+                f"{np.round(outside, 9).tolist()} lies outside the body ({int((cell < 0).sum())} "
+                "such points)."
+            )
+        return cell, bary, sides_of(self.space, cell, bary, side), single
+
+
+def sides_of(space: Space, cell: Ints, bary: Floats, lip: int) -> Ints:
+    """Side of each crack of points in cells `(q, cracks)`; `lip` decides on a crack."""
+    side = cell_side(space, cell)
+    for c, cut in enumerate(space.cuts):
+        phi = np.einsum("qb,qb->q", bary, cut.level_set.phi[space.mesh.cells[cell]])
+        split = (cut.is_cut | cut.is_tip)[cell]
+        on_lip = np.abs(phi) <= 1e-9 * space.mesh.cell_size[cell]
+        own = np.where(on_lip & (lip != 0), lip, np.where(phi >= 0, 1, -1))
+        side[:, c] = np.where(split, own, side[:, c])
+    return side

@@ -1,0 +1,35 @@
+"""What a step hands to the next: closed sets by place."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from xcrack.arrays import Bools, Floats
+from xcrack.multipliers import Multipliers
+
+
+@dataclass(frozen=True, eq=False)
+class Warm:
+    """Closed sets of all load states.
+
+    Attributes
+    ----------
+    centre : tuple of (g, d) arrays or None
+        Where the multipliers of each crack sit; None for a crack without.
+    active : tuple of (states, g) arrays of bool or None
+    """
+
+    centre: tuple[Floats | None, ...]
+    active: tuple[Bools | None, ...]
+
+    def start(self, space_of: Multipliers, state: int) -> Bools | None:
+        """Closed set of the nearest multipliers, or None where nothing is known."""
+        c = space_of.crack
+        if c >= len(self.centre):
+            return None
+        centre, active = self.centre[c], self.active[c]
+        if centre is None or active is None or state >= len(active) or not len(centre):
+            return None
+        nearest = cKDTree(centre).query(space_of.centre)[1]
+        return np.asarray(active[state][nearest])
