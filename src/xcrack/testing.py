@@ -1,0 +1,198 @@
+"""Checks for functions that users write: what is wrong with a law or a criterion, in words."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from xcrack.arrays import Floats
+from xcrack.criteria import Criterion
+from xcrack.errors import ProblemError
+from xcrack.laws import Law
+
+_ROUND_OFF = 1e-9  # relative; a few operations on numbers of order one
+
+
+def check_law(law: Law, dK_max: float = 100.0) -> None:
+    """Try a growth law and say all that is wrong with it.
+
+    Parameters
+    ----------
+    law : callable (dK_eq, R) -> da/dN
+        Called with arrays `(f,)`; must return an array `(f,)` that is finite, never negative,
+        does not fall when dK_eq grows, and takes each point for itself.
+    dK_max : float, stress √length
+        Largest range to try; take one at which your law is still valid.
+
+    Raises
+    ------
+    ProblemError
+        With one line for each fault.
+
+    Examples
+    --------
+    >>> from xcrack.laws import paris
+    >>> check_law(paris(C=1e-11, m=3))
+    """
+    wrong: list[str] = []
+    dK = np.repeat(np.linspace(0.0, dK_max, 9), 5)
+    R = np.tile([0.0, 0.1, 0.5, 0.8, 0.95], 9)
+    rate = _called(law, (dK, R), wrong, "da/dN")
+    if rate is not None:
+        if rate.shape != dK.shape:
+            wrong.append(f"for {len(dK)} points it returns shape {rate.shape}, not {dK.shape}")
+        else:
+            _check_rates(law, dK, R, rate, wrong)
+    _judge("law", law, wrong)
+
+
+def _check_rates(law: Law, dK: Floats, R: Floats, rate: Floats, wrong: list[str]) -> None:
+    bad = ~np.isfinite(rate)
+    if bad.any():
+        i = int(np.argmax(bad))
+        wrong.append(f"da/dN = {rate[i]} for dK_eq = {dK[i]}, R = {R[i]}: it must be finite")
+        return
+    if (rate < 0).any():
+        i = int(np.argmin(rate))
+        wrong.append(f"da/dN = {rate[i]} < 0 for dK_eq = {dK[i]}, R = {R[i]}: no crack shrinks")
+    if (rate[dK == 0] != 0).any():
+        wrong.append("da/dN is not 0 for dK_eq = 0: a crack without load would grow")
+    falls = np.diff(rate.reshape(9, 5), axis=0) < -_ROUND_OFF * np.abs(rate).max()
+    if falls.any():
+        i, j = np.argwhere(falls)[0]
+        wrong.append(
+            f"da/dN falls when dK_eq grows from {dK[5 * i]} to {dK[5 * i + 5]} at R = {R[j]}"
+        )
+    one = np.array(
+        [np.asarray(law(dK[i : i + 1], R[i : i + 1])).reshape(-1)[0] for i in range(len(dK))]
+    )
+    if not np.allclose(one, rate, rtol=_ROUND_OFF, atol=0):
+        wrong.append(
+            "a point alone gets another rate than among others: each must stand for itself"
+        )
+
+
+def check_criterion(criterion: Criterion, nu: float = 0.3) -> None:
+    """Try a direction criterion and say all that is wrong with it.
+
+    Parameters
+    ----------
+    criterion : callable (K, nu) -> (angle, dK_eq, R)
+        Called with K `(s, f, 2)` and `(s, f, 3)`; must return three arrays `(f,)`: finite, the
+        range not negative, R in [0, 1]. Four times the load gives the same angle and four times
+        the range; the opposite K_II (and K_III) gives the opposite angle; the order of the states
+        does not matter; no load gives 0; K_I < 0 counts as 0.
+    nu : float
+        Poisson's ratio to try it with.
+
+    Raises
+    ------
+    ProblemError
+        With one line for each fault.
+
+    Examples
+    --------
+    >>> from xcrack.criteria import weighted_angle
+    >>> check_criterion(weighted_angle)
+    """
+    wrong: list[str] = []
+    for modes in (2, 3):
+        _check_modes(criterion, nu, modes, wrong)
+        if wrong:
+            break
+    _judge("criterion", criterion, wrong)
+
+
+def _check_modes(criterion: Criterion, nu: float, modes: int, wrong: list[str]) -> None:
+    generator = np.random.default_rng(68712)
+    K = generator.uniform(-0.4, 0.4, (3, 7, modes))
+    K[..., 0] = generator.uniform(0.5, 1.5, (3, 7))
+    first = _answered(criterion, K, nu, wrong)
+    if first is None:
+        return
+    angle, dK, R = first
+    if (dK < 0).any():
+        wrong.append(f"dK_eq = {dK.min()} is negative")
+    if (R < 0).any() or (R > 1).any():
+        wrong.append(f"R = {R} is not in [0, 1]")
+    if (np.abs(angle) > np.pi).any():
+        wrong.append(f"angle = {angle} is beyond ±π: it is in rad, positive towards the normal")
+    mirror = np.array([1.0, -1.0, -1.0])[:modes]
+    unloaded = np.zeros_like(K)
+    closed, negative = K.copy(), K.copy()
+    closed[0, :, 0], negative[0, :, 0] = 0.0, -0.5
+    at_closed = _answered(criterion, closed, nu, wrong)
+    same = {
+        "states in another order": (K[::-1], (angle, dK, R)),
+        "four times the load": (4 * K, (angle, 4 * dK, R)),
+        "K_II and K_III reversed": (K * mirror, (-angle, dK, R)),
+        "front points in another order": (K[:, ::-1], (angle[::-1], dK[::-1], R[::-1])),
+        "no load": (unloaded, (0 * angle, 0 * dK, 0 * R)),
+    }
+    if at_closed is not None:
+        same["a state with K_I < 0 instead of 0"] = (negative, at_closed)
+    for what, (changed, expected) in same.items():
+        answer = _answered(criterion, changed, nu, wrong)
+        if answer is None:
+            return
+        for name, got, want in zip(("angle", "dK_eq", "R"), answer, expected):
+            if not np.allclose(got, want, rtol=_ROUND_OFF, atol=_ROUND_OFF):
+                i = int(np.argmax(np.abs(got - want)))
+                wrong.append(f"{what}: {name} is {got[i]:.6g}, it should be {want[i]:.6g}")
+
+
+def _answered(
+    criterion: Criterion, K: Floats, nu: float, wrong: list[str]
+) -> tuple[Floats, Floats, Floats] | None:
+    answer: Any = _called(lambda values: criterion(values, nu), (K,), wrong, None)
+    if answer is None:
+        return None
+    if not isinstance(answer, tuple) or len(answer) != 3:
+        wrong.append(f"it must return a tuple (angle, dK_eq, R), not {type(answer).__name__}")
+        return None
+    parts = []
+    for name, part in zip(("angle", "dK_eq", "R"), answer):
+        values = np.asarray(part, dtype=float)
+        if values.shape != (K.shape[1],) or not np.isfinite(values).all():
+            wrong.append(
+                f"{name} for K of shape {K.shape} must be finite, of shape ({K.shape[1]},): "
+                f"it is {values}, of shape {values.shape}"
+            )
+            return None
+        parts.append(values)
+    return parts[0], parts[1], parts[2]
+
+
+def _called(
+    function: Callable[..., Any], arguments: tuple[Floats, ...], wrong: list[str], name: str | None
+) -> Any:
+    """Answer of a function that must neither fail nor change its arguments."""
+    import warnings
+
+    given = [np.array(a) for a in arguments]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        try:
+            answer = function(*given)
+        except Exception as error:
+            shapes = ", ".join(str(a.shape) for a in arguments)
+            wrong.append(f"called with arrays of shape {shapes} it raises {error!r}")
+            return None
+    if not all(np.array_equal(a, b) for a, b in zip(given, arguments)):
+        wrong.append("it changes the arrays it is given: work on a copy")
+    if name is None:
+        return answer
+    try:
+        return np.asarray(answer, dtype=float)
+    except (TypeError, ValueError):
+        wrong.append(f"{name} must be an array of numbers, not {answer!r}")
+        return None
+
+
+def _judge(kind: str, function: object, wrong: list[str]) -> None:
+    if wrong:
+        name = getattr(function, "__name__", repr(function))
+        raise ProblemError(f"the {kind} {name} cannot be used:\n- " + "\n- ".join(wrong))
+
+
+__all__ = ["check_criterion", "check_law"]
