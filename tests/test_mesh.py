@@ -196,3 +196,12 @@ def test_three_cells_at_one_facet_are_refused():
 def test_wrong_boxes_are_refused(lower, upper, n):
     with pytest.raises(MeshError, match="box"):
         box(lower, upper, n)
+
+
+def test_inverted_cell_is_named():
+    """A point pulled across its neighbours folds cells over one another."""
+    mesh = box((0, 0), (1, 1), 6)
+    points = np.array(mesh.points)
+    points[24] = (0.9, 0.9)
+    with pytest.raises(MeshError, match=r"is inverted: it folds over its neighbour .* remesh"):
+        Mesh(points, mesh.cells)

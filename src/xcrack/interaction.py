@@ -35,8 +35,8 @@ from xcrack.williams import unit_gradients
 
 # Inner radius of the ring in which q falls, as a share of the outer one. At order 1 the ring stays
 # outside the enriched disc; at order 2 a wide ring saves digits on coarse meshes (measured).
-_RING = {1: 0.4, 2: 0.1}
-_OUTER = {1: 2.5, 2: 2.0}  # outer radius, as a multiple of the enriched radius
+_RING = {1: 0.4, 2: 0.2}
+_OUTER = {1: 2.5, 2: 2.5}  # outer radius, as a multiple of the enriched radius
 _SECOND = 0.7  # outer radius of the second domain, as a share of the first
 _CHUNK = 4000  # cells integrated at once; bounds the memory
 _WARN = 0.01  # difference of the two domains, relative to the largest K, that is worth a word
@@ -203,7 +203,7 @@ def domain_radius(solution: Solution, t: int) -> tuple[float, float, float]:
         for c, points in enumerate(solution.lips)
         if c != tip.crack and len(points)
     ]
-    limit = min([0.9 * free, *[0.8 * float(o) for o in others], *[0.9 * float(v) for v in lips]])
+    limit = min([0.95 * free, *[0.8 * float(o) for o in others], *[0.9 * float(v) for v in lips]])
     return min(wanted, max(limit, 1.2 * size)), wanted, size
 
 

@@ -40,7 +40,7 @@ class Mesh:
     ------
     MeshError
         No cells, wrong shapes, nan coordinates, point numbers out of range, points without a
-        cell, flat or doubled cells, facets that no cell has.
+        cell, flat, doubled or inverted (folded) cells, facets that no cell has.
 
     Examples
     --------
@@ -58,6 +58,7 @@ class Mesh:
         points, cells = _checked(self.points, self.cells)
         object.__setattr__(self, "points", frozen(points))
         object.__setattr__(self, "cells", frozen(_oriented(points, cells)))
+        self._check_folds()
         d = points.shape[1]
         facet_sets = {
             str(name): frozen(np.asarray(facets, dtype=np.int64).reshape(-1, d))
@@ -121,12 +122,12 @@ class Mesh:
         d = self.dim
         local = local_facets(d)
         all_facets = np.sort(self.cells[:, local].reshape(-1, d), axis=1)
-        key = _facet_key(all_facets, self.n_points)
-        unique, first, inverse, counts = np.unique(
-            key, axis=0, return_index=True, return_inverse=True, return_counts=True
+        _, first, inverse, counts = np.unique(
+            _scalar_key(all_facets, self.n_points),
+            return_index=True,
+            return_inverse=True,
+            return_counts=True,
         )
-        del unique
-        inverse = inverse.ravel()
         if counts.max(initial=0) > 2:
             bad = all_facets[first[np.argmax(counts)]]
             raise MeshError(
@@ -218,6 +219,24 @@ class Mesh:
         number = order[place]
         return np.where(known[number] == asked, number, -1)
 
+    def _check_folds(self) -> None:
+        """Cells on both sides of a facet must lie on different sides of it."""
+        inner = self.facet_to_cell[:, 1] >= 0
+        one, other = self.facet_to_cell[inner].T
+        place = np.argmax(self.cell_to_facet[one] == np.nonzero(inner)[0][:, None], axis=1)
+        across = np.argmax(self.cell_to_facet[other] == np.nonzero(inner)[0][:, None], axis=1)
+        corner = self.points[self.cells[other, across]] - self.points[self.cells[one, place]]
+        # The barycentric coordinate is 1 at the cell's own corner, 0 on the facet.
+        coordinate = 1 + np.einsum("fd,fd->f", self.gradient[one, place], corner)
+        folded = coordinate >= 0
+        if folded.any():
+            i = int(np.argmax(folded))
+            where = np.round(self.points[self.cells[other[i]]].mean(axis=0), 6).tolist()
+            raise MeshError(
+                f"cell {int(other[i])} at {where} is inverted: it folds over its neighbour "
+                f"{int(one[i])} ({int(folded.sum())} such pairs). Move its points back or remesh."
+            )
+
     def _check_facets(self, name: str, facets: Ints) -> None:
         if not len(facets):
             return
@@ -232,10 +251,6 @@ class Mesh:
                 f"facet set {name!r}: facet {facets[np.argmax(missing)].tolist()} is no facet of "
                 f"any cell ({int(missing.sum())} in all); mesh body and sets together."
             )
-
-
-def _facet_key(facets: Ints, n_points: int) -> Ints:
-    return np.asarray(facets if n_points > 2_000_000 else _scalar_key(facets, n_points)[:, None])
 
 
 def _scalar_key(facets: Ints, n_points: int) -> Ints:

@@ -179,9 +179,16 @@ def _hats(values: sp.csr_matrix, lips: LipPoints) -> sp.csr_matrix:
     )
 
 
-def gap_rows(space: Space, lips: LipPoints, space_of: Multipliers) -> sp.csr_matrix:
-    """Rows N of the weak gaps `(g, n_dof)`: N u is the integral of mu n . [[u]]."""
-    jump = jump_matrix(space, space_of.crack, lips)
+def gap_rows(space_of: Multipliers, lips: LipPoints, jump: sp.csr_matrix) -> sp.csr_matrix:
+    """Rows N of the weak gaps `(g, n_dof)`: N u is the integral of mu n . [[u]].
+
+    Parameters
+    ----------
+    space_of : Multipliers
+    lips : LipPoints
+    jump : sparse matrix (q, n_dof)
+        Normal jump at the lip points, from `jump_matrix`.
+    """
     return sp.csr_matrix(space_of.values.T @ sp.diags(lips.weight) @ jump)
 
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -26,7 +27,7 @@ from xcrack.supports import Known, known_unknowns
 from xcrack.warm import Warm
 
 _OVERLAP = 1e-9  # share of the largest displacement by which lips must overlap to need contact
-_BLOCK = 64  # right-hand sides solved at once for the dual matrix; bounds the memory
+_BLOCK = 16  # right-hand sides solved at once for the dual matrix; bounds the memory
 
 
 def solve(
@@ -76,8 +77,9 @@ def solve_states(
     motion = free_motion(model.space, fixed)
     fixed[motion.pins] = True
     engine = system(model.space, model.stiffness, fixed, problem.numerics, solver)
-    f = np.stack([balanced(model.space, motion, case.f)[0] for case in cases], axis=1)
-    imbalance = max(balanced(model.space, motion, case.f)[1] for case in cases)
+    in_balance = [balanced(model.space, motion, case.f) for case in cases]
+    f = np.stack([loads for loads, _ in in_balance], axis=1)
+    imbalance = max(share for _, share in in_balance)
     known = np.stack([case.known for case in cases], axis=1)
     u = engine.solve(f, known)
     lips_contact = _contact(problem, model, engine, f, known, u, warm)
@@ -125,6 +127,11 @@ class Model:
     stiffness: Any
     known: Known
     n_points: int
+
+    @cached_property
+    def jumps(self) -> tuple[Any, ...]:
+        """Normal jumps at the lip points of each crack, made when first asked for."""
+        return tuple(jump_matrix(self.space, c, lips) for c, lips in enumerate(self.lips))
 
 
 def build(problem: Problem, bulk_: Bulk | None = None) -> Model:
@@ -204,7 +211,7 @@ def _contact(
         for c in pending:
             spaces[c] = multipliers(model.space, c, model.lips[c], problem.numerics.multipliers)
         chosen = [m for m in spaces if m is not None]
-        rows = [gap_rows(model.space, model.lips[m.crack], m) for m in chosen]
+        rows = [gap_rows(m, model.lips[m.crack], model.jumps[m.crack]) for m in chosen]
         N = rows[0] if len(rows) == 1 else _stacked(rows)
         F = _dual(engine, N)
         measure = np.concatenate([m.measure for m in chosen])
@@ -243,7 +250,7 @@ def _needing(
         if problem.contact == "on":
             needing.append(c)
             continue
-        gap = jump_matrix(model.space, c, lips) @ u
+        gap = model.jumps[c] @ u
         limit = -_OVERLAP * np.abs(u[: model.space.n_nodes * model.space.dim]).max(axis=0)
         if (gap.min(axis=0) >= limit).all():
             continue
@@ -290,7 +297,7 @@ def _contact_of(model: Model, found: _Lips, u: Floats, k: int) -> tuple[Contact 
         if m is None or lam is None or active is None:
             result.append(None)
             continue
-        gap = jump_matrix(model.space, c, lips) @ u
+        gap = model.jumps[c] @ u
         closed = np.asarray(m.values @ active[k].astype(float)) >= 0.5
         result.append(
             Contact(
