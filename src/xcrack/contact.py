@@ -14,6 +14,7 @@ from xcrack.arrays import Bools, Floats
 from xcrack.errors import ConvergenceError
 
 _MAX_SETS = 100
+_REDUNDANT = 1e-7  # root of the eigenvalue, relative, below which groups count as dependent
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,24 +80,47 @@ def active_set(F: Floats, d: Floats, measure: Floats, stiffness: float, start: B
 
 
 def _of_set(F: Floats, d: Floats, active: Bools) -> tuple[Floats, Floats]:
+    """Pressures that close the groups of a set, and the gaps they leave."""
     pressure = np.zeros(len(d))
     if active.any():
-        block = F[np.ix_(active, active)]
-        pressure[active] = scipy.linalg.solve(block, -d[active], assume_a="sym")
+        # Groups differ in size by many orders of magnitude: scaled, the matrix is well conditioned.
+        scale = _scale(F)[active]
+        block = F[np.ix_(active, active)] * scale[:, None] * scale
+        pressure[active] = scale * _solved(block, -d[active] * scale)
     gap = F @ pressure + d
     gap[active] = 0.0
     return pressure, gap
 
 
+def _scale(F: Floats) -> Floats:
+    """Inverse roots of the diagonal, 0 for a group that no free unknown can move."""
+    diagonal = np.diag(F)
+    moved = diagonal > 0
+    return np.where(moved, 1 / np.sqrt(np.where(moved, diagonal, 1.0)), 0.0)
+
+
+def _solved(A: Floats, b: Floats) -> Floats:
+    """Solution of a positive system; the smallest one where groups are redundant."""
+    try:
+        factor = scipy.linalg.cho_factor(A)
+        if np.diag(factor[0]).min() > _REDUNDANT:
+            return np.asarray(scipy.linalg.cho_solve(factor, b))
+    except scipy.linalg.LinAlgError:
+        pass
+    return np.asarray(scipy.linalg.lstsq(A, b, cond=_REDUNDANT**2)[0])
+
+
 def _safe(F: Floats, d: Floats, tried: int) -> ActiveSet:
-    """Non-negative least squares on the Cholesky factor (Lawson and Hanson, 1974)."""
-    lower = np.linalg.cholesky((F + F.T) / 2)
-    rhs = -scipy.linalg.solve_triangular(lower, d, lower=True)
-    guess, _ = scipy.optimize.nnls(lower.T, rhs)
+    """Non-negative least squares on a root of F (Lawson and Hanson, 1974)."""
+    scale = _scale(F)
+    w, V = np.linalg.eigh((F + F.T) / 2 * scale[:, None] * scale)
+    kept = w > _REDUNDANT**2 * w[-1]
+    root = np.sqrt(w[kept])
+    guess, _ = scipy.optimize.nnls(root[:, None] * V[:, kept].T, -(V[:, kept].T @ (scale * d)) / root)
     active = guess > 0
     pressure, gap = _of_set(F, d, active)
-    scale = float(np.abs(d).max(initial=0.0))
-    if (gap < -1e-8 * scale).any() or (pressure < -1e-8 * np.abs(pressure).max(initial=0)).any():
+    size = float(np.abs(d).max(initial=0.0))
+    if (gap < -1e-8 * size).any() or (pressure < -1e-8 * np.abs(pressure).max(initial=0)).any():
         raise ConvergenceError(
             f"contact: after {tried} sets and non-negative least squares, {int(active.sum())} of "
             f"{len(d)} groups are closed, with a smallest gap of {gap.min():.3g} and a smallest "

@@ -260,7 +260,7 @@ def _domain_points(space: Space, centre: Floats, radius: float) -> list[Points]:
     middle = mesh.points[mesh.cells[near]].mean(axis=1)
     near = near[np.linalg.norm(middle - centre, axis=1) <= radius + mesh.cell_size[near]]
     share = mesh.cell_size[near] / radius
-    parts = []
+    parts: list[Points] = []
     for low, high, n, degree in ((0.0, 0.03, 4, 4), (0.03, 0.1, 4, 8), (0.1, np.inf, 5, 10)):
         cells = near[(share > low) & (share <= high)]
         parts.extend(

@@ -25,7 +25,7 @@ class LipPoints:
         From lip - to lip +.
     x : (q, d) array, length
     s : (q,) array, length
-        Position along the crack, from the end of its first point (in the plane).
+        Position along the crack from where it enters the body (in the plane).
     """
 
     segment: Ints
@@ -51,7 +51,8 @@ def lip_points(space: Space, c: int, n: int = 6) -> LipPoints:
     length = np.linalg.norm(corners[:, 1] - corners[:, 0], axis=1)
     at = (1 - t)[:, None, None] * bary[k, :, 0] + t[:, None, None] * bary[k, :, 1]
     x = (1 - t)[:, None] * corners[k, 0] + t[:, None] * corners[k, 1]
-    s = arc_position(space.cracks[c].points, x)
+    ends = arc_position(space.cracks[c].points, corners.reshape(-1, mesh.dim))
+    s = arc_position(space.cracks[c].points, x) - ends.min(initial=np.inf)
     order = np.argsort(s, kind="stable")
     k = k[order]
     return LipPoints(

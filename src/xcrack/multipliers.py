@@ -95,9 +95,9 @@ def _groups(space: Space, c: int, nodes: Ints, traces: sp.csr_matrix, weight: Fl
     for a, b in pairs[kept]:
         # An end of a cut edge at a sliver may have no trace that is seen; its star keeps the rest.
         i, j = place.get(int(a)), place.get(int(b))
-        for k in (i, j):
-            if k is not None:
-                covered[k] = True
+        for end in (i, j):
+            if end is not None:
+                covered[end] = True
         if i is not None and j is not None:
             parent[root(i)] = root(j)
     on_crack = cut.level_set.phi[nodes] == 0

@@ -40,7 +40,7 @@ class Contact:
         Normal opening n . [[u]].
     closed : (q,) array of bool
     s : (q,) array, length
-        Position along the crack.
+        Position along the crack from where it enters the body.
     """
 
     points: Floats

@@ -89,13 +89,46 @@ def _functions_of(space: Space, where: object, what: str) -> Ints:
     """Standard and enriched functions of all nodes of a set."""
     nodes = _set_nodes(space, where, what)
     parts = [nodes]
-    parts.extend(h[nodes][h[nodes] >= 0] for h in space.heaviside)
+    for c, number in enumerate(space.heaviside):
+        # Where the set ends on lip + its nodes there leave lip - free.
+        both = nodes[~np.isin(nodes, _at_plus_lip(space, where, c, what))]
+        parts.append(number[both][number[both] >= 0])
     vertices = nodes[nodes < space.mesh.n_points]
     for tip in space.tips:
         first = tip.point_to_function[vertices]
         first = first[first >= 0]
         parts.append((first[:, None] + np.arange(tip.functions)).ravel())
     return np.unique(np.concatenate(parts))
+
+
+def _at_plus_lip(space: Space, where: object, c: int, what: str) -> Ints:
+    """Points on crack c at which a set ends on lip +.
+
+    Raises
+    ------
+    ProblemError
+        The set ends on lip -: the functions of such a point are those of lip + and of the jump,
+        and only their sum is known.
+    """
+    if not isinstance(where, str):
+        return np.zeros(0, dtype=np.int64)
+    phi = space.cuts[c].level_set.phi
+    facets = facet_set(space.mesh, where, what)
+    touches = np.zeros((2, space.mesh.n_points), dtype=bool)
+    for corner in range(facets.shape[1]):
+        others = np.delete(phi[facets], corner, axis=1)
+        touches[0, facets[(others < 0).any(axis=1), corner]] = True
+        touches[1, facets[(others > 0).any(axis=1), corner]] = True
+    ends = (phi == 0) & (space.heaviside[c][: space.mesh.n_points] >= 0)
+    bad = ends & touches[0] & ~touches[1]
+    if bad.any():
+        raise ProblemError(
+            f"{what}({where!r}) ends at {np.round(space.mesh.points[np.argmax(bad)], 6).tolist()}, "
+            f"where crack {c} meets the boundary, and holds its lip - only: give the points of the "
+            "crack in the reverse order (the held lip is then lip +), or move its mouth by a "
+            "thousandth of a cell."
+        )
+    return np.nonzero(ends & touches[1] & ~touches[0])[0]
 
 
 def _imposed(space: Space, support: Displacement) -> list[tuple[int, Ints, Floats, int]]:
@@ -112,6 +145,8 @@ def _imposed(space: Space, support: Displacement) -> list[tuple[int, Ints, Float
     if not isinstance(support.where, str):
         u = evaluate(value, space.node_points[nodes], what)
         return [(axis, nodes, u[:, axis], 0) for axis in axes]
+    for c in range(len(space.cuts)):
+        _at_plus_lip(space, support.where, c, "displacement")
     fitted, coefficients = _fit(space, support.where, value, what)
     plain = nodes[~np.isin(nodes, fitted[fitted < space.n_nodes])]
     u = evaluate(value, space.node_points[plain], what) if len(plain) else np.zeros((0, space.dim))
@@ -121,15 +156,20 @@ def _imposed(space: Space, support: Displacement) -> list[tuple[int, Ints, Float
 
 
 def _fit(space: Space, where: str, value: object, what: str) -> tuple[Ints, Floats]:
-    """Least-squares fit on the facets where enriched functions act.
+    """Least-squares fit on the facets where enriched functions act, and at nodes on a crack.
 
     Shifted functions vanish at nodes, not between them: fixing only the standard unknowns there
-    would leave the facet half free.
+    would leave the facet half free. At a node on a crack the value has two answers: the facets
+    beside it tell which one is meant.
     """
     empty = np.zeros(0, dtype=np.int64), np.zeros((0, space.dim))
     facets = facet_set(space.mesh, where, what)
     owner = space.mesh.facet_to_cell[space.mesh.facet_numbers(facets), 0]
-    facets = facets[space.signature[owner] != 0]
+    on_lip = np.zeros(space.n_nodes, dtype=bool)
+    for cut, number in zip(space.cuts, space.heaviside, strict=True):
+        vertices = np.arange(space.mesh.n_points)
+        on_lip[vertices] |= (cut.level_set.phi == 0) & (number[vertices] >= 0)
+    facets = facets[(space.signature[owner] != 0) | on_lip[facets].any(axis=1)]
     if not len(facets):
         return empty
     points, _ = facet_points(space, facets)
@@ -145,10 +185,10 @@ def _fit(space: Space, where: str, value: object, what: str) -> tuple[Ints, Floa
         rows.append(np.broadcast_to(number[:, None], functions.shape)[acts])
         values.append(N[acts])
     column, row, entry = np.concatenate(columns), np.concatenate(rows), np.concatenate(values)
-    enriched_rows = np.unique(row[column >= space.n_nodes])
-    if not len(enriched_rows):
+    special = (column >= space.n_nodes) | np.isin(column, np.nonzero(on_lip)[0])
+    if not special.any():
         return empty
-    keep = np.isin(row, enriched_rows)
+    keep = np.isin(row, np.unique(row[special]))
     unknowns, place = np.unique(column[keep], return_inverse=True)
     row_ids, row_place = np.unique(row[keep], return_inverse=True)
     A = np.zeros((len(row_ids), len(unknowns)))
@@ -157,4 +197,4 @@ def _fit(space: Space, where: str, value: object, what: str) -> tuple[Ints, Floa
     target = evaluate(value, x, what)
     weight = np.sqrt(points.weight[row_ids])[:, None]
     solution = np.linalg.lstsq(weight * A, weight * target, rcond=1e-10)[0]
-    return unknowns, solution
+    return unknowns, np.asarray(solution, dtype=np.float64)

@@ -1,0 +1,141 @@
+"""One picture of a solution: a field on the opened crack, the mesh, or a graph along the lips."""
+
+import os
+import sys
+from pathlib import Path
+from typing import Any
+
+from xcrack.errors import ProblemError
+from xcrack.plot_scene import FIELDS, scene
+from xcrack.solution import Solution
+
+_GRAPHS = ("pressure", "opening")
+_KNOWN = (*FIELDS, "mesh", *_GRAPHS)
+
+
+def plot(
+    solution: Solution,
+    field: str = "von_mises",
+    *,
+    file: str | Path | None = None,
+    warp: float = 0.0,
+    show: bool | None = None,
+    renderer: str = "auto",
+    title: str | None = None,
+    edges: bool = False,
+    limits: tuple[float, float] | None = None,
+    cmap: str | None = None,
+    crack: int | None = None,
+) -> Any:
+    """Draw a solution.
+
+    Parameters
+    ----------
+    solution : Solution
+    field : str
+        On the body: "von_mises", "sxx", "syy", "sxy", "displacement" (its norm), "ux", "uy".
+        Along the lips: "pressure" (of contact), "opening" (with the sliding); where the lips
+        touch the graph is shaded. "mesh": the mesh with its cracks and enriched nodes.
+    file : path, optional
+        Where to save the picture; ``.png`` is added to a path without suffix.
+    warp : float
+        Displacements are drawn this many times as large as they are; 0: the body at rest.
+    show : bool, optional
+        Open a window; left out: only without a file, and where there is a display.
+    renderer : {"auto", "pyvista", "matplotlib"}
+        Of a field on the body. auto: pyvista where it can draw (off screen without a display)
+        and knows the kind of file, else matplotlib, which alone draws meshes and graphs.
+    title : str, optional
+    edges : bool
+        Draw the edges of the mesh.
+    limits : (float, float), optional
+        Ends of the colours. Left out: all values; of a stress, which is unbounded at a tip, those
+        of at least 99 % of the area and of all cells without tip functions, and the colour bar
+        says what share.
+    cmap : str, optional
+        Colour map of matplotlib; left out: one that parts at zero for a field of both signs.
+    crack : int, optional
+        Draw the graphs of this crack only.
+
+    Returns
+    -------
+    Path, or a matplotlib figure or pyvista plotter where there is no file
+
+    Raises
+    ------
+    ProblemError
+        An unknown field or renderer, a crack that does not exist, a renderer that cannot draw.
+    """
+    if field not in _KNOWN:
+        known = ", ".join(f'"{name}"' for name in _KNOWN)
+        raise ProblemError(f"plot(field={field!r}): there is no such field; give one of {known}.")
+    if renderer not in ("auto", "pyvista", "matplotlib"):
+        raise ProblemError(f'plot(renderer={renderer!r}): give "auto", "pyvista" or "matplotlib".')
+    target = _target(file)
+    window = (target is None and _has_display()) if show is None else show
+    if field in _GRAPHS:
+        from xcrack.plot_matplotlib import draw_along
+
+        return draw_along(solution, field, _cracks(solution, field, crack), target, window, title)
+    if field == "mesh":
+        from xcrack.plot_matplotlib import draw_mesh
+
+        return draw_mesh(solution, target, window, title)
+    picture = scene(solution, field, warp, limits)
+    colours = cmap or ("RdBu_r" if picture.signed else "viridis")
+    if _by_pyvista(renderer, target):
+        from xcrack import plot_pyvista
+
+        return plot_pyvista.draw(picture, target, window, title, edges, colours)
+    from xcrack import plot_matplotlib
+
+    return plot_matplotlib.draw(picture, target, window, title, edges, colours)
+
+
+def _target(file: str | Path | None) -> Path | None:
+    if file is None:
+        return None
+    path = Path(file)
+    if not path.suffix:
+        path = path.with_name(path.name + ".png")
+    path.parent.mkdir(parents=True, exist_ok=True)
+    return path
+
+
+def _has_display() -> bool:
+    # Set for runs without windows: tests, batch jobs.
+    if os.environ.get("PYVISTA_OFF_SCREEN", "").lower() in ("1", "true"):
+        return False
+    if os.name == "nt" or sys.platform == "darwin":
+        return True
+    return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
+
+
+def _cracks(solution: Solution, field: str, crack: int | None) -> list[int]:
+    n = len(solution.lips)
+    if n == 0:
+        raise ProblemError(f'plot(field="{field}"): the body has no crack, so there are no lips.')
+    if crack is not None and not 0 <= crack < n:
+        raise ProblemError(f"plot(crack={crack}): the problem has {n} crack(s), numbered from 0.")
+    return list(range(n)) if crack is None else [crack]
+
+
+def _by_pyvista(renderer: str, target: Path | None) -> bool:
+    from xcrack.plot_pyvista import RASTER, renders
+
+    if renderer == "matplotlib":
+        return False
+    known = target is None or target.suffix.lower() in RASTER
+    if renderer == "auto":
+        return known and renders()
+    if not known and target is not None:
+        raise ProblemError(
+            f'plot(file="{target}"): pyvista writes {", ".join(RASTER)}; take '
+            'renderer="matplotlib" for other kinds of files.'
+        )
+    if not renders():
+        raise ProblemError(
+            'plot(renderer="pyvista"): pyvista cannot draw here (no OpenGL); install libEGL '
+            '(apt-get install libegl1 libgl1-mesa-dri) or take renderer="matplotlib".'
+        )
+    return True
