@@ -39,7 +39,7 @@ _RING = {1: 0.4, 2: 0.2}
 _OUTER = {1: 2.5, 2: 2.5}  # outer radius, as a multiple of the enriched radius
 _SECOND = 0.7  # outer radius of the second domain, as a share of the first
 _CHUNK = 4000  # cells integrated at once; bounds the memory
-_WARN = 0.01  # difference of the two domains, relative to the largest K, that is worth a word
+_WARN = 0.01  # difference of the two domains, as a share of K, that is worth a word
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,7 +116,7 @@ def stress_intensity(solution: Solution, crack: int = 0) -> SIF:
     -----
     XcrackWarning
         A domain that body or other tips clip below two cells beyond the tip's disc, or two
-        domains that differ by more than 1 % of the largest K.
+        domains that differ by more than 1 % of K there.
     """
     space = solution.space
     if not 0 <= crack < len(space.cuts):
@@ -146,7 +146,10 @@ def _at_tip(solution: Solution, t: int) -> tuple[Floats, float, Floats]:
     K = 0.5 * E_prime * values[:, :2]
     T = E_prime * values[:, 2] + _constant_part(solution, t)
     spread = np.abs(K[0] - K[1])
-    largest = float(np.abs(K).max())
+    # At a closed tip K is zero: what counts there is K of the body's mean stress at the disc.
+    volume = float(space.mesh.volume.sum())
+    mean_stress = np.sqrt(2 * max(solution.energy, 0.0) * E_prime / volume)
+    scale = max(float(np.abs(K).max()), 0.1 * mean_stress * np.sqrt(np.pi * space.tips[t].radius))
     tip = space.tips[t]
     where = np.round(tip.x, 6).tolist()
     needed = max(tip.radius + size, 3.0 * size)
@@ -158,10 +161,11 @@ def _at_tip(solution: Solution, t: int) -> tuple[Floats, float, Floats]:
             XcrackWarning,
             stacklevel=4,
         )
-    if largest > 0 and spread.max() > _WARN * largest:
+    if spread.max() > _WARN * scale:
         warnings.warn(
             f"K at {where}: domains of radius {radii[0]:.4g} and {radii[1]:.4g} differ by "
-            f"{100 * spread.max() / largest:.2g} % of the largest K. Refine the mesh there.",
+            f"{spread.max():.3g}, {100 * spread.max() / scale:.2g} % of K there. Refine the mesh "
+            "around the tip.",
             XcrackWarning,
             stacklevel=4,
         )
@@ -283,15 +287,15 @@ def _weight(r: Floats, xi: Floats, radii: Floats, ring: float) -> tuple[Floats, 
 def _angle(xi: Floats, side: Ints, behind: Bools) -> tuple[Floats, Floats]:
     """Polar coordinates at a tip, the cut of the angle following the real lips.
 
-    A point on side + of a crack that bends down may have a polar angle below -pi/2: it is
-    continued by a turn, so that the auxiliary field jumps where the crack is. `behind` tells
-    the side of the crack from that of its prolongation ahead.
+    A point on side + of a crack that bends down may have a negative polar angle: it is continued
+    by a turn, so that the auxiliary field jumps where the crack is. `behind` tells the side of
+    the crack from that of its prolongation ahead.
     """
     r = np.hypot(xi[:, 0], xi[:, 1])
     theta = np.arctan2(xi[:, 1], xi[:, 0])
     known = behind & (side != 0)
-    theta = np.where(known & (side > 0) & (theta < -np.pi / 2), theta + 2 * np.pi, theta)
-    return r, np.where(known & (side < 0) & (theta > np.pi / 2), theta - 2 * np.pi, theta)
+    theta = np.where(known & (side > 0) & (theta < 0), theta + 2 * np.pi, theta)
+    return r, np.where(known & (side < 0) & (theta > 0), theta - 2 * np.pi, theta)
 
 
 _Aux = tuple[Floats, Floats, Floats]

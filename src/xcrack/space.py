@@ -2,7 +2,8 @@
 
 Every scalar function has a number; unknown `d * function + component` is its coefficient in one
 direction. All enriched functions are shifted, N_i (H - H_i) and N_i (F - F(x_i)), so that the
-standard unknown of a node is the displacement there.
+standard unknown of a mesh point is the displacement there. Tip functions ride on linear hats at
+both orders: quadratic ones would nearly repeat the other functions.
 """
 
 from dataclasses import dataclass

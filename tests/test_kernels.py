@@ -1,0 +1,84 @@
+"""Each kernel against a twin without tricks."""
+
+import numpy as np
+
+import scenes
+import xcrack as xc
+from xcrack.assembly import bulk
+from xcrack.kernels.blocks import dense_blocks
+from xcrack.kernels.bulk import block_pattern
+from xcrack.kernels.enriched import stiffness_triplets
+from xcrack.simplex import cell_nodes, shape_derivatives, simplex_rule
+
+
+def elastic_block(G, weight, lam, mu):
+    """Stiffness of tabulated gradients (q, n, d), term by term."""
+    n, d = G.shape[1:]
+    K = np.zeros((n, d, n, d))
+    for q, w in enumerate(weight):
+        for a in range(n):
+            for b in range(n):
+                ga, gb = G[q, a], G[q, b]
+                K[a, :, b, :] += w * (
+                    lam * np.outer(ga, gb) + mu * np.outer(gb, ga) + mu * (ga @ gb) * np.eye(d)
+                )
+    return K
+
+
+def test_enriched_stiffness():
+    rng = np.random.default_rng(577)
+    functions = np.array([[0, 3, 5, 6], [1, 4, -1, 7], [2, 0, 5, -1]])
+    offsets = np.array([0, 2, 5, 6])
+    weight, G = rng.uniform(0.1, 1, 6), rng.normal(size=(6, 4, 2))
+    row, column, value = stiffness_triplets(functions, offsets, weight, G, 5, 1.3, 0.7)
+    found = np.zeros((16, 16))
+    np.add.at(found, (row, column), value)
+    expected = np.zeros((8, 2, 8, 2))
+    for e, numbers in enumerate(functions):
+        on = np.nonzero(numbers >= 0)[0]
+        q = slice(offsets[e], offsets[e + 1])
+        block = elastic_block(G[q][:, on], weight[q], 1.3, 0.7)
+        for i, a in enumerate(numbers[on]):
+            for j, b in enumerate(numbers[on]):
+                if a >= 5 or b >= 5:
+                    expected[a, :, b] += block[i, :, j]
+    np.testing.assert_allclose(found, expected.reshape(16, 16), atol=1e-13)  # round-off
+
+
+def test_bulk_stiffness():
+    material = xc.Isotropic(E=3.0, nu=0.2, plane="stress")
+    for order in (1, 2):
+        mesh = scenes.perturbed(3, seed=8)
+        nodes = cell_nodes(mesh, order)
+        bary, rule = simplex_rule(2, 2 * (order - 1))
+        dN = shape_derivatives(order, bary)
+        size = int(nodes.max()) + 1
+        expected = np.zeros((size, 2, size, 2))
+        for c, numbers in enumerate(nodes):
+            G = np.einsum("qnb,bd->qnd", dN, mesh.gradient[c])
+            block = elastic_block(G, rule * mesh.volume[c], material.lam, material.mu)
+            expected[np.ix_(numbers, range(2), numbers, range(2))] += block
+        found = bulk(mesh, material, order).matrix.toarray()
+        np.testing.assert_allclose(found, expected.reshape(2 * size, -1), atol=1e-13)
+
+
+def test_pattern_holds_every_pair_once():
+    mesh = scenes.perturbed(4, seed=9)
+    indptr, indices, slot = block_pattern(np.ascontiguousarray(mesh.cells), mesh.n_points)
+    pairs = {(int(a), int(b)) for cell in mesh.cells for a in cell for b in cell}
+    rows = np.repeat(np.arange(mesh.n_points), np.diff(indptr))
+    assert sorted(pairs) == list(zip(rows.tolist(), indices.tolist(), strict=True))
+    for cell, own in zip(mesh.cells, slot, strict=True):
+        np.testing.assert_array_equal(indices[own], np.broadcast_to(cell, (3, 3)))
+
+
+def test_dense_blocks():
+    rng = np.random.default_rng(83)
+    matrix = rng.normal(size=(9, 9)) * (rng.random((9, 9)) < 0.6)
+    import scipy.sparse as sp
+
+    K = sp.csr_matrix(matrix)
+    members, offsets = np.array([2, 5, 0, 8, 3]), np.array([0, 3, 5])
+    found = dense_blocks(K.indptr, K.indices, K.data, members, offsets)
+    first, second = matrix[np.ix_(members[:3], members[:3])], matrix[np.ix_([8, 3], [8, 3])]
+    np.testing.assert_array_equal(found, np.concatenate([first.ravel(), second.ravel()]))
