@@ -1,13 +1,13 @@
 """Cracks as values: their faces and their tips; the mesh knows nothing of them."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
 from xcrack.arrays import Bools, Floats, Ints, frozen
-from xcrack.errors import GeometryError, XcrackWarning
+from xcrack.errors import GeometryError
 from xcrack.locate import contains, locate, nearest_boundary
 from xcrack.mesh import Mesh
 
@@ -228,19 +228,11 @@ def advance(crack: Crack, angle: ArrayLike, da: ArrayLike) -> Crack:
         np.cos(beta)[:, None] * frame[:, 0] + np.sin(beta)[:, None] * frame[:, 1]
     )
     points = np.array(crack.points)
-    tips = list(crack.tips or ())
-    shift = 0
     for k, tip in enumerate(crack.tips or ()):
-        if step[k] == 0:
-            continue
-        if tip == 0:
-            points = np.concatenate([moved[k : k + 1], points])
-            shift = 1
-        else:
-            points = np.concatenate([points, moved[k : k + 1]])
-    new_last = len(points) - 1
-    tips = [0 if tip == 0 else new_last for tip in tips]
-    del shift
+        if step[k] != 0:
+            new = moved[k : k + 1]
+            points = np.concatenate([new, points] if tip == 0 else [points, new])
+    tips = [0 if tip == 0 else len(points) - 1 for tip in crack.tips or ()]
     number = np.arange(len(points))
     return Crack(points, np.stack([number[:-1], number[1:]], axis=1), tuple(tips))
 
@@ -292,21 +284,3 @@ def _crossing(a: Floats, b: Floats, same: bool) -> Floats | None:
         return None
     i, j = np.argwhere(hit)[0]
     return np.asarray(a[i] + t[i, j] * (a[i + 1] - a[i]))
-
-
-def without_tips(crack: Crack) -> Crack:
-    """The same crack with every end taken for a mouth."""
-    return replace(crack, tips=())
-
-
-__all__ = [
-    "Crack",
-    "XcrackWarning",
-    "advance",
-    "check_cracks",
-    "crack_length",
-    "front",
-    "line_crack",
-    "place",
-    "without_tips",
-]

@@ -40,8 +40,6 @@ class Cut:
         Vertices of the segment in the barycentric coordinates of these cells.
     lip_normal : (l, d) array
         From lip - to lip +.
-    lip_tip : (l,) array of int
-        Tip at which the segment ends (its vertex 1), or -1.
     cut_edge : (e,) array
         Cut position on each mesh edge, from its first point, nan where the crack does not cross.
     side : (m,) array of int
@@ -57,7 +55,6 @@ class Cut:
     lip_cell: Ints
     lip_bary: Floats
     lip_normal: Floats
-    lip_tip: Ints
     cut_edge: Floats
     side: Ints
 
@@ -105,11 +102,7 @@ def cut(mesh: Mesh, level_set: LevelSet) -> Cut:
     cells = candidates[kept]
 
     bary, fraction, side, owner = cut_simplices(phi[mesh.cells[cells]])
-    lips = [
-        _Lips(
-            np.stack([cells, cells], 1), np.stack([ends.bary[kept]] * 2, 1), np.full(len(cells), -1)
-        )
-    ]
+    lips = [_Lips(np.stack([cells, cells], 1), np.stack([ends.bary[kept]] * 2, 1))]
     edge_flag = np.zeros(len(mesh.edges), dtype=bool)
     edge_flag[mesh.cell_to_edge[cells]] = True
     subs = [(cells[owner], bary, fraction, side)]
@@ -131,7 +124,6 @@ def cut(mesh: Mesh, level_set: LevelSet) -> Cut:
         lip_cell=lock(lip_cell),
         lip_bary=lock(lip_bary),
         lip_normal=lock(_lip_normals(mesh, phi, lip_cell, lip_bary)),
-        lip_tip=lock(np.concatenate([part.tip for part in lips])),
         cut_edge=lock(np.where(edge_flag & exists, positions, np.nan)),
         side=lock(np.where(crossed, 0, _cell_sides(values))),
     )
@@ -141,7 +133,6 @@ def cut(mesh: Mesh, level_set: LevelSet) -> Cut:
 class _Lips:
     cell: Ints
     bary: Floats
-    tip: Ints
 
 
 @dataclass(frozen=True, eq=False)
@@ -333,7 +324,7 @@ def _tip_cells(
     subs = (np.array(owner)[keep], b[keep], fraction[keep], np.array(side, dtype=np.int64)[keep])
     both = np.array(lip_cells, dtype=np.int64)
     two = np.array(lip_bary, dtype=float).reshape(-1, 2, 3)
-    lips = _Lips(np.stack([both, both], 1), np.stack([two, two], 1), np.full(len(both), k))
+    lips = _Lips(np.stack([both, both], 1), np.stack([two, two], 1))
     return subs, lips, np.array(entries, dtype=np.int64)
 
 
@@ -342,7 +333,7 @@ def _facet_lips(mesh: Mesh, level_set: LevelSet) -> _Lips:
     d = mesh.dim
     zero = (level_set.phi[mesh.facets] == 0).all(axis=1)
     facets = np.nonzero(zero & (mesh.facet_to_cell[:, 1] >= 0))[0]
-    empty = _Lips(np.zeros((0, 2), np.int64), np.zeros((0, 2, d, d + 1)), np.zeros(0, np.int64))
+    empty = _Lips(np.zeros((0, 2), np.int64), np.zeros((0, 2, d, d + 1)))
     if not len(facets):
         return empty
     cells = mesh.facet_to_cell[facets]
@@ -354,7 +345,7 @@ def _facet_lips(mesh: Mesh, level_set: LevelSet) -> _Lips:
         return empty
     cells = np.where(side[:, :1] > 0, cells[:, ::-1], cells)
     x = mesh.points[mesh.facets[facets]]
-    tip_of = np.full(len(facets), -1, dtype=np.int64)
+    ends_at_tip = np.zeros(len(facets), dtype=bool)
     for k, tip in enumerate(level_set.tip):
         own = level_set.psi[k][mesh.facets[facets]]
         length = np.linalg.norm(x[:, 1] - x[:, 0], axis=1)
@@ -366,9 +357,9 @@ def _facet_lips(mesh: Mesh, level_set: LevelSet) -> _Lips:
         x = np.where(
             reaches[:, None, None], np.stack([begin, np.broadcast_to(tip, begin.shape)], 1), x
         )
-        tip_of[reaches] = k
-    far = (tip_of < 0) & (psi.mean(axis=1) >= 0)
-    x, cells, tip_of = x[~far], cells[~far], tip_of[~far]
+        ends_at_tip |= reaches
+    far = ~ends_at_tip & (psi.mean(axis=1) >= 0)
+    x, cells = x[~far], cells[~far]
     bary = np.stack(
         [
             np.stack([barycentric(mesh, cells[:, s], x[:, v]) for v in range(d)], axis=1)
@@ -376,7 +367,7 @@ def _facet_lips(mesh: Mesh, level_set: LevelSet) -> _Lips:
         ],
         axis=1,
     )
-    return _Lips(cells, np.where(np.abs(bary) < 1e-14, 0.0, bary), tip_of)
+    return _Lips(cells, np.where(np.abs(bary) < 1e-14, 0.0, bary))
 
 
 def _lip_normals(mesh: Mesh, phi: Floats, cell: Ints, bary: Floats) -> Floats:

@@ -1,7 +1,7 @@
 """The scene: body, cracks, supports and loads, checked before anything is built."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -92,10 +92,6 @@ class Problem:
     def placed(self) -> tuple[Crack, ...]:
         """The cracks with tips and mouths decided in this mesh."""
         return tuple(place(crack, self.mesh) for crack in self.cracks)
-
-    def with_cracks(self, cracks: Sequence[Crack]) -> "Problem":
-        """The same scene with other cracks."""
-        return replace(self, cracks=tuple(cracks))
 
     def state(self, state: Any) -> tuple[tuple[Load, ...], float]:
         """Loads and factor of a load state: a number, or a list of loads."""

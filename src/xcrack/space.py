@@ -17,7 +17,7 @@ from xcrack.cut import Cut
 from xcrack.enrichment import heaviside_nodes, node_level, tip_points, tip_radii
 from xcrack.mesh import Mesh
 from xcrack.numerics import Numerics
-from xcrack.simplex import cell_nodes, n_shapes, node_points, shape_derivatives, shape_values
+from xcrack.simplex import cell_nodes, node_points, shape_derivatives, shape_values
 from xcrack.williams import polar, tip_derivatives, tip_values
 
 
@@ -263,8 +263,3 @@ def space(
             count += numerics.functions * int(flag.sum())
             tips.append(Tip(c, k, x[k], frame[k], radii[c][k], numerics.functions, lock(number)))
     return Space(mesh, order, cracks, cuts, tuple(heaviside), tuple(tips), n_nodes, count)
-
-
-def n_standard_shapes(space_: Space) -> int:
-    """Number of standard shape functions of a cell."""
-    return n_shapes(space_.order, space_.dim)
