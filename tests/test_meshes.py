@@ -259,9 +259,9 @@ FILES = {
     "plate_with_hole_40": 21693,
     "finite_plate": 2712,
     "edge_crack": 935,
-    "two_holes": 1927,
-    "two_holes_free": 1913,
-    "turning_load": 1234,
+    "two_holes": 1893,
+    "two_holes_free": 1893,
+    "turning_load": 1309,
 }
 
 

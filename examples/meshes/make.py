@@ -18,9 +18,19 @@ HERE = Path(__file__).parent
 
 # Where the two cracks of two_holes.py are expected to run; the second is the first one turned.
 TURN = np.array([20.0, 10.0])
-PATH = np.array([(0.0, 2.85), (4.0, 2.85), (8.5, 2.75), (12.8, 2.3)])
+PATH = np.array(
+    [(0.0, 2.85), (2.0, 3.07), (3.8, 3.6), (5.4, 3.43), (7.3, 3.32), (9.2, 3.41), (10.4, 3.67),
+     (11.3, 4.15), (12.9, 5.2)]
+)  # fmt: skip
 PATHS = (PATH, TURN - PATH)
 HOLES = (((3.0, 7.0), 2.0), ((17.0, 3.0), 2.0))
+
+# The crack of turning_load.py, and the fan of directions in which its criteria let it grow.
+TURNING = (
+    [(-7.0, 2.8), (-4.0, 0.0), (4.0, 0.0), (7.0, -2.8)],
+    [(-8.0, 0.0), (-4.0, 0.0)],
+    [(4.0, 0.0), (8.0, 0.0)],
+)
 
 
 def short(mesh: Mesh) -> Mesh:
@@ -104,8 +114,8 @@ def meshes() -> dict[str, Mesh]:
         20.0, 10.0, holes=HOLES, size=0.6, size_near=0.25, along=PATHS, band=0.5, transition=1.2
     )
     made["turning_load"] = plate(
-        40.0, 40.0, lower=(-20.0, -20.0), size=4.0, size_near=0.5,
-        along=[(-5.0, 0.0), (5.0, 0.0)], band=4.0, transition=14.0,
+        40.0, 40.0, lower=(-20.0, -20.0), size=4.0, size_near=0.3,
+        along=TURNING, band=0.6, transition=14.0,
     )  # fmt: skip
     return {**{name: short(mesh) for name, mesh in made.items()}, "two_holes": two_holes()}
 

@@ -1,0 +1,56 @@
+"""Every example runs from any folder, keeps what it asserts, and leaves its pictures."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import matplotlib.image
+import pytest
+
+EXAMPLES = sorted((Path(__file__).resolve().parent.parent / "examples").glob("*.py"))
+
+# An example that warns is a bad example.
+RUN = (
+    "import runpy, sys, warnings, xcrack; "
+    "warnings.simplefilter('error', xcrack.XcrackWarning); "
+    "runpy.run_path(sys.argv[1], run_name='__main__')"
+)
+
+
+def test_there_are_examples():
+    assert {path.stem for path in EXAMPLES} >= {
+        "plate_with_hole", "edge_crack_growth", "two_holes", "turning_load",
+    }  # fmt: skip
+
+
+@pytest.mark.slow
+@pytest.mark.mission
+@pytest.mark.parametrize("script", EXAMPLES, ids=lambda path: path.stem)
+def test_example_runs_from_another_folder_and_leaves_pictures(script, tmp_path):
+    run = subprocess.run(
+        [sys.executable, "-c", RUN, str(script)],
+        cwd=tmp_path,
+        env={**os.environ, "MPLBACKEND": "Agg", "PYTHONIOENCODING": "utf-8"},
+        capture_output=True,
+        text=True,
+        encoding="utf-8",
+        timeout=500,
+        check=False,
+    )
+    assert run.returncode == 0, run.stdout[-2000:] + run.stderr[-4000:]
+    folder = tmp_path / "out" / script.stem
+    assert [path.name for path in tmp_path.iterdir()] == ["out"]
+    assert [path.name for path in (tmp_path / "out").iterdir()] == [script.stem]
+    assert str(folder) in run.stdout.splitlines()[-1]  # it says where things are
+    pictures = sorted(folder.glob("*.png"))
+    assert len(pictures) >= 2
+    for picture in pictures:
+        image = matplotlib.image.imread(picture)
+        assert min(image.shape[:2]) > 300
+        assert image[..., :3].std() > 0.01, f"{picture.name} is blank"
+    assert list(folder.glob("*.csv"))
+    assert list(folder.rglob("*.vtu"))
+    assert list(folder.rglob("*.vtp"))
