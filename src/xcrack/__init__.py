@@ -33,6 +33,7 @@ _HOME = {
     "Solution": "solution",
     "energy_error": "norms",
     "stress_intensity": "interaction",
+    "stress_intensities": "interaction",
     "SIF": "interaction",
     "max_hoop_stress": "criteria",
     "mean_reference": "criteria",

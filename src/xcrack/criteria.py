@@ -17,6 +17,7 @@ from xcrack.errors import ProblemError, XcrackWarning
 Criterion = Callable[[Floats, float], tuple[Floats, Floats, Floats]]
 
 _TIE = 1e-12  # relative: two states whose K_eq differ by round-off only are a tie
+_CLOSED = 1e-3  # share of the largest K below which a negative K_I is that of a closed tip
 _DIFFER = 0.2  # share by which the two kinds of range may differ before it is said
 
 
@@ -239,7 +240,8 @@ def _checked(K: ArrayLike, nu: float, range: str) -> Floats:
         raise ProblemError(f"Poisson's ratio nu = {nu} must lie in (-1, 0.5).")
     if range not in ("difference", "component"):
         raise ProblemError(f'range = {range!r}: give "difference" or "component".')
-    negative = K[..., 0] < 0
+    # A closed tip has K_I = 0 up to discretisation: only a real overlap is worth a word.
+    negative = K[..., 0] < -_CLOSED * np.abs(K).max(initial=0.0)
     if negative.any():
         state, point = np.unravel_index(np.argmin(K[..., 0]), negative.shape)
         warnings.warn(

@@ -12,7 +12,7 @@ from xcrack.arrays import Floats
 from xcrack.crack import Crack, advance, front
 from xcrack.criteria import Criterion, clipped, equivalent_K
 from xcrack.errors import GeometryError, ProblemError, XcrackError, XcrackWarning
-from xcrack.interaction import SIF, stress_intensity
+from xcrack.interaction import SIF, stress_intensities
 from xcrack.laws import Law
 from xcrack.problem import Problem
 from xcrack.settings import describe
@@ -278,10 +278,8 @@ def respond(
     solutions = solve_states(
         problem, run.cycle.load_states, bulk=bulk, warm=warm, solver=run.solver
     )
-    numbers = range(len(problem.cracks))
-    return tuple(solutions), tuple(
-        tuple(stress_intensity(solution, c) for c in numbers) for solution in solutions
-    )
+    by_crack = [stress_intensities(solutions, c) for c in range(len(problem.cracks))]
+    return tuple(solutions), tuple(zip(*by_crack, strict=True))
 
 
 def _directed(run: Run, K: Floats, crack: int) -> tuple[Floats, Floats, Floats]:

@@ -114,19 +114,8 @@ class Solution:
 
         The gradient's rows are components, its columns directions.
         """
-        u = np.zeros((len(cell), self.space.dim))
-        gradient = np.zeros((len(cell), self.space.dim, self.space.dim))
-        cells, inverse = np.unique(cell, return_inverse=True)
-        for batch, rows in self.space.batches(cells):
-            place = np.full(len(cells), -1, dtype=np.int64)
-            place[rows] = np.arange(len(rows))
-            number = np.nonzero(place[inverse] >= 0)[0]
-            row = place[inverse][number]
-            N, G = self.space.tabulate(batch, row, bary[number], side[number])
-            a = self.coefficients[batch.functions[row]]
-            u[number] = np.einsum("qn,qni->qi", N, a)
-            gradient[number] = np.einsum("qnj,qni->qij", G, a)
-        return u, gradient
+        u, gradient = fields_at(self.space, self.coefficients[..., None], cell, bary, side)
+        return u[..., 0], gradient[..., 0]
 
     def displacement(self, x: ArrayLike, side: int = 0) -> Floats:
         """Displacement at points.
@@ -199,6 +188,37 @@ class Solution:
                 "such points)."
             )
         return cell, bary, sides_of(self.space, cell, bary, side), single
+
+
+def fields_at(
+    space: Space, coefficients: Floats, cell: Ints, bary: Floats, side: Ints
+) -> tuple[Floats, Floats]:
+    """Displacements `(q, d, s)` and gradients `(q, d, d, s)` of several states at once.
+
+    Parameters
+    ----------
+    space : Space
+        Shared by all states.
+    coefficients : (n + 1, d, s) array, length
+        Unknowns by function, the last row zero.
+    cell, bary, side : arrays
+        Points, as in `Solution.at`.
+    """
+    d, states = coefficients.shape[1:]
+    u = np.zeros((len(cell), d, states))
+    gradient = np.zeros((len(cell), d, d, states))
+    cells, inverse = np.unique(cell, return_inverse=True)
+    for batch, rows in space.batches(cells):
+        place = np.full(len(cells), -1, dtype=np.int64)
+        place[rows] = np.arange(len(rows))
+        number = np.nonzero(place[inverse] >= 0)[0]
+        row = place[inverse][number]
+        N, G = space.tabulate(batch, row, bary[number], side[number])
+        a = coefficients[batch.functions[row]].reshape(len(row), -1, d * states)
+        u[number] = (N[:, None] @ a).reshape(-1, d, states)
+        slope = np.swapaxes(G, 1, 2) @ a
+        gradient[number] = np.swapaxes(slope.reshape(len(row), d, d, states), 1, 2)
+    return u, gradient
 
 
 def sides_of(space: Space, cell: Ints, bary: Floats, lip: int) -> Ints:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from xcrack.arrays import Floats, Ints
+from xcrack.arrays import Bools, Floats, Ints
 
 
 def polar(psi: Floats, phi: Floats, side: Ints) -> tuple[Floats, Floats]:
@@ -14,6 +14,20 @@ def polar(psi: Floats, phi: Floats, side: Ints) -> tuple[Floats, Floats]:
     tiny = 1e-300
     forced = np.where((side != 0) & (phi * side <= 0), side * tiny, phi)
     return np.hypot(psi, phi), np.arctan2(forced, psi)
+
+
+def continued_polar(xi: Floats, side: Ints, behind: Bools) -> tuple[Floats, Floats]:
+    """Polar coordinates at a tip, the cut of the angle following the real lips.
+
+    A point on side + of a crack that bends down may have a negative polar angle: it is continued
+    by a turn, so that the auxiliary field jumps where the crack is. `behind` tells the side of
+    the crack from that of its prolongation ahead.
+    """
+    r = np.hypot(xi[:, 0], xi[:, 1])
+    theta = np.arctan2(xi[:, 1], xi[:, 0])
+    known = behind & (side != 0)
+    theta = np.where(known & (side > 0) & (theta < 0), theta + 2 * np.pi, theta)
+    return r, np.where(known & (side < 0) & (theta > 0), theta - 2 * np.pi, theta)
 
 
 def angular(theta: Floats) -> tuple[Floats, Floats]:
