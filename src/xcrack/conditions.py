@@ -216,7 +216,7 @@ def initial_stress(f: Any) -> InitialStress:
     """
     if callable(f):
         return InitialStress(f)
-    sigma = np.asarray(f, dtype=float)
+    sigma = _numbers(f, "initial_stress")
     if sigma.ndim != 2 or sigma.shape[0] != sigma.shape[1] or not np.isfinite(sigma).all():
         raise ProblemError(f"initial_stress: give a finite (d, d) array, not {f!r}.")
     if not np.allclose(sigma, sigma.T):
@@ -229,9 +229,10 @@ def evaluate(value: Value, x: Floats, what: str, normal: Floats | None = None) -
     n, d = x.shape
     if callable(value):
         two = normal is not None and _n_positional(value) >= 2
-        result = np.asarray(value(x, normal) if two else value(x), dtype=float)
+        result = _numbers(value(x, normal) if two else value(x), what)
     else:
-        result = np.broadcast_to(np.asarray(value, dtype=float), (n, d))
+        vector = _numbers(value, what)
+        result = np.broadcast_to(vector, (n, d)) if vector.shape == (d,) else vector
     if result.shape != (n, d):
         raise ProblemError(
             f"{what}: the value has shape {result.shape}, wanted {(n, d)} for {n} points in "
@@ -243,8 +244,13 @@ def evaluate(value: Value, x: Floats, what: str, normal: Floats | None = None) -
 
 def evaluate_scalar(value: Any, x: Floats, what: str) -> Floats:
     """Value of a number or f(x) at points `(n, d)`, checked `(n,)`."""
-    given = value(x) if callable(value) else value
-    result = np.broadcast_to(np.asarray(given, dtype=float), (len(x),))
+    given = _numbers(value(x) if callable(value) else value, what)
+    if given.shape not in ((), (len(x),)):
+        raise ProblemError(
+            f"{what}: the value has shape {given.shape}, wanted {(len(x),)}; give a number or a "
+            "function that returns (n,)."
+        )
+    result = np.broadcast_to(given, (len(x),))
     _finite(result, x, what)
     return result
 
@@ -252,7 +258,7 @@ def evaluate_scalar(value: Any, x: Floats, what: str) -> Floats:
 def evaluate_stress(value: Any, x: Floats) -> Floats:
     """Initial stress at points, checked `(n, d, d)`."""
     d = x.shape[1]
-    result = np.asarray(value(x) if callable(value) else value, dtype=float)
+    result = _numbers(value(x) if callable(value) else value, "initial_stress")
     if result.shape not in ((d, d), (len(x), d, d)):
         raise ProblemError(f"initial_stress: shape {result.shape}, wanted {(len(x), d, d)}.")
     result = np.broadcast_to(result, (len(x), d, d))
@@ -270,6 +276,16 @@ def _finite(result: Floats, x: Floats, what: str) -> None:
         )
 
 
+def _numbers(value: Any, what: str) -> Floats:
+    try:
+        return np.asarray(value, dtype=float)
+    except (TypeError, ValueError) as error:
+        raise ProblemError(
+            f"{what}: {value!r} is no number, vector or array of them; give one, or a function "
+            "that returns one."
+        ) from error
+
+
 def _n_positional(function: Callable[..., Any]) -> int:
     try:
         parameters = inspect.signature(function).parameters.values()
@@ -284,7 +300,7 @@ def _n_positional(function: Callable[..., Any]) -> int:
 def _where(where: Where, what: str) -> Where:
     if isinstance(where, str):
         return where
-    point = np.asarray(where, dtype=float)
+    point = _numbers(where, what)
     if point.ndim != 1 or not np.isfinite(point).all():
         raise ProblemError(f"{what}: {where!r} is neither the name of a set nor a point.")
     return frozen(point)
@@ -298,7 +314,7 @@ def _value(value: Value, what: str, none: bool = False) -> Value:
             if v is not None and not np.isfinite(v):
                 raise ProblemError(f"{what}: the value {value!r} is not finite.")
         return tuple(value)
-    vector = np.asarray(value, dtype=float)
+    vector = _numbers(value, what)
     if vector.ndim != 1 or len(vector) not in (2, 3):
         raise ProblemError(f"{what}: give a vector of 2 or 3 numbers or a function, not {value!r}.")
     if not np.isfinite(vector).all():
@@ -309,7 +325,7 @@ def _value(value: Value, what: str, none: bool = False) -> Value:
 def _scalar(value: Any, what: str) -> Any:
     if callable(value):
         return value
-    number = np.asarray(value, dtype=float)
+    number = _numbers(value, what)
     if number.ndim != 0 or not np.isfinite(number):
         raise ProblemError(f"{what}: give a finite number or a function f(x), not {value!r}.")
     return float(number)

@@ -116,7 +116,8 @@ def _safe(F: Floats, d: Floats, tried: int) -> ActiveSet:
     w, V = np.linalg.eigh((F + F.T) / 2 * scale[:, None] * scale)
     kept = w > _REDUNDANT**2 * w[-1]
     root = np.sqrt(w[kept])
-    guess, _ = scipy.optimize.nnls(root[:, None] * V[:, kept].T, -(V[:, kept].T @ (scale * d)) / root)
+    rhs = -(V[:, kept].T @ (scale * d)) / root
+    guess, _ = scipy.optimize.nnls(root[:, None] * V[:, kept].T, rhs)
     active = guess > 0
     pressure, gap = _of_set(F, d, active)
     size = float(np.abs(d).max(initial=0.0))

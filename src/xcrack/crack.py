@@ -71,7 +71,8 @@ def line_crack(points: ArrayLike) -> Crack:
     Raises
     ------
     GeometryError
-        Fewer than two points, nan, points that coincide, a line that crosses itself.
+        Fewer than two points, nan, points that coincide, a line that crosses itself or turns
+        back.
 
     Examples
     --------
@@ -91,6 +92,14 @@ def line_crack(points: ArrayLike) -> Crack:
         raise GeometryError(
             f"the crack has a piece of zero length: points {i} and {i + 1} both lie at "
             f"{x[i].tolist()}; leave one out."
+        )
+    along = np.diff(x, axis=0) / length[:, None]
+    turns = (along[1:] * along[:-1]).sum(axis=1)
+    if (turns < -1 + 1e-12).any():
+        back = x[1 + int(np.argmin(turns))]
+        raise GeometryError(
+            f"the crack turns back on itself at {np.round(back, 6).tolist()}: leave out what runs "
+            "over it twice."
         )
     crossing = _crossing(x, x, same=True)
     if crossing is not None:
@@ -119,7 +128,8 @@ def place(crack: Crack, mesh: Mesh) -> Crack:
     Raises
     ------
     GeometryError
-        No part of the crack lies inside the body; or the crack is shorter than a cell.
+        No part of the crack lies inside the body; or the crack is shorter than a cell, or ends
+        less than half a cell inside the boundary that it comes from.
     """
     if crack.dim != mesh.dim:
         raise GeometryError(f"a {crack.dim}D crack cannot be put into a {mesh.dim}D mesh.")
@@ -150,6 +160,8 @@ def place(crack: Crack, mesh: Mesh) -> Crack:
             continue
         if end not in candidates:
             continue
+        if inside:
+            _check_nick(mesh, points[end], out, gap, size)
         outside = -gap if inside else gap
         if outside < size:
             points[end] = _prolonged(mesh, points[end], out, size)
@@ -162,6 +174,17 @@ def place(crack: Crack, mesh: Mesh) -> Crack:
                 f"the cell there ({h.min():.4g}): refine the mesh around it or leave it out."
             )
     return placed
+
+
+def _check_nick(mesh: Mesh, end: Floats, out: Floats, gap: float, size: float) -> None:
+    """Raise where a crack has just come in through the boundary that its end is close to."""
+    ahead = end + 0.25 * size * out
+    if contains(mesh, ahead[None])[0] and nearest_boundary(mesh, ahead)[0] > gap + 0.01 * size:
+        raise GeometryError(
+            f"the crack ends at {np.round(end, 6).tolist()}, {gap:.4g} inside the boundary that it "
+            f"comes from, which is less than half a cell ({size:.4g}): refine the mesh there, or "
+            "leave this part of the crack out."
+        )
 
 
 def _prolonged(mesh: Mesh, end: Floats, out: Floats, size: float) -> Floats:
@@ -261,9 +284,9 @@ def check_cracks(cracks: tuple[Crack, ...], mesh: Mesh) -> None:
         apart = float(np.linalg.norm(x[i] - x[j]))
         if apart < min(size[i], size[j]) or cell[i] == cell[j]:
             raise GeometryError(
-                f"a tip of crack {owner[i]} at {x[i].tolist()} and one of crack {owner[j]} at "
-                f"{x[j].tolist()} are {apart:.4g} apart, closer than a cell ({size[i]:.4g}): "
-                "refine the mesh between them, or join the cracks."
+                f"a tip of crack {owner[i]} at {np.round(x[i], 6).tolist()} and one of crack "
+                f"{owner[j]} at {np.round(x[j], 6).tolist()} are {apart:.4g} apart, closer than a "
+                f"cell ({size[i]:.4g}): refine the mesh between them, or join the cracks."
             )
 
 

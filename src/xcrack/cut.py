@@ -15,7 +15,7 @@ from xcrack.level_set import LevelSet
 from xcrack.locate import barycentric
 from xcrack.mesh import Mesh, local_edges, local_facets
 
-_ROUND_OFF = 1e-13  # barycentric coordinates of a tip below this are zero
+_ON_FACET = 1e-13  # barycentric coordinates of a tip below this are zero
 _NOTHING = 1e-30  # sub-cells below this share of their cell are left out
 
 _ROUND_OFF = 1e-14  # the same for fractions that are determinants
@@ -245,6 +245,9 @@ def _one_alone(phi: Floats, rows: Ints, alone: Ints, side: int) -> list[_Part]:
     values = phi[rows]
     n = values.shape[1]
     others = local_facets(n - 1)[alone]
+    # The values decide which diagonal splits what is left, not the numbers of the nodes.
+    by_value = np.argsort(np.abs(np.take_along_axis(values, others, 1)), axis=1, kind="stable")
+    others = np.take_along_axis(others, by_value, 1)
     cut_points, t, u = zip(*[_mix(values, alone, others[:, m]) for m in range(n - 1)], strict=True)
     corners = [_corner(values, others[:, m]) for m in range(n - 1)]
     parts = [(np.stack([_corner(values, alone), *cut_points], 1), np.prod(t, axis=0), side)]
@@ -285,7 +288,7 @@ def _tip_cells(
     tip = level_set.tip[k]
     apex = barycentric(mesh, cells, np.broadcast_to(tip, (len(cells), mesh.dim)))
     # Round-off of a tip on a facet would leave a sub-cell without area whose points hit the tip.
-    apex = np.where(apex > _ROUND_OFF, apex, 0.0)
+    apex = np.where(apex > _ON_FACET, apex, 0.0)
     apex /= apex.sum(axis=1, keepdims=True)
     phi = level_set.phi[mesh.cells[cells]]
     crossed = (phi.min(axis=1) < 0) & (phi.max(axis=1) > 0)

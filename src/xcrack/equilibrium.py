@@ -69,7 +69,7 @@ def balanced(space: Space, motion: Motion, f: Floats) -> tuple[Floats, float]:
         return f, 0.0
     d = space.dim
     n = space.n_nodes * d
-    total = float(np.linalg.norm(f[:n].reshape(-1, d), axis=1).sum())
+    total = _total(space, f)
     if total == 0:
         return f, 0.0
     # Resultants of unit translations and rotations with a lever of the body's size.
@@ -77,15 +77,30 @@ def balanced(space: Space, motion: Motion, f: Floats) -> tuple[Floats, float]:
     residual = modes.T @ f
     share = float(np.abs(residual).max() / total)
     if share > _IMBALANCE:
-        force = f[:n].reshape(-1, d).sum(axis=0)
+        modes = rigid_modes(space.node_points)
+        resultant = modes.T @ f[:n]
         raise ProblemError(
             f"the body is not held against a rigid motion and its loads are out of balance by "
             f"{100 * share:.3g} % of the sum of all forces ({total:.4g}; resultant force "
-            f"{np.array2string(force, precision=4)}): add a support such as fix(set, axis), or "
+            f"{np.round(resultant[:d], 6).tolist()}, moment about the centre "
+            f"{np.round(resultant[d:], 6).tolist()}): add a support such as fix(set, axis), or "
             "loads that balance."
         )
     correction = motion.modes @ (motion.modes.T @ f)
     return f - correction, share
+
+
+def _total(space: Space, f: Floats) -> float:
+    """Sum of all forces; pressure on lips acts on the jumps of enriched functions alone."""
+    size = np.linalg.norm(f.reshape(-1, space.dim), axis=1)
+    total = float(size[: space.n_nodes].sum())
+    for number in space.heaviside:
+        total += float(size[number[number >= 0]].sum())
+    for tip in space.tips:
+        first = tip.point_to_function[tip.point_to_function >= 0]
+        each = (first[:, None] + np.arange(tip.functions)).ravel()
+        total += float(size[each].sum()) / np.sqrt(tip.radius)
+    return total
 
 
 def without_motion(motion: Motion, u: Floats) -> Floats:

@@ -46,7 +46,9 @@ def inf_sup(problem: Problem, crack: int = 0, *, norm: str = "h1") -> float:
     model = build(problem)
     space = model.space
     if not 0 <= crack < len(space.cuts):
-        raise ProblemError(f"crack {crack}: the problem has {len(space.cuts)}, numbered from 0.")
+        raise ProblemError(
+            f"crack {crack}: the problem has {len(space.cuts)} crack(s), numbered from 0."
+        )
     lips = model.lips[crack]
     chosen = multipliers(space, crack, lips, problem.numerics.multipliers)
     if norm == "h1":

@@ -59,9 +59,7 @@ def level_set(mesh: Mesh, crack: Crack) -> LevelSet:
     from xcrack.kernels.distance import polyline_distance
 
     reach = 10 * mesh.extent + float(np.abs(crack.points - mesh.points[0]).max())
-    first, last = crack.points[0], crack.points[-1]
-    start = first + reach * _unit(first - crack.points[1])
-    stop = last + reach * _unit(last - crack.points[-2])
+    start, stop = _prolongation(crack.points, reach)
     vertices = np.concatenate([[start], crack.points, [stop]])
     phi, segment = polyline_distance(mesh.points, vertices)
     x, frame = front(crack)
@@ -91,6 +89,34 @@ def level_set(mesh: Mesh, crack: Crack) -> LevelSet:
         near[np.isin(mesh.edges, nodes).any(axis=1)] = True
     phi = _snapped(mesh, phi)
     return LevelSet(lock(phi), lock(psi), tip_cells, lock(x), lock(mouth), lock(near))
+
+
+def _prolongation(points: Floats, reach: float) -> tuple[Floats, Floats]:
+    """Ends of the rays that prolong a polyline, where they meet it or each other at the latest.
+
+    Beyond such a crossing of a crack that turns by more than half a circle the sides of the two
+    pieces contradict each other.
+    """
+    first, last = points[0], points[-1]
+    back, on = _unit(first - points[1]), _unit(last - points[-2])
+    near = _free_reach(first, back, points[1:], reach)
+    far = _free_reach(last, on, points[:-1], reach)
+    ahead = np.stack([last, last + far * on])
+    near = _free_reach(first, back, ahead, near)
+    far = _free_reach(last, on, np.stack([first, first + near * back]), far)
+    return first + near * back, last + far * on
+
+
+def _free_reach(origin: Floats, direction: Floats, polyline: Floats, reach: float) -> float:
+    """Length up to which a ray runs before it meets a polyline."""
+    a, along = polyline[:-1], np.diff(polyline, axis=0)
+    gap = a - origin
+    cross = direction[0] * along[:, 1] - direction[1] * along[:, 0]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        t = (gap[:, 0] * along[:, 1] - gap[:, 1] * along[:, 0]) / cross
+        u = (gap[:, 0] * direction[1] - gap[:, 1] * direction[0]) / cross
+    hit = (cross != 0) & (t > 0) & (u >= -1e-9) & (u <= 1 + 1e-9)
+    return float(min(reach, np.min(t[hit], initial=np.inf)))
 
 
 def _unit(v: Floats) -> Floats:

@@ -1,8 +1,9 @@
 """The scene: body, cracks, supports and loads, checked before anything is built."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from numbers import Real
 from typing import Any
 
 from xcrack.conditions import (
@@ -64,11 +65,14 @@ class Problem:
         for name, kind in (("mesh", Mesh), ("material", Isotropic), ("numerics", Numerics)):
             if not isinstance(getattr(self, name), kind):
                 raise ProblemError(
-                    f"Problem({name}=...) must be a {kind.__name__}, "
+                    f"Problem({name}=...) must be of type {kind.__name__}, "
                     f"not {type(getattr(self, name)).__name__}."
                 )
         for name in ("cracks", "supports", "loads"):
-            object.__setattr__(self, name, tuple(getattr(self, name)))
+            given = getattr(self, name)
+            if isinstance(given, str) or not isinstance(given, Iterable):
+                raise ProblemError(f"{name}: give a list, such as {name}=[...], not {type(given).__name__}.")
+            object.__setattr__(self, name, tuple(given))
         if self.mesh.dim == 3:
             raise ProblemError(
                 "the mesh has tetrahedra: this version solves plane bodies; give a mesh of "
@@ -97,10 +101,13 @@ class Problem:
         """Loads and factor of a load state: a number, or a list of loads."""
         if state is None:
             return tuple(self.loads), 1.0
-        if isinstance(state, int | float):
-            if not abs(state) < float("inf"):
-                raise ProblemError(f"load state {state}: give a finite number.")
-            return tuple(self.loads), float(state)
+        if isinstance(state, Real):
+            factor = float(state)
+            if not abs(factor) < float("inf"):
+                raise ProblemError(f"load state {factor}: give a finite number.")
+            return tuple(self.loads), factor
+        if isinstance(state, str) or not isinstance(state, Iterable):
+            raise ProblemError(f"load state {state!r}: give a number or a list of loads.")
         loads = tuple(state)
         for load in loads:
             self._check_load(load)

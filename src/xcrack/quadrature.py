@@ -18,6 +18,7 @@ from xcrack.space import Space
 
 _LEVELS = 5  # bisections towards a tip before the fan takes over
 _SECTOR = 0.6  # rad, widest sector of a fan
+_FOOT = 1e-9  # a foot this close to an end is the end: round-off of coordinates far from 0
 _EDGE_POINTS = 6  # Gauss points of a boundary piece
 
 
@@ -127,12 +128,14 @@ def cell_points(space: Space, cells: Ints, n: int, degree: int) -> Points:
     plain = np.nonzero(~with_tip)[0]
     bary, weight = simplex_rule(space.dim, degree)
     number = [np.repeat(plain, len(weight))]
-    where = [np.einsum("pv,svb->spb", bary, subs.bary[plain]).reshape(-1, space.dim + 1)]
+    corners = _from_tips(space, subs.cell[plain], subs.bary[plain])
+    where = [np.einsum("pv,svb->spb", bary, corners).reshape(-1, space.dim + 1)]
     share = [np.outer(subs.fraction[plain], weight).ravel()]
     regular, regular_bary, regular_share, fans = _towards_tips(space, subs, np.nonzero(with_tip)[0])
     rule, rule_weight = simplex_rule(space.dim, 2 * n) if n in (4, 5) else conical(space.dim, n)
     number.append(np.repeat(regular, len(rule_weight)))
-    where.append(np.einsum("pv,svb->spb", rule, regular_bary).reshape(-1, space.dim + 1))
+    corners = _from_tips(space, subs.cell[regular], regular_bary)
+    where.append(np.einsum("pv,svb->spb", rule, corners).reshape(-1, space.dim + 1))
     share.append(np.outer(regular_share, rule_weight).ravel())
     sub, swept, swept_share = _fan_points(space, subs, fans, n)
     number.append(sub)
@@ -145,6 +148,20 @@ def cell_points(space: Space, cells: Ints, n: int, degree: int) -> Points:
     return Points(
         cell, every[order], part[order] * space.mesh.volume[cell], subs.side[numbers[order]]
     )
+
+
+def _from_tips(space: Space, cell: Ints, bary: Floats) -> Floats:
+    """Vertices of simplices, those nearer to a tip first.
+
+    A conical rule is not symmetric: with an order that geometry decides, points do not depend
+    on how nodes are numbered.
+    """
+    if not space.tips or not len(cell):
+        return bary
+    x = np.einsum("svb,sbd->svd", bary, space.mesh.points[space.mesh.cells[cell]])
+    distance = np.min([np.linalg.norm(x - tip.x, axis=2) for tip in space.tips], axis=0)
+    order = np.argsort(distance, axis=1, kind="stable")
+    return np.take_along_axis(bary, order[:, :, None], axis=1)
 
 
 _Fans = tuple[Ints, Floats, Floats]
@@ -294,7 +311,7 @@ def segment_points(
         along = end - begin
         square = np.maximum((along * along).sum(axis=1), 1e-300)
         foot = np.clip(((nearest - begin) * along).sum(axis=1) / square, 0, 1)
-        foot = np.where(foot < 1e-12, 0.0, np.where(foot > 1 - 1e-12, 1.0, foot))
+        foot = np.where(foot < _FOOT, 0.0, np.where(foot > 1 - _FOOT, 1.0, foot))
         distance = np.linalg.norm(begin + foot[:, None] * along - nearest, axis=1)
         near = distance < length
     u, w = gauss(n)

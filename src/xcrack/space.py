@@ -15,6 +15,7 @@ from xcrack.arrays import Bools, Floats, Ints, lock
 from xcrack.crack import Crack, front
 from xcrack.cut import Cut
 from xcrack.enrichment import heaviside_nodes, node_level, tip_points, tip_radii
+from xcrack.errors import GeometryError
 from xcrack.mesh import Mesh
 from xcrack.numerics import Numerics
 from xcrack.simplex import cell_nodes, node_points, shape_derivatives, shape_values
@@ -243,6 +244,13 @@ def space(
     mesh: Mesh, order: int, cracks: tuple[Crack, ...], cuts: tuple[Cut, ...], numerics: Numerics
 ) -> Space:
     """Number the functions: standard ones first, then Heaviside by crack, then tips."""
+    for c, (crack, cut) in enumerate(zip(cracks, cuts, strict=True)):
+        if not len(cut.lip_cell):
+            first, last = np.round(crack.points[[0, -1]], 6).tolist()
+            raise GeometryError(
+                f"crack {c} from {first} to {last} cuts no cell: it runs along the boundary; move "
+                "it inside, or leave it out."
+            )
     n_nodes = mesh.n_points + (len(mesh.edges) if order == 2 else 0)
     count = n_nodes
     heaviside = []

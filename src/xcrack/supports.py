@@ -8,6 +8,7 @@ from xcrack.arrays import Bools, Floats, Ints
 from xcrack.conditions import Displacement, Fix, evaluate
 from xcrack.errors import ProblemError
 from xcrack.loads import facet_points, facet_set, nearest_point, position
+from xcrack.quadrature import Points
 from xcrack.simplex import facet_nodes
 from xcrack.space import Space
 
@@ -39,6 +40,7 @@ def known_unknowns(space: Space, supports: tuple[Fix | Displacement, ...]) -> Kn
     """
     fixed = np.zeros((space.n_functions, space.dim), dtype=bool)
     value = np.zeros((space.n_functions, space.dim))
+    fitted = np.zeros_like(fixed)
     for support in supports:
         if isinstance(support, Fix):
             functions = _functions_of(space, support.where, "fix")
@@ -46,10 +48,10 @@ def known_unknowns(space: Space, supports: tuple[Fix | Displacement, ...]) -> Kn
             if support.axis is not None and support.axis >= space.dim:
                 raise ProblemError(f"fix(axis={support.axis}): the body is plane, axis is 0 or 1.")
             for axis in axes:
-                _impose(space, fixed, value, functions, axis, np.zeros(len(functions)), 0)
+                _impose(space, fixed, value, fitted, functions, axis, np.zeros(len(functions)), 0)
         else:
             for axis, functions, numbers, n_fitted in _imposed(space, support):
-                _impose(space, fixed, value, functions, axis, numbers, n_fitted)
+                _impose(space, fixed, value, fitted, functions, axis, numbers, n_fitted)
     return Known(fixed.ravel(), value.ravel())
 
 
@@ -57,6 +59,7 @@ def _impose(
     space: Space,
     fixed: Bools,
     value: Floats,
+    fitted: Bools,
     functions: Ints,
     axis: int,
     numbers: Floats,
@@ -64,9 +67,10 @@ def _impose(
 ) -> None:
     """Write values; the last `n_fitted` come from a fit and may differ from a neighbour's."""
     again = fixed[functions, axis]
+    from_fit = np.arange(len(functions)) >= len(functions) - n_fitted
     scale = max(float(np.abs(numbers).max(initial=0)), float(np.abs(value).max(initial=0)))
     clash = again & (np.abs(value[functions, axis] - numbers) > 1e-6 * scale)
-    clash &= np.arange(len(functions)) < len(functions) - n_fitted
+    clash &= ~from_fit & ~fitted[functions, axis]
     if clash.any():
         i = int(np.argmax(clash))
         x = space.node_points[functions[i]]
@@ -76,6 +80,7 @@ def _impose(
         )
     value[functions[~again], axis] = numbers[~again]
     fixed[functions, axis] = True
+    fitted[functions[~again], axis] = from_fit[~again]
 
 
 def _set_nodes(space: Space, where: object, what: str) -> Ints:
@@ -86,49 +91,64 @@ def _set_nodes(space: Space, where: object, what: str) -> Ints:
 
 
 def _functions_of(space: Space, where: object, what: str) -> Ints:
-    """Standard and enriched functions of all nodes of a set."""
+    """Functions that act on a set: standard ones, and enriched ones with a trace there.
+
+    At a point only the standard function has a value, and that of a jump on the crack.
+    """
     nodes = _set_nodes(space, where, what)
     parts = [nodes]
-    for c, number in enumerate(space.heaviside):
-        # Where the set ends on lip + its nodes there leave lip - free.
-        both = nodes[~np.isin(nodes, _at_plus_lip(space, where, c, what))]
-        parts.append(number[both][number[both] >= 0])
-    vertices = nodes[nodes < space.mesh.n_points]
-    for tip in space.tips:
-        first = tip.point_to_function[vertices]
-        first = first[first >= 0]
-        parts.append((first[:, None] + np.arange(tip.functions)).ravel())
+    if isinstance(where, str):
+        facets = facet_set(space.mesh, where, what)
+        _check_ends(space, where, facets, what)
+        owner = space.mesh.facet_to_cell[space.mesh.facet_numbers(facets), 0]
+        facets = facets[space.signature[owner] != 0]
+        if len(facets):
+            parts.append(_traces(space, facets)[1])
+    else:
+        for cut, number in zip(space.cuts, space.heaviside, strict=True):
+            on_lip = nodes[cut.level_set.phi[nodes] == 0]
+            parts.append(number[on_lip][number[on_lip] >= 0])
     return np.unique(np.concatenate(parts))
 
 
-def _at_plus_lip(space: Space, where: object, c: int, what: str) -> Ints:
-    """Points on crack c at which a set ends on lip +.
+def _check_ends(space: Space, where: str, facets: Ints, what: str) -> None:
+    """Raise where a set ends at a point on a crack and holds its lip - there.
 
-    Raises
-    ------
-    ProblemError
-        The set ends on lip -: the functions of such a point are those of lip + and of the jump,
-        and only their sum is known.
+    The functions of such a point are those of lip + and of the jump: only their sum is known.
     """
-    if not isinstance(where, str):
-        return np.zeros(0, dtype=np.int64)
-    phi = space.cuts[c].level_set.phi
-    facets = facet_set(space.mesh, where, what)
-    touches = np.zeros((2, space.mesh.n_points), dtype=bool)
-    for corner in range(facets.shape[1]):
-        others = np.delete(phi[facets], corner, axis=1)
-        touches[0, facets[(others < 0).any(axis=1), corner]] = True
-        touches[1, facets[(others > 0).any(axis=1), corner]] = True
-    ends = (phi == 0) & (space.heaviside[c][: space.mesh.n_points] >= 0)
-    bad = ends & touches[0] & ~touches[1]
-    if bad.any():
-        raise ProblemError(
-            f"{what}({where!r}) ends at {np.round(space.mesh.points[np.argmax(bad)], 6).tolist()}, "
-            f"where crack {c} meets the boundary, and holds its lip - only: give the points of the "
-            "crack in the reverse order (the held lip is then lip +), or move its mouth by a "
-            "thousandth of a cell."
-        )
-    return np.nonzero(ends & touches[1] & ~touches[0])[0]
+    for c, cut in enumerate(space.cuts):
+        phi = cut.level_set.phi
+        touches = np.zeros((2, space.mesh.n_points), dtype=bool)
+        for corner in range(facets.shape[1]):
+            others = np.delete(phi[facets], corner, axis=1)
+            touches[0, facets[(others < 0).any(axis=1), corner]] = True
+            touches[1, facets[(others > 0).any(axis=1), corner]] = True
+        ends = (phi == 0) & (space.heaviside[c][: space.mesh.n_points] >= 0)
+        bad = ends & touches[0] & ~touches[1]
+        if bad.any():
+            x = np.round(space.mesh.points[np.argmax(bad)], 6).tolist()
+            raise ProblemError(
+                f"{what}({where!r}) ends at {x}, where crack {c} meets the boundary, and holds its "
+                "lip - only: give the points of the crack in the reverse order (the held lip is "
+                "then lip +), or move its mouth by a thousandth of a cell."
+            )
+
+
+def _traces(space: Space, facets: Ints) -> tuple[Points, Ints, Ints, Floats]:
+    """Points on facets, and what acts there: function, number of the point, value."""
+    points, _ = facet_points(space, facets)
+    columns: list[Ints] = []
+    rows: list[Ints] = []
+    values: list[Floats] = []
+    for batch, _ in space.batches(np.unique(points.cell)):
+        number, row, _ = points.of_cells(batch.cells)
+        N, _ = space.tabulate(batch, row, points.bary[number], points.side[number])
+        functions = batch.functions[row]
+        acts = (functions >= 0) & (np.abs(N) > _TRACE)
+        columns.append(functions[acts])
+        rows.append(np.broadcast_to(number[:, None], functions.shape)[acts])
+        values.append(N[acts])
+    return points, np.concatenate(columns), np.concatenate(rows), np.concatenate(values)
 
 
 def _imposed(space: Space, support: Displacement) -> list[tuple[int, Ints, Floats, int]]:
@@ -145,8 +165,9 @@ def _imposed(space: Space, support: Displacement) -> list[tuple[int, Ints, Float
     if not isinstance(support.where, str):
         u = evaluate(value, space.node_points[nodes], what)
         return [(axis, nodes, u[:, axis], 0) for axis in axes]
-    for c in range(len(space.cuts)):
-        _at_plus_lip(space, support.where, c, "displacement")
+    _check_ends(
+        space, support.where, facet_set(space.mesh, support.where, what), "displacement"
+    )
     fitted, coefficients = _fit(space, support.where, value, what)
     plain = nodes[~np.isin(nodes, fitted[fitted < space.n_nodes])]
     u = evaluate(value, space.node_points[plain], what) if len(plain) else np.zeros((0, space.dim))
@@ -172,19 +193,7 @@ def _fit(space: Space, where: str, value: object, what: str) -> tuple[Ints, Floa
     facets = facets[(space.signature[owner] != 0) | on_lip[facets].any(axis=1)]
     if not len(facets):
         return empty
-    points, _ = facet_points(space, facets)
-    columns: list[Ints] = []
-    rows: list[Ints] = []
-    values: list[Floats] = []
-    for batch, _ in space.batches(np.unique(points.cell)):
-        number, row, _ = points.of_cells(batch.cells)
-        N, _ = space.tabulate(batch, row, points.bary[number], points.side[number])
-        functions = batch.functions[row]
-        acts = (functions >= 0) & (np.abs(N) > _TRACE)
-        columns.append(functions[acts])
-        rows.append(np.broadcast_to(number[:, None], functions.shape)[acts])
-        values.append(N[acts])
-    column, row, entry = np.concatenate(columns), np.concatenate(rows), np.concatenate(values)
+    points, column, row, entry = _traces(space, facets)
     special = (column >= space.n_nodes) | np.isin(column, np.nonzero(on_lip)[0])
     if not special.any():
         return empty

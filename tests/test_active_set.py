@@ -1,0 +1,191 @@
+"""The dense contact problem 0 <= p, F p + d >= 0, p (F p + d) = 0, solved in other ways too."""
+
+import itertools
+
+import numpy as np
+import pytest
+import scipy.optimize
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from xcrack.contact import active_set
+from xcrack.errors import ConvergenceError
+
+
+def solve(F, d, start=True, measure=None, stiffness=1.0):
+    F, d = np.asarray(F, dtype=float), np.asarray(d, dtype=float)
+    measure = np.ones(len(d)) if measure is None else measure
+    return active_set(F, d, measure, stiffness, np.full(len(d), start))
+
+
+def by_enumeration(F, d):
+    """Pressure by trying every set: the only one that satisfies all conditions."""
+    n = len(d)
+    for pattern in itertools.product([False, True], repeat=n):
+        active, p = np.array(pattern), np.zeros(n)
+        if active.any():
+            p[active] = np.linalg.solve(F[np.ix_(active, active)], -d[active])
+        if (p >= -1e-12).all() and (F @ p + d >= -1e-12)[~active].all():
+            return p
+    raise AssertionError("no set fits")
+
+
+def by_least_squares(F, d):
+    """Minimum of p F p / 2 + d p over p >= 0 by SciPy."""
+    root = np.linalg.cholesky(F).T
+    return scipy.optimize.nnls(root, -np.linalg.solve(root.T, d))[0]
+
+
+def drawn(seed, n, rank=None):
+    """A symmetric positive matrix and weak gaps of both signs."""
+    rng = np.random.default_rng(seed)
+    A = rng.normal(size=(n, rank or n + 2))
+    return A @ A.T, rng.normal(size=n)
+
+
+@given(seed=st.integers(0, 2**32 - 1), n=st.integers(1, 7), start=st.booleans())
+@settings(max_examples=150, deadline=None, derandomize=True)
+def test_against_enumeration(seed, n, start):
+    F, d = drawn(seed, n)
+    found = solve(F, d, start)
+    exact = by_enumeration(F, d)
+    scale = 1 + np.abs(exact).max()
+    # round-off, times the condition number of a small drawn matrix
+    assert np.abs(found.pressure - exact).max() <= 1e-8 * scale
+    assert found.pressure.min() >= 0
+    assert found.gap.min() >= -1e-8 * np.abs(d).max()
+    assert np.abs(found.pressure * found.gap).max() <= 1e-8 * scale * np.abs(d).max()
+
+
+@pytest.mark.parametrize("n", [20, 60])
+@pytest.mark.parametrize("start", [True, False])
+def test_against_non_negative_least_squares(n, start):
+    """Round-off on matrices like those of lips: neighbours move together."""
+    for seed in range(810, 814):
+        x = np.sort(np.random.default_rng(seed).uniform(0, 1, n))
+        F = np.exp(-8 * np.abs(x[:, None] - x)) + 0.05 * np.eye(n)
+        d = np.cos(9 * x + seed)
+        found = solve(F, d, start)
+        assert np.abs(found.pressure - by_least_squares(F, d)).max() <= 1e-9 * found.pressure.max()
+        assert found.iterations <= 12
+        assert not found.fallback
+
+
+# A set that the plain iteration leaves and returns to (found by a search over small integers).
+CYCLING = [[11.0, 13.0, -10.0], [13.0, 18.0, -15.0], [-10.0, -15.0, 15.0]], [-1.0, -4.0, 4.0]
+
+
+def test_a_cycle_ends_in_the_fallback():
+    F, d = np.array(CYCLING[0]), np.array(CYCLING[1])
+    found = solve(F, d)
+    assert found.fallback
+    assert found.iterations <= 8
+    assert found.pressure == pytest.approx([0, 2 / 9, 0], abs=1e-12)  # round-off
+    assert found.gap == pytest.approx([17 / 9, 0, 2 / 3], abs=1e-12)
+    assert found.active.tolist() == [False, True, False]
+
+
+def test_start_does_not_matter():
+    for seed in range(830, 860):
+        F, d = drawn(seed, 6)
+        every = [
+            active_set(F, d, np.ones(6), 1.0, np.array(start))
+            for start in itertools.product([False, True], repeat=6)
+        ]
+        for found in every:
+            assert np.abs(found.pressure - every[0].pressure).max() <= 1e-9 * (
+                1 + every[0].pressure.max()
+            )
+
+
+@pytest.mark.parametrize("stiffness", [1e-6, 1e-3, 1.0, 1e3, 1e9])
+def test_weight_of_gaps_changes_nothing(stiffness):
+    F, d = drawn(871, 12)
+    reference = solve(F, d)
+    found = solve(F, d, stiffness=stiffness)
+    assert np.array_equal(found.active, reference.active)
+    assert found.iterations == reference.iterations
+
+
+def test_units_change_nothing_but_units():
+    F, d = drawn(873, 9)
+    reference = solve(F, d)
+    for length, stress in ((1e-9, 1e9), (1e3, 1e-6)):
+        measure = np.full(9, length)
+        scaled = F * length**3 / stress
+        found = solve(scaled, d * length**2, measure=measure, stiffness=stress / length)
+        assert np.array_equal(found.active, reference.active)
+        assert found.pressure * length / stress == pytest.approx(reference.pressure, rel=1e-9)
+
+
+def test_groups_of_very_different_size():
+    """A sliver's group beside others: rows scale with the size of their function."""
+    F, d = drawn(877, 8)
+    reference = solve(F, d)
+    size = 10.0 ** np.array([0, -3, -6, -9, -12, 0, -2, -14])
+    found = solve(F * size[:, None] * size, d * size, measure=size)
+    assert np.array_equal(found.active, reference.active)
+    assert found.pressure * size == pytest.approx(reference.pressure, rel=1e-8, abs=1e-12)
+
+
+def test_wide_open_and_wholly_closed():
+    F, _ = drawn(881, 5)
+    for start in (True, False):
+        is_open = solve(F, np.ones(5), start)
+        assert is_open.pressure.max() == 0
+        assert not is_open.active.any()
+        closed = solve(F, -F @ np.arange(1.0, 6.0), start)
+        assert closed.pressure == pytest.approx(np.arange(1.0, 6.0), rel=1e-9)  # round-off
+        assert closed.active.all()
+        assert closed.gap.max() == 0
+
+
+def test_one_group_and_none():
+    assert solve([[2.0]], [-3.0]).pressure == pytest.approx([1.5])
+    assert solve([[2.0]], [3.0], start=True).pressure == pytest.approx([0.0])
+    assert len(solve(np.zeros((0, 0)), np.zeros(0)).pressure) == 0
+
+
+@pytest.mark.parametrize("start", [True, False])
+def test_neither_pressure_nor_gap(start):
+    """d = 0, or of round-off: any set is right, and the pressure is nothing."""
+    F, _ = drawn(883, 6)
+    assert solve(F, np.zeros(6), start).pressure.max() == 0
+    noise = 1e-16 * np.random.default_rng(5).normal(size=6)
+    found = solve(F, noise, start)
+    assert 0 <= found.pressure.max() <= 1e-12
+    assert found.iterations <= 30
+
+
+@pytest.mark.parametrize("start", [True, False])
+def test_groups_that_touch(start):
+    """Groups whose pressure and gap are both zero, but for round-off, do not let the set hunt."""
+    F, _ = drawn(887, 6)
+    pressure = np.array([2.0, 0.0, 1.0, 0.0, 3.0, 0.0])
+    for seed in range(10):
+        noise = 1e-15 * np.random.default_rng(seed).normal(size=6)
+        found = solve(F, -F @ pressure + noise, start)
+        assert found.pressure == pytest.approx(pressure, abs=1e-12)  # round-off
+        assert found.iterations <= 10
+
+
+@pytest.mark.parametrize("start", [True, False])
+def test_redundant_groups(start):
+    """Two groups with one and the same row share its pressure: the least one is taken."""
+    F, d = drawn(891, 4)
+    twice = np.array([0, 1, 2, 3, 3])
+    d[3] = -abs(d[3]) - 3
+    reference = solve(F, d, start)
+    found = solve(F[np.ix_(twice, twice)], d[twice], start)
+    assert reference.pressure[3] > 0
+    assert found.pressure[3] == pytest.approx(found.pressure[4], rel=1e-6)
+    assert found.pressure[3] + found.pressure[4] == pytest.approx(reference.pressure[3], rel=1e-6)
+    assert found.pressure[:3] == pytest.approx(reference.pressure[:3], rel=1e-6, abs=1e-9)
+
+
+def test_lips_that_supports_press_into_each_other():
+    """A group that nothing free can move, pressed shut by the supports: no pressure opens it."""
+    F, d = drawn(893, 4)
+    F[3], F[:, 3], d[3] = 0, 0, -1.0
+    with pytest.raises(ConvergenceError, match="smallest gap of -1"):
+        solve(F, d, False)
