@@ -76,10 +76,10 @@ class System:
 
     def solve(self, f: Floats, known: Floats | None = None) -> Floats:
         """Displacements for loads `(n_dof,)` or `(n_dof, k)` and known values of the same shape."""
-        known = np.zeros_like(f) if known is None else known
-        residual = f - self.matrix @ known
+        residual = f if known is None else f - self.matrix @ known
         self.count.solves += 1 if f.ndim == 1 else f.shape[1]
-        u = known + self.basis @ self.apply_inverse(self.basis.T @ residual)
+        u = self.basis @ self.apply_inverse(self.basis.T @ residual)
+        u = u if known is None else known + u
         if not np.isfinite(u).all():
             raise ConvergenceError(
                 "the linear solve returned nan: the stiffness is singular. Is the body held, or "

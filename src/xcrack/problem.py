@@ -71,7 +71,9 @@ class Problem:
         for name in ("cracks", "supports", "loads"):
             given = getattr(self, name)
             if isinstance(given, str) or not isinstance(given, Iterable):
-                raise ProblemError(f"{name}: give a list, such as {name}=[...], not {type(given).__name__}.")
+                raise ProblemError(
+                    f"{name}: give a list, such as {name}=[...], not {type(given).__name__}."
+                )
             object.__setattr__(self, name, tuple(given))
         if self.mesh.dim == 3:
             raise ProblemError(

@@ -213,7 +213,7 @@ def _contact(
         chosen = [m for m in spaces if m is not None]
         rows = [gap_rows(m, model.lips[m.crack], model.jumps[m.crack]) for m in chosen]
         N = rows[0] if len(rows) == 1 else _stacked(rows)
-        F = _dual(engine, N)
+        F = dual(engine, N)
         measure = np.concatenate([m.measure for m in chosen])
         d = N @ open_u
         sets = []
@@ -267,7 +267,7 @@ def _stacked(rows: list[Any]) -> Any:
     return sp.csr_matrix(sp.vstack(rows))
 
 
-def _dual(engine: System, N: Any) -> Floats:
+def dual(engine: System, N: Any) -> Floats:
     """F = N K^-1 N^T, in blocks of right-hand sides."""
     F = np.empty((N.shape[0], N.shape[0]))
     for first in range(0, N.shape[0], _BLOCK):
