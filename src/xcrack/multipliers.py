@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from xcrack.arrays import Floats, Ints
+from xcrack.arrays import Bools, Floats, Ints
 from xcrack.lip_points import LipPoints
 from xcrack.loads import jump_values
 from xcrack.space import Space
@@ -40,13 +40,20 @@ class Multipliers:
     centre: Floats
 
 
-def multipliers(space: Space, c: int, lips: LipPoints, kind: str) -> Multipliers:
-    """Multiplier space of crack c: "reduced" or "naive"."""
+def multipliers(
+    space: Space, c: int, lips: LipPoints, kind: str, fixed: Bools | None = None
+) -> Multipliers:
+    """Multiplier space of crack c: "reduced" or "naive".
+
+    Where supports decide the jump, as at a mouth in a side whose displacement is imposed, a group
+    of its own would be redundant: with `fixed` (n_dof,) it joins its neighbour.
+    """
     nodes, traces = _traces(space, lips)
     if kind == "naive":
         group = np.arange(len(nodes))
     else:
-        group = _groups(space, c, nodes, traces, lips.weight)
+        held = _held(space, c, nodes, traces, lips, fixed)
+        group = _groups(space, c, nodes, traces, lips.weight, held)
     n_groups = int(group.max(initial=-1)) + 1
     gather = sp.csr_matrix(
         (np.ones(len(nodes)), (np.arange(len(nodes)), group)), shape=(len(nodes), n_groups)
@@ -74,7 +81,21 @@ def _traces(space: Space, lips: LipPoints) -> tuple[Ints, sp.csr_matrix]:
     return nodes[reached], sp.csr_matrix(matrix[:, np.nonzero(reached)[0]])
 
 
-def _groups(space: Space, c: int, nodes: Ints, traces: sp.csr_matrix, weight: Floats) -> Ints:
+def _held(
+    space: Space, c: int, nodes: Ints, traces: sp.csr_matrix, lips: LipPoints, fixed: Bools | None
+) -> Bools:
+    """Which of the nodes have a normal jump that supports decide."""
+    number = space.heaviside[c][nodes]
+    if fixed is None:
+        return np.zeros(len(nodes), dtype=bool)
+    normal = np.asarray(traces.T @ (lips.weight[:, None] * lips.normal))
+    share = (normal**2 * fixed.reshape(-1, space.dim)[number]).sum(axis=1)
+    return np.asarray((number >= 0) & (share > 0.5 * (normal**2).sum(axis=1)))
+
+
+def _groups(
+    space: Space, c: int, nodes: Ints, traces: sp.csr_matrix, weight: Floats, held: Bools
+) -> Ints:
     """Group number of each node."""
     mesh, cut = space.mesh, space.cuts[c]
     edges = np.nonzero(~np.isnan(cut.cut_edge))[0]
@@ -105,6 +126,12 @@ def _groups(space: Space, c: int, nodes: Ints, traces: sp.csr_matrix, weight: Fl
     # Nodes on the crack carry a group of their own, unless the tip lies on them.
     own = on_crack & inside & ~covered
     covered |= own
+    if held.any():
+        roots = np.array([root(i) for i in range(len(nodes))])
+        mass = np.asarray(traces.T @ weight).ravel()
+        total = np.bincount(roots, mass, len(nodes))
+        covered &= np.bincount(roots, mass * held, len(nodes))[roots] < 0.5 * total[roots]
+        parent[~covered] = np.nonzero(~covered)[0]
     if covered.any() and not covered.all():
         overlap = (traces.T @ sp.diags(weight) @ traces).toarray()
         choices = np.nonzero(covered)[0]

@@ -209,7 +209,7 @@ def _contact(
     pending = _needing(problem, model, u, spaces)
     while pending:
         for c in pending:
-            spaces[c] = multipliers(model.space, c, model.lips[c], problem.numerics.multipliers)
+            spaces[c] = _multipliers(problem, model, c)
         chosen = [m for m in spaces if m is not None]
         rows = [gap_rows(m, model.lips[m.crack], model.jumps[m.crack]) for m in chosen]
         N = rows[0] if len(rows) == 1 else _stacked(rows)
@@ -254,11 +254,16 @@ def _needing(
         limit = -_OVERLAP * np.abs(u[: model.space.n_nodes * model.space.dim]).max(axis=0)
         if (gap.min(axis=0) >= limit).all():
             continue
-        trial = multipliers(model.space, c, lips, problem.numerics.multipliers)
+        trial = _multipliers(problem, model, c)
         weak = (trial.values.T @ (lips.weight[:, None] * gap)) / trial.measure[:, None]
         if (weak.min(axis=0) < limit).any():
             needing.append(c)
     return needing
+
+
+def _multipliers(problem: Problem, model: Model, c: int) -> Multipliers:
+    kind = problem.numerics.multipliers
+    return multipliers(model.space, c, model.lips[c], kind, model.known.fixed)
 
 
 def _stacked(rows: list[Any]) -> Any:

@@ -204,6 +204,11 @@ def _fit(space: Space, where: str, value: object, what: str) -> tuple[Ints, Floa
     A[row_place, place] = entry[keep]
     x = position(space, points.cell, points.bary)[row_ids]
     target = evaluate(value, x, what)
-    weight = np.sqrt(points.weight[row_ids])[:, None]
-    solution = np.linalg.lstsq(weight * A, weight * target, rcond=1e-10)[0]
-    return unknowns, np.asarray(solution, dtype=np.float64)
+    # Each point counts alike: weighted by length, the data of a sliver would be cut off as noise.
+    # Enriched functions take what standard ones leave, or they would take part in every field
+    # where their traces are nearly those of polynomials.
+    standard = unknowns < space.n_nodes
+    solution = np.zeros((len(unknowns), space.dim))
+    solution[standard] = np.linalg.lstsq(A[:, standard], target, rcond=1e-11)[0]
+    solution += np.linalg.lstsq(A, target - A @ solution, rcond=1e-11)[0]
+    return unknowns, solution

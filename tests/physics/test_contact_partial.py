@@ -80,8 +80,7 @@ def test_partial_closure(order, s_m, place):
     assert abs(sif.K_I[0]) <= (1e-2 if order == 1 else 1e-3) * K
     assert np.abs(sif.K_II).max() <= 1e-3 * K
     assert abs(end - (x0 - c)) <= h
-    # Of the closed part at s_m = 0.25 only 6.7 cells are left, and its end lies in one of them.
-    assert error_p <= (0.05 if s_m == 0 else 0.08)
+    assert error_p <= 0.05
     assert error_gap <= 1e-2
     assert solution.report.operations["contact_iterations"] <= 30
     # Groups do not overlap but for round-off; inside a group the lips may, where contact ends.
@@ -206,6 +205,11 @@ SLIDING = [
 ]
 
 
+@cache
+def drawn_sliding(order):
+    return [closed_and_sliding(order, where) for where in SLIDING]
+
+
 @pytest.mark.parametrize("order", [1, 2])
 def test_closed_under_compression_and_shear(order):
     """K_I = 0 while K_II is not, on 41 by 41; a / h is 10 here.
@@ -214,7 +218,7 @@ def test_closed_under_compression_and_shear(order):
     the last groups' pressures. At order 2 every tip is below 0.05 %. At order 1 the typical tip
     is below half a per cent; one of these twelve, whose last group is half a cell long, has 5 %.
     """
-    found = [closed_and_sliding(order, where) for where in SLIDING]
+    found = drawn_sliding(order)
     K = np.array([k for k, _ in found])
     K_I, K_II = np.abs(K[..., 0]), np.abs(np.abs(K[..., 1]) - 1)
     error_p = [np.abs(s.contact[0].pressure - 1).max() for _, s in found]
@@ -232,6 +236,24 @@ def test_closed_under_compression_and_shear(order):
         assert solution.contact[0].closed.all()
         slip = np.abs(solution.jump(0)).max()
         assert np.abs(solution.contact[0].gap).max() <= (3e-2 if order == 1 else 2e-3) * slip
+
+
+@pytest.mark.parametrize(
+    "order",
+    [
+        pytest.param(
+            1,
+            marks=pytest.mark.xfail(
+                strict=True,
+                reason="order 1: pressures of short groups at a tip are off by up to a third",
+            ),
+        ),
+        2,
+    ],
+)
+def test_every_closed_tip_is_below_half_a_per_cent(order):
+    """The promise for K_I, of every one of the twelve tips and not of the typical one."""
+    assert max(np.abs(K[:, 0]).max() for K, _ in drawn_sliding(order)) <= 5e-3
 
 
 @pytest.mark.parametrize("order", [1, 2])

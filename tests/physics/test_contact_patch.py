@@ -250,6 +250,26 @@ def test_sliding_at_any_cut_position(order):
         assert found <= EXACT, eps
 
 
+@pytest.mark.parametrize("order", [1, 2])
+@pytest.mark.parametrize("traction", [(), ("left",)], ids=str)
+def test_sliding_where_the_cut_sides_are_held(order, traction):
+    """Displacements imposed on the sides the crack leaves through, whatever sliver it leaves."""
+    mesh = xc.box((-1, -1), (1, 1), 10)
+    for eps in CUTS + CUTS_BELOW:
+        found = sliding_patch(mesh, 0.0, (0.0, eps * CELL), order, traction)
+        assert found <= EXACT, eps
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_tip_next_to_a_held_side(order):
+    """Tip functions that reach a side with imposed displacements: 1e-8, round-off of the fit."""
+    for k, tip in enumerate([(0.72, 0.77), (-0.635, -0.681), (0.574, 0.765)]):
+        ahead = scenes.rows(0.6 + 0.3 * k)[0] * (-1 if k == 1 else 1)
+        crack = xc.line_crack([np.array(tip) - 0.9 * ahead, tip])
+        found = uniform_patch(scenes.perturbed(7 + 2 * k, 31 + k), [crack], order, ())
+        assert found <= 1e-8, tip
+
+
 # Linear pressure ---------------------------------------------------------------------------------
 
 # Uniform, and two of Airy's cubics; pressure 1 - (0.28 x) along the crack, with shear off it.
