@@ -58,7 +58,7 @@ def imposed(field, names):
 
 
 def on_box(mesh, cracks, field, *, traction=(), order=2, plane="strain", E=1.0, nu=0.3, **options):
-    """Problem whose exact solution is the field: tractions on some sides, displacements elsewhere."""
+    """Problem whose exact solution is the field: tractions on some sides, else displacements."""
     sides = [s for s in ("left", "right", "bottom", "top") if s not in traction]
     return xc.Problem(
         mesh,
@@ -77,7 +77,9 @@ def edge_line(tip, angle, length=1.3):
     return xc.line_crack([tip - length * rows(angle)[0], tip])
 
 
-def williams_edge(n, tip, angle, *, seed=3, order=2, K=(1.0, 0.6), T=0.0, plane="strain", **options):
+def williams_edge(
+    n, tip, angle, *, seed=3, order=2, K=(1.0, 0.6), T=0.0, plane="strain", **options
+):
     """Edge crack in [-1, 1]² under a Williams field, traction on the cracked side."""
     field = turned(
         lambda x, y: exact.williams(x, y, 1.0, 0.3, K[0], K[1], T, plane=plane), tip, angle
@@ -134,12 +136,6 @@ def K_of(problem, crack=0):
         return np.array(xc.stress_intensity(xc.solve(problem), crack).K)
 
 
-def wedge(theta):
-    """Rotation by an angle, to be applied to rows of points."""
-    c, s = np.cos(theta), np.sin(theta)
-    return np.array([[c, s], [-s, c]])
-
-
 def griffith_box(n, *, a=1.0, half=2.0, stress=(0.0, 1.0, 0.0), angle=0.0, origin=(0.0, 0.0),
                  order=2, seed=3, amplitude=0.15, E=1.0, nu=0.3, plane="strain", points=None,
                  contact="auto", **options):  # fmt: skip
@@ -148,9 +144,7 @@ def griffith_box(n, *, a=1.0, half=2.0, stress=(0.0, 1.0, 0.0), angle=0.0, origi
     `stress` is (sxx, syy, sxy) in the frame of the crack, which is turned by `angle`; `points`
     replaces the two ends of the crack.
     """
-    field = turned(
-        lambda x, y: exact.griffith(x, y, a, E, nu, *stress, plane=plane), origin, angle
-    )
+    field = turned(lambda x, y: exact.griffith(x, y, a, E, nu, *stress, plane=plane), origin, angle)
     mesh = perturbed(n, seed, amplitude, (-half, -half), (half, half))
     if points is None:
         points = np.array([[-a, 0.0], [a, 0.0]]) @ rows(angle) + np.asarray(origin)

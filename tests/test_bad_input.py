@@ -144,7 +144,7 @@ PROBLEMS = {
     "E nan": (lambda: xc.Isotropic(NAN, 0.3), "modulus E = nan must be positive"),
     "nu": (lambda: xc.Isotropic(1.0, 0.5), r"nu = 0.5 must lie in \(-1, 0.5\).*0.4999"),
     "nu below": (lambda: xc.Isotropic(1.0, -1.0), r"nu = -1.0 must lie in \(-1, 0.5\)"),
-    "plane": (lambda: xc.Isotropic(1.0, 0.3, plane="stain"), "plane = 'stain': give \"strain\""),
+    "plane": (lambda: xc.Isotropic(1.0, 0.3, plane="stain"), "plane='stain'.: give \"strain\""),
     "no plane": (
         lambda: xc.Problem(box(), xc.Isotropic(1.0, 0.3)),
         r'plane="strain"\) or plane="stress"',

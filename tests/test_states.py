@@ -32,3 +32,11 @@ def test_solutions_of_different_solves_are_refused():
     problem = pulled()
     with pytest.raises(xc.ProblemError, match="do not share one space"):
         xc.stress_intensities([xc.solve(problem), xc.solve(problem)])
+
+
+@pytest.mark.parametrize("states", [1.0, "max"])
+def test_states_must_be_a_list(states):
+    with pytest.raises(
+        xc.ProblemError, match=r"give a list of load states, such as states=\[1.0\]"
+    ):
+        xc.solve(pulled(), states=states)

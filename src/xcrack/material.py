@@ -45,7 +45,9 @@ class Isotropic:
                 "incompressible material take a value such as 0.4999."
             )
         if self.plane not in (None, "strain", "stress"):
-            raise ProblemError(f'plane = {self.plane!r}: give "strain" or "stress".')
+            raise ProblemError(
+                f'Isotropic(plane={self.plane!r}): give "strain" or "stress" (nothing in space).'
+            )
 
     @property
     def mu(self) -> float:

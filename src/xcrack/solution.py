@@ -185,7 +185,7 @@ class Solution:
             outside = points[np.argmax(cell < 0)]
             raise GeometryError(
                 f"{np.round(outside, 9).tolist()} lies outside the body ({int((cell < 0).sum())} "
-                "such points)."
+                "such points): ask only for points of the mesh; a curved boundary is a polygon."
             )
         return cell, bary, sides_of(self.space, cell, bary, side), single
 

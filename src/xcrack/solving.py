@@ -1,6 +1,6 @@
 """From a problem to solutions: one stiffness, one factor, any number of load states."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -56,6 +56,10 @@ def solve(
     ConvergenceError
         A singular stiffness, or contact that finds no closed set.
     """
+    if states is not None and (isinstance(states, str) or not isinstance(states, Iterable)):
+        raise ProblemError(
+            f"states = {states!r}: give a list of load states, such as states=[1.0]."
+        )
     solutions = solve_states(problem, [None] if states is None else list(states), solver=solver)
     return solutions[0] if states is None else solutions
 
