@@ -10,7 +10,7 @@ from xcrack.space import Space
 
 # Inner radius of the ring in which q falls, as a share of the outer one. At order 1 the ring stays
 # outside the enriched disc; at order 2 a wide ring saves digits on coarse meshes (measured).
-_RING = {1: 0.4, 2: 0.1}
+_RING = {1: 0.4, 2: 0.15}
 _OUTER = {1: 2.5, 2: 2.5}  # outer radius, as a multiple of the enriched radius
 _CHUNK = 4000  # cells integrated at once; bounds the memory
 

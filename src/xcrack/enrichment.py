@@ -11,6 +11,11 @@ from xcrack.simplex import cell_nodes, facet_nodes
 
 _SHARE = {1: 0.3, 2: 0.4}  # of the free length around a tip, measured best for K at each order
 
+_LEAST = 2.0  # cells
+# In cells: by then K is right to 1e-7 (order 2) or 1e-4 (order 1), and a wider disc would only cost
+# unknowns and fill.
+_MOST = {1: 40.0, 2: 20.0}
+
 
 def leg_size(mesh: Mesh, cells: Ints) -> float:
     """Size of the simplex with right angles that has the mean volume of the cells, length."""
@@ -24,8 +29,9 @@ def tip_radii(
     """Radius of the enriched disc at each tip of each crack, length.
 
     Without a wanted radius: a share (0.3 at order 1, 0.4 at order 2) of the smallest of crack
-    length, distance to the boundary and distance to another tip. A wanted radius is kept, and
-    shrunk only where the body or another tip demands. Never below two cells.
+    length, distance to the boundary and distance to another tip, at most 20 cells (40 at
+    order 1). A wanted radius is kept, and shrunk only where the body or another tip demands.
+    Never below two cells.
     """
     tips = [front(crack)[0] for crack in cracks]
     every = np.concatenate(tips) if tips else np.zeros((0, mesh.dim))
@@ -37,12 +43,12 @@ def tip_radii(
             to_boundary, _ = nearest_boundary(mesh, x)
             apart = np.linalg.norm(every - x, axis=1)
             to_tip = float(np.min(apart[apart > 0], initial=np.inf))
-            least = 2.0 * leg_size(mesh, cut.level_set.tip_cells[k])
+            size = leg_size(mesh, cut.level_set.tip_cells[k])
             if wanted is None:
-                radius = _SHARE[order] * min(length, to_boundary, to_tip)
+                radius = min(_SHARE[order] * min(length, to_boundary, to_tip), _MOST[order] * size)
             else:
                 radius = min(wanted, 0.8 * to_boundary, 0.45 * to_tip)
-            row.append(max(radius, least))
+            row.append(max(radius, _LEAST * size))
         radii.append(tuple(row))
     return radii
 

@@ -16,7 +16,7 @@ class Numerics:
         Geometric: energy rate 1 (order 1) or 2 (order 2) instead of about 0.5.
     radius : float, length, optional
         Radius of the enriched disc. None: 0.3 (order 1) or 0.4 (order 2) of the smallest of crack
-        length, distance to the boundary and to another tip, never below two cells.
+        length, distance to the boundary and to another tip, from 2 to 20 cells (40 at order 1).
     functions : {4, 2}
         Tip functions; two (those of the modes' leading angular terms) cost accuracy.
     multipliers : {"reduced", "naive"}
