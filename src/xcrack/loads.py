@@ -184,12 +184,7 @@ def jump_values(space: Space, c: int, lips: LipPoints) -> list[tuple[Ints, Ints,
         cell = lips.cell[:, s]
         side = cell_side(space, cell)
         side[:, c] = sign
-        cells, inverse = np.unique(cell, return_inverse=True)
-        for batch, rows in space.batches(cells):
-            place = np.full(len(cells), -1, dtype=np.int64)
-            place[rows] = np.arange(len(rows))
-            number = np.nonzero(place[inverse] >= 0)[0]
-            row = place[inverse][number]
+        for batch, number, row in space.batches_of_points(cell):
             N, _ = space.tabulate(batch, row, lips.bary[number, s], side[number])
             result.append((batch.functions[row], number, sign * N))
     return result

@@ -207,12 +207,7 @@ def fields_at(
     d, states = coefficients.shape[1:]
     u = np.zeros((len(cell), d, states))
     gradient = np.zeros((len(cell), d, d, states))
-    cells, inverse = np.unique(cell, return_inverse=True)
-    for batch, rows in space.batches(cells):
-        place = np.full(len(cells), -1, dtype=np.int64)
-        place[rows] = np.arange(len(rows))
-        number = np.nonzero(place[inverse] >= 0)[0]
-        row = place[inverse][number]
+    for batch, number, row in space.batches_of_points(cell):
         N, G = space.tabulate(batch, row, bary[number], side[number])
         a = coefficients[batch.functions[row]].reshape(len(row), -1, d * states)
         u[number] = (N[:, None] @ a).reshape(-1, d, states)

@@ -161,6 +161,22 @@ class Space:
             groups.append((self._batch(cells[rows], cracks, tips), rows))
         return groups
 
+    def batches_of_points(self, cell: Ints) -> list[tuple[Batch, Ints, Ints]]:
+        """Batches that serve points in the given cells `(q,)`, in any order and repeated.
+
+        Returns
+        -------
+        list of (batch, numbers of its points, row in the batch of the cell of each)
+        """
+        cells, inverse = np.unique(cell, return_inverse=True)
+        served = []
+        for batch, rows in self.batches(cells):
+            place = np.full(len(cells), -1, dtype=np.int64)
+            place[rows] = np.arange(len(rows))
+            number = np.nonzero(place[inverse] >= 0)[0]
+            served.append((batch, number, place[inverse][number]))
+        return served
+
     def _batch(self, cells: Ints, cracks: tuple[int, ...], tips: tuple[int, ...]) -> Batch:
         nodes = self.cell_nodes[cells]
         columns = [nodes]
