@@ -23,19 +23,32 @@ class Crack:
     points : (p, d) array, length
         Vertices of the faces; in the plane in the order in which the polyline runs.
     faces : (f, d) array of int
-        Point numbers of each face. Lip + is on the left of the order of the points.
+        Point numbers of each face. In the plane lip + is on the left of the order of the points;
+        in space the normal by the right-hand rule points to it.
     tips : tuple of int, optional
-        Point numbers of the tips, in the order of the points; None where no mesh has decided
-        yet which ends are tips and which are mouths.
+        In the plane: point numbers of the tips, in the order of the points; None where no mesh
+        has decided yet which ends are tips and which are mouths.
+    fronts : tuple of (k,) arrays of int, optional
+        In space: point numbers along each front, in the direction of the third row of its frames
+        (ahead, normal, ahead x normal); a closed front repeats its first point at the end. None
+        where no mesh has decided yet.
     """
 
     points: Floats
     faces: Ints
     tips: tuple[int, ...] | None = None
+    fronts: tuple[Ints, ...] | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "points", frozen(self.points, np.float64))
         object.__setattr__(self, "faces", frozen(self.faces, np.int64))
+        if self.fronts is not None:
+            object.__setattr__(self, "fronts", tuple(frozen(f, np.int64) for f in self.fronts))
+
+    @property
+    def placed(self) -> bool:
+        """Whether a mesh has decided what is front and what is mouth."""
+        return (self.tips if self.dim == 2 else self.fronts) is not None
 
     @property
     def dim(self) -> int:
@@ -44,11 +57,13 @@ class Crack:
 
     @property
     def n_tips(self) -> int:
-        """Number of tips; 0 where they are not decided yet."""
-        return len(self.tips or ())
+        """Number of tips, in space of fronts; 0 where they are not decided yet."""
+        return len(self.tips or self.fronts or ())
 
     def __repr__(self) -> str:
         ends = "not placed" if self.tips is None else f"tips {list(self.tips)}"
+        if self.dim == 3 and self.fronts is not None:
+            ends = f"{len(self.fronts)} front(s)"
         return f"Crack({len(self.points)} points, {len(self.faces)} faces, {ends})"
 
 
