@@ -8,9 +8,9 @@ from xcrack import growth
 from xcrack.crack import front, line_crack
 from xcrack.interaction import SIF
 from xcrack.material import Isotropic
-from xcrack.mesh import box
 from xcrack.problem import Problem
 from xcrack.stepping import length_inside
+from xcrack.structured import box
 
 STRESS = 100.0
 

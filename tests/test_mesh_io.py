@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from xcrack.errors import MeshError, XcrackError, XcrackWarning
-from xcrack.mesh import Mesh, box
+from xcrack.mesh import Mesh
 from xcrack.mesh_io import read_mesh, write_mesh
+from xcrack.structured import box
 
 # Files that gmsh, meshio and pyvista wrote: data/make.py.
 DATA = Path(__file__).parent / "data"

@@ -18,30 +18,30 @@ def barycentric(mesh: Mesh, cell: Ints, x: Floats) -> Floats:
 def locate(mesh: Mesh, x: Floats) -> tuple[Ints, Floats]:
     """Cell of each point `(k,)`, -1 outside, and its barycentric coordinates `(k, d + 1)`.
 
-    Candidates are taken by the distance of their centroids, more and more of them until no cell
-    farther away could still reach the point.
+    Candidates are taken by the distance of their centroids, among cells of like size, more and
+    more of them until no cell farther away could still reach the point.
     """
     x = np.atleast_2d(np.asarray(x, dtype=float))
     cell = np.full(len(x), -1, dtype=np.int64)
     bary = np.zeros((len(x), mesh.dim + 1))
-    tree = mesh.cell_tree
-    open_points = np.arange(len(x))
-    count, seen = 8, 0
-    reach = float(mesh.cell_size.max())
-    while len(open_points) and seen < len(mesh.cells):
-        count = min(count, len(mesh.cells))
-        distance, near = tree.query(x[open_points], k=np.arange(seen + 1, count + 1))
-        n_new = near.shape[1]
-        flat = near.ravel()
-        trial = barycentric(mesh, flat, np.repeat(x[open_points], n_new, axis=0))
-        inside = (trial.min(axis=1) >= -_TOLERANCE).reshape(-1, n_new)
-        hit = inside.any(axis=1)
-        pick = np.argmax(inside, axis=1)
-        rows = np.nonzero(hit)[0]
-        cell[open_points[rows]] = near[rows, pick[rows]]
-        bary[open_points[rows]] = trial.reshape(-1, n_new, mesh.dim + 1)[rows, pick[rows]]
-        open_points = open_points[~hit & (distance[:, -1] <= reach)]
-        seen, count = count, 4 * count
+    boxed = ((x >= mesh.lower) & (x <= mesh.upper)).all(axis=1)
+    for number, tree, reach in mesh.cell_classes:
+        open_points = np.nonzero((cell < 0) & boxed)[0]
+        count, seen = 8, 0
+        while len(open_points) and seen < len(number):
+            count = min(count, len(number))
+            distance, near = tree.query(x[open_points], k=np.arange(seen + 1, count + 1))
+            n_new = near.shape[1]
+            flat = number[near.ravel()]
+            trial = barycentric(mesh, flat, np.repeat(x[open_points], n_new, axis=0))
+            inside = (trial.min(axis=1) >= -_TOLERANCE).reshape(-1, n_new)
+            hit = inside.any(axis=1)
+            pick = np.argmax(inside, axis=1)
+            rows = np.nonzero(hit)[0]
+            cell[open_points[rows]] = number[near[rows, pick[rows]]]
+            bary[open_points[rows]] = trial.reshape(-1, n_new, mesh.dim + 1)[rows, pick[rows]]
+            open_points = open_points[~hit & (distance[:, -1] <= reach)]
+            seen, count = count, 4 * count
     return cell, bary
 
 

@@ -66,7 +66,7 @@ def read_mesh(path: str | PathLike[str]) -> Mesh:
     Examples
     --------
     >>> import tempfile, pathlib
-    >>> from xcrack.mesh import box
+    >>> from xcrack.structured import box
     >>> path = pathlib.Path(tempfile.mkdtemp()) / "plate.msh"
     >>> write_mesh(path, box((0, 0), (1, 1), 2))
     >>> read_mesh(path)
