@@ -1,13 +1,14 @@
 """Each kernel against a twin without tricks."""
 
 import numpy as np
+import scipy.sparse as sp
 
 import scenes
 import xcrack as xc
 from xcrack.assembly import bulk
 from xcrack.kernels.blocks import dense_blocks
 from xcrack.kernels.bulk import block_pattern
-from xcrack.kernels.enriched import stiffness_triplets
+from xcrack.kernels.enriched import add_stiffness, enriched_pattern
 from xcrack.simplex import cell_nodes, shape_derivatives, simplex_rule
 
 
@@ -30,9 +31,10 @@ def test_enriched_stiffness():
     functions = np.array([[0, 3, 5, 6], [1, 4, -1, 7], [2, 0, 5, -1]])
     offsets = np.array([0, 2, 5, 6])
     weight, G = rng.uniform(0.1, 1, 6), rng.normal(size=(6, 4, 2))
-    row, column, value = stiffness_triplets(functions, offsets, weight, G, 5, 1.3, 0.7)
-    found = np.zeros((16, 16))
-    np.add.at(found, (row, column), value)
+    indptr, indices = enriched_pattern(functions, 8, 5)
+    data = np.zeros((len(indices), 2, 2))
+    add_stiffness(data, indptr, indices, functions, offsets, weight, G, 5, 1.3, 0.7)
+    found = sp.bsr_matrix((data, indices, indptr), shape=(16, 16)).toarray()
     expected = np.zeros((8, 2, 8, 2))
     for e, numbers in enumerate(functions):
         on = np.nonzero(numbers >= 0)[0]

@@ -1,6 +1,7 @@
 """Stiffness: the uncracked body once a mesh, enriched cells once a crack."""
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.sparse as sp
@@ -14,6 +15,9 @@ from xcrack.numerics import Numerics
 from xcrack.quadrature import Points, cell_points
 from xcrack.simplex import cell_nodes, shape_derivatives, simplex_rule
 from xcrack.space import Space
+
+if TYPE_CHECKING:
+    from xcrack.hierarchy import Hierarchy
 
 _CHUNK = 60_000  # integration points tabulated at once; bounds the memory
 
@@ -29,12 +33,15 @@ class Bulk:
     order : int
     matrix : sparse matrix (n, n), stress · length^(d - 2)
         Node blocks, BSR.
+    levels : Hierarchy, optional
+        Coarse levels of the iterative solver, once it has made them.
     """
 
     mesh: Mesh
     material: Isotropic
     order: int
     matrix: sp.bsr_matrix
+    levels: "Hierarchy | None" = None
 
 
 def bulk(mesh: Mesh, material: Isotropic, order: int) -> Bulk:
@@ -66,7 +73,7 @@ def enriched_stiffness(
 
     Entries of two standard functions are left out: they are those of the uncracked body.
     """
-    from xcrack.kernels.enriched import stiffness_triplets
+    from xcrack.kernels.enriched import add_stiffness, enriched_pattern
 
     cells = space.enriched
     n = space.n_dof
@@ -77,7 +84,9 @@ def enriched_stiffness(
     boundary = None
     if numerics.consistent and len(with_tip):
         boundary = boundary_points(space, with_tip, lips)
-    rows, columns, values = [], [], []
+    indptr, indices = enriched_pattern(_functions(space, cells), space.n_functions, space.n_nodes)
+    d = space.dim
+    data = np.zeros((len(indices), d, d))
     for part in _chunks(space, points, cells):
         for batch, _ in space.batches(part):
             number, row, first = points.of_cells(batch.cells)
@@ -86,14 +95,29 @@ def enriched_stiffness(
             N, G = space.tabulate(batch, row, bary, side)
             if batch.tips and boundary is not None:
                 G = corrected(space, batch, (row, bary, weight, side), N, G, boundary)
-            r, c, v = stiffness_triplets(
-                batch.functions, first, weight, G, space.n_nodes, material.lam, material.mu
+            add_stiffness(
+                data,
+                indptr,
+                indices,
+                batch.functions,
+                first,
+                weight,
+                G,
+                space.n_nodes,
+                material.lam,
+                material.mu,
             )
-            rows.append(r)
-            columns.append(c)
-            values.append(v)
-    triplets = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
-    return sp.csr_matrix(triplets, shape=(n, n)), len(points.weight)
+    if d * d * len(indices) < np.iinfo(np.int32).max:
+        indptr = indptr.astype(np.int32)
+    return sp.bsr_matrix((data, indices, indptr), shape=(n, n)).tocsr(), len(points.weight)
+
+
+def _functions(space: Space, cells: Ints) -> Ints:
+    """Functions that act on cells, in rows of one length."""
+    parts = [batch.functions for batch, _ in space.batches(cells)]
+    width = max(part.shape[1] for part in parts)
+    filled = [np.pad(p, ((0, 0), (0, width - p.shape[1])), constant_values=-1) for p in parts]
+    return np.concatenate(filled)
 
 
 def _chunks(space: Space, points: Points, cells: Ints) -> list[Ints]:

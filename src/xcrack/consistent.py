@@ -12,11 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from xcrack.arrays import Floats, Ints
+from xcrack.arrays import Floats, Ints, ranges
 from xcrack.cut import Cut
+from xcrack.facet_parts import part_points, split_facets
 from xcrack.lip_points import LipPoints
-from xcrack.mesh import local_facets
-from xcrack.quadrature import cell_side, segment_points
+from xcrack.quadrature import cell_side
 from xcrack.space import Batch, Space
 
 
@@ -58,92 +58,37 @@ _Part = tuple[Ints, Floats, Floats, Ints, Ints]
 
 
 def _facet_points(space: Space, cells: Ints) -> _Part:
-    """Points on the edges of plane cells, split where a crack crosses them."""
+    """Points on the facets of cells, split where a crack crosses them."""
     mesh = space.mesh
     facet_ids, inverse = np.unique(mesh.cell_to_facet[cells].ravel(), return_inverse=True)
     ends = mesh.facets[facet_ids]
-    number, begin, end, sides = split_facets(space, ends)
-    x = mesh.points[ends]
-    first = (1 - begin)[:, None] * x[number, 0] + begin[:, None] * x[number, 1]
-    last = (1 - end)[:, None] * x[number, 0] + end[:, None] * x[number, 1]
-    rule = segment_points(space, first, last)
-    piece = rule.segment
-    t = begin[piece] + (end - begin)[piece] * rule.position
-    weight = (end - begin)[piece] * rule.weight
-    facet = number[piece]
+    parts = split_facets(space, ends)
+    piece, place, weight = part_points(space, ends[parts.number], parts.bary)
+    at = np.einsum("qv,qvb->qb", place, parts.bary[piece])
+    facet = parts.number[piece]
+    order = np.argsort(facet, kind="stable")
+    piece, at, weight, facet = piece[order], at[order], weight[order], facet[order]
     # Each facet's points are handed to every cell that has it.
-    by_facet = sp.csr_matrix(
-        (np.arange(len(t)) + 1, (facet, np.arange(len(t)))), shape=(len(facet_ids), len(t))
-    )
-    counts = np.diff(by_facet.indptr)[inverse]
-    start = by_facet.indptr[inverse]
-    owner = np.repeat(np.arange(len(inverse)), counts)
-    place = np.arange(len(owner)) - np.repeat(np.cumsum(counts) - counts, counts)
-    point = by_facet.indices[start[owner] + place]
+    first = np.searchsorted(facet, np.arange(len(facet_ids)))
+    counts = np.bincount(facet, minlength=len(facet_ids))[inverse]
+    owner, k = ranges(counts)
+    point = first[inverse][owner] + k
     row, opposite = owner // (mesh.dim + 1), owner % (mesh.dim + 1)
     cell = cells[row]
-    local = local_facets(mesh.dim)[opposite]
-    vertices = np.take_along_axis(mesh.cells[cell], local, 1)
-    low_first = vertices[:, 0] == ends[facet[point], 0]
-    position = np.where(low_first, t[point], 1 - t[point])
-    other = np.where(low_first, 1 - t[point], t[point])
-    bary = np.zeros((len(owner), mesh.dim + 1))
-    rows = np.arange(len(owner))
-    bary[rows, local[:, 0]] = other
-    bary[rows, local[:, 1]] = position
-    outward = -mesh.gradient[cell, opposite] * (mesh.dim * mesh.volume[cell])[:, None]
+    # Place of each point of the facet among those of the cell.
+    same = mesh.cells[cell][:, :, None] == ends[facet[point]][:, None, :]
+    bary = np.einsum("qvf,qf->qv", same.astype(float), at[point])
+    inward = mesh.gradient[cell, opposite]
+    outward = -inward / np.linalg.norm(inward, axis=1, keepdims=True)
     normal = outward * weight[point, None]
     side = cell_side(space, cell)
     piece_side = np.zeros(len(owner), dtype=np.int64)
     for c, cut in enumerate(space.cuts):
         crossed = cut.is_cut[cell] | (cut.is_tip[cell] & (side[:, c] == 0))
-        own = sides[piece[point], c]
+        own = parts.side[piece[point], c]
         side[crossed, c] = own[crossed]
         piece_side = np.where(cut.is_cut[cell], own, piece_side)
     return cell, bary, normal, side, piece_side
-
-
-def split_facets(space: Space, ends: Ints) -> tuple[Ints, Floats, Floats, Ints]:
-    """Split plane facets `(k, 2)` where cracks cross them.
-
-    Returns
-    -------
-    number : (s,) array of int
-        Row of `ends` of each part.
-    begin, end : (s,) arrays
-        Positions from the first point.
-    side : (s, cracks) array of int
-        Sign of phi on the part, 0 where it lies on the crack or phi changes its sign on it.
-    """
-    mesh = space.mesh
-    edge = _edge_numbers(mesh, ends)
-    k = len(ends)
-    position = np.full(k, np.nan)
-    for cut in space.cuts:
-        t = cut.cut_edge[edge]
-        # cut_edge counts from the smaller point number.
-        t = np.where(ends[:, 0] < ends[:, 1], t, 1 - t)
-        position = np.where(np.isnan(position), t, position)
-    split = ~np.isnan(position)
-    number = np.concatenate([np.arange(k), np.nonzero(split)[0]])
-    begin = np.concatenate([np.zeros(k), position[split]])
-    end = np.concatenate([np.where(split, position, 1.0), np.ones(int(split.sum()))])
-    side = np.zeros((len(number), len(space.cuts)), dtype=np.int64)
-    for c, cut in enumerate(space.cuts):
-        values = cut.level_set.phi[ends[number]]
-        middle = (begin + end) / 2
-        at = (1 - middle) * values[:, 0] + middle * values[:, 1]
-        # Ahead of a tip phi changes its sign on a facet that no crack splits.
-        ahead = np.isnan(cut.cut_edge[edge])[number] & (values[:, 0] * values[:, 1] < 0)
-        side[:, c] = np.where(ahead, 0, np.sign(at))
-    return number, begin, end, side
-
-
-def _edge_numbers(mesh: object, ends: Ints) -> Ints:
-    edges, n = mesh.edges, mesh.n_points  # type: ignore[attr-defined]
-    key = edges[:, 0] * np.int64(n) + edges[:, 1]
-    low, high = np.sort(ends, axis=1).T
-    return np.searchsorted(key, low * np.int64(n) + high)
 
 
 def _lip_parts(space: Space, c: int, cut: Cut, lips: LipPoints, wanted: np.ndarray) -> list[_Part]:
@@ -177,6 +122,8 @@ def corrected(
     values, gradients : tabulated functions at these points
     boundary : points on the boundary of all pieces
     """
+    from xcrack.kernels.tips import add_correction, add_flux, take_volume
+
     row, bary, weight, side = points
     d = space.dim
     n_tip = sum((d + 1) * space.tips[t].functions for t in batch.tips)
@@ -185,28 +132,35 @@ def corrected(
     piece, n_pieces = _pieces(space, batch, row, side)
 
     chosen, brow = _of_batch(batch, boundary.cell)
-    bvalues, _ = space.tabulate(batch, brow, boundary.bary[chosen], boundary.side[chosen])
-    bx, _ = _local(space, batch, brow, boundary.bary[chosen])
+    bary_, bside = boundary.bary[chosen], boundary.side[chosen]
+    bvalues = np.concatenate(
+        [space.tip_tables(t, batch, brow, bary_, bside, slopes=False)[0] for t in batch.tips],
+        axis=1,
+    )
+    bx, _ = _local(space, batch, brow, bary_)
     bpiece = 2 * brow + (boundary.piece_side[chosen] > 0)
 
-    moments = np.concatenate([np.ones((len(x), 1)), x], axis=1)
-    bmoments = np.concatenate([np.ones((len(bx), 1)), bx], axis=1)
-    psi, dpsi = values[:, first:], gradients[:, first:]
-    flux = np.einsum("qf,qj,qa->qfja", bvalues[:, first:], boundary.normal[chosen], bmoments)
-    inner = np.einsum("q,qfj,qa->qfja", weight, dpsi, moments)
-    # d(x_a)/dx_j is 1/size in the scaled coordinates of a cell.
-    for j in range(d):
-        inner[:, :, j, 1 + j] += weight[:, None] * psi / size[row][:, None]
-    defect = _sum(bpiece, flux, n_pieces) - _sum(piece, inner, n_pieces)
+    moments, bmoments = _moments(space, x), _moments(space, bx)
+    defect = np.zeros((n_pieces, n_tip, d, moments.shape[1]))
+    add_flux(defect, bpiece, bvalues, boundary.normal[chosen], bmoments)
+    take_volume(
+        defect, piece, weight, values[:, first:], gradients[:, first:], moments, 1 / size[row]
+    )
     gram = _sum(piece, np.einsum("q,qa,qb->qab", weight, moments, moments), n_pieces)
     total = np.maximum(gram[:, 0, 0], 1e-300)
     inverse = np.linalg.pinv(gram / total[:, None, None], rcond=1e-12, hermitian=True)
     coefficient = np.einsum("pab,pfjb->pfja", inverse, defect / total[:, None, None, None])
     result = gradients.copy()
-    result[:, first:] += np.einsum("qfja,qa->qfj", coefficient[piece], moments)
-    # Functions that do not act on a cell stay zero.
-    result[:, first:] *= (batch.functions[row, first:] >= 0)[:, :, None]
+    add_correction(result, first, piece, row, coefficient, moments, batch.functions)
     return result
+
+
+def _moments(space: Space, x: Floats) -> Floats:
+    """1 and x; in space at order 1 only 1: its pressures cannot be linear to round-off anyway."""
+    one = np.ones((len(x), 1))
+    if space.order == 1 and space.dim == 3:
+        return one
+    return np.concatenate([one, x], axis=1)
 
 
 def _local(space: Space, batch: Batch, row: Ints, bary: Floats) -> tuple[Floats, Floats]:

@@ -2,12 +2,13 @@
 
 import numpy as np
 
-from xcrack.arrays import Bools, Floats, Ints
+from xcrack.arrays import Bools, Floats
 from xcrack.crack import Crack, crack_length, front
 from xcrack.cut import Cut
 from xcrack.locate import nearest_boundary
 from xcrack.mesh import Mesh
 from xcrack.simplex import cell_nodes, facet_nodes
+from xcrack.tube import front_radii, leg_size
 
 _SHARE = {1: 0.3, 2: 0.4}  # of the free length around a tip, measured best for K at each order
 
@@ -17,22 +18,18 @@ _LEAST = 2.0  # cells
 _MOST = {1: 40.0, 2: 20.0}
 
 
-def leg_size(mesh: Mesh, cells: Ints) -> float:
-    """Size of the simplex with right angles that has the mean volume of the cells, length."""
-    factor = 2.0 if mesh.dim == 2 else 6.0
-    return float((factor * mesh.volume[cells].mean()) ** (1 / mesh.dim))
-
-
 def tip_radii(
     mesh: Mesh, cracks: tuple[Crack, ...], cuts: tuple[Cut, ...], order: int, wanted: float | None
 ) -> list[tuple[float, ...]]:
-    """Radius of the enriched disc at each tip of each crack, length.
+    """Radius of the enriched disc at each tip of each crack, length; see `front_radii` in space.
 
     Without a wanted radius: a share (0.3 at order 1, 0.4 at order 2) of the smallest of crack
     length, distance to the boundary and distance to another tip, at most 20 cells (40 at
     order 1). A wanted radius is kept, and shrunk only where the body or another tip demands.
     Never below two cells.
     """
+    if mesh.dim == 3:
+        return front_radii(mesh, cracks, cuts, wanted)
     tips = [front(crack)[0] for crack in cracks]
     every = np.concatenate(tips) if tips else np.zeros((0, mesh.dim))
     radii = []
@@ -65,8 +62,9 @@ def heaviside_nodes(mesh: Mesh, order: int, cut: Cut) -> Bools:
     flag[nodes[cut.cells]] = True
     on_facets = cut.lip_cell[:, 0] != cut.lip_cell[:, 1]
     if on_facets.any():
-        shared = [np.intersect1d(mesh.cells[a], mesh.cells[b]) for a, b in cut.lip_cell[on_facets]]
-        facets = np.array(shared, dtype=np.int64)
+        one, other = mesh.cells[np.unique(cut.lip_cell[on_facets], axis=0)].transpose(1, 0, 2)
+        shared = (one[:, :, None] == other[:, None, :]).any(axis=2)
+        facets = one[shared].reshape(-1, mesh.dim)
         flag[facet_nodes(mesh, order, facets)] = True
     for cells in cut.level_set.tip_cells:
         flag[nodes[cells]] = False
@@ -79,7 +77,7 @@ def tip_points(mesh: Mesh, cut: Cut, k: int, radius: float, kind: str) -> Bools:
     flag[mesh.cells[cut.level_set.tip_cells[k]]] = True
     if kind == "geometric":
         # Points on the rim count whatever their round-off: the set is symmetric where the mesh is.
-        distance = np.linalg.norm(mesh.points - cut.level_set.tip[k], axis=1)
+        distance = np.hypot(cut.level_set.phi, cut.level_set.psi[k])
         flag |= distance <= radius * (1 + 1e-9)
     return flag
 

@@ -9,8 +9,8 @@ from scipy.sparse.csgraph import connected_components
 
 from xcrack.arrays import Bools, Floats, Ints
 from xcrack.assembly import rigid_modes
-from xcrack.consistent import split_facets
 from xcrack.errors import ProblemError
+from xcrack.facet_parts import split_facets
 from xcrack.space import Space
 
 _IMBALANCE = 1e-3  # share of the sum of all forces above which loads count as out of balance
@@ -49,11 +49,18 @@ def free_motion(space: Space, fixed: Bools) -> Motion:
     plain = np.ones(space.n_nodes, dtype=bool)
     plain[space.cell_nodes[space.enriched]] = False
     plain[space.mesh.n_points :] = False
-    if not plain.any():
-        plain[: space.mesh.n_points] = True
-    candidates = (np.nonzero(plain)[0][:, None] * space.dim + np.arange(space.dim)).ravel()
-    candidates = candidates[~fixed[candidates]]
-    pivots = scipy.linalg.qr(modes[candidates].T, mode="r", pivoting=True)[1]
+    every = np.zeros(space.n_nodes, dtype=bool)
+    every[: space.mesh.n_points] = True
+    for chosen in (plain, every):
+        candidates = (np.nonzero(chosen)[0][:, None] * space.dim + np.arange(space.dim)).ravel()
+        candidates = candidates[~fixed[candidates]]
+        if len(candidates) < null.shape[1]:
+            continue
+        triangle, pivots = scipy.linalg.qr(modes[candidates].T, mode="r", pivoting=True)
+        diagonal = np.abs(np.diag(triangle))
+        # Two points in space leave the turn about their line free.
+        if diagonal[-1] > 1e-6 * diagonal[0]:
+            break
     return Motion(modes, candidates[pivots[: null.shape[1]]])
 
 
@@ -134,7 +141,8 @@ def pieces(space: Space) -> tuple[Ints, int, Floats]:
     m = len(mesh.cells)
     inner = np.nonzero(mesh.facet_to_cell[:, 1] >= 0)[0]
     ends = mesh.facets[inner]
-    part, _, _, sides = split_facets(space, ends)
+    parts = split_facets(space, ends)
+    part, sides = parts.number, parts.side
     cells = mesh.facet_to_cell[inner][part]
     on_lip = np.zeros(len(mesh.facets), dtype=bool)
     is_cut = np.full(m, -1, dtype=np.int64)

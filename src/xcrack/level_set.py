@@ -30,9 +30,9 @@ class LevelSet:
     psi : (f, n) array, length
         Signed distance to each tip along the crack; the crack is where all are negative.
     tip_cells : tuple of (k,) arrays of int
-        Cells whose closed set contains the tip, for each tip.
+        Cells whose closed set meets the tip or the front, for each of them.
     tip : (f, d) array, length
-        Tip points.
+        Tip points; a point of each front in space.
     mouth : (n,) array, length
         Positive where a point is nearest to the prolongation of a mouth: across a hole, say, the
         line of a crack runs on, but not the crack.
@@ -55,7 +55,7 @@ class LevelSet:
 
 
 def level_set(mesh: Mesh, crack: Crack) -> LevelSet:
-    """Level sets of a placed crack at the points of a mesh."""
+    """Level sets of a placed crack in the plane at the points of a mesh."""
     from xcrack.kernels.distance import polyline_distance
 
     reach = 10 * mesh.extent + float(np.abs(crack.points - mesh.points[0]).max())
@@ -77,7 +77,7 @@ def level_set(mesh: Mesh, crack: Crack) -> LevelSet:
         if end not in (crack.tips or ()):
             beyond = segment == ray
             mouth[beyond] = np.linalg.norm(mesh.points[beyond] - crack.points[end], axis=1)
-    near = _near(mesh, phi)
+    near = near_edges(mesh, phi)
     tip_cells = tuple(_cells_at(mesh, point) for point in x)
     for k, cells in enumerate(tip_cells):
         # Around a tip the level sets are those of its frame, so that the tip stays where it is
@@ -87,7 +87,7 @@ def level_set(mesh: Mesh, crack: Crack) -> LevelSet:
         phi[nodes] = local @ frame[k, 1]
         psi[k, nodes] = local @ frame[k, 0]
         near[np.isin(mesh.edges, nodes).any(axis=1)] = True
-    phi = _snapped(mesh, phi)
+    phi = snapped(mesh, phi)
     return LevelSet(lock(phi), lock(psi), tip_cells, lock(x), lock(mouth), lock(near))
 
 
@@ -131,13 +131,14 @@ def _cells_at(mesh: Mesh, x: Floats) -> Ints:
     return near[bary.min(axis=1) >= -_SNAP]
 
 
-def _near(mesh: Mesh, phi: Floats) -> Bools:
+def near_edges(mesh: Mesh, phi: Floats) -> Bools:
+    """Edges short enough to be crossed where phi changes its sign `(e,)`."""
     x = mesh.points[mesh.edges]
     length = np.linalg.norm(x[:, 1] - x[:, 0], axis=1)
     return np.asarray(np.abs(phi[mesh.edges]).sum(axis=1) <= length * (1 + 1e-6))
 
 
-def _snapped(mesh: Mesh, phi: Floats) -> Floats:
+def snapped(mesh: Mesh, phi: Floats) -> Floats:
     """Move cut points within 1e-10 of an edge's end onto that end, until nothing changes."""
     phi = np.array(phi)
     longest = np.zeros(mesh.n_points)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from xcrack.arrays import Floats, Ints
-from xcrack.quadrature import segment_points
+from xcrack.facet_parts import part_points
 from xcrack.space import Space
 
 
@@ -16,7 +16,7 @@ class LipPoints:
     Attributes
     ----------
     segment : (q,) array of int
-        Lip segment of the cut.
+        Lip segment or triangle of the cut.
     cell : (q, 2) array of int
         Cell on side - and on side +.
     bary : (q, 2, d + 1) array
@@ -25,7 +25,7 @@ class LipPoints:
         From lip - to lip +.
     x : (q, d) array, length
     s : (q,) array, length
-        Position along the crack from where it enters the body (in the plane).
+        In the plane: position along the crack from where it enters the body; zero in space.
     """
 
     segment: Ints
@@ -43,23 +43,24 @@ class LipPoints:
 def lip_points(space: Space, c: int, n: int = 6) -> LipPoints:
     """Points on the lips of crack c, graded towards its tips, in the order of the crack."""
     cut, mesh = space.cuts[c], space.mesh
-    corners = cut.lip_points(mesh)
     bary = cut.lip_bary
     # The ends of a segment on a facet are sorted as the boundary rule sorts them.
-    rule = segment_points(space, corners[:, 0], corners[:, 1], n)
-    k, t = rule.segment, rule.position
-    length = np.linalg.norm(corners[:, 1] - corners[:, 0], axis=1)
-    at = (1 - t)[:, None, None] * bary[k, :, 0] + t[:, None, None] * bary[k, :, 1]
-    x = (1 - t)[:, None] * corners[k, 0] + t[:, None] * corners[k, 1]
-    ends = arc_position(space.cracks[c].points, corners.reshape(-1, mesh.dim))
-    s = arc_position(space.cracks[c].points, x) - ends.min(initial=np.inf)
+    k, place, weight = part_points(space, mesh.cells[cut.lip_cell[:, 1]], bary[:, 1], n)
+    at = np.einsum("qv,qsvb->qsb", place, bary[k])
+    corners = cut.lip_points(mesh)
+    x = np.einsum("qv,qvd->qd", place, corners[k])
+    if mesh.dim == 2:
+        ends = arc_position(space.cracks[c].points, corners.reshape(-1, mesh.dim))
+        s = arc_position(space.cracks[c].points, x) - ends.min(initial=np.inf)
+    else:
+        s = np.zeros(len(x))
     order = np.argsort(s, kind="stable")
     k = k[order]
     return LipPoints(
         k,
         cut.lip_cell[k],
         at[order],
-        length[k] * rule.weight[order],
+        weight[order],
         cut.lip_normal[k],
         x[order],
         s[order],

@@ -15,11 +15,11 @@ from xcrack.conditions import (
     evaluate_scalar,
     evaluate_stress,
 )
-from xcrack.consistent import split_facets
 from xcrack.errors import ProblemError
+from xcrack.facet_parts import part_points, split_facets
 from xcrack.lip_points import LipPoints
 from xcrack.mesh import Mesh
-from xcrack.quadrature import Points, cell_points, cell_side, segment_points
+from xcrack.quadrature import Points, cell_points, cell_side
 from xcrack.space import Space
 
 
@@ -98,33 +98,22 @@ def facet_points(space: Space, facets: Ints, n: int = 6) -> tuple[Points, Floats
     mesh = space.mesh
     number = mesh.facet_numbers(facets)
     cell = mesh.facet_to_cell[number, 0]
-    part, begin, end, sides = split_facets(space, facets)
-    x = mesh.points[facets]
-    first = (1 - begin)[:, None] * x[part, 0] + begin[:, None] * x[part, 1]
-    last = (1 - end)[:, None] * x[part, 0] + end[:, None] * x[part, 1]
-    rule = segment_points(space, first, last, n)
-    k = rule.segment
-    t = begin[k] + (end - begin)[k] * rule.position
-    owner = part[k]
+    parts = split_facets(space, facets)
+    k, place, weight = part_points(space, facets[parts.number], parts.bary, n)
+    owner = parts.number[k]
     c = cell[owner]
-    # Local places of the facet's points in its cell.
-    local = (mesh.cells[c][:, :, None] == facets[owner][:, None, :]).argmax(axis=1)
-    bary = np.zeros((len(t), mesh.dim + 1))
-    rows = np.arange(len(t))
-    bary[rows, local[:, 0]] = 1 - t
-    bary[rows, local[:, 1]] = t
-    opposite = (~(mesh.cells[c][:, :, None] == facets[owner][:, None, :]).any(axis=2)).argmax(
-        axis=1
-    )
+    # Place of each point of the facet among those of its cell.
+    same = mesh.cells[c][:, :, None] == facets[owner][:, None, :]
+    on_facet = np.einsum("qv,qvb->qb", place, parts.bary[k])
+    bary = np.einsum("qvf,qf->qv", same.astype(float), on_facet)
+    opposite = (~same.any(axis=2)).argmax(axis=1)
     inward = mesh.gradient[c, opposite]
     normal = -inward / np.linalg.norm(inward, axis=1, keepdims=True)
-    length = np.linalg.norm(last - first, axis=1)
     side = cell_side(space, c)
     for i, cut in enumerate(space.cuts):
         crossed = cut.is_cut[c] | (cut.is_tip[c] & (side[:, i] == 0))
-        side[crossed, i] = sides[k, i][crossed]
+        side[crossed, i] = parts.side[k, i][crossed]
     order = np.argsort(c, kind="stable")
-    weight = length[k] * rule.weight
     return Points(c[order], bary[order], weight[order], side[order]), normal[order]
 
 

@@ -133,10 +133,12 @@ def _groups(
         covered &= np.bincount(roots, mass * held, len(nodes))[roots] < 0.5 * total[roots]
         parent[~covered] = np.nonzero(~covered)[0]
     if covered.any() and not covered.all():
-        overlap = (traces.T @ sp.diags(weight) @ traces).toarray()
-        choices = np.nonzero(covered)[0]
-        for k in np.nonzero(~covered)[0]:
-            parent[k] = root(int(choices[np.argmax(overlap[k, choices])]))
+        alone, choices = np.nonzero(~covered)[0], np.nonzero(covered)[0]
+        weighted = sp.diags(weight) @ traces
+        overlap = sp.csr_matrix(weighted[:, alone].T @ traces[:, choices])
+        for k, row in zip(alone, overlap, strict=True):
+            if row.nnz:
+                parent[k] = root(int(choices[row.indices[np.argmax(row.data)]]))
     roots = np.array([root(i) for i in range(len(nodes))])
     return np.unique(roots, return_inverse=True)[1]
 

@@ -13,6 +13,7 @@ from xcrack.arrays import Floats, Ints, offsets, ranges
 from xcrack.errors import GeometryError
 from xcrack.locate import closest_on_segment
 from xcrack.mesh import local_edges
+from xcrack.quadrature_front import front_points
 from xcrack.simplex import conical, gauss, simplex_rule
 from xcrack.space import Space
 
@@ -128,10 +129,23 @@ def cell_points(space: Space, cells: Ints, n: int, degree: int) -> Points:
     plain = np.nonzero(~with_tip)[0]
     bary, weight = simplex_rule(space.dim, degree)
     number = [np.repeat(plain, len(weight))]
-    corners = _from_tips(space, subs.cell[plain], subs.bary[plain])
+    corners = subs.bary[plain]
+    if space.dim == 2:
+        corners = _from_tips(space, subs.cell[plain], corners)
     where = [np.einsum("pv,svb->spb", bary, corners).reshape(-1, space.dim + 1)]
     share = [np.outer(subs.fraction[plain], weight).ravel()]
-    regular, regular_bary, regular_share, fans = _towards_tips(space, subs, np.nonzero(with_tip)[0])
+    rows = np.nonzero(with_tip)[0]
+    if space.dim == 3:
+        chosen = (subs.cell[rows], subs.bary[rows], subs.fraction[rows])
+        near, place, part = front_points(space, *chosen, n)
+        return _sorted(
+            space,
+            subs,
+            np.concatenate([*number, rows[near]]),
+            np.concatenate([*where, place]),
+            np.concatenate([*share, part]),
+        )
+    regular, regular_bary, regular_share, fans = _towards_tips(space, subs, rows)
     rule, rule_weight = simplex_rule(space.dim, 2 * n) if n in (4, 5) else conical(space.dim, n)
     number.append(np.repeat(regular, len(rule_weight)))
     corners = _from_tips(space, subs.cell[regular], regular_bary)
@@ -141,7 +155,13 @@ def cell_points(space: Space, cells: Ints, n: int, degree: int) -> Points:
     number.append(sub)
     where.append(swept)
     share.append(swept_share)
-    numbers, every, part = np.concatenate(number), np.concatenate(where), np.concatenate(share)
+    return _sorted(
+        space, subs, np.concatenate(number), np.concatenate(where), np.concatenate(share)
+    )
+
+
+def _sorted(space: Space, subs: SubCells, numbers: Ints, every: Floats, part: Floats) -> Points:
+    """Points of sub-cells, sorted by cell and sub-cell."""
     cell = subs.cell[numbers]
     order = np.lexsort((numbers, cell))
     cell = cell[order]

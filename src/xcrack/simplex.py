@@ -113,6 +113,30 @@ _SYMMETRIC = {
 }
 
 
+# The same on tetrahedra, degree 5 (Walkington, 2000): weight, coordinate of the odd vertices.
+_TETRAHEDRON_4 = [
+    (0.1126879257180158508, 0.3108859192633006098),
+    (0.0734930431163619495, 0.0927352503108912264),
+]
+_TETRAHEDRON_6 = (0.0425460207770814664, 0.0455037041256496495)
+
+
+@lru_cache(maxsize=1)
+def _tetrahedron() -> tuple[Floats, Floats]:
+    bary, weight = [], []
+    for w, a in _TETRAHEDRON_4:
+        bary.append(np.full((4, 4), a) + np.eye(4) * (1 - 4 * a))
+        weight.append(np.full(4, w))
+    w, a = _TETRAHEDRON_6
+    for i, j in local_edges(3):
+        point = np.full(4, a)
+        point[[i, j]] = 0.5 - a
+        bary.append(point[None])
+        weight.append(np.full(1, w))
+    total = np.concatenate(weight)
+    return lock(np.concatenate(bary)), lock(total / total.sum())
+
+
 @lru_cache(maxsize=8)
 def _symmetric(degree: int) -> tuple[Floats, Floats]:
     bary, weight = [], []
@@ -141,4 +165,6 @@ def simplex_rule(dim: int, degree: int) -> tuple[Floats, Floats]:
         for known in _SYMMETRIC:
             if degree <= known:
                 return _symmetric(known)
+    if dim == 3 and degree <= 5:
+        return _tetrahedron()
     return conical(dim, degree // 2 + 1)

@@ -19,19 +19,21 @@ from xcrack.errors import GeometryError
 from xcrack.mesh import Mesh
 from xcrack.numerics import Numerics
 from xcrack.simplex import cell_nodes, node_points, shape_derivatives, shape_values
-from xcrack.williams import polar, tip_derivatives, tip_values
+from xcrack.strip import front_frames
+from xcrack.williams import polar, tip_values
 
 
 @dataclass(frozen=True, eq=False)
 class Tip:
-    """One tip and the functions around it.
+    """One tip, or in space one front, and the functions around it.
 
     Attributes
     ----------
     crack, number : int
         Which tip of which crack.
     x, frame : (d,) and (d, d) arrays
-        Position and rows (ahead, normal).
+        Position and rows (ahead, normal); in space the vertices of a front `(m, 3)` and their
+        frames `(m, 3, 3)`.
     radius : float, length
     functions : int
         Tip functions a point.
@@ -188,9 +190,7 @@ class Space:
             columns.append(np.where(first[:, :, None] >= 0, each, -1).reshape(len(cells), -1))
         return Batch(cells, cracks, tips, np.ascontiguousarray(np.concatenate(columns, axis=1)))
 
-    def tabulate(
-        self, batch: Batch, row: Ints, bary: Floats, side: Ints
-    ) -> tuple[Floats, Floats]:
+    def tabulate(self, batch: Batch, row: Ints, bary: Floats, side: Ints) -> tuple[Floats, Floats]:
         """Values `(q, n)` and gradients `(q, n, d)` of a batch's functions at points.
 
         Parameters
@@ -214,35 +214,31 @@ class Space:
             values.append(N * jump)
             gradients.append(dN * jump[..., None])
         for t in batch.tips:
-            F, dF = self._tip_products(t, cell, bary, gradient, side)
+            F, dF = self.tip_tables(t, batch, row, bary, side)
             values.append(F)
             gradients.append(dF)
         return np.concatenate(values, axis=1), np.concatenate(gradients, axis=1)
 
-    def _tip_products(
-        self, t: int, cell: Ints, bary: Floats, gradient: Floats, side: Ints
+    def tip_tables(
+        self, t: int, batch: Batch, row: Ints, bary: Floats, side: Ints, slopes: bool = True
     ) -> tuple[Floats, Floats]:
+        """Values `(q, k)` and, if wanted, gradients `(q, k, d)` of the functions of tip t."""
+        from xcrack.kernels.tips import tip_tables
+
         tip = self.tips[t]
         levels = self.cuts[tip.crack].level_set
-        nodes = self.mesh.cells[cell]
-        phi, psi = levels.phi[nodes], levels.psi[tip.number][nodes]
-        active = tip.point_to_function[nodes] >= 0
-        r, theta = polar(
-            np.einsum("qb,qb->q", psi, bary), np.einsum("qb,qb->q", phi, bary), side[:, tip.crack]
+        return tip_tables(
+            row,
+            np.ascontiguousarray(bary),
+            np.ascontiguousarray(side[:, tip.crack]),
+            self.mesh.cells[batch.cells],
+            self.mesh.gradient[batch.cells],
+            levels.phi,
+            levels.psi[tip.number],
+            tip.point_to_function >= 0,
+            self.tip_shift[t],
+            slopes,
         )
-        F = tip_values(r, theta, tip.functions)
-        ahead, normal = tip_derivatives(r, theta, tip.functions)
-        dF = (
-            ahead[:, :, None] * np.einsum("qb,qbd->qd", psi, gradient)[:, None]
-            + normal[:, :, None] * np.einsum("qb,qbd->qd", phi, gradient)[:, None]
-        )
-        shifted = F[:, None] - self.tip_shift[t][nodes]
-        shifted = np.where(active[:, :, None], shifted, 0.0)
-        hat = np.where(active, bary, 0.0)
-        value = hat[:, :, None] * shifted
-        slope = shifted[..., None] * gradient[:, :, None] + hat[:, :, None, None] * dF[:, None]
-        q = len(cell)
-        return value.reshape(q, -1), slope.reshape(q, -1, self.dim)
 
     @cached_property
     def tip_shift(self) -> tuple[Floats, ...]:
@@ -254,6 +250,12 @@ class Space:
             r, theta = polar(levels.psi[tip.number], phi, np.where(phi == 0, 1, 0))
             shifts.append(lock(tip_values(r, theta, tip.functions)))
         return tuple(shifts)
+
+
+def fronts(crack: Crack) -> tuple[list[Floats], list[Floats]]:
+    """Vertices and frames of each front of a crack in space."""
+    every = front_frames(crack)
+    return [front.x for front in every], [front.frame for front in every]
 
 
 def space(
@@ -279,7 +281,7 @@ def space(
     radii = tip_radii(mesh, cracks, cuts, order, numerics.radius)
     tips = []
     for c, cut in enumerate(cuts):
-        x, frame = front(cracks[c])
+        x, frame = front(cracks[c]) if mesh.dim == 2 else fronts(cracks[c])
         for k in range(cut.n_tips):
             flag = tip_points(mesh, cut, k, radii[c][k], numerics.enrichment)
             number = np.full(mesh.n_points, -1, dtype=np.int64)

@@ -1,18 +1,95 @@
-"""Element stiffness from functions tabulated at integration points."""
+"""Element stiffness from functions tabulated at integration points, summed into blocks."""
 
 import numba
 import numpy as np
 
 
 @numba.njit(cache=True, error_model="numpy")
-def stiffness_triplets(functions, offsets, weight, gradient, n_standard, lam, mu):  # type: ignore[no-untyped-def]
-    """Entries of the elastic stiffness that involve an enriched function.
+def enriched_pattern(functions, n_functions, n_standard):  # type: ignore[no-untyped-def]
+    """Pattern of the blocks of function pairs of which one is enriched.
+
+    Parameters
+    ----------
+    functions : (m, n) array of int
+        Function numbers, -1 for an empty place; below n_standard: standard functions.
+    n_functions, n_standard : int
+
+    Returns
+    -------
+    indptr : (n_functions + 1,) array of int64
+    indices : (k,) array of int32
+        Sorted in each row.
+    """
+    m, n = functions.shape
+    count = np.zeros(n_functions + 1, np.int64)
+    for e in range(m):
+        for a in range(n):
+            if functions[e, a] >= 0:
+                count[functions[e, a] + 1] += 1
+    for i in range(n_functions):
+        count[i + 1] += count[i]
+    around = np.empty(count[n_functions], np.int64)
+    fill = count[:-1].copy()
+    for e in range(m):
+        for a in range(n):
+            f = functions[e, a]
+            if f >= 0:
+                around[fill[f]] = e
+                fill[f] += 1
+    mark = np.full(n_functions, -1, np.int64)
+    indptr = np.zeros(n_functions + 1, np.int64)
+    for i in range(n_functions):
+        found = 0
+        for k in range(count[i], count[i + 1]):
+            e = around[k]
+            for a in range(n):
+                f = functions[e, a]
+                if f >= 0 and (f >= n_standard or i >= n_standard) and mark[f] != i:
+                    mark[f] = i
+                    found += 1
+        indptr[i + 1] = indptr[i] + found
+    indices = np.empty(indptr[n_functions], np.int32)
+    mark[:] = -1
+    for i in range(n_functions):
+        place = indptr[i]
+        for k in range(count[i], count[i + 1]):
+            e = around[k]
+            for a in range(n):
+                f = functions[e, a]
+                if f >= 0 and (f >= n_standard or i >= n_standard) and mark[f] != i:
+                    mark[f] = i
+                    indices[place] = f
+                    place += 1
+        indices[indptr[i] : place].sort()
+    return indptr, indices
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _slot(indptr, indices, row, column):  # type: ignore[no-untyped-def]
+    low, high = indptr[row], indptr[row + 1] - 1
+    while low < high:
+        middle = (low + high) // 2
+        if indices[middle] < column:
+            low = middle + 1
+        else:
+            high = middle
+    return low
+
+
+@numba.njit(cache=True, error_model="numpy")
+def add_stiffness(  # type: ignore[no-untyped-def]
+    data, indptr, indices, functions, offsets, weight, gradient, n_standard, lam, mu
+):
+    """Add the elastic stiffness of cells with enriched functions.
 
     Entry of functions a, b and components i, j: the integral of
     lam G_ai G_bj + mu G_aj G_bi + mu delta_ij G_a . G_b.
 
     Parameters
     ----------
+    data : (k, d, d) array
+        Changed in place.
+    indptr, indices : pattern of the blocks
     functions : (m, n) array of int
         Function numbers, -1 for an empty place; below n_standard: standard functions.
     offsets : (m + 1,) array of int
@@ -22,45 +99,27 @@ def stiffness_triplets(functions, offsets, weight, gradient, n_standard, lam, mu
     n_standard : int
     lam, mu : float
         Lamé constants.
-
-    Returns
-    -------
-    row, column : (t,) arrays of int
-    value : (t,) array
     """
     m, n = functions.shape
     d = gradient.shape[2]
-    total = 0
-    for e in range(m):
-        standard = 0
-        active = 0
-        for a in range(n):
-            if functions[e, a] >= 0:
-                active += 1
-                if functions[e, a] < n_standard:
-                    standard += 1
-        total += (active * active - standard * standard) * d * d
-    row = np.empty(total, np.int64)
-    column = np.empty(total, np.int64)
-    value = np.empty(total)
     place = np.empty(n, np.int64)
-    t = 0
+    block = np.zeros((n, n, d, d))
     for e in range(m):
         active = 0
         for a in range(n):
             if functions[e, a] >= 0:
                 place[active] = a
                 active += 1
-        first, last = offsets[e], offsets[e + 1]
-        block = np.zeros((active, active, d, d))
-        for q in range(first, last):
+        block[:active, :active] = 0.0
+        for q in range(offsets[e], offsets[e + 1]):
             w = weight[q]
             for a in range(active):
                 pa = place[a]
+                plain = functions[e, pa] < n_standard
                 for b in range(a, active):
-                    if functions[e, place[b]] < n_standard:
-                        continue
                     pb = place[b]
+                    if plain and functions[e, pb] < n_standard:
+                        continue
                     for i in range(d):
                         gai = w * gradient[q, pa, i]
                         for j in range(d):
@@ -74,18 +133,13 @@ def stiffness_triplets(functions, offsets, weight, gradient, n_standard, lam, mu
                 trace = 0.0
                 for i in range(d):
                     trace += block[a, b, i, i]
+                one = data[_slot(indptr, indices, fa, fb)]
+                other = data[_slot(indptr, indices, fb, fa)]
                 for i in range(d):
                     for j in range(d):
                         v = lam * block[a, b, i, j] + mu * block[a, b, j, i]
                         if i == j:
                             v += mu * trace
-                        row[t] = fa * d + i
-                        column[t] = fb * d + j
-                        value[t] = v
-                        t += 1
+                        one[i, j] += v
                         if a != b:
-                            row[t] = fb * d + j
-                            column[t] = fa * d + i
-                            value[t] = v
-                            t += 1
-    return row, column, value
+                            other[j, i] += v

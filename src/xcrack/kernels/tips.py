@@ -1,0 +1,161 @@
+"""Tip functions on hats, tabulated at points, and the correction of their gradients."""
+
+import math
+
+import numba
+import numpy as np
+
+
+@numba.njit(cache=True, error_model="numpy")
+def tip_tables(row, bary, side, nodes, gradient, phi, psi, active, shift, slopes):  # type: ignore[no-untyped-def]
+    """Shifted tip functions times hats, and their gradients.
+
+    F = sqrt(r) {cos(t/2), sin(t/2), sin(t/2) sin(t), cos(t/2) sin(t)}, the first k of them.
+
+    Parameters
+    ----------
+    row : (q,) array of int
+        Cell of each point.
+    bary : (q, d + 1) array
+    side : (q,) array of int
+        Side of the crack, 0 where unknown: it decides the angle on a lip.
+    nodes : (m, d + 1) array of int
+    gradient : (m, d + 1, d) array
+        Gradients of the barycentric coordinates.
+    phi, psi : (n,) arrays
+    active : (n,) array of bool
+        Points that carry the functions.
+    shift : (n, k) array
+        The functions at the points.
+    slopes : bool
+        Whether gradients are wanted.
+
+    Returns
+    -------
+    value : (q, (d + 1) k) array
+    slope : (q, (d + 1) k, d) array, of length 0 where it is not wanted
+    """
+    q, corners = bary.shape
+    d = corners - 1
+    k = shift.shape[1]
+    value = np.zeros((q, corners * k))
+    slope = np.zeros((q if slopes else 0, corners * k, d))
+    F, ahead, normal = np.empty(4), np.empty(4), np.empty(4)
+    to_psi, to_phi = np.empty(d), np.empty(d)
+    for p in range(q):
+        e = row[p]
+        x = 0.0
+        y = 0.0
+        for b in range(corners):
+            x += bary[p, b] * psi[nodes[e, b]]
+            y += bary[p, b] * phi[nodes[e, b]]
+        r = math.sqrt(x * x + y * y)
+        if side[p] != 0 and y * side[p] <= 0.0:
+            y = side[p] * 1e-300
+        theta = math.atan2(y, x)
+        c, s = math.cos(theta / 2), math.sin(theta / 2)
+        C, S = math.cos(theta), math.sin(theta)
+        root = math.sqrt(r)
+        F[0], F[1], F[2], F[3] = c, s, s * S, c * S
+        if slopes:
+            ahead[0], ahead[1] = -s / 2, c / 2
+            ahead[2], ahead[3] = c * S / 2 + s * C, -s * S / 2 + c * C
+            for j in range(d):
+                to_psi[j] = 0.0
+                to_phi[j] = 0.0
+                for b in range(corners):
+                    to_psi[j] += psi[nodes[e, b]] * gradient[e, b, j]
+                    to_phi[j] += phi[nodes[e, b]] * gradient[e, b, j]
+            for f in range(4):
+                turn = ahead[f]
+                ahead[f] = (0.5 * F[f] * C - turn * S) / root
+                normal[f] = (0.5 * F[f] * S + turn * C) / root
+        for b in range(corners):
+            node = nodes[e, b]
+            if not active[node]:
+                continue
+            for f in range(k):
+                lifted = root * F[f] - shift[node, f]
+                value[p, b * k + f] = bary[p, b] * lifted
+                if slopes:
+                    for j in range(d):
+                        steep = ahead[f] * to_psi[j] + normal[f] * to_phi[j]
+                        slope[p, b * k + f, j] = lifted * gradient[e, b, j] + bary[p, b] * steep
+    return value, slope
+
+
+@numba.njit(cache=True, error_model="numpy")
+def add_flux(defect, piece, value, normal, moment):  # type: ignore[no-untyped-def]
+    """Add the boundary integral of value x normal x moment to each piece.
+
+    Parameters
+    ----------
+    defect : (p, f, d, a) array
+        Changed in place.
+    piece : (q,) array of int
+    value : (q, f) array
+    normal : (q, d) array
+        Times the weight.
+    moment : (q, a) array
+    """
+    for q in range(len(piece)):
+        k = piece[q]
+        for f in range(value.shape[1]):
+            v = value[q, f]
+            if v != 0.0:
+                for j in range(normal.shape[1]):
+                    for a in range(moment.shape[1]):
+                        defect[k, f, j, a] += v * normal[q, j] * moment[q, a]
+
+
+@numba.njit(cache=True, error_model="numpy")
+def take_volume(defect, piece, weight, value, slope, moment, scale):  # type: ignore[no-untyped-def]
+    """Subtract the volume integral of the gradient of value x moment from each piece.
+
+    Parameters
+    ----------
+    defect : (p, f, d, a) array
+        Changed in place.
+    piece : (q,) array of int
+    weight : (q,) array
+    value : (q, f) array
+    slope : (q, f, d) array
+    moment : (q, a) array
+        1 and, if a > 1, the coordinates in units of the size of the cell.
+    scale : (q,) array, 1/length
+        One over that size.
+    """
+    for q in range(len(piece)):
+        k = piece[q]
+        w = weight[q]
+        for f in range(value.shape[1]):
+            for j in range(slope.shape[2]):
+                for a in range(moment.shape[1]):
+                    defect[k, f, j, a] -= w * slope[q, f, j] * moment[q, a]
+                if moment.shape[1] > 1:
+                    defect[k, f, j, 1 + j] -= w * value[q, f] * scale[q]
+
+
+@numba.njit(cache=True, error_model="numpy")
+def add_correction(slope, first, piece, row, coefficient, moment, functions):  # type: ignore[no-untyped-def]
+    """Add coefficient . moment to the gradients from function `first` on, where they act.
+
+    Parameters
+    ----------
+    slope : (q, n, d) array
+        Changed in place.
+    first : int
+    piece, row : (q,) arrays of int
+    coefficient : (p, f, d, a) array
+    moment : (q, a) array
+    functions : (m, n) array of int
+        Negative where a function does not act on a cell.
+    """
+    for q in range(len(piece)):
+        k = piece[q]
+        for f in range(coefficient.shape[1]):
+            if functions[row[q], first + f] < 0:
+                continue
+            for j in range(slope.shape[2]):
+                for a in range(moment.shape[1]):
+                    slope[q, first + f, j] += coefficient[k, f, j, a] * moment[q, a]
