@@ -23,9 +23,9 @@ from xcrack.equilibrium import free_motion
 from xcrack.level_set import level_set
 from xcrack.lip_points import lip_points
 from xcrack.loads import load_vector
-from xcrack.solving import dual
 from xcrack.space import space
 from xcrack.supports import known_unknowns
+from xcrack.touching import dual
 
 PARTS = ("mesh", "level sets", "cut and space", "bulk", "enriched cells", "loads", "factor",
          "solve", "contact", "K")  # fmt: skip

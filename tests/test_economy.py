@@ -270,6 +270,7 @@ def test_cheaper_choices_cost_less():
 
 def test_plan_names_every_ingredient_before_anything_is_built(monkeypatch):
     """One line an ingredient, without cutting or assembling; the report has the same and more."""
+    import xcrack.model
     import xcrack.solving
 
     def forbidden(*args, **options):
@@ -277,8 +278,9 @@ def test_plan_names_every_ingredient_before_anything_is_built(monkeypatch):
 
     scene = problem(EDGE, INNER)
     with monkeypatch.context() as patch:
-        for name in ("cut", "space", "bulk", "system"):
-            patch.setattr(xcrack.solving, name, forbidden)
+        for name in ("cut", "space", "bulk"):
+            patch.setattr(xcrack.model, name, forbidden)
+        patch.setattr(xcrack.solving, "system", forbidden)
         planned = xc.plan(scene)
     lines = str(planned).splitlines()
     assert len(lines) == len(planned.ingredients)

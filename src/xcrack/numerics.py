@@ -38,6 +38,10 @@ class Numerics:
     domain : float, length, optional
         Outer radius of the first domain of the interaction integral. None: twice the enriched
         radius, as far as body and other tips allow.
+    linear : {"auto", "direct", "iterative"}
+        Linear solver. Auto: a factorisation in the plane and below 4 000 unknowns, above that in
+        space conjugate gradients with a multigrid hierarchy: a factor of a body in space fills
+        with the square of the unknowns.
     initial_set : {"closed", "open"}
         State of the lips that the contact iteration starts from where nothing is known.
 
@@ -56,6 +60,7 @@ class Numerics:
     patch: bool = False
     points: int = 4
     domain: float | None = None
+    linear: str = "auto"
     initial_set: str = "closed"
 
     def __post_init__(self) -> None:
@@ -64,6 +69,7 @@ class Numerics:
             "functions": (4, 2),
             "multipliers": ("reduced", "naive"),
             "orthonormal": ("star", "node", "none"),
+            "linear": ("auto", "direct", "iterative"),
             "initial_set": ("closed", "open"),
         }
         for name, allowed in choices.items():

@@ -80,7 +80,7 @@ def plan(problem: Problem) -> Report:
     n_tips = [crack.n_tips for crack in problem.placed]
     rows = [_heaviside(n_tips), _tips(problem, n_tips)]
     rows.extend(_multipliers(problem))
-    rows.append(Ingredient("third mode", False, "a plane problem has modes I and II only"))
+    rows.append(_third_mode(problem, n_tips))
     held = "held by supports" if problem.supports else "none given; rigid motion is removed"
     rows.append(Ingredient("supports", bool(problem.supports), held))
     rows.append(
@@ -94,6 +94,14 @@ def plan(problem: Problem) -> Report:
     )
     rows.append(Ingredient("refinement", False, "the mesh is taken as it is"))
     return Report(tuple(rows), {})
+
+
+def _third_mode(problem: Problem, n_tips: list[int]) -> Ingredient:
+    if problem.mesh.dim == 2:
+        return Ingredient("third mode", False, "a plane problem has modes I and II only")
+    if not sum(n_tips):
+        return Ingredient("third mode", False, "no front to tear along")
+    return Ingredient("third mode", True, "K_III along every front")
 
 
 def _heaviside(n_tips: list[int]) -> Ingredient:
@@ -111,7 +119,8 @@ def _tips(problem: Problem, n_tips: list[int]) -> Ingredient:
     reach = (
         "within a fixed radius" if problem.numerics.enrichment == "geometric" else "tip cells only"
     )
-    return Ingredient("tip functions", True, f"{sum(n_tips)} tip(s), {n} functions, {reach}")
+    what = "tip(s)" if problem.mesh.dim == 2 else "front(s)"
+    return Ingredient("tip functions", True, f"{sum(n_tips)} {what}, {n} functions, {reach}")
 
 
 def _multipliers(problem: Problem) -> list[Ingredient]:

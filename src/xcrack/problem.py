@@ -24,6 +24,7 @@ from xcrack.loads import facet_set
 from xcrack.material import Isotropic
 from xcrack.mesh import Mesh
 from xcrack.numerics import Numerics
+from xcrack.surface_place import check_surfaces, place_surface
 
 _LOADS = (Traction, Pressure, PointForce, BodyForce, CrackPressure, InitialStress, Displacement)
 
@@ -43,7 +44,8 @@ class Problem:
     contact : {"auto", "on", "off"}
         auto: a crack whose lips would overlap gets multipliers, others get none.
     order : {1, 2}, optional
-        Degree of the standard and Heaviside functions; 2 in the plane where it is left out.
+        Degree of the standard and Heaviside functions. Where it is left out: 2 in the plane, 1 in
+        space, where it is the only choice.
     numerics : Numerics
 
     Raises
@@ -75,29 +77,35 @@ class Problem:
                     f"{name}: give a list, such as {name}=[...], not {type(given).__name__}."
                 )
             object.__setattr__(self, name, tuple(given))
-        if self.mesh.dim == 3:
+        if self.mesh.dim == 3 and self.material.plane is not None:
             raise ProblemError(
-                "the mesh has tetrahedra: this version solves plane bodies; give a mesh of "
-                "triangles (read_mesh drops a constant z)."
+                f'Isotropic(plane="{self.material.plane}") is for plane bodies: leave plane out '
+                "for a mesh of tetrahedra (read_mesh drops a constant z)."
             )
-        if self.material.plane is None:
+        if self.mesh.dim == 2 and self.material.plane is None:
             raise ProblemError(
                 'a plane body needs Isotropic(..., plane="strain") or plane="stress": the two '
                 "differ by up to 1/(1 - nu²) in stiffness, so there is no default."
             )
         if self.order is None:
-            object.__setattr__(self, "order", 2)
+            object.__setattr__(self, "order", 2 if self.mesh.dim == 2 else 1)
+        if self.mesh.dim == 3 and self.order == 2:
+            raise ProblemError("order = 2: bodies in space are solved at order 1; leave it out.")
         if self.order not in (1, 2):
             raise ProblemError(f"order = {self.order!r}: give 1 or 2.")
         if self.contact not in ("auto", "on", "off"):
             raise ProblemError(f'contact = {self.contact!r}: give "auto", "on" or "off".')
         self._check_members()
-        check_cracks(self.placed, self.mesh)
+        if self.mesh.dim == 2:
+            check_cracks(self.placed, self.mesh)
+        else:
+            check_surfaces(self.placed, self.mesh)
 
     @cached_property
     def placed(self) -> tuple[Crack, ...]:
         """The cracks with tips and mouths decided in this mesh."""
-        return tuple(place(crack, self.mesh) for crack in self.cracks)
+        put = place if self.mesh.dim == 2 else place_surface
+        return tuple(put(crack, self.mesh) for crack in self.cracks)
 
     def state(self, state: Any) -> tuple[tuple[Load, ...], float]:
         """Loads and factor of a load state: a number, or a list of loads."""

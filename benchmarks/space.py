@@ -1,0 +1,138 @@
+"""Time and memory of a penny crack in a cube, part by part, three load states with contact.
+
+    python benchmarks/space.py                 # 3e4, 1e5, 3e5 and 1e6 unknowns
+    python benchmarks/space.py 20 29           # cells a side of the cube
+
+Each size runs in a process of its own, so that its peak memory is its own. Everything that numba
+compiles is compiled before the clock starts.
+"""
+
+import json
+import resource
+import subprocess
+import sys
+import time
+from dataclasses import replace
+
+import numpy as np
+
+import xcrack as xc
+from xcrack.assembly import bulk, enriched_stiffness, total_stiffness
+from xcrack.cut import cut
+from xcrack.equilibrium import balanced, free_motion
+from xcrack.iterative import iterative_system
+from xcrack.lip_points import lip_points
+from xcrack.loads import load_vector
+from xcrack.model import Model, levels
+from xcrack.multipliers import gap_rows, multipliers
+from xcrack.solving import solve_states
+from xcrack.space import space
+from xcrack.supports import known_unknowns
+
+SIZES = (20, 29, 43, 65)
+STATES = {
+    "tension": [xc.traction("top", (0, 0, 1.0)), xc.traction("bottom", (0, 0, -1.0))],
+    "compression and shear": [
+        xc.traction("top", (0.4, 0, -1.0)),
+        xc.traction("bottom", (-0.4, 0, 1.0)),
+        xc.traction("right", (0, 0, 0.4)),
+        xc.traction("left", (0, 0, -0.4)),
+    ],
+    "bending": [
+        xc.traction("top", lambda x: np.outer(x[:, 0], (0, 0, 1.0))),
+        xc.traction("bottom", lambda x: np.outer(x[:, 0], (0, 0, -1.0))),
+    ],
+}
+
+
+def scene(n: int) -> xc.Problem:
+    """A tilted penny of radius 0.5 in a cube of side 2."""
+    mesh = xc.box((-1, -1, -1), (1, 1, 1), n)
+    crack = xc.penny_crack((0.013, -0.021, 0.0317), (0.2, -0.3, 1.0), 0.5)
+    return xc.Problem(mesh, xc.Isotropic(E=1.0, nu=0.3), [crack])
+
+
+def measure(n: int) -> dict[str, object]:
+    """Seconds of each part, steps of the solver, peak memory."""
+    problem = scene(n)
+    numerics = problem.numerics
+    seconds: dict[str, float] = {}
+
+    def timed(name, function, *arguments):
+        start = time.perf_counter()
+        result = function(*arguments)
+        seconds[name] = seconds.get(name, 0.0) + time.perf_counter() - start
+        return result
+
+    mesh = problem.mesh
+    timed("mesh", lambda: (mesh.gradient, mesh.edges, mesh.facets, mesh.cell_size, mesh.cell_tree))
+    cracks = timed("crack", lambda: problem.placed)
+    phi = timed("level sets", levels, mesh, cracks[0], None)
+    cuts = (timed("cutting", cut, mesh, phi),)
+    where = timed("cutting", space, mesh, 1, cracks, cuts, numerics)
+    lips = (timed("cutting", lip_points, where, 0),)
+    plain = timed("bulk", bulk, mesh, problem.material, 1)
+    enriched, n_points = timed(
+        "enriched cells", enriched_stiffness, where, problem.material, numerics, lips
+    )
+    K = timed("enriched cells", total_stiffness, plain, enriched)
+    known = known_unknowns(where, ())
+    model = Model(where, lips, plain, K, known, n_points)
+    motion = timed("set-up", free_motion, where, known.fixed)
+    engine = timed("set-up", iterative_system, where, K, plain, known.fixed, None, motion.modes)
+    f = np.stack(
+        [balanced(where, motion, load_vector(where, s, lips))[0] for s in STATES.values()], axis=1
+    )
+    u = timed("open solves", engine.solve, f)
+    open_steps = engine.count.iterations
+    chosen = timed("contact", multipliers, where, 0, lips[0], "reduced")
+    N = timed("contact", lambda: gap_rows(chosen, lips[0], model.jumps[0]))
+    h = mesh.cell_size.mean()
+    timed("contact", engine.contact, N, f, np.zeros_like(f), chosen.measure, 1 / h, [None] * 3, u)
+    contact_steps = engine.count.iterations - open_steps
+    # The same through the front door, for K and for the step after the first.
+    first = solve_states(problem, list(STATES.values()))
+    timed("K", xc.stress_intensity, first[1])
+    start = time.perf_counter()
+    next_problem = replace(
+        problem, cracks=[xc.penny_crack((0.013, -0.021, 0.0317), (0.2, -0.3, 1.0), 0.52)]
+    )
+    solve_states(next_problem, list(STATES.values()), bulk=first[0].bulk, warm=first[0].warm)
+    later = time.perf_counter() - start
+    return {
+        "n": n,
+        "unknowns": where.n_dof,
+        "enriched": where.n_dof - 3 * mesh.n_points,
+        "groups": len(chosen.measure),
+        "points": n_points,
+        "seconds": {k: round(v, 3) for k, v in seconds.items()},
+        "next step": round(later, 3),
+        "steps": [open_steps, contact_steps],
+        "peak MB": round(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024),
+    }
+
+
+def main() -> None:
+    """Run all sizes and print a table."""
+    if len(sys.argv) == 3 and sys.argv[1] == "--one":
+        measure(6)
+        print(json.dumps(measure(int(sys.argv[2]))))
+        return
+    for n in [int(a) for a in sys.argv[1:]] or SIZES:
+        run = subprocess.run(
+            [sys.executable, __file__, "--one", str(n)], capture_output=True, text=True, check=False
+        )
+        if run.returncode:
+            print(run.stderr[-2000:])
+            continue
+        row = json.loads(run.stdout.splitlines()[-1])
+        parts = "  ".join(f"{k} {v}" for k, v in row["seconds"].items())
+        print(
+            f"n {row['n']}: {row['unknowns']} unknowns, {row['enriched']} enriched, "
+            f"{row['groups']} groups, {row['points']} points, peak {row['peak MB']} MB\n"
+            f"    {parts}\n    steps {row['steps']}, next step with everything {row['next step']} s"
+        )
+
+
+if __name__ == "__main__":
+    main()

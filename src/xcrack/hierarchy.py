@@ -1,0 +1,384 @@
+"""Multigrid for cracked bodies: the levels of the uncracked body, an enriched matrix on top.
+
+Smoothed aggregation (Vanek, Mandel and Brezina, 1996) on the stiffness of the uncracked body is
+made once a mesh. A crack only changes the finest level: its matrix is the enriched one, and the
+prolongator gets a zero row for each enriched unknown. This works in the basis in which the
+enriched unknowns of a node are orthonormal and orthogonal to its standard ones in energy.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, cast
+
+import numpy as np
+import scipy.sparse as sp
+
+from xcrack.arrays import Bools, Floats, Ints, lock, offsets
+from xcrack.assembly import Bulk, rigid_modes
+from xcrack.simplex import node_points
+
+_COARSEST = 300  # unknowns below which a dense inverse ends the hierarchy
+_LANCZOS = 12  # steps for the largest eigenvalue of D^-1 A
+_SAFETY = 1.1  # by which it is enlarged: Lanczos gives a lower bound
+_SHARE = 0.1  # of the spectrum's upper end from which Chebyshev smooths
+_OMEGA = 4 / 3  # damping of the step that smooths the prolongator
+_START = 613_077  # seed of the vector that Lanczos starts from
+_NULL = 1e-11  # eigenvalues of the coarsest matrix below this share are rigid motions
+
+
+@dataclass(frozen=True, eq=False)
+class RowBlocks:
+    """Sparse matrix in blocks of rows that share one pattern.
+
+    Attributes
+    ----------
+    shape : (rows, columns)
+    first, start, offset : (b + 1,) arrays of uint32
+        First row, column list and values of each block.
+    columns : array of uint32
+    values : array, float32 or float64
+    """
+
+    shape: tuple[int, int]
+    first: Any
+    start: Any
+    offset: Any
+    columns: Any
+    values: Any
+
+    @property
+    def dtype(self) -> Any:
+        """Type of the values."""
+        return self.values.dtype
+
+    def times(self, x: Any) -> Any:
+        """A x, in the type of the values."""
+        return self.added(np.zeros(self.shape[0], self.dtype), 1, x)
+
+    def added(self, y: Any, scale: float, x: Any) -> Any:
+        """Write y + scale A x over y, and return it."""
+        from xcrack.kernels.cycle import product
+
+        number = self.dtype.type(scale)
+        product(self.first, self.start, self.offset, self.columns, self.values, x, y, number, y)
+        return y
+
+    def single(self) -> "RowBlocks":
+        """The same matrix in single precision; it shares the pattern."""
+        values = lock(self.values.astype(np.float32))
+        return RowBlocks(self.shape, self.first, self.start, self.offset, self.columns, values)
+
+
+def row_blocks(parts: Sequence[sp.csr_matrix], first: Ints, dtype: Any = np.float64) -> RowBlocks:
+    """Store CSR matrices side by side in blocks of rows.
+
+    Parameters
+    ----------
+    parts : sequence of sparse matrices (n, m)
+        From the left to the right; they need not be joined before.
+    first : (b + 1,) array of int
+        First row of each block, and n at the end.
+    dtype : numpy type of the values
+    """
+    from xcrack.kernels.cycle import fill_blocks, pattern_sizes
+
+    first = np.asarray(first, dtype=np.int64)
+    sizes = [pattern_sizes(A.indptr, A.indices, first, A.shape[1]) for A in parts]
+    whole = np.asarray(np.sum(sizes, axis=0, dtype=np.int64))
+    start, offset = offsets(whole), offsets(whole * np.diff(first))
+    columns, values = np.empty(start[-1], np.uint32), np.zeros(offset[-1], dtype)
+    left, shift = np.zeros_like(whole), 0
+    for A, own in zip(parts, sizes):
+        fill_blocks(
+            A.indptr, A.indices, A.data, first, start[:-1] + left, np.stack([left, whole], axis=1),
+            offset[:-1], A.shape[1], shift, columns, values,
+        )  # fmt: skip
+        left, shift = left + own, shift + A.shape[1]
+    short = [each.astype(np.uint32) for each in (first, start, offset)]
+    return RowBlocks((int(first[-1]), shift), *map(lock, (*short, columns, values)))
+
+
+@dataclass(frozen=True, eq=False)
+class Bordered:
+    """Matrix of standard and enriched unknowns; the standard block is that of every crack.
+
+    Attributes
+    ----------
+    standard : RowBlocks (n, n)
+    across : RowBlocks (n, e)
+    below : RowBlocks (e, n + e)
+    """
+
+    standard: RowBlocks
+    across: RowBlocks
+    below: RowBlocks
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Numbers of rows and columns."""
+        n = self.below.shape[1]
+        return n, n
+
+    @property
+    def dtype(self) -> Any:
+        """Type of the values."""
+        return self.standard.dtype
+
+    def times(self, x: Any) -> Any:
+        """A x, in the type of the values."""
+        return self.added(np.zeros(len(x), self.dtype), 1, x)
+
+    def added(self, y: Any, scale: float, x: Any) -> Any:
+        """Write y + scale A x over y, and return it."""
+        n = self.standard.shape[0]
+        self.standard.added(y[:n], scale, x[:n])
+        self.across.added(y[:n], scale, x[n:])
+        self.below.added(y[n:], scale, x)
+        return y
+
+
+@dataclass(frozen=True, eq=False)
+class Level:
+    """One level of a cycle, in single precision.
+
+    Attributes
+    ----------
+    matrix : RowBlocks or Bordered
+    inverse : (n,) array
+        Inverse diagonal, 0 where the diagonal is.
+    largest : float
+        Upper bound of the spectrum of D^-1 A.
+    prolong, restrict : RowBlocks
+        From and to the next level; their rows and columns are the leading unknowns of this one.
+    """
+
+    matrix: RowBlocks | Bordered
+    inverse: Any
+    largest: float
+    prolong: RowBlocks
+    restrict: RowBlocks
+
+
+@dataclass(frozen=True, eq=False)
+class Cycle:
+    """A V-cycle with Chebyshev smoothing of degree 2: an approximate inverse, symmetric.
+
+    Attributes
+    ----------
+    levels : tuple of Level
+        The finest first.
+    coarsest : (c, c) array
+        Pseudo-inverse of the last matrix.
+    """
+
+    levels: tuple[Level, ...]
+    coarsest: Any
+
+    def __call__(self, r: Floats) -> Floats:
+        """Approximate A^-1 r."""
+        size = float(np.abs(r).max(initial=0.0))
+        if size == 0 or not np.isfinite(size):
+            return np.zeros_like(r)
+        return self._down(0, (r / size).astype(np.float32)).astype(np.float64) * size
+
+    def _down(self, number: int, b: Any) -> Any:
+        if number == len(self.levels):
+            return self.coarsest @ b
+        level = self.levels[number]
+        x, r = np.zeros_like(b), b.copy()
+        d = _smoothed(level, r, x)
+        level.matrix.added(r, -1, d)
+        n = level.prolong.shape[0]
+        coarse = self._down(number + 1, level.restrict.times(r[:n]))
+        correction = np.zeros_like(x)
+        level.prolong.added(correction[:n], 1, coarse)
+        x += correction
+        level.matrix.added(r, -1, correction)
+        _smoothed(level, r, x)
+        return x
+
+
+def _smoothed(level: Level, r: Any, x: Any) -> Any:
+    """Two Chebyshev steps; r is left one step behind x, by A times the result."""
+    from xcrack.kernels.cycle import first_step, next_step
+
+    high, low = level.largest, _SHARE * level.largest
+    middle, half = (high + low) / 2, (high - low) / 2
+    sigma = middle / half
+    rho = 1 / (2 * sigma - 1 / sigma)
+    single = np.float32
+    d = np.empty_like(x)
+    first_step(level.inverse, r, single(1 / middle), d, x)
+    level.matrix.added(r, -1, d)
+    next_step(level.inverse, r, single(rho / sigma), single(2 * rho / half), d, x)
+    return d
+
+
+@dataclass(frozen=True, eq=False)
+class Hierarchy:
+    """Levels of the uncracked body, kept from crack to crack.
+
+    Attributes
+    ----------
+    bulk : Bulk
+    fixed : (n,) array of bool
+        Standard unknowns that supports decide.
+    nodes : (k,) array of int
+        Nodes with a free unknown; theirs are the unknowns of the hierarchy.
+    free : (k d,) array of bool
+        Which of these unknowns are free; the others are decoupled.
+    matrix : RowBlocks (k d, k d)
+        In double precision.
+    diagonal : (k d,) array
+    levels : tuple of Level
+        The uncracked body first.
+    coarsest : (c, c) array
+        Pseudo-inverse of the last matrix.
+    """
+
+    bulk: Bulk
+    fixed: Bools
+    nodes: Ints
+    free: Bools
+    matrix: RowBlocks
+    diagonal: Floats
+    levels: tuple[Level, ...]
+    coarsest: Any
+
+    def fits(self, bulk: Bulk, fixed: Bools) -> bool:
+        """Whether the hierarchy is that of a stiffness and its supports."""
+        n = len(self.fixed)
+        return self.bulk.matrix is bulk.matrix and np.array_equal(self.fixed, fixed[:n])
+
+
+def hierarchy(bulk: Bulk, fixed: Bools) -> Hierarchy:
+    """Make the levels of the uncracked body by smoothed aggregation with its rigid motions.
+
+    Parameters
+    ----------
+    bulk : Bulk
+    fixed : (n,) array of bool
+        Unknowns that supports decide; entries behind the standard unknowns are not looked at.
+        A body that is not held is welcome: its motions are left out on the coarsest level.
+    """
+    n, d = bulk.matrix.shape[0], bulk.mesh.dim
+    fixed = np.array(fixed[:n], dtype=bool)
+    nodes = np.nonzero(~fixed.reshape(-1, d).all(axis=1))[0]
+    unknowns = (nodes[:, None] * d + np.arange(d)).ravel()
+    free = ~fixed[unknowns]
+    matrix = _decoupled(bulk.matrix.tocsr()[unknowns][:, unknowns], free)
+    candidates = rigid_modes(node_points(bulk.mesh, bulk.order)[nodes]) * free[:, None]
+    A = sp.bsr_matrix(matrix, blocksize=(d, d))
+    finest = _stored(A, np.float64)
+    levels: list[Level] = []
+    while A.shape[0] > _COARSEST or not levels:
+        blocks = _stored(A) if levels else finest.single()
+        diagonal = A.diagonal()
+        largest = largest_eigenvalue(blocks, diagonal)
+        P, candidates = _prolongator(A, diagonal, largest, candidates)
+        levels.append(_level(blocks, diagonal, largest, P))
+        A = sp.bsr_matrix(P.T @ (A @ P), blocksize=(P.blocksize[1],) * 2)
+        if A.shape[0] > 0.7 * P.shape[0]:
+            break
+    return Hierarchy(
+        bulk=bulk,
+        fixed=lock(fixed),
+        nodes=lock(nodes),
+        free=lock(free),
+        matrix=finest,
+        diagonal=lock(matrix.diagonal()),
+        levels=tuple(levels),
+        coarsest=_inverse(A.toarray()),
+    )
+
+
+def extended(levels: Hierarchy, A: Bordered, diagonal: Floats) -> Cycle:
+    """Cycle for an enriched matrix whose standard block is that of a hierarchy.
+
+    Parameters
+    ----------
+    levels : Hierarchy
+    A : Bordered
+        In the basis in which the enriched unknowns of a node are orthogonal to its standard ones.
+    diagonal : (n,) array
+    """
+    finest = levels.levels[0]
+    standard = cast(RowBlocks, finest.matrix)
+    single = Bordered(standard, A.across.single(), A.below.single())
+    inverse = _reciprocal(diagonal).astype(np.float32)
+    largest = largest_eigenvalue(single, diagonal)
+    top = Level(single, lock(inverse), largest, finest.prolong, finest.restrict)
+    return Cycle((top, *levels.levels[1:]), levels.coarsest)
+
+
+def largest_eigenvalue(A: RowBlocks | Bordered, diagonal: Floats) -> float:
+    """Upper bound of the spectrum of D^-1 A, from a few steps of Lanczos."""
+    root = np.sqrt(_reciprocal(diagonal))
+    q = np.random.default_rng(_START).standard_normal(len(root))
+    q /= np.sqrt(np.einsum("i,i", q, q))
+    before, beta = np.zeros_like(q), 0.0
+    alphas, betas = [], []
+    for _ in range(_LANCZOS):
+        w = root * A.times((root * q).astype(A.dtype)) - beta * before
+        alpha = float(np.einsum("i,i", w, q))
+        w -= alpha * q
+        beta = float(np.sqrt(np.einsum("i,i", w, w)))
+        alphas.append(alpha)
+        if beta <= 1e-10 * abs(alpha):
+            break
+        betas.append(beta)
+        before, q = q, w / beta
+    n = len(alphas)
+    T = np.diag(alphas) + np.diag(betas[: n - 1], 1) + np.diag(betas[: n - 1], -1)
+    return _SAFETY * float(np.linalg.eigvalsh(T)[-1])
+
+
+def _decoupled(A: sp.csr_matrix, free: Bools) -> sp.csr_matrix:
+    """Matrix in which unknowns that are not free keep their diagonal entry alone."""
+    if free.all():
+        return sp.csr_matrix(A)
+    keep = sp.diags(free.astype(float))
+    rest = sp.diags(np.where(free, 0.0, A.diagonal()))
+    return sp.csr_matrix(keep @ A @ keep + rest)
+
+
+def _stored(A: sp.bsr_matrix, dtype: Any = np.float32) -> RowBlocks:
+    first = np.arange(0, A.shape[0] + 1, A.blocksize[0])
+    return row_blocks([A.tocsr()], first, dtype)
+
+
+def _level(blocks: RowBlocks, diagonal: Floats, largest: float, P: sp.bsr_matrix) -> Level:
+    R = sp.bsr_matrix(P.T, blocksize=P.blocksize[::-1])
+    inverse = lock(_reciprocal(diagonal).astype(np.float32))
+    return Level(blocks, inverse, largest, _stored(P), _stored(R))
+
+
+def _prolongator(
+    A: sp.bsr_matrix, diagonal: Floats, largest: float, candidates: Floats
+) -> tuple[sp.bsr_matrix, Floats]:
+    """Aggregates whose motions are smoothed once, and the motions of the next level."""
+    from pyamg.aggregation import fit_candidates, standard_aggregation
+
+    n = A.shape[0] // A.blocksize[0]
+    ones = np.ones(len(A.indices))
+    graph = sp.csr_matrix((ones, A.indices, A.indptr), shape=(n, n))
+    T, coarse = fit_candidates(standard_aggregation(graph)[0], candidates)
+    T = sp.bsr_matrix(T)
+    damped = sp.diags(_OMEGA * _SAFETY / largest * _reciprocal(diagonal))
+    P = T - sp.bsr_matrix(damped @ A, blocksize=A.blocksize) @ T
+    return sp.bsr_matrix(P, blocksize=T.blocksize), coarse
+
+
+def _reciprocal(diagonal: Floats) -> Floats:
+    """1 / diagonal, 0 where an aggregate was too small for all motions."""
+    alive = diagonal > 1e-12 * diagonal.max(initial=0.0)
+    return np.where(alive, 1 / np.where(alive, diagonal, 1.0), 0.0)
+
+
+def _inverse(A: Floats) -> Any:
+    """Pseudo-inverse of a symmetric matrix, in single precision."""
+    root = np.sqrt(_reciprocal(np.diag(A)))
+    w, V = np.linalg.eigh(root[:, None] * A * root)
+    kept = w > _NULL * w[-1]
+    V = root[:, None] * V[:, kept]
+    return lock(((V / w[kept]) @ V.T).astype(np.float32))

@@ -1,0 +1,78 @@
+"""From a problem to matrices: cut, numbered, integrated and assembled, but not solved."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+from xcrack.assembly import Bulk, bulk, enriched_stiffness, total_stiffness
+from xcrack.crack import Crack
+from xcrack.cut import cut
+from xcrack.level_set import LevelSet, level_set
+from xcrack.lip_points import LipPoints, lip_points
+from xcrack.mesh import Mesh
+from xcrack.multipliers import jump_matrix
+from xcrack.problem import Problem
+from xcrack.space import Space, space
+from xcrack.supports import Known, known_unknowns
+from xcrack.surface_levels import surface_levels
+from xcrack.tube import front_reach
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """Everything that load states share.
+
+    Attributes
+    ----------
+    space : Space
+    lips : tuple of LipPoints
+    bulk : Bulk
+    stiffness : sparse matrix
+    known : Known
+    n_points : int
+        Integration points of the enriched cells.
+    """
+
+    space: Space
+    lips: tuple[LipPoints, ...]
+    bulk: Bulk
+    stiffness: Any
+    known: Known
+    n_points: int
+
+    @cached_property
+    def jumps(self) -> tuple[Any, ...]:
+        """Normal jumps at the lip points of each crack, made when first asked for."""
+        return tuple(jump_matrix(self.space, c, lips) for c, lips in enumerate(self.lips))
+
+
+def build(problem: Problem, bulk_: Bulk | None = None) -> Model:
+    """Cut, number, integrate and assemble a problem, without solving it."""
+    mesh, order = problem.mesh, problem.order or 1
+    cracks = problem.placed
+    cuts = tuple(cut(mesh, levels(mesh, crack, problem.numerics.radius)) for crack in cracks)
+    space_ = space(mesh, order, cracks, cuts, problem.numerics)
+    lips = tuple(lip_points(space_, c) for c in range(len(cracks)))
+    if (
+        bulk_ is None
+        or bulk_.mesh is not mesh
+        or bulk_.order != order
+        or bulk_.material != problem.material
+    ):
+        bulk_ = bulk(mesh, problem.material, order)
+    enriched, n_points = enriched_stiffness(space_, problem.material, problem.numerics, lips)
+    return Model(
+        space_,
+        lips,
+        bulk_,
+        total_stiffness(bulk_, enriched),
+        known_unknowns(space_, tuple(problem.supports)),
+        n_points,
+    )
+
+
+def levels(mesh: Mesh, crack: Crack, radius: float | None) -> LevelSet:
+    """Level sets of a placed crack; in space up to where its functions may reach."""
+    if mesh.dim == 2:
+        return level_set(mesh, crack)
+    return surface_levels(mesh, crack, front_reach(mesh, crack, radius))

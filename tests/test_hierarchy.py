@@ -1,0 +1,222 @@
+"""Multigrid cycle: products, symmetry, few iterations at any size, bodies without supports."""
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+import scipy.sparse.linalg as sla
+
+import xcrack as xc
+from xcrack.assembly import bulk, rigid_modes
+from xcrack.hierarchy import Bordered, extended, hierarchy, largest_eigenvalue, row_blocks
+from xcrack.kernels.cycle import first_step, next_step
+from xcrack.projected import Operator, conjugate_gradients
+
+
+def drawn(shape, share, seed):
+    rng = np.random.default_rng(seed)
+    return sp.csr_matrix(rng.normal(size=shape) * (rng.random(shape) < share))
+
+
+@pytest.mark.parametrize("sizes", [[3, 3, 3], [1, 2, 3, 4, 5, 6, 7], [2, 6, 0, 8], [11]])
+def test_blocks_of_rows_multiply_like_csr(sizes):
+    A = drawn((sum(sizes), 9), 0.4, 4409 + len(sizes))
+    blocks = row_blocks([A], np.cumsum([0, *sizes]))
+    x, y = np.random.default_rng(63).normal(size=(2, 50))
+    x, y = x[:9], y[: A.shape[0]]
+    np.testing.assert_allclose(blocks.times(x), A @ x, atol=1e-14)  # round-off
+    np.testing.assert_allclose(blocks.added(y.copy(), -0.7, x), y - 0.7 * (A @ x), atol=1e-14)
+    single = blocks.single().times(x.astype(np.float32))
+    assert single.dtype == np.float32
+    np.testing.assert_allclose(single, A @ x, atol=1e-5)  # round-off in single precision
+
+
+def test_a_matrix_in_parts():
+    """Standard and enriched unknowns: blocks side by side, and a border, as if joined before."""
+    standard, across = drawn((8, 8), 0.4, 4447), drawn((8, 4), 0.4, 4451)
+    below = [drawn((4, 8), 0.5, 4457), drawn((4, 4), 0.5, 4463)]
+    first = np.array([0, 3, 4, 8])
+    lower = row_blocks(below, np.array([0, 4]))
+    joined = row_blocks([sp.csr_matrix(sp.hstack(below))], np.array([0, 4]))
+    for name in ("shape", "first", "start", "offset", "columns", "values"):
+        assert np.array_equal(getattr(lower, name), getattr(joined, name)), name
+    A = Bordered(row_blocks([standard], first), row_blocks([across], first), lower)
+    whole = sp.vstack([sp.hstack([standard, across]), sp.hstack(below)])
+    x = np.random.default_rng(4481).normal(size=12)
+    assert A.shape == (12, 12)
+    np.testing.assert_allclose(A.times(x), whole @ x, atol=1e-14)  # round-off
+
+
+def test_blocks_hold_each_column_once():
+    A = drawn((6, 20), 0.2, 4423)
+    blocks = row_blocks([A], np.array([0, 3, 6]))
+    for k, rows in enumerate((A[:3], A[3:])):
+        own = blocks.columns[blocks.start[k] : blocks.start[k + 1]]
+        assert own.tolist() == np.unique(rows.indices).tolist()
+    assert blocks.columns.dtype == np.uint32
+
+
+def test_chebyshev_steps():
+    rng = np.random.default_rng(4441)
+    inverse, r, d, x = rng.normal(size=(4, 7))
+    new, moved = d.copy(), x.copy()
+    first_step(inverse, r, 0.3, new, moved)
+    np.testing.assert_allclose(new, 0.3 * inverse * r)
+    np.testing.assert_allclose(moved, x + new)
+    before = new.copy()
+    next_step(inverse, r, 0.6, 0.2, new, moved)
+    np.testing.assert_allclose(new, 0.6 * before + 0.2 * inverse * r)
+
+
+def body(n, *, held="foot", E=1.0, nu=0.3, size=1.0, seed=2203):
+    """Stiffness of a box with moved inner points, and which unknowns supports decide."""
+    dim = len(n)
+    mesh = xc.box((0.0,) * dim, (size,) * dim, n)
+    x = np.array(mesh.points)
+    inner = ((x > 1e-9 * size) & (x < (1 - 1e-9) * size)).all(axis=1)
+    shift = np.random.default_rng(seed).uniform(-1, 1, (int(inner.sum()), dim))
+    x[inner] += 0.15 * size / np.array(n) * shift
+    mesh = xc.Mesh(x, mesh.cells, mesh.facet_sets)
+    material = xc.Isotropic(E, nu, "strain") if dim == 2 else xc.Isotropic(E, nu)
+    fixed = np.zeros((len(x), dim), dtype=bool)
+    if held == "foot":
+        fixed[x[:, -1] < 1e-9 * size] = True
+    elif held == "symmetry":
+        for i in range(dim):
+            fixed[x[:, i] < 1e-9 * size, i] = True
+    return bulk(mesh, material, 1), fixed.ravel()
+
+
+def operator_of(stiffness, fixed, null=None):
+    """Levels, their finest matrix and the operator of a body without a crack."""
+    levels = hierarchy(stiffness, fixed)
+    d, n = stiffness.mesh.dim, len(levels.free)
+    unknowns = (levels.nodes[:, None] * d + np.arange(d)).ravel()
+    free = sp.diags(levels.free.astype(float))
+    A = free @ stiffness.matrix.tocsr()[unknowns][:, unknowns] @ free
+    A = sp.csr_matrix(A + sp.diags(levels.diagonal * ~levels.free))
+    nothing = np.zeros(1, dtype=np.int64)
+    border = [
+        row_blocks([sp.csr_matrix((n, 0))], levels.matrix.first),
+        row_blocks([sp.csr_matrix((0, n)), sp.csr_matrix((0, 0))], nothing),
+    ]
+    K = Bordered(levels.matrix, *border)
+    null = np.zeros((n, 0)) if null is None else null
+    return A, levels, Operator(K.times, extended(levels, K, A.diagonal()), A.diagonal(), null)
+
+
+def load(levels, seed=911):
+    return np.random.default_rng(seed).normal(size=len(levels.free)) * levels.free
+
+
+@pytest.mark.parametrize("held", ["foot", "symmetry"])
+def test_against_a_direct_solver(held):
+    A, levels, K = operator_of(*body((7, 8, 9), held=held))
+    b = load(levels)
+    y, steps = conjugate_gradients(K, b, np.zeros_like(b), 1e-11)
+    exact = sla.spsolve(sp.csc_matrix(A), b)
+    assert steps <= 25
+    # the tolerance, times the root of the condition number
+    assert np.abs(y - exact).max() <= 1e-9 * np.abs(exact).max()
+    assert (y[~levels.free] == 0).all()
+
+
+def test_cycle_is_symmetric_and_positive():
+    _, levels, K = operator_of(*body((9, 8, 7)))
+    x, y = load(levels, 77), load(levels, 78)
+    Vx, Vy = K.cycle(x), K.cycle(y)
+    size = np.sqrt((x @ Vx) * (y @ Vy))
+    assert x @ Vx > 0
+    assert y @ Vy > 0
+    assert abs(x @ Vy - y @ Vx) <= 1e-5 * size  # round-off in single precision
+    np.testing.assert_allclose(K.cycle(1e12 * x), 1e12 * Vx, rtol=1e-3, atol=1e-5 * 1e12)
+    assert (K.cycle(0 * x) == 0).all()
+
+
+def test_steps_hardly_grow_with_the_mesh():
+    steps = []
+    for n in (4, 8, 14):
+        A, levels, K = operator_of(*body((n, n, n)))
+        b = np.zeros(len(levels.free)).reshape(-1, 3)
+        top = levels.bulk.mesh.points[levels.nodes, 2] > 1 - 1e-9
+        b[top] = (1.0, 0.3, 0.5)
+        b = b.ravel()
+        y, count = conjugate_gradients(K, b, np.zeros_like(b))
+        assert np.linalg.norm(b - A @ y) <= 1.1e-8 * np.linalg.norm(b)
+        steps.append(count)
+    assert max(steps) <= 20, steps
+
+
+def test_a_thin_plate_and_a_plane_body():
+    """The aggregates have no say in the shape of the body or its dimension."""
+    for n in ((30, 20, 2), (60, 50)):
+        _, levels, K = operator_of(*body(n))
+        b = load(levels)
+        assert conjugate_gradients(K, b, np.zeros_like(b))[1] <= 40
+
+
+def test_units_change_nothing():
+    steps = []
+    for E, size in ((1.0, 1.0), (2e11, 1e-3), (1e-9, 1e4)):
+        _, levels, K = operator_of(*body((6, 6, 6), E=E, size=size))
+        b = load(levels)
+        steps.append(conjugate_gradients(K, b, np.zeros_like(b))[1])
+    assert max(steps) - min(steps) <= 1, steps
+
+
+def test_without_supports():
+    """Six rigid motions: any solution is right, up to such a motion."""
+    stiffness, fixed = body((7, 6, 7), held="not")
+    x = stiffness.mesh.points
+    modes = np.linalg.qr(rigid_modes(x))[0]
+    A, levels, K = operator_of(stiffness, fixed, modes)
+    b = load(levels)
+    b -= modes @ (modes.T @ b)
+    y, steps = conjugate_gradients(K, b, np.zeros_like(b), 1e-11)
+    assert steps <= 30
+    assert np.linalg.norm(b - A @ y) <= 2e-11 * np.linalg.norm(b)
+    assert np.abs(modes.T @ y).max() <= 1e-12 * np.linalg.norm(y)  # round-off
+    pinned = sp.csc_matrix(A + 1e-2 * sp.csr_matrix(modes @ modes.T))
+    exact = sla.spsolve(pinned, b)
+    assert np.abs(y - exact).max() <= 1e-8 * np.abs(exact).max()
+
+
+def test_a_small_body_is_solved_at_once():
+    A, levels, K = operator_of(*body((2, 2, 2)))
+    assert len(levels.free) < 100
+    b = load(levels)
+    y, steps = conjugate_gradients(K, b, np.zeros_like(b))
+    exact = sla.spsolve(sp.csc_matrix(A), b)
+    assert steps <= 15
+    assert np.abs(y - exact).max() <= 1e-7 * np.abs(exact).max()
+
+
+def test_made_twice_is_the_same():
+    """No draw of random numbers by anyone: bit by bit."""
+    np.random.seed(99)  # noqa: NPY002
+    stiffness, fixed = body((6, 7, 6))
+    first = hierarchy(stiffness, fixed)
+    np.random.seed(98)  # noqa: NPY002
+    second = hierarchy(stiffness, fixed)
+    assert len(first.levels) == len(second.levels)
+    for a, b in zip(first.levels, second.levels):
+        assert a.largest == b.largest
+        assert np.array_equal(a.matrix.values, b.matrix.values)
+        assert np.array_equal(a.prolong.values, b.prolong.values)
+    assert np.array_equal(first.coarsest, second.coarsest)
+
+
+def test_serves_the_same_body_and_supports():
+    stiffness, fixed = body((4, 4, 4))
+    levels = hierarchy(stiffness, fixed)
+    longer = np.concatenate([fixed, np.ones(12, dtype=bool)])
+    assert levels.fits(stiffness, longer)
+    assert not levels.fits(stiffness, ~fixed)
+    assert not levels.fits(body((4, 4, 4))[0], fixed)
+
+
+def test_largest_eigenvalue_is_a_bound():
+    A, _, _ = operator_of(*body((6, 6, 6)))
+    root = sp.diags(1 / np.sqrt(A.diagonal()))
+    exact = sla.eigsh(root @ A @ root, k=1, return_eigenvectors=False)[0]
+    blocks = row_blocks([A], np.arange(0, A.shape[0] + 1, 3))
+    assert exact <= largest_eigenvalue(blocks, A.diagonal()) <= 1.12 * exact
