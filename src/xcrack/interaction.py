@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from xcrack.arrays import Bools, Floats, Ints
+from xcrack.arrays import Floats
 from xcrack.conditions import (
     BodyForce,
     CrackPressure,
@@ -27,9 +27,11 @@ from xcrack.conditions import (
 )
 from xcrack.domain import domain_points, domain_radius, mean_rotation, weight
 from xcrack.errors import ProblemError, XcrackWarning
+from xcrack.front_sif import along_fronts
 from xcrack.lip_points import LipPoints, lip_points
 from xcrack.loads import position
 from xcrack.quadrature import Points, cell_side
+from xcrack.sif import SIF
 from xcrack.solution import Solution, fields_at
 from xcrack.williams import continued_polar, unit_gradients
 
@@ -37,61 +39,8 @@ _SECOND = 0.7  # outer radius of the second domain, as a share of the first
 _WARN = 0.01  # difference of the two domains, as a share of K, that is worth a word
 
 
-@dataclass(frozen=True, eq=False)
-class SIF:
-    """Stress intensity factors of one crack.
-
-    Attributes
-    ----------
-    x : (f, d) array, length
-        Tips in the order of the crack's points; mouths are left out.
-    frame : (f, d, d) array
-        Rows (ahead, normal).
-    K : (f, 2) array, stress · √length
-        Columns I, II; K_II is positive for a positive shear in the frame (ahead, normal).
-    T : (f,) array, stress
-        Stress along the lips.
-    spread : (f, 2) array
-        Difference between two domains, stress · √length.
-    s : (f,) array, length
-        Position along the front; zero in the plane.
-    front : (f,) array of int
-        Which front.
-    at_surface : (f,) array of bool
-        Ends of a front at a free surface; never in the plane.
-    """
-
-    x: Floats
-    frame: Floats
-    K: Floats
-    T: Floats
-    spread: Floats
-    s: Floats
-    front: Ints
-    at_surface: Bools
-
-    @property
-    def K_I(self) -> Floats:
-        """Opening mode `(f,)`."""
-        return self.K[:, 0]
-
-    @property
-    def K_II(self) -> Floats:
-        """Sliding mode `(f,)`."""
-        return self.K[:, 1]
-
-    @property
-    def K_III(self) -> Floats:
-        """Tearing mode `(f,)`; zero in the plane."""
-        return self.K[:, 2] if self.K.shape[1] > 2 else np.zeros(len(self.K))
-
-    def __repr__(self) -> str:
-        rows = ", ".join(f"({k[0]:.6g}, {k[1]:.6g})" for k in self.K)
-        return f"SIF(K = [{rows}])"
-
-
 def stress_intensity(solution: Solution, crack: int = 0) -> SIF:
-    """K_I, K_II and T at the tips of a crack, from two domains.
+    """K_I, K_II and T at the tips, or K_I to K_III along the fronts of a crack, from two domains.
 
     Parameters
     ----------
@@ -141,6 +90,8 @@ def stress_intensities(solutions: Sequence[Solution], crack: int = 0) -> list[SI
         raise ProblemError(
             f"crack {crack}: the problem has {len(space.cuts)} crack(s), numbered from 0."
         )
+    if space.dim == 3:
+        return along_fronts(solutions, crack)
     tips = [t for t, tip in enumerate(space.tips) if tip.crack == crack]
     by_tip = [_at_tip(solutions, t) for t in tips]
     d = space.dim

@@ -1,0 +1,225 @@
+"""A smooth curve through the vertices of a crack front, with the frames along it."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+from scipy.spatial import cKDTree
+
+from xcrack.arrays import Bools, Floats, Ints, lock
+from xcrack.errors import GeometryError
+
+# Points among which the first guess of a foot is looked for: in all, and at least on a piece.
+_SAMPLES, _LEAST = 400, 3
+_GAUSS = np.polynomial.legendre.leggauss(6)
+
+
+@dataclass(frozen=True, eq=False)
+class Feet:
+    """Points around a front in its local coordinates, x = X(s) + x1 t(s) + x2 n(s).
+
+    Attributes
+    ----------
+    s : (q,) array, length
+        Parameter of the foot.
+    local : (q, 2) array, length
+        x1 along t and x2 along n.
+    frame : (q, 3, 3) array
+        Rows (t, n, b) at the foot.
+    turn : (q, 4) array
+        Curvatures kt = b'.t and kn = b'.n, twist t'.n, and the speed of the parameter.
+    beyond : (q,) array of bool
+        Past the end of an open front: no foot.
+    """
+
+    s: Floats
+    local: Floats
+    frame: Floats
+    turn: Floats
+    beyond: Bools
+
+    @property
+    def r(self) -> Floats:
+        """Distance to the front `(q,)`."""
+        return np.hypot(self.local[:, 0], self.local[:, 1])
+
+    @property
+    def metric(self) -> Floats:
+        """Length along b for a unit of arc of the front, 1 - kt x1 - kn x2 `(q,)`."""
+        return 1 - (self.turn[:, :2] * self.local).sum(axis=1)
+
+
+@dataclass(frozen=True, eq=False)
+class FrontCurve:
+    """Cubic splines of the points and normals of a front, periodic where it is closed.
+
+    The parameter s is close to the arc length from the first vertex: it is the arc length at the
+    vertices, and the speed in between is known and used.
+
+    Attributes
+    ----------
+    breaks : (m + 1,) array, length
+        Arc length at the vertices; a closed front ends with its first vertex again.
+    place, normal : (4, m, 3) arrays
+        Coefficients of the pieces, highest power first.
+    closed : bool
+    """
+
+    breaks: Floats
+    place: Floats
+    normal: Floats
+    closed: bool
+
+    @property
+    def length(self) -> float:
+        """Length of the front."""
+        return float(self.breaks[-1])
+
+    @cached_property
+    def _guesses(self) -> tuple[Floats, cKDTree]:
+        each = max(_LEAST, -(-_SAMPLES // (len(self.breaks) - 1)))
+        inner = np.arange(each) / each
+        s = (self.breaks[:-1, None] + np.diff(self.breaks)[:, None] * inner).ravel()
+        s = np.append(s, self.breaks[-1])
+        return s, cKDTree(self.at(s)[0])
+
+    def at(self, s: Floats) -> tuple[Floats, Floats, Floats]:
+        """Points of the front.
+
+        Parameters
+        ----------
+        s : (q,) array, length
+            Parameters; on a closed front any number of turns.
+
+        Returns
+        -------
+        x : (q, 3) array, length
+        frame : (q, 3, 3) array
+            Rows (t, n, b).
+        turn : (q, 4) array
+            Curvatures kt, kn, twist, speed.
+        """
+        from xcrack.kernels.front import frames_at
+
+        u = np.ascontiguousarray(s, dtype=float)
+        u = np.mod(u, self.length) if self.closed else np.clip(u, 0.0, self.length)
+        return frames_at(u, self.breaks, self.place, self.normal)
+
+    def feet(self, x: Floats) -> Feet:
+        """Nearest points of the front.
+
+        Parameters
+        ----------
+        x : (q, 3) array, length
+
+        Returns
+        -------
+        Feet
+            Unique where the metric is positive, that is nearer than the radius of curvature.
+        """
+        return self.near(x, np.inf)[1]
+
+    def near(self, x: Floats, radius: float) -> tuple[Ints, Feet]:
+        """Points within a radius of the front, and a few more, with their feet.
+
+        Parameters
+        ----------
+        x : (q, 3) array, length
+        radius : float, length
+
+        Returns
+        -------
+        rows : (k,) array of int
+            Which points.
+        feet : Feet
+            Theirs.
+        """
+        from xcrack.kernels.front import feet
+
+        s, tree = self._guesses
+        step = float(np.diff(s).max())
+        distance, sample = tree.query(x, distance_upper_bound=radius + step)
+        rows = np.nonzero(distance < np.inf)[0]
+        picked = np.ascontiguousarray(x[rows], dtype=float)
+        curve = (self.breaks, self.place, self.normal, self.closed)
+        return rows, Feet(*feet(picked, s[sample[rows]], 2 * step, *curve))
+
+    def distance(self, x: Floats) -> Floats:
+        """Distance of points to the samples of the front `(q,)`, a bound from above."""
+        return np.asarray(self._guesses[1].query(x)[0])
+
+    def sharpest(self) -> float:
+        """Smallest radius of curvature among the samples; inf for a straight front."""
+        turn = self.at(self._guesses[0])[2]
+        largest = float(np.hypot(turn[:, 0], turn[:, 1]).max())
+        return 1 / largest if largest > 1e-12 / self.length else np.inf
+
+    def arc(self, s: Floats) -> Floats:
+        """Arc length from the first vertex `(q,)` at parameters within the breaks."""
+        u = np.asarray(s, dtype=float)
+        piece = np.clip(np.searchsorted(self.breaks, u, side="right") - 1, 0, len(self.breaks) - 2)
+        begin = self.breaks[piece]
+        t = begin[:, None] + (u - begin)[:, None] * (_GAUSS[0] + 1) / 2
+        speed = self.at(t.ravel())[2][:, 3].reshape(t.shape)
+        return np.asarray(begin + (u - begin) * (speed @ _GAUSS[1]) / 2)
+
+
+def front_curve(x: Floats, frame: Floats, closed: bool) -> FrontCurve:
+    """Smooth curve through the vertices of a front.
+
+    Parameters
+    ----------
+    x : (m, 3) array, length
+        Vertices in the direction of b; the last of a closed front may repeat the first.
+    frame : (m, 3, 3) array
+        Rows (t, n, b); only the normals n count, t and b follow from the curve.
+    closed : bool
+
+    Returns
+    -------
+    FrontCurve
+
+    Raises
+    ------
+    GeometryError
+        Too few vertices, coinciding ones, or vertices that run against b.
+
+    Examples
+    --------
+    A straight front along y with the normal z runs in the direction of b = x × z = -y.
+
+    >>> frame = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])
+    >>> curve = front_curve(np.array([[0, 1.0, 0], [0, -1, 0]]), np.stack([frame, frame]), False)
+    >>> curve.length
+    2.0
+    """
+    x, normal = np.asarray(x, dtype=float), np.asarray(frame, dtype=float)[:, 1]
+    b = np.asarray(frame, dtype=float)[:, 2]
+    if closed and len(x) > 1 and np.allclose(x[0], x[-1], atol=1e-12 * np.ptp(x)):
+        x, normal, b = x[:-1], normal[:-1], b[:-1]
+    if len(x) < (3 if closed else 2):
+        raise GeometryError(f"a crack front needs more than {len(x)} points.")
+    if closed:
+        x, normal, b = (np.concatenate([v, v[:1]]) for v in (x, normal, b))
+    chord = np.linalg.norm(np.diff(x, axis=0), axis=1)
+    if chord.min() <= 1e-9 * chord.sum():
+        where = np.round(x[int(np.argmin(chord))], 6).tolist()
+        raise GeometryError(f"two vertices of a crack front coincide at {where}: leave one out.")
+    if np.einsum("md,md->", np.diff(x, axis=0), b[1:] + b[:-1]) < 0:
+        raise GeometryError("the vertices of a crack front run against b = t × n: reverse them.")
+    ends = "periodic" if closed else "not-a-knot"
+    breaks = np.concatenate([[0.0], np.cumsum(chord)])
+    for _ in range(4):
+        place = CubicSpline(breaks, x, bc_type=ends)
+        step = np.diff(breaks)
+        t = breaks[:-1, None] + step[:, None] * (_GAUSS[0] + 1) / 2
+        speed = np.linalg.norm(place(t, 1), axis=2)
+        breaks = np.concatenate([[0.0], np.cumsum(step * (speed @ _GAUSS[1]) / 2)])
+    place, across = CubicSpline(breaks, x, bc_type=ends), CubicSpline(breaks, normal, bc_type=ends)
+    return FrontCurve(
+        lock(breaks),
+        lock(np.ascontiguousarray(place.c)),
+        lock(np.ascontiguousarray(across.c)),
+        closed,
+    )

@@ -1,0 +1,73 @@
+"""Stress intensity factors at the tips or along the fronts of one crack."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from xcrack.arrays import Bools, Floats, Ints
+
+
+@dataclass(frozen=True, eq=False)
+class SIF:
+    """Stress intensity factors of one crack.
+
+    Attributes
+    ----------
+    x : (f, d) array, length
+        Tips in the order of the crack's points, mouths left out; in space vertices of the fronts
+        inside the body, in the direction of the last row of their frames.
+    frame : (f, d, d) array
+        Rows (ahead, normal), in space (ahead, normal, ahead x normal).
+    K : (f, 2 or 3) array, stress · √length
+        Columns I, II and in space III; K_II is positive for a positive shear in the frame
+        (ahead, normal), K_III for one in (ahead x normal, normal).
+    T : (f,) array, stress
+        Stress along the lips; nan in space, where it is not computed.
+    spread : (f, 2 or 3) array
+        Difference between two domains, stress · √length.
+    s : (f,) array, length
+        Position along the front; zero in the plane.
+    front : (f,) array of int
+        Which front.
+    at_surface : (f,) array of bool
+        Places where a front is so close to a free surface that K, which has no meaning there, is
+        prolonged from inside; never in the plane.
+    """
+
+    x: Floats
+    frame: Floats
+    K: Floats
+    T: Floats
+    spread: Floats
+    s: Floats
+    front: Ints
+    at_surface: Bools
+
+    @property
+    def K_I(self) -> Floats:
+        """Opening mode `(f,)`."""
+        return self.K[:, 0]
+
+    @property
+    def K_II(self) -> Floats:
+        """Sliding mode `(f,)`."""
+        return self.K[:, 1]
+
+    @property
+    def K_III(self) -> Floats:
+        """Tearing mode `(f,)`; zero in the plane."""
+        return self.K[:, 2] if self.K.shape[1] > 2 else np.zeros(len(self.K))
+
+    def __repr__(self) -> str:
+        if self.K.shape[1] == 3:
+            return self._along()
+        rows = ", ".join(f"({k[0]:.6g}, {k[1]:.6g})" for k in self.K)
+        return f"SIF(K = [{rows}])"
+
+    def _along(self) -> str:
+        if not len(self.K):
+            return "SIF(no front)"
+        low, high = self.K.min(axis=0), self.K.max(axis=0)
+        modes = zip(("K_I", "K_II", "K_III"), low, high, strict=True)
+        ranges = ", ".join(f"{name} {a:.6g} to {b:.6g}" for name, a, b in modes)
+        return f"SIF({len(self.K)} places on {len(np.unique(self.front))} front(s): {ranges})"
