@@ -8,14 +8,16 @@ from typing import Any
 
 import numpy as np
 
-from xcrack.arrays import Floats
-from xcrack.crack import Crack, advance, front
+from xcrack.answers import directed, law_rate
+from xcrack.crack import Crack, advance
 from xcrack.criteria import Criterion, clipped, equivalent_K
 from xcrack.errors import GeometryError, ProblemError, XcrackError, XcrackWarning
-from xcrack.interaction import SIF, stress_intensities
+from xcrack.follow import crack_sizes, followed, memory_of
+from xcrack.interaction import stress_intensities
 from xcrack.laws import Law
 from xcrack.problem import Problem
 from xcrack.settings import describe
+from xcrack.sif import SIF
 from xcrack.solution import Solution
 from xcrack.solving import solve_states
 from xcrack.step import Cycle, Memory, Step
@@ -24,10 +26,12 @@ from xcrack.stepping import (
     Advance,
     PerCrack,
     cell_sizes,
-    elapsed,
-    length_inside,
     plan_advance,
 )
+from xcrack.surface_growth import advance_fronts
+
+_SPACING = 0.5  # of a cell, between the points of a new front in space
+_LEAST_IN_SPACE = 0.02  # of a cell: neighbours along a front move on, so a slow part has to follow
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,12 +162,12 @@ def steps_of(run: Run, last: Step | None = None) -> Generator[Step, None, str]:
     bulk: Any = None
     warned = False
     if last is None:
-        last, bulk = _next_step(run, run.problem, None, None, bulk)
+        last, bulk = _next_step(run, run.problem, None, bulk)
         yield last
     while True:
-        memory = _memory(last)
+        memory = memory_of(last)
         ended = _stop(run, last)
-        plan = _plan(run, last.cracks, last.rate, last.dK_eq, memory.pending)
+        plan = _plan(run, last.sif[0], last.rate, last.dK_eq, memory.pending)
         if not ended and plan.largest < LEAST * plan.size:
             if last.index == 0:
                 raise ProblemError(_too_short(last, plan, run))
@@ -181,17 +185,16 @@ def steps_of(run: Run, last: Step | None = None) -> Generator[Step, None, str]:
                 stacklevel=2,
             )
         try:
-            moved = [advance(*each) for each in zip(last.cracks, last.angle, last.da)]
+            moved = [_advanced(run, last, c) for c in range(len(last.cracks))]
             problem = _problem(run, moved, memory)
         except GeometryError as error:
             return _said(run, f"the cracks cannot go on after step {last.index}: {error}")
-        kept = [_kept(m, placed) for m, placed in zip(moved, problem.placed)]
-        gone = [(c, j) for c, m in enumerate(moved) for j in range(m.n_tips) if j not in kept[c]]
+        gone = _gone(moved, problem.placed)
         left = "tip left the body: " + "; ".join(_where(last, tip) for tip in gone)
-        if not any(kept):
+        if not any(placed.n_tips for placed in problem.placed):
             return _said(run, left)
         try:
-            last, bulk = _next_step(run, problem, last, kept, bulk)
+            last, bulk = _next_step(run, problem, last, bulk)
         except GeometryError as error:
             return _said(run, f"the cracks cannot go on after step {last.index}: {error}")
         except XcrackError as error:
@@ -205,23 +208,24 @@ def _next_step(
     run: Run,
     problem: Problem,
     last: Step | None,
-    kept: list[list[int]] | None,
     bulk: Any,
 ) -> tuple[Step, Any]:
     """Solve all load states of a problem and decide where and how fast its cracks grow."""
-    before = None if last is None else _memory(last)
+    before = None if last is None else memory_of(last)
     cracks = problem.placed
     solutions, sif = respond(problem, run, bulk, None if before is None else before.warm)
-    angle, dK_eq, R, law_rate = [], [], [], []
+    nu = run.problem.material.nu
+    angle, dK_eq, R, law_rates = [], [], [], []
     for c in range(len(cracks)):
         K = np.stack([state[c].K for state in sif])
-        direction, dK, ratio = _directed(run, K, c)
+        direction, dK, ratio = directed(run.criterion, K, nu, c)
         angle.append(direction)
         dK_eq.append(dK)
         R.append(ratio)
-        law_rate.append(_law_rate(run, dK, ratio, c))
-    rate = tuple(np.where(d < run.threshold, 0.0, r) for d, r in zip(dK_eq, law_rate))
-    if last is None or before is None or kept is None:
+        law_rates.append(law_rate(run.law, dK, ratio, c))
+    rate = tuple(np.where(d < run.threshold, 0.0, r) for d, r in zip(dK_eq, law_rates))
+    length = crack_sizes(cracks, problem.mesh)
+    if last is None or before is None:
         n_cycles, index = 0.0, 0
         pending = tuple(np.zeros_like(r) for r in rate)
         settings: Mapping[str, str] = run.settings
@@ -230,16 +234,11 @@ def _next_step(
             radius = float(np.min(solutions[0].space.radius))
     else:
         index, settings, radius = last.index + 1, before.settings, before.radius
-        rate1: list[list[float | None]] = [[None] * len(r) for r in before.law_rate]
-        for c, row in enumerate(kept):
-            for new, old in enumerate(row):
-                rate1[c][old] = float(law_rate[c][new])
-        n_cycles = last.cycles + elapsed(before.length, last.da, before.law_rate, rate1)
-        pending = tuple(p[row] for p, row in zip(before.pending, kept))
-    plan = _plan(run, cracks, rate, tuple(dK_eq), pending)
-    length = tuple(length_inside(crack, problem.mesh) for crack in cracks)
+        since, pending = followed(last, cracks, sif[0], law_rates, length, problem.mesh)
+        n_cycles = last.cycles + since
+    plan = _plan(run, sif[0], rate, tuple(dK_eq), pending)
     warm = solutions[0].warm
-    memory = Memory(tuple(law_rate), length, plan.pending, radius, warm, settings)
+    memory = Memory(tuple(law_rates), length, plan.pending, radius, warm, settings)
     step = Step(
         index=index,
         cycles=n_cycles,
@@ -265,10 +264,27 @@ def _problem(run: Run, cracks: Sequence[Crack], memory: Memory) -> Problem:
     return replace(run.problem, cracks=tuple(cracks), numerics=numerics)
 
 
-def _kept(moved: Crack, placed: Crack) -> list[int]:
-    """Which tips of a crack that has advanced are still inside the body."""
-    before = moved.tips or ()
-    return [before.index(tip) for tip in placed.tips or ()]
+def _advanced(run: Run, step: Step, c: int) -> Crack:
+    """Crack c after the advance of a step."""
+    crack = step.cracks[c]
+    if crack.dim == 2:
+        return advance(crack, step.angle[c], step.da[c])
+    found = step.sif[0][c]
+    if not len(found.s):
+        return crack
+    size = _SPACING * float(cell_sizes(run.problem.mesh, found.x).mean())
+    return advance_fronts(crack, found.s, found.front, step.angle[c], step.da[c], size)
+
+
+def _gone(moved: Sequence[Crack], placed: Sequence[Crack]) -> list[tuple[int, int]]:
+    """Tips that have left the body: crack and number. A front counts when all of it has."""
+    gone: list[tuple[int, int]] = []
+    for c, (m, p) in enumerate(zip(moved, placed)):
+        if m.dim == 2:
+            gone.extend((c, j) for j, tip in enumerate(m.tips or ()) if tip not in (p.tips or ()))
+        elif m.n_tips and not p.n_tips:
+            gone.append((c, 0))
+    return gone
 
 
 def respond(
@@ -282,55 +298,19 @@ def respond(
     return tuple(solutions), tuple(zip(*by_crack, strict=True))
 
 
-def _directed(run: Run, K: Floats, crack: int) -> tuple[Floats, Floats, Floats]:
-    """Answer of the criterion for one crack, after a look at what it returned."""
-    n = K.shape[1]
-    if n == 0:
-        return np.zeros(0), np.zeros(0), np.zeros(0)
-    answer = run.criterion(K, run.problem.material.nu)
-    try:
-        angle, dK_eq, R = (np.asarray(part, dtype=float) for part in answer)
-    except (TypeError, ValueError) as error:
-        raise ProblemError(
-            f"the criterion must return three arrays (angle, dK_eq, R), not {answer!r}."
-        ) from error
-    for name, values in (("angle", angle), ("dK_eq", dK_eq), ("R", R)):
-        if values.shape != (n,) or not np.isfinite(values).all():
-            raise ProblemError(
-                f"the criterion returned {name} = {values} at the {n} tips of crack {crack}; it "
-                "must be finite, one number a tip. xcrack.testing.check_criterion tries it."
-            )
-    if (dK_eq < 0).any():
-        raise ProblemError(f"the criterion returned a negative range {dK_eq} at crack {crack}.")
-    return angle, dK_eq, R
-
-
-def _law_rate(run: Run, dK_eq: Floats, R: Floats, crack: int) -> Floats:
-    """Answer of the law for one crack, after a look at what it returned."""
-    if len(dK_eq) == 0:
-        return np.zeros(0)
-    rate = np.asarray(run.law(dK_eq, R), dtype=float)
-    if rate.shape != dK_eq.shape:
-        raise ProblemError(
-            f"the law returned shape {rate.shape} for {len(dK_eq)} tips; it must return one rate a "
-            "tip. xcrack.testing.check_law tells what is wrong."
-        )
-    bad = ~(np.isfinite(rate) & (rate >= 0))
-    if bad.any():
-        tip = int(np.argmax(bad))
-        raise ProblemError(
-            f"the law returned da/dN = {rate[tip]} for dK_eq = {dK_eq[tip]:.6g}, R = {R[tip]:.6g} "
-            f"(crack {crack}, tip {tip}); a crack does not shrink: return a number >= 0."
-        )
-    return rate
-
-
 def _plan(
-    run: Run, cracks: tuple[Crack, ...], rate: PerCrack, dK_eq: PerCrack, pending: PerCrack
+    run: Run, sif: Sequence[SIF], rate: PerCrack, dK_eq: PerCrack, pending: PerCrack
 ) -> Advance:
-    size = tuple(cell_sizes(run.problem.mesh, front(crack)[0]) for crack in cracks)
+    size = tuple(cell_sizes(run.problem.mesh, found.x) for found in sif)
     return plan_advance(
-        rate, dK_eq, pending, size, da=run.da, cycles=run.cycles, scaling=run.scaling
+        rate,
+        dK_eq,
+        pending,
+        size,
+        da=run.da,
+        cycles=run.cycles,
+        scaling=run.scaling,
+        least=LEAST if run.problem.mesh.dim == 2 else _LEAST_IN_SPACE,
     )
 
 
@@ -349,7 +329,7 @@ def _stop(run: Run, step: Step) -> str:
     if run.max_steps is not None and step.index + 1 >= run.max_steps:
         return f"max_steps = {run.max_steps} reached"
     if not any((r > 0).any() for r in step.rate):
-        if any((r > 0).any() for r in _memory(step).law_rate):
+        if any((r > 0).any() for r in memory_of(step).law_rate):
             return f"rate is zero: dK_eq is below the threshold {run.threshold:.6g} at every tip"
         return "rate is zero at every tip"
     return ""
@@ -366,14 +346,8 @@ def _too_short(step: Step, plan: Advance, run: Run) -> str:
 
 def _where(step: Step, tip: tuple[int, int]) -> str:
     c, j = tip
-    x = ", ".join(f"{v:.6g}" for v in front(step.cracks[c])[0][j])
+    x = ", ".join(f"{v:.6g}" for v in step.sif[0][c].x[j])
     return f"crack {c}, tip {j} at ({x})"
-
-
-def _memory(step: Step) -> Memory:
-    if step.memory is None:
-        raise ProblemError(f"step {step.index} carries no memory: it was not made by grow.")
-    return step.memory
 
 
 def _report(run: Run, step: Step) -> None:

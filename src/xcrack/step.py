@@ -8,7 +8,7 @@ import numpy as np
 
 from xcrack.crack import Crack
 from xcrack.errors import ProblemError
-from xcrack.interaction import SIF
+from xcrack.sif import SIF
 from xcrack.solution import Solution
 from xcrack.stepping import PerCrack
 

@@ -51,6 +51,7 @@ def plan_advance(
     da: float | None,
     cycles: float | None,
     scaling: str,
+    least: float = LEAST,
 ) -> Advance:
     """Share one step out over the tips.
 
@@ -65,6 +66,8 @@ def plan_advance(
     scaling : {"law", "linear"}
         Advance of the other tips in proportion to the rate, or to dK_eq as in the source paper
         (which contradicts its own law, and does not converge to the right path).
+    least : float
+        Share of a cell below which an advance waits.
 
     Returns
     -------
@@ -84,7 +87,7 @@ def plan_advance(
     by_cycles = np.inf if cycles is None else cycles * fastest
     largest = float(min(np.inf if da is None else da, by_cycles))
     wanted = [p + largest * (s / best) for p, s in zip(pending, score)]
-    go = [w >= LEAST * h for w, h in zip(wanted, size)]
+    go = [w >= least * h for w, h in zip(wanted, size)]
     return Advance(
         da=tuple(np.where(g, w, 0.0) for g, w in zip(go, wanted)),
         pending=tuple(np.where(g, 0.0, w) for g, w in zip(go, wanted)),
@@ -95,7 +98,10 @@ def plan_advance(
 
 
 def elapsed(
-    length: Sequence[float], da: PerCrack, rate0: PerCrack, rate1: Sequence[Sequence[float | None]]
+    length: Sequence[float],
+    da: PerCrack,
+    rate0: PerCrack,
+    rate1: Sequence[Sequence[float | None]],
 ) -> float:
     """Cycles of one step, by the local power law of the tip that drives it.
 
@@ -163,4 +169,12 @@ def length_inside(crack: Crack, mesh: Mesh) -> float:
     return total
 
 
-__all__ = ["LEAST", "Advance", "PerCrack", "cell_sizes", "elapsed", "length_inside", "plan_advance"]
+__all__ = [
+    "LEAST",
+    "Advance",
+    "PerCrack",
+    "cell_sizes",
+    "elapsed",
+    "length_inside",
+    "plan_advance",
+]

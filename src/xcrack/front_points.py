@@ -1,0 +1,411 @@
+"""Points of a crack front on their way: moved, faired, merged and split, and stitched."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from xcrack.arrays import Bools, Floats, Ints, frozen
+
+_FEWEST = 8  # points of a closed front that are not merged for their spacing
+_PART = 0.1  # of its advance by which fairing may move a point
+_NOTCH = np.cos(np.radians(100.0))  # a hollow front that turns by more has a notch
+_BEND = np.cos(np.radians(60.0))  # a polyline that turns by more has a corner
+_FLAT = 1e-7  # double area over the square of the longest side of a triangle without area
+_LIKE = 0.95  # a diagonal is as good as another if its worst triangle is at most that much worse
+
+
+@dataclass(frozen=True, eq=False)
+class Chain:
+    """Points of a new front, and which points of the old one each of them has come from.
+
+    Attributes
+    ----------
+    x : (g, 3) array, length
+        In the direction of the front.
+    closed : bool
+    held : (g,) array of bool
+        Points that stay where they are: those that do not advance, and the ends of open fronts.
+    start : (r, 3) array, length
+        Points that were sent out, on the old front.
+    stop : (r, 3) array, length
+        Where these arrived.
+    still : (r,) array of bool
+        Which of these did not advance; they keep their point number.
+    owner : (r,) array of int
+        The point of the new front that each of them became.
+    """
+
+    x: Floats
+    closed: bool
+    held: Bools
+    start: Floats
+    stop: Floats
+    still: Bools
+    owner: Ints
+
+    def __post_init__(self) -> None:
+        for name in ("x", "held", "start", "stop", "still", "owner"):
+            object.__setattr__(self, name, frozen(getattr(self, name)))
+
+    @property
+    def side(self) -> Floats:
+        """Vectors from each point to the next one."""
+        return steps(self.x, self.closed)
+
+    @property
+    def old_side(self) -> Floats:
+        """Where each side comes from: between the middles of what its ends were."""
+        first, last = self.members()
+        return steps((self.start[first] + self.start[last]) / 2, self.closed)
+
+    def members(self) -> tuple[Ints, Ints]:
+        """First and last of those that became each point, `(g,)` both."""
+        changes = self.owner != np.roll(self.owner, 1)
+        changes[0] |= not self.closed
+        first = np.nonzero(changes)[0]
+        if not len(first):
+            first = np.zeros(1, dtype=np.int64)
+        last = (np.roll(first, -1) - 1) % len(self.owner)
+        order = np.argsort(self.owner[first], kind="stable")
+        return first[order], last[order]
+
+    def fixed(self) -> Bools:
+        """Sides that are part of the old front and remain."""
+        still = np.zeros(len(self.x), dtype=bool)
+        still[self.owner[self.still]] = True
+        following = np.roll(still, -1)
+        return np.asarray((still & following)[: len(self.side)])
+
+
+def chain(start: Floats, stop: Floats, still: Bools, closed: bool) -> Chain:
+    """All that was sent out, each a point of its own.
+
+    Parameters
+    ----------
+    start, stop : (r, 3) arrays, length
+        Points on the old front in its direction, and where they arrived.
+    still : (r,) array of bool
+        Which did not move.
+    closed : bool
+
+    Returns
+    -------
+    Chain
+    """
+    held = np.array(still)
+    if not closed:
+        held[[0, -1]] = True
+    return Chain(stop, closed, held, start, stop, still, np.arange(len(start)))
+
+
+def merged(front: Chain, side: int, x: Floats) -> Chain:
+    """A front with the ends of one side made one point.
+
+    Parameters
+    ----------
+    front : Chain
+    side : int
+        Leads from the point with this number to the next one.
+    x : (3,) array, length
+        Where the point is to lie, unless one of the two is held.
+
+    Returns
+    -------
+    Chain
+    """
+    n = len(front.x)
+    one, other = side, (side + 1) % n
+    if front.held[one]:
+        x = front.x[one]
+    elif front.held[other]:
+        x = front.x[other]
+    held = np.array(front.held)
+    held[one] |= held[other]
+    points = np.array(front.x)
+    points[one] = x
+    number = np.arange(n)
+    number[other] = one
+    number[number > other] -= 1
+    rest = np.arange(n) != other
+    return replace(front, x=points[rest], held=held[rest], owner=number[front.owner])
+
+
+def without_loops(front: Chain) -> Chain:
+    """A front whose sides all run on in their old direction; points of others are merged.
+
+    Where a hollow front converges its points overtake each other: the sides between them turn
+    round first, and merging these until none is left shrinks the loop to a point.
+    """
+    while len(front.x) > 2:
+        side, before = front.side, front.old_side
+        forward = np.einsum("ij,ij->i", side, before) / np.einsum("ij,ij->i", before, before)
+        held = front.held & np.roll(front.held, -1)
+        forward[held[: len(side)]] = np.inf
+        worst = int(np.argmin(forward))
+        if forward[worst] > 0:
+            break
+        front = _joined(front, worst)
+    return front
+
+
+def _joined(front: Chain, side: int) -> Chain:
+    """Both ends of a side merged half way between the outermost of what they come from."""
+    first, last = front.members()
+    other = (side + 1) % len(front.x)
+    return merged(front, side, (front.stop[first[side]] + front.stop[last[other]]) / 2)
+
+
+def without_sides(front: Chain, sides: Ints) -> Chain:
+    """A front in which the ends of the sides with these numbers are merged if one is free."""
+    for side in sorted(set(sides.tolist()), reverse=True):
+        other = (side + 1) % len(front.x)
+        if len(front.x) > 3 and not (front.held[side] and front.held[other]):
+            front = _joined(front, side)
+    return front
+
+
+def faired(front: Chain, passes: int) -> Chain:
+    """A front without zigzag; what is smooth over five of its points hardly moves.
+
+    In each pass each free point goes towards the cubic, over the arc length, that fits it and its
+    four neighbours best, perpendicular to the front; in all at most a tenth of its advance. On
+    evenly spaced points a zigzag vanishes at once, a wave of n points loses sin(π/n)^4 of its
+    height in a pass: a circle of 64 points 6e-6 of its radius.
+
+    Parameters
+    ----------
+    front : Chain
+    passes : int
+
+    Returns
+    -------
+    Chain
+    """
+    n = len(front.x)
+    length = np.linalg.norm(front.side, axis=1)
+    if n < 5 or length.min() <= 1e-6 * length.max():
+        return front
+    window = np.arange(n)[:, None] + np.arange(-2, 3)
+    if front.closed:
+        total = length.sum()
+        s = np.concatenate([[0.0], np.cumsum(length[:-1])])
+        place = s[window % n] + total * (window // n)
+        window %= n
+    else:
+        window += np.maximum(-window[:, :1], 0) - np.maximum(window[:, -1:] - (n - 1), 0)
+        place = np.concatenate([[0.0], np.cumsum(length)])[window]
+    gap = place[:, :, None] - place[:, None, :] + length.mean() * np.eye(5)
+    weight = 1 / (gap / length.mean()).prod(axis=2)
+    own = np.argmax(window == np.arange(n)[:, None], axis=1)
+    # 3/8 at the middle of five even points, which is 36/70 of the whole way to the cubic.
+    weight *= (0.375 * 70 / 36 * weight[np.arange(n), own] / np.einsum("ij,ij->i", weight, weight))[
+        :, None
+    ]
+    along = tangents(front.x, front.closed)
+    x = np.array(front.x)
+    for _ in range(passes):
+        move = -np.einsum("ij,ijk->ik", weight, x[window])
+        move -= np.einsum("ij,ij->i", move, along)[:, None] * along
+        x[~front.held] += move[~front.held]
+    advance = np.full(n, np.inf)
+    np.minimum.at(advance, front.owner, np.linalg.norm(front.stop - front.start, axis=1))
+    move, most = x - front.x, _PART * advance
+    size = np.linalg.norm(move, axis=1)
+    move *= (np.minimum(most, size) / np.where(size > 0, size, 1.0))[:, None]
+    return replace(front, x=np.where(front.held[:, None], front.x, front.x + move))
+
+
+def spaced(front: Chain, least: float) -> Chain:
+    """A front without short sides: of two points that are too close one is left out.
+
+    Parameters
+    ----------
+    front : Chain
+    least : float, length
+        Sides are at least that long, unless both ends are held or a closed front has few points.
+
+    Returns
+    -------
+    Chain
+    """
+    while True:
+        n = len(front.x)
+        if n <= (_FEWEST if front.closed else 2):
+            return front
+        length = np.linalg.norm(front.side, axis=1)
+        free = ~(front.held & np.roll(front.held, -1))[: len(length)]
+        tried = np.where(free, length, np.inf)
+        side = int(np.argmin(tried))
+        if tried[side] >= least:
+            return front
+        other = (side + 1) % n
+        # The point whose neighbour on the far side is nearer can better be spared.
+        stays = side if length[side - 1] > length[other % len(length)] else other
+        front = merged(front, side, front.x[stays])
+
+
+def without_notches(front: Chain) -> Chain:
+    """A front without hollow corners of less than 80 degrees; what lies in them is passed over."""
+    n = len(front.x)
+    side = front.side
+    back = np.roll(side, 1, axis=0)
+    if not front.closed:
+        back, side = np.concatenate([side[:1], side]), np.concatenate([side, side[-1:]])
+    first, _ = front.members()
+    ahead = front.stop[first] - front.start[first]
+    hollow = np.einsum("ij,ij->i", side - back, ahead) > 0
+    ahead_length, back_length = np.linalg.norm(side, axis=1), np.linalg.norm(back, axis=1)
+    turn = np.einsum("ij,ij->i", side, back) / (ahead_length * back_length)
+    for i in np.nonzero(hollow & (turn < _NOTCH) & ~front.held)[0][::-1]:
+        if len(front.x) > 3:
+            into = i if ahead_length[i] < back_length[i] else (i - 1) % n
+            kept = (i + 1) % n if into == i else into
+            return merged(front, int(into), front.x[kept])
+    return front
+
+
+def divided(x: Floats, closed: bool, pieces: Ints, straight: Bools) -> list[Floats]:
+    """Points inside each side of a polyline, which divide it evenly.
+
+    Parameters
+    ----------
+    x : (m, 3) array, length
+    closed : bool
+        Whether a last side leads back to the first point.
+    pieces : (sides,) array of int
+        Into how many parts each side is divided.
+    straight : (m,) array of bool
+        Points whose sides are to be divided as they are.
+
+    Returns
+    -------
+    list of (pieces - 1, 3) arrays
+        On the cubic with the tangents of the circles through three points in a row; on the
+        straight side where one of its ends is a corner.
+    """
+    side = steps(x, closed)
+    length = np.linalg.norm(side, axis=1)
+    tangent = tangents(x, closed)
+    unit = side / length[:, None]
+    result = []
+    for j, count in enumerate(pieces):
+        t = (np.arange(1, count) / count)[:, None]
+        a, b = j, (j + 1) % len(x)
+        inner = x[a] + t * side[j]
+        bends = count > 1 and not (straight[a] or straight[b])
+        if bends and min(tangent[a] @ unit[j], tangent[b] @ unit[j]) > np.sqrt((1 + _BEND) / 2):
+            # Written as chord and bulge: a straight side stays straight to the last bit.
+            first, last = length[j] * tangent[a] - side[j], length[j] * tangent[b] - side[j]
+            inner += t * (1 - t) * ((1 - t) * first - t * last)
+        result.append(inner)
+    return result
+
+
+def stitched(
+    corners: tuple[int, int], numbers: list[int], x: Floats, normal: Floats
+) -> tuple[list[tuple[int, int, int]], float]:
+    """Triangles between one side of the old front and the new front ahead of it.
+
+    Parameters
+    ----------
+    corners : (int, int)
+        Point numbers of the old side in the direction of the front.
+    numbers : list of int
+        Point numbers of the new front ahead of it, in the same direction.
+    x : (2 + len(numbers), 3) array, length
+        The points of both.
+    normal : (3,) array
+        Where about the triangles look.
+
+    Returns
+    -------
+    triangles : list of (int, int, int)
+        Without those that have a point twice.
+    upright : float
+        Smallest cosine between the normal of a triangle and the given one; -1 for one without
+        area.
+    """
+    place = [corners[0], corners[1], *numbers]
+    best: list[tuple[int, int, int]] = []
+    quality, upright = -np.inf, -1.0
+    for turn in range(len(numbers)):
+        local = [(0, q + 3, q + 2) for q in range(turn)]
+        local.append((0, 1, turn + 2))
+        local.extend((1, q + 3, q + 2) for q in range(turn, len(numbers) - 1))
+        local = [
+            (a, b, c)
+            for a, b, c in local
+            if place[a] != place[b] != place[c] and place[a] != place[c]
+        ]
+        if not local:
+            return [], 1.0
+        shape, cosine = _worst(x, np.array(local), normal)
+        # The first way unless another is clearly better: neighbours are cut alike.
+        if shape > (quality / _LIKE if quality > 0 else quality):
+            best = [(place[a], place[b], place[c]) for a, b, c in local]
+            quality, upright = shape, cosine
+    return best, upright
+
+
+def _worst(x: Floats, triangles: Ints, normal: Floats) -> tuple[float, float]:
+    """Smallest double area along the normal over longest side squared, and cosine to it."""
+    a, b, c = (x[triangles[:, i]] for i in range(3))
+    area = np.cross(b - a, c - a)
+    longest = np.maximum(
+        np.maximum(((b - a) ** 2).sum(axis=1), ((c - b) ** 2).sum(axis=1)),
+        ((a - c) ** 2).sum(axis=1),
+    )
+    along, total = area @ normal, np.linalg.norm(area, axis=1)
+    cosine = np.where(total > _FLAT * longest, along / np.where(total > 0, total, 1.0), -1.0)
+    return float((along / longest).min()), float(cosine.min())
+
+
+def along_front(s: Floats, values: Floats, place: Floats, closed: bool, length: float) -> Floats:
+    """Values at other places of a front, by monotone cubics (Fritsch and Butland, 1984).
+
+    Parameters
+    ----------
+    s : (f,) array, length
+        Where the values are known, in any order.
+    values : (f,) array
+    place : (k,) array, length
+        Where they are sought.
+    closed : bool
+        Whether the front is closed; else values beyond the first and last place are theirs.
+    length : float, length
+        Length of the front, the period of a closed one.
+
+    Returns
+    -------
+    (k,) array
+    """
+    from scipy.interpolate import PchipInterpolator
+
+    if closed:
+        s, place = s % length, place % length
+    s, inverse = np.unique(s, return_inverse=True)
+    values = np.bincount(inverse, weights=values) / np.bincount(inverse)
+    if len(s) == 1:
+        return np.full(len(place), values[0])
+    if closed:
+        n = min(3, len(s))
+        s = np.concatenate([s[-n:] - length, s, s[:n] + length])
+        values = np.concatenate([values[-n:], values, values[:n]])
+    return np.asarray(PchipInterpolator(s, values)(np.clip(place, s[0], s[-1])))
+
+
+def steps(x: Floats, closed: bool) -> Floats:
+    """Vectors from each point of a polyline to the next one."""
+    return np.asarray(np.roll(x, -1, axis=0) - x if closed else np.diff(x, axis=0))
+
+
+def tangents(x: Floats, closed: bool) -> Floats:
+    """Unit tangents of the circles through three points in a row, of the sides at open ends."""
+    side = steps(x, closed)
+    ahead = side if closed else np.concatenate([side, side[-1:]])
+    back = np.roll(side, 1, axis=0) if closed else np.concatenate([side[:1], side])
+    ahead_length = np.linalg.norm(ahead, axis=1, keepdims=True)
+    back_length = np.linalg.norm(back, axis=1, keepdims=True)
+    tangent = ahead * (back_length / ahead_length) + back * (ahead_length / back_length)
+    length = np.linalg.norm(tangent, axis=1, keepdims=True)
+    return np.asarray(tangent / np.where(length > 0, length, 1.0))
