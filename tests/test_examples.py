@@ -11,6 +11,9 @@ import matplotlib.image
 import pytest
 
 EXAMPLES = sorted((Path(__file__).resolve().parent.parent / "examples").glob("*.py"))
+IN_SPACE = ("cylinder_bending", "penny", "semi_elliptic_growth")  # seconds with --quick
+PLANE = [path for path in EXAMPLES if path.stem not in IN_SPACE]
+SPACE = [path for path in EXAMPLES if path.stem in IN_SPACE]
 
 # An example that warns is a bad example.
 RUN = (
@@ -22,22 +25,20 @@ RUN = (
 
 def test_there_are_examples():
     assert {path.stem for path in EXAMPLES} >= {
-        "plate_with_hole", "edge_crack_growth", "two_holes", "turning_load",
+        "plate_with_hole", "edge_crack_growth", "two_holes", "turning_load", *IN_SPACE,
     }  # fmt: skip
 
 
-@pytest.mark.slow
-@pytest.mark.mission
-@pytest.mark.parametrize("script", EXAMPLES, ids=lambda path: path.stem)
-def test_example_runs_from_another_folder_and_leaves_pictures(script, tmp_path):
+def run_and_look(tmp_path, script, *options, timeout):
+    """Run an example in a folder of its own, with warnings as errors, and look at what it left."""
     run = subprocess.run(
-        [sys.executable, "-c", RUN, str(script)],
+        [sys.executable, "-c", RUN, str(script), *options],
         cwd=tmp_path,
         env={**os.environ, "MPLBACKEND": "Agg", "PYTHONIOENCODING": "utf-8"},
         capture_output=True,
         text=True,
         encoding="utf-8",
-        timeout=500,
+        timeout=timeout,
         check=False,
     )
     assert run.returncode == 0, run.stdout[-2000:] + run.stderr[-4000:]
@@ -54,3 +55,36 @@ def test_example_runs_from_another_folder_and_leaves_pictures(script, tmp_path):
     assert list(folder.glob("*.csv"))
     assert list(folder.rglob("*.vtu"))
     assert list(folder.rglob("*.vtp"))
+
+
+@pytest.mark.slow
+@pytest.mark.mission
+@pytest.mark.parametrize("script", PLANE, ids=lambda path: path.stem)
+def test_example_runs_from_another_folder_and_leaves_pictures(script, tmp_path):
+    run_and_look(tmp_path, script, timeout=500)
+
+
+@pytest.mark.slow
+@pytest.mark.mission
+@pytest.mark.gmsh
+@pytest.mark.plot
+@pytest.mark.parametrize("script", SPACE, ids=lambda path: path.stem)
+def test_example_in_space_runs_on_a_coarse_mesh(script, tmp_path):
+    run_and_look(tmp_path, script, "--quick", timeout=500)
+
+
+@pytest.mark.slow
+@pytest.mark.gmsh
+@pytest.mark.plot
+def test_inclined_crack_runs_on_a_coarse_mesh(tmp_path):
+    script = next(path for path in SPACE if path.stem == "cylinder_bending")
+    run_and_look(tmp_path, script, "--quick", "--skew", timeout=500)
+
+
+@pytest.mark.slow
+@pytest.mark.gmsh
+@pytest.mark.plot
+@pytest.mark.timeout(3600)
+@pytest.mark.parametrize("script", SPACE, ids=lambda path: path.stem)
+def test_example_in_space_runs_at_full_size(script, tmp_path):
+    run_and_look(tmp_path, script, timeout=3500)

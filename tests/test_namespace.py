@@ -12,7 +12,9 @@ NAMES = [
     # scene
     "Crack", "Isotropic", "Mesh", "Numerics", "Problem",
     "body_force", "box", "crack_pressure", "displacement", "fix", "initial_stress", "line_crack",
-    "plate", "plate_with_hole", "point_force", "pressure", "read_mesh", "traction", "write_mesh",
+    "penny_crack", "elliptic_crack", "plane_crack", "surface_crack", "read_surface",
+    "notched_cylinder", "plate", "plate_with_hole", "point_force", "pressure", "read_mesh",
+    "traction", "write_mesh",
     # solution
     "Solution", "energy_error", "inf_sup", "plan", "plot", "solve", "stress_intensity", "write",
     "SIF", "stress_intensities",

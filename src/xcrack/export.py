@@ -10,8 +10,10 @@ from typing import Any
 import numpy as np
 
 from xcrack.arrays import Floats, Ints
+from xcrack.crack_surface import lip_faces
 from xcrack.errors import ProblemError, XcrackError
 from xcrack.pieces import Pieces, lips_of, pieces, von_mises
+from xcrack.sif import SIF
 from xcrack.solution import Solution
 
 # VTK's numbers of simplices, and the order of their nodes, by number of nodes.
@@ -24,7 +26,9 @@ _ORDER = {
 }
 
 
-def write(solution: Solution, path: str | Path) -> list[Path]:
+def write(
+    solution: Solution, path: str | Path, *, sif: SIF | Sequence[SIF] | None = None
+) -> list[Path]:
     """Write a solution for ParaView: ``<path>.vtu`` and, for its cracks, ``<path>_lips.vtp``.
 
     The grid has quadratic simplices wherever the solution is not linear, and points twice where
@@ -39,11 +43,19 @@ def write(solution: Solution, path: str | Path) -> list[Path]:
     (the whole jump), ``displacement_minus`` and ``displacement_plus``, to warp by. Points are
     those of the undeformed body.
 
+    In space the lips are triangles: ``pressure`` is taken to their vertices by the best linear
+    fit, and cell data are ``crack``, ``closed`` (half of the triangle or more), ``closed_share``,
+    ``pressure_mean`` and ``gap_mean``. A third file, ``<path>_fronts.vtp``, has a line for each
+    front with its frames (``ahead``, ``normal``), its arc length ``s`` and, where they are given,
+    ``K_I``, ``K_II``, ``K_III`` and ``at_surface``.
+
     Parameters
     ----------
     solution : Solution
     path : path
         With or without ``.vtu``; folders on the way are made.
+    sif : SIF, or one for each crack, optional
+        What `stress_intensity` returned, for the file of the fronts.
 
     Returns
     -------
@@ -53,8 +65,11 @@ def write(solution: Solution, path: str | Path) -> list[Path]:
     Raises
     ------
     ProblemError
-        A path that ends on the suffix of another kind of VTK file.
+        A path that ends on the suffix of another kind of VTK file; not one SIF for each crack.
     """
+    K = () if sif is None else (sif,) if isinstance(sif, SIF) else tuple(sif)
+    if K and len(K) != len(solution.lips):
+        raise ProblemError(f"write(sif=...): {len(K)} SIF for {len(solution.lips)} crack(s).")
     target = Path(path)
     if target.suffix in (".vtp", ".vtk", ".pvd", ".vtm"):
         raise ProblemError(f"write(path={str(path)!r}): the grid is a .vtu file; give that suffix.")
@@ -65,8 +80,15 @@ def write(solution: Solution, path: str | Path) -> list[Path]:
     if not any(len(lips) for lips in solution.lips):
         return [target]
     lips = target.with_name(f"{target.stem}_lips.vtp")
-    _write_lips(solution, lips)
-    return [target, lips]
+    if all(crack.fronts is None for crack in solution.space.cracks):
+        _write_lips(solution, lips)
+        return [target, lips]
+    _write_lip_faces(solution, lips)
+    if not solution.space.tips:
+        return [target, lips]
+    fronts = target.with_name(f"{target.stem}_fronts.vtp")
+    _write_fronts(solution, K, fronts)
+    return [target, lips, fronts]
 
 
 def _write_grid(body: Pieces, path: Path) -> None:
@@ -123,6 +145,72 @@ def _write_lips(solution: Solution, path: Path) -> None:
     data.SetPoints(_points(np.concatenate([each.x for each in lips])))
     data.SetLines(_cells([run[None] for _, run in runs]))
     _save(vtkXMLPolyDataWriter(), data, at_points, {"crack": np.array([c for c, _ in runs])}, path)
+
+
+def _write_lip_faces(solution: Solution, path: Path) -> None:
+    from vtkmodules.vtkCommonDataModel import vtkPolyData
+    from vtkmodules.vtkIOXML import vtkXMLPolyDataWriter
+
+    lips = [lip_faces(solution, c) for c in range(len(solution.lips))]
+    start = np.cumsum([0, *(len(each.points) for each in lips)])
+
+    def joined(name: str) -> np.ndarray:
+        return np.concatenate([getattr(each, name) for each in lips])
+
+    at_points = {name: joined(name) for name in ("pressure", "gap", "normal")}
+    at_points["opening"] = joined("jump")
+    at_points |= {f"displacement_{name}": joined(name) for name in ("minus", "plus")}
+    at_cells: dict[str, np.ndarray] = {
+        "crack": np.repeat(np.arange(len(lips)), [len(each.area) for each in lips]),
+        "closed": (joined("closed") >= 0.5).astype(np.int8),
+        "closed_share": joined("closed"),
+        "pressure_mean": joined("mean_pressure"),
+        "gap_mean": joined("mean_gap"),
+    }
+    data = vtkPolyData()
+    data.SetPoints(_points(joined("points")))
+    faces = [each.triangles + begin for each, begin in zip(lips, start, strict=False)]
+    data.SetPolys(_cells([np.concatenate(faces)]))
+    _save(vtkXMLPolyDataWriter(), data, at_points, at_cells, path)
+
+
+def _write_fronts(solution: Solution, sif: Sequence[SIF], path: Path) -> None:
+    from vtkmodules.vtkCommonDataModel import vtkPolyData
+    from vtkmodules.vtkIOXML import vtkXMLPolyDataWriter
+
+    tips = solution.space.tips
+    lines: list[dict[str, np.ndarray]] = []
+    for tip in tips:
+        if sif:
+            own = sif[tip.crack]
+            mine = own.front == tip.number
+            line = {"x": own.x[mine], "frame": own.frame[mine], "s": own.s[mine]}
+            line |= {f"K_{name}": getattr(own, f"K_{name}")[mine] for name in ("I", "II", "III")}
+            line["at_surface"] = own.at_surface[mine].astype(np.int8)
+        else:
+            step = np.linalg.norm(np.diff(tip.x, axis=0), axis=1)
+            line = {"x": tip.x, "frame": tip.frame, "s": np.append(0.0, np.cumsum(step))}
+        lines.append(line)
+    start = np.cumsum([0, *(len(line["x"]) for line in lines)])
+    runs = []
+    for tip, line, begin in zip(tips, lines, start, strict=False):
+        run = begin + np.arange(len(line["x"]))
+        front = (solution.space.cracks[tip.crack].fronts or ())[tip.number]
+        # K is known inside the body: a closed front that leaves it in part is open there.
+        whole = front[0] == front[-1] and len(run) == len(front) - 1
+        runs.append(np.append(run, run[:1]) if whole else run)
+    every = {name: np.concatenate([line[name] for line in lines]) for name in lines[0]}
+    frame = every.pop("frame")
+    x = every.pop("x")
+    at_points = {"ahead": frame[:, 0], "normal": frame[:, 1], **every}
+    at_cells = {
+        "crack": np.array([tip.crack for tip in tips]),
+        "front": np.array([tip.number for tip in tips]),
+    }
+    data = vtkPolyData()
+    data.SetPoints(_points(x))
+    data.SetLines(_cells([run[None] for run in runs]))
+    _save(vtkXMLPolyDataWriter(), data, at_points, at_cells, path)
 
 
 def _six(stress: Floats) -> Floats:

@@ -15,6 +15,7 @@ from xcrack.crack import Crack, front
 from xcrack.criteria import Criterion
 from xcrack.errors import ProblemError, XcrackWarning
 from xcrack.growth import Run, steps_of
+from xcrack.history_table import space_table
 from xcrack.laws import Law
 from xcrack.mesh import Mesh
 from xcrack.problem import Problem
@@ -60,15 +61,20 @@ class History:
         return f"History({len(self.steps)} steps, {self.life:.6g} cycles, ended: {self.ended})"
 
     def table(self) -> NDArray[Any]:
-        """All numbers, one row for each tip of each step.
+        """All numbers, one row for each tip, in space for each front, of each step.
 
         Returns
         -------
         structured array
             Columns step, N, crack, tip; x, y[, z] of the tip; a (length of its crack inside the
             body); K_I, K_II[, K_III] of load state 0 as ``K_I_0`` and so on, then of state 1, ...;
-            angle, dK_eq, R, rate, da as in `Step`.
+            angle, dK_eq, R, rate, da as in `Step`. In space ``front`` stands for ``tip`` and x, y,
+            z is the middle of the front; each K and each of the others has three columns, its
+            smallest value along the front, its mean over the length and its largest:
+            ``K_I_0_min``, ``K_I_0_mean``, ``K_I_0_max``.
         """
+        if self.cracks and self.cracks[0].fronts is not None:
+            return space_table(self.steps)
         rows = [row for step in self.steps for row in _rows(step)]
         modes = max(
             (state[0].K.shape[1] for s in self.steps for state in s.sif if state), default=2
@@ -86,9 +92,10 @@ class History:
 
         Parameters
         ----------
-        kind : {"K", "a", "path"}
+        kind : {"K", "a", "path", "fronts"}
             K of the most severe state over the crack length, length over cycles, or the cracks
-            in the body.
+            in the body; in space the largest K along each front over cycles, and the fronts over
+            the section of the body.
         file : path, optional
             Where to save the picture; else it is shown.
 

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
+from xcrack.arrays import Ints
 from xcrack.crack import Crack
 from xcrack.step import Step
 
@@ -12,8 +13,8 @@ from xcrack.step import Step
 def write_series(steps: Sequence[Step], folder: Path) -> Path:
     """Write ``history.pvd`` and the files it lists; its time is the number of the step.
 
-    Steps with solutions: a grid with the lips for each load state. Steps without: the lines of
-    the cracks.
+    Steps with solutions: a grid with the lips for each load state, in space with the fronts and
+    K along them. Steps without: the lines, or in space the faces and fronts, of the cracks.
     """
     from xcrack.export import write  # loads the writers of files
 
@@ -24,7 +25,8 @@ def write_series(steps: Sequence[Step], folder: Path) -> Path:
         names = []
         for state, solution in enumerate(step.solutions):
             stem = parts / f"step_{step.index:05d}_state_{state}"
-            names += [file.name for file in write(solution, stem)]
+            K = {"sif": step.sif[state]} if step.sif and step.cracks[0].fronts is not None else {}
+            names += [file.name for file in write(solution, stem, **K)]
         if not names:
             name = f"step_{step.index:05d}_cracks.vtp"
             (parts / name).write_text(polylines(step.cracks))
@@ -43,35 +45,51 @@ def write_series(steps: Sequence[Step], folder: Path) -> Path:
 
 
 def polylines(cracks: Sequence[Crack]) -> str:
-    """Text of a ``.vtp`` file with the faces of all cracks."""
+    """Text of a ``.vtp`` file with the faces of all cracks, in space with their fronts as lines."""
     dim = cracks[0].points.shape[1] if cracks else 2
-    kind = "Lines" if dim == 2 else "Polys"
     start = np.cumsum([0, *(len(crack.points) for crack in cracks)])
     points = [np.pad(crack.points, ((0, 0), (0, 3 - dim))) for crack in cracks]
-    faces = [crack.faces + begin for crack, begin in zip(cracks, start)]
-    owner = [np.full(len(crack.faces), i) for i, crack in enumerate(cracks)]
-    n_faces = sum(len(each) for each in faces)
-    connectivity = " ".join(str(i) for each in faces for i in each.ravel())
+    faces = [
+        (c, face + begin)
+        for c, (crack, begin) in enumerate(zip(cracks, start, strict=False))
+        for face in crack.faces
+    ]
+    fronts = [
+        (c, front + begin)
+        for c, (crack, begin) in enumerate(zip(cracks, start, strict=False))
+        for front in crack.fronts or ()
+    ]
+    lines, polys = (faces, []) if dim == 2 else (fronts, faces)
+    blocks = "".join(_cells(name, part) for name, part in (("Lines", lines), ("Polys", polys)))
     coordinates = "\n".join(" ".join(repr(float(v)) for v in x) for each in points for x in each)
-    offsets = " ".join(str(dim * (i + 1)) for i in range(n_faces))
-    crack_of = " ".join(str(i) for each in owner for i in each)
+    crack_of = " ".join(str(c) for c, _ in [*lines, *polys])
+    counts = f'NumberOfLines="{len(lines)}" NumberOfPolys="{len(polys)}"'
     return f"""<?xml version="1.0"?>
 <VTKFile type="PolyData" version="0.1" byte_order="LittleEndian">
   <PolyData>
-    <Piece NumberOfPoints="{start[-1]}" NumberOf{kind}="{n_faces}">
+    <Piece NumberOfPoints="{start[-1]}" {counts}>
       <CellData>
         <DataArray type="Int32" Name="crack" format="ascii">{crack_of}</DataArray>
       </CellData>
       <Points><DataArray type="Float64" NumberOfComponents="3" format="ascii">
 {coordinates}
       </DataArray></Points>
-      <{kind}>
-        <DataArray type="Int64" Name="connectivity" format="ascii">{connectivity}</DataArray>
-        <DataArray type="Int64" Name="offsets" format="ascii">{offsets}</DataArray>
-      </{kind}>
-    </Piece>
+{blocks}    </Piece>
   </PolyData>
 </VTKFile>
+"""
+
+
+def _cells(name: str, cells: Sequence[tuple[int, Ints]]) -> str:
+    """Text of the lines or polygons of a file; nothing where there are none."""
+    if not cells:
+        return ""
+    connectivity = " ".join(str(i) for _, cell in cells for i in cell)
+    offsets = " ".join(str(i) for i in np.cumsum([len(cell) for _, cell in cells]))
+    return f"""      <{name}>
+        <DataArray type="Int64" Name="connectivity" format="ascii">{connectivity}</DataArray>
+        <DataArray type="Int64" Name="offsets" format="ascii">{offsets}</DataArray>
+      </{name}>
 """
 
 

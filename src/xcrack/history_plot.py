@@ -12,10 +12,17 @@ if TYPE_CHECKING:
 
 
 def draw(history: "History", kind: str, file: str | Path | None) -> Any:
-    """Figure of K over length, length over cycles, or the paths; saved or shown."""
+    """Figure of K, of length over cycles, of the paths or the fronts; saved or shown."""
     kinds = {"K": _draw_K, "a": _draw_a, "path": _draw_path}
-    if kind not in kinds:
-        raise ProblemError(f'plot kind = {kind!r}: give "K", "a" or "path".')
+    if history.cracks and history.cracks[0].fronts is not None:
+        kinds = {"K": _draw_K_of_fronts, "a": _draw_a, "fronts": _draw_fronts}
+        kinds["path"] = _draw_fronts
+    if kind == "fronts" and kind not in kinds and history.steps:
+        raise ProblemError('plot kind = "fronts": only cracks in space have them; give "path".')
+    if kind not in (*kinds, "fronts"):
+        raise ProblemError(
+            f'plot kind = {kind!r}: give "K", "a" or "path", in space also "fronts".'
+        )
     if not history.steps:
         raise ProblemError("there is nothing to draw: the history has no steps.")
     if file is None:
@@ -38,7 +45,7 @@ def draw(history: "History", kind: str, file: str | Path | None) -> Any:
 def _draw_K(history: "History", axes: Any) -> None:
     table = history.table()
     n_states = sum(name.startswith("K_I_") for name in table.dtype.names or ())
-    for number, (crack, tip) in enumerate(_tips(table)):
+    for number, (crack, tip) in enumerate(_rows_of(table, "tip")):
         rows = table[(table["crack"] == crack) & (table["tip"] == tip)]
         every = np.array([[rows[f"K_{m}_{s}"] for m in ("I", "II")] for s in range(n_states)])
         severe = np.argmax(np.hypot(every[:, 0], every[:, 1]), axis=0)
@@ -49,6 +56,46 @@ def _draw_K(history: "History", axes: Any) -> None:
     axes.set(xlabel="crack length a", ylabel="K of the most severe state")
     axes.axhline(0, color="0.7", lw=0.8, zorder=0)
     axes.legend(fontsize="small")
+
+
+def _draw_K_of_fronts(history: "History", axes: Any) -> None:
+    """Largest and smallest K along each front, of the state that is most severe there."""
+    table = history.table()
+    for number, (crack, front) in enumerate(_rows_of(table, "front")):
+        rows = table[(table["crack"] == crack) & (table["front"] == front)]
+        label = f"crack {crack}, front {front}"
+        for mode, style in (("I", "o-"), ("II", "s--"), ("III", "^:")):
+            low, high = (_extreme(rows, mode, end) for end in ("min", "max"))
+            # The sign of modes II and III goes round with the front.
+            largest = high if mode == "I" else np.maximum(np.abs(low), np.abs(high))
+            name = f"$K_I$, {label}" if mode == "I" else f"$|K_{{{mode}}}|$, {label}"
+            axes.plot(rows["N"], largest, style, ms=3, color=f"C{number}", label=name)
+            if mode == "I":
+                name = "all $K_I$ along it"
+                axes.fill_between(
+                    rows["N"], low, high, color=f"C{number}", alpha=0.15, lw=0, label=name
+                )
+    axes.set(xlabel="cycles N", ylabel="largest K along the front")
+    axes.axhline(0, color="0.7", lw=0.8, zorder=0)
+    axes.legend(fontsize="small")
+
+
+def _extreme(rows: Any, mode: str, end: str) -> Any:
+    """Smallest or largest K of a mode in the state whose K is largest in size `(k,)`."""
+    n_states = sum(name.startswith("K_I_") and name.endswith("_max") for name in rows.dtype.names)
+    ends = [
+        np.array([[rows[f"K_{m}_{s}_{e}"] for e in ("min", "max")] for m in ("I", "II", "III")])
+        for s in range(n_states)
+    ]
+    severe = np.argmax([np.abs(each).max(axis=(0, 1)) for each in ends], axis=0)
+    return np.array([rows[f"K_{mode}_{s}_{end}"][k] for k, s in enumerate(severe)])
+
+
+def _draw_fronts(history: "History", axes: Any) -> None:
+    from xcrack.plot_fronts import front_axes
+
+    # One picture, one plane: further cracks are drawn by draw_fronts(crack=...).
+    front_axes(axes, [history.steps], 0, None, history.mesh, [""])
 
 
 def _draw_a(history: "History", axes: Any) -> None:
@@ -82,8 +129,8 @@ def _draw_path(history: "History", axes: Any) -> None:
     axes.legend(fontsize="small")
 
 
-def _tips(table: Any) -> list[tuple[int, int]]:
-    return sorted({(int(row["crack"]), int(row["tip"])) for row in table})
+def _rows_of(table: Any, what: str) -> list[tuple[int, int]]:
+    return sorted({(int(row["crack"]), int(row[what])) for row in table})
 
 
 __all__ = ["draw"]

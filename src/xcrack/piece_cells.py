@@ -47,17 +47,27 @@ class PieceCells:
 
 
 def piece_cells(space: Space) -> PieceCells:
-    """Split the cells on which enriched functions act, finer towards the tips."""
+    """Split the cells on which enriched functions act, in the plane finer towards the tips.
+
+    In space a face of a cell at a front may be split while its neighbour ahead is whole, and two
+    neighbours may halve a four-sided face along different diagonals: points on such a face hang.
+    They lie where they should and carry the value of the solution there, which a picture needs.
+    """
     touched = space.signature > 0
     for cut in space.cuts:
         touched = touched | cut.is_cut | cut.is_tip
-    mesh = space.mesh
-    touched = touched | _near_tip(space, mesh.points[mesh.edges])[mesh.cell_to_edge].any(axis=1)
+    mesh, plane = space.mesh, space.dim == 2
+    if plane:
+        near = _near_tip(space, mesh.points[mesh.edges])
+        touched = touched | near[mesh.cell_to_edge].any(axis=1)
     plain, others = np.nonzero(~touched)[0], np.nonzero(touched)[0]
-    cell, bary, side = _without_exits(space, sub_cells(space, others))
+    subs = sub_cells(space, others)
+    cell, bary, side = (
+        _without_exits(space, subs) if plane else (subs.cell, subs.bary.copy(), subs.side.copy())
+    )
     wrong = np.linalg.det(bary) < 0
     bary[wrong, -2:] = bary[wrong, -2:][:, ::-1]
-    for _ in range(_LEVELS if space.dim == 2 else 0):
+    for _ in range(_LEVELS if plane else 0):
         cell, bary, side = _halved(space, cell, bary, side)
     return PieceCells(plain, cell, bary, side)
 

@@ -38,7 +38,7 @@ class Pieces:
     displacement : (n, d) array, length
     stress : (n, 3, 3) array, stress
         Mean of the pieces that meet at the point on the same lip, weighted by their size. At a
-        tip, where it is infinite, each gives the value half way to its centre.
+        tip or front, where it is infinite, each gives the value half way to its centre.
     plain : (m, k) array of int
         Cells without enriched functions, with the nodes of the order of the solution.
     split : (s, k) array of int
@@ -193,9 +193,7 @@ def _join(
     x = np.concatenate([plain.x[first[old]], split.x])
     size = float(space.mesh.cell_size.min())
     key = np.concatenate([(x - x[:1]) / size, 3.0 * _lip(space, cell, bary, side)], axis=1)
-    pairs = cKDTree(key).query_pairs(_SAME, output_type="ndarray")
-    links = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(x), len(x)))
-    _, group = connected_components(links, directed=False)
+    group = _same(key)
     point = np.full(group.max(initial=-1) + 1, -1, dtype=np.int64)
     point[group[: len(old)]] = old
     new = np.nonzero(point < 0)[0]
@@ -203,6 +201,21 @@ def _join(
     _, one = np.unique(group, return_index=True)
     source = np.concatenate([first, n_rows + one[new] - len(old)])
     return point[group[len(old) :]], n_plain + len(new), source
+
+
+def _same(key: Floats) -> Ints:
+    """Number of the place of each row: rows closer than `_SAME` share it.
+
+    Most rows are equal when rounded; only one of these is compared with others.
+    """
+    _, one, rounded = np.unique(
+        np.round(key / _SAME).astype(np.int64), axis=0, return_index=True, return_inverse=True
+    )
+    pairs = cKDTree(key[one]).query_pairs(_SAME, output_type="ndarray")
+    n = len(one)
+    links = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(n, n))
+    _, group = connected_components(links, directed=False)
+    return np.asarray(group[rounded.ravel()], dtype=np.int64)
 
 
 def _lip(space: Space, cell: Ints, bary: Floats, side: Ints) -> Ints:
@@ -224,11 +237,21 @@ def _stresses(solution: Solution, block: _Block) -> tuple[Floats, Floats]:
     center = block.center[1]
     each = len(cell) // max(len(center), 1)
     if solution.space.tips:
-        tips = cKDTree(np.array([tip.x for tip in solution.space.tips]))
-        at_tip = tips.query(block.x)[0] < _SAME * solution.space.mesh.cell_size[cell]
         inner = (bary + np.repeat(center, each, axis=0)) / 2
-        bary = np.where(at_tip[:, None], inner, bary)
+        bary = np.where(_at_tip(solution.space, cell, bary)[:, None], inner, bary)
     return full_stress(solution, cell, bary, side), full_stress(solution, *block.center)
+
+
+def _at_tip(space: Space, cell: Ints, bary: Floats) -> Bools:
+    """Which points `(q,)` lie at a tip or on a front, as the level sets have it."""
+    corner = space.mesh.cells[cell]
+    near = np.full(len(cell), np.inf)
+    for cut in space.cuts:
+        phi = np.einsum("qb,qb->q", bary, cut.level_set.phi[corner])
+        for level in cut.level_set.psi:
+            psi = np.einsum("qb,qb->q", bary, level[corner])
+            near = np.minimum(near, np.hypot(phi, psi))
+    return np.asarray(near < _SAME * space.mesh.cell_size[cell])
 
 
 def full_stress(solution: Solution, cell: Ints, bary: Floats, side: Ints) -> Floats:

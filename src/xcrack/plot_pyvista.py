@@ -19,10 +19,10 @@ _PROBE = (
     "p.add_mesh(pv.Sphere()); image = p.screenshot(None, return_img=True);"
     "raise SystemExit(0 if image.std() > 0 else 1)"
 )
-_LONGER = 1100  # pixels of the longer side of the body
-_SHORTEST = 480  # pixels that a colour bar needs
-_BAR = 300  # pixels beside the body for the colour bar
-_MARGIN = 50
+LONGER = 1100  # pixels of the longer side of the body
+SHORTEST = 480  # pixels that a colour bar needs
+BAR = 300  # pixels beside the body for the colour bar
+MARGIN = 50
 
 
 @functools.cache
@@ -48,11 +48,11 @@ def draw(
 
     low, high = picture.box
     size = high - low
-    scale = _LONGER / float(size.max())
+    scale = LONGER / float(size.max())
     top = 70 if title else 0
-    width = int(size[0] * scale) + 2 * _MARGIN + _BAR
-    height = max(int(size[1] * scale) + 2 * _MARGIN, _SHORTEST) + top
-    with _quiet():
+    width = int(size[0] * scale) + 2 * MARGIN + BAR
+    height = max(int(size[1] * scale) + 2 * MARGIN, SHORTEST) + top
+    with quiet():
         plotter = pv.Plotter(off_screen=not show, window_size=[width, height])
         plotter.set_background("white")
         plotter.enable_anti_aliasing("ssaa")
@@ -61,16 +61,16 @@ def draw(
         if title:
             plotter.add_text(
                 title,
-                position=(_MARGIN / width, 1 - 50 / height),
+                position=(MARGIN / width, 1 - 50 / height),
                 viewport=True,
-                font_size=_points(26),
+                font_size=font_size(26),
                 color="black",
             )
         plotter.view_xy()
         camera = plotter.camera
         camera.parallel_projection = True
         # The body fills the window but for the bar on the right and the title above.
-        x = low[0] + (width / 2 - _MARGIN) / scale
+        x = low[0] + (width / 2 - MARGIN) / scale
         y = (low[1] + high[1]) / 2 + top / 2 / scale
         far = float(size.max())
         camera.focal_point, camera.position = (x, y, 0.0), (x, y, far)
@@ -89,8 +89,6 @@ def draw(
 
 
 def _add_body(pv: Any, plotter: Any, picture: Scene, cmap: str, window: tuple[int, int]) -> None:
-    from vtkmodules.util.numpy_support import numpy_to_vtk
-
     body = pv.PolyData.from_regular_faces(_raised(picture.points, 0.0), picture.triangles)
     body.point_data["values"] = picture.values
     actor = plotter.add_mesh(
@@ -103,15 +101,38 @@ def _add_body(pv: Any, plotter: Any, picture: Scene, cmap: str, window: tuple[in
         show_scalar_bar=False,
     )
     width, height = window
-    title = picture.label.replace(", ", "\n")
+    add_bar(plotter, actor, picture.label, picture.limits, window)
+    if len(picture.closed):
+        plotter.add_text(
+            "lips touch",
+            position=(1 - BAR / width, 30 / height),
+            viewport=True,
+            font_size=font_size(24),
+            color=CLOSED,
+        )
+
+
+def add_bar(
+    plotter: Any,
+    actor: Any,
+    label: str,
+    limits: tuple[float, float],
+    window: tuple[int, int],
+    bottom: float = 0.1,
+) -> None:
+    """Colour bar on the right of the window, from a share of its height on."""
+    from vtkmodules.util.numpy_support import numpy_to_vtk
+
+    width, _ = window
+    title = label.replace(", ", "\n")
     bar = plotter.add_scalar_bar(
         title=title,
         mapper=actor.mapper,
         vertical=True,
-        width=(_BAR - 60) / width,
-        height=0.7,
-        position_x=1 - (_BAR - 20) / width,
-        position_y=0.1,
+        width=(BAR - 60) / width,
+        height=0.8 - bottom,
+        position_x=1 - (BAR - 20) / width,
+        position_y=bottom,
         color="black",
         title_font_size=26,
         label_font_size=24,
@@ -121,15 +142,7 @@ def _add_body(pv: Any, plotter: Any, picture: Scene, cmap: str, window: tuple[in
     bar.SetBarRatio(0.17)
     bar.SetVerticalTitleSeparation(18)
     bar.SetUseCustomLabels(True)
-    bar.SetCustomLabels(numpy_to_vtk(_ticks(*picture.limits), deep=True))
-    if len(picture.closed):
-        plotter.add_text(
-            "lips touch",
-            position=(1 - _BAR / width, 30 / height),
-            viewport=True,
-            font_size=_points(24),
-            color=CLOSED,
-        )
+    bar.SetCustomLabels(numpy_to_vtk(_ticks(*limits), deep=True))
 
 
 def _add_lines(pv: Any, plotter: Any, picture: Scene, edges: bool, step: float) -> None:
@@ -160,7 +173,7 @@ def _ticks(low: float, high: float) -> Floats:
 
 
 @contextlib.contextmanager
-def _quiet() -> Iterator[None]:
+def quiet() -> Iterator[None]:
     """Without VTK's remark that it found no display and draws without one."""
     from vtkmodules.vtkCommonCore import vtkLogger
 
@@ -172,7 +185,7 @@ def _quiet() -> Iterator[None]:
         vtkLogger.SetStderrVerbosity(before)
 
 
-def _points(pixels: int) -> int:
+def font_size(pixels: int) -> int:
     """Font size of `add_text` for a height in pixels."""
     return max(pixels // 2, 6)
 

@@ -20,8 +20,14 @@ FIELDS = {
     "ux": "displacement x",
     "uy": "displacement y",
 }
+SPACE_FIELDS = FIELDS | {
+    "szz": "stress zz",
+    "syz": "stress yz",
+    "sxz": "stress xz",
+    "uz": "displacement z",
+}
 CLOSED = "#d6006c"  # colour of lips that touch
-_STRESSES = ("von_mises", "sxx", "syy", "sxy")
+STRESSES = ("von_mises", "sxx", "syy", "sxy", "szz", "syz", "sxz")
 _SHARE = 99.0  # % of the area at least whose stress stays within the colours
 _NEAR = 1e-8  # share of a cell within which a point lies on a crack
 
@@ -72,7 +78,7 @@ def scene(solution: Solution, field: str, warp: float, limits: tuple[float, floa
     """Field on the moved body, each piece with its own side of the crack."""
     body = pieces(solution)
     moved = body.points + warp * body.displacement
-    values = _values(body, field)
+    values = field_values(body, field)
     low, high, share = _range(body, field, values, limits)
     # Rounded down: "100 %" would not be true.
     label = FIELDS[field] + (f", clipped at {int(10 * share) / 10:g} %" if share < 100 else "")
@@ -101,15 +107,16 @@ def scene(solution: Solution, field: str, warp: float, limits: tuple[float, floa
     )
 
 
-def _values(body: Pieces, field: str) -> Floats:
+def field_values(body: Pieces, field: str) -> Floats:
+    """Values of a field at the points of the pieces `(n,)`."""
     if field == "von_mises":
         return von_mises(body.stress)
-    if field in _STRESSES:
-        i, j = ("xy".index(letter) for letter in field[1:])
+    if field in STRESSES:
+        i, j = ("xyz".index(letter) for letter in field[1:])
         return np.array(body.stress[:, i, j])
     if field == "displacement":
         return np.asarray(np.linalg.norm(body.displacement, axis=1))
-    return np.array(body.displacement[:, "xy".index(field[1])])
+    return np.array(body.displacement[:, "xyz".index(field[1])])
 
 
 def _range(
@@ -118,20 +125,45 @@ def _range(
     """Ends of the colours, and the share of the area (%) within them."""
     if limits is not None:
         return float(limits[0]), float(limits[1]), 100.0
-    low, high, share = float(values.min()), float(values.max()), 100.0
-    if field in _STRESSES and body.solution.space.tips:
-        # Shares of the area, or small pieces around a tip would count for more than they cover.
-        size = np.abs(values[body.corners])
-        order = np.argsort(size, axis=None)
-        area = np.cumsum(np.repeat(body.volume / size.shape[1], size.shape[1])[order])
-        size_sorted = size.ravel()[order]
-        regular = size[~body.solution.space.has_tip[body.cell]].max(initial=0.0)
-        enough = size_sorted[np.searchsorted(area, _SHARE / 100 * area[-1])]
-        top = max(float(regular), float(enough))
-        if max(-low, high) > top:
-            within = np.searchsorted(size_sorted, top, side="right") - 1
-            share = 100 * float(area[within] / area[-1])
-            low, high = max(low, -top), min(high, top)
+    if field in STRESSES and body.solution.space.tips:
+        regular = values[body.corners[~body.solution.space.has_tip[body.cell]]]
+        low, high, share = clipped(
+            values[body.corners], body.volume, float(np.abs(regular).max(initial=0.0))
+        )
+        low, high = max(low, float(values.min())), min(high, float(values.max()))
+    else:
+        low, high, share = float(values.min()), float(values.max()), 100.0
+    return *rounded(low, high, field), share
+
+
+def clipped(values: Floats, measure: Floats, regular: float = 0.0) -> tuple[float, float, float]:
+    """Lowest and highest value without the few that are very large, and the share kept (%).
+
+    Parameters
+    ----------
+    values : (k, v) array
+        At the vertices of simplices.
+    measure : (k,) array
+        Their areas or volumes: otherwise small pieces around a tip would count for more than
+        they cover.
+    regular : float
+        Values up to this size are kept at any rate.
+    """
+    low, high = float(values.min()), float(values.max())
+    size = np.abs(values)
+    order = np.argsort(size, axis=None)
+    area = np.cumsum(np.repeat(measure / size.shape[1], size.shape[1])[order])
+    size_sorted = size.ravel()[order]
+    enough = size_sorted[min(np.searchsorted(area, _SHARE / 100 * area[-1]), len(area) - 1)]
+    top = max(regular, float(enough))
+    if max(-low, high) <= top:
+        return low, high, 100.0
+    within = np.searchsorted(size_sorted, top, side="right") - 1
+    return max(low, -top), min(high, top), 100 * float(area[within] / area[-1])
+
+
+def rounded(low: float, high: float, field: str) -> tuple[float, float]:
+    """Ends of the colours for values from low to high."""
     if low < 0 < high and min(-low, high) > 0.05 * max(-low, high):
         high = max(-low, high)
         low = -high
@@ -141,7 +173,7 @@ def _range(
         # One value everywhere: noise should not be spread over all the colours.
         middle, reach = (low + high) / 2, 0.05 * max(abs(low), abs(high), 1e-300)
         low, high = middle - reach, middle + reach
-    return low, high, share
+    return low, high
 
 
 def _triangles(body: Pieces) -> Ints:

@@ -2,11 +2,12 @@
 
 import os
 import sys
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from xcrack.errors import ProblemError
-from xcrack.plot_scene import FIELDS, scene
+from xcrack.plot_scene import FIELDS, SPACE_FIELDS, scene
 from xcrack.solution import Solution
 
 _GRAPHS = ("pressure", "opening")
@@ -26,6 +27,9 @@ def plot(
     limits: tuple[float, float] | None = None,
     cmap: str | None = None,
     crack: int | None = None,
+    clip: tuple[Any, Any] | None = None,
+    view: Any = None,
+    loads: bool = False,
 ) -> Any:
     """Draw a solution.
 
@@ -35,7 +39,9 @@ def plot(
     field : str
         On the body: "von_mises", "sxx", "syy", "sxy", "displacement" (its norm), "ux", "uy".
         Along the lips: "pressure" (of contact), "opening" (with the sliding); where the lips
-        touch the graph is shaded. "mesh": the mesh with its cracks and enriched nodes.
+        touch the graph is shaded. "mesh": the mesh with its cracks and enriched nodes. In space
+        also "szz", "syz", "sxz" and "uz"; "pressure", "opening" (or "gap") and "sliding" colour
+        the cracks, with their fronts, in a body that is seen through.
     file : path, optional
         Where to save the picture; ``.png`` is added to a path without suffix.
     warp : float
@@ -55,7 +61,14 @@ def plot(
     cmap : str, optional
         Colour map of matplotlib; left out: one that parts at zero for a field of both signs.
     crack : int, optional
-        Draw the graphs of this crack only.
+        Draw the graphs, or in space the colours, of this crack only.
+    clip : (point, normal), optional
+        In space: leave out what lies on the side of the normal of this plane, to see inside.
+    view : (3,) array, optional
+        In space: direction from the body to the viewer; left out: one from which the cut or the
+        crack is seen.
+    loads : bool
+        In space: draw arrows of tractions, pressures and point forces.
 
     Returns
     -------
@@ -64,13 +77,18 @@ def plot(
     Raises
     ------
     ProblemError
-        An unknown field or renderer, a crack that does not exist, a renderer that cannot draw.
+        An unknown field or renderer, a crack that does not exist, a renderer that cannot draw, a
+        plane that leaves nothing.
     """
+    if solution.space.dim == 3:
+        look = Look(warp, title, edges, limits, cmap, crack, clip, view, loads)
+        return _in_space(solution, field, file, show, renderer, look)
+    if clip is not None or view is not None or loads:
+        raise ProblemError("plot(clip=, view=, loads=): only bodies in space know these.")
     if field not in _KNOWN:
         known = ", ".join(f'"{name}"' for name in _KNOWN)
         raise ProblemError(f"plot(field={field!r}): there is no such field; give one of {known}.")
-    if renderer not in ("auto", "pyvista", "matplotlib"):
-        raise ProblemError(f'plot(renderer={renderer!r}): give "auto", "pyvista" or "matplotlib".')
+    _check_renderer(renderer)
     target = _target(file)
     window = (target is None and _has_display()) if show is None else show
     if field in _GRAPHS:
@@ -90,6 +108,83 @@ def plot(
     from xcrack import plot_matplotlib
 
     return plot_matplotlib.draw(picture, target, window, title, edges, colours)
+
+
+@dataclass(frozen=True, eq=False)
+class Look:
+    """How a picture in space is to look: arguments of `plot`."""
+
+    warp: float
+    title: str | None
+    edges: bool
+    limits: tuple[float, float] | None
+    cmap: str | None
+    crack: int | None
+    clip: Any
+    view: Any
+    loads: bool
+
+
+def _in_space(
+    solution: Solution,
+    field: str,
+    file: str | Path | None,
+    show: bool | None,
+    renderer: str,
+    look: Look,
+) -> Any:
+    from xcrack.plot_space import (
+        LIP_FIELDS,
+        clip_plane,
+        crack_scene,
+        direction,
+        mesh_scene,
+        space_scene,
+    )
+
+    known = (*SPACE_FIELDS, "mesh", *LIP_FIELDS)
+    if field not in known:
+        names = ", ".join(f'"{name}"' for name in known)
+        raise ProblemError(f"plot(field={field!r}): there is no such field; give one of {names}.")
+    _check_renderer(renderer)
+    plane, view = clip_plane(look.clip), direction(look.view)
+    cracks = _cracks(solution, field, look.crack) if field in LIP_FIELDS else []
+    target = _target(file)
+    window = (target is None and _has_display()) if show is None else show
+    if not _by_pyvista(renderer, target):
+        from xcrack import plot_matplotlib_space
+        from xcrack.plot_pyvista import RASTER
+
+        if cracks:
+            return plot_matplotlib_space.draw_cracks(
+                solution, field, cracks, target, window, look.title, look.limits, look.cmap
+            )
+        raise ProblemError(
+            f'plot(field="{field}"): a body in space is drawn by pyvista, as '
+            f"{', '.join(RASTER)}; matplotlib draws {', '.join(LIP_FIELDS)} only. Without OpenGL "
+            "install libEGL (apt-get install libegl1 libgl1-mesa-dri)."
+        )
+    if field == "mesh":
+        picture = mesh_scene(solution, plane, view)
+    elif cracks:
+        picture = crack_scene(solution, field, cracks, look.warp, look.limits, plane, view)
+    else:
+        picture = space_scene(solution, field, look.warp, look.limits, plane, view)
+    arrows = None
+    if look.loads:
+        from xcrack.plot_loads import load_arrows
+
+        arrows = load_arrows(solution)
+    from xcrack.plot_pyvista_space import draw_space
+
+    colours = look.cmap or ("RdBu_r" if picture.signed else "viridis")
+    edges = look.edges or field == "mesh"
+    return draw_space(picture, arrows, target, window, look.title, edges, colours)
+
+
+def _check_renderer(renderer: str) -> None:
+    if renderer not in ("auto", "pyvista", "matplotlib"):
+        raise ProblemError(f'plot(renderer={renderer!r}): give "auto", "pyvista" or "matplotlib".')
 
 
 def _target(file: str | Path | None) -> Path | None:
