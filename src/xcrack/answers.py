@@ -25,8 +25,9 @@ def directed(
     for name, values in (("angle", angle), ("dK_eq", dK_eq), ("R", R)):
         if values.shape != (n,) or not np.isfinite(values).all():
             raise ProblemError(
-                f"the criterion returned {name} = {values} at the {n} tips of crack {crack}; it "
-                "must be finite, one number a tip. xcrack.testing.check_criterion tries it."
+                f"the criterion returned {name} = {values} at the {n} tips (or places along "
+                f"fronts) of crack {crack}; it must be finite, one number each. "
+                "xcrack.testing.check_criterion tries it."
             )
     if (dK_eq < 0).any():
         raise ProblemError(f"the criterion returned a negative range {dK_eq} at crack {crack}.")
@@ -40,8 +41,8 @@ def law_rate(law: Law, dK_eq: Floats, R: Floats, crack: int) -> Floats:
     rate = np.asarray(law(dK_eq, R), dtype=float)
     if rate.shape != dK_eq.shape:
         raise ProblemError(
-            f"the law returned shape {rate.shape} for {len(dK_eq)} tips; it must return one rate a "
-            "tip. xcrack.testing.check_law tells what is wrong."
+            f"the law returned shape {rate.shape} for {len(dK_eq)} tips or places along "
+            "fronts; it must return one rate for each. xcrack.testing.check_law tells what is wrong."
         )
     bad = ~(np.isfinite(rate) & (rate >= 0))
     if bad.any():

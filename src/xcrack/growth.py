@@ -190,7 +190,7 @@ def steps_of(run: Run, last: Step | None = None) -> Generator[Step, None, str]:
         except GeometryError as error:
             return _said(run, f"the cracks cannot go on after step {last.index}: {error}")
         gone = _gone(moved, problem.placed)
-        left = "tip left the body: " + "; ".join(_where(last, tip) for tip in gone)
+        left = _left(last, gone)
         if not any(placed.n_tips for placed in problem.placed):
             return _said(run, left)
         try:
@@ -344,10 +344,17 @@ def _too_short(step: Step, plan: Advance, run: Run) -> str:
     )
 
 
+def _left(step: Step, gone: list[tuple[int, int]]) -> str:
+    if any(step.cracks[c].dim == 3 for c, _ in gone):
+        return "front left the body: crack " + ", ".join(str(c) for c, _ in gone)
+    return "tip left the body: " + "; ".join(_where(step, tip) for tip in gone)
+
+
 def _where(step: Step, tip: tuple[int, int]) -> str:
     c, j = tip
     x = ", ".join(f"{v:.6g}" for v in step.sif[0][c].x[j])
-    return f"crack {c}, tip {j} at ({x})"
+    what = "tip" if step.cracks[c].dim == 2 else "front place"
+    return f"crack {c}, {what} {j} at ({x})"
 
 
 def _report(run: Run, step: Step) -> None:
@@ -357,7 +364,7 @@ def _report(run: Run, step: Step) -> None:
     da = max((float(d.max(initial=0.0)) for d in step.da), default=0.0)
     print(
         f"step {step.index:4d}  N {step.cycles:12.6g}  largest dK_eq {largest:10.5g}  "
-        f"da {da:9.4g}  tips {step.n_tips}",
+        f"da {da:9.4g}  {'tips' if step.cracks[0].dim == 2 else 'front places'} {step.n_tips}",
         file=sys.stderr,
     )
 

@@ -7,7 +7,7 @@ from xcrack.errors import ProblemError
 
 @dataclass(frozen=True)
 class Numerics:
-    """Choices of method, with the reason of each default (numbers in docs/theory.md).
+    """Choices of method, with the reason of each default (numbers in docs/measured.md).
 
     Parameters
     ----------
@@ -17,6 +17,8 @@ class Numerics:
     radius : float, length, optional
         Radius of the enriched disc. None: 0.3 (order 1) or 0.4 (order 2) of the smallest of crack
         length, distance to the boundary and to another tip, from 2 to 20 cells (40 at order 1).
+        In space 0.65 of the size of the crack, 0.7 of the distance to a side and 0.45 of that to
+        another front, from 2.6 to 3.6 cells.
     functions : {4, 2}
         Tip functions; two (those of the modes' leading angular terms) cost accuracy.
     multipliers : {"reduced", "naive"}
@@ -24,7 +26,8 @@ class Numerics:
         for each node, for comparison only; it oscillates.
     consistent : bool
         Correct the gradients of the tip functions so that linear stress fields pass the patch
-        test to round-off whatever the quadrature (variationally consistent integration).
+        test to round-off whatever the quadrature (variationally consistent integration). In space
+        constant ones.
     orthonormal : {"star", "node", "none"}
         Change of basis before the solver. Star: the unknowns of a node, and the Heaviside
         unknowns of the cut edges whose far end it is, are made orthonormal in energy, so that the
@@ -36,12 +39,14 @@ class Numerics:
     points : int
         Conical Gauss points a direction in a sub-cell with tip functions.
     domain : float, length, optional
-        Outer radius of the first domain of the interaction integral. None: twice the enriched
-        radius, as far as body and other tips allow.
+        Outer radius of the first domain of the interaction integral. None: in the plane 2.5 times
+        the enriched radius or 4 cells, in space 1.05 times it or 2.6 cells, whichever is more, as
+        far as body, other tips and the bend of a front allow.
     linear : {"auto", "direct", "iterative"}
         Linear solver. Auto: a factorisation in the plane and below 4 000 unknowns, above that in
-        space conjugate gradients with a multigrid hierarchy: a factor of a body in space fills
-        with the square of the unknowns.
+        space conjugate gradients with a multigrid hierarchy: a factor of a body in space fills,
+        and its time grows with the square of the unknowns. Iterative does without `orthonormal`
+        and `patch`: it has its own basis, orthonormal node by node.
     initial_set : {"closed", "open"}
         State of the lips that the contact iteration starts from where nothing is known.
 
