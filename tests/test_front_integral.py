@@ -359,4 +359,5 @@ def test_straight_front_through_a_cube():
     assert not at_surface[np.abs(x[:, 1]) < 0.3].any()
     error = (K - [K_I, K_II, K_III]) / K_I
     assert np.abs(error[~at_surface].mean(axis=0)).max() < 0.03
-    assert np.abs(error).max() < 0.06
+    assert np.abs(error[~at_surface]).max() < 0.06
+    assert np.abs(error).max() < 0.1  # prolonged to the sides

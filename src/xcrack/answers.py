@@ -42,7 +42,8 @@ def law_rate(law: Law, dK_eq: Floats, R: Floats, crack: int) -> Floats:
     if rate.shape != dK_eq.shape:
         raise ProblemError(
             f"the law returned shape {rate.shape} for {len(dK_eq)} tips or places along "
-            "fronts; it must return one rate for each. xcrack.testing.check_law tells what is wrong."
+            "fronts; it must return one rate for each. xcrack.testing.check_law tells what is "
+            "wrong."
         )
     bad = ~(np.isfinite(rate) & (rate >= 0))
     if bad.any():

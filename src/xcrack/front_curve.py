@@ -149,9 +149,19 @@ class FrontCurve:
         """Distance of points to the samples of the front `(q,)`, a bound from above."""
         return np.asarray(self._guesses[1].query(x)[0])
 
-    def sharpest(self) -> float:
-        """Smallest radius of curvature among the samples; inf for a straight front."""
-        turn = self.at(self._guesses[0])[2]
+    def sharpest(self, first: float = -np.inf, last: float = np.inf) -> float:
+        """Smallest radius of curvature among the samples; inf for a straight front.
+
+        Parameters
+        ----------
+        first, last : float, length
+            Parameters between which samples count.
+        """
+        s = self._guesses[0]
+        between = s[(s >= first) & (s <= last)]
+        if not len(between):
+            return np.inf
+        turn = self.at(between)[2]
         largest = float(np.hypot(turn[:, 0], turn[:, 1]).max())
         return 1 / largest if largest > 1e-12 / self.length else np.inf
 

@@ -65,7 +65,9 @@ def tube_radius(
     wanted = solution.problem.numerics.domain
     if wanted is None:
         wanted = max(_OUTER * size, _REACH * tip.radius)
-    limit = _BENT * curve.sharpest()
+    # Near the exits hats are left out anyway; a bend there must not narrow the whole tube.
+    ahead = 0.0 if curve.closed else min(wanted, 0.4 * (ends[1] - ends[0]))
+    limit = _BENT * curve.sharpest(ends[0] + ahead, ends[1] - ahead)
     s = np.linspace(*ends, max(8, round((ends[1] - ends[0]) / (2 * size))) + 1)
     x = curve.at(s)[0]
     # Near its exits a front is close to the boundary; that is dealt with by leaving out hats.

@@ -6,6 +6,7 @@ from scipy.interpolate import CubicSpline
 from xcrack.arrays import Bools, Floats
 from xcrack.front_curve import FrontCurve
 
+_RISE = 0.1  # of the largest value, by which a prolonged one may differ from the last
 _TREND = 4  # values whose trend prolongs K: fewer would prolong their scatter
 
 
@@ -58,7 +59,7 @@ def along(K: Floats, knots: Floats, valid: Bools, curve: FrontCurve, s: Floats) 
     -------
     (..., m, 3) array
         Prolonged by the trend of the last four values to the next top of a hat beyond the valid
-        ones, constant from there.
+        ones, by at most a tenth of the largest value, constant from there.
     """
     rows = np.nonzero(valid)[0]
     if len(rows) < 2:
@@ -89,6 +90,9 @@ def along(K: Floats, knots: Floats, valid: Bools, curve: FrontCurve, s: Floats) 
     over = bounded - inner
     shape = (-1,) + (1,) * (values.ndim - 1)
     rise = np.where((over < 0).reshape(shape), slope[0], slope[1]) * over.reshape(shape)
+    # A trend of scattered values would let the ends of a growing front run ahead or stay behind.
+    most = _RISE * np.abs(values).max(axis=0)
+    rise = np.clip(rise, -most, most)
     return np.moveaxis(spline(inner) + rise, 0, -2)
 
 

@@ -45,7 +45,7 @@ class Problem:
         auto: a crack whose lips would overlap gets multipliers, others get none.
     order : {1, 2}, optional
         Degree of the standard and Heaviside functions. Where it is left out: 2 in the plane, 1 in
-        space, where it is the only choice.
+        space. There order 2 is solved by a factorisation alone: for small scenes.
     numerics : Numerics
 
     Raises
@@ -89,8 +89,6 @@ class Problem:
             )
         if self.order is None:
             object.__setattr__(self, "order", 2 if self.mesh.dim == 2 else 1)
-        if self.mesh.dim == 3 and self.order == 2:
-            raise ProblemError("order = 2: bodies in space are solved at order 1; leave it out.")
         if self.order not in (1, 2):
             raise ProblemError(f"order = {self.order!r}: give 1 or 2.")
         if self.contact not in ("auto", "on", "off"):

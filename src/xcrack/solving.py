@@ -112,13 +112,19 @@ def _engine(
 ) -> System | IterativeSystem:
     """A factorisation, or in space above some size conjugate gradients."""
     space_, wanted = model.space, problem.numerics.linear
-    large = space_.dim == 3 and space_.n_dof > _DIRECT
+    large = space_.dim == 3 and space_.order == 1 and space_.n_dof > _DIRECT
     if solver is None and (wanted == "iterative" or (wanted == "auto" and large)):
         return iterative_system(
-            space_, model.stiffness, model.bulk, fixed, model.bulk.levels, motion.modes
+            space_,
+            model.stiffness,
+            model.bulk,
+            fixed,
+            model.bulk.levels,
+            motion.modes,
+            problem.material if problem.numerics.tip_basis == "vectorial" else None,
         )
     fixed[motion.pins] = True
-    return system(space_, model.stiffness, fixed, problem.numerics, solver)
+    return system(space_, model.stiffness, fixed, problem.numerics, solver, problem.material)
 
 
 @dataclass(frozen=True, eq=False)

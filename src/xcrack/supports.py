@@ -211,5 +211,15 @@ def _fit(space: Space, where: str, value: object, what: str) -> tuple[Ints, Floa
     # In space a tube that just reaches a side has traces there so small that they would buy any
     # value with a coefficient of any size inside the body.
     limit = 1e-11 if space.dim == 2 else 1e-3
-    solution += np.linalg.lstsq(A, target - A @ solution, rcond=limit)[0]
-    return unknowns, solution
+    scale = _scales(space)[unknowns]
+    rest = np.linalg.lstsq(A / scale, target - A @ solution, rcond=limit)[0]
+    return unknowns, solution + rest / scale[:, None]
+
+
+def _scales(space: Space) -> Floats:
+    """Size of each function: 1, but the root of the radius for those of a tip."""
+    scale = np.ones(space.n_functions)
+    for tip in space.tips:
+        first = tip.point_to_function[tip.point_to_function >= 0]
+        scale[first[:, None] + np.arange(tip.functions)] = np.sqrt(tip.radius)
+    return scale
