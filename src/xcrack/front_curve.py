@@ -149,21 +149,31 @@ class FrontCurve:
         """Distance of points to the samples of the front `(q,)`, a bound from above."""
         return np.asarray(self._guesses[1].query(x)[0])
 
-    def sharpest(self, first: float = -np.inf, last: float = np.inf) -> float:
+    def sharpest(self, first: float = -np.inf, last: float = np.inf, over: float = 0.0) -> float:
         """Smallest radius of curvature among the samples; inf for a straight front.
 
         Parameters
         ----------
         first, last : float, length
             Parameters between which samples count.
+        over : float, length
+            Length over which a bend is averaged: a spot that is much shorter counts for little.
         """
         s = self._guesses[0]
         between = s[(s >= first) & (s <= last)]
         if not len(between):
             return np.inf
-        turn = self.at(between)[2]
-        largest = float(np.hypot(turn[:, 0], turn[:, 1]).max())
-        return 1 / largest if largest > 1e-12 / self.length else np.inf
+        if over > 0:
+            low, high = between - over / 2, between + over / 2
+            if not self.closed:
+                low, high = np.maximum(low, 0.0), np.minimum(high, self.length)
+            ahead, behind = self.at(high)[1][:, 2], self.at(low)[1][:, 2]
+            angle = np.arccos(np.clip(np.einsum("qd,qd->q", ahead, behind), -1, 1))
+            largest = float((angle / (high - low)).max())
+        else:
+            turn = self.at(between)[2]
+            largest = float(np.hypot(turn[:, 0], turn[:, 1]).max())
+        return 1 / largest if largest > 1e-9 / self.length else np.inf
 
     def arc(self, s: Floats) -> Floats:
         """Arc length from the first vertex `(q,)` at parameters within the breaks."""

@@ -67,7 +67,7 @@ def tube_radius(
         wanted = max(_OUTER * size, _REACH * tip.radius)
     # Near the exits hats are left out anyway; a bend there must not narrow the whole tube.
     ahead = 0.0 if curve.closed else min(wanted, 0.4 * (ends[1] - ends[0]))
-    limit = _BENT * curve.sharpest(ends[0] + ahead, ends[1] - ahead)
+    limit = _BENT * curve.sharpest(ends[0] + ahead, ends[1] - ahead, over=2 * size)
     s = np.linspace(*ends, max(8, round((ends[1] - ends[0]) / (2 * size))) + 1)
     x = curve.at(s)[0]
     # Near its exits a front is close to the boundary; that is dealt with by leaving out hats.
@@ -182,7 +182,7 @@ def front_values(
             np.zeros(len(knots), bool),
         )
     outer, wanted, size = tube_radius(solutions[0], t, curve, ends)
-    radii = np.array([outer, max(SECOND * outer, min(outer, 1.2 * size))])
+    radii = np.array([outer, SECOND * outer])
     knots = front_nodes(curve, _SPACING * size, None if curve.closed else ends)
     turn = np.stack([_mean_rotation(s, curve, outer) for s in solutions], axis=-1)
     total = _lip_part(solutions, t, curve, knots, radii, turn)

@@ -103,11 +103,15 @@ def test_penny_converges():
 @pytest.mark.slow
 @pytest.mark.mission
 def test_ellipse_all_round():
-    """2:1, three cells to the radius of curvature at its sharp ends."""
+    """2:1, three and a third cells to the radius of curvature at its sharp ends, b / h = 6.7.
+
+    With three cells the largest error, at the sharp ends, is 2.9 and 3.0 % for two seeds.
+    """
     a, b = 0.6, 0.3
     problem, place = fronts.flat_scene(
-        0.05, a=a, b=b, stress=MIXED, rotation=ROTATION, seed=SEED, half=1.2, margin=0.12, depth=0.2
-    )
+        0.045, a=a, b=b, stress=MIXED, rotation=ROTATION, seed=SEED,
+        half=1.2, margin=0.11, depth=0.17,
+    )  # fmt: skip
     sif, error, wanted = errors(problem, place, MIXED, a, b)
     ratio = sif.K_I / wanted[:, 0]
     shear = np.abs(error[:, 1:]).max(axis=0) / np.abs(wanted[:, 1:]).max(axis=0)
@@ -189,7 +193,10 @@ def extruded(n, layers, K, seed=None):
     if K[2] == 0:
         supports += [xc.fix("bottom", axis=2), xc.fix("top", axis=2)]
     else:
-        loads = [xc.traction(side, antiplane) for side in ("bottom", "top")]
+        loads = [
+            xc.traction(side, lambda x, normal: K[2] * antiplane(x, normal))
+            for side in ("bottom", "top")
+        ]
     return xc.Problem(
         mesh, xc.Isotropic(E=1.0, nu=0.3), [crack], supports=supports, loads=loads, contact="off"
     )
@@ -252,12 +259,12 @@ def test_mode_III_coarse():
 @pytest.mark.mission
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_mode_III(sign):
-    """Cross-talk is an error that scatters: 0.5 % in the mean square, 1 % at any place."""
-    inner, _, _ = through(20, 20, (0.0, 0.0, 1.0), 471 if sign > 0 else 472)
-    assert inner[:, 2].mean() == pytest.approx(1.0, abs=0.01)
-    assert inner[:, 2] == pytest.approx(1.0, abs=0.02)
+    """Cross-talk is an error that scatters: 0.5 % in the mean square, 1.5 % anywhere."""
+    inner, _, _ = through(20, 20, (0.0, 0.0, sign), 471 if sign > 0 else 472)
+    assert inner[:, 2].mean() == pytest.approx(sign, abs=0.01)
+    assert inner[:, 2] == pytest.approx(sign, abs=0.02)
     assert np.sqrt((inner[:, :2] ** 2).mean(axis=0)).max() <= 0.005
-    assert np.abs(inner[:, :2]).max() <= 0.01
+    assert np.abs(inner[:, :2]).max() <= 0.015
 
 
 # Surface and corner cracks -----------------------------------------------------------------------
@@ -293,7 +300,7 @@ def test_against_newman_and_raju(corner):
     inner = ~sif.at_surface
     ratio = sif.K_I / wanted
     print(f"\nNewman-Raju: {ratio[inner].min():.3f} to {ratio[inner].max():.3f}")
-    assert inner.sum() >= 0.7 * len(phi)
+    assert inner.sum() >= 0.6 * len(phi)
     assert sif.at_surface[[0, -1]].all()
     assert np.abs(ratio[inner] - 1).max() <= 0.07
     assert np.abs(ratio - 1).max() <= 0.15
@@ -312,7 +319,7 @@ def test_surface_crack_coarse():
 
 
 def small(**options):
-    return fronts.flat_scene(0.2, a=A, stress=MIXED, half=1.0, margin=0.1, depth=0.25, **options)
+    return fronts.flat_scene(0.25, a=A, stress=MIXED, half=1.0, margin=0.1, depth=0.25, **options)
 
 
 def K_of(problem):
@@ -324,43 +331,60 @@ def test_several_load_states_are_equal_to_one_by_one():
     problem, (c, Q) = small()
     S = np.array([[0.0, 0.0, 0.3], [0.0, 0.0, 0.2], [0.3, 0.2, 1.0]])
 
-    def state(sigma):
-        return [xc.displacement("boundary", lambda x: exact.penny((x - c) @ Q.T, A, 1, 0.3, sigma) @ Q)]
+    def state(sigma, sign=1.0):
+        def u(x):
+            return sign * exact.penny((x - c) @ Q.T, A, 1.0, 0.3, sigma) @ Q
+
+        return [xc.displacement("boundary", u)]
 
     tension, shear = np.diag([0, 0, 1.0]), S - np.diag([0, 0, 1.0])
     stresses = (S, tension, shear, -shear)
-    together = xc.stress_intensities(xc.solve(problem, [state(s) for s in stresses]))
-    alone = [xc.stress_intensity(xc.solve(problem, [state(s)])[0]) for s in stresses]
-    for a, b in zip(together, alone, strict=True):
-        assert np.abs(a.K - b.K).max() <= 1e-6 * K_0
+    states = [*map(state, stresses), state(tension, -1.0)]
+    together = xc.stress_intensities(xc.solve(problem, states))
+    for k in (0, 2):
+        alone = xc.stress_intensity(xc.solve(problem, [states[k]])[0])
+        assert np.abs(together[k].K - alone.K).max() <= 1e-6 * K_0
     K = [sif.K for sif in together]
     assert np.abs(K[1] + K[2] - K[0]).max() <= 1e-6 * K_0
     assert np.abs(K[2] + K[3]).max() <= 1e-6 * K_0
+    assert np.abs(K[1] + K[4]).max() <= 1e-6 * K_0  # lips may overlap: contact is off
 
 
 def test_renumbered_nodes_and_cells():
-    problem, _ = small()
+    """To the tolerance of the iteration (round-off with a direct solver)."""
+    problem, _ = small(seed=811)
     mesh, rng = problem.mesh, np.random.default_rng(9071)
     order = rng.permutation(mesh.n_points)
     new_of_old = np.argsort(order)
     sets = {name: new_of_old[facets] for name, facets in mesh.facet_sets.items()}
-    # Corners keep their order within a cell: which diagonal cuts a prism must stay the same.
     cells = new_of_old[mesh.cells][rng.permutation(len(mesh.cells))]
     other = xc.Problem(
         xc.Mesh(mesh.points[order], cells, sets), problem.material, problem.cracks,
         supports=problem.supports, contact="off",
     )  # fmt: skip
-    # Sub-tetrahedra are cut along other diagonals: quadrature, not round-off.
-    assert np.abs(K_of(other) - K_of(problem)).max() <= 2e-3 * K_0
+    assert np.abs(K_of(other) - K_of(problem)).max() <= 1e-6 * K_0
 
 
-def test_turned_scaled_and_in_other_units():
-    """To the tolerance of the iteration; K scales with E at fixed strain, and with root length."""
-    reference = K_of(small()[0])
-    turned = K_of(small(rotation=ROTATION)[0])
-    # Points around the circle start from another axis: the same K along it, elsewhere.
-    assert turned[:, 0].mean() == pytest.approx(reference[:, 0].mean(), rel=1e-3)
-    larger = K_of(small(scale=1000.0)[0])
-    assert np.abs(larger / np.sqrt(1000.0) - reference).max() <= 1e-6 * K_0
-    stiffer = K_of(small(E=210e9)[0])
-    assert np.abs(stiffer - reference).max() <= 1e-6 * K_0
+@cache
+def reference_K():
+    """K of an ellipse with equal axes: its points start from an axis that turns with it."""
+    return K_of(small(b=A, seed=811)[0])
+
+
+@pytest.mark.parametrize(
+    ("scale", "options"),
+    [
+        (1.0, {"rotation": ROTATION}),
+        (1000.0, {}),
+        (1e-3, {"rotation": ROTATION.T}),
+        (1.0, {"E": 210e9}),
+    ],
+    ids=["turned", "millimetres", "turned kilometres", "pascals"],
+)
+def test_turned_scaled_and_in_other_units(scale, options):
+    """To the tolerance of the iteration; K goes with the root of length. No ties: mesh perturbed.
+
+    On a structured mesh round-off decides which cells get the finer rule of quadrature.
+    """
+    other = K_of(small(b=A, seed=811, scale=scale, **options)[0])
+    assert np.abs(other / np.sqrt(scale) - reference_K()).max() <= 1e-6 * K_0
