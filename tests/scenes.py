@@ -165,7 +165,9 @@ def condition(problem):
     from xcrack.solving import build
 
     model = build(problem)
-    basis = scaled_basis(model.space, model.stiffness, model.known.fixed, problem.numerics)
+    basis = scaled_basis(
+        model.space, model.stiffness, model.known.fixed, problem.numerics, problem.material
+    )
     A = sp.csc_matrix(basis.T @ model.stiffness @ basis)
     A = (A + A.T) / 2
     start = np.random.default_rng(70331).standard_normal(A.shape[0])

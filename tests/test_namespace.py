@@ -16,8 +16,8 @@ NAMES = [
     "notched_cylinder", "plate", "plate_with_hole", "point_force", "pressure", "read_mesh",
     "traction", "write_mesh",
     # solution
-    "Solution", "energy_error", "inf_sup", "plan", "plot", "solve", "stress_intensity", "write",
-    "SIF", "stress_intensities",
+    "Solution", "chart", "energy_error", "inf_sup", "plan", "plot", "solve", "stress_intensity",
+    "write", "SIF", "stress_intensities",
     # growth
     "Cycle", "History", "Step", "collect", "elber", "equivalent_K", "grow", "max_hoop_stress",
     "mean_reference", "paris", "resume", "walker", "weighted_angle",

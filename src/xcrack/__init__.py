@@ -58,6 +58,7 @@ _HOME = {
     "plot": "plotting",
     "inf_sup": "infsup",
     "plan": "planning",
+    "chart": "charting",
     "XcrackError": "errors",
     "XcrackWarning": "errors",
     "MeshError": "errors",

@@ -61,7 +61,7 @@ def inf_sup(problem: Problem, crack: int = 0, *, norm: str = "h1") -> float:
         # A small mass makes the rigid motions regular without a support.
         A = A + 1e-8 * sp.diags(A.diagonal())
         B = gap_rows(chosen, lips, model.jumps[crack])
-        basis = scaled_basis(space, sp.csr_matrix(A), fixed, problem.numerics)
+        basis = scaled_basis(space, sp.csr_matrix(A), fixed, problem.numerics, problem.material)
     L, d = space.mesh.extent, space.dim
     h = leg_size(space.mesh, np.unique(lips.cell.ravel())) / L
     gram = (chosen.values.T @ sp.diags(lips.weight) @ chosen.values).toarray() / L ** (d - 1)

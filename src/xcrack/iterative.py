@@ -17,8 +17,10 @@ from xcrack.assembly import Bulk
 from xcrack.basis import Blocks, node_blocks, orthonormal, restricted
 from xcrack.errors import ProblemError
 from xcrack.hierarchy import Bordered, Hierarchy, extended, hierarchy, row_blocks
+from xcrack.material import Isotropic
 from xcrack.projected import TOLERANCE, Operator, Pressed, conjugate_gradients, projected
 from xcrack.space import Space
+from xcrack.vectorial import mode_columns
 
 _LEAST_SHARE = 1e-4  # of the load, to which forces are resolved; round-off forbids much less
 
@@ -190,6 +192,7 @@ def iterative_system(
     fixed: Bools,
     levels: Hierarchy | None = None,
     modes: Floats | None = None,
+    vectorial: Isotropic | None = None,
 ) -> IterativeSystem:
     """Change the basis and put the enriched matrix on top of the levels of the uncracked body.
 
@@ -206,6 +209,8 @@ def iterative_system(
         Of an earlier crack in the same mesh; made anew where it does not fit.
     modes : (n_dof, k) array, optional
         Rigid motions that nothing prevents; loads have to be in balance with them.
+    vectorial : Isotropic, optional
+        The material where the tip basis is vectorial.
 
     Raises
     ------
@@ -223,8 +228,11 @@ def iterative_system(
     free = ~fixed
     d = space.dim
     plain = (levels.nodes[:, None] * d + np.arange(d)).ravel()
-    blocks = restricted(node_blocks(space, "node"), free)
-    enriched, starts = _enriched_basis(space, K, blocks, levels)
+    combined, in_use = None, free
+    if vectorial is not None and space.tips:
+        combined, in_use = mode_columns(space, vectorial, free)
+    blocks = restricted(node_blocks(space, "node"), in_use)
+    enriched, starts = _enriched_basis(space, K, blocks, levels, combined)
     stored, diagonal = _reduced(levels, K, plain, enriched, starts)
     identity = sp.csr_matrix(
         (levels.free.astype(float), (plain, np.arange(len(plain)))),
@@ -239,7 +247,11 @@ def iterative_system(
 
 
 def _enriched_basis(
-    space: Space, K: sp.csr_matrix, blocks: Blocks, levels: Hierarchy
+    space: Space,
+    K: sp.csr_matrix,
+    blocks: Blocks,
+    levels: Hierarchy,
+    combined: sp.csr_matrix | None,
 ) -> tuple[sp.csc_matrix, Ints]:
     """Orthonormal enriched columns, node by node, and the first column of each node.
 
@@ -247,6 +259,8 @@ def _enriched_basis(
     then weighs both alike.
     """
     first = space.n_nodes * space.dim
+    if combined is not None:
+        K = sp.csr_matrix(combined.T @ K @ combined)
     Z = sp.csc_matrix(orthonormal(K, blocks, np.arange(first, space.n_dof))[:, first:])
     owner = np.repeat(np.arange(len(blocks.n_standard)), np.diff(blocks.offsets))
     block_of = np.full(space.n_dof, -1, dtype=np.int64)
@@ -255,6 +269,7 @@ def _enriched_basis(
     order = np.argsort(node, kind="stable")
     size = np.sqrt(levels.diagonal.mean())
     Z = sp.csc_matrix(Z[:, order] * size)
+    Z = Z if combined is None else sp.csc_matrix(combined @ Z)
     node = node[order]
     return Z, np.nonzero(np.concatenate([[True], node[1:] != node[:-1]]))[0] if len(node) else node
 

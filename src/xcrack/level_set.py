@@ -77,11 +77,20 @@ def level_set(mesh: Mesh, crack: Crack) -> LevelSet:
         if end not in (crack.tips or ()):
             beyond = segment == ray
             mouth[beyond] = np.linalg.norm(mesh.points[beyond] - crack.points[end], axis=1)
-    near = near_edges(mesh, phi)
+    return tied_to_tips(mesh, crack, phi, psi, mouth, near_edges(mesh, phi))
+
+
+def tied_to_tips(
+    mesh: Mesh, crack: Crack, phi: Floats, psi: Floats, mouth: Floats, near: Bools
+) -> LevelSet:
+    """Level sets of a placed crack in the plane from values at the points, which are changed.
+
+    Around a tip they become those of its frame, so that the tip stays where it is even when the
+    last kink is less than a cell away.
+    """
+    x, frame = front(crack)
     tip_cells = tuple(_cells_at(mesh, point) for point in x)
     for k, cells in enumerate(tip_cells):
-        # Around a tip the level sets are those of its frame, so that the tip stays where it is
-        # even when the last kink is less than a cell away.
         nodes = np.unique(mesh.cells[cells])
         local = mesh.points[nodes] - x[k]
         phi[nodes] = local @ frame[k, 1]

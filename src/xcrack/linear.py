@@ -11,8 +11,10 @@ import scipy.sparse.linalg as sla
 from xcrack.arrays import Bools, Floats
 from xcrack.basis import node_blocks, orthonormal, patch_orthogonal, restricted
 from xcrack.errors import ConvergenceError, ProblemError
+from xcrack.material import Isotropic
 from xcrack.numerics import Numerics
 from xcrack.space import Space
+from xcrack.vectorial import mode_columns
 
 Solve = Callable[[Floats], Floats]
 Solver = Callable[[sp.csc_matrix], Solve]
@@ -89,25 +91,42 @@ class System:
 
 
 def system(
-    space: Space, K: sp.csr_matrix, fixed: Bools, numerics: Numerics, solver: Solver | None = None
+    space: Space,
+    K: sp.csr_matrix,
+    fixed: Bools,
+    numerics: Numerics,
+    solver: Solver | None = None,
+    material: Isotropic | None = None,
 ) -> System:
     """Eliminate known unknowns, change the basis, scale by the diagonal and factor."""
-    basis = scaled_basis(space, K, fixed, numerics)
+    basis = scaled_basis(space, K, fixed, numerics, material)
     reduced = sp.csc_matrix(basis.T @ K @ basis)
     apply_inverse = (solver or superlu)(reduced)
     return System(K, ~fixed, basis, reduced, apply_inverse, Count(factorisations=1))
 
 
-def scaled_basis(space: Space, K: sp.csr_matrix, fixed: Bools, numerics: Numerics) -> sp.csr_matrix:
-    """Columns of the solver's basis in the basis of the space `(n_dof, k)`."""
+def scaled_basis(
+    space: Space,
+    K: sp.csr_matrix,
+    fixed: Bools,
+    numerics: Numerics,
+    material: Isotropic | None = None,
+) -> sp.csr_matrix:
+    """Columns of the solver's basis in the basis of the space `(n_dof, k)`.
+
+    The material counts for the vectorial tip basis alone.
+    """
     free = ~fixed
     n = space.n_dof
     first = space.n_nodes * space.dim
-    unknowns = np.nonzero(free)[0]
     basis = sp.identity(n, format="csr")
-    if numerics.patch and space.tips:
-        basis = patch_orthogonal(space, K, free)
+    if numerics.tip_basis == "vectorial" and space.tips:
+        basis, free = mode_columns(space, material, free)
         K = sp.csr_matrix(basis.T @ K @ basis)
+    if numerics.patch and space.tips:
+        patch = patch_orthogonal(space, K, free)
+        basis, K = sp.csr_matrix(basis @ patch), sp.csr_matrix(patch.T @ K @ patch)
+    unknowns = np.nonzero(free)[0]
     if numerics.orthonormal != "none" and n > first:
         blocks = restricted(node_blocks(space, numerics.orthonormal), free)
         Z = orthonormal(K, blocks, np.arange(first, n))

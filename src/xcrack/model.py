@@ -7,10 +7,13 @@ from typing import Any
 from xcrack.assembly import Bulk, bulk, enriched_stiffness, total_stiffness
 from xcrack.crack import Crack
 from xcrack.cut import cut
+from xcrack.errors import ProblemError
 from xcrack.level_set import LevelSet, level_set
 from xcrack.lip_points import LipPoints, lip_points
 from xcrack.mesh import Mesh
 from xcrack.multipliers import jump_matrix
+from xcrack.nodal_update import nodal_level_set
+from xcrack.numerics import Numerics
 from xcrack.problem import Problem
 from xcrack.space import Space, space
 from xcrack.supports import Known, known_unknowns
@@ -50,7 +53,7 @@ def build(problem: Problem, bulk_: Bulk | None = None) -> Model:
     """Cut, number, integrate and assemble a problem, without solving it."""
     mesh, order = problem.mesh, problem.order or 1
     cracks = problem.placed
-    cuts = tuple(cut(mesh, levels(mesh, crack, problem.numerics.radius)) for crack in cracks)
+    cuts = tuple(cut(mesh, levels(mesh, crack, problem.numerics)) for crack in cracks)
     space_ = space(mesh, order, cracks, cuts, problem.numerics)
     lips = tuple(lip_points(space_, c) for c in range(len(cracks)))
     if (
@@ -71,8 +74,13 @@ def build(problem: Problem, bulk_: Bulk | None = None) -> Model:
     )
 
 
-def levels(mesh: Mesh, crack: Crack, radius: float | None) -> LevelSet:
+def levels(mesh: Mesh, crack: Crack, numerics: Numerics) -> LevelSet:
     """Level sets of a placed crack; in space up to where its functions may reach."""
+    nodal = numerics.update == "nodal"
     if mesh.dim == 2:
-        return level_set(mesh, crack)
-    return surface_levels(mesh, crack, front_reach(mesh, crack, radius))
+        return nodal_level_set(mesh, crack) if nodal else level_set(mesh, crack)
+    if nodal:
+        raise ProblemError(
+            'Numerics(update="nodal") is for the plane only: leave it out for a crack in space.'
+        )
+    return surface_levels(mesh, crack, front_reach(mesh, crack, numerics.radius))

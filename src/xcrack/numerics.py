@@ -21,9 +21,28 @@ class Numerics:
         another front, from 2.6 to 3.6 cells.
     functions : {4, 2}
         Tip functions; two (those of the modes' leading angular terms) cost accuracy.
+    tip_basis : {"scalar", "vectorial"}
+        Unknowns of a point with tip functions. Scalar: one for each function and component.
+        Vectorial: one a mode, two in the plane and three in space, the leading fields of K_I to
+        K_III; fewer unknowns, but nothing beside the modes. For comparison.
+    update : {"explicit", "nodal"}
+        Where the level sets of a crack in the plane come from. Explicit: distances to its
+        polyline. Nodal: kept at the nodes and changed by the frame of each advance (after Duflot,
+        2007); for comparison only, it loses cracks that turn by more than about 120 degrees.
     multipliers : {"reduced", "naive"}
         Space of the contact multipliers. Reduced: inf-sup stable for any cut. Naive: one unknown
         for each node, for comparison only; it oscillates.
+    lips : {"multipliers", "penalty", "augmented", "nitsche"}
+        What keeps the lips apart. The others are opponents of the multipliers, for comparison, and
+        need a factorisation. Penalty: a spring at each lip point that overlaps. Augmented: an
+        augmented Lagrangian, whose multipliers live in the space that `multipliers` names and are
+        updated until they stay. Nitsche: the stress of the lips in the place of multipliers, with
+        a penalty that keeps it stable (symmetric).
+    penalty : float, optional
+        Stiffness of the springs per area of lip, as a factor of E over the size of a cell. None:
+        100 (penalty), 10 (augmented), 40 (nitsche). The overlap of a penalty falls with it, and
+        the pressure starts to oscillate; an augmented Lagrangian takes fewer updates; Nitsche is
+        unstable below a bound that depends on order and cells.
     consistent : bool
         Correct the gradients of the tip functions so that linear stress fields pass the patch
         test to round-off whatever the quadrature (variationally consistent integration). In space
@@ -59,7 +78,11 @@ class Numerics:
     enrichment: str = "geometric"
     radius: float | None = None
     functions: int = 4
+    tip_basis: str = "scalar"
+    update: str = "explicit"
     multipliers: str = "reduced"
+    lips: str = "multipliers"
+    penalty: float | None = None
     consistent: bool = True
     orthonormal: str = "star"
     patch: bool = False
@@ -72,7 +95,10 @@ class Numerics:
         choices: dict[str, tuple[object, ...]] = {
             "enrichment": ("geometric", "topological"),
             "functions": (4, 2),
+            "tip_basis": ("scalar", "vectorial"),
+            "update": ("explicit", "nodal"),
             "multipliers": ("reduced", "naive"),
+            "lips": ("multipliers", "penalty", "augmented", "nitsche"),
             "orthonormal": ("star", "node", "none"),
             "linear": ("auto", "direct", "iterative"),
             "initial_set": ("closed", "open"),
@@ -81,9 +107,21 @@ class Numerics:
             if getattr(self, name) not in allowed:
                 words = " or ".join(repr(a) for a in allowed)
                 raise ProblemError(f"Numerics({name}={getattr(self, name)!r}): give {words}.")
+        if self.tip_basis == "vectorial" and self.functions != 4:
+            raise ProblemError(
+                'Numerics(tip_basis="vectorial") combines all four tip functions: leave '
+                f"functions = {self.functions} out."
+            )
         for name in ("radius", "domain"):
             value = getattr(self, name)
             if value is not None and not (value > 0 and value < float("inf")):
                 raise ProblemError(f"Numerics({name}={value}): a length must be positive.")
+        if self.penalty is not None and not 0 < self.penalty < float("inf"):
+            raise ProblemError(f"Numerics(penalty={self.penalty}): a stiffness must be positive.")
+        if self.lips != "multipliers" and self.linear == "iterative":
+            raise ProblemError(
+                f'Numerics(lips="{self.lips}", linear="iterative"): conjugate gradients know '
+                'multipliers only; give linear="direct", or leave lips out.'
+            )
         if not 2 <= self.points <= 32:
             raise ProblemError(f"Numerics(points={self.points}): give 2 to 32 points a direction.")

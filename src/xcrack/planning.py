@@ -4,6 +4,12 @@ from dataclasses import dataclass
 
 from xcrack.problem import Problem
 
+LIPS = {
+    "penalty": "a penalty",
+    "augmented": "an augmented Lagrangian",
+    "nitsche": "Nitsche's method",
+}
+
 
 @dataclass(frozen=True)
 class Ingredient:
@@ -37,7 +43,8 @@ class Report:
     ----------
     ingredients : tuple of Ingredient
     operations : dict
-        Factorisations, solves, assembled cells, integration points, multipliers.
+        Unknowns solved for, factorisations, solves, assembled cells, integration points,
+        multipliers.
     """
 
     ingredients: tuple[Ingredient, ...]
@@ -115,12 +122,14 @@ def _tips(problem: Problem, n_tips: list[int]) -> Ingredient:
         return Ingredient("tip functions", False, "no cracks")
     if not sum(n_tips):
         return Ingredient("tip functions", False, "every crack cuts through: there is no tip")
-    n = problem.numerics.functions
+    what_each = f"{problem.numerics.functions} functions"
+    if problem.numerics.tip_basis == "vectorial":
+        what_each = f"modes I to {'II' if problem.mesh.dim == 2 else 'III'} only"
     reach = (
         "within a fixed radius" if problem.numerics.enrichment == "geometric" else "tip cells only"
     )
     what = "tip(s)" if problem.mesh.dim == 2 else "front(s)"
-    return Ingredient("tip functions", True, f"{sum(n_tips)} {what}, {n} functions, {reach}")
+    return Ingredient("tip functions", True, f"{sum(n_tips)} {what}, {what_each}, {reach}")
 
 
 def _multipliers(problem: Problem) -> list[Ingredient]:
@@ -130,6 +139,8 @@ def _multipliers(problem: Problem) -> list[Ingredient]:
         "auto": (False, "none until the lips of the open solution overlap"),
     }
     used, reason = reasons[problem.contact]
+    if used and problem.numerics.lips in LIPS:
+        reason += f"; held by {LIPS[problem.numerics.lips]}"
     return [
         Ingredient(f"multipliers of crack {c}", used, reason) for c in range(len(problem.cracks))
     ]

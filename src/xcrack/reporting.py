@@ -1,5 +1,6 @@
 """What was modelled, what was left out and why, after a solve."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -9,7 +10,8 @@ from xcrack.equilibrium import Motion
 from xcrack.iterative import IterativeSystem
 from xcrack.linear import System
 from xcrack.model import Model
-from xcrack.planning import Ingredient, Report, plan
+from xcrack.multipliers import Multipliers
+from xcrack.planning import LIPS, Ingredient, Report, plan
 from xcrack.problem import Problem
 from xcrack.touching import Pressed
 
@@ -40,7 +42,10 @@ def report(
     d = model.space.dim
     rows = []
     n_heaviside = sum(int((h >= 0).sum()) for h in model.space.heaviside) * d
-    n_tip = sum(int((t.point_to_function >= 0).sum()) * t.functions for t in model.space.tips) * d
+    modes = problem.numerics.tip_basis == "vectorial"
+    each = [d if modes else d * tip.functions for tip in model.space.tips]
+    n_points = [int((tip.point_to_function >= 0).sum()) for tip in model.space.tips]
+    n_tip = sum(n * k for n, k in zip(n_points, each, strict=True))
     for row in plan(problem).ingredients:
         if row.name == "Heaviside functions":
             row = replace(row, unknowns=n_heaviside)
@@ -65,24 +70,28 @@ def report(
     )
     for c, (given, placed) in enumerate(zip(problem.cracks, problem.placed, strict=True)):
         if not given.placed and not np.array_equal(given.points, placed.points):
-            rows.append(Ingredient(f"mouths of crack {c}", True, _mouths(placed)))
+            rows.append(Ingredient(f"mouths of crack {c}", True, _mouths(given, placed)))
     if isinstance(engine, IterativeSystem):
         rows.append(Ingredient("linear solver", True, "conjugate gradients: a large body in space"))
     operations = {
+        "unknowns": engine.basis.shape[1],
         "factorisations": engine.count.factorisations,
         "solves": engine.count.solves,
         **({"iterations": engine.count.iterations} if isinstance(engine, IterativeSystem) else {}),
         "assembled_cells": len(model.space.enriched),
         "integration_points": model.n_points,
-        "multipliers": sum(len(m.measure) for m in found.spaces if m is not None),
+        "multipliers": _n_multipliers(problem, found.spaces),
         "contact_iterations": found.iterations,
     }
     return Report(tuple(rows), operations)
 
 
-def _mouths(placed: Crack) -> str:
+def _mouths(given: Crack, placed: Crack) -> str:
     if placed.dim == 3:
-        return "sides refined to the size of the cells, prolonged to the outside where open"
+        words = "sides refined to the size of the cells, prolonged to the outside where open"
+        kept = {tuple(x) for x in placed.points.tolist()}
+        lost = sum(tuple(x) not in kept for x in given.points.tolist())
+        return words + (f"; {lost} corner(s) of fronts rounded to two cells" if lost else "")
     return f"{2 - placed.n_tips}, prolonged to one cell outside"
 
 
@@ -91,7 +100,16 @@ def _multiplier_row(problem: Problem, found: Pressed, c: int) -> Ingredient:
     m = found.spaces[c]
     if m is not None:
         why = "contact is switched on" if problem.contact == "on" else "the open lips overlap"
-        return Ingredient(name, True, why, unknowns=len(m.measure))
+        if problem.numerics.lips != "multipliers":
+            why += f"; held by {LIPS[problem.numerics.lips]}"
+        return Ingredient(name, True, why, unknowns=_n_multipliers(problem, [m]))
     if problem.contact == "off":
         return Ingredient(name, False, "contact is switched off: lips may overlap")
     return Ingredient(name, False, "the lips stay apart in every load state")
+
+
+def _n_multipliers(problem: Problem, spaces: Sequence[Multipliers | None]) -> int:
+    """Unknowns of the lips: a penalty and Nitsche's method have none."""
+    if problem.numerics.lips in ("penalty", "nitsche"):
+        return 0
+    return sum(len(m.measure) for m in spaces if m is not None)

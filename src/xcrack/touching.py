@@ -8,9 +8,12 @@ import numpy as np
 import scipy.sparse as sp
 
 from xcrack.arrays import Bools, Floats, lock
+from xcrack.conditions import Load
 from xcrack.contact import active_set
+from xcrack.errors import ProblemError
 from xcrack.iterative import IterativeSystem
 from xcrack.linear import System
+from xcrack.lips_opponents import Held, held_lips, lip_space
 from xcrack.model import Model
 from xcrack.multipliers import Multipliers, gap_rows, multipliers
 from xcrack.problem import Problem
@@ -54,6 +57,7 @@ def contact(
     known: Floats,
     u: Floats,
     warm: Warm | None,
+    acting: Sequence[tuple[tuple[Load, ...], float]] | None = None,
 ) -> Pressed:
     """Give multipliers to cracks whose lips overlap, until none does.
 
@@ -68,6 +72,13 @@ def contact(
         Solution without contact.
     warm : Warm, optional
         Of an earlier step.
+    acting : sequence of (loads, factor), optional
+        Loads of each state and their scale, for Nitsche's method: what acts on the lips besides.
+
+    Raises
+    ------
+    ProblemError
+        Lips held otherwise than by multipliers, with an iterative solver.
     """
     n = len(model.lips)
     spaces: list[Multipliers | None] = [None] * n
@@ -78,40 +89,70 @@ def contact(
     pending = _needing(problem, model, u, spaces)
     while pending:
         for c in pending:
-            spaces[c] = _multipliers(problem, model, c)
+            spaces[c] = lip_space(problem, model, c)
         chosen = [m for m in spaces if m is not None]
-        rows = [gap_rows(m, model.lips[m.crack], model.jumps[m.crack]) for m in chosen]
-        N = rows[0] if len(rows) == 1 else _stacked(rows)
-        measure = np.concatenate([m.measure for m in chosen])
-        states = range(u.shape[1])
-        stiffness = problem.material.E / _lip_size(model, chosen)
-        if isinstance(engine, IterativeSystem):
-            # Without an earlier set the overlap of the open lips is the best guess.
-            guess = [None if warm is None else _start(problem, chosen, warm, k) for k in states]
-            sets: list[Any] = engine.contact(N, f, known, measure, stiffness, guess, u)
-            u = np.stack([s.u for s in sets], axis=1)
-            lam = np.stack([s.pressure for s in sets], axis=1)
+        if problem.numerics.lips == "multipliers":
+            held = _by_multipliers(problem, model, engine, chosen, f, known, (u, open_u), warm)
         else:
-            F = dual(engine, N)
-            d = N @ open_u
-            sets = [
-                active_set(F, d[:, k], measure, stiffness, _start(problem, chosen, warm, k))
-                for k in states
-            ]
-            lam = np.stack([s.pressure for s in sets], axis=1)
-            u = engine.solve(f + N.T @ lam, known)
-        iterations = max(s.iterations for s in sets)
+            start = [_start(problem, chosen, warm, k) for k in range(u.shape[1])]
+            factored = _factored(engine, problem.numerics.lips)
+            held = held_lips(problem, model, factored, chosen, f, known, start, acting)
+        u, iterations = held.u, held.iterations
         first = 0
         for m in chosen:
             last = first + len(m.measure)
-            pressure[m.crack] = lam[first:last]
-            active[m.crack] = np.stack([s.active[first:last] for s in sets])
+            pressure[m.crack] = held.pressure[first:last]
+            active[m.crack] = held.active[:, first:last]
             first = last
         pending = _needing(problem, model, u, spaces)
     centre = tuple(None if m is None else m.centre for m in spaces)
     return Pressed(
         u, tuple(spaces), tuple(pressure), tuple(active), Warm(centre, tuple(active)), iterations
     )
+
+
+def _by_multipliers(
+    problem: Problem,
+    model: Model,
+    engine: System | IterativeSystem,
+    chosen: list[Multipliers],
+    f: Floats,
+    known: Floats,
+    guess: tuple[Floats, Floats],
+    warm: Warm | None,
+) -> Held:
+    """Pressures of all load states by multipliers; `guess` is the last u and that of open lips."""
+    u, open_u = guess
+    rows = [gap_rows(m, model.lips[m.crack], model.jumps[m.crack]) for m in chosen]
+    N = rows[0] if len(rows) == 1 else _stacked(rows)
+    measure = np.concatenate([m.measure for m in chosen])
+    states = range(u.shape[1])
+    stiffness = problem.material.E / _lip_size(model, chosen)
+    if isinstance(engine, IterativeSystem):
+        # Without an earlier set the overlap of the open lips is the best guess.
+        first = [None if warm is None else _start(problem, chosen, warm, k) for k in states]
+        sets: list[Any] = engine.contact(N, f, known, measure, stiffness, first, u)
+        u = np.stack([s.u for s in sets], axis=1)
+        lam = np.stack([s.pressure for s in sets], axis=1)
+    else:
+        F = dual(engine, N)
+        d = N @ open_u
+        sets = [
+            active_set(F, d[:, k], measure, stiffness, _start(problem, chosen, warm, k))
+            for k in states
+        ]
+        lam = np.stack([s.pressure for s in sets], axis=1)
+        u = engine.solve(f + N.T @ lam, known)
+    return Held(u, lam, np.stack([s.active for s in sets]), max(s.iterations for s in sets))
+
+
+def _factored(engine: System | IterativeSystem, method: str) -> System:
+    if isinstance(engine, IterativeSystem):
+        raise ProblemError(
+            f'Numerics(lips="{method}") needs a factorisation: give Numerics(linear="direct") '
+            'with it, or take lips="multipliers".'
+        )
+    return engine
 
 
 def _needing(

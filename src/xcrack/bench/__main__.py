@@ -1,0 +1,101 @@
+"""`python -m xcrack.bench [--quick] [scene ...]`: measure, keep, draw and say who is ahead."""
+
+import argparse
+import os
+import sys
+from pathlib import Path
+from typing import Any
+
+_WANTED = {
+    "edge": ("K", (1e-3, 2e-4, 1e-4, 1e-5)),
+    "half_closed": ("K_I", (1e-3, 2e-4)),
+    "closed": ("K_II", (1e-4,)),
+    "growth": ("tip", (1e-2, 5e-3)),
+    "penny": ("K_I", (3e-2, 1e-2, 3e-3)),
+    "penny_closed": ("K_II, K_III", (3e-2,)),
+}
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run scenes of the chart.
+
+    Parameters
+    ----------
+    arguments : list of str, optional
+        Those of the command line where they are left out.
+
+    Returns
+    -------
+    int
+        0; argparse ends the process on options that do not exist.
+    """
+    # One thread a solve, as in a growth run beside others; set before numpy is loaded.
+    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+        os.environ.setdefault(name, "1")
+    from xcrack.bench import charts, conforming, runs, suites
+
+    parser = argparse.ArgumentParser(prog="python -m xcrack.bench", description=__doc__)
+    parser.add_argument("scenes", nargs="*", help=f"of {', '.join(suites.names(False))}")
+    parser.add_argument("--quick", action="store_true", help="few points, under a minute")
+    parser.add_argument("--repeats", type=int, default=None, help="rounds that count (3)")
+    parser.add_argument("--draw", action="store_true", help="only draw what --out holds")
+    parser.add_argument("--out", type=Path, default=Path("out/bench/results"))
+    parser.add_argument("--figures", type=Path, default=Path("out/bench/figures"))
+    asked = parser.parse_args(arguments)
+    unknown = set(asked.scenes) - set(suites.names(False))
+    if unknown:
+        parser.error(f"no scene {', '.join(sorted(unknown))}: of {', '.join(suites.names(False))}")
+    if conforming.missing():
+        print(conforming.missing(), file=sys.stderr)
+    for scene in asked.scenes or suites.names(asked.quick):
+        if asked.draw:
+            record = _read(asked.out / f"{scene}.json")
+        else:
+            before = runs.machine()
+            repeats = asked.repeats or 3
+            rows = runs.measure(
+                suites.cases(scene, asked.quick), repeats, lambda text: print(text, file=sys.stderr)
+            )
+            after = runs.machine()
+            busiest = max(before, after, key=lambda m: m["load"][:1])
+            record = {
+                "scene": scene, "quick": asked.quick, "clock": runs.clock(busiest),
+                "repeats": repeats, "machine": busiest, "rows": rows,
+            }  # fmt: skip
+            runs.keep(asked.out, scene, record)
+        _tell(record)
+        for path in charts.draw(record, asked.figures):
+            print(f"  {path}")
+    return 0
+
+
+def _read(path: Path) -> dict[str, Any]:
+    import json
+
+    found: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+    return found
+
+
+def _tell(record: dict[str, Any]) -> None:
+    """A table of ratios: the default settings against the rest."""
+    from xcrack.bench.pareto import behind
+
+    rows, clock = record["rows"], record["clock"]
+    name, wanted = _WANTED[record["scene"]]
+    print(f"{record['scene']}: time of the default settings ({clock}) over that of others")
+    for error in wanted:
+        words = []
+        for kinds in (("setting",), ("mesh",), ("opponent",)):
+            ratio, ahead = behind(rows, name, clock, kinds, error)
+            if ahead:
+                words.append(f"{ratio:.2f} of {ahead}")
+        print(f"  {name} to {error:g}: {'; '.join(words) or 'no other reaches it'}")
+    off = {r["size"]: r for r in rows if r["kind"] == "off"}
+    pairs = [(r, off[r["size"]]) for r in rows if r["kind"] == "default" and r["size"] in off]
+    if pairs:
+        costs = [f"{a[clock] / b[clock]:.2f} at {a['unknowns']}" for a, b in pairs]
+        print(f"  contact over none: {', '.join(costs)} unknowns")
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,148 @@
+"""The opponent in space: a penny in a mesh of quadratic tetrahedra that follows its front.
+
+As in the plane: gmsh grades towards the front, middle nodes next to it lie at the quarter points
+and those on it on the circle. K_I is the mean over the front, from the energy that a radial
+extension of the penny releases (a domain integral).
+"""
+
+from typing import Any
+
+import numpy as np
+
+from xcrack.arrays import Bools, Floats, Ints
+from xcrack.bench.conforming import Grading
+from xcrack.bench.fields import E_PRIME, LAMBDA, MU, penny_K_I
+from xcrack.bench.fields import penny as exact
+from xcrack.bench.scenes import PENNY, Outcome
+from xcrack.gmsh_session import session
+
+_REACH = 0.35  # of the weight, from the front
+
+
+def penny(grading: Grading, seed: int) -> Outcome:
+    """Mean K_I of the open penny in [-1, 1]³ under tension, exact displacements on the sides.
+
+    Parameters
+    ----------
+    grading : Grading
+        By the distance to the front.
+    seed : int
+        Changes the coarse cells by some per cent.
+    """
+    import skfem
+    from skfem.models.elasticity import linear_elasticity
+
+    far = grading.far / (1 + 0.03 * seed)
+    points, cells, front = cracked_cube(Grading(grading.near, grading.growth, far))
+    mesh = curved(points, cells, front)
+    basis = skfem.Basis(mesh, skfem.ElementVector(skfem.ElementTetP2()), intorder=4)
+    K = linear_elasticity(LAMBDA, MU).assemble(basis)
+    x = basis.doflocs
+    held = np.nonzero((np.abs(x) > 1 - 1e-9).any(axis=0))[0]
+    u = basis.zeros()
+    u[held] = exact(PENNY, 1.0)(x[:, held].T)[np.arange(len(held)), held % 3]
+    u = solved(K, u, held, x[:, ::3].T)
+    error = abs(_mean_K(basis, u) / penny_K_I(PENNY, 1.0) - 1)
+    return Outcome({"K_I": error}, int(basis.N))
+
+
+def cracked_cube(grading: Grading) -> tuple[Floats, Ints, Bools]:
+    """Points, tetrahedra and which points lie on the front; the lips of the penny are apart."""
+    with session() as gmsh:
+        box = gmsh.model.occ.addBox(-1, -1, -1, 2, 2, 2)
+        disk = gmsh.model.occ.addDisk(0, 0, 0, PENNY, PENNY)
+        _, pieces = gmsh.model.occ.fragment([(3, box)], [(2, disk)])
+        gmsh.model.occ.synchronize()
+        field = gmsh.model.mesh.field
+        number = field.add("MathEval")
+        distance = f"Sqrt((Sqrt(x^2+y^2)-{PENNY!r})^2+z^2)"
+        text = f"Min({grading.far!r}, Max({grading.near!r}, {grading.growth!r}*{distance}))"
+        field.setString(number, "F", text)
+        field.setAsBackgroundMesh(number)
+        gmsh.model.mesh.generate(3)
+        tags, flat, _ = gmsh.model.mesh.getNodes()
+        _, _, nodes = gmsh.model.mesh.getElements(3)
+        lips = [gmsh.model.mesh.getNodes(2, tag, True, False)[0] for _, tag in pieces[1]]
+    index = np.full(int(tags.max()) + 1, -1)
+    index[tags] = np.arange(len(tags))
+    points = flat.reshape(-1, 3)
+    cells = index[nodes[0].astype(np.int64)].reshape(-1, 4)
+    on_lips = index[np.unique(np.concatenate(lips)).astype(np.int64)]
+    r = np.hypot(points[on_lips, 0], points[on_lips, 1])
+    front = np.zeros(len(points), dtype=bool)
+    front[on_lips[r > PENNY * (1 - 1e-6)]] = True
+    twice = on_lips[r <= PENNY * (1 - 1e-6)]
+    copy = np.full(len(points), -1)
+    copy[twice] = len(points) + np.arange(len(twice))
+    below = np.nonzero(points[cells].mean(axis=1)[:, 2] < 0)[0]
+    cells[below] = np.where(copy[cells[below]] >= 0, copy[cells[below]], cells[below])
+    return (
+        np.concatenate([points, points[twice]]),
+        cells,
+        np.concatenate([front, np.zeros(len(twice), dtype=bool)]),
+    )
+
+
+def curved(points: Floats, cells: Ints, front: Bools) -> Any:
+    """Quadratic tetrahedra: middle nodes at the quarter points beside the front, on it round."""
+    import skfem
+
+    mesh = skfem.MeshTet(np.ascontiguousarray(points.T), np.ascontiguousarray(cells.T))
+    straight = skfem.MeshTet2.from_mesh(mesh)
+    x = straight.doflocs.copy()
+    edge = mesh.edges
+    count = front[edge].sum(axis=0)
+    middle = straight.dofs.edge_dofs[0]
+    at = np.where(front[edge[0]], edge[0], edge[1])
+    other = np.where(front[edge[0]], edge[1], edge[0])
+    one = count == 1
+    x[:, middle[one]] = 0.75 * mesh.p[:, at[one]] + 0.25 * mesh.p[:, other[one]]
+    two = count == 2
+    chord = mesh.p[:, edge[:, two]].mean(axis=1)
+    # Only edges between neighbours on the front; a longer chord would be bent through cells.
+    x[:2, middle[two]] = chord[:2] * PENNY / np.hypot(chord[0], chord[1])
+    return skfem.MeshTet2(x, straight.t, sort_t=False)
+
+
+def solved(K: Any, u: Floats, held: Ints, points: Floats) -> Floats:
+    """Displacements by conjugate gradients with smoothed aggregation that knows rigid motion."""
+    from pyamg import smoothed_aggregation_solver
+
+    free = np.setdiff1d(np.arange(len(u)), held)
+    rows = K[free]
+    A = rows[:, free].tobsr(blocksize=(3, 3))
+    rigid = np.zeros((len(u), 6))
+    for i in range(3):
+        rigid[i::3, i] = 1
+        j, k = (i + 1) % 3, (i + 2) % 3
+        rigid[j::3, 3 + i], rigid[k::3, 3 + i] = -points[:, k], points[:, j]
+    hierarchy = smoothed_aggregation_solver(A, B=rigid[free], strength=("symmetric", {"theta": 0}))
+    found = hierarchy.solve(-(rows @ u), tol=1e-8, accel="cg", maxiter=300)
+    u[free] = found
+    return u
+
+
+def _mean_K(basis: Any, u: Floats) -> float:
+    """Mean K_I from G = int (sigma_ij u_i,k - W delta_jk) V_k,j / length, V = q e_r."""
+    x = np.asarray(basis.default_parameters()["x"]).reshape(3, -1)
+    gradient = np.moveaxis(np.asarray(basis.interpolate(u).grad).reshape(3, 3, -1), -1, 0)
+    weight = np.asarray(basis.dx).ravel()
+    r = np.hypot(x[0], x[1])
+    s = np.hypot(r - PENNY, x[2])
+    near = np.nonzero(s < _REACH)[0]
+    x, gradient, weight, r, s = x[:, near], gradient[near], weight[near], r[near], s[near]
+    strain = (gradient + np.swapaxes(gradient, 1, 2)) / 2
+    trace = np.trace(strain, axis1=1, axis2=2)[:, None, None]
+    sigma = 2 * MU * strain + LAMBDA * trace * np.eye(3)
+    energy = np.einsum("qij,qij->q", sigma, strain) / 2
+    t = s / _REACH
+    q = 1 - t**3 * (10 - 15 * t + 6 * t**2)
+    slope = -30 * t**2 * (1 - t) ** 2 / _REACH / np.maximum(s, 1e-300)
+    outward = np.stack([x[0] / r, x[1] / r, 0 * r], axis=1)
+    around = np.stack([-outward[:, 1], outward[:, 0], 0 * r], axis=1)
+    steps = np.stack([(r - PENNY) * outward[:, 0], (r - PENNY) * outward[:, 1], x[2]], axis=1)
+    V = np.einsum("qk,qj->qkj", outward, slope[:, None] * steps)
+    V += (q / r)[:, None, None] * around[:, :, None] * around[:, None, :]
+    flux = np.einsum("qij,qik->qjk", sigma, gradient) - energy[:, None, None] * np.eye(3)
+    released = float(np.einsum("qjk,qkj,q->", flux, V, weight))
+    return float(np.sqrt(max(released, 0.0) / (2 * np.pi * PENNY) * E_PRIME))

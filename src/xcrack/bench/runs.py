@@ -1,0 +1,188 @@
+"""Interleaved runs of cases, their medians, and the file they are kept in."""
+
+import ctypes
+import gc
+import json
+import os
+import platform
+import subprocess
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from statistics import median
+from time import perf_counter, process_time
+from typing import Any
+
+from xcrack.bench.scenes import Outcome
+
+Row = dict[str, Any]
+_PACKAGES = ("xcrack", "numpy", "scipy", "numba", "gmsh", "scikit-fem", "pyamg", "matplotlib")
+
+
+@dataclass(frozen=True)
+class Case:
+    """One point of a chart.
+
+    Attributes
+    ----------
+    series : str
+        Name of the curve that the point belongs to.
+    kind : {"default", "setting", "mesh", "opponent"}
+        Default settings of xcrack, others, another kind of mesh, another method.
+    size : str
+        What the point differs by from others of its series.
+    run : callable (seed) -> Outcome
+    """
+
+    series: str
+    kind: str
+    size: str
+    run: Callable[[int], Outcome]
+
+
+def measure(cases: Sequence[Case], repeats: int, say: Callable[[str], None]) -> list[Row]:
+    """Rows of all cases: worst errors, medians of times.
+
+    Every round runs each case once, so that a spell of load on the machine falls on all of them;
+    each round has meshes of its own. A round before the first compiles and fills caches.
+
+    Parameters
+    ----------
+    cases : sequence of Case
+    repeats : int
+        Rounds that count.
+    say : callable (str)
+        Where a case that cannot run is told.
+
+    Returns
+    -------
+    list of dict
+    """
+    found: dict[int, list[tuple[Outcome, float, float]]] = {i: [] for i in range(len(cases))}
+    for seed in range(repeats + 1):
+        for i in list(found):
+            wall, processor = perf_counter(), process_time()
+            try:
+                outcome = cases[i].run(seed)
+            except Exception as error:
+                say(f"{cases[i].series}, {cases[i].size}: {type(error).__name__}: {error}")
+                del found[i]
+                continue
+            if seed:
+                found[i].append((outcome, perf_counter() - wall, process_time() - processor))
+    rows = [_row(cases[i], results) for i, results in found.items()]
+    return [{**row, "MB": memory(cases[i])} for i, row in zip(found, rows)]
+
+
+def memory(case: Case) -> float | None:
+    """Memory in MB that a run adds at its peak (Linux; elsewhere None).
+
+    Parameters
+    ----------
+    case : Case
+
+    Returns
+    -------
+    float or None
+    """
+    try:
+        gc.collect()
+        ctypes.CDLL("libc.so.6").malloc_trim(0)  # or a run would find free memory of the last one
+        Path("/proc/self/clear_refs").write_text("5", encoding="ascii")  # the peak starts anew
+        before = _resident("VmRSS")
+        case.run(1)
+        return max(_resident("VmHWM") - before, 0.0)
+    except (OSError, AttributeError):
+        return None
+
+
+def _resident(name: str) -> float:
+    """A line of the kernel's account of this process, in MB."""
+    lines = Path("/proc/self/status").read_text(encoding="ascii").splitlines()
+    return next(float(x.split()[1]) for x in lines if x.startswith(name)) / 1024
+
+
+def _row(case: Case, results: Sequence[tuple[Outcome, float, float]]) -> Row:
+    outcomes = [outcome for outcome, _, _ in results]
+    names = sorted({n for o in outcomes for n in o.errors}, key=list(outcomes[0].errors).index)
+    return {
+        "series": case.series,
+        "kind": case.kind,
+        "size": case.size,
+        "errors": {n: max(o.errors[n] for o in outcomes) for n in names},
+        "unknowns": outcomes[0].unknowns,
+        "wall": median(w for _, w, _ in results),
+        "processor": median(p for _, _, p in results),
+        "parts": {n: median(o.parts[n] for o in outcomes) for n in outcomes[0].parts},
+    }
+
+
+def machine() -> dict[str, Any]:
+    """What the numbers depend on: machine, load, versions, commit."""
+    versions: dict[str, str | None] = {}
+    for name in _PACKAGES:
+        try:
+            versions[name] = version(name)
+        except PackageNotFoundError:
+            versions[name] = None
+    load = list(os.getloadavg()) if hasattr(os, "getloadavg") else []
+    return {
+        "processor": _processor(),
+        "cores": os.cpu_count(),
+        "threads": os.environ.get("OMP_NUM_THREADS"),
+        "system": platform.platform(),
+        "python": sys.version.split()[0],
+        "load": load,
+        "versions": versions,
+        "commit": _commit(),
+    }
+
+
+def _processor() -> str:
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        return platform.processor()
+    return next((x.split(":")[1].strip() for x in lines if x.startswith("model name")), "")
+
+
+def _commit() -> str:
+    """The commit of the sources, with a word where they differ from it; empty without git."""
+    here = Path(__file__).parent
+    try:
+        head, changes = (
+            subprocess.run(
+                ["git", *words], cwd=here, capture_output=True, text=True, check=True, timeout=20
+            ).stdout.strip()
+            for words in (["rev-parse", "HEAD"], ["status", "--porcelain", "--", ".."])
+        )
+    except (OSError, subprocess.SubprocessError):
+        return ""
+    return f"{head} with changes" if changes else head
+
+
+def clock(record: dict[str, Any]) -> str:
+    """The time to compare by: wall, or processor where others load the machine.
+
+    All runs keep to one thread, so on an idle machine the two are the same.
+
+    Parameters
+    ----------
+    record : dict
+        As `machine` returns it.
+
+    Returns
+    -------
+    {"wall", "processor"}
+    """
+    return "processor" if record["load"] and record["load"][0] > 1.5 else "wall"
+
+
+def keep(folder: Path, scene: str, record: Row) -> Path:
+    """Write the record of a scene to `folder/scene.json`."""
+    folder.mkdir(parents=True, exist_ok=True)
+    path = folder / f"{scene}.json"
+    path.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
+    return path
