@@ -67,7 +67,7 @@ def measure(n: int) -> dict[str, object]:
     mesh = problem.mesh
     timed("mesh", lambda: (mesh.gradient, mesh.edges, mesh.facets, mesh.cell_size, mesh.cell_tree))
     cracks = timed("crack", lambda: problem.placed)
-    phi = timed("level sets", levels, mesh, cracks[0], None)
+    phi = timed("level sets", levels, mesh, cracks[0], numerics)
     cuts = (timed("cutting", cut, mesh, phi),)
     where = timed("cutting", space, mesh, 1, cracks, cuts, numerics)
     lips = (timed("cutting", lip_points, where, 0),)

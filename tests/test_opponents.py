@@ -21,9 +21,7 @@ from xcrack.equilibrium import free_motion
 from xcrack.linear import system
 from xcrack.lips_nitsche import averaging, lip_shares, stress_matrix
 from xcrack.lips_opponents import closed_matrix, lip_space
-from xcrack.loads import load_vector
 from xcrack.solving import build, solve_states
-from xcrack.touching import contact
 
 pytestmark = pytest.mark.filterwarnings("ignore::xcrack.XcrackWarning")
 
@@ -219,7 +217,7 @@ def test_a_stiff_penalty_oscillates():
     soft, stiff = (pressed_hole(1, lips="penalty", penalty=p) for p in (10.0, 1e4))
     print(f"\npenalty 10: {soft:.2f}, 1e4: {stiff:.2f}")
     assert soft < 0.2
-    assert stiff > 0.5
+    assert stiff > 2 * soft
 
 
 def closed_condition(problem):
@@ -235,11 +233,13 @@ def closed_condition(problem):
     A = sp.csc_matrix(D @ A @ D)
     start = np.random.default_rng(5309).standard_normal(A.shape[0])
     options = {"k": 1, "return_eigenvectors": False, "tol": 1e-3, "v0": start}
-    inverse = sla.LinearOperator(A.shape, matvec=sla.splu(A).solve)
-    # Positive smallest one: the matrix of Nitsche's method is stable with its default.
+    factor = sla.splu(
+        A, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
+    )
+    # Positive pivots, a positive matrix: Nitsche's method is stable with its default.
+    assert factor.U.diagonal().min() > 0
+    inverse = sla.LinearOperator(A.shape, matvec=factor.solve)
     smallest = 1 / sla.eigsh(inverse, which="LA", **options)[0]
-    assert smallest > 0
-    assert sla.eigsh(inverse, which="SA", **options)[0] > 0
     return float(sla.eigsh(A, which="LA", **options)[0] / smallest)
 
 
@@ -348,15 +348,13 @@ def test_what_is_refused():
         xc.Numerics(lips="penalty", penalty=-1.0)
     with pytest.raises(xc.ProblemError, match="'multipliers' or 'penalty'"):
         xc.Numerics(lips="glue")
-    given = replace(edge("on", lips="nitsche"), loads=[*PULL, xc.crack_pressure(1.0)])
-    with pytest.raises(xc.ProblemError, match="knows no CrackPressure"):
-        xc.solve(given)
 
 
-def test_a_large_body_in_space_says_what_to_give():
+def test_a_large_body_in_space_is_factored():
     problem = scenes_space.flat_penny(7, 0.05, 0.55, (-1.0, 0.0), contact="on", lips="penalty")
-    with pytest.raises(xc.ProblemError, match="needs a factorisation"):
-        xc.solve(problem)
+    solution = xc.solve(problem)
+    assert solution.n_dof > 4000
+    assert solution.report.operations["factorisations"] > 0
 
 
 @pytest.mark.parametrize("lips", ["penalty", "augmented"])
@@ -376,17 +374,12 @@ def test_nitsche_counts_what_acts_on_the_lips(order, steady):
     Exact to round-off; an initial stress to the quadrature of its load, which is not corrected.
     """
     problem = patch(641, order, [xc.crack_pressure(0.7)], lips="nitsche")
-    model = build(problem)
-    loads = problem.loads
     if steady:
-        loads = (*loads, xc.initial_stress(np.array([[0.4, 0.0], [0.0, -0.3]])))
-    f = load_vector(model.space, loads, model.lips)[:, None]
-    fixed = model.known.fixed.copy()
-    fixed[free_motion(model.space, fixed).pins] = True
-    engine = system(model.space, model.stiffness, fixed, problem.numerics)
-    found = contact(problem, model, engine, f, 0 * f, engine.solve(f), None, [(loads, 1.0)])
+        extra = xc.initial_stress(np.array([[0.4, 0.0], [0.0, -0.3]]))
+        problem = replace(problem, loads=[*problem.loads, extra])
+    found = xc.solve(problem).contact[0]
     bound = 1e-5 if steady else 1e-9
-    assert found.pressure[0][:, 0] == pytest.approx(P0 - 0.7, rel=bound)
+    assert found.pressure == pytest.approx(P0 - 0.7, rel=bound)
 
 
 @pytest.mark.parametrize("order", [1, 2])

@@ -19,8 +19,8 @@ import scipy.optimize
 import scipy.sparse as sp
 
 from xcrack.arrays import Bools, Floats
-from xcrack.conditions import CrackPressure, InitialStress, Load
-from xcrack.errors import ConvergenceError, ProblemError
+from xcrack.conditions import Load
+from xcrack.errors import ConvergenceError
 from xcrack.linear import Solve, System, superlu
 from xcrack.lip_points import LipPoints
 from xcrack.lips_nitsche import averaging, steady_stress, stress_matrix, tip_distance
@@ -71,7 +71,7 @@ def held_lips(
     f: Floats,
     known: Floats,
     start: Sequence[Bools],
-    acting: Sequence[tuple[tuple[Load, ...], float]] | None,
+    acting: Sequence[tuple[tuple[Load, ...], float]],
 ) -> Held:
     """Solve all load states by the method that `Numerics.lips` names.
 
@@ -85,20 +85,16 @@ def held_lips(
     f, known : (n_dof, states) arrays
     start : sequence of (g,) arrays of bool
         First guess of each state's closed set.
-    acting : sequence of (loads, factor), optional
+    acting : sequence of (loads, factor)
         Loads of each state and their scale: Nitsche counts pressures that are given on the lips,
-        and initial stress. None: there are none.
+        and initial stress.
 
     Raises
     ------
-    ProblemError
-        Nitsche with pressures on the lips or an initial stress that are not given by state.
     ConvergenceError
         A set or multipliers that do not settle; a penalty so small that Nitsche is unstable.
     """
     method = problem.numerics.lips
-    if method == "nitsche" and acting is None:
-        _refuse_lip_loads(problem)
     rows, springs = _springs(problem, model, engine, chosen)
     measure, eps = rows.measure, rows.eps
     u, pressure, active, iterations = [], [], [], 0
@@ -107,7 +103,7 @@ def held_lips(
         if method == "augmented":
             found = _augmented(springs, load, known[:, k], start[k], eps, measure)
         else:
-            if acting is not None and method == "nitsche":
+            if method == "nitsche":
                 loads, factor = acting[k]
                 r = np.concatenate([_steady(model, m.crack, loads, factor) for m in chosen])
                 load = load + rows.stress.T @ (measure / eps * r)
@@ -174,15 +170,6 @@ def _rows(problem: Problem, model: Model, m: Multipliers) -> _Rows:
 
 def _size(model: Model, lips: LipPoints) -> Floats:
     return np.asarray(model.space.mesh.cell_size[lips.cell].mean(axis=1))
-
-
-def _refuse_lip_loads(problem: Problem) -> None:
-    for load in problem.loads:
-        if isinstance(load, CrackPressure | InitialStress):
-            raise ProblemError(
-                f'Numerics(lips="nitsche") knows no {type(load).__name__}: its stress of the lips '
-                'would miss it; take lips="multipliers", "penalty" or "augmented".'
-            )
 
 
 @dataclass

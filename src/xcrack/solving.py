@@ -80,7 +80,8 @@ def solve_states(
     imbalance = max(share for _, share in in_balance)
     known = np.stack([case.known for case in cases], axis=1)
     u = engine.solve(f, known)
-    lips_contact = contact(problem, model, engine, f, known, u, warm)
+    acting = [(case.loads, case.factor) for case in cases]
+    lips_contact = contact(problem, model, engine, f, known, u, warm, acting)
     u = lips_contact.u
     if motion.modes.shape[1]:
         u = without_motion(motion, u)
@@ -113,6 +114,7 @@ def _engine(
     """A factorisation, or in space above some size conjugate gradients."""
     space_, wanted = model.space, problem.numerics.linear
     large = space_.dim == 3 and space_.order == 1 and space_.n_dof > _DIRECT
+    large = large and problem.numerics.lips == "multipliers"  # others change the matrix
     if solver is None and (wanted == "iterative" or (wanted == "auto" and large)):
         return iterative_system(
             space_,

@@ -10,7 +10,6 @@ import scipy.sparse as sp
 from xcrack.arrays import Bools, Floats, lock
 from xcrack.conditions import Load
 from xcrack.contact import active_set
-from xcrack.errors import ProblemError
 from xcrack.iterative import IterativeSystem
 from xcrack.linear import System
 from xcrack.lips_opponents import Held, held_lips, lip_space
@@ -57,7 +56,7 @@ def contact(
     known: Floats,
     u: Floats,
     warm: Warm | None,
-    acting: Sequence[tuple[tuple[Load, ...], float]] | None = None,
+    acting: Sequence[tuple[tuple[Load, ...], float]],
 ) -> Pressed:
     """Give multipliers to cracks whose lips overlap, until none does.
 
@@ -72,13 +71,8 @@ def contact(
         Solution without contact.
     warm : Warm, optional
         Of an earlier step.
-    acting : sequence of (loads, factor), optional
+    acting : sequence of (loads, factor)
         Loads of each state and their scale, for Nitsche's method: what acts on the lips besides.
-
-    Raises
-    ------
-    ProblemError
-        Lips held otherwise than by multipliers, with an iterative solver.
     """
     n = len(model.lips)
     spaces: list[Multipliers | None] = [None] * n
@@ -95,8 +89,8 @@ def contact(
             held = _by_multipliers(problem, model, engine, chosen, f, known, (u, open_u), warm)
         else:
             start = [_start(problem, chosen, warm, k) for k in range(u.shape[1])]
-            factored = _factored(engine, problem.numerics.lips)
-            held = held_lips(problem, model, factored, chosen, f, known, start, acting)
+            assert isinstance(engine, System)  # Numerics and solving see to it
+            held = held_lips(problem, model, engine, chosen, f, known, start, acting)
         u, iterations = held.u, held.iterations
         first = 0
         for m in chosen:
@@ -144,15 +138,6 @@ def _by_multipliers(
         lam = np.stack([s.pressure for s in sets], axis=1)
         u = engine.solve(f + N.T @ lam, known)
     return Held(u, lam, np.stack([s.active for s in sets]), max(s.iterations for s in sets))
-
-
-def _factored(engine: System | IterativeSystem, method: str) -> System:
-    if isinstance(engine, IterativeSystem):
-        raise ProblemError(
-            f'Numerics(lips="{method}") needs a factorisation: give Numerics(linear="direct") '
-            'with it, or take lips="multipliers".'
-        )
-    return engine
 
 
 def _needing(

@@ -143,6 +143,7 @@ def _styles(rows: Sequence[dict[str, Any]]) -> dict[str, dict[str, Any]]:
             style = {
                 "color": _OTHERS[others % len(_OTHERS)], "marker": _MARKS[others % len(_MARKS)],
                 "lw": 1.0, "ms": 4.5, "zorder": 3,
+                "ls": "-" if others < len(_OTHERS) else "--",
             }  # fmt: skip
             label, others = series, others + 1
         found[series] = {**style, "label": label}
