@@ -3,6 +3,7 @@
 import numpy as np
 
 from xcrack.arrays import Floats
+from xcrack.loads import position
 from xcrack.locate import nearest_boundary
 from xcrack.quadrature import Points, cell_points
 from xcrack.solution import Solution
@@ -33,30 +34,38 @@ def domain_radius(solution: Solution, t: int) -> tuple[float, float, float]:
     return min(wanted, max(limit, 1.2 * size)), wanted, size
 
 
-def domain_points(space: Space, centre: Floats, radius: float) -> list[Points]:
-    """Integration points of all cells that meet the disc, denser where cells are large."""
+def domain_points(space: Space, centre: Floats, radii: tuple[float, float]) -> list[Points]:
+    """Integration points between two radii, denser where cells are large."""
     mesh = space.mesh
+    hollow, radius = radii
     near = np.array(
         mesh.cell_tree.query_ball_point(centre, radius + float(mesh.cell_size.max())),
         dtype=np.int64,
     )
     near.sort()
-    middle = mesh.points[mesh.cells[near]].mean(axis=1)
-    near = near[np.linalg.norm(middle - centre, axis=1) <= radius + mesh.cell_size[near]]
+    x = mesh.points[mesh.cells[near]]
+    inside = np.linalg.norm(x - centre, axis=2).max(axis=1) <= hollow
+    far = np.linalg.norm(x.mean(axis=1) - centre, axis=1) > radius + mesh.cell_size[near]
+    near = near[~inside & ~far]
     share = mesh.cell_size[near] / radius
     parts: list[Points] = []
     for low, high, n, degree in ((0.0, 0.03, 4, 4), (0.03, 0.1, 4, 8), (0.1, np.inf, 5, 10)):
         cells = near[(share > low) & (share <= high)]
-        parts.extend(
-            cell_points(space, cells[first : first + _CHUNK], n, degree)
-            for first in range(0, len(cells), _CHUNK)
-        )
+        for first in range(0, len(cells), _CHUNK):
+            points = cell_points(space, cells[first : first + _CHUNK], n, degree)
+            r = np.linalg.norm(position(space, points.cell, points.bary) - centre, axis=1)
+            parts.append(points.chosen((hollow < r) & (r < radius)))
     return parts
+
+
+def inner_radii(order: int, radii: Floats) -> Floats:
+    """Radii within which the weight q is one, length."""
+    return _RING[order] * radii
 
 
 def weight(order: int, r: Floats, xi: Floats, radii: Floats) -> tuple[Floats, Floats]:
     """Weight q, one inside and zero outside by a quintic, and its gradient, for each domain."""
-    inner = _RING[order] * radii[:, None]
+    inner = inner_radii(order, radii)[:, None]
     width = radii[:, None] - inner
     z = np.clip((r - inner) / width, 0.0, 1.0)
     q = 1 - z**3 * (10 - 15 * z + 6 * z**2)

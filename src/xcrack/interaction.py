@@ -25,15 +25,15 @@ from xcrack.conditions import (
     evaluate_scalar,
     evaluate_stress,
 )
-from xcrack.domain import domain_points, domain_radius, mean_rotation, weight
+from xcrack.domain import domain_points, domain_radius, inner_radii, mean_rotation, weight
 from xcrack.errors import ProblemError, XcrackWarning
 from xcrack.front_sif import along_fronts
-from xcrack.lip_points import LipPoints, lip_points
+from xcrack.lip_points import LipPoints
 from xcrack.loads import position
 from xcrack.quadrature import Points, cell_side
 from xcrack.sif import SIF
-from xcrack.solution import Solution, fields_at
-from xcrack.williams import continued_polar, unit_gradients
+from xcrack.solution import Solution, gradients_at
+from xcrack.williams import continued_polar, mode_matrix, unit_gradients
 
 _SECOND = 0.7  # outer radius of the second domain, as a share of the first
 _WARN = 0.01  # difference of the two domains, as a share of K, that is worth a word
@@ -172,22 +172,27 @@ def _steady(solution: Solution, t: int) -> Floats:
 def _integrals(solutions: Sequence[Solution], t: int, radii: Floats) -> Floats:
     """I of modes I, II and of the point force for each state and domain `(s, radii, 3)`."""
     space, tip = solutions[0].space, solutions[0].space.tips[t]
-    total = np.stack([_lip_terms(solution, t, radii) for solution in solutions])
-    coefficients = np.stack([solution.coefficients for solution in solutions], axis=-1)
     turn = np.stack([mean_rotation(s, t, float(radii.max())) for s in solutions], axis=-1)
-    for points in domain_points(space, tip.x, float(radii.max())):
-        _, gradient = fields_at(space, coefficients, points.cell, points.bary, points.side)
+    total = _lip_terms(solutions, t, radii, turn)
+    coefficients = np.stack([solution.coefficients for solution in solutions], axis=-1)
+    # Within the inner radius grad q vanishes: only loads of the volume need points there.
+    hollow = 0.0 if _volume_loads(solutions) else float(inner_radii(space.order, radii).min())
+    for points in domain_points(space, tip.x, (hollow, float(radii.max()))):
+        gradient = gradients_at(space, coefficients, points.cell, points.bary, points.side)
         total += _domain_terms(solutions, t, radii, points, gradient - turn)
     return total
+
+
+def _volume_loads(solutions: Sequence[Solution]) -> bool:
+    return any(isinstance(load, BodyForce | InitialStress) for s in solutions for load in s.loads)
 
 
 def _domain_terms(
     solutions: Sequence[Solution], t: int, radii: Floats, points: Points, gradient: Floats
 ) -> Floats:
-    """Domain integrals over some of the points `(s, radii, 3)`.
+    """Domain integrals over some of the points `(s, radii, 3)`; gradient: (q, d, d, s)."""
+    from xcrack.kernels.ring import add_ring
 
-    They are linear in the gradient (q, d, d, s): its factor is made once for all states.
-    """
     space, material = solutions[0].space, solutions[0].problem.material
     tip = space.tips[t]
     x = position(space, points.cell, points.bary)
@@ -195,21 +200,18 @@ def _domain_terms(
     psi = space.cuts[tip.crack].level_set.psi[tip.number]
     behind = psi[space.mesh.cells[points.cell]].mean(axis=1) < 0
     r, theta = continued_polar(xi, points.side[:, tip.crack], behind)
-    q, dq = weight(space.order, r, xi, radii)
-    weighted = points.weight[:, None] * dq  # (radii, q, d)
-    flat = gradient.reshape(len(x), -1, len(solutions))
     result = np.zeros((len(solutions), len(radii), 3))
-    for m, field in enumerate(_auxiliary(solutions, r, theta)):
-        for k in range(len(radii)):
-            # sigma_ij u^a_i,1 q_j is C : (u^a_,1 x grad q); in the frame (ahead, normal),
-            # mirrored where it is left-handed, which changes no formula.
-            factor = material.stress(field.gradient[:, :, 0, None] * weighted[k][:, None])
-            factor[:, :, 0] += np.einsum("qij,qj->qi", field.stress, weighted[k])
-            factor -= weighted[k][:, 0, None, None] * field.stress
-            turned = np.einsum("ai,qab,bj->qij", tip.frame, factor, tip.frame)
-            result[:, k, m] = np.einsum("qf,qfs->s", turned.reshape(len(x), -1), flat)
-        for s, solution in enumerate(solutions):
-            result[s, :, m] += _load_terms(solution, t, points, x, field, q, weighted)
+    add_ring(
+        result, gradient, xi, theta, points.weight, radii, inner_radii(space.order, radii),
+        np.ascontiguousarray(tip.frame), mode_matrix(material.kolosov, material.mu),
+        material.kolosov, material.lam, material.mu,
+    )  # fmt: skip
+    if _volume_loads(solutions):
+        q, dq = weight(space.order, r, xi, radii)
+        weighted = points.weight[:, None] * dq  # (radii, q, d)
+        for m, field in enumerate(_auxiliary(solutions, r, theta)):
+            for s, solution in enumerate(solutions):
+                result[s, :, m] += _load_terms(solution, t, points, x, field, q, weighted)
     return result
 
 
@@ -269,46 +271,47 @@ def _load_terms(
     return total
 
 
-def _lip_terms(solution: Solution, t: int, radii: Floats) -> Floats:
-    """Full lip term of each domain and field `(radii, 3)`."""
-    space = solution.space
-    tip = space.tips[t]
-    lips = lip_points(space, tip.crack)
+def _lip_terms(solutions: Sequence[Solution], t: int, radii: Floats, turn: Floats) -> Floats:
+    """Full lip term of each state, domain and field `(s, radii, 3)`; turn: (d, d, s)."""
+    space = solutions[0].space
+    tip, lips = space.tips[t], solutions[0].lips[space.tips[t].crack]
+    result = np.zeros((len(solutions), len(radii), 3))
     near = np.linalg.norm(lips.x - tip.x, axis=1) < radii.max()
-    result = np.zeros((len(radii), 3))
     if not near.any():
         return result
-    pressure = _lip_pressure(solution, tip.crack, lips)
+    pressure = np.stack([_lip_pressure(s, tip.crack, lips)[near] for s in solutions])
     R = tip.frame
-    material = solution.problem.material
-    steady, turn = _steady(solution, t), mean_rotation(solution, t, radii.max())
-    xi = (lips.x - tip.x) @ R.T
+    material = solutions[0].problem.material
+    xi = (lips.x[near] - tip.x) @ R.T
     # The last piece is straight: what differs there is round-off, which 1 / r would magnify.
     xi[np.abs(xi[:, 1]) < 1e-9 * radii.max(), 1] = 0.0
-    bent = np.abs(xi[near, 1]).max() > 1e-9 * radii.max()
-    if not bent and not np.abs(pressure[near]).any():
+    bent = bool(xi[:, 1].any())
+    if not bent and not pressure.any():
         return result
+    coefficients = np.stack([s.coefficients for s in solutions], axis=-1)
+    behind = np.ones(len(xi), dtype=bool)
+    w = lips.weight[near]
     for s, sign in ((0, -1), (1, 1)):
         cell, bary = lips.cell[near, s], lips.bary[near, s]
         side = cell_side(space, cell)
         side[:, tip.crack] = sign
-        r, theta = continued_polar(xi[near], side[:, tip.crack], np.ones(len(cell), dtype=bool))
-        m_out = -sign * lips.normal[near] @ R.T
-        traction = -pressure[near, None] * m_out
-        q, _ = weight(space.order, r, xi[near], radii)
-        w = lips.weight[near]
-        aux = _auxiliary([solution], r, theta)
+        r, theta = continued_polar(xi, side[:, tip.crack], behind)
+        outward = -sign * lips.normal[near] @ R.T
+        q, _ = weight(space.order, r, xi, radii)
+        aux = _auxiliary(solutions, r, theta)
         local = None
         if bent:
-            _, gradient = solution.at(cell, bary, side)
-            local = np.einsum("ai,qij,bj->qab", R, gradient - turn, R)
-        for k, field in enumerate(aux):
-            density = np.einsum("qi,qi->q", traction, field.gradient[:, :, 0])
-            if local is not None:
-                density += np.einsum("qij,qj,qi->q", field.stress, m_out, local[:, :, 0])
-                W = np.einsum("qij,qij->q", material.stress(local) + steady, field.gradient)
-                density -= W * m_out[:, 0]
-            result[:, k] -= np.einsum("q,q,rq->r", w, density, q)
+            gradient = gradients_at(space, coefficients, cell, bary, side) - turn
+            local = np.einsum("ai,qijs,bj->sqab", R, gradient, R)
+        for k, solution in enumerate(solutions):
+            traction = -pressure[k][:, None] * outward
+            for m, field in enumerate(aux):
+                density = np.einsum("qi,qi->q", traction, field.gradient[:, :, 0])
+                if local is not None:
+                    density += np.einsum("qij,qj,qi->q", field.stress, outward, local[k][:, :, 0])
+                    sigma = material.stress(local[k]) + _steady(solution, t)
+                    density -= np.einsum("qij,qij->q", sigma, field.gradient) * outward[:, 0]
+                result[k, :, m] -= q @ (w * density)
     return result
 
 

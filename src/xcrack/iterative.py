@@ -81,15 +81,32 @@ class IterativeSystem:
     blocks: Blocks
     count: Count = field(default_factory=Count)
 
-    def solve(self, f: Floats, known: Floats | None = None) -> Floats:
-        """Displacements for loads `(n_dof,)` or `(n_dof, k)` and known values of the same shape."""
+    def solve(
+        self,
+        f: Floats,
+        known: Floats | None = None,
+        start: Floats | None = None,
+        tolerance: float = TOLERANCE,
+    ) -> Floats:
+        """Displacements for loads `(n_dof,)` or `(n_dof, k)` and known values of the same shape.
+
+        Parameters
+        ----------
+        f, known : arrays
+        start : array of the same shape, optional
+            First guess of the displacements.
+        tolerance : float
+            Residual relative to the load at which to stop.
+        """
         columns = f.reshape(len(f), -1)
         given = np.zeros_like(columns) if known is None else known.reshape(columns.shape)
         b = self.basis.T @ (columns - self.matrix @ given)
         y = np.zeros_like(b)
+        if start is not None:
+            y = self.coordinates(start.reshape(columns.shape) - given)
         for k in range(b.shape[1]):
-            start = _best_guess(self.operator, y[:, :k], b[:, k])
-            y[:, k] = self._apart(b[:, k], given[:, k], start)
+            guess = _best_guess(self.operator, y[:, :k], b[:, k]) if start is None else y[:, k]
+            y[:, k] = self._apart(b[:, k], given[:, k], guess, tolerance)
         return np.asarray(given + self.basis @ y).reshape(f.shape)
 
     def contact(
@@ -117,7 +134,8 @@ class IterativeSystem:
             First guess of each state's closed set. None: the groups that overlap in the first
             guess of the displacements.
         u_start : (n_dof, states) array, optional
-            First guess of the displacements; those with open lips are a good one.
+            First guess of the displacements; those with open lips are a good one. Without it each
+            state starts from those before it.
         """
         rows = sp.csr_matrix(N @ self.basis)
         b = self.basis.T @ (f - self.matrix @ known)
@@ -125,19 +143,22 @@ class IterativeSystem:
         found = []
         for k in range(b.shape[1]):
             gap = N @ known[:, k]
+            if u_start is None:
+                guess[:, k] = _best_guess(self.operator, guess[:, :k], b[:, k])
             first = start[k]
             active = rows @ guess[:, k] + gap < 0 if first is None else first
             run = partial(projected, self.operator, b[:, k], rows, gap, measure, stiffness)
             state = self._together(run, b[:, k], known[:, k], active, guess[:, k])
+            guess[:, k] = state.y
             u = known[:, k] + self.basis @ state.y
             found.append(Touching(u, state.pressure, state.gap, state.active, state.sets))
         return found
 
-    def _apart(self, b: Floats, known: Floats, start: Floats) -> Floats:
-        y, steps = conjugate_gradients(self.operator, b, start)
+    def _apart(self, b: Floats, known: Floats, start: Floats, tolerance: float) -> Floats:
+        y, steps = conjugate_gradients(self.operator, b, start, tolerance)
         share = self._share(y, b, known)
         if share < 1:
-            y, more = conjugate_gradients(self.operator, b, y, share * TOLERANCE)
+            y, more = conjugate_gradients(self.operator, b, y, share * tolerance)
             steps += more
         self.count.solves += 1
         self.count.iterations += steps

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from xcrack.arrays import Floats, Ints, offsets, ranges
+from xcrack.arrays import Bools, Floats, Ints, offsets, ranges
 from xcrack.errors import GeometryError
 from xcrack.locate import closest_on_segment
 from xcrack.mesh import local_edges
@@ -40,6 +40,10 @@ class Points:
     bary: Floats
     weight: Floats
     side: Ints
+
+    def chosen(self, wanted: Bools) -> "Points":
+        """Some of the points."""
+        return Points(self.cell[wanted], self.bary[wanted], self.weight[wanted], self.side[wanted])
 
     def of_cells(self, cells: Ints) -> tuple[Ints, Ints, Ints]:
         """Points of the given cells: their numbers, row of their cell, offsets by cell."""

@@ -204,16 +204,32 @@ def fields_at(
     cell, bary, side : arrays
         Points, as in `Solution.at`.
     """
-    d, states = coefficients.shape[1:]
-    u = np.zeros((len(cell), d, states))
-    gradient = np.zeros((len(cell), d, d, states))
+    u = np.zeros((len(cell), *coefficients.shape[1:]))
     for batch, number, row in space.batches_of_points(cell):
-        N, G = space.tabulate(batch, row, bary[number], side[number])
-        a = coefficients[batch.functions[row]].reshape(len(row), -1, d * states)
-        u[number] = (N[:, None] @ a).reshape(-1, d, states)
-        slope = np.swapaxes(G, 1, 2) @ a
-        gradient[number] = np.swapaxes(slope.reshape(len(row), d, d, states), 1, 2)
-    return u, gradient
+        N, _ = space.tabulate(batch, row, bary[number], side[number], slopes=False)
+        a = coefficients[batch.functions[row]].reshape(len(row), N.shape[1], -1)
+        u[number] = (N[:, None] @ a).reshape(len(row), *u.shape[1:])
+    return u, gradients_at(space, coefficients, cell, bary, side)
+
+
+def gradients_at(
+    space: Space, coefficients: Floats, cell: Ints, bary: Floats, side: Ints
+) -> Floats:
+    """Gradients of displacements `(q, d, d, s)` of several states at once.
+
+    Parameters
+    ----------
+    space, coefficients, cell, bary, side : as in `fields_at`
+    """
+    from xcrack.kernels.fields import set_gradients
+
+    d, states = coefficients.shape[1:]
+    gradient = np.zeros((len(cell), d, d, states))
+    coefficients = np.ascontiguousarray(coefficients)
+    for batch, number, row in space.batches_of_points(cell):
+        _, G = space.tabulate(batch, row, bary[number], side[number])
+        set_gradients(gradient, number, G, batch.functions, row, coefficients)
+    return gradient
 
 
 def sides_of(space: Space, cell: Ints, bary: Floats, lip: int) -> Ints:

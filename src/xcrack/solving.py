@@ -79,9 +79,8 @@ def solve_states(
     f = np.stack([loads for loads, _ in in_balance], axis=1)
     imbalance = max(share for _, share in in_balance)
     known = np.stack([case.known for case in cases], axis=1)
-    u = engine.solve(f, known)
     acting = [(case.loads, case.factor) for case in cases]
-    lips_contact = contact(problem, model, engine, f, known, u, warm, acting)
+    lips_contact = contact(problem, model, engine, f, known, warm, acting)
     u = lips_contact.u
     if motion.modes.shape[1]:
         u = without_motion(motion, u)

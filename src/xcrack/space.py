@@ -190,8 +190,10 @@ class Space:
             columns.append(np.where(first[:, :, None] >= 0, each, -1).reshape(len(cells), -1))
         return Batch(cells, cracks, tips, np.ascontiguousarray(np.concatenate(columns, axis=1)))
 
-    def tabulate(self, batch: Batch, row: Ints, bary: Floats, side: Ints) -> tuple[Floats, Floats]:
-        """Values `(q, n)` and gradients `(q, n, d)` of a batch's functions at points.
+    def tabulate(
+        self, batch: Batch, row: Ints, bary: Floats, side: Ints, slopes: bool = True
+    ) -> tuple[Floats, Floats]:
+        """Values `(q, n)` and, if wanted, gradients `(q, n, d)` of a batch's functions at points.
 
         Parameters
         ----------
@@ -203,20 +205,26 @@ class Space:
             Side of each crack on which the point lies: +1, -1, or 0 where that means nothing.
         """
         cell = batch.cells[row]
-        gradient = self.mesh.gradient[cell]
         N = shape_values(self.order, bary)
-        dN = np.einsum("qnb,qbd->qnd", shape_derivatives(self.order, bary), gradient)
-        values, gradients = [N], [dN]
+        values, gradients = [N], []
+        if slopes:
+            dN = _to_place(shape_derivatives(self.order, bary), self.mesh.gradient[cell])
+            gradients.append(dN)
         for c in batch.cracks:
             nodes = self.cell_nodes[cell]
             jump = side[:, c, None] - self.node_side[c][nodes]
             jump = np.where(self.heaviside[c][nodes] >= 0, jump, 0.0)
             values.append(N * jump)
-            gradients.append(dN * jump[..., None])
+            if slopes:
+                gradients.append(dN * jump[..., None])
         for t in batch.tips:
-            F, dF = self.tip_tables(t, batch, row, bary, side)
+            F, dF = self.tip_tables(t, batch, row, bary, side, slopes)
             values.append(F)
             gradients.append(dF)
+        if not slopes:
+            return np.concatenate(values, axis=1), np.zeros((0, 0, self.dim))
+        if len(values) == 1:
+            return N, dN
         return np.concatenate(values, axis=1), np.concatenate(gradients, axis=1)
 
     def tip_tables(
@@ -250,6 +258,14 @@ class Space:
             r, theta = polar(levels.psi[tip.number], phi, np.where(phi == 0, 1, 0))
             shifts.append(lock(tip_values(r, theta, tip.functions)))
         return tuple(shifts)
+
+
+def _to_place(derivative: Floats, gradient: Floats) -> Floats:
+    """Derivatives by barycentric coordinates `(q, n, d + 1)` to those by place `(q, n, d)`."""
+    result = derivative[:, :, 0, None] * gradient[:, None, 0]
+    for b in range(1, gradient.shape[1]):
+        result += derivative[:, :, b, None] * gradient[:, None, b]
+    return np.asarray(result)
 
 
 def fronts(crack: Crack) -> tuple[list[Floats], list[Floats]]:

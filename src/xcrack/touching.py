@@ -20,6 +20,7 @@ from xcrack.solution import Contact
 from xcrack.warm import Warm
 
 _OVERLAP = 1e-9  # share of the largest displacement by which lips must overlap to need contact
+_ROUGH = 0.02  # residual of a first solution that only shows which lips overlap
 _BLOCK = 16  # right-hand sides solved at once for the dual matrix; bounds the memory
 
 
@@ -54,11 +55,14 @@ def contact(
     engine: System | IterativeSystem,
     f: Floats,
     known: Floats,
-    u: Floats,
     warm: Warm | None,
     acting: Sequence[tuple[tuple[Load, ...], float]],
 ) -> Pressed:
-    """Give multipliers to cracks whose lips overlap, until none does.
+    """Solve, and give multipliers to cracks whose lips overlap, until none does.
+
+    Conjugate gradients spend as few steps as they can on lips that are not to overlap: a crack
+    that was closed in the step before gets its multipliers at once, and without any such crack
+    the first solution is a rough one, made exact where nothing overlaps.
 
     Parameters
     ----------
@@ -67,8 +71,6 @@ def contact(
     engine : System or IterativeSystem
     f, known : (n_dof, states) arrays
         Loads, and displacements that supports impose.
-    u : (n_dof, states) array, length
-        Solution without contact.
     warm : Warm, optional
         Of an earlier step.
     acting : sequence of (loads, factor)
@@ -79,8 +81,9 @@ def contact(
     pressure: list[Floats | None] = [None] * n
     active: list[Bools | None] = [None] * n
     iterations = 0
-    open_u = u
-    pending = _needing(problem, model, u, spaces)
+    open_u, pending = _first(problem, model, engine, f, known, warm)
+    expected = pending if open_u is None else []
+    u = open_u
     while pending:
         for c in pending:
             spaces[c] = lip_space(problem, model, c)
@@ -88,7 +91,7 @@ def contact(
         if problem.numerics.lips == "multipliers":
             held = _by_multipliers(problem, model, engine, chosen, f, known, (u, open_u), warm)
         else:
-            start = [_start(problem, chosen, warm, k) for k in range(u.shape[1])]
+            start = [_start(problem, chosen, warm, k) for k in range(f.shape[1])]
             assert isinstance(engine, System)  # Numerics and solving see to it
             held = held_lips(problem, model, engine, chosen, f, known, start, acting)
         u, iterations = held.u, held.iterations
@@ -99,6 +102,11 @@ def contact(
             active[m.crack] = held.active[:, first:last]
             first = last
         pending = _needing(problem, model, u, spaces)
+    assert u is not None
+    for c in expected:
+        states = active[c]
+        if states is not None and not states.any() and problem.contact != "on":
+            spaces[c] = pressure[c] = active[c] = None
     centre = tuple(None if m is None else m.centre for m in spaces)
     return Pressed(
         u, tuple(spaces), tuple(pressure), tuple(active), Warm(centre, tuple(active)), iterations
@@ -112,7 +120,7 @@ def _by_multipliers(
     chosen: list[Multipliers],
     f: Floats,
     known: Floats,
-    guess: tuple[Floats, Floats],
+    guess: tuple[Floats | None, Floats | None],
     warm: Warm | None,
 ) -> Held:
     """Pressures of all load states by multipliers; `guess` is the last u and that of open lips."""
@@ -120,7 +128,7 @@ def _by_multipliers(
     rows = [gap_rows(m, model.lips[m.crack], model.jumps[m.crack]) for m in chosen]
     N = rows[0] if len(rows) == 1 else _stacked(rows)
     measure = np.concatenate([m.measure for m in chosen])
-    states = range(u.shape[1])
+    states = range(f.shape[1])
     stiffness = problem.material.E / _lip_size(model, chosen)
     if isinstance(engine, IterativeSystem):
         # Without an earlier set the overlap of the open lips is the best guess.
@@ -130,6 +138,7 @@ def _by_multipliers(
         lam = np.stack([s.pressure for s in sets], axis=1)
     else:
         F = dual(engine, N)
+        assert open_u is not None
         d = N @ open_u
         sets = [
             active_set(F, d[:, k], measure, stiffness, _start(problem, chosen, warm, k))
@@ -140,11 +149,39 @@ def _by_multipliers(
     return Held(u, lam, np.stack([s.active for s in sets]), max(s.iterations for s in sets))
 
 
+def _first(
+    problem: Problem,
+    model: Model,
+    engine: System | IterativeSystem,
+    f: Floats,
+    known: Floats,
+    warm: Warm | None,
+) -> tuple[Floats | None, list[int]]:
+    """Displacements with open lips, if they were needed, and the cracks that need contact."""
+    none: list[Multipliers | None] = [None] * len(model.lips)
+    if not isinstance(engine, IterativeSystem):
+        u = engine.solve(f, known)
+        return u, _needing(problem, model, u, none)
+    if problem.contact != "off":
+        before = warm.closed if warm is not None else lambda c: False
+        closed = [c for c, lips in enumerate(model.lips) if len(lips) and before(c)]
+        if closed:
+            return None, closed
+        u = engine.solve(f, known, tolerance=_ROUGH)
+        pending = _needing(problem, model, u, none)
+        if pending:
+            return u, pending
+        u = engine.solve(f, known, u)
+    else:
+        u = engine.solve(f, known)
+    return u, _needing(problem, model, u, none)
+
+
 def _needing(
-    problem: Problem, model: Model, u: Floats, spaces: Sequence[Multipliers | None]
+    problem: Problem, model: Model, u: Floats | None, spaces: Sequence[Multipliers | None]
 ) -> list[int]:
     """Cracks without multipliers whose lips overlap in some load state."""
-    if problem.contact == "off":
+    if problem.contact == "off" or u is None:
         return []
     needing = []
     for c, lips in enumerate(model.lips):

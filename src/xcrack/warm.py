@@ -23,6 +23,11 @@ class Warm:
     centre: tuple[Floats | None, ...]
     active: tuple[Bools | None, ...]
 
+    def closed(self, c: int) -> bool:
+        """Whether any group of crack c was closed in any state."""
+        active = self.active[c] if c < len(self.active) else None
+        return active is not None and bool(active.any())
+
     def start(self, space_of: Multipliers, state: int) -> Bools | None:
         """Closed set of the nearest multipliers, or None where nothing is known."""
         c = space_of.crack

@@ -103,41 +103,41 @@ def add_stiffness(  # type: ignore[no-untyped-def]
     m, n = functions.shape
     d = gradient.shape[2]
     place = np.empty(n, np.int64)
-    block = np.zeros((n, n, d, d))
+    block = np.zeros((n * d, n * d))
+    row = np.empty(n * d)
     for e in range(m):
         active = 0
+        plain = 0  # standard functions come first
         for a in range(n):
             if functions[e, a] >= 0:
                 place[active] = a
                 active += 1
-        block[:active, :active] = 0.0
+                if functions[e, a] < n_standard:
+                    plain = active
+        block[: active * d, : active * d] = 0.0
         for q in range(offsets[e], offsets[e + 1]):
-            w = weight[q]
             for a in range(active):
-                pa = place[a]
-                plain = functions[e, pa] < n_standard
-                for b in range(a, active):
-                    pb = place[b]
-                    if plain and functions[e, pb] < n_standard:
-                        continue
-                    for i in range(d):
-                        gai = w * gradient[q, pa, i]
-                        for j in range(d):
-                            block[a, b, i, j] += gai * gradient[q, pb, j]
+                for i in range(d):
+                    row[a * d + i] = gradient[q, place[a], i]
+            for a in range(active):
+                start = d * max(a, plain)
+                for i in range(d):
+                    scaled = weight[q] * row[a * d + i]
+                    line = block[a * d + i]
+                    for k in range(start, active * d):
+                        line[k] += scaled * row[k]
         for a in range(active):
             fa = functions[e, place[a]]
-            for b in range(a, active):
+            for b in range(max(a, plain), active):
                 fb = functions[e, place[b]]
-                if fa < n_standard and fb < n_standard:
-                    continue
                 trace = 0.0
                 for i in range(d):
-                    trace += block[a, b, i, i]
+                    trace += block[a * d + i, b * d + i]
                 one = data[_slot(indptr, indices, fa, fb)]
                 other = data[_slot(indptr, indices, fb, fa)]
                 for i in range(d):
                     for j in range(d):
-                        v = lam * block[a, b, i, j] + mu * block[a, b, j, i]
+                        v = lam * block[a * d + i, b * d + j] + mu * block[a * d + j, b * d + i]
                         if i == j:
                             v += mu * trace
                         one[i, j] += v

@@ -1,0 +1,59 @@
+"""Kernels of fields and of the plane's interaction integral against their naive twins."""
+
+import numpy as np
+import pytest
+
+import xcrack as xc
+from xcrack.domain import weight
+from xcrack.kernels.fields import set_gradients
+from xcrack.kernels.ring import add_ring
+from xcrack.williams import mode_matrix, unit_gradients
+
+STEEL = xc.Isotropic(E=3.0, nu=0.27, plane="strain")
+
+
+@pytest.mark.parametrize("states", [1, 3])
+@pytest.mark.parametrize("hand", [1.0, -1.0])
+def test_ring(states, hand):
+    """P_kj t_k q_,j written out, for a right-handed and a left-handed frame."""
+    rng = np.random.default_rng(3105)
+    n, order = 200, 2
+    angle = rng.uniform(-3, 3)
+    frame = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+    frame[1] *= hand
+    theta, r = rng.uniform(-np.pi, np.pi, n), rng.uniform(0.01, 1.2, n)
+    xi = r[:, None] * np.stack([np.cos(theta), np.sin(theta)], axis=1)
+    gradient = rng.standard_normal((n, 2, 2, states))
+    area, radii = rng.uniform(size=n), np.array([1.0, 0.7])
+    found = np.zeros((states, 2, 3))
+    add_ring(
+        found, gradient, xi, theta, area, radii, 0.15 * radii, frame,
+        mode_matrix(STEEL.kolosov, STEEL.mu), STEEL.kolosov, STEEL.lam, STEEL.mu,
+    )  # fmt: skip
+    _, dq = weight(order, r, xi, radii)
+    wanted = np.zeros_like(found)
+    local = np.einsum("ai,qijs,bj->sqab", frame, gradient, frame)
+    for m, g in enumerate(unit_gradients(r, theta, STEEL.kolosov, STEEL.mu)):
+        for s in range(states):
+            sigma, own = STEEL.stress(local[s]), STEEL.stress(g)
+            P = np.einsum("qij,qi->qj", sigma, g[:, :, 0])
+            P += np.einsum("qij,qi->qj", own, local[s][:, :, 0])
+            P[:, 0] -= np.einsum("qij,qij->q", sigma, g)
+            wanted[s, :, m] = np.einsum("q,qj,kqj->k", area, P, dq)
+    assert found == pytest.approx(wanted, rel=1e-11, abs=1e-12 * np.abs(wanted).max())
+
+
+@pytest.mark.parametrize("d", [2, 3])
+def test_gradients(d):
+    """Functions that do not act on a cell (-1) count nothing; other points stay as they are."""
+    rng = np.random.default_rng(3106)
+    slope, row = rng.standard_normal((7, 5, d)), rng.integers(0, 3, 7)
+    functions = rng.integers(-1, 9, (3, 5))
+    coefficients = rng.standard_normal((9, d, 2))
+    number = np.array([8, 1, 0, 5, 3, 9, 2])
+    found = np.full((10, d, d, 2), 7.0)
+    set_gradients(found, number, slope, functions, row, coefficients)
+    values = np.where((functions >= 0)[..., None, None], coefficients[functions], 0.0)
+    wanted = np.full((10, d, d, 2), 7.0)
+    wanted[number] = np.einsum("qnj,qnis->qijs", slope, values[row])
+    assert found == pytest.approx(wanted, rel=1e-13)
