@@ -47,14 +47,11 @@ def naive_stiffness(mesh, order, lam, mu):
             for a, row in enumerate(cell):
                 for b, column in enumerate(cell):
                     block = K.setdefault((int(row), int(column)), np.zeros((2, 2)))
-                    dot = 0.0
-                    for i in range(2):
-                        dot += G[a, i] * G[b, i]
-                    dot *= w * mu
-                    for i in range(2):
-                        for j in range(2):
-                            block[i, j] += w * (lam * G[a, i] * G[b, j] + mu * G[a, j] * G[b, i])
-                        block[i, i] += dot
+                    (ax, ay), (bx, by) = w * G[a], G[b]
+                    block[0, 0] += (lam + 2 * mu) * (ax * bx) + mu * (ay * by)
+                    block[0, 1] += lam * (ax * by) + mu * (ay * bx)
+                    block[1, 0] += lam * (ay * bx) + mu * (ax * by)
+                    block[1, 1] += (lam + 2 * mu) * (ay * by) + mu * (ax * bx)
     dense = np.zeros((2 * n, 2 * n))
     for (row, column), block in K.items():
         dense[2 * row : 2 * row + 2, 2 * column : 2 * column + 2] = block

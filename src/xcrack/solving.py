@@ -71,7 +71,8 @@ def solve_states(
     if not len(states):
         raise ProblemError("states is empty: give at least one load state, or none at all.")
     model = build(problem, bulk)
-    cases = [_case(problem, model, state) for state in states]
+    known_loads: dict[tuple[int, ...], Floats] = {}
+    cases = [_case(problem, model, state, known_loads) for state in states]
     fixed = model.known.fixed.copy()
     motion = free_motion(model.space, fixed)
     engine = _engine(problem, model, fixed, motion, solver)
@@ -136,12 +137,21 @@ class _Case:
     known: Floats
 
 
-def _case(problem: Problem, model: Model, state: Any) -> _Case:
+def _case(
+    problem: Problem, model: Model, state: Any, known_loads: dict[tuple[int, ...], Floats]
+) -> _Case:
+    """A load state; states that differ by a factor integrate their loads once."""
     loads, factor = problem.state(state)
     scaled = tuple(load for load in loads if not isinstance(load, InitialStress))
     steady = tuple(load for load in loads if isinstance(load, InitialStress))
-    f = factor * load_vector(model.space, scaled, model.lips)
-    f += load_vector(model.space, steady, model.lips)
+
+    def vector(chosen: tuple[Load, ...]) -> Floats:
+        key = tuple(map(id, chosen))
+        if key not in known_loads:
+            known_loads[key] = load_vector(model.space, chosen, model.lips)
+        return known_loads[key]
+
+    f = factor * vector(scaled) + vector(steady)
     known = model.known.value
     moved = tuple(load for load in loads if isinstance(load, Displacement))
     if moved:
