@@ -7,6 +7,9 @@ import xcrack as xc
 from xcrack.domain import weight
 from xcrack.kernels.fields import set_gradients
 from xcrack.kernels.ring import add_ring
+from xcrack.kernels.shapes import set_jumps, set_standard
+from xcrack.mesh import local_edges
+from xcrack.simplex import n_shapes, shape_derivatives, shape_values
 from xcrack.williams import mode_matrix, unit_gradients
 
 STEEL = xc.Isotropic(E=3.0, nu=0.27, plane="strain")
@@ -57,3 +60,29 @@ def test_gradients(d):
     wanted = np.full((10, d, d, 2), 7.0)
     wanted[number] = np.einsum("qnj,qnis->qijs", slope, values[row])
     assert found == pytest.approx(wanted, rel=1e-13)
+
+
+@pytest.mark.parametrize("order", [1, 2])
+@pytest.mark.parametrize("d", [2, 3])
+def test_tables(order, d):
+    """Standard functions against `shape_values`, jumps written out; values alone are the same."""
+    rng = np.random.default_rng(3107)
+    n, m, nodes_n = 9, 4, n_shapes(order, d)
+    bary = rng.dirichlet(np.ones(d + 1), n)
+    row, gradient = rng.integers(0, m, n), rng.standard_normal((m, d + 1, d))
+    edges = local_edges(d)[: None if order == 2 else 0]
+    value, slope = np.full((n, 2 * nodes_n), np.nan), np.full((n, 2 * nodes_n, d), np.nan)
+    nodes = rng.integers(0, 30, (m, nodes_n))
+    side, node_side = rng.choice([-1, 0, 1], n), rng.choice([-1, 1], 30)
+    number = rng.integers(-1, 3, 30)
+    set_standard(value, slope, row, bary, gradient, edges)
+    set_jumps(value, slope, nodes_n, row, side, nodes, node_side, number)
+    N = shape_values(order, bary)
+    dN = np.einsum("qnb,qbd->qnd", shape_derivatives(order, bary), gradient[row])
+    jump = np.where(number[nodes[row]] >= 0, side[:, None] - node_side[nodes[row]], 0)
+    assert value == pytest.approx(np.hstack([N, N * jump]), abs=1e-14)
+    assert slope == pytest.approx(np.hstack([dN, dN * jump[..., None]]), abs=1e-13)
+    alone = np.empty_like(value)
+    set_standard(alone, np.empty((0, 0, d)), row, bary, gradient, edges)
+    set_jumps(alone, np.empty((0, 0, d)), nodes_n, row, side, nodes, node_side, number)
+    assert (alone == value).all()

@@ -133,10 +133,7 @@ def corrected(
 
     chosen, brow = _of_batch(batch, boundary.cell)
     bary_, bside = boundary.bary[chosen], boundary.side[chosen]
-    bvalues = np.concatenate(
-        [space.tip_tables(t, batch, brow, bary_, bside, slopes=False)[0] for t in batch.tips],
-        axis=1,
-    )
+    bvalues = space.tip_values(batch, brow, bary_, bside)
     bx, _ = _local(space, batch, brow, bary_)
     bpiece = 2 * brow + (boundary.piece_side[chosen] > 0)
 

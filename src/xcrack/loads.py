@@ -70,7 +70,11 @@ def load_vector(space: Space, loads: tuple[Load, ...], lips: tuple[LipPoints, ..
 
 def position(space: Space, cell: Ints, bary: Floats) -> Floats:
     """Coordinates of points given by cell and barycentric coordinates."""
-    return np.einsum("qb,qbd->qd", bary, space.mesh.points[space.mesh.cells[cell]])
+    corners = space.mesh.points[space.mesh.cells[cell]]
+    x = bary[:, 0, None] * corners[:, 0]
+    for b in range(1, bary.shape[1]):
+        x += bary[:, b, None] * corners[:, b]
+    return x
 
 
 def _add(f: Floats, space: Space, points: Points, density: Floats) -> None:

@@ -16,9 +16,9 @@ from xcrack.crack import Crack, front
 from xcrack.cut import Cut
 from xcrack.enrichment import heaviside_nodes, node_level, tip_points, tip_radii
 from xcrack.errors import GeometryError
-from xcrack.mesh import Mesh
+from xcrack.mesh import Mesh, local_edges
 from xcrack.numerics import Numerics
-from xcrack.simplex import cell_nodes, node_points, shape_derivatives, shape_values
+from xcrack.simplex import cell_nodes, node_points
 from xcrack.strip import front_frames
 from xcrack.williams import polar, tip_values
 
@@ -204,38 +204,52 @@ class Space:
         side : (q, cracks) array
             Side of each crack on which the point lies: +1, -1, or 0 where that means nothing.
         """
-        cell = batch.cells[row]
-        N = shape_values(self.order, bary)
-        values, gradients = [N], []
-        if slopes:
-            dN = _to_place(shape_derivatives(self.order, bary), self.mesh.gradient[cell])
-            gradients.append(dN)
-        for c in batch.cracks:
-            nodes = self.cell_nodes[cell]
-            jump = side[:, c, None] - self.node_side[c][nodes]
-            jump = np.where(self.heaviside[c][nodes] >= 0, jump, 0.0)
-            values.append(N * jump)
-            if slopes:
-                gradients.append(dN * jump[..., None])
-        for t in batch.tips:
-            F, dF = self.tip_tables(t, batch, row, bary, side, slopes)
-            values.append(F)
-            gradients.append(dF)
-        if not slopes:
-            return np.concatenate(values, axis=1), np.zeros((0, 0, self.dim))
-        if len(values) == 1:
-            return N, dN
-        return np.concatenate(values, axis=1), np.concatenate(gradients, axis=1)
+        from xcrack.kernels.shapes import set_jumps, set_standard
 
-    def tip_tables(
-        self, t: int, batch: Batch, row: Ints, bary: Floats, side: Ints, slopes: bool = True
-    ) -> tuple[Floats, Floats]:
-        """Values `(q, k)` and, if wanted, gradients `(q, k, d)` of the functions of tip t."""
-        from xcrack.kernels.tips import tip_tables
+        mesh, n = self.mesh, self.cell_nodes.shape[1]
+        width = batch.functions.shape[1]
+        N = np.empty((len(row), width))
+        G = np.empty((len(row) if slopes else 0, width, self.dim))
+        bary = np.ascontiguousarray(bary)
+        gradient, edges = mesh.gradient[batch.cells], local_edges(self.dim)
+        set_standard(N, G, row, bary, gradient, edges[: len(edges) if self.order == 2 else 0])
+        first = n
+        for c in batch.cracks:
+            own = np.ascontiguousarray(side[:, c])
+            nodes = self.cell_nodes[batch.cells]
+            set_jumps(N, G, first, row, own, nodes, self.node_side[c], self.heaviside[c])
+            first += n
+        for t in batch.tips:
+            self._tabulate_tip(t, batch, (N, G), first, row, bary, side)
+            first += (self.dim + 1) * self.tips[t].functions
+        return N, G
+
+    def tip_values(self, batch: Batch, row: Ints, bary: Floats, side: Ints) -> Floats:
+        """Values `(q, k)` of the functions of all tips of a batch."""
+        count = [(self.dim + 1) * self.tips[t].functions for t in batch.tips]
+        tables = np.empty((len(row), sum(count))), np.empty((0, sum(count), self.dim))
+        for t, first in zip(batch.tips, np.cumsum([0, *count]), strict=False):
+            self._tabulate_tip(t, batch, tables, int(first), row, bary, side)
+        return tables[0]
+
+    def _tabulate_tip(
+        self,
+        t: int,
+        batch: Batch,
+        tables: tuple[Floats, Floats],
+        first: int,
+        row: Ints,
+        bary: Floats,
+        side: Ints,
+    ) -> None:
+        """Set values and, if there is room for them, gradients of the functions of tip t."""
+        from xcrack.kernels.tips import set_tips
 
         tip = self.tips[t]
         levels = self.cuts[tip.crack].level_set
-        return tip_tables(
+        set_tips(
+            *tables,
+            first,
             row,
             np.ascontiguousarray(bary),
             np.ascontiguousarray(side[:, tip.crack]),
@@ -245,7 +259,6 @@ class Space:
             levels.psi[tip.number],
             tip.point_to_function >= 0,
             self.tip_shift[t],
-            slopes,
         )
 
     @cached_property
@@ -258,14 +271,6 @@ class Space:
             r, theta = polar(levels.psi[tip.number], phi, np.where(phi == 0, 1, 0))
             shifts.append(lock(tip_values(r, theta, tip.functions)))
         return tuple(shifts)
-
-
-def _to_place(derivative: Floats, gradient: Floats) -> Floats:
-    """Derivatives by barycentric coordinates `(q, n, d + 1)` to those by place `(q, n, d)`."""
-    result = derivative[:, :, 0, None] * gradient[:, None, 0]
-    for b in range(1, gradient.shape[1]):
-        result += derivative[:, :, b, None] * gradient[:, None, b]
-    return np.asarray(result)
 
 
 def fronts(crack: Crack) -> tuple[list[Floats], list[Floats]]:

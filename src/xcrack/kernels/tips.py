@@ -7,13 +7,18 @@ import numpy as np
 
 
 @numba.njit(cache=True, error_model="numpy")
-def tip_tables(row, bary, side, nodes, gradient, phi, psi, active, shift, slopes):  # type: ignore[no-untyped-def]
-    """Shifted tip functions times hats, and their gradients.
+def set_tips(value, slope, first, row, bary, side, nodes, gradient, phi, psi, active, shift):  # type: ignore[no-untyped-def]
+    """Set shifted tip functions times hats from column `first` on, and their gradients.
 
     F = sqrt(r) {cos(t/2), sin(t/2), sin(t/2) sin(t), cos(t/2) sin(t)}, the first k of them.
 
     Parameters
     ----------
+    value : (q, n) array
+        Changed in place.
+    slope : (q or 0, n, d) array
+        Changed in place; of length 0 where it is not wanted.
+    first : int
     row : (q,) array of int
         Cell of each point.
     bary : (q, d + 1) array
@@ -27,19 +32,11 @@ def tip_tables(row, bary, side, nodes, gradient, phi, psi, active, shift, slopes
         Points that carry the functions.
     shift : (n, k) array
         The functions at the points.
-    slopes : bool
-        Whether gradients are wanted.
-
-    Returns
-    -------
-    value : (q, (d + 1) k) array
-    slope : (q, (d + 1) k, d) array, of length 0 where it is not wanted
     """
     q, corners = bary.shape
     d = corners - 1
     k = shift.shape[1]
-    value = np.zeros((q, corners * k))
-    slope = np.zeros((q if slopes else 0, corners * k, d))
+    slopes = len(slope) > 0
     F, ahead, normal = np.empty(4), np.empty(4), np.empty(4)
     to_psi, to_phi = np.empty(d), np.empty(d)
     for p in range(q):
@@ -72,16 +69,15 @@ def tip_tables(row, bary, side, nodes, gradient, phi, psi, active, shift, slopes
                 normal[f] = (0.5 * F[f] * S + turn * C) / root
         for b in range(corners):
             node = nodes[e, b]
-            if not active[node]:
-                continue
             for f in range(k):
-                lifted = root * F[f] - shift[node, f]
-                value[p, b * k + f] = bary[p, b] * lifted
+                to = first + b * k + f
+                lifted = root * F[f] - shift[node, f] if active[node] else 0.0
+                value[p, to] = bary[p, b] * lifted
                 if slopes:
                     for j in range(d):
                         steep = ahead[f] * to_psi[j] + normal[f] * to_phi[j]
-                        slope[p, b * k + f, j] = lifted * gradient[e, b, j] + bary[p, b] * steep
-    return value, slope
+                        total = lifted * gradient[e, b, j] + bary[p, b] * steep
+                        slope[p, to, j] = total if active[node] else 0.0
 
 
 @numba.njit(cache=True, error_model="numpy")
