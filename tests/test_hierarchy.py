@@ -6,6 +6,7 @@ import scipy.sparse as sp
 import scipy.sparse.linalg as sla
 
 import xcrack as xc
+import xcrack.hierarchy as multigrid
 from xcrack.assembly import bulk, rigid_modes
 from xcrack.hierarchy import Bordered, extended, hierarchy, largest_eigenvalue, row_blocks
 from xcrack.kernels.cycle import first_step, next_step
@@ -178,6 +179,21 @@ def test_without_supports():
     pinned = sp.csc_matrix(A + 1e-2 * sp.csr_matrix(modes @ modes.T))
     exact = sla.spsolve(pinned, b)
     assert np.abs(y - exact).max() <= 1e-8 * np.abs(exact).max()
+
+
+@pytest.mark.parametrize("E", [1.0, 2.1e5])
+def test_one_aggregate_without_supports(monkeypatch, E):
+    """The coarsest matrix is round-off alone: inverted, it would swamp everything."""
+    monkeypatch.setattr(multigrid, "_COARSEST", 6)
+    stiffness, fixed = body((7, 6, 7), held="not", E=E)
+    modes = np.linalg.qr(rigid_modes(stiffness.mesh.points))[0]
+    A, levels, K = operator_of(stiffness, fixed, modes)
+    assert levels.coarsest.shape == (6, 6)
+    b = load(levels)
+    b -= modes @ (modes.T @ b)
+    y, steps = conjugate_gradients(K, b, np.zeros_like(b), 1e-11)
+    assert steps <= 35
+    assert np.linalg.norm(b - A @ y) <= 2e-11 * np.linalg.norm(b)
 
 
 def test_a_small_body_is_solved_at_once():

@@ -277,6 +277,7 @@ def hierarchy(bulk: Bulk, fixed: Bools) -> Hierarchy:
         largest = largest_eigenvalue(blocks, diagonal)
         P, candidates = _prolongator(A, diagonal, largest, candidates)
         levels.append(_level(blocks, diagonal, largest, P))
+        scale = float(diagonal.max())
         A = sp.bsr_matrix(P.T @ (A @ P), blocksize=(P.blocksize[1],) * 2)
         if A.shape[0] > 0.7 * P.shape[0]:
             break
@@ -288,7 +289,7 @@ def hierarchy(bulk: Bulk, fixed: Bools) -> Hierarchy:
         matrix=finest,
         diagonal=lock(matrix.diagonal()),
         levels=tuple(levels),
-        coarsest=_inverse(A.toarray()),
+        coarsest=_inverse(A.toarray(), scale),
     )
 
 
@@ -375,10 +376,15 @@ def _reciprocal(diagonal: Floats) -> Floats:
     return np.where(alive, 1 / np.where(alive, diagonal, 1.0), 0.0)
 
 
-def _inverse(A: Floats) -> Any:
-    """Pseudo-inverse of a symmetric matrix, in single precision."""
-    root = np.sqrt(_reciprocal(np.diag(A)))
+def _inverse(A: Floats, scale: float) -> Any:
+    """Pseudo-inverse of a symmetric matrix, in single precision.
+
+    A body that nothing holds may end in one aggregate, whose matrix is round-off of entries of
+    size `scale`: nothing of it is inverted.
+    """
+    diagonal = np.diag(A)
+    root = np.sqrt(np.where(diagonal > _NULL * scale, _reciprocal(diagonal), 0.0))
     w, V = np.linalg.eigh(root[:, None] * A * root)
-    kept = w > _NULL * w[-1]
+    kept = w > _NULL * max(w[-1], _NULL)
     V = root[:, None] * V[:, kept]
     return lock(((V / w[kept]) @ V.T).astype(np.float32))
