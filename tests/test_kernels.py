@@ -1,6 +1,7 @@
 """Each kernel against a twin without tricks."""
 
 import numpy as np
+import pytest
 import scipy.sparse as sp
 
 import scenes
@@ -84,3 +85,33 @@ def test_dense_blocks():
     found = dense_blocks(K.indptr, K.indices, K.data, members, offsets)
     first, second = matrix[np.ix_(members[:3], members[:3])], matrix[np.ix_([8, 3], [8, 3])]
     np.testing.assert_array_equal(found, np.concatenate([first.ravel(), second.ravel()]))
+
+
+def test_bisect_fills_triangles_and_stops_at_tips():
+    """Parts add up to their triangle; none is larger than its distance to a tip but the marked."""
+    from xcrack.kernels.bisect import bisect
+
+    rng = np.random.default_rng(4410)
+    x, tips = rng.uniform(size=(20, 3, 2)), rng.uniform(size=(2, 2))
+    nothing = np.empty(0, int), np.empty((0, 3, 3)), np.empty(0, int), np.empty(0, bool)
+    n = bisect(x, tips, 4, False, *nothing)
+    owner, depth = np.empty(n, np.int64), np.empty(n, np.int64)
+    bary, near = np.empty((n, 3, 3)), np.empty(n, bool)
+    assert bisect(x, tips, 4, True, owner, bary, depth, near) == n
+    assert np.bincount(owner, 0.25**depth) == pytest.approx(np.ones(20), abs=1e-14)
+    centre = np.zeros((20, 3))
+    np.add.at(centre, owner, 0.25 ** depth[:, None] * bary.mean(axis=1))
+    assert centre == pytest.approx(np.full((20, 3), 1 / 3), abs=1e-14)
+    for s, local, level, close in zip(owner, bary, depth, near, strict=True):
+        part = local @ x[s]
+        size = max(np.linalg.norm(part[i] - part[i - 1]) for i in range(3))
+        weights = np.linspace(0, 1, 101)
+        edge = [w * part[i] + (1 - w) * part[i - 1] for i in range(3) for w in weights]
+        away = min(np.linalg.norm(np.array(edge) - tip, axis=1).min() for tip in tips)
+        inside = [
+            (np.linalg.solve(np.vstack([part.T, np.ones(3)]), [*tip, 1]) >= 0).all() for tip in tips
+        ]
+        # The edges are sampled: what lies within a hundredth may be either.
+        if any(inside) or abs(size - away) > 0.01 * size:
+            assert close == (any(inside) or size > away)
+        assert level == 4 or not close

@@ -12,7 +12,6 @@ import numpy as np
 from xcrack.arrays import Bools, Floats, Ints, offsets, ranges
 from xcrack.errors import GeometryError
 from xcrack.locate import closest_on_segment
-from xcrack.mesh import local_edges
 from xcrack.quadrature_front import front_points
 from xcrack.simplex import conical, gauss, simplex_rule
 from xcrack.space import Space
@@ -193,57 +192,34 @@ _Fans = tuple[Ints, Floats, Floats]
 
 def _towards_tips(space: Space, subs: SubCells, rows: Ints) -> tuple[Ints, Floats, Floats, _Fans]:
     """Bisect sub-cells until they are no larger than their distance to a tip."""
+    from xcrack.kernels.bisect import bisect
+
     mesh = space.mesh
     tips = np.array([tip.x for tip in space.tips]).reshape(-1, mesh.dim)
-    fan_rows = rows[subs.fan[rows]]
+    fan_rows, others = rows[subs.fan[rows]], rows[~subs.fan[rows]]
     fans = [(fan_rows, subs.bary[fan_rows], subs.fraction[fan_rows])]
-    number, bary = rows[~subs.fan[rows]], subs.bary[rows[~subs.fan[rows]]]
-    share = subs.fraction[number]
-    done = []
-    if not len(rows):
-        return number, bary, share, fans[0]
-    for level in range(_LEVELS + 1):
-        x = np.einsum("svb,sbd->svd", bary, mesh.points[mesh.cells[subs.cell[number]]])
-        size = np.linalg.norm(
-            x[:, local_edges(mesh.dim)[:, 0]] - x[:, local_edges(mesh.dim)[:, 1]], axis=2
-        )
-        distance = np.min([_to_triangles(tip, x) for tip in tips], axis=0)
-        near = size.max(axis=1) > distance
-        done.append((number[~near], bary[~near], share[~near]))
-        number, bary, share, x = number[near], bary[near], share[near], x[near]
-        if level == _LEVELS or not len(number):
-            break
-        number = np.repeat(number, 4)
-        share = np.repeat(share / 4, 4)
-        bary = _quartered(bary)
-    if len(number):
-        nearest = tips[np.argmin([_to_triangles(tip, x) for tip in tips], axis=0)]
-        fans.append(_fan_around(number, bary, share, x, nearest))
-    a, b, c = (np.concatenate(p) for p in zip(*done, strict=True))
+    x = subs.bary[others] @ mesh.points[mesh.cells[subs.cell[others]]]
+
+    def parts(n: int) -> tuple[Ints, Floats, Ints, Bools]:
+        integers = np.empty((2, n), dtype=np.int64)
+        return integers[0], np.empty((n, 3, 3)), integers[1], np.empty(n, dtype=bool)
+
+    found = parts(bisect(x, tips, _LEVELS, False, *parts(0)))
+    bisect(x, tips, _LEVELS, True, *found)
+    owner, local, depth, near = found
+    number = others[owner]
+    bary, share = local @ subs.bary[number], subs.fraction[number] / 4.0**depth
+    if near.any():
+        x = local[near] @ x[owner[near]]
+        middle = x.mean(axis=1)
+        nearest = np.argmin(np.linalg.norm(middle[:, None] - tips, axis=2), axis=1)
+        fans.append(_fan_around(number[near], bary[near], share[near], x, tips[nearest]))
     f = tuple(np.concatenate(p) for p in zip(*fans, strict=True))
-    return a, b, c, (f[0], f[1], f[2])
-
-
-def _to_triangles(tip: Floats, x: Floats) -> Floats:
-    """Distance of a tip to triangles `(s, 3, 2)`, 0 inside."""
-    pairs = [(0, 1), (1, 2), (2, 0)]
-    edge = [
-        np.linalg.norm(tip - closest_on_segment(tip, x[:, i], x[:, j]), axis=1) for i, j in pairs
-    ]
-    turn = [_cross(x[:, j] - x[:, i], tip - x[:, i]) for i, j in pairs]
-    inside = (np.min(turn, axis=0) >= 0) | (np.max(turn, axis=0) <= 0)
-    return np.where(inside, 0.0, np.min(edge, axis=0))
+    return number[~near], bary[~near], share[~near], (f[0], f[1], f[2])
 
 
 def _cross(a: Floats, b: Floats) -> Floats:
     return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
-
-
-def _quartered(bary: Floats) -> Floats:
-    a, b, c = bary[:, 0], bary[:, 1], bary[:, 2]
-    ab, bc, ca = (a + b) / 2, (b + c) / 2, (c + a) / 2
-    children = [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]
-    return np.stack([np.stack(t, axis=1) for t in children], axis=1).reshape(-1, 3, 3)
 
 
 def _fan_around(number: Ints, bary: Floats, share: Floats, x: Floats, tip: Floats) -> _Fans:
