@@ -12,9 +12,12 @@ _TITLES = {
     "edge": "Edge crack, K_I = 1 and K_II = 0.5",
     "half_closed": "Crack in bending, a third of it closed",
     "closed": "Closed edge crack that slides",
-    "growth": "A crack that turns: 15 steps",
+    "hole": "Closed crack at a hole, exact pressure (mesh not timed)",
+    "growth": "A crack that turns while it grows, in 15 steps where not named",
+    "life": "Life of an edge crack, over the number of steps",
     "penny": "Penny under tension",
     "penny_closed": "Penny, closed and sheared",
+    "cylinder": "Notched bar bent across its crack (mesh not timed)",
 }
 _ERRORS = {
     "tip": "end of the tip, in advances",
@@ -22,6 +25,10 @@ _ERRORS = {
     "pressure": "pressure (L2)",
     "rms": "K_I, root of the mean square along the front",
     "K_I": "K_I",
+    "energy": "energy norm",
+    "path": "end of the tip, against steps of no length",
+    "life": "cycles",
+    "closed share": "closed share of the lips",
 }
 _DEFAULT, _OPPONENT, _QUOTED = "#c0392b", "#1f4e79", "#7f7f7f"
 _OTHERS = ("#2e8b57", "#d68910", "#7d3c98", "#138d90", "#6e5a3b", "#b03a75", "#5d8a1f", "#3f6fd1")
@@ -54,22 +61,23 @@ def draw(record: dict[str, Any], folder: Path) -> list[Path]:
     settings = [r for r in rows if r["kind"] in ("default", "setting")]
     crowded = len({r["series"] for r in settings}) > _MOST
     error = next(iter(rows[0]["errors"]))
-    found = [_chart(record, error, folder / f"{scene}.png", lambda r: not crowded or _main(r))]
+    found = [_chart(record, error, folder / f"{scene}.png", partial(_shown, error, crowded))]
     if crowded:
         path = folder / f"{scene}_settings.png"
         found.append(_chart(record, error, path, lambda r: r in settings, quoted=False))
-    for name in ("pressure", "rms"):
-        if len({r["series"] for r in rows if name in r["errors"]}) > 1:
-            path = folder / f"{scene}_{name}.png"
-            found.append(_chart(record, name, path, partial(_has, name), quoted=False))
+    for name in ("pressure", "rms", "energy", "path", "closed share"):
+        if name != error and len({r["series"] for r in rows if name in r["errors"]}) > 1:
+            path = folder / f"{scene}_{name.replace(' ', '_')}.png"
+            few = crowded and name == "energy"
+            found.append(_chart(record, name, path, partial(_shown, name, few), quoted=False))
     if any(r["kind"] == "off" for r in record["rows"]):
         found.append(_ratios(record, folder / f"{scene}_cost.png"))
     return found
 
 
-def _has(name: str, row: dict[str, Any]) -> bool:
-    """Whether a row has an error of this name."""
-    return name in row["errors"]
+def _shown(name: str, few: bool, row: dict[str, Any]) -> bool:
+    """Whether a row has an error of this name, and is one of the main ones where few are shown."""
+    return name in row["errors"] and (not few or _main(row))
 
 
 def _main(row: dict[str, Any]) -> bool:
@@ -128,7 +136,7 @@ def _chart(
 def _styles(rows: Sequence[dict[str, Any]]) -> dict[str, dict[str, Any]]:
     """Line and mark of each series: defaults and opponents stand out."""
     found: dict[str, dict[str, Any]] = {}
-    others = 0
+    others = opponents = 0
     for row in rows:
         series, kind = row["series"], row["kind"]
         if series in found:
@@ -137,8 +145,11 @@ def _styles(rows: Sequence[dict[str, Any]]) -> dict[str, dict[str, Any]]:
             style = {"color": _DEFAULT, "marker": "o", "lw": 2.4, "ms": 7, "zorder": 5}
             label = "xcrack, default settings"
         elif kind == "opponent":
-            style = {"color": _OPPONENT, "marker": "s", "lw": 2.0, "ms": 6, "zorder": 4}
-            label = series
+            style = {
+                "color": _OPPONENT, "marker": "sD^v"[opponents % 4], "lw": 2.0, "ms": 6,
+                "zorder": 4, "ls": "--" if opponents else "-",
+            }  # fmt: skip
+            label, opponents = series, opponents + 1
         else:
             style = {
                 "color": _OTHERS[others % len(_OTHERS)], "marker": _MARKS[others % len(_MARKS)],
@@ -161,7 +172,7 @@ def _ratios(record: dict[str, Any], path: Path) -> Path:
     ratio = [r[clock] / off[r["size"]][clock] for r in on]
     unknowns = [r["unknowns"] for r in on]
     axis.plot(unknowns, ratio, color=_DEFAULT, marker="o", lw=2, label="measured")
-    aim = 2.0 if record["scene"].startswith("penny") else 1.25
+    aim = 2.0 if record["scene"].startswith(("penny", "cylinder")) else 1.25  # space, plane
     axis.axhline(aim, color="0.4", ls="--", lw=1, label=f"aim: {aim:g}")
     axis.axhline(1.0, color="0.8", lw=1)
     axis.set(

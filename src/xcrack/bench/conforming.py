@@ -11,7 +11,16 @@ from typing import Any
 import numpy as np
 
 from xcrack.arrays import Floats, Ints
-from xcrack.bench.fields import E_PRIME, KOLOSOV, LAMBDA, MU, Field, edge_fields, stress_of
+from xcrack.bench.fields import (
+    E_PRIME,
+    KOLOSOV,
+    LAMBDA,
+    MU,
+    Field,
+    edge_fields,
+    energy,
+    stress_of,
+)
 from xcrack.gmsh_session import session
 from xcrack.williams import unit_gradients
 
@@ -37,7 +46,9 @@ def missing() -> str:
 
 
 def cracked_square(crack: Floats, grading: Grading) -> tuple[Floats, Ints, int]:
-    """Triangles of [-1, 1]² with the lips of a crack from the left side apart, and the tip's node.
+    """Triangles of a plate with the lips of a crack from its left side apart, and the tip's node.
+
+    The plate is [x, 1] x [-1, 1], x that of the mouth.
 
     Parameters
     ----------
@@ -51,7 +62,8 @@ def cracked_square(crack: Floats, grading: Grading) -> tuple[Floats, Ints, int]:
     cells : (m, 3)
     tip : int
     """
-    corners = [(-1, -1), (1, -1), (1, 1), (-1, 1)]
+    left = float(crack[0, 0])
+    corners = [(left, -1), (1, -1), (1, 1), (left, 1)]
     x, y = (float(v) for v in crack[-1])
     with session() as gmsh:
         geo = gmsh.model.geo
@@ -194,8 +206,32 @@ def interaction(basis: Any, u: Floats, tip: Floats, ahead: Floats, radius: float
     return 0.5 * E_PRIME * np.einsum("mqj,qj,q->m", flux, q, np.asarray(local.dx).ravel())
 
 
+def energy_error(basis: Any, u: Floats, stress: Field) -> float:
+    """Relative error in the energy norm against an exact stress field."""
+    import skfem
+
+    # Not at the tip: points lie inside, and quarter points take the singular field out there.
+    fine = skfem.Basis(basis.mesh, basis.elem, intorder=8)
+    x = np.asarray(fine.default_parameters()["x"]).reshape(2, -1).T
+    gradient = np.moveaxis(np.asarray(fine.interpolate(u).grad).reshape(2, 2, -1), -1, 0)
+    exact, weight = stress(x), np.asarray(fine.dx).ravel()
+    wrong, total = (energy(s) @ weight for s in (exact - stress_of(gradient), exact))
+    return float(np.sqrt(wrong / total))
+
+
 def edge(grading: Grading, K: tuple[float, float]) -> tuple[Floats, int]:
     """K and unknowns of the edge crack under its exact field: traction left, else displacement."""
+    basis, u = edge_solution(grading, K)
+    return edge_K(basis, u), int(basis.N)
+
+
+def edge_K(basis: Any, u: Floats) -> Floats:
+    """K at the tip of the edge crack, in the origin."""
+    return interaction(basis, u, np.zeros(2), np.array([1.0, 0.0]), 1.0)
+
+
+def edge_solution(grading: Grading, K: tuple[float, float]) -> tuple[Any, Floats]:
+    """Basis and displacements of the edge crack under its exact field."""
     displacement, stress = edge_fields(K)
     points, cells, tip = cracked_square(np.array([[-1.0, 0.0], [0.0, 0.0]]), grading)
     basis = body(points, cells, tip)
@@ -205,12 +241,11 @@ def edge(grading: Grading, K: tuple[float, float]) -> tuple[Floats, int]:
     held = np.nonzero((x[0] > 1 - 1e-9) | (np.abs(x[1]) > 1 - 1e-9))[0]
     u = basis.zeros()
     u[held] = displacement(x[:, held].T)[np.arange(len(held)), held % 2]
-    u = solved(A, f, u, held)
-    return interaction(basis, u, np.zeros(2), np.array([1.0, 0.0]), 1.0), int(basis.N)
+    return basis, solved(A, f, u, held)
 
 
 def pulled(crack: Floats, grading: Grading, radius: float) -> tuple[Floats, int]:
-    """K and unknowns of [-1, 1]² with a crack from its left side, pulled by 1 at top and bottom."""
+    """K and unknowns of such a plate, pulled by 1 at top and bottom."""
     points, cells, tip = cracked_square(crack, grading)
     basis = body(points, cells, tip)
     A = stiffness(basis)

@@ -4,32 +4,60 @@ from time import process_time
 
 import numpy as np
 
-from xcrack.arrays import Floats
+import xcrack as xc
 from xcrack.bench.conforming import Grading, pulled
-from xcrack.bench.scenes import DA, N_STEPS, TURNING, Outcome
+from xcrack.bench.fields import NU
+from xcrack.bench.scenes import Outcome
+from xcrack.bench.scenes_growth import A0, A1, GROWN, LAW, N_STEPS, TURNING, exact_life, tip_errors
 from xcrack.criteria import kink_angle
+from xcrack.cycles import cycles_between
 
 
-def grown(grading: Grading, reference: Floats, steps: int = N_STEPS) -> Outcome:
-    """Steps of the turning growth; error of where the tip ends, in advances.
+def grown(grading: Grading, steps: int = N_STEPS) -> Outcome:
+    """The turning growth by remeshing; errors of where the tip ends.
 
     Parameters
     ----------
     grading : Grading
-    reference : (2,)
-        Tip after the steps.
     steps : int
     """
     crack, unknowns, times = np.array(TURNING), 0, [process_time()]
+    da = GROWN / steps
     for step in range(steps + 1):
-        K, unknowns = pulled(crack, grading, DA)
+        K, unknowns = pulled(crack, grading, da)
         last = crack[-1] - crack[-2]
         direction = np.arctan2(last[1], last[0]) + float(kink_angle(K))
         ahead = np.array([np.cos(direction), np.sin(direction)])
         if step < steps:
-            crack = np.vstack([crack, crack[-1] + DA * ahead])
+            crack = np.vstack([crack, crack[-1] + da * ahead])
         times.append(process_time())
     lasted = np.diff(times)
     parts = {"first step": float(lasted[0]), "later step": float(np.median(lasted[1:]))}
-    error = float(np.hypot(*(crack[-1] - reference))) / DA
-    return Outcome({"tip": error}, unknowns, parts)
+    return Outcome(tip_errors(crack[-1], da), unknowns, parts)
+
+
+def life(grading: Grading, steps: int, seed: int) -> Outcome:
+    """Cycles of the edge crack from A0 to A1, counted between the steps as xcrack does.
+
+    Parameters
+    ----------
+    grading : Grading
+    steps : int
+        Of one length.
+    seed : int
+        Changes the coarse cells by some per cent.
+    """
+    grading = Grading(grading.near, grading.growth, grading.far / (1 + 0.03 * seed))
+    crack, unknowns, rates = np.array([(0.0, 0.0), (A0, 0.0)]), 0, []
+    da = (A1 - A0) / steps
+    for _ in range(steps + 1):
+        K, unknowns = pulled(crack, grading, A0)
+        kink, dK, _ = xc.max_hoop_stress(np.stack([0 * K, K])[:, None], NU)
+        rates.append(float(LAW(dK, np.zeros(1))[0]))
+        last = crack[-1] - crack[-2]
+        direction = np.arctan2(last[1], last[0]) + float(kink[0])
+        ahead = np.array([np.cos(direction), np.sin(direction)])
+        crack = np.vstack([crack, crack[-1] + da * ahead])
+    a, rate = np.linspace(A0, A1, steps + 1), np.array(rates)
+    cycles = float(cycles_between(a[:-1], a[1:], rate[:-1], rate[1:]).sum())
+    return Outcome({"life": abs(cycles / exact_life() - 1)}, unknowns)

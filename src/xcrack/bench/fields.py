@@ -23,6 +23,13 @@ def stress_of(gradient: Floats) -> Floats:
     return 2 * MU * strain + LAMBDA * trace * np.eye(2)
 
 
+def energy(stress: Floats) -> Floats:
+    """Twice the energy of a volume in plane strain, sigma : C^-1 : sigma, `(n,)`."""
+    trace = np.trace(stress, axis1=-2, axis2=-1)
+    square = np.einsum("...ij,...ij->...", stress, stress)
+    return np.asarray((1 + NU) / E * (square - NU * trace**2))
+
+
 def edge_fields(K: tuple[float, float], pressure: float = 0.0) -> tuple[Field, Field]:
     """Displacement and stress of Williams (1957) at a tip at 0, crack on x < 0, y = 0.
 
@@ -72,6 +79,31 @@ def closure_pressure(x: Floats, s_m: float, s_b: float = 1.0) -> Floats:
     r = np.abs(x - (1 - c))
     p = s_b * (r + c / 2) * np.sqrt(np.maximum(r - c, 0) / (r + c))
     return np.where(x < 1 - 2 * c, p, 0.0)
+
+
+def kirsch(angle: float) -> Field:
+    """Stress around a hole of radius 1 in a plate pressed by 1 across a direction (Kirsch, 1898).
+
+    The line that leaves the hole in that direction is under `kirsch_pressure` and free of shear.
+    """
+
+    def stress(x: Floats) -> Floats:
+        r, along = np.hypot(x[:, 0], x[:, 1]), np.arctan2(x[:, 1], x[:, 0])
+        q, c2, s2 = 1 / r**2, np.cos(2 * (along - angle)), np.sin(2 * (along - angle))
+        rr = -0.5 * ((1 - q) - (1 - 4 * q + 3 * q**2) * c2)
+        tt = -0.5 * ((1 + q) + (1 + 3 * q**2) * c2)
+        rt = -0.5 * (1 + 2 * q - 3 * q**2) * s2
+        c, s = np.cos(along), np.sin(along)
+        xx, yy = rr * c**2 + tt * s**2 - 2 * rt * s * c, rr * s**2 + tt * c**2 + 2 * rt * s * c
+        xy = (rr - tt) * s * c + rt * (c**2 - s**2)
+        return np.stack([np.stack([xx, xy], -1), np.stack([xy, yy], -1)], -1)
+
+    return stress
+
+
+def kirsch_pressure(r: Floats) -> Floats:
+    """Pressure on that line at a distance from the middle of the hole."""
+    return 0.5 * (2 + 1 / r**2 + 3 / r**4)
 
 
 def penny(radius: float, tension: float, shear: float = 0.0) -> Field:

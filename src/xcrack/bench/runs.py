@@ -8,7 +8,7 @@ import platform
 import subprocess
 import sys
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from statistics import median
@@ -18,6 +18,7 @@ from typing import Any
 from xcrack.bench.scenes import Outcome
 
 Row = dict[str, Any]
+Timed = tuple[Outcome, float, float]  # with wall and processor time
 _PACKAGES = ("xcrack", "numpy", "scipy", "numba", "gmsh", "scikit-fem", "pyamg", "matplotlib")
 
 
@@ -29,17 +30,22 @@ class Case:
     ----------
     series : str
         Name of the curve that the point belongs to.
-    kind : {"default", "setting", "mesh", "opponent"}
-        Default settings of xcrack, others, another kind of mesh, another method.
+    kind : {"default", "setting", "mesh", "steps", "opponent", "off"}
+        Default settings of xcrack, others, another kind of mesh, other steps of growth, another
+        method, without contact.
     size : str
         What the point differs by from others of its series.
     run : callable (seed) -> Outcome
+        What is timed; the `later` errors of the outcome are not.
+    prepare : callable (), optional
+        What goes before and is not timed, such as a mesh that all cases share.
     """
 
     series: str
     kind: str
     size: str
     run: Callable[[int], Outcome]
+    prepare: Callable[[], object] | None = None
 
 
 def measure(cases: Sequence[Case], repeats: int, say: Callable[[str], None]) -> list[Row]:
@@ -60,20 +66,42 @@ def measure(cases: Sequence[Case], repeats: int, say: Callable[[str], None]) -> 
     -------
     list of dict
     """
-    found: dict[int, list[tuple[Outcome, float, float]]] = {i: [] for i in range(len(cases))}
+    found: dict[int, list[Timed]] = {i: [] for i in range(len(cases))}
     for seed in range(repeats + 1):
         for i in list(found):
-            wall, processor = perf_counter(), process_time()
             try:
-                outcome = cases[i].run(seed)
+                result = timed(cases[i], seed)
             except Exception as error:
                 say(f"{cases[i].series}, {cases[i].size}: {type(error).__name__}: {error}")
                 del found[i]
                 continue
             if seed:
-                found[i].append((outcome, perf_counter() - wall, process_time() - processor))
+                found[i].append(result)
     rows = [_row(cases[i], results) for i, results in found.items()]
     return [{**row, "MB": memory(cases[i])} for i, row in zip(found, rows)]
+
+
+def timed(case: Case, seed: int) -> Timed:
+    """Outcome of a case with all of its errors, wall and processor time of the run alone.
+
+    Parameters
+    ----------
+    case : Case
+    seed : int
+        Of the mesh.
+
+    Returns
+    -------
+    Outcome, float, float
+    """
+    if case.prepare is not None:
+        case.prepare()
+    wall, processor = perf_counter(), process_time()
+    outcome = case.run(seed)
+    wall, processor = perf_counter() - wall, process_time() - processor
+    if outcome.later is not None:  # it holds the solution: let go of it
+        outcome = replace(outcome, errors={**outcome.errors, **outcome.later()}, later=None)
+    return outcome, wall, processor
 
 
 def memory(case: Case) -> float | None:
@@ -88,6 +116,8 @@ def memory(case: Case) -> float | None:
     float or None
     """
     try:
+        if case.prepare is not None:
+            case.prepare()
         gc.collect()
         ctypes.CDLL("libc.so.6").malloc_trim(0)  # or a run would find free memory of the last one
         Path("/proc/self/clear_refs").write_text("5", encoding="ascii")  # the peak starts anew
@@ -104,7 +134,7 @@ def _resident(name: str) -> float:
     return next(float(x.split()[1]) for x in lines if x.startswith(name)) / 1024
 
 
-def _row(case: Case, results: Sequence[tuple[Outcome, float, float]]) -> Row:
+def _row(case: Case, results: Sequence[Timed]) -> Row:
     outcomes = [outcome for outcome, _, _ in results]
     names = sorted({n for o in outcomes for n in o.errors}, key=list(outcomes[0].errors).index)
     return {

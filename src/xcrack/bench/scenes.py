@@ -5,9 +5,8 @@ hang on one lucky mesh.
 """
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from time import process_time
 
 import numpy as np
 
@@ -27,8 +26,6 @@ from xcrack.bench.fields import (
 _SQUARE = ("left", "right", "bottom", "top")
 STEEL = {2: xc.Isotropic(E, NU, "strain"), 3: xc.Isotropic(E, NU)}
 MODES = (1.0, 0.5)  # K_I and K_II of the edge crack
-TURNING = ((-1.0, 0.0), (-0.5, 0.2))  # crack of the growth, under tension along y
-DA, N_STEPS = 0.05, 15
 PENNY = 0.5  # radius
 
 
@@ -43,11 +40,14 @@ class Outcome:
     unknowns : int
     parts : dict
         Seconds of parts that the scene times itself.
+    later : callable () -> dict, optional
+        Further errors, whose evaluation is no part of the work: called when the clock has stopped.
     """
 
     errors: dict[str, float]
     unknowns: int
     parts: dict[str, float] = field(default_factory=dict)
+    later: Callable[[], dict[str, float]] | None = None
 
 
 @dataclass(frozen=True)
@@ -84,7 +84,7 @@ def mesh_of(s: Settings, half: float, dim: int, seed: int) -> xc.Mesh:
     return xc.Mesh(x, plain.cells, plain.facet_sets)
 
 
-def _quiet(problem: xc.Problem) -> tuple[xc.Solution, xc.SIF]:
+def quiet(problem: xc.Problem) -> tuple[xc.Solution, xc.SIF]:
     """Solution and K; coarse meshes clip the domain and say so, which is not news here."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", xc.XcrackWarning)
@@ -105,8 +105,11 @@ def edge(s: Settings, seed: int) -> Outcome:
         loads=[xc.traction("left", lambda x, n: np.einsum("qij,qj->qi", sigma(x), n))],
         contact="off", order=s.order, numerics=s.numerics,
     )  # fmt: skip
-    solution, sif = _quiet(problem)
-    return Outcome({"K": worst(sif.K[0], MODES)}, solution.n_dof)
+    solution, sif = quiet(problem)
+    return Outcome(
+        {"K": worst(sif.K[0], MODES)}, solution.n_dof,
+        later=lambda: {"energy": xc.energy_error(solution, sigma)},
+    )  # fmt: skip
 
 
 def closed(s: Settings, seed: int) -> Outcome:
@@ -118,7 +121,7 @@ def closed(s: Settings, seed: int) -> Outcome:
         loads=[xc.traction("left", lambda x, n: np.einsum("qij,qj->qi", sigma(x), n))],
         contact=s.contact, order=s.order, numerics=s.numerics,
     )  # fmt: skip
-    solution, sif = _quiet(problem)
+    solution, sif = quiet(problem)
     errors = {"K_II": abs(sif.K_II[0] / 0.5 - 1), "K_I": abs(sif.K_I[0]) / 0.5}
     lips = solution.contact[0]
     if lips is not None:
@@ -134,7 +137,7 @@ def half_closed(s: Settings, seed: int) -> Outcome:
         mesh_of(s, 2.0, 2, seed), STEEL[2], [xc.line_crack([(-1.0, 0.0), (1.0, 0.0)])],
         supports=_imposed(_SQUARE, u), contact=s.contact, order=s.order, numerics=s.numerics,
     )  # fmt: skip
-    solution, sif = _quiet(problem)
+    solution, sif = quiet(problem)
     right = int(np.argmax(sif.x[:, 0]))
     errors = {"K_I": abs(sif.K_I[right] / K - 1), "K_I, closed tip": abs(sif.K_I[1 - right]) / K}
     lips = solution.contact[0]
@@ -149,49 +152,6 @@ def half_closed(s: Settings, seed: int) -> Outcome:
 def worst(K: Floats, exact: Sequence[float]) -> float:
     """Largest relative error of the modes."""
     return float(np.max(np.abs(np.asarray(K) / np.asarray(exact) - 1)))
-
-
-def growth(s: Settings, mesh: str, reference: Floats, steps: int = N_STEPS) -> Outcome:
-    """A crack that turns under tension; error of where its tip ends, in advances.
-
-    Parameters
-    ----------
-    s : Settings
-    mesh : {"uniform", "graded"}
-        Graded: by gmsh, small cells along where the crack runs, `s.n` cells a side of that size.
-    reference : (2,)
-        Tip after the steps.
-    steps : int
-    """
-    start = process_time()
-    if mesh == "uniform":
-        body = xc.box((-1, -1), (1, 1), s.n)
-    else:
-        body = xc.plate(
-            2.0, 2.0, lower=(-1.0, -1.0), size=0.25, size_near=2.0 / s.n,
-            along=[(-0.6, 0.2), (0.3, 0.35)], band=0.15,
-        )  # fmt: skip
-    tension = np.diag([0.0, 1.0])
-    loads = [xc.traction(side, lambda x, n: n @ tension) for side in ("bottom", "top")]
-    problem = xc.Problem(
-        body, STEEL[2], [xc.line_crack([(-1.1, -0.04), TURNING[1]])], loads=loads,
-        order=s.order, numerics=s.numerics,
-    )  # fmt: skip
-    times, tip, unknowns = [start], TURNING[1], 0
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", xc.XcrackWarning)
-        run = xc.grow(
-            problem, xc.paris(C=1e-3, m=2.0), xc.max_hoop_stress, xc.Cycle(0.0, 1.0), DA,
-            max_steps=steps + 1, progress=False,
-        )  # fmt: skip
-        for step in run:
-            times.append(process_time())
-            tip = step.sif[0][0].x[0]
-            unknowns = step.solutions[0].n_dof
-    lasted = np.diff(times)
-    error = float(np.hypot(*(np.asarray(tip) - reference))) / DA
-    parts = {"first step": float(lasted[0]), "later step": float(np.median(lasted[1:]))}
-    return Outcome({"tip": error}, unknowns, parts)
 
 
 def penny_open(s: Settings, seed: int) -> Outcome:
@@ -211,7 +171,7 @@ def _penny(s: Settings, seed: int, stress: tuple[float, float]) -> Outcome:
         supports=[xc.displacement("boundary", lambda x: u(x))],
         contact=s.contact, order=s.order, numerics=s.numerics,
     )  # fmt: skip
-    solution, sif = _quiet(problem)
+    solution, sif = quiet(problem)
     root = np.sqrt(a / np.pi)
     if stress[0] > 0:
         exact = penny_K_I(a, stress[0])
