@@ -52,15 +52,16 @@ def bisect(x, tips, levels, fill, owner, bary, depth, near):  # type: ignore[no-
     count = 0
     for s in range(len(x)):
         top = 1
-        stack[0] = 0.0
         deep[0] = 0
         for i in range(3):
-            stack[0, i, i] = 1.0
+            for b in range(3):
+                stack[0, i, b] = 1.0 if i == b else 0.0
         while top > 0:
             top -= 1
-            own[:] = stack[top]
             level = deep[top]
             for i in range(3):
+                for b in range(3):
+                    own[i, b] = stack[top, i, b]
                 for k in range(2):
                     corner[i, k] = 0.0
                     for b in range(3):
@@ -78,7 +79,9 @@ def bisect(x, tips, levels, fill, owner, bary, depth, near):  # type: ignore[no-
             if not close or level == levels:
                 if fill:
                     owner[count] = s
-                    bary[count] = own
+                    for i in range(3):
+                        for b in range(3):
+                            bary[count, i, b] = own[i, b]
                     depth[count] = level
                     near[count] = close
                 count += 1
@@ -87,10 +90,11 @@ def bisect(x, tips, levels, fill, owner, bary, depth, near):  # type: ignore[no-
                 for b in range(3):
                     middle[i, b] = (own[i, b] + own[(i + 1) % 3, b]) / 2
             for i in range(3):
-                stack[top, i] = middle[i]
-                stack[top + 1 + i, 0] = own[i]
-                stack[top + 1 + i, 1] = middle[i]
-                stack[top + 1 + i, 2] = middle[(i + 2) % 3]
+                for b in range(3):
+                    stack[top, i, b] = middle[i, b]
+                    stack[top + 1 + i, 0, b] = own[i, b]
+                    stack[top + 1 + i, 1, b] = middle[i, b]
+                    stack[top + 1 + i, 2, b] = middle[(i + 2) % 3, b]
             for i in range(4):
                 deep[top + i] = level + 1
             top += 4

@@ -46,19 +46,18 @@ def block_pattern(nodes, n_nodes):  # type: ignore[no-untyped-def]
                     mark[nodes[e, a]] = i
                     found += 1
         indptr[i + 1] = indptr[i] + found
+    # The pattern is symmetric: nodes that go to their neighbours in turn fill sorted rows.
     indices = np.empty(indptr[n_nodes], np.int32)
-    mark[:] = -1
+    place = indptr[:-1].copy()
     for i in range(n_nodes):
-        place = indptr[i]
         for k in range(count[i], count[i + 1]):
             e = around[k]
             for a in range(n):
                 node = nodes[e, a]
-                if mark[node] != i:
-                    mark[node] = i
-                    indices[place] = node
-                    place += 1
-        indices[indptr[i] : place].sort()
+                if mark[node] != n_nodes + i:
+                    mark[node] = n_nodes + i
+                    indices[place[node]] = i
+                    place[node] += 1
     slot = np.empty((m, n, n), np.int32)
     for e in range(m):
         for a in range(n):

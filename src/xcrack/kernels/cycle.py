@@ -40,6 +40,23 @@ def pattern_sizes(indptr, indices, first, n_columns):  # type: ignore[no-untyped
 
 
 @numba.njit(cache=True, error_model="numpy")
+def _sort(values, first, last):  # type: ignore[no-untyped-def]
+    """Sort a stretch (Shell); numba's own sort takes longer to compile than the rest."""
+    gap = 1
+    while 3 * gap + 1 < last - first:
+        gap = 3 * gap + 1
+    while gap > 0:
+        for place in range(first + gap, last):
+            value = values[place]
+            at = place
+            while at >= first + gap and values[at - gap] > value:
+                values[at] = values[at - gap]
+                at -= gap
+            values[at] = value
+        gap //= 3
+
+
+@numba.njit(cache=True, error_model="numpy")
 def fill_blocks(indptr, indices, data, first, start, size, offset, n_columns, shift, columns, values):  # type: ignore[no-untyped-def]  # fmt: skip # noqa: E501
     """Copy the entries of a CSR matrix into blocks of rows, which other matrices may share.
 
@@ -71,7 +88,7 @@ def fill_blocks(indptr, indices, data, first, start, size, offset, n_columns, sh
                 mark[column] = g
                 columns[m] = column
                 m += 1
-        columns[start[g] : m].sort()
+        _sort(columns, start[g], m)
         left, whole = size[g]
         for k in range(start[g], m):
             place[columns[k]] = left + k - start[g]

@@ -48,19 +48,18 @@ def enriched_pattern(functions, n_functions, n_standard):  # type: ignore[no-unt
                     mark[f] = i
                     found += 1
         indptr[i + 1] = indptr[i] + found
+    # The pattern is symmetric: functions that go to their neighbours in turn fill sorted rows.
     indices = np.empty(indptr[n_functions], np.int32)
-    mark[:] = -1
+    place = indptr[:-1].copy()
     for i in range(n_functions):
-        place = indptr[i]
         for k in range(count[i], count[i + 1]):
             e = around[k]
             for a in range(n):
                 f = functions[e, a]
-                if f >= 0 and (f >= n_standard or i >= n_standard) and mark[f] != i:
-                    mark[f] = i
-                    indices[place] = f
-                    place += 1
-        indices[indptr[i] : place].sort()
+                if f >= 0 and (f >= n_standard or i >= n_standard) and mark[f] != n_functions + i:
+                    mark[f] = n_functions + i
+                    indices[place[f]] = i
+                    place[f] += 1
     return indptr, indices
 
 
@@ -114,7 +113,9 @@ def add_stiffness(  # type: ignore[no-untyped-def]
                 active += 1
                 if functions[e, a] < n_standard:
                     plain = active
-        block[: active * d, : active * d] = 0.0
+        for k in range(active * d):
+            for j in range(active * d):
+                block[k, j] = 0.0
         for q in range(offsets[e], offsets[e + 1]):
             for a in range(active):
                 for i in range(d):

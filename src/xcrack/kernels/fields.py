@@ -24,7 +24,10 @@ def set_gradients(gradient, number, slope, functions, row, coefficients):  # typ
     d, states = coefficients.shape[1], coefficients.shape[2]
     for p in range(len(number)):
         to = number[p]
-        gradient[to] = 0.0
+        for i in range(d):
+            for j in range(d):
+                for s in range(states):
+                    gradient[to, i, j, s] = 0.0
         for a in range(slope.shape[1]):
             f = functions[row[p], a]
             if f < 0:

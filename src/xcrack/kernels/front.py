@@ -400,7 +400,9 @@ def lip_terms(  # type: ignore[no-untyped-def]
                     density += t[a] * G[a, 0]
                 if len(gradient) > 0:
                     _into_frame(frame[q], gradient[q, :, :, n], g)
-                    sigma[:] = 0.0
+                    for a in range(3):
+                        for b in range(3):
+                            sigma[a, b] = 0.0
                     if len(initial) > 0:
                         _into_frame(frame[q], initial[q, :, :, n], sigma)
                     trace = lam * (g[0, 0] + g[1, 1] + g[2, 2])

@@ -37,7 +37,9 @@ def add_ring(  # type: ignore[no-untyped-def]
     ahead, normal = np.empty(4), np.empty(4)
     g, sigma = np.empty((3, 2, 2)), np.empty((3, 2, 2))
     factor, turned = np.empty((2, 2)), np.empty((2, 2))
-    largest, smallest = radii.max(), inner.min()
+    largest, smallest = radii[0], inner[0]
+    for k in range(domains):
+        largest, smallest = max(largest, radii[k]), min(smallest, inner[k])
     for p in range(len(weight)):
         x, y = xi[p, 0], xi[p, 1]
         r = math.sqrt(x * x + y * y)
