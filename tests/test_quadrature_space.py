@@ -129,7 +129,7 @@ def gram(space, lips, cell, points, consistent):
     if consistent:
         boundary = boundary_points(space, np.array([cell]), lips)
         part = (row, points.bary, points.weight, points.side)
-        G = corrected(space, batch, part, N, G, boundary)
+        G = corrected(space, batch, part, N, G.copy(), boundary)
     return np.einsum("q,qad,qbd->ab", points.weight, G, G)
 
 
@@ -221,7 +221,7 @@ def test_the_correction_closes_the_defect(name):
         number, row, _ = points.of_cells(batch.cells)
         bary, weight, side = points.bary[number], points.weight[number], points.side[number]
         N, G = space.tabulate(batch, row, bary, side)
-        fixed = corrected(space, batch, (row, bary, weight, side), N, G, boundary)
+        fixed = corrected(space, batch, (row, bary, weight, side), N, G.copy(), boundary)
         chosen = np.isin(boundary.cell, batch.cells)
         brow = np.searchsorted(batch.cells, boundary.cell[chosen])
         values, _ = space.tabulate(batch, brow, boundary.bary[chosen], boundary.side[chosen])

@@ -10,7 +10,6 @@ The integrals over the boundary of a piece use points that neighbours share.
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.sparse as sp
 
 from xcrack.arrays import Floats, Ints, ranges
 from xcrack.cut import Cut
@@ -119,54 +118,41 @@ def corrected(
     Parameters
     ----------
     points : row in batch, barycentric coordinates, weights and sides of the volume points
-    values, gradients : tabulated functions at these points
+    values, gradients : tabulated functions at these points; gradients are changed in place
     boundary : points on the boundary of all pieces
     """
-    from xcrack.kernels.tips import add_correction, add_flux, take_volume
+    from xcrack.kernels.tips import add_correction, add_flux, moments_at, take_volume
 
     row, bary, weight, side = points
-    d = space.dim
+    mesh, d = space.mesh, space.dim
     n_tip = sum((d + 1) * space.tips[t].functions for t in batch.tips)
     first = batch.functions.shape[1] - n_tip
-    x, size = _local(space, batch, row, bary)
+    # Differences of corners avoid the cancellation of absolute coordinates.
+    corners = mesh.points[mesh.cells[batch.cells]]
+    size = mesh.cell_size[batch.cells]
+    corners = (corners - corners.mean(axis=1, keepdims=True)) / size[:, None, None]
+    # In space at order 1 only 1: its pressures cannot be linear to round-off anyway.
+    linear = space.order == 2 or d == 2
     piece, n_pieces = _pieces(space, batch, row, side)
 
     chosen, brow = _of_batch(batch, boundary.cell)
     bary_, bside = boundary.bary[chosen], boundary.side[chosen]
     bvalues = space.tip_values(batch, brow, bary_, bside)
-    bx, _ = _local(space, batch, brow, bary_)
     bpiece = 2 * brow + (boundary.piece_side[chosen] > 0)
 
-    moments, bmoments = _moments(space, x), _moments(space, bx)
-    defect = np.zeros((n_pieces, n_tip, d, moments.shape[1]))
+    moments = moments_at(row, bary, corners, linear)
+    bmoments = moments_at(brow, bary_, corners, linear)
+    count = moments.shape[1]
+    defect, gram = np.zeros((n_pieces, n_tip, d, count)), np.zeros((n_pieces, count, count))
     add_flux(defect, bpiece, bvalues, boundary.normal[chosen], bmoments)
     take_volume(
-        defect, piece, weight, values[:, first:], gradients[:, first:], moments, 1 / size[row]
+        defect, gram, piece, weight, values[:, first:], gradients[:, first:], moments, 1 / size[row]
     )
-    gram = _sum(piece, np.einsum("q,qa,qb->qab", weight, moments, moments), n_pieces)
-    total = np.maximum(gram[:, 0, 0], 1e-300)
-    inverse = np.linalg.pinv(gram / total[:, None, None], rcond=1e-12, hermitian=True)
-    coefficient = np.einsum("pab,pfjb->pfja", inverse, defect / total[:, None, None, None])
-    result = gradients.copy()
-    add_correction(result, first, piece, row, coefficient, moments, batch.functions)
-    return result
-
-
-def _moments(space: Space, x: Floats) -> Floats:
-    """1 and x; in space at order 1 only 1: its pressures cannot be linear to round-off anyway."""
-    one = np.ones((len(x), 1))
-    if space.order == 1 and space.dim == 3:
-        return one
-    return np.concatenate([one, x], axis=1)
-
-
-def _local(space: Space, batch: Batch, row: Ints, bary: Floats) -> tuple[Floats, Floats]:
-    mesh = space.mesh
-    corners = mesh.points[mesh.cells[batch.cells]]
-    centre, size = corners.mean(axis=1), mesh.cell_size[batch.cells]
-    # Summing the differences avoids the cancellation of absolute coordinates.
-    relative = np.einsum("qb,qbd->qd", bary, corners[row] - centre[row][:, None])
-    return relative / size[row][:, None], size
+    total = np.maximum(gram[:, :1, :1], 1e-300)
+    inverse = np.linalg.pinv(gram / total, rcond=1e-12, hermitian=True) / total
+    coefficient = (defect.reshape(n_pieces, -1, count) @ inverse).reshape(defect.shape)
+    add_correction(gradients, first, piece, row, coefficient, moments, batch.functions)
+    return gradients
 
 
 def _pieces(space: Space, batch: Batch, row: Ints, side: Ints) -> tuple[Ints, int]:
@@ -181,11 +167,3 @@ def _of_batch(batch: Batch, cell: Ints) -> tuple[Ints, Ints]:
     place = np.minimum(place, len(batch.cells) - 1)
     chosen = np.nonzero(batch.cells[place] == cell)[0]
     return chosen, place[chosen]
-
-
-def _sum(group: Ints, values: Floats, n: int) -> Floats:
-    gather = sp.csr_matrix(
-        (np.ones(len(group)), (group, np.arange(len(group)))), shape=(n, len(group))
-    )
-    flat = gather @ values.reshape(len(group), -1)
-    return np.asarray(flat).reshape(n, *values.shape[1:])

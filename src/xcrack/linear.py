@@ -99,8 +99,7 @@ def system(
     material: Isotropic | None = None,
 ) -> System:
     """Eliminate known unknowns, change the basis, scale by the diagonal and factor."""
-    basis = scaled_basis(space, K, fixed, numerics, material)
-    reduced = sp.csc_matrix(basis.T @ K @ basis)
+    basis, reduced = _scaled(_columns(space, K, fixed, numerics, material), K)
     apply_inverse = (solver or superlu)(reduced)
     return System(K, ~fixed, basis, reduced, apply_inverse, Count(factorisations=1))
 
@@ -116,17 +115,35 @@ def scaled_basis(
 
     The material counts for the vectorial tip basis alone.
     """
+    return _scaled(_columns(space, K, fixed, numerics, material), K)[0]
+
+
+def _scaled(basis: sp.csr_matrix, K: sp.csr_matrix) -> tuple[sp.csr_matrix, sp.csc_matrix]:
+    """Columns scaled to energy one, those without energy left out, and K in them."""
+    reduced = sp.csc_matrix(basis.T @ (K @ basis))
+    diagonal = reduced.diagonal()
+    if not (diagonal > 0).all():
+        alive = np.nonzero(diagonal > 0)[0]
+        basis, reduced, diagonal = basis[:, alive], reduced[alive][:, alive], diagonal[alive]
+    scale = sp.diags(1 / np.sqrt(diagonal))
+    return sp.csr_matrix(basis @ scale), sp.csc_matrix(scale @ reduced @ scale)
+
+
+def _columns(
+    space: Space, K: sp.csr_matrix, fixed: Bools, numerics: Numerics, material: Isotropic | None
+) -> sp.csr_matrix:
+    """The solver's basis before it is scaled."""
     free = ~fixed
     n = space.n_dof
     first = space.n_nodes * space.dim
-    basis = sp.identity(n, format="csr")
+    changed = None
     if numerics.tip_basis == "vectorial" and space.tips:
-        basis, free = mode_columns(space, material, free)
-        K = sp.csr_matrix(basis.T @ K @ basis)
+        changed, free = mode_columns(space, material, free)
+        K = sp.csr_matrix(changed.T @ K @ changed)
     if numerics.patch and space.tips:
         patch = patch_orthogonal(space, K, free)
-        basis, K = sp.csr_matrix(basis @ patch), sp.csr_matrix(patch.T @ K @ patch)
-    unknowns = np.nonzero(free)[0]
+        changed = sp.csr_matrix(patch if changed is None else changed @ patch)
+        K = sp.csr_matrix(patch.T @ K @ patch)
     if numerics.orthonormal != "none" and n > first:
         blocks = restricted(node_blocks(space, numerics.orthonormal), free)
         Z = orthonormal(K, blocks, np.arange(first, n))
@@ -135,8 +152,5 @@ def scaled_basis(
         keep[:first] = free[:first]
         Z = Z[:, np.nonzero(keep)[0]]
     else:
-        Z = sp.csr_matrix(sp.identity(n, format="csr")[:, unknowns])
-    diagonal = np.asarray((Z.multiply(K @ Z)).sum(axis=0)).ravel()
-    alive = np.nonzero(diagonal > 0)[0]
-    Z = Z[:, alive] @ sp.diags(1 / np.sqrt(diagonal[alive]))
-    return sp.csr_matrix(basis @ Z)
+        Z = sp.identity(n, format="csr")[:, np.nonzero(free)[0]]
+    return sp.csr_matrix(Z if changed is None else changed @ Z)

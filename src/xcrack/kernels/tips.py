@@ -105,12 +105,41 @@ def add_flux(defect, piece, value, normal, moment):  # type: ignore[no-untyped-d
 
 
 @numba.njit(cache=True, error_model="numpy")
-def take_volume(defect, piece, weight, value, slope, moment, scale):  # type: ignore[no-untyped-def]
+def moments_at(row, bary, corners, linear):  # type: ignore[no-untyped-def]
+    """1 and, where wanted, the coordinates at points `(q, 1)` or `(q, d + 1)`.
+
+    Parameters
+    ----------
+    row : (q,) array of int
+        Cell of each point.
+    bary : (q, d + 1) array
+    corners : (m, d + 1, d) array
+        Corners of the cells, from their centre and in units of their size.
+    linear : bool
+    """
+    d = corners.shape[2]
+    moment = np.ones((len(row), d + 1 if linear else 1))
+    if linear:
+        for q in range(len(row)):
+            for j in range(d):
+                x = 0.0
+                for b in range(d + 1):
+                    x += bary[q, b] * corners[row[q], b, j]
+                moment[q, 1 + j] = x
+    return moment
+
+
+@numba.njit(cache=True, error_model="numpy")
+def take_volume(defect, gram, piece, weight, value, slope, moment, scale):  # type: ignore[no-untyped-def]
     """Subtract the volume integral of the gradient of value x moment from each piece.
+
+    The integrals of the products of moments are added to `gram`.
 
     Parameters
     ----------
     defect : (p, f, d, a) array
+        Changed in place.
+    gram : (p, a, a) array
         Changed in place.
     piece : (q,) array of int
     weight : (q,) array
@@ -124,6 +153,9 @@ def take_volume(defect, piece, weight, value, slope, moment, scale):  # type: ig
     for q in range(len(piece)):
         k = piece[q]
         w = weight[q]
+        for a in range(moment.shape[1]):
+            for b in range(moment.shape[1]):
+                gram[k, a, b] += w * moment[q, a] * moment[q, b]
         for f in range(value.shape[1]):
             for j in range(slope.shape[2]):
                 for a in range(moment.shape[1]):
