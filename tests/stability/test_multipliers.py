@@ -38,7 +38,7 @@ def test_pressure_of_bending():
 def test_sliver_of_a_hundred_millionth(order):
     """Uniform pressure, a crack 1e-8 of a cell above nodes: exact to round-off.
 
-    With naive multipliers the system is singular: the last bits decide between round-off and 66 %.
+    With naive multipliers the system is singular: the last bits decide between round-off and 97 %.
     """
     field = scenes.turned(lambda x, y: exact.uniform_stress(x, y, -2, -2, 0, 1.0, 0.3), (0, 0))
     errors = {}
