@@ -11,7 +11,7 @@ is 20 mm thick and 140 mm long, the notch 2 mm deep with 60°, the forces are 12
 E = 210 GPa, nu = 0.3; a force of 1963.5 N at each of the four stations gives 100 MPa of nominal
 bending stress.
 
-    python cylinder_bending.py             more than 10^5 unknowns, a quarter of an hour
+    python cylinder_bending.py             more than 10^5 unknowns, six minutes and more
     python cylinder_bending.py --quick     the same on a coarse mesh, under a minute
     python cylinder_bending.py --skew      a crack inclined by 10° takes half of the section at
                                            once: mixed modes, and the criteria side by side
