@@ -34,8 +34,10 @@ def domain_radius(solution: Solution, t: int) -> tuple[float, float, float]:
     return min(wanted, max(limit, 1.2 * size)), wanted, size
 
 
-def domain_points(space: Space, centre: Floats, radii: tuple[float, float]) -> list[Points]:
-    """Integration points between two radii, denser where cells are large."""
+def domain_points(
+    space: Space, centre: Floats, radii: tuple[float, float]
+) -> list[tuple[Points, Floats]]:
+    """Integration points between two radii and their places, denser where cells are large."""
     mesh = space.mesh
     hollow, radius = radii
     near = np.array(
@@ -48,13 +50,15 @@ def domain_points(space: Space, centre: Floats, radii: tuple[float, float]) -> l
     far = np.linalg.norm(x.mean(axis=1) - centre, axis=1) > radius + mesh.cell_size[near]
     near = near[~inside & ~far]
     share = mesh.cell_size[near] / radius
-    parts: list[Points] = []
+    parts: list[tuple[Points, Floats]] = []
     for low, high, n, degree in ((0.0, 0.03, 4, 4), (0.03, 0.1, 4, 8), (0.1, np.inf, 5, 10)):
         cells = near[(share > low) & (share <= high)]
         for first in range(0, len(cells), _CHUNK):
             points = cell_points(space, cells[first : first + _CHUNK], n, degree)
-            r = np.linalg.norm(position(space, points.cell, points.bary) - centre, axis=1)
-            parts.append(points.chosen((hollow < r) & (r < radius)))
+            x = position(space, points.cell, points.bary)
+            r = np.linalg.norm(x - centre, axis=1)
+            between = (hollow < r) & (r < radius)
+            parts.append((points.chosen(between), x[between]))
     return parts
 
 

@@ -246,16 +246,16 @@ def _domain_parts(
         points = cell_points(space, cells[first : first + _CHUNK], _POINTS, _DEGREE)
         x = position(space, points.cell, points.bary)
         near, feet = curve.near(x, outer)
-        cell, bary, side = points.cell[near], points.bary[near], points.side[near]
-        gradient = gradients_at(space, coefficients, cell, bary, side)
-        behind = np.einsum("qb,qb->q", psi[mesh.cells[cell]], bary) < 0
+        points = points.chosen(near)
+        gradient = gradients_at(space, coefficients, points.cell, points.bary, points.side)
+        behind = np.einsum("qb,qb->q", psi[mesh.cells[points.cell]], points.bary) < 0
         yield integrals(
             curve,
             knots,
             feet,
-            points.weight[near],
+            points.weight,
             gradient - turn,
-            side[:, tip.crack],
+            points.side[:, tip.crack],
             behind,
             solutions[0].problem.material,
             radii,

@@ -29,7 +29,6 @@ from xcrack.domain import domain_points, domain_radius, inner_radii, mean_rotati
 from xcrack.errors import ProblemError, XcrackWarning
 from xcrack.front_sif import along_fronts
 from xcrack.lip_points import LipPoints
-from xcrack.loads import position
 from xcrack.quadrature import Points, cell_side
 from xcrack.sif import SIF
 from xcrack.solution import Solution, gradients_at
@@ -177,9 +176,9 @@ def _integrals(solutions: Sequence[Solution], t: int, radii: Floats) -> Floats:
     coefficients = np.stack([solution.coefficients for solution in solutions], axis=-1)
     # Within the inner radius grad q vanishes: only loads of the volume need points there.
     hollow = 0.0 if _volume_loads(solutions) else float(inner_radii(space.order, radii).min())
-    for points in domain_points(space, tip.x, (hollow, float(radii.max()))):
+    for points, x in domain_points(space, tip.x, (hollow, float(radii.max()))):
         gradient = gradients_at(space, coefficients, points.cell, points.bary, points.side)
-        total += _domain_terms(solutions, t, radii, points, gradient - turn)
+        total += _domain_terms(solutions, t, radii, points, x, gradient - turn)
     return total
 
 
@@ -188,14 +187,18 @@ def _volume_loads(solutions: Sequence[Solution]) -> bool:
 
 
 def _domain_terms(
-    solutions: Sequence[Solution], t: int, radii: Floats, points: Points, gradient: Floats
+    solutions: Sequence[Solution],
+    t: int,
+    radii: Floats,
+    points: Points,
+    x: Floats,
+    gradient: Floats,
 ) -> Floats:
     """Domain integrals over some of the points `(s, radii, 3)`; gradient: (q, d, d, s)."""
     from xcrack.kernels.ring import add_ring
 
     space, material = solutions[0].space, solutions[0].problem.material
     tip = space.tips[t]
-    x = position(space, points.cell, points.bary)
     xi = (x - tip.x) @ tip.frame.T
     psi = space.cuts[tip.crack].level_set.psi[tip.number]
     behind = psi[space.mesh.cells[points.cell]].mean(axis=1) < 0

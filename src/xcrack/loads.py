@@ -82,7 +82,7 @@ def _add(f: Floats, space: Space, points: Points, density: Floats) -> None:
     cells = np.unique(points.cell)
     for batch, _ in space.batches(cells):
         number, row, _ = points.of_cells(batch.cells)
-        N, _ = space.tabulate(batch, row, points.bary[number], points.side[number])
+        N, _ = space.tabulate(batch, row, points.bary[number], points.side[number], slopes=False)
         force = N[:, :, None] * (points.weight[number, None] * density[number])[:, None]
         _scatter(f, batch.functions[row], force)
 
@@ -178,6 +178,6 @@ def jump_values(space: Space, c: int, lips: LipPoints) -> list[tuple[Ints, Ints,
         side = cell_side(space, cell)
         side[:, c] = sign
         for batch, number, row in space.batches_of_points(cell):
-            N, _ = space.tabulate(batch, row, lips.bary[number, s], side[number])
+            N, _ = space.tabulate(batch, row, lips.bary[number, s], side[number], slopes=False)
             result.append((batch.functions[row], number, sign * N))
     return result

@@ -76,16 +76,7 @@ def draw(
         camera.focal_point, camera.position = (x, y, 0.0), (x, y, far)
         camera.parallel_scale = height / 2 / scale
         camera.clipping_range = (0.5 * far, 1.5 * far)
-        if file is None:
-            if show:
-                plotter.show(auto_close=False)
-            return plotter
-        if show:
-            plotter.show(screenshot=str(file))
-        else:
-            plotter.screenshot(str(file))
-            plotter.close()
-    return file
+        return shown(plotter, file, show)
 
 
 def _add_body(pv: Any, plotter: Any, picture: Scene, cmap: str, window: tuple[int, int]) -> None:
@@ -110,6 +101,20 @@ def _add_body(pv: Any, plotter: Any, picture: Scene, cmap: str, window: tuple[in
             font_size=font_size(24),
             color=CLOSED,
         )
+
+
+def shown(plotter: Any, file: Path | None, show: bool) -> Any:
+    """Open the window, save the picture, or both: the file, or the plotter without one."""
+    if file is None:
+        if show:
+            plotter.show(auto_close=False)
+        return plotter
+    if show:
+        plotter.show(screenshot=str(file))
+    else:
+        plotter.screenshot(str(file))
+        plotter.close()
+    return file
 
 
 def add_bar(

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from xcrack.arrays import Floats
-from xcrack.plot_pyvista import BAR, LONGER, MARGIN, SHORTEST, add_bar, font_size, quiet
+from xcrack.plot_pyvista import BAR, LONGER, MARGIN, SHORTEST, add_bar, font_size, quiet, shown
 from xcrack.plot_scene import CLOSED
 from xcrack.plot_space import SpaceScene
 
@@ -76,16 +76,7 @@ def draw_space(
         camera.parallel_scale = height / 2 / scale
         camera.clipping_range = (0.01 * far, 2.5 * far)
         plotter.add_axes(viewport=(0.0, 0.0, 130 / width, 130 / height), line_width=3)
-        if file is None:
-            if show:
-                plotter.show(auto_close=False)
-            return plotter
-        if show:
-            plotter.show(screenshot=str(file))
-        else:
-            plotter.screenshot(str(file))
-            plotter.close()
-    return file
+        return shown(plotter, file, show)
 
 
 def _axes(toward: Floats) -> tuple[Floats, Floats, Floats]:

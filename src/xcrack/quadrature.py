@@ -40,8 +40,8 @@ class Points:
     weight: Floats
     side: Ints
 
-    def chosen(self, wanted: Bools) -> "Points":
-        """Some of the points."""
+    def chosen(self, wanted: Bools | Ints) -> "Points":
+        """Some of the points, by a mask or by their numbers."""
         return Points(self.cell[wanted], self.bary[wanted], self.weight[wanted], self.side[wanted])
 
     def of_cells(self, cells: Ints) -> tuple[Ints, Ints, Ints]:

@@ -40,14 +40,6 @@ def facet_nodes(mesh: Mesh, order: int, facets: Ints) -> Ints:
     return np.concatenate([facets, mesh.n_points + number.reshape(-1, len(pairs))], axis=1)
 
 
-def shape_values(order: int, bary: Floats) -> Floats:
-    """Shape functions `(..., n_shapes)` at barycentric coordinates `(..., d + 1)`."""
-    if order == 1:
-        return bary
-    i, j = local_edges(bary.shape[-1] - 1).T
-    return np.concatenate([bary * (2 * bary - 1), 4 * bary[..., i] * bary[..., j]], axis=-1)
-
-
 def shape_derivatives(order: int, bary: Floats) -> Floats:
     """Derivatives with respect to the barycentric coordinates, `(..., n_shapes, d + 1)`."""
     k = bary.shape[-1]

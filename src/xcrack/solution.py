@@ -1,5 +1,6 @@
 """What a solve returns: displacements, stresses, openings and contact, anywhere in the body."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -204,12 +205,16 @@ def fields_at(
     cell, bary, side : arrays
         Points, as in `Solution.at`.
     """
-    u = np.zeros((len(cell), *coefficients.shape[1:]))
-    for batch, number, row in space.batches_of_points(cell):
-        N, _ = space.tabulate(batch, row, bary[number], side[number], slopes=False)
-        a = coefficients[batch.functions[row]].reshape(len(row), N.shape[1], -1)
-        u[number] = (N[:, None] @ a).reshape(len(row), *u.shape[1:])
-    return u, gradients_at(space, coefficients, cell, bary, side)
+    from xcrack.kernels.fields import set_gradients
+
+    coefficients = np.ascontiguousarray(coefficients)
+    d, states = coefficients.shape[1:]
+    u, gradient = np.zeros((len(cell), d, states)), np.zeros((len(cell), d, d, states))
+    for number, row, functions, N, G in _tables(space, cell, bary, side):
+        a = coefficients[functions[row]].reshape(len(row), N.shape[1], -1)
+        u[number] = (N[:, None] @ a).reshape(-1, d, states)
+        set_gradients(gradient, number, G, functions, row, coefficients)
+    return u, gradient
 
 
 def gradients_at(
@@ -223,13 +228,21 @@ def gradients_at(
     """
     from xcrack.kernels.fields import set_gradients
 
+    coefficients = np.ascontiguousarray(coefficients)
     d, states = coefficients.shape[1:]
     gradient = np.zeros((len(cell), d, d, states))
-    coefficients = np.ascontiguousarray(coefficients)
-    for batch, number, row in space.batches_of_points(cell):
-        _, G = space.tabulate(batch, row, bary[number], side[number])
-        set_gradients(gradient, number, G, batch.functions, row, coefficients)
+    for number, row, functions, _, G in _tables(space, cell, bary, side):
+        set_gradients(gradient, number, G, functions, row, coefficients)
     return gradient
+
+
+def _tables(
+    space: Space, cell: Ints, bary: Floats, side: Ints
+) -> Iterator[tuple[Ints, Ints, Ints, Floats, Floats]]:
+    """Of each batch: numbers of its points, their rows, its functions, values and gradients."""
+    for batch, number, row in space.batches_of_points(cell):
+        N, G = space.tabulate(batch, row, bary[number], side[number])
+        yield number, row, batch.functions, N, G
 
 
 def sides_of(space: Space, cell: Ints, bary: Floats, lip: int) -> Ints:

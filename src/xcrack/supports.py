@@ -142,7 +142,7 @@ def _traces(space: Space, facets: Ints) -> tuple[Points, Ints, Ints, Floats]:
     values: list[Floats] = []
     for batch, _ in space.batches(np.unique(points.cell)):
         number, row, _ = points.of_cells(batch.cells)
-        N, _ = space.tabulate(batch, row, points.bary[number], points.side[number])
+        N, _ = space.tabulate(batch, row, points.bary[number], points.side[number], slopes=False)
         functions = batch.functions[row]
         acts = (functions >= 0) & (np.abs(N) > _TRACE)
         columns.append(functions[acts])

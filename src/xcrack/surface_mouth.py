@@ -5,9 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from xcrack.arrays import Bools, Floats, Ints
-from xcrack.distances import TriangleTree, signed_in, triangle_tree
+from xcrack.body import ON, Body
 from xcrack.errors import GeometryError
-from xcrack.mesh import Mesh
 from xcrack.triangulation import face_normals, rim, ruled, unit
 
 SIDE = 0.75  # sides of a front are at most this share of a cell long
@@ -16,48 +15,8 @@ SMOOTH = np.cos(np.radians(30.0))  # an outline that turns by more has a corner
 _LEAST = 1.25  # cells by which an old front may still be outside
 _REACH = 12.0  # cells within which a way out of the body is sought
 _INSIDE = 4.0  # cells of the body that lie at most on this way
-_ON = 1e-9  # share of a cell within which a point lies on the boundary
 _STEP = 0.125  # of a cell, in this search
 _MEET = 0.3  # share of a mouth that its ends may come closer to each other outside
-
-
-@dataclass(frozen=True, eq=False)
-class Body:
-    """A mesh and the search tree of its boundary."""
-
-    mesh: Mesh
-    boundary: TriangleTree
-    facet_size: Floats
-
-    @staticmethod
-    def of(mesh: Mesh) -> "Body":
-        """The body that a mesh fills."""
-        place = np.nonzero(mesh.facet_to_cell[:, 1] < 0)[0]
-        cell = mesh.facet_to_cell[place, 0]
-        facets = mesh.facets[place]
-        corner = mesh.points[facets]
-        # Barycentric coordinates decrease towards the facet opposite to their corner.
-        local = np.argmax(mesh.cell_to_facet[cell] == place[:, None], axis=1)
-        inward = mesh.gradient[cell, local]
-        normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
-        turned = np.einsum("ij,ij->i", normal, inward) > 0
-        facets = np.where(turned[:, None], facets[:, ::-1], facets)
-        size = np.linalg.norm(corner - np.roll(corner, 1, axis=1), axis=2).max(axis=1)
-        return Body(mesh, triangle_tree(mesh.points, facets), size)
-
-    def depth(self, x: Floats) -> tuple[Floats, Floats]:
-        """Distance to the boundary, negative inside, and the size of the facet there."""
-        distance, facet, _ = signed_in(self.boundary, x)
-        return distance, self.facet_size[facet]
-
-    def contains(self, x: Floats) -> Bools:
-        """Which points lie in the body, its boundary included."""
-        distance, size = self.depth(x)
-        return np.asarray(distance <= _ON * size)
-
-    def cell_size(self, x: Floats) -> Floats:
-        """Size of the cell with the nearest centroid, outside the body as well."""
-        return np.asarray(self.mesh.cell_size[self.mesh.cell_tree.query(x)[1]])
 
 
 @dataclass(frozen=True, eq=False)
@@ -206,7 +165,7 @@ def _led_out(
     tangent, leaves, corner = along, -1, False
     for k in range(room + 1):
         at = vertex[k]
-        if leaves < 0 and depth[at] >= -_ON * size[at]:
+        if leaves < 0 and depth[at] >= -ON * size[at]:
             leaves, tangent = k, along
         enough = _LEAST if k > 0 and old[k - 1] and not old[k] else 0.999 * OUTSIDE
         if depth[at] >= enough * size[at]:
@@ -270,7 +229,7 @@ def _way_out(x: Floats, direction: Floats, size: Floats, wanted: float, body: Bo
     every, _ = body.depth(trial.reshape(-1, 3))
     result = np.zeros(len(x))
     for k, row in enumerate(every.reshape(len(x), -1) / size[:, None]):
-        outside = row > _ON
+        outside = row > ON
         first = int(np.argmax(outside))
         if not outside[first] or steps[first] > _INSIDE or (first == 0 and row[1] < row[0]):
             continue

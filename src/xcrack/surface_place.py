@@ -4,13 +4,14 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from xcrack.arrays import Bools, Floats, Ints
+from xcrack.body import Body
 from xcrack.crack import Crack
 from xcrack.distances import closest_in, first_crossing, triangle_tree
 from xcrack.errors import GeometryError
 from xcrack.locate import locate
 from xcrack.mesh import Mesh
 from xcrack.surface_corners import rounded
-from xcrack.surface_mouth import OUTSIDE, SIDE, SMOOTH, Body, Outline, open_fronts, runs_of
+from xcrack.surface_mouth import OUTSIDE, SIDE, SMOOTH, Outline, open_fronts, runs_of
 from xcrack.triangulation import (
     components,
     face_areas,

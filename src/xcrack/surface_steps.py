@@ -1,23 +1,16 @@
 """What a growth run keeps of cracks in space: their size in the body, values along, and cycles."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from scipy.special import exprel
 
 from xcrack.arrays import Floats, Ints, ranges
+from xcrack.body import Body
 from xcrack.crack import Crack
-from xcrack.distances import (
-    TriangleTree,
-    closest_in,
-    corner_normals,
-    front_distance,
-    triangle_tree,
-)
+from xcrack.distances import front_distance
 from xcrack.errors import ProblemError
 from xcrack.mesh import Mesh
-from xcrack.triangulation import face_vectors, side_keys
 
 _FINE = 0.25  # of a cell: sides of the pieces that the boundary of the body clips
 _MOST = 1000  # parts of a side of a front
@@ -46,7 +39,10 @@ def area_inside(crack: Crack, mesh: Mesh) -> float:
     ProblemError
         No part of the crack lies in the body.
     """
-    body = _Body.of(mesh)
+    return _area_inside(crack, Body.of(mesh))
+
+
+def _area_inside(crack: Crack, body: Body) -> float:
     piece = crack.points[crack.faces]
     total = 0.0
     while len(piece):
@@ -56,14 +52,14 @@ def area_inside(crack: Crack, mesh: Mesh) -> float:
         area /= 2
         centre = piece.mean(axis=1)
         radius = np.linalg.norm(piece - centre[:, None], axis=2).max(axis=1)
-        depth = body.depth(centre)
+        depth = body.depth(centre)[0]
         near = np.abs(depth) < radius
         total += float(area[~near & (depth < 0)].sum())
         side = np.linalg.norm(np.roll(piece, -1, axis=1) - piece, axis=2)
-        cell = mesh.cell_size[mesh.cell_tree.query(centre)[1]]
+        cell = body.cell_size(centre)
         small = near & (side.max(axis=1) <= _FINE * cell)
         corners = piece[small].reshape(-1, 3)
-        share = _share_below_zero(body.depth(corners).reshape(-1, 3))
+        share = _share_below_zero(body.depth(corners)[0].reshape(-1, 3))
         total += float((area[small] * share).sum())
         piece = _halved(piece[near & ~small], side[near & ~small])
     if total <= 0:
@@ -85,8 +81,11 @@ def front_length_inside(crack: Crack, mesh: Mesh) -> float:
     float
         length; 0 where no front is left.
     """
-    body = _Body.of(mesh)
-    finest = _FINE * float(mesh.cell_size.min())
+    return _front_length_inside(crack, Body.of(mesh))
+
+
+def _front_length_inside(crack: Crack, body: Body) -> float:
+    finest = _FINE * float(body.mesh.cell_size.min())
     total = 0.0
     for front in crack.fronts or ():
         x = crack.points[front]
@@ -95,7 +94,8 @@ def front_length_inside(crack: Crack, mesh: Mesh) -> float:
         parts = np.clip(np.ceil(length / finest), 1, _MOST).astype(np.int64)
         row, part = ranges(parts)
         one, other = (
-            body.depth(x[row] + ((part + end) / parts[row])[:, None] * side[row]) for end in (0, 1)
+            body.depth(x[row] + ((part + end) / parts[row])[:, None] * side[row])[0]
+            for end in (0, 1)
         )
         low, high = np.minimum(one, other), np.maximum(one, other)
         width = np.where(high > low, high - low, 1.0)
@@ -119,7 +119,8 @@ def surface_size(crack: Crack, mesh: Mesh) -> float:
         length: that of a crack with a straight front, half the radius of a penny; the root of the
         area where all fronts have left the body.
     """
-    area, length = area_inside(crack, mesh), front_length_inside(crack, mesh)
+    body = Body.of(mesh)
+    area, length = _area_inside(crack, body), _front_length_inside(crack, body)
     return area / length if length > 0 else float(np.sqrt(area))
 
 
@@ -232,44 +233,6 @@ def elapsed_in_space(
         return 2 * by_first_rate
     x, y = np.log(size1[c] / size0[c]), np.log(ratio)
     return by_first_rate * float(exprel(x - y) / exprel(x))
-
-
-@dataclass(frozen=True, eq=False)
-class _Body:
-    """The boundary of a mesh; normals of each facet, its corners and its sides, `(k, 7, 3)`."""
-
-    tree: TriangleTree
-    normals: Floats
-
-    @staticmethod
-    def of(mesh: Mesh) -> "_Body":
-        outer = mesh.facet_to_cell[:, 1] < 0
-        facets = np.array(mesh.facets[outer])
-        inside = mesh.points[mesh.cells[mesh.facet_to_cell[outer, 0]]].mean(axis=1)
-        to_inside = inside - mesh.points[facets[:, 0]]
-        inward = np.einsum("ij,ij->i", face_vectors(mesh.points, facets), to_inside) > 0
-        facets[inward] = facets[inward][:, ::-1]
-        tree = triangle_tree(mesh.points, facets)
-        normal = tree.normal
-        _, side = np.unique(side_keys(facets), return_inverse=True)
-        side = side.reshape(-1, 3)
-        both = [np.bincount(side.ravel(), weights=np.repeat(n, 3)) for n in normal.T]
-        # In the order in which `Closest.part` counts.
-        normals = np.concatenate(
-            [
-                normal[:, None],
-                corner_normals(mesh.points, facets, normal)[facets],
-                np.stack(both, axis=1)[side],
-            ],
-            axis=1,
-        )
-        return _Body(tree, normals)
-
-    def depth(self, x: Floats) -> Floats:
-        """Distance of points to the boundary, negative inside the body."""
-        near = closest_in(self.tree, x)
-        out = self.normals[near.triangle, near.part]
-        return np.copysign(near.distance, np.einsum("ij,ij->i", x - near.foot, out))
 
 
 def _halved(piece: Floats, side: Floats) -> Floats:

@@ -159,12 +159,9 @@ def _first(
 ) -> tuple[Floats | None, list[int]]:
     """Displacements with open lips, if they were needed, and the cracks that need contact."""
     none: list[Multipliers | None] = [None] * len(model.lips)
-    if not isinstance(engine, IterativeSystem):
-        u = engine.solve(f, known)
-        return u, _needing(problem, model, u, none)
-    if problem.contact != "off":
-        before = warm.closed if warm is not None else lambda c: False
-        closed = [c for c, lips in enumerate(model.lips) if len(lips) and before(c)]
+    if isinstance(engine, IterativeSystem) and problem.contact != "off":
+        closed = [] if warm is None else [c for c in range(len(none)) if warm.closed(c)]
+        closed = [c for c in closed if len(model.lips[c])]
         if closed:
             return None, closed
         u = engine.solve(f, known, tolerance=_ROUGH)
@@ -178,10 +175,10 @@ def _first(
 
 
 def _needing(
-    problem: Problem, model: Model, u: Floats | None, spaces: Sequence[Multipliers | None]
+    problem: Problem, model: Model, u: Floats, spaces: Sequence[Multipliers | None]
 ) -> list[int]:
     """Cracks without multipliers whose lips overlap in some load state."""
-    if problem.contact == "off" or u is None:
+    if problem.contact == "off":
         return []
     needing = []
     for c, lips in enumerate(model.lips):

@@ -8,7 +8,7 @@ from xcrack.crack import Crack
 from xcrack.cut import Cut
 from xcrack.locate import contains, nearest_boundary
 from xcrack.mesh import Mesh
-from xcrack.surface_steps import area_inside, front_length_inside
+from xcrack.surface_steps import surface_size
 
 # Of the crack's size, of the distance to a side of the body, of that to another front.
 _SHARE, _ASIDE, _APART = 0.65, 0.7, 0.45
@@ -57,8 +57,8 @@ def front_radii(
     for c, (crack, cut) in enumerate(zip(cracks, cuts, strict=True)):
         row = []
         fronts = crack.fronts or ()
-        if fronts:
-            size = area_inside(crack, mesh) / max(front_length_inside(crack, mesh), 1e-300)
+        if fronts and wanted is None:
+            size = surface_size(crack, mesh)
         for k, numbers in enumerate(fronts):
             cell = leg_size(mesh, cut.level_set.tip_cells[k])
             closed = bool(numbers[0] == numbers[-1])

@@ -164,6 +164,20 @@ def _to_triangle(p, corner, normal, foot, trial):  # type: ignore[no-untyped-def
 
 
 @numba.njit(cache=True, error_model="numpy")
+def _descend(p, child, low, high, stack, stack_square, top):  # type: ignore[no-untyped-def]
+    """Put two children on the stack, the nearer one on top, and return the new top."""
+    one = _to_box(p, low[child], high[child])
+    two = _to_box(p, low[child + 1], high[child + 1])
+    near, other = child, child + 1
+    if two < one:
+        near, other = other, near
+        one, two = two, one
+    stack[top + 1], stack_square[top + 1] = other, two
+    stack[top + 2], stack_square[top + 2] = near, one
+    return top + 2
+
+
+@numba.njit(cache=True, error_model="numpy")
 def closest_triangle(x, corners, normal, order, node, low, high, band, tiny):  # type: ignore[no-untyped-def]
     """Closest triangle of each point, and the part of it that is closest.
 
@@ -219,16 +233,7 @@ def closest_triangle(x, corners, normal, order, node, low, high, band, tiny):  #
                 continue
             child = node[at, 0]
             if child >= 0:
-                one = _to_box(p, low[child], high[child])
-                two = _to_box(p, low[child + 1], high[child + 1])
-                near, other = child, child + 1
-                if two < one:
-                    near, other = other, near
-                    one, two = two, one
-                top += 1
-                stack[top], stack_square[top] = other, two
-                top += 1
-                stack[top], stack_square[top] = near, one
+                top = _descend(p, child, low, high, stack, stack_square, top)
                 continue
             for place in range(node[at, 1], node[at, 2]):
                 k = order[place]
@@ -299,16 +304,7 @@ def closest_segment(x, start, stop, order, node, low, high, band):  # type: igno
                 continue
             child = node[at, 0]
             if child >= 0:
-                one = _to_box(p, low[child], high[child])
-                two = _to_box(p, low[child + 1], high[child + 1])
-                near, other = child, child + 1
-                if two < one:
-                    near, other = other, near
-                    one, two = two, one
-                top += 1
-                stack[top], stack_square[top] = other, two
-                top += 1
-                stack[top], stack_square[top] = near, one
+                top = _descend(p, child, low, high, stack, stack_square, top)
                 continue
             for place in range(node[at, 1], node[at, 2]):
                 k = order[place]
