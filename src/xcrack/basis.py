@@ -35,20 +35,27 @@ class Blocks:
     n_standard: Ints
 
 
-def node_blocks(space: Space, kind: str) -> Blocks:
-    """Unknowns of each enriched node, in blocks: "node" or "star"."""
-    owner = np.full(space.n_functions, -1, dtype=np.int64)
-    for c, number in enumerate(space.heaviside):
+def function_nodes(space: Space) -> Ints:
+    """Node of each function `(n_functions,)`."""
+    owner = np.arange(space.n_functions)
+    for number in space.heaviside:
         nodes = np.nonzero(number >= 0)[0]
-        home = nodes.copy()
-        if kind == "star" and space.order == 2:
-            home = _star_home(space, c, nodes)
-        owner[number[nodes]] = home
+        owner[number[nodes]] = nodes
     for tip in space.tips:
         points = np.nonzero(tip.point_to_function >= 0)[0]
         each = tip.point_to_function[points][:, None] + np.arange(tip.functions)
         owner[each] = points[:, None]
-    enriched = np.nonzero(owner >= 0)[0]
+    return owner
+
+
+def node_blocks(space: Space, kind: str) -> Blocks:
+    """Unknowns of each enriched node, in blocks: "node" or "star"."""
+    owner = function_nodes(space)
+    if kind == "star" and space.order == 2:
+        for c, number in enumerate(space.heaviside):
+            nodes = np.nonzero(number >= 0)[0]
+            owner[number[nodes]] = _star_home(space, c, nodes)
+    enriched = np.arange(space.n_nodes, space.n_functions)
     order = np.argsort(owner[enriched], kind="stable")
     functions = enriched[order]
     nodes, counts = np.unique(owner[functions], return_counts=True)
@@ -87,18 +94,10 @@ def restricted(blocks: Blocks, free: Bools) -> Blocks:
     return Blocks(blocks.members[keep], offsets(counts), standard)
 
 
-def orthonormal(K: sp.csr_matrix, blocks: Blocks, enriched: Ints) -> sp.csr_matrix:
-    """Matrix Z of the new basis in the old one `(n, k)`, k <= n.
-
-    Columns of unknowns outside the blocks are those of the identity; `enriched` numbers the
-    unknowns that the blocks replace.
-    """
-    n = K.shape[0]
-    keep = np.ones(n, dtype=bool)
-    keep[enriched] = False
-    plain = np.nonzero(keep)[0]
-    rows, columns, values = [plain], [np.arange(len(plain))], [np.ones(len(plain))]
-    count = len(plain)
+def orthonormal(K: sp.csr_matrix, blocks: Blocks) -> sp.csr_matrix:
+    """The functions that replace the enriched unknowns of blocks, in the old basis `(n, k)`."""
+    rows, columns, values = [], [], []
+    count = 0
     for members, k, n_standard in _by_shape(K, blocks):
         Z = _block_basis(k, n_standard)
         used = Z != 0
@@ -110,8 +109,10 @@ def orthonormal(K: sp.csr_matrix, blocks: Blocks, enriched: Ints) -> sp.csr_matr
         rows.append(members[b, i])
         columns.append(number[b, j])
         values.append(Z[b, i, j])
+    if not count:
+        return sp.csr_matrix((K.shape[0], 0))
     triplets = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
-    return sp.csr_matrix(triplets, shape=(n, count))
+    return sp.csr_matrix(triplets, shape=(K.shape[0], count))
 
 
 def _by_shape(K: sp.csr_matrix, blocks: Blocks) -> list[tuple[Ints, Floats, int]]:

@@ -13,6 +13,8 @@ from xcrack.space import Space
 # outside the enriched disc; at order 2 a wide ring saves digits on coarse meshes (measured).
 _RING = {1: 0.4, 2: 0.15}
 _OUTER = {1: 2.5, 2: 2.5}  # outer radius, as a multiple of the enriched radius
+# Cells up to a share of the outer radius: points a direction with tip functions, degree without.
+_DEGREES = ((0.0, 0.03, 4, 4), (0.03, 0.1, 5, 6), (0.1, 0.25, 5, 8), (0.25, np.inf, 5, 10))
 _CHUNK = 4000  # cells integrated at once; bounds the memory
 
 
@@ -51,7 +53,7 @@ def domain_points(
     near = near[~inside & ~far]
     share = mesh.cell_size[near] / radius
     parts: list[tuple[Points, Floats]] = []
-    for low, high, n, degree in ((0.0, 0.03, 4, 4), (0.03, 0.1, 4, 8), (0.1, np.inf, 5, 10)):
+    for low, high, n, degree in _DEGREES:
         cells = near[(share > low) & (share <= high)]
         for first in range(0, len(cells), _CHUNK):
             points = cell_points(space, cells[first : first + _CHUNK], n, degree)

@@ -279,10 +279,9 @@ def _enriched_basis(
     Their diagonal entries are made the mean one of the standard unknowns: the norm of a residual
     then weighs both alike.
     """
-    first = space.n_nodes * space.dim
     if combined is not None:
         K = sp.csr_matrix(combined.T @ K @ combined)
-    Z = sp.csc_matrix(orthonormal(K, blocks, np.arange(first, space.n_dof))[:, first:])
+    Z = sp.csc_matrix(orthonormal(K, blocks))
     owner = np.repeat(np.arange(len(blocks.n_standard)), np.diff(blocks.offsets))
     block_of = np.full(space.n_dof, -1, dtype=np.int64)
     block_of[blocks.members] = owner

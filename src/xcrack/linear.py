@@ -6,33 +6,17 @@ from importlib.util import find_spec
 
 import numpy as np
 import scipy.sparse as sp
-import scipy.sparse.linalg as sla
 
-from xcrack.arrays import Bools, Floats
-from xcrack.basis import node_blocks, orthonormal, patch_orthogonal, restricted
+from xcrack.arrays import Bools, Floats, Ints
+from xcrack.basis import function_nodes, node_blocks, orthonormal, patch_orthogonal, restricted
+from xcrack.elimination import Elimination, Solve, eliminated
 from xcrack.errors import ConvergenceError, ProblemError
 from xcrack.material import Isotropic
 from xcrack.numerics import Numerics
 from xcrack.space import Space
 from xcrack.vectorial import mode_columns
 
-Solve = Callable[[Floats], Floats]
 Solver = Callable[[sp.csc_matrix], Solve]
-
-
-def superlu(A: sp.csc_matrix) -> Solve:
-    """Factor a symmetric positive matrix with SuperLU, minimum degree, symmetric mode.
-
-    Off-diagonal pivoting is switched off: on a scaled symmetric matrix it buys no digit and costs
-    up to sixty times.
-    """
-    factor = sla.splu(
-        A,
-        permc_spec="MMD_AT_PLUS_A",
-        diag_pivot_thresh=0.0,
-        options={"SymmetricMode": True},
-    )
-    return lambda b: np.asarray(factor.solve(b))
 
 
 def pardiso(A: sp.csc_matrix) -> Solve:
@@ -67,6 +51,8 @@ class System:
     basis : sparse matrix (n_dof, k)
         Columns of the solver's basis, scaled; zero in the rows of known unknowns.
     count : Count
+    elimination : Elimination, optional
+        Order of the nodes, for the next crack in the mesh.
     """
 
     matrix: sp.csr_matrix
@@ -75,6 +61,7 @@ class System:
     reduced: sp.csc_matrix
     apply_inverse: Solve
     count: Count = field(default_factory=Count)
+    elimination: Elimination | None = None
 
     def solve(self, f: Floats, known: Floats | None = None) -> Floats:
         """Displacements for loads `(n_dof,)` or `(n_dof, k)` and known values of the same shape."""
@@ -97,11 +84,18 @@ def system(
     numerics: Numerics,
     solver: Solver | None = None,
     material: Isotropic | None = None,
+    elimination: Elimination | None = None,
 ) -> System:
     """Eliminate known unknowns, change the basis, scale by the diagonal and factor."""
-    basis, reduced = _scaled(_columns(space, K, fixed, numerics, material), K)
-    apply_inverse = (solver or superlu)(reduced)
-    return System(K, ~fixed, basis, reduced, apply_inverse, Count(factorisations=1))
+    basis, reduced = _reduced(space, K, fixed, numerics, material)
+    count = Count(factorisations=1)
+    if solver is not None:
+        return System(K, ~fixed, basis, reduced, solver(reduced), count)
+    columns = sp.csc_matrix(basis)
+    last = np.maximum.reduceat(columns.indices, columns.indptr[:-1])
+    node = function_nodes(space)[last // space.dim]
+    solve, kept = eliminated(reduced, node, space.n_nodes, elimination)
+    return System(K, ~fixed, basis, reduced, solve, count, kept)
 
 
 def scaled_basis(
@@ -115,25 +109,56 @@ def scaled_basis(
 
     The material counts for the vectorial tip basis alone.
     """
-    return _scaled(_columns(space, K, fixed, numerics, material), K)[0]
+    return _reduced(space, K, fixed, numerics, material)[0]
 
 
-def _scaled(basis: sp.csr_matrix, K: sp.csr_matrix) -> tuple[sp.csr_matrix, sp.csc_matrix]:
-    """Columns scaled to energy one, those without energy left out, and K in them."""
-    reduced = sp.csc_matrix(basis.T @ (K @ basis))
-    diagonal = reduced.diagonal()
-    if not (diagonal > 0).all():
-        alive = np.nonzero(diagonal > 0)[0]
-        basis, reduced, diagonal = basis[:, alive], reduced[alive][:, alive], diagonal[alive]
-    scale = sp.diags(1 / np.sqrt(diagonal))
-    return sp.csr_matrix(basis @ scale), sp.csc_matrix(scale @ reduced @ scale)
-
-
-def _columns(
+def _reduced(
     space: Space, K: sp.csr_matrix, fixed: Bools, numerics: Numerics, material: Isotropic | None
+) -> tuple[sp.csr_matrix, sp.csc_matrix]:
+    """Columns scaled to energy one, those without energy left out, and K in them.
+
+    Standard columns are those of the identity: only the border of enriched ones is multiplied out.
+    """
+    from xcrack.kernels.bordered import bordered
+
+    first = space.n_nodes * space.dim
+    enriched = _enriched_columns(space, K, ~fixed, numerics, material)
+    image = sp.csr_matrix(K @ enriched)
+    own = sp.csc_matrix(enriched.T @ image)
+    plain = K.diagonal()[:first]
+    border = own.diagonal()
+    alive = np.nonzero(border > 0)[0]
+    if len(alive) < len(border):
+        enriched, image, own = enriched[:, alive], image[:, alive], own[alive][:, alive]
+        border = border[alive]
+    kept = np.nonzero(~fixed[:first] & (plain > 0))[0]
+    number = np.full(first, -1, dtype=np.int64)
+    number[kept] = np.arange(len(kept))
+    scale = 1 / np.sqrt(np.concatenate([plain[kept], border]))
+    down = sp.csc_matrix(image)
+    for part in (image, down, own):
+        part.sort_indices()
+    indptr, rows, values = bordered(
+        K.indptr, K.indices, K.data, number, scale, _arrays(image), _arrays(down), _arrays(own)
+    )
+    size = len(scale)
+    reduced = sp.csc_matrix((values, rows, indptr), shape=(size, size))
+    columns = sp.csc_matrix(enriched)
+    ends = np.concatenate([np.arange(len(kept)), len(kept) + columns.indptr])
+    entries = np.concatenate([np.ones(len(kept)), columns.data]) * np.repeat(scale, np.diff(ends))
+    where = np.concatenate([kept, columns.indices])
+    basis = sp.csc_matrix((entries, where, ends), shape=(K.shape[0], size))
+    return sp.csr_matrix(basis), reduced
+
+
+def _arrays(A: sp.csr_matrix | sp.csc_matrix) -> tuple[Ints, Ints, Floats]:
+    return A.indptr, A.indices, A.data
+
+
+def _enriched_columns(
+    space: Space, K: sp.csr_matrix, free: Bools, numerics: Numerics, material: Isotropic | None
 ) -> sp.csr_matrix:
-    """The solver's basis before it is scaled."""
-    free = ~fixed
+    """The columns of the solver's basis for enriched unknowns `(n_dof, k)`, not yet scaled."""
     n = space.n_dof
     first = space.n_nodes * space.dim
     changed = None
@@ -145,12 +170,9 @@ def _columns(
         changed = sp.csr_matrix(patch if changed is None else changed @ patch)
         K = sp.csr_matrix(patch.T @ K @ patch)
     if numerics.orthonormal != "none" and n > first:
-        blocks = restricted(node_blocks(space, numerics.orthonormal), free)
-        Z = orthonormal(K, blocks, np.arange(first, n))
-        # Columns of known standard unknowns go; known enriched ones are in no block.
-        keep = np.ones(Z.shape[1], dtype=bool)
-        keep[:first] = free[:first]
-        Z = Z[:, np.nonzero(keep)[0]]
+        Z = orthonormal(K, restricted(node_blocks(space, numerics.orthonormal), free))
     else:
-        Z = sp.identity(n, format="csr")[:, np.nonzero(free)[0]]
-    return sp.csr_matrix(Z if changed is None else changed @ Z)
+        chosen = first + np.nonzero(free[first:])[0]
+        ones = (np.ones(len(chosen)), (chosen, np.arange(len(chosen))))
+        Z = sp.csr_matrix(ones, shape=(n, len(chosen)))
+    return Z if changed is None else sp.csr_matrix(changed @ Z)

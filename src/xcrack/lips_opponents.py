@@ -20,8 +20,9 @@ import scipy.sparse as sp
 
 from xcrack.arrays import Bools, Floats
 from xcrack.conditions import Load
+from xcrack.elimination import Solve, superlu
 from xcrack.errors import ConvergenceError
-from xcrack.linear import Solve, System, superlu
+from xcrack.linear import System
 from xcrack.lip_points import LipPoints
 from xcrack.lips_nitsche import averaging, steady_stress, stress_matrix, tip_distance
 from xcrack.model import Model

@@ -64,9 +64,9 @@ class Mesh:
             str(name): frozen(np.asarray(facets, dtype=np.int64).reshape(-1, d))
             for name, facets in dict(self.facet_sets).items()
         }
-        facet_sets.setdefault("boundary", self._boundary)
         for name, facets in facet_sets.items():
             self._check_facets(name, facets)
+        facet_sets.setdefault("boundary", self._boundary)
         cell_sets = {}
         for name, members in dict(self.cell_sets).items():
             members = np.asarray(members, dtype=np.int64).ravel()
@@ -159,6 +159,11 @@ class Mesh:
         return self._facets[2]
 
     @cached_property
+    def _facet_keys(self) -> Ints:
+        """One number a facet, growing."""
+        return lock(_scalar_key(self.facets, self.n_points))
+
+    @cached_property
     def _boundary(self) -> Ints:
         return lock(self.facets[self.facet_to_cell[:, 1] < 0])
 
@@ -236,12 +241,9 @@ class Mesh:
 
     def facet_numbers(self, facets: Ints) -> Ints:
         """Numbers (rows of `facets`) of the given facets `(k, d)`; -1 where there is none."""
-        known = _scalar_key(self.facets, self.n_points)
+        known = self._facet_keys
         asked = _scalar_key(np.sort(np.asarray(facets, dtype=np.int64), axis=1), self.n_points)
-        order = np.argsort(known, kind="stable")
-        place = np.searchsorted(known[order], asked)
-        place = np.minimum(place, len(known) - 1)
-        number = order[place]
+        number = np.minimum(np.searchsorted(known, asked), len(known) - 1)
         return np.where(known[number] == asked, number, -1)
 
     def _check_folds(self) -> None:

@@ -223,16 +223,18 @@ def gap_rows(space_of: Multipliers, lips: LipPoints, jump: sp.csr_matrix) -> sp.
 
 def jump_matrix(space: Space, c: int, lips: LipPoints) -> sp.csr_matrix:
     """Normal jump n . [[u]] at the lip points `(q, n_dof)`."""
-    d = space.dim
     rows, columns, values = [], [], []
     for functions, number, N in jump_values(space, c, lips):
         acts = (functions >= 0) & (N != 0)
-        point = np.broadcast_to(number[:, None], functions.shape)[acts]
-        for i in range(d):
-            rows.append(point)
-            columns.append(functions[acts] * d + i)
-            values.append(N[acts] * lips.normal[point, i])
+        rows.append(np.broadcast_to(number[:, None], functions.shape)[acts])
+        columns.append(functions[acts])
+        values.append(N[acts])
     triplets = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
-    matrix = sp.csr_matrix(triplets, shape=(len(lips), space.n_dof))
-    matrix.sum_duplicates()
-    return matrix
+    jump = sp.csr_matrix(triplets, shape=(len(lips), space.n_functions))
+    jump.sum_duplicates()
+    jump.eliminate_zeros()  # standard functions take one value on both lips of a cell
+    d = space.dim
+    point = np.repeat(np.arange(len(lips)), np.diff(jump.indptr))
+    entries = (jump.data[:, None] * lips.normal[point]).ravel()
+    unknown = (jump.indices[:, None] * d + np.arange(d)).ravel()
+    return sp.csr_matrix((entries, unknown, jump.indptr * d), shape=(len(lips), space.n_dof))

@@ -56,7 +56,9 @@ class Numerics:
         Make tip functions orthogonal to the standard and Heaviside functions around them: a
         condition number that grows like h^-2 for iterative solvers. A direct solver needs it not.
     points : int
-        Conical Gauss points a direction in a sub-cell with tip functions.
+        Gauss points a direction where tip functions act: those of the sectors round a tip. Plane
+        sub-cells that do not touch it are no larger than their distance to it, and have a rule of
+        degree 2 points - 3.
     domain : float, length, optional
         Outer radius of the first domain of the interaction integral. None: in the plane 2.5 times
         the enriched radius or 4 cells, in space 1.05 times it or 2.6 cells, whichever is more, as

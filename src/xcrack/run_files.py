@@ -8,10 +8,14 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from xcrack.elimination import Elimination
 from xcrack.errors import ProblemError
 from xcrack.settings import differences
 from xcrack.step import Memory, Step
 from xcrack.store import load, save, write_whole
+from xcrack.warm import Warm
 
 _HEADER = "run.json"
 _FORMAT = 1
@@ -85,8 +89,14 @@ def step_path(folder: Path, index: int) -> Path:
 
 
 def write_step(folder: Path, step: Step) -> None:
-    """Write a step without its solutions; afterwards it is on disk as a whole."""
+    """Write a step without its solutions; afterwards it is on disk as a whole.
+
+    An order of elimination is written by the step that found it; those that follow only say so.
+    """
     memory = None if step.memory is None else replace(step.memory, settings={})
+    order = _order_of(memory)
+    if memory is not None and order is not None and order.age:
+        memory = _with_order(memory, replace(order, place=np.zeros(0, dtype=np.int32)))
     save(step_path(folder, step.index), replace(step, solutions=(), memory=memory))
 
 
@@ -101,8 +111,23 @@ def read_steps(folder: Path, settings: Mapping[str, str]) -> tuple[list[Step], P
         if not isinstance(step, Step) or step.index != len(steps):
             return steps, path
         if isinstance(step.memory, Memory):
-            step = replace(step, memory=replace(step.memory, settings=dict(settings)))
+            memory = replace(step.memory, settings=dict(settings))
+            order = _order_of(memory)
+            if order is not None and order.age:
+                found = _order_of(steps[-1].memory) if steps else None
+                if found is None:
+                    return steps, path
+                memory = _with_order(memory, replace(order, place=found.place))
+            step = replace(step, memory=memory)
         steps.append(step)
+
+
+def _order_of(memory: Memory | None) -> Elimination | None:
+    return memory.warm.elimination if memory and isinstance(memory.warm, Warm) else None
+
+
+def _with_order(memory: Memory, order: Elimination) -> Memory:
+    return replace(memory, warm=replace(memory.warm, elimination=order))
 
 
 def remove_steps(folder: Path, begin: int) -> None:

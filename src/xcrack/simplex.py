@@ -80,12 +80,23 @@ def conical(dim: int, n: int) -> tuple[Floats, Floats]:
     return lock(bary), lock(weight)
 
 
-# Fully symmetric rules on triangles (Dunavant, 1985), polished to round-off on the moments:
+# Fully symmetric rules on triangles (degree 5: Radon, 1948, in closed form; the others: Dunavant,
+# 1985, polished to round-off on the moments):
 # degree -> (weight of each point, first two barycentric coordinates of the orbit).
-_SYMMETRIC = {
+_TRIANGLES: dict[int, list[tuple[float, ...]]] = {
     4: [
         (0.22338158967801147, 0.10810301816807023, 0.44594849091596489),
         (0.10995174365532187, 0.81684757298045851, 0.09157621350977074),
+    ],
+    5: [
+        (9 / 40, 1 / 3, 1 / 3),
+        ((155 - 15**0.5) / 1200, (6 - 15**0.5) / 21, (6 - 15**0.5) / 21),
+        ((155 + 15**0.5) / 1200, (6 + 15**0.5) / 21, (6 + 15**0.5) / 21),
+    ],
+    6: [
+        (0.11678627572637902, 0.2492867451709106, 0.2492867451709106),
+        (0.05084490637020671, 0.06308901449150216, 0.06308901449150216),
+        (0.08285107561837379, 0.05314504984481712, 0.3103524510337842),
     ],
     8: [
         (0.144315607677787, 1 / 3, 1 / 3),
@@ -105,47 +116,40 @@ _SYMMETRIC = {
 }
 
 
-# The same on tetrahedra, degree 5 (Walkington, 2000): weight, coordinate of the odd vertices.
-_TETRAHEDRON_4 = [
-    (0.1126879257180158508, 0.3108859192633006098),
-    (0.0734930431163619495, 0.0927352503108912264),
-]
-_TETRAHEDRON_6 = (0.0425460207770814664, 0.0455037041256496495)
+# The same on tetrahedra: degree -> (weight, first three barycentric coordinates of the orbit).
+_TETRAHEDRA: dict[int, list[tuple[float, ...]]] = {
+    5: [  # Walkington, 2000
+        (0.1126879257180158508, *(0.3108859192633006098,) * 3),
+        (0.0734930431163619495, *(0.0927352503108912264,) * 3),
+        (0.0425460207770814664, *(0.0455037041256496495,) * 2, 0.4544962958743503505),
+    ],
+    6: [  # Keast, 1986, polished to round-off on the moments
+        (0.03992275025816775, *(0.214602871259152,) * 3),
+        (0.01007721105532069, *(0.04067395853461148,) * 3),
+        (0.055357181543654384, *(0.32233789014227565,) * 3),
+        (0.04821428571428574, 0.06366100187501757, 0.06366100187501757, 0.2696723314583159),
+    ],
+}
 
 
-@lru_cache(maxsize=1)
-def _tetrahedron() -> tuple[Floats, Floats]:
+@lru_cache(maxsize=16)
+def _symmetric(dim: int, degree: int) -> tuple[Floats, Floats]:
     bary, weight = [], []
-    for w, a in _TETRAHEDRON_4:
-        bary.append(np.full((4, 4), a) + np.eye(4) * (1 - 4 * a))
-        weight.append(np.full(4, w))
-    w, a = _TETRAHEDRON_6
-    for i, j in local_edges(3):
-        point = np.full(4, a)
-        point[[i, j]] = 0.5 - a
-        bary.append(point[None])
-        weight.append(np.full(1, w))
-    total = np.concatenate(weight)
-    return lock(np.concatenate(bary)), lock(total / total.sum())
-
-
-@lru_cache(maxsize=8)
-def _symmetric(degree: int) -> tuple[Floats, Floats]:
-    bary, weight = [], []
-    for w, a, b in _SYMMETRIC[degree]:
-        orbit = np.array(list(permutations((a, b, 1 - a - b))))
+    for w, *first in (_TRIANGLES if dim == 2 else _TETRAHEDRA)[degree]:
+        orbit = np.array(list(permutations((*first, 1 - sum(first)))))
         # Coinciding images are told apart by 1e-6; the rules keep their points far wider apart.
         unique = np.unique(np.round(orbit, 6), axis=0, return_index=True)[1]
         bary.append(orbit[np.sort(unique)])
         weight.append(np.full(len(unique), w))
-    points = np.concatenate(bary)
-    return lock(points / points.sum(axis=1, keepdims=True)), lock(np.concatenate(weight))
+    points, total = np.concatenate(bary), np.concatenate(weight)
+    return lock(points / points.sum(axis=1, keepdims=True)), lock(total / total.sum())
 
 
 def simplex_rule(dim: int, degree: int) -> tuple[Floats, Floats]:
     """A rule exact for polynomials of the given degree: points `(q, d + 1)`, weights sum to 1.
 
-    In the plane up to degree 10 it is symmetric: a mirrored mesh gives a mirrored result.
+    In the plane up to degree 10 it is symmetric, so that a mirrored mesh gives a mirrored result;
+    in space up to degree 6.
     """
     if degree <= 1:
         return np.full((1, dim + 1), 1 / (dim + 1)), np.ones(1)
@@ -153,10 +157,7 @@ def simplex_rule(dim: int, degree: int) -> tuple[Floats, Floats]:
         a = {1: 0.5 - 0.5 / np.sqrt(3), 2: 1 / 6, 3: (5 - np.sqrt(5)) / 20}[dim]
         bary = np.full((dim + 1, dim + 1), a) + np.eye(dim + 1) * (1 - (dim + 1) * a)
         return bary, np.full(dim + 1, 1 / (dim + 1))
-    if dim == 2:
-        for known in _SYMMETRIC:
-            if degree <= known:
-                return _symmetric(known)
-    if dim == 3 and degree <= 5:
-        return _tetrahedron()
+    for known in {2: _TRIANGLES, 3: _TETRAHEDRA}.get(dim, {}):
+        if degree <= known:
+            return _symmetric(dim, known)
     return conical(dim, degree // 2 + 1)

@@ -38,7 +38,7 @@ def solve(
         stress), or lists of loads. None: the loads as they are.
     solver : callable, optional
         Given a sparse symmetric matrix, returns a function that solves for right-hand sides;
-        `xcrack.linear.superlu` where it is left out.
+        `xcrack.elimination.superlu` where it is left out.
 
     Returns
     -------
@@ -75,7 +75,7 @@ def solve_states(
     cases = [_case(problem, model, state, known_loads) for state in states]
     fixed = model.known.fixed.copy()
     motion = free_motion(model.space, fixed)
-    engine = _engine(problem, model, fixed, motion, solver)
+    engine = _engine(problem, model, fixed, motion, solver, warm)
     in_balance = [balanced(model.space, motion, case.f) for case in cases]
     f = np.stack([loads for loads, _ in in_balance], axis=1)
     imbalance = max(share for _, share in in_balance)
@@ -85,9 +85,11 @@ def solve_states(
     u = lips_contact.u
     if motion.modes.shape[1]:
         u = without_motion(motion, u)
-    kept = model.bulk
+    kept, handed_on = model.bulk, lips_contact.warm
     if isinstance(engine, IterativeSystem):
         kept = replace(kept, levels=engine.hierarchy)
+    else:
+        handed_on = replace(handed_on, elimination=engine.elimination)
     said = report(problem, model, engine, lips_contact, motion, imbalance, len(states))
     return [
         Solution(
@@ -102,14 +104,19 @@ def solve_states(
             energy=0.5 * float(u[:, k] @ (model.stiffness @ u[:, k])),
             report=said,
             bulk=kept,
-            warm=lips_contact.warm,
+            warm=handed_on,
         )
         for k, (state, case) in enumerate(zip(states, cases, strict=True))
     ]
 
 
 def _engine(
-    problem: Problem, model: Model, fixed: Bools, motion: Motion, solver: Solver | None
+    problem: Problem,
+    model: Model,
+    fixed: Bools,
+    motion: Motion,
+    solver: Solver | None,
+    warm: Warm | None,
 ) -> System | IterativeSystem:
     """A factorisation, or in space above some size conjugate gradients."""
     space_, wanted = model.space, problem.numerics.linear
@@ -126,7 +133,15 @@ def _engine(
             problem.material if problem.numerics.tip_basis == "vectorial" else None,
         )
     fixed[motion.pins] = True
-    return system(space_, model.stiffness, fixed, problem.numerics, solver, problem.material)
+    return system(
+        space_,
+        model.stiffness,
+        fixed,
+        problem.numerics,
+        solver,
+        problem.material,
+        None if warm is None else warm.elimination,
+    )
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,7 +5,7 @@ from itertools import permutations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from xcrack.arrays import Ints
+from xcrack.arrays import Bools, Ints
 from xcrack.errors import MeshError
 from xcrack.mesh import Mesh
 
@@ -62,14 +62,19 @@ def box(lower: ArrayLike, upper: ArrayLike, n: int | tuple[int, ...]) -> Mesh:
         if d == 2
         else [("left", "right"), ("front", "back"), ("bottom", "top")]
     )
-    bare = Mesh(points, stacked)
-    facets = bare.facet_sets["boundary"]
+    index = np.stack(np.unravel_index(np.arange(len(points)), tuple(count + 1)), axis=1)
     sets = {}
-    for axis, (first, last) in enumerate(names):
-        index = np.unravel_index(facets, tuple(count + 1))[axis]
-        sets[first] = facets[(index == 0).all(axis=1)]
-        sets[last] = facets[(index == count[axis]).all(axis=1)]
+    for axis, both in enumerate(names):
+        for name, end in zip(both, (0, count[axis]), strict=True):
+            sets[name] = _facets_on(stacked, index[:, axis] == end)
     return Mesh(points, stacked, sets)
+
+
+def _facets_on(cells: Ints, on_side: Bools) -> Ints:
+    """Facets all of whose points lie on a side, sorted as those of a mesh are."""
+    near = cells[on_side[cells].sum(axis=1) == cells.shape[1] - 1]
+    facets = np.sort(near[on_side[near]].reshape(len(near), -1), axis=1)
+    return facets[np.lexsort(facets.T[::-1])]
 
 
 def _mirrored(place: Ints, corner: Ints, number: Ints) -> Ints:

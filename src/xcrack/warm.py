@@ -1,4 +1,4 @@
-"""What a step hands to the next: closed sets by place."""
+"""What a step hands to the next: closed sets by place, and the order of elimination."""
 
 from dataclasses import dataclass
 
@@ -6,22 +6,26 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from xcrack.arrays import Bools, Floats
+from xcrack.elimination import Elimination
 from xcrack.multipliers import Multipliers
 
 
 @dataclass(frozen=True, eq=False)
 class Warm:
-    """Closed sets of all load states.
+    """Closed sets of all load states, and the order in which a factorisation takes the nodes.
 
     Attributes
     ----------
     centre : tuple of (g, d) arrays or None
         Where the multipliers of each crack sit; None for a crack without.
     active : tuple of (states, g) arrays of bool or None
+    elimination : Elimination, optional
+        None without a factorisation.
     """
 
     centre: tuple[Floats | None, ...]
     active: tuple[Bools | None, ...]
+    elimination: Elimination | None = None
 
     def closed(self, c: int) -> bool:
         """Whether any group of crack c was closed in any state."""

@@ -1,0 +1,69 @@
+"""The order of elimination that cracks in one mesh share."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+
+import scenes
+import xcrack as xc
+from xcrack.elimination import Elimination, eliminated
+from xcrack.solving import solve_states
+
+TENSION = [xc.traction("top", (0.0, 1.0)), xc.traction("bottom", (0.0, -1.0))]
+EDGE = [(-1.2, 0.013), (-0.2, 0.013)]
+
+
+def problem(tip, mesh):
+    crack = xc.line_crack([*EDGE, tip])
+    return xc.Problem(mesh, xc.Isotropic(1.0, 0.3, "strain"), [crack], loads=TENSION)
+
+
+def laplacian(n, seed):
+    """A symmetric positive matrix on a path of points with random links."""
+    rng = np.random.default_rng(seed)
+    i, j = rng.integers(n, size=(2, 3 * n))
+    link = sp.coo_matrix((rng.random(3 * n), (i, j)), shape=(n, n))
+    link = link + link.T
+    return sp.csc_matrix(sp.diags(np.asarray(link.sum(axis=0)).ravel() + 1) - link)
+
+
+def test_a_known_order_gives_the_same_solution():
+    A, b = laplacian(60, 4401), np.random.default_rng(4402).random((60, 2))
+    node = np.arange(60)
+    first, order = eliminated(A, node, 60, None)
+    assert order.age == 0
+    again, kept = eliminated(A, node, 60, order)
+    np.testing.assert_allclose(first(b), again(b), rtol=1e-12)  # round-off
+    np.testing.assert_allclose(A @ again(b[:, 0]), b[:, 0], rtol=1e-11)
+    assert kept.age == 1
+    assert kept.place is order.place
+
+
+def test_an_order_that_fills_is_given_up():
+    A = laplacian(60, 4403)
+    _, order = eliminated(A, np.arange(60), 60, None)
+    solve, kept = eliminated(A, np.arange(60), 60, replace(order, fill=order.fill // 2))
+    assert kept is None
+    np.testing.assert_allclose(A @ solve(np.ones(60)), 1.0, rtol=1e-11)
+
+
+def test_an_order_of_another_mesh_is_passed_over():
+    A = laplacian(40, 4404)
+    _, order = eliminated(A, np.arange(40), 40, Elimination(np.arange(7), 10))
+    assert len(order.place) == 40
+    assert order.age == 0
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_the_next_crack_takes_the_order_of_the_last(order):
+    """Displacements differ by round-off, and the factor is hardly larger than a new one."""
+    mesh = scenes.perturbed(16, 77)
+    first = xc.solve(replace(problem((0.0, 0.05), mesh), order=order))
+    longer = replace(problem((0.15, 0.12), mesh), order=order)
+    kept = solve_states(longer, [None], bulk=first.bulk, warm=first.warm)[0]
+    fresh = xc.solve(longer)
+    assert kept.warm.elimination.age == 1
+    scale = np.abs(fresh.u).max()
+    np.testing.assert_allclose(kept.u, fresh.u, atol=1e-10 * scale)
