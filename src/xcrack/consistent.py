@@ -72,14 +72,16 @@ def _facet_points(space: Space, cells: Ints) -> _Part:
     counts = np.bincount(facet, minlength=len(facet_ids))[inverse]
     owner, k = ranges(counts)
     point = first[inverse][owner] + k
-    row, opposite = owner // (mesh.dim + 1), owner % (mesh.dim + 1)
-    cell = cells[row]
-    # Place of each point of the facet among those of the cell.
-    same = mesh.cells[cell][:, :, None] == ends[facet[point]][:, None, :]
-    bary = np.einsum("qvf,qf->qv", same.astype(float), at[point])
-    inward = mesh.gradient[cell, opposite]
+    # Of each facet of each cell: its corners among those of the cell, and its outward normal.
+    corners = mesh.dim + 1
+    same = np.repeat(mesh.cells[cells], corners, axis=0)[:, :, None] == ends[inverse][:, None, :]
+    local = same.argmax(axis=1)
+    inward = mesh.gradient[cells].reshape(-1, mesh.dim)
     outward = -inward / np.linalg.norm(inward, axis=1, keepdims=True)
-    normal = outward * weight[point, None]
+    bary = np.zeros((len(owner), corners))
+    bary[np.arange(len(owner))[:, None], local[owner]] = at[point]
+    normal = outward[owner] * weight[point, None]
+    cell = cells[owner // corners]
     side = cell_side(space, cell)
     piece_side = np.zeros(len(owner), dtype=np.int64)
     for c, cut in enumerate(space.cuts):

@@ -9,6 +9,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from xcrack.arrays import Bools, Floats, Ints
+from xcrack.body import Body
 from xcrack.conditions import BodyForce, CrackPressure, InitialStress, evaluate, evaluate_scalar
 from xcrack.errors import XcrackWarning
 from xcrack.front_curve import Feet, FrontCurve, front_curve
@@ -22,7 +23,7 @@ from xcrack.front_integral import (
     solve_front,
 )
 from xcrack.loads import position
-from xcrack.locate import contains, nearest_boundary
+from xcrack.locate import contains
 from xcrack.quadrature import cell_points, cell_side
 from xcrack.solution import Solution, gradients_at
 from xcrack.tube import leg_size
@@ -74,8 +75,8 @@ def tube_radius(
     inner = np.ones(len(s), dtype=bool)
     if not curve.closed:
         inner = np.minimum(s - ends[0], ends[1] - s) >= min(wanted, 0.4 * (ends[1] - ends[0]))
-    free = min(nearest_boundary(space.mesh, point)[0] for point in x[inner])
-    limit = min(limit, 0.95 * free)
+    free = np.abs(Body.of(space.mesh).depth(x[inner])[0])
+    limit = min(limit, 0.95 * float(free.min()))
     for other in space.tips:
         if other is not tip:
             limit = min(limit, 0.8 * float(cKDTree(other.x).query(x)[0].min()))
@@ -242,6 +243,8 @@ def _domain_parts(
     initial = partial(_initial, solutions) if _has_initial(solutions) else None
     middle = mesh.points[mesh.cells].mean(axis=1)
     cells = np.nonzero(curve.distance(middle) <= 1.05 * outer + mesh.cell_size)[0]
+    reach = np.linalg.norm(mesh.points[mesh.cells[cells]] - middle[cells, None], axis=2).max(axis=1)
+    cells = cells[curve.distance(middle[cells]) <= 1.05 * outer + reach]
     for first in range(0, len(cells), _CHUNK):
         points = cell_points(space, cells[first : first + _CHUNK], _POINTS, _DEGREE)
         x = position(space, points.cell, points.bary)

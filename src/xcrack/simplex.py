@@ -123,12 +123,6 @@ _TETRAHEDRA: dict[int, list[tuple[float, ...]]] = {
         (0.0734930431163619495, *(0.0927352503108912264,) * 3),
         (0.0425460207770814664, *(0.0455037041256496495,) * 2, 0.4544962958743503505),
     ],
-    6: [  # Keast, 1986, polished to round-off on the moments
-        (0.03992275025816775, *(0.214602871259152,) * 3),
-        (0.01007721105532069, *(0.04067395853461148,) * 3),
-        (0.055357181543654384, *(0.32233789014227565,) * 3),
-        (0.04821428571428574, 0.06366100187501757, 0.06366100187501757, 0.2696723314583159),
-    ],
 }
 
 
@@ -149,7 +143,7 @@ def simplex_rule(dim: int, degree: int) -> tuple[Floats, Floats]:
     """A rule exact for polynomials of the given degree: points `(q, d + 1)`, weights sum to 1.
 
     In the plane up to degree 10 it is symmetric, so that a mirrored mesh gives a mirrored result;
-    in space up to degree 6.
+    in space up to degree 5.
     """
     if degree <= 1:
         return np.full((1, dim + 1), 1 / (dim + 1)), np.ones(1)

@@ -159,19 +159,20 @@ def _rays(front: Front, side_normal: dict[tuple[int, int], Floats]) -> tuple[Int
     following = np.roll(front.number, -1)
     n_sides = m if front.closed else m - 1
     along = np.roll(front.x, -1, axis=0) - front.x
-    out = np.zeros((n_sides, 3))
-    for j in range(n_sides):
-        # The faces run against the direction of the front.
-        normal = side_normal.get((int(following[j]), int(front.number[j])), front.frame[j, 1])
-        out[j] = np.cross(normal, along[j])
-    out = unit(out)
+    # The faces run against the direction of the front.
+    normal = [
+        side_normal.get((int(following[j]), int(front.number[j])), front.frame[j, 1])
+        for j in range(n_sides)
+    ]
+    out = unit(np.cross(normal, along[:n_sides]))
+    previous = np.roll(out, 1, axis=0)
+    angles = np.arccos(np.clip(np.einsum("ij,ij->i", previous, out), -1, 1))
     base, direction, normals = [], [], []
     for j in range(m):
         t, n, b = front.frame[j]
         rays = [t]
         if front.closed or 0 < j < m - 1:
-            before, after = out[j - 1], out[j % n_sides]
-            angle = float(np.arccos(np.clip(before @ after, -1, 1)))
+            before, after, angle = previous[j], out[j], float(angles[j])
             if angle > _FAN and (after - before) @ b > 0:
                 pieces = int(np.ceil(angle / _FAN))
                 share = np.arange(pieces + 1) / pieces

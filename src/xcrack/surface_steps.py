@@ -104,7 +104,7 @@ def _front_length_inside(crack: Crack, body: Body) -> float:
     return total
 
 
-def surface_size(crack: Crack, mesh: Mesh) -> float:
+def surface_size(crack: Crack, mesh: Mesh, body: Body | None = None) -> float:
     """Area of a crack in space over the length of its fronts, within the body.
 
     Parameters
@@ -112,6 +112,8 @@ def surface_size(crack: Crack, mesh: Mesh) -> float:
     crack : Crack
         In space, placed.
     mesh : Mesh
+    body : Body, optional
+        Of the mesh, where it is known.
 
     Returns
     -------
@@ -119,7 +121,7 @@ def surface_size(crack: Crack, mesh: Mesh) -> float:
         length: that of a crack with a straight front, half the radius of a penny; the root of the
         area where all fronts have left the body.
     """
-    body = Body.of(mesh)
+    body = body or Body.of(mesh)
     area, length = _area_inside(crack, body), _front_length_inside(crack, body)
     return area / length if length > 0 else float(np.sqrt(area))
 

@@ -4,9 +4,9 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from xcrack.arrays import Floats, Ints
+from xcrack.body import Body
 from xcrack.crack import Crack
 from xcrack.cut import Cut
-from xcrack.locate import contains, nearest_boundary
 from xcrack.mesh import Mesh
 from xcrack.surface_steps import surface_size
 
@@ -53,16 +53,18 @@ def front_radii(
     wanted : float, length, optional
     """
     every = [[crack.points[front] for front in crack.fronts or ()] for crack in cracks]
+    body = Body.of(mesh) if any(len(fronts) for fronts in every) else None
     radii = []
     for c, (crack, cut) in enumerate(zip(cracks, cuts, strict=True)):
         row = []
         fronts = crack.fronts or ()
         if fronts and wanted is None:
-            size = surface_size(crack, mesh)
+            size = surface_size(crack, mesh, body)
         for k, numbers in enumerate(fronts):
             cell = leg_size(mesh, cut.level_set.tip_cells[k])
             closed = bool(numbers[0] == numbers[-1])
-            room = _ASIDE * _to_sides(mesh, every[c][k], closed)
+            assert body is not None
+            room = _ASIDE * _to_sides(body, every[c][k], closed)
             others = [
                 x for d, own in enumerate(every) for j, x in enumerate(own) if (d, j) != (c, k)
             ]
@@ -78,13 +80,13 @@ def front_radii(
     return radii
 
 
-def _to_sides(mesh: Mesh, x: Floats, closed: bool) -> float:
+def _to_sides(body: Body, x: Floats, closed: bool) -> float:
     """Distance of a front to the boundary, but where it runs into it."""
-    inside = np.nonzero(contains(mesh, x))[0]
+    inside = np.nonzero(body.contains(x))[0]
     if not len(inside):
         return np.inf
     rows: Ints = inside[np.unique(np.linspace(0, len(inside) - 1, _SAMPLES).astype(int))]
-    distance = np.array([nearest_boundary(mesh, x[i])[0] for i in rows])
+    distance = np.abs(body.depth(x[rows])[0])
     if closed:
         return float(distance.min())
     s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(x, axis=0), axis=1))])
