@@ -36,7 +36,7 @@ def main(arguments: list[str] | None = None) -> int:
     # One thread a solve, as in a growth run beside others; set before numpy is loaded.
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(name, "1")
-    from xcrack.bench import charts, conforming, runs, suites
+    from xcrack.bench import charts, conforming, getfem_runs, runs, suites
 
     parser = argparse.ArgumentParser(prog="python -m xcrack.bench", description=__doc__)
     parser.add_argument("scenes", nargs="*", help=f"of {', '.join(suites.names(False))}")
@@ -49,9 +49,9 @@ def main(arguments: list[str] | None = None) -> int:
     unknown = set(asked.scenes) - set(suites.names(False))
     if unknown:
         parser.error(f"no scene {', '.join(sorted(unknown))}: of {', '.join(suites.names(False))}")
-    if conforming.missing():
-        print(conforming.missing(), file=sys.stderr)
-    print(_getfem(), file=sys.stderr)
+    for why in (conforming.missing(), getfem_runs.missing()):
+        if why:
+            print(why, file=sys.stderr)
     for scene in asked.scenes or suites.names(asked.quick):
         if asked.draw:
             record = _read(asked.out / f"{scene}.json")
@@ -63,6 +63,8 @@ def main(arguments: list[str] | None = None) -> int:
             )
             after = runs.machine()
             busiest = max(before, after, key=lambda m: m["load"][:1])
+            getfem = getfem_runs.found()
+            busiest["versions"]["GetFEM"] = getfem and getfem.version
             record = {
                 "scene": scene, "quick": asked.quick, "clock": runs.clock(busiest),
                 "repeats": repeats, "machine": busiest, "rows": rows,
@@ -72,14 +74,6 @@ def main(arguments: list[str] | None = None) -> int:
         for path in charts.draw(record, asked.figures):
             print(f"  {path}")
     return 0
-
-
-def _getfem() -> str:
-    """What is said of a code whose numbers are quoted, never measured here."""
-    from importlib.util import find_spec
-
-    there = "is installed, but not run" if find_spec("getfem") else "is not installed"
-    return f"GetFEM {there}: its XFEM is shown as quoted numbers"
 
 
 def _read(path: Path) -> dict[str, Any]:
