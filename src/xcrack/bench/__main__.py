@@ -92,8 +92,8 @@ def _tell(record: dict[str, Any]) -> None:
     pairs = [(name, e) for name, some in _WANTED[record["scene"]].items() for e in some]
     for name, error in pairs:
         words = []
-        for kinds in (("setting",), ("mesh",), ("steps",), ("opponent",)):
-            ratio, ahead = behind(rows, name, clock, kinds, error)
+        for some, kind in _groups(rows):
+            ratio, ahead = behind(some, name, clock, (kind,), error)
             if ahead:
                 words.append(f"{ratio:.2f} of {ahead}")
         print(f"  {name} to {error:g}: {'; '.join(words) or 'no other reaches it'}")
@@ -102,6 +102,16 @@ def _tell(record: dict[str, Any]) -> None:
     if both:
         costs = [f"{a[clock] / b[clock]:.2f} at {a['unknowns']}" for a, b in both]
         print(f"  contact over none: {', '.join(costs)} unknowns")
+
+
+def _groups(rows: list[dict[str, Any]]) -> list[tuple[list[dict[str, Any]], str]]:
+    """Rows to compare the default settings with, by their kind; each opponent for itself."""
+    groups = [(rows, kind) for kind in ("setting", "mesh", "steps")]
+    codes = dict.fromkeys(r["series"].split()[0] for r in rows if r["kind"] == "opponent")
+    for code in codes:
+        some = [r for r in rows if r["kind"] == "default" or r["series"].split()[0] == code]
+        groups.append((some, "opponent"))
+    return groups
 
 
 if __name__ == "__main__":

@@ -243,7 +243,7 @@ def _memory(command: tuple[str, ...], scene: str, n: int, order: int) -> float:
     """Memory of a run in a fresh process, in which a small one has loaded what is loaded once."""
     worker = Worker(command)
     try:
-        _run(worker, scene, 5, order, 1)
+        _run(worker, scene, 11, order, 1)
         return peak(lambda: _run(worker, scene, n, order, 1), worker.number())
     finally:
         worker.stop()
