@@ -17,6 +17,7 @@ from dataclasses import dataclass
 from functools import cache, partial
 from pathlib import Path
 from threading import Timer
+from time import monotonic
 from typing import IO, Any
 
 from xcrack.bench.runs import Case, peak
@@ -26,6 +27,9 @@ from xcrack.errors import XcrackError
 VARIABLE = "XCRACK_GETFEM_PYTHON"
 SCRIPT = Path(__file__).with_name("getfem_script.py")
 _ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+_ADVICE = (
+    f"Set {VARIABLE} to a Python in which `import getfem` works, or to `none` to leave GetFEM out."
+)
 # A file of a mesh is where its Python interface tells the version.
 _PROBE = """
 import os, tempfile, numpy, getfem
@@ -85,7 +89,7 @@ class Worker:
         process = self._running()
         assert process.stdin is not None
         assert process.stdout is not None
-        watch = Timer(self._patience, process.kill)
+        watch, start = Timer(self._patience, process.kill), monotonic()
         watch.start()
         try:
             process.stdin.write(json.dumps(request) + "\n")
@@ -96,14 +100,14 @@ class Worker:
         finally:
             watch.cancel()
         if not line:
-            raise GetfemError(self._ended(process))
+            raise GetfemError(self._ended(process, monotonic() - start > self._patience))
         try:
             answer = json.loads(line)
         except ValueError:
             answer = None
         if not isinstance(answer, dict):
             self.stop()
-            raise GetfemError(f"the process of GetFEM answered {line.strip()[:80]!r}. {_advice()}")
+            raise GetfemError(f"the process of GetFEM answered {line.strip()[:80]!r}. {_ADVICE}")
         if "failed" in answer:
             raise GetfemError(f"GetFEM could not solve this scene: {answer['failed']}")
         return answer
@@ -123,23 +127,28 @@ class Worker:
             return self._process
         self.stop()
         self._notes = tempfile.TemporaryFile()
-        self._process = subprocess.Popen(
-            self._command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._notes,
-            text=True, env={**os.environ, **dict.fromkeys(_ONE_THREAD, "1")},
-        )  # fmt: skip
+        try:
+            self._process = subprocess.Popen(
+                self._command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._notes,
+                text=True, env={**os.environ, **dict.fromkeys(_ONE_THREAD, "1")},
+            )  # fmt: skip
+        except OSError as error:
+            self._notes.close()
+            raise GetfemError(f"GetFEM could not be started: {error}. {_ADVICE}") from None
         self._end = weakref.finalize(self, _end, self._process, self._notes)
         return self._process
 
-    def _ended(self, process: "subprocess.Popen[str]") -> str:
+    def _ended(self, process: "subprocess.Popen[str]", late: bool) -> str:
         """What is said of a process that has ended: how, and its last words."""
-        code = process.wait()
-        words = ""
+        code, words = process.wait(), ""
         if self._notes is not None:
             self._notes.seek(0)
             last = self._notes.read().decode(errors="replace").strip().splitlines()[-1:]
             words = "".join(f": {line}" for line in last)
         self.stop()
-        return f"the process of GetFEM ended ({code}{words}). {_advice()}"
+        if late:
+            return f"the process of GetFEM gave no answer within {self._patience:g} s. {_ADVICE}"
+        return f"the process of GetFEM ended ({code}{words}). {_ADVICE}"
 
 
 def _end(process: "subprocess.Popen[str]", notes: IO[bytes]) -> None:
@@ -156,13 +165,6 @@ def _end(process: "subprocess.Popen[str]", notes: IO[bytes]) -> None:
         process.kill()
         process.wait()
     notes.close()
-
-
-def _advice() -> str:
-    return (
-        f"Set {VARIABLE} to a Python in which `import getfem` works, or to `none` to leave "
-        "GetFEM out."
-    )
 
 
 def found() -> Getfem | None:
@@ -243,7 +245,7 @@ def _memory(command: tuple[str, ...], scene: str, n: int, order: int) -> float:
     """Memory of a run in a fresh process, in which a small one has loaded what is loaded once."""
     worker = Worker(command)
     try:
-        _run(worker, scene, 11, order, 1)
+        _run(worker, "edge" if scene == "edge" else "closed", 5, order, 1)
         return peak(lambda: _run(worker, scene, n, order, 1), worker.number())
     finally:
         worker.stop()
