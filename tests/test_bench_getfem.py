@@ -148,6 +148,15 @@ def test_every_opponent_is_compared_with():
     ]  # fmt: skip
 
 
+def test_process_keeps_to_one_thread(monkeypatch):
+    monkeypatch.setenv("OMP_NUM_THREADS", "4")
+    worker = program(
+        "import json, os", "sys.stdin.readline()",
+        "print(json.dumps({k: v for k, v in os.environ.items() if 'THREAD' in k}), flush=True)",
+    )  # fmt: skip
+    assert set(worker.ask({}).values()) == {"1"}
+
+
 def test_process_that_ends_is_told_and_started_anew():
     worker = program("sys.stdin.readline()", "sys.exit('out of memory')")
     numbers = []

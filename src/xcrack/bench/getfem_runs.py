@@ -26,7 +26,10 @@ from xcrack.errors import XcrackError
 
 VARIABLE = "XCRACK_GETFEM_PYTHON"
 SCRIPT = Path(__file__).with_name("getfem_script.py")
-_ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+# The last one is that of the ordering before a factorisation.
+_ONE_THREAD = (
+    "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "SCOTCH_PTHREAD_NUMBER",
+)  # fmt: skip
 _ADVICE = (
     f"Set {VARIABLE} to a Python in which `import getfem` works, or to `none` to leave GetFEM out."
 )
