@@ -238,7 +238,7 @@ def contact(
 ) -> Any:  # fmt: skip
     """Pressures on the lips: a constant a cell at order 1, continuous and linear at order 2.
 
-    Linear ones are unstable beside displacements of order 1; constant ones are stable beside both.
+    Linear ones can be unstable beside displacements of order 1, constant ones were sound there.
     """
     space = gf.MeshFem(mesh)
     space.set_fem(gf.Fem(f"FEM_QK(2,{order - 1})"), cells)
