@@ -228,10 +228,6 @@ def test_every_scene_has_a_chart_and_errors_to_compare_at(tmp_path):
     assert [p.name for p in drawn] == ["edge.png", "edge_energy.png"]
 
 
-def test_getfem_is_said_to_be_quoted():
-    assert __main__._getfem().endswith("its XFEM is shown as quoted numbers")
-
-
 @pytest.mark.gmsh
 def test_opponent_is_a_worthy_one():
     """Discretisation: quarter-point triangles of 3.4 k unknowns are good to 1.2e-4 (measured)."""

@@ -36,7 +36,7 @@ def main(arguments: list[str] | None = None) -> int:
     # One thread a solve, as in a growth run beside others; set before numpy is loaded.
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(name, "1")
-    from xcrack.bench import charts, conforming, runs, suites
+    from xcrack.bench import charts, conforming, getfem_runs, runs, suites
 
     parser = argparse.ArgumentParser(prog="python -m xcrack.bench", description=__doc__)
     parser.add_argument("scenes", nargs="*", help=f"of {', '.join(suites.names(False))}")
@@ -49,9 +49,9 @@ def main(arguments: list[str] | None = None) -> int:
     unknown = set(asked.scenes) - set(suites.names(False))
     if unknown:
         parser.error(f"no scene {', '.join(sorted(unknown))}: of {', '.join(suites.names(False))}")
-    if conforming.missing():
-        print(conforming.missing(), file=sys.stderr)
-    print(_getfem(), file=sys.stderr)
+    for why in (conforming.missing(), getfem_runs.missing()):
+        if why:
+            print(why, file=sys.stderr)
     for scene in asked.scenes or suites.names(asked.quick):
         if asked.draw:
             record = _read(asked.out / f"{scene}.json")
@@ -63,6 +63,8 @@ def main(arguments: list[str] | None = None) -> int:
             )
             after = runs.machine()
             busiest = max(before, after, key=lambda m: m["load"][:1])
+            getfem = getfem_runs.found()
+            busiest["versions"]["GetFEM"] = getfem and getfem.version
             record = {
                 "scene": scene, "quick": asked.quick, "clock": runs.clock(busiest),
                 "repeats": repeats, "machine": busiest, "rows": rows,
@@ -72,14 +74,6 @@ def main(arguments: list[str] | None = None) -> int:
         for path in charts.draw(record, asked.figures):
             print(f"  {path}")
     return 0
-
-
-def _getfem() -> str:
-    """What is said of a code whose numbers are quoted, never measured here."""
-    from importlib.util import find_spec
-
-    there = "is installed, but not run" if find_spec("getfem") else "is not installed"
-    return f"GetFEM {there}: its XFEM is shown as quoted numbers"
 
 
 def _read(path: Path) -> dict[str, Any]:
@@ -98,8 +92,8 @@ def _tell(record: dict[str, Any]) -> None:
     pairs = [(name, e) for name, some in _WANTED[record["scene"]].items() for e in some]
     for name, error in pairs:
         words = []
-        for kinds in (("setting",), ("mesh",), ("steps",), ("opponent",)):
-            ratio, ahead = behind(rows, name, clock, kinds, error)
+        for some, kind in _groups(rows):
+            ratio, ahead = behind(some, name, clock, (kind,), error)
             if ahead:
                 words.append(f"{ratio:.2f} of {ahead}")
         print(f"  {name} to {error:g}: {'; '.join(words) or 'no other reaches it'}")
@@ -108,6 +102,16 @@ def _tell(record: dict[str, Any]) -> None:
     if both:
         costs = [f"{a[clock] / b[clock]:.2f} at {a['unknowns']}" for a, b in both]
         print(f"  contact over none: {', '.join(costs)} unknowns")
+
+
+def _groups(rows: list[dict[str, Any]]) -> list[tuple[list[dict[str, Any]], str]]:
+    """Rows to compare the default settings with, by their kind; each opponent for itself."""
+    groups = [(rows, kind) for kind in ("setting", "mesh", "steps")]
+    codes = dict.fromkeys(r["series"].split()[0] for r in rows if r["kind"] == "opponent")
+    for code in codes:
+        some = [r for r in rows if r["kind"] == "default" or r["series"].split()[0] == code]
+        groups.append((some, "opponent"))
+    return groups
 
 
 if __name__ == "__main__":

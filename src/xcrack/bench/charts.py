@@ -2,11 +2,12 @@
 
 from collections.abc import Callable, Sequence
 from functools import partial
+from itertools import cycle
 from pathlib import Path
 from typing import Any
 
 from xcrack.bench.pareto import front, points_of
-from xcrack.bench.quoted import QUOTED
+from xcrack.bench.quoted import to_draw
 
 _TITLES = {
     "edge": "Edge crack, K_I = 1 and K_II = 0.5",
@@ -104,8 +105,8 @@ def _chart(
         chosen = [r for r in rows if r["series"] == series and r["errors"].get(error, 0) > 0]
         for axis, x in zip(axes, measures):
             axis.plot([r[x] for r in chosen], [r["errors"][error] for r in chosen], **style)
-    for name, points in QUOTED.get(scene, {}).items() if quoted else ():
-        mark = "osD^v"[list(QUOTED[scene]).index(name) % 5]
+    before = to_draw(scene, (r["series"] for r in record["rows"])) if quoted else {}
+    for (name, points), mark in zip(before.items(), cycle("osD^v")):
         for axis, k in zip(axes, (2, 0)):  # not the memory: it was not measured
             axis.plot(
                 [p[k] for p in points], [p[1] for p in points], ls=":", lw=0.8, marker=mark,

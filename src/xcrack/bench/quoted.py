@@ -1,11 +1,15 @@
 """Other codes on the same scenes, measured once on two cores of an AMD EPYC (Zen 4), one thread.
 
-They are not run here: they are drawn hollow. Seconds are the least of up to three runs, without
-imports; K is the worse of the modes (edge crack) or the mean of K_I (penny).
+They are drawn hollow, unless the same code ran in the chart. Seconds are the least of up to three
+runs, without imports; K is the worse of the modes (edge crack) or the mean of K_I (penny).
 """
 
-# scene -> code -> (unknowns, error, seconds)
-QUOTED: dict[str, dict[str, tuple[tuple[int, float, float], ...]]] = {
+from collections.abc import Iterable
+
+Point = tuple[int, float, float]  # unknowns, error, seconds
+
+# scene -> code -> points
+QUOTED: dict[str, dict[str, tuple[Point, ...]]] = {
     "edge": {
         "GetFEM 5.4 XFEM, Q1, radius": (
             (1424, 1.26e-3, 0.343), (5272, 2.33e-4, 0.519), (20168, 3.82e-5, 1.382),
@@ -33,3 +37,21 @@ QUOTED: dict[str, dict[str, tuple[tuple[int, float, float], ...]]] = {
         ),
     },
 }  # fmt: skip
+
+
+def to_draw(scene: str, ran: Iterable[str]) -> dict[str, tuple[Point, ...]]:
+    """Curves of a scene that are quoted: those of codes that did not run.
+
+    Parameters
+    ----------
+    scene : str
+    ran : iterable of str
+        Names of the series that ran; a code is the first word of such a name.
+
+    Returns
+    -------
+    dict
+    """
+    codes = {name.split()[0] for name in ran}
+    found = QUOTED.get(scene, {})
+    return {name: points for name, points in found.items() if name.split()[0] not in codes}

@@ -16,6 +16,7 @@ from time import perf_counter, process_time
 from typing import Any
 
 from xcrack.bench.scenes import Outcome
+from xcrack.errors import XcrackError
 
 Row = dict[str, Any]
 Timed = tuple[Outcome, float, float]  # with wall and processor time
@@ -39,6 +40,8 @@ class Case:
         What is timed; the `later` errors of the outcome are not.
     prepare : callable (), optional
         What goes before and is not timed, such as a mesh that all cases share.
+    memory : callable () -> float, optional
+        Memory in MB that a run adds, for runs that take place in another process.
     """
 
     series: str
@@ -46,6 +49,7 @@ class Case:
     size: str
     run: Callable[[int], Outcome]
     prepare: Callable[[], object] | None = None
+    memory: Callable[[], float] | None = None
 
 
 def measure(cases: Sequence[Case], repeats: int, say: Callable[[str], None]) -> list[Row]:
@@ -99,13 +103,15 @@ def timed(case: Case, seed: int) -> Timed:
     wall, processor = perf_counter(), process_time()
     outcome = case.run(seed)
     wall, processor = perf_counter() - wall, process_time() - processor
+    if outcome.took is not None:
+        wall, processor = outcome.took
     if outcome.later is not None:  # it holds the solution: let go of it
         outcome = replace(outcome, errors={**outcome.errors, **outcome.later()}, later=None)
     return outcome, wall, processor
 
 
 def memory(case: Case) -> float | None:
-    """Memory in MB that a run adds at its peak (Linux; elsewhere None).
+    """Memory in MB that a run adds at its peak (Linux; elsewhere, or if it fails, None).
 
     Parameters
     ----------
@@ -116,22 +122,40 @@ def memory(case: Case) -> float | None:
     float or None
     """
     try:
+        if case.memory is not None:
+            return case.memory()
         if case.prepare is not None:
             case.prepare()
         gc.collect()
         ctypes.CDLL("libc.so.6").malloc_trim(0)  # or a run would find free memory of the last one
-        Path("/proc/self/clear_refs").write_text("5", encoding="ascii")  # the peak starts anew
-        before = _resident("VmRSS")
-        case.run(1)
-        return max(_resident("VmHWM") - before, 0.0)
-    except (OSError, AttributeError):
+        return peak(lambda: case.run(1))
+    except (OSError, AttributeError, XcrackError):
         return None
 
 
-def _resident(name: str) -> float:
-    """A line of the kernel's account of this process, in MB."""
-    lines = Path("/proc/self/status").read_text(encoding="ascii").splitlines()
-    return next(float(x.split()[1]) for x in lines if x.startswith(name)) / 1024
+def peak(run: Callable[[], object], process: int | None = None) -> float:
+    """Memory in MB that a process holds at the peak of a run above what it held before (Linux).
+
+    Parameters
+    ----------
+    run : callable ()
+    process : int, optional
+        Its number; this process where left out.
+
+    Returns
+    -------
+    float
+    """
+    account = Path("/proc") / ("self" if process is None else str(process))
+
+    def resident(name: str) -> float:
+        lines = (account / "status").read_text(encoding="utf-8").splitlines()
+        return next(float(x.split()[1]) for x in lines if x.startswith(name)) / 1024
+
+    (account / "clear_refs").write_text("5", encoding="ascii")  # the peak starts anew
+    before = resident("VmRSS")
+    run()
+    return max(resident("VmHWM") - before, 0.0)
 
 
 def _row(case: Case, results: Sequence[Timed]) -> Row:

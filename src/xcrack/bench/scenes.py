@@ -42,12 +42,15 @@ class Outcome:
         Seconds of parts that the scene times itself.
     later : callable () -> dict, optional
         Further errors, whose evaluation is no part of the work: called when the clock has stopped.
+    took : (float, float), optional
+        Wall and processor time of a run that took place in another process.
     """
 
     errors: dict[str, float]
     unknowns: int
     parts: dict[str, float] = field(default_factory=dict)
     later: Callable[[], dict[str, float]] | None = None
+    took: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 from functools import partial
 
-from xcrack.bench import conforming, conforming_space, scenes, suites_bodies
+from xcrack.bench import conforming, conforming_space, getfem_runs, scenes, suites_bodies
 from xcrack.bench.conforming import Grading
 from xcrack.bench.fields import edge_fields
 from xcrack.bench.runs import Case
@@ -57,7 +57,7 @@ def _edge(quick: bool) -> list[Case]:
         found += variant(run, "patch basis", some, patch=True)
         found += variant(run, "not consistent", some, consistent=False)
         found += series(run, "graded cells", "mesh", (5, 7, 9, 13, 17, 23, 31), grading=1.4)
-    return found + _conforming_edge(quick)
+    return found + _conforming_edge(quick) + _getfem("edge", quick)
 
 
 def _conforming_edge(quick: bool) -> list[Case]:
@@ -84,6 +84,12 @@ def _conforming_edge(quick: bool) -> list[Case]:
     ]
 
 
+def _getfem(scene: str, quick: bool) -> list[Case]:
+    # Its solver takes a minute for 60 k unknowns of order 2.
+    few, all_of_them = {1: (21,), 2: (11, 21)}, {1: (11, 21, 41, 81), 2: (11, 15, 21, 29, 41)}
+    return getfem_runs.cases(scene, few if quick else all_of_them)
+
+
 def _half_closed(quick: bool) -> list[Case]:
     sizes = (11, 17) if quick else (11, 15, 21, 29, 41, 57)
     run = scenes.half_closed
@@ -95,6 +101,7 @@ def _half_closed(quick: bool) -> list[Case]:
         found += variant(run, "penalty", sizes, lips="penalty")
         found += variant(run, "augmented Lagrangian", sizes, lips="augmented")
         found += variant(run, "Nitsche", sizes, lips="nitsche")
+    found += _getfem("half_closed", quick)
     return found + series(run, "contact off", "off", sizes, contact="off")
 
 
@@ -107,6 +114,7 @@ def _closed(quick: bool) -> list[Case]:
         found += variant(scenes.closed, "penalty", sizes[:3], lips="penalty")
         found += variant(scenes.closed, "augmented Lagrangian", sizes[:3], lips="augmented")
         found += variant(scenes.closed, "Nitsche", sizes[:3], lips="nitsche")
+    found += _getfem("closed", quick)
     return found + series(scenes.closed, "contact off", "off", sizes, contact="off")
 
 
