@@ -8,6 +8,7 @@ import scipy.sparse as sp
 
 from xcrack.arrays import Floats, Ints
 from xcrack.consistent import boundary_points, corrected
+from xcrack.kept_cells import KeptCells, kept_cells, with_one_jump
 from xcrack.lip_points import LipPoints
 from xcrack.material import Isotropic
 from xcrack.mesh import Mesh
@@ -35,6 +36,8 @@ class Bulk:
         Node blocks, BSR.
     levels : Hierarchy, optional
         Coarse levels of the iterative solver, once it has made them.
+    cells : KeptCells, optional
+        Cut cells of the last crack that may serve the next.
     """
 
     mesh: Mesh
@@ -42,6 +45,7 @@ class Bulk:
     order: int
     matrix: sp.bsr_matrix
     levels: "Hierarchy | None" = None
+    cells: KeptCells | None = None
 
 
 def bulk(mesh: Mesh, material: Isotropic, order: int) -> Bulk:
@@ -67,19 +71,39 @@ def bulk(mesh: Mesh, material: Isotropic, order: int) -> Bulk:
 
 
 def enriched_stiffness(
-    space: Space, material: Isotropic, numerics: Numerics, lips: tuple[LipPoints, ...]
-) -> tuple[sp.csr_matrix, int]:
-    """Entries with an enriched function, as a matrix of all unknowns, and the points used.
+    space: Space,
+    material: Isotropic,
+    numerics: Numerics,
+    lips: tuple[LipPoints, ...],
+    known: KeptCells | None = None,
+) -> tuple[sp.csr_matrix, int, KeptCells | None]:
+    """Entries with an enriched function, as a matrix of all unknowns.
 
     Entries of two standard functions are left out: they are those of the uncracked body.
+
+    Parameters
+    ----------
+    known : KeptCells, optional
+        Of an earlier crack in the same mesh.
+
+    Returns
+    -------
+    matrix : sparse matrix (n_dof, n_dof)
+    n_points : int
+        Integration points used.
+    kept : KeptCells or None
+        For the next crack.
     """
-    from xcrack.kernels.enriched import add_stiffness, enriched_pattern
+    from xcrack.kernels.enriched import add_products, add_stiffness, enriched_pattern
 
     cells = space.enriched
     n = space.n_dof
     if not len(cells):
-        return sp.csr_matrix((n, n)), 0
-    points = cell_points(space, cells, numerics.points, 2 * (space.order - 1))
+        return sp.csr_matrix((n, n)), 0, None
+    simple = with_one_jump(space, cells)
+    kept, n_points = kept_cells(space, cells[simple], known)
+    others = cells[~simple]
+    points = cell_points(space, others, numerics.points, 2 * (space.order - 1))
     with_tip = cells[space.has_tip[cells]]
     boundary = None
     if numerics.consistent and len(with_tip):
@@ -87,7 +111,11 @@ def enriched_stiffness(
     indptr, indices = enriched_pattern(_functions(space, cells), space.n_functions, space.n_nodes)
     d = space.dim
     data = np.zeros((len(indices), d, d))
-    for part in _chunks(space, points, cells):
+    lame = material.lam, material.mu
+    for batch, rows in space.batches(kept.cells):
+        products = kept.products[rows]
+        add_products(data, indptr, indices, batch.functions, products, space.n_nodes, *lame)
+    for part in _chunks(space, points, others):
         for batch, _ in space.batches(part):
             number, row, first = points.of_cells(batch.cells)
             bary, weight = points.bary[number], points.weight[number]
@@ -104,12 +132,12 @@ def enriched_stiffness(
                 weight,
                 G,
                 space.n_nodes,
-                material.lam,
-                material.mu,
+                *lame,
             )
     if d * d * len(indices) < np.iinfo(np.int32).max:
         indptr = indptr.astype(np.int32)
-    return sp.bsr_matrix((data, indices, indptr), shape=(n, n)).tocsr(), len(points.weight)
+    matrix = sp.bsr_matrix((data, indices, indptr), shape=(n, n)).tocsr()
+    return matrix, n_points + len(points.weight), kept
 
 
 def _functions(space: Space, cells: Ints) -> Ints:

@@ -1,6 +1,6 @@
 """From a problem to matrices: cut, numbered, integrated and assembled, but not solved."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -63,11 +63,13 @@ def build(problem: Problem, bulk_: Bulk | None = None) -> Model:
         or bulk_.material != problem.material
     ):
         bulk_ = bulk(mesh, problem.material, order)
-    enriched, n_points = enriched_stiffness(space_, problem.material, problem.numerics, lips)
+    enriched, n_points, kept = enriched_stiffness(
+        space_, problem.material, problem.numerics, lips, bulk_.cells
+    )
     return Model(
         space_,
         lips,
-        bulk_,
+        replace(bulk_, cells=kept),
         total_stiffness(bulk_, enriched),
         known_unknowns(space_, tuple(problem.supports)),
         n_points,

@@ -13,7 +13,7 @@ from xcrack.arrays import Bools, Floats, Ints, offsets, ranges
 from xcrack.errors import GeometryError
 from xcrack.locate import closest_on_segment
 from xcrack.quadrature_front import front_points
-from xcrack.simplex import gauss, simplex_rule
+from xcrack.simplex import SYMMETRIC, gauss, simplex_rule
 from xcrack.space import Space
 
 _LEVELS = 5  # bisections towards a tip before the fan takes over
@@ -132,12 +132,11 @@ def cell_points(space: Space, cells: Ints, n: int, degree: int) -> Points:
     plain = np.nonzero(~with_tip)[0]
     bary, weight = simplex_rule(space.dim, degree)
     number = [np.repeat(plain, len(weight))]
-    corners = subs.bary[plain]
-    if space.dim == 2:
-        corners = _from_tips(space, subs.cell[plain], corners)
-    where = [np.einsum("pv,svb->spb", bary, corners).reshape(-1, space.dim + 1)]
+    where = [np.einsum("pv,svb->spb", bary, subs.bary[plain]).reshape(-1, space.dim + 1)]
     share = [np.outer(subs.fraction[plain], weight).ravel()]
     rows = np.nonzero(with_tip)[0]
+    if not len(rows):
+        return _sorted(space, subs, number[0], where[0], share[0])
     if space.dim == 3:
         chosen = (subs.cell[rows], subs.bary[rows], subs.fraction[rows])
         near, place, part = front_points(space, *chosen, n)
@@ -153,8 +152,9 @@ def cell_points(space: Space, cells: Ints, n: int, degree: int) -> Points:
     # enough (K is the same to its error with half of the points, measured).
     rule, rule_weight = simplex_rule(space.dim, 2 * n - 3)
     number.append(np.repeat(regular, len(rule_weight)))
-    corners = _from_tips(space, subs.cell[regular], regular_bary)
-    where.append(np.einsum("pv,svb->spb", rule, corners).reshape(-1, space.dim + 1))
+    if 2 * n - 3 > SYMMETRIC:
+        regular_bary = _from_tips(space, subs.cell[regular], regular_bary)
+    where.append(np.einsum("pv,svb->spb", rule, regular_bary).reshape(-1, space.dim + 1))
     share.append(np.outer(regular_share, rule_weight).ravel())
     sub, swept, swept_share = _fan_points(space, subs, fans, n)
     number.append(sub)

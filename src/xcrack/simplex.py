@@ -116,6 +116,8 @@ _TRIANGLES: dict[int, list[tuple[float, ...]]] = {
 }
 
 
+SYMMETRIC = max(_TRIANGLES)  # degree up to which rules on triangles are symmetric
+
 # The same on tetrahedra: degree -> (weight, first three barycentric coordinates of the orbit).
 _TETRAHEDRA: dict[int, list[tuple[float, ...]]] = {
     5: [  # Walkington, 2000

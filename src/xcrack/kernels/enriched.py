@@ -76,6 +76,64 @@ def _slot(indptr, indices, row, column):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, error_model="numpy")
+def _active(functions, n_standard, place):  # type: ignore[no-untyped-def]
+    """Set the places of the functions of a cell; their number, and that of standard ones."""
+    active, plain = 0, 0  # standard functions come first
+    for a in range(len(functions)):
+        if functions[a] >= 0:
+            place[active] = a
+            active += 1
+            if functions[a] < n_standard:
+                plain = active
+    return active, plain
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _products(begin, end, weight, gradient, place, active, plain, row, block):  # type: ignore[no-untyped-def]
+    """Integrals of G_ai G_bj over the points of a cell, b >= a, b enriched."""
+    d = gradient.shape[2]
+    for k in range(active * d):
+        for j in range(active * d):
+            block[k, j] = 0.0
+    for q in range(begin, end):
+        for a in range(active):
+            for i in range(d):
+                row[a * d + i] = gradient[q, place[a], i]
+        for a in range(active):
+            start = d * max(a, plain)
+            for i in range(d):
+                scaled = weight[q] * row[a * d + i]
+                line = block[a * d + i]
+                for k in range(start, active * d):
+                    line[k] += scaled * row[k]
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _scatter(  # type: ignore[no-untyped-def]
+    data, indptr, indices, functions, place, active, plain, block, lam, mu
+):
+    """Add the stiffness that follows from the products of a cell."""
+    d = data.shape[1]
+    for a in range(active):
+        fa = functions[place[a]]
+        for b in range(max(a, plain), active):
+            fb = functions[place[b]]
+            trace = 0.0
+            for i in range(d):
+                trace += block[a * d + i, b * d + i]
+            one = data[_slot(indptr, indices, fa, fb)]
+            other = data[_slot(indptr, indices, fb, fa)]
+            for i in range(d):
+                for j in range(d):
+                    v = lam * block[a * d + i, b * d + j] + mu * block[a * d + j, b * d + i]
+                    if i == j:
+                        v += mu * trace
+                    one[i, j] += v
+                    if a != b:
+                        other[j, i] += v
+
+
+@numba.njit(cache=True, error_model="numpy")
 def add_stiffness(  # type: ignore[no-untyped-def]
     data, indptr, indices, functions, offsets, weight, gradient, n_standard, lam, mu
 ):
@@ -102,45 +160,62 @@ def add_stiffness(  # type: ignore[no-untyped-def]
     m, n = functions.shape
     d = gradient.shape[2]
     place = np.empty(n, np.int64)
-    block = np.zeros((n * d, n * d))
-    row = np.empty(n * d)
+    block, row = np.zeros((n * d, n * d)), np.empty(n * d)
     for e in range(m):
-        active = 0
-        plain = 0  # standard functions come first
-        for a in range(n):
-            if functions[e, a] >= 0:
-                place[active] = a
-                active += 1
-                if functions[e, a] < n_standard:
-                    plain = active
-        for k in range(active * d):
-            for j in range(active * d):
-                block[k, j] = 0.0
-        for q in range(offsets[e], offsets[e + 1]):
-            for a in range(active):
-                for i in range(d):
-                    row[a * d + i] = gradient[q, place[a], i]
-            for a in range(active):
-                start = d * max(a, plain)
-                for i in range(d):
-                    scaled = weight[q] * row[a * d + i]
-                    line = block[a * d + i]
-                    for k in range(start, active * d):
-                        line[k] += scaled * row[k]
+        active, plain = _active(functions[e], n_standard, place)
+        _products(offsets[e], offsets[e + 1], weight, gradient, place, active, plain, row, block)
+        _scatter(data, indptr, indices, functions[e], place, active, plain, block, lam, mu)
+
+
+@numba.njit(cache=True, error_model="numpy")
+def gradient_products(offsets, weight, gradient, plain):  # type: ignore[no-untyped-def]
+    """Integrals of G_ai G_bj in cells, from which their stiffness follows for any material.
+
+    Parameters
+    ----------
+    offsets : (m + 1,) array of int
+        Points of each cell.
+    weight : (q,) array
+    gradient : (q, n, d) array
+    plain : int
+        Leading functions that are standard ones: their products are left out.
+
+    Returns
+    -------
+    (m, n d, n d) array
+        Zero where b < a.
+    """
+    n, d = gradient.shape[1:]
+    m = len(offsets) - 1
+    place, row = np.arange(n), np.empty(n * d)
+    result = np.zeros((m, n * d, n * d))
+    for e in range(m):
+        _products(offsets[e], offsets[e + 1], weight, gradient, place, n, plain, row, result[e])
+    return result
+
+
+@numba.njit(cache=True, error_model="numpy")
+def add_products(  # type: ignore[no-untyped-def]
+    data, indptr, indices, functions, products, n_standard, lam, mu
+):
+    """Add the stiffness of cells whose products are known.
+
+    Parameters
+    ----------
+    data, indptr, indices, functions, n_standard, lam, mu : as of `add_stiffness`
+    products : (m, n d, n d) array
+        As of `gradient_products`.
+    """
+    m, n = functions.shape
+    d = data.shape[1]
+    place = np.empty(n, np.int64)
+    block = np.zeros((n * d, n * d))
+    for e in range(m):
+        active, plain = _active(functions[e], n_standard, place)
         for a in range(active):
-            fa = functions[e, place[a]]
-            for b in range(max(a, plain), active):
-                fb = functions[e, place[b]]
-                trace = 0.0
-                for i in range(d):
-                    trace += block[a * d + i, b * d + i]
-                one = data[_slot(indptr, indices, fa, fb)]
-                other = data[_slot(indptr, indices, fb, fa)]
-                for i in range(d):
+            for i in range(d):
+                for b in range(max(a, plain), active):
                     for j in range(d):
-                        v = lam * block[a * d + i, b * d + j] + mu * block[a * d + j, b * d + i]
-                        if i == j:
-                            v += mu * trace
-                        one[i, j] += v
-                        if a != b:
-                            other[j, i] += v
+                        to = products[e, place[a] * d + i, place[b] * d + j]
+                        block[a * d + i, b * d + j] = to
+        _scatter(data, indptr, indices, functions[e], place, active, plain, block, lam, mu)
