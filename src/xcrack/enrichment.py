@@ -13,7 +13,9 @@ from xcrack.tube import front_radii, leg_size
 _SHARE = {1: 0.3, 2: 0.4}  # of the free length around a tip, measured best for K at each order
 
 _LEAST = 2.0  # cells
-_WHOLE = 1.5  # cells; within this distance of a tip all cells carry its functions whole
+# Cells: within this distance of a tip all cells carry its functions whole. By dimension and order:
+# at order 1 pressures of closed cracks gained nothing.
+_WHOLE = {(2, 2): 1.5}
 # In cells: by then K is right to 1e-7 (order 2) or 1e-4 (order 1), and a wider disc would only cost
 # unknowns and fill.
 _MOST = {1: 40.0, 2: 20.0}
@@ -87,8 +89,8 @@ def tip_points(mesh: Mesh, order: int, cut: Cut, k: int, radius: float, kind: st
         # What is on the rim counts whatever its round-off: the set is symmetric where the mesh is.
         distance = np.hypot(cut.level_set.phi, cut.level_set.psi[k])
         flag |= distance <= radius * (1 + 1e-9)
-        if mesh.dim == 2 and order == 2:
-            whole = _WHOLE * leg_size(mesh, tip_cells)
+        if (mesh.dim, order) in _WHOLE:
+            whole = _WHOLE[mesh.dim, order] * leg_size(mesh, tip_cells)
             flag[mesh.cells[cells_within(mesh, cut.level_set.tip[k], whole * (1 + 1e-9))]] = True
     return flag
 
