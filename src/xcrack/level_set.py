@@ -71,7 +71,11 @@ def level_set(mesh: Mesh, crack: Crack) -> LevelSet:
         r = np.linalg.norm(from_tip, axis=1)
         behind = -np.sqrt(np.maximum((r - np.abs(phi)) * (r + np.abs(phi)), 0.0))
         ray, neighbour = (0, 1) if tip == 0 else (n_segments - 1, n_segments - 2)
-        psi[k] = np.where((segment == ray) | (segment == neighbour), straight, behind)
+        # Points nearest to the kink behind the last piece are as near to one piece as to the
+        # other: round-off must not decide.
+        last = np.linalg.norm(vertices[neighbour + 1] - vertices[neighbour])
+        along = (segment == ray) | ((segment == neighbour) & (straight > -last))
+        psi[k] = np.where(along, straight, behind)
     mouth = np.full(mesh.n_points, -reach)
     for end, ray in ((0, 0), (len(crack.points) - 1, n_segments - 1)):
         if end not in (crack.tips or ()):

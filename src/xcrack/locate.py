@@ -63,6 +63,21 @@ def nearest_boundary(mesh: Mesh, x: Floats) -> tuple[float, float]:
     return float(distance[best]), float(size)
 
 
+def cells_within(mesh: Mesh, x: Floats, radius: float) -> Ints:
+    """Cells of a plane mesh that come nearer to a point outside them than a radius.
+
+    A cell that holds the point is among them only if its sides are near enough.
+    """
+    found = []
+    for number, tree, reach in mesh.cell_classes:
+        near = number[np.sort(np.array(tree.query_ball_point(x, radius + reach), dtype=np.int64))]
+        corners = mesh.points[mesh.cells[near]]
+        sides = [corners[:, pair] for pair in ([0, 1], [1, 2], [2, 0])]
+        distance = np.min([distance_to_simplices(x, side) for side in sides], axis=0)
+        found.append(near[distance <= radius])
+    return np.concatenate(found)
+
+
 def distance_to_simplices(x: Floats, corners: Floats) -> Floats:
     """Distance of point x `(d,)` to segments `(k, 2, d)` or triangles `(k, 3, d)`."""
     a, b = corners[:, 0], corners[:, 1]

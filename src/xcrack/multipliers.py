@@ -4,7 +4,7 @@ Groups are the stars of a minimal cover of the cut edges ("vital edges", Béchet
 Wohlmuth, 2009); a node without a cut edge of its own joins the group with which its trace
 overlaps most, so that no small group is left at a tip. A group's function is the sum of its
 hats' traces: positive, and all of them sum to one. Order 2 in the plane uses hats along the
-crack instead, with knots at the groups' centres: as many unknowns, one order more in pressure.
+crack instead, with knots near the groups' centres: as many unknowns, one order more in pressure.
 """
 
 import heapq
@@ -17,6 +17,9 @@ from xcrack.arrays import Bools, Floats, Ints
 from xcrack.lip_points import LipPoints
 from xcrack.loads import jump_values
 from xcrack.space import Space
+
+_PASSES = 5  # in which knots are moved; each looks one knot to either side
+_END = 0.6  # share of the last piece in the last two
 
 
 @dataclass(frozen=True, eq=False)
@@ -186,16 +189,37 @@ def vital_edges(pairs: Ints, length: Floats) -> Ints:
     return np.nonzero(kept)[0]
 
 
-def _hats(values: sp.csr_matrix, lips: LipPoints) -> sp.csr_matrix:
-    """Piecewise linear hats along the crack, with knots at the groups' centres.
+def _knots(centre: Floats, ends: tuple[float, float]) -> Floats:
+    """Knots of hats: as many as groups, the first and the last one at the ends of the crack.
 
-    The first and last knots move to the ends of the crack, so that linear pressures are exact.
+    A group's size is an accident of the mesh. What counts is the piece between the last two knots
+    at a tip: a short one leaves the pressure there to chance, a long one cannot follow it. It is
+    made 1.5 times the next one, and the others are evened out among near neighbours.
+    """
+    knots = np.array(centre)
+    knots[0], knots[-1] = ends
+    if len(knots) == 3:
+        knots[1] = (knots[0] + knots[2]) / 2
+    if len(knots) <= 3:
+        return knots
+    for _ in range(_PASSES):
+        old = knots.copy()
+        knots[2:-2] = (old[1:-3] + 2 * old[2:-2] + old[3:-1]) / 4
+        # Half of the way only: with four knots both ends would pass each other.
+        knots[1] = (old[1] + old[0] + _END * (old[2] - old[0])) / 2
+        knots[-2] = (old[-2] + old[-1] - _END * (old[-1] - old[-3])) / 2
+    return knots
+
+
+def _hats(values: sp.csr_matrix, lips: LipPoints) -> sp.csr_matrix:
+    """Piecewise linear hats along the crack, with knots near the groups' centres.
+
+    They reach the ends of the crack, so that linear pressures are exact.
     """
     mass = np.asarray(values.T @ lips.weight).ravel()
     centre = np.asarray(values.T @ (lips.weight * lips.s)).ravel() / np.maximum(mass, 1e-300)
     knots = np.unique(centre[mass > 1e-14 * mass.max()])
-    ends = lips.s.min(), lips.s.max()
-    knots[0], knots[-1] = ends
+    knots = _knots(knots, (float(lips.s.min()), float(lips.s.max())))
     place = np.clip(np.searchsorted(knots, lips.s, side="right") - 1, 0, len(knots) - 2)
     t = (lips.s - knots[place]) / (knots[place + 1] - knots[place])
     row = np.arange(len(lips.s))

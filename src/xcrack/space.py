@@ -304,7 +304,7 @@ def space(
     for c, cut in enumerate(cuts):
         x, frame = front(cracks[c]) if mesh.dim == 2 else fronts(cracks[c])
         for k in range(cut.n_tips):
-            flag = tip_points(mesh, cut, k, radii[c][k], numerics.enrichment)
+            flag = tip_points(mesh, order, cut, k, radii[c][k], numerics.enrichment)
             number = np.full(mesh.n_points, -1, dtype=np.int64)
             number[flag] = count + numerics.functions * np.arange(int(flag.sum()))
             count += numerics.functions * int(flag.sum())

@@ -39,6 +39,19 @@ def test_a_seed_makes_the_same_scene_again():
     assert scenes_drawn.drawn(720)[1] != scenes_drawn.drawn(724)[1]
 
 
+def test_the_worst_of_before():
+    """Few points with tip functions, or a piece of pressure at a tip of one cell or of three."""
+    medians = {
+        "edge crack": 6.2e-5,
+        "open": 2.6e-4,
+        "closed, sliding": 7.4e-4,
+        "half closed": 3.2e-2,
+    }
+    for seed in (510270, 510296, 510379, 510396, 510509):  # 3.3 to 4.0 of the medians of then
+        name, error, _ = scenes_drawn.drawn(seed)
+        assert error <= 1.2 * medians[name], (seed, name)
+
+
 def test_a_class_of_space():
     """A straight front askew to the mesh, six cells a side: the quickest of the three."""
     name, error, said = scenes_drawn.drawn(722, "space", 6)
@@ -72,7 +85,7 @@ def test_a_tenth_of_the_campaign():
     for where, seeds in (("plane", range(710000, 710100)), ("space", range(720000, 720012))):
         judged = campaign(seeds, where)
         assert all(row["solved"] == row["scenes"] for row in judged["classes"].values()), where
-        # Of the whole campaign one in 200 lies beyond 3 medians, none beyond 5 (docs/stability.md).
+        # Of whole campaigns one or two in 1000 lie beyond 3 medians, none beyond 4.
         assert judged["pass rate"] >= 0.97, judged["failed"]
         assert max(row["ratio"] for row in judged["classes"].values()) <= 5.0
 
