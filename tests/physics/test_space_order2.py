@@ -191,7 +191,7 @@ def test_modes_in_the_place_of_tip_functions():
 
 @pytest.mark.slow
 def test_a_body_that_no_factor_fits():
-    """Contact in 200 k unknowns: a factorisation of 138 k takes 5 GB and 100 times as long."""
+    """Contact in 200 k unknowns: a factorisation of 135 k takes 5 GB and 75 times as long."""
     problem = tilted(19, supports=False)
     solutions = xc.solve(problem, states=[1.0, -1.0])
     operations = solutions[0].report.operations
