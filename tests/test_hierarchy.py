@@ -8,9 +8,11 @@ import scipy.sparse.linalg as sla
 import xcrack as xc
 import xcrack.hierarchy as multigrid
 from xcrack.assembly import bulk, rigid_modes
-from xcrack.hierarchy import Bordered, extended, hierarchy, largest_eigenvalue, row_blocks
+from xcrack.bordered import Bordered, row_blocks
+from xcrack.hierarchy import extended, hierarchy, largest_eigenvalue
 from xcrack.kernels.cycle import first_step, next_step
 from xcrack.projected import Operator, conjugate_gradients
+from xcrack.simplex import node_points
 
 
 def drawn(shape, share, seed):
@@ -68,7 +70,7 @@ def test_chebyshev_steps():
     np.testing.assert_allclose(new, 0.6 * before + 0.2 * inverse * r)
 
 
-def body(n, *, held="foot", E=1.0, nu=0.3, size=1.0, seed=2203):
+def body(n, *, held="foot", E=1.0, nu=0.3, size=1.0, seed=2203, order=1):
     """Stiffness of a box with moved inner points, and which unknowns supports decide."""
     dim = len(n)
     mesh = xc.box((0.0,) * dim, (size,) * dim, n)
@@ -78,13 +80,14 @@ def body(n, *, held="foot", E=1.0, nu=0.3, size=1.0, seed=2203):
     x[inner] += 0.15 * size / np.array(n) * shift
     mesh = xc.Mesh(x, mesh.cells, mesh.facet_sets)
     material = xc.Isotropic(E, nu, "strain") if dim == 2 else xc.Isotropic(E, nu)
+    x = node_points(mesh, order)
     fixed = np.zeros((len(x), dim), dtype=bool)
     if held == "foot":
         fixed[x[:, -1] < 1e-9 * size] = True
     elif held == "symmetry":
         for i in range(dim):
             fixed[x[:, i] < 1e-9 * size, i] = True
-    return bulk(mesh, material, 1), fixed.ravel()
+    return bulk(mesh, material, order), fixed.ravel()
 
 
 def operator_of(stiffness, fixed, null=None):
@@ -109,9 +112,10 @@ def load(levels, seed=911):
     return np.random.default_rng(seed).normal(size=len(levels.free)) * levels.free
 
 
+@pytest.mark.parametrize("order", [1, 2])
 @pytest.mark.parametrize("held", ["foot", "symmetry"])
-def test_against_a_direct_solver(held):
-    A, levels, K = operator_of(*body((7, 8, 9), held=held))
+def test_against_a_direct_solver(held, order):
+    A, levels, K = operator_of(*body((9 - 2 * order, 8, 11 - 2 * order), held=held, order=order))
     b = load(levels)
     y, steps = conjugate_gradients(K, b, np.zeros_like(b), 1e-11)
     exact = sla.spsolve(sp.csc_matrix(A), b)
@@ -147,6 +151,24 @@ def test_steps_hardly_grow_with_the_mesh():
     assert max(steps) <= 20, steps
 
 
+def test_quadratic_functions_take_no_more_steps():
+    """One level on top, which contains the linear functions."""
+    steps = []
+    for n in (3, 5, 8):
+        stiffness, fixed = body((n, n, n), order=2)
+        _, levels, K = operator_of(stiffness, fixed)
+        b = load(levels)
+        steps.append(conjugate_gradients(K, b, np.zeros_like(b))[1])
+        lower = hierarchy(bulk(stiffness.mesh, stiffness.material, 1), fixed)
+        assert len(levels.levels) == len(lower.levels) + 1
+        # Linear functions have the energy that they have at order 1.
+        v = load(lower, 913).astype(np.float32)
+        top, below = levels.levels[0], lower.levels[0]
+        w = top.prolong.times(v)
+        assert w @ top.matrix.times(w) == pytest.approx(v @ below.matrix.times(v), rel=1e-5)
+    assert max(steps) <= 20, steps
+
+
 def test_a_thin_plate_and_a_plane_body():
     """The aggregates have no say in the shape of the body or its dimension."""
     for n in ((30, 20, 2), (60, 50)):
@@ -164,10 +186,11 @@ def test_units_change_nothing():
     assert max(steps) - min(steps) <= 1, steps
 
 
-def test_without_supports():
+@pytest.mark.parametrize("order", [1, 2])
+def test_without_supports(order):
     """Six rigid motions: any solution is right, up to such a motion."""
-    stiffness, fixed = body((7, 6, 7), held="not")
-    x = stiffness.mesh.points
+    stiffness, fixed = body((7, 6, 7) if order == 1 else (4, 3, 4), held="not", order=order)
+    x = node_points(stiffness.mesh, order)
     modes = np.linalg.qr(rigid_modes(x))[0]
     A, levels, K = operator_of(stiffness, fixed, modes)
     b = load(levels)

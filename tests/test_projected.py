@@ -193,7 +193,7 @@ CRACKS = {
 class Scene:
     """A cracked square and all that both engines need."""
 
-    def __init__(self, name, n=20, seed=3119, supports=None, **material):
+    def __init__(self, name, n=20, seed=3119, supports=None, order=1, **material):
         cracks = [xc.line_crack(points) for points in CRACKS[name]]
         foot = xc.fix("bottom")
         held = [foot, xc.displacement("top", bent)] if name == "through" else [foot]
@@ -202,7 +202,7 @@ class Scene:
         material = {"E": 1.0, "nu": 0.3, "plane": "strain"} | material
         problem = xc.Problem(
             scenes.perturbed(n, seed), xc.Isotropic(**material), cracks, supports=held,
-            loads=loads, order=1,
+            loads=loads, order=order,
         )  # fmt: skip
         self.problem, self.model = problem, build(problem)
         self.space, self.fixed = self.model.space, self.model.known.fixed
@@ -233,14 +233,15 @@ class Scene:
         return max(jump, np.abs((u - reference)[:n]).max()) / np.abs(reference[:n]).max()
 
 
+@pytest.mark.parametrize("order", [1, 2])
 @pytest.mark.parametrize("name", list(CRACKS))
-def test_open_lips_as_with_a_factor(name):
-    scene = Scene(name)
+def test_open_lips_as_with_a_factor(name, order):
+    scene = Scene(name, n=20 // order, order=order)
     reference = scene.direct().solve(scene.f, scene.known)
     engine = scene.iterative()
     u = engine.solve(scene.f, scene.known)
     assert scene.displacement_error(u, reference) <= 1e-7  # the iteration's tolerance
-    assert engine.count.iterations <= 60
+    assert engine.count.iterations <= 70
     assert np.array_equal(u[scene.fixed], scene.known[scene.fixed])
     back = engine.basis @ engine.coordinates(u - scene.known) + scene.known
     assert scene.displacement_error(back, u) <= 1e-12  # round-off
@@ -339,17 +340,6 @@ def test_units_change_nothing():
     assert abs(steps[0] - steps[1]) <= 12
 
 
-def test_order_two_is_refused():
-    problem = xc.Problem(
-        scenes.perturbed(6, 3121), xc.Isotropic(1.0, 0.3, "strain"),
-        [xc.line_crack(CRACKS["edge"][0])], [xc.fix("bottom")], [xc.traction("top", beam)],
-        order=2,
-    )  # fmt: skip
-    model = build(problem)
-    with pytest.raises(xc.ProblemError, match="order 1 only"):
-        iterative_system(model.space, model.stiffness, model.bulk, model.known.fixed)
-
-
 def test_without_supports():
     """Balanced loads on a body that nothing holds, as with pins, up to a rigid motion."""
     scene = Scene("inner", supports=[])
@@ -391,13 +381,14 @@ def turning(x, normal):
     return np.stack([0.2 + 0 * x[:, 0], 0 * x[:, 0], -0.2 - x[:, 0]], axis=1)
 
 
+@pytest.mark.parametrize("order", [1, 2])
 @pytest.mark.parametrize("supports", [[xc.fix("bottom")], []], ids=["held", "not held"])
-def test_a_tilted_penny_as_with_a_factor(supports):
-    mesh = xc.box((-1, -1, -1), (1, 1, 1), 6)
+def test_a_tilted_penny_as_with_a_factor(supports, order):
+    mesh = xc.box((-1, -1, -1), (1, 1, 1), 8 - 2 * order)
     crack = xc.penny_crack((0.01, 0.02, 0.03), (0.3, -0.2, 1.0), 0.5)
     sides = [xc.traction("top", (0.0, 0.0, -1.0)), xc.traction("bottom", (0.0, 0.0, 1.0))]
     loads = [xc.traction("top", turning)] if supports else sides
-    problem = xc.Problem(mesh, xc.Isotropic(1.0, 0.3), [crack], supports, loads, order=1)
+    problem = xc.Problem(mesh, xc.Isotropic(1.0, 0.3), [crack], supports, loads, order=order)
     model = build(problem)
     space, fixed = model.space, model.known.fixed
     motion = free_motion(space, fixed)
@@ -423,4 +414,4 @@ def test_a_tilted_penny_as_with_a_factor(supports):
         size = np.abs(without_motion(motion, other)).max()
         assert np.abs(gap[: 3 * space.n_nodes]).max() <= 1e-7 * size
         assert np.abs(model.jumps[0] @ gap).max() <= 1e-7 * size
-    assert engine.count.iterations <= 70
+    assert engine.count.iterations <= {1: 70, 2: 120}[order]

@@ -13,6 +13,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from xcrack.arrays import Bools, Floats, Ints, offsets, ranges
+from xcrack.mesh import Mesh
 from xcrack.space import Space
 
 _DEPENDENT = 1e-10  # eigenvalues below this share of a block's largest are dropped
@@ -152,14 +153,33 @@ def _block_basis(k: Floats, n_standard: int) -> Floats:
     return np.concatenate([-np.einsum("bsi,bij->bsj", C, Z), Z], axis=1)
 
 
-def patch_orthogonal(space: Space, K: sp.csr_matrix, free: Bools) -> sp.csr_matrix:
-    """Basis in which tip functions are orthogonal to the functions of the cells around them.
+def stars(mesh: Mesh, order: int) -> sp.csr_matrix:
+    """Pattern `(n_points, n_nodes)`: each point and, at order 2, the midpoints of its edges.
 
-    F_i minus its projection in energy on all standard and Heaviside functions of the cells round
-    point i; columns of all other unknowns are those of the identity `(n, n)`.
+    Their functions are those that end inside the cells around the point.
+    """
+    n = mesh.n_points
+    rows, columns = [np.arange(n)], [np.arange(n)]
+    if order == 2:
+        rows.append(mesh.edges.T.ravel())
+        columns.append(n + np.tile(np.arange(len(mesh.edges)), 2))
+    row, column = np.concatenate(rows), np.concatenate(columns)
+    shape = (n, int(column.max()) + 1)
+    return sp.csr_matrix((np.ones(len(row), np.int8), (row, column)), shape=shape)
+
+
+def patch_orthogonal(
+    space: Space, K: sp.csr_matrix, free: Bools, around: str = "cells"
+) -> sp.csr_matrix:
+    """Basis in which tip functions are orthogonal to the functions around them.
+
+    F_i minus its projection in energy on standard and Heaviside functions, all those of the cells
+    round point i ("cells") or those that end inside these cells ("star"); the latter couple it
+    with no further unknown. Columns of all other unknowns are those of the identity `(n, n)`.
     """
     d = space.dim
-    start, around = space.mesh.point_to_cell
+    start, cells = space.mesh.point_to_cell
+    star = stars(space.mesh, space.order)
     rows, columns, values = (
         [np.arange(space.n_dof)],
         [np.arange(space.n_dof)],
@@ -168,7 +188,10 @@ def patch_orthogonal(space: Space, K: sp.csr_matrix, free: Bools) -> sp.csr_matr
     members, counts, n_patch = [], [], []
     for tip in space.tips:
         for point in np.nonzero(tip.point_to_function >= 0)[0]:
-            nodes = np.unique(space.cell_nodes[around[start[point] : start[point + 1]]])
+            if around == "star":
+                nodes = star.indices[star.indptr[point] : star.indptr[point + 1]]
+            else:
+                nodes = np.unique(space.cell_nodes[cells[start[point] : start[point + 1]]])
             functions = [nodes, *[h[nodes][h[nodes] >= 0] for h in space.heaviside]]
             patch = (np.concatenate(functions)[:, None] * d + np.arange(d)).ravel()
             own = tip.point_to_function[point] + np.arange(tip.functions)
@@ -181,7 +204,9 @@ def patch_orthogonal(space: Space, K: sp.csr_matrix, free: Bools) -> sp.csr_matr
         blocks = Blocks(np.concatenate(members), offsets(np.array(counts)), np.array(n_patch))
         for group, k, n_p in _by_shape(K, blocks):
             pp, pf = k[:, :n_p, :n_p], k[:, :n_p, n_p:]
-            D = 1 / np.sqrt(np.einsum("bii->bi", pp))
+            diagonal = np.einsum("bii->bi", pp)
+            # Functions of a sliver may have no energy but round-off.
+            D = np.where(diagonal > 0, 1 / np.sqrt(np.maximum(diagonal, 1e-300)), 0.0)
             inverse = np.linalg.pinv(
                 D[:, :, None] * pp * D[:, None, :], rcond=1e-10, hermitian=True
             )

@@ -20,7 +20,8 @@ class _Share:
     factor: float
 
 
-# Order 2 is for the plane. The default domain is 2.5 radii in the plane, about one in space.
+# In space order 2 pays for a high accuracy alone. The default domain is 2.5 radii in the plane,
+# about one in space.
 _DEFAULT: dict[int, dict[str, dict[str, Any]]] = {
     2: {
         "other order": {},

@@ -32,7 +32,7 @@ def tip_radii(
     Never below two cells.
     """
     if mesh.dim == 3:
-        return front_radii(mesh, cracks, cuts, wanted)
+        return front_radii(mesh, cracks, cuts, order, wanted)
     tips = [front(crack)[0] for crack in cracks]
     every = np.concatenate(tips) if tips else np.zeros((0, mesh.dim))
     radii = []

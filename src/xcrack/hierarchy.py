@@ -4,17 +4,22 @@ Smoothed aggregation (Vanek, Mandel and Brezina, 1996) on the stiffness of the u
 made once a mesh. A crack only changes the finest level: its matrix is the enriched one, and the
 prolongator gets a zero row for each enriched unknown. This works in the basis in which the
 enriched unknowns of a node are orthonormal and orthogonal to its standard ones in energy.
+Quadratic functions are one more level on top: they contain the linear ones (p-multigrid, Ronquist
+and Patera, 1987).
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, cast
 
 import numpy as np
 import scipy.sparse as sp
 
-from xcrack.arrays import Bools, Floats, Ints, lock, offsets
-from xcrack.assembly import Bulk, rigid_modes
+from xcrack.arrays import Bools, Floats, Ints, lock
+from xcrack.assembly import Bulk, bulk, rigid_modes
+from xcrack.basis import stars
+from xcrack.bordered import Bordered, RowBlocks, row_blocks
+from xcrack.patches import Patches
+from xcrack.patches import largest_eigenvalue as largest_in_patches
 from xcrack.simplex import node_points
 
 _COARSEST = 300  # unknowns below which a dense inverse ends the hierarchy
@@ -24,117 +29,6 @@ _SHARE = 0.1  # of the spectrum's upper end from which Chebyshev smooths
 _OMEGA = 4 / 3  # damping of the step that smooths the prolongator
 _START = 613_077  # seed of the vector that Lanczos starts from
 _NULL = 1e-11  # eigenvalues of the coarsest matrix below this share are rigid motions
-
-
-@dataclass(frozen=True, eq=False)
-class RowBlocks:
-    """Sparse matrix in blocks of rows that share one pattern.
-
-    Attributes
-    ----------
-    shape : (rows, columns)
-    first, start, offset : (b + 1,) arrays of uint32
-        First row, column list and values of each block.
-    columns : array of uint32
-    values : array, float32 or float64
-    """
-
-    shape: tuple[int, int]
-    first: Any
-    start: Any
-    offset: Any
-    columns: Any
-    values: Any
-
-    @property
-    def dtype(self) -> Any:
-        """Type of the values."""
-        return self.values.dtype
-
-    def times(self, x: Any) -> Any:
-        """A x, in the type of the values."""
-        return self.added(np.zeros(self.shape[0], self.dtype), 1, x)
-
-    def added(self, y: Any, scale: float, x: Any) -> Any:
-        """Write y + scale A x over y, and return it."""
-        from xcrack.kernels.cycle import product
-
-        number = self.dtype.type(scale)
-        product(self.first, self.start, self.offset, self.columns, self.values, x, y, number, y)
-        return y
-
-    def single(self) -> "RowBlocks":
-        """The same matrix in single precision; it shares the pattern."""
-        values = lock(self.values.astype(np.float32))
-        return RowBlocks(self.shape, self.first, self.start, self.offset, self.columns, values)
-
-
-def row_blocks(parts: Sequence[sp.csr_matrix], first: Ints, dtype: Any = np.float64) -> RowBlocks:
-    """Store CSR matrices side by side in blocks of rows.
-
-    Parameters
-    ----------
-    parts : sequence of sparse matrices (n, m)
-        From the left to the right; they need not be joined before.
-    first : (b + 1,) array of int
-        First row of each block, and n at the end.
-    dtype : numpy type of the values
-    """
-    from xcrack.kernels.cycle import fill_blocks, pattern_sizes
-
-    first = np.asarray(first, dtype=np.int64)
-    sizes = [pattern_sizes(A.indptr, A.indices, first, A.shape[1]) for A in parts]
-    whole = np.asarray(np.sum(sizes, axis=0, dtype=np.int64))
-    start, offset = offsets(whole), offsets(whole * np.diff(first))
-    columns, values = np.empty(start[-1], np.uint32), np.zeros(offset[-1], dtype)
-    left, shift = np.zeros_like(whole), 0
-    for A, own in zip(parts, sizes):
-        fill_blocks(
-            A.indptr, A.indices, A.data, first, start[:-1] + left, np.stack([left, whole], axis=1),
-            offset[:-1], A.shape[1], shift, columns, values,
-        )  # fmt: skip
-        left, shift = left + own, shift + A.shape[1]
-    short = [each.astype(np.uint32) for each in (first, start, offset)]
-    return RowBlocks((int(first[-1]), shift), *map(lock, (*short, columns, values)))
-
-
-@dataclass(frozen=True, eq=False)
-class Bordered:
-    """Matrix of standard and enriched unknowns; the standard block is that of every crack.
-
-    Attributes
-    ----------
-    standard : RowBlocks (n, n)
-    across : RowBlocks (n, e)
-    below : RowBlocks (e, n + e)
-    """
-
-    standard: RowBlocks
-    across: RowBlocks
-    below: RowBlocks
-
-    @property
-    def shape(self) -> tuple[int, int]:
-        """Numbers of rows and columns."""
-        n = self.below.shape[1]
-        return n, n
-
-    @property
-    def dtype(self) -> Any:
-        """Type of the values."""
-        return self.standard.dtype
-
-    def times(self, x: Any) -> Any:
-        """A x, in the type of the values."""
-        return self.added(np.zeros(len(x), self.dtype), 1, x)
-
-    def added(self, y: Any, scale: float, x: Any) -> Any:
-        """Write y + scale A x over y, and return it."""
-        n = self.standard.shape[0]
-        self.standard.added(y[:n], scale, x[:n])
-        self.across.added(y[:n], scale, x[n:])
-        self.below.added(y[n:], scale, x)
-        return y
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,6 +44,8 @@ class Level:
         Upper bound of the spectrum of D^-1 A.
     prolong, restrict : RowBlocks
         From and to the next level; their rows and columns are the leading unknowns of this one.
+    patches : Patches, optional
+        Smooth in the place of the inverse diagonal, which is then one.
     """
 
     matrix: RowBlocks | Bordered
@@ -157,6 +53,11 @@ class Level:
     largest: float
     prolong: RowBlocks
     restrict: RowBlocks
+    patches: Patches | None = None
+
+    def solved(self, r: Any) -> Any:
+        """What the smoother multiplies by the inverse diagonal."""
+        return r if self.patches is None else self.patches.times(r)
 
 
 @dataclass(frozen=True, eq=False)
@@ -208,9 +109,10 @@ def _smoothed(level: Level, r: Any, x: Any) -> Any:
     rho = 1 / (2 * sigma - 1 / sigma)
     single = np.float32
     d = np.empty_like(x)
-    first_step(level.inverse, r, single(1 / middle), d, x)
+    first_step(level.inverse, level.solved(r), single(1 / middle), d, x)
     level.matrix.added(r, -1, d)
-    next_step(level.inverse, r, single(rho / sigma), single(2 * rho / half), d, x)
+    scale = single(2 * rho / half)
+    next_step(level.inverse, level.solved(r), single(rho / sigma), scale, d, x)
     return d
 
 
@@ -261,12 +163,10 @@ def hierarchy(bulk: Bulk, fixed: Bools) -> Hierarchy:
         Unknowns that supports decide; entries behind the standard unknowns are not looked at.
         A body that is not held is welcome: its motions are left out on the coarsest level.
     """
-    n, d = bulk.matrix.shape[0], bulk.mesh.dim
-    fixed = np.array(fixed[:n], dtype=bool)
-    nodes = np.nonzero(~fixed.reshape(-1, d).all(axis=1))[0]
-    unknowns = (nodes[:, None] * d + np.arange(d)).ravel()
-    free = ~fixed[unknowns]
-    matrix = _decoupled(bulk.matrix.tocsr()[unknowns][:, unknowns], free)
+    if bulk.order == 2:
+        return _on_top(bulk, fixed)
+    fixed, nodes, free, matrix = _part_in_use(bulk, fixed)
+    d = bulk.mesh.dim
     candidates = rigid_modes(node_points(bulk.mesh, bulk.order)[nodes]) * free[:, None]
     A = sp.bsr_matrix(matrix, blocksize=(d, d))
     finest = _stored(A, np.float64)
@@ -293,7 +193,43 @@ def hierarchy(bulk: Bulk, fixed: Bools) -> Hierarchy:
     )
 
 
-def extended(levels: Hierarchy, A: Bordered, diagonal: Floats) -> Cycle:
+def _on_top(bulk_: Bulk, fixed: Bools) -> Hierarchy:
+    """Quadratic functions over the levels of the linear ones, which they contain."""
+    mesh, d = bulk_.mesh, bulk_.mesh.dim
+    lower = hierarchy(bulk(mesh, bulk_.material, 1), fixed)
+    fixed, nodes, free, matrix = _part_in_use(bulk_, fixed)
+    half = 0.5 * stars(mesh, 2)
+    half.setdiag(1.0)
+    P = sp.kron(half.T.tocsr()[nodes][:, lower.nodes], sp.identity(d))
+    P = sp.bsr_matrix(sp.diags(free * 1.0) @ P @ sp.diags(lower.free * 1.0), blocksize=(d, d))
+    finest = _stored(sp.bsr_matrix(matrix, blocksize=(d, d)), np.float64)
+    single, diagonal = finest.single(), matrix.diagonal()
+    top = _level(single, diagonal, largest_eigenvalue(single, diagonal), P)
+    return Hierarchy(
+        bulk=bulk_,
+        fixed=lock(fixed),
+        nodes=lock(nodes),
+        free=lock(free),
+        matrix=finest,
+        diagonal=lock(diagonal),
+        levels=(top, *lower.levels),
+        coarsest=lower.coarsest,
+    )
+
+
+def _part_in_use(bulk: Bulk, fixed: Bools) -> tuple[Bools, Ints, Bools, sp.csr_matrix]:
+    """Fixed unknowns, nodes with a free one, which of theirs are free, and their stiffness."""
+    n, d = bulk.matrix.shape[0], bulk.mesh.dim
+    fixed = np.array(fixed[:n], dtype=bool)
+    nodes = np.nonzero(~fixed.reshape(-1, d).all(axis=1))[0]
+    unknowns = (nodes[:, None] * d + np.arange(d)).ravel()
+    free = ~fixed[unknowns]
+    return fixed, nodes, free, _decoupled(bulk.matrix.tocsr()[unknowns][:, unknowns], free)
+
+
+def extended(
+    levels: Hierarchy, A: Bordered, diagonal: Floats, patches: Patches | None = None
+) -> Cycle:
     """Cycle for an enriched matrix whose standard block is that of a hierarchy.
 
     Parameters
@@ -302,13 +238,19 @@ def extended(levels: Hierarchy, A: Bordered, diagonal: Floats) -> Cycle:
     A : Bordered
         In the basis in which the enriched unknowns of a node are orthogonal to its standard ones.
     diagonal : (n,) array
+    patches : Patches, optional
+        Blocks that smooth in the place of the diagonal.
     """
     finest = levels.levels[0]
     standard = cast(RowBlocks, finest.matrix)
     single = Bordered(standard, A.across.single(), A.below.single())
-    inverse = _reciprocal(diagonal).astype(np.float32)
-    largest = largest_eigenvalue(single, diagonal)
-    top = Level(single, lock(inverse), largest, finest.prolong, finest.restrict)
+    if patches is None:
+        inverse = _reciprocal(diagonal).astype(np.float32)
+        largest = largest_eigenvalue(single, diagonal)
+    else:
+        inverse = np.ones(len(diagonal), np.float32)
+        largest = largest_in_patches(single, patches)
+    top = Level(single, lock(inverse), largest, finest.prolong, finest.restrict, patches)
     return Cycle((top, *levels.levels[1:]), levels.coarsest)
 
 

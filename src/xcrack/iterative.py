@@ -14,10 +14,11 @@ import scipy.sparse as sp
 from xcrack import linear
 from xcrack.arrays import Bools, Floats, Ints, lock, ranges
 from xcrack.assembly import Bulk
-from xcrack.basis import Blocks, node_blocks, orthonormal, restricted
-from xcrack.errors import ProblemError
-from xcrack.hierarchy import Bordered, Hierarchy, extended, hierarchy, row_blocks
+from xcrack.basis import Blocks, node_blocks, orthonormal, patch_orthogonal, restricted
+from xcrack.bordered import Bordered, row_blocks
+from xcrack.hierarchy import Hierarchy, extended, hierarchy
 from xcrack.material import Isotropic
+from xcrack.patches import star_patches
 from xcrack.projected import TOLERANCE, Operator, Pressed, conjugate_gradients, projected
 from xcrack.space import Space
 from xcrack.vectorial import mode_columns
@@ -70,6 +71,8 @@ class IterativeSystem:
     operator : Operator
     blocks : Blocks
         Unknowns of each enriched node.
+    combined, back : sparse matrices (n_dof, n_dof), optional
+        Basis to which the blocks belong where it is not that of the space, and its inverse.
     count : Count
     """
 
@@ -79,6 +82,8 @@ class IterativeSystem:
     hierarchy: Hierarchy
     operator: Operator
     blocks: Blocks
+    combined: sp.csr_matrix | None = None
+    back: sp.csr_matrix | None = None
     count: Count = field(default_factory=Count)
 
     def solve(
@@ -203,7 +208,10 @@ class IterativeSystem:
     @cached_property
     def _within(self) -> sp.csr_matrix:
         """Entries of the stiffness between unknowns of one node."""
-        return _within_blocks(self.matrix, self.blocks)
+        if self.combined is None or self.back is None:
+            return _within_blocks(self.matrix, self.blocks)
+        K = _nearby(self.matrix, self.combined, self.blocks)
+        return sp.csr_matrix(self.back.T @ _within_blocks(K, self.blocks) @ self.back)
 
 
 def iterative_system(
@@ -232,29 +240,28 @@ def iterative_system(
         Rigid motions that nothing prevents; loads have to be in balance with them.
     vectorial : Isotropic, optional
         The material where the tip basis is vectorial.
-
-    Raises
-    ------
-    ProblemError
-        Order 2 with cracks: tip functions nearly repeat the quadratic ones of their neighbours,
-        which blocks of one node do not cure; 600 steps and more were counted.
     """
-    if space.order == 2 and space.n_functions > space.n_nodes:
-        raise ProblemError(
-            "the iterative solver takes cracks at order 1 only: choose order=1, or "
-            'Numerics(linear="direct").'
-        )
     if levels is None or not levels.fits(bulk, fixed):
         levels = hierarchy(bulk, fixed)
     free = ~fixed
     d = space.dim
     plain = (levels.nodes[:, None] * d + np.arange(d)).ravel()
-    combined, in_use = None, free
+    stars = space.order == 2 and space.n_functions > space.n_nodes
+    combined, in_use, back = None, free, None
     if vectorial is not None and space.tips:
         combined, in_use = mode_columns(space, vectorial, free)
-    blocks = restricted(node_blocks(space, "node"), in_use)
-    enriched, starts = _enriched_basis(space, K, blocks, levels, combined)
-    stored, diagonal = _reduced(levels, K, plain, enriched, starts)
+    if stars and space.tips:
+        combined, back = _apart(space, K, combined, in_use)
+    whole = node_blocks(space, "star" if stars else "node")
+    blocks = restricted(whole, in_use)
+    enriched, starts, block = _enriched_basis(space, K, blocks, levels, combined)
+    parts = _Parts(levels, K, plain, enriched)
+    stored, diagonal = parts.stored(starts), parts.diagonal
+    patches = None
+    if stars and len(block):
+        home = np.where(levels.free, plain // d, -1)
+        home = np.concatenate([home, whole.members[whole.offsets[block]] // d])
+        patches = star_patches(space, home, len(plain), diagonal, parts.entries)
     identity = sp.csr_matrix(
         (levels.free.astype(float), (plain, np.arange(len(plain)))),
         shape=(space.n_dof, len(plain)),
@@ -263,8 +270,24 @@ def iterative_system(
     null = np.zeros((len(diagonal), 0 if modes is None else modes.shape[1]))
     if modes is not None and modes.shape[1]:
         null[: len(plain)] = np.linalg.qr(modes[plain] * levels.free[:, None])[0]
-    operator = Operator(stored.times, extended(levels, stored, diagonal), diagonal, null)
-    return IterativeSystem(K, lock(free), basis, levels, operator, blocks)
+    operator = Operator(stored.times, extended(levels, stored, diagonal, patches), diagonal, null)
+    return IterativeSystem(K, lock(free), basis, levels, operator, blocks, combined, back)
+
+
+def _apart(
+    space: Space, K: sp.csr_matrix, modes: sp.csr_matrix | None, free: Bools
+) -> tuple[sp.csr_matrix, sp.csr_matrix]:
+    """Basis in which tip functions are orthogonal to the functions of their star; its inverse."""
+    if modes is None:
+        apart = patch_orthogonal(space, K, free, "star")
+        # What is taken off belongs to unknowns from which nothing is taken.
+        return apart, sp.csr_matrix(2 * sp.identity(space.n_dof) - apart)
+    apart = patch_orthogonal(space, sp.csr_matrix(modes.T @ K @ modes), free, "star")
+    # The modes of a point are orthogonal to each other: no two share a function of a component.
+    size = np.asarray(modes.multiply(modes).sum(axis=0)).ravel()
+    own = sp.diags(1 / np.where(size > 0, size, 1.0)) @ modes.T
+    back = (2 * sp.identity(space.n_dof) - apart) @ own
+    return sp.csr_matrix(modes @ apart), sp.csr_matrix(back)
 
 
 def _enriched_basis(
@@ -273,14 +296,14 @@ def _enriched_basis(
     blocks: Blocks,
     levels: Hierarchy,
     combined: sp.csr_matrix | None,
-) -> tuple[sp.csc_matrix, Ints]:
-    """Orthonormal enriched columns, node by node, and the first column of each node.
+) -> tuple[sp.csc_matrix, Ints, Ints]:
+    """Orthonormal enriched columns, node by node, the first column of each node, and their blocks.
 
     Their diagonal entries are made the mean one of the standard unknowns: the norm of a residual
     then weighs both alike.
     """
     if combined is not None:
-        K = sp.csr_matrix(combined.T @ K @ combined)
+        K = _nearby(K, combined, blocks)
     Z = sp.csc_matrix(orthonormal(K, blocks))
     owner = np.repeat(np.arange(len(blocks.n_standard)), np.diff(blocks.offsets))
     block_of = np.full(space.n_dof, -1, dtype=np.int64)
@@ -291,23 +314,62 @@ def _enriched_basis(
     Z = sp.csc_matrix(Z[:, order] * size)
     Z = Z if combined is None else sp.csc_matrix(combined @ Z)
     node = node[order]
-    return Z, np.nonzero(np.concatenate([[True], node[1:] != node[:-1]]))[0] if len(node) else node
+    starts = np.nonzero(np.concatenate([[True], node[1:] != node[:-1]]))[0] if len(node) else node
+    return Z, starts, node
 
 
-def _reduced(
-    levels: Hierarchy, K: sp.csr_matrix, plain: Ints, enriched: sp.csc_matrix, starts: Ints
-) -> tuple[Bordered, Floats]:
-    """Stiffness in the solver's basis, and its diagonal."""
-    image = sp.csr_matrix(K @ enriched)
-    across = sp.csr_matrix(sp.diags(levels.free.astype(float)) @ image[plain])
-    own = sp.csr_matrix(enriched.T @ image)
-    first = np.concatenate([starts, [own.shape[0]]])
-    A = Bordered(
-        levels.matrix,
-        row_blocks([across], levels.matrix.first),
-        row_blocks([across.T.tocsr(), own], first),
-    )
-    return A, np.concatenate([levels.diagonal, own.diagonal()])
+@dataclass(frozen=True, eq=False)
+class _Parts:
+    """Stiffness in the solver's basis."""
+
+    levels: Hierarchy
+    K: sp.csr_matrix
+    plain: Ints
+    enriched: sp.csc_matrix
+
+    @cached_property
+    def across(self) -> sp.csr_matrix:
+        return sp.csr_matrix(sp.diags(self.levels.free.astype(float)) @ self.image[self.plain])
+
+    @cached_property
+    def image(self) -> sp.csr_matrix:
+        return sp.csr_matrix(self.K @ self.enriched)
+
+    @cached_property
+    def own(self) -> sp.csr_matrix:
+        return sp.csr_matrix(self.enriched.T @ self.image)
+
+    @property
+    def diagonal(self) -> Floats:
+        return np.concatenate([self.levels.diagonal, self.own.diagonal()])
+
+    def stored(self, starts: Ints) -> Bordered:
+        """The whole matrix; `starts` are the first columns of the enriched nodes."""
+        first = np.concatenate([starts, [self.own.shape[0]]])
+        return Bordered(
+            self.levels.matrix,
+            row_blocks([self.across], self.levels.matrix.first),
+            row_blocks([self.across.T.tocsr(), self.own], first),
+        )
+
+    def entries(self, chosen: Ints) -> sp.csr_matrix:
+        """Entries between free unknowns, given sorted."""
+        n = len(self.plain)
+        standard, rest = chosen[chosen < n], chosen[chosen >= n] - n
+        known = self.plain[standard]
+        across = self.across[standard][:, rest]
+        parts = [[self.K[known][:, known], across], [across.T, self.own[rest][:, rest]]]
+        return sp.csr_matrix(sp.bmat(parts))
+
+
+def _nearby(K: sp.csr_matrix, changed: sp.csr_matrix, blocks: Blocks) -> sp.csr_matrix:
+    """Stiffness in a changed basis: entries between the unknowns of blocks."""
+    own = np.unique(blocks.members)
+    columns = sp.csc_matrix(changed[:, own])
+    near = np.unique(columns.indices)
+    columns = columns[near]
+    found = sp.coo_matrix(columns.T @ (K[near][:, near] @ columns))
+    return sp.csr_matrix((found.data, (own[found.row], own[found.col])), shape=K.shape)
 
 
 def _within_blocks(K: sp.csr_matrix, blocks: Blocks) -> sp.csr_matrix:

@@ -18,7 +18,7 @@ class Numerics:
         Radius of the enriched disc. None: 0.3 (order 1) or 0.4 (order 2) of the smallest of crack
         length, distance to the boundary and to another tip, from 2 to 20 cells (40 at order 1).
         In space 0.65 of the size of the crack, 0.7 of the distance to a side and 0.45 of that to
-        another front, from 2.6 to 3.6 cells.
+        another front, from 2.6 to 3.6 cells; two cells at order 2.
     functions : {4, 2}
         Tip functions; two (those of the modes' leading angular terms) cost accuracy.
     tip_basis : {"scalar", "vectorial"}
@@ -64,10 +64,11 @@ class Numerics:
         the enriched radius or 4 cells, in space 1.05 times it or 2.6 cells, whichever is more, as
         far as body, other tips and the bend of a front allow.
     linear : {"auto", "direct", "iterative"}
-        Linear solver. Auto: a factorisation in the plane and below 4 000 unknowns, above that in
-        space conjugate gradients with a multigrid hierarchy: a factor of a body in space fills,
-        and its time grows with the square of the unknowns. Iterative does without `orthonormal`
-        and `patch`: it has its own basis, orthonormal node by node.
+        Linear solver. Auto: a factorisation in the plane and below 4 000 unknowns (8 000 at order
+        2), above that in space conjugate gradients with a multigrid hierarchy: a factor of a body
+        in space fills, and its time grows with the square of the unknowns. Iterative does without
+        `orthonormal` and `patch`: it has its own basis, orthonormal node by node, at order 2 star
+        by star.
     initial_set : {"closed", "open"}
         State of the lips that the contact iteration starts from where nothing is known.
 

@@ -45,7 +45,7 @@ class Problem:
         auto: a crack whose lips would overlap gets multipliers, others get none.
     order : {1, 2}, optional
         Degree of the standard and Heaviside functions. Where it is left out: 2 in the plane, 1 in
-        space. There order 2 is solved by a factorisation alone: for small scenes.
+        space.
     numerics : Numerics
 
     Raises

@@ -6,6 +6,10 @@ from there, both with r = s², so that roots of r turn into polynomials. Others 
 degree 5 or, away from the front and where they are tiny, of degree 2: more points change the
 stiffness of a cell by less than 1 % and K by a tenth of its discretisation error, while the time
 to assemble grows with their number.
+
+Not so at order 2, where tip functions nearly repeat the quadratic ones: the little that is left of
+them must not drown in errors of the rules, or the stiffness has negative eigenvalues. There the
+rules at a front take one point more, and all others degree 5.
 """
 
 from functools import lru_cache
@@ -57,7 +61,7 @@ def front_points(
     share : (s,) array
         Of the cell's volume.
     n : int
-        Gauss points along the angle at a front.
+        Gauss points along the angle at a front; at order 2 one more.
 
     Returns
     -------
@@ -79,13 +83,14 @@ def front_points(
     edge, free = touches == 2, touches == 0
     vertex = ~edge & ~free
     tiny = share < _TINY
-    coarse = free & (tiny | (r.min(axis=1) > _FAR * size))
+    coarse = free & (tiny | (r.min(axis=1) > _FAR * size)) & (space.order == 1)
+    along = n if space.order == 1 else n + 1
     parts = []
     for chosen, rule in (
-        (edge & ~tiny, _edge_rule(n)),
-        (edge & tiny, _edge_rule(max(n - 1, 2))),
-        (vertex & ~tiny, _vertex_rule(n)),
-        (vertex & tiny, _vertex_rule(max(n - 1, 2))),
+        (edge & ~tiny, _edge_rule(along)),
+        (edge & tiny, _edge_rule(max(along - 1, 2))),
+        (vertex & ~tiny, _vertex_rule(along)),
+        (vertex & tiny, _vertex_rule(max(along - 1, 2))),
         (free & ~coarse, simplex_rule(3, 2 * n - 3)),
         (coarse, simplex_rule(3, max(n - 2, 1))),
     ):

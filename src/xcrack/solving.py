@@ -22,7 +22,8 @@ from xcrack.supports import known_unknowns
 from xcrack.touching import contact, contact_of
 from xcrack.warm import Warm
 
-_DIRECT = 4_000  # unknowns of a body in space above which a factorisation costs more (measured)
+# Unknowns of a body in space above which a factorisation costs more, by order (measured).
+_DIRECT = {1: 4_000, 2: 8_000}
 
 
 def solve(
@@ -120,7 +121,7 @@ def _engine(
 ) -> System | IterativeSystem:
     """A factorisation, or in space above some size conjugate gradients."""
     space_, wanted = model.space, problem.numerics.linear
-    large = space_.dim == 3 and space_.order == 1 and space_.n_dof > _DIRECT
+    large = space_.dim == 3 and space_.n_dof > _DIRECT[space_.order]
     large = large and problem.numerics.lips == "multipliers"  # others change the matrix
     if solver is None and (wanted == "iterative" or (wanted == "auto" and large)):
         return iterative_system(

@@ -12,9 +12,11 @@ from xcrack.surface_steps import surface_size
 
 # Of the crack's size, of the distance to a side of the body, of that to another front.
 _SHARE, _ASIDE, _APART = 0.65, 0.7, 0.45
-# In cells. K_I of a penny is 2, .9 and .2 % low with 2.3, 2.8 and 3.4 cells; unknowns and points
-# grow with the square of the radius, but are few.
-_LEAST, _USUAL, _MOST = 2.0, 2.6, 3.6
+# In cells. At order 1 K_I of a penny is 2, .9 and .2 % low with 2.3, 2.8 and 3.4 cells; unknowns
+# and points grow with the square of the radius, but are few. At order 2 more than two cells
+# change nothing, and take a third more time.
+_LEAST = 2.0
+_RANGE = {1: (2.6, 3.6), 2: (2.0, 2.0)}
 _EXIT = 1.5  # a front is near its exit where that is closer than this many distances to the side
 _SAMPLES = 24  # points of an open front at which the distance to the boundary is taken
 
@@ -32,26 +34,28 @@ def front_reach(mesh: Mesh, crack: Crack, wanted: float | None) -> float:
         return 0.0
     near = mesh.cell_tree.query(np.concatenate(fronts))[1]
     size = float(mesh.cell_size[near].max())
-    return max(wanted or 0.0, _MOST * size) + size
+    return max(wanted or 0.0, _RANGE[1][1] * size) + size
 
 
 def front_radii(
-    mesh: Mesh, cracks: tuple[Crack, ...], cuts: tuple[Cut, ...], wanted: float | None
+    mesh: Mesh, cracks: tuple[Crack, ...], cuts: tuple[Cut, ...], order: int, wanted: float | None
 ) -> list[tuple[float, ...]]:
     """Radius of the enriched tube around each front of each crack, length.
 
     Without a wanted radius: the smallest of 0.65 of the crack's size (area over length of its
     fronts, twice that where they are closed), 0.7 of the distance to sides that the front does not
-    pierce, and 0.45 of that to other fronts; from 2.6 to 3.6 cells. A wanted radius is kept, and
-    shrunk only where the body or another front demands; never below two cells.
+    pierce, and 0.45 of that to other fronts; from 2.6 to 3.6 cells, and two at order 2. A wanted
+    radius is kept, and shrunk only where the body or another front demands; never below two cells.
 
     Parameters
     ----------
     mesh : Mesh
     cracks : tuple of Crack
     cuts : tuple of Cut
+    order : int
     wanted : float, length, optional
     """
+    least, most = _RANGE[order]
     every = [[crack.points[front] for front in crack.fronts or ()] for crack in cracks]
     body = Body.of(mesh) if any(len(fronts) for fronts in every) else None
     radii = []
@@ -73,7 +77,7 @@ def front_radii(
                 room = min(room, _APART * float(nearest.min()))
             if wanted is None:
                 free = min(_SHARE * (2 if closed else 1) * size, room)
-                row.append(max(min(free, _MOST * cell), _USUAL * cell))
+                row.append(max(min(free, most * cell), least * cell))
             else:
                 row.append(max(min(wanted, room), _LEAST * cell))
         radii.append(tuple(row))

@@ -120,8 +120,9 @@ def _closed(quick: bool) -> list[Case]:
 
 def _penny(quick: bool) -> list[Case]:
     sizes = (6, 8) if quick else (6, 8, 10, 13, 17)
-    found = series(scenes.penny_open, "default", "default", sizes)
-    found += series(scenes.penny_open, "order 2", "setting", (5, 6, 8), order=2)
+    fine, quadratic = ((), (5, 6, 8)) if quick else ((22, 29), (5, 6, 8, 10, 13, 17))
+    found = series(scenes.penny_open, "default", "default", (*sizes, *fine))
+    found += series(scenes.penny_open, "order 2", "setting", quadratic, order=2)
     if not quick:
         found += variant(scenes.penny_open, "topological", sizes, enrichment="topological")
         found += variant(scenes.penny_open, "radius 0.25", sizes, radius=0.25)

@@ -1,0 +1,121 @@
+"""Matrices of the multigrid cycle: rows that share a pattern, and an enriched border."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from xcrack.arrays import Ints, lock, offsets
+
+
+@dataclass(frozen=True, eq=False)
+class RowBlocks:
+    """Sparse matrix in blocks of rows that share one pattern.
+
+    Attributes
+    ----------
+    shape : (rows, columns)
+    first, start, offset : (b + 1,) arrays of uint32
+        First row, column list and values of each block.
+    columns : array of uint32
+    values : array, float32 or float64
+    """
+
+    shape: tuple[int, int]
+    first: Any
+    start: Any
+    offset: Any
+    columns: Any
+    values: Any
+
+    @property
+    def dtype(self) -> Any:
+        """Type of the values."""
+        return self.values.dtype
+
+    def times(self, x: Any) -> Any:
+        """A x, in the type of the values."""
+        return self.added(np.zeros(self.shape[0], self.dtype), 1, x)
+
+    def added(self, y: Any, scale: float, x: Any) -> Any:
+        """Write y + scale A x over y, and return it."""
+        from xcrack.kernels.cycle import product
+
+        number = self.dtype.type(scale)
+        product(self.first, self.start, self.offset, self.columns, self.values, x, y, number, y)
+        return y
+
+    def single(self) -> "RowBlocks":
+        """The same matrix in single precision; it shares the pattern."""
+        values = lock(self.values.astype(np.float32))
+        return RowBlocks(self.shape, self.first, self.start, self.offset, self.columns, values)
+
+
+def row_blocks(parts: Sequence[sp.csr_matrix], first: Ints, dtype: Any = np.float64) -> RowBlocks:
+    """Store CSR matrices side by side in blocks of rows.
+
+    Parameters
+    ----------
+    parts : sequence of sparse matrices (n, m)
+        From the left to the right; they need not be joined before.
+    first : (b + 1,) array of int
+        First row of each block, and n at the end.
+    dtype : numpy type of the values
+    """
+    from xcrack.kernels.cycle import fill_blocks, pattern_sizes
+
+    first = np.asarray(first, dtype=np.int64)
+    sizes = [pattern_sizes(A.indptr, A.indices, first, A.shape[1]) for A in parts]
+    whole = np.asarray(np.sum(sizes, axis=0, dtype=np.int64))
+    start, offset = offsets(whole), offsets(whole * np.diff(first))
+    columns, values = np.empty(start[-1], np.uint32), np.zeros(offset[-1], dtype)
+    left, shift = np.zeros_like(whole), 0
+    for A, own in zip(parts, sizes):
+        fill_blocks(
+            A.indptr, A.indices, A.data, first, start[:-1] + left, np.stack([left, whole], axis=1),
+            offset[:-1], A.shape[1], shift, columns, values,
+        )  # fmt: skip
+        left, shift = left + own, shift + A.shape[1]
+    short = [each.astype(np.uint32) for each in (first, start, offset)]
+    return RowBlocks((int(first[-1]), shift), *map(lock, (*short, columns, values)))
+
+
+@dataclass(frozen=True, eq=False)
+class Bordered:
+    """Matrix of standard and enriched unknowns; the standard block is that of every crack.
+
+    Attributes
+    ----------
+    standard : RowBlocks (n, n)
+    across : RowBlocks (n, e)
+    below : RowBlocks (e, n + e)
+    """
+
+    standard: RowBlocks
+    across: RowBlocks
+    below: RowBlocks
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Numbers of rows and columns."""
+        n = self.below.shape[1]
+        return n, n
+
+    @property
+    def dtype(self) -> Any:
+        """Type of the values."""
+        return self.standard.dtype
+
+    def times(self, x: Any) -> Any:
+        """A x, in the type of the values."""
+        return self.added(np.zeros(len(x), self.dtype), 1, x)
+
+    def added(self, y: Any, scale: float, x: Any) -> Any:
+        """Write y + scale A x over y, and return it."""
+        n = self.standard.shape[0]
+        self.standard.added(y[:n], scale, x[:n])
+        self.across.added(y[:n], scale, x[n:])
+        self.below.added(y[n:], scale, x)
+        return y
