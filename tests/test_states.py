@@ -1,5 +1,7 @@
 """Several load states of one solve: one factorisation, one geometry for K."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -26,6 +28,41 @@ def test_states_together_give_what_each_gives_alone():
     np.testing.assert_allclose(together[2].K, 2.5 * together[1].K, rtol=1e-10)
     assert not together[0].K.any()
     assert solutions[0].report.operations["factorisations"] == 1
+
+
+@pytest.mark.parametrize("order", [[0.0, 1.0], [1.0, 0.0], [0.0, 0.0]], ids=str)
+def test_a_state_at_rest_has_no_K(order):
+    """In any place, with the tips of the others."""
+    found = xc.stress_intensities(xc.solve(pulled(), states=order))
+    alone = xc.stress_intensity(xc.solve(pulled()))
+    for state, sif in zip(order, found, strict=True):
+        np.testing.assert_array_equal(sif.x, alone.x)
+        np.testing.assert_allclose(sif.K, state * alone.K, rtol=1e-12)
+        np.testing.assert_allclose(sif.T, state * alone.T, rtol=1e-11)
+
+
+def test_an_initial_stress_is_not_rest():
+    """It stays when the loads are scaled to nothing."""
+    stress = xc.initial_stress(np.diag([0.0, 0.5]))
+    held = [xc.fix("top"), xc.fix("bottom")]
+    solutions = xc.solve(replace(pulled(), supports=held, loads=[stress]), states=[0.0, 1.0])
+    assert not solutions[0].at_rest
+    none, loaded = xc.stress_intensities(solutions)
+    assert none.K_I[0] > 0.1
+    np.testing.assert_allclose(none.K, loaded.K, rtol=1e-12)
+
+
+@pytest.mark.filterwarnings("ignore::xcrack.XcrackWarning")
+def test_a_front_at_rest():
+    mesh = xc.box((-1, -1, -1), (1, 1, 1), 6)
+    loads = [xc.traction("top", (0.0, 0.0, 1.0)), xc.traction("bottom", (0.0, 0.0, -1.0))]
+    crack = xc.penny_crack((0, 0, 0.02), (0, 0, 1), 0.5)
+    problem = xc.Problem(mesh, xc.Isotropic(1.0, 0.3), [crack], loads=loads)
+    none, loaded = xc.stress_intensities(xc.solve(problem, states=[0.0, 1.0]))
+    assert not none.K.any()
+    assert np.isnan(none.T).all()
+    np.testing.assert_array_equal(none.x, loaded.x)
+    assert loaded.K_I.min() > 0
 
 
 def test_solutions_of_different_solves_are_refused():

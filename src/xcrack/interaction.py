@@ -12,7 +12,7 @@ counted in sigma : eps^a, and by its change from there, times the derivative of 
 
 import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -89,8 +89,18 @@ def stress_intensities(solutions: Sequence[Solution], crack: int = 0) -> list[SI
         raise ProblemError(
             f"crack {crack}: the problem has {len(space.cuts)} crack(s), numbered from 0."
         )
-    if space.dim == 3:
-        return along_fronts(solutions, crack)
+    # Cycles from nothing are the most common ones: their lower state has no K to look for.
+    live = [s for s in solutions if not s.at_rest] or list(solutions[:1])
+    found = along_fronts(live, crack) if space.dim == 3 else _at_tips(live, crack)
+    place = np.cumsum([not s.at_rest for s in solutions]) - 1
+    K, T = np.zeros_like(found[0].K), np.where(np.isnan(found[0].T), np.nan, 0.0)
+    rest = replace(found[0], K=K, T=T, spread=K)
+    return [rest if s.at_rest else found[k] for s, k in zip(solutions, place, strict=True)]
+
+
+def _at_tips(solutions: Sequence[Solution], crack: int) -> list[SIF]:
+    """K_I, K_II and T at the tips of a crack in the plane, for each state."""
+    space = solutions[0].space
     tips = [t for t, tip in enumerate(space.tips) if tip.crack == crack]
     by_tip = [_at_tip(solutions, t) for t in tips]
     d = space.dim
@@ -123,7 +133,7 @@ def _at_tip(solutions: Sequence[Solution], t: int) -> list[tuple[Floats, float, 
             f"boundary or another tip; to leave the enriched disc it needs {needed:.4g}. Refine "
             "the mesh around the tip.",
             XcrackWarning,
-            stacklevel=5,
+            stacklevel=6,
         )
     volume = float(space.mesh.volume.sum())
     result, worst = [], (0.0, 0.0)
@@ -142,7 +152,7 @@ def _at_tip(solutions: Sequence[Solution], t: int) -> list[tuple[Floats, float, 
             f"K at {where}: domains of radius {radii[0]:.4g} and {radii[1]:.4g} differ by "
             f"{worst[0]:.3g}, {100 * worst[1]:.2g} % of K there. Refine the mesh around the tip.",
             XcrackWarning,
-            stacklevel=5,
+            stacklevel=6,
         )
     return result
 

@@ -100,6 +100,11 @@ class Solution:
         return f"Solution(state={self.state!r}, n_dof={self.n_dof}, energy={self.energy:.6g})"
 
     @property
+    def at_rest(self) -> bool:
+        """Whether nothing acts in this state: no load, no imposed displacement, no stress."""
+        return self.factor == 0 and not any(isinstance(x, InitialStress) for x in self.loads)
+
+    @property
     def n_dof(self) -> int:
         """Number of unknowns, without multipliers."""
         return self.space.n_dof

@@ -162,15 +162,13 @@ def feet(x, start, reach, breaks, place, normal, closed):  # type: ignore[no-unt
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _unit_field(mode, r, theta, kolosov, scale, U, turned, G, slope, spin, bend):  # type: ignore[no-untyped-def]
-    """Field of Williams of one mode and its derivatives, components (t, n, b).
+def _unit_field(mode, r, ch, sh, kolosov, scale, U, turned, G, slope, spin, bend):  # type: ignore[no-untyped-def]
+    """Field of Williams of one mode, and more, from the cosine and sine of half the angle.
 
-    U, and d/dtheta of it (turned); G[i, 0:2] its gradient along t, n; slope: d/dx1 of turned;
-    spin[i, 0:2]: d/dtheta of G; bend[i, 0:2]: d/dx1 of G.
+    U (t, n, b), its gradient G along t, n; d/dtheta: turned, spin; d/dx1: slope (of turned), bend.
     """
-    ch, sh = math.cos(0.5 * theta), math.sin(0.5 * theta)
-    c3, s3 = math.cos(1.5 * theta), math.sin(1.5 * theta)
-    c, s = math.cos(theta), math.sin(theta)
+    c, s = ch * ch - sh * sh, 2.0 * sh * ch
+    c3, s3 = ch * c - sh * s, sh * c + ch * s
     root = math.sqrt(r)
     for i in range(3):
         a = b = e = d = 0.0  # of cos, sin of theta / 2, then of 3 theta / 2
@@ -280,7 +278,8 @@ def front_terms(  # type: ignore[no-untyped-def]
         r, theta = polar[q, 0], polar[q, 1]
         if hat[q, 0] < 0 or r >= radii.max() or r <= 0.0:
             continue
-        c, s = math.cos(theta), math.sin(theta)
+        ch, sh = math.cos(0.5 * theta), math.sin(0.5 * theta)
+        c, s = ch * ch - sh * sh, 2.0 * sh * ch
         kt, kn, w = turn[q, 0], turn[q, 1], turn[q, 2]
         if not curved:
             kt = kn = w = 0.0
@@ -291,7 +290,7 @@ def front_terms(  # type: ignore[no-untyped-def]
             measure[k, hat[q, 1]] += weight[q] * Q[k] * share[q]
         for m in range(3):
             _unit_field(
-                m, r, theta, kolosov, scale, U[m], turned[m], G[m], slope[m], spin[m], bend[m]
+                m, r, ch, sh, kolosov, scale, U[m], turned[m], G[m], slope[m], spin[m], bend[m]
             )
             _unit_stress(G[m], lam, mu, S[m])
             _unit_stress(spin[m], lam, mu, dS)
@@ -388,8 +387,9 @@ def lip_terms(  # type: ignore[no-untyped-def]
             m_out[a] = 0.0
             for i in range(3):
                 m_out[a] += frame[q, a, i] * outward[q, i]
+        ch, sh = math.cos(0.5 * polar[q, 1]), math.sin(0.5 * polar[q, 1])
         for mode in range(3):
-            _unit_field(mode, r, polar[q, 1], kolosov, scale, U, turned, G, slope, spin, bend)
+            _unit_field(mode, r, ch, sh, kolosov, scale, U, turned, G, slope, spin, bend)
             _unit_stress(G, lam, mu, S)
             for n in range(states):
                 density = 0.0

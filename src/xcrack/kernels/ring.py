@@ -45,8 +45,8 @@ def add_ring(  # type: ignore[no-untyped-def]
         r = math.sqrt(x * x + y * y)
         if r >= largest or r <= smallest:
             continue
-        t = theta[p]
-        c, s, C, S = math.cos(t / 2), math.sin(t / 2), math.cos(t), math.sin(t)
+        c, s = math.cos(0.5 * theta[p]), math.sin(0.5 * theta[p])
+        C, S = c * c - s * s, 2.0 * s * c
         root = 1.0 / math.sqrt(r)
         value = (c, s, s * S, c * S)
         slope = (-s / 2, c / 2, c * S / 2 + s * C, -s * S / 2 + c * C)

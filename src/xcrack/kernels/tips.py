@@ -49,9 +49,16 @@ def set_tips(value, slope, first, row, bary, side, nodes, gradient, phi, psi, ac
         r = math.sqrt(x * x + y * y)
         if side[p] != 0 and y * side[p] <= 0.0:
             y = side[p] * 1e-300
-        theta = math.atan2(y, x)
-        c, s = math.cos(theta / 2), math.sin(theta / 2)
-        C, S = math.cos(theta), math.sin(theta)
+        # Half the angle without trigonometry; the larger of its sine and cosine by the root.
+        c, s, C, S = 1.0, 0.0, 1.0, 0.0
+        if r > 0.0:
+            C, S = x / r, y / r
+            if x >= 0.0:
+                c = math.sqrt(0.5 * (1.0 + C))
+                s = 0.5 * S / c
+            else:
+                s = math.copysign(math.sqrt(0.5 * (1.0 - C)), y)
+                c = 0.5 * S / s
         root = math.sqrt(r)
         F[0], F[1], F[2], F[3] = c, s, s * S, c * S
         if slopes:
