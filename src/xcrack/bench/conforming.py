@@ -156,8 +156,8 @@ def solved(K: Any, f: Floats, u: Floats, known: Ints) -> Floats:
     free = np.setdiff1d(np.arange(len(u)), known)
     rows = K[free]
     factor = splu(
-        rows[:, free].tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0,
-        options={"SymmetricMode": True},
+        rows[:, free].tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, panel_size=2,
+        relax=1, options={"SymmetricMode": True},
     )  # fmt: skip
     u[free] = factor.solve(f[free] - rows @ np.where(np.isin(np.arange(len(u)), known), u, 0.0))
     return u
