@@ -111,3 +111,16 @@ def test_boundaries_of_pieces_close(tip):
     for axis in range(2):
         total = np.bincount(piece, boundary.normal[:, axis])
         np.testing.assert_allclose(total, 0.0, atol=1e-14)
+
+
+@pytest.mark.parametrize("points", [2, 3, 5, 7, 8])
+def test_few_points_are_enough(points):
+    """K moves by a hundredth of what a cell changes; 7 and more points are not symmetric."""
+
+    def K(n):
+        problem, _ = scenes.williams_edge(
+            14, *scenes.TIPS[0], order=2, K=(1.0, 0.5), numerics=xc.Numerics(points=n)
+        )
+        return xc.stress_intensity(xc.solve(problem)).K[0]
+
+    assert np.abs(K(points) - K(4)).max() <= 1e-5

@@ -58,7 +58,7 @@ class Numerics:
     points : int
         Gauss points a direction where tip functions act: those of the sectors round a tip. Plane
         sub-cells that do not touch it are no larger than their distance to it, and have a rule of
-        degree 2 points - 3.
+        degree 2 points - 3, at least 3.
     domain : float, length, optional
         Outer radius of the first domain of the interaction integral. None: in the plane 2.5 times
         the enriched radius or 4 cells, in space 1.05 times it or 2.6 cells, whichever is more, as

@@ -150,9 +150,10 @@ def cell_points(space: Space, cells: Ints, n: int, degree: int) -> Points:
     regular, regular_bary, regular_share, fans = _towards_tips(space, subs, rows)
     # Bisected, they are no larger than their distance to a tip: a lower degree than in the fans is
     # enough (K is the same to its error with half of the points, measured).
-    rule, rule_weight = simplex_rule(space.dim, 2 * n - 3)
+    enough = max(2 * n - 3, 3)
+    rule, rule_weight = simplex_rule(space.dim, enough)
     number.append(np.repeat(regular, len(rule_weight)))
-    if 2 * n - 3 > SYMMETRIC:
+    if enough > SYMMETRIC:
         regular_bary = _from_tips(space, subs.cell[regular], regular_bary)
     where.append(np.einsum("pv,svb->spb", rule, regular_bary).reshape(-1, space.dim + 1))
     share.append(np.outer(regular_share, rule_weight).ravel())
