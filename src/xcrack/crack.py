@@ -152,23 +152,17 @@ def place(crack: Crack, mesh: Mesh) -> Crack:
     candidates = (0, last) if crack.tips is None else crack.tips
     points = np.array(crack.points)
     length = np.linalg.norm(np.diff(points, axis=0), axis=1)
-    samples = np.concatenate(
-        [
-            a + np.linspace(0, 1, 9)[:, None] * (b - a)
-            for a, b in zip(points, points[1:], strict=False)
-        ]
-    )
-    if not contains(mesh, samples).any():
+    within = contains(mesh, points[[0, last]])
+    if not within.any() and not contains(mesh, _samples(points)).any():
         low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
         raise GeometryError(
             f"the crack from {points[0].tolist()} to {points[-1].tolist()} lies outside the body, "
             f"which fills [{low.tolist()}, {high.tolist()}]: move it inside."
         )
     tips = []
-    for end in (0, last):
+    for end, inside in zip((0, last), within.tolist()):
         inward = 1 if end == 0 else last - 1
         out = (points[end] - points[inward]) / np.linalg.norm(points[end] - points[inward])
-        inside = bool(contains(mesh, points[end : end + 1])[0])
         gap, size = nearest_boundary(mesh, points[end])
         if end in candidates and inside and gap > _MOUTH * size:
             tips.append(end)
@@ -189,6 +183,12 @@ def place(crack: Crack, mesh: Mesh) -> Crack:
                 f"the cell there ({h.min():.4g}): refine the mesh around it or leave it out."
             )
     return placed
+
+
+def _samples(points: Floats) -> Floats:
+    """Nine points on each piece of a polyline."""
+    share = np.linspace(0, 1, 9)[:, None]
+    return np.concatenate([a + share * (b - a) for a, b in zip(points, points[1:], strict=False)])
 
 
 def _check_nick(mesh: Mesh, end: Floats, out: Floats, gap: float, size: float) -> None:

@@ -334,7 +334,8 @@ def _checked(points: ArrayLike, cells: ArrayLike) -> tuple[Floats, Ints]:
 def _oriented(points: Floats, cells: Ints) -> Ints:
     x = points[cells]
     volume = np.linalg.det(x[:, 1:] - x[:, :1])
-    longest = np.linalg.norm(x[:, :, None] - x[:, None], axis=-1).max(axis=(1, 2))
+    one, other = local_edges(points.shape[1]).T
+    longest = np.sqrt(((x[:, one] - x[:, other]) ** 2).sum(axis=2).max(axis=1))
     flat = np.abs(volume) <= _FLAT * longest ** points.shape[1]
     if flat.any():
         worst = int(np.argmax(flat))
