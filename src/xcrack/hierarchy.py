@@ -8,6 +8,7 @@ Quadratic functions are one more level on top: they contain the linear ones (p-m
 and Patera, 1987).
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, cast
 
@@ -19,11 +20,10 @@ from xcrack.assembly import Bulk, bulk, rigid_modes
 from xcrack.basis import stars
 from xcrack.bordered import Bordered, RowBlocks, row_blocks
 from xcrack.patches import Patches
-from xcrack.patches import largest_eigenvalue as largest_in_patches
 from xcrack.simplex import node_points
 
 _COARSEST = 300  # unknowns below which a dense inverse ends the hierarchy
-_LANCZOS = 12  # steps for the largest eigenvalue of D^-1 A
+_LANCZOS = 12  # steps for the largest eigenvalue
 _SAFETY = 1.1  # by which it is enlarged: Lanczos gives a lower bound
 _SHARE = 0.1  # of the spectrum's upper end from which Chebyshev smooths
 _OMEGA = 4 / 3  # damping of the step that smooths the prolongator
@@ -163,13 +163,35 @@ def hierarchy(bulk: Bulk, fixed: Bools) -> Hierarchy:
         Unknowns that supports decide; entries behind the standard unknowns are not looked at.
         A body that is not held is welcome: its motions are left out on the coarsest level.
     """
-    if bulk.order == 2:
-        return _on_top(bulk, fixed)
-    fixed, nodes, free, matrix = _part_in_use(bulk, fixed)
-    d = bulk.mesh.dim
-    candidates = rigid_modes(node_points(bulk.mesh, bulk.order)[nodes]) * free[:, None]
+    n, d = bulk.matrix.shape[0], bulk.mesh.dim
+    fixed = np.array(fixed[:n], dtype=bool)
+    nodes = np.nonzero(~fixed.reshape(-1, d).all(axis=1))[0]
+    unknowns = (nodes[:, None] * d + np.arange(d)).ravel()
+    free = ~fixed[unknowns]
+    matrix = _decoupled(bulk.matrix.tocsr()[unknowns][:, unknowns], free)
     A = sp.bsr_matrix(matrix, blocksize=(d, d))
     finest = _stored(A, np.float64)
+    if bulk.order == 2:
+        levels, coarsest = _over_linear(bulk, fixed, nodes, free, finest, matrix.diagonal())
+    else:
+        motions = rigid_modes(node_points(bulk.mesh, bulk.order)[nodes]) * free[:, None]
+        levels, coarsest = _aggregated(A, finest, motions)
+    return Hierarchy(
+        bulk=bulk,
+        fixed=lock(fixed),
+        nodes=lock(nodes),
+        free=lock(free),
+        matrix=finest,
+        diagonal=lock(matrix.diagonal()),
+        levels=levels,
+        coarsest=coarsest,
+    )
+
+
+def _aggregated(
+    A: sp.bsr_matrix, finest: RowBlocks, candidates: Floats
+) -> tuple[tuple[Level, ...], Floats]:
+    """Levels of smoothed aggregation, and the inverse on the coarsest."""
     levels: list[Level] = []
     while A.shape[0] > _COARSEST or not levels:
         blocks = _stored(A) if levels else finest.single()
@@ -181,50 +203,22 @@ def hierarchy(bulk: Bulk, fixed: Bools) -> Hierarchy:
         A = sp.bsr_matrix(P.T @ (A @ P), blocksize=(P.blocksize[1],) * 2)
         if A.shape[0] > 0.7 * P.shape[0]:
             break
-    return Hierarchy(
-        bulk=bulk,
-        fixed=lock(fixed),
-        nodes=lock(nodes),
-        free=lock(free),
-        matrix=finest,
-        diagonal=lock(matrix.diagonal()),
-        levels=tuple(levels),
-        coarsest=_inverse(A.toarray(), scale),
-    )
+    return tuple(levels), _inverse(A.toarray(), scale)
 
 
-def _on_top(bulk_: Bulk, fixed: Bools) -> Hierarchy:
+def _over_linear(
+    bulk_: Bulk, fixed: Bools, nodes: Ints, free: Bools, finest: RowBlocks, diagonal: Floats
+) -> tuple[tuple[Level, ...], Floats]:
     """Quadratic functions over the levels of the linear ones, which they contain."""
     mesh, d = bulk_.mesh, bulk_.mesh.dim
     lower = hierarchy(bulk(mesh, bulk_.material, 1), fixed)
-    fixed, nodes, free, matrix = _part_in_use(bulk_, fixed)
     half = 0.5 * stars(mesh, 2)
     half.setdiag(1.0)
     P = sp.kron(half.T.tocsr()[nodes][:, lower.nodes], sp.identity(d))
     P = sp.bsr_matrix(sp.diags(free * 1.0) @ P @ sp.diags(lower.free * 1.0), blocksize=(d, d))
-    finest = _stored(sp.bsr_matrix(matrix, blocksize=(d, d)), np.float64)
-    single, diagonal = finest.single(), matrix.diagonal()
+    single = finest.single()
     top = _level(single, diagonal, largest_eigenvalue(single, diagonal), P)
-    return Hierarchy(
-        bulk=bulk_,
-        fixed=lock(fixed),
-        nodes=lock(nodes),
-        free=lock(free),
-        matrix=finest,
-        diagonal=lock(diagonal),
-        levels=(top, *lower.levels),
-        coarsest=lower.coarsest,
-    )
-
-
-def _part_in_use(bulk: Bulk, fixed: Bools) -> tuple[Bools, Ints, Bools, sp.csr_matrix]:
-    """Fixed unknowns, nodes with a free one, which of theirs are free, and their stiffness."""
-    n, d = bulk.matrix.shape[0], bulk.mesh.dim
-    fixed = np.array(fixed[:n], dtype=bool)
-    nodes = np.nonzero(~fixed.reshape(-1, d).all(axis=1))[0]
-    unknowns = (nodes[:, None] * d + np.arange(d)).ravel()
-    free = ~fixed[unknowns]
-    return fixed, nodes, free, _decoupled(bulk.matrix.tocsr()[unknowns][:, unknowns], free)
+    return (top, *lower.levels), lower.coarsest
 
 
 def extended(
@@ -249,28 +243,48 @@ def extended(
         largest = largest_eigenvalue(single, diagonal)
     else:
         inverse = np.ones(len(diagonal), np.float32)
-        largest = largest_in_patches(single, patches)
+        largest = largest_eigenvalue(single, diagonal, patches.times)
     top = Level(single, lock(inverse), largest, finest.prolong, finest.restrict, patches)
     return Cycle((top, *levels.levels[1:]), levels.coarsest)
 
 
-def largest_eigenvalue(A: RowBlocks | Bordered, diagonal: Floats) -> float:
-    """Upper bound of the spectrum of D^-1 A, from a few steps of Lanczos."""
-    root = np.sqrt(_reciprocal(diagonal))
-    q = np.random.default_rng(_START).standard_normal(len(root))
-    q /= np.sqrt(np.einsum("i,i", q, q))
-    before, beta = np.zeros_like(q), 0.0
-    alphas, betas = [], []
+def largest_eigenvalue(
+    A: RowBlocks | Bordered, diagonal: Floats, solved: Callable[[Any], Any] | None = None
+) -> float:
+    """Upper bound of the spectrum of B A, from a few steps of Lanczos.
+
+    They run in the inner product of the inverse of B, in which B A is symmetric.
+
+    Parameters
+    ----------
+    A : RowBlocks or Bordered
+    diagonal : (n,) array
+    solved : callable, optional
+        B r of a residual r in single precision; without it B is the inverse diagonal.
+    """
+    inverse = _reciprocal(diagonal)
+
+    def image(w: Floats) -> Floats:
+        z = inverse * w if solved is None else solved(w.astype(np.float32))
+        return np.asarray(z, dtype=float)
+
+    w = np.sqrt(np.maximum(diagonal, 0.0)) * np.random.default_rng(_START).standard_normal(
+        len(diagonal)
+    )
+    z, before = image(w), np.zeros_like(w)
+    beta = float(np.sqrt(np.einsum("i,i", w, z)))
+    alphas: list[float] = []
+    betas: list[float] = []
     for _ in range(_LANCZOS):
-        w = root * A.times((root * q).astype(A.dtype)) - beta * before
-        alpha = float(np.einsum("i,i", w, q))
-        w -= alpha * q
-        beta = float(np.sqrt(np.einsum("i,i", w, w)))
-        alphas.append(alpha)
-        if beta <= 1e-10 * abs(alpha):
+        q, p = w / beta, z / beta
+        w = A.times(p.astype(A.dtype)) - beta * before
+        alphas.append(float(np.einsum("i,i", w, p)))
+        w -= alphas[-1] * q
+        z, before = image(w), q
+        beta = float(np.sqrt(max(np.einsum("i,i", w, z), 0.0)))
+        if beta <= 1e-6 * abs(alphas[-1]):
             break
         betas.append(beta)
-        before, q = q, w / beta
     n = len(alphas)
     T = np.diag(alphas) + np.diag(betas[: n - 1], 1) + np.diag(betas[: n - 1], -1)
     return _SAFETY * float(np.linalg.eigvalsh(T)[-1])

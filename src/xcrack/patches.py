@@ -9,7 +9,7 @@ diagonal (additive Schwarz, on vertex stars after Schoeberl, Melenk, Pechstein a
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -19,16 +19,6 @@ from xcrack.basis import stars
 from xcrack.space import Space
 
 _LEAST = 1e-6  # of a block's largest eigenvalue: single precision resolves no more
-_LANCZOS = 12  # steps for the largest eigenvalue
-_SAFETY = 1.1  # by which it is enlarged: Lanczos gives a lower bound
-_START = 613_099  # seed of the vector that Lanczos starts from
-
-
-class _Times(Protocol):
-    @property
-    def dtype(self) -> Any: ...
-
-    def times(self, x: Any) -> Any: ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,37 +82,6 @@ def star_patches(
     alone[used] = 0
     short = [each.astype(np.uint32) for each in (members, start)]
     return Patches(*map(lock, (*short, offset, inverse, alone)))
-
-
-def largest_eigenvalue(A: _Times, patches: Patches) -> float:
-    """Upper bound of the spectrum of B A, with B the sum of the blocks.
-
-    A few steps of Lanczos in the energy of A, in which B A is symmetric.
-    """
-
-    def image(v: Floats) -> Floats:
-        return np.asarray(A.times(v.astype(A.dtype)), dtype=float)
-
-    w = np.random.default_rng(_START).standard_normal(len(patches.alone))
-    Aw = image(w)
-    size = float(np.sqrt(np.einsum("i,i", w, Aw)))
-    before = np.zeros_like(w)
-    alphas: list[float] = []
-    betas: list[float] = []
-    for _ in range(_LANCZOS):
-        q, Aq = w / size, Aw / size
-        w = patches.times(Aq.astype(np.float32)) - (betas[-1] if betas else 0.0) * before
-        alphas.append(float(np.einsum("i,i", w, Aq)))
-        w -= alphas[-1] * q
-        Aw = image(w)
-        size = float(np.sqrt(max(np.einsum("i,i", w, Aw), 0.0)))
-        if size <= 1e-6 * alphas[0]:
-            break
-        betas.append(size)
-        before = q
-    n = len(alphas)
-    T = np.diag(alphas) + np.diag(betas[: n - 1], 1) + np.diag(betas[: n - 1], -1)
-    return _SAFETY * float(np.linalg.eigvalsh(T)[-1])
 
 
 def _members(space: Space, home: Ints, n_standard: int) -> tuple[Ints, Ints]:

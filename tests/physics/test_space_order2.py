@@ -14,6 +14,7 @@ import xcrack as xc
 from xcrack import iterative
 from xcrack.linear import scaled_basis
 from xcrack.model import build
+from xcrack.tube import leg_size
 
 C = np.array([0.013, -0.021, 0.0317])
 
@@ -182,6 +183,24 @@ def test_steps_near_incompressibility():
     print(f"steps {counts}")
     assert counts[0] <= 50
     assert counts[-1] <= 120
+
+
+@pytest.mark.parametrize(("order", "cells"), [(1, (2.6, 3.6)), (2, (2.0, 2.0))])
+def test_tube_in_cells(order, cells):
+    """Two cells are enough at order 2."""
+    space = build(replace(tilted(8), order=order)).space
+    size = leg_size(space.mesh, space.cuts[0].level_set.tip_cells[0])
+    assert cells[0] - 1e-12 <= space.tips[0].radius / size <= cells[1] + 1e-12
+
+
+@pytest.mark.parametrize(("order", "few", "many"), [(1, 6, 7), (2, 5, 6)])
+def test_choice_of_the_solver(order, few, many):
+    """A factorisation up to 4 000 unknowns, at order 2 up to 8 000."""
+    bound = {1: 4_000, 2: 8_000}[order]
+    small, large = (xc.solve(replace(tilted(n), order=order)) for n in (few, many))
+    assert small.n_dof < bound < large.n_dof < 1.2 * bound
+    assert small.report.operations["factorisations"] == 1
+    assert large.report.operations["factorisations"] == 0
 
 
 def test_modes_in_the_place_of_tip_functions():

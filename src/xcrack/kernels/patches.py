@@ -10,14 +10,7 @@ def add_solved(members, start, offset, inverse, r, out):  # type: ignore[no-unty
 
     Parameters
     ----------
-    members : array of uint32
-        Unknowns of the blocks, one block after the other.
-    start : (b + 1,) array of uint32
-        Where each block begins in `members`.
-    offset : (b,) array of uint64
-        Where its inverse begins.
-    inverse : array
-        Symmetric inverses, row by row.
+    members, start, offset, inverse : as of `Patches`
     r : (n,) array
     out : (n,) array
         Changed.
