@@ -51,6 +51,32 @@ def test_only_what_changed_is_integrated(scene, first, second, order):
     assert fresh.n_points - kept.n_points == every - changed
 
 
+@pytest.mark.parametrize("order", [1, 2])
+def test_a_node_that_lost_its_function(order):
+    """Cells around it are integrated anew, all others taken over."""
+    space_ = build(plane((0.1, 0.05), order)).space
+    cells = space_.enriched[with_one_jump(space_, space_.enriched)]
+    known, _ = kept_cells(space_, cells, None)
+    nodes = space_.cell_nodes[cells]
+    lost = np.array(space_.heaviside[0])
+    lost[nodes[lost[nodes] >= 0][0]] = -1
+    changed = replace(space_, heaviside=(lost,))
+    cells = changed.enriched[with_one_jump(changed, changed.enriched)]
+    found, used = kept_cells(changed, cells, known)
+    fresh, every = kept_cells(changed, cells, None)
+    np.testing.assert_array_equal(found.products, fresh.products)
+    assert 0 < used < every
+
+
+def test_functions_jump_in_a_crossed_cell_only_where_it_is_cut():
+    """What the key of a cell leaves out."""
+    for problem in (plane((0.1, 0.05), 2), plane((0.31, -0.22), 1), space(0.2, 1)):
+        space_ = build(problem).space
+        cells = space_.enriched[with_one_jump(space_, space_.enriched)]
+        cut = space_.cuts[0]
+        np.testing.assert_array_equal(cut.is_cut[cells], cut.side[cells] == 0)
+
+
 def test_another_crack_in_the_same_cells_is_integrated_anew():
     """Shifted by a millionth of a cell, mirrored, or numbered as another crack."""
     known = build(plane((0.1, 0.05), 2)).bulk.cells

@@ -74,18 +74,19 @@ def kept_cells(space: Space, cells: Ints, known: KeptCells | None) -> tuple[Kept
 
 
 def _keys(space: Space, cells: Ints) -> Floats:
-    """Crack, whether it cuts the cell, its side, its level set, the nodes with its function.
+    """Crack, its level set, the nodes with its function.
 
-    The sub-cells of a cell without a tip follow from the level set at its corners alone.
+    Side and sub-cells of a cell without a tip follow from the level set at its corners alone, and
+    where functions jump in a cell whose level set changes its sign, the crack cuts it.
     """
     mesh = space.mesh
     crack = np.log2(space.signature[cells]).astype(np.int64)
-    corners = mesh.cells.shape[1]
-    key = np.empty((len(cells), 3 + corners + space.cell_nodes.shape[1]))
+    end = 1 + mesh.cells.shape[1]
+    key = np.empty((len(cells), end + space.cell_nodes.shape[1]))
     for c in np.unique(crack):
         rows = np.nonzero(crack == c)[0]
-        cut, own = space.cuts[c], cells[rows]
-        key[rows, 0], key[rows, 1], key[rows, 2] = c, cut.is_cut[own], cut.side[own]
-        key[rows, 3 : 3 + corners] = cut.level_set.phi[mesh.cells[own]]
-        key[rows, 3 + corners :] = space.heaviside[c][space.cell_nodes[own]] >= 0
+        own = cells[rows]
+        key[rows, 0] = c
+        key[rows, 1:end] = space.cuts[c].level_set.phi[mesh.cells[own]]
+        key[rows, end:] = space.heaviside[c][space.cell_nodes[own]] >= 0
     return key
