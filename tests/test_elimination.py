@@ -9,7 +9,11 @@ import scipy.sparse as sp
 import scenes
 import xcrack as xc
 from xcrack.elimination import Elimination, eliminated
+from xcrack.linear import scaled_basis, system
+from xcrack.model import build
+from xcrack.run_files import read_steps, step_path
 from xcrack.solving import solve_states
+from xcrack.store import load, save
 
 TENSION = [xc.traction("top", (0.0, 1.0)), xc.traction("bottom", (0.0, -1.0))]
 EDGE = [(-1.2, 0.013), (-0.2, 0.013)]
@@ -67,3 +71,39 @@ def test_the_next_crack_takes_the_order_of_the_last(order):
     assert kept.warm.elimination.age == 1
     scale = np.abs(fresh.u).max()
     np.testing.assert_allclose(kept.u, fresh.u, atol=1e-10 * scale)
+
+
+def test_a_function_without_energy_is_left_out():
+    """As is that of a sliver below round-off; the others stay as they were."""
+    numerics = xc.Numerics(orthonormal="none")
+    model = build(replace(problem((0.0, 0.05), scenes.perturbed(12, 78)), numerics=numerics))
+    lost = model.space.n_nodes * 2 + 3
+    keep = sp.diags((np.arange(model.space.n_dof) != lost).astype(float))
+    K, fixed = sp.csr_matrix(keep @ model.stiffness @ keep), model.known.fixed.copy()
+    fixed[:4] = True
+    basis = scaled_basis(model.space, K, fixed, numerics)
+    whole = scaled_basis(model.space, model.stiffness, fixed, numerics)
+    assert basis.shape[1] == whole.shape[1] - 1
+    assert basis[lost].nnz == 0
+    engine = system(model.space, K, fixed, numerics)
+    assert np.abs(engine.reduced.diagonal() - 1).max() <= 1e-12  # round-off
+
+
+@pytest.mark.filterwarnings("ignore::xcrack.XcrackWarning")
+def test_a_step_whose_order_is_lost_is_not_taken_for_whole(tmp_path):
+    """The step that found the order holds it for those that follow."""
+    run = xc.grow(
+        problem((0.0, 0.05), scenes.perturbed(12, 79)), xc.paris(C=1e-3, m=2.0),
+        xc.max_hoop_stress, xc.Cycle(0.0, 1.0), 0.15, max_steps=3,
+    )  # fmt: skip
+    xc.collect(run, tmp_path)
+    steps, broken = read_steps(tmp_path, {})
+    assert [step.memory.warm.elimination.age for step in steps] == [0, 1, 2]
+    assert broken is None
+    assert load(step_path(tmp_path, 1)).memory.warm.elimination.place.size == 0
+    first = load(step_path(tmp_path, 0))
+    warm = replace(first.memory.warm, elimination=None)
+    save(step_path(tmp_path, 0), replace(first, memory=replace(first.memory, warm=warm)))
+    steps, broken = read_steps(tmp_path, {})
+    assert len(steps) == 1
+    assert broken == step_path(tmp_path, 1)

@@ -8,7 +8,7 @@ import xcrack as xc
 from xcrack.consistent import boundary_points, corrected
 from xcrack.loads import position
 from xcrack.quadrature import Points, cell_points, sub_cells
-from xcrack.quadrature_front import radius_at, triangle_points
+from xcrack.quadrature_front import front_points, radius_at, triangle_points
 from xcrack.simplex import conical
 from xcrack.solving import build
 
@@ -240,3 +240,18 @@ def test_the_correction_closes_the_defect(name):
     print(f"\n{name}: defect {before / largest:.1e} before, {after / largest:.1e} after")
     assert before > 1e-5 * largest
     assert after <= 1e-12 * largest
+
+
+@pytest.mark.parametrize(("order", "count"), [(1, 4), (2, 14)])
+def test_points_away_from_a_front(order, count):
+    """Degree 2 at order 1; 5 at order 2, whose tip functions nearly repeat the quadratic ones."""
+    crack = xc.penny_crack((0.01, -0.02, 0.03), (0.3, -0.5, 1.0), 0.5)
+    mesh = xc.box((-1, -1, -1), (1, 1, 1), 6)
+    space = build(xc.Problem(mesh, xc.Isotropic(1.0, 0.3), [crack], order=order)).space
+    cells = np.nonzero(space.has_tip)[0]
+    corner = np.broadcast_to(np.eye(4), (len(cells), 4, 4))
+    far = radius_at(space, mesh.cells[cells], corner).min(axis=1) > mesh.cell_size[cells]
+    assert far.sum() > 20
+    number, _, weight = front_points(space, cells[far], corner[far], np.ones(far.sum()), 4)
+    np.testing.assert_array_equal(np.bincount(number), count)
+    np.testing.assert_allclose(np.bincount(number, weight), 1, rtol=1e-14)  # round-off

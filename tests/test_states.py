@@ -65,6 +65,21 @@ def test_a_front_at_rest():
     assert loaded.K_I.min() > 0
 
 
+@pytest.mark.parametrize("dim", [2, 3])
+def test_a_warning_names_the_line_that_asked_for_K(dim):
+    """Not one of xcrack's own."""
+    up, plane = np.eye(dim)[-1], "strain" if dim == 2 else None
+    crack = xc.line_crack([(-1.2, 0.01), (0.8, 0.01)])
+    if dim == 3:
+        crack = xc.penny_crack((0, 0, 0.02), (0, 0, 1), 0.6)
+    loads = [xc.traction("top", tuple(up)), xc.traction("bottom", tuple(-up))]
+    mesh = xc.box((-1,) * dim, (1,) * dim, 6)
+    solution = xc.solve(xc.Problem(mesh, xc.Isotropic(1.0, 0.3, plane), [crack], loads=loads))
+    with pytest.warns(xc.XcrackWarning, match="clipped") as said:
+        xc.stress_intensity(solution)
+    assert all(warning.filename == __file__ for warning in said)
+
+
 def test_solutions_of_different_solves_are_refused():
     problem = pulled()
     with pytest.raises(xc.ProblemError, match="do not share one space"):

@@ -179,7 +179,7 @@ def patch_orthogonal(
     """
     d = space.dim
     start, cells = space.mesh.point_to_cell
-    star = stars(space.mesh, space.order)
+    star = stars(space.mesh, space.order) if around == "star" else None
     rows, columns, values = (
         [np.arange(space.n_dof)],
         [np.arange(space.n_dof)],
@@ -188,7 +188,7 @@ def patch_orthogonal(
     members, counts, n_patch = [], [], []
     for tip in space.tips:
         for point in np.nonzero(tip.point_to_function >= 0)[0]:
-            if around == "star":
+            if star is not None:
                 nodes = star.indices[star.indptr[point] : star.indptr[point + 1]]
             else:
                 nodes = np.unique(space.cell_nodes[cells[start[point] : start[point + 1]]])

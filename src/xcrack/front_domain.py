@@ -213,7 +213,7 @@ def _warn(curve: FrontCurve, radii: tuple[float, float, float], K: Floats) -> No
             f"({outer / size:.1f} cells) by the boundary, another front or a bend of the front. "
             "Refine the mesh around the front.",
             XcrackWarning,
-            stacklevel=6,
+            stacklevel=8,
         )
     largest = np.abs(K).max(initial=0.0)
     apart = np.abs(K[:, 0] - K[:, 1]).mean(axis=1).max(initial=0.0)
@@ -222,7 +222,7 @@ def _warn(curve: FrontCurve, radii: tuple[float, float, float], K: Floats) -> No
             f"K along the front through {where}: two domains differ by {apart:.3g} in the mean, "
             f"{100 * apart / largest:.2g} % of the largest K. Refine the mesh around the front.",
             XcrackWarning,
-            stacklevel=6,
+            stacklevel=8,
         )
 
 
@@ -242,9 +242,10 @@ def _domain_parts(
     coefficients = np.stack([solution.coefficients for solution in solutions], axis=-1)
     initial = partial(_initial, solutions) if _has_initial(solutions) else None
     middle = mesh.points[mesh.cells].mean(axis=1)
-    cells = np.nonzero(curve.distance(middle) <= 1.05 * outer + mesh.cell_size)[0]
+    distance = curve.distance(middle) - 1.05 * outer
+    cells = np.nonzero(distance <= mesh.cell_size)[0]
     reach = np.linalg.norm(mesh.points[mesh.cells[cells]] - middle[cells, None], axis=2).max(axis=1)
-    cells = cells[curve.distance(middle[cells]) <= 1.05 * outer + reach]
+    cells = cells[distance[cells] <= reach]
     for first in range(0, len(cells), _CHUNK):
         points = cell_points(space, cells[first : first + _CHUNK], _POINTS, _DEGREE)
         x = position(space, points.cell, points.bary)

@@ -182,8 +182,6 @@ def _from_tips(space: Space, cell: Ints, bary: Floats) -> Floats:
     A conical rule is not symmetric: with an order that geometry decides, points do not depend
     on how nodes are numbered.
     """
-    if not space.tips or not len(cell):
-        return bary
     x = np.einsum("svb,sbd->svd", bary, space.mesh.points[space.mesh.cells[cell]])
     distance = np.min([np.linalg.norm(x - tip.x, axis=2) for tip in space.tips], axis=0)
     order = np.argsort(distance, axis=1, kind="stable")

@@ -57,8 +57,9 @@ def front_radii(
     """
     least, most = _RANGE[order]
     every = [[crack.points[front] for front in crack.fronts or ()] for crack in cracks]
-    body = Body.of(mesh) if any(len(fronts) for fronts in every) else None
-    radii = []
+    if not any(every):
+        return [() for _ in cracks]
+    body, radii = Body.of(mesh), []
     for c, (crack, cut) in enumerate(zip(cracks, cuts, strict=True)):
         row = []
         fronts = crack.fronts or ()
@@ -67,7 +68,6 @@ def front_radii(
         for k, numbers in enumerate(fronts):
             cell = leg_size(mesh, cut.level_set.tip_cells[k])
             closed = bool(numbers[0] == numbers[-1])
-            assert body is not None
             room = _ASIDE * _to_sides(body, every[c][k], closed)
             others = [
                 x for d, own in enumerate(every) for j, x in enumerate(own) if (d, j) != (c, k)
