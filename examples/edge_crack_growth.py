@@ -20,7 +20,6 @@ import numpy as np
 from scipy.integrate import quad
 
 import xcrack as xc
-from xcrack.cycles import cycles_between
 
 OUT = Path("out/edge_crack_growth")
 OUT.mkdir(parents=True, exist_ok=True)
@@ -59,7 +58,7 @@ rules = []
 for steps in (5, 10, 20, 40):
     a = np.linspace(A0, A1, steps + 1)
     rate = exact_rate(a)
-    power_law = cycles_between(a[:-1], a[1:], rate[:-1], rate[1:]).sum()
+    power_law = xc.cycles_between(a[:-1], a[1:], rate[:-1], rate[1:]).sum()
     euler = (np.diff(a) / rate[:-1]).sum()
     rules.append(
         {
@@ -102,7 +101,7 @@ print(history.steps[-1].solutions[-1].report)
 stopped = xc.collect(
     xc.grow(plate, **asked), path=OUT / "run", until=lambda step: step.index == 4, overwrite=True
 )
-print(f"stopped: {stopped.ended}; on disk: {len(xc.history.load(OUT / 'run').steps)} steps")
+print(f"stopped: {stopped.ended}; on disk: {len(xc.load(OUT / 'run').steps)} steps")
 resumed = xc.resume(OUT / "run", plate, **asked)
 print(f"resumed: {resumed}")
 

@@ -21,7 +21,6 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import xcrack as xc
-from xcrack.crack import advance, front
 
 OUT = Path("out/turning_load")
 OUT.mkdir(parents=True, exist_ok=True)
@@ -136,8 +135,11 @@ for name, how in RUNS:
             )
         )
     last = grown[name, how].steps[-1]
-    end[name, how] = advance(last.cracks[0], last.angle[0], last.da[0])  # where step 3 would be
-    x, y = front(end[name, how])[0][TIP]
+    ahead, normal = last.sif[0][0].frame[TIP]
+    angle, da = last.angle[0][TIP], last.da[0][TIP]
+    tip = last.sif[0][0].x[TIP] + da * (np.cos(angle) * ahead + np.sin(angle) * normal)
+    end[name, how] = np.vstack([last.cracks[0].points, tip])  # where step 3 would be
+    x, y = tip
     print(f"{name:22} {how:13} two steps in {last.cycles:7.0f} cycles, next tip ({x:.3f}, {y:.3f})")
 
 # %% The same cycle on the crack once it has turned
@@ -236,7 +238,7 @@ axes[0].legend()
 COLORS = {"max_hoop_stress": "C1", **{name: color for name, (_, color, _) in RAYS.items()}}
 for name, how in RUNS:
     style = "-" if how == "with contact" else "--"
-    x = end[name, how].points
+    x = end[name, how]
     axes[1].plot(*x.T, style, color=COLORS[name], lw=1.6, marker="o", ms=3, label=f"{name}, {how}")
 axes[1].plot([-A, A], [0, 0], "k-", lw=3, label="crack at first")
 axes[1].set(xlabel="x, mm", ylabel="y, mm", aspect="equal", xlim=(-8.5, 8.5), ylim=(-3.4, 3.4))

@@ -11,7 +11,7 @@ import xcrack as xc
 from xcrack.elimination import Elimination, eliminated
 from xcrack.linear import scaled_basis, system
 from xcrack.model import build
-from xcrack.run_files import read_steps, step_path
+from xcrack.run_files import CLASSES, read_steps, step_path
 from xcrack.solving import solve_states
 from xcrack.store import load, save
 
@@ -100,10 +100,13 @@ def test_a_step_whose_order_is_lost_is_not_taken_for_whole(tmp_path):
     steps, broken = read_steps(tmp_path, {})
     assert [step.memory.warm.elimination.age for step in steps] == [0, 1, 2]
     assert broken is None
-    assert load(step_path(tmp_path, 1)).memory.warm.elimination.place.size == 0
-    first = load(step_path(tmp_path, 0))
-    warm = replace(first.memory.warm, elimination=None)
-    save(step_path(tmp_path, 0), replace(first, memory=replace(first.memory, warm=warm)))
+    second = load(step_path(tmp_path, 1), CLASSES)["step"]
+    assert second.memory.warm.elimination.place.size == 0
+    stored = load(step_path(tmp_path, 0), CLASSES)
+    memory = stored["step"].memory
+    memory = replace(memory, warm=replace(memory.warm, elimination=None))
+    stored["step"] = replace(stored["step"], memory=memory)
+    save(step_path(tmp_path, 0), stored, CLASSES)
     steps, broken = read_steps(tmp_path, {})
     assert len(steps) == 1
     assert broken == step_path(tmp_path, 1)

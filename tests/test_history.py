@@ -16,11 +16,11 @@ import numpy as np
 import pytest
 
 from growth_fakes import mode_I, patch_respond, plate
-from xcrack import conditions, run_files, store
+from xcrack import conditions, run_files, settings, store
 from xcrack.crack import line_crack
 from xcrack.criteria import max_hoop_stress, weighted_angle
 from xcrack.errors import ProblemError, XcrackWarning
-from xcrack.growth import Cycle, grow
+from xcrack.growth import Cycle, Run, grow
 from xcrack.history import History, collect, load, resume
 from xcrack.laws import paris
 from xcrack.settings import describe, differences
@@ -275,12 +275,12 @@ def push(size):
     ("changes", "words"),
     [
         ({"law": paris(1e-11, 3.1)}, r"law\.m: stored 3\.0, given 3\.1"),
-        ({"criterion": max_hoop_stress}, r"criterion: stored weighted_angle .* max_hoop_stress"),
+        ({"criterion": max_hoop_stress}, r"criterion: stored xcrack\.weighted_angle, given .*hoop"),
         ({"cycle": Cycle(0.1, 1.0)}, r"cycle\.min: stored 0\.0, given 0\.1"),
         ({"da": 1.8}, r"da: stored 1\.7, given 1\.8"),
-        ({"threshold": 1.0}, "threshold: stored 0.0, given 1.0"),
+        ({"threshold": 1.0}, "threshold: stored the default, given 1.0"),
         ({"scaling": "linear"}, "scaling"),
-        ({"cycles": 1e5}, "cycles: stored None"),
+        ({"cycles": 1e5}, "cycles: stored the default, given 100000"),
     ],
 )
 def test_resume_names_what_is_different(whole, changes, words):
@@ -296,7 +296,7 @@ def test_resume_names_what_is_different_in_the_problem(whole):
     problem = scene()
     for changed, words in (
         (replace(problem, material=replace(problem.material, nu=0.2)), r"problem\.material\.nu"),
-        (replace(problem, order=1), r"problem\.order: stored 2, given 1"),
+        (replace(problem, order=1), r"problem\.order: stored the default, given 1"),
         (replace(problem, contact="off"), r"problem\.contact"),
         (replace(problem, numerics=replace(problem.numerics, points=5)), r"numerics\.points"),
         (replace(problem, loads=[conditions.body_force((1.0, 0.0))]), r"problem\.loads"),
@@ -348,9 +348,83 @@ def test_a_run_may_be_written_anew(whole):
 def test_a_stored_file_chooses_no_code(tmp_path):
     tree = {"class": "subprocess:Popen", "fields": {"args": "true"}}
     np.savez(tmp_path / "x.npz", tree=np.array(json.dumps(tree)))
-    assert store.load(tmp_path / "x.npz") is None
+    with pytest.raises(ProblemError, match=r"x\.npz holds a 'subprocess:Popen'"):
+        store.load(tmp_path / "x.npz", run_files.CLASSES)
     with pytest.raises(ProblemError, match=r"Path cannot be stored"):
-        store.save(tmp_path / "y.npz", {"path": Path()})
+        store.save(tmp_path / "y.npz", {"path": Path()}, run_files.CLASSES)
+
+
+# --- other formats, other defaults ---------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("written", "words"), [(1, "before the first release"), (3, "newer xcrack")]
+)
+@pytest.mark.parametrize("lost", [False, True], ids=["header", "steps"])
+def test_a_run_of_another_format(whole, monkeypatch, written, words, lost):
+    """Whether the header says so, or the steps where it is lost."""
+    folder = whole.path.parent / "other"
+    with monkeypatch.context() as patch:
+        patch.setattr(run_files, "_FORMAT", written)
+        collect(grow(**run_of()), folder)
+    if lost:
+        (folder / "run.json").unlink()
+    before = content(folder)
+    for read in (load, lambda path: resume(path, **run_of())):
+        with pytest.raises(ProblemError, match=words):
+            read(folder)
+    assert content(folder) == before
+
+
+def test_a_lost_header_is_made_again_from_the_steps(whole):
+    before = content(whole.path)
+    (whole.path / "run.json").unlink()
+    assert load(whole.path).table().tobytes() == whole.table().tobytes()
+    with pytest.raises(ProblemError, match=r"da: stored 1\.7, given 1\.8"):
+        resume(whole.path, **run_of(da=1.8))
+    resume(whole.path, **run_of())
+    assert content(whole.path) == before
+
+
+def test_a_class_of_another_version(whole):
+    """A name that is not known, a field that is not, a field that is missing."""
+    path = run_files.step_path(whole.path, 1)
+    with np.load(path) as members:
+        arrays = dict(members)
+    tree = str(arrays.pop("tree"))
+    for old, new, words in (
+        ('"class": "SIF"', '"class": "Jump"', "holds a 'Jump'"),
+        ('"spread":', '"scatter":', "holds a SIF that differs in scatter, spread"),
+    ):
+        np.savez(path, tree=np.array(tree.replace(old, new)), **arrays)
+        with pytest.raises(ProblemError, match=words):
+            load(whole.path)
+
+
+def test_a_run_goes_on_with_its_own_defaults(formula, whole, monkeypatch):
+    """Of the set it began with, where the user left the choice to them."""
+    monkeypatch.setattr(settings, "DEFAULTS", 2)
+    monkeypatch.setitem(settings.REPLACED, 2, {"problem.numerics.points": 6, "scaling": "linear"})
+    run = Run(**run_of())
+    begun = run.as_begun(whole.steps[0].memory.settings)
+    assert begun.problem.numerics.points == 6
+    assert begun.scaling == "linear"
+    assert begun.settings == whole.steps[0].memory.settings
+    assert begun.as_begun(begun.settings).settings == begun.settings
+
+
+def test_a_choice_that_became_the_default_is_still_a_choice(whole, monkeypatch):
+    monkeypatch.setattr(settings, "DEFAULTS", 2)
+    monkeypatch.setitem(settings.REPLACED, 2, {"scaling": "linear"})
+    stored = {**whole.steps[0].memory.settings, "scaling": "'law'"}
+    assert Run(**run_of()).as_begun(stored).settings == stored
+
+
+def test_what_changes_no_result_is_not_in_the_settings():
+    keys = set(Run(**run_of(max_steps=3, K_c=1e9, progress=False)).settings)
+    assert not keys & {"max_steps", "max_cycles", "K_c", "progress"}
+    assert "problem.order" not in keys
+    assert "problem.order" in Run(**run_of(replace(scene(), order=1))).settings
 
 
 # --- what is read off --------------------------------------------------------------------------

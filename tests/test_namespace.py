@@ -17,10 +17,11 @@ NAMES = [
     "traction", "write_mesh",
     # solution
     "Solution", "chart", "energy_error", "inf_sup", "plan", "plot", "solve", "stress_intensity",
-    "write", "SIF", "stress_intensities",
+    "write", "SIF", "stress_intensities", "refine", "pardiso", "draw_K",
     # growth
     "Cycle", "History", "Step", "collect", "elber", "equivalent_K", "grow", "max_hoop_stress",
-    "mean_reference", "paris", "resume", "walker", "weighted_angle",
+    "mean_reference", "paris", "resume", "walker", "weighted_angle", "cycles_between", "load",
+    "draw_fronts",
     # errors
     "ConvergenceError", "GeometryError", "MeshError", "ProblemError", "XcrackError",
     "XcrackWarning",

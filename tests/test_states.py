@@ -92,3 +92,13 @@ def test_states_must_be_a_list(states):
         xc.ProblemError, match=r"give a list of load states, such as states=\[1.0\]"
     ):
         xc.solve(pulled(), states=states)
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_points_inside_the_body(dim):
+    mesh = xc.box((-1,) * dim, (1,) * dim, 3)
+    solution = xc.solve(xc.Problem(mesh, xc.Isotropic(1.0, 0.3, "strain" if dim == 2 else None)))
+    x = np.zeros((3, dim))
+    x[1], x[2, 0] = 1.0, 1.0 + 1e-6
+    np.testing.assert_array_equal(solution.inside(x), [True, True, False])
+    np.testing.assert_array_equal(solution.inside(x[2]), [False])

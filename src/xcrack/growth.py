@@ -3,7 +3,7 @@
 import sys
 import warnings
 from collections.abc import Generator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -16,7 +16,7 @@ from xcrack.follow import crack_sizes, followed, memory_of
 from xcrack.interaction import stress_intensities
 from xcrack.laws import Law
 from xcrack.problem import Problem
-from xcrack.settings import describe
+from xcrack.settings import DEFAULTS, describe, with_defaults_of
 from xcrack.sif import SIF
 from xcrack.solution import Solution
 from xcrack.solving import solve_states
@@ -34,6 +34,9 @@ _SPACING = 0.5  # of a cell, between the points of a new front in space
 _LEAST_IN_SPACE = 0.02  # of a cell: neighbours along a front move on, so a slow part has to follow
 
 
+_STOPS = {"changes_results": False}  # when a run stops, not how its cracks grow
+
+
 @dataclass(frozen=True, eq=False)
 class Run:
     """All that `grow` was asked for, checked."""
@@ -42,15 +45,16 @@ class Run:
     law: Law
     criterion: Criterion
     cycle: Cycle
-    da: float | None
-    cycles: float | None
-    scaling: str
-    threshold: float
-    K_c: float | None
-    max_steps: int | None
-    max_cycles: float | None
-    solver: Any
-    progress: bool | str
+    da: float | None = None
+    cycles: float | None = None
+    scaling: str = "law"
+    threshold: float = 0.0
+    solver: Any = None
+    K_c: float | None = field(default=None, metadata=_STOPS)
+    max_steps: int | None = field(default=None, metadata=_STOPS)
+    max_cycles: float | None = field(default=None, metadata=_STOPS)
+    progress: bool | str = field(default=True, metadata=_STOPS)
+    defaults: int = field(default=DEFAULTS, metadata=_STOPS)
 
     def __post_init__(self) -> None:
         if self.da is None and self.cycles is None:
@@ -76,11 +80,12 @@ class Run:
     @property
     def settings(self) -> dict[str, str]:
         """Text of all that decides how the cracks grow; rules that stop a run are not in it."""
-        names = ("problem", "law", "criterion", "cycle", "da", "cycles", "scaling", "threshold")
-        lines: dict[str, str] = {}
-        for name in (*names, "solver"):
-            lines |= describe(name, getattr(self, name))
-        return lines
+        return {"defaults": str(self.defaults), **describe("", self, self.defaults)}
+
+    def as_begun(self, stored: Mapping[str, str]) -> "Run":
+        """The run with the defaults of a stored one, where it leaves a choice to them."""
+        number = int(stored["defaults"])
+        return replace(with_defaults_of(self, number, stored), defaults=number)
 
 
 def grow(
@@ -151,8 +156,8 @@ def grow(
     analysis of all load states and the life of ten steps is good to a few tenths of a per cent.
     """
     run = Run(
-        problem, law, criterion, cycle, da, cycles, scaling, threshold, K_c, max_steps, max_cycles,
-        solver, progress,
+        problem, law, criterion, cycle, da, cycles, scaling, threshold, solver, K_c, max_steps,
+        max_cycles, progress,
     )  # fmt: skip
     return steps_of(run)
 

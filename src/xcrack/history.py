@@ -213,8 +213,8 @@ def resume(
         No run is there, or it was made with other settings: the message names them.
     """
     run = Run(
-        problem, law, criterion, cycle, da, cycles, scaling, threshold, K_c, max_steps, max_cycles,
-        solver, progress,
+        problem, law, criterion, cycle, da, cycles, scaling, threshold, solver, K_c, max_steps,
+        max_cycles, progress,
     )  # fmt: skip
     folder = Path(path)
     if not folder.is_dir():
@@ -224,6 +224,7 @@ def resume(
     header = run_files.read_header(folder)
     if header is None:  # killed before its first step
         return _collected(steps_of(run), folder, until, (), None, False, keep_solutions)
+    run = run.as_begun(header.settings)
     settings = run.settings
     lines = differences(header.settings, settings)
     if lines:
@@ -312,7 +313,7 @@ def _collected(
             if header is None:
                 settings = {} if step.memory is None else step.memory.settings
                 header = run_files.begin(folder, settings, overwrite)
-            run_files.write_step(folder, step)
+            run_files.write_step(folder, step, header)
         if mesh is None and step.solutions:
             mesh = step.solutions[0].problem.mesh
         kept.append(step if keep_solutions else replace(step, solutions=()))

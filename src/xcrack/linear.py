@@ -20,7 +20,22 @@ Solver = Callable[[sp.csc_matrix], Solve]
 
 
 def pardiso(A: sp.csc_matrix) -> Solve:
-    """Factor a symmetric positive matrix with MKL PARDISO (the extra ``pardiso``)."""
+    """Factor a symmetric positive matrix with MKL PARDISO, as ``solve(problem, solver=pardiso)``.
+
+    Parameters
+    ----------
+    A : sparse matrix (n, n)
+
+    Returns
+    -------
+    callable
+        Solves for right-hand sides `(n,)` or `(n, k)`.
+
+    Raises
+    ------
+    ProblemError
+        pypardiso is not installed: the extra ``pardiso``, for x86-64.
+    """
     if find_spec("pypardiso") is None:
         raise ProblemError("solver=pardiso needs pypardiso: pip install 'xcrack[pardiso]'.")
     import pypardiso

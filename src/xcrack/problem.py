@@ -29,6 +29,9 @@ from xcrack.surface_place import check_surfaces, place_surface
 _LOADS = (Traction, Pressure, PointForce, BodyForce, CrackPressure, InitialStress, Displacement)
 
 
+_ORDER = {2: 2, 3: 1}  # of the standard functions, by dimension (measured)
+
+
 @dataclass(frozen=True, eq=False)
 class Problem:
     """A body with cracks, supports and loads.
@@ -60,7 +63,7 @@ class Problem:
     supports: Sequence[Support] = ()
     loads: Sequence[Load] = ()
     contact: str = "auto"
-    order: int | None = None
+    order: int | None = field(default=None, metadata={"resolved": lambda own: _ORDER[own.mesh.dim]})
     numerics: Numerics = field(default_factory=Numerics)
 
     def __post_init__(self) -> None:
@@ -88,7 +91,7 @@ class Problem:
                 "differ by up to 1/(1 - nu²) in stiffness, so there is no default."
             )
         if self.order is None:
-            object.__setattr__(self, "order", 2 if self.mesh.dim == 2 else 1)
+            object.__setattr__(self, "order", _ORDER[self.mesh.dim])
         if self.order not in (1, 2):
             raise ProblemError(f"order = {self.order!r}: give 1 or 2.")
         if self.contact not in ("auto", "on", "off"):

@@ -1,4 +1,7 @@
-"""The folder of a growth run: one file a step, and one that says what the run is."""
+"""The folder of a growth run: one file a step, and one that says what the run is.
+
+Each step also carries what the run is, so that a lost header is made again from the steps.
+"""
 
 import json
 import platform
@@ -10,25 +13,33 @@ from typing import Any
 
 import numpy as np
 
+from xcrack.crack import Crack
 from xcrack.elimination import Elimination
 from xcrack.errors import ProblemError
-from xcrack.settings import differences
+from xcrack.settings import DEFAULTS, differences
+from xcrack.sif import SIF
 from xcrack.step import Memory, Step
 from xcrack.store import load, save, write_whole
 from xcrack.warm import Warm
 
 _HEADER = "run.json"
-_FORMAT = 1
+_FORMAT = 2
 _SHOWN = 5
+CLASSES: dict[str, type] = {
+    "Step": Step, "Memory": Memory, "Warm": Warm, "Elimination": Elimination, "Crack": Crack,
+    "SIF": SIF,
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
 class Header:
-    """What the first file of a run says.
+    """What a run is: the same in its first file and in each step.
 
     Attributes
     ----------
-    settings, versions : mapping of str to str
+    settings : mapping of str to str
+        What the run was asked to do, and the number of its set of defaults.
+    versions : mapping of str to str
     ended : str
         Why the run ended; empty while it goes on.
     """
@@ -36,6 +47,11 @@ class Header:
     settings: Mapping[str, str]
     versions: Mapping[str, str]
     ended: str = ""
+
+    @property
+    def defaults(self) -> int:
+        """Number of the set of defaults that the run began with."""
+        return int(self.settings["defaults"])
 
 
 def versions() -> dict[str, str]:
@@ -51,36 +67,67 @@ def versions() -> dict[str, str]:
 
 def write_header(folder: Path, header: Header) -> None:
     """Write, or write anew, what the run is."""
-    content = {
+    content = {"ended": header.ended, **_content(header)}
+    write_whole(folder / _HEADER, (json.dumps(content, indent=1) + "\n").encode())
+
+
+def _content(header: Header) -> dict[str, Any]:
+    """What each file of a run says of it."""
+    return {
         "format": _FORMAT,
-        "ended": header.ended,
         "versions": dict(header.versions),
         "settings": dict(header.settings),
     }
-    write_whole(folder / _HEADER, (json.dumps(content, indent=1) + "\n").encode())
+
+
+def _header(content: Any, path: Path) -> Header:
+    """What a file says of its run.
+
+    Raises
+    ------
+    ProblemError
+        It was written by an xcrack that this one cannot follow.
+    """
+    written = content["format"]
+    if written < _FORMAT:
+        raise ProblemError(
+            f"{path} has format {written}, from before the first release, and this xcrack reads "
+            f"{_FORMAT}: start the run again in another folder."
+        )
+    header = Header(content["settings"], content["versions"], content.get("ended", ""))
+    if written > _FORMAT or header.defaults > DEFAULTS:
+        raise ProblemError(
+            f"{path} was written by a newer xcrack (format {written}, this one reads {_FORMAT}): "
+            "update xcrack, or read the run with the version that wrote it."
+        )
+    return header
 
 
 def read_header(folder: Path) -> Header | None:
     """What the run is; None where nothing was written yet.
 
+    Where the file is lost, it is taken from the first step that is whole.
+
     Raises
     ------
     ProblemError
-        The file is not one of xcrack's.
+        The file is not one of xcrack's, or of another format.
     """
     path = folder / _HEADER
     if not path.exists():
-        return None
+        return _header_of_steps(folder)
     try:
-        content: dict[str, Any] = json.loads(path.read_text())
-        if content["format"] != _FORMAT:
-            raise ProblemError(
-                f"{path} has format {content['format']}, this xcrack reads {_FORMAT}: read it with "
-                "the version that wrote it."
-            )
-        return Header(content["settings"], content["versions"], content["ended"])
+        return _header(json.loads(path.read_text()), path)
     except (ValueError, KeyError, TypeError) as error:
         raise ProblemError(f"{path} is not the header of a run ({error}): move it away.") from error
+
+
+def _header_of_steps(folder: Path) -> Header | None:
+    for path in sorted(folder.glob("step_*.npz")):
+        stored = load(path, CLASSES)
+        if stored is not None:
+            return _header(stored["run"], path)
+    return None
 
 
 def step_path(folder: Path, index: int) -> Path:
@@ -88,7 +135,7 @@ def step_path(folder: Path, index: int) -> Path:
     return folder / f"step_{index:05d}.npz"
 
 
-def write_step(folder: Path, step: Step) -> None:
+def write_step(folder: Path, step: Step, header: Header) -> None:
     """Write a step without its solutions; afterwards it is on disk as a whole.
 
     An order of elimination is written by the step that found it; those that follow only say so.
@@ -97,7 +144,8 @@ def write_step(folder: Path, step: Step) -> None:
     order = _order_of(memory)
     if memory is not None and order is not None and order.age:
         memory = _with_order(memory, replace(order, place=np.zeros(0, dtype=np.int32)))
-    save(step_path(folder, step.index), replace(step, solutions=(), memory=memory))
+    stored = {"run": _content(header), "step": replace(step, solutions=(), memory=memory)}
+    save(step_path(folder, step.index), stored, CLASSES)
 
 
 def read_steps(folder: Path, settings: Mapping[str, str]) -> tuple[list[Step], Path | None]:
@@ -107,7 +155,8 @@ def read_steps(folder: Path, settings: Mapping[str, str]) -> tuple[list[Step], P
         path = step_path(folder, len(steps))
         if not path.exists():
             return steps, None
-        step = load(path)
+        stored = load(path, CLASSES)
+        step = stored["step"] if isinstance(stored, dict) else None
         if not isinstance(step, Step) or step.index != len(steps):
             return steps, path
         if isinstance(step.memory, Memory):
@@ -172,6 +221,7 @@ def shortened(lines: list[str]) -> str:
 
 
 __all__ = [
+    "CLASSES",
     "Header",
     "begin",
     "read_header",

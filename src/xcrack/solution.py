@@ -182,6 +182,15 @@ class Solution:
             jump[number] += np.einsum("qn,qni->qi", N, self.coefficients[functions])
         return jump
 
+    def inside(self, x: ArrayLike) -> Bools:
+        """Whether points lie in the mesh of the body `(n,)`, for which a curved side is a polygon.
+
+        Parameters
+        ----------
+        x : (n, d) array, length
+        """
+        return locate(self.space.mesh, np.atleast_2d(np.asarray(x, dtype=float)))[0] >= 0
+
     def _where(self, x: ArrayLike, side: int) -> tuple[Ints, Floats, Ints, bool]:
         points = np.asarray(x, dtype=float)
         single = points.ndim == 1
@@ -191,7 +200,8 @@ class Solution:
             outside = points[np.argmax(cell < 0)]
             raise GeometryError(
                 f"{np.round(outside, 9).tolist()} lies outside the body ({int((cell < 0).sum())} "
-                "such points): ask only for points of the mesh; a curved boundary is a polygon."
+                "such points), where a curved boundary is a polygon: choose points by "
+                "solution.inside(x)."
             )
         return cell, bary, sides_of(self.space, cell, bary, side), single
 

@@ -1,12 +1,11 @@
 """Values to files and back to the last bit; a file is there as a whole or not at all."""
 
-import importlib
 import io
 import json
 import os
 import zipfile
 from collections.abc import Mapping
-from dataclasses import fields, is_dataclass
+from dataclasses import MISSING, fields
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +14,7 @@ from numpy.typing import NDArray
 
 from xcrack.errors import ProblemError
 
-_PACKAGE = "xcrack."
+Classes = Mapping[str, type]  # dataclasses that a file may hold, by the name they have in it
 
 
 def write_whole(path: Path, data: bytes) -> None:
@@ -34,8 +33,16 @@ def write_whole(path: Path, data: bytes) -> None:
             os.close(folder)
 
 
-def save(path: Path, value: Any) -> None:
-    """Write a value: numbers, strings, arrays, tuples, lists, dicts and dataclasses of xcrack.
+def save(path: Path, value: Any, classes: Classes) -> None:
+    """Write a value: numbers, strings, arrays, tuples, lists, dicts and known dataclasses.
+
+    Parameters
+    ----------
+    path : Path
+    value : anything of these
+    classes : mapping of str to dataclass
+        A file names a class by its key here, so that it outlives a move of the class to another
+        module, and never chooses what is imported.
 
     Raises
     ------
@@ -43,25 +50,32 @@ def save(path: Path, value: Any) -> None:
         Something in it is none of these.
     """
     arrays: list[NDArray[Any]] = []
-    tree = _encoded(value, arrays)
+    names = {kind: name for name, kind in classes.items()}
+    tree = _encoded(value, arrays, names)
     buffer = io.BytesIO()
     members = {f"array_{i}": array for i, array in enumerate(arrays)}
     np.savez(buffer, allow_pickle=False, tree=np.array(json.dumps(tree)), **members)
     write_whole(path, buffer.getvalue())
 
 
-def load(path: Path) -> Any:
-    """Read a value that `save` wrote; None where the file is not whole."""
+def load(path: Path, classes: Classes) -> Any:
+    """Read a value that `save` wrote; None where the file is not whole.
+
+    Raises
+    ------
+    ProblemError
+        It holds a class that is not among those given, or one with other fields.
+    """
     try:
         with np.load(path, allow_pickle=False) as members:
             tree = json.loads(str(members["tree"]))
             arrays = {name: members[name] for name in members.files if name != "tree"}
-        return _decoded(tree, arrays)
+        return _decoded(tree, arrays, classes, path)
     except (OSError, EOFError, KeyError, ValueError, zipfile.BadZipFile):
         return None
 
 
-def _encoded(value: Any, arrays: list[NDArray[Any]]) -> Any:
+def _encoded(value: Any, arrays: list[NDArray[Any]], names: Mapping[type, str]) -> Any:
     if value is None or isinstance(value, bool | int | float | str):
         return value
     if isinstance(value, np.generic | np.ndarray):
@@ -70,26 +84,32 @@ def _encoded(value: Any, arrays: list[NDArray[Any]]) -> Any:
             raise ProblemError(f"an array of {array.dtype} cannot be stored; use numbers.")
         arrays.append(array)
         return {"array": len(arrays) - 1, "scalar": isinstance(value, np.generic)}
+
+    def encoded(item: Any) -> Any:
+        return _encoded(item, arrays, names)
+
     if isinstance(value, tuple | list):
         name = "tuple" if isinstance(value, tuple) else "list"
-        return {name: [_encoded(item, arrays) for item in value]}
+        return {name: [encoded(item) for item in value]}
     if isinstance(value, Mapping):
-        return {"dict": [[_encoded(k, arrays), _encoded(v, arrays)] for k, v in value.items()]}
+        return {"dict": [[encoded(k), encoded(v)] for k, v in value.items()]}
     kind = type(value)
-    if is_dataclass(value) and kind.__module__.startswith(_PACKAGE):
-        content = {
-            f.name: _encoded(getattr(value, f.name), arrays) for f in fields(value) if f.init
-        }
-        return {"class": f"{kind.__module__}:{kind.__qualname__}", "fields": content}
+    if kind in names:
+        content = {f.name: encoded(getattr(value, f.name)) for f in fields(value) if f.init}
+        return {"class": names[kind], "fields": content}
     raise ProblemError(
         f"a {kind.__module__}.{kind.__qualname__} cannot be stored; only numbers, strings, arrays, "
-        "tuples, lists, dicts and the dataclasses of xcrack can."
+        f"tuples, lists, dicts and the dataclasses {', '.join(names.values()) or '(none)'} can."
     )
 
 
-def _decoded(tree: Any, arrays: Mapping[str, NDArray[Any]]) -> Any:
+def _decoded(tree: Any, arrays: Mapping[str, NDArray[Any]], classes: Classes, path: Path) -> Any:
     if not isinstance(tree, dict):
         return tree
+
+    def decoded(item: Any) -> Any:
+        return _decoded(item, arrays, classes, path)
+
     if "array" in tree:
         array = arrays[f"array_{tree['array']}"]
         if tree["scalar"]:
@@ -97,19 +117,28 @@ def _decoded(tree: Any, arrays: Mapping[str, NDArray[Any]]) -> Any:
         array.flags.writeable = False
         return array
     if "tuple" in tree:
-        return tuple(_decoded(item, arrays) for item in tree["tuple"])
+        return tuple(decoded(item) for item in tree["tuple"])
     if "list" in tree:
-        return [_decoded(item, arrays) for item in tree["list"]]
+        return [decoded(item) for item in tree["list"]]
     if "dict" in tree:
-        return {_decoded(k, arrays): _decoded(v, arrays) for k, v in tree["dict"]}
-    module, name = tree["class"].split(":")
-    if not module.startswith(_PACKAGE):  # a file must not choose what is imported
-        raise ValueError(module)
-    found = getattr(importlib.import_module(module), name)
-    if not is_dataclass(found):
-        raise ValueError(name)
-    make: Any = found
-    return make(**{key: _decoded(item, arrays) for key, item in tree["fields"].items()})
+        return {decoded(k): decoded(v) for k, v in tree["dict"]}
+    name = tree["class"]
+    if name not in classes:
+        raise ProblemError(
+            f"{path} holds a {name!r}, which this xcrack does not know: read it with the version "
+            "that wrote it."
+        )
+    values = {key: decoded(item) for key, item in tree["fields"].items()}
+    make: Any = classes[name]
+    known = {f.name: f for f in fields(make) if f.init}
+    needed = {n for n, f in known.items() if f.default is f.default_factory is MISSING}
+    odd = sorted((set(values) - set(known)) | (needed - set(values)))
+    if odd:
+        raise ProblemError(
+            f"{path} holds a {name} that differs in {', '.join(odd)} from the one of this xcrack: "
+            "read it with the version that wrote it."
+        )
+    return make(**values)
 
 
-__all__ = ["load", "save", "write_whole"]
+__all__ = ["Classes", "load", "save", "write_whole"]
