@@ -25,10 +25,10 @@ for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 import numpy as np  # noqa: E402
 
 import xcrack as xc  # noqa: E402
+from xcrack.analysis.solve import solve_states  # noqa: E402
 from xcrack.bench.fields import NU, edge_fields, penny, penny_K_I  # noqa: E402
 from xcrack.bench.runs import machine  # noqa: E402
 from xcrack.bench.scenes import STEEL, Settings, mesh_of  # noqa: E402
-from xcrack.solving import solve_states  # noqa: E402
 
 ROOT = Path(__file__).resolve().parent.parent
 RESULTS = ROOT / "benchmarks" / "results" / "economy.json"

@@ -16,16 +16,18 @@ from contextlib import contextmanager
 import numpy as np
 
 import xcrack as xc
-from xcrack import contact, linear, multipliers
-from xcrack.assembly import bulk, enriched_stiffness, total_stiffness
-from xcrack.cut import cut
-from xcrack.equilibrium import free_motion
-from xcrack.level_set import level_set
-from xcrack.lip_points import lip_points
-from xcrack.loads import load_vector
-from xcrack.space import space
-from xcrack.supports import known_unknowns
-from xcrack.touching import dual
+from xcrack.contact import active_set as contact
+from xcrack.contact import multipliers
+from xcrack.contact.solve import dual
+from xcrack.cutting.cut import cut
+from xcrack.cutting.level_set import level_set
+from xcrack.solvers import direct as linear
+from xcrack.solvers.rigid_motion import free_motion
+from xcrack.xfem.assembly import bulk, enriched_stiffness, total_stiffness
+from xcrack.xfem.function_space import space
+from xcrack.xfem.lips import lip_points
+from xcrack.xfem.loads import load_vector
+from xcrack.xfem.supports import known_unknowns
 
 PARTS = ("mesh", "level sets", "cut and space", "bulk", "enriched cells", "loads", "factor",
          "solve", "contact", "K")  # fmt: skip

@@ -21,17 +21,17 @@ for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 import numpy as np  # noqa: E402
 
 import xcrack as xc  # noqa: E402
-from xcrack.assembly import bulk, enriched_stiffness, total_stiffness  # noqa: E402
-from xcrack.cut import cut  # noqa: E402
-from xcrack.equilibrium import balanced, free_motion  # noqa: E402
-from xcrack.iterative import iterative_system  # noqa: E402
-from xcrack.lip_points import lip_points  # noqa: E402
-from xcrack.loads import load_vector  # noqa: E402
-from xcrack.model import Model, levels  # noqa: E402
-from xcrack.multipliers import gap_rows, multipliers  # noqa: E402
-from xcrack.solving import solve_states  # noqa: E402
-from xcrack.space import space  # noqa: E402
-from xcrack.supports import known_unknowns  # noqa: E402
+from xcrack.analysis.solve import solve_states  # noqa: E402
+from xcrack.contact.multipliers import gap_rows, multipliers  # noqa: E402
+from xcrack.cutting.cut import cut  # noqa: E402
+from xcrack.solvers.iterative import iterative_system  # noqa: E402
+from xcrack.solvers.rigid_motion import balanced, free_motion  # noqa: E402
+from xcrack.xfem.assembly import bulk, enriched_stiffness, total_stiffness  # noqa: E402
+from xcrack.xfem.function_space import space  # noqa: E402
+from xcrack.xfem.lips import lip_points  # noqa: E402
+from xcrack.xfem.loads import load_vector  # noqa: E402
+from xcrack.xfem.model import Model, levels  # noqa: E402
+from xcrack.xfem.supports import known_unknowns  # noqa: E402
 
 SIZES = (18, 29, 44, 67)
 STATES = {

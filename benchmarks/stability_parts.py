@@ -29,7 +29,7 @@ from scenes_stability import (
     beside_an_edge,
     cut_condition,
 )
-from xcrack.criteria import kink_angle, max_hoop_stress, mean_reference, weighted_angle
+from xcrack.growth.criteria import kink_angle, max_hoop_stress, mean_reference, weighted_angle
 
 EPS = (0.5, 0.1, 1e-2, 1e-3, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12, 1e-14, 0.0, -1e-12, -1e-6, -1e-2)
 ROUND = 5  # digits that are kept

@@ -49,7 +49,7 @@ def assembly() -> None:
 
     import xcrack as xc
     from xcrack.kernels.bulk import block_pattern, block_stiffness
-    from xcrack.simplex import cell_nodes, shape_derivatives, simplex_rule
+    from xcrack.mesh.simplex import cell_nodes, shape_derivatives, simplex_rule
 
     for dim, n in ((2, 400), (3, 36)):
         mesh = xc.box((0,) * dim, (1,) * dim, n)

@@ -4,7 +4,7 @@ import numpy as np
 from scipy.special import elliprd
 
 import exact
-from xcrack.front_curve import front_curve
+from xcrack.crack.front_curve import front_curve
 
 GAUSS = np.polynomial.legendre.leggauss
 

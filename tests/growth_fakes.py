@@ -4,13 +4,13 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from xcrack import growth
-from xcrack.crack import front, line_crack
-from xcrack.interaction import SIF
-from xcrack.material import Isotropic
-from xcrack.problem import Problem
-from xcrack.stepping import length_inside
-from xcrack.structured import box
+from xcrack.crack.crack import front, line_crack
+from xcrack.growth import run as growth
+from xcrack.growth.advance import length_inside
+from xcrack.mesh.box import box
+from xcrack.scene.material import Isotropic
+from xcrack.scene.problem import Problem
+from xcrack.sif.interaction_2d import SIF
 
 STRESS = 100.0
 

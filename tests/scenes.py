@@ -121,7 +121,7 @@ TIPS = (
 
 def n_free(problem):
     """Unknowns that are solved for: those that supports decide are left out."""
-    from xcrack.solving import build
+    from xcrack.analysis.solve import build
 
     model = build(problem)
     return int((~model.known.fixed).sum())
@@ -161,8 +161,8 @@ def condition(problem):
     import scipy.sparse as sp
     import scipy.sparse.linalg as sla
 
-    from xcrack.linear import scaled_basis
-    from xcrack.solving import build
+    from xcrack.analysis.solve import build
+    from xcrack.solvers.direct import scaled_basis
 
     model = build(problem)
     basis = scaled_basis(

@@ -99,7 +99,7 @@ def flat_penny(n, z, a, stress, *, seed=None, contact="off", **options):
 
 def opening(solution, crack=0):
     """Volume between the lips, and the integral of the squared normal jump."""
-    from xcrack.multipliers import jump_matrix
+    from xcrack.xfem.lips import jump_matrix
 
     lips = solution.lips[crack]
     jump = jump_matrix(solution.space, crack, lips) @ solution.u

@@ -5,7 +5,7 @@ import numpy as np
 import exact
 import scenes
 import xcrack as xc
-from xcrack.solving import build
+from xcrack.analysis.solve import build
 
 STEEL = xc.Isotropic(1.0, 0.3, plane="strain")
 PULL = (xc.traction("top", (0.0, 1.0)), xc.traction("bottom", (0.0, -1.0)))

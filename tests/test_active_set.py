@@ -8,7 +8,7 @@ import scipy.optimize
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from xcrack.contact import active_set
+from xcrack.contact.active_set import active_set
 from xcrack.errors import ConvergenceError
 
 

@@ -7,9 +7,9 @@ import pytest
 
 import scenes
 import xcrack as xc
-from xcrack.chart_result import Chart, Row
-from xcrack.chart_values import Sampled, at_places, most_trusted, remaining
-from xcrack.refinement import refine
+from xcrack.charting.result import Chart, Row
+from xcrack.charting.values import Sampled, at_places, most_trusted, remaining
+from xcrack.mesh.refinement import refine
 
 PULL = [xc.traction("top", (0.0, 1.0)), xc.traction("bottom", (0.0, -1.0))]
 STEEL = xc.Isotropic(1.0, 0.3, plane="strain")

@@ -8,14 +8,14 @@ from hypothesis.extra.numpy import arrays
 from scipy.optimize import minimize_scalar
 
 import exact
-from xcrack.criteria import (
+from xcrack.errors import ProblemError, XcrackWarning
+from xcrack.growth.criteria import (
     equivalent_K,
     kink_angle,
     max_hoop_stress,
     mean_reference,
     weighted_angle,
 )
-from xcrack.errors import ProblemError, XcrackWarning
 
 SEED = 90317
 CRITERIA = [

@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 
 import scenes
 import xcrack as xc
-from xcrack.crack import place
-from xcrack.cut import cut, cut_simplices
-from xcrack.level_set import level_set
+from xcrack.crack.crack import place
+from xcrack.cutting.cut import cut, cut_simplices
+from xcrack.cutting.level_set import level_set
 
 
 @pytest.mark.parametrize("n", [3, 4])

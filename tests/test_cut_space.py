@@ -7,9 +7,9 @@ from hypothesis import strategies as st
 
 import scenes_space as scenes
 import xcrack as xc
-from xcrack.cut_fronts import behind
-from xcrack.solving import build
-from xcrack.split import cut_simplices, interface_simplices
+from xcrack.analysis.solve import build
+from xcrack.cutting.fronts_3d import behind
+from xcrack.mesh.split import cut_simplices, interface_simplices
 
 REGULAR = np.array([[1.0, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]])
 
@@ -165,7 +165,7 @@ def test_front_cells_hold_the_front():
     fine = np.concatenate(
         [a + np.linspace(0, 1, 9)[:-1, None] * (b - a) for a, b in zip(front, front[1:])]
     )
-    from xcrack.locate import locate
+    from xcrack.mesh.locate import locate
 
     passed = np.unique(locate(mesh, fine)[0])
     # The level sets are interpolated: a circle seen through them lies a little off, h²/8a.

@@ -2,10 +2,10 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from xcrack.cylinder import notched_cylinder
 from xcrack.errors import GeometryError, MeshError
-from xcrack.gmsh_session import import_gmsh, session
-from xcrack.mesh import Mesh
+from xcrack.mesh.cylinder import notched_cylinder
+from xcrack.mesh.gmsh_session import import_gmsh, session
+from xcrack.mesh.mesh import Mesh
 
 ROUND_OFF = 1e-12
 RADIUS, DEPTH, ANGLE = 10.0, 2.0, np.pi / 3

@@ -9,7 +9,7 @@ import scipy.sparse.linalg as sla
 
 import scenes
 import xcrack as xc
-from xcrack.solving import build, solve_states
+from xcrack.analysis.solve import build, solve_states
 
 STEEL = xc.Isotropic(1.3, 0.27, plane="strain")
 PULL = (xc.traction("top", (0.0, 1.0)), xc.traction("bottom", (0.0, -1.0)))
@@ -27,7 +27,7 @@ def problem(*cracks, mesh=None, loads=PULL, **options):
 
 def naive_stiffness(mesh, order, lam, mu):
     """Plain finite elements by loops: the same sums in the same order as the kernel's."""
-    from xcrack.simplex import cell_nodes, shape_derivatives, simplex_rule
+    from xcrack.mesh.simplex import cell_nodes, shape_derivatives, simplex_rule
 
     nodes = cell_nodes(mesh, order)
     bary, weight = simplex_rule(2, 2 * (order - 1))
@@ -267,8 +267,8 @@ def test_cheaper_choices_cost_less():
 
 def test_plan_names_every_ingredient_before_anything_is_built(monkeypatch):
     """One line an ingredient, without cutting or assembling; the report has the same and more."""
-    import xcrack.model
-    import xcrack.solving
+    import xcrack.analysis.solve
+    import xcrack.xfem.model
 
     def forbidden(*args, **options):
         raise AssertionError("plan built something")
@@ -276,8 +276,8 @@ def test_plan_names_every_ingredient_before_anything_is_built(monkeypatch):
     scene = problem(EDGE, INNER)
     with monkeypatch.context() as patch:
         for name in ("cut", "space", "bulk"):
-            patch.setattr(xcrack.model, name, forbidden)
-        patch.setattr(xcrack.solving, "system", forbidden)
+            patch.setattr(xcrack.xfem.model, name, forbidden)
+        patch.setattr(xcrack.analysis.solve, "system", forbidden)
         planned = xc.plan(scene)
     lines = str(planned).splitlines()
     assert len(lines) == len(planned.ingredients)

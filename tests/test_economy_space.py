@@ -11,7 +11,7 @@ import pytest
 
 import scenes_space
 import xcrack as xc
-from xcrack.solving import build, solve_states
+from xcrack.analysis.solve import build, solve_states
 
 STEEL = xc.Isotropic(1.3, 0.27)
 PULL = (xc.traction("top", (0, 0, 1.0)), xc.traction("bottom", (0, 0, -1.0)))
@@ -205,8 +205,8 @@ def test_unknowns_in_the_report_add_up():
 
 
 def test_plan_names_every_ingredient_before_anything_is_built(monkeypatch):
-    import xcrack.model
-    import xcrack.solving
+    import xcrack.analysis.solve
+    import xcrack.xfem.model
 
     def forbidden(*args, **options):
         raise AssertionError("plan built something")
@@ -214,9 +214,9 @@ def test_plan_names_every_ingredient_before_anything_is_built(monkeypatch):
     scene = problem(PENNY)
     with monkeypatch.context() as patch:
         for name in ("cut", "space", "bulk"):
-            patch.setattr(xcrack.model, name, forbidden)
+            patch.setattr(xcrack.xfem.model, name, forbidden)
         for name in ("system", "iterative_system"):
-            patch.setattr(xcrack.solving, name, forbidden)
+            patch.setattr(xcrack.analysis.solve, name, forbidden)
         planned = xc.plan(scene)
     assert planned["third mode"].used
     report = xc.solve(scene).report

@@ -8,12 +8,12 @@ import scipy.sparse as sp
 
 import scenes
 import xcrack as xc
-from xcrack.elimination import Elimination, eliminated
-from xcrack.linear import scaled_basis, system
-from xcrack.model import build
-from xcrack.run_files import CLASSES, read_steps, step_path
-from xcrack.solving import solve_states
-from xcrack.store import load, save
+from xcrack.analysis.solve import solve_states
+from xcrack.history.run_folder import CLASSES, read_steps, step_path
+from xcrack.history.store import load, save
+from xcrack.solvers.direct import scaled_basis, system
+from xcrack.solvers.factor import Elimination, eliminated
+from xcrack.xfem.model import build
 
 TENSION = [xc.traction("top", (0.0, 1.0)), xc.traction("bottom", (0.0, -1.0))]
 EDGE = [(-1.2, 0.013), (-0.2, 0.013)]

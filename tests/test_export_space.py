@@ -5,12 +5,12 @@ import numpy as np
 import pytest
 
 import xcrack as xc
-from xcrack.crack_surface import lip_faces
-from xcrack.history import History
-from xcrack.history_export import polylines
-from xcrack.piece_cells import piece_cells
-from xcrack.pieces import pieces
-from xcrack.step import Step
+from xcrack.growth.step import Step
+from xcrack.history.history import History
+from xcrack.history.series import polylines
+from xcrack.post.lip_faces_3d import lip_faces
+from xcrack.post.piece_cells import piece_cells
+from xcrack.post.pieces import pieces
 
 N = 6
 

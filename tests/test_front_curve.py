@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from front_fields import ellipse_front, flat_front
+from xcrack.crack.front_curve import front_curve
 from xcrack.errors import GeometryError
-from xcrack.front_curve import front_curve
 
 TURN = 2 * np.pi
 

@@ -15,10 +15,10 @@ from front_fields import (
     ruled_lips,
     tube,
 )
-from xcrack.front_curve import FrontCurve, front_curve
-from xcrack.front_domain import front_intensity
-from xcrack.front_fit import along, smoothed
-from xcrack.front_integral import (
+from xcrack.crack.front_curve import FrontCurve, front_curve
+from xcrack.scene.material import Isotropic
+from xcrack.sif.domain_3d import front_intensity
+from xcrack.sif.interaction_3d import (
     front_nodes,
     full_measure,
     hats,
@@ -27,7 +27,7 @@ from xcrack.front_integral import (
     lip_integrals,
     solve_front,
 )
-from xcrack.material import Isotropic
+from xcrack.sif.smoothing_3d import along, smoothed
 
 STEEL = Isotropic(E=1000.0, nu=0.3)
 STRESS = np.array([[0.3, 0.1, 0.7], [0.1, -0.2, -0.4], [0.7, -0.4, 1.1]])

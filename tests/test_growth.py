@@ -6,13 +6,13 @@ from scipy.integrate import quad
 
 import exact
 from growth_fakes import STRESS, mode_I, patch_respond, plate
-from xcrack import growth
-from xcrack.crack import front, line_crack
-from xcrack.criteria import max_hoop_stress, weighted_angle
+from xcrack.crack.crack import front, line_crack
 from xcrack.errors import ProblemError, XcrackWarning
-from xcrack.growth import Cycle, grow
-from xcrack.laws import elber, paris
-from xcrack.stepping import length_inside
+from xcrack.growth import run as growth
+from xcrack.growth.advance import length_inside
+from xcrack.growth.criteria import max_hoop_stress, weighted_angle
+from xcrack.growth.laws import elber, paris
+from xcrack.growth.run import Cycle, grow
 
 LAW = paris(C=1e-11, m=3.0)
 CYCLE = Cycle(0.0, 1.0)

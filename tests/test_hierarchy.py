@@ -6,13 +6,13 @@ import scipy.sparse as sp
 import scipy.sparse.linalg as sla
 
 import xcrack as xc
-import xcrack.hierarchy as multigrid
-from xcrack.assembly import bulk, rigid_modes
-from xcrack.bordered import Bordered, row_blocks
-from xcrack.hierarchy import extended, hierarchy, largest_eigenvalue
+import xcrack.solvers.multigrid as multigrid
 from xcrack.kernels.cycle import first_step, next_step
-from xcrack.projected import Operator, conjugate_gradients
-from xcrack.simplex import node_points
+from xcrack.mesh.simplex import node_points
+from xcrack.solvers.multigrid import extended, hierarchy, largest_eigenvalue
+from xcrack.solvers.projected_cg import Operator, conjugate_gradients
+from xcrack.solvers.row_blocks import Bordered, row_blocks
+from xcrack.xfem.assembly import bulk, rigid_modes
 
 
 def drawn(shape, share, seed):

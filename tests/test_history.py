@@ -16,14 +16,17 @@ import numpy as np
 import pytest
 
 from growth_fakes import mode_I, patch_respond, plate
-from xcrack import conditions, run_files, settings, store
-from xcrack.crack import line_crack
-from xcrack.criteria import max_hoop_stress, weighted_angle
+from xcrack.crack.crack import line_crack
 from xcrack.errors import ProblemError, XcrackWarning
-from xcrack.growth import Cycle, Run, grow
-from xcrack.history import History, collect, load, resume
-from xcrack.laws import paris
-from xcrack.settings import describe, differences
+from xcrack.growth import fingerprint as settings
+from xcrack.growth.criteria import max_hoop_stress, weighted_angle
+from xcrack.growth.fingerprint import describe, differences
+from xcrack.growth.laws import paris
+from xcrack.growth.run import Cycle, Run, grow
+from xcrack.history import run_folder as run_files
+from xcrack.history import store
+from xcrack.history.history import History, collect, load, resume
+from xcrack.scene import conditions
 
 LAW = paris(C=1e-11, m=3.0)
 CYCLE = Cycle(0.0, 1.0)
@@ -485,7 +488,7 @@ def test_write_with_solutions_and_without(whole, tmp_path, monkeypatch):
             file.write_text("<VTKFile/>")
         return files
 
-    monkeypatch.setitem(sys.modules, "xcrack.export", SimpleNamespace(write=write))
+    monkeypatch.setitem(sys.modules, "xcrack.post.vtk", SimpleNamespace(write=write))
     mixed = replace(whole, steps=(load(whole.path).steps[0], *whole.steps[1:2]))
     mixed.write(tmp_path / "out")
     with open(tmp_path / "out" / "history.csv", newline="") as file:

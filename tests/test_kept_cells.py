@@ -8,8 +8,8 @@ import pytest
 import scenes
 import scenes_space
 import xcrack as xc
-from xcrack.kept_cells import kept_cells, with_one_jump
-from xcrack.model import build
+from xcrack.xfem.kept_cells import kept_cells, with_one_jump
+from xcrack.xfem.model import build
 
 STEEL = xc.Isotropic(1.0, 0.3, "strain")
 ROOT = [(-1.2, 0.013), (-0.5, 0.03)]

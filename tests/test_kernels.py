@@ -6,11 +6,11 @@ import scipy.sparse as sp
 
 import scenes
 import xcrack as xc
-from xcrack.assembly import bulk
 from xcrack.kernels.blocks import dense_blocks
 from xcrack.kernels.bulk import block_pattern
 from xcrack.kernels.enriched import add_stiffness, enriched_pattern
-from xcrack.simplex import cell_nodes, shape_derivatives, simplex_rule
+from xcrack.mesh.simplex import cell_nodes, shape_derivatives, simplex_rule
+from xcrack.xfem.assembly import bulk
 
 
 def elastic_block(G, weight, lam, mu):

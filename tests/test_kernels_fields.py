@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 import xcrack as xc
-from xcrack.domain import weight
 from xcrack.kernels.fields import set_gradients
 from xcrack.kernels.ring import add_ring
 from xcrack.kernels.shapes import set_jumps, set_standard
-from xcrack.mesh import local_edges
-from xcrack.simplex import n_shapes, shape_derivatives
-from xcrack.williams import mode_matrix, unit_gradients
+from xcrack.mesh.mesh import local_edges
+from xcrack.mesh.simplex import n_shapes, shape_derivatives
+from xcrack.sif.domain_2d import weight
+from xcrack.xfem.williams import mode_matrix, unit_gradients
 
 STEEL = xc.Isotropic(E=3.0, nu=0.27, plane="strain")
 

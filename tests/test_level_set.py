@@ -7,11 +7,11 @@ import pytest
 
 import scenes
 import xcrack as xc
-from xcrack.crack import advance, front, place
-from xcrack.cut import cut
+from xcrack.crack.crack import advance, front, place
+from xcrack.cutting.cut import cut
+from xcrack.cutting.level_set import level_set
 from xcrack.kernels.distance import polyline_distance
-from xcrack.level_set import level_set
-from xcrack.locate import closest_on_segment
+from xcrack.mesh.locate import closest_on_segment
 
 EXAMPLE_MESHES = Path(__file__).parents[1] / "examples" / "meshes"
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from xcrack.errors import MeshError, XcrackError, XcrackWarning
-from xcrack.mesh import Mesh
-from xcrack.mesh_io import read_mesh, write_mesh
-from xcrack.structured import box
+from xcrack.mesh.box import box
+from xcrack.mesh.files import read_mesh, write_mesh
+from xcrack.mesh.mesh import Mesh
 
 # Files that gmsh, meshio and pyvista wrote: data/make.py.
 DATA = Path(__file__).parent / "data"
@@ -251,7 +251,7 @@ def test_sets_off_the_body_are_left_out_with_a_warning(tmp_path):
 @pytest.mark.parametrize("version", ["4.1", "2.2"])
 @pytest.mark.parametrize("d", [2, 3])
 def test_gmsh_reads_what_we_write(d, version, tmp_path):
-    from xcrack.gmsh_session import session
+    from xcrack.mesh.gmsh_session import session
 
     mesh = scene(d)
     write_mesh(tmp_path / "ours.msh", mesh, msh_version=version)

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from xcrack.errors import GeometryError, MeshError, XcrackError
-from xcrack.gmsh_session import SYSTEM_LIBRARIES, import_gmsh, session
-from xcrack.grading import graded_size, polylines
-from xcrack.mesh import Mesh
-from xcrack.mesh_io import read_mesh
-from xcrack.meshes import plate, plate_with_hole
+from xcrack.mesh.files import read_mesh
+from xcrack.mesh.gmsh_session import SYSTEM_LIBRARIES, import_gmsh, session
+from xcrack.mesh.grading import graded_size, polylines
+from xcrack.mesh.mesh import Mesh
+from xcrack.mesh.plates import plate, plate_with_hole
 
 EXAMPLES = Path(__file__).parents[1] / "examples" / "meshes"
 SIDES = ["left", "right", "bottom", "top"]

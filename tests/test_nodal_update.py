@@ -8,11 +8,11 @@ import pytest
 import scenes
 import scenes_space
 import xcrack as xc
-from xcrack.crack import advance, front, place
-from xcrack.cut import cut
-from xcrack.level_set import level_set
-from xcrack.locate import closest_on_segment
-from xcrack.nodal_update import Nodal, nodal_level_set, nodal_update
+from xcrack.crack.crack import advance, front, place
+from xcrack.cutting.cut import cut
+from xcrack.cutting.level_set import level_set
+from xcrack.cutting.level_set_nodal import Nodal, nodal_level_set, nodal_update
+from xcrack.mesh.locate import closest_on_segment
 
 STEP = np.radians(5.0)
 STEEL = xc.Isotropic(1.3, 0.27, plane="strain")

@@ -17,11 +17,11 @@ import exact
 import scenes
 import scenes_space
 import xcrack as xc
-from xcrack.equilibrium import free_motion
-from xcrack.linear import system
-from xcrack.lips_nitsche import averaging, lip_shares, stress_matrix
-from xcrack.lips_opponents import closed_matrix, lip_space
-from xcrack.solving import build, solve_states
+from xcrack.analysis.solve import build, solve_states
+from xcrack.contact.alternatives import closed_matrix, lip_space
+from xcrack.contact.nitsche import averaging, lip_shares, stress_matrix
+from xcrack.solvers.direct import system
+from xcrack.solvers.rigid_motion import free_motion
 
 pytestmark = pytest.mark.filterwarnings("ignore::xcrack.XcrackWarning")
 

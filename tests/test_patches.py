@@ -6,12 +6,12 @@ import scipy.linalg
 import scipy.sparse as sp
 
 import xcrack as xc
-from xcrack.basis import patch_orthogonal, stars
-from xcrack.hierarchy import largest_eigenvalue
-from xcrack.iterative import iterative_system
 from xcrack.kernels.patches import add_solved
-from xcrack.model import build
-from xcrack.patches import _inverse
+from xcrack.solvers.basis import patch_orthogonal, stars
+from xcrack.solvers.iterative import iterative_system
+from xcrack.solvers.multigrid import largest_eigenvalue
+from xcrack.solvers.schwarz import _inverse
+from xcrack.xfem.model import build
 
 
 def test_blocks_are_solved_and_summed():

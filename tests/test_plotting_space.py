@@ -6,14 +6,14 @@ from matplotlib.figure import Figure
 from scipy.spatial import cKDTree
 
 import xcrack as xc
-from xcrack import plot_pyvista
-from xcrack.history import History
-from xcrack.plot_fronts import draw_fronts, draw_K, front_weights, is_closed, step_fronts
-from xcrack.plot_loads import load_arrows
-from xcrack.plot_scene import SPACE_FIELDS
-from xcrack.plot_space import LIP_FIELDS, clip_plane, crack_scene, mesh_scene, space_scene
-from xcrack.projection import best_plane, given_plane, on_plane, section_outline
-from xcrack.step import Step
+from xcrack.growth.step import Step
+from xcrack.history.history import History
+from xcrack.plotting import pyvista_2d as plot_pyvista
+from xcrack.plotting.fronts_3d import draw_fronts, draw_K, front_weights, is_closed, step_fronts
+from xcrack.plotting.loads_3d import load_arrows
+from xcrack.plotting.projection import best_plane, given_plane, on_plane, section_outline
+from xcrack.plotting.scene_2d import SPACE_FIELDS
+from xcrack.plotting.scene_3d import LIP_FIELDS, clip_plane, crack_scene, mesh_scene, space_scene
 
 TIP = 0.083
 

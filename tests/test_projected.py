@@ -10,15 +10,15 @@ from hypothesis import strategies as st
 
 import scenes
 import xcrack as xc
-from xcrack.contact import active_set
-from xcrack.equilibrium import balanced, free_motion, without_motion
+from xcrack.analysis.solve import build
+from xcrack.contact.active_set import active_set
+from xcrack.contact.multipliers import gap_rows, multipliers
 from xcrack.errors import ConvergenceError
-from xcrack.iterative import iterative_system
-from xcrack.linear import system
-from xcrack.loads import load_vector
-from xcrack.multipliers import gap_rows, multipliers
-from xcrack.projected import Operator, conjugate_gradients, projected
-from xcrack.solving import build
+from xcrack.solvers.direct import system
+from xcrack.solvers.iterative import iterative_system
+from xcrack.solvers.projected_cg import Operator, conjugate_gradients, projected
+from xcrack.solvers.rigid_motion import balanced, free_motion, without_motion
+from xcrack.xfem.loads import load_vector
 
 
 def dense(K, null=None):

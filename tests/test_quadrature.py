@@ -7,11 +7,11 @@ import pytest
 
 import scenes
 import xcrack as xc
-from xcrack.consistent import boundary_points
-from xcrack.loads import position
-from xcrack.quadrature import cell_points, segment_points
-from xcrack.simplex import conical, simplex_rule
-from xcrack.solving import build
+from xcrack.analysis.solve import build
+from xcrack.mesh.simplex import conical, simplex_rule
+from xcrack.xfem.consistent import boundary_points
+from xcrack.xfem.loads import position
+from xcrack.xfem.quadrature import cell_points, segment_points
 
 
 def moment(powers):

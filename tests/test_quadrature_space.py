@@ -5,12 +5,12 @@ import pytest
 
 import scenes_space as scenes
 import xcrack as xc
-from xcrack.consistent import boundary_points, corrected
-from xcrack.loads import position
-from xcrack.quadrature import Points, cell_points, sub_cells
-from xcrack.quadrature_front import front_points, radius_at, triangle_points
-from xcrack.simplex import conical
-from xcrack.solving import build
+from xcrack.analysis.solve import build
+from xcrack.mesh.simplex import conical
+from xcrack.xfem.consistent import boundary_points, corrected
+from xcrack.xfem.loads import position
+from xcrack.xfem.quadrature import Points, cell_points, sub_cells
+from xcrack.xfem.quadrature_3d import front_points, radius_at, triangle_points
 
 CRACKS = {
     "oblique": xc.penny_crack((0.013, 0.021, 0.034), (0.1, 0.2, 1.0), 0.5),

@@ -5,9 +5,9 @@ import pytest
 
 import scenes
 import xcrack as xc
-from xcrack.quadrature import cell_points
-from xcrack.simplex import node_points
-from xcrack.solving import build
+from xcrack.analysis.solve import build
+from xcrack.mesh.simplex import node_points
+from xcrack.xfem.quadrature import cell_points
 
 
 def spaces():

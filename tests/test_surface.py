@@ -4,19 +4,19 @@ import numpy as np
 import pytest
 
 import xcrack as xc
-from xcrack.crack import Crack
-from xcrack.errors import GeometryError, XcrackError
-from xcrack.strip import extended, front_frames
-from xcrack.surface import (
+from xcrack.crack.crack import Crack
+from xcrack.crack.fronts_3d import extended, front_frames
+from xcrack.crack.mouths_3d import Body
+from xcrack.crack.placing_3d import check_surfaces, crack_area, place_surface
+from xcrack.crack.surfaces import (
     elliptic_crack,
     penny_crack,
     plane_crack,
     read_surface,
     surface_crack,
 )
-from xcrack.surface_mouth import Body
-from xcrack.surface_place import check_surfaces, crack_area, place_surface
-from xcrack.triangulation import face_areas, face_normals, loops, rim, ruled, side_keys
+from xcrack.errors import GeometryError, XcrackError
+from xcrack.geometry.triangulation import face_areas, face_normals, loops, rim, ruled, side_keys
 
 SQUARE = [(-0.5, -0.5, 0.03), (0.5, -0.5, 0.03), (0.5, 0.5, 0.03), (-0.5, 0.5, 0.03)]
 

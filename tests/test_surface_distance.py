@@ -4,8 +4,11 @@ import numpy as np
 import pytest
 
 import xcrack as xc
-from xcrack.crack import Crack
-from xcrack.distances import (
+from xcrack.crack.crack import Crack
+from xcrack.crack.fronts_3d import extended, front_frames
+from xcrack.crack.placing_3d import place_surface
+from xcrack.crack.surfaces import elliptic_crack, penny_crack, plane_crack, surface_crack
+from xcrack.geometry.distances import (
     closest_in,
     first_crossing,
     front_distance,
@@ -13,11 +16,8 @@ from xcrack.distances import (
     surface_distance,
     triangle_tree,
 )
-from xcrack.locate import closest_on_segment, distance_to_simplices
-from xcrack.strip import extended, front_frames
-from xcrack.surface import elliptic_crack, penny_crack, plane_crack, surface_crack
-from xcrack.surface_place import place_surface
-from xcrack.triangulation import face_normals, rim, split_sides
+from xcrack.geometry.triangulation import face_normals, rim, split_sides
+from xcrack.mesh.locate import closest_on_segment, distance_to_simplices
 
 ROUND_OFF = 1e-14
 

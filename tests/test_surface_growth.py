@@ -4,23 +4,23 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from xcrack.crack import Crack, _crossing
-from xcrack.cycles import cycles_between
-from xcrack.errors import GeometryError, XcrackWarning
-from xcrack.front_points import along_front
-from xcrack.strip import front_frames
-from xcrack.structured import box
-from xcrack.surface import elliptic_crack, penny_crack
-from xcrack.surface_growth import advance_fronts
-from xcrack.surface_place import place_surface
-from xcrack.surface_steps import (
+from xcrack.crack.advance_3d import advance_fronts
+from xcrack.crack.crack import Crack, _crossing
+from xcrack.crack.front_remeshing import along_front
+from xcrack.crack.fronts_3d import front_frames
+from xcrack.crack.placing_3d import place_surface
+from xcrack.crack.size_3d import (
     area_inside,
     carried,
     elapsed_in_space,
     front_length_inside,
     surface_size,
 )
-from xcrack.triangulation import face_areas, face_normals, loops, oriented, side_keys
+from xcrack.crack.surfaces import elliptic_crack, penny_crack
+from xcrack.errors import GeometryError, XcrackWarning
+from xcrack.geometry.triangulation import face_areas, face_normals, loops, oriented, side_keys
+from xcrack.growth.cycles import cycles_between
+from xcrack.mesh.box import box
 
 
 def whole(crack):

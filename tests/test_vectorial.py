@@ -9,10 +9,10 @@ import exact
 import scenes
 import scenes_fronts as fronts
 import xcrack as xc
-from xcrack.linear import scaled_basis
-from xcrack.model import build
-from xcrack.vectorial import local_modes, mode_columns
-from xcrack.williams import tip_values
+from xcrack.solvers.direct import scaled_basis
+from xcrack.solvers.modal_basis import local_modes, mode_columns
+from xcrack.xfem.model import build
+from xcrack.xfem.williams import tip_values
 
 MIXED = (1.0, 0.3, 0.2)
 

@@ -7,7 +7,7 @@ import pytest
 
 import scenes_space
 import xcrack as xc
-from xcrack.solving import solve_states
+from xcrack.analysis.solve import solve_states
 
 pytestmark = pytest.mark.filterwarnings("ignore::xcrack.XcrackWarning")
 PRESS = [xc.traction("top", (0.3, 0, -1.0)), xc.traction("bottom", (-0.3, 0, 1.0)),

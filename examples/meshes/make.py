@@ -8,11 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
-from xcrack.gmsh_session import session
-from xcrack.grading import graded_size
-from xcrack.mesh import Mesh
-from xcrack.mesh_io import write_mesh
-from xcrack.meshes import mesh_model, plate, plate_with_hole
+from xcrack.mesh.files import write_mesh
+from xcrack.mesh.gmsh_session import session
+from xcrack.mesh.grading import graded_size
+from xcrack.mesh.mesh import Mesh
+from xcrack.mesh.plates import mesh_model, plate, plate_with_hole
 
 HERE = Path(__file__).parent
 

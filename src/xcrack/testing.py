@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 
 from xcrack.arrays import Floats
-from xcrack.criteria import Criterion
 from xcrack.errors import ProblemError
-from xcrack.laws import Law
+from xcrack.growth.criteria import Criterion
+from xcrack.growth.laws import Law
 
 _ROUND_OFF = 1e-9  # relative; a few operations on numbers of order one
 
@@ -31,7 +31,7 @@ def check_law(law: Law, dK_max: float = 100.0) -> None:
 
     Examples
     --------
-    >>> from xcrack.laws import paris
+    >>> from xcrack.growth.laws import paris
     >>> check_law(paris(C=1e-11, m=3))
     """
     wrong: list[str] = []
@@ -92,7 +92,7 @@ def check_criterion(criterion: Criterion, nu: float = 0.3) -> None:
 
     Examples
     --------
-    >>> from xcrack.criteria import weighted_angle
+    >>> from xcrack.growth.criteria import weighted_angle
     >>> check_criterion(weighted_angle)
     """
     wrong: list[str] = []

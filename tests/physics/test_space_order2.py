@@ -11,10 +11,10 @@ import scipy.sparse.linalg as sla
 import exact
 import scenes_space as scenes
 import xcrack as xc
-from xcrack import iterative
-from xcrack.linear import scaled_basis
-from xcrack.model import build
-from xcrack.tube import leg_size
+from xcrack.solvers import iterative
+from xcrack.solvers.direct import scaled_basis
+from xcrack.xfem.enrichment_3d import leg_size
+from xcrack.xfem.model import build
 
 C = np.array([0.013, -0.021, 0.0317])
 

@@ -21,8 +21,8 @@ from xcrack.bench.fields import (
     energy,
     stress_of,
 )
-from xcrack.gmsh_session import session
-from xcrack.williams import unit_gradients
+from xcrack.mesh.gmsh_session import session
+from xcrack.xfem.williams import unit_gradients
 
 _RING = (0.2, 0.9)  # of the radius given: where the weight falls from 1 to 0
 

@@ -9,8 +9,8 @@ from xcrack.bench.conforming import Grading, pulled
 from xcrack.bench.fields import NU
 from xcrack.bench.scenes import Outcome
 from xcrack.bench.scenes_growth import A0, A1, GROWN, LAW, N_STEPS, TURNING, exact_life, tip_errors
-from xcrack.criteria import kink_angle
-from xcrack.cycles import cycles_between
+from xcrack.growth.criteria import kink_angle
+from xcrack.growth.cycles import cycles_between
 
 
 def grown(grading: Grading, steps: int = N_STEPS) -> Outcome:

@@ -14,7 +14,7 @@ from xcrack.bench.conforming import Grading
 from xcrack.bench.fields import E_PRIME, LAMBDA, MU, penny_K_I
 from xcrack.bench.fields import penny as exact
 from xcrack.bench.scenes import PENNY, Outcome
-from xcrack.gmsh_session import session
+from xcrack.mesh.gmsh_session import session
 
 _REACH = 0.35  # of the weight, from the front
 

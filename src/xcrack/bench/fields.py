@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 
 from xcrack.arrays import Floats
-from xcrack.williams import mode_matrix, tip_values, unit_gradients
+from xcrack.xfem.williams import mode_matrix, tip_values, unit_gradients
 
 E, NU = 1.0, 0.3
 MU = E / (2 * (1 + NU))

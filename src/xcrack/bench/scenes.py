@@ -95,7 +95,7 @@ def quiet(problem: xc.Problem) -> tuple[xc.Solution, xc.SIF]:
         return solution, xc.stress_intensity(solution)
 
 
-def _imposed(sides: Sequence[str], u: Field) -> list[xc.conditions.Displacement]:
+def _imposed(sides: Sequence[str], u: Field) -> list[xc.scene.conditions.Displacement]:
     return [xc.displacement(side, lambda x: u(x)) for side in sides]
 
 

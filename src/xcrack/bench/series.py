@@ -5,7 +5,7 @@ from functools import partial
 
 from xcrack.bench.runs import Case
 from xcrack.bench.scenes import Outcome, Settings
-from xcrack.numerics import Numerics
+from xcrack.scene.numerics import Numerics
 
 Scene = Callable[[Settings, int], Outcome]
 

@@ -9,7 +9,7 @@ from xcrack.bench.conforming import Grading
 from xcrack.bench.runs import Case
 from xcrack.bench.scenes import Outcome, Settings
 from xcrack.bench.series import series, variant
-from xcrack.numerics import Numerics
+from xcrack.scene.numerics import Numerics
 
 
 def growth(quick: bool) -> list[Case]:

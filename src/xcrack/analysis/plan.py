@@ -1,0 +1,146 @@
+"""Scene economy: what a scene needs, said before anything is solved, and what was found."""
+
+from dataclasses import dataclass
+
+from xcrack.scene.problem import Problem
+
+LIPS = {
+    "penalty": "a penalty",
+    "augmented": "an augmented Lagrangian",
+    "nitsche": "Nitsche's method",
+}
+
+
+@dataclass(frozen=True)
+class Ingredient:
+    """One thing that may be modelled.
+
+    Attributes
+    ----------
+    name : str
+    used : bool
+    reason : str
+    unknowns : int
+        Cost in unknowns.
+    """
+
+    name: str
+    used: bool
+    reason: str
+    unknowns: int = 0
+
+    def __str__(self) -> str:
+        mark = "used" if self.used else "left out"
+        cost = f"  [{self.unknowns} unknowns]" if self.unknowns else ""
+        return f"{self.name:<24}{mark:<10}{self.reason}{cost}"
+
+
+@dataclass(frozen=True)
+class Report:
+    """Ingredients of a scene, one line each, and the operations that a solve took.
+
+    Attributes
+    ----------
+    ingredients : tuple of Ingredient
+    operations : dict
+        Unknowns solved for, factorisations, solves, assembled cells, integration points,
+        multipliers.
+    """
+
+    ingredients: tuple[Ingredient, ...]
+    operations: dict[str, int]
+
+    def __str__(self) -> str:
+        lines = [str(i) for i in self.ingredients]
+        if self.operations:
+            counts = ", ".join(f"{v} {k.replace('_', ' ')}" for k, v in self.operations.items())
+            lines.append(f"{'operations':<24}{counts}")
+        return "\n".join(lines)
+
+    def __getitem__(self, name: str) -> Ingredient:
+        for ingredient in self.ingredients:
+            if ingredient.name == name:
+                return ingredient
+        raise KeyError(name)
+
+
+def plan(problem: Problem) -> Report:
+    """What a scene needs, decided before anything is built.
+
+    Parameters
+    ----------
+    problem : Problem
+
+    Returns
+    -------
+    Report
+        Printed, it gives one line an ingredient: used or left out, and the reason.
+
+    Examples
+    --------
+    >>> import xcrack as xc
+    >>> mesh = xc.box((0, 0), (1, 1), 8)
+    >>> steel = xc.Isotropic(E=210e3, nu=0.3, plane="strain")
+    >>> print(xc.plan(xc.Problem(mesh, steel))["tip functions"])
+    tip functions           left out  no cracks
+    """
+    n_tips = [crack.n_tips for crack in problem.placed]
+    rows = [_heaviside(n_tips), _tips(problem, n_tips)]
+    rows.extend(_multipliers(problem))
+    rows.append(_third_mode(problem, n_tips))
+    held = "held by supports" if problem.supports else "none given; rigid motion is removed"
+    rows.append(Ingredient("supports", bool(problem.supports), held))
+    rows.append(
+        Ingredient(
+            "enriched quadrature",
+            bool(sum(n_tips)) or bool(n_tips),
+            "points only in cells with enriched functions; plain cells are tabulated"
+            if n_tips
+            else "no cracks: plain finite elements",
+        )
+    )
+    rows.append(Ingredient("refinement", False, "the mesh is taken as it is"))
+    return Report(tuple(rows), {})
+
+
+def _third_mode(problem: Problem, n_tips: list[int]) -> Ingredient:
+    if problem.mesh.dim == 2:
+        return Ingredient("third mode", False, "a plane problem has modes I and II only")
+    if not sum(n_tips):
+        return Ingredient("third mode", False, "no front to tear along")
+    return Ingredient("third mode", True, "K_III along every front")
+
+
+def _heaviside(n_tips: list[int]) -> Ingredient:
+    if not n_tips:
+        return Ingredient("Heaviside functions", False, "no cracks")
+    return Ingredient("Heaviside functions", True, f"{len(n_tips)} crack(s) cut through cells")
+
+
+def _tips(problem: Problem, n_tips: list[int]) -> Ingredient:
+    if not n_tips:
+        return Ingredient("tip functions", False, "no cracks")
+    if not sum(n_tips):
+        return Ingredient("tip functions", False, "every crack cuts through: there is no tip")
+    what_each = f"{problem.numerics.functions} functions"
+    if problem.numerics.tip_basis == "vectorial":
+        what_each = f"modes I to {'II' if problem.mesh.dim == 2 else 'III'} only"
+    reach = (
+        "within a fixed radius" if problem.numerics.enrichment == "geometric" else "tip cells only"
+    )
+    what = "tip(s)" if problem.mesh.dim == 2 else "front(s)"
+    return Ingredient("tip functions", True, f"{sum(n_tips)} {what}, {what_each}, {reach}")
+
+
+def _multipliers(problem: Problem) -> list[Ingredient]:
+    reasons = {
+        "off": (False, "contact is switched off: lips may overlap"),
+        "on": (True, "contact is switched on"),
+        "auto": (False, "none until the lips of the open solution overlap"),
+    }
+    used, reason = reasons[problem.contact]
+    if used and problem.numerics.lips in LIPS:
+        reason += f"; held by {LIPS[problem.numerics.lips]}"
+    return [
+        Ingredient(f"multipliers of crack {c}", used, reason) for c in range(len(problem.cracks))
+    ]

@@ -1,0 +1,115 @@
+"""What was modelled, what was left out and why, after a solve."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from xcrack.analysis.plan import LIPS, Ingredient, Report, plan
+from xcrack.contact.multipliers import Multipliers
+from xcrack.contact.solve import Pressed
+from xcrack.crack.crack import Crack
+from xcrack.scene.problem import Problem
+from xcrack.solvers.direct import System
+from xcrack.solvers.iterative import IterativeSystem
+from xcrack.solvers.rigid_motion import Motion
+from xcrack.xfem.model import Model
+
+
+def report(
+    problem: Problem,
+    model: Model,
+    engine: System | IterativeSystem,
+    found: Pressed,
+    motion: Motion,
+    imbalance: float,
+    n_states: int,
+) -> Report:
+    """The plan of a problem, with what was found.
+
+    Parameters
+    ----------
+    problem : Problem
+    model : Model
+    engine : System or IterativeSystem
+    found : Pressed
+    motion : Motion
+        Rigid motions that were removed.
+    imbalance : float
+        Share of the loads that was out of balance.
+    n_states : int
+    """
+    d = model.space.dim
+    rows = []
+    n_heaviside = sum(int((h >= 0).sum()) for h in model.space.heaviside) * d
+    modes = problem.numerics.tip_basis == "vectorial"
+    each = [d if modes else d * tip.functions for tip in model.space.tips]
+    n_points = [int((tip.point_to_function >= 0).sum()) for tip in model.space.tips]
+    n_tip = sum(n * k for n, k in zip(n_points, each, strict=True))
+    for row in plan(problem).ingredients:
+        if row.name == "Heaviside functions":
+            row = replace(row, unknowns=n_heaviside)
+        elif row.name == "tip functions" and row.used:
+            radii = ", ".join(f"{r:.4g}" for r in model.space.radius)
+            row = replace(row, unknowns=n_tip, reason=f"{row.reason}; radius {radii}")
+        elif row.name.startswith("multipliers of crack"):
+            row = _multiplier_row(problem, found, int(row.name.split()[-1]))
+        elif row.name == "supports" and motion.modes.shape[1]:
+            row = replace(
+                row,
+                reason=f"{motion.modes.shape[1]} rigid motion(s) free and removed; loads balance "
+                f"to {imbalance:.1e}",
+            )
+        rows.append(row)
+    what = "factorisation" if isinstance(engine, System) else "multigrid hierarchy"
+    shared = f"share one {what}" if n_states > 1 else f"one {what}"
+    rows.append(Ingredient("load states", True, f"{n_states}, {shared}"))
+    standard = model.space.n_nodes * d
+    rows.append(
+        Ingredient("standard functions", True, f"order {model.space.order}", unknowns=standard)
+    )
+    for c, (given, placed) in enumerate(zip(problem.cracks, problem.placed, strict=True)):
+        if not given.placed and not np.array_equal(given.points, placed.points):
+            rows.append(Ingredient(f"mouths of crack {c}", True, _mouths(given, placed)))
+    if isinstance(engine, IterativeSystem):
+        rows.append(Ingredient("linear solver", True, "conjugate gradients: a large body in space"))
+    operations = {
+        "unknowns": engine.basis.shape[1],
+        "factorisations": engine.count.factorisations,
+        "solves": engine.count.solves,
+        **({"iterations": engine.count.iterations} if isinstance(engine, IterativeSystem) else {}),
+        "assembled_cells": len(model.space.enriched),
+        "integration_points": model.n_points,
+        "multipliers": _n_multipliers(problem, found.spaces),
+        "contact_iterations": found.iterations,
+    }
+    return Report(tuple(rows), operations)
+
+
+def _mouths(given: Crack, placed: Crack) -> str:
+    if placed.dim == 3:
+        words = "sides refined to the size of the cells, prolonged to the outside where open"
+        kept = {tuple(x) for x in placed.points.tolist()}
+        lost = sum(tuple(x) not in kept for x in given.points.tolist())
+        return words + (f"; {lost} corner(s) of fronts rounded to two cells" if lost else "")
+    return f"{2 - placed.n_tips}, prolonged to one cell outside"
+
+
+def _multiplier_row(problem: Problem, found: Pressed, c: int) -> Ingredient:
+    name = f"multipliers of crack {c}"
+    m = found.spaces[c]
+    if m is not None:
+        why = "contact is switched on" if problem.contact == "on" else "the open lips overlap"
+        if problem.numerics.lips != "multipliers":
+            why += f"; held by {LIPS[problem.numerics.lips]}"
+        return Ingredient(name, True, why, unknowns=_n_multipliers(problem, [m]))
+    if problem.contact == "off":
+        return Ingredient(name, False, "contact is switched off: lips may overlap")
+    return Ingredient(name, False, "the lips stay apart in every load state")
+
+
+def _n_multipliers(problem: Problem, spaces: Sequence[Multipliers | None]) -> int:
+    """Unknowns of the lips: a penalty and Nitsche's method have none."""
+    if problem.numerics.lips in ("penalty", "nitsche"):
+        return 0
+    return sum(len(m.measure) for m in spaces if m is not None)

@@ -1,0 +1,244 @@
+"""What a solve returns: displacements, stresses, openings and contact, anywhere in the body."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from xcrack.arrays import Bools, Floats, Ints, lock
+from xcrack.contact.result import Contact
+from xcrack.errors import GeometryError
+from xcrack.mesh.locate import locate
+from xcrack.scene.conditions import InitialStress, Load, evaluate_stress
+from xcrack.scene.problem import Problem
+from xcrack.xfem.function_space import Space
+from xcrack.xfem.lips import LipPoints, jump_values
+from xcrack.xfem.loads import position
+from xcrack.xfem.quadrature import cell_side
+
+if TYPE_CHECKING:
+    from xcrack.analysis.plan import Report
+    from xcrack.contact.warm_start import Warm
+    from xcrack.xfem.assembly import Bulk
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """Solution of one load state.
+
+    Attributes
+    ----------
+    problem : Problem
+    state : object
+        The load state as it was given.
+    loads : tuple of loads
+        Loads of this state, before they were scaled.
+    factor : float
+        Scale of the loads (not of an initial stress).
+    space : Space
+    u : (n_dof,) array, length
+        Unknowns: standard, Heaviside, tip functions.
+    lips : tuple of LipPoints
+        Integration points on the lips of each crack.
+    contact : tuple
+        One entry a crack: Contact, or None where it has no multipliers.
+    energy : float
+        Strain energy, u K u / 2.
+    report : Report
+        What was modelled, what was left out, and why.
+    bulk : Bulk
+        Stiffness of the uncracked body, for the next crack in the same mesh.
+    warm : Warm
+        Closed sets, for the next solve.
+    """
+
+    problem: Problem
+    state: object
+    loads: tuple[Load, ...]
+    factor: float
+    space: Space
+    u: Floats
+    lips: tuple[LipPoints, ...]
+    contact: tuple[Contact | None, ...]
+    energy: float
+    report: "Report"
+    bulk: "Bulk"
+    warm: "Warm"
+
+    def __repr__(self) -> str:
+        return f"Solution(state={self.state!r}, n_dof={self.n_dof}, energy={self.energy:.6g})"
+
+    @property
+    def at_rest(self) -> bool:
+        """Whether nothing acts in this state: no load, no imposed displacement, no stress."""
+        return self.factor == 0 and not any(isinstance(x, InitialStress) for x in self.loads)
+
+    @property
+    def n_dof(self) -> int:
+        """Number of unknowns, without multipliers."""
+        return self.space.n_dof
+
+    @cached_property
+    def coefficients(self) -> Floats:
+        """Unknowns by function, with a last row of zeros for empty places `(n + 1, d)`."""
+        d = self.space.dim
+        return lock(np.concatenate([self.u.reshape(-1, d), np.zeros((1, d))]))
+
+    def at(self, cell: Ints, bary: Floats, side: Ints) -> tuple[Floats, Floats]:
+        """Displacement `(q, d)` and gradient `(q, d, d)` at points given by cell.
+
+        The gradient's rows are components, its columns directions.
+        """
+        u, gradient = fields_at(self.space, self.coefficients[..., None], cell, bary, side)
+        return u[..., 0], gradient[..., 0]
+
+    def displacement(self, x: ArrayLike, side: int = 0) -> Floats:
+        """Displacement at points.
+
+        Parameters
+        ----------
+        x : (n, d) array, length
+        side : {0, 1, -1}
+            Lip on which points that lie on a crack are taken; 0: lip +.
+
+        Returns
+        -------
+        (n, d) array, length
+        """
+        cell, bary, sides, single = self._where(x, side)
+        u = self.at(cell, bary, sides)[0]
+        return u[0] if single else u
+
+    def stress(self, x: ArrayLike, side: int = 0) -> Floats:
+        """Stress at points `(n, d, d)`, initial stress included.
+
+        Parameters
+        ----------
+        x : (n, d) array, length
+        side : {0, 1, -1}
+            Lip on which points that lie on a crack are taken; 0: lip +.
+
+        Returns
+        -------
+        (n, d, d) array, stress
+        """
+        cell, bary, sides, single = self._where(x, side)
+        sigma = self.stress_at(cell, bary, sides)
+        return sigma[0] if single else sigma
+
+    def stress_at(self, cell: Ints, bary: Floats, side: Ints) -> Floats:
+        """Stress at points given by cell `(q, d, d)`."""
+        sigma = self.problem.material.stress(self.at(cell, bary, side)[1])
+        return sigma + self.initial_stress(position(self.space, cell, bary))
+
+    def initial_stress(self, x: Floats) -> Floats:
+        """Sum of the initial stresses at points `(q, d, d)`."""
+        total = np.zeros((len(x), self.space.dim, self.space.dim))
+        for load in self.loads:
+            if isinstance(load, InitialStress):
+                total = total + evaluate_stress(load.value, x)
+        return total
+
+    def opening(self, crack: int = 0) -> Floats:
+        """Normal opening n . [[u]] `(q,)` at the points `lips[crack].x`, length."""
+        return np.einsum("qd,qd->q", self.jump(crack), self.lips[crack].normal)
+
+    def jump(self, crack: int = 0) -> Floats:
+        """Displacement of lip + minus that of lip - `(q, d)` at `lips[crack].x`, length."""
+        lips = self.lips[crack]
+        jump = np.zeros((len(lips), self.space.dim))
+        for functions, number, N in jump_values(self.space, crack, lips):
+            jump[number] += np.einsum("qn,qni->qi", N, self.coefficients[functions])
+        return jump
+
+    def inside(self, x: ArrayLike) -> Bools:
+        """Whether points lie in the mesh of the body `(n,)`, for which a curved side is a polygon.
+
+        Parameters
+        ----------
+        x : (n, d) array, length
+        """
+        return locate(self.space.mesh, np.atleast_2d(np.asarray(x, dtype=float)))[0] >= 0
+
+    def _where(self, x: ArrayLike, side: int) -> tuple[Ints, Floats, Ints, bool]:
+        points = np.asarray(x, dtype=float)
+        single = points.ndim == 1
+        points = np.atleast_2d(points)
+        cell, bary = locate(self.space.mesh, points)
+        if (cell < 0).any():
+            outside = points[np.argmax(cell < 0)]
+            raise GeometryError(
+                f"{np.round(outside, 9).tolist()} lies outside the body ({int((cell < 0).sum())} "
+                "such points), where a curved boundary is a polygon: choose points by "
+                "solution.inside(x)."
+            )
+        return cell, bary, sides_of(self.space, cell, bary, side), single
+
+
+def fields_at(
+    space: Space, coefficients: Floats, cell: Ints, bary: Floats, side: Ints
+) -> tuple[Floats, Floats]:
+    """Displacements `(q, d, s)` and gradients `(q, d, d, s)` of several states at once.
+
+    Parameters
+    ----------
+    space : Space
+        Shared by all states.
+    coefficients : (n + 1, d, s) array, length
+        Unknowns by function, the last row zero.
+    cell, bary, side : arrays
+        Points, as in `Solution.at`.
+    """
+    from xcrack.kernels.fields import set_gradients
+
+    coefficients = np.ascontiguousarray(coefficients)
+    d, states = coefficients.shape[1:]
+    u, gradient = np.zeros((len(cell), d, states)), np.zeros((len(cell), d, d, states))
+    for number, row, functions, N, G in _tables(space, cell, bary, side):
+        a = coefficients[functions[row]].reshape(len(row), N.shape[1], -1)
+        u[number] = (N[:, None] @ a).reshape(-1, d, states)
+        set_gradients(gradient, number, G, functions, row, coefficients)
+    return u, gradient
+
+
+def gradients_at(
+    space: Space, coefficients: Floats, cell: Ints, bary: Floats, side: Ints
+) -> Floats:
+    """Gradients of displacements `(q, d, d, s)` of several states at once.
+
+    Parameters
+    ----------
+    space, coefficients, cell, bary, side : as in `fields_at`
+    """
+    from xcrack.kernels.fields import set_gradients
+
+    coefficients = np.ascontiguousarray(coefficients)
+    d, states = coefficients.shape[1:]
+    gradient = np.zeros((len(cell), d, d, states))
+    for number, row, functions, _, G in _tables(space, cell, bary, side):
+        set_gradients(gradient, number, G, functions, row, coefficients)
+    return gradient
+
+
+def _tables(
+    space: Space, cell: Ints, bary: Floats, side: Ints
+) -> Iterator[tuple[Ints, Ints, Ints, Floats, Floats]]:
+    """Of each batch: numbers of its points, their rows, its functions, values and gradients."""
+    for batch, number, row in space.batches_of_points(cell):
+        N, G = space.tabulate(batch, row, bary[number], side[number])
+        yield number, row, batch.functions, N, G
+
+
+def sides_of(space: Space, cell: Ints, bary: Floats, lip: int) -> Ints:
+    """Side of each crack of points in cells `(q, cracks)`; `lip` decides on a crack."""
+    side = cell_side(space, cell)
+    for c, cut in enumerate(space.cuts):
+        phi = np.einsum("qb,qb->q", bary, cut.level_set.phi[space.mesh.cells[cell]])
+        split = (cut.is_cut | cut.is_tip)[cell]
+        on_lip = np.abs(phi) <= 1e-9 * space.mesh.cell_size[cell]
+        own = np.where(on_lip & (lip != 0), lip, np.where(phi >= 0, 1, -1))
+        side[:, c] = np.where(split, own, side[:, c])
+    return side

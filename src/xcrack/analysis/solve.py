@@ -1,0 +1,176 @@
+"""From a problem to solutions: one stiffness, one factor, any number of load states."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from xcrack.analysis.report import report
+from xcrack.analysis.solution import Solution
+from xcrack.arrays import Bools, Floats, lock
+from xcrack.contact.solve import contact, contact_of
+from xcrack.contact.warm_start import Warm
+from xcrack.errors import ProblemError
+from xcrack.scene.conditions import Displacement, InitialStress, Load
+from xcrack.scene.problem import Problem
+from xcrack.solvers.direct import Solver, System, system
+from xcrack.solvers.iterative import IterativeSystem, iterative_system
+from xcrack.solvers.rigid_motion import Motion, balanced, free_motion, without_motion
+from xcrack.xfem.assembly import Bulk
+from xcrack.xfem.loads import load_vector
+from xcrack.xfem.model import Model, build
+from xcrack.xfem.supports import known_unknowns
+
+# Unknowns of a body in space above which a factorisation costs more, by order (measured).
+_DIRECT = {1: 4_000, 2: 8_000}
+
+
+def solve(
+    problem: Problem, states: Sequence[Any] | None = None, solver: Solver | None = None
+) -> Any:
+    """Solve a problem for one load state or several, with one factorisation.
+
+    Parameters
+    ----------
+    problem : Problem
+    states : sequence, optional
+        Load states: numbers that scale all loads and imposed displacements (but not an initial
+        stress), or lists of loads. None: the loads as they are.
+    solver : callable, optional
+        Given a sparse symmetric matrix, returns a function that solves for right-hand sides;
+        `xcrack.solvers.factor.superlu` where it is left out.
+
+    Returns
+    -------
+    Solution, or a list of them where states are given
+
+    Raises
+    ------
+    ProblemError
+        A body that is not held and loads out of balance, supports that contradict each other.
+    ConvergenceError
+        A singular stiffness, or contact that finds no closed set.
+    """
+    if states is not None and (isinstance(states, str) or not isinstance(states, Iterable)):
+        raise ProblemError(
+            f"states = {states!r}: give a list of load states, such as states=[1.0]."
+        )
+    solutions = solve_states(problem, [None] if states is None else list(states), solver=solver)
+    return solutions[0] if states is None else solutions
+
+
+def solve_states(
+    problem: Problem,
+    states: Sequence[Any],
+    *,
+    bulk: Bulk | None = None,
+    warm: Warm | None = None,
+    solver: Solver | None = None,
+) -> list[Solution]:
+    """Solve all load states; `bulk` and `warm` of an earlier solution save work."""
+    if not len(states):
+        raise ProblemError("states is empty: give at least one load state, or none at all.")
+    model = build(problem, bulk)
+    known_loads: dict[tuple[int, ...], Floats] = {}
+    cases = [_case(problem, model, state, known_loads) for state in states]
+    fixed = model.known.fixed.copy()
+    motion = free_motion(model.space, fixed)
+    engine = _engine(problem, model, fixed, motion, solver, warm)
+    in_balance = [balanced(model.space, motion, case.f) for case in cases]
+    f = np.stack([loads for loads, _ in in_balance], axis=1)
+    imbalance = max(share for _, share in in_balance)
+    known = np.stack([case.known for case in cases], axis=1)
+    acting = [(case.loads, case.factor) for case in cases]
+    lips_contact = contact(problem, model, engine, f, known, warm, acting)
+    u = lips_contact.u
+    if motion.modes.shape[1]:
+        u = without_motion(motion, u)
+    kept, handed_on = model.bulk, lips_contact.warm
+    if isinstance(engine, IterativeSystem):
+        kept = replace(kept, levels=engine.hierarchy)
+    else:
+        handed_on = replace(handed_on, elimination=engine.elimination)
+    said = report(problem, model, engine, lips_contact, motion, imbalance, len(states))
+    return [
+        Solution(
+            problem=problem,
+            state=state,
+            loads=case.loads,
+            factor=case.factor,
+            space=model.space,
+            u=lock(np.ascontiguousarray(u[:, k])),
+            lips=model.lips,
+            contact=contact_of(model, lips_contact, u[:, k], k),
+            energy=0.5 * float(u[:, k] @ (model.stiffness @ u[:, k])),
+            report=said,
+            bulk=kept,
+            warm=handed_on,
+        )
+        for k, (state, case) in enumerate(zip(states, cases, strict=True))
+    ]
+
+
+def _engine(
+    problem: Problem,
+    model: Model,
+    fixed: Bools,
+    motion: Motion,
+    solver: Solver | None,
+    warm: Warm | None,
+) -> System | IterativeSystem:
+    """A factorisation, or in space above some size conjugate gradients."""
+    space_, wanted = model.space, problem.numerics.linear
+    large = space_.dim == 3 and space_.n_dof > _DIRECT[space_.order]
+    large = large and problem.numerics.lips == "multipliers"  # others change the matrix
+    if solver is None and (wanted == "iterative" or (wanted == "auto" and large)):
+        return iterative_system(
+            space_,
+            model.stiffness,
+            model.bulk,
+            fixed,
+            model.bulk.levels,
+            motion.modes,
+            problem.material if problem.numerics.tip_basis == "vectorial" else None,
+        )
+    fixed[motion.pins] = True
+    return system(
+        space_,
+        model.stiffness,
+        fixed,
+        problem.numerics,
+        solver,
+        problem.material,
+        None if warm is None else warm.elimination,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Case:
+    loads: tuple[Load, ...]
+    factor: float
+    f: Floats
+    known: Floats
+
+
+def _case(
+    problem: Problem, model: Model, state: Any, known_loads: dict[tuple[int, ...], Floats]
+) -> _Case:
+    """A load state; states that differ by a factor integrate their loads once."""
+    loads, factor = problem.state(state)
+    scaled = tuple(load for load in loads if not isinstance(load, InitialStress))
+    steady = tuple(load for load in loads if isinstance(load, InitialStress))
+
+    def vector(chosen: tuple[Load, ...]) -> Floats:
+        key = tuple(map(id, chosen))
+        if key not in known_loads:
+            known_loads[key] = load_vector(model.space, chosen, model.lips)
+        return known_loads[key]
+
+    f = factor * vector(scaled) + vector(steady)
+    known = model.known.value
+    moved = tuple(load for load in loads if isinstance(load, Displacement))
+    if moved:
+        new = known_unknowns(model.space, moved)
+        known = np.where(new.fixed & model.known.fixed, new.value, known)
+    return _Case(loads, factor, f, factor * known)

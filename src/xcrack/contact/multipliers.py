@@ -1,0 +1,244 @@
+"""Contact multipliers: the nodes of the cells along the lips, tied into stable groups.
+
+Groups are the stars of a minimal cover of the cut edges ("vital edges", Béchet, Moës and
+Wohlmuth, 2009); a node without a cut edge of its own joins the group with which its trace
+overlaps most, so that no small group is left at a tip. A group's function is the sum of its
+hats' traces: positive, and all of them sum to one. Order 2 in the plane uses hats along the
+crack instead, with knots near the groups' centres: as many unknowns, one order more in pressure.
+"""
+
+import heapq
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+
+from xcrack.arrays import Bools, Floats, Ints
+from xcrack.xfem.function_space import Space
+from xcrack.xfem.lips import LipPoints
+
+_PASSES = 5  # in which knots are moved; each looks one knot to either side
+_END = 0.6  # share of the last piece in the last two
+
+
+@dataclass(frozen=True, eq=False)
+class Multipliers:
+    """Multiplier space on the lips of one crack.
+
+    Attributes
+    ----------
+    crack : int
+    values : sparse matrix (q, g)
+        Each function at the lip points.
+    measure : (g,) array, length^(d - 1)
+        Integral of each function.
+    centre : (g, d) array, length
+        Where each function sits; carries states from step to step.
+    """
+
+    crack: int
+    values: sp.csr_matrix
+    measure: Floats
+    centre: Floats
+
+
+def multipliers(
+    space: Space, c: int, lips: LipPoints, kind: str, fixed: Bools | None = None
+) -> Multipliers:
+    """Multiplier space of crack c: "reduced" or "naive".
+
+    Where supports decide the jump, as at a mouth in a side whose displacement is imposed, a group
+    of its own would be redundant: with `fixed` (n_dof,) it joins its neighbour.
+    """
+    nodes, traces = _traces(space, lips)
+    if kind == "naive":
+        group = np.arange(len(nodes))
+    else:
+        held = _held(space, c, nodes, traces, lips, fixed)
+        group = _groups(space, c, nodes, traces, lips.weight, held)
+    n_groups = int(group.max(initial=-1)) + 1
+    gather = sp.csr_matrix(
+        (np.ones(len(nodes)), (np.arange(len(nodes)), group)), shape=(len(nodes), n_groups)
+    )
+    values = sp.csr_matrix(traces @ gather)
+    if kind == "reduced" and space.order == 2 and space.dim == 2 and n_groups > 1:
+        values = _hats(values, lips)
+    measure = np.asarray(values.T @ lips.weight).ravel()
+    keep = measure > 1e-14 * measure.max(initial=0.0)
+    values = sp.csr_matrix(values[:, np.nonzero(keep)[0]])
+    centre = np.asarray(values.T @ (lips.weight[:, None] * lips.x)) / measure[keep][:, None]
+    return Multipliers(c, values, measure[keep], centre)
+
+
+def _traces(space: Space, lips: LipPoints) -> tuple[Ints, sp.csr_matrix]:
+    """Mesh points whose hats reach the lips, and the hats at the lip points `(q, k)`."""
+    cell = lips.cell[:, 1]
+    corners = space.mesh.cells[cell]
+    nodes, place = np.unique(corners.ravel(), return_inverse=True)
+    row = np.repeat(np.arange(len(cell)), corners.shape[1])
+    entry = lips.bary[:, 1].ravel()
+    acts = np.abs(entry) > 1e-13
+    matrix = sp.csr_matrix((entry[acts], (row[acts], place[acts])), shape=(len(cell), len(nodes)))
+    reached = np.asarray((matrix != 0).sum(axis=0)).ravel() > 0
+    return nodes[reached], sp.csr_matrix(matrix[:, np.nonzero(reached)[0]])
+
+
+def _held(
+    space: Space, c: int, nodes: Ints, traces: sp.csr_matrix, lips: LipPoints, fixed: Bools | None
+) -> Bools:
+    """Which of the nodes have a normal jump that supports decide."""
+    number = space.heaviside[c][nodes]
+    if fixed is None:
+        return np.zeros(len(nodes), dtype=bool)
+    normal = np.asarray(traces.T @ (lips.weight[:, None] * lips.normal))
+    share = (normal**2 * fixed.reshape(-1, space.dim)[number]).sum(axis=1)
+    return np.asarray((number >= 0) & (share > 0.5 * (normal**2).sum(axis=1)))
+
+
+def _groups(
+    space: Space, c: int, nodes: Ints, traces: sp.csr_matrix, weight: Floats, held: Bools
+) -> Ints:
+    """Group number of each node."""
+    mesh, cut = space.mesh, space.cuts[c]
+    edges = np.nonzero(~np.isnan(cut.cut_edge))[0]
+    pairs = mesh.edges[edges]
+    kept = vital_edges(
+        pairs, np.linalg.norm(mesh.points[pairs[:, 0]] - mesh.points[pairs[:, 1]], axis=1)
+    )
+    place = {int(n): i for i, n in enumerate(nodes)}
+    parent = np.arange(len(nodes))
+    covered = np.zeros(len(nodes), dtype=bool)
+
+    def root(i: int) -> int:
+        while parent[i] != i:
+            parent[i] = parent[parent[i]]
+            i = int(parent[i])
+        return i
+
+    for a, b in pairs[kept]:
+        # An end of a cut edge at a sliver may have no trace that is seen; its star keeps the rest.
+        i, j = place.get(int(a)), place.get(int(b))
+        for end in (i, j):
+            if end is not None:
+                covered[end] = True
+        if i is not None and j is not None:
+            parent[root(i)] = root(j)
+    on_crack = cut.level_set.phi[nodes] == 0
+    inside = cut.level_set.inside[nodes] < 0
+    # Nodes on the crack carry a group of their own, unless the tip lies on them.
+    own = on_crack & inside & ~covered
+    covered |= own
+    if held.any():
+        roots = np.array([root(i) for i in range(len(nodes))])
+        mass = np.asarray(traces.T @ weight).ravel()
+        total = np.bincount(roots, mass, len(nodes))
+        covered &= np.bincount(roots, mass * held, len(nodes))[roots] < 0.5 * total[roots]
+        parent[~covered] = np.nonzero(~covered)[0]
+    if covered.any() and not covered.all():
+        alone, choices = np.nonzero(~covered)[0], np.nonzero(covered)[0]
+        weighted = sp.diags(weight) @ traces
+        overlap = sp.csr_matrix(weighted[:, alone].T @ traces[:, choices])
+        for k, row in zip(alone, overlap, strict=True):
+            if row.nnz:
+                parent[k] = root(int(choices[row.indices[np.argmax(row.data)]]))
+    roots = np.array([root(i) for i in range(len(nodes))])
+    return np.unique(roots, return_inverse=True)[1]
+
+
+def vital_edges(pairs: Ints, length: Floats) -> Ints:
+    """Minimal cover of the ends of edges by edges: what remains are stars.
+
+    Edges are removed as long as both their ends keep another one, those with the best-connected
+    weaker end first, longer ones first among equals.
+
+    Parameters
+    ----------
+    pairs : (e, 2) array of int
+    length : (e,) array
+
+    Returns
+    -------
+    (k,) array of int
+        Rows of `pairs` that are kept.
+    """
+    degree: dict[int, int] = {}
+    for a, b in pairs.tolist():
+        degree[a] = degree.get(a, 0) + 1
+        degree[b] = degree.get(b, 0) + 1
+
+    def entry(e: int) -> tuple[int, float, int, int, int]:
+        a, b = pairs[e].tolist()
+        return (-min(degree[a], degree[b]), -float(length[e]), min(a, b), max(a, b), e)
+
+    heap = [entry(e) for e in range(len(pairs))]
+    heapq.heapify(heap)
+    kept = np.ones(len(pairs), dtype=bool)
+    while heap:
+        top = heapq.heappop(heap)
+        e = top[-1]
+        now = entry(e)
+        if now[0] != top[0]:
+            heapq.heappush(heap, now)
+            continue
+        if now[0] >= -1:
+            break
+        kept[e] = False
+        for end in pairs[e].tolist():
+            degree[end] -= 1
+    return np.nonzero(kept)[0]
+
+
+def _knots(centre: Floats, ends: tuple[float, float]) -> Floats:
+    """Knots of hats: as many as groups, the first and the last one at the ends of the crack.
+
+    A group's size is an accident of the mesh. What counts is the piece between the last two knots
+    at a tip: a short one leaves the pressure there to chance, a long one cannot follow it. It is
+    made 1.5 times the next one, and the others are evened out among near neighbours.
+    """
+    knots = np.array(centre)
+    knots[0], knots[-1] = ends
+    if len(knots) == 3:
+        knots[1] = (knots[0] + knots[2]) / 2
+    if len(knots) <= 3:
+        return knots
+    for _ in range(_PASSES):
+        old = knots.copy()
+        knots[2:-2] = (old[1:-3] + 2 * old[2:-2] + old[3:-1]) / 4
+        # Half of the way only: with four knots both ends would pass each other.
+        knots[1] = (old[1] + old[0] + _END * (old[2] - old[0])) / 2
+        knots[-2] = (old[-2] + old[-1] - _END * (old[-1] - old[-3])) / 2
+    return knots
+
+
+def _hats(values: sp.csr_matrix, lips: LipPoints) -> sp.csr_matrix:
+    """Piecewise linear hats along the crack, with knots near the groups' centres.
+
+    They reach the ends of the crack, so that linear pressures are exact.
+    """
+    mass = np.asarray(values.T @ lips.weight).ravel()
+    centre = np.asarray(values.T @ (lips.weight * lips.s)).ravel() / np.maximum(mass, 1e-300)
+    knots = np.unique(centre[mass > 1e-14 * mass.max()])
+    knots = _knots(knots, (float(lips.s.min()), float(lips.s.max())))
+    place = np.clip(np.searchsorted(knots, lips.s, side="right") - 1, 0, len(knots) - 2)
+    t = (lips.s - knots[place]) / (knots[place + 1] - knots[place])
+    row = np.arange(len(lips.s))
+    return sp.csr_matrix(
+        (
+            np.concatenate([1 - t, t]),
+            (np.concatenate([row, row]), np.concatenate([place, place + 1])),
+        ),
+        shape=(len(row), len(knots)),
+    )
+
+
+def gap_rows(space_of: Multipliers, lips: LipPoints, jump: sp.csr_matrix) -> sp.csr_matrix:
+    """Rows N of the weak gaps `(g, n_dof)`: N u is the integral of mu n . [[u]].
+
+    Parameters
+    ----------
+    space_of : Multipliers
+    lips : LipPoints
+    jump : sparse matrix (q, n_dof)
+        Normal jump at the lip points, from `jump_matrix`.
+    """
+    return sp.csr_matrix(space_of.values.T @ sp.diags(lips.weight) @ jump)

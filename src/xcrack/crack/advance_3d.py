@@ -1,0 +1,385 @@
+"""Growth of cracks in space: their fronts advance, and a strip of triangles joins the surface."""
+
+import warnings
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from xcrack.arrays import Bools, Floats, Ints
+from xcrack.crack.crack import Crack
+from xcrack.crack.front_curve import front_curve
+from xcrack.crack.front_remeshing import (
+    Chain,
+    along_front,
+    chain,
+    divided,
+    faired,
+    spaced,
+    steps,
+    stitched,
+    without_loops,
+    without_notches,
+    without_sides,
+)
+from xcrack.crack.fronts_3d import Front, front_frames
+from xcrack.errors import GeometryError, XcrackWarning
+from xcrack.geometry.distances import first_crossing, surface_distance, triangle_tree
+
+LOW, HIGH = 0.5, 1.5  # bounds of the spacing of front points, in sizes
+_LEAST = 0.02  # of the size, and at most a tenth of the largest: a smaller advance is none
+_UPRIGHT = 0.05  # cosine to the expected normal below which a triangle is turned over
+_LOST = 0.05  # share of its length that fairing may take from a front before it is said
+_PASSES = 2.0  # of fairing, an advance of one size
+_SHARP = np.cos(np.radians(30.0))  # a front that turns by more has a corner
+_AHEAD = 0.6  # of the size: half as far from this place ahead of a front no crack may lie
+
+
+def advance_fronts(
+    crack: Crack, s: ArrayLike, front: ArrayLike, angle: ArrayLike, da: ArrayLike, size: float
+) -> Crack:
+    """Let the fronts of a placed crack in space advance.
+
+    Each vertex of a front moves by da (cos(angle) t + sin(angle) n) in its frame, and a strip of
+    triangles joins the old front with the new one. Angle and advance run between the given
+    places as monotone cubics, around closed fronts periodically; beyond the first and last place
+    of an open front they are constant. The new front is faired (see `front_points.faired`), its
+    points are merged and split so that they lie between 0.5 and 1.5 sizes apart.
+
+    Parameters
+    ----------
+    crack : Crack
+        Placed in a mesh.
+    s : (f,) array, length
+        Places along the fronts, from the first point of each, as in `SIF`.
+    front : (f,) array of int
+        Which front. A front that is not named stays.
+    angle : (f,) array, rad
+        Kink angle, positive towards the normal of lip +.
+    da : (f,) array, length
+        Advance; where it is 0 on both sides of a point of the front, that point stays. Advances
+        below a fiftieth of `size` (or a tenth of the largest one, if that is less) are none.
+    size : float, length
+        Spacing of the points of the new front, about half a cell to a cell.
+
+    Returns
+    -------
+    Crack
+        The old points and faces come first and are unchanged to the last bit; `fronts` hold the
+        new ones, in the same order and direction. Not yet placed again: parts of the fronts may
+        lie outside the body.
+
+    Raises
+    ------
+    GeometryError
+        Numbers that do not fit or are not finite, a front that closes upon itself, meets another
+        part of the crack, or folds because its neighbours turn in opposite directions.
+    """
+    s, angle, da = (np.asarray(v, dtype=float) for v in (s, angle, da))
+    number = np.asarray(front, dtype=np.int64)
+    _check(crack, s, number, angle, da, size)
+    n_points = len(crack.points)
+    points, faces, fronts, strips = [crack.points], [crack.faces], [], []
+    for k, old in enumerate(front_frames(crack)):
+        own = number == k
+        new = _strip(old, s[own], angle[own], da[own], size, n_points)
+        if new is None:
+            fronts.append((crack.fronts or ())[k])
+            continue
+        points.append(new.points)
+        faces.append(new.faces)
+        fronts.append(new.front)
+        strips.append((k, new))
+        n_points += len(new.points)
+    grown = Crack(np.concatenate(points), np.concatenate(faces), None, tuple(fronts))
+    for k, new in strips:
+        _check_free(crack, grown, k, new, size)
+    return grown
+
+
+@dataclass(frozen=True, eq=False)
+class _Strip:
+    """What one front adds to its crack."""
+
+    points: Floats
+    faces: Ints
+    front: Ints
+    start: Floats
+    stop: Floats
+
+
+def _check(crack: Crack, s: Floats, front: Ints, angle: Floats, da: Floats, size: float) -> None:
+    if crack.fronts is None:
+        raise GeometryError("the crack is not placed in a mesh: it has no fronts to advance.")
+    if not (s.ndim == 1 and s.shape == front.shape == angle.shape == da.shape):
+        raise GeometryError(
+            f"s, front, angle and da must be as long as each other, not {s.shape}, {front.shape}, "
+            f"{angle.shape} and {da.shape}."
+        )
+    if not (np.isfinite(size) and size > 0):
+        raise GeometryError(f"the size {size!r} of a front's sides must be positive and finite.")
+    for name, values in (("s", s), ("angle", angle), ("da", da)):
+        if not np.isfinite(values).all():
+            bad = int(np.argmin(np.isfinite(values)))
+            raise GeometryError(f"{name} = {values[bad]} at front place {bad} is not finite.")
+    if (da < 0).any():
+        bad = int(np.argmin(da))
+        raise GeometryError(f"da = {da[bad]} at front place {bad}: a crack does not shrink.")
+    if len(front) and not (front.min() >= 0 and front.max() < len(crack.fronts)):
+        raise GeometryError(
+            f"places name fronts {front.min()} to {front.max()}; the crack has fronts 0 to "
+            f"{len(crack.fronts) - 1}."
+        )
+
+
+def _strip(
+    old: Front, s: Floats, angle: Floats, da: Floats, size: float, n_points: int
+) -> _Strip | None:
+    """New points and faces ahead of one front; None where it stays."""
+    if not len(s) or da.max() == 0:
+        return None
+    sent = _sent(old, s, angle, da, size)
+    if sent is None:
+        return None
+    rays, vertex, normal = sent
+    front = without_loops(rays)
+    if len(front.x) < 3 and old.closed:
+        raise _closes(old)
+    # A wave along the front is damped, beyond da of a few sides turned over, by the growth itself:
+    # K is larger where the front lags behind. What longer steps overshoot more passes take away.
+    smooth = faired(front, int(np.clip(np.ceil(_PASSES * da.max() / size), 1, 8)))
+    before = np.linalg.norm(front.side, axis=1).sum()
+    after = np.linalg.norm(smooth.side, axis=1).sum()
+    if abs(after - before) > _LOST * before:
+        warnings.warn(
+            f"fairing changes the length of the front at {_at(smooth.x)} from {before:.4g} to "
+            f"{after:.4g}: its points zigzag. K along the front, or the advance, jumps from point "
+            "to point; smooth it, or take a smaller da.",
+            XcrackWarning,
+            stacklevel=4,
+        )
+    return _joined(old, rays, smooth, vertex, normal, size, n_points)
+
+
+def _joined(
+    old: Front,
+    rays: Chain,
+    front: Chain,
+    vertex: Ints,
+    normal: Floats,
+    size: float,
+    n_points: int,
+) -> _Strip:
+    """The strip to a new front whose points are merged and split, no triangle turned over.
+
+    Where points that have been left out turn triangles over (a short advance of a curved front)
+    they are taken back; where points that have run into each other do so, these are merged.
+    """
+    needed = np.zeros(len(rays.x), dtype=bool)
+    while True:
+        trial = _cleared(_with_held(front, rays.held | needed), size)
+        strip, bad = _stitched(old, trial, vertex, normal, size, n_points)
+        if not len(bad):
+            return strip
+        ends = np.concatenate([bad, (bad + 1) % len(trial.x)])
+        around = np.isin(trial.owner, ends)
+        if (around & ~needed).any():
+            needed |= around
+            continue
+        front = without_sides(_with_held(trial, rays.held), bad)
+        if old.closed and len(front.x) < 3:
+            raise _closes(old)
+        if len(front.x) == len(trial.x):
+            raise GeometryError(
+                f"the front that has come to {_at(trial.x[bad[:1]])} folds: neighbours turn in "
+                "opposite directions or run into each other there. Take a smaller da, or smooth "
+                "the angles along the front."
+            )
+
+
+def _with_held(front: Chain, rays: Bools) -> Chain:
+    """A front of which those points are held that one of the given rays has become."""
+    held = np.zeros(len(front.x), dtype=bool)
+    held[front.owner[rays]] = True
+    return replace(front, held=held)
+
+
+def _cleared(front: Chain, size: float) -> Chain:
+    """A front without short sides and notches."""
+    while True:
+        count = len(front.x)
+        front = without_notches(spaced(front, LOW * size))
+        if len(front.x) == count:
+            return front
+
+
+def _closes(old: Front) -> GeometryError:
+    return GeometryError(
+        f"the front around {_at(old.x)} closes upon itself: what it went around is cut through. "
+        "End growth before, or take a smaller da to come closer."
+    )
+
+
+def _at(x: Floats) -> list[float]:
+    return list(np.round(x.mean(axis=0), 6).tolist())
+
+
+def _sent(
+    old: Front, s: Floats, angle: Floats, da: Floats, size: float
+) -> tuple[Chain, Ints, Floats] | None:
+    """Where the points of a front go, which of them are its vertices, and the new normals.
+
+    Sides of the front much longer than `size` send out points from between their ends.
+    """
+    m, closed = len(old.x), old.closed
+    following = np.roll(np.arange(m), -1) if closed else np.arange(1, m)
+    leading = np.arange(len(following))
+    side = np.linalg.norm(old.x[following] - old.x[leading], axis=1)
+    breaks = front_curve(old.x, old.frame, closed).breaks
+    length = float(breaks[-1])
+    pieces = np.where(side > HIGH * size, np.round(side / size), 1).astype(np.int64)
+    inner = divided(old.x, closed, pieces, np.zeros(m, dtype=bool))
+    own_frame = _frames(old)
+    x: list[Floats] = []
+    place: list[float] = []
+    frame: list[Floats] = []
+    vertex: list[int] = []
+    for j in range(m):
+        vertex.append(len(place))
+        x.append(old.x[j : j + 1])
+        place.append(float(breaks[j]))
+        frame.append(own_frame[j : j + 1, :2])
+        if j == len(leading):
+            break
+        t = np.arange(1, pieces[j]) / pieces[j]
+        x.append(inner[j])
+        place.extend(breaks[j] + t * (breaks[j + 1] - breaks[j]))
+        blend = t[:, None, None]
+        frame.append((1 - blend) * own_frame[j, :2] + blend * own_frame[following[j], :2])
+    start, where = np.concatenate(x), np.array(place)
+    ahead, normal = np.concatenate(frame).transpose(1, 0, 2)
+    step = along_front(s, da, where, closed, length)
+    turn = along_front(s, angle, where, closed, length)
+    step[step < min(_LEAST * size, 0.1 * float(step.max()))] = 0.0
+    direction = np.cos(turn)[:, None] * ahead + np.sin(turn)[:, None] * normal
+    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+    stop = start + step[:, None] * direction
+    new_normal = np.cos(turn)[:, None] * normal - np.sin(turn)[:, None] * ahead
+    still = step == 0
+    if still.all():
+        return None
+    is_vertex = np.zeros(len(start), dtype=bool)
+    is_vertex[vertex] = True
+    kept = is_vertex | ~still
+    number = np.cumsum(kept) - 1
+    rays = chain(start[kept], stop[kept], still[kept], closed)
+    return rays, number[np.array(vertex)], new_normal[kept]
+
+
+def _frames(front: Front) -> Floats:
+    """Frames of a front, at its corners with the bisector of both sides for the direction ahead."""
+    frame = np.array(front.frame)
+    side = steps(front.x, front.closed)
+    side /= np.linalg.norm(side, axis=1, keepdims=True)
+    back = np.roll(side, 1, axis=0)
+    if not front.closed:
+        back, side = np.concatenate([side[:1], side]), np.concatenate([side, side[-1:]])
+    sharp = np.einsum("ij,ij->i", back, side) < _SHARP
+    along = (back + side)[sharp]
+    along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-300)
+    normal = frame[sharp, 1]
+    normal -= np.einsum("ij,ij->i", normal, along)[:, None] * along
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    frame[sharp] = np.stack([np.cross(normal, along), normal, along], axis=1)
+    return frame
+
+
+def _stitched(
+    old: Front, front: Chain, vertex: Ints, normal: Floats, size: float, n_points: int
+) -> tuple[_Strip, Ints]:
+    """The strip up to a new front, and the sides of it at which triangles are turned over."""
+    fixed = front.fixed()
+    length = np.linalg.norm(front.side, axis=1)
+    pieces = np.where(~fixed & (length > HIGH * size), np.round(length / size), 1).astype(np.int64)
+    n, n_rays = len(front.x), len(front.owner)
+    own_number = np.full(n, -1)
+    ray_to_vertex = np.full(n_rays, -1)
+    ray_to_vertex[vertex] = np.arange(len(vertex))
+    still = np.nonzero(front.still)[0]
+    own_number[front.owner[still]] = old.number[ray_to_vertex[still]]
+    inner = divided(front.x, front.closed, pieces, own_number >= 0)
+    points: list[Floats] = []
+    line: list[int] = []
+    begin = np.zeros(n, dtype=np.int64)
+    count = n_points
+    x_of: dict[int, Floats] = {int(number): x for number, x in zip(old.number, old.x)}
+    for g in range(n):
+        begin[g] = len(line)
+        new = [] if own_number[g] >= 0 else [front.x[g]]
+        if g < len(inner):
+            new.extend(inner[g])
+        if own_number[g] >= 0:
+            line.append(int(own_number[g]))
+        for x in new:
+            x_of[count] = x
+            line.append(count)
+            count += 1
+        points.extend(new)
+    if front.closed:
+        line.append(line[0])
+    end = np.append(begin[1:], len(line) - 1)
+    faces: list[tuple[int, int, int]] = []
+    bad: list[int] = []
+    sides = len(vertex) if front.closed else len(vertex) - 1
+    for j in range(sides):
+        first, last = int(vertex[j]), int(vertex[(j + 1) % len(vertex)])
+        last += n_rays if last <= first else 0
+        owners = front.owner[np.arange(first, last + 1) % n_rays]
+        ahead, across = [line[begin[owners[0]]]], []
+        for one, other in zip(owners, owners[1:]):
+            if one != other:
+                across.append(int(one))
+                ahead.extend(line[begin[one] + 1 : end[one] + 1])
+        corners = int(old.number[j]), int(old.number[(j + 1) % len(vertex)])
+        x = np.array([x_of[p] for p in (*corners, *ahead)])
+        expected = normal[first] + normal[last % n_rays]
+        expected /= np.linalg.norm(expected)
+        triangles, upright = stitched(corners, ahead, x, expected)
+        faces.extend(triangles)
+        if upright < _UPRIGHT:
+            bad.extend(across or [(int(owners[0]) - 1) % n, int(owners[0])])
+    bad = [side for side in bad if side < len(front.side)]
+    strip = _Strip(
+        np.array(points).reshape(-1, 3),
+        np.array(faces, dtype=np.int64).reshape(-1, 3),
+        np.array(line),
+        front.start[~front.still],
+        front.stop[~front.still],
+    )
+    return strip, np.array(bad, dtype=np.int64)
+
+
+def _check_free(old: Crack, grown: Crack, number: int, strip: _Strip, size: float) -> None:
+    """Raise where a front that has advanced meets another part of its crack."""
+    new = front_frames(grown)[number]
+    moved = new.number >= len(old.points)
+    if not new.closed:
+        moved[[0, -1]] = False  # outside the body, beside the outline of the mouth
+    probe = new.x[moved] + _AHEAD * size * _frames(new)[moved, 0]
+    phi, _, _ = surface_distance(probe, grown.points, grown.faces, _AHEAD * size)
+    hit = probe[np.abs(phi) < 0.5 * _AHEAD * size]
+    if not len(hit):
+        path = strip.stop - strip.start
+        length = np.linalg.norm(path, axis=1)
+        # The faces around the start of a path are its own.
+        far = length > 0.5 * size
+        start = strip.start[far] + path[far] * (0.5 * size / length[far])[:, None]
+        stop = strip.stop[far]
+        crossed, place = first_crossing(triangle_tree(old.points, old.faces), start, stop)
+        hit = (start + place[:, None] * (stop - start))[crossed >= 0]
+    if len(hit):
+        raise GeometryError(
+            f"front {number} of a crack meets another part of the same crack near "
+            f"{np.round(hit[0], 6).tolist()}: the ligament between them is cut through, which is "
+            "not modelled. End growth before, or describe what has joined as one crack and go on."
+        )

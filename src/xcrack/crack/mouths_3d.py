@@ -1,0 +1,287 @@
+"""Outlines of cracks in space against a body: open fronts led outside, mouths moved outside."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from xcrack.arrays import Bools, Floats, Ints
+from xcrack.errors import GeometryError
+from xcrack.geometry.triangulation import face_normals, rim, ruled, unit
+from xcrack.mesh.body import ON, Body
+
+SIDE = 0.75  # sides of a front are at most this share of a cell long
+OUTSIDE = 2.0  # cells by which an open front leaves the body
+SMOOTH = np.cos(np.radians(30.0))  # an outline that turns by more has a corner
+_LEAST = 1.25  # cells by which an old front may still be outside
+_REACH = 12.0  # cells within which a way out of the body is sought
+_INSIDE = 4.0  # cells of the body that lie at most on this way
+_STEP = 0.125  # of a cell, in this search
+_MEET = 0.3  # share of a mouth that its ends may come closer to each other outside
+
+
+@dataclass(frozen=True, eq=False)
+class Outline:
+    """One loop of a surface: its points, and of its sides which may be and which are front."""
+
+    loop: Ints
+    candidate: Bools
+    inside: Bools
+    first_time: bool
+
+
+def open_fronts(
+    points: Floats, faces: Ints, outline: Outline, body: Body
+) -> tuple[Floats, Ints, list[Ints]]:
+    """Open fronts of one outline, led out of the body, and its mouths moved outside."""
+    loop, m = outline.loop, len(outline.loop)
+    x = points[loop]
+    depth, _ = body.depth(x)
+    size = body.cell_size(x)
+    outward, normal = _outward(points, faces, loop)
+    runs = runs_of(outline.inside)
+    movable = outline.candidate | np.roll(outline.candidate, 1)
+    before: dict[int, Ints] = {}
+    after: dict[int, Ints] = {}
+    for mouth in runs_of(~outline.inside):
+        vertex = np.append(mouth, (mouth[-1] + 1) % m) if runs else mouth
+        offset = np.zeros((len(vertex), 3))
+        inner = np.array(movable[vertex])
+        if runs:
+            room = (len(mouth) - 1) // 2
+            old = outline.candidate[mouth] & (not outline.first_time)
+            ways = (x, depth, size, outward)
+            first, offset[0] = _led_out(*ways, vertex, old, room, body)
+            stop, offset[-1] = _led_out(*ways, vertex[::-1], old[::-1], room, body)
+            last = len(vertex) - 1 - stop
+            after[int(vertex[0])] = loop[vertex[1 : first + 1]]
+            before[int(vertex[-1])] = loop[vertex[last:-1]]
+            ends = offset[[0, -1]]
+            start, vertex = int(vertex[0]), vertex[first : last + 1]
+            goal = int(mouth[-1] + 1) % m
+            offset, inner = offset[: len(vertex)], inner[first : last + 1]
+            offset[[0, -1]] = ends
+            inner[[0, -1]] = False
+        way = _side_by_side(x[vertex], outward[vertex], offset) if runs else outward[vertex]
+        offset[inner] = _pushed(
+            x[vertex[inner]], way[inner], depth[vertex[inner]], size[vertex[inner]],
+            body, outline.first_time,
+        )  # fmt: skip
+        offset = _untangled(x, vertex, offset, normal, not runs)
+        long = np.linalg.norm(offset, axis=1)
+        if not long.any():
+            continue
+        layers = int(np.ceil((long / (SIDE * size[vertex])).max()))
+        number = len(points) + np.arange(layers)
+        new, strip = ruled(len(points), loop[vertex], x[vertex], offset, layers, not runs)
+        if runs and long[0] > 0:
+            after[start] = np.append(after[start], number)
+        if runs and long[-1] > 0:
+            chain = number + (int((long > 0).sum()) - 1) * layers
+            before[goal] = np.append(chain[::-1], before[goal])
+        points, faces = np.concatenate([points, new]), np.concatenate([faces, strip])
+    fronts = [
+        np.concatenate(
+            [
+                before[int(run[0])],
+                loop[run],
+                loop[[(run[-1] + 1) % m]],
+                after[int(run[-1] + 1) % m],
+            ]
+        )
+        for run in runs
+    ]
+    return points, faces, fronts
+
+
+def _outward(points: Floats, faces: Ints, loop: Ints) -> tuple[Floats, Floats]:
+    """Directions out of the surface at the points of a loop, and the normals at its sides."""
+    edges, owner = rim(faces)
+    n = len(points)
+    key = edges[:, 1] * n + edges[:, 0]
+    order = np.argsort(key)
+    side = np.searchsorted(key[order], loop * n + np.roll(loop, -1))
+    normal = face_normals(points, faces[owner[order[side]]])
+    along = np.roll(points[loop], -1, axis=0) - points[loop]
+    one = unit(np.cross(normal, along))
+    return unit(one + np.roll(one, 1, axis=0)), normal
+
+
+def _side_by_side(x: Floats, outward: Floats, offset: Floats) -> Floats:
+    """Ways out along a mouth that turn towards the rays at its ends, so that none are crossed."""
+    length = np.linalg.norm(np.diff(x, axis=0), axis=1)
+    s = np.concatenate([[0.0], np.cumsum(length)])
+    rest, mixed = np.ones(len(x)), np.zeros_like(x)
+    for end, away in ((0, s), (-1, s[-1] - s)):
+        long = float(np.linalg.norm(offset[end]))
+        if long > 0:
+            weight = np.maximum(1 - away / (2 * long), 0)
+            mixed += weight[:, None] * offset[end] / long
+            rest -= weight
+    return unit(mixed + np.maximum(rest, 0)[:, None] * outward)
+
+
+def _untangled(x: Floats, vertex: Ints, offset: Floats, normal: Floats, closed: bool) -> Floats:
+    """Rays of a mouth made even where neighbours cross, the ones at its ends kept."""
+    offset = np.array(offset)
+    for _ in range(40):
+        a, o = x[vertex], offset
+        if closed:
+            a, o = np.append(a, a[:1], axis=0), np.append(o, o[:1], axis=0)
+        along, far = np.diff(a, axis=0), np.diff(a + o, axis=0)
+        n = normal[vertex[: len(along)]]
+        turned = np.zeros(len(along), dtype=bool)
+        for one, other in ((along, along + o[1:]), (along + o[1:], o[:-1])):
+            area = np.einsum("ij,ij->i", np.cross(one, other), n)
+            turned |= area < -1e-12 * np.einsum("ij,ij->i", far, far)
+        if not turned.any():
+            break
+        moved = turned | np.roll(turned, 1) if closed else np.zeros(len(vertex), dtype=bool)
+        if not closed:
+            moved[1:-1] = turned[1:] | turned[:-1]
+        even = (np.roll(offset, 1, axis=0) + 2 * offset + np.roll(offset, -1, axis=0)) / 4
+        offset[moved] = even[moved]
+    return offset
+
+
+def _led_out(
+    x: Floats,
+    depth: Floats,
+    size: Floats,
+    outward: Floats,
+    vertex: Ints,
+    old: Bools,
+    room: int,
+    body: Body,
+) -> tuple[int, Floats]:
+    """How a front goes on from its last point `vertex[0]` until it is two cells outside.
+
+    It follows the outline while this is smooth, and always where it was front before (`old`).
+    Returns the number of points along the outline that it takes over, and a vector by which it
+    goes on straight from there (zero where the outline itself leads far enough).
+    """
+    m = len(x)
+    step = int((vertex[1] - vertex[0] + 1) % m) - 1
+    along = unit(x[vertex[0]] - x[(vertex[0] - step) % m])
+    tangent, leaves, corner = along, -1, False
+    for k in range(room + 1):
+        at = vertex[k]
+        if leaves < 0 and depth[at] >= -ON * size[at]:
+            leaves, tangent = k, along
+        enough = _LEAST if k > 0 and old[k - 1] and not old[k] else 0.999 * OUTSIDE
+        if depth[at] >= enough * size[at]:
+            return k, np.zeros(3)
+        following = unit(x[vertex[k + 1]] - x[at])
+        # Round a hollow corner the outline leads on; straight on lies the surface itself.
+        corner = bool(following @ along < SMOOTH and following @ outward[at] < 0) and not old[k]
+        turns_round = depth[at] > 0 and depth[vertex[k + 1]] < depth[at] and not old[k]
+        if corner or turns_round or k == room:
+            # From a corner the front goes on straight; an outline that turns round is left
+            # where it comes out of the body.
+            if corner or leaves < 0:
+                leaves, tangent = k, along
+            break
+        along = following
+    at = vertex[leaves]
+    way = outward[at]
+    across = x[vertex[-1 - leaves]] - x[at]
+    width = float(np.linalg.norm(across))
+    # Beside an outline that turns round its own tangent leaves no room for the mouth.
+    ways = [unit(tangent + way), way]
+    ways.insert(0 if corner else 2, tangent)
+    for direction in ways:
+        offset = _straight_out(x[at], direction, float(size[at]), body)
+        closer = float(offset @ across) / width
+        if closer > _MEET * width:
+            # The front at the other end of this mouth would be met outside the body.
+            straight = direction - (direction @ across) * across / width**2
+            offset = _straight_out(x[at], unit(straight + 1e-3 * way), float(size[at]), body)
+        if offset.any():
+            return leaves, offset
+    return leaves, np.zeros(3)
+
+
+def _straight_out(x: Floats, direction: Floats, size: float, body: Body) -> Floats:
+    """Vector by which the end of a front goes on, no shorter than a side; zero: no way out."""
+    length = _way_out(x[None], direction[None], np.array([size]), OUTSIDE, body)[0]
+    return np.asarray(direction * (max(length, SIDE * size) if length > 0 else 0.0))
+
+
+def _way_out(x: Floats, direction: Floats, size: Floats, wanted: float, body: Body) -> Floats:
+    """Lengths by which points move until they are some cells outside; zero: no way out.
+
+    Where the body begins again before, this is half way across the gap.
+
+    Parameters
+    ----------
+    x, direction : (k, 3) arrays
+    size : (k,) array, length
+        Of the cells.
+    wanted : float
+        Cells that the points shall lie outside.
+    body : Body
+
+    Returns
+    -------
+    (k,) array, length
+    """
+    steps = _STEP * np.arange(int(_REACH / _STEP) + 1)
+    trial = x[:, None] + (steps * size[:, None])[..., None] * direction[:, None]
+    every, _ = body.depth(trial.reshape(-1, 3))
+    result = np.zeros(len(x))
+    for k, row in enumerate(every.reshape(len(x), -1) / size[:, None]):
+        outside = row > ON
+        first = int(np.argmax(outside))
+        if not outside[first] or steps[first] > _INSIDE or (first == 0 and row[1] < row[0]):
+            continue
+        again = np.nonzero(~outside[first:])[0]
+        stop = first + int(again[0]) if len(again) else len(steps)
+        far = np.nonzero(row[first:stop] >= wanted)[0]
+        if len(far) and first + far[0] > 0:
+            j = first + int(far[0])
+            result[k] = steps[j] - _STEP * (row[j] - wanted) / (row[j] - row[j - 1])
+        elif len(again):
+            result[k] = (steps[first] + steps[stop]) / 2
+        else:
+            result[k] = steps[first] + wanted
+    return result * size
+
+
+def _pushed(
+    x: Floats, outward: Floats, depth: Floats, size: Floats, body: Body, first_time: bool
+) -> Floats:
+    """Vectors that lead points of a mouth one cell out of the body, zero where they are there."""
+    offset = np.zeros_like(x)
+    near = depth < 0.999 * size
+    if near.any():
+        if first_time:
+            _check_nick(x[near], outward[near], depth[near], size[near], body)
+        length = _way_out(x[near], outward[near], size[near], 1.0, body)
+        offset[near] = length[:, None] * outward[near]
+    return offset
+
+
+def _check_nick(x: Floats, way: Floats, depth: Floats, size: Floats, body: Body) -> None:
+    """Raise where a crack has just come in through the boundary that its outline is close to."""
+    inside = np.nonzero(depth < 0)[0]
+    if not len(inside):
+        return
+    ahead, _ = body.depth(x[inside] + 0.25 * size[inside, None] * way[inside])
+    bad = inside[ahead < depth[inside] - 0.01 * size[inside]]
+    if len(bad):
+        raise GeometryError(
+            f"the crack ends at {np.round(x[bad[0]], 6).tolist()}, {-depth[bad[0]]:.4g} inside the "
+            f"boundary that it comes from, which is less than half a cell ({size[bad[0]]:.4g}): "
+            "refine the mesh there, or leave this part of the crack out."
+        )
+
+
+def runs_of(flag: Bools) -> list[Ints]:
+    """Cyclic runs of true values, each as its places in order."""
+    if flag.all():
+        return [np.arange(len(flag))]
+    start = np.nonzero(flag & ~np.roll(flag, 1))[0]
+    result = []
+    for first in start:
+        place = (first + np.arange(len(flag))) % len(flag)
+        result.append(place[: int(np.argmin(flag[place]))])
+    return result

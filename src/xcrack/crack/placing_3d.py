@@ -1,0 +1,277 @@
+"""Cracks in space put into a mesh: what of their outline is front, and mouths led outside."""
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from xcrack.arrays import Bools, Floats, Ints
+from xcrack.crack.corners_3d import rounded
+from xcrack.crack.crack import Crack
+from xcrack.crack.mouths_3d import OUTSIDE, SIDE, SMOOTH, Outline, open_fronts, runs_of
+from xcrack.errors import GeometryError
+from xcrack.geometry.distances import closest_in, first_crossing, triangle_tree
+from xcrack.geometry.triangulation import (
+    components,
+    face_areas,
+    face_normals,
+    loops,
+    on_rim,
+    rim,
+    sides,
+    split_sides,
+    unit,
+)
+from xcrack.mesh.body import Body
+from xcrack.mesh.locate import locate
+from xcrack.mesh.mesh import Mesh
+
+_MOUTH = 0.5  # an edge within this share of a cell from the boundary is a mouth
+_NEAR = 3.0  # cells around the body in which the outline is refined
+_TOUCH = 1e-6  # share of a cell within which cracks touch
+
+
+def place_surface(crack: Crack, mesh: Mesh) -> Crack:
+    """Decide which parts of a crack's outline are front in this mesh, and lead mouths outside.
+
+    Parts of the outline inside the body are front; parts outside, or within half a cell of the
+    boundary, are mouth. The outline is divided into sides of about a cell; corners of the front
+    of a plane crack are rounded with a radius of two cells.
+
+    Parameters
+    ----------
+    crack : Crack
+        In space. If its fronts are known already, only these are looked at again, and its points
+        stay as they are.
+    mesh : Mesh
+
+    Returns
+    -------
+    Crack
+        With `fronts` set. Ends of open fronts lie two cells outside the body, mouths at least
+        one cell (less in a gap that is narrower).
+
+    Raises
+    ------
+    GeometryError
+        No part of the crack lies inside the body; or the crack is smaller than a cell, or ends
+        less than half a cell inside the boundary that it comes from.
+    """
+    if crack.dim != mesh.dim:
+        raise GeometryError(f"a {crack.dim}D crack cannot be put into a {mesh.dim}D mesh.")
+    body = Body.of(mesh)
+    _check_inside(crack, body)
+    points, faces = np.array(crack.points), np.array(crack.faces)
+    first_time = crack.fronts is None
+    if first_time:
+        points, faces = _refined(points, faces, body)
+        points, faces = _with_round_corners(points, faces, body)
+        _check_size(points, faces, body)
+    owner = {
+        (int(a), int(b)): number
+        for number, front in enumerate(crack.fronts or ())
+        for a, b in zip(front, front[1:], strict=False)
+    }
+    fronts: list[tuple[int, Ints]] = []
+    for loop in loops(faces):
+        pairs = zip(loop.tolist(), np.roll(loop, -1).tolist(), strict=True)
+        number = np.array([0 if first_time else owner.get(pair, -1) for pair in pairs])
+        if (number < 0).all():
+            continue
+        inside = _front_sides(points[loop], number >= 0, body)
+        if inside.all():
+            fronts.append((int(number[0]), np.append(loop, loop[0])))
+            continue
+        outline = Outline(loop, number >= 0, inside, first_time)
+        points, faces, found = open_fronts(points, faces, outline, body)
+        fronts.extend(
+            (int(number[run[0]]), front) for run, front in zip(runs_of(inside), found, strict=True)
+        )
+    fronts.sort(key=lambda pair: pair[0])
+    return Crack(points, faces, None, tuple(front for _, front in fronts))
+
+
+def _check_inside(crack: Crack, body: Body) -> None:
+    """Raise where no part of the crack lies inside the body."""
+    mesh = body.mesh
+    near = closest_in(
+        triangle_tree(crack.points, crack.faces), mesh.points, 1.001 * float(mesh.cell_size.max())
+    )
+    foot = near.foot[near.triangle >= 0]
+    if len(foot):
+        depth, size = body.depth(foot)
+        # A crack that lies on the boundary does not cut the body.
+        if (depth < -_TOUCH * size).any():
+            return
+    low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
+    at_low, at_high = crack.points.min(axis=0), crack.points.max(axis=0)
+    raise GeometryError(
+        f"the crack in [{at_low.tolist()}, {at_high.tolist()}] lies outside the body, which fills "
+        f"[{low.tolist()}, {high.tolist()}]: move it inside."
+    )
+
+
+def _check_size(points: Floats, faces: Ints, body: Body) -> None:
+    """Raise where a piece of a crack inside the body is smaller than a cell."""
+    piece = components(faces)
+    edges, owner = rim(faces)
+    length = np.bincount(
+        piece[owner], weights=np.linalg.norm(points[edges[:, 1]] - points[edges[:, 0]], axis=1)
+    )
+    # The diameter of a disc, twice the width of a strip.
+    width = 4 * np.bincount(piece, weights=face_areas(points, faces)) / length
+    for k in np.nonzero(width < body.mesh.cell_size.max())[0]:
+        x = points[edges[piece[owner] == k, 0]]
+        depth, size = body.depth(x)
+        inside = depth < -_MOUTH * size
+        cell = float(body.cell_size(x).min())
+        if width[k] < cell and inside.any():
+            raise GeometryError(
+                f"the crack at {np.round(x[inside][0], 6).tolist()} is {width[k]:.4g} wide, less "
+                f"than the cell there ({cell:.4g}): refine the mesh around it or leave it out."
+            )
+
+
+def crack_area(crack: Crack) -> float:
+    """Area of all faces of a crack in space, length²."""
+    return float(face_areas(crack.points, crack.faces).sum())
+
+
+def _refined(points: Floats, faces: Ints, body: Body) -> tuple[Floats, Ints]:
+    """Faces divided until the sides of the outline in and near the body are shorter than a cell."""
+    for _ in range(40):
+        pairs = sides(faces)
+        marked = on_rim(faces)
+        ends = points[pairs[marked]]
+        middle = ends.mean(axis=1)
+        length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+        size = body.cell_size(middle)
+        long = length > SIDE * size
+        if long.any():
+            long[long] = body.depth(middle[long])[0] < length[long] / 2 + _NEAR * size[long]
+        if not long.any():
+            break
+        marked[marked] = long
+        points, faces = split_sides(points, faces, marked)
+    return points, faces
+
+
+def _with_round_corners(points: Floats, faces: Ints, body: Body) -> tuple[Floats, Ints]:
+    """Front corners of a plane crack rounded with a radius of two cells."""
+    normal = face_normals(points, faces)
+    extent = float(np.ptp(points, axis=0).max())
+    level = (points - points[0]) @ normal[0]
+    if np.abs(normal - normal[0]).max() > 1e-6 or np.abs(level).max() > 1e-8 * extent:
+        return points, faces
+    corners: list[int] = []
+    for loop in loops(faces):
+        x = points[loop]
+        along = unit(np.roll(x, -1, axis=0) - x)
+        turn = np.einsum("ij,ij->i", along, np.roll(along, 1, axis=0))
+        depth, size = body.depth((x + np.roll(x, -1, axis=0)) / 2)
+        inside = depth < -_MOUTH * size
+        corners.extend(loop[(turn < SMOOTH) & inside & np.roll(inside, 1)].tolist())
+    if not corners:
+        return points, faces
+    number = np.array(corners)
+    return rounded(points, faces, number, 2 * body.cell_size(points[number]))
+
+
+def _front_sides(x: Floats, candidate: Bools, body: Body) -> Bools:
+    """Sides of an outline that are front.
+
+    Where a front comes close to the boundary over less than two cells without leaving the body,
+    it runs on; a piece of front shorter than a cell is none.
+    """
+    following = np.roll(x, -1, axis=0)
+    depth, facet = body.depth((x + following) / 2)
+    size = body.cell_size((x + following) / 2)
+    length = np.linalg.norm(following - x, axis=1)
+    inside: Bools = (depth < -_MOUTH * facet) & candidate
+    for value, least in ((False, OUTSIDE), (True, 1.0)):
+        for run in runs_of(inside == value):
+            if len(run) == len(inside) or length[run].sum() >= least * size[run].max():
+                continue
+            if value or (candidate[run] & (depth[run] < 0)).all():
+                inside[run] = not value
+    return inside
+
+
+def check_surfaces(cracks: tuple[Crack, ...], mesh: Mesh) -> None:
+    """Raise where cracks in space cross or touch, or fronts of two come closer than a cell.
+
+    Parameters
+    ----------
+    cracks : tuple of Crack
+        Placed in the mesh.
+    mesh : Mesh
+
+    Raises
+    ------
+    GeometryError
+        Two cracks meet inside the body, or their fronts are too close for the mesh.
+    """
+    if len(cracks) < 2:
+        return
+    body = Body.of(mesh)
+    for j, crack in enumerate(cracks):
+        for i in range(j):
+            meeting = _meeting(cracks[i], crack, body)
+            if meeting is not None:
+                raise GeometryError(
+                    f"cracks {i} and {j} cross near {np.round(meeting, 6).tolist()}: crossing and "
+                    "branching cracks are not supported; end one of them a few cells before."
+                )
+    _check_apart(cracks, body)
+
+
+def _check_apart(cracks: tuple[Crack, ...], body: Body) -> None:
+    """Raise where fronts of two cracks come closer than a cell."""
+    parts, owners = [np.zeros((0, 3))], [np.zeros(0, dtype=np.int64)]
+    for i, crack in enumerate(cracks):
+        for front in crack.fronts or ():
+            parts.append(crack.points[front])
+            owners.append(np.full(len(front), i))
+    x, owner = np.concatenate(parts), np.concatenate(owners)
+    inside = body.contains(x)
+    x, owner = x[inside], owner[inside]
+    if len(np.unique(owner)) < 2:
+        return
+    cell, _ = locate(body.mesh, x)
+    size = body.cell_size(x)
+    pairs = cKDTree(x).query_pairs(float(size.max()), output_type="ndarray")
+    pairs = pairs[owner[pairs[:, 0]] != owner[pairs[:, 1]]]
+    apart = np.linalg.norm(x[pairs[:, 0]] - x[pairs[:, 1]], axis=1)
+    close = np.nonzero(
+        (apart < size[pairs].min(axis=1)) | (cell[pairs[:, 0]] == cell[pairs[:, 1]])
+    )[0]
+    if len(close):
+        k = close[np.argmin(apart[close])]
+        i, j = pairs[k]
+        raise GeometryError(
+            f"the front of crack {owner[i]} at {np.round(x[i], 6).tolist()} and that of crack "
+            f"{owner[j]} at {np.round(x[j], 6).tolist()} are {apart[k]:.4g} apart, closer than a "
+            f"cell ({size[i]:.4g}): refine the mesh between them, or join the cracks."
+        )
+
+
+def _meeting(one: Crack, other: Crack, body: Body) -> Floats | None:
+    """A point inside the body where two surfaces cross or touch, or None."""
+    low = np.maximum(one.points.min(axis=0), other.points.min(axis=0))
+    high = np.minimum(one.points.max(axis=0), other.points.max(axis=0))
+    if (low > high).any():
+        return None
+    found = [np.zeros((0, 3))]
+    for a, b in ((one, other), (other, one)):
+        tree = triangle_tree(b.points, b.faces)
+        pairs = np.unique(np.sort(sides(a.faces).reshape(-1, 2), axis=1), axis=0)
+        start, stop = a.points[pairs[:, 0]], a.points[pairs[:, 1]]
+        triangle, position = first_crossing(tree, start, stop)
+        hit = triangle >= 0
+        found.append(start[hit] + position[hit, None] * (stop - start)[hit])
+        # Surfaces in one plane cross nothing, but lie on each other.
+        x = np.concatenate([a.points, a.points[a.faces].mean(axis=1)])
+        size = body.cell_size(x)
+        near = closest_in(tree, x, _TOUCH * float(size.max()))
+        found.append(x[(near.triangle >= 0) & (near.distance < _TOUCH * size)])
+    points = np.concatenate(found)
+    points = points[body.contains(points)]
+    return points[0] if len(points) else None

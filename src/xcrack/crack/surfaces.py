@@ -1,0 +1,402 @@
+"""Cracks in space: flat ones by their outline, others by their triangles."""
+
+import warnings
+from os import PathLike
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from xcrack.arrays import Floats, Ints
+from xcrack.crack.crack import Crack
+from xcrack.errors import GeometryError, XcrackError
+from xcrack.geometry.polygon import ear_clipped, self_crossing
+from xcrack.geometry.triangulation import face_areas, oriented, rim, side_keys
+
+_FLAT = 1e-9  # share of its size by which a plane polygon may leave its plane
+_FEWEST = 8  # boundary points that still make a disc
+
+
+def penny_crack(center: ArrayLike, normal: ArrayLike, radius: float, *, n: int = 128) -> Crack:
+    """Circular crack in space.
+
+    Parameters
+    ----------
+    center : (3,) array, length
+    normal : (3,) array
+        Points from lip - to lip +; need not have unit length.
+    radius : float, length
+    n : int
+        Points on the circle. With 128 the polygon stays within 3e-4 of the radius of it.
+
+    Returns
+    -------
+    Crack
+
+    Raises
+    ------
+    GeometryError
+        Values that are not finite, no normal, a radius that is not positive, n below 8.
+
+    Examples
+    --------
+    >>> penny_crack((0, 0, 0), (0, 0, 1), 2.0, n=32).dim
+    3
+    """
+    middle, direction = _vector(center, "center"), _vector(normal, "normal")
+    z = _unit(direction, "the normal of the penny crack")
+    x = np.eye(3)[int(np.argmin(np.abs(z)))]
+    x = np.cross(np.cross(z, x), z)
+    x /= np.linalg.norm(x)
+    return _disc(middle, x * _length(radius, "radius"), np.cross(z, x) * radius, n)
+
+
+def elliptic_crack(
+    center: ArrayLike,
+    normal: ArrayLike,
+    axis: ArrayLike,
+    a: float,
+    b: float,
+    *,
+    n: int = 128,
+) -> Crack:
+    """Elliptic crack in space.
+
+    Parameters
+    ----------
+    center : (3,) array, length
+    normal : (3,) array
+        Points from lip - to lip +; need not have unit length.
+    axis : (3,) array
+        Direction of the half-axis a; its part along the normal does not count.
+    a, b : float, length
+        Half-axes along `axis` and across it.
+    n : int
+        Points on the ellipse, denser where it is more curved.
+
+    Returns
+    -------
+    Crack
+
+    Raises
+    ------
+    GeometryError
+        Values that are not finite, no normal, an axis along the normal, half-axes that are not
+        positive, n below 8.
+
+    Examples
+    --------
+    >>> elliptic_crack((0, 0, 0), (0, 0, 1), (1, 0, 0), 2.0, 1.0).dim
+    3
+    """
+    middle = _vector(center, "center")
+    z = _unit(_vector(normal, "normal"), "the normal of the elliptic crack")
+    given = _vector(axis, "axis")
+    flat = given - (given @ z) * z
+    if not np.linalg.norm(flat) > 1e-9 * np.linalg.norm(given):
+        raise GeometryError(
+            f"the axis {given.tolist()} of the elliptic crack runs along its normal or is zero: "
+            "give the direction of the half-axis a, which lies in the plane of the crack."
+        )
+    x = flat / np.linalg.norm(flat)
+    y = np.cross(z, x)
+    return _disc(middle, x * _length(a, "half-axis a"), y * _length(b, "half-axis b"), n)
+
+
+def _disc(center: Floats, first: Floats, second: Floats, n: int) -> Crack:
+    """Disc spanned by two conjugate half-axes, in rings whose points become half as many."""
+    if int(n) != n or n < _FEWEST:
+        raise GeometryError(f"a round crack needs n of at least {_FEWEST} points, not n = {n}.")
+    rings = [(int(n), 1.0)]
+    while rings[-1][0] % 2 == 0 and rings[-1][0] >= 2 * _FEWEST:
+        count, radius = rings[-1]
+        side = 2 * np.pi * radius / count
+        # The inner side is twice as long as the outer one, the height between both.
+        inner = max(radius - 1.4 * side, radius / 2)
+        rings.append((count // 2, inner))
+    points, faces = [], []
+    begin = 0
+    for k, (count, radius) in enumerate(rings):
+        turns = np.arange(count) / count
+        points.append(
+            center
+            + radius * _cosine(turns)[:, None] * first
+            + radius * _cosine(turns - 0.25)[:, None] * second
+        )
+        i = np.arange(count)
+        outer = begin + i
+        if k == len(rings) - 1:
+            middle = np.full(count, begin + count)
+            faces.append(np.stack([outer, begin + (i + 1) % count, middle], axis=1))
+        else:
+            half = np.arange(count // 2)
+            inner_now = begin + count + half
+            inner_next = begin + count + (half + 1) % (count // 2)
+            even, odd = outer[::2], outer[1::2]
+            following = np.roll(even, -1)
+            faces.append(np.stack([even, odd, inner_now], axis=1))
+            faces.append(np.stack([odd, inner_next, inner_now], axis=1))
+            faces.append(np.stack([odd, following, inner_next], axis=1))
+        begin += count
+    points.append(center[None])
+    return Crack(np.concatenate(points), np.concatenate(faces))
+
+
+def _cosine(turns: Floats) -> Floats:
+    """Cosine of an angle in full turns, such that mirrored points mirror to the last bit."""
+    part = np.mod(turns, 1.0)
+    part = np.minimum(part, 1 - part)
+    back = part > 0.25
+    value = np.cos(2 * np.pi * np.where(back, 0.5 - part, part))
+    return np.where(part == 0.25, 0.0, np.where(back, -value, value))
+
+
+def plane_crack(polygon: ArrayLike) -> Crack:
+    """Flat crack in space bounded by a polygon.
+
+    Edges inside the body become its front as soon as it is put into a mesh, edges outside or
+    within half a cell of the boundary its mouth; corners of the front are rounded there.
+
+    Parameters
+    ----------
+    polygon : (m, 3) array, length
+        Corners in order; seen from the side of lip + they run counter-clockwise. Need not be
+        convex.
+
+    Returns
+    -------
+    Crack
+
+    Raises
+    ------
+    GeometryError
+        Fewer than three corners, nan, corners that coincide, a polygon that is not plane (to
+        1e-9 of its size), has no area or crosses itself.
+
+    Examples
+    --------
+    >>> plane_crack([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)])
+    Crack(4 points, 2 faces, not placed)
+    """
+    x = np.asarray(polygon, dtype=float)
+    if x.ndim != 2 or x.shape[1] != 3 or len(x) < 3:
+        raise GeometryError(f"a plane crack needs at least three corners (m, 3), not {x.shape}.")
+    if not np.isfinite(x).all():
+        bad = x[~np.isfinite(x).all(axis=1)][0].tolist()
+        raise GeometryError(f"corner {bad} of the plane crack is not finite.")
+    size = float(np.linalg.norm(np.ptp(x, axis=0)))
+    length = np.linalg.norm(np.roll(x, -1, axis=0) - x, axis=1)
+    if (length <= 1e-12 * size).any():
+        i = int(np.argmin(length))
+        raise GeometryError(
+            f"corners {i} and {(i + 1) % len(x)} of the plane crack both lie at {x[i].tolist()}: "
+            "leave one out (the first corner is not repeated at the end)."
+        )
+    local = x - x.mean(axis=0)
+    vector = np.cross(local, np.roll(local, -1, axis=0)).sum(axis=0)
+    if np.linalg.norm(vector) <= 1e-12 * size**2:
+        raise GeometryError(
+            f"the plane crack at {np.round(x[0], 6).tolist()} has no area: its corners lie on a "
+            "line, or the polygon crosses itself."
+        )
+    normal = vector / np.linalg.norm(vector)
+    height = local @ normal
+    if np.abs(height).max() > _FLAT * size:
+        i = int(np.argmax(np.abs(height)))
+        raise GeometryError(
+            f"corner {i} at {x[i].tolist()} lies {abs(height[i]):.4g} off the plane of the others; "
+            f"{_FLAT * size:.4g} is allowed. Use surface_crack for a crack that is not plane."
+        )
+    along = np.eye(3)[int(np.argmin(np.abs(normal)))]
+    along = np.cross(np.cross(normal, along), normal)
+    along /= np.linalg.norm(along)
+    flat = np.stack([local @ along, local @ np.cross(normal, along)], axis=1)
+    crossing = self_crossing(flat)
+    if crossing is not None:
+        i, j = crossing
+        raise GeometryError(
+            f"sides {i} and {j} of the plane crack meet near {np.round(x[j], 6).tolist()}: give "
+            "the corners in order around the crack."
+        )
+    return Crack(x, ear_clipped(flat))
+
+
+def surface_crack(points: ArrayLike, triangles: ArrayLike) -> Crack:
+    """Crack in space along a triangulated surface, in one or several pieces.
+
+    Faces are turned so that neighbours agree; the first face of each piece tells where lip + is
+    (on the side from which its points run counter-clockwise).
+
+    Parameters
+    ----------
+    points : (p, 3) array, length
+        Points that no triangle uses are dropped.
+    triangles : (f, 3) array of int
+        Point numbers of each triangle.
+
+    Returns
+    -------
+    Crack
+
+    Raises
+    ------
+    GeometryError
+        Wrong shapes, nan, point numbers out of range, triangles without area, sides with more
+        than two triangles, pieces that touch in a point only, a one-sided (Möbius) or a closed
+        surface.
+
+    Examples
+    --------
+    >>> surface_crack([(0, 0, 0), (1, 0, 0), (1, 1, 0.1), (0, 1, 0)], [(0, 1, 2), (0, 3, 2)])
+    Crack(4 points, 2 faces, not placed)
+    """
+    x, faces = np.asarray(points, dtype=float), np.asarray(triangles)
+    if x.ndim != 2 or x.shape[1] != 3:
+        raise GeometryError(f"the points of a surface crack must be (p, 3), not {x.shape}.")
+    if faces.ndim != 2 or faces.shape[1] != 3 or not len(faces):
+        raise GeometryError(f"the triangles of a surface crack must be (f, 3), not {faces.shape}.")
+    faces = faces.astype(np.int64)
+    if faces.min() < 0 or faces.max() >= len(x):
+        bad = int(np.argmax(((faces < 0) | (faces >= len(x))).any(axis=1)))
+        raise GeometryError(
+            f"triangle {bad} {faces[bad].tolist()} of the surface crack names a point outside "
+            f"0 ... {len(x) - 1}."
+        )
+    used, inverse = np.unique(faces, return_inverse=True)
+    x, faces = x[used], inverse.reshape(-1, 3)
+    if not np.isfinite(x).all():
+        bad = int(used[np.argmax(~np.isfinite(x).all(axis=1))])
+        raise GeometryError(f"point {bad} of the surface crack is not finite.")
+    _check_shape(x, faces)
+    turned = oriented(faces)
+    if turned is None:
+        raise GeometryError(
+            "the surface crack has only one side (a Möbius strip): cut it open, so that lip + and "
+            "lip - can be told apart."
+        )
+    edges, _ = rim(turned)
+    if not len(edges):
+        raise GeometryError(
+            f"the surface crack around {np.round(x.mean(axis=0), 6).tolist()} is closed: it would "
+            "cut a piece out of the body and has no front."
+        )
+    starts = np.bincount(edges[:, 0], minlength=len(x))
+    if starts.max() > 1:
+        raise GeometryError(
+            f"pieces of the surface crack touch at {x[int(np.argmax(starts))].tolist()} in a point "
+            "only: join them along a side, or move them apart."
+        )
+    return Crack(x, turned)
+
+
+def _check_shape(x: Floats, faces: Ints) -> None:
+    corner = x[faces]
+    longest = np.linalg.norm(corner - np.roll(corner, 1, axis=1), axis=2).max(axis=1)
+    thin = face_areas(x, faces) <= 1e-10 * longest**2
+    if thin.any():
+        bad = int(np.argmax(thin))
+        raise GeometryError(
+            f"triangle {bad} of the surface crack at {np.round(corner[bad][0], 6).tolist()} has no "
+            f"area ({int(thin.sum())} such triangles): remove it or merge its points."
+        )
+    key, count = np.unique(side_keys(faces), return_counts=True)
+    if count.max() > 2:
+        i, j = divmod(int(key[np.argmax(count)]), int(faces.max()) + 1)
+        raise GeometryError(
+            f"{int(count.max())} triangles meet at the side from {x[i].tolist()} to "
+            f"{x[j].tolist()}: a crack must not branch; describe the branches as cracks of their "
+            "own that end before they meet."
+        )
+
+
+def read_surface(path: str | PathLike[str]) -> Crack:
+    """Read a crack in space from a file with triangles.
+
+    Parameters
+    ----------
+    path : path
+        File in a format of meshio, told by its extension: ``.stl``, ``.obj``, ``.vtk``, ``.msh``
+        ... Points that coincide (every STL has them) are merged; other cells than triangles do
+        not count.
+
+    Returns
+    -------
+    Crack
+
+    Raises
+    ------
+    XcrackError
+        The file is missing or cannot be read.
+    GeometryError
+        It holds no triangles, or not such as `surface_crack` takes.
+    """
+    import meshio
+
+    path = Path(path)
+    if not path.is_file():
+        raise XcrackError(
+            f"surface file {str(path)!r} does not exist (looked in {Path.cwd()}): check the path."
+        )
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            raw = meshio.read(path)
+    except (Exception, SystemExit) as error:
+        raise XcrackError(
+            f"surface file {str(path)!r} cannot be read as {path.suffix or 'a file'}: {error}"
+        ) from error
+    blocks = [block.data for block in raw.cells if block.type == "triangle"]
+    if not blocks:
+        kinds = sorted({block.type for block in raw.cells})
+        raise GeometryError(
+            f"surface file {str(path)!r} holds no triangles, but {kinds or 'nothing'}: export the "
+            "surface as linear triangles."
+        )
+    return surface_crack(*_merged(np.asarray(raw.points, dtype=float), np.concatenate(blocks)))
+
+
+def _merged(points: Floats, triangles: Ints) -> tuple[Floats, Ints]:
+    """Points within 1e-7 of the size of the surface made one; triangles that collapse dropped."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+    from scipy.spatial import cKDTree
+
+    if points.shape[1] == 2:
+        points = np.column_stack([points, np.zeros(len(points))])
+    used = np.unique(triangles)
+    if not np.isfinite(points[used]).all():
+        return points, np.asarray(triangles, dtype=np.int64)
+    x = points[used]
+    # Single precision is what a binary STL stores.
+    close = cKDTree(x).query_pairs(1e-7 * float(np.ptp(x, axis=0).max()), output_type="ndarray")
+    n = len(x)
+    graph = coo_array((np.ones(len(close)), (close[:, 0], close[:, 1])), shape=(n, n))
+    group = connected_components(graph, directed=False)[1]
+    _, first = np.unique(group, return_index=True)
+    place = np.zeros(len(points), dtype=np.int64)
+    place[used] = group
+    faces = place[triangles]
+    whole = (faces != np.roll(faces, 1, axis=1)).all(axis=1)
+    return x[first], faces[whole]
+
+
+def _vector(value: ArrayLike, name: str) -> Floats:
+    vector = np.asarray(value, dtype=float)
+    if vector.shape != (3,):
+        raise GeometryError(f"{name} of a crack in space must have shape (3,), not {vector.shape}.")
+    if not np.isfinite(vector).all():
+        raise GeometryError(f"{name} {vector.tolist()} is not finite.")
+    return vector
+
+
+def _unit(vector: Floats, what: str) -> Floats:
+    length = float(np.linalg.norm(vector))
+    if length == 0:
+        raise GeometryError(f"{what} is zero: give the direction from lip - to lip +.")
+    return np.asarray(vector / length)
+
+
+def _length(value: float, name: str) -> float:
+    if not np.isfinite(value) or value <= 0:
+        raise GeometryError(f"{name} of a crack must be a positive length, not {value!r}.")
+    return float(value)

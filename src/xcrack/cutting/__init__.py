@@ -1,0 +1,1 @@
+"""Level sets of a crack, and the mesh cut by them."""

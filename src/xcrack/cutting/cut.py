@@ -1,0 +1,227 @@
+"""Cut of a mesh by a crack: sub-cells, lips and the cells at tips and fronts.
+
+All topology comes from the linear interpolant of the nodal level set, so that it is watertight
+from cell to cell. Sub-cell fractions are products of positive cut positions (no cancellation):
+tiny pieces keep their relative accuracy.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from xcrack.arrays import Bools, Floats, Ints, lock
+from xcrack.cutting.fronts_3d import behind, front_subs
+from xcrack.cutting.level_set import LevelSet
+from xcrack.cutting.tips_2d import tip_cells
+from xcrack.mesh.locate import barycentric
+from xcrack.mesh.mesh import Mesh
+from xcrack.mesh.split import cut_simplices, interface_simplices
+
+
+@dataclass(frozen=True, eq=False)
+class Cut:
+    """Where one crack runs through a mesh.
+
+    Attributes
+    ----------
+    level_set : LevelSet
+    cells : (k,) array of int
+        Cells cut from side to side (cells at tips and fronts are not among them).
+    sub_to_cell, sub_bary, sub_fraction, sub_side : arrays
+        Sub-cells of the cut cells and of the tip cells: mesh cell, barycentric coordinates of the
+        vertices `(s, d + 1, d + 1)`, share of the cell's volume, side +1 or -1. In a tip cell of
+        the plane vertex 0 of every sub-cell is the tip; in space no sub-cell at a front has
+        parts both ahead of it and behind.
+    lip_cell : (l, 2) array of int
+        Cell on side - and on side + of each lip segment or triangle; twice the same inside a cell.
+    lip_bary : (l, 2, d, d + 1) array
+        Its vertices in the barycentric coordinates of these cells.
+    lip_normal : (l, d) array
+        From lip - to lip +.
+    cut_edge : (e,) array
+        Cut position on each mesh edge, from its first point, nan where the crack does not cross.
+    side : (m,) array of int
+        Side of each cell, 0 where phi changes its sign in it.
+    """
+
+    level_set: LevelSet
+    cells: Ints
+    sub_to_cell: Ints
+    sub_bary: Floats
+    sub_fraction: Floats
+    sub_side: Ints
+    lip_cell: Ints
+    lip_bary: Floats
+    lip_normal: Floats
+    cut_edge: Floats
+    side: Ints
+
+    @cached_property
+    def is_cut(self) -> Bools:
+        """Which cells are cut from side to side `(m,)`."""
+        flag = np.zeros(len(self.side), dtype=bool)
+        flag[self.cells] = True
+        return lock(flag)
+
+    @cached_property
+    def is_tip(self) -> Bools:
+        """Which cells contain a tip `(m,)`."""
+        flag = np.zeros(len(self.side), dtype=bool)
+        for cells in self.level_set.tip_cells:
+            flag[cells] = True
+        return lock(flag)
+
+    @property
+    def n_tips(self) -> int:
+        """Number of tips of the crack."""
+        return len(self.level_set.psi)
+
+    def lip_points(self, mesh: Mesh) -> Floats:
+        """Vertices of the segments or triangles of the lips `(l, d, d)`, length."""
+        return np.einsum(
+            "lvb,lbd->lvd", self.lip_bary[:, 1], mesh.points[mesh.cells[self.lip_cell[:, 1]]]
+        )
+
+
+def cut(mesh: Mesh, level_set: LevelSet) -> Cut:
+    """Cut a mesh along the level sets of a crack."""
+    phi = level_set.phi
+    values = phi[mesh.cells]
+    crossed = (values.min(axis=1) < 0) & (values.max(axis=1) > 0)
+    positions, exists = _edge_positions(mesh, phi)
+    is_tip = np.zeros(len(mesh.cells), dtype=bool)
+    for cells in level_set.tip_cells:
+        is_tip[cells] = True
+    candidates = np.nonzero(crossed & ~is_tip)[0]
+    lip, owner = interface_simplices(values[candidates])
+    psi = np.einsum("svb,sb->s", lip, level_set.inside[mesh.cells[candidates[owner]]])
+    sign_change = exists[mesh.cell_to_edge[candidates]]
+    close = (level_set.near[mesh.cell_to_edge[candidates]] | ~sign_change).all(axis=1)
+    kept = close & (np.bincount(owner, psi, len(candidates)) < 0)
+    cells = candidates[kept]
+
+    bary, fraction, side, parent = cut_simplices(values[cells])
+    lips = [_both(candidates[owner[kept[owner]]], lip[kept[owner]])]
+    edge_flag = np.zeros(len(mesh.edges), dtype=bool)
+    edge_flag[mesh.cell_to_edge[cells]] = True
+    subs = [(cells[parent], bary, fraction, side)]
+    if mesh.dim == 2:
+        for k, around in enumerate(level_set.tip_cells):
+            tip_subs, tip_lips, entry = tip_cells(mesh, level_set, k, around, positions, exists)
+            subs.append(tip_subs)
+            lips.append(_both(*tip_lips))
+            edge_flag[entry] = True
+    else:
+        front = np.nonzero(is_tip)[0]
+        front_parts, front_lips, entry = front_subs(mesh, level_set, front, positions)
+        subs.append(front_parts)
+        lips.append(_both(*front_lips))
+        edge_flag[entry] = True
+    lips.append(_facet_lips(mesh, level_set))
+    lip_cell = np.concatenate([part.cell for part in lips])
+    lip_bary = np.concatenate([part.bary for part in lips])
+    return Cut(
+        level_set=level_set,
+        cells=lock(cells),
+        sub_to_cell=lock(np.concatenate([s[0] for s in subs])),
+        sub_bary=lock(np.concatenate([s[1] for s in subs])),
+        sub_fraction=lock(np.concatenate([s[2] for s in subs])),
+        sub_side=lock(np.concatenate([s[3] for s in subs])),
+        lip_cell=lock(lip_cell),
+        lip_bary=lock(lip_bary),
+        lip_normal=lock(_lip_normals(mesh, phi, lip_cell, lip_bary)),
+        cut_edge=lock(np.where(edge_flag & exists, positions, np.nan)),
+        side=lock(np.where(crossed, 0, _cell_sides(values))),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Lips:
+    cell: Ints
+    bary: Floats
+
+
+def _both(cell: Ints, bary: Floats) -> _Lips:
+    """Lips inside cells: the same cell on both sides."""
+    return _Lips(np.stack([cell, cell], axis=1), np.stack([bary, bary], axis=1))
+
+
+def _cell_sides(values: Floats) -> Ints:
+    largest = np.take_along_axis(values, np.abs(values).argmax(axis=1)[:, None], 1)[:, 0]
+    return np.where(largest >= 0, 1, -1).astype(np.int64)
+
+
+def _edge_positions(mesh: Mesh, phi: Floats) -> tuple[Floats, Bools]:
+    a, b = phi[mesh.edges].T
+    exists = a * b < 0
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(exists, a / (a - b), np.nan), exists
+
+
+def _facet_lips(mesh: Mesh, level_set: LevelSet) -> _Lips:
+    """Lips that lie on facets of the mesh, each assembled once from its two cells."""
+    d = mesh.dim
+    zero = (level_set.phi[mesh.facets] == 0).all(axis=1)
+    facets = np.nonzero(zero & (mesh.facet_to_cell[:, 1] >= 0))[0]
+    empty = _Lips(np.zeros((0, 2), np.int64), np.zeros((0, 2, d, d + 1)))
+    if not len(facets):
+        return empty
+    cells = mesh.facet_to_cell[facets]
+    side = _cell_sides(level_set.phi[mesh.cells[cells.ravel()]]).reshape(-1, 2)
+    psi = level_set.inside[mesh.facets[facets]]
+    keep = (psi.min(axis=1) < 0) & (side[:, 0] != side[:, 1])
+    facets, cells, side, psi = facets[keep], cells[keep], side[keep], psi[keep]
+    if not len(facets):
+        return empty
+    cells = np.where(side[:, :1] > 0, cells[:, ::-1], cells)
+    if d == 2:
+        x, row = _up_to_tips(mesh, level_set, facets, cells, psi)
+    else:
+        part, row = behind(psi)
+        x = np.einsum("svb,sbd->svd", part, mesh.points[mesh.facets[facets[row]]])
+    cells = cells[row]
+    bary = np.stack(
+        [
+            np.stack([barycentric(mesh, cells[:, s], x[:, v]) for v in range(d)], axis=1)
+            for s in (0, 1)
+        ],
+        axis=1,
+    )
+    return _Lips(cells, np.where(np.abs(bary) < 1e-14, 0.0, bary))
+
+
+def _up_to_tips(
+    mesh: Mesh, level_set: LevelSet, facets: Ints, cells: Ints, psi: Floats
+) -> tuple[Floats, Ints]:
+    """Ends of the lips on plane facets, and the facet of each: those at a tip end there."""
+    x = mesh.points[mesh.facets[facets]]
+    ends_at_tip = np.zeros(len(facets), dtype=bool)
+    for k, tip in enumerate(level_set.tip):
+        own = level_set.psi[k][mesh.facets[facets]]
+        length = np.linalg.norm(x[:, 1] - x[:, 0], axis=1)
+        ahead, behind_ = own.argmax(axis=1), own.argmin(axis=1)
+        row = np.arange(len(facets))
+        reaches = (own[row, ahead] > -1e-9 * length) & (own[row, behind_] < -1e-9 * length)
+        reaches &= np.isin(cells, level_set.tip_cells[k]).any(axis=1)
+        begin = x[row, behind_]
+        x = np.where(
+            reaches[:, None, None], np.stack([begin, np.broadcast_to(tip, begin.shape)], 1), x
+        )
+        ends_at_tip |= reaches
+    near = np.nonzero(ends_at_tip | (psi.mean(axis=1) < 0))[0]
+    return x[near], near
+
+
+def _lip_normals(mesh: Mesh, phi: Floats, cell: Ints, bary: Floats) -> Floats:
+    """Unit normals of lip segments, exactly perpendicular to them, towards growing phi."""
+    corners = np.einsum("lvb,lbd->lvd", bary[:, 1], mesh.points[mesh.cells[cell[:, 1]]])
+    slope = np.einsum("lb,lbd->ld", phi[mesh.cells[cell[:, 1]]], mesh.gradient[cell[:, 1]])
+    if mesh.dim == 2:
+        along = corners[:, 1] - corners[:, 0]
+        normal = np.stack([-along[:, 1], along[:, 0]], axis=1)
+    else:
+        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    length = np.linalg.norm(normal, axis=1, keepdims=True)
+    normal = normal / np.maximum(length, 1e-300)
+    return np.asarray(normal * np.sign(np.einsum("ld,ld->l", normal, slope))[:, None])

@@ -1,0 +1,1 @@
+"""Triangles, polygons and distances as arrays; no mesh, no crack."""

@@ -1,0 +1,1 @@
+"""Criteria, laws, and the growth of cracks step by step."""

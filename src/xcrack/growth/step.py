@@ -1,0 +1,130 @@
+"""The values of a growth run: the load cycle, and one state of the cracks after the other."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from xcrack.analysis.solution import Solution
+from xcrack.crack.crack import Crack
+from xcrack.errors import ProblemError
+from xcrack.growth.advance import PerCrack
+from xcrack.sif.sif import SIF
+
+
+@dataclass(frozen=True, eq=False)
+class Cycle:
+    """The load states of one cycle.
+
+    Parameters
+    ----------
+    min, max : float, optional
+        Two factors on all loads of the problem.
+    states : sequence of load states, optional
+        Any number of states instead: each a factor, or a list of loads.
+
+    Raises
+    ------
+    ProblemError
+        Neither or both are given, a factor is not finite, or min > max.
+
+    Examples
+    --------
+    >>> Cycle(0.1, 1.0).load_states
+    (0.1, 1.0)
+    """
+
+    min: float | None = None
+    max: float | None = None
+    states: Sequence[Any] | None = None
+
+    def __post_init__(self) -> None:
+        if self.states is None:
+            if self.min is None or self.max is None:
+                raise ProblemError("a cycle is Cycle(min, max) or Cycle(states=[...]).")
+            if not (np.isfinite(self.min) and np.isfinite(self.max) and self.min <= self.max):
+                raise ProblemError(f"Cycle({self.min}, {self.max}): give finite min <= max.")
+            return
+        if self.min is not None or self.max is not None:
+            raise ProblemError("a cycle is Cycle(min, max) or Cycle(states=[...]), not both.")
+        if isinstance(self.states, str) or len(self.states) == 0:
+            raise ProblemError("Cycle(states=...) takes a list of at least one load state.")
+        object.__setattr__(self, "states", tuple(self.states))
+
+    @property
+    def load_states(self) -> tuple[Any, ...]:
+        """The states as `solve` takes them."""
+        return (self.min, self.max) if self.states is None else tuple(self.states)
+
+
+@dataclass(frozen=True, eq=False)
+class Memory:
+    """What a step leaves to the next one, beside what it reports.
+
+    Attributes
+    ----------
+    law_rate : tuple of (f,) arrays, length/cycle
+        Rates before the threshold is applied: the cycles of a step that ends below it are finite.
+    length : tuple of float, length
+        Length of each crack inside the body; in space its area over the length of its fronts.
+    pending : tuple of (f,) arrays, length
+        Growth too short to be modelled yet.
+    radius : float, length, or None
+        Enriched radius of the first step.
+    warm : anything that `store` can store
+        What the solver starts the next contact iteration from.
+    settings : mapping of str to str
+        What the run was asked to do.
+    """
+
+    law_rate: PerCrack
+    length: tuple[float, ...]
+    pending: PerCrack
+    radius: float | None
+    warm: Any
+    settings: Mapping[str, str]
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """One state of the cracks during growth.
+
+    Attributes
+    ----------
+    index : int
+        0 for the cracks as they were given.
+    cycles : float
+        Cycles until the cracks look like this.
+    cracks : tuple of Crack
+    sif : tuple of tuple of SIF
+        ``sif[state][crack]``.
+    angle, dK_eq, R, rate, da : tuple of (f,) arrays
+        One array a crack: kink angle (rad), equivalent range (stress √length), ratio, growth a
+        cycle (length/cycle; 0 below the threshold), and the advance from here to the next step
+        (length; 0 for a tip whose growth is still shorter than a tenth of a cell: it waits).
+    solutions : tuple of Solution
+        One for each load state; empty in a step that was read from disk.
+    memory : Memory, optional
+        What the next step needs.
+    """
+
+    index: int
+    cycles: float
+    cracks: tuple[Crack, ...]
+    sif: tuple[tuple[SIF, ...], ...]
+    angle: PerCrack
+    dK_eq: PerCrack
+    R: PerCrack
+    rate: PerCrack
+    da: PerCrack
+    solutions: tuple[Solution, ...] = ()
+    memory: Memory | None = None
+
+    @property
+    def n_tips(self) -> int:
+        """Number of tips of all cracks."""
+        return sum(len(a) for a in self.angle)
+
+
+__all__ = ["Cycle", "Memory", "Step"]

@@ -1,0 +1,1 @@
+"""Runs collected, kept on disk and taken up again."""

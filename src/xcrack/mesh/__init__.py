@@ -1,0 +1,1 @@
+"""Meshes of simplices: their values, generators, files, and where points lie in them."""

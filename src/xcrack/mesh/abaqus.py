@@ -1,0 +1,261 @@
+"""Abaqus input files: meshio's reader knows no plane strain elements and no surfaces."""
+
+import re
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+
+import numpy as np
+
+from xcrack.arrays import Floats, Ints
+from xcrack.errors import MeshError
+from xcrack.mesh.mesh import Mesh
+from xcrack.mesh.raw import TOPOLOGICAL_DIM, RawMesh, sets_to_write
+
+_PLANE = r"(?:CPS|CPEG?|CG?AX|DC2D|DCAX|AC2D|STRI|S|DS|M3D|SFM3D|R3D|F3D)(\d)"
+_SOLID = r"(?:C3D|DC3D|AC3D)(\d+)"
+_LINE = r"(?:T2D2|T3D2|R2D2|RAX2|B21|B23|B31|B33|SAX1|DC1D2|F2D2)"
+_LINE_3 = r"(?:T2D3|T3D3|B22|B32|SAX2|DC1D3)"
+_PLANE_KIND = {"3": "triangle", "4": "quad", "6": "triangle6", "8": "quad8", "9": "quad9"}
+_SOLID_KIND = {
+    "4": "tetra", "5": "pyramid", "6": "wedge", "8": "hexahedron", "10": "tetra10",
+    "15": "wedge15", "20": "hexahedron20",
+}  # fmt: skip
+_NODES = {
+    "line": 2, "line3": 3, "triangle": 3, "quad": 4, "triangle6": 6, "quad8": 8, "quad9": 9,
+    "tetra": 4, "pyramid": 5, "wedge": 6, "hexahedron": 8, "tetra10": 10, "wedge15": 15,
+    "hexahedron20": 20,
+}  # fmt: skip
+# Faces S1, S2, ... of an element, as local node numbers (Abaqus manual, element library).
+_FACES = {
+    "triangle": ((0, 1), (1, 2), (2, 0)),
+    "tetra": ((0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0)),
+}
+_WRITTEN_TYPES = {2: ("T3D2", "CPS3"), 3: ("S3", "C3D4")}  # facets, cells
+_FACE_KIND = {"triangle": "line", "tetra": "triangle"}
+
+Section = tuple[str, dict[str, str], list[list[str]]]
+
+
+def read_abaqus(path: Path) -> RawMesh:
+    """Read nodes, elements, sets and element surfaces of an Abaqus input file.
+
+    Parameters
+    ----------
+    path : Path
+        The file; files that it includes are looked for beside it.
+
+    Returns
+    -------
+    RawMesh
+        Its contents. Sets keep the case of their first coming.
+
+    Raises
+    ------
+    MeshError
+        Several parts, an element that names an unknown node, a line that is no numbers.
+    """
+    nodes: dict[int, list[float]] = {}
+    elements: dict[int, tuple[str, list[int]]] = {}
+    element_sets: dict[str, list[int]] = {}
+    point_sets: dict[str, list[int]] = {}
+    faces: dict[str, list[tuple[str, str]]] = {}
+    parts = 0
+    for keyword, options, rows in _sections(path):
+        try:
+            if keyword == "NODE":
+                nodes.update((int(r[0]), [float(v or 0) for v in r[1:4]]) for r in rows)
+            elif keyword == "ELEMENT":
+                kind = _kind(options.get("TYPE", ""))
+                new = {e[0]: (kind, e[1:]) for e in _elements(kind, rows)}
+                elements.update(new)
+                if "ELSET" in options:
+                    _collect(element_sets, options["ELSET"], new)
+            elif keyword == "ELSET":
+                _collect(element_sets, options["ELSET"], _members(options, rows, element_sets))
+            elif keyword == "NSET":
+                _collect(point_sets, options["NSET"], _members(options, rows, point_sets))
+            elif keyword == "SURFACE" and options.get("TYPE", "ELEMENT").upper() == "ELEMENT":
+                pairs = [(r[0], r[1].upper()) for r in rows if len(r) > 1]
+                faces.setdefault(options["NAME"], []).extend(pairs)
+            parts += keyword == "PART"
+        except (ValueError, KeyError, IndexError) as error:
+            raise MeshError(f"{path.name}: cannot read a *{keyword} section ({error}).") from error
+    if parts > 1:
+        raise MeshError(
+            f"{path.name} has {parts} parts, whose node numbers clash: merge them into one part "
+            "and write the input file anew."
+        )
+    return _raw(path.name, nodes, elements, element_sets, point_sets, faces)
+
+
+def write_abaqus(path: Path, mesh: Mesh) -> None:
+    """Write a mesh as Abaqus input: cells as CPS3 or C3D4, facets of sets as T3D2 or S3.
+
+    Parameters
+    ----------
+    path : Path
+        Where to.
+    mesh : Mesh
+        What to write; its sets become ``*ELSET``.
+
+    Raises
+    ------
+    MeshError
+        A name of a set with a comma, a line break or space at an end.
+    """
+    facet_sets, cell_sets = sets_to_write(mesh)
+    for name in (*facet_sets, *cell_sets):
+        if not name or "," in name or "\n" in name or name != name.strip():
+            raise MeshError(f"set name {name!r}: Abaqus files hold no commas or line breaks.")
+    numbers = {name: mesh.facet_numbers(facets) for name, facets in facet_sets.items()}
+    rows = np.unique(np.concatenate([np.zeros(0, np.int64), *numbers.values()]))
+    flat = ", 0." * (3 - mesh.dim)
+    facet_type, cell_type = _WRITTEN_TYPES[mesh.dim]
+    lines = ["*HEADING", "mesh written by xcrack", "*NODE"]
+    lines += [
+        f"{i}, {', '.join(map(repr, x))}{flat}" for i, x in enumerate(mesh.points.tolist(), 1)
+    ]
+    if len(rows):
+        lines += [f"*ELEMENT, TYPE={facet_type}", *_rows(mesh.facets[rows], 1)]
+    lines += [f"*ELEMENT, TYPE={cell_type}", *_rows(mesh.cells, 1 + len(rows))]
+    for name in dict.fromkeys([*facet_sets, *cell_sets]):
+        members = np.concatenate(
+            [
+                1 + np.searchsorted(rows, numbers.get(name, np.zeros(0, np.int64))),
+                1 + len(rows) + np.asarray(cell_sets.get(name, []), dtype=np.int64),
+            ]
+        ).tolist()
+        lines.append(f"*ELSET, ELSET={name}")
+        lines += [", ".join(map(str, members[i : i + 16])) for i in range(0, len(members), 16)]
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def _rows(elements: Ints, first: int) -> Iterable[str]:
+    for i, row in enumerate((elements + 1).tolist(), first):
+        yield f"{i}, {', '.join(map(str, row))}"
+
+
+def _sections(path: Path) -> Iterator[Section]:
+    """Keyword, options and data rows of each section, included files in their place."""
+    keyword = ""
+    options: dict[str, str] = {}
+    rows: list[list[str]] = []
+    for line in path.read_text(encoding="utf-8", errors="replace").splitlines():
+        text = line.strip()
+        if not text or text.startswith("**"):
+            continue
+        if not text.startswith("*"):
+            rows.append([entry.strip() for entry in text.rstrip(",").split(",")])
+            continue
+        if keyword:
+            yield keyword, options, rows
+        head, *entries = text[1:].split(",")
+        keyword, rows = head.strip().upper(), []
+        pairs = (entry.partition("=") for entry in entries)
+        options = {key.strip().upper(): value.strip().strip('"') for key, _, value in pairs}
+        if keyword == "INCLUDE" and "INPUT" in options:
+            inner = path.parent / options["INPUT"]
+            if not inner.is_file():
+                raise MeshError(f"{path.name} includes {str(inner)!r}, which does not exist.")
+            yield from _sections(inner)
+    if keyword:
+        yield keyword, options, rows
+
+
+def _kind(element_type: str) -> str:
+    name = element_type.upper()
+    if found := re.match(_SOLID, name):
+        return _SOLID_KIND.get(found.group(1), element_type)
+    if re.match(_LINE_3, name):
+        return "line3"
+    if re.match(_LINE, name):
+        return "line"
+    if found := re.match(_PLANE, name):
+        return _PLANE_KIND.get(found.group(1), element_type)
+    return element_type or "element without TYPE"
+
+
+def _elements(kind: str, rows: list[list[str]]) -> list[list[int]]:
+    if kind not in _NODES:
+        return [[int(v) for v in row if v] for row in rows]
+    # Long elements go on in the next line, so count entries, not lines.
+    flat = [int(v) for row in rows for v in row if v]
+    width = _NODES[kind] + 1
+    if len(flat) % width:
+        raise ValueError(f"{len(flat)} numbers for elements of {width} each")
+    return [flat[i : i + width] for i in range(0, len(flat), width)]
+
+
+def _find(sets: dict[str, list[int]], name: str) -> str:
+    return next((known for known in sets if known.casefold() == name.casefold()), name)
+
+
+def _collect(sets: dict[str, list[int]], name: str, members: Iterable[int]) -> None:
+    sets.setdefault(_find(sets, name), []).extend(members)
+
+
+def _members(
+    options: dict[str, str], rows: list[list[str]], sets: dict[str, list[int]]
+) -> list[int]:
+    if "GENERATE" in options:
+        members: list[int] = []
+        for row in rows:
+            first, last, step = (*map(int, row), 1)[:3]
+            members += range(first, last + 1, step)
+        return members
+    members = []
+    for entry in (entry for row in rows for entry in row if entry):
+        members += [int(entry)] if entry.isdigit() else sets.get(_find(sets, entry), [])
+    return members
+
+
+def _raw(
+    source: str,
+    nodes: dict[int, list[float]],
+    elements: dict[int, tuple[str, list[int]]],
+    element_sets: dict[str, list[int]],
+    point_sets: dict[str, list[int]],
+    faces: dict[str, list[tuple[str, str]]],
+) -> RawMesh:
+    points: Floats = np.zeros((len(nodes), 3))
+    for i, x in enumerate(nodes.values()):
+        points[i, : len(x)] = x
+    number = {node: i for i, node in enumerate(nodes)}
+
+    def by_kind(members: Iterable[int]) -> Iterator[tuple[str, Ints]]:
+        kinds: dict[str, list[list[int]]] = {}
+        for member in dict.fromkeys(members):
+            if member in elements:
+                kind, corners = elements[member]
+                kinds.setdefault(kind, []).append(corners)
+        for kind, rows in kinds.items():
+            if kind in TOPOLOGICAL_DIM:
+                try:
+                    yield kind, np.array([[number[node] for node in row] for row in rows])
+                except KeyError as error:
+                    raise MeshError(
+                        f"{source}: an element names node {error}, which the file lacks."
+                    ) from error
+            else:
+                yield kind, np.zeros((len(rows), 1), dtype=np.int64)
+
+    blocks = list(by_kind(elements))
+    sets = [
+        (kind, name, rows)
+        for name, members in element_sets.items()
+        for kind, rows in by_kind(members)
+    ]
+    for name, pairs in faces.items():
+        for where, face in pairs:
+            if not re.fullmatch(r"S\d", face):
+                continue  # SPOS, SNEG: sides of a shell
+            known = element_sets.get(_find(element_sets, where), [])
+            for kind, rows in by_kind([int(where)] if where.isdigit() else known):
+                local = _FACES.get(kind, ())
+                if int(face[1]) <= len(local):
+                    sets.append((_FACE_KIND[kind], name, rows[:, local[int(face[1]) - 1]]))
+    rows_of = [
+        (name, np.array([number[n] for n in members if n in number], dtype=np.int64))
+        for name, members in point_sets.items()
+    ]
+    return RawMesh(points, blocks, sets, rows_of)

@@ -1,0 +1,83 @@
+"""Structured meshes."""
+
+from itertools import permutations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from xcrack.arrays import Bools, Ints
+from xcrack.errors import MeshError
+from xcrack.mesh.mesh import Mesh
+
+
+def box(lower: ArrayLike, upper: ArrayLike, n: int | tuple[int, ...]) -> Mesh:
+    """Structured simplices in a box, diagonals alternating from cell to cell.
+
+    Parameters
+    ----------
+    lower, upper : (d,) array, length
+        Opposite corners, d = 2 or 3.
+    n : int or tuple of int
+        Cells a direction.
+
+    Returns
+    -------
+    Mesh
+        Facet sets ``left/right`` (x), ``bottom/top`` (last axis), in space ``front/back`` (y).
+
+    Raises
+    ------
+    MeshError
+        Corners that do not span a box, or n below 1.
+
+    Examples
+    --------
+    >>> box((0, 0), (2, 1), (4, 2))
+    Mesh(15 points, 16 triangles, facet sets: left, right, bottom, top, boundary)
+    """
+    low, high = np.asarray(lower, dtype=float), np.asarray(upper, dtype=float)
+    d = len(low)
+    count = np.broadcast_to(np.asarray(n, dtype=np.int64), (d,))
+    if d not in (2, 3) or high.shape != low.shape or not (high > low).all():
+        raise MeshError(f"box: upper {high.tolist()} must exceed lower {low.tolist()}, d = 2 or 3.")
+    if (count < 1).any():
+        raise MeshError(f"box: n must be at least 1 in every direction, not {count.tolist()}.")
+    axes = [np.linspace(a, b, k + 1) for a, b, k in zip(low, high, count, strict=True)]
+    points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, d)
+    number = np.arange(len(points)).reshape(count + 1)
+    place = np.stack(np.meshgrid(*[np.arange(k) for k in count], indexing="ij"), -1).reshape(-1, d)
+    simplices = []
+    for path in permutations(range(d)):
+        corners = [np.zeros((len(place), d), dtype=np.int64)]
+        for axis in path:
+            corners.append(corners[-1] + np.eye(d, dtype=np.int64)[axis])
+        # Mirroring every second block keeps the mesh conforming and lets the diagonals alternate.
+        simplices.append(np.stack([_mirrored(place, c, number) for c in corners], axis=1))
+    stacked = np.stack(simplices, axis=1).reshape(-1, d + 1)
+    x = points[stacked]
+    turn = np.linalg.det(x[:, 1:] - x[:, :1]) < 0
+    stacked[turn] = stacked[turn][:, [1, 0, *range(2, d + 1)]]
+    names = (
+        [("left", "right"), ("bottom", "top")]
+        if d == 2
+        else [("left", "right"), ("front", "back"), ("bottom", "top")]
+    )
+    index = np.stack(np.unravel_index(np.arange(len(points)), tuple(count + 1)), axis=1)
+    sets = {}
+    for axis, both in enumerate(names):
+        for name, end in zip(both, (0, count[axis]), strict=True):
+            sets[name] = _facets_on(stacked, index[:, axis] == end)
+    return Mesh(points, stacked, sets)
+
+
+def _facets_on(cells: Ints, on_side: Bools) -> Ints:
+    """Facets all of whose points lie on a side, sorted as those of a mesh are."""
+    near = cells[on_side[cells].sum(axis=1) == cells.shape[1] - 1]
+    facets = np.sort(near[on_side[near]].reshape(len(near), -1), axis=1)
+    return facets[np.lexsort(facets.T[::-1])]
+
+
+def _mirrored(place: Ints, corner: Ints, number: Ints) -> Ints:
+    odd = place % 2 == 1
+    inside = np.where(odd, 1 - corner, corner)
+    return np.asarray(number[tuple((place + inside).T)])

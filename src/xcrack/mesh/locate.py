@@ -1,0 +1,108 @@
+"""Where points lie in a mesh."""
+
+import numpy as np
+
+from xcrack.arrays import Bools, Floats, Ints
+from xcrack.mesh.mesh import Mesh
+
+_TOLERANCE = 1e-10  # barycentric; a point this close to a cell belongs to it (round-off)
+
+
+def barycentric(mesh: Mesh, cell: Ints, x: Floats) -> Floats:
+    """Barycentric coordinates `(k, d + 1)` of points `(k, d)` in the given cells `(k,)`."""
+    from_first = x - mesh.points[mesh.cells[cell, 0]]
+    rest = np.einsum("kid,kd->ki", mesh.gradient[cell, 1:], from_first)
+    return np.concatenate([1 - rest.sum(axis=1, keepdims=True), rest], axis=1)
+
+
+def locate(mesh: Mesh, x: Floats) -> tuple[Ints, Floats]:
+    """Cell of each point `(k,)`, -1 outside, and its barycentric coordinates `(k, d + 1)`.
+
+    Candidates are taken by the distance of their centroids, among cells of like size, more and
+    more of them until no cell farther away could still reach the point.
+    """
+    x = np.atleast_2d(np.asarray(x, dtype=float))
+    cell = np.full(len(x), -1, dtype=np.int64)
+    bary = np.zeros((len(x), mesh.dim + 1))
+    boxed = ((x >= mesh.lower) & (x <= mesh.upper)).all(axis=1)
+    for number, tree, reach in mesh.cell_classes:
+        open_points = np.nonzero((cell < 0) & boxed)[0]
+        count, seen = 8, 0
+        while len(open_points) and seen < len(number):
+            count = min(count, len(number))
+            distance, near = tree.query(x[open_points], k=np.arange(seen + 1, count + 1))
+            n_new = near.shape[1]
+            flat = number[near.ravel()]
+            trial = barycentric(mesh, flat, np.repeat(x[open_points], n_new, axis=0))
+            inside = (trial.min(axis=1) >= -_TOLERANCE).reshape(-1, n_new)
+            hit = inside.any(axis=1)
+            pick = np.argmax(inside, axis=1)
+            rows = np.nonzero(hit)[0]
+            cell[open_points[rows]] = number[near[rows, pick[rows]]]
+            bary[open_points[rows]] = trial.reshape(-1, n_new, mesh.dim + 1)[rows, pick[rows]]
+            open_points = open_points[~hit & (distance[:, -1] <= reach)]
+            seen, count = count, 4 * count
+    return cell, bary
+
+
+def contains(mesh: Mesh, x: Floats) -> Bools:
+    """Which points lie in the body."""
+    return locate(mesh, x)[0] >= 0
+
+
+def nearest_boundary(mesh: Mesh, x: Floats) -> tuple[float, float]:
+    """Distance of one point to the boundary, and the size of the cell there."""
+    facets = mesh.facet_sets["boundary"]
+    tree = mesh.boundary_tree
+    first, _ = tree.query(x)
+    near = tree.query_ball_point(x, first + float(mesh.cell_size.max()))
+    distance = distance_to_simplices(np.asarray(x, dtype=float), mesh.points[facets[near]])
+    best = int(np.argmin(distance))
+    corners = mesh.points[facets[near[best]]]
+    size = np.linalg.norm(corners[:, None] - corners[None], axis=-1).max()
+    return float(distance[best]), float(size)
+
+
+def cells_within(mesh: Mesh, x: Floats, radius: float) -> Ints:
+    """Cells of a plane mesh that come nearer to a point outside them than a radius.
+
+    A cell that holds the point is among them only if its sides are near enough.
+    """
+    found = []
+    for number, tree, reach in mesh.cell_classes:
+        near = number[np.sort(np.array(tree.query_ball_point(x, radius + reach), dtype=np.int64))]
+        corners = mesh.points[mesh.cells[near]]
+        sides = [corners[:, pair] for pair in ([0, 1], [1, 2], [2, 0])]
+        distance = np.min([distance_to_simplices(x, side) for side in sides], axis=0)
+        found.append(near[distance <= radius])
+    return np.concatenate(found)
+
+
+def distance_to_simplices(x: Floats, corners: Floats) -> Floats:
+    """Distance of point x `(d,)` to segments `(k, 2, d)` or triangles `(k, 3, d)`."""
+    a, b = corners[:, 0], corners[:, 1]
+    if corners.shape[1] == 2:
+        return np.linalg.norm(x - closest_on_segment(x, a, b), axis=1)
+    c = corners[:, 2]
+    normal = np.cross(b - a, c - a)
+    area = np.einsum("kd,kd->k", normal, normal)
+    v = np.einsum("kd,kd->k", np.cross(b - a, x - a), normal) / area
+    w = np.einsum("kd,kd->k", np.cross(x - a, c - a), normal) / area
+    inside = (v >= 0) & (w >= 0) & (v + w <= 1)
+    plane = np.abs(np.einsum("kd,kd->k", x - a, normal)) / np.sqrt(area)
+    edges = np.min(
+        [
+            np.linalg.norm(x - closest_on_segment(x, p, q), axis=1)
+            for p, q in ((a, b), (b, c), (c, a))
+        ],
+        axis=0,
+    )
+    return np.where(inside, plane, edges)
+
+
+def closest_on_segment(x: Floats, a: Floats, b: Floats) -> Floats:
+    """Closest points on segments a b `(..., d)` to x."""
+    along = b - a
+    square = np.maximum((along * along).sum(axis=-1), 1e-300)
+    t = np.clip(((x - a) * along).sum(axis=-1) / square, 0, 1)
+    return np.asarray(a + t[..., None] * along)

@@ -1,0 +1,344 @@
+"""Plates with round holes, meshed by gmsh and graded towards where cracks will run."""
+
+from collections.abc import Callable, Iterable, Sequence
+from math import ceil, frexp, hypot, inf, isfinite, pi
+from types import ModuleType
+
+import numpy as np
+
+from xcrack.arrays import Floats, Ints
+from xcrack.errors import GeometryError, MeshError
+from xcrack.mesh.gmsh_session import session
+from xcrack.mesh.grading import graded_size, polylines
+from xcrack.mesh.mesh import Mesh
+
+Point = tuple[float, float]
+Hole = tuple[Point, float]
+Path = Sequence[Sequence[float]]
+
+_FEWEST_HOLE_EDGES = 24  # an inscribed polygon of 24 edges has lost 1.1 % of the disc's area
+_BAND = 0.25  # of the smallest radius: lengths of the body, so that halving both sizes halves
+_TRANSITION = 8.0  # the cell size everywhere, as convergence studies need
+_STEEPEST = 0.5  # growth of the cell size a unit of distance that still gives good triangles
+_MOST_POINTS = 5_000_000
+
+
+def plate_with_hole(
+    *,
+    width: float,
+    height: float,
+    radius: float,
+    size: float,
+    size_near: float | None = None,
+    center: Point = (0.0, 0.0),
+    along: Path | Sequence[Path] | None = None,
+    band: float | None = None,
+    transition: float | None = None,
+) -> Mesh:
+    """Rectangular plate centred at the origin with one round hole.
+
+    Parameters
+    ----------
+    width, height : float, length
+        Sides of the plate.
+    radius : float, length
+        Radius of the hole.
+    size : float, length
+        Cell size far away.
+    size_near : float, length, optional
+        Cell size at the hole and along `along`. By default `size`, or what a round hole needs.
+    center : (2,) floats, length
+        Centre of the hole.
+    along : (k, 2) points or several such polylines, length, optional
+        Where cracks will run: `size_near` holds within `band` of these lines.
+    band : float, length, optional
+        Distance from the hole and from `along` up to which `size_near` holds. By default a
+        quarter of the radius.
+    transition : float, length, optional
+        Distance beyond the band over which cells grow linearly to `size`. By default eight
+        radii, and never less than twice `size - size_near`.
+
+    Returns
+    -------
+    Mesh
+        Facet sets ``left``, ``right``, ``bottom``, ``top``, ``hole``. A node lies at
+        ``center + (radius, 0)`` and at the three quarter turns from it.
+
+    Raises
+    ------
+    GeometryError
+        A length that is not positive, a hole that does not fit, sizes larger than the plate.
+    XcrackError
+        gmsh cannot be imported; the message says what to install.
+
+    Examples
+    --------
+    A crack is to start at the right of the hole::
+
+        mesh = plate_with_hole(
+            width=100.0, height=100.0, radius=5.0, size=4.0, size_near=0.25,
+            along=[(5.0, 0.0), (12.0, 0.0)], transition=15.0,
+        )
+    """
+    _check_lengths(width=width, height=height, radius=radius)
+    return _plate(
+        width, height, (-width / 2, -height / 2), [(center, radius)], ["hole"], size, size_near,
+        along, band, transition,
+    )  # fmt: skip
+
+
+def plate(
+    width: float,
+    height: float,
+    *,
+    size: float,
+    size_near: float | None = None,
+    lower: Point = (0.0, 0.0),
+    holes: Iterable[Hole] = (),
+    along: Path | Sequence[Path] | None = None,
+    band: float | None = None,
+    transition: float | None = None,
+) -> Mesh:
+    """Rectangular plate with any number of round holes, none included.
+
+    Parameters
+    ----------
+    width, height : float, length
+        Sides of the plate.
+    size : float, length
+        Cell size far away.
+    size_near : float, length, optional
+        Cell size at the holes and along `along`. By default `size`, or what a hole needs.
+    lower : (2,) floats, length
+        Lower left corner.
+    holes : iterable of ((x, y), radius), length
+        Centre and radius of each hole. They may not touch the sides or each other.
+    along, band, transition
+        As in `plate_with_hole`; without holes a tenth of the smaller side stands for the radius.
+
+    Returns
+    -------
+    Mesh
+        Facet sets ``left``, ``right``, ``bottom``, ``top``, ``hole_0``, ``hole_1``, ...
+
+    Raises
+    ------
+    GeometryError
+        A length that is not positive, a hole that does not fit, sizes larger than the plate.
+    XcrackError
+        gmsh cannot be imported; the message says what to install.
+
+    Examples
+    --------
+    A plate with two holes and a path for a crack from its left side::
+
+        mesh = plate(
+            20.0, 10.0, holes=[((3.0, 7.0), 2.0), ((17.0, 3.0), 2.0)], size=0.6, size_near=0.25,
+            along=[(0.0, 2.85), (12.8, 2.3)],
+        )
+    """
+    holes = list(holes)
+    names = [f"hole_{i}" for i in range(len(holes))]
+    return _plate(width, height, lower, holes, names, size, size_near, along, band, transition)
+
+
+def _plate(
+    width: float,
+    height: float,
+    lower: Point,
+    holes: Sequence[Hole],
+    names: Sequence[str],
+    size: float,
+    size_near: float | None,
+    along: Path | Sequence[Path] | None,
+    band: float | None,
+    transition: float | None,
+) -> Mesh:
+    _check_lengths(width=width, height=height, size=size)
+    _check_holes(width, height, lower, holes)
+    smallest_radius = min((radius for _, radius in holes), default=inf)
+    hole_size = 2 * pi * smallest_radius / _FEWEST_HOLE_EDGES
+    near = float(min(size, hole_size) if size_near is None else size_near)
+    _check_lengths(size_near=near)
+    _check_sizes(width, height, size, near)
+    reach = smallest_radius if holes else min(width, height) / 10
+    if band is None:
+        band = _BAND * reach
+    if transition is None:
+        transition = max(_TRANSITION * reach, (size - near) / _STEEPEST)
+    for name, value in (("band", band), ("transition", transition)):
+        if not (isfinite(value) and value >= 0):
+            raise GeometryError(f"{name} = {value} must be a finite length, zero or more.")
+    paths = polylines(along)
+    _check_cost(width, height, size, near, band, paths)
+    # gmsh's tolerances are absolute: mesh a plate of unit size; powers of two lose no digit.
+    scale = 2.0 ** frexp(max(width, height))[1]
+    length = graded_size(
+        [(x / scale, y / scale, r / scale) for (x, y), r in holes],
+        [path / scale for path in paths],
+        size / scale,
+        near / scale,
+        band / scale,
+        transition / scale,
+    )
+    corner = (lower[0] / scale, lower[1] / scale)
+    scaled = [((x / scale, y / scale), r / scale) for (x, y), r in holes]
+    with session() as gmsh:
+        curves = _draw(gmsh, width / scale, height / scale, corner, scaled, names, near / scale)
+        points, cells, facets = mesh_model(gmsh, curves, length)
+    return _finish(points * scale, cells, facets, width, height, lower)
+
+
+def _draw(
+    gmsh: ModuleType,
+    width: float,
+    height: float,
+    lower: Point,
+    holes: Sequence[Hole],
+    names: Sequence[str],
+    near: float,
+) -> dict[str, list[int]]:
+    """Draw the plate in the current model; return the curves of each facet set."""
+    geo = gmsh.model.geo
+    (x0, y0), x1, y1 = lower, lower[0] + width, lower[1] + height
+    corner = [geo.addPoint(x, y, 0.0) for x, y in [(x0, y0), (x1, y0), (x1, y1), (x0, y1)]]
+    sides = [geo.addLine(corner[i], corner[(i + 1) % 4]) for i in range(4)]
+    curves = dict(zip(("bottom", "right", "top", "left"), ([side] for side in sides), strict=True))
+    loops = [geo.addCurveLoop(sides)]
+    for name, ((x, y), radius) in zip(names, holes, strict=True):
+        middle = geo.addPoint(x, y, 0.0)
+        turn = [(radius, 0.0), (0.0, radius), (-radius, 0.0), (0.0, -radius)]
+        rim = [geo.addPoint(x + dx, y + dy, 0.0) for dx, dy in turn]
+        curves[name] = [geo.addCircleArc(rim[i], middle, rim[(i + 1) % 4]) for i in range(4)]
+        edges = ceil(max(_FEWEST_HOLE_EDGES / 4, pi / 2 * radius / near - 1e-9))
+        for arc in curves[name]:
+            geo.mesh.setTransfiniteCurve(arc, edges + 1)
+        loops.append(geo.addCurveLoop(curves[name]))
+    geo.addPlaneSurface(loops)
+    geo.synchronize()
+    return curves
+
+
+def mesh_model(
+    gmsh: ModuleType, curves: dict[str, list[int]], length: Callable[[float, float], float]
+) -> tuple[Floats, Ints, dict[str, Ints]]:
+    """Mesh the current gmsh model of one plane surface or several.
+
+    Parameters
+    ----------
+    gmsh : module
+        gmsh with an open session.
+    curves : dict of name to list of int
+        Curves of each facet set.
+    length : callable
+        Maps x, y to the cell size.
+
+    Returns
+    -------
+    points : (n, 2) array, length
+        Coordinates, of points that cells use.
+    cells : (m, 3) array of int
+        Triangles.
+    facets : dict of name to (k, 2) array of int
+        Edges of each set.
+
+    Raises
+    ------
+    MeshError
+        gmsh found no mesh.
+    """
+    mesh = gmsh.model.mesh
+    mesh.setSizeCallback(lambda dim, tag, x, y, z, size: length(x, y))
+    try:
+        mesh.generate(2)
+    except Exception as error:  # gmsh raises nothing more precise
+        raise MeshError(f"gmsh found no mesh ({error}); smaller sizes may help.") from error
+    tags, coordinates, _ = mesh.getNodes()
+    points = coordinates.reshape(-1, 3)[:, :2]
+    number = np.full(int(tags.max()) + 1, -1, dtype=np.int64)
+    number[tags] = np.arange(len(tags))
+    cells = number[mesh.getElementsByType(2)[1]].reshape(-1, 3)
+    facets = {
+        name: np.concatenate([number[mesh.getElementsByType(1, c)[1]].reshape(-1, 2) for c in tags])
+        for name, tags in curves.items()
+    }
+    # Centres of arcs are nodes of the model, but of no cell.
+    used = np.unique(cells)
+    new = np.full(len(points), -1, dtype=np.int64)
+    new[used] = np.arange(len(used))
+    return points[used], new[cells], {name: new[edges] for name, edges in facets.items()}
+
+
+def _finish(
+    points: Floats,
+    cells: Ints,
+    facets: dict[str, Ints],
+    width: float,
+    height: float,
+    lower: Point,
+) -> Mesh:
+    """Put the nodes of the sides exactly onto them and order the sets."""
+    sides = {
+        "left": (0, lower[0]),
+        "right": (0, lower[0] + width),
+        "bottom": (1, lower[1]),
+        "top": (1, lower[1] + height),
+    }
+    for name, (axis, value) in sides.items():
+        points[facets[name].ravel(), axis] = value
+    order = [*sides, *(name for name in facets if name not in sides)]
+    return Mesh(points, cells, {name: facets[name] for name in order})
+
+
+def _check_lengths(**lengths: float) -> None:
+    for name, value in lengths.items():
+        if not (isfinite(value) and value > 0):
+            raise GeometryError(f"{name} = {value} must be finite and positive.")
+
+
+def _check_sizes(width: float, height: float, size: float, near: float) -> None:
+    if size > min(width, height):
+        raise GeometryError(
+            f"size = {size:g} is larger than the plate ({width:g} x {height:g}): "
+            f"give at most {min(width, height):g}, better a tenth of it."
+        )
+    if near > size:
+        raise GeometryError(
+            f"size_near = {near:g} is larger than size = {size:g}: cells grow away from holes and "
+            "paths; exchange the two or leave size_near out."
+        )
+
+
+def _check_holes(width: float, height: float, lower: Point, holes: Sequence[Hole]) -> None:
+    for i, (center, radius) in enumerate(holes):
+        _check_lengths(**{f"radius of hole {i}": radius})
+        if not np.isfinite(center).all():
+            raise GeometryError(f"hole {i}: centre {tuple(center)} must be finite.")
+        x, y = center[0] - lower[0], center[1] - lower[1]
+        gap = min(x, y, width - x, height - y) - radius
+        if gap <= 0:
+            raise GeometryError(
+                f"hole {i} (centre {tuple(center)}, radius {radius:g}) reaches {-gap:g} beyond the "
+                f"plate [{lower[0]:g}, {lower[0] + width:g}] x [{lower[1]:g}, "
+                f"{lower[1] + height:g}]: move it inwards or make it smaller."
+            )
+        for j, (other, other_radius) in enumerate(holes[:i]):
+            gap = hypot(center[0] - other[0], center[1] - other[1]) - radius - other_radius
+            if gap <= 0:
+                raise GeometryError(
+                    f"holes {j} and {i} overlap by {-gap:g}: move them apart or make them smaller."
+                )
+
+
+def _check_cost(
+    width: float, height: float, size: float, near: float, band: float, paths: Sequence[Floats]
+) -> None:
+    run = sum(float(np.linalg.norm(np.diff(p, axis=0), axis=1).sum()) for p in paths)
+    cell = 3**0.5 / 2
+    fine = min(2 * band * run, width * height)
+    points = width * height / (cell * size**2) + fine / (cell * near**2)
+    if points > _MOST_POINTS:
+        raise GeometryError(
+            f"size = {size:g} and size_near = {near:g} ask for about {points:.1e} points, more "
+            f"than {_MOST_POINTS:.0e}: enlarge the size, or narrow the band."
+        )

@@ -1,0 +1,193 @@
+"""Mesh as a file holds it, before it is a `Mesh`: blocks of elements and sets by name."""
+
+import warnings
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from xcrack.arrays import Floats, Ints
+from xcrack.errors import MeshError, XcrackWarning
+from xcrack.mesh.mesh import Mesh
+
+TOPOLOGICAL_DIM = {"vertex": 0, "line": 1, "triangle": 2, "tetra": 3}
+CELL_KIND = {2: "triangle", 3: "tetra"}
+FACET_KIND = {2: "line", 3: "triangle"}
+_PLANAR = 1e-9  # spread of z over the extent of the body below which a mesh is plane
+
+
+@dataclass(frozen=True, eq=False)
+class RawMesh:
+    """What a mesh file says.
+
+    Parameters
+    ----------
+    points : (n, 2) or (n, 3) array, length
+        Coordinates.
+    blocks : list of (kind, (m, k) array)
+        Elements by kind (meshio's names), as point numbers.
+    sets : list of (kind, name, (m, k) array)
+        Elements of each set, as point numbers; a name may come several times.
+    point_sets : list of (name, (m,) array)
+        Sets of points.
+    """
+
+    points: Floats
+    blocks: list[tuple[str, Ints]]
+    sets: list[tuple[str, str, Ints]] = field(default_factory=list)
+    point_sets: list[tuple[str, Ints]] = field(default_factory=list)
+
+
+def mesh_from_raw(raw: RawMesh, source: str) -> Mesh:
+    """Make a `Mesh` of what a file says, or tell what in the file stands against it.
+
+    The highest cells are the body, elements of one dimension less become facet sets. Doubled
+    cells (msh 2.2 repeats a cell for each of its groups) are made one, points that no cell uses
+    are dropped, a set of points becomes the facet set of the boundary facets it holds wholly.
+
+    Parameters
+    ----------
+    raw : RawMesh
+        Contents of the file.
+    source : str
+        Name of the file, for messages.
+
+    Returns
+    -------
+    Mesh
+        The mesh with its sets.
+
+    Raises
+    ------
+    MeshError
+        No cells, cells that are no linear simplices, a surface in space.
+    """
+    _check_kinds(raw.blocks, source)
+    dim = 3 if any(kind == "tetra" and len(data) for kind, data in raw.blocks) else 2
+    doubled = _stack((data for kind, data in raw.blocks if kind == CELL_KIND[dim]), dim + 1)
+    if not len(doubled):
+        found = ", ".join(f"{len(data)} {kind}" for kind, data in raw.blocks) or "nothing"
+        raise MeshError(
+            f"{source} has no triangles and no tetrahedra (found: {found}). In gmsh, mesh the "
+            "surface or volume, and if there are physical groups, put it into one."
+        )
+    points = _in_dimensions(raw.points, doubled, dim, source)
+    cells = _unique_rows(doubled)
+    used = np.unique(cells)
+    new = np.full(len(points), -1, dtype=np.int64)
+    new[used] = np.arange(len(used))
+    points, cells = points[used], new[cells]
+    bare = Mesh(points, cells)
+    facet_sets = _facet_sets(raw, bare, new, source)
+    cell_sets = {
+        name: np.sort(_row_numbers(cells, new[members]))
+        for name, members in _grouped(raw.sets, CELL_KIND[dim], dim + 1).items()
+    }
+    for name, members in raw.point_sets:
+        if name not in facet_sets and name not in cell_sets:
+            inside = np.zeros(len(points), dtype=bool)
+            inside[new[members][new[members] >= 0]] = True
+            facets = bare.facet_sets["boundary"]
+            facets = facets[inside[facets].all(axis=1)]
+            if len(facets):
+                facet_sets[name] = facets
+    return Mesh(points, cells, facet_sets, cell_sets)
+
+
+def default_boundary(mesh: Mesh) -> bool:
+    """Whether the set ``"boundary"`` is the one every mesh has, so that no file need hold it."""
+    own = np.unique(mesh.facet_numbers(mesh.facet_sets["boundary"]))
+    return bool(np.array_equal(own, np.flatnonzero(mesh.facet_to_cell[:, 1] < 0)))
+
+
+def sets_to_write(mesh: Mesh) -> tuple[dict[str, Ints], dict[str, Ints]]:
+    """Facet sets as point numbers and cell sets as cell numbers, less what is made anew anyway."""
+    facet_sets = dict(mesh.facet_sets)
+    if default_boundary(mesh):
+        del facet_sets["boundary"]
+    return facet_sets, dict(mesh.cell_sets)
+
+
+def _facet_sets(raw: RawMesh, bare: Mesh, new: Ints, source: str) -> dict[str, Ints]:
+    facet_sets = {}
+    for name, members in _grouped(raw.sets, FACET_KIND[bare.dim], bare.dim).items():
+        facets = new[members]
+        known = (facets >= 0).all(axis=1) & (bare.facet_numbers(facets) >= 0)
+        if not known.all():
+            warnings.warn(
+                f"{source}: {int((~known).sum())} of the {len(facets)} elements in set {name!r} "
+                "are no facets of any cell and are left out; mesh body and sets together.",
+                XcrackWarning,
+                stacklevel=4,
+            )
+        if known.any():
+            facet_sets[name] = _unique_rows(facets[known])
+    return facet_sets
+
+
+def _check_kinds(blocks: list[tuple[str, Ints]], source: str) -> None:
+    counts: dict[str, int] = {}
+    for kind, data in blocks:
+        if kind not in TOPOLOGICAL_DIM and len(data):
+            counts[kind] = counts.get(kind, 0) + len(data)
+    if not counts:
+        return
+    found = ", ".join(f"{count} {kind}" for kind, count in counts.items())
+    if any(kind.startswith(("line", "triangle", "tetra")) for kind in counts):
+        remedy = (
+            "Save the mesh at first order (gmsh: Mesh.ElementOrder = 1; Abaqus: CPE3, CPS3, C3D4); "
+            "xcrack adds the functions of order 2 itself."
+        )
+    else:
+        remedy = (
+            "Mesh with triangles or tetrahedra (gmsh: Mesh.RecombineAll = 0, no Recombine, no "
+            "Layers; Abaqus: element shape Tri or Tet)."
+        )
+    raise MeshError(
+        f"{source} has {found}: only linear triangles and tetrahedra are used. {remedy}"
+    )
+
+
+def _in_dimensions(points: Floats, cells: Ints, dim: int, source: str) -> Floats:
+    points = np.asarray(points, dtype=np.float64)
+    if points.shape[1] == dim:
+        return points
+    if points.shape[1] < dim:
+        raise MeshError(f"{source} has tetrahedra, but points in the plane.")
+    body = points[np.unique(cells)]
+    spread = np.ptp(body, axis=0)
+    if spread[2] > _PLANAR * spread.max():
+        raise MeshError(
+            f"{source} has triangles in space (z from {body[:, 2].min():g} to "
+            f"{body[:, 2].max():g}) and no tetrahedra: for a plane problem turn the mesh into a "
+            "plane z = constant; for a body mesh its volume, not only its surface."
+        )
+    return points[:, :2]
+
+
+def _stack(arrays: Iterable[Ints], width: int) -> Ints:
+    parts = [np.asarray(a, dtype=np.int64).reshape(-1, width) for a in arrays]
+    return np.concatenate(parts) if parts else np.zeros((0, width), dtype=np.int64)
+
+
+def _grouped(sets: list[tuple[str, str, Ints]], kind: str, width: int) -> dict[str, Ints]:
+    parts: dict[str, list[Ints]] = {}
+    for of_kind, name, members in sets:
+        if of_kind == kind and len(members):
+            parts.setdefault(name, []).append(members)
+    return {name: _stack(members, width) for name, members in parts.items()}
+
+
+def _unique_rows(rows: Ints) -> Ints:
+    """Rows whose points come once, in the order of their first coming."""
+    first = np.unique(np.sort(rows, axis=1), axis=0, return_index=True)[1]
+    return rows[np.sort(first)]
+
+
+def _row_numbers(rows: Ints, asked: Ints) -> Ints:
+    """Numbers of the rows that have the points asked for, each once."""
+    both = np.sort(np.concatenate([rows, asked]), axis=1)
+    inverse = np.unique(both, axis=0, return_inverse=True)[1].ravel()
+    place = np.full(int(inverse.max()) + 1, -1, dtype=np.int64)
+    place[inverse[: len(rows)]] = np.arange(len(rows))
+    return np.unique(place[inverse[len(rows) :]])

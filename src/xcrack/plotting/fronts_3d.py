@@ -1,0 +1,391 @@
+"""Drawings of fronts in space: over the section of the body, and K along them.
+
+By matplotlib, without a renderer; for one run or one state, or for several side by side.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from xcrack.arrays import Bools, Floats
+from xcrack.errors import ProblemError
+from xcrack.growth.step import Step
+from xcrack.plotting.projection import View, best_plane, given_plane, on_plane, section_outline
+from xcrack.sif.sif import SIF
+
+if TYPE_CHECKING:
+    from xcrack.history.history import History
+    from xcrack.mesh.mesh import Mesh
+
+_DPI = 150
+_FAR = 2.5  # median spacings that still close a front, from its last point to its first
+_MODES = ("I", "II", "III")
+_NOISE = 0.1  # share of the largest K that a panel reaches at least: noise should not fill it
+
+
+@dataclass(frozen=True, eq=False)
+class FrontLine:
+    """One front as it is drawn.
+
+    Attributes
+    ----------
+    x : (m, 3) array, length
+        A closed front repeats its first point at the end.
+    closed : bool
+    number : int
+        Which front of the crack.
+    """
+
+    x: Floats
+    closed: bool
+    number: int
+
+
+def draw_fronts(
+    history: "History | Sequence[History]",
+    *,
+    crack: int = 0,
+    plane: tuple[ArrayLike, Sequence[ArrayLike]] | None = None,
+    labels: Sequence[str] | None = None,
+    every: int = 1,
+    mesh: "Mesh | None" = None,
+    file: str | Path | None = None,
+    show: bool | None = None,
+    title: str | None = None,
+) -> Any:
+    """Draw the fronts of growth runs over the section of the body.
+
+    One run is coloured by its steps, several have a colour each, paler for older fronts.
+
+    Parameters
+    ----------
+    history : History or sequence of History
+    crack : int
+    plane : (origin, (right, up)), optional
+        Point and two directions of the plane to draw on; left out: the plane that the first
+        surface of the crack lies nearest to.
+    labels : sequence of str, optional
+        A name for each run.
+    every : int
+        Draw each n-th step, and the last.
+    mesh : Mesh, optional
+        For the outline of the body; left out: that of the history.
+    file : path, optional
+        Where to save the picture.
+    show : bool, optional
+        Open a window; left out: only without a file.
+    title : str, optional
+
+    Returns
+    -------
+    Path, or a matplotlib figure where there is no file
+
+    Raises
+    ------
+    ProblemError
+        No steps, no such crack, a crack of the plane, labels of another number.
+    """
+    runs = _several(history, "steps")
+    names = _names(labels, len(runs), "draw_fronts")
+    figure, pyplot = _figure((6.4, 5.6), file, show)
+    axes = figure.add_subplot()
+    body = mesh if mesh is not None else next((r.mesh for r in runs if r.mesh is not None), None)
+    view = None if plane is None else given_plane(*plane)
+    front_axes(axes, [run.steps for run in runs], crack, view, body, names, every)
+    return _done(figure, pyplot, axes, file, title)
+
+
+def draw_K(
+    sif: SIF | Sequence[SIF],
+    *,
+    front: int = 0,
+    labels: Sequence[str] | None = None,
+    modes: Sequence[str] = _MODES,
+    file: str | Path | None = None,
+    show: bool | None = None,
+    title: str | None = None,
+) -> Any:
+    """Draw K_I, K_II and K_III along a front over its arc length, from 0 to 1.
+
+    Points at a free surface, where K has no meaning, are hollow.
+
+    Parameters
+    ----------
+    sif : SIF or sequence of SIF
+        Of one front, or of the same front in several states, runs or meshes.
+    front : int
+        Which front of the crack.
+    labels : sequence of str, optional
+        A name for each SIF.
+    modes : sequence of {"I", "II", "III"}
+        A panel each.
+    file : path, optional
+        Where to save the picture.
+    show : bool, optional
+        Open a window; left out: only without a file.
+    title : str, optional
+
+    Returns
+    -------
+    Path, or a matplotlib figure where there is no file
+
+    Raises
+    ------
+    ProblemError
+        No such front or mode, K of the plane, labels of another number.
+    """
+    every = _several(sif, "K")
+    names = _names(labels, len(every), "draw_K")
+    unknown = [m for m in modes if m not in _MODES]
+    if unknown or not len(modes):
+        raise ProblemError(f'draw_K(modes={list(modes)!r}): give some of "I", "II", "III".')
+    for one in every:
+        if one.K.shape[1] < 3 or not (one.front == front).any():
+            known = sorted({int(f) for f in one.front}) if one.K.shape[1] > 2 else []
+            raise ProblemError(
+                f"draw_K(front={front}): there is no such front in space, only {known}; in the "
+                "plane read sif.K."
+            )
+    figure, pyplot = _figure((6.4, 0.8 + 2.0 * len(modes)), file, show)
+    panels = figure.subplots(len(modes), 1, squeeze=False, sharex=True)[:, 0]
+    largest = max(float(np.abs(one.K[one.front == front]).max()) for one in every)
+    for axes, mode in zip(panels, modes, strict=True):
+        reach = 0.0
+        for k, (one, name) in enumerate(zip(every, names, strict=True)):
+            share, K, surface = _along(one, front, _MODES.index(mode))
+            color, style = f"C{k}", ("-", "--", "-.", ":")[k % 4]
+            axes.plot(share, K, style, color=color, lw=1.6, label=name or None)
+            axes.plot(share[surface], K[surface], "o", mfc="white", mec=color, ms=5)
+            reach = max(reach, float(np.abs(K).max()))
+        axes.axhline(0, color="0.7", lw=0.8, zorder=0)
+        axes.set_ylabel(f"$K_{{{mode}}}$")
+        axes.margins(x=0.02)
+        if reach <= _NOISE * largest:
+            axes.set_ylim(-_NOISE * (largest or 1), _NOISE * (largest or 1))
+    panels[-1].set_xlabel("s / length of the front")
+    if any(names):
+        figure.legend(
+            *panels[0].get_legend_handles_labels(),
+            loc="outside lower center",
+            ncols=min(len(every), 3),
+            fontsize="small",
+            frameon=False,
+        )
+    return _done(figure, pyplot, panels[0], file, title)
+
+
+def front_axes(
+    axes: Any,
+    runs: Sequence[Sequence[Step]],
+    crack: int,
+    plane: View | None,
+    mesh: "Mesh | None",
+    labels: Sequence[str],
+    every: int = 1,
+) -> None:
+    """Draw the fronts of runs into axes of matplotlib, with the section of the body.
+
+    Parameters
+    ----------
+    axes : axes of matplotlib
+    runs : sequence of sequences of Step
+    crack : int
+    plane : View, optional
+        Left out: the best one through the first surface.
+    mesh : Mesh, optional
+    labels : sequence of str
+        A name for each run; may be empty.
+    every : int
+        Draw each n-th step, and the last.
+    """
+    from matplotlib import colormaps
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.collections import LineCollection
+    from matplotlib.colors import Normalize
+    from matplotlib.ticker import MaxNLocator
+
+    if every < 1:
+        raise ProblemError(f"draw_fronts(every={every}): give 1 or more.")
+    for steps in runs:
+        _check(steps, crack)
+    view = best_plane(_surface(runs[0][0], crack)) if plane is None else plane
+    if mesh is not None:
+        rim = section_outline(mesh, view)
+        axes.add_collection(LineCollection(list(rim), colors="0.45", linewidths=1.0))
+    first = runs[0][0].cracks[crack]
+    edges = on_plane(first.points[_rim(first.faces)], view)
+    if mesh is None:
+        axes.add_collection(LineCollection(list(edges), colors="0.7", linewidths=0.8))
+    single = len(runs) == 1
+    last = max(steps[-1].index for steps in runs)
+    colours, scale = colormaps["viridis"], Normalize(runs[0][0].index, max(last, 1))
+    for k, (steps, name) in enumerate(zip(runs, labels, strict=True)):
+        shown = [*steps[:-1:every], steps[-1]]
+        for step in shown:
+            newest = step is shown[-1]
+            age = (last - step.index) / max(last, 1)
+            color = colours(scale(step.index)) if single else f"C{k}"
+            for line in step_fronts(step, crack):
+                axes.plot(
+                    *on_plane(line.x, view).T,
+                    ("-", "--", "-.", ":")[k % 4],
+                    color=color,
+                    lw=2.0 if newest else 1.1,
+                    alpha=1.0 if single else 1.0 - 0.65 * age,
+                )
+        if name:
+            axes.plot([], [], ("-", "--", "-.", ":")[k % 4], color=f"C{k}", label=name)
+    axes.set_aspect("equal")
+    axes.autoscale_view()
+    axes.set(xlabel=view.label(0), ylabel=view.label(1))
+    axes.spines[["top", "right"]].set_visible(False)
+    if single and len(runs[0]) > 1:
+        bar = ScalarMappable(scale, colours)
+        whole = MaxNLocator(integer=True)
+        axes.figure.colorbar(bar, ax=axes, label="step", shrink=0.8, aspect=25, ticks=whole)
+    elif any(labels):
+        axes.legend(
+            fontsize="small",
+            frameon=False,
+            loc="upper center",
+            bbox_to_anchor=(0.5, -0.13),
+            ncols=min(len(runs), 3),
+        )
+
+
+def step_fronts(step: Step, crack: int) -> list[FrontLine]:
+    """Fronts of a crack in a step: where K was found, or else as the crack has them.
+
+    Parameters
+    ----------
+    step : Step
+    crack : int
+
+    Returns
+    -------
+    list of FrontLine
+    """
+    body = step.cracks[crack]
+    closed = [bool(front[0] == front[-1]) for front in body.fronts or ()]
+    lines = []
+    found = step.sif[0][crack] if step.sif else None
+    if found is not None and len(found.x):
+        for number in np.unique(found.front):
+            x = found.x[found.front == number]
+            # A closed front that leaves the body in part has K on the rest of it.
+            whole = (number >= len(closed) or closed[number]) and is_closed(x)
+            lines.append(FrontLine(np.concatenate([x, x[:1]]) if whole else x, whole, int(number)))
+        return lines
+    return [
+        FrontLine(body.points[front], whole, k)
+        for k, (front, whole) in enumerate(zip(body.fronts or (), closed, strict=True))
+    ]
+
+
+def is_closed(x: Floats) -> bool:
+    """Whether points along a front, each once, go round: the last lies next to the first."""
+    if len(x) < 4:
+        return False
+    spacing = np.linalg.norm(np.diff(x, axis=0), axis=1)
+    return bool(np.linalg.norm(x[-1] - x[0]) < _FAR * np.median(spacing))
+
+
+def front_weights(x: Floats) -> Floats:
+    """Share of the length of a front that belongs to each of its points `(m,)`; their sum is 1."""
+    if len(x) == 1:
+        return np.ones(1)
+    along = np.linalg.norm(np.diff(x, axis=0), axis=1)
+    if is_closed(x):
+        along = np.append(along, np.linalg.norm(x[0] - x[-1]))
+        weight = along + np.roll(along, 1)
+    else:
+        weight = np.append(along, 0.0) + np.append(0.0, along)
+    total = float(weight.sum())
+    return np.asarray(weight / total if total else np.full(len(x), 1 / len(x)))
+
+
+def _along(sif: SIF, front: int, mode: int) -> tuple[Floats, Floats, Bools]:
+    """Share of the arc length, K of a mode, and which points lie at a free surface."""
+    mine = np.nonzero(sif.front == front)[0]
+    mine = mine[np.argsort(sif.s[mine], kind="stable")]
+    x, K, surface = sif.x[mine], sif.K[mine, mode], sif.at_surface[mine]
+    s = sif.s[mine] - sif.s[mine[0]]
+    if is_closed(x) and not surface.any():
+        s = np.append(s, s[-1] + np.linalg.norm(x[0] - x[-1]))
+        K, surface = np.append(K, K[0]), np.append(surface, surface[0])
+    total = float(s[-1])
+    return s / total if total else s, K, surface
+
+
+def _surface(step: Step, crack: int) -> Floats:
+    body = step.cracks[crack]
+    x = [line.x for line in step_fronts(step, crack)]
+    return np.concatenate([body.points[np.unique(body.faces)], *x])
+
+
+def _rim(faces: Any) -> Any:
+    from xcrack.geometry.triangulation import rim
+
+    return rim(faces)[0]
+
+
+def _check(steps: Sequence[Step], crack: int) -> None:
+    if not steps:
+        raise ProblemError("there is nothing to draw: the history has no steps.")
+    n = len(steps[0].cracks)
+    if not 0 <= crack < n:
+        raise ProblemError(f"draw_fronts(crack={crack}): there are {n} crack(s), numbered from 0.")
+    if steps[0].cracks[crack].fronts is None:
+        raise ProblemError('fronts are those of cracks in space; in the plane plot "path".')
+
+
+def _several(value: Any, attribute: str) -> list[Any]:
+    return [value] if hasattr(value, attribute) else list(value)
+
+
+def _names(labels: Sequence[str] | None, n: int, what: str) -> list[str]:
+    if labels is None:
+        return [""] * n if n == 1 else [str(k) for k in range(n)]
+    names = [labels] if isinstance(labels, str) else list(labels)
+    if len(names) != n or n == 0:
+        raise ProblemError(f"{what}(labels=...): {len(names)} labels for {n} curves.")
+    return names
+
+
+def _figure(size: tuple[float, float], file: Any, show: bool | None) -> tuple[Any, Any]:
+    if file is None if show is None else show:
+        from matplotlib import pyplot
+
+        return pyplot.figure(figsize=size, layout="constrained"), pyplot
+    from matplotlib.figure import Figure
+
+    return Figure(figsize=size, layout="constrained"), None
+
+
+def _done(figure: Any, pyplot: Any, axes: Any, file: Any, title: str | None) -> Any:
+    if title:
+        axes.set_title(title)
+    target = None if file is None else Path(file)
+    if target is not None:
+        if not target.suffix:
+            target = target.with_name(target.name + ".png")
+        target.parent.mkdir(parents=True, exist_ok=True)
+        figure.savefig(target, dpi=_DPI)
+    if pyplot is not None:
+        pyplot.show()
+    return figure if target is None else target
+
+
+__all__ = [
+    "FrontLine",
+    "draw_K",
+    "draw_fronts",
+    "front_axes",
+    "front_weights",
+    "is_closed",
+    "step_fronts",
+]

@@ -1,0 +1,358 @@
+"""What a picture of a body in space shows, as arrays: triangles, lines, colours and arrows."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from xcrack.analysis.solution import Solution
+from xcrack.arrays import Bools, Floats
+from xcrack.errors import ProblemError
+from xcrack.plotting.scene_2d import SPACE_FIELDS, STRESSES, clipped, field_values, rounded
+from xcrack.plotting.section_3d import (
+    Plane,
+    Soup,
+    areas,
+    crossing,
+    edges_of,
+    faces,
+    levels,
+    on_facets,
+    section,
+    segments_behind,
+    sharp_edges,
+)
+from xcrack.post.lip_faces_3d import LipFaces, lip_faces
+from xcrack.post.pieces import pieces
+
+LIP_FIELDS = {
+    "pressure": "contact pressure",
+    "opening": "normal opening",
+    "gap": "normal opening",
+    "sliding": "sliding of the lips",
+}
+_CLOSE = 0.3  # share of the body below which a crack is looked at from close by
+_AROUND = 0.25  # share of its size that is seen around it
+_TOUCH = 0.5  # share of a triangle on which the lips touch that counts as closed
+
+
+@dataclass(frozen=True, eq=False)
+class SpaceScene:
+    """A field on a body in space, or on its cracks, ready to draw.
+
+    Attributes
+    ----------
+    triangles : (t, 3, 3) array, length
+        Coloured ones: surface of the body, its section and its lips; or the cracks.
+    values : (t, 3) array
+    label : str
+        What the colour bar says; empty where nothing is coloured by a field.
+    limits : (float, float)
+        Ends of the colours.
+    signed : bool
+        The field has a sign: its colours part at zero.
+    touching, apart : (k, 3, 3) arrays, length
+        Triangles of a crack that are not coloured: its lips touch there, or do not.
+    skin : (s, 3, 3) array, length
+        Surface of a body that is seen through.
+    outline, cell_edges, faint, rims, fronts : (k, 2, 3) arrays, length
+        Lines: sharp edges of the body and its section, edges of cells, what is only hinted at
+        (the body that has not moved, the edges of cells behind the rest), edges of the lips,
+        fronts.
+    toward : (3,) array
+        Unit vector from the body to the viewer.
+    heaviside, tip : (k, 3) arrays, length
+        Points that carry these functions.
+    """
+
+    triangles: Floats
+    values: Floats
+    label: str
+    limits: tuple[float, float]
+    signed: bool
+    touching: Floats
+    apart: Floats
+    skin: Floats
+    outline: Floats
+    cell_edges: Floats
+    faint: Floats
+    rims: Floats
+    fronts: Floats
+    toward: Floats
+    heaviside: Floats
+    tip: Floats
+
+    @property
+    def box(self) -> Floats:
+        """Points that have to be in the picture `(k, 3)`, length: a small crack fills it."""
+        body = self.body
+        if not len(self.skin) or len(self.heaviside):
+            return body
+        parts = (self.triangles, self.touching, self.apart)
+        x = np.concatenate([part.reshape(-1, 3) for part in parts])
+        low, high = x.min(axis=0), x.max(axis=0)
+        size = float((high - low).max())
+        if size > _CLOSE * float(np.ptp(body, axis=0).max()):
+            return body
+        ends = np.stack([low - _AROUND * size, high + _AROUND * size])
+        return np.stack(np.meshgrid(*ends.T), axis=-1).reshape(-1, 3)
+
+    @property
+    def body(self) -> Floats:
+        """Points of all that is drawn `(k, 3)`, length."""
+        parts = (self.triangles, self.touching, self.skin, self.outline, self.faint)
+        return np.concatenate([part.reshape(-1, 3) for part in parts])
+
+
+def clip_plane(clip: object) -> Plane | None:
+    """Point and unit normal of a plane, as the user gave them."""
+    if clip is None:
+        return None
+    try:
+        point, normal = (np.asarray(part, dtype=float) for part in clip)  # type: ignore[attr-defined]
+        length = float(np.linalg.norm(normal))
+        good = point.shape == normal.shape == (3,) and 0 < length < np.inf
+        good = good and bool(np.isfinite(point).all())
+    except (TypeError, ValueError):
+        good = False
+    if not good:
+        raise ProblemError(
+            f"plot(clip={clip!r}): give a point and a normal, ((x, y, z), (nx, ny, nz)); what "
+            "lies on the side of the normal is left out."
+        )
+    return point, normal / length
+
+
+def direction(view: object) -> Floats | None:
+    """Unit vector from the body to the viewer, as the user gave it."""
+    if view is None:
+        return None
+    try:
+        v = np.asarray(view, dtype=float)
+        good = v.shape == (3,) and 0 < float(np.linalg.norm(v)) < np.inf
+    except (TypeError, ValueError):
+        good = False
+    if not good:
+        raise ProblemError(
+            f"plot(view={view!r}): give the direction from the body to the viewer, (x, y, z)."
+        )
+    return np.asarray(v / np.linalg.norm(v))
+
+
+def space_scene(
+    solution: Solution,
+    field: str,
+    warp: float,
+    limits: tuple[float, float] | None,
+    plane: Plane | None,
+    view: Floats | None,
+) -> SpaceScene:
+    """Field on the moved body: its surface, and with a plane its section and the lips behind."""
+    body = pieces(solution)
+    moved = body.points + warp * body.displacement
+    shown = field_values(body, field)
+    level = levels(body.points, plane)
+    shell, lip, outline, rims, cell_edges = faces(body, level)
+    drawn = [Soup.of(f, None).behind(level) for f in (shell, lip)]
+    lines = [segments_behind(part, level) for part in (outline, rims, cell_edges)]
+    if plane is not None:
+        drawn.append(section(body, level))
+        lines[0] += crossing(shell, level)
+        lines[1] += crossing(lip, level)
+        lines[2] += crossing(on_facets(body, level), level)
+    corners = np.concatenate([part.at(moved) for part in drawn])
+    values = np.concatenate([part.at(shown[:, None])[..., 0] for part in drawn])
+    if not len(corners):
+        raise ProblemError("plot(clip=...): the plane leaves nothing of the body; turn its normal.")
+    share = 100.0
+    low, high = float(values.min()), float(values.max())
+    if field in STRESSES and solution.space.tips:
+        low, high, share = clipped(values, areas(corners))
+    low, high = rounded(low, high, field) if limits is None else limits
+    clip = limits is None and share < 100
+    nothing = np.zeros((0, 3, 3))
+    curves = [
+        np.concatenate([part.at(moved) for part in group] or [np.zeros((0, 2, 3))])
+        for group in lines
+    ]
+    outline_rest = np.concatenate([part.at(body.points) for part in lines[0]])
+    return SpaceScene(
+        triangles=corners,
+        values=values,
+        label=SPACE_FIELDS[field] + (f", clipped at {int(10 * share) / 10:g} %" if clip else ""),
+        limits=(low, high),
+        signed=low < 0 < high,
+        touching=nothing,
+        apart=nothing,
+        skin=nothing,
+        outline=curves[0],
+        cell_edges=curves[2],
+        faint=outline_rest if warp else np.zeros((0, 2, 3)),
+        rims=curves[1],
+        fronts=_front_lines(solution, warp, plane)[: None if plane is not None else 0],
+        toward=_toward(plane, view, None),
+        heaviside=np.zeros((0, 3)),
+        tip=np.zeros((0, 3)),
+    )
+
+
+def crack_scene(
+    solution: Solution,
+    field: str,
+    cracks: list[int],
+    warp: float,
+    limits: tuple[float, float] | None,
+    plane: Plane | None,
+    view: Floats | None,
+) -> SpaceScene:
+    """Field on cracks, in a body that is seen through."""
+    lips = [lip_faces(solution, c) for c in cracks]
+    corners = np.concatenate([_middle(each, warp)[each.triangles] for each in lips])
+    values = np.concatenate([lip_values(each, field) for each in lips])
+    coloured = np.concatenate([is_coloured(each, field) for each in lips])
+    nothing = np.zeros((0, 3, 3))
+    low, high = (0.0, 1.0)
+    if coloured.any():
+        low, high = float(values[coloured].min()), float(values[coloured].max())
+    # Gaps are closed in the mean of a cell only: near contact some points lie a bit too deep.
+    if field != "pressure" and low > -0.3 * high:
+        low = 0.0
+    if field == "pressure":
+        low = min(low, 0.0)
+    low, high = rounded(low, high, field) if limits is None else limits
+    return replace(
+        _seen_through(solution, warp, plane),
+        triangles=corners[coloured],
+        values=values[coloured],
+        label=LIP_FIELDS[field],
+        limits=(low, high),
+        signed=low < 0 < high,
+        touching=nothing if field == "pressure" else corners[~coloured],
+        apart=corners[~coloured] if field == "pressure" else nothing,
+        rims=np.concatenate([_middle(each, warp)[each.mouth] for each in lips]),
+        cell_edges=edges_of(corners),
+        toward=_toward(plane, view, lips),
+    )
+
+
+def mesh_scene(solution: Solution, plane: Plane | None, view: Floats | None) -> SpaceScene:
+    """Mesh, cracks and enriched points."""
+    space = solution.space
+    lips = [lip_faces(solution, c) for c in range(len(space.cuts))]
+    corners = [each.points[each.triangles] for each in lips]
+    through = _seen_through(solution, 0.0, plane)
+    carries = np.zeros(space.n_nodes, dtype=bool)
+    for number in space.heaviside:
+        carries |= number >= 0
+    around = np.zeros(space.mesh.n_points, dtype=bool)
+    for tip in space.tips:
+        around |= tip.point_to_function >= 0
+    every = np.concatenate([np.zeros((0, 3, 3)), *corners])
+    return replace(
+        through,
+        touching=every,
+        cell_edges=edges_of(every),
+        faint=edges_of(through.skin),
+        toward=_toward(plane, view, lips),
+        heaviside=space.node_points[carries],
+        tip=space.mesh.points[around],
+    )
+
+
+def _seen_through(solution: Solution, warp: float, plane: Plane | None) -> SpaceScene:
+    """The body and its fronts without colours."""
+    mesh = solution.space.mesh
+    moved = mesh.points + warp * solution.coefficients[: mesh.n_points]
+    level = levels(mesh.points, plane)
+    facets = mesh.facet_sets["boundary"]
+    skin = Soup.of(facets, None).behind(level).at(moved)
+    sharp = segments_behind(mesh.edges[sharp_edges(mesh)], level)
+    if plane is not None:
+        sharp += crossing(facets, level)
+    empty = np.zeros((0, 2, 3))
+    outline = np.concatenate([part.at(moved) for part in sharp] or [empty])
+    return SpaceScene(
+        triangles=np.zeros((0, 3, 3)),
+        values=np.zeros((0, 3)),
+        label="",
+        limits=(0.0, 1.0),
+        signed=False,
+        touching=np.zeros((0, 3, 3)),
+        apart=np.zeros((0, 3, 3)),
+        skin=skin,
+        outline=outline,
+        cell_edges=empty,
+        faint=empty,
+        rims=empty,
+        fronts=_front_lines(solution, warp, None),
+        toward=np.array([0.0, -1.0, 0.0]),
+        heaviside=np.zeros((0, 3)),
+        tip=np.zeros((0, 3)),
+    )
+
+
+def lip_values(lips: LipFaces, field: str) -> Floats:
+    """Values at the vertices of the triangles of a crack `(t, 3)`."""
+    values = lips.gap if field in ("opening", "gap") else getattr(lips, field)
+    return np.asarray(values[lips.triangles])
+
+
+def is_coloured(lips: LipFaces, field: str) -> Bools:
+    """Triangles of a crack that show a field `(t,)`; the others touch, or bear no pressure.
+
+    Lips that touch slide without friction: sliding is shown everywhere.
+    """
+    if field == "pressure":
+        bears = lips.mean_pressure > 1e-6 * float(lips.mean_pressure.max(initial=0.0))
+        return np.asarray(bears | (lips.closed >= _TOUCH))
+    return np.asarray(lips.closed < _TOUCH) | (field == "sliding")
+
+
+def _middle(lips: LipFaces, warp: float) -> Floats:
+    return np.asarray(lips.points + warp * (lips.minus + lips.plus) / 2)
+
+
+def _front_lines(solution: Solution, warp: float, plane: Plane | None) -> Floats:
+    parts = [np.zeros((0, 2, 3))]
+    for c in range(len(solution.lips)):
+        lips = lip_faces(solution, c)
+        kept = segments_behind(lips.front, levels(lips.points, plane))
+        parts += [part.at(_middle(lips, warp)) for part in kept]
+    return np.concatenate(parts)
+
+
+def _toward(plane: Plane | None, view: Floats | None, lips: list[LipFaces] | None) -> Floats:
+    """From the body to the viewer: what was cut open, or the faces of the crack, is seen."""
+    if view is not None:
+        return view
+    usual = np.array([0.45, -0.75, 0.48])
+    if plane is not None:
+        ahead = plane[1]
+    elif lips:
+        ahead = np.sum([(each.area[:, None] * _face_normals(each)).sum(axis=0) for each in lips], 0)
+        length = float(np.linalg.norm(ahead))
+        ahead = ahead / length if length else usual
+        ahead = ahead if ahead @ usual >= 0 else -ahead
+    else:
+        return np.asarray(usual / np.linalg.norm(usual))
+    side = usual - 0.999 * (usual @ ahead) * ahead
+    both = ahead + 0.75 * side / np.linalg.norm(side)
+    return np.asarray(both / np.linalg.norm(both))
+
+
+def _face_normals(lips: LipFaces) -> Floats:
+    normal = lips.normal[lips.triangles].sum(axis=1)
+    return np.asarray(normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300))
+
+
+__all__ = [
+    "LIP_FIELDS",
+    "Plane",
+    "SpaceScene",
+    "clip_plane",
+    "crack_scene",
+    "direction",
+    "is_coloured",
+    "lip_values",
+    "mesh_scene",
+    "space_scene",
+]

@@ -1,0 +1,1 @@
+"""Solutions as pieces that can be drawn, written and compared."""

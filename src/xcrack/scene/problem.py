@@ -1,0 +1,167 @@
+"""The scene: body, cracks, supports and loads, checked before anything is built."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from numbers import Real
+from typing import Any
+
+from xcrack.crack.crack import Crack, check_cracks, place
+from xcrack.crack.placing_3d import check_surfaces, place_surface
+from xcrack.errors import ProblemError
+from xcrack.mesh.mesh import Mesh
+from xcrack.mesh.sets import facet_set
+from xcrack.scene.conditions import (
+    BodyForce,
+    CrackPressure,
+    Displacement,
+    Fix,
+    InitialStress,
+    Load,
+    PointForce,
+    Pressure,
+    Support,
+    Traction,
+)
+from xcrack.scene.material import Isotropic
+from xcrack.scene.numerics import Numerics
+
+_LOADS = (Traction, Pressure, PointForce, BodyForce, CrackPressure, InitialStress, Displacement)
+
+
+_ORDER = {2: 2, 3: 1}  # of the standard functions, by dimension (measured)
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """A body with cracks, supports and loads.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    material : Isotropic
+    cracks : sequence of Crack
+    supports : sequence of fix(...) and displacement(...)
+        None are needed for loads in equilibrium: rigid motion is removed.
+    loads : sequence of loads
+    contact : {"auto", "on", "off"}
+        auto: a crack whose lips would overlap gets multipliers, others get none.
+    order : {1, 2}, optional
+        Degree of the standard and Heaviside functions. Where it is left out: 2 in the plane, 1 in
+        space.
+    numerics : Numerics
+
+    Raises
+    ------
+    ProblemError, GeometryError
+        A scene that is not well posed; the message names object, value and remedy.
+    """
+
+    mesh: Mesh
+    material: Isotropic
+    cracks: Sequence[Crack] = ()
+    supports: Sequence[Support] = ()
+    loads: Sequence[Load] = ()
+    contact: str = "auto"
+    order: int | None = field(default=None, metadata={"resolved": lambda own: _ORDER[own.mesh.dim]})
+    numerics: Numerics = field(default_factory=Numerics)
+
+    def __post_init__(self) -> None:
+        for name, kind in (("mesh", Mesh), ("material", Isotropic), ("numerics", Numerics)):
+            if not isinstance(getattr(self, name), kind):
+                raise ProblemError(
+                    f"Problem({name}=...) must be of type {kind.__name__}, "
+                    f"not {type(getattr(self, name)).__name__}."
+                )
+        for name in ("cracks", "supports", "loads"):
+            given = getattr(self, name)
+            if isinstance(given, str) or not isinstance(given, Iterable):
+                raise ProblemError(
+                    f"{name}: give a list, such as {name}=[...], not {type(given).__name__}."
+                )
+            object.__setattr__(self, name, tuple(given))
+        if self.mesh.dim == 3 and self.material.plane is not None:
+            raise ProblemError(
+                f'Isotropic(plane="{self.material.plane}") is for plane bodies: leave plane out '
+                "for a mesh of tetrahedra (read_mesh drops a constant z)."
+            )
+        if self.mesh.dim == 2 and self.material.plane is None:
+            raise ProblemError(
+                'a plane body needs Isotropic(..., plane="strain") or plane="stress": the two '
+                "differ by up to 1/(1 - nu²) in stiffness, so there is no default."
+            )
+        if self.order is None:
+            object.__setattr__(self, "order", _ORDER[self.mesh.dim])
+        if self.order not in (1, 2):
+            raise ProblemError(f"order = {self.order!r}: give 1 or 2.")
+        if self.contact not in ("auto", "on", "off"):
+            raise ProblemError(f'contact = {self.contact!r}: give "auto", "on" or "off".')
+        self._check_members()
+        if self.mesh.dim == 2:
+            check_cracks(self.placed, self.mesh)
+        else:
+            check_surfaces(self.placed, self.mesh)
+
+    @cached_property
+    def placed(self) -> tuple[Crack, ...]:
+        """The cracks with tips and mouths decided in this mesh."""
+        put = place if self.mesh.dim == 2 else place_surface
+        return tuple(put(crack, self.mesh) for crack in self.cracks)
+
+    def state(self, state: Any) -> tuple[tuple[Load, ...], float]:
+        """Loads and factor of a load state: a number, or a list of loads."""
+        if state is None:
+            return tuple(self.loads), 1.0
+        if isinstance(state, Real):
+            factor = float(state)
+            if not abs(factor) < float("inf"):
+                raise ProblemError(f"load state {factor}: give a finite number.")
+            return tuple(self.loads), factor
+        if isinstance(state, str) or not isinstance(state, Iterable):
+            raise ProblemError(f"load state {state!r}: give a number or a list of loads.")
+        loads = tuple(state)
+        for load in loads:
+            self._check_load(load)
+        body = tuple(load for load in self.loads if isinstance(load, InitialStress))
+        return loads + tuple(b for b in body if b not in loads), 1.0
+
+    def _check_members(self) -> None:
+        for crack in self.cracks:
+            if not isinstance(crack, Crack):
+                raise ProblemError(f"cracks: {crack!r} is no crack; make one by line_crack(...).")
+        for support in self.supports:
+            if not isinstance(support, Fix | Displacement):
+                raise ProblemError(
+                    f"supports: {type(support).__name__} is no support; give fix(...) or "
+                    "displacement(...), and put forces into loads."
+                )
+            if isinstance(support.where, str):
+                facet_set(self.mesh, support.where, type(support).__name__.lower())
+        for load in self.loads:
+            self._check_load(load)
+
+    def _check_load(self, load: Any) -> None:
+        if not isinstance(load, _LOADS):
+            raise ProblemError(f"loads: {load!r} is no load; see traction(...), pressure(...).")
+        where = getattr(load, "where", None)
+        if isinstance(where, str):
+            facet_set(self.mesh, where, type(load).__name__.lower())
+        if isinstance(load, Displacement):
+            held = [s.where for s in self.supports]
+            if not any(_same(where, h) for h in held):
+                raise ProblemError(
+                    f"displacement({where!r}) among the loads gives a new value to a support, but "
+                    "nothing is supported there: put it into supports first."
+                )
+        if isinstance(load, CrackPressure) and load.crack is not None:
+            if not 0 <= load.crack < len(self.cracks):
+                raise ProblemError(
+                    f"crack_pressure(crack={load.crack}): the problem has {len(self.cracks)} "
+                    "crack(s), numbered from 0."
+                )
+
+
+def _same(a: Any, b: Any) -> bool:
+    if isinstance(a, str) or isinstance(b, str):
+        return bool(isinstance(a, str) and isinstance(b, str) and a == b)
+    return bool(len(a) == len(b) and (a == b).all())

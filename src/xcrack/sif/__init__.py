@@ -1,0 +1,1 @@
+"""Stress intensity factors at tips and along fronts."""

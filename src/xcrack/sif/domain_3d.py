@@ -1,0 +1,397 @@
+"""K along the fronts of a solution in space: radii, points, loads, and values at the vertices."""
+
+import warnings
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from xcrack.analysis.solution import Solution, gradients_at
+from xcrack.arrays import Bools, Floats, Ints
+from xcrack.crack.front_curve import Feet, FrontCurve, front_curve
+from xcrack.errors import XcrackWarning
+from xcrack.mesh.body import Body
+from xcrack.mesh.locate import contains
+from xcrack.scene.conditions import (
+    BodyForce,
+    CrackPressure,
+    InitialStress,
+    evaluate,
+    evaluate_scalar,
+)
+from xcrack.sif.interaction_3d import (
+    front_nodes,
+    full_measure,
+    inside_body,
+    integrals,
+    lip_integrals,
+    solve_front,
+)
+from xcrack.sif.smoothing_3d import along, smoothed
+from xcrack.xfem.enrichment_3d import leg_size
+from xcrack.xfem.loads import position
+from xcrack.xfem.quadrature import cell_points, cell_side
+
+SECOND = 0.7  # outer radius of the second domain, as a share of the first
+_OUTER = 2.6  # least outer radius, in legs of the cells at the front
+# Outer radius in radii of the enriched tube: the error sits in the cells at its rim, and a domain
+# that reaches beyond them makes K of a penny 1 % too low.
+_REACH = 1.05
+_BENT = 0.9  # largest outer radius, as a share of the radius of curvature of the front
+_SPACING = 2.0  # of the hats, in legs: with less K scatters more
+_SMOOTH = 12  # hats; fewer are so far apart that smoothing would cut off what varies
+_LEAST = 1.2  # legs; a smaller domain is none
+_POINTS, _DEGREE = 5, 4  # 6 takes twice the time and is as far from 8, which differs by 0.3 %
+_NARROW = 1.5  # legs; a domain clipped below is worth a word
+_DIFFER = 0.05  # difference of two domains, as a share of the largest K, that is worth a word
+_CHUNK = 2000  # cells integrated at once; bounds the memory
+_SAMPLES = 400  # points of an open front among which its way into the body is looked for
+
+
+def tube_radius(
+    solution: Solution, t: int, curve: FrontCurve, ends: tuple[float, float]
+) -> tuple[float, float, float]:
+    """Outer radius of the tube around a front, the wanted one, and the size of cells, length.
+
+    Parameters
+    ----------
+    solution : Solution
+    t : int
+        Number of the front in `solution.space.tips`.
+    curve : FrontCurve
+        Of that front.
+    ends : tuple of float, length
+        Where an open front enters and leaves the body.
+    """
+    space = solution.space
+    tip = space.tips[t]
+    cells = space.cuts[tip.crack].level_set.tip_cells[tip.number]
+    size = leg_size(space.mesh, cells)
+    wanted = solution.problem.numerics.domain
+    if wanted is None:
+        wanted = max(_OUTER * size, _REACH * tip.radius)
+    # Near the exits hats are left out anyway; a bend there must not narrow the whole tube.
+    ahead = 0.0 if curve.closed else min(wanted, 0.4 * (ends[1] - ends[0]))
+    limit = _BENT * curve.sharpest(ends[0] + ahead, ends[1] - ahead, over=2 * size)
+    s = np.linspace(*ends, max(8, round((ends[1] - ends[0]) / (2 * size))) + 1)
+    x = curve.at(s)[0]
+    # Near its exits a front is close to the boundary; that is dealt with by leaving out hats.
+    inner = np.ones(len(s), dtype=bool)
+    if not curve.closed:
+        inner = np.minimum(s - ends[0], ends[1] - s) >= min(wanted, 0.4 * (ends[1] - ends[0]))
+    free = np.abs(Body.of(space.mesh).depth(x[inner])[0])
+    limit = min(limit, 0.95 * float(free.min()))
+    for other in space.tips:
+        if other is not tip:
+            limit = min(limit, 0.8 * float(cKDTree(other.x).query(x)[0].min()))
+    for c, lips in enumerate(solution.lips):
+        if c != tip.crack and len(lips):
+            limit = min(limit, 0.9 * float(cKDTree(lips.x).query(x)[0].min()))
+    return min(wanted, max(limit, _LEAST * size)), wanted, size
+
+
+def way_inside(solution: Solution, curve: FrontCurve) -> tuple[float, float] | None:
+    """Parameters at which an open front enters and leaves the body; None if it never does."""
+    if curve.closed:
+        return 0.0, curve.length
+    mesh = solution.space.mesh
+    s = np.linspace(0.0, curve.length, _SAMPLES + 1)
+    inside = np.nonzero(contains(mesh, curve.at(s)[0]))[0]
+    if not len(inside):
+        return None
+    ends = []
+    for last, step in ((int(inside[0]), -1), (int(inside[-1]), 1)):
+        within = s[last]
+        outside = s[min(max(last + step, 0), _SAMPLES)]
+        for _ in range(30 if outside != within else 0):
+            middle = (within + outside) / 2
+            if contains(mesh, curve.at(np.array([middle]))[0])[0]:
+                within = middle
+            else:
+                outside = middle
+        ends.append(float(within))
+    return ends[0], ends[1]
+
+
+def front_intensity(
+    solutions: Sequence[Solution], t: int
+) -> list[tuple[Floats, Floats, Floats, Floats, Floats, Bools]]:
+    """K at the vertices of one front, for several load states of one solve.
+
+    Parameters
+    ----------
+    solutions : sequence of Solution
+        States of one problem, which share their space.
+    t : int
+        Number of the front in `space.tips`.
+
+    Returns
+    -------
+    list of (K, spread, x, frame, s, at_surface)
+        For each state: K `(m, 3)` and the difference of two domains, stress · √length; vertices
+        `(m, 3)`, their frames `(m, 3, 3)`, arc length `(m,)`, and which vertices lie where the
+        tube is cut by the surface of the body or outside: K is prolonged to there.
+    """
+    space = solutions[0].space
+    tip = space.tips[t]
+    number = space.cracks[tip.crack].fronts or ()
+    closed = bool(number[tip.number][0] == number[tip.number][-1])
+    curve = front_curve(tip.x, tip.frame, closed)
+    at_vertex = curve.breaks[: len(tip.x)]
+    knots, K, valid = front_values(solutions, t, curve)
+    _, frame, _ = curve.at(at_vertex)
+    found = along(K, knots, valid, curve, at_vertex)
+    surface = ~_covered(curve, knots, valid, at_vertex)
+    s = curve.arc(at_vertex)
+    return [
+        (values[0], np.abs(values[0] - values[1]), np.array(tip.x), frame, s, surface)
+        for values in found
+    ]
+
+
+def _covered(curve: FrontCurve, knots: Floats, valid: Bools, s: Floats) -> Bools:
+    """Which parameters lie between two valid tops of hats."""
+    if curve.closed:
+        left = np.mod(np.searchsorted(knots, s * (1 + 1e-12), side="right") - 1, len(knots))
+        return np.asarray(valid[left] & valid[(left + 1) % len(knots)])
+    left = np.clip(np.searchsorted(knots, s, side="right") - 1, 0, len(knots) - 2)
+    within = (s >= knots[0]) & (s <= knots[-1])
+    return np.asarray(within & valid[left] & valid[left + 1])
+
+
+def front_values(
+    solutions: Sequence[Solution], t: int, curve: FrontCurve
+) -> tuple[Floats, Floats, Bools]:
+    """K at the tops of the hats of one front.
+
+    Parameters
+    ----------
+    solutions : sequence of Solution
+    t : int
+    curve : FrontCurve
+
+    Returns
+    -------
+    knots : (p,) array, length
+    K : (n, 2, p, 3) array, stress · √length
+        Of n states and two domains; smoothed where there are hats enough.
+    valid : (p,) array of bool
+        Hats whose domains lie in the body.
+    """
+    ends = way_inside(solutions[0], curve)
+    if ends is None:
+        knots = front_nodes(curve, curve.length)
+        return (
+            knots,
+            np.full((len(solutions), 2, len(knots), 3), np.nan),
+            np.zeros(len(knots), bool),
+        )
+    outer, wanted, size = tube_radius(solutions[0], t, curve, ends)
+    radii = np.array([outer, SECOND * outer])
+    knots = front_nodes(curve, _SPACING * size, None if curve.closed else ends)
+    turn = np.stack([_mean_rotation(s, curve, outer) for s in solutions], axis=-1)
+    total = _lip_part(solutions, t, curve, knots, radii, turn)
+    measure = np.zeros((len(radii), len(knots)))
+    for part, volume in _domain_parts(solutions, t, curve, knots, radii, turn):
+        total += part
+        measure += volume
+    valid = inside_body(measure, full_measure(curve, knots, radii))
+    if not curve.closed:
+        valid[[0, -1]] = False
+    K = solve_front(total, knots, curve, solutions[0].problem.material, valid)
+    rows = np.nonzero(valid)[0]
+    period = curve.length if curve.closed and valid.all() else None
+    if len(rows) >= _SMOOTH:
+        K[:, :, rows] = smoothed(K[:, :, rows], knots[rows], period)
+    _warn(curve, (outer, wanted, size), K[:, :, rows])
+    return knots, K, valid
+
+
+def _warn(curve: FrontCurve, radii: tuple[float, float, float], K: Floats) -> None:
+    """Say where a domain is too small, or two of them disagree."""
+    outer, wanted, size = radii
+    where = np.round(curve.at(np.zeros(1))[0][0], 6).tolist()
+    if outer < wanted and outer < _NARROW * size:
+        warnings.warn(
+            f"K along the front through {where}: its domain is clipped to {outer:.4g} "
+            f"({outer / size:.1f} cells) by the boundary, another front or a bend of the front. "
+            "Refine the mesh around the front.",
+            XcrackWarning,
+            stacklevel=8,
+        )
+    largest = np.abs(K).max(initial=0.0)
+    apart = np.abs(K[:, 0] - K[:, 1]).mean(axis=1).max(initial=0.0)
+    if apart > _DIFFER * largest > 0:
+        warnings.warn(
+            f"K along the front through {where}: two domains differ by {apart:.3g} in the mean, "
+            f"{100 * apart / largest:.2g} % of the largest K. Refine the mesh around the front.",
+            XcrackWarning,
+            stacklevel=8,
+        )
+
+
+def _domain_parts(
+    solutions: Sequence[Solution],
+    t: int,
+    curve: FrontCurve,
+    knots: Floats,
+    radii: Floats,
+    turn: Floats,
+) -> Iterator[tuple[Floats, Floats]]:
+    """Domain integrals of the hats and their measures, chunk by chunk."""
+    space = solutions[0].space
+    tip = space.tips[t]
+    mesh, psi = space.mesh, space.cuts[tip.crack].level_set.psi[tip.number]
+    outer = float(radii.max())
+    coefficients = np.stack([solution.coefficients for solution in solutions], axis=-1)
+    initial = partial(_initial, solutions) if _has_initial(solutions) else None
+    middle = mesh.points[mesh.cells].mean(axis=1)
+    distance = curve.distance(middle) - 1.05 * outer
+    cells = np.nonzero(distance <= mesh.cell_size)[0]
+    reach = np.linalg.norm(mesh.points[mesh.cells[cells]] - middle[cells, None], axis=2).max(axis=1)
+    cells = cells[distance[cells] <= reach]
+    for first in range(0, len(cells), _CHUNK):
+        points = cell_points(space, cells[first : first + _CHUNK], _POINTS, _DEGREE)
+        x = position(space, points.cell, points.bary)
+        near, feet = curve.near(x, outer)
+        points = points.chosen(near)
+        gradient = gradients_at(space, coefficients, points.cell, points.bary, points.side)
+        behind = np.einsum("qb,qb->q", psi[mesh.cells[points.cell]], points.bary) < 0
+        yield integrals(
+            curve,
+            knots,
+            feet,
+            points.weight,
+            gradient - turn,
+            points.side[:, tip.crack],
+            behind,
+            solutions[0].problem.material,
+            radii,
+            force=_force(solutions, x[near]),
+            initial=initial,
+        )
+
+
+def _force(solutions: Sequence[Solution], x: Floats) -> Floats | None:
+    """Body forces of all states `(q, 3, n)`."""
+    total = np.zeros((len(x), 3, len(solutions)))
+    found = False
+    for n, solution in enumerate(solutions):
+        for load in solution.loads:
+            if isinstance(load, BodyForce):
+                found = True
+                total[:, :, n] += solution.factor * evaluate(load.value, x, "body_force")
+    return total if found else None
+
+
+def _has_initial(solutions: Sequence[Solution]) -> bool:
+    return any(isinstance(load, InitialStress) for s in solutions for load in s.loads)
+
+
+def _initial(solutions: Sequence[Solution], x: Floats) -> Floats:
+    return np.stack([solution.initial_stress(x) for solution in solutions], axis=-1)
+
+
+def _lip_part(
+    solutions: Sequence[Solution],
+    t: int,
+    curve: FrontCurve,
+    knots: Floats,
+    radii: Floats,
+    turn: Floats,
+) -> Floats:
+    """Lip integrals of the hats `(n, k, 3, p)`."""
+    space = solutions[0].space
+    c = space.tips[t].crack
+    lips, outer = solutions[0].lips[c], float(radii.max())
+    near, feet = curve.near(lips.x, outer)
+    feet = _as_seen(solutions[0], t, near, feet)
+    pressure = np.stack([lip_pressure(solution, c)[near] for solution in solutions], axis=-1)
+    inside = feet.r < outer
+    height = np.abs(feet.local[inside, 1]).max(initial=0.0)
+    bent = height > 1e-9 * outer
+    if not bent and not np.abs(pressure).any():
+        return np.zeros((len(solutions), len(radii), 3, len(knots)))
+    gradient = None
+    if bent:
+        coefficients = np.stack([solution.coefficients for solution in solutions], axis=-1)
+        both = [
+            gradients_at(space, coefficients, *_on_lip(solutions[0], c, near, s, sign)) - turn
+            for s, sign in ((0, -1), (1, 1))
+        ]
+        gradient = np.stack(both)
+    return lip_integrals(
+        curve,
+        knots,
+        feet,
+        lips.normal[near],
+        lips.weight[near],
+        lips.normal[near][:, :, None] * pressure[:, None],
+        solutions[0].problem.material,
+        radii,
+        gradient=gradient,
+        initial=partial(_initial, solutions) if _has_initial(solutions) else None,
+    )
+
+
+def _as_seen(solution: Solution, t: int, rows: Ints, feet: Feet) -> Feet:
+    """Feet of points on the lips, x1 measured from the front that the cells see.
+
+    The lips end at its chords, and so does the pressure: on a lip the auxiliary field goes like
+    the inverse root of x1, and a strip of 1 % that chords cut off would lose 10 % of the term.
+    """
+    space = solution.space
+    tip = space.tips[t]
+    lips = solution.lips[tip.crack]
+    corner = space.mesh.cells[lips.cell[rows, 1]]
+    psi = space.cuts[tip.crack].level_set.psi[tip.number][corner]
+    ahead = np.einsum("qb,qb->q", lips.bary[rows, 1], psi)
+    local = np.array(feet.local)
+    # Out of reach of the tube psi has only a sign.
+    known = np.abs(ahead - local[:, 0]) < tip.radius
+    local[known, 0] = ahead[known]
+    return replace(feet, local=local)
+
+
+def _on_lip(solution: Solution, c: int, rows: Ints, s: int, sign: int) -> tuple[Ints, Floats, Ints]:
+    """Cells, places and sides of points on one lip."""
+    lips = solution.lips[c]
+    cell = lips.cell[rows, s]
+    side = cell_side(solution.space, cell)
+    side[:, c] = sign
+    return cell, lips.bary[rows, s], side
+
+
+def lip_pressure(solution: Solution, c: int) -> Floats:
+    """Pressure on the lips of crack c at their points: multipliers and given pressure `(q,)`.
+
+    Parameters
+    ----------
+    solution : Solution
+    c : int
+    """
+    lips, contact = solution.lips[c], solution.contact[c]
+    total = np.zeros(len(lips)) if contact is None else np.array(contact.pressure)
+    for load in solution.loads:
+        if isinstance(load, CrackPressure) and load.crack in (None, c):
+            given = evaluate_scalar(load.value, lips.x, "crack_pressure")
+            total = total + solution.factor * given
+    return total
+
+
+def _mean_rotation(solution: Solution, curve: FrontCurve, radius: float) -> Floats:
+    """Mean rotation of the mesh points around a front `(3, 3)`.
+
+    A rigid rotation adds nothing to the integrals but the error of quadrature of terms that
+    would vanish.
+    """
+    points = solution.space.mesh.points
+    near = np.nonzero(curve.distance(points) < radius)[0]
+    if len(near) < 4:
+        return np.zeros((3, 3))
+    y, u = points[near] - points[near].mean(axis=0), solution.coefficients[near]
+    inertia = (y * y).sum() * np.eye(3) - y.T @ y
+    w = np.linalg.solve(inertia, np.cross(y, u).sum(axis=0))
+    return np.array([[0.0, -w[2], w[1]], [w[2], 0.0, -w[0]], [-w[1], w[0], 0.0]])

@@ -1,0 +1,186 @@
+"""Rigid motion: what holds the body, and what to do where nothing does."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg
+import scipy.sparse as sp
+from scipy.sparse.csgraph import connected_components
+
+from xcrack.arrays import Bools, Floats, Ints
+from xcrack.errors import ProblemError
+from xcrack.xfem.assembly import rigid_modes
+from xcrack.xfem.facets import split_facets
+from xcrack.xfem.function_space import Space
+
+_IMBALANCE = 1e-3  # share of the sum of all forces above which loads count as out of balance
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """Rigid motions that no support prevents.
+
+    Attributes
+    ----------
+    modes : (n_dof, k) array
+        Orthonormal; k = 0 for a body that is held.
+    pins : (k,) array of int
+        Unknowns pinned to make the stiffness regular.
+    """
+
+    modes: Floats
+    pins: Ints
+
+
+def free_motion(space: Space, fixed: Bools) -> Motion:
+    """Rigid motions left by the supports, and far standard unknowns to pin."""
+    if any(cut.n_tips == 0 for cut in space.cuts):
+        _check_pieces(space, fixed)
+    n = space.n_nodes * space.dim
+    R = np.linalg.qr(rigid_modes(space.node_points))[0]
+    held = R[fixed[:n]]
+    gram = held.T @ held
+    w, V = np.linalg.eigh(gram)
+    null = V[:, w < 1e-10 * max(float(w.max(initial=0.0)), 1.0 / len(R))]
+    modes = np.zeros((space.n_dof, null.shape[1]))
+    modes[:n] = R @ null
+    if null.shape[1] == 0:
+        return Motion(modes, np.zeros(0, dtype=np.int64))
+    plain = np.ones(space.n_nodes, dtype=bool)
+    plain[space.cell_nodes[space.enriched]] = False
+    plain[space.mesh.n_points :] = False
+    every = np.zeros(space.n_nodes, dtype=bool)
+    every[: space.mesh.n_points] = True
+    for chosen in (plain, every):
+        candidates = (np.nonzero(chosen)[0][:, None] * space.dim + np.arange(space.dim)).ravel()
+        candidates = candidates[~fixed[candidates]]
+        if len(candidates) < null.shape[1]:
+            continue
+        triangle, pivots = scipy.linalg.qr(modes[candidates].T, mode="r", pivoting=True)
+        diagonal = np.abs(np.diag(triangle))
+        # Two points in space leave the turn about their line free.
+        if diagonal[-1] > 1e-6 * diagonal[0]:
+            break
+    return Motion(modes, candidates[pivots[: null.shape[1]]])
+
+
+def balanced(space: Space, motion: Motion, f: Floats) -> tuple[Floats, float]:
+    """Loads without their small resultants, and the share that was removed.
+
+    Raises
+    ------
+    ProblemError
+        A resultant above 1e-3 of the sum of all forces in a direction that nothing holds.
+    """
+    if motion.modes.shape[1] == 0:
+        return f, 0.0
+    d = space.dim
+    n = space.n_nodes * d
+    total = _total(space, f)
+    if total == 0:
+        return f, 0.0
+    # Resultants of unit translations and rotations with a lever of the body's size.
+    modes = motion.modes / np.abs(motion.modes).max(axis=0)
+    residual = modes.T @ f
+    share = float(np.abs(residual).max() / total)
+    if share > _IMBALANCE:
+        modes = rigid_modes(space.node_points)
+        resultant = modes.T @ f[:n]
+        raise ProblemError(
+            f"the body is not held against a rigid motion and its loads are out of balance by "
+            f"{100 * share:.3g} % of the sum of all forces ({total:.4g}; resultant force "
+            f"{np.round(resultant[:d], 6).tolist()}, moment about the centre "
+            f"{np.round(resultant[d:], 6).tolist()}): add a support such as fix(set, axis), or "
+            "loads that balance."
+        )
+    correction = motion.modes @ (motion.modes.T @ f)
+    return f - correction, share
+
+
+def _total(space: Space, f: Floats) -> float:
+    """Sum of all forces; pressure on lips acts on the jumps of enriched functions alone."""
+    size = np.linalg.norm(f.reshape(-1, space.dim), axis=1)
+    total = float(size[: space.n_nodes].sum())
+    for number in space.heaviside:
+        total += float(size[number[number >= 0]].sum())
+    for tip in space.tips:
+        first = tip.point_to_function[tip.point_to_function >= 0]
+        each = (first[:, None] + np.arange(tip.functions)).ravel()
+        total += float(size[each].sum()) / np.sqrt(tip.radius)
+    return total
+
+
+def without_motion(motion: Motion, u: Floats) -> Floats:
+    """Displacements without the rigid motion that nothing prevents."""
+    return np.asarray(u - motion.modes @ (motion.modes.T @ u))
+
+
+def _check_pieces(space: Space, fixed: Bools) -> None:
+    """Raise where a crack cuts off a piece that nothing holds."""
+    piece_of_node, n_pieces, volume = pieces(space)
+    if n_pieces == 1:
+        return
+    x, d = space.node_points, space.dim
+    R = rigid_modes(x) / np.abs(rigid_modes(x)).max(axis=0)
+    for k in range(n_pieces):
+        nodes = piece_of_node == k
+        mask = fixed[: len(R)] & np.repeat(nodes, d)
+        rank = np.linalg.matrix_rank(R[mask], tol=1e-8) if mask.any() else 0
+        if rank < R.shape[1]:
+            raise ProblemError(
+                f"the cracks cut the body into {n_pieces} pieces, and the one around "
+                f"{np.round(x[nodes].mean(axis=0), 6).tolist()} ({100 * volume[k]:.3g} % of the "
+                f"body) is not held against {R.shape[1] - rank} rigid motion(s): hold it by a "
+                "support of its own; contact alone cannot."
+            )
+
+
+def pieces(space: Space) -> tuple[Ints, int, Floats]:
+    """Connected pieces of the cut body: piece of each node, their number, shares of volume."""
+    mesh = space.mesh
+    m = len(mesh.cells)
+    inner = np.nonzero(mesh.facet_to_cell[:, 1] >= 0)[0]
+    ends = mesh.facets[inner]
+    parts = split_facets(space, ends)
+    part, sides = parts.number, parts.side
+    cells = mesh.facet_to_cell[inner][part]
+    on_lip = np.zeros(len(mesh.facets), dtype=bool)
+    is_cut = np.full(m, -1, dtype=np.int64)
+    for c, cut in enumerate(space.cuts):
+        is_cut[cut.cells] = c
+        own = cut.lip_cell[:, 0] != cut.lip_cell[:, 1]
+        for a, b in cut.lip_cell[own]:
+            both = np.intersect1d(mesh.cell_to_facet[a], mesh.cell_to_facet[b])
+            on_lip[both] = True
+    joined = ~on_lip[inner][part]
+    cells, sides = cells[joined], sides[joined]
+    crack = is_cut[cells]
+    own_side = np.take_along_axis(sides, np.maximum(crack, 0), axis=1) > 0
+    vertex = 2 * cells + ((crack >= 0) & own_side)
+    graph = sp.csr_matrix(
+        (np.ones(len(vertex)), (vertex[:, 0], vertex[:, 1])), shape=(2 * m, 2 * m)
+    )
+    label = connected_components(graph, directed=False)[1]
+    used = np.zeros(2 * m, dtype=bool)
+    used[0::2] = True
+    used[1::2] = is_cut >= 0
+    names, number = np.unique(label[used], return_inverse=True)
+    piece = np.full(2 * m, -1, dtype=np.int64)
+    piece[used] = number
+    share = np.zeros(len(names))
+    np.add.at(share, piece[0::2][is_cut < 0], mesh.volume[is_cut < 0])
+    for cut in space.cuts:
+        mine = cut.is_cut[cut.sub_to_cell]
+        vertex_of = 2 * cut.sub_to_cell[mine] + (cut.sub_side[mine] > 0)
+        np.add.at(
+            share, piece[vertex_of], cut.sub_fraction[mine] * mesh.volume[cut.sub_to_cell[mine]]
+        )
+    of_node = np.zeros(space.n_nodes, dtype=np.int64)
+    nodes = space.cell_nodes
+    plain = is_cut < 0
+    for c in range(len(space.cuts)):
+        rows = np.nonzero(is_cut == c)[0]
+        own = space.node_side[c][nodes[rows]] > 0
+        of_node[nodes[rows]] = piece[2 * rows[:, None] + own]
+    of_node[nodes[plain]] = piece[2 * np.nonzero(plain)[0]][:, None]
+    return of_node, len(names), share / share.sum()

@@ -1,0 +1,1 @@
+"""Enriched functions, their integration and their matrices."""

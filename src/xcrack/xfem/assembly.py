@@ -1,0 +1,177 @@
+"""Stiffness: the uncracked body once a mesh, enriched cells once a crack."""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import scipy.sparse as sp
+
+from xcrack.arrays import Floats, Ints
+from xcrack.mesh.mesh import Mesh
+from xcrack.mesh.simplex import cell_nodes, shape_derivatives, simplex_rule
+from xcrack.scene.material import Isotropic
+from xcrack.scene.numerics import Numerics
+from xcrack.xfem.consistent import boundary_points, corrected
+from xcrack.xfem.function_space import Space
+from xcrack.xfem.kept_cells import KeptCells, kept_cells, with_one_jump
+from xcrack.xfem.lips import LipPoints
+from xcrack.xfem.quadrature import Points, cell_points
+
+if TYPE_CHECKING:
+    from xcrack.solvers.multigrid import Hierarchy
+
+_CHUNK = 60_000  # integration points tabulated at once; bounds the memory
+
+
+@dataclass(frozen=True, eq=False)
+class Bulk:
+    """Stiffness of the uncracked body; the same for every crack in a mesh.
+
+    Attributes
+    ----------
+    mesh : Mesh
+    material : Isotropic
+    order : int
+    matrix : sparse matrix (n, n), stress · length^(d - 2)
+        Node blocks, BSR.
+    levels : Hierarchy, optional
+        Coarse levels of the iterative solver, once it has made them.
+    cells : KeptCells, optional
+        Cut cells of the last crack that may serve the next.
+    """
+
+    mesh: Mesh
+    material: Isotropic
+    order: int
+    matrix: sp.bsr_matrix
+    levels: "Hierarchy | None" = None
+    cells: KeptCells | None = None
+
+
+def bulk(mesh: Mesh, material: Isotropic, order: int) -> Bulk:
+    """Stiffness of the uncracked body."""
+    from xcrack.kernels.bulk import block_pattern, block_stiffness
+
+    nodes = np.ascontiguousarray(cell_nodes(mesh, order))
+    n_nodes = mesh.n_points + (len(mesh.edges) if order == 2 else 0)
+    indptr, indices, slot = block_pattern(nodes, n_nodes)
+    bary, weight = simplex_rule(mesh.dim, 2 * (order - 1))
+    data = block_stiffness(
+        slot,
+        len(indices),
+        mesh.gradient,
+        mesh.volume,
+        shape_derivatives(order, bary),
+        weight,
+        material.lam,
+        material.mu,
+    )
+    size = n_nodes * mesh.dim
+    return Bulk(mesh, material, order, sp.bsr_matrix((data, indices, indptr), shape=(size, size)))
+
+
+def enriched_stiffness(
+    space: Space,
+    material: Isotropic,
+    numerics: Numerics,
+    lips: tuple[LipPoints, ...],
+    known: KeptCells | None = None,
+) -> tuple[sp.csr_matrix, int, KeptCells | None]:
+    """Entries with an enriched function, as a matrix of all unknowns.
+
+    Entries of two standard functions are left out: they are those of the uncracked body.
+
+    Parameters
+    ----------
+    known : KeptCells, optional
+        Of an earlier crack in the same mesh.
+
+    Returns
+    -------
+    matrix : sparse matrix (n_dof, n_dof)
+    n_points : int
+        Integration points used.
+    kept : KeptCells or None
+        For the next crack.
+    """
+    from xcrack.kernels.enriched import add_products, add_stiffness, enriched_pattern
+
+    cells = space.enriched
+    n = space.n_dof
+    if not len(cells):
+        return sp.csr_matrix((n, n)), 0, None
+    simple = with_one_jump(space, cells)
+    kept, n_points = kept_cells(space, cells[simple], known)
+    others = cells[~simple]
+    points = cell_points(space, others, numerics.points, 2 * (space.order - 1))
+    with_tip = cells[space.has_tip[cells]]
+    boundary = None
+    if numerics.consistent and len(with_tip):
+        boundary = boundary_points(space, with_tip, lips)
+    indptr, indices = enriched_pattern(_functions(space, cells), space.n_functions, space.n_nodes)
+    d = space.dim
+    data = np.zeros((len(indices), d, d))
+    lame = material.lam, material.mu
+    for batch, rows in space.batches(kept.cells):
+        products = kept.products[rows]
+        add_products(data, indptr, indices, batch.functions, products, space.n_nodes, *lame)
+    for part in _chunks(space, points, others):
+        for batch, _ in space.batches(part):
+            number, row, first = points.of_cells(batch.cells)
+            bary, weight = points.bary[number], points.weight[number]
+            side = points.side[number]
+            N, G = space.tabulate(batch, row, bary, side)
+            if batch.tips and boundary is not None:
+                G = corrected(space, batch, (row, bary, weight, side), N, G, boundary)
+            add_stiffness(
+                data,
+                indptr,
+                indices,
+                batch.functions,
+                first,
+                weight,
+                G,
+                space.n_nodes,
+                *lame,
+            )
+    if d * d * len(indices) < np.iinfo(np.int32).max:
+        indptr = indptr.astype(np.int32)
+    matrix = sp.bsr_matrix((data, indices, indptr), shape=(n, n)).tocsr()
+    return matrix, n_points + len(points.weight), kept
+
+
+def _functions(space: Space, cells: Ints) -> Ints:
+    """Functions that act on cells, in rows of one length."""
+    parts = [batch.functions for batch, _ in space.batches(cells)]
+    width = max(part.shape[1] for part in parts)
+    filled = [np.pad(p, ((0, 0), (0, width - p.shape[1])), constant_values=-1) for p in parts]
+    return np.concatenate(filled)
+
+
+def _chunks(space: Space, points: Points, cells: Ints) -> list[Ints]:
+    counts = np.searchsorted(points.cell, cells, side="right") - np.searchsorted(points.cell, cells)
+    group = np.cumsum(counts) // _CHUNK
+    return [cells[group == g] for g in np.unique(group)]
+
+
+def total_stiffness(bulk_: Bulk, enriched: sp.csr_matrix) -> sp.csr_matrix:
+    """Stiffness of all unknowns."""
+    n, m = enriched.shape[0], bulk_.matrix.shape[0]
+    plain = bulk_.matrix.tocsr()
+    indptr = np.concatenate([plain.indptr, np.full(n - m, plain.indptr[-1], plain.indptr.dtype)])
+    padded = sp.csr_matrix((plain.data, plain.indices, indptr), shape=(n, n))
+    return (padded + enriched).tocsr()
+
+
+def rigid_modes(x: Floats) -> Floats:
+    """Rigid motions of points `(n, d)`: `(n d, 3)` in the plane, `(n d, 6)` in space."""
+    n, d = x.shape
+    centre = x.mean(axis=0)
+    y = x - centre
+    modes = [np.tile(np.eye(d)[i], n) for i in range(d)]
+    for i in range(d):
+        for j in range(i + 1, d):
+            turn = np.zeros((n, d))
+            turn[:, i], turn[:, j] = -y[:, j], y[:, i]
+            modes.append(turn.ravel())
+    return np.stack(modes, axis=1)

@@ -1,0 +1,156 @@
+"""Facets split where cracks cross them, and the integration points that neighbours share."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from xcrack.arrays import Bools, Floats, Ints
+from xcrack.mesh.split import cut_simplices
+from xcrack.xfem.function_space import Space
+from xcrack.xfem.quadrature import segment_points
+from xcrack.xfem.quadrature_3d import radius_at, triangle_points
+
+_AT = 1e-10  # share of a facet's level set below which a value is zero
+
+
+@dataclass(frozen=True, eq=False)
+class FacetParts:
+    """Parts of facets.
+
+    Attributes
+    ----------
+    number : (s,) array of int
+        Row of the facet that each part belongs to.
+    bary : (s, d, d) array
+        Vertices in barycentric coordinates of the facet.
+    side : (s, cracks) array of int
+        Side of the part, 0 where it lies on the crack or phi changes its sign on it.
+    """
+
+    number: Ints
+    bary: Floats
+    side: Ints
+
+
+def split_facets(space: Space, ends: Ints) -> FacetParts:
+    """Split facets `(k, d)`, given by their points, where cracks cross them.
+
+    In space those of cells at a front are split along psi too.
+    """
+    return _split_segments(space, ends) if space.dim == 2 else _split_triangles(space, ends)
+
+
+def part_points(space: Space, nodes: Ints, bary: Floats, n: int = 6) -> tuple[Ints, Floats, Floats]:
+    """Integration points on segments or triangles inside simplices, graded towards tips.
+
+    The rule depends only on the part, so that the cells on both sides of a facet share it.
+
+    Parameters
+    ----------
+    space : Space
+    nodes : (s, m) array of int
+        Points of the facets or cells that the parts lie in.
+    bary : (s, d, m) array
+        Vertices of the parts in them.
+    n : int
+        Gauss points of a segment.
+
+    Returns
+    -------
+    number : (q,) array of int
+        Part of each point.
+    place : (q, d) array
+        Barycentric coordinates in the part.
+    weight : (q,) array
+        Length or area.
+    """
+    x = np.einsum("svm,smd->svd", bary, space.mesh.points[nodes])
+    if space.dim == 2:
+        rule = segment_points(space, x[:, 0], x[:, 1], n)
+        place = np.stack([1 - rule.position, rule.position], axis=1)
+        length = np.linalg.norm(x[:, 1] - x[:, 0], axis=1)
+        return rule.segment, place, length[rule.segment] * rule.weight
+    sides = x[:, [1, 2, 0]] - x
+    size = np.linalg.norm(sides, axis=2).max(axis=1)
+    number, place, share = triangle_points(radius_at(space, nodes, bary), size)
+    area = np.linalg.norm(np.cross(sides[:, 0], sides[:, 2]), axis=1) / 2
+    order = np.argsort(number, kind="stable")
+    number = number[order]
+    return number, place[order], area[number] * share[order]
+
+
+def _split_segments(space: Space, ends: Ints) -> FacetParts:
+    edge = _edge_numbers(space, ends)
+    k = len(ends)
+    position = np.full(k, np.nan)
+    for cut in space.cuts:
+        t = cut.cut_edge[edge]
+        # cut_edge counts from the smaller point number.
+        t = np.where(ends[:, 0] < ends[:, 1], t, 1 - t)
+        position = np.where(np.isnan(position), t, position)
+    split = ~np.isnan(position)
+    number = np.concatenate([np.arange(k), np.nonzero(split)[0]])
+    begin = np.concatenate([np.zeros(k), position[split]])
+    end = np.concatenate([np.where(split, position, 1.0), np.ones(int(split.sum()))])
+    bary = np.stack([np.stack([1 - p, p], axis=1) for p in (begin, end)], axis=1)
+    side = np.zeros((len(number), len(space.cuts)), dtype=np.int64)
+    for c, cut in enumerate(space.cuts):
+        values = cut.level_set.phi[ends[number]]
+        middle = (begin + end) / 2
+        at = (1 - middle) * values[:, 0] + middle * values[:, 1]
+        # Ahead of a tip phi changes its sign on a facet that no crack splits.
+        ahead = np.isnan(cut.cut_edge[edge])[number] & (values[:, 0] * values[:, 1] < 0)
+        side[:, c] = np.where(ahead, 0, np.sign(at))
+    return FacetParts(number, bary, side)
+
+
+def _edge_numbers(space: Space, ends: Ints) -> Ints:
+    edges, n = space.mesh.edges, space.mesh.n_points
+    key = edges[:, 0] * np.int64(n) + edges[:, 1]
+    low, high = np.sort(ends, axis=1).T
+    return np.searchsorted(key, low * np.int64(n) + high)
+
+
+def _split_triangles(space: Space, ends: Ints) -> FacetParts:
+    k = len(ends)
+    number, bary = np.arange(k), np.broadcast_to(np.eye(3), (k, 3, 3))
+    side = np.zeros((k, len(space.cuts)), dtype=np.int64)
+    facet = space.mesh.facet_numbers(ends)
+    for c, cut in enumerate(space.cuts):
+        touched, at_front = _touched(space, c)
+        levels = [(cut.level_set.phi, touched)]
+        levels += [(psi, at_front) for psi in cut.level_set.psi]
+        for values, where in levels:
+            chosen = where[facet[number]]
+            number, bary, side = _split(number, bary, side, values[ends], chosen)
+        at = np.einsum("svb,sb->sv", bary, cut.level_set.phi[ends[number]])
+        largest = np.take_along_axis(at, np.abs(at).argmax(axis=1)[:, None], 1)[:, 0]
+        changes = (at.min(axis=1) < 0) & (at.max(axis=1) > 0) & ~touched[facet[number]]
+        side[:, c] = np.where(changes, 0, np.sign(largest))
+    return FacetParts(number, bary, side)
+
+
+def _touched(space: Space, c: int) -> tuple[Bools, Bools]:
+    """Facets of the cells that crack c cuts or ends in, and of the latter alone."""
+    mesh, cut = space.mesh, space.cuts[c]
+    flags = []
+    for cells in (cut.is_cut | cut.is_tip, cut.is_tip):
+        flag = np.zeros(len(mesh.facets), dtype=bool)
+        flag[mesh.cell_to_facet[cells]] = True
+        flags.append(flag)
+    return flags[0], flags[1]
+
+
+def _split(
+    number: Ints, bary: Floats, side: Ints, values: Floats, chosen: Bools
+) -> tuple[Ints, Floats, Ints]:
+    """Split those of the chosen parts on which a function of the facet changes its sign."""
+    at = np.einsum("svb,sb->sv", bary, values[number])
+    small = _AT * np.abs(values[number]).max(axis=1, keepdims=True)
+    at = np.where(np.abs(at) < small, 0.0, at)
+    cut = chosen & (at.min(axis=1) < 0) & (at.max(axis=1) > 0)
+    kept, rows = np.nonzero(~cut)[0], np.nonzero(cut)[0]
+    inner, _, _, parent = cut_simplices(at[rows])
+    source = np.concatenate([kept, rows[parent]])
+    finer = np.einsum("svw,swb->svb", inner, bary[rows[parent]])
+    return number[source], np.concatenate([bary[kept], finer]), side[source]

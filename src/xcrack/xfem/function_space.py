@@ -1,0 +1,312 @@
+"""The approximation space: standard, Heaviside and tip functions, numbered and tabulated.
+
+Every scalar function has a number; unknown `d * function + component` is its coefficient in one
+direction. All enriched functions are shifted, N_i (H - H_i) and N_i (F - F(x_i)), so that the
+standard unknown of a mesh point is the displacement there. Tip functions ride on linear hats at
+both orders: quadratic ones would nearly repeat the other functions.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from xcrack.arrays import Bools, Floats, Ints, lock
+from xcrack.crack.crack import Crack, front
+from xcrack.crack.fronts_3d import front_frames
+from xcrack.cutting.cut import Cut
+from xcrack.errors import GeometryError
+from xcrack.mesh.mesh import Mesh, local_edges
+from xcrack.mesh.simplex import cell_nodes, node_points
+from xcrack.scene.numerics import Numerics
+from xcrack.xfem.enrichment import heaviside_nodes, node_level, tip_points, tip_radii
+from xcrack.xfem.williams import polar, tip_values
+
+
+@dataclass(frozen=True, eq=False)
+class Tip:
+    """One tip, or in space one front, and the functions around it.
+
+    Attributes
+    ----------
+    crack, number : int
+        Which tip of which crack.
+    x, frame : (d,) and (d, d) arrays
+        Position and rows (ahead, normal); in space the vertices of a front `(m, 3)` and their
+        frames `(m, 3, 3)`.
+    radius : float, length
+    functions : int
+        Tip functions a point.
+    point_to_function : (n,) array of int
+        First of its functions at each mesh point, or -1.
+    """
+
+    crack: int
+    number: int
+    x: Floats
+    frame: Floats
+    radius: float
+    functions: int
+    point_to_function: Ints
+
+
+@dataclass(frozen=True, eq=False)
+class Batch:
+    """Cells on which the same kinds of functions act.
+
+    Attributes
+    ----------
+    cells : (m,) array of int
+    cracks, tips : tuple of int
+        Cracks whose Heaviside functions, and tips whose functions act here.
+    functions : (m, n) array of int
+        Scalar function numbers, -1 where a place is empty.
+    """
+
+    cells: Ints
+    cracks: tuple[int, ...]
+    tips: tuple[int, ...]
+    functions: Ints
+
+
+@dataclass(frozen=True, eq=False)
+class Space:
+    """Functions on a mesh with cracks.
+
+    Attributes
+    ----------
+    mesh : Mesh
+    order : int
+        Degree of the standard and Heaviside functions.
+    cracks : tuple of Crack
+        Placed cracks.
+    cuts : tuple of Cut
+    heaviside : tuple of (n_nodes,) arrays of int
+        Heaviside function of each node for each crack, or -1.
+    tips : tuple of Tip
+    n_nodes, n_functions : int
+    """
+
+    mesh: Mesh
+    order: int
+    cracks: tuple[Crack, ...]
+    cuts: tuple[Cut, ...]
+    heaviside: tuple[Ints, ...]
+    tips: tuple[Tip, ...]
+    n_nodes: int
+    n_functions: int
+
+    @property
+    def dim(self) -> int:
+        """Number of space dimensions."""
+        return self.mesh.dim
+
+    @property
+    def n_dof(self) -> int:
+        """Number of unknowns."""
+        return self.n_functions * self.dim
+
+    @property
+    def radius(self) -> Floats:
+        """Radius of the enriched disc of each tip, length."""
+        return np.array([tip.radius for tip in self.tips])
+
+    @cached_property
+    def cell_nodes(self) -> Ints:
+        """Nodes of each cell `(m, n_shapes)`."""
+        return lock(np.ascontiguousarray(cell_nodes(self.mesh, self.order)))
+
+    @cached_property
+    def node_points(self) -> Floats:
+        """Coordinates of the nodes."""
+        return lock(np.array(node_points(self.mesh, self.order)))
+
+    @cached_property
+    def node_side(self) -> tuple[Ints, ...]:
+        """Side +1 or -1 of each node for each crack; a node on a lip counts as +."""
+        levels = [node_level(self.mesh, self.order, cut.level_set.phi) for cut in self.cuts]
+        return tuple(lock(np.where(phi >= 0, 1, -1).astype(np.int64)) for phi in levels)
+
+    @cached_property
+    def signature(self) -> Ints:
+        """Bit mask of what acts on each cell: cracks first, then tips; 0 for a plain cell."""
+        mask = np.zeros(len(self.mesh.cells), dtype=np.int64)
+        for c, cut in enumerate(self.cuts):
+            carries = self.heaviside[c][self.cell_nodes] >= 0
+            differs = self.node_side[c][self.cell_nodes] == -cut.side[:, None]
+            acts = (carries & (differs | cut.is_cut[:, None])).any(axis=1)
+            mask |= acts.astype(np.int64) << c
+        for t, tip in enumerate(self.tips):
+            acts = (tip.point_to_function[self.mesh.cells] >= 0).any(axis=1)
+            mask |= acts.astype(np.int64) << (len(self.cuts) + t)
+        return lock(mask)
+
+    @cached_property
+    def enriched(self) -> Ints:
+        """Cells that are not plain."""
+        return lock(np.nonzero(self.signature)[0])
+
+    @cached_property
+    def has_tip(self) -> Bools:
+        """Cells on which a tip function acts."""
+        return lock((self.signature >> len(self.cuts)) > 0)
+
+    def batches(self, cells: Ints) -> list[tuple[Batch, Ints]]:
+        """Group cells by what acts on them; with each batch the positions in `cells`."""
+        signature = self.signature[cells]
+        groups = []
+        for value in np.unique(signature):
+            rows = np.nonzero(signature == value)[0]
+            bits = [b for b in range(len(self.cuts) + len(self.tips)) if value >> b & 1]
+            cracks = tuple(b for b in bits if b < len(self.cuts))
+            tips = tuple(b - len(self.cuts) for b in bits if b >= len(self.cuts))
+            groups.append((self._batch(cells[rows], cracks, tips), rows))
+        return groups
+
+    def batches_of_points(self, cell: Ints) -> list[tuple[Batch, Ints, Ints]]:
+        """Batches that serve points in the given cells `(q,)`, in any order and repeated.
+
+        Returns
+        -------
+        list of (batch, numbers of its points, row in the batch of the cell of each)
+        """
+        cells, inverse = np.unique(cell, return_inverse=True)
+        served = []
+        for batch, rows in self.batches(cells):
+            place = np.full(len(cells), -1, dtype=np.int64)
+            place[rows] = np.arange(len(rows))
+            number = np.nonzero(place[inverse] >= 0)[0]
+            served.append((batch, number, place[inverse][number]))
+        return served
+
+    def _batch(self, cells: Ints, cracks: tuple[int, ...], tips: tuple[int, ...]) -> Batch:
+        nodes = self.cell_nodes[cells]
+        columns = [nodes]
+        columns.extend(self.heaviside[c][nodes] for c in cracks)
+        for t in tips:
+            tip = self.tips[t]
+            first = tip.point_to_function[self.mesh.cells[cells]]
+            each = first[:, :, None] + np.arange(tip.functions)
+            columns.append(np.where(first[:, :, None] >= 0, each, -1).reshape(len(cells), -1))
+        return Batch(cells, cracks, tips, np.ascontiguousarray(np.concatenate(columns, axis=1)))
+
+    def tabulate(
+        self, batch: Batch, row: Ints, bary: Floats, side: Ints, slopes: bool = True
+    ) -> tuple[Floats, Floats]:
+        """Values `(q, n)` and, if wanted, gradients `(q, n, d)` of a batch's functions at points.
+
+        Parameters
+        ----------
+        batch : Batch
+        row : (q,) array of int
+            Position in the batch of the cell of each point.
+        bary : (q, d + 1) array
+        side : (q, cracks) array
+            Side of each crack on which the point lies: +1, -1, or 0 where that means nothing.
+        """
+        from xcrack.kernels.shapes import set_jumps, set_standard
+
+        mesh, n = self.mesh, self.cell_nodes.shape[1]
+        width = batch.functions.shape[1]
+        N = np.empty((len(row), width))
+        G = np.empty((len(row) if slopes else 0, width, self.dim))
+        bary = np.ascontiguousarray(bary)
+        gradient, edges = mesh.gradient[batch.cells], local_edges(self.dim)
+        set_standard(N, G, row, bary, gradient, edges[: len(edges) if self.order == 2 else 0])
+        first = n
+        for c in batch.cracks:
+            own = np.ascontiguousarray(side[:, c])
+            nodes = self.cell_nodes[batch.cells]
+            set_jumps(N, G, first, row, own, nodes, self.node_side[c], self.heaviside[c])
+            first += n
+        for t in batch.tips:
+            self._tabulate_tip(t, batch, (N, G), first, row, bary, side)
+            first += (self.dim + 1) * self.tips[t].functions
+        return N, G
+
+    def tip_values(self, batch: Batch, row: Ints, bary: Floats, side: Ints) -> Floats:
+        """Values `(q, k)` of the functions of all tips of a batch."""
+        count = [(self.dim + 1) * self.tips[t].functions for t in batch.tips]
+        tables = np.empty((len(row), sum(count))), np.empty((0, sum(count), self.dim))
+        for t, first in zip(batch.tips, np.cumsum([0, *count]), strict=False):
+            self._tabulate_tip(t, batch, tables, int(first), row, bary, side)
+        return tables[0]
+
+    def _tabulate_tip(
+        self,
+        t: int,
+        batch: Batch,
+        tables: tuple[Floats, Floats],
+        first: int,
+        row: Ints,
+        bary: Floats,
+        side: Ints,
+    ) -> None:
+        """Set values and, if there is room for them, gradients of the functions of tip t."""
+        from xcrack.kernels.tips import set_tips
+
+        tip = self.tips[t]
+        levels = self.cuts[tip.crack].level_set
+        set_tips(
+            *tables,
+            first,
+            row,
+            np.ascontiguousarray(bary),
+            np.ascontiguousarray(side[:, tip.crack]),
+            self.mesh.cells[batch.cells],
+            self.mesh.gradient[batch.cells],
+            levels.phi,
+            levels.psi[tip.number],
+            tip.point_to_function >= 0,
+            self.tip_shift[t],
+        )
+
+    @cached_property
+    def tip_shift(self) -> tuple[Floats, ...]:
+        """Tip functions at the mesh points, from the + lip where a point lies on it `(n, k)`."""
+        shifts = []
+        for tip in self.tips:
+            levels = self.cuts[tip.crack].level_set
+            phi = levels.phi
+            r, theta = polar(levels.psi[tip.number], phi, np.where(phi == 0, 1, 0))
+            shifts.append(lock(tip_values(r, theta, tip.functions)))
+        return tuple(shifts)
+
+
+def fronts(crack: Crack) -> tuple[list[Floats], list[Floats]]:
+    """Vertices and frames of each front of a crack in space."""
+    every = front_frames(crack)
+    return [front.x for front in every], [front.frame for front in every]
+
+
+def space(
+    mesh: Mesh, order: int, cracks: tuple[Crack, ...], cuts: tuple[Cut, ...], numerics: Numerics
+) -> Space:
+    """Number the functions: standard ones first, then Heaviside by crack, then tips."""
+    for c, (crack, cut) in enumerate(zip(cracks, cuts, strict=True)):
+        if not len(cut.lip_cell):
+            first, last = np.round(crack.points[[0, -1]], 6).tolist()
+            raise GeometryError(
+                f"crack {c} from {first} to {last} cuts no cell: it runs along the boundary; move "
+                "it inside, or leave it out."
+            )
+    n_nodes = mesh.n_points + (len(mesh.edges) if order == 2 else 0)
+    count = n_nodes
+    heaviside = []
+    for cut in cuts:
+        flag = heaviside_nodes(mesh, order, cut)
+        number = np.full(n_nodes, -1, dtype=np.int64)
+        number[flag] = count + np.arange(int(flag.sum()))
+        heaviside.append(lock(number))
+        count += int(flag.sum())
+    radii = tip_radii(mesh, cracks, cuts, order, numerics.radius)
+    tips = []
+    for c, cut in enumerate(cuts):
+        x, frame = front(cracks[c]) if mesh.dim == 2 else fronts(cracks[c])
+        for k in range(cut.n_tips):
+            flag = tip_points(mesh, order, cut, k, radii[c][k], numerics.enrichment)
+            number = np.full(mesh.n_points, -1, dtype=np.int64)
+            number[flag] = count + numerics.functions * np.arange(int(flag.sum()))
+            count += numerics.functions * int(flag.sum())
+            tips.append(Tip(c, k, x[k], frame[k], radii[c][k], numerics.functions, lock(number)))
+    return Space(mesh, order, cracks, cuts, tuple(heaviside), tuple(tips), n_nodes, count)

@@ -1,0 +1,143 @@
+"""Load vectors: every load is tested with every function, enriched ones included."""
+
+import numpy as np
+
+from xcrack.arrays import Floats, Ints
+from xcrack.errors import ProblemError
+from xcrack.mesh.sets import facet_set, nearest_point
+from xcrack.scene.conditions import (
+    BodyForce,
+    CrackPressure,
+    InitialStress,
+    Load,
+    PointForce,
+    Pressure,
+    Traction,
+    evaluate,
+    evaluate_scalar,
+    evaluate_stress,
+)
+from xcrack.xfem.facets import part_points, split_facets
+from xcrack.xfem.function_space import Space
+from xcrack.xfem.lips import LipPoints, jump_values
+from xcrack.xfem.quadrature import Points, cell_points, cell_side
+
+
+def load_vector(space: Space, loads: tuple[Load, ...], lips: tuple[LipPoints, ...]) -> Floats:
+    """Sum of the given loads, tested with every function `(n_dof,)`; displacements are skipped."""
+    f = np.zeros((space.n_functions, space.dim))
+    for load in loads:
+        if isinstance(load, Traction | Pressure):
+            _add_traction(f, space, load)
+        elif isinstance(load, PointForce):
+            point = nearest_point(space.mesh, load.x, "point_force")
+            f[point] += load.force
+        elif isinstance(load, BodyForce):
+            points = _body_points(space)
+            b = evaluate(load.value, position(space, points.cell, points.bary), "body_force")
+            _add(f, space, points, b)
+        elif isinstance(load, InitialStress):
+            _add_initial_stress(f, space, load)
+        elif isinstance(load, CrackPressure):
+            for c, points_on_lip in enumerate(lips):
+                if load.crack is None or load.crack == c:
+                    p = evaluate_scalar(load.value, points_on_lip.x, "crack_pressure")
+                    f += lip_force(space, c, points_on_lip, p[:, None] * points_on_lip.normal)
+    return f.ravel()
+
+
+def position(space: Space, cell: Ints, bary: Floats) -> Floats:
+    """Coordinates of points given by cell and barycentric coordinates."""
+    corners = space.mesh.points[space.mesh.cells[cell]]
+    x = bary[:, 0, None] * corners[:, 0]
+    for b in range(1, bary.shape[1]):
+        x += bary[:, b, None] * corners[:, b]
+    return x
+
+
+def _add(f: Floats, space: Space, points: Points, density: Floats) -> None:
+    """Add the integral of density . v over the points."""
+    cells = np.unique(points.cell)
+    for batch, _ in space.batches(cells):
+        number, row, _ = points.of_cells(batch.cells)
+        N, _ = space.tabulate(batch, row, points.bary[number], points.side[number], slopes=False)
+        force = N[:, :, None] * (points.weight[number, None] * density[number])[:, None]
+        _scatter(f, batch.functions[row], force)
+
+
+def _scatter(f: Floats, functions: Ints, force: Floats) -> None:
+    active = functions >= 0
+    np.add.at(f, functions[active], force[active])
+
+
+def _body_points(space: Space) -> Points:
+    cells = np.arange(len(space.mesh.cells))
+    # Loads are not corrected as the stiffness is: they need a degree more near tips.
+    return cell_points(space, cells, 5, space.order + 2)
+
+
+def facet_points(space: Space, facets: Ints, n: int = 6) -> tuple[Points, Floats]:
+    """Points on boundary facets with their outward normals; weights are lengths or areas."""
+    mesh = space.mesh
+    number = mesh.facet_numbers(facets)
+    cell = mesh.facet_to_cell[number, 0]
+    parts = split_facets(space, facets)
+    k, place, weight = part_points(space, facets[parts.number], parts.bary, n)
+    owner = parts.number[k]
+    c = cell[owner]
+    # Place of each point of the facet among those of its cell.
+    same = mesh.cells[c][:, :, None] == facets[owner][:, None, :]
+    on_facet = np.einsum("qv,qvb->qb", place, parts.bary[k])
+    bary = np.einsum("qvf,qf->qv", same.astype(float), on_facet)
+    opposite = (~same.any(axis=2)).argmax(axis=1)
+    inward = mesh.gradient[c, opposite]
+    normal = -inward / np.linalg.norm(inward, axis=1, keepdims=True)
+    side = cell_side(space, c)
+    for i, cut in enumerate(space.cuts):
+        crossed = cut.is_cut[c] | (cut.is_tip[c] & (side[:, i] == 0))
+        side[crossed, i] = parts.side[k, i][crossed]
+    order = np.argsort(c, kind="stable")
+    return Points(c[order], bary[order], weight[order], side[order]), normal[order]
+
+
+def _add_traction(f: Floats, space: Space, load: Traction | Pressure) -> None:
+    what = f"{type(load).__name__.lower()}({load.where!r})"
+    facets = facet_set(space.mesh, load.where, what)
+    inner = space.mesh.facet_to_cell[space.mesh.facet_numbers(facets), 1] >= 0
+    if inner.any():
+        raise ProblemError(
+            f"{what}: {int(inner.sum())} of its facets lie inside the body; loads act on the "
+            "boundary only."
+        )
+    points, normal = facet_points(space, facets)
+    x = position(space, points.cell, points.bary)
+    if isinstance(load, Pressure):
+        density = -evaluate_scalar(load.value, x, what)[:, None] * normal
+    else:
+        density = evaluate(load.value, x, what, normal)
+    _add(f, space, points, density)
+
+
+def _add_initial_stress(f: Floats, space: Space, load: InitialStress) -> None:
+    """Subtract the integral of sigma0 : grad v."""
+    points = _body_points(space)
+    sigma = evaluate_stress(load.value, position(space, points.cell, points.bary))
+    for batch, _ in space.batches(np.unique(points.cell)):
+        number, row, _ = points.of_cells(batch.cells)
+        _, G = space.tabulate(batch, row, points.bary[number], points.side[number])
+        force = -np.einsum("q,qij,qnj->qni", points.weight[number], sigma[number], G)
+        _scatter(f, batch.functions[row], force)
+
+
+def lip_force(space: Space, c: int, lips: LipPoints, force: Floats) -> Floats:
+    """Integral of force . [[v]] over the lips of crack c `(n_functions, d)`.
+
+    Parameters
+    ----------
+    force : (q, d) array, stress
+        On lip +; the opposite acts on lip -.
+    """
+    f = np.zeros((space.n_functions, space.dim))
+    for functions, number, N in jump_values(space, c, lips):
+        _scatter(f, functions, N[:, :, None] * (lips.weight[number, None] * force[number])[:, None])
+    return f

@@ -1,0 +1,87 @@
+"""From a problem to matrices: cut, numbered, integrated and assembled, but not solved."""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+from xcrack.crack.crack import Crack
+from xcrack.cutting.cut import cut
+from xcrack.cutting.level_set import LevelSet, level_set
+from xcrack.cutting.level_set_3d import surface_levels
+from xcrack.cutting.level_set_nodal import nodal_level_set
+from xcrack.errors import ProblemError
+from xcrack.mesh.mesh import Mesh
+from xcrack.scene.numerics import Numerics
+from xcrack.scene.problem import Problem
+from xcrack.xfem.assembly import Bulk, bulk, enriched_stiffness, total_stiffness
+from xcrack.xfem.enrichment_3d import front_reach
+from xcrack.xfem.function_space import Space, space
+from xcrack.xfem.lips import LipPoints, jump_matrix, lip_points
+from xcrack.xfem.supports import Known, known_unknowns
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """Everything that load states share.
+
+    Attributes
+    ----------
+    space : Space
+    lips : tuple of LipPoints
+    bulk : Bulk
+    stiffness : sparse matrix
+    known : Known
+    n_points : int
+        Integration points of the enriched cells.
+    """
+
+    space: Space
+    lips: tuple[LipPoints, ...]
+    bulk: Bulk
+    stiffness: Any
+    known: Known
+    n_points: int
+
+    @cached_property
+    def jumps(self) -> tuple[Any, ...]:
+        """Normal jumps at the lip points of each crack, made when first asked for."""
+        return tuple(jump_matrix(self.space, c, lips) for c, lips in enumerate(self.lips))
+
+
+def build(problem: Problem, bulk_: Bulk | None = None) -> Model:
+    """Cut, number, integrate and assemble a problem, without solving it."""
+    mesh, order = problem.mesh, problem.order or 1
+    cracks = problem.placed
+    cuts = tuple(cut(mesh, levels(mesh, crack, problem.numerics)) for crack in cracks)
+    space_ = space(mesh, order, cracks, cuts, problem.numerics)
+    lips = tuple(lip_points(space_, c) for c in range(len(cracks)))
+    if (
+        bulk_ is None
+        or bulk_.mesh is not mesh
+        or bulk_.order != order
+        or bulk_.material != problem.material
+    ):
+        bulk_ = bulk(mesh, problem.material, order)
+    enriched, n_points, kept = enriched_stiffness(
+        space_, problem.material, problem.numerics, lips, bulk_.cells
+    )
+    return Model(
+        space_,
+        lips,
+        replace(bulk_, cells=kept),
+        total_stiffness(bulk_, enriched),
+        known_unknowns(space_, tuple(problem.supports)),
+        n_points,
+    )
+
+
+def levels(mesh: Mesh, crack: Crack, numerics: Numerics) -> LevelSet:
+    """Level sets of a placed crack; in space up to where its functions may reach."""
+    nodal = numerics.update == "nodal"
+    if mesh.dim == 2:
+        return nodal_level_set(mesh, crack) if nodal else level_set(mesh, crack)
+    if nodal:
+        raise ProblemError(
+            'Numerics(update="nodal") is for the plane only: leave it out for a crack in space.'
+        )
+    return surface_levels(mesh, crack, front_reach(mesh, crack, numerics.radius))
