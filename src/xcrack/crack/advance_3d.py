@@ -1,6 +1,5 @@
 """Growth of cracks in space: their fronts advance, and a strip of triangles joins the surface."""
 
-import warnings
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -23,7 +22,7 @@ from xcrack.crack.front_remeshing import (
     without_sides,
 )
 from xcrack.crack.fronts_3d import Front, front_frames
-from xcrack.errors import GeometryError, XcrackWarning
+from xcrack.errors import GeometryError, warn
 from xcrack.geometry.distances import first_crossing, surface_distance, triangle_tree
 
 LOW, HIGH = 0.5, 1.5  # bounds of the spacing of front points, in sizes
@@ -151,12 +150,10 @@ def _strip(
     before = np.linalg.norm(front.side, axis=1).sum()
     after = np.linalg.norm(smooth.side, axis=1).sum()
     if abs(after - before) > _LOST * before:
-        warnings.warn(
+        warn(
             f"fairing changes the length of the front at {_at(smooth.x)} from {before:.4g} to "
             f"{after:.4g}: its points zigzag. K along the front, or the advance, jumps from point "
-            "to point; smooth it, or take a smaller da.",
-            XcrackWarning,
-            stacklevel=4,
+            "to point; smooth it, or take a smaller da."
         )
     return _joined(old, rays, smooth, vertex, normal, size, n_points)
 

@@ -5,14 +5,13 @@ cycle, and returns the kink angle, the equivalent range and the ratio R of each 
 A criterion of your own is any function of that form; `xcrack.testing.check_criterion` tries it.
 """
 
-import warnings
 from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from xcrack.arrays import Floats
-from xcrack.errors import ProblemError, XcrackWarning
+from xcrack.errors import ProblemError, warn
 
 Criterion = Callable[[Floats, float], tuple[Floats, Floats, Floats]]
 
@@ -244,12 +243,10 @@ def _checked(K: ArrayLike, nu: float, range: str) -> Floats:
     negative = K[..., 0] < -_CLOSED * np.abs(K).max(initial=0.0)
     if negative.any():
         state, point = np.unravel_index(np.argmin(K[..., 0]), negative.shape)
-        warnings.warn(
+        warn(
             f"K_I < 0 in {np.count_nonzero(negative)} of {negative.size} values counts as 0; the "
             f"smallest is {K[state, point, 0]:.4g} (state {state}, front point {point}). With "
-            "contact on the lips it is discretisation error; without, the lips overlap there.",
-            XcrackWarning,
-            stacklevel=3,
+            "contact on the lips it is discretisation error; without, the lips overlap there."
         )
     return clipped(K)
 
@@ -279,13 +276,11 @@ def _rated(K: Floats, angle: Floats, nu: float, range: str) -> tuple[Floats, Flo
     apart = gap > _DIFFER * np.maximum(component, difference)
     if apart.any():
         point = int(np.argmax(gap))
-        warnings.warn(
+        warn(
             f"the difference of the extreme K_eq ({difference[point]:.4g}) and the K_eq of the "
             f"difference of two states ({component[point]:.4g}) are more than 20 % apart at "
             f"{np.count_nonzero(apart)} of {len(apart)} front points (first at {point}): a mode "
-            'is reversed within the cycle; range="component" takes the second.',
-            XcrackWarning,
-            stacklevel=3,
+            'is reversed within the cycle; range="component" takes the second.'
         )
     return angle, difference, R
 

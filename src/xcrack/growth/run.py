@@ -1,7 +1,6 @@
 """Fatigue crack growth: one step after the other, from load states to cycles."""
 
 import sys
-import warnings
 from collections.abc import Generator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -12,7 +11,7 @@ from xcrack.analysis.solution import Solution
 from xcrack.analysis.solve import solve_states
 from xcrack.crack.advance_3d import advance_fronts
 from xcrack.crack.crack import Crack, advance
-from xcrack.errors import GeometryError, ProblemError, XcrackError, XcrackWarning
+from xcrack.errors import GeometryError, ProblemError, XcrackError, warn
 from xcrack.growth.advance import (
     LEAST,
     Advance,
@@ -177,17 +176,15 @@ def steps_of(run: Run, last: Step | None = None) -> Generator[Step, None, str]:
             if last.index == 0:
                 raise ProblemError(_too_short(last, plan, run))
             ended = _too_short(last, plan, run)
-            warnings.warn(ended, XcrackWarning, stacklevel=2)
+            warn(ended)
         if ended:
             return _said(run, ended)
         if plan.largest < plan.size and not warned:
             warned = True
-            warnings.warn(
+            warn(
                 f"the advance {plan.largest:.4g} is below one cell at {_where(last, plan.tip)} "
                 f"(cell size {plan.size:.4g}): K of the next step feels the kink through one cell "
-                "only. Take a larger da or a finer mesh around the tip.",
-                XcrackWarning,
-                stacklevel=2,
+                "only. Take a larger da or a finer mesh around the tip."
             )
         try:
             moved = [_advanced(run, last, c) for c in range(len(last.cracks))]

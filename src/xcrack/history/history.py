@@ -1,7 +1,6 @@
 """What became of the cracks: steps collected, kept on disk, and taken up again."""
 
 import csv
-import warnings
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -11,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xcrack.crack.crack import Crack, front
-from xcrack.errors import ProblemError, XcrackWarning
+from xcrack.errors import ProblemError, warn
 from xcrack.growth.criteria import Criterion
 from xcrack.growth.fingerprint import differences
 from xcrack.growth.laws import Law
@@ -233,19 +232,13 @@ def resume(
         )
     lines = differences(header.versions, run_files.versions())
     if lines:
-        warnings.warn(
+        warn(
             f"the run in {folder} was made with other versions, its last bits may differ: "
-            f"{run_files.shortened(lines)}.",
-            XcrackWarning,
-            stacklevel=2,
+            f"{run_files.shortened(lines)}."
         )
     done, damaged = run_files.read_steps(folder, settings)
     if damaged is not None:
-        warnings.warn(
-            f"{damaged} is not whole: growth goes on from step {len(done) - 1}.",
-            XcrackWarning,
-            stacklevel=2,
-        )
+        warn(f"{damaged} is not whole: growth goes on from step {len(done) - 1}.")
     run_files.remove_steps(folder, len(done))
     header = replace(header, ended="")
     run_files.write_header(folder, header)

@@ -4,7 +4,6 @@ import contextlib
 import io
 import re
 import shlex
-import warnings
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -13,7 +12,7 @@ from urllib.parse import quote, unquote
 import numpy as np
 
 from xcrack.arrays import Ints
-from xcrack.errors import MeshError, XcrackError, XcrackWarning
+from xcrack.errors import MeshError, XcrackError, warn
 from xcrack.mesh.abaqus import read_abaqus, write_abaqus
 from xcrack.mesh.mesh import Mesh
 from xcrack.mesh.msh import REST, write_msh
@@ -163,11 +162,9 @@ def _meshio_write(path: Path, mesh: Mesh) -> None:
             on_cells[cell_sets.get(name, [])] = 1
             data[_SET + quote(name)] = [on_facets, on_cells] if len(rows) else [on_cells]
     elif facet_sets or cell_sets:
-        warnings.warn(
+        warn(
             f"{path.name}: {path.suffix} files carry no sets, so "
-            f"{sorted({*facet_sets, *cell_sets})} are lost; write .msh, .inp or .vtu to keep them.",
-            XcrackWarning,
-            stacklevel=3,
+            f"{sorted({*facet_sets, *cell_sets})} are lost; write .msh, .inp or .vtu to keep them."
         )
     said = io.StringIO()
     try:

@@ -1,13 +1,12 @@
 """Mesh as a file holds it, before it is a `Mesh`: blocks of elements and sets by name."""
 
-import warnings
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from xcrack.arrays import Floats, Ints
-from xcrack.errors import MeshError, XcrackWarning
+from xcrack.errors import MeshError, warn
 from xcrack.mesh.mesh import Mesh
 
 TOPOLOGICAL_DIM = {"vertex": 0, "line": 1, "triangle": 2, "tetra": 3}
@@ -114,11 +113,9 @@ def _facet_sets(raw: RawMesh, bare: Mesh, new: Ints, source: str) -> dict[str, I
         facets = new[members]
         known = (facets >= 0).all(axis=1) & (bare.facet_numbers(facets) >= 0)
         if not known.all():
-            warnings.warn(
+            warn(
                 f"{source}: {int((~known).sum())} of the {len(facets)} elements in set {name!r} "
-                "are no facets of any cell and are left out; mesh body and sets together.",
-                XcrackWarning,
-                stacklevel=4,
+                "are no facets of any cell and are left out; mesh body and sets together."
             )
         if known.any():
             facet_sets[name] = _unique_rows(facets[known])

@@ -1,6 +1,5 @@
 """K along the fronts of a solution in space: radii, points, loads, and values at the vertices."""
 
-import warnings
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import partial
@@ -11,7 +10,7 @@ from scipy.spatial import cKDTree
 from xcrack.analysis.solution import Solution, gradients_at
 from xcrack.arrays import Bools, Floats, Ints
 from xcrack.crack.front_curve import Feet, FrontCurve, front_curve
-from xcrack.errors import XcrackWarning
+from xcrack.errors import warn
 from xcrack.mesh.body import Body
 from xcrack.mesh.locate import contains
 from xcrack.scene.conditions import (
@@ -214,21 +213,17 @@ def _warn(curve: FrontCurve, radii: tuple[float, float, float], K: Floats) -> No
     outer, wanted, size = radii
     where = np.round(curve.at(np.zeros(1))[0][0], 6).tolist()
     if outer < wanted and outer < _NARROW * size:
-        warnings.warn(
+        warn(
             f"K along the front through {where}: its domain is clipped to {outer:.4g} "
             f"({outer / size:.1f} cells) by the boundary, another front or a bend of the front. "
-            "Refine the mesh around the front.",
-            XcrackWarning,
-            stacklevel=8,
+            "Refine the mesh around the front."
         )
     largest = np.abs(K).max(initial=0.0)
     apart = np.abs(K[:, 0] - K[:, 1]).mean(axis=1).max(initial=0.0)
     if apart > _DIFFER * largest > 0:
-        warnings.warn(
+        warn(
             f"K along the front through {where}: two domains differ by {apart:.3g} in the mean, "
-            f"{100 * apart / largest:.2g} % of the largest K. Refine the mesh around the front.",
-            XcrackWarning,
-            stacklevel=8,
+            f"{100 * apart / largest:.2g} % of the largest K. Refine the mesh around the front."
         )
 
 

@@ -1,6 +1,5 @@
 """K along all fronts of a crack in space."""
 
-import warnings
 from collections.abc import Sequence
 from typing import Any
 
@@ -8,7 +7,7 @@ import numpy as np
 
 from xcrack.analysis.solution import Solution
 from xcrack.arrays import Floats
-from xcrack.errors import XcrackWarning
+from xcrack.errors import warn
 from xcrack.mesh.locate import contains
 from xcrack.sif.domain_3d import front_intensity
 from xcrack.sif.sif import SIF
@@ -61,10 +60,8 @@ def along_fronts(solutions: Sequence[Solution], crack: int) -> list[SIF]:
 
 
 def _say_short(x: Floats) -> None:
-    warnings.warn(
+    warn(
         f"the front from {np.round(x[0], 6).tolist()} to {np.round(x[-1], 6).tolist()} is too "
         "short inside the body for K: no domain around it is whole. K counts as 0 there, and it "
-        "does not grow. Refine the mesh around it.",
-        XcrackWarning,
-        stacklevel=5,
+        "does not grow. Refine the mesh around it."
     )

@@ -10,7 +10,6 @@ the pressure on the lips at the tip. An initial stress enters by its value at th
 counted in sigma : eps^a, and by its change from there, times the derivative of eps^a.
 """
 
-import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -18,7 +17,7 @@ import numpy as np
 
 from xcrack.analysis.solution import Solution, gradients_at
 from xcrack.arrays import Floats
-from xcrack.errors import ProblemError, XcrackWarning
+from xcrack.errors import ProblemError, warn
 from xcrack.scene.conditions import (
     BodyForce,
     CrackPressure,
@@ -128,12 +127,10 @@ def _at_tip(solutions: Sequence[Solution], t: int) -> list[tuple[Floats, float, 
     where = np.round(tip.x, 6).tolist()
     needed = max(tip.radius + size, 3.0 * size)
     if outer < min(wanted, needed) * (1 - 1e-12):
-        warnings.warn(
+        warn(
             f"K at {where}: the domain is clipped to {outer:.4g} ({outer / size:.1f} cells) by the "
             f"boundary or another tip; to leave the enriched disc it needs {needed:.4g}. Refine "
-            "the mesh around the tip.",
-            XcrackWarning,
-            stacklevel=6,
+            "the mesh around the tip."
         )
     volume = float(space.mesh.volume.sum())
     result, worst = [], (0.0, 0.0)
@@ -148,11 +145,9 @@ def _at_tip(solutions: Sequence[Solution], t: int) -> list[tuple[Floats, float, 
             worst = float(spread.max()), float(spread.max() / scale)
         result.append((K[0], float(T), spread))
     if worst[1] > _WARN:
-        warnings.warn(
+        warn(
             f"K at {where}: domains of radius {radii[0]:.4g} and {radii[1]:.4g} differ by "
-            f"{worst[0]:.3g}, {100 * worst[1]:.2g} % of K there. Refine the mesh around the tip.",
-            XcrackWarning,
-            stacklevel=6,
+            f"{worst[0]:.3g}, {100 * worst[1]:.2g} % of K there. Refine the mesh around the tip."
         )
     return result
 
