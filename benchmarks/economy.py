@@ -29,6 +29,7 @@ from xcrack.analysis.solve import solve_states  # noqa: E402
 from xcrack.bench.fields import NU, edge_fields, penny, penny_K_I  # noqa: E402
 from xcrack.bench.runs import machine  # noqa: E402
 from xcrack.bench.scenes import STEEL, Settings, mesh_of  # noqa: E402
+from xcrack.scene.numerics import with_choices  # noqa: E402
 
 ROOT = Path(__file__).resolve().parent.parent
 RESULTS = ROOT / "benchmarks" / "results" / "economy.json"
@@ -56,7 +57,7 @@ def run(variant: Variant, seed: int) -> tuple[float, Errors, dict[str, int]]:
     kept: dict = {}
     if variant.how in ("kept", "anew"):  # both from a mesh that has been used
         first = solve_states(variant.problem(body, True), variant.states)[0]
-        kept = {"bulk": first.bulk, "warm": first.warm} if variant.how == "kept" else {}
+        kept = {"reuse": first.reuse} if variant.how == "kept" else {}
     sets = [[s] for s in variant.states] if variant.how == "apart" else [list(variant.states)]
     start = process_time()
     problem = variant.problem(body, False)
@@ -96,7 +97,7 @@ def edge(
             body, STEEL[2], [xc.line_crack([(-1.3, 0.0), (-0.04 * shorter, 0.0)])],
             supports=[xc.displacement(s, lambda x: u(x)) for s in ("right", "bottom", "top")],
             loads=[xc.traction("left", lambda x, n: np.einsum("qij,qj->qi", sigma(x), n))],
-            contact=contact, order=order, numerics=xc.Numerics(**numerics),  # type: ignore[arg-type]
+            contact=contact, order=order, numerics=with_choices(xc.Numerics(), numerics),
         )  # fmt: skip
 
     def judge(solution: xc.Solution, sif: xc.SIF) -> Errors:
@@ -155,7 +156,7 @@ def disc(
     def problem(mesh: xc.Mesh, shorter: bool) -> xc.Problem:
         crack = xc.penny_crack((0, 0, 0), (0, 0, 1), 0.5 - 0.02 * shorter)
         held = [xc.displacement("boundary", lambda x: u(x))]
-        method = xc.Numerics(**numerics)  # type: ignore[arg-type]
+        method = with_choices(xc.Numerics(), numerics)
         return xc.Problem(mesh, STEEL[3], [crack], supports=held, contact=contact, numerics=method)
 
     def judge(solution: xc.Solution, sif: xc.SIF) -> Errors:

@@ -102,7 +102,7 @@ def measure(n: int) -> dict[str, object]:
     next_problem = replace(
         problem, cracks=[xc.penny_crack((0.013, -0.021, 0.0317), (0.2, -0.3, 1.0), 0.52)]
     )
-    solve_states(next_problem, list(STATES.values()), bulk=first[0].bulk, warm=first[0].warm)
+    solve_states(next_problem, list(STATES.values()), reuse=first[0].reuse)
     later = time.process_time() - start
     start = time.process_time()
     solve_states(replace(problem, contact="off"), list(STATES.values()))

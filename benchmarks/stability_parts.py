@@ -30,6 +30,7 @@ from scenes_stability import (
     cut_condition,
 )
 from xcrack.growth.criteria import kink_angle, max_hoop_stress, mean_reference, weighted_angle
+from xcrack.scene.numerics import with_choices
 
 EPS = (0.5, 0.1, 1e-2, 1e-3, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12, 1e-14, 0.0, -1e-12, -1e-6, -1e-2)
 ROUND = 5  # digits that are kept
@@ -126,7 +127,11 @@ def condition():
                     tried(
                         scenes.condition,
                         scenes.williams_edge(
-                            n, tip, angle, order=order, numerics=xc.Numerics(**enrichment, **basis)
+                            n,
+                            tip,
+                            angle,
+                            order=order,
+                            numerics=with_choices(xc.Numerics(), {**enrichment, **basis}),
                         )[0],
                     )
                     for n in sizes
@@ -155,7 +160,7 @@ def slivers():
         crack = xc.line_crack([(-1.5, eps * row.CELL), (0.37, eps * row.CELL)])
         problem = scenes.on_box(
             mesh, [crack], row.uniform, traction=("left", "top"), order=order, contact="on",
-            numerics=xc.Numerics(**options),
+            numerics=with_choices(xc.Numerics(), options),
         )  # fmt: skip
         solution = tried(xc.solve, problem)
         if solution is None:
@@ -251,7 +256,9 @@ def turned():
     found = {"degrees": (60, 90, 120, 150, 180, 200, 240, 300)}
     for update in ("explicit", "nodal"):
         if "update" in xc.Numerics.__dataclass_fields__:
-            numerics = xc.Numerics(radius=0.15, domain=0.25, update=update)
+            numerics = xc.Numerics(
+                radius=0.15, domain=0.25, comparison=xc.Comparison(update=update)
+            )
         elif update == "explicit":
             numerics = xc.Numerics(radius=0.15, domain=0.25)
         else:

@@ -10,7 +10,8 @@ from xcrack.growth.advance import length_inside
 from xcrack.mesh.box import box
 from xcrack.scene.material import Isotropic
 from xcrack.scene.problem import Problem
-from xcrack.sif.interaction_2d import SIF
+from xcrack.sif.sif import SIF
+from xcrack.solvers.reuse import Reuse
 
 STRESS = 100.0
 
@@ -45,14 +46,13 @@ def patch_respond(monkeypatch, K_of, radius=1.5):
     """
     calls = []
 
-    def respond(problem, run, bulk, warm):
-        calls.append((problem.numerics, warm))
+    def respond(problem, run, reuse):
+        calls.append((problem.numerics, reuse))
         n = sum(crack.n_tips for crack in problem.placed)
         solution = SimpleNamespace(
             problem=problem,
             space=SimpleNamespace(radius=np.full(n, radius)),
-            bulk="bulk",
-            warm={"count": np.array([1 if warm is None else warm["count"][0] + 1])},
+            reuse=Reuse(centre=(np.full((1, 2), 1.0 if reuse is None else reuse.centre[0] + 1),)),
         )
         full = [K_of(problem, c) for c in range(len(problem.placed))]
         answers = tuple(

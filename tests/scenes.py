@@ -6,9 +6,15 @@ import numpy as np
 
 import exact
 import xcrack as xc
+from xcrack.scene.numerics import with_choices
 
 UNIT = {"E": 1.0, "nu": 0.3}
 Field = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
+
+
+def numerics_of(**choices):
+    """Choices of method by name, those for comparison among them."""
+    return with_choices(xc.Numerics(), choices)
 
 
 def perturbed(n, seed=3, amplitude=0.15, lower=(-1.0, -1.0), upper=(1.0, 1.0)):
@@ -151,7 +157,7 @@ def griffith_box(n, *, a=1.0, half=2.0, stress=(0.0, 1.0, 0.0), angle=0.0, origi
     sides = ("left", "right", "bottom", "top")
     problem = xc.Problem(
         mesh, xc.Isotropic(E, nu, plane), [xc.line_crack(points)], supports=imposed(field, sides),
-        order=order, contact=contact, numerics=xc.Numerics(**options),
+        order=order, contact=contact, numerics=numerics_of(**options),
     )  # fmt: skip
     return problem, field
 

@@ -7,6 +7,7 @@ import numpy as np
 import exact
 import front_fields
 import xcrack as xc
+from scenes import numerics_of
 
 NU = 0.3
 
@@ -98,7 +99,7 @@ def flat_scene(
 
     problem = xc.Problem(
         mesh, xc.Isotropic(E=E, nu=nu), [crack], supports=[xc.displacement("boundary", u)],
-        contact=contact, numerics=xc.Numerics(**options),
+        contact=contact, numerics=numerics_of(**options),
     )  # fmt: skip
     return problem, (c, Q)
 

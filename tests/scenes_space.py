@@ -4,6 +4,7 @@ import numpy as np
 
 import exact
 import xcrack as xc
+from scenes import numerics_of
 
 STEEL = xc.Isotropic(1.0, 0.3)
 SIX = ("left", "right", "front", "back", "bottom", "top")
@@ -93,7 +94,7 @@ def flat_penny(n, z, a, stress, *, seed=None, contact="off", **options):
         [xc.penny_crack(centre, (0, 0, 1), a)],
         supports=[xc.displacement("boundary", lambda x: exact.penny(x - centre, a, 1.0, 0.3, S))],
         contact=contact,
-        numerics=xc.Numerics(**options),
+        numerics=numerics_of(**options),
     )
 
 

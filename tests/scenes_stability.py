@@ -5,6 +5,7 @@ import numpy as np
 import exact
 import scenes
 import xcrack as xc
+from scenes import numerics_of
 from xcrack.analysis.solve import build
 
 STEEL = xc.Isotropic(1.0, 0.3, plane="strain")
@@ -29,7 +30,7 @@ def cut_condition(eps, enrichment, basis, n=20):
     field = scenes.turned(lambda x, y: exact.williams(x, y, 1.0, 0.3, 1.0, 0.6), (0.037, y))
     problem = scenes.on_box(
         xc.box((-1, -1), (1, 1), n), [xc.line_crack([(-1.2, y), (0.037, y)])], field,
-        traction=("left",), contact="off", numerics=xc.Numerics(**enrichment, **basis),
+        traction=("left",), contact="off", numerics=numerics_of(**enrichment, **basis),
     )  # fmt: skip
     return scenes.condition(problem)
 

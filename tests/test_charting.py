@@ -183,7 +183,7 @@ def test_errors_are_those_of_the_exact_solution(williams):
 def test_failures_are_kept(williams):
     assert len(williams.rows) == 8
     assert {row.setting for row in williams.failed} == {"wrong"}
-    assert all("points=99" in row.failed for row in williams.failed)
+    assert all("points = 99" in row.failed for row in williams.failed)
     assert "failed: ProblemError" in williams.table()
 
 

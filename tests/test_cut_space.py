@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 import scenes_space as scenes
 import xcrack as xc
+from scenes import numerics_of
 from xcrack.analysis.solve import build
 from xcrack.cutting.fronts_3d import behind
 from xcrack.mesh.split import cut_simplices, interface_simplices
@@ -86,7 +87,7 @@ def test_parts_of_triangles_behind_a_front():
 
 
 def model(mesh, *cracks, **options):
-    return build(xc.Problem(mesh, scenes.STEEL, list(cracks), numerics=xc.Numerics(**options)))
+    return build(xc.Problem(mesh, scenes.STEEL, list(cracks), numerics=numerics_of(**options)))
 
 
 def check_cut(built, area=None):

@@ -9,7 +9,9 @@ import scipy.sparse.linalg as sla
 
 import scenes
 import xcrack as xc
+from scenes import numerics_of
 from xcrack.analysis.solve import build, solve_states
+from xcrack.solvers.reuse import Reuse
 
 STEEL = xc.Isotropic(1.3, 0.27, plane="strain")
 PULL = (xc.traction("top", (0.0, 1.0)), xc.traction("bottom", (0.0, -1.0)))
@@ -117,13 +119,15 @@ def test_the_uncracked_stiffness_is_made_once_a_mesh():
     mesh = scenes.perturbed(14, 5)
     first = xc.solve(problem(EDGE, mesh=mesh))
     longer = [EDGE[0], EDGE[1], (0.3, 0.1)]
-    again = solve_states(problem(longer, mesh=mesh), [None], bulk=first.bulk)[0]
-    assert again.bulk.matrix is first.bulk.matrix
+    again = solve_states(problem(longer, mesh=mesh), [None], reuse=Reuse(bulk=first.reuse.bulk))[0]
+    assert again.reuse.bulk.matrix is first.reuse.bulk.matrix
     fresh = xc.solve(problem(longer, mesh=mesh))
     assert (again.u == fresh.u).all()
     # Another mesh or order must not take it.
-    other = solve_states(problem(EDGE, mesh=mesh, order=1), [None], bulk=first.bulk)[0]
-    assert other.bulk is not first.bulk
+    other = solve_states(
+        problem(EDGE, mesh=mesh, order=1), [None], reuse=Reuse(bulk=first.reuse.bulk)
+    )[0]
+    assert other.reuse.bulk is not first.reuse.bulk
 
 
 @pytest.mark.parametrize("order", [1, 2])
@@ -179,7 +183,7 @@ def test_an_open_crack_costs_nothing_for_contact(order):
     assert (found["auto"].u == found["off"].u).all()
     row = found["auto"].report["multipliers of crack 0"]
     assert not row.used
-    assert row.reason == "the lips stay apart in every load state"
+    assert row.reason == "the crack faces stay apart in every load state"
 
 
 @pytest.mark.parametrize("order", [1, 2])
@@ -257,7 +261,7 @@ def test_unknowns_in_the_report_add_up(order):
 
 def test_cheaper_choices_cost_less():
     def unknowns(**choice):
-        solution = xc.solve(problem(EDGE, numerics=xc.Numerics(radius=0.4, **choice)))
+        solution = xc.solve(problem(EDGE, numerics=numerics_of(radius=0.4, **choice)))
         return solution.report["tip functions"].unknowns
 
     full = unknowns()

@@ -11,6 +11,7 @@ import pytest
 
 import scenes_space
 import xcrack as xc
+from scenes import numerics_of
 from xcrack.analysis.solve import build, solve_states
 
 STEEL = xc.Isotropic(1.3, 0.27)
@@ -73,7 +74,7 @@ def test_choices_for_cracks_change_no_bit_without_cracks(linear):
         {"multipliers": "naive", "consistent": False, "points": 8, "radius": 0.1},
     ):
         other = xc.solve(
-            replace(scene, numerics=xc.Numerics(linear=linear, **choice), contact="on")
+            replace(scene, numerics=numerics_of(linear=linear, **choice), contact="on")
         )
         assert (other.u == plain.u).all()
     for name in ("Heaviside functions", "tip functions", "enriched quadrature", "third mode"):
@@ -140,7 +141,7 @@ def test_an_open_crack_costs_nothing_for_contact(linear):
     assert auto.contact == (None,)
     row = auto.report["multipliers of crack 0"]
     assert not row.used
-    assert row.reason == "the lips stay apart in every load state"
+    assert row.reason == "the crack faces stay apart in every load state"
     if linear == "direct":
         assert spent["solves"] == plain["solves"]
         assert (auto.u == off.u).all()
@@ -171,7 +172,7 @@ def test_three_states_share_one_factor_or_hierarchy(linear):
     shared = "factorisation" if linear == "direct" else "multigrid hierarchy"
     assert report["load states"].reason == f"3, share one {shared}"
     assert all(s.space is together[0].space for s in together)
-    assert all(s.bulk is together[0].bulk for s in together)
+    assert all(s.reuse.bulk is together[0].reuse.bulk for s in together)
     for state, solution in zip([1.0, -1.0, 2.0], together, strict=True):
         alone = xc.solve(scene, states=[state])[0]
         # Tolerance of conjugate gradients.
@@ -182,19 +183,19 @@ def test_stiffness_and_levels_of_the_body_are_made_once_a_mesh():
     mesh = scenes_space.perturbed(5, 71)
     numerics = xc.Numerics(linear="iterative")
     first = xc.solve(problem(PENNY, mesh=mesh, numerics=numerics))
-    assert first.bulk.levels is not None
+    assert first.reuse.hierarchy is not None
     grown = xc.penny_crack((0.013, -0.021, 0.0317), (0.1, -0.2, 1.0), 0.6, n=24)
     scene = problem(grown, mesh=mesh, numerics=numerics)
-    again = solve_states(scene, [None], bulk=first.bulk)[0]
-    assert again.bulk.matrix is first.bulk.matrix
-    assert again.bulk.levels is first.bulk.levels
+    again = solve_states(scene, [None], reuse=first.reuse)[0]
+    assert again.reuse.bulk.matrix is first.reuse.bulk.matrix
+    assert again.reuse.hierarchy is first.reuse.hierarchy
     fresh = xc.solve(scene)
-    assert fresh.bulk.matrix is not first.bulk.matrix
+    assert fresh.reuse.bulk.matrix is not first.reuse.bulk.matrix
     assert (again.u == fresh.u).all()
     # Another mesh must not take it.
-    other = solve_states(problem(PENNY, numerics=numerics), [None], bulk=first.bulk)[0]
-    assert other.bulk.matrix is not first.bulk.matrix
-    assert other.bulk.levels is not first.bulk.levels
+    other = solve_states(problem(PENNY, numerics=numerics), [None], reuse=first.reuse)[0]
+    assert other.reuse.bulk.matrix is not first.reuse.bulk.matrix
+    assert other.reuse.hierarchy is not first.reuse.hierarchy
 
 
 def test_unknowns_in_the_report_add_up():

@@ -66,9 +66,9 @@ def test_the_next_crack_takes_the_order_of_the_last(order):
     mesh = scenes.perturbed(16, 77)
     first = xc.solve(replace(problem((0.0, 0.05), mesh), order=order))
     longer = replace(problem((0.15, 0.12), mesh), order=order)
-    kept = solve_states(longer, [None], bulk=first.bulk, warm=first.warm)[0]
+    kept = solve_states(longer, [None], reuse=first.reuse)[0]
     fresh = xc.solve(longer)
-    assert kept.warm.elimination.age == 1
+    assert kept.reuse.elimination.age == 1
     scale = np.abs(fresh.u).max()
     np.testing.assert_allclose(kept.u, fresh.u, atol=1e-10 * scale)
 
@@ -98,13 +98,13 @@ def test_a_step_whose_order_is_lost_is_not_taken_for_whole(tmp_path):
     )  # fmt: skip
     xc.collect(run, tmp_path)
     steps, broken = read_steps(tmp_path, {})
-    assert [step.memory.warm.elimination.age for step in steps] == [0, 1, 2]
+    assert [step.memory.reuse.elimination.age for step in steps] == [0, 1, 2]
     assert broken is None
     second = load(step_path(tmp_path, 1), CLASSES)["step"]
-    assert second.memory.warm.elimination.place.size == 0
+    assert second.memory.reuse.elimination.place.size == 0
     stored = load(step_path(tmp_path, 0), CLASSES)
     memory = stored["step"].memory
-    memory = replace(memory, warm=replace(memory.warm, elimination=None))
+    memory = replace(memory, reuse=replace(memory.reuse, elimination=None))
     stored["step"] = replace(stored["step"], memory=memory)
     save(step_path(tmp_path, 0), stored, CLASSES)
     steps, broken = read_steps(tmp_path, {})

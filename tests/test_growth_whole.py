@@ -81,7 +81,7 @@ def test_resumed_run_with_contact_is_the_same_to_the_last_bit(tmp_path):
         assert again.table().tobytes() == whole.table().tobytes()
         for name in ("step_00003.npz", "run.json"):
             assert (folder / name).read_bytes() == (whole.path / name).read_bytes()
-    assert load(whole.path).steps[2].memory.warm.active[0].dtype == bool
+    assert load(whole.path).steps[2].memory.reuse.active[0].dtype == bool
 
 
 @pytest.mark.filterwarnings("ignore::xcrack.XcrackWarning")

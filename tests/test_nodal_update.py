@@ -8,6 +8,7 @@ import pytest
 import scenes
 import scenes_space
 import xcrack as xc
+from scenes import numerics_of
 from xcrack.crack.crack import advance, front, place
 from xcrack.cutting.cut import cut
 from xcrack.cutting.level_set import level_set
@@ -91,7 +92,7 @@ def test_updates_near_the_tip_leave_phantoms():
 def K_by(update, mesh, crack, order):
     problem = xc.Problem(
         mesh, STEEL, [crack], loads=PULL, order=order, contact="off",
-        numerics=xc.Numerics(update=update),
+        numerics=numerics_of(update=update),
     )  # fmt: skip
     return scenes.K_of(problem)[0]
 
@@ -157,7 +158,7 @@ def test_growth_follows_the_same_path():
     for update in ("explicit", "nodal"):
         problem = xc.Problem(
             scenes.perturbed(20, seed=81), STEEL, [xc.line_crack([(-1.1, -0.203), (-0.3, 0.05)])],
-            loads=PULL, numerics=xc.Numerics(update=update),
+            loads=PULL, numerics=numerics_of(update=update),
         )  # fmt: skip
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", xc.XcrackWarning)
@@ -174,5 +175,5 @@ def test_growth_follows_the_same_path():
 
 def test_in_space_there_is_none():
     problem = scenes_space.flat_penny(4, 0.013, 0.5, (1.0, 0.0), update="nodal")
-    with pytest.raises(xc.ProblemError, match="plane only"):
+    with pytest.raises(xc.ProblemError, match="2D only"):
         xc.solve(problem)

@@ -4,6 +4,7 @@ Exact solutions are imposed on boxes. Bounds are of discretisation unless they s
 tolerance; those that show a failing are lower bounds.
 """
 
+import inspect
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -17,9 +18,11 @@ import exact
 import scenes
 import scenes_space
 import xcrack as xc
+from scenes import numerics_of
 from xcrack.analysis.solve import build, solve_states
-from xcrack.contact.alternatives import closed_matrix, lip_space
+from xcrack.contact.alternatives import _springs, lip_space
 from xcrack.contact.nitsche import averaging, lip_shares, stress_matrix
+from xcrack.scene.numerics import with_choices
 from xcrack.solvers.direct import system
 from xcrack.solvers.rigid_motion import free_motion
 
@@ -40,7 +43,7 @@ def patch(seed, order, loads=(), **options):
     crack = xc.line_crack([middle - back * ahead, middle + length * ahead])
     problem = scenes.on_box(
         scenes.perturbed(9 + seed % 5, seed), [crack], uniform, traction=scenes.SIDES,
-        order=order, contact="on", numerics=xc.Numerics(**options),
+        order=order, contact="on", numerics=numerics_of(**options),
     )  # fmt: skip
     return replace(problem, loads=[*problem.loads, *loads])
 
@@ -85,7 +88,7 @@ def test_nitsche_is_exact_for_linear_pressure_at_order_2():
     field = scenes.turned(lambda x, y: scenes.polynomial_pressure(x, y, terms), (0, 0))
     problem = scenes.on_box(
         scenes.perturbed(11, 712), [xc.line_crack([(-0.41, 0.0), (0.37, 0.0)])], field,
-        traction=scenes.SIDES, contact="on", numerics=xc.Numerics(lips="nitsche"),
+        traction=scenes.SIDES, contact="on", numerics=numerics_of(lips="nitsche"),
     )  # fmt: skip
     found = xc.solve(problem).contact[0]
     assert found.pressure == pytest.approx(scenes.pressure_of(terms)(found.points[:, 0]), abs=1e-9)
@@ -98,7 +101,7 @@ def test_nitsche_at_slivers(order):
         crack = xc.line_crack([(-0.43, eps * 0.2), (0.37, eps * 0.2)])
         problem = scenes.on_box(
             xc.box((-1, -1), (1, 1), 10), [crack], uniform, traction=scenes.SIDES, order=order,
-            contact="on", numerics=xc.Numerics(lips="nitsche"),
+            contact="on", numerics=numerics_of(lips="nitsche"),
         )  # fmt: skip
         assert deviation(problem) <= 1e-8, eps
         model = build(problem)
@@ -118,7 +121,7 @@ def half_closed(order, **options):
 def closing(order, **options):
     return scenes.centre_crack(
         lambda x, y: exact.partial_closure(x, y, 1.0, 1.0, 0.3, 0.0, 1.0), 24, order=order,
-        angle=0.21, origin=(0.05, -0.07), numerics=xc.Numerics(**options),
+        angle=0.21, origin=(0.05, -0.07), numerics=numerics_of(**options),
     )[0]  # fmt: skip
 
 
@@ -164,7 +167,7 @@ def test_both_starts_of_the_set_agree(lips):
 
 def test_a_known_set_saves_factorisations():
     first = half_closed(1, lips="penalty")
-    again = solve_states(closing(1, lips="penalty"), [None], warm=first.warm)[0]
+    again = solve_states(closing(1, lips="penalty"), [None], reuse=first.reuse)[0]
     assert again.report.operations["contact_iterations"] == 1
     assert first.report.operations["contact_iterations"] > 2
     assert again.u == pytest.approx(first.u, abs=1e-12 * np.abs(first.u).max())
@@ -186,7 +189,7 @@ def hole(order, **options):
         loads=scenes.tractions(field, (*scenes.SIDES, "hole")),
         order=order,
         contact="on",
-        numerics=xc.Numerics(**options),
+        numerics=numerics_of(**options),
     )
 
 
@@ -227,8 +230,9 @@ def closed_condition(problem):
     fixed[free_motion(model.space, fixed).pins] = True
     engine = system(model.space, model.stiffness, fixed, problem.numerics)
     A = engine.reduced
-    if problem.numerics.lips != "multipliers":
-        A = closed_matrix(problem, model, engine, [lip_space(problem, model, 0)])
+    if problem.numerics.comparison.lips != "multipliers":
+        springs = _springs(problem, model, engine, [lip_space(problem, model, 0)])[1]
+        A = springs.closed(np.ones(len(springs.c), dtype=bool))
     D = sp.diags(1 / np.sqrt(A.diagonal()))
     A = sp.csc_matrix(D @ A @ D)
     start = np.random.default_rng(5309).standard_normal(A.shape[0])
@@ -281,7 +285,7 @@ def test_nitsche_in_space_keeps_uniform_pressure():
     S = -np.eye(3)
     sides = [xc.traction(side, lambda x, n: n @ S) for side in scenes_space.SIX]
     problem = replace(
-        problem, supports=[], loads=sides, numerics=xc.Numerics(lips="nitsche", linear="direct")
+        problem, supports=[], loads=sides, numerics=numerics_of(lips="nitsche", linear="direct")
     )
     assert deviation(problem, 1.0) <= 1e-8
 
@@ -295,7 +299,7 @@ PULL = (xc.traction("top", (0.0, 1.0)), xc.traction("bottom", (0.0, -1.0)))
 def edge(contact="auto", **options):
     return xc.Problem(
         scenes.perturbed(10, 5), STEEL, [xc.line_crack([(-1.1, 0.031), (0.07, 0.012)])],
-        loads=PULL, order=1, contact=contact, numerics=xc.Numerics(**options),
+        loads=PULL, order=1, contact=contact, numerics=numerics_of(**options),
     )  # fmt: skip
 
 
@@ -343,11 +347,11 @@ def test_report_names_the_method():
 
 def test_what_is_refused():
     with pytest.raises(xc.ProblemError, match="multipliers only"):
-        xc.Numerics(lips="penalty", linear="iterative")
-    with pytest.raises(xc.ProblemError, match="penalty=-1"):
-        xc.Numerics(lips="penalty", penalty=-1.0)
+        numerics_of(lips="penalty", linear="iterative")
+    with pytest.raises(xc.ProblemError, match="penalty = -1"):
+        numerics_of(lips="penalty", penalty=-1.0)
     with pytest.raises(xc.ProblemError, match="'multipliers' or 'penalty'"):
-        xc.Numerics(lips="glue")
+        numerics_of(lips="glue")
 
 
 def test_a_large_body_in_space_is_factored():
@@ -414,3 +418,20 @@ def test_averaging_keeps_polynomials(order):
     # A projection: twice is once, and integrals stay.
     assert mean @ (mean @ drawn) == pytest.approx(mean @ drawn, abs=1e-10)
     assert lips.weight @ (mean @ drawn) == pytest.approx(lips.weight @ drawn)
+
+
+@pytest.mark.parametrize("name", ["tip_basis", "update", "lips", "penalty"])
+def test_an_option_that_moved_says_where_to(name):
+    with pytest.raises(xc.ProblemError, match=rf"give Numerics\(comparison=Comparison\({name}=7\)"):
+        xc.Numerics(**{name: 7})
+    with pytest.raises(TypeError, match="unexpected keyword argument 'lip'"):
+        xc.Numerics(lip="penalty")
+    assert name not in inspect.signature(xc.Numerics).parameters
+    with pytest.raises(xc.ProblemError, match="comparison = 'nitsche': give Comparison"):
+        xc.Numerics(comparison="nitsche")
+
+
+def test_choices_by_name():
+    numerics = numerics_of(lips="penalty", penalty=3.0, points=5)
+    assert numerics == xc.Numerics(points=5, comparison=xc.Comparison(lips="penalty", penalty=3.0))
+    assert with_choices(numerics, {"points": 6}).comparison == numerics.comparison

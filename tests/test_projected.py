@@ -11,10 +11,11 @@ from hypothesis import strategies as st
 import scenes
 import xcrack as xc
 from xcrack.analysis.solve import build
-from xcrack.contact.active_set import active_set
 from xcrack.contact.multipliers import gap_rows, multipliers
 from xcrack.errors import ConvergenceError
+from xcrack.solvers.active_set import active_set
 from xcrack.solvers.direct import system
+from xcrack.solvers.engine import ContactRows
 from xcrack.solvers.iterative import iterative_system
 from xcrack.solvers.projected_cg import Operator, conjugate_gradients, projected
 from xcrack.solvers.rigid_motion import balanced, free_motion, without_motion
@@ -264,8 +265,8 @@ def test_contact_as_with_a_factor(name, start):
     reference = direct.solve(scene.f + N.T @ exact.pressure, scene.known)
     guess = None if start == "overlap" else np.full(len(measure), start == "closed")
     found = engine.contact(
-        N, scene.f[:, None], scene.known[:, None], measure, scene.stiffness, [guess],
-        u0[:, None] if start == "overlap" else None,
+        ContactRows(N, measure, scene.stiffness, True), scene.f[:, None], scene.known[:, None],
+        [guess], u0[:, None] if start == "overlap" else None,
     )[0]  # fmt: skip
     assert np.array_equal(found.active, exact.active)
     assert found.pressure == pytest.approx(
@@ -282,13 +283,12 @@ def test_a_solution_is_a_perfect_start():
     N, measure = scene.lips()
     f, known = scene.f[:, None], scene.known[:, None]
     guess = [np.ones(len(measure), dtype=bool)]
-    found = engine.contact(N, f, known, measure, scene.stiffness, guess)[0]
+    rows = ContactRows(N, measure, scene.stiffness, True)
+    found = engine.contact(rows, f, known, guess)[0]
     before = engine.count.iterations
-    again = engine.contact(N, f, known, measure, scene.stiffness, [found.active], found.u[:, None])[
-        0
-    ]
+    again = engine.contact(rows, f, known, [found.active], found.u[:, None])[0]
     assert engine.count.iterations == before
-    assert again.iterations == 1
+    assert again.sets == 1
     assert scene.displacement_error(again.u, found.u) <= 1e-12
 
 
@@ -332,8 +332,8 @@ def test_units_change_nothing():
         N, measure = scene.lips()
         u = engine.solve(E * scene.f, scene.known)
         engine.contact(
-            N, E * scene.f[:, None], scene.known[:, None], measure, scene.stiffness, [None],
-            u[:, None],
+            ContactRows(N, measure, scene.stiffness, True), E * scene.f[:, None],
+            scene.known[:, None], [None], u[:, None],
         )  # fmt: skip
         steps.append(engine.count.iterations)
     # the last digits, where the cycle's single precision is felt
@@ -365,9 +365,8 @@ def test_without_supports():
         np.ones(len(measure), dtype=bool),
     )
     assert exact.active.any()
-    found = engine.contact(
-        N, f[:, None], 0 * f[:, None], measure, scene.stiffness, [None], u[:, None]
-    )[0]
+    rows = ContactRows(N, measure, scene.stiffness, True)
+    found = engine.contact(rows, f[:, None], 0 * f[:, None], [None], u[:, None])[0]
     assert np.array_equal(found.active, exact.active)
     assert found.pressure == pytest.approx(exact.pressure, abs=1e-6 * exact.pressure.max())
     closed = without_motion(motion, direct.solve(f + N.T @ exact.pressure))
@@ -406,7 +405,8 @@ def test_a_tilted_penny_as_with_a_factor(supports, order):
     reference = direct.solve(f + N.T @ exact.pressure)
     assert exact.active.any()
     assert exact.active.all() == (not supports)
-    found = engine.contact(N, f[:, None], 0 * f[:, None], m.measure, 6.0, [None], u[:, None])[0]
+    rows = ContactRows(N, m.measure, 6.0, True)
+    found = engine.contact(rows, f[:, None], 0 * f[:, None], [None], u[:, None])[0]
     assert np.array_equal(found.active, exact.active)
     assert found.pressure == pytest.approx(exact.pressure, abs=1e-6 * exact.pressure.max())
     for one, other in ((u, u0), (found.u, reference)):

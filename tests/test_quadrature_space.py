@@ -5,6 +5,7 @@ import pytest
 
 import scenes_space as scenes
 import xcrack as xc
+from scenes import numerics_of
 from xcrack.analysis.solve import build
 from xcrack.mesh.simplex import conical
 from xcrack.xfem.consistent import boundary_points, corrected
@@ -23,7 +24,7 @@ CRACKS = {
 
 def model(crack, n=6, seed=None, **options):
     mesh = xc.box((-1, -1, -1), (1, 1, 1), n) if seed is None else scenes.perturbed(n, seed)
-    return build(xc.Problem(mesh, scenes.STEEL, [crack], numerics=xc.Numerics(**options)))
+    return build(xc.Problem(mesh, scenes.STEEL, [crack], numerics=numerics_of(**options)))
 
 
 def with_tip(space):

@@ -9,6 +9,7 @@ import exact
 import scenes
 import scenes_fronts as fronts
 import xcrack as xc
+from scenes import numerics_of
 from xcrack.solvers.direct import scaled_basis
 from xcrack.solvers.modal_basis import local_modes, mode_columns
 from xcrack.xfem.model import build
@@ -46,7 +47,7 @@ def measured(n, order, tip_basis):
     for seed, (tip, angle) in enumerate(scenes.TIPS[:2], start=3):
         problem, field = scenes.williams_edge(
             n, tip, angle, seed=seed, order=order,
-            numerics=xc.Numerics(radius={1: 0.3, 2: 0.4}[order], tip_basis=tip_basis),
+            numerics=numerics_of(radius={1: 0.3, 2: 0.4}[order], tip_basis=tip_basis),
         )  # fmt: skip
         solution = xc.solve(problem)
         K = scenes.K_of(problem)[0]
@@ -79,7 +80,7 @@ def condition(n, tip_basis, orthonormal):
     tip, angle = scenes.TIPS[0]
     problem, _ = scenes.williams_edge(
         n, tip, angle, order=1,
-        numerics=xc.Numerics(radius=0.3, tip_basis=tip_basis, orthonormal=orthonormal),
+        numerics=numerics_of(radius=0.3, tip_basis=tip_basis, orthonormal=orthonormal),
     )  # fmt: skip
     return scenes.condition(problem)
 
@@ -101,7 +102,7 @@ def test_condition_number_without_blocks():
 def test_unknowns_in_use_are_reported():
     tip, angle = scenes.TIPS[1]
     problem, _ = scenes.williams_edge(
-        14, tip, angle, order=1, numerics=xc.Numerics(tip_basis="vectorial")
+        14, tip, angle, order=1, numerics=numerics_of(tip_basis="vectorial")
     )
     solution = xc.solve(problem)
     space = solution.space
@@ -118,7 +119,7 @@ def test_unknowns_in_use_are_reported():
 def test_columns_are_the_modes_in_the_frame_of_the_tip():
     tip, angle = scenes.TIPS[2]
     problem, _ = scenes.williams_edge(
-        10, tip, angle, order=2, numerics=xc.Numerics(tip_basis="vectorial")
+        10, tip, angle, order=2, numerics=numerics_of(tip_basis="vectorial")
     )
     space = build(problem).space
     free = np.ones(space.n_dof, dtype=bool)
@@ -139,7 +140,7 @@ def test_columns_are_the_modes_in_the_frame_of_the_tip():
 def test_a_point_that_a_support_decides_goes_without():
     tip, angle = scenes.TIPS[0]
     problem, _ = scenes.williams_edge(
-        10, tip, angle, order=1, numerics=xc.Numerics(tip_basis="vectorial")
+        10, tip, angle, order=1, numerics=numerics_of(tip_basis="vectorial")
     )
     model = build(problem)
     first = 2 * model.space.tips[0].point_to_function.max()
@@ -155,7 +156,7 @@ def test_a_point_that_a_support_decides_goes_without():
 def test_the_basis_of_the_solver_changes_no_digit(orthonormal, patch):
     tip, angle = scenes.TIPS[3]
     K = [
-        scenes.K_of(scenes.williams_edge(12, tip, angle, numerics=xc.Numerics(**options))[0])[0]
+        scenes.K_of(scenes.williams_edge(12, tip, angle, numerics=numerics_of(**options))[0])[0]
         for options in (
             {"tip_basis": "vectorial"},
             {"tip_basis": "vectorial", "orthonormal": orthonormal, "patch": patch},
@@ -171,7 +172,7 @@ def test_closed_lips_carry_the_pressure():
         xc.Isotropic(1.3, 0.27, plane="strain"),
         [xc.line_crack([(-0.41, 0.013), (0.37, 0.013)])],
         loads=(xc.traction("top", (0.0, -1.0)), xc.traction("bottom", (0.0, 1.0))),
-        numerics=xc.Numerics(tip_basis="vectorial"),
+        numerics=numerics_of(tip_basis="vectorial"),
     )
     contact = xc.solve(problem).contact[0]
     np.testing.assert_allclose(contact.pressure[contact.closed], 1.0, atol=1e-8)
@@ -213,6 +214,6 @@ def test_in_space_both_solvers_agree():
 
 def test_what_does_not_go_together():
     with pytest.raises(xc.ProblemError, match="functions = 2"):
-        xc.Numerics(tip_basis="vectorial", functions=2)
+        numerics_of(tip_basis="vectorial", functions=2)
     with pytest.raises(xc.ProblemError, match="'scalar' or 'vectorial'"):
-        xc.Numerics(tip_basis="modes")
+        numerics_of(tip_basis="modes")

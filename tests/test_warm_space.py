@@ -28,7 +28,7 @@ def test_next_step_starts_from_closed_lips():
     """One solve a state instead of two, and what a fresh start finds."""
     first = solve_states(scene(0.55), [PRESS, PULL])
     next_scene = replace(scene(0.58), mesh=first[0].problem.mesh)
-    warm = solve_states(next_scene, [PRESS, PULL], bulk=first[0].bulk, warm=first[0].warm)
+    warm = solve_states(next_scene, [PRESS, PULL], reuse=first[0].reuse)
     fresh = solve_states(next_scene, [PRESS, PULL])
     count = [s[0].report.operations for s in (warm, fresh)]
     assert count[0]["solves"] == 2 < count[1]["solves"]
@@ -44,7 +44,7 @@ def test_a_crack_that_opens_again_gives_its_multipliers_back():
     closed = solve_states(scene(0.55), [PRESS])
     opened = solve_states(
         replace(scene(0.55), mesh=closed[0].problem.mesh), [PULL],
-        bulk=closed[0].bulk, warm=closed[0].warm,
+        reuse=closed[0].reuse,
     )[0]  # fmt: skip
     assert closed[0].contact[0] is not None
     assert opened.contact[0] is None

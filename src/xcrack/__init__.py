@@ -36,6 +36,7 @@ _HOME = {
     "initial_stress": "scene.conditions",
     "Problem": "scene.problem",
     "Numerics": "scene.numerics",
+    "Comparison": "scene.numerics",
     "solve": "analysis.solve",
     "Solution": "analysis.solution",
     "pardiso": "solvers.direct",

@@ -346,8 +346,8 @@ def test_path_warm_start_and_first_set_do_not_matter(order):
         warm = None
         for k in (3, 7, 1, 5, 4, 0):
             cold = xc.solve(other, states=[states[k]])[0]
-            warmed = solve_states(other, [states[k]], bulk=cold.bulk, warm=warm)[0]
-            warm = warmed.warm
+            warmed = solve_states(other, [states[k]], reuse=warm)[0]
+            warm = warmed.reuse
             for solution in (cold, warmed):
                 assert np.abs(solution.contact[0].pressure - reference[k]).max() <= 1e-9 * size
                 assert solution.report.operations["contact_iterations"] <= 30

@@ -10,7 +10,7 @@ import pytest
 import exact
 import scenes
 import xcrack as xc
-from scenes import SIDES
+from scenes import SIDES, numerics_of
 
 P0 = 2.5
 EXACT = 1e-10  # round-off; measured 1e-15 to 2e-12
@@ -167,7 +167,7 @@ def test_arc_and_several_cracks(order):
 def test_no_option_of_method_spoils_it(order, numerics):
     mesh = scenes.perturbed(11, 77)
     crack = drawn_crack(311)
-    found = uniform_patch(mesh, [crack], order, numerics=xc.Numerics(**numerics))
+    found = uniform_patch(mesh, [crack], order, numerics=numerics_of(**numerics))
     assert found <= EXACT
 
 

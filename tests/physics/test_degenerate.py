@@ -11,6 +11,7 @@ import pytest
 import exact
 import scenes
 import xcrack as xc
+from scenes import numerics_of
 
 pytestmark = pytest.mark.filterwarnings("ignore::xcrack.XcrackWarning")
 
@@ -33,7 +34,7 @@ def williams_on_shifted_mesh(n, shift, angle, order, **options):
         traction=("left",),
         order=order,
         contact="off",
-        numerics=xc.Numerics(**options),
+        numerics=numerics_of(**options),
     )
 
 

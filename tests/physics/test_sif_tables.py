@@ -9,6 +9,7 @@ import pytest
 import exact
 import scenes
 import xcrack as xc
+from scenes import numerics_of
 
 # At order 1 the two domains may differ by 1 % while K itself is within 0.5 %: they say so.
 pytestmark = pytest.mark.filterwarnings("ignore::xcrack.XcrackWarning")
@@ -199,7 +200,7 @@ def arc_box(n, order, alpha, stress, **options):
         supports=scenes.imposed(field, SIDES),
         order=order,
         contact="off",
-        numerics=xc.Numerics(**options),
+        numerics=numerics_of(**options),
     )
     return problem, arc
 

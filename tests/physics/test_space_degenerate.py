@@ -14,6 +14,7 @@ import exact
 import scenes
 import scenes_space
 import xcrack as xc
+from scenes import numerics_of
 from scenes_space import SIX, STEEL, half_sheet, sheet
 
 CELL = 0.25  # of a cube [-1, 1]³ with 8 cells a side
@@ -129,7 +130,7 @@ def through_crack(n, x, z, held, seed=None, **options):
             if name not in held
         ],
         contact="off",
-        numerics=xc.Numerics(**options),
+        numerics=numerics_of(**options),
     )
 
 
@@ -183,14 +184,14 @@ def sheet_problem(eps, **options):
     return xc.Problem(
         xc.box((-1, -1, -1), (1, 1, 1), 6), STEEL, [sheet((0, 0, 1), eps / 3)],
         supports=[xc.fix("bottom"), xc.fix("top")], contact="off",
-        numerics=xc.Numerics(**options),
+        numerics=numerics_of(**options),
     )  # fmt: skip
 
 
 def front_problem(eps, **options):
     return xc.Problem(
         xc.box((-1, -1, -1), (1, 1, 1), 6), STEEL, [half_sheet(0.07, eps / 3)],
-        supports=[xc.fix("bottom")], contact="off", numerics=xc.Numerics(**options),
+        supports=[xc.fix("bottom")], contact="off", numerics=numerics_of(**options),
     )  # fmt: skip
 
 

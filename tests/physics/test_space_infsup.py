@@ -10,6 +10,7 @@ import pytest
 
 import scenes_space as scenes
 import xcrack as xc
+from scenes import numerics_of
 
 EPS = (0.5, 0.1, 1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12, 1e-14, 0.0, -1e-12, -1e-6, -1e-2)
 _RNG = np.random.default_rng(40512277)
@@ -22,7 +23,7 @@ MISSION = (pytest.mark.slow, pytest.mark.mission)
 
 
 def problem(mesh, crack, **options):
-    return xc.Problem(mesh, scenes.STEEL, [crack], numerics=xc.Numerics(**options))
+    return xc.Problem(mesh, scenes.STEEL, [crack], numerics=numerics_of(**options))
 
 
 def through(n, k, **options):

@@ -11,6 +11,7 @@ import scipy.sparse.linalg as sla
 import exact
 import scenes_space as scenes
 import xcrack as xc
+from scenes import numerics_of
 from xcrack.solvers import iterative
 from xcrack.solvers.direct import scaled_basis
 from xcrack.xfem.enrichment_3d import leg_size
@@ -204,7 +205,7 @@ def test_choice_of_the_solver(order, few, many):
 
 
 def test_modes_in_the_place_of_tip_functions():
-    counts = [steps(tilted(n, numerics=xc.Numerics(tip_basis="vectorial"))) for n in (5, 8)]
+    counts = [steps(tilted(n, numerics=numerics_of(tip_basis="vectorial"))) for n in (5, 8)]
     assert max(counts) <= 30
 
 

@@ -11,6 +11,7 @@ import pytest
 
 import scenes_space as scenes
 import xcrack as xc
+from scenes import numerics_of
 from scenes_space import SIX
 
 P0 = 2.5
@@ -169,7 +170,7 @@ def test_several_cracks():
 )
 def test_no_option_of_method_spoils_it(numerics):
     mesh, crack = scenes.perturbed(6, 77), drawn_penny(711)
-    assert patch(mesh, [crack], numerics=xc.Numerics(**numerics)) <= EXACT
+    assert patch(mesh, [crack], numerics=numerics_of(**numerics)) <= EXACT
 
 
 def test_material_and_units_have_no_part_in_it():

@@ -4,12 +4,11 @@ Exact solutions of arcs (Muskhelishvili), else a finer mesh; all tolerances are 
 `tests/physics/test_degenerate.py` has kinks, mesh lines, corners and what is refused.
 """
 
-import dataclasses
-
 import pytest
 
 import scenes_stability as scenes
 import xcrack as xc
+from scenes import numerics_of
 
 pytestmark = pytest.mark.filterwarnings("ignore::xcrack.XcrackWarning")
 CELL = 2.4 / 30
@@ -39,13 +38,9 @@ def test_a_crack_that_has_turned_back(degrees):
     assert error <= 2e-2
 
 
-@pytest.mark.skipif(
-    "update" not in {field.name for field in dataclasses.fields(xc.Numerics)},
-    reason="no other update of level sets to compare with",
-)
 def test_nodal_level_sets_lose_it():
     """The opponent: as good up to 150°, without the beginning of the crack from 180° on."""
-    numerics = xc.Numerics(radius=0.15, domain=0.25, update="nodal")
+    numerics = numerics_of(radius=0.15, domain=0.25, update="nodal")
     assert scenes.arc_error(0.6, 90, 40, pieces=48, numerics=numerics) <= 2e-3
     assert scenes.arc_length(0.6, 240, 40, pieces=48, numerics=numerics) <= 0.9
 

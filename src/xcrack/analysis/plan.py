@@ -1,4 +1,4 @@
-"""Scene economy: what a scene needs, said before anything is solved, and what was found."""
+"""Scene economy: what a scene needs, decided before anything is solved."""
 
 from dataclasses import dataclass
 
@@ -88,8 +88,8 @@ def plan(problem: Problem) -> Report:
     rows = [_heaviside(n_tips), _tips(problem, n_tips)]
     rows.extend(_multipliers(problem))
     rows.append(_third_mode(problem, n_tips))
-    held = "held by supports" if problem.supports else "none given; rigid motion is removed"
-    rows.append(Ingredient("supports", bool(problem.supports), held))
+    why = "the body is supported" if problem.supports else "none given; rigid motion is removed"
+    rows.append(Ingredient("supports", bool(problem.supports), why))
     rows.append(
         Ingredient(
             "enriched quadrature",
@@ -123,7 +123,7 @@ def _tips(problem: Problem, n_tips: list[int]) -> Ingredient:
     if not sum(n_tips):
         return Ingredient("tip functions", False, "every crack cuts through: there is no tip")
     what_each = f"{problem.numerics.functions} functions"
-    if problem.numerics.tip_basis == "vectorial":
+    if problem.numerics.comparison.tip_basis == "vectorial":
         what_each = f"modes I to {'II' if problem.mesh.dim == 2 else 'III'} only"
     reach = (
         "within a fixed radius" if problem.numerics.enrichment == "geometric" else "tip cells only"
@@ -139,8 +139,8 @@ def _multipliers(problem: Problem) -> list[Ingredient]:
         "auto": (False, "none until the lips of the open solution overlap"),
     }
     used, reason = reasons[problem.contact]
-    if used and problem.numerics.lips in LIPS:
-        reason += f"; held by {LIPS[problem.numerics.lips]}"
+    if used and problem.numerics.comparison.lips in LIPS:
+        reason += f"; by {LIPS[problem.numerics.comparison.lips]}"
     return [
         Ingredient(f"multipliers of crack {c}", used, reason) for c in range(len(problem.cracks))
     ]

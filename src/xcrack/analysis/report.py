@@ -7,11 +7,10 @@ import numpy as np
 
 from xcrack.analysis.plan import LIPS, Ingredient, Report, plan
 from xcrack.contact.multipliers import Multipliers
-from xcrack.contact.solve import Pressed
+from xcrack.contact.result import ContactSolution
 from xcrack.crack.crack import Crack
 from xcrack.scene.problem import Problem
-from xcrack.solvers.direct import System
-from xcrack.solvers.iterative import IterativeSystem
+from xcrack.solvers.engine import Engine
 from xcrack.solvers.rigid_motion import Motion
 from xcrack.xfem.model import Model
 
@@ -19,20 +18,20 @@ from xcrack.xfem.model import Model
 def report(
     problem: Problem,
     model: Model,
-    engine: System | IterativeSystem,
-    found: Pressed,
+    engine: Engine,
+    contact: ContactSolution,
     motion: Motion,
     imbalance: float,
     n_states: int,
 ) -> Report:
-    """The plan of a problem, with what was found.
+    """The plan of a problem, completed by what its solution took.
 
     Parameters
     ----------
     problem : Problem
     model : Model
-    engine : System or IterativeSystem
-    found : Pressed
+    engine : Engine
+    contact : ContactSolution
     motion : Motion
         Rigid motions that were removed.
     imbalance : float
@@ -42,7 +41,7 @@ def report(
     d = model.space.dim
     rows = []
     n_heaviside = sum(int((h >= 0).sum()) for h in model.space.heaviside) * d
-    modes = problem.numerics.tip_basis == "vectorial"
+    modes = problem.numerics.comparison.tip_basis == "vectorial"
     each = [d if modes else d * tip.functions for tip in model.space.tips]
     n_points = [int((tip.point_to_function >= 0).sum()) for tip in model.space.tips]
     n_tip = sum(n * k for n, k in zip(n_points, each, strict=True))
@@ -53,7 +52,7 @@ def report(
             radii = ", ".join(f"{r:.4g}" for r in model.space.radius)
             row = replace(row, unknowns=n_tip, reason=f"{row.reason}; radius {radii}")
         elif row.name.startswith("multipliers of crack"):
-            row = _multiplier_row(problem, found, int(row.name.split()[-1]))
+            row = _multiplier_row(problem, contact, int(row.name.split()[-1]))
         elif row.name == "supports" and motion.modes.shape[1]:
             row = replace(
                 row,
@@ -61,8 +60,7 @@ def report(
                 f"to {imbalance:.1e}",
             )
         rows.append(row)
-    what = "factorisation" if isinstance(engine, System) else "multigrid hierarchy"
-    shared = f"share one {what}" if n_states > 1 else f"one {what}"
+    shared = f"share one {engine.shared}" if n_states > 1 else f"one {engine.shared}"
     rows.append(Ingredient("load states", True, f"{n_states}, {shared}"))
     standard = model.space.n_nodes * d
     rows.append(
@@ -71,17 +69,17 @@ def report(
     for c, (given, placed) in enumerate(zip(problem.cracks, problem.placed, strict=True)):
         if not given.placed and not np.array_equal(given.points, placed.points):
             rows.append(Ingredient(f"mouths of crack {c}", True, _mouths(given, placed)))
-    if isinstance(engine, IterativeSystem):
-        rows.append(Ingredient("linear solver", True, "conjugate gradients: a large body in space"))
+    if engine.reason:
+        rows.append(Ingredient("linear solver", True, engine.reason))
     operations = {
         "unknowns": engine.basis.shape[1],
         "factorisations": engine.count.factorisations,
         "solves": engine.count.solves,
-        **({"iterations": engine.count.iterations} if isinstance(engine, IterativeSystem) else {}),
+        **({"iterations": engine.count.iterations} if engine.reason else {}),
         "assembled_cells": len(model.space.enriched),
         "integration_points": model.n_points,
-        "multipliers": _n_multipliers(problem, found.spaces),
-        "contact_iterations": found.iterations,
+        "multipliers": _n_multipliers(problem, contact.spaces),
+        "contact_iterations": contact.sets,
     }
     return Report(tuple(rows), operations)
 
@@ -89,27 +87,29 @@ def report(
 def _mouths(given: Crack, placed: Crack) -> str:
     if placed.dim == 3:
         words = "sides refined to the size of the cells, prolonged to the outside where open"
-        kept = {tuple(x) for x in placed.points.tolist()}
-        lost = sum(tuple(x) not in kept for x in given.points.tolist())
+        present = {tuple(x) for x in placed.points.tolist()}
+        lost = sum(tuple(x) not in present for x in given.points.tolist())
         return words + (f"; {lost} corner(s) of fronts rounded to two cells" if lost else "")
     return f"{2 - placed.n_tips}, prolonged to one cell outside"
 
 
-def _multiplier_row(problem: Problem, found: Pressed, c: int) -> Ingredient:
+def _multiplier_row(problem: Problem, contact: ContactSolution, c: int) -> Ingredient:
     name = f"multipliers of crack {c}"
-    m = found.spaces[c]
+    m = contact.spaces[c]
     if m is not None:
-        why = "contact is switched on" if problem.contact == "on" else "the open lips overlap"
-        if problem.numerics.lips != "multipliers":
-            why += f"; held by {LIPS[problem.numerics.lips]}"
+        why = (
+            "contact is switched on" if problem.contact == "on" else "the open crack faces overlap"
+        )
+        if problem.numerics.comparison.lips != "multipliers":
+            why += f"; by {LIPS[problem.numerics.comparison.lips]}"
         return Ingredient(name, True, why, unknowns=_n_multipliers(problem, [m]))
     if problem.contact == "off":
-        return Ingredient(name, False, "contact is switched off: lips may overlap")
-    return Ingredient(name, False, "the lips stay apart in every load state")
+        return Ingredient(name, False, "contact is switched off: crack faces may overlap")
+    return Ingredient(name, False, "the crack faces stay apart in every load state")
 
 
 def _n_multipliers(problem: Problem, spaces: Sequence[Multipliers | None]) -> int:
     """Unknowns of the lips: a penalty and Nitsche's method have none."""
-    if problem.numerics.lips in ("penalty", "nitsche"):
+    if problem.numerics.comparison.lips in ("penalty", "nitsche"):
         return 0
     return sum(len(m.measure) for m in spaces if m is not None)

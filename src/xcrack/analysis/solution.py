@@ -3,26 +3,22 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from xcrack.analysis.plan import Report
 from xcrack.arrays import Bools, Floats, Ints, lock
 from xcrack.contact.result import Contact
 from xcrack.errors import GeometryError
 from xcrack.mesh.locate import locate
 from xcrack.scene.conditions import InitialStress, Load, evaluate_stress
 from xcrack.scene.problem import Problem
+from xcrack.solvers.reuse import Reuse
 from xcrack.xfem.function_space import Space
 from xcrack.xfem.lips import LipPoints, jump_values
 from xcrack.xfem.loads import position
 from xcrack.xfem.quadrature import cell_side
-
-if TYPE_CHECKING:
-    from xcrack.analysis.plan import Report
-    from xcrack.contact.warm_start import Warm
-    from xcrack.xfem.assembly import Bulk
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,10 +45,8 @@ class Solution:
         Strain energy, u K u / 2.
     report : Report
         What was modelled, what was left out, and why.
-    bulk : Bulk
-        Stiffness of the uncracked body, for the next crack in the same mesh.
-    warm : Warm
-        Closed sets, for the next solve.
+    reuse : Reuse
+        What serves the next solve in the same mesh.
     """
 
     problem: Problem
@@ -64,9 +58,8 @@ class Solution:
     lips: tuple[LipPoints, ...]
     contact: tuple[Contact | None, ...]
     energy: float
-    report: "Report"
-    bulk: "Bulk"
-    warm: "Warm"
+    report: Report
+    reuse: Reuse
 
     def __repr__(self) -> str:
         return f"Solution(state={self.state!r}, n_dof={self.n_dof}, energy={self.energy:.6g})"

@@ -9,15 +9,15 @@ import numpy as np
 from xcrack.analysis.report import report
 from xcrack.analysis.solution import Solution
 from xcrack.arrays import Bools, Floats, lock
-from xcrack.contact.solve import contact, contact_of
-from xcrack.contact.warm_start import Warm
+from xcrack.contact.solve import contact_of, solve_contact
 from xcrack.errors import ProblemError
 from xcrack.scene.conditions import Displacement, InitialStress, Load
 from xcrack.scene.problem import Problem
-from xcrack.solvers.direct import Solver, System, system
-from xcrack.solvers.iterative import IterativeSystem, iterative_system
+from xcrack.solvers.direct import Solver, system
+from xcrack.solvers.engine import Engine
+from xcrack.solvers.iterative import iterative_system
+from xcrack.solvers.reuse import Reuse
 from xcrack.solvers.rigid_motion import Motion, balanced, free_motion, without_motion
-from xcrack.xfem.assembly import Bulk
 from xcrack.xfem.loads import load_vector
 from xcrack.xfem.model import Model, build
 from xcrack.xfem.supports import known_unknowns
@@ -48,7 +48,7 @@ def solve(
     Raises
     ------
     ProblemError
-        A body that is not held and loads out of balance, supports that contradict each other.
+        An unsupported body and loads out of balance, supports that contradict each other.
     ConvergenceError
         A singular stiffness, or contact that finds no closed set.
     """
@@ -64,34 +64,30 @@ def solve_states(
     problem: Problem,
     states: Sequence[Any],
     *,
-    bulk: Bulk | None = None,
-    warm: Warm | None = None,
+    reuse: Reuse | None = None,
     solver: Solver | None = None,
 ) -> list[Solution]:
-    """Solve all load states; `bulk` and `warm` of an earlier solution save work."""
+    """Solve all load states; `reuse` of an earlier solution in the same mesh saves work."""
     if not len(states):
         raise ProblemError("states is empty: give at least one load state, or none at all.")
-    model = build(problem, bulk)
+    reuse = reuse or Reuse()
+    model = build(problem, reuse.bulk)
     known_loads: dict[tuple[int, ...], Floats] = {}
     cases = [_case(problem, model, state, known_loads) for state in states]
     fixed = model.known.fixed.copy()
     motion = free_motion(model.space, fixed)
-    engine = _engine(problem, model, fixed, motion, solver, warm)
+    engine = _engine(problem, model, fixed, motion, solver, reuse)
     in_balance = [balanced(model.space, motion, case.f) for case in cases]
     f = np.stack([loads for loads, _ in in_balance], axis=1)
     imbalance = max(share for _, share in in_balance)
     known = np.stack([case.known for case in cases], axis=1)
     acting = [(case.loads, case.factor) for case in cases]
-    lips_contact = contact(problem, model, engine, f, known, warm, acting)
-    u = lips_contact.u
+    pressed = solve_contact(problem, model, engine, f, known, reuse, acting)
+    u = pressed.u
     if motion.modes.shape[1]:
         u = without_motion(motion, u)
-    kept, handed_on = model.bulk, lips_contact.warm
-    if isinstance(engine, IterativeSystem):
-        kept = replace(kept, levels=engine.hierarchy)
-    else:
-        handed_on = replace(handed_on, elimination=engine.elimination)
-    said = report(problem, model, engine, lips_contact, motion, imbalance, len(states))
+    handed_on = engine.handed_on(replace(pressed.closed_sets(), bulk=model.bulk))
+    summary = report(problem, model, engine, pressed, motion, imbalance, len(states))
     return [
         Solution(
             problem=problem,
@@ -101,11 +97,10 @@ def solve_states(
             space=model.space,
             u=lock(np.ascontiguousarray(u[:, k])),
             lips=model.lips,
-            contact=contact_of(model, lips_contact, u[:, k], k),
+            contact=contact_of(model, pressed, u[:, k], k),
             energy=0.5 * float(u[:, k] @ (model.stiffness @ u[:, k])),
-            report=said,
-            bulk=kept,
-            warm=handed_on,
+            report=summary,
+            reuse=handed_on,
         )
         for k, (state, case) in enumerate(zip(states, cases, strict=True))
     ]
@@ -117,21 +112,22 @@ def _engine(
     fixed: Bools,
     motion: Motion,
     solver: Solver | None,
-    warm: Warm | None,
-) -> System | IterativeSystem:
-    """A factorisation, or in space above some size conjugate gradients."""
+    reuse: Reuse,
+) -> Engine:
+    """A factorisation, or in 3D above some size conjugate gradients."""
     space_, wanted = model.space, problem.numerics.linear
     large = space_.dim == 3 and space_.n_dof > _DIRECT[space_.order]
-    large = large and problem.numerics.lips == "multipliers"  # others change the matrix
+    comparison = problem.numerics.comparison
+    large = large and comparison.lips == "multipliers"  # others change the matrix
     if solver is None and (wanted == "iterative" or (wanted == "auto" and large)):
         return iterative_system(
             space_,
             model.stiffness,
             model.bulk,
             fixed,
-            model.bulk.levels,
+            reuse.hierarchy,
             motion.modes,
-            problem.material if problem.numerics.tip_basis == "vectorial" else None,
+            problem.material if comparison.tip_basis == "vectorial" else None,
         )
     fixed[motion.pins] = True
     return system(
@@ -141,7 +137,7 @@ def _engine(
         problem.numerics,
         solver,
         problem.material,
-        None if warm is None else warm.elimination,
+        reuse.elimination,
     )
 
 

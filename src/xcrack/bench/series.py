@@ -5,7 +5,7 @@ from functools import partial
 
 from xcrack.bench.runs import Case
 from xcrack.bench.scenes import Outcome, Settings
-from xcrack.scene.numerics import Numerics
+from xcrack.scene.numerics import Numerics, with_choices
 
 Scene = Callable[[Settings, int], Outcome]
 
@@ -39,5 +39,5 @@ def variant(
     prepare: Callable[[int], object] | None = None, **choices: object,
 ) -> list[Case]:  # fmt: skip
     """The curve of other choices of method than the defaults."""
-    numerics = Numerics(**choices)  # type: ignore[arg-type]
+    numerics = with_choices(Numerics(), choices)
     return series(run, name, "setting", sizes, prepare, numerics=numerics)

@@ -21,6 +21,7 @@ from xcrack.charting.values import K_of_all, Sampled, at_places, most_trusted, p
 from xcrack.errors import ProblemError, XcrackError
 from xcrack.mesh.mesh import Mesh
 from xcrack.mesh.refinement import refine
+from xcrack.scene.numerics import with_choices
 from xcrack.scene.problem import Problem
 
 Settings = Sequence[Mapping[str, Any]] | Mapping[str, Mapping[str, Any]]
@@ -194,7 +195,7 @@ def _run(runs: _Runs, mesh: Mesh, changes: dict[str, Any]) -> _Outcome:
 def _varied(problem: Problem, mesh: Mesh, changes: dict[str, Any]) -> Problem:
     whole = {name: value for name, value in changes.items() if name in IN_PROBLEM}
     method = {name: value for name, value in changes.items() if name not in IN_PROBLEM}
-    return replace(problem, mesh=mesh, numerics=replace(problem.numerics, **method), **whole)
+    return replace(problem, mesh=mesh, numerics=with_choices(problem.numerics, method), **whole)
 
 
 def _meshes(runs: _Runs, given: Meshes | None, repeat: int, seconds: float) -> list[Mesh]:

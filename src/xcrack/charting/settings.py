@@ -5,11 +5,16 @@ from dataclasses import dataclass, fields
 from typing import Any
 
 from xcrack.errors import ProblemError
-from xcrack.scene.numerics import Numerics
+from xcrack.scene.numerics import Comparison, Numerics
 from xcrack.scene.problem import Problem
 
 IN_PROBLEM = ("order", "contact")  # what a setting may change in Problem; all else is the scene
-_METHOD = tuple(item.name for item in fields(Numerics))
+_METHOD = tuple(
+    item.name
+    for kind in (Numerics, Comparison)
+    for item in fields(kind)
+    if item.name != "comparison"
+)
 _AS_GIVEN = "as given"
 
 

@@ -1,4 +1,4 @@
-"""Other ways to hold the lips, for comparison: penalty, augmented Lagrangian, Nitsche.
+"""Alternatives to multipliers, for comparison: penalty, augmented Lagrangian, Nitsche.
 
 Each minimises  u K u / 2 - f u + sum c <-(R u + r)>² / 2  by a semi-smooth Newton iteration over
 the set where R u + r < 0 (Alart and Curnier, 1991); they differ in K, f, R, r and c alone:
@@ -25,6 +25,7 @@ from xcrack.errors import ConvergenceError
 from xcrack.scene.conditions import Load
 from xcrack.scene.problem import Problem
 from xcrack.solvers.direct import System
+from xcrack.solvers.engine import StateContact
 from xcrack.solvers.factor import Solve, superlu
 from xcrack.xfem.lips import LipPoints
 from xcrack.xfem.model import Model
@@ -35,46 +36,27 @@ _MAX_UPDATES = 500
 _TOLERANCE = 1e-8  # change of the multipliers, as a share of the largest, that ends their updates
 
 
-@dataclass(frozen=True, eq=False)
-class Held:
-    """Load states whose lips are held by an opponent.
-
-    Attributes
-    ----------
-    u : (n_dof, states) array, length
-    pressure : (g, states) array, stress
-        At the lip points, or of the groups of an augmented Lagrangian.
-    active : (states, g) array of bool
-    iterations : int
-        Sets tried in the worst state, with those of all updates.
-    """
-
-    u: Floats
-    pressure: Floats
-    active: Bools
-    iterations: int
-
-
 def lip_space(problem: Problem, model: Model, c: int) -> Multipliers:
     """Where pressures live: groups of multipliers, or the lip points one by one."""
     lips = model.lips[c]
-    if problem.numerics.lips in ("penalty", "nitsche"):
+    if problem.numerics.comparison.lips in ("penalty", "nitsche"):
         each = sp.csr_matrix(sp.identity(len(lips), format="csr"))
         return Multipliers(c, each, lips.weight, lips.x)
     return multipliers(model.space, c, lips, problem.numerics.multipliers, model.known.fixed)
 
 
-def held_lips(
+def solve_alternative(
     problem: Problem,
     model: Model,
     engine: System,
     chosen: Sequence[Multipliers],
     f: Floats,
     known: Floats,
-    start: Sequence[Bools],
+    start: Sequence[Bools | None],
+    closed: bool,
     acting: Sequence[tuple[tuple[Load, ...], float]],
-) -> Held:
-    """Solve all load states by the method that `Numerics.lips` names.
+) -> list[StateContact]:
+    """Solve all load states by the method that `Comparison.lips` names.
 
     Parameters
     ----------
@@ -84,10 +66,12 @@ def held_lips(
     chosen : sequence of Multipliers
         Of the cracks that need contact, from `lip_space`.
     f, known : (n_dof, states) arrays
-    start : sequence of (g,) arrays of bool
+    start : sequence of (g,) arrays of bool or None
         First guess of each state's closed set.
+    closed : bool
+        State of all rows where there is no guess.
     acting : sequence of (loads, factor)
-        Loads of each state and their scale: Nitsche counts pressures that are given on the lips,
+        Loads of each state and their scale: Nitsche counts pressures that are given on the faces,
         and initial stress.
 
     Raises
@@ -95,43 +79,26 @@ def held_lips(
     ConvergenceError
         A set or multipliers that do not settle; a penalty so small that Nitsche is unstable.
     """
-    method = problem.numerics.lips
+    method = problem.numerics.comparison.lips
     rows, springs = _springs(problem, model, engine, chosen)
     measure, eps = rows.measure, rows.eps
-    u, pressure, active, iterations = [], [], [], 0
+    states = []
     for k in range(f.shape[1]):
         load, r = f[:, k], np.zeros(len(eps))
+        first = start[k]
+        guess = np.full(len(eps), closed) if first is None else first
         if method == "augmented":
-            found = _augmented(springs, load, known[:, k], start[k], eps, measure)
+            u, pressure, sets = _augmented(springs, load, known[:, k], guess, eps, measure)
         else:
             if method == "nitsche":
                 loads, factor = acting[k]
                 r = np.concatenate([_steady(model, m.crack, loads, factor) for m in chosen])
                 load = load + rows.stress.T @ (measure / eps * r)
-            state = _newton(springs, load, known[:, k], r, start[k])
-            found = state.u, np.maximum(-state.residual * _unit(method, eps), 0.0), state.sets
-        u.append(found[0])
-        pressure.append(found[1])
-        active.append(found[1] > 0)
-        iterations = max(iterations, found[2])
-    return Held(np.stack(u, axis=1), np.stack(pressure, axis=1), np.stack(active), iterations)
-
-
-def closed_matrix(
-    problem: Problem, model: Model, engine: System, chosen: Sequence[Multipliers]
-) -> sp.csc_matrix:
-    """The matrix that is factored where the lips of the chosen cracks are closed all along.
-
-    Parameters
-    ----------
-    problem : Problem
-    model : Model
-    engine : System
-    chosen : sequence of Multipliers
-        From `lip_space`.
-    """
-    springs = _springs(problem, model, engine, chosen)[1]
-    return springs.closed(np.ones(len(springs.c), dtype=bool))
+            state = _newton(springs, load, known[:, k], r, guess)
+            u, sets = state.u, state.sets
+            pressure = np.maximum(-state.residual * _unit(method, eps), 0.0)
+        states.append(StateContact(pressure, rows.jump @ u, pressure > 0, sets, u))
+    return states
 
 
 def _steady(model: Model, c: int, loads: tuple[Load, ...], factor: float) -> Floats:
@@ -154,18 +121,18 @@ class _Rows:
 
 
 def _rows(problem: Problem, model: Model, m: Multipliers) -> _Rows:
-    numerics, c = problem.numerics, m.crack
+    method, c = problem.numerics.comparison, m.crack
     lips, jump = model.lips[c], model.jumps[c]
     size = _size(model, lips)
     stress = sp.csr_matrix((len(m.measure), model.space.n_dof))
-    if numerics.lips == "augmented":
+    if method.lips == "augmented":
         size = np.asarray(m.values.T @ (lips.weight * size)) / m.measure
         jump = gap_rows(m, lips, jump)
-    elif numerics.lips == "nitsche":
+    elif method.lips == "nitsche":
         mean = averaging(model.space, lips)
         size = np.minimum(size, tip_distance(model.space, c, lips))
         stress = sp.csr_matrix(mean @ stress_matrix(model.space, problem.material, c, lips))
-    factor = FACTORS[numerics.lips] if numerics.penalty is None else numerics.penalty
+    factor = FACTORS[method.lips] if method.penalty is None else method.penalty
     return _Rows(jump, stress, factor * problem.material.E / size, m.measure)
 
 
@@ -211,9 +178,9 @@ def _springs(
     )
     K, basis, reduced = engine.matrix, engine.basis, engine.reduced
     c, R = rows.eps * rows.measure, rows.jump
-    if problem.numerics.lips == "augmented":
+    if problem.numerics.comparison.lips == "augmented":
         c = rows.eps / rows.measure
-    elif problem.numerics.lips == "nitsche":
+    elif problem.numerics.comparison.lips == "nitsche":
         c = rows.measure / rows.eps
         R = sp.csr_matrix(rows.stress + sp.diags(rows.eps) @ rows.jump)
         own = sp.csr_matrix(rows.stress @ basis)
@@ -255,8 +222,8 @@ def _newton(springs: _Springs, f: Floats, known: Floats, r: Floats, start: Bools
         u, active = new, gap < -floor
     raise ConvergenceError(
         f"contact: after {sets} sets of {len(c)} places the set of closed ones still changes. Give "
-        "another Numerics(penalty=...): less where lips are held by a penalty, more for Nitsche's "
-        'method; or take lips="multipliers".'
+        "another Comparison(penalty=...): less for a penalty, more for Nitsche's method; or take "
+        'lips="multipliers".'
     )
 
 
@@ -289,5 +256,5 @@ def _augmented(
             return state.u, lam, sets
     raise ConvergenceError(
         f"contact: after {_MAX_UPDATES} updates the multipliers still change by {change:.3g}, "
-        f"where the largest is {lam.max():.3g}. Give a larger Numerics(penalty=...)."
+        f"where the largest is {lam.max():.3g}. Give a larger Comparison(penalty=...)."
     )

@@ -1,13 +1,15 @@
-"""Pressure, gap and state on the lips of one crack."""
+"""Contact of crack faces (lips): on one crack in one state, and of all cracks in all states."""
 
 from dataclasses import dataclass
 
 from xcrack.arrays import Bools, Floats
+from xcrack.contact.multipliers import Multipliers
+from xcrack.solvers.reuse import Reuse
 
 
 @dataclass(frozen=True, eq=False)
 class Contact:
-    """Contact on the whole lip of one crack, at its integration points.
+    """Contact on all faces of one crack in one load state, at their integration points.
 
     Attributes
     ----------
@@ -32,3 +34,30 @@ class Contact:
     gap: Floats
     closed: Bools
     s: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class ContactSolution:
+    """Displacements and contact pressures of all load states.
+
+    Attributes
+    ----------
+    u : (n_dof, states) array, length
+    spaces : tuple of Multipliers or None
+        One entry a crack; None for a crack without multipliers.
+    pressure : tuple of (g, states) arrays or None
+    active : tuple of (states, g) arrays of bool or None
+    sets : int
+        Closed sets tried in the worst state.
+    """
+
+    u: Floats
+    spaces: tuple[Multipliers | None, ...]
+    pressure: tuple[Floats | None, ...]
+    active: tuple[Bools | None, ...]
+    sets: int
+
+    def closed_sets(self) -> Reuse:
+        """Closed sets by place, for the next solve."""
+        centre = tuple(None if m is None else m.centre for m in self.spaces)
+        return Reuse(centre, self.active)

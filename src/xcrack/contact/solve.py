@@ -1,66 +1,38 @@
-"""Which cracks need multipliers, and the pressures on their lips in all load states."""
+"""Which cracks need multipliers, and the pressures on their faces in all load states."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import cast
 
 import numpy as np
 import scipy.sparse as sp
 
 from xcrack.arrays import Bools, Floats, lock
-from xcrack.contact.active_set import active_set
-from xcrack.contact.alternatives import Held, held_lips, lip_space
 from xcrack.contact.multipliers import Multipliers, gap_rows, multipliers
-from xcrack.contact.result import Contact
-from xcrack.contact.warm_start import Warm
+from xcrack.contact.result import Contact, ContactSolution
 from xcrack.scene.conditions import Load
 from xcrack.scene.problem import Problem
 from xcrack.solvers.direct import System
-from xcrack.solvers.iterative import IterativeSystem
+from xcrack.solvers.engine import ContactRows, Engine, StateContact
+from xcrack.solvers.reuse import Reuse
 from xcrack.xfem.model import Model
 
-_OVERLAP = 1e-9  # share of the largest displacement by which lips must overlap to need contact
-_ROUGH = 0.02  # residual of a first solution that only shows which lips overlap
-_BLOCK = 16  # right-hand sides solved at once for the dual matrix; bounds the memory
+Acting = Sequence[tuple[tuple[Load, ...], float]]
+
+_OVERLAP = 1e-9  # share of the largest displacement by which faces must overlap to need contact
 
 
-@dataclass(frozen=True, eq=False)
-class Pressed:
-    """Pressures on the lips in all load states.
-
-    Attributes
-    ----------
-    u : (n_dof, states) array, length
-    spaces : tuple of Multipliers or None
-        One entry a crack.
-    pressure : tuple of (g, states) arrays or None
-    active : tuple of (states, g) arrays of bool or None
-    warm : Warm
-        What the next step may start from.
-    iterations : int
-        Sets tried in the worst state.
-    """
-
-    u: Floats
-    spaces: tuple[Multipliers | None, ...]
-    pressure: tuple[Floats | None, ...]
-    active: tuple[Bools | None, ...]
-    warm: Warm
-    iterations: int
-
-
-def contact(
+def solve_contact(
     problem: Problem,
     model: Model,
-    engine: System | IterativeSystem,
+    engine: Engine,
     f: Floats,
     known: Floats,
-    warm: Warm | None,
-    acting: Sequence[tuple[tuple[Load, ...], float]],
-) -> Pressed:
-    """Solve, and give multipliers to cracks whose lips overlap, until none does.
+    reuse: Reuse,
+    acting: Acting,
+) -> ContactSolution:
+    """Solve, and give multipliers to cracks whose faces overlap, until none does.
 
-    Conjugate gradients spend as few steps as they can on lips that are not to overlap: a crack
+    Conjugate gradients spend as few steps as they can on faces that are not to overlap: a crack
     that was closed in the step before gets its multipliers at once, and without any such crack
     the first solution is a rough one, made exact where nothing overlaps.
 
@@ -68,118 +40,89 @@ def contact(
     ----------
     problem : Problem
     model : Model
-    engine : System or IterativeSystem
+    engine : Engine
     f, known : (n_dof, states) arrays
         Loads, and displacements that supports impose.
-    warm : Warm, optional
+    reuse : Reuse
         Of an earlier step.
     acting : sequence of (loads, factor)
-        Loads of each state and their scale, for Nitsche's method: what acts on the lips besides.
+        Loads of each state and their scale: some alternatives to multipliers need what acts on
+        the faces besides.
     """
     n = len(model.lips)
     spaces: list[Multipliers | None] = [None] * n
     pressure: list[Floats | None] = [None] * n
     active: list[Bools | None] = [None] * n
-    iterations = 0
-    open_u, pending = _first(problem, model, engine, f, known, warm)
-    expected = pending if open_u is None else []
-    u = open_u
+    expected: list[int] = []
+    sets = 0
+    if problem.contact == "off":
+        u: Floats | None = engine.solve(f, known)
+        pending: list[int] = []
+    else:
+        closed = [c for c in range(n) if len(model.lips[c]) and reuse.was_closed(c)]
+        u, exact = engine.first_look(f, known, bool(closed))
+        if u is None:
+            pending = expected = closed
+        else:
+            pending = _needing(problem, model, u, spaces)
+            if not pending and not exact:
+                u = engine.solve(f, known, u)
+                pending = _needing(problem, model, u, spaces)
+    opened = u
     while pending:
         for c in pending:
-            spaces[c] = lip_space(problem, model, c)
+            spaces[c] = _space(problem, model, c)
         chosen = [m for m in spaces if m is not None]
-        if problem.numerics.lips == "multipliers":
-            held = _by_multipliers(problem, model, engine, chosen, f, known, (u, open_u), warm)
-        else:
-            start = [_start(problem, chosen, warm, k) for k in range(f.shape[1])]
-            assert isinstance(engine, System)  # Numerics and solving see to it
-            held = held_lips(problem, model, engine, chosen, f, known, start, acting)
-        u, iterations = held.u, held.iterations
+        states = _solve_states(problem, model, engine, chosen, f, known, (u, opened), reuse, acting)
+        u = np.stack([cast(Floats, state.u) for state in states], axis=1)
+        sets = max(state.sets for state in states)
         first = 0
         for m in chosen:
             last = first + len(m.measure)
-            pressure[m.crack] = held.pressure[first:last]
-            active[m.crack] = held.active[:, first:last]
+            pressure[m.crack] = np.stack([s.pressure[first:last] for s in states], axis=1)
+            active[m.crack] = np.stack([s.active[first:last] for s in states])
             first = last
         pending = _needing(problem, model, u, spaces)
-    assert u is not None
+    assert u is not None  # of the first look, or of the loop that it made begin
     for c in expected:
-        states = active[c]
-        if states is not None and not states.any() and problem.contact != "on":
+        ever = active[c]
+        if ever is not None and not ever.any() and problem.contact != "on":
             spaces[c] = pressure[c] = active[c] = None
-    centre = tuple(None if m is None else m.centre for m in spaces)
-    return Pressed(
-        u, tuple(spaces), tuple(pressure), tuple(active), Warm(centre, tuple(active)), iterations
-    )
+    return ContactSolution(u, tuple(spaces), tuple(pressure), tuple(active), sets)
 
 
-def _by_multipliers(
+def _solve_states(
     problem: Problem,
     model: Model,
-    engine: System | IterativeSystem,
+    engine: Engine,
     chosen: list[Multipliers],
     f: Floats,
     known: Floats,
     guess: tuple[Floats | None, Floats | None],
-    warm: Warm | None,
-) -> Held:
-    """Pressures of all load states by multipliers; `guess` is the last u and that of open lips."""
-    u, open_u = guess
+    reuse: Reuse,
+    acting: Acting,
+) -> list[StateContact]:
+    """Contact of all load states; `guess` is the latest u and that of open faces."""
+    closed = problem.numerics.initial_set == "closed"
+    start = [_start(chosen, reuse, k, closed) for k in range(f.shape[1])]
+    if problem.numerics.comparison.lips != "multipliers":
+        from xcrack.contact.alternatives import solve_alternative
+
+        # These change the matrix itself, for which `solve` takes a factorisation always.
+        system = cast(System, engine)
+        return solve_alternative(problem, model, system, chosen, f, known, start, closed, acting)
     rows = [gap_rows(m, model.lips[m.crack], model.jumps[m.crack]) for m in chosen]
-    N = rows[0] if len(rows) == 1 else _stacked(rows)
+    N = rows[0] if len(rows) == 1 else sp.csr_matrix(sp.vstack(rows))
     measure = np.concatenate([m.measure for m in chosen])
-    states = range(f.shape[1])
-    stiffness = problem.material.E / _lip_size(model, chosen)
-    if isinstance(engine, IterativeSystem):
-        # Without an earlier set the overlap of the open lips is the best guess.
-        first = [None if warm is None else _start(problem, chosen, warm, k) for k in states]
-        sets: list[Any] = engine.contact(N, f, known, measure, stiffness, first, u)
-        u = np.stack([s.u for s in sets], axis=1)
-        lam = np.stack([s.pressure for s in sets], axis=1)
-    else:
-        F = dual(engine, N)
-        assert open_u is not None
-        d = N @ open_u
-        sets = [
-            active_set(F, d[:, k], measure, stiffness, _start(problem, chosen, warm, k))
-            for k in states
-        ]
-        lam = np.stack([s.pressure for s in sets], axis=1)
-        u = engine.solve(f + N.T @ lam, known)
-    return Held(u, lam, np.stack([s.active for s in sets]), max(s.iterations for s in sets))
-
-
-def _first(
-    problem: Problem,
-    model: Model,
-    engine: System | IterativeSystem,
-    f: Floats,
-    known: Floats,
-    warm: Warm | None,
-) -> tuple[Floats | None, list[int]]:
-    """Displacements with open lips, if they were needed, and the cracks that need contact."""
-    none: list[Multipliers | None] = [None] * len(model.lips)
-    if isinstance(engine, IterativeSystem) and problem.contact != "off":
-        closed = [] if warm is None else [c for c in range(len(none)) if warm.closed(c)]
-        closed = [c for c in closed if len(model.lips[c])]
-        if closed:
-            return None, closed
-        u = engine.solve(f, known, tolerance=_ROUGH)
-        pending = _needing(problem, model, u, none)
-        if pending:
-            return u, pending
-        u = engine.solve(f, known, u)
-    else:
-        u = engine.solve(f, known)
-    return u, _needing(problem, model, u, none)
+    stiffness = problem.material.E / _face_size(model, chosen)
+    conditions = ContactRows(N, measure, stiffness, closed)
+    return engine.contact(conditions, f, known, start, *guess)
 
 
 def _needing(
     problem: Problem, model: Model, u: Floats, spaces: Sequence[Multipliers | None]
 ) -> list[int]:
-    """Cracks without multipliers whose lips overlap in some load state."""
-    if problem.contact == "off":
-        return []
+    """Cracks without multipliers whose faces overlap in some load state."""
     needing = []
     for c, lips in enumerate(model.lips):
         if spaces[c] is not None or not len(lips):
@@ -191,63 +134,57 @@ def _needing(
         limit = -_OVERLAP * np.abs(u[: model.space.n_nodes * model.space.dim]).max(axis=0)
         if (gap.min(axis=0) >= limit).all():
             continue
-        trial = _multipliers(problem, model, c)
+        trial = multipliers(model.space, c, lips, problem.numerics.multipliers, model.known.fixed)
         weak = (trial.values.T @ (lips.weight[:, None] * gap)) / trial.measure[:, None]
         if (weak.min(axis=0) < limit).any():
             needing.append(c)
     return needing
 
 
-def _multipliers(problem: Problem, model: Model, c: int) -> Multipliers:
+def _space(problem: Problem, model: Model, c: int) -> Multipliers:
+    """Where the pressures of a crack live."""
+    if problem.numerics.comparison.lips != "multipliers":
+        from xcrack.contact.alternatives import lip_space
+
+        return lip_space(problem, model, c)
     kind = problem.numerics.multipliers
     return multipliers(model.space, c, model.lips[c], kind, model.known.fixed)
 
 
-def _stacked(rows: list[Any]) -> Any:
-
-    return sp.csr_matrix(sp.vstack(rows))
-
-
-def dual(engine: System, N: Any) -> Floats:
-    """F = N K^-1 N^T, in blocks of right-hand sides."""
-    F = np.empty((N.shape[0], N.shape[0]))
-    for first in range(0, N.shape[0], _BLOCK):
-        rhs = N[first : first + _BLOCK].T.toarray()
-        F[:, first : first + _BLOCK] = N @ engine.solve(rhs)
-    return (F + F.T) / 2
-
-
-def _start(problem: Problem, chosen: list[Multipliers], warm: Warm | None, k: int) -> Bools:
-    closed = problem.numerics.initial_set == "closed"
+def _start(chosen: list[Multipliers], reuse: Reuse, k: int, closed: bool) -> Bools | None:
+    """Closed set that state k starts from; None where no step came before."""
+    if not reuse.centre:
+        return None
     parts = []
     for m in chosen:
-        start = None if warm is None else warm.start(m, k)
-        parts.append(np.full(len(m.measure), closed) if start is None else start)
+        before = reuse.start(m.crack, m.centre, k)
+        parts.append(np.full(len(m.measure), closed) if before is None else before)
     return np.concatenate(parts)
 
 
-def _lip_size(model: Model, chosen: list[Multipliers]) -> float:
+def _face_size(model: Model, chosen: list[Multipliers]) -> float:
     cells = np.unique(np.concatenate([model.lips[m.crack].cell.ravel() for m in chosen]))
     return float(model.space.mesh.cell_size[cells].mean())
 
 
-def contact_of(model: Model, found: Pressed, u: Floats, k: int) -> tuple[Contact | None, ...]:
+def contact_of(
+    model: Model, solution: ContactSolution, u: Floats, k: int
+) -> tuple[Contact | None, ...]:
     """Contact of each crack in state k, None where it has no multipliers."""
     result: list[Contact | None] = []
     for c, lips in enumerate(model.lips):
-        m, lam, active = found.spaces[c], found.pressure[c], found.active[c]
-        if m is None or lam is None or active is None:
+        m, pressure, active = solution.spaces[c], solution.pressure[c], solution.active[c]
+        if m is None or pressure is None or active is None:
             result.append(None)
             continue
-        gap = model.jumps[c] @ u
         closed = np.asarray(m.values @ active[k].astype(float)) >= 0.5
         result.append(
             Contact(
                 lips.x,
                 lips.normal,
                 lips.weight,
-                lock(np.asarray(m.values @ lam[:, k])),
-                lock(np.asarray(gap)),
+                lock(np.asarray(m.values @ pressure[:, k])),
+                lock(np.asarray(model.jumps[c] @ u)),
                 lock(closed),
                 lips.s,
             )

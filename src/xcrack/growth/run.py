@@ -28,6 +28,7 @@ from xcrack.growth.step import Cycle, Memory, Step
 from xcrack.scene.problem import Problem
 from xcrack.sif.interaction_2d import stress_intensities
 from xcrack.sif.sif import SIF
+from xcrack.solvers.reuse import Reuse
 
 _SPACING = 0.5  # of a cell, between the points of a new front in space
 _LEAST_IN_SPACE = 0.02  # of a cell: neighbours along a front move on, so a slow part has to follow
@@ -163,11 +164,12 @@ def grow(
 
 def steps_of(run: Run, last: Step | None = None) -> Generator[Step, None, str]:
     """Steps of a run: from the beginning, or those that follow a step."""
-    bulk: Any = None
     warned = False
     if last is None:
-        last, bulk = _next_step(run, run.problem, None, bulk)
+        last, reuse = _next_step(run, run.problem, None, None)
         yield last
+    else:
+        reuse = memory_of(last).reuse
     while True:
         memory = memory_of(last)
         ended = _stop(run, last)
@@ -196,7 +198,7 @@ def steps_of(run: Run, last: Step | None = None) -> Generator[Step, None, str]:
         if not any(placed.n_tips for placed in problem.placed):
             return _said(run, left)
         try:
-            last, bulk = _next_step(run, problem, last, bulk)
+            last, reuse = _next_step(run, problem, last, reuse)
         except GeometryError as error:
             return _said(run, f"the cracks cannot go on after step {last.index}: {error}")
         except XcrackError as error:
@@ -210,12 +212,12 @@ def _next_step(
     run: Run,
     problem: Problem,
     last: Step | None,
-    bulk: Any,
-) -> tuple[Step, Any]:
+    reuse: Reuse | None,
+) -> tuple[Step, Reuse]:
     """Solve all load states of a problem and decide where and how fast its cracks grow."""
     before = None if last is None else memory_of(last)
     cracks = problem.placed
-    solutions, sif = respond(problem, run, bulk, None if before is None else before.warm)
+    solutions, sif = respond(problem, run, reuse)
     nu = run.problem.material.nu
     angle, dK_eq, R, law_rates = [], [], [], []
     for c in range(len(cracks)):
@@ -239,8 +241,10 @@ def _next_step(
         since, pending = followed(last, cracks, sif[0], law_rates, length, problem.mesh)
         n_cycles = last.cycles + since
     plan = _plan(run, sif[0], rate, tuple(dK_eq), pending)
-    warm = solutions[0].warm
-    memory = Memory(tuple(law_rates), length, plan.pending, radius, warm, settings)
+    handed_on = solutions[0].reuse
+    memory = Memory(
+        tuple(law_rates), length, plan.pending, radius, handed_on.without_matrices(), settings
+    )
     step = Step(
         index=index,
         cycles=n_cycles,
@@ -255,7 +259,7 @@ def _next_step(
         memory=memory,
     )
     _report(run, step)
-    return step, solutions[0].bulk
+    return step, handed_on
 
 
 def _problem(run: Run, cracks: Sequence[Crack], memory: Memory) -> Problem:
@@ -290,12 +294,10 @@ def _gone(moved: Sequence[Crack], placed: Sequence[Crack]) -> list[tuple[int, in
 
 
 def respond(
-    problem: Problem, run: Run, bulk: Any, warm: Any
+    problem: Problem, run: Run, reuse: Reuse | None
 ) -> tuple[tuple[Solution, ...], tuple[tuple[SIF, ...], ...]]:
     """Solutions of all load states, and K of each crack in each of them."""
-    solutions = solve_states(
-        problem, run.cycle.load_states, bulk=bulk, warm=warm, solver=run.solver
-    )
+    solutions = solve_states(problem, run.cycle.load_states, reuse=reuse, solver=run.solver)
     by_crack = [stress_intensities(solutions, c) for c in range(len(problem.cracks))]
     return tuple(solutions), tuple(zip(*by_crack, strict=True))
 

@@ -11,6 +11,7 @@ from xcrack.crack.crack import Crack
 from xcrack.errors import ProblemError
 from xcrack.growth.advance import PerCrack
 from xcrack.sif.sif import SIF
+from xcrack.solvers.reuse import Reuse
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,8 +73,8 @@ class Memory:
         Growth too short to be modelled yet.
     radius : float, length, or None
         Enriched radius of the first step.
-    warm : anything that `store` can store
-        What the solver starts the next contact iteration from.
+    reuse : Reuse
+        What the next solve starts from, without matrices.
     settings : mapping of str to str
         What the run was asked to do.
     """
@@ -82,7 +83,7 @@ class Memory:
     length: tuple[float, ...]
     pending: PerCrack
     radius: float | None
-    warm: Any
+    reuse: Reuse
     settings: Mapping[str, str]
 
 

@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 
-from xcrack.contact.warm_start import Warm
 from xcrack.crack.crack import Crack
 from xcrack.errors import ProblemError
 from xcrack.growth.fingerprint import DEFAULTS, differences
@@ -21,12 +20,13 @@ from xcrack.growth.step import Memory, Step
 from xcrack.history.store import load, save, write_whole
 from xcrack.sif.sif import SIF
 from xcrack.solvers.factor import Elimination
+from xcrack.solvers.reuse import Reuse
 
 _HEADER = "run.json"
 _FORMAT = 2
 _SHOWN = 5
 CLASSES: dict[str, type] = {
-    "Step": Step, "Memory": Memory, "Warm": Warm, "Elimination": Elimination, "Crack": Crack,
+    "Step": Step, "Memory": Memory, "Reuse": Reuse, "Elimination": Elimination, "Crack": Crack,
     "SIF": SIF,
 }  # fmt: skip
 
@@ -172,11 +172,11 @@ def read_steps(folder: Path, settings: Mapping[str, str]) -> tuple[list[Step], P
 
 
 def _order_of(memory: Memory | None) -> Elimination | None:
-    return memory.warm.elimination if memory and isinstance(memory.warm, Warm) else None
+    return memory.reuse.elimination if memory else None
 
 
 def _with_order(memory: Memory, order: Elimination) -> Memory:
-    return replace(memory, warm=replace(memory.warm, elimination=order))
+    return replace(memory, reuse=replace(memory.reuse, elimination=order))
 
 
 def remove_steps(folder: Path, begin: int) -> None:

@@ -1,8 +1,69 @@
 """Everything that is method, not scene, in one place."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
+from functools import wraps
+from typing import Any
 
 from xcrack.errors import ProblemError
+from xcrack.inputs import number, whole
+
+
+def _check_choices(given: object, **choices: tuple[object, ...]) -> None:
+    """Raise where a field has none of its values; 1 is not True."""
+    for name, allowed in choices.items():
+        value = getattr(given, name)
+        if not any(type(value) is type(a) and value == a for a in allowed):
+            words = " or ".join(repr(a) for a in allowed)
+            raise ProblemError(f"{type(given).__name__}({name}={value!r:.80}): give {words}.")
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Methods that xcrack does not use, to compare it with; reachable only through `Numerics`.
+
+    Parameters
+    ----------
+    tip_basis : {"scalar", "vectorial"}
+        Unknowns of a point with tip functions. Scalar: one for each function and component.
+        Vectorial: one a mode, two in 2D and three in 3D, the leading fields of K_I to K_III; fewer
+        unknowns, but nothing beside the modes.
+    update : {"explicit", "nodal"}
+        Where the level sets of a crack in 2D come from. Explicit: distances to its polyline.
+        Nodal: stored at the nodes and changed by the frame of each advance (after Duflot, 2007);
+        it loses cracks that turn by more than about 120 degrees.
+    lips : {"multipliers", "penalty", "augmented", "nitsche"}
+        What prevents crack faces from overlapping. The alternatives to multipliers need a
+        factorisation. Penalty: a spring at each point of the faces that overlaps. Augmented: an
+        augmented Lagrangian, whose multipliers live in the space that `Numerics.multipliers` names
+        and are updated until they stay. Nitsche: the stress of the faces instead of multipliers,
+        with a penalty that makes it stable (symmetric).
+    penalty : float, optional
+        Stiffness of the springs per area of crack face, as a factor of E over the size of a cell.
+        None: 100 (penalty), 10 (augmented), 40 (nitsche). The overlap of a penalty falls with it,
+        and the pressure starts to oscillate; an augmented Lagrangian takes fewer updates; Nitsche
+        is unstable below a bound that depends on order and cells.
+
+    Raises
+    ------
+    ProblemError
+        A word or number that is not one of these.
+    """
+
+    tip_basis: str = "scalar"
+    update: str = "explicit"
+    lips: str = "multipliers"
+    penalty: float | None = None
+
+    def __post_init__(self) -> None:
+        _check_choices(
+            self,
+            tip_basis=("scalar", "vectorial"),
+            update=("explicit", "nodal"),
+            lips=("multipliers", "penalty", "augmented", "nitsche"),
+        )
+        if self.penalty is not None:
+            number(self.penalty, "Comparison: penalty", above=0)
 
 
 @dataclass(frozen=True)
@@ -21,28 +82,9 @@ class Numerics:
         another front, from 2.6 to 3.6 cells; two cells at order 2.
     functions : {4, 2}
         Tip functions; two (those of the modes' leading angular terms) cost accuracy.
-    tip_basis : {"scalar", "vectorial"}
-        Unknowns of a point with tip functions. Scalar: one for each function and component.
-        Vectorial: one a mode, two in the plane and three in space, the leading fields of K_I to
-        K_III; fewer unknowns, but nothing beside the modes. For comparison.
-    update : {"explicit", "nodal"}
-        Where the level sets of a crack in the plane come from. Explicit: distances to its
-        polyline. Nodal: kept at the nodes and changed by the frame of each advance (after Duflot,
-        2007); for comparison only, it loses cracks that turn by more than about 120 degrees.
     multipliers : {"reduced", "naive"}
         Space of the contact multipliers. Reduced: inf-sup stable for any cut. Naive: one unknown
         for each node, for comparison only; it oscillates.
-    lips : {"multipliers", "penalty", "augmented", "nitsche"}
-        What keeps the lips apart. The others are opponents of the multipliers, for comparison, and
-        need a factorisation. Penalty: a spring at each lip point that overlaps. Augmented: an
-        augmented Lagrangian, whose multipliers live in the space that `multipliers` names and are
-        updated until they stay. Nitsche: the stress of the lips in the place of multipliers, with
-        a penalty that keeps it stable (symmetric).
-    penalty : float, optional
-        Stiffness of the springs per area of lip, as a factor of E over the size of a cell. None:
-        100 (penalty), 10 (augmented), 40 (nitsche). The overlap of a penalty falls with it, and
-        the pressure starts to oscillate; an augmented Lagrangian takes fewer updates; Nitsche is
-        unstable below a bound that depends on order and cells.
     consistent : bool
         Correct the gradients of the tip functions so that linear stress fields pass the patch
         test to round-off whatever the quadrature (variationally consistent integration). In space
@@ -70,7 +112,9 @@ class Numerics:
         `orthonormal` and `patch`: it has its own basis, orthonormal node by node, at order 2 star
         by star.
     initial_set : {"closed", "open"}
-        State of the lips that the contact iteration starts from where nothing is known.
+        State of the crack faces that the contact iteration starts from where nothing is known.
+    comparison : Comparison
+        Methods to compare with.
 
     Raises
     ------
@@ -81,11 +125,7 @@ class Numerics:
     enrichment: str = "geometric"
     radius: float | None = None
     functions: int = 4
-    tip_basis: str = "scalar"
-    update: str = "explicit"
     multipliers: str = "reduced"
-    lips: str = "multipliers"
-    penalty: float | None = None
     consistent: bool = True
     orthonormal: str = "star"
     patch: bool = False
@@ -93,38 +133,75 @@ class Numerics:
     domain: float | None = None
     linear: str = "auto"
     initial_set: str = "closed"
+    comparison: Comparison = Comparison()
 
     def __post_init__(self) -> None:
-        choices: dict[str, tuple[object, ...]] = {
-            "enrichment": ("geometric", "topological"),
-            "functions": (4, 2),
-            "tip_basis": ("scalar", "vectorial"),
-            "update": ("explicit", "nodal"),
-            "multipliers": ("reduced", "naive"),
-            "lips": ("multipliers", "penalty", "augmented", "nitsche"),
-            "orthonormal": ("star", "node", "none"),
-            "linear": ("auto", "direct", "iterative"),
-            "initial_set": ("closed", "open"),
-        }
-        for name, allowed in choices.items():
-            if getattr(self, name) not in allowed:
-                words = " or ".join(repr(a) for a in allowed)
-                raise ProblemError(f"Numerics({name}={getattr(self, name)!r}): give {words}.")
-        if self.tip_basis == "vectorial" and self.functions != 4:
+        _check_choices(
+            self,
+            enrichment=("geometric", "topological"),
+            functions=(4, 2),
+            multipliers=("reduced", "naive"),
+            orthonormal=("star", "node", "none"),
+            linear=("auto", "direct", "iterative"),
+            initial_set=("closed", "open"),
+            consistent=(True, False),
+            patch=(True, False),
+        )
+        for name in ("radius", "domain"):
+            if getattr(self, name) is not None:
+                number(getattr(self, name), f"Numerics: {name}", above=0)
+        whole(self.points, "Numerics: points", least=2, most=32)
+        if not isinstance(self.comparison, Comparison):
             raise ProblemError(
-                'Numerics(tip_basis="vectorial") combines all four tip functions: leave '
+                f"Numerics: comparison = {self.comparison!r}: give Comparison(lips=...)."
+            )
+        if self.comparison.tip_basis == "vectorial" and self.functions != 4:
+            raise ProblemError(
+                'Comparison(tip_basis="vectorial") combines all four tip functions: leave '
                 f"functions = {self.functions} out."
             )
-        for name in ("radius", "domain"):
-            value = getattr(self, name)
-            if value is not None and not (value > 0 and value < float("inf")):
-                raise ProblemError(f"Numerics({name}={value}): a length must be positive.")
-        if self.penalty is not None and not 0 < self.penalty < float("inf"):
-            raise ProblemError(f"Numerics(penalty={self.penalty}): a stiffness must be positive.")
-        if self.lips != "multipliers" and self.linear == "iterative":
+        if self.comparison.lips != "multipliers" and self.linear == "iterative":
             raise ProblemError(
-                f'Numerics(lips="{self.lips}", linear="iterative"): conjugate gradients know '
-                'multipliers only; give linear="direct", or leave lips out.'
+                f'Comparison(lips="{self.comparison.lips}") with linear="iterative": conjugate '
+                'gradients know multipliers only; give linear="direct", or leave lips out.'
             )
-        if not 2 <= self.points <= 32:
-            raise ProblemError(f"Numerics(points={self.points}): give 2 to 32 points a direction.")
+
+
+def _name_moved(cls: type) -> None:
+    """Let keywords that have moved to `Comparison` say so instead of being unknown."""
+    make = cls.__init__  # type: ignore[misc]
+    moved = [field.name for field in fields(Comparison)]
+
+    @wraps(make)
+    def checked(self: object, *values: object, **named: object) -> None:
+        for name in moved:
+            if name in named:
+                raise ProblemError(
+                    f"Numerics({name}=...) is for comparison with other methods: give "
+                    f"Numerics(comparison=Comparison({name}={named[name]!r}))."
+                )
+        make(self, *values, **named)
+
+    cls.__init__ = checked  # type: ignore[misc]
+
+
+_name_moved(Numerics)
+
+
+def with_choices(numerics: Numerics, choices: Mapping[str, Any]) -> Numerics:
+    """Other choices of method by name, those of `Comparison` among them.
+
+    Parameters
+    ----------
+    numerics : Numerics
+    choices : mapping of name to value
+    """
+    inner = {field.name for field in fields(Comparison)} & set(choices)
+    outer = {name: value for name, value in choices.items() if name not in inner}
+    if inner:
+        own = {name: choices[name] for name in inner}
+        outer["comparison"] = replace(numerics.comparison, **own)
+    return replace(numerics, **outer)
+
+
+__all__ = ["Comparison", "Numerics", "with_choices"]

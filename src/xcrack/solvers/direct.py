@@ -1,7 +1,7 @@
 """Linear systems: supports eliminated, a well-conditioned basis, one factor for all states."""
 
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
 from importlib.util import find_spec
 
 import numpy as np
@@ -11,6 +11,7 @@ from xcrack.arrays import Bools, Floats, Ints
 from xcrack.errors import ConvergenceError, ProblemError
 from xcrack.scene.material import Isotropic
 from xcrack.scene.numerics import Numerics
+from xcrack.solvers.active_set import active_set
 from xcrack.solvers.basis import (
     function_nodes,
     node_blocks,
@@ -18,9 +19,13 @@ from xcrack.solvers.basis import (
     patch_orthogonal,
     restricted,
 )
+from xcrack.solvers.engine import ContactRows, Count, StateContact
 from xcrack.solvers.factor import Elimination, Solve, eliminated
 from xcrack.solvers.modal_basis import mode_columns
+from xcrack.solvers.reuse import Reuse
 from xcrack.xfem.function_space import Space
+
+_BLOCK = 16  # right-hand sides solved at once for the dual matrix; bounds the memory
 
 Solver = Callable[[sp.csc_matrix], Solve]
 
@@ -52,14 +57,6 @@ def pardiso(A: sp.csc_matrix) -> Solve:
     return lambda b: np.asarray(solver.solve(upper, np.ascontiguousarray(b)))
 
 
-@dataclass
-class Count:
-    """Operations of a run, counted for its report."""
-
-    factorisations: int = 0
-    solves: int = 0
-
-
 @dataclass(frozen=True, eq=False)
 class System:
     """A factored system.
@@ -83,19 +80,68 @@ class System:
     apply_inverse: Solve
     count: Count = field(default_factory=Count)
     elimination: Elimination | None = None
+    shared: str = "factorisation"
+    reason: str = ""
 
-    def solve(self, f: Floats, known: Floats | None = None) -> Floats:
+    def solve(self, f: Floats, known: Floats | None = None, start: Floats | None = None) -> Floats:
         """Displacements for loads `(n_dof,)` or `(n_dof, k)` and known values of the same shape."""
+        del start
         residual = f if known is None else f - self.matrix @ known
         self.count.solves += 1 if f.ndim == 1 else f.shape[1]
         u = self.basis @ self.apply_inverse(self.basis.T @ residual)
         u = u if known is None else known + u
         if not np.isfinite(u).all():
             raise ConvergenceError(
-                "the linear solve returned nan: the stiffness is singular. Is the body held, or "
-                "does a crack cut off a piece that nothing holds?"
+                "the linear solve returned nan: the stiffness is singular. Is the body "
+                "supported, or does a crack cut off a piece that nothing supports?"
             )
         return np.asarray(u)
+
+    def first_look(
+        self, f: Floats, known: Floats, closed_before: bool
+    ) -> tuple[Floats | None, bool]:
+        """The solution with open faces, which contact needs in any case."""
+        del closed_before
+        return self.solve(f, known), True
+
+    def contact(
+        self,
+        rows: ContactRows,
+        f: Floats,
+        known: Floats,
+        start: Sequence[Bools | None],
+        latest: Floats | None = None,
+        opened: Floats | None = None,
+    ) -> list[StateContact]:
+        """Solve load states with crack faces that may touch; see `Engine`.
+
+        F = N K^-1 N^T is made once for all states.
+        """
+        del latest
+        F = self.dual(rows.N)
+        d = rows.N @ (self.solve(f, known) if opened is None else opened)
+        unknown = np.full(len(rows.measure), rows.closed)
+        states = [
+            active_set(
+                F, d[:, k], rows.measure, rows.stiffness, unknown if first is None else first
+            )
+            for k, first in enumerate(start)
+        ]
+        pressure = np.stack([state.pressure for state in states], axis=1)
+        u = self.solve(f + rows.N.T @ pressure, known)
+        return [replace(state, u=u[:, k]) for k, state in enumerate(states)]
+
+    def dual(self, N: sp.csr_matrix) -> Floats:
+        """F = N K^-1 N^T `(g, g)`, in blocks of right-hand sides."""
+        F = np.empty((N.shape[0], N.shape[0]))
+        for first in range(0, N.shape[0], _BLOCK):
+            rhs = N[first : first + _BLOCK].T.toarray()
+            F[:, first : first + _BLOCK] = N @ self.solve(rhs)
+        return (F + F.T) / 2
+
+    def handed_on(self, reuse: Reuse) -> Reuse:
+        """With the order of elimination."""
+        return replace(reuse, elimination=self.elimination)
 
 
 def system(
@@ -113,8 +159,8 @@ def system(
     if solver is not None:
         return System(K, ~fixed, basis, reduced, solver(reduced), count)
     node = function_nodes(space)[last // space.dim]
-    solve, kept = eliminated(reduced, node, space.n_nodes, elimination)
-    return System(K, ~fixed, basis, reduced, solve, count, kept)
+    solve, order = eliminated(reduced, node, space.n_nodes, elimination)
+    return System(K, ~fixed, basis, reduced, solve, count, order)
 
 
 def scaled_basis(
@@ -151,10 +197,10 @@ def _reduced(
     if len(alive) < len(border):
         enriched, across, down = enriched[:, alive], across[:, alive], down[:, alive]
         own, border = own[alive][:, alive], border[alive]
-    kept = np.nonzero(~fixed[:first] & (plain > 0))[0]
+    standard = np.nonzero(~fixed[:first] & (plain > 0))[0]
     number = np.full(first, -1, dtype=np.int64)
-    number[kept] = np.arange(len(kept))
-    scale = 1 / np.sqrt(np.concatenate([plain[kept], border]))
+    number[standard] = np.arange(len(standard))
+    scale = 1 / np.sqrt(np.concatenate([plain[standard], border]))
     for part in (across, down, own):
         part.sort_indices()
     indptr, rows, values = bordered(
@@ -162,20 +208,20 @@ def _reduced(
     )
     reduced = sp.csc_matrix((values, rows, indptr), shape=(len(scale), len(scale)))
     columns = sp.csc_matrix(enriched)
-    last = np.concatenate([kept, np.maximum.reduceat(columns.indices, columns.indptr[:-1])])
-    return _beside_identity(kept, enriched, scale), reduced, last
+    last = np.concatenate([standard, np.maximum.reduceat(columns.indices, columns.indptr[:-1])])
+    return _beside_identity(standard, enriched, scale), reduced, last
 
 
-def _beside_identity(kept: Ints, enriched: sp.csr_matrix, scale: Floats) -> sp.csr_matrix:
+def _beside_identity(standard: Ints, enriched: sp.csr_matrix, scale: Floats) -> sp.csr_matrix:
     """Columns of the identity, then enriched ones `(n, k)`, all of them scaled."""
     n = enriched.shape[0]
     row = np.zeros(n, dtype=np.int64)
-    row[kept] = 1
+    row[standard] = 1
     ends = np.concatenate([[0], np.cumsum(row + np.diff(enriched.indptr))])
     other = np.ones(ends[-1], dtype=bool)
-    other[ends[kept]] = False
+    other[ends[standard]] = False
     column, value = np.empty(ends[-1], dtype=np.int64), np.ones(ends[-1])
-    column[~other], column[other] = np.arange(len(kept)), len(kept) + enriched.indices
+    column[~other], column[other] = np.arange(len(standard)), len(standard) + enriched.indices
     value[other] = enriched.data
     return sp.csr_matrix((value * scale[column], column, ends), shape=(n, len(scale)))
 
@@ -191,7 +237,7 @@ def _enriched_columns(
     n = space.n_dof
     first = space.n_nodes * space.dim
     changed = None
-    if numerics.tip_basis == "vectorial" and space.tips:
+    if numerics.comparison.tip_basis == "vectorial" and space.tips:
         changed, free = mode_columns(space, material, free)
         K = sp.csr_matrix(changed.T @ K @ changed)
     if numerics.patch and space.tips:

@@ -1,6 +1,6 @@
-"""The iterative engine for bodies in space: conjugate gradients with a multigrid cycle.
+"""The iterative engine for large bodies in 3D: conjugate gradients with a multigrid cycle.
 
-It offers what `linear.System` offers, without a factor: memory and time grow with the number of
+It needs no factor: memory and time grow with the number of
 unknowns, and the levels below the finest one serve every crack in a mesh.
 """
 
@@ -13,46 +13,25 @@ import scipy.sparse as sp
 
 from xcrack.arrays import Bools, Floats, Ints, lock, ranges
 from xcrack.scene.material import Isotropic
-from xcrack.solvers import direct as linear
 from xcrack.solvers.basis import Blocks, node_blocks, orthonormal, patch_orthogonal, restricted
+from xcrack.solvers.engine import ContactRows, Count, StateContact
 from xcrack.solvers.modal_basis import mode_columns
 from xcrack.solvers.multigrid import Hierarchy, extended, hierarchy
-from xcrack.solvers.projected_cg import TOLERANCE, Operator, Pressed, conjugate_gradients, projected
+from xcrack.solvers.projected_cg import (
+    TOLERANCE,
+    Operator,
+    ProjectedState,
+    conjugate_gradients,
+    projected,
+)
+from xcrack.solvers.reuse import Reuse
 from xcrack.solvers.row_blocks import Bordered, row_blocks
 from xcrack.solvers.schwarz import star_patches
 from xcrack.xfem.assembly import Bulk
 from xcrack.xfem.function_space import Space
 
+_ROUGH = 0.02  # residual of a first solution that only shows which faces overlap
 _LEAST_SHARE = 1e-4  # of the load, to which forces are resolved; round-off forbids much less
-
-
-@dataclass
-class Count(linear.Count):
-    """Operations of a run, counted for its report."""
-
-    iterations: int = 0
-
-
-@dataclass(frozen=True, eq=False)
-class Touching:
-    """One load state with contact.
-
-    Attributes
-    ----------
-    u : (n_dof,) array, length
-    pressure : (g,) array, stress
-    gap : (g,) array
-        Weak gaps, integrals of the function times the gap.
-    active : (g,) array of bool
-    iterations : int
-        Sets tried.
-    """
-
-    u: Floats
-    pressure: Floats
-    gap: Floats
-    active: Bools
-    iterations: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,6 +64,8 @@ class IterativeSystem:
     combined: sp.csr_matrix | None = None
     back: sp.csr_matrix | None = None
     count: Count = field(default_factory=Count)
+    shared: str = "multigrid hierarchy"
+    reason: str = "conjugate gradients: a large body in 3D"
 
     def solve(
         self,
@@ -114,50 +95,49 @@ class IterativeSystem:
             y[:, k] = self._apart(b[:, k], given[:, k], guess, tolerance)
         return np.asarray(given + self.basis @ y).reshape(f.shape)
 
+    def first_look(
+        self, f: Floats, known: Floats, closed_before: bool
+    ) -> tuple[Floats | None, bool]:
+        """Rough displacements, as few steps as show which faces overlap; none after closed sets."""
+        if closed_before:
+            return None, False
+        return self.solve(f, known, tolerance=_ROUGH), False
+
     def contact(
         self,
-        N: sp.csr_matrix,
+        rows: ContactRows,
         f: Floats,
         known: Floats,
-        measure: Floats,
-        stiffness: float,
         start: Sequence[Bools | None],
-        u_start: Floats | None = None,
-    ) -> list[Touching]:
-        """Solve load states with lips that may touch.
+        latest: Floats | None = None,
+        opened: Floats | None = None,
+    ) -> list[StateContact]:
+        """Solve load states with crack faces that may touch; see `Engine`.
 
-        Parameters
-        ----------
-        N : sparse matrix (g, n_dof)
-            Rows of the weak gaps.
-        f, known : (n_dof, states) arrays
-        measure : (g,) array
-            Integral of each multiplier function.
-        stiffness : float, stress / length
-            Weighs gaps against pressures in the prediction of the set; E / h is natural.
-        start : sequence of (g,) arrays of bool or None
-            First guess of each state's closed set. None: the groups that overlap in the first
-            guess of the displacements.
-        u_start : (n_dof, states) array, optional
-            First guess of the displacements; those with open lips are a good one. Without it each
-            state starts from those before it.
+        Without a first set, that of the groups that overlap in the latest displacements is the
+        best guess. Without displacements each state starts from those before it.
         """
-        rows = sp.csr_matrix(N @ self.basis)
+        del opened
+        own = sp.csr_matrix(rows.N @ self.basis)
         b = self.basis.T @ (f - self.matrix @ known)
-        guess = np.zeros_like(b) if u_start is None else self.coordinates(u_start - known)
-        found = []
+        guess = np.zeros_like(b) if latest is None else self.coordinates(latest - known)
+        states = []
         for k in range(b.shape[1]):
-            gap = N @ known[:, k]
-            if u_start is None:
+            gap = rows.N @ known[:, k]
+            if latest is None:
                 guess[:, k] = _best_guess(self.operator, guess[:, :k], b[:, k])
             first = start[k]
-            active = rows @ guess[:, k] + gap < 0 if first is None else first
-            run = partial(projected, self.operator, b[:, k], rows, gap, measure, stiffness)
+            active = own @ guess[:, k] + gap < 0 if first is None else first
+            run = partial(projected, self.operator, b[:, k], own, gap, rows.measure, rows.stiffness)
             state = self._together(run, b[:, k], known[:, k], active, guess[:, k])
             guess[:, k] = state.y
             u = known[:, k] + self.basis @ state.y
-            found.append(Touching(u, state.pressure, state.gap, state.active, state.sets))
-        return found
+            states.append(StateContact(state.pressure, state.gap, state.active, state.sets, u))
+        return states
+
+    def handed_on(self, reuse: Reuse) -> Reuse:
+        """With the levels of the mesh."""
+        return replace(reuse, hierarchy=self.hierarchy)
 
     def _apart(self, b: Floats, known: Floats, start: Floats, tolerance: float) -> Floats:
         y, steps = conjugate_gradients(self.operator, b, start, tolerance)
@@ -170,8 +150,8 @@ class IterativeSystem:
         return y
 
     def _together(
-        self, run: Callable[..., Pressed], b: Floats, known: Floats, active: Bools, y: Floats
-    ) -> Pressed:
+        self, run: Callable[..., ProjectedState], b: Floats, known: Floats, active: Bools, y: Floats
+    ) -> ProjectedState:
         state = run(active, y)
         sets, steps = state.sets, state.iterations
         share = self._share(state.y, b, known)
@@ -368,8 +348,8 @@ def _nearby(K: sp.csr_matrix, changed: sp.csr_matrix, blocks: Blocks) -> sp.csr_
     columns = sp.csc_matrix(changed[:, own])
     near = np.unique(columns.indices)
     columns = columns[near]
-    found = sp.coo_matrix(columns.T @ (K[near][:, near] @ columns))
-    return sp.csr_matrix((found.data, (own[found.row], own[found.col])), shape=K.shape)
+    small = sp.coo_matrix(columns.T @ (K[near][:, near] @ columns))
+    return sp.csr_matrix((small.data, (own[small.row], own[small.col])), shape=K.shape)
 
 
 def _within_blocks(K: sp.csr_matrix, blocks: Blocks) -> sp.csr_matrix:

@@ -43,7 +43,7 @@ def mode_columns(
         Columns that stand for an unknown.
     """
     if material is None:
-        raise ProblemError('Numerics(tip_basis="vectorial") needs the material of the body.')
+        raise ProblemError('Comparison(tip_basis="vectorial") needs the material of the body.')
     d = space.dim
     modes = local_modes(material.kolosov, d)
     rows, columns, values = [], [], []

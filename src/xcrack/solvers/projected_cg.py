@@ -1,4 +1,4 @@
-"""Contact by conjugate gradients among displacements that keep the closed lips closed.
+"""Contact by conjugate gradients among displacements that keep closed crack faces closed.
 
 The gaps of the closed groups vanish exactly throughout: start and search directions are projected
 onto the null space of their rows N_A by I - D^-1 N_A^T (N_A D^-1 N_A^T)^-1 N_A with the diagonal D
@@ -50,7 +50,7 @@ class Operator:
 
 
 @dataclass(frozen=True, eq=False)
-class Pressed:
+class ProjectedState:
     """Solution of one load state with contact.
 
     Attributes
@@ -227,7 +227,7 @@ def projected(
     y: Floats,
     tolerance: float = TOLERANCE,
     limit: int = MOST_STEPS,
-) -> Pressed:
+) -> ProjectedState:
     """Solve K y = b + N^T lam with 0 <= lam, N y + d >= 0 and lam (N y + d) = 0.
 
     Parameters
@@ -279,7 +279,7 @@ class _Loop:
     steps: int = 0
     sets: int = 0
 
-    def run(self, active: Bools, y: Floats) -> Pressed:
+    def run(self, active: Bools, y: Floats) -> ProjectedState:
         if not (np.isfinite(self.b).all() and np.isfinite(self.d).all()):
             self._give_up(float("nan"), active)
         size = self._size()
@@ -337,7 +337,7 @@ class _Loop:
         gap = self.N @ descent.y + self.d
         gap[active] = 0.0
         trial = np.where(self.movable, pressure - self.stiffness * gap / self.measure, 0.0)
-        # What lies within the accuracy of the iteration changes nothing: lips that only touch
+        # What lies within the accuracy of the iteration changes nothing: faces that only touch
         # must not make the set flicker.
         doubt = self.tolerance * float(np.abs(trial).max(initial=0.0))
         return pressure, gap, np.where(np.abs(trial) > doubt, trial > 0, active)
@@ -356,7 +356,7 @@ class _Loop:
             return size
         return _norm(self.K.times(plane.nearest(np.zeros(len(self.b)))))
 
-    def _result(self, y: Floats, pressure: Floats, gap: Floats, active: Bools) -> Pressed:
+    def _result(self, y: Floats, pressure: Floats, gap: Floats, active: Bools) -> ProjectedState:
         length = np.abs(gap / self.measure).max(initial=0.0)
         stuck = ~self.movable & (gap / self.measure < -1e-8 * length)
         if stuck.any():
@@ -365,7 +365,7 @@ class _Loop:
                 f"the supports, with a smallest gap of {gap[stuck].min():.3g}; no pressure can "
                 "open them."
             )
-        return Pressed(y, np.maximum(pressure, 0.0), gap, active, self.steps, self.sets)
+        return ProjectedState(y, np.maximum(pressure, 0.0), gap, active, self.steps, self.sets)
 
     def _give_up(self, residual: float, active: Bools) -> None:
         raise ConvergenceError(

@@ -1,7 +1,6 @@
 """Stiffness: the uncracked body once a mesh, enriched cells once a crack."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.sparse as sp
@@ -17,9 +16,6 @@ from xcrack.xfem.kept_cells import KeptCells, kept_cells, with_one_jump
 from xcrack.xfem.lips import LipPoints
 from xcrack.xfem.quadrature import Points, cell_points
 
-if TYPE_CHECKING:
-    from xcrack.solvers.multigrid import Hierarchy
-
 _CHUNK = 60_000  # integration points tabulated at once; bounds the memory
 
 
@@ -34,8 +30,6 @@ class Bulk:
     order : int
     matrix : sparse matrix (n, n), stress · length^(d - 2)
         Node blocks, BSR.
-    levels : Hierarchy, optional
-        Coarse levels of the iterative solver, once it has made them.
     cells : KeptCells, optional
         Cut cells of the last crack that may serve the next.
     """
@@ -44,7 +38,6 @@ class Bulk:
     material: Isotropic
     order: int
     matrix: sp.bsr_matrix
-    levels: "Hierarchy | None" = None
     cells: KeptCells | None = None
 
 

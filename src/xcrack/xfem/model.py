@@ -77,11 +77,11 @@ def build(problem: Problem, bulk_: Bulk | None = None) -> Model:
 
 def levels(mesh: Mesh, crack: Crack, numerics: Numerics) -> LevelSet:
     """Level sets of a placed crack; in space up to where its functions may reach."""
-    nodal = numerics.update == "nodal"
+    nodal = numerics.comparison.update == "nodal"
     if mesh.dim == 2:
         return nodal_level_set(mesh, crack) if nodal else level_set(mesh, crack)
     if nodal:
         raise ProblemError(
-            'Numerics(update="nodal") is for the plane only: leave it out for a crack in space.'
+            'Comparison(update="nodal") is for 2D only: leave it out for a crack in 3D.'
         )
     return surface_levels(mesh, crack, front_reach(mesh, crack, numerics.radius))

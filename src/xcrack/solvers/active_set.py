@@ -1,10 +1,8 @@
-"""Contact of the lips: a primal-dual active set on a small dense problem.
+"""Contact of crack faces: a primal-dual active set on a small dense problem.
 
 With F = N K^-1 N^T and d = N u0 the pressures obey 0 <= lam, F lam + d >= 0, lam (F lam + d) = 0.
 F depends on the crack alone: every load state shares it, and the factor behind it.
 """
-
-from dataclasses import dataclass
 
 import numpy as np
 import scipy.linalg
@@ -12,35 +10,15 @@ import scipy.optimize
 
 from xcrack.arrays import Bools, Floats
 from xcrack.errors import ConvergenceError
+from xcrack.solvers.engine import StateContact
 
 _MAX_SETS = 100
 _REDUNDANT = 1e-7  # root of the eigenvalue, relative, below which groups count as dependent
 
 
-@dataclass(frozen=True, eq=False)
-class ActiveSet:
-    """Solution of one contact problem.
-
-    Attributes
-    ----------
-    pressure : (g,) array, stress
-    gap : (g,) array
-        Weak gaps, integrals of the function times the gap.
-    active : (g,) array of bool
-    iterations : int
-        Sets tried.
-    fallback : bool
-        The set cycled and was found by non-negative least squares instead.
-    """
-
-    pressure: Floats
-    gap: Floats
-    active: Bools
-    iterations: int
-    fallback: bool
-
-
-def active_set(F: Floats, d: Floats, measure: Floats, stiffness: float, start: Bools) -> ActiveSet:
+def active_set(
+    F: Floats, d: Floats, measure: Floats, stiffness: float, start: Bools
+) -> StateContact:
     """Solve 0 <= lam, F lam + d >= 0 by a primal-dual active set.
 
     Parameters
@@ -65,12 +43,12 @@ def active_set(F: Floats, d: Floats, measure: Floats, stiffness: float, start: B
     active = np.array(start, dtype=bool)
     for iteration in range(1, _MAX_SETS + 1):
         pressure, gap = _of_set(F, d, active)
-        # Values at round-off of zero (lips that only touch) must not make the set flicker.
+        # Values at round-off of zero (faces that only touch) must not make the set flicker.
         lam_scale = 1e-13 * float(np.abs(pressure).max(initial=0.0))
         trial = pressure - stiffness * gap / measure
         new = trial > lam_scale
         if (new == active).all():
-            return ActiveSet(pressure, gap, active, iteration, False)
+            return StateContact(pressure, gap, active, iteration)
         key = new.tobytes()
         if key in seen:
             break
@@ -110,14 +88,14 @@ def _solved(A: Floats, b: Floats) -> Floats:
     return np.asarray(scipy.linalg.lstsq(A, b, cond=_REDUNDANT**2)[0])
 
 
-def _safe(F: Floats, d: Floats, tried: int) -> ActiveSet:
+def _safe(F: Floats, d: Floats, tried: int) -> StateContact:
     """Non-negative least squares on a root of F (Lawson and Hanson, 1974)."""
     scale = _scale(F)
     w, V = np.linalg.eigh((F + F.T) / 2 * scale[:, None] * scale)
-    kept = w > _REDUNDANT**2 * w[-1]
-    root = np.sqrt(w[kept])
-    rhs = -(V[:, kept].T @ (scale * d)) / root
-    guess, _ = scipy.optimize.nnls(root[:, None] * V[:, kept].T, rhs)
+    resolved = w > _REDUNDANT**2 * w[-1]
+    root = np.sqrt(w[resolved])
+    rhs = -(V[:, resolved].T @ (scale * d)) / root
+    guess, _ = scipy.optimize.nnls(root[:, None] * V[:, resolved].T, rhs)
     active = guess > 0
     pressure, gap = _of_set(F, d, active)
     size = float(np.abs(d).max(initial=0.0))
@@ -125,7 +103,7 @@ def _safe(F: Floats, d: Floats, tried: int) -> ActiveSet:
         raise ConvergenceError(
             f"contact: after {tried} sets and non-negative least squares, {int(active.sum())} of "
             f"{len(d)} groups are closed, with a smallest gap of {gap.min():.3g} and a smallest "
-            f"pressure of {pressure.min():.3g}. Refine the mesh along the lips, or start from "
+            f"pressure of {pressure.min():.3g}. Refine the mesh along the crack, or start from "
             'Numerics(initial_set="open").'
         )
-    return ActiveSet(np.maximum(pressure, 0.0), gap, active, tried, True)
+    return StateContact(np.maximum(pressure, 0.0), gap, active, tried, fallback=True)

@@ -1,0 +1,64 @@
+"""What one solve hands on to the next: matrices of the mesh, orders, and closed sets by place."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from xcrack.arrays import Bools, Floats
+from xcrack.solvers.factor import Elimination
+from xcrack.solvers.multigrid import Hierarchy
+from xcrack.xfem.assembly import Bulk
+
+
+@dataclass(frozen=True, eq=False)
+class Reuse:
+    """Work of an earlier solve in the same mesh; an empty one is ``Reuse()``.
+
+    Attributes
+    ----------
+    centre : tuple of (g, d) arrays or None
+        Where the multipliers of each crack sit; None for a crack without.
+    active : tuple of (states, g) arrays of bool or None
+        Closed sets of all load states.
+    elimination : Elimination, optional
+        Order in which a factorisation takes the nodes.
+    bulk : Bulk, optional
+        Stiffness of the uncracked body, and cut cells that may serve the next crack.
+    hierarchy : Hierarchy, optional
+        Coarse levels of the iterative solver.
+    """
+
+    centre: tuple[Floats | None, ...] = ()
+    active: tuple[Bools | None, ...] = ()
+    elimination: Elimination | None = None
+    bulk: Bulk | None = None
+    hierarchy: Hierarchy | None = None
+
+    def without_matrices(self) -> "Reuse":
+        """The part that fits into a file, and that decides the last bit of the next solve."""
+        return replace(self, bulk=None, hierarchy=None)
+
+    def was_closed(self, c: int) -> bool:
+        """Whether any group of crack c was closed in any state."""
+        active = self.active[c] if c < len(self.active) else None
+        return active is not None and bool(active.any())
+
+    def start(self, c: int, centre: Floats, state: int) -> Bools | None:
+        """Closed set of the nearest multipliers `(g,)`, or None where nothing is known.
+
+        Parameters
+        ----------
+        c : int
+            Crack.
+        centre : (g, d) array, length
+            Where its multipliers sit now.
+        state : int
+        """
+        if c >= len(self.centre):
+            return None
+        before, active = self.centre[c], self.active[c]
+        if before is None or active is None or state >= len(active) or not len(before):
+            return None
+        nearest = cKDTree(before).query(centre)[1]
+        return np.asarray(active[state][nearest])
