@@ -16,7 +16,7 @@ import xcrack
 ROOT = Path(__file__).resolve().parent.parent
 SOURCE = ROOT / "src" / "xcrack"
 FILES = sorted(SOURCE.rglob("*.py"))
-KERNELS = sorted((SOURCE / "kernels").glob("*.py"))
+KERNELS = sorted(set((SOURCE / "kernels").glob("*.py")) - {SOURCE / "kernels" / "jit.py"})
 LONGEST_FILE = 420
 HEAVY = ("numba", "gmsh", "meshio", "pyvista", "vtk", "vtkmodules", "matplotlib", "pyamg")
 
@@ -64,25 +64,17 @@ def imported(tree: ast.AST) -> set[str]:
 @pytest.mark.parametrize("path", KERNELS, ids=label)
 def test_kernels_know_arrays_only(path: Path) -> None:
     # not even each other: numba does not notice that a helper in another file has changed
+    text = path.read_text().replace("from xcrack.kernels.jit import kernel\n", "")
     allowed = {"__future__", "collections", "math", "numba", "numpy", "typing"}
-    assert imported(ast.parse(path.read_text())) <= allowed
-
-
-def compiled(tree: ast.Module) -> list[ast.FunctionDef]:
-    """Functions of a file that carry a numba decorator."""
-    return [
-        node
-        for node in ast.walk(tree)
-        if isinstance(node, ast.FunctionDef)
-        and any("jit" in ast.unparse(decorator) for decorator in node.decorator_list)
-    ]
+    assert imported(ast.parse(text)) <= allowed
 
 
 @pytest.mark.parametrize("path", KERNELS, ids=label)
-def test_kernels_are_cached(path: Path) -> None:
-    for function in compiled(ast.parse(path.read_text())):
-        decorators = " ".join(map(ast.unparse, function.decorator_list))
-        assert "cache=True" in decorators or "inline" in decorators, function.name
+def test_kernels_are_compiled_in_one_way(path: Path) -> None:
+    """By `kernel`, whose cache copes with folders that cannot be written to."""
+    functions = [n for n in ast.parse(path.read_text()).body if isinstance(n, ast.FunctionDef)]
+    for function in functions:
+        assert [ast.unparse(d) for d in function.decorator_list] == ["kernel"], function.name
 
 
 def documented(text: str) -> set[str]:

@@ -2,11 +2,12 @@
 
 import math
 
-import numba
 import numpy as np
 
+from xcrack.kernels.jit import kernel
 
-@numba.njit(cache=True, error_model="numpy")
+
+@kernel
 def _distance(x, y, corner):  # type: ignore[no-untyped-def]
     """Distance of a point to a triangle (3, 2), 0 inside."""
     best = np.inf
@@ -23,7 +24,7 @@ def _distance(x, y, corner):  # type: ignore[no-untyped-def]
     return 0.0 if low >= 0.0 or high <= 0.0 else best
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel
 def bisect(x, tips, levels, fill, owner, bary, depth, near):  # type: ignore[no-untyped-def]
     """Quarter triangles until they are no larger than their distance to every tip.
 

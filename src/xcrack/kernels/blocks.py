@@ -1,10 +1,11 @@
 """Dense blocks of a sparse matrix."""
 
-import numba
 import numpy as np
 
+from xcrack.kernels.jit import kernel
 
-@numba.njit(cache=True, error_model="numpy")
+
+@kernel
 def dense_blocks(indptr, indices, data, members, offsets):  # type: ignore[no-untyped-def]
     """Gather K[block, block] for ragged blocks of unknowns.
 

@@ -1,10 +1,11 @@
 """A symmetric matrix with a few more rows and columns, put together and scaled."""
 
-import numba
 import numpy as np
 
+from xcrack.kernels.jit import kernel
 
-@numba.njit(cache=True, error_model="numpy")
+
+@kernel
 def bordered(  # type: ignore[no-untyped-def]
     indptr, indices, data, number, scale, across, down, own
 ):

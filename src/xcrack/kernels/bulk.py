@@ -1,10 +1,11 @@
 """Sparsity pattern and stiffness of plain cells."""
 
-import numba
 import numpy as np
 
+from xcrack.kernels.jit import kernel
 
-@numba.njit(cache=True, error_model="numpy")
+
+@kernel
 def block_pattern(nodes, n_nodes):  # type: ignore[no-untyped-def]
     """Pattern of node blocks and the slot of each cell's pairs in it.
 
@@ -75,7 +76,7 @@ def block_pattern(nodes, n_nodes):  # type: ignore[no-untyped-def]
     return indptr, indices, slot
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel
 def block_stiffness(slot, n_blocks, gradient, volume, derivative, weight, lam, mu):  # type: ignore[no-untyped-def]
     """Elastic stiffness of plain cells, summed into node blocks.
 

@@ -6,13 +6,14 @@ beside row, so that they are read in one stream. All indices are unsigned: numba
 ones against negative values, which costs up to four times.
 """
 
-import numba
 import numpy as np
+
+from xcrack.kernels.jit import kernel
 
 _ONE, _TWO, _THREE = np.uint32(1), np.uint32(2), np.uint32(3)
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel
 def pattern_sizes(indptr, indices, first, n_columns):  # type: ignore[no-untyped-def]
     """Number of different columns in each block of rows.
 
@@ -39,7 +40,7 @@ def pattern_sizes(indptr, indices, first, n_columns):  # type: ignore[no-untyped
     return count
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel
 def _sort(values, first, last):  # type: ignore[no-untyped-def]
     """Sort a stretch (Shell); numba's own sort takes longer to compile than the rest."""
     gap = 1
@@ -56,7 +57,7 @@ def _sort(values, first, last):  # type: ignore[no-untyped-def]
         gap //= 3
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel
 def fill_blocks(indptr, indices, data, first, start, size, offset, n_columns, shift, columns, values):  # type: ignore[no-untyped-def]  # fmt: skip # noqa: E501
     """Copy the entries of a CSR matrix into blocks of rows, which other matrices may share.
 
@@ -103,7 +104,7 @@ def fill_blocks(indptr, indices, data, first, start, size, offset, n_columns, sh
                 values[base + stride * place[indices[k]]] += data[k]
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel
 def product(first, start, offset, columns, values, x, y, scale, out):  # type: ignore[no-untyped-def]
     """Write y + scale A x into `out`.
 
@@ -141,7 +142,7 @@ def product(first, start, offset, columns, values, x, y, scale, out):  # type: i
             row += _ONE
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel
 def first_step(inverse, r, scale, d, x):  # type: ignore[no-untyped-def]
     """Begin a Chebyshev sweep: d = scale D^-1 r, x += d.
 
@@ -160,7 +161,7 @@ def first_step(inverse, r, scale, d, x):  # type: ignore[no-untyped-def]
         x[i] += d[i]
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel
 def next_step(inverse, r, keep, scale, d, x):  # type: ignore[no-untyped-def]
     """Go on with a Chebyshev sweep: d = keep d + scale D^-1 r, x += d.
 

@@ -1,10 +1,11 @@
 """Signed distance of points to a polyline."""
 
-import numba
 import numpy as np
 
+from xcrack.kernels.jit import kernel
 
-@numba.njit(cache=True, error_model="numpy")
+
+@kernel
 def polyline_distance(x, vertices):  # type: ignore[no-untyped-def]
     """Signed distance to a polyline, positive on its left, and the closest segment.
 

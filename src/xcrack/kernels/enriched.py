@@ -1,10 +1,11 @@
 """Element stiffness from functions tabulated at integration points, summed into blocks."""
 
-import numba
 import numpy as np
 
+from xcrack.kernels.jit import kernel
 
-@numba.njit(cache=True, error_model="numpy")
+
+@kernel
 def enriched_pattern(functions, n_functions, n_standard):  # type: ignore[no-untyped-def]
     """Pattern of the blocks of function pairs of which one is enriched.
 
@@ -63,7 +64,7 @@ def enriched_pattern(functions, n_functions, n_standard):  # type: ignore[no-unt
     return indptr, indices
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel
 def _slot(indptr, indices, row, column):  # type: ignore[no-untyped-def]
     low, high = indptr[row], indptr[row + 1] - 1
     while low < high:
@@ -75,7 +76,7 @@ def _slot(indptr, indices, row, column):  # type: ignore[no-untyped-def]
     return low
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel
 def _active(functions, n_standard, place):  # type: ignore[no-untyped-def]
     """Set the places of the functions of a cell; their number, and that of standard ones."""
     active, plain = 0, 0  # standard functions come first
@@ -88,7 +89,7 @@ def _active(functions, n_standard, place):  # type: ignore[no-untyped-def]
     return active, plain
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel
 def _products(begin, end, weight, gradient, place, active, plain, row, block):  # type: ignore[no-untyped-def]
     """Integrals of G_ai G_bj over the points of a cell, b >= a, b enriched."""
     d = gradient.shape[2]
@@ -108,7 +109,7 @@ def _products(begin, end, weight, gradient, place, active, plain, row, block):  
                     line[k] += scaled * row[k]
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel
 def _scatter(  # type: ignore[no-untyped-def]
     data, indptr, indices, functions, place, active, plain, block, lam, mu
 ):
@@ -133,7 +134,7 @@ def _scatter(  # type: ignore[no-untyped-def]
                         other[j, i] += v
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel
 def add_stiffness(  # type: ignore[no-untyped-def]
     data, indptr, indices, functions, offsets, weight, gradient, n_standard, lam, mu
 ):
@@ -167,7 +168,7 @@ def add_stiffness(  # type: ignore[no-untyped-def]
         _scatter(data, indptr, indices, functions[e], place, active, plain, block, lam, mu)
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel
 def gradient_products(offsets, weight, gradient, plain):  # type: ignore[no-untyped-def]
     """Integrals of G_ai G_bj in cells, from which their stiffness follows for any material.
 
@@ -194,7 +195,7 @@ def gradient_products(offsets, weight, gradient, plain):  # type: ignore[no-unty
     return result
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel
 def add_products(  # type: ignore[no-untyped-def]
     data, indptr, indices, functions, products, n_standard, lam, mu
 ):

@@ -1,9 +1,9 @@
 """Sums of functions times their unknowns at points."""
 
-import numba
+from xcrack.kernels.jit import kernel
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel
 def set_gradients(gradient, number, slope, functions, row, coefficients):  # type: ignore[no-untyped-def]
     """Set the gradients of displacements at some points.
 

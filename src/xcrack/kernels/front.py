@@ -1,12 +1,13 @@
-"""Points around a curved crack front: their feet on it, and the interaction integrand there."""
+"""Points around a curved crack front: feet on it, and the interaction integrand there."""
 
 import math
 
-import numba
 import numpy as np
 
+from xcrack.kernels.jit import kernel
 
-@numba.njit(cache=True, error_model="numpy")
+
+@kernel
 def _curve_at(s, breaks, place, value, slope, bend):  # type: ignore[no-untyped-def]
     """Value and two derivatives of a cubic spline; coefficients as of scipy, highest first."""
     low, high = 0, len(breaks) - 2
@@ -25,15 +26,14 @@ def _curve_at(s, breaks, place, value, slope, bend):  # type: ignore[no-untyped-
         bend[i] = 6 * c3 * t + 2 * c2
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel
 def frames_at(s, breaks, place, normal):  # type: ignore[no-untyped-def]
     """Points of a front and how its frame turns there.
 
     Parameters
     ----------
-    s : (q,) array
+    s, breaks : (q,) array, (m + 1,) array
         Parameters within the breaks.
-    breaks : (m + 1,) array
     place, normal : (4, m, 3) arrays
         Spline coefficients of the points and of the normals.
 
@@ -58,7 +58,7 @@ def frames_at(s, breaks, place, normal):  # type: ignore[no-untyped-def]
     return x, frame, turn
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel
 def _frame(dx, ddx, N, dN, frame, turn):  # type: ignore[no-untyped-def]
     speed = math.sqrt(dx[0] * dx[0] + dx[1] * dx[1] + dx[2] * dx[2])
     along = 0.0
@@ -86,7 +86,7 @@ def _frame(dx, ddx, N, dN, frame, turn):  # type: ignore[no-untyped-def]
     turn[3] = speed
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel
 def feet(x, start, reach, breaks, place, normal, closed):  # type: ignore[no-untyped-def]
     """Project points onto a front: (x - X(s)) . X'(s) = 0 by Newton's method.
 
@@ -161,7 +161,7 @@ def feet(x, start, reach, breaks, place, normal, closed):  # type: ignore[no-unt
     return s, local, frame, turn, beyond
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel
 def _unit_field(mode, r, ch, sh, kolosov, scale, U, turned, G, slope, spin, bend):  # type: ignore[no-untyped-def]
     """Field of Williams of one mode, and more, from the cosine and sine of half the angle.
 
@@ -197,7 +197,7 @@ def _unit_field(mode, r, ch, sh, kolosov, scale, U, turned, G, slope, spin, bend
         bend[i, 1] = -(0.5 * p1 * c + d1 * s) / (root * r)
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel
 def _unit_stress(G, lam, mu, S):  # type: ignore[no-untyped-def]
     """Stress of a gradient that has no part along b."""
     trace = G[0, 0] + G[1, 1]
@@ -209,7 +209,7 @@ def _unit_stress(G, lam, mu, S):  # type: ignore[no-untyped-def]
     S[1, 2] = S[2, 1] = mu * G[2, 1]
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel
 def _weight(r, radius, ring):  # type: ignore[no-untyped-def]
     """One inside, zero outside, a quintic in the ring between; and its slope."""
     width = (1.0 - ring) * radius
@@ -217,7 +217,7 @@ def _weight(r, radius, ring):  # type: ignore[no-untyped-def]
     return 1.0 - z**3 * (10.0 - 15.0 * z + 6.0 * z * z), -30.0 * (z * (1.0 - z)) ** 2 / width
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel
 def _into_frame(frame, tensor, result):  # type: ignore[no-untyped-def]
     """Components of a tensor along the rows of a frame."""
     for a in range(3):
@@ -229,7 +229,7 @@ def _into_frame(frame, tensor, result):  # type: ignore[no-untyped-def]
             result[a, b] = first * frame[b, 0] + second * frame[b, 1] + third * frame[b, 2]
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel
 def front_terms(  # type: ignore[no-untyped-def]
     weight, gradient, force, initial, change, polar, frame, turn, hat, share, step, radii, ring,
     lam, mu, curved, result, measure,
@@ -349,7 +349,7 @@ def front_terms(  # type: ignore[no-untyped-def]
                     result[n, k, m, hat[q, 1]] += every * share[q] + change_k
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel
 def lip_terms(  # type: ignore[no-untyped-def]
     weight, outward, traction, gradient, initial, polar, frame, hat, share, radii, ring, lam, mu,
     result,

@@ -1,10 +1,11 @@
 """Overlapping blocks of unknowns, each solved by itself and summed."""
 
-import numba
 import numpy as np
 
+from xcrack.kernels.jit import kernel
 
-@numba.njit(cache=True, error_model="numpy")
+
+@kernel
 def add_solved(members, start, offset, inverse, r, out):  # type: ignore[no-untyped-def]
     """Add the inverse of each block times its part of r.
 

@@ -2,11 +2,12 @@
 
 import math
 
-import numba
 import numpy as np
 
+from xcrack.kernels.jit import kernel
 
-@numba.njit(cache=True, error_model="numpy")
+
+@kernel
 def add_ring(  # type: ignore[no-untyped-def]
     total, gradient, xi, theta, weight, radii, inner, frame, modes, kolosov, lam, mu
 ):

@@ -1,9 +1,9 @@
 """Standard and Heaviside functions, tabulated at points."""
 
-import numba
+from xcrack.kernels.jit import kernel
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel
 def set_standard(value, slope, row, bary, gradient, edges):  # type: ignore[no-untyped-def]
     """Set the shape functions of the first columns, and their gradients where these are wanted.
 
@@ -42,7 +42,7 @@ def set_standard(value, slope, row, bary, gradient, edges):  # type: ignore[no-u
                     slope[q, corners + k, j] = y * G[a, j] + x * G[b, j]
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel
 def set_jumps(value, slope, first, row, side, nodes, node_side, number):  # type: ignore[no-untyped-def]
     """Set shifted Heaviside functions from column `first` on: shape times side less that of node.
 

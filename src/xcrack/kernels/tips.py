@@ -2,11 +2,12 @@
 
 import math
 
-import numba
 import numpy as np
 
+from xcrack.kernels.jit import kernel
 
-@numba.njit(cache=True, error_model="numpy")
+
+@kernel
 def set_tips(value, slope, first, row, bary, side, nodes, gradient, phi, psi, active, shift):  # type: ignore[no-untyped-def]
     """Set shifted tip functions times hats from column `first` on, and their gradients.
 
@@ -87,7 +88,7 @@ def set_tips(value, slope, first, row, bary, side, nodes, gradient, phi, psi, ac
                         slope[p, to, j] = total if active[node] else 0.0
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel
 def add_flux(defect, piece, value, normal, moment):  # type: ignore[no-untyped-def]
     """Add the boundary integral of value x normal x moment to each piece.
 
@@ -111,7 +112,7 @@ def add_flux(defect, piece, value, normal, moment):  # type: ignore[no-untyped-d
                         defect[k, f, j, a] += v * normal[q, j] * moment[q, a]
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel
 def moments_at(row, bary, corners, linear):  # type: ignore[no-untyped-def]
     """1 and, where wanted, the coordinates at points `(q, 1)` or `(q, d + 1)`.
 
@@ -136,7 +137,7 @@ def moments_at(row, bary, corners, linear):  # type: ignore[no-untyped-def]
     return moment
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel
 def take_volume(defect, gram, piece, weight, value, slope, moment, scale):  # type: ignore[no-untyped-def]
     """Subtract the volume integral of the gradient of value x moment from each piece.
 
@@ -171,7 +172,7 @@ def take_volume(defect, gram, piece, weight, value, slope, moment, scale):  # ty
                     defect[k, f, j, 1 + j] -= w * value[q, f] * scale[q]
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel
 def add_correction(slope, first, piece, row, coefficient, moment, functions):  # type: ignore[no-untyped-def]
     """Add coefficient . moment to the gradients from function `first` on, where they act.
 

@@ -1,12 +1,13 @@
 """Closest points on triangles and segments in space, found in a tree of boxes."""
 
-import numba
 import numpy as np
+
+from xcrack.kernels.jit import kernel
 
 LEAF = 4  # boxes a leaf of the tree
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel
 def _sort(order, first, last, lower, upper, axis):  # type: ignore[no-untyped-def]
     """Sort a stretch of the items by the middles of their boxes, equal ones by number (Shell).
 
@@ -31,7 +32,7 @@ def _sort(order, first, last, lower, upper, axis):  # type: ignore[no-untyped-de
         gap //= 3
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel
 def box_tree(lower, upper):  # type: ignore[no-untyped-def]
     """Tree of boxes by halving at the median of the longest side.
 
@@ -85,7 +86,7 @@ def box_tree(lower, upper):  # type: ignore[no-untyped-def]
     return order, node[:used].copy(), low[:used].copy(), high[:used].copy()
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel
 def _to_box(p, low, high):  # type: ignore[no-untyped-def]
     """Squared distance of a point to a box."""
     square = 0.0
@@ -96,7 +97,7 @@ def _to_box(p, low, high):  # type: ignore[no-untyped-def]
     return square
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel
 def _on_edge(p, a, b, foot):  # type: ignore[no-untyped-def]
     """Position in [0, 1] of the point of an edge closest to p, put into foot."""
     along = 0.0
@@ -117,7 +118,7 @@ def _on_edge(p, a, b, foot):  # type: ignore[no-untyped-def]
     return position
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel
 def _to_triangle(p, corner, normal, foot, trial):  # type: ignore[no-untyped-def]
     """Squared distance to a triangle and the part of it that is closest; foot is filled."""
     height = 0.0
@@ -163,7 +164,7 @@ def _to_triangle(p, corner, normal, foot, trial):  # type: ignore[no-untyped-def
     return best, part
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel
 def _descend(p, child, low, high, stack, stack_square, top):  # type: ignore[no-untyped-def]
     """Put two children on the stack, the nearer one on top, and return the new top."""
     one = _to_box(p, low[child], high[child])
@@ -177,7 +178,7 @@ def _descend(p, child, low, high, stack, stack_square, top):  # type: ignore[no-
     return top + 2
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel
 def closest_triangle(x, corners, normal, order, node, low, high, band, tiny):  # type: ignore[no-untyped-def]
     """Closest triangle of each point, and the part of it that is closest.
 
@@ -259,7 +260,7 @@ def closest_triangle(x, corners, normal, order, node, low, high, band, tiny):  #
     return distance, triangle, part, foot
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel
 def closest_segment(x, start, stop, order, node, low, high, band):  # type: ignore[no-untyped-def]
     """Closest segment of each point; of two equally far the one with the lower number.
 
@@ -321,7 +322,7 @@ def closest_segment(x, start, stop, order, node, low, high, band):  # type: igno
     return distance, segment, position
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel
 def crossed_triangle(start, stop, corners, normal, order, node, low, high):  # type: ignore[no-untyped-def]
     """First triangle that each segment crosses; a triangle's sides belong to it.
 
