@@ -9,6 +9,7 @@ import pytest
 
 import scenes
 import xcrack as xc
+from xcrack.solvers.factor import superlu
 
 STEEL = xc.Isotropic(1.0, 0.3, plane="strain")
 SIDES = ("left", "right", "bottom", "top")
@@ -138,10 +139,11 @@ GEOMETRY = {
     ),
 }
 
+EDGE = [(-1.1, 0.03), (0.0, 0.03)]
 HELD = [xc.fix("bottom")]
 PROBLEMS = {
-    "E": (lambda: xc.Isotropic(0.0, 0.3), "modulus E = 0.0 must be positive"),
-    "E nan": (lambda: xc.Isotropic(NAN, 0.3), "modulus E = nan must be positive"),
+    "E": (lambda: xc.Isotropic(0.0, 0.3), r"modulus E = 0.0 is not possible: give .* above 0"),
+    "E nan": (lambda: xc.Isotropic(NAN, 0.3), r"modulus E = nan is not possible: give .* above 0"),
     "nu": (lambda: xc.Isotropic(1.0, 0.5), r"nu = 0.5 must lie in \(-1, 0.5\).*0.4999"),
     "nu below": (lambda: xc.Isotropic(1.0, -1.0), r"nu = -1.0 must lie in \(-1, 0.5\)"),
     "plane": (lambda: xc.Isotropic(1.0, 0.3, plane="stain"), "plane='stain'.: give \"strain\""),
@@ -176,7 +178,7 @@ PROBLEMS = {
     ),
     "load nan": (
         lambda: xc.traction("top", (0, NAN)),
-        r"traction: the value \[0.0, nan\] is not finite",
+        r"traction: the value\[1\] = nan: every number must be finite",
     ),
     "load of a function nan": (
         lambda: solve(loads=[xc.traction("top", lambda x: x * NAN)], supports=HELD),
@@ -198,16 +200,22 @@ PROBLEMS = {
         lambda: solve(loads=[xc.pressure("top", lambda x: x)], supports=HELD),
         r"pressure\('top'\): the value has shape \(\d+, 2\)",
     ),
-    "pressure vector": (lambda: xc.pressure("top", (1, 2)), r"pressure: give a finite number"),
-    "load of words": (lambda: xc.traction("top", "up"), "traction: 'up' is no number, vector"),
+    "pressure vector": (
+        lambda: xc.pressure("top", (1, 2)),
+        r"pressure: the value = \(1, 2\) is not a number: give a finite number",
+    ),
+    "load of words": (
+        lambda: xc.traction("top", "up"),
+        r"traction: the value = 'up' holds str entries: give an array",
+    ),
     "initial stress shape": (
         lambda: xc.initial_stress((1, 2)),
-        r"initial_stress: give a finite \(d, d\)",
+        r"initial_stress has the shape \(2,\): give an array .* \(n, n\)",
     ),
     "initial stress lopsided": (lambda: xc.initial_stress([[1, 2], [0, 1]]), "not symmetric"),
     "displacement nan": (
         lambda: xc.displacement("top", (None, NAN)),
-        r"displacement: the value .* is not finite",
+        r"displacement: value\[1\] = nan is not possible: give a finite number",
     ),
     "displacement entries": (
         lambda: solve(supports=[xc.displacement("top", (None, 0.0, 0.0))]),
@@ -217,7 +225,10 @@ PROBLEMS = {
         lambda: solve(supports=[xc.fix("left"), xc.displacement("top", (1.0, 0.0))], loads=()),
         r"two supports contradict each other at \[-1.0, 1.0\], axis 0: 0 and 1",
     ),
-    "axis": (lambda: xc.fix("top", axis=3), r"fix\('top', axis=3\): axis is 0, 1 or 2"),
+    "axis": (
+        lambda: xc.fix("top", axis=3),
+        r"fix\('top'\): axis = 3 is not possible: give .* at least 0 and of at most 2",
+    ),
     "axis of space": (lambda: solve(supports=[xc.fix("top", axis=2)]), "axis is 0 or 1"),
     "point of a support": (
         lambda: solve(supports=[xc.fix((9.0, 0.0))]),
@@ -235,9 +246,12 @@ PROBLEMS = {
         lambda: problem(loads=[xc.crack_pressure(1.0, crack=1)]),
         r"crack_pressure\(crack=1\): the problem has 0 crack",
     ),
-    "no load": (lambda: problem(loads=["top"]), "loads: 'top' is no load"),
-    "no support": (lambda: problem(supports=PULL), "Traction is no support; give fix"),
-    "no crack": (lambda: xc.Problem(box(), STEEL, [[(0, 0), (1, 1)]]), "is no crack; make one by"),
+    "no load": (lambda: problem(loads=["top"]), "loads: 'top' is not a load"),
+    "no support": (lambda: problem(supports=PULL), "Traction is not a support; give fix"),
+    "no crack": (
+        lambda: xc.Problem(box(), STEEL, [[(0, 0), (1, 1)]]),
+        "is not a Crack; make one by",
+    ),
     "a load for loads": (
         lambda: xc.Problem(box(), STEEL, loads=PULL[0]),
         r"loads: give a list, such as loads=\[...\], not Tr",
@@ -254,12 +268,47 @@ PROBLEMS = {
     "order": (lambda: problem(order=3), "order = 3: give 1 or 2"),
     "load state": (
         lambda: xc.solve(problem(), states=[NAN]),
-        "load state nan: give a finite number",
+        "load state = nan is not possible: give a finite number, or a list of loads",
     ),
     "no load state": (lambda: xc.solve(problem(), states=[]), "states is empty: give at least one"),
     "load state of words": (
         lambda: xc.solve(problem(), states=["half"]),
-        "load state 'half': give a number or a list",
+        "load state = 'half' is not a number: give a finite number, or a list",
+    ),
+    "a nan place": (
+        lambda: xc.point_force((NAN, 1.0), (0.0, 1.0)),
+        r"point_force: x\[0\] = nan: every number must be finite",
+    ),
+    "a lopsided stress": (
+        lambda: solve(
+            loads=[xc.initial_stress(lambda x: np.tile([[0, 1], [0, 0]], (len(x), 1, 1)))]
+        ),
+        "initial_stress: the value at .* a stress must be symmetric",
+    ),
+    "a problem": (
+        lambda: xc.solve("scene"),
+        r"solve: give a Problem\(.*, not str",
+    ),
+    "a solver": (lambda: xc.solve(problem(), solver="mumps"), "solver = 'mumps' cannot be called"),
+    "a solver of nothing": (
+        lambda: xc.solve(problem(supports=HELD), solver=lambda A: None),
+        "solver returned None: it must return a function",
+    ),
+    "a solver of another shape": (
+        lambda: xc.solve(problem(supports=HELD), solver=lambda A: lambda b: b[:3]),
+        r"what the solver returned has the shape \(3, 1\)",
+    ),
+    "points of the other kind": (
+        lambda: solve(supports=HELD).displacement((0.0, 0.0, 0.0)),
+        r"x has the shape \(3,\): give points \(n, 2\)",
+    ),
+    "a side": (
+        lambda: solve(supports=HELD).stress((0.0, 0.0), side="up"),
+        r"side = 'up': give 1 \(lip \+\), -1 \(lip -\) or 0",
+    ),
+    "an opening": (
+        lambda: solve(cracks=[EDGE], supports=HELD).opening(-1),
+        "opening: crack = -1 is not possible: give a whole number of at least 0",
     ),
     "crack number": (lambda: xc.stress_intensity(solve(), 0), "crack 0: the problem has 0 crack"),
     "enrichment": (
@@ -414,3 +463,31 @@ def test_forces_that_nearly_balance_are_balanced_and_said():
     solution = solve(loads=loads)
     assert re.search(r"loads balance to [1-9]\.\de-04", str(solution.report))
     assert scenes.rows(0.0) == pytest.approx(np.eye(2))
+
+
+@pytest.mark.parametrize(("factor", "words"), [(2.0, "1 of"), (1.01, "0.01 of")])
+def test_a_solver_that_is_wrong_is_not_believed(factor, words):
+    """One product tells; a coarse one is used with a warning."""
+    with pytest.raises(xc.ConvergenceError, match=f"solver leaves a residual of {words}"):
+        xc.solve(problem(supports=HELD), solver=lambda A: lambda b: factor * superlu(A)(b))
+
+
+def test_a_coarse_solver_is_used_with_a_warning():
+    with pytest.warns(xc.XcrackWarning, match=r"leaves a residual of .*e-06"):
+        coarse = xc.solve(
+            problem(supports=HELD), solver=lambda A: lambda b: superlu(A)(b) * 1.000002
+        )
+    assert coarse.energy == pytest.approx(solve(supports=HELD).energy, rel=1e-5)
+
+
+def test_an_exception_in_a_users_function_says_where():
+    def broken(x):
+        raise KeyError("mine")
+
+    for call in (
+        lambda: solve(loads=[xc.traction("top", broken)]),
+        lambda: xc.solve(problem(supports=HELD), solver=broken),
+    ):
+        with pytest.raises(KeyError, match="mine") as caught:
+            call()
+        assert "broken, which xcrack called for" in caught.value.__notes__[0]

@@ -10,10 +10,11 @@ from numpy.typing import ArrayLike
 from xcrack.analysis.plan import Report
 from xcrack.arrays import Bools, Floats, Ints, lock
 from xcrack.contact.result import Contact
-from xcrack.errors import GeometryError
+from xcrack.errors import GeometryError, ProblemError
+from xcrack.inputs import numbers
 from xcrack.mesh.locate import locate
 from xcrack.scene.conditions import InitialStress, Load, evaluate_stress
-from xcrack.scene.problem import Problem
+from xcrack.scene.problem import Problem, crack_number
 from xcrack.solvers.reuse import Reuse
 from xcrack.xfem.function_space import Space
 from xcrack.xfem.lips import LipPoints, jump_values
@@ -95,7 +96,7 @@ class Solution:
         ----------
         x : (n, d) array, length
         side : {0, 1, -1}
-            Lip on which points that lie on a crack are taken; 0: lip +.
+            Crack face (lip) on which points that lie on a crack are taken; 0: lip +.
 
         Returns
         -------
@@ -112,7 +113,7 @@ class Solution:
         ----------
         x : (n, d) array, length
         side : {0, 1, -1}
-            Lip on which points that lie on a crack are taken; 0: lip +.
+            Crack face (lip) on which points that lie on a crack are taken; 0: lip +.
 
         Returns
         -------
@@ -137,11 +138,12 @@ class Solution:
 
     def opening(self, crack: int = 0) -> Floats:
         """Normal opening n . [[u]] `(q,)` at the points `lips[crack].x`, length."""
-        return np.einsum("qd,qd->q", self.jump(crack), self.lips[crack].normal)
+        jump = self.jump(crack)
+        return np.einsum("qd,qd->q", jump, self.lips[crack].normal)
 
     def jump(self, crack: int = 0) -> Floats:
         """Displacement of lip + minus that of lip - `(q, d)` at `lips[crack].x`, length."""
-        lips = self.lips[crack]
+        lips = self.lips[crack_number(self.problem, crack, "opening")]
         jump = np.zeros((len(lips), self.space.dim))
         for functions, number, N in jump_values(self.space, crack, lips):
             jump[number] += np.einsum("qn,qni->qi", N, self.coefficients[functions])
@@ -154,12 +156,21 @@ class Solution:
         ----------
         x : (n, d) array, length
         """
-        return locate(self.space.mesh, np.atleast_2d(np.asarray(x, dtype=float)))[0] >= 0
+        return locate(self.space.mesh, self._points(x)[0])[0] >= 0
+
+    def _points(self, x: ArrayLike) -> tuple[Floats, bool]:
+        """Points `(n, d)`, and whether a single one was given."""
+        points, d = numbers(x, "x"), self.space.dim
+        if points.ndim not in (1, 2) or points.shape[-1] != d:
+            raise ProblemError(
+                f"x has the shape {points.shape}: give points (n, {d}), or one point ({d},)."
+            )
+        return np.atleast_2d(points), points.ndim == 1
 
     def _where(self, x: ArrayLike, side: int) -> tuple[Ints, Floats, Ints, bool]:
-        points = np.asarray(x, dtype=float)
-        single = points.ndim == 1
-        points = np.atleast_2d(points)
+        points, single = self._points(x)
+        if isinstance(side, bool) or side not in (0, 1, -1):
+            raise ProblemError(f"side = {side!r:.80}: give 1 (lip +), -1 (lip -) or 0.")
         cell, bary = locate(self.space.mesh, points)
         if (cell < 0).any():
             outside = points[np.argmax(cell < 0)]

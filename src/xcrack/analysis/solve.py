@@ -12,7 +12,7 @@ from xcrack.arrays import Bools, Floats, lock
 from xcrack.contact.solve import contact_of, solve_contact
 from xcrack.errors import ProblemError
 from xcrack.scene.conditions import Displacement, InitialStress, Load
-from xcrack.scene.problem import Problem
+from xcrack.scene.problem import Problem, check_problem
 from xcrack.solvers.direct import Solver, system
 from xcrack.solvers.engine import Engine
 from xcrack.solvers.iterative import iterative_system
@@ -52,9 +52,15 @@ def solve(
     ConvergenceError
         A singular stiffness, or contact that finds no closed set.
     """
+    check_problem(problem, "solve")
+    if solver is not None and not callable(solver):
+        raise ProblemError(
+            f"solver = {solver!r:.80} cannot be called: give a function of a sparse matrix that "
+            "returns a function of right-hand sides, such as xc.pardiso."
+        )
     if states is not None and (isinstance(states, str) or not isinstance(states, Iterable)):
         raise ProblemError(
-            f"states = {states!r}: give a list of load states, such as states=[1.0]."
+            f"states = {states!r:.80}: give a list of load states, such as states=[1.0]."
         )
     solutions = solve_states(problem, [None] if states is None else list(states), solver=solver)
     return solutions[0] if states is None else solutions

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from xcrack.arrays import Floats, frozen
 from xcrack.errors import ProblemError
+from xcrack.inputs import called, number, numbers, whole
 
 Value = Any  # vector, f(x) or f(x, normal)
 Where = Any  # name of a facet set, or a point
@@ -95,9 +96,10 @@ def fix(where: Where, axis: int | None = None) -> Fix:
     -------
     Fix
     """
-    if axis is not None and axis not in (0, 1, 2):
-        raise ProblemError(f"fix({where!r}, axis={axis!r}): axis is 0, 1 or 2.")
-    return Fix(_where(where, "fix"), axis)
+    place = _where(where, "fix")
+    if axis is None:
+        return Fix(place, None)
+    return Fix(place, whole(axis, f"fix({_name(where)}): axis", least=0, most=2))
 
 
 def displacement(where: Where, value: Value) -> Displacement:
@@ -132,7 +134,7 @@ def traction(where: str, value: Value) -> Traction:
     -------
     Traction
     """
-    return Traction(where, _value(value, "traction"))
+    return Traction(_set_name(where, "traction"), _value(value, "traction"))
 
 
 def pressure(where: str, p: float | Callable[..., ArrayLike]) -> Pressure:
@@ -149,7 +151,7 @@ def pressure(where: str, p: float | Callable[..., ArrayLike]) -> Pressure:
     -------
     Pressure
     """
-    return Pressure(where, _scalar(p, "pressure"))
+    return Pressure(_set_name(where, "pressure"), _scalar(p, "pressure"))
 
 
 def point_force(x: ArrayLike, f: ArrayLike) -> PointForce:
@@ -164,10 +166,13 @@ def point_force(x: ArrayLike, f: ArrayLike) -> PointForce:
     -------
     PointForce
     """
-    place, force = np.asarray(x, dtype=float), _value(f, "point_force")
-    if place.shape != np.shape(force):
-        raise ProblemError(f"point_force: x {place.tolist()} and f {force} differ in dimension.")
-    return PointForce(frozen(place), force)
+    place, force = numbers(x, "point_force: x", (None,)), numbers(f, "point_force: f", (None,))
+    if len(place) not in (2, 3) or len(place) != len(force):
+        raise ProblemError(
+            f"point_force: x {place.tolist()} and f {force.tolist()} must both have 2 or both 3 "
+            "numbers."
+        )
+    return PointForce(frozen(place), frozen(force))
 
 
 def body_force(b: Value) -> BodyForce:
@@ -199,6 +204,8 @@ def crack_pressure(p: float | Callable[..., ArrayLike], crack: int | None = None
     -------
     CrackPressure
     """
+    if crack is not None:
+        crack = whole(crack, "crack_pressure: crack", least=0)
     return CrackPressure(_scalar(p, "crack_pressure"), crack)
 
 
@@ -216,9 +223,9 @@ def initial_stress(f: Any) -> InitialStress:
     """
     if callable(f):
         return InitialStress(f)
-    sigma = _numbers(f, "initial_stress")
-    if sigma.ndim != 2 or sigma.shape[0] != sigma.shape[1] or not np.isfinite(sigma).all():
-        raise ProblemError(f"initial_stress: give a finite (d, d) array, not {f!r}.")
+    sigma = numbers(f, "initial_stress", (None, None))
+    if sigma.shape not in ((2, 2), (3, 3)):
+        raise ProblemError(f"initial_stress has the shape {sigma.shape}: give (2, 2) or (3, 3).")
     if not np.allclose(sigma, sigma.T):
         raise ProblemError(f"initial_stress: {sigma.tolist()} is not symmetric.")
     return InitialStress(frozen(sigma))
@@ -229,44 +236,73 @@ def evaluate(value: Value, x: Floats, what: str, normal: Floats | None = None) -
     n, d = x.shape
     if callable(value):
         two = normal is not None and _n_positional(value) >= 2
-        result = _numbers(value(x, normal) if two else value(x), what)
+        arguments = (x, normal) if two else (x,)
+        result = _values(called(value, f"the value of {what}", *arguments), what)
     else:
-        vector = _numbers(value, what)
-        result = np.broadcast_to(vector, (n, d)) if vector.shape == (d,) else vector
+        result = numbers(value, what)
+    if result.shape == (d,):
+        result = np.broadcast_to(result, (n, d))
     if result.shape != (n, d):
         raise ProblemError(
             f"{what}: the value has shape {result.shape}, wanted {(n, d)} for {n} points in "
             f"{d} dimensions; give a vector of length {d} or a function that returns (n, {d})."
         )
-    _finite(result, x, what)
+    _check_finite(result, x, what)
     return result
 
 
 def evaluate_scalar(value: Any, x: Floats, what: str) -> Floats:
     """Value of a number or f(x) at points `(n, d)`, checked `(n,)`."""
-    given = _numbers(value(x) if callable(value) else value, what)
+    if callable(value):
+        given = _values(called(value, f"the value of {what}", x), what)
+    else:
+        given = numbers(value, what)
     if given.shape not in ((), (len(x),)):
         raise ProblemError(
             f"{what}: the value has shape {given.shape}, wanted {(len(x),)}; give a number or a "
             "function that returns (n,)."
         )
     result = np.broadcast_to(given, (len(x),))
-    _finite(result, x, what)
+    _check_finite(result, x, what)
     return result
 
 
 def evaluate_stress(value: Any, x: Floats) -> Floats:
-    """Initial stress at points, checked `(n, d, d)`."""
-    d = x.shape[1]
-    result = _numbers(value(x) if callable(value) else value, "initial_stress")
+    """Initial stress at points, checked `(n, d, d)`.
+
+    Raises
+    ------
+    ProblemError
+        Another shape, values that are not finite or not symmetric.
+    """
+    d, what = x.shape[1], "initial_stress"
+    if callable(value):
+        result = _values(called(value, f"the value of {what}", x), what)
+    else:
+        result = numbers(value, what)
     if result.shape not in ((d, d), (len(x), d, d)):
-        raise ProblemError(f"initial_stress: shape {result.shape}, wanted {(len(x), d, d)}.")
+        raise ProblemError(
+            f"{what}: the value has shape {result.shape}, wanted {(len(x), d, d)} for {len(x)} "
+            f"points in {d} dimensions."
+        )
     result = np.broadcast_to(result, (len(x), d, d))
-    _finite(result, x, "initial_stress")
+    _check_finite(result, x, what)
+    lopsided = np.abs(result - np.swapaxes(result, 1, 2)).reshape(len(x), -1).max(axis=1, initial=0)
+    if (lopsided > 1e-8 * np.abs(result).max(initial=0.0)).any():
+        where = int(np.argmax(lopsided))
+        raise ProblemError(
+            f"{what}: the value at {np.round(x[where], 9).tolist()} is "
+            f"{result[where].tolist()}: a stress must be symmetric."
+        )
     return result
 
 
-def _finite(result: Floats, x: Floats, what: str) -> None:
+def _values(result: Any, what: str) -> Floats:
+    """What a function returned: an array of real numbers; others are looked for later."""
+    return numbers(result, f"{what}: the returned value", finite=False)
+
+
+def _check_finite(result: Floats, x: Floats, what: str) -> None:
     bad = ~np.isfinite(result.reshape(len(x), -1)).all(axis=1)
     if bad.any():
         where = x[np.argmax(bad)]
@@ -274,16 +310,6 @@ def _finite(result: Floats, x: Floats, what: str) -> None:
             f"{what}: the value at {np.round(where, 9).tolist()} is "
             f"{result[np.argmax(bad)].tolist()}: every value must be finite."
         )
-
-
-def _numbers(value: Any, what: str) -> Floats:
-    try:
-        return np.asarray(value, dtype=float)
-    except (TypeError, ValueError) as error:
-        raise ProblemError(
-            f"{what}: {value!r} is no number, vector or array of them; give one, or a function "
-            "that returns one."
-        ) from error
 
 
 def _n_positional(function: Callable[..., Any]) -> int:
@@ -300,32 +326,36 @@ def _n_positional(function: Callable[..., Any]) -> int:
 def _where(where: Where, what: str) -> Where:
     if isinstance(where, str):
         return where
-    point = _numbers(where, what)
-    if point.ndim != 1 or not np.isfinite(point).all():
-        raise ProblemError(f"{what}: {where!r} is neither the name of a set nor a point.")
-    return frozen(point)
+    try:
+        return frozen(numbers(where, f"{what}: where", (None,)))
+    except ProblemError as error:
+        raise ProblemError(f"{error} Or give the name of a facet set.") from None
+
+
+def _set_name(where: Any, what: str) -> str:
+    if not isinstance(where, str):
+        raise ProblemError(f"{what}: {_name(where)} is not the name of a facet set.")
+    return where
+
+
+def _name(where: Any) -> str:
+    return f"{where!r:.80}"
 
 
 def _value(value: Value, what: str, none: bool = False) -> Value:
     if callable(value):
         return value
     if none and isinstance(value, Sequence) and any(v is None for v in value):
-        for v in value:
-            if v is not None and not np.isfinite(v):
-                raise ProblemError(f"{what}: the value {value!r} is not finite.")
-        return tuple(value)
-    vector = _numbers(value, what)
-    if vector.ndim != 1 or len(vector) not in (2, 3):
-        raise ProblemError(f"{what}: give a vector of 2 or 3 numbers or a function, not {value!r}.")
-    if not np.isfinite(vector).all():
-        raise ProblemError(f"{what}: the value {vector.tolist()} is not finite.")
+        return tuple(
+            None if v is None else number(v, f"{what}: value[{i}]") for i, v in enumerate(value)
+        )
+    vector = numbers(value, f"{what}: the value", (None,))
+    if len(vector) not in (2, 3):
+        raise ProblemError(
+            f"{what}: give a vector of 2 or 3 numbers or a function, not {_name(value)}."
+        )
     return frozen(vector)
 
 
 def _scalar(value: Any, what: str) -> Any:
-    if callable(value):
-        return value
-    number = _numbers(value, what)
-    if number.ndim != 0 or not np.isfinite(number):
-        raise ProblemError(f"{what}: give a finite number or a function f(x), not {value!r}.")
-    return float(number)
+    return value if callable(value) else number(value, f"{what}: the value")

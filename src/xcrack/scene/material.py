@@ -6,6 +6,9 @@ import numpy as np
 
 from xcrack.arrays import Floats
 from xcrack.errors import ProblemError
+from xcrack.inputs import number
+
+_PLANES = ("strain", "stress")
 
 
 @dataclass(frozen=True)
@@ -19,7 +22,7 @@ class Isotropic:
     nu : float
         Poisson's ratio in (-1, 0.5).
     plane : {"strain", "stress"}, optional
-        State of a plane body; None in space.
+        State of a 2D body; None in 3D.
 
     Raises
     ------
@@ -37,16 +40,16 @@ class Isotropic:
     plane: str | None = None
 
     def __post_init__(self) -> None:
-        if not (np.isfinite(self.E) and self.E > 0):
-            raise ProblemError(f"Young's modulus E = {self.E} must be positive and finite.")
-        if not -1 < self.nu < 0.5:
+        number(self.E, "Young's modulus E", above=0)
+        if not -1 < number(self.nu, "Poisson's ratio nu") < 0.5:
             raise ProblemError(
                 f"Poisson's ratio nu = {self.nu} must lie in (-1, 0.5); for a nearly "
                 "incompressible material take a value such as 0.4999."
             )
-        if self.plane not in (None, "strain", "stress"):
+        if not (self.plane is None or (isinstance(self.plane, str) and self.plane in _PLANES)):
             raise ProblemError(
-                f'Isotropic(plane={self.plane!r}): give "strain" or "stress" (nothing in space).'
+                f'Isotropic(plane={self.plane!r:.80}): give "strain" or "stress" in 2D, nothing '
+                "in 3D."
             )
 
     @property
@@ -62,7 +65,7 @@ class Isotropic:
 
     @property
     def kolosov(self) -> float:
-        """Kolosov's constant: 3 - 4 nu (strain and space) or (3 - nu) / (1 + nu)."""
+        """Kolosov's constant: 3 - 4 nu (plane strain and 3D) or (3 - nu) / (1 + nu)."""
         return (3 - self.nu) / (1 + self.nu) if self.plane == "stress" else 3 - 4 * self.nu
 
     @property

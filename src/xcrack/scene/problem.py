@@ -6,9 +6,12 @@ from functools import cached_property
 from numbers import Real
 from typing import Any
 
+import numpy as np
+
 from xcrack.crack.crack import Crack, check_cracks, place
 from xcrack.crack.placing_3d import check_surfaces, place_surface
 from xcrack.errors import ProblemError
+from xcrack.inputs import number, whole
 from xcrack.mesh.mesh import Mesh
 from xcrack.mesh.sets import facet_set
 from xcrack.scene.conditions import (
@@ -92,10 +95,10 @@ class Problem:
             )
         if self.order is None:
             object.__setattr__(self, "order", _ORDER[self.mesh.dim])
-        if self.order not in (1, 2):
-            raise ProblemError(f"order = {self.order!r}: give 1 or 2.")
-        if self.contact not in ("auto", "on", "off"):
-            raise ProblemError(f'contact = {self.contact!r}: give "auto", "on" or "off".')
+        if isinstance(self.order, bool) or self.order not in (1, 2):
+            raise ProblemError(f"order = {self.order!r:.80}: give 1 or 2.")
+        if not isinstance(self.contact, str) or self.contact not in ("auto", "on", "off"):
+            raise ProblemError(f'contact = {self.contact!r:.80}: give "auto", "on" or "off".')
         self._check_members()
         if self.mesh.dim == 2:
             check_cracks(self.placed, self.mesh)
@@ -112,13 +115,13 @@ class Problem:
         """Loads and factor of a load state: a number, or a list of loads."""
         if state is None:
             return tuple(self.loads), 1.0
-        if isinstance(state, Real):
-            factor = float(state)
-            if not abs(factor) < float("inf"):
-                raise ProblemError(f"load state {factor}: give a finite number.")
-            return tuple(self.loads), factor
-        if isinstance(state, str) or not isinstance(state, Iterable):
-            raise ProblemError(f"load state {state!r}: give a number or a list of loads.")
+        if isinstance(state, Real | np.ndarray) or np.isscalar(state):
+            try:
+                return tuple(self.loads), number(state, "load state")
+            except ProblemError as error:
+                raise ProblemError(f"{str(error)[:-1]}, or a list of loads.") from None
+        if not isinstance(state, Iterable):
+            raise ProblemError(f"load state {state!r:.80}: give a number or a list of loads.")
         loads = tuple(state)
         for load in loads:
             self._check_load(load)
@@ -128,11 +131,13 @@ class Problem:
     def _check_members(self) -> None:
         for crack in self.cracks:
             if not isinstance(crack, Crack):
-                raise ProblemError(f"cracks: {crack!r} is no crack; make one by line_crack(...).")
+                raise ProblemError(
+                    f"cracks: {crack!r} is not a Crack; make one by line_crack(...)."
+                )
         for support in self.supports:
             if not isinstance(support, Fix | Displacement):
                 raise ProblemError(
-                    f"supports: {type(support).__name__} is no support; give fix(...) or "
+                    f"supports: {type(support).__name__} is not a support; give fix(...) or "
                     "displacement(...), and put forces into loads."
                 )
             if isinstance(support.where, str):
@@ -142,7 +147,9 @@ class Problem:
 
     def _check_load(self, load: Any) -> None:
         if not isinstance(load, _LOADS):
-            raise ProblemError(f"loads: {load!r} is no load; see traction(...), pressure(...).")
+            raise ProblemError(
+                f"loads: {load!r:.80} is not a load; see traction(...), pressure(...)."
+            )
         where = getattr(load, "where", None)
         if isinstance(where, str):
             facet_set(self.mesh, where, type(load).__name__.lower())
@@ -159,6 +166,22 @@ class Problem:
                     f"crack_pressure(crack={load.crack}): the problem has {len(self.cracks)} "
                     "crack(s), numbered from 0."
                 )
+
+
+def check_problem(problem: Any, what: str) -> None:
+    """Raise where a function that needs a problem was given something else."""
+    if not isinstance(problem, Problem):
+        raise ProblemError(
+            f"{what}: give a Problem(mesh, material, ...), not {type(problem).__name__}."
+        )
+
+
+def crack_number(problem: Problem, crack: Any, what: str) -> int:
+    """A crack of the problem by number, checked."""
+    n = len(problem.cracks)
+    if not n:
+        raise ProblemError(f"{what}: crack {crack!r:.80}: the problem has no crack.")
+    return whole(crack, f"{what}: crack", least=0, most=n - 1)
 
 
 def _same(a: Any, b: Any) -> bool:

@@ -8,7 +8,8 @@ import numpy as np
 import scipy.sparse as sp
 
 from xcrack.arrays import Bools, Floats, Ints
-from xcrack.errors import ConvergenceError, ProblemError
+from xcrack.errors import ConvergenceError, ProblemError, warn
+from xcrack.inputs import called, numbers
 from xcrack.scene.material import Isotropic
 from xcrack.scene.numerics import Numerics
 from xcrack.solvers.active_set import active_set
@@ -25,6 +26,8 @@ from xcrack.solvers.modal_basis import mode_columns
 from xcrack.solvers.reuse import Reuse
 from xcrack.xfem.function_space import Space
 
+_WRONG = 1e-3  # residual of a user's solver, relative, that is not a solution
+_COARSE = 1e-8  # and one that limits what follows
 _BLOCK = 16  # right-hand sides solved at once for the dual matrix; bounds the memory
 
 Solver = Callable[[sp.csc_matrix], Solve]
@@ -157,10 +160,40 @@ def system(
     basis, reduced, last = _reduced(space, K, fixed, numerics, material)
     count = Count(factorisations=1)
     if solver is not None:
-        return System(K, ~fixed, basis, reduced, solver(reduced), count)
+        return System(K, ~fixed, basis, reduced, _verified(solver, reduced), count)
     node = function_nodes(space)[last // space.dim]
     solve, order = eliminated(reduced, node, space.n_nodes, elimination)
     return System(K, ~fixed, basis, reduced, solve, count, order)
+
+
+def _verified(solver: Solver, A: sp.csc_matrix) -> Solve:
+    """A user's solver, with a look at what it returns: a residual costs one product."""
+    solve = called(solver, "solver=", A)
+    if not callable(solve):
+        raise ProblemError(
+            f"solver returned {solve!r:.80}: it must return a function of right-hand sides."
+        )
+
+    def verified(b: Floats) -> Floats:
+        x = numbers(called(solve, "solver=", b), "what the solver returned", b.shape, finite=False)
+        if not np.isfinite(x).all():
+            return x  # a singular stiffness, which has its own error
+        size = np.sqrt((b * b).sum(axis=0))
+        residual = np.sqrt(((b - A @ x) ** 2).sum(axis=0))
+        share = float(np.max(residual / np.where(size > 0, size, 1.0), initial=0.0))
+        if share > _WRONG:
+            raise ConvergenceError(
+                f"the given solver leaves a residual of {share:.3g} of the right-hand side: what "
+                "it returned is not the solution. Try it on a small matrix, or leave solver out."
+            )
+        if share > _COARSE:
+            warn(
+                f"the given solver leaves a residual of {share:.3g} of the right-hand side; K and "
+                "contact are no better. Give it a smaller tolerance."
+            )
+        return x
+
+    return verified
 
 
 def scaled_basis(
