@@ -5,8 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 
 from xcrack.crack.crack import front, line_crack
+from xcrack.crack.size_2d import length_inside
 from xcrack.growth import run as growth
-from xcrack.growth.advance import length_inside
 from xcrack.mesh.box import box
 from xcrack.scene.material import Isotropic
 from xcrack.scene.problem import Problem

@@ -324,7 +324,7 @@ PROBLEMS = {
     "points": (lambda: xc.Numerics(points=1), r"points = 1 is not possible"),
     # Growth
     "da": (lambda: grow(da=0.01), "advance 0.01 .*below a tenth of the cell.*cell size"),
-    "da nan": (lambda: grow(da=NAN), "da = nan must be positive"),
+    "da nan": (lambda: grow(da=NAN), "da = nan .* a finite number above 0"),
     "no da": (lambda: grow(da=None), "grow needs da .* or cycles"),
     "law negative": (
         lambda: grow(law=lambda dK, R: -dK),

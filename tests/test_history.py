@@ -22,7 +22,9 @@ from xcrack.growth import fingerprint as settings
 from xcrack.growth.criteria import max_hoop_stress, weighted_angle
 from xcrack.growth.fingerprint import describe, differences
 from xcrack.growth.laws import paris
-from xcrack.growth.run import Cycle, Run, grow
+from xcrack.growth.options import Run
+from xcrack.growth.run import grow
+from xcrack.growth.step import Cycle
 from xcrack.history import run_folder as run_files
 from xcrack.history import store
 from xcrack.history.history import History, collect, load, resume

@@ -6,10 +6,11 @@ from matplotlib.figure import Figure
 from scipy.spatial import cKDTree
 
 import xcrack as xc
+from xcrack.crack.fronts_3d import front_weights, is_closed
 from xcrack.growth.step import Step
 from xcrack.history.history import History
 from xcrack.plotting import pyvista_2d as plot_pyvista
-from xcrack.plotting.fronts_3d import draw_fronts, draw_K, front_weights, is_closed, step_fronts
+from xcrack.plotting.fronts_3d import draw_fronts, draw_K, step_fronts
 from xcrack.plotting.loads_3d import load_arrows
 from xcrack.plotting.projection import best_plane, given_plane, on_plane, section_outline
 from xcrack.plotting.scene_2d import SPACE_FIELDS

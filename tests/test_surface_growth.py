@@ -9,17 +9,13 @@ from xcrack.crack.crack import Crack, _crossing
 from xcrack.crack.front_remeshing import along_front
 from xcrack.crack.fronts_3d import front_frames
 from xcrack.crack.placing_3d import place_surface
-from xcrack.crack.size_3d import (
-    area_inside,
-    carried,
-    elapsed_in_space,
-    front_length_inside,
-    surface_size,
-)
+from xcrack.crack.size_3d import area_inside, front_length_inside, surface_size
 from xcrack.crack.surfaces import elliptic_crack, penny_crack
 from xcrack.errors import GeometryError, XcrackWarning
 from xcrack.geometry.triangulation import face_areas, face_normals, loops, oriented, side_keys
 from xcrack.growth.cycles import cycles_between
+from xcrack.growth.cycles_3d import elapsed_3d
+from xcrack.growth.follow_3d import carried
 from xcrack.mesh.box import box
 
 
@@ -450,22 +446,22 @@ def test_cycles_of_a_penny_and_of_a_straight_front(power):
     da = np.full(8, a1 - a0)
     exact = cycles_between(a0, a1, rate0[0], rate1[0])
     for size in ((a0 / 2, a1 / 2), (a0, a1)):
-        found = elapsed_in_space([size[0]], [size[1]], [da], [rate0], [rate1])
+        found = elapsed_3d([size[0]], [size[1]], [da], [rate0], [rate1])
         assert found == pytest.approx(exact, rel=1e-12)
     scatter = rate1 * (1 + 0.03 * np.array([1, -1, 1, -1, -1, 1, -1, 1]))
-    found = elapsed_in_space([1.0], [1.5], [da], [rate0], [scatter])
+    found = elapsed_3d([1.0], [1.5], [da], [rate0], [scatter])
     assert found == pytest.approx(exact, rel=1e-12)
 
 
 def test_cycles_where_points_stop_or_leave():
     da, rate = [np.array([0.1, 0.2]), np.zeros(0)], [np.array([1e-3, 2e-3]), np.zeros(0)]
     gone = [np.full(2, np.nan), np.zeros(0)]
-    assert elapsed_in_space([1, 1], [1.1, 1], da, rate, gone) == pytest.approx(100)
+    assert elapsed_3d([1, 1], [1.1, 1], da, rate, gone) == pytest.approx(100)
     still = [np.zeros(2), np.zeros(0)]
-    assert elapsed_in_space([1, 1], [1.1, 1], da, rate, still) == pytest.approx(200)
+    assert elapsed_3d([1, 1], [1.1, 1], da, rate, still) == pytest.approx(200)
     one = [np.array([1e-3, np.nan]), np.zeros(0)]
-    assert elapsed_in_space([1, 1], [1.1, 1], da, rate, one) == pytest.approx(100, rel=1e-12)
-    assert elapsed_in_space([1, 1], [1.0, 1], da, rate, rate) == pytest.approx(100, rel=1e-12)
+    assert elapsed_3d([1, 1], [1.1, 1], da, rate, one) == pytest.approx(100, rel=1e-12)
+    assert elapsed_3d([1, 1], [1.0, 1], da, rate, rate) == pytest.approx(100, rel=1e-12)
 
 
 def test_life_of_a_penny_that_grows():
@@ -481,7 +477,7 @@ def test_life_of_a_penny_that_grows():
         radius = np.linalg.norm(new, axis=1)
         after = carried(new, np.zeros(len(new), int), [True], radius**1.5, places * 1.2, 0.9)
         before = np.full(len(places), (1 + 0.2 * step) ** 1.5)
-        cycles += elapsed_in_space(sizes[-2:-1], sizes[-1:], [da], [before], [after])
+        cycles += elapsed_3d(sizes[-2:-1], sizes[-1:], [da], [before], [after])
     assert cycles == pytest.approx(2 - 2 / np.sqrt(2), rel=2e-3)
 
 

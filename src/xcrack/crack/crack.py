@@ -8,7 +8,7 @@ from scipy.spatial import cKDTree
 
 from xcrack.arrays import Bools, Floats, Ints, frozen
 from xcrack.errors import GeometryError
-from xcrack.mesh.locate import contains, locate, nearest_boundary
+from xcrack.mesh.locate import cell_sizes, contains, locate, nearest_boundary
 from xcrack.mesh.mesh import Mesh
 
 _MOUTH = 0.5  # an end within this share of a cell from the boundary is a mouth
@@ -176,7 +176,7 @@ def place(crack: Crack, mesh: Mesh) -> Crack:
             points[end] = _prolonged(mesh, points[end], out, size)
     placed = Crack(points, crack.faces, tuple(tips))
     if tips:
-        h = _cell_sizes(mesh, points[tips])
+        h = cell_sizes(mesh, points[tips])
         if length.sum() < h.min():
             raise GeometryError(
                 f"the crack at {points[tips[0]].tolist()} has length {length.sum():.4g}, less than "
@@ -211,11 +211,6 @@ def _prolonged(mesh: Mesh, end: Floats, out: Floats, size: float) -> Floats:
     again = np.nonzero(inside[first_out:])[0]
     gap = float(again[0]) * step if len(again) else np.inf
     return np.asarray(end + out * (steps[first_out] + min(size, gap / 2)))
-
-
-def _cell_sizes(mesh: Mesh, x: Floats) -> Floats:
-    cell, _ = locate(mesh, x)
-    return mesh.cell_size[np.maximum(cell, 0)]
 
 
 def front(crack: Crack) -> tuple[Floats, Floats]:

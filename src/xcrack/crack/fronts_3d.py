@@ -10,6 +10,7 @@ from xcrack.geometry.distances import corner_normals
 from xcrack.geometry.triangulation import face_normals, rim, ruled, unit
 from xcrack.mesh.mesh import Mesh
 
+_FAR = 2.5  # median spacings that still close a front, from its last point to its first
 _FAN = np.radians(30.0)  # a front that turns away by more gets rays between
 
 
@@ -79,6 +80,28 @@ def _tangents(x: Floats, closed: bool) -> Floats:
     back_length = np.linalg.norm(back, axis=1, keepdims=True)
     tangent = ahead / ahead_length * back_length + back / back_length * ahead_length
     return unit(tangent)
+
+
+def is_closed(x: Floats) -> bool:
+    """Whether points along a front, each once, go round: the last lies next to the first."""
+    if len(x) < 4:
+        return False
+    spacing = np.linalg.norm(np.diff(x, axis=0), axis=1)
+    return bool(np.linalg.norm(x[-1] - x[0]) < _FAR * np.median(spacing))
+
+
+def front_weights(x: Floats) -> Floats:
+    """Share of the length of a front that belongs to each of its points `(m,)`; their sum is 1."""
+    if len(x) == 1:
+        return np.ones(1)
+    along = np.linalg.norm(np.diff(x, axis=0), axis=1)
+    if is_closed(x):
+        along = np.append(along, np.linalg.norm(x[0] - x[-1]))
+        weight = along + np.roll(along, 1)
+    else:
+        weight = np.append(along, 0.0) + np.append(0.0, along)
+    total = float(weight.sum())
+    return np.asarray(weight / total if total else np.full(len(x), 1 / len(x)))
 
 
 @dataclass(frozen=True, eq=False)

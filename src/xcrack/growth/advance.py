@@ -1,16 +1,10 @@
-"""How far each tip of all cracks goes in one step, and how many cycles that takes."""
+"""How far each tip of all cracks goes in one step."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from xcrack.arrays import Floats
-from xcrack.crack.crack import Crack
-from xcrack.errors import ProblemError
-from xcrack.growth.cycles import cycles_between
-from xcrack.mesh.locate import contains, locate
-from xcrack.mesh.mesh import Mesh
 
 LEAST = 0.1  # of a cell: a shorter new face turns the tip's frame, but not the crack the mesh sees
 
@@ -97,84 +91,4 @@ def plan_advance(
     )
 
 
-def elapsed(
-    length: Sequence[float],
-    da: PerCrack,
-    rate0: PerCrack,
-    rate1: Sequence[Sequence[float | None]],
-) -> float:
-    """Cycles of one step, by the local power law of the tip that drives it.
-
-    The driving tip is the one with the largest rate of those that moved, and that are still
-    there: a tip that has left the body has no rate after the step. If none is left, the rate
-    before the step stands for the whole of it.
-
-    Parameters
-    ----------
-    length : sequence of float, length
-        Length of each crack before the step. A tip is given the part of it that its advance has
-        in that of its crack: half for each tip of a crack that grows evenly.
-    da, rate0 : tuple of (f,) arrays
-        Advance of each tip, and growth a cycle before the step.
-    rate1 : sequence of sequence of float or None
-        Growth a cycle after the step, None at tips that are gone.
-
-    Returns
-    -------
-    float
-    """
-    moved = [
-        (c, j) for c, d in enumerate(da) for j in range(len(d)) if d[j] > 0 and rate0[c][j] > 0
-    ]
-    stay = [(c, j) for c, j in moved if rate1[c][j] is not None]
-    c, j = max(stay or moved, key=lambda tip: rate0[tip[0]][tip[1]])
-    after = rate1[c][j]
-    if after is None:
-        return float(da[c][j] / rate0[c][j])
-    a = length[c] * float(da[c][j] / da[c].sum())
-    return float(cycles_between(a, a + da[c][j], rate0[c][j], after))
-
-
-def cell_sizes(mesh: Mesh, x: Floats) -> Floats:
-    """Size of the cell at each point `(k,)`, length; at the nearest cell where none has it."""
-    cell, _ = locate(mesh, x)
-    if (cell < 0).any():
-        _, nearest = mesh.cell_tree.query(x[cell < 0])
-        cell = np.array(cell)
-        cell[cell < 0] = nearest
-    return np.asarray(mesh.cell_size[cell])
-
-
-def length_inside(crack: Crack, mesh: Mesh) -> float:
-    """Length of the part of a crack in the plane that lies in the body.
-
-    A mouth lies outside, as far as the crack was prolonged; that part does not count.
-    """
-    facets = mesh.points[mesh.facet_sets["boundary"]]
-    q, s = facets[:, 0], facets[:, 1] - facets[:, 0]
-    total = 0.0
-    for first, second in crack.faces:
-        p, r = crack.points[first], crack.points[second] - crack.points[first]
-        cross = r[0] * s[:, 1] - r[1] * s[:, 0]
-        gap = q - p
-        with np.errstate(divide="ignore", invalid="ignore"):
-            t = (gap[:, 0] * s[:, 1] - gap[:, 1] * s[:, 0]) / cross
-            u = (gap[:, 0] * r[1] - gap[:, 1] * r[0]) / cross
-        hits = t[(cross != 0) & (u >= 0) & (u <= 1) & (t > 0) & (t < 1)]
-        ends = np.concatenate([[0.0], np.sort(hits), [1.0]])
-        inside = contains(mesh, p + 0.5 * (ends[:-1] + ends[1:])[:, None] * r)
-        total += float(np.diff(ends)[inside].sum() * np.linalg.norm(r))
-    if total <= 0:
-        raise ProblemError(f"no part of the crack from {crack.points[0].tolist()} is in the body.")
-    return total
-
-
-__all__ = [
-    "LEAST",
-    "Advance",
-    "PerCrack",
-    "cell_sizes",
-    "elapsed",
-    "length_inside",
-    "plan_advance",
-]
+__all__ = ["LEAST", "Advance", "PerCrack", "plan_advance"]

@@ -1,4 +1,4 @@
-"""Answers of a criterion and a law, after a look at what they returned."""
+"""Evaluate criteria and laws, and validate what they return."""
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from xcrack.growth.laws import Law
 def directed(
     criterion: Criterion, K: Floats, nu: float, crack: int
 ) -> tuple[Floats, Floats, Floats]:
-    """Answer of the criterion for one crack, after a look at what it returned."""
+    """Angle, range and ratio of one crack by a criterion, checked."""
     n = K.shape[1]
     if n == 0:
         return np.zeros(0), np.zeros(0), np.zeros(0)
@@ -35,7 +35,7 @@ def directed(
 
 
 def law_rate(law: Law, dK_eq: Floats, R: Floats, crack: int) -> Floats:
-    """Answer of the law for one crack, after a look at what it returned."""
+    """Growth rates of one crack by a law, checked."""
     if len(dK_eq) == 0:
         return np.zeros(0)
     rate = np.asarray(law(dK_eq, R), dtype=float)

@@ -1,11 +1,14 @@
 """Number of load cycles between two states of a growing crack."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import exprel
 
 from xcrack.arrays import Floats
 from xcrack.errors import ProblemError
+from xcrack.growth.advance import PerCrack
 
 
 def cycles_between(a0: ArrayLike, a1: ArrayLike, rate0: ArrayLike, rate1: ArrayLike) -> Floats:
@@ -54,4 +57,42 @@ def cycles_between(a0: ArrayLike, a1: ArrayLike, rate0: ArrayLike, rate1: ArrayL
     return np.asarray(np.where(stops, 2 * (a1 - a0) / rate0, a0 / rate0 * x * exprel(q)))[()]
 
 
-__all__ = ["cycles_between"]
+def elapsed(
+    length: Sequence[float],
+    da: PerCrack,
+    rate0: PerCrack,
+    rate1: Sequence[Sequence[float | None]],
+) -> float:
+    """Cycles of one step, by the local power law of the tip that drives it.
+
+    The driving tip is the one with the largest rate of those that moved, and that are still
+    there: a tip that has left the body has no rate after the step. If none is left, the rate
+    before the step stands for the whole of it.
+
+    Parameters
+    ----------
+    length : sequence of float, length
+        Length of each crack before the step. A tip is given the part of it that its advance has
+        in that of its crack: half for each tip of a crack that grows evenly.
+    da, rate0 : tuple of (f,) arrays
+        Advance of each tip, and growth a cycle before the step.
+    rate1 : sequence of sequence of float or None
+        Growth a cycle after the step, None at tips that are gone.
+
+    Returns
+    -------
+    float
+    """
+    moved = [
+        (c, j) for c, d in enumerate(da) for j in range(len(d)) if d[j] > 0 and rate0[c][j] > 0
+    ]
+    stay = [(c, j) for c, j in moved if rate1[c][j] is not None]
+    c, j = max(stay or moved, key=lambda tip: rate0[tip[0]][tip[1]])
+    after = rate1[c][j]
+    if after is None:
+        return float(da[c][j] / rate0[c][j])
+    a = length[c] * float(da[c][j] / da[c].sum())
+    return float(cycles_between(a, a + da[c][j], rate0[c][j], after))
+
+
+__all__ = ["cycles_between", "elapsed"]

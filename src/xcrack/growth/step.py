@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from xcrack.analysis.solution import Solution
+from xcrack.arrays import Floats
 from xcrack.crack.crack import Crack
 from xcrack.errors import ProblemError
 from xcrack.growth.advance import PerCrack
@@ -128,4 +129,18 @@ class Step:
         return sum(len(a) for a in self.angle)
 
 
-__all__ = ["Cycle", "Memory", "Step"]
+def memory_of(step: Step) -> Memory:
+    """What a step left to the next one."""
+    if step.memory is None:
+        raise ProblemError(f"step {step.index} carries no memory: it was not made by grow.")
+    return step.memory
+
+
+def moved_places(step: Step, c: int) -> Floats:
+    """Where the tips, or the places along fronts, of crack c have come to `(f, d)`."""
+    sif, beta = step.sif[0][c], step.angle[c][:, None]
+    direction = np.cos(beta) * sif.frame[:, 0] + np.sin(beta) * sif.frame[:, 1]
+    return np.asarray(sif.x + step.da[c][:, None] * direction)
+
+
+__all__ = ["Cycle", "Memory", "Step", "memory_of", "moved_places"]

@@ -4,27 +4,24 @@ import csv
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Unpack
 
-import numpy as np
 from numpy.typing import NDArray
 
-from xcrack.crack.crack import Crack, front
+from xcrack.crack.crack import Crack
 from xcrack.errors import ProblemError, warn
 from xcrack.growth.criteria import Criterion
 from xcrack.growth.fingerprint import differences
 from xcrack.growth.laws import Law
-from xcrack.growth.run import Run, steps_of
+from xcrack.growth.options import GrowOptions, lists_options, run_of
+from xcrack.growth.run import steps_of
 from xcrack.growth.step import Cycle, Step
 from xcrack.history import run_folder as run_files
-from xcrack.history.table_3d import space_table
+from xcrack.history.table import table
 from xcrack.mesh.mesh import Mesh
 from xcrack.scene.problem import Problem
 
 Until = Callable[[Step], bool]
-
-_AXES = "xyz"
-_MODES = ("I", "II", "III")
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,19 +69,7 @@ class History:
             smallest value along the front, its mean over the length and its largest:
             ``K_I_0_min``, ``K_I_0_mean``, ``K_I_0_max``.
         """
-        if self.cracks and self.cracks[0].fronts is not None:
-            return space_table(self.steps)
-        rows = [row for step in self.steps for row in _rows(step)]
-        modes = max(
-            (state[0].K.shape[1] for s in self.steps for state in s.sif if state), default=2
-        )
-        n_states = max((len(step.sif) for step in self.steps), default=0)
-        dim = self.cracks[0].points.shape[1] if self.cracks else 2
-        names = ["step", "N", "crack", "tip", *_AXES[:dim], "a"]
-        names += [f"K_{m}_{s}" for s in range(n_states) for m in _MODES[:modes]]
-        names += ["angle", "dK_eq", "R", "rate", "da"]
-        whole = ("step", "crack", "tip")
-        return np.array(rows, dtype=[(n, np.int64 if n in whole else np.float64) for n in names])
+        return table(self.steps)
 
     def plot(self, kind: str, file: str | Path | None = None) -> Any:
         """Draw the run.
@@ -167,6 +152,7 @@ def collect(
     return _collected(steps, folder, until, (), None, overwrite, keep_solutions)
 
 
+@lists_options
 def resume(
     path: str | Path,
     problem: Problem,
@@ -176,15 +162,8 @@ def resume(
     da: float | None = None,
     *,
     until: Until | None = None,
-    cycles: float | None = None,
-    scaling: str = "law",
-    threshold: float = 0.0,
-    K_c: float | None = None,
-    max_steps: int | None = None,
-    max_cycles: float | None = None,
-    solver: Any = None,
-    progress: bool | str = True,
     keep_solutions: bool = True,
+    **options: Unpack[GrowOptions],
 ) -> History:
     """Go on with a run that is on disk, to the history it would have had, to the last bit.
 
@@ -211,10 +190,7 @@ def resume(
     ProblemError
         No run is there, or it was made with other settings: the message names them.
     """
-    run = Run(
-        problem, law, criterion, cycle, da, cycles, scaling, threshold, solver, K_c, max_steps,
-        max_cycles, progress,
-    )  # fmt: skip
+    run = run_of("resume", problem, law, criterion, cycle, da, options)
     folder = Path(path)
     if not folder.is_dir():
         raise ProblemError(
@@ -330,18 +306,6 @@ def _folder(path: str | Path) -> Path:
         raise ProblemError(f"{folder} is a file; a run needs a folder of its own.")
     folder.mkdir(parents=True, exist_ok=True)
     return folder
-
-
-def _rows(step: Step) -> list[tuple[Any, ...]]:
-    rows = []
-    for c, crack in enumerate(step.cracks):
-        x, _ = front(crack)
-        a = np.nan if step.memory is None else step.memory.length[c]
-        for j in range(len(step.angle[c])):
-            K = [value for state in step.sif for value in state[c].K[j]]
-            own = (part[c][j] for part in (step.angle, step.dK_eq, step.R, step.rate, step.da))
-            rows.append((step.index, step.cycles, c, j, *x[j], a, *K, *own))
-    return rows
 
 
 __all__ = ["History", "collect", "load", "resume"]

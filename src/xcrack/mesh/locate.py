@@ -50,6 +50,16 @@ def contains(mesh: Mesh, x: Floats) -> Bools:
     return locate(mesh, x)[0] >= 0
 
 
+def cell_sizes(mesh: Mesh, x: Floats) -> Floats:
+    """Size of the cell at each point `(k,)`, length; at the nearest cell where none has it."""
+    cell, _ = locate(mesh, x)
+    if (cell < 0).any():
+        _, nearest = mesh.cell_tree.query(x[cell < 0])
+        cell = np.array(cell)
+        cell[cell < 0] = nearest
+    return np.asarray(mesh.cell_size[cell])
+
+
 def nearest_boundary(mesh: Mesh, x: Floats) -> tuple[float, float]:
     """Distance of one point to the boundary, and the size of the cell there."""
     facets = mesh.facet_sets["boundary"]

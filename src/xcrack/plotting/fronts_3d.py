@@ -6,23 +6,21 @@ By matplotlib, without a renderer; for one run or one state, or for several side
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from xcrack.arrays import Bools, Floats
+from xcrack.crack.fronts_3d import is_closed
 from xcrack.errors import ProblemError
 from xcrack.growth.step import Step
+from xcrack.history.history import History
+from xcrack.mesh.mesh import Mesh
 from xcrack.plotting.projection import View, best_plane, given_plane, on_plane, section_outline
 from xcrack.sif.sif import SIF
 
-if TYPE_CHECKING:
-    from xcrack.history.history import History
-    from xcrack.mesh.mesh import Mesh
-
 _DPI = 150
-_FAR = 2.5  # median spacings that still close a front, from its last point to its first
 _MODES = ("I", "II", "III")
 _NOISE = 0.1  # share of the largest K that a panel reaches at least: noise should not fill it
 
@@ -46,13 +44,13 @@ class FrontLine:
 
 
 def draw_fronts(
-    history: "History | Sequence[History]",
+    history: History | Sequence[History],
     *,
     crack: int = 0,
     plane: tuple[ArrayLike, Sequence[ArrayLike]] | None = None,
     labels: Sequence[str] | None = None,
     every: int = 1,
-    mesh: "Mesh | None" = None,
+    mesh: Mesh | None = None,
     file: str | Path | None = None,
     show: bool | None = None,
     title: str | None = None,
@@ -183,7 +181,7 @@ def front_axes(
     runs: Sequence[Sequence[Step]],
     crack: int,
     plane: View | None,
-    mesh: "Mesh | None",
+    mesh: Mesh | None,
     labels: Sequence[str],
     every: int = 1,
 ) -> None:
@@ -286,28 +284,6 @@ def step_fronts(step: Step, crack: int) -> list[FrontLine]:
     ]
 
 
-def is_closed(x: Floats) -> bool:
-    """Whether points along a front, each once, go round: the last lies next to the first."""
-    if len(x) < 4:
-        return False
-    spacing = np.linalg.norm(np.diff(x, axis=0), axis=1)
-    return bool(np.linalg.norm(x[-1] - x[0]) < _FAR * np.median(spacing))
-
-
-def front_weights(x: Floats) -> Floats:
-    """Share of the length of a front that belongs to each of its points `(m,)`; their sum is 1."""
-    if len(x) == 1:
-        return np.ones(1)
-    along = np.linalg.norm(np.diff(x, axis=0), axis=1)
-    if is_closed(x):
-        along = np.append(along, np.linalg.norm(x[0] - x[-1]))
-        weight = along + np.roll(along, 1)
-    else:
-        weight = np.append(along, 0.0) + np.append(0.0, along)
-    total = float(weight.sum())
-    return np.asarray(weight / total if total else np.full(len(x), 1 / len(x)))
-
-
 def _along(sif: SIF, front: int, mode: int) -> tuple[Floats, Floats, Bools]:
     """Share of the arc length, K of a mode, and which points lie at a free surface."""
     mine = np.nonzero(sif.front == front)[0]
@@ -385,7 +361,5 @@ __all__ = [
     "draw_K",
     "draw_fronts",
     "front_axes",
-    "front_weights",
-    "is_closed",
     "step_fronts",
 ]

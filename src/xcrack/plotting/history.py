@@ -1,17 +1,15 @@
 """Pictures of a growth run."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from xcrack.errors import ProblemError
-
-if TYPE_CHECKING:
-    from xcrack.history.history import History
+from xcrack.history.history import History
 
 
-def draw(history: "History", kind: str, file: str | Path | None) -> Any:
+def draw(history: History, kind: str, file: str | Path | None) -> Any:
     """Figure of K, of length over cycles, of the paths or the fronts; saved or shown."""
     kinds = {"K": _draw_K, "a": _draw_a, "path": _draw_path}
     if history.cracks and history.cracks[0].fronts is not None:
@@ -42,7 +40,7 @@ def draw(history: "History", kind: str, file: str | Path | None) -> Any:
     return figure
 
 
-def _draw_K(history: "History", axes: Any) -> None:
+def _draw_K(history: History, axes: Any) -> None:
     table = history.table()
     n_states = sum(name.startswith("K_I_") for name in table.dtype.names or ())
     for number, (crack, tip) in enumerate(_rows_of(table, "tip")):
@@ -58,7 +56,7 @@ def _draw_K(history: "History", axes: Any) -> None:
     axes.legend(fontsize="small")
 
 
-def _draw_K_of_fronts(history: "History", axes: Any) -> None:
+def _draw_K_of_fronts(history: History, axes: Any) -> None:
     """Largest and smallest K along each front, of the state that is most severe there."""
     table = history.table()
     for number, (crack, front) in enumerate(_rows_of(table, "front")):
@@ -91,14 +89,14 @@ def _extreme(rows: Any, mode: str, end: str) -> Any:
     return np.array([rows[f"K_{mode}_{s}_{end}"][k] for k, s in enumerate(severe)])
 
 
-def _draw_fronts(history: "History", axes: Any) -> None:
+def _draw_fronts(history: History, axes: Any) -> None:
     from xcrack.plotting.fronts_3d import front_axes
 
     # One picture, one plane: further cracks are drawn by draw_fronts(crack=...).
     front_axes(axes, [history.steps], 0, None, history.mesh, [""])
 
 
-def _draw_a(history: "History", axes: Any) -> None:
+def _draw_a(history: History, axes: Any) -> None:
     table = history.table()
     for crack in np.unique(table["crack"]):
         rows = table[table["crack"] == crack]
@@ -108,7 +106,7 @@ def _draw_a(history: "History", axes: Any) -> None:
     axes.legend(fontsize="small")
 
 
-def _draw_path(history: "History", axes: Any) -> None:
+def _draw_path(history: History, axes: Any) -> None:
     if history.mesh is not None:
         from matplotlib.collections import LineCollection
 

@@ -1,0 +1,54 @@
+"""Why growth ends."""
+
+import numpy as np
+
+from xcrack.growth.advance import Advance
+from xcrack.growth.criteria import clipped, equivalent_K
+from xcrack.growth.follow import following
+from xcrack.growth.options import Run
+from xcrack.growth.step import Step, memory_of
+
+
+def end_at(run: Run, step: Step) -> str:
+    """Why growth ends at this step; empty where it goes on."""
+    if run.K_c is not None:
+        for c in range(len(step.cracks)):
+            K = clipped(np.stack([state[c].K for state in step.sif]))
+            K_eq = equivalent_K(K, step.angle[c], run.problem.material.nu).max(axis=0)
+            for j in np.nonzero(K_eq >= run.K_c)[0].tolist():
+                place = place_name(run, step, c, j)
+                return f"K_c reached: K_eq = {K_eq[j]:.6g} >= {run.K_c:.6g} at {place}"
+    if run.max_cycles is not None and step.cycles >= run.max_cycles:
+        return f"max_cycles = {run.max_cycles:.6g} reached: {step.cycles:.6g} cycles"
+    if run.max_steps is not None and step.index + 1 >= run.max_steps:
+        return f"max_steps = {run.max_steps} reached"
+    if not any((r > 0).any() for r in step.rate):
+        if any((r > 0).any() for r in memory_of(step).law_rate):
+            return f"rate is zero: dK_eq is below the threshold {run.threshold:.6g} at every tip"
+        return "rate is zero at every tip"
+    return ""
+
+
+def too_short(run: Run, step: Step, plan: Advance) -> str:
+    """Why a run ends whose advance is below a tenth of a cell."""
+    remedy = "cycles" if run.da is None else "da"
+    return (
+        f"the advance {plan.largest:.4g} at {place_name(run, step, *plan.tip)} is below a tenth of "
+        f"the cell there (cell size {plan.size:.4g}): the mesh cannot see it. Take a larger "
+        f"{remedy} or a finer mesh around the tip."
+    )
+
+
+def left_the_body(run: Run, step: Step, gone: list[tuple[int, int]]) -> str:
+    """Why a run ends whose last tips or fronts have left the body."""
+    where = [place_name(run, step, *place) for place in gone]
+    return following(run.problem.mesh).left(where, [c for c, _ in gone])
+
+
+def place_name(run: Run, step: Step, c: int, j: int) -> str:
+    """Number and coordinates of a tip, or of a place along a front, for a message."""
+    x = ", ".join(f"{v:.6g}" for v in step.sif[0][c].x[j])
+    return f"crack {c}, {following(run.problem.mesh).PLACE} {j} at ({x})"
+
+
+__all__ = ["end_at", "left_the_body", "place_name", "too_short"]

@@ -1,0 +1,78 @@
+"""From one step of 2D cracks to the next, tip by tip."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from xcrack.arrays import Floats, Ints
+from xcrack.crack.crack import Crack, advance
+from xcrack.crack.size_2d import length_inside
+from xcrack.growth.advance import LEAST, PerCrack
+from xcrack.growth.cycles import elapsed
+from xcrack.growth.step import Step, memory_of, moved_places
+from xcrack.mesh.mesh import Mesh
+from xcrack.sif.sif import SIF
+
+PLACE = "tip"
+WAITS_BELOW = LEAST
+
+_SAME = 1e-6  # of the coordinates: a tip recognised after its advance
+
+
+def crack_size(crack: Crack, mesh: Mesh) -> float:
+    """Length of a crack in the body."""
+    return length_inside(crack, mesh)
+
+
+def advanced(crack: Crack, sif: SIF, angle: Floats, da: Floats, mesh: Mesh) -> Crack:
+    """A crack after the advance of its tips."""
+    del sif, mesh
+    return advance(crack, angle, da)
+
+
+def gone(advanced: Crack, placed: Crack) -> list[int]:
+    """Numbers of the tips that have left the body."""
+    return [j for j, tip in enumerate(advanced.tips or ()) if tip not in (placed.tips or ())]
+
+
+def left(where: Sequence[str], cracks: Sequence[int]) -> str:
+    """Why a run ends whose last tips have left the body."""
+    del cracks
+    return "tip left the body: " + "; ".join(where)
+
+
+def followed(
+    last: Step,
+    cracks: Sequence[Crack],
+    sif: Sequence[SIF],
+    law_rate: Sequence[Floats],
+    length: Sequence[float],
+    mesh: Mesh,
+) -> tuple[float, PerCrack]:
+    """Cycles since the last step, and the growth that waits at the tips of this one.
+
+    Parameters and results are those of `Following.followed`.
+    """
+    del length, mesh
+    before = memory_of(last)
+    rate1, pending = [], []
+    for c in range(len(cracks)):
+        new_of_old = _matched(moved_places(last, c), sif[c].x)
+        rate1.append([None if n < 0 else float(law_rate[c][n]) for n in new_of_old])
+        waits = np.zeros(len(sif[c].x))
+        there = new_of_old >= 0
+        waits[new_of_old[there]] = before.pending[c][there]
+        pending.append(waits)
+    return elapsed(before.length, last.da, before.law_rate, rate1), tuple(pending)
+
+
+def _matched(moved: Floats, tips: Floats) -> Ints:
+    """Row of each tip after the step, -1 where it has left the body."""
+    if not len(tips) or not len(moved):
+        return np.full(len(moved), -1)
+    distance, row = cKDTree(tips).query(moved)
+    return np.where(distance <= _SAME * np.abs(tips).max(), row, -1)
+
+
+__all__ = ["PLACE", "WAITS_BELOW", "advanced", "crack_size", "followed", "gone", "left"]

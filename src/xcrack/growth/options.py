@@ -1,0 +1,146 @@
+"""All that `grow` can be asked for: its options stand here once, their defaults on `Run` alone."""
+
+import inspect
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, fields, replace
+from typing import Any, TypedDict, TypeVar, cast
+
+from xcrack.errors import ProblemError
+from xcrack.growth.criteria import Criterion
+from xcrack.growth.fingerprint import DEFAULTS, describe, with_defaults_of
+from xcrack.growth.laws import Law
+from xcrack.growth.step import Cycle
+from xcrack.inputs import number, whole
+from xcrack.scene.problem import Problem
+
+_STOPS = {"changes_results": False}  # when a run stops, not how its cracks grow
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+
+class GrowOptions(TypedDict, total=False):
+    """Options of `grow` and `resume` by name; `grow` describes them."""
+
+    cycles: float | None
+    scaling: str
+    threshold: float
+    K_c: float | None
+    max_steps: int | None
+    max_cycles: float | None
+    solver: Any
+    progress: bool | str
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """All that `grow` was asked for, checked.
+
+    Parameters
+    ----------
+    problem, law, criterion, cycle, da, cycles, scaling, threshold, solver, K_c, max_steps, \
+    max_cycles, progress
+        As of `grow`.
+    defaults : int
+        Number of the set of defaults.
+
+    Raises
+    ------
+    ProblemError
+        One of them does not fit.
+    """
+
+    problem: Problem
+    law: Law
+    criterion: Criterion
+    cycle: Cycle
+    da: float | None = None
+    cycles: float | None = None
+    scaling: str = "law"
+    threshold: float = 0.0
+    solver: Any = None
+    K_c: float | None = field(default=None, metadata=_STOPS)
+    max_steps: int | None = field(default=None, metadata=_STOPS)
+    max_cycles: float | None = field(default=None, metadata=_STOPS)
+    progress: bool | str = field(default=True, metadata=_STOPS)
+    defaults: int = field(default=DEFAULTS, metadata=_STOPS)
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.problem, Problem):
+            raise ProblemError(f"grow: problem = {self.problem!r}: give a Problem.")
+        for name in ("law", "criterion"):
+            if not callable(getattr(self, name)):
+                raise ProblemError(f"grow: {name} = {getattr(self, name)!r} cannot be called.")
+        if not isinstance(self.cycle, Cycle):
+            raise ProblemError(f"grow: cycle = {self.cycle!r}: give Cycle(min, max).")
+        for state in self.cycle.load_states:
+            self.problem.state(state)
+        if not self.problem.cracks:
+            raise ProblemError("grow: the problem has no crack; growth does not start one.")
+        if self.da is None and self.cycles is None:
+            raise ProblemError("grow needs da (largest advance a step) or cycles (cycles a step).")
+        for name in ("da", "cycles", "K_c", "max_cycles"):
+            value = getattr(self, name)
+            if value is not None:
+                object.__setattr__(self, name, number(value, f"grow: {name}", above=0))
+        if self.max_steps is not None:
+            steps = whole(self.max_steps, "grow: max_steps", least=1)
+            object.__setattr__(self, "max_steps", steps)
+        object.__setattr__(self, "threshold", number(self.threshold, "grow: threshold", least=0))
+        if not isinstance(self.scaling, str) or self.scaling not in ("law", "linear"):
+            raise ProblemError(f'grow: scaling = {self.scaling!r}: give "law" or "linear".')
+        if self.solver is not None and not callable(self.solver):
+            raise ProblemError(f"grow: solver = {self.solver!r} cannot be called.")
+        if not isinstance(self.progress, bool) and self.progress != "always":
+            raise ProblemError(f'grow: progress = {self.progress!r}: give True, False or "always".')
+
+    @property
+    def settings(self) -> dict[str, str]:
+        """Text of all that decides how the cracks grow; rules that stop a run are not in it."""
+        return {"defaults": str(self.defaults), **describe("", self, self.defaults)}
+
+    def as_begun(self, stored: Mapping[str, str]) -> "Run":
+        """The run with the defaults of a stored one, where it leaves a choice to them."""
+        defaults = int(stored["defaults"])
+        return replace(with_defaults_of(self, defaults, stored), defaults=defaults)
+
+
+def run_of(
+    caller: str,
+    problem: Problem,
+    law: Law,
+    criterion: Criterion,
+    cycle: Cycle,
+    da: float | None,
+    options: GrowOptions,
+) -> Run:
+    """The run that a function with the options of `grow` was called for.
+
+    Raises
+    ------
+    TypeError
+        An option that there is not, in the words of Python.
+    ProblemError
+        One that does not fit.
+    """
+    for name in options:
+        if name not in GrowOptions.__annotations__:
+            raise TypeError(f"{caller}() got an unexpected keyword argument {name!r}")
+    return Run(problem, law, criterion, cycle, da, **options)
+
+
+def lists_options(function: Function) -> Function:
+    """Let help and completion list the `GrowOptions` that a function takes by name."""
+    signature = inspect.signature(function)
+    default = {each.name: each.default for each in fields(Run)}
+    own = [p for p in signature.parameters.values() if p.kind is not p.VAR_KEYWORD]
+    options = [
+        inspect.Parameter(
+            name, inspect.Parameter.KEYWORD_ONLY, default=default[name], annotation=annotation
+        )
+        for name, annotation in GrowOptions.__annotations__.items()
+    ]
+    cast(Any, function).__signature__ = signature.replace(parameters=[*own, *options])
+    return function
+
+
+__all__ = ["GrowOptions", "Run", "lists_options", "run_of"]
