@@ -343,8 +343,8 @@ PROBLEMS = {
     "cycle order": (lambda: xc.Cycle(1.0, 0.0), r"Cycle\(1.0, 0.0\): give finite min <= max"),
     "cycle twice": (lambda: xc.Cycle(0.0, 1.0, states=[1.0]), "not both"),
     "cycle of nothing": (lambda: xc.Cycle(states=[]), "at least one load state"),
-    "paris": (lambda: xc.paris(-1.0, 3.0), "paris: C = -1.0 must be positive"),
-    "walker": (lambda: xc.walker(1.0, 3.0, 2.0), r"gamma = 2.0 must lie in \[0, 1\]"),
+    "paris": (lambda: xc.paris(-1.0, 3.0), "paris: C = -1.0 .* above 0"),
+    "walker": (lambda: xc.walker(1.0, 3.0, 2.0), r"gamma = 2.0 .* at least 0 .* at most 1"),
     "elber": (lambda: xc.elber(1.0, 3.0, -1.0, 0.5), "is not positive for any R"),
 }
 
@@ -453,8 +453,8 @@ def test_a_rate_that_is_zero():
 
 
 def test_an_advance_below_a_cell_warns():
-    with pytest.warns(xc.XcrackWarning, match=r"below one cell .*cell size"):
-        grow(da=0.08)
+    with pytest.warns(xc.XcrackWarning, match=r"below one cell along the path"):
+        grow(crack=((-0.41, -0.43), (0.11, 0.13)), da=0.08)
 
 
 def test_forces_that_nearly_balance_are_balanced_and_said():

@@ -94,9 +94,21 @@ def test_arrays_are_taken_point_by_point():
         ((0.0, 1.0, 1.0, 1.0), "positive"),
         ((1.0, 2.0, 0.0, 1.0), "growth rates"),
         ((1.0, 2.0, 1.0, -1.0), "growth rates"),
-        ((1.0, 2.0, np.nan, 1.0), "growth rates"),
+        ((1.0, 2.0, np.nan, 1.0), "growth rate rate0 = nan"),
+        ((1.0, 2.0, 1.0, np.nan), "growth rates"),
+        ((1.0, 2.0, np.inf, 1.0), "rate0 = inf"),
+        (("one", 2.0, 1.0, 1.0), "crack length a0 = 'one'"),
+        (([1.0, 2.0], [2.0, 3.0, 4.0], 1.0, 1.0), r"shapes \(2,\), \(3,\)"),
     ],
 )
 def test_bad_input(arguments, words):
     with pytest.raises(ProblemError, match=words):
         cycles_between(*arguments)
+
+
+def test_a_rate_that_becomes_infinite():
+    """1/rate falls to 0 with the length: the triangle under it, and a fine division of it."""
+    assert cycles_between(1.0, 2.0, 1e-3, np.inf) == 500.0
+    rate = 1e-3 / np.maximum(2.0 - (a := np.linspace(1.0, 2.0, 2001)), 0.0).clip(1e-300)
+    rate[-1] = np.inf
+    assert cycles_between(a[:-1], a[1:], rate[:-1], rate[1:]).sum() == pytest.approx(500, rel=1e-4)

@@ -8,7 +8,7 @@ import exact
 from growth_fakes import STRESS, mode_I, patch_respond, plate
 from xcrack.crack.crack import front, line_crack
 from xcrack.crack.size_2d import length_inside
-from xcrack.errors import ProblemError, XcrackWarning
+from xcrack.errors import ProblemError
 from xcrack.growth import run as growth
 from xcrack.growth.criteria import max_hoop_stress, weighted_angle
 from xcrack.growth.laws import elber, paris
@@ -320,90 +320,3 @@ def test_limits_of_cycles_and_steps(monkeypatch):
     assert ended.startswith("max_cycles = 5000 reached")
     steps, ended = run(grow(plate(), LAW, max_hoop_stress, CYCLE, da=2.0, max_steps=1))
     assert (len(steps), ended) == (1, "max_steps = 1 reached")
-
-
-# --- what must fail loudly ---------------------------------------------------------------------
-
-
-def test_advance_below_a_tenth_of_a_cell(monkeypatch):
-    patch_respond(monkeypatch, mode_I())
-    steps = grow(plate(), LAW, max_hoop_stress, CYCLE, da=0.14)
-    next(steps)
-    with pytest.raises(ProblemError, match=r"0\.14 at crack 0, tip 0 .* tenth .* size 1\.414"):
-        next(steps)
-
-
-def test_advance_below_one_cell(monkeypatch):
-    patch_respond(monkeypatch, mode_I())
-    steps = grow(plate(), LAW, max_hoop_stress, CYCLE, da=0.5, max_steps=4)
-    with pytest.warns(XcrackWarning, match=r"below one cell .* size 1\.414") as caught:
-        run(steps)
-    assert len(caught) == 1
-
-
-@pytest.mark.filterwarnings("ignore:the advance .* below one cell")
-def test_advance_that_becomes_too_short_ends_the_run(monkeypatch):
-    patch_respond(monkeypatch, mode_I(lambda a: (5.0 / a) ** 8))
-    steps = grow(plate(), LAW, max_hoop_stress, CYCLE, cycles=1.0 / LAW(STRESS, 0))
-    with pytest.warns(XcrackWarning, match="below a tenth"):
-        taken, ended = run(steps)
-    assert len(taken) == 2
-    assert "Take a larger cycles" in ended
-
-
-@pytest.mark.parametrize(
-    ("law", "words"),
-    [
-        (lambda dK, R: -dK, r"returned da/dN = -.*dK_eq = .*crack 0, tip 0"),
-        (lambda dK, R: dK * np.nan, "da/dN = nan"),
-        (lambda dK, R: dK * np.inf, "da/dN = inf"),
-        (lambda dK, R: 1.0, r"returned shape \(\) for 1 tips"),
-    ],
-)
-def test_bad_law(monkeypatch, law, words):
-    patch_respond(monkeypatch, mode_I())
-    with pytest.raises(ProblemError, match=words):
-        next(grow(plate(), law, max_hoop_stress, CYCLE, da=2.0))
-
-
-@pytest.mark.parametrize(
-    ("criterion", "words"),
-    [
-        (lambda K, nu: 1.0, "three arrays"),
-        (lambda K, nu: (K[0, :, 0], K[0, :, 0]), "three arrays"),
-        (lambda K, nu: (K[0, :, 0] * np.nan, K[0, :, 0], K[0, :, 0]), "angle = "),
-        (lambda K, nu: (K[0, :, 0], K[0], K[0, :, 0]), "dK_eq = "),
-        (lambda K, nu: (0 * K[0, :, 0], -K[1, :, 0], K[0, :, 0]), "negative range"),
-    ],
-)
-def test_bad_criterion(monkeypatch, criterion, words):
-    patch_respond(monkeypatch, mode_I())
-    with pytest.raises(ProblemError, match=words):
-        next(grow(plate(), LAW, criterion, CYCLE, da=2.0))
-
-
-@pytest.mark.parametrize(
-    ("options", "words"),
-    [
-        ({}, "needs da"),
-        ({"da": 0.0}, r"grow: da = 0\.0 .* a finite number above 0"),
-        ({"da": np.nan}, "da = nan"),
-        ({"cycles": -1}, "cycles = -1"),
-        ({"da": 1.0, "max_steps": 0}, "max_steps = 0"),
-        ({"da": 1.0, "threshold": -1.0}, "threshold"),
-        ({"da": 1.0, "scaling": "square"}, "scaling = 'square'"),
-        ({"da": 1.0, "K_c": 0.0}, "K_c"),
-    ],
-)
-def test_bad_options_fail_before_anything_is_computed(options, words):
-    with pytest.raises(ProblemError, match=words):
-        grow(plate(), LAW, max_hoop_stress, CYCLE, **options)
-
-
-def test_bad_arguments():
-    with pytest.raises(ProblemError, match="law = 3 cannot be called"):
-        grow(plate(), 3, max_hoop_stress, CYCLE, da=1.0)
-    with pytest.raises(ProblemError, match="cycle ="):
-        grow(plate(), LAW, max_hoop_stress, (0, 1), da=1.0)
-    with pytest.raises(ProblemError, match="no crack"):
-        grow(plate([]), LAW, max_hoop_stress, CYCLE, da=1.0)

@@ -87,7 +87,11 @@ def named(name, function):
     [
         (lambda dK, R: -dK, "no crack shrinks"),
         (lambda dK, R: dK + 1, "not 0 for dK_eq = 0"),
-        (lambda dK, R: dK / R, "finite"),
+        (lambda dK, R: dK / R, "da/dN = nan .* must be a number"),
+        (
+            lambda dK, R: np.where((dK > 40) & (dK < 70), np.inf, dK),
+            "falls when dK_eq grows from 62.5",
+        ),
         (lambda dK, R: dK.sum(), "returns shape"),
         (lambda dK, R: dK * (100 - dK), "falls when dK_eq grows from 50.0"),
         (lambda dK, R: dK * dK.max(), "each must stand for itself"),
@@ -100,6 +104,49 @@ def named(name, function):
 def test_check_law_names_the_fault(law, words):
     with pytest.raises(ProblemError, match=words):
         check_law(law)
+
+
+def test_a_law_may_return_inf_where_the_toughness_is_reached():
+    check_law(lambda dK, R: np.where(dK < 80, dK, np.inf))
+
+
+@pytest.mark.parametrize("law", [paris(C, 3), elber(C, 3, 0.5, 0.4), walker(C, 3, 0.6)])
+@pytest.mark.parametrize(
+    ("dK", "R", "words"),
+    [
+        ("large", 0.0, "dK_eq = 'large' holds str"),
+        (None, 0.0, "dK_eq = None"),
+        ([1.0, [2.0]], 0.0, "dK_eq"),
+        (1.0 + 1.0j, 0.0, "complex"),
+        (np.nan, 0.0, "finite"),
+        (-1.0, 0.0, "a range is not negative"),
+        (1.0, 1.5, "at most 1"),
+        (1.0, "low", "R = 'low'"),
+        ([1.0, 2.0], [0.0, 0.1, 0.2], r"shapes \(2,\) and \(3,\)"),
+    ],
+)
+def test_bad_calls_of_laws(law, dK, R, words):
+    with pytest.raises(ProblemError, match=words):
+        law(dK, R)
+
+
+def test_a_constant_given_as_a_whole_number_is_the_same_setting():
+    assert paris(1e-11, 3) == paris(1e-11, 3.0)
+    assert type(paris(1e-11, 3).m) is float
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda: paris("1e-11", 3), "paris: C = '1e-11' is not a number"),
+        (lambda: paris(C, [3]), "paris: m"),
+        (lambda: elber(C, 3, None, 0.4), "elber: a = None"),
+        (lambda: walker(C, 3, True), "walker: gamma = True"),
+    ],
+)
+def test_constants_of_a_wrong_type(make, words):
+    with pytest.raises(ProblemError, match=words):
+        make()
 
 
 def constant(K, nu):

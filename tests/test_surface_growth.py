@@ -481,6 +481,17 @@ def test_life_of_a_penny_that_grows():
     assert cycles == pytest.approx(2 - 2 / np.sqrt(2), rel=2e-3)
 
 
+def test_a_front_that_reaches_its_toughness():
+    """As in 2D: half of what the rate before gives; and inf goes along a front as far as it is."""
+    da, rate = [np.array([0.1, 0.1])], [np.array([1e-3, 1e-3])]
+    assert elapsed_3d([1.0], [1.1], da, rate, [np.array([1e-2, np.inf])]) == pytest.approx(50)
+    x = np.array([[0.0, 0, 0], [1, 0, 0], [2, 0, 0]])
+    values = np.array([1.0, 2.0, np.inf])
+    target = np.array([[0.0, 0, 0], [0.5, 0, 0], [1.0, 0, 0], [1.5, 0, 0], [2.0, 0, 0]])
+    got = carried(x, np.zeros(3, int), [False], values, target, 0.1)
+    assert got.tolist() == [1.0, 1.5, 2.0, np.inf, np.inf]
+
+
 def test_values_are_carried_to_a_front_that_has_moved():
     crack = penny()
     frames = front_frames(crack)[0]

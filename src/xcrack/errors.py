@@ -2,9 +2,15 @@
 
 import sys
 import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 
 # Frames of these are passed over when a warning looks for the line of the user that it is about.
 _INSIDE = {"xcrack", "numpy", "scipy", "functools", "contextlib"}
+
+# Where messages of `warn` go within `collected_warnings`: of each thread its own.
+_collecting: ContextVar[list[str] | None] = ContextVar("collecting", default=None)
 
 
 class XcrackError(Exception):
@@ -39,6 +45,10 @@ def warn(message: str) -> None:
     message : str
         What is wrong, where, and how to mend it.
     """
+    messages = _collecting.get()
+    if messages is not None:
+        messages.append(message)
+        return
     level = 2  # the caller of this function
     while True:
         try:
@@ -49,3 +59,16 @@ def warn(message: str) -> None:
             break
         level += 1
     warnings.warn(message, XcrackWarning, stacklevel=level)
+
+
+@contextmanager
+def collected_warnings(messages: list[str]) -> Iterator[None]:
+    """Append the messages of `warn` to a list instead of issuing them, within a `with` block.
+
+    Warnings of others, and the filters of the user, stay as they are.
+    """
+    token = _collecting.set(messages)
+    try:
+        yield
+    finally:
+        _collecting.reset(token)

@@ -19,8 +19,9 @@ def check_law(law: Law, dK_max: float = 100.0) -> None:
     Parameters
     ----------
     law : callable (dK_eq, R) -> da/dN
-        Called with arrays `(f,)`; must return an array `(f,)` that is finite, never negative,
-        does not fall when dK_eq grows, and takes each point for itself.
+        Called with arrays `(f,)`; must return an array `(f,)` that is never negative or nan,
+        does not fall when dK_eq grows, and takes each point for itself. inf says that the
+        toughness is reached.
     dK_max : float, stress √length
         Largest range to try; take one at which your law is still valid.
 
@@ -47,17 +48,23 @@ def check_law(law: Law, dK_max: float = 100.0) -> None:
 
 
 def _check_rates(law: Law, dK: Floats, R: Floats, rate: Floats, wrong: list[str]) -> None:
-    bad = ~np.isfinite(rate)
+    bad = np.isnan(rate)
     if bad.any():
         i = int(np.argmax(bad))
-        wrong.append(f"da/dN = {rate[i]} for dK_eq = {dK[i]}, R = {R[i]}: it must be finite")
+        wrong.append(f"da/dN = {rate[i]} for dK_eq = {dK[i]}, R = {R[i]}: it must be a number")
         return
     if (rate < 0).any():
         i = int(np.argmin(rate))
-        wrong.append(f"da/dN = {rate[i]} < 0 for dK_eq = {dK[i]}, R = {R[i]}: no crack shrinks")
+        wrong.append(
+            f"da/dN = {rate[i]} < 0 for dK_eq = {dK[i]}, R = {R[i]}: no crack shrinks; return inf "
+            "where the toughness is reached"
+        )
     if (rate[dK == 0] != 0).any():
         wrong.append("da/dN is not 0 for dK_eq = 0: a crack without load would grow")
-    falls = np.diff(rate.reshape(9, 5), axis=0) < -_ROUND_OFF * np.abs(rate).max()
+    largest = np.abs(rate[np.isfinite(rate)]).max(initial=0.0)
+    table = rate.reshape(9, 5)
+    # inf to inf is no fall, inf to a number is one
+    falls = table[1:] < np.where(np.isinf(table[:-1]), np.inf, table[:-1] - _ROUND_OFF * largest)
     if falls.any():
         i, j = np.argwhere(falls)[0]
         wrong.append(
@@ -115,7 +122,7 @@ def _check_modes(criterion: Criterion, nu: float, modes: int, wrong: list[str]) 
         wrong.append(f"dK_eq = {dK.min()} is negative")
     if (R < 0).any() or (R > 1).any():
         wrong.append(f"R = {R} is not in [0, 1]")
-    if (np.abs(angle) > np.pi).any():
+    if (np.abs(angle) >= np.pi).any():
         wrong.append(f"angle = {angle} is beyond ±π: it is in rad, positive towards the normal")
     mirror = np.array([1.0, -1.0, -1.0])[:modes]
     unloaded = np.zeros_like(K)

@@ -22,7 +22,7 @@ class Advance:
     pending : tuple of (f,) arrays, length
         Growth that is too short to be modelled yet and waits for the next steps.
     largest : float, length
-        Advance asked for at the fastest tip; 0 where nothing grows.
+        Advance asked for at the fastest tip; 0 where nothing grows, or a rate is infinite.
     size : float, length
         Cell size at that tip.
     tip : (int, int)
@@ -69,7 +69,7 @@ def plan_advance(
     """
     every_rate = np.concatenate(rate)
     fastest = float(every_rate.max(initial=0.0))
-    if fastest == 0:
+    if fastest == 0 or np.isinf(fastest):
         still = tuple(np.zeros_like(r) for r in rate)
         return Advance(still, pending, 0.0, np.inf, (0, 0))
     score = (

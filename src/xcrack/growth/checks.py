@@ -1,55 +1,128 @@
 """Evaluate criteria and laws, and validate what they return."""
 
+from typing import Any
+
 import numpy as np
 
 from xcrack.arrays import Floats
 from xcrack.errors import ProblemError
 from xcrack.growth.criteria import Criterion
 from xcrack.growth.laws import Law
+from xcrack.inputs import called, numbers
+
+_RATIOS = (0.0, 0.5)  # a law that gives the same rate for both does not depend on R
 
 
-def directed(
-    criterion: Criterion, K: Floats, nu: float, crack: int
+def evaluate_criterion(
+    criterion: Criterion, K: Floats, nu: float, crack: int, place: str = "tip"
 ) -> tuple[Floats, Floats, Floats]:
-    """Angle, range and ratio of one crack by a criterion, checked."""
+    """Angle, range and ratio at each place of one crack.
+
+    Parameters
+    ----------
+    criterion : callable
+    K : (s, f, 2 or 3) array, stress √length
+    nu : float
+    crack : int
+        Its number, for messages.
+    place : str
+        What a point of a front is called in messages.
+
+    Returns
+    -------
+    angle, dK_eq, R : (f,) arrays
+
+    Raises
+    ------
+    ProblemError
+        The criterion does not return three arrays of finite numbers, one for each place; an angle
+        is no kink, a range is negative.
+    """
     n = K.shape[1]
     if n == 0:
         return np.zeros(0), np.zeros(0), np.zeros(0)
-    answer = criterion(K, nu)
+    result = called(criterion, f"the directions of crack {crack}", K.copy(), nu)
     try:
-        angle, dK_eq, R = (np.asarray(part, dtype=float) for part in answer)
-    except (TypeError, ValueError) as error:
+        parts = tuple(result)
+    except TypeError:
+        parts = ()
+    if len(parts) != 3 or isinstance(result, str):
         raise ProblemError(
-            f"the criterion must return three arrays (angle, dK_eq, R), not {answer!r}."
-        ) from error
-    for name, values in (("angle", angle), ("dK_eq", dK_eq), ("R", R)):
-        if values.shape != (n,) or not np.isfinite(values).all():
-            raise ProblemError(
-                f"the criterion returned {name} = {values} at the {n} tips (or places along "
-                f"fronts) of crack {crack}; it must be finite, one number each. "
-                "xcrack.testing.check_criterion tries it."
-            )
+            f"the criterion must return three arrays (angle, dK_eq, R), not {result!r}."
+        )
+    angle, dK_eq, R = (
+        _one_a_place(part, name, n, f"{place}s of crack {crack}")
+        for name, part in zip(("angle", "dK_eq", "R"), parts)
+    )
+    if (np.abs(angle) >= np.pi).any():
+        j = int(np.argmax(np.abs(angle)))
+        raise ProblemError(
+            f"the criterion returned the angle {angle[j]:.6g} (crack {crack}, {place} {j}): angles "
+            "are in rad, between -pi and pi, from straight ahead towards the crack normal; for "
+            "degrees use numpy.radians."
+        )
     if (dK_eq < 0).any():
         raise ProblemError(f"the criterion returned a negative range {dK_eq} at crack {crack}.")
     return angle, dK_eq, R
 
 
-def law_rate(law: Law, dK_eq: Floats, R: Floats, crack: int) -> Floats:
-    """Growth rates of one crack by a law, checked."""
+def _one_a_place(part: Any, name: str, n: int, places: str) -> Floats:
+    try:
+        return np.array(numbers(part, name, (n,)))
+    except ProblemError as error:
+        raise ProblemError(
+            f"the criterion must return three arrays (angle, dK_eq, R), each with one finite "
+            f"number for each of the {n} {places}: {error} "
+            "xcrack.testing.check_criterion tries it."
+        ) from error
+
+
+def evaluate_law(law: Law, dK_eq: Floats, R: Floats, crack: int, place: str = "tip") -> Floats:
+    """Growth a cycle at each place of one crack.
+
+    Parameters
+    ----------
+    law : callable
+    dK_eq, R : (f,) arrays
+    crack : int
+        Its number, for messages.
+    place : str
+        What a point of a front is called in messages.
+
+    Returns
+    -------
+    (f,) array, length/cycle
+        inf where the law says that the toughness is reached.
+
+    Raises
+    ------
+    ProblemError
+        The law does not return one number >= 0 for each place.
+    """
     if len(dK_eq) == 0:
         return np.zeros(0)
-    rate = np.asarray(law(dK_eq, R), dtype=float)
+    result = called(law, f"the growth rates of crack {crack}", dK_eq.copy(), R.copy())
+    rate = np.array(numbers(result, "the growth rate that the law returned", finite=False))
     if rate.shape != dK_eq.shape:
         raise ProblemError(
-            f"the law returned shape {rate.shape} for {len(dK_eq)} tips or places along "
-            "fronts; it must return one rate for each. xcrack.testing.check_law tells what is "
-            "wrong."
+            f"the law returned shape {rate.shape} for {len(dK_eq)} {place}s; it must return one "
+            "rate for each. xcrack.testing.check_law shows what is wrong."
         )
-    bad = ~(np.isfinite(rate) & (rate >= 0))
+    bad = ~(rate >= 0)
     if bad.any():
-        tip = int(np.argmax(bad))
+        j = int(np.argmax(bad))
         raise ProblemError(
-            f"the law returned da/dN = {rate[tip]} for dK_eq = {dK_eq[tip]:.6g}, R = {R[tip]:.6g} "
-            f"(crack {crack}, tip {tip}); a crack does not shrink: return a number >= 0."
+            f"the law returned da/dN = {rate[j]} for dK_eq = {dK_eq[j]:.6g}, R = {R[j]:.6g} "
+            f"(crack {crack}, {place} {j}); a crack does not shrink: return a number >= 0, and inf "
+            "where the toughness is reached, which ends the run."
         )
     return rate
+
+
+def depends_on_ratio(law: Law, dK_eq: Floats) -> bool:
+    """Whether a law gives other rates for other ratios R at these ranges `(f,)`."""
+    low, high = (evaluate_law(law, dK_eq, np.full(len(dK_eq), ratio), 0) for ratio in _RATIOS)
+    return not np.array_equal(low, high)
+
+
+__all__ = ["depends_on_ratio", "evaluate_criterion", "evaluate_law"]

@@ -12,12 +12,13 @@ from numpy.typing import ArrayLike
 
 from xcrack.arrays import Floats
 from xcrack.errors import ProblemError, warn
+from xcrack.inputs import number, numbers
 
 Criterion = Callable[[Floats, float], tuple[Floats, Floats, Floats]]
 
 _TIE = 1e-12  # relative: two states whose K_eq differ by round-off only are a tie
 _CLOSED = 1e-3  # share of the largest K below which a negative K_I is that of a closed tip
-_DIFFER = 0.2  # share by which the two kinds of range may differ before it is said
+_DIFFER = 0.2  # share by which the two kinds of range may differ before a warning
 
 
 def kink_angle(K: ArrayLike) -> Floats:
@@ -44,7 +45,7 @@ def kink_angle(K: ArrayLike) -> Floats:
     >>> np.degrees(kink_angle([0.0, 1.0])).round(4)       # pure mode II
     np.float64(-70.5288)
     """
-    K = np.asarray(K, dtype=float)
+    K = _columns(K)
     K_I, K_II = np.maximum(K[..., 0], 0.0), K[..., 1]
     angle = -2 * np.arctan2(2 * K_II, K_I + np.hypot(K_I, np.sqrt(8.0) * K_II))
     return angle + 0.0  # no -0.0: straight ahead is one number
@@ -78,10 +79,16 @@ def equivalent_K(K: ArrayLike, angle: ArrayLike, nu: float) -> Floats:
     >>> equivalent_K(K, kink_angle(K), nu=0.3).round(6)
     np.float64(1.36899)
     """
-    K = np.asarray(K, dtype=float)
-    if K.ndim < 1 or K.shape[-1] not in (2, 3):
-        raise ProblemError(f"K must have 2 or 3 columns (I, II[, III]), not shape {K.shape}.")
-    half = np.asarray(angle, dtype=float) / 2
+    K, angle = _columns(K), numbers(angle, "angle", finite=False)
+    nu = number(nu, "Poisson's ratio nu", above=-1, below=0.5)
+    try:
+        np.broadcast_shapes(K.shape[:-1], angle.shape)
+    except ValueError as error:
+        raise ProblemError(
+            f"K of shape {K.shape} and angles of shape {angle.shape} do not fit: give one angle "
+            "for each row of K, or one for all."
+        ) from error
+    half = angle / 2
     cos, sin = np.cos(half), np.sin(half)
     bracket = np.maximum(cos**2 * (K[..., 0] * cos - 3 * K[..., 1] * sin), 0.0)
     if K.shape[-1] == 2:
@@ -163,11 +170,11 @@ def mean_reference(
     [0.]
     """
     K = _checked(K, nu, range)
+    if not isinstance(reference, str) or reference not in ("mean", "max", "min"):
+        raise ProblemError(f'reference = {reference!r}: give "mean", "max" or "min".')
     if reference == "mean":
         mean = _sum(K) / len(K)
         return _rated(K, kink_angle(mean), nu, range)
-    if reference not in ("max", "min"):
-        raise ProblemError(f'reference = {reference!r}: give "mean", "max" or "min".')
     own = kink_angle(K)
     K_eq = equivalent_K(K, own, nu)
     return _rated(K, _angle_of_largest(K_eq if reference == "max" else -K_eq, own), nu, range)
@@ -223,7 +230,7 @@ def clipped(K: ArrayLike) -> Floats:
 
 def _checked(K: ArrayLike, nu: float, range: str) -> Floats:
     """K as `(s, f, 2 or 3)` with K_I >= 0, after all that a caller can get wrong."""
-    K = np.asarray(K, dtype=float)
+    K = numbers(K, "K", finite=False)
     if K.ndim != 3 or K.shape[-1] not in (2, 3) or len(K) == 0:
         raise ProblemError(
             f"a criterion takes K of shape (states, front points, 2 or 3), not {K.shape}; "
@@ -235,9 +242,8 @@ def _checked(K: ArrayLike, nu: float, range: str) -> Floats:
             f"K of state {state}, front point {point}, mode {mode + 1} is "
             f"{K[state, point, mode]}: no direction can be chosen."
         )
-    if not -1 < nu < 0.5:
-        raise ProblemError(f"Poisson's ratio nu = {nu} must lie in (-1, 0.5).")
-    if range not in ("difference", "component"):
+    number(nu, "Poisson's ratio nu", above=-1, below=0.5)
+    if not isinstance(range, str) or range not in ("difference", "component"):
         raise ProblemError(f'range = {range!r}: give "difference" or "component".')
     # A closed tip has K_I = 0 up to discretisation: only a real overlap is worth a word.
     negative = K[..., 0] < -_CLOSED * np.abs(K).max(initial=0.0)
@@ -249,6 +255,14 @@ def _checked(K: ArrayLike, nu: float, range: str) -> Floats:
             "contact on the lips it is discretisation error; without, the lips overlap there."
         )
     return clipped(K)
+
+
+def _columns(K: ArrayLike) -> Floats:
+    """K `(..., 2 or 3)`; factors that are nan or inf stay what they are."""
+    K = numbers(K, "K", finite=False)
+    if K.ndim < 1 or K.shape[-1] not in (2, 3):
+        raise ProblemError(f"K must have 2 or 3 columns (I, II[, III]), not shape {K.shape}.")
+    return K
 
 
 def _sum(values: Floats) -> Floats:

@@ -9,6 +9,7 @@ from scipy.special import exprel
 from xcrack.arrays import Floats
 from xcrack.errors import ProblemError
 from xcrack.growth.advance import PerCrack
+from xcrack.inputs import numbers
 
 
 def cycles_between(a0: ArrayLike, a1: ArrayLike, rate0: ArrayLike, rate1: ArrayLike) -> Floats:
@@ -24,13 +25,15 @@ def cycles_between(a0: ArrayLike, a1: ArrayLike, rate0: ArrayLike, rate1: ArrayL
     Returns
     -------
     (...) array
-        Cycles, 0 where a1 = a0. Where the rate falls to exactly 0 no power law passes through
-        both: there the rate is taken to fall in proportion to the cycles, 2 (a1 - a0) / rate0.
+        Cycles, 0 where a1 = a0. Where the rate falls to exactly 0, or rises to inf, no power law
+        passes through both: the rate is then taken to fall in proportion to the cycles, which
+        gives 2 (a1 - a0) / rate0, or its inverse to fall to 0 in proportion to the length as close
+        to the toughness, which gives half of (a1 - a0) / rate0.
 
     Raises
     ------
     ProblemError
-        Lengths that shrink or are not positive, rates that are negative, or 0 at a0.
+        Lengths that shrink or are not positive, rates that are negative or nan, or 0 or inf at a0.
 
     Notes
     -----
@@ -44,7 +47,16 @@ def cycles_between(a0: ArrayLike, a1: ArrayLike, rate0: ArrayLike, rate1: ArrayL
     >>> print(cycles_between(1.0, 2.0, 1e-3, 2e-3).round(6))   # rate ~ a: ln 2 / 1e-3
     693.147181
     """
-    a0, a1, rate0, rate1 = (np.asarray(v, dtype=float) for v in (a0, a1, rate0, rate1))
+    a0, a1 = numbers(a0, "crack length a0"), numbers(a1, "crack length a1")
+    rate0 = numbers(rate0, "growth rate rate0")
+    rate1 = numbers(rate1, "growth rate rate1", finite=False)
+    try:
+        np.broadcast_shapes(a0.shape, a1.shape, rate0.shape, rate1.shape)
+    except ValueError as error:
+        raise ProblemError(
+            f"cycles_between: lengths and rates have the shapes {a0.shape}, {a1.shape}, "
+            f"{rate0.shape} and {rate1.shape}, which do not fit each other."
+        ) from error
     if not (np.all(a0 > 0) and np.all(a1 >= a0)):
         raise ProblemError(f"crack lengths must be positive and not shrink: from {a0} to {a1}.")
     if not (np.all(rate0 > 0) and np.all(rate1 >= 0)):
@@ -52,9 +64,11 @@ def cycles_between(a0: ArrayLike, a1: ArrayLike, rate0: ArrayLike, rate1: ArrayL
             f"growth rates {rate0} (before) and {rate1} (after) must be positive and not negative."
         )
     x = np.log1p((a1 - a0) / a0)
-    stops = rate1 == 0
-    q = x - np.log(np.where(stops, 1.0, rate1 / rate0))
-    return np.asarray(np.where(stops, 2 * (a1 - a0) / rate0, a0 / rate0 * x * exprel(q)))[()]
+    stops, breaks = rate1 == 0, np.isinf(rate1)
+    q = x - np.log(np.where(stops | breaks, 1.0, rate1 / rate0))
+    by_first_rate = (a1 - a0) / rate0
+    by_power = np.where(breaks, 0.5 * by_first_rate, a0 / rate0 * x * exprel(q))
+    return np.asarray(np.where(stops, 2 * by_first_rate, by_power))[()]
 
 
 def elapsed(

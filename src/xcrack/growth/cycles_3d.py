@@ -28,7 +28,7 @@ def elapsed_3d(
         Advance of the places along the fronts of each crack, and growth a cycle before the step.
     rate1 : sequence of (f,) arrays, length/cycle
         Growth a cycle after the step where these places have come to (see `carried`), nan where
-        they have left the body.
+        they have left the body, inf where the toughness is reached.
 
     Returns
     -------
@@ -59,7 +59,7 @@ def elapsed_3d(
     moved = [(d > 0) & (r > 0) for d, r in zip(da, rate0)]
     if not any(m.any() for m in moved):
         raise ProblemError("no point of a front with a growth rate has advanced.")
-    stay = [m & np.isfinite(r) for m, r in zip(moved, rate1)]
+    stay = [m & ~np.isnan(r) for m, r in zip(moved, rate1)]
     there = any(m.any() for m in stay)
     largest = [float(r[m].max(initial=-1.0)) for r, m in zip(rate0, stay if there else moved)]
     c = int(np.argmax(largest))
@@ -69,6 +69,8 @@ def elapsed_3d(
     if not there:
         return by_first_rate
     fast = stay[c] & (rate0[c] >= _DRIVING * largest[c])
+    if np.isinf(rate1[c][fast]).any():
+        return 0.5 * by_first_rate  # as in `cycles_between`
     ratio = float(rate1[c][fast].sum() / rate0[c][fast].sum())
     if ratio == 0:
         return 2 * by_first_rate

@@ -113,7 +113,10 @@ def carried(
         r, segment, place = front_distance(target, line, shut)
         following = (segment + 1) % len(line)
         place = np.nan_to_num(place)
-        value = (1 - place) * along[segment] + place * along[following]
+        first, second = along[segment], along[following]
+        with np.errstate(invalid="ignore"):  # inf where the toughness is reached
+            between = (1 - place) * first + place * second
+        value = np.where(place == 0, first, np.where(place == 1, second, between))
         nearer = r <= best
         result[nearer], best[nearer] = value[nearer], r[nearer]
     return result

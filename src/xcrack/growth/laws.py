@@ -1,7 +1,8 @@
 """Growth laws: plain callables ``(dK_eq, R) -> da/dN``.
 
-A law of your own is any function of that form; `xcrack.testing.check_law` tries it. C carries
-the units of da/dN over (stress √length)^m: it belongs to one set of units only.
+A law of your own is any function of that form; `xcrack.testing.check_law` tries it. It may return
+inf where the toughness is reached, which ends a run. C carries the units of da/dN over
+(stress √length)^m: it belongs to one set of units only.
 """
 
 from collections.abc import Callable
@@ -12,6 +13,9 @@ from numpy.typing import ArrayLike
 
 from xcrack.arrays import Floats
 from xcrack.errors import ProblemError
+from xcrack.inputs import number, numbers
+
+_ROUND_OFF = 1e-9
 
 Law = Callable[[Floats, Floats], Floats]
 
@@ -47,12 +51,12 @@ class paris:  # noqa: N801 - it is used as a function: paris(C, m)(dK_eq, R)
     m: float
 
     def __post_init__(self) -> None:
-        _positive("paris", C=self.C, m=self.m)
+        _set(self, C=number(self.C, "paris: C", above=0), m=number(self.m, "paris: m", above=0))
 
     def __call__(self, dK_eq: ArrayLike, R: ArrayLike) -> Floats:
         """Growth a cycle of each point, length."""
-        del R
-        return np.asarray(self.C * np.asarray(dK_eq, dtype=float) ** self.m)[()]
+        dK, _ = _range_and_ratio("paris", dK_eq, R)
+        return np.asarray(self.C * dK**self.m)[()]
 
 
 @dataclass(frozen=True)
@@ -94,9 +98,8 @@ class elber:  # noqa: N801 - it is used as a function
     b: float
 
     def __post_init__(self) -> None:
-        _positive("elber", C=self.C, m=self.m)
-        if not (np.isfinite(self.a) and np.isfinite(self.b)):
-            raise ProblemError(f"elber: a = {self.a}, b = {self.b} must be finite.")
+        _set(self, C=number(self.C, "elber: C", above=0), m=number(self.m, "elber: m", above=0))
+        _set(self, a=number(self.a, "elber: a"), b=number(self.b, "elber: b"))
         if max(self.a, self.a + self.b) <= 0:
             raise ProblemError(
                 f"elber: U = {self.a} + {self.b} R is not positive for any R in [0, 1]: nothing "
@@ -105,11 +108,12 @@ class elber:  # noqa: N801 - it is used as a function
 
     def U(self, R: ArrayLike) -> Floats:  # noqa: N802 - Elber's own name
         """Share of the range that opens the crack, in [0, 1]."""
-        return np.asarray(np.clip(self.a + self.b * np.asarray(R, dtype=float), 0.0, 1.0))[()]
+        return np.asarray(np.clip(self.a + self.b * numbers(R, "elber: R"), 0.0, 1.0))[()]
 
     def __call__(self, dK_eq: ArrayLike, R: ArrayLike) -> Floats:
         """Growth a cycle of each point, length."""
-        return np.asarray(self.C * (self.U(R) * np.asarray(dK_eq, dtype=float)) ** self.m)[()]
+        dK, ratio = _range_and_ratio("elber", dK_eq, R)
+        return np.asarray(self.C * (self.U(ratio) * dK) ** self.m)[()]
 
 
 @dataclass(frozen=True)
@@ -146,23 +150,40 @@ class walker:  # noqa: N801 - it is used as a function
     gamma: float
 
     def __post_init__(self) -> None:
-        _positive("walker", C=self.C, m=self.m)
-        if not 0 <= self.gamma <= 1:
-            raise ProblemError(f"walker: gamma = {self.gamma} must lie in [0, 1].")
+        _set(self, C=number(self.C, "walker: C", above=0), m=number(self.m, "walker: m", above=0))
+        _set(self, gamma=number(self.gamma, "walker: gamma", least=0, most=1))
 
     def __call__(self, dK_eq: ArrayLike, R: ArrayLike) -> Floats:
         """Growth a cycle of each point, length."""
-        dK = np.asarray(dK_eq, dtype=float)
+        dK, ratio = _range_and_ratio("walker", dK_eq, R)
         # R = 1 is a load that does not vary: ΔK = 0, and 0/0 must not become nan
-        share = np.maximum(1.0 - np.asarray(R, dtype=float), np.finfo(float).tiny)
+        share = np.maximum(1.0 - ratio, np.finfo(float).tiny)
         effective = np.where(dK > 0, dK / share ** (1.0 - self.gamma), 0.0)
         return np.asarray(self.C * effective**self.m)[()]
 
 
-def _positive(name: str, **values: float) -> None:
-    for key, value in values.items():
-        if not (np.isfinite(value) and value > 0):
-            raise ProblemError(f"{name}: {key} = {value} must be positive and finite.")
+def _set(law: object, **values: float) -> None:
+    """Constants of a law as floats: 3 and 3.0 are the same setting."""
+    for name, value in values.items():
+        object.__setattr__(law, name, value)
+
+
+def _range_and_ratio(name: str, dK_eq: ArrayLike, R: ArrayLike) -> tuple[Floats, Floats]:
+    """What a law is called with, as arrays that fit each other."""
+    dK, ratio = numbers(dK_eq, f"{name}: dK_eq"), numbers(R, f"{name}: R")
+    try:
+        np.broadcast_shapes(dK.shape, ratio.shape)
+    except ValueError as error:
+        raise ProblemError(
+            f"{name}: dK_eq and R have the shapes {dK.shape} and {ratio.shape}: give one R for "
+            "each range, or one for all."
+        ) from error
+    if (dK < 0).any() or (ratio > 1 + _ROUND_OFF).any():
+        raise ProblemError(
+            f"{name}: dK_eq from {dK.min():.6g} and R up to {ratio.max():.6g}: a range is not "
+            "negative, and R = K_min / K_max is at most 1."
+        )
+    return dK, ratio
 
 
 __all__ = ["Law", "elber", "paris", "walker"]

@@ -11,11 +11,12 @@ from xcrack.analysis.solve import solve_states
 from xcrack.crack.crack import Crack
 from xcrack.errors import GeometryError, ProblemError, XcrackError, warn
 from xcrack.growth.advance import LEAST, Advance, PerCrack, plan_advance
-from xcrack.growth.checks import directed, law_rate
+from xcrack.growth.checks import depends_on_ratio, evaluate_criterion, evaluate_law
 from xcrack.growth.criteria import Criterion
-from xcrack.growth.ending import end_at, left_the_body, place_name, too_short
+from xcrack.growth.ending import end_at, left_the_body, short_kink, too_short
 from xcrack.growth.follow import following
 from xcrack.growth.laws import Law
+from xcrack.growth.notices import Notices
 from xcrack.growth.options import GrowOptions, Run, lists_options, run_of
 from xcrack.growth.progress import report_end, report_step
 from xcrack.growth.step import Cycle, Memory, Step, memory_of
@@ -46,9 +47,10 @@ def grow(
         With the cracks as they are at first. The radius of the tip functions is taken at the
         first step and kept.
     law : callable (dK_eq, R) -> da/dN
-        `paris`, `elber`, `walker` or your own.
+        `paris`, `elber`, `walker` or your own. Where it returns inf, the toughness is reached and
+        growth ends.
     criterion : callable (K, nu) -> (angle, dK_eq, R)
-        `max_hoop_stress`, `mean_reference`, `weighted_angle` or your own.
+        `max_hoop_stress`, `mean_reference`, `weighted_angle` or your own; angles in rad.
     cycle : Cycle
     da : float, length, optional
         Largest advance of any tip in a step.
@@ -77,9 +79,15 @@ def grow(
     Raises
     ------
     ProblemError
-        Options that do not fit; a law that returns negative or nan; an advance below a tenth of
-        the cell at the tip (later in a run: a warning, and the run ends). Warns where it is below
-        one cell.
+        Options that do not fit; a law that returns negative or nan; an angle of pi or more; an
+        advance below a tenth of the cell at the tip (later in a run: a warning, and the run ends).
+
+    Warns
+    -----
+    XcrackWarning
+        A turn by more than 10 degrees with an advance below the cell along the path; R < 0 asked
+        of a law that depends on R. Warnings that come again in later steps are counted, and
+        summarised in one when the run ends.
 
     Notes
     -----
@@ -91,55 +99,74 @@ def grow(
 
 def steps_of(run: Run, last: Step | None = None) -> Generator[Step, None, str]:
     """Steps of a run: from the beginning, or those that follow a step."""
-    warned = False
-    if last is None:
-        last, reuse = _next_step(run, run.problem, None, None)
-        yield last
-    else:
-        reuse = memory_of(last).reuse
-    while True:
-        memory = memory_of(last)
-        ended = end_at(run, last)
-        plan = _plan(run, last.sif[0], last.rate, last.dK_eq, memory.pending)
-        if not ended and plan.largest < LEAST * plan.size:
-            ended = too_short(run, last, plan)
-            if last.index == 0:
-                raise ProblemError(ended)
-            warn(ended)
-        if ended:
-            break
-        if plan.largest < plan.size and not warned:
-            warned = True
-            warn(
-                f"the advance {plan.largest:.4g} is below one cell at "
-                f"{place_name(run, last, *plan.tip)} (cell size {plan.size:.4g}): K of the next "
-                "step feels the kink through one cell only. Take a larger da or a finer mesh "
-                "around the tip."
-            )
-        try:
-            cracks = _advanced(run, last)
-            problem = _problem(run, cracks, memory)
-        except GeometryError as error:
-            ended = f"the cracks cannot go on after step {last.index}: {error}"
-            break
-        gone = _gone(run, cracks, problem.placed)
-        if not any(placed.n_tips for placed in problem.placed):
-            ended = left_the_body(run, last, gone)
-            break
-        try:
-            last, reuse = _next_step(run, problem, last, reuse)
-        except GeometryError as error:
-            ended = f"the cracks cannot go on after step {last.index}: {error}"
-            break
-        except XcrackError as error:
-            if not gone:
-                raise
-            left = left_the_body(run, last, gone)
-            ended = f"{left}, and the body cannot be solved without it: {error}"
-            break
-        yield last
+    notices = Notices()
+    kink = ""
+    try:
+        if last is None:
+            with notices.watch(0):
+                last, reuse = _next_step(run, run.problem, None, None)
+                _warn_of_ratio(run, last)
+            yield last
+        else:
+            reuse = memory_of(last).reuse
+        while True:
+            ended = end_at(run, last)
+            plan = _plan(run, last.sif[0], last.rate, last.dK_eq, memory_of(last).pending)
+            if not ended and plan.largest < LEAST * plan.size:
+                ended = too_short(run, last, plan)
+                if last.index == 0:
+                    raise ProblemError(ended)
+                warn(ended)
+            if ended:
+                break
+            if not kink:
+                kink = short_kink(run, last, plan)
+                if kink:
+                    warn(kink)
+            with notices.watch(last.index + 1):
+                next_step, reuse, ended = _after(run, last, reuse)
+            if next_step is None:
+                break
+            last = next_step
+            yield last
+    finally:
+        notices.summarise()
     report_end(run, ended)
     return ended
+
+
+def _after(run: Run, last: Step, reuse: Reuse) -> tuple[Step | None, Reuse, str]:
+    """The step after another one, or why there is none."""
+    try:
+        cracks = _advanced(run, last)
+        problem = _problem(run, cracks, memory_of(last))
+    except GeometryError as error:
+        return None, reuse, f"the cracks cannot go on after step {last.index}: {error}"
+    gone = _gone(run, cracks, problem.placed)
+    if not any(placed.n_tips for placed in problem.placed):
+        return None, reuse, left_the_body(run, last, gone)
+    try:
+        return *_next_step(run, problem, last, reuse), ""
+    except GeometryError as error:
+        return None, reuse, f"the cracks cannot go on after step {last.index}: {error}"
+    except XcrackError as error:
+        if not gone:
+            raise
+        left = left_the_body(run, last, gone)
+        return None, reuse, f"{left}, and the body cannot be solved without it: {error}"
+
+
+def _warn_of_ratio(run: Run, first: Step) -> None:
+    """Warn where R < 0 was asked for and a law that depends on R never sees it."""
+    ratio, dK_eq = run.cycle.ratio, np.concatenate([d[d > 0] for d in first.dK_eq])
+    if ratio is None or ratio >= 0 or not len(dK_eq) or not depends_on_ratio(run.law, dK_eq):
+        return
+    warn(
+        f"the cycle has R = {ratio:.4g}, but a closed crack has K_I = 0: the law sees K_max as "
+        f"range and R = {min(float(R.min(initial=1.0)) for R in first.R):.2g} or more. Constants "
+        "fitted with nominal R < 0 then give up to 3 times too small rates, which is unsafe: take "
+        "those fitted for R = 0."
+    )
 
 
 def _next_step(
@@ -148,15 +175,16 @@ def _next_step(
     """Solve all load states of a problem and decide where and how fast its cracks grow."""
     before = None if last is None else memory_of(last)
     cracks, mesh, nu = problem.placed, problem.mesh, run.problem.material.nu
+    place = following(mesh).PLACE
     solutions, sif = respond(problem, run, reuse)
     angle, dK_eq, R, law_rates = [], [], [], []
     for c in range(len(cracks)):
         K = np.stack([state[c].K for state in sif])
-        direction, dK, ratio = directed(run.criterion, K, nu, c)
+        direction, dK, ratio = evaluate_criterion(run.criterion, K, nu, c, place)
         angle.append(direction)
         dK_eq.append(dK)
         R.append(ratio)
-        law_rates.append(law_rate(run.law, dK, ratio, c))
+        law_rates.append(evaluate_law(run.law, dK, ratio, c, place))
     rate = tuple(np.where(d < run.threshold, 0.0, r) for d, r in zip(dK_eq, law_rates))
     length = tuple(following(mesh).crack_size(crack, mesh) for crack in cracks)
     if last is None or before is None:

@@ -1,7 +1,8 @@
 """The values of a growth run: the load cycle, and one state of the cracks after the other."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ from xcrack.arrays import Floats
 from xcrack.crack.crack import Crack
 from xcrack.errors import ProblemError
 from xcrack.growth.advance import PerCrack
+from xcrack.inputs import number
 from xcrack.sif.sif import SIF
 from xcrack.solvers.reuse import Reuse
 
@@ -29,7 +31,7 @@ class Cycle:
     Raises
     ------
     ProblemError
-        Neither or both are given, a factor is not finite, or min > max.
+        Neither or both are given, a factor is no finite number, or min > max.
 
     Examples
     --------
@@ -45,14 +47,38 @@ class Cycle:
         if self.states is None:
             if self.min is None or self.max is None:
                 raise ProblemError("a cycle is Cycle(min, max) or Cycle(states=[...]).")
-            if not (np.isfinite(self.min) and np.isfinite(self.max) and self.min <= self.max):
+            for name in ("min", "max"):
+                factor = number(getattr(self, name), f"Cycle({name}=...)")
+                object.__setattr__(self, name, factor)
+            if not self.min <= self.max:
                 raise ProblemError(f"Cycle({self.min}, {self.max}): give finite min <= max.")
             return
         if self.min is not None or self.max is not None:
             raise ProblemError("a cycle is Cycle(min, max) or Cycle(states=[...]), not both.")
-        if isinstance(self.states, str) or len(self.states) == 0:
+        if isinstance(self.states, str) or not isinstance(self.states, Iterable):
+            raise ProblemError(f"Cycle(states={self.states!r}): give a list of load states.")
+        states = tuple(self.states)
+        if not states:
             raise ProblemError("Cycle(states=...) takes a list of at least one load state.")
-        object.__setattr__(self, "states", tuple(self.states))
+        for k, state in enumerate(states):
+            if isinstance(state, str) or not isinstance(state, Real | Iterable):
+                raise ProblemError(
+                    f"Cycle(states=...): state {k} is {state!r}: give a number or a list of loads."
+                )
+            if isinstance(state, Real):
+                number(state, f"Cycle(states=...): state {k}")
+        object.__setattr__(self, "states", states)
+
+    @property
+    def ratio(self) -> float | None:
+        """Smallest over largest factor of the cycle, as it was asked for.
+
+        None where that is no ratio of forces: a state that is a list of loads, or no factor > 0.
+        """
+        factors = [float(state) for state in self.load_states if isinstance(state, Real)]
+        if len(factors) < len(self.load_states) or max(factors) <= 0:
+            return None
+        return min(factors) / max(factors)
 
     @property
     def load_states(self) -> tuple[Any, ...]:
@@ -103,8 +129,9 @@ class Step:
         ``sif[state][crack]``.
     angle, dK_eq, R, rate, da : tuple of (f,) arrays
         One array a crack: kink angle (rad), equivalent range (stress √length), ratio, growth a
-        cycle (length/cycle; 0 below the threshold), and the advance from here to the next step
-        (length; 0 for a tip whose growth is still shorter than a tenth of a cell: it waits).
+        cycle (length/cycle; 0 below the threshold, inf where the law says that the toughness is
+        reached), and the advance from here to the next step (length; 0 for a tip whose growth is
+        still shorter than a tenth of a cell: it waits).
     solutions : tuple of Solution
         One for each load state; empty in a step that was read from disk.
     memory : Memory, optional
@@ -136,11 +163,15 @@ def memory_of(step: Step) -> Memory:
     return step.memory
 
 
+def directions(step: Step, c: int) -> Floats:
+    """Unit vectors `(f, d)` along which the places of crack c advance."""
+    frame, beta = step.sif[0][c].frame, step.angle[c][:, None]
+    return np.asarray(np.cos(beta) * frame[:, 0] + np.sin(beta) * frame[:, 1])
+
+
 def moved_places(step: Step, c: int) -> Floats:
     """Where the tips, or the places along fronts, of crack c have come to `(f, d)`."""
-    sif, beta = step.sif[0][c], step.angle[c][:, None]
-    direction = np.cos(beta) * sif.frame[:, 0] + np.sin(beta) * sif.frame[:, 1]
-    return np.asarray(sif.x + step.da[c][:, None] * direction)
+    return np.asarray(step.sif[0][c].x + step.da[c][:, None] * directions(step, c))
 
 
-__all__ = ["Cycle", "Memory", "Step", "memory_of", "moved_places"]
+__all__ = ["Cycle", "Memory", "Step", "directions", "memory_of", "moved_places"]

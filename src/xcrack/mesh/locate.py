@@ -50,14 +50,25 @@ def contains(mesh: Mesh, x: Floats) -> Bools:
     return locate(mesh, x)[0] >= 0
 
 
-def cell_sizes(mesh: Mesh, x: Floats) -> Floats:
-    """Size of the cell at each point `(k,)`, length; at the nearest cell where none has it."""
+def cells_at(mesh: Mesh, x: Floats) -> Ints:
+    """Cell of each point `(k,)`; the nearest where none has it."""
     cell, _ = locate(mesh, x)
     if (cell < 0).any():
         _, nearest = mesh.cell_tree.query(x[cell < 0])
         cell = np.array(cell)
         cell[cell < 0] = nearest
-    return np.asarray(mesh.cell_size[cell])
+    return cell
+
+
+def cell_sizes(mesh: Mesh, x: Floats) -> Floats:
+    """Size of the cell at each point `(k,)`, length; of the nearest cell where none has it."""
+    return np.asarray(mesh.cell_size[cells_at(mesh, x)])
+
+
+def cell_extents(mesh: Mesh, x: Floats, direction: Floats) -> Floats:
+    """Extent of the cell at each point `(k, d)` along a unit vector `(k, d)`: `(k,)`, length."""
+    corners = mesh.points[mesh.cells[cells_at(mesh, x)][:, : mesh.dim + 1]]
+    return np.asarray(np.ptp(np.einsum("kid,kd->ki", corners, direction), axis=1))
 
 
 def nearest_boundary(mesh: Mesh, x: Floats) -> tuple[float, float]:
