@@ -103,8 +103,9 @@ def steps_of(run: Run, last: Step | None = None) -> Generator[Step, None, str]:
     kink = ""
     try:
         if last is None:
+            settings = run.settings  # before a law is called that may change what it reads
             with notices.watch(0):
-                last, reuse = _next_step(run, run.problem, None, None)
+                last, reuse = _next_step(run, run.problem, None, None, settings)
                 _warn_of_ratio(run, last)
             yield last
         else:
@@ -146,7 +147,7 @@ def _after(run: Run, last: Step, reuse: Reuse) -> tuple[Step | None, Reuse, str]
     if not any(placed.n_tips for placed in problem.placed):
         return None, reuse, left_the_body(run, last, gone)
     try:
-        return *_next_step(run, problem, last, reuse), ""
+        return *_next_step(run, problem, last, reuse, memory_of(last).settings), ""
     except GeometryError as error:
         return None, reuse, f"the cracks cannot go on after step {last.index}: {error}"
     except XcrackError as error:
@@ -170,7 +171,11 @@ def _warn_of_ratio(run: Run, first: Step) -> None:
 
 
 def _next_step(
-    run: Run, problem: Problem, last: Step | None, reuse: Reuse | None
+    run: Run,
+    problem: Problem,
+    last: Step | None,
+    reuse: Reuse | None,
+    settings: Mapping[str, str],
 ) -> tuple[Step, Reuse]:
     """Solve all load states of a problem and decide where and how fast its cracks grow."""
     before = None if last is None else memory_of(last)
@@ -190,12 +195,11 @@ def _next_step(
     if last is None or before is None:
         n_cycles, index = 0.0, 0
         pending = tuple(np.zeros_like(r) for r in rate)
-        settings: Mapping[str, str] = run.settings
         radius = run.problem.numerics.radius
         if radius is None and len(solutions[0].space.radius):
             radius = float(np.min(solutions[0].space.radius))
     else:
-        index, settings, radius = last.index + 1, before.settings, before.radius
+        index, radius = last.index + 1, before.radius
         since, pending = following(mesh).followed(last, cracks, sif[0], law_rates, length, mesh)
         n_cycles = last.cycles + since
     plan = _plan(run, sif[0], rate, tuple(dK_eq), pending)
