@@ -221,12 +221,14 @@ def main() -> int:
                 k: difference(stored[k], found[k], scale_of(k, stored))
                 for k in expected & set(found)
             }
-            apart |= {k: np.inf for k in expected ^ set(found)}
+            apart |= {k: np.inf for k in expected - set(found)}
             largest = max(apart, key=lambda k: apart[k])
             worst = max(worst, apart[largest])
             line += (
                 f"   {'same bits' if apart[largest] == 0 else f'{apart[largest]:.1e} {largest}'}"
             )
+            new = set(found) - expected  # columns that there were not before
+            line += f"   ({len(new)} new arrays)" if new else ""
         print(line, flush=True)
     if options.save:
         np.savez(options.save, **results)

@@ -9,7 +9,7 @@ import scipy.sparse as sp
 import scenes
 import xcrack as xc
 from xcrack.analysis.solve import solve_states
-from xcrack.history.run_folder import CLASSES, read_steps, step_path
+from xcrack.history.run_folder import CLASSES, read_header, read_steps, step_path
 from xcrack.history.store import load, save
 from xcrack.solvers.direct import scaled_basis, system
 from xcrack.solvers.factor import Elimination, eliminated
@@ -97,9 +97,10 @@ def test_a_step_whose_order_is_lost_is_not_taken_for_whole(tmp_path):
         xc.max_hoop_stress, xc.Cycle(0.0, 1.0), 0.15, max_steps=3,
     )  # fmt: skip
     xc.collect(run, tmp_path)
-    steps, broken = read_steps(tmp_path, {})
-    assert [step.memory.reuse.elimination.age for step in steps] == [0, 1, 2]
-    assert broken is None
+    header, _ = read_header(tmp_path)
+    whole = read_steps(tmp_path, header)
+    assert [step.memory.reuse.elimination.age for step in whole.steps] == [0, 1, 2]
+    assert whole.fault == ""
     second = load(step_path(tmp_path, 1), CLASSES)["step"]
     assert second.memory.reuse.elimination.place.size == 0
     stored = load(step_path(tmp_path, 0), CLASSES)
@@ -107,6 +108,7 @@ def test_a_step_whose_order_is_lost_is_not_taken_for_whole(tmp_path):
     memory = replace(memory, reuse=replace(memory.reuse, elimination=None))
     stored["step"] = replace(stored["step"], memory=memory)
     save(step_path(tmp_path, 0), stored, CLASSES)
-    steps, broken = read_steps(tmp_path, {})
-    assert len(steps) == 1
-    assert broken == step_path(tmp_path, 1)
+    broken = read_steps(tmp_path, header)
+    assert len(broken.steps) == 1
+    assert broken.fault == "step_00001.npz is not whole"
+    assert broken.rest == (step_path(tmp_path, 2), step_path(tmp_path, 1))

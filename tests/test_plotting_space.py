@@ -392,7 +392,7 @@ def test_bad_fronts(history):
         draw_K(ring(0.5, 8), modes=("IV",), show=False)
     with pytest.raises(xc.ProblemError, match="every=0"):
         draw_fronts(history, every=0, show=False)
-    with pytest.raises(xc.ProblemError, match="in space also"):
+    with pytest.raises(xc.ProblemError, match="in 3D also"):
         history.plot("S", None)
 
 

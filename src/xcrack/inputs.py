@@ -1,8 +1,11 @@
-"""Checks of numbers and arrays where users give them, and calls of users' functions."""
+"""Checks of numbers, arrays and paths where users give them, and calls of users' functions."""
 
 import operator
-from collections.abc import Callable
+import os
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from numbers import Real
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -221,6 +224,64 @@ def called(function: Callable[..., Any], what: str, *arguments: Any) -> Any:
         raise
 
 
+def path_of(value: Any, what: str, *, error: type[XcrackError] = XcrackError) -> Path:
+    """Check that a value can be the path of a file, and return it.
+
+    Parameters
+    ----------
+    value : anything
+    what : str
+        Its name in the message, such as ``"write_mesh: path"``.
+    error : type of XcrackError
+
+    Returns
+    -------
+    Path
+
+    Raises
+    ------
+    error
+        Neither a string nor a path, empty, or with a NUL character.
+
+    Examples
+    --------
+    >>> path_of("plate.msh", "read_mesh: path").suffix
+    '.msh'
+    """
+    if not isinstance(value, str | os.PathLike) or isinstance(os.fspath(value), bytes):
+        raise error(f"{what} = {_shown(value)} is not a path: give a string or a pathlib.Path.")
+    text = os.fspath(value)
+    if not text or "\0" in text:
+        reason = "holds a NUL character" if text else "is empty"
+        raise error(f"{what} = {_shown(value)} {reason}: give the path of a file.")
+    return Path(text)
+
+
+@contextmanager
+def system_errors(
+    what: str, path: Path, *, error: type[XcrackError] = XcrackError
+) -> Iterator[None]:
+    """Turn what the system refuses (no space, no permission, a folder) into an error of ours.
+
+    Parameters
+    ----------
+    what : str
+        What failed, such as ``"the mesh cannot be written to"``; the path follows.
+    path : Path
+    error : type of XcrackError
+
+    Raises
+    ------
+    error
+        For an OSError; it names the path and what the system said.
+    """
+    try:
+        yield
+    except OSError as cause:
+        reason = cause.strerror or str(cause) or type(cause).__name__
+        raise error(f"{what} {str(path)!r}: {reason}.") from cause
+
+
 def _real_array(value: Any, what: str, wanted: str, error: type[XcrackError]) -> Any:
     if isinstance(value, np.ma.MaskedArray):
         if np.ma.getmaskarray(value).any():
@@ -279,4 +340,4 @@ def _shown(value: Any) -> str:
     return text if len(text) <= 80 else f"{text[:60]} … ({type(value).__name__})"
 
 
-__all__ = ["called", "number", "numbers", "whole", "whole_numbers"]
+__all__ = ["called", "number", "numbers", "path_of", "system_errors", "whole", "whole_numbers"]

@@ -8,7 +8,7 @@ import pytest
 
 import scenes_fronts as fronts
 import xcrack as xc
-from xcrack.history.history import load
+from xcrack.history.collect import load
 
 # Small meshes: the two domains of K differ by a few per cent, advances are about a cell.
 pytestmark = pytest.mark.filterwarnings("ignore::xcrack.XcrackWarning")

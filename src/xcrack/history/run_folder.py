@@ -1,13 +1,13 @@
 """The folder of a growth run: one file a step, and one that says what the run is.
 
-Each step also carries what the run is, so that a lost header is made again from the steps.
+Each step also carries what the run is, so that a lost header is made again from the steps. What was
+finished is never deleted: files that do not belong to the run are moved into a folder beside them.
 """
 
 import json
-import platform
-from collections.abc import Mapping
+import re
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
@@ -15,16 +15,18 @@ import numpy as np
 
 from xcrack.crack.crack import Crack
 from xcrack.errors import ProblemError
-from xcrack.growth.fingerprint import DEFAULTS, differences
+from xcrack.growth.fingerprint import DEFAULTS
 from xcrack.growth.step import Memory, Step
-from xcrack.history.store import load, save, write_whole
+from xcrack.history import lock
+from xcrack.history.store import PART, load, save, write_whole
+from xcrack.inputs import system_errors
 from xcrack.sif.sif import SIF
 from xcrack.solvers.factor import Elimination
 from xcrack.solvers.reuse import Reuse
 
-_HEADER = "run.json"
+HEADER = "run.json"
 _FORMAT = 2
-_SHOWN = 5
+_STEP = re.compile(r"step_(\d{5,})\.npz")
 CLASSES: dict[str, type] = {
     "Step": Step, "Memory": Memory, "Reuse": Reuse, "Elimination": Elimination, "Crack": Crack,
     "SIF": SIF,
@@ -54,21 +56,30 @@ class Header:
         return int(self.settings["defaults"])
 
 
-def versions() -> dict[str, str]:
-    """Versions of all that the last bit of a result depends on."""
-    found = {"python": platform.python_version()}
-    for name in ("xcrack", "numpy", "scipy", "numba"):
-        try:
-            found[name] = version(name)
-        except PackageNotFoundError:
-            found[name] = "unknown"
-    return found
+@dataclass(frozen=True, eq=False)
+class Stored:
+    """Steps of a folder.
+
+    Attributes
+    ----------
+    steps : tuple of Step
+        From the first to the last before one that is missing or damaged.
+    fault : str
+        What is wrong with the next one; empty where no file follows.
+    rest : tuple of Path
+        Files of steps that are not among these, the last first.
+    """
+
+    steps: tuple[Step, ...]
+    fault: str
+    rest: tuple[Path, ...]
 
 
 def write_header(folder: Path, header: Header) -> None:
     """Write, or write anew, what the run is."""
     content = {"ended": header.ended, **_content(header)}
-    write_whole(folder / _HEADER, (json.dumps(content, indent=1) + "\n").encode())
+    with system_errors("the header of the run cannot be written to", folder, error=ProblemError):
+        write_whole(folder / HEADER, (json.dumps(content, indent=1) + "\n").encode())
 
 
 def _content(header: Header) -> dict[str, Any]:
@@ -87,6 +98,8 @@ def _header(content: Any, path: Path) -> Header:
     ------
     ProblemError
         It was written by an xcrack that this one cannot follow.
+    KeyError, TypeError, ValueError
+        It is not a file of a run.
     """
     written = content["format"]
     if written < _FORMAT:
@@ -94,39 +107,52 @@ def _header(content: Any, path: Path) -> Header:
             f"{path} has format {written}, from before the first release, and this xcrack reads "
             f"{_FORMAT}: start the run again in another folder."
         )
-    header = Header(content["settings"], content["versions"], content.get("ended", ""))
-    if written > _FORMAT or header.defaults > DEFAULTS:
-        raise ProblemError(
-            f"{path} was written by a newer xcrack (format {written}, this one reads {_FORMAT}): "
-            "update xcrack, or read the run with the version that wrote it."
-        )
+    newer = ProblemError(
+        f"{path} was written by a newer xcrack (format {written}, this one reads {_FORMAT}): "
+        "update xcrack, or read the run with the version that wrote it."
+    )
+    if written > _FORMAT:
+        raise newer
+    settings, versions = ({**content[key]} for key in ("settings", "versions"))
+    header = Header(settings, versions, str(content.get("ended", "")))
+    if header.defaults > DEFAULTS:
+        raise newer
     return header
 
 
-def read_header(folder: Path) -> Header | None:
-    """What the run is; None where nothing was written yet.
+def read_header(folder: Path) -> tuple[Header | None, Path | None]:
+    """What the run is, and the file of it that is damaged, if one is.
 
-    Where the file is lost, it is taken from the first step that is whole.
+    Where the file is lost or damaged, it is taken from the first step that is whole; None where
+    there is none of these either.
 
     Raises
     ------
     ProblemError
-        The file is not one of xcrack's, or of another format.
+        The file is not one of xcrack's, and no step says more; or it is of another format.
     """
-    path = folder / _HEADER
-    if not path.exists():
-        return _header_of_steps(folder)
+    path = folder / HEADER
+    with system_errors("the header of the run cannot be read from", path, error=ProblemError):
+        text = path.read_bytes() if path.is_file() else None
+    if text is None:
+        return _header_of_steps(folder), path if path.exists() else None
     try:
-        return _header(json.loads(path.read_text()), path)
-    except (ValueError, KeyError, TypeError) as error:
-        raise ProblemError(f"{path} is not the header of a run ({error}): move it away.") from error
+        return _header(json.loads(text), path), None
+    except (ValueError, KeyError, TypeError, RecursionError) as error:
+        header = _header_of_steps(folder)
+        if header is None:
+            raise ProblemError(
+                f"{path} is not the header of a run ({error}), and no step beside it is whole: "
+                "move it away."
+            ) from error
+        return header, path
 
 
 def _header_of_steps(folder: Path) -> Header | None:
-    for path in sorted(folder.glob("step_*.npz")):
-        stored = load(path, CLASSES)
-        if stored is not None:
-            return _header(stored["run"], path)
+    for path in step_files(folder):
+        header, step = _read(path)
+        if step is not None:
+            return header
     return None
 
 
@@ -135,40 +161,100 @@ def step_path(folder: Path, index: int) -> Path:
     return folder / f"step_{index:05d}.npz"
 
 
+def step_files(folder: Path) -> list[Path]:
+    """All files, and whatever else, in the place of steps, by their number."""
+    with system_errors("the run cannot be read from", folder, error=ProblemError):
+        names = {path.name for path in folder.iterdir()} if folder.is_dir() else set()
+    numbers = sorted(int(match[1]) for match in map(_STEP.fullmatch, names) if match)
+    return [path for path in (step_path(folder, n) for n in numbers) if path.name in names]
+
+
 def write_step(folder: Path, step: Step, header: Header) -> None:
     """Write a step without its solutions; afterwards it is on disk as a whole.
 
     An order of elimination is written by the step that found it; those that follow only say so.
+
+    Raises
+    ------
+    ProblemError
+        The system refuses: no space, no permission. The steps before are whole.
     """
     memory = None if step.memory is None else replace(step.memory, settings={})
     order = _order_of(memory)
     if memory is not None and order is not None and order.age:
         memory = _with_order(memory, replace(order, place=np.zeros(0, dtype=np.int32)))
     stored = {"run": _content(header), "step": replace(step, solutions=(), memory=memory)}
-    save(step_path(folder, step.index), stored, CLASSES)
+    path = step_path(folder, step.index)
+    try:
+        save(path, stored, CLASSES)
+    except OSError as error:
+        before = f"The {step.index} steps before it are whole" if step.index else "No step is there"
+        raise ProblemError(
+            f"step {step.index} cannot be written to {path}: {error.strerror or error}. {before}: "
+            "mend that and go on by resume."
+        ) from error
 
 
-def read_steps(folder: Path, settings: Mapping[str, str]) -> tuple[list[Step], Path | None]:
-    """Steps up to the first that is missing or not whole, and its file if it is there."""
+def read_steps(folder: Path, header: Header) -> Stored:
+    """Steps up to the first that is missing, damaged, or of another run."""
+    files = step_files(folder)
     steps: list[Step] = []
-    while True:
-        path = step_path(folder, len(steps))
-        if not path.exists():
-            return steps, None
-        stored = load(path, CLASSES)
-        step = stored["step"] if isinstance(stored, dict) else None
-        if not isinstance(step, Step) or step.index != len(steps):
-            return steps, path
-        if isinstance(step.memory, Memory):
-            memory = replace(step.memory, settings=dict(settings))
-            order = _order_of(memory)
-            if order is not None and order.age:
-                found = _order_of(steps[-1].memory) if steps else None
-                if found is None:
-                    return steps, path
-                memory = _with_order(memory, replace(order, place=found.place))
-            step = replace(step, memory=memory)
-        steps.append(step)
+    fault = ""
+    for path in files:
+        number = len(steps)
+        if path != step_path(folder, number):
+            fault = f"{step_path(folder, number).name} is missing"
+            break
+        own, step = _read(path)
+        if own is None or step is None or step.index != number:
+            fault = f"{path.name} is not whole"
+            break
+        if own.settings != header.settings:
+            fault = f"{path.name} belongs to another run"
+            break
+        memory = None if step.memory is None else replace(step.memory, settings=header.settings)
+        order = _order_of(memory)
+        if memory is not None and order is not None and order.age:
+            before = _order_of(steps[-1].memory) if steps else None
+            if before is None:
+                fault = f"{path.name} is not whole"
+                break
+            memory = _with_order(memory, replace(order, place=before.place))
+        steps.append(replace(step, memory=memory))
+    return Stored(tuple(steps), fault, tuple(reversed(files[len(steps) :])))
+
+
+def _read(path: Path) -> tuple[Header | None, Step | None]:
+    """What a file says of its run, and its step; None where it is no step of a run."""
+    content = load(path, CLASSES)
+    if not isinstance(content, dict):
+        return None, None
+    try:
+        header = _header(content["run"], path)
+    except (ValueError, KeyError, TypeError):
+        return None, None
+    step = content.get("step")
+    return header, step if _is_step(step) else None
+
+
+def _is_step(step: Any) -> bool:
+    """Whether a value that was read has the parts of a step."""
+    if not isinstance(step, Step) or not isinstance(step.memory, Memory | None):
+        return False
+    try:
+        n = [len(angle) for angle in step.angle]
+        parts = (step.angle, step.dK_eq, step.R, step.rate, step.da)
+        return (
+            isinstance(step.index, int)
+            and bool(np.isfinite(step.cycles))
+            and len(step.cracks) == len(n)
+            and all(isinstance(crack, Crack) for crack in step.cracks)
+            and all(isinstance(sif, SIF) for state in step.sif for sif in state)
+            and all([len(sif.K) for sif in state] == n for state in step.sif)
+            and all([array.shape for array in part] == [(k,) for k in n] for part in parts)
+        )
+    except (TypeError, AttributeError):
+        return False
 
 
 def _order_of(memory: Memory | None) -> Elimination | None:
@@ -179,57 +265,46 @@ def _with_order(memory: Memory, order: Elimination) -> Memory:
     return replace(memory, reuse=replace(memory.reuse, elimination=order))
 
 
-def remove_steps(folder: Path, begin: int) -> None:
-    """Remove the steps from a number on, the last first: what is left is always a run."""
-    for path in sorted(folder.glob("step_*.npz"), reverse=True):
-        number = path.stem.removeprefix("step_")
-        if number.isdigit() and int(number) >= begin:
-            path.unlink()
-    for name in (_HEADER, "step_*.npz"):
-        for path in folder.glob(f".{name}.part"):
-            path.unlink()
+def move_aside(folder: Path, files: Sequence[Path]) -> Path:
+    """Move files of a folder into a new folder in it, and return that.
 
-
-def begin(folder: Path, settings: Mapping[str, str], overwrite: bool) -> Header:
-    """Make the folder ready for a new run.
-
-    A run of the very same settings may be written anew, since it comes out the same.
-
-    Raises
-    ------
-    ProblemError
-        The folder holds another run.
+    They go in the order in which they are given: with the last steps first, what is left by a kill
+    is always a run.
     """
-    stored = read_header(folder)
-    if stored is not None and not overwrite:
-        lines = differences(stored.settings, settings)
-        if lines:
-            raise ProblemError(
-                f"{folder} holds a run with other settings ({shortened(lines)}). Take another "
-                "path, or overwrite=True to lose it."
-            )
-    remove_steps(folder, 0)
-    header = Header(dict(settings), versions())
-    write_header(folder, header)
-    return header
+    with system_errors("files cannot be moved aside in", folder, error=ProblemError):
+        number = 1
+        while True:
+            aside = folder / f"moved_aside_{number}"
+            try:
+                aside.mkdir()
+                break
+            except FileExistsError:
+                number += 1
+        for path in files:
+            path.rename(aside / path.name)
+    return aside
 
 
-def shortened(lines: list[str]) -> str:
-    """The first few of many differences, in one line."""
-    more = len(lines) - _SHOWN
-    return "; ".join(lines[:_SHOWN]) + (f"; and {more} more" if more > 0 else "")
+def sweep(folder: Path) -> None:
+    """Remove what killed processes left half written; only the owner of the lock may do so."""
+    with system_errors("left over files cannot be removed from", folder, error=ProblemError):
+        for path in folder.glob(f".*{PART}"):
+            name = path.name.removeprefix(".")
+            if name.startswith((f"{HEADER}.", f"{lock.NAME}.")) or _STEP.match(name):
+                path.unlink(missing_ok=True)
 
 
 __all__ = [
     "CLASSES",
+    "HEADER",
     "Header",
-    "begin",
+    "Stored",
+    "move_aside",
     "read_header",
     "read_steps",
-    "remove_steps",
-    "shortened",
+    "step_files",
     "step_path",
-    "versions",
+    "sweep",
     "write_header",
     "write_step",
 ]

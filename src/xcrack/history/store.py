@@ -1,9 +1,10 @@
-"""Values to files and back to the last bit; a file is there as a whole or not at all."""
+"""Values to files and back to the last bit; writes are atomic."""
 
+import contextlib
 import io
 import json
 import os
-import zipfile
+import secrets
 from collections.abc import Mapping
 from dataclasses import MISSING, fields
 from pathlib import Path
@@ -13,18 +14,33 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xcrack.errors import ProblemError
+from xcrack.inputs import system_errors
 
+PART = ".part"  # ending of a file that is not whole yet
 Classes = Mapping[str, type]  # dataclasses that a file may hold, by the name they have in it
 
 
 def write_whole(path: Path, data: bytes) -> None:
-    """Write a file so that a kill at any moment leaves the old one or the new one."""
-    part = path.with_name(f".{path.name}.part")
-    with open(part, "wb") as file:
-        file.write(data)
-        file.flush()
-        os.fsync(file.fileno())
-    os.replace(part, path)
+    """Write a file so that a kill at any moment leaves the old one or the new one.
+
+    Until it is whole it has a name of its own, so that two processes never share one.
+
+    Raises
+    ------
+    OSError
+        The system refuses; nothing is left of the attempt.
+    """
+    part = path.with_name(f".{path.name}.{os.getpid()}_{secrets.token_hex(4)}{PART}")
+    try:
+        with open(part, "wb") as file:
+            file.write(data)
+            file.flush()
+            os.fsync(file.fileno())
+        os.replace(part, path)
+    except OSError:
+        with contextlib.suppress(OSError):
+            part.unlink()
+        raise
     if os.name == "posix":  # the name itself is on disk only once the folder is
         folder = os.open(path.parent, os.O_RDONLY)
         try:
@@ -59,19 +75,26 @@ def save(path: Path, value: Any, classes: Classes) -> None:
 
 
 def load(path: Path, classes: Classes) -> Any:
-    """Read a value that `save` wrote; None where the file is not whole.
+    """Read a value that `save` wrote; None where the file is damaged, or not one of these.
 
     Raises
     ------
     ProblemError
-        It holds a class that is not among those given, or one with other fields.
+        It holds a class that is not among those given, or one with other fields, or the system
+        does not let it be read.
     """
+    if path.is_dir():
+        return None
+    with system_errors("a stored value cannot be read from", path, error=ProblemError):
+        data = path.read_bytes()
     try:
-        with np.load(path, allow_pickle=False) as members:
+        with np.load(io.BytesIO(data), allow_pickle=False) as members:
             tree = json.loads(str(members["tree"]))
             arrays = {name: members[name] for name in members.files if name != "tree"}
         return _decoded(tree, arrays, classes, path)
-    except (OSError, EOFError, KeyError, ValueError, zipfile.BadZipFile):
+    except ProblemError:
+        raise
+    except Exception:  # whatever zipfile, zlib, numpy and json say of bytes that are not theirs
         return None
 
 
@@ -141,4 +164,4 @@ def _decoded(tree: Any, arrays: Mapping[str, NDArray[Any]], classes: Classes, pa
     return make(**values)
 
 
-__all__ = ["Classes", "load", "save", "write_whole"]
+__all__ = ["PART", "Classes", "load", "save", "write_whole"]

@@ -18,9 +18,9 @@ from xcrack.growth.step import Step
 from xcrack.history.history import History
 from xcrack.mesh.mesh import Mesh
 from xcrack.plotting.projection import View, best_plane, given_plane, on_plane, section_outline
+from xcrack.plotting.saving import save_figure
 from xcrack.sif.sif import SIF
 
-_DPI = 150
 _MODES = ("I", "II", "III")
 _NOISE = 0.1  # share of the largest K that a panel reaches at least: noise should not fill it
 
@@ -345,12 +345,7 @@ def _figure(size: tuple[float, float], file: Any, show: bool | None) -> tuple[An
 def _done(figure: Any, pyplot: Any, axes: Any, file: Any, title: str | None) -> Any:
     if title:
         axes.set_title(title)
-    target = None if file is None else Path(file)
-    if target is not None:
-        if not target.suffix:
-            target = target.with_name(target.name + ".png")
-        target.parent.mkdir(parents=True, exist_ok=True)
-        figure.savefig(target, dpi=_DPI)
+    target = None if file is None else save_figure(figure, file, "file")
     if pyplot is not None:
         pyplot.show()
     return figure if target is None else target

@@ -7,6 +7,7 @@ import numpy as np
 
 from xcrack.errors import ProblemError
 from xcrack.history.history import History
+from xcrack.plotting.saving import save_figure
 
 
 def draw(history: History, kind: str, file: str | Path | None) -> Any:
@@ -15,12 +16,10 @@ def draw(history: History, kind: str, file: str | Path | None) -> Any:
     if history.cracks and history.cracks[0].fronts is not None:
         kinds = {"K": _draw_K_of_fronts, "a": _draw_a, "fronts": _draw_fronts}
         kinds["path"] = _draw_fronts
-    if kind == "fronts" and kind not in kinds and history.steps:
-        raise ProblemError('plot kind = "fronts": only cracks in space have them; give "path".')
-    if kind not in (*kinds, "fronts"):
-        raise ProblemError(
-            f'plot kind = {kind!r}: give "K", "a" or "path", in space also "fronts".'
-        )
+    if isinstance(kind, str) and kind == "fronts" and kind not in kinds and history.steps:
+        raise ProblemError('plot kind = "fronts": only 3D cracks have them; give "path".')
+    if not isinstance(kind, str) or kind not in (*kinds, "fronts"):
+        raise ProblemError(f'plot kind = {kind!r}: give "K", "a" or "path", in 3D also "fronts".')
     if not history.steps:
         raise ProblemError("there is nothing to draw: the history has no steps.")
     if file is None:
@@ -35,8 +34,7 @@ def draw(history: History, kind: str, file: str | Path | None) -> Any:
     if file is None:
         pyplot.show()
     else:
-        Path(file).parent.mkdir(parents=True, exist_ok=True)
-        figure.savefig(file, dpi=150)
+        save_figure(figure, file, "plot: file")
     return figure
 
 

@@ -1,0 +1,393 @@
+"""Growth run to its end: steps collected, stored one by one, and taken up again after a kill."""
+
+from collections.abc import Callable, Iterable
+from contextlib import ExitStack
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, Unpack
+
+from xcrack.errors import ProblemError, warn
+from xcrack.growth.criteria import Criterion
+from xcrack.growth.fingerprint import differences, only_compiled_differently
+from xcrack.growth.laws import Law
+from xcrack.growth.options import GrowOptions, Run, lists_options, run_of
+from xcrack.growth.run import steps_of
+from xcrack.growth.step import Cycle, Step
+from xcrack.history import run_folder
+from xcrack.history.history import History
+from xcrack.history.lock import locked
+from xcrack.history.run_folder import Header
+from xcrack.history.versions import versions
+from xcrack.inputs import called, path_of, system_errors
+from xcrack.mesh.mesh import Mesh
+from xcrack.scene.problem import Problem
+
+Until = Callable[[Step], bool]
+
+_SHOWN = 5  # differences that a message lists
+
+
+def collect(
+    steps: Iterable[Step],
+    path: str | Path | None = None,
+    until: Until | None = None,
+    *,
+    overwrite: bool = False,
+    keep_solutions: bool = True,
+) -> History:
+    """Run growth to its end.
+
+    Ctrl-C ends it too, once a step is finished: the history of all finished steps is returned, with
+    `ended` that begins with "interrupted", and a warning. Where an error ends it, the error carries
+    the history of the finished steps as its attribute `history`.
+
+    Parameters
+    ----------
+    steps : iterable of Step
+        What `grow` returns.
+    path : path, optional
+        Folder in which each step is stored as soon as it is finished; `resume` goes on from it. One
+        process at a time may write to it.
+    until : callable Step -> bool, optional
+        Growth stops at the first step for which it is true.
+    overwrite : bool
+        Begin although a run is stored in the folder: that one is moved aside, into a folder
+        ``moved_aside_1`` in it.
+    keep_solutions : bool
+        Keep the solutions of all steps in memory, for `History.write`.
+
+    Returns
+    -------
+    History
+
+    Raises
+    ------
+    ProblemError
+        `path` holds a run, is in use by another process, is a file, or cannot be written.
+    """
+    if isinstance(steps, str) or not isinstance(steps, Iterable):
+        raise ProblemError(f"collect: steps = {_shown(steps)}: give what grow returns.")
+    _check_options("collect", until, overwrite=overwrite, keep_solutions=keep_solutions)
+    run = _Collection(until, keep_solutions)
+    if path is None:
+        return run.of(steps)
+    folder = path_of(path, "collect: path", error=ProblemError)
+    with system_errors("a folder for the run cannot be made at", folder, error=ProblemError):
+        if folder.exists() and not folder.is_dir():
+            raise ProblemError(f"{folder} is a file; a run needs a folder of its own.")
+        folder.mkdir(parents=True, exist_ok=True)
+    with locked(folder) as check:
+        run_folder.sweep(folder)
+        if not overwrite:
+            _refuse_stored(folder)
+        run.store = _Store(folder, check)
+        return run.of(steps)
+
+
+@lists_options
+def resume(
+    path: str | Path,
+    problem: Problem,
+    law: Law,
+    criterion: Criterion,
+    cycle: Cycle,
+    da: float | None = None,
+    *,
+    until: Until | None = None,
+    keep_solutions: bool = True,
+    **options: Unpack[GrowOptions],
+) -> History:
+    """Go on with a run that is on disk, to the history it would have had, to the last bit.
+
+    A step that is missing or damaged is computed again, and so are those behind it; their files are
+    moved into a folder ``moved_aside_1`` beside them, with a warning. A lost or damaged header is
+    made again from the steps. Ctrl-C is handled as in `collect`.
+
+    Parameters
+    ----------
+    path : path
+        Folder that `collect` wrote to.
+    problem, law, criterion, cycle, da
+        As they were given to `grow`; the problem has the cracks as they were at first. Functions
+        are compared by their code and by all that they read.
+    until
+        As in `collect`.
+    cycles, scaling, threshold, solver, progress, keep_solutions
+        As they were given to `grow` and `collect`.
+    K_c, max_steps, max_cycles
+        Rules that stop a run may be other ones than before.
+
+    Returns
+    -------
+    History
+        With all steps; those from disk have no solutions.
+
+    Raises
+    ------
+    ProblemError
+        No run is there, or it was made with other settings: the message names them. It is in use by
+        another process, or cannot be written.
+
+    Warns
+    -----
+    XcrackWarning
+        Versions, the processor or the number of threads of the BLAS are others than those that the
+        run was begun with, so that its last bits may differ.
+    """
+    run = run_of("resume", problem, law, criterion, cycle, da, options)
+    _check_options("resume", until, keep_solutions=keep_solutions)
+    folder = path_of(path, "resume: path", error=ProblemError)
+    with system_errors("no run can be read from", folder, error=ProblemError):
+        there = folder.is_dir()
+    if not there:
+        raise ProblemError(
+            f"no run to go on with in {folder}: collect(grow(...), path=...) starts one."
+        )
+    collection = _Collection(until, keep_solutions, mesh=problem.mesh)
+    with locked(folder) as check:
+        run_folder.sweep(folder)
+        header, damaged = run_folder.read_header(folder)
+        if header is None:  # killed before its first step
+            collection.store = _Store(folder, check)
+            return collection.of(steps_of(run))
+        run = _as_begun(run, header, folder)
+        stored = run_folder.read_steps(folder, header)
+        if stored.rest or damaged is not None:
+            _move_aside(folder, stored, damaged)
+        header = replace(header, ended="")
+        run_folder.write_header(folder, header)
+        collection.store = _Store(folder, check, header)
+        collection.taken.extend(stored.steps)
+        return collection.of(steps_of(run, stored.steps[-1] if stored.steps else None))
+
+
+def load(path: str | Path) -> History:
+    """Read a stored run without going on with it; another process may write to it meanwhile.
+
+    Parameters
+    ----------
+    path : path
+        Folder that `collect` wrote to.
+
+    Returns
+    -------
+    History
+        Its steps have no solutions.
+
+    Raises
+    ------
+    ProblemError
+        No run is there, or it cannot be read.
+
+    Warns
+    -----
+    XcrackWarning
+        A step is missing or damaged: those behind it are left out.
+    """
+    folder = path_of(path, "load: path", error=ProblemError)
+    header, _ = run_folder.read_header(folder)
+    if header is None:
+        raise ProblemError(f"{folder} holds no run: {folder / run_folder.HEADER} is missing.")
+    stored = run_folder.read_steps(folder, header)
+    if stored.rest:
+        warn(
+            f"{stored.fault} in {folder}: the {len(stored.steps)} steps before it are read. resume "
+            "computes the others again."
+        )
+    ended = header.ended or "not ended: it is still going on, or was killed; resume goes on with it"
+    return History(stored.steps, ended, folder)
+
+
+@dataclass
+class _Store:
+    """Where the steps of a run go; the header is written with the first of them."""
+
+    folder: Path
+    check: Callable[[], None]  # raises where another process has taken over
+    header: Header | None = None
+
+    def write(self, step: Step) -> None:
+        self.check()
+        if self.header is None:
+            settings = {} if step.memory is None else dict(step.memory.settings)
+            _make_room(self.folder)
+            self.header = Header(settings, versions())
+            run_folder.write_header(self.folder, self.header)
+        run_folder.write_step(self.folder, step, self.header)
+
+    def end(self, ended: str) -> None:
+        if self.header is not None:
+            self.check()
+            run_folder.write_header(self.folder, replace(self.header, ended=ended))
+
+
+@dataclass
+class _Collection:
+    """Steps that are taken until they end, each on disk before the next is asked for."""
+
+    until: Until | None
+    keep_solutions: bool
+    mesh: Mesh | None = None
+    store: _Store | None = None
+    taken: list[Step] = field(default_factory=list)
+
+    def of(self, steps: Iterable[Step]) -> History:
+        """Take all steps of an iterable; Ctrl-C and errors lose none of those taken."""
+        with ExitStack() as stack:
+            close = getattr(steps, "close", None)
+            if close is not None:
+                stack.callback(close)
+            try:
+                ended = self._take(steps)
+            except KeyboardInterrupt:
+                if not self.taken:
+                    raise
+                ended = f"interrupted after step {self.taken[-1].index}"
+            except Exception as error:
+                self._attach(error)
+                raise
+        history = self._history(ended)
+        if self.store is not None:
+            try:
+                self.store.end(ended)
+            except ProblemError as error:
+                self._attach(error)
+                raise
+        if ended.startswith("interrupted"):
+            warn(f"growth was {ended}: {len(self.taken)} finished steps are handed back.")
+        return history
+
+    def _take(self, steps: Iterable[Step]) -> str:
+        """Take steps, and return why they ended."""
+        if self.taken and self._is_enough(self.taken[-1]):  # killed before it could write so
+            return self._stopped()
+        iterator = iter(steps)
+        while True:
+            try:
+                step = next(iterator)
+            except StopIteration as stop:
+                return str(stop.value or "no more steps")
+            if not isinstance(step, Step):
+                raise ProblemError(
+                    f"collect: {_shown(step)} is not a Step: give what grow returns."
+                )
+            if self.mesh is None and step.solutions:
+                self.mesh = step.solutions[0].problem.mesh
+            self.taken.append(step if self.keep_solutions else replace(step, solutions=()))
+            if self.store is not None:
+                self.store.write(step)
+            if self._is_enough(step):
+                return self._stopped()
+
+    def _is_enough(self, step: Step) -> bool:
+        if self.until is None:
+            return False
+        return bool(called(self.until, f"until, after step {step.index}", step))
+
+    def _stopped(self) -> str:
+        return f"until was true at step {self.taken[-1].index}"
+
+    def _attach(self, error: Exception) -> None:
+        """Hand the finished steps over with an error."""
+        if not self.taken:
+            return
+        error.history = self._history(f"an error: {error}")  # type: ignore[attr-defined]
+        error.add_note(
+            f"{len(self.taken)} finished steps are in the attribute `history` of this error"
+            + ("." if self.store is None else f", and in {self.store.folder}: see resume.")
+        )
+
+    def _history(self, ended: str) -> History:
+        folder = None if self.store is None else self.store.folder
+        return History(tuple(self.taken), ended, folder, self.mesh)
+
+
+def _as_begun(run: Run, header: Header, folder: Path) -> Run:
+    """The run with the defaults of a stored one, whose settings must be the same."""
+    run = run.as_begun(header.settings)
+    settings, now = run.settings, versions()
+    compiled: list[str] = []
+    if header.versions.get("python") != now["python"]:
+        compiled = only_compiled_differently(header.settings, settings)
+    given = {**settings, **{key: header.settings[key] for key in compiled}}
+    lines = differences(header.settings, given)
+    if lines:
+        raise ProblemError(f"the run in {folder} was made with other settings: {_few(lines)}.")
+    lines = differences(header.versions, now)
+    lines += [f"{key}: its code cannot be compared between the two" for key in compiled]
+    if lines:
+        warn(
+            f"the run in {folder} was made with other versions, on another processor or with "
+            f"other threads, its last bits may differ: {_few(lines)}."
+        )
+    # What is stored stands for the run, however another python compiles its functions.
+    return run
+
+
+def _refuse_stored(folder: Path) -> None:
+    """Raise where a folder holds a run of which a step is finished."""
+    header, _ = run_folder.read_header(folder)
+    steps = run_folder.step_files(folder)
+    if header is None or not steps:
+        return
+    raise ProblemError(
+        f"{folder} holds a run of {len(steps)} steps already: go on with it by "
+        f"resume({str(folder)!r}, ...), take another path, or give overwrite=True, which moves it "
+        "into a folder moved_aside_1 beside the new one."
+    )
+
+
+def _make_room(folder: Path) -> None:
+    """Move aside what stands in the place of the files of a new run."""
+    files = run_folder.step_files(folder)[::-1]
+    header = folder / run_folder.HEADER
+    if header.exists() and (files or not _is_header(folder)):
+        files.append(header)
+    if files:
+        aside = run_folder.move_aside(folder, files)
+        warn(f"{len(files)} files that stood in {folder} were moved to {aside}.")
+
+
+def _is_header(folder: Path) -> bool:
+    """Whether the header of a folder can be read; one without steps may be written anew."""
+    try:
+        return run_folder.read_header(folder)[1] is None
+    except ProblemError:
+        return False
+
+
+def _move_aside(folder: Path, stored: run_folder.Stored, damaged: Path | None) -> None:
+    """Move aside what does not belong to the part of a run that is whole, and warn of it."""
+    files = [*stored.rest, *([] if damaged is None else [damaged])]
+    aside = run_folder.move_aside(folder, files)
+    if stored.rest:
+        last = len(stored.steps) - 1
+        begin = f"growth goes on from step {last}" if stored.steps else "growth begins anew"
+        warn(
+            f"{stored.fault} in {folder}: {begin}; {len(stored.rest)} files of steps were moved to "
+            f"{aside}."
+        )
+    if damaged is not None:
+        warn(f"{damaged} was damaged: it was moved to {aside}, and made again from the steps.")
+
+
+def _check_options(caller: str, until: Any, **flags: Any) -> None:
+    if until is not None and not callable(until):
+        raise ProblemError(f"{caller}: until = {_shown(until)} cannot be called.")
+    for name, value in flags.items():
+        if not isinstance(value, bool):
+            raise ProblemError(f"{caller}: {name} = {_shown(value)}: give True or False.")
+
+
+def _few(lines: list[str]) -> str:
+    """The first few of many differences, in one line."""
+    more = len(lines) - _SHOWN
+    return "; ".join(lines[:_SHOWN]) + (f"; and {more} more" if more > 0 else "")
+
+
+def _shown(value: Any) -> str:
+    text = " ".join(repr(value).split())
+    return text if len(text) <= 80 else f"{text[:60]} … ({type(value).__name__})"
+
+
+__all__ = ["collect", "load", "resume"]
