@@ -10,6 +10,7 @@ out/edge_crack_growth.
 
 # %% What is known: K over the length, and with it the life
 import csv
+import shutil
 from pathlib import Path
 
 import matplotlib
@@ -98,9 +99,8 @@ K, a, y = table["K_I_1"], table["a"], table["y"]
 print(history.steps[-1].solutions[-1].report)
 
 # %% The same run, stopped on its way and taken up again from disk
-stopped = xc.collect(
-    xc.grow(plate, **asked), path=OUT / "run", until=lambda step: step.index == 4, overwrite=True
-)
+shutil.rmtree(OUT / "run", ignore_errors=True)  # collect replaces no run
+stopped = xc.collect(xc.grow(plate, **asked), path=OUT / "run", until=lambda step: step.index == 4)
 print(f"stopped: {stopped.ended}; on disk: {len(xc.load(OUT / 'run').steps)} steps")
 resumed = xc.resume(OUT / "run", plate, **asked)
 print(f"resumed: {resumed}")

@@ -17,6 +17,7 @@ out/semi_elliptic_growth.
 
 # %% The plate: fine cells where the crack is and where it will be
 import csv
+import shutil
 import sys
 from pathlib import Path
 
@@ -93,10 +94,10 @@ problem = xc.Problem(
     cracks=[xc.elliptic_crack((0.0, 0.0, 0.26 * H), (0, 0, 1), (1, 0, 0), C, A)],
     loads=[xc.traction("top", (0.0, 0.0, SIGMA)), xc.traction("bottom", (0.0, 0.0, -SIGMA))],
 )
+shutil.rmtree(OUT / "run", ignore_errors=True)  # collect replaces no run
 history = xc.collect(
     xc.grow(problem, LAW, xc.max_hoop_stress, xc.Cycle(0.0, 1.0), da=DA, max_steps=STEPS),
     path=OUT / "run",
-    overwrite=True,
 )
 print(history)
 print(history.steps[0].solutions[-1].report)

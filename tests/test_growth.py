@@ -205,6 +205,23 @@ def test_line_a_step(monkeypatch, capsys):
     assert capsys.readouterr().err == ""  # not a terminal
 
 
+def test_time_that_is_left(monkeypatch, capsys):
+    """Of 4 steps that take 90 s each: 270 s after the first, and none after the last."""
+    patch_respond(monkeypatch, mode_I())
+    clock = iter(90.0 * k for k in range(100))
+    monkeypatch.setattr(growth.time, "perf_counter", lambda: next(clock))
+    run(grow(plate(), LAW, max_hoop_stress, CYCLE, da=2.0, max_steps=4, progress="always"))
+    lines = capsys.readouterr().err.splitlines()
+    assert [line.partition("about")[2] for line in lines] == [
+        *(" 4.5 min left", " 3 min left", " 1.5 min left", "", ""),
+    ]
+    run(grow(plate(), LAW, max_hoop_stress, CYCLE, da=2.0, max_cycles=5e3, progress="always"))
+    lines = capsys.readouterr().err.splitlines()
+    assert "left" not in lines[0]  # no step yet whose cycles say how many there will be
+    assert lines[1].endswith(" min left")
+    assert "left" not in lines[-1]
+
+
 # --- why it ends -------------------------------------------------------------------------------
 
 

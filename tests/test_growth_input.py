@@ -274,3 +274,13 @@ def test_a_warning_that_comes_once_is_not_in_the_summary(monkeypatch):
     assert second.startswith("the cycle has R = -1")
     assert "K_I < 0" in summary
     assert "the cycle has R" not in summary
+
+
+def test_a_kind_that_is_ignored_is_not_in_the_summary(monkeypatch):
+    patch_respond(monkeypatch, mode_I())
+    law, cycle = elber(1e-11, 3.0, 0.5, 0.4), Cycle(-1, 1)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        warnings.filterwarnings("ignore", "K_I < 0", XcrackWarning)
+        run(grow(plate(), law, max_hoop_stress, cycle, 2.0, max_steps=3))
+    assert [str(w.message)[:19] for w in caught] == ["the cycle has R = -"]

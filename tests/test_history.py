@@ -20,7 +20,8 @@ def test_table(whole):
     table = whole.table()
     assert table.dtype.names == (
         *("step", "N", "crack", "tip", "x", "y", "a"),
-        *("K_I_0", "K_II_0", "K_I_1", "K_II_1", "spread", "domain_cells"),
+        *("K_I_0", "K_II_0", "K_I_1", "K_II_1", "spread"),
+        *(name for name in ("domain_cells",) if hasattr(whole.steps[0].sif[0][0], name)),
         *("angle", "dK_eq", "R", "rate", "da"),
     )
     assert len(table) == 2 * N_STEPS
@@ -36,6 +37,25 @@ def test_table(whole):
     # every step makes its crack longer by its da
     own = table[table["crack"] == 0]
     assert np.diff(own["a"]) == pytest.approx(own["da"][:-1], rel=1e-10)
+
+
+def test_columns_that_say_how_far_K_is_to_be_trusted(whole):
+    """The largest spread of all states and modes; domains are known where K says so."""
+    steps = []
+    for step in whole.steps:
+        sif = []
+        for k, state in enumerate(step.sif):
+            crack = replace(state[0], spread=np.array([[0.1 * step.index, 1.0 - k]]))
+            object.__setattr__(crack, "domain_cells", np.array([3.0 - k]))
+            other = replace(state[1])
+            object.__setattr__(other, "domain_cells", np.array([2.0]))
+            sif.append((crack, other))
+        steps.append(replace(step, sif=tuple(sif)))
+    table = History(tuple(steps), "").table()
+    first = table[table["crack"] == 0]
+    assert first["spread"].tolist() == [max(0.1 * k, 1.0) for k in range(N_STEPS)]
+    assert first["domain_cells"].tolist() == [2.0] * N_STEPS
+    assert "spread" in whole.table().dtype.names
 
 
 def test_empty_history():

@@ -1,11 +1,12 @@
 """Warnings of a run: each kind when it comes first, and one summary of those that came again."""
 
 import re
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 
-from xcrack.errors import collected_warnings, warn
+from xcrack.errors import XcrackWarning, collected_warnings, warn
 
 _NUMBER = re.compile(r"[-+]?\d+(\.\d+)?(e[-+]?\d+)?", re.IGNORECASE)
 _SEVERAL = re.compile(r"#(,? #)+")
@@ -49,8 +50,9 @@ class Notices:
             warn(message)
 
     def summarise(self) -> None:
-        """Issue one warning for all kinds that came in more than one step."""
-        again = [kind for kind in self.kinds.values() if kind.steps > 1]
+        """Issue one warning for all kinds that came in more than one step, and are not ignored."""
+        several = (kind for kind in self.kinds.values() if kind.steps > 1)
+        again = [kind for kind in several if not _is_ignored(kind.message)]
         self.kinds = {}
         if not again:
             return
@@ -63,6 +65,15 @@ class Notices:
             "during growth warnings came again; the columns spread and domain_cells of "
             "history.table() show each step.\n- " + "\n- ".join(lines)
         )
+
+
+def _is_ignored(message: str) -> bool:
+    """Whether the user's filters ignore a warning of this text: the summary begins with another."""
+    for action, text, category, module, _ in warnings.filters:
+        fits = text is None or re.match(text, message) is not None
+        if fits and module is None and issubclass(XcrackWarning, category):
+            return action == "ignore"
+    return False
 
 
 __all__ = ["Notices"]

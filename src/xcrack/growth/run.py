@@ -1,5 +1,6 @@
 """Fatigue crack growth: one step after the other, from load states to cycles."""
 
+import time
 from collections.abc import Generator, Mapping, Sequence
 from dataclasses import replace
 from typing import Unpack
@@ -39,13 +40,13 @@ def grow(
     """Let the cracks of a problem grow under a repeated load cycle.
 
     A generator: each `Step` is complete when it is handed over, and the next one is computed only
-    when it is asked for. The value it returns says why growth ended; `collect` keeps it.
+    when it is asked for. The value it returns says why growth ended; `collect` puts it into the history.
 
     Parameters
     ----------
     problem : Problem
         With the cracks as they are at first. The radius of the tip functions is taken at the
-        first step and kept.
+        first step and used in all.
     law : callable (dK_eq, R) -> da/dN
         `paris`, `elber`, `walker` or your own. Where it returns inf, the toughness is reached and
         growth ends.
@@ -70,7 +71,8 @@ def grow(
     solver : optional
         As in `solve`.
     progress : bool or "always"
-        One line a step on standard error, if that is a terminal (or always).
+        One line a step on standard error, if that is a terminal or a notebook (or always); with the
+        time that is left, where `max_steps` or `max_cycles` allows an estimate.
 
     Returns
     -------
@@ -178,6 +180,7 @@ def _next_step(
     settings: Mapping[str, str],
 ) -> tuple[Step, Reuse]:
     """Solve all load states of a problem and decide where and how fast its cracks grow."""
+    begin = time.perf_counter()
     before = None if last is None else memory_of(last)
     cracks, mesh, nu = problem.placed, problem.mesh, run.problem.material.nu
     place = following(mesh).PLACE
@@ -220,7 +223,8 @@ def _next_step(
         solutions=solutions,
         memory=memory,
     )
-    report_step(run, step)
+    since = n_cycles - (0.0 if last is None else last.cycles)
+    report_step(run, step, since, time.perf_counter() - begin)
     return step, handed_on
 
 

@@ -95,7 +95,7 @@ class Memory:
     law_rate : tuple of (f,) arrays, length/cycle
         Rates before the threshold is applied: the cycles of a step that ends below it are finite.
     length : tuple of float, length
-        Length of each crack inside the body; in space its area over the length of its fronts.
+        Length of each crack inside the body; in 3D its area over the length of its fronts.
     pending : tuple of (f,) arrays, length
         Growth too short to be modelled yet.
     radius : float, length, or None

@@ -1,1 +1,1 @@
-"""Runs collected, kept on disk and taken up again."""
+"""Runs collected, stored on disk and taken up again."""

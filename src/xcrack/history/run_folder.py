@@ -172,7 +172,7 @@ def step_files(folder: Path) -> list[Path]:
 def write_step(folder: Path, step: Step, header: Header) -> None:
     """Write a step without its solutions; afterwards it is on disk as a whole.
 
-    An order of elimination is written by the step that found it; those that follow only say so.
+    An order of elimination is written by the step that computed it; those that follow refer to it.
 
     Raises
     ------

@@ -13,8 +13,8 @@ from xcrack.growth.step import Step
 def write_series(steps: Sequence[Step], folder: Path) -> Path:
     """Write ``history.pvd`` and the files it lists; its time is the number of the step.
 
-    Steps with solutions: a grid with the lips for each load state, in space with the fronts and
-    K along them. Steps without: the lines, or in space the faces and fronts, of the cracks.
+    Steps with solutions: a grid with the lips for each load state, in 3D with the fronts and
+    K along them. Steps without: the lines, or in 3D the faces and fronts, of the cracks.
     """
     from xcrack.post.vtk import write  # loads the writers of files
 
@@ -45,7 +45,7 @@ def write_series(steps: Sequence[Step], folder: Path) -> Path:
 
 
 def polylines(cracks: Sequence[Crack]) -> str:
-    """Text of a ``.vtp`` file with the faces of all cracks, in space with their fronts as lines."""
+    """Text of a ``.vtp`` file with the faces of all cracks, in 3D with their fronts as lines."""
     dim = cracks[0].points.shape[1] if cracks else 2
     start = np.cumsum([0, *(len(crack.points) for crack in cracks)])
     points = [np.pad(crack.points, ((0, 0), (0, 3 - dim))) for crack in cracks]

@@ -1,6 +1,6 @@
 """Numbers of a growth run as a table: a row for each tip, in 3D for each front, of each step."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,8 +11,11 @@ from xcrack.crack.crack import front
 from xcrack.crack.fronts_3d import front_weights
 from xcrack.growth.step import Step
 
+Measures = dict[str, Callable[[Step, int], Floats]]
+
 _MODES = ("I", "II", "III")
 _ENDS = ("min", "mean", "max")
+_CELLS = "domain_cells"
 _PARTS = ("angle", "dK_eq", "R", "rate", "da")
 _WHOLE = ("step", "crack", "tip", "front")
 
@@ -29,15 +32,16 @@ def _table_2d(steps: Sequence[Step]) -> tuple[list[str], list[tuple[Any, ...]]]:
     states = range(max((len(step.sif) for step in steps), default=0))
     names = ["step", "N", "crack", "tip", "x", "y", "a"]
     names += [f"K_{m}_{s}" for s in states for m in _MODES[:2]]
-    names += ["spread", "domain_cells", *_PARTS]
+    quality = _quality(steps)
+    names += [*quality, *_PARTS]
     rows = []
     for step in steps:
         for c, crack in enumerate(step.cracks):
             x, _ = front(crack)
-            quality = _spread(step, c), _domain_cells(step, c)
+            parts = [*(measure(step, c) for measure in quality.values()), *_parts(step, c)]
             for j in range(len(step.angle[c])):
                 K = [value for state in step.sif for value in state[c].K[j]]
-                own = [values[j] for values in (*quality, *(getattr(step, p)[c] for p in _PARTS))]
+                own = [values[j] for values in parts]
                 rows.append((step.index, step.cycles, c, j, *x[j], _size(step, c), *K, *own))
     return names, rows
 
@@ -46,13 +50,14 @@ def _table_3d(steps: Sequence[Step]) -> tuple[list[str], list[tuple[Any, ...]]]:
     """Columns, and a row for each front: smallest value along it, mean over its length, largest."""
     n_states = max((len(step.sif) for step in steps), default=0)
     values = [f"K_{m}_{s}" for s in range(n_states) for m in _MODES]
-    values += ["spread", "domain_cells", *_PARTS]
+    quality = _quality(steps)
+    values += [*quality, *_PARTS]
     names = ["step", "N", "crack", "front", "x", "y", "z", "a"]
     names += [f"{value}_{end}" for value in values for end in _ENDS]
-    return names, [row for step in steps for row in _rows_3d(step, n_states)]
+    return names, [row for step in steps for row in _rows_3d(step, n_states, quality)]
 
 
-def _rows_3d(step: Step, n_states: int) -> list[tuple[Any, ...]]:
+def _rows_3d(step: Step, n_states: int, quality: Measures) -> list[tuple[Any, ...]]:
     rows: list[tuple[Any, ...]] = []
     for c in range(len(step.cracks)):
         if not step.sif:
@@ -67,8 +72,8 @@ def _rows_3d(step: Step, n_states: int) -> list[tuple[Any, ...]]:
                 for m in range(3)
             ]
             columns += [np.full(len(mine), np.nan)] * (3 * n_states - len(columns))
-            columns += [_spread(step, c)[mine], _domain_cells(step, c)[mine]]
-            columns += [getattr(step, part)[c][mine] for part in _PARTS]
+            columns += [measure(step, c)[mine] for measure in quality.values()]
+            columns += [values[mine] for values in _parts(step, c)]
             ends = [end for values in columns for end in _ends(values, weight)]
             middle, size = weight @ sif.x[mine], _size(step, c)
             rows.append((step.index, step.cycles, c, int(number), *middle, size, *ends))
@@ -82,10 +87,20 @@ def _spread(step: Step, c: int) -> Floats:
 
 
 def _domain_cells(step: Step, c: int) -> Floats:
-    """Smallest radius of the domains of all states, in cells `(f,)`; nan where it is not known."""
-    unknown = np.full(len(step.angle[c]), np.nan)
-    every = [getattr(state[c], "domain_cells", None) for state in step.sif]
-    return np.fmin.reduce([unknown, *(cells for cells in every if cells is not None)])
+    """Smallest radius of the domains of all states, in cells `(f,)`."""
+    return np.min([getattr(state[c], _CELLS) for state in step.sif], axis=0)
+
+
+def _quality(steps: Sequence[Step]) -> Measures:
+    """Columns that say how far K is to be trusted, of what the steps have."""
+    every = [sif for step in steps for state in step.sif for sif in state]
+    known = bool(every) and all(hasattr(sif, _CELLS) for sif in every)
+    measures: Measures = {"spread": _spread}
+    return {**measures, _CELLS: _domain_cells} if known else measures
+
+
+def _parts(step: Step, c: int) -> list[Floats]:
+    return [getattr(step, part)[c] for part in _PARTS]
 
 
 def _size(step: Step, c: int) -> float:
