@@ -279,3 +279,20 @@ def test_bad_options():
         weighted_angle(K, 0.3, range="sum")
     with pytest.raises(ProblemError, match=r"nu = 0\.5"):
         max_hoop_stress(K, 0.5)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("K", 0.0, 0.3), "K = 'K'"),
+        (([1.0, np.nan], 0.0, 0.3), "finite"),
+        (([1.0, 0.1], 70.5, 0.3), "angle = 70.5: angles are in rad"),
+        (([1.0, 0.1], [0.0, "a"], 0.3), "angle"),
+        (([[1.0, 0.1]] * 3, [0.0, 0.1], 0.3), r"shapes? \(3, 2\).*\(2,\)|\(3, 2\) .* \(2,\)"),
+        (([1.0, 0.1], 0.0, "0.3"), "Poisson's ratio nu = '0.3'"),
+        (([1.0, 0.1], 0.0, 0.5), "below 0.5"),
+    ],
+)
+def test_bad_arguments_of_the_equivalent_factor(arguments, words):
+    with pytest.raises(ProblemError, match=words):
+        equivalent_K(*arguments)

@@ -14,6 +14,7 @@ from xcrack.growth.criteria import max_hoop_stress, weighted_angle
 from xcrack.growth.laws import elber, paris
 from xcrack.growth.run import grow
 from xcrack.growth.step import Cycle
+from xcrack.scene.conditions import traction
 
 LAW = paris(C=1e-11, m=3.0)
 CYCLE = Cycle(0.0, 1.0)
@@ -180,7 +181,8 @@ def test_radius_of_the_first_step_is_kept_and_the_solver_is_warm(monkeypatch):
 
 def test_states_of_a_cycle():
     assert Cycle(0.1, 1.0).load_states == (0.1, 1.0)
-    loads = ["a", "b"], ["c"]
+    pull, push = traction("top", (0.0, 1.0)), traction("top", (0.0, -1.0))
+    loads = [pull, push], [push]
     assert Cycle(states=loads).load_states == loads
     for make, words in (
         (lambda: Cycle(), "Cycle"),
@@ -189,6 +191,10 @@ def test_states_of_a_cycle():
         (lambda: Cycle(np.nan, 0.0), "finite"),
         (lambda: Cycle(0.0, 1.0, states=[1.0]), "not both"),
         (lambda: Cycle(states=[]), "at least one"),
+        (lambda: Cycle(states=3.0), "states = 3.0: give a list"),
+        (lambda: Cycle(states="loads"), "states = 'loads'"),
+        (lambda: Cycle(states=[1.0, np.nan]), r"states\[1\] = nan"),
+        (lambda: Cycle(states=[[1.0]]), r"states\[0\] has 1.0, which is not a load"),
     ):
         with pytest.raises(ProblemError, match=words):
             make()

@@ -114,3 +114,55 @@ def test_write_with_solutions_and_without(whole, tmp_path, monkeypatch):
     assert (piece.get("NumberOfPoints"), piece.get("NumberOfLines")) == ("4", "2")
     lines = piece.find(".//Lines/DataArray[@Name='connectivity']").text.split()
     assert lines == ["0", "1", "2", "3"]
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"steps": 3}, "History: steps = 3"),
+        ({"steps": ("step",)}, "'step' among the steps is not a Step"),
+        ({"ended": None}, "ended = None"),
+        ({"path": 3}, "History: path = 3 is not a path"),
+        ({"mesh": "mesh"}, "mesh = 'mesh': give a Mesh"),
+    ],
+)
+def test_histories_that_cannot_be(changes, words):
+    with pytest.raises(ProblemError, match=words):
+        History(**{"steps": (), "ended": "", **changes})
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"index": -1}, "Step: index = -1"),
+        ({"cycles": "many"}, "Step: cycles = 'many'"),
+        ({"cracks": (1, 2)}, "give a tuple of Crack"),
+        ({"sif": ((1, 2),)}, "give SIF"),
+        ({"angle": (np.zeros(2), np.zeros(1))}, r"\[2, 1\].* one for each tip"),
+        ({"rate": 3.0}, "Step: rate = 3.0: give a list"),
+        ({"memory": {}}, "that is made by grow"),
+    ],
+)
+def test_steps_that_cannot_be(whole, changes, words):
+    with pytest.raises(ProblemError, match=words):
+        replace(whole.steps[0], **changes)
+
+
+def test_what_the_system_refuses_to_write(whole, tmp_path):
+    """A file in the place of a folder, a folder in the place of a file, odd names."""
+    (tmp_path / "file").write_text("")
+    (tmp_path / "out" / "history.csv").mkdir(parents=True)
+    (tmp_path / "a.png").mkdir()
+    for call, words in (
+        (lambda: whole.write(tmp_path / "file"), "cannot be written as a whole to .*File exists"),
+        (lambda: whole.write(tmp_path / "out"), "cannot be written as a whole .*Is a directory"),
+        (lambda: whole.write("a\0b"), "NUL"),
+        (lambda: whole.write(None), "is not a path"),
+        (lambda: whole.plot("K", tmp_path / "a.png"), r"a\.png'?: Is a directory"),
+        (lambda: whole.plot("K", tmp_path / "file" / "b.png"), "Not a directory|File exists"),
+        (lambda: whole.plot("K", tmp_path / "b.xyz"), r"b\.xyz.*ends in .*png"),
+        (lambda: whole.plot("K", tmp_path / ("x" * 300 + ".png")), "too long"),
+        (lambda: whole.plot(["K"], tmp_path / "c.png"), "plot kind"),
+    ):
+        with pytest.raises(ProblemError, match=words):
+            call()

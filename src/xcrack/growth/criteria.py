@@ -68,6 +68,12 @@ def equivalent_K(K: ArrayLike, angle: ArrayLike, nu: float) -> Floats:
     (...) array, stress √length
         Never negative: where the hoop stress is compressive only mode III remains.
 
+    Raises
+    ------
+    ProblemError
+        Factors or angles that are not finite or do not fit each other, an angle beyond pi, nu
+        outside (-1, 0.5).
+
     Notes
     -----
     K_eq² = ⟨cos²(θ/2) [K_I cos(θ/2) - 3 K_II sin(θ/2)]⟩² + K_III² / (1 - ν): hoop stress of
@@ -79,7 +85,12 @@ def equivalent_K(K: ArrayLike, angle: ArrayLike, nu: float) -> Floats:
     >>> equivalent_K(K, kink_angle(K), nu=0.3).round(6)
     np.float64(1.36899)
     """
-    K, angle = _columns(K), numbers(angle, "angle", finite=False)
+    K, angle = _columns(K), numbers(angle, "angle")
+    if (np.abs(angle) > np.pi).any():
+        raise ProblemError(
+            f"angle = {angle.flat[np.argmax(np.abs(angle))]:.6g}: angles are in rad, from -pi to "
+            "pi; for degrees use numpy.radians."
+        )
     nu = number(nu, "Poisson's ratio nu", above=-1, below=0.5)
     try:
         np.broadcast_shapes(K.shape[:-1], angle.shape)
@@ -258,8 +269,8 @@ def _checked(K: ArrayLike, nu: float, range: str) -> Floats:
 
 
 def _columns(K: ArrayLike) -> Floats:
-    """K `(..., 2 or 3)`; factors that are nan or inf stay what they are."""
-    K = numbers(K, "K", finite=False)
+    """K as `(..., 2 or 3)` array of finite numbers."""
+    K = numbers(K, "K")
     if K.ndim < 1 or K.shape[-1] not in (2, 3):
         raise ProblemError(f"K must have 2 or 3 columns (I, II[, III]), not shape {K.shape}.")
     return K

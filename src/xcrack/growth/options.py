@@ -90,7 +90,8 @@ class Run:
             raise ProblemError(f'grow: scaling = {self.scaling!r}: give "law" or "linear".')
         if self.solver is not None and not callable(self.solver):
             raise ProblemError(f"grow: solver = {self.solver!r} cannot be called.")
-        if not isinstance(self.progress, bool) and self.progress != "always":
+        always = isinstance(self.progress, str) and self.progress == "always"
+        if not (isinstance(self.progress, bool) or always):
             raise ProblemError(f'grow: progress = {self.progress!r}: give True, False or "always".')
 
     @property

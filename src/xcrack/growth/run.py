@@ -40,7 +40,7 @@ def grow(
     """Let the cracks of a problem grow under a repeated load cycle.
 
     A generator: each `Step` is complete when it is handed over, and the next one is computed only
-    when it is asked for. The value it returns says why growth ended; `collect` puts it into the history.
+    when it is asked for. The value it returns says why growth ended, as `History.ended` does.
 
     Parameters
     ----------

@@ -1,6 +1,6 @@
 """The values of a growth run: the load cycle, and one state of the cracks after the other."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from numbers import Real
 from typing import Any
@@ -12,7 +12,8 @@ from xcrack.arrays import Floats
 from xcrack.crack.crack import Crack
 from xcrack.errors import ProblemError
 from xcrack.growth.advance import PerCrack
-from xcrack.inputs import number
+from xcrack.inputs import number, numbers, whole
+from xcrack.scene.conditions import Load
 from xcrack.sif.sif import SIF
 from xcrack.solvers.reuse import Reuse
 
@@ -55,19 +56,11 @@ class Cycle:
             return
         if self.min is not None or self.max is not None:
             raise ProblemError("a cycle is Cycle(min, max) or Cycle(states=[...]), not both.")
-        if isinstance(self.states, str) or not isinstance(self.states, Iterable):
-            raise ProblemError(f"Cycle(states={self.states!r}): give a list of load states.")
-        states = tuple(self.states)
+        states = entries(self.states, "Cycle: states")
         if not states:
             raise ProblemError("Cycle(states=...) takes a list of at least one load state.")
-        for k, state in enumerate(states):
-            if isinstance(state, str) or not isinstance(state, Real | Iterable):
-                raise ProblemError(
-                    f"Cycle(states=...): state {k} is {state!r}: give a number or a list of loads."
-                )
-            if isinstance(state, Real):
-                number(state, f"Cycle(states=...): state {k}")
-        object.__setattr__(self, "states", states)
+        checked = (_load_state(state, f"Cycle: states[{k}]") for k, state in enumerate(states))
+        object.__setattr__(self, "states", tuple(checked))
 
     @property
     def ratio(self) -> float | None:
@@ -84,6 +77,33 @@ class Cycle:
     def load_states(self) -> tuple[Any, ...]:
         """The states as `solve` takes them."""
         return (self.min, self.max) if self.states is None else tuple(self.states)
+
+
+def entries(value: Any, what: str) -> tuple[Any, ...]:
+    """Entries of a list, tuple or whatever else can be gone through, but for text."""
+    try:
+        if not isinstance(value, str | bytes):
+            return tuple(value)
+    except TypeError:
+        pass
+    raise ProblemError(f"{what} = {shortened(value)}: give a list.")
+
+
+def shortened(value: Any) -> str:
+    """A value in a message, in one line."""
+    text = " ".join(repr(value).split())
+    return text if len(text) <= 80 else f"{text[:60]} … ({type(value).__name__})"
+
+
+def _load_state(state: Any, what: str) -> Any:
+    """A load state, checked: a number, or a tuple of loads."""
+    if isinstance(state, Real):
+        return number(state, what)
+    loads = entries(state, what)
+    for load in loads:
+        if not isinstance(load, Load):
+            raise ProblemError(f"{what} has {shortened(load)}, which is not a load: see traction.")
+    return state if isinstance(state, list | tuple) else loads
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,6 +156,11 @@ class Step:
         One for each load state; empty in a step that was read from disk.
     memory : Memory, optional
         What the next step needs.
+
+    Raises
+    ------
+    ProblemError
+        Parts that are not of these types, or do not fit each other.
     """
 
     index: int
@@ -149,6 +174,28 @@ class Step:
     da: PerCrack
     solutions: tuple[Solution, ...] = ()
     memory: Memory | None = None
+
+    def __post_init__(self) -> None:
+        whole(self.index, "Step: index", least=0)
+        number(self.cycles, "Step: cycles", least=0)
+        if not all(isinstance(crack, Crack) for crack in entries(self.cracks, "Step: cracks")):
+            raise ProblemError(f"Step: cracks = {shortened(self.cracks)}: give a tuple of Crack.")
+        states = [entries(state, "Step: sif") for state in entries(self.sif, "Step: sif")]
+        if not all(isinstance(sif, SIF) for state in states for sif in state):
+            raise ProblemError(f"Step: sif = {shortened(self.sif)}: give SIF of states and cracks.")
+        counts = [[len(sif.x) for sif in state] for state in states]
+        for name in ("angle", "dK_eq", "R", "rate", "da"):
+            parts = entries(getattr(self, name), f"Step: {name}")
+            shapes = [numbers(part, f"Step: {name}", (None,), finite=False).shape for part in parts]
+            counts.append([shape[0] for shape in shapes])
+        n = len(self.cracks)
+        if any(count != counts[0] for count in counts) or len(counts[0]) not in (0, n):
+            raise ProblemError(
+                f"Step: K, angle, dK_eq, R, rate and da have {counts} values for {n} cracks: give "
+                "one for each tip, or place along a front, of each crack."
+            )
+        if not isinstance(self.memory, Memory | None):
+            raise ProblemError(f"Step: memory = {shortened(self.memory)}: that is made by grow.")
 
     @property
     def n_tips(self) -> int:
@@ -174,4 +221,13 @@ def moved_places(step: Step, c: int) -> Floats:
     return np.asarray(step.sif[0][c].x + step.da[c][:, None] * directions(step, c))
 
 
-__all__ = ["Cycle", "Memory", "Step", "directions", "memory_of", "moved_places"]
+__all__ = [
+    "Cycle",
+    "Memory",
+    "Step",
+    "directions",
+    "entries",
+    "memory_of",
+    "moved_places",
+    "shortened",
+]

@@ -12,7 +12,7 @@ from xcrack.growth.fingerprint import differences, only_compiled_differently
 from xcrack.growth.laws import Law
 from xcrack.growth.options import GrowOptions, Run, lists_options, run_of
 from xcrack.growth.run import steps_of
-from xcrack.growth.step import Cycle, Step
+from xcrack.growth.step import Cycle, Step, shortened
 from xcrack.history import run_folder
 from xcrack.history.history import History
 from xcrack.history.lock import locked
@@ -65,8 +65,12 @@ def collect(
     ProblemError
         `path` holds a run, is in use by another process, is a file, or cannot be written.
     """
-    if isinstance(steps, str) or not isinstance(steps, Iterable):
-        raise ProblemError(f"collect: steps = {_shown(steps)}: give what grow returns.")
+    try:
+        iter(steps)
+    except TypeError as error:
+        raise ProblemError(
+            f"collect: steps = {shortened(steps)}: give what grow returns."
+        ) from error
     _check_options("collect", until, overwrite=overwrite, keep_solutions=keep_solutions)
     run = _Collection(until, keep_solutions)
     if path is None:
@@ -269,7 +273,7 @@ class _Collection:
                 return str(stop.value or "no more steps")
             if not isinstance(step, Step):
                 raise ProblemError(
-                    f"collect: {_shown(step)} is not a Step: give what grow returns."
+                    f"collect: {shortened(step)} is not a Step: give what grow returns."
                 )
             if self.mesh is None and step.solutions:
                 self.mesh = step.solutions[0].problem.mesh
@@ -373,21 +377,16 @@ def _move_aside(folder: Path, stored: run_folder.Stored, damaged: Path | None) -
 
 def _check_options(caller: str, until: Any, **flags: Any) -> None:
     if until is not None and not callable(until):
-        raise ProblemError(f"{caller}: until = {_shown(until)} cannot be called.")
+        raise ProblemError(f"{caller}: until = {shortened(until)} cannot be called.")
     for name, value in flags.items():
         if not isinstance(value, bool):
-            raise ProblemError(f"{caller}: {name} = {_shown(value)}: give True or False.")
+            raise ProblemError(f"{caller}: {name} = {shortened(value)}: give True or False.")
 
 
 def _few(lines: list[str]) -> str:
     """The first few of many differences, in one line."""
     more = len(lines) - _SHOWN
     return "; ".join(lines[:_SHOWN]) + (f"; and {more} more" if more > 0 else "")
-
-
-def _shown(value: Any) -> str:
-    text = " ".join(repr(value).split())
-    return text if len(text) <= 80 else f"{text[:60]} … ({type(value).__name__})"
 
 
 __all__ = ["collect", "load", "resume"]

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from xcrack.crack.crack import Crack
 from xcrack.errors import ProblemError
-from xcrack.growth.step import Step
+from xcrack.growth.step import Step, entries, shortened
 from xcrack.history.table import table
 from xcrack.inputs import path_of, system_errors
 from xcrack.mesh.mesh import Mesh
@@ -32,7 +32,7 @@ class History:
     Raises
     ------
     ProblemError
-        `steps` has an entry that is no Step.
+        A part that is not of its type.
     """
 
     steps: tuple[Step, ...]
@@ -41,12 +41,18 @@ class History:
     mesh: Mesh | None = None
 
     def __post_init__(self) -> None:
-        if not isinstance(self.steps, tuple | list):
-            raise ProblemError(f"History: steps = {self.steps!r}: give a tuple of steps.")
-        for step in self.steps:
+        steps = entries(self.steps, "History: steps")
+        for step in steps:
             if not isinstance(step, Step):
-                raise ProblemError(f"History: {step!r} among the steps is not a Step.")
-        object.__setattr__(self, "steps", tuple(self.steps))
+                raise ProblemError(f"History: {shortened(step)} among the steps is not a Step.")
+        object.__setattr__(self, "steps", steps)
+        if not isinstance(self.ended, str):
+            raise ProblemError(f"History: ended = {shortened(self.ended)}: give a text.")
+        if self.path is not None:
+            path = path_of(self.path, "History: path", error=ProblemError)
+            object.__setattr__(self, "path", path)
+        if not isinstance(self.mesh, Mesh | None):
+            raise ProblemError(f"History: mesh = {shortened(self.mesh)}: give a Mesh.")
 
     @property
     def cracks(self) -> tuple[Crack, ...]:

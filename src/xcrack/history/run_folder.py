@@ -234,27 +234,7 @@ def _read(path: Path) -> tuple[Header | None, Step | None]:
     except (ValueError, KeyError, TypeError):
         return None, None
     step = content.get("step")
-    return header, step if _is_step(step) else None
-
-
-def _is_step(step: Any) -> bool:
-    """Whether a value that was read has the parts of a step."""
-    if not isinstance(step, Step) or not isinstance(step.memory, Memory | None):
-        return False
-    try:
-        n = [len(angle) for angle in step.angle]
-        parts = (step.angle, step.dK_eq, step.R, step.rate, step.da)
-        return (
-            isinstance(step.index, int)
-            and bool(np.isfinite(step.cycles))
-            and len(step.cracks) == len(n)
-            and all(isinstance(crack, Crack) for crack in step.cracks)
-            and all(isinstance(sif, SIF) for state in step.sif for sif in state)
-            and all([len(sif.K) for sif in state] == n for state in step.sif)
-            and all([array.shape for array in part] == [(k,) for k in n] for part in parts)
-        )
-    except (TypeError, AttributeError):
-        return False
+    return header, step if isinstance(step, Step) else None
 
 
 def _order_of(memory: Memory | None) -> Elimination | None:

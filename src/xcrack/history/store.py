@@ -20,6 +20,10 @@ PART = ".part"  # ending of a file that is not whole yet
 Classes = Mapping[str, type]  # dataclasses that a file may hold, by the name they have in it
 
 
+class UnknownValueError(ProblemError):
+    """A file that another version of xcrack wrote."""
+
+
 def write_whole(path: Path, data: bytes) -> None:
     """Write a file so that a kill at any moment leaves the old one or the new one.
 
@@ -92,7 +96,7 @@ def load(path: Path, classes: Classes) -> Any:
             tree = json.loads(str(members["tree"]))
             arrays = {name: members[name] for name in members.files if name != "tree"}
         return _decoded(tree, arrays, classes, path)
-    except ProblemError:
+    except UnknownValueError:
         raise
     except Exception:  # whatever zipfile, zlib, numpy and json say of bytes that are not theirs
         return None
@@ -147,7 +151,7 @@ def _decoded(tree: Any, arrays: Mapping[str, NDArray[Any]], classes: Classes, pa
         return {decoded(k): decoded(v) for k, v in tree["dict"]}
     name = tree["class"]
     if name not in classes:
-        raise ProblemError(
+        raise UnknownValueError(
             f"{path} holds a {name!r}, which this xcrack does not know: read it with the version "
             "that wrote it."
         )
@@ -157,7 +161,7 @@ def _decoded(tree: Any, arrays: Mapping[str, NDArray[Any]], classes: Classes, pa
     needed = {n for n, f in known.items() if f.default is f.default_factory is MISSING}
     odd = sorted((set(values) - set(known)) | (needed - set(values)))
     if odd:
-        raise ProblemError(
+        raise UnknownValueError(
             f"{path} holds a {name} that differs in {', '.join(odd)} from the one of this xcrack: "
             "read it with the version that wrote it."
         )
