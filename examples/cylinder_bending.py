@@ -2,22 +2,22 @@
 
 A round bar is bent so that its notch opens. A crack with a straight front starts at the root of the
 notch and grows until notch and crack take half of the section. Then the bar is turned under its
-four forces, from back to front: one half of the front still opens, the lips of the other half are
-pressed together. The crack grows on, once with contact of the lips and once as if they could pass
-through each other.
+four forces, from back to front: along one half of the front the crack still opens, along the other
+its faces are pressed together. Growth continues, once with contact and once as if the faces could
+pass through each other.
 
-The paper that this follows (Pierard et al., see docs/theory.md) prints no dimensions. Here the bar
-is 20 mm thick and 140 mm long, the notch 2 mm deep with 60°, the forces are 120 and 40 mm apart,
-E = 210 GPa, nu = 0.3; a force of 1963.5 N at each of the four stations gives 100 MPa of nominal
-bending stress.
+The source paper (Pierard et al., see docs/theory.md) gives no dimensions. Here the bar is 20 mm in
+diameter and 140 mm long, the notch is 2 mm deep with 60°, the forces are 120 and 40 mm apart,
+E = 210 GPa, nu = 0.3; a force of 1963.5 N at each of the four stations gives a nominal bending
+stress of 100 MPa.
 
-    python cylinder_bending.py             more than 10^5 unknowns, six minutes and more
+    python cylinder_bending.py             more than 10^5 unknowns, at least six minutes
     python cylinder_bending.py --quick     the same on a coarse mesh, under a minute
-    python cylinder_bending.py --skew      a crack inclined by 10° takes half of the section at
-                                           once: mixed modes, and the criteria side by side
+    python cylinder_bending.py --skew      a crack inclined by 10° takes half of the section from
+                                           the start: mixed modes, and the criteria compared
 
-Started again after it was killed, it goes on from the last step on disk. Units: N, mm, MPa; K in
-MPa √mm. Pictures, ParaView files and tables are left in out/cylinder_bending.
+When restarted after a kill, it resumes from the last step on disk. Units: N, mm, MPa; K in MPa √mm.
+Pictures, ParaView files and tables go to out/cylinder_bending.
 """
 
 # %% The bar; gmsh meshes it once
@@ -41,7 +41,7 @@ OUT = Path("out/cylinder_bending")
 OUT.mkdir(parents=True, exist_ok=True)
 VARIANT = ("quick" if QUICK else "full") + ("_skew" if SKEW else "")
 D, NOTCH = 20.0, 2.0
-# Depths count from the lowest line of the bar. A coarse mesh needs a longer crack to begin with.
+# Depths are measured from the lowest line of the bar. A coarse mesh needs a longer initial crack.
 START = 10.3 if SKEW else 5.0 if QUICK else 3.0
 OUTER, INNER = 120.0, 40.0
 NOMINAL = 100.0
@@ -60,7 +60,7 @@ spent = {}
 
 
 def lap(part):
-    """Count the time since the last call to a part."""
+    """Add the time since the last call to a part."""
     global clock
     now = time.perf_counter()
     spent[part] = spent.get(part, 0.0) + now - clock
@@ -96,12 +96,12 @@ def turned(k):
 
 
 def bar(cracks, k, contact="auto"):
-    """The bar with its cracks under the four forces; nothing holds it, nothing has to."""
+    """The bar with its cracks under the four forces, which balance: it needs no supports."""
     return xc.Problem(BAR, STEEL, cracks=cracks, loads=turned(k), contact=contact)
 
 
 # %% The crack: straight along y, one millimetre ahead of the root in the full run
-# Its mouth lies in the notch, below the root; where exactly does not matter.
+# Its mouth lies in the notch, below the root; the exact place does not matter.
 ROOT = NOTCH - R
 REACH = 1.2 * R
 ahead = np.array([np.sin(TILT), 0.0, np.cos(TILT)])
@@ -127,7 +127,7 @@ def lips_file(name, step):
 
 
 def lips_of(solution):
-    """What the lips of a loaded crack do, at their integration points."""
+    """State of the faces of a loaded crack, at their integration points."""
     lips, contact = solution.lips[0], solution.contact[0]
     nothing = np.zeros(len(lips.weight))
     return {
@@ -141,7 +141,7 @@ def lips_of(solution):
 
 
 def grown(name, problem, until, max_steps):
-    """Steps of a run, and its lips in each; what is on disk already is not computed again."""
+    """Steps of a run and its crack faces in each; steps on disk are not computed again."""
     folder = OUT / "run" / VARIANT / name
 
     def seen(step):
@@ -152,19 +152,19 @@ def grown(name, problem, until, max_steps):
         file = lips_file(name, step.index)
         return until(np.load(file)["area"].sum()) if file.exists() else False
 
-    asked = (LAW, xc.max_hoop_stress, CYCLE, DA)
+    inputs = (LAW, xc.max_hoop_stress, CYCLE, DA)
     with warnings.catch_warnings():
-        # A criterion says where it counts K_I < 0 as 0: without contact that is what it must do,
-        # with contact it is discretisation error, which is shown below.
+        # A criterion warns where it counts K_I < 0 as 0: expected without contact, and with contact
+        # a discretisation error that is shown below.
         warnings.filterwarnings("ignore", "K_I < 0", xc.XcrackWarning)
-        # Where the front bends, beside the surface of the bar, the domain of K is narrow.
+        # Where the front bends, near the surface of the bar, the domain of K is narrow.
         warnings.filterwarnings("ignore", "K along the front", xc.XcrackWarning)
         if (folder / "run.json").exists():
             history = xc.resume(
-                folder, problem, *asked, until=seen, max_steps=max_steps, keep_solutions=False
+                folder, problem, *inputs, until=seen, max_steps=max_steps, keep_solutions=False
             )
         else:
-            steps = xc.grow(problem, *asked, max_steps=max_steps)
+            steps = xc.grow(problem, *inputs, max_steps=max_steps)
             history = xc.collect(steps, path=folder, until=seen, keep_solutions=False)
     lap(name)
     for step in history.steps:
@@ -195,7 +195,7 @@ with warnings.catch_warnings():
 lap("at the turn")
 print(closed.report)
 
-# %% After the turn: it grows on, with and without contact
+# %% After the turn: growth continues, with and without contact
 for name, contact in (("with contact", "auto"), ("without", "off")):
     runs[name] = grown(name, bar(last.cracks, TURN, contact), lambda area: False, AFTER)
     print(name, runs[name][0])
@@ -219,7 +219,7 @@ for name, (history, lips) in runs.items():
         sif, angle = step.sif[-1][0], directions(step)
         inside = ~sif.at_surface
         K_I, sheared = sif.K_I, np.abs(sif.K[inside, 1:]).max(axis=0)
-        # Where the front hardly moves a direction is that of two numbers near zero.
+        # Where the front hardly moves, the direction comes from two numbers near zero.
         moves = inside & (step.dK_eq[0] > 0.5 * step.dK_eq[0].max())
         rows.append(
             (
@@ -251,9 +251,9 @@ for r in rows:
     print("{:13} {:4d} {:8.0f} {:8d} {:6.3f} {:8.1f} {:6.1f} {:6.1f} {:7.2f} {:7.2f} {:6.3f}"
           " {:6.2f} {:6.2f}        {:8.2f} {:6.2f} {:9.2f}".format(*r))  # fmt: skip
 
-# %% What the section carries after the turn: pressure on the lips and stress in the ligament
-# Each half of the bar is in equilibrium under its two forces and what the section carries: no
-# force, the bending moment about the turned axis, none about the other. The ligament is summed
+# %% What the section carries after the turn: pressure on the crack faces and stress in the ligament
+# Each half of the bar is in equilibrium under its two forces and the resultants of the section: no
+# force, the bending moment about the turned axis, no moment about the other. The ligament is summed
 # over a plane through the front, with a grid that is dense where the stress is large.
 
 
@@ -279,14 +279,14 @@ def front_of(solution):
 
 
 def from_lips(solution):
-    """What contact carries: the half bar at lip + pushes the other one back."""
+    """Resultants of the contact pressure, from the half bar at the + face on the other one."""
     lips, normal = lips_of(solution), np.asarray(solution.lips[0].normal)
     outward = normal * np.sign(normal[:, :1])
     return resultants(-(lips["pressure"] * lips["area"])[:, None] * outward, lips["x"])
 
 
 def from_ligament(solution, n=300):
-    """What the stress ahead of the front carries."""
+    """Resultants of the stress ahead of the front."""
     front = front_of(solution)
     y = R * (2 * (np.arange(n) + 0.5) / n - 1)
     x0, z0 = (np.interp(y, front[:, 1], front[:, i]) for i in (0, 2))
@@ -299,24 +299,24 @@ def from_ligament(solution, n=300):
     return resultants(solution.stress(points)[:, :, 0] * area[:, None], points)
 
 
-carried = {"lips": from_lips(closed), "ligament": from_ligament(closed)}
-pushed = -carried["lips"][0]
+carried = {"crack faces": from_lips(closed), "ligament": from_ligament(closed)}
+pushed = -carried["crack faces"][0]
 print("after the turn the section carries      force, N   moment, N mm   about the other axis")
 for name, value in carried.items():
     print(f"  {name:35} {value[0]:10.1f} {value[1]:14.1f} {value[2]:12.1f}")
 total = sum(carried.values())
 print(f"  {'together':35} {total[0]:10.1f} {total[1]:14.1f} {total[2]:12.1f}")
-print(f"  {'the forces ask for':35} {0.0:10.1f} {MOMENT:14.1f} {0.0:12.1f}")
+print(f"  {'required by the forces':35} {0.0:10.1f} {MOMENT:14.1f} {0.0:12.1f}")
 
 # %% No interpenetration: contact pressure acts only where the mean gap is zero
-# Pointwise the faces may overlap by as much as a cell can bend; the pressure does no work on them.
+# Pointwise the faces may overlap by as much as a cell can bend; the pressure does no work on that.
 lip_area = closed.lips[0].weight
 press = closed.contact[0].pressure * lip_area
 pressed_gap = (press @ closed.opening(0)) / press.sum()
 overlap = np.minimum(overlapping.opening(0), 0.0)
 closed_share = lip_area[closed.contact[0].closed].sum() / lip_area.sum()
 print(f"mean gap under the pressure {pressed_gap:.1e} mm, largest {closed.opening(0).max():.1e} mm")
-print(f"without contact the lips overlap by up to {-1e3 * overlap.min():.2f} um")
+print(f"without contact the faces overlap by up to {-1e3 * overlap.min():.2f} um")
 
 # %% Pictures: the bar with its loads
 for solution, name in ((before, "before"), (closed, "after")):
@@ -339,7 +339,7 @@ def outline(axis):
 
 
 def on_lips(axis, solution, values, **look):
-    """Values at the lip points as a coloured map; triangles across gaps are left out."""
+    """Values at points of the crack faces as a coloured map, without triangles across gaps."""
     x = solution.lips[0].x
     map_ = Triangulation(x[:, 1], x[:, 2])
     corner = np.stack([x[map_.triangles, 1], x[map_.triangles, 2]], axis=-1)
@@ -408,9 +408,9 @@ for axis, mode in zip(axes, range(3), strict=True):
 low, high = axes[0].get_ylim()
 axes[0].axhspan(low, 0, color="C3", alpha=0.07, lw=0)
 axes[0].set_ylim(low, high)
-axes[0].text(0.45, 0.03, "$K_I$ < 0: the lips overlap", color="C3", transform=axes[0].transAxes)
+axes[0].text(0.45, 0.03, "$K_I$ < 0: the faces overlap", color="C3", transform=axes[0].transAxes)
 axes[0].legend(fontsize="small", frameon=False)
-axes[2].set_xlabel("y along the front, mm (hollow: at the free surface, prolonged from inside)")
+axes[2].set_xlabel("y along the front, mm (hollow: at the free surface, extrapolated)")
 figure.savefig(OUT / "K_at_the_turn.png", dpi=150)
 
 # %% Size of the crack over the cycles
@@ -432,9 +432,9 @@ for axis in axes:
 figure.savefig(OUT / "life.png", dpi=150)
 lap("pictures")
 
-# %% --skew: the criteria side by side, and the paths
-# In a cycle from zero each criterion sees one loaded state only and gives one angle. So let the
-# forces swing within a cycle: unloaded, before the turn, after it.
+# %% --skew: the criteria compared, and the paths
+# In a cycle from zero there is only one loaded state, and all criteria give the same angle. So let
+# the forces swing within a cycle: unloaded, before the turn, after it.
 if SKEW:
     swinging = {
         "with contact": np.stack([0 * K_before.K, K_before.K, K_closed.K]),
@@ -482,7 +482,7 @@ if SKEW:
         print("{:7.2f} {:30.2f} {:6.2f} {:9.2f} {:14.2f} {:6.2f} {:9.2f}".format(
             K_closed.x[j, 1], *values))  # fmt: skip
 
-# %% What must hold
+# %% Checks
 first = runs["before"][1]
 with_contact, without = (runs[name][0] for name in ("with contact", "without"))
 share_before = max(float(lip["area"][lip["closed"]].sum() / lip["area"].sum()) for lip in first)
@@ -499,17 +499,17 @@ print(f"out of balance: force {total[0] / bent:.2%}, moment {total[1] / MOMENT -
 assert abs(total[0]) < tolerance * bent
 assert abs(total[1] / MOMENT - 1) < tolerance
 assert abs(total[2]) < tolerance * MOMENT
-assert pushed > 0.1 * bent  # so that contact counts in it
-assert K_overlap.K_I.min() < -0.2 * K_overlap.K_I.max()  # without contact lips overlap
+assert pushed > 0.1 * bent  # so that contact is part of the balance
+assert K_overlap.K_I.min() < -0.2 * K_overlap.K_I.max()  # without contact the faces overlap
 assert overlap.min() < 0
 inside = ~K_closed.at_surface
 assert K_closed.K_I[inside].min() > -0.05 * K_closed.K_I.max()
 last_with, last_without = with_contact.steps[-1], without.steps[-1]
-assert abs(last_with.cycles / last_without.cycles - 1) > 0.02  # another life,
+assert abs(last_with.cycles / last_without.cycles - 1) > 0.02  # a different life,
 area_with, area_without = (runs[name][1][-1]["area"].sum() for name in ("with contact", "without"))
-assert abs(area_with - area_without) > 0.002 * SECTION  # and another front
+assert abs(area_with - area_without) > 0.002 * SECTION  # and a different front
 if not SKEW:
-    # Mirror symmetry: mode I alone, as far as the mesh, which has none, and the grown front allow.
+    # Mirror symmetry: mode I only, within the error of the unsymmetric mesh and the grown front.
     shear = [max(row[8], row[9]) / row[7] for row in rows if row[0] == "before"]
     print(f"largest |K_II| or |K_III| over the largest K_I before the turn: {max(shear):.2%}")
     assert max(shear) < 0.03
@@ -520,8 +520,8 @@ else:
     print(f"inclined crack before the turn: largest |K_II| over the largest K_I {sheared:.1%}")
     assert sheared > 0.05
     hoop, mean = (kinks[name, "with contact"] for name in ("max_hoop_stress", "mean_reference"))
-    assert np.abs(hoop - mean)[shown].max() > 1  # in a cycle that swings criteria differ,
-    mended = kinks["mean_reference", "without"]
-    assert np.abs(mean - mended)[shown].max() > 0.3  # and contact matters to them
+    assert np.abs(hoop - mean)[shown].max() > 1  # criteria differ in a swinging cycle,
+    without_contact = kinks["mean_reference", "without"]
+    assert np.abs(mean - without_contact)[shown].max() > 0.3  # and contact affects them
 print(", ".join(f"{part} {seconds:.0f} s" for part, seconds in spent.items()))
 print(f"pictures, ParaView files and tables are in {OUT.resolve()}")

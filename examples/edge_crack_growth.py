@@ -1,14 +1,14 @@
-"""The life of an edge-cracked plate, against the life integrated from a table of K.
+"""The life of an edge-cracked plate, compared with the life integrated from a table of K.
 
-A plate 50 mm wide and 100 mm high is pulled at its ends; a crack grows from its left edge across
-it, from 10 to 25 mm, in ten steps. K at five lengths is known to five digits, so the life is known
-too: the growth law, integrated over the length.
+A plate 50 mm wide and 100 mm high is pulled at its ends. A crack grows from its left edge, from 10
+to 25 mm, in ten steps. K at five lengths is known to five digits, and integrating the growth law
+over the length gives the life.
 
-Units: N, mm, MPa; K in MPa √mm. Pictures, ParaView files and tables are left in
+Units: N, mm, MPa; K in MPa √mm. Pictures, ParaView files and tables go to
 out/edge_crack_growth.
 """
 
-# %% What is known: K over the length, and with it the life
+# %% Reference: K over the length, and from it the life
 import csv
 import shutil
 from pathlib import Path
@@ -35,7 +35,7 @@ LAW = xc.elber(C=1.4e-11, m=2.9, a=0.5, b=0.4)
 # it lies within 0.1 % of Kaya and Erdogan's (1987) values for the long strip.
 TABLE = {0.2: 1.36822, 0.3: 1.66114, 0.4: 2.11277, 0.5: 2.82547, 0.6: 4.03334}
 share = np.array(list(TABLE))
-# F grows like (1 - a/W)^(-3/2) towards the far edge; without it, a quartic passes the five points.
+# F grows like (1 - a/W)^(-3/2) towards the far edge; a quartic interpolates the rest.
 quartic = np.polyfit(share, np.array(list(TABLE.values())) * (1 - share) ** 1.5, 4)
 
 
@@ -54,7 +54,7 @@ def exact_life(a):
     return quad(lambda x: 1 / exact_rate(x), A0, a, epsrel=1e-12)[0]
 
 
-# %% Cycles between two steps: a power law through both rates, or the rate at the start (Euler)
+# %% Cycles between two steps: a power law through both rates, or the initial rate (Euler)
 rules = []
 for steps in (5, 10, 20, 40):
     a = np.linspace(A0, A1, steps + 1)
@@ -79,33 +79,35 @@ def order(name):
     return np.log2(abs(rules[-2][name] / rules[-1][name]))
 
 
-# %% The run: the crack finds its own way, nothing tells it that it is straight
+# %% The run: the path is computed, not prescribed to be straight
 plate = xc.Problem(
     xc.read_mesh(MESHES / "edge_crack.msh"),
     xc.Isotropic(E=210e3, nu=0.3, plane="strain"),
     cracks=[xc.line_crack([(0.0, 0.0), (A0, 0.0)])],
     loads=[xc.traction("top", (0.0, SIGMA)), xc.traction("bottom", (0.0, -SIGMA))],
 )
-asked = {
+options = {
     "law": LAW,
     "criterion": xc.max_hoop_stress,
     "cycle": xc.Cycle(MINIMUM, MAXIMUM),
     "da": DA,
     "max_steps": round((A1 - A0) / DA) + 1,
 }
-history = xc.collect(xc.grow(plate, **asked))
+history = xc.collect(xc.grow(plate, **options))
 table = history.table()
 K, a, y = table["K_I_1"], table["a"], table["y"]
 print(history.steps[-1].solutions[-1].report)
 
-# %% The same run, stopped on its way and taken up again from disk
-shutil.rmtree(OUT / "run", ignore_errors=True)  # collect replaces no run
-stopped = xc.collect(xc.grow(plate, **asked), path=OUT / "run", until=lambda step: step.index == 4)
+# %% The same run, stopped and resumed from disk
+shutil.rmtree(OUT / "run", ignore_errors=True)  # collect does not replace a run
+stopped = xc.collect(
+    xc.grow(plate, **options), path=OUT / "run", until=lambda step: step.index == 4
+)
 print(f"stopped: {stopped.ended}; on disk: {len(xc.load(OUT / 'run').steps)} steps")
-resumed = xc.resume(OUT / "run", plate, **asked)
+resumed = xc.resume(OUT / "run", plate, **options)
 print(f"resumed: {resumed}")
 
-# %% K over the length, life, and how far both are from what is known
+# %% K over the length, the life, and the errors of both
 K_error = K / exact_K(a) - 1
 known_life = np.array([exact_life(length) for length in a])
 life_error = table["N"][1:] / known_life[1:] - 1
@@ -147,7 +149,7 @@ last = history.steps[-1].solutions[-1]
 xc.plot(last, "von_mises", warp=50.0, file=OUT / "von_mises.png")
 history.write(OUT)
 
-# %% What must hold
+# %% Checks
 assert np.abs(K_error).max() < 0.005
 assert abs(life_error[-1]) < LAW.m * np.abs(K_error).max() + 0.003
 assert np.abs(np.diff(y)).max() < 0.02 * DA  # straight, on a mesh that is not symmetric

@@ -1,15 +1,15 @@
 """A penny-shaped crack in a large cube: tension, shear, and closed under compression and shear.
 
-In an infinite body everything is known. Tension s across the crack gives K_I = 2 s √(a/π); a shear
-t along it K_II = 4/(2 - ν) t √(a/π) cos φ and K_III = 4 (1 - ν)/(2 - ν) t √(a/π) sin φ, where φ
-runs around the front from the direction of the shear. Under compression and shear the lips are
-closed with the pressure |s|, K_I is zero, and K_II and K_III are those of the shear alone: lips
-without friction slide.
+K in an infinite body is known exactly. Tension s across the crack gives K_I = 2 s √(a/π); a shear t
+along it gives K_II = 4/(2 - ν) t √(a/π) cos φ and K_III = 4 (1 - ν)/(2 - ν) t √(a/π) sin φ, where
+φ runs around the front from the direction of the shear. Under compression and shear the crack
+faces are closed with the pressure |s|, K_I is zero, and K_II and K_III are those of the shear
+alone: without friction the faces slide.
 
-A finite cube differs. In a round bar of radius b tension is raised by the factor of Benthem and
-Koiter (1973), 0.35 % for a / b = 0.2; the cube here is ten crack radii wide, and larger than that
-bar. Units: K over its largest exact value, lengths in mm, stresses in MPa. Pictures, ParaView files
-and a table are left in out/penny.
+A finite cube differs. In a round bar of radius b, K under tension is larger by the factor of
+Benthem and Koiter (1973), 0.35 % for a / b = 0.2; the cube here is ten crack radii wide, larger
+than that bar. Units: K over its largest exact value, lengths in mm, stresses in MPa. Pictures,
+ParaView files and a table go to out/penny.
 
     python penny.py            three meshes, a / h = 4, 6, 8
     python penny.py --quick    two meshes, a / h = 3, 4
@@ -53,7 +53,7 @@ def cube(parts):
     """Cube of half side HALF with a fine middle."""
     along = [spaced(1.4 * A, HALF, A / parts)] * 2 + [spaced(0.6 * A, HALF, A / parts)]
     count = [len(x) - 1 for x in along]
-    mesh = xc.box((0, 0, 0), count, count)  # the corners are whole numbers: each finds its place
+    mesh = xc.box((0, 0, 0), count, count)  # integer corners, mapped below
     number = np.rint(mesh.points).astype(int)
     points = np.stack([x[number[:, i]] for i, x in enumerate(along)], axis=1)
     return xc.Mesh(points, mesh.cells, mesh.facet_sets)
@@ -87,7 +87,7 @@ def benthem_koiter(ratio):
 
 
 # %% Solve on each mesh, all three states in one call
-# The crack lies between the layers of points, and off the middle of the cells.
+# The crack lies between layers of points, off the middle of the cells.
 CRACK = xc.penny_crack((0.013 * A, -0.021 * A, 0.0317 * A), (0, 0, 1), A)
 K_0 = np.array([2 * TENSION, 4 / (2 - NU) * SHEAR, 4 * (1 - NU) / (2 - NU) * SHEAR]) * UNIT
 HEAD = ("a/h", "unknowns", "seconds", "K_I mean", "K_I scatter", "K_II error", "K_III error",
@@ -158,18 +158,18 @@ figure.savefig(OUT / "lips.png", dpi=150)
 xc.plot(solutions[0], "opening", file=OUT / "opening.png")
 xc.write(solutions[2], OUT / "closed")
 
-# %% What must hold
+# %% Checks
 table = {name: np.array([row[i] for row in rows]) for i, name in enumerate(HEAD)}
 fine = PARTS[-1] >= 8
 assert abs(table["K_I mean"][-1] - 1) < 0.015
 assert table["K_I scatter"][-1] < (0.005 if fine else 0.01)
 for name in ("K_II error", "K_III error", "closed: K_II error", "closed: K_III error"):
     assert table[name][-1] < (0.015 if fine else 0.03), name
-# K_I of lips that slide is the mesh's: pressure is constant on the patches of its multipliers.
+# K_I of sliding faces is a discretisation error: pressure is constant on each multiplier group.
 assert table["closed: K_I rms"][-1] < 0.01
 assert table["closed: K_I largest"][-1] < (0.02 if fine else 0.03)
 assert table["pressure error L2"][-1] < (0.02 if fine else 0.03)
 assert contact.closed.all()
-# Lips without friction: pressure and sliding do not know of each other.
+# Without friction, pressure and sliding are independent of each other.
 assert np.abs(sifs[2].K[:, 1:] - sifs[1].K[:, 1:]).max() < 0.01 * K_0[0]
 print(f"pictures, ParaView files and table.csv are in {OUT.resolve()}")

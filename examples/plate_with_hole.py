@@ -1,11 +1,11 @@
-"""A closed crack at a hole, with exact multipliers.
+"""A closed crack at a hole, whose contact pressure is known exactly.
 
-An infinite plate with a circular hole is pressed on two sides; a crack runs from the hole across
-the load. Its lips are pressed together everywhere, and the contact pressure is known exactly:
-p(r) = sigma/2 (2 + R²/r² + 3 R⁴/r⁴), the hoop stress of Kirsch (1898). Beside it stands a finite
-plate under uniform pressure.
+An infinite plate with a circular hole is compressed on two sides; a crack runs from the hole
+across the load. Its faces press together everywhere, and the exact contact pressure is
+p(r) = sigma/2 (2 + R²/r² + 3 R⁴/r⁴), the hoop stress of Kirsch (1898). A finite plate under
+uniform pressure is shown for comparison.
 
-Units: N, mm, MPa. Pictures, ParaView files and a table are left in out/plate_with_hole.
+Units: N, mm, MPa. Pictures, ParaView files and a table go to out/plate_with_hole.
 """
 
 # %% The scene: a square around the hole, with the exact tractions of the infinite plate
@@ -61,7 +61,7 @@ def infinite_plate(parts, order, functions=4):
     )
 
 
-# %% Solve on four meshes, at both orders: contact is found, not asked for
+# %% Solve on four meshes, at both orders; contact is detected automatically
 PARTS = (5, 10, 20, 40)
 FORM = "{:>5} {:>4} {:>13} {:>9} {:>13.2e} {:>18.2e} {:>31.2e}"
 HEAD = ("order", "R/h", "tip functions", "unknowns", "energy error", "pressure error L2",
@@ -111,9 +111,9 @@ def rate(errors):
     return -np.polyfit(np.log(PARTS), np.log(errors), 1)[0]
 
 
-# %% The multipliers against the exact curve, with four and with two tip functions
-# The closed tip has no singularity in this scene: two functions do as well as four, and contact
-# decides the pressure. Where a tip opens or slides they do not (docs/measured.md).
+# %% The multipliers and the exact curve, with four and with two tip functions
+# The closed tip has no singularity in this scene: two functions are as good as four, and contact
+# determines the pressure. At a tip that opens or slides they are not (docs/measured.md).
 figure, axes = plt.subplots(
     2, 2, figsize=(11, 6), sharex=True, layout="constrained", height_ratios=(2, 1)
 )
@@ -145,12 +145,12 @@ for axis, name in zip(axes, ("energy error", "pressure error L2"), strict=True):
     axis.legend()
 figure.savefig(OUT / "rates.png", dpi=150)
 
-# %% The norm of the displacement over the plate, and files for ParaView
+# %% Magnitude of the displacement, and files for ParaView
 xc.plot(shown, "displacement", warp=200.0, file=OUT / "displacement.png")
 xc.plot(shown, "pressure", file=OUT / "pressure.png")
 files = xc.write(shown, OUT / "plate")
 
-# %% Beside it: a finite plate, 20 R wide, under uniform pressure and without supports
+# %% For comparison: a finite plate, 20 R wide, under uniform pressure and without supports
 mesh = xc.read_mesh(MESHES / "finite_plate.msh")
 finite = xc.solve(
     xc.Problem(
@@ -170,7 +170,7 @@ axis.legend()
 figure.savefig(OUT / "finite_plate_pressure.png", dpi=150)
 xc.plot(finite, "von_mises", warp=200.0, file=OUT / "finite_plate.png")
 
-# %% What must hold
+# %% Checks
 assert rate(column("energy error", 1)) > 0.95
 assert rate(column("energy error", 2)) > 1.75
 assert rate(column("pressure error L2", 1)) > 0.9

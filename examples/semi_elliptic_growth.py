@@ -1,14 +1,15 @@
-"""A semi-elliptic crack at the face of a plate, against Newman and Raju, and its growth.
+"""A semi-elliptic surface crack in a plate, compared with Newman and Raju, and its growth.
 
-A plate under tension has a crack half as deep as it is long at its face. K along its front is
+A plate under tension has a surface crack of depth 1 mm and half length 1.6 mm. K along its front is
 compared with the equations of Newman and Raju (1981), which they fitted to finite elements within
-5 %. Then the crack grows by the law of Paris, point by point; at each step the front is still close
-to a semi-ellipse, so that the equations give K of every step, and the life too.
+5 %. Then the crack grows by the Paris law, point by point. The front stays close to a semi-ellipse,
+so the equations give K of every step, and the life.
 
-Where the front meets the face K has no meaning in the usual sense: the singularity is another one
-there. The library marks these places and prolongs K to them from inside; they are drawn hollow.
+Where the front meets the surface, K in the usual sense does not exist: the singularity there is of
+a different order. The library marks these places and extrapolates K to them from inside; they are
+drawn hollow.
 
-Units: N, mm, MPa; K in MPa √mm. Pictures, ParaView files and tables are left in
+Units: N, mm, MPa; K in MPa √mm. Pictures, ParaView files and tables go to
 out/semi_elliptic_growth.
 
     python semi_elliptic_growth.py            h = a / 7, four steps of growth
@@ -32,7 +33,7 @@ import xcrack as xc
 QUICK = "--quick" in sys.argv
 OUT = Path("out/semi_elliptic_growth")
 OUT.mkdir(parents=True, exist_ok=True)
-A, C = 1.0, 1.6  # depth, half length at the face
+A, C = 1.0, 1.6  # depth, half length at the surface
 THICKNESS, WIDTH, HEIGHT = 4.0, 7.0, 7.0  # the last two are halves
 SIGMA = 100.0
 H = A / (4 if QUICK else 7)
@@ -50,7 +51,7 @@ def growing(core, length):
 
 
 def plate():
-    """Box with x along the face, y into the depth, z along the load."""
+    """Box with x along the surface, y into the depth, z along the load."""
     reach = DA * (STEPS - 1)
     half = C + 0.8 * reach + 3 * H
     deep = A + reach + 3 * H
@@ -63,7 +64,7 @@ def plate():
         np.concatenate([-growing(near, HEIGHT)[::-1], z, growing(near, HEIGHT)]),
     )  # fmt: skip
     count = [len(v) - 1 for v in along]
-    mesh = xc.box((0, 0, 0), count, count)  # the corners are whole numbers: each finds its place
+    mesh = xc.box((0, 0, 0), count, count)  # integer corners, mapped below
     number = np.rint(mesh.points).astype(int)
     points = np.stack([v[number[:, i]] for i, v in enumerate(along)], axis=1)
     return xc.Mesh(points, mesh.cells, mesh.facet_sets)
@@ -72,7 +73,7 @@ def plate():
 def newman_raju(phi, a, c):
     """K_I of a semi-elliptic surface crack under tension (Newman and Raju, 1981, eq. 1 to 10).
 
-    phi is the parametric angle, 0 where the front meets the face; a <= c.
+    phi is the parametric angle, 0 where the front meets the surface; a <= c.
     """
     ratio, depth = a / c, a / THICKNESS
     Q = 1 + 1.464 * ratio**1.65
@@ -86,7 +87,7 @@ def newman_raju(phi, a, c):
     return SIGMA * np.sqrt(np.pi * a / Q) * F
 
 
-# %% The crack: an ellipse around the middle of the face; what lies outside does not count
+# %% The crack: an ellipse around the middle of the surface; the part outside the body is ignored
 # It lies between two layers of points.
 problem = xc.Problem(
     plate(),
@@ -94,7 +95,7 @@ problem = xc.Problem(
     cracks=[xc.elliptic_crack((0.0, 0.0, 0.26 * H), (0, 0, 1), (1, 0, 0), C, A)],
     loads=[xc.traction("top", (0.0, 0.0, SIGMA)), xc.traction("bottom", (0.0, 0.0, -SIGMA))],
 )
-shutil.rmtree(OUT / "run", ignore_errors=True)  # collect replaces no run
+shutil.rmtree(OUT / "run", ignore_errors=True)  # collect does not replace a run
 history = xc.collect(
     xc.grow(problem, LAW, xc.max_hoop_stress, xc.Cycle(0.0, 1.0), da=DA, max_steps=STEPS),
     path=OUT / "run",
@@ -103,9 +104,9 @@ print(history)
 print(history.steps[0].solutions[-1].report)
 
 
-# %% K along the front of each step against the equations
+# %% K along the front of each step, compared with the equations
 def ellipse(step):
-    """Depth and half length of the ellipse that fits the front, and how far the front is off."""
+    """Depth and half length of the best-fitting ellipse, and the distance of the front from it."""
     sif = step.sif[-1][0]
     x, y = sif.x[:, 0], sif.x[:, 1]
     u = np.linalg.lstsq(np.stack([x**2, y**2], axis=1), np.ones(len(x)), rcond=None)[0]
@@ -140,8 +141,8 @@ for row in rows:
 a, c, N = A, C, 0.0
 life = [(N, a, c)]
 while c < rows[-1][3] or a < rows[-1][2]:
-    # Depth by K at the deepest point, length by 0.9 K at the face, as Newman and Raju (1981) do:
-    # a front at a free surface grows as if its K were lower.
+    # Depth from K at the deepest point, length from 0.9 K at the surface, as in Newman and Raju
+    # (1981): a front at a free surface grows as if its K were lower.
     deepest, face = newman_raju(np.array([np.pi / 2, 0.0]), a, c)
     rate_a, rate_c = LAW(deepest, 0.0), LAW(0.9 * face, 0.0)
     dN = 0.002 * A / rate_a
@@ -190,10 +191,10 @@ figure.savefig(OUT / "K_and_life.png", dpi=150)
 xc.plot(history.steps[-1].solutions[-1], "opening", file=OUT / "opening.png")
 xc.write(history.steps[-1].solutions[-1], OUT / "last")
 
-# %% What must hold
+# %% Checks
 off = np.array([row[7] for row in rows])
-assert off[0] < 0.07  # Newman and Raju's own 5 %, and the mesh
-assert off.max() < 0.09  # grown fronts are no ellipses
+assert off[0] < 0.07  # the 5 % of Newman and Raju, and the mesh
+assert off.max() < 0.09  # grown fronts are not ellipses
 assert max(row[8] for row in rows) < 0.03  # symmetric: mode I alone
 assert max(row[4] for row in rows) < 0.05
 assert (np.diff([row[2] for row in rows]) > 0).all()

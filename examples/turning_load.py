@@ -1,11 +1,11 @@
-"""A load that turns: tension, then shear, then compression, and the lips close.
+"""A load that turns: tension, then shear, then compression that closes the crack.
 
-A plate with a central crack is under a stress across the crack and a shear that does not keep
-step with it. K_I and K_II reach their extremes at different instants, and for a good part of the
-cycle the lips are closed and slide. Where does the crack turn, and how fast does it grow? The
-answers of the direction criteria stand side by side, with contact of the lips and without.
+A plate with a central crack is under a stress across the crack and a shear out of phase with it.
+K_I and K_II reach their extremes at different instants, and for a good part of the cycle the crack
+faces are closed and slide. Where does the crack turn, and how fast does it grow? The example
+compares the direction criteria, with contact of the crack faces and without.
 
-Units: N, mm, MPa; K in MPa √mm. Pictures, ParaView files and tables are left in out/turning_load.
+Units: N, mm, MPa; K in MPa √mm. Pictures, ParaView files and tables go to out/turning_load.
 """
 
 # %% The cycle: 24 instants, solved in one call with one factorisation
@@ -60,7 +60,7 @@ def cycle_of(cracks, contact):
 
 
 def closed_at_tip(solution):
-    """Whether the lips touch over the last half millimetre before the tip."""
+    """Whether the crack faces touch over the last half millimetre before the tip."""
     contact = solution.contact[0]
     near = np.linalg.norm(contact.points - xc.stress_intensity(solution).x[TIP], axis=1) < 0.5
     return bool(contact.closed[near].all())
@@ -72,7 +72,7 @@ CONTACT = {"with contact": "auto", "without": "off"}
 straight = {name: cycle_of([CRACK], contact) for name, contact in CONTACT.items()}
 print(straight["with contact"][0][0].report)
 
-# %% The criteria: each takes K of all instants, and returns angle, range and ratio R
+# %% The criteria: each takes K at all instants and returns angle, range and ratio R
 CRITERIA = {
     "max_hoop_stress": xc.max_hoop_stress,
     "mean_reference, max": partial(xc.mean_reference, reference="max"),
@@ -83,7 +83,7 @@ CRITERIA = {
 rows = []
 
 
-def answers(scene, K_of):
+def angles(scene, K_of):
     """Angle of each criterion with and without contact; rows for the table."""
     angle = {}
     for name, criterion in CRITERIA.items():
@@ -106,11 +106,11 @@ def answers(scene, K_of):
     return angle
 
 
-straight_angle = answers("straight", straight)
+straight_angle = angles("straight", straight)
 
-# %% Growth: each criterion goes its own way
+# %% Growth: each criterion gives its own path
 # Eight of the instants are enough. A criterion warns of each K_I < 0 that it counts as 0, and of
-# a mode that is reversed within the cycle: this cycle is made for both.
+# a mode that reverses within the cycle; both are intended here.
 cycle = xc.Cycle(states=[state(k / 8) for k in range(8)])
 RUNS = (
     ("max_hoop_stress", "with contact"),
@@ -143,12 +143,12 @@ for name, how in RUNS:
     print(f"{name:22} {how:13} two steps in {last.cycles:7.0f} cycles, next tip ({x:.3f}, {y:.3f})")
 
 # %% The same cycle on the crack once it has turned
-# On a straight crack criteria mend the missing contact by counting K_I < 0 as 0. Once the crack
-# has turned they cannot: closed lips behind the kink slide and wedge the new piece open, and
-# without contact they sink into each other instead.
+# On a straight crack, counting K_I < 0 as 0 compensates for missing contact. Once the crack has
+# turned it does not: closed faces behind the kink slide and wedge the new piece open; without
+# contact they interpenetrate instead.
 turned_crack = grown["weighted_angle", "with contact"].steps[2].cracks
 turned = {name: cycle_of(turned_crack, contact) for name, contact in CONTACT.items()}
-turned_angle = answers("turned", turned)
+turned_angle = angles("turned", turned)
 for row in rows:
     print(
         f"{row['crack']:9} {row['criterion']:22} {row['contact']:13} "
@@ -161,8 +161,8 @@ with (OUT / "table.csv").open("w", newline="") as file:
     writer.writerows(rows)
 
 # %% The path of (K_I, K_II) over the cycle
-# A ray holds all (K_I, K_II) that kink at one angle: K_I sin t + K_II (3 cos t - 1) = 0. That of
-# max, min and mean passes through the state they refer to.
+# A ray contains all (K_I, K_II) that kink at one angle, K_I sin t + K_II (3 cos t - 1) = 0. The
+# rays of max, min and mean pass through the state they refer to.
 RAYS = {
     "mean_reference, max": ("max", "C1", "^"),
     "mean_reference, min": ("min", "C4", "v"),
@@ -172,7 +172,7 @@ RAYS = {
 
 
 def reference(K, which):
-    """The state that an angle refers to."""
+    """The state that determines an angle."""
     K = np.maximum(K, [0.0, -np.inf])
     own = xc.max_hoop_stress
     K_eq = np.array([own(np.stack([0 * k, k])[:, None], STEEL.nu)[1][0] for k in K])
@@ -219,7 +219,7 @@ for axis, (title, K_of, angle), (low, high) in zip(axes, scenes, ranges, strict=
         loc="upper center", bbox_to_anchor=(0.5, -0.09), ncols=2, frameon=False, columnspacing=1
     )
 axes[0].set_ylabel(r"$K_{II}$, MPa$\sqrt{\mathrm{mm}}$")
-axes[0].text(-325, -335, "$K_I$ < 0: the lips overlap", color="C3", va="bottom")
+axes[0].text(-325, -335, "$K_I$ < 0: the faces overlap", color="C3", va="bottom")
 figure.savefig(OUT / "K_path.png", dpi=150)
 
 # %% The cycle, and the paths
@@ -245,11 +245,11 @@ axes[1].set(xlabel="x, mm", ylabel="y, mm", aspect="equal", xlim=(-8.5, 8.5), yl
 axes[1].legend(fontsize="small", loc="upper center", bbox_to_anchor=(0.5, -0.18), ncols=2)
 figure.savefig(OUT / "paths.png", dpi=150)
 
-# %% The lips of the turned crack at the instant of the largest compression
-# Each lip is drawn half of the jump away from the crack: the turning of the body, magnified too,
-# would look like a gap. At the kinks the pressure is unbounded (the corner of one lip presses into
-# the other), and two or three cells beside them cannot follow it. The opening steps there because
-# it is measured along the normal of the crack, which turns.
+# %% The faces of the turned crack at the instant of the largest compression
+# Each face is drawn half of the jump away from the crack, because the magnified rotation of the
+# body would look like a gap. At the kinks the pressure is unbounded (the corner of one face presses
+# into the other), and two or three cells beside them cannot resolve it. The opening jumps there
+# because it is measured along the normal of the crack, which turns.
 WARP = 150.0
 press = int(np.argmin(across))
 figure, axes = plt.subplots(2, 2, figsize=(12, 6), layout="constrained", sharex=True)
@@ -261,9 +261,9 @@ for column, how in zip(axes.T, CONTACT, strict=True):
     gap = solution.opening(0)[order]
     upper, lower = (x + half).T, (x - half).T
     column[0].plot(*x.T, "-", color="0.7", lw=1, label="crack at rest")
-    column[0].plot(*upper, "C0-", lw=1.8, label="lip +")
-    column[0].plot(*lower, "C1-", lw=1.8, label="lip −")
-    title = "with contact" if how == "with contact" else "without contact: the lips overlap"
+    column[0].plot(*upper, "C0-", lw=1.8, label="+ face")
+    column[0].plot(*lower, "C1-", lw=1.8, label="− face")
+    title = "with contact" if how == "with contact" else "without contact: the faces overlap"
     column[0].set(title=f"{title} (displacements × {WARP:.0f})", ylabel="y, mm", aspect="equal")
     column[0].set(xlim=(-6.5, 6.5), ylim=(-2.6, 2.6))
     column[0].legend(fontsize="small", loc="upper right")
@@ -280,15 +280,15 @@ shown = turned["with contact"][0][press]
 xc.plot(shown, "von_mises", warp=100.0, file=OUT / "von_mises.png")
 xc.write(shown, OUT / "largest_compression")
 
-# %% What must hold
+# %% Checks
 # K of the straight crack: sigma sqrt(pi a) 1.05538 for 2 a / W = 0.2 in a square plate (CCT_LS of
-# tests/exact.py); the lips carry all of the compression, so that K_I is 0 where it is negative.
+# tests/exact.py); the faces carry all of the compression, so that K_I is 0 instead of negative.
 F = 1.05538
 K_contact, K_overlap = (straight[how][1][:, TIP] for how in CONTACT)
 scale = 100.0 * np.sqrt(np.pi * A)
 assert np.allclose(K_overlap[:, 0], F * across * np.sqrt(np.pi * A), atol=0.002 * scale)
 assert np.allclose(K_contact[:, 0], np.maximum(K_overlap[:, 0], 0), atol=0.002 * scale)
-assert np.allclose(K_contact[:, 1], K_overlap[:, 1], atol=0.002 * scale)  # lips slide freely
+assert np.allclose(K_contact[:, 1], K_overlap[:, 1], atol=0.002 * scale)  # the faces slide freely
 is_closed = np.array([closed_at_tip(s) for s in straight["with contact"][0]])
 assert np.array_equal(is_closed, across < 0)
 assert np.abs(K_contact[is_closed, 0]).max() < 1e-3 * scale
@@ -302,19 +302,19 @@ for K_of, angle in ((straight, straight_angle), (turned, turned_angle)):
         warnings.simplefilter("ignore", xc.XcrackWarning)
         own = [xc.max_hoop_stress(k[None], STEEL.nu)[0][TIP] for k in K]
         assert min(own) < angle["weighted_angle", "with contact"] < max(own)
-        # and no criterion asks in which order the instants come
+        # and no criterion depends on the order of the instants
         shuffled = np.random.default_rng(20240613).permutation(K)
         for criterion in CRITERIA.values():
             for given, other in zip(criterion(K, 0.3), criterion(shuffled, 0.3), strict=True):
                 assert np.array_equal(given, other)
 
-# both tips do the same: the scene is its own half turn
+# both tips behave alike: a half turn maps the scene onto itself
 K = turned["with contact"][1]
 assert np.abs(K[:, 0] - K[:, 1] * [1, -1]).max() < 0.01 * scale
 difference = {name: np.degrees(turned_angle[name, "without"] - turned_angle[name, "with contact"])
               for name in CRITERIA}  # fmt: skip
-assert abs(difference["mean_reference, mean"]) > 5  # what contact is needed for
+assert abs(difference["mean_reference, mean"]) > 5  # why contact is needed
 assert abs(difference["max_hoop_stress"]) < 0.1  # the instant of the largest K_eq is open
 overlap = -turned["without"][0][press].opening(0).min()
-print(f"without contact the lips of the turned crack overlap by up to {1000 * overlap:.1f} µm")
+print(f"without contact the faces of the turned crack overlap by up to {1000 * overlap:.1f} µm")
 print(f"pictures, ParaView files and table.csv are in {OUT.resolve()}")

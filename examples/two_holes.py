@@ -1,15 +1,14 @@
 """Two cracks that attract and miss each other.
 
-A plate with two holes is stretched; two cracks start from its opposite sides (Bouchard, Bay and
-Chastel 2003). Each turns towards the hole that it passes, runs on almost straight, and bends
-towards the other crack once their tips have passed each other; in each other's shadow both slow
-down. A half turn about the middle maps the plate onto itself: so it must map one path onto the
-other.
+A plate with two holes is stretched; two cracks start from opposite sides (Bouchard, Bay and Chastel
+2003). Each turns towards the hole that it passes, continues almost straight, and bends towards the
+other crack once their tips have passed each other; the cracks then shield each other and slow down.
+A half turn about the middle maps the plate onto itself, so it must map one path onto the other.
 
-Units: N, mm, MPa; K in MPa √mm. Pictures, ParaView files and a table are left in out/two_holes.
+Units: N, mm, MPa; K in MPa √mm. Pictures, ParaView files and a table go to out/two_holes.
 """
 
-# %% The plate: both ends held in x and pulled in y
+# %% The plate: both ends fixed in x and pulled in y
 import csv
 from dataclasses import replace
 from pathlib import Path
@@ -71,7 +70,7 @@ def grown(name, da):
     )
 
 
-symmetric = grown("two_holes", 0.5)  # made of one half and its copy, turned
+symmetric = grown("two_holes", 0.5)  # one half and its rotated copy
 free = grown("two_holes_free", 0.5)  # meshed in one piece
 coarse = grown("two_holes", 1.0)  # steps twice as long
 table = symmetric.table()
@@ -102,13 +101,13 @@ step_gap = step_gap[coarse_path[:, 0] <= left[-1, 0]].max()
 print(f"half turn: paths differ by {antisymmetry:.1e}; free mesh: by {free_gap:.1e}")
 print(f"steps of 1 instead of 0.5: by {step_gap:.2f}")
 
-# %% Against another code
+# %% Comparison with another code
 # Regression data of MSolve (X-FEM, 4-node quadrilaterals, 4272 to 4442 unknowns, steps of 1), the
 # first from ISAAR.MSolve.XFEM.Tests/HolesTests.cs (u_x = 0 at both ends), the second from
 # MGroup.XFEM.Tests/Fracture/Benchmarks/HolesBenchmark.cs (u_x = 0 at two corners). Their author
-# claims no more than that the first look like published pictures. Neither is converged: held as
-# in the second, the crack here runs into the hole. They are a band for the eye; what is checked
-# is the half turn, the free mesh, the step, and K against a conforming mesh.
+# only claims that the first look like published pictures. Neither is converged: with the supports
+# of the second, the crack here runs into the hole. They are drawn for orientation; the checks are
+# the half turn, the free mesh, the step, and K on a conforming mesh.
 EARLIER = (
     [(1, 2.85), (2, 2.860), (2.999, 2.896), (3.976, 2.682), (4.905, 2.311), (5.869, 2.046),
      (6.849, 1.844), (7.844, 1.748), (8.843, 1.717), (9.840, 1.802), (10.828, 1.958),
@@ -144,8 +143,8 @@ earlier_gap = max(away(EARLIER[0]), away(TURN - np.array(EARLIER[1])))
 print(f"MSolve, later: two paths unlike by {unlike(LATER):.2f}, from here {later_gap:.2f}")
 print(f"MSolve, earlier: two paths unlike by {unlike(EARLIER):.2f}, from here {earlier_gap:.2f}")
 
-# The earlier path runs away from the hole. A crack turns until K_II is zero: so put the cracks
-# onto that path, as far as x = 7.8, and look at K_II.
+# The earlier path runs away from the hole. A crack turns until K_II is zero, so place the cracks on
+# that path, as far as x = 7.8, and compute K_II.
 there = [LEFT[0], *EARLIER[0][:8]]
 published = xc.solve(stretched(symmetric.mesh, there, list(TURN - np.array(there))))
 K = xc.stress_intensity(published).K[0]
@@ -156,8 +155,8 @@ print(
 )
 print(f"on the path computed here no kink after the first exceeds {own_turn:.1f}°")
 
-# At the first step K was also found with plain quadratic triangles, the lips a cut in the mesh
-# (102 k unknowns, cells of 0.0005 at the tip, jump of the lips extrapolated to the tip).
+# K of the first step was also computed with plain quadratic triangles and a meshed crack (102 k
+# unknowns, cells of 0.0005 at the tip, jump between the crack faces extrapolated to the tip).
 CONFORMING = np.array([2923.0, -269.4])
 K_start = np.array([first["K_I_1"][0], first["K_II_1"][0]]) / 0.1
 print(f"first step: K = {K_start.round(1)}, conforming mesh {CONFORMING}")
@@ -168,22 +167,22 @@ axis.add_patch(plt.Rectangle((0, 0), *TURN, fc="0.96", ec="k", lw=1.2))
 for centre, radius in HOLES:
     axis.add_patch(plt.Circle(centre, radius, fc="white", ec="k", lw=1.2))
 for c in (0, 1):
-    said = (lambda text: text) if c == 0 else (lambda text: None)  # one entry each in the legend
+    label = (lambda text: text) if c == 0 else (lambda text: None)  # one legend entry each
     whole = np.vstack([(LEFT, RIGHT)[c][0], np.array([tip(s, c) for s in symmetric.steps])])
     axis.plot(*whole.T, f"C{3 * c}-", lw=2, label=("left crack", "right crack")[c], zorder=3)
     x = np.array([tip(s, c) for s in free.steps])
-    axis.plot(*x.T, "ko", ms=4, mfc="none", mew=0.8, label=said("free mesh"), zorder=4)
+    axis.plot(*x.T, "ko", ms=4, mfc="none", mew=0.8, label=label("free mesh"), zorder=4)
     x = np.array([tip(s, c) for s in coarse.steps])
-    axis.plot(*x.T, "kx", ms=5, mew=0.9, label=said("steps of 1 mm"), zorder=4)
+    axis.plot(*x.T, "kx", ms=5, mew=0.9, label=label("steps of 1 mm"), zorder=4)
     x, y = np.array(LATER[c]).T
-    axis.plot(x, y, "C2-", lw=1, label=said("MSolve, later"))
-    axis.fill_between(x, y - 0.5, y + 0.5, color="C2", alpha=0.15, lw=0, label=said("± 0.5 mm"))
-    axis.plot(*np.array(EARLIER[c]).T, ":", color="0.45", lw=1.4, label=said("MSolve, earlier"))
+    axis.plot(x, y, "C2-", lw=1, label=label("MSolve, later"))
+    axis.fill_between(x, y - 0.5, y + 0.5, color="C2", alpha=0.15, lw=0, label=label("± 0.5 mm"))
+    axis.plot(*np.array(EARLIER[c]).T, ":", color="0.45", lw=1.4, label=label("MSolve, earlier"))
 axis.set(xlabel="x, mm", ylabel="y, mm", aspect="equal", xlim=(-0.4, 20.4), ylim=(-0.4, 10.4))
 axis.legend(loc="upper center", bbox_to_anchor=(0.5, -0.1), ncols=4, frameon=False)
 figure.savefig(OUT / "paths.png", dpi=150)
 
-# %% K along the way, and the length over the cycles
+# %% K along the path, and the length over the cycles
 figure, axes = plt.subplots(1, 2, figsize=(11, 4.2), layout="constrained")
 axes[0].axhline(0, color="0.6", lw=0.8)
 axes[0].axvline(10, color="0.6", lw=0.8, ls="--")
@@ -196,7 +195,7 @@ axes[1].plot(first["N"] / 1000, first["a"], "C0o-", ms=3)
 axes[1].set(xlabel="thousand cycles", ylabel="length of the left crack a, mm", xlim=(0, None))
 figure.savefig(OUT / "K_and_length.png", dpi=150)
 
-# %% The opened cracks at the last step; a series for ParaView, without the unloaded state
+# %% The open cracks at the last step; a series for ParaView, without the unloaded state
 last = symmetric.steps[-1].solutions[-1]
 xc.plot(last, "von_mises", warp=60.0, file=OUT / "von_mises.png")
 loaded = tuple(replace(step, solutions=step.solutions[-1:]) for step in symmetric.steps)
@@ -206,7 +205,7 @@ with (OUT / "paths.csv").open("w", newline="") as file:
     writer.writerow(["step", "left x", "left y", "right x, turned", "right y, turned"])
     writer.writerows([i, *p, *q] for i, (p, q) in enumerate(zip(left, right, strict=True)))
 
-# %% What must hold
+# %% Checks
 apart = np.linalg.norm(left[:, None] - (TURN - right)[None], axis=-1).min()
 assert antisymmetry < 1e-6
 assert free_gap < 0.1 * 0.5
@@ -214,9 +213,9 @@ assert step_gap < 0.15
 assert np.allclose(K_start, CONFORMING, atol=0.002 * CONFORMING[0])
 assert left[-1, 0] > (TURN - right)[-1, 0] + 1  # they have passed each other,
 assert apart > 1.0  # and missed
-assert left[6:8, 1].max() > 3.6  # drawn to the hole above
+assert left[6:8, 1].max() > 3.6  # attracted by the hole above
 assert left[-1, 1] - left[14, 1] > 1.5  # and then to the other crack
-assert first["K_I_1"][-1] < 0.3 * first["K_I_1"].max()  # in whose shadow it slows down
+assert first["K_I_1"][-1] < 0.3 * first["K_I_1"].max()  # which shields it
 assert later_gap < 0.5
 assert published_turn > 15
 print(f"pictures, ParaView files and tables are in {OUT.resolve()}")
