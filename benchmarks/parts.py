@@ -24,7 +24,7 @@ from xcrack.cutting.level_set import level_set
 from xcrack.solvers import direct as linear
 from xcrack.solvers.rigid_motion import free_motion
 from xcrack.xfem.assembly import bulk, enriched_stiffness, total_stiffness
-from xcrack.xfem.function_space import space
+from xcrack.xfem.function_space import function_space
 from xcrack.xfem.lips import lip_points
 from xcrack.xfem.loads import load_vector
 from xcrack.xfem.supports import known_unknowns
@@ -65,7 +65,7 @@ def run(n: int) -> None:
         levels = level_set(mesh, problem.placed[0])
     with part("cut and space"):
         cuts = (cut(mesh, levels),)
-        V = space(mesh, 2, problem.placed, cuts, numerics)
+        V = function_space(mesh, 2, problem.placed, cuts, numerics)
         lips = (lip_points(V, 0),)
         _ = V.signature
     with part("bulk"):

@@ -27,7 +27,7 @@ from xcrack.cutting.cut import cut  # noqa: E402
 from xcrack.solvers.iterative import iterative_system  # noqa: E402
 from xcrack.solvers.rigid_motion import balanced, free_motion  # noqa: E402
 from xcrack.xfem.assembly import bulk, enriched_stiffness, total_stiffness  # noqa: E402
-from xcrack.xfem.function_space import space  # noqa: E402
+from xcrack.xfem.function_space import function_space  # noqa: E402
 from xcrack.xfem.lips import lip_points  # noqa: E402
 from xcrack.xfem.loads import load_vector  # noqa: E402
 from xcrack.xfem.model import Model, levels  # noqa: E402
@@ -72,7 +72,7 @@ def measure(n: int) -> dict[str, object]:
     cracks = timed("crack", lambda: problem.placed)
     phi = timed("level sets", levels, mesh, cracks[0], numerics)
     cuts = (timed("cutting", cut, mesh, phi),)
-    where = timed("cutting", space, mesh, 1, cracks, cuts, numerics)
+    where = timed("cutting", function_space, mesh, 1, cracks, cuts, numerics)
     lips = (timed("cutting", lip_points, where, 0),)
     plain = timed("bulk", bulk, mesh, problem.material, 1)
     enriched, n_points, _ = timed(

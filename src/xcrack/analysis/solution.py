@@ -16,7 +16,7 @@ from xcrack.mesh.locate import locate
 from xcrack.scene.conditions import InitialStress, Load, evaluate_stress
 from xcrack.scene.problem import Problem, crack_number
 from xcrack.solvers.reuse import Reuse
-from xcrack.xfem.function_space import Space
+from xcrack.xfem.function_space import FunctionSpace
 from xcrack.xfem.lips import LipPoints, jump_values
 from xcrack.xfem.loads import position
 from xcrack.xfem.quadrature import cell_side
@@ -35,7 +35,7 @@ class Solution:
         Loads of this state, before they were scaled.
     factor : float
         Scale of the loads (not of an initial stress).
-    space : Space
+    space : FunctionSpace
     u : (n_dof,) array, length
         Unknowns: standard, Heaviside, tip functions.
     lips : tuple of LipPoints
@@ -54,7 +54,7 @@ class Solution:
     state: object
     loads: tuple[Load, ...]
     factor: float
-    space: Space
+    space: FunctionSpace
     u: Floats
     lips: tuple[LipPoints, ...]
     contact: tuple[Contact | None, ...]
@@ -183,13 +183,13 @@ class Solution:
 
 
 def fields_at(
-    space: Space, coefficients: Floats, cell: Ints, bary: Floats, side: Ints
+    space: FunctionSpace, coefficients: Floats, cell: Ints, bary: Floats, side: Ints
 ) -> tuple[Floats, Floats]:
     """Displacements `(q, d, s)` and gradients `(q, d, d, s)` of several states at once.
 
     Parameters
     ----------
-    space : Space
+    space : FunctionSpace
         Shared by all states.
     coefficients : (n + 1, d, s) array, length
         Unknowns by function, the last row zero.
@@ -209,7 +209,7 @@ def fields_at(
 
 
 def gradients_at(
-    space: Space, coefficients: Floats, cell: Ints, bary: Floats, side: Ints
+    space: FunctionSpace, coefficients: Floats, cell: Ints, bary: Floats, side: Ints
 ) -> Floats:
     """Gradients of displacements `(q, d, d, s)` of several states at once.
 
@@ -228,7 +228,7 @@ def gradients_at(
 
 
 def _tables(
-    space: Space, cell: Ints, bary: Floats, side: Ints
+    space: FunctionSpace, cell: Ints, bary: Floats, side: Ints
 ) -> Iterator[tuple[Ints, Ints, Ints, Floats, Floats]]:
     """Of each batch: numbers of its points, their rows, its functions, values and gradients."""
     for batch, number, row in space.batches_of_points(cell):
@@ -236,7 +236,7 @@ def _tables(
         yield number, row, batch.functions, N, G
 
 
-def sides_of(space: Space, cell: Ints, bary: Floats, lip: int) -> Ints:
+def sides_of(space: FunctionSpace, cell: Ints, bary: Floats, lip: int) -> Ints:
     """Side of each crack of points in cells `(q, cracks)`; `lip` decides on a crack."""
     side = cell_side(space, cell)
     for c, cut in enumerate(space.cuts):

@@ -11,7 +11,7 @@ from xcrack.errors import ProblemError
 from xcrack.scene.problem import Problem
 from xcrack.solvers.direct import scaled_basis
 from xcrack.xfem.enrichment_3d import leg_size
-from xcrack.xfem.function_space import Space
+from xcrack.xfem.function_space import FunctionSpace
 from xcrack.xfem.lips import jump_values
 from xcrack.xfem.model import Model, build
 from xcrack.xfem.quadrature import cell_points
@@ -93,7 +93,7 @@ def _smallest(schur: Floats, gram: Floats) -> float:
     return float(scipy.linalg.eigvalsh(T.T @ ((schur + schur.T) / 2) @ T)[0])
 
 
-def _h1(space: Space) -> sp.csr_matrix:
+def _h1(space: FunctionSpace) -> sp.csr_matrix:
     """Matrix of int grad u . grad v + u v / L² of all scalar functions."""
     cells = np.arange(len(space.mesh.cells))
     points = cell_points(space, cells, 4, 2 * space.order)
@@ -116,7 +116,7 @@ def _h1(space: Space) -> sp.csr_matrix:
     return sp.csr_matrix(triplets, shape=(space.n_functions, space.n_functions))
 
 
-def _scalar_rows(space: Space, model: Model, c: int, chosen: Multipliers) -> sp.csr_matrix:
+def _scalar_rows(space: FunctionSpace, model: Model, c: int, chosen: Multipliers) -> sp.csr_matrix:
     lips = model.lips[c]
     rows, columns, values = [], [], []
     for functions, number, N in jump_values(space, c, lips):

@@ -14,7 +14,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from xcrack.arrays import Bools, Floats, Ints
-from xcrack.xfem.function_space import Space
+from xcrack.xfem.function_space import FunctionSpace
 from xcrack.xfem.lips import LipPoints
 
 _PASSES = 5  # in which knots are moved; each looks one knot to either side
@@ -43,7 +43,7 @@ class Multipliers:
 
 
 def multipliers(
-    space: Space, c: int, lips: LipPoints, kind: str, fixed: Bools | None = None
+    space: FunctionSpace, c: int, lips: LipPoints, kind: str, fixed: Bools | None = None
 ) -> Multipliers:
     """Multiplier space of crack c: "reduced" or "naive".
 
@@ -70,7 +70,7 @@ def multipliers(
     return Multipliers(c, values, measure[keep], centre)
 
 
-def _traces(space: Space, lips: LipPoints) -> tuple[Ints, sp.csr_matrix]:
+def _traces(space: FunctionSpace, lips: LipPoints) -> tuple[Ints, sp.csr_matrix]:
     """Mesh points whose hats reach the lips, and the hats at the lip points `(q, k)`."""
     cell = lips.cell[:, 1]
     corners = space.mesh.cells[cell]
@@ -84,7 +84,12 @@ def _traces(space: Space, lips: LipPoints) -> tuple[Ints, sp.csr_matrix]:
 
 
 def _held(
-    space: Space, c: int, nodes: Ints, traces: sp.csr_matrix, lips: LipPoints, fixed: Bools | None
+    space: FunctionSpace,
+    c: int,
+    nodes: Ints,
+    traces: sp.csr_matrix,
+    lips: LipPoints,
+    fixed: Bools | None,
 ) -> Bools:
     """Which of the nodes have a normal jump that supports decide."""
     number = space.heaviside[c][nodes]
@@ -96,7 +101,7 @@ def _held(
 
 
 def _groups(
-    space: Space, c: int, nodes: Ints, traces: sp.csr_matrix, weight: Floats, held: Bools
+    space: FunctionSpace, c: int, nodes: Ints, traces: sp.csr_matrix, weight: Floats, held: Bools
 ) -> Ints:
     """Group number of each node."""
     mesh, cut = space.mesh, space.cuts[c]

@@ -16,17 +16,19 @@ from xcrack.scene.conditions import (
     evaluate_stress,
 )
 from xcrack.scene.material import Isotropic
-from xcrack.xfem.function_space import Space
+from xcrack.xfem.function_space import FunctionSpace
 from xcrack.xfem.lips import LipPoints
 from xcrack.xfem.quadrature import cell_side
 
 
-def stress_matrix(space: Space, material: Isotropic, c: int, lips: LipPoints) -> sp.csr_matrix:
+def stress_matrix(
+    space: FunctionSpace, material: Isotropic, c: int, lips: LipPoints
+) -> sp.csr_matrix:
     """Mean normal stress n . sigma . n at the lip points, of the strain alone `(q, n_dof)`.
 
     Parameters
     ----------
-    space : Space
+    space : FunctionSpace
     material : Isotropic
     c : int
         Crack.
@@ -57,12 +59,12 @@ def stress_matrix(space: Space, material: Isotropic, c: int, lips: LipPoints) ->
     return matrix
 
 
-def lip_shares(space: Space, c: int, lips: LipPoints) -> Floats:
+def lip_shares(space: FunctionSpace, c: int, lips: LipPoints) -> Floats:
     """Shares of the stress on lip - and lip + in their mean `(q, 2)`: of the cells' volumes.
 
     Parameters
     ----------
-    space : Space
+    space : FunctionSpace
     c : int
         Crack.
     lips : LipPoints
@@ -78,7 +80,7 @@ def lip_shares(space: Space, c: int, lips: LipPoints) -> Floats:
     return np.asarray(part / part.sum(axis=1, keepdims=True))
 
 
-def averaging(space: Space, lips: LipPoints) -> sp.csr_matrix:
+def averaging(space: FunctionSpace, lips: LipPoints) -> sp.csr_matrix:
     """Projection on polynomials of one degree less than u on each lip segment or triangle `(q, q)`.
 
     The stress of the tip functions goes like 1 / sqrt(r) along the lips: its square could not be
@@ -109,12 +111,12 @@ def averaging(space: Space, lips: LipPoints) -> sp.csr_matrix:
     return sp.csr_matrix(B @ middle @ B.T @ sp.diags(lips.weight))
 
 
-def tip_distance(space: Space, c: int, lips: LipPoints) -> Floats:
+def tip_distance(space: FunctionSpace, c: int, lips: LipPoints) -> Floats:
     """Mean distance of each point's lip segment to the nearest tip or front `(q,)`, length.
 
     Parameters
     ----------
-    space : Space
+    space : FunctionSpace
     c : int
         Crack.
     lips : LipPoints

@@ -7,7 +7,7 @@ from scipy.spatial import cKDTree
 
 from xcrack.arrays import Bools, Floats, Ints
 from xcrack.mesh.mesh import local_edges
-from xcrack.xfem.function_space import Space
+from xcrack.xfem.function_space import FunctionSpace
 from xcrack.xfem.quadrature import SubCells, sub_cells
 
 _REACH = 1.731  # lengths of an edge from a tip within which it is halved; no tie on regular meshes
@@ -46,7 +46,7 @@ class PieceCells:
     side: Ints
 
 
-def piece_cells(space: Space) -> PieceCells:
+def piece_cells(space: FunctionSpace) -> PieceCells:
     """Split the cells on which enriched functions act, in the plane finer towards the tips.
 
     In space a face of a cell at a front may be split while its neighbour ahead is whole, and two
@@ -72,7 +72,7 @@ def piece_cells(space: Space) -> PieceCells:
     return PieceCells(plain, cell, bary, side)
 
 
-def _near_tip(space: Space, ends: Floats) -> Bools:
+def _near_tip(space: FunctionSpace, ends: Floats) -> Bools:
     """Edges `(..., 2, d)` to be halved: a matter of the edge alone, so that neighbours agree."""
     if not space.tips:
         return np.zeros(ends.shape[:-2], dtype=bool)
@@ -81,7 +81,9 @@ def _near_tip(space: Space, ends: Floats) -> Bools:
     return np.asarray(tips.query(ends.mean(axis=-2))[0] < _REACH * length)
 
 
-def _halved(space: Space, cell: Ints, bary: Floats, side: Ints) -> tuple[Ints, Floats, Ints]:
+def _halved(
+    space: FunctionSpace, cell: Ints, bary: Floats, side: Ints
+) -> tuple[Ints, Floats, Ints]:
     """Halve the edges of triangles near a tip."""
     pairs = local_edges(2)
     x = np.einsum("svb,sbd->svd", bary, space.mesh.points[space.mesh.cells[cell]])
@@ -98,7 +100,7 @@ def _halved(space: Space, cell: Ints, bary: Floats, side: Ints) -> tuple[Ints, F
     return cell[every], np.concatenate(parts), side[every]
 
 
-def _without_exits(space: Space, subs: SubCells) -> tuple[Ints, Floats, Ints]:
+def _without_exits(space: FunctionSpace, subs: SubCells) -> tuple[Ints, Floats, Ints]:
     """Join the two sub-cells of a tip cell that meet where the prolonged crack leaves it.
 
     No function jumps there, and the cell ahead is whole: its edge would not fit two.

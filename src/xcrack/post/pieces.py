@@ -17,7 +17,7 @@ from xcrack.arrays import Bools, Floats, Ints, lock
 from xcrack.mesh.mesh import local_edges
 from xcrack.mesh.simplex import n_shapes
 from xcrack.post.piece_cells import piece_cells
-from xcrack.xfem.function_space import Space
+from xcrack.xfem.function_space import FunctionSpace
 from xcrack.xfem.loads import position
 from xcrack.xfem.quadrature import cell_side
 
@@ -157,7 +157,7 @@ class _Block:
 
     @classmethod
     def of(
-        cls, space: Space, cell: Ints, corners: Floats, order: int, side: Ints | None = None
+        cls, space: FunctionSpace, cell: Ints, corners: Floats, order: int, side: Ints | None = None
     ) -> "_Block":
         side = cell_side(space, cell) if side is None else side
         bary = corners
@@ -178,7 +178,7 @@ class _Block:
 
 
 def _join(
-    space: Space, blocks: list[_Block], used: Ints, first: Ints, shared: Bools
+    space: FunctionSpace, blocks: list[_Block], used: Ints, first: Ints, shared: Bools
 ) -> tuple[Ints, int, Ints]:
     """Points of the split pieces `(q,)`: one for each place and lip; plain nodes come first.
 
@@ -218,7 +218,7 @@ def _same(key: Floats) -> Ints:
     return np.asarray(group[rounded.ravel()], dtype=np.int64)
 
 
-def _lip(space: Space, cell: Ints, bary: Floats, side: Ints) -> Ints:
+def _lip(space: FunctionSpace, cell: Ints, bary: Floats, side: Ints) -> Ints:
     """Lip of each crack on which points lie `(q, cracks)`: +1, -1, or 0 off the crack."""
     lip = np.zeros(side.shape, dtype=np.int64)
     near = _SAME * space.mesh.cell_size[cell]
@@ -242,7 +242,7 @@ def _stresses(solution: Solution, block: _Block) -> tuple[Floats, Floats]:
     return full_stress(solution, cell, bary, side), full_stress(solution, *block.center)
 
 
-def _at_tip(space: Space, cell: Ints, bary: Floats) -> Bools:
+def _at_tip(space: FunctionSpace, cell: Ints, bary: Floats) -> Bools:
     """Which points `(q,)` lie at a tip or on a front, as the level sets have it."""
     corner = space.mesh.cells[cell]
     near = np.full(len(cell), np.inf)
@@ -332,7 +332,7 @@ def lips_of(solution: Solution, crack: int) -> Lips:
     )
 
 
-def lip_side(space: Space, crack: int, lip_cell: Ints, k: int) -> Ints:
+def lip_side(space: FunctionSpace, crack: int, lip_cell: Ints, k: int) -> Ints:
     """Side of each crack `(q, cracks)` for points on lip - (k = 0) or lip + (k = 1)."""
     side = cell_side(space, lip_cell[:, k]).copy()
     side[:, crack] = 2 * k - 1

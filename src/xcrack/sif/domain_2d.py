@@ -5,7 +5,7 @@ import numpy as np
 from xcrack.analysis.solution import Solution
 from xcrack.arrays import Floats
 from xcrack.mesh.locate import nearest_boundary
-from xcrack.xfem.function_space import Space
+from xcrack.xfem.function_space import FunctionSpace
 from xcrack.xfem.loads import position
 from xcrack.xfem.quadrature import Points, cell_points
 
@@ -37,7 +37,7 @@ def domain_radius(solution: Solution, t: int) -> tuple[float, float, float]:
 
 
 def domain_points(
-    space: Space, centre: Floats, radii: tuple[float, float]
+    space: FunctionSpace, centre: Floats, radii: tuple[float, float]
 ) -> list[tuple[Points, Floats]]:
     """Integration points between two radii and their places, denser where cells are large."""
     mesh = space.mesh

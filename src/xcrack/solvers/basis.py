@@ -14,7 +14,7 @@ import scipy.sparse as sp
 
 from xcrack.arrays import Bools, Floats, Ints, offsets, ranges
 from xcrack.mesh.mesh import Mesh
-from xcrack.xfem.function_space import Space
+from xcrack.xfem.function_space import FunctionSpace
 
 _DEPENDENT = 1e-10  # eigenvalues below this share of a block's largest are dropped
 
@@ -36,7 +36,7 @@ class Blocks:
     n_standard: Ints
 
 
-def function_nodes(space: Space) -> Ints:
+def function_nodes(space: FunctionSpace) -> Ints:
     """Node of each function `(n_functions,)`."""
     owner = np.arange(space.n_functions)
     for number in space.heaviside:
@@ -49,7 +49,7 @@ def function_nodes(space: Space) -> Ints:
     return owner
 
 
-def node_blocks(space: Space, kind: str) -> Blocks:
+def node_blocks(space: FunctionSpace, kind: str) -> Blocks:
     """Unknowns of each enriched node, in blocks: "node" or "star"."""
     owner = function_nodes(space)
     if kind == "star" and space.order == 2:
@@ -70,7 +70,7 @@ def node_blocks(space: Space, kind: str) -> Blocks:
     return Blocks(members, offsets((1 + counts) * d), np.full(len(nodes), d))
 
 
-def _star_home(space: Space, c: int, nodes: Ints) -> Ints:
+def _star_home(space: FunctionSpace, c: int, nodes: Ints) -> Ints:
     mesh, cut = space.mesh, space.cuts[c]
     n = mesh.n_points
     home = nodes.copy()
@@ -169,7 +169,7 @@ def stars(mesh: Mesh, order: int) -> sp.csr_matrix:
 
 
 def patch_orthogonal(
-    space: Space, K: sp.csr_matrix, free: Bools, around: str = "cells"
+    space: FunctionSpace, K: sp.csr_matrix, free: Bools, around: str = "cells"
 ) -> sp.csr_matrix:
     """Basis in which tip functions are orthogonal to the functions around them.
 

@@ -24,7 +24,7 @@ from xcrack.solvers.engine import ContactRows, Count, StateContact
 from xcrack.solvers.factor import Elimination, Solve, eliminated
 from xcrack.solvers.modal_basis import mode_columns
 from xcrack.solvers.reuse import Reuse
-from xcrack.xfem.function_space import Space
+from xcrack.xfem.function_space import FunctionSpace
 
 _WRONG = 1e-3  # residual of a user's solver, relative, that is not a solution
 _COARSE = 1e-8  # and one that limits what follows
@@ -148,7 +148,7 @@ class System:
 
 
 def system(
-    space: Space,
+    space: FunctionSpace,
     K: sp.csr_matrix,
     fixed: Bools,
     numerics: Numerics,
@@ -197,7 +197,7 @@ def _verified(solver: Solver, A: sp.csc_matrix) -> Solve:
 
 
 def scaled_basis(
-    space: Space,
+    space: FunctionSpace,
     K: sp.csr_matrix,
     fixed: Bools,
     numerics: Numerics,
@@ -211,7 +211,11 @@ def scaled_basis(
 
 
 def _reduced(
-    space: Space, K: sp.csr_matrix, fixed: Bools, numerics: Numerics, material: Isotropic | None
+    space: FunctionSpace,
+    K: sp.csr_matrix,
+    fixed: Bools,
+    numerics: Numerics,
+    material: Isotropic | None,
 ) -> tuple[sp.csr_matrix, sp.csc_matrix, Ints]:
     """Columns scaled to energy one, K in them, and the last unknown in each of them.
 
@@ -264,7 +268,11 @@ def _arrays(A: sp.csr_matrix | sp.csc_matrix) -> tuple[Ints, Ints, Floats]:
 
 
 def _enriched_columns(
-    space: Space, K: sp.csr_matrix, free: Bools, numerics: Numerics, material: Isotropic | None
+    space: FunctionSpace,
+    K: sp.csr_matrix,
+    free: Bools,
+    numerics: Numerics,
+    material: Isotropic | None,
 ) -> sp.csr_matrix:
     """The columns of the solver's basis for enriched unknowns `(n_dof, k)`, not yet scaled."""
     n = space.n_dof

@@ -28,7 +28,7 @@ from xcrack.solvers.reuse import Reuse
 from xcrack.solvers.row_blocks import Bordered, row_blocks
 from xcrack.solvers.schwarz import star_patches
 from xcrack.xfem.assembly import Bulk
-from xcrack.xfem.function_space import Space
+from xcrack.xfem.function_space import FunctionSpace
 
 _ROUGH = 0.02  # residual of a first solution that only shows which faces overlap
 _LEAST_SHARE = 1e-4  # of the load, to which forces are resolved; round-off forbids much less
@@ -195,7 +195,7 @@ class IterativeSystem:
 
 
 def iterative_system(
-    space: Space,
+    space: FunctionSpace,
     K: sp.csr_matrix,
     bulk: Bulk,
     fixed: Bools,
@@ -207,7 +207,7 @@ def iterative_system(
 
     Parameters
     ----------
-    space : Space
+    space : FunctionSpace
     K : sparse matrix (n_dof, n_dof)
         Stiffness of all unknowns.
     bulk : Bulk
@@ -255,7 +255,7 @@ def iterative_system(
 
 
 def _apart(
-    space: Space, K: sp.csr_matrix, modes: sp.csr_matrix | None, free: Bools
+    space: FunctionSpace, K: sp.csr_matrix, modes: sp.csr_matrix | None, free: Bools
 ) -> tuple[sp.csr_matrix, sp.csr_matrix]:
     """Basis in which tip functions are orthogonal to the functions of their star; its inverse."""
     if modes is None:
@@ -271,7 +271,7 @@ def _apart(
 
 
 def _enriched_basis(
-    space: Space,
+    space: FunctionSpace,
     K: sp.csr_matrix,
     blocks: Blocks,
     levels: Hierarchy,

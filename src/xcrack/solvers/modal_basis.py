@@ -13,12 +13,12 @@ from scipy.spatial import cKDTree
 from xcrack.arrays import Bools, Floats, Ints, lock
 from xcrack.errors import ProblemError
 from xcrack.scene.material import Isotropic
-from xcrack.xfem.function_space import Space, Tip
+from xcrack.xfem.function_space import FunctionSpace, Tip
 from xcrack.xfem.williams import mode_matrix
 
 
 def mode_columns(
-    space: Space, material: Isotropic | None, free: Bools
+    space: FunctionSpace, material: Isotropic | None, free: Bools
 ) -> tuple[sp.csr_matrix, Bools]:
     """Basis in which each enriched point has one unknown a mode, and which columns are in use.
 
@@ -29,7 +29,7 @@ def mode_columns(
 
     Parameters
     ----------
-    space : Space
+    space : FunctionSpace
         With four functions a tip.
     material : Isotropic or None
         The angular part of the modes depends on Poisson's ratio.
@@ -86,7 +86,7 @@ def local_modes(kolosov: float, dim: int) -> Floats:
     return modes
 
 
-def _frames(space: Space, tip: Tip, points: Ints) -> Floats:
+def _frames(space: FunctionSpace, tip: Tip, points: Ints) -> Floats:
     """Frames at mesh points: those of the tip, or in space of the nearest vertex of the front."""
     if tip.frame.ndim == 2:
         return np.broadcast_to(tip.frame, (len(points), *tip.frame.shape))

@@ -11,7 +11,7 @@ from xcrack.arrays import Bools, Floats, Ints
 from xcrack.errors import ProblemError
 from xcrack.xfem.assembly import rigid_modes
 from xcrack.xfem.facets import split_facets
-from xcrack.xfem.function_space import Space
+from xcrack.xfem.function_space import FunctionSpace
 
 _IMBALANCE = 1e-3  # share of the sum of all forces above which loads count as out of balance
 
@@ -32,7 +32,7 @@ class Motion:
     pins: Ints
 
 
-def free_motion(space: Space, fixed: Bools) -> Motion:
+def free_motion(space: FunctionSpace, fixed: Bools) -> Motion:
     """Rigid motions left by the supports, and far standard unknowns to pin."""
     if any(cut.n_tips == 0 for cut in space.cuts):
         _check_pieces(space, fixed)
@@ -64,7 +64,7 @@ def free_motion(space: Space, fixed: Bools) -> Motion:
     return Motion(modes, candidates[pivots[: null.shape[1]]])
 
 
-def balanced(space: Space, motion: Motion, f: Floats) -> tuple[Floats, float]:
+def balanced(space: FunctionSpace, motion: Motion, f: Floats) -> tuple[Floats, float]:
     """Loads without their small resultants, and the share that was removed.
 
     Raises
@@ -97,7 +97,7 @@ def balanced(space: Space, motion: Motion, f: Floats) -> tuple[Floats, float]:
     return f - correction, share
 
 
-def _total(space: Space, f: Floats) -> float:
+def _total(space: FunctionSpace, f: Floats) -> float:
     """Sum of all forces; pressure on lips acts on the jumps of enriched functions alone."""
     size = np.linalg.norm(f.reshape(-1, space.dim), axis=1)
     total = float(size[: space.n_nodes].sum())
@@ -115,7 +115,7 @@ def without_motion(motion: Motion, u: Floats) -> Floats:
     return np.asarray(u - motion.modes @ (motion.modes.T @ u))
 
 
-def _check_pieces(space: Space, fixed: Bools) -> None:
+def _check_pieces(space: FunctionSpace, fixed: Bools) -> None:
     """Raise where a crack cuts off a piece that nothing holds."""
     piece_of_node, n_pieces, volume = pieces(space)
     if n_pieces == 1:
@@ -135,7 +135,7 @@ def _check_pieces(space: Space, fixed: Bools) -> None:
             )
 
 
-def pieces(space: Space) -> tuple[Ints, int, Floats]:
+def pieces(space: FunctionSpace) -> tuple[Ints, int, Floats]:
     """Connected pieces of the cut body: piece of each node, their number, shares of volume."""
     mesh = space.mesh
     m = len(mesh.cells)

@@ -16,7 +16,7 @@ import scipy.sparse as sp
 
 from xcrack.arrays import Floats, Ints, lock, offsets
 from xcrack.solvers.basis import stars
-from xcrack.xfem.function_space import Space
+from xcrack.xfem.function_space import FunctionSpace
 
 _LEAST = 1e-6  # of a block's largest eigenvalue: single precision resolves no more
 
@@ -55,7 +55,7 @@ class Patches:
 
 
 def star_patches(
-    space: Space,
+    space: FunctionSpace,
     home: Ints,
     n_standard: int,
     diagonal: Floats,
@@ -65,7 +65,7 @@ def star_patches(
 
     Parameters
     ----------
-    space : Space
+    space : FunctionSpace
     home : (n,) array of int
         Node at which each unknown of the matrix is at home, -1 for decoupled ones.
     n_standard : int
@@ -84,7 +84,7 @@ def star_patches(
     return Patches(*map(lock, (*short, offset, inverse, alone)))
 
 
-def _members(space: Space, home: Ints, n_standard: int) -> tuple[Ints, Ints]:
+def _members(space: FunctionSpace, home: Ints, n_standard: int) -> tuple[Ints, Ints]:
     """Unknowns of each star, one star after the other, and where each begins."""
     n = space.mesh.n_points
     enriched = np.unique(home[n_standard:])

@@ -11,7 +11,7 @@ from xcrack.mesh.simplex import cell_nodes, shape_derivatives, simplex_rule
 from xcrack.scene.material import Isotropic
 from xcrack.scene.numerics import Numerics
 from xcrack.xfem.consistent import boundary_points, corrected
-from xcrack.xfem.function_space import Space
+from xcrack.xfem.function_space import FunctionSpace
 from xcrack.xfem.kept_cells import KeptCells, kept_cells, with_one_jump
 from xcrack.xfem.lips import LipPoints
 from xcrack.xfem.quadrature import Points, cell_points
@@ -64,7 +64,7 @@ def bulk(mesh: Mesh, material: Isotropic, order: int) -> Bulk:
 
 
 def enriched_stiffness(
-    space: Space,
+    space: FunctionSpace,
     material: Isotropic,
     numerics: Numerics,
     lips: tuple[LipPoints, ...],
@@ -133,7 +133,7 @@ def enriched_stiffness(
     return matrix, n_points + len(points.weight), kept
 
 
-def _functions(space: Space, cells: Ints) -> Ints:
+def _functions(space: FunctionSpace, cells: Ints) -> Ints:
     """Functions that act on cells, in rows of one length."""
     parts = [batch.functions for batch, _ in space.batches(cells)]
     width = max(part.shape[1] for part in parts)
@@ -141,7 +141,7 @@ def _functions(space: Space, cells: Ints) -> Ints:
     return np.concatenate(filled)
 
 
-def _chunks(space: Space, points: Points, cells: Ints) -> list[Ints]:
+def _chunks(space: FunctionSpace, points: Points, cells: Ints) -> list[Ints]:
     counts = np.searchsorted(points.cell, cells, side="right") - np.searchsorted(points.cell, cells)
     group = np.cumsum(counts) // _CHUNK
     return [cells[group == g] for g in np.unique(group)]

@@ -14,7 +14,7 @@ import numpy as np
 from xcrack.arrays import Floats, Ints, ranges
 from xcrack.cutting.cut import Cut
 from xcrack.xfem.facets import part_points, split_facets
-from xcrack.xfem.function_space import Batch, Space
+from xcrack.xfem.function_space import Batch, FunctionSpace
 from xcrack.xfem.lips import LipPoints
 from xcrack.xfem.quadrature import cell_side
 
@@ -41,7 +41,9 @@ class BoundaryPoints:
     piece_side: Ints
 
 
-def boundary_points(space: Space, cells: Ints, lips: tuple[LipPoints, ...]) -> BoundaryPoints:
+def boundary_points(
+    space: FunctionSpace, cells: Ints, lips: tuple[LipPoints, ...]
+) -> BoundaryPoints:
     """Points on all facets and lips of the pieces of the given cells, sorted by cell."""
     parts = [_facet_points(space, cells)]
     wanted = np.zeros(len(space.mesh.cells), dtype=bool)
@@ -56,7 +58,7 @@ def boundary_points(space: Space, cells: Ints, lips: tuple[LipPoints, ...]) -> B
 _Part = tuple[Ints, Floats, Floats, Ints, Ints]
 
 
-def _facet_points(space: Space, cells: Ints) -> _Part:
+def _facet_points(space: FunctionSpace, cells: Ints) -> _Part:
     """Points on the facets of cells, split where a crack crosses them."""
     mesh = space.mesh
     facet_ids, inverse = np.unique(mesh.cell_to_facet[cells].ravel(), return_inverse=True)
@@ -92,7 +94,9 @@ def _facet_points(space: Space, cells: Ints) -> _Part:
     return cell, bary, normal, side, piece_side
 
 
-def _lip_parts(space: Space, c: int, cut: Cut, lips: LipPoints, wanted: np.ndarray) -> list[_Part]:
+def _lip_parts(
+    space: FunctionSpace, c: int, cut: Cut, lips: LipPoints, wanted: np.ndarray
+) -> list[_Part]:
     parts = []
     same = lips.cell[:, 0] == lips.cell[:, 1]
     for s, sign in ((0, -1), (1, 1)):
@@ -108,7 +112,7 @@ def _lip_parts(space: Space, c: int, cut: Cut, lips: LipPoints, wanted: np.ndarr
 
 
 def corrected(
-    space: Space,
+    space: FunctionSpace,
     batch: Batch,
     points: tuple[Ints, Floats, Floats, Ints],
     values: Floats,
@@ -157,7 +161,7 @@ def corrected(
     return gradients
 
 
-def _pieces(space: Space, batch: Batch, row: Ints, side: Ints) -> tuple[Ints, int]:
+def _pieces(space: FunctionSpace, batch: Batch, row: Ints, side: Ints) -> tuple[Ints, int]:
     plus = np.zeros(len(row), dtype=bool)
     for c, cut in enumerate(space.cuts):
         plus |= cut.is_cut[batch.cells][row] & (side[:, c] > 0)

@@ -6,7 +6,7 @@ import numpy as np
 
 from xcrack.arrays import Bools, Floats, Ints
 from xcrack.mesh.split import cut_simplices
-from xcrack.xfem.function_space import Space
+from xcrack.xfem.function_space import FunctionSpace
 from xcrack.xfem.quadrature import segment_points
 from xcrack.xfem.quadrature_3d import radius_at, triangle_points
 
@@ -32,7 +32,7 @@ class FacetParts:
     side: Ints
 
 
-def split_facets(space: Space, ends: Ints) -> FacetParts:
+def split_facets(space: FunctionSpace, ends: Ints) -> FacetParts:
     """Split facets `(k, d)`, given by their points, where cracks cross them.
 
     In space those of cells at a front are split along psi too.
@@ -40,14 +40,16 @@ def split_facets(space: Space, ends: Ints) -> FacetParts:
     return _split_segments(space, ends) if space.dim == 2 else _split_triangles(space, ends)
 
 
-def part_points(space: Space, nodes: Ints, bary: Floats, n: int = 6) -> tuple[Ints, Floats, Floats]:
+def part_points(
+    space: FunctionSpace, nodes: Ints, bary: Floats, n: int = 6
+) -> tuple[Ints, Floats, Floats]:
     """Integration points on segments or triangles inside simplices, graded towards tips.
 
     The rule depends only on the part, so that the cells on both sides of a facet share it.
 
     Parameters
     ----------
-    space : Space
+    space : FunctionSpace
     nodes : (s, m) array of int
         Points of the facets or cells that the parts lie in.
     bary : (s, d, m) array
@@ -79,7 +81,7 @@ def part_points(space: Space, nodes: Ints, bary: Floats, n: int = 6) -> tuple[In
     return number, place[order], area[number] * share[order]
 
 
-def _split_segments(space: Space, ends: Ints) -> FacetParts:
+def _split_segments(space: FunctionSpace, ends: Ints) -> FacetParts:
     edge = _edge_numbers(space, ends)
     k = len(ends)
     position = np.full(k, np.nan)
@@ -104,14 +106,14 @@ def _split_segments(space: Space, ends: Ints) -> FacetParts:
     return FacetParts(number, bary, side)
 
 
-def _edge_numbers(space: Space, ends: Ints) -> Ints:
+def _edge_numbers(space: FunctionSpace, ends: Ints) -> Ints:
     edges, n = space.mesh.edges, space.mesh.n_points
     key = edges[:, 0] * np.int64(n) + edges[:, 1]
     low, high = np.sort(ends, axis=1).T
     return np.searchsorted(key, low * np.int64(n) + high)
 
 
-def _split_triangles(space: Space, ends: Ints) -> FacetParts:
+def _split_triangles(space: FunctionSpace, ends: Ints) -> FacetParts:
     k = len(ends)
     number, bary = np.arange(k), np.broadcast_to(np.eye(3), (k, 3, 3))
     side = np.zeros((k, len(space.cuts)), dtype=np.int64)
@@ -130,7 +132,7 @@ def _split_triangles(space: Space, ends: Ints) -> FacetParts:
     return FacetParts(number, bary, side)
 
 
-def _touched(space: Space, c: int) -> tuple[Bools, Bools]:
+def _touched(space: FunctionSpace, c: int) -> tuple[Bools, Bools]:
     """Facets of the cells that crack c cuts or ends in, and of the latter alone."""
     mesh, cut = space.mesh, space.cuts[c]
     flags = []

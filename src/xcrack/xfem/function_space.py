@@ -70,7 +70,7 @@ class Batch:
 
 
 @dataclass(frozen=True, eq=False)
-class Space:
+class FunctionSpace:
     """Functions on a mesh with cracks.
 
     Attributes
@@ -279,9 +279,9 @@ def fronts(crack: Crack) -> tuple[list[Floats], list[Floats]]:
     return [front.x for front in every], [front.frame for front in every]
 
 
-def space(
+def function_space(
     mesh: Mesh, order: int, cracks: tuple[Crack, ...], cuts: tuple[Cut, ...], numerics: Numerics
-) -> Space:
+) -> FunctionSpace:
     """Number the functions: standard ones first, then Heaviside by crack, then tips."""
     for c, (crack, cut) in enumerate(zip(cracks, cuts, strict=True)):
         if not len(cut.lip_cell):
@@ -309,4 +309,4 @@ def space(
             number[flag] = count + numerics.functions * np.arange(int(flag.sum()))
             count += numerics.functions * int(flag.sum())
             tips.append(Tip(c, k, x[k], frame[k], radii[c][k], numerics.functions, lock(number)))
-    return Space(mesh, order, cracks, cuts, tuple(heaviside), tuple(tips), n_nodes, count)
+    return FunctionSpace(mesh, order, cracks, cuts, tuple(heaviside), tuple(tips), n_nodes, count)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from xcrack.arrays import Bools, Floats, Ints
-from xcrack.xfem.function_space import Space
+from xcrack.xfem.function_space import FunctionSpace
 from xcrack.xfem.quadrature import cell_points
 
 
@@ -32,18 +32,18 @@ class KeptCells:
     products: Floats
 
 
-def with_one_jump(space: Space, cells: Ints) -> Bools:
+def with_one_jump(space: FunctionSpace, cells: Ints) -> Bools:
     """On which cells the Heaviside functions of one crack act, and nothing else."""
     mask = space.signature[cells]
     return np.asarray((mask & (mask - 1) == 0) & (mask < 1 << len(space.cuts)))
 
 
-def kept_cells(space: Space, cells: Ints, known: KeptCells | None) -> tuple[KeptCells, int]:
+def kept_cells(space: FunctionSpace, cells: Ints, known: KeptCells | None) -> tuple[KeptCells, int]:
     """Integrate cells with one jump, but those that are known already.
 
     Parameters
     ----------
-    space : Space
+    space : FunctionSpace
     cells : (m,) array of int
         Growing.
     known : KeptCells, optional
@@ -73,7 +73,7 @@ def kept_cells(space: Space, cells: Ints, known: KeptCells | None) -> tuple[Kept
     return KeptCells(cells, key, products), len(points.weight)
 
 
-def _keys(space: Space, cells: Ints) -> Floats:
+def _keys(space: FunctionSpace, cells: Ints) -> Floats:
     """Crack, its level set, the nodes with its function.
 
     Side and sub-cells of a cell without a tip follow from the level set at its corners alone, and

@@ -7,7 +7,7 @@ import scipy.sparse as sp
 
 from xcrack.arrays import Floats, Ints
 from xcrack.xfem.facets import part_points
-from xcrack.xfem.function_space import Space
+from xcrack.xfem.function_space import FunctionSpace
 from xcrack.xfem.quadrature import cell_side
 
 
@@ -42,7 +42,7 @@ class LipPoints:
         return len(self.weight)
 
 
-def lip_points(space: Space, c: int, n: int = 6) -> LipPoints:
+def lip_points(space: FunctionSpace, c: int, n: int = 6) -> LipPoints:
     """Points on the lips of crack c, graded towards its tips, in the order of the crack."""
     cut, mesh = space.cuts[c], space.mesh
     bary = cut.lip_bary
@@ -82,7 +82,7 @@ def arc_position(polyline: Floats, x: Floats) -> Floats:
     return start[best] + t[row, best] * length[best]
 
 
-def jump_values(space: Space, c: int, lips: LipPoints) -> list[tuple[Ints, Ints, Floats]]:
+def jump_values(space: FunctionSpace, c: int, lips: LipPoints) -> list[tuple[Ints, Ints, Floats]]:
     """Signed traces of the functions on both lips: + lip minus - lip.
 
     Returns
@@ -101,7 +101,7 @@ def jump_values(space: Space, c: int, lips: LipPoints) -> list[tuple[Ints, Ints,
     return result
 
 
-def jump_matrix(space: Space, c: int, lips: LipPoints) -> sp.csr_matrix:
+def jump_matrix(space: FunctionSpace, c: int, lips: LipPoints) -> sp.csr_matrix:
     """Normal jump n . [[u]] at the lip points `(q, n_dof)`."""
     rows, columns, values = [], [], []
     for functions, number, N in jump_values(space, c, lips):

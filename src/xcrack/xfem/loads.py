@@ -18,12 +18,14 @@ from xcrack.scene.conditions import (
     evaluate_stress,
 )
 from xcrack.xfem.facets import part_points, split_facets
-from xcrack.xfem.function_space import Space
+from xcrack.xfem.function_space import FunctionSpace
 from xcrack.xfem.lips import LipPoints, jump_values
 from xcrack.xfem.quadrature import Points, cell_points, cell_side
 
 
-def load_vector(space: Space, loads: tuple[Load, ...], lips: tuple[LipPoints, ...]) -> Floats:
+def load_vector(
+    space: FunctionSpace, loads: tuple[Load, ...], lips: tuple[LipPoints, ...]
+) -> Floats:
     """Sum of the given loads, tested with every function `(n_dof,)`; displacements are skipped."""
     f = np.zeros((space.n_functions, space.dim))
     for load in loads:
@@ -46,7 +48,7 @@ def load_vector(space: Space, loads: tuple[Load, ...], lips: tuple[LipPoints, ..
     return f.ravel()
 
 
-def position(space: Space, cell: Ints, bary: Floats) -> Floats:
+def position(space: FunctionSpace, cell: Ints, bary: Floats) -> Floats:
     """Coordinates of points given by cell and barycentric coordinates."""
     corners = space.mesh.points[space.mesh.cells[cell]]
     x = bary[:, 0, None] * corners[:, 0]
@@ -55,7 +57,7 @@ def position(space: Space, cell: Ints, bary: Floats) -> Floats:
     return x
 
 
-def _add(f: Floats, space: Space, points: Points, density: Floats) -> None:
+def _add(f: Floats, space: FunctionSpace, points: Points, density: Floats) -> None:
     """Add the integral of density . v over the points."""
     cells = np.unique(points.cell)
     for batch, _ in space.batches(cells):
@@ -70,13 +72,13 @@ def _scatter(f: Floats, functions: Ints, force: Floats) -> None:
     np.add.at(f, functions[active], force[active])
 
 
-def _body_points(space: Space) -> Points:
+def _body_points(space: FunctionSpace) -> Points:
     cells = np.arange(len(space.mesh.cells))
     # Loads are not corrected as the stiffness is: they need a degree more near tips.
     return cell_points(space, cells, 5, space.order + 2)
 
 
-def facet_points(space: Space, facets: Ints, n: int = 6) -> tuple[Points, Floats]:
+def facet_points(space: FunctionSpace, facets: Ints, n: int = 6) -> tuple[Points, Floats]:
     """Points on boundary facets with their outward normals; weights are lengths or areas."""
     mesh = space.mesh
     number = mesh.facet_numbers(facets)
@@ -100,7 +102,7 @@ def facet_points(space: Space, facets: Ints, n: int = 6) -> tuple[Points, Floats
     return Points(c[order], bary[order], weight[order], side[order]), normal[order]
 
 
-def _add_traction(f: Floats, space: Space, load: Traction | Pressure) -> None:
+def _add_traction(f: Floats, space: FunctionSpace, load: Traction | Pressure) -> None:
     what = f"{type(load).__name__.lower()}({load.where!r})"
     facets = facet_set(space.mesh, load.where, what)
     inner = space.mesh.facet_to_cell[space.mesh.facet_numbers(facets), 1] >= 0
@@ -118,7 +120,7 @@ def _add_traction(f: Floats, space: Space, load: Traction | Pressure) -> None:
     _add(f, space, points, density)
 
 
-def _add_initial_stress(f: Floats, space: Space, load: InitialStress) -> None:
+def _add_initial_stress(f: Floats, space: FunctionSpace, load: InitialStress) -> None:
     """Subtract the integral of sigma0 : grad v."""
     points = _body_points(space)
     sigma = evaluate_stress(load.value, position(space, points.cell, points.bary))
@@ -129,7 +131,7 @@ def _add_initial_stress(f: Floats, space: Space, load: InitialStress) -> None:
         _scatter(f, batch.functions[row], force)
 
 
-def lip_force(space: Space, c: int, lips: LipPoints, force: Floats) -> Floats:
+def lip_force(space: FunctionSpace, c: int, lips: LipPoints, force: Floats) -> Floats:
     """Integral of force . [[v]] over the lips of crack c `(n_functions, d)`.
 
     Parameters

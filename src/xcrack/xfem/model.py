@@ -15,7 +15,7 @@ from xcrack.scene.numerics import Numerics
 from xcrack.scene.problem import Problem
 from xcrack.xfem.assembly import Bulk, bulk, enriched_stiffness, total_stiffness
 from xcrack.xfem.enrichment_3d import front_reach
-from xcrack.xfem.function_space import Space, space
+from xcrack.xfem.function_space import FunctionSpace, function_space
 from xcrack.xfem.lips import LipPoints, jump_matrix, lip_points
 from xcrack.xfem.supports import Known, known_unknowns
 
@@ -26,7 +26,7 @@ class Model:
 
     Attributes
     ----------
-    space : Space
+    space : FunctionSpace
     lips : tuple of LipPoints
     bulk : Bulk
     stiffness : sparse matrix
@@ -35,7 +35,7 @@ class Model:
         Integration points of the enriched cells.
     """
 
-    space: Space
+    space: FunctionSpace
     lips: tuple[LipPoints, ...]
     bulk: Bulk
     stiffness: Any
@@ -53,8 +53,8 @@ def build(problem: Problem, bulk_: Bulk | None = None) -> Model:
     mesh, order = problem.mesh, problem.order or 1
     cracks = problem.placed
     cuts = tuple(cut(mesh, levels(mesh, crack, problem.numerics)) for crack in cracks)
-    space_ = space(mesh, order, cracks, cuts, problem.numerics)
-    lips = tuple(lip_points(space_, c) for c in range(len(cracks)))
+    space = function_space(mesh, order, cracks, cuts, problem.numerics)
+    lips = tuple(lip_points(space, c) for c in range(len(cracks)))
     if (
         bulk_ is None
         or bulk_.mesh is not mesh
@@ -63,14 +63,14 @@ def build(problem: Problem, bulk_: Bulk | None = None) -> Model:
     ):
         bulk_ = bulk(mesh, problem.material, order)
     enriched, n_points, kept = enriched_stiffness(
-        space_, problem.material, problem.numerics, lips, bulk_.cells
+        space, problem.material, problem.numerics, lips, bulk_.cells
     )
     return Model(
-        space_,
+        space,
         lips,
         replace(bulk_, cells=kept),
         total_stiffness(bulk_, enriched),
-        known_unknowns(space_, tuple(problem.supports)),
+        known_unknowns(space, tuple(problem.supports)),
         n_points,
     )
 

@@ -13,7 +13,7 @@ from xcrack.arrays import Bools, Floats, Ints, offsets, ranges
 from xcrack.errors import GeometryError
 from xcrack.mesh.locate import closest_on_segment
 from xcrack.mesh.simplex import SYMMETRIC, gauss, simplex_rule
-from xcrack.xfem.function_space import Space
+from xcrack.xfem.function_space import FunctionSpace
 from xcrack.xfem.quadrature_3d import front_points
 
 _LEVELS = 5  # bisections towards a tip before the fan takes over
@@ -75,7 +75,7 @@ class SubCells:
     fan: np.ndarray
 
 
-def sub_cells(space: Space, cells: Ints) -> SubCells:
+def sub_cells(space: FunctionSpace, cells: Ints) -> SubCells:
     """Sub-cells of the given cells, in their order."""
     mesh = space.mesh
     base = cell_side(space, cells)
@@ -108,19 +108,19 @@ def sub_cells(space: Space, cells: Ints) -> SubCells:
     return SubCells(cells[owner[order]], bary[order], fraction[order], side[order], fan[order])
 
 
-def cell_side(space: Space, cells: Ints) -> Ints:
+def cell_side(space: FunctionSpace, cells: Ints) -> Ints:
     """Side of each crack on which cells lie `(k, cracks)`, 0 where a crack crosses them."""
     if not space.cuts:
         return np.zeros((len(cells), 0), dtype=np.int64)
     return np.stack([cut.side[cells] for cut in space.cuts], axis=1)
 
 
-def cell_points(space: Space, cells: Ints, n: int, degree: int) -> Points:
+def cell_points(space: FunctionSpace, cells: Ints, n: int, degree: int) -> Points:
     """Integration points of cells, sorted by cell.
 
     Parameters
     ----------
-    space : Space
+    space : FunctionSpace
     cells : (k,) array of int, increasing
     n : int
         Points a direction where tip functions act.
@@ -166,7 +166,9 @@ def cell_points(space: Space, cells: Ints, n: int, degree: int) -> Points:
     )
 
 
-def _sorted(space: Space, subs: SubCells, numbers: Ints, every: Floats, part: Floats) -> Points:
+def _sorted(
+    space: FunctionSpace, subs: SubCells, numbers: Ints, every: Floats, part: Floats
+) -> Points:
     """Points of sub-cells, sorted by cell and sub-cell."""
     cell = subs.cell[numbers]
     order = np.lexsort((numbers, cell))
@@ -176,7 +178,7 @@ def _sorted(space: Space, subs: SubCells, numbers: Ints, every: Floats, part: Fl
     )
 
 
-def _from_tips(space: Space, cell: Ints, bary: Floats) -> Floats:
+def _from_tips(space: FunctionSpace, cell: Ints, bary: Floats) -> Floats:
     """Vertices of simplices, those nearer to a tip first.
 
     A conical rule is not symmetric: with an order that geometry decides, points do not depend
@@ -191,7 +193,9 @@ def _from_tips(space: Space, cell: Ints, bary: Floats) -> Floats:
 _Fans = tuple[Ints, Floats, Floats]
 
 
-def _towards_tips(space: Space, subs: SubCells, rows: Ints) -> tuple[Ints, Floats, Floats, _Fans]:
+def _towards_tips(
+    space: FunctionSpace, subs: SubCells, rows: Ints
+) -> tuple[Ints, Floats, Floats, _Fans]:
     """Bisect sub-cells until they are no larger than their distance to a tip."""
     from xcrack.kernels.bisect import bisect
 
@@ -248,7 +252,9 @@ def _fan_around(number: Ints, bary: Floats, share: Floats, x: Floats, tip: Float
     )
 
 
-def _fan_points(space: Space, subs: SubCells, fans: _Fans, n: int) -> tuple[Ints, Floats, Floats]:
+def _fan_points(
+    space: FunctionSpace, subs: SubCells, fans: _Fans, n: int
+) -> tuple[Ints, Floats, Floats]:
     """Sweep triangles from vertex 0 in sectors, x = A + s² (E - A), E on the far side.
 
     Exact for polynomials, and for products of derivatives of the tip functions along r; the
@@ -293,7 +299,7 @@ class SegmentPoints:
 
 
 def segment_points(
-    space: Space, begin: Floats, end: Floats, n: int = _EDGE_POINTS
+    space: FunctionSpace, begin: Floats, end: Floats, n: int = _EDGE_POINTS
 ) -> SegmentPoints:
     """Gauss points on segments `(k, 2)`, graded towards a tip that is closer than their length.
 

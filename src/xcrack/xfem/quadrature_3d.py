@@ -19,7 +19,7 @@ import numpy as np
 from xcrack.arrays import Floats, Ints, lock
 from xcrack.mesh.mesh import local_edges
 from xcrack.mesh.simplex import gauss, simplex_rule
-from xcrack.xfem.function_space import Space
+from xcrack.xfem.function_space import FunctionSpace
 
 _AT = 1e-9  # share of a sub-cell's size below which a vertex lies on the front
 _FAR = 0.7  # distance to the front, in sizes of the sub-cell, beyond which a rule of degree 2 does
@@ -27,12 +27,12 @@ _TINY = 0.01  # sub-cells below this share of their cell get fewer points
 _NEAR = 0.5  # triangles closer to the front, in their sizes, are cut in four
 
 
-def radius_at(space: Space, nodes: Ints, bary: Floats) -> Floats:
+def radius_at(space: FunctionSpace, nodes: Ints, bary: Floats) -> Floats:
     """Distance to the nearest front `(k, v)`, from the level sets as they are interpolated.
 
     Parameters
     ----------
-    space : Space
+    space : FunctionSpace
     nodes : (k, m) array of int
         Mesh points of simplices.
     bary : (k, v, m) array
@@ -48,13 +48,13 @@ def radius_at(space: Space, nodes: Ints, bary: Floats) -> Floats:
 
 
 def front_points(
-    space: Space, cell: Ints, bary: Floats, share: Floats, n: int
+    space: FunctionSpace, cell: Ints, bary: Floats, share: Floats, n: int
 ) -> tuple[Ints, Floats, Floats]:
     """Points in sub-cells on which tip functions act.
 
     Parameters
     ----------
-    space : Space
+    space : FunctionSpace
     cell : (s,) array of int
     bary : (s, 4, 4) array
         Vertices of the sub-cells in their cells.

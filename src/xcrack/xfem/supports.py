@@ -9,7 +9,7 @@ from xcrack.errors import ProblemError
 from xcrack.mesh.sets import facet_set, nearest_point
 from xcrack.mesh.simplex import facet_nodes
 from xcrack.scene.conditions import Displacement, Fix, evaluate
-from xcrack.xfem.function_space import Space
+from xcrack.xfem.function_space import FunctionSpace
 from xcrack.xfem.loads import facet_points, position
 from xcrack.xfem.quadrature import Points
 
@@ -31,7 +31,7 @@ class Known:
     value: Floats
 
 
-def known_unknowns(space: Space, supports: tuple[Fix | Displacement, ...]) -> Known:
+def known_unknowns(space: FunctionSpace, supports: tuple[Fix | Displacement, ...]) -> Known:
     """Unknowns decided by the supports.
 
     Raises
@@ -57,7 +57,7 @@ def known_unknowns(space: Space, supports: tuple[Fix | Displacement, ...]) -> Kn
 
 
 def _impose(
-    space: Space,
+    space: FunctionSpace,
     fixed: Bools,
     value: Floats,
     fitted: Bools,
@@ -84,14 +84,14 @@ def _impose(
     fitted[functions[~again], axis] = from_fit[~again]
 
 
-def _set_nodes(space: Space, where: object, what: str) -> Ints:
+def _set_nodes(space: FunctionSpace, where: object, what: str) -> Ints:
     if isinstance(where, str):
         facets = facet_set(space.mesh, where, what)
         return np.unique(facet_nodes(space.mesh, space.order, facets))
     return np.array([nearest_point(space.mesh, np.asarray(where), what)])
 
 
-def _functions_of(space: Space, where: object, what: str) -> Ints:
+def _functions_of(space: FunctionSpace, where: object, what: str) -> Ints:
     """Functions that act on a set: standard ones, and enriched ones with a trace there.
 
     At a point only the standard function has a value, and that of a jump on the crack.
@@ -112,7 +112,7 @@ def _functions_of(space: Space, where: object, what: str) -> Ints:
     return np.unique(np.concatenate(parts))
 
 
-def _check_ends(space: Space, where: str, facets: Ints, what: str) -> None:
+def _check_ends(space: FunctionSpace, where: str, facets: Ints, what: str) -> None:
     """Raise where a set ends at a point on a crack and holds its lip - there.
 
     The functions of such a point are those of lip + and of the jump: only their sum is known.
@@ -135,7 +135,7 @@ def _check_ends(space: Space, where: str, facets: Ints, what: str) -> None:
             )
 
 
-def _traces(space: Space, facets: Ints) -> tuple[Points, Ints, Ints, Floats]:
+def _traces(space: FunctionSpace, facets: Ints) -> tuple[Points, Ints, Ints, Floats]:
     """Points on facets, and what acts there: function, number of the point, value."""
     points, _ = facet_points(space, facets)
     columns: list[Ints] = []
@@ -152,7 +152,7 @@ def _traces(space: Space, facets: Ints) -> tuple[Points, Ints, Ints, Floats]:
     return points, np.concatenate(columns), np.concatenate(rows), np.concatenate(values)
 
 
-def _imposed(space: Space, support: Displacement) -> list[tuple[int, Ints, Floats, int]]:
+def _imposed(space: FunctionSpace, support: Displacement) -> list[tuple[int, Ints, Floats, int]]:
     """Axis, functions, values and number of fitted values of an imposed displacement."""
     nodes = _set_nodes(space, support.where, "displacement")
     what = f"displacement({support.where!r})"
@@ -175,7 +175,7 @@ def _imposed(space: Space, support: Displacement) -> list[tuple[int, Ints, Float
     return [(axis, functions, values[:, axis], len(fitted)) for axis in axes]
 
 
-def _fit(space: Space, where: str, value: object, what: str) -> tuple[Ints, Floats]:
+def _fit(space: FunctionSpace, where: str, value: object, what: str) -> tuple[Ints, Floats]:
     """Least-squares fit on the facets where enriched functions act, and at nodes on a crack.
 
     Shifted functions vanish at nodes, not between them: fixing only the standard unknowns there
@@ -217,7 +217,7 @@ def _fit(space: Space, where: str, value: object, what: str) -> tuple[Ints, Floa
     return unknowns, solution + rest / scale[:, None]
 
 
-def _scales(space: Space) -> Floats:
+def _scales(space: FunctionSpace) -> Floats:
     """Size of each function: 1, but the root of the radius for those of a tip."""
     scale = np.ones(space.n_functions)
     for tip in space.tips:
