@@ -4,8 +4,9 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from xcrack.crack.crack import front, line_crack
+from xcrack.crack.lines import line_crack
 from xcrack.crack.size_2d import length_inside
+from xcrack.crack.tips_2d import tip_frames
 from xcrack.growth import run as growth
 from xcrack.mesh.box import box
 from xcrack.scene.material import Isotropic
@@ -25,7 +26,7 @@ def plate(cracks=None, size=(60.0, 40.0), n=(60, 40)):
 
 
 def sif(crack, K):
-    x, frame = front(crack)
+    x, frame = tip_frames(crack)
     n = len(x)
     return SIF(
         x=x,

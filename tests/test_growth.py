@@ -6,8 +6,9 @@ from scipy.integrate import quad
 
 import exact
 from growth_fakes import STRESS, mode_I, patch_respond, plate
-from xcrack.crack.crack import front, line_crack
+from xcrack.crack.lines import line_crack
 from xcrack.crack.size_2d import length_inside
+from xcrack.crack.tips_2d import tip_frames
 from xcrack.errors import ProblemError
 from xcrack.growth import run as growth
 from xcrack.growth.criteria import max_hoop_stress, weighted_angle
@@ -154,7 +155,7 @@ def test_short_growth_waits_until_the_mesh_can_see_it(monkeypatch):
     assert da == pytest.approx([0, 0, 0.18, 0, 0, 0.18, 0], abs=1e-12)
     before, after = steps[0].cracks[1], steps[2].cracks[1]
     assert np.array_equal(before.points, after.points)  # not a bit moves while it waits
-    end = front(steps[6].cracks[1])[0][0, 0]
+    end = tip_frames(steps[6].cracks[1])[0][0, 0]
     assert end == pytest.approx(4.36, abs=1e-12)  # and nothing is lost
 
 
@@ -166,7 +167,7 @@ def test_control_by_cycles(monkeypatch):
         assert before.da[0][0] == pytest.approx(1e3 * before.rate[0][0], rel=1e-14)
         # the rate rises within the step, so the same advance takes fewer cycles
         assert 0.7 * 1e3 < after.cycles - before.cycles < 1e3
-    N = exact.paris_life(5.0, front(steps[-1].cracks[0])[0][0, 0], LAW.C, LAW.m, STRESS)
+    N = exact.paris_life(5.0, tip_frames(steps[-1].cracks[0])[0][0, 0], LAW.C, LAW.m, STRESS)
     assert steps[-1].cycles == pytest.approx(N, rel=1e-10)
     capped, _ = run(grow(plate(), LAW, max_hoop_stress, CYCLE, 1.5, cycles=1e9, max_steps=3))
     assert [step.da[0][0] for step in capped] == [1.5, 1.5, 1.5]
@@ -296,7 +297,7 @@ def test_threshold(monkeypatch):
     steps, ended = run(grow(plate(), LAW, max_hoop_stress, CYCLE, da=2.0, threshold=10.0))
     assert ended == "rate is zero: dK_eq is below the threshold 10 at every tip"
     assert steps[-1].rate[0][0] == 0 < steps[-2].rate[0][0]
-    end = front(steps[-1].cracks[0])[0][0, 0]
+    end = tip_frames(steps[-1].cracks[0])[0][0, 0]
     assert end == 11.0
     N = (end**4 - 5.0**4) / 4 / (LAW.C * STRESS**3)
     assert steps[-1].cycles == pytest.approx(N, rel=1e-10)

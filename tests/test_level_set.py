@@ -7,7 +7,9 @@ import pytest
 
 import scenes
 import xcrack as xc
-from xcrack.crack.crack import advance, front, place
+from xcrack.crack.advance_2d import advance
+from xcrack.crack.placing_2d import place_line
+from xcrack.crack.tips_2d import tip_frames
 from xcrack.cutting.cut import cut
 from xcrack.cutting.level_set import level_set
 from xcrack.kernels.distance import polyline_distance
@@ -42,9 +44,9 @@ def test_distance_agrees_with_its_naive_twin():
 
 def test_straight_crack_has_linear_level_sets():
     mesh = scenes.perturbed(9, seed=31)
-    crack = place(scenes.edge_line((0.083, 0.047), 0.41), mesh)
+    crack = place_line(scenes.edge_line((0.083, 0.047), 0.41), mesh)
     levels = level_set(mesh, crack)
-    x, frame = front(crack)
+    x, frame = tip_frames(crack)
     local = (mesh.points - x[0]) @ frame[0].T
     np.testing.assert_allclose(levels.phi, local[:, 1], atol=1e-14)  # round-off
     np.testing.assert_allclose(levels.psi[0], local[:, 0], atol=1e-14)
@@ -61,7 +63,7 @@ def turning(steps, radius, degrees):
 def test_turning_crack_keeps_all_its_faces(degrees):
     """At 200 degrees a purely nodal update loses 7 % of the crack; the polyline loses nothing."""
     mesh = scenes.perturbed(50, seed=77)
-    crack = place(xc.line_crack([(-1.0, -0.503), (-0.05, -0.503)]), mesh)
+    crack = place_line(xc.line_crack([(-1.0, -0.503), (-0.05, -0.503)]), mesh)
     turn, da = turning(40, 0.4, degrees)
     for _ in range(40):
         crack = advance(crack, [turn], [da])
@@ -79,7 +81,7 @@ def test_turning_crack_keeps_all_its_faces(degrees):
 
 def test_old_faces_are_frozen_to_the_last_bit():
     mesh = scenes.perturbed(24, seed=5)
-    before = place(xc.line_crack([(-1.0, 0.013), (0.021, 0.017)]), mesh)
+    before = place_line(xc.line_crack([(-1.0, 0.013), (0.021, 0.017)]), mesh)
     after = advance(before, [0.6], [0.2])
     old, new = level_set(mesh, before), level_set(mesh, after)
     tip = before.points[-1]
@@ -92,7 +94,7 @@ def test_old_faces_are_frozen_to_the_last_bit():
 
 def test_tip_that_does_not_move_is_the_same_to_the_last_bit():
     mesh = scenes.perturbed(24, seed=6)
-    crack = place(xc.line_crack([(-0.4, 0.013), (0.4, 0.11)]), mesh)
+    crack = place_line(xc.line_crack([(-0.4, 0.013), (0.4, 0.11)]), mesh)
     moved = advance(crack, [0.3, 0.2], [0.0, 0.15])
     np.testing.assert_array_equal(moved.points[:2], crack.points)
     assert moved.tips == (0, 2)
@@ -103,7 +105,7 @@ def test_tip_that_does_not_move_is_the_same_to_the_last_bit():
 def test_line_beyond_a_hole_is_no_crack():
     """The ray of a mouth on a hole meets the body again on the far side: nothing is cut there."""
     mesh = xc.read_mesh(EXAMPLE_MESHES / "plate_with_hole_05.msh")
-    crack = place(xc.line_crack([(1.0, 0.0), (2.4, 0.0)]), mesh)
+    crack = place_line(xc.line_crack([(1.0, 0.0), (2.4, 0.0)]), mesh)
     lips = cut(mesh, level_set(mesh, crack)).lip_points(mesh)
     assert lips[..., 0].min() > 0.95
     length = np.linalg.norm(lips[:, 1] - lips[:, 0], axis=1).sum()
@@ -113,7 +115,7 @@ def test_line_beyond_a_hole_is_no_crack():
 def test_growth_steps_given_by_angles_reach_the_published_tips():
     """Three steps of 0.4, each turned by 30 degrees (code_aster SSLV316 in the plane)."""
     mesh = xc.box((0, 0), (8, 18), (40, 90))
-    crack = place(xc.line_crack([(0.0, 9.0), (2.0, 9.0)]), mesh)
+    crack = place_line(xc.line_crack([(0.0, 9.0), (2.0, 9.0)]), mesh)
     tips = []
     for _ in range(3):
         crack = advance(crack, [np.pi / 6], [0.4])

@@ -9,7 +9,9 @@ import scenes
 import scenes_space
 import xcrack as xc
 from scenes import numerics_of
-from xcrack.crack.crack import advance, front, place
+from xcrack.crack.advance_2d import advance
+from xcrack.crack.placing_2d import place_line
+from xcrack.crack.tips_2d import tip_frames
 from xcrack.cutting.cut import cut
 from xcrack.cutting.level_set import level_set
 from xcrack.cutting.level_set_nodal import Nodal, nodal_level_set, nodal_update
@@ -27,7 +29,7 @@ def turned(degrees, *, start=0.15, mouth=False, radius=0.4):
     mesh = scenes.perturbed(N, seed=77)
     y = -0.503
     first = [(-1.0, y), (-1.0 + start, y)] if mouth else [(-0.05 - start, y), (-0.05, y)]
-    crack = place(xc.line_crack(first), mesh)
+    crack = place_line(xc.line_crack(first), mesh)
     da = 2 * radius * np.sin(STEP / 2)
     still = [0.0] * (crack.n_tips - 1)
     for _ in range(degrees // 5):
@@ -101,7 +103,7 @@ def K_by(update, mesh, crack, order):
 @pytest.mark.parametrize("kinks", [4, 12])
 def test_K_of_a_moderately_turned_crack(kinks, order):
     mesh = scenes.perturbed(24, seed=78)
-    crack = place(xc.line_crack([(-1.0, -0.103), (-0.4, -0.103)]), mesh)
+    crack = place_line(xc.line_crack([(-1.0, -0.103), (-0.4, -0.103)]), mesh)
     for _ in range(kinks):
         crack = advance(crack, [STEP], [0.06])
     explicit, nodal = (K_by(update, mesh, crack, order) for update in ("explicit", "nodal"))
@@ -112,7 +114,7 @@ def test_K_of_a_moderately_turned_crack(kinks, order):
 
 def test_both_tips_of_a_crack_grow():
     mesh = scenes.perturbed(24, seed=79)
-    crack = place(xc.line_crack([(-0.4, -0.103), (0.3, -0.05)]), mesh)
+    crack = place_line(xc.line_crack([(-0.4, -0.103), (0.3, -0.05)]), mesh)
     for _ in range(5):
         crack = advance(crack, [0.08, -0.11], [0.07, 0.06])
     explicit, nodal = level_set(mesh, crack), nodal_level_set(mesh, crack)
@@ -147,7 +149,7 @@ def test_one_update(angle):
 def test_cracks_that_have_not_grown_are_the_same():
     mesh = scenes.perturbed(20, seed=80)
     for line in ([(-1.0, 0.03), (0.1, 0.11)], [(-0.4, 0.03), (0.3, 0.11)], [(-1.2, 0), (1.2, 0.1)]):
-        crack = place(xc.line_crack(line), mesh)
+        crack = place_line(xc.line_crack(line), mesh)
         explicit, nodal = level_set(mesh, crack), nodal_level_set(mesh, crack)
         np.testing.assert_array_equal(nodal.phi, explicit.phi)
         np.testing.assert_array_equal(nodal.psi, explicit.psi)
@@ -168,7 +170,7 @@ def test_growth_follows_the_same_path():
                     da=0.1, max_steps=4,
                 )
             )  # fmt: skip
-        tips.append(front(steps[-1].cracks[0])[0][0])
+        tips.append(tip_frames(steps[-1].cracks[0])[0][0])
     # What the last digits of K differ by, times the length grown.
     np.testing.assert_allclose(tips[1], tips[0], atol=1e-4)
 

@@ -5,9 +5,10 @@ import pytest
 
 import xcrack as xc
 from xcrack.crack.crack import Crack
-from xcrack.crack.fronts_3d import extended, front_frames
+from xcrack.crack.fronts_3d import front_frames
 from xcrack.crack.mouths_3d import Body
-from xcrack.crack.placing_3d import check_surfaces, crack_area, place_surface
+from xcrack.crack.placing import placed
+from xcrack.crack.placing_3d import check_surfaces, place_surface
 from xcrack.crack.surfaces import (
     elliptic_crack,
     penny_crack,
@@ -15,6 +16,7 @@ from xcrack.crack.surfaces import (
     read_surface,
     surface_crack,
 )
+from xcrack.cutting.extension_3d import extended
 from xcrack.errors import GeometryError, XcrackError
 from xcrack.geometry.triangulation import face_areas, face_normals, loops, rim, ruled, side_keys
 
@@ -35,6 +37,10 @@ def rectangle(x0, x1, y0, y1, z=0.03):
     return plane_crack([(x0, y0, z), (x1, y0, z), (x1, y1, z), (x0, y1, z)])
 
 
+def area_of(crack):
+    return face_areas(crack.points, crack.faces).sum()
+
+
 # --- constructors ---------------------------------------------------------------------------
 
 
@@ -45,7 +51,7 @@ def test_penny_is_a_disc_of_good_triangles(n):
     np.testing.assert_allclose(face_normals(crack.points, crack.faces) @ normal, 1, atol=1e-12)
     # the area of a regular polygon
     area = n / 2 * 0.7**2 * np.sin(2 * np.pi / n)
-    assert crack_area(crack) == pytest.approx(area, rel=1e-12)
+    assert area_of(crack) == pytest.approx(area, rel=1e-12)
     (loop,) = loops(crack.faces)
     assert len(loop) == n
     radius = np.linalg.norm(crack.points[loop] - [1, 2, 3], axis=1)
@@ -92,7 +98,7 @@ def test_plane_crack_covers_its_polygon_and_looks_along_its_normal():
     crack = plane_crack(polygon)
     after = np.roll(flat, -1, axis=0)
     shoelace = (flat[:, 0] * after[:, 1] - flat[:, 1] * after[:, 0]).sum() / 2
-    assert crack_area(crack) == pytest.approx(shoelace, rel=1e-12)
+    assert area_of(crack) == pytest.approx(shoelace, rel=1e-12)
     np.testing.assert_allclose(
         face_normals(crack.points, crack.faces), np.tile(turn[:, 2], (38, 1)), atol=1e-9
     )
@@ -123,7 +129,7 @@ def test_surface_from_a_file(tmp_path, suffix):
     again = read_surface(path)
     assert len(again.points) == len(crack.points)
     assert again.faces.shape == crack.faces.shape
-    assert crack_area(again) == pytest.approx(crack_area(crack), rel=1e-6)  # single precision
+    assert area_of(again) == pytest.approx(area_of(crack), rel=1e-6)  # single precision
     assert len(loops(again.faces)) == 1
 
 
@@ -289,14 +295,14 @@ def test_front_corners_are_rounded_and_mouth_corners_are_not(cube):
     square = place_surface(plane_crack([(6 * x / 5, 6 * y / 5, z) for x, y, z in SQUARE]), cube)
     (front,) = front_frames(square)
     radius = 0.45 * 1.2  # the room that corners 1.2 apart leave for arcs of 2 * 0.2887
-    assert crack_area(square) == pytest.approx(1.44 - (4 - np.pi) * radius**2, rel=0.02)
+    assert area_of(square) == pytest.approx(1.44 - (4 - np.pi) * radius**2, rel=0.02)
     turn = np.einsum("ij,ij->i", front.frame[:, 2], np.roll(front.frame[:, 2], 1, axis=0))
     assert turn.min() > np.cos(np.radians(25))
     edge = place_surface(rectangle(-1.5, 0, -1.5, 1.5), cube)
     assert len(front_frames(edge)[0].x) > 0
     assert {(-1.5, -1.5), (-1.5, 1.5)} <= {tuple(row) for row in edge.points[:, :2].tolist()}
     corner = place_surface(rectangle(0, 2, 0, 2), cube)
-    lost = 4 - crack_area(corner)
+    lost = 4 - area_of(corner)
     assert lost == pytest.approx((1 - np.pi / 4) * (2 * np.sqrt(3) / 6) ** 2, rel=0.1)
 
 
@@ -428,9 +434,9 @@ def test_cracks_that_no_mesh_takes(crack, message, cube):
 
 def test_plane_and_space_do_not_mix(cube):
     with pytest.raises(GeometryError, match="3D crack"):
-        place_surface(penny_crack((0, 0, 0), (0, 0, 1), 0.5), xc.box((0, 0), (1, 1), 4))
+        placed(penny_crack((0, 0, 0), (0, 0, 1), 0.5), xc.box((0, 0), (1, 1), 4))
     with pytest.raises(GeometryError, match="2D crack"):
-        place_surface(xc.line_crack([(0, 0), (1, 0)]), cube)
+        placed(xc.line_crack([(0, 0), (1, 0)]), cube)
 
 
 def test_a_notch_is_narrower_than_a_cell(body):

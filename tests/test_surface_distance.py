@@ -5,9 +5,10 @@ import pytest
 
 import xcrack as xc
 from xcrack.crack.crack import Crack
-from xcrack.crack.fronts_3d import extended, front_frames
+from xcrack.crack.fronts_3d import front_frames
 from xcrack.crack.placing_3d import place_surface
 from xcrack.crack.surfaces import elliptic_crack, penny_crack, plane_crack, surface_crack
+from xcrack.cutting.extension_3d import extended
 from xcrack.geometry.distances import (
     closest_in,
     first_crossing,

@@ -20,7 +20,7 @@ _HOME = {
     "refine": "mesh.refinement",
     "Isotropic": "scene.material",
     "Crack": "crack.crack",
-    "line_crack": "crack.crack",
+    "line_crack": "crack.lines",
     "penny_crack": "crack.surfaces",
     "elliptic_crack": "crack.surfaces",
     "plane_crack": "crack.surfaces",

@@ -7,21 +7,19 @@ from numpy.typing import ArrayLike
 
 from xcrack.arrays import Bools, Floats, Ints
 from xcrack.crack.crack import Crack
-from xcrack.crack.front_curve import front_curve
-from xcrack.crack.front_remeshing import (
+from xcrack.crack.front_chain import (
     Chain,
-    along_front,
     chain,
-    divided,
     faired,
     spaced,
-    steps,
-    stitched,
     without_loops,
     without_notches,
     without_sides,
 )
+from xcrack.crack.front_curve import front_curve
+from xcrack.crack.front_stitching import along_front, divided, stitched
 from xcrack.crack.fronts_3d import Front, front_frames
+from xcrack.crack.polylines_3d import steps
 from xcrack.errors import GeometryError, warn
 from xcrack.geometry.distances import first_crossing, surface_distance, triangle_tree
 
@@ -42,7 +40,7 @@ def advance_fronts(
     Each vertex of a front moves by da (cos(angle) t + sin(angle) n) in its frame, and a strip of
     triangles joins the old front with the new one. Angle and advance run between the given
     places as monotone cubics, around closed fronts periodically; beyond the first and last place
-    of an open front they are constant. The new front is faired (see `front_points.faired`), its
+    of an open front they are constant. The new front is faired (see `front_chain.faired`), its
     points are merged and split so that they lie between 0.5 and 1.5 sizes apart.
 
     Parameters

@@ -55,8 +55,6 @@ def place_surface(crack: Crack, mesh: Mesh) -> Crack:
         No part of the crack lies inside the body; or the crack is smaller than a cell, or ends
         less than half a cell inside the boundary that it comes from.
     """
-    if crack.dim != mesh.dim:
-        raise GeometryError(f"a {crack.dim}D crack cannot be put into a {mesh.dim}D mesh.")
     body = Body.of(mesh)
     _check_inside(crack, body)
     points, faces = np.array(crack.points), np.array(crack.faces)
@@ -128,11 +126,6 @@ def _check_size(points: Floats, faces: Ints, body: Body) -> None:
                 f"the crack at {np.round(x[inside][0], 6).tolist()} is {width[k]:.4g} wide, less "
                 f"than the cell there ({cell:.4g}): refine the mesh around it or leave it out."
             )
-
-
-def crack_area(crack: Crack) -> float:
-    """Area of all faces of a crack in space, length²."""
-    return float(face_areas(crack.points, crack.faces).sum())
 
 
 def _refined(points: Floats, faces: Ints, body: Body) -> tuple[Floats, Ints]:

@@ -12,7 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from xcrack.arrays import Bools, Floats, Ints, lock
-from xcrack.crack.crack import Crack, front
+from xcrack.crack.crack import Crack
+from xcrack.crack.tips_2d import tip_frames
 from xcrack.mesh.locate import barycentric
 from xcrack.mesh.mesh import Mesh
 
@@ -62,7 +63,7 @@ def level_set(mesh: Mesh, crack: Crack) -> LevelSet:
     start, stop = _prolongation(crack.points, reach)
     vertices = np.concatenate([[start], crack.points, [stop]])
     phi, segment = polyline_distance(mesh.points, vertices)
-    x, frame = front(crack)
+    x, frame = tip_frames(crack)
     psi = np.empty((len(x), mesh.n_points))
     n_segments = len(vertices) - 1
     for k, tip in enumerate(crack.tips or ()):
@@ -92,7 +93,7 @@ def tied_to_tips(
     Around a tip they become those of its frame, so that the tip stays where it is even when the
     last kink is less than a cell away.
     """
-    x, frame = front(crack)
+    x, frame = tip_frames(crack)
     tip_cells = tuple(_cells_at(mesh, point) for point in x)
     for k, cells in enumerate(tip_cells):
         nodes = np.unique(mesh.cells[cells])

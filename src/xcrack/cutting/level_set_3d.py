@@ -12,7 +12,8 @@ from scipy.spatial import cKDTree
 
 from xcrack.arrays import Bools, Floats, Ints, lock
 from xcrack.crack.crack import Crack
-from xcrack.crack.fronts_3d import Front, extended, front_frames
+from xcrack.crack.fronts_3d import Front, front_frames
+from xcrack.cutting.extension_3d import extended
 from xcrack.cutting.level_set import LevelSet, near_edges, snapped
 from xcrack.geometry.distances import front_distance, surface_distance
 from xcrack.mesh.mesh import Mesh, local_facets

@@ -13,7 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from xcrack.arrays import Floats, lock
-from xcrack.crack.crack import Crack, advance, front
+from xcrack.crack.advance_2d import advance
+from xcrack.crack.crack import Crack
+from xcrack.crack.tips_2d import tip_frames
 from xcrack.cutting.level_set import LevelSet, level_set, tied_to_tips
 from xcrack.mesh.mesh import Mesh
 
@@ -110,7 +112,7 @@ def nodal_level_set(
     for k, tip in enumerate(tips):
         pieces = crack.points[low::-1] if tip == 0 else crack.points[high:]
         for new in pieces[1:]:
-            x, frame = front(grown)
+            x, frame = tip_frames(grown)
             along, across = frame[k] @ (new - x[k])
             angle, da = np.zeros(len(tips)), np.zeros(len(tips))
             angle[k], da[k] = np.arctan2(across, along), np.hypot(along, across)

@@ -6,7 +6,8 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from xcrack.arrays import Floats, Ints
-from xcrack.crack.crack import Crack, advance
+from xcrack.crack.advance_2d import advance
+from xcrack.crack.crack import Crack
 from xcrack.crack.size_2d import length_inside
 from xcrack.growth.advance import LEAST, PerCrack
 from xcrack.growth.cycles import elapsed

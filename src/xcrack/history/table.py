@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xcrack.arrays import Floats
-from xcrack.crack.crack import front
 from xcrack.crack.fronts_3d import front_weights
+from xcrack.crack.tips_2d import tip_frames
 from xcrack.growth.step import Step
 
 Measures = dict[str, Callable[[Step, int], Floats]]
@@ -37,7 +37,7 @@ def _table_2d(steps: Sequence[Step]) -> tuple[list[str], list[tuple[Any, ...]]]:
     rows = []
     for step in steps:
         for c, crack in enumerate(step.cracks):
-            x, _ = front(crack)
+            x, _ = tip_frames(crack)
             parts = [*(measure(step, c) for measure in quality.values()), *_parts(step, c)]
             for j in range(len(step.angle[c])):
                 K = [value for state in step.sif for value in state[c].K[j]]

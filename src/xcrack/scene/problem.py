@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from xcrack.crack.crack import Crack, check_cracks, place
-from xcrack.crack.placing_3d import check_surfaces, place_surface
+from xcrack.crack.crack import Crack
+from xcrack.crack.placing import check_cracks, placed
 from xcrack.errors import ProblemError
 from xcrack.inputs import number, whole
 from xcrack.mesh.mesh import Mesh
@@ -100,16 +100,12 @@ class Problem:
         if not isinstance(self.contact, str) or self.contact not in ("auto", "on", "off"):
             raise ProblemError(f'contact = {self.contact!r:.80}: give "auto", "on" or "off".')
         self._check_members()
-        if self.mesh.dim == 2:
-            check_cracks(self.placed, self.mesh)
-        else:
-            check_surfaces(self.placed, self.mesh)
+        check_cracks(self.placed, self.mesh)
 
     @cached_property
     def placed(self) -> tuple[Crack, ...]:
         """The cracks with tips and mouths decided in this mesh."""
-        put = place if self.mesh.dim == 2 else place_surface
-        return tuple(put(crack, self.mesh) for crack in self.cracks)
+        return tuple(placed(crack, self.mesh) for crack in self.cracks)
 
     def state(self, state: Any) -> tuple[tuple[Load, ...], float]:
         """Loads and factor of a load state: a number, or a list of loads."""

@@ -3,7 +3,8 @@
 import numpy as np
 
 from xcrack.arrays import Bools, Floats
-from xcrack.crack.crack import Crack, crack_length, front
+from xcrack.crack.crack import Crack, crack_length
+from xcrack.crack.tips_2d import tip_frames
 from xcrack.cutting.cut import Cut
 from xcrack.mesh.locate import cells_within, nearest_boundary
 from xcrack.mesh.mesh import Mesh
@@ -33,7 +34,7 @@ def tip_radii(
     """
     if mesh.dim == 3:
         return front_radii(mesh, cracks, cuts, order, wanted)
-    tips = [front(crack)[0] for crack in cracks]
+    tips = [tip_frames(crack)[0] for crack in cracks]
     every = np.concatenate(tips) if tips else np.zeros((0, mesh.dim))
     radii = []
     for crack, cut, own in zip(cracks, cuts, tips, strict=True):

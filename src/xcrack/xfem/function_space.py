@@ -12,8 +12,8 @@ from functools import cached_property
 import numpy as np
 
 from xcrack.arrays import Bools, Floats, Ints, lock
-from xcrack.crack.crack import Crack, front
-from xcrack.crack.fronts_3d import front_frames
+from xcrack.crack.crack import Crack
+from xcrack.crack.ends import end_frames
 from xcrack.cutting.cut import Cut
 from xcrack.errors import GeometryError
 from xcrack.mesh.mesh import Mesh, local_edges
@@ -273,12 +273,6 @@ class FunctionSpace:
         return tuple(shifts)
 
 
-def fronts(crack: Crack) -> tuple[list[Floats], list[Floats]]:
-    """Vertices and frames of each front of a crack in space."""
-    every = front_frames(crack)
-    return [front.x for front in every], [front.frame for front in every]
-
-
 def function_space(
     mesh: Mesh, order: int, cracks: tuple[Crack, ...], cuts: tuple[Cut, ...], numerics: Numerics
 ) -> FunctionSpace:
@@ -302,7 +296,7 @@ def function_space(
     radii = tip_radii(mesh, cracks, cuts, order, numerics.radius)
     tips = []
     for c, cut in enumerate(cuts):
-        x, frame = front(cracks[c]) if mesh.dim == 2 else fronts(cracks[c])
+        x, frame = end_frames(cracks[c])
         for k in range(cut.n_tips):
             flag = tip_points(mesh, order, cut, k, radii[c][k], numerics.enrichment)
             number = np.full(mesh.n_points, -1, dtype=np.int64)

@@ -1,0 +1,56 @@
+"""Cracks put into a mesh: what of them is tip or front, what is mouth, and whether they meet."""
+
+from collections.abc import Callable
+
+from xcrack.crack.crack import Crack
+from xcrack.crack.placing_2d import check_lines, place_line
+from xcrack.crack.placing_3d import check_surfaces, place_surface
+from xcrack.errors import GeometryError
+from xcrack.mesh.mesh import Mesh
+
+_PLACE: dict[int, Callable[[Crack, Mesh], Crack]] = {2: place_line, 3: place_surface}
+_CHECK: dict[int, Callable[[tuple[Crack, ...], Mesh], None]] = {2: check_lines, 3: check_surfaces}
+
+
+def placed(crack: Crack, mesh: Mesh) -> Crack:
+    """Decide what of a crack is tip or front in this mesh, and lead its mouths out of the body.
+
+    Parameters
+    ----------
+    crack : Crack
+        If its tips or fronts are known already, only these are looked at again.
+    mesh : Mesh
+
+    Returns
+    -------
+    Crack
+        With `tips` or `fronts`; see `place_line` and `place_surface`.
+
+    Raises
+    ------
+    GeometryError
+        A crack of another dimension, outside the body, or too small for the mesh.
+    """
+    if crack.dim != mesh.dim:
+        raise GeometryError(f"a {crack.dim}D crack cannot be put into a {mesh.dim}D mesh.")
+    return _PLACE[mesh.dim](crack, mesh)
+
+
+def check_cracks(cracks: tuple[Crack, ...], mesh: Mesh) -> None:
+    """Raise where placed cracks cross or touch, or their ends are closer than a cell.
+
+    Parameters
+    ----------
+    cracks : tuple of Crack
+        Placed in the mesh.
+    mesh : Mesh
+
+    Raises
+    ------
+    GeometryError
+        The message names the cracks and the place.
+    """
+    _CHECK[mesh.dim](cracks, mesh)
+
+
+__all__ = ["check_cracks", "placed"]
