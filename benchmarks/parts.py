@@ -20,7 +20,7 @@ from xcrack.contact import active_set as contact
 from xcrack.contact import multipliers
 from xcrack.contact.solve import dual
 from xcrack.cutting.cut import cut
-from xcrack.cutting.level_set import level_set
+from xcrack.cutting.level_set_2d import line_levels
 from xcrack.solvers import direct as linear
 from xcrack.solvers.rigid_motion import free_motion
 from xcrack.xfem.assembly import bulk, enriched_stiffness, total_stiffness
@@ -62,7 +62,7 @@ def run(n: int) -> None:
         mesh, material, numerics = problem.mesh, problem.material, problem.numerics
         _ = mesh.edges, mesh.gradient, mesh.volume, mesh.facets, mesh.cell_tree, problem.placed
     with part("level sets"):
-        levels = level_set(mesh, problem.placed[0])
+        levels = line_levels(mesh, problem.placed[0])
     with part("cut and space"):
         cuts = (cut(mesh, levels),)
         V = function_space(mesh, 2, problem.placed, cuts, numerics)

@@ -11,7 +11,7 @@ import scenes
 import xcrack as xc
 from xcrack.crack.placing_2d import place_line
 from xcrack.cutting.cut import cut, cut_simplices
-from xcrack.cutting.level_set import level_set
+from xcrack.cutting.level_set_2d import line_levels
 
 
 @pytest.mark.parametrize("n", [3, 4])
@@ -47,7 +47,7 @@ def test_lips_of_a_line_through_a_box_have_its_length(angle, offset, seed):
     mesh = scenes.perturbed(7, seed)
     t, n = scenes.rows(angle)
     crack = place_line(xc.line_crack([offset * n - 3 * t, offset * n + 3 * t]), mesh)
-    lips = cut(mesh, level_set(mesh, crack)).lip_points(mesh)
+    lips = cut(mesh, line_levels(mesh, crack)).lip_points(mesh)
     reach = np.min(
         [(np.sign(ti) - o) / ti for ti, o in zip(t, offset * n, strict=True) if abs(ti) > 1e-12]
     )
@@ -73,7 +73,7 @@ def test_lips_of_a_line_through_a_box_have_its_length(angle, offset, seed):
 )
 def test_cracks_on_mesh_lines_are_counted_once(points, length):
     mesh = xc.box((-1, -1), (1, 1), 20)
-    lips = cut(mesh, level_set(mesh, place_line(xc.line_crack(points), mesh))).lip_points(mesh)
+    lips = cut(mesh, line_levels(mesh, place_line(xc.line_crack(points), mesh))).lip_points(mesh)
     assert np.linalg.norm(lips[:, 1] - lips[:, 0], axis=1).sum() == pytest.approx(length, abs=1e-9)
 
 
@@ -81,6 +81,6 @@ def test_normals_point_to_the_left_of_the_order_of_the_points():
     mesh = scenes.perturbed(11, seed=12)
     for points in ([(-1, 0.1), (0.3, 0.2)], [(0.3, 0.2), (-1, 0.1)], [(-1, 0.0), (0.0, 0.0)]):
         crack = place_line(xc.line_crack(points), mesh)
-        normal = cut(mesh, level_set(mesh, crack)).lip_normal
+        normal = cut(mesh, line_levels(mesh, crack)).lip_normal
         along = np.subtract(points[1], points[0])
         assert (normal @ np.array([-along[1], along[0]]) > 0).all()

@@ -11,7 +11,7 @@ from xcrack.crack.advance_2d import advance
 from xcrack.crack.placing_2d import place_line
 from xcrack.crack.tips_2d import tip_frames
 from xcrack.cutting.cut import cut
-from xcrack.cutting.level_set import level_set
+from xcrack.cutting.level_set_2d import line_levels
 from xcrack.kernels.distance import polyline_distance
 from xcrack.mesh.locate import closest_on_segment
 
@@ -45,7 +45,7 @@ def test_distance_agrees_with_its_naive_twin():
 def test_straight_crack_has_linear_level_sets():
     mesh = scenes.perturbed(9, seed=31)
     crack = place_line(scenes.edge_line((0.083, 0.047), 0.41), mesh)
-    levels = level_set(mesh, crack)
+    levels = line_levels(mesh, crack)
     x, frame = tip_frames(crack)
     local = (mesh.points - x[0]) @ frame[0].T
     np.testing.assert_allclose(levels.phi, local[:, 1], atol=1e-14)  # round-off
@@ -67,7 +67,7 @@ def test_turning_crack_keeps_all_its_faces(degrees):
     turn, da = turning(40, 0.4, degrees)
     for _ in range(40):
         crack = advance(crack, [turn], [da])
-    found = cut(mesh, level_set(mesh, crack))
+    found = cut(mesh, line_levels(mesh, crack))
     lips = found.lip_points(mesh)
     length = np.linalg.norm(lips[:, 1] - lips[:, 0], axis=1).sum()
     inside = np.linalg.norm(np.diff(crack.points, axis=0), axis=1).sum() - (
@@ -83,7 +83,7 @@ def test_old_faces_are_frozen_to_the_last_bit():
     mesh = scenes.perturbed(24, seed=5)
     before = place_line(xc.line_crack([(-1.0, 0.013), (0.021, 0.017)]), mesh)
     after = advance(before, [0.6], [0.2])
-    old, new = level_set(mesh, before), level_set(mesh, after)
+    old, new = line_levels(mesh, before), line_levels(mesh, after)
     tip = before.points[-1]
     behind = mesh.points[:, 0] < tip[0] - 2 * mesh.cell_size.max()
     behind &= np.abs(mesh.points[:, 1]) < 0.3
@@ -98,7 +98,7 @@ def test_tip_that_does_not_move_is_the_same_to_the_last_bit():
     moved = advance(crack, [0.3, 0.2], [0.0, 0.15])
     np.testing.assert_array_equal(moved.points[:2], crack.points)
     assert moved.tips == (0, 2)
-    levels = level_set(mesh, moved)
+    levels = line_levels(mesh, moved)
     assert [len(c) for c in levels.tip_cells] == [1, 1]
 
 
@@ -106,7 +106,7 @@ def test_line_beyond_a_hole_is_no_crack():
     """The ray of a mouth on a hole meets the body again on the far side: nothing is cut there."""
     mesh = xc.read_mesh(EXAMPLE_MESHES / "plate_with_hole_05.msh")
     crack = place_line(xc.line_crack([(1.0, 0.0), (2.4, 0.0)]), mesh)
-    lips = cut(mesh, level_set(mesh, crack)).lip_points(mesh)
+    lips = cut(mesh, line_levels(mesh, crack)).lip_points(mesh)
     assert lips[..., 0].min() > 0.95
     length = np.linalg.norm(lips[:, 1] - lips[:, 0], axis=1).sum()
     assert length == pytest.approx(1.4, abs=1e-9)  # round-off; a node lies at (1, 0)

@@ -13,7 +13,7 @@ from xcrack.crack.advance_2d import advance
 from xcrack.crack.placing_2d import place_line
 from xcrack.crack.tips_2d import tip_frames
 from xcrack.cutting.cut import cut
-from xcrack.cutting.level_set import level_set
+from xcrack.cutting.level_set_2d import line_levels
 from xcrack.cutting.level_set_nodal import Nodal, nodal_level_set, nodal_update
 from xcrack.mesh.locate import closest_on_segment
 
@@ -60,7 +60,7 @@ def covered(found, crack):
 @pytest.mark.parametrize("degrees", [60, 120])
 def test_up_to_120_degrees_both_cut_alike(degrees, mouth):
     mesh, crack = turned(degrees, start=0.5 if mouth else 0.15, mouth=mouth)
-    explicit, nodal = lips(mesh, level_set(mesh, crack)), lips(mesh, nodal_level_set(mesh, crack))
+    explicit, nodal = lips(mesh, line_levels(mesh, crack)), lips(mesh, nodal_level_set(mesh, crack))
     apart = gaps(nodal.reshape(-1, 2), explicit[:, 0], explicit[:, 1]).max()
     back = gaps(explicit.reshape(-1, 2), nodal[:, 0], nodal[:, 1]).max()
     print(f"\n{degrees} degrees: {apart / H:.1e} and {back / H:.1e} of a cell apart")
@@ -72,7 +72,7 @@ def test_up_to_120_degrees_both_cut_alike(degrees, mouth):
 def test_at_200_degrees_the_beginning_is_lost(start, mouth, least):
     """It lies ahead of the tip's frame by then. The longer the beginning, the greater the loss."""
     mesh, crack = turned(200, start=start, mouth=mouth)
-    explicit = covered(lips(mesh, level_set(mesh, crack)), crack)
+    explicit = covered(lips(mesh, line_levels(mesh, crack)), crack)
     nodal = covered(lips(mesh, nodal_level_set(mesh, crack)), crack)
     print(f"\n200 degrees: {1 - explicit:.1%} lost by the polyline, {1 - nodal:.1%} by the nodes")
     assert explicit == pytest.approx(1.0)
@@ -87,7 +87,7 @@ def test_updates_near_the_tip_leave_phantoms():
     off = gaps(found.mean(axis=1), crack.points[:-1], crack.points[1:])
     print(f"\nupdates within 0.5: lips up to {off.max() / H:.1f} cells off the crack")
     assert off.max() > 5 * H
-    explicit = lips(mesh, level_set(mesh, crack))
+    explicit = lips(mesh, line_levels(mesh, crack))
     assert gaps(explicit.mean(axis=1), crack.points[:-1], crack.points[1:]).max() < 0.05 * H
 
 
@@ -117,7 +117,7 @@ def test_both_tips_of_a_crack_grow():
     crack = place_line(xc.line_crack([(-0.4, -0.103), (0.3, -0.05)]), mesh)
     for _ in range(5):
         crack = advance(crack, [0.08, -0.11], [0.07, 0.06])
-    explicit, nodal = level_set(mesh, crack), nodal_level_set(mesh, crack)
+    explicit, nodal = line_levels(mesh, crack), nodal_level_set(mesh, crack)
     one, other = lips(mesh, explicit), lips(mesh, nodal)
     assert gaps(other.reshape(-1, 2), one[:, 0], one[:, 1]).max() <= 0.02 * 2 / 24
     np.testing.assert_array_equal(nodal.tip, explicit.tip)
@@ -150,7 +150,7 @@ def test_cracks_that_have_not_grown_are_the_same():
     mesh = scenes.perturbed(20, seed=80)
     for line in ([(-1.0, 0.03), (0.1, 0.11)], [(-0.4, 0.03), (0.3, 0.11)], [(-1.2, 0), (1.2, 0.1)]):
         crack = place_line(xc.line_crack(line), mesh)
-        explicit, nodal = level_set(mesh, crack), nodal_level_set(mesh, crack)
+        explicit, nodal = line_levels(mesh, crack), nodal_level_set(mesh, crack)
         np.testing.assert_array_equal(nodal.phi, explicit.phi)
         np.testing.assert_array_equal(nodal.psi, explicit.psi)
 

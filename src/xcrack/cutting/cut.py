@@ -11,9 +11,9 @@ from functools import cached_property
 import numpy as np
 
 from xcrack.arrays import Bools, Floats, Ints, lock
-from xcrack.cutting.fronts_3d import behind, front_subs
+from xcrack.cutting.fronts_3d import front_parts, lips_up_to_fronts
 from xcrack.cutting.level_set import LevelSet
-from xcrack.cutting.tips_2d import tip_cells
+from xcrack.cutting.tips_2d import lips_up_to_tips, tip_parts
 from xcrack.mesh.locate import barycentric
 from xcrack.mesh.mesh import Mesh
 from xcrack.mesh.split import cut_simplices, interface_simplices
@@ -30,9 +30,9 @@ class Cut:
         Cells cut from side to side (cells at tips and fronts are not among them).
     sub_to_cell, sub_bary, sub_fraction, sub_side : arrays
         Sub-cells of the cut cells and of the tip cells: mesh cell, barycentric coordinates of the
-        vertices `(s, d + 1, d + 1)`, share of the cell's volume, side +1 or -1. In a tip cell of
-        the plane vertex 0 of every sub-cell is the tip; in space no sub-cell at a front has
-        parts both ahead of it and behind.
+        vertices `(s, d + 1, d + 1)`, share of the cell's volume, side +1 or -1. In 2D vertex 0
+        of every sub-cell of a tip cell is the tip; in 3D no sub-cell at a front has parts both
+        ahead of it and behind.
     lip_cell : (l, 2) array of int
         Cell on side - and on side + of each lip segment or triangle; twice the same inside a cell.
     lip_bary : (l, 2, d, d + 1) array
@@ -106,17 +106,9 @@ def cut(mesh: Mesh, level_set: LevelSet) -> Cut:
     edge_flag = np.zeros(len(mesh.edges), dtype=bool)
     edge_flag[mesh.cell_to_edge[cells]] = True
     subs = [(cells[parent], bary, fraction, side)]
-    if mesh.dim == 2:
-        for k, around in enumerate(level_set.tip_cells):
-            tip_subs, tip_lips, entry = tip_cells(mesh, level_set, k, around, positions, exists)
-            subs.append(tip_subs)
-            lips.append(_both(*tip_lips))
-            edge_flag[entry] = True
-    else:
-        front = np.nonzero(is_tip)[0]
-        front_parts, front_lips, entry = front_subs(mesh, level_set, front, positions)
-        subs.append(front_parts)
-        lips.append(_both(*front_lips))
+    for end_subs, end_lips, entry in _END_PARTS[mesh.dim](mesh, level_set, positions, exists):
+        subs.append(end_subs)
+        lips.append(_both(*end_lips))
         edge_flag[entry] = True
     lips.append(_facet_lips(mesh, level_set))
     lip_cell = np.concatenate([part.cell for part in lips])
@@ -175,11 +167,7 @@ def _facet_lips(mesh: Mesh, level_set: LevelSet) -> _Lips:
     if not len(facets):
         return empty
     cells = np.where(side[:, :1] > 0, cells[:, ::-1], cells)
-    if d == 2:
-        x, row = _up_to_tips(mesh, level_set, facets, cells, psi)
-    else:
-        part, row = behind(psi)
-        x = np.einsum("svb,sbd->svd", part, mesh.points[mesh.facets[facets[row]]])
+    x, row = _UP_TO_ENDS[d](mesh, level_set, facets, cells, psi)
     cells = cells[row]
     bary = np.stack(
         [
@@ -191,37 +179,27 @@ def _facet_lips(mesh: Mesh, level_set: LevelSet) -> _Lips:
     return _Lips(cells, np.where(np.abs(bary) < 1e-14, 0.0, bary))
 
 
-def _up_to_tips(
-    mesh: Mesh, level_set: LevelSet, facets: Ints, cells: Ints, psi: Floats
-) -> tuple[Floats, Ints]:
-    """Ends of the lips on plane facets, and the facet of each: those at a tip end there."""
-    x = mesh.points[mesh.facets[facets]]
-    ends_at_tip = np.zeros(len(facets), dtype=bool)
-    for k, tip in enumerate(level_set.tip):
-        own = level_set.psi[k][mesh.facets[facets]]
-        length = np.linalg.norm(x[:, 1] - x[:, 0], axis=1)
-        ahead, behind_ = own.argmax(axis=1), own.argmin(axis=1)
-        row = np.arange(len(facets))
-        reaches = (own[row, ahead] > -1e-9 * length) & (own[row, behind_] < -1e-9 * length)
-        reaches &= np.isin(cells, level_set.tip_cells[k]).any(axis=1)
-        begin = x[row, behind_]
-        x = np.where(
-            reaches[:, None, None], np.stack([begin, np.broadcast_to(tip, begin.shape)], 1), x
-        )
-        ends_at_tip |= reaches
-    near = np.nonzero(ends_at_tip | (psi.mean(axis=1) < 0))[0]
-    return x[near], near
-
-
 def _lip_normals(mesh: Mesh, phi: Floats, cell: Ints, bary: Floats) -> Floats:
     """Unit normals of lip segments, exactly perpendicular to them, towards growing phi."""
     corners = np.einsum("lvb,lbd->lvd", bary[:, 1], mesh.points[mesh.cells[cell[:, 1]]])
     slope = np.einsum("lb,lbd->ld", phi[mesh.cells[cell[:, 1]]], mesh.gradient[cell[:, 1]])
-    if mesh.dim == 2:
-        along = corners[:, 1] - corners[:, 0]
-        normal = np.stack([-along[:, 1], along[:, 0]], axis=1)
-    else:
-        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normal = _ACROSS[mesh.dim](corners)
     length = np.linalg.norm(normal, axis=1, keepdims=True)
     normal = normal / np.maximum(length, 1e-300)
     return np.asarray(normal * np.sign(np.einsum("ld,ld->l", normal, slope))[:, None])
+
+
+def _across_segments(corners: Floats) -> Floats:
+    along = corners[:, 1] - corners[:, 0]
+    return np.stack([-along[:, 1], along[:, 0]], axis=1)
+
+
+def _across_triangles(corners: Floats) -> Floats:
+    return np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+
+
+# What differs with the dimension: the cells at tips and fronts, where lips on facets of the mesh
+# end, and a vector across a lip.
+_END_PARTS = {2: tip_parts, 3: front_parts}
+_UP_TO_ENDS = {2: lips_up_to_tips, 3: lips_up_to_fronts}
+_ACROSS = {2: _across_segments, 3: _across_triangles}

@@ -1,4 +1,4 @@
-"""Cells at the fronts of a crack in space: cut by phi, then by psi.
+"""Cells at the fronts of a crack in 3D: cut by phi, then by psi.
 
 In a cell the front is the straight line phi = psi = 0. Cut along both, each sub-cell lies in one
 quadrant around it and touches it with an edge, with a vertex, or not at all, which is what the
@@ -7,7 +7,7 @@ integration rules want.
 
 import numpy as np
 
-from xcrack.arrays import Floats, Ints
+from xcrack.arrays import Bools, Floats, Ints
 from xcrack.cutting.level_set import LevelSet
 from xcrack.mesh.mesh import Mesh
 from xcrack.mesh.split import cut_simplices, interface_simplices
@@ -16,7 +16,17 @@ _AT = 1e-10  # share of a cell's range of psi below which a vertex lies on the f
 _NOTHING = 1e-30  # sub-cells below this share of their cell are left out
 
 
-def front_subs(
+def front_parts(
+    mesh: Mesh, level_set: LevelSet, positions: Floats, exists: Bools
+) -> list[tuple[tuple[Ints, Floats, Floats, Ints], tuple[Ints, Floats], Ints]]:
+    """Sub-cells, lips and entry edges of the cells at all fronts together; see `_front_subs`."""
+    is_tip = np.zeros(len(mesh.cells), dtype=bool)
+    for cells in level_set.tip_cells:
+        is_tip[cells] = True
+    return [_front_subs(mesh, level_set, np.nonzero(is_tip)[0], positions)]
+
+
+def _front_subs(
     mesh: Mesh, level_set: LevelSet, cells: Ints, positions: Floats
 ) -> tuple[tuple[Ints, Floats, Floats, Ints], tuple[Ints, Floats], Ints]:
     """Sub-cells and lips of the cells at fronts, and the edges that the crack crosses there.
@@ -68,6 +78,14 @@ def _cut_again(
     keep = result > _NOTHING
     vertices = np.concatenate([bary[kept], finer])
     return owner[every][keep], vertices[keep], result[keep], side[every][keep]
+
+
+def lips_up_to_fronts(
+    mesh: Mesh, level_set: LevelSet, facets: Ints, cells: Ints, psi: Floats
+) -> tuple[Floats, Ints]:
+    """Corners of the lips on facets of the mesh, and the facet of each: those behind fronts."""
+    part, row = behind(psi)
+    return np.einsum("svb,sbd->svd", part, mesh.points[mesh.facets[facets[row]]]), row
 
 
 def behind(psi: Floats) -> tuple[Floats, Ints]:

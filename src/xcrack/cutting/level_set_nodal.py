@@ -16,7 +16,8 @@ from xcrack.arrays import Floats, lock
 from xcrack.crack.advance_2d import advance
 from xcrack.crack.crack import Crack
 from xcrack.crack.tips_2d import tip_frames
-from xcrack.cutting.level_set import LevelSet, level_set, tied_to_tips
+from xcrack.cutting.level_set import LevelSet
+from xcrack.cutting.level_set_2d import line_levels, tied_to_tips
 from xcrack.mesh.mesh import Mesh
 
 
@@ -100,14 +101,14 @@ def nodal_level_set(
     """
     tips, last = crack.tips or (), len(crack.points) - 1
     if not tips:
-        return level_set(mesh, crack)
+        return line_levels(mesh, crack)
     if first is None:
         length = np.linalg.norm(np.diff(crack.points, axis=0), axis=1)
         first = int(np.argmax(length)) if len(tips) == 2 else (last - 1 if tips[0] == 0 else 0)
     low, high = (first if 0 in tips else 0), (first + 1 if last in tips else last)
     ends = tuple(0 if tip == 0 else high - low for tip in tips)
     start = Crack(crack.points[low : high + 1], crack.faces[: high - low], ends)
-    initial = level_set(mesh, start)
+    initial = line_levels(mesh, start)
     levels, grown = Nodal(initial.phi, initial.psi), start
     for k, tip in enumerate(tips):
         pieces = crack.points[low::-1] if tip == 0 else crack.points[high:]

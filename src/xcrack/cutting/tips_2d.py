@@ -1,4 +1,4 @@
-"""Cells at the tips of a crack in the plane: fans of sub-cells, and the lips that end there."""
+"""Cells at the tips of a crack in 2D: fans of sub-cells, and the lips that end there."""
 
 from dataclasses import dataclass
 
@@ -55,7 +55,17 @@ def _cut_points(
     return _Ends(bary, psi, number)
 
 
-def tip_cells(
+def tip_parts(
+    mesh: Mesh, level_set: LevelSet, positions: Floats, exists: Bools
+) -> list[tuple[SubParts, LipParts, Ints]]:
+    """Sub-cells, lips and entry edges of the cells at each tip; see `_tip_cells`."""
+    return [
+        _tip_cells(mesh, level_set, k, cells, positions, exists)
+        for k, cells in enumerate(level_set.tip_cells)
+    ]
+
+
+def _tip_cells(
     mesh: Mesh, level_set: LevelSet, k: int, cells: Ints, positions: Floats, exists: Bools
 ) -> tuple[SubParts, LipParts, Ints]:
     """Fans of sub-cells from tip k, the lip piece that ends there, and its entry edges."""
@@ -102,3 +112,25 @@ def tip_cells(
     both = np.array(lip_cells, dtype=np.int64)
     two = np.array(lip_bary, dtype=float).reshape(-1, 2, 3)
     return subs, (both, two), np.array(entries, dtype=np.int64)
+
+
+def lips_up_to_tips(
+    mesh: Mesh, level_set: LevelSet, facets: Ints, cells: Ints, psi: Floats
+) -> tuple[Floats, Ints]:
+    """Ends of the lips on plane facets, and the facet of each: those at a tip end there."""
+    x = mesh.points[mesh.facets[facets]]
+    ends_at_tip = np.zeros(len(facets), dtype=bool)
+    for k, tip in enumerate(level_set.tip):
+        own = level_set.psi[k][mesh.facets[facets]]
+        length = np.linalg.norm(x[:, 1] - x[:, 0], axis=1)
+        ahead, behind_ = own.argmax(axis=1), own.argmin(axis=1)
+        row = np.arange(len(facets))
+        reaches = (own[row, ahead] > -1e-9 * length) & (own[row, behind_] < -1e-9 * length)
+        reaches &= np.isin(cells, level_set.tip_cells[k]).any(axis=1)
+        begin = x[row, behind_]
+        x = np.where(
+            reaches[:, None, None], np.stack([begin, np.broadcast_to(tip, begin.shape)], 1), x
+        )
+        ends_at_tip |= reaches
+    near = np.nonzero(ends_at_tip | (psi.mean(axis=1) < 0))[0]
+    return x[near], near

@@ -6,10 +6,8 @@ from typing import Any
 
 from xcrack.crack.crack import Crack
 from xcrack.cutting.cut import cut
-from xcrack.cutting.level_set import LevelSet, level_set
-from xcrack.cutting.level_set_3d import surface_levels
-from xcrack.cutting.level_set_nodal import nodal_level_set
-from xcrack.errors import ProblemError
+from xcrack.cutting.level_set import LevelSet
+from xcrack.cutting.level_sets import level_sets
 from xcrack.mesh.mesh import Mesh
 from xcrack.scene.numerics import Numerics
 from xcrack.scene.problem import Problem
@@ -76,12 +74,6 @@ def build(problem: Problem, bulk_: Bulk | None = None) -> Model:
 
 
 def levels(mesh: Mesh, crack: Crack, numerics: Numerics) -> LevelSet:
-    """Level sets of a placed crack; in space up to where its functions may reach."""
-    nodal = numerics.comparison.update == "nodal"
-    if mesh.dim == 2:
-        return nodal_level_set(mesh, crack) if nodal else level_set(mesh, crack)
-    if nodal:
-        raise ProblemError(
-            'Comparison(update="nodal") is for 2D only: leave it out for a crack in 3D.'
-        )
-    return surface_levels(mesh, crack, front_reach(mesh, crack, numerics.radius))
+    """Level sets of a placed crack; in 3D up to where its functions may reach."""
+    reach = front_reach(mesh, crack, numerics.radius)
+    return level_sets(mesh, crack, reach, nodal=numerics.comparison.update == "nodal")
