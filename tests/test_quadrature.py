@@ -11,7 +11,8 @@ from xcrack.analysis.solve import build
 from xcrack.mesh.simplex import conical, simplex_rule
 from xcrack.xfem.consistent import boundary_points
 from xcrack.xfem.loads import position
-from xcrack.xfem.quadrature import cell_points, segment_points
+from xcrack.xfem.quadrature import cell_points
+from xcrack.xfem.quadrature_2d import segment_points
 
 
 def moment(powers):

@@ -12,9 +12,9 @@ import exact
 import scenes_space as scenes
 import xcrack as xc
 from scenes import numerics_of
+from xcrack.mesh.sizes import leg_size
 from xcrack.solvers import iterative
 from xcrack.solvers.direct import scaled_basis
-from xcrack.xfem.enrichment_3d import leg_size
 from xcrack.xfem.model import build
 
 C = np.array([0.013, -0.021, 0.0317])

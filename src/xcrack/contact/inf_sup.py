@@ -8,9 +8,9 @@ import scipy.sparse.linalg as sla
 from xcrack.arrays import Floats
 from xcrack.contact.multipliers import Multipliers, gap_rows, multipliers
 from xcrack.errors import ProblemError
+from xcrack.mesh.sizes import leg_size
 from xcrack.scene.problem import Problem
 from xcrack.solvers.direct import scaled_basis
-from xcrack.xfem.enrichment_3d import leg_size
 from xcrack.xfem.function_space import FunctionSpace
 from xcrack.xfem.lips import jump_values
 from xcrack.xfem.model import Model, build

@@ -9,6 +9,11 @@ from xcrack.arrays import Bools, Ints
 from xcrack.errors import MeshError
 from xcrack.mesh.mesh import Mesh
 
+_SIDES = {
+    2: [("left", "right"), ("bottom", "top")],
+    3: [("left", "right"), ("front", "back"), ("bottom", "top")],
+}
+
 
 def box(lower: ArrayLike, upper: ArrayLike, n: int | tuple[int, ...]) -> Mesh:
     """Structured simplices in a box, diagonals alternating from cell to cell.
@@ -57,14 +62,9 @@ def box(lower: ArrayLike, upper: ArrayLike, n: int | tuple[int, ...]) -> Mesh:
     x = points[stacked]
     turn = np.linalg.det(x[:, 1:] - x[:, :1]) < 0
     stacked[turn] = stacked[turn][:, [1, 0, *range(2, d + 1)]]
-    names = (
-        [("left", "right"), ("bottom", "top")]
-        if d == 2
-        else [("left", "right"), ("front", "back"), ("bottom", "top")]
-    )
     index = np.stack(np.unravel_index(np.arange(len(points)), tuple(count + 1)), axis=1)
     sets = {}
-    for axis, both in enumerate(names):
+    for axis, both in enumerate(_SIDES[d]):
         for name, end in zip(both, (0, count[axis]), strict=True):
             sets[name] = _facets_on(stacked, index[:, axis] == end)
     return Mesh(points, stacked, sets)

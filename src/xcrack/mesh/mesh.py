@@ -16,6 +16,7 @@ from xcrack.arrays import Floats, Ints, frozen, lock
 from xcrack.errors import MeshError
 
 _FLAT = 1e-12  # a cell whose volume is below this share of (longest edge)^d has no shape
+_CELLS = {2: "triangles", 3: "tetrahedra"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,9 +84,9 @@ class Mesh:
         return Mesh, (self.points, self.cells, dict(self.facet_sets), dict(self.cell_sets))
 
     def __repr__(self) -> str:
-        kind = "triangles" if self.dim == 2 else "tetrahedra"
         names = ", ".join(self.facet_sets)
-        return f"Mesh({self.n_points} points, {len(self.cells)} {kind}, facet sets: {names})"
+        cells = f"{len(self.cells)} {_CELLS[self.dim]}"
+        return f"Mesh({self.n_points} points, {cells}, facet sets: {names})"
 
     @property
     def dim(self) -> int:

@@ -126,14 +126,15 @@ _TETRAHEDRA: dict[int, list[tuple[float, ...]]] = {
         (0.0425460207770814664, *(0.0455037041256496495,) * 2, 0.4544962958743503505),
     ],
 }
+_RULES = {2: _TRIANGLES, 3: _TETRAHEDRA}
 
 
 @lru_cache(maxsize=16)
 def _symmetric(dim: int, degree: int) -> tuple[Floats, Floats]:
     bary, weight = [], []
-    for w, *first in (_TRIANGLES if dim == 2 else _TETRAHEDRA)[degree]:
+    for w, *first in _RULES[dim][degree]:
         orbit = np.array(list(permutations((*first, 1 - sum(first)))))
-        # Coinciding images are told apart by 1e-6; the rules keep their points far wider apart.
+        # Images less than 1e-6 apart are one; the rules keep their points far wider apart.
         unique = np.unique(np.round(orbit, 6), axis=0, return_index=True)[1]
         bary.append(orbit[np.sort(unique)])
         weight.append(np.full(len(unique), w))
@@ -144,8 +145,8 @@ def _symmetric(dim: int, degree: int) -> tuple[Floats, Floats]:
 def simplex_rule(dim: int, degree: int) -> tuple[Floats, Floats]:
     """A rule exact for polynomials of the given degree: points `(q, d + 1)`, weights sum to 1.
 
-    In the plane up to degree 10 it is symmetric, so that a mirrored mesh gives a mirrored result;
-    in space up to degree 5.
+    In 2D up to degree 10 it is symmetric, so that a mirrored mesh gives a mirrored result;
+    in 3D up to degree 5.
     """
     if degree <= 1:
         return np.full((1, dim + 1), 1 / (dim + 1)), np.ones(1)
@@ -153,7 +154,7 @@ def simplex_rule(dim: int, degree: int) -> tuple[Floats, Floats]:
         a = {1: 0.5 - 0.5 / np.sqrt(3), 2: 1 / 6, 3: (5 - np.sqrt(5)) / 20}[dim]
         bary = np.full((dim + 1, dim + 1), a) + np.eye(dim + 1) * (1 - (dim + 1) * a)
         return bary, np.full(dim + 1, 1 / (dim + 1))
-    for known in {2: _TRIANGLES, 3: _TETRAHEDRA}.get(dim, {}):
+    for known in _RULES.get(dim, {}):
         if degree <= known:
             return _symmetric(dim, known)
     return conical(dim, degree // 2 + 1)

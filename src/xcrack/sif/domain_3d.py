@@ -13,6 +13,7 @@ from xcrack.crack.front_curve import Feet, FrontCurve, front_curve
 from xcrack.errors import warn
 from xcrack.mesh.body import Body
 from xcrack.mesh.locate import contains
+from xcrack.mesh.sizes import leg_size
 from xcrack.scene.conditions import (
     BodyForce,
     CrackPressure,
@@ -29,7 +30,6 @@ from xcrack.sif.interaction_3d import (
     solve_front,
 )
 from xcrack.sif.smoothing_3d import along, smoothed
-from xcrack.xfem.enrichment_3d import leg_size
 from xcrack.xfem.loads import position
 from xcrack.xfem.quadrature import cell_points, cell_side
 

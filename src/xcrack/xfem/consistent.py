@@ -18,6 +18,10 @@ from xcrack.xfem.function_space import Batch, FunctionSpace
 from xcrack.xfem.lips import LipPoints
 from xcrack.xfem.quadrature import cell_side
 
+# Dimension and order at which the moments 1 and x are used: in 3D at order 1 only 1, since its
+# pressures cannot be linear to round-off anyway.
+_LINEAR = {(2, 1), (2, 2), (3, 2)}
+
 
 @dataclass(frozen=True, eq=False)
 class BoundaryPoints:
@@ -137,8 +141,7 @@ def corrected(
     corners = mesh.points[mesh.cells[batch.cells]]
     size = mesh.cell_size[batch.cells]
     corners = (corners - corners.mean(axis=1, keepdims=True)) / size[:, None, None]
-    # In space at order 1 only 1: its pressures cannot be linear to round-off anyway.
-    linear = space.order == 2 or d == 2
+    linear = (d, space.order) in _LINEAR
     piece, n_pieces = _pieces(space, batch, row, side)
 
     chosen, brow = _of_batch(batch, boundary.cell)

@@ -3,55 +3,39 @@
 import numpy as np
 
 from xcrack.arrays import Bools, Floats
-from xcrack.crack.crack import Crack, crack_length
-from xcrack.crack.tips_2d import tip_frames
+from xcrack.crack.crack import Crack
 from xcrack.cutting.cut import Cut
-from xcrack.mesh.locate import cells_within, nearest_boundary
+from xcrack.mesh.locate import cells_within
 from xcrack.mesh.mesh import Mesh
 from xcrack.mesh.simplex import cell_nodes, facet_nodes
-from xcrack.xfem.enrichment_3d import front_radii, leg_size
+from xcrack.mesh.sizes import leg_size
+from xcrack.xfem.enrichment_2d import disc_radii
+from xcrack.xfem.enrichment_3d import front_radii
 
-_SHARE = {1: 0.3, 2: 0.4}  # of the free length around a tip, measured best for K at each order
-
-_LEAST = 2.0  # cells
 # Cells: within this distance of a tip all cells carry its functions whole. By dimension and order:
 # at order 1 pressures of closed cracks gained nothing.
 _WHOLE = {(2, 2): 1.5}
-# In cells: by then K is right to 1e-7 (order 2) or 1e-4 (order 1), and a wider disc would only cost
-# unknowns and fill.
-_MOST = {1: 40.0, 2: 20.0}
+
+_RADII = {2: disc_radii, 3: front_radii}
 
 
 def tip_radii(
     mesh: Mesh, cracks: tuple[Crack, ...], cuts: tuple[Cut, ...], order: int, wanted: float | None
 ) -> list[tuple[float, ...]]:
-    """Radius of the enriched disc at each tip of each crack, length; see `front_radii` in space.
+    """Radius of the enriched disc around each tip, in 3D of the tube around each front, by crack.
 
-    Without a wanted radius: a share (0.3 at order 1, 0.4 at order 2) of the smallest of crack
-    length, distance to the boundary and distance to another tip, at most 20 cells (40 at
-    order 1). A wanted radius is kept, and shrunk only where the body or another tip demands.
-    Never below two cells.
+    Parameters
+    ----------
+    mesh : Mesh
+    cracks : tuple of Crack
+    cuts : tuple of Cut
+    order : int
+        Of the standard functions.
+    wanted : float, length, optional
+        Shrunk only where the body or another tip demands; see `disc_radii` and `front_radii` for
+        what is taken without it.
     """
-    if mesh.dim == 3:
-        return front_radii(mesh, cracks, cuts, order, wanted)
-    tips = [tip_frames(crack)[0] for crack in cracks]
-    every = np.concatenate(tips) if tips else np.zeros((0, mesh.dim))
-    radii = []
-    for crack, cut, own in zip(cracks, cuts, tips, strict=True):
-        length = crack_length(crack) / max(len(own), 1)
-        row = []
-        for k, x in enumerate(own):
-            to_boundary, _ = nearest_boundary(mesh, x)
-            apart = np.linalg.norm(every - x, axis=1)
-            to_tip = float(np.min(apart[apart > 0], initial=np.inf))
-            size = leg_size(mesh, cut.level_set.tip_cells[k])
-            if wanted is None:
-                radius = min(_SHARE[order] * min(length, to_boundary, to_tip), _MOST[order] * size)
-            else:
-                radius = min(wanted, 0.8 * to_boundary, 0.45 * to_tip)
-            row.append(max(radius, _LEAST * size))
-        radii.append(tuple(row))
-    return radii
+    return _RADII[mesh.dim](mesh, cracks, cuts, order, wanted)
 
 
 def heaviside_nodes(mesh: Mesh, order: int, cut: Cut) -> Bools:
@@ -78,7 +62,7 @@ def heaviside_nodes(mesh: Mesh, order: int, cut: Cut) -> Bools:
 def tip_points(mesh: Mesh, order: int, cut: Cut, k: int, radius: float, kind: str) -> Bools:
     """Mesh points that carry the functions of tip k `(n,)`.
 
-    At order 2 in the plane, besides those within the radius, the corners of all cells that come
+    At order 2 in 2D, besides those within the radius, the corners of all cells that come
     nearer to the tip than 1.5 cells. The functions represent the field of the tip only in cells
     all of whose corners carry them: in a disc of two cells, points taken by their own distance
     leave such cells out as near as one cell or as far as two, as the mesh happens to lie.

@@ -1,4 +1,4 @@
-"""How far the tip functions reach around fronts in space."""
+"""How far the tip functions reach around fronts in 3D."""
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -9,6 +9,7 @@ from xcrack.crack.size_3d import surface_size
 from xcrack.cutting.cut import Cut
 from xcrack.mesh.body import Body
 from xcrack.mesh.mesh import Mesh
+from xcrack.mesh.sizes import leg_size
 
 # Of the crack's size, of the distance to a side of the body, of that to another front.
 _SHARE, _ASIDE, _APART = 0.65, 0.7, 0.45
@@ -19,12 +20,6 @@ _LEAST = 2.0
 _RANGE = {1: (2.6, 3.6), 2: (2.0, 2.0)}
 _EXIT = 1.5  # a front is near its exit where that is closer than this many distances to the side
 _SAMPLES = 24  # points of an open front at which the distance to the boundary is taken
-
-
-def leg_size(mesh: Mesh, cells: Ints) -> float:
-    """Size of the simplex with right angles that has the mean volume of the cells, length."""
-    factor = 2.0 if mesh.dim == 2 else 6.0
-    return float((factor * mesh.volume[cells].mean()) ** (1 / mesh.dim))
 
 
 def front_reach(mesh: Mesh, crack: Crack, wanted: float | None) -> float:

@@ -7,7 +7,7 @@ import numpy as np
 from xcrack.arrays import Bools, Floats, Ints
 from xcrack.mesh.split import cut_simplices
 from xcrack.xfem.function_space import FunctionSpace
-from xcrack.xfem.quadrature import segment_points
+from xcrack.xfem.quadrature_2d import segment_points
 from xcrack.xfem.quadrature_3d import radius_at, triangle_points
 
 _AT = 1e-10  # share of a facet's level set below which a value is zero
@@ -35,9 +35,9 @@ class FacetParts:
 def split_facets(space: FunctionSpace, ends: Ints) -> FacetParts:
     """Split facets `(k, d)`, given by their points, where cracks cross them.
 
-    In space those of cells at a front are split along psi too.
+    In 3D those of cells at a front are split along psi too.
     """
-    return _split_segments(space, ends) if space.dim == 2 else _split_triangles(space, ends)
+    return _SPLIT[space.dim](space, ends)
 
 
 def part_points(
@@ -67,11 +67,21 @@ def part_points(
         Length or area.
     """
     x = np.einsum("svm,smd->svd", bary, space.mesh.points[nodes])
-    if space.dim == 2:
-        rule = segment_points(space, x[:, 0], x[:, 1], n)
-        place = np.stack([1 - rule.position, rule.position], axis=1)
-        length = np.linalg.norm(x[:, 1] - x[:, 0], axis=1)
-        return rule.segment, place, length[rule.segment] * rule.weight
+    return _POINTS[space.dim](space, x, nodes, bary, n)
+
+
+def _on_segments(
+    space: FunctionSpace, x: Floats, nodes: Ints, bary: Floats, n: int
+) -> tuple[Ints, Floats, Floats]:
+    rule = segment_points(space, x[:, 0], x[:, 1], n)
+    place = np.stack([1 - rule.position, rule.position], axis=1)
+    length = np.linalg.norm(x[:, 1] - x[:, 0], axis=1)
+    return rule.segment, place, length[rule.segment] * rule.weight
+
+
+def _on_triangles(
+    space: FunctionSpace, x: Floats, nodes: Ints, bary: Floats, n: int
+) -> tuple[Ints, Floats, Floats]:
     sides = x[:, [1, 2, 0]] - x
     size = np.linalg.norm(sides, axis=2).max(axis=1)
     number, place, share = triangle_points(radius_at(space, nodes, bary), size)
@@ -141,6 +151,10 @@ def _touched(space: FunctionSpace, c: int) -> tuple[Bools, Bools]:
         flag[mesh.cell_to_facet[cells]] = True
         flags.append(flag)
     return flags[0], flags[1]
+
+
+_SPLIT = {2: _split_segments, 3: _split_triangles}
+_POINTS = {2: _on_segments, 3: _on_triangles}
 
 
 def _split(

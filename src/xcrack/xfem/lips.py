@@ -27,7 +27,7 @@ class LipPoints:
         From lip - to lip +.
     x : (q, d) array, length
     s : (q,) array, length
-        In the plane: position along the crack from where it enters the body; zero in space.
+        In 2D: position along the crack from where it enters the body; zero in 3D.
     """
 
     segment: Ints
@@ -51,11 +51,7 @@ def lip_points(space: FunctionSpace, c: int, n: int = 6) -> LipPoints:
     at = np.einsum("qv,qsvb->qsb", place, bary[k])
     corners = cut.lip_points(mesh)
     x = np.einsum("qv,qvd->qd", place, corners[k])
-    if mesh.dim == 2:
-        ends = arc_position(space.cracks[c].points, corners.reshape(-1, mesh.dim))
-        s = arc_position(space.cracks[c].points, x) - ends.min(initial=np.inf)
-    else:
-        s = np.zeros(len(x))
+    s = _POSITION[mesh.dim](space.cracks[c].points, x, corners)
     order = np.argsort(s, kind="stable")
     k = k[order]
     return LipPoints(
@@ -67,6 +63,19 @@ def lip_points(space: FunctionSpace, c: int, n: int = 6) -> LipPoints:
         x[order],
         s[order],
     )
+
+
+def _along_line(polyline: Floats, x: Floats, corners: Floats) -> Floats:
+    ends = arc_position(polyline, corners.reshape(-1, 2))
+    return arc_position(polyline, x) - ends.min(initial=np.inf)
+
+
+def _nowhere(points: Floats, x: Floats, corners: Floats) -> Floats:
+    """A surface has no order of its points."""
+    return np.zeros(len(x))
+
+
+_POSITION = {2: _along_line, 3: _nowhere}
 
 
 def arc_position(polyline: Floats, x: Floats) -> Floats:

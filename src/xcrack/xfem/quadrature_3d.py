@@ -1,4 +1,4 @@
-"""Integration points around the fronts of cracks in space.
+"""Integration points around the fronts of cracks in 3D.
 
 Near a front the products of derivatives of tip functions go like 1 / r. Sub-cells that touch the
 front with an edge are swept by rays from that edge, those that touch it with a vertex by rays
@@ -16,7 +16,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from xcrack.arrays import Floats, Ints, lock
+from xcrack.arrays import Bools, Floats, Ints, lock
 from xcrack.mesh.mesh import local_edges
 from xcrack.mesh.simplex import gauss, simplex_rule
 from xcrack.xfem.function_space import FunctionSpace
@@ -48,7 +48,7 @@ def radius_at(space: FunctionSpace, nodes: Ints, bary: Floats) -> Floats:
 
 
 def front_points(
-    space: FunctionSpace, cell: Ints, bary: Floats, share: Floats, n: int
+    space: FunctionSpace, cell: Ints, bary: Floats, share: Floats, fan: Bools, n: int
 ) -> tuple[Ints, Floats, Floats]:
     """Points in sub-cells on which tip functions act.
 
@@ -60,6 +60,8 @@ def front_points(
         Vertices of the sub-cells in their cells.
     share : (s,) array
         Of the cell's volume.
+    fan : (s,) array of bool
+        Not used: which vertices lie on the front follows from the level sets.
     n : int
         Gauss points along the angle at a front; at order 2 one more.
 
