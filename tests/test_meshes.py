@@ -1,13 +1,12 @@
-import builtins
 import importlib.util
 import signal
-import sys
 from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from xcrack import optional
 from xcrack.errors import GeometryError, MeshError, XcrackError
 from xcrack.mesh.files import read_mesh
 from xcrack.mesh.gmsh_session import SYSTEM_LIBRARIES, import_gmsh, session
@@ -239,15 +238,10 @@ def test_a_body_that_gmsh_cannot_mesh_is_a_mesh_error(monkeypatch):
     ],
 )
 def test_a_gmsh_that_does_not_load_says_what_to_install(error, says, monkeypatch):
-    plain = builtins.__import__
+    def lame(name):
+        raise error
 
-    def lame(name, *args, **kwargs):
-        if name == "gmsh":
-            raise error
-        return plain(name, *args, **kwargs)
-
-    monkeypatch.delitem(sys.modules, "gmsh", raising=False)
-    monkeypatch.setattr(builtins, "__import__", lame)
+    monkeypatch.setattr(optional, "import_module", lame)
     with pytest.raises(XcrackError, match=says):
         example_plate()
 

@@ -1,17 +1,16 @@
 """Cracks in space: flat ones by their outline, others by their triangles."""
 
-import warnings
 from os import PathLike
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from xcrack.arrays import Floats, Ints
 from xcrack.crack.crack import Crack
-from xcrack.errors import GeometryError, XcrackError
+from xcrack.errors import GeometryError
 from xcrack.geometry.polygon import ear_clipped, self_crossing
 from xcrack.geometry.triangulation import face_areas, oriented, rim, side_keys
+from xcrack.mesh.files import read_triangles
 
 _FLAT = 1e-9  # share of its size by which a plane polygon may leave its plane
 _FEWEST = 8  # boundary points that still make a disc
@@ -330,29 +329,7 @@ def read_surface(path: str | PathLike[str]) -> Crack:
     GeometryError
         It holds no triangles, or not such as `surface_crack` takes.
     """
-    import meshio
-
-    path = Path(path)
-    if not path.is_file():
-        raise XcrackError(
-            f"surface file {str(path)!r} does not exist (looked in {Path.cwd()}): check the path."
-        )
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            raw = meshio.read(path)
-    except (Exception, SystemExit) as error:
-        raise XcrackError(
-            f"surface file {str(path)!r} cannot be read as {path.suffix or 'a file'}: {error}"
-        ) from error
-    blocks = [block.data for block in raw.cells if block.type == "triangle"]
-    if not blocks:
-        kinds = sorted({block.type for block in raw.cells})
-        raise GeometryError(
-            f"surface file {str(path)!r} holds no triangles, but {kinds or 'nothing'}: export the "
-            "surface as linear triangles."
-        )
-    return surface_crack(*_merged(np.asarray(raw.points, dtype=float), np.concatenate(blocks)))
+    return surface_crack(*_merged(*read_triangles(path)))
 
 
 def _merged(points: Floats, triangles: Ints) -> tuple[Floats, Ints]:

@@ -52,7 +52,8 @@ def read_abaqus(path: Path) -> RawMesh:
     Raises
     ------
     MeshError
-        Several parts, an element that names an unknown node, a line that is no numbers.
+        Several parts, an element that names an unknown node, a line without numbers, a file that
+        includes itself.
     """
     nodes: dict[int, list[float]] = {}
     elements: dict[int, tuple[str, list[int]]] = {}
@@ -88,15 +89,17 @@ def read_abaqus(path: Path) -> RawMesh:
     return _raw(path.name, nodes, elements, element_sets, point_sets, faces)
 
 
-def write_abaqus(path: Path, mesh: Mesh) -> None:
-    """Write a mesh as Abaqus input: cells as CPS3 or C3D4, facets of sets as T3D2 or S3.
+def abaqus_text(mesh: Mesh) -> str:
+    """A mesh as Abaqus input: cells as CPS3 or C3D4, facets of sets as T3D2 or S3.
 
     Parameters
     ----------
-    path : Path
-        Where to.
     mesh : Mesh
         What to write; its sets become ``*ELSET``.
+
+    Returns
+    -------
+    str
 
     Raises
     ------
@@ -106,7 +109,7 @@ def write_abaqus(path: Path, mesh: Mesh) -> None:
     facet_sets, cell_sets = sets_to_write(mesh)
     for name in (*facet_sets, *cell_sets):
         if not name or "," in name or "\n" in name or name != name.strip():
-            raise MeshError(f"set name {name!r}: Abaqus files hold no commas or line breaks.")
+            raise MeshError(f"set name {name!r}: Abaqus files take no commas or line breaks.")
     numbers = {name: mesh.facet_numbers(facets) for name, facets in facet_sets.items()}
     rows = np.unique(np.concatenate([np.zeros(0, np.int64), *numbers.values()]))
     flat = ", 0." * (3 - mesh.dim)
@@ -127,7 +130,7 @@ def write_abaqus(path: Path, mesh: Mesh) -> None:
         ).tolist()
         lines.append(f"*ELSET, ELSET={name}")
         lines += [", ".join(map(str, members[i : i + 16])) for i in range(0, len(members), 16)]
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return "\n".join(lines) + "\n"
 
 
 def _rows(elements: Ints, first: int) -> Iterable[str]:
@@ -135,8 +138,11 @@ def _rows(elements: Ints, first: int) -> Iterable[str]:
         yield f"{i}, {', '.join(map(str, row))}"
 
 
-def _sections(path: Path) -> Iterator[Section]:
+def _sections(path: Path, outer: tuple[Path, ...] = ()) -> Iterator[Section]:
     """Keyword, options and data rows of each section, included files in their place."""
+    own = path.resolve()
+    if own in outer:
+        raise MeshError(f"{path.name} includes itself: leave that *INCLUDE out.")
     keyword = ""
     options: dict[str, str] = {}
     rows: list[list[str]] = []
@@ -157,21 +163,21 @@ def _sections(path: Path) -> Iterator[Section]:
             inner = path.parent / options["INPUT"]
             if not inner.is_file():
                 raise MeshError(f"{path.name} includes {str(inner)!r}, which does not exist.")
-            yield from _sections(inner)
+            yield from _sections(inner, (*outer, own))
     if keyword:
         yield keyword, options, rows
 
 
 def _kind(element_type: str) -> str:
     name = element_type.upper()
-    if found := re.match(_SOLID, name):
-        return _SOLID_KIND.get(found.group(1), element_type)
+    if solid := re.match(_SOLID, name):
+        return _SOLID_KIND.get(solid.group(1), element_type)
     if re.match(_LINE_3, name):
         return "line3"
     if re.match(_LINE, name):
         return "line"
-    if found := re.match(_PLANE, name):
-        return _PLANE_KIND.get(found.group(1), element_type)
+    if plane := re.match(_PLANE, name):
+        return _PLANE_KIND.get(plane.group(1), element_type)
     return element_type or "element without TYPE"
 
 

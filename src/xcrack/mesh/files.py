@@ -1,9 +1,11 @@
-"""Meshes from files and to files, in any format meshio knows."""
+"""Meshes and surfaces from files, meshes to files, in any format that meshio reads or writes."""
 
 import contextlib
 import io
+import os
 import re
 import shlex
+import warnings
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -11,11 +13,12 @@ from urllib.parse import quote, unquote
 
 import numpy as np
 
-from xcrack.arrays import Ints
-from xcrack.errors import MeshError, XcrackError, warn
-from xcrack.mesh.abaqus import read_abaqus, write_abaqus
+from xcrack.arrays import Floats, Ints
+from xcrack.errors import GeometryError, MeshError, XcrackError, warn
+from xcrack.inputs import path_of, system_errors
+from xcrack.mesh.abaqus import abaqus_text, read_abaqus
 from xcrack.mesh.mesh import Mesh
-from xcrack.mesh.msh import REST, write_msh
+from xcrack.mesh.msh import REST, msh_text
 from xcrack.mesh.raw import (
     CELL_KIND,
     FACET_KIND,
@@ -24,6 +27,7 @@ from xcrack.mesh.raw import (
     mesh_from_raw,
     sets_to_write,
 )
+from xcrack.optional import required
 
 _SET = "set:"  # prefix of the 0/1 cell data that carry a set in formats without sets
 _WITH_CELL_DATA = {".vtu", ".vtk", ".xdmf", ".xmf"}
@@ -32,12 +36,12 @@ _ENTITY_TAGS = "gmsh:geometrical"
 
 
 def read_mesh(path: str | PathLike[str]) -> Mesh:
-    """Read a mesh of triangles (plane) or tetrahedra (space) with its sets.
+    """Read a mesh of triangles (2D) or tetrahedra (3D) with its sets.
 
     Parameters
     ----------
     path : path
-        File in a format of meshio, told by its extension: ``.msh`` (gmsh 2.2, 4.1, text or
+        File in a format of meshio, chosen by its extension: ``.msh`` (gmsh 2.2, 4.1, text or
         binary), ``.inp`` (Abaqus), ``.vtu``, ``.vtk``, ``.mesh``, ``.xdmf`` ...
 
     Returns
@@ -53,12 +57,12 @@ def read_mesh(path: str | PathLike[str]) -> Mesh:
         * vtu, vtk, xdmf: cell data named ``set:<name>``, not zero on members, lower-dimensional
           cells included (so `write_mesh` stores them).
 
-        Triangles with z = constant give a plane mesh. Points that no cell uses are dropped.
+        Triangles with z = constant give a 2D mesh. Points that no cell uses are dropped.
 
     Raises
     ------
     XcrackError
-        The file is missing, or of a kind nobody can read.
+        The file is missing, may not be read, or has an unknown extension.
     MeshError
         The contents are unreadable, or no mesh of linear triangles or tetrahedra.
 
@@ -71,16 +75,52 @@ def read_mesh(path: str | PathLike[str]) -> Mesh:
     >>> read_mesh(path)
     Mesh(9 points, 8 triangles, facet sets: left, right, bottom, top, boundary)
     """
-    path = Path(path)
-    if not path.is_file():
-        raise XcrackError(
-            f"mesh file {str(path)!r} does not exist (looked in {Path.cwd()}): check the path."
-        )
-    if path.suffix.lower() == ".inp":
-        raw = read_abaqus(path)
-    else:
-        raw = _raw_from_meshio(_meshio_read(path), _gmsh_names(path))
+    path = _existing(path, "mesh")
+    with system_errors("cannot read the mesh file", path):
+        if path.suffix.lower() == ".inp":
+            raw = read_abaqus(path)
+        else:
+            raw = _raw_from_meshio(_meshio_read(path, "mesh"), _gmsh_names(path))
     return mesh_from_raw(raw, path.name)
+
+
+def read_triangles(path: str | PathLike[str]) -> tuple[Floats, Ints]:
+    """Read the points and triangles of a surface.
+
+    Parameters
+    ----------
+    path : path
+        File in a format of meshio, chosen by its extension.
+
+    Returns
+    -------
+    points : (p, 2) or (p, 3) array, length
+    triangles : (f, 3) array of int
+
+    Raises
+    ------
+    XcrackError
+        The file is missing, cannot be read, or has an unknown extension.
+    GeometryError
+        It contains no linear triangles.
+    """
+    path = _existing(path, "surface")
+    with system_errors("cannot read the surface file", path):
+        raw = _meshio_read(path, "surface")
+    blocks = [block.data for block in raw.cells if block.type == "triangle"]
+    if not blocks:
+        kinds = sorted({block.type for block in raw.cells})
+        raise GeometryError(
+            f"surface file {str(path)!r} has no triangles, but {kinds or 'nothing'}: export the "
+            "surface as linear triangles."
+        )
+    points, triangles = np.asarray(raw.points, dtype=float), np.concatenate(blocks)
+    if triangles.min() < 0 or triangles.max() >= len(points):
+        raise GeometryError(
+            f"surface file {str(path)!r}: a triangle names a point that the file lacks (it has "
+            f"{len(points)} points): the file is damaged."
+        )
+    return points, triangles.astype(np.int64)
 
 
 def write_mesh(path: str | PathLike[str], mesh: Mesh, *, msh_version: str = "4.1") -> None:
@@ -98,7 +138,7 @@ def write_mesh(path: str | PathLike[str], mesh: Mesh, *, msh_version: str = "4.1
     Parameters
     ----------
     path : path
-        Where to; the extension tells the format.
+        Where to; the extension chooses the format.
     mesh : Mesh
         What to write.
     msh_version : {"4.1", "2.2"}
@@ -107,31 +147,70 @@ def write_mesh(path: str | PathLike[str], mesh: Mesh, *, msh_version: str = "4.1
     Raises
     ------
     XcrackError
-        Unknown extension, or a folder that does not exist.
+        Unknown extension, a folder that does not exist, or what the system refuses (no space, no
+        permission).
     MeshError
         A name of a set that the format cannot hold.
     """
-    path = Path(path)
+    path = path_of(path, "write_mesh: path")
+    if not isinstance(mesh, Mesh):
+        raise MeshError(f"write_mesh: give a Mesh, not {type(mesh).__name__}.")
     if not path.parent.is_dir():
         raise XcrackError(f"folder {str(path.parent)!r} does not exist: make it first.")
+    if path.is_dir():
+        raise XcrackError(f"{str(path)!r} is a folder: give the path of a file in it.")
     extension = path.suffix.lower()
     if extension == ".msh":
-        write_msh(path, mesh, msh_version)
+        _write_text(path, msh_text(mesh, msh_version))
     elif extension == ".inp":
-        write_abaqus(path, mesh)
+        _write_text(path, abaqus_text(mesh))
     else:
         _meshio_write(path, mesh)
 
 
-def _meshio_read(path: Path) -> Any:
-    import meshio
+def _write_text(path: Path, text: str) -> None:
+    """Write a file wholly or not at all."""
+    whole = path.resolve()
+    part = whole.with_name(f".{whole.name}.{os.getpid()}.part")
+    with system_errors("the mesh is not written (an older file is left as it was) to", path):
+        try:
+            part.write_text(text, encoding="utf-8")
+            os.replace(part, whole)
+        except OSError:
+            with contextlib.suppress(OSError):
+                part.unlink()
+            raise
 
+
+def _existing(value: str | PathLike[str], what: str) -> Path:
+    """Path of a file that is there."""
+    path = path_of(value, f"path of the {what} file")
+    if path.is_dir():
+        raise XcrackError(f"{what} file {str(path)!r} is a folder: give the path of a file in it.")
+    with system_errors(f"cannot read the {what} file", path):
+        if not path.exists():
+            raise XcrackError(
+                f"{what} file {str(path)!r} does not exist (looked in {Path.cwd()}): check the "
+                "path."
+            )
+    return path
+
+
+def _meshio_read(path: Path, what: str) -> Any:
+    meshio = required("meshio", f"reading a {path.suffix} file")
     _check_extension(path, "read", meshio.extension_to_filetypes)
-    said = io.StringIO()
+    output = io.StringIO()
     try:
         # meshio prints what went wrong and leaves python where no reader fits.
-        with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
+        with (
+            contextlib.redirect_stdout(output),
+            contextlib.redirect_stderr(output),
+            warnings.catch_warnings(),
+        ):
+            warnings.simplefilter("ignore")  # of numpy, about damaged files
             return meshio.read(path)
+    except OSError:
+        raise
     except (Exception, SystemExit) as error:
         if "gmsh:physical" in str(error):
             reason = (
@@ -139,13 +218,15 @@ def _meshio_read(path: Path) -> Any:
                 "set Mesh.SaveAll = 0, or put every point, curve and surface into a group"
             )
         else:
-            reason = " ".join(f"{said.getvalue()} {error}".split())
-        raise MeshError(f"cannot read {str(path)!r}: {reason}.") from error
+            reason = " ".join(f"{output.getvalue()} {error}".split()) or type(error).__name__
+        raise MeshError(
+            f"cannot read the {what} file {str(path)!r}: {reason}. Check that it is a whole "
+            f"{path.suffix} file."
+        ) from error
 
 
 def _meshio_write(path: Path, mesh: Mesh) -> None:
-    import meshio
-
+    meshio = required("meshio", f"writing a {path.suffix} file")
     _check_extension(path, "write", meshio.extension_to_filetypes)
     points = np.zeros((mesh.n_points, 3))
     points[:, : mesh.dim] = mesh.points
@@ -166,12 +247,18 @@ def _meshio_write(path: Path, mesh: Mesh) -> None:
             f"{path.name}: {path.suffix} files carry no sets, so "
             f"{sorted({*facet_sets, *cell_sets})} are lost; write .msh, .inp or .vtu to keep them."
         )
-    said = io.StringIO()
+    output = io.StringIO()
     try:
-        with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
+        with (
+            contextlib.redirect_stdout(output),
+            contextlib.redirect_stderr(output),
+            system_errors("the mesh is not, or not wholly, written to", path),
+        ):
             meshio.Mesh(points, blocks, cell_data=data).write(path)
+    except XcrackError:
+        raise
     except (Exception, SystemExit) as error:
-        reason = " ".join(f"{said.getvalue()} {error}".split())
+        reason = " ".join(f"{output.getvalue()} {error}".split())
         raise MeshError(f"cannot write {str(path)!r}: {reason}.") from error
 
 
@@ -187,12 +274,17 @@ def _gmsh_names(path: Path) -> dict[tuple[int, int], str]:
     """Names of the physical groups by dimension and tag: meshio keeps one dimension a name."""
     if path.suffix.lower() != ".msh":
         return {}
-    found = re.search(rb"\$PhysicalNames\s(.*?)\$EndPhysicalNames", path.read_bytes(), re.DOTALL)
+    section = re.search(rb"\$PhysicalNames\s(.*?)\$EndPhysicalNames", path.read_bytes(), re.DOTALL)
     names = {}
-    for line in found.group(1).decode().splitlines()[1:] if found else []:
-        fields = shlex.split(line)
-        if len(fields) == 3:
-            names[int(fields[0]), int(fields[1])] = fields[2]
+    try:
+        for line in section.group(1).decode().splitlines()[1:] if section else []:
+            fields = shlex.split(line)
+            if len(fields) == 3:
+                names[int(fields[0]), int(fields[1])] = fields[2]
+    except ValueError as error:  # a quotation mark left open, no number, no text
+        raise MeshError(
+            f"cannot read the names of the physical groups in {str(path)!r} ({error})."
+        ) from error
     return names
 
 

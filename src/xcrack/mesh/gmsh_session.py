@@ -6,11 +6,14 @@ from contextlib import contextmanager
 from types import ModuleType
 
 from xcrack.errors import XcrackError
+from xcrack.optional import required
 
 SYSTEM_LIBRARIES = (
     "apt-get install -y --no-install-recommends libglu1-mesa libgl1 libegl1 libgl1-mesa-dri "
     "libxrender1 libxcursor1 libxfixes3 libxext6 libxft2 libfontconfig1 libxinerama1 libgomp1"
 )
+
+_WITHOUT = "Meshes from a file (read_mesh) and box need no gmsh."
 
 # Options outlive models and even gmsh.clear(), so each one that shapes a mesh is set here.
 # Two threads give the same number of nodes at different places from run to run.
@@ -63,21 +66,15 @@ def import_gmsh() -> ModuleType:
         gmsh is not installed, or cannot load a library of the system.
     """
     try:
-        import gmsh
-    except ModuleNotFoundError as error:
+        return required("gmsh", "a mesh generator", _WITHOUT)
+    except XcrackError as error:
+        library = re.search(r"[\w+-]+\.so[.\d]*", str(error.__cause__))
+        if library is None:
+            raise
         raise XcrackError(
-            f"mesh generators need gmsh, and python has none ({error}): pip install gmsh. "
-            "Meshes from a file (read_mesh) and box need no gmsh."
-        ) from error
-    except (ImportError, OSError) as error:
-        found = re.search(r"[\w+-]+\.so[.\d]*", str(error))
-        library = found.group(0) if found else str(error)
-        raise XcrackError(
-            f"gmsh cannot load the system library {library}. On a Debian-like system, as root:\n"
-            f"    {SYSTEM_LIBRARIES}\n"
-            "Meshes from a file (read_mesh) and box need no gmsh."
-        ) from error
-    return gmsh
+            f"gmsh cannot load the system library {library.group(0)}. On a Debian-like system, as "
+            f"root:\n    {SYSTEM_LIBRARIES}\n{_WITHOUT}"
+        ) from error.__cause__
 
 
 @contextmanager

@@ -1,7 +1,6 @@
 """Write gmsh's msh format: meshio's writer knows one physical group an entity, and no overlap."""
 
 from collections.abc import Iterable
-from pathlib import Path
 
 import numpy as np
 
@@ -16,19 +15,21 @@ _ELEMENT_TYPE = {1: 1, 2: 2, 3: 4}  # gmsh's numbers of line, triangle, tetrahed
 Entity = tuple[int, int, Ints, Ints]  # dimension, number, tags of its groups, its elements
 
 
-def write_msh(path: Path, mesh: Mesh, version: str = "4.1") -> None:
-    """Write a mesh as msh text; every set is a physical group.
+def msh_text(mesh: Mesh, version: str = "4.1") -> str:
+    """A mesh as msh text; every set is a physical group.
 
     Elements that share the same sets make one entity, which bears the groups of all of them.
 
     Parameters
     ----------
-    path : Path
-        Where to.
     mesh : Mesh
         What to write.
     version : {"4.1", "2.2"}
         Version of the format.
+
+    Returns
+    -------
+    str
 
     Raises
     ------
@@ -50,7 +51,7 @@ def write_msh(path: Path, mesh: Mesh, version: str = "4.1") -> None:
     names += [(d, tag, name) for tag, name in enumerate(cell_names, 1)]
     body = _version_4(mesh, entities) if version == "4.1" else _version_2(mesh, entities)
     lines = ["$MeshFormat", f"{version} 0 8", "$EndMeshFormat", *_names(names), *body]
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return "\n".join(lines) + "\n"
 
 
 def _groups(
@@ -76,7 +77,7 @@ def _groups(
 def _names(names: list[tuple[int, int, str]]) -> Iterable[str]:
     for _, _, name in names:
         if '"' in name or "\n" in name or "\\" in name:
-            raise MeshError(f"set name {name!r}: msh files hold no quotation marks or backslashes.")
+            raise MeshError(f"set name {name!r}: msh files take no quotation marks or backslashes.")
     yield from ["$PhysicalNames", str(len(names))]
     yield from (f'{dim} {tag} "{name}"' for dim, tag, name in names)
     yield "$EndPhysicalNames"

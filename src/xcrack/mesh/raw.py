@@ -70,6 +70,11 @@ def mesh_from_raw(raw: RawMesh, source: str) -> Mesh:
             f"{source} has no triangles and no tetrahedra (found: {found}). In gmsh, mesh the "
             "surface or volume, and if there are physical groups, put it into one."
         )
+    if doubled.min() < 0 or doubled.max() >= len(raw.points):
+        raise MeshError(
+            f"{source}: a cell names a point that the file lacks (it has {len(raw.points)} "
+            "points): the file is damaged."
+        )
     points = _in_dimensions(raw.points, doubled, dim, source)
     cells = _unique_rows(doubled)
     used = np.unique(cells)

@@ -1,0 +1,56 @@
+"""Packages that are imported only where they are used: gmsh, meshio, pyvista, matplotlib ..."""
+
+from importlib import import_module
+from types import ModuleType
+
+from xcrack.errors import XcrackError
+
+
+def required(name: str, purpose: str, instead: str = "") -> ModuleType:
+    """Import a package that only some functions need; an error says how to install it.
+
+    Parameters
+    ----------
+    name : str
+        Of the module, such as ``"matplotlib.pyplot"``.
+    purpose : str
+        What it is for, such as ``"plot(renderer='pyvista')"``; the message begins with it.
+    instead : str
+        What can be done without it: a sentence for the end of the message.
+
+    Returns
+    -------
+    module
+
+    Raises
+    ------
+    XcrackError
+        The package is not installed, or cannot be imported.
+
+    Examples
+    --------
+    >>> required("math", "an example").__name__
+    'math'
+    """
+    package = name.partition(".")[0]
+    try:
+        return import_module(name)
+    except ModuleNotFoundError as error:
+        missing = (error.name or package).partition(".")[0]
+        needs = "" if missing == package else f" of the package {package}"
+        problem = (
+            f"{purpose} needs the package {missing}{needs}, which is not installed in this Python: "
+            f"python -m pip install {missing}."
+        )
+        cause: Exception = error
+    except (ImportError, OSError) as error:
+        problem = (
+            f"{purpose} needs the package {package}, which is installed but cannot be imported "
+            f"({error}): python -m pip install --force-reinstall {package}, or install the system "
+            "library that the message names."
+        )
+        cause = error
+    raise XcrackError(f"{problem} {instead}".rstrip()) from cause
+
+
+__all__ = ["required"]
