@@ -6,7 +6,7 @@ from functools import cache
 import pytest
 
 from growth_fakes import mode_I, patch_respond, plate
-from xcrack.crack.crack import line_crack
+from xcrack.crack.lines import line_crack
 from xcrack.growth.criteria import weighted_angle
 from xcrack.growth.laws import paris
 from xcrack.growth.run import grow

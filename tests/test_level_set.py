@@ -12,8 +12,8 @@ from xcrack.crack.placing_2d import place_line
 from xcrack.crack.tips_2d import tip_frames
 from xcrack.cutting.cut import cut
 from xcrack.cutting.level_set_2d import line_levels
+from xcrack.geometry.simplices import closest_on_segment
 from xcrack.kernels.distance import polyline_distance
-from xcrack.mesh.locate import closest_on_segment
 
 EXAMPLE_MESHES = Path(__file__).parents[1] / "examples" / "meshes"
 

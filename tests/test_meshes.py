@@ -143,7 +143,7 @@ REFUSED = {
     "size = 31 is larger than the plate": {"size": 31.0},
     "size_near = 5 is larger than size = 4": {"size_near": 5.0},
     "reaches 1 beyond the plate": {"center": (16.0, 0.0)},
-    r"hole 0: centre \(nan": {"center": (np.nan, 0.0)},
+    r"hole 0: centre\[0\] = nan": {"center": (np.nan, 0.0)},
     "points, more than 5e": {"size": 1e-3, "size_near": 1e-3},
     "along = ": {"along": [(1.0, 2.0, 3.0)]},
 }

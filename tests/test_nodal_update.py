@@ -15,7 +15,7 @@ from xcrack.crack.tips_2d import tip_frames
 from xcrack.cutting.cut import cut
 from xcrack.cutting.level_set_2d import line_levels
 from xcrack.cutting.level_set_nodal import Nodal, nodal_level_set, nodal_update
-from xcrack.mesh.locate import closest_on_segment
+from xcrack.geometry.simplices import closest_on_segment
 
 STEP = np.radians(5.0)
 STEEL = xc.Isotropic(1.3, 0.27, plane="strain")

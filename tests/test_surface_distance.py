@@ -17,8 +17,8 @@ from xcrack.geometry.distances import (
     surface_distance,
     triangle_tree,
 )
+from xcrack.geometry.simplices import closest_on_segment, distance_to_simplices
 from xcrack.geometry.triangulation import face_normals, rim, split_sides
-from xcrack.mesh.locate import closest_on_segment, distance_to_simplices
 
 ROUND_OFF = 1e-14
 

@@ -13,7 +13,7 @@ def length_inside(crack: Crack, mesh: Mesh) -> float:
 
     A mouth lies outside, as far as the crack was prolonged; that part does not count.
     """
-    facets = mesh.points[mesh.facet_sets["boundary"]]
+    facets = mesh.points[mesh.boundary]
     q, s = facets[:, 0], facets[:, 1] - facets[:, 0]
     total = 0.0
     for first, second in crack.faces:

@@ -1,14 +1,18 @@
 """Structured meshes."""
 
 from itertools import permutations
+from math import factorial
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from xcrack.arrays import Bools, Ints
 from xcrack.errors import MeshError
-from xcrack.mesh.mesh import Mesh
+from xcrack.inputs import numbers, whole_numbers
+from xcrack.mesh.checks import LARGEST
+from xcrack.mesh.mesh import Mesh, sound_mesh
 
+_MOST_CELLS = 1e8  # more do not fit into the memory of any machine that solves them
 _SIDES = {
     2: [("left", "right"), ("bottom", "top")],
     3: [("left", "right"), ("front", "back"), ("bottom", "top")],
@@ -28,25 +32,38 @@ def box(lower: ArrayLike, upper: ArrayLike, n: int | tuple[int, ...]) -> Mesh:
     Returns
     -------
     Mesh
-        Facet sets ``left/right`` (x), ``bottom/top`` (last axis), in space ``front/back`` (y).
+        Facet sets ``left/right`` (x), ``bottom/top`` (last axis), in 3D ``front/back`` (y).
 
     Raises
     ------
     MeshError
-        Corners that do not span a box, or n below 1.
+        Corners that do not span a box, n that is not a whole number or below 1.
 
     Examples
     --------
     >>> box((0, 0), (2, 1), (4, 2))
     Mesh(15 points, 16 triangles, facet sets: left, right, bottom, top, boundary)
     """
-    low, high = np.asarray(lower, dtype=float), np.asarray(upper, dtype=float)
+    low = numbers(lower, "box: lower", (None,), error=MeshError)
     d = len(low)
-    count = np.broadcast_to(np.asarray(n, dtype=np.int64), (d,))
-    if d not in (2, 3) or high.shape != low.shape or not (high > low).all():
-        raise MeshError(f"box: upper {high.tolist()} must exceed lower {low.tolist()}, d = 2 or 3.")
+    if d not in (2, 3):
+        raise MeshError(f"box: lower {low.tolist()} needs two or three coordinates.")
+    high = numbers(upper, "box: upper", (d,), error=MeshError)
+    if not (high > low).all() or max(np.abs(low).max(), np.abs(high).max()) > LARGEST:
+        raise MeshError(
+            f"box: upper {high.tolist()} must exceed lower {low.tolist()}, and neither "
+            f"{LARGEST:.0e}."
+        )
+    count = whole_numbers(n, "box: n", error=MeshError)
+    if count.ndim:
+        count = whole_numbers(count, "box: n", (d,), error=MeshError)
+    count = np.broadcast_to(count, (d,))
     if (count < 1).any():
         raise MeshError(f"box: n must be at least 1 in every direction, not {count.tolist()}.")
+    if float(np.prod(count.astype(float))) * factorial(d) > _MOST_CELLS:
+        raise MeshError(
+            f"box: n = {count.tolist()} asks for more than {_MOST_CELLS:.0e} cells: take fewer."
+        )
     axes = [np.linspace(a, b, k + 1) for a, b, k in zip(low, high, count, strict=True)]
     points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, d)
     number = np.arange(len(points)).reshape(count + 1)
@@ -60,14 +77,15 @@ def box(lower: ArrayLike, upper: ArrayLike, n: int | tuple[int, ...]) -> Mesh:
         simplices.append(np.stack([_mirrored(place, c, number) for c in corners], axis=1))
     stacked = np.stack(simplices, axis=1).reshape(-1, d + 1)
     x = points[stacked]
-    turn = np.linalg.det(x[:, 1:] - x[:, :1]) < 0
+    with np.errstate(all="ignore"):  # sides too short for a number are refused by the mesh
+        turn = np.linalg.det(x[:, 1:] - x[:, :1]) < 0
     stacked[turn] = stacked[turn][:, [1, 0, *range(2, d + 1)]]
     index = np.stack(np.unravel_index(np.arange(len(points)), tuple(count + 1)), axis=1)
     sets = {}
     for axis, both in enumerate(_SIDES[d]):
         for name, end in zip(both, (0, count[axis]), strict=True):
             sets[name] = _facets_on(stacked, index[:, axis] == end)
-    return Mesh(points, stacked, sets)
+    return sound_mesh(points, stacked, sets)
 
 
 def _facets_on(cells: Ints, on_side: Bools) -> Ints:

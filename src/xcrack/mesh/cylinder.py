@@ -1,15 +1,16 @@
 """A notched round bar for bending in many directions, meshed by gmsh."""
 
-from math import frexp, isfinite, pi, sin, tan
+from math import frexp, pi, sin, tan
 from types import ModuleType
 
 import numpy as np
 
 from xcrack.arrays import Floats, Ints
 from xcrack.errors import GeometryError, MeshError
+from xcrack.inputs import number
 from xcrack.mesh.gmsh_session import session
-from xcrack.mesh.grading import graded_size
-from xcrack.mesh.mesh import Mesh
+from xcrack.mesh.grading import graded_size, length_of
+from xcrack.mesh.mesh import Mesh, sound_mesh
 
 _FACES = 24
 _TURN = 2 * pi / _FACES  # from one face of an end to the next
@@ -85,7 +86,7 @@ def notched_cylinder(
     ------
     GeometryError
         A length that is not positive, stations that overlap or do not fit between the ends and
-        the notch, an angle that is none in rad, sizes that do not fit.
+        the notch, an angle outside 0 ... pi, sizes that do not fit.
     MeshError
         gmsh found no mesh.
     XcrackError
@@ -104,21 +105,22 @@ def notched_cylinder(
             traction("inner_right_12", (0.0, 0.0, -p)), traction("outer_right_00", (0.0, 0.0, p)),
         ]
     """
-    radius = diameter / 2
-    near = size if size_near is None else size_near
+    diameter, length = length_of(diameter, "diameter"), length_of(length, "length")
+    notch_depth = length_of(notch_depth, "notch_depth")
+    notch_angle = number(notch_angle, "notch_angle", error=GeometryError)
+    outer_span = length_of(outer_span, "outer_span")
+    inner_span = length_of(inner_span, "inner_span")
+    size, radius = length_of(size, "size"), diameter / 2
+    near = length_of(size if size_near is None else size_near, "size_near")
     patch = diameter * sin(_TURN / 2) if patch_length is None else patch_length
-    depth = radius if crack_depth is None else crack_depth
+    patch = length_of(patch, "patch_length")
+    depth = length_of(radius if crack_depth is None else crack_depth, "crack_depth")
     if band is None:
         band = _BAND * diameter
     if transition is None:
         transition = max(_TRANSITION * diameter, (size - near) / _STEEPEST)
-    _check_lengths(
-        diameter=diameter, length=length, notch_depth=notch_depth, outer_span=outer_span,
-        inner_span=inner_span, size=size, size_near=near, patch_length=patch, crack_depth=depth,
-    )  # fmt: skip
-    for name, value in (("band", band), ("transition", transition)):
-        if not (isfinite(value) and value >= 0):
-            raise GeometryError(f"{name} = {value} must be a finite length, zero or more.")
+    band = number(band, "band", least=0, error=GeometryError)
+    transition = number(transition, "transition", least=0, error=GeometryError)
     _check_depths(diameter, notch_depth, notch_angle, depth)
     _check_sizes(diameter, length, size, near, band, depth)
     slope = tan(notch_angle / 2)
@@ -215,7 +217,7 @@ def _with_sets(
     points[in_root, 0], points[in_root, 2] = 0.0, root
     for end in (-sections[0], sections[0]):
         points[abs(points[:, 0] - end) < tolerance, 0] = end
-    facets = Mesh(points, cells).facet_sets["boundary"]
+    facets = sound_mesh(points, cells).boundary
     x, y, z = np.moveaxis(points[facets], -1, 0)
 
     sets = {
@@ -232,13 +234,7 @@ def _with_sets(
             here = ((along > low - tolerance) & (along < high + tolerance)).all(axis=1)
             for k in range(_FACES):
                 sets[f"{station}_{side}_{k:02d}"] = facets[here & on_face[k]]
-    return Mesh(points, cells, sets)
-
-
-def _check_lengths(**lengths: float) -> None:
-    for name, value in lengths.items():
-        if not (isfinite(value) and value > 0):
-            raise GeometryError(f"{name} = {value} must be finite and positive.")
+    return sound_mesh(points, cells, sets)
 
 
 def _check_depths(diameter: float, notch_depth: float, notch_angle: float, depth: float) -> None:

@@ -8,6 +8,8 @@ import numpy as np
 
 from xcrack.arrays import Floats
 from xcrack.errors import GeometryError
+from xcrack.inputs import number, numbers
+from xcrack.mesh.checks import LARGEST
 
 
 def graded_size(
@@ -84,13 +86,17 @@ def polylines(along: Any) -> list[Floats]:
         return []
     try:
         many = bool(np.ndim(along[0][0]))
-        paths = [np.array(path, dtype=np.float64) for path in (along if many else [along])]
-        bad = any(p.ndim != 2 or p.shape[1] != 2 or not np.isfinite(p).all() for p in paths)
-    except (TypeError, ValueError, IndexError, KeyError):
-        bad = True
-    if bad:
+        return [
+            numbers(path, "along", (None, 2), error=GeometryError)
+            for path in (along if many else [along])
+        ]
+    except (TypeError, ValueError, IndexError, KeyError, GeometryError) as error:
         raise GeometryError(
-            f"along = {along!r} must be points of a polyline, [(x0, y0), (x1, y1), ...], or a "
-            "list of such polylines, with finite coordinates."
-        )
-    return paths
+            f"along = {along!r:.200} must be points of a polyline, [(x0, y0), (x1, y1), ...], or "
+            "a list of such polylines, with finite coordinates."
+        ) from error
+
+
+def length_of(value: Any, what: str) -> float:
+    """Check that a value is a positive length that gmsh can compute with, and return it."""
+    return number(value, what, above=0, most=LARGEST, error=GeometryError)

@@ -1,4 +1,4 @@
-"""Meshes of simplices: triangles in the plane, tetrahedra in space."""
+"""Meshes of simplices: triangles in 2D, tetrahedra in 3D."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -9,13 +9,12 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
 from xcrack.arrays import Floats, Ints, frozen, lock
-from xcrack.errors import MeshError
+from xcrack.errors import MeshError, warn
+from xcrack.mesh.checks import checked, checked_sets, doubts, unused_sets
 
-_FLAT = 1e-12  # a cell whose volume is below this share of (longest edge)^d has no shape
 _CELLS = {2: "triangles", 3: "tetrahedra"}
 
 
@@ -23,8 +22,9 @@ _CELLS = {2: "triangles", 3: "tetrahedra"}
 class Mesh:
     """Simplices with sets by name; it never changes, whatever the crack does.
 
-    Cells of negative orientation are turned. The facet set ``"boundary"`` always exists: where
-    it is not given, it is made of the facets that belong to one cell only.
+    Cells of negative orientation are turned. The facet set ``"boundary"`` always exists: all
+    facets that belong to one cell only. A warning names doubled and hanging points, cells that
+    overlap, and cell sets that divide the body, since nothing uses them.
 
     Parameters
     ----------
@@ -33,7 +33,7 @@ class Mesh:
     cells : (m, d + 1) array of int
         Point numbers of each simplex.
     facet_sets : mapping of name to (k, d) array of int, optional
-        Point numbers of the facets (edges in the plane, triangles in space) of each set.
+        Point numbers of the facets (edges in 2D, triangles in 3D) of each set.
     cell_sets : mapping of name to (k,) array of int, optional
         Cell numbers of each set.
 
@@ -41,7 +41,8 @@ class Mesh:
     ------
     MeshError
         No cells, wrong shapes, nan coordinates, point numbers out of range, points without a
-        cell, flat, doubled or inverted (folded) cells, facets that no cell has.
+        cell, flat, doubled or inverted (folded) cells, facets that no cell has, a set
+        ``"boundary"`` that is not the boundary.
 
     Examples
     --------
@@ -56,32 +57,34 @@ class Mesh:
     cell_sets: Mapping[str, Ints] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        points, cells = _checked(self.points, self.cells)
+        self._complete()
+        facet = np.nonzero(self.facet_to_cell[:, 1] < 0)[0]
+        owner = self.facet_to_cell[facet, 0]
+        for message in doubts(self.points, self.cells, self.facets[facet], owner):
+            warn(message)
+        for message in unused_sets(self.cell_sets, len(self.cells)):
+            warn(message)
+
+    def _complete(self) -> None:
+        """Check what was given, and put read-only arrays in its place."""
+        points, cells = checked(self.points, self.cells)
         object.__setattr__(self, "points", frozen(points))
-        object.__setattr__(self, "cells", frozen(_oriented(points, cells)))
+        object.__setattr__(self, "cells", frozen(cells))
         self._check_folds()
-        d = points.shape[1]
-        facet_sets = {
-            str(name): frozen(np.asarray(facets, dtype=np.int64).reshape(-1, d))
-            for name, facets in dict(self.facet_sets).items()
-        }
+        facet_sets, cell_sets = checked_sets(
+            self.facet_sets, self.cell_sets, self.n_points, len(cells), self.dim
+        )
         for name, facets in facet_sets.items():
             self._check_facets(name, facets)
-        facet_sets.setdefault("boundary", self._boundary)
-        cell_sets = {}
-        for name, members in dict(self.cell_sets).items():
-            members = np.asarray(members, dtype=np.int64).ravel()
-            if len(members) and (members.min() < 0 or members.max() >= len(cells)):
-                raise MeshError(
-                    f"cell set {name!r} names cells beyond the {len(cells)} of the mesh; "
-                    "cells are numbered from 0."
-                )
-            cell_sets[str(name)] = frozen(members)
-        object.__setattr__(self, "facet_sets", MappingProxyType(facet_sets))
-        object.__setattr__(self, "cell_sets", MappingProxyType(cell_sets))
+        named = {name: frozen(facets) for name, facets in facet_sets.items()}
+        named.setdefault("boundary", self.boundary)
+        rest = {name: frozen(members) for name, members in cell_sets.items()}
+        object.__setattr__(self, "facet_sets", MappingProxyType(named))
+        object.__setattr__(self, "cell_sets", MappingProxyType(rest))
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return Mesh, (self.points, self.cells, dict(self.facet_sets), dict(self.cell_sets))
+        named = {name: facets for name, facets in self.facet_sets.items() if name != "boundary"}
+        return sound_mesh, (self.points, self.cells, named, dict(self.cell_sets))
 
     def __repr__(self) -> str:
         names = ", ".join(self.facet_sets)
@@ -90,7 +93,7 @@ class Mesh:
 
     @property
     def dim(self) -> int:
-        """Number of space dimensions."""
+        """Number of dimensions, 2 or 3."""
         return int(self.points.shape[1])
 
     @property
@@ -165,7 +168,8 @@ class Mesh:
         return lock(_scalar_key(self.facets, self.n_points))
 
     @cached_property
-    def _boundary(self) -> Ints:
+    def boundary(self) -> Ints:
+        """Facets that belong to one cell only, as sorted point numbers `(k, d)`."""
         return lock(self.facets[self.facet_to_cell[:, 1] < 0])
 
     @cached_property
@@ -238,7 +242,7 @@ class Mesh:
     @cached_property
     def boundary_tree(self) -> cKDTree:
         """Search tree of the centroids of the boundary facets."""
-        return cKDTree(self.points[self.facet_sets["boundary"]].mean(axis=1))
+        return cKDTree(self.points[self.boundary].mean(axis=1))
 
     def facet_numbers(self, facets: Ints) -> Ints:
         """Numbers (rows of `facets`) of the given facets `(k, d)`; -1 where there is none."""
@@ -266,19 +270,48 @@ class Mesh:
             )
 
     def _check_facets(self, name: str, facets: Ints) -> None:
-        if not len(facets):
-            return
-        if facets.min() < 0 or facets.max() >= self.n_points:
+        number = self.facet_numbers(facets)
+        if (number < 0).any():
             raise MeshError(
-                f"facet set {name!r} names points beyond the {self.n_points} of the mesh; "
-                "points are numbered from 0."
+                f"facet set {name!r}: facet {facets[np.argmax(number < 0)].tolist()} is no facet "
+                f"of any cell ({int((number < 0).sum())} in all); mesh body and sets together."
             )
-        missing = self.facet_numbers(facets) < 0
-        if missing.any():
+        outer = np.nonzero(self.facet_to_cell[:, 1] < 0)[0]
+        if name == "boundary" and not np.array_equal(np.unique(number), outer):
             raise MeshError(
-                f"facet set {name!r}: facet {facets[np.argmax(missing)].tolist()} is no facet of "
-                f"any cell ({int(missing.sum())} in all); mesh body and sets together."
+                f'facet set "boundary" has {len(np.unique(number))} facets, the boundary of the '
+                f"mesh has {len(outer)}: that name means all facets of one cell only, and every "
+                "mesh makes the set itself. Leave it out, or give yours another name."
             )
+
+
+def sound_mesh(
+    points: Floats,
+    cells: Ints,
+    facet_sets: Mapping[str, Ints] | None = None,
+    cell_sets: Mapping[str, Ints] | None = None,
+) -> Mesh:
+    """A mesh that conforms by its making, as those of generators: errors, but no doubts.
+
+    Parameters
+    ----------
+    points, cells, facet_sets, cell_sets
+        As of `Mesh`.
+
+    Returns
+    -------
+    Mesh
+    """
+    mesh = object.__new__(Mesh)
+    for name, value in (
+        ("points", points),
+        ("cells", cells),
+        ("facet_sets", facet_sets or {}),
+        ("cell_sets", cell_sets or {}),
+    ):
+        object.__setattr__(mesh, name, value)
+    mesh._complete()
+    return mesh
 
 
 def _scalar_key(facets: Ints, n_points: int) -> Ints:
@@ -286,67 +319,6 @@ def _scalar_key(facets: Ints, n_points: int) -> Ints:
     for column in facets.T[1:]:
         key = key * np.int64(n_points) + column
     return key
-
-
-def _checked(points: ArrayLike, cells: ArrayLike) -> tuple[Floats, Ints]:
-    x = np.asarray(points, dtype=np.float64)
-    c = np.asarray(cells)
-    if c.size == 0:
-        raise MeshError(
-            "the mesh has no cells: give triangles (plane) or tetrahedra (space); in gmsh, mesh "
-            "the surface or volume and put it into a physical group."
-        )
-    if x.ndim != 2 or x.shape[1] not in (2, 3):
-        raise MeshError(f"points must be (n, 2) or (n, 3), not {x.shape}.")
-    if c.ndim != 2 or c.shape[1] != x.shape[1] + 1:
-        raise MeshError(
-            f"cells must be (m, {x.shape[1] + 1}) for points in {x.shape[1]} dimensions, "
-            f"not {c.shape}: only triangles in the plane and tetrahedra in space are used."
-        )
-    c = c.astype(np.int64)
-    bad = ~np.isfinite(x).all(axis=1)
-    if bad.any():
-        raise MeshError(
-            f"point {int(np.argmax(bad))} has coordinates {x[np.argmax(bad)].tolist()} "
-            f"({int(bad.sum())} such points): every coordinate must be finite."
-        )
-    if c.min() < 0 or c.max() >= len(x):
-        raise MeshError(
-            f"cell {int(np.argmax(((c < 0) | (c >= len(x))).any(axis=1)))} names a point outside "
-            f"0 ... {len(x) - 1}."
-        )
-    unused = np.bincount(c.ravel(), minlength=len(x)) == 0
-    if unused.any():
-        raise MeshError(
-            f"point {int(np.argmax(unused))} belongs to no cell ({int(unused.sum())} such "
-            "points): remove them (read_mesh does)."
-        )
-    doubled = np.sort(c, axis=1)
-    order = np.lexsort(doubled.T)
-    same = (np.diff(doubled[order], axis=0) == 0).all(axis=1)
-    if same.any():
-        raise MeshError(
-            f"cells {int(order[np.argmax(same)])} and {int(order[np.argmax(same) + 1])} have the "
-            f"same points ({int(same.sum())} such pairs): remove one of each."
-        )
-    return x, c
-
-
-def _oriented(points: Floats, cells: Ints) -> Ints:
-    x = points[cells]
-    volume = np.linalg.det(x[:, 1:] - x[:, :1])
-    one, other = local_edges(points.shape[1]).T
-    longest = np.sqrt(((x[:, one] - x[:, other]) ** 2).sum(axis=2).max(axis=1))
-    flat = np.abs(volume) <= _FLAT * longest ** points.shape[1]
-    if flat.any():
-        worst = int(np.argmax(flat))
-        raise MeshError(
-            f"cell {worst} at {np.round(x[worst].mean(axis=0), 6).tolist()} has no volume "
-            f"({int(flat.sum())} such cells): remesh, or merge its points."
-        )
-    turned = np.array(cells)
-    turned[volume < 0] = turned[volume < 0][:, [1, 0, *range(2, cells.shape[1])]]
-    return turned
 
 
 def local_edges(dim: int) -> Ints:

@@ -1,16 +1,18 @@
 """Plates with round holes, meshed by gmsh and graded towards where cracks will run."""
 
 from collections.abc import Callable, Iterable, Sequence
-from math import ceil, frexp, hypot, inf, isfinite, pi
+from math import ceil, frexp, hypot, inf, pi
 from types import ModuleType
+from typing import Any
 
 import numpy as np
 
 from xcrack.arrays import Floats, Ints
 from xcrack.errors import GeometryError, MeshError
+from xcrack.inputs import number, numbers
 from xcrack.mesh.gmsh_session import session
-from xcrack.mesh.grading import graded_size, polylines
-from xcrack.mesh.mesh import Mesh
+from xcrack.mesh.grading import graded_size, length_of, polylines
+from xcrack.mesh.mesh import Mesh, sound_mesh
 
 Point = tuple[float, float]
 Hole = tuple[Point, float]
@@ -80,7 +82,8 @@ def plate_with_hole(
             along=[(5.0, 0.0), (12.0, 0.0)], transition=15.0,
         )
     """
-    _check_lengths(width=width, height=height, radius=radius)
+    width, height = length_of(width, "width"), length_of(height, "height")
+    radius = length_of(radius, "radius")
     return _plate(
         width, height, (-width / 2, -height / 2), [(center, radius)], ["hole"], size, size_near,
         along, band, transition,
@@ -137,7 +140,7 @@ def plate(
             along=[(0.0, 2.85), (12.8, 2.3)],
         )
     """
-    holes = list(holes)
+    holes = _listed(holes)
     names = [f"hole_{i}" for i in range(len(holes))]
     return _plate(width, height, lower, holes, names, size, size_near, along, band, transition)
 
@@ -154,21 +157,25 @@ def _plate(
     band: float | None,
     transition: float | None,
 ) -> Mesh:
-    _check_lengths(width=width, height=height, size=size)
+    width, height = length_of(width, "width"), length_of(height, "height")
+    size = length_of(size, "size")
+    lower = _pair(lower, "lower")
+    holes = [
+        (_pair(center, f"hole {i}: centre"), length_of(radius, f"radius of hole {i}"))
+        for i, (center, radius) in enumerate(holes)
+    ]
     _check_holes(width, height, lower, holes)
     smallest_radius = min((radius for _, radius in holes), default=inf)
     hole_size = 2 * pi * smallest_radius / _FEWEST_HOLE_EDGES
-    near = float(min(size, hole_size) if size_near is None else size_near)
-    _check_lengths(size_near=near)
+    near = length_of(min(size, hole_size) if size_near is None else size_near, "size_near")
     _check_sizes(width, height, size, near)
     reach = smallest_radius if holes else min(width, height) / 10
     if band is None:
         band = _BAND * reach
     if transition is None:
         transition = max(_TRANSITION * reach, (size - near) / _STEEPEST)
-    for name, value in (("band", band), ("transition", transition)):
-        if not (isfinite(value) and value >= 0):
-            raise GeometryError(f"{name} = {value} must be a finite length, zero or more.")
+    band = number(band, "band", least=0, error=GeometryError)
+    transition = number(transition, "transition", least=0, error=GeometryError)
     paths = polylines(along)
     _check_cost(width, height, size, near, band, paths)
     # gmsh's tolerances are absolute: mesh a plate of unit size; powers of two lose no digit.
@@ -287,13 +294,24 @@ def _finish(
     for name, (axis, value) in sides.items():
         points[facets[name].ravel(), axis] = value
     order = [*sides, *(name for name in facets if name not in sides)]
-    return Mesh(points, cells, {name: facets[name] for name in order})
+    return sound_mesh(points, cells, {name: facets[name] for name in order})
 
 
-def _check_lengths(**lengths: float) -> None:
-    for name, value in lengths.items():
-        if not (isfinite(value) and value > 0):
-            raise GeometryError(f"{name} = {value} must be finite and positive.")
+def _pair(value: Any, what: str) -> Point:
+    x, y = numbers(value, what, (2,), error=GeometryError).tolist()
+    return x, y
+
+
+def _listed(holes: Any) -> list[Hole]:
+    """Holes as a list of pairs."""
+    try:
+        pairs = [(center, radius) for center, radius in holes]
+    except (TypeError, ValueError) as error:
+        raise GeometryError(
+            f"holes = {holes!r:.80} must be a list of centres and radii, such as "
+            "[((x, y), radius)]."
+        ) from error
+    return pairs
 
 
 def _check_sizes(width: float, height: float, size: float, near: float) -> None:
@@ -311,9 +329,6 @@ def _check_sizes(width: float, height: float, size: float, near: float) -> None:
 
 def _check_holes(width: float, height: float, lower: Point, holes: Sequence[Hole]) -> None:
     for i, (center, radius) in enumerate(holes):
-        _check_lengths(**{f"radius of hole {i}": radius})
-        if not np.isfinite(center).all():
-            raise GeometryError(f"hole {i}: centre {tuple(center)} must be finite.")
         x, y = center[0] - lower[0], center[1] - lower[1]
         gap = min(x, y, width - x, height - y) - radius
         if gap <= 0:

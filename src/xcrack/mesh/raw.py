@@ -7,7 +7,7 @@ import numpy as np
 
 from xcrack.arrays import Floats, Ints
 from xcrack.errors import MeshError, warn
-from xcrack.mesh.mesh import Mesh
+from xcrack.mesh.mesh import Mesh, sound_mesh
 
 TOPOLOGICAL_DIM = {"vertex": 0, "line": 1, "triangle": 2, "tetra": 3}
 CELL_KIND = {2: "triangle", 3: "tetra"}
@@ -17,7 +17,7 @@ _PLANAR = 1e-9  # spread of z over the extent of the body below which a mesh is 
 
 @dataclass(frozen=True, eq=False)
 class RawMesh:
-    """What a mesh file says.
+    """Contents of a mesh file.
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ class RawMesh:
 
 
 def mesh_from_raw(raw: RawMesh, source: str) -> Mesh:
-    """Make a `Mesh` of what a file says, or tell what in the file stands against it.
+    """Make a `Mesh` of what a file says, or say what in the file prevents it.
 
     The highest cells are the body, elements of one dimension less become facet sets. Doubled
     cells (msh 2.2 repeats a cell for each of its groups) are made one, points that no cell uses
@@ -59,7 +59,7 @@ def mesh_from_raw(raw: RawMesh, source: str) -> Mesh:
     Raises
     ------
     MeshError
-        No cells, cells that are no linear simplices, a surface in space.
+        No cells, cells that are not linear simplices, a surface in 3D.
     """
     _check_kinds(raw.blocks, source)
     dim = 3 if any(kind == "tetra" and len(data) for kind, data in raw.blocks) else 2
@@ -81,7 +81,7 @@ def mesh_from_raw(raw: RawMesh, source: str) -> Mesh:
     new = np.full(len(points), -1, dtype=np.int64)
     new[used] = np.arange(len(used))
     points, cells = points[used], new[cells]
-    bare = Mesh(points, cells)
+    bare = sound_mesh(points, cells)
     facet_sets = _facet_sets(raw, bare, new, source)
     cell_sets = {
         name: np.sort(_row_numbers(cells, new[members]))
@@ -91,31 +91,42 @@ def mesh_from_raw(raw: RawMesh, source: str) -> Mesh:
         if name not in facet_sets and name not in cell_sets:
             inside = np.zeros(len(points), dtype=bool)
             inside[new[members][new[members] >= 0]] = True
-            facets = bare.facet_sets["boundary"]
+            facets = bare.boundary
             facets = facets[inside[facets].all(axis=1)]
             if len(facets):
                 facet_sets[name] = facets
-    return Mesh(points, cells, facet_sets, cell_sets)
+    return Mesh(points, cells, _without_own_boundary(facet_sets, bare, source), cell_sets)
 
 
-def default_boundary(mesh: Mesh) -> bool:
-    """Whether the set ``"boundary"`` is the one every mesh has, so that no file need hold it."""
-    own = np.unique(mesh.facet_numbers(mesh.facet_sets["boundary"]))
-    return bool(np.array_equal(own, np.flatnonzero(mesh.facet_to_cell[:, 1] < 0)))
+def _without_own_boundary(facet_sets: dict[str, Ints], bare: Mesh, source: str) -> dict[str, Ints]:
+    """Facet sets with another name for a set "boundary" that is not the boundary of the mesh."""
+    facets = facet_sets.pop("boundary", None)
+    if facets is None:
+        return facet_sets
+    number, outer = (np.unique(bare.facet_numbers(f)) for f in (facets, bare.boundary))
+    if not np.array_equal(number, outer):
+        name = "boundary_of_file"
+        while name in facet_sets:
+            name += "_"
+        facet_sets[name] = facets
+        warn(
+            f'{source}: the set "boundary" has {len(number)} facets, the boundary of the mesh has '
+            f'{len(outer)}: it is called {name!r} here, since "boundary" means all of them.'
+        )
+    return facet_sets
 
 
 def sets_to_write(mesh: Mesh) -> tuple[dict[str, Ints], dict[str, Ints]]:
     """Facet sets as point numbers and cell sets as cell numbers, less what is made anew anyway."""
-    facet_sets = dict(mesh.facet_sets)
-    if default_boundary(mesh):
-        del facet_sets["boundary"]
+    facet_sets = {name: facets for name, facets in mesh.facet_sets.items() if name != "boundary"}
     return facet_sets, dict(mesh.cell_sets)
 
 
 def _facet_sets(raw: RawMesh, bare: Mesh, new: Ints, source: str) -> dict[str, Ints]:
     facet_sets = {}
     for name, members in _grouped(raw.sets, FACET_KIND[bare.dim], bare.dim).items():
-        facets = new[members]
+        exists = (members >= 0) & (members < len(new))
+        facets = np.where(exists, new[np.where(exists, members, 0)], -1)
         known = (facets >= 0).all(axis=1) & (bare.facet_numbers(facets) >= 0)
         if not known.all():
             warn(
@@ -155,13 +166,13 @@ def _in_dimensions(points: Floats, cells: Ints, dim: int, source: str) -> Floats
     if points.shape[1] == dim:
         return points
     if points.shape[1] < dim:
-        raise MeshError(f"{source} has tetrahedra, but points in the plane.")
+        raise MeshError(f"{source} has tetrahedra, but points with two coordinates.")
     body = points[np.unique(cells)]
     spread = np.ptp(body, axis=0)
     if spread[2] > _PLANAR * spread.max():
         raise MeshError(
-            f"{source} has triangles in space (z from {body[:, 2].min():g} to "
-            f"{body[:, 2].max():g}) and no tetrahedra: for a plane problem turn the mesh into a "
+            f"{source} has triangles in 3D (z from {body[:, 2].min():g} to "
+            f"{body[:, 2].max():g}) and no tetrahedra: for a 2D problem turn the mesh into a "
             "plane z = constant; for a body mesh its volume, not only its surface."
         )
     return points[:, :2]

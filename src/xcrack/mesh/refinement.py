@@ -4,7 +4,7 @@ import numpy as np
 
 from xcrack.arrays import Floats, Ints
 from xcrack.errors import MeshError
-from xcrack.mesh.mesh import Mesh
+from xcrack.mesh.mesh import Mesh, sound_mesh
 from xcrack.mesh.simplex import cell_nodes, facet_nodes, node_points
 
 # Children of a simplex by its nodes: vertices first, then midpoints in the order of local_edges.
@@ -49,7 +49,7 @@ def refine(mesh: Mesh) -> Mesh:
     nodes = cell_nodes(mesh, 2)
     cells, parent = (_triangles, _tetrahedra)[mesh.dim - 2](points, nodes)
     inverse = np.argsort(parent, kind="stable").reshape(len(mesh.cells), -1)
-    return Mesh(
+    return sound_mesh(
         points,
         cells,
         {name: _halved(mesh, facets) for name, facets in mesh.facet_sets.items()},

@@ -108,7 +108,7 @@ def _draw_path(history: History, axes: Any) -> None:
     if history.mesh is not None:
         from matplotlib.collections import LineCollection
 
-        facets = history.mesh.points[history.mesh.facet_sets["boundary"]]
+        facets = history.mesh.points[history.mesh.boundary]
         axes.add_collection(LineCollection(list(facets[..., :2]), colors="0.6", linewidths=1))
         axes.autoscale_view()
         low, high = history.mesh.points.min(axis=0), history.mesh.points.max(axis=0)

@@ -73,7 +73,7 @@ def draw_mesh(solution: Solution, file: Path | None, show: bool, title: str | No
     axes.add_collection(
         LineCollection(list(mesh.points[mesh.edges]), colors="0.72", linewidths=0.4)
     )
-    rim = mesh.points[mesh.facet_sets["boundary"]]
+    rim = mesh.points[mesh.boundary]
     axes.add_collection(LineCollection(list(rim), colors="black", linewidths=0.9))
     carries = [number >= 0 for number in space.heaviside]
     if carries:

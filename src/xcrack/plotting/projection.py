@@ -118,7 +118,7 @@ def on_plane(x: Floats, plane: View) -> Floats:
 
 def section_outline(mesh: Mesh, plane: View) -> Floats:
     """Segments in which a plane meets the boundary of a body, in the plane `(k, 2, 2)`."""
-    facets = mesh.facet_sets["boundary"]
+    facets = mesh.boundary
     level = (mesh.points - plane.origin) @ plane.normal
     level = np.where(np.abs(level) < 1e-9 * np.abs(level).max(), 0.0, level)[facets]
     rows = np.nonzero((level.min(axis=1) < 0) & (level.max(axis=1) >= 0))[0]

@@ -263,7 +263,7 @@ def _seen_through(solution: Solution, warp: float, plane: Plane | None) -> Space
     mesh = solution.space.mesh
     moved = mesh.points + warp * solution.coefficients[: mesh.n_points]
     level = levels(mesh.points, plane)
-    facets = mesh.facet_sets["boundary"]
+    facets = mesh.boundary
     skin = Soup.of(facets, None).behind(level).at(moved)
     sharp = segments_behind(mesh.edges[sharp_edges(mesh)], level)
     if plane is not None:

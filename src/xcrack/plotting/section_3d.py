@@ -215,7 +215,7 @@ def _middle_of(a: int, b: int) -> int:
 
 def sharp_edges(mesh: Mesh) -> Bools:
     """Edges of the mesh at which its boundary turns `(e,)`."""
-    facets = mesh.facet_sets["boundary"]
+    facets = mesh.boundary
     x = mesh.points[facets]
     normal = np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0])
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from xcrack.arrays import Bools, Floats, Ints, ranges
-from xcrack.mesh.locate import closest_on_segment
+from xcrack.geometry.simplices import closest_on_segment
 from xcrack.mesh.simplex import SYMMETRIC, gauss, simplex_rule
 from xcrack.xfem.function_space import FunctionSpace
 

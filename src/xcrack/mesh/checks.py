@@ -1,0 +1,284 @@
+"""Checks of what a mesh is made of: errors where it cannot be used, doubts where it may mislead."""
+
+import re
+from collections.abc import Mapping
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from xcrack.arrays import Floats, Ints, ranges
+from xcrack.errors import MeshError
+from xcrack.geometry.simplices import distance_to_simplices
+from xcrack.inputs import numbers, whole_numbers
+
+_FLAT = 1e-12  # a cell whose volume is below this share of (longest edge)^d has no shape
+LARGEST = 1e90  # coordinate whose third power is still a number
+_SAME = 1e-6  # of a facet: points this close to each other, or to a facet, are on each other
+_INSIDE = 1e-3  # barycentric: a point this deep in a cell is in it, whatever the round-off
+# Names that programs make: `read_mesh` for groups without a name, gmsh for surfaces and volumes in
+# Abaqus files, Abaqus for faces and picked elements.
+_UNNAMED = re.compile(r"cells_\d+|(Physical)?(Surface|Volume)\d+|_.*")
+_AT_ONCE = 200_000  # pairs of points and cells looked at together
+
+
+def checked(points: Any, cells: Any) -> tuple[Floats, Ints]:
+    """Points and cells of a mesh as arrays, the cells turned to positive orientation.
+
+    Parameters
+    ----------
+    points, cells : anything
+
+    Returns
+    -------
+    points : (n, d) array, length
+    cells : (m, d + 1) array of int
+
+    Raises
+    ------
+    MeshError
+        Whatever keeps them from being a mesh; the message names the first such point or cell.
+    """
+    x = numbers(points, "points of the mesh", finite=False, error=MeshError)
+    c = whole_numbers(cells, "cells of the mesh", error=MeshError)
+    if c.size == 0:
+        raise MeshError(
+            "the mesh has no cells: give triangles (2D) or tetrahedra (3D); in gmsh, mesh the "
+            "surface or volume and put it into a physical group."
+        )
+    if x.ndim != 2 or x.shape[1] not in (2, 3):
+        raise MeshError(f"points must be (n, 2) or (n, 3), not {x.shape}.")
+    if c.ndim != 2 or c.shape[1] != x.shape[1] + 1:
+        raise MeshError(
+            f"cells must be (m, {x.shape[1] + 1}) for points with {x.shape[1]} coordinates, "
+            f"not {c.shape}: only triangles in 2D and tetrahedra in 3D are used."
+        )
+    bad = ~np.isfinite(x).all(axis=1)
+    if bad.any():
+        raise MeshError(
+            f"point {int(np.argmax(bad))} has coordinates {x[np.argmax(bad)].tolist()} "
+            f"({int(bad.sum())} such points): every coordinate must be finite."
+        )
+    if np.abs(x).max() > LARGEST:
+        raise MeshError(
+            f"coordinates of up to {np.abs(x).max():.3g} are too large for computing with their "
+            "powers: take another unit of length."
+        )
+    if c.min() < 0 or c.max() >= len(x):
+        raise MeshError(
+            f"cell {int(np.argmax(((c < 0) | (c >= len(x))).any(axis=1)))} names a point outside "
+            f"0 ... {len(x) - 1}."
+        )
+    unused = np.bincount(c.ravel(), minlength=len(x)) == 0
+    if unused.any():
+        raise MeshError(
+            f"point {int(np.argmax(unused))} belongs to no cell ({int(unused.sum())} such "
+            "points): remove them (read_mesh does)."
+        )
+    doubled = np.sort(c, axis=1)
+    order = np.lexsort(doubled.T)
+    same = (np.diff(doubled[order], axis=0) == 0).all(axis=1)
+    if same.any():
+        raise MeshError(
+            f"cells {int(order[np.argmax(same)])} and {int(order[np.argmax(same) + 1])} have the "
+            f"same points ({int(same.sum())} such pairs): remove one of each."
+        )
+    return x, _oriented(x, c)
+
+
+def _oriented(points: Floats, cells: Ints) -> Ints:
+    x = points[cells]
+    with np.errstate(all="ignore"):  # lengths whose products are too small for a number
+        volume = np.linalg.det(x[:, 1:] - x[:, :1])
+    one, other = np.array(list(combinations(range(cells.shape[1]), 2))).T
+    longest = np.sqrt(((x[:, one] - x[:, other]) ** 2).sum(axis=2).max(axis=1))
+    flat = np.abs(volume) <= _FLAT * longest ** points.shape[1]
+    if flat.any():
+        worst = int(np.argmax(flat))
+        raise MeshError(
+            f"cell {worst} at {_at(x[worst].mean(axis=0))} has no volume "
+            f"({int(flat.sum())} such cells): remesh, or merge its points."
+        )
+    turned = np.array(cells)
+    turned[volume < 0] = turned[volume < 0][:, [1, 0, *range(2, cells.shape[1])]]
+    return turned
+
+
+def checked_sets(
+    facet_sets: Any, cell_sets: Any, n_points: int, n_cells: int, dim: int
+) -> tuple[dict[str, Ints], dict[str, Ints]]:
+    """Sets of a mesh as arrays.
+
+    Parameters
+    ----------
+    facet_sets, cell_sets : anything
+    n_points, n_cells, dim : int
+        Of the mesh.
+
+    Raises
+    ------
+    MeshError
+        Not mappings from names to arrays of the right shape, or numbers out of range.
+    """
+    for what, sets in (("facet_sets", facet_sets), ("cell_sets", cell_sets)):
+        if not isinstance(sets, Mapping) or not all(isinstance(name, str) for name in sets):
+            raise MeshError(
+                f"{what}: give a dict of names and arrays, such as {what}={{'left': ...}}, not "
+                f"{type(sets).__name__}{' with other keys' * isinstance(sets, Mapping)}."
+            )
+    facets, cells = {}, {}
+    for name, members in facet_sets.items():
+        what = f"facet set {name!r}"
+        array = whole_numbers(members, what, error=MeshError)
+        facets[name] = (
+            whole_numbers(array, what, (None, dim), error=MeshError)
+            if array.size
+            else np.zeros((0, dim), dtype=np.int64)
+        )
+        if array.size and (array.min() < 0 or array.max() >= n_points):
+            raise MeshError(
+                f"{what} names points beyond the {n_points} of the mesh; points are numbered "
+                "from 0."
+            )
+    for name, members in cell_sets.items():
+        what = f"cell set {name!r}"
+        array = whole_numbers(members, what, (None,), error=MeshError)
+        if array.size and (array.min() < 0 or array.max() >= n_cells):
+            raise MeshError(
+                f"{what} names cells beyond the {n_cells} of the mesh; cells are numbered from 0."
+            )
+        cells[name] = array
+    return facets, cells
+
+
+def doubts(points: Floats, cells: Ints, facets: Ints, owner: Ints) -> list[str]:
+    """Why a mesh may not be the body it looks like: doubled points, hanging ones, overlaps.
+
+    Parameters
+    ----------
+    points, cells : arrays
+        Of the mesh.
+    facets : (k, d) array of int
+        Facets that belong to one cell only: whatever is not joined has such facets.
+    owner : (k,) array of int
+        Cell of each.
+
+    Returns
+    -------
+    list of str
+        Messages with place, number and remedy; none for a sound mesh.
+    """
+    number = np.unique(facets)
+    corner = points[facets]
+    size = np.linalg.norm(corner - np.roll(corner, 1, axis=1), axis=2).max(axis=1)
+    near = np.zeros(len(points))
+    for column in facets.T:
+        np.maximum.at(near, column, size)
+    messages = []
+    tree = cKDTree(points)
+    distance, other = tree.query(points[number], k=2)
+    twin = distance[:, 1] <= _SAME * near[number]
+    if twin.any():
+        i = int(np.argmax(twin))
+        pair = sorted(
+            map(int, (number[i], other[i, 1] if other[i, 0] == number[i] else other[i, 0]))
+        )
+        messages.append(
+            f"points {pair[0]} and {pair[1]} of the mesh both lie at {_at(points[number[i]])} "
+            f"({int(twin.sum())} points have such a twin): cells are not joined there, which acts "
+            "as a cut, or bodies lie on top of each other. Merge the points (gmsh: Coherence, or "
+            "removeDuplicateNodes), unless the cut is meant."
+        )
+    messages += _hanging(points, facets, owner, number[~twin], corner, size)
+    messages += _overlapping(points, cells, owner, corner)
+    return messages
+
+
+def _hanging(
+    points: Floats, facets: Ints, owner: Ints, number: Ints, corner: Floats, size: Floats
+) -> list[str]:
+    """Points that lie on a facet of a cell without being one of its points."""
+    middle = corner.mean(axis=1)
+    reach = np.linalg.norm(corner - middle[:, None], axis=2).max(axis=1)
+    row, candidate = _within(cKDTree(points[number]), middle, reach + _SAME * size)
+    candidate = number[candidate]
+    own = (facets[row] == candidate[:, None]).any(axis=1)
+    row, candidate = row[~own], candidate[~own]
+    x = points[candidate]
+    on = distance_to_simplices(x, corner[row]) <= _SAME * size[row]
+    on &= np.linalg.norm(corner[row] - x[:, None], axis=2).min(axis=1) > _SAME * size[row]
+    if not on.any():
+        return []
+    i = int(np.argmax(on))
+    return [
+        f"point {int(candidate[i])} of the mesh at {_at(x[i])} lies on a side of cell "
+        f"{int(owner[row[i]])} without being one of its points ({len(np.unique(candidate[on]))} "
+        "such points): the mesh does not conform, and the body is open there. Mesh its parts "
+        "together (gmsh: BooleanFragments or Coherence before meshing)."
+    ]
+
+
+def _overlapping(points: Floats, cells: Ints, owner: Ints, corner: Floats) -> list[str]:
+    """Cells in which the middle of a boundary facet of another cell lies."""
+    x = corner.mean(axis=1)
+    shape = points[cells]
+    middle = shape.mean(axis=1)
+    reach = np.linalg.norm(shape - middle[:, None], axis=2).max(axis=1)
+    step = np.floor(np.log2(reach / reach.min())).astype(np.int64)
+    bad = np.zeros(len(x), dtype=np.int64) - 1
+    for k in np.unique(step):
+        rows = np.nonzero(step == k)[0]
+        tree, most = cKDTree(middle[rows]), float(reach[rows].max())
+        for begin in range(0, len(x), chunk := max(_AT_ONCE // 100, 1)):
+            part = np.arange(begin, min(begin + chunk, len(x)))
+            point, cell = _within(tree, x[part], np.full(len(part), most))
+            point, cell = part[point], rows[cell]
+            close = np.linalg.norm(middle[cell] - x[point], axis=1) < reach[cell]
+            close &= cell != owner[point]
+            point, cell = point[close], cell[close]
+            edges = shape[cell, 1:] - shape[cell, :1]
+            rest = np.linalg.solve(np.swapaxes(edges, 1, 2), (x[point] - shape[cell, 0])[..., None])
+            bary = np.concatenate([1 - rest.sum(axis=1), rest[..., 0]], axis=1)
+            inside = bary.min(axis=1) > _INSIDE
+            bad[point[inside]] = cell[inside]
+    if (bad < 0).all():
+        return []
+    i = int(np.argmax(bad >= 0))
+    return [
+        f"cells {int(owner[i])} and {int(bad[i])} of the mesh overlap at {_at(x[i])} "
+        f"({int((bad >= 0).sum())} such places): parts of the body are there twice, and twice as "
+        "stiff. Unite them before meshing (gmsh: BooleanUnion or BooleanFragments)."
+    ]
+
+
+def _within(tree: cKDTree, x: Floats, reach: Floats) -> tuple[Ints, Ints]:
+    """Pairs of places and points of a tree no farther from them than a reach."""
+    near = tree.query_ball_point(x, reach)
+    row, _ = ranges(np.array([len(one) for one in near], dtype=np.int64))
+    every = [np.asarray(one, dtype=np.int64) for one in near]
+    return row, np.concatenate([np.zeros(0, dtype=np.int64), *every])
+
+
+def unused_sets(cell_sets: Mapping[str, Ints], n_cells: int) -> list[str]:
+    """A message where cell sets with names of the user's divide the body; else nothing."""
+    parts = [
+        name
+        for name, members in cell_sets.items()
+        if 0 < len(np.unique(members)) < n_cells and not _UNNAMED.fullmatch(name)
+    ]
+    if len(parts) < 2:
+        return []
+    names = ", ".join(repr(name) for name in parts[:5]) + (" ..." if len(parts) > 5 else "")
+    return [
+        f"the mesh has {len(parts)} cell sets that each cover a part of the body ({names}): "
+        "xcrack takes the whole body to be of one material and uses no cell sets. If they stand "
+        "for different materials, the result is not that of your part."
+    ]
+
+
+def _at(x: Floats) -> list[float]:
+    return list(np.round(x, 6).tolist())
+
+
+__all__ = ["LARGEST", "checked", "checked_sets", "doubts", "unused_sets"]
