@@ -1,4 +1,4 @@
-"""Meshes that can be solved but may not be the body they look like are warned of, with the place."""
+"""Meshes that may not be the body they look like are warned of, with the place."""
 
 import warnings
 
