@@ -279,7 +279,7 @@ def test_plan_names_every_ingredient_before_anything_is_built(monkeypatch):
 
     scene = problem(EDGE, INNER)
     with monkeypatch.context() as patch:
-        for name in ("cut", "space", "bulk"):
+        for name in ("cut", "function_space", "bulk"):
             patch.setattr(xcrack.xfem.model, name, forbidden)
         patch.setattr(xcrack.analysis.solve, "system", forbidden)
         planned = xc.plan(scene)

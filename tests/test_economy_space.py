@@ -214,7 +214,7 @@ def test_plan_names_every_ingredient_before_anything_is_built(monkeypatch):
 
     scene = problem(PENNY)
     with monkeypatch.context() as patch:
-        for name in ("cut", "space", "bulk"):
+        for name in ("cut", "function_space", "bulk"):
             patch.setattr(xcrack.xfem.model, name, forbidden)
         for name in ("system", "iterative_system"):
             patch.setattr(xcrack.analysis.solve, name, forbidden)
