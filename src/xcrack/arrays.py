@@ -1,4 +1,4 @@
-"""Small helpers for read-only arrays and ragged rows."""
+"""Small helpers for read-only arrays, ragged rows and places in messages."""
 
 from typing import Any
 
@@ -18,9 +18,14 @@ def frozen(values: ArrayLike, dtype: Any = None) -> NDArray[Any]:
 
 
 def lock(values: NDArray[Any]) -> NDArray[Any]:
-    """Make an array that nobody else holds read-only, and return it."""
+    """Make an array of one's own read-only, and return it."""
     values.flags.writeable = False
     return values
+
+
+def at(x: ArrayLike) -> list[float]:
+    """A place for a message: coordinates with six digits."""
+    return list(np.round(np.asarray(x, dtype=float), 6).tolist())
 
 
 def ranges(counts: Ints) -> tuple[Ints, Ints]:

@@ -481,10 +481,15 @@ def test_shapes_that_are_refused_or_harmless():
         lines = [xc.line_crack(c) for c in cracks]
         return xc.solve(xc.Problem(mesh, STEEL, lines, loads=PULL, **options))
 
-    with pytest.raises(xc.GeometryError, match=r"crack 0 from .* cuts no cell.*along the boundary"):
+    along = r"runs along the boundary: it ends at \[-0.5, .*half model.*model both halves"
+    with pytest.raises(xc.GeometryError, match=along):
         solve([(-0.5, -1.0), (0.5, -1.0)])
-    with pytest.raises(xc.ProblemError, match=r"cut the body into 2 pieces.*hold it by a support"):
+    with pytest.raises(xc.GeometryError, match=along):
         solve([(-0.5, -1 + 0.3 * h), (0.5, -1 + 0.3 * h)])  # a sliver along the bottom
+    with pytest.raises(xc.GeometryError, match=r"crack 0 from .* cuts no cell.*along the boundary"):
+        solve([(-1.5, -1.0), (1.5, -1.0)])
+    with pytest.raises(xc.ProblemError, match=r"cut the body into 2 pieces.*hold it by a support"):
+        solve([(-1.5, -1 + 0.3 * h), (1.5, -1 + 0.3 * h)])
     with pytest.raises(xc.GeometryError, match=r"ends at .* inside the boundary.*half a cell"):
         solve([(-0.5, -1.3), (-0.45, -1 + 0.3 * h)])  # a nick
     with pytest.raises(xc.GeometryError, match=r"has length .* less than.*the cell there"):

@@ -3,13 +3,18 @@
 import numpy as np
 from numpy.typing import ArrayLike
 
-from xcrack.arrays import Bools, Floats
+from xcrack.arrays import Bools, Floats, at
 from xcrack.crack.crack import Crack
 from xcrack.errors import GeometryError
+from xcrack.geometry.simplices import closest_on_segment
+from xcrack.mesh.checks import coordinates
+
+_SAME = 1e-9  # share of its length within which a line touches itself or is closed
+_AT_ONCE = 1_000_000  # pairs of pieces looked at together
 
 
 def line_crack(points: ArrayLike) -> Crack:
-    """Crack in the plane along a polyline.
+    """2D crack along a polyline.
 
     An end outside the body, or within half a cell of its boundary, becomes a mouth as soon as
     the crack is put into a mesh; an end inside is a tip. Lip + lies to the left of the order of
@@ -27,21 +32,17 @@ def line_crack(points: ArrayLike) -> Crack:
     Raises
     ------
     GeometryError
-        Fewer than two points, nan, points that coincide, a line that crosses itself or turns
-        back.
+        Fewer than two points, nan, points that coincide, a line that is closed, crosses or
+        touches itself, or turns back.
 
     Examples
     --------
     >>> line_crack([(0, 0), (1, 0), (2, 1)])
     Crack(3 points, 2 faces, not placed)
     """
-    x = np.asarray(points, dtype=float)
-    if x.ndim != 2 or x.shape[1] != 2 or len(x) < 2:
-        raise GeometryError(f"a line crack needs at least two points (p, 2), not shape {x.shape}.")
-    if not np.isfinite(x).all():
-        raise GeometryError(
-            f"crack point {x[~np.isfinite(x).all(axis=1)][0].tolist()} is not finite."
-        )
+    x = coordinates(points, "line_crack: points", (None, 2), error=GeometryError)
+    if len(x) < 2:
+        raise GeometryError(f"a line crack needs at least two points (p, 2), not {len(x)}.")
     length = np.linalg.norm(np.diff(x, axis=0), axis=1)
     if (length <= 1e-12 * length.max(initial=0.0)).any() or length.max() == 0:
         i = int(np.argmin(length))
@@ -54,33 +55,73 @@ def line_crack(points: ArrayLike) -> Crack:
     if (turns < -1 + 1e-12).any():
         back = x[1 + int(np.argmin(turns))]
         raise GeometryError(
-            f"the crack turns back on itself at {np.round(back, 6).tolist()}: leave out what runs "
-            "over it twice."
+            f"the crack turns back on itself at {at(back)}: leave out what runs over it twice."
         )
-    crossing = crossing_point(x, x, same=True)
-    if crossing is not None:
+    if np.linalg.norm(x[-1] - x[0]) <= _SAME * length.sum():
         raise GeometryError(
-            f"the crack crosses itself near {np.round(crossing, 6).tolist()}: end it there, or "
-            "describe it by two cracks that do not meet."
+            f"the line is closed: its first and last point both lie at {at(x[0])}. A closed crack "
+            "cuts a piece out of the body; leave a gap of a few cells between its ends, or give "
+            "two arcs as two cracks that do not meet."
         )
-    number = np.arange(len(x))
-    return Crack(x, np.stack([number[:-1], number[1:]], axis=1))
+    meeting = crossing_point(x, x, same=True)
+    if meeting is None:
+        touching = touching_points(x, x, _SAME * float(length.sum()), same=True)
+        meeting = touching[0] if len(touching) else None
+    if meeting is not None:
+        raise GeometryError(
+            f"the crack crosses itself near {at(meeting)}: end it there, or describe it by two "
+            "cracks that do not meet."
+        )
+    return polyline_crack(x)
 
 
-def crossing_point(a: Floats, b: Floats, same: bool) -> Floats | None:
+def polyline_crack(points: Floats, tips: tuple[int, ...] | None = None) -> Crack:
+    """Crack along points that are known to be sound, each piece a face."""
+    number = np.arange(len(points))
+    return Crack(points, np.stack([number[:-1], number[1:]], axis=1), tips)
+
+
+def crossing_point(a: Floats, b: Floats, same: bool = False) -> Floats | None:
     """A point where polylines a and b cross, or None; neighbours of one line do not count."""
-    p, r = a[:-1, None], np.diff(a, axis=0)[:, None]
-    q, s = b[None, :-1], np.diff(b, axis=0)[None]
-    cross = r[..., 0] * s[..., 1] - r[..., 1] * s[..., 0]
-    gap = q - p
-    with np.errstate(divide="ignore", invalid="ignore"):
-        t = (gap[..., 0] * s[..., 1] - gap[..., 1] * s[..., 0]) / cross
-        u = (gap[..., 0] * r[..., 1] - gap[..., 1] * r[..., 0]) / cross
-    hit: Bools = (cross != 0) & (t >= 0) & (t <= 1) & (u >= 0) & (u <= 1)
-    if same:
-        i, j = np.indices(hit.shape)
-        hit &= np.abs(i - j) > 1
-    if not hit.any():
-        return None
-    i, j = np.argwhere(hit)[0]
-    return np.asarray(a[i] + t[i, j] * (a[i + 1] - a[i]))
+    s, q = np.diff(b, axis=0)[None], b[None, :-1]
+    step = max(_AT_ONCE // max(len(b), 1), 1)
+    for first in range(0, len(a) - 1, step):
+        start = a[first : first + step + 1]
+        p, r = start[:-1, None], np.diff(start, axis=0)[:, None]
+        cross = r[..., 0] * s[..., 1] - r[..., 1] * s[..., 0]
+        gap = q - p
+        with np.errstate(divide="ignore", invalid="ignore"):
+            t = (gap[..., 0] * s[..., 1] - gap[..., 1] * s[..., 0]) / cross
+            u = (gap[..., 0] * r[..., 1] - gap[..., 1] * r[..., 0]) / cross
+        hit: Bools = (cross != 0) & (t >= 0) & (t <= 1) & (u >= 0) & (u <= 1)
+        if same:
+            i, j = np.indices(hit.shape)
+            hit &= np.abs(i + first - j) > 1
+        if hit.any():
+            i, j = np.argwhere(hit)[0]
+            return np.asarray(start[i] + t[i, j] * (start[i + 1] - start[i]))
+    return None
+
+
+def touching_points(a: Floats, b: Floats, reach: float, same: bool = False) -> Floats:
+    """Vertices of polylines a and b within a reach of the other line `(k, 2)`.
+
+    Lines that lie on each other touch so, though they cross nowhere. Of one line the neighbours
+    of a vertex do not count.
+    """
+    parts = [np.zeros((0, 2))]
+    for x, line in ((a, b),) if same else ((a, b), (b, a)):
+        step = max(_AT_ONCE // max(len(line), 1), 1)
+        for first in range(0, len(x), step):
+            vertex = x[first : first + step]
+            foot = closest_on_segment(vertex[:, None], line[None, :-1], line[None, 1:])
+            close: Bools = np.linalg.norm(foot - vertex[:, None], axis=2) <= reach
+            if same:
+                i, j = np.indices(close.shape)
+                i += first
+                close &= (j < i - 1) | (j > i)
+            parts.append(vertex[close.any(axis=1)])
+    return np.concatenate(parts)
+
+
+__all__ = ["crossing_point", "line_crack", "polyline_crack", "touching_points"]

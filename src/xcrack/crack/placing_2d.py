@@ -3,15 +3,21 @@
 import numpy as np
 from scipy.spatial import cKDTree
 
-from xcrack.arrays import Floats
+from xcrack.arrays import Floats, at
 from xcrack.crack.crack import Crack
-from xcrack.crack.lines import crossing_point
+from xcrack.crack.lines import crossing_point, touching_points
 from xcrack.crack.tips_2d import tip_frames
-from xcrack.errors import GeometryError
-from xcrack.mesh.locate import contains, locate, nearest_boundary
+from xcrack.errors import GeometryError, warn
+from xcrack.geometry.simplices import closest_on_segment
+from xcrack.mesh.locate import contains, locate, nearest_boundary, parts_inside
 from xcrack.mesh.mesh import Mesh
 
 _MOUTH = 0.5  # an end within this share of a cell from the boundary is a mouth
+_MEANT = 0.1  # share of a cell inside the boundary up to which nobody means a tip
+_WAY = 3.0  # cells to the boundary, along the crack, from an end that is close to it
+_ROUND = 1.1  # a way outside the body that is this much longer than its chord goes out and back
+_OWN = 2.0  # cells along a crack within which it is close to its own tip
+_TOUCH = 1e-6  # share of a cell within which cracks touch
 
 
 def place_line(crack: Crack, mesh: Mesh) -> Crack:
@@ -31,20 +37,18 @@ def place_line(crack: Crack, mesh: Mesh) -> Crack:
     Raises
     ------
     GeometryError
-        No part of the crack lies inside the body; or the crack is shorter than a cell, or ends
-        less than half a cell inside the boundary that it comes from.
+        No part of the crack lies inside the body; or the crack is shorter than a cell, runs along
+        the boundary, leaves the body by a kink for less than a cell, or ends less than half a
+        cell inside the boundary that it comes from.
     """
     last = len(crack.points) - 1
+    first_time = crack.tips is None
     candidates = (0, last) if crack.tips is None else crack.tips
     points = np.array(crack.points)
     length = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    if first_time:
+        _check_inside(points, mesh)
     within = contains(mesh, points[[0, last]])
-    if not within.any() and not contains(mesh, _samples(points)).any():
-        low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
-        raise GeometryError(
-            f"the crack from {points[0].tolist()} to {points[-1].tolist()} lies outside the body, "
-            f"which fills [{low.tolist()}, {high.tolist()}]: move it inside."
-        )
     tips = []
     for end, inside in zip((0, last), within.tolist()):
         inward = 1 if end == 0 else last - 1
@@ -59,7 +63,10 @@ def place_line(crack: Crack, mesh: Mesh) -> Crack:
             _check_nick(mesh, points[end], out, gap, size)
         outside = -gap if inside else gap
         if outside < size:
-            points[end] = _prolonged(mesh, points[end], out, size)
+            way, prolonged = _prolonged(mesh, points[end], out, size)
+            if first_time and inside:
+                _check_mouth(points[end], gap, size, way)
+            points[end] = prolonged
     placed = Crack(points, crack.faces, tuple(tips))
     if tips:
         h = _cell_sizes(mesh, points[tips])
@@ -71,10 +78,58 @@ def place_line(crack: Crack, mesh: Mesh) -> Crack:
     return placed
 
 
-def _samples(points: Floats) -> Floats:
-    """Nine points on each piece of a polyline."""
-    share = np.linspace(0, 1, 9)[:, None]
-    return np.concatenate([a + share * (b - a) for a, b in zip(points, points[1:], strict=False)])
+def _check_inside(points: Floats, mesh: Mesh) -> None:
+    """Raise where no part of a crack lies in the body; warn where it leaves it by a kink."""
+    parts = parts_inside(mesh, points)
+    first = [piece[0, 0] if len(piece) else np.inf for piece in parts]
+    last = [piece[-1, 1] if len(piece) else -np.inf for piece in parts]
+    rows = [i for i, piece in enumerate(parts) if len(piece)]
+    if not rows:
+        low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
+        raise GeometryError(
+            f"the crack from {points[0].tolist()} to {points[-1].tolist()} lies outside the body, "
+            f"which fills [{low.tolist()}, {high.tolist()}]: move it inside."
+        )
+    for i, j in zip(rows, rows[1:]):
+        if last[i] == 1 and first[j] == 0 and j == i + 1:
+            continue  # the vertex between lies in the body
+        kinks = points[i + 1 : j + 1]
+        ends = [
+            points[k] + t * (points[k + 1] - points[k]) for k, t in ((i, last[i]), (j, first[j]))
+        ]
+        way = np.linalg.norm(np.diff([ends[0], *kinks, ends[1]], axis=0), axis=1).sum()
+        chord = float(np.linalg.norm(ends[1] - ends[0]))
+        if way < _ROUND * chord:
+            continue  # across a hole or a notch
+        _, size = nearest_boundary(mesh, ends[0])
+        if chord < size:
+            raise GeometryError(
+                f"the crack leaves the body by its kink at {at(kinks[0])} and comes back only "
+                f"{chord:.4g} beside, less than a cell ({size:.4g}): refine the mesh there, or "
+                "move the kink inside."
+            )
+        warn(
+            f"the crack leaves the body by its kink at {at(kinks[0])}, from {at(ends[0])} to "
+            f"{at(ends[1])}: in the body these are two cracks with mouths there. If that is not "
+            "meant, move the kink inside."
+        )
+
+
+def _check_mouth(end: Floats, gap: float, size: float, way: float) -> None:
+    """Raise or warn where an end inside the body is taken for a mouth, but may not be meant so."""
+    if way > _WAY * size:
+        raise GeometryError(
+            f"the crack runs along the boundary: it ends at {at(end)}, {gap:.4g} from it and less "
+            f"than half a cell ({size:.4g}), but would leave the body only after {way:.4g}. Move "
+            "it inside or refine the mesh there. A crack on the symmetry plane of a half model "
+            "cuts nothing: model both halves."
+        )
+    if gap > _MEANT * size:
+        warn(
+            f"the crack ends at {at(end)}, {gap:.4g} inside the boundary and less than half a cell "
+            f"({size:.4g}): this end is taken as a mouth, at which the body is cut through. If it "
+            "is to be a tip, refine the mesh there; else end the crack at the boundary."
+        )
 
 
 def _check_nick(mesh: Mesh, end: Floats, out: Floats, gap: float, size: float) -> None:
@@ -82,21 +137,25 @@ def _check_nick(mesh: Mesh, end: Floats, out: Floats, gap: float, size: float) -
     ahead = end + 0.25 * size * out
     if contains(mesh, ahead[None])[0] and nearest_boundary(mesh, ahead)[0] > gap + 0.01 * size:
         raise GeometryError(
-            f"the crack ends at {np.round(end, 6).tolist()}, {gap:.4g} inside the boundary that it "
+            f"the crack ends at {at(end)}, {gap:.4g} inside the boundary that it "
             f"comes from, which is less than half a cell ({size:.4g}): refine the mesh there, or "
             "leave this part of the crack out."
         )
 
 
-def _prolonged(mesh: Mesh, end: Floats, out: Floats, size: float) -> Floats:
-    """The end moved one cell outside the body, or half way across a narrower gap in it."""
+def _prolonged(mesh: Mesh, end: Floats, out: Floats, size: float) -> tuple[float, Floats]:
+    """How far an end is from leaving the body, and the end moved one cell outside.
+
+    Half way across a narrower gap in the body.
+    """
     step = size / 8
     steps = step * np.arange(97)
     inside = contains(mesh, end + steps[:, None] * out)
     first_out = int(np.argmin(inside)) if not inside.all() else len(steps) - 1
     again = np.nonzero(inside[first_out:])[0]
     gap = float(again[0]) * step if len(again) else np.inf
-    return np.asarray(end + out * (steps[first_out] + min(size, gap / 2)))
+    way = float(steps[first_out])
+    return way, np.asarray(end + out * (way + min(size, gap / 2)))
 
 
 def _cell_sizes(mesh: Mesh, x: Floats) -> Floats:
@@ -105,30 +164,98 @@ def _cell_sizes(mesh: Mesh, x: Floats) -> Floats:
 
 
 def check_lines(cracks: tuple[Crack, ...], mesh: Mesh) -> None:
-    """Raise GeometryError where cracks cross, or two tips lie in one cell or closer than one."""
-    tips: list[Floats] = []
-    owner: list[int] = []
+    """Raise where cracks cross or touch, or a tip is closer than a cell to what it must not meet.
+
+    Parameters
+    ----------
+    cracks : tuple of Crack
+        Placed in the mesh.
+    mesh : Mesh
+
+    Raises
+    ------
+    GeometryError
+        Two cracks cross or lie on each other, two tips are closer than a cell, or a tip is closer
+        than half a cell to another part of its own crack.
+    """
     for i, crack in enumerate(cracks):
-        x, _ = tip_frames(crack)
-        tips.extend(x)
-        owner.extend([i] * len(x))
         for j in range(i):
-            crossing = crossing_point(cracks[j].points, crack.points, same=False)
+            crossing = crossing_point(cracks[j].points, crack.points)
             if crossing is not None:
                 raise GeometryError(
-                    f"cracks {j} and {i} cross near {np.round(crossing, 6).tolist()}: crossing and "
+                    f"cracks {j} and {i} cross near {at(crossing)}: crossing and "
                     "branching cracks are not supported; end one of them a few cells before."
                 )
-    if len(tips) < 2:
+    _check_tips(cracks, mesh)
+    for i, crack in enumerate(cracks):
+        _check_own(i, crack, mesh)
+        for j in range(i):
+            _check_touch((j, cracks[j]), (i, crack), mesh)
+
+
+def _check_tips(cracks: tuple[Crack, ...], mesh: Mesh) -> None:
+    """Raise where two tips lie in one cell or closer than one."""
+    tips = [tip_frames(crack)[0] for crack in cracks]
+    x = np.concatenate([np.zeros((0, 2)), *tips])
+    owner = np.repeat(np.arange(len(cracks)), [len(own) for own in tips])
+    if len(x) < 2:
         return
-    x = np.array(tips)
     cell, _ = locate(mesh, x)
     size = mesh.cell_size[np.maximum(cell, 0)]
     for i, j in sorted(cKDTree(x).query_pairs(float(size.max()))):
         apart = float(np.linalg.norm(x[i] - x[j]))
         if apart < min(size[i], size[j]) or cell[i] == cell[j]:
+            if owner[i] == owner[j]:
+                raise GeometryError(
+                    f"the tips of crack {owner[i]} at {at(x[i])} and {at(x[j])} are {apart:.4g} "
+                    f"apart, closer than a cell ({size[i]:.4g}): a crack that closes cuts a piece "
+                    "out of the body. Refine the mesh between them, or leave a gap of a few cells."
+                )
             raise GeometryError(
-                f"a tip of crack {owner[i]} at {np.round(x[i], 6).tolist()} and one of crack "
-                f"{owner[j]} at {np.round(x[j], 6).tolist()} are {apart:.4g} apart, closer than a "
+                f"a tip of crack {owner[i]} at {at(x[i])} and one of crack {owner[j]} at "
+                f"{at(x[j])} are {apart:.4g} apart, closer than a "
                 f"cell ({size[i]:.4g}): refine the mesh between them, or join the cracks."
             )
+
+
+def _check_own(number: int, crack: Crack, mesh: Mesh) -> None:
+    """Raise where a tip comes closer than half a cell to another part of its own crack."""
+    x, _ = tip_frames(crack)
+    for tip, end, size in zip(crack.tips or (), x, _cell_sizes(mesh, x)):
+        line = crack.points if tip == 0 else crack.points[::-1]
+        length = np.linalg.norm(np.diff(line, axis=0), axis=1)
+        away = np.concatenate([[0.0], np.cumsum(length)])  # along the crack, from the tip
+        if away[-1] <= _OWN * size:
+            continue
+        # The piece on which that distance is reached counts from there.
+        first = int(np.searchsorted(away, _OWN * size, side="right")) - 1
+        begin = line[first] + (_OWN * size - away[first]) / length[first] * (
+            line[first + 1] - line[first]
+        )
+        rest = np.concatenate([begin[None], line[first + 1 :]])
+        foot = closest_on_segment(end, rest[:-1], rest[1:])
+        distance = np.linalg.norm(foot - end, axis=1)
+        near = int(np.argmin(distance))
+        if distance[near] < _MOUTH * size:
+            raise GeometryError(
+                f"a tip of crack {number} at {at(end)} is {distance[near]:.4g} from another part "
+                f"of the same crack at {at(foot[near])}, less than half a cell ({size:.4g}): what "
+                "lies between is all but cut out. End growth before, or refine the mesh there."
+            )
+
+
+def _check_touch(one: tuple[int, Crack], other: tuple[int, Crack], mesh: Mesh) -> None:
+    """Raise where two cracks lie on each other in the body: they cross nowhere."""
+    (i, a), (j, b) = one, other
+    reach = _TOUCH * float(mesh.cell_size.max())
+    low = np.maximum(a.points.min(axis=0), b.points.min(axis=0)) - reach
+    high = np.minimum(a.points.max(axis=0), b.points.max(axis=0)) + reach
+    if (low > high).any():
+        return
+    touching = touching_points(a.points, b.points, reach)
+    touching = touching[contains(mesh, touching)] if len(touching) else touching
+    if len(touching):
+        raise GeometryError(
+            f"cracks {i} and {j} touch or lie on each other near {at(touching[0])}: describe them "
+            "by one crack, or leave a few cells between them."
+        )

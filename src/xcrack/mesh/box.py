@@ -8,8 +8,8 @@ from numpy.typing import ArrayLike
 
 from xcrack.arrays import Bools, Ints
 from xcrack.errors import MeshError
-from xcrack.inputs import numbers, whole_numbers
-from xcrack.mesh.checks import LARGEST
+from xcrack.inputs import whole_numbers
+from xcrack.mesh.checks import coordinates
 from xcrack.mesh.mesh import Mesh, sound_mesh
 
 _MOST_CELLS = 1e8  # more do not fit into the memory of any machine that solves them
@@ -44,16 +44,13 @@ def box(lower: ArrayLike, upper: ArrayLike, n: int | tuple[int, ...]) -> Mesh:
     >>> box((0, 0), (2, 1), (4, 2))
     Mesh(15 points, 16 triangles, facet sets: left, right, bottom, top, boundary)
     """
-    low = numbers(lower, "box: lower", (None,), error=MeshError)
+    low = coordinates(lower, "box: lower", (None,))
     d = len(low)
     if d not in (2, 3):
         raise MeshError(f"box: lower {low.tolist()} needs two or three coordinates.")
-    high = numbers(upper, "box: upper", (d,), error=MeshError)
-    if not (high > low).all() or max(np.abs(low).max(), np.abs(high).max()) > LARGEST:
-        raise MeshError(
-            f"box: upper {high.tolist()} must exceed lower {low.tolist()}, and neither "
-            f"{LARGEST:.0e}."
-        )
+    high = coordinates(upper, "box: upper", (d,))
+    if not (high > low).all():
+        raise MeshError(f"box: upper {high.tolist()} must exceed lower {low.tolist()}.")
     count = whole_numbers(n, "box: n", error=MeshError)
     if count.ndim:
         count = whole_numbers(count, "box: n", (d,), error=MeshError)

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
-from xcrack.arrays import Floats, Ints, ranges
-from xcrack.errors import MeshError
+from xcrack.arrays import Floats, Ints, at, ranges
+from xcrack.errors import MeshError, XcrackError
 from xcrack.geometry.simplices import distance_to_simplices
-from xcrack.inputs import numbers, whole_numbers
+from xcrack.inputs import Shape, numbers, whole_numbers
 
 _FLAT = 1e-12  # a cell whose volume is below this share of (longest edge)^d has no shape
 LARGEST = 1e90  # coordinate whose third power is still a number
@@ -21,6 +21,29 @@ _INSIDE = 1e-3  # barycentric: a point this deep in a cell is in it, whatever th
 # Abaqus files, Abaqus for faces and picked elements.
 _UNNAMED = re.compile(r"cells_\d+|(Physical)?(Surface|Volume)\d+|_.*")
 _AT_ONCE = 200_000  # pairs of points and cells looked at together
+
+
+def coordinates(
+    value: Any, what: str, shape: Shape, *, error: type[XcrackError] = MeshError
+) -> Floats:
+    """Check that a value is an array of finite coordinates, small enough to compute with.
+
+    Parameters
+    ----------
+    value, what, shape, error
+        As of `xcrack.inputs.numbers`.
+
+    Returns
+    -------
+    array of float
+    """
+    x = numbers(value, what, shape, error=error)
+    if x.size and np.abs(x).max() > LARGEST:
+        raise error(
+            f"{what}: coordinates of up to {np.abs(x).max():.3g} are too large to compute with "
+            "their powers; take another unit of length."
+        )
+    return x
 
 
 def checked(points: Any, cells: Any) -> tuple[Floats, Ints]:
@@ -60,11 +83,7 @@ def checked(points: Any, cells: Any) -> tuple[Floats, Ints]:
             f"point {int(np.argmax(bad))} has coordinates {x[np.argmax(bad)].tolist()} "
             f"({int(bad.sum())} such points): every coordinate must be finite."
         )
-    if np.abs(x).max() > LARGEST:
-        raise MeshError(
-            f"coordinates of up to {np.abs(x).max():.3g} are too large for computing with their "
-            "powers: take another unit of length."
-        )
+    coordinates(x, "points of the mesh", x.shape)
     if c.min() < 0 or c.max() >= len(x):
         raise MeshError(
             f"cell {int(np.argmax(((c < 0) | (c >= len(x))).any(axis=1)))} names a point outside "
@@ -97,7 +116,7 @@ def _oriented(points: Floats, cells: Ints) -> Ints:
     if flat.any():
         worst = int(np.argmax(flat))
         raise MeshError(
-            f"cell {worst} at {_at(x[worst].mean(axis=0))} has no volume "
+            f"cell {worst} at {at(x[worst].mean(axis=0))} has no volume "
             f"({int(flat.sum())} such cells): remesh, or merge its points."
         )
     turned = np.array(cells)
@@ -185,7 +204,7 @@ def doubts(points: Floats, cells: Ints, facets: Ints, owner: Ints) -> list[str]:
             map(int, (number[i], other[i, 1] if other[i, 0] == number[i] else other[i, 0]))
         )
         messages.append(
-            f"points {pair[0]} and {pair[1]} of the mesh both lie at {_at(points[number[i]])} "
+            f"points {pair[0]} and {pair[1]} of the mesh both lie at {at(points[number[i]])} "
             f"({int(twin.sum())} points have such a twin): cells are not joined there, which acts "
             "as a cut, or bodies lie on top of each other. Merge the points (gmsh: Coherence, or "
             "removeDuplicateNodes), unless the cut is meant."
@@ -212,7 +231,7 @@ def _hanging(
         return []
     i = int(np.argmax(on))
     return [
-        f"point {int(candidate[i])} of the mesh at {_at(x[i])} lies on a side of cell "
+        f"point {int(candidate[i])} of the mesh at {at(x[i])} lies on a side of cell "
         f"{int(owner[row[i]])} without being one of its points ({len(np.unique(candidate[on]))} "
         "such points): the mesh does not conform, and the body is open there. Mesh its parts "
         "together (gmsh: BooleanFragments or Coherence before meshing)."
@@ -246,7 +265,7 @@ def _overlapping(points: Floats, cells: Ints, owner: Ints, corner: Floats) -> li
         return []
     i = int(np.argmax(bad >= 0))
     return [
-        f"cells {int(owner[i])} and {int(bad[i])} of the mesh overlap at {_at(x[i])} "
+        f"cells {int(owner[i])} and {int(bad[i])} of the mesh overlap at {at(x[i])} "
         f"({int((bad >= 0).sum())} such places): parts of the body are there twice, and twice as "
         "stiff. Unite them before meshing (gmsh: BooleanUnion or BooleanFragments)."
     ]
@@ -277,8 +296,4 @@ def unused_sets(cell_sets: Mapping[str, Ints], n_cells: int) -> list[str]:
     ]
 
 
-def _at(x: Floats) -> list[float]:
-    return list(np.round(x, 6).tolist())
-
-
-__all__ = ["LARGEST", "checked", "checked_sets", "doubts", "unused_sets"]
+__all__ = ["LARGEST", "checked", "checked_sets", "coordinates", "doubts", "unused_sets"]

@@ -85,6 +85,35 @@ def nearest_boundary(mesh: Mesh, x: Floats) -> tuple[float, float]:
     return float(distance[best]), float(size)
 
 
+def parts_inside(mesh: Mesh, polyline: Floats) -> list[Floats]:
+    """Parts of each piece of a 2D polyline that lie in the body.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    polyline : (p, 2) array, length
+
+    Returns
+    -------
+    list of (k, 2) arrays, one a piece
+        Where each part begins and ends, as shares of the piece.
+    """
+    corner = mesh.points[mesh.boundary]
+    q, s = corner[:, 0], corner[:, 1] - corner[:, 0]
+    parts = []
+    for p, r in zip(polyline, np.diff(polyline, axis=0)):
+        cross = r[0] * s[:, 1] - r[1] * s[:, 0]
+        gap = q - p
+        with np.errstate(divide="ignore", invalid="ignore"):
+            t = (gap[:, 0] * s[:, 1] - gap[:, 1] * s[:, 0]) / cross
+            u = (gap[:, 0] * r[1] - gap[:, 1] * r[0]) / cross
+        hits = t[(cross != 0) & (u >= 0) & (u <= 1) & (t > 0) & (t < 1)]
+        ends = np.concatenate([[0.0], np.sort(hits), [1.0]])
+        pairs = np.stack([ends[:-1], ends[1:]], axis=1)
+        parts.append(pairs[contains(mesh, p + pairs.mean(axis=1)[:, None] * r)])
+    return parts
+
+
 def cells_within(mesh: Mesh, x: Floats, radius: float) -> Ints:
     """Cells of a plane mesh that come nearer to a point outside them than a radius.
 
