@@ -25,7 +25,7 @@ def lock(values: NDArray[Any]) -> NDArray[Any]:
 
 def at(x: ArrayLike) -> list[float]:
     """A place for a message: coordinates with six digits."""
-    return list(np.round(np.asarray(x, dtype=float), 6).tolist())
+    return list((np.round(np.asarray(x, dtype=float), 6) + 0.0).tolist())  # no -0.0
 
 
 def ranges(counts: Ints) -> tuple[Ints, Ints]:

@@ -2,7 +2,10 @@
 
 from dataclasses import dataclass
 
+from xcrack.crack.placing import short_fronts
 from xcrack.scene.problem import Problem
+
+_MODES, _ENDS = {2: "II", 3: "III"}, {2: "tip(s)", 3: "front(s)"}
 
 LIPS = {
     "penalty": "a penalty",
@@ -104,8 +107,8 @@ def plan(problem: Problem) -> Report:
 
 
 def _third_mode(problem: Problem, n_tips: list[int]) -> Ingredient:
-    if problem.mesh.dim == 2:
-        return Ingredient("third mode", False, "a plane problem has modes I and II only")
+    if _MODES[problem.mesh.dim] == "II":
+        return Ingredient("third mode", False, "a 2D problem has modes I and II only")
     if not sum(n_tips):
         return Ingredient("third mode", False, "no front to tear along")
     return Ingredient("third mode", True, "K_III along every front")
@@ -120,16 +123,24 @@ def _heaviside(n_tips: list[int]) -> Ingredient:
 def _tips(problem: Problem, n_tips: list[int]) -> Ingredient:
     if not n_tips:
         return Ingredient("tip functions", False, "no cracks")
+    short = [
+        f"crack {c}: {front}"
+        for c, crack in enumerate(problem.cracks)
+        for front in short_fronts(crack, problem.mesh)
+    ]
+    lost = "; ".join(short)
     if not sum(n_tips):
-        return Ingredient("tip functions", False, "every crack cuts through: there is no tip")
+        return Ingredient(
+            "tip functions", False, lost or "every crack cuts through: there is no tip"
+        )
     what_each = f"{problem.numerics.functions} functions"
     if problem.numerics.comparison.tip_basis == "vectorial":
-        what_each = f"modes I to {'II' if problem.mesh.dim == 2 else 'III'} only"
+        what_each = f"modes I to {_MODES[problem.mesh.dim]} only"
     reach = (
         "within a fixed radius" if problem.numerics.enrichment == "geometric" else "tip cells only"
     )
-    what = "tip(s)" if problem.mesh.dim == 2 else "front(s)"
-    return Ingredient("tip functions", True, f"{sum(n_tips)} {what}, {what_each}, {reach}")
+    reason = f"{sum(n_tips)} {_ENDS[problem.mesh.dim]}, {what_each}, {reach}"
+    return Ingredient("tip functions", True, reason + (f"; left out: {lost}" if lost else ""))
 
 
 def _multipliers(problem: Problem) -> list[Ingredient]:

@@ -5,7 +5,7 @@ from numpy.typing import ArrayLike
 
 from xcrack.arrays import at
 from xcrack.crack.crack import Crack
-from xcrack.crack.lines import crossing_point, polyline_crack
+from xcrack.crack.lines import crossing_points, polyline_crack
 from xcrack.crack.tips_2d import tip_frames
 from xcrack.errors import GeometryError
 from xcrack.inputs import numbers
@@ -60,10 +60,10 @@ def advance(crack: Crack, angle: ArrayLike, da: ArrayLike) -> Crack:
     for tip, da_ in zip(tips, step):
         if da_ != 0:
             new, rest = (points[:2], points[2:]) if tip == 0 else (points[-2:], points[:-2])
-            crossing = crossing_point(new, rest) if len(rest) > 1 else None
-            if crossing is not None:
+            crossing = crossing_points(new, rest)
+            if len(crossing):
                 raise GeometryError(
-                    f"the crack grows across itself near {at(crossing)}: what lies between is cut "
-                    "out, which is not modelled. End growth before."
+                    f"the crack grows across itself near {at(crossing[0])}: what lies between is "
+                    "cut out, which is not modelled. End growth before."
                 )
     return polyline_crack(points, tuple(tips))

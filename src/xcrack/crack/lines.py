@@ -63,13 +63,12 @@ def line_crack(points: ArrayLike) -> Crack:
             "cuts a piece out of the body; leave a gap of a few cells between its ends, or give "
             "two arcs as two cracks that do not meet."
         )
-    meeting = crossing_point(x, x, same=True)
-    if meeting is None:
-        touching = touching_points(x, x, _SAME * float(length.sum()), same=True)
-        meeting = touching[0] if len(touching) else None
-    if meeting is not None:
+    meeting = crossing_points(x, x, same=True)
+    if not len(meeting):
+        meeting = touching_points(x, x, _SAME * float(length.sum()), same=True)
+    if len(meeting):
         raise GeometryError(
-            f"the crack crosses itself near {at(meeting)}: end it there, or describe it by two "
+            f"the crack crosses itself near {at(meeting[0])}: end it there, or describe it by two "
             "cracks that do not meet."
         )
     return polyline_crack(x)
@@ -81,8 +80,9 @@ def polyline_crack(points: Floats, tips: tuple[int, ...] | None = None) -> Crack
     return Crack(points, np.stack([number[:-1], number[1:]], axis=1), tips)
 
 
-def crossing_point(a: Floats, b: Floats, same: bool = False) -> Floats | None:
-    """A point where polylines a and b cross, or None; neighbours of one line do not count."""
+def crossing_points(a: Floats, b: Floats, same: bool = False) -> Floats:
+    """Points where polylines a and b cross `(k, 2)`; neighbours of one line do not count."""
+    parts = [np.zeros((0, 2))]
     s, q = np.diff(b, axis=0)[None], b[None, :-1]
     step = max(_AT_ONCE // max(len(b), 1), 1)
     for first in range(0, len(a) - 1, step):
@@ -97,10 +97,9 @@ def crossing_point(a: Floats, b: Floats, same: bool = False) -> Floats | None:
         if same:
             i, j = np.indices(hit.shape)
             hit &= np.abs(i + first - j) > 1
-        if hit.any():
-            i, j = np.argwhere(hit)[0]
-            return np.asarray(start[i] + t[i, j] * (start[i + 1] - start[i]))
-    return None
+        row = np.nonzero(hit)[0]
+        parts.append(start[row] + t[hit][:, None] * (start[row + 1] - start[row]))
+    return np.concatenate(parts)
 
 
 def touching_points(a: Floats, b: Floats, reach: float, same: bool = False) -> Floats:
@@ -124,4 +123,4 @@ def touching_points(a: Floats, b: Floats, reach: float, same: bool = False) -> F
     return np.concatenate(parts)
 
 
-__all__ = ["crossing_point", "line_crack", "polyline_crack", "touching_points"]
+__all__ = ["crossing_points", "line_crack", "polyline_crack", "touching_points"]

@@ -4,12 +4,18 @@ from collections.abc import Callable
 
 from xcrack.crack.crack import Crack
 from xcrack.crack.placing_2d import check_lines, place_line
-from xcrack.crack.placing_3d import check_surfaces, place_surface
+from xcrack.crack.placing_3d import ShortFront, check_surfaces, place_surface
+from xcrack.crack.placing_3d import short_fronts as surface_short_fronts
 from xcrack.errors import GeometryError
 from xcrack.mesh.mesh import Mesh
 
 _PLACE: dict[int, Callable[[Crack, Mesh], Crack]] = {2: place_line, 3: place_surface}
 _CHECK: dict[int, Callable[[tuple[Crack, ...], Mesh], None]] = {2: check_lines, 3: check_surfaces}
+
+_SHORT: dict[int, Callable[[Crack, Mesh], list[ShortFront]]] = {
+    2: lambda crack, mesh: [],
+    3: surface_short_fronts,
+}
 
 
 def placed(crack: Crack, mesh: Mesh) -> Crack:
@@ -36,6 +42,21 @@ def placed(crack: Crack, mesh: Mesh) -> Crack:
     return _PLACE[mesh.dim](crack, mesh)
 
 
+def short_fronts(crack: Crack, mesh: Mesh) -> list[ShortFront]:
+    """Fronts of a crack, not placed yet, that this mesh is too coarse for; none in 2D.
+
+    Parameters
+    ----------
+    crack : Crack
+    mesh : Mesh
+
+    Returns
+    -------
+    list of ShortFront
+    """
+    return _SHORT[mesh.dim](crack, mesh)
+
+
 def check_cracks(cracks: tuple[Crack, ...], mesh: Mesh) -> None:
     """Raise where placed cracks cross or touch, or their ends are closer than a cell.
 
@@ -53,4 +74,4 @@ def check_cracks(cracks: tuple[Crack, ...], mesh: Mesh) -> None:
     _CHECK[mesh.dim](cracks, mesh)
 
 
-__all__ = ["check_cracks", "placed"]
+__all__ = ["check_cracks", "placed", "short_fronts"]

@@ -5,7 +5,7 @@ from scipy.spatial import cKDTree
 
 from xcrack.arrays import Floats, at
 from xcrack.crack.crack import Crack
-from xcrack.crack.lines import crossing_point, touching_points
+from xcrack.crack.lines import crossing_points, touching_points
 from xcrack.crack.tips_2d import tip_frames
 from xcrack.errors import GeometryError, warn
 from xcrack.geometry.simplices import closest_on_segment
@@ -180,10 +180,11 @@ def check_lines(cracks: tuple[Crack, ...], mesh: Mesh) -> None:
     """
     for i, crack in enumerate(cracks):
         for j in range(i):
-            crossing = crossing_point(cracks[j].points, crack.points)
-            if crossing is not None:
+            crossing = crossing_points(cracks[j].points, crack.points)
+            crossing = crossing[contains(mesh, crossing)] if len(crossing) else crossing
+            if len(crossing):
                 raise GeometryError(
-                    f"cracks {j} and {i} cross near {at(crossing)}: crossing and "
+                    f"cracks {j} and {i} cross near {at(crossing[0])}: crossing and "
                     "branching cracks are not supported; end one of them a few cells before."
                 )
     _check_tips(cracks, mesh)

@@ -1,13 +1,15 @@
-"""Cracks in space put into a mesh: what of their outline is front, and mouths led outside."""
+"""Cracks in 3D put into a mesh: what of their outline is front, and mouths led outside."""
+
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.spatial import cKDTree
 
-from xcrack.arrays import Bools, Floats, Ints
+from xcrack.arrays import Bools, Floats, Ints, at
 from xcrack.crack.corners_3d import rounded
 from xcrack.crack.crack import Crack
 from xcrack.crack.mouths_3d import OUTSIDE, SIDE, SMOOTH, Outline, open_fronts, runs_of
-from xcrack.errors import GeometryError
+from xcrack.errors import GeometryError, warn
 from xcrack.geometry.distances import closest_in, first_crossing, triangle_tree
 from xcrack.geometry.triangulation import (
     components,
@@ -29,6 +31,31 @@ _NEAR = 3.0  # cells around the body in which the outline is refined
 _TOUCH = 1e-6  # share of a cell within which cracks touch
 
 
+@dataclass(frozen=True)
+class ShortFront:
+    """A piece of outline in the body that is too short for the mesh to be a front.
+
+    Attributes
+    ----------
+    x : tuple of float, length
+        Its middle.
+    length : float, length
+        Of the part that lies more than half a cell inside.
+    cell : float, length
+        Size of the largest cell there.
+    """
+
+    x: tuple[float, ...]
+    length: float
+    cell: float
+
+    def __str__(self) -> str:
+        return (
+            f"the front at {at(self.x)}, {self.length:.4g} long without what lies within half a "
+            f"cell of the boundary, is shorter than a cell ({self.cell:.4g})"
+        )
+
+
 def place_surface(crack: Crack, mesh: Mesh) -> Crack:
     """Decide which parts of a crack's outline are front in this mesh, and lead mouths outside.
 
@@ -39,7 +66,7 @@ def place_surface(crack: Crack, mesh: Mesh) -> Crack:
     Parameters
     ----------
     crack : Crack
-        In space. If its fronts are known already, only these are looked at again, and its points
+        In 3D. If its fronts are known already, only these are looked at again, and its points
         stay as they are.
     mesh : Mesh
 
@@ -47,7 +74,8 @@ def place_surface(crack: Crack, mesh: Mesh) -> Crack:
     -------
     Crack
         With `fronts` set. Ends of open fronts lie two cells outside the body, mouths at least
-        one cell (less in a gap that is narrower).
+        one cell (less in a gap that is narrower). A warning names a front that is shorter than a
+        cell and becomes part of the mouth.
 
     Raises
     ------
@@ -55,6 +83,33 @@ def place_surface(crack: Crack, mesh: Mesh) -> Crack:
         No part of the crack lies inside the body; or the crack is smaller than a cell, or ends
         less than half a cell inside the boundary that it comes from.
     """
+    placed, short = _placed(crack, mesh)
+    if crack.fronts is None:
+        for front in short:
+            warn(
+                f"{front}: it becomes part of the mouth, the crack cuts through there and has no "
+                "K. Take at least three cells along it."
+            )
+    return placed
+
+
+def short_fronts(crack: Crack, mesh: Mesh) -> list[ShortFront]:
+    """Pieces of the outline of a crack that a mesh is too coarse to take for fronts.
+
+    Parameters
+    ----------
+    crack : Crack
+        In 3D, not placed.
+    mesh : Mesh
+
+    Returns
+    -------
+    list of ShortFront
+    """
+    return _placed(crack, mesh)[1] if crack.fronts is None else []
+
+
+def _placed(crack: Crack, mesh: Mesh) -> tuple[Crack, list[ShortFront]]:
     body = Body.of(mesh)
     _check_inside(crack, body)
     points, faces = np.array(crack.points), np.array(crack.faces)
@@ -69,22 +124,24 @@ def place_surface(crack: Crack, mesh: Mesh) -> Crack:
         for a, b in zip(front, front[1:], strict=False)
     }
     fronts: list[tuple[int, Ints]] = []
+    short: list[ShortFront] = []
     for loop in loops(faces):
         pairs = zip(loop.tolist(), np.roll(loop, -1).tolist(), strict=True)
         number = np.array([0 if first_time else owner.get(pair, -1) for pair in pairs])
         if (number < 0).all():
             continue
-        inside = _front_sides(points[loop], number >= 0, body)
+        inside, too_short = _front_sides(points[loop], number >= 0, body)
+        short.extend(too_short)
         if inside.all():
             fronts.append((int(number[0]), np.append(loop, loop[0])))
             continue
         outline = Outline(loop, number >= 0, inside, first_time)
-        points, faces, found = open_fronts(points, faces, outline, body)
+        points, faces, own = open_fronts(points, faces, outline, body)
         fronts.extend(
-            (int(number[run[0]]), front) for run, front in zip(runs_of(inside), found, strict=True)
+            (int(number[run[0]]), front) for run, front in zip(runs_of(inside), own, strict=True)
         )
     fronts.sort(key=lambda pair: pair[0])
-    return Crack(points, faces, None, tuple(front for _, front in fronts))
+    return Crack(points, faces, None, tuple(front for _, front in fronts)), short
 
 
 def _check_inside(crack: Crack, body: Body) -> None:
@@ -99,6 +156,12 @@ def _check_inside(crack: Crack, body: Body) -> None:
         # A crack that lies on the boundary does not cut the body.
         if (depth < -_TOUCH * size).any():
             return
+        if (depth < _TOUCH * size).any():
+            where = foot[int(np.argmin(depth))]
+            raise GeometryError(
+                f"the crack near {at(where)} lies on the boundary and cuts nothing: move it "
+                "inside. If that is the symmetry plane of a half model, model both halves."
+            )
     low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
     at_low, at_high = crack.points.min(axis=0), crack.points.max(axis=0)
     raise GeometryError(
@@ -123,7 +186,7 @@ def _check_size(points: Floats, faces: Ints, body: Body) -> None:
         cell = float(body.cell_size(x).min())
         if width[k] < cell and inside.any():
             raise GeometryError(
-                f"the crack at {np.round(x[inside][0], 6).tolist()} is {width[k]:.4g} wide, less "
+                f"the crack at {at(x[inside][0])} is {width[k]:.4g} wide, less "
                 f"than the cell there ({cell:.4g}): refine the mesh around it or leave it out."
             )
 
@@ -168,24 +231,29 @@ def _with_round_corners(points: Floats, faces: Ints, body: Body) -> tuple[Floats
     return rounded(points, faces, number, 2 * body.cell_size(points[number]))
 
 
-def _front_sides(x: Floats, candidate: Bools, body: Body) -> Bools:
-    """Sides of an outline that are front.
+def _front_sides(x: Floats, candidate: Bools, body: Body) -> tuple[Bools, list[ShortFront]]:
+    """Sides of an outline that are front, and pieces too short for that.
 
     Where a front comes close to the boundary over less than two cells without leaving the body,
-    it runs on; a piece of front shorter than a cell is none.
+    it runs on; pieces shorter than a cell are no fronts.
     """
     following = np.roll(x, -1, axis=0)
     depth, facet = body.depth((x + following) / 2)
     size = body.cell_size((x + following) / 2)
     length = np.linalg.norm(following - x, axis=1)
     inside: Bools = (depth < -_MOUTH * facet) & candidate
+    short = []
     for value, least in ((False, OUTSIDE), (True, 1.0)):
         for run in runs_of(inside == value):
             if len(run) == len(inside) or length[run].sum() >= least * size[run].max():
                 continue
-            if value or (candidate[run] & (depth[run] < 0)).all():
-                inside[run] = not value
-    return inside
+            if value:
+                place = tuple(((x + following) / 2)[run].mean(axis=0).tolist())
+                short.append(ShortFront(place, float(length[run].sum()), float(size[run].max())))
+                inside[run] = False
+            elif (candidate[run] & (depth[run] < 0)).all():
+                inside[run] = True
+    return inside, short
 
 
 def check_surfaces(cracks: tuple[Crack, ...], mesh: Mesh) -> None:
@@ -210,7 +278,7 @@ def check_surfaces(cracks: tuple[Crack, ...], mesh: Mesh) -> None:
             meeting = _meeting(cracks[i], crack, body)
             if meeting is not None:
                 raise GeometryError(
-                    f"cracks {i} and {j} cross near {np.round(meeting, 6).tolist()}: crossing and "
+                    f"cracks {i} and {j} cross near {at(meeting)}: crossing and "
                     "branching cracks are not supported; end one of them a few cells before."
                 )
     _check_apart(cracks, body)
@@ -240,8 +308,8 @@ def _check_apart(cracks: tuple[Crack, ...], body: Body) -> None:
         k = close[np.argmin(apart[close])]
         i, j = pairs[k]
         raise GeometryError(
-            f"the front of crack {owner[i]} at {np.round(x[i], 6).tolist()} and that of crack "
-            f"{owner[j]} at {np.round(x[j], 6).tolist()} are {apart[k]:.4g} apart, closer than a "
+            f"the front of crack {owner[i]} at {at(x[i])} and that of crack "
+            f"{owner[j]} at {at(x[j])} are {apart[k]:.4g} apart, closer than a "
             f"cell ({size[i]:.4g}): refine the mesh between them, or join the cracks."
         )
 

@@ -1,23 +1,25 @@
-"""Cracks in space: flat ones by their outline, others by their triangles."""
+"""Cracks in 3D: flat ones by their outline, others by their triangles."""
 
 from os import PathLike
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from xcrack.arrays import Floats, Ints
+from xcrack.arrays import Floats, Ints, at
 from xcrack.crack.crack import Crack
 from xcrack.errors import GeometryError
 from xcrack.geometry.polygon import ear_clipped, self_crossing
 from xcrack.geometry.triangulation import face_areas, oriented, rim, side_keys
+from xcrack.inputs import number, numbers, whole, whole_numbers
+from xcrack.mesh.checks import LARGEST, coordinates
 from xcrack.mesh.files import read_triangles
 
 _FLAT = 1e-9  # share of its size by which a plane polygon may leave its plane
-_FEWEST = 8  # boundary points that still make a disc
+_FEWEST, _MOST = 8, 100_000  # boundary points of a disc
 
 
 def penny_crack(center: ArrayLike, normal: ArrayLike, radius: float, *, n: int = 128) -> Crack:
-    """Circular crack in space.
+    """Circular 3D crack.
 
     Parameters
     ----------
@@ -42,12 +44,13 @@ def penny_crack(center: ArrayLike, normal: ArrayLike, radius: float, *, n: int =
     >>> penny_crack((0, 0, 0), (0, 0, 1), 2.0, n=32).dim
     3
     """
-    middle, direction = _vector(center, "center"), _vector(normal, "normal")
-    z = _unit(direction, "the normal of the penny crack")
+    middle = _vector(center, "penny_crack: center")
+    z = _unit(_vector(normal, "penny_crack: normal"), "the normal of the penny crack")
+    radius = number(radius, "penny_crack: radius", above=0, most=LARGEST, error=GeometryError)
     x = np.eye(3)[int(np.argmin(np.abs(z)))]
     x = np.cross(np.cross(z, x), z)
     x /= np.linalg.norm(x)
-    return _disc(middle, x * _length(radius, "radius"), np.cross(z, x) * radius, n)
+    return _disc(middle, x * radius, np.cross(z, x) * radius, n)
 
 
 def elliptic_crack(
@@ -59,7 +62,7 @@ def elliptic_crack(
     *,
     n: int = 128,
 ) -> Crack:
-    """Elliptic crack in space.
+    """Elliptic 3D crack.
 
     Parameters
     ----------
@@ -88,9 +91,11 @@ def elliptic_crack(
     >>> elliptic_crack((0, 0, 0), (0, 0, 1), (1, 0, 0), 2.0, 1.0).dim
     3
     """
-    middle = _vector(center, "center")
-    z = _unit(_vector(normal, "normal"), "the normal of the elliptic crack")
-    given = _vector(axis, "axis")
+    middle = _vector(center, "elliptic_crack: center")
+    z = _unit(_vector(normal, "elliptic_crack: normal"), "the normal of the elliptic crack")
+    given = _vector(axis, "elliptic_crack: axis")
+    a = number(a, "elliptic_crack: half-axis a", above=0, most=LARGEST, error=GeometryError)
+    b = number(b, "elliptic_crack: half-axis b", above=0, most=LARGEST, error=GeometryError)
     flat = given - (given @ z) * z
     if not np.linalg.norm(flat) > 1e-9 * np.linalg.norm(given):
         raise GeometryError(
@@ -99,14 +104,13 @@ def elliptic_crack(
         )
     x = flat / np.linalg.norm(flat)
     y = np.cross(z, x)
-    return _disc(middle, x * _length(a, "half-axis a"), y * _length(b, "half-axis b"), n)
+    return _disc(middle, x * a, y * b, n)
 
 
 def _disc(center: Floats, first: Floats, second: Floats, n: int) -> Crack:
     """Disc spanned by two conjugate half-axes, in rings whose points become half as many."""
-    if int(n) != n or n < _FEWEST:
-        raise GeometryError(f"a round crack needs n of at least {_FEWEST} points, not n = {n}.")
-    rings = [(int(n), 1.0)]
+    count = whole(n, "points of a round crack: n", least=_FEWEST, most=_MOST, error=GeometryError)
+    rings = [(count, 1.0)]
     while rings[-1][0] % 2 == 0 and rings[-1][0] >= 2 * _FEWEST:
         count, radius = rings[-1]
         side = 2 * np.pi * radius / count
@@ -151,7 +155,7 @@ def _cosine(turns: Floats) -> Floats:
 
 
 def plane_crack(polygon: ArrayLike) -> Crack:
-    """Flat crack in space bounded by a polygon.
+    """Flat 3D crack bounded by a polygon.
 
     Edges inside the body become its front as soon as it is put into a mesh, edges outside or
     within half a cell of the boundary its mouth; corners of the front are rounded there.
@@ -177,12 +181,9 @@ def plane_crack(polygon: ArrayLike) -> Crack:
     >>> plane_crack([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)])
     Crack(4 points, 2 faces, not placed)
     """
-    x = np.asarray(polygon, dtype=float)
-    if x.ndim != 2 or x.shape[1] != 3 or len(x) < 3:
-        raise GeometryError(f"a plane crack needs at least three corners (m, 3), not {x.shape}.")
-    if not np.isfinite(x).all():
-        bad = x[~np.isfinite(x).all(axis=1)][0].tolist()
-        raise GeometryError(f"corner {bad} of the plane crack is not finite.")
+    x = coordinates(polygon, "plane_crack: polygon", (None, 3), error=GeometryError)
+    if len(x) < 3:
+        raise GeometryError(f"a plane crack needs at least three corners (m, 3), not {len(x)}.")
     size = float(np.linalg.norm(np.ptp(x, axis=0)))
     length = np.linalg.norm(np.roll(x, -1, axis=0) - x, axis=1)
     if (length <= 1e-12 * size).any():
@@ -195,7 +196,7 @@ def plane_crack(polygon: ArrayLike) -> Crack:
     vector = np.cross(local, np.roll(local, -1, axis=0)).sum(axis=0)
     if np.linalg.norm(vector) <= 1e-12 * size**2:
         raise GeometryError(
-            f"the plane crack at {np.round(x[0], 6).tolist()} has no area: its corners lie on a "
+            f"the plane crack at {at(x[0])} has no area: its corners lie on a "
             "line, or the polygon crosses itself."
         )
     normal = vector / np.linalg.norm(vector)
@@ -214,16 +215,16 @@ def plane_crack(polygon: ArrayLike) -> Crack:
     if crossing is not None:
         i, j = crossing
         raise GeometryError(
-            f"sides {i} and {j} of the plane crack meet near {np.round(x[j], 6).tolist()}: give "
+            f"sides {i} and {j} of the plane crack meet near {at(x[j])}: give "
             "the corners in order around the crack."
         )
     return Crack(x, ear_clipped(flat))
 
 
 def surface_crack(points: ArrayLike, triangles: ArrayLike) -> Crack:
-    """Crack in space along a triangulated surface, in one or several pieces.
+    """3D crack along a triangulated surface, in one or several pieces.
 
-    Faces are turned so that neighbours agree; the first face of each piece tells where lip + is
+    Faces are turned so that neighbours agree; the first face of each piece decides where lip + is
     (on the side from which its points run counter-clockwise).
 
     Parameters
@@ -249,12 +250,12 @@ def surface_crack(points: ArrayLike, triangles: ArrayLike) -> Crack:
     >>> surface_crack([(0, 0, 0), (1, 0, 0), (1, 1, 0.1), (0, 1, 0)], [(0, 1, 2), (0, 3, 2)])
     Crack(4 points, 2 faces, not placed)
     """
-    x, faces = np.asarray(points, dtype=float), np.asarray(triangles)
-    if x.ndim != 2 or x.shape[1] != 3:
-        raise GeometryError(f"the points of a surface crack must be (p, 3), not {x.shape}.")
-    if faces.ndim != 2 or faces.shape[1] != 3 or not len(faces):
-        raise GeometryError(f"the triangles of a surface crack must be (f, 3), not {faces.shape}.")
-    faces = faces.astype(np.int64)
+    what = "surface_crack: points"
+    x = numbers(points, what, (None, 3), finite=False, error=GeometryError)
+    faces = whole_numbers(triangles, "surface_crack: triangles", error=GeometryError)
+    if not faces.size:
+        raise GeometryError("a surface crack needs triangles (f, 3), and there are none.")
+    faces = whole_numbers(faces, "surface_crack: triangles", (None, 3), error=GeometryError)
     if faces.min() < 0 or faces.max() >= len(x):
         bad = int(np.argmax(((faces < 0) | (faces >= len(x))).any(axis=1)))
         raise GeometryError(
@@ -266,17 +267,18 @@ def surface_crack(points: ArrayLike, triangles: ArrayLike) -> Crack:
     if not np.isfinite(x).all():
         bad = int(used[np.argmax(~np.isfinite(x).all(axis=1))])
         raise GeometryError(f"point {bad} of the surface crack is not finite.")
+    x = coordinates(x, what, (None, 3), error=GeometryError)
     _check_shape(x, faces)
     turned = oriented(faces)
     if turned is None:
         raise GeometryError(
             "the surface crack has only one side (a Möbius strip): cut it open, so that lip + and "
-            "lip - can be told apart."
+            "lip - can be distinguished."
         )
     edges, _ = rim(turned)
     if not len(edges):
         raise GeometryError(
-            f"the surface crack around {np.round(x.mean(axis=0), 6).tolist()} is closed: it would "
+            f"the surface crack around {at(x.mean(axis=0))} is closed: it would "
             "cut a piece out of the body and has no front."
         )
     starts = np.bincount(edges[:, 0], minlength=len(x))
@@ -295,7 +297,7 @@ def _check_shape(x: Floats, faces: Ints) -> None:
     if thin.any():
         bad = int(np.argmax(thin))
         raise GeometryError(
-            f"triangle {bad} of the surface crack at {np.round(corner[bad][0], 6).tolist()} has no "
+            f"triangle {bad} of the surface crack at {at(corner[bad][0])} has no "
             f"area ({int(thin.sum())} such triangles): remove it or merge its points."
         )
     key, count = np.unique(side_keys(faces), return_counts=True)
@@ -309,12 +311,12 @@ def _check_shape(x: Floats, faces: Ints) -> None:
 
 
 def read_surface(path: str | PathLike[str]) -> Crack:
-    """Read a crack in space from a file with triangles.
+    """Read a 3D crack from a file with triangles.
 
     Parameters
     ----------
     path : path
-        File in a format of meshio, told by its extension: ``.stl``, ``.obj``, ``.vtk``, ``.msh``
+        File in a format of meshio, chosen by its extension: ``.stl``, ``.obj``, ``.vtk``, ``.msh``
         ... Points that coincide (every STL has them) are merged; other cells than triangles do
         not count.
 
@@ -327,7 +329,7 @@ def read_surface(path: str | PathLike[str]) -> Crack:
     XcrackError
         The file is missing or cannot be read.
     GeometryError
-        It holds no triangles, or not such as `surface_crack` takes.
+        It has no triangles, or not such as `surface_crack` takes.
     """
     return surface_crack(*_merged(*read_triangles(path)))
 
@@ -357,13 +359,8 @@ def _merged(points: Floats, triangles: Ints) -> tuple[Floats, Ints]:
     return x[first], faces[whole]
 
 
-def _vector(value: ArrayLike, name: str) -> Floats:
-    vector = np.asarray(value, dtype=float)
-    if vector.shape != (3,):
-        raise GeometryError(f"{name} of a crack in space must have shape (3,), not {vector.shape}.")
-    if not np.isfinite(vector).all():
-        raise GeometryError(f"{name} {vector.tolist()} is not finite.")
-    return vector
+def _vector(value: ArrayLike, what: str) -> Floats:
+    return coordinates(value, what, (3,), error=GeometryError)
 
 
 def _unit(vector: Floats, what: str) -> Floats:
@@ -371,9 +368,3 @@ def _unit(vector: Floats, what: str) -> Floats:
     if length == 0:
         raise GeometryError(f"{what} is zero: give the direction from lip - to lip +.")
     return np.asarray(vector / length)
-
-
-def _length(value: float, name: str) -> float:
-    if not np.isfinite(value) or value <= 0:
-        raise GeometryError(f"{name} of a crack must be a positive length, not {value!r}.")
-    return float(value)

@@ -31,8 +31,14 @@ from xcrack.scene.numerics import Numerics
 
 _LOADS = (Traction, Pressure, PointForce, BodyForce, CrackPressure, InitialStress, Displacement)
 
-
 _ORDER = {2: 2, 3: 1}  # of the standard functions, by dimension (measured)
+_PLANE = {2: True, 3: False}  # whether the material must name a plane state
+_WRONG_PLANE = {
+    2: 'a 2D body needs Isotropic(..., plane="strain") or plane="stress": the two differ by up to '
+    "1/(1 - nu²) in stiffness, so there is no default.",
+    3: 'Isotropic(plane="{}") is for 2D bodies: leave plane out for a mesh of tetrahedra '
+    "(read_mesh drops a constant z).",
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,16 +89,8 @@ class Problem:
                     f"{name}: give a list, such as {name}=[...], not {type(given).__name__}."
                 )
             object.__setattr__(self, name, tuple(given))
-        if self.mesh.dim == 3 and self.material.plane is not None:
-            raise ProblemError(
-                f'Isotropic(plane="{self.material.plane}") is for plane bodies: leave plane out '
-                "for a mesh of tetrahedra (read_mesh drops a constant z)."
-            )
-        if self.mesh.dim == 2 and self.material.plane is None:
-            raise ProblemError(
-                'a plane body needs Isotropic(..., plane="strain") or plane="stress": the two '
-                "differ by up to 1/(1 - nu²) in stiffness, so there is no default."
-            )
+        if (self.material.plane is None) is _PLANE[self.mesh.dim]:
+            raise ProblemError(_WRONG_PLANE[self.mesh.dim].format(self.material.plane))
         if self.order is None:
             object.__setattr__(self, "order", _ORDER[self.mesh.dim])
         if isinstance(self.order, bool) or self.order not in (1, 2):

@@ -282,7 +282,8 @@ def function_space(
             first, last = np.round(crack.points[[0, -1]], 6).tolist()
             raise GeometryError(
                 f"crack {c} from {first} to {last} cuts no cell: it runs along the boundary; move "
-                "it inside, or leave it out."
+                "it inside, or leave it out. If that is the symmetry plane of a half model, model "
+                "both halves."
             )
     n_nodes = mesh.n_points + (len(mesh.edges) if order == 2 else 0)
     count = n_nodes
