@@ -1,10 +1,15 @@
-"""Cracks as values: their faces and their tips; the mesh knows nothing of them."""
+"""Cracks as values: their faces and their ends; the mesh knows nothing of them."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from xcrack.arrays import Floats, Ints, frozen
+from xcrack.errors import GeometryError
+from xcrack.inputs import Shape, whole_numbers
+from xcrack.mesh.checks import coordinates
 
 
 @dataclass(frozen=True, eq=False)
@@ -14,17 +19,22 @@ class Crack:
     Parameters
     ----------
     points : (p, d) array, length
-        Vertices of the faces; in the plane in the order in which the polyline runs.
+        Vertices of the faces; in 2D in the order in which the polyline runs.
     faces : (f, d) array of int
-        Point numbers of each face. In the plane lip + is on the left of the order of the points;
-        in space the normal by the right-hand rule points to it.
+        Point numbers of each face. In 2D lip + is on the left of the order of the points; in 3D
+        the normal by the right-hand rule points to it.
     tips : tuple of int, optional
-        In the plane: point numbers of the tips, in the order of the points; None where no mesh
+        In 2D: point numbers of the tips, in the order of the points; None where no mesh
         has decided yet which ends are tips and which are mouths.
     fronts : tuple of (k,) arrays of int, optional
-        In space: point numbers along each front, in the direction of the third row of its frames
+        In 3D: point numbers along each front, in the direction of the third row of its frames
         (ahead, normal, ahead x normal); a closed front repeats its first point at the end. None
         where no mesh has decided yet.
+
+    Raises
+    ------
+    GeometryError
+        Arrays of other shapes, coordinates that are not finite, point numbers out of range.
     """
 
     points: Floats
@@ -33,10 +43,32 @@ class Crack:
     fronts: tuple[Ints, ...] | None = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "points", frozen(self.points, np.float64))
-        object.__setattr__(self, "faces", frozen(self.faces, np.int64))
+        points = coordinates(self.points, "Crack: points", (None, None), error=GeometryError)
+        d = points.shape[1]
+        if d not in (2, 3) or not len(points):
+            raise GeometryError(f"Crack: points must be (p, 2) or (p, 3), not {points.shape}.")
+        object.__setattr__(self, "points", frozen(points))
+        object.__setattr__(self, "faces", self._numbers("faces", self.faces, (None, d)))
+        if self.tips is not None:
+            own = self._numbers("tips", self.tips, (None,))
+            object.__setattr__(self, "tips", tuple(own.tolist()))
         if self.fronts is not None:
-            object.__setattr__(self, "fronts", tuple(frozen(f, np.int64) for f in self.fronts))
+            if isinstance(self.fronts, str) or not isinstance(self.fronts, Iterable):
+                raise GeometryError(
+                    f"Crack: fronts = {self.fronts!r:.80} must be arrays, one a front."
+                )
+            fronts = [self._numbers(f"fronts[{k}]", f, (None,)) for k, f in enumerate(self.fronts)]
+            object.__setattr__(self, "fronts", tuple(fronts))
+
+    def _numbers(self, name: str, given: Any, shape: Shape) -> Ints:
+        """Point numbers as a read-only array."""
+        array = whole_numbers(given, f"Crack: {name}", shape, error=GeometryError)
+        if array.size and (array.min() < 0 or array.max() >= len(self.points)):
+            raise GeometryError(
+                f"Crack: {name} name points outside 0 ... {len(self.points) - 1}, such as "
+                f"{array.min() if array.min() < 0 else array.max()}."
+            )
+        return frozen(array, np.int64)
 
     @property
     def placed(self) -> bool:
@@ -45,12 +77,12 @@ class Crack:
 
     @property
     def dim(self) -> int:
-        """Number of space dimensions."""
+        """Number of dimensions, 2 or 3."""
         return int(self.points.shape[1])
 
     @property
     def n_tips(self) -> int:
-        """Number of tips, in space of fronts; 0 where they are not decided yet."""
+        """Number of tips, in 3D of fronts; 0 where they are not decided yet."""
         return len(self.tips or self.fronts or ())
 
     def __repr__(self) -> str:
@@ -63,5 +95,5 @@ class Crack:
 
 
 def crack_length(crack: Crack) -> float:
-    """Arc length of all faces of a crack in the plane, length."""
+    """Arc length of all faces of a 2D crack, length."""
     return float(np.linalg.norm(np.diff(crack.points, axis=0), axis=1).sum())

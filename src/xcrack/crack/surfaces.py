@@ -343,8 +343,8 @@ def _merged(points: Floats, triangles: Ints) -> tuple[Floats, Ints]:
     if points.shape[1] == 2:
         points = np.column_stack([points, np.zeros(len(points))])
     used = np.unique(triangles)
-    if not np.isfinite(points[used]).all():
-        return points, np.asarray(triangles, dtype=np.int64)
+    if not (np.abs(points[used]) <= LARGEST).all():
+        return points, triangles  # refused by surface_crack
     x = points[used]
     # Single precision is what a binary STL stores.
     close = cKDTree(x).query_pairs(1e-7 * float(np.ptp(x, axis=0).max()), output_type="ndarray")

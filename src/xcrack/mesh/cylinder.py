@@ -1,6 +1,6 @@
 """A notched round bar for bending in many directions, meshed by gmsh."""
 
-from math import frexp, pi, sin, tan
+from math import frexp, inf, pi, sin, tan
 from types import ModuleType
 
 import numpy as np
@@ -9,7 +9,7 @@ from xcrack.arrays import Floats, Ints
 from xcrack.errors import GeometryError, MeshError
 from xcrack.inputs import number
 from xcrack.mesh.gmsh_session import session
-from xcrack.mesh.grading import graded_size, length_of
+from xcrack.mesh.grading import FINEST, graded_size, length_of
 from xcrack.mesh.mesh import Mesh, sound_mesh
 
 _FACES = 24
@@ -264,7 +264,9 @@ def _check_sizes(
             "exchange the two or leave size_near out."
         )
     body = pi / 4 * diameter**2 * length
-    points = body / size**3 + min(2 * band * diameter * depth, body) / near**3
+    points = inf  # also where powers of sizes are too small for a number
+    if near > FINEST * length:
+        points = body / size**3 + min(2 * band * diameter * depth, body) / near**3
     if points > _MOST_POINTS:
         raise GeometryError(
             f"size = {size:g} and size_near = {near:g} ask for about {points:.1e} points, more "

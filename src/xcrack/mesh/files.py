@@ -155,10 +155,11 @@ def write_mesh(path: str | PathLike[str], mesh: Mesh, *, msh_version: str = "4.1
     path = path_of(path, "write_mesh: path")
     if not isinstance(mesh, Mesh):
         raise MeshError(f"write_mesh: give a Mesh, not {type(mesh).__name__}.")
-    if not path.parent.is_dir():
-        raise XcrackError(f"folder {str(path.parent)!r} does not exist: make it first.")
-    if path.is_dir():
-        raise XcrackError(f"{str(path)!r} is a folder: give the path of a file in it.")
+    with system_errors("cannot write", path):
+        if not path.parent.is_dir():
+            raise XcrackError(f"folder {str(path.parent)!r} does not exist: make it first.")
+        if path.is_dir():
+            raise XcrackError(f"{str(path)!r} is a folder: give the path of a file in it.")
     extension = path.suffix.lower()
     if extension == ".msh":
         _write_text(path, msh_text(mesh, msh_version))
@@ -185,9 +186,11 @@ def _write_text(path: Path, text: str) -> None:
 def _existing(value: str | PathLike[str], what: str) -> Path:
     """Path of a file that is there."""
     path = path_of(value, f"path of the {what} file")
-    if path.is_dir():
-        raise XcrackError(f"{what} file {str(path)!r} is a folder: give the path of a file in it.")
     with system_errors(f"cannot read the {what} file", path):
+        if path.is_dir():
+            raise XcrackError(
+                f"{what} file {str(path)!r} is a folder: give the path of a file in it."
+            )
         if not path.exists():
             raise XcrackError(
                 f"{what} file {str(path)!r} does not exist (looked in {Path.cwd()}): check the "

@@ -8,8 +8,10 @@ import numpy as np
 
 from xcrack.arrays import Floats
 from xcrack.errors import GeometryError
-from xcrack.inputs import number, numbers
-from xcrack.mesh.checks import LARGEST
+from xcrack.inputs import number
+from xcrack.mesh.checks import LARGEST, coordinates
+
+FINEST = 1e-6  # share of a body's length below which no cell size is taken
 
 
 def graded_size(
@@ -87,7 +89,7 @@ def polylines(along: Any) -> list[Floats]:
     try:
         many = bool(np.ndim(along[0][0]))
         return [
-            numbers(path, "along", (None, 2), error=GeometryError)
+            coordinates(path, "along", (None, 2), error=GeometryError)
             for path in (along if many else [along])
         ]
     except (TypeError, ValueError, IndexError, KeyError, GeometryError) as error:

@@ -9,9 +9,10 @@ import numpy as np
 
 from xcrack.arrays import Floats, Ints
 from xcrack.errors import GeometryError, MeshError
-from xcrack.inputs import number, numbers
+from xcrack.inputs import number
+from xcrack.mesh.checks import coordinates
 from xcrack.mesh.gmsh_session import session
-from xcrack.mesh.grading import graded_size, length_of, polylines
+from xcrack.mesh.grading import FINEST, graded_size, length_of, polylines
 from xcrack.mesh.mesh import Mesh, sound_mesh
 
 Point = tuple[float, float]
@@ -298,7 +299,7 @@ def _finish(
 
 
 def _pair(value: Any, what: str) -> Point:
-    x, y = numbers(value, what, (2,), error=GeometryError).tolist()
+    x, y = coordinates(value, what, (2,), error=GeometryError).tolist()
     return x, y
 
 
@@ -351,7 +352,9 @@ def _check_cost(
     run = sum(float(np.linalg.norm(np.diff(p, axis=0), axis=1).sum()) for p in paths)
     cell = 3**0.5 / 2
     fine = min(2 * band * run, width * height)
-    points = width * height / (cell * size**2) + fine / (cell * near**2)
+    points = inf  # also where squares of sizes are too small for a number
+    if near > FINEST * max(width, height):
+        points = width * height / (cell * size**2) + fine / (cell * near**2)
     if points > _MOST_POINTS:
         raise GeometryError(
             f"size = {size:g} and size_near = {near:g} ask for about {points:.1e} points, more "
