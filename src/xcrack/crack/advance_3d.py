@@ -1,4 +1,4 @@
-"""Growth of cracks in space: their fronts advance, and a strip of triangles joins the surface."""
+"""Growth of cracks in 3D: their fronts advance, and a strip of triangles joins the surface."""
 
 from dataclasses import dataclass, replace
 
@@ -26,7 +26,7 @@ from xcrack.geometry.distances import first_crossing, surface_distance, triangle
 LOW, HIGH = 0.5, 1.5  # bounds of the spacing of front points, in sizes
 _LEAST = 0.02  # of the size, and at most a tenth of the largest: a smaller advance is none
 _UPRIGHT = 0.05  # cosine to the expected normal below which a triangle is turned over
-_LOST = 0.05  # share of its length that fairing may take from a front before it is said
+_LOST = 0.05  # share of its length that fairing may take from a front before a warning
 _PASSES = 2.0  # of fairing, an advance of one size
 _SHARP = np.cos(np.radians(30.0))  # a front that turns by more has a corner
 _AHEAD = 0.6  # of the size: half as far from this place ahead of a front no crack may lie
@@ -35,7 +35,7 @@ _AHEAD = 0.6  # of the size: half as far from this place ahead of a front no cra
 def advance_fronts(
     crack: Crack, s: ArrayLike, front: ArrayLike, angle: ArrayLike, da: ArrayLike, size: float
 ) -> Crack:
-    """Let the fronts of a placed crack in space advance.
+    """Let the fronts of a placed 3D crack advance.
 
     Each vertex of a front moves by da (cos(angle) t + sin(angle) n) in its frame, and a strip of
     triangles joins the old front with the new one. Angle and advance run between the given
@@ -172,7 +172,7 @@ def _joined(
     """
     needed = np.zeros(len(rays.x), dtype=bool)
     while True:
-        trial = _cleared(_with_held(front, rays.held | needed), size)
+        trial = _cleared(_pinned(front, rays.pinned | needed), size)
         strip, bad = _stitched(old, trial, vertex, normal, size, n_points)
         if not len(bad):
             return strip
@@ -181,7 +181,7 @@ def _joined(
         if (around & ~needed).any():
             needed |= around
             continue
-        front = without_sides(_with_held(trial, rays.held), bad)
+        front = without_sides(_pinned(trial, rays.pinned), bad)
         if old.closed and len(front.x) < 3:
             raise _closes(old)
         if len(front.x) == len(trial.x):
@@ -192,11 +192,11 @@ def _joined(
             )
 
 
-def _with_held(front: Chain, rays: Bools) -> Chain:
-    """A front of which those points are held that one of the given rays has become."""
-    held = np.zeros(len(front.x), dtype=bool)
-    held[front.owner[rays]] = True
-    return replace(front, held=held)
+def _pinned(front: Chain, rays: Bools) -> Chain:
+    """A front of which those points are pinned that one of the given rays has become."""
+    pinned = np.zeros(len(front.x), dtype=bool)
+    pinned[front.owner[rays]] = True
+    return replace(front, pinned=pinned)
 
 
 def _cleared(front: Chain, size: float) -> Chain:
@@ -265,10 +265,10 @@ def _sent(
         return None
     is_vertex = np.zeros(len(start), dtype=bool)
     is_vertex[vertex] = True
-    kept = is_vertex | ~still
-    number = np.cumsum(kept) - 1
-    rays = chain(start[kept], stop[kept], still[kept], closed)
-    return rays, number[np.array(vertex)], new_normal[kept]
+    chosen = is_vertex | ~still
+    number = np.cumsum(chosen) - 1
+    rays = chain(start[chosen], stop[chosen], still[chosen], closed)
+    return rays, number[np.array(vertex)], new_normal[chosen]
 
 
 def _frames(front: Front) -> Floats:

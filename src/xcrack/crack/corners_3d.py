@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.spatial import Delaunay, cKDTree
 
-from xcrack.arrays import Bools, Floats, Ints
+from xcrack.arrays import Bools, Floats, Ints, at
 from xcrack.errors import GeometryError
 from xcrack.geometry.polygon import cross, within
 from xcrack.geometry.triangulation import face_normals, loops, on_rim
@@ -129,10 +129,10 @@ def _triangulated(
         edges = _edges(outlines)
         flat = (points - origin) @ plane.T
         if len(inner):
-            kept = within(flat, flat[edges])
-            kept[: len(points) - len(inner)] = True
-            inner = inner[kept[len(points) - len(inner) :]]
-            points, flat = points[kept], flat[kept]
+            inside = within(flat, flat[edges])
+            inside[: len(points) - len(inner)] = True
+            inner = inner[inside[len(points) - len(inner) :]]
+            points, flat = points[inside], flat[inside]
         faces = Delaunay(flat).simplices.astype(np.int64)
         corner = flat[faces]
         area = cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
@@ -141,9 +141,9 @@ def _triangulated(
         # Three points of a straight side leave triangles that are round-off.
         faces = faces[(np.abs(area) > 1e-9 * longest) & within(corner.mean(axis=1), flat[edges])]
         rim = np.stack([faces, np.roll(faces, -1, axis=1)], axis=2)[on_rim(faces)]
-        found = {(int(b), int(a)) for a, b in rim}
-        missing = np.array([tuple(edge) not in found for edge in edges.tolist()])
-        if not missing.any() and len(found) == len(edges):
+        outer = {(int(b), int(a)) for a, b in rim}
+        missing = np.array([tuple(edge) not in outer for edge in edges.tolist()])
+        if not missing.any() and len(outer) == len(edges):
             used, inverse = np.unique(faces, return_inverse=True)
             return points[used], inverse.reshape(-1, 3)
         present = np.isin(
@@ -152,7 +152,7 @@ def _triangulated(
         )
         outlines = _halved(outlines, ~present)
     raise GeometryError(
-        f"the plane crack at {np.round(origin, 6).tolist()} has an outline too narrow for rounded "
+        f"the plane crack at {at(origin)} has an outline too narrow for rounded "
         "corners: refine the mesh there, or simplify the crack."
     )
 

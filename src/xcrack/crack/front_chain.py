@@ -21,7 +21,7 @@ class Chain:
     x : (g, 3) array, length
         In the direction of the front.
     closed : bool
-    held : (g,) array of bool
+    pinned : (g,) array of bool
         Points that stay where they are: those that do not advance, and the ends of open fronts.
     start : (r, 3) array, length
         Points that were sent out, on the old front.
@@ -35,14 +35,14 @@ class Chain:
 
     x: Floats
     closed: bool
-    held: Bools
+    pinned: Bools
     start: Floats
     stop: Floats
     still: Bools
     owner: Ints
 
     def __post_init__(self) -> None:
-        for name in ("x", "held", "start", "stop", "still", "owner"):
+        for name in ("x", "pinned", "start", "stop", "still", "owner"):
             object.__setattr__(self, name, frozen(getattr(self, name)))
 
     @property
@@ -90,10 +90,10 @@ def chain(start: Floats, stop: Floats, still: Bools, closed: bool) -> Chain:
     -------
     Chain
     """
-    held = np.array(still)
+    pinned = np.array(still)
     if not closed:
-        held[[0, -1]] = True
-    return Chain(stop, closed, held, start, stop, still, np.arange(len(start)))
+        pinned[[0, -1]] = True
+    return Chain(stop, closed, pinned, start, stop, still, np.arange(len(start)))
 
 
 def merged(front: Chain, side: int, x: Floats) -> Chain:
@@ -105,7 +105,7 @@ def merged(front: Chain, side: int, x: Floats) -> Chain:
     side : int
         Leads from the point with this number to the next one.
     x : (3,) array, length
-        Where the point is to lie, unless one of the two is held.
+        Where the point is to lie, unless one of the two is pinned.
 
     Returns
     -------
@@ -113,19 +113,19 @@ def merged(front: Chain, side: int, x: Floats) -> Chain:
     """
     n = len(front.x)
     one, other = side, (side + 1) % n
-    if front.held[one]:
+    if front.pinned[one]:
         x = front.x[one]
-    elif front.held[other]:
+    elif front.pinned[other]:
         x = front.x[other]
-    held = np.array(front.held)
-    held[one] |= held[other]
+    pinned = np.array(front.pinned)
+    pinned[one] |= pinned[other]
     points = np.array(front.x)
     points[one] = x
     number = np.arange(n)
     number[other] = one
     number[number > other] -= 1
     rest = np.arange(n) != other
-    return replace(front, x=points[rest], held=held[rest], owner=number[front.owner])
+    return replace(front, x=points[rest], pinned=pinned[rest], owner=number[front.owner])
 
 
 def without_loops(front: Chain) -> Chain:
@@ -137,8 +137,8 @@ def without_loops(front: Chain) -> Chain:
     while len(front.x) > 2:
         side, before = front.side, front.old_side
         forward = np.einsum("ij,ij->i", side, before) / np.einsum("ij,ij->i", before, before)
-        held = front.held & np.roll(front.held, -1)
-        forward[held[: len(side)]] = np.inf
+        pinned = front.pinned & np.roll(front.pinned, -1)
+        forward[pinned[: len(side)]] = np.inf
         worst = int(np.argmin(forward))
         if forward[worst] > 0:
             break
@@ -157,7 +157,7 @@ def without_sides(front: Chain, sides: Ints) -> Chain:
     """A front in which the ends of the sides with these numbers are merged if one is free."""
     for side in sorted(set(sides.tolist()), reverse=True):
         other = (side + 1) % len(front.x)
-        if len(front.x) > 3 and not (front.held[side] and front.held[other]):
+        if len(front.x) > 3 and not (front.pinned[side] and front.pinned[other]):
             front = _joined(front, side)
     return front
 
@@ -204,13 +204,13 @@ def faired(front: Chain, passes: int) -> Chain:
     for _ in range(passes):
         move = -np.einsum("ij,ijk->ik", weight, x[window])
         move -= np.einsum("ij,ij->i", move, along)[:, None] * along
-        x[~front.held] += move[~front.held]
+        x[~front.pinned] += move[~front.pinned]
     advance = np.full(n, np.inf)
     np.minimum.at(advance, front.owner, np.linalg.norm(front.stop - front.start, axis=1))
     move, most = x - front.x, _PART * advance
     size = np.linalg.norm(move, axis=1)
     move *= (np.minimum(most, size) / np.where(size > 0, size, 1.0))[:, None]
-    return replace(front, x=np.where(front.held[:, None], front.x, front.x + move))
+    return replace(front, x=np.where(front.pinned[:, None], front.x, front.x + move))
 
 
 def spaced(front: Chain, least: float) -> Chain:
@@ -220,7 +220,7 @@ def spaced(front: Chain, least: float) -> Chain:
     ----------
     front : Chain
     least : float, length
-        Sides are at least that long, unless both ends are held or a closed front has few points.
+        Sides are at least that long, unless both ends are pinned or a closed front has few points.
 
     Returns
     -------
@@ -231,7 +231,7 @@ def spaced(front: Chain, least: float) -> Chain:
         if n <= (_FEWEST if front.closed else 2):
             return front
         length = np.linalg.norm(front.side, axis=1)
-        free = ~(front.held & np.roll(front.held, -1))[: len(length)]
+        free = ~(front.pinned & np.roll(front.pinned, -1))[: len(length)]
         tried = np.where(free, length, np.inf)
         side = int(np.argmin(tried))
         if tried[side] >= least:
@@ -254,9 +254,9 @@ def without_notches(front: Chain) -> Chain:
     hollow = np.einsum("ij,ij->i", side - back, ahead) > 0
     ahead_length, back_length = np.linalg.norm(side, axis=1), np.linalg.norm(back, axis=1)
     turn = np.einsum("ij,ij->i", side, back) / (ahead_length * back_length)
-    for i in np.nonzero(hollow & (turn < _NOTCH) & ~front.held)[0][::-1]:
+    for i in np.nonzero(hollow & (turn < _NOTCH) & ~front.pinned)[0][::-1]:
         if len(front.x) > 3:
             into = i if ahead_length[i] < back_length[i] else (i - 1) % n
-            kept = (i + 1) % n if into == i else into
-            return merged(front, int(into), front.x[kept])
+            goal = (i + 1) % n if into == i else into
+            return merged(front, int(into), front.x[goal])
     return front

@@ -14,7 +14,7 @@ _FAR = 2.5  # median spacings that still close a front, from its last point to i
 
 @dataclass(frozen=True, eq=False)
 class Front:
-    """One front of a crack in space.
+    """One front of a 3D crack.
 
     Attributes
     ----------
@@ -37,7 +37,7 @@ class Front:
 
 
 def front_frames(crack: Crack) -> list[Front]:
-    """Vertices, frames and arc lengths of the fronts of a placed crack in space.
+    """Vertices, frames and arc lengths of the fronts of a placed 3D crack.
 
     b is the tangent of the circle through a vertex and its two neighbours, n the normal of the
     faces around the vertex made perpendicular to b, and t = n x b shows out of the crack.

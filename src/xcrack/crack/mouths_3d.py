@@ -1,4 +1,4 @@
-"""Outlines of cracks in space against a body: open fronts led outside, mouths moved outside."""
+"""Outlines of cracks in 3D against a body: open fronts led outside, mouths moved outside."""
 
 from dataclasses import dataclass
 
@@ -121,7 +121,7 @@ def _side_by_side(x: Floats, outward: Floats, offset: Floats) -> Floats:
 
 
 def _untangled(x: Floats, vertex: Ints, offset: Floats, normal: Floats, closed: bool) -> Floats:
-    """Rays of a mouth made even where neighbours cross, the ones at its ends kept."""
+    """Rays of a mouth made even where neighbours cross, those at its ends as they are."""
     offset = np.array(offset)
     for _ in range(40):
         a, o = x[vertex], offset

@@ -257,7 +257,7 @@ def _front_sides(x: Floats, candidate: Bools, body: Body) -> tuple[Bools, list[S
 
 
 def check_surfaces(cracks: tuple[Crack, ...], mesh: Mesh) -> None:
-    """Raise where cracks in space cross or touch, or fronts of two come closer than a cell.
+    """Raise where 3D cracks cross or touch, or fronts of two come closer than a cell.
 
     Parameters
     ----------
@@ -320,19 +320,19 @@ def _meeting(one: Crack, other: Crack, body: Body) -> Floats | None:
     high = np.minimum(one.points.max(axis=0), other.points.max(axis=0))
     if (low > high).any():
         return None
-    found = [np.zeros((0, 3))]
+    parts = [np.zeros((0, 3))]
     for a, b in ((one, other), (other, one)):
         tree = triangle_tree(b.points, b.faces)
         pairs = np.unique(np.sort(sides(a.faces).reshape(-1, 2), axis=1), axis=0)
         start, stop = a.points[pairs[:, 0]], a.points[pairs[:, 1]]
         triangle, position = first_crossing(tree, start, stop)
         hit = triangle >= 0
-        found.append(start[hit] + position[hit, None] * (stop - start)[hit])
+        parts.append(start[hit] + position[hit, None] * (stop - start)[hit])
         # Surfaces in one plane cross nothing, but lie on each other.
         x = np.concatenate([a.points, a.points[a.faces].mean(axis=1)])
         size = body.cell_size(x)
         near = closest_in(tree, x, _TOUCH * float(size.max()))
-        found.append(x[(near.triangle >= 0) & (near.distance < _TOUCH * size)])
-    points = np.concatenate(found)
+        parts.append(x[(near.triangle >= 0) & (near.distance < _TOUCH * size)])
+    points = np.concatenate(parts)
     points = points[body.contains(points)]
     return points[0] if len(points) else None

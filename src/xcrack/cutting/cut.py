@@ -98,11 +98,11 @@ def cut(mesh: Mesh, level_set: LevelSet) -> Cut:
     psi = np.einsum("svb,sb->s", lip, level_set.inside[mesh.cells[candidates[owner]]])
     sign_change = exists[mesh.cell_to_edge[candidates]]
     close = (level_set.near[mesh.cell_to_edge[candidates]] | ~sign_change).all(axis=1)
-    kept = close & (np.bincount(owner, psi, len(candidates)) < 0)
-    cells = candidates[kept]
+    through = close & (np.bincount(owner, psi, len(candidates)) < 0)
+    cells = candidates[through]
 
     bary, fraction, side, parent = cut_simplices(values[cells])
-    lips = [_both(candidates[owner[kept[owner]]], lip[kept[owner]])]
+    lips = [_both(candidates[owner[through[owner]]], lip[through[owner]])]
     edge_flag = np.zeros(len(mesh.edges), dtype=bool)
     edge_flag[mesh.cell_to_edge[cells]] = True
     subs = [(cells[parent], bary, fraction, side)]

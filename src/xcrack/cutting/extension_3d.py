@@ -15,7 +15,7 @@ _FAN = np.radians(30.0)  # a front that turns away by more gets rays between
 
 @dataclass(frozen=True, eq=False)
 class Extended:
-    """A crack in space prolonged ahead of its fronts.
+    """A 3D crack prolonged ahead of its fronts.
 
     Attributes
     ----------

@@ -69,14 +69,14 @@ def _cut_again(
     """Cut sub-cells along psi, given at the corners of their cells `(k, 4)`."""
     values = _snapped(np.einsum("svb,sb->sv", bary, psi[owner]), psi[owner])
     cut = (values.min(axis=1) < 0) & (values.max(axis=1) > 0)
-    kept, rows = np.nonzero(~cut)[0], np.nonzero(cut)[0]
+    same, rows = np.nonzero(~cut)[0], np.nonzero(cut)[0]
     inner, part, _, parent = cut_simplices(values[rows])
     source = rows[parent]
     finer = np.einsum("svw,swb->svb", inner, bary[source])
-    every = np.concatenate([kept, source])
-    result = np.concatenate([share[kept], share[source] * part])
+    every = np.concatenate([same, source])
+    result = np.concatenate([share[same], share[source] * part])
     keep = result > _NOTHING
-    vertices = np.concatenate([bary[kept], finer])
+    vertices = np.concatenate([bary[same], finer])
     return owner[every][keep], vertices[keep], result[keep], side[every][keep]
 
 

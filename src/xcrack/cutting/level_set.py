@@ -23,7 +23,7 @@ class LevelSet:
     tip_cells : tuple of (k,) arrays of int
         Cells whose closed set meets the tip or the front, for each of them.
     tip : (f, d) array, length
-        Tip points; a point of each front in space.
+        Tip points; in 3D a point of each front.
     mouth : (n,) array, length
         Positive where a point is nearest to the prolongation of a mouth: across a hole, say, the
         line of a crack runs on, but not the crack.

@@ -25,7 +25,7 @@ _CHORDS = 12  # chords over which their offset is averaged
 
 
 def surface_levels(mesh: Mesh, crack: Crack, reach: float) -> LevelSet:
-    """Level sets of a placed crack in space.
+    """Level sets of a placed 3D crack.
 
     Parameters
     ----------

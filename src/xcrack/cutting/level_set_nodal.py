@@ -1,8 +1,8 @@
-"""Level sets kept at the nodes and changed by each advance: an opponent of the polyline.
+"""Level sets stored at the nodes and changed by each advance: an alternative to the polyline.
 
-Purely nodal codes know no polyline: an advance changes phi and psi where psi shows that a point
+Purely nodal codes have no polyline: an advance changes phi and psi where psi shows that a point
 lies ahead of the tip, and freezes phi behind it (the geometric form of the update of Duflot,
-2007). The signs of both are all that tells where the crack is. A crack that turns round loses its
+2007). Only the signs of both show where the crack is. A crack that turns round loses its
 beginning, which comes to lie ahead of the new frame; updates near the tip alone keep it, but where
 they end phi jumps, and where psi is negative there the jump is taken for a crack. Such level sets
 are had here by replaying a polyline, piece by piece, for comparison only.
@@ -88,7 +88,7 @@ def nodal_level_set(
     ----------
     mesh : Mesh
     crack : Crack
-        Placed; in the plane.
+        Placed; 2D.
     first : int, optional
         Number of the face that was there at first. None: the one at the mouth, or of a crack
         with two tips the longest.

@@ -27,7 +27,7 @@ class _Ends:
 def _cut_points(
     mesh: Mesh, level_set: LevelSet, cells: Ints, positions: Floats, exists: Bools
 ) -> _Ends:
-    """The two points where phi = 0 meets the boundary of plane cells in which it changes sign."""
+    """The two points where phi = 0 meets the boundary of triangles in which it changes sign."""
     pairs = local_edges(mesh.dim)
     edge = mesh.cell_to_edge[cells]
     phi = level_set.phi[mesh.cells[cells]]
@@ -117,7 +117,7 @@ def _tip_cells(
 def lips_up_to_tips(
     mesh: Mesh, level_set: LevelSet, facets: Ints, cells: Ints, psi: Floats
 ) -> tuple[Floats, Ints]:
-    """Ends of the lips on plane facets, and the facet of each: those at a tip end there."""
+    """Ends of the lips on edges of the mesh, and the facet of each: those at a tip end there."""
     x = mesh.points[mesh.facets[facets]]
     ends_at_tip = np.zeros(len(facets), dtype=bool)
     for k, tip in enumerate(level_set.tip):

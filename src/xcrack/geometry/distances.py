@@ -1,4 +1,4 @@
-"""Exact distances in space: to triangulated surfaces, with a sign, and to polylines."""
+"""Exact distances in 3D: to triangulated surfaces, with a sign, and to polylines."""
 
 from dataclasses import dataclass
 
@@ -94,8 +94,8 @@ def closest_in(tree: TriangleTree, x: Floats, band: float = np.inf) -> Closest:
 
     # A copy is never read-only, for which the kernel would be compiled once more.
     own = np.array(x, dtype=float, order="C")
-    found = closest_triangle(own, tree.corners, tree.normal, *tree.boxes, float(band), tree.tiny)
-    return Closest(*found)
+    nearest = closest_triangle(own, tree.corners, tree.normal, *tree.boxes, float(band), tree.tiny)
+    return Closest(*nearest)
 
 
 def signed_in(tree: TriangleTree, x: Floats, band: float = np.inf) -> tuple[Floats, Ints, Bools]:
@@ -175,7 +175,7 @@ def first_crossing(tree: TriangleTree, start: Floats, stop: Floats) -> tuple[Int
 def front_distance(
     x: Floats, polyline: Floats, closed: bool, band: float = np.inf
 ) -> tuple[Floats, Ints, Floats]:
-    """Distance of points to a polyline in space.
+    """Distance of points to a polyline in 3D.
 
     Parameters
     ----------

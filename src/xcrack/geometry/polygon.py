@@ -1,4 +1,4 @@
-"""Polygons in the plane: ears, crossings, what lies inside."""
+"""Polygons in 2D: ears, crossings, what lies inside."""
 
 import numpy as np
 
@@ -44,7 +44,7 @@ def ear_clipped(polygon: Floats) -> Ints:
 
 
 def self_crossing(flat: Floats) -> tuple[int, int] | None:
-    """Two sides of a closed polygon in the plane that meet other than at their common end."""
+    """Two sides of a closed 2D polygon that meet other than at their common end."""
     m = len(flat)
     r = np.roll(flat, -1, axis=0) - flat
     cross = r[:, None, 0] * r[None, :, 1] - r[:, None, 1] * r[None, :, 0]

@@ -1,4 +1,4 @@
-"""Triangulated surfaces in space as arrays: normals, sides, boundary loops, refinement."""
+"""Triangulated surfaces in 3D as arrays: normals, sides, boundary loops, refinement."""
 
 import numpy as np
 
@@ -166,7 +166,7 @@ def components(faces: Ints) -> Ints:
 
 
 def oriented(faces: Ints) -> Ints | None:
-    """Faces turned so that neighbours agree, the first of each piece kept; None: one-sided."""
+    """Faces turned so that neighbours agree, the first of each piece as it is; None: one-sided."""
     _, inverse = np.unique(side_keys(faces), return_inverse=True)
     flat = inverse.ravel()
     pairs = sides(faces).reshape(-1, 2)

@@ -1,4 +1,4 @@
-"""Abaqus input files: meshio's reader knows no plane strain elements and no surfaces."""
+"""Abaqus input files: meshio's reader has no plane strain elements and no surfaces."""
 
 import re
 from collections.abc import Iterable, Iterator

@@ -1,4 +1,4 @@
-"""The body that a mesh in space fills: how deep points lie in it, and how large its cells are."""
+"""The body that a 3D mesh fills: how deep points lie in it, and how large its cells are."""
 
 from dataclasses import dataclass
 

@@ -88,7 +88,7 @@ def notched_cylinder(
         A length that is not positive, stations that overlap or do not fit between the ends and
         the notch, an angle outside 0 ... pi, sizes that do not fit.
     MeshError
-        gmsh found no mesh.
+        gmsh made no mesh.
     XcrackError
         gmsh cannot be imported; the message says what to install.
 
@@ -145,7 +145,7 @@ def notched_cylinder(
             gmsh.model.mesh.generate(3)
         except Exception as error:  # gmsh raises nothing more precise
             raise MeshError(
-                f"gmsh found no mesh ({error}); smaller sizes or wider gaps between patches, "
+                f"gmsh made no mesh ({error}); smaller sizes or wider gaps between patches, "
                 "notch and ends may help."
             ) from error
         points, cells = _tetrahedra(gmsh)

@@ -132,8 +132,8 @@ def write_mesh(path: str | PathLike[str], mesh: Mesh, *, msh_version: str = "4.1
       written once for each, as gmsh does.
     * ``.inp``: all sets as ``*ELSET``, facets as T3D2 or S3 elements. Names have no comma.
     * ``.vtu``, ``.vtk``, ``.xdmf``: facets as lower-dimensional cells, sets as 0/1 cell data
-      ``set:<name>``. A set without members is kept by vtu-like formats only.
-    * Others: points and cells only; sets are lost, which a warning says.
+      ``set:<name>``. A set without members survives in vtu-like formats only.
+    * Others: points and cells only; sets are lost, with a warning.
 
     Parameters
     ----------

@@ -115,15 +115,15 @@ def parts_inside(mesh: Mesh, polyline: Floats) -> list[Floats]:
 
 
 def cells_within(mesh: Mesh, x: Floats, radius: float) -> Ints:
-    """Cells of a plane mesh that come nearer to a point outside them than a radius.
+    """Cells of a 2D mesh that come nearer to a point outside them than a radius.
 
-    A cell that holds the point is among them only if its sides are near enough.
+    A cell that contains the point is among them only if its sides are near enough.
     """
-    found = []
+    parts = []
     for number, tree, reach in mesh.cell_classes:
         near = number[np.sort(np.array(tree.query_ball_point(x, radius + reach), dtype=np.int64))]
         corners = mesh.points[mesh.cells[near]]
         sides = [corners[:, pair] for pair in ([0, 1], [1, 2], [2, 0])]
         distance = np.min([distance_to_simplices(x, side) for side in sides], axis=0)
-        found.append(near[distance <= radius])
-    return np.concatenate(found)
+        parts.append(near[distance <= radius])
+    return np.concatenate(parts)

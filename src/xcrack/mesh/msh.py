@@ -1,4 +1,4 @@
-"""Write gmsh's msh format: meshio's writer knows one physical group an entity, and no overlap."""
+"""Write gmsh's msh format: meshio's writer takes one physical group an entity, and no overlap."""
 
 from collections.abc import Iterable
 

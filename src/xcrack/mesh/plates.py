@@ -253,14 +253,14 @@ def mesh_model(
     Raises
     ------
     MeshError
-        gmsh found no mesh.
+        gmsh made no mesh.
     """
     mesh = gmsh.model.mesh
     mesh.setSizeCallback(lambda dim, tag, x, y, z, size: length(x, y))
     try:
         mesh.generate(2)
     except Exception as error:  # gmsh raises nothing more precise
-        raise MeshError(f"gmsh found no mesh ({error}); smaller sizes may help.") from error
+        raise MeshError(f"gmsh made no mesh ({error}); smaller sizes may help.") from error
     tags, coordinates, _ = mesh.getNodes()
     points = coordinates.reshape(-1, 3)[:, :2]
     number = np.full(int(tags.max()) + 1, -1, dtype=np.int64)

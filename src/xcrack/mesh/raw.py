@@ -65,9 +65,9 @@ def mesh_from_raw(raw: RawMesh, source: str) -> Mesh:
     dim = 3 if any(kind == "tetra" and len(data) for kind, data in raw.blocks) else 2
     doubled = _stack((data for kind, data in raw.blocks if kind == CELL_KIND[dim]), dim + 1)
     if not len(doubled):
-        found = ", ".join(f"{len(data)} {kind}" for kind, data in raw.blocks) or "nothing"
+        content = ", ".join(f"{len(data)} {kind}" for kind, data in raw.blocks) or "nothing"
         raise MeshError(
-            f"{source} has no triangles and no tetrahedra (found: {found}). In gmsh, mesh the "
+            f"{source} has no triangles and no tetrahedra (it has {content}). In gmsh, mesh the "
             "surface or volume, and if there are physical groups, put it into one."
         )
     if doubled.min() < 0 or doubled.max() >= len(raw.points):
@@ -145,7 +145,7 @@ def _check_kinds(blocks: list[tuple[str, Ints]], source: str) -> None:
             counts[kind] = counts.get(kind, 0) + len(data)
     if not counts:
         return
-    found = ", ".join(f"{count} {kind}" for kind, count in counts.items())
+    content = ", ".join(f"{count} {kind}" for kind, count in counts.items())
     if any(kind.startswith(("line", "triangle", "tetra")) for kind in counts):
         remedy = (
             "Save the mesh at first order (gmsh: Mesh.ElementOrder = 1; Abaqus: CPE3, CPS3, C3D4); "
@@ -157,7 +157,7 @@ def _check_kinds(blocks: list[tuple[str, Ints]], source: str) -> None:
             "Layers; Abaqus: element shape Tri or Tet)."
         )
     raise MeshError(
-        f"{source} has {found}: only linear triangles and tetrahedra are used. {remedy}"
+        f"{source} has {content}: only linear triangles and tetrahedra are used. {remedy}"
     )
 
 

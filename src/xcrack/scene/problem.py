@@ -56,8 +56,8 @@ class Problem:
     contact : {"auto", "on", "off"}
         auto: a crack whose lips would overlap gets multipliers, others get none.
     order : {1, 2}, optional
-        Degree of the standard and Heaviside functions. Where it is left out: 2 in the plane, 1 in
-        space.
+        Degree of the standard and Heaviside functions. Where it is left out: 2 in 2D, 1 in
+        3D.
     numerics : Numerics
 
     Raises
@@ -148,8 +148,8 @@ class Problem:
         if isinstance(where, str):
             facet_set(self.mesh, where, type(load).__name__.lower())
         if isinstance(load, Displacement):
-            held = [s.where for s in self.supports]
-            if not any(_same(where, h) for h in held):
+            supported = [s.where for s in self.supports]
+            if not any(_same(where, h) for h in supported):
                 raise ProblemError(
                     f"displacement({where!r}) among the loads gives a new value to a support, but "
                     "nothing is supported there: put it into supports first."

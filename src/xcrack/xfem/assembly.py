@@ -84,7 +84,7 @@ def enriched_stiffness(
     matrix : sparse matrix (n_dof, n_dof)
     n_points : int
         Integration points used.
-    kept : KeptCells or None
+    reusable : KeptCells or None
         For the next crack.
     """
     from xcrack.kernels.enriched import add_products, add_stiffness, enriched_pattern
@@ -94,7 +94,7 @@ def enriched_stiffness(
     if not len(cells):
         return sp.csr_matrix((n, n)), 0, None
     simple = with_one_jump(space, cells)
-    kept, n_points = kept_cells(space, cells[simple], known)
+    reusable, n_points = kept_cells(space, cells[simple], known)
     others = cells[~simple]
     points = cell_points(space, others, numerics.points, 2 * (space.order - 1))
     with_tip = cells[space.has_tip[cells]]
@@ -105,8 +105,8 @@ def enriched_stiffness(
     d = space.dim
     data = np.zeros((len(indices), d, d))
     lame = material.lam, material.mu
-    for batch, rows in space.batches(kept.cells):
-        products = kept.products[rows]
+    for batch, rows in space.batches(reusable.cells):
+        products = reusable.products[rows]
         add_products(data, indptr, indices, batch.functions, products, space.n_nodes, *lame)
     for part in _chunks(space, points, others):
         for batch, _ in space.batches(part):
@@ -130,7 +130,7 @@ def enriched_stiffness(
     if d * d * len(indices) < np.iinfo(np.int32).max:
         indptr = indptr.astype(np.int32)
     matrix = sp.bsr_matrix((data, indices, indptr), shape=(n, n)).tocsr()
-    return matrix, n_points + len(points.weight), kept
+    return matrix, n_points + len(points.weight), reusable
 
 
 def _functions(space: FunctionSpace, cells: Ints) -> Ints:
@@ -157,7 +157,7 @@ def total_stiffness(bulk_: Bulk, enriched: sp.csr_matrix) -> sp.csr_matrix:
 
 
 def rigid_modes(x: Floats) -> Floats:
-    """Rigid motions of points `(n, d)`: `(n d, 3)` in the plane, `(n d, 6)` in space."""
+    """Rigid motions of points `(n, d)`: `(n d, 3)` in 2D, `(n d, 6)` in 3D."""
     n, d = x.shape
     centre = x.mean(axis=0)
     y = x - centre

@@ -23,7 +23,7 @@ def disc_radii(
 
     Without a wanted radius: a share (0.3 at order 1, 0.4 at order 2) of the smallest of crack
     length, distance to the boundary and distance to another tip, at most 20 cells (40 at
-    order 1). A wanted radius is kept, and shrunk only where the body or another tip demands.
+    order 1). A wanted radius is used, and shrunk only where the body or another tip demands.
     Never below two cells.
     """
     tips = [tip_frames(crack)[0] for crack in cracks]

@@ -23,7 +23,7 @@ _SAMPLES = 24  # points of an open front at which the distance to the boundary i
 
 
 def front_reach(mesh: Mesh, crack: Crack, wanted: float | None) -> float:
-    """Distance from the fronts of a crack in space up to which tip functions may act, length."""
+    """Distance from the fronts of a 3D crack up to which tip functions may act, length."""
     fronts = [crack.points[front] for front in crack.fronts or ()]
     if not fronts:
         return 0.0
@@ -40,7 +40,7 @@ def front_radii(
     Without a wanted radius: the smallest of 0.65 of the crack's size (area over length of its
     fronts, twice that where they are closed), 0.7 of the distance to sides that the front does not
     pierce, and 0.45 of that to other fronts; from 2.6 to 3.6 cells, and two at order 2. A wanted
-    radius is kept, and shrunk only where the body or another front demands; never below two cells.
+    radius is used, and shrunk only where the body or another front demands; never below two cells.
 
     Parameters
     ----------

@@ -165,8 +165,8 @@ def _split(
     small = _AT * np.abs(values[number]).max(axis=1, keepdims=True)
     at = np.where(np.abs(at) < small, 0.0, at)
     cut = chosen & (at.min(axis=1) < 0) & (at.max(axis=1) > 0)
-    kept, rows = np.nonzero(~cut)[0], np.nonzero(cut)[0]
+    same, rows = np.nonzero(~cut)[0], np.nonzero(cut)[0]
     inner, _, _, parent = cut_simplices(at[rows])
-    source = np.concatenate([kept, rows[parent]])
+    source = np.concatenate([same, rows[parent]])
     finer = np.einsum("svw,swb->svb", inner, bary[rows[parent]])
-    return number[source], np.concatenate([bary[kept], finer]), side[source]
+    return number[source], np.concatenate([bary[same], finer]), side[source]

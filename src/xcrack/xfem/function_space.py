@@ -25,14 +25,14 @@ from xcrack.xfem.williams import polar, tip_values
 
 @dataclass(frozen=True, eq=False)
 class Tip:
-    """One tip, or in space one front, and the functions around it.
+    """One tip, or in 3D one front, and the functions around it.
 
     Attributes
     ----------
     crack, number : int
         Which tip of which crack.
     x, frame : (d,) and (d, d) arrays
-        Position and rows (ahead, normal); in space the vertices of a front `(m, 3)` and their
+        Position and rows (ahead, normal); in 3D the vertices of a front `(m, 3)` and their
         frames `(m, 3, 3)`.
     radius : float, length
     functions : int
@@ -98,7 +98,7 @@ class FunctionSpace:
 
     @property
     def dim(self) -> int:
-        """Number of space dimensions."""
+        """Number of dimensions, 2 or 3."""
         return self.mesh.dim
 
     @property

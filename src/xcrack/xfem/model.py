@@ -60,13 +60,13 @@ def build(problem: Problem, bulk_: Bulk | None = None) -> Model:
         or bulk_.material != problem.material
     ):
         bulk_ = bulk(mesh, problem.material, order)
-    enriched, n_points, kept = enriched_stiffness(
+    enriched, n_points, reusable = enriched_stiffness(
         space, problem.material, problem.numerics, lips, bulk_.cells
     )
     return Model(
         space,
         lips,
-        replace(bulk_, cells=kept),
+        replace(bulk_, cells=reusable),
         total_stiffness(bulk_, enriched),
         known_unknowns(space, tuple(problem.supports)),
         n_points,

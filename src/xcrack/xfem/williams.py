@@ -9,7 +9,7 @@ def polar(psi: Floats, phi: Floats, side: Ints) -> tuple[Floats, Floats]:
     """Radius and angle in (-pi, pi] from the level sets; `side` decides the angle on a lip.
 
     `side` is +1 or -1 where the point belongs to a known side of the crack, else 0. A point with
-    phi = 0 exactly has atan2 = +pi on both lips; its side tells them apart.
+    phi = 0 exactly has atan2 = +pi on both lips; its side decides.
     """
     tiny = 1e-300
     forced = np.where((side != 0) & (phi * side <= 0), side * tiny, phi)
@@ -20,7 +20,7 @@ def continued_polar(xi: Floats, side: Ints, behind: Bools) -> tuple[Floats, Floa
     """Polar coordinates at a tip, the cut of the angle following the real lips.
 
     A point on side + of a crack that bends down may have a negative polar angle: it is continued
-    by a turn, so that the auxiliary field jumps where the crack is. `behind` tells the side of
+    by a turn, so that the auxiliary field jumps where the crack is. `behind` gives the side of
     the crack from that of its prolongation ahead.
     """
     r = np.hypot(xi[:, 0], xi[:, 1])
