@@ -6,6 +6,7 @@ import numpy as np
 
 from xcrack.arrays import Floats, Ints, lock
 from xcrack.crack.crack import Crack
+from xcrack.crack.polylines_3d import tangents
 from xcrack.geometry.distances import corner_normals
 from xcrack.geometry.triangulation import unit
 
@@ -56,7 +57,7 @@ def front_frames(crack: Crack) -> list[Front]:
         closed = bool(front[0] == front[-1])
         number = np.array(front[:-1] if closed else front)
         x = crack.points[number]
-        b = _tangents(x, closed)
+        b = tangents(x, closed)
         n = normal[number]
         n = unit(n - np.einsum("ij,ij->i", n, b)[:, None] * b)
         frame = np.stack([np.cross(n, b), n, b], axis=1)
@@ -64,20 +65,6 @@ def front_frames(crack: Crack) -> list[Front]:
         s = np.concatenate([[0.0], np.cumsum(length)])
         result.append(Front(lock(x), lock(frame), closed, lock(s), lock(number)))
     return result
-
-
-def _tangents(x: Floats, closed: bool) -> Floats:
-    """Unit tangents of the circles through three points in a row, one-sided at open ends."""
-    if closed:
-        ahead = np.roll(x, -1, axis=0) - x
-        back = np.roll(ahead, 1, axis=0)
-    else:
-        inner = np.diff(x, axis=0)
-        ahead, back = np.concatenate([inner, inner[-1:]]), np.concatenate([inner[:1], inner])
-    ahead_length = np.linalg.norm(ahead, axis=1, keepdims=True)
-    back_length = np.linalg.norm(back, axis=1, keepdims=True)
-    tangent = ahead / ahead_length * back_length + back / back_length * ahead_length
-    return unit(tangent)
 
 
 def is_closed(x: Floats) -> bool:

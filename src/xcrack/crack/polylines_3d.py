@@ -17,6 +17,6 @@ def tangents(x: Floats, closed: bool) -> Floats:
     back = np.roll(side, 1, axis=0) if closed else np.concatenate([side[:1], side])
     ahead_length = np.linalg.norm(ahead, axis=1, keepdims=True)
     back_length = np.linalg.norm(back, axis=1, keepdims=True)
-    tangent = ahead * (back_length / ahead_length) + back * (ahead_length / back_length)
+    tangent = ahead / ahead_length * back_length + back / back_length * ahead_length
     length = np.linalg.norm(tangent, axis=1, keepdims=True)
     return np.asarray(tangent / np.where(length > 0, length, 1.0))
