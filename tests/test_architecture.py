@@ -18,7 +18,8 @@ ROOT = Path(__file__).resolve().parent.parent
 SOURCE = ROOT / "src" / "xcrack"
 FILES = sorted(SOURCE.rglob("*.py"))
 KERNELS = sorted(set((SOURCE / "kernels").glob("*.py")) - {SOURCE / "kernels" / "jit.py"})
-LONGEST_FILE = 420
+LONGEST_FILE = 400
+LONGEST_KERNEL = 420  # helpers stay in the file of the kernel; bench leaves the package
 HEAVY = ("numba", "gmsh", "meshio", "pyvista", "vtk", "vtkmodules", "matplotlib", "pyamg")
 
 
@@ -28,7 +29,8 @@ def label(path: Path) -> str:
 
 @pytest.mark.parametrize("path", FILES, ids=label)
 def test_file_is_short(path: Path) -> None:
-    assert len(path.read_text().splitlines()) <= LONGEST_FILE
+    long = path.relative_to(SOURCE).parts[0] in ("kernels", "bench")
+    assert len(path.read_text().splitlines()) <= (LONGEST_KERNEL if long else LONGEST_FILE)
 
 
 def test_import_loads_nothing_heavy() -> None:
@@ -155,4 +157,4 @@ def test_plane_and_space_are_one_code_path() -> None:
     """
     branch = re.compile(r"\b(dim|d)\s*(==|!=)\s*[23]\b")
     count = sum(len(branch.findall(path.read_text())) for path in FILES)
-    assert count <= 34, f"{count} branches on the dimension"
+    assert count <= 9, f"{count} branches on the dimension"

@@ -14,6 +14,10 @@ from xcrack.xfem.loads import facet_points, position
 from xcrack.xfem.quadrature import Points
 
 _TRACE = 1e-13  # enriched functions below this value on a facet do not act there (round-off)
+# Share of the largest singular value below which traces of enriched functions do not count. A tube
+# that just reaches a side of a 3D body has traces there so small that they would buy any value with
+# a coefficient of any size inside the body.
+_LEAST = {2: 1e-11, 3: 1e-3}
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,8 +134,8 @@ def _check_ends(space: FunctionSpace, where: str, facets: Ints, what: str) -> No
             x = np.round(space.mesh.points[np.argmax(bad)], 6).tolist()
             raise ProblemError(
                 f"{what}({where!r}) ends at {x}, where crack {c} meets the boundary, and holds its "
-                "lip - only: give the points of the crack in the reverse order (the held lip is "
-                "then lip +), or move its mouth by a thousandth of a cell."
+                "lip - only: give the points of the crack in the reverse order (the supported "
+                "lip is then lip +), or move its mouth by a thousandth of a cell."
             )
 
 
@@ -209,11 +213,8 @@ def _fit(space: FunctionSpace, where: str, value: object, what: str) -> tuple[In
     standard = unknowns < space.n_nodes
     solution = np.zeros((len(unknowns), space.dim))
     solution[standard] = np.linalg.lstsq(A[:, standard], target, rcond=1e-11)[0]
-    # In space a tube that just reaches a side has traces there so small that they would buy any
-    # value with a coefficient of any size inside the body.
-    limit = 1e-11 if space.dim == 2 else 1e-3
     scale = _scales(space)[unknowns]
-    rest = np.linalg.lstsq(A / scale, target - A @ solution, rcond=limit)[0]
+    rest = np.linalg.lstsq(A / scale, target - A @ solution, rcond=_LEAST[space.dim])[0]
     return unknowns, solution + rest / scale[:, None]
 
 
