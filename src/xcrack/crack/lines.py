@@ -90,7 +90,7 @@ def crossing_points(a: Floats, b: Floats, same: bool = False) -> Floats:
         p, r = start[:-1, None], np.diff(start, axis=0)[:, None]
         cross = r[..., 0] * s[..., 1] - r[..., 1] * s[..., 0]
         gap = q - p
-        with np.errstate(divide="ignore", invalid="ignore"):
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             t = (gap[..., 0] * s[..., 1] - gap[..., 1] * s[..., 0]) / cross
             u = (gap[..., 0] * r[..., 1] - gap[..., 1] * r[..., 0]) / cross
         hit: Bools = (cross != 0) & (t >= 0) & (t <= 1) & (u >= 0) & (u <= 1)

@@ -104,7 +104,7 @@ def parts_inside(mesh: Mesh, polyline: Floats) -> list[Floats]:
     for p, r in zip(polyline, np.diff(polyline, axis=0)):
         cross = r[0] * s[:, 1] - r[1] * s[:, 0]
         gap = q - p
-        with np.errstate(divide="ignore", invalid="ignore"):
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             t = (gap[:, 0] * s[:, 1] - gap[:, 1] * s[:, 0]) / cross
             u = (gap[:, 0] * r[1] - gap[:, 1] * r[0]) / cross
         hits = t[(cross != 0) & (u >= 0) & (u <= 1) & (t > 0) & (t < 1)]
