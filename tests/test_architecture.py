@@ -40,6 +40,13 @@ def test_import_loads_nothing_heavy() -> None:
     assert run.stdout.strip() == "[]"
 
 
+@pytest.mark.parametrize("package", ["gmsh", "meshio"])
+def test_a_package_for_files_has_one_home(package: str) -> None:
+    loads = re.compile(rf"(import {package}\b|required\(\s*[\"']{package}\b)")
+    homes = {path.relative_to(SOURCE).parts[0] for path in FILES if loads.search(path.read_text())}
+    assert homes == {"mesh"}
+
+
 def test_layers_are_one_way() -> None:
     program = "from importlinter.cli import lint_imports_command as run; run()"
     run = subprocess.run(

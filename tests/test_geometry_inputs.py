@@ -160,11 +160,20 @@ def test_a_full_disk_is_said_with_the_path(name, tmp_path):
         assert os.listdir(tmp_path) == [name]
 
 
-@pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")
-def test_a_folder_where_nothing_may_be_written(tmp_path):
-    tmp_path.chmod(0o500)
-    with pytest.raises(xc.XcrackError, match="Permission denied"):
-        xc.write_mesh(tmp_path / "a.msh", MESH)
+@pytest.mark.parametrize("name", ["a.msh", "a.inp"])
+def test_a_folder_where_nothing_may_be_written(name, tmp_path, monkeypatch):
+    def refused(*_, **__):
+        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+
+    monkeypatch.setattr(Path, "write_text", refused)  # root may write anywhere
+    with pytest.raises(xc.XcrackError, match=f"{name}.*Permission denied"):
+        xc.write_mesh(tmp_path / name, MESH)
+    monkeypatch.undo()
+    xc.write_mesh(tmp_path / name, MESH)
+    monkeypatch.setattr(Path, "read_bytes", refused)
+    monkeypatch.setattr(Path, "read_text", refused)
+    with pytest.raises(xc.XcrackError, match=f"{name}.*Permission denied"):
+        xc.read_mesh(tmp_path / name)
 
 
 # --- packages that are missing ------------------------------------------------------------------
