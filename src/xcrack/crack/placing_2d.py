@@ -9,7 +9,7 @@ from xcrack.crack.lines import crossing_points, touching_points
 from xcrack.crack.tips_2d import tip_frames
 from xcrack.errors import GeometryError, warn
 from xcrack.geometry.simplices import closest_on_segment
-from xcrack.mesh.locate import contains, locate, nearest_boundary, parts_inside
+from xcrack.mesh.locate import cell_sizes, cells_at, contains, nearest_boundary, parts_inside
 from xcrack.mesh.mesh import Mesh
 
 _MOUTH = 0.5  # an end within this share of a cell from the boundary is a mouth
@@ -69,7 +69,7 @@ def place_line(crack: Crack, mesh: Mesh) -> Crack:
             points[end] = prolonged
     placed = Crack(points, crack.faces, tuple(tips))
     if tips:
-        h = _cell_sizes(mesh, points[tips])
+        h = cell_sizes(mesh, points[tips])
         if length.sum() < h.min():
             raise GeometryError(
                 f"the crack at {points[tips[0]].tolist()} has length {length.sum():.4g}, less than "
@@ -158,11 +158,6 @@ def _prolonged(mesh: Mesh, end: Floats, out: Floats, size: float) -> tuple[float
     return way, np.asarray(end + out * (way + min(size, gap / 2)))
 
 
-def _cell_sizes(mesh: Mesh, x: Floats) -> Floats:
-    cell, _ = locate(mesh, x)
-    return mesh.cell_size[np.maximum(cell, 0)]
-
-
 def check_lines(cracks: tuple[Crack, ...], mesh: Mesh) -> None:
     """Raise where cracks cross or touch, or a tip is closer than a cell to what it must not meet.
 
@@ -201,8 +196,8 @@ def _check_tips(cracks: tuple[Crack, ...], mesh: Mesh) -> None:
     owner = np.repeat(np.arange(len(cracks)), [len(own) for own in tips])
     if len(x) < 2:
         return
-    cell, _ = locate(mesh, x)
-    size = mesh.cell_size[np.maximum(cell, 0)]
+    cell = cells_at(mesh, x)
+    size = mesh.cell_size[cell]
     for i, j in sorted(cKDTree(x).query_pairs(float(size.max()))):
         apart = float(np.linalg.norm(x[i] - x[j]))
         if apart < min(size[i], size[j]) or cell[i] == cell[j]:
@@ -222,7 +217,7 @@ def _check_tips(cracks: tuple[Crack, ...], mesh: Mesh) -> None:
 def _check_own(number: int, crack: Crack, mesh: Mesh) -> None:
     """Raise where a tip comes closer than half a cell to another part of its own crack."""
     x, _ = tip_frames(crack)
-    for tip, end, size in zip(crack.tips or (), x, _cell_sizes(mesh, x)):
+    for tip, end, size in zip(crack.tips or (), x, cell_sizes(mesh, x)):
         line = crack.points if tip == 0 else crack.points[::-1]
         length = np.linalg.norm(np.diff(line, axis=0), axis=1)
         away = np.concatenate([[0.0], np.cumsum(length)])  # along the crack, from the tip

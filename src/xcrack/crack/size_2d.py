@@ -4,7 +4,7 @@ import numpy as np
 
 from xcrack.crack.crack import Crack
 from xcrack.errors import ProblemError
-from xcrack.mesh.locate import contains
+from xcrack.mesh.locate import parts_inside
 from xcrack.mesh.mesh import Mesh
 
 
@@ -13,20 +13,9 @@ def length_inside(crack: Crack, mesh: Mesh) -> float:
 
     A mouth lies outside, as far as the crack was prolonged; that part does not count.
     """
-    facets = mesh.points[mesh.boundary]
-    q, s = facets[:, 0], facets[:, 1] - facets[:, 0]
-    total = 0.0
-    for first, second in crack.faces:
-        p, r = crack.points[first], crack.points[second] - crack.points[first]
-        cross = r[0] * s[:, 1] - r[1] * s[:, 0]
-        gap = q - p
-        with np.errstate(divide="ignore", invalid="ignore"):
-            t = (gap[:, 0] * s[:, 1] - gap[:, 1] * s[:, 0]) / cross
-            u = (gap[:, 0] * r[1] - gap[:, 1] * r[0]) / cross
-        hits = t[(cross != 0) & (u >= 0) & (u <= 1) & (t > 0) & (t < 1)]
-        ends = np.concatenate([[0.0], np.sort(hits), [1.0]])
-        inside = contains(mesh, p + 0.5 * (ends[:-1] + ends[1:])[:, None] * r)
-        total += float(np.diff(ends)[inside].sum() * np.linalg.norm(r))
+    length = np.linalg.norm(np.diff(crack.points, axis=0), axis=1)
+    share = [float(np.diff(parts, axis=1).sum()) for parts in parts_inside(mesh, crack.points)]
+    total = float(length @ share)
     if total <= 0:
         raise ProblemError(f"no part of the crack from {crack.points[0].tolist()} is in the body.")
     return total
