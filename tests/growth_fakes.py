@@ -53,14 +53,16 @@ def patch_respond(monkeypatch, K_of, radius=1.5):
         solution = SimpleNamespace(
             problem=problem,
             space=SimpleNamespace(radius=np.full(n, radius)),
-            reuse=Reuse(centre=(np.full((1, 2), 1.0 if reuse is None else reuse.centre[0] + 1),)),
+            reuse=Reuse(
+                centre=(np.full((1, 2), 1.0 if not reuse.centre else reuse.centre[0] + 1),)
+            ),
         )
         full = [K_of(problem, c) for c in range(len(problem.placed))]
         answers = tuple(
             tuple(sif(crack, load * np.asarray(K)) for crack, K in zip(problem.placed, full))
             for load in run.cycle.load_states
         )
-        return tuple(solution for _ in answers), answers
+        return tuple(solution for _ in answers), answers, solution.reuse
 
     monkeypatch.setattr(growth, "respond", respond)
     return calls

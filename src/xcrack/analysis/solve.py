@@ -39,7 +39,7 @@ def solve(
         stress), or lists of loads. None: the loads as they are.
     solver : callable, optional
         Given a sparse symmetric matrix, returns a function that solves for right-hand sides;
-        `xcrack.solvers.factor.superlu` where it is left out.
+        a multifrontal factorisation if omitted.
 
     Returns
     -------
@@ -73,22 +73,22 @@ def solve_states(
     reuse: Reuse | None = None,
     solver: Solver | None = None,
 ) -> list[Solution]:
-    """Solve all load states; `reuse` of an earlier solution in the same mesh saves work."""
+    """Solve all load states; `reuse` of an earlier solution in the same mesh saves work.
+
+    Give `Reuse()` at the first of several solves in one mesh: what serves the next is kept then.
+    """
     if not len(states):
         raise ProblemError("states is empty: give at least one load state, or none at all.")
-    reuse = reuse or Reuse()
-    model = build(problem, reuse.bulk)
+    model = build(problem, None if reuse is None else reuse.bulk)
     known_loads: dict[tuple[int, ...], Floats] = {}
     cases = [_case(problem, model, state, known_loads) for state in states]
     fixed = model.known.fixed.copy()
     motion = free_motion(model.space, fixed)
     engine = _engine(problem, model, fixed, motion, solver, reuse)
-    in_balance = [balanced(model.space, motion, case.f) for case in cases]
-    f = np.stack([loads for loads, _ in in_balance], axis=1)
-    imbalance = max(share for _, share in in_balance)
+    f, imbalance = balanced(model.space, motion, np.stack([case.f for case in cases], axis=1))
     known = np.stack([case.known for case in cases], axis=1)
     acting = [(case.loads, case.factor) for case in cases]
-    pressed = solve_contact(problem, model, engine, f, known, reuse, acting)
+    pressed = solve_contact(problem, model, engine, f, known, reuse or Reuse(), acting)
     u = pressed.u
     if motion.modes.shape[1]:
         u = without_motion(motion, u)
@@ -118,7 +118,7 @@ def _engine(
     fixed: Bools,
     motion: Motion,
     solver: Solver | None,
-    reuse: Reuse,
+    reuse: Reuse | None,
 ) -> Engine:
     """A factorisation, or in 3D above some size conjugate gradients."""
     space_, wanted = model.space, problem.numerics.linear
@@ -131,7 +131,7 @@ def _engine(
             model.stiffness,
             model.bulk,
             fixed,
-            reuse.hierarchy,
+            None if reuse is None else reuse.hierarchy,
             motion.modes,
             problem.material if comparison.tip_basis == "vectorial" else None,
         )
@@ -143,7 +143,7 @@ def _engine(
         problem.numerics,
         solver,
         problem.material,
-        reuse.elimination,
+        reuse,
     )
 
 

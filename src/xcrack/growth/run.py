@@ -107,7 +107,7 @@ def steps_of(run: Run, last: Step | None = None) -> Generator[Step, None, str]:
         if last is None:
             settings = run.settings  # before a law is called that may change what it reads
             with notices.watch(0):
-                last, reuse = _next_step(run, run.problem, None, None, settings)
+                last, reuse = _next_step(run, run.problem, None, Reuse(), settings)
                 _warn_of_ratio(run, last)
             yield last
         else:
@@ -176,7 +176,7 @@ def _next_step(
     run: Run,
     problem: Problem,
     last: Step | None,
-    reuse: Reuse | None,
+    reuse: Reuse,
     settings: Mapping[str, str],
 ) -> tuple[Step, Reuse]:
     """Solve all load states of a problem and decide where and how fast its cracks grow."""
@@ -184,7 +184,7 @@ def _next_step(
     before = None if last is None else memory_of(last)
     cracks, mesh, nu = problem.placed, problem.mesh, run.problem.material.nu
     place = following(mesh).PLACE
-    solutions, sif = respond(problem, run, reuse)
+    solutions, sif, handed_on = respond(problem, run, reuse)
     angle, dK_eq, R, law_rates = [], [], [], []
     for c in range(len(cracks)):
         K = np.stack([state[c].K for state in sif])
@@ -206,7 +206,6 @@ def _next_step(
         since, pending = following(mesh).followed(last, cracks, sif[0], law_rates, length, mesh)
         n_cycles = last.cycles + since
     plan = _plan(run, sif[0], rate, tuple(dK_eq), pending)
-    handed_on = solutions[0].reuse
     memory = Memory(
         tuple(law_rates), length, plan.pending, radius, handed_on.without_matrices(), settings
     )
@@ -229,12 +228,19 @@ def _next_step(
 
 
 def respond(
-    problem: Problem, run: Run, reuse: Reuse | None
-) -> tuple[tuple[Solution, ...], tuple[tuple[SIF, ...], ...]]:
-    """Solutions of all load states, and K of each crack in each of them."""
-    solutions = solve_states(problem, run.cycle.load_states, reuse=reuse, solver=run.solver)
+    problem: Problem, run: Run, reuse: Reuse
+) -> tuple[tuple[Solution, ...], tuple[tuple[SIF, ...], ...], Reuse]:
+    """Solutions of all load states, K of each crack in each of them, and what serves the next.
+
+    The factor is handed on, but not kept with the solutions.
+    """
+    states = run.cycle.load_states
+    solutions = solve_states(problem, states, reuse=reuse, solver=run.solver)
+    handed_on = solutions[0].reuse
+    light = handed_on.without_factor()
+    solutions = [replace(solution, reuse=light) for solution in solutions]
     by_crack = [stress_intensities(solutions, c) for c in range(len(problem.cracks))]
-    return tuple(solutions), tuple(zip(*by_crack, strict=True))
+    return tuple(solutions), tuple(zip(*by_crack, strict=True)), handed_on
 
 
 def _plan(

@@ -11,8 +11,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from xcrack.crack.crack import Crack
 from xcrack.errors import ProblemError
 from xcrack.growth.fingerprint import DEFAULTS
@@ -21,14 +19,13 @@ from xcrack.history import lock
 from xcrack.history.store import PART, load, save, write_whole
 from xcrack.inputs import system_errors
 from xcrack.sif.sif import SIF
-from xcrack.solvers.factor import Elimination
 from xcrack.solvers.reuse import Reuse
 
 HEADER = "run.json"
 _FORMAT = 2
 _STEP = re.compile(r"step_(\d{5,})\.npz")
 CLASSES: dict[str, type] = {
-    "Step": Step, "Memory": Memory, "Reuse": Reuse, "Elimination": Elimination, "Crack": Crack,
+    "Step": Step, "Memory": Memory, "Reuse": Reuse, "Crack": Crack,
     "SIF": SIF,
 }  # fmt: skip
 
@@ -172,17 +169,12 @@ def step_files(folder: Path) -> list[Path]:
 def write_step(folder: Path, step: Step, header: Header) -> None:
     """Write a step without its solutions; afterwards it is on disk as a whole.
 
-    An order of elimination is written by the step that computed it; those that follow refer to it.
-
     Raises
     ------
     ProblemError
         The system refuses: no space, no permission. The steps before are whole.
     """
     memory = None if step.memory is None else replace(step.memory, settings={})
-    order = _order_of(memory)
-    if memory is not None and order is not None and order.age:
-        memory = _with_order(memory, replace(order, place=np.zeros(0, dtype=np.int32)))
     stored = {"run": _content(header), "step": replace(step, solutions=(), memory=memory)}
     path = step_path(folder, step.index)
     try:
@@ -213,13 +205,6 @@ def read_steps(folder: Path, header: Header) -> Stored:
             fault = f"{path.name} belongs to another run"
             break
         memory = None if step.memory is None else replace(step.memory, settings=header.settings)
-        order = _order_of(memory)
-        if memory is not None and order is not None and order.age:
-            before = _order_of(steps[-1].memory) if steps else None
-            if before is None:
-                fault = f"{path.name} is not whole"
-                break
-            memory = _with_order(memory, replace(order, place=before.place))
         steps.append(replace(step, memory=memory))
     return Stored(tuple(steps), fault, tuple(reversed(files[len(steps) :])))
 
@@ -235,14 +220,6 @@ def _read(path: Path) -> tuple[Header | None, Step | None]:
         return None, None
     step = content.get("step")
     return header, step if isinstance(step, Step) else None
-
-
-def _order_of(memory: Memory | None) -> Elimination | None:
-    return memory.reuse.elimination if memory else None
-
-
-def _with_order(memory: Memory, order: Elimination) -> Memory:
-    return replace(memory, reuse=replace(memory.reuse, elimination=order))
 
 
 def move_aside(folder: Path, files: Sequence[Path]) -> Path:

@@ -1,7 +1,10 @@
 """Element stiffness from functions tabulated at integration points, summed into blocks."""
 
+import math
+
 import numpy as np
 
+from xcrack.kernels.blas import dsyrk
 from xcrack.kernels.jit import kernel
 
 
@@ -110,6 +113,39 @@ def _products(begin, end, weight, gradient, place, active, plain, row, block):  
 
 
 @kernel
+def _products_by_blas(begin, end, weight, gradient, place, active, rows, block):  # type: ignore[no-untyped-def]
+    """The same products as those of rows of gradients times the root of the weight, by dsyrk."""
+    d, width = gradient.shape[2], block.shape[1]
+    k = active * d
+    for q in range(begin, end):
+        root, at = math.sqrt(weight[q]), (q - begin) * k
+        for a in range(active):
+            for i in range(d):
+                rows[at + a * d + i] = root * gradient[q, place[a], i]
+    size = np.array([k, end - begin, width], dtype=np.int32)
+    scalar = np.array([1.0, 0.0])
+    letter = np.array([76, 78], dtype=np.uint8)  # L N
+    integer, real, text = size.ctypes.data, scalar.ctypes.data, letter.ctypes.data
+    dsyrk(
+        text,
+        text + 1,
+        integer,
+        integer + 4,
+        real,
+        rows.ctypes.data,
+        integer,
+        real + 8,
+        block.ctypes.data,
+        integer + 8,
+    )
+    for a in range(active):
+        for i in range(d):
+            for j in range(i):
+                block[a * d + i, a * d + j] = block[a * d + j, a * d + i]
+    return size[0] + letter[0] + scalar[0]  # addresses alone keep no array alive
+
+
+@kernel
 def _scatter(  # type: ignore[no-untyped-def]
     data, indptr, indices, functions, place, active, plain, block, lam, mu
 ):
@@ -162,9 +198,20 @@ def add_stiffness(  # type: ignore[no-untyped-def]
     d = gradient.shape[2]
     place = np.empty(n, np.int64)
     block, row = np.zeros((n * d, n * d)), np.empty(n * d)
+    most = 0
+    for e in range(m):
+        most = max(most, offsets[e + 1] - offsets[e])
+    rows = np.empty(most * n * d)
     for e in range(m):
         active, plain = _active(functions[e], n_standard, place)
-        _products(offsets[e], offsets[e + 1], weight, gradient, place, active, plain, row, block)
+        begin, end = offsets[e], offsets[e + 1]
+        least = 0.0
+        for q in range(begin, end):
+            least = min(least, weight[q])
+        if least < 0.0:
+            _products(begin, end, weight, gradient, place, active, plain, row, block)
+        else:
+            _products_by_blas(begin, end, weight, gradient, place, active, rows, block)
         _scatter(data, indptr, indices, functions[e], place, active, plain, block, lam, mu)
 
 

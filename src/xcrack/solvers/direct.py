@@ -21,13 +21,16 @@ from xcrack.solvers.basis import (
     restricted,
 )
 from xcrack.solvers.engine import ContactRows, Count, StateContact
-from xcrack.solvers.factor import Elimination, Solve, eliminated
+from xcrack.solvers.factor import Solve, superlu
 from xcrack.solvers.modal_basis import mode_columns
+from xcrack.solvers.multifrontal import Factor, Tree, factorised, tree
 from xcrack.solvers.reuse import Reuse
+from xcrack.threads import one_blas_thread
 from xcrack.xfem.function_space import FunctionSpace
 
 _WRONG = 1e-3  # residual of a user's solver, relative, that is not a solution
 _COARSE = 1e-8  # and one that limits what follows
+_LOST = 1e-3  # residual of our own factor that asks for another
 _BLOCK = 16  # right-hand sides solved at once for the dual matrix; bounds the memory
 
 Solver = Callable[[sp.csc_matrix], Solve]
@@ -71,9 +74,15 @@ class System:
     free : (n_dof,) array of bool
     basis : sparse matrix (n_dof, k)
         Columns of the solver's basis, scaled; zero in the rows of known unknowns.
+    reduced : sparse matrix (k, k)
+        Stiffness in that basis.
+    apply_inverse : callable
+    factor : Factor, optional
+        Whose halves serve contact; None for SuperLU and a user's solver.
+    tree : Tree, optional
+    hand_on : bool
+        Whether the next solve in the same mesh is to use the factor.
     count : Count
-    elimination : Elimination, optional
-        Order of the nodes, for the next crack in the mesh.
     """
 
     matrix: sp.csr_matrix
@@ -81,8 +90,10 @@ class System:
     basis: sp.csr_matrix
     reduced: sp.csc_matrix
     apply_inverse: Solve
+    factor: Factor | None = None
+    tree: Tree | None = None
+    hand_on: bool = False
     count: Count = field(default_factory=Count)
-    elimination: Elimination | None = None
     shared: str = "factorisation"
     reason: str = ""
 
@@ -91,20 +102,14 @@ class System:
         del start
         residual = f if known is None else f - self.matrix @ known
         self.count.solves += 1 if f.ndim == 1 else f.shape[1]
-        u = self.basis @ self.apply_inverse(self.basis.T @ residual)
-        u = u if known is None else known + u
-        if not np.isfinite(u).all():
-            raise ConvergenceError(
-                "the linear solve returned nan: the stiffness is singular. Is the body "
-                "supported, or does a crack cut off a piece that nothing supports?"
-            )
-        return np.asarray(u)
+        return self._expanded(self.apply_inverse(self.basis.T @ residual), known)
 
     def first_look(
         self, f: Floats, known: Floats, closed_before: bool
     ) -> tuple[Floats | None, bool]:
-        """The solution with open faces, which contact needs in any case."""
-        del closed_before
+        """The solution with open faces; none after closed sets where the factor has halves."""
+        if closed_before and self.factor is not None:
+            return None, False
         return self.solve(f, known), True
 
     def contact(
@@ -118,20 +123,25 @@ class System:
     ) -> list[StateContact]:
         """Solve load states with crack faces that may touch; see `Engine`.
 
-        F = N K^-1 N^T is made once for all states.
+        F = N K^-1 N^T is made once for all states: of Y = L^-1 N^T, the forward half of the rows
+        alone, F = Y^T Y and the gaps of the open faces are Y^T (L^-1 f). One backward half then
+        gives the displacements with contact.
         """
         del latest
-        F = self.dual(rows.N)
-        d = rows.N @ (self.solve(f, known) if opened is None else opened)
-        unknown = np.full(len(rows.measure), rows.closed)
-        states = [
-            active_set(
-                F, d[:, k], rows.measure, rows.stiffness, unknown if first is None else first
-            )
-            for k, first in enumerate(start)
-        ]
+        if self.factor is None:
+            return self._contact_by_solves(rows, f, known, start, opened)
+        b = self.basis.T @ (f - self.matrix @ known)
+        Y, places = self.factor.forward_sparse(sp.csr_matrix(rows.N @ self.basis))
+        y = self.factor.forward(b)
+        with one_blas_thread():
+            F = Y.T @ Y
+            d = rows.N @ known + Y.T @ y[places]
+        states = self._sets(F, d, rows, start)
         pressure = np.stack([state.pressure for state in states], axis=1)
-        u = self.solve(f + rows.N.T @ pressure, known)
+        with one_blas_thread():
+            y[places] += Y @ pressure
+        self.count.solves += b.shape[1]
+        u = self._expanded(self.factor.backward(y), known)
         return [replace(state, u=u[:, k]) for k, state in enumerate(states)]
 
     def dual(self, N: sp.csr_matrix) -> Floats:
@@ -143,8 +153,44 @@ class System:
         return (F + F.T) / 2
 
     def handed_on(self, reuse: Reuse) -> Reuse:
-        """With the order of elimination."""
-        return replace(reuse, elimination=self.elimination)
+        """With the tree of the mesh, and the factor where it may serve again."""
+        return replace(reuse, tree=self.tree, factor=self.factor if self.hand_on else None)
+
+    def _contact_by_solves(
+        self,
+        rows: ContactRows,
+        f: Floats,
+        known: Floats,
+        start: Sequence[Bools | None],
+        opened: Floats | None,
+    ) -> list[StateContact]:
+        d = rows.N @ (self.solve(f, known) if opened is None else opened)
+        states = self._sets(self.dual(rows.N), d, rows, start)
+        pressure = np.stack([state.pressure for state in states], axis=1)
+        u = self.solve(f + rows.N.T @ pressure, known)
+        return [replace(state, u=u[:, k]) for k, state in enumerate(states)]
+
+    def _sets(
+        self, F: Floats, d: Floats, rows: ContactRows, start: Sequence[Bools | None]
+    ) -> list[StateContact]:
+        unknown = np.full(len(rows.measure), rows.closed)
+        return [
+            active_set(
+                F, d[:, k], rows.measure, rows.stiffness, unknown if first is None else first
+            )
+            for k, first in enumerate(start)
+        ]
+
+    def _expanded(self, y: Floats, known: Floats | None) -> Floats:
+        """Displacements of coefficients in the solver's basis."""
+        u = self.basis @ y
+        u = u if known is None else known + u
+        if not np.isfinite(u).all():
+            raise ConvergenceError(
+                "the linear solve returned nan: the stiffness is singular. Is the body supported, "
+                "or does a crack cut off a piece that nothing supports?"
+            )
+        return np.asarray(u)
 
 
 def system(
@@ -154,16 +200,62 @@ def system(
     numerics: Numerics,
     solver: Solver | None = None,
     material: Isotropic | None = None,
-    elimination: Elimination | None = None,
+    reuse: Reuse | None = None,
 ) -> System:
-    """Eliminate known unknowns, change the basis, scale by the diagonal and factor."""
-    basis, reduced, last = _reduced(space, K, fixed, numerics, material)
+    """Eliminate known unknowns, change the basis, scale by the diagonal and factor.
+
+    Parameters
+    ----------
+    space : Space
+    K : sparse matrix (n_dof, n_dof)
+    fixed : (n_dof,) array of bool
+        Unknowns that supports decide, and pins.
+    numerics : Numerics
+    solver : callable, optional
+        In the place of the factorisation.
+    material : Isotropic, optional
+        For the vectorial tip basis alone.
+    reuse : Reuse, optional
+        Of an earlier solve. Where it is given, the next one may use this factor.
+    """
+    basis, reduced = _reduced(space, K, fixed, numerics, material)
     count = Count(factorisations=1)
     if solver is not None:
-        return System(K, ~fixed, basis, reduced, _verified(solver, reduced), count)
-    node = function_nodes(space)[last // space.dim]
-    solve, order = eliminated(reduced, node, space.n_nodes, elimination)
-    return System(K, ~fixed, basis, reduced, solve, count, order)
+        return System(K, ~fixed, basis, reduced, _verified(solver, reduced), count=count)
+    halves = None if reuse is None else reuse.tree
+    if halves is None or halves.mesh is not space.mesh or halves.order != space.order:
+        halves = tree(space.mesh, space.order)
+    columns = sp.csc_matrix(basis)
+    support = columns.indptr, columns.indices, function_nodes(space), space.dim
+    before = None if reuse is None else reuse.factor
+    factor = factorised(reduced, support, halves, before, keep=reuse is not None)
+    if factor is None:  # a pivot that is not positive: SuperLU needs none
+        return System(K, ~fixed, basis, reduced, superlu(reduced), tree=halves, count=count)
+    inverse = _checked(factor, reduced, count)
+    return System(K, ~fixed, basis, reduced, inverse, factor, halves, reuse is not None, count)
+
+
+def _checked(factor: Factor, A: sp.csc_matrix, count: Count) -> Solve:
+    """Solve by a factor; by SuperLU where the residual says that it has lost its digits."""
+    fallback: list[Solve] = []
+
+    def solve(b: Floats) -> Floats:
+        if not fallback:
+            x = factor.solve(b)
+            if _residual(A, x, b) <= _LOST:
+                return x
+            count.factorisations += 1
+            fallback.append(superlu(A))
+        return fallback[0](b)
+
+    return solve
+
+
+def _residual(A: sp.csc_matrix, x: Floats, b: Floats) -> float:
+    """Largest residual of right-hand sides, relative to their size."""
+    r = b - A @ x
+    size, residual = (np.sqrt(np.einsum("i...,i...->...", v, v)) for v in (b, r))
+    return float(np.max(residual / np.where(size > 0, size, 1.0), initial=0.0))
 
 
 def _verified(solver: Solver, A: sp.csc_matrix) -> Solve:
@@ -178,9 +270,7 @@ def _verified(solver: Solver, A: sp.csc_matrix) -> Solve:
         x = numbers(called(solve, "solver=", b), "what the solver returned", b.shape, finite=False)
         if not np.isfinite(x).all():
             return x  # a singular stiffness, which has its own error
-        size = np.sqrt((b * b).sum(axis=0))
-        residual = np.sqrt(((b - A @ x) ** 2).sum(axis=0))
-        share = float(np.max(residual / np.where(size > 0, size, 1.0), initial=0.0))
+        share = _residual(A, x, b)
         if share > _WRONG:
             raise ConvergenceError(
                 f"the given solver leaves a residual of {share:.3g} of the right-hand side: what "
@@ -216,8 +306,8 @@ def _reduced(
     fixed: Bools,
     numerics: Numerics,
     material: Isotropic | None,
-) -> tuple[sp.csr_matrix, sp.csc_matrix, Ints]:
-    """Columns scaled to energy one, K in them, and the last unknown in each of them.
+) -> tuple[sp.csr_matrix, sp.csc_matrix]:
+    """Columns scaled to energy one, and K in them.
 
     Standard columns are those of the identity: only the border of enriched ones is multiplied
     out. Columns without energy are left out.
@@ -244,9 +334,7 @@ def _reduced(
         K.indptr, K.indices, K.data, number, scale, _arrays(across), _arrays(down), _arrays(own)
     )
     reduced = sp.csc_matrix((values, rows, indptr), shape=(len(scale), len(scale)))
-    columns = sp.csc_matrix(enriched)
-    last = np.concatenate([standard, np.maximum.reduceat(columns.indices, columns.indptr[:-1])])
-    return _beside_identity(standard, enriched, scale), reduced, last
+    return _beside_identity(standard, enriched, scale), reduced
 
 
 def _beside_identity(standard: Ints, enriched: sp.csr_matrix, scale: Floats) -> sp.csr_matrix:

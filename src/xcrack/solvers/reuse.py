@@ -1,12 +1,13 @@
-"""What one solve hands on to the next: matrices of the mesh, orders, and closed sets by place."""
+"""What one solve hands on to the next: matrices of the mesh, factors, closed sets by place."""
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from xcrack.arrays import Bools, Floats
-from xcrack.solvers.factor import Elimination
+from xcrack.solvers.multifrontal import Factor, Tree
 from xcrack.solvers.multigrid import Hierarchy
 from xcrack.xfem.assembly import Bulk
 
@@ -21,8 +22,10 @@ class Reuse:
         Where the multipliers of each crack sit; None for a crack without.
     active : tuple of (states, g) arrays of bool or None
         Closed sets of all load states.
-    elimination : Elimination, optional
-        Order in which a factorisation takes the nodes.
+    tree : Tree, optional
+        Halves of the mesh, in whose order a factorisation takes the unknowns.
+    factor : Factor, optional
+        Of the last crack, whose panels serve the next one where nothing changed.
     bulk : Bulk, optional
         Stiffness of the uncracked body, and cut cells that may serve the next crack.
     hierarchy : Hierarchy, optional
@@ -31,13 +34,22 @@ class Reuse:
 
     centre: tuple[Floats | None, ...] = ()
     active: tuple[Bools | None, ...] = ()
-    elimination: Elimination | None = None
+    tree: Tree | None = None
+    factor: Factor | None = None
     bulk: Bulk | None = None
     hierarchy: Hierarchy | None = None
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        # A factor holds addresses: in another process they mean nothing.
+        return Reuse, (self.centre, self.active, None, None, self.bulk, self.hierarchy)
+
     def without_matrices(self) -> "Reuse":
         """The part that fits into a file, and that decides the last bit of the next solve."""
-        return replace(self, bulk=None, hierarchy=None)
+        return Reuse(self.centre, self.active)
+
+    def without_factor(self) -> "Reuse":
+        """The part that is small enough to be kept with each solution."""
+        return replace(self, factor=None)
 
     def was_closed(self, c: int) -> bool:
         """Whether any group of crack c was closed in any state."""

@@ -1,6 +1,7 @@
 """Rigid motion: what holds the body, and what to do where nothing does."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import scipy.linalg
@@ -30,6 +31,11 @@ class Motion:
 
     modes: Floats
     pins: Ints
+
+    @cached_property
+    def size(self) -> Floats:
+        """Largest entry of each motion `(k,)`."""
+        return np.abs(self.modes).max(axis=0)
 
 
 def free_motion(space: FunctionSpace, fixed: Bools) -> Motion:
@@ -65,36 +71,36 @@ def free_motion(space: FunctionSpace, fixed: Bools) -> Motion:
 
 
 def balanced(space: FunctionSpace, motion: Motion, f: Floats) -> tuple[Floats, float]:
-    """Loads without their small resultants, and the share that was removed.
+    """Loads `(n_dof, states)` without their small resultants, and the largest share removed.
 
     Raises
     ------
     ProblemError
-        A resultant above 1e-3 of the sum of all forces in a direction that nothing holds.
+        A resultant above 1e-3 of the sum of all forces in a direction that nothing supports.
     """
     if motion.modes.shape[1] == 0:
         return f, 0.0
     d = space.dim
     n = space.n_nodes * d
-    total = _total(space, f)
-    if total == 0:
-        return f, 0.0
-    # Resultants of unit translations and rotations with a lever of the body's size.
-    modes = motion.modes / np.abs(motion.modes).max(axis=0)
-    residual = modes.T @ f
-    share = float(np.abs(residual).max() / total)
-    if share > _IMBALANCE:
-        modes = rigid_modes(space.node_points)
-        resultant = modes.T @ f[:n]
-        raise ProblemError(
-            f"the body is not held against a rigid motion and its loads are out of balance by "
-            f"{100 * share:.3g} % of the sum of all forces ({total:.4g}; resultant force "
-            f"{np.round(resultant[:d], 6).tolist()}, moment about the centre "
-            f"{np.round(resultant[d:], 6).tolist()}): add a support such as fix(set, axis), or "
-            "loads that balance."
-        )
-    correction = motion.modes @ (motion.modes.T @ f)
-    return f - correction, share
+    resultants = motion.modes.T @ f
+    # Of unit translations and of rotations with a lever of the body's size.
+    largest = 0.0
+    for k, residual in enumerate(resultants.T / motion.size):
+        total = _total(space, f[:, k])
+        if total == 0:
+            continue
+        share = float(np.abs(residual).max() / total)
+        if share > _IMBALANCE:
+            resultant = rigid_modes(space.node_points).T @ f[:n, k]
+            raise ProblemError(
+                f"the body is not held against a rigid motion and its loads are out of balance by "
+                f"{100 * share:.3g} % of the sum of all forces ({total:.4g}; resultant force "
+                f"{np.round(resultant[:d], 6).tolist()}, moment about the centre "
+                f"{np.round(resultant[d:], 6).tolist()}): add a support such as fix(set, axis), "
+                "or loads that balance."
+            )
+        largest = max(largest, share)
+    return f - motion.modes @ resultants, largest
 
 
 def _total(space: FunctionSpace, f: Floats) -> float:

@@ -10,6 +10,7 @@ from xcrack.mesh.mesh import Mesh
 from xcrack.mesh.simplex import cell_nodes, shape_derivatives, simplex_rule
 from xcrack.scene.material import Isotropic
 from xcrack.scene.numerics import Numerics
+from xcrack.threads import one_blas_thread
 from xcrack.xfem.consistent import boundary_points, corrected
 from xcrack.xfem.function_space import FunctionSpace
 from xcrack.xfem.kept_cells import KeptCells, kept_cells, with_one_jump
@@ -116,17 +117,18 @@ def enriched_stiffness(
             N, G = space.tabulate(batch, row, bary, side)
             if batch.tips and boundary is not None:
                 G = corrected(space, batch, (row, bary, weight, side), N, G, boundary)
-            add_stiffness(
-                data,
-                indptr,
-                indices,
-                batch.functions,
-                first,
-                weight,
-                G,
-                space.n_nodes,
-                *lame,
-            )
+            with one_blas_thread():
+                add_stiffness(
+                    data,
+                    indptr,
+                    indices,
+                    batch.functions,
+                    first,
+                    weight,
+                    G,
+                    space.n_nodes,
+                    *lame,
+                )
     if d * d * len(indices) < np.iinfo(np.int32).max:
         indptr = indptr.astype(np.int32)
     matrix = sp.bsr_matrix((data, indices, indptr), shape=(n, n)).tocsr()

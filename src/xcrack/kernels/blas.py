@@ -1,0 +1,34 @@
+"""Routines of scipy's BLAS and LAPACK for kernels; all arguments are addresses."""
+
+from typing import Any
+
+import llvmlite.binding
+from numba import types
+from numba.extending import get_cython_function_address, intrinsic
+
+
+def _external(module: str, name: str, count: int) -> Any:
+    symbol = f"xcrack_{name}"
+    address = get_cython_function_address(f"scipy.linalg.cython_{module}", name)
+    llvmlite.binding.add_symbol(symbol, address)
+    return types.ExternalFunction(symbol, types.void(*([types.uintp] * count)))
+
+
+dpotrf = _external("lapack", "dpotrf", 5)
+dtrsm = _external("blas", "dtrsm", 11)
+dsyrk = _external("blas", "dsyrk", 10)
+dgemm = _external("blas", "dgemm", 13)
+dtrsv = _external("blas", "dtrsv", 8)
+dgemv = _external("blas", "dgemv", 11)
+
+
+@intrinsic
+def doubles_at(context, address):  # type: ignore[no-untyped-def]
+    """Pointer to float64 numbers at an address; `numba.carray` makes an array of it."""
+    del context, address
+
+    def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
+        kind = context.get_value_type(signature.return_type)
+        return builder.inttoptr(arguments[0], kind)
+
+    return types.CPointer(types.float64)(types.uint64), generate
