@@ -28,8 +28,8 @@ examples: environment
 	@set -e; for script in examples/*.py; do echo "== $$script"; $(BIN)/python $$script; done
 
 bench: environment
-	$(BIN)/python -m pip install --quiet "scikit-fem>=10" || echo "without scikit-fem: no opponent"
-	$(BIN)/python -m xcrack.bench --out benchmarks/results --figures docs/figures
+	$(BIN)/python -m pip install --quiet "scikit-fem>=10" || echo "without scikit-fem: no baseline"
+	$(BIN)/python -m benchmarks --out benchmarks/results --figures docs/figures
 
 environment:
 	@$(PYTHON) scripts/bootstrap.py

@@ -1,6 +1,6 @@
 """Processor time of this code beside that of another checkout, scene by scene, in turns.
 
-    python benchmarks/beside.py /path/to/other/checkout [--scenes edge hole] [--rounds 7] [--json F]
+    python -m benchmarks.beside /path/to/other/checkout [--scenes edge hole] [--rounds 7] [--json F]
 
 One process for each of the two stays alive; rounds alternate, so that transient load on
 the machine affects both. Scenes use public names that both have. Printed are medians of processor
@@ -193,10 +193,10 @@ def compare(name: str, other: Path, rounds: int) -> Numbers:
     processes = [_process(HERE, name), _process(other, name)]
     results: list[list[Numbers]] = [[], []]
     for k in range(rounds + 1):
-        for process, found in zip(processes, results):
+        for process, own in zip(processes, results):
             numbers = _round(process)
             if k:
-                found.append(numbers)
+                own.append(numbers)
     for process in processes:
         process.kill()
     new, old = results

@@ -1,7 +1,7 @@
 """What each ingredient of a scene costs, and what the error becomes without it.
 
-    python benchmarks/economy.py                        # every scene
-    python benchmarks/economy.py penny "closed edge"    # some; the others keep their numbers
+    python -m benchmarks.economy                        # every scene
+    python -m benchmarks.economy penny "closed edge"    # some; the others keep their numbers
 
 Every scene has an exact solution. Its variants take turns, each round on a mesh of its own; the
 first round compiles and does not count. Times are processor times from the mesh to K (to the
@@ -25,10 +25,17 @@ for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 import numpy as np  # noqa: E402
 
 import xcrack as xc  # noqa: E402
+from benchmarks.runs import machine  # noqa: E402
+from benchmarks.scenes.exact_fields import (  # noqa: E402
+    edge_fields,
+    penny,
+    penny_K_I,
+    penny_largest_K_II,
+    penny_shear_K,
+)
+from benchmarks.scenes.material import STEEL  # noqa: E402
+from benchmarks.scenes.settings import Settings, mesh_of  # noqa: E402
 from xcrack.analysis.solve import solve_states  # noqa: E402
-from xcrack.bench.fields import NU, edge_fields, penny, penny_K_I  # noqa: E402
-from xcrack.bench.runs import machine  # noqa: E402
-from xcrack.bench.scenes import STEEL, Settings, mesh_of  # noqa: E402
 from xcrack.scene.numerics import with_choices  # noqa: E402
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -42,7 +49,7 @@ Part = tuple[str, bool, "Variant"]  # ingredient, is it in the default, the othe
 
 @dataclass(frozen=True, eq=False)
 class Variant:
-    """A scene and how: "kept" and "anew", a step after another; "apart", each state for itself."""
+    """A scene and how: "reused" and "anew", a step after another; "apart", each state by itself."""
 
     mesh: MeshOf
     problem: Callable[[xc.Mesh, bool], xc.Problem]  # True: the shorter crack
@@ -54,15 +61,15 @@ class Variant:
 def run(variant: Variant, seed: int) -> tuple[float, Errors, dict[str, int]]:
     """Processor seconds, worst errors and operations of one run."""
     body = variant.mesh(seed)
-    kept: dict = {}
-    if variant.how in ("kept", "anew"):  # both from a mesh that has been used
+    reuse = None
+    if variant.how in ("reused", "anew"):  # both from a mesh that has been used
         first = solve_states(variant.problem(body, True), variant.states)[0]
-        kept = {"reuse": first.reuse} if variant.how == "kept" else {}
+        reuse = first.reuse if variant.how == "reused" else None
     sets = [[s] for s in variant.states] if variant.how == "apart" else [list(variant.states)]
     start = process_time()
     problem = variant.problem(body, False)
     try:
-        groups = [solve_states(problem, some, **kept) for some in sets]
+        groups = [solve_states(problem, some, reuse=reuse) for some in sets]
     except xc.ConvergenceError:
         return process_time() - start, {}, {}
     solved = process_time()
@@ -77,7 +84,7 @@ def run(variant: Variant, seed: int) -> tuple[float, Errors, dict[str, int]]:
 
 
 def pressed(solution: xc.Solution, p: float) -> Errors:
-    """Relative error of a uniform pressure on the lips, where they have multipliers."""
+    """Relative error of a uniform pressure on the crack faces, where they have multipliers."""
     if (lips := solution.contact[0]) is None:
         return {}
     wrong = (lips.pressure / solution.factor / p - 1) ** 2
@@ -89,7 +96,7 @@ def edge(
     mesh: MeshOf | None = None, order: int | None = None, contact: str = "auto", how: str = "",
     states: Sequence[float] = (1.0,), **numerics: object,
 ) -> Variant:  # fmt: skip
-    """Edge crack in [-1, 1]² with its tip at 0, under K_I and K_II, and a pressure on its lips."""
+    """Edge crack in [-1, 1]² with its tip at 0, under K_I and K_II, and a pressure on its faces."""
     u, sigma = edge_fields(modes, p)
 
     def problem(body: xc.Mesh, shorter: bool) -> xc.Problem:
@@ -136,9 +143,11 @@ def body(n: int = 11) -> Variant:
     def problem(mesh: xc.Mesh, shorter: bool) -> xc.Problem:
         crack = xc.plane_crack([(-1.3, -2, 0), (0, -2, 0), (0, 2, 0), (-1.3, 2, 0)])
         sides, loads = ("right", "bottom", "top"), [xc.traction("left", left)]
-        held = [xc.displacement(s, lambda x: np.insert(u(x[:, ::2]), 1, 0, axis=1)) for s in sides]
-        held += [xc.fix("front", 1), xc.fix("back", 1)]
-        return xc.Problem(mesh, STEEL[3], [crack], supports=held, loads=loads)
+        supports = [
+            xc.displacement(s, lambda x: np.insert(u(x[:, ::2]), 1, 0, axis=1)) for s in sides
+        ]
+        supports += [xc.fix("front", 1), xc.fix("back", 1)]
+        return xc.Problem(mesh, STEEL[3], [crack], supports=supports, loads=loads)
 
     def judge(solution: xc.Solution, sif: xc.SIF) -> Errors:
         return {"K": np.abs(np.median(np.abs(sif.K[:, :2]), axis=0) / (1.0, 0.5) - 1).max()}
@@ -155,17 +164,18 @@ def disc(
 
     def problem(mesh: xc.Mesh, shorter: bool) -> xc.Problem:
         crack = xc.penny_crack((0, 0, 0), (0, 0, 1), 0.5 - 0.02 * shorter)
-        held = [xc.displacement("boundary", lambda x: u(x))]
-        method = with_choices(xc.Numerics(), numerics)
-        return xc.Problem(mesh, STEEL[3], [crack], supports=held, contact=contact, numerics=method)
+        return xc.Problem(
+            mesh, STEEL[3], [crack], supports=[xc.displacement("boundary", lambda x: u(x))],
+            contact=contact, numerics=with_choices(xc.Numerics(), numerics),
+        )  # fmt: skip
 
     def judge(solution: xc.Solution, sif: xc.SIF) -> Errors:
         K = sif.K / solution.factor
         if tension > 0:
             wrong = K[:, 0] / penny_K_I(0.5, tension) - 1
             return {"mean K_I": abs(wrong.mean()), "K_I along front": np.sqrt((wrong**2).mean())}
-        size = 4 / (2 - NU) * (shear or 1.0) * np.sqrt(0.5 / np.pi)
-        exact = size * bool(shear) * sif.frame[:, [0, 2], 0] * (1.0, 1.0 - NU)
+        size = penny_largest_K_II(0.5, shear or 1.0)
+        exact = penny_shear_K(0.5, shear, sif.frame)
         wrong = np.sqrt(((K[:, 1:] - exact) ** 2).sum(axis=1).mean()) / size
         errors = {"K_II, K_III": wrong, "K_I": np.abs(K[:, 0]).max() / size}
         return errors | pressed(solution, -tension)
@@ -209,7 +219,7 @@ SCENES: dict[str, tuple[Variant, list[Part]]] = {
         ("corrected gradients", True, edge(*patch, consistent=False))]),
     "closed edge, three states": (edge(*shut, how="together", states=three), [
         ("a factor for each state", False, edge(*shut, how="apart", states=three))]),
-    "closed edge, next step": (edge(*fine, how="kept"), [
+    "closed edge, next step": (edge(*fine, how="reused"), [
         ("kept stiffness and closed set", True, edge(*fine, how="anew"))]),
     "penny": (disc(), [
         ("multipliers on open lips", False, disc(contact="on")),
@@ -227,7 +237,7 @@ SCENES: dict[str, tuple[Variant, list[Part]]] = {
         ("corrected gradients", True, disc(*even, consistent=False))]),
     "penny, three states": (disc(11, how="together", states=three), [
         ("levels for each state", False, disc(11, how="apart", states=three))]),
-    "penny, next step": (disc(14, how="kept"), [
+    "penny, next step": (disc(14, how="reused"), [
         ("kept stiffness and levels", True, disc(14, how="anew"))]),
 }
 # fmt: on
@@ -237,15 +247,15 @@ def measure(scene: str, rounds: int = 3) -> dict[str, dict[str, object]]:
     """Median seconds, worst errors and counts of the default and of each other variant."""
     default, parts = SCENES[scene]
     variants = {"default": default} | {part: other for part, _, other in parts}
-    found: dict[str, list] = {name: [] for name in variants}
+    results: dict[str, list] = {name: [] for name in variants}
     for seed in range(rounds + 1):
-        for name, results in found.items():
+        for name, runs in results.items():
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", xc.XcrackWarning)
-                results.append(run(variants[name], seed))
+                runs.append(run(variants[name], seed))
     rows = {}
-    for name, results in found.items():
-        seconds, errors, counts = zip(*results[1:])
+    for name, runs in results.items():
+        seconds, errors, counts = zip(*runs[1:])
         worst = {k: max(e[k] for e in errors) for k in errors[0]} if all(errors) else {}
         rows[name] = {"seconds": median(seconds), "errors": worst, **counts[-1]}
     return rows
@@ -282,16 +292,16 @@ def table(scenes: dict) -> str:
     return "\n".join(lines)
 
 
-def main(asked: Sequence[str], results: Path = RESULTS, page: Path = PAGE) -> None:
-    """Measure the scenes that are asked for, then write file and page."""
-    kept = json.loads(results.read_text(encoding="utf-8")) if results.exists() else {}
-    for scene in asked or SCENES:
-        kept[scene] = {"machine": machine(), "rows": measure(scene)}
-        results.write_text(json.dumps(kept, indent=1) + "\n", encoding="utf-8")
+def main(scenes: Sequence[str], results: Path = RESULTS, page: Path = PAGE) -> None:
+    """Measure these scenes, or all where none is named, then write file and page."""
+    record = json.loads(results.read_text(encoding="utf-8")) if results.exists() else {}
+    for scene in scenes or SCENES:
+        record[scene] = {"machine": machine(), "rows": measure(scene)}
+        results.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
         before, start, rest = page.read_text(encoding="utf-8").partition("<!-- table -->\n")
         _, end, after = rest.partition("<!-- /table -->")
-        page.write_text(f"{before}{start}{table(kept)}\n{end}{after}", encoding="utf-8")
-        print(scene, [f"{row['seconds']:.2f}" for row in kept[scene]["rows"].values()])
+        page.write_text(f"{before}{start}{table(record)}\n{end}{after}", encoding="utf-8")
+        print(scene, [f"{row['seconds']:.2f}" for row in record[scene]["rows"].values()])
 
 
 if __name__ == "__main__":

@@ -1,9 +1,9 @@
-"""Time and memory of a closed crack in the plane, by part.
+"""Time and memory of a closed crack in 2D, by part.
 
 Scene: edge crack in [-1, 1]² under uniform compression and a K_II field, order 2. Each size runs
 in a process of its own, so that the peak memory is its own; kernels are warm. Prints a table.
 
-    python benchmarks/parts.py [unknowns ...]
+    python -m benchmarks.parts [unknowns ...]
 """
 
 import resource
@@ -12,23 +12,24 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 
 import numpy as np
 
 import xcrack as xc
-from xcrack.contact import active_set as contact
-from xcrack.contact import multipliers
-from xcrack.contact.solve import dual
+from xcrack.contact.multipliers import gap_rows, multipliers
 from xcrack.cutting.cut import cut
 from xcrack.cutting.level_set_2d import line_levels
 from xcrack.solvers import direct as linear
+from xcrack.solvers.engine import ContactRows
 from xcrack.solvers.rigid_motion import free_motion
 from xcrack.xfem.assembly import bulk, enriched_stiffness, total_stiffness
 from xcrack.xfem.function_space import function_space
-from xcrack.xfem.lips import lip_points
+from xcrack.xfem.lips import jump_matrix, lip_points
 from xcrack.xfem.loads import load_vector
 from xcrack.xfem.supports import known_unknowns
 
+ROOT = Path(__file__).resolve().parent.parent
 PARTS = ("mesh", "level sets", "cut and space", "bulk", "enriched cells", "loads", "factor",
          "solve", "contact", "K")  # fmt: skip
 
@@ -73,7 +74,7 @@ def run(n: int) -> None:
     with part("enriched cells"):
         K = total_stiffness(plain, enriched_stiffness(V, material, numerics, lips)[0])
     with part("loads"):
-        f = load_vector(V, tuple(problem.loads), lips)
+        f = load_vector(V, tuple(problem.loads), lips)[:, None]
         fixed = known_unknowns(V, ()).fixed.copy()
         fixed[free_motion(V, fixed).pins] = True
     with part("factor"):
@@ -81,13 +82,10 @@ def run(n: int) -> None:
     with part("solve"):
         u = engine.solve(f)
     with part("contact"):
-        space_of = multipliers.multipliers(V, 0, lips[0], "reduced")
-        jump = multipliers.jump_matrix(V, 0, lips[0])
-        N = multipliers.gap_rows(space_of, lips[0], jump)
-        F = dual(engine, N)
-        closed = np.ones(len(space_of.measure), dtype=bool)
-        found = contact.active_set(F, N @ u, space_of.measure, material.E * n / 2, closed)
-        u = engine.solve(f + N.T @ found.pressure)
+        chosen = multipliers(V, 0, lips[0], "reduced")
+        N = gap_rows(chosen, lips[0], jump_matrix(V, 0, lips[0]))
+        rows = ContactRows(N, chosen.measure, material.E * n / 2, True)
+        engine.contact(rows, f, np.zeros_like(f), [None], opened=u)
     solution = xc.solve(problem)
     with part("K"):
         xc.stress_intensity(solution)
@@ -105,4 +103,5 @@ if __name__ == "__main__":
     print("|" + "---|" * (len(PARTS) + 3), flush=True)
     for size in [int(a) for a in sys.argv[1:]] or [10_000, 100_000, 500_000]:
         cells = round((size / 8.7) ** 0.5)
-        subprocess.run([sys.executable, __file__, "--one", str(cells)], check=True)
+        command = [sys.executable, "-m", "benchmarks.parts", "--one", str(cells)]
+        subprocess.run(command, cwd=ROOT, check=True)

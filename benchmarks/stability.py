@@ -1,13 +1,13 @@
 """Where crack methods fail, run on xcrack: tables, pictures and a campaign of random cracks.
 
-    python benchmarks/stability.py                          # everything
-    python benchmarks/stability.py --only infsup kinks      # some parts
-    python benchmarks/stability.py --only drawn --seeds 510000:510250
-    python benchmarks/stability.py --only drawn --space-seeds 610000:610050
-    python benchmarks/stability.py --only drawn --seeds 510137:510138   # one scene again
+    python -m benchmarks.stability                          # everything
+    python -m benchmarks.stability --only infsup shapes     # some parts
+    python -m benchmarks.stability --only drawn --seeds 510000:510250
+    python -m benchmarks.stability --only drawn --seeds-3d 610000:610050
+    python -m benchmarks.stability --only drawn --seeds 510137:510138   # one scene again
 
 Each part adds its numbers to benchmarks/results/stability.json; seeds may be run in pieces and add
-up. The scenes are those of tests/, their exact solutions are in tests/exact.py.
+up. The scenes are those of tests/, their exact solutions those of xcrack.verification.
 """
 
 import argparse
@@ -27,13 +27,13 @@ for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT / "tests"))
 RESULTS = ROOT / "benchmarks" / "results" / "stability.json"
-SEEDS, SPACE_SEEDS = "510000:511000", "610000:610100"
-
-import stability_figures  # noqa: E402
-import stability_parts  # noqa: E402
+SEEDS, SEEDS_3D = "510000:511000", "610000:610100"
 
 import scenes_drawn  # noqa: E402
 import xcrack as xc  # noqa: E402
+from benchmarks import stability_cycles, stability_figures, stability_parts  # noqa: E402
+
+PARTS = {part.__name__: part for part in (*stability_parts.PARTS, stability_cycles.cycles)}
 
 
 def machine() -> dict[str, object]:
@@ -57,11 +57,11 @@ def machine() -> dict[str, object]:
     }
 
 
-def merged(part: str, found: dict[str, object], path: Path) -> dict[str, dict]:
+def merged(part: str, numbers: dict[str, object], path: Path) -> dict[str, dict]:
     """Results with one part added, written to the file."""
     results = json.loads(path.read_text()) if path.exists() else {}
     old = results.get(part, {}) if part == "drawn" else {}
-    results[part] = old | found
+    results[part] = old | numbers
     results["made with"] = machine()
     path.parent.mkdir(parents=True, exist_ok=True)
     text = json.dumps(results, indent=1)
@@ -84,10 +84,10 @@ def draw(seeds: str, where: str, n: int, path: Path) -> dict[str, object]:
     key = f"{where}, {n} cells a side"
     errors = before.get(key, {}).get("errors", {})
     for seed in range(first, last):
-        name, error, said = scenes_drawn.drawn(seed, where, n)
-        errors[str(seed)] = [name, None if error is None else float(f"{error:.3e}"), said]
+        name, error, message = scenes_drawn.drawn(seed, where, n)
+        errors[str(seed)] = [name, None if error is None else float(f"{error:.3e}"), message]
         if last - first < 20 or error is None:
-            print(f"  seed {seed}: {name}, {said or f'{error:.2e}'}", flush=True)
+            print(f"  seed {seed}: {name}, {message or f'{error:.2e}'}", flush=True)
     judged = scenes_drawn.judged({int(seed): entry for seed, entry in errors.items()})
     for name, row in judged["classes"].items():
         print(f"  {key}, {name}: {row['solved']} of {row['scenes']} solved, median "
@@ -98,34 +98,38 @@ def draw(seeds: str, where: str, n: int, path: Path) -> dict[str, object]:
 
 
 def main() -> None:
-    """Run the parts that are asked for."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
-    names = [*stability_parts.PARTS, "drawn", "figures"]
+    """Run the parts that `--only` names."""
+    parser = argparse.ArgumentParser(
+        prog="python -m benchmarks.stability", description=(__doc__ or "").split("\n")[0]
+    )
+    names = [*PARTS, "drawn", "figures"]
     parser.add_argument("--only", nargs="*", choices=names, default=names)
-    parser.add_argument("--seeds", help=f"a:b, in the plane (all: {SEEDS})")
-    parser.add_argument("--space-seeds", help=f"a:b, in space (all: {SPACE_SEEDS})")
+    parser.add_argument("--seeds", help=f"a:b, in 2D (all: {SEEDS})")
+    parser.add_argument("--seeds-3d", help=f"a:b, in 3D (all: {SEEDS_3D})")
     parser.add_argument("--cells", type=int, help="cells a side of the drawn meshes")
     parser.add_argument("--results", type=Path, default=RESULTS)
-    asked = parser.parse_args()
+    options = parser.parse_args()
     warnings.simplefilter("ignore", xc.XcrackWarning)
-    for name in asked.only:
+    for name in options.only:
         start = time.perf_counter()
         print(f"== {name}", flush=True)
         if name == "drawn":
-            given = asked.seeds or asked.space_seeds
+            some = options.seeds or options.seeds_3d
             for where, seeds, all_of_them in (
-                ("plane", asked.seeds, SEEDS), ("space", asked.space_seeds, SPACE_SEEDS)
+                ("plane", options.seeds, SEEDS), ("space", options.seeds_3d, SEEDS_3D)
             ):  # fmt: skip
-                if seeds or not given:
-                    n = asked.cells or scenes_drawn.CELLS[where]
+                if seeds or not some:
+                    n = options.cells or scenes_drawn.CELLS[where]
                     for piece in pieces(seeds or all_of_them):
-                        merged(name, draw(piece, where, n, asked.results), asked.results)
+                        merged(name, draw(piece, where, n, options.results), options.results)
         elif name == "figures":
-            stability_figures.draw_all(json.loads(asked.results.read_text()), ROOT / "docs/figures")
+            stability_figures.draw_all(
+                json.loads(options.results.read_text()), ROOT / "docs/figures"
+            )
         else:
-            found = stability_parts.PARTS[name]()
-            merged(name, found, asked.results)
-            print(json.dumps(found, indent=1))
+            numbers = PARTS[name]()
+            merged(name, numbers, options.results)
+            print(json.dumps(numbers, indent=1))
         print(f"   {time.perf_counter() - start:.0f} s", flush=True)
 
 

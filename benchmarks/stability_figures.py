@@ -1,15 +1,21 @@
 """Pictures of benchmarks/results/stability.json for docs/stability.md."""
 
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+
+from xcrack.arrays import Floats, Ints
+
+Part = dict[str, Any]
 
 OURS, FAILS, GREY = "#1f5fa8", "#c8442c", "#8a8a8a"
 COLOURS = {"none": FAILS, "node": "#e0a030", "star": OURS, "star and patch": "#2b8f5a"}
 HIGHEST = 1e18  # where a singular matrix is drawn
 
 
-def _cut_axis(axis, eps):
+def _cut_axis(axis: Any, eps: Sequence[float]) -> Ints:
     """Places of cut positions on an axis: above the nodes by their size, on them, below."""
     axis.set_xticks(range(len(eps)))
     axis.set_xticklabels([f"{e:g}".replace("e-0", "e-") for e in eps], rotation=60, fontsize=7)
@@ -17,11 +23,11 @@ def _cut_axis(axis, eps):
     return np.arange(len(eps))
 
 
-def _drawn(values, instead):
+def _drawn(values: Sequence[float | None], instead: float) -> list[float]:
     return [instead if v is None else v for v in values]
 
 
-def infsup(part, plt):
+def infsup(part: Part, plt: Any) -> Any:
     """Inf-sup constants over mesh size and cut position, reduced beside naive."""
     figure, axes = plt.subplots(1, 2, figsize=(10, 4.2), sharey=True)
     kinds = (
@@ -46,8 +52,8 @@ def infsup(part, plt):
     return figure
 
 
-def pressure(part, plt):
-    """Error of the pressure along the lips, and the largest of it over mesh size."""
+def pressure(part: Part, plt: Any) -> Any:
+    """Error of the pressure along the crack faces, and the largest of it over mesh size."""
     figure, axes = plt.subplots(1, 2, figsize=(10, 4), width_ratios=(2, 1))
     axis = axes[0]
     for kind, colour, name in (("naive", FAILS, "one multiplier a node"),
@@ -62,7 +68,7 @@ def pressure(part, plt):
     axis.axhline(0, color="k", ls="--", lw=0.8)
     worst = np.array(part["p naive"]).max() - 2.2
     axis.set(
-        xlabel="x / a along the lips",
+        xlabel="x / a along the crack",
         ylabel="(pressure - exact pressure) / s_b",
         ylim=(-0.25, 0.25),
         title=f"bending on compression, a/h = 10; at x = -a naive is off by {worst:.1f}",
@@ -76,7 +82,7 @@ def pressure(part, plt):
     return figure
 
 
-def condition(part, plt):
+def condition(part: Part, plt: Any) -> Any:
     """Condition numbers over mesh size and cut position."""
     names = ("geometric", "two functions", "topological")
     figure, axes = plt.subplots(2, 3, figsize=(11, 7), sharey=True)
@@ -102,7 +108,7 @@ def condition(part, plt):
     return figure
 
 
-def cuts(part, plt):
+def cuts(part: Part, plt: Any) -> Any:
     """Pressure of a patch and K over cut positions."""
     figure, axes = plt.subplots(1, 2, figsize=(10, 4.4))
     least = 1e-16
@@ -127,14 +133,14 @@ def cuts(part, plt):
     return figure
 
 
-def drawn(part, plt):
+def drawn(part: Part, plt: Any) -> Any:
     """Errors of the drawn cracks over the median of their class."""
     rows = [(where, name) for where, entry in part.items() for name in entry["classes"]]
     figure, axis = plt.subplots(figsize=(9, 0.42 * len(rows) + 1.2))
     for y, (where, name) in enumerate(rows):
         median = part[where]["classes"][name]["median"]
-        found = [e for n, e, _ in part[where]["errors"].values() if n == name and e is not None]
-        ratio = np.array(found) / median
+        errors = [e for n, e, _ in part[where]["errors"].values() if n == name and e is not None]
+        ratio: Floats = np.array(errors) / median
         shift = np.random.default_rng(8861).uniform(-0.3, 0.3, len(ratio))
         axis.semilogx(ratio, y + shift, ".", ms=2.5, color=OURS)
         far = ratio > 3
@@ -149,7 +155,7 @@ def drawn(part, plt):
     return figure
 
 
-def locking(part, plt):
+def locking(part: Part, plt: Any) -> Any:
     """Error of K as Poisson's ratio tends to a half."""
     figure, axis = plt.subplots(figsize=(5.5, 3.8))
     distance = 0.5 - np.array(part["nu"])
@@ -161,7 +167,7 @@ def locking(part, plt):
     return figure
 
 
-def turned(part, plt):
+def turned(part: Part, plt: Any) -> Any:
     """Length and K of a crack that turns, by the update of its level sets."""
     figure, axes = plt.subplots(1, 2, figsize=(9, 3.8))
     for update, colour in (("nodal", FAILS), ("explicit", OURS)):
@@ -169,7 +175,7 @@ def turned(part, plt):
             axes[0].plot(part["degrees"], part[f"length, {update}"], "o-", color=colour)
             axes[1].semilogy(part["degrees"], part[f"error of K, {update}"], "o-", color=colour,
                              label=update)  # fmt: skip
-    axes[0].set(ylabel="length of the lips in the mesh, over the crack's", ylim=(0, 1.15))
+    axes[0].set(ylabel="length of the crack in the mesh, over its own", ylim=(0, 1.15))
     axes[1].set(ylabel="error of K over the largest")
     for axis in axes:
         axis.set_xlabel("degrees that the crack has turned")
@@ -185,7 +191,7 @@ PICTURES = {
 }  # fmt: skip
 
 
-def draw_all(results: dict, folder: Path) -> None:
+def draw_all(results: dict[str, Part], folder: Path) -> None:
     """Draw every picture whose part has been run."""
     import matplotlib
 

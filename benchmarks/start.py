@@ -1,6 +1,6 @@
 """What is paid before the first number: imports, compiled kernels, stiffness of the plain body.
 
-    python benchmarks/start.py
+    python -m benchmarks.start
 
 Cold start: a process of its own for each line, with an empty cache of numba and with a full one.
 Assembly: linear cells, values and pattern of the stiffness of the uncracked body, one thread.
@@ -11,6 +11,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from pathlib import Path
 from statistics import median
 
 for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
@@ -19,15 +20,16 @@ for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 START = """
 import time; begin = time.perf_counter()
 import xcrack; imported = time.perf_counter()
-from xcrack.bench import scenes
-scene = {scene}
-settings = scenes.Settings({n})
+from benchmarks.scenes import penny, plane
+from benchmarks.scenes.settings import Settings
+scene, settings = {scene}, Settings({n})
 scene(settings, 0); first = time.perf_counter()
 scene(settings, 0); second = time.perf_counter()
 print(f"import {{imported - begin:.2f}} s, first {{first - imported:.2f}} s, "
       f"later {{second - first:.2f}} s")
 """
-SCENES = {"plane": ("scenes.edge", 9), "space": ("scenes.penny_closed", 8)}
+SCENES = {"2D": ("plane.edge", 9), "3D": ("penny.penny_closed", 8)}
+ROOT = Path(__file__).resolve().parent.parent
 
 
 def cold_start() -> None:
@@ -37,7 +39,7 @@ def cold_start() -> None:
             for state in ("empty", "full"):
                 run = subprocess.run(
                     [sys.executable, "-W", "ignore", "-c", START.format(scene=scene, n=n)],
-                    env=os.environ | {"NUMBA_CACHE_DIR": cache},
+                    env=os.environ | {"NUMBA_CACHE_DIR": cache}, cwd=ROOT,
                     capture_output=True, text=True, check=True,
                 )  # fmt: skip
                 print(f"{where}, {state} cache: {run.stdout.strip()}", flush=True)

@@ -1,4 +1,4 @@
-"""GetFEM's XFEM in the charts: what it gives where it is, what is said where it is not."""
+"""GetFEM's XFEM in the charts: what it gives where it is, what is printed where it is not."""
 
 from __future__ import annotations
 
@@ -12,9 +12,12 @@ from time import perf_counter
 import numpy as np
 import pytest
 
-from xcrack.bench import __main__, charts, fields, getfem_runs, getfem_script, quoted, runs, suites
-from xcrack.bench.getfem_runs import GetfemError, Worker
-from xcrack.bench.scenes import Outcome
+from benchmarks import __main__, charts, quoted, runs
+from benchmarks.baselines import getfem_runs, getfem_script
+from benchmarks.baselines.getfem_runs import GetfemError, Worker
+from benchmarks.runs import Outcome
+from benchmarks.scenes import exact_fields
+from benchmarks.suites import cases as suites
 
 LINUX = sys.platform.startswith("linux")
 
@@ -26,12 +29,12 @@ def absent(monkeypatch):
 
 @pytest.fixture(scope="module")
 def worker():
-    getfem = getfem_runs.found()
+    getfem = getfem_runs.installed()
     if getfem is None:
         pytest.skip(getfem_runs.missing())
-    found = Worker((getfem.python, str(getfem_runs.SCRIPT)))
-    yield found
-    found.stop()
+    process = Worker((getfem.python, str(getfem_runs.SCRIPT)))
+    yield process
+    process.stop()
 
 
 def program(*lines):
@@ -89,7 +92,7 @@ def test_getfem_is_a_series_like_others(worker):
     assert not LINUX or runs.memory(cases[-1]) > 1.0  # 16 MB were measured
 
 
-def test_scene_that_getfem_cannot_solve_is_told(worker):
+def test_scene_that_getfem_cannot_solve_is_reported(worker):
     """No node lies within the radius of a tip: there is nothing to enrich, and no factor."""
     with pytest.raises(GetfemError, match="could not solve this scene: RuntimeError"):
         ask(worker, "half_closed", 5, 2)
@@ -97,19 +100,19 @@ def test_scene_that_getfem_cannot_solve_is_told(worker):
 
 
 def test_without_getfem_one_line_says_how_to_install_it(absent, tmp_path, capsys):
-    assert getfem_runs.found() is None
+    assert getfem_runs.installed() is None
     cases = suites.cases("edge", quick=True)
     assert cases
     assert not [c for c in cases if c.series.startswith("GetFEM")]
     rows = [row("default", "default", k) for k in (1, 2)]
     record = {"scene": "edge", "clock": "wall", "rows": rows}
     (tmp_path / "edge.json").write_text(json.dumps(record))
-    asked = ["--draw", "edge", "--out", str(tmp_path), "--figures", str(tmp_path)]
-    assert __main__.main(asked) == 0
-    told = [line for line in capsys.readouterr().err.splitlines() if "GetFEM" in line]
-    assert len(told) == 1
-    assert "skipped" in told[0]
-    assert "apt-get install python3-getfem" in told[0]
+    words = ["--draw", "edge", "--out", str(tmp_path), "--figures", str(tmp_path)]
+    assert __main__.main(words) == 0
+    lines = [line for line in capsys.readouterr().err.splitlines() if "GetFEM" in line]
+    assert len(lines) == 1
+    assert "skipped" in lines[0]
+    assert "apt-get install python3-getfem" in lines[0]
     assert (tmp_path / "edge.png").stat().st_size > 10_000
 
 
@@ -126,7 +129,7 @@ def test_what_ran_is_not_quoted(monkeypatch, tmp_path):
         charts, "to_draw", lambda *a: drawn.append(quoted.to_draw(*a)) or drawn[-1]
     )  # fmt: skip
     rows = [row("default", "default", k) for k in (1, 2)]
-    live = [row("GetFEM XFEM, Q2", "opponent", k) for k in (1, 2)]
+    live = [row("GetFEM XFEM, Q2", "baseline", k) for k in (1, 2)]
     for some in (rows, rows + live):
         charts.draw({"scene": "edge", "clock": "wall", "rows": some}, tmp_path)
     before, now = drawn
@@ -136,10 +139,10 @@ def test_what_ran_is_not_quoted(monkeypatch, tmp_path):
     ]  # fmt: skip
 
 
-def test_every_opponent_is_compared_with():
+def test_every_baseline_is_compared_with():
     rows = [
-        row("default", "default", 2), row("conforming, remeshed", "opponent", 1),
-        row("GetFEM XFEM, Q1", "opponent", 3), row("GetFEM XFEM, Q2", "opponent", 4),
+        row("default", "default", 2), row("conforming, remeshed", "baseline", 1),
+        row("GetFEM XFEM, Q1", "baseline", 3), row("GetFEM XFEM, Q2", "baseline", 4),
     ]  # fmt: skip
     groups = [{r["series"] for r in some} for some, kind in __main__._groups(rows)]
     assert groups[-2:] == [
@@ -157,7 +160,7 @@ def test_process_keeps_to_one_thread(monkeypatch):
     assert set(worker.ask({}).values()) == {"1"}
 
 
-def test_process_that_ends_is_told_and_started_anew():
+def test_process_that_ends_is_reported_and_started_anew():
     worker = program("sys.stdin.readline()", "sys.exit('out of memory')")
     numbers = []
     for _ in range(2):
@@ -179,7 +182,7 @@ def test_python_that_is_not_there():
 
 
 @pytest.mark.parametrize("answer", ["print('Trace 2 in model')", "print('[1, 2]')"])
-def test_rubbish_is_told(answer):
+def test_rubbish_is_reported(answer):
     worker = program("sys.stdin.readline()", answer, "sys.stdout.flush()", "sys.stdin.readline()")
     with pytest.raises(GetfemError, match=r"answered .*GETFEM_PYTHON"):
         worker.ask({"scene": "edge"})
@@ -203,13 +206,15 @@ def test_process_ends_with_its_owner():
 def test_chart_goes_on_without_a_process_that_dies():
     worker = program("sys.exit('broken')")
     cases = [
-        runs.Case("GetFEM XFEM, Q1", "opponent", "n = 1", lambda seed: worker.ask({})),
+        runs.Case("GetFEM XFEM, Q1", "baseline", "n = 1", lambda seed: worker.ask({})),
         runs.Case("default", "default", "n = 1", lambda seed: Outcome({"K": 0.1}, 7)),
     ]
-    told = []
-    assert [r["series"] for r in runs.measure(cases, 1, told.append)] == ["default"]
-    assert len(told) == 1
-    assert told[0].startswith("GetFEM XFEM, Q1, n = 1: GetfemError: the process of GetFEM ended")
+    messages = []
+    assert [r["series"] for r in runs.measure(cases, 1, messages.append)] == ["default"]
+    assert len(messages) == 1
+    assert messages[0].startswith(
+        "GetFEM XFEM, Q1, n = 1: GetfemError: the process of GetFEM ended"
+    )
 
 
 def test_what_getfem_prints_is_no_answer(tmp_path, monkeypatch):
@@ -242,14 +247,14 @@ def test_fields_of_the_script_are_those_of_the_charts():
     """Round-off: two ways to write the same closed form."""
     x = np.random.default_rng(50321).uniform(-1.5, 1.5, (60, 2))
     for K, pressure in (((1.0, 0.5), 0.0), ((0.0, 0.5), 1.0)):
-        u, sigma = fields.edge_fields(K, pressure)
+        u, sigma = exact_fields.edge_fields(K, pressure)
         assert getfem_script.williams(K, pressure, x.T).T == pytest.approx(u(x), abs=1e-13)
-        found = getfem_script.stress_of(getfem_script.williams_gradient(K, x))
-        assert found - pressure * np.eye(2) == pytest.approx(sigma(x), abs=1e-11)
-    u, K_I, end = fields.partial_closure(0.0)
+        computed = getfem_script.stress_of(getfem_script.williams_gradient(K, x))
+        assert computed - pressure * np.eye(2) == pytest.approx(sigma(x), abs=1e-11)
+    u, K_I, end = exact_fields.partial_closure(0.0)
     assert getfem_script.bent(x.T).T == pytest.approx(u(x), abs=1e-12)
     assert getfem_script.OPENING * np.sqrt(np.pi * getfem_script.OPENING) == pytest.approx(K_I)
     along = np.linspace(-1, 1, 41)
-    wanted = fields.closure_pressure(along, 0.0)
+    wanted = exact_fields.closure_pressure(along, 0.0)
     assert getfem_script.bent_pressure(along) == pytest.approx(wanted, abs=1e-14)
     assert end == pytest.approx(1 - 2 * getfem_script.OPENING)

@@ -1,14 +1,14 @@
-"""The opponent that grows a crack: mesh, solve and read K anew in every step."""
+"""The conforming baseline that grows a crack: mesh, solve and read K anew in every step."""
 
 from time import process_time
 
 import numpy as np
 
 import xcrack as xc
-from xcrack.bench.conforming import Grading, pulled
-from xcrack.bench.fields import NU
-from xcrack.bench.scenes import Outcome
-from xcrack.bench.scenes_growth import A0, A1, GROWN, LAW, N_STEPS, TURNING, exact_life, tip_errors
+from benchmarks.baselines.conforming_2d import Grading, pulled
+from benchmarks.runs import Outcome
+from benchmarks.scenes.growth import A0, A1, GROWN, LAW, N_STEPS, TURNING, exact_life, tip_errors
+from benchmarks.scenes.material import NU
 from xcrack.growth.criteria import kink_angle
 from xcrack.growth.cycles import cycles_between
 

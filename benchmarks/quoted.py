@@ -53,5 +53,5 @@ def to_draw(scene: str, ran: Iterable[str]) -> dict[str, tuple[Point, ...]]:
     dict
     """
     codes = {name.split()[0] for name in ran}
-    found = QUOTED.get(scene, {})
-    return {name: points for name, points in found.items() if name.split()[0] not in codes}
+    quoted = QUOTED.get(scene, {})
+    return {name: points for name, points in quoted.items() if name.split()[0] not in codes}

@@ -1,6 +1,7 @@
-"""`python -m xcrack.bench [--quick] [scene ...]`: measure, keep, draw and say who is ahead."""
+"""`python -m benchmarks [--quick] [scene ...]`: measure, save, draw and print who is ahead."""
 
 import argparse
+import json
 import os
 import sys
 from pathlib import Path
@@ -18,10 +19,11 @@ _WANTED: dict[str, dict[str, tuple[float, ...]]] = {
     "penny_closed": {"K_II, K_III": (3e-2,)},
     "cylinder": {"K_I": (1e-2, 6e-3)},
 }
+_OLD_KINDS = {"opponent": "baseline"}  # words of records that were measured before
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run scenes of the chart.
+    """Run scenes of the charts.
 
     Parameters
     ----------
@@ -36,67 +38,69 @@ def main(arguments: list[str] | None = None) -> int:
     # One thread a solve, as in a growth run beside others; set before numpy is loaded.
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(name, "1")
-    from xcrack.bench import charts, conforming, getfem_runs, runs, suites
+    from benchmarks import charts, runs
+    from benchmarks.baselines import conforming_2d, getfem_runs
+    from benchmarks.suites import cases
 
-    parser = argparse.ArgumentParser(prog="python -m xcrack.bench", description=__doc__)
-    parser.add_argument("scenes", nargs="*", help=f"of {', '.join(suites.names(False))}")
+    parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
+    parser.add_argument("scenes", nargs="*", help=f"of {', '.join(cases.ALL)}")
     parser.add_argument("--quick", action="store_true", help="few points, under a minute")
-    parser.add_argument("--repeats", type=int, default=None, help="rounds that count (3)")
+    parser.add_argument("--repeats", type=int, default=3, help="rounds that count (3)")
     parser.add_argument("--draw", action="store_true", help="only draw what --out holds")
     parser.add_argument("--out", type=Path, default=Path("out/bench/results"))
     parser.add_argument("--figures", type=Path, default=Path("out/bench/figures"))
-    asked = parser.parse_args(arguments)
-    unknown = set(asked.scenes) - set(suites.names(False))
+    options = parser.parse_args(arguments)
+    unknown = set(options.scenes) - set(cases.ALL)
     if unknown:
-        parser.error(f"no scene {', '.join(sorted(unknown))}: of {', '.join(suites.names(False))}")
-    for why in (conforming.missing(), getfem_runs.missing()):
-        if why:
-            print(why, file=sys.stderr)
-    for scene in asked.scenes or suites.names(asked.quick):
-        if asked.draw:
-            record = _read(asked.out / f"{scene}.json")
+        parser.error(f"no scene {', '.join(sorted(unknown))}: of {', '.join(cases.ALL)}")
+    for reason in (conforming_2d.missing(), getfem_runs.missing()):
+        if reason:
+            print(reason, file=sys.stderr)
+    for scene in options.scenes or cases.names(options.quick):
+        if options.draw:
+            record = _read(options.out / f"{scene}.json")
         else:
             before = runs.machine()
-            repeats = asked.repeats or 3
             rows = runs.measure(
-                suites.cases(scene, asked.quick), repeats, lambda text: print(text, file=sys.stderr)
-            )
+                cases.cases(scene, options.quick), options.repeats,
+                lambda message: print(message, file=sys.stderr),
+            )  # fmt: skip
             after = runs.machine()
             busiest = max(before, after, key=lambda m: m["load"][:1])
-            getfem = getfem_runs.found()
+            getfem = getfem_runs.installed()
             busiest["versions"]["GetFEM"] = getfem and getfem.version
             record = {
-                "scene": scene, "quick": asked.quick, "clock": runs.clock(busiest),
-                "repeats": repeats, "machine": busiest, "rows": rows,
+                "scene": scene, "quick": options.quick, "clock": runs.clock(busiest),
+                "repeats": options.repeats, "machine": busiest, "rows": rows,
             }  # fmt: skip
-            runs.keep(asked.out, scene, record)
-        _tell(record)
-        for path in charts.draw(record, asked.figures):
+            runs.save(options.out, scene, record)
+        _print_ratios(record)
+        for path in charts.draw(record, options.figures):
             print(f"  {path}")
     return 0
 
 
 def _read(path: Path) -> dict[str, Any]:
-    import json
+    record: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+    for row in record["rows"]:
+        row["kind"] = _OLD_KINDS.get(row["kind"], row["kind"])
+    return record
 
-    found: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-    return found
 
-
-def _tell(record: dict[str, Any]) -> None:
+def _print_ratios(record: dict[str, Any]) -> None:
     """A table of ratios: the default settings against the rest."""
-    from xcrack.bench.pareto import behind
+    from benchmarks.pareto import behind
 
     rows, clock = record["rows"], record["clock"]
     print(f"{record['scene']}: time of the default settings ({clock}) over that of others")
     pairs = [(name, e) for name, some in _WANTED[record["scene"]].items() for e in some]
     for name, error in pairs:
-        words = []
+        ratios = []
         for some, kind in _groups(rows):
             ratio, ahead = behind(some, name, clock, (kind,), error)
             if ahead:
-                words.append(f"{ratio:.2f} of {ahead}")
-        print(f"  {name} to {error:g}: {'; '.join(words) or 'no other reaches it'}")
+                ratios.append(f"{ratio:.2f} of {ahead}")
+        print(f"  {name} to {error:g}: {'; '.join(ratios) or 'no other reaches it'}")
     off = {r["size"]: r for r in rows if r["kind"] == "off"}
     both = [(r, off[r["size"]]) for r in rows if r["kind"] == "default" and r["size"] in off]
     if both:
@@ -105,12 +109,12 @@ def _tell(record: dict[str, Any]) -> None:
 
 
 def _groups(rows: list[dict[str, Any]]) -> list[tuple[list[dict[str, Any]], str]]:
-    """Rows to compare the default settings with, by their kind; each opponent for itself."""
+    """Rows to compare the default settings with, by their kind; each baseline by itself."""
     groups = [(rows, kind) for kind in ("setting", "mesh", "steps")]
-    codes = dict.fromkeys(r["series"].split()[0] for r in rows if r["kind"] == "opponent")
+    codes = dict.fromkeys(r["series"].split()[0] for r in rows if r["kind"] == "baseline")
     for code in codes:
         some = [r for r in rows if r["kind"] == "default" or r["series"].split()[0] == code]
-        groups.append((some, "opponent"))
+        groups.append((some, "baseline"))
     return groups
 
 

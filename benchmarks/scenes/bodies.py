@@ -10,9 +10,11 @@ from math import pi, sin
 import numpy as np
 
 import xcrack as xc
+from benchmarks.runs import Outcome
+from benchmarks.scenes.exact_fields import kirsch, kirsch_pressure
+from benchmarks.scenes.material import STEEL
+from benchmarks.scenes.settings import Settings, quiet
 from xcrack.arrays import Floats
-from xcrack.bench.fields import kirsch, kirsch_pressure
-from xcrack.bench.scenes import STEEL, Outcome, Settings, quiet
 
 _D, _NOTCH, _OUTER, _INNER = 20.0, 2.0, 120.0, 40.0  # of the bar
 _TURN = 6  # faces of 15° by which the bar is turned under its loads
@@ -20,7 +22,7 @@ FINEST = 0.3  # cell size that the others are compared with
 
 
 def fresh(mesh: xc.Mesh) -> xc.Mesh:
-    """The same mesh without what it keeps of earlier runs."""
+    """The same mesh without what earlier runs derived from it."""
     return xc.Mesh(mesh.points, mesh.cells, mesh.facet_sets)
 
 
@@ -102,7 +104,7 @@ def cylinder(size: float, s: Settings) -> Outcome:
 
 @cache
 def finest() -> tuple[Floats, Floats, float]:
-    """Places along the front, K_I there and the closed share of the lips, on the finest mesh."""
+    """Places along the front, K_I there and the closed share of the crack, on the finest mesh."""
     solution, sif = _bent(FINEST, Settings(0))
     order = np.argsort(sif.x[:, 1])
     return sif.x[order, 1], sif.K_I[order], _closed_share(solution)

@@ -1,6 +1,6 @@
-"""The opponent in space: a penny in a mesh of quadratic tetrahedra that follows its front.
+"""The conforming baseline in 3D: a penny in a mesh of quadratic tetrahedra that follows its front.
 
-As in the plane: gmsh grades towards the front, middle nodes next to it lie at the quarter points
+As in 2D: gmsh grades towards the front, middle nodes next to it lie at the quarter points
 and those on it on the circle. K_I is the mean over the front, from the energy that a radial
 extension of the penny releases (a domain integral).
 """
@@ -9,11 +9,13 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.baselines.conforming_2d import Grading
+from benchmarks.runs import Outcome
+from benchmarks.scenes.exact_fields import penny as exact
+from benchmarks.scenes.exact_fields import penny_K_I
+from benchmarks.scenes.material import E_PRIME, LAMBDA, MU, stress_of
+from benchmarks.scenes.penny import RADIUS
 from xcrack.arrays import Bools, Floats, Ints
-from xcrack.bench.conforming import Grading
-from xcrack.bench.fields import E_PRIME, LAMBDA, MU, penny_K_I
-from xcrack.bench.fields import penny as exact
-from xcrack.bench.scenes import PENNY, Outcome
 from xcrack.mesh.gmsh_session import session
 
 _REACH = 0.35  # of the weight, from the front
@@ -38,40 +40,40 @@ def penny(grading: Grading, seed: int) -> Outcome:
     basis = skfem.Basis(mesh, skfem.ElementVector(skfem.ElementTetP2()), intorder=4)
     K = linear_elasticity(LAMBDA, MU).assemble(basis)
     x = basis.doflocs
-    held = np.nonzero((np.abs(x) > 1 - 1e-9).any(axis=0))[0]
+    known = np.nonzero((np.abs(x) > 1 - 1e-9).any(axis=0))[0]
     u = basis.zeros()
-    u[held] = exact(PENNY, 1.0)(x[:, held].T)[np.arange(len(held)), held % 3]
-    u = solved(K, u, held, x[:, ::3].T)
-    error = abs(_mean_K(basis, u) / penny_K_I(PENNY, 1.0) - 1)
+    u[known] = exact(RADIUS, 1.0)(x[:, known].T)[np.arange(len(known)), known % 3]
+    u = solved(K, u, known, x[:, ::3].T)
+    error = abs(_mean_K(basis, u) / penny_K_I(RADIUS, 1.0) - 1)
     return Outcome({"K_I": error}, int(basis.N))
 
 
 def cracked_cube(grading: Grading) -> tuple[Floats, Ints, Bools]:
-    """Points, tetrahedra and which points lie on the front; the lips of the penny are apart."""
+    """Points, tetrahedra and which points lie on the front; the faces of the penny are apart."""
     with session() as gmsh:
         box = gmsh.model.occ.addBox(-1, -1, -1, 2, 2, 2)
-        disk = gmsh.model.occ.addDisk(0, 0, 0, PENNY, PENNY)
+        disk = gmsh.model.occ.addDisk(0, 0, 0, RADIUS, RADIUS)
         _, pieces = gmsh.model.occ.fragment([(3, box)], [(2, disk)])
         gmsh.model.occ.synchronize()
         field = gmsh.model.mesh.field
         number = field.add("MathEval")
-        distance = f"Sqrt((Sqrt(x^2+y^2)-{PENNY!r})^2+z^2)"
+        distance = f"Sqrt((Sqrt(x^2+y^2)-{RADIUS!r})^2+z^2)"
         text = f"Min({grading.far!r}, Max({grading.near!r}, {grading.growth!r}*{distance}))"
         field.setString(number, "F", text)
         field.setAsBackgroundMesh(number)
         gmsh.model.mesh.generate(3)
         tags, flat, _ = gmsh.model.mesh.getNodes()
         _, _, nodes = gmsh.model.mesh.getElements(3)
-        lips = [gmsh.model.mesh.getNodes(2, tag, True, False)[0] for _, tag in pieces[1]]
+        faces = [gmsh.model.mesh.getNodes(2, tag, True, False)[0] for _, tag in pieces[1]]
     index = np.full(int(tags.max()) + 1, -1)
     index[tags] = np.arange(len(tags))
     points = flat.reshape(-1, 3)
     cells = index[nodes[0].astype(np.int64)].reshape(-1, 4)
-    on_lips = index[np.unique(np.concatenate(lips)).astype(np.int64)]
-    r = np.hypot(points[on_lips, 0], points[on_lips, 1])
+    on_crack = index[np.unique(np.concatenate(faces)).astype(np.int64)]
+    r = np.hypot(points[on_crack, 0], points[on_crack, 1])
     front = np.zeros(len(points), dtype=bool)
-    front[on_lips[r > PENNY * (1 - 1e-6)]] = True
-    twice = on_lips[r <= PENNY * (1 - 1e-6)]
+    front[on_crack[r > RADIUS * (1 - 1e-6)]] = True
+    twice = on_crack[r <= RADIUS * (1 - 1e-6)]
     copy = np.full(len(points), -1)
     copy[twice] = len(points) + np.arange(len(twice))
     below = np.nonzero(points[cells].mean(axis=1)[:, 2] < 0)[0]
@@ -100,15 +102,15 @@ def curved(points: Floats, cells: Ints, front: Bools) -> Any:
     two = count == 2
     chord = mesh.p[:, edge[:, two]].mean(axis=1)
     # Only edges between neighbours on the front; a longer chord would be bent through cells.
-    x[:2, middle[two]] = chord[:2] * PENNY / np.hypot(chord[0], chord[1])
+    x[:2, middle[two]] = chord[:2] * RADIUS / np.hypot(chord[0], chord[1])
     return skfem.MeshTet2(x, straight.t, sort_t=False)
 
 
-def solved(K: Any, u: Floats, held: Ints, points: Floats) -> Floats:
+def solved(K: Any, u: Floats, known: Ints, points: Floats) -> Floats:
     """Displacements by conjugate gradients with smoothed aggregation that knows rigid motion."""
     from pyamg import smoothed_aggregation_solver
 
-    free = np.setdiff1d(np.arange(len(u)), held)
+    free = np.setdiff1d(np.arange(len(u)), known)
     rows = K[free]
     A = rows[:, free].tobsr(blocksize=(3, 3))
     rigid = np.zeros((len(u), 6))
@@ -117,8 +119,7 @@ def solved(K: Any, u: Floats, held: Ints, points: Floats) -> Floats:
         j, k = (i + 1) % 3, (i + 2) % 3
         rigid[j::3, 3 + i], rigid[k::3, 3 + i] = -points[:, k], points[:, j]
     hierarchy = smoothed_aggregation_solver(A, B=rigid[free], strength=("symmetric", {"theta": 0}))
-    found = hierarchy.solve(-(rows @ u), tol=1e-8, accel="cg", maxiter=300)
-    u[free] = found
+    u[free] = hierarchy.solve(-(rows @ u), tol=1e-8, accel="cg", maxiter=300)
     return u
 
 
@@ -128,21 +129,20 @@ def _mean_K(basis: Any, u: Floats) -> float:
     gradient = np.moveaxis(np.asarray(basis.interpolate(u).grad).reshape(3, 3, -1), -1, 0)
     weight = np.asarray(basis.dx).ravel()
     r = np.hypot(x[0], x[1])
-    s = np.hypot(r - PENNY, x[2])
+    s = np.hypot(r - RADIUS, x[2])
     near = np.nonzero(s < _REACH)[0]
     x, gradient, weight, r, s = x[:, near], gradient[near], weight[near], r[near], s[near]
     strain = (gradient + np.swapaxes(gradient, 1, 2)) / 2
-    trace = np.trace(strain, axis1=1, axis2=2)[:, None, None]
-    sigma = 2 * MU * strain + LAMBDA * trace * np.eye(3)
+    sigma = stress_of(gradient)
     energy = np.einsum("qij,qij->q", sigma, strain) / 2
     t = s / _REACH
     q = 1 - t**3 * (10 - 15 * t + 6 * t**2)
     slope = -30 * t**2 * (1 - t) ** 2 / _REACH / np.maximum(s, 1e-300)
     outward = np.stack([x[0] / r, x[1] / r, 0 * r], axis=1)
     around = np.stack([-outward[:, 1], outward[:, 0], 0 * r], axis=1)
-    steps = np.stack([(r - PENNY) * outward[:, 0], (r - PENNY) * outward[:, 1], x[2]], axis=1)
+    steps = np.stack([(r - RADIUS) * outward[:, 0], (r - RADIUS) * outward[:, 1], x[2]], axis=1)
     V = np.einsum("qk,qj->qkj", outward, slope[:, None] * steps)
     V += (q / r)[:, None, None] * around[:, :, None] * around[:, None, :]
     flux = np.einsum("qij,qik->qjk", sigma, gradient) - energy[:, None, None] * np.eye(3)
     released = float(np.einsum("qjk,qkj,q->", flux, V, weight))
-    return float(np.sqrt(max(released, 0.0) / (2 * np.pi * PENNY) * E_PRIME))
+    return float(np.sqrt(max(released, 0.0) / (2 * np.pi * RADIUS) * E_PRIME))

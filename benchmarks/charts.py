@@ -6,8 +6,8 @@ from itertools import cycle
 from pathlib import Path
 from typing import Any
 
-from xcrack.bench.pareto import front, points_of
-from xcrack.bench.quoted import to_draw
+from benchmarks.pareto import front, points_of
+from benchmarks.quoted import to_draw
 
 _TITLES = {
     "edge": "Edge crack, K_I = 1 and K_II = 0.5",
@@ -29,9 +29,9 @@ _ERRORS = {
     "energy": "energy norm",
     "path": "end of the tip, against steps of no length",
     "life": "cycles",
-    "closed share": "closed share of the lips",
+    "closed share": "closed share of the crack faces",
 }
-_DEFAULT, _OPPONENT, _QUOTED = "#c0392b", "#1f4e79", "#7f7f7f"
+_DEFAULT, _BASELINE, _QUOTED = "#c0392b", "#1f4e79", "#7f7f7f"
 _OTHERS = ("#2e8b57", "#d68910", "#7d3c98", "#138d90", "#6e5a3b", "#b03a75", "#5d8a1f", "#3f6fd1")
 _MOST = 6  # series of settings that a first figure bears
 # Those that it shows where there are more.
@@ -62,18 +62,18 @@ def draw(record: dict[str, Any], folder: Path) -> list[Path]:
     settings = [r for r in rows if r["kind"] in ("default", "setting")]
     crowded = len({r["series"] for r in settings}) > _MOST
     error = next(iter(rows[0]["errors"]))
-    found = [_chart(record, error, folder / f"{scene}.png", partial(_shown, error, crowded))]
+    paths = [_chart(record, error, folder / f"{scene}.png", partial(_shown, error, crowded))]
     if crowded:
         path = folder / f"{scene}_settings.png"
-        found.append(_chart(record, error, path, lambda r: r in settings, quoted=False))
+        paths.append(_chart(record, error, path, lambda r: r in settings, quoted=False))
     for name in ("pressure", "rms", "energy", "path", "closed share"):
         if name != error and len({r["series"] for r in rows if name in r["errors"]}) > 1:
             path = folder / f"{scene}_{name.replace(' ', '_')}.png"
             few = crowded and name == "energy"
-            found.append(_chart(record, name, path, partial(_shown, name, few), quoted=False))
+            paths.append(_chart(record, name, path, partial(_shown, name, few), quoted=False))
     if any(r["kind"] == "off" for r in record["rows"]):
-        found.append(_ratios(record, folder / f"{scene}_cost.png"))
-    return found
+        paths.append(_ratios(record, folder / f"{scene}_cost.png"))
+    return paths
 
 
 def _shown(name: str, few: bool, row: dict[str, Any]) -> bool:
@@ -135,22 +135,22 @@ def _chart(
 
 
 def _styles(rows: Sequence[dict[str, Any]]) -> dict[str, dict[str, Any]]:
-    """Line and mark of each series: defaults and opponents stand out."""
-    found: dict[str, dict[str, Any]] = {}
-    others = opponents = 0
+    """Line and mark of each series: defaults and baselines stand out."""
+    styles: dict[str, dict[str, Any]] = {}
+    others = baselines = 0
     for row in rows:
         series, kind = row["series"], row["kind"]
-        if series in found:
+        if series in styles:
             continue
         if kind == "default":
             style = {"color": _DEFAULT, "marker": "o", "lw": 2.4, "ms": 7, "zorder": 5}
             label = "xcrack, default settings"
-        elif kind == "opponent":
+        elif kind == "baseline":
             style = {
-                "color": _OPPONENT, "marker": "sD^v"[opponents % 4], "lw": 2.0, "ms": 6,
-                "zorder": 4, "ls": "--" if opponents else "-",
+                "color": _BASELINE, "marker": "sD^v"[baselines % 4], "lw": 2.0, "ms": 6,
+                "zorder": 4, "ls": "--" if baselines else "-",
             }  # fmt: skip
-            label, opponents = series, opponents + 1
+            label, baselines = series, baselines + 1
         else:
             style = {
                 "color": _OTHERS[others % len(_OTHERS)], "marker": _MARKS[others % len(_MARKS)],
@@ -158,8 +158,8 @@ def _styles(rows: Sequence[dict[str, Any]]) -> dict[str, dict[str, Any]]:
                 "ls": "-" if others < len(_OTHERS) else "--",
             }  # fmt: skip
             label, others = series, others + 1
-        found[series] = {**style, "label": label}
-    return found
+        styles[series] = {**style, "label": label}
+    return styles
 
 
 def _ratios(record: dict[str, Any], path: Path) -> Path:
@@ -173,7 +173,7 @@ def _ratios(record: dict[str, Any], path: Path) -> Path:
     ratio = [r[clock] / off[r["size"]][clock] for r in on]
     unknowns = [r["unknowns"] for r in on]
     axis.plot(unknowns, ratio, color=_DEFAULT, marker="o", lw=2, label="measured")
-    aim = 2.0 if record["scene"].startswith(("penny", "cylinder")) else 1.25  # space, plane
+    aim = 2.0 if record["scene"].startswith(("penny", "cylinder")) else 1.25  # 3D, 2D
     axis.axhline(aim, color="0.4", ls="--", lw=1, label=f"aim: {aim:g}")
     axis.axhline(1.0, color="0.8", lw=1)
     axis.set(

@@ -3,8 +3,8 @@
 from collections.abc import Callable, Sequence
 from functools import partial
 
-from xcrack.bench.runs import Case
-from xcrack.bench.scenes import Outcome, Settings
+from benchmarks.runs import Case, Outcome
+from benchmarks.scenes.settings import Settings
 from xcrack.scene.numerics import Numerics, with_choices
 
 Scene = Callable[[Settings, int], Outcome]

@@ -1,6 +1,6 @@
-"""The opponent of the same kind: GetFEM's XFEM, in a process of the Python that has it.
+"""The baseline of the same kind: GetFEM's XFEM, in a process of the Python that has it.
 
-GetFEM comes with the system, for the system's Python and numpy: `getfem_script` runs there, kept
+GetFEM comes with the system, for the system's Python and numpy: `getfem_script` runs there, stays
 alive from one run to the next, and answers requests line by line. Its clock runs around the scene
 alone, so neither the start of the process nor its imports count.
 """
@@ -20,8 +20,7 @@ from threading import Timer
 from time import monotonic
 from typing import IO, Any
 
-from xcrack.bench.runs import Case, peak
-from xcrack.bench.scenes import Outcome
+from benchmarks.runs import Case, Outcome, peak
 from xcrack.errors import XcrackError
 
 VARIABLE = "XCRACK_GETFEM_PYTHON"
@@ -142,7 +141,7 @@ class Worker:
         return self._process
 
     def _ended(self, process: "subprocess.Popen[str]", late: bool) -> str:
-        """What is said of a process that has ended: how, and its last words."""
+        """The message for a process that has ended: how, and its last line."""
         code, words = process.wait(), ""
         if self._notes is not None:
             self._notes.seek(0)
@@ -170,7 +169,7 @@ def _end(process: "subprocess.Popen[str]", notes: IO[bytes]) -> None:
     notes.close()
 
 
-def found() -> Getfem | None:
+def installed() -> Getfem | None:
     """The first Python that has GetFEM: that of the environment variable, else this, else python3.
 
     Returns
@@ -201,7 +200,7 @@ def _first(candidates: tuple[str, ...]) -> Getfem | None:
 
 def missing() -> str:
     """Why GetFEM cannot run, in one line; empty where it can."""
-    if found() is not None:
+    if installed() is not None:
         return ""
     return (
         "GetFEM is not installed: its XFEM is skipped, points measured before are drawn "
@@ -222,14 +221,14 @@ def cases(scene: str, sizes: Mapping[int, Sequence[int]]) -> list[Case]:
     -------
     list of Case
     """
-    getfem = found()
+    getfem = installed()
     if getfem is None:
         return []
     command = (getfem.python, str(SCRIPT))
     worker = Worker(command)
     return [
         Case(
-            f"GetFEM XFEM, Q{order}", "opponent", f"n = {n}",
+            f"GetFEM XFEM, Q{order}", "baseline", f"n = {n}",
             partial(_run, worker, scene, n, order),
             memory=partial(_memory, command, scene, n, order),
         )

@@ -1,4 +1,4 @@
-"""The opponent in the plane: a mesh that follows the crack, made anew for each crack.
+"""The conforming baseline in 2D: a mesh that follows the crack, made anew for each crack.
 
 Quadratic triangles by scikit-fem, graded by gmsh towards the tip, whose cells have their middle
 nodes at the quarter points (Henshell and Shaw; Barsoum; 1975-76); K by the interaction integral
@@ -10,17 +10,9 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.scenes.exact_fields import Field, edge_fields
+from benchmarks.scenes.material import E_PRIME, KOLOSOV, LAMBDA, MU, energy, stress_of
 from xcrack.arrays import Floats, Ints
-from xcrack.bench.fields import (
-    E_PRIME,
-    KOLOSOV,
-    LAMBDA,
-    MU,
-    Field,
-    edge_fields,
-    energy,
-    stress_of,
-)
 from xcrack.mesh.gmsh_session import session
 from xcrack.xfem.williams import unit_gradients
 
@@ -37,16 +29,16 @@ class Grading:
 
 
 def missing() -> str:
-    """Why the opponent cannot run; empty where it can."""
+    """Why the baseline cannot run; empty where it can."""
     try:
         import skfem  # noqa: F401
     except ImportError:
-        return 'scikit-fem is not installed: the conforming opponent is left out (".[bench]").'
+        return "scikit-fem is missing: no conforming baseline (pip install scikit-fem)."
     return ""
 
 
 def cracked_square(crack: Floats, grading: Grading) -> tuple[Floats, Ints, int]:
-    """Triangles of a plate with the lips of a crack from its left side apart, and the tip's node.
+    """Triangles of a plate with the faces of a crack from its left side apart, and the tip's node.
 
     The plate is [x, 1] x [-1, 1], x that of the mouth.
 
@@ -71,10 +63,10 @@ def cracked_square(crack: Floats, grading: Grading) -> tuple[Floats, Ints, int]:
         path = [geo.addPoint(float(p[0]), float(p[1]), 0) for p in crack]
         ring = [*corner, path[0]]
         sides = [geo.addLine(a, b) for a, b in zip(ring, [*ring[1:], ring[0]])]
-        lips = [geo.addLine(a, b) for a, b in zip(path, path[1:])]
+        faces = [geo.addLine(a, b) for a, b in zip(path, path[1:])]
         surface = geo.addPlaneSurface([geo.addCurveLoop(sides)])
         geo.synchronize()
-        gmsh.model.mesh.embed(1, lips, 2, surface)
+        gmsh.model.mesh.embed(1, faces, 2, surface)
         field = gmsh.model.mesh.field
         number = field.add("MathEval")
         distance = f"Sqrt((x-({x!r}))^2+(y-({y!r}))^2)"
@@ -84,7 +76,7 @@ def cracked_square(crack: Floats, grading: Grading) -> tuple[Floats, Ints, int]:
         gmsh.model.mesh.generate(2)
         tags, flat, _ = gmsh.model.mesh.getNodes()
         _, _, nodes = gmsh.model.mesh.getElements(2, surface)
-        on_crack = [gmsh.model.mesh.getNodes(1, line, True, False)[0] for line in lips]
+        on_crack = [gmsh.model.mesh.getNodes(1, line, True, False)[0] for line in faces]
     index = np.full(int(tags.max()) + 1, -1)
     index[tags] = np.arange(len(tags))
     points = flat.reshape(-1, 3)[:, :2]
@@ -238,10 +230,10 @@ def edge_solution(grading: Grading, K: tuple[float, float]) -> tuple[Any, Floats
     A = stiffness(basis)
     f = traction_vector(basis, lambda x: x[0] < -1 + 1e-9, stress)
     x = basis.doflocs
-    held = np.nonzero((x[0] > 1 - 1e-9) | (np.abs(x[1]) > 1 - 1e-9))[0]
+    known = np.nonzero((x[0] > 1 - 1e-9) | (np.abs(x[1]) > 1 - 1e-9))[0]
     u = basis.zeros()
-    u[held] = displacement(x[:, held].T)[np.arange(len(held)), held % 2]
-    return basis, solved(A, f, u, held)
+    u[known] = displacement(x[:, known].T)[np.arange(len(known)), known % 2]
+    return basis, solved(A, f, u, known)
 
 
 def pulled(crack: Floats, grading: Grading, radius: float) -> tuple[Floats, int]:
@@ -257,7 +249,7 @@ def pulled(crack: Floats, grading: Grading, radius: float) -> tuple[Floats, int]
     x = basis.doflocs
     # Three statically determinate supports: both components of a corner, x of the one above it.
     right = np.nonzero((x[0] > 1 - 1e-9) & (np.abs(x[1]) > 1 - 1e-9))[0]
-    held = right[(x[1, right] < 0) | (right % 2 == 0)]
-    u = solved(A, f, basis.zeros(), held)
+    known = right[(x[1, right] < 0) | (right % 2 == 0)]
+    u = solved(A, f, basis.zeros(), known)
     ahead = crack[-1] - crack[-2]
     return interaction(basis, u, crack[-1], ahead / np.hypot(*ahead), radius), int(basis.N)

@@ -1,7 +1,7 @@
 """Time and memory of a penny crack in a cube, part by part, three load states with contact.
 
-    python benchmarks/space.py                 # 3e4, 1e5, 3e5 and 1e6 unknowns
-    python benchmarks/space.py 20 29           # cells a side of the cube
+    python -m benchmarks.solid                 # 3e4, 1e5, 3e5 and 1e6 unknowns
+    python -m benchmarks.solid 20 29           # cells a side of the cube
 
 Each size runs in a process of its own, so that its peak memory is its own. Everything that numba
 compiles is compiled before the clock starts, which counts processor time (one thread).
@@ -13,7 +13,10 @@ import resource
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
+from typing import Any
 
 for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(name, "1")
@@ -24,6 +27,7 @@ import xcrack as xc  # noqa: E402
 from xcrack.analysis.solve import solve_states  # noqa: E402
 from xcrack.contact.multipliers import gap_rows, multipliers  # noqa: E402
 from xcrack.cutting.cut import cut  # noqa: E402
+from xcrack.solvers.engine import ContactRows  # noqa: E402
 from xcrack.solvers.iterative import iterative_system  # noqa: E402
 from xcrack.solvers.rigid_motion import balanced, free_motion  # noqa: E402
 from xcrack.xfem.assembly import bulk, enriched_stiffness, total_stiffness  # noqa: E402
@@ -33,6 +37,7 @@ from xcrack.xfem.loads import load_vector  # noqa: E402
 from xcrack.xfem.model import Model, levels  # noqa: E402
 from xcrack.xfem.supports import known_unknowns  # noqa: E402
 
+ROOT = Path(__file__).resolve().parent.parent
 SIZES = (18, 29, 44, 67)
 STATES = {
     "tension": [xc.traction("top", (0, 0, 1.0)), xc.traction("bottom", (0, 0, -1.0))],
@@ -60,7 +65,7 @@ def measure(n: int) -> dict[str, object]:
     """Seconds of each part, steps of the solver, peak memory."""
     seconds: dict[str, float] = {}
 
-    def timed(name, function, *arguments):
+    def timed(name: str, function: Callable[..., Any], *arguments: Any) -> Any:
         start = time.process_time()
         result = function(*arguments)
         seconds[name] = seconds.get(name, 0.0) + time.process_time() - start
@@ -83,15 +88,15 @@ def measure(n: int) -> dict[str, object]:
     model = Model(where, lips, plain, K, known, n_points)
     motion = timed("set-up", free_motion, where, known.fixed)
     engine = timed("set-up", iterative_system, where, K, plain, known.fixed, None, motion.modes)
-    f = np.stack(
-        [balanced(where, motion, load_vector(where, s, lips))[0] for s in STATES.values()], axis=1
-    )
+    loads = np.stack([load_vector(where, tuple(s), lips) for s in STATES.values()], axis=1)
+    f = balanced(where, motion, loads)[0]
     u = timed("open solves", engine.solve, f)
     open_steps = engine.count.iterations
     chosen = timed("contact", multipliers, where, 0, lips[0], "reduced")
     N = timed("contact", lambda: gap_rows(chosen, lips[0], model.jumps[0]))
     h = mesh.cell_size.mean()
-    timed("contact", engine.contact, N, f, np.zeros_like(f), chosen.measure, 1 / h, [None] * 3, u)
+    rows = ContactRows(N, chosen.measure, problem.material.E / h, True)
+    timed("contact", engine.contact, rows, f, np.zeros_like(f), [None] * 3, u)
     contact_steps = engine.count.iterations - open_steps
     # The same through the front door, for K and for the step after the first.
     start = time.process_time()
@@ -133,9 +138,8 @@ def main() -> None:
         print(json.dumps(measure(int(sys.argv[2]))))
         return
     for n in [int(a) for a in sys.argv[1:]] or SIZES:
-        run = subprocess.run(
-            [sys.executable, __file__, "--one", str(n)], capture_output=True, text=True, check=False
-        )
+        command = [sys.executable, "-m", "benchmarks.solid", "--one", str(n)]
+        run = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
         if run.returncode:
             print(run.stderr[-2000:])
             continue

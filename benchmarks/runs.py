@@ -1,4 +1,4 @@
-"""Interleaved runs of cases, their medians, and the file they are kept in."""
+"""Interleaved runs of cases, their medians, and the file they are saved in."""
 
 import ctypes
 import gc
@@ -8,19 +8,45 @@ import platform
 import subprocess
 import sys
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from statistics import median
 from time import perf_counter, process_time
 from typing import Any
 
-from xcrack.bench.scenes import Outcome
 from xcrack.errors import XcrackError
 
 Row = dict[str, Any]
-Timed = tuple[Outcome, float, float]  # with wall and processor time
 _PACKAGES = ("xcrack", "numpy", "scipy", "numba", "gmsh", "scikit-fem", "pyamg", "matplotlib")
+_SOURCES = ("src", "benchmarks/*.py")
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What one run of a case gave.
+
+    Attributes
+    ----------
+    errors : dict
+        Relative errors by name; the first one is charted.
+    unknowns : int
+    parts : dict
+        Seconds of parts that the scene times itself.
+    later : callable () -> dict, optional
+        Further errors, whose evaluation is no part of the work: called when the clock has stopped.
+    took : (float, float), optional
+        Wall and processor time of a run that took place in another process.
+    """
+
+    errors: dict[str, float]
+    unknowns: int
+    parts: dict[str, float] = field(default_factory=dict)
+    later: Callable[[], dict[str, float]] | None = None
+    took: tuple[float, float] | None = None
+
+
+Timed = tuple[Outcome, float, float]  # with wall and processor time
 
 
 @dataclass(frozen=True)
@@ -31,9 +57,9 @@ class Case:
     ----------
     series : str
         Name of the curve that the point belongs to.
-    kind : {"default", "setting", "mesh", "steps", "opponent", "off"}
+    kind : {"default", "setting", "mesh", "steps", "baseline", "off"}
         Default settings of xcrack, others, another kind of mesh, other steps of growth, another
-        method, without contact.
+        method or program, without contact.
     size : str
         What the point differs by from others of its series.
     run : callable (seed) -> Outcome
@@ -52,37 +78,37 @@ class Case:
     memory: Callable[[], float] | None = None
 
 
-def measure(cases: Sequence[Case], repeats: int, say: Callable[[str], None]) -> list[Row]:
+def measure(cases: Sequence[Case], repeats: int, report: Callable[[str], None]) -> list[Row]:
     """Rows of all cases: worst errors, medians of times.
 
-    Every round runs each case once, so that a spell of load on the machine falls on all of them;
-    each round has meshes of its own. A round before the first compiles and fills caches.
+    Every round runs each case once, so that transient load on the machine affects all cases
+    equally; each round has meshes of its own. A round before the first compiles and fills caches.
 
     Parameters
     ----------
     cases : sequence of Case
     repeats : int
         Rounds that count.
-    say : callable (str)
-        Where a case that cannot run is told.
+    report : callable (str)
+        Called with a message for each case that cannot run.
 
     Returns
     -------
     list of dict
     """
-    found: dict[int, list[Timed]] = {i: [] for i in range(len(cases))}
+    results: dict[int, list[Timed]] = {i: [] for i in range(len(cases))}
     for seed in range(repeats + 1):
-        for i in list(found):
+        for i in list(results):
             try:
-                result = timed(cases[i], seed)
+                outcome = timed(cases[i], seed)
             except Exception as error:
-                say(f"{cases[i].series}, {cases[i].size}: {type(error).__name__}: {error}")
-                del found[i]
+                report(f"{cases[i].series}, {cases[i].size}: {type(error).__name__}: {error}")
+                del results[i]
                 continue
             if seed:
-                found[i].append(result)
-    rows = [_row(cases[i], results) for i, results in found.items()]
-    return [{**row, "MB": memory(cases[i])} for i, row in zip(found, rows)]
+                results[i].append(outcome)
+    rows = [_row(cases[i], some) for i, some in results.items()]
+    return [{**row, "MB": memory(cases[i])} for i, row in zip(results, rows)]
 
 
 def timed(case: Case, seed: int) -> Timed:
@@ -105,7 +131,7 @@ def timed(case: Case, seed: int) -> Timed:
     wall, processor = perf_counter() - wall, process_time() - processor
     if outcome.took is not None:
         wall, processor = outcome.took
-    if outcome.later is not None:  # it holds the solution: let go of it
+    if outcome.later is not None:  # it has the solution: let go of it
         outcome = replace(outcome, errors={**outcome.errors, **outcome.later()}, later=None)
     return outcome, wall, processor
 
@@ -134,7 +160,7 @@ def memory(case: Case) -> float | None:
 
 
 def peak(run: Callable[[], object], process: int | None = None) -> float:
-    """Memory in MB that a process holds at the peak of a run above what it held before (Linux).
+    """Memory in MB that a process has at the peak of a run above what it had before (Linux).
 
     Parameters
     ----------
@@ -203,14 +229,14 @@ def _processor() -> str:
 
 
 def _commit() -> str:
-    """The commit of the sources, with a word where they differ from it; empty without git."""
-    here = Path(__file__).parent
+    """The commit of the sources, marked where they differ from it; empty without git."""
+    root = Path(__file__).resolve().parent.parent
     try:
         head, changes = (
             subprocess.run(
-                ["git", *words], cwd=here, capture_output=True, text=True, check=True, timeout=20
+                ["git", *words], cwd=root, capture_output=True, text=True, check=True, timeout=20
             ).stdout.strip()
-            for words in (["rev-parse", "HEAD"], ["status", "--porcelain", "--", ".."])
+            for words in (["rev-parse", "HEAD"], ["status", "--porcelain", "--", *_SOURCES])
         )
     except (OSError, subprocess.SubprocessError):
         return ""
@@ -234,7 +260,7 @@ def clock(record: dict[str, Any]) -> str:
     return "processor" if record["load"] and record["load"][0] > 1.5 else "wall"
 
 
-def keep(folder: Path, scene: str, record: Row) -> Path:
+def save(folder: Path, scene: str, record: Row) -> Path:
     """Write the record of a scene to `folder/scene.json`."""
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / f"{scene}.json"

@@ -37,10 +37,10 @@ def settled(points: Sequence[Point]) -> list[Point]:
 
     An error that changes its sign between two meshes is small by luck on some mesh between.
     """
-    found: list[Point] = []
+    worst: list[Point] = []
     for time, error in sorted(points, reverse=True):
-        found.append((time, max(error, found[-1][1]) if found else error))
-    return found[::-1]
+        worst.append((time, max(error, worst[-1][1]) if worst else error))
+    return worst[::-1]
 
 
 def points_of(rows: Sequence[dict[str, Any]], name: str, clock: str) -> list[Point]:

@@ -6,7 +6,7 @@ stdout; whatever GetFEM itself prints goes to stderr.
 
 The method is that of Laborde, Pommier, Renard and Salaün (2005): four tip functions times a linear
 partition of unity on all nodes within a fixed radius of a tip, a step across the rest of the crack,
-on rectangles of order 1 or 2. Closed lips: an augmented Lagrangian (Alart and Curnier, 1991).
+on rectangles of order 1 or 2. Closed faces: an augmented Lagrangian (Alart and Curnier, 1991).
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ SIDES, LEFT, LIPS, RING_CELLS = 1, 2, 3, 4  # regions of a mesh
 
 @dataclass(frozen=True)
 class Scene:
-    """A crack on y = 0 and what holds and loads the square around it.
+    """A crack on y = 0, and supports and loads of the square around it.
 
     Attributes
     ----------
@@ -55,9 +55,9 @@ class Scene:
     u : callable (x (2, n)) -> (2, n)
         Displacements on the sides.
     modes : (float, float), optional
-        K_I and K_II of the traction on the left, which is then not held.
+        K_I and K_II of the traction on the left, which is then not supported.
     pressure : callable (x (n,)) -> (n,), optional
-        Exact pressure between the lips; without it the scene has no contact.
+        Exact pressure between the crack faces; without it the scene has no contact.
     """
 
     half: float
@@ -70,7 +70,7 @@ class Scene:
 
 @dataclass(frozen=True)
 class Solved:
-    """A solved scene; `kept` holds what GetFEM needs but does not keep alive itself."""
+    """A solved scene; `alive` has what GetFEM needs but does not keep alive itself."""
 
     scene: Scene
     lines: tuple[Any, Any]
@@ -81,7 +81,7 @@ class Solved:
     model: Any
     unknowns: int
     lips: Any
-    kept: tuple[Any, ...]
+    alive: tuple[Any, ...]
 
 
 def main() -> None:
@@ -147,7 +147,7 @@ def solution(scene: Scene, n: int, order: int, seed: int | None) -> Solved:
     model.add_initialized_data("first", [LAMBDA])
     model.add_initialized_data("second", [MU])
     model.add_isotropic_linearized_elasticity_brick(volume, "u", "first", "second")
-    hold(scene, mesh, space, model)
+    support(scene, mesh, space, model)
     if scene.modes is not None:
         pressure = float(scene.pressure(np.zeros(1))[0]) if scene.pressure else 0.0
         model.add_source_term(volume, f"-({traction(scene.modes, pressure)}).Test_u", LEFT)
@@ -216,7 +216,7 @@ def rules(parts: int, polar: int, order: int) -> tuple[Any, Any, Any]:
     )
 
 
-def hold(scene: Scene, mesh: Any, space: Any, model: Any) -> None:
+def support(scene: Scene, mesh: Any, space: Any, model: Any) -> None:
     """Impose the displacements on the sides, node by node; they are the start of Newton's method.
 
     A penalty would do, but its forces hide the residual by which an active set is judged.
@@ -228,15 +228,15 @@ def hold(scene: Scene, mesh: Any, space: Any, model: Any) -> None:
     on = space.basic_dof_on_region(SIDES)
     u = np.zeros(space.nbdof())
     u[on] = scene.u(space.basic_dof_nodes()[:, on])[on % 2, np.arange(len(on))]
-    model.add_initialized_fem_data("held", space, u)
-    model.add_Dirichlet_condition_with_simplification("u", SIDES, "held")
+    model.add_initialized_fem_data("known", space, u)
+    model.add_Dirichlet_condition_with_simplification("u", SIDES, "known")
     model.set_variable("u", u)
 
 
 def contact(
     mesh: Any, cells: Any, order: int, n: int, scene: Scene, model: Any, lips: Any
 ) -> Any:  # fmt: skip
-    """Pressures on the lips: a constant a cell at order 1, continuous and linear at order 2.
+    """Pressures on the crack faces: a constant a cell at order 1, continuous and linear at order 2.
 
     Linear ones can be unstable beside displacements of order 1, constant ones were sound there.
     """
@@ -247,7 +247,7 @@ def contact(
         spread = np.equal.outer(shared, np.arange(shared.max() + 1)).astype(float)
         space.set("reduction matrices", sparse((spread / spread.sum(axis=0)).T), sparse(spread))
     model.add_fem_variable("p", space)
-    model.set_variable("p", np.ones(space.nbdof()))  # closed until found open
+    model.set_variable("p", np.ones(space.nbdof()))  # closed until they open
     model.add_initialized_data("r", [AUGMENTED * E * n / (2 * scene.half)])
     gap = "((Xfem_plus(u)-Xfem_minus(u)).[0;1])"
     test = "((Xfem_plus(Test_u)-Xfem_minus(Test_u)).[0;1])"
@@ -260,10 +260,10 @@ def contact(
 
 def sparse(values: Any) -> Any:
     """A matrix of GetFEM's with the values that are not zero."""
-    found = gf.Spmat("empty", *values.shape)
+    matrix = gf.Spmat("empty", *values.shape)
     for i, j in zip(*np.nonzero(values)):
-        found.assign(int(i), int(j), float(values[i, j]))
-    return found
+        matrix.assign(int(i), int(j), float(values[i, j]))
+    return matrix
 
 
 def points(solved: Solved, rule: Any, cells: Any) -> tuple[Any, Any]:
@@ -285,7 +285,7 @@ def gradients(solved: Solved, rule: Any, cells: Any) -> Any:
 def intensity(solved: Solved, tip: float, ahead: float) -> Any:
     """K_I and K_II by the interaction integral over a ring around a tip.
 
-    The pressure between the lips works on the opening of the auxiliary field of mode I.
+    The pressure between the crack faces works on the opening of the auxiliary field of mode I.
     """
     inner, outer = RING
     r = np.hypot(solved.corners[0] - tip, solved.corners[1])
@@ -315,13 +315,13 @@ def intensity(solved: Solved, tip: float, ahead: float) -> Any:
 
 
 def pressures(solved: Solved, x: Any) -> Any:
-    """Pressure between the lips at places along them."""
+    """Pressure between the crack faces at places along them."""
     at = np.stack([x, np.zeros_like(x)])
     return solved.model.interpolation("p", at, solved.mesh, LIPS)
 
 
 def pressure_error(solved: Solved) -> float:
-    """Relative error of the pressure, root of the mean square along the lips."""
+    """Relative error of the pressure, root of the mean square along the crack."""
     x, weight = points(solved, solved.lips, solved.mesh.region(LIPS)[0])
     assert solved.scene.pressure is not None
     exact = solved.scene.pressure(x[:, 0])
@@ -331,12 +331,12 @@ def pressure_error(solved: Solved) -> float:
 
 def energy_error(solved: Solved) -> float:
     """Relative error in the energy norm, by finer integration than that of the solution."""
-    fine = gf.MeshIm("levelset", solved.kept[1], "all", *rules(4, 9, 14))
+    fine = gf.MeshIm("levelset", solved.alive[1], "all", *rules(4, 9, 14))
     x, weight = points(solved, fine, solved.cells)
     assert solved.scene.modes is not None
     exact = stress_of(williams_gradient(solved.scene.modes, x))
-    found = stress_of(gradients(solved, fine, solved.cells))
-    wrong, total = (energy(s) @ weight for s in (found - exact, exact))
+    computed = stress_of(gradients(solved, fine, solved.cells))
+    wrong, total = (energy(s) @ weight for s in (computed - exact, exact))
     return float(np.sqrt(wrong / total))
 
 
@@ -396,7 +396,7 @@ def bent(x: Any) -> Any:
 
 
 def bent_pressure(x: Any) -> Any:
-    """Pressure between the lips of that crack."""
+    """Pressure between the faces of that crack."""
     c = OPENING
     r = np.abs(x - (1 - c))
     p = (r + c / 2) * np.sqrt(np.maximum(r - c, 0) / (r + c))

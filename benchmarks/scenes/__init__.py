@@ -1,0 +1,1 @@
+"""The scenes of the charts and the exact solutions that they are compared with."""
