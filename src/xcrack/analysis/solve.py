@@ -18,6 +18,7 @@ from xcrack.solvers.engine import Engine
 from xcrack.solvers.iterative import iterative_system
 from xcrack.solvers.reuse import Reuse
 from xcrack.solvers.rigid_motion import Motion, balanced, free_motion, without_motion
+from xcrack.threads import threads
 from xcrack.xfem.loads import load_vector
 from xcrack.xfem.model import Model, build
 from xcrack.xfem.supports import known_unknowns
@@ -79,6 +80,13 @@ def solve_states(
     """
     if not len(states):
         raise ProblemError("states is empty: give at least one load state, or none at all.")
+    with threads(problem.numerics.threads):
+        return _solve_states(problem, states, reuse, solver)
+
+
+def _solve_states(
+    problem: Problem, states: Sequence[Any], reuse: Reuse | None, solver: Solver | None
+) -> list[Solution]:
     model = build(problem, None if reuse is None else reuse.bulk)
     known_loads: dict[tuple[int, ...], Floats] = {}
     cases = [_case(problem, model, state, known_loads) for state in states]

@@ -43,14 +43,15 @@ class _Cache(caching.FunctionCache):
 def kernel(function: Callable[..., Any]) -> Any:
     """Compile a function of arrays; its machine code is kept on disk.
 
-    Division by zero gives inf or nan as in numpy. The helpers that a kernel calls stand in its own
+    Division by zero gives inf or nan as in numpy. Python's lock is released, so that threads run
+    kernels side by side. The helpers that a kernel calls stand in its own
     file: numba notices changes of that file alone.
 
     Parameters
     ----------
     function : callable
     """
-    compiled = numba.njit(error_model="numpy")(function)
+    compiled = numba.njit(error_model="numpy", nogil=True)(function)
     if not numba.config.DISABLE_JIT:
         compiled._cache = _cache_of(function)
     return compiled

@@ -118,10 +118,10 @@ def column_parts(indptr, indices, owner, d, part):  # type: ignore[no-untyped-de
     """
     result = np.zeros(len(indptr) - 1, dtype=np.int64)
     for column in range(len(result)):
-        found = 0
+        common = 0
         for k in range(indptr[column], indptr[column + 1]):
-            found = _ancestor(found, part[owner[indices[k] // d]])
-        result[column] = max(found, 1)
+            common = _ancestor(common, part[owner[indices[k] // d]])
+        result[column] = max(common, 1)
     return result
 
 

@@ -1,7 +1,7 @@
 """Everything that is method, not scene, in one place."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import wraps
 from typing import Any
 
@@ -113,6 +113,10 @@ class Numerics:
         by star.
     initial_set : {"closed", "open"}
         State of the crack faces that the contact iteration starts from where nothing is known.
+    threads : int, optional
+        Threads that share a solve. None: as many processors as the process may use, by affinity
+        and quota, at most 16, or the environment variable XCRACK_THREADS. Results have the same
+        bits for any number.
     comparison : Comparison
         Methods to compare with.
 
@@ -133,6 +137,7 @@ class Numerics:
     domain: float | None = None
     linear: str = "auto"
     initial_set: str = "closed"
+    threads: int | None = field(default=None, metadata={"changes_results": False})
     comparison: Comparison = Comparison()
 
     def __post_init__(self) -> None:
@@ -151,6 +156,8 @@ class Numerics:
             if getattr(self, name) is not None:
                 number(getattr(self, name), f"Numerics: {name}", above=0)
         whole(self.points, "Numerics: points", least=2, most=32)
+        if self.threads is not None:
+            whole(self.threads, "Numerics: threads", least=1)
         if not isinstance(self.comparison, Comparison):
             raise ProblemError(
                 f"Numerics: comparison = {self.comparison!r}: give Comparison(lips=...)."

@@ -16,10 +16,11 @@ import scipy.sparse as sp
 from xcrack.arrays import Bools, Floats, Ints, lock
 from xcrack.mesh.mesh import Mesh
 from xcrack.mesh.simplex import cell_nodes
-from xcrack.threads import one_blas_thread
+from xcrack.threads import each, one_blas_thread
 
 _LEAF = 8  # cells of a part that is not halved any more
 _UNIT = 4  # levels of a subtree that is factored as a whole or not at all: 128 cells
+_SHARED = 4  # levels above the subtrees that threads take
 _FEW = 4  # right-hand sides up to which each is quicker alone
 _SPREAD = 1.5  # times the numbers in use that arrays of earlier factorisations may hold
 _MOST = 1 << 27  # entries of update matrices, 1 GB, above which larger subtrees are the unit
@@ -90,7 +91,7 @@ class Factor:
     used : int
         Numbers in them that belong to this factor.
     lowest : int
-        Levels of the subtrees that are factored as a whole.
+        Levels of the subtrees that are factored as a whole; -1 where nothing is kept for the next.
     """
 
     tree: Tree
@@ -198,7 +199,6 @@ def factorised(
         Keep what the next factorisation may take over.
     """
     from xcrack.kernels.fronts import arranged, places_of_updates, sizes, unchanged
-    from xcrack.kernels.multifrontal import factored
     from xcrack.kernels.tree import column_parts
 
     order, rank = tree.postorder, tree.rank
@@ -213,59 +213,85 @@ def factorised(
     fronts = first, begin, in_parent, start, row, value, order, rank
     panel_size, update_size, _ = sizes(first, begin)
     depth = len(order).bit_length() - 1
-    lowest = min(_UNIT, depth) if keep else depth + 1
+    # Subtrees of that many levels have a stack each; above them update matrices are stored.
+    lowest = min(_UNIT, depth) if keep else max(depth - _SHARED, min(_UNIT, depth))
     place, height, stack = places_of_updates(order, rank, update_size, lowest)
     while lowest <= depth and update_size[place < 0].sum() > _MOST:
         lowest += 1
         place, height, stack = places_of_updates(order, rank, update_size, lowest)
     own_size = np.where(place < 0, update_size, 0)
-    used = int(panel_size.sum() + own_size.sum())
+    used = int(panel_size.sum() + (own_size.sum() if keep else 0))
     wanted = np.ones(len(order), dtype=bool)
     earlier: tuple[Floats, ...] = ()
     if before is not None and before.tree is tree and before.lowest == lowest <= depth:
         wanted = _wanted(~unchanged(fronts, before.fronts), order, rank, height, lowest)
         earlier = before.memory
-    new = np.where(wanted, panel_size, 0), np.where(wanted, own_size, 0)
-    numbers = np.empty(int(new[0].sum() + new[1].sum()))
-    panel, update = _addresses(numbers, *new)
+    panels, panel = _room(np.where(wanted, panel_size, 0))
+    updates, update = _room(np.where(wanted, own_size, 0))
     if earlier and before is not None:
         panel = np.where(wanted, panel, before.panel)
         update = np.where(wanted, update, before.update)
-    scratch = np.empty(stack)
-    update = np.where(place >= 0, scratch.ctypes.data + 8 * place.astype(np.uint64), update)
-    with one_blas_thread():
-        failed = factored(fronts, panel, update, wanted, 0, len(order))
-    if failed:
+    if _factored(fronts, panel, update, (place, height, wanted), stack, lowest):
         return None
-    memory = (*earlier, lock(numbers))
+    memory = (*earlier, lock(panels), lock(updates)) if keep else (lock(panels),)
     if sum(len(part) for part in memory) > _SPREAD * used:
-        numbers = np.empty(used)
-        panel, update = _gathered(numbers, (panel, update), (panel_size, own_size))
-        memory = (lock(numbers),)
+        panels, panel = _gathered(panel, panel_size)
+        updates, update = _gathered(update, own_size)
+        memory = (lock(panels), lock(updates))
     return Factor(
         tree, lock(perm), lock(first), lock(begin), lock(boundary), lock(in_parent), lock(start),
-        lock(row), lock(value), lock(panel), lock(update), memory, used, lowest,
+        lock(row), lock(value), lock(panel), lock(update), memory, used, lowest if keep else -1,
     )  # fmt: skip
 
 
-def _addresses(numbers: Floats, panel_size: Ints, update_size: Ints) -> tuple[Any, Any]:
-    """Places in an array for panels, then for update matrices."""
-    sizes = np.concatenate([panel_size, update_size])
-    begin = np.concatenate([[0], np.cumsum(sizes)[:-1]]).astype(np.uint64)
-    places = np.uint64(numbers.ctypes.data) + np.uint64(8) * begin
-    return places[: len(panel_size)], places[len(panel_size) :]
+def _factored(
+    fronts: tuple[Any, ...],
+    panel: Ints,
+    update: Ints,
+    parts: tuple[Ints, Ints, Bools],
+    stack: int,
+    lowest: int,
+) -> bool:
+    """Factor subtrees side by side, then what is above them; whether a pivot was not positive.
+
+    `parts` are the places of update matrices in a stack, heights, and which parts to factor.
+    """
+    from xcrack.kernels.multifrontal import factored
+
+    place, height, wanted = parts
+    depth = int(height[-1])
+    level = min(max(depth - _SHARED, lowest), depth)
+
+    def subtree(root: int) -> int:
+        begin, end = root + 2 - (2 << level), root + 1
+        if not wanted[begin:end].any():
+            return 0
+        scratch = np.empty(stack)
+        at = np.uint64(scratch.ctypes.data) + np.uint64(8) * place[begin:end].astype(np.uint64)
+        update[begin:end] = np.where(place[begin:end] >= 0, at, update[begin:end])
+        return int(factored(fronts, panel, update, wanted, begin, end))
+
+    with one_blas_thread():
+        if any(each(subtree, np.nonzero(height == level)[0].tolist())):
+            return True
+        above = wanted & (height > level)
+        return bool(above.any() and factored(fronts, panel, update, above, 0, len(height)))
 
 
-def _gathered(
-    numbers: Floats, old: tuple[Ints, Ints], sizes: tuple[Ints, Ints]
-) -> tuple[Ints, Ints]:
-    """Copy all panels and update matrices into one array."""
+def _room(size: Ints) -> tuple[Floats, Any]:
+    """An array for numbers of parts, and the address of those of each."""
+    numbers = np.empty(int(size.sum()))
+    begin = np.concatenate([[0], np.cumsum(size)[:-1]]).astype(np.uint64)
+    return numbers, np.uint64(numbers.ctypes.data) + np.uint64(8) * begin
+
+
+def _gathered(old: Ints, size: Ints) -> tuple[Floats, Any]:
+    """The numbers of all parts copied into one array, and their addresses."""
     from xcrack.kernels.multifrontal import copied
 
-    new = _addresses(numbers, *sizes)
-    for one, other, size in zip(old, new, sizes):
-        copied(one, other, size)
-    return new
+    numbers, new = _room(size)
+    copied(old, new, size)
+    return numbers, new
 
 
 def _wanted(changed: Bools, order: Ints, rank: Ints, height: Ints, lowest: int) -> Bools:

@@ -1,5 +1,6 @@
 """Matrices of the multigrid cycle: rows that share a pattern, and an enriched border."""
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -8,6 +9,9 @@ import numpy as np
 import scipy.sparse as sp
 
 from xcrack.arrays import Ints, lock, offsets
+from xcrack.threads import each, number_of_threads
+
+_LEAST = 100_000  # values of a part of a product: less takes no longer than to hand it over
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,8 +48,23 @@ class RowBlocks:
         from xcrack.kernels.cycle import product
 
         number = self.dtype.type(scale)
-        product(self.first, self.start, self.offset, self.columns, self.values, x, y, number, y)
+
+        def rows(stretch: slice) -> None:
+            product(
+                self.first[stretch], self.start[stretch], self.offset[stretch], self.columns,
+                self.values, x, y, number, y,
+            )  # fmt: skip
+
+        each(rows, self._stretches(min(number_of_threads(), len(self.values) // _LEAST)))
         return y
+
+    def _stretches(self, count: int) -> list[slice]:
+        """Blocks of rows in stretches with about as many values each."""
+        if count < 2:
+            return [slice(None)]
+        wanted = np.arange(1, count) * (len(self.values) / count)
+        ends = [0, *np.searchsorted(self.offset, wanted), len(self.first) - 1]
+        return [slice(a, b + 1) for a, b in itertools.pairwise(ends)]
 
     def single(self) -> "RowBlocks":
         """The same matrix in single precision; it shares the pattern."""

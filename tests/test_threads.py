@@ -1,0 +1,172 @@
+"""Threads: the same bits for any number, and no harm to processes and threads of the user."""
+
+import multiprocessing
+import os
+import subprocess
+import sys
+import threading
+import time
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import threadpoolctl
+
+import xcrack as xc
+from xcrack import threads
+from xcrack.solvers import row_blocks
+
+
+def plane(n=24):
+    crack = xc.line_crack([(-1.2, 0.013), (-0.2, 0.031)])
+    push = [xc.traction("top", (0.3, -1.0)), xc.traction("bottom", (-0.3, 1.0))]
+    sides = [xc.traction("right", (0.0, 0.3)), xc.traction("left", (0.0, -0.3))]
+    mesh = xc.box((-1, -1), (1, 1), n)
+    return xc.Problem(mesh, xc.Isotropic(1.0, 0.3, "strain"), [crack], loads=push + sides)
+
+
+def solid(n=10):
+    crack = xc.penny_crack((0.01, -0.02, 0.03), (0.3, -0.5, 1.0), 0.5)
+    loads = [xc.traction("top", (0, 0, -1.0)), xc.traction("bottom", (0, 0, 1.0))]
+    return xc.Problem(xc.box((-1,) * 3, (1,) * 3, n), xc.Isotropic(1.0, 0.3), [crack], loads=loads)
+
+
+def bits(problem, count=None):
+    """Displacements, pressures and K of two states, as bytes."""
+    problem = replace(problem, numerics=replace(problem.numerics, threads=count))
+    solutions = xc.solve(problem, states=[1.0, -1.0])
+    K = [s.K for s in xc.stress_intensities(solutions)]
+    parts = [s.u for s in solutions] + K
+    parts += [c.pressure for s in solutions for c in s.contact if c is not None]
+    return b"".join(np.ascontiguousarray(part).tobytes() for part in parts)
+
+
+@pytest.mark.parametrize("scene", [plane, solid])
+def test_the_same_bits_for_any_number(scene, monkeypatch):
+    monkeypatch.setattr(row_blocks, "_LEAST", 1000)  # small matrices are shared too
+    problem = scene()
+    one = bits(problem, 1)
+    for count in (2, 3, 7):
+        assert bits(problem, count) == one
+    with threadpoolctl.threadpool_limits(2, user_api="blas"):
+        if scene is plane:  # BLAS outside our own loops belongs to numpy: bases of small blocks
+            assert len(bits(problem, 2)) == len(one)
+
+
+def test_threads_are_no_setting_of_a_run():
+    problem = plane()
+    other = replace(problem, numerics=xc.Numerics(threads=3))
+    from xcrack.growth.fingerprint import describe
+
+    assert describe("problem", problem) == describe("problem", other)
+
+
+# --- how many ------------------------------------------------------------------------------------
+
+
+def test_available(monkeypatch, tmp_path):
+    monkeypatch.delenv("XCRACK_THREADS", raising=False)
+    monkeypatch.setattr(os, "sched_getaffinity", lambda pid: set(range(40)), raising=False)
+    monkeypatch.setattr(threads, "_QUOTA", tmp_path / "cpu.max")
+    assert threads.available() == 16
+    for text, count in (("max 100000", 16), ("250000 100000", 3), ("50000 100000", 1), ("x", 16)):
+        (tmp_path / "cpu.max").write_text(text + "\n")
+        assert threads.available() == count
+    monkeypatch.setattr(os, "sched_getaffinity", lambda pid: {3}, raising=False)
+    assert threads.available() == 1
+    monkeypatch.setenv("XCRACK_THREADS", "24")
+    assert threads.available() == 24
+    for wrong in ("0", "-1", "two", "1.5", ""):
+        monkeypatch.setenv("XCRACK_THREADS", wrong)
+        with pytest.raises(xc.ProblemError, match=f"XCRACK_THREADS = '{wrong}' in the environment"):
+            threads.available()
+
+
+@pytest.mark.parametrize("wrong", [0, -1, 1.5, "two", True])
+def test_a_number_that_is_none(wrong):
+    with pytest.raises(xc.ProblemError, match=r"Numerics: threads = .*whole number of at least 1"):
+        xc.Numerics(threads=wrong)
+
+
+def test_each_keeps_the_order_and_its_errors():
+    def slow(k):
+        time.sleep(0.01 * (3 - k))
+        return k
+
+    with threads.threads(3) as count:
+        assert count == threads.number_of_threads() == 3
+        assert threads.each(slow, range(4)) == [0, 1, 2, 3]
+        assert threads.each(lambda _: threads.number_of_threads(), [0]) == [1]  # no pool in a pool
+        with pytest.raises(ZeroDivisionError):
+            threads.each(lambda k: 1 / k, [1, 0])
+        with threads.threads(2):  # that of the outer block goes on
+            assert threads.number_of_threads() == 3
+    assert threads.number_of_threads() == 1
+    assert not any(thread.name.startswith("xcrack") for thread in threading.enumerate())
+
+
+# --- processes and threads of the user -----------------------------------------------------------
+
+
+def test_threads_of_the_user():
+    """Four solve at once, each with two threads of its own."""
+    problem = plane(12)
+    one = bits(problem, 1)
+    with ThreadPoolExecutor(4) as pool:
+        assert set(pool.map(lambda _: bits(problem, 2), range(4))) == {one}
+
+
+def _child(queue):
+    queue.put(bits(plane(12), 2))
+
+
+@pytest.mark.filterwarnings("ignore:This process:DeprecationWarning")
+@pytest.mark.parametrize("method", ["fork", "spawn"])
+def test_processes_started_after_a_solve(method):
+    if method not in multiprocessing.get_all_start_methods():
+        pytest.skip(f"no {method} on this system")
+    if method == "spawn":
+        code = "from test_threads import bits, plane; print(hash(bits(plane(12), 2)))"
+        folder = os.path.dirname(__file__)
+        environment = {**os.environ, "PYTHONHASHSEED": "0", "PYTHONPATH": os.pathsep.join(
+            [folder, *sys.path])}  # fmt: skip
+        runs = [
+            subprocess.run([sys.executable, "-c", c], env=environment, capture_output=True,
+                           text=True, timeout=120, check=True).stdout
+            for c in (code, code.replace(", 2)", ", 1)"))
+        ]  # fmt: skip
+        assert runs[0] == runs[1]
+        return
+    context = multiprocessing.get_context(method)
+    one, queue = bits(plane(12), 2), context.Queue()
+    child = context.Process(target=_child, args=(queue,))
+    child.start()
+    assert queue.get(timeout=60) == one
+    child.join(10)
+    assert child.exitcode == 0
+    assert bits(plane(12), 2) == one
+
+
+def test_blas_is_restored_when_the_last_has_left():
+    def blas():
+        pools = threadpoolctl.threadpool_info()
+        return {pool["num_threads"] for pool in pools if pool["user_api"] == "blas"}
+
+    inside, leave = threading.Event(), threading.Event()
+
+    def other():
+        with threads.one_blas_thread():
+            inside.set()
+            leave.wait(10)
+
+    with threadpoolctl.threadpool_limits(2, user_api="blas"):
+        thread = threading.Thread(target=other)
+        thread.start()
+        inside.wait(10)
+        with threads.one_blas_thread():
+            assert blas() == {1}
+        assert blas() == {1}  # the other one is still inside
+        leave.set()
+        thread.join()
+        assert blas() == {2}
