@@ -311,17 +311,18 @@ def test_penny_by_the_finite_element_solution():
     # Discretisation: a / h = 2.5 and 8 hats; the solution itself is wrong by 2 %.
     a, z = 0.5, 0.013
     solution = xc.solve(scenes.flat_penny(10, z, a, (1.0, 0.6), seed=4))
-    ((K, spread, x, frame, s, at_surface),) = front_intensity([solution], 0)
+    (sif,) = front_intensity([solution], 0)
+    K, x = sif.K, sif.x
     S = np.array([[0, 0, 0.6], [0, 0, 0], [0.6, 0, 1.0]])
     expected = penny_exact(x, a, S)
     scale = expected[:, 0].mean()
-    assert not at_surface.any()
+    assert not sif.at_surface.any()
     assert abs(K[:, 0].mean() / scale - 1) < 0.04
     assert np.abs(K - expected).max() < 0.08 * scale
     assert np.abs(K - expected).std() < 0.02 * scale
-    assert spread.max() < 0.1 * scale
-    assert (np.diff(s) > 0).all()
-    np.testing.assert_allclose(frame[:, 0, :2], x[:, :2] / a, atol=1e-5)  # spline
+    assert sif.spread.max() < 0.1 * scale
+    assert (np.diff(sif.s) > 0).all()
+    np.testing.assert_allclose(sif.frame[:, 0, :2], x[:, :2] / a, atol=1e-5)  # spline
 
 
 def test_two_states_at_once_are_those_of_one_by_one():
@@ -330,7 +331,7 @@ def test_two_states_at_once_are_those_of_one_by_one():
     solution = xc.solve(problem)
     single = front_intensity([solution], 0)[0]
     for state in front_intensity([solution, solution], 0):
-        np.testing.assert_allclose(state[0], single[0], rtol=1e-9, atol=1e-12)
+        np.testing.assert_allclose(state.K, single.K, rtol=1e-9, atol=1e-12)
 
 
 def test_straight_front_through_a_cube():
@@ -353,8 +354,9 @@ def test_straight_front_through_a_cube():
         supports=[xc.displacement("boundary", field)],
         contact="off",
     )
-    ((K, _, x, frame, _, at_surface),) = front_intensity([xc.solve(problem)], 0)
-    np.testing.assert_allclose(frame[:, :2], [[[1, 0, 0], [0, 0, 1]]] * len(x), atol=1e-12)
+    (sif,) = front_intensity([xc.solve(problem)], 0)
+    K, x, at_surface = sif.K, sif.x, sif.at_surface
+    np.testing.assert_allclose(sif.frame[:, :2], [[[1, 0, 0], [0, 0, 1]]] * len(x), atol=1e-12)
     assert at_surface[np.abs(x[:, 1]) >= 1].all()
     assert not at_surface[np.abs(x[:, 1]) < 0.3].any()
     error = (K - [K_I, K_II, K_III]) / K_I

@@ -9,7 +9,7 @@ import numpy as np
 from xcrack.analysis.solution import Solution
 from xcrack.arrays import Floats, Ints
 from xcrack.errors import ProblemError
-from xcrack.sif.interaction_2d import stress_intensities
+from xcrack.sif.stress_intensity import stress_intensities
 
 # Rates that are believed between two meshes. What falls faster than by the second power is taken
 # for luck, what falls slower than by the square root for scatter.

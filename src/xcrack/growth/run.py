@@ -23,8 +23,8 @@ from xcrack.growth.progress import report_end, report_step
 from xcrack.growth.step import Cycle, Memory, Step, memory_of
 from xcrack.mesh.locate import cell_sizes
 from xcrack.scene.problem import Problem
-from xcrack.sif.interaction_2d import stress_intensities
 from xcrack.sif.sif import SIF
+from xcrack.sif.stress_intensity import stress_intensities
 from xcrack.solvers.reuse import Reuse
 
 

@@ -1,21 +1,96 @@
-"""The domain of the interaction integral: its size, its points and its weight q."""
+"""K at a tip of a solution in 2D: the domain of the integrals, its points, and the SIF."""
+
+from collections.abc import Sequence
 
 import numpy as np
 
-from xcrack.analysis.solution import Solution
+from xcrack.analysis.solution import Solution, gradients_at
 from xcrack.arrays import Floats
+from xcrack.errors import warn
 from xcrack.mesh.locate import nearest_boundary
+from xcrack.scene.conditions import BodyForce, InitialStress
+from xcrack.sif.common import acts, mean_rotation
+from xcrack.sif.interaction_2d import constant_part, domain_terms, inner_radii, lip_terms
+from xcrack.sif.sif import SIF
 from xcrack.xfem.function_space import FunctionSpace
 from xcrack.xfem.loads import position
 from xcrack.xfem.quadrature import Points, cell_points
 
-# Inner radius of the ring in which q falls, as a share of the outer one. At order 1 the ring stays
-# outside the enriched disc; at order 2 a wide ring saves digits on coarse meshes (measured).
-_RING = {1: 0.4, 2: 0.15}
 _OUTER = {1: 2.5, 2: 2.5}  # outer radius, as a multiple of the enriched radius
+_SECOND = 0.7  # outer radius of the second domain, as a share of the first
+_WARN = 0.01  # difference of the two domains, as a share of K, that is worth a word
 # Cells up to a share of the outer radius: points a direction with tip functions, degree without.
 _DEGREES = ((0.0, 0.03, 4, 4), (0.03, 0.1, 5, 6), (0.1, 0.25, 5, 8), (0.25, np.inf, 5, 10))
 _CHUNK = 4000  # cells integrated at once; bounds the memory
+
+
+def tip_intensity(solutions: Sequence[Solution], t: int) -> list[SIF]:
+    """K and T at one tip, for several load states of one solve.
+
+    Parameters
+    ----------
+    solutions : sequence of Solution
+        States of one problem, which share their space.
+    t : int
+        Number of the tip in `space.tips`.
+    """
+    space, tip = solutions[0].space, solutions[0].space.tips[t]
+    outer, wanted, size = domain_radius(solutions[0], t)
+    radii = np.array([outer, max(_SECOND * outer, min(outer, 1.5 * size))])
+    E_prime = solutions[0].problem.material.E_prime
+    where = np.round(tip.x, 6).tolist()
+    needed = max(tip.radius + size, 3.0 * size)
+    if outer < min(wanted, needed) * (1 - 1e-12):
+        warn(
+            f"K at {where}: the domain is clipped to {outer:.4g} ({outer / size:.1f} cells) by the "
+            f"boundary or another tip; to leave the enriched disc it needs {needed:.4g}. Refine "
+            "the mesh around the tip."
+        )
+    volume = float(space.mesh.volume.sum())
+    result, worst = [], (0.0, 0.0)
+    for solution, values in zip(solutions, _integrals(solutions, t, radii), strict=True):
+        K = 0.5 * E_prime * values[:, :2]
+        T = E_prime * values[0, 2] + constant_part(solution, t)
+        spread = np.abs(K[0] - K[1])
+        # At a closed tip K is zero: what counts there is K of the body's mean stress at the disc.
+        mean_stress = np.sqrt(2 * max(solution.energy, 0.0) * E_prime / volume)
+        scale = max(float(np.abs(K).max()), 0.1 * mean_stress * np.sqrt(np.pi * tip.radius))
+        if scale > 0 and spread.max() / scale > worst[1]:
+            worst = float(spread.max()), float(spread.max() / scale)
+        result.append(
+            SIF(
+                x=tip.x[None],
+                frame=tip.frame[None],
+                K=K[:1],
+                T=np.array([T]),
+                spread=spread[None],
+                s=np.zeros(1),
+                front=np.zeros(1, dtype=np.int64),
+                at_surface=np.zeros(1, dtype=bool),
+            )
+        )
+    if worst[1] > _WARN:
+        warn(
+            f"K at {where}: domains of radius {radii[0]:.4g} and {radii[1]:.4g} differ by "
+            f"{worst[0]:.3g}, {100 * worst[1]:.2g} % of K there. Refine the mesh around the tip."
+        )
+    return result
+
+
+def _integrals(solutions: Sequence[Solution], t: int, radii: Floats) -> Floats:
+    """I of modes I, II and of the point force for each state and domain `(s, radii, 3)`."""
+    space, tip = solutions[0].space, solutions[0].space.tips[t]
+    distance = np.linalg.norm(space.mesh.points - tip.x, axis=1)
+    turn = np.stack([mean_rotation(s, distance, float(radii.max())) for s in solutions], axis=-1)
+    total = lip_terms(solutions, t, radii, turn)
+    coefficients = np.stack([solution.coefficients for solution in solutions], axis=-1)
+    # Within the inner radius grad q vanishes: only loads of the volume need points there.
+    loaded = acts(solutions, BodyForce, InitialStress)
+    hollow = 0.0 if loaded else float(inner_radii(space.order, radii).min())
+    for points, x in domain_points(space, tip.x, (hollow, float(radii.max()))):
+        gradient = gradients_at(space, coefficients, points.cell, points.bary, points.side)
+        total += domain_terms(solutions, t, radii, points, x, gradient - turn)
+    return total
 
 
 def domain_radius(solution: Solution, t: int) -> tuple[float, float, float]:
@@ -62,33 +137,3 @@ def domain_points(
             between = (hollow < r) & (r < radius)
             parts.append((points.chosen(between), x[between]))
     return parts
-
-
-def inner_radii(order: int, radii: Floats) -> Floats:
-    """Radii within which the weight q is one, length."""
-    return _RING[order] * radii
-
-
-def weight(order: int, r: Floats, xi: Floats, radii: Floats) -> tuple[Floats, Floats]:
-    """Weight q, one inside and zero outside by a quintic, and its gradient, for each domain."""
-    inner = inner_radii(order, radii)[:, None]
-    width = radii[:, None] - inner
-    z = np.clip((r - inner) / width, 0.0, 1.0)
-    q = 1 - z**3 * (10 - 15 * z + 6 * z**2)
-    slope = -30 * z**2 * (1 - z) ** 2 / width
-    return q, slope[..., None] * (xi / np.maximum(r, 1e-300)[:, None])[None]
-
-
-def mean_rotation(solution: Solution, t: int, radius: float) -> Floats:
-    """Mean rotation of the mesh points around tip t `(d, d)`.
-
-    A rigid rotation adds nothing to I but the quadrature error of a term that would vanish.
-    """
-    space = solution.space
-    x = space.mesh.points - space.tips[t].x
-    near = np.nonzero(np.linalg.norm(x, axis=1) < radius)[0]
-    if len(near) < 2:
-        return np.zeros((2, 2))
-    y, u = x[near] - x[near].mean(axis=0), solution.coefficients[near]
-    w = float((y[:, 0] * u[:, 1] - y[:, 1] * u[:, 0]).sum() / (y * y).sum())
-    return np.array([[0.0, -w], [w, 0.0]])

@@ -16,11 +16,10 @@ from xcrack.mesh.locate import contains
 from xcrack.mesh.sizes import leg_size
 from xcrack.scene.conditions import (
     BodyForce,
-    CrackPressure,
     InitialStress,
     evaluate,
-    evaluate_scalar,
 )
+from xcrack.sif.common import acts, lip_pressure, mean_rotation
 from xcrack.sif.interaction_3d import (
     front_nodes,
     full_measure,
@@ -29,6 +28,7 @@ from xcrack.sif.interaction_3d import (
     lip_integrals,
     solve_front,
 )
+from xcrack.sif.sif import SIF
 from xcrack.sif.smoothing_3d import along, smoothed
 from xcrack.xfem.loads import position
 from xcrack.xfem.quadrature import cell_points, cell_side
@@ -114,10 +114,8 @@ def way_inside(solution: Solution, curve: FrontCurve) -> tuple[float, float] | N
     return ends[0], ends[1]
 
 
-def front_intensity(
-    solutions: Sequence[Solution], t: int
-) -> list[tuple[Floats, Floats, Floats, Floats, Floats, Bools]]:
-    """K at the vertices of one front, for several load states of one solve.
+def front_intensity(solutions: Sequence[Solution], t: int) -> list[SIF]:
+    """K at the vertices of one front in the body, for several load states of one solve.
 
     Parameters
     ----------
@@ -128,10 +126,8 @@ def front_intensity(
 
     Returns
     -------
-    list of (K, spread, x, frame, s, at_surface)
-        For each state: K `(m, 3)` and the difference of two domains, stress · √length; vertices
-        `(m, 3)`, their frames `(m, 3, 3)`, arc length `(m,)`, and which vertices lie where the
-        tube is cut by the surface of the body or outside: K is prolonged to there.
+    list of SIF
+        Zero, with a warning, where the front is too short for K.
     """
     space = solutions[0].space
     tip = space.tips[t]
@@ -140,14 +136,34 @@ def front_intensity(
     curve = front_curve(tip.x, tip.frame, closed)
     at_vertex = curve.breaks[: len(tip.x)]
     knots, K, valid = front_values(solutions, t, curve)
+    if not valid.any():
+        K = np.zeros_like(K)
+        _warn_short(np.array(tip.x))
     _, frame, _ = curve.at(at_vertex)
-    found = along(K, knots, valid, curve, at_vertex)
-    surface = ~_covered(curve, knots, valid, at_vertex)
-    s = curve.arc(at_vertex)
+    values = along(K, knots, valid, curve, at_vertex)
+    inside = contains(space.mesh, np.array(tip.x))
+    shape = (int(inside.sum()),)
     return [
-        (values[0], np.abs(values[0] - values[1]), np.array(tip.x), frame, s, surface)
-        for values in found
+        SIF(
+            x=np.array(tip.x)[inside],
+            frame=frame[inside],
+            K=first[inside],
+            T=np.full(shape, np.nan),
+            spread=np.abs(first - second)[inside],
+            s=curve.arc(at_vertex)[inside],
+            front=np.zeros(shape, dtype=np.int64),
+            at_surface=~_covered(curve, knots, valid, at_vertex)[inside],
+        )
+        for first, second in values
     ]
+
+
+def _warn_short(x: Floats) -> None:
+    warn(
+        f"the front from {np.round(x[0], 6).tolist()} to {np.round(x[-1], 6).tolist()} is too "
+        "short inside the body for K: no domain around it is whole. K counts as 0 there, and it "
+        "does not grow. Refine the mesh around it."
+    )
 
 
 def _covered(curve: FrontCurve, knots: Floats, valid: Bools, s: Floats) -> Bools:
@@ -190,7 +206,8 @@ def front_values(
     outer, wanted, size = tube_radius(solutions[0], t, curve, ends)
     radii = np.array([outer, SECOND * outer])
     knots = front_nodes(curve, _SPACING * size, None if curve.closed else ends)
-    turn = np.stack([_mean_rotation(s, curve, outer) for s in solutions], axis=-1)
+    distance = curve.distance(solutions[0].space.mesh.points)
+    turn = np.stack([mean_rotation(s, distance, outer) for s in solutions], axis=-1)
     total = _lip_part(solutions, t, curve, knots, radii, turn)
     measure = np.zeros((len(radii), len(knots)))
     for part, volume in _domain_parts(solutions, t, curve, knots, radii, turn):
@@ -241,7 +258,7 @@ def _domain_parts(
     mesh, psi = space.mesh, space.cuts[tip.crack].level_set.psi[tip.number]
     outer = float(radii.max())
     coefficients = np.stack([solution.coefficients for solution in solutions], axis=-1)
-    initial = partial(_initial, solutions) if _has_initial(solutions) else None
+    initial = partial(_initial, solutions) if acts(solutions, InitialStress) else None
     middle = mesh.points[mesh.cells].mean(axis=1)
     distance = curve.distance(middle) - 1.05 * outer
     cells = np.nonzero(distance <= mesh.cell_size)[0]
@@ -279,10 +296,6 @@ def _force(solutions: Sequence[Solution], x: Floats) -> Floats | None:
                 found = True
                 total[:, :, n] += solution.factor * evaluate(load.value, x, "body_force")
     return total if found else None
-
-
-def _has_initial(solutions: Sequence[Solution]) -> bool:
-    return any(isinstance(load, InitialStress) for s in solutions for load in s.loads)
 
 
 def _initial(solutions: Sequence[Solution], x: Floats) -> Floats:
@@ -327,7 +340,7 @@ def _lip_part(
         solutions[0].problem.material,
         radii,
         gradient=gradient,
-        initial=partial(_initial, solutions) if _has_initial(solutions) else None,
+        initial=partial(_initial, solutions) if acts(solutions, InitialStress) else None,
     )
 
 
@@ -357,36 +370,3 @@ def _on_lip(solution: Solution, c: int, rows: Ints, s: int, sign: int) -> tuple[
     side = cell_side(solution.space, cell)
     side[:, c] = sign
     return cell, lips.bary[rows, s], side
-
-
-def lip_pressure(solution: Solution, c: int) -> Floats:
-    """Pressure on the lips of crack c at their points: multipliers and given pressure `(q,)`.
-
-    Parameters
-    ----------
-    solution : Solution
-    c : int
-    """
-    lips, contact = solution.lips[c], solution.contact[c]
-    total = np.zeros(len(lips)) if contact is None else np.array(contact.pressure)
-    for load in solution.loads:
-        if isinstance(load, CrackPressure) and load.crack in (None, c):
-            given = evaluate_scalar(load.value, lips.x, "crack_pressure")
-            total = total + solution.factor * given
-    return total
-
-
-def _mean_rotation(solution: Solution, curve: FrontCurve, radius: float) -> Floats:
-    """Mean rotation of the mesh points around a front `(3, 3)`.
-
-    A rigid rotation adds nothing to the integrals but the error of quadrature of terms that
-    would vanish.
-    """
-    points = solution.space.mesh.points
-    near = np.nonzero(curve.distance(points) < radius)[0]
-    if len(near) < 4:
-        return np.zeros((3, 3))
-    y, u = points[near] - points[near].mean(axis=0), solution.coefficients[near]
-    inertia = (y * y).sum() * np.eye(3) - y.T @ y
-    w = np.linalg.solve(inertia, np.cross(y, u).sum(axis=0))
-    return np.array([[0.0, -w[2], w[1]], [w[2], 0.0, -w[0]], [-w[1], w[0], 0.0]])

@@ -11,148 +11,28 @@ counted in sigma : eps^a, and by its change from there, times the derivative of 
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from xcrack.analysis.solution import Solution, gradients_at
 from xcrack.arrays import Floats
-from xcrack.errors import ProblemError, warn
-from xcrack.scene.conditions import (
-    BodyForce,
-    CrackPressure,
-    InitialStress,
-    evaluate,
-    evaluate_scalar,
-    evaluate_stress,
-)
-from xcrack.sif.domain_2d import domain_points, domain_radius, inner_radii, mean_rotation, weight
-from xcrack.sif.fronts_3d import along_fronts
-from xcrack.sif.sif import SIF
-from xcrack.xfem.lips import LipPoints
+from xcrack.scene.conditions import BodyForce, InitialStress, evaluate, evaluate_stress
+from xcrack.sif.common import acts, lip_pressure, weight
 from xcrack.xfem.quadrature import Points, cell_side
 from xcrack.xfem.williams import continued_polar, mode_matrix, unit_gradients
 
-_SECOND = 0.7  # outer radius of the second domain, as a share of the first
-_WARN = 0.01  # difference of the two domains, as a share of K, that is worth a word
+# Inner radius of the ring in which q falls, as a share of the outer one. At order 1 the ring stays
+# outside the enriched disc; at order 2 a wide ring saves digits on coarse meshes (measured).
+_RING = {1: 0.4, 2: 0.15}
 
 
-def stress_intensity(solution: Solution, crack: int = 0) -> SIF:
-    """K_I, K_II and T at the tips, or K_I to K_III along the fronts of a crack, from two domains.
-
-    Parameters
-    ----------
-    solution : Solution
-    crack : int
-
-    Returns
-    -------
-    SIF
-
-    Raises
-    ------
-    ProblemError
-        No such crack.
-
-    Warns
-    -----
-    XcrackWarning
-        A domain that body or other tips clip below two cells beyond the tip's disc, or two
-        domains that differ by more than 1 % of K there.
-    """
-    return stress_intensities([solution], crack)[0]
+def inner_radii(order: int, radii: Floats) -> Floats:
+    """Radii within which the weight q is one, length."""
+    return _RING[order] * radii
 
 
-def stress_intensities(solutions: Sequence[Solution], crack: int = 0) -> list[SIF]:
-    """K of several load states that one solve returned; what is geometry is made once.
-
-    Parameters
-    ----------
-    solutions : sequence of Solution
-        States of one problem, which share their space.
-    crack : int
-
-    Returns
-    -------
-    list of SIF
-
-    Raises
-    ------
-    ProblemError
-        No such crack, or solutions of different problems.
-    """
-    space = solutions[0].space
-    if any(solution.space is not space for solution in solutions):
-        raise ProblemError("the solutions do not share one space: pass the states of one solve.")
-    if not 0 <= crack < len(space.cuts):
-        raise ProblemError(
-            f"crack {crack}: the problem has {len(space.cuts)} crack(s), numbered from 0."
-        )
-    # Cycles from nothing are the most common ones: their lower state has no K to look for.
-    live = [s for s in solutions if not s.at_rest] or list(solutions[:1])
-    found = along_fronts(live, crack) if space.dim == 3 else _at_tips(live, crack)
-    place = np.cumsum([not s.at_rest for s in solutions]) - 1
-    K, T = np.zeros_like(found[0].K), np.where(np.isnan(found[0].T), np.nan, 0.0)
-    rest = replace(found[0], K=K, T=T, spread=K)
-    return [rest if s.at_rest else found[k] for s, k in zip(solutions, place, strict=True)]
-
-
-def _at_tips(solutions: Sequence[Solution], crack: int) -> list[SIF]:
-    """K_I, K_II and T at the tips of a crack in the plane, for each state."""
-    space = solutions[0].space
-    tips = [t for t, tip in enumerate(space.tips) if tip.crack == crack]
-    by_tip = [_at_tip(solutions, t) for t in tips]
-    d = space.dim
-    return [
-        SIF(
-            x=np.array([space.tips[t].x for t in tips]).reshape(-1, d),
-            frame=np.array([space.tips[t].frame for t in tips]).reshape(-1, d, d),
-            K=np.array([found[k][0] for found in by_tip]).reshape(-1, d),
-            T=np.array([found[k][1] for found in by_tip]),
-            spread=np.array([found[k][2] for found in by_tip]).reshape(-1, d),
-            s=np.zeros(len(tips)),
-            front=np.arange(len(tips)),
-            at_surface=np.zeros(len(tips), dtype=bool),
-        )
-        for k in range(len(solutions))
-    ]
-
-
-def _at_tip(solutions: Sequence[Solution], t: int) -> list[tuple[Floats, float, Floats]]:
-    """K, T and spread of each state at one tip."""
-    space, tip = solutions[0].space, solutions[0].space.tips[t]
-    outer, wanted, size = domain_radius(solutions[0], t)
-    radii = np.array([outer, max(_SECOND * outer, min(outer, 1.5 * size))])
-    E_prime = solutions[0].problem.material.E_prime
-    where = np.round(tip.x, 6).tolist()
-    needed = max(tip.radius + size, 3.0 * size)
-    if outer < min(wanted, needed) * (1 - 1e-12):
-        warn(
-            f"K at {where}: the domain is clipped to {outer:.4g} ({outer / size:.1f} cells) by the "
-            f"boundary or another tip; to leave the enriched disc it needs {needed:.4g}. Refine "
-            "the mesh around the tip."
-        )
-    volume = float(space.mesh.volume.sum())
-    result, worst = [], (0.0, 0.0)
-    for solution, values in zip(solutions, _integrals(solutions, t, radii), strict=True):
-        K = 0.5 * E_prime * values[:, :2]
-        T = E_prime * values[0, 2] + _constant_part(solution, t)
-        spread = np.abs(K[0] - K[1])
-        # At a closed tip K is zero: what counts there is K of the body's mean stress at the disc.
-        mean_stress = np.sqrt(2 * max(solution.energy, 0.0) * E_prime / volume)
-        scale = max(float(np.abs(K).max()), 0.1 * mean_stress * np.sqrt(np.pi * tip.radius))
-        if scale > 0 and spread.max() / scale > worst[1]:
-            worst = float(spread.max()), float(spread.max() / scale)
-        result.append((K[0], float(T), spread))
-    if worst[1] > _WARN:
-        warn(
-            f"K at {where}: domains of radius {radii[0]:.4g} and {radii[1]:.4g} differ by "
-            f"{worst[0]:.3g}, {100 * worst[1]:.2g} % of K there. Refine the mesh around the tip."
-        )
-    return result
-
-
-def _constant_part(solution: Solution, t: int) -> float:
+def constant_part(solution: Solution, t: int) -> float:
     """What pressure on the lips and initial stress at the tip add to E' I / f.
 
     A uniform state gives E' I / f = sigma_11 - sigma_22 for its elastic part: the displacement of
@@ -161,7 +41,7 @@ def _constant_part(solution: Solution, t: int) -> float:
     tip, material = solution.space.tips[t], solution.problem.material
     lips = solution.lips[tip.crack]
     at_tip = int(np.argmin(np.linalg.norm(lips.x - tip.x, axis=1)))
-    pressure = float(_lip_pressure(solution, tip.crack, lips)[at_tip])
+    pressure = float(lip_pressure(solution, tip.crack)[at_tip])
     steady = _steady(solution, t)
     contraction = material.lam / (material.lam + 2 * material.mu)
     return float(steady[0, 0] - contraction * steady[1, 1]) - pressure
@@ -173,25 +53,7 @@ def _steady(solution: Solution, t: int) -> Floats:
     return np.asarray(tip.frame @ solution.initial_stress(tip.x[None])[0] @ tip.frame.T)
 
 
-def _integrals(solutions: Sequence[Solution], t: int, radii: Floats) -> Floats:
-    """I of modes I, II and of the point force for each state and domain `(s, radii, 3)`."""
-    space, tip = solutions[0].space, solutions[0].space.tips[t]
-    turn = np.stack([mean_rotation(s, t, float(radii.max())) for s in solutions], axis=-1)
-    total = _lip_terms(solutions, t, radii, turn)
-    coefficients = np.stack([solution.coefficients for solution in solutions], axis=-1)
-    # Within the inner radius grad q vanishes: only loads of the volume need points there.
-    hollow = 0.0 if _volume_loads(solutions) else float(inner_radii(space.order, radii).min())
-    for points, x in domain_points(space, tip.x, (hollow, float(radii.max()))):
-        gradient = gradients_at(space, coefficients, points.cell, points.bary, points.side)
-        total += _domain_terms(solutions, t, radii, points, x, gradient - turn)
-    return total
-
-
-def _volume_loads(solutions: Sequence[Solution]) -> bool:
-    return any(isinstance(load, BodyForce | InitialStress) for s in solutions for load in s.loads)
-
-
-def _domain_terms(
+def domain_terms(
     solutions: Sequence[Solution],
     t: int,
     radii: Floats,
@@ -214,8 +76,8 @@ def _domain_terms(
         np.ascontiguousarray(tip.frame), mode_matrix(material.kolosov, material.mu),
         material.kolosov, material.lam, material.mu,
     )  # fmt: skip
-    if _volume_loads(solutions):
-        q, dq = weight(space.order, r, xi, radii)
+    if acts(solutions, BodyForce, InitialStress):
+        q, dq = weight(r, xi, inner_radii(space.order, radii), radii)
         weighted = points.weight[:, None] * dq  # (radii, q, d)
         for m, field in enumerate(_auxiliary(solutions, r, theta)):
             for s, solution in enumerate(solutions):
@@ -237,7 +99,7 @@ def _auxiliary(solutions: Sequence[Solution], r: Floats, theta: Floats) -> list[
     material = solutions[0].problem.material
     gradients = unit_gradients(r, theta, material.kolosov, material.mu)
     curves = np.zeros((len(gradients), 0, 2, 2))
-    if any(isinstance(load, InitialStress) for s in solutions for load in s.loads):
+    if acts(solutions, InitialStress):
         curves = _ahead_derivative(solutions[0], r, theta)
     return [_Field(g, material.stress(g), c) for g, c in zip(gradients, curves, strict=True)]
 
@@ -279,7 +141,7 @@ def _load_terms(
     return total
 
 
-def _lip_terms(solutions: Sequence[Solution], t: int, radii: Floats, turn: Floats) -> Floats:
+def lip_terms(solutions: Sequence[Solution], t: int, radii: Floats, turn: Floats) -> Floats:
     """Full lip term of each state, domain and field `(s, radii, 3)`; turn: (d, d, s)."""
     space = solutions[0].space
     tip, lips = space.tips[t], solutions[0].lips[space.tips[t].crack]
@@ -287,7 +149,7 @@ def _lip_terms(solutions: Sequence[Solution], t: int, radii: Floats, turn: Float
     near = np.linalg.norm(lips.x - tip.x, axis=1) < radii.max()
     if not near.any():
         return result
-    pressure = np.stack([_lip_pressure(s, tip.crack, lips)[near] for s in solutions])
+    pressure = np.stack([lip_pressure(s, tip.crack)[near] for s in solutions])
     R = tip.frame
     material = solutions[0].problem.material
     xi = (lips.x[near] - tip.x) @ R.T
@@ -305,7 +167,7 @@ def _lip_terms(solutions: Sequence[Solution], t: int, radii: Floats, turn: Float
         side[:, tip.crack] = sign
         r, theta = continued_polar(xi, side[:, tip.crack], behind)
         outward = -sign * lips.normal[near] @ R.T
-        q, _ = weight(space.order, r, xi, radii)
+        q, _ = weight(r, xi, inner_radii(space.order, radii), radii)
         aux = _auxiliary(solutions, r, theta)
         local = None
         if bent:
@@ -321,14 +183,3 @@ def _lip_terms(solutions: Sequence[Solution], t: int, radii: Floats, turn: Float
                     density -= np.einsum("qij,qij->q", sigma, field.gradient) * outward[:, 0]
                 result[k, :, m] -= q @ (w * density)
     return result
-
-
-def _lip_pressure(solution: Solution, c: int, lips: LipPoints) -> Floats:
-    """Pressure on the lips at their points: multipliers and given pressure `(q,)`."""
-    contact = solution.contact[c]
-    total = np.zeros(len(lips)) if contact is None else np.array(contact.pressure)
-    for load in solution.loads:
-        if isinstance(load, CrackPressure) and load.crack in (None, c):
-            given = evaluate_scalar(load.value, lips.x, "crack_pressure")
-            total = total + solution.factor * given
-    return total

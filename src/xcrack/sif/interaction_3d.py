@@ -17,6 +17,7 @@ import numpy as np
 from xcrack.arrays import Bools, Floats, Ints
 from xcrack.crack.front_curve import Feet, FrontCurve
 from xcrack.scene.material import Isotropic
+from xcrack.sif.common import weight_integral
 from xcrack.xfem.williams import continued_polar
 
 RING = 0.4  # share of a radius at which the weight starts to fall; 1 inside
@@ -262,8 +263,7 @@ def full_measure(curve: FrontCurve, knots: Floats, radii: Floats) -> Floats:
     radii : (k,) array, length
     """
     radii = np.asarray(radii, dtype=float)
-    inner, width = RING * radii, (1 - RING) * radii
-    section = 2 * np.pi * (inner**2 / 2 + width * (inner / 2 + width / 7))
+    section = weight_integral(RING * radii, radii)
     return np.asarray(section[:, None] * _mass(curve, knots).sum(axis=1))
 
 

@@ -1,10 +1,11 @@
 """Stress intensity factors at the tips or along the fronts of one crack."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from xcrack.arrays import Bools, Floats, Ints
+from xcrack.arrays import Bools, Floats, Ints, lock
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,3 +72,31 @@ class SIF:
         modes = zip(("K_I", "K_II", "K_III"), low, high, strict=True)
         ranges = ", ".join(f"{name} {a:.6g} to {b:.6g}" for name, a, b in modes)
         return f"SIF({len(self.K)} places on {len(np.unique(self.front))} front(s): {ranges})"
+
+
+def joined(parts: Sequence[SIF], dim: int) -> SIF:
+    """K of all tips or fronts of one crack.
+
+    Parameters
+    ----------
+    parts : sequence of SIF
+        One for each tip or front; their number becomes that of the front.
+    dim : int
+        Of the body: a crack may have no tip.
+    """
+    count = [len(part.K) for part in parts]
+
+    def rows(name: str, *shape: int) -> Floats:
+        values = [getattr(part, name) for part in parts]
+        return lock(np.concatenate([np.zeros((0, *shape)), *values]))
+
+    return SIF(
+        x=rows("x", dim),
+        frame=rows("frame", dim, dim),
+        K=rows("K", dim),
+        T=rows("T"),
+        spread=rows("spread", dim),
+        s=rows("s"),
+        front=lock(np.repeat(np.arange(len(parts)), count)),
+        at_surface=lock(rows("at_surface").astype(bool)),
+    )

@@ -1,0 +1,87 @@
+"""What K at the tips of 2D and along the fronts of 3D share."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from xcrack.analysis.solution import Solution
+from xcrack.arrays import Floats
+from xcrack.scene.conditions import CrackPressure, Load, evaluate_scalar
+
+
+def weight(r: Floats, xi: Floats, inner: Floats, outer: Floats) -> tuple[Floats, Floats]:
+    """Weight q of a domain integral, one inside and zero outside by a quintic, and its gradient.
+
+    Parameters
+    ----------
+    r : (q,) array, length
+        Distance to the tip.
+    xi : (q, d) array, length
+        Places from the tip.
+    inner, outer : (k,) arrays, length
+        Radii of each domain between which q falls.
+
+    Returns
+    -------
+    q : (k, q) array
+    gradient : (k, q, d) array, 1/length
+    """
+    inner = inner[:, None]
+    width = outer[:, None] - inner
+    z = np.clip((r - inner) / width, 0.0, 1.0)
+    q = 1 - z**3 * (10 - 15 * z + 6 * z**2)
+    slope = -30 * z**2 * (1 - z) ** 2 / width
+    return q, slope[..., None] * (xi / np.maximum(r, 1e-300)[:, None])[None]
+
+
+def weight_integral(inner: Floats, outer: Floats) -> Floats:
+    """Integral of the weight q over a section of the tube around a front `(k,)`, length²."""
+    width = outer - inner
+    return np.asarray(2 * np.pi * (inner**2 / 2 + width * (inner / 2 + width / 7)))
+
+
+def mean_rotation(solution: Solution, distance: Floats, radius: float) -> Floats:
+    """Mean rotation of the mesh points around a tip or front `(d, d)`.
+
+    A rigid rotation adds nothing to the integrals but the quadrature error of terms that would
+    vanish.
+
+    Parameters
+    ----------
+    solution : Solution
+    distance : (n,) array, length
+        Of the mesh points to the tip or front.
+    radius : float, length
+    """
+    points = solution.space.mesh.points
+    d = points.shape[1]
+    near = np.nonzero(distance < radius)[0]
+    if len(near) <= d:
+        return np.zeros((d, d))
+    y, u = np.zeros((2, len(near), 3))  # 2D turns about the third axis
+    y[:, :d], u[:, :d] = points[near] - points[near].mean(axis=0), solution.coefficients[near]
+    inertia = (y * y).sum() * np.eye(3) - y.T @ y
+    w = np.linalg.solve(inertia, np.cross(y, u).sum(axis=0))
+    return np.array([[0.0, -w[2], w[1]], [w[2], 0.0, -w[0]], [-w[1], w[0], 0.0]])[:d, :d]
+
+
+def lip_pressure(solution: Solution, c: int) -> Floats:
+    """Pressure on the lips of crack c at their points: multipliers and given pressure `(q,)`.
+
+    Parameters
+    ----------
+    solution : Solution
+    c : int
+    """
+    lips, contact = solution.lips[c], solution.contact[c]
+    total = np.zeros(len(lips)) if contact is None else np.array(contact.pressure)
+    for load in solution.loads:
+        if isinstance(load, CrackPressure) and load.crack in (None, c):
+            given = evaluate_scalar(load.value, lips.x, "crack_pressure")
+            total = total + solution.factor * given
+    return total
+
+
+def acts(solutions: Sequence[Solution], *kinds: type[Load]) -> bool:
+    """Whether loads of one of these kinds act in any of the states."""
+    return any(isinstance(load, kinds) for s in solutions for load in s.loads)
