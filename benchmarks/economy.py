@@ -108,7 +108,7 @@ def edge(
         )  # fmt: skip
 
     def judge(solution: xc.Solution, sif: xc.SIF) -> Errors:
-        K = np.abs(sif.K[0]) / solution.factor
+        K = np.abs(sif.K_integral[0]) / solution.factor
         if not p:
             return {"K": np.abs(K / modes - 1).max()}
         off = abs(K - (0.0, modes[1])) / (modes[1] or 1.0)
@@ -170,7 +170,7 @@ def disc(
         )  # fmt: skip
 
     def judge(solution: xc.Solution, sif: xc.SIF) -> Errors:
-        K = sif.K / solution.factor
+        K = sif.K_integral / solution.factor
         if tension > 0:
             wrong = K[:, 0] / penny_K_I(0.5, tension) - 1
             return {"mean K_I": abs(wrong.mean()), "K_I along front": np.sqrt((wrong**2).mean())}

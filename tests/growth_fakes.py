@@ -37,6 +37,8 @@ def sif(crack, K):
         s=np.zeros(n),
         front=np.arange(n),
         at_surface=np.zeros(n, dtype=bool),
+        closed=np.zeros(n, dtype=bool),
+        domain_cells=np.full(n, 4.0),
     )
 
 

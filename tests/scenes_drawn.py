@@ -123,7 +123,7 @@ def _penny_error(rng, n, a, Q, centre, stress):
     )  # fmt: skip
     sif = scenes_fronts.K_along(problem)
     wanted = scenes_fronts.exact_K(sif.x, (centre, Q), a, None, stress)
-    return _mean_square(sif.K - wanted) / _mean_square(wanted)
+    return _mean_square(sif.K_integral - wanted) / _mean_square(wanted)
 
 
 def straight(rng, n):

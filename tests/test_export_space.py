@@ -219,7 +219,18 @@ def made_up(tip, K):
     m = len(tip.x)
     zero = np.zeros(m)
     s = np.append(0, np.cumsum(np.linalg.norm(np.diff(tip.x, axis=0), axis=1)))
-    return xc.SIF(tip.x, tip.frame, K, zero, 0 * K, s, np.zeros(m, int), np.zeros(m, bool))
+    return xc.SIF(
+        tip.x,
+        tip.frame,
+        K,
+        zero,
+        0 * K,
+        s,
+        np.zeros(m, int),
+        np.zeros(m, bool),
+        np.zeros(m, bool),
+        zero,
+    )
 
 
 def test_the_same_solution_gives_the_same_bytes(tmp_path, penny):

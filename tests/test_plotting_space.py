@@ -204,7 +204,9 @@ def ring(radius, n, modes=3, part=1.0):
     if part < 1:
         surface[[0, -1]] = True
     x = radius * ahead + [0, 0, 0.2]
-    return xc.SIF(x, frame, K, 0 * angle, 0 * K, radius * angle, np.zeros(n, int), surface)
+    return xc.SIF(
+        x, frame, K, 0 * angle, 0 * K, radius * angle, np.zeros(n, int), surface, surface, 0 * angle
+    )
 
 
 def ring_step(index, n=24):

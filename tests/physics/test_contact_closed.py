@@ -237,7 +237,7 @@ def sliding_edge_crack(n, order, which, multipliers="reduced"):
     sif = xc.stress_intensity(solution)
     inner = scenes.inner_part(contact.s)
     return (
-        abs(sif.K_I[0]),
+        abs(sif.K_integral[0, 0]),
         abs(sif.K_II[0] / 0.6 - 1),
         scenes.l2(contact.pressure, p, contact.measure),
         float(np.abs(contact.pressure - p)[inner].max()),

@@ -135,7 +135,7 @@ def closed_penny(h):
     sif = xc.stress_intensity(solution)
     wanted = fronts.exact_K(sif.x, place, A, None, stress)
     shear = np.abs(sif.K - wanted)[:, 1:].max(axis=0) / np.abs(wanted[:, 1:]).max(axis=0)
-    K_I = np.abs(sif.K_I).max() / K_0
+    K_I = np.abs(sif.K_integral[:, 0]).max() / K_0
     print(f"\nclosed penny a/h = {A / h:.1f}: p {pressure:.4f}, K_I {K_I:.4f}, others {shear}")
     return pressure, K_I, shear
 

@@ -1,4 +1,4 @@
-"""K along the fronts of a solution in space: radii, points, loads, and values at the vertices."""
+"""K along the fronts of a solution in 3D: radii, points, loads, and values at the vertices."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -19,6 +19,8 @@ from xcrack.scene.conditions import (
     InitialStress,
     evaluate,
 )
+from xcrack.sif.accuracy import Domain, check
+from xcrack.sif.closure import with_closed
 from xcrack.sif.common import acts, lip_pressure, mean_rotation
 from xcrack.sif.interaction_3d import (
     front_nodes,
@@ -41,18 +43,16 @@ _REACH = 1.05
 _BENT = 0.9  # largest outer radius, as a share of the radius of curvature of the front
 _SPACING = 2.0  # of the hats, in legs: with less K scatters more
 _SMOOTH = 12  # hats; fewer are so far apart that smoothing would cut off what varies
-_LEAST = 1.2  # legs; a smaller domain is none
+_LEAST = 1.2  # legs; the radius of the smallest domain
 _POINTS, _DEGREE = 5, 4  # 6 takes twice the time and is as far from 8, which differs by 0.3 %
-_NARROW = 1.5  # legs; a domain clipped below is worth a word
-_DIFFER = 0.05  # difference of two domains, as a share of the largest K, that is worth a word
+_NARROW = 1.5  # legs; a domain clipped below gives a warning
+_DIFFER = 0.05  # difference of two domains, as a share of the largest K, that gives a warning
 _CHUNK = 2000  # cells integrated at once; bounds the memory
 _SAMPLES = 400  # points of an open front among which its way into the body is looked for
 
 
-def tube_radius(
-    solution: Solution, t: int, curve: FrontCurve, ends: tuple[float, float]
-) -> tuple[float, float, float]:
-    """Outer radius of the tube around a front, the wanted one, and the size of cells, length.
+def tube_of(solution: Solution, t: int, curve: FrontCurve, ends: tuple[float, float]) -> Domain:
+    """Radius of the tube around a front, and the room for it.
 
     Parameters
     ----------
@@ -71,24 +71,42 @@ def tube_radius(
     wanted = solution.problem.numerics.domain
     if wanted is None:
         wanted = max(_OUTER * size, _REACH * tip.radius)
-    # Near the exits hats are left out anyway; a bend there must not narrow the whole tube.
-    ahead = 0.0 if curve.closed else min(wanted, 0.4 * (ends[1] - ends[0]))
-    limit = _BENT * curve.sharpest(ends[0] + ahead, ends[1] - ahead, over=2 * size)
     s = np.linspace(*ends, max(8, round((ends[1] - ends[0]) / (2 * size))) + 1)
     x = curve.at(s)[0]
-    # Near its exits a front is close to the boundary; that is dealt with by leaving out hats.
+    # Near its exits a front is close to the boundary; that is dealt with by leaving out hats, and
+    # neither that nor a bend there must narrow the whole tube.
     inner = np.ones(len(s), dtype=bool)
+    ahead = 0.0 if curve.closed else min(wanted, 0.4 * (ends[1] - ends[0]))
     if not curve.closed:
-        inner = np.minimum(s - ends[0], ends[1] - s) >= min(wanted, 0.4 * (ends[1] - ends[0]))
-    free = np.abs(Body.of(space.mesh).depth(x[inner])[0])
-    limit = min(limit, 0.95 * float(free.min()))
+        inner = np.minimum(s - ends[0], ends[1] - s) >= ahead
+    room = _BENT * _bends(curve, s, (ends[0] + ahead, ends[1] - ahead), 2 * size)
+    depth = np.abs(Body.of(space.mesh).depth(x[inner])[0])
+    room[inner] = np.minimum(room[inner], 0.95 * depth)
     for other in space.tips:
         if other is not tip:
-            limit = min(limit, 0.8 * float(cKDTree(other.x).query(x)[0].min()))
+            room = np.minimum(room, 0.8 * cKDTree(other.x).query(x)[0])
     for c, lips in enumerate(solution.lips):
         if c != tip.crack and len(lips):
-            limit = min(limit, 0.9 * float(cKDTree(lips.x).query(x)[0].min()))
-    return min(wanted, max(limit, _LEAST * size)), wanted, size
+            room = np.minimum(room, 0.9 * cKDTree(lips.x).query(x)[0])
+    least = float(room.min())
+    return Domain(
+        outer=min(wanted, max(least, _LEAST * size)),
+        wanted=wanted,
+        room=least,
+        least=_NARROW * size,
+        short=False,
+        size=size,
+        narrowest=x[int(room.argmin())],
+        differ=_DIFFER,
+        label="K along the front, at",
+    )
+
+
+def _bends(curve: FrontCurve, s: Floats, between: tuple[float, float], over: float) -> Floats:
+    """Smallest radius of curvature around each of evenly spaced parameters `(k,)`, length."""
+    half = 0.51 * (s[1] - s[0])
+    low, high = np.maximum(s - half, between[0]), np.minimum(s + half, between[1])
+    return np.array([curve.sharpest(a, b, over) for a, b in zip(low, high, strict=True)])
 
 
 def way_inside(solution: Solution, curve: FrontCurve) -> tuple[float, float] | None:
@@ -135,27 +153,35 @@ def front_intensity(solutions: Sequence[Solution], t: int) -> list[SIF]:
     closed = bool(number[tip.number][0] == number[tip.number][-1])
     curve = front_curve(tip.x, tip.frame, closed)
     at_vertex = curve.breaks[: len(tip.x)]
-    knots, K, valid = front_values(solutions, t, curve)
+    knots, K, valid, domain = front_values(solutions, t, curve)
+    inside = contains(space.mesh, np.array(tip.x))
     if not valid.any():
         K = np.zeros_like(K)
-        _warn_short(np.array(tip.x))
+        _warn_short(np.array(tip.x)[inside] if inside.any() else np.array(tip.x))
     _, frame, _ = curve.at(at_vertex)
-    values = along(K, knots, valid, curve, at_vertex)
-    inside = contains(space.mesh, np.array(tip.x))
     shape = (int(inside.sum()),)
-    return [
-        SIF(
+    result = []
+    for solution, values in zip(
+        solutions, along(K, knots, valid, curve, at_vertex)[:, :, inside], strict=True
+    ):
+        sif = SIF(
             x=np.array(tip.x)[inside],
             frame=frame[inside],
-            K=first[inside],
+            K=values[0],
             T=np.full(shape, np.nan),
-            spread=np.abs(first - second)[inside],
+            spread=np.abs(values[0] - values[1]),
             s=curve.arc(at_vertex)[inside],
             front=np.zeros(shape, dtype=np.int64),
             at_surface=~_covered(curve, knots, valid, at_vertex)[inside],
+            closed=np.zeros(shape, dtype=bool),
+            domain_cells=np.full(shape, 0.0 if domain is None else domain.outer / domain.size),
         )
-        for first, second in values
-    ]
+        if domain is not None:
+            sif = with_closed(sif, solution, tip.crack, domain.size)
+        result.append(sif)
+    if domain is not None and valid.any() and inside.any():
+        check(solutions, t, domain, result)
+    return result
 
 
 def _warn_short(x: Floats) -> None:
@@ -178,7 +204,7 @@ def _covered(curve: FrontCurve, knots: Floats, valid: Bools, s: Floats) -> Bools
 
 def front_values(
     solutions: Sequence[Solution], t: int, curve: FrontCurve
-) -> tuple[Floats, Floats, Bools]:
+) -> tuple[Floats, Floats, Bools, Domain | None]:
     """K at the tops of the hats of one front.
 
     Parameters
@@ -194,6 +220,8 @@ def front_values(
         Of n states and two domains; smoothed where there are hats enough.
     valid : (p,) array of bool
         Hats whose domains lie in the body.
+    domain : Domain
+        None where no part of the front lies in the body.
     """
     ends = way_inside(solutions[0], curve)
     if ends is None:
@@ -202,8 +230,10 @@ def front_values(
             knots,
             np.full((len(solutions), 2, len(knots), 3), np.nan),
             np.zeros(len(knots), bool),
+            None,
         )
-    outer, wanted, size = tube_radius(solutions[0], t, curve, ends)
+    domain = tube_of(solutions[0], t, curve, ends)
+    outer, size = domain.outer, domain.size
     radii = np.array([outer, SECOND * outer])
     knots = front_nodes(curve, _SPACING * size, None if curve.closed else ends)
     distance = curve.distance(solutions[0].space.mesh.points)
@@ -221,27 +251,7 @@ def front_values(
     period = curve.length if curve.closed and valid.all() else None
     if len(rows) >= _SMOOTH:
         K[:, :, rows] = smoothed(K[:, :, rows], knots[rows], period)
-    _warn(curve, (outer, wanted, size), K[:, :, rows])
-    return knots, K, valid
-
-
-def _warn(curve: FrontCurve, radii: tuple[float, float, float], K: Floats) -> None:
-    """Say where a domain is too small, or two of them disagree."""
-    outer, wanted, size = radii
-    where = np.round(curve.at(np.zeros(1))[0][0], 6).tolist()
-    if outer < wanted and outer < _NARROW * size:
-        warn(
-            f"K along the front through {where}: its domain is clipped to {outer:.4g} "
-            f"({outer / size:.1f} cells) by the boundary, another front or a bend of the front. "
-            "Refine the mesh around the front."
-        )
-    largest = np.abs(K).max(initial=0.0)
-    apart = np.abs(K[:, 0] - K[:, 1]).mean(axis=1).max(initial=0.0)
-    if apart > _DIFFER * largest > 0:
-        warn(
-            f"K along the front through {where}: two domains differ by {apart:.3g} in the mean, "
-            f"{100 * apart / largest:.2g} % of the largest K. Refine the mesh around the front."
-        )
+    return knots, K, valid, domain
 
 
 def _domain_parts(
@@ -268,6 +278,8 @@ def _domain_parts(
         points = cell_points(space, cells[first : first + _CHUNK], _POINTS, _DEGREE)
         x = position(space, points.cell, points.bary)
         near, feet = curve.near(x, outer)
+        if not len(near):
+            continue
         points = points.chosen(near)
         gradient = gradients_at(space, coefficients, points.cell, points.bary, points.side)
         behind = np.einsum("qb,qb->q", psi[mesh.cells[points.cell]], points.bary) < 0
@@ -288,14 +300,14 @@ def _domain_parts(
 
 def _force(solutions: Sequence[Solution], x: Floats) -> Floats | None:
     """Body forces of all states `(q, 3, n)`."""
+    if not acts(solutions, BodyForce):
+        return None
     total = np.zeros((len(x), 3, len(solutions)))
-    found = False
     for n, solution in enumerate(solutions):
         for load in solution.loads:
             if isinstance(load, BodyForce):
-                found = True
                 total[:, :, n] += solution.factor * evaluate(load.value, x, "body_force")
-    return total if found else None
+    return total
 
 
 def _initial(solutions: Sequence[Solution], x: Floats) -> Floats:

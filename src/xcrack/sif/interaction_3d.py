@@ -1,4 +1,4 @@
-"""K along a front in space by interaction integrals with hats along the front.
+"""K along a front in 3D by interaction integrals with hats along the front.
 
 I_j = int P_kj V_k,j + [sigma_ij (u^a_i,jk - eps^a_ij,k) + sigma^a_ij,j u_i,k] V_k dV
 - int_lips P_kj m_j V_k dA, V = hat_j(s) q(r) t(s). The auxiliary fields are those of Williams of
@@ -332,8 +332,8 @@ def solve_front(
     if not len(rows):
         return K
     right = np.moveaxis(I, 3, 0)[rows].reshape(len(rows), -1)
-    found = np.linalg.solve(mixed[np.ix_(rows, rows)], right)
-    K[:, :, rows] = np.moveaxis(found.reshape(len(rows), *I.shape[:3]), 0, 2) * factor
+    solved = np.linalg.solve(mixed[np.ix_(rows, rows)], right)
+    K[:, :, rows] = np.moveaxis(solved.reshape(len(rows), *I.shape[:3]), 0, 2) * factor
     return K
 
 

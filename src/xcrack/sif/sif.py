@@ -15,24 +15,29 @@ class SIF:
     Attributes
     ----------
     x : (f, d) array, length
-        Tips in the order of the crack's points, mouths left out; in space vertices of the fronts
+        Tips in the order of the crack's points, mouths left out; in 3D vertices of the fronts
         inside the body, in the direction of the last row of their frames.
     frame : (f, d, d) array
-        Rows (ahead, normal), in space (ahead, normal, ahead x normal).
+        Rows (ahead, normal), in 3D (ahead, normal, ahead x normal).
     K : (f, 2 or 3) array, stress · √length
-        Columns I, II and in space III; K_II is positive for a positive shear in the frame
+        Columns I, II and in 3D III; K_II is positive for a positive shear in the frame
         (ahead, normal), K_III for one in (ahead x normal, normal).
     T : (f,) array, stress
-        Stress along the lips; nan in space, where it is not computed.
-    spread : (f, 2 or 3) array
-        Difference between two domains, stress · √length.
+        Stress along the crack faces (lips); nan in 3D, where it is not computed.
+    spread : (f, 2 or 3) array, stress · √length
+        Difference between two domains; of K_I at closed places, what the integral gave there.
     s : (f,) array, length
-        Position along the front; zero in the plane.
+        Position along the front; zero in 2D.
     front : (f,) array of int
-        Which front.
+        Which tip or front.
     at_surface : (f,) array of bool
         Places where a front is so close to a free surface that K, which has no meaning there, is
-        prolonged from inside; never in the plane.
+        prolonged from inside; never in 2D.
+    closed : (f,) array of bool
+        Places up to which the lips press together: K_I is exactly zero there. Never so on a crack
+        without multipliers.
+    domain_cells : (f,) array
+        Outer radius of the larger domain, in cells; few of them mean a domain that is clipped.
     """
 
     x: Floats
@@ -43,6 +48,8 @@ class SIF:
     s: Floats
     front: Ints
     at_surface: Bools
+    closed: Bools
+    domain_cells: Floats
 
     @property
     def K_I(self) -> Floats:
@@ -56,13 +63,23 @@ class SIF:
 
     @property
     def K_III(self) -> Floats:
-        """Tearing mode `(f,)`; zero in the plane."""
+        """Tearing mode `(f,)`; zero in 2D."""
         return self.K[:, 2] if self.K.shape[1] > 2 else np.zeros(len(self.K))
+
+    @property
+    def K_integral(self) -> Floats:
+        """K as the integrals gave it `(f, 2 or 3)`: its K_I of closed places, without sign."""
+        K = np.array(self.K)
+        K[self.closed, 0] = self.spread[self.closed, 0]
+        return K
 
     def __repr__(self) -> str:
         if self.K.shape[1] == 3:
             return self._along()
-        rows = ", ".join(f"({k[0]:.6g}, {k[1]:.6g})" for k in self.K)
+        rows = ", ".join(
+            f"({k[0]:.6g}, {k[1]:.6g}){' closed' if closed else ''}"
+            for k, closed in zip(self.K, self.closed, strict=True)
+        )
         return f"SIF(K = [{rows}])"
 
     def _along(self) -> str:
@@ -71,7 +88,13 @@ class SIF:
         low, high = self.K.min(axis=0), self.K.max(axis=0)
         modes = zip(("K_I", "K_II", "K_III"), low, high, strict=True)
         ranges = ", ".join(f"{name} {a:.6g} to {b:.6g}" for name, a, b in modes)
-        return f"SIF({len(self.K)} places on {len(np.unique(self.front))} front(s): {ranges})"
+        notes = "".join(
+            f", {np.count_nonzero(rows)} {name}"
+            for name, rows in (("closed", self.closed), ("at a surface", self.at_surface))
+            if rows.any()
+        )
+        fronts = len(np.unique(self.front))
+        return f"SIF({len(self.K)} places on {fronts} front(s){notes}: {ranges})"
 
 
 def joined(parts: Sequence[SIF], dim: int) -> SIF:
@@ -99,4 +122,6 @@ def joined(parts: Sequence[SIF], dim: int) -> SIF:
         s=rows("s"),
         front=lock(np.repeat(np.arange(len(parts)), count)),
         at_surface=lock(rows("at_surface").astype(bool)),
+        closed=lock(rows("closed").astype(bool)),
+        domain_cells=rows("domain_cells"),
     )

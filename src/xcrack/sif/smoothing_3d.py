@@ -21,7 +21,7 @@ def smoothed(K: Floats, s: Floats, period: float | None, window: int = 5) -> Flo
     period : float, length, optional
         Of a closed front.
     window : int
-        Values each quadratic runs through; linear and quadratic variation is kept.
+        Values each quadratic runs through; linear and quadratic variation stays as it is.
 
     Returns
     -------

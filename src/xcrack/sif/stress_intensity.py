@@ -2,11 +2,13 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from xcrack.analysis.solution import Solution
 from xcrack.errors import ProblemError
+from xcrack.inputs import whole
 from xcrack.sif.domain_2d import tip_intensity
 from xcrack.sif.domain_3d import front_intensity
 from xcrack.sif.sif import SIF, joined
@@ -19,22 +21,33 @@ def stress_intensity(solution: Solution, crack: int = 0) -> SIF:
     ----------
     solution : Solution
     crack : int
+        Its number in the problem.
 
     Returns
     -------
     SIF
+        K_I of closed tips and places of fronts is exactly zero.
 
     Raises
     ------
     ProblemError
-        No such crack.
+        Not a solution, or no such crack.
 
     Warns
     -----
     XcrackWarning
-        A domain that body or other tips clip below two cells beyond the tip's disc, or two
-        domains that differ by more than 1 % of K there.
+        A domain with too little room for small errors; two domains that differ by more than 1 % of
+        K at a tip, or by 5 % of the largest K in the mean of a front; a contact zone at a tip or
+        front that is shorter than two cells; a front too short for K.
     """
+    if not isinstance(solution, Solution):
+        hint = ""
+        if isinstance(solution, list | tuple):
+            hint = "; stress_intensities takes the solutions of one solve"
+        raise ProblemError(
+            f"stress_intensity takes a Solution as solve returns it, not a "
+            f"{type(solution).__name__}{hint}."
+        )
     return stress_intensities([solution], crack)[0]
 
 
@@ -46,30 +59,66 @@ def stress_intensities(solutions: Sequence[Solution], crack: int = 0) -> list[SI
     solutions : sequence of Solution
         States of one problem, which share their space.
     crack : int
+        Its number in the problem.
 
     Returns
     -------
     list of SIF
+        One for each solution, as of `stress_intensity`.
 
     Raises
     ------
     ProblemError
-        No such crack, or solutions of different problems.
+        Not a list of solutions, solutions of different solves, or no such crack.
+
+    Warns
+    -----
+    XcrackWarning
+        As of `stress_intensity`.
     """
+    solutions = _checked(solutions)
     space = solutions[0].space
-    if any(solution.space is not space for solution in solutions):
-        raise ProblemError("the solutions do not share one space: pass the states of one solve.")
+    crack = whole(crack, "crack")
     if not 0 <= crack < len(space.cuts):
         raise ProblemError(
             f"crack {crack}: the problem has {len(space.cuts)} crack(s), numbered from 0."
         )
     # Cycles from nothing are the most common ones: their lower state has no K to look for.
-    live = [s for s in solutions if not s.at_rest] or list(solutions[:1])
+    live = [s for s in solutions if not s.at_rest] or solutions[:1]
     intensity = front_intensity if space.dim == 3 else tip_intensity
     ends = [t for t, tip in enumerate(space.tips) if tip.crack == crack]
     by_end = [intensity(live, t) for t in ends]
     by_state = [joined([states[k] for states in by_end], space.dim) for k in range(len(live))]
     place = np.cumsum([not s.at_rest for s in solutions]) - 1
     K, T = np.zeros_like(by_state[0].K), np.where(np.isnan(by_state[0].T), np.nan, 0.0)
-    rest = replace(by_state[0], K=K, T=T, spread=K)
+    rest = replace(by_state[0], K=K, T=T, spread=K, closed=np.zeros(len(K), dtype=bool))
     return [rest if s.at_rest else by_state[k] for s, k in zip(solutions, place, strict=True)]
+
+
+def _checked(solutions: Any) -> list[Solution]:
+    """The solutions as a list, if they are those of one solve."""
+    if isinstance(solutions, Solution):
+        raise ProblemError(
+            "stress_intensities takes a list of solutions: give [solution], or ask "
+            "stress_intensity."
+        )
+    try:
+        result = list(solutions)
+    except TypeError:
+        raise ProblemError(
+            f"stress_intensities takes a list of solutions, not a {type(solutions).__name__}."
+        ) from None
+    if not result:
+        raise ProblemError("stress_intensities: the list of solutions is empty.")
+    for k, solution in enumerate(result):
+        if not isinstance(solution, Solution):
+            raise ProblemError(
+                f"stress_intensities: item {k} is a {type(solution).__name__}, not a Solution as "
+                "solve returns it."
+            )
+    if any(solution.space is not result[0].space for solution in result):
+        raise ProblemError(
+            "the solutions do not share one space: give the states of one solve, and those of "
+            "another solve to another call."
+        )
+    return result

@@ -1,0 +1,153 @@
+"""Warnings about the accuracy of K; their thresholds come from measured errors."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from xcrack.analysis.solution import Solution
+from xcrack.arrays import Floats
+from xcrack.errors import warn
+from xcrack.sif.closure import pressed, shallow
+from xcrack.sif.sif import SIF
+
+_LOAD = 0.1  # share of K of the mean stress of the body that counts where K is next to nothing
+_ZONE = 2.0  # cells; in shorter contact zones the pressure is hardly more than one number
+
+
+@dataclass(frozen=True, eq=False)
+class Domain:
+    """Size of the domain around a tip or front, and what is expected of it.
+
+    Attributes
+    ----------
+    outer : float, length
+        Outer radius of the first domain.
+    wanted : float, length
+        What it would be without neighbours.
+    room : float, length
+        What boundary, other cracks, and bends of a front leave.
+    least : float, length
+        Room below which large errors are common.
+    short : bool
+        Whether the crack is so short that they are common too.
+    size : float, length
+        Of the cells there.
+    narrowest : (d,) array, length
+        Where the room is least.
+    differ : float
+        Share of K by which two domains may differ.
+    label : str
+        How warnings name the place.
+    """
+
+    outer: float
+    wanted: float
+    room: float
+    least: float
+    short: bool
+    size: float
+    narrowest: Floats
+    differ: float
+    label: str
+
+    def at(self, x: Floats) -> str:
+        """Name of a place in a warning."""
+        return f"{self.label} {np.round(x, 6).tolist()}"
+
+
+def check(solutions: Sequence[Solution], t: int, domain: Domain, parts: Sequence[SIF]) -> None:
+    """Warn where the domain is clipped too far, two domains differ, or a contact zone is short.
+
+    Parameters
+    ----------
+    solutions : sequence of Solution
+        States of one problem.
+    t : int
+        Tip or front in `space.tips`.
+    domain : Domain
+    parts : sequence of SIF
+        One for each state, with at least one row.
+    """
+    tip = solutions[0].space.tips[t]
+    scales = [_scale(s, part, tip.radius) for s, part in zip(solutions, parts, strict=True)]
+    difference, place = _difference(domain, parts, scales)
+    doubts = [difference, _overlap(solutions, domain, parts, scales)]
+    narrow = domain.room < domain.least or domain.short
+    if domain.outer < domain.wanted * (1 - 1e-12) and (narrow or any(doubts)):
+        place = domain.narrowest
+        doubts.insert(0, _clipped(domain))
+    else:
+        doubts = [difference]
+    if any(doubts):
+        warn(f"{domain.at(place)}: {'; '.join(filter(None, doubts))}. Refine the mesh there.")
+    for solution, part in zip(solutions, parts, strict=True):
+        if _check_zone(solution, tip.crack, domain, part):
+            break
+
+
+def _scale(solution: Solution, part: SIF, radius: float) -> float:
+    """What differences of K are compared with: the largest K, or what the load would make of it.
+
+    K of a closed or shielded tip may be zero: what counts there is K of the body's mean stress at a
+    crack as long as the enriched radius.
+    """
+    volume = float(solution.space.mesh.volume.sum())
+    E_prime = solution.problem.material.E_prime
+    mean_stress = np.sqrt(2 * max(solution.energy, 0.0) * E_prime / volume)
+    return max(float(np.abs(part.K).max()), _LOAD * float(mean_stress * np.sqrt(np.pi * radius)))
+
+
+def _clipped(domain: Domain) -> str:
+    text = (
+        f"the domain is clipped to {domain.outer:.4g} ({domain.outer / domain.size:.1f} cells) by "
+        "the boundary, another tip or crack, or a bend of the front"
+    )
+    if domain.room < domain.least:
+        return f"{text}, and errors are small from {domain.least / domain.size:.3g} cells on"
+    return f"{text}, and the crack is only a few cells long" if domain.short else text
+
+
+def _overlap(
+    solutions: Sequence[Solution], domain: Domain, parts: Sequence[SIF], scales: Sequence[float]
+) -> str:
+    """K_I below zero in a problem with contact: the mesh does not resolve the contact there."""
+    for solution, part, scale in zip(solutions, parts, scales, strict=True):
+        least = float(part.K_I.min())
+        if solution.problem.contact != "off" and least < -domain.differ * scale:
+            return f"K_I = {least:.3g} means lips that overlap where the contact cannot see it"
+    return ""
+
+
+def _difference(
+    domain: Domain, parts: Sequence[SIF], scales: Sequence[float]
+) -> tuple[str, Floats]:
+    """By how much two domains differ where that is too much, and the place."""
+    worst, text, place = domain.differ, "", domain.narrowest
+    for part, scale in zip(parts, scales, strict=True):
+        spread = np.array(part.spread)
+        spread[part.closed, 0] = 0.0  # K_I is exact there
+        inner = ~part.at_surface if not part.at_surface.all() else part.at_surface
+        apart = float(spread[inner].mean(axis=0).max())
+        if scale > 0 and apart / scale > worst:
+            worst = apart / scale
+            place = part.x[inner][np.argmax(spread[inner].max(axis=1))]
+            text = (
+                f"domains of radius {domain.outer:.4g} and less differ by {apart:.3g}, "
+                f"{100 * worst:.2g} % of the largest K"
+            )
+    return text, place
+
+
+def _check_zone(solution: Solution, c: int, domain: Domain, part: SIF) -> bool:
+    """Warn of a contact zone that is short wherever it touches a front; whether it is."""
+    touching = pressed(part, solution, c)
+    short = shallow(part, solution, c, _ZONE * domain.size)
+    if not touching.any() or (touching & ~short).any():
+        return False
+    warn(
+        f"{domain.at(part.x[np.argmax(touching)])}: the contact zone there is shorter than two "
+        f"cells ({_ZONE * domain.size:.4g}): its pressure and its end are not resolved. Refine the "
+        "mesh there."
+    )
+    return True
