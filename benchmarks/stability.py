@@ -29,9 +29,9 @@ sys.path.insert(0, str(ROOT / "tests"))
 RESULTS = ROOT / "benchmarks" / "results" / "stability.json"
 SEEDS, SEEDS_3D = "510000:511000", "610000:610100"
 
-import scenes_drawn  # noqa: E402
 import xcrack as xc  # noqa: E402
 from benchmarks import stability_cycles, stability_figures, stability_parts  # noqa: E402
+from support import scenes_drawn  # noqa: E402
 
 PARTS = {part.__name__: part for part in (*stability_parts.PARTS, stability_cycles.cycles)}
 

@@ -2,10 +2,10 @@
 
 import numpy as np
 
-import scenes
 import xcrack as xc
 from benchmarks.stability_parts import Results, short
 from physics import test_contact_partial
+from support import scenes_2d as scenes
 from xcrack.arrays import Floats
 from xcrack.growth.criteria import kink_angle, max_hoop_stress, mean_reference, weighted_angle
 

@@ -9,8 +9,6 @@ from typing import Any
 
 import numpy as np
 
-import scenes
-import scenes_space
 import xcrack as xc
 from physics import (
     test_conditioning,
@@ -23,7 +21,9 @@ from physics import (
     test_space_infsup,
     test_space_patch,
 )
-from scenes_stability import (
+from support import scenes_2d as scenes
+from support import scenes_3d as scenes_space
+from support.scenes_stability import (
     BASES,
     ENRICHMENTS,
     arc_error,

@@ -4,7 +4,7 @@
     PYTHONPATH=<old>/src:<old>/tests python benchmarks/warnings_of_K.py --label 0fd7707
     python benchmarks/warnings_of_K.py --seeds 0:0             # tables of what is stored
 
-Scenes are those of tests/scenes_of_K.py. Results of each label add up in
+Scenes are those of tests/support/scenes_of_K.py. Results of each label add up in
 benchmarks/results/warnings_of_K.json, seed by seed: a run that was stopped goes on. References are
 stored with the first label that needed them.
 """
@@ -25,8 +25,7 @@ RESULTS = ROOT / "benchmarks" / "results" / "warnings_of_K.json"
 LIMITS = (0.01, 0.05)
 CLASSES = ("below 1 %", "1 % to 5 %", "above 5 %")
 
-import outcomes_of_K  # noqa: E402
-import scenes_of_K  # noqa: E402
+from support import outcomes_of_K, scenes_of_K  # noqa: E402
 
 REFERENCED = {kind.__name__ for kind in scenes_of_K.REFERENCED}
 

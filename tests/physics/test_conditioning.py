@@ -9,9 +9,9 @@ from functools import cache
 import numpy as np
 import pytest
 
-import exact
-import scenes
 import xcrack as xc
+from support import exact
+from support import scenes_2d as scenes
 
 EPS = (0.1, 1e-2, 1e-3, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12, 0.0)
 

@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import exact
-import scenes
 import xcrack as xc
+from support import exact
+from support import scenes_2d as scenes
 
 MESHES = Path(__file__).parents[2] / "examples" / "meshes"
 

@@ -9,10 +9,10 @@ from functools import cache
 import numpy as np
 import pytest
 
-import exact
-import scenes
 import xcrack as xc
-from scenes import SIDES
+from support import exact
+from support import scenes_2d as scenes
+from support.scenes_2d import SIDES
 from xcrack.analysis.solve import solve_states
 
 pytestmark = pytest.mark.filterwarnings("ignore::xcrack.XcrackWarning")

@@ -7,10 +7,10 @@ of mesh size, cut position and tip position.
 import numpy as np
 import pytest
 
-import exact
-import scenes
 import xcrack as xc
-from scenes import SIDES, numerics_of
+from support import exact
+from support import scenes_2d as scenes
+from support.scenes_2d import SIDES, numerics_of
 
 P0 = 2.5
 EXACT = 1e-10  # round-off; measured 1e-15 to 2e-12

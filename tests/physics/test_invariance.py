@@ -7,8 +7,8 @@ to is the condition number of the stiffness (1e4 ... 1e6 here) times 1e-16.
 import numpy as np
 import pytest
 
-import scenes
 import xcrack as xc
+from support import scenes_2d as scenes
 
 ROUND_OFF = 1e-8
 SIDES = ("left", "right", "bottom", "top")

@@ -8,9 +8,9 @@ from functools import cache
 import numpy as np
 import pytest
 
-import exact
-import scenes
 import xcrack as xc
+from support import exact
+from support import scenes_2d as scenes
 
 # The coarsest meshes leave less than three cells around the tip for the domain: they say so.
 pytestmark = pytest.mark.filterwarnings("ignore::xcrack.XcrackWarning")

@@ -6,7 +6,7 @@
 import numpy as np
 import pytest
 
-import scenes_stability as scenes
+from support import scenes_stability as scenes
 
 EPS = (0.1, 1e-3, 1e-6, 1e-10, 0.0)
 

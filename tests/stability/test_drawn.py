@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import scenes_drawn
+from support import scenes_drawn
 
 PUBLISHED = Path(__file__).parents[2] / "benchmarks" / "results" / "stability.json"
 

@@ -1,14 +1,14 @@
 """What a multiplier for each node does to pressures, beside the space in use.
 
-`tests/physics/test_infsup.py` and `test_space_infsup.py` have the inf-sup constants.
+`tests/physics/test_inf_sup_2d.py` and `test_inf_sup_3d.py` have the inf-sup constants.
 """
 
 import numpy as np
 import pytest
 
-import exact
-import scenes
 import xcrack as xc
+from support import exact
+from support import scenes_2d as scenes
 
 pytestmark = pytest.mark.filterwarnings("ignore::xcrack.XcrackWarning")
 

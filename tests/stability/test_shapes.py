@@ -1,14 +1,14 @@
 """Shapes at which methods break: arcs hardly wider than a cell, cracks that turn round, free edges.
 
 Exact solutions of arcs (Muskhelishvili), else a finer mesh; all tolerances are of discretisation.
-`tests/physics/test_degenerate.py` has kinks, mesh lines, corners and what is refused.
+`tests/physics/test_degenerate_2d.py` has kinks, mesh lines, corners and what is refused.
 """
 
 import pytest
 
-import scenes_stability as scenes
 import xcrack as xc
-from scenes import numerics_of
+from support import scenes_stability as scenes
+from support.scenes_2d import numerics_of
 
 pytestmark = pytest.mark.filterwarnings("ignore::xcrack.XcrackWarning")
 CELL = 2.4 / 30

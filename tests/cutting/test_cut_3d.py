@@ -1,0 +1,183 @@
+"""Cutting tetrahedra: interfaces, volumes, lips that are counted once, cells at fronts."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import xcrack as xc
+from support import scenes_3d as scenes
+from support.scenes_2d import numerics_of
+from xcrack.analysis.solve import build
+from xcrack.cutting.fronts_3d import behind
+from xcrack.mesh.split import cut_simplices, interface_simplices
+
+REGULAR = np.array([[1.0, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]])
+
+
+def drawn_levels(seed, k=400):
+    """Values at the corners of tetrahedra, of both signs, over nine decades, some zero."""
+    rng = np.random.default_rng(seed)
+    phi = rng.uniform(-1, 1, (k, 4)) * 10.0 ** rng.uniform(-9, 0, (k, 4))
+    phi[::7, 0] = 0.0
+    phi[::21, 1] = 0.0
+    return phi[(phi.min(axis=1) < 0) & (phi.max(axis=1) > 0)]
+
+
+def areas(x):
+    return np.linalg.norm(np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]), axis=1) / 2
+
+
+def test_interfaces_lie_on_phi_zero_and_close_both_sides():
+    """Divergence theorem: on each side the area vectors of the faces and the interface cancel."""
+    phi = drawn_levels(2236)
+    bary, parent = interface_simplices(phi)
+    at = np.einsum("svb,sb->sv", bary, phi[parent])
+    assert (np.abs(at) <= 1e-15 * np.abs(phi[parent]).max(axis=1, keepdims=True)).all()
+    np.testing.assert_allclose(bary.sum(axis=2), 1.0, rtol=1e-14)
+    assert (bary >= 0).all()
+    # The derivative of the volume behind phi = c is the area over |grad phi|, c from below.
+    x = np.einsum("svb,bd->svd", bary, REGULAR)
+    vertices = np.concatenate([np.ones((4, 1)), REGULAR], axis=1)
+    slope = np.linalg.norm(np.linalg.solve(vertices, phi.T)[1:], axis=0)
+    area = np.bincount(parent, areas(x), len(phi))
+    step = 1e-4 * np.abs(phi).min(axis=1, keepdims=True)
+    smooth = (phi != 0).all(axis=1)
+    volume = abs(np.linalg.det(REGULAR[1:] - REGULAR[0])) / 6
+
+    def positive(values):
+        _, fraction, side, owner = cut_simplices(values)
+        return volume * np.bincount(owner, fraction * (side > 0), len(values))
+
+    rows = smooth & (np.abs(phi).min(axis=1) > 1e-3 * np.abs(phi).max(axis=1))
+    assert rows.sum() > 20
+    change = (positive((phi + step)[rows]) - positive((phi - step)[rows])) / (2 * step[rows, 0])
+    np.testing.assert_allclose(change, area[rows] / slope[rows], rtol=1e-5)  # differences
+
+
+def test_sub_cells_are_bounded_by_the_interface():
+    """Area of the faces that sub-cells of one side leave on phi = 0 is that of the interface."""
+    phi = drawn_levels(449)
+    bary, _, side, parent = cut_simplices(phi)
+    at = np.einsum("svb,sb->sv", bary, phi[parent])
+    on = np.abs(at) <= 1e-15 * np.abs(phi[parent]).max(axis=1, keepdims=True)
+    generic = (phi != 0).all(axis=1)
+    flat, owner = interface_simplices(phi)
+    wanted = np.bincount(owner, areas(np.einsum("svb,bd->svd", flat, REGULAR)), len(phi))
+    for sign in (1, -1):
+        rows = np.nonzero((on.sum(axis=1) == 3) & (side == sign) & generic[parent])[0]
+        corner = np.array([b[f] for b, f in zip(bary[rows], on[rows], strict=True)])
+        area = np.bincount(parent[rows], areas(np.einsum("svb,bd->svd", corner, REGULAR)), len(phi))
+        np.testing.assert_allclose(area[generic], wanted[generic], rtol=1e-9, atol=1e-15)
+
+
+def test_parts_of_triangles_behind_a_front():
+    rng = np.random.default_rng(86028)
+    psi = rng.uniform(-1, 1, (300, 3))
+    psi[::5, 1] = 0.0
+    part, row = behind(psi)
+    share = np.abs(np.linalg.det(part))
+    total = np.bincount(row, share, len(psi))
+    a, b, c = np.sort(psi, axis=1).T
+    # Share of a triangle on which a linear function is negative, by its sorted corner values.
+    with np.errstate(divide="ignore", invalid="ignore"):
+        one, two = a * a / ((b - a) * (c - a)), 1 - c * c / ((c - a) * (c - b))
+    wanted = np.select([c <= 0, b <= 0, a < 0], [1.0, two, one], 0.0)
+    np.testing.assert_allclose(total, wanted, atol=1e-12)
+
+
+def model(mesh, *cracks, **options):
+    return build(xc.Problem(mesh, scenes.STEEL, list(cracks), numerics=numerics_of(**options)))
+
+
+def check_cut(built, area=None):
+    """Volumes of sub-cells, sides, and the area of the lips where it is known."""
+    space, cut = built.space, built.space.cuts[0]
+    mesh, phi = space.mesh, cut.level_set.phi
+    total = np.bincount(cut.sub_to_cell, cut.sub_fraction, len(mesh.cells))
+    split = np.unique(cut.sub_to_cell)
+    np.testing.assert_allclose(total[split], 1.0, rtol=1e-12)
+    determinant = np.abs(np.linalg.det(cut.sub_bary))
+    np.testing.assert_allclose(determinant, cut.sub_fraction, atol=1e-13)
+    middle = np.einsum("sb,sb->s", cut.sub_bary.mean(axis=1), phi[mesh.cells[cut.sub_to_cell]])
+    assert (np.sign(middle) == cut.sub_side).all()
+    lips = built.lips[0]
+    found = areas(cut.lip_points(mesh)).sum()
+    assert lips.weight.sum() == pytest.approx(found, rel=1e-10)
+    if area is not None:
+        assert found == pytest.approx(area, rel=1e-9)  # snapping moves a cut by 1e-10 of a cell
+
+
+@settings(max_examples=15, deadline=None)
+@given(
+    normal=st.tuples(*[st.integers(-9, 9)] * 3).filter(any),
+    offset=st.floats(-0.5, 0.5),
+    seed=st.integers(0, 10_000),
+)
+def test_lips_of_a_plane_through_a_box_have_the_area_of_the_section(normal, offset, seed):
+    built = model(scenes.perturbed(4, seed), scenes.sheet(normal, offset))
+    check_cut(built, scenes.section_area(normal, offset))
+    np.testing.assert_allclose(
+        built.lips[0].normal, np.broadcast_to(scenes.unit(normal), built.lips[0].normal.shape),
+        atol=1e-7,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "normal", [(0, 0, 1), (1, 0, 0), (0, 1, -1), (1, 1, 1), (0, 1, 2)], ids=str
+)
+def test_planes_on_faces_and_nodes_are_counted_once(normal):
+    """On faces of cells, through nodes, and 1e-12 ... 1e-9 of a cell beside."""
+    mesh = xc.box((-1, -1, -1), (1, 1, 1), 6)
+    for offset in (0.0, 3e-13, -3e-13, 3e-10):
+        check_cut(model(mesh, scenes.sheet(normal, offset)), scenes.section_area(normal, offset))
+
+
+@pytest.mark.parametrize("z", [0.0, 0.1, 1e-12], ids=str)
+def test_lips_end_at_the_front(z):
+    """A straight front is cut exactly, wherever it runs: on nodes, beside them, through cells."""
+    mesh = xc.box((-1, -1, -1), (1, 1, 1), 6)
+    for x in (0.0, 0.07, 1 / 3, 1e-12, 1 / 6):
+        check_cut(model(mesh, scenes.half_sheet(x, z)), 2 * (1 + x))
+
+
+def test_area_of_a_penny_converges():
+    """The front is straight in a cell: what it cuts off the circle goes like h²."""
+    sizes, error = (6, 12), []
+    for n in sizes:
+        built = model(
+            xc.box((-1, -1, -1), (1, 1, 1), n), xc.penny_crack((0, 0, 0.03), (1, 2, 3), 0.6)
+        )
+        check_cut(built)
+        error.append(1 - built.lips[0].weight.sum() / (np.pi * 0.36))
+    print(f"\narea of a penny: {error}")
+    assert abs(error[1]) < 0.4 * abs(error[0])
+    assert abs(error[1]) < 0.01
+
+
+def test_front_cells_hold_the_front():
+    """All cells that the circle passes through are known, and no cell away from it."""
+    mesh = scenes.perturbed(6, 17)
+    crack = xc.penny_crack((0.02, 0.01, 0.03), (0.2, -0.1, 1), 0.55)
+    built = model(mesh, crack)
+    cut, placed = built.space.cuts[0], built.space.cracks[0]
+    front = placed.points[placed.fronts[0]]
+    cells = cut.level_set.tip_cells[0]
+    fine = np.concatenate(
+        [a + np.linspace(0, 1, 9)[:-1, None] * (b - a) for a, b in zip(front, front[1:])]
+    )
+    from xcrack.mesh.locate import locate
+
+    passed = np.unique(locate(mesh, fine)[0])
+    # The level sets are interpolated: a circle seen through them lies a little off, h²/8a.
+    assert np.isin(passed, cells).mean() > 0.8
+    centre = mesh.points[mesh.cells[cells]].mean(axis=1)
+    away = np.linalg.norm(centre[:, None] - fine, axis=2).min(axis=1)
+    assert (away <= mesh.cell_size[cells]).all()
+    # Sub-cells there are cut along psi as well: none has parts both ahead and behind.
+    at = cut.is_tip[cut.sub_to_cell]
+    psi = np.einsum(
+        "svb,sb->sv", cut.sub_bary[at], cut.level_set.psi[0][mesh.cells[cut.sub_to_cell[at]]]
+    )
+    scale = 1e-9 * mesh.cell_size[cut.sub_to_cell[at]]
+    assert ((psi.min(axis=1) >= -scale) | (psi.max(axis=1) <= scale)).all()

@@ -1,0 +1,346 @@
+"""The growth loop with K from formulas: lives, shares of the tips, stop rules, bad input."""
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+from support import exact
+from support.growth_fakes import STRESS, mode_I, patch_respond, plate
+from xcrack.crack.lines import line_crack
+from xcrack.crack.size_2d import length_inside
+from xcrack.crack.tips_2d import tip_frames
+from xcrack.errors import ProblemError
+from xcrack.growth import run as growth
+from xcrack.growth.criteria import max_hoop_stress, weighted_angle
+from xcrack.growth.laws import elber, paris
+from xcrack.growth.run import grow
+from xcrack.growth.step import Cycle
+from xcrack.scene.conditions import traction
+
+LAW = paris(C=1e-11, m=3.0)
+CYCLE = Cycle(0.0, 1.0)
+
+
+def run(steps):
+    """All steps, and what the generator returned."""
+    taken = []
+    while True:
+        try:
+            taken.append(next(steps))
+        except StopIteration as stop:
+            return taken, stop.value
+
+
+def two_cracks():
+    return plate([line_crack([(0, 8.3), (5, 8.3)]), line_crack([(0, -8.3), (4, -8.3)])])
+
+
+def centre_crack():
+    return plate([line_crack([(25.0, 0.37), (35.0, 0.37)])])
+
+
+# --- lives -------------------------------------------------------------------------------------
+
+
+def test_life_of_ten_steps_is_exact_where_the_rate_is_a_power_of_length(monkeypatch):
+    """Round-off, and the cut of the crack with the boundary."""
+    patch_respond(monkeypatch, mode_I())
+    steps, _ = run(grow(plate(), LAW, max_hoop_stress, CYCLE, da=3.0, max_steps=11))
+    assert [step.index for step in steps] == list(range(11))
+    for step in steps:
+        N = exact.paris_life(5.0, 5.0 + 3.0 * step.index, LAW.C, LAW.m, STRESS)
+        assert step.cycles == pytest.approx(N, rel=1e-10, abs=1e-12)
+
+
+def test_life_with_elber_over_R(monkeypatch):
+    """Closed form N / U³ with the range (1 - R) stress, R = 0.3."""
+    patch_respond(monkeypatch, mode_I(stress=STRESS / 0.7))
+    law = elber(1e-11, 3.0, a=0.5, b=0.4)
+    steps, _ = run(grow(plate(), law, weighted_angle, Cycle(0.3, 1.0), da=5.0, max_steps=3))
+    N = exact.paris_life(5.0, 15.0, 1e-11, 3.0, STRESS) / exact.elber_U(0.3) ** 3
+    assert steps[-1].cycles == pytest.approx(N, rel=1e-10)
+    assert steps[-1].R[0][0] == pytest.approx(0.3, rel=1e-14)
+
+
+def test_life_of_ten_steps_within_three_per_mille(monkeypatch):
+    """K ~ √(W tan(π a/W)), a from 5 to 35, exact K: the error is that of the cycle rule alone."""
+
+    def factor(a):
+        return np.sqrt(90.0 * np.tan(np.pi * a / 90.0))
+
+    patch_respond(monkeypatch, mode_I(factor))
+    N, _ = quad(lambda a: 1 / LAW(STRESS * factor(a), 0), 5, 35, epsrel=1e-12)
+    error = {}
+    for n in (5, 10, 20):
+        steps, _ = run(grow(plate(), LAW, max_hoop_stress, CYCLE, da=30 / n, max_steps=n + 1))
+        error[n] = steps[-1].cycles / N - 1
+    print({n: f"{100 * e:+.3f} %" for n, e in error.items()})
+    assert abs(error[10]) <= 3e-3
+    assert np.log2(error[10] / error[20]) == pytest.approx(2, abs=0.1)
+
+
+def test_both_tips_of_a_centre_crack(monkeypatch):
+    patch_respond(monkeypatch, mode_I())
+    steps, _ = run(grow(centre_crack(), LAW, max_hoop_stress, CYCLE, da=2.0, max_steps=6))
+    N = exact.paris_life(5.0, 15.0, LAW.C, LAW.m, STRESS)
+    assert steps[-1].cycles == pytest.approx(N, rel=1e-10)
+    assert steps[-1].cracks[0].points[[0, -1], 0] == pytest.approx([15.0, 45.0], abs=1e-12)
+
+
+# --- one step ----------------------------------------------------------------------------------
+
+
+def test_what_a_step_carries(monkeypatch):
+    patch_respond(monkeypatch, mode_I())
+    steps, _ = run(grow(two_cracks(), LAW, max_hoop_stress, Cycle(0.2, 1.0), da=2.0, max_steps=3))
+    for step in steps:
+        assert len(step.sif) == len(step.solutions) == 2
+        assert len(step.sif[0]) == len(step.cracks) == 2
+        for part in (step.angle, step.dK_eq, step.R, step.rate, step.da):
+            assert isinstance(part, tuple)
+            assert [a.shape for a in part] == [(1,), (1,)]
+    assert steps[0].cycles == 0.0
+    for before, after in zip(steps, steps[1:]):
+        assert after.cycles > before.cycles
+        for c in range(2):
+            old, new = before.cracks[c].points, after.cracks[c].points
+            assert np.array_equal(new[1 : len(old)], old[1:])  # frozen to the last bit
+            reached = np.linalg.norm(new[-1] - old[-1])
+            assert reached == pytest.approx(before.da[c][0], rel=1e-13)
+
+
+def test_kink_is_towards_the_side_that_the_signs_say(monkeypatch):
+    """Inclined load on a centre crack: K_II has opposite signs at the tips, seen along n.
+
+    Both tips then turn across the load, one up and one down: the path is antisymmetric.
+    """
+    K_I, K_II = exact.inclined_remote(100.0, np.radians(60.0))[1:]
+
+    def K_of(problem, c):
+        return [[K_I, -K_II], [K_I, K_II]]
+
+    patch_respond(monkeypatch, K_of)
+    steps, _ = run(grow(centre_crack(), LAW, max_hoop_stress, CYCLE, da=2.0, max_steps=2))
+    x = steps[1].cracks[0].points
+    assert len(x) == 4
+    centre = np.array([30.0, 0.37])
+    assert np.allclose(x - centre, -(x[::-1] - centre), atol=1e-12)
+    turned = np.degrees(np.arctan2(*(x[-1] - x[-2])[::-1]))
+    assert turned == pytest.approx(-np.sign(K_II) * 43.2213, abs=5e-5)  # printed table, 60°
+
+
+def test_slower_tips_follow_in_proportion_to_their_rate_or_range(monkeypatch):
+    def K_of(problem, c):
+        return [[10.0 if c == 0 else 8.0, 0.0]]
+
+    patch_respond(monkeypatch, K_of)
+    for scaling, share in (("law", 0.8**3), ("linear", 0.8)):
+        steps, _ = run(
+            grow(two_cracks(), LAW, max_hoop_stress, CYCLE, da=2.0, max_steps=2, scaling=scaling)
+        )
+        assert steps[0].da[0][0] == 2.0
+        assert steps[0].da[1][0] == pytest.approx(2.0 * share, rel=1e-13)
+        assert steps[1].cycles == pytest.approx(2.0 / LAW(10.0, 0), rel=1e-12)
+
+
+def test_short_growth_waits_until_the_mesh_can_see_it(monkeypatch):
+    """Rate ratio 0.03 with da = 2 is 0.06 of a cell of 1.41 a step: it goes on every third step."""
+
+    def K_of(problem, c):
+        return [[10.0 if c == 0 else 10.0 * 0.03 ** (1 / 3), 0.0]]
+
+    patch_respond(monkeypatch, K_of)
+    steps, _ = run(grow(two_cracks(), LAW, max_hoop_stress, CYCLE, da=2.0, max_steps=7))
+    da = np.array([step.da[1][0] for step in steps])
+    assert da == pytest.approx([0, 0, 0.18, 0, 0, 0.18, 0], abs=1e-12)
+    before, after = steps[0].cracks[1], steps[2].cracks[1]
+    assert np.array_equal(before.points, after.points)  # not a bit moves while it waits
+    end = tip_frames(steps[6].cracks[1])[0][0, 0]
+    assert end == pytest.approx(4.36, abs=1e-12)  # and nothing is lost
+
+
+@pytest.mark.filterwarnings("ignore:the advance .* below one cell")
+def test_control_by_cycles(monkeypatch):
+    patch_respond(monkeypatch, mode_I())
+    steps, _ = run(grow(plate(), LAW, max_hoop_stress, CYCLE, cycles=1e3, max_steps=6))
+    for before, after in zip(steps, steps[1:]):
+        assert before.da[0][0] == pytest.approx(1e3 * before.rate[0][0], rel=1e-14)
+        # the rate rises within the step, so the same advance takes fewer cycles
+        assert 0.7 * 1e3 < after.cycles - before.cycles < 1e3
+    N = exact.paris_life(5.0, tip_frames(steps[-1].cracks[0])[0][0, 0], LAW.C, LAW.m, STRESS)
+    assert steps[-1].cycles == pytest.approx(N, rel=1e-10)
+    capped, _ = run(grow(plate(), LAW, max_hoop_stress, CYCLE, 1.5, cycles=1e9, max_steps=3))
+    assert [step.da[0][0] for step in capped] == [1.5, 1.5, 1.5]
+
+
+def test_radius_of_the_first_step_is_kept_and_the_solver_is_warm(monkeypatch):
+    calls = patch_respond(monkeypatch, mode_I(), radius=1.25)
+    run(grow(plate(), LAW, max_hoop_stress, CYCLE, da=2.0, max_steps=3))
+    assert [numerics.radius for numerics, _ in calls] == [None, 1.25, 1.25]
+    assert [r.centre[0][0, 0] if r.centre else None for _, r in calls] == [None, 1, 2]
+
+
+def test_states_of_a_cycle():
+    assert Cycle(0.1, 1.0).load_states == (0.1, 1.0)
+    pull, push = traction("top", (0.0, 1.0)), traction("top", (0.0, -1.0))
+    loads = [pull, push], [push]
+    assert Cycle(states=loads).load_states == loads
+    for make, words in (
+        (lambda: Cycle(), "Cycle"),
+        (lambda: Cycle(1.0), "Cycle"),
+        (lambda: Cycle(1.0, 0.0), "min <= max"),
+        (lambda: Cycle(np.nan, 0.0), "finite"),
+        (lambda: Cycle(0.0, 1.0, states=[1.0]), "not both"),
+        (lambda: Cycle(states=[]), "at least one"),
+        (lambda: Cycle(states=3.0), "states = 3.0: give a list"),
+        (lambda: Cycle(states="loads"), "states = 'loads'"),
+        (lambda: Cycle(states=[1.0, np.nan]), r"states\[1\] = nan"),
+        (lambda: Cycle(states=[[1.0]]), r"states\[0\] has 1.0, which is not a load"),
+    ):
+        with pytest.raises(ProblemError, match=words):
+            make()
+
+
+def test_line_a_step(monkeypatch, capsys):
+    patch_respond(monkeypatch, mode_I())
+    run(grow(plate(), LAW, max_hoop_stress, CYCLE, da=2.0, max_steps=2, progress="always"))
+    lines = capsys.readouterr().err.splitlines()
+    assert len(lines) == 3
+    assert lines[0].startswith("step    0  N            0")
+    assert lines[2] == "growth ended: max_steps = 2 reached"
+    run(grow(plate(), LAW, max_hoop_stress, CYCLE, da=2.0, max_steps=2))
+    assert capsys.readouterr().err == ""  # not a terminal
+
+
+def test_time_that_is_left(monkeypatch, capsys):
+    """Of 4 steps that take 90 s each: 270 s after the first, and none after the last."""
+    patch_respond(monkeypatch, mode_I())
+    clock = iter(90.0 * k for k in range(100))
+    monkeypatch.setattr(growth.time, "perf_counter", lambda: next(clock))
+    run(grow(plate(), LAW, max_hoop_stress, CYCLE, da=2.0, max_steps=4, progress="always"))
+    lines = capsys.readouterr().err.splitlines()
+    assert [line.partition("about")[2] for line in lines] == [
+        *(" 4.5 min left", " 3 min left", " 1.5 min left", "", ""),
+    ]
+    run(grow(plate(), LAW, max_hoop_stress, CYCLE, da=2.0, max_cycles=5e3, progress="always"))
+    lines = capsys.readouterr().err.splitlines()
+    assert "left" not in lines[0]  # no step yet whose cycles say how many there will be
+    assert lines[1].endswith(" min left")
+    assert "left" not in lines[-1]
+
+
+# --- why it ends -------------------------------------------------------------------------------
+
+
+def test_ends_where_the_tip_leaves_the_body(monkeypatch):
+    patch_respond(monkeypatch, mode_I())
+    steps, ended = run(grow(plate(), LAW, max_hoop_stress, CYCLE, da=20.0))
+    assert ended == "tip left the body: crack 0, tip 0 at (45, 0.37)"
+    assert len(steps) == 3
+
+
+def test_one_tip_leaves_and_the_other_goes_on(monkeypatch):
+    problem = plate([line_crack([(8.0, 0.37), (20.0, 0.37)])])
+    calls = patch_respond(monkeypatch, mode_I())
+    steps, ended = run(grow(problem, LAW, max_hoop_stress, CYCLE, da=6.0, max_steps=4))
+    assert [step.n_tips for step in steps] == [2, 2, 1, 1]
+    assert ended.startswith("max_steps")
+    assert np.isfinite(steps[-1].cycles)
+    assert length_inside(steps[2].cracks[0], problem.mesh) == pytest.approx(32.0, rel=1e-12)
+    del calls
+
+
+def test_a_body_that_falls_apart_ends_the_run(monkeypatch):
+    problem = plate([line_crack([(8.0, 0.37), (20.0, 0.37)])])
+    patch_respond(monkeypatch, mode_I())
+    whole = growth.respond
+
+    def respond(problem, *rest):
+        if problem.placed[0].n_tips < 2:
+            raise ProblemError("a piece is held by nothing")
+        return whole(problem, *rest)
+
+    monkeypatch.setattr(growth, "respond", respond)
+    steps, ended = run(grow(problem, LAW, max_hoop_stress, CYCLE, da=6.0))
+    assert len(steps) == 2
+    assert ended.startswith("tip left the body: crack 0, tip 0")
+    assert "a piece is held by nothing" in ended
+
+
+def test_cracks_that_meet_end_the_run(monkeypatch):
+    from xcrack.errors import GeometryError
+
+    patch_respond(monkeypatch, mode_I())
+    whole = growth.respond
+
+    def respond(problem, *rest):
+        if len(problem.placed[0].points) > 4:
+            raise GeometryError("cracks 0 and 1 cross")
+        return whole(problem, *rest)
+
+    monkeypatch.setattr(growth, "respond", respond)
+    steps, ended = run(grow(two_cracks(), LAW, max_hoop_stress, CYCLE, da=3.0))
+    assert len(steps) == 3
+    assert ended == "the cracks cannot go on after step 2: cracks 0 and 1 cross"
+
+
+def test_ends_where_nothing_grows(monkeypatch):
+    patch_respond(monkeypatch, mode_I(stress=0.0))
+    steps, ended = run(grow(plate(), LAW, max_hoop_stress, CYCLE, da=2.0))
+    assert (len(steps), ended) == (1, "rate is zero at every tip")
+    assert steps[0].da[0][0] == 0
+
+
+def test_threshold(monkeypatch):
+    """K falls with length: the run ends at the first step below, with a finite life."""
+    patch_respond(monkeypatch, mode_I(lambda a: 1 / a))
+    steps, ended = run(grow(plate(), LAW, max_hoop_stress, CYCLE, da=2.0, threshold=10.0))
+    assert ended == "rate is zero: dK_eq is below the threshold 10 at every tip"
+    assert steps[-1].rate[0][0] == 0 < steps[-2].rate[0][0]
+    end = tip_frames(steps[-1].cracks[0])[0][0, 0]
+    assert end == 11.0
+    N = (end**4 - 5.0**4) / 4 / (LAW.C * STRESS**3)
+    assert steps[-1].cycles == pytest.approx(N, rel=1e-10)
+
+
+def test_a_tip_below_the_threshold_waits_for_the_others(monkeypatch):
+    def K_of(problem, c):
+        return [[10.0 if c == 0 else 6.0, 0.0]]
+
+    patch_respond(monkeypatch, K_of)
+    steps, _ = run(
+        grow(two_cracks(), LAW, max_hoop_stress, CYCLE, da=2.0, max_steps=3, threshold=7.0)
+    )
+    assert [step.da[1][0] for step in steps] == [0, 0, 0]
+    assert np.array_equal(steps[0].cracks[1].points, steps[2].cracks[1].points)
+
+
+def test_the_driving_tip_may_be_shielded(monkeypatch):
+    """The fastest tip stops and another takes over: cycles stay finite, and go on."""
+
+    def K_of(problem, c):
+        stopped = len(problem.placed[0].points) > 2
+        return [[[0.0 if stopped else 10.0, 9.0][c], 0.0]]
+
+    patch_respond(monkeypatch, K_of)
+    steps, _ = run(grow(two_cracks(), LAW, max_hoop_stress, CYCLE, da=2.0, max_steps=3))
+    assert steps[1].cycles == pytest.approx(2 * 2.0 / LAW(10.0, 0))
+    assert steps[2].cycles > steps[1].cycles
+    assert steps[1].da[0][0] == 0
+
+
+def test_toughness(monkeypatch):
+    patch_respond(monkeypatch, mode_I())
+    K_c = STRESS * np.sqrt(np.pi * 10.5)
+    steps, ended = run(grow(plate(), LAW, max_hoop_stress, Cycle(0.5, 1.0), da=2.0, K_c=K_c))
+    assert steps[-1].cracks[0].points[-1, 0] == 11.0
+    assert ended == "K_c reached: K_eq = 587.856 >= 574.341 at crack 0, tip 0 at (11, 0.37)"
+
+
+def test_limits_of_cycles_and_steps(monkeypatch):
+    patch_respond(monkeypatch, mode_I())
+    steps, ended = run(grow(plate(), LAW, max_hoop_stress, CYCLE, da=2.0, max_cycles=5e3))
+    assert steps[-2].cycles < 5e3 <= steps[-1].cycles
+    assert ended.startswith("max_cycles = 5000 reached")
+    steps, ended = run(grow(plate(), LAW, max_hoop_stress, CYCLE, da=2.0, max_steps=1))
+    assert (len(steps), ended) == (1, "max_steps = 1 reached")

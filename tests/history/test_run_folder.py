@@ -1,0 +1,346 @@
+"""The folder of a run: kills between any two writes, damage, files of others."""
+
+import io
+import json
+import pickle
+import warnings
+import zipfile
+
+import numpy as np
+import pytest
+
+from support.growth_runs import *  # noqa: F403 - fixtures come by name
+from support.growth_runs import N_STEPS, Killed, Saboteur, assert_same, content, run_of
+from xcrack.errors import ProblemError, XcrackWarning
+from xcrack.growth.run import grow
+from xcrack.history import run_folder as run_files
+from xcrack.history import store
+from xcrack.history.collect import collect, load, resume
+
+# --- to disk and on ----------------------------------------------------------------------------
+
+
+def test_each_step_is_on_disk_before_the_next_begins(formula, tmp_path):
+    seen = []
+
+    def steps():
+        for step in grow(**run_of()):
+            seen.append(len(list(tmp_path.glob("step_*.npz"))))
+            yield step
+
+    history = collect(steps(), tmp_path)
+    assert seen == list(range(N_STEPS))
+    assert len(history.steps) == N_STEPS
+    assert not list(tmp_path.glob(".*"))  # nothing half done is left
+    assert not (tmp_path / "run.lock").exists()
+    assert json.loads((tmp_path / "run.json").read_text())["versions"]["numpy"] == np.__version__
+
+
+def test_killed_between_any_two_writes(whole, tmp_path):
+    """Every place where the disk is touched, from the first to the last."""
+    with pytest.MonkeyPatch.context() as patch:
+        counter = Saboteur(patch, 0)
+        collect(grow(**run_of()), tmp_path / "count")
+    assert counter.count == 5 * (N_STEPS + 2)
+    for n in range(1, counter.count + 1):
+        folder = tmp_path / f"killed_{n}"
+        with pytest.MonkeyPatch.context() as patch:
+            Saboteur(patch, n)
+            with pytest.raises(Killed):
+                collect(grow(**run_of()), folder)
+        assert_same(resume(folder, **run_of()), whole)
+
+
+def test_killed_again_while_it_resumes(whole, tmp_path):
+    folder = tmp_path / "killed"
+    n, done = 9, False
+    while not done:
+        with pytest.MonkeyPatch.context() as patch:
+            Saboteur(patch, n)
+            try:
+                history = (
+                    resume(folder, **run_of())
+                    if folder.exists()
+                    else collect(grow(**run_of()), folder)
+                )
+                done = True
+            except Killed:
+                n += 1
+    assert_same(history, whole)
+
+
+def test_until_and_the_rules_that_stop_a_run_may_change(formula, whole, tmp_path):
+    folder = tmp_path / "short"
+    first = collect(grow(**run_of()), folder, until=lambda step: step.index == 1)
+    assert first.ended == "until was true at step 1"
+    again = resume(folder, **run_of(), until=lambda step: step.index >= 1)
+    assert (len(again.steps), again.ended) == (2, first.ended)
+    longer = resume(folder, **run_of(max_steps=3))
+    assert (len(longer.steps), longer.ended) == (3, "max_steps = 3 reached")
+    assert load(folder).ended == "max_steps = 3 reached"
+    assert_same(resume(folder, **run_of(K_c=1e9)), whole)
+
+
+def test_no_step_is_computed_after_until_was_true(formula):
+    steps = grow(**run_of())
+    collect(steps, until=lambda step: True)
+    assert list(steps) == []
+
+
+# --- other formats, other defaults ---------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("written", "words"), [(1, "before the first release"), (3, "newer xcrack")]
+)
+@pytest.mark.parametrize("lost", [False, True], ids=["header", "steps"])
+def test_a_run_of_another_format(whole, monkeypatch, written, words, lost):
+    """Whether the header says so, or the steps where it is lost."""
+    folder = whole.path.parent / "other"
+    with monkeypatch.context() as patch:
+        patch.setattr(run_files, "_FORMAT", written)
+        collect(grow(**run_of()), folder)
+    if lost:
+        (folder / "run.json").unlink()
+    before = content(folder)
+    for read in (load, lambda path: resume(path, **run_of())):
+        with pytest.raises(ProblemError, match=words):
+            read(folder)
+    assert content(folder) == before
+
+
+def test_a_class_of_another_version(whole):
+    """A name that is not known, a field that is not, a field that is missing."""
+    path = run_files.step_path(whole.path, 1)
+    with np.load(path) as members:
+        arrays = dict(members)
+    tree = str(arrays.pop("tree"))
+    for old, new, words in (
+        ('"class": "SIF"', '"class": "Jump"', "holds a 'Jump'"),
+        ('"spread":', '"scatter":', "holds a SIF that differs in scatter, spread"),
+    ):
+        np.savez(path, tree=np.array(tree.replace(old, new)), **arrays)
+        with pytest.raises(ProblemError, match=words):
+            load(whole.path)
+
+
+def test_a_stored_file_chooses_no_code(tmp_path):
+    tree = {"class": "subprocess:Popen", "fields": {"args": "true"}}
+    np.savez(tmp_path / "x.npz", tree=np.array(json.dumps(tree)))
+    with pytest.raises(ProblemError, match=r"x\.npz holds a 'subprocess:Popen'"):
+        store.load(tmp_path / "x.npz", run_files.CLASSES)
+    with pytest.raises(ProblemError, match=r"(Posix|Windows)Path cannot be stored"):
+        store.save(tmp_path / "y.npz", {"path": tmp_path}, run_files.CLASSES)
+
+
+# --- damage and strangers ------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("keep", [0, 1, 100])
+@pytest.mark.parametrize("index", [0, 2, N_STEPS - 1])
+def test_a_step_that_is_cut_short_is_computed_again(whole, index, keep):
+    path = run_files.step_path(whole.path, index)
+    before = content(whole.path)
+    path.write_bytes(path.read_bytes()[: keep * path.stat().st_size // 101])
+    damaged = content(whole.path)
+    with pytest.warns(XcrackWarning, match=rf"{path.name} is not whole.*moved_aside_1"):
+        history = resume(whole.path, **run_of())
+    assert content(whole.path) == before
+    assert history.table().tobytes() == whole.table().tobytes()
+    aside = content(whole.path / "moved_aside_1")
+    assert aside == {name: damaged[name] for name in sorted(damaged) if name >= path.name}
+
+
+@pytest.mark.parametrize("index", [0, 2, N_STEPS - 2])
+def test_a_lost_middle_step_is_computed_again_to_the_same_bytes(whole, index):
+    """Nothing that was finished is lost: the steps behind it are moved aside."""
+    path = run_files.step_path(whole.path, index)
+    before = content(whole.path)
+    path.unlink()
+    with pytest.warns(XcrackWarning, match=rf"{path.name} is missing .* {index} steps before it"):
+        assert len(load(whole.path).steps) == index
+    with pytest.warns(XcrackWarning, match=rf"{path.name} is missing.*moved_aside_1"):
+        history = resume(whole.path, **run_of())
+    assert content(whole.path) == before
+    assert history.table().tobytes() == whole.table().tobytes()
+    aside = content(whole.path / "moved_aside_1")
+    assert aside == {name: before[name] for name in before if name > path.name}
+
+
+@pytest.mark.parametrize("text", [None, "", "{", '{"format": 2}', "[]"])
+def test_a_lost_or_damaged_header_is_made_again_from_the_steps(whole, text):
+    before = content(whole.path)
+    path = whole.path / "run.json"
+    if text is None:
+        path.unlink()
+    else:
+        path.write_text(text)
+    assert load(whole.path).table().tobytes() == whole.table().tobytes()
+    with pytest.raises(ProblemError, match=r"da: stored 1\.7, given 1\.8"):
+        resume(whole.path, **run_of(da=1.8))
+    with pytest.raises(ProblemError, match="holds a run of 5 steps"):
+        collect(grow(**run_of(da=1.8)), whole.path)
+    if text is None:
+        resume(whole.path, **run_of())
+    else:
+        with pytest.warns(XcrackWarning, match=r"run\.json was damaged.*moved_aside_1"):
+            resume(whole.path, **run_of())
+        assert (whole.path / "moved_aside_1" / "run.json").read_text() == text
+    assert content(whole.path) == before
+
+
+def junk(folder):
+    """Contents that are no step, by what they are."""
+    tree = {"tuple": [1, 2]}
+    member = io.BytesIO()
+    np.savez(member, tree=np.array(json.dumps(tree)))
+    array = io.BytesIO()
+    np.save(array, np.arange(3))
+    deep = io.BytesIO()
+    np.savez(deep, tree=np.array("[" * 10_000 + "]" * 10_000))
+    odd = io.BytesIO()
+    fields = {"index": 2, "cycles": "many", "cracks": 1, "sif": 2, "angle": None, "dK_eq": 1}
+    fields |= {"R": 1, "rate": 1, "da": 1, "solutions": {"tuple": []}, "memory": None}
+    run = json.loads((folder / "run.json").read_text())
+    del run["ended"]
+    pairs = {
+        "dict": [
+            ["run", {"dict": [[k, as_dict(v)] for k, v in run.items()]}],
+            ["step", {"class": "Step", "fields": fields}],
+        ]
+    }
+    np.savez(odd, tree=np.array(json.dumps(pairs)))
+    return {
+        "empty": b"",
+        "text": b"my own notes",
+        "pickle": pickle.dumps({"a": 1}),
+        "zip of something": zipped({"a.txt": b"b"}),
+        "array": array.getvalue(),
+        "other values": member.getvalue(),
+        "deep nesting": deep.getvalue(),
+        "step of odd parts": odd.getvalue(),
+    }
+
+
+def as_dict(value):
+    return {"dict": list(value.items())} if isinstance(value, dict) else value
+
+
+def zipped(files):
+    target = io.BytesIO()
+    with zipfile.ZipFile(target, "w") as archive:
+        for name, data in files.items():
+            archive.writestr(name, data)
+    return target.getvalue()
+
+
+def test_files_of_others_in_the_place_of_steps(whole, tmp_path):
+    """None ends in a traceback, none is lost, and the run comes out the same."""
+    for name, data in junk(whole.path).items():
+        folder = tmp_path / name
+        folder.mkdir()
+        run_files.step_path(folder, 2).write_bytes(data)
+        with pytest.raises(ProblemError, match="holds no run"):
+            load(folder)
+        with pytest.warns(XcrackWarning, match="1 files that stood in .* were moved"):
+            history = collect(grow(**run_of()), folder)
+        assert_same(history, whole)
+        assert content(folder / "moved_aside_1") == {"step_00002.npz": data}
+        # and in the place of a step of a run
+        run_files.step_path(folder, 2).write_bytes(data)
+        with pytest.warns(XcrackWarning, match=r"step_00002\.npz is not whole"):
+            history = resume(folder, **run_of())
+        assert_same(history, whole)
+
+
+def test_flipped_bits_are_noticed(whole):
+    """A hundred places, drawn: the step is computed again, or the bit was one of padding."""
+    before = content(whole.path)
+    path = run_files.step_path(whole.path, 2)
+    data = path.read_bytes()
+    generator = np.random.default_rng(70412)
+    for bit in generator.integers(0, 8 * len(data), 100):
+        changed = bytearray(data)
+        changed[bit // 8] ^= 1 << (bit % 8)
+        path.write_bytes(bytes(changed))
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", XcrackWarning)
+            steps = load(whole.path)
+        assert len(steps.steps) in (2, N_STEPS)
+        assert steps.table().tobytes() == whole.table().tobytes()[: steps.table().nbytes]
+    path.write_bytes(data)
+    assert content(whole.path) == before
+
+
+def test_a_step_of_another_run(formula, whole, tmp_path):
+    other = collect(grow(**run_of(da=1.8)), tmp_path / "other")
+    before = content(whole.path)
+    path = run_files.step_path(whole.path, 3)
+    path.write_bytes(run_files.step_path(other.path, 3).read_bytes())
+    with pytest.warns(XcrackWarning, match=r"step_00003\.npz belongs to another run"):
+        resume(whole.path, **run_of())
+    assert content(whole.path) == before
+
+
+def test_left_over_parts_are_swept_away_and_nothing_else(whole):
+    parts = [".step_00003.npz.4711_0a0b0c0d.part", ".run.json.12_aa.part", ".run.lock.3_bb.part"]
+    for name in parts:
+        (whole.path / name).write_bytes(b"half")
+    others = ["notes.txt", ".mine.part", "step_3.npz", "step_last.npz", "step_00003.npz.bak"]
+    for name in others:
+        (whole.path / name).write_text("the user's own")
+    resume(whole.path, **run_of())
+    names = {path.name for path in whole.path.iterdir()}
+    assert not names & set(parts)
+    assert set(others) <= names
+    assert "moved_aside_1" not in names
+
+
+def test_a_folder_that_holds_something_else(formula, tmp_path):
+    with pytest.raises(ProblemError, match="no run to go on with"):
+        resume(tmp_path / "nowhere", **run_of())
+    (tmp_path / "file").write_text("")
+    with pytest.raises(ProblemError, match="is a file"):
+        collect(grow(**run_of()), tmp_path / "file")
+    for text in ("{", "{}", "[]", '{"format": 99}'):
+        (tmp_path / "run.json").write_text(text)
+        for call in (lambda: resume(tmp_path, **run_of()), lambda: load(tmp_path)):
+            with pytest.raises(ProblemError, match=r"run\.json"):
+                call()
+        with pytest.raises(ProblemError, match=r"run\.json"):
+            collect(grow(**run_of()), tmp_path)
+    with pytest.warns(XcrackWarning, match="moved_aside_1"):
+        collect(grow(**run_of()), tmp_path, overwrite=True)
+    assert (tmp_path / "moved_aside_1" / "run.json").read_text() == text
+    with pytest.raises(ProblemError, match="holds no run"):
+        load(tmp_path / "nowhere")
+
+
+def test_a_finished_step_is_never_replaced_by_a_new_run(whole):
+    """The same settings or others: refused before anything is computed, or moved aside."""
+    before = content(whole.path)
+    for run in (run_of(), run_of(da=3.0)):
+        steps = grow(**run)
+        with pytest.raises(ProblemError, match="run of 5 steps already: go on with it by resume"):
+            collect(steps, whole.path)
+        next(steps)  # not begun, not closed
+    assert content(whole.path) == before
+    with pytest.warns(XcrackWarning, match="6 files .*moved_aside_1"):
+        other = collect(grow(**run_of(da=3.0, max_steps=2)), whole.path, overwrite=True)
+    assert len(other.steps) == 2
+    assert len(list(whole.path.glob("step_*.npz"))) == 2
+    assert content(whole.path / "moved_aside_1") == before
+    with pytest.warns(XcrackWarning, match="3 files .*moved_aside_2"):
+        collect(grow(**run_of()), whole.path, overwrite=True)
+    assert content(whole.path) == before
+
+
+def test_an_overwritten_run_is_there_until_the_first_step_is_finished(whole):
+    before = content(whole.path)
+
+    def broken(dK, R):
+        raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        collect(grow(**run_of(law=broken)), whole.path, overwrite=True)
+    assert content(whole.path) == before

@@ -1,0 +1,144 @@
+"""Each kernel against a twin without tricks."""
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+
+import xcrack as xc
+from support import scenes_2d as scenes
+from xcrack.kernels.blocks import dense_blocks
+from xcrack.kernels.bulk import block_pattern
+from xcrack.kernels.enriched import add_stiffness, enriched_pattern
+from xcrack.mesh.simplex import cell_nodes, shape_derivatives, simplex_rule
+from xcrack.xfem.assembly import bulk
+
+
+def elastic_block(G, weight, lam, mu):
+    """Stiffness of tabulated gradients (q, n, d), term by term."""
+    n, d = G.shape[1:]
+    K = np.zeros((n, d, n, d))
+    for q, w in enumerate(weight):
+        for a in range(n):
+            for b in range(n):
+                ga, gb = G[q, a], G[q, b]
+                K[a, :, b, :] += w * (
+                    lam * np.outer(ga, gb) + mu * np.outer(gb, ga) + mu * (ga @ gb) * np.eye(d)
+                )
+    return K
+
+
+def test_enriched_stiffness():
+    rng = np.random.default_rng(577)
+    functions = np.array([[0, 3, 5, 6], [1, 4, -1, 7], [2, 0, 5, -1]])
+    offsets = np.array([0, 2, 5, 6])
+    weight, G = rng.uniform(0.1, 1, 6), rng.normal(size=(6, 4, 2))
+    indptr, indices = enriched_pattern(functions, 8, 5)
+    data = np.zeros((len(indices), 2, 2))
+    add_stiffness(data, indptr, indices, functions, offsets, weight, G, 5, 1.3, 0.7)
+    found = sp.bsr_matrix((data, indices, indptr), shape=(16, 16)).toarray()
+    expected = np.zeros((8, 2, 8, 2))
+    for e, numbers in enumerate(functions):
+        on = np.nonzero(numbers >= 0)[0]
+        q = slice(offsets[e], offsets[e + 1])
+        block = elastic_block(G[q][:, on], weight[q], 1.3, 0.7)
+        for i, a in enumerate(numbers[on]):
+            for j, b in enumerate(numbers[on]):
+                if a >= 5 or b >= 5:
+                    expected[a, :, b] += block[i, :, j]
+    np.testing.assert_allclose(found, expected.reshape(16, 16), atol=1e-13)  # round-off
+
+
+def test_bulk_stiffness():
+    material = xc.Isotropic(E=3.0, nu=0.2, plane="stress")
+    for order in (1, 2):
+        mesh = scenes.perturbed(3, seed=8)
+        nodes = cell_nodes(mesh, order)
+        bary, rule = simplex_rule(2, 2 * (order - 1))
+        dN = shape_derivatives(order, bary)
+        size = int(nodes.max()) + 1
+        expected = np.zeros((size, 2, size, 2))
+        for c, numbers in enumerate(nodes):
+            G = np.einsum("qnb,bd->qnd", dN, mesh.gradient[c])
+            block = elastic_block(G, rule * mesh.volume[c], material.lam, material.mu)
+            expected[np.ix_(numbers, range(2), numbers, range(2))] += block
+        found = bulk(mesh, material, order).matrix.toarray()
+        np.testing.assert_allclose(found, expected.reshape(2 * size, -1), atol=1e-13)
+
+
+def test_pattern_holds_every_pair_once():
+    mesh = scenes.perturbed(4, seed=9)
+    indptr, indices, slot = block_pattern(np.ascontiguousarray(mesh.cells), mesh.n_points)
+    pairs = {(int(a), int(b)) for cell in mesh.cells for a in cell for b in cell}
+    rows = np.repeat(np.arange(mesh.n_points), np.diff(indptr))
+    assert sorted(pairs) == list(zip(rows.tolist(), indices.tolist(), strict=True))
+    for cell, own in zip(mesh.cells, slot, strict=True):
+        np.testing.assert_array_equal(indices[own], np.broadcast_to(cell, (3, 3)))
+
+
+def test_dense_blocks():
+    rng = np.random.default_rng(83)
+    matrix = rng.normal(size=(9, 9)) * (rng.random((9, 9)) < 0.6)
+    import scipy.sparse as sp
+
+    K = sp.csr_matrix(matrix)
+    members, offsets = np.array([2, 5, 0, 8, 3]), np.array([0, 3, 5])
+    found = dense_blocks(K.indptr, K.indices, K.data, members, offsets)
+    first, second = matrix[np.ix_(members[:3], members[:3])], matrix[np.ix_([8, 3], [8, 3])]
+    np.testing.assert_array_equal(found, np.concatenate([first.ravel(), second.ravel()]))
+
+
+def test_bordered():
+    """Rows that do not count are left out, and both sides are scaled."""
+    from xcrack.kernels.bordered import bordered
+
+    rng = np.random.default_rng(4411)
+    import scipy.sparse as sp
+
+    A = rng.normal(size=(7, 7)) * (rng.random((7, 7)) < 0.6)
+    A, Y = A + A.T, rng.normal(size=(2, 2))
+    X = rng.normal(size=(7, 2)) * (rng.random((7, 2)) < 0.6)
+    kept, scale = np.array([0, 2, 3]), rng.random(5)  # of the first five rows
+    number = np.full(5, -1)
+    number[kept] = np.arange(3)
+
+    def arrays(M):
+        return M.indptr, M.indices, M.data
+
+    across, down, own = sp.csr_matrix(X), sp.csc_matrix(X), sp.csc_matrix(Y + Y.T)
+    found = bordered(
+        *arrays(sp.csr_matrix(A)), number, scale, arrays(across), arrays(down), arrays(own)
+    )
+    expected = np.block([[A[np.ix_(kept, kept)], X[kept]], [X[kept].T, Y + Y.T]])
+    matrix = sp.csc_matrix((found[2], found[1], found[0]), shape=(5, 5))
+    assert matrix.has_sorted_indices
+    np.testing.assert_allclose(matrix.toarray(), scale[:, None] * expected * scale, rtol=1e-15)
+
+
+def test_bisect_fills_triangles_and_stops_at_tips():
+    """Parts add up to their triangle; none is larger than its distance to a tip but the marked."""
+    from xcrack.kernels.bisect import bisect
+
+    rng = np.random.default_rng(4410)
+    x, tips = rng.uniform(size=(20, 3, 2)), rng.uniform(size=(2, 2))
+    nothing = np.empty(0, int), np.empty((0, 3, 3)), np.empty(0, int), np.empty(0, bool)
+    n = bisect(x, tips, 4, False, *nothing)
+    owner, depth = np.empty(n, np.int64), np.empty(n, np.int64)
+    bary, near = np.empty((n, 3, 3)), np.empty(n, bool)
+    assert bisect(x, tips, 4, True, owner, bary, depth, near) == n
+    assert np.bincount(owner, 0.25**depth) == pytest.approx(np.ones(20), abs=1e-14)
+    centre = np.zeros((20, 3))
+    np.add.at(centre, owner, 0.25 ** depth[:, None] * bary.mean(axis=1))
+    assert centre == pytest.approx(np.full((20, 3), 1 / 3), abs=1e-14)
+    for s, local, level, close in zip(owner, bary, depth, near, strict=True):
+        part = local @ x[s]
+        size = max(np.linalg.norm(part[i] - part[i - 1]) for i in range(3))
+        weights = np.linspace(0, 1, 101)
+        edge = [w * part[i] + (1 - w) * part[i - 1] for i in range(3) for w in weights]
+        away = min(np.linalg.norm(np.array(edge) - tip, axis=1).min() for tip in tips)
+        inside = [
+            (np.linalg.solve(np.vstack([part.T, np.ones(3)]), [*tip, 1]) >= 0).all() for tip in tips
+        ]
+        # The edges are sampled: what lies within a hundredth may be either.
+        if any(inside) or abs(size - away) > 0.01 * size:
+            assert close == (any(inside) or size > away)
+        assert level == 4 or not close

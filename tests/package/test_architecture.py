@@ -1,0 +1,193 @@
+"""The shape of the code: short files, one-way imports, late heavy imports, documented names."""
+
+from __future__ import annotations
+
+import ast
+import inspect
+import re
+import subprocess
+import sys
+from dataclasses import fields
+from pathlib import Path
+
+import pytest
+
+import xcrack
+
+ROOT = Path(__file__).resolve().parents[2]
+SOURCE = ROOT / "src" / "xcrack"
+FILES = sorted(SOURCE.rglob("*.py"))
+KERNELS = sorted(p for p in (SOURCE / "kernels").glob("*.py") if p.stem not in ("jit", "blas"))
+LONGEST_FILE = 400
+LONGEST_KERNEL = 420  # helpers stay in the file of the kernel
+HEAVY = ("numba", "gmsh", "meshio", "pyvista", "vtk", "vtkmodules", "matplotlib", "pyamg")
+
+
+def label(path: Path) -> str:
+    return path.relative_to(SOURCE).as_posix()
+
+
+@pytest.mark.parametrize("path", FILES, ids=label)
+def test_file_is_short(path: Path) -> None:
+    long = path.relative_to(SOURCE).parts[0] in ("kernels", "bench")
+    assert len(path.read_text().splitlines()) <= (LONGEST_KERNEL if long else LONGEST_FILE)
+
+
+def test_import_loads_nothing_heavy() -> None:
+    code = f"import sys, xcrack; print([name for name in {HEAVY} if name in sys.modules])"
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert run.returncode == 0, run.stderr
+    assert run.stdout.strip() == "[]"
+
+
+@pytest.mark.parametrize("package", ["gmsh", "meshio"])
+def test_a_package_for_files_has_one_home(package: str) -> None:
+    loads = re.compile(rf"(import {package}\b|required\(\s*[\"']{package}\b)")
+    homes = {path.relative_to(SOURCE).parts[0] for path in FILES if loads.search(path.read_text())}
+    assert homes == {"mesh"}
+
+
+def test_layers_are_one_way() -> None:
+    program = "from importlinter.cli import lint_imports_command as run; run()"
+    run = subprocess.run(
+        [sys.executable, "-c", program, "--no-cache"],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert run.returncode == 0, run.stdout + run.stderr
+    assert "7 kept, 0 broken" in run.stdout
+
+
+IMPORTED_IN = {
+    "gmsh": {"mesh"},
+    "meshio": {"mesh"},
+    "pyvista": {"plotting"},
+    "matplotlib": {"plotting", "charting"},
+    "vtk": {"post", "plotting"},
+    "vtkmodules": {"post", "plotting"},
+    "pyamg": {"solvers"},
+    "numba": {"kernels"},
+    "llvmlite": {"kernels"},
+}
+
+
+def test_heavy_packages_are_not_imported_by_name_elsewhere() -> None:
+    """The contracts of import-linter, for calls such as `import_module("gmsh")`."""
+    for path in FILES:
+        for node in ast.walk(ast.parse(path.read_text())):
+            if not isinstance(node, ast.Call) or not node.args:
+                continue
+            function, name = ast.unparse(node.func).rpartition(".")[2], node.args[0]
+            if function in {"import_module", "required"} and isinstance(name, ast.Constant):
+                package = str(name.value).partition(".")[0]
+                folder = label(path).partition("/")[0]
+                assert folder in IMPORTED_IN.get(package, {folder}), f"{package} in {label(path)}"
+
+
+def imported(tree: ast.AST) -> set[str]:
+    """Top names of all that a file imports; "." for a relative import."""
+    names: set[str] = set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            names |= {alias.name.partition(".")[0] for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            names.add("." if node.level else (node.module or "").partition(".")[0])
+    return names
+
+
+@pytest.mark.parametrize("path", KERNELS, ids=label)
+def test_kernels_know_arrays_only(path: Path) -> None:
+    # not even each other: numba does not notice that a helper in another file has changed
+    text = re.sub(r"from xcrack\.kernels\.(jit|blas) import .*\n", "", path.read_text())
+    allowed = {"__future__", "collections", "math", "numba", "numpy", "typing"}
+    assert imported(ast.parse(text)) <= allowed
+
+
+@pytest.mark.parametrize("path", KERNELS, ids=label)
+def test_kernels_are_compiled_in_one_way(path: Path) -> None:
+    """By `kernel`, whose cache copes with folders that cannot be written to."""
+    functions = [n for n in ast.parse(path.read_text()).body if isinstance(n, ast.FunctionDef)]
+    for function in functions:
+        assert [ast.unparse(d) for d in function.decorator_list] == ["kernel"], function.name
+
+
+def documented(text: str) -> set[str]:
+    """Names that a numpydoc string describes in Parameters or Attributes."""
+    found: set[str] = set()
+    sections = re.split(r"^([A-Z][A-Za-z ]+)\n-{3,}\n", inspect.cleandoc(text), flags=re.MULTILINE)
+    for title, body in zip(sections[1::2], sections[2::2], strict=True):
+        if title in {"Parameters", "Other Parameters", "Attributes"}:
+            for line in body.splitlines():
+                entry = re.match(r"([*\w, ]+?)\s*(:.*)?$", line)
+                if entry and not line.startswith(" "):
+                    found |= {name.strip(" *") for name in entry[1].split(",")}
+    return found
+
+
+def test_documented_reads_numpydoc() -> None:
+    text = """One sentence.
+
+    Parameters
+    ----------
+    points : (n, d), length
+        Where.
+    a, b : float
+        Half axes.
+    *rest
+        More.
+
+    Returns
+    -------
+    value : float
+    """
+    assert documented(text) == {"points", "a", "b", "rest"}
+
+
+@pytest.mark.parametrize("name", sorted(xcrack.__all__))
+def test_public_name_is_documented(name: str) -> None:
+    value = getattr(xcrack, name)
+    if not callable(value):
+        return
+    assert inspect.getdoc(value), f"{name} has no docstring"
+    if inspect.isclass(value):
+        fields = getattr(value, "__dataclass_fields__", {})
+        wanted = {key for key, field in fields.items() if field.init and not key.startswith("_")}
+    else:
+        wanted = set(inspect.signature(value).parameters)
+    assert wanted <= documented(value.__doc__ or ""), f"{name}: parameters without a description"
+
+
+def test_options_of_growth_stand_once() -> None:
+    """Names in `GrowOptions`, defaults on `Run`; signatures of both functions list them."""
+    from xcrack.growth.options import GrowOptions, Run
+
+    options = GrowOptions.__annotations__
+    defaults = {f.name: f.default for f in fields(Run) if f.name in options}
+    assert set(defaults) == set(options)
+    for function in (xcrack.grow, xcrack.resume):
+        shown = inspect.signature(function).parameters
+        assert {name: shown[name].default for name in options} == defaults
+        assert all(shown[name].kind is inspect.Parameter.KEYWORD_ONLY for name in options)
+        tree = ast.parse(inspect.getsource(function))
+        own = tree.body[0].args  # type: ignore[attr-defined]
+        assert not {a.arg for a in [*own.args, *own.kwonlyargs]} & set(options)
+
+
+@pytest.mark.parametrize("name", ["grow", "resume"])
+def test_an_unknown_option_is_refused_by_the_name_of_the_function(name: str) -> None:
+    positional = [None] * (4 + (name == "resume"))
+    with pytest.raises(TypeError, match=rf"^{name}\(\) got an unexpected keyword argument 'dA'$"):
+        getattr(xcrack, name)(*positional, dA=1.0)
+
+
+def test_plane_and_space_are_one_code_path() -> None:
+    """Branches on the dimension are few: it is an array shape.
+
+    Those that are left choose what a tip is (a point or a front), how it is placed, cut round,
+    measured, moved and drawn.
+    """
+    branch = re.compile(r"\b(dim|d)\s*(==|!=)\s*[23]\b")
+    count = sum(len(branch.findall(path.read_text())) for path in FILES)
+    assert count <= 9, f"{count} branches on the dimension"

@@ -1,0 +1,52 @@
+"""What `import xcrack as xc` offers: this list and nothing else."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+import xcrack
+
+NAMES = [
+    # scene
+    "Comparison", "Crack", "Isotropic", "Mesh", "Numerics", "Problem",
+    "body_force", "box", "crack_pressure", "displacement", "fix", "initial_stress", "line_crack",
+    "penny_crack", "elliptic_crack", "plane_crack", "surface_crack", "read_surface",
+    "notched_cylinder", "plate", "plate_with_hole", "point_force", "pressure", "read_mesh",
+    "traction", "write_mesh",
+    # solution
+    "Solution", "chart", "energy_error", "inf_sup", "plan", "plot", "solve", "stress_intensity",
+    "write", "SIF", "stress_intensities", "refine", "pardiso", "draw_K",
+    # growth
+    "Cycle", "History", "Step", "collect", "elber", "equivalent_K", "grow", "max_hoop_stress",
+    "mean_reference", "paris", "resume", "walker", "weighted_angle", "cycles_between", "load",
+    "draw_fronts",
+    # errors
+    "ConvergenceError", "GeometryError", "MeshError", "ProblemError", "XcrackError",
+    "XcrackWarning",
+]  # fmt: skip
+
+
+def test_names_are_the_list() -> None:
+    assert sorted(xcrack.__all__) == sorted(NAMES)
+
+
+def test_dir_shows_the_names() -> None:
+    shown = {name for name in dir(xcrack) if not name.startswith("_")}
+    assert shown == set(xcrack.__all__)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_name_is_there(name: str) -> None:
+    assert getattr(xcrack, name).__name__ == name
+
+
+def test_unknown_name_is_an_attribute_error() -> None:
+    with pytest.raises(AttributeError, match="no_such_name"):
+        _ = xcrack.no_such_name
+
+
+def test_version_is_that_of_the_citation() -> None:
+    citation = Path(__file__).resolve().parents[2] / "CITATION.cff"
+    assert f"\nversion: {xcrack.__version__}\n" in citation.read_text()

@@ -1,0 +1,50 @@
+"""Every python block of the pages runs, in order, in a folder of its own."""
+
+import os
+import re
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+PAGES = ["README.md", *sorted(str(p.relative_to(ROOT)) for p in (ROOT / "docs").glob("*.md"))]
+BLOCK = re.compile(r"(<!-- needs gmsh -->\n)?```python\n(.*?)```", re.DOTALL)
+
+
+def blocks(page):
+    """Pairs (needs gmsh, code) of a page."""
+    found = BLOCK.findall((ROOT / page).read_text(encoding="utf-8"))
+    return [(bool(mark), code) for mark, code in found]
+
+
+def run(codes, folder):
+    """Run blocks one after the other, as a reader would."""
+    before = Path.cwd()
+    os.chdir(folder)
+    try:
+        names = {}
+        for code in codes:
+            exec(compile(code, "block", "exec"), names)
+    finally:
+        os.chdir(before)
+
+
+@pytest.mark.filterwarnings("ignore::xcrack.XcrackWarning")
+@pytest.mark.parametrize("page", [p for p in PAGES if any(not g for g, _ in blocks(p))])
+def test_blocks_run(page, tmp_path):
+    run([code for gmsh, code in blocks(page) if not gmsh], tmp_path)
+
+
+@pytest.mark.gmsh
+@pytest.mark.filterwarnings("ignore::xcrack.XcrackWarning")
+@pytest.mark.parametrize("page", [p for p in PAGES if any(g for g, _ in blocks(p))])
+def test_blocks_with_gmsh_run(page, tmp_path):
+    header = "import numpy as np\nimport xcrack as xc\n"
+    run([header, *[code for gmsh, code in blocks(page) if gmsh]], tmp_path)
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_links_lead_somewhere(page):
+    folder = (ROOT / page).parent
+    for target in re.findall(r"\]\(([^)#:]+)\)", (ROOT / page).read_text(encoding="utf-8")):
+        assert (folder / target).exists(), f"{page} links to {target}, which is not there"

@@ -1,0 +1,60 @@
+"""What a step in space takes over from the one before: fewer steps, the same answer."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import xcrack as xc
+from support import scenes_3d as scenes_space
+from xcrack.analysis.solve import solve_states
+
+pytestmark = pytest.mark.filterwarnings("ignore::xcrack.XcrackWarning")
+PRESS = [xc.traction("top", (0.3, 0, -1.0)), xc.traction("bottom", (-0.3, 0, 1.0)),
+         xc.traction("right", (0, 0, 0.3)), xc.traction("left", (0, 0, -0.3))]  # fmt: skip
+PULL = [xc.traction("top", (0, 0, 1.0)), xc.traction("bottom", (0, 0, -1.0))]
+
+
+def scene(radius, **options):
+    mesh = xc.box((-1, -1, -1), (1, 1, 1), 8)
+    crack = xc.penny_crack((0.013, -0.021, 0.0317), (0.2, -0.3, 1.0), radius)
+    return xc.Problem(
+        mesh, scenes_space.STEEL, [crack],
+        numerics=xc.Numerics(linear="iterative"), **options,
+    )  # fmt: skip
+
+
+def test_next_step_starts_from_closed_lips():
+    """One solve a state instead of two, and what a fresh start finds."""
+    first = solve_states(scene(0.55), [PRESS, PULL])
+    next_scene = replace(scene(0.58), mesh=first[0].problem.mesh)
+    warm = solve_states(next_scene, [PRESS, PULL], reuse=first[0].reuse)
+    fresh = solve_states(next_scene, [PRESS, PULL])
+    count = [s[0].report.operations for s in (warm, fresh)]
+    assert count[0]["solves"] == 2 < count[1]["solves"]
+    assert count[0]["iterations"] < count[1]["iterations"]
+    for one, other in zip(warm, fresh, strict=True):
+        # To the residual of the conjugate gradients, 1e-8.
+        assert one.u == pytest.approx(other.u, abs=1e-6 * np.abs(other.u).max())
+        p = other.contact[0].pressure
+        assert one.contact[0].pressure == pytest.approx(p, abs=1e-5)
+
+
+def test_a_crack_that_opens_again_gives_its_multipliers_back():
+    closed = solve_states(scene(0.55), [PRESS])
+    opened = solve_states(
+        replace(scene(0.55), mesh=closed[0].problem.mesh), [PULL],
+        reuse=closed[0].reuse,
+    )[0]  # fmt: skip
+    assert closed[0].contact[0] is not None
+    assert opened.contact[0] is None
+    assert opened.opening(0).min() >= 0
+    assert not opened.report["multipliers of crack 0"].used
+
+
+def test_an_open_crack_is_solved_to_the_end():
+    """The rough look at the lips is not the answer."""
+    found = xc.solve(scene(0.55, loads=PULL))
+    exact = xc.solve(replace(scene(0.55, loads=PULL), numerics=xc.Numerics(linear="direct")))
+    # To rigid motions, which neither engine decides alike: by the opening.
+    assert found.opening(0) == pytest.approx(exact.opening(0), rel=1e-5, abs=1e-7)

@@ -1,0 +1,1 @@
+"""Scenes, fakes and processes that tests share."""

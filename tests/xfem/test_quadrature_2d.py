@@ -1,0 +1,127 @@
+"""Rules: polynomials exactly, roots of r well, and boundary points that neighbours share."""
+
+from math import factorial
+
+import numpy as np
+import pytest
+
+import xcrack as xc
+from support import scenes_2d as scenes
+from xcrack.analysis.solve import build
+from xcrack.mesh.simplex import conical, simplex_rule
+from xcrack.xfem.consistent import boundary_points
+from xcrack.xfem.loads import position
+from xcrack.xfem.quadrature import cell_points
+from xcrack.xfem.quadrature_2d import segment_points
+
+
+def moment(powers):
+    """Mean of a monomial in the barycentric coordinates over a simplex."""
+    d = len(powers) - 1
+    top = factorial(d) * np.prod([factorial(p) for p in powers], dtype=float)
+    return top / factorial(sum(powers) + d)
+
+
+@pytest.mark.parametrize("dim", [1, 2, 3])
+@pytest.mark.parametrize("degree", range(1, 13))
+def test_rules_are_exact_to_their_degree(dim, degree):
+    bary, weight = simplex_rule(dim, degree)
+    rng = np.random.default_rng(degree)
+    for _ in range(12):
+        powers = rng.multinomial(degree, np.full(dim + 1, 1 / (dim + 1)))
+        found = weight @ np.prod(bary**powers, axis=1)
+        assert found == pytest.approx(moment(powers), rel=1e-12)  # round-off
+
+
+def test_conical_points_lie_inside():
+    for n in range(1, 9):
+        bary, weight = conical(2, n)
+        assert bary.min() > 0
+        assert weight.min() > 0
+
+
+def model(points, order=2, n=9, seed=21, radius=None):
+    """A built problem with one crack."""
+    return build(
+        xc.Problem(
+            scenes.perturbed(n, seed),
+            xc.Isotropic(1.0, 0.3, "strain"),
+            [xc.line_crack(points)],
+            order=order,
+            numerics=xc.Numerics(radius=radius),
+        )
+    )
+
+
+@pytest.mark.parametrize("tip", [(0.083, 0.047), (0.0, 0.0), (1e-12, -1e-9), (0.2, 0.111)])
+def test_cells_are_filled_and_cubics_exact(tip):
+    """The tip's cell included: its fan is exact for polynomials, which the patch tests need."""
+    space = model([(-1.2, 0.03), tip]).space
+    mesh = space.mesh
+    cells = space.enriched
+    points = cell_points(space, cells, 4, 4)
+    x = position(space, points.cell, points.bary)
+    for powers in ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2), (3, 0), (1, 2)):
+        total = np.bincount(
+            points.cell,
+            points.weight * x[:, 0] ** powers[0] * x[:, 1] ** powers[1],
+            len(mesh.cells),
+        )
+        bary, weight = conical(2, 4)
+        y = np.einsum("qb,cbd->cqd", bary, mesh.points[mesh.cells[cells]])
+        exact = mesh.volume[cells] * (y[..., 0] ** powers[0] * y[..., 1] ** powers[1] @ weight)
+        np.testing.assert_allclose(total[cells], exact, atol=1e-13)  # round-off
+
+
+def test_one_over_r_around_a_tip():
+    """Integral of 1/r over the square, against its closed form: discretisation."""
+    tip = (0.083, 0.047)
+    space = model([(-1.2, 0.03), tip], radius=2.0).space
+    points = cell_points(space, np.arange(len(space.mesh.cells)), 4, 4)
+    x = position(space, points.cell, points.bary)
+    found = points.weight @ (1 / np.linalg.norm(x - tip, axis=1))
+    exact = 0.0
+    for sx, sy in ((1, 1), (1, -1), (-1, 1), (-1, -1)):
+        a, b = 1 - sx * tip[0], 1 - sy * tip[1]
+        # In a right triangle with leg a along an axis, int 1/r = a asinh(b/a), and its twin.
+        exact += a * np.arcsinh(b / a) + b * np.arcsinh(a / b)
+    assert found == pytest.approx(exact, rel=2e-5)
+
+
+def test_graded_segments_integrate_polynomials_and_roots():
+    space = model([(-1.2, 0.03), (0.083, 0.047)]).space
+    begin = np.array([[0.083, 0.047], [0.05, 0.05], [0.6, 0.6]])
+    end = np.array([[0.2, 0.1], [0.2, 0.05], [0.7, 0.6]])
+    rule = segment_points(space, begin, end)
+    for k in range(3):
+        t, w = rule.position[rule.segment == k], rule.weight[rule.segment == k]
+        for p in range(5):
+            assert w @ t**p == pytest.approx(1 / (p + 1), rel=1e-12)
+    t, w = rule.position[rule.segment == 0], rule.weight[rule.segment == 0]
+    assert w @ np.sqrt(t) == pytest.approx(2 / 3, rel=1e-12)  # starts at the tip: r = u² is exact
+
+
+@pytest.mark.parametrize("tip", [(0.083, 0.047), (0.0, 0.0), (0.2, 0.111)])
+def test_boundaries_of_pieces_close(tip):
+    """The outward normals of each piece sum to zero: no facet or lip is missing or doubled."""
+    built = model([(-1.2, 0.03), tip])
+    space = built.space
+    cells = space.enriched[space.has_tip[space.enriched]]
+    boundary = boundary_points(space, cells, built.lips)
+    piece = 2 * np.searchsorted(cells, boundary.cell) + (boundary.piece_side > 0)
+    for axis in range(2):
+        total = np.bincount(piece, boundary.normal[:, axis])
+        np.testing.assert_allclose(total, 0.0, atol=1e-14)
+
+
+@pytest.mark.parametrize("points", [2, 3, 5, 7, 8])
+def test_few_points_are_enough(points):
+    """K moves by a hundredth of what a cell changes; 7 and more points are not symmetric."""
+
+    def K(n):
+        problem, _ = scenes.williams_edge(
+            14, *scenes.TIPS[0], order=2, K=(1.0, 0.5), numerics=xc.Numerics(points=n)
+        )
+        return xc.stress_intensity(xc.solve(problem)).K[0]
+
+    assert np.abs(K(points) - K(4)).max() <= 1e-5

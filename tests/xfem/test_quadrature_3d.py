@@ -1,0 +1,259 @@
+"""Rules around fronts in space: volumes, polynomials, stiffness, and boundaries of pieces."""
+
+import numpy as np
+import pytest
+
+import xcrack as xc
+from support import scenes_3d as scenes
+from support.scenes_2d import numerics_of
+from xcrack.analysis.solve import build
+from xcrack.mesh.simplex import conical
+from xcrack.xfem.consistent import boundary_points, corrected
+from xcrack.xfem.loads import position
+from xcrack.xfem.quadrature import Points, cell_points, sub_cells
+from xcrack.xfem.quadrature_3d import front_points, radius_at, triangle_points
+
+CRACKS = {
+    "oblique": xc.penny_crack((0.013, 0.021, 0.034), (0.1, 0.2, 1.0), 0.5),
+    "on a layer": xc.penny_crack((0, 0, 0), (0, 0, 1), 0.5),
+    "front on nodes": scenes.square_crack(2 / 3, 0.0),
+    "a hair above": xc.penny_crack((0, 0, 1e-9), (0, 0, 1), 2 / 3),
+    "from side to side": scenes.half_sheet(0.07, 0.1),
+}
+
+
+def model(crack, n=6, seed=None, **options):
+    mesh = xc.box((-1, -1, -1), (1, 1, 1), n) if seed is None else scenes.perturbed(n, seed)
+    return build(xc.Problem(mesh, scenes.STEEL, [crack], numerics=numerics_of(**options)))
+
+
+def with_tip(space):
+    return space.enriched[space.has_tip[space.enriched]]
+
+
+def moments(space, cells, points):
+    """Largest error of the moments of each degree in the cells, relative to their volume."""
+    x = position(space, points.cell, points.bary)
+    bary, weight = conical(3, 4)
+    y = np.einsum("qb,cbd->cqd", bary, space.mesh.points[space.mesh.cells[cells]])
+    error = np.zeros(3)
+    for powers in ((0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), (2, 0, 0), (0, 1, 1), (0, 0, 2)):
+        total = np.bincount(
+            points.cell, points.weight * np.prod(x**powers, axis=1), len(space.mesh.cells)
+        )
+        exact = space.mesh.volume[cells] * (np.prod(y**powers, axis=2) @ weight)
+        worst = np.abs(total[cells] - exact) / space.mesh.volume[cells]
+        error[sum(powers)] = max(error[sum(powers)], worst.max())
+    return error
+
+
+@pytest.mark.parametrize("name", CRACKS)
+def test_cells_are_filled(name):
+    """Volumes to round-off; quadratics too, but not where r = s² takes some of the degree."""
+    space = model(CRACKS[name]).space
+    cells = with_tip(space)
+    found = moments(space, cells, cell_points(space, cells, 4, 0))
+    assert found[0] <= 1e-13
+    away = cells[~np.isin(cells, space.cuts[0].level_set.tip_cells[0])]
+    assert (moments(space, away, cell_points(space, away, 4, 0)) <= 1e-13).all()
+    rich = moments(space, cells, cell_points(space, cells, 6, 0))
+    print(f"\n{name}: moments of degree 0, 1, 2 to {found}; {rich} with 6 points")
+    assert (found[1:] <= 1e-2).all()
+    assert (rich[:2] <= 1e-13).all()
+    assert rich[2] <= 1e-5
+
+
+def test_points_lie_inside_with_positive_weights():
+    space = model(CRACKS["oblique"], seed=19).space
+    cells = with_tip(space)
+    for n in (2, 3, 4, 6):
+        points = cell_points(space, cells, n, 0)
+        assert (points.bary > 0).all()
+        assert (points.weight > 0).all()
+        total = np.bincount(points.cell, points.weight, len(space.mesh.cells))
+        np.testing.assert_allclose(total[cells], space.mesh.volume[cells], rtol=1e-12)
+
+
+def test_no_more_points_than_needed():
+    """The time to assemble grows with them; 20 a cell are enough for K."""
+    space = model(CRACKS["oblique"], n=8, seed=3).space
+    cells = with_tip(space)
+    count = len(cell_points(space, cells, 4, 0).weight) / len(cells)
+    print(f"\n{count:.1f} points a cell with tip functions")
+    assert count < 25
+
+
+# Stiffness -------------------------------------------------------------------------------------
+
+
+def eighths(bary, share, number):
+    """Cut tetrahedra in eight."""
+    a, b, c, d = (bary[:, k] for k in range(4))
+    ab, ac, ad, bc, bd, cd = ((p + q) / 2 for p, q in
+                              ((a, b), (a, c), (a, d), (b, c), (b, d), (c, d)))  # fmt: skip
+    children = [(a, ab, ac, ad), (ab, b, bc, bd), (ac, bc, c, cd), (ad, bd, cd, d),
+                (ab, ac, ad, bd), (ab, ac, bc, bd), (ac, ad, bd, cd), (ac, bc, bd, cd)]  # fmt: skip
+    finer = np.concatenate([np.stack(child, axis=1) for child in children])
+    return finer, np.tile(share / 8, 8), np.tile(number, 8)
+
+
+def brute_force(space, cells, levels):
+    """Points by cutting in eight towards the front, with no map at all."""
+    subs = sub_cells(space, cells)
+    bary, share, number = subs.bary, subs.fraction, np.arange(len(subs.cell))
+    rule, weight = conical(3, 3)
+    parts = []
+    for level in range(levels + 1):
+        nodes = space.mesh.cells[subs.cell[number]]
+        x = np.einsum("svb,sbd->svd", bary, space.mesh.points[nodes])
+        size = np.linalg.norm(x[:, :, None] - x[:, None], axis=3).max(axis=(1, 2))
+        near = (radius_at(space, nodes, bary).min(axis=1) < size) & (level < levels)
+        rows = np.nonzero(~near)[0]
+        place = np.einsum("pv,svb->spb", rule, bary[rows]).reshape(-1, 4)
+        parts.append((np.repeat(number[rows], len(weight)), place, np.outer(share[rows], weight)))
+        bary, share, number = eighths(bary[near], share[near], number[near])
+    number = np.concatenate([p[0] for p in parts])
+    place = np.concatenate([p[1] for p in parts])
+    weight = np.concatenate([p[2].ravel() for p in parts])
+    order = np.argsort(subs.cell[number], kind="stable")
+    number = number[order]
+    cell = subs.cell[number]
+    volume = space.mesh.volume[cell]
+    return Points(cell, place[order], weight[order] * volume, subs.side[number])
+
+
+def gram(space, lips, cell, points, consistent):
+    """Gram matrix of the gradients of all functions on one cell."""
+    ((batch, _),) = space.batches(np.array([cell]))
+    row = np.zeros(len(points.weight), dtype=np.int64)
+    N, G = space.tabulate(batch, row, points.bary, points.side)
+    if consistent:
+        boundary = boundary_points(space, np.array([cell]), lips)
+        part = (row, points.bary, points.weight, points.side)
+        G = corrected(space, batch, part, N, G.copy(), boundary)
+    return np.einsum("q,qad,qbd->ab", points.weight, G, G)
+
+
+def test_stiffness_against_brute_force():
+    """Cells at the front and around it: the rules in use against thousands of points a cell."""
+    built = model(CRACKS["oblique"], seed=23)
+    space, lips = built.space, built.lips
+    rng = np.random.default_rng(23)
+    at_front = space.cuts[0].level_set.tip_cells[0]
+    around = np.setdiff1d(with_tip(space), at_front)
+    worst = {}
+    for name, cells in (("front", at_front), ("around", around)):
+        errors = []
+        for cell in rng.choice(cells, 6, replace=False):
+            one = np.array([cell])
+            wanted = gram(space, lips, cell, brute_force(space, one, 3), False)
+            found = gram(space, lips, cell, cell_points(space, one, 4, 0), True)
+            errors.append(np.linalg.norm(found - wanted) / np.linalg.norm(wanted))
+        worst[name] = max(errors)
+    print(f"\nstiffness of cells: {worst}")
+    assert worst["front"] <= 1e-2
+    assert worst["around"] <= 1e-2
+
+
+def test_more_points_are_more_exact():
+    built = model(CRACKS["oblique"], seed=29)
+    space, lips = built.space, built.lips
+    cells = space.cuts[0].level_set.tip_cells[0][:5]
+    error = []
+    for n in (3, 4, 6):
+        part = []
+        for cell in cells:
+            one = np.array([cell])
+            wanted = gram(space, lips, cell, cell_points(space, one, 9, 0), True)
+            found = gram(space, lips, cell, cell_points(space, one, n, 0), True)
+            part.append(np.linalg.norm(found - wanted) / np.linalg.norm(wanted))
+        error.append(max(part))
+    print(f"\nstiffness with 3, 4, 6 points: {error}")
+    assert error[0] > error[1] > error[2]
+    assert error[2] < 1e-3
+
+
+# Boundaries ------------------------------------------------------------------------------------
+
+
+def test_triangles_with_roots_of_the_distance():
+    """Triangles at, near and away from a front x = 0; r = x: integrals of 1, x, sqrt(x)."""
+    r = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 1.0], [0.2, 1.1, 1.2], [3.0, 4.0, 4.0]])
+    size = np.full(4, 1.2)
+    number, bary, weight = triangle_points(r, size)
+    x = np.einsum("qv,qv->q", bary, r[number])
+    # With linear x the mean of f(x) over a triangle is a divided difference of its antiderivative.
+    found = [np.bincount(number, weight * f) for f in (np.ones_like(x), x, x**2, np.sqrt(x))]
+    np.testing.assert_allclose(found[0], 1.0, rtol=1e-14)
+    np.testing.assert_allclose(found[1], r.mean(axis=1), rtol=1e-13)
+    square = ((r**2).sum(axis=1) + r[:, 0] * r[:, 1] + r[:, 0] * r[:, 2] + r[:, 1] * r[:, 2]) / 6
+    np.testing.assert_allclose(found[2], square, rtol=1e-12)
+    fine, share = conical(2, 12)
+    wanted = np.sqrt(r @ fine.T) @ share
+    # The first two by closed form: 2 int (1 - x) sqrt(x), 2 int x sqrt(x).
+    wanted[:2] = 8 / 15, 4 / 5
+    np.testing.assert_allclose(found[3][:2], wanted[:2], rtol=1e-12)
+    np.testing.assert_allclose(found[3][2:], wanted[2:], rtol=1e-4)
+
+
+@pytest.mark.parametrize("name", CRACKS)
+def test_boundaries_of_pieces_close(name):
+    """The outward normals of each piece sum to zero: no facet or lip is missing or doubled."""
+    built = model(CRACKS[name])
+    space = built.space
+    cells = with_tip(space)
+    boundary = boundary_points(space, cells, built.lips)
+    piece = 2 * np.searchsorted(cells, boundary.cell) + (boundary.piece_side > 0)
+    for axis in range(3):
+        total = np.bincount(piece, boundary.normal[:, axis])
+        np.testing.assert_allclose(total, 0.0, atol=1e-13)
+
+
+@pytest.mark.parametrize("name", ["oblique", "a hair above"])
+def test_the_correction_closes_the_defect(name):
+    """Integral of the gradient against that of the normal over the boundary, piece by piece."""
+    built = model(CRACKS[name], seed=None if name == "a hair above" else 31)
+    space = built.space
+    cells = with_tip(space)
+    points = cell_points(space, cells, 4, 0)
+    boundary = boundary_points(space, cells, built.lips)
+    before = after = largest = 0.0
+    for batch, _ in space.batches(cells):
+        number, row, _ = points.of_cells(batch.cells)
+        bary, weight, side = points.bary[number], points.weight[number], points.side[number]
+        N, G = space.tabulate(batch, row, bary, side)
+        fixed = corrected(space, batch, (row, bary, weight, side), N, G.copy(), boundary)
+        chosen = np.isin(boundary.cell, batch.cells)
+        brow = np.searchsorted(batch.cells, boundary.cell[chosen])
+        values, _ = space.tabulate(batch, brow, boundary.bary[chosen], boundary.side[chosen])
+        acts = batch.functions >= 0
+        flux = np.zeros((len(batch.cells), N.shape[1], 3))
+        np.add.at(flux, brow, values[:, :, None] * boundary.normal[chosen][:, None])
+        for gradient, which in ((G, "before"), (fixed, "after")):
+            inner = np.zeros_like(flux)
+            np.add.at(inner, row, weight[:, None, None] * gradient)
+            defect = float(np.abs((inner - flux)[acts]).max())
+            if which == "before":
+                before = max(before, defect)
+            else:
+                after = max(after, defect)
+        largest = max(largest, float(np.abs(flux[acts]).max()))
+    print(f"\n{name}: defect {before / largest:.1e} before, {after / largest:.1e} after")
+    assert before > 1e-5 * largest
+    assert after <= 1e-12 * largest
+
+
+@pytest.mark.parametrize(("order", "count"), [(1, 4), (2, 14)])
+def test_points_away_from_a_front(order, count):
+    """Degree 2 at order 1; 5 at order 2, whose tip functions nearly repeat the quadratic ones."""
+    crack = xc.penny_crack((0.01, -0.02, 0.03), (0.3, -0.5, 1.0), 0.5)
+    mesh = xc.box((-1, -1, -1), (1, 1, 1), 6)
+    space = build(xc.Problem(mesh, xc.Isotropic(1.0, 0.3), [crack], order=order)).space
+    cells = np.nonzero(space.has_tip)[0]
+    corner = np.broadcast_to(np.eye(4), (len(cells), 4, 4))
+    far = radius_at(space, mesh.cells[cells], corner).min(axis=1) > mesh.cell_size[cells]
+    assert far.sum() > 20
+    whole, fan = np.ones(far.sum()), np.zeros(far.sum(), dtype=bool)
+    number, _, weight = front_points(space, cells[far], corner[far], whole, fan, 4)
+    np.testing.assert_array_equal(np.bincount(number), count)
+    np.testing.assert_allclose(np.bincount(number, weight), 1, rtol=1e-14)  # round-off
