@@ -212,22 +212,22 @@ def main() -> int:
         start = time.perf_counter()
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", xc.XcrackWarning)
-            found = {f"{name}/{key}": np.asarray(value) for key, value in run().items()}
-        results |= found
-        line = f"{name:36} {len(found):4d} arrays {time.perf_counter() - start:6.1f} s"
+            result = {f"{name}/{key}": np.asarray(value) for key, value in run().items()}
+        results |= result
+        line = f"{name:36} {len(result):4d} arrays {time.perf_counter() - start:6.1f} s"
         if stored:
             expected = {key for key in stored if key.startswith(f"{name}/")}
             apart = {
-                k: difference(stored[k], found[k], scale_of(k, stored))
-                for k in expected & set(found)
+                k: difference(stored[k], result[k], scale_of(k, stored))
+                for k in expected & set(result)
             }
-            apart |= {k: np.inf for k in expected - set(found)}
+            apart |= {k: np.inf for k in expected - set(result)}
             largest = max(apart, key=lambda k: apart[k])
             worst = max(worst, apart[largest])
             line += (
                 f"   {'same bits' if apart[largest] == 0 else f'{apart[largest]:.1e} {largest}'}"
             )
-            new = set(found) - expected  # columns that there were not before
+            new = set(result) - expected  # columns that there were not before
             line += f"   ({len(new)} new arrays)" if new else ""
         print(line, flush=True)
     if options.save:

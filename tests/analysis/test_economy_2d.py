@@ -171,17 +171,17 @@ def test_points_are_spent_only_where_a_function_is_no_polynomial(order):
 @pytest.mark.parametrize("order", [1, 2])
 def test_an_open_crack_costs_nothing_for_contact(order):
     """No multipliers, and the same operations as with contact switched off (2 % are allowed)."""
-    found = {
+    result = {
         contact: xc.solve(problem(EDGE, INNER, order=order, contact=contact))
         for contact in ("auto", "off")
     }
-    auto, off = (found[c].report.operations for c in ("auto", "off"))
+    auto, off = (result[c].report.operations for c in ("auto", "off"))
     for name in ("factorisations", "solves", "assembled_cells", "integration_points"):
         assert auto[name] <= 1.02 * off[name]
     assert auto["multipliers"] == auto["contact_iterations"] == 0
-    assert found["auto"].contact == (None, None)
-    assert (found["auto"].u == found["off"].u).all()
-    row = found["auto"].report["multipliers of crack 0"]
+    assert result["auto"].contact == (None, None)
+    assert (result["auto"].u == result["off"].u).all()
+    row = result["auto"].report["multipliers of crack 0"]
     assert not row.used
     assert row.reason == "the crack faces stay apart in every load state"
 

@@ -33,9 +33,9 @@ def test_states_together_give_what_each_gives_alone():
 @pytest.mark.parametrize("order", [[0.0, 1.0], [1.0, 0.0], [0.0, 0.0]], ids=str)
 def test_a_state_at_rest_has_no_K(order):
     """In any place, with the tips of the others."""
-    found = xc.stress_intensities(xc.solve(pulled(), states=order))
+    result = xc.stress_intensities(xc.solve(pulled(), states=order))
     alone = xc.stress_intensity(xc.solve(pulled()))
-    for state, sif in zip(order, found, strict=True):
+    for state, sif in zip(order, result, strict=True):
         np.testing.assert_array_equal(sif.x, alone.x)
         np.testing.assert_allclose(sif.K, state * alone.K, rtol=1e-12)
         np.testing.assert_allclose(sif.T, state * alone.T, rtol=1e-11)
@@ -44,8 +44,8 @@ def test_a_state_at_rest_has_no_K(order):
 def test_an_initial_stress_is_not_rest():
     """It stays when the loads are scaled to nothing."""
     stress = xc.initial_stress(np.diag([0.0, 0.5]))
-    held = [xc.fix("top"), xc.fix("bottom")]
-    solutions = xc.solve(replace(pulled(), supports=held, loads=[stress]), states=[0.0, 1.0])
+    supported = [xc.fix("top"), xc.fix("bottom")]
+    solutions = xc.solve(replace(pulled(), supports=supported, loads=[stress]), states=[0.0, 1.0])
     assert not solutions[0].at_rest
     none, loaded = xc.stress_intensities(solutions)
     assert none.K_I[0] > 0.1
@@ -75,9 +75,9 @@ def test_a_warning_names_the_line_that_asked_for_K(dim):
     loads = [xc.traction("top", tuple(up)), xc.traction("bottom", tuple(-up))]
     mesh = xc.box((-1,) * dim, (1,) * dim, 6)
     solution = xc.solve(xc.Problem(mesh, xc.Isotropic(1.0, 0.3, plane), [crack], loads=loads))
-    with pytest.warns(xc.XcrackWarning, match="clipped") as said:
+    with pytest.warns(xc.XcrackWarning, match="clipped") as messages:
         xc.stress_intensity(solution)
-    assert all(warning.filename == __file__ for warning in said)
+    assert all(warning.filename == __file__ for warning in messages)
 
 
 def test_solutions_of_different_solves_are_refused():

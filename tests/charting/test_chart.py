@@ -139,9 +139,9 @@ def circle(n, start, front=0):
 
 def test_fronts_are_compared_place_by_place():
     fine, coarse = circle(90, 0.31), circle(40, 2.13)
-    exact, found = fine.values, at_places(coarse, fine).reshape(-1, 2)
+    exact, result = fine.values, at_places(coarse, fine).reshape(-1, 2)
     bend = np.array([1, 4])  # second derivatives; linear interpolation errs by h²/8 of them
-    assert np.all(np.abs(found - exact).max(axis=0) < 1.1 * (2 * np.pi / 40) ** 2 / 8 * bend)
+    assert np.all(np.abs(result - exact).max(axis=0) < 1.1 * (2 * np.pi / 40) ** 2 / 8 * bend)
     with pytest.raises(xc.ProblemError, match=r"1 tip\(s\) or front\(s\) here.*finer meshes"):
         at_places(circle(40, 0.2), circle(90, 0.1, front=1))
 
@@ -195,8 +195,8 @@ def test_advice_can_be_solved(williams):
     assert best.row.seconds == min(
         r.seconds for r in williams.good if r.error + williams.reference_error <= 1e-2
     )
-    found = scenes.K_of(best.problem)[0]
-    assert np.allclose(found, best.row.values, rtol=1e-12)
+    result = scenes.K_of(best.problem)[0]
+    assert np.allclose(result, best.row.values, rtol=1e-12)
     assert str(best) in str(williams)
     none = williams.best(1e-12)
     assert not none
@@ -226,7 +226,7 @@ def test_meshes_of_a_function():
         return xc.box((-1, -1), (1, 1), round(2 / h))
 
     scene = xc.Problem(xc.box((-1, -1), (1, 1), 4), STEEL, loads=PULL)
-    found = xc.chart(
+    result = xc.chart(
         scene,
         [{"order": 1}],
         meshes=maker,
@@ -238,34 +238,34 @@ def test_meshes_of_a_function():
     )
     assert np.allclose(asked, [0.5, 0.25])
     # Constant stress: every run is exact, to round-off.
-    assert max(row.error for row in found.rows) < 1e-10
-    assert found.reference.values[1] == pytest.approx(4 * found.reference.values[0])
-    assert found.quantity == "quantity"
-    assert "<" in found.table()
+    assert max(row.error for row in result.rows) < 1e-10
+    assert result.reference.values[1] == pytest.approx(4 * result.reference.values[0])
+    assert result.quantity == "quantity"
+    assert "<" in result.table()
 
 
 def test_without_tips_the_energy_is_compared():
     scene = xc.Problem(xc.box((-1, -1), (1, 1), 3), STEEL, loads=PULL)
-    found = xc.chart(scene, repeat=1, seconds=1e-6, progress=False)
-    assert {row.setting for row in found.rows} == {"as given", "order 1"}
+    result = xc.chart(scene, repeat=1, seconds=1e-6, progress=False)
+    assert {row.setting for row in result.rows} == {"as given", "order 1"}
     # Energy of a constant stress: area (1 - nu²) / 2 E.
-    assert found.reference.values[0] == pytest.approx(2 * (1 - 0.3**2))
-    assert found.quantity == "strain energy"
+    assert result.reference.values[0] == pytest.approx(2 * (1 - 0.3**2))
+    assert result.quantity == "strain energy"
 
 
 @pytest.mark.slow
 def test_default_settings_vary_what_is_there():
     crack = xc.line_crack([(-1.2, 0.03), (0.0, 0.03)])
     scene = xc.Problem(xc.box((-1, -1), (1, 1), 6), STEEL, [crack], loads=PULL)
-    found = xc.chart(scene, repeat=1, seconds=1e-6, progress=False)
-    names = {row.setting for row in found.rows}
+    result = xc.chart(scene, repeat=1, seconds=1e-6, progress=False)
+    names = {row.setting for row in result.rows}
     assert names == {"as given", "order 1", "radius × 0.7", "radius × 1.4", "topological",
                      "domain 1.5 radii", "2 functions"}  # fmt: skip
-    assert not found.failed
-    by_name = {row.setting: row for row in found.rows if row.mesh == 1}
+    assert not result.failed
+    by_name = {row.setting: row for row in result.rows if row.mesh == 1}
     ratio = by_name["radius × 1.4"].fields["radius"] / by_name["radius × 0.7"].fields["radius"]
     assert ratio == pytest.approx(2.0)
-    assert any(row.warnings for row in found.rows if row.mesh == 0)
+    assert any(row.warnings for row in result.rows if row.mesh == 0)
 
 
 def test_contact_is_compared_but_no_reference():
@@ -273,9 +273,9 @@ def test_contact_is_compared_but_no_reference():
     crack = xc.line_crack([(-1.2, 0.03), (0.0, 0.03)])
     body = xc.Problem(xc.box((-1, -1), (1, 1), 5), STEEL, [crack], loads=PULL)
     off, states = [{"contact": "off"}], [1.0, -1.0]
-    found = xc.chart(body, off, states=states, seconds=1e-6, repeat=1, progress=False)
-    assert found.reference.setting == "as given"
-    errors = [row.error for row in found.rows if row.setting == "contact off"]
+    result = xc.chart(body, off, states=states, seconds=1e-6, repeat=1, progress=False)
+    assert result.reference.setting == "as given"
+    errors = [row.error for row in result.rows if row.setting == "contact off"]
     assert np.allclose(errors, 1.0, atol=0.05)  # discretisation
 
 
@@ -289,13 +289,15 @@ def test_penny():
         loads=[xc.traction("top", (0, 0, 1.0)), xc.traction("bottom", (0, 0, -1.0))],
     )
     meshes = [xc.box((-1, -1, -1), (1, 1, 1), n) for n in (6, 9, 13)]
-    found = xc.chart(scene, [{"functions": 2}], meshes=meshes, wanted=0.1, repeat=1, progress=False)
-    assert not found.failed
-    assert found.reference.mesh == 2
-    assert found.reference_error < 0.05
-    assert found.best()
+    result = xc.chart(
+        scene, [{"functions": 2}], meshes=meshes, wanted=0.1, repeat=1, progress=False
+    )
+    assert not result.failed
+    assert result.reference.mesh == 2
+    assert result.reference_error < 0.05
+    assert result.best()
     infinite = 2 * np.sqrt(0.5 / np.pi)
-    K_I = found.reference.values.reshape(-1, 3)[:, 0]
+    K_I = result.reference.values.reshape(-1, 3)[:, 0]
     assert 1.0 < K_I.mean() / infinite < 1.15  # finite block: above that of an infinite body
 
 

@@ -49,9 +49,9 @@ def patch(seed, order, loads=(), **options):
 
 
 def deviation(problem, p=P0):
-    found = xc.solve(problem).contact[0]
-    assert found.closed.all()
-    return float(np.abs(found.pressure / p - 1).max())
+    result = xc.solve(problem).contact[0]
+    assert result.closed.all()
+    return float(np.abs(result.pressure / p - 1).max())
 
 
 # Uniform pressure --------------------------------------------------------------------------------
@@ -61,10 +61,10 @@ def deviation(problem, p=P0):
 def test_overlap_of_a_penalty_falls_with_its_stiffness(order):
     """Like 1 / eps; the pressure itself stays wrong at the tips, where no gap can be."""
     factors = (1e2, 1e3, 1e4)
-    found = [xc.solve(patch(641, order, lips="penalty", penalty=p)).contact[0] for p in factors]
-    overlap = [-c.gap.min() for c in found]
+    result = [xc.solve(patch(641, order, lips="penalty", penalty=p)).contact[0] for p in factors]
+    overlap = [-c.gap.min() for c in result]
     assert scenes.rate(overlap, factors) == pytest.approx(-1, abs=0.02)
-    for c in found:
+    for c in result:
         assert 0.02 < scenes.l2(c.pressure, np.full(len(c.s), P0), c.measure) < 0.5
 
 
@@ -90,8 +90,10 @@ def test_nitsche_is_exact_for_linear_pressure_at_order_2():
         scenes.perturbed(11, 712), [xc.line_crack([(-0.41, 0.0), (0.37, 0.0)])], field,
         traction=scenes.SIDES, contact="on", numerics=numerics_of(lips="nitsche"),
     )  # fmt: skip
-    found = xc.solve(problem).contact[0]
-    assert found.pressure == pytest.approx(scenes.pressure_of(terms)(found.points[:, 0]), abs=1e-9)
+    result = xc.solve(problem).contact[0]
+    assert result.pressure == pytest.approx(
+        scenes.pressure_of(terms)(result.points[:, 0]), abs=1e-9
+    )
 
 
 @pytest.mark.parametrize("order", [1, 2])
@@ -131,20 +133,20 @@ def test_partial_closure(order, lips):
     """K_I of the open tip and the end of contact: all agree; the closed tip tells them apart."""
     x0, c, K = exact.partial_closure_params(1.0, 0.0, 1.0)
     solution = half_closed(order, lips=lips)
-    found = solution.contact[0]
-    x = (found.points - [0.05, -0.07]) @ scenes.rows(0.21)[0]
+    result = solution.contact[0]
+    x = (result.points - [0.05, -0.07]) @ scenes.rows(0.21)[0]
     sif = xc.stress_intensity(solution)
     p = exact.partial_closure_pressure(x, 1.0, 0.0, 1.0)
-    error_p = scenes.l2(found.pressure, p, found.measure)
+    error_p = scenes.l2(result.pressure, p, result.measure)
     operations = solution.report.operations
     print(f"\n{lips} order {order}: K_I {sif.K_I[1] / K - 1:+.1e}, closed tip "
-          f"{sif.K_I[0] / K:+.1e}, end {(x[found.closed].max() - x0 + c) * 6:+.2f} h, p "
+          f"{sif.K_I[0] / K:+.1e}, end {(x[result.closed].max() - x0 + c) * 6:+.2f} h, p "
           f"{error_p:.3f}, {operations['contact_iterations']} sets, "
           f"{operations['factorisations']} factorisations")  # fmt: skip
     assert abs(sif.K_I[1] / K - 1) <= (1e-2 if order == 1 else 5e-4)
-    assert abs(x[found.closed].max() - (x0 - c)) <= 1 / 6
+    assert abs(x[result.closed].max() - (x0 - c)) <= 1 / 6
     assert error_p <= (0.4 if order == 1 else 0.2)
-    assert found.pressure.min() >= 0
+    assert result.pressure.min() >= 0
     assert operations["contact_iterations"] <= 60
 
 
@@ -196,10 +198,10 @@ def hole(order, **options):
 @cache
 def pressed_hole(order, **options):
     """Largest error of the pressure on the inner 80 % of the crack."""
-    found = xc.solve(hole(order, **options)).contact[0]
-    r = np.linalg.norm(found.points, axis=1)
+    result = xc.solve(hole(order, **options)).contact[0]
+    r = np.linalg.norm(result.points, axis=1)
     p = 0.5 * (2 + 1 / r**2 + 3 / r**4)
-    return float((np.abs(found.pressure - p) / p)[scenes.inner_part(found.s)].max())
+    return float((np.abs(result.pressure - p) / p)[scenes.inner_part(result.s)].max())
 
 
 @pytest.mark.parametrize("order", [1, 2])
@@ -250,13 +252,13 @@ def closed_condition(problem):
 @pytest.mark.parametrize("order", [1, 2])
 def test_condition_numbers(order):
     """Multipliers leave the stiffness alone; springs do not, the less the stiffer they are."""
-    found = {"multipliers": closed_condition(hole(order))}
+    result = {"multipliers": closed_condition(hole(order))}
     for lips in OPPONENTS:
-        found[lips] = closed_condition(hole(order, lips=lips))
-    found["stiff penalty"] = closed_condition(hole(order, lips="penalty", penalty=1e4))
-    print(f"\ncondition order {order}: " + ", ".join(f"{k} {v:.1e}" for k, v in found.items()))
-    assert found["multipliers"] < min(found[lips] for lips in OPPONENTS)
-    assert found["stiff penalty"] > found["penalty"]
+        result[lips] = closed_condition(hole(order, lips=lips))
+    result["stiff penalty"] = closed_condition(hole(order, lips="penalty", penalty=1e4))
+    print(f"\ncondition order {order}: " + ", ".join(f"{k} {v:.1e}" for k, v in result.items()))
+    assert result["multipliers"] < min(result[lips] for lips in OPPONENTS)
+    assert result["stiff penalty"] > result["penalty"]
 
 
 def test_updates_do_not_settle_on_naive_multipliers():
@@ -271,11 +273,11 @@ def test_closed_penny(lips):
     problem = scenes_space.flat_penny(
         6, 0.05, 0.55, (-1.0, 0.5), seed=7, contact="on", lips=lips, linear="direct"
     )
-    found = xc.solve(problem).contact[0]
-    inner = np.linalg.norm(found.points[:, :2], axis=1) < 0.4
-    error = np.abs(found.pressure - 1)[inner].max()
+    result = xc.solve(problem).contact[0]
+    inner = np.linalg.norm(result.points[:, :2], axis=1) < 0.4
+    error = np.abs(result.pressure - 1)[inner].max()
     print(f"\n{lips}: {error:.3f}")
-    assert found.closed.all()
+    assert result.closed.all()
     assert error <= (0.05 if lips in ("multipliers", "augmented") else 0.5)
 
 
@@ -310,16 +312,16 @@ def test_states(lips):
     Contact is on: Nitsche's method acts on open lips too, whose stress is zero but for the error.
     """
     states = [1.0, -1.0, -2.0]
-    found = xc.solve(edge("on", lips=lips), states=states)
-    for state, together in zip(states, found, strict=True):
+    result = xc.solve(edge("on", lips=lips), states=states)
+    for state, together in zip(states, result, strict=True):
         alone = xc.solve(edge("on", lips=lips), states=[state])[0]
         assert together.u == pytest.approx(alone.u, abs=1e-7 * np.abs(alone.u).max())
-    assert not found[0].contact[0].pressure.any()
-    assert not found[0].contact[0].closed.any()
-    p = found[1].contact[0].pressure
+    assert not result[0].contact[0].pressure.any()
+    assert not result[0].contact[0].closed.any()
+    p = result[1].contact[0].pressure
     assert p.min() >= 0
     # Homogeneous: twice the load, twice the pressure. 1e-6: the tolerance of the updates.
-    assert found[2].contact[0].pressure == pytest.approx(2 * p, abs=1e-6 * p.max())
+    assert result[2].contact[0].pressure == pytest.approx(2 * p, abs=1e-6 * p.max())
 
 
 @pytest.mark.parametrize("lips", OPPONENTS)
@@ -365,9 +367,9 @@ def test_a_large_body_in_space_is_factored():
 def test_pressure_given_on_the_lips(lips):
     """What is given takes its part of the load: contact carries the rest."""
     given = patch(641, 2, [xc.crack_pressure(0.7)], lips=lips, penalty=1e3)
-    found = xc.solve(given).contact[0]
-    middle = scenes.inner_part(found.s, 0.5)
-    assert found.pressure[middle] == pytest.approx(P0 - 0.7, rel=0.1)
+    result = xc.solve(given).contact[0]
+    middle = scenes.inner_part(result.s, 0.5)
+    assert result.pressure[middle] == pytest.approx(P0 - 0.7, rel=0.1)
 
 
 @pytest.mark.parametrize("order", [1, 2])
@@ -381,9 +383,9 @@ def test_nitsche_counts_what_acts_on_the_lips(order, steady):
     if steady:
         extra = xc.initial_stress(np.array([[0.4, 0.0], [0.0, -0.3]]))
         problem = replace(problem, loads=[*problem.loads, extra])
-    found = xc.solve(problem).contact[0]
+    result = xc.solve(problem).contact[0]
     bound = 1e-5 if steady else 1e-9
-    assert found.pressure == pytest.approx(P0 - 0.7, rel=bound)
+    assert result.pressure == pytest.approx(P0 - 0.7, rel=bound)
 
 
 @pytest.mark.parametrize("order", [1, 2])

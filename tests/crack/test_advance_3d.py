@@ -398,8 +398,8 @@ def test_along_front():
     )
     place = np.linspace(0, 2 * np.pi, 24, endpoint=False)
     fine = np.linspace(-1, 8, 91)
-    found = along_front(place, np.cos(place), fine, True, 2 * np.pi)
-    assert found == pytest.approx(np.cos(fine), abs=0.02)
+    result = along_front(place, np.cos(place), fine, True, 2 * np.pi)
+    assert result == pytest.approx(np.cos(fine), abs=0.02)
     step = along_front(place, np.where(place < 3, 0.0, 1.0), fine, True, 2 * np.pi)
     assert step.min() == 0
     assert step.max() == 1
@@ -447,11 +447,11 @@ def test_cycles_of_a_penny_and_of_a_straight_front(power):
     da = np.full(8, a1 - a0)
     exact = cycles_between(a0, a1, rate0[0], rate1[0])
     for size in ((a0 / 2, a1 / 2), (a0, a1)):
-        found = elapsed_3d([size[0]], [size[1]], [da], [rate0], [rate1])
-        assert found == pytest.approx(exact, rel=1e-12)
+        result = elapsed_3d([size[0]], [size[1]], [da], [rate0], [rate1])
+        assert result == pytest.approx(exact, rel=1e-12)
     scatter = rate1 * (1 + 0.03 * np.array([1, -1, 1, -1, -1, 1, -1, 1]))
-    found = elapsed_3d([1.0], [1.5], [da], [rate0], [scatter])
-    assert found == pytest.approx(exact, rel=1e-12)
+    result = elapsed_3d([1.0], [1.5], [da], [rate0], [scatter])
+    assert result == pytest.approx(exact, rel=1e-12)
 
 
 def test_cycles_where_points_stop_or_leave():
@@ -499,8 +499,8 @@ def test_values_are_carried_to_a_front_that_has_moved():
     value = np.cos(np.arctan2(frames.x[:, 1], frames.x[:, 0]))
     new = front_points(grown(crack, 0.05, 0.05))
     number = np.zeros(64, int)
-    found = carried(frames.x, number, [True], value, new, 0.1)
-    assert found == pytest.approx(np.cos(np.arctan2(new[:, 1], new[:, 0])), abs=0.01)
+    result = carried(frames.x, number, [True], value, new, 0.1)
+    assert result == pytest.approx(np.cos(np.arctan2(new[:, 1], new[:, 0])), abs=0.01)
     assert np.isnan(carried(frames.x, number, [True], value, new * 2, 0.1)).all()
 
 

@@ -69,12 +69,12 @@ def test_feet_of_drawn_points(closed):
     s = rng.uniform(0.02, 0.98, 400) * curve.length
     x, frame, _ = curve.at(s)
     local = reach * rng.uniform(-0.7, 0.7, (400, 2))
-    found = curve.feet(x + np.einsum("qa,qad->qd", local, frame[:, :2]))
-    np.testing.assert_allclose(found.s, s, atol=1e-11)  # round-off over the metric
-    np.testing.assert_allclose(found.local, local, atol=1e-12)
-    np.testing.assert_allclose(found.frame, frame, atol=1e-10)
-    assert (found.metric > 0).all()
-    assert not found.beyond.any()
+    result = curve.feet(x + np.einsum("qa,qad->qd", local, frame[:, :2]))
+    np.testing.assert_allclose(result.s, s, atol=1e-11)  # round-off over the metric
+    np.testing.assert_allclose(result.local, local, atol=1e-12)
+    np.testing.assert_allclose(result.frame, frame, atol=1e-10)
+    assert (result.metric > 0).all()
+    assert not result.beyond.any()
 
 
 def test_points_past_an_open_end_have_no_foot():

@@ -102,10 +102,10 @@ def check_cut(built, area=None):
     middle = np.einsum("sb,sb->s", cut.sub_bary.mean(axis=1), phi[mesh.cells[cut.sub_to_cell]])
     assert (np.sign(middle) == cut.sub_side).all()
     lips = built.lips[0]
-    found = areas(cut.lip_points(mesh)).sum()
-    assert lips.weight.sum() == pytest.approx(found, rel=1e-10)
+    result = areas(cut.lip_points(mesh)).sum()
+    assert lips.weight.sum() == pytest.approx(result, rel=1e-10)
     if area is not None:
-        assert found == pytest.approx(area, rel=1e-9)  # snapping moves a cut by 1e-10 of a cell
+        assert result == pytest.approx(area, rel=1e-9)  # snapping moves a cut by 1e-10 of a cell
 
 
 @settings(max_examples=15, deadline=None)

@@ -67,8 +67,8 @@ def test_turning_crack_keeps_all_its_faces(degrees):
     turn, da = turning(40, 0.4, degrees)
     for _ in range(40):
         crack = advance(crack, [turn], [da])
-    found = cut(mesh, line_levels(mesh, crack))
-    lips = found.lip_points(mesh)
+    result = cut(mesh, line_levels(mesh, crack))
+    lips = result.lip_points(mesh)
     length = np.linalg.norm(lips[:, 1] - lips[:, 0], axis=1).sum()
     inside = np.linalg.norm(np.diff(crack.points, axis=0), axis=1).sum() - (
         -1.0 - crack.points[0, 0]

@@ -46,13 +46,13 @@ def gaps(x, a, b):
     return np.array([np.linalg.norm(p - closest_on_segment(p, a, b), axis=1).min() for p in x])
 
 
-def covered(found, crack):
+def covered(result, crack):
     """Share of a crack that has a lip within a tenth of a cell."""
     share = (np.arange(20) + 0.5)[:, None, None] / 20
     a, b = crack.points[:-1], crack.points[1:]
     x = a + share * (b - a)
     weight = np.where((np.abs(x) < 1).all(axis=2), np.linalg.norm(b - a, axis=1), 0.0).ravel()
-    near = gaps(x.reshape(-1, 2), found[:, 0], found[:, 1]) < 0.1 * H
+    near = gaps(x.reshape(-1, 2), result[:, 0], result[:, 1]) < 0.1 * H
     return float(weight[near].sum() / weight.sum())
 
 
@@ -82,9 +82,9 @@ def test_at_200_degrees_the_beginning_is_lost(start, mouth, least):
 def test_updates_near_the_tip_leave_phantoms():
     """They keep the beginning, but phi jumps where they end: lips appear far from the crack."""
     mesh, crack = turned(200)
-    found = lips(mesh, nodal_level_set(mesh, crack, reach=0.5))
-    assert covered(found, crack) == pytest.approx(1.0)
-    off = gaps(found.mean(axis=1), crack.points[:-1], crack.points[1:])
+    result = lips(mesh, nodal_level_set(mesh, crack, reach=0.5))
+    assert covered(result, crack) == pytest.approx(1.0)
+    off = gaps(result.mean(axis=1), crack.points[:-1], crack.points[1:])
     print(f"\nupdates within 0.5: lips up to {off.max() / H:.1f} cells off the crack")
     assert off.max() > 5 * H
     explicit = lips(mesh, line_levels(mesh, crack))

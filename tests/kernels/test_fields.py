@@ -28,13 +28,13 @@ def test_ring(states, hand):
     xi = r[:, None] * np.stack([np.cos(theta), np.sin(theta)], axis=1)
     gradient = rng.standard_normal((n, 2, 2, states))
     area, radii = rng.uniform(size=n), np.array([1.0, 0.7])
-    found = np.zeros((states, 2, 3))
+    result = np.zeros((states, 2, 3))
     add_ring(
-        found, gradient, xi, theta, area, radii, 0.15 * radii, frame,
+        result, gradient, xi, theta, area, radii, 0.15 * radii, frame,
         mode_matrix(STEEL.kolosov, STEEL.mu), STEEL.kolosov, STEEL.lam, STEEL.mu,
     )  # fmt: skip
     _, dq = weight(r, xi, 0.15 * radii, radii)
-    wanted = np.zeros_like(found)
+    wanted = np.zeros_like(result)
     local = np.einsum("ai,qijs,bj->sqab", frame, gradient, frame)
     for m, g in enumerate(unit_gradients(r, theta, STEEL.kolosov, STEEL.mu)):
         for s in range(states):
@@ -43,7 +43,7 @@ def test_ring(states, hand):
             P += np.einsum("qij,qi->qj", own, local[s][:, :, 0])
             P[:, 0] -= np.einsum("qij,qij->q", sigma, g)
             wanted[s, :, m] = np.einsum("q,qj,kqj->k", area, P, dq)
-    assert found == pytest.approx(wanted, rel=1e-11, abs=1e-12 * np.abs(wanted).max())
+    assert result == pytest.approx(wanted, rel=1e-11, abs=1e-12 * np.abs(wanted).max())
 
 
 @pytest.mark.parametrize("d", [2, 3])
@@ -54,12 +54,12 @@ def test_gradients(d):
     functions = rng.integers(-1, 9, (3, 5))
     coefficients = rng.standard_normal((9, d, 2))
     number = np.array([8, 1, 0, 5, 3, 9, 2])
-    found = np.full((10, d, d, 2), 7.0)
-    set_gradients(found, number, slope, functions, row, coefficients)
+    result = np.full((10, d, d, 2), 7.0)
+    set_gradients(result, number, slope, functions, row, coefficients)
     values = np.where((functions >= 0)[..., None, None], coefficients[functions], 0.0)
     wanted = np.full((10, d, d, 2), 7.0)
     wanted[number] = np.einsum("qnj,qnis->qijs", slope, values[row])
-    assert found == pytest.approx(wanted, rel=1e-13)
+    assert result == pytest.approx(wanted, rel=1e-13)
 
 
 @pytest.mark.parametrize("order", [1, 2])

@@ -35,7 +35,7 @@ def test_enriched_stiffness():
     indptr, indices = enriched_pattern(functions, 8, 5)
     data = np.zeros((len(indices), 2, 2))
     add_stiffness(data, indptr, indices, functions, offsets, weight, G, 5, 1.3, 0.7)
-    found = sp.bsr_matrix((data, indices, indptr), shape=(16, 16)).toarray()
+    result = sp.bsr_matrix((data, indices, indptr), shape=(16, 16)).toarray()
     expected = np.zeros((8, 2, 8, 2))
     for e, numbers in enumerate(functions):
         on = np.nonzero(numbers >= 0)[0]
@@ -45,7 +45,7 @@ def test_enriched_stiffness():
             for j, b in enumerate(numbers[on]):
                 if a >= 5 or b >= 5:
                     expected[a, :, b] += block[i, :, j]
-    np.testing.assert_allclose(found, expected.reshape(16, 16), atol=1e-13)  # round-off
+    np.testing.assert_allclose(result, expected.reshape(16, 16), atol=1e-13)  # round-off
 
 
 def test_bulk_stiffness():
@@ -61,8 +61,8 @@ def test_bulk_stiffness():
             G = np.einsum("qnb,bd->qnd", dN, mesh.gradient[c])
             block = elastic_block(G, rule * mesh.volume[c], material.lam, material.mu)
             expected[np.ix_(numbers, range(2), numbers, range(2))] += block
-        found = bulk(mesh, material, order).matrix.toarray()
-        np.testing.assert_allclose(found, expected.reshape(2 * size, -1), atol=1e-13)
+        result = bulk(mesh, material, order).matrix.toarray()
+        np.testing.assert_allclose(result, expected.reshape(2 * size, -1), atol=1e-13)
 
 
 def test_pattern_holds_every_pair_once():
@@ -82,9 +82,9 @@ def test_dense_blocks():
 
     K = sp.csr_matrix(matrix)
     members, offsets = np.array([2, 5, 0, 8, 3]), np.array([0, 3, 5])
-    found = dense_blocks(K.indptr, K.indices, K.data, members, offsets)
+    result = dense_blocks(K.indptr, K.indices, K.data, members, offsets)
     first, second = matrix[np.ix_(members[:3], members[:3])], matrix[np.ix_([8, 3], [8, 3])]
-    np.testing.assert_array_equal(found, np.concatenate([first.ravel(), second.ravel()]))
+    np.testing.assert_array_equal(result, np.concatenate([first.ravel(), second.ravel()]))
 
 
 def test_bordered():
@@ -97,19 +97,19 @@ def test_bordered():
     A = rng.normal(size=(7, 7)) * (rng.random((7, 7)) < 0.6)
     A, Y = A + A.T, rng.normal(size=(2, 2))
     X = rng.normal(size=(7, 2)) * (rng.random((7, 2)) < 0.6)
-    kept, scale = np.array([0, 2, 3]), rng.random(5)  # of the first five rows
+    retained, scale = np.array([0, 2, 3]), rng.random(5)  # of the first five rows
     number = np.full(5, -1)
-    number[kept] = np.arange(3)
+    number[retained] = np.arange(3)
 
     def arrays(M):
         return M.indptr, M.indices, M.data
 
     across, down, own = sp.csr_matrix(X), sp.csc_matrix(X), sp.csc_matrix(Y + Y.T)
-    found = bordered(
+    result = bordered(
         *arrays(sp.csr_matrix(A)), number, scale, arrays(across), arrays(down), arrays(own)
     )
-    expected = np.block([[A[np.ix_(kept, kept)], X[kept]], [X[kept].T, Y + Y.T]])
-    matrix = sp.csc_matrix((found[2], found[1], found[0]), shape=(5, 5))
+    expected = np.block([[A[np.ix_(retained, retained)], X[retained]], [X[retained].T, Y + Y.T]])
+    matrix = sp.csc_matrix((result[2], result[1], result[0]), shape=(5, 5))
     assert matrix.has_sorted_indices
     np.testing.assert_allclose(matrix.toarray(), scale[:, None] * expected * scale, rtol=1e-15)
 

@@ -66,9 +66,9 @@ def test_gradients_are_those_of_linear_fields(lower, upper, n):
     mesh = jittered(box(lower, upper, n), rng)
     slope = rng.normal(size=mesh.dim)
     values = mesh.points @ slope + rng.normal()
-    found = np.einsum("mai,ma->mi", mesh.gradient, values[mesh.cells])
+    result = np.einsum("mai,ma->mi", mesh.gradient, values[mesh.cells])
     # round-off: values of size 10 over edges of 0.2
-    np.testing.assert_allclose(found, np.broadcast_to(slope, found.shape), atol=1e-11)
+    np.testing.assert_allclose(result, np.broadcast_to(slope, result.shape), atol=1e-11)
     np.testing.assert_allclose(mesh.gradient.sum(axis=1), 0.0, atol=1e-11)
 
 
@@ -109,8 +109,8 @@ def test_maps_agree_with_plain_loops(lower, upper, n):
             assert cell in mesh.facet_to_cell[facet]
     offsets, around = mesh.point_to_cell
     for point in range(mesh.n_points):
-        found = around[offsets[point] : offsets[point + 1]]
-        assert sorted(found) == sorted(np.flatnonzero((mesh.cells == point).any(axis=1)))
+        result = around[offsets[point] : offsets[point + 1]]
+        assert sorted(result) == sorted(np.flatnonzero((mesh.cells == point).any(axis=1)))
 
 
 def test_euler_characteristic():
@@ -155,8 +155,8 @@ def test_pickle_keeps_all():
 
 def test_boundary_holds_every_facet_of_one_cell():
     mesh = Mesh([(0, 0), (1, 0), (1, 1), (0, 1)], [(0, 1, 2), (0, 2, 3)])
-    found = {tuple(f) for f in np.sort(mesh.facet_sets["boundary"], axis=1)}
-    assert found == {(0, 1), (1, 2), (2, 3), (0, 3)}
+    result = {tuple(f) for f in np.sort(mesh.facet_sets["boundary"], axis=1)}
+    assert result == {(0, 1), (1, 2), (2, 3), (0, 3)}
 
 
 WRONG = {

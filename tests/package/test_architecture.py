@@ -115,15 +115,15 @@ def test_kernels_are_compiled_in_one_way(path: Path) -> None:
 
 def documented(text: str) -> set[str]:
     """Names that a numpydoc string describes in Parameters or Attributes."""
-    found: set[str] = set()
+    result: set[str] = set()
     sections = re.split(r"^([A-Z][A-Za-z ]+)\n-{3,}\n", inspect.cleandoc(text), flags=re.MULTILINE)
     for title, body in zip(sections[1::2], sections[2::2], strict=True):
         if title in {"Parameters", "Other Parameters", "Attributes"}:
             for line in body.splitlines():
                 entry = re.match(r"([*\w, ]+?)\s*(:.*)?$", line)
                 if entry and not line.startswith(" "):
-                    found |= {name.strip(" *") for name in entry[1].split(",")}
-    return found
+                    result |= {name.strip(" *") for name in entry[1].split(",")}
+    return result
 
 
 def test_documented_reads_numpydoc() -> None:

@@ -349,7 +349,7 @@ PROBLEMS = {
 }
 
 
-def said(call, kind):
+def message_of(call, kind):
     """The message of an error of the given class; nothing else may come out."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
@@ -363,26 +363,26 @@ def said(call, kind):
 @pytest.mark.parametrize("name", MESHES)
 def test_meshes(name):
     call, words = MESHES[name]
-    assert re.search(words, said(call, xc.MeshError), re.DOTALL)
+    assert re.search(words, message_of(call, xc.MeshError), re.DOTALL)
 
 
 @pytest.mark.parametrize("name", GEOMETRY)
 def test_geometry(name):
     call, words = GEOMETRY[name]
-    assert re.search(words, said(call, xc.GeometryError), re.DOTALL)
+    assert re.search(words, message_of(call, xc.GeometryError), re.DOTALL)
 
 
 @pytest.mark.parametrize("name", PROBLEMS)
 def test_problems(name):
     call, words = PROBLEMS[name]
-    assert re.search(words, said(call, xc.ProblemError), re.DOTALL)
+    assert re.search(words, message_of(call, xc.ProblemError), re.DOTALL)
 
 
 @pytest.mark.parametrize("name", [*MESHES, *GEOMETRY, *PROBLEMS])
 def test_messages_are_sentences(name):
     """No raw arrays, no dictionary, no empty phrase; short enough to be read aloud."""
     call, _ = {**MESHES, **GEOMETRY, **PROBLEMS}[name]
-    message = said(call, xc.XcrackError)
+    message = message_of(call, xc.XcrackError)
     assert 20 <= len(message) <= 400
     for ugly in ("array(", "dtype", "np.float64", "np.int64", "<function", "object at 0x", "\n"):
         assert ugly not in message

@@ -13,8 +13,8 @@ BLOCK = re.compile(r"(<!-- needs gmsh -->\n)?```python\n(.*?)```", re.DOTALL)
 
 def blocks(page):
     """Pairs (needs gmsh, code) of a page."""
-    found = BLOCK.findall((ROOT / page).read_text(encoding="utf-8"))
-    return [(bool(mark), code) for mark, code in found]
+    result = BLOCK.findall((ROOT / page).read_text(encoding="utf-8"))
+    return [(bool(mark), code) for mark, code in result]
 
 
 def run(codes, folder):

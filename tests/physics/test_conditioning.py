@@ -55,11 +55,11 @@ def flatness(values):
 
 def test_order_1_node_blocks_grow_like_plain_elements():
     sizes = (10, 20, 40)
-    found = [by_size(n, 1, "node", False) for n in sizes]
-    assert scenes.rate(found, sizes) <= 2.1
-    assert max(c / n**2 for c, n in zip(found, sizes, strict=True)) <= 2.5
+    result = [by_size(n, 1, "node", False) for n in sizes]
+    assert scenes.rate(result, sizes) <= 2.1
+    assert max(c / n**2 for c, n in zip(result, sizes, strict=True)) <= 2.5
     # Scaling by the diagonal alone is a thousand times worse already.
-    assert by_size(40, 1, "none", False, n_tips=1) > 1e3 * found[2]
+    assert by_size(40, 1, "none", False, n_tips=1) > 1e3 * result[2]
 
 
 MISSION = (pytest.mark.slow, pytest.mark.mission)
@@ -74,11 +74,11 @@ def test_order_2_star_and_patch_stay_below_15_n_squared(n):
 
 def test_order_2_star_and_patch_grow_like_plain_elements():
     sizes = (10, 20, 40)
-    found = [by_size(n, 2, "star", True, n_tips=1) for n in sizes]
+    result = [by_size(n, 2, "star", True, n_tips=1) for n in sizes]
     # One tip each: its place in its cell makes the slope a little uneven (2.12 measured).
-    assert scenes.rate(found, sizes) <= 2.3
+    assert scenes.rate(result, sizes) <= 2.3
     # Without the patch it is the size of the enriched disc that tells: a direct solver bears it.
-    assert by_size(40, 2, "star", False, n_tips=1) > 1e3 * found[2]
+    assert by_size(40, 2, "star", False, n_tips=1) > 1e3 * result[2]
 
 
 def test_order_2_is_flat_over_cut_positions():
@@ -104,11 +104,11 @@ def test_order_1_is_flat_over_cut_positions():
 @pytest.mark.parametrize("kind", ["none", "node"])
 def test_without_the_star_slivers_ruin_order_2(kind):
     """The condition number grows like eps^-2, and the matrix is singular in the end."""
-    found = [scenes.condition(beside_a_row(eps, 2, kind)) for eps in (1e-2, 1e-3, 1e-4, 1e-8)]
-    print(f"\n{kind}: {found}")
-    assert found[2] / found[1] == pytest.approx(100, rel=0.1)
-    assert found[2] > 1e9
-    assert found[3] > 1e15
+    result = [scenes.condition(beside_a_row(eps, 2, kind)) for eps in (1e-2, 1e-3, 1e-4, 1e-8)]
+    print(f"\n{kind}: {result}")
+    assert result[2] / result[1] == pytest.approx(100, rel=0.1)
+    assert result[2] > 1e9
+    assert result[3] > 1e15
 
 
 @pytest.mark.parametrize("eps", [0.1, 1e-2, 1e-3, 1e-4])
@@ -153,7 +153,7 @@ def test_star_drops_what_is_dependent_and_nothing_else():
         return basis.shape[1], int((~model.known.fixed).sum())
 
     for eps in (0.3, 1e-2, 1e-4):
-        kept, free = columns(eps)
-        assert kept == free
-    kept, free = columns(1e-8)
-    assert 0 < free - kept <= 2 * 20
+        retained, free = columns(eps)
+        assert retained == free
+    retained, free = columns(1e-8)
+    assert 0 < free - retained <= 2 * 20

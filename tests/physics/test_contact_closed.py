@@ -30,10 +30,10 @@ def measure(problem, field, pressure):
     )
 
 
-def rates(found, sizes, label):
+def rates(computed, sizes, label):
     """Fitted rates of the three errors, printed with them."""
-    result = [scenes.rate(errors, sizes) for errors in zip(*found, strict=True)]
-    for size, row in zip(sizes, found, strict=True):
+    result = [scenes.rate(errors, sizes) for errors in zip(*computed, strict=True)]
+    for size, row in zip(sizes, computed, strict=True):
         print(f"\n{label} h {size:.4f}: E {row[0]:.3e}, p {row[1]:.3e}, max {row[2]:.3e}", end="")
     print(f"\n{label} rates: E {result[0]:.2f}, p {result[1]:.2f}, max {result[2]:.2f}")
     return result
@@ -76,14 +76,14 @@ def plate_with_hole(parts, order, angle):
 @pytest.mark.parametrize("order", [1, 2])
 def test_plate_with_hole(order):
     """The three coarser meshes; at h = R/20 two per cent are promised for the pressure."""
-    found = [plate_with_hole(parts, order, 0.061) for parts in (5, 10, 20)]
-    rate = rates(found, (1 / 5, 1 / 10, 1 / 20), f"Kirsch order {order}")
+    result = [plate_with_hole(parts, order, 0.061) for parts in (5, 10, 20)]
+    rate = rates(result, (1 / 5, 1 / 10, 1 / 20), f"Kirsch order {order}")
     assert rate[0] >= 0.95 * order
     assert rate[1] >= 0.9
-    assert found[-1][1] <= 0.02
+    assert result[-1][1] <= 0.02
     # No oscillation: the largest error on the inner part is of the size of the mean one, and falls.
-    assert found[-1][2] <= 0.03
-    assert found[-1][2] < found[0][2]
+    assert result[-1][2] <= 0.03
+    assert result[-1][2] < result[0][2]
 
 
 @pytest.mark.slow
@@ -91,13 +91,13 @@ def test_plate_with_hole(order):
 @pytest.mark.parametrize("order", [1, 2])
 @pytest.mark.parametrize("angle", [0.0, 0.03], ids=["along the band", "turned"])
 def test_plate_with_hole_over_four_meshes(order, angle):
-    found = [plate_with_hole(parts, order, angle) for parts in (5, 10, 20, 40)]
-    rate = rates(found, (1 / 5, 1 / 10, 1 / 20, 1 / 40), f"Kirsch order {order} angle {angle}")
+    result = [plate_with_hole(parts, order, angle) for parts in (5, 10, 20, 40)]
+    rate = rates(result, (1 / 5, 1 / 10, 1 / 20, 1 / 40), f"Kirsch order {order} angle {angle}")
     assert rate[0] >= 0.95 * order
     assert rate[1] >= 0.9
-    assert found[2][1] <= 0.02
+    assert result[2][1] <= 0.02
     assert rate[2] >= 0.9
-    assert found[-1][2] <= 0.01
+    assert result[-1][2] <= 0.01
 
 
 # A thick cylinder under outer pressure (Lamé, 1852) ----------------------------------------------
@@ -138,12 +138,12 @@ RADIAL = {
 @pytest.mark.parametrize("ends", RADIAL.values(), ids=RADIAL)
 def test_thick_cylinder(order, ends):
     sizes = (1 / 6, 1 / 12, 1 / 24)
-    found = [thick_cylinder(n, order, ends) for n in (6, 12, 24)]
-    rate = rates(found, sizes, f"Lamé order {order} {ends}")
+    result = [thick_cylinder(n, order, ends) for n in (6, 12, 24)]
+    rate = rates(result, sizes, f"Lamé order {order} {ends}")
     assert rate[0] >= 0.93 * order
     assert rate[1] >= 0.9
-    assert found[-1][2] <= 0.02
-    assert found[-1][2] < found[0][2]
+    assert result[-1][2] <= 0.02
+    assert result[-1][2] < result[0][2]
 
 
 @pytest.mark.slow
@@ -152,11 +152,11 @@ def test_thick_cylinder(order, ends):
 @pytest.mark.parametrize("ends", RADIAL.values(), ids=RADIAL)
 def test_thick_cylinder_over_four_meshes(order, ends):
     sizes = (1 / 6, 1 / 12, 1 / 24, 1 / 48)
-    found = [thick_cylinder(n, order, ends) for n in (6, 12, 24, 48)]
-    rate = rates(found, sizes, f"Lamé order {order} {ends}")
+    result = [thick_cylinder(n, order, ends) for n in (6, 12, 24, 48)]
+    rate = rates(result, sizes, f"Lamé order {order} {ends}")
     assert rate[0] >= 0.95 * order
     assert rate[1] >= 0.9
-    assert found[-1][2] <= 0.01
+    assert result[-1][2] <= 0.01
 
 
 # A crack along an arc, in a smooth field without shear there -------------------------------------
@@ -189,23 +189,23 @@ def arc(n, order):
 
 @pytest.mark.parametrize("order", [1, 2])
 def test_manufactured_arc(order):
-    found = [arc(n, order) for n in (10, 20, 40)]
-    rate = rates(found, (1 / 10, 1 / 20, 1 / 40), f"arc order {order}")
+    result = [arc(n, order) for n in (10, 20, 40)]
+    rate = rates(result, (1 / 10, 1 / 20, 1 / 40), f"arc order {order}")
     assert rate[0] >= 0.95 * order
     assert rate[1] >= 0.9
-    assert found[-1][2] <= 0.02
-    assert found[-1][2] < found[0][2]
+    assert result[-1][2] <= 0.02
+    assert result[-1][2] < result[0][2]
 
 
 @pytest.mark.slow
 @pytest.mark.mission
 @pytest.mark.parametrize("order", [1, 2])
 def test_manufactured_arc_over_four_meshes(order):
-    found = [arc(n, order) for n in (10, 20, 40, 80)]
-    rate = rates(found, (1 / 10, 1 / 20, 1 / 40, 1 / 80), f"arc order {order}")
+    result = [arc(n, order) for n in (10, 20, 40, 80)]
+    rate = rates(result, (1 / 10, 1 / 20, 1 / 40, 1 / 80), f"arc order {order}")
     assert rate[0] >= 0.95 * order
     assert rate[1] >= 0.9
-    assert found[-1][2] <= 0.01
+    assert result[-1][2] <= 0.01
 
 
 # A closed crack that slides in a field of quadratic pressure -------------------------------------

@@ -224,10 +224,10 @@ def test_closed_under_compression_and_shear(order):
     typical tip is below half a per cent; one of these twelve, whose last group is half a cell long,
     has 5 %.
     """
-    found = drawn_sliding(order)
-    K = np.array([k for k, _ in found])
+    result = drawn_sliding(order)
+    K = np.array([k for k, _ in result])
     K_I, K_II = np.abs(K[..., 0]), np.abs(np.abs(K[..., 1]) - 1)
-    error_p = [np.abs(s.contact[0].pressure - 1).max() for _, s in found]
+    error_p = [np.abs(s.contact[0].pressure - 1).max() for _, s in result]
     print(f"\nsliding order {order}: |K_I| median {np.median(K_I):.1e} worst {K_I.max():.1e}, K_II "
           f"{K_II.max():.1e}, p max {max(error_p):.1e}")  # fmt: skip
     # Signs: positive shear gives K_II > 0 at the last tip, and by the convention < 0 at tip 0.
@@ -238,7 +238,7 @@ def test_closed_under_compression_and_shear(order):
     assert K_I.max() <= (6e-2 if order == 1 else 5e-4)
     assert K_II.max() <= (5e-3 if order == 1 else 5e-5)
     assert max(error_p) <= (0.4 if order == 1 else 5e-3)
-    for _, solution in found:
+    for _, solution in result:
         assert solution.contact[0].closed.all()
         slip = np.abs(solution.jump(0)).max()
         assert np.abs(solution.contact[0].gap).max() <= (3e-2 if order == 1 else 2e-3) * slip
@@ -354,14 +354,14 @@ def test_path_warm_start_and_first_set_do_not_matter(order):
 @pytest.mark.parametrize("order", [1, 2])
 def test_pressure_does_not_depend_on_the_modulus(order):
     """E times 1e6 under the same tractions: the same pressures to 1e-8, a millionth of the gaps."""
-    found = []
+    result = []
     for E in (1.0, 1e6):
         problem, _ = scenes.centre_crack(
             lambda x, y, E=E: exact.partial_closure(x, y, 1.0, E, 0.3, 0.0, 1.0), 24, order=order,
             traction=SIDES, E=E, angle=0.4,
         )  # fmt: skip
-        found.append(xc.solve(problem).contact[0])
-    soft, stiff = found
+        result.append(xc.solve(problem).contact[0])
+    soft, stiff = result
     # round-off
     assert np.abs(stiff.pressure - soft.pressure).max() <= 1e-8 * soft.pressure.max()
     assert np.abs(1e6 * stiff.gap - soft.gap).max() <= 1e-8 * soft.gap.max()
@@ -376,15 +376,15 @@ COUNTED = ("factorisations", "solves", "assembled_cells", "integration_points", 
 @pytest.mark.parametrize("order", [1, 2])
 def test_open_crack_costs_nothing(order):
     """An open crack has no multipliers, and the very operations of a model without contact."""
-    found = {}
+    result = {}
     for contact in ("auto", "off"):
         problem, _ = scenes.griffith_box(24, order=order, contact=contact)
-        found[contact] = xc.solve(problem, states=[1.0, 0.3, 0.6])
-    operations = [found[c][0].report.operations for c in ("auto", "off")]
+        result[contact] = xc.solve(problem, states=[1.0, 0.3, 0.6])
+    operations = [result[c][0].report.operations for c in ("auto", "off")]
     assert [operations[0][k] for k in COUNTED] == [operations[1][k] for k in COUNTED]
     assert operations[0]["multipliers"] == 0
     assert operations[0]["factorisations"] == 1
-    for a, b in zip(found["auto"], found["off"], strict=True):
+    for a, b in zip(result["auto"], result["off"], strict=True):
         assert a.contact == (None,)
         assert np.array_equal(a.u, b.u)
 

@@ -167,8 +167,8 @@ def test_arc_and_several_cracks(order):
 def test_no_option_of_method_spoils_it(order, numerics):
     mesh = scenes.perturbed(11, 77)
     crack = drawn_crack(311)
-    found = uniform_patch(mesh, [crack], order, numerics=numerics_of(**numerics))
-    assert found <= EXACT
+    result = uniform_patch(mesh, [crack], order, numerics=numerics_of(**numerics))
+    assert result <= EXACT
 
 
 @pytest.mark.parametrize("order", [1, 2])
@@ -196,8 +196,8 @@ def test_without_the_consistent_correction_it_fails(order):
         scenes.perturbed(11, 77), [drawn_crack(311)], uniform, traction=SIDES, order=order,
         contact="on", numerics=xc.Numerics(consistent=False),
     )  # fmt: skip
-    found = np.abs(xc.solve(problem).contact[0].pressure / P0 - 1).max()
-    assert 1e-7 < found < 0.1
+    result = np.abs(xc.solve(problem).contact[0].pressure / P0 - 1).max()
+    assert 1e-7 < result < 0.1
 
 
 # Sliding -----------------------------------------------------------------------------------------
@@ -236,18 +236,18 @@ def test_sliding_at_any_angle(order, traction):
     for seed in range(640, 644):
         rng = np.random.default_rng(seed)
         mesh = scenes.perturbed(8 + seed % 5, seed)
-        found = sliding_patch(
+        result = sliding_patch(
             mesh, rng.uniform(-0.7, 0.7), rng.uniform(-0.2, 0.2, 2), order, traction
         )
-        assert found <= EXACT, seed
+        assert result <= EXACT, seed
 
 
 @pytest.mark.parametrize("order", [1, 2])
 def test_sliding_at_any_cut_position(order):
     mesh = xc.box((-1, -1), (1, 1), 10)
     for eps in CUTS + CUTS_BELOW:
-        found = sliding_patch(mesh, 0.0, (0.0, eps * CELL), order, ("left", "right"))
-        assert found <= EXACT, eps
+        result = sliding_patch(mesh, 0.0, (0.0, eps * CELL), order, ("left", "right"))
+        assert result <= EXACT, eps
 
 
 @pytest.mark.parametrize("order", [1, 2])
@@ -256,8 +256,8 @@ def test_sliding_where_the_cut_sides_are_held(order, traction):
     """Displacements imposed on the sides the crack leaves through, whatever sliver it leaves."""
     mesh = xc.box((-1, -1), (1, 1), 10)
     for eps in CUTS + CUTS_BELOW:
-        found = sliding_patch(mesh, 0.0, (0.0, eps * CELL), order, traction)
-        assert found <= EXACT, eps
+        result = sliding_patch(mesh, 0.0, (0.0, eps * CELL), order, traction)
+        assert result <= EXACT, eps
 
 
 @pytest.mark.parametrize("order", [1, 2])
@@ -266,8 +266,8 @@ def test_tip_next_to_a_held_side(order):
     for k, tip in enumerate([(0.72, 0.77), (-0.635, -0.681), (0.574, 0.765)]):
         ahead = scenes.rows(0.6 + 0.3 * k)[0] * (-1 if k == 1 else 1)
         crack = xc.line_crack([np.array(tip) - 0.9 * ahead, tip])
-        found = uniform_patch(scenes.perturbed(7 + 2 * k, 31 + k), [crack], order, ())
-        assert found <= 1e-8, tip
+        result = uniform_patch(scenes.perturbed(7 + 2 * k, 31 + k), [crack], order, ())
+        assert result <= 1e-8, tip
 
 
 # Linear pressure ---------------------------------------------------------------------------------
@@ -294,14 +294,14 @@ def test_linear_pressure_at_order_2(data):
         angle, origin = rng.uniform(0, 2 * np.pi), rng.uniform(-0.25, 0.25, 2)
         first = -2.5 if seed % 3 == 0 and data == 0 else -rng.uniform(0.25, 0.45)
         ends = np.array([first, rng.uniform(0.25, 0.45)])
-        found = linear_patch(
+        result = linear_patch(
             scenes.perturbed(9 + seed % 6, seed),
             origin + ends[:, None] * scenes.rows(angle)[0],
             traction=DATA[data],
             origin=origin,
             angle=angle,
         )
-        assert found <= EXACT, seed
+        assert result <= EXACT, seed
 
 
 def parallel_linear(ends, eps):

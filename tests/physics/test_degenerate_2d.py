@@ -70,7 +70,7 @@ def test_all_places_on_mesh_lines(direction, order):
 def check_places(direction, order, bases, distances):
     n = 40
     h = 2 / n
-    found = []
+    result = []
     for base in bases.values():
         for eps in distances:
             # Off both mesh lines, but along a diagonal: shift across it.
@@ -78,12 +78,12 @@ def check_places(direction, order, bases, distances):
             shift = h * (np.array(base) + away)
             if direction == "along diagonals" and base[0] == base[1]:
                 shift = shift + np.array([h, 0.0])  # else it leaves through the corner: next test
-            found.append(
+            result.append(
                 scenes.K_of(williams_on_shifted_mesh(n, shift, ANGLES[direction], order))[0]
             )
-    error = np.abs(np.array(found) / WANTED - 1).max()
-    spread = np.ptp(np.array(found) / WANTED, axis=0).max()
-    print(f"\n{direction}, order {order}: K {error:.1e}, spread {spread:.1e} over {len(found)}")
+    error = np.abs(np.array(result) / WANTED - 1).max()
+    spread = np.ptp(np.array(result) / WANTED, axis=0).max()
+    print(f"\n{direction}, order {order}: K {error:.1e}, spread {spread:.1e} over {len(result)}")
     assert error <= PLACES[order]
     assert spread <= PLACES[order]
 
@@ -130,12 +130,12 @@ def test_clamped_side_that_ends_at_the_mouth(order):
     mesh = xc.box((-1, -1), (1, 1), 16)
     crack = [xc.line_crack([(-1.3, -1.3), (0.0, 0.0)])]
     pull = [xc.traction("bottom", (0.2, -1.0))]
-    held = xc.Problem(mesh, STEEL, crack, supports=[xc.fix("left")], loads=pull, order=order)
+    supported = xc.Problem(mesh, STEEL, crack, supports=[xc.fix("left")], loads=pull, order=order)
     # It leaves through the bottom: all of the left side belongs to lip +.
     shifted = [xc.line_crack([(-1.3, -1.3 - 1e-3), (0.0, -1e-3)])]
     beside = xc.Problem(mesh, STEEL, shifted, supports=[xc.fix("left")], loads=pull, order=order)
     # A tip that has moved by a thousandth, and another trace of the mesh along the crack.
-    K = [scenes.K_of(problem)[0] for problem in (held, beside)]
+    K = [scenes.K_of(problem)[0] for problem in (supported, beside)]
     print(f"\nclamped to the mouth, order {order}: {K}")
     assert K[0] == pytest.approx(K[1], rel=3e-2)
 
@@ -207,17 +207,17 @@ def campaign(seeds, order, n):
 @pytest.mark.parametrize(("order", "n", "median"), [(1, 24, 5e-3), (2, 16, 2e-4)])
 def test_random_cracks(order, n, median):
     """20 of each order, every one solved, none far from the others."""
-    error, found, worst = campaign(range(73000, 73020), order, n)
-    assert found <= median
-    assert error[worst] <= 3 * found, f"seed {worst}"
+    error, result, worst = campaign(range(73000, 73020), order, n)
+    assert result <= median
+    assert error[worst] <= 3 * result, f"seed {worst}"
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("order", "n", "median"), [(1, 30, 4e-3), (2, 20, 6e-5)])
 def test_many_random_cracks(order, n, median):
-    error, found, worst = campaign(range(91000, 91200), order, n)
-    assert found <= median
-    assert error[worst] <= 3 * found, f"seed {worst}"
+    error, result, worst = campaign(range(91000, 91200), order, n)
+    assert result <= median
+    assert error[worst] <= 3 * result, f"seed {worst}"
 
 
 def random_scene(seed):
@@ -238,7 +238,7 @@ def random_scene(seed):
     return mesh, cracks, loads, int(rng.integers(1, 3))
 
 
-def solved_or_said(seed):
+def solved_or_refused(seed):
     """True where a random scene is solved, False where an error of ours says why not."""
     mesh, cracks, loads, order = random_scene(seed)
     try:
@@ -250,8 +250,8 @@ def solved_or_said(seed):
             sif = xc.stress_intensity(solution, c)
             assert np.isfinite(sif.K).all(), f"seed {seed}"
             assert np.isfinite(sif.T).all(), f"seed {seed}"
-    except (xc.GeometryError, xc.ProblemError) as said:
-        return len(str(said)) < 40  # words, not a number alone
+    except (xc.GeometryError, xc.ProblemError) as refused:
+        return len(str(refused)) < 40  # words, not a number alone
     except Exception as error:
         error.add_note(f"seed {seed}")
         raise
@@ -262,14 +262,14 @@ def solved_or_said(seed):
 
 def test_random_scenes_are_solved_or_refused_with_words():
     """Whatever is drawn: polylines that leave the body, cross, close in on each other."""
-    solved = sum(solved_or_said(seed) for seed in range(40100, 40120))
+    solved = sum(solved_or_refused(seed) for seed in range(40100, 40120))
     print(f"\n{solved} of 20 random scenes solved, the others refused")
     assert solved >= 10
 
 
 @pytest.mark.slow
 def test_many_random_scenes_are_solved_or_refused_with_words():
-    solved = sum(solved_or_said(seed) for seed in range(52000, 52400))
+    solved = sum(solved_or_refused(seed) for seed in range(52000, 52400))
     print(f"\n{solved} of 400 random scenes solved, the others refused")
     assert solved >= 200
 
@@ -313,20 +313,20 @@ def test_sharp_kinks(degrees):
 @pytest.mark.parametrize("degrees", [90, 120])
 def test_sharp_kinks_at_order_1(degrees):
     wanted = scenes.K_of(kinked(degrees, 2, 60))[0]
-    found = scenes.K_of(kinked(degrees, 1, 80))[0]
-    assert found == pytest.approx(wanted, abs=1e-2 * np.linalg.norm(wanted))
+    result = scenes.K_of(kinked(degrees, 1, 80))[0]
+    assert result == pytest.approx(wanted, abs=1e-2 * np.linalg.norm(wanted))
 
 
 def test_kink_of_90_degrees_inside_a_cell():
     """The last leg is half a cell: K tends to that of the long kink, nothing breaks."""
     n = 30
-    found = []
+    result = []
     for leg in (0.03, 0.015, 0.0075):
         crack = xc.line_crack([(-1.1, -0.013), (0.02, -0.013), (0.02, -0.013 + leg)])
         problem = xc.Problem(scenes.perturbed(n, 9), STEEL, [crack], loads=PULL)
-        found.append(scenes.K_of(problem)[0])
-    assert np.isfinite(found).all()
-    assert np.ptp(found, axis=0).max() <= 0.3 * np.linalg.norm(found[0])
+        result.append(scenes.K_of(problem)[0])
+    assert np.isfinite(result).all()
+    assert np.ptp(result, axis=0).max() <= 0.3 * np.linalg.norm(result[0])
 
 
 @pytest.mark.parametrize("degrees", [120, 150])

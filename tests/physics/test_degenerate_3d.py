@@ -37,11 +37,11 @@ def test_results_are_continuous_in_the_cut_position():
 
     What changes is discretisation; when Heaviside functions become dependent and go, 0.3 %.
     """
-    found = np.array([opened(eps) for eps in EPS] + [opened(0.0)])
-    print(f"\nenergy, opening over cuts: spread {np.ptp(found, axis=0) / found[-1]}")
+    result = np.array([opened(eps) for eps in EPS] + [opened(0.0)])
+    print(f"\nenergy, opening over cuts: spread {np.ptp(result, axis=0) / result[-1]}")
     small = np.array((*EPS, 0.0)) <= 1e-2
-    assert (np.ptp(found[small], axis=0) <= 1e-2 * found[-1]).all()
-    assert (np.ptp(found, axis=0)[:2] <= 1e-2 * found[-1, :2]).all()
+    assert (np.ptp(result[small], axis=0) <= 1e-2 * result[-1]).all()
+    assert (np.ptp(result, axis=0)[:2] <= 1e-2 * result[-1, :2]).all()
 
 
 @pytest.mark.parametrize("eps", [1e-2, 1e-6, 1e-9, 1e-12, 1e-14])
@@ -108,7 +108,7 @@ def test_two_halves_come_apart_without_a_trace_of_stress(plane):
 # Place of the front ----------------------------------------------------------------------------
 
 
-def through_crack(n, x, z, held, seed=None, **options):
+def through_crack(n, x, z, supported, seed=None, **options):
     """Straight front through the thickness under Williams' field of plane strain."""
 
     def field(points):
@@ -123,11 +123,11 @@ def through_crack(n, x, z, held, seed=None, **options):
         mesh,
         STEEL,
         [half_sheet(x, z)],
-        supports=[xc.displacement(name, lambda p: field(p)[0]) for name in held],
+        supports=[xc.displacement(name, lambda p: field(p)[0]) for name in supported],
         loads=[
             xc.traction(name, lambda p, normal: np.einsum("qij,qj->qi", field(p)[1], normal))
             for name in SIX
-            if name not in held
+            if name not in supported
         ],
         contact="off",
         numerics=numerics_of(**options),
@@ -156,16 +156,16 @@ PLACES = {
 }
 
 
-@pytest.mark.parametrize("held", [("right", "bottom", "top"), SIX], ids=["three", "six"])
-def test_straight_front_at_any_place(held):
+@pytest.mark.parametrize("supported", [("right", "bottom", "top"), SIX], ids=["three", "six"])
+def test_straight_front_at_any_place(supported):
     """Discretisation: a coarse mesh is half a per cent off, wherever the front lies."""
-    found = []
+    result = []
     for x, z in PLACES.values():
-        problem = through_crack(8, x, z, held)
-        found.append(opening_error(problem, x))
-    print(f"\nopening of a straight front: {np.round(found, 4).tolist()}")
-    assert np.abs(found).max() <= 1e-2
-    assert np.ptp(found) <= 1e-2
+        problem = through_crack(8, x, z, supported)
+        result.append(opening_error(problem, x))
+    print(f"\nopening of a straight front: {np.round(result, 4).tolist()}")
+    assert np.abs(result).max() <= 1e-2
+    assert np.ptp(result) <= 1e-2
 
 
 def test_energy_of_a_straight_front_is_that_of_its_neighbours():
@@ -197,11 +197,11 @@ def front_problem(eps, **options):
 
 @pytest.mark.parametrize("scene", [sheet_problem, front_problem], ids=["no front", "front"])
 def test_condition_number_does_not_depend_on_the_cut(scene):
-    found = [scenes.condition(scene(eps)) for eps in (1e-2, 1e-4, 1e-8, 1e-12, 0.0, -1e-6)]
-    print(f"\ncondition over cuts: {np.round(found, 2).tolist()}")
-    assert np.ptp(found) <= 0.05 * max(found)
+    result = [scenes.condition(scene(eps)) for eps in (1e-2, 1e-4, 1e-8, 1e-12, 0.0, -1e-6)]
+    print(f"\ncondition over cuts: {np.round(result, 2).tolist()}")
+    assert np.ptp(result) <= 0.05 * max(result)
     # Farther away it is the mesh around the cut that tells.
-    assert scenes.condition(scene(0.5)) == pytest.approx(found[0], rel=0.6)
+    assert scenes.condition(scene(0.5)) == pytest.approx(result[0], rel=0.6)
 
 
 def test_scaling_alone_is_worse_by_far():
@@ -216,9 +216,9 @@ def test_scaling_alone_is_worse_by_far():
 @pytest.mark.mission
 def test_condition_number_of_pennies_grows_like_plain_elements():
     sizes = (4, 6, 8, 10)
-    found = [
+    result = [
         scenes.condition(scenes_space.flat_penny(n, 0.013, 0.5, (1.0, 0.0), seed=40 + n))
         for n in sizes
     ]
-    print(f"\ncondition of pennies, n = {sizes}: {np.round(found, 1).tolist()}")
-    assert scenes.rate(found, sizes) <= 2.3
+    print(f"\ncondition of pennies, n = {sizes}: {np.round(result, 1).tolist()}")
+    assert scenes.rate(result, sizes) <= 2.3

@@ -55,11 +55,11 @@ def test_flat_in_mesh_size_without_a_front(meshes):
 
 
 def test_flat_in_cut_position_without_a_front():
-    found = [xc.inf_sup(beside_a_layer(eps)) for eps in EPS]
-    print(f"\ninf-sup in space, eps = .5 ... 1e-14, 0, below: {np.round(found, 4).tolist()}")
-    assert min(found) >= 0.25
-    assert np.ptp(found) <= 0.15 * max(found)
-    small = [beta for eps, beta in zip(EPS, found, strict=True) if abs(eps) <= 1e-4]
+    result = [xc.inf_sup(beside_a_layer(eps)) for eps in EPS]
+    print(f"\ninf-sup in space, eps = .5 ... 1e-14, 0, below: {np.round(result, 4).tolist()}")
+    assert min(result) >= 0.25
+    assert np.ptp(result) <= 0.15 * max(result)
+    small = [beta for eps, beta in zip(EPS, result, strict=True) if abs(eps) <= 1e-4]
     assert np.ptp(small) <= 1e-3
 
 
@@ -76,24 +76,24 @@ def test_flat_in_mesh_size_with_a_front(norm, meshes, pennies):
 
 
 def test_topological_enrichment_is_no_less_stable():
-    found = [xc.inf_sup(penny(6, k, enrichment="topological")) for k in range(4)]
-    print(f"\ninf-sup of pennies, topological: {np.round(found, 3).tolist()}")
-    assert min(found) >= 0.2
+    result = [xc.inf_sup(penny(6, k, enrichment="topological")) for k in range(4)]
+    print(f"\ninf-sup of pennies, topological: {np.round(result, 3).tolist()}")
+    assert min(result) >= 0.2
 
 
 # In cells from a line of nodes: on it, a hair behind and ahead of it, in between.
 @pytest.mark.parametrize("norm", ["h1", "energy"])
 def test_front_just_past_nodes(norm):
     """The last strip of lip is 1e-1 ... 1e-12 of a cell wide: it gets no multiplier of its own."""
-    found = [
+    result = [
         xc.inf_sup(beside_a_layer(eps, front * 2 / 6), norm=norm)
         for eps, front in (
             (0.37, 0.1), (0.37, 1e-2), (0.37, 1e-6), (0.37, 1e-12), (0.37, 0.0), (0.0, 1e-2),
             (0.0, 1e-6), (0.0, 0.0), (1e-6, 0.5), (1e-12, 1e-6), (0.0, -1e-6),
         )
     ]  # fmt: skip
-    print(f"\ninf-sup, front past nodes, {norm}: {np.round(found, 3).tolist()}")
-    assert min(found) >= 0.2
+    print(f"\ninf-sup, front past nodes, {norm}: {np.round(result, 3).tolist()}")
+    assert min(result) >= 0.2
 
 
 def test_naive_space_fails():

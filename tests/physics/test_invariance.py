@@ -42,8 +42,8 @@ def all_K(problem):
     return np.concatenate([s.K for s in sif]), np.concatenate([s.T for s in sif])
 
 
-def agree(found, wanted, label):
-    K, T = found
+def agree(result, wanted, label):
+    K, T = result
     scale = np.abs(wanted[0]).max()
     error = np.abs(K - wanted[0]).max() / scale
     print(f"\n{label}: {error:.1e}")
@@ -68,7 +68,7 @@ pytestmark = pytest.mark.filterwarnings("ignore::xcrack.XcrackWarning")
 def test_units(order, reference, length, stress):
     """Lengths in other units, stresses and moduli too: K is stress times the root of length."""
     base = scenes.perturbed(18, 31)
-    found = all_K(
+    result = all_K(
         scene(
             order,
             length * base.points,
@@ -78,7 +78,7 @@ def test_units(order, reference, length, stress):
         )
     )
     K, T = reference[order]
-    agree((found[0] / (stress * np.sqrt(length)), found[1] / stress), (K, T), "units")
+    agree((result[0] / (stress * np.sqrt(length)), result[1] / stress), (K, T), "units")
 
 
 @pytest.mark.parametrize("E", [1e-6, 2.1e11])
@@ -91,7 +91,7 @@ def test_modulus_alone(order, reference, E):
 def test_body_rotated_and_shifted(order, reference, angle):
     Q, shift = scenes.rows(angle), np.array([3.7, -11.0])
     base = scenes.perturbed(18, 31)
-    found = all_K(
+    result = all_K(
         scene(
             order,
             base.points @ Q + shift,
@@ -99,15 +99,15 @@ def test_body_rotated_and_shifted(order, reference, angle):
             stress=Q.T @ STRESS @ Q,
         )
     )
-    agree(found, reference[order], f"rotated by {angle:.2f}")
+    agree(result, reference[order], f"rotated by {angle:.2f}")
 
 
 def test_far_from_the_origin(order, reference):
     """1e4 sizes of the body away: coordinates have lost four digits, and K no more."""
     shift = np.array([2e4, -1e4])
     base = scenes.perturbed(18, 31)
-    found = all_K(scene(order, base.points + shift, cracks=(INNER + shift, EDGE + shift)))
-    agree(found, reference[order], "far away")
+    result = all_K(scene(order, base.points + shift, cracks=(INNER + shift, EDGE + shift)))
+    agree(result, reference[order], "far away")
 
 
 def test_nodes_and_cells_renumbered(order, reference):
@@ -139,10 +139,10 @@ def test_mirrored(order, reference):
     """x -> -x: the left of a direction becomes its right, so K_II changes its sign."""
     base = scenes.perturbed(18, 31)
     M = np.diag([-1.0, 1.0])
-    found = all_K(
+    result = all_K(
         scene(order, base.points @ M, cracks=(INNER @ M, EDGE @ M), stress=M @ STRESS @ M)
     )
-    agree((found[0] * [1, -1], found[1]), reference[order], "mirrored")
+    agree((result[0] * [1, -1], result[1]), reference[order], "mirrored")
 
 
 def test_a_point_in_the_middle_of_a_straight_piece(order, reference):
@@ -154,15 +154,15 @@ def test_supports_that_hold_only_the_rigid_motion(order, reference):
     """Pinned at three unknowns instead of free: loads balance, so nothing changes."""
     base = scene(order)
     corner = [xc.fix((-1.0, -1.0)), xc.fix((1.0, -1.0), axis=1)]
-    held = xc.Problem(
+    supported = xc.Problem(
         base.mesh, base.material, base.cracks, supports=corner, loads=base.loads, order=order
     )
-    agree(all_K(held), reference[order], "pinned")
+    agree(all_K(supported), reference[order], "pinned")
 
 
 def test_a_rigid_motion_of_all_supports(order):
     """Imposed displacements plus a small rotation and a shift: the same stresses."""
-    found = []
+    result = []
     for turn in (0.0, 0.02):
         W = np.array([[0.0, -turn], [turn, 0.0]])
         supports = [
@@ -170,10 +170,10 @@ def test_a_rigid_motion_of_all_supports(order):
             xc.displacement("bottom", lambda x, W=W: 0.1 * x[:, ::-1] + x @ W.T + 3 * W[1]),
         ]
         base = scene(order, loads=())
-        found.append(
+        result.append(
             all_K(xc.Problem(base.mesh, base.material, base.cracks, supports=supports, order=order))
         )
-    agree(found[1], found[0], "rigid motion")
+    agree(result[1], result[0], "rigid motion")
 
 
 def test_load_states_scale(order, reference):

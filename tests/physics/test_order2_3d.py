@@ -48,7 +48,7 @@ def test_penny_on_a_mesh_of_half_the_cells():
     def field(x):
         return exact.penny((x - C) @ rows.T, a, 1.0, nu, stress) @ rows
 
-    found = {}
+    result = {}
     for order, n in ((1, 12), (2, 7)):
         problem = xc.Problem(
             xc.box((-1, -1, -1), (1, 1, 1), n),
@@ -61,10 +61,10 @@ def test_penny_on_a_mesh_of_half_the_cells():
         )
         solution = xc.solve(problem)
         ratio = xc.stress_intensity(solution).K_I / (2 * np.sqrt(a / np.pi))
-        found[order] = solution.n_dof, abs(ratio.mean() - 1), ratio.std()
-        print(f"order {order}: {found[order]}")
-    assert found[2][0] < 1.25 * found[1][0]
-    for _, mean, scatter in found.values():  # discretisation
+        result[order] = solution.n_dof, abs(ratio.mean() - 1), ratio.std()
+        print(f"order {order}: {result[order]}")
+    assert result[2][0] < 1.25 * result[1][0]
+    for _, mean, scatter in result.values():  # discretisation
         assert mean < 0.01
         assert scatter < 0.015
 
@@ -127,22 +127,22 @@ def exactly(monkeypatch):
     monkeypatch.setattr(iterative, "projected", partial(pressed, tolerance=1e-12))
 
 
-@pytest.mark.parametrize("held", [True, False], ids=["held", "not held"])
-def test_states_as_with_a_factor(monkeypatch, held):
+@pytest.mark.parametrize("supported", [True, False], ids=["held", "not held"])
+def test_states_as_with_a_factor(monkeypatch, supported):
     """Open, closed and bent, so that a part is closed: all to 1e-8."""
     exactly(monkeypatch)
-    problem = tilted(6, supports=held)
+    problem = tilted(6, supports=supported)
     bend = [
         xc.traction("top", lambda x: np.outer(x[:, 0], (0, 0, 1.0))),
         xc.traction("bottom", lambda x: np.outer(x[:, 0], (0, 0, -1.0))),
     ]
-    states = [1.0, -1.0, bend[:1] if held else bend]
-    found = [
+    states = [1.0, -1.0, bend[:1] if supported else bend]
+    result = [
         xc.solve(replace(problem, numerics=xc.Numerics(linear=linear)), states=states)
         for linear in ("iterative", "direct")
     ]
     closed = []
-    for one, other in zip(*found, strict=True):
+    for one, other in zip(*result, strict=True):
         n = 3 * one.space.n_nodes
         size = np.abs(other.u[:n]).max()
         assert np.abs(one.u[:n] - other.u[:n]).max() <= 1e-8 * size

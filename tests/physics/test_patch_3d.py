@@ -26,7 +26,7 @@ def structured(n=6):
     return xc.box((-1, -1, -1), (1, 1, 1), n)
 
 
-def patch(mesh, cracks, held=(), *, E=1.0, nu=0.3, gap=1e-9, **options):
+def patch(mesh, cracks, supported=(), *, E=1.0, nu=0.3, gap=1e-9, **options):
     """Largest error of the pressure; held sides get the exact displacements, others the load."""
     stretch = -P0 * (1 - 2 * nu) / E
     # Conjugate gradients would stop at 1e-8 of the load: what is tested here is round-off.
@@ -35,8 +35,8 @@ def patch(mesh, cracks, held=(), *, E=1.0, nu=0.3, gap=1e-9, **options):
         mesh,
         xc.Isotropic(E, nu),
         cracks,
-        supports=[xc.displacement(name, lambda x: stretch * x) for name in held],
-        loads=[xc.pressure(name, P0) for name in SIX if name not in held],
+        supports=[xc.displacement(name, lambda x: stretch * x) for name in supported],
+        loads=[xc.pressure(name, P0) for name in SIX if name not in supported],
         contact="on",
         numerics=numerics,
         **options,
@@ -59,11 +59,13 @@ def drawn_penny(seed):
     )
 
 
-@pytest.mark.parametrize("held", [(), ("bottom", "left"), SIX], ids=["free", "two sides", "all"])
-def test_pennies_anywhere(held):
+@pytest.mark.parametrize(
+    "supported", [(), ("bottom", "left"), SIX], ids=["free", "two sides", "all"]
+)
+def test_pennies_anywhere(supported):
     for seed in range(710, 713):
-        found = patch(scenes.perturbed(5 + seed % 3, seed), [drawn_penny(seed)], held)
-        assert found <= EXACT, seed
+        result = patch(scenes.perturbed(5 + seed % 3, seed), [drawn_penny(seed)], supported)
+        assert result <= EXACT, seed
 
 
 @pytest.mark.slow
@@ -72,9 +74,9 @@ def test_many_pennies_anywhere():
     worst = 0.0
     for seed in range(3100, 3160):
         mesh = scenes.perturbed(5 + seed % 5, seed, amplitude=0.2 * (seed % 2))
-        found = patch(mesh, [drawn_penny(seed)])
-        worst = max(worst, found)
-        assert found <= EXACT, seed
+        result = patch(mesh, [drawn_penny(seed)])
+        worst = max(worst, result)
+        assert result <= EXACT, seed
     print(f"\n60 pennies anywhere: pressure to {worst:.1e}")
 
 
@@ -185,6 +187,6 @@ def test_material_and_units_have_no_part_in_it():
 def test_without_the_consistent_correction_it_fails():
     """Ordinary quadrature leaves an error that any number of points only slowly removes."""
     plain = xc.Numerics(consistent=False)
-    found = patch(scenes.perturbed(6, 77), [drawn_penny(711)], gap=0.1, numerics=plain)
-    print(f"\nwithout correction: {found:.1e}")
-    assert 1e-6 < found < 0.5
+    result = patch(scenes.perturbed(6, 77), [drawn_penny(711)], gap=0.1, numerics=plain)
+    print(f"\nwithout correction: {result:.1e}")
+    assert 1e-6 < result < 0.5

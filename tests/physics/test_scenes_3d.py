@@ -80,8 +80,8 @@ def test_bar_cut_through_pulled_apart():
 
 def test_oblique_cut_slips():
     """Ends held, pressed over an oblique cut without friction: closed, softer than the whole."""
-    held = [xc.fix(side, axis=k) for side in ("bottom", "top") for k in (0, 1)]
-    cut, whole = (xc.solve(sawn_bar(0.3, held, cut)) for cut in (True, False))
+    supported = [xc.fix(side, axis=k) for side in ("bottom", "top") for k in (0, 1)]
+    cut, whole = (xc.solve(sawn_bar(0.3, supported, cut)) for cut in (True, False))
     contact = cut.contact[0]
     inner = np.abs(contact.points[:, :2]).max(axis=1) < 0.3
     assert contact.closed[inner].all()

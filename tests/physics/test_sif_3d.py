@@ -34,7 +34,7 @@ def errors(problem, place, stress, a=A, b=None):
     return sif, sif.K - wanted, wanted
 
 
-def said(name, error, wanted):
+def report_errors(name, error, wanted):
     size = np.abs(wanted).max(axis=0)
     print(f"\n{name}: mean {error.mean(axis=0) / size}, largest {np.abs(error).max(axis=0) / size}")
 
@@ -46,7 +46,7 @@ def test_penny_coarse():
     """a / h = 2.9, ten thousand unknowns: within 4 % at every place, 1.5 % in the mean."""
     problem, place = penny(0.17, MIXED)
     sif, error, wanted = errors(problem, place, MIXED)
-    said("penny a/h = 2.9", error, wanted)
+    report_errors("penny a/h = 2.9", error, wanted)
     assert abs((sif.K_I / wanted[:, 0]).mean() - 1) <= 0.015
     assert (np.abs(error).max(axis=0) <= 0.04 * np.abs(wanted).max(axis=0)).all()
 
@@ -74,7 +74,7 @@ def test_modes_that_are_not_there(stress):
     problem, place = penny(0.0884, stress)
     _, error, wanted = errors(problem, place, stress)
     spurious = np.abs(error).max(axis=0) / np.abs(wanted).max()
-    said(f"penny {stress}", error, np.full(3, np.abs(wanted).max()))
+    report_errors(f"penny {stress}", error, np.full(3, np.abs(wanted).max()))
     absent = np.abs(wanted).max(axis=0) == 0
     assert absent.any()
     assert (spurious[absent] <= 0.015).all()
@@ -85,16 +85,16 @@ def test_modes_that_are_not_there(stress):
 @pytest.mark.mission
 def test_penny_converges():
     """Three meshes with one enriched radius: the error of K over all places falls."""
-    sizes, found = (0.15, 0.1, 0.0667), []
+    sizes, result = (0.15, 0.1, 0.0667), []
     for h in sizes:
         problem, place = penny(h, MIXED, half=1.4, depth=0.35, radius=0.3)
         _, error, wanted = errors(problem, place, MIXED)
-        found.append(np.sqrt((error**2).sum(axis=1).mean()) / np.abs(wanted).max())
-    rate = np.polyfit(np.log(sizes), np.log(found), 1)[0]
-    print(f"\npenny, error of K: {np.array(found)}, rate {rate:.2f}")
-    assert found[2] < found[1] < found[0]
+        result.append(np.sqrt((error**2).sum(axis=1).mean()) / np.abs(wanted).max())
+    rate = np.polyfit(np.log(sizes), np.log(result), 1)[0]
+    print(f"\npenny, error of K: {np.array(result)}, rate {rate:.2f}")
+    assert result[2] < result[1] < result[0]
     assert rate >= 0.5
-    assert found[2] <= 0.01
+    assert result[2] <= 0.01
 
 
 # Ellipse -----------------------------------------------------------------------------------------

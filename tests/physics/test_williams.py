@@ -47,9 +47,9 @@ def measured(n, order, radius, plane="strain"):
     ],
 )
 def test_order_2_meets_the_promised_errors(n, K, E):
-    found = measured(n, 2, 0.4)
-    assert found[0] <= K
-    assert found[1] <= E
+    result = measured(n, 2, 0.4)
+    assert result[0] <= K
+    assert result[1] <= E
 
 
 @pytest.mark.slow
@@ -66,15 +66,15 @@ def test_order_2_converges_at_the_promised_rates():
 
 @pytest.mark.parametrize(("n", "unknowns", "K"), [(13, 1800, 1e-4), (23, 5300, 1e-5)])
 def test_order_2_needs_few_unknowns(n, unknowns, K):
-    found = measured(n, 2, 0.4)
-    assert found[2] <= unknowns
-    assert found[0] <= K
+    result = measured(n, 2, 0.4)
+    assert result[2] <= unknowns
+    assert result[0] <= K
 
 
 @pytest.mark.parametrize("plane", ["strain", "stress"])
 def test_order_1_is_within_a_sixth_of_a_per_cent_at_41(plane):
-    found = measured(41, 1, None, plane)
-    assert found[0] <= 1.5e-3
+    result = measured(41, 1, None, plane)
+    assert result[0] <= 1.5e-3
 
 
 @pytest.mark.slow
@@ -88,9 +88,9 @@ def test_order_1_converges_at_rate_one_in_energy():
 
 
 def test_plane_stress_is_as_good_as_plane_strain_at_order_2():
-    found = measured(20, 2, 0.4, "stress")
-    assert found[0] <= 2e-5
-    assert found[1] <= 5.5e-3
+    result = measured(20, 2, 0.4, "stress")
+    assert result[0] <= 2e-5
+    assert result[1] <= 5.5e-3
 
 
 @pytest.mark.parametrize("plane", ["strain", "stress"])
@@ -132,13 +132,13 @@ def test_terms_of_higher_order_do_not_disturb_K(order, n, wanted):
 @pytest.mark.parametrize(("order", "n", "wanted"), [(1, 40, 5e-3), (2, 20, 5e-4)])
 def test_K_does_not_depend_on_the_domain(order, n, wanted):
     tip, angle = scenes.TIPS[0]
-    found = []
+    result = []
     for domain in (0.45, 0.55, 0.65, 0.75):
         problem, _ = scenes.williams_edge(
             n, tip, angle, order=order, numerics=xc.Numerics(radius=0.3, domain=domain)
         )
-        found.append(xc.stress_intensity(xc.solve(problem)).K[0])
-    spread = float(np.ptp(found, axis=0).max())
+        result.append(xc.stress_intensity(xc.solve(problem)).K[0])
+    spread = float(np.ptp(result, axis=0).max())
     print(f"\nfour domains, order {order}: spread {spread:.1e}")
     assert spread <= wanted
 

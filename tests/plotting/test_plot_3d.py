@@ -77,9 +77,9 @@ def test_a_plane_cuts_the_body_open(solution, normal):
     on_shell = np.abs(np.abs(x).min(axis=1) - 1).min(axis=1) < 1e-9
     in_plane = np.abs(depth).max(axis=1) < 1e-9
     out = np.where(on_shell[:, None], np.where(np.abs(middle) > 1 - 1e-9, middle, 0), plane[1])
-    kept = on_shell | in_plane
+    retained = on_shell | in_plane
     turned *= np.sign(np.einsum("td,td->t", turned, out))[:, None]
-    enclosed = np.einsum("td,td->", middle[kept], turned[kept]) / 3
+    enclosed = np.einsum("td,td->", middle[retained], turned[retained]) / 3
     rng = np.random.default_rng(51277)
     sample = rng.uniform(-1, 1, (200_000, 3))
     expected = 8 * np.mean((sample - plane[0]) @ plane[1] < 0)

@@ -42,8 +42,8 @@ def penny_exact(x, a, S, nu=0.3):
 
 def ellipse_exact(x, a, b, S, nu=0.3):
     omega = angle_on_ellipse(x, a, b)
-    found = exact.ellipse_K(omega, a, b, nu, S[2, 2], S[0, 2], S[1, 2])
-    return np.stack(found, axis=1) * [1, 1, -1]
+    result = exact.ellipse_K(omega, a, b, nu, S[2, 2], S[0, 2], S[1, 2])
+    return np.stack(result, axis=1) * [1, 1, -1]
 
 
 def moments(curve, knots, K_of):
@@ -64,7 +64,7 @@ def lumped(curve, knots, I, material):
     return solve_front(I, knots, curve, material, every, lumped=1.0)[0, 0]
 
 
-def found_with(curve, knots, displacement, radius, *, curved=True):
+def computed_with(curve, knots, displacement, radius, *, curved=True):
     """Means of K over the hats by the integrals with the gradient of an exact displacement."""
     x, weight, r, theta = tube(curve, knots, radius)
     gradient = gradient_of(displacement, x, 2e-3 * r)[..., None]
@@ -82,9 +82,9 @@ def test_penny_at_any_radius(radius):
     # What is left is the spline through 64 uneven vertices; 0.6e-5 to 3e-5 measured.
     curve = ellipse_front(1.0, 1.0, 64, seed=7)
     knots = front_nodes(curve, 0.5)
-    found = found_with(curve, knots, lambda x: exact.penny(x, 1.0, 1000.0, 0.3, STRESS), radius)
+    result = computed_with(curve, knots, lambda x: exact.penny(x, 1.0, 1000.0, 0.3, STRESS), radius)
     expected = moments(curve, knots, lambda x: penny_exact(x, 1.0, STRESS))
-    assert np.abs(found - expected).max() < 1e-4 * np.abs(expected).max()
+    assert np.abs(result - expected).max() < 1e-4 * np.abs(expected).max()
 
 
 @pytest.mark.parametrize(("radius", "error"), [(0.05, 0.0087), (0.2, 0.0348), (0.4, 0.0708)])
@@ -95,8 +95,8 @@ def test_penny_without_the_terms_of_curvature(radius, error):
     knots = front_nodes(curve, 0.5)
     args = (curve, knots, lambda x: exact.penny(x, 1.0, 1000.0, 0.3, tension), radius)
     K_I = 2 / np.sqrt(np.pi)
-    assert np.abs(found_with(*args)[:, 0] / K_I - 1).max() < 1e-4
-    assert found_with(*args, curved=False)[:, 0].mean() / K_I - 1 > 0.5 * error
+    assert np.abs(computed_with(*args)[:, 0] / K_I - 1).max() < 1e-4
+    assert computed_with(*args, curved=False)[:, 0].mean() / K_I - 1 > 0.5 * error
 
 
 def test_inclined_penny_in_a_turned_frame():
@@ -111,11 +111,11 @@ def test_inclined_penny_in_a_turned_frame():
     x, frame, _ = flat.at(flat.breaks)
     curve = front_curve(x @ turn.T, frame @ turn.T, True)
     knots = front_nodes(curve, 0.5)
-    found = found_with(
+    result = computed_with(
         curve, knots, lambda y: exact.penny(y @ turn, 1.0, 1000.0, 0.3, S) @ turn.T, 0.3
     )
     expected = moments(curve, knots, lambda y: penny_exact(y @ turn, 1.0, S))
-    assert np.abs(found - expected).max() < 1e-4 * np.abs(expected).max()
+    assert np.abs(result - expected).max() < 1e-4 * np.abs(expected).max()
 
 
 @pytest.mark.parametrize("radius", [0.01, 0.05, 0.12])
@@ -123,9 +123,11 @@ def test_ellipse(radius):
     # The sharpest radius of curvature is 1/4; 160 vertices.
     curve = ellipse_front(1.0, 0.5, 160)
     knots = front_nodes(curve, curve.length / 16)
-    found = found_with(curve, knots, lambda x: ellipse(x, 1.0, 0.5, 1000.0, 0.3, STRESS), radius)
+    result = computed_with(
+        curve, knots, lambda x: ellipse(x, 1.0, 0.5, 1000.0, 0.3, STRESS), radius
+    )
     expected = moments(curve, knots, lambda x: ellipse_exact(x, 1.0, 0.5, STRESS))
-    assert np.abs(found - expected).max() < 1e-4 * np.abs(expected).max()
+    assert np.abs(result - expected).max() < 1e-4 * np.abs(expected).max()
 
 
 def test_exact_field_of_the_ellipse_is_that_of_the_quadrature():
@@ -133,8 +135,8 @@ def test_exact_field_of_the_ellipse_is_that_of_the_quadrature():
     x = rng.normal(size=(40, 3))
     x[:, 2] += np.copysign(0.6, x[:, 2])
     known = exact.ellipse_disp(x, 1.0, 0.5, 1000.0, 0.3, STRESS)
-    found = ellipse(x, 1.0, 0.5, 1000.0, 0.3, STRESS)
-    np.testing.assert_allclose(found, known, atol=1e-12 * np.abs(known).max())
+    result = ellipse(x, 1.0, 0.5, 1000.0, 0.3, STRESS)
+    np.testing.assert_allclose(result, known, atol=1e-12 * np.abs(known).max())
 
 
 def twisted_helix():
@@ -230,8 +232,8 @@ def test_pressure_on_the_lips_is_superposed():
         curve, knots, curve.feet(lips), normal, area, p * normal[..., None], STEEL, radii
     )
     expected = penny_exact(x[:1], 1.0, S)[0]
-    found = lumped(curve, knots, body + lip, STEEL)
-    assert np.abs(found - expected).max() < 1e-4 * expected[0]
+    result = lumped(curve, knots, body + lip, STEEL)
+    assert np.abs(result - expected).max() < 1e-4 * expected[0]
     assert np.abs(lumped(curve, knots, body, STEEL)[:, 0] / expected[0] - 1).min() > 0.05
 
 
@@ -286,8 +288,8 @@ def test_values_along_the_front():
     valid[[0, -1]] = False
     K = np.stack([knots, 1 + 2 * knots, 0 * knots], axis=1)
     at = np.linspace(0, 4, 31)
-    found = along(K, knots, valid, straight, at)
-    np.testing.assert_allclose(found[:, 1], 1 + 2 * at, atol=1e-12)
+    result = along(K, knots, valid, straight, at)
+    np.testing.assert_allclose(result[:, 1], 1 + 2 * at, atol=1e-12)
 
 
 def test_hats_outside_the_body_are_told_by_their_volume():
@@ -298,11 +300,13 @@ def test_hats_outside_the_body_are_told_by_their_volume():
     knots = front_nodes(curve, 0.4)
     radii = np.array([0.3])
     x, weight, _, theta = tube(curve, knots, 0.3)
-    kept = curve.feet(x).s < 3.0
-    feet = curve.feet(x[kept])
-    nothing = np.zeros((int(kept.sum()), 3, 3, 1))
-    side, behind = np.where(theta > 0, 1, -1)[kept], (np.abs(theta) > 2)[kept]
-    _, measure = integrals(curve, knots, feet, weight[kept], nothing, side, behind, STEEL, radii)
+    retained = curve.feet(x).s < 3.0
+    feet = curve.feet(x[retained])
+    nothing = np.zeros((int(retained.sum()), 3, 3, 1))
+    side, behind = np.where(theta > 0, 1, -1)[retained], (np.abs(theta) > 2)[retained]
+    _, measure = integrals(
+        curve, knots, feet, weight[retained], nothing, side, behind, STEEL, radii
+    )
     valid = inside_body(measure, full_measure(curve, knots, radii))
     np.testing.assert_array_equal(valid, knots + 0.4 <= 3.0 + 1e-9)
 
@@ -371,11 +375,11 @@ def test_no_cell_of_a_domain_is_left_out(monkeypatch):
     loads = [xc.traction("top", (0, 0, 1.0)), xc.traction("bottom", (0, 0, -1.0))]
     crack = xc.penny_crack((0.01, -0.02, 0.03), (0.3, -0.5, 1.0), 0.5)
     solution = xc.solve(xc.Problem(mesh, xc.Isotropic(1.0, 0.3), [crack], loads=loads))
-    found = xc.stress_intensity(solution)
+    result = xc.stress_intensity(solution)
     plain = FrontCurve.distance
 
     def none(self, x):
         return np.zeros(len(x)) if len(x) == len(mesh.cells) else plain(self, x)
 
     monkeypatch.setattr(FrontCurve, "distance", none)
-    np.testing.assert_allclose(found.K, xc.stress_intensity(solution).K, atol=1e-10)
+    np.testing.assert_allclose(result.K, xc.stress_intensity(solution).K, atol=1e-10)

@@ -47,14 +47,14 @@ def drawn(seed, n, rank=None):
 @settings(max_examples=150, deadline=None, derandomize=True)
 def test_against_enumeration(seed, n, start):
     F, d = drawn(seed, n)
-    found = solve(F, d, start)
+    result = solve(F, d, start)
     exact = by_enumeration(F, d)
     scale = 1 + np.abs(exact).max()
     # round-off, times the condition number of a small drawn matrix
-    assert np.abs(found.pressure - exact).max() <= 1e-8 * scale
-    assert found.pressure.min() >= 0
-    assert found.gap.min() >= -1e-8 * np.abs(d).max()
-    assert np.abs(found.pressure * found.gap).max() <= 1e-8 * scale * np.abs(d).max()
+    assert np.abs(result.pressure - exact).max() <= 1e-8 * scale
+    assert result.pressure.min() >= 0
+    assert result.gap.min() >= -1e-8 * np.abs(d).max()
+    assert np.abs(result.pressure * result.gap).max() <= 1e-8 * scale * np.abs(d).max()
 
 
 @pytest.mark.parametrize("n", [20, 60])
@@ -65,10 +65,12 @@ def test_against_non_negative_least_squares(n, start):
         x = np.sort(np.random.default_rng(seed).uniform(0, 1, n))
         F = np.exp(-8 * np.abs(x[:, None] - x)) + 0.05 * np.eye(n)
         d = np.cos(9 * x + seed)
-        found = solve(F, d, start)
-        assert np.abs(found.pressure - by_least_squares(F, d)).max() <= 1e-9 * found.pressure.max()
-        assert found.sets <= 12
-        assert not found.fallback
+        result = solve(F, d, start)
+        assert (
+            np.abs(result.pressure - by_least_squares(F, d)).max() <= 1e-9 * result.pressure.max()
+        )
+        assert result.sets <= 12
+        assert not result.fallback
 
 
 # A set that the plain iteration leaves and returns to (found by a search over small integers).
@@ -77,12 +79,12 @@ CYCLING = [[11.0, 13.0, -10.0], [13.0, 18.0, -15.0], [-10.0, -15.0, 15.0]], [-1.
 
 def test_a_cycle_ends_in_the_fallback():
     F, d = np.array(CYCLING[0]), np.array(CYCLING[1])
-    found = solve(F, d)
-    assert found.fallback
-    assert found.sets <= 8
-    assert found.pressure == pytest.approx([0, 2 / 9, 0], abs=1e-12)  # round-off
-    assert found.gap == pytest.approx([17 / 9, 0, 2 / 3], abs=1e-12)
-    assert found.active.tolist() == [False, True, False]
+    result = solve(F, d)
+    assert result.fallback
+    assert result.sets <= 8
+    assert result.pressure == pytest.approx([0, 2 / 9, 0], abs=1e-12)  # round-off
+    assert result.gap == pytest.approx([17 / 9, 0, 2 / 3], abs=1e-12)
+    assert result.active.tolist() == [False, True, False]
 
 
 def test_start_does_not_matter():
@@ -92,8 +94,8 @@ def test_start_does_not_matter():
             active_set(F, d, np.ones(6), 1.0, np.array(start))
             for start in itertools.product([False, True], repeat=6)
         ]
-        for found in every:
-            assert np.abs(found.pressure - every[0].pressure).max() <= 1e-9 * (
+        for result in every:
+            assert np.abs(result.pressure - every[0].pressure).max() <= 1e-9 * (
                 1 + every[0].pressure.max()
             )
 
@@ -102,9 +104,9 @@ def test_start_does_not_matter():
 def test_weight_of_gaps_changes_nothing(stiffness):
     F, d = drawn(871, 12)
     reference = solve(F, d)
-    found = solve(F, d, stiffness=stiffness)
-    assert np.array_equal(found.active, reference.active)
-    assert found.sets == reference.sets
+    result = solve(F, d, stiffness=stiffness)
+    assert np.array_equal(result.active, reference.active)
+    assert result.sets == reference.sets
 
 
 def test_units_change_nothing_but_units():
@@ -113,9 +115,9 @@ def test_units_change_nothing_but_units():
     for length, stress in ((1e-9, 1e9), (1e3, 1e-6)):
         measure = np.full(9, length)
         scaled = F * length**3 / stress
-        found = solve(scaled, d * length**2, measure=measure, stiffness=stress / length)
-        assert np.array_equal(found.active, reference.active)
-        assert found.pressure * length / stress == pytest.approx(reference.pressure, rel=1e-9)
+        result = solve(scaled, d * length**2, measure=measure, stiffness=stress / length)
+        assert np.array_equal(result.active, reference.active)
+        assert result.pressure * length / stress == pytest.approx(reference.pressure, rel=1e-9)
 
 
 def test_groups_of_very_different_size():
@@ -123,9 +125,9 @@ def test_groups_of_very_different_size():
     F, d = drawn(877, 8)
     reference = solve(F, d)
     size = 10.0 ** np.array([0, -3, -6, -9, -12, 0, -2, -14])
-    found = solve(F * size[:, None] * size, d * size, measure=size)
-    assert np.array_equal(found.active, reference.active)
-    assert found.pressure * size == pytest.approx(reference.pressure, rel=1e-8, abs=1e-12)
+    result = solve(F * size[:, None] * size, d * size, measure=size)
+    assert np.array_equal(result.active, reference.active)
+    assert result.pressure * size == pytest.approx(reference.pressure, rel=1e-8, abs=1e-12)
 
 
 def test_wide_open_and_wholly_closed():
@@ -152,9 +154,9 @@ def test_neither_pressure_nor_gap(start):
     F, _ = drawn(883, 6)
     assert solve(F, np.zeros(6), start).pressure.max() == 0
     noise = 1e-16 * np.random.default_rng(5).normal(size=6)
-    found = solve(F, noise, start)
-    assert 0 <= found.pressure.max() <= 1e-12
-    assert found.sets <= 30
+    result = solve(F, noise, start)
+    assert 0 <= result.pressure.max() <= 1e-12
+    assert result.sets <= 30
 
 
 @pytest.mark.parametrize("start", [True, False])
@@ -164,9 +166,9 @@ def test_groups_that_touch(start):
     pressure = np.array([2.0, 0.0, 1.0, 0.0, 3.0, 0.0])
     for seed in range(10):
         noise = 1e-15 * np.random.default_rng(seed).normal(size=6)
-        found = solve(F, -F @ pressure + noise, start)
-        assert found.pressure == pytest.approx(pressure, abs=1e-12)  # round-off
-        assert found.sets <= 10
+        result = solve(F, -F @ pressure + noise, start)
+        assert result.pressure == pytest.approx(pressure, abs=1e-12)  # round-off
+        assert result.sets <= 10
 
 
 @pytest.mark.parametrize("start", [True, False])
@@ -176,11 +178,11 @@ def test_redundant_groups(start):
     twice = np.array([0, 1, 2, 3, 3])
     d[3] = -abs(d[3]) - 3
     reference = solve(F, d, start)
-    found = solve(F[np.ix_(twice, twice)], d[twice], start)
+    result = solve(F[np.ix_(twice, twice)], d[twice], start)
     assert reference.pressure[3] > 0
-    assert found.pressure[3] == pytest.approx(found.pressure[4], rel=1e-6)
-    assert found.pressure[3] + found.pressure[4] == pytest.approx(reference.pressure[3], rel=1e-6)
-    assert found.pressure[:3] == pytest.approx(reference.pressure[:3], rel=1e-6, abs=1e-9)
+    assert result.pressure[3] == pytest.approx(result.pressure[4], rel=1e-6)
+    assert result.pressure[3] + result.pressure[4] == pytest.approx(reference.pressure[3], rel=1e-6)
+    assert result.pressure[:3] == pytest.approx(reference.pressure[:3], rel=1e-6, abs=1e-9)
 
 
 def test_lips_that_supports_press_into_each_other():

@@ -43,7 +43,7 @@ def test_third_mode_is_antiplane():
 @cache
 def measured(n, order, tip_basis):
     """Worst errors in K and energy, most unknowns, over two tips."""
-    found = []
+    result = []
     for seed, (tip, angle) in enumerate(scenes.TIPS[:2], start=3):
         problem, field = scenes.williams_edge(
             n, tip, angle, seed=seed, order=order,
@@ -53,8 +53,8 @@ def measured(n, order, tip_basis):
         K = scenes.K_of(problem)[0]
         error = xc.energy_error(solution, lambda x, field=field: field(x)[1])
         unknowns = solution.report.operations["unknowns"]
-        found.append((abs(K - [1.0, 0.6]).max(), error, unknowns))
-    worst = tuple(np.max(found, axis=0))
+        result.append((abs(K - [1.0, 0.6]).max(), error, unknowns))
+    worst = tuple(np.max(result, axis=0))
     print(f"\norder {order} n {n} {tip_basis}: K {worst[0]:.2e}, E {worst[1]:.3e}, {worst[2]:.0f}")
     return worst
 

@@ -256,11 +256,11 @@ def test_memory_of_update_matrices_is_bounded(monkeypatch):
     halves = tree(problem.mesh, 2)
     free = factorised(A, columns, halves, keep=True)
     once = factorised(A, columns, halves)
-    kept = free.used - once.used
-    monkeypatch.setattr(multifrontal, "_MOST", kept // 3)
+    retained = free.used - once.used
+    monkeypatch.setattr(multifrontal, "_MOST", retained // 3)
     bound = factorised(A, columns, halves, keep=True)
     assert bound.lowest > free.lowest
-    assert bound.used - once.used <= kept // 3
+    assert bound.used - once.used <= retained // 3
     b = np.ones(A.shape[0])
     assert bound.solve(b).tobytes() == free.solve(b).tobytes()
     # A factor with other units is not taken over, and one of another tree neither.

@@ -70,7 +70,7 @@ def test_chebyshev_steps():
     np.testing.assert_allclose(new, 0.6 * before + 0.2 * inverse * r)
 
 
-def body(n, *, held="foot", E=1.0, nu=0.3, size=1.0, seed=2203, order=1):
+def body(n, *, supported="foot", E=1.0, nu=0.3, size=1.0, seed=2203, order=1):
     """Stiffness of a box with moved inner points, and which unknowns supports decide."""
     dim = len(n)
     mesh = xc.box((0.0,) * dim, (size,) * dim, n)
@@ -82,9 +82,9 @@ def body(n, *, held="foot", E=1.0, nu=0.3, size=1.0, seed=2203, order=1):
     material = xc.Isotropic(E, nu, "strain") if dim == 2 else xc.Isotropic(E, nu)
     x = node_points(mesh, order)
     fixed = np.zeros((len(x), dim), dtype=bool)
-    if held == "foot":
+    if supported == "foot":
         fixed[x[:, -1] < 1e-9 * size] = True
-    elif held == "symmetry":
+    elif supported == "symmetry":
         for i in range(dim):
             fixed[x[:, i] < 1e-9 * size, i] = True
     return bulk(mesh, material, order), fixed.ravel()
@@ -113,9 +113,11 @@ def load(levels, seed=911):
 
 
 @pytest.mark.parametrize("order", [1, 2])
-@pytest.mark.parametrize("held", ["foot", "symmetry"])
-def test_against_a_direct_solver(held, order):
-    A, levels, K = operator_of(*body((9 - 2 * order, 8, 11 - 2 * order), held=held, order=order))
+@pytest.mark.parametrize("supported", ["foot", "symmetry"])
+def test_against_a_direct_solver(supported, order):
+    A, levels, K = operator_of(
+        *body((9 - 2 * order, 8, 11 - 2 * order), supported=supported, order=order)
+    )
     b = load(levels)
     y, steps = conjugate_gradients(K, b, np.zeros_like(b), 1e-11)
     exact = sla.spsolve(sp.csc_matrix(A), b)
@@ -189,7 +191,7 @@ def test_units_change_nothing():
 @pytest.mark.parametrize("order", [1, 2])
 def test_without_supports(order):
     """Six rigid motions: any solution is right, up to such a motion."""
-    stiffness, fixed = body((7, 6, 7) if order == 1 else (4, 3, 4), held="not", order=order)
+    stiffness, fixed = body((7, 6, 7) if order == 1 else (4, 3, 4), supported="not", order=order)
     x = node_points(stiffness.mesh, order)
     modes = np.linalg.qr(rigid_modes(x))[0]
     A, levels, K = operator_of(stiffness, fixed, modes)
@@ -208,7 +210,7 @@ def test_without_supports(order):
 def test_one_aggregate_without_supports(monkeypatch, E):
     """The coarsest matrix is round-off alone: inverted, it would swamp everything."""
     monkeypatch.setattr(multigrid, "_COARSEST", 6)
-    stiffness, fixed = body((7, 6, 7), held="not", E=E)
+    stiffness, fixed = body((7, 6, 7), supported="not", E=E)
     modes = np.linalg.qr(rigid_modes(stiffness.mesh.points))[0]
     A, levels, K = operator_of(stiffness, fixed, modes)
     assert levels.coarsest.shape == (6, 6)

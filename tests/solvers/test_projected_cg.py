@@ -60,15 +60,15 @@ def by_enumeration(K, b, N, d):
 @settings(max_examples=60, deadline=None, derandomize=True)
 def test_against_enumeration(seed, g, start):
     K, b, N, d = drawn(seed, 9, g)
-    found = pressed(K, b, N, d, start)
+    result = pressed(K, b, N, d, start)
     exact = by_enumeration(K, b, N, d)
     # the tolerance times condition numbers of small drawn matrices
-    assert np.abs(found.pressure - exact).max() <= 1e-7 * (1 + np.abs(exact).max())
+    assert np.abs(result.pressure - exact).max() <= 1e-7 * (1 + np.abs(exact).max())
     y = np.linalg.solve(K, b + N.T @ exact)
-    assert np.abs(found.y - y).max() <= 1e-7 * (1 + np.abs(y).max())
-    assert np.abs((N @ found.y + d)[found.active]).max(initial=0) <= 1e-12  # round-off
-    assert found.gap.min() >= -1e-7
-    assert (found.pressure * found.gap == 0).all()
+    assert np.abs(result.y - y).max() <= 1e-7 * (1 + np.abs(y).max())
+    assert np.abs((N @ result.y + d)[result.active]).max(initial=0) <= 1e-12  # round-off
+    assert result.gap.min() >= -1e-7
+    assert (result.pressure * result.gap == 0).all()
 
 
 # A set that plain corrections leave and return to (the one of test_active_set).
@@ -79,19 +79,19 @@ CYCLING = np.array([[11.0, 13.0, -10.0], [13.0, 18.0, -15.0], [-10.0, -15.0, 15.
 def test_a_cycle_ends_group_by_group(start):
     K = np.linalg.inv(CYCLING)
     d = np.array([-1.0, -4.0, 4.0])
-    found = pressed(K, np.zeros(3), np.eye(3), d, start)
-    assert found.pressure == pytest.approx([0, 2 / 9, 0], abs=1e-9)
-    assert found.gap == pytest.approx([17 / 9, 0, 2 / 3], abs=1e-9)
-    assert found.sets <= 12
+    result = pressed(K, np.zeros(3), np.eye(3), d, start)
+    assert result.pressure == pytest.approx([0, 2 / 9, 0], abs=1e-9)
+    assert result.gap == pytest.approx([17 / 9, 0, 2 / 3], abs=1e-9)
+    assert result.sets <= 12
 
 
 def test_groups_of_very_different_size():
     K, b, N, d = drawn(8821, 12, 5)
     reference = pressed(K, b, N, d)
     size = 10.0 ** np.array([0, -3, -6, -9, -12])
-    found = pressed(K, b, N * size[:, None], d * size, measure=size)
-    assert np.array_equal(found.active, reference.active)
-    assert found.pressure * size == pytest.approx(reference.pressure, rel=1e-8, abs=1e-12)
+    result = pressed(K, b, N * size[:, None], d * size, measure=size)
+    assert np.array_equal(result.active, reference.active)
+    assert result.pressure * size == pytest.approx(reference.pressure, rel=1e-8, abs=1e-12)
 
 
 def test_redundant_groups_share_their_pressure():
@@ -100,10 +100,10 @@ def test_redundant_groups_share_their_pressure():
     reference = pressed(K, b, N, d)
     assert reference.pressure[3] > 0
     twice = np.array([0, 1, 2, 3, 3])
-    found = pressed(K, b, N[twice], d[twice])
-    assert found.pressure[3] == pytest.approx(found.pressure[4], rel=1e-6)
-    assert found.pressure[3] + found.pressure[4] == pytest.approx(reference.pressure[3], rel=1e-6)
-    assert found.y == pytest.approx(reference.y, rel=1e-6, abs=1e-9)
+    result = pressed(K, b, N[twice], d[twice])
+    assert result.pressure[3] == pytest.approx(result.pressure[4], rel=1e-6)
+    assert result.pressure[3] + result.pressure[4] == pytest.approx(reference.pressure[3], rel=1e-6)
+    assert result.y == pytest.approx(reference.y, rel=1e-6, abs=1e-9)
 
 
 def test_many_groups_take_the_sparse_factor():
@@ -115,20 +115,20 @@ def test_many_groups_take_the_sparse_factor():
     )
     rng = np.random.default_rng(8839)
     b, N, d = -1 - rng.random(n), np.eye(n) + 0.3 * np.eye(n, k=1), np.zeros(n)
-    found = pressed(K, b, N[:700], d[:700])
-    assert found.active.sum() > 400
+    result = pressed(K, b, N[:700], d[:700])
+    assert result.active.sum() > 400
     F, gap = N[:700] @ np.linalg.solve(K, N[:700].T), N[:700] @ np.linalg.solve(K, b)
     exact = active_set(F, gap, np.ones(700), 1.0, np.ones(700, dtype=bool))
-    assert np.array_equal(found.active, exact.active)
-    assert found.pressure == pytest.approx(exact.pressure, rel=1e-8, abs=1e-9)
+    assert np.array_equal(result.active, exact.active)
+    assert result.pressure == pytest.approx(exact.pressure, rel=1e-8, abs=1e-9)
 
 
 def test_no_load_no_pressure():
     K, _, N, d = drawn(8849, 7, 3)
-    found = pressed(K, np.zeros(7), N, 0 * d)
-    assert found.iterations == 0
-    assert found.pressure.max() == 0
-    assert np.abs(found.y).max() == 0
+    result = pressed(K, np.zeros(7), N, 0 * d)
+    assert result.iterations == 0
+    assert result.pressure.max() == 0
+    assert np.abs(result.y).max() == 0
 
 
 @pytest.mark.parametrize("start", [True, False])
@@ -139,9 +139,9 @@ def test_groups_that_touch(start):
     gap = N @ np.linalg.solve(K, N.T @ p)
     for seed in range(8870, 8875):
         noise = 1e-15 * np.random.default_rng(seed).normal(size=6)
-        found = pressed(K, np.zeros(10), N, -gap + noise, start, tolerance=1e-10)
-        assert found.pressure == pytest.approx(p, abs=1e-7)
-        assert found.sets <= 12
+        result = pressed(K, np.zeros(10), N, -gap + noise, start, tolerance=1e-10)
+        assert result.pressure == pytest.approx(p, abs=1e-7)
+        assert result.sets <= 12
 
 
 def test_no_solution_says_how_far_it_got():
@@ -197,12 +197,12 @@ class Scene:
     def __init__(self, name, n=20, seed=3119, supports=None, order=1, **material):
         cracks = [xc.line_crack(points) for points in CRACKS[name]]
         foot = xc.fix("bottom")
-        held = [foot, xc.displacement("top", bent)] if name == "through" else [foot]
+        supported = [foot, xc.displacement("top", bent)] if name == "through" else [foot]
         loads = [] if name == "through" else [xc.traction("top", beam)]
-        held = held if supports is None else supports
+        supported = supported if supports is None else supports
         material = {"E": 1.0, "nu": 0.3, "plane": "strain"} | material
         problem = xc.Problem(
-            scenes.perturbed(n, seed), xc.Isotropic(**material), cracks, supports=held,
+            scenes.perturbed(n, seed), xc.Isotropic(**material), cracks, supports=supported,
             loads=loads, order=order,
         )  # fmt: skip
         self.problem, self.model = problem, build(problem)
@@ -264,17 +264,17 @@ def test_contact_as_with_a_factor(name, start):
     )
     reference = direct.solve(scene.f + N.T @ exact.pressure, scene.known)
     guess = None if start == "overlap" else np.full(len(measure), start == "closed")
-    found = engine.contact(
+    result = engine.contact(
         ContactRows(N, measure, scene.stiffness, True), scene.f[:, None], scene.known[:, None],
         [guess], u0[:, None] if start == "overlap" else None,
     )[0]  # fmt: skip
-    assert np.array_equal(found.active, exact.active)
-    assert found.pressure == pytest.approx(
+    assert np.array_equal(result.active, exact.active)
+    assert result.pressure == pytest.approx(
         exact.pressure, rel=0, abs=1e-6 * exact.pressure.max() + 1e-300
     )
-    assert scene.displacement_error(found.u, reference) <= 1e-7
-    assert np.abs(N @ found.u)[found.active].max(initial=0) <= 1e-15  # round-off
-    assert (found.gap[found.active] == 0).all()
+    assert scene.displacement_error(result.u, reference) <= 1e-7
+    assert np.abs(N @ result.u)[result.active].max(initial=0) <= 1e-15  # round-off
+    assert (result.gap[result.active] == 0).all()
 
 
 def test_a_solution_is_a_perfect_start():
@@ -284,12 +284,12 @@ def test_a_solution_is_a_perfect_start():
     f, known = scene.f[:, None], scene.known[:, None]
     guess = [np.ones(len(measure), dtype=bool)]
     rows = ContactRows(N, measure, scene.stiffness, True)
-    found = engine.contact(rows, f, known, guess)[0]
+    result = engine.contact(rows, f, known, guess)[0]
     before = engine.count.iterations
-    again = engine.contact(rows, f, known, [found.active], found.u[:, None])[0]
+    again = engine.contact(rows, f, known, [result.active], result.u[:, None])[0]
     assert engine.count.iterations == before
     assert again.sets == 1
-    assert scene.displacement_error(again.u, found.u) <= 1e-12
+    assert scene.displacement_error(again.u, result.u) <= 1e-12
 
 
 def test_proportional_loads_cost_nothing():
@@ -366,11 +366,11 @@ def test_without_supports():
     )
     assert exact.active.any()
     rows = ContactRows(N, measure, scene.stiffness, True)
-    found = engine.contact(rows, f[:, None], 0 * f[:, None], [None], u[:, None])[0]
-    assert np.array_equal(found.active, exact.active)
-    assert found.pressure == pytest.approx(exact.pressure, abs=1e-6 * exact.pressure.max())
+    result = engine.contact(rows, f[:, None], 0 * f[:, None], [None], u[:, None])[0]
+    assert np.array_equal(result.active, exact.active)
+    assert result.pressure == pytest.approx(exact.pressure, abs=1e-6 * exact.pressure.max())
     closed = without_motion(motion, direct.solve(f + N.T @ exact.pressure))
-    assert scene.displacement_error(without_motion(motion, found.u), closed) <= 1e-7
+    assert scene.displacement_error(without_motion(motion, result.u), closed) <= 1e-7
 
 
 # Bodies in space ---------------------------------------------------------------------------------
@@ -407,10 +407,10 @@ def test_a_tilted_penny_as_with_a_factor(supports, order):
     assert exact.active.any()
     assert exact.active.all() == (not supports)
     rows = ContactRows(N, m.measure, 6.0, True)
-    found = engine.contact(rows, f[:, None], 0 * f[:, None], [None], u[:, None])[0]
-    assert np.array_equal(found.active, exact.active)
-    assert found.pressure == pytest.approx(exact.pressure, abs=1e-6 * exact.pressure.max())
-    for one, other in ((u, u0), (found.u, reference)):
+    result = engine.contact(rows, f[:, None], 0 * f[:, None], [None], u[:, None])[0]
+    assert np.array_equal(result.active, exact.active)
+    assert result.pressure == pytest.approx(exact.pressure, abs=1e-6 * exact.pressure.max())
+    for one, other in ((u, u0), (result.u, reference)):
         gap = without_motion(motion, one) - without_motion(motion, other)
         size = np.abs(without_motion(motion, other)).max()
         assert np.abs(gap[: 3 * space.n_nodes]).max() <= 1e-7 * size

@@ -54,7 +54,7 @@ def test_a_crack_that_opens_again_gives_its_multipliers_back():
 
 def test_an_open_crack_is_solved_to_the_end():
     """The rough look at the lips is not the answer."""
-    found = xc.solve(scene(0.55, loads=PULL))
+    result = xc.solve(scene(0.55, loads=PULL))
     exact = xc.solve(replace(scene(0.55, loads=PULL), numerics=xc.Numerics(linear="direct")))
     # To rigid motions, which neither engine decides alike: by the opening.
-    assert found.opening(0) == pytest.approx(exact.opening(0), rel=1e-5, abs=1e-7)
+    assert result.opening(0) == pytest.approx(exact.opening(0), rel=1e-5, abs=1e-7)

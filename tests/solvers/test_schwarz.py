@@ -95,15 +95,17 @@ def test_the_bound_of_the_spectrum(penny):
     top = engine.operator.cycle.levels[0]
     n = len(engine.operator.diagonal)
     A = (engine.basis.T @ engine.matrix @ engine.basis).toarray()
-    held = ~np.concatenate([engine.hierarchy.free, np.ones(n - len(engine.hierarchy.free), bool)])
-    A[held, held] = engine.operator.diagonal[held]
+    supported = ~np.concatenate(
+        [engine.hierarchy.free, np.ones(n - len(engine.hierarchy.free), bool)]
+    )
+    A[supported, supported] = engine.operator.diagonal[supported]
     B = np.stack([top.patches.times(column) for column in np.eye(n, dtype=np.float32)], axis=1)
     assert np.abs(B - B.T).max() <= 1e-5 * np.abs(B).max()  # single precision
     L = np.linalg.cholesky(A)
     w = scipy.linalg.eigvalsh(L.T @ B @ L)
     assert w[0] > 0
-    found = largest_eigenvalue(top.matrix, engine.operator.diagonal, top.patches.times)
-    assert w[-1] <= found <= 1.12 * w[-1]
+    result = largest_eigenvalue(top.matrix, engine.operator.diagonal, top.patches.times)
+    assert w[-1] <= result <= 1.12 * w[-1]
 
 
 def test_coordinates_come_back(penny):

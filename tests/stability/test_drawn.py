@@ -17,8 +17,8 @@ PUBLISHED = Path(__file__).parents[2] / "benchmarks" / "results" / "stability.js
 
 def campaign(seeds, where):
     """Judgement of the scenes of these seeds, printed."""
-    found = {seed: scenes_drawn.drawn(seed, where) for seed in seeds}
-    judged = scenes_drawn.judged(found)
+    result = {seed: scenes_drawn.drawn(seed, where) for seed in seeds}
+    judged = scenes_drawn.judged(result)
     for name, row in judged["classes"].items():
         print(f"\n{where}, {name}: {row['solved']} of {row['scenes']}, median {row['median']:.1e}, "
               f"worst {row['ratio']:.2f} times that (seed {row['seed of the worst']})",
@@ -28,8 +28,8 @@ def campaign(seeds, where):
 
 def test_one_of_each_class_in_the_plane():
     for seed in range(710, 714):
-        name, error, said = scenes_drawn.drawn(seed)
-        assert said == "", (seed, name)
+        name, error, messages = scenes_drawn.drawn(seed)
+        assert messages == "", (seed, name)
         assert error <= (0.06 if name == "half closed" else 3e-3), (seed, name)
 
 
@@ -54,16 +54,16 @@ def test_the_worst_of_before():
 
 def test_a_class_of_space():
     """A straight front askew to the mesh, six cells a side: the quickest of the three."""
-    name, error, said = scenes_drawn.drawn(722, "space", 6)
-    assert (name, said) == ("straight front", "")
+    name, error, messages = scenes_drawn.drawn(722, "space", 6)
+    assert (name, messages) == ("straight front", "")
     assert error <= 0.05
 
 
 def test_the_judge_sees_what_fails():
     """One error far out and one scene without a solution: both are told with their seeds."""
-    found = {seed: ("a", 1.0 + 0.01 * seed, "") for seed in range(8)}
-    found |= {8: ("a", 3.5, ""), 9: ("a", None, "SolverError: singular")}
-    judged = scenes_drawn.judged(found)
+    result = {seed: ("a", 1.0 + 0.01 * seed, "") for seed in range(8)}
+    result |= {8: ("a", 3.5, ""), 9: ("a", None, "SolverError: singular")}
+    judged = scenes_drawn.judged(result)
     assert judged["pass rate"] == pytest.approx(0.8)
     assert set(judged["failed"]) == {8, 9}
     assert judged["failed"][9] == "SolverError: singular"

@@ -166,7 +166,7 @@ def drawn(seed, where="plane", n=None):
     -------
     name : str
     error : float, or None where it was not solved
-    said : str
+    message : str
     """
     classes = CLASSES[where]
     name = list(classes)[seed % len(classes)]
@@ -179,21 +179,21 @@ def drawn(seed, where="plane", n=None):
     return name, error if np.isfinite(error) else None, ""
 
 
-def judged(found):
-    """Pass rate of `{seed: (name, error, said)}`: medians, worst ratios and failed seeds."""
+def judged(result):
+    """Pass rate of `{seed: (name, error, message)}`: medians, worst ratios and failed seeds."""
     table, failed = {}, {}
-    for name in dict.fromkeys(entry[0] for entry in found.values()):
-        errors = {s: e for s, (kind, e, _) in found.items() if kind == name and e is not None}
+    for name in dict.fromkeys(entry[0] for entry in result.values()):
+        errors = {s: e for s, (kind, e, _) in result.items() if kind == name and e is not None}
         if not errors:
             continue
         median = float(np.median(list(errors.values())))
         worst = max(errors, key=lambda s: errors[s])
         table[name] = {
-            "scenes": sum(entry[0] == name for entry in found.values()),
+            "scenes": sum(entry[0] == name for entry in result.values()),
             "solved": len(errors), "median": median, "worst": errors[worst],
             "ratio": errors[worst] / median, "seed of the worst": worst,
             "beyond": sorted(s for s, e in errors.items() if e > MOST * median),
         }  # fmt: skip
         failed |= {s: f"{e / median:.2f} medians" for s, e in errors.items() if e > MOST * median}
-    failed |= {s: said or "not finite" for s, (_, e, said) in found.items() if e is None}
-    return {"classes": table, "failed": failed, "pass rate": 1 - len(failed) / len(found)}
+    failed |= {s: messages or "not finite" for s, (_, e, messages) in result.items() if e is None}
+    return {"classes": table, "failed": failed, "pass rate": 1 - len(failed) / len(result)}

@@ -29,8 +29,8 @@ def test_rules_are_exact_to_their_degree(dim, degree):
     rng = np.random.default_rng(degree)
     for _ in range(12):
         powers = rng.multinomial(degree, np.full(dim + 1, 1 / (dim + 1)))
-        found = weight @ np.prod(bary**powers, axis=1)
-        assert found == pytest.approx(moment(powers), rel=1e-12)  # round-off
+        result = weight @ np.prod(bary**powers, axis=1)
+        assert result == pytest.approx(moment(powers), rel=1e-12)  # round-off
 
 
 def test_conical_points_lie_inside():
@@ -79,13 +79,13 @@ def test_one_over_r_around_a_tip():
     space = model([(-1.2, 0.03), tip], radius=2.0).space
     points = cell_points(space, np.arange(len(space.mesh.cells)), 4, 4)
     x = position(space, points.cell, points.bary)
-    found = points.weight @ (1 / np.linalg.norm(x - tip, axis=1))
+    result = points.weight @ (1 / np.linalg.norm(x - tip, axis=1))
     exact = 0.0
     for sx, sy in ((1, 1), (1, -1), (-1, 1), (-1, -1)):
         a, b = 1 - sx * tip[0], 1 - sy * tip[1]
         # In a right triangle with leg a along an axis, int 1/r = a asinh(b/a), and its twin.
         exact += a * np.arcsinh(b / a) + b * np.arcsinh(a / b)
-    assert found == pytest.approx(exact, rel=2e-5)
+    assert result == pytest.approx(exact, rel=2e-5)
 
 
 def test_graded_segments_integrate_polynomials_and_roots():

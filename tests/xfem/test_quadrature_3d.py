@@ -52,13 +52,13 @@ def test_cells_are_filled(name):
     """Volumes to round-off; quadratics too, but not where r = s² takes some of the degree."""
     space = model(CRACKS[name]).space
     cells = with_tip(space)
-    found = moments(space, cells, cell_points(space, cells, 4, 0))
-    assert found[0] <= 1e-13
+    result = moments(space, cells, cell_points(space, cells, 4, 0))
+    assert result[0] <= 1e-13
     away = cells[~np.isin(cells, space.cuts[0].level_set.tip_cells[0])]
     assert (moments(space, away, cell_points(space, away, 4, 0)) <= 1e-13).all()
     rich = moments(space, cells, cell_points(space, cells, 6, 0))
-    print(f"\n{name}: moments of degree 0, 1, 2 to {found}; {rich} with 6 points")
-    assert (found[1:] <= 1e-2).all()
+    print(f"\n{name}: moments of degree 0, 1, 2 to {result}; {rich} with 6 points")
+    assert (result[1:] <= 1e-2).all()
     assert (rich[:2] <= 1e-13).all()
     assert rich[2] <= 1e-5
 
@@ -147,8 +147,8 @@ def test_stiffness_against_brute_force():
         for cell in rng.choice(cells, 6, replace=False):
             one = np.array([cell])
             wanted = gram(space, lips, cell, brute_force(space, one, 3), False)
-            found = gram(space, lips, cell, cell_points(space, one, 4, 0), True)
-            errors.append(np.linalg.norm(found - wanted) / np.linalg.norm(wanted))
+            result = gram(space, lips, cell, cell_points(space, one, 4, 0), True)
+            errors.append(np.linalg.norm(result - wanted) / np.linalg.norm(wanted))
         worst[name] = max(errors)
     print(f"\nstiffness of cells: {worst}")
     assert worst["front"] <= 1e-2
@@ -165,8 +165,8 @@ def test_more_points_are_more_exact():
         for cell in cells:
             one = np.array([cell])
             wanted = gram(space, lips, cell, cell_points(space, one, 9, 0), True)
-            found = gram(space, lips, cell, cell_points(space, one, n, 0), True)
-            part.append(np.linalg.norm(found - wanted) / np.linalg.norm(wanted))
+            result = gram(space, lips, cell, cell_points(space, one, n, 0), True)
+            part.append(np.linalg.norm(result - wanted) / np.linalg.norm(wanted))
         error.append(max(part))
     print(f"\nstiffness with 3, 4, 6 points: {error}")
     assert error[0] > error[1] > error[2]
@@ -183,17 +183,17 @@ def test_triangles_with_roots_of_the_distance():
     number, bary, weight = triangle_points(r, size)
     x = np.einsum("qv,qv->q", bary, r[number])
     # With linear x the mean of f(x) over a triangle is a divided difference of its antiderivative.
-    found = [np.bincount(number, weight * f) for f in (np.ones_like(x), x, x**2, np.sqrt(x))]
-    np.testing.assert_allclose(found[0], 1.0, rtol=1e-14)
-    np.testing.assert_allclose(found[1], r.mean(axis=1), rtol=1e-13)
+    result = [np.bincount(number, weight * f) for f in (np.ones_like(x), x, x**2, np.sqrt(x))]
+    np.testing.assert_allclose(result[0], 1.0, rtol=1e-14)
+    np.testing.assert_allclose(result[1], r.mean(axis=1), rtol=1e-13)
     square = ((r**2).sum(axis=1) + r[:, 0] * r[:, 1] + r[:, 0] * r[:, 2] + r[:, 1] * r[:, 2]) / 6
-    np.testing.assert_allclose(found[2], square, rtol=1e-12)
+    np.testing.assert_allclose(result[2], square, rtol=1e-12)
     fine, share = conical(2, 12)
     wanted = np.sqrt(r @ fine.T) @ share
     # The first two by closed form: 2 int (1 - x) sqrt(x), 2 int x sqrt(x).
     wanted[:2] = 8 / 15, 4 / 5
-    np.testing.assert_allclose(found[3][:2], wanted[:2], rtol=1e-12)
-    np.testing.assert_allclose(found[3][2:], wanted[2:], rtol=1e-4)
+    np.testing.assert_allclose(result[3][:2], wanted[:2], rtol=1e-12)
+    np.testing.assert_allclose(result[3][2:], wanted[2:], rtol=1e-4)
 
 
 @pytest.mark.parametrize("name", CRACKS)

@@ -103,8 +103,8 @@ def chart(
     >>> scene = xc.Problem(
     ...     xc.box((0, -1), (1, 1), (6, 12)), xc.Isotropic(1.0, 0.3, "strain"), loads=pull
     ... )
-    >>> found = xc.chart(scene, [{"order": 1}], repeat=1, seconds=0.1)
-    >>> sorted({row.setting for row in found.rows})
+    >>> chart = xc.chart(scene, [{"order": 1}], repeat=1, seconds=0.1)
+    >>> sorted({row.setting for row in chart.rows})
     ['as given', 'order 1']
     """
     if not isinstance(problem, Problem):
@@ -120,10 +120,10 @@ def chart(
     runs = _Runs(problem, named, states, quantity, progress)
     every = _meshes(runs, meshes, max(int(repeat), 1), float(seconds))
     outcomes = _timed(runs, every, max(int(repeat), 1))
-    found = _compared(runs, every, outcomes, wanted, max(int(repeat), 1))
+    result = _compared(runs, every, outcomes, wanted, max(int(repeat), 1))
     if file is not None:
-        found.plot(file)
-    return found
+        result.plot(file)
+    return result
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,15 +161,15 @@ class _Outcome:
 
 def _run(runs: _Runs, mesh: Mesh, changes: dict[str, Any]) -> _Outcome:
     scene: Problem | None = None
-    with warnings.catch_warnings(record=True) as said:
+    with warnings.catch_warnings(record=True) as messages:
         warnings.simplefilter("always")
         start = perf_counter()
         try:
             scene = _varied(runs.problem, mesh, changes)
-            found = solve(scene, runs.states)
-            solutions: list[Solution] = [found] if runs.states is None else found
+            result = solve(scene, runs.states)
+            solutions: list[Solution] = [result] if runs.states is None else result
             if runs.quantity is not None:
-                sample = plain(runs.quantity(found))
+                sample = plain(runs.quantity(result))
             elif runs.has_tips:
                 sample = K_of_all(solutions)
             else:
@@ -187,7 +187,7 @@ def _run(runs: _Runs, mesh: Mesh, changes: dict[str, Any]) -> _Outcome:
         sample,
         solutions[0].n_dof,
         min(radii, default=None),
-        tuple(dict.fromkeys(str(one.message) for one in said)),
+        tuple(dict.fromkeys(str(one.message) for one in messages)),
         problem=scene,
     )
 

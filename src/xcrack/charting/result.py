@@ -256,9 +256,13 @@ class Chart:
         advice = [self.best(wanted) for wanted in asked]
         words = [str(best) for best in advice if best or self.wanted is not None]
         # A looser wish that the same run fulfils adds nothing.
-        found = [best.row for best in advice if best]
+        best_rows = [best.row for best in advice if best]
         if self.wanted is None:
-            words = [w for w, row, then in zip(words, found, [*found[1:], None]) if row is not then]
+            words = [
+                w
+                for w, row, then in zip(words, best_rows, [*best_rows[1:], None])
+                if row is not then
+            ]
         return "\n".join([head, "", self.table(), "", *words])
 
 

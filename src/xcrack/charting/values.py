@@ -100,13 +100,13 @@ def at_places(sample: Sampled, places: Sampled) -> Floats:
             f"{len(here)} tip(s) or front(s) here, {len(there)} in the reference: another crack. "
             "An end within half a cell of the boundary is a mouth; take finer meshes."
         )
-    kept = ~np.asarray(places.at_surface)
-    kept = kept if kept.any() else np.ones_like(kept)
-    result = np.zeros((int(kept.sum()), sample.values.shape[1]))
+    inner = ~np.asarray(places.at_surface)
+    inner = inner if inner.any() else np.ones_like(inner)
+    result = np.zeros((int(inner.sum()), sample.values.shape[1]))
     # By crack, not by front: fronts of one crack may be numbered otherwise in another mesh.
     for c in np.unique(asked[:, 0]):
-        mine = asked[kept, 0] == c
-        result[mine] = _nearest(sample, int(c), places.points[kept][mine])
+        mine = asked[inner, 0] == c
+        result[mine] = _nearest(sample, int(c), places.points[inner][mine])
     return result.ravel()
 
 

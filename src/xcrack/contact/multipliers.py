@@ -54,8 +54,8 @@ def multipliers(
     if kind == "naive":
         group = np.arange(len(nodes))
     else:
-        held = _held(space, c, nodes, traces, lips, fixed)
-        group = _groups(space, c, nodes, traces, lips.weight, held)
+        supported = _supported(space, c, nodes, traces, lips, fixed)
+        group = _groups(space, c, nodes, traces, lips.weight, supported)
     n_groups = int(group.max(initial=-1)) + 1
     gather = sp.csr_matrix(
         (np.ones(len(nodes)), (np.arange(len(nodes)), group)), shape=(len(nodes), n_groups)
@@ -83,7 +83,7 @@ def _traces(space: FunctionSpace, lips: LipPoints) -> tuple[Ints, sp.csr_matrix]
     return nodes[reached], sp.csr_matrix(matrix[:, np.nonzero(reached)[0]])
 
 
-def _held(
+def _supported(
     space: FunctionSpace,
     c: int,
     nodes: Ints,
@@ -101,13 +101,18 @@ def _held(
 
 
 def _groups(
-    space: FunctionSpace, c: int, nodes: Ints, traces: sp.csr_matrix, weight: Floats, held: Bools
+    space: FunctionSpace,
+    c: int,
+    nodes: Ints,
+    traces: sp.csr_matrix,
+    weight: Floats,
+    supported: Bools,
 ) -> Ints:
     """Group number of each node."""
     mesh, cut = space.mesh, space.cuts[c]
     edges = np.nonzero(~np.isnan(cut.cut_edge))[0]
     pairs = mesh.edges[edges]
-    kept = vital_edges(
+    vital = vital_edges(
         pairs, np.linalg.norm(mesh.points[pairs[:, 0]] - mesh.points[pairs[:, 1]], axis=1)
     )
     place = {int(n): i for i, n in enumerate(nodes)}
@@ -120,7 +125,7 @@ def _groups(
             i = int(parent[i])
         return i
 
-    for a, b in pairs[kept]:
+    for a, b in pairs[vital]:
         # An end of a cut edge at a sliver may have no trace that is seen; its star keeps the rest.
         i, j = place.get(int(a)), place.get(int(b))
         for end in (i, j):
@@ -133,11 +138,11 @@ def _groups(
     # Nodes on the crack carry a group of their own, unless the tip lies on them.
     own = on_crack & inside & ~covered
     covered |= own
-    if held.any():
+    if supported.any():
         roots = np.array([root(i) for i in range(len(nodes))])
         mass = np.asarray(traces.T @ weight).ravel()
         total = np.bincount(roots, mass, len(nodes))
-        covered &= np.bincount(roots, mass * held, len(nodes))[roots] < 0.5 * total[roots]
+        covered &= np.bincount(roots, mass * supported, len(nodes))[roots] < 0.5 * total[roots]
         parent[~covered] = np.nonzero(~covered)[0]
     if covered.any() and not covered.all():
         alone, choices = np.nonzero(~covered)[0], np.nonzero(covered)[0]
@@ -177,7 +182,7 @@ def vital_edges(pairs: Ints, length: Floats) -> Ints:
 
     heap = [entry(e) for e in range(len(pairs))]
     heapq.heapify(heap)
-    kept = np.ones(len(pairs), dtype=bool)
+    vital = np.ones(len(pairs), dtype=bool)
     while heap:
         top = heapq.heappop(heap)
         e = top[-1]
@@ -187,10 +192,10 @@ def vital_edges(pairs: Ints, length: Floats) -> Ints:
             continue
         if now[0] >= -1:
             break
-        kept[e] = False
+        vital[e] = False
         for end in pairs[e].tolist():
             degree[end] -= 1
-    return np.nonzero(kept)[0]
+    return np.nonzero(vital)[0]
 
 
 def _knots(centre: Floats, ends: tuple[float, float]) -> Floats:

@@ -39,14 +39,14 @@ def block_pattern(nodes, n_nodes):  # type: ignore[no-untyped-def]
     mark = np.full(n_nodes, -1, np.int64)
     indptr = np.zeros(n_nodes + 1, np.int32)
     for i in range(n_nodes):
-        found = 0
+        entries = 0
         for k in range(count[i], count[i + 1]):
             e = around[k]
             for a in range(n):
                 if mark[nodes[e, a]] != i:
                     mark[nodes[e, a]] = i
-                    found += 1
-        indptr[i + 1] = indptr[i] + found
+                    entries += 1
+        indptr[i + 1] = indptr[i] + entries
     # The pattern is symmetric: nodes that go to their neighbours in turn fill sorted rows.
     indices = np.empty(indptr[n_nodes], np.int32)
     place = indptr[:-1].copy()

@@ -43,15 +43,15 @@ def enriched_pattern(functions, n_functions, n_standard):  # type: ignore[no-unt
     mark = np.full(n_functions, -1, np.int64)
     indptr = np.zeros(n_functions + 1, np.int64)
     for i in range(n_functions):
-        found = 0
+        entries = 0
         for k in range(count[i], count[i + 1]):
             e = around[k]
             for a in range(n):
                 f = functions[e, a]
                 if f >= 0 and (f >= n_standard or i >= n_standard) and mark[f] != i:
                     mark[f] = i
-                    found += 1
-        indptr[i + 1] = indptr[i] + found
+                    entries += 1
+        indptr[i + 1] = indptr[i] + entries
     # The pattern is symmetric: functions that go to their neighbours in turn fill sorted rows.
     indices = np.empty(indptr[n_functions], np.int32)
     place = indptr[:-1].copy()

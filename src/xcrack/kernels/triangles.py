@@ -222,7 +222,7 @@ def closest_triangle(x, corners, normal, order, node, low, high, band, tiny):  #
         p = x[i]
         best = band
         reach = (best + tiny) * (best + tiny)
-        found = -1
+        nearest = -1
         top = 0
         stack[0] = 0
         stack_square[0] = _to_box(p, low[0], high[0])
@@ -240,20 +240,20 @@ def closest_triangle(x, corners, normal, order, node, low, high, band, tiny):  #
                 k = order[place]
                 square, which = _to_triangle(p, corners[k], normal[k], here, trial)
                 gap = np.sqrt(square)
-                if gap < best - tiny or (gap <= best + tiny and k < found):
+                if gap < best - tiny or (gap <= best + tiny and k < nearest):
                     better = True
                 else:
-                    better = found < 0 and gap <= best
+                    better = nearest < 0 and gap <= best
                 if better:
                     best = min(best, gap)
                     reach = (best + tiny) * (best + tiny)
-                    found = k
+                    nearest = k
                     distance[i] = gap
                     part[i] = which
                     for d in range(3):
                         foot[i, d] = here[d]
-        triangle[i] = found
-        if found < 0:
+        triangle[i] = nearest
+        if nearest < 0:
             distance[i] = band
             for d in range(3):
                 foot[i, d] = p[d]
@@ -293,7 +293,7 @@ def closest_segment(x, start, stop, order, node, low, high, band):  # type: igno
     for i in range(n):
         p = x[i]
         best = band * band
-        found = -1
+        nearest = -1
         top = 0
         stack[0] = 0
         stack_square[0] = _to_box(p, low[0], high[0])
@@ -313,12 +313,12 @@ def closest_segment(x, start, stop, order, node, low, high, band):  # type: igno
                 square = 0.0
                 for d in range(3):
                     square += (p[d] - foot[d]) * (p[d] - foot[d])
-                if square < best or (square == best and (found < 0 or k < found)):
+                if square < best or (square == best and (nearest < 0 or k < nearest)):
                     best = square
-                    found = k
+                    nearest = k
                     position[i] = along
-        segment[i] = found
-        distance[i] = np.sqrt(best) if found >= 0 else band
+        segment[i] = nearest
+        distance[i] = np.sqrt(best) if nearest >= 0 else band
     return distance, segment, position
 
 

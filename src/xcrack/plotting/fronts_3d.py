@@ -270,10 +270,10 @@ def step_fronts(step: Step, crack: int) -> list[FrontLine]:
     body = step.cracks[crack]
     closed = [bool(front[0] == front[-1]) for front in body.fronts or ()]
     lines = []
-    found = step.sif[0][crack] if step.sif else None
-    if found is not None and len(found.x):
-        for number in np.unique(found.front):
-            x = found.x[found.front == number]
+    evaluated = step.sif[0][crack] if step.sif else None
+    if evaluated is not None and len(evaluated.x):
+        for number in np.unique(evaluated.front):
+            x = evaluated.x[evaluated.front == number]
             # A closed front that leaves the body in part has K on the rest of it.
             whole = (number >= len(closed) or closed[number]) and is_closed(x)
             lines.append(FrontLine(np.concatenate([x, x[:1]]) if whole else x, whole, int(number)))

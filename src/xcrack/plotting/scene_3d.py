@@ -315,8 +315,8 @@ def _front_lines(solution: Solution, warp: float, plane: Plane | None) -> Floats
     parts = [np.zeros((0, 2, 3))]
     for c in range(len(solution.lips)):
         lips = lip_faces(solution, c)
-        kept = segments_behind(lips.front, levels(lips.points, plane))
-        parts += [part.at(_middle(lips, warp)) for part in kept]
+        behind = segments_behind(lips.front, levels(lips.points, plane))
+        parts += [part.at(_middle(lips, warp)) for part in behind]
     return np.concatenate(parts)
 
 

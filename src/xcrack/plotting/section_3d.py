@@ -83,8 +83,8 @@ def segments_behind(number: Ints, level: Floats | None) -> list[Soup]:
     # Both vertices on the side that is kept, one of them the cut point.
     share = np.zeros((len(t), 2, 2))
     share[:, 0] = np.stack([1 - t, t], axis=1)
-    kept = np.where(a[crossed] < 0, 0, 1)
-    share[np.arange(len(t)), 1, kept] = 1.0
+    retained = np.where(a[crossed] < 0, 0, 1)
+    share[np.arange(len(t)), 1, retained] = 1.0
     return [Soup.of(number[whole], None), Soup(number[crossed], share)]
 
 

@@ -33,8 +33,8 @@ def energy_error(solution: Solution, stress: Callable[[Floats], Floats]) -> floa
         points = cell_points(space, cells, 8, 2 * space.order + 2)
         x = position(space, points.cell, points.bary)
         exact = np.asarray(stress(x), dtype=float)
-        found = solution.stress_at(points.cell, points.bary, points.side)
-        difference = exact - found
+        computed = solution.stress_at(points.cell, points.bary, points.side)
+        difference = exact - computed
         error += _energy(material.strain(difference), difference, points.weight)
         total += _energy(material.strain(exact), exact, points.weight)
     return float(np.sqrt(error / total))

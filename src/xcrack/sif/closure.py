@@ -10,7 +10,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from xcrack.analysis.solution import Solution
-from xcrack.arrays import Bools
+from xcrack.arrays import Bools, Floats
 from xcrack.sif.sif import SIF
 
 _STEEPEST = np.cos(np.pi / 4)  # of a point behind a place on a front: those beside it do not count
@@ -60,13 +60,18 @@ def _without_gaps(closed: Bools, sif: SIF, size: float) -> Bools:
     return result
 
 
-def pressed(sif: SIF, solution: Solution, c: int) -> Bools:
-    """Whether the lip point nearest to each place bears pressure `(f,)`."""
+def pressure_at(sif: SIF, solution: Solution, c: int) -> Floats:
+    """Pressure of the lip point nearest to each place `(f,)`; 0 where it is open."""
     contact = solution.contact[c]
     if contact is None or not len(contact.points):
-        return np.zeros(len(sif.x), dtype=bool)
+        return np.zeros(len(sif.x))
     _, nearest = cKDTree(contact.points).query(sif.x)
-    return np.asarray(contact.closed[nearest] & (contact.pressure[nearest] > 0))
+    return np.where(contact.closed[nearest], np.maximum(contact.pressure[nearest], 0.0), 0.0)
+
+
+def pressed(sif: SIF, solution: Solution, c: int) -> Bools:
+    """Whether the lip point nearest to each place bears pressure `(f,)`."""
+    return np.asarray(pressure_at(sif, solution, c) > 0)
 
 
 def shallow(sif: SIF, solution: Solution, c: int, depth: float) -> Bools:

@@ -341,6 +341,6 @@ def _inverse(A: Floats, scale: float) -> Any:
     diagonal = np.diag(A)
     root = np.sqrt(np.where(diagonal > _NULL * scale, _reciprocal(diagonal), 0.0))
     w, V = np.linalg.eigh(root[:, None] * A * root)
-    kept = w > _NULL * max(w[-1], _NULL)
-    V = root[:, None] * V[:, kept]
-    return lock(((V / w[kept]) @ V.T).astype(np.float32))
+    significant = w > _NULL * max(w[-1], _NULL)
+    V = root[:, None] * V[:, significant]
+    return lock(((V / w[significant]) @ V.T).astype(np.float32))

@@ -44,8 +44,8 @@ def free_motion(space: FunctionSpace, fixed: Bools) -> Motion:
         _check_pieces(space, fixed)
     n = space.n_nodes * space.dim
     R = np.linalg.qr(rigid_modes(space.node_points))[0]
-    held = R[fixed[:n]]
-    gram = held.T @ held
+    supported = R[fixed[:n]]
+    gram = supported.T @ supported
     w, V = np.linalg.eigh(gram)
     null = V[:, w < 1e-10 * max(float(w.max(initial=0.0)), 1.0 / len(R))]
     modes = np.zeros((space.n_dof, null.shape[1]))

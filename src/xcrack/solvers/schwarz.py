@@ -94,9 +94,9 @@ def _members(space: FunctionSpace, home: Ints, n_standard: int) -> tuple[Ints, I
     at = sp.csr_matrix(
         (np.ones(len(known), np.int8), (home[known], known)), shape=(space.n_nodes, len(home))
     )
-    found = sp.csr_matrix(stars(space.mesh, space.order)[points] @ at)
-    found.sort_indices()
-    return found.indices.astype(np.int64), found.indptr.astype(np.int64)
+    patches = sp.csr_matrix(stars(space.mesh, space.order)[points] @ at)
+    patches.sort_indices()
+    return patches.indices.astype(np.int64), patches.indptr.astype(np.int64)
 
 
 def _inverses(A: sp.csr_matrix, members: Ints, start: Ints) -> tuple[Any, Any]:
@@ -109,8 +109,8 @@ def _inverses(A: sp.csr_matrix, members: Ints, start: Ints) -> tuple[Any, Any]:
     flat = dense_blocks(A.indptr, A.indices, A.data, members, start)
     for s in np.unique(size):
         where = offset[:-1][size == s][:, None] + np.arange(s * s)
-        found = _inverse(flat[where].reshape(-1, s, s))
-        result[where] = found.reshape(-1, s * s)
+        inverse = _inverse(flat[where].reshape(-1, s, s))
+        result[where] = inverse.reshape(-1, s * s)
     return result, offset[:-1].astype(np.uint64)
 
 

@@ -13,9 +13,9 @@ from xcrack.scene.numerics import Numerics
 from xcrack.threads import one_blas_thread
 from xcrack.xfem.consistent import boundary_points, corrected
 from xcrack.xfem.function_space import FunctionSpace
-from xcrack.xfem.kept_cells import KeptCells, kept_cells, with_one_jump
 from xcrack.xfem.lips import LipPoints
 from xcrack.xfem.quadrature import Points, cell_points
+from xcrack.xfem.reused_cells import ReusedCells, reused_cells, with_one_jump
 
 _CHUNK = 60_000  # integration points tabulated at once; bounds the memory
 
@@ -31,7 +31,7 @@ class Bulk:
     order : int
     matrix : sparse matrix (n, n), stress · length^(d - 2)
         Node blocks, BSR.
-    cells : KeptCells, optional
+    cells : ReusedCells, optional
         Cut cells of the last crack that may serve the next.
     """
 
@@ -39,7 +39,7 @@ class Bulk:
     material: Isotropic
     order: int
     matrix: sp.bsr_matrix
-    cells: KeptCells | None = None
+    cells: ReusedCells | None = None
 
 
 def bulk(mesh: Mesh, material: Isotropic, order: int) -> Bulk:
@@ -69,15 +69,15 @@ def enriched_stiffness(
     material: Isotropic,
     numerics: Numerics,
     lips: tuple[LipPoints, ...],
-    known: KeptCells | None = None,
-) -> tuple[sp.csr_matrix, int, KeptCells | None]:
+    known: ReusedCells | None = None,
+) -> tuple[sp.csr_matrix, int, ReusedCells | None]:
     """Entries with an enriched function, as a matrix of all unknowns.
 
     Entries of two standard functions are left out: they are those of the uncracked body.
 
     Parameters
     ----------
-    known : KeptCells, optional
+    known : ReusedCells, optional
         Of an earlier crack in the same mesh.
 
     Returns
@@ -85,7 +85,7 @@ def enriched_stiffness(
     matrix : sparse matrix (n_dof, n_dof)
     n_points : int
         Integration points used.
-    reusable : KeptCells or None
+    reusable : ReusedCells or None
         For the next crack.
     """
     from xcrack.kernels.enriched import add_products, add_stiffness, enriched_pattern
@@ -95,7 +95,7 @@ def enriched_stiffness(
     if not len(cells):
         return sp.csr_matrix((n, n)), 0, None
     simple = with_one_jump(space, cells)
-    reusable, n_points = kept_cells(space, cells[simple], known)
+    reusable, n_points = reused_cells(space, cells[simple], known)
     others = cells[~simple]
     points = cell_points(space, others, numerics.points, 2 * (space.order - 1))
     with_tip = cells[space.has_tip[cells]]

@@ -8,8 +8,8 @@ import pytest
 import xcrack as xc
 from support import scenes_2d as scenes
 from support import scenes_3d as scenes_space
-from xcrack.xfem.kept_cells import kept_cells, with_one_jump
 from xcrack.xfem.model import build
+from xcrack.xfem.reused_cells import reused_cells, with_one_jump
 
 STEEL = xc.Isotropic(1.0, 0.3, "strain")
 ROOT = [(-1.2, 0.013), (-0.5, 0.03)]
@@ -38,17 +38,17 @@ def test_only_what_changed_is_integrated(scene, first, second, order):
     """The stiffness is the same to the last bit, with fewer points."""
     before = scene(first, order)
     after = replace(scene(second, order), mesh=before.mesh)
-    kept = build(after, build(before).bulk)
+    retained = build(after, build(before).bulk)
     fresh = build(after)
-    assert (kept.stiffness != fresh.stiffness).nnz == 0
-    assert kept.n_points < fresh.n_points
+    assert (retained.stiffness != fresh.stiffness).nnz == 0
+    assert retained.n_points < fresh.n_points
     simple = fresh.space.enriched[with_one_jump(fresh.space, fresh.space.enriched)]
-    _, again = kept_cells(fresh.space, simple, kept.bulk.cells)
+    _, again = reused_cells(fresh.space, simple, retained.bulk.cells)
     assert again == 0
-    _, changed = kept_cells(fresh.space, simple, build(before).bulk.cells)
-    _, every = kept_cells(fresh.space, simple, None)
+    _, changed = reused_cells(fresh.space, simple, build(before).bulk.cells)
+    _, every = reused_cells(fresh.space, simple, None)
     assert 0 < changed < every
-    assert fresh.n_points - kept.n_points == every - changed
+    assert fresh.n_points - retained.n_points == every - changed
 
 
 @pytest.mark.parametrize("order", [1, 2])
@@ -56,15 +56,15 @@ def test_a_node_that_lost_its_function(order):
     """Cells around it are integrated anew, all others taken over."""
     space_ = build(plane((0.1, 0.05), order)).space
     cells = space_.enriched[with_one_jump(space_, space_.enriched)]
-    known, _ = kept_cells(space_, cells, None)
+    known, _ = reused_cells(space_, cells, None)
     nodes = space_.cell_nodes[cells]
     lost = np.array(space_.heaviside[0])
     lost[nodes[lost[nodes] >= 0][0]] = -1
     changed = replace(space_, heaviside=(lost,))
     cells = changed.enriched[with_one_jump(changed, changed.enriched)]
-    found, used = kept_cells(changed, cells, known)
-    fresh, every = kept_cells(changed, cells, None)
-    np.testing.assert_array_equal(found.products, fresh.products)
+    result, used = reused_cells(changed, cells, known)
+    fresh, every = reused_cells(changed, cells, None)
+    np.testing.assert_array_equal(result.products, fresh.products)
     assert 0 < used < every
 
 
@@ -88,8 +88,8 @@ def test_another_crack_in_the_same_cells_is_integrated_anew():
     for cracks in ([shifted], [turned], [other, xc.line_crack([*ROOT, (0.1, 0.05)])]):
         changed = build(replace(scene, cracks=cracks))
         cells = changed.space.enriched[with_one_jump(changed.space, changed.space.enriched)]
-        _, used = kept_cells(changed.space, cells, known)
-        _, every = kept_cells(changed.space, cells, None)
+        _, used = reused_cells(changed.space, cells, known)
+        _, every = reused_cells(changed.space, cells, None)
         assert used == every
 
 

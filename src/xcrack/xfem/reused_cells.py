@@ -14,7 +14,7 @@ from xcrack.xfem.quadrature import cell_points
 
 
 @dataclass(frozen=True, eq=False)
-class KeptCells:
+class ReusedCells:
     """Integrals of cells with the Heaviside functions of one crack and no others.
 
     Attributes
@@ -38,7 +38,9 @@ def with_one_jump(space: FunctionSpace, cells: Ints) -> Bools:
     return np.asarray((mask & (mask - 1) == 0) & (mask < 1 << len(space.cuts)))
 
 
-def kept_cells(space: FunctionSpace, cells: Ints, known: KeptCells | None) -> tuple[KeptCells, int]:
+def reused_cells(
+    space: FunctionSpace, cells: Ints, known: ReusedCells | None
+) -> tuple[ReusedCells, int]:
     """Integrate cells with one jump, but those that are known already.
 
     Parameters
@@ -46,12 +48,12 @@ def kept_cells(space: FunctionSpace, cells: Ints, known: KeptCells | None) -> tu
     space : FunctionSpace
     cells : (m,) array of int
         Growing.
-    known : KeptCells, optional
+    known : ReusedCells, optional
         Of an earlier crack in the same mesh.
 
     Returns
     -------
-    KeptCells
+    ReusedCells
     n_points : int
         Integration points used.
     """
@@ -70,7 +72,7 @@ def kept_cells(space: FunctionSpace, cells: Ints, known: KeptCells | None) -> tu
         number, place, first = points.of_cells(batch.cells)
         _, G = space.tabulate(batch, place, points.bary[number], points.side[number])
         products[new[rows]] = gradient_products(first, points.weight[number], G, n)
-    return KeptCells(cells, key, products), len(points.weight)
+    return ReusedCells(cells, key, products), len(points.weight)
 
 
 def _keys(space: FunctionSpace, cells: Ints) -> Floats:
