@@ -30,7 +30,12 @@ def is_public_library(module: str | None) -> bool:
 
 
 def is_installed(module: str | None) -> bool:
-    """Whether a module belongs to an installed package, and not to the user's own files."""
+    """Whether a module belongs to an installed package, and not to the user's own files.
+
+    What a script defines is the user's even where an installed program runs it (a profiler, pytest).
+    """
+    if module == "__main__":
+        return False
     file = getattr(sys.modules.get(module or ""), "__file__", None)
     return file is not None and str(Path(file).resolve()).startswith(_INSTALLED)
 
