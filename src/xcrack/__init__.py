@@ -1,4 +1,4 @@
-"""xcrack: fatigue crack growth by extended finite elements, with contact of the lips.
+"""xcrack: fatigue crack growth by extended finite elements, with contact of the crack faces.
 
 Importing it loads neither gmsh, pyvista, meshio, matplotlib nor numba; each is loaded where it
 is first used.

@@ -273,7 +273,7 @@ def system_errors(
     Raises
     ------
     error
-        For an OSError; it names the path and what the system said.
+        For an OSError; it names the path and what the system answered.
     """
     try:
         yield

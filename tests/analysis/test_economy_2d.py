@@ -192,7 +192,7 @@ def test_a_closed_crack_costs_one_factorisation_and_a_small_dense_problem(order)
     operations = solution.report.operations
     assert operations["factorisations"] == 1
     multipliers = operations["multipliers"]
-    # About one for each pair of cells along the lip.
+    # About one for each pair of cells along the crack face.
     assert 0 < multipliers <= len(solution.space.cuts[0].lip_cell)
     assert operations["solves"] == 2
     assert solution.contact[0] is not None

@@ -1,4 +1,4 @@
-"""Scene economy in space: the rules of test_economy_2d.py for tetrahedra, fronts and levels."""
+"""Scene economy in 3D: the rules of test_economy_2d.py for tetrahedra, fronts and levels."""
 
 import importlib.util
 import json

@@ -180,7 +180,7 @@ def test_errors_are_those_of_the_exact_solution(williams):
         assert row.unknowns > 0
 
 
-def test_failures_are_kept(williams):
+def test_failures_are_recorded(williams):
     assert len(williams.rows) == 8
     assert {row.setting for row in williams.failed} == {"wrong"}
     assert all("points = 99" in row.failed for row in williams.failed)
@@ -269,7 +269,7 @@ def test_default_settings_vary_what_is_there():
 
 
 def test_contact_is_compared_but_no_reference():
-    """Lips that overlap have K_I = -K where those that touch have none: an error of 1."""
+    """Crack faces that overlap have K_I = -K where those that touch have none: an error of 1."""
     crack = xc.line_crack([(-1.2, 0.03), (0.0, 0.03)])
     body = xc.Problem(xc.box((-1, -1), (1, 1), 5), STEEL, [crack], loads=PULL)
     off, states = [{"contact": "off"}], [1.0, -1.0]

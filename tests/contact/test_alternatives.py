@@ -1,4 +1,5 @@
-"""Other ways to hold the lips than the reduced multipliers: what each is good for, and what not.
+"""Other ways to hold the crack faces than the reduced multipliers: what each is good for, and what
+not.
 
 Exact solutions are imposed on boxes. Bounds are of discretisation unless they say round-off or
 tolerance; those that show a failing are lower bounds.
@@ -98,7 +99,7 @@ def test_nitsche_is_exact_for_linear_pressure_at_order_2():
 
 @pytest.mark.parametrize("order", [1, 2])
 def test_nitsche_at_slivers(order):
-    """Round-off for any cut: the lip of a sliver has no say in the mean stress."""
+    """Round-off for any cut: the crack face of a sliver has no say in the mean stress."""
     for eps in (0.1, 1e-3, 1e-6, 1e-10, 0.0):
         crack = xc.line_crack([(-0.43, eps * 0.2), (0.37, eps * 0.2)])
         problem = scenes.on_box(
@@ -218,7 +219,7 @@ def test_pressure_at_a_hole(order):
 
 
 def test_a_stiff_penalty_oscillates():
-    """Order 1: the points hold the lips at more places than the jump can follow."""
+    """Order 1: the points hold the crack faces at more places than the jump can follow."""
     soft, stiff = (pressed_hole(1, lips="penalty", penalty=p) for p in (10.0, 1e4))
     print(f"\npenalty 10: {soft:.2f}, 1e4: {stiff:.2f}")
     assert soft < 0.2
@@ -309,7 +310,8 @@ def edge(contact="auto", **options):
 def test_states(lips):
     """Pulled and pushed together as alone; an open state has no pressure.
 
-    Contact is on: Nitsche's method acts on open lips too, whose stress is zero but for the error.
+    Contact is on: Nitsche's method acts on open crack faces too, whose stress is zero but for the
+    error.
     """
     states = [1.0, -1.0, -2.0]
     result = xc.solve(edge("on", lips=lips), states=states)
@@ -390,7 +392,7 @@ def test_nitsche_counts_what_acts_on_the_lips(order, steady):
 
 @pytest.mark.parametrize("order", [1, 2])
 def test_rows_of_stress(order):
-    """Against the stress of a solution on both lips, with what is drawn as its unknowns."""
+    """Against the stress of a solution on both crack faces, with what is drawn as its unknowns."""
     problem = patch(641, order)
     solution = xc.solve(problem)
     u = np.random.default_rng(6611).standard_normal(solution.n_dof)

@@ -1,4 +1,4 @@
-"""Growth of cracks in space (D-4): exact geometry, old surface frozen, spacing, folds, meeting."""
+"""Growth of 3D cracks (D-4): exact geometry, old surface frozen, spacing, folds, meeting."""
 
 import numpy as np
 import pytest
@@ -259,7 +259,7 @@ def test_zigzag_dies_out(period, share):
     assert inner.mean() == pytest.approx(2.4, abs=1e-3)
 
 
-def test_zigzag_that_loses_length_is_said():
+def test_zigzag_that_loses_length_warns():
     z = np.linspace(0, 6, 61)
     crack = sheet(2 + 0.03 * (-1.0) ** np.arange(61), z)
     with pytest.warns(XcrackWarning, match="zigzag"):
@@ -441,7 +441,7 @@ def test_area_of_large_faces():
 
 @pytest.mark.parametrize("power", [0.5, 1.0, 2.0, 3.0])
 def test_cycles_of_a_penny_and_of_a_straight_front(power):
-    """Rate ~ radius^power: cycles of the same law in the plane; round-off."""
+    """Rate ~ radius^power: cycles of the same law in 2D; round-off."""
     a0, a1 = 2.0, 3.0
     rate0, rate1 = (np.full(8, 1e-3 * a**power) for a in (a0, a1))
     da = np.full(8, a1 - a0)

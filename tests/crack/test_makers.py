@@ -143,7 +143,7 @@ def test_damaged_files(name, version, tmp_path):
 
 
 @pytest.mark.parametrize("name", ["a.msh", "a.inp", "a.vtu"])
-def test_a_full_disk_is_said_with_the_path(name, tmp_path):
+def test_a_full_disk_is_reported_with_the_path(name, tmp_path):
     path = tmp_path / name
     xc.write_mesh(path, MESH)
     before = path.read_bytes()

@@ -192,7 +192,7 @@ def test_a_long_piece_through_a_small_body_is_inside():
 # --- fronts that a mesh is too coarse for ------------------------------------------------------
 
 
-def test_a_front_shorter_than_a_cell_is_said_here_and_in_plan():
+def test_a_front_shorter_than_a_cell_is_reported_here_and_in_plan():
     mesh = xc.box((0, 0, 0), (4, 4, 0.6), (13, 13, 2))
     crack = xc.plane_crack([(-1, 2.03, -1), (2.05, 2.03, -1), (2.05, 2.03, 2), (-1, 2.03, 2)])
     steel = xc.Isotropic(E=1.0, nu=0.3)

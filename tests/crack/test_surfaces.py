@@ -1,4 +1,4 @@
-"""Cracks in space: how they are described, and what of them becomes front in a mesh."""
+"""3D cracks: how they are described, and what of them becomes front in a mesh."""
 
 import numpy as np
 import pytest

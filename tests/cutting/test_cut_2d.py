@@ -1,4 +1,4 @@
-"""Cutting: fractions without cancellation, lips that are counted once."""
+"""Cutting: fractions without cancellation, crack faces that are counted once."""
 
 from fractions import Fraction
 

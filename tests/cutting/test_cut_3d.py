@@ -1,4 +1,4 @@
-"""Cutting tetrahedra: interfaces, volumes, lips that are counted once, cells at fronts."""
+"""Cutting tetrahedra: interfaces, volumes, crack faces that are counted once, cells at fronts."""
 
 import numpy as np
 import pytest
@@ -91,7 +91,7 @@ def model(mesh, *cracks, **options):
 
 
 def check_cut(built, area=None):
-    """Volumes of sub-cells, sides, and the area of the lips where it is known."""
+    """Volumes of sub-cells, sides, and the area of the crack faces where it is known."""
     space, cut = built.space, built.space.cuts[0]
     mesh, phi = space.mesh, cut.level_set.phi
     total = np.bincount(cut.sub_to_cell, cut.sub_fraction, len(mesh.cells))

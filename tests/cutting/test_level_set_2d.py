@@ -113,7 +113,7 @@ def test_line_beyond_a_hole_is_no_crack():
 
 
 def test_growth_steps_given_by_angles_reach_the_published_tips():
-    """Three steps of 0.4, each turned by 30 degrees (code_aster SSLV316 in the plane)."""
+    """Three steps of 0.4, each turned by 30 degrees (code_aster SSLV316 in 2D)."""
     mesh = xc.box((0, 0), (8, 18), (40, 90))
     crack = place_line(xc.line_crack([(0.0, 9.0), (2.0, 9.0)]), mesh)
     tips = []

@@ -1,4 +1,4 @@
-"""Distances to surfaces and fronts in space: naive twins, signs, flat and curved cracks."""
+"""Distances to surfaces and fronts in 3D: naive twins, signs, flat and curved cracks."""
 
 import numpy as np
 import pytest

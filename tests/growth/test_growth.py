@@ -173,7 +173,7 @@ def test_control_by_cycles(monkeypatch):
     assert [step.da[0][0] for step in capped] == [1.5, 1.5, 1.5]
 
 
-def test_radius_of_the_first_step_is_kept_and_the_solver_is_warm(monkeypatch):
+def test_radius_of_the_first_step_stays_and_the_solver_is_warm(monkeypatch):
     calls = patch_respond(monkeypatch, mode_I(), radius=1.25)
     run(grow(plate(), LAW, max_hoop_stress, CYCLE, da=2.0, max_steps=3))
     assert [numerics.radius for numerics, _ in calls] == [None, 1.25, 1.25]

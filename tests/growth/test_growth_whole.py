@@ -103,7 +103,7 @@ def test_path_of_an_inclined_crack_is_antisymmetric_and_turns_across_the_load():
     assert np.abs((points + points[::-1]) / 2 - middle).max() < 0.02
 
 
-def test_radius_of_the_first_step_is_kept():
+def test_radius_of_the_first_step_stays():
     steps = list(
         xc.grow(edge_crack(0.0), LAW, xc.max_hoop_stress, xc.Cycle(0, 1), da=0.1, max_steps=3)
     )

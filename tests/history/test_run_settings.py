@@ -271,7 +271,7 @@ def test_other_versions_are_warned_of(whole):
         resume(whole.path, **run_of())
 
 
-def test_the_number_of_threads_is_recorded_and_said(whole, monkeypatch):
+def test_the_number_of_threads_is_recorded_and_reported(whole, monkeypatch):
     path = whole.path / "run.json"
     assert f'"BLAS threads": "{versions()["BLAS threads"]}"' in path.read_text()
     monkeypatch.setattr(collecting, "versions", lambda: {**versions(), "BLAS threads": "7"})

@@ -191,3 +191,24 @@ def test_plane_and_space_are_one_code_path() -> None:
     branch = re.compile(r"\b(dim|d)\s*(==|!=)\s*[23]\b")
     count = sum(len(branch.findall(path.read_text())) for path in FILES)
     assert count <= 9, f"{count} branches on the dimension"
+
+
+def test_no_variable_has_a_name_that_says_nothing() -> None:
+    """What a name holds is in it: a message, a result, a support; not that it was found or kept."""
+    vague = {"said", "told", "found", "kept", "held"}
+    bad = []
+    for folder in ("src", "tests", "benchmarks", "examples", "scripts"):
+        for path in sorted((ROOT / folder).rglob("*.py")):
+            for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+                name = ""
+                if isinstance(node, ast.Name | ast.Attribute) and isinstance(node.ctx, ast.Store):
+                    name = node.id if isinstance(node, ast.Name) else node.attr
+                elif isinstance(node, ast.arg):
+                    name = node.arg
+                elif isinstance(node, ast.FunctionDef | ast.ClassDef):
+                    name = node.name
+                elif isinstance(node, ast.ExceptHandler):
+                    name = node.name or ""
+                if vague & set(name.strip("_").split("_")):
+                    bad.append(f"{path.relative_to(ROOT)}:{getattr(node, 'lineno', 0)}: {name}")
+    assert not bad, "\n".join(bad)

@@ -176,7 +176,8 @@ def arc(n, order):
     """Errors of a crack along an arc of one rad in [-1, 1]².
 
     The polyline has a piece a cell: its chords lie h² from the circle and turn by h against it,
-    and inside a cell the lip is straight in any case. That limits order 2 to rate 2 in energy.
+    and inside a cell the crack face is straight in any case. That limits order 2 to rate 2 in
+    energy.
     """
     theta = np.linspace(-0.45, 0.6, max(n // 2, 8) + 1)
     points = CENTRE + np.stack([np.cos(theta), np.sin(theta)], axis=1)

@@ -85,7 +85,8 @@ def test_partial_closure(order, s_m, place):
     assert error_p <= 0.05
     assert error_gap <= 1e-2
     assert solution.report.operations["contact_iterations"] <= 30
-    # Groups do not overlap but for round-off; inside a group the lips may, where contact ends.
+    # Groups do not overlap but for round-off; inside a group the crack faces may, where contact
+    # ends.
     assert group_gaps(solution).min() >= -1e-12 * opening.max()
     assert contact.gap.min() >= -5e-3 * opening.max()
     assert contact.pressure.min() >= 0
@@ -104,7 +105,8 @@ def test_partial_closure_does_no_work(order):
 @pytest.mark.parametrize("order", [1, 2])
 @pytest.mark.parametrize("s_m", [0.0, 0.25])
 def test_without_contact_K_is_wrong(order, s_m):
-    """What the lips contribute: an open model overlaps and misses K by more than a per cent."""
+    """What the crack faces contribute: an open model overlaps and misses K by more than a per
+    cent."""
     K = exact.partial_closure_params(1.0, s_m, 1.0)[2]
     problem, _ = scenes.centre_crack(
         lambda x, y: exact.partial_closure(x, y, 1.0, 1.0, 0.3, s_m, 1.0), 24, order=order,
@@ -136,7 +138,7 @@ def test_closure_point_on_a_node(order):
 
 @pytest.mark.parametrize("order", [1, 2])
 def test_touching_at_one_point(order):
-    """s_m = 0.5: open all along, K_I = 0 at the left tip, where the lips touch."""
+    """s_m = 0.5: open all along, K_I = 0 at the left tip, where the crack faces touch."""
     problem, _ = scenes.centre_crack(
         lambda x, y: exact.partial_closure(x, y, 1.0, 1.0, 0.3, 0.5, 1.0), 40, order=order,
         angle=0.3, origin=(0.02, 0.01), contact="on",

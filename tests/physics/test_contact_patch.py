@@ -252,7 +252,7 @@ def test_sliding_at_any_cut_position(order):
 
 @pytest.mark.parametrize("order", [1, 2])
 @pytest.mark.parametrize("traction", [(), ("left",)], ids=str)
-def test_sliding_where_the_cut_sides_are_held(order, traction):
+def test_sliding_where_the_cut_sides_are_supported(order, traction):
     """Displacements imposed on the sides the crack leaves through, whatever sliver it leaves."""
     mesh = xc.box((-1, -1), (1, 1), 10)
     for eps in CUTS + CUTS_BELOW:
@@ -261,7 +261,7 @@ def test_sliding_where_the_cut_sides_are_held(order, traction):
 
 
 @pytest.mark.parametrize("order", [1, 2])
-def test_tip_next_to_a_held_side(order):
+def test_tip_next_to_a_supported_side(order):
     """Tip functions that reach a side with imposed displacements: 1e-8, round-off of the fit."""
     for k, tip in enumerate([(0.72, 0.77), (-0.635, -0.681), (0.574, 0.765)]):
         ahead = scenes.rows(0.6 + 0.3 * k)[0] * (-1 if k == 1 else 1)

@@ -118,7 +118,7 @@ def test_mouth_at_a_corner(order, reverse, loaded):
     assert np.abs(K / WANTED - 1).max() <= 4 * PLACES[order]
 
 
-def test_a_corner_where_only_lip_minus_is_held_is_refused():
+def test_a_corner_where_only_lip_minus_is_supported_is_refused():
     with pytest.raises(xc.ProblemError, match=r"displacement\('bottom'\) ends at \[-1.0, -1.0\].*"
                        "crack 0.*lip - only.*reverse order"):  # fmt: skip
         xc.solve(williams_on_shifted_mesh(8, (0.0, 0.0), np.pi / 4, 1))
@@ -413,7 +413,7 @@ def test_two_cracks_three_cells_apart(order):
 
 
 def test_tip_that_nearly_meets_another_crack():
-    """From five cells to two from the lip of another crack: K rises; below one, an error."""
+    """From five cells to two from the crack face of another crack: K rises; below one, an error."""
     n = 30
     h = 2 / n
     mesh = scenes.perturbed(n, 9)

@@ -1,4 +1,4 @@
-"""Cracks in space where a method may break: on layers of nodes, along faces, a hair beside them.
+"""3D cracks where a method may break: on layers of nodes, along faces, a hair beside them.
 
 What comes out must not depend on where the mesh lies under a crack: within the error of the
 discretisation for a front that moves through the mesh, to round-off where the exact field is in
@@ -135,7 +135,7 @@ def through_crack(n, x, z, supported, seed=None, **options):
 
 
 def opening_error(problem, x):
-    """Volume between the lips over that of K_I = 1, less one."""
+    """Volume between the crack faces over that of K_I = 1, less one."""
     # The jump is 8 K_I / E' sqrt(r / 2 pi) over the width 2 of the cube.
     wanted = 2 * 8 * (1 - 0.3**2) / np.sqrt(2 * np.pi) * (1 + x) ** 1.5 / 1.5
     return scenes_space.opening(xc.solve(problem))[0] / wanted - 1

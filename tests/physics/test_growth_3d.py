@@ -1,4 +1,4 @@
-"""Growth in space with the real analysis: shape, frozen surface, level sets, ends, resuming.
+"""Growth in 3D with the real analysis: shape, frozen surface, level sets, ends, resuming.
 
 Tolerances are of discretisation unless they say otherwise. `pytest -s` prints the numbers.
 """
@@ -102,7 +102,7 @@ def test_inclined_penny_keeps_its_front_and_its_surface(turned_penny):
 
 @pytest.mark.slow
 @pytest.mark.mission
-def test_inclined_penny_moves_where_it_was_told(turned_penny):
+def test_inclined_penny_moves_as_the_criterion_asks(turned_penny):
     """New fronts pass through x + da (cos b t + sin b n): fairing and spacing within 5 % of da."""
     for old, new in zip(turned_penny, turned_penny[1:]):
         sif, beta, da = old.sif[0][0], old.angle[0][:, None], old.da[0][:, None]
@@ -208,7 +208,8 @@ def test_contact_under_a_turning_load():
         assert pulled.opening().min() > 0
         contact = pressed.contact[0]
         assert contact.closed.mean() > 0.8
-        # Zero in the mean over each multiplier, at the points of the lips within discretisation.
+        # Zero in the mean over each multiplier, at the points of the crack faces within
+        # discretisation.
         assert contact.gap.min() >= -0.1 * pulled.opening().max()
         overlap = -(contact.measure @ np.minimum(contact.gap, 0))
         print(f"overlap {overlap / (contact.measure @ pulled.opening()):.1e} of the opening")

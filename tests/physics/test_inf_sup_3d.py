@@ -1,4 +1,4 @@
-"""The multipliers in space are stable: flat in mesh size, cut position and place of the front.
+"""The multipliers in 3D are stable: flat in mesh size, cut position and place of the front.
 
 The family of Chapelle and Bathe (1993) for random planes and pennies, and for planes next to a
 layer of nodes; the naive space has to fail the same tests. All tolerances are properties of the
@@ -48,7 +48,7 @@ def beside_a_layer(eps, front=None, n=6, **options):
 )
 def test_flat_in_mesh_size_without_a_front(meshes):
     worst = [min(xc.inf_sup(through(n, k)) for k in range(4)) for n in meshes]
-    print(f"\ninf-sup in space, n = {meshes}: {np.round(worst, 3).tolist()}")
+    print(f"\ninf-sup in 3D, n = {meshes}: {np.round(worst, 3).tolist()}")
     assert min(worst) >= 0.25
     # No trend downwards: from the coarsest mesh to the finest it loses no more than a tenth.
     assert worst[-1] >= 0.9 * worst[0]
@@ -56,7 +56,7 @@ def test_flat_in_mesh_size_without_a_front(meshes):
 
 def test_flat_in_cut_position_without_a_front():
     result = [xc.inf_sup(beside_a_layer(eps)) for eps in EPS]
-    print(f"\ninf-sup in space, eps = .5 ... 1e-14, 0, below: {np.round(result, 4).tolist()}")
+    print(f"\ninf-sup in 3D, eps = .5 ... 1e-14, 0, below: {np.round(result, 4).tolist()}")
     assert min(result) >= 0.25
     assert np.ptp(result) <= 0.15 * max(result)
     small = [beta for eps, beta in zip(EPS, result, strict=True) if abs(eps) <= 1e-4]
@@ -101,7 +101,7 @@ def test_naive_space_fails():
     by_size = [xc.inf_sup(through(n, k, multipliers="naive")) for n in (4, 6, 8) for k in (0, 1)]
     by_cut = [xc.inf_sup(beside_a_layer(eps, multipliers="naive")) for eps in EPS[:6]]
     fronts = [xc.inf_sup(penny(6, k, multipliers="naive")) for k in (0, 1)]
-    print(f"\nnaive inf-sup in space: {by_size}, {by_cut}, {fronts}")
+    print(f"\nnaive inf-sup in 3D: {by_size}, {by_cut}, {fronts}")
     assert max(by_size + by_cut + fronts) < 0.1
 
 

@@ -1,4 +1,4 @@
-"""Order 2 in space: quadratic tetrahedra and Heaviside functions, tip functions on linear hats."""
+"""Order 2 in 3D: quadratic tetrahedra and Heaviside functions, tip functions on linear hats."""
 
 from dataclasses import replace
 from functools import partial

@@ -1,4 +1,4 @@
-"""Contact patch tests in space: a uniform pressure comes out exactly, wherever the crack runs.
+"""Contact patch tests in 3D: a uniform pressure comes out exactly, wherever the crack runs.
 
 The exact displacements are in the space, so every tolerance here is one of round-off: it is free
 of mesh size, cut position and place of the front.

@@ -1,4 +1,4 @@
-"""Scenes in space that need no word from the user: cut through, two cracks, ends on a notch.
+"""Scenes in 3D that need no word from the user: cut through, two cracks, ends on a notch.
 
 Tolerances are of discretisation unless they say otherwise. `pytest -s` prints the numbers.
 """

@@ -1,4 +1,4 @@
-"""K along fronts in space: pennies, ellipses, straight fronts, surface and corner cracks.
+"""K along fronts in 3D: pennies, ellipses, straight fronts, surface and corner cracks.
 
 Every tolerance is one of discretisation unless it says otherwise. `pytest -s` prints the numbers.
 """
@@ -204,7 +204,7 @@ def extruded(n, layers, K, seed=None):
 
 @cache
 def plane_K(n, radius):
-    """K of the plane analysis of order 1 on the same mesh."""
+    """K in 2D analysis of order 1 on the same mesh."""
     problem = xc.Problem(
         xc.box((-1.0, -1.0), (1.0, 1.0), n),
         xc.Isotropic(E=1.0, nu=0.3, plane="strain"),
@@ -241,7 +241,7 @@ def test_through_crack_coarse():
 @pytest.mark.mission
 @pytest.mark.parametrize("seed", [None, 471])
 def test_through_crack(seed):
-    """Twenty layers: spread along the front below 1 %, mean as in the plane."""
+    """Twenty layers: spread along the front below 1 %, mean as in 2D."""
     inner, _, radius = through(20, 20, (1.0, 0.5, 0.0), seed)
     assert inner.mean(axis=0)[:2] == pytest.approx(plane_K(20, radius), rel=0.005)
     assert (inner.std(axis=0)[:2] <= 0.01 * inner.mean(axis=0)[:2]).all()

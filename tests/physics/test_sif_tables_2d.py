@@ -236,7 +236,7 @@ MISSION = (pytest.mark.slow, pytest.mark.mission)
     ],
 )
 def test_K_of_an_arc_does_not_depend_on_the_domain(order, n, domains):
-    """Domains in which the lips turn by 0.2 ... 0.7 rad: 0.2 % of the largest K."""
+    """Domains in which the crack faces turn by 0.2 ... 0.7 rad: 0.2 % of the largest K."""
     result = []
     for domain in domains:
         problem, _ = arc_box(n, order, np.radians(60), (1.0, 1.0, 0.0), radius=0.1, domain=domain)
@@ -267,7 +267,8 @@ def test_K_behind_a_kink_does_not_depend_on_the_domain(order, n):
     assert spread <= 2e-3
 
 
-# What acts on the lips or in the body ----------------------------------------------------------
+# What acts on the crack faces or in the body
+# ----------------------------------------------------------
 
 _E, _NU, _A = 1.0, 0.3, 1.0
 
@@ -300,7 +301,7 @@ def _uniform(stress):
 
 @pytest.mark.parametrize("order", [1, 2])
 def test_pressure_on_the_lips_stands_for_remote_tension(order):
-    """Griffith's field minus an isotropic tension p: pressure p on the lips, the same K."""
+    """Griffith's field minus an isotropic tension p: pressure p on the crack faces, the same K."""
     p = 0.8
     shift, _ = _uniform((p, p, 0.0))
     problem = _imposed_griffith(order, shift, [xc.crack_pressure(p)])
@@ -376,7 +377,8 @@ def test_body_force_with_pressure_on_the_lips(order):
     assert np.abs(sif.K - wanted).max() / np.sqrt(np.pi) <= GRIFFITH[order]
     assert sif.T == pytest.approx(-1.0, abs={1: 1e-2, 2: 1e-3}[order])
 
-    # u = (c x², 0): pressure -2 c lam x on the lips, body force -2 c (lam + 2 mu) along them.
+    # u = (c x², 0): pressure -2 c lam x on the crack faces, body force -2 c (lam + 2 mu) along
+    # them.
     def along(x):
         return -c * ((x @ ahead) ** 2)[:, None] * ahead
 

@@ -81,7 +81,7 @@ def test_the_crack_opens_with_the_warp(pulled):
     np.testing.assert_array_equal(moved.at_rest, at_rest.outline)
 
 
-def test_closed_lips_are_told_apart(pressed):
+def test_closed_lips_look_different(pressed):
     picture = scene(pressed, "von_mises", 0.0, None)
     assert len(picture.lips) == 0
     assert length(picture.closed) == pytest.approx(2 * 1.083 * np.hypot(1, 0.01325), rel=1e-4)
@@ -226,7 +226,7 @@ def test_pressure_along_the_lips(pressed):
     entry = np.array([-1, 0.03 + 0.2 * 0.017 / 1.283])
     np.testing.assert_allclose(x, np.linalg.norm(contact.points - entry, axis=1), atol=1e-12)
     labels = [text.get_text() for text in axes.get_legend().get_texts()]
-    assert labels == ["contact pressure p", "lips touch"]
+    assert labels == ["contact pressure p", "crack faces touch"]
 
 
 def test_opening_of_lips_that_stay_apart(pulled):
@@ -234,7 +234,7 @@ def test_opening_of_lips_that_stay_apart(pulled):
     np.testing.assert_allclose(axes.lines[0].get_ydata(), pulled.opening(0), rtol=1e-14)
     slip = pulled.jump(0) @ np.array([1.283, 0.017]) / np.hypot(1.283, 0.017)
     np.testing.assert_allclose(axes.lines[1].get_ydata(), slip, atol=1e-12)
-    assert "lips touch" not in [text.get_text() for text in axes.get_legend().get_texts()]
+    assert "crack faces touch" not in [text.get_text() for text in axes.get_legend().get_texts()]
 
 
 def test_one_graph_a_crack(two_cracks):

@@ -1,4 +1,4 @@
-"""Pictures of bodies in space: what is drawn, as arrays; files are written and not empty."""
+"""Pictures of 3D bodies: what is drawn, as arrays; files are written and not empty."""
 
 import numpy as np
 import pytest
@@ -52,7 +52,7 @@ def length(segments):
 
 
 def test_surface_and_lips_at_rest(solution):
-    """Six sides of area 4 and both lips; edges of a cube, round-off."""
+    """Six sides of area 4 and both crack faces; edges of a cube, round-off."""
     picture = space_scene(solution, "von_mises", 0.0, None, None, None)
     lips = 2 * 2 * (1 + TIP)
     assert area(picture.triangles) == pytest.approx(24 + lips, rel=1e-10)
@@ -88,7 +88,8 @@ def test_a_plane_cuts_the_body_open(solution, normal):
 
 
 def test_the_section_shows_both_lips(solution):
-    """Across the crack: the section has the area of the square, and the lips meet it twice."""
+    """Across the crack: the section has the area of the square, and the crack faces meet it
+    twice."""
     plane = clip_plane(((0, 0.04, 0), (0, 1, 0)))
     picture = space_scene(solution, "uz", 0.0, None, plane, None)
     at = np.abs(picture.triangles[..., 1] - 0.04).max(axis=1) < 1e-12
@@ -136,13 +137,13 @@ def test_values_are_those_of_the_solution(solution, field):
     np.testing.assert_allclose(values, expected, atol=1e-9 * np.abs(expected).max())
 
 
-def test_closed_lips_are_told_from_open_ones(solution):
+def test_closed_lips_look_unlike_open_ones(solution):
     """Bending about x: open where y > 0, and beyond by a cell."""
     pressed = crack_scene(solution, "pressure", [0], 0.0, None, None, None)
     total = 2 * (1 + TIP)
     assert area(pressed.triangles) + area(pressed.apart) == pytest.approx(total, rel=1e-10)
     assert pressed.triangles.mean(axis=1)[:, 1].max() < 0.34
-    # Linear pressures: their integral over the triangles is the force between the lips.
+    # Linear pressures: their integral over the triangles is the force between the crack faces.
     contact = solution.contact[0]
     force = contact.pressure @ contact.measure
     x = pressed.triangles
@@ -414,5 +415,5 @@ def test_plane_bodies_are_not_cut_open():
         xc.Isotropic(E=1.0, nu=0.3, plane="strain"),
         loads=[xc.pressure("boundary", 1.0)],
     )
-    with pytest.raises(xc.ProblemError, match="only bodies in space"):
+    with pytest.raises(xc.ProblemError, match="only 3D bodies"):
         xc.plot(xc.solve(flat), clip=((0, 0, 0), (1, 0, 0)))

@@ -92,7 +92,7 @@ def test_the_jump_is_in_the_grid(tmp_path, crack, order):
     scale = np.abs(plus).max()
     up = np.sign((jump * (plus - minus)).sum(axis=1))[:, None]
     np.testing.assert_allclose(up * jump, plus - minus, rtol=0, atol=1e-11 * scale)
-    # The lips are all there: from end to end, both ends of each of their segments.
+    # The crack faces are all there: from end to end, both ends of each of their segments.
     corners = solution.space.cuts[0].lip_points(solution.space.mesh).reshape(-1, 2)
     tips = np.array([tip.x for tip in solution.space.tips])
     at_tip = (np.linalg.norm(corners[:, None] - tips, axis=2) < 1e-9).any(axis=1)
@@ -134,7 +134,7 @@ def test_pieces_fill_the_body(tmp_path, crack, order):
 
 @pytest.mark.parametrize("crack", CRACKS)
 def test_pieces_fit_each_other(crack):
-    """An edge belongs to two pieces, but on the boundary and on the lips."""
+    """An edge belongs to two pieces, but on the boundary and on the crack faces."""
     body = pieces(xc.solve(scene(crack)))
     ends = np.sort(body.corners[:, local_edges(2)].reshape(-1, 2), axis=1)
     edge, count = np.unique(ends, axis=0, return_counts=True)

@@ -1,4 +1,4 @@
-"""Files of bodies in space: nothing is lost, every jump is in them, the lips are triangles."""
+"""Files of 3D bodies: nothing is lost, every jump is in them, the crack faces are triangles."""
 
 import meshio
 import numpy as np
@@ -109,7 +109,8 @@ def test_points_on_the_lips_exist_twice_and_carry_the_jump(pulled):
     plus, minus = pulled.displacement(x, side=1), pulled.displacement(x, side=-1)
     up = np.sign(((plus - minus) * jump).sum(axis=1))[:, None]
     np.testing.assert_allclose(up * jump, plus - minus, atol=1e-11 * np.abs(plus).max())
-    # Every vertex of the lips is there, but those on the front, which both lips share.
+    # Every vertex of the crack faces is there, but those on the front, which both crack faces
+    # share.
     corners = pulled.space.cuts[0].lip_points(pulled.problem.mesh).reshape(-1, 3)
     inner = corners[corners[:, 0] < 0.083 - 1e-6]
     assert np.linalg.norm(inner[:, None] - x, axis=2).min(axis=1).max() < 1e-9
@@ -136,7 +137,7 @@ def test_a_body_without_cracks_is_its_mesh(tmp_path):
 
 
 def test_hydrostatic_pressure_is_written_exactly(tmp_path, penny):
-    """Stress -p on the diagonal, von Mises 0, pressure p on the lips: a patch test.
+    """Stress -p on the diagonal, von Mises 0, pressure p on the crack faces: a patch test.
 
     Round-off, magnified by the condition of the enriched functions.
     """

@@ -15,7 +15,7 @@ quiet = pytest.mark.filterwarnings("ignore::xcrack.XcrackWarning")
 
 
 def pressed_and_sheared(n, *, order=1, press=0.5, shear=1.0, **options):
-    """A crack of half length 0.5, turned, in the exact field of closed lips."""
+    """A crack of half length 0.5, turned, in the exact field of closed crack faces."""
     field = scenes.turned(
         lambda x, y: exact.closed_crack(x, y, 0.5, 1.0, 0.3, syy=-press, sxy=shear), (0, 0), 0.6
     )
@@ -42,7 +42,7 @@ def test_both_tips_closed(order):
 
 @quiet
 def test_without_multipliers_nothing_is_closed():
-    """Lips that may overlap have a K_I below zero."""
+    """Crack faces that may overlap have a K_I below zero."""
     sif = xc.stress_intensity(xc.solve(pressed_and_sheared(16, press=1.0, contact="off")))
     assert not sif.closed.any()
     assert (sif.K_I < 0).all()

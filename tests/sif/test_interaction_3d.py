@@ -180,7 +180,8 @@ def residual_stress(x):
 
 @pytest.mark.parametrize("prestressed", [False, True])
 def test_a_smooth_field_has_no_K_on_a_twisted_front(prestressed):
-    # All terms at once: curvatures, twist, body force, both lips of a twisted surface, and an
+    # All terms at once: curvatures, twist, body force, both crack faces of a twisted surface, and
+    # an
     # initial stress that varies. Round-off and the spline; 1e-7 measured, 0.2 without curvature.
     material = Isotropic(E=3.0, nu=0.28)
     curve, radii = twisted_helix(), np.array([0.3])
@@ -214,7 +215,8 @@ def test_a_smooth_field_has_no_K_on_a_twisted_front(prestressed):
 
 
 def test_pressure_on_the_lips_is_superposed():
-    # Remote tension p, less the uniform stress p: free surface far away, pressure p on the lips.
+    # Remote tension p, less the uniform stress p: free surface far away, pressure p on the crack
+    # faces.
     p = 1.7
     S = np.diag([0.0, 0.0, p])
     curve, radii = ellipse_front(1.0, 1.0, 64), np.array([0.35])
@@ -292,7 +294,7 @@ def test_values_along_the_front():
     np.testing.assert_allclose(result[:, 1], 1 + 2 * at, atol=1e-12)
 
 
-def test_hats_outside_the_body_are_told_by_their_volume():
+def test_hats_outside_the_body_are_recognised_by_their_volume():
     # A straight front that leaves the body at s = 3.
     curve = flat_front(
         np.array([[0.0, 2, 0], [0, -2, 0]]), np.array([[1.0, 0, 0], [1, 0, 0]]), False

@@ -60,7 +60,7 @@ def test_against_enumeration(seed, n, start):
 @pytest.mark.parametrize("n", [20, 60])
 @pytest.mark.parametrize("start", [True, False])
 def test_against_non_negative_least_squares(n, start):
-    """Round-off on matrices like those of lips: neighbours move together."""
+    """Round-off on matrices like those of crack faces: neighbours move together."""
     for seed in range(810, 814):
         x = np.sort(np.random.default_rng(seed).uniform(0, 1, n))
         F = np.exp(-8 * np.abs(x[:, None] - x)) + 0.05 * np.eye(n)

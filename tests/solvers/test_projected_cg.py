@@ -373,7 +373,7 @@ def test_without_supports():
     assert scene.displacement_error(without_motion(motion, result.u), closed) <= 1e-7
 
 
-# Bodies in space ---------------------------------------------------------------------------------
+# 3D bodies ---------------------------------------------------------------------------------
 
 
 def turning(x, normal):

@@ -1,4 +1,4 @@
-"""What a step in space takes over from the one before: fewer steps, the same answer."""
+"""What a step in 3D takes over from the one before: fewer steps, the same answer."""
 
 from dataclasses import replace
 
@@ -53,7 +53,7 @@ def test_a_crack_that_opens_again_gives_its_multipliers_back():
 
 
 def test_an_open_crack_is_solved_to_the_end():
-    """The rough look at the lips is not the answer."""
+    """The rough look at the crack faces is not the answer."""
     result = xc.solve(scene(0.55, loads=PULL))
     exact = xc.solve(replace(scene(0.55, loads=PULL), numerics=xc.Numerics(linear="direct")))
     # To rigid motions, which neither engine decides alike: by the opening.

@@ -1,6 +1,6 @@
 """Random cracks: every one solved, none far from its like; a seed makes a scene again.
 
-The whole campaign (1000 in the plane, 100 in space) is benchmarks/stability.py; a tenth of it is a
+The whole campaign (1000 in 2D, 100 in 3D) is benchmarks/stability.py; a tenth of it is a
 test. Errors are of discretisation, judged against the median of their class.
 """
 

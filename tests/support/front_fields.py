@@ -1,4 +1,4 @@
-"""Exact fields around crack fronts in space, and points that fill a tube around a front."""
+"""Exact fields around crack fronts in 3D, and points that fill a tube around a front."""
 
 import numpy as np
 from scipy.special import elliprd

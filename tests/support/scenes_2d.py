@@ -196,7 +196,7 @@ SIDES = ("left", "right", "bottom", "top")
 
 
 def polynomial_pressure(x, y, terms, E=1.0, nu=0.3, plane="strain"):
-    """Smooth field without shear on y = 0, and of any degree: for patch tests of the lips.
+    """Smooth field without shear on y = 0, and of any degree: for patch tests of the crack faces.
 
     `terms` are (k, a, b): phi = a z^(k+1) and psi = (b - i k Im a) z^(k+1), which give
     sigma_xy(x, 0) = 0 and sigma_yy(x, 0) = (k + 1) ((k + 2) Re a + b) x^k.
@@ -306,7 +306,7 @@ def annulus(inner, outer, n, around, *, seed=7, amplitude=0.15):
 
 
 def inner_part(s, share=0.8):
-    """Which lip points lie on the inner part of the lip."""
+    """Which lip points lie on the inner part of the crack face."""
     low, high = s.min(), s.max()
     edge = (1 - share) / 2 * (high - low)
     return (s > low + edge) & (s < high - edge)

@@ -1,4 +1,4 @@
-"""Scenes in space: boxes of tetrahedra, flat cracks in them, exact data on their sides."""
+"""Scenes in 3D: boxes of tetrahedra, flat cracks in them, exact data on their sides."""
 
 import numpy as np
 
@@ -99,7 +99,7 @@ def flat_penny(n, z, a, stress, *, seed=None, contact="off", **options):
 
 
 def opening(solution, crack=0):
-    """Volume between the lips, and the integral of the squared normal jump."""
+    """Volume between the crack faces, and the integral of the squared normal jump."""
     from xcrack.xfem.lips import jump_matrix
 
     lips = solution.lips[crack]

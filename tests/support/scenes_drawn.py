@@ -13,7 +13,7 @@ from support import exact, scenes_fronts
 from support import scenes_2d as scenes
 from support import scenes_3d as scenes_space
 
-# Meshes in the plane: [-HALF, HALF]², order 2, tip functions within RADIUS. Where the side of the
+# Meshes in 2D: [-HALF, HALF]², order 2, tip functions within RADIUS. Where the side of the
 # body, or a smaller mesh, decided the radius, the error would follow that and not the cut.
 HALF, RADIUS = 1.2, 0.4
 CELLS = {"plane": 12, "space": 8}

@@ -1,4 +1,4 @@
-"""Scenes whose K is known along a front in space: graded boxes, flat cracks, their exact fields."""
+"""Scenes whose K is known along a front in 3D: graded boxes, flat cracks, their exact fields."""
 
 import warnings
 

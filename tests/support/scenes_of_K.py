@@ -1,8 +1,8 @@
 """Random cracks with known K, near all that clips a domain: a seed is a scene, and makes it again.
 
-Tips come close to sides, holes, other tips and other cracks; lips are open, closed, half closed or
-under pressure. Where there is an exact field it is imposed on all of the boundary, that of holes
-included, and holds however near that is. Else K of two much finer meshes has to agree.
+Tips come close to sides, holes, other tips and other cracks; crack faces are open, closed, half
+closed or under pressure. Where there is an exact field it is imposed on all of the boundary, that
+of holes included, and holds however near that is. Else K of two much finer meshes has to agree.
 """
 
 from collections.abc import Callable
@@ -30,7 +30,7 @@ class Scene:
     finer : callable, optional
         n -> Problem, the same scene on n by n cells.
     closed : (m,) array of bool, optional
-        Tips at which the lips press.
+        Tips at which the crack faces press.
     """
 
     problem: xc.Problem
@@ -141,7 +141,7 @@ def inner(rng, drawn):
 
 
 def under_pressure(rng, drawn):
-    """Griffith's crack opened by pressure on its lips."""
+    """Griffith's crack opened by pressure on its faces."""
     a, angle, middle, points = _straight(rng, drawn)
 
     def values(x, y):
@@ -181,7 +181,7 @@ def near_a_tip(rng, drawn):
 
 
 def arc(rng, drawn):
-    """An arc of traction-free lips, the last tip near a side."""
+    """An arc of traction-free crack faces, the last tip near a side."""
     radius, half = rng.uniform(0.3, 1.5), rng.uniform(0.15, 0.4)
     stress = (1.0, 1.0, 0.0) if rng.random() < 0.5 else (1.0, 0.2, 0.0)
     field_ = exact.ArcCrack(radius, half, 1.0, 0.3, *stress)
@@ -336,7 +336,7 @@ def two_edges(rng, drawn):
 
 
 def towards_a_lip(rng, drawn):
-    """A crack whose tip comes near the lips of another one."""
+    """A crack whose tip comes near the faces of another one."""
     wall, y = rng.uniform(0.1, 0.5), _off_grid(rng)
     tilt = rng.uniform(-0.3, 0.3)
     low, high = -rng.uniform(0.3, 0.6), rng.uniform(0.3, 0.6)

@@ -42,7 +42,7 @@ def test_gradients_are_those_of_the_values(number):
         step = 1e-5 * np.minimum(size, near)
         for axis in range(2):
             shift = space.mesh.gradient[batch.cells[row]][:, :, axis] * step[:, None]
-            # phi keeps its sign over a step: points are far from the lips compared with it.
+            # phi keeps its sign over a step: points are far from the crack faces compared with it.
             high, _ = space.tabulate(batch, row, bary + shift, side)
             low, _ = space.tabulate(batch, row, bary - shift, side)
             slope = (high - low) / (2 * step[:, None])

@@ -1,4 +1,4 @@
-"""Rules around fronts in space: volumes, polynomials, stiffness, and boundaries of pieces."""
+"""Rules around fronts in 3D: volumes, polynomials, stiffness, and boundaries of pieces."""
 
 import numpy as np
 import pytest

@@ -104,7 +104,7 @@ def test_a_crack_that_stands_still_beside_one_that_grows():
     assert same[second].all()
 
 
-def test_cells_with_tip_functions_or_two_cracks_are_not_kept():
+def test_cells_with_tip_functions_or_two_cracks_are_not_reused():
     other = xc.line_crack([(1.2, -0.15), (0.0, -0.12)])
     problem = plane((0.1, 0.05), 2, [other])
     space_ = build(problem).space

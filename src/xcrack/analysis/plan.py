@@ -145,9 +145,9 @@ def _tips(problem: Problem, n_tips: list[int]) -> Ingredient:
 
 def _multipliers(problem: Problem) -> list[Ingredient]:
     reasons = {
-        "off": (False, "contact is switched off: lips may overlap"),
+        "off": (False, "contact is switched off: the crack faces may overlap"),
         "on": (True, "contact is switched on"),
-        "auto": (False, "none until the lips of the open solution overlap"),
+        "auto": (False, "none until the crack faces of the open solution overlap"),
     }
     used, reason = reasons[problem.contact]
     if used and problem.numerics.comparison.lips in LIPS:

@@ -109,7 +109,7 @@ def _multiplier_row(problem: Problem, contact: ContactSolution, c: int) -> Ingre
 
 
 def _n_multipliers(problem: Problem, spaces: Sequence[Multipliers | None]) -> int:
-    """Unknowns of the lips: a penalty and Nitsche's method have none."""
+    """Unknowns of the crack faces: a penalty and Nitsche's method have none."""
     if problem.numerics.comparison.lips in ("penalty", "nitsche"):
         return 0
     return sum(len(m.measure) for m in spaces if m is not None)

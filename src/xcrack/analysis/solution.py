@@ -39,7 +39,7 @@ class Solution:
     u : (n_dof,) array, length
         Unknowns: standard, Heaviside, tip functions.
     lips : tuple of LipPoints
-        Integration points on the lips of each crack.
+        Integration points on the faces of each crack.
     contact : tuple
         One entry a crack: Contact, or None where it has no multipliers.
     energy : float

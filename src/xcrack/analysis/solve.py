@@ -23,7 +23,7 @@ from xcrack.xfem.loads import load_vector
 from xcrack.xfem.model import Model, build
 from xcrack.xfem.supports import known_unknowns
 
-# Unknowns of a body in space above which a factorisation costs more, by order (measured).
+# Unknowns of a 3D body above which a factorisation costs more, by order (measured).
 _DIRECT = {1: 4_000, 2: 8_000}
 
 

@@ -29,7 +29,7 @@ Meshes = Sequence[Mesh] | Callable[[float], Mesh]
 Quantity = Callable[[Any], Any]
 
 _MOST_MESHES = 4
-# Unknowns of the finest mesh by dimension: 1.7 GB of a factor in the plane, of multigrid in space.
+# Unknowns of the finest mesh by dimension: 1.7 GB of a factor in 2D, of multigrid in 3D.
 _MOST_UNKNOWNS = {2: 200_000, 3: 300_000}
 # Time on a mesh over that on the one before it, where it has not been seen yet.
 _DEARER = {2: 5.0, 3: 10.0}
@@ -147,7 +147,7 @@ class _Runs:
 
 @dataclass(frozen=True, eq=False)
 class _Outcome:
-    """Result of one run; `failed` tells why there is none."""
+    """Result of one run; `failed` states why there is none."""
 
     fields: dict[str, Any]
     seconds: float = np.nan

@@ -38,7 +38,7 @@ class Row:
     values : (n,) array
         The quantity at the places of the reference.
     warnings : tuple of str
-        What the run said.
+        Warnings of the run.
     failed : str
         Why there is no result; empty where there is one.
     problem : Problem or None

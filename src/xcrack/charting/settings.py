@@ -25,8 +25,8 @@ class _Share:
     factor: float
 
 
-# In space order 2 pays for a high accuracy alone. The default domain is 2.5 radii in the plane,
-# about one in space.
+# In 3D order 2 pays for a high accuracy alone. The default domain is 2.5 radii in 2D,
+# about one in 3D.
 _DEFAULT: dict[int, dict[str, dict[str, Any]]] = {
     2: {
         "other order": {},

@@ -1,1 +1,1 @@
-"""Contact of the lips: multipliers, active sets, and the methods they are compared with."""
+"""Contact of the crack faces: multipliers, active sets, and the methods they are compared with."""

@@ -6,7 +6,7 @@ the set where R u + r < 0 (Alart and Curnier, 1991); they differ in K, f, R, r a
 * penalty: R u the gaps at the lip points, r = 0, c = eps times weight;
 * augmented Lagrangian (Simo and Laursen, 1992): R u the weak gaps of the multiplier groups,
   r = -lam measure / eps, c = eps / measure, and lam <- <lam - eps gap> until it stays;
-* Nitsche (Chouly and Hild, 2013, theta = 1): with the stress S u + s of the lips, R u + r =
+* Nitsche (Chouly and Hild, 2013, theta = 1): with the stress S u + s of the crack faces, R u + r =
   S u + s + gamma gap, c = weight / gamma, K less S' (weight / gamma) S. S is a mean on each lip
   segment; gamma grows towards a tip, where the stress of the tip functions does.
 """
@@ -210,7 +210,7 @@ def _newton(springs: _Springs, f: Floats, known: Floats, r: Floats, start: Bools
         if not np.isfinite(new).all():
             break
         gap = np.asarray(R @ new + r)
-        # Values at round-off of zero (lips that only touch) must not make the set flicker.
+        # Values at round-off of zero (crack faces that only touch) must not make the set flicker.
         floor = 1e-13 * float(np.abs(gap).max(initial=0.0))
         if ((gap < -floor) == active).all():
             return _State(new, gap, active, sets)

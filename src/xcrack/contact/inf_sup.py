@@ -34,7 +34,7 @@ def inf_sup(problem: Problem, crack: int = 0, *, norm: str = "h1") -> float:
     Returns
     -------
     float
-        Near 0.5 in the plane and 0.3 in space for the reduced space, whatever the mesh and the cut;
+        Near 0.5 in 2D and 0.3 in 3D for the reduced space, whatever the mesh and the cut;
         tends to 0 for the naive one.
 
     Raises
@@ -65,7 +65,7 @@ def inf_sup(problem: Problem, crack: int = 0, *, norm: str = "h1") -> float:
     L, d = space.mesh.extent, space.dim
     h = leg_size(space.mesh, np.unique(lips.cell.ravel())) / L
     gram = (chosen.values.T @ sp.diags(lips.weight) @ chosen.values).toarray() / L ** (d - 1)
-    # A grows like length^(d - 2), B and the mass like the area of the lips.
+    # A grows like length^(d - 2), B and the mass like the area of the crack faces.
     schur = _schur(A, B / L ** (d - 1), basis, L ** (d - 2))
     return float(np.sqrt(max(_smallest(schur, h * gram), 0.0)))
 

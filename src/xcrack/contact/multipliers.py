@@ -1,9 +1,9 @@
-"""Contact multipliers: the nodes of the cells along the lips, tied into stable groups.
+"""Contact multipliers: the nodes of the cells along the crack faces, tied into stable groups.
 
 Groups are the stars of a minimal cover of the cut edges ("vital edges", Béchet, Moës and
 Wohlmuth, 2009); a node without a cut edge of its own joins the group with which its trace
 overlaps most, so that no small group is left at a tip. A group's function is the sum of its
-hats' traces: positive, and all of them sum to one. Order 2 in the plane uses hats along the
+hats' traces: positive, and all of them sum to one. Order 2 in 2D uses hats along the
 crack instead, with knots near the groups' centres: as many unknowns, one order more in pressure.
 """
 
@@ -23,7 +23,7 @@ _END = 0.6  # share of the last piece in the last two
 
 @dataclass(frozen=True, eq=False)
 class Multipliers:
-    """Multiplier space on the lips of one crack.
+    """Multiplier space on the faces of one crack.
 
     Attributes
     ----------
@@ -71,7 +71,7 @@ def multipliers(
 
 
 def _traces(space: FunctionSpace, lips: LipPoints) -> tuple[Ints, sp.csr_matrix]:
-    """Mesh points whose hats reach the lips, and the hats at the lip points `(q, k)`."""
+    """Mesh points whose hats reach the crack faces, and the hats at the lip points `(q, k)`."""
     cell = lips.cell[:, 1]
     corners = space.mesh.cells[cell]
     nodes, place = np.unique(corners.ravel(), return_inverse=True)

@@ -1,7 +1,7 @@
-"""Normal stress on the lips, as rows: what Nitsche's method needs beside the gaps.
+"""Normal stress on the crack faces, as rows: what Nitsche's method needs beside the gaps.
 
-The stress is a mean of both lips, weighted by the parts of the cell on either side, so that a
-sliver has no say (Hansbo and Hansbo, 2002; Annavarapu, Hautefeuille and Dolbow, 2012).
+The stress is a mean of both crack faces, weighted by the parts of the cell on either side, so that
+a sliver has no say (Hansbo and Hansbo, 2002; Annavarapu, Hautefeuille and Dolbow, 2012).
 """
 
 import numpy as np
@@ -83,8 +83,8 @@ def lip_shares(space: FunctionSpace, c: int, lips: LipPoints) -> Floats:
 def averaging(space: FunctionSpace, lips: LipPoints) -> sp.csr_matrix:
     """Projection on polynomials of one degree less than u on each lip segment or triangle `(q, q)`.
 
-    The stress of the tip functions goes like 1 / sqrt(r) along the lips: its square could not be
-    integrated, and at points near a tip a small error in K would be a large pressure.
+    The stress of the tip functions goes like 1 / sqrt(r) along the crack faces: its square could
+    not be integrated, and at points near a tip a small error in K would be a large pressure.
     """
     n = int(lips.segment.max()) + 1
     # Segments without points divide by something that is not zero.

@@ -17,7 +17,7 @@ class Contact:
     normal : (q, d) array
         From lip - to lip +.
     measure : (q,) array, length^(d - 1)
-        Weight of each point: sums are integrals along the lip.
+        Weight of each point: sums are integrals along the crack face.
     pressure : (q,) array, stress
         The multiplier field, 0 where open.
     gap : (q,) array, length

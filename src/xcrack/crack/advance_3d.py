@@ -24,7 +24,7 @@ from xcrack.errors import GeometryError, warn
 from xcrack.geometry.distances import first_crossing, surface_distance, triangle_tree
 
 LOW, HIGH = 0.5, 1.5  # bounds of the spacing of front points, in sizes
-_LEAST = 0.02  # of the size, and at most a tenth of the largest: a smaller advance is none
+_LEAST = 0.02  # of the size, and at most a tenth of the largest: a smaller advance is ignored
 _UPRIGHT = 0.05  # cosine to the expected normal below which a triangle is turned over
 _LOST = 0.05  # share of its length that fairing may take from a front before a warning
 _PASSES = 2.0  # of fairing, an advance of one size

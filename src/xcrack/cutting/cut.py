@@ -78,7 +78,7 @@ class Cut:
         return len(self.level_set.psi)
 
     def lip_points(self, mesh: Mesh) -> Floats:
-        """Vertices of the segments or triangles of the lips `(l, d, d)`, length."""
+        """Vertices of the segments or triangles of the crack faces `(l, d, d)`, length."""
         return np.einsum(
             "lvb,lbd->lvd", self.lip_bary[:, 1], mesh.points[mesh.cells[self.lip_cell[:, 1]]]
         )
@@ -152,7 +152,7 @@ def _edge_positions(mesh: Mesh, phi: Floats) -> tuple[Floats, Bools]:
 
 
 def _facet_lips(mesh: Mesh, level_set: LevelSet) -> _Lips:
-    """Lips that lie on facets of the mesh, each assembled once from its two cells."""
+    """Crack faces that lie on facets of the mesh, each assembled once from its two cells."""
     d = mesh.dim
     zero = (level_set.phi[mesh.facets] == 0).all(axis=1)
     facets = np.nonzero(zero & (mesh.facet_to_cell[:, 1] >= 0))[0]

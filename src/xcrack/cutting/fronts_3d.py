@@ -29,7 +29,7 @@ def front_parts(
 def _front_subs(
     mesh: Mesh, level_set: LevelSet, cells: Ints, positions: Floats
 ) -> tuple[tuple[Ints, Floats, Floats, Ints], tuple[Ints, Floats], Ints]:
-    """Sub-cells and lips of the cells at fronts, and the edges that the crack crosses there.
+    """Sub-cells and faces of the cells at fronts, and the edges that the crack crosses there.
 
     Returns
     -------
@@ -83,7 +83,10 @@ def _cut_again(
 def lips_up_to_fronts(
     mesh: Mesh, level_set: LevelSet, facets: Ints, cells: Ints, psi: Floats
 ) -> tuple[Floats, Ints]:
-    """Corners of the lips on facets of the mesh, and the facet of each: those behind fronts."""
+    """Corners of the crack faces on facets of the mesh, and the facet of each.
+
+    Those behind fronts.
+    """
     part, row = behind(psi)
     return np.einsum("svb,sbd->svd", part, mesh.points[mesh.facets[facets[row]]]), row
 

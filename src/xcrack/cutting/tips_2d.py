@@ -1,4 +1,4 @@
-"""Cells at the tips of a crack in 2D: fans of sub-cells, and the lips that end there."""
+"""Cells at the tips of a crack in 2D: fans of sub-cells, and the crack faces that end there."""
 
 from dataclasses import dataclass
 
@@ -68,7 +68,7 @@ def tip_parts(
 def _tip_cells(
     mesh: Mesh, level_set: LevelSet, k: int, cells: Ints, positions: Floats, exists: Bools
 ) -> tuple[SubParts, LipParts, Ints]:
-    """Fans of sub-cells from tip k, the lip piece that ends there, and its entry edges."""
+    """Fans of sub-cells from tip k, the crack face piece that ends there, and its entry edges."""
     tip = level_set.tip[k]
     apex = barycentric(mesh, cells, np.broadcast_to(tip, (len(cells), mesh.dim)))
     # Round-off of a tip on a facet would leave a sub-cell without area whose points hit the tip.
@@ -117,7 +117,10 @@ def _tip_cells(
 def lips_up_to_tips(
     mesh: Mesh, level_set: LevelSet, facets: Ints, cells: Ints, psi: Floats
 ) -> tuple[Floats, Ints]:
-    """Ends of the lips on edges of the mesh, and the facet of each: those at a tip end there."""
+    """Ends of the crack faces on edges of the mesh, and the facet of each.
+
+    Those at a tip end there.
+    """
     x = mesh.points[mesh.facets[facets]]
     ends_at_tip = np.zeros(len(facets), dtype=bool)
     for k, tip in enumerate(level_set.tip):

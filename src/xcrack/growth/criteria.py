@@ -256,14 +256,14 @@ def _checked(K: ArrayLike, nu: float, range: str) -> Floats:
     number(nu, "Poisson's ratio nu", above=-1, below=0.5)
     if not isinstance(range, str) or range not in ("difference", "component"):
         raise ProblemError(f'range = {range!r}: give "difference" or "component".')
-    # A closed tip has K_I = 0 up to discretisation: only a real overlap is worth a word.
+    # A closed tip has K_I = 0 up to discretisation: only a real overlap triggers a warning.
     negative = K[..., 0] < -_CLOSED * np.abs(K).max(initial=0.0)
     if negative.any():
         state, point = np.unravel_index(np.argmin(K[..., 0]), negative.shape)
         warn(
             f"K_I < 0 in {np.count_nonzero(negative)} of {negative.size} values counts as 0; the "
             f"smallest is {K[state, point, 0]:.4g} (state {state}, front point {point}). With "
-            "contact on the lips it is discretisation error; without, the lips overlap there."
+            "contact it is discretisation error; without, the crack faces overlap there."
         )
     return clipped(K)
 

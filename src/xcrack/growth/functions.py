@@ -32,7 +32,7 @@ def is_public_library(module: str | None) -> bool:
 def is_installed(module: str | None) -> bool:
     """Whether a module belongs to an installed package, and not to the user's own files.
 
-    What a script defines is the user's even where an installed program runs it (a profiler, pytest).
+    What a script defines is the user's, whichever installed program runs it (a profiler).
     """
     if module == "__main__":
         return False

@@ -63,8 +63,8 @@ class paris:  # noqa: N801 - it is used as a function: paris(C, m)(dK_eq, R)
 class elber:  # noqa: N801 - it is used as a function
     """Growth by the part of the range in which the plastic wake lets the crack open.
 
-    Where contact of the lips is computed, the smallest K is that of the closed crack already;
-    U then stands for the closure by plasticity only.
+    Where contact of the crack faces is computed, the smallest K is that of the closed crack
+    already; U then stands for the closure by plasticity only.
 
     Parameters
     ----------

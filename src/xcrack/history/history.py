@@ -113,7 +113,7 @@ class History:
         """Write a table and a series for ParaView into a folder.
 
         ``history.csv`` is `table`; ``history.pvd`` lists for each step the solutions of all load
-        states with their lips, or the lines of the cracks where a step has no solutions any
+        states with their faces, or the lines of the cracks where a step has no solutions any
         more (it was read from disk).
 
         Parameters

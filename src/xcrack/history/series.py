@@ -13,7 +13,7 @@ from xcrack.growth.step import Step
 def write_series(steps: Sequence[Step], folder: Path) -> Path:
     """Write ``history.pvd`` and the files it lists; its time is the number of the step.
 
-    Steps with solutions: a grid with the lips for each load state, in 3D with the fronts and
+    Steps with solutions: a grid with the crack faces for each load state, in 3D with the fronts and
     K along them. Steps without: the lines, or in 3D the faces and fronts, of the cracks.
     """
     from xcrack.post.vtk import write  # loads the writers of files

@@ -365,7 +365,7 @@ def lip_terms(  # type: ignore[no-untyped-def]
     traction : (q, 3, n) array
         True traction on this lip, of n states.
     gradient : (q or 0, 3, 3, n) array
-        Displacement gradients; without them the lips are taken as free of auxiliary traction.
+        Displacement gradients; without them the faces count as free of auxiliary traction.
     initial : (q or 0, 3, 3, n) array
         Initial stress at the foot, if any.
     polar, frame, hat, share, radii, ring, lam, mu

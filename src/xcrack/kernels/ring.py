@@ -1,4 +1,4 @@
-"""The interaction integral in the plane, point by point."""
+"""The interaction integral in 2D, point by point."""
 
 import math
 
@@ -25,7 +25,7 @@ def add_ring(  # type: ignore[no-untyped-def]
     xi : (q, 2) array, length
         Places from the tip, in its frame.
     theta : (q,) array
-        Angle, continued along the lips.
+        Angle, continued along the crack faces.
     weight : (q,) array
     radii, inner : (k,) arrays, length
         q falls from one to zero by a quintic between inner and radii.

@@ -1,4 +1,4 @@
-"""Closest points on triangles and segments in space, found in a tree of boxes."""
+"""Closest points on triangles and segments in 3D, found in a tree of boxes."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Drawings of fronts in space: over the section of the body, and K along them.
+"""Drawings of fronts in 3D: over the section of the body, and K along them.
 
 By matplotlib, without a renderer; for one run or one state, or for several side by side.
 """
@@ -85,7 +85,7 @@ def draw_fronts(
     Raises
     ------
     ProblemError
-        No steps, no such crack, a crack of the plane, labels of another number.
+        No steps, no such crack, a 2D crack, labels of another number.
     """
     runs = _several(history, "steps")
     names = _names(labels, len(runs), "draw_fronts")
@@ -134,7 +134,7 @@ def draw_K(
     Raises
     ------
     ProblemError
-        No such front or mode, K of the plane, labels of another number.
+        No such front or mode, K in 2D, labels of another number.
     """
     every = _several(sif, "K")
     names = _names(labels, len(every), "draw_K")
@@ -145,7 +145,7 @@ def draw_K(
         if one.K.shape[1] < 3 or not (one.front == front).any():
             known = sorted({int(f) for f in one.front}) if one.K.shape[1] > 2 else []
             raise ProblemError(
-                f"draw_K(front={front}): there is no such front in space, only {known}; in the "
+                f"draw_K(front={front}): there is no such front in 3D, only {known}; in the "
                 "plane read sif.K."
             )
     figure, pyplot = _figure((6.4, 0.8 + 2.0 * len(modes)), file, show)
@@ -316,7 +316,7 @@ def _check(steps: Sequence[Step], crack: int) -> None:
     if not 0 <= crack < n:
         raise ProblemError(f"draw_fronts(crack={crack}): there are {n} crack(s), numbered from 0.")
     if steps[0].cracks[crack].fronts is None:
-        raise ProblemError('fronts are those of cracks in space; in the plane plot "path".')
+        raise ProblemError('fronts are those of 3D cracks; in 2D plot "path".')
 
 
 def _several(value: Any, attribute: str) -> list[Any]:

@@ -1,4 +1,4 @@
-"""Arrows that show the loads of a solution in space."""
+"""Arrows that show the loads of a solution in 3D."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Pictures by matplotlib: plane fields without a renderer, meshes, and graphs along the lips."""
+"""Pictures by matplotlib: 2D fields without a renderer, meshes, graphs along cracks."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -48,7 +48,7 @@ def draw(
         )
     _frame(axes, picture.box)
     if len(picture.closed):
-        axes.plot([], [], color=CLOSED, lw=2.2, label="lips touch")
+        axes.plot([], [], color=CLOSED, lw=2.2, label="crack faces touch")
         _legend_below(axes, 1)
     extend = {(False, False): "neither", (True, False): "min", (False, True): "max"}
     figure.colorbar(
@@ -139,7 +139,9 @@ def _along(axes: Any, solution: Solution, field: str, c: int) -> None:
             axes.plot(s[run], values[run], style, color=color, lw=1.6, label=name)
     first = True
     for a, b in _closed_parts(lips.closed, s):
-        axes.axvspan(a, b, color=CLOSED, alpha=0.12, lw=0, label="lips touch" if first else None)
+        axes.axvspan(
+            a, b, color=CLOSED, alpha=0.12, lw=0, label="crack faces touch" if first else None
+        )
         first = False
     for x in crack.points[list(crack.tips or ())]:
         at = float(arc_position(crack.points, x[None])[0]) - start
@@ -159,7 +161,7 @@ def _along(axes: Any, solution: Solution, field: str, c: int) -> None:
         _from_zero(axes, lips.pressure)
     if field == "pressure" and solution.contact[c] is None:
         note = (
-            "no multipliers: the lips stay apart"
+            "no multipliers: the crack faces stay apart"
             if solution.problem.contact != "off"
             else ("contact is switched off")
         )
@@ -170,7 +172,7 @@ def _along(axes: Any, solution: Solution, field: str, c: int) -> None:
 
 
 def _closed_parts(closed: np.ndarray, s: Floats) -> list[tuple[float, float]]:
-    """Stretches of s on which the lips touch, up to half way to the next open point."""
+    """Stretches of s on which the crack faces touch, up to half way to the next open point."""
     change = np.diff(np.concatenate([[0], closed.astype(np.int64), [0]]))
     begin, end = np.nonzero(change > 0)[0], np.nonzero(change < 0)[0] - 1
     middle = np.concatenate([s[:1], (s[1:] + s[:-1]) / 2, s[-1:]])

@@ -1,4 +1,4 @@
-"""Cracks in space by matplotlib, where no renderer is: maps in the plane of each crack."""
+"""3D cracks by matplotlib, where no renderer is: maps in the plane of each crack."""
 
 from pathlib import Path
 from typing import Any
@@ -90,7 +90,9 @@ def _map(
         rasterized=True,
     )
     marked = ~is_coloured(lips, field)
-    color, label = ("#c9ccd1", "lips apart") if field == "pressure" else (CLOSED, "lips touch")
+    color, label = (
+        ("#c9ccd1", "crack faces apart") if field == "pressure" else (CLOSED, "crack faces touch")
+    )
     if marked.any():
         parts: list[Floats] = list(x[lips.triangles[marked]])
         axes.add_collection(

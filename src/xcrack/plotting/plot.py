@@ -1,4 +1,4 @@
-"""One picture of a solution: a field on the opened crack, the mesh, or a graph along the lips."""
+"""One picture of a solution: a field on the opened crack, the mesh, or a graph along the crack."""
 
 import os
 import sys
@@ -38,10 +38,10 @@ def plot(
     solution : Solution
     field : str
         On the body: "von_mises", "sxx", "syy", "sxy", "displacement" (its norm), "ux", "uy".
-        Along the lips: "pressure" (of contact), "opening" (with the sliding); where the lips
-        touch the graph is shaded. "mesh": the mesh with its cracks and enriched nodes. In space
-        also "szz", "syz", "sxz" and "uz"; "pressure", "opening" (or "gap") and "sliding" colour
-        the cracks, with their fronts, in a body that is seen through.
+        Along the crack faces: "pressure" (of contact), "opening" (with the sliding); where the
+        crack faces touch the graph is shaded. "mesh": the mesh with its cracks and enriched nodes.
+        In 3D also "szz", "syz", "sxz" and "uz"; "pressure", "opening" (or "gap") and "sliding"
+        colour the cracks, with their fronts, in a body that is seen through.
     file : path, optional
         Where to save the picture; ``.png`` is added to a path without suffix.
     warp : float
@@ -61,14 +61,14 @@ def plot(
     cmap : str, optional
         Colour map of matplotlib; left out: one that parts at zero for a field of both signs.
     crack : int, optional
-        Draw the graphs, or in space the colours, of this crack only.
+        Draw the graphs, or in 3D the colours, of this crack only.
     clip : (point, normal), optional
-        In space: leave out what lies on the side of the normal of this plane, to see inside.
+        In 3D: leave out what lies on the side of the normal of this plane, to see inside.
     view : (3,) array, optional
-        In space: direction from the body to the viewer; left out: one from which the cut or the
+        In 3D: direction from the body to the viewer; left out: one from which the cut or the
         crack is seen.
     loads : bool
-        In space: draw arrows of tractions, pressures and point forces.
+        In 3D: draw arrows of tractions, pressures and point forces.
 
     Returns
     -------
@@ -84,7 +84,7 @@ def plot(
         look = Look(warp, title, edges, limits, cmap, crack, clip, view, loads)
         return _in_space(solution, field, file, show, renderer, look)
     if clip is not None or view is not None or loads:
-        raise ProblemError("plot(clip=, view=, loads=): only bodies in space know these.")
+        raise ProblemError("plot(clip=, view=, loads=): only 3D bodies know these.")
     if field not in _KNOWN:
         known = ", ".join(f'"{name}"' for name in _KNOWN)
         raise ProblemError(f"plot(field={field!r}): there is no such field; give one of {known}.")
@@ -112,7 +112,7 @@ def plot(
 
 @dataclass(frozen=True, eq=False)
 class Look:
-    """How a picture in space is to look: arguments of `plot`."""
+    """How a picture in 3D is to look: arguments of `plot`."""
 
     warp: float
     title: str | None
@@ -160,7 +160,7 @@ def _in_space(
                 solution, field, cracks, target, window, look.title, look.limits, look.cmap
             )
         raise ProblemError(
-            f'plot(field="{field}"): a body in space is drawn by pyvista, as '
+            f'plot(field="{field}"): a 3D body is drawn by pyvista, as '
             f"{', '.join(RASTER)}; matplotlib draws {', '.join(LIP_FIELDS)} only. Without OpenGL "
             "install libEGL (apt-get install libegl1 libgl1-mesa-dri)."
         )
@@ -209,7 +209,9 @@ def _has_display() -> bool:
 def _cracks(solution: Solution, field: str, crack: int | None) -> list[int]:
     n = len(solution.lips)
     if n == 0:
-        raise ProblemError(f'plot(field="{field}"): the body has no crack, so there are no lips.')
+        raise ProblemError(
+            f'plot(field="{field}"): the body has no crack, so there are no crack faces.'
+        )
     if crack is not None and not 0 <= crack < n:
         raise ProblemError(f"plot(crack={crack}): the problem has {n} crack(s), numbered from 0.")
     return list(range(n)) if crack is None else [crack]

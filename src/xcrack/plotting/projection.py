@@ -1,4 +1,4 @@
-"""Planes onto which fronts and cracks in space are projected, and sections of a body with them."""
+"""Planes onto which fronts and 3D cracks are projected, and sections of a body with them."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -95,7 +95,7 @@ def _add_body(pv: Any, plotter: Any, picture: Scene, cmap: str, window: tuple[in
     add_bar(plotter, actor, picture.label, picture.limits, window)
     if len(picture.closed):
         plotter.add_text(
-            "lips touch",
+            "crack faces touch",
             position=(1 - BAR / width, 30 / height),
             viewport=True,
             font_size=font_size(24),

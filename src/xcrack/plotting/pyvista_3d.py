@@ -1,4 +1,4 @@
-"""Pictures of bodies in space by pyvista, on screen or off."""
+"""Pictures of 3D bodies by pyvista, on screen or off."""
 
 from pathlib import Path
 from typing import Any
@@ -175,10 +175,10 @@ def _add_arrows(pv: Any, plotter: Any, arrows: tuple[Floats, Floats]) -> None:
 
 def _legend(picture: SpaceScene) -> list[tuple[str, str]]:
     """Words of the legend and their colours."""
-    crack = "crack" if len(picture.heaviside) else "lips touch"
+    crack = "crack" if len(picture.heaviside) else "crack faces touch"
     entries = [
         (len(picture.touching), crack, CLOSED),
-        (len(picture.apart), "lips apart", "#8d9299"),
+        (len(picture.apart), "crack faces apart", "#8d9299"),
         (len(picture.fronts), "front", _FRONT),
         (len(picture.heaviside), "Heaviside", "#1f77b4"),
         (len(picture.tip), "tip functions", "#ff7f0e"),

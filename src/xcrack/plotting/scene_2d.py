@@ -50,8 +50,8 @@ class Scene:
     signed : bool
         The field has a sign: its colours part at zero.
     outline, lips, closed, cell_edges, at_rest : (k, 3, 2) arrays, length
-        Edges as three points: of the body, of open lips, of closed lips, between cells of the
-        mesh, and of the body that has not moved.
+        Edges as three points: of the body, of open crack faces, of closed crack faces, between
+        cells of the mesh, and of the body that has not moved.
     """
 
     points: Floats
@@ -229,7 +229,7 @@ def _curves(body: Pieces, edge: Ints, points: Floats) -> Floats:
 
 
 def _on_lips(body: Pieces, edge: Ints) -> tuple[Ints, Bools]:
-    """Crack on which each edge lies, or -1, and whether its lips touch there."""
+    """Crack on which each edge lies, or -1, and whether its faces touch there."""
     crack = np.full(len(edge), -1, dtype=np.int64)
     closed = np.zeros(len(edge), dtype=bool)
     a, b = body.points[edge[:, 0]], body.points[edge[:, 1]]

@@ -1,4 +1,4 @@
-"""What a picture of a body in space shows, as arrays: triangles, lines, colours and arrows."""
+"""What a picture of a 3D body shows, as arrays: triangles, lines, colours and arrows."""
 
 from dataclasses import dataclass, replace
 
@@ -28,7 +28,7 @@ LIP_FIELDS = {
     "pressure": "contact pressure",
     "opening": "normal opening",
     "gap": "normal opening",
-    "sliding": "sliding of the lips",
+    "sliding": "sliding of the crack faces",
 }
 _CLOSE = 0.3  # share of the body below which a crack is looked at from close by
 _AROUND = 0.25  # share of its size that is seen around it
@@ -37,12 +37,12 @@ _TOUCH = 0.5  # share of a triangle on which the lips touch that counts as close
 
 @dataclass(frozen=True, eq=False)
 class SpaceScene:
-    """A field on a body in space, or on its cracks, ready to draw.
+    """A field on a 3D body, or on its cracks, ready to draw.
 
     Attributes
     ----------
     triangles : (t, 3, 3) array, length
-        Coloured ones: surface of the body, its section and its lips; or the cracks.
+        Coloured ones: surface of the body, its section and its faces; or the cracks.
     values : (t, 3) array
     label : str
         What the colour bar says; empty where nothing is coloured by a field.
@@ -51,12 +51,12 @@ class SpaceScene:
     signed : bool
         The field has a sign: its colours part at zero.
     touching, apart : (k, 3, 3) arrays, length
-        Triangles of a crack that are not coloured: its lips touch there, or do not.
+        Triangles of a crack that are not coloured: its faces touch there, or do not.
     skin : (s, 3, 3) array, length
         Surface of a body that is seen through.
     outline, cell_edges, faint, rims, fronts : (k, 2, 3) arrays, length
         Lines: sharp edges of the body and its section, edges of cells, what is only hinted at
-        (the body that has not moved, the edges of cells behind the rest), edges of the lips,
+        (the body that has not moved, the edges of cells behind the rest), edges of the crack faces,
         fronts.
     toward : (3,) array
         Unit vector from the body to the viewer.
@@ -146,7 +146,7 @@ def space_scene(
     plane: Plane | None,
     view: Floats | None,
 ) -> SpaceScene:
-    """Field on the moved body: its surface, and with a plane its section and the lips behind."""
+    """Field on the moved body: its surface, and with a plane its section, crack faces behind."""
     body = pieces(solution)
     moved = body.points + warp * body.displacement
     shown = field_values(body, field)
@@ -299,7 +299,7 @@ def lip_values(lips: LipFaces, field: str) -> Floats:
 def is_coloured(lips: LipFaces, field: str) -> Bools:
     """Triangles of a crack that show a field `(t,)`; the others touch, or bear no pressure.
 
-    Lips that touch slide without friction: sliding is shown everywhere.
+    Crack faces that touch slide without friction: sliding is shown everywhere.
     """
     if field == "pressure":
         bears = lips.mean_pressure > 1e-6 * float(lips.mean_pressure.max(initial=0.0))

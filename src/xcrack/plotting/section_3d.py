@@ -1,4 +1,4 @@
-"""Triangles and lines of a body in space, cut open by a plane."""
+"""Triangles and lines of a 3D body, cut open by a plane."""
 
 from dataclasses import dataclass
 
@@ -116,7 +116,7 @@ _Faces = tuple[Ints, Ints, Ints, Ints, Ints]
 
 
 def faces(body: Pieces, level: Floats | None) -> _Faces:
-    """Triangles on the boundary and on the lips, and segments: sharp, of lips, of cells."""
+    """Triangles on boundary and crack faces, and segments: sharp, of crack faces, of cells."""
     mesh = body.solution.space.mesh
     rim = np.zeros(mesh.cells.shape, dtype=bool)
     outer = np.nonzero(mesh.facet_to_cell[:, 1] < 0)[0]

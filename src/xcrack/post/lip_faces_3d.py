@@ -1,4 +1,4 @@
-"""Lips of a crack in space as triangles that share their vertices, with the fields on them."""
+"""Faces of a 3D crack as triangles that share their vertices, with the fields on them."""
 
 from dataclasses import dataclass
 
@@ -15,7 +15,7 @@ _SAME = 1e-9  # share of a cell within which vertices are one, or lie on a front
 
 @dataclass(frozen=True, eq=False)
 class LipFaces:
-    """Lips of one crack in space.
+    """Faces of one crack in 3D.
 
     Attributes
     ----------
@@ -32,7 +32,7 @@ class LipFaces:
     mean_pressure, mean_gap : (t,) arrays
         Means over each triangle.
     closed : (t,) array
-        Share of each triangle on which the lips touch.
+        Share of each triangle on which the crack faces touch.
     front : (k, 2) array of int
         Edges on the fronts.
     mouth : (m, 2) array of int
@@ -70,7 +70,7 @@ class LipFaces:
 
 
 def lip_faces(solution: Solution, crack: int) -> LipFaces:
-    """Triangles of the lips of a crack in space, and the fields on them.
+    """Triangles of the faces of a 3D crack, and the fields on them.
 
     Parameters
     ----------

@@ -47,9 +47,9 @@ class PieceCells:
 
 
 def piece_cells(space: FunctionSpace) -> PieceCells:
-    """Split the cells on which enriched functions act, in the plane finer towards the tips.
+    """Split the cells on which enriched functions act, in 2D finer towards the tips.
 
-    In space a face of a cell at a front may be split while its neighbour ahead is whole, and two
+    In 3D a face of a cell at a front may be split while its neighbour ahead is whole, and two
     neighbours may halve a four-sided face along different diagonals: points on such a face hang.
     They lie where they should and carry the value of the solution there, which a picture needs.
     """

@@ -1,4 +1,4 @@
-"""A solution as it is seen: pieces of the body that show every jump, and the lips of its cracks.
+"""A solution as it is seen: pieces of the body that show every jump, and the faces of its cracks.
 
 Plain cells share their points, cells with enriched functions are replaced by their sub-cells, and
 points on a crack exist twice, once for each lip. Files and pictures are made of these.
@@ -171,7 +171,7 @@ class _Block:
         return cls(
             (owner, flat, np.repeat(side, k, axis=0)),
             position(space, owner, flat),
-            # A piece too thin for its volume to be told from zero still has a weight.
+            # A piece too thin for its volume to be distinguished from zero still has a weight.
             np.repeat(np.maximum(volume, 1e-30 * space.mesh.volume[cell]), k),
             (cell, corners.mean(axis=1), side),
         )
@@ -276,7 +276,7 @@ def _volume(x: Floats) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class Lips:
-    """Fields on the lips of one crack, at their integration points in the order of the crack.
+    """Fields on the faces of one crack, at their integration points in the order of the crack.
 
     Attributes
     ----------
@@ -306,7 +306,7 @@ class Lips:
 
 
 def lips_of(solution: Solution, crack: int) -> Lips:
-    """Fields on the lips of a crack."""
+    """Fields on the faces of a crack."""
     lips, contact = solution.lips[crack], solution.contact[crack]
     moved = [
         solution.at(lips.cell[:, k], lips.bary[:, k], lip_side(solution.space, crack, lips.cell, k))

@@ -1,4 +1,4 @@
-"""Files for ParaView: the body with its cracks open, and their lips.
+"""Files for ParaView: the body with its cracks open, and their faces.
 
 VTK's own writers are used without pyvista: they need no renderer and no libGL.
 """
@@ -43,7 +43,7 @@ def write(
     (the whole jump), ``displacement_minus`` and ``displacement_plus``, to warp by. Points are
     those of the undeformed body.
 
-    In space the lips are triangles: ``pressure`` is taken to their vertices by the best linear
+    In 3D the lips are triangles: ``pressure`` is taken to their vertices by the best linear
     fit, and cell data are ``crack``, ``closed`` (half of the triangle or more), ``closed_share``,
     ``pressure_mean`` and ``gap_mean``. A third file, ``<path>_fronts.vtp``, has a line for each
     front with its frames (``ahead``, ``normal``), its arc length ``s`` and, where they are given,

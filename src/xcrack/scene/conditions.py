@@ -65,7 +65,7 @@ class BodyForce:
 
 @dataclass(frozen=True, eq=False)
 class CrackPressure:
-    """Pressure on the lips of a crack, positive where it opens it."""
+    """Pressure on the faces of a crack, positive where it opens it."""
 
     value: Any
     crack: int | None
@@ -88,7 +88,7 @@ def fix(where: Where, axis: int | None = None) -> Fix:
     Parameters
     ----------
     where : str or (d,) array
-        Name of a facet set, or a point (the nearest mesh point is held).
+        Name of a facet set, or a point (the nearest mesh point is supported).
     axis : int, optional
         Direction 0, 1 (, 2); all where it is left out.
 
@@ -160,7 +160,7 @@ def point_force(x: ArrayLike, f: ArrayLike) -> PointForce:
     Parameters
     ----------
     x : (d,) array, length
-    f : (d,) array, force (per thickness in the plane)
+    f : (d,) array, force (per thickness in 2D)
 
     Returns
     -------
@@ -191,7 +191,7 @@ def body_force(b: Value) -> BodyForce:
 
 
 def crack_pressure(p: float | Callable[..., ArrayLike], crack: int | None = None) -> CrackPressure:
-    """Pressure on both lips, positive where it opens the crack.
+    """Pressure on both crack faces, positive where it opens the crack.
 
     Parameters
     ----------

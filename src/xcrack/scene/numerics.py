@@ -78,7 +78,7 @@ class Numerics:
     radius : float, length, optional
         Radius of the enriched disc. None: 0.3 (order 1) or 0.4 (order 2) of the smallest of crack
         length, distance to the boundary and to another tip, from 2 to 20 cells (40 at order 1).
-        In space 0.65 of the size of the crack, 0.7 of the distance to a side and 0.45 of that to
+        In 3D 0.65 of the size of the crack, 0.7 of the distance to a side and 0.45 of that to
         another front, from 2.6 to 3.6 cells; two cells at order 2.
     functions : {4, 2}
         Tip functions; two (those of the modes' leading angular terms) cost accuracy.
@@ -87,7 +87,7 @@ class Numerics:
         for each node, for comparison only; it oscillates.
     consistent : bool
         Correct the gradients of the tip functions so that linear stress fields pass the patch
-        test to round-off whatever the quadrature (variationally consistent integration). In space
+        test to round-off whatever the quadrature (variationally consistent integration). In 3D
         constant ones.
     orthonormal : {"star", "node", "none"}
         Change of basis before the solver. Star: the unknowns of a node, and the Heaviside
@@ -102,13 +102,13 @@ class Numerics:
         sub-cells that do not touch it are no larger than their distance to it, and have a rule of
         degree 2 points - 3, at least 3.
     domain : float, length, optional
-        Outer radius of the first domain of the interaction integral. None: in the plane 2.5 times
-        the enriched radius or 4 cells, in space 1.05 times it or 2.6 cells, whichever is more, as
+        Outer radius of the first domain of the interaction integral. None: in 2D 2.5 times
+        the enriched radius or 4 cells, in 3D 1.05 times it or 2.6 cells, whichever is more, as
         far as body, other tips and the bend of a front allow.
     linear : {"auto", "direct", "iterative"}
-        Linear solver. Auto: a factorisation in the plane and below 4 000 unknowns (8 000 at order
-        2), above that in space conjugate gradients with a multigrid hierarchy: a factor of a body
-        in space fills, and its time grows with the square of the unknowns. Iterative does without
+        Linear solver. Auto: a factorisation in 2D and below 4 000 unknowns (8 000 at order
+        2), above that in 3D conjugate gradients with a multigrid hierarchy: a factor of a 3D body
+        fills, and its time grows with the square of the unknowns. Iterative does without
         `orthonormal` and `patch`: it has its own basis, orthonormal node by node, at order 2 star
         by star.
     initial_set : {"closed", "open"}

@@ -115,7 +115,9 @@ def _overlap(
     for solution, part, scale in zip(solutions, parts, scales, strict=True):
         least = float(part.K_I.min())
         if solution.problem.contact != "off" and least < -domain.differ * scale:
-            return f"K_I = {least:.3g} means lips that overlap where the contact cannot see it"
+            return (
+                f"K_I = {least:.3g} means crack faces that overlap where the contact cannot see it"
+            )
     return ""
 
 

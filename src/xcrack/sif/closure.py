@@ -21,7 +21,7 @@ def with_closed(sif: SIF, solution: Solution, c: int, size: float) -> SIF:
 
     A place is closed where the lip point nearest to it, that is the one beside the front at its arc
     position, bears pressure of the multipliers; along a front also between two such places within a
-    cell on either side. And it is closed where K_I came out negative, which lips that cannot
+    cell on either side. And it is closed where K_I came out negative, which crack faces that cannot
     overlap do not have: they press over less than the multipliers resolve.
 
     Parameters
@@ -75,7 +75,7 @@ def pressed(sif: SIF, solution: Solution, c: int) -> Bools:
 
 
 def shallow(sif: SIF, solution: Solution, c: int, depth: float) -> Bools:
-    """Pressed places behind which lips are open within a depth `(f,)`.
+    """Pressed places behind which crack faces are open within a depth `(f,)`.
 
     Parameters
     ----------

@@ -66,7 +66,7 @@ def mean_rotation(solution: Solution, distance: Floats, radius: float) -> Floats
 
 
 def lip_pressure(solution: Solution, c: int) -> Floats:
-    """Pressure on the lips of crack c at their points: multipliers and given pressure `(q,)`.
+    """Pressure on the faces of crack c at their points: multipliers and given pressure `(q,)`.
 
     Parameters
     ----------

@@ -357,10 +357,10 @@ def _lip_part(
 
 
 def _as_seen(solution: Solution, t: int, rows: Ints, feet: Feet) -> Feet:
-    """Feet of points on the lips, x1 measured from the front that the cells see.
+    """Feet of points on the crack faces, x1 measured from the front that the cells see.
 
-    The lips end at its chords, and so does the pressure: on a lip the auxiliary field goes like
-    the inverse root of x1, and a strip of 1 % that chords cut off would lose 10 % of the term.
+    The crack faces end at its chords, and so does the pressure: on a lip the auxiliary field goes
+    like the inverse root of x1, and a strip of 1 % that chords cut off would lose 10 % of the term.
     """
     space = solution.space
     tip = space.tips[t]

@@ -1,12 +1,13 @@
-"""Stress intensity factors by the interaction integral, with what acts on the lips.
+"""Stress intensity factors by the interaction integral, with what acts on the crack faces.
 
 I = int P_kj t_k q_,j dA - int_lips (P_kj m_j t_k) q ds + volume terms, where
 P_kj = sigma_ij u^a_i,k + sigma^a_ij u_i,k - (sigma : eps^a) delta_kj, t is the direction ahead of
 the tip and m the outward normal of a lip, on which sigma m is the true traction: the multipliers
-or a given pressure. On lips that are not straight the auxiliary field of Williams is continued
-in angle to the side of the lip, and its own traction counts (full lip term).
-K = E'/2 I with the unit fields; T = E' I / f with that of a point force f along the lips, less
-the pressure on the lips at the tip. An initial stress enters by its value at the tip, which is
+or a given pressure. On crack faces that are not straight the auxiliary field of Williams is
+continued in angle to the side of the crack face, and its own traction counts (full lip term). K =
+E'/2 I with the unit fields; T = E' I / f with that of a point force f along the crack faces, less
+the pressure on the crack faces at the tip. An initial stress enters by its value at the tip, which
+is
 counted in sigma : eps^a, and by its change from there, times the derivative of eps^a.
 """
 
@@ -33,10 +34,10 @@ def inner_radii(order: int, radii: Floats) -> Floats:
 
 
 def constant_part(solution: Solution, t: int) -> float:
-    """What pressure on the lips and initial stress at the tip add to E' I / f.
+    """What pressure on the crack faces and initial stress at the tip add to E' I / f.
 
     A uniform state gives E' I / f = sigma_11 - sigma_22 for its elastic part: the displacement of
-    the point force jumps across the lips. T is sigma_11 of the whole.
+    the point force jumps across the crack faces. T is sigma_11 of the whole.
     """
     tip, material = solution.space.tips[t], solution.problem.material
     lips = solution.lips[tip.crack]

@@ -114,7 +114,7 @@ def integrals(
     side : (q,) array of int
         Side of the crack; 0 where that means nothing.
     behind : (q,) array of bool
-        Behind the front, where the angle of a point follows the lip of its side.
+        Behind the front, where the angle of a point follows the crack face of its side.
     material : Isotropic
     radii : (k,) array, length
     force : (q, 3, n) array, stress/length, optional
@@ -193,14 +193,14 @@ def lip_integrals(
     gradient: Floats | None = None,
     initial: Callable[[Floats], Floats] | None = None,
 ) -> Floats:
-    """What both lips add to the integrals, for true tractions on them.
+    """What both crack faces add to the integrals, for true tractions on them.
 
     Parameters
     ----------
     curve : FrontCurve
     knots : (p,) array, length
     feet : Feet
-        `curve.feet(x)` of the points of the lips.
+        `curve.feet(x)` of the points of the crack faces.
     normal : (q, 3) array
         From lip - to lip +.
     weight : (q,) array, length²
@@ -209,8 +209,8 @@ def lip_integrals(
     material : Isotropic
     radii : (k,) array, length
     gradient : (2, q, 3, 3, n) array, optional
-        Displacement gradients on lip - and lip +: needed where the lips are not the half-plane of
-        the frame, since the auxiliary field has a traction of its own there.
+        Displacement gradients on lip - and lip +: needed where the crack faces are not the
+        half-plane of the frame, since the auxiliary field has a traction of its own there.
     initial : callable, optional
         Initial stress, as in `integrals`; only counts with gradients.
 

@@ -34,8 +34,8 @@ class SIF:
         Places where a front is so close to a free surface that K, which has no meaning there, is
         prolonged from inside; never in 2D.
     closed : (f,) array of bool
-        Places up to which the lips press together: K_I is exactly zero there. Never so on a crack
-        without multipliers.
+        Places up to which the crack faces press together: K_I is exactly zero there. Never so on a
+        crack without multipliers.
     domain_cells : (f,) array
         Outer radius of the larger domain, in cells; few of them mean a domain that is clipped.
     """

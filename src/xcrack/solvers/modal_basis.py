@@ -1,7 +1,7 @@
 """The vectorial tip basis: the modes of a tip alone, as a restriction of the solver's basis.
 
 The four tip functions times the d components of the displacement contain the fields of modes I
-and II, and III in space. Their span at a point has d columns instead of 4 d: cheaper and better
+and II, and III in 3D. Their span at a point has d columns instead of 4 d: cheaper and better
 conditioned, but blind to every field near a tip that is not one of its modes. It is there to be
 compared with the functions one by one.
 """
@@ -76,7 +76,7 @@ def mode_columns(
 def local_modes(kolosov: float, dim: int) -> Floats:
     """Modes in the frame of a tip `(modes, components, 4)`, up to a factor.
 
-    I and II of Williams (1957) in the components (ahead, normal); in space III, 4 F_2 along the
+    I and II of Williams (1957) in the components (ahead, normal); in 3D III, 4 F_2 along the
     front.
     """
     modes = np.zeros((dim, dim, 4))
@@ -87,7 +87,7 @@ def local_modes(kolosov: float, dim: int) -> Floats:
 
 
 def _frames(space: FunctionSpace, tip: Tip, points: Ints) -> Floats:
-    """Frames at mesh points: those of the tip, or in space of the nearest vertex of the front."""
+    """Frames at mesh points: those of the tip, or in 3D of the nearest vertex of the front."""
     if tip.frame.ndim == 2:
         return np.broadcast_to(tip.frame, (len(points), *tip.frame.shape))
     _, nearest = cKDTree(tip.x).query(space.mesh.points[points])

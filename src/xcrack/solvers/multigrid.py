@@ -161,7 +161,7 @@ def hierarchy(bulk: Bulk, fixed: Bools) -> Hierarchy:
     bulk : Bulk
     fixed : (n,) array of bool
         Unknowns that supports decide; entries behind the standard unknowns are not looked at.
-        A body that is not held is welcome: its motions are left out on the coarsest level.
+        An unsupported body is allowed: its motions are left out on the coarsest level.
     """
     n, d = bulk.matrix.shape[0], bulk.mesh.dim
     fixed = np.array(fixed[:n], dtype=bool)

@@ -160,8 +160,8 @@ class _Descent:
         curvature = _dot(p, q)
         if not curvature > 0 or not np.isfinite(rz):
             raise ConvergenceError(
-                "the conjugate gradients broke down: the stiffness is singular. Is the body held, "
-                "or does a crack cut off a piece that nothing holds?"
+                "the conjugate gradients broke down: the stiffness is singular. Is the body "
+                "supported, or does a crack cut off a piece that nothing supports?"
             )
         a = rz / curvature
         self.y = self.y + a * p
@@ -208,8 +208,8 @@ def conjugate_gradients(
         if steps == limit:
             raise ConvergenceError(
                 f"the conjugate gradients did not converge: after {steps} steps the residual is "
-                f"{descent.norm / size:.3g} of the load, not {tolerance:.3g}. Is the body held? A "
-                "direct solver, or a mesh without flat cells, may help."
+                f"{descent.norm / size:.3g} of the load, not {tolerance:.3g}. Is the body "
+                "supported? A direct solver, or a mesh without flat cells, may help."
             )
         descent.step()
         steps += 1
@@ -371,6 +371,6 @@ class _Loop:
         raise ConvergenceError(
             f"contact: after {self.steps} steps of conjugate gradients and {self.sets} sets the "
             f"residual is {residual:.3g} of the load and {int(active.sum())} of {len(active)} "
-            "groups are closed. Refine the mesh along the lips, start from "
+            "groups are closed. Refine the mesh along the crack, start from "
             'Numerics(initial_set="open"), or choose a direct solver.'
         )

@@ -24,7 +24,7 @@ class Motion:
     Attributes
     ----------
     modes : (n_dof, k) array
-        Orthonormal; k = 0 for a body that is held.
+        Orthonormal; k = 0 for a supported body.
     pins : (k,) array of int
         Unknowns pinned to make the stiffness regular.
     """
@@ -64,7 +64,7 @@ def free_motion(space: FunctionSpace, fixed: Bools) -> Motion:
             continue
         triangle, pivots = scipy.linalg.qr(modes[candidates].T, mode="r", pivoting=True)
         diagonal = np.abs(np.diag(triangle))
-        # Two points in space leave the turn about their line free.
+        # Two points in 3D leave the turn about their line free.
         if diagonal[-1] > 1e-6 * diagonal[0]:
             break
     return Motion(modes, candidates[pivots[: null.shape[1]]])
@@ -93,7 +93,7 @@ def balanced(space: FunctionSpace, motion: Motion, f: Floats) -> tuple[Floats, f
         if share > _IMBALANCE:
             resultant = rigid_modes(space.node_points).T @ f[:n, k]
             raise ProblemError(
-                f"the body is not held against a rigid motion and its loads are out of balance by "
+                f"the supports leave a rigid motion free and the loads are out of balance by "
                 f"{100 * share:.3g} % of the sum of all forces ({total:.4g}; resultant force "
                 f"{np.round(resultant[:d], 6).tolist()}, moment about the centre "
                 f"{np.round(resultant[d:], 6).tolist()}): add a support such as fix(set, axis), "
@@ -104,7 +104,7 @@ def balanced(space: FunctionSpace, motion: Motion, f: Floats) -> tuple[Floats, f
 
 
 def _total(space: FunctionSpace, f: Floats) -> float:
-    """Sum of all forces; pressure on lips acts on the jumps of enriched functions alone."""
+    """Sum of all forces; pressure on crack faces acts on the jumps of enriched functions alone."""
     size = np.linalg.norm(f.reshape(-1, space.dim), axis=1)
     total = float(size[: space.n_nodes].sum())
     for number in space.heaviside:
@@ -136,8 +136,8 @@ def _check_pieces(space: FunctionSpace, fixed: Bools) -> None:
             raise ProblemError(
                 f"the cracks cut the body into {n_pieces} pieces, and the one around "
                 f"{np.round(x[nodes].mean(axis=0), 6).tolist()} ({100 * volume[k]:.3g} % of the "
-                f"body) is not held against {R.shape[1] - rank} rigid motion(s): hold it by a "
-                "support of its own; contact alone cannot."
+                f"body) has {R.shape[1] - rank} free rigid motion(s): give it a support of its "
+                "own; contact alone cannot support it."
             )
 
 

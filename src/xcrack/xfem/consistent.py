@@ -48,7 +48,7 @@ class BoundaryPoints:
 def boundary_points(
     space: FunctionSpace, cells: Ints, lips: tuple[LipPoints, ...]
 ) -> BoundaryPoints:
-    """Points on all facets and lips of the pieces of the given cells, sorted by cell."""
+    """Points on all facets and faces of the pieces of the given cells, sorted by cell."""
     parts = [_facet_points(space, cells)]
     wanted = np.zeros(len(space.mesh.cells), dtype=bool)
     wanted[cells] = True

@@ -1,4 +1,4 @@
-"""Integration points on the lips of a crack, shared by contact, loads and K."""
+"""Integration points on the faces of a crack, shared by contact, loads and K."""
 
 from dataclasses import dataclass
 
@@ -13,7 +13,7 @@ from xcrack.xfem.quadrature import cell_side
 
 @dataclass(frozen=True, eq=False)
 class LipPoints:
-    """Integration points on the lips of one crack.
+    """Integration points on the faces of one crack.
 
     Attributes
     ----------
@@ -43,7 +43,7 @@ class LipPoints:
 
 
 def lip_points(space: FunctionSpace, c: int, n: int = 6) -> LipPoints:
-    """Points on the lips of crack c, graded towards its tips, in the order of the crack."""
+    """Points on the faces of crack c, graded towards its tips, in the order of the crack."""
     cut, mesh = space.cuts[c], space.mesh
     bary = cut.lip_bary
     # The ends of a segment on a facet are sorted as the boundary rule sorts them.
@@ -92,7 +92,7 @@ def arc_position(polyline: Floats, x: Floats) -> Floats:
 
 
 def jump_values(space: FunctionSpace, c: int, lips: LipPoints) -> list[tuple[Ints, Ints, Floats]]:
-    """Signed traces of the functions on both lips: + lip minus - lip.
+    """Signed traces of the functions on both crack faces: + lip minus - lip.
 
     Returns
     -------

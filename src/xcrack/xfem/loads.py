@@ -132,7 +132,7 @@ def _add_initial_stress(f: Floats, space: FunctionSpace, load: InitialStress) ->
 
 
 def lip_force(space: FunctionSpace, c: int, lips: LipPoints, force: Floats) -> Floats:
-    """Integral of force . [[v]] over the lips of crack c `(n_functions, d)`.
+    """Integral of force . [[v]] over the faces of crack c `(n_functions, d)`.
 
     Parameters
     ----------

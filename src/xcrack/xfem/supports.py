@@ -133,8 +133,8 @@ def _check_ends(space: FunctionSpace, where: str, facets: Ints, what: str) -> No
         if bad.any():
             x = np.round(space.mesh.points[np.argmax(bad)], 6).tolist()
             raise ProblemError(
-                f"{what}({where!r}) ends at {x}, where crack {c} meets the boundary, and holds its "
-                "lip - only: give the points of the crack in the reverse order (the supported "
+                f"{what}({where!r}) ends at {x}, where crack {c} meets the boundary, and supports "
+                "its lip - only: give the points of the crack in the reverse order (the supported "
                 "lip is then lip +), or move its mouth by a thousandth of a cell."
             )
 

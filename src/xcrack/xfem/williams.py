@@ -9,7 +9,7 @@ def polar(psi: Floats, phi: Floats, side: Ints) -> tuple[Floats, Floats]:
     """Radius and angle in (-pi, pi] from the level sets; `side` decides the angle on a lip.
 
     `side` is +1 or -1 where the point belongs to a known side of the crack, else 0. A point with
-    phi = 0 exactly has atan2 = +pi on both lips; its side decides.
+    phi = 0 exactly has atan2 = +pi on both crack faces; its side decides.
     """
     tiny = 1e-300
     forced = np.where((side != 0) & (phi * side <= 0), side * tiny, phi)
@@ -72,8 +72,8 @@ def mode_matrix(kolosov: float, mu: float) -> Floats:
 def unit_gradients(r: Floats, theta: Floats, kolosov: float, mu: float) -> Floats:
     """Displacement gradients of unit K_I, unit K_II and a unit point force `(3, q, 2, 2)`.
 
-    Plane components (ahead, normal). The force acts on the tip, along the lips, which it leaves
-    free of traction: sigma_rr = -cos(theta) / (pi r) (Michell, 1902); it is the field of T.
+    Plane components (ahead, normal). The force acts on the tip, along the crack faces, which it
+    leaves free of traction: sigma_rr = -cos(theta) / (pi r) (Michell, 1902); it is the field of T.
     """
     modes = mode_matrix(kolosov, mu)
     ahead, normal = tip_derivatives(r, theta)
