@@ -1,20 +1,26 @@
 """K at a tip of a solution in 2D: the domain of the integrals, its points, and the SIF."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from xcrack.analysis.solution import Solution, gradients_at
-from xcrack.arrays import Floats
+from xcrack.analysis.solution import Solution
+from xcrack.arrays import Floats, Ints
 from xcrack.mesh.locate import nearest_boundary
 from xcrack.scene.conditions import BodyForce, InitialStress
 from xcrack.sif.accuracy import Domain, check
 from xcrack.sif.closure import with_closed
-from xcrack.sif.common import acts, mean_rotation
-from xcrack.sif.interaction_2d import constant_part, domain_terms, inner_radii, lip_terms
+from xcrack.sif.common import acts
+from xcrack.sif.interaction_2d import (
+    constant_part,
+    lip_terms,
+    plain_terms,
+    point_terms,
+    ring_around,
+    volume_terms,
+)
 from xcrack.sif.sif import SIF
 from xcrack.xfem.function_space import FunctionSpace
-from xcrack.xfem.loads import position
 from xcrack.xfem.quadrature import Points, cell_points
 
 _OUTER = {1: 2.5, 2: 2.5}  # outer radius, as a multiple of the enriched radius
@@ -70,17 +76,42 @@ def tip_intensity(solutions: Sequence[Solution], t: int) -> list[SIF]:
 def _integrals(solutions: Sequence[Solution], t: int, radii: Floats) -> Floats:
     """I of modes I, II and of the point force for each state and domain `(s, radii, 3)`."""
     space, tip = solutions[0].space, solutions[0].space.tips[t]
-    distance = np.linalg.norm(space.mesh.points - tip.x, axis=1)
-    turn = np.stack([mean_rotation(s, distance, float(radii.max())) for s in solutions], axis=-1)
-    total = lip_terms(solutions, t, radii, turn)
-    coefficients = np.stack([solution.coefficients for solution in solutions], axis=-1)
-    # Within the inner radius grad q vanishes: only loads of the volume need points there.
-    loaded = acts(solutions, BodyForce, InitialStress)
-    hollow = 0.0 if loaded else float(inner_radii(space.order, radii).min())
-    for points, x in domain_points(space, tip.x, (hollow, float(radii.max()))):
-        gradient = gradients_at(space, coefficients, points.cell, points.bary, points.side)
-        total += domain_terms(solutions, t, radii, points, x, gradient - turn)
+    ring = ring_around(solutions, t, radii)
+    outer = float(radii.max())
+    total = lip_terms(solutions, ring)
+    # Within the inner radius grad q vanishes.
+    hollow = float(ring.inner.min())
+    for cells, n, degree in _classes(space, tip.x, hollow, outer):
+        plain = space.signature[cells] == 0
+        total += plain_terms(solutions, ring, cells[plain], degree)
+        for points in _points(space, cells[~plain], n, degree):
+            total += point_terms(solutions, ring, points)
+    if acts(solutions, BodyForce, InitialStress):
+        for cells, n, degree in _classes(space, tip.x, 0.0, outer):
+            for points in _points(space, cells, n, degree):
+                total += volume_terms(solutions, ring, points)
     return total
+
+
+def _classes(
+    space: FunctionSpace, centre: Floats, hollow: float, radius: float
+) -> Iterator[tuple[Ints, int, int]]:
+    """Cells between two radii by size, points a direction with tip functions, degree without."""
+    from xcrack.kernels.ring import cells_between
+
+    mesh = space.mesh
+    near = cells_between(mesh.points, mesh.cells, mesh.cell_size, centre, hollow, radius)
+    share = mesh.cell_size[near] / radius
+    for low, high, n, degree in _DEGREES:
+        cells = near[(share > low) & (share <= high)]
+        if len(cells):
+            yield cells, n, degree
+
+
+def _points(space: FunctionSpace, cells: Ints, n: int, degree: int) -> Iterator[Points]:
+    """Integration points of cells, of some cells at once."""
+    for first in range(0, len(cells), _CHUNK):
+        yield cell_points(space, cells[first : first + _CHUNK], n, degree)
 
 
 def domain_of(solution: Solution, t: int) -> Domain:
@@ -125,32 +156,3 @@ def domain_of(solution: Solution, t: int) -> Domain:
         differ=_DIFFER,
         label="K at",
     )
-
-
-def domain_points(
-    space: FunctionSpace, centre: Floats, radii: tuple[float, float]
-) -> list[tuple[Points, Floats]]:
-    """Integration points between two radii and their places, denser where cells are large."""
-    mesh = space.mesh
-    hollow, radius = radii
-    near = np.array(
-        mesh.cell_tree.query_ball_point(centre, radius + float(mesh.cell_size.max())),
-        dtype=np.int64,
-    )
-    near.sort()
-    x = mesh.points[mesh.cells[near]]
-    inside = np.linalg.norm(x - centre, axis=2).max(axis=1) <= hollow
-    far = np.linalg.norm(x.mean(axis=1) - centre, axis=1) > radius + mesh.cell_size[near]
-    near = near[~inside & ~far]
-    share = mesh.cell_size[near] / radius
-    parts: list[tuple[Points, Floats]] = []
-    for low, high, n, degree in _DEGREES:
-        cells = near[(share > low) & (share <= high)]
-        for first in range(0, len(cells), _CHUNK):
-            points = cell_points(space, cells[first : first + _CHUNK], n, degree)
-            x = position(space, points.cell, points.bary)
-            r = np.linalg.norm(x - centre, axis=1)
-            between = (hollow < r) & (r < radius)
-            if between.any():
-                parts.append((points.chosen(between), x[between]))
-    return parts

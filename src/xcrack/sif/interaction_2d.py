@@ -13,13 +13,17 @@ counted in sigma : eps^a, and by its change from there, times the derivative of 
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from xcrack.analysis.solution import Solution, gradients_at
-from xcrack.arrays import Floats
+from xcrack.arrays import Floats, Ints
+from xcrack.mesh.mesh import local_edges
+from xcrack.mesh.simplex import simplex_rule
 from xcrack.scene.conditions import BodyForce, InitialStress, evaluate, evaluate_stress
-from xcrack.sif.common import acts, lip_pressure, weight
+from xcrack.sif.common import acts, lip_pressure, mean_rotation, weight
+from xcrack.xfem.loads import position
 from xcrack.xfem.quadrature import Points, cell_side
 from xcrack.xfem.williams import continued_polar, mode_matrix, unit_gradients
 
@@ -54,35 +58,93 @@ def _steady(solution: Solution, t: int) -> Floats:
     return np.asarray(tip.frame @ solution.initial_stress(tip.x[None])[0] @ tip.frame.T)
 
 
-def domain_terms(
-    solutions: Sequence[Solution],
-    t: int,
-    radii: Floats,
-    points: Points,
-    x: Floats,
-    gradient: Floats,
-) -> Floats:
-    """Domain integrals over some of the points `(s, radii, 3)`; gradient: (q, d, d, s)."""
-    from xcrack.kernels.ring import add_ring
+@dataclass(frozen=True, eq=False)
+class Ring:
+    """What the domain integrals around one tip need, for several states.
 
-    space, material = solutions[0].space, solutions[0].problem.material
-    tip = space.tips[t]
+    Attributes
+    ----------
+    t : int
+        Number of the tip.
+    radii, inner : (k,) arrays, length
+        Outer radii of the domains, and radii within which their weight is one.
+    turn : (d, d, s) array
+        Mean rotation of each state, subtracted from its gradients.
+    coefficients : (f, d, s) array
+    """
+
+    t: int
+    radii: Floats
+    inner: Floats
+    turn: Floats
+    coefficients: Floats
+
+
+def ring_around(solutions: Sequence[Solution], t: int, radii: Floats) -> Ring:
+    """The domains around tip t with the given outer radii."""
+    space = solutions[0].space
+    distance = np.linalg.norm(space.mesh.points - space.tips[t].x, axis=1)
+    turns = [mean_rotation(s, distance, float(radii.max())) for s in solutions]
+    coefficients = np.stack([s.coefficients for s in solutions], axis=-1)
+    return Ring(t, radii, inner_radii(space.order, radii), np.stack(turns, axis=-1), coefficients)
+
+
+def _constants(solution: Solution, ring: Ring) -> tuple[Any, ...]:
+    """Last arguments of the kernels of domain integrals."""
+    tip, material = solution.space.tips[ring.t], solution.problem.material
+    return (
+        tip.x, ring.turn, ring.radii, ring.inner, np.ascontiguousarray(tip.frame),
+        mode_matrix(material.kolosov, material.mu), material.kolosov, material.lam, material.mu,
+    )  # fmt: skip
+
+
+def plain_terms(solutions: Sequence[Solution], ring: Ring, cells: Ints, degree: int) -> Floats:
+    """Domain integrals over plain cells `(s, radii, 3)`, by a rule of the given degree."""
+    from xcrack.kernels.ring import add_plain_cells
+
+    space = solutions[0].space
+    mesh, tip = space.mesh, space.tips[ring.t]
+    cut, edges = space.cuts[tip.crack], local_edges(2)
+    result = np.zeros((len(solutions), len(ring.radii), 3))
+    add_plain_cells(
+        result, cells, mesh.points, mesh.cells, mesh.gradient, mesh.volume, space.cell_nodes,
+        edges if space.order == 2 else edges[:0], ring.coefficients, cut.side,
+        cut.level_set.psi[tip.number], *simplex_rule(2, degree), *_constants(solutions[0], ring),
+    )  # fmt: skip
+    return result
+
+
+def point_terms(solutions: Sequence[Solution], ring: Ring, points: Points) -> Floats:
+    """Domain integrals over points of any cells `(s, radii, 3)`."""
+    from xcrack.kernels.ring import add_points
+
+    space = solutions[0].space
+    mesh, tip = space.mesh, space.tips[ring.t]
+    gradient = gradients_at(space, ring.coefficients, points.cell, points.bary, points.side)
+    result = np.zeros((len(solutions), len(ring.radii), 3))
+    add_points(
+        result, gradient, points.cell, points.bary, points.side[:, tip.crack], points.weight,
+        mesh.points, mesh.cells, space.cuts[tip.crack].level_set.psi[tip.number],
+        *_constants(solutions[0], ring),
+    )  # fmt: skip
+    return result
+
+
+def volume_terms(solutions: Sequence[Solution], ring: Ring, points: Points) -> Floats:
+    """What body forces and initial stress add at points `(s, radii, 3)`."""
+    space = solutions[0].space
+    tip = space.tips[ring.t]
+    x = position(space, points.cell, points.bary)
     xi = (x - tip.x) @ tip.frame.T
     psi = space.cuts[tip.crack].level_set.psi[tip.number]
     behind = psi[space.mesh.cells[points.cell]].mean(axis=1) < 0
     r, theta = continued_polar(xi, points.side[:, tip.crack], behind)
-    result = np.zeros((len(solutions), len(radii), 3))
-    add_ring(
-        result, gradient, xi, theta, points.weight, radii, inner_radii(space.order, radii),
-        np.ascontiguousarray(tip.frame), mode_matrix(material.kolosov, material.mu),
-        material.kolosov, material.lam, material.mu,
-    )  # fmt: skip
-    if acts(solutions, BodyForce, InitialStress):
-        q, dq = weight(r, xi, inner_radii(space.order, radii), radii)
-        weighted = points.weight[:, None] * dq  # (radii, q, d)
-        for m, field in enumerate(_auxiliary(solutions, r, theta)):
-            for s, solution in enumerate(solutions):
-                result[s, :, m] += _load_terms(solution, t, points, x, field, q, weighted)
+    result = np.zeros((len(solutions), len(ring.radii), 3))
+    q, dq = weight(r, xi, ring.inner, ring.radii)
+    weighted = points.weight[:, None] * dq  # (radii, q, d)
+    for m, field in enumerate(_auxiliary(solutions, r, theta)):
+        for s, solution in enumerate(solutions):
+            result[s, :, m] += _load_terms(solution, ring.t, points, x, field, q, weighted)
     return result
 
 
@@ -142,9 +204,9 @@ def _load_terms(
     return total
 
 
-def lip_terms(solutions: Sequence[Solution], t: int, radii: Floats, turn: Floats) -> Floats:
-    """Full lip term of each state, domain and field `(s, radii, 3)`; turn: (d, d, s)."""
-    space = solutions[0].space
+def lip_terms(solutions: Sequence[Solution], ring: Ring) -> Floats:
+    """Full lip term of each state, domain and field `(s, radii, 3)`."""
+    space, t, radii = solutions[0].space, ring.t, ring.radii
     tip, lips = space.tips[t], solutions[0].lips[space.tips[t].crack]
     result = np.zeros((len(solutions), len(radii), 3))
     near = np.linalg.norm(lips.x - tip.x, axis=1) < radii.max()
@@ -159,7 +221,6 @@ def lip_terms(solutions: Sequence[Solution], t: int, radii: Floats, turn: Floats
     bent = bool(xi[:, 1].any())
     if not bent and not pressure.any():
         return result
-    coefficients = np.stack([s.coefficients for s in solutions], axis=-1)
     behind = np.ones(len(xi), dtype=bool)
     w = lips.weight[near]
     for s, sign in ((0, -1), (1, 1)):
@@ -168,11 +229,11 @@ def lip_terms(solutions: Sequence[Solution], t: int, radii: Floats, turn: Floats
         side[:, tip.crack] = sign
         r, theta = continued_polar(xi, side[:, tip.crack], behind)
         outward = -sign * lips.normal[near] @ R.T
-        q, _ = weight(r, xi, inner_radii(space.order, radii), radii)
+        q, _ = weight(r, xi, ring.inner, radii)
         aux = _auxiliary(solutions, r, theta)
         local = None
         if bent:
-            gradient = gradients_at(space, coefficients, cell, bary, side) - turn
+            gradient = gradients_at(space, ring.coefficients, cell, bary, side) - ring.turn
             local = np.einsum("ai,qijs,bj->sqab", R, gradient, R)
         for k, solution in enumerate(solutions):
             traction = -pressure[k][:, None] * outward
