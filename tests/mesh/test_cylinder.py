@@ -91,9 +91,9 @@ def test_patches_are_squares_turned_by_15_degrees(bar, station, side, sign):
 
 
 @pytest.mark.gmsh
-def test_sets_are_the_96_patches_the_ends_and_the_notch(bar):
+def test_sets_are_the_96_patches_the_ends_the_notch_and_the_cylinder(bar):
     patches = [f"{a}_{b}_{k:02d}" for a in STATIONS for b in ("left", "right") for k in range(24)]
-    assert set(bar.facet_sets) == {*patches, "left", "right", "notch", "boundary"}
+    assert set(bar.facet_sets) == {*patches, "left", "right", "notch", "round", "boundary"}
     named = np.concatenate([f for name, f in bar.facet_sets.items() if name != "boundary"])
     assert len(np.unique(np.sort(named, axis=1), axis=0)) == len(named)
     assert (bar.facet_to_cell[bar.facet_numbers(named), 1] < 0).all()

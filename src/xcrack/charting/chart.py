@@ -66,7 +66,7 @@ def chart(
         From coarse to fine, at least two; or a function of the size of the smallest cell, which
         is called with that of the problem's mesh, its half, quarter... Left out: the mesh of the
         problem and what `xcrack.mesh.refinement.refine` makes of it, at most three times. A polygon
-        that stands for a curved boundary stays one then, and its error is not seen.
+        stays one then, and its error is not seen, unless the mesh knows its curve.
     states : sequence, optional
         Load states, as for `solve`.
     quantity : callable, optional

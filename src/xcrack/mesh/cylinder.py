@@ -7,6 +7,7 @@ import numpy as np
 
 from xcrack.arrays import Floats, Ints
 from xcrack.errors import GeometryError, MeshError
+from xcrack.geometry.curves import Round
 from xcrack.inputs import number
 from xcrack.mesh.gmsh_session import session
 from xcrack.mesh.grading import FINEST, graded_size, length_of
@@ -78,7 +79,8 @@ def notched_cylinder(
     Returns
     -------
     Mesh
-        Facet sets ``left``, ``right`` (ends), ``notch`` (both faces), ``outer_left_00`` ...
+        Facet sets ``left``, ``right`` (ends), ``notch`` (both faces), ``round`` (the cylinder
+        between the inner stations, onto which `refine` puts its new points), ``outer_left_00`` ...
         ``outer_left_23``, ``outer_right_00`` ..., ``inner_left_00`` ..., ``inner_right_00`` ...
         (plane rectangles of one area). Nodes of the root lie exactly in x = 0.
 
@@ -149,7 +151,7 @@ def notched_cylinder(
                 "notch and ends may help."
             ) from error
         points, cells = _tetrahedra(gmsh)
-    return _with_sets(points * scale, cells, radius, sections, notch_depth, slope)
+    return _with_sets(points * scale, cells, radius, sections, round_half, notch_depth, slope)
 
 
 def _draw(
@@ -207,6 +209,7 @@ def _with_sets(
     cells: Ints,
     radius: float,
     sections: list[float],
+    round_half: float,
     notch_depth: float,
     slope: float,
 ) -> Mesh:
@@ -220,10 +223,14 @@ def _with_sets(
     facets = sound_mesh(points, cells).boundary
     x, y, z = np.moveaxis(points[facets], -1, 0)
 
+    round_side = Round((0.0, 0.0, 0.0), radius, (1.0, 0.0, 0.0))
+    on_round = (abs(np.hypot(y, z) - radius) < tolerance) & (abs(x) < round_half + tolerance)
+    in_notch = (abs(abs(x) - (root - z) * slope) < tolerance).all(axis=1)
     sets = {
         "left": facets[(x == -sections[0]).all(axis=1)],
         "right": facets[(x == sections[0]).all(axis=1)],
-        "notch": facets[(abs(abs(x) - (root - z) * slope) < tolerance).all(axis=1)],
+        "notch": facets[in_notch],
+        "round": facets[on_round.all(axis=1) & ~in_notch],
     }
     angle = _TURN * np.arange(_FACES)[:, None, None]
     height = np.sin(angle) * y - np.cos(angle) * z - radius * np.cos(_TURN / 2)
@@ -234,7 +241,7 @@ def _with_sets(
             here = ((along > low - tolerance) & (along < high + tolerance)).all(axis=1)
             for k in range(_FACES):
                 sets[f"{station}_{side}_{k:02d}"] = facets[here & on_face[k]]
-    return sound_mesh(points, cells, sets)
+    return sound_mesh(points, cells, sets, curves={"round": round_side})
 
 
 def _check_depths(diameter: float, notch_depth: float, notch_angle: float, depth: float) -> None:

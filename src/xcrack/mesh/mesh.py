@@ -14,6 +14,7 @@ from scipy.spatial import cKDTree
 from xcrack.arrays import Floats, Ints, frozen, lock
 from xcrack.errors import MeshError, warn
 from xcrack.mesh.checks import checked, checked_sets, doubts, unused_sets
+from xcrack.mesh.curves import Curves, check_on_curves, checked_curves
 
 _CELLS = {2: "triangles", 3: "tetrahedra"}
 
@@ -36,13 +37,17 @@ class Mesh:
         Point numbers of the facets (edges in 2D, triangles in 3D) of each set.
     cell_sets : mapping of name to (k,) array of int, optional
         Cell numbers of each set.
+    curves : mapping of name to callable, optional
+        Of facet sets that stand for a curve or a curved surface: ``f(x) -> (n, d)`` returns its
+        points nearest to the points x (n, d), which are close to it. `refine` puts new points
+        there. Files do not hold them.
 
     Raises
     ------
     MeshError
         No cells, wrong shapes, nan coordinates, point numbers out of range, points without a
         cell, flat, doubled or inverted (folded) cells, facets that no cell has, a set
-        ``"boundary"`` that is not the boundary.
+        ``"boundary"`` that is not the boundary, a curve far from the points of its set.
 
     Examples
     --------
@@ -55,9 +60,12 @@ class Mesh:
     cells: Ints
     facet_sets: Mapping[str, Ints] = field(default_factory=dict)
     cell_sets: Mapping[str, Ints] = field(default_factory=dict)
+    # What is computed on a mesh does not know them; what refines describes them itself.
+    curves: Curves = field(default_factory=dict, metadata={"changes_results": False})
 
     def __post_init__(self) -> None:
         self._complete()
+        check_on_curves(self.points, self.facet_sets, self.curves)
         facet = np.nonzero(self.facet_to_cell[:, 1] < 0)[0]
         owner = self.facet_to_cell[facet, 0]
         for message in doubts(self.points, self.cells, self.facets[facet], owner):
@@ -81,10 +89,13 @@ class Mesh:
         rest = {name: frozen(members) for name, members in cell_sets.items()}
         object.__setattr__(self, "facet_sets", MappingProxyType(named))
         object.__setattr__(self, "cell_sets", MappingProxyType(rest))
+        curves = checked_curves(self.curves, self.facet_sets)
+        object.__setattr__(self, "curves", MappingProxyType(curves))
 
     def __reduce__(self) -> tuple[Any, ...]:
         named = {name: facets for name, facets in self.facet_sets.items() if name != "boundary"}
-        return sound_mesh, (self.points, self.cells, named, dict(self.cell_sets))
+        rest = (dict(self.cell_sets), dict(self.curves))
+        return sound_mesh, (self.points, self.cells, named, *rest)
 
     def __repr__(self) -> str:
         names = ", ".join(self.facet_sets)
@@ -290,12 +301,13 @@ def sound_mesh(
     cells: Ints,
     facet_sets: Mapping[str, Ints] | None = None,
     cell_sets: Mapping[str, Ints] | None = None,
+    curves: Curves | None = None,
 ) -> Mesh:
     """A mesh that conforms by its making, as those of generators: errors, but no doubts.
 
     Parameters
     ----------
-    points, cells, facet_sets, cell_sets
+    points, cells, facet_sets, cell_sets, curves
         As of `Mesh`.
 
     Returns
@@ -308,6 +320,7 @@ def sound_mesh(
         ("cells", cells),
         ("facet_sets", facet_sets or {}),
         ("cell_sets", cell_sets or {}),
+        ("curves", curves or {}),
     ):
         object.__setattr__(mesh, name, value)
     mesh._complete()

@@ -9,6 +9,7 @@ import numpy as np
 
 from xcrack.arrays import Floats, Ints
 from xcrack.errors import GeometryError, MeshError
+from xcrack.geometry.curves import Round
 from xcrack.inputs import number
 from xcrack.mesh.checks import coordinates
 from xcrack.mesh.gmsh_session import session
@@ -65,7 +66,8 @@ def plate_with_hole(
     -------
     Mesh
         Facet sets ``left``, ``right``, ``bottom``, ``top``, ``hole``. A node lies at
-        ``center + (radius, 0)`` and at the three quarter turns from it.
+        ``center + (radius, 0)`` and at the three quarter turns from it; `refine` puts new points
+        of the hole onto its circle.
 
     Raises
     ------
@@ -194,7 +196,8 @@ def _plate(
     with session() as gmsh:
         curves = _draw(gmsh, width / scale, height / scale, corner, scaled, names, near / scale)
         points, cells, facets = mesh_model(gmsh, curves, length)
-    return _finish(points * scale, cells, facets, width, height, lower)
+    rims = {name: Round(center, radius) for name, (center, radius) in zip(names, holes)}
+    return _finish(points * scale, cells, facets, rims, width, height, lower)
 
 
 def _draw(
@@ -281,6 +284,7 @@ def _finish(
     points: Floats,
     cells: Ints,
     facets: dict[str, Ints],
+    rims: dict[str, Round],
     width: float,
     height: float,
     lower: Point,
@@ -295,7 +299,7 @@ def _finish(
     for name, (axis, value) in sides.items():
         points[facets[name].ravel(), axis] = value
     order = [*sides, *(name for name in facets if name not in sides)]
-    return sound_mesh(points, cells, {name: facets[name] for name in order})
+    return sound_mesh(points, cells, {name: facets[name] for name in order}, curves=rims)
 
 
 def _pair(value: Any, what: str) -> Point:

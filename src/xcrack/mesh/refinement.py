@@ -1,10 +1,17 @@
-"""Uniform refinement: each simplex into parts of half its size."""
+"""Finer meshes: each simplex into parts of half its size, or some of them bisected."""
+
+from collections.abc import Callable
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from xcrack.arrays import Floats, Ints
+from xcrack.arrays import Bools, Floats, Ints, at, ranges
 from xcrack.errors import MeshError
-from xcrack.mesh.mesh import Mesh, sound_mesh
+from xcrack.inputs import called, number, numbers, whole_numbers
+from xcrack.mesh.bisection import Simplices, bisected, moved, simplices
+from xcrack.mesh.curves import on_curves
+from xcrack.mesh.grading import FINEST
+from xcrack.mesh.mesh import Mesh, local_facets, sound_mesh
 from xcrack.mesh.simplex import cell_nodes, facet_nodes, node_points
 
 # Children of a simplex by its nodes: vertices first, then midpoints in the order of local_edges.
@@ -16,45 +23,212 @@ _AROUND = np.array([(5, 7, 8, 6), (4, 7, 9, 6), (4, 5, 9, 8)])
 _TIE = 1e-6  # share by which a diagonal must be shorter to be taken instead of one before it
 
 
-def refine(mesh: Mesh) -> Mesh:
-    """Split every edge in two: triangles into four, tetrahedra into eight.
+_MOST_CELLS = 10_000_000  # more do not fit into the memory of machines that solve them
 
-    The octahedron inside a tetrahedron is cut along its shortest diagonal, which keeps shapes
-    from degrading when it is repeated (Zhang, 1995, Houston J. Math. 21, Successive subdivisions
-    of tetrahedra). A polygon that stands for a curved boundary stays that polygon.
+Size = float | Callable[[Floats], ArrayLike]
+
+
+def refine(mesh: Mesh, cells: ArrayLike | None = None, *, size: Size | None = None) -> Mesh:
+    """Make a mesh finer: everywhere, at some cells, or to a wanted size.
+
+    Given neither `cells` nor `size`, every edge is split in two: triangles into four, tetrahedra
+    into eight, whose inner octahedron is cut along its shortest diagonal, which keeps shapes from
+    degrading when it is repeated (Zhang, 1995, Houston J. Math. 21, Successive subdivisions of
+    tetrahedra). Else cells are bisected at their longest edge, and neighbours as far as it takes to
+    conform (Rivara, 1984, Int. J. Numer. Meth. Eng. 20, 745): angles of triangles stay above half
+    of the smallest one of the mesh. How points are numbered plays no part.
+
+    New points of facet sets with a curve (`Mesh.curves`) are put onto it; of other sets they stay
+    on the polygon.
 
     Parameters
     ----------
     mesh : Mesh
+    cells : (k,) array of int, optional
+        Cells to bisect once: two bisections halve a triangle's edges, three a tetrahedron's.
+    size : float or callable, length, optional
+        Longest edge wanted: a number, or f(x) -> (n,), called with centres of cells (n, d); inf
+        where any will do. Every cell of the result has edges no longer than the size at its
+        centre, and none was bisected that had not longer ones, or a neighbour that had.
 
     Returns
     -------
     Mesh
-        Conforming, the old points first, with the same facet and cell sets.
+        Conforming, the old points first, with the same facet and cell sets and curves.
 
     Raises
     ------
     MeshError
-        Not a mesh.
+        Not a mesh, both `cells` and `size`, numbers of no cell, a size that is nan, not positive,
+        or so small that there would be more than ten million cells, a curve that returns points
+        elsewhere.
 
     Examples
     --------
     >>> from xcrack.mesh.box import box
-    >>> refine(box((0, 0), (1, 1), 1))
+    >>> coarse = box((0, 0), (1, 1), 1)
+    >>> refine(coarse)
     Mesh(9 points, 8 triangles, facet sets: left, right, bottom, top, boundary)
+    >>> refine(coarse, size=lambda x: 0.1 + np.linalg.norm(x, axis=1))
+    Mesh(13 points, 14 triangles, facet sets: left, right, bottom, top, boundary)
     """
     if not isinstance(mesh, Mesh):
         raise MeshError(f"refine: give a Mesh, not {type(mesh).__name__}.")
+    if cells is not None and size is not None:
+        raise MeshError("refine: give cells or size, not both.")
+    if size is not None:
+        return _to_size(mesh, _checked_size(mesh, size), None)
+    return _everywhere(mesh) if cells is None else _some(mesh, cells)
+
+
+def refine_to(mesh: Mesh, wanted: Floats, sweeps: int) -> Mesh:
+    """Bisect cells until their edges are no longer than wanted of the cell in which they lie.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    wanted : (m,) array, length
+        Longest edge wanted in each cell of the mesh.
+    sweeps : int
+        Most bisections of a cell, but for those of its neighbours.
+
+    Returns
+    -------
+    Mesh
+        As of `refine`.
+    """
+    return _to_size(mesh, lambda centre, parent: wanted[parent], sweeps)
+
+
+def _some(mesh: Mesh, cells: ArrayLike) -> Mesh:
+    given = whole_numbers(cells, "refine: cells", (None,), error=MeshError)
+    if given.size and (given.min() < 0 or given.max() >= len(mesh.cells)):
+        raise MeshError(
+            f"refine: cells names {int(given.min() if given.min() < 0 else given.max())}; the mesh "
+            f"has {len(mesh.cells)} cells, numbered from 0."
+        )
+    if not given.size:
+        return mesh
+    marked = np.zeros(len(mesh.cells), dtype=bool)
+    marked[given] = True
+    return _finished(mesh, _swept(mesh, simplices(mesh), marked)[0])
+
+
+def _to_size(mesh: Mesh, wanted: Callable[[Floats, Ints], Floats], sweeps: int | None) -> Mesh:
+    """Bisect until every cell is as small as wanted of its centre and its parent."""
+    whole = simplices(mesh)
+    limit = np.asarray(wanted(whole.centre, whole.parent))
+    done = 0
+    while sweeps is None or done < sweeps:
+        marked = whole.size > limit
+        if not marked.any():
+            break
+        whole, old, same = _swept(mesh, whole, marked)
+        # A size is asked for once, of cells that are new or whose points have moved.
+        limit = np.concatenate([limit[old], np.zeros(len(whole.cells) - len(limit[old]))])
+        new = ~same
+        limit[new] = wanted(whole.centre[new], whole.parent[new])
+        done += 1
+    return _finished(mesh, whole) if done else mesh
+
+
+def _checked_size(mesh: Mesh, size: Size) -> Callable[[Floats, Ints], Floats]:
+    """Wanted size of cells, checked as it is asked for."""
+    what, least = "the size of refine", FINEST * mesh.extent
+    function = size if callable(size) else None
+    fixed = 0.0 if function else number(size, "refine: size", above=0, error=MeshError)
+
+    def wanted(centre: Floats, parent: Ints) -> Floats:
+        given = fixed if function is None else called(function, what, centre.copy())
+        value = numbers(given, what, finite=False, error=MeshError)
+        if value.shape not in ((), (len(centre),)):
+            raise MeshError(
+                f"{what} has the shape {value.shape} at {len(centre)} centres: return one number "
+                "for each."
+            )
+        value = np.broadcast_to(value, len(centre))
+        bad = ~(value >= least)
+        if bad.any():
+            i = int(np.argmax(bad))
+            raise MeshError(
+                f"{what} is {value[i]:g} at {at(centre[i])} ({int(bad.sum())} such cells): it must "
+                f"be a length, no less than a millionth of the body ({least:.3g})."
+            )
+        return value
+
+    return wanted
+
+
+def _swept(mesh: Mesh, whole: Simplices, marked: Bools) -> tuple[Simplices, Bools, Bools]:
+    """One sweep of bisections, its new points on their curves.
+
+    Returns
+    -------
+    whole : Simplices
+    old : (m,) array of bool
+        Which of the cells before are still there; they come first.
+    same : (m',) array of bool
+        Which of the cells now are those, with their points where they were.
+    """
+    first = len(whole.points)
+    fine, old = bisected(whole, marked)
+    if len(fine.cells) > _MOST_CELLS:
+        raise MeshError(
+            f"refine: the size asks for more than {_MOST_CELLS:.0e} cells "
+            f"({len(fine.cells)} and more to come): enlarge it."
+        )
+    same = np.arange(len(fine.cells)) < int(old.sum())
+    if mesh.curves:
+        sets = {
+            name: _parts(fine, mesh.facet_numbers(mesh.facet_sets[name])) for name in mesh.curves
+        }
+        outer = _parts(fine, np.nonzero(mesh.facet_to_cell[:, 1] < 0)[0])
+        points, changed = on_curves(fine.points, fine.cells, first, sets, outer, mesh.curves)
+        if changed.any():
+            fine = moved(fine, points)
+            same &= ~changed[fine.cells].any(axis=1)
+    return fine, old, same
+
+
+def _parts(whole: Simplices, facets: Ints) -> Ints:
+    """Facets of the simplices in which facets of the mesh were split `(k, d)`."""
+    lies = np.zeros(max(int(whole.facet.max()), int(facets.max(initial=0))) + 2, dtype=bool)
+    lies[facets] = True  # the last entry is that of no facet
+    cell, corner = np.nonzero(lies[whole.facet])
+    return np.take_along_axis(
+        whole.cells[cell], local_facets(whole.points.shape[1])[corner], axis=1
+    )
+
+
+def _finished(mesh: Mesh, whole: Simplices) -> Mesh:
+    """The simplices as a mesh with the sets and curves of the one they were made from."""
+    order = np.argsort(whole.parent, kind="stable")
+    begin = np.searchsorted(whole.parent[order], np.arange(len(mesh.cells) + 1))
+
+    def inside(members: Ints) -> Ints:
+        row, place = ranges(begin[members + 1] - begin[members])
+        return order[begin[members][row] + place]
+
+    facets = {
+        name: _parts(whole, mesh.facet_numbers(facets)) for name, facets in mesh.facet_sets.items()
+    }
+    cells = {name: inside(members) for name, members in mesh.cell_sets.items()}
+    return sound_mesh(whole.points, whole.cells, facets, cells, mesh.curves)
+
+
+def _everywhere(mesh: Mesh) -> Mesh:
+    """Every edge split in two."""
     points = node_points(mesh, 2)
     nodes = cell_nodes(mesh, 2)
     cells, parent = (_triangles, _tetrahedra)[mesh.dim - 2](points, nodes)
     inverse = np.argsort(parent, kind="stable").reshape(len(mesh.cells), -1)
-    return sound_mesh(
-        points,
-        cells,
-        {name: _halved(mesh, facets) for name, facets in mesh.facet_sets.items()},
-        {name: inverse[members].ravel() for name, members in mesh.cell_sets.items()},
-    )
+    facets = {name: _quartered(mesh, facets) for name, facets in mesh.facet_sets.items()}
+    curved = {name: facets[name] for name in mesh.curves}
+    if curved:
+        outer = facets["boundary"]
+        points, _ = on_curves(points, cells, mesh.n_points, curved, outer, mesh.curves)
+    members = {name: inverse[members].ravel() for name, members in mesh.cell_sets.items()}
+    return sound_mesh(points, cells, facets, members, mesh.curves)
 
 
 def _triangles(points: Floats, nodes: Ints) -> tuple[Ints, Ints]:
@@ -79,7 +253,7 @@ def _tetrahedra(points: Floats, nodes: Ints) -> tuple[Ints, Ints]:
     return children.reshape(-1, 4), np.repeat(np.arange(len(nodes)), 8)
 
 
-def _halved(mesh: Mesh, facets: Ints) -> Ints:
+def _quartered(mesh: Mesh, facets: Ints) -> Ints:
     """Parts of facets: two of an edge, four of a triangle."""
     if not len(facets):
         return facets
@@ -88,4 +262,4 @@ def _halved(mesh: Mesh, facets: Ints) -> Ints:
     return np.asarray(nodes[:, parts].reshape(-1, mesh.dim))
 
 
-__all__ = ["refine"]
+__all__ = ["refine", "refine_to"]
