@@ -66,6 +66,7 @@ _HOME = {
     "inf_sup": "contact.inf_sup",
     "plan": "analysis.plan",
     "chart": "charting.chart",
+    "verify": "book.verify",
     "XcrackError": "errors",
     "XcrackWarning": "errors",
     "MeshError": "errors",

@@ -22,6 +22,8 @@ NAMES = [
     "Cycle", "History", "Step", "collect", "elber", "equivalent_K", "grow", "max_hoop_stress",
     "mean_reference", "paris", "resume", "walker", "weighted_angle", "cycles_between", "load",
     "draw_fronts",
+    # verification, reports, files of scenes
+    "verify",
     # errors
     "ConvergenceError", "GeometryError", "MeshError", "ProblemError", "XcrackError",
     "XcrackWarning",

@@ -6,6 +6,19 @@ import numpy as np
 
 import xcrack as xc
 from support import exact
+from xcrack.book.scenes_2d import (
+    SIDES,
+    annulus,
+    edge_line,
+    imposed,
+    inner_part,
+    l2,
+    on_box,
+    perturbed,
+    rows,
+    tractions,
+    turned,
+)
 from xcrack.scene.numerics import with_choices
 
 UNIT = {"E": 1.0, "nu": 0.3}
@@ -15,72 +28,6 @@ Field = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 def numerics_of(**choices):
     """Choices of method by name, those for comparison among them."""
     return with_choices(xc.Numerics(), choices)
-
-
-def perturbed(n, seed=3, amplitude=0.15, lower=(-1.0, -1.0), upper=(1.0, 1.0)):
-    """A structured box whose inner points are moved by a share of a cell."""
-    mesh = xc.box(lower, upper, n)
-    rng = np.random.default_rng(seed)
-    x = np.array(mesh.points)
-    low, high = np.array(lower), np.array(upper)
-    h = (high - low) / n
-    inner = ((x > low + 1e-9) & (x < high - 1e-9)).all(axis=1)
-    x[inner] += amplitude * h * rng.uniform(-1, 1, (int(inner.sum()), 2))
-    return xc.Mesh(x, mesh.cells, mesh.facet_sets)
-
-
-def rows(angle):
-    """Frame (ahead, left) of a direction."""
-    c, s = np.cos(angle), np.sin(angle)
-    return np.array([[c, s], [-s, c]])
-
-
-def turned(function, origin, angle=0.0):
-    """Displacement and stress `(n, d, d)` of an exact field placed at an origin and turned."""
-    Q, origin = rows(angle), np.asarray(origin, dtype=float)
-
-    def field(x):
-        y = (x - origin) @ Q.T
-        u, s = function(y[:, 0], y[:, 1])
-        sigma = np.empty((len(x), 2, 2))
-        sigma[:, 0, 0], sigma[:, 1, 1] = s[:, 0], s[:, 1]
-        sigma[:, 0, 1] = sigma[:, 1, 0] = s[:, 2]
-        return u @ Q, np.einsum("ai,qab,bj->qij", Q, sigma, Q)
-
-    return field
-
-
-def tractions(field, names):
-    """Exact tractions on the given sets."""
-    return [
-        xc.traction(name, lambda x, normal: np.einsum("qij,qj->qi", field(x)[1], normal))
-        for name in names
-    ]
-
-
-def imposed(field, names):
-    """Exact displacements on the given sets."""
-    return [xc.displacement(name, lambda x: field(x)[0]) for name in names]
-
-
-def on_box(mesh, cracks, field, *, traction=(), order=2, plane="strain", E=1.0, nu=0.3, **options):
-    """Problem whose exact solution is the field: tractions on some sides, else displacements."""
-    sides = [s for s in ("left", "right", "bottom", "top") if s not in traction]
-    return xc.Problem(
-        mesh,
-        xc.Isotropic(E, nu, plane),
-        cracks,
-        supports=imposed(field, sides),
-        loads=tractions(field, traction),
-        order=order,
-        **options,
-    )
-
-
-def edge_line(tip, angle, length=1.3):
-    """Straight crack that ends at the tip, running in the direction of the angle."""
-    tip = np.asarray(tip, dtype=float)
-    return xc.line_crack([tip - length * rows(angle)[0], tip])
 
 
 def williams_edge(
@@ -100,13 +47,6 @@ def williams_edge(
         **options,
     )
     return problem, field
-
-
-def l2(values, reference, measure):
-    """Relative L2 error along a lip."""
-    return float(
-        np.sqrt(np.sum(measure * (values - reference) ** 2) / np.sum(measure * reference**2))
-    )
 
 
 def rate(errors, sizes):
@@ -192,8 +132,6 @@ def condition(problem):
 
 # Contact -----------------------------------------------------------------------------------------
 
-SIDES = ("left", "right", "bottom", "top")
-
 
 def polynomial_pressure(x, y, terms, E=1.0, nu=0.3, plane="strain"):
     """Smooth field without shear on y = 0, and of any degree: for patch tests of the crack faces.
@@ -276,37 +214,3 @@ def centre_crack(function, n, *, a=1.0, half=2.0, angle=0.0, origin=(0.0, 0.0), 
     mesh = perturbed(n, seed, amplitude, (-half, -half), (half, half))
     crack = xc.line_crack(np.array([[-a, 0.0], [a, 0.0]]) @ rows(angle) + np.asarray(origin))
     return on_box(mesh, [crack], field, E=E, **options), field
-
-
-def annulus(inner, outer, n, around, *, seed=7, amplitude=0.15):
-    """Ring of n by `around` quadrilaterals, halved; cells grow with the radius, all are moved.
-
-    Its cut through x > 0 lies nowhere on a line of the mesh.
-    """
-    rng = np.random.default_rng(seed)
-    i, j = np.meshgrid(np.arange(n + 1), np.arange(around), indexing="ij")
-    radial = amplitude * rng.uniform(-1, 1, i.shape)
-    radial[[0, -1]] = 0
-    theta = 2 * np.pi * (j + 0.37 + amplitude * rng.uniform(-1, 1, i.shape)) / around
-    r = inner * (outer / inner) ** ((i + radial) / n)
-    points = np.stack([r * np.cos(theta), r * np.sin(theta)], axis=-1).reshape(-1, 2)
-
-    def number(i, j):
-        return i * around + j % around
-
-    i, j = i[:-1].ravel(), j[:-1].ravel()
-    a, b, c, d = number(i, j), number(i + 1, j), number(i + 1, j + 1), number(i, j + 1)
-    cells = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
-    k = np.arange(around)
-    sets = {
-        "inner": np.stack([number(0, k), number(0, k + 1)], 1),
-        "outer": np.stack([number(n, k), number(n, k + 1)], 1),
-    }
-    return xc.Mesh(points, cells, sets)
-
-
-def inner_part(s, share=0.8):
-    """Which lip points lie on the inner part of the crack face."""
-    low, high = s.min(), s.max()
-    edge = (1 - share) / 2 * (high - low)
-    return (s > low + edge) & (s < high - edge)
