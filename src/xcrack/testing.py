@@ -7,13 +7,15 @@ import numpy as np
 
 from xcrack.arrays import Floats
 from xcrack.errors import ProblemError
+from xcrack.growth.checks import wants
 from xcrack.growth.criteria import Criterion
 from xcrack.growth.laws import Law
 
 _ROUND_OFF = 1e-9  # relative; a few operations on numbers of order one
+_RATIOS = [0.0, 0.1, 0.5, 0.8, 0.95]
 
 
-def check_law(law: Law, dK_max: float = 100.0) -> None:
+def check_law(law: Law, dK_max: float = 100.0, a: float = 1.0) -> None:
     """Try a growth law and say all that is wrong with it.
 
     Parameters
@@ -21,9 +23,12 @@ def check_law(law: Law, dK_max: float = 100.0) -> None:
     law : callable (dK_eq, R) -> da/dN
         Called with arrays `(f,)`; must return an array `(f,)` that is never negative or nan,
         does not fall when dK_eq grows, and takes each point for itself. inf says that the
-        toughness is reached.
+        toughness is reached. What it names in ``needs`` is passed by name; with
+        ``ratio = "nominal"`` it is called with R from -2 too.
     dK_max : float, stress √length
         Largest range to try; take one at which your law is still valid.
+    a : float, length
+        Crack size to try it with, where the law asks for it.
 
     Raises
     ------
@@ -36,15 +41,28 @@ def check_law(law: Law, dK_max: float = 100.0) -> None:
     >>> check_law(paris(C=1e-11, m=3))
     """
     wrong: list[str] = []
-    dK = np.repeat(np.linspace(0.0, dK_max, 9), 5)
-    R = np.tile([0.0, 0.1, 0.5, 0.8, 0.95], 9)
-    rate = _called(law, (dK, R), wrong, "da/dN")
+    ratios = [-2.0, -1.0, -0.3, -1e-9] if getattr(law, "ratio", None) == "nominal" else []
+    ratios = [R for R in [*ratios, *_RATIOS] if _is_within(R, getattr(law, "R_range", None))]
+    if not ratios:
+        raise ProblemError(f"the law has no R of {_RATIOS} in its R_range: nothing can be tried.")
+    dK = np.repeat(np.linspace(0.0, dK_max, 9), len(ratios))
+    R = np.tile(ratios, 9)
+    size = np.full(len(dK), a)
+
+    def asked(dK: Floats, R: Floats) -> Floats:
+        return law(dK, R, **wants(law, dK, R, size[: len(dK)]))
+
+    rate = _called(asked, (dK, R), wrong, "da/dN")
     if rate is not None:
         if rate.shape != dK.shape:
             wrong.append(f"for {len(dK)} points it returns shape {rate.shape}, not {dK.shape}")
         else:
-            _check_rates(law, dK, R, rate, wrong)
+            _check_rates(asked, dK, R, rate, wrong)
     _judge("law", law, wrong)
+
+
+def _is_within(R: float, bounds: tuple[float, float] | None) -> bool:
+    return bounds is None or bounds[0] <= R <= bounds[1]
 
 
 def _check_rates(law: Law, dK: Floats, R: Floats, rate: Floats, wrong: list[str]) -> None:
@@ -62,13 +80,14 @@ def _check_rates(law: Law, dK: Floats, R: Floats, rate: Floats, wrong: list[str]
     if (rate[dK == 0] != 0).any():
         wrong.append("da/dN is not 0 for dK_eq = 0: a crack without load would grow")
     largest = np.abs(rate[np.isfinite(rate)]).max(initial=0.0)
-    table = rate.reshape(9, 5)
+    table = rate.reshape(9, -1)
+    n = table.shape[1]
     # inf to inf is no fall, inf to a number is one
     falls = table[1:] < np.where(np.isinf(table[:-1]), np.inf, table[:-1] - _ROUND_OFF * largest)
     if falls.any():
         i, j = np.argwhere(falls)[0]
         wrong.append(
-            f"da/dN falls when dK_eq grows from {dK[5 * i]} to {dK[5 * i + 5]} at R = {R[j]}"
+            f"da/dN falls when dK_eq grows from {dK[n * i]} to {dK[n * i + n]} at R = {R[j]}"
         )
     one = np.array(
         [np.asarray(law(dK[i : i + 1], R[i : i + 1])).reshape(-1)[0] for i in range(len(dK))]

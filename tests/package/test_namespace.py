@@ -24,6 +24,10 @@ NAMES = [
     "draw_fronts",
     # verification, reports, files of scenes
     "verify",
+    # laws
+    "el_haddad", "forman", "hartman_schijve", "klesnil_lukas", "law", "linear_closure", "nasgro",
+    "nasgro_K_c", "nasgro3_threshold", "nasgro4_threshold", "newman_closure", "piecewise",
+    "presets", "rate_table", "schijve_closure", "stepped_threshold",
     # errors
     "ConvergenceError", "GeometryError", "MeshError", "ProblemError", "XcrackError",
     "XcrackWarning",

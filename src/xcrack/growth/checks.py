@@ -1,5 +1,6 @@
 """Evaluate criteria and laws, and validate what they return."""
 
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -9,6 +10,7 @@ from xcrack.errors import ProblemError
 from xcrack.growth.criteria import Criterion
 from xcrack.growth.laws import Law
 from xcrack.inputs import called, numbers
+from xcrack.laws.law import NEEDS, largest_K
 
 _RATIOS = (0.0, 0.5)  # a law that gives the same rate for both does not depend on R
 
@@ -77,7 +79,9 @@ def _one_a_place(part: Any, name: str, n: int, places: str) -> Floats:
         ) from error
 
 
-def evaluate_law(law: Law, dK_eq: Floats, R: Floats, crack: int, place: str = "tip") -> Floats:
+def evaluate_law(
+    law: Law, dK_eq: Floats, R: Floats, crack: int, place: str = "tip", a: Floats | None = None
+) -> Floats:
     """Growth a cycle at each place of one crack.
 
     Parameters
@@ -88,6 +92,8 @@ def evaluate_law(law: Law, dK_eq: Floats, R: Floats, crack: int, place: str = "t
         Its number, for messages.
     place : str
         What a point of a front is called in messages.
+    a : (f,) array, optional, length
+        Crack size at each place, for a law that asks for it.
 
     Returns
     -------
@@ -101,7 +107,10 @@ def evaluate_law(law: Law, dK_eq: Floats, R: Floats, crack: int, place: str = "t
     """
     if len(dK_eq) == 0:
         return np.zeros(0)
-    result = called(law, f"the growth rates of crack {crack}", dK_eq.copy(), R.copy())
+    wanted = wants(law, dK_eq, R, a)
+    result = called(
+        partial(law, **wanted), f"the growth rates of crack {crack}", dK_eq.copy(), R.copy()
+    )
     rate = np.array(numbers(result, "the growth rate that the law returned", finite=False))
     if rate.shape != dK_eq.shape:
         raise ProblemError(
@@ -119,10 +128,30 @@ def evaluate_law(law: Law, dK_eq: Floats, R: Floats, crack: int, place: str = "t
     return rate
 
 
+def wants(law: Law, dK_eq: Floats, R: Floats, a: Floats | None) -> dict[str, Floats]:
+    """What a law asks for by name beside the range and R: ``needs`` says it.
+
+    Raises
+    ------
+    ProblemError
+        It asks for something that there is not.
+    """
+    needs = getattr(law, "needs", ())
+    unknown = [name for name in needs if name not in NEEDS]
+    if unknown:
+        raise ProblemError(f"the law needs {unknown}: it can be given {', '.join(NEEDS)}.")
+    values: dict[str, Floats] = {}
+    if "a" in needs:
+        values["a"] = np.ones(len(dK_eq)) if a is None else a.copy()
+    if "K_max" in needs:
+        values["K_max"] = largest_K(dK_eq, R)
+    return values
+
+
 def depends_on_ratio(law: Law, dK_eq: Floats) -> bool:
     """Whether a law gives other rates for other ratios R at these ranges `(f,)`."""
     low, high = (evaluate_law(law, dK_eq, np.full(len(dK_eq), ratio), 0) for ratio in _RATIOS)
     return not np.array_equal(low, high)
 
 
-__all__ = ["depends_on_ratio", "evaluate_criterion", "evaluate_law"]
+__all__ = ["depends_on_ratio", "evaluate_criterion", "evaluate_law", "wants"]

@@ -12,7 +12,7 @@ from xcrack.analysis.solve import solve_states
 from xcrack.crack.crack import Crack
 from xcrack.errors import GeometryError, ProblemError, XcrackError, warn
 from xcrack.growth.advance import LEAST, Advance, PerCrack, plan_advance
-from xcrack.growth.checks import depends_on_ratio, evaluate_criterion, evaluate_law
+from xcrack.growth.checks import depends_on_ratio
 from xcrack.growth.criteria import Criterion
 from xcrack.growth.ending import end_at, left_the_body, short_kink, too_short
 from xcrack.growth.follow import following
@@ -20,6 +20,7 @@ from xcrack.growth.laws import Law
 from xcrack.growth.notices import Notices
 from xcrack.growth.options import GrowOptions, Run, lists_options, run_of
 from xcrack.growth.progress import report_end, report_step
+from xcrack.growth.rating import check_choice, rates_of
 from xcrack.growth.step import Cycle, Memory, Step, memory_of
 from xcrack.mesh.locate import cell_sizes
 from xcrack.scene.problem import Problem
@@ -48,8 +49,9 @@ def grow(
         With the cracks as they are at first. The radius of the tip functions is taken at the
         first step and used in all.
     law : callable (dK_eq, R) -> da/dN
-        `paris`, `elber`, `walker` or your own. Where it returns inf, the toughness is reached and
-        growth ends.
+        `paris`, `walker`, `forman`, `nasgro` ... or your own. Where it returns inf, the toughness
+        is reached and growth ends. One with ``ratio="nominal"`` gets range and R < 0 of the scene
+        without contact, in the direction that K with contact asks for: one more solve a step.
     criterion : callable (K, nu) -> (angle, dK_eq, R)
         `max_hoop_stress`, `mean_reference`, `weighted_angle` or your own; angles in rad.
     cycle : Cycle
@@ -81,8 +83,9 @@ def grow(
     Raises
     ------
     ProblemError
-        Options that do not fit; a law that returns negative or nan; an angle of pi or more; an
-        advance below a tenth of the cell at the tip (later in a run: a warning, and the run ends).
+        Options that do not fit; R < 0 under a law that must know how R is meant, and does not; a
+        law that returns negative or nan; an angle of pi or more; an advance below a tenth of the
+        cell at the tip (later in a run: a warning, and the run ends).
 
     Warns
     -----
@@ -101,6 +104,7 @@ def grow(
 
 def steps_of(run: Run, last: Step | None = None) -> Generator[Step, None, str]:
     """Steps of a run: from the beginning, or those that follow a step."""
+    check_choice(run.law, run.cycle.ratio)
     notices = Notices()
     kink = ""
     try:
@@ -161,6 +165,8 @@ def _after(run: Run, last: Step, reuse: Reuse) -> tuple[Step | None, Reuse, str]
 
 def _warn_of_ratio(run: Run, first: Step) -> None:
     """Warn where R < 0 was asked for and a law that depends on R never sees it."""
+    if getattr(run.law, "ratio", None) is not None:
+        return
     ratio, dK_eq = run.cycle.ratio, np.concatenate([d[d > 0] for d in first.dK_eq])
     if ratio is None or ratio >= 0 or not len(dK_eq) or not depends_on_ratio(run.law, dK_eq):
         return
@@ -182,17 +188,9 @@ def _next_step(
     """Solve all load states of a problem and decide where and how fast its cracks grow."""
     begin = time.perf_counter()
     before = None if last is None else memory_of(last)
-    cracks, mesh, nu = problem.placed, problem.mesh, run.problem.material.nu
-    place = following(mesh).PLACE
+    cracks, mesh = problem.placed, problem.mesh
     solutions, sif, handed_on = respond(problem, run, reuse)
-    angle, dK_eq, R, law_rates = [], [], [], []
-    for c in range(len(cracks)):
-        K = np.stack([state[c].K for state in sif])
-        direction, dK, ratio = evaluate_criterion(run.criterion, K, nu, c, place)
-        angle.append(direction)
-        dK_eq.append(dK)
-        R.append(ratio)
-        law_rates.append(evaluate_law(run.law, dK, ratio, c, place))
+    angle, dK_eq, R, law_rates = rates_of(run, problem, sif)
     rate = tuple(np.where(d < run.threshold, 0.0, r) for d, r in zip(dK_eq, law_rates))
     length = tuple(following(mesh).crack_size(crack, mesh) for crack in cracks)
     if last is None or before is None:
@@ -205,18 +203,16 @@ def _next_step(
         index, radius = last.index + 1, before.radius
         since, pending = following(mesh).followed(last, cracks, sif[0], law_rates, length, mesh)
         n_cycles = last.cycles + since
-    plan = _plan(run, sif[0], rate, tuple(dK_eq), pending)
-    memory = Memory(
-        tuple(law_rates), length, plan.pending, radius, handed_on.without_matrices(), settings
-    )
+    plan = _plan(run, sif[0], rate, dK_eq, pending)
+    memory = Memory(law_rates, length, plan.pending, radius, handed_on.without_matrices(), settings)
     step = Step(
         index=index,
         cycles=n_cycles,
         cracks=cracks,
         sif=sif,
-        angle=tuple(angle),
-        dK_eq=tuple(dK_eq),
-        R=tuple(R),
+        angle=angle,
+        dK_eq=dK_eq,
+        R=R,
         rate=rate,
         da=plan.da,
         solutions=solutions,

@@ -41,22 +41,22 @@ def _meshes(level: int, order: int) -> list[Value]:
 
 def _cuts(level: int, order: int) -> list[Value]:
     del level
-    found = {}
+    result = {}
     for share in (0.5, 0.1, 1e-2, 1e-6, 1e-12):
         y = (2 + share) / 8
         crack = line_crack([(-1.1, y), (1.1, y)])
         problem = Problem(box((-1, -1), (1, 1), 16), _MATERIAL, [crack], order=order)
-        found[f"{share:g} cells from a row"] = inf_sup(problem)
-    return _flat(found)
+        result[f"{share:g} cells from a row"] = inf_sup(problem)
+    return _flat(result)
 
 
 def _space(level: int) -> list[Value]:
-    found = {}
+    result = {}
     for n in (4, 6, 8)[: 2 + level]:
         crack = plane_crack([(-2, -2, 0.1), (2, -2, -0.05), (2, 2, -0.05), (-2, 2, 0.1)])
         mesh = perturbed(n, 23, lower=(-1,) * 3, upper=(1,) * 3)
-        found[f"{n} cells a side"] = inf_sup(Problem(mesh, Isotropic(1.0, 0.3), [crack]))
-    return _flat(found)
+        result[f"{n} cells a side"] = inf_sup(Problem(mesh, Isotropic(1.0, 0.3), [crack]))
+    return _flat(result)
 
 
 CASES = (

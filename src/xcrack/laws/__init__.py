@@ -1,0 +1,1 @@
+"""Growth laws, closures and thresholds: values that are called, and presets with their sources."""
