@@ -13,6 +13,7 @@ _HOME = {
     "Mesh": "mesh.mesh",
     "box": "mesh.box",
     "read_mesh": "mesh.files",
+    "mesh_step": "mesh.step",
     "write_mesh": "mesh.files",
     "plate": "mesh.plates",
     "plate_with_hole": "mesh.plates",

@@ -149,7 +149,7 @@ def test_a_case_that_breaks_has_failed_and_says_why():
     assert not Book((result,), True).passed
 
 
-def test_what_is_missing_is_skipped_and_said():
+def test_what_is_missing_is_skipped_and_reported():
     result = run_case(fake(lambda k: [], needs="no_such_package"))
     assert result.status == "skipped"
     assert "no_such_package" in result.skipped

@@ -8,8 +8,9 @@ import numpy as np
 
 from xcrack.arrays import Floats, Ints
 from xcrack.errors import MeshError
+from xcrack.mesh.linear import base_kind
 from xcrack.mesh.mesh import Mesh
-from xcrack.mesh.raw import TOPOLOGICAL_DIM, RawMesh, sets_to_write
+from xcrack.mesh.raw import RawMesh, sets_to_write
 
 _PLANE = r"(?:CPS|CPEG?|CG?AX|DC2D|DCAX|AC2D|STRI|S|DS|M3D|SFM3D|R3D|F3D)(\d)"
 _SOLID = r"(?:C3D|DC3D|AC3D)(\d+)"
@@ -26,12 +27,18 @@ _NODES = {
     "hexahedron20": 20,
 }  # fmt: skip
 # Faces S1, S2, ... of an element, as local node numbers (Abaqus manual, element library).
-_FACES = {
+_FACES: dict[str, tuple[tuple[int, ...], ...]] = {
     "triangle": ((0, 1), (1, 2), (2, 0)),
+    "quad": ((0, 1), (1, 2), (2, 3), (3, 0)),
     "tetra": ((0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0)),
-}
+    "pyramid": ((0, 1, 2, 3), (0, 4, 1), (1, 4, 2), (2, 4, 3), (3, 4, 0)),
+    "wedge": ((0, 1, 2), (3, 5, 4), (0, 3, 4, 1), (1, 4, 5, 2), (2, 5, 3, 0)),
+    "hexahedron": (
+        (0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1), (1, 5, 6, 2), (2, 6, 7, 3), (3, 7, 4, 0),
+    ),
+}  # fmt: skip
 _WRITTEN_TYPES = {2: ("T3D2", "CPS3"), 3: ("S3", "C3D4")}  # facets, cells
-_FACE_KIND = {"triangle": "line", "tetra": "triangle"}
+_FACE_KIND = {2: "line", 3: "triangle", 4: "quad"}  # by corners
 
 Section = tuple[str, dict[str, str], list[list[str]]]
 
@@ -235,7 +242,7 @@ def _raw(
                 kind, corners = elements[member]
                 kinds.setdefault(kind, []).append(corners)
         for kind, rows in kinds.items():
-            if kind in TOPOLOGICAL_DIM:
+            if base_kind(kind) is not None:
                 try:
                     yield kind, np.array([[number[node] for node in row] for row in rows])
                 except KeyError as error:
@@ -257,9 +264,10 @@ def _raw(
                 continue  # SPOS, SNEG: sides of a shell
             known = element_sets.get(_find(element_sets, where), [])
             for kind, rows in by_kind([int(where)] if where.isdigit() else known):
-                local = _FACES.get(kind, ())
-                if int(face[1]) <= len(local):
-                    sets.append((_FACE_KIND[kind], name, rows[:, local[int(face[1]) - 1]]))
+                local = _FACES.get(base_kind(kind) or "", ())
+                if 1 <= int(face[1]) <= len(local):
+                    corners = local[int(face[1]) - 1]
+                    sets.append((_FACE_KIND[len(corners)], name, rows[:, corners]))
     rows_of = [
         (name, np.array([number[n] for n in members if n in number], dtype=np.int64))
         for name, members in point_sets.items()

@@ -17,32 +17,43 @@ from xcrack.arrays import Floats, Ints
 from xcrack.errors import GeometryError, MeshError, XcrackError, warn
 from xcrack.inputs import path_of, system_errors
 from xcrack.mesh.abaqus import abaqus_text, read_abaqus
+from xcrack.mesh.linear import SHAPES, base_kind, linearised
 from xcrack.mesh.mesh import Mesh
 from xcrack.mesh.msh import REST, msh_text
-from xcrack.mesh.raw import (
-    CELL_KIND,
-    FACET_KIND,
-    TOPOLOGICAL_DIM,
-    RawMesh,
-    mesh_from_raw,
-    sets_to_write,
-)
+from xcrack.mesh.raw import CELL_KIND, FACET_KIND, RawMesh, mesh_from_raw, sets_to_write
 from xcrack.optional import required
 
 _SET = "set:"  # prefix of the 0/1 cell data that carry a set in formats without sets
 _WITH_CELL_DATA = {".vtu", ".vtk", ".xdmf", ".xmf"}
 _TAGS = ("gmsh:physical", "medit:ref", "cell_tags", "nastran:ref", "su2:tag")
 _ENTITY_TAGS = "gmsh:geometrical"
+_WITH_GMSH = "Let gmsh convert it, which keeps its groups: gmsh {0} -save -o {1}.msh."
+_CONVERT = {  # formats that meshio does not read, or not always
+    ".unv": _WITH_GMSH,
+    ".bdf": _WITH_GMSH,
+    ".nas": _WITH_GMSH,
+    ".fem": _WITH_GMSH,
+    ".cdb": "Convert it in Python with the package mapdl-archive (python -m pip install "
+    'mapdl-archive): mapdl_archive.Archive("{0}").grid.save("{1}.vtu").',
+    ".step": 'It is a shape without a mesh: xcrack.mesh_step("{0}", size=...) meshes it.',
+    ".stp": 'It is a shape without a mesh: xcrack.mesh_step("{0}", size=...) meshes it.',
+}
 
 
-def read_mesh(path: str | PathLike[str]) -> Mesh:
-    """Read a mesh of triangles (2D) or tetrahedra (3D) with its sets.
+def read_mesh(path: str | PathLike[str], *, strict: bool = False) -> Mesh:
+    """Read a mesh with its sets, and make triangles (2D) or tetrahedra (3D) of its cells.
+
+    Midside nodes of cells of second or higher order are left out. Quadrilaterals, pyramids, prisms
+    and hexahedra are divided so that neighbours agree: a face of four corners from its smallest
+    point number (Dompierre et al. 1999). A warning counts them.
 
     Parameters
     ----------
     path : path
         File in a format of meshio, chosen by its extension: ``.msh`` (gmsh 2.2, 4.1, text or
         binary), ``.inp`` (Abaqus), ``.vtu``, ``.vtk``, ``.mesh``, ``.xdmf`` ...
+    strict : bool
+        Refuse cells that would be changed: only linear triangles and tetrahedra are taken.
 
     Returns
     -------
@@ -64,7 +75,8 @@ def read_mesh(path: str | PathLike[str]) -> Mesh:
     XcrackError
         The file is missing, may not be read, or has an unknown extension.
     MeshError
-        The contents are unreadable, or no mesh of linear triangles or tetrahedra.
+        The contents are unreadable, or no mesh that triangles or tetrahedra can be made of;
+        cells that are turned inside out; other cells than linear simplices where `strict`.
 
     Examples
     --------
@@ -81,7 +93,7 @@ def read_mesh(path: str | PathLike[str]) -> Mesh:
             raw = read_abaqus(path)
         else:
             raw = _raw_from_meshio(_meshio_read(path, "mesh"), _gmsh_names(path))
-    return mesh_from_raw(raw, path.name)
+    return mesh_from_raw(linearised(raw, path.name, strict), path.name)
 
 
 def read_triangles(path: str | PathLike[str]) -> tuple[Floats, Ints]:
@@ -215,6 +227,8 @@ def _meshio_read(path: Path, what: str) -> Any:
     except OSError:
         raise
     except (Exception, SystemExit) as error:
+        if isinstance(error, ModuleNotFoundError) and error.name:
+            required(error.name, f"reading a {path.suffix} file")
         if "gmsh:physical" in str(error):
             reason = (
                 "some of its elements are in physical groups and some are not (gmsh saved all): "
@@ -223,9 +237,14 @@ def _meshio_read(path: Path, what: str) -> Any:
         else:
             reason = " ".join(f"{output.getvalue()} {error}".split()) or type(error).__name__
         raise MeshError(
-            f"cannot read the {what} file {str(path)!r}: {reason}. Check that it is a whole "
-            f"{path.suffix} file."
+            f"cannot read the {what} file {str(path)!r}: {reason.rstrip('.')}. Check that it is a "
+            f"whole {path.suffix} file. {_conversion(path)}".rstrip()
         ) from error
+
+
+def _conversion(path: Path) -> str:
+    """What to do with a file of a format that meshio does not read, or not always."""
+    return _CONVERT.get(path.suffix.lower(), "").format(path.name, path.stem)
 
 
 def _meshio_write(path: Path, mesh: Mesh) -> None:
@@ -267,9 +286,10 @@ def _meshio_write(path: Path, mesh: Mesh) -> None:
 
 def _check_extension(path: Path, verb: str, known: dict[str, list[str]]) -> None:
     if path.suffix.lower() not in known:
+        remedy = _conversion(path) if verb == "read" else ""
         raise XcrackError(
-            f"cannot {verb} {path.name!r}: no mesh format has the extension {path.suffix!r}; "
-            f"known are {', '.join(sorted(known))}."
+            f"cannot {verb} {path.name!r}: {path.suffix!r} is no extension of a mesh format that "
+            f"is known here. {remedy or 'Known are ' + ', '.join(sorted(known)) + '.'}"
         )
 
 
@@ -298,11 +318,12 @@ def _raw_from_meshio(mesh: Any, names: dict[tuple[int, int], str]) -> RawMesh:
     tag_names = [name for name in _TAGS if name in tagged]
     if not tag_names and not names and _ENTITY_TAGS in tagged:
         tag_names = [_ENTITY_TAGS]
-    top = max((TOPOLOGICAL_DIM.get(kind, 0) for kind, _ in blocks), default=0)
+    base = [base_kind(kind) for kind, _ in blocks]
+    top = max((SHAPES[shape].dim for shape in base if shape), default=0)
     for number, (kind, data) in enumerate(blocks):
-        if kind not in TOPOLOGICAL_DIM:
+        if (shape := base[number]) is None:
             continue
-        dim = TOPOLOGICAL_DIM[kind]
+        dim = SHAPES[shape].dim
         noun = "cells" if dim == top else "facets"
         for tag_name in tag_names:
             tags = np.abs(np.asarray(mesh.cell_data[tag_name][number], dtype=np.int64))

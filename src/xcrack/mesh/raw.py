@@ -146,18 +146,11 @@ def _check_kinds(blocks: list[tuple[str, Ints]], source: str) -> None:
     if not counts:
         return
     content = ", ".join(f"{count} {kind}" for kind, count in counts.items())
-    if any(kind.startswith(("line", "triangle", "tetra")) for kind in counts):
-        remedy = (
-            "Save the mesh at first order (gmsh: Mesh.ElementOrder = 1; Abaqus: CPE3, CPS3, C3D4); "
-            "xcrack adds the functions of order 2 itself."
-        )
-    else:
-        remedy = (
-            "Mesh with triangles or tetrahedra (gmsh: Mesh.RecombineAll = 0, no Recombine, no "
-            "Layers; Abaqus: element shape Tri or Tet)."
-        )
     raise MeshError(
-        f"{source} has {content}: only linear triangles and tetrahedra are used. {remedy}"
+        f"{source} has {content}: xcrack makes triangles and tetrahedra of triangles, "
+        "quadrilaterals, tetrahedra, pyramids, prisms and hexahedra of any order, and reads no "
+        "other cells. Mesh with those (gmsh: no Recombine of volumes; Abaqus: CPE3, CPS4, C3D10 "
+        "...)."
     )
 
 
