@@ -9,7 +9,7 @@ from xcrack.arrays import Floats
 from xcrack.errors import ProblemError
 from xcrack.growth.checks import wants
 from xcrack.growth.criteria import Criterion
-from xcrack.growth.laws import Law
+from xcrack.laws.law import Law
 
 _ROUND_OFF = 1e-9  # relative; a few operations on numbers of order one
 _RATIOS = [0.0, 0.1, 0.5, 0.8, 0.95]
@@ -37,7 +37,7 @@ def check_law(law: Law, dK_max: float = 100.0, a: float = 1.0) -> None:
 
     Examples
     --------
-    >>> from xcrack.growth.laws import paris
+    >>> from xcrack.laws.power import paris
     >>> check_law(paris(C=1e-11, m=3))
     """
     wrong: list[str] = []

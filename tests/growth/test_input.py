@@ -10,9 +10,9 @@ from xcrack.crack.size_2d import length_inside
 from xcrack.errors import ProblemError, XcrackWarning, warn
 from xcrack.growth import run as growth
 from xcrack.growth.criteria import max_hoop_stress
-from xcrack.growth.laws import elber, paris, walker
 from xcrack.growth.run import grow
 from xcrack.growth.step import Cycle
+from xcrack.laws.power import elber, paris, walker
 
 LAW = paris(C=1e-11, m=3.0)
 CYCLE = Cycle(0.0, 1.0)

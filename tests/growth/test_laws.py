@@ -6,7 +6,7 @@ from scipy.integrate import quad
 
 from support import exact
 from xcrack.errors import ProblemError
-from xcrack.growth.laws import elber, paris, walker
+from xcrack.laws.power import elber, paris, walker
 from xcrack.testing import check_criterion, check_law
 
 A0, A1, STRESS, C = 1e-3, 1e-2, 100.0, 1e-11

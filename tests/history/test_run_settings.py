@@ -19,13 +19,13 @@ from xcrack.growth import description
 from xcrack.growth import fingerprint as settings
 from xcrack.growth.criteria import max_hoop_stress
 from xcrack.growth.fingerprint import describe, differences
-from xcrack.growth.laws import paris
 from xcrack.growth.options import Run
 from xcrack.growth.run import grow
 from xcrack.growth.step import Cycle
 from xcrack.history import collect as collecting
 from xcrack.history.collect import collect, resume
 from xcrack.history.versions import versions
+from xcrack.laws.power import paris
 from xcrack.scene import conditions
 
 

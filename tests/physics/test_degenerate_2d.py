@@ -488,7 +488,7 @@ def test_shapes_that_are_refused_or_harmless():
         solve([(-0.5, -1 + 0.3 * h), (0.5, -1 + 0.3 * h)])  # a sliver along the bottom
     with pytest.raises(xc.GeometryError, match=r"crack 0 from .* cuts no cell.*along the boundary"):
         solve([(-1.5, -1.0), (1.5, -1.0)])
-    with pytest.raises(xc.ProblemError, match=r"cut the body into 2 pieces.*hold it by a support"):
+    with pytest.raises(xc.ProblemError, match=r"cut the body into 2 pieces.*give it a support"):
         solve([(-1.5, -1 + 0.3 * h), (1.5, -1 + 0.3 * h)])
     with pytest.raises(xc.GeometryError, match=r"ends at .* inside the boundary.*half a cell"):
         solve([(-0.5, -1.3), (-0.45, -1 + 0.3 * h)])  # a nick

@@ -8,11 +8,11 @@ import pytest
 from support.growth_fakes import mode_I, patch_respond, plate
 from xcrack.crack.lines import line_crack
 from xcrack.growth.criteria import weighted_angle
-from xcrack.growth.laws import paris
 from xcrack.growth.run import grow
 from xcrack.growth.step import Cycle
 from xcrack.history import store
 from xcrack.history.collect import collect
+from xcrack.laws.power import paris
 
 LAW = paris(C=1e-11, m=3.0)
 CYCLE = Cycle(0.0, 1.0)

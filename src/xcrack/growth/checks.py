@@ -8,9 +8,8 @@ import numpy as np
 from xcrack.arrays import Floats
 from xcrack.errors import ProblemError
 from xcrack.growth.criteria import Criterion
-from xcrack.growth.laws import Law
 from xcrack.inputs import called, numbers
-from xcrack.laws.law import NEEDS, largest_K
+from xcrack.laws.law import NEEDS, Law, largest_K
 
 _RATIOS = (0.0, 0.5)  # a law that gives the same rate for both does not depend on R
 

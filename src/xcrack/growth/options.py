@@ -8,9 +8,9 @@ from typing import Any, TypedDict, TypeVar, cast
 from xcrack.errors import ProblemError
 from xcrack.growth.criteria import Criterion
 from xcrack.growth.fingerprint import DEFAULTS, describe, with_defaults_of
-from xcrack.growth.laws import Law
 from xcrack.growth.step import Cycle
 from xcrack.inputs import number, whole
+from xcrack.laws.law import Law
 from xcrack.scene.problem import Problem
 
 _STOPS = {"changes_results": False}  # when a run stops, not how its cracks grow

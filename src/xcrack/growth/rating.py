@@ -11,8 +11,8 @@ from xcrack.errors import ProblemError
 from xcrack.growth.advance import PerCrack
 from xcrack.growth.checks import evaluate_criterion, evaluate_law
 from xcrack.growth.follow import following
-from xcrack.growth.laws import Law
 from xcrack.growth.options import Run
+from xcrack.laws.law import Law
 from xcrack.scene.problem import Problem
 from xcrack.sif.sif import SIF
 from xcrack.sif.stress_intensity import stress_intensities

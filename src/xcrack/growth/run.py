@@ -16,12 +16,12 @@ from xcrack.growth.checks import depends_on_ratio
 from xcrack.growth.criteria import Criterion
 from xcrack.growth.ending import end_at, left_the_body, short_kink, too_short
 from xcrack.growth.follow import following
-from xcrack.growth.laws import Law
 from xcrack.growth.notices import Notices
 from xcrack.growth.options import GrowOptions, Run, lists_options, run_of
 from xcrack.growth.progress import report_end, report_step
 from xcrack.growth.rating import check_choice, rates_of
 from xcrack.growth.step import Cycle, Memory, Step, memory_of
+from xcrack.laws.law import Law
 from xcrack.mesh.locate import cell_sizes
 from xcrack.scene.problem import Problem
 from xcrack.sif.sif import SIF

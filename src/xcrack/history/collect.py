@@ -9,7 +9,6 @@ from typing import Any, Unpack
 from xcrack.errors import ProblemError, warn
 from xcrack.growth.criteria import Criterion
 from xcrack.growth.fingerprint import differences, only_compiled_differently
-from xcrack.growth.laws import Law
 from xcrack.growth.options import GrowOptions, Run, lists_options, run_of
 from xcrack.growth.run import steps_of
 from xcrack.growth.step import Cycle, Step, shortened
@@ -19,6 +18,7 @@ from xcrack.history.lock import locked
 from xcrack.history.run_folder import Header
 from xcrack.history.versions import versions
 from xcrack.inputs import called, path_of, system_errors
+from xcrack.laws.law import Law
 from xcrack.mesh.mesh import Mesh
 from xcrack.scene.problem import Problem
 

@@ -10,10 +10,10 @@ from xcrack.book.case import Case, Value
 from xcrack.crack.lines import line_crack
 from xcrack.crack.surfaces import penny_crack
 from xcrack.growth.criteria import max_hoop_stress, weighted_angle
-from xcrack.growth.laws import paris
 from xcrack.growth.run import grow
 from xcrack.growth.step import Cycle
 from xcrack.history.collect import collect, resume
+from xcrack.laws.power import paris
 from xcrack.mesh.box import box
 from xcrack.scene.conditions import traction
 from xcrack.scene.material import Isotropic

@@ -11,10 +11,11 @@ from xcrack.book.case import Case, Value
 from xcrack.crack.lines import line_crack
 from xcrack.growth.criteria import weighted_angle
 from xcrack.growth.cycles import cycles_between
-from xcrack.growth.laws import Law, elber, paris, walker
 from xcrack.growth.run import grow
 from xcrack.growth.step import Cycle
 from xcrack.history.collect import collect
+from xcrack.laws.law import Law
+from xcrack.laws.power import elber, paris, walker
 from xcrack.mesh.box import box
 from xcrack.scene.conditions import fix, traction
 from xcrack.scene.material import Isotropic
