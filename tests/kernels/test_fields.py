@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import xcrack as xc
-from xcrack.kernels.fields import set_gradients
+from xcrack.kernels.fields import places, set_gradients
 from xcrack.kernels.ring import add_plain_cells, add_points, cells_between
 from xcrack.kernels.shapes import set_jumps, set_standard
 from xcrack.mesh.locate import locate
@@ -135,6 +135,16 @@ def test_gradients(d):
     wanted = np.full((10, d, d, 2), 7.0)
     wanted[number] = np.einsum("qnj,qnis->qijs", slope, values[row])
     assert result == pytest.approx(wanted, rel=1e-13)
+
+
+@pytest.mark.parametrize("d", [2, 3])
+def test_places(d):
+    """Coordinates are the corners weighted."""
+    rng = np.random.default_rng(3111)
+    points, cells = rng.standard_normal((9, d)), rng.integers(0, 9, (4, d + 1))
+    cell, bary = rng.integers(0, 4, 11), rng.dirichlet(np.ones(d + 1), 11)
+    wanted = np.einsum("qb,qbd->qd", bary, points[cells[cell]])
+    assert places(cell, bary, points, cells) == pytest.approx(wanted, rel=1e-13, abs=1e-14)
 
 
 @pytest.mark.parametrize("order", [1, 2])

@@ -5,7 +5,6 @@ from functools import cached_property
 
 import numpy as np
 from scipy.interpolate import CubicSpline
-from scipy.spatial import cKDTree
 
 from xcrack.arrays import Bools, Floats, Ints, lock
 from xcrack.errors import GeometryError
@@ -77,12 +76,12 @@ class FrontCurve:
         return float(self.breaks[-1])
 
     @cached_property
-    def _guesses(self) -> tuple[Floats, cKDTree]:
+    def _guesses(self) -> tuple[Floats, Floats]:
         each = max(_LEAST, -(-_SAMPLES // (len(self.breaks) - 1)))
         inner = np.arange(each) / each
         s = (self.breaks[:-1, None] + np.diff(self.breaks)[:, None] * inner).ravel()
         s = np.append(s, self.breaks[-1])
-        return s, cKDTree(self.at(s)[0])
+        return s, self.at(s)[0]
 
     def at(self, s: Floats) -> tuple[Floats, Floats, Floats]:
         """Points of the front.
@@ -135,19 +134,25 @@ class FrontCurve:
         feet : Feet
             Theirs.
         """
+        from xcrack.kernels.distance import nearest_vertices
         from xcrack.kernels.front import feet
 
-        s, tree = self._guesses
+        s, samples = self._guesses
         step = float(np.diff(s).max())
-        distance, sample = tree.query(x, distance_upper_bound=radius + step)
-        rows = np.nonzero(distance < np.inf)[0]
+        sample, _ = nearest_vertices(x, samples, radius + step)
+        rows = np.nonzero(sample >= 0)[0]
         picked = np.ascontiguousarray(x[rows], dtype=float)
         curve = (self.breaks, self.place, self.normal, self.closed)
         return rows, Feet(*feet(picked, s[sample[rows]], 2 * step, *curve))
 
-    def distance(self, x: Floats) -> Floats:
-        """Distance of points to the samples of the front `(q,)`, a bound from above."""
-        return np.asarray(self._guesses[1].query(x)[0])
+    def distance(self, x: Floats, bound: float = np.inf) -> Floats:
+        """Distance of points to the samples of the front `(q,)`; inf beyond a bound, length.
+
+        It bounds the distance to the front from above.
+        """
+        from xcrack.kernels.distance import nearest_vertices
+
+        return np.asarray(nearest_vertices(x, self._guesses[1], bound)[1])
 
     def sharpest(self, first: float = -np.inf, last: float = np.inf, over: float = 0.0) -> float:
         """Smallest radius of curvature among the samples; inf for a straight front.

@@ -1,4 +1,6 @@
-"""Signed distance of points to a polyline."""
+"""Distances of points to polylines."""
+
+import math
 
 import numpy as np
 
@@ -70,3 +72,66 @@ def polyline_distance(x, vertices):  # type: ignore[no-untyped-def]
         sign = (-ey[s] - ey[other]) * rx + (ex[s] + ex[other]) * ry
         phi[i] = np.copysign(np.sqrt(best), sign)
     return phi, segment
+
+
+@kernel
+def nearest_vertices(x, vertices, bound):  # type: ignore[no-untyped-def]
+    """Nearest vertex of a polyline to each point.
+
+    The polyline is divided into stretches, each within a radius of its middle vertex. The stretch
+    of the point before is looked at first: points in the order of their cells leave few others
+    that may come nearer.
+
+    Parameters
+    ----------
+    x : (n, d) array
+    vertices : (p, d) array
+    bound : float
+        Points farther than this from all vertices have none.
+
+    Returns
+    -------
+    nearest : (n,) array of int
+        -1 where there is none.
+    distance : (n,) array
+        inf where there is none.
+    """
+    n, count, dim = len(x), len(vertices), x.shape[1]
+    each = max(1, int(0.6 * math.sqrt(count)))
+    stretches = (count + each - 1) // each
+    middle, reach = np.empty((stretches, dim)), np.zeros(stretches)
+    for b in range(stretches):
+        first, end = b * each, min(count, (b + 1) * each)
+        for j in range(dim):
+            middle[b, j] = vertices[(first + end) // 2, j]
+        for v in range(first, end):
+            square = 0.0
+            for j in range(dim):
+                square += (vertices[v, j] - middle[b, j]) ** 2
+            reach[b] = max(reach[b], math.sqrt(square) * (1.0 + 1e-12))
+    nearest, distance = np.full(n, -1, np.int64), np.full(n, np.inf)
+    start = 0
+    for i in range(n):
+        best, least, where = bound, bound * bound, -1
+        for k in range(-1, stretches):
+            b = start if k < 0 else k
+            if k == start:
+                continue
+            square = 0.0
+            for j in range(dim):
+                square += (x[i, j] - middle[b, j]) ** 2
+            if square >= (best + reach[b]) ** 2:
+                continue
+            closer = False
+            for v in range(b * each, min(count, (b + 1) * each)):
+                square = 0.0
+                for j in range(dim):
+                    square += (x[i, j] - vertices[v, j]) ** 2
+                if square < least:
+                    least, where, closer = square, v, True
+            if closer:
+                best = math.sqrt(least)
+        if where >= 0:
+            nearest[i], distance[i] = where, best
+            start = where // each
+    return nearest, distance

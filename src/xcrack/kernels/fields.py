@@ -1,4 +1,6 @@
-"""Sums of functions times their unknowns at points."""
+"""Sums of functions times their unknowns at points, and the places of points."""
+
+import numpy as np
 
 from xcrack.kernels.jit import kernel
 
@@ -25,15 +27,35 @@ def set_gradients(gradient, number, slope, functions, row, coefficients):  # typ
     for p in range(len(number)):
         to = number[p]
         for i in range(d):
-            for j in range(d):
-                for s in range(states):
-                    gradient[to, i, j, s] = 0.0
-        for a in range(slope.shape[1]):
-            f = functions[row[p], a]
-            if f < 0:
-                continue
-            for i in range(d):
-                for s in range(states):
-                    c = coefficients[f, i, s]
-                    for j in range(d):
-                        gradient[to, i, j, s] += slope[p, a, j] * c
+            for s in range(states):
+                x, y, z = 0.0, 0.0, 0.0
+                for a in range(slope.shape[1]):
+                    f = functions[row[p], a]
+                    if f >= 0:
+                        c = coefficients[f, i, s]
+                        x += slope[p, a, 0] * c
+                        y += slope[p, a, 1] * c
+                        if d == 3:
+                            z += slope[p, a, 2] * c
+                gradient[to, i, 0, s], gradient[to, i, 1, s] = x, y
+                if d == 3:
+                    gradient[to, i, 2, s] = z
+
+
+@kernel
+def places(cell, bary, points, cells):  # type: ignore[no-untyped-def]
+    """Coordinates of points in cells `(q, d)`.
+
+    Parameters
+    ----------
+    cell : (q,) array of int
+    bary : (q, d + 1) array
+    points, cells : (n, d) and (m, d + 1) arrays
+    """
+    x = np.zeros((len(cell), points.shape[1]))
+    for q in range(len(cell)):
+        for b in range(bary.shape[1]):
+            node = cells[cell[q], b]
+            for j in range(points.shape[1]):
+                x[q, j] += bary[q, b] * points[node, j]
+    return x

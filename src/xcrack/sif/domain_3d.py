@@ -236,7 +236,7 @@ def front_values(
     outer, size = domain.outer, domain.size
     radii = np.array([outer, SECOND * outer])
     knots = front_nodes(curve, _SPACING * size, None if curve.closed else ends)
-    distance = curve.distance(solutions[0].space.mesh.points)
+    distance = curve.distance(solutions[0].space.mesh.points, outer)
     turn = np.stack([mean_rotation(s, distance, outer) for s in solutions], axis=-1)
     total = _lip_part(solutions, t, curve, knots, radii, turn)
     measure = np.zeros((len(radii), len(knots)))
@@ -270,7 +270,8 @@ def _domain_parts(
     coefficients = np.stack([solution.coefficients for solution in solutions], axis=-1)
     initial = partial(_initial, solutions) if acts(solutions, InitialStress) else None
     middle = mesh.points[mesh.cells].mean(axis=1)
-    distance = curve.distance(middle) - 1.05 * outer
+    reach = 1.05 * outer
+    distance = curve.distance(middle, reach + float(mesh.cell_size.max())) - reach
     cells = np.nonzero(distance <= mesh.cell_size)[0]
     reach = np.linalg.norm(mesh.points[mesh.cells[cells]] - middle[cells, None], axis=2).max(axis=1)
     cells = cells[distance[cells] <= reach]
