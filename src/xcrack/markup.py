@@ -11,8 +11,10 @@ body { font: 15px/1.5 system-ui, sans-serif; max-width: 70rem; margin: 2rem auto
 h1 { font-size: 1.7rem; margin-bottom: .2rem } h2 { margin-top: 2.2rem; font-size: 1.25rem;
 border-bottom: 1px solid var(--line) } table { border-collapse: collapse; margin: .6rem 0 }
 th, td { padding: .2rem .6rem; border-bottom: 1px solid var(--line); text-align: left;
-vertical-align: top; font-variant-numeric: tabular-nums } th { background: var(--soft) }
-td.n { text-align: right } .scroll { overflow: auto; max-height: 28rem } img { max-width: 100%;
+vertical-align: top; font-variant-numeric: tabular-nums }
+th { background: var(--soft) }
+td.n { text-align: right } .scroll { overflow: auto; max-height: 28rem }
+img { max-width: min(100%, 46rem);
 height: auto; background: #fff } .good { color: var(--good) } .bad { color: var(--bad);
 font-weight: 600 } .soft { opacity: .7 } pre { background: var(--soft); padding: .6rem;
 overflow: auto } figure { margin: .8rem 0 } nav a { margin-right: 1rem }

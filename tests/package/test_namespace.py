@@ -29,6 +29,7 @@ NAMES = [
     "el_haddad", "forman", "hartman_schijve", "klesnil_lukas", "law", "linear_closure", "nasgro",
     "nasgro_K_c", "nasgro3_threshold", "nasgro4_threshold", "newman_closure", "piecewise",
     "presets", "rate_table", "schijve_closure", "stepped_threshold",
+    "verify", "report", "read_case", "run", "info", "demo", "convert_mesh",
     # errors
     "ConvergenceError", "GeometryError", "MeshError", "ProblemError", "XcrackError",
     "XcrackWarning",

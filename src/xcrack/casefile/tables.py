@@ -1,0 +1,187 @@
+"""A toml file as tables that know the lines their keys stand in."""
+
+import difflib
+import re
+import tomllib
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, NoReturn
+
+from xcrack.casefile.units import NUMBER, Dimension, Units
+from xcrack.errors import ProblemError, XcrackError
+from xcrack.inputs import system_errors
+
+Key = tuple[str | int, ...]
+
+_HEADER = re.compile(r"\s*(\[\[?)\s*([^\[\]]+?)\s*\]\]?\s*(?:#.*)?")
+_ENTRY = re.compile(r"\s*([\w.\"'-]+(?:\s*\.\s*[\w\"'-]+)*)\s*=(.*)", re.DOTALL)
+_QUOTED = re.compile(r"\"(?:\\.|[^\"\\])*\"|'[^']*'")
+
+
+@dataclass(frozen=True)
+class Source:
+    """A file, and the line of each of its keys."""
+
+    path: Path
+    lines: dict[Key, int]
+    units: Units = field(default_factory=Units)
+
+    def refuse(self, key: Key, words: str) -> NoReturn:
+        """Raise an error that names file, line and place."""
+        raise ProblemError(f"{self.path}, line {self.line(key)}, {_shown(key)}: {words}")
+
+    def line(self, key: Key) -> int:
+        """Line of a key, or of the table that it is missing from."""
+        while key and key not in self.lines:
+            key = key[:-1]
+        return self.lines.get(key, 1)
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table of the file."""
+
+    source: Source
+    key: Key
+    content: dict[str, Any]
+
+    def __contains__(self, name: str) -> bool:
+        return name in self.content
+
+    def known(self, names: Iterable[str], what: str = "") -> None:
+        """Refuse keys that are not among these."""
+        names = list(names)
+        for name in self.content:
+            if name not in names:
+                near = difflib.get_close_matches(name, names, 1)
+                hint = f"did you mean {near[0]!r}? " if near else ""
+                self.refuse(
+                    name, f"there is no such key{what}: {hint}known are {', '.join(names)}."
+                )
+
+    def refuse(self, name: str, words: str) -> NoReturn:
+        """Raise an error that names file, line and key."""
+        self.source.refuse((*self.key, name) if name else self.key, words)
+
+    def table(self, name: str) -> "Table":
+        """A table within this one; an empty one where it is missing."""
+        value = self.content.get(name, {})
+        if not isinstance(value, dict):
+            self.refuse(name, f"{value!r:.60} is no table: begin it with [{name}].")
+        return Table(self.source, (*self.key, name), value)
+
+    def tables(self, name: str) -> list["Table"]:
+        """Tables of an array; none where it is missing."""
+        value = self.content.get(name, [])
+        if not isinstance(value, list) or not all(isinstance(item, dict) for item in value):
+            self.refuse(name, f"give a list of tables: begin each with [[{name}]].")
+        return [Table(self.source, (*self.key, name, k), item) for k, item in enumerate(value)]
+
+    def text(self, name: str, default: str | None = None) -> str:
+        """A key that is text."""
+        value = self.content.get(name, default)
+        if value is None:
+            self.refuse("", f"the key {name!r} is missing.")
+        if not isinstance(value, str):
+            self.refuse(name, f"{value!r:.60} is no text: put it into quotes.")
+        return value
+
+    def value(self, name: str, dimension: Dimension | None) -> Any:
+        """A key in the units of the file, lists entry by entry; text stays text without one."""
+        try:
+            return self._converted(self.content[name], dimension)
+        except ProblemError as error:
+            self.refuse(name, str(error))
+
+    def _converted(self, value: Any, dimension: Dimension | None) -> Any:
+        if isinstance(value, list):
+            return [self._converted(item, dimension) for item in value]
+        if isinstance(value, str) and dimension is not None:
+            return self.source.units.number(value, dimension)
+        return value
+
+    def wrap(self, error: XcrackError | TypeError) -> NoReturn:
+        """Raise an error of a function that this table was given to, with file and line."""
+        text = str(error)
+        key = next((name for name in self.content if re.search(rf"\b{name}\b", text)), "")
+        place = (*self.key, key) if key else self.key
+        kind = type(error) if isinstance(error, XcrackError) else ProblemError
+        line = self.source.line(place)
+        raise kind(f"{self.source.path}, line {line}, {_shown(place)}: {text}") from error
+
+
+def read_tables(path: Path) -> Table:
+    """The root table of a file.
+
+    Raises
+    ------
+    ProblemError
+        No such file, or one that is no toml.
+    """
+    with system_errors("the scene cannot be read from", path, error=ProblemError):
+        data = path.read_bytes()
+    try:
+        text = data.decode("utf-8")
+        content = tomllib.loads(text)
+    except UnicodeDecodeError as error:
+        line = data[: error.start].count(b"\n") + 1
+        raise ProblemError(f"{path}, line {line}: this is no text in utf-8.") from error
+    except tomllib.TOMLDecodeError as error:
+        place = re.search(r"line (\d+)", str(error))
+        line = int(place[1]) if place else text.count("\n") + 1
+        raise ProblemError(
+            f"{path}, line {line}: this is no toml ({error}); texts stand in quotes, lists in [ ]."
+        ) from error
+    source = Source(path, _lines(text))
+    root = Table(source, (), content)
+    units = root.table("units")
+    units.known(("length", "force"))
+    try:
+        own = Units(**units.content)
+    except ProblemError as error:
+        units.wrap(error)
+    return Table(Source(path, source.lines, own), (), content)
+
+
+def _lines(text: str) -> dict[Key, int]:
+    """Line of each header and each key."""
+    lines: dict[Key, int] = {}
+    counts: dict[Key, int] = {}
+    table: Key = ()
+    depth = 0
+    for number, line in enumerate(text.splitlines(), 1):
+        plain = _QUOTED.sub('""', line).partition("#")[0]
+        header = _HEADER.fullmatch(line) if depth == 0 else None
+        entry = _ENTRY.fullmatch(line) if depth == 0 and header is None else None
+        if header is not None:
+            table = _parts(header[2])
+            if header[1] == "[[":
+                counts[table] = counts.get(table, -1) + 1
+                lines.setdefault(table, number)
+                table = (*table, counts[table])
+            lines.setdefault(table, number)
+            continue
+        if entry is not None:
+            parts = _parts(entry[1])
+            for n in range(1, len(parts) + 1):
+                lines.setdefault((*table, *parts[:n]), number)
+        depth = max(
+            depth + sum(plain.count(c) for c in "[{") - sum(plain.count(c) for c in "]}"), 0
+        )
+    return lines
+
+
+def _parts(name: str) -> Key:
+    return tuple(part.strip().strip("\"'") for part in name.split("."))
+
+
+def _shown(key: Key) -> str:
+    """A key as a reader would look for it."""
+    names = [f"{key[k - 1]} {part + 1}" if isinstance(part, int) else part
+             for k, part in enumerate(key)
+             if not (k + 1 < len(key) and isinstance(key[k + 1], int))]  # fmt: skip
+    return ".".join(names) if names else "the file"
+
+
+__all__ = ["NUMBER", "Key", "Source", "Table", "read_tables"]

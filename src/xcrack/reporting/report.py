@@ -1,0 +1,154 @@
+"""Write a report: sections, pictures and the interactive view in one file."""
+
+import base64
+import datetime
+import json
+from collections.abc import Callable, Sequence
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+from xcrack.errors import ProblemError, XcrackError
+from xcrack.history.versions import versions
+from xcrack.inputs import number, path_of, system_errors
+from xcrack.markup import Markup, element, joined, listed, page
+from xcrack.plotting.report_pictures import Picture, history_pictures, solution_pictures
+from xcrack.plotting.view_3d import history_layers, packed, solution_layers
+from xcrack.reporting import results, scene
+from xcrack.reporting.section import Section
+from xcrack.reporting.source import Source, source_of
+from xcrack.reporting.viewer import viewer
+
+_FORMAT = 1
+
+
+def report(
+    result: Any,
+    file: str | PathLike[str],
+    *,
+    title: str = "",
+    yield_stress: float | None = None,
+) -> Path:
+    """Write what was modelled and what came out, as one page that needs no network.
+
+    The page has the scene, assumptions and their validity, K, contact, growth, all warnings, the
+    table of a run as CSV, pictures, for bodies in space a view to turn, and how to run it again.
+    A ``.json`` file beside it has the numbers.
+
+    Parameters
+    ----------
+    result : Solution, list of Solution, History, or path
+        A path is the folder that `collect` wrote to; a run that is half written is reported as far
+        as it is there.
+    file : path
+        Of the page; ``.html`` is added where it has no suffix.
+    title : str
+    yield_stress : float, stress, optional
+        Lets the report compare plastic zones with crack and cell.
+
+    Returns
+    -------
+    Path
+
+    Raises
+    ------
+    ProblemError
+        Something else than these, no run in the folder, or a file that cannot be written.
+    """
+    path = path_of(file, "report: file", error=ProblemError)
+    path = path if path.suffix else path.with_name(path.name + ".html")
+    if not isinstance(title, str):
+        raise ProblemError(f"report: title = {title!r:.80}: give a text.")
+    if yield_stress is not None:
+        yield_stress = number(yield_stress, "report: yield_stress", above=0)
+    source = source_of(result, title, yield_stress)
+    sections = [made for make in SECTIONS if (made := make(source)) is not None]
+    with system_errors("the report cannot be written to", path, error=ProblemError):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(_page(source, sections), encoding="utf-8")
+        path.with_suffix(".json").write_text(_json(source, sections), encoding="utf-8")
+    return path
+
+
+def pictures(source: Source) -> Section:
+    """Pictures; why some are missing is said."""
+    shown, missing = solution_pictures(source.solutions, source.sif)
+    if source.history is not None:
+        of_run, lost = history_pictures(source.history)
+        shown, missing = shown + of_run, missing + lost
+    parts: list[Any] = [_figure(picture) for picture in shown]
+    if missing:
+        parts += [element("p", "Not drawn here:", cls="soft"), listed(missing)]
+    if not parts:
+        parts.append(element("p", "There is nothing to draw yet."))
+    return Section("pictures", "Pictures", joined(*parts),
+                   {"drawn": [words for words, _ in shown], "missing": missing})  # fmt: skip
+
+
+def space_view(source: Source) -> Section | None:
+    """The interactive view of a body in space."""
+    layers: list[dict[str, Any]] = []
+    if source.dim < 3:
+        return None
+    history = source.history
+    try:
+        if history is not None and len(history.steps) > 1:
+            layers = history_layers(history)
+        elif source.solutions:
+            layers = solution_layers(source.solutions[-1])
+    except XcrackError:
+        layers = []
+    content = packed(layers)
+    if content is None:
+        words = (
+            "No view to turn: there is nothing to draw, or too much for a page; see the pictures."
+        )
+        return Section("view", "View", element("p", words, cls="soft"), {"layers": 0})
+    return Section("view", "View", viewer(content), {"layers": len(content["layers"])})
+
+
+SECTIONS: Sequence[Callable[[Source], Section | None]] = (
+    scene.scene,
+    space_view,
+    results.growth,
+    results.intensity,
+    results.contact,
+    scene.assumptions,
+    scene.warned,
+    pictures,
+    results.numbers,
+    scene.again,
+)
+"""Parts of a report in their order; a new one is a function of the source, and an entry here."""
+
+
+def _page(source: Source, sections: Sequence[Section]) -> str:
+    today = datetime.date.today().isoformat()
+    links = Markup(" ".join(f'<a href="#{s.key}">{s.title}</a>' for s in sections))
+    parts: list[Any] = [
+        element("h1", source.title),
+        element("p", f"xcrack {versions()['xcrack']} · {today}", cls="soft"),
+    ]
+    if not source.is_whole:
+        words = "This run is not finished; the report shows what is there."
+        parts.append(element("p", words, cls="bad"))
+    parts.append(element("nav", links))
+    for section in sections:
+        parts += [Markup(f'<h2 id="{section.key}">{section.title}</h2>'), section.content]
+    return page(source.title, *parts)
+
+
+def _figure(picture: Picture) -> Markup:
+    words, data = picture
+    coded = base64.b64encode(data).decode()
+    text = element("figcaption", words)
+    return Markup(f'<figure><img alt="{words}" src="data:image/png;base64,{coded}">{text}</figure>')
+
+
+def _json(source: Source, sections: Sequence[Section]) -> str:
+    content = {"format": _FORMAT, "title": source.title, "whole": source.is_whole,
+               **{section.key: dict(section.numbers) for section in sections}}  # fmt: skip
+    return json.dumps(content, indent=1, ensure_ascii=False, default=str) + "\n"
+
+
+__all__ = ["SECTIONS", "report"]

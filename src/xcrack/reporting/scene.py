@@ -1,0 +1,196 @@
+"""Sections on what was asked: scene, assumptions, validity, inputs and how to run it again."""
+
+from typing import Any
+
+import numpy as np
+
+from xcrack.analysis.solution import Solution
+from xcrack.history.versions import versions
+from xcrack.markup import Markup, element, joined, listed, table
+from xcrack.reporting.section import Section
+from xcrack.reporting.source import Source
+from xcrack.scene.conditions import Displacement, Fix, InitialStress
+from xcrack.xfem.loads import load_vector
+
+_SMALL = 0.1  # share of a length up to which a plastic zone counts as small
+
+
+def scene(source: Source) -> Section:
+    """Body, material, cracks, supports, and each load with its resultant."""
+    rows: list[tuple[Any, Any]] = []
+    numbers: dict[str, Any] = {"dim": source.dim, "cracks": len(source.cracks)}
+    mesh, problem = source.mesh, source.problem
+    if mesh is not None:
+        size = " × ".join(f"{v:.6g}" for v in np.ptp(mesh.points, axis=0))
+        rows += [("body", size), ("mesh", f"{mesh.n_points} points, {len(mesh.cells)} cells")]
+        numbers |= {"points": mesh.n_points, "cells": len(mesh.cells)}
+    if problem is not None:
+        rows += [("material", repr(problem.material)), ("order of the elements", problem.order),
+                 ("contact", problem.contact)]  # fmt: skip
+    for c, crack in enumerate(source.cracks):
+        rows.append((f"crack {c}", _crack(crack)))
+    parts: list[Any] = [table((), rows)]
+    if problem is not None and source.solutions:
+        parts.append(_conditions(source.solutions[0]))
+    else:
+        parts.append(element("p", "The stored steps do not hold the loads: they are in the script "
+                             "or the case file that made the run.", cls="soft"))  # fmt: skip
+    return Section("scene", "Scene", joined(*parts), numbers)
+
+
+def _crack(crack: Any) -> str:
+    if crack.fronts is not None:
+        n = [len(front) for front in crack.fronts]
+        return f"{len(crack.faces)} triangles, {len(n)} front(s) of {', '.join(map(str, n))} points"
+    length = float(np.linalg.norm(np.diff(crack.points, axis=0), axis=1).sum())
+    tips = "not placed" if crack.tips is None else f"{len(crack.tips)} tip(s)"
+    return f"{len(crack.points)} points, length {length:.6g}, {tips}"
+
+
+def _conditions(solution: Solution) -> Markup:
+    rows = []
+    for support in solution.problem.supports:
+        where = (
+            support.where if isinstance(support.where, str) else f"{len(support.where)} point(s)"
+        )
+        if isinstance(support, Fix):
+            rows.append(("fix", where, "all axes" if support.axis is None else support.axis, ""))
+        else:
+            rows.append(("displacement", where, _value(support.value), ""))
+    for load in solution.loads:
+        where = getattr(load, "where", "")
+        value = next((_value(getattr(load, n)) for n in ("value", "force") if hasattr(load, n)), "")
+        name = type(load).__name__
+        rows.append((name, where if isinstance(where, str) else "points", value,
+                     _resultant(solution, load)))  # fmt: skip
+    if not rows:
+        return element("p", "No supports and no loads.")
+    return table(("condition", "where", "value", "resultant, before load factors"), rows)
+
+
+def _value(value: Any) -> str:
+    if callable(value):
+        return f"function {getattr(value, '__name__', type(value).__name__)}"
+    array = np.asarray(value, dtype=object)
+    return str(array.tolist() if array.ndim else value)
+
+
+def _resultant(solution: Solution, load: Any) -> str:
+    """Sum of the forces of a load: standard functions sum to one."""
+    if isinstance(load, Displacement | InitialStress):
+        return ""
+    space = solution.space
+    f = load_vector(space, (load,), solution.lips).reshape(-1, space.dim)[: space.n_nodes]
+    total = f.sum(axis=0)
+    largest = np.abs(f).max(initial=0.0)
+    total = np.where(np.abs(total) < 1e-9 * largest, 0.0, total)
+    return "(" + ", ".join(f"{v:.6g}" for v in total) + ")"
+
+
+def assumptions(source: Source) -> Section:
+    """What was modelled and what was left out, and why; where linear elasticity holds."""
+    rows, numbers = [], {}
+    if source.solutions:
+        for row in source.solutions[0].report.ingredients:
+            rows.append((row.name, "used" if row.used else "left out", row.reason,
+                         row.unknowns or ""))  # fmt: skip
+            numbers[row.name] = {"used": row.used, "reason": row.reason}
+    parts: list[Any] = []
+    if rows:
+        parts.append(table(("ingredient", "", "reason", "unknowns"), rows))
+    notes = _notes(source)
+    parts.append(element("h3", "Validity of linear elastic fracture mechanics"))
+    parts.append(listed(notes))
+    return Section("assumptions", "Assumptions", joined(*parts),
+                   {"ingredients": numbers, "validity": notes})  # fmt: skip
+
+
+def _notes(source: Source) -> list[str]:
+    notes = ["Small strains, a linear elastic isotropic body, crack faces without friction."]
+    notes.append(_plastic_zone(source))
+    history = source.history
+    memory = history.steps[0].memory if history is not None and history.steps else None
+    if history is not None and memory is not None:
+        law = memory.settings.get("law", "")
+        ratios = [R for step in history.steps for R in step.R if len(R)]
+        if ratios:
+            every = np.concatenate(ratios)
+            every = every[np.isfinite(every)]
+            if len(every):
+                notes.append(f"R of the run is {every.min():.3g} to {every.max():.3g}: compare it "
+                             "with the range that the growth law was fitted for.")  # fmt: skip
+        touching = any(state[c].closed.any() for step in history.steps for state in step.sif
+                       for c in range(len(state)))  # fmt: skip
+        if "elber" in law and touching:
+            notes.append("Closure may be counted twice: the law has a share U of the range, and "
+                         "contact of the crack faces was computed too.")  # fmt: skip
+    return notes
+
+
+def _plastic_zone(source: Source) -> str:
+    """Size of the plastic zone against the shortest crack, and what it is judged by."""
+    if source.yield_stress is None:
+        return ("Plastic zones were not judged: give report(..., yield_stress=...) to have them "
+                "compared with crack, ligament and cell.")  # fmt: skip
+    every = [sif.K[:, :2] for state in source.sif for sif in state]
+    largest = max((float(np.abs(K).max(initial=0.0)) for K in every), default=0.0)
+    radius = (largest / source.yield_stress) ** 2 / (2 * np.pi)
+    lengths = {"crack": _shortest(source), "cell": _cell(source)}
+    words = ", ".join(f"{100 * radius / v:.3g} % of the {name}" for name, v in lengths.items()
+                      if v > 0)  # fmt: skip
+    small = lengths["crack"] <= 0 or radius <= _SMALL * lengths["crack"]
+    verdict = "small" if small else "NOT small: linear elastic K is not valid"
+    return (f"Plastic zone (Irwin, plane stress) (K/yield)²/2π = {radius:.4g} for the largest K "
+            f"{largest:.6g}: {words}; {verdict}.")  # fmt: skip
+
+
+def _shortest(source: Source) -> float:
+    sizes = [float(np.ptp(crack.points, axis=0).max()) for crack in source.cracks]
+    return min(sizes, default=0.0)
+
+
+def _cell(source: Source) -> float:
+    return 0.0 if source.mesh is None else float(source.mesh.cell_size.min())
+
+
+def warned(source: Source) -> Section:
+    """All warnings, counted."""
+    if source.warnings:
+        rows = [(n, text) for text, n in source.warnings.most_common()]
+        content = joined(table(("times", "warning"), rows))
+    else:
+        content = element("p", "There were none.")
+    if source.history is not None and not source.solutions:
+        hint = ("Steps read from a folder hold no warnings of K: columns spread and domain_cells "
+                "of the table show how far each K is to be trusted.")  # fmt: skip
+        content = joined(content, element("p", hint, cls="soft"))
+    return Section("warnings", f"Warnings ({source.warnings.total()})", content,
+                   {"messages": dict(source.warnings)})  # fmt: skip
+
+
+def again(source: Source) -> Section:
+    """Inputs, versions, and how to run it again."""
+    known, hashes = versions(), source.hashes()
+    settings: dict[str, str] = {}
+    history = source.history
+    if history is not None and history.steps and history.steps[0].memory is not None:
+        settings = dict(history.steps[0].memory.settings)
+    parts: list[Any] = [table((), [*known.items(), *hashes.items()])]
+    if history is not None and history.path is not None:
+        text = f"history = xc.load({str(history.path)!r})\nxc.report(history, 'report.html')"
+        if not source.is_whole:
+            text += (
+                f"\n# go on: xc.resume({str(history.path)!r}, problem, law, criterion, cycle, ...)"
+            )
+        parts.append(element("pre", text))
+    else:
+        parts.append(element("p", "Run the script or the case file that made this again; equal "
+                             "hashes say that mesh and cracks are the same."))  # fmt: skip
+    if settings:
+        body = table((), sorted(settings.items()), scroll=True)
+        parts.append(Markup(f"<details><summary>settings of the run</summary>{body}</details>"))
+    return Section("again", "Inputs, versions, and how to run it again", joined(*parts),
+                   {"versions": known, "hashes": hashes, "settings": settings})  # fmt: skip
+
+
+__all__ = ["again", "assumptions", "scene", "warned"]

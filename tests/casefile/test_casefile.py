@@ -1,0 +1,210 @@
+"""Case files: the same scene as a script's, units, and messages with file, line and mend."""
+
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import xcrack as xc
+from xcrack.casefile.units import FORCE, LENGTH, STRESS, TOUGHNESS, Units
+
+pytestmark = pytest.mark.filterwarnings("ignore::xcrack.XcrackWarning")
+
+PLATE = """\
+title = "Edge crack"                      # a comment
+
+[units]
+length = "mm"
+force = "N"
+
+[mesh]
+kind = "box"
+lower = [0.0, -20.0]
+upper = [20.0, 20.0]
+n = [10, 20]
+
+[material]
+E = "210 GPa"
+nu = 0.3
+plane = "strain"
+
+[[cracks]]
+kind = "line"
+points = [
+    [0.0, "0.1 cm"],
+    [6.0, 1.0],
+]
+
+[[loads]]
+kind = "traction"
+where = "top"
+value = [0.0, "80 MPa"]
+
+[[loads]]
+kind = "traction"
+where = "bottom"
+value = [0.0, -80.0]
+
+[solve]
+order = 1
+"""
+GROWTH = (
+    PLATE
+    + """
+[growth]
+law = { kind = "paris", C = 1e-11, m = 3 }
+cycle = { min = 0.1, max = 1.0 }
+da = "2 mm"
+max_steps = 3
+K_c = "300 MPa*sqrt(m)"
+progress = false
+"""
+)
+
+
+@pytest.fixture(autouse=True)
+def _by_matplotlib(monkeypatch):
+    monkeypatch.setattr("xcrack.plotting.pyvista_2d.renders", lambda: False)
+
+
+def written(folder, text, name="case.toml"):
+    path = folder / name
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def script():
+    return xc.Problem(
+        xc.box((0, -20), (20, 20), (10, 20)),
+        xc.Isotropic(E=210e3, nu=0.3, plane="strain"),
+        [xc.line_crack([(0, 1), (6, 1)])],
+        loads=[xc.traction("top", (0, 80.0)), xc.traction("bottom", (0, -80.0))],
+        order=1,
+    )
+
+
+def test_a_file_is_the_scene_of_a_script(tmp_path):
+    case = xc.read_case(written(tmp_path, PLATE))
+    assert case.title == "Edge crack"
+    assert case.problem.material == script().material
+    assert case.growth is None
+    K, wanted = (xc.stress_intensity(xc.solve(p)).K for p in (case.problem, script()))
+    assert K.tobytes() == wanted.tobytes()
+
+
+def test_run_solves_and_reports(tmp_path):
+    text = PLATE + '\n[output]\nfolder = "out"\npictures = ["opening"]\n'
+    result = xc.run(written(tmp_path, text.replace("order = 1", "order = 1\nstates = [0.5, 1.0]")))
+    assert [solution.factor for solution in result] == [0.5, 1.0]
+    names = {path.name for path in (tmp_path / "out").iterdir()}
+    assert {"report.html", "report.json", "opening_0.png", "opening_1.png"} <= names
+    assert json.loads((tmp_path / "out" / "report.json").read_text())["title"] == "Edge crack"
+
+
+@pytest.mark.slow
+@pytest.mark.mission
+def test_run_grows_and_goes_on_to_the_same_result(tmp_path):
+    path = written(tmp_path, GROWTH)
+    whole = xc.run(path)
+    steps = xc.grow(
+        script(), xc.paris(1e-11, 3), xc.max_hoop_stress, xc.Cycle(0.1, 1.0), da=2.0, max_steps=3,
+        K_c=300 * np.sqrt(1000), progress=False,
+    )  # fmt: skip
+    assert whole.table().tobytes() == xc.collect(steps).table().tobytes()
+    folder = tmp_path / "case_results"
+    assert (folder / "history.csv").is_file()
+    with pytest.raises(xc.ProblemError, match="holds a run of 3 steps"):
+        xc.run(path)
+    (folder / "steps" / "step_00002.npz").unlink()
+    again = xc.run(path, resumed=True)
+    assert again.table().tobytes() == whole.table().tobytes()
+    assert json.loads((folder / "report.json").read_text(encoding="utf-8"))["growth"]["steps"] == 3
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "line", "words"),
+    [
+        ("nu = 0.3", "nuu = 0.3", 15, "there is no such key: did you mean 'nu'?"),
+        ("nu = 0.3\n", "", 13, "the key 'nu' is missing"),
+        ("[material]", "[materials]", 13, "did you mean 'material'?"),
+        ("210 GPa", "210 GPx", 14, "the unit 'GPx' is not known: known are m, cm"),
+        ("210 GPa", "210 mm", 14, "'210 mm' is a length, but a stress belongs here"),
+        ("210 GPa", "much", 14, 'is no number with a unit, such as "80 MPa"'),
+        ("nu = 0.3", 'nu = "0.3 mm"', 15, "is a length, but a plain number belongs here"),
+        ("nu = 0.3", "nu = 0.7", 15, "nu"),
+        ('force = "N"', 'force = "kg"', 5, "known are N, kN"),
+        ('kind = "box"', 'kind = "boxx"', 8, "known are file, box"),
+        ('kind = "line"', 'kind = "circle"', 19, "known are line, penny"),
+        ('kind = "line"', "kind = 3", 19, "put it into quotes"),
+        ('where = "bottom"', 'were = "bottom"', 32, "did you mean 'where'?"),
+        ('where = "bottom"', 'where = "botom"', None, "botom"),
+        ("order = 1", "order = 3", 36, "give 1 or 2"),
+        ("order = 1", "states = 3", 36, "give a list of factors"),
+        ("order = 1", "order =", 36, "this is no toml"),
+        ("[solve]", "[[solve]]", 35, "begin it with"),
+        ("[[cracks]]", "[cracks]", 18, "begin each with"),
+        ('[units]\nlength = "mm"\nforce = "N"\n', "", 11, "give [units]"),
+    ],
+)
+def test_what_is_wrong_is_said_with_its_line(old, new, line, words, tmp_path):
+    assert old in PLATE
+    path = written(tmp_path, PLATE.replace(old, new, 1))
+    with pytest.raises(xc.XcrackError) as caught:
+        xc.read_case(path)
+    message = str(caught.value)
+    assert words in message
+    assert message.startswith(str(path) if line is None else f"{path}, line {line}, ".rstrip(", "))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ('"paris"', '"parris"', "known are paris, elber, walker"),
+        ("C = 1e-11", "C = -1", "paris: C"),
+        ("min = 0.1", "min = 2.0", "min <= max"),
+        ("max_steps", "max_step", "did you mean 'max_steps'?"),
+        ('da = "2 mm"', 'da = "2 MPa"', "is a stress, but a length belongs here"),
+        ("progress = false", 'criterion = "hoop"', "known are max_hoop_stress"),
+    ],
+)
+def test_growth_that_is_wrong_is_said(old, new, words, tmp_path):
+    path = written(tmp_path, GROWTH.replace(old, new, 1))
+    with pytest.raises(xc.XcrackError, match=words) as caught:
+        xc.read_case(path)
+    line = next(k for k, row in enumerate(path.read_text().splitlines(), 1) if new in row)
+    assert f"line {line}, growth" in str(caught.value)
+
+
+def test_files_begin_at_the_case_file(tmp_path):
+    data = Path(__file__).parents[1] / "data"
+    text = PLATE.partition("[material]")
+    mesh = '[mesh]\nkind = "file"\npath = "meshes/plate.msh"\n\n'
+    path = written(tmp_path, mesh + "[material]" + text[2].replace("210 GPa", "1").replace(
+        '"1"', "1.0").replace('"0.1 cm"', "1.0").replace('"80 MPa"', "80.0"))  # fmt: skip
+    (tmp_path / "meshes").mkdir()
+    shutil.copy(data / "plate_41.msh", tmp_path / "meshes" / "plates.msh")
+    with pytest.raises(xc.ProblemError, match=r"line 3, mesh.path: there is no file .*plate.msh; "
+                       r"beside it are plates.msh"):  # fmt: skip
+        xc.read_case(path)
+    with pytest.raises(xc.ProblemError, match="cannot be read"):
+        xc.read_case(tmp_path / "nothing.toml")
+    with pytest.raises(xc.ProblemError, match="is not a path"):
+        xc.read_case(3)
+    (tmp_path / "bytes.toml").write_bytes(b"title = '\xff'\n")
+    with pytest.raises(xc.ProblemError, match="line 1: this is no text in utf-8"):
+        xc.read_case(tmp_path / "bytes.toml")
+
+
+def test_units_are_those_of_the_tables():
+    """Round-off; a psi is 6894.757293168 Pa, a lbf 4.4482216152605 N (NIST)."""
+    mm = Units("mm", "N")
+    for text, dimension, wanted in (
+        ("210 GPa", STRESS, 210e3), ("1e1 ksi", STRESS, 68.94757293168), ("2 in", LENGTH, 50.8),
+        ("1 kN", FORCE, 1e3), ("1 MPa*sqrt(m)", TOUGHNESS, np.sqrt(1000)),
+        ("1 MPa √m", TOUGHNESS, np.sqrt(1000)), ("3 N/mm^2", STRESS, 3.0),
+        ("1 MPa·√mm", TOUGHNESS, 1.0), ("-.5 µm", LENGTH, -5e-4),
+    ):  # fmt: skip
+        assert mm.number(text, dimension) == pytest.approx(wanted, rel=1e-12), text
+    assert Units("m", "MN").number("1 MPa", STRESS) == pytest.approx(1.0, rel=1e-12)

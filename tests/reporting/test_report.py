@@ -1,0 +1,251 @@
+"""Reports: what they hold, that they need no network, and how they look in a browser."""
+
+import base64
+import json
+import re
+import shutil
+import subprocess
+from functools import cache
+from html.parser import HTMLParser
+
+import matplotlib.image
+import numpy as np
+import pytest
+
+import xcrack as xc
+from xcrack.plotting.view_3d import packed
+from xcrack.reporting import report as reporting
+
+STEEL = xc.Isotropic(E=210e3, nu=0.3, plane="strain")
+pytestmark = pytest.mark.filterwarnings("ignore::xcrack.XcrackWarning")
+
+
+@pytest.fixture(autouse=True)
+def _by_matplotlib(monkeypatch, request):
+    """No renderer where a test does not ask for one: quick, and the same everywhere."""
+    if not request.node.get_closest_marker("plot"):
+        monkeypatch.setattr("xcrack.plotting.pyvista_2d.renders", lambda: False)
+
+
+def plate():
+    loads = [xc.traction("top", (0.0, 80.0)), xc.traction("bottom", (0.0, -80.0))]
+    crack = xc.line_crack([(-0.31, -0.11), (0.29, 0.12)])
+    return xc.Problem(xc.box((-1, -1), (1, 1), 12), STEEL, [crack], loads=loads, order=1)
+
+
+def block():
+    loads = [xc.traction("top", (0, 0, 100.0)), xc.traction("bottom", (0, 0, -100.0))]
+    crack = xc.penny_crack((0.0, 0.0, 0.04), (0.3, 0, 1), 0.5, n=32)
+    mesh = xc.box((-1, -1, -1), (1, 1, 1), 6)
+    return xc.Problem(mesh, xc.Isotropic(E=210e3, nu=0.3), [crack], loads=loads)
+
+
+def growth(problem, path=None, **options):
+    given = {"da": 0.2, "max_steps": 3, "progress": False, **options}
+    law = xc.elber(C=1e-11, m=3, a=0.5, b=0.4)
+    return xc.collect(xc.grow(problem, law, xc.max_hoop_stress, xc.Cycle(-1, 1), **given), path)
+
+
+@cache
+def penny():
+    return xc.solve(block())
+
+
+class Reader(HTMLParser):
+    """Links, anchors, pictures and the nesting of a page."""
+
+    EMPTY = frozenset({"meta", "link", "img", "input", "br", "!doctype"})
+
+    def __init__(self):
+        super().__init__()
+        self.open, self.ids, self.links, self.pictures = [], [], [], []
+
+    def handle_starttag(self, tag, attrs):
+        given = dict(attrs)
+        self.ids += [given["id"]] if "id" in given else []
+        self.links += [given[k] for k in ("href", "src") if k in given]
+        self.pictures += [given["src"]] if tag == "img" else []
+        if tag not in self.EMPTY:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+
+def read(path):
+    """A page, checked: well formed, anchors there, nothing from elsewhere, pictures whole."""
+    text = path.read_text(encoding="utf-8")
+    reader = Reader()
+    reader.feed(text)
+    assert not reader.open
+    assert len(reader.ids) == len(set(reader.ids))
+    for link in reader.links:
+        if link.startswith("#"):
+            assert link[1:] in reader.ids
+        else:
+            assert link.startswith("data:"), link
+    for picture in reader.pictures:
+        data = base64.b64decode(picture.partition(",")[2])
+        assert data.startswith(b"\x89PNG")
+    assert len(text) < 15e6
+    numbers = json.loads(path.with_suffix(".json").read_text(encoding="utf-8"))
+    return text, reader, numbers
+
+
+def test_report_of_a_solution(tmp_path):
+    solutions = xc.solve(plate(), [1.0, -1.0])
+    path = xc.report(solutions, tmp_path / "new" / "plate", title="A <plate>", yield_stress=300.0)
+    assert path == tmp_path / "new" / "plate.html"
+    text, reader, numbers = read(path)
+    assert "A &lt;plate&gt;" in text
+    assert len(reader.pictures) == len(numbers["pictures"]["drawn"]) >= 4
+    sif = xc.stress_intensity(solutions[0])
+    rows = numbers["K"]["rows"]
+    assert [row["K_I"] for row in rows[:2]] == sif.K_I.tolist()
+    assert [row["closed"] for row in rows] == [False, False, True, True]
+    closed = [row["closed share"] for row in numbers["contact"]["rows"]]
+    assert closed[0] == 0.0
+    assert closed[1] > 0.9
+    assert "(0, 160)" in text  # resultant of 80 over the width of 2
+    zone = next(note for note in numbers["assumptions"]["validity"] if "Plastic zone" in note)
+    largest = np.abs(sif.K).max()
+    assert f"{(largest / 300) ** 2 / (2 * np.pi):.4g}" in zone
+    ingredients = numbers["assumptions"]["ingredients"]
+    assert set(ingredients) == {row.name for row in solutions[0].report.ingredients}
+    assert numbers["again"]["hashes"].keys() == {"mesh", "cracks"}
+
+
+def test_report_of_a_run_and_of_its_folder(tmp_path):
+    history = growth(plate(), tmp_path / "run")
+    text, _, numbers = read(xc.report(history, tmp_path / "run.html"))
+    assert numbers["growth"] == {"steps": 3, "cycles": history.life, "ended": history.ended,
+                                 "whole": True}  # fmt: skip
+    table = history.table()
+    assert numbers["table"]["columns"] == list(table.dtype.names)
+    coded = re.search(r"data:text/csv;base64,([^\"]+)", text)[1]
+    lines = base64.b64decode(coded).decode().splitlines()
+    assert len(lines) == 1 + len(table)
+    assert float(lines[1].split(",")[6]) == table["a"][0]
+    # Pressed together in one state, and a law that has a share of the range: said.
+    assert any("counted twice" in note for note in numbers["assumptions"]["validity"])
+    assert numbers["again"]["settings"]["law"] == "elber"
+    again = read(xc.report(tmp_path / "run", tmp_path / "again.html"))[2]
+    assert again["table"] == numbers["table"]
+    assert again["K"] == numbers["K"]
+    assert again["growth"]["whole"] is True
+
+
+def test_a_half_written_run_is_reported_and_said(tmp_path):
+    growth(plate(), tmp_path / "run")
+    header = tmp_path / "run" / "run.json"
+    header.write_text(json.dumps({**json.loads(header.read_text()), "ended": ""}))
+    (tmp_path / "run" / "step_00001.npz").write_bytes(b"half")
+    text, _, numbers = read(xc.report(tmp_path / "run", tmp_path / "half.html"))
+    assert not numbers["whole"]
+    assert numbers["growth"]["steps"] == 1
+    assert "This run is not finished" in text
+    assert "xc.resume" in text
+    assert any("step_00001.npz is not whole" in m for m in numbers["warnings"]["messages"])
+
+
+@pytest.mark.slow
+def test_report_of_a_run_in_space(tmp_path):
+    history = growth(block(), da=0.3, max_steps=2)
+    text, _, numbers = read(xc.report(history, tmp_path / "growth.html"))
+    assert numbers["view"]["layers"] == 6  # body and its edges; surface and front of each step
+    data = json.loads(re.search(r'id="view-data">(.*?)</script>', text, re.DOTALL)[1])
+    assert [layer["step"] for layer in data["layers"]] == [-1, -1, 0, 0, 1, 1]
+    corners = np.frombuffer(base64.b64decode(data["layers"][0]["places"]), "<u2").reshape(-1, 3)
+    mesh = block().mesh
+    x = mesh.points[mesh.boundary].reshape(-1, 3)
+    assert len(corners) == len(x)
+    assert corners / 65535 * data["extent"] - 1 == pytest.approx(x, abs=2e-5)  # of 16 bits
+
+
+def test_too_much_is_left_out_and_said(monkeypatch, tmp_path):
+    monkeypatch.setattr("xcrack.plotting.view_3d.MOST", 10)
+    text, _, numbers = read(xc.report(penny(), tmp_path / "large.html"))
+    assert numbers["view"] == {"layers": 0}
+    assert "too much for a page" in text
+    assert packed([]) is None
+    # What cannot be drawn without a renderer is named.
+    assert any("Mesh" in words for words in numbers["pictures"]["missing"])
+
+
+def test_a_section_of_ones_own(monkeypatch, tmp_path):
+    """How later features add theirs."""
+    from xcrack.markup import element
+    from xcrack.reporting.section import Section
+
+    def own(source):
+        return Section("own", "Own", element("p", f"{len(source.cracks)} crack"), {"n": 1})
+
+    monkeypatch.setattr(reporting, "SECTIONS", (*reporting.SECTIONS, own))
+    text, _, numbers = read(xc.report(xc.solve(plate()), tmp_path / "own.html"))
+    assert "<p>1 crack</p>" in text
+    assert numbers["own"] == {"n": 1}
+
+
+def test_body_without_crack(tmp_path):
+    problem = xc.Problem(xc.box((-1, -1), (1, 1), 4), STEEL, loads=plate().loads)
+    _, _, numbers = read(xc.report(xc.solve(problem), tmp_path / "plain.html"))
+    assert "K" not in numbers
+    assert "contact" not in numbers
+
+
+def test_misuse_says_what_to_give(tmp_path):
+    solution = penny()
+    for call, words in (
+        (lambda: xc.report(3, tmp_path / "a.html"), "takes a Solution or a list of them"),
+        (lambda: xc.report([], tmp_path / "a.html"), "takes a Solution or a list of them"),
+        (lambda: xc.report(tmp_path, tmp_path / "a.html"), "holds no run"),
+        (lambda: xc.report(solution, 3), "is not a path"),
+        (lambda: xc.report(solution, tmp_path / "a.html", yield_stress=-1), "yield_stress"),
+        (lambda: xc.report(solution, tmp_path / "a.html", title=3), "give a text"),
+    ):
+        with pytest.raises(xc.ProblemError, match=words):
+            call()
+    (tmp_path / "folder.html").mkdir()
+    with pytest.raises(xc.ProblemError, match="cannot be written"):
+        xc.report(xc.solve(plate()), tmp_path / "folder.html")
+
+
+CHROMIUM = next(
+    filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), ""
+)
+
+
+@pytest.mark.slow
+@pytest.mark.plot
+@pytest.mark.skipif(not CHROMIUM, reason="browser not available: no chromium")
+@pytest.mark.parametrize("kind", ["solution", "growth", "plane"])
+def test_report_in_a_browser(kind, tmp_path):
+    """No error on the console of the page, every picture shown, the view drawn."""
+    makers = {"solution": penny, "growth": lambda: growth(block(), da=0.3, max_steps=2),
+              "plane": lambda: xc.solve(plate(), [1.0, -1.0])}  # fmt: skip
+    page = xc.report(makers[kind](), tmp_path / "report.html")
+    _, reader, _ = read(page)
+    # Says in the title how many pictures were decoded and layers drawn, for the dump below.
+    probe = (
+        "<script>window.addEventListener('load', () => { const c = document.getElementById("
+        "'view-canvas'); document.title = 'pictures ' + [...document.images].filter(i => "
+        "i.naturalWidth > 0).length + ' drawn ' + (c ? c.dataset.drawn : 'none'); });</script>"
+    )
+    page.write_text(page.read_text(encoding="utf-8").replace("</body>", probe + "</body>"), "utf-8")
+    command = [CHROMIUM, "--headless", "--no-sandbox", "--enable-unsafe-swiftshader",
+               "--enable-logging=stderr", "--virtual-time-budget=8000", "--hide-scrollbars",
+               f"--user-data-dir={tmp_path / 'profile'}", "--window-size=1200,1100"]  # fmt: skip
+    run = subprocess.run([*command, "--dump-dom", page.as_uri()], capture_output=True, text=True,
+                         timeout=120, check=True)  # fmt: skip
+    console = [line for line in run.stderr.splitlines() if ":CONSOLE:" in line]
+    assert not [line for line in console if "GL Driver Message" not in line], console
+    title = re.search(r"<title>(.*?)</title>", run.stdout)[1]
+    drawn = {"solution": r"[3-9]", "growth": r"4", "plane": "none"}[kind]
+    assert re.fullmatch(rf"pictures {len(reader.pictures)} drawn {drawn}", title), title
+    shot = tmp_path / "shot.png"
+    subprocess.run([*command, f"--screenshot={shot}", page.as_uri()], capture_output=True,
+                   timeout=120, check=True)  # fmt: skip
+    image = matplotlib.image.imread(shot)[..., :3]
+    if kind != "plane":  # colours are those of the view alone, above the pictures
+        coloured = np.ptp(image[400:], axis=2) > 0.15
+        assert coloured.mean() > 0.005
