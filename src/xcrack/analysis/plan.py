@@ -39,6 +39,29 @@ class Ingredient:
 
 
 @dataclass(frozen=True)
+class Resultant:
+    """Force and moment of a load, or of the reaction of a support.
+
+    Attributes
+    ----------
+    name : str
+    force : (d,) tuple, force (per thickness in 2D)
+    moment : float in 2D, (3,) tuple in 3D, force times length (per thickness in 2D)
+        About the origin.
+    """
+
+    name: str
+    force: tuple[float, ...]
+    moment: float | tuple[float, ...]
+
+    def __str__(self) -> str:
+        force = ", ".join(f"{f:.6g}" for f in self.force)
+        parts = (self.moment,) if isinstance(self.moment, float) else self.moment
+        moment = ", ".join(f"{m:.6g}" for m in parts)
+        return f"{self.name:<34}force ({force}), moment about the origin ({moment})"
+
+
+@dataclass(frozen=True)
 class Report:
     """Ingredients of a scene, one line each, and the operations that a solve took.
 
@@ -48,13 +71,16 @@ class Report:
     operations : dict
         Unknowns solved for, factorisations, solves, assembled cells, integration points,
         multipliers.
+    resultants : tuple of Resultant
+        Of each load of the state, and of the reaction of each support.
     """
 
     ingredients: tuple[Ingredient, ...]
     operations: dict[str, int]
+    resultants: tuple[Resultant, ...] = ()
 
     def __str__(self) -> str:
-        lines = [str(i) for i in self.ingredients]
+        lines = [str(i) for i in (*self.ingredients, *self.resultants)]
         if self.operations:
             counts = ", ".join(f"{v} {k.replace('_', ' ')}" for k, v in self.operations.items())
             lines.append(f"{'operations':<24}{counts}")

@@ -23,6 +23,7 @@ def report(
     motion: Motion,
     imbalance: float,
     n_states: int,
+    unbalanced: float | None,
 ) -> Report:
     """The plan of a problem, completed by what its solution took.
 
@@ -37,6 +38,8 @@ def report(
     imbalance : float
         Share of the loads that was out of balance.
     n_states : int
+    unbalanced : float or None
+        Share of the energy of an initial stress that relaxes without any crack.
     """
     d = model.space.dim
     rows = []
@@ -69,6 +72,9 @@ def report(
     for c, (given, placed) in enumerate(zip(problem.cracks, problem.placed, strict=True)):
         if not given.placed and not np.array_equal(given.points, placed.points):
             rows.append(Ingredient(f"mouths of crack {c}", True, _mouths(given, placed)))
+    if unbalanced is not None:
+        why = f"{unbalanced:.2%} of its energy is out of balance: it relaxes without any crack"
+        rows.append(Ingredient("initial stress", True, why))
     if engine.reason:
         rows.append(Ingredient("linear solver", True, engine.reason))
     operations = {

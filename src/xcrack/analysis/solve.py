@@ -6,7 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from xcrack.analysis.relaxation import out_of_balance
 from xcrack.analysis.report import report
+from xcrack.analysis.resultants import resultants
 from xcrack.analysis.solution import Solution
 from xcrack.arrays import Bools, Floats, lock
 from xcrack.contact.solve import contact_of, solve_contact
@@ -88,7 +90,7 @@ def _solve_states(
     problem: Problem, states: Sequence[Any], reuse: Reuse | None, solver: Solver | None
 ) -> list[Solution]:
     model = build(problem, None if reuse is None else reuse.bulk)
-    known_loads: dict[tuple[int, ...], Floats] = {}
+    known_loads: dict[int, Floats] = {}
     cases = [_case(problem, model, state, known_loads) for state in states]
     fixed = model.known.fixed.copy()
     motion = free_motion(model.space, fixed)
@@ -101,23 +103,29 @@ def _solve_states(
     if motion.modes.shape[1]:
         u = without_motion(motion, u)
     handed_on = engine.handed_on(replace(pressed.closed_sets(), bulk=model.bulk))
-    summary = report(problem, model, engine, pressed, motion, imbalance, len(states))
-    return [
-        Solution(
-            problem=problem,
-            state=state,
-            loads=case.loads,
-            factor=case.factor,
-            space=model.space,
-            u=lock(np.ascontiguousarray(u[:, k])),
-            lips=model.lips,
-            contact=contact_of(model, pressed, u[:, k], k),
-            energy=0.5 * float(u[:, k] @ (model.stiffness @ u[:, k])),
-            report=summary,
-            reuse=handed_on,
+    # It depends on the mesh, not on the cracks: steps of a run leave it out.
+    unbalanced = None if reuse is not None else out_of_balance(problem, model, cases[0].loads)
+    summary = report(problem, model, engine, pressed, motion, imbalance, len(states), unbalanced)
+    solutions = []
+    for k, (state, case) in enumerate(zip(states, cases, strict=True)):
+        forces = model.stiffness @ u[:, k]
+        rows = resultants(problem, model, case.loads, case.parts, forces - case.f)
+        solutions.append(
+            Solution(
+                problem=problem,
+                state=state,
+                loads=case.loads,
+                factor=case.factor,
+                space=model.space,
+                u=lock(np.ascontiguousarray(u[:, k])),
+                lips=model.lips,
+                contact=contact_of(model, pressed, u[:, k], k),
+                energy=0.5 * float(u[:, k] @ forces),
+                report=replace(summary, resultants=rows),
+                reuse=handed_on,
+            )
         )
-        for k, (state, case) in enumerate(zip(states, cases, strict=True))
-    ]
+    return solutions
 
 
 def _engine(
@@ -157,30 +165,28 @@ def _engine(
 
 @dataclass(frozen=True, eq=False)
 class _Case:
+    """A load state: its vector, those of each load, and imposed displacements."""
+
     loads: tuple[Load, ...]
     factor: float
     f: Floats
+    parts: tuple[Floats, ...]
     known: Floats
 
 
-def _case(
-    problem: Problem, model: Model, state: Any, known_loads: dict[tuple[int, ...], Floats]
-) -> _Case:
-    """A load state; states that differ by a factor integrate their loads once."""
+def _case(problem: Problem, model: Model, state: Any, known_loads: dict[int, Floats]) -> _Case:
+    """A load state; states that share loads integrate them once."""
     loads, factor = problem.state(state)
-    scaled = tuple(load for load in loads if not isinstance(load, InitialStress))
-    steady = tuple(load for load in loads if isinstance(load, InitialStress))
-
-    def vector(chosen: tuple[Load, ...]) -> Floats:
-        key = tuple(map(id, chosen))
-        if key not in known_loads:
-            known_loads[key] = load_vector(model.space, chosen, model.lips)
-        return known_loads[key]
-
-    f = factor * vector(scaled) + vector(steady)
+    parts = []
+    for load in loads:
+        if id(load) not in known_loads:
+            known_loads[id(load)] = load_vector(model.space, (load,), model.lips)
+        scale = 1.0 if isinstance(load, InitialStress) else factor
+        parts.append(scale * known_loads[id(load)])
+    f = sum(parts, np.zeros(model.space.n_dof))
     known = model.known.value
     moved = tuple(load for load in loads if isinstance(load, Displacement))
     if moved:
         new = known_unknowns(model.space, moved)
         known = np.where(new.fixed & model.known.fixed, new.value, known)
-    return _Case(loads, factor, f, factor * known)
+    return _Case(loads, factor, f, tuple(parts), factor * known)

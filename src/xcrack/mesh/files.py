@@ -87,12 +87,12 @@ def read_mesh(path: str | PathLike[str], *, strict: bool = False) -> Mesh:
     >>> read_mesh(path)
     Mesh(9 points, 8 triangles, facet sets: left, right, bottom, top, boundary)
     """
-    path = _existing(path, "mesh")
+    path = existing_file(path, "mesh")
     with system_errors("cannot read the mesh file", path):
         if path.suffix.lower() == ".inp":
             raw = read_abaqus(path)
         else:
-            raw = _raw_from_meshio(_meshio_read(path, "mesh"), _gmsh_names(path))
+            raw = _raw_from_meshio(meshio_read(path, "mesh"), _gmsh_names(path))
     return mesh_from_raw(linearised(raw, path.name, strict), path.name)
 
 
@@ -116,9 +116,9 @@ def read_triangles(path: str | PathLike[str]) -> tuple[Floats, Ints]:
     GeometryError
         It contains no linear triangles.
     """
-    path = _existing(path, "surface")
+    path = existing_file(path, "surface")
     with system_errors("cannot read the surface file", path):
-        raw = _meshio_read(path, "surface")
+        raw = meshio_read(path, "surface")
     blocks = [block.data for block in raw.cells if block.type == "triangle"]
     if not blocks:
         kinds = sorted({block.type for block in raw.cells})
@@ -195,7 +195,7 @@ def _write_text(path: Path, text: str) -> None:
             raise
 
 
-def _existing(value: str | PathLike[str], what: str) -> Path:
+def existing_file(value: str | PathLike[str], what: str) -> Path:
     """Path of a file that is there."""
     path = path_of(value, f"path of the {what} file")
     with system_errors(f"cannot read the {what} file", path):
@@ -211,7 +211,8 @@ def _existing(value: str | PathLike[str], what: str) -> Path:
     return path
 
 
-def _meshio_read(path: Path, what: str) -> Any:
+def meshio_read(path: Path, what: str) -> Any:
+    """Content of a file as meshio reads it; errors name the file and what to do."""
     meshio = required("meshio", f"reading a {path.suffix} file")
     _check_extension(path, "read", meshio.extension_to_filetypes)
     output = io.StringIO()

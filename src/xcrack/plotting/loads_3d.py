@@ -6,6 +6,7 @@ from xcrack.analysis.solution import Solution
 from xcrack.arrays import Floats, Ints
 from xcrack.mesh.mesh import Mesh
 from xcrack.scene.conditions import PointForce, Pressure, Traction, evaluate, evaluate_scalar
+from xcrack.scene.set_loads import Bearing, Resultant
 
 _SMALL = 0.25  # share of the body up to which a loaded set has one arrow, its resultant
 _LENGTH = 0.16  # share of the body of the longest arrow
@@ -27,6 +28,12 @@ def load_arrows(solution: Solution) -> tuple[Floats, Floats]:
     for load in solution.loads:
         if isinstance(load, PointForce):
             forces.append(np.stack([load.x, load.force, np.zeros(3)])[None])
+        elif isinstance(load, Bearing | Resultant):
+            facets = mesh.facet_sets[load.where]
+            area = np.linalg.norm(_outward(mesh, facets), axis=1)
+            middle = area @ mesh.points[facets].mean(axis=1) / area.sum()
+            force = np.zeros(3) if load.force is None else load.force
+            forces.append(np.stack([middle, force, np.zeros(3)])[None])
         elif isinstance(load, Traction | Pressure):
             facets = mesh.facet_sets[load.where]
             x = mesh.points[facets].mean(axis=1)

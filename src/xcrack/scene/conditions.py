@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from xcrack.arrays import Floats, frozen
 from xcrack.errors import ProblemError
 from xcrack.inputs import called, number, numbers, whole
+from xcrack.scene.set_loads import Bearing, Resultant
 
 Value = Any  # vector, f(x) or f(x, normal)
 Where = Any  # name of a facet set, or a point
@@ -78,7 +79,8 @@ class InitialStress:
     value: Any
 
 
-Load = Displacement | Traction | Pressure | PointForce | BodyForce | CrackPressure | InitialStress
+SetLoad = Traction | Pressure | Bearing | Resultant
+Load = Displacement | SetLoad | PointForce | BodyForce | CrackPressure | InitialStress
 Support = Fix | Displacement
 
 
@@ -287,7 +289,7 @@ def evaluate_stress(value: Any, x: Floats) -> Floats:
         )
     result = np.broadcast_to(result, (len(x), d, d))
     _check_finite(result, x, what)
-    lopsided = np.abs(result - np.swapaxes(result, 1, 2)).reshape(len(x), -1).max(axis=1, initial=0)
+    lopsided = np.abs(result - np.swapaxes(result, 1, 2)).max(axis=(1, 2), initial=0)
     if (lopsided > 1e-8 * np.abs(result).max(initial=0.0)).any():
         where = int(np.argmax(lopsided))
         raise ProblemError(
@@ -303,7 +305,7 @@ def _values(result: Any, what: str) -> Floats:
 
 
 def _check_finite(result: Floats, x: Floats, what: str) -> None:
-    bad = ~np.isfinite(result.reshape(len(x), -1)).all(axis=1)
+    bad = ~np.isfinite(result).reshape(len(x), int(np.prod(result.shape[1:]))).all(axis=1)
     if bad.any():
         where = x[np.argmax(bad)]
         raise ProblemError(

@@ -12,24 +12,21 @@ from xcrack.crack.crack import Crack
 from xcrack.crack.placing import check_cracks, placed
 from xcrack.errors import ProblemError
 from xcrack.inputs import number, whole
+from xcrack.mesh.holes import round_hole
 from xcrack.mesh.mesh import Mesh
 from xcrack.mesh.sets import facet_set
 from xcrack.scene.conditions import (
-    BodyForce,
     CrackPressure,
     Displacement,
     Fix,
     InitialStress,
     Load,
-    PointForce,
-    Pressure,
     Support,
-    Traction,
 )
 from xcrack.scene.material import Isotropic
 from xcrack.scene.numerics import Numerics
-
-_LOADS = (Traction, Pressure, PointForce, BodyForce, CrackPressure, InitialStress, Displacement)
+from xcrack.scene.set_loads import Bearing, Resultant, check_dimension
+from xcrack.scene.temperature import with_material
 
 _ORDER = {2: 2, 3: 1}  # of the standard functions, by dimension (measured)
 _PLANE = {2: True, 3: False}  # whether the material must name a plane state
@@ -108,10 +105,10 @@ class Problem:
     def state(self, state: Any) -> tuple[tuple[Load, ...], float]:
         """Loads and factor of a load state: a number, or a list of loads."""
         if state is None:
-            return tuple(self.loads), 1.0
+            return self._acting, 1.0
         if isinstance(state, Real | np.ndarray) or np.isscalar(state):
             try:
-                return tuple(self.loads), number(state, "load state")
+                return self._acting, number(state, "load state")
             except ProblemError as error:
                 raise ProblemError(f"{str(error)[:-1]}, or a list of loads.") from None
         if not isinstance(state, Iterable):
@@ -120,7 +117,14 @@ class Problem:
         for load in loads:
             self._check_load(load)
         body = tuple(load for load in self.loads if isinstance(load, InitialStress))
-        return loads + tuple(b for b in body if b not in loads), 1.0
+        loads += tuple(b for b in body if b not in loads)
+        own = dict(zip(map(id, self.loads), self._acting, strict=True))
+        return tuple(own.get(id(x), with_material(x, self.material)) for x in loads), 1.0
+
+    @cached_property
+    def _acting(self) -> tuple[Load, ...]:
+        """The loads with all that depends on the material."""
+        return tuple(with_material(load, self.material) for load in self.loads)
 
     def _check_members(self) -> None:
         for crack in self.cracks:
@@ -140,13 +144,18 @@ class Problem:
             self._check_load(load)
 
     def _check_load(self, load: Any) -> None:
-        if not isinstance(load, _LOADS):
+        if not isinstance(load, Load):
             raise ProblemError(
                 f"loads: {load!r:.80} is not a load; see traction(...), pressure(...)."
             )
         where = getattr(load, "where", None)
         if isinstance(where, str):
             facet_set(self.mesh, where, type(load).__name__.lower())
+        if isinstance(load, Bearing | Resultant):
+            check_dimension(load, self.mesh.dim)
+        if isinstance(load, Bearing):
+            what = f"bearing({load.where!r})"
+            round_hole(self.mesh, facet_set(self.mesh, load.where, what), what)
         if isinstance(load, Displacement):
             supported = [s.where for s in self.supports]
             if not any(_same(where, h) for h in supported):

@@ -4,6 +4,7 @@ import numpy as np
 
 from xcrack.arrays import Floats, Ints
 from xcrack.errors import ProblemError
+from xcrack.mesh.holes import round_hole
 from xcrack.mesh.sets import facet_set, nearest_point
 from xcrack.scene.conditions import (
     BodyForce,
@@ -12,15 +13,17 @@ from xcrack.scene.conditions import (
     Load,
     PointForce,
     Pressure,
-    Traction,
+    SetLoad,
     evaluate,
     evaluate_scalar,
     evaluate_stress,
 )
+from xcrack.scene.set_loads import Bearing, Resultant
 from xcrack.xfem.facets import part_points, split_facets
 from xcrack.xfem.function_space import FunctionSpace
 from xcrack.xfem.lips import LipPoints, jump_values
 from xcrack.xfem.quadrature import Points, cell_points, cell_side
+from xcrack.xfem.set_loads import bearing_traction, resultant_traction
 
 
 def load_vector(
@@ -29,13 +32,13 @@ def load_vector(
     """Sum of the given loads, tested with every function `(n_dof,)`; displacements are skipped."""
     f = np.zeros((space.n_functions, space.dim))
     for load in loads:
-        if isinstance(load, Traction | Pressure):
+        if isinstance(load, SetLoad):
             _add_traction(f, space, load)
         elif isinstance(load, PointForce):
             point = nearest_point(space.mesh, load.x, "point_force")
             f[point] += load.force
         elif isinstance(load, BodyForce):
-            points = _body_points(space)
+            points = body_points(space)
             b = evaluate(load.value, position(space, points.cell, points.bary), "body_force")
             _add(f, space, points, b)
         elif isinstance(load, InitialStress):
@@ -71,7 +74,8 @@ def _scatter(f: Floats, functions: Ints, force: Floats) -> None:
     np.add.at(f, functions[active], force[active])
 
 
-def _body_points(space: FunctionSpace) -> Points:
+def body_points(space: FunctionSpace) -> Points:
+    """Points of integration of loads in the whole body."""
     cells = np.arange(len(space.mesh.cells))
     # Loads are not corrected as the stiffness is: they need a degree more near tips.
     return cell_points(space, cells, 5, space.order + 2)
@@ -101,7 +105,7 @@ def facet_points(space: FunctionSpace, facets: Ints, n: int = 6) -> tuple[Points
     return Points(c[order], bary[order], weight[order], side[order]), normal[order]
 
 
-def _add_traction(f: Floats, space: FunctionSpace, load: Traction | Pressure) -> None:
+def _add_traction(f: Floats, space: FunctionSpace, load: SetLoad) -> None:
     what = f"{type(load).__name__.lower()}({load.where!r})"
     facets = facet_set(space.mesh, load.where, what)
     inner = space.mesh.facet_to_cell[space.mesh.facet_numbers(facets), 1] >= 0
@@ -114,6 +118,11 @@ def _add_traction(f: Floats, space: FunctionSpace, load: Traction | Pressure) ->
     x = position(space, points.cell, points.bary)
     if isinstance(load, Pressure):
         density = -evaluate_scalar(load.value, x, what)[:, None] * normal
+    elif isinstance(load, Bearing):
+        hole = round_hole(space.mesh, facets, what)
+        density = bearing_traction(load, hole, x, points.weight)
+    elif isinstance(load, Resultant):
+        density = resultant_traction(load, x, points.weight)
     else:
         density = evaluate(load.value, x, what, normal)
     _add(f, space, points, density)
@@ -121,7 +130,7 @@ def _add_traction(f: Floats, space: FunctionSpace, load: Traction | Pressure) ->
 
 def _add_initial_stress(f: Floats, space: FunctionSpace, load: InitialStress) -> None:
     """Subtract the integral of sigma0 : grad v."""
-    points = _body_points(space)
+    points = body_points(space)
     sigma = evaluate_stress(load.value, position(space, points.cell, points.bary))
     for batch, _ in space.batches(np.unique(points.cell)):
         number, row, _ = points.of_cells(batch.cells)

@@ -29,10 +29,13 @@ class Known:
     fixed : (n_dof,) array of bool
     value : (n_dof,) array, length
         Zero where nothing is imposed.
+    owner : (n_dof,) array of int
+        Number of the support that decides, -1 where none does.
     """
 
     fixed: Bools
     value: Floats
+    owner: Ints
 
 
 def known_unknowns(space: FunctionSpace, supports: tuple[Fix | Displacement, ...]) -> Known:
@@ -46,7 +49,8 @@ def known_unknowns(space: FunctionSpace, supports: tuple[Fix | Displacement, ...
     fixed = np.zeros((space.n_functions, space.dim), dtype=bool)
     value = np.zeros((space.n_functions, space.dim))
     fitted = np.zeros_like(fixed)
-    for support in supports:
+    owner = np.full(fixed.shape, -1, dtype=np.int64)
+    for number, support in enumerate(supports):
         if isinstance(support, Fix):
             functions = _functions_of(space, support.where, "fix")
             axes = range(space.dim) if support.axis is None else [support.axis]
@@ -57,7 +61,8 @@ def known_unknowns(space: FunctionSpace, supports: tuple[Fix | Displacement, ...
         else:
             for axis, functions, numbers, n_fitted in _imposed(space, support):
                 _impose(space, fixed, value, fitted, functions, axis, numbers, n_fitted)
-    return Known(fixed.ravel(), value.ravel())
+        owner[fixed & (owner < 0)] = number
+    return Known(fixed.ravel(), value.ravel(), owner.ravel())
 
 
 def _impose(

@@ -1,0 +1,94 @@
+"""Round holes among the facet sets of a mesh: axis, centre and radius."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from xcrack.arrays import Floats, Ints
+from xcrack.errors import ProblemError
+from xcrack.mesh.mesh import Mesh
+from xcrack.mesh.normals import outward_areas
+
+_ROUND = 0.02  # of the radius: points of a hole are no farther from its circle
+_ALONG = 0.01  # share of the squared normals along the axis of a cylinder
+
+
+@dataclass(frozen=True, eq=False)
+class Hole:
+    """A round hole.
+
+    Attributes
+    ----------
+    centre : (2,) array, length
+        In the section across the axis.
+    section : (2, d) array
+        Two directions across the axis; the unit directions in 2D.
+    radius : float, length
+    """
+
+    centre: Floats
+    section: Floats
+    radius: float
+
+    def local(self, x: Floats) -> Floats:
+        """Places from the axis in the section `(n, 2)`."""
+        return np.asarray(x @ self.section.T - self.centre)
+
+
+def round_hole(mesh: Mesh, facets: Ints, what: str) -> Hole:
+    """Fit a circle (2D) or a cylinder (3D) to facets of the boundary.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    facets : (k, d) array of int
+        On the boundary.
+    what : str
+        The load, for messages.
+
+    Raises
+    ------
+    ProblemError
+        The facets are not the wall of a round hole, or lie inside the body.
+    """
+    if not len(facets):
+        raise ProblemError(f"{what}: the set has no facets.")
+    area = outward_areas(mesh, facets, what)
+    section = _section(area, what)
+    x = mesh.points[np.unique(facets)] @ section.T
+    A = np.column_stack([2 * x, np.ones(len(x))])
+    solution, _, rank, _ = np.linalg.lstsq(A, (x**2).sum(axis=1), rcond=1e-10)
+    if rank < 3:
+        raise ProblemError(f"{what}: the set is straight, not the wall of a round hole.")
+    centre = solution[:2]
+    distance = np.linalg.norm(x - centre, axis=1)
+    radius = float(distance.mean())
+    off = np.abs(distance - radius).max() / radius
+    hole = Hole(centre, section, radius)
+    if off > _ROUND:
+        raise ProblemError(
+            f"{what}: the set is not a round hole: its points lie up to {100 * off:.3g} % of the "
+            f"radius {radius:.4g} off the best circle. Give the facets of one hole."
+        )
+    middle = hole.local(mesh.points[facets].mean(axis=1))
+    if (np.einsum("ks,ks->k", middle, area @ section.T) > 0).any():
+        raise ProblemError(
+            f"{what}: the set is round, but no hole: the body lies inside of it, at least in "
+            "places. A pin presses on the wall of a hole."
+        )
+    return hole
+
+
+def _section(area: Floats, what: str) -> Floats:
+    """Directions across the axis: in 2D all, in 3D those in which the normals of the wall lie."""
+    if area.shape[1] < 3:
+        return np.eye(2)
+    size = np.linalg.norm(area, axis=1)
+    spread = (area / size[:, None]).T @ area / size.sum()
+    share, direction = np.linalg.eigh(spread)
+    if share[0] > _ALONG or share[1] < _ALONG:
+        kind = "plane" if share[1] < _ALONG else "not a cylinder"
+        raise ProblemError(
+            f"{what}: the set is {kind}: give the facets of the wall of one round hole only."
+        )
+    return np.asarray(direction[:, 1:].T)
