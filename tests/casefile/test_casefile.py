@@ -148,7 +148,7 @@ def test_run_grows_and_goes_on_to_the_same_result(tmp_path):
         ('[units]\nlength = "mm"\nforce = "N"\n', "", 11, "give [units]"),
     ],
 )
-def test_what_is_wrong_is_said_with_its_line(old, new, line, words, tmp_path):
+def test_what_is_wrong_is_reported_with_its_line(old, new, line, words, tmp_path):
     assert old in PLATE
     path = written(tmp_path, PLATE.replace(old, new, 1))
     with pytest.raises(xc.XcrackError) as caught:
@@ -169,7 +169,7 @@ def test_what_is_wrong_is_said_with_its_line(old, new, line, words, tmp_path):
         ("progress = false", 'criterion = "hoop"', "known are max_hoop_stress"),
     ],
 )
-def test_growth_that_is_wrong_is_said(old, new, words, tmp_path):
+def test_growth_that_is_wrong_is_reported(old, new, words, tmp_path):
     path = written(tmp_path, GROWTH.replace(old, new, 1))
     with pytest.raises(xc.XcrackError, match=words) as caught:
         xc.read_case(path)

@@ -186,11 +186,12 @@ def test_plane_and_space_are_one_code_path() -> None:
     """Branches on the dimension are few: it is an array shape.
 
     Those that are left choose what a tip is (a point or a front), how it is placed, cut round,
-    measured, moved and drawn.
+    measured, moved and drawn. Kernels write sums out by dimension, for the compiler.
     """
     branch = re.compile(r"\b(dim|d)\s*(==|!=)\s*[23]\b")
-    count = sum(len(branch.findall(path.read_text())) for path in FILES)
-    assert count <= 9, f"{count} branches on the dimension"
+    files = [path for path in FILES if path.parent.name != "kernels"]
+    count = sum(len(branch.findall(path.read_text())) for path in files)
+    assert count <= 8, f"{count} branches on the dimension"
 
 
 def test_no_variable_has_a_name_that_says_nothing() -> None:

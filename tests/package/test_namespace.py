@@ -23,12 +23,11 @@ NAMES = [
     "Cycle", "History", "Step", "collect", "elber", "equivalent_K", "grow", "max_hoop_stress",
     "mean_reference", "paris", "resume", "walker", "weighted_angle", "cycles_between", "load",
     "draw_fronts",
-    # verification, reports, files of scenes
-    "verify",
     # laws
     "el_haddad", "forman", "hartman_schijve", "klesnil_lukas", "law", "linear_closure", "nasgro",
     "nasgro_K_c", "nasgro3_threshold", "nasgro4_threshold", "newman_closure", "piecewise",
     "presets", "rate_table", "schijve_closure", "stepped_threshold",
+    # verification, reports, files of scenes
     "verify", "report", "read_case", "run", "info", "demo", "convert_mesh",
     # errors
     "ConvergenceError", "GeometryError", "MeshError", "ProblemError", "XcrackError",

@@ -135,7 +135,7 @@ def test_report_of_a_run_and_of_its_folder(tmp_path):
     assert again["growth"]["whole"] is True
 
 
-def test_a_half_written_run_is_reported_and_said(tmp_path):
+def test_a_half_written_run_is_reported(tmp_path):
     growth(plate(), tmp_path / "run")
     header = tmp_path / "run" / "run.json"
     header.write_text(json.dumps({**json.loads(header.read_text()), "ended": ""}))
@@ -162,7 +162,7 @@ def test_report_of_a_run_in_space(tmp_path):
     assert corners / 65535 * data["extent"] - 1 == pytest.approx(x, abs=2e-5)  # of 16 bits
 
 
-def test_too_much_is_left_out_and_said(monkeypatch, tmp_path):
+def test_too_much_is_left_out_and_named(monkeypatch, tmp_path):
     monkeypatch.setattr("xcrack.plotting.view_3d.MOST", 10)
     text, _, numbers = read(xc.report(penny(), tmp_path / "large.html"))
     assert numbers["view"] == {"layers": 0}

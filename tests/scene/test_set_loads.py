@@ -208,7 +208,7 @@ def test_a_free_body_expands_without_stress(plane: str | None) -> None:
     np.testing.assert_allclose(solution.stress(x), 0, atol=1e-6)
 
 
-def test_K_of_a_held_strip_with_a_linear_gradient() -> None:
+def test_K_of_a_supported_strip_with_a_linear_gradient() -> None:
     """Superposition: the stress -E alpha dT of the strip without a crack, as pressure on it."""
     body = xc.Isotropic(E=2e5, nu=0.3, plane="stress")
     mesh = xc.box((0, 0), (1, 3), (20, 60))
@@ -217,14 +217,14 @@ def test_K_of_a_held_strip_with_a_linear_gradient() -> None:
     def warm(x: np.ndarray) -> np.ndarray:
         return -40.0 + 60.0 * x[:, 0]
 
-    held = [xc.fix("bottom", axis=1), xc.fix("top", axis=1), xc.fix((0.0, 0.0), axis=0)]
+    supported = [xc.fix("bottom", axis=1), xc.fix("top", axis=1), xc.fix((0.0, 0.0), axis=0)]
     crack = xc.line_crack([(-0.1, 1.513), (0.4, 1.513)])
     K = []
     for load in (
         xc.temperature(warm, alpha),
         xc.crack_pressure(lambda x: -body.E * alpha * warm(x)),
     ):
-        problem = xc.Problem(mesh, body, cracks=[crack], supports=held, loads=[load])
+        problem = xc.Problem(mesh, body, cracks=[crack], supports=supported, loads=[load])
         sif = xc.stress_intensity(xc.solve(problem))
         K.append((sif.K_I[0], sif.K_II[0], sif.T[0]))
     # Another load vector and other terms of the integral: discretisation of both.
@@ -236,14 +236,16 @@ def test_K_of_a_held_strip_with_a_linear_gradient() -> None:
 def test_temperature_and_stress_of_a_state() -> None:
     mesh = xc.box((0, 0), (1, 1), 4)
     warm = xc.temperature(lambda x: x[:, 0] * 0 + 10.0, 1e-5)
-    held = [xc.fix("boundary")]
-    problem = xc.Problem(mesh, STEEL, supports=held, loads=[warm])
+    supported = [xc.fix("boundary")]
+    problem = xc.Problem(mesh, STEEL, supports=supported, loads=[warm])
     exact = -2e5 / 0.4 * 1e-4 * np.eye(2)
     for state in (None, 0.5, [warm], [xc.temperature(10.0, 0.0)], []):
         solution = xc.solve(problem, states=[state])[0]
         np.testing.assert_allclose(solution.stress(np.array([[0.3, 0.4]]))[0], exact, atol=1e-9)
     with pytest.raises(ProblemError, match="temperature"):
-        xc.solve(xc.Problem(mesh, STEEL, supports=held, loads=[xc.temperature(lambda x: x, 1.0)]))
+        xc.solve(
+            xc.Problem(mesh, STEEL, supports=supported, loads=[xc.temperature(lambda x: x, 1.0)])
+        )
 
 
 def test_the_part_of_a_stress_out_of_balance() -> None:

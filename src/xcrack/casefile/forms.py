@@ -10,7 +10,8 @@ from xcrack.casefile.units import BODY_FORCE, FORCE, LENGTH, NUMBER, STRESS, Dim
 from xcrack.crack.lines import line_crack
 from xcrack.crack.surfaces import elliptic_crack, penny_crack, plane_crack, read_surface
 from xcrack.errors import ProblemError, XcrackError
-from xcrack.growth import criteria, laws
+from xcrack.growth import criteria
+from xcrack.laws import power
 from xcrack.mesh.box import box
 from xcrack.mesh.cylinder import notched_cylinder
 from xcrack.mesh.files import read_mesh
@@ -76,9 +77,9 @@ LOADS = {
     "displacement": Form(conditions.displacement, {"value": LENGTH}),
 }
 LAWS = {
-    "paris": Form(laws.paris),
-    "elber": Form(laws.elber),
-    "walker": Form(laws.walker),
+    "paris": Form(power.paris),
+    "elber": Form(power.elber),
+    "walker": Form(power.walker),
 }
 CRITERIA: dict[str, Callable[..., Any]] = {
     "max_hoop_stress": criteria.max_hoop_stress,

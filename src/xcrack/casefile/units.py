@@ -71,13 +71,13 @@ class Units:
             raise ProblemError(
                 f"{text!r:.60} is no number with a unit, such as {_example(dimension)}."
             )
-        value, size, found = float(match[1]), 1.0, NUMBER
+        value, size, computed = float(match[1]), 1.0, NUMBER
         rest = match[2]
         while rest:
-            size, found, rest = _times(size, found, rest)
+            size, computed, rest = _times(size, computed, rest)
         wanted = _NAMES.get(dimension, "another quantity")
-        if found != dimension:
-            have = _NAMES.get(found, "another quantity")
+        if computed != dimension:
+            have = _NAMES.get(computed, "another quantity")
             raise ProblemError(f"{text!r:.60} is {have}, but {wanted} belongs here.")
         if dimension != NUMBER and not (self.length and self.force):
             raise ProblemError(
@@ -90,7 +90,7 @@ class Units:
         return result if isfinite(result) else inf
 
 
-def _times(size: float, found: Dimension, rest: str) -> tuple[float, Dimension, str]:
+def _times(size: float, result: Dimension, rest: str) -> tuple[float, Dimension, str]:
     """One more factor of a unit."""
     match = _FACTOR.match(rest)
     if match is None or match[3] not in _UNITS:
@@ -99,7 +99,7 @@ def _times(size: float, found: Dimension, rest: str) -> tuple[float, Dimension, 
         raise ProblemError(f"the unit {name!r:.40} is not known: known are {known}.")
     power = float(match[4] or 1) * (0.5 if match[2] else 1.0) * (-1 if match[1] == "/" else 1)
     factor, own = _UNITS[match[3]]
-    powers = found[0] + power * own[0], found[1] + power * own[1]
+    powers = result[0] + power * own[0], result[1] + power * own[1]
     return size * factor**power, powers, rest[match.end() :]
 
 

@@ -143,9 +143,9 @@ def _sif(solutions: Sequence[Solution]) -> tuple[tuple[SIF, ...], ...]:
 
 
 def _solutions(given: Any) -> tuple[Solution, ...]:
-    found = [given] if isinstance(given, Solution) else given
-    if isinstance(found, list | tuple) and found and all(isinstance(s, Solution) for s in found):
-        return tuple(found)
+    result = [given] if isinstance(given, Solution) else given
+    if isinstance(result, list | tuple) and result and all(isinstance(s, Solution) for s in result):
+        return tuple(result)
     raise ProblemError(
         f"report takes a Solution or a list of them, a History, or the folder of a run, not a "
         f"{type(given).__name__}."
