@@ -1,11 +1,9 @@
-"""Checks of numbers, arrays and paths where users give them, and calls of users' functions."""
+"""Checks of numbers, arrays and words where users give them, and calls of users' functions."""
 
 import operator
-import os
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+import re
+from collections.abc import Callable, Mapping, Sequence
 from numbers import Real
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -55,7 +53,7 @@ def number(
     if isinstance(value, np.ndarray) and value.ndim == 0:
         value = value[()]
     if isinstance(value, bool | np.bool_) or not isinstance(value, Real):
-        raise error(f"{what} = {_shown(value)} is not a number: give {wanted}.")
+        raise error(f"{what} = {shown(value)} is not a number: give {wanted}.")
     try:
         result = float(value)
     except OverflowError:
@@ -67,7 +65,7 @@ def number(
         and (below is None or result < below)
         and (most is None or result <= most)
     ):
-        raise error(f"{what} = {_shown(value)} is not possible: give {wanted}.")
+        raise error(f"{what} = {shown(value)} is not possible: give {wanted}.")
     return result
 
 
@@ -106,16 +104,16 @@ def whole(
     if isinstance(value, np.ndarray) and value.ndim == 0:
         value = value[()]
     if isinstance(value, bool | np.bool_) or not isinstance(value, Real):
-        raise error(f"{what} = {_shown(value)} is not a number: give {wanted}.")
+        raise error(f"{what} = {shown(value)} is not a number: give {wanted}.")
     try:
         result = operator.index(value)  # type: ignore[arg-type]
     except TypeError:
         rounded = float(value)
         if not rounded.is_integer():  # nan and inf are not either
-            raise error(f"{what} = {_shown(value)} is not possible: give {wanted}.") from None
+            raise error(f"{what} = {shown(value)} is not possible: give {wanted}.") from None
         result = int(rounded)
     if (least is not None and result < least) or (most is not None and result > most):
-        raise error(f"{what} = {_shown(value)} is not possible: give {wanted}.")
+        raise error(f"{what} = {shown(value)} is not possible: give {wanted}.")
     return result
 
 
@@ -199,10 +197,118 @@ def whole_numbers(
     result = _real_array(value, what, wanted, error)
     _check_shape(result, what, shape, wanted, error)
     if result.dtype.kind == "f":
+        result = result.astype(np.float64, copy=False)  # a half float ends at 65504
         odd = ~(np.isfinite(result) & (result == np.round(result)) & (np.abs(result) < 2**53))
         if odd.any():
             raise error(f"{what} holds {result[odd].flat[0]}: give {wanted}.")
     return result.astype(np.int64, copy=False)
+
+
+def one_of(
+    value: Any, what: str, words: Sequence[str], *, error: type[XcrackError] = ProblemError
+) -> str:
+    """Check that a value is one of some words, and return it.
+
+    Parameters
+    ----------
+    value, what, error
+        As of `number`.
+    words : sequence of str
+
+    Returns
+    -------
+    str
+
+    Raises
+    ------
+    error
+        It is another word, or no text.
+
+    Examples
+    --------
+    >>> one_of("on", "contact", ("auto", "on", "off"))
+    'on'
+    """
+    if not isinstance(value, str) or value not in words:
+        known = " or ".join([", ".join(f'"{word}"' for word in words[:-1]), f'"{words[-1]}"'])
+        raise error(f"{what} = {shown(value)} is not known: give {known}.")
+    return value
+
+
+def flag(value: Any, what: str, *, error: type[XcrackError] = ProblemError) -> bool:
+    """Check that a value is True or False, and return it; 1 and "no" are neither.
+
+    Parameters
+    ----------
+    value, what, error
+        As of `number`.
+
+    Returns
+    -------
+    bool
+
+    Raises
+    ------
+    error
+        It is neither.
+
+    Examples
+    --------
+    >>> flag(False, "plot: edges")
+    False
+    """
+    if not isinstance(value, bool | np.bool_):
+        raise error(f"{what} = {shown(value)}: give True or False.")
+    return bool(value)
+
+
+def entries(value: Any, what: str, *, error: type[XcrackError] = ProblemError) -> tuple[Any, ...]:
+    """Entries of a list, tuple or whatever else can be gone through, but for text and mappings.
+
+    Parameters
+    ----------
+    value, what, error
+        As of `number`.
+
+    Returns
+    -------
+    tuple
+
+    Raises
+    ------
+    error
+        It cannot be gone through.
+    """
+    try:
+        items = None if isinstance(value, str | bytes | bytearray | Mapping) else iter(value)
+    except Exception:  # whatever an object's own __iter__ raises
+        items = None
+    if items is None:
+        raise error(f"{what} = {shown(value)}: give a list.")
+    return tuple(items)
+
+
+def shown(value: Any) -> str:
+    """A value in a message: one short line, whatever it is.
+
+    Parameters
+    ----------
+    value : anything
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> shown([1.5, None])
+    '[1.5, None]'
+    """
+    try:
+        text = re.sub(r"\barray\((.*?)(, dtype=\w+)?\)", r"\1", " ".join(repr(value).split()))
+    except Exception:
+        text = object.__repr__(value)
+    return text if len(text) <= 80 else f"{text[:60]} … ({type(value).__name__})"
 
 
 def called(function: Callable[..., Any], what: str, *arguments: Any) -> Any:
@@ -224,80 +330,24 @@ def called(function: Callable[..., Any], what: str, *arguments: Any) -> Any:
         raise
 
 
-def path_of(value: Any, what: str, *, error: type[XcrackError] = XcrackError) -> Path:
-    """Check that a value can be the path of a file, and return it.
-
-    Parameters
-    ----------
-    value : anything
-    what : str
-        Its name in the message, such as ``"write_mesh: path"``.
-    error : type of XcrackError
-
-    Returns
-    -------
-    Path
-
-    Raises
-    ------
-    error
-        Neither a string nor a path, empty, or with a NUL character.
-
-    Examples
-    --------
-    >>> path_of("plate.msh", "read_mesh: path").suffix
-    '.msh'
-    """
-    if not isinstance(value, str | os.PathLike) or isinstance(os.fspath(value), bytes):
-        raise error(f"{what} = {_shown(value)} is not a path: give a string or a pathlib.Path.")
-    text = os.fspath(value)
-    if not text or "\0" in text:
-        reason = "holds a NUL character" if text else "is empty"
-        raise error(f"{what} = {_shown(value)} {reason}: give the path of a file.")
-    return Path(text)
-
-
-@contextmanager
-def system_errors(
-    what: str, path: Path, *, error: type[XcrackError] = XcrackError
-) -> Iterator[None]:
-    """Turn what the system refuses (no space, no permission, a folder) into an error of ours.
-
-    Parameters
-    ----------
-    what : str
-        What failed, such as ``"the mesh cannot be written to"``; the path follows.
-    path : Path
-    error : type of XcrackError
-
-    Raises
-    ------
-    error
-        For an OSError; it names the path and what the system answered.
-    """
-    try:
-        yield
-    except OSError as cause:
-        reason = cause.strerror or str(cause) or type(cause).__name__
-        raise error(f"{what} {str(path)!r}: {reason}.") from cause
-
-
 def _real_array(value: Any, what: str, wanted: str, error: type[XcrackError]) -> Any:
     if isinstance(value, np.ma.MaskedArray):
         if np.ma.getmaskarray(value).any():
             raise error(f"{what} has masked entries: give {wanted}, without a mask.")
         value = value.data
+    if isinstance(value, bytes | bytearray):  # numpy takes the second for numbers
+        raise error(f"{what} = {shown(value)} is text: give {wanted}.")
     try:
         result = np.asarray(value)
     except Exception as cause:  # ragged rows, or whatever an object's own __array__ raises
-        raise error(f"{what} = {_shown(value)}: give {wanted} ({cause}).") from cause
+        raise error(f"{what} = {shown(value)}: give {wanted} ({cause}).") from cause
     if result.size == 0 and result.dtype.kind in "Of":
         return result.astype(float)
     if result.dtype.kind not in "iuf":
         kind = {"c": "complex", "b": "bool", "U": "str", "S": "bytes"}.get(
             result.dtype.kind, str(result.dtype)
         )
-        raise error(f"{what} = {_shown(value)} holds {kind} entries: give {wanted}.")
+        raise error(f"{what} = {shown(value)} holds {kind} entries: give {wanted}.")
     return result
 
 
@@ -331,13 +381,14 @@ def _bounds(
     return f" {text}" if text else ""
 
 
-def _shown(value: Any) -> str:
-    """A value in a message: short, whatever it is."""
-    try:
-        text = " ".join(repr(value).split())
-    except Exception:
-        text = object.__repr__(value)
-    return text if len(text) <= 80 else f"{text[:60]} … ({type(value).__name__})"
-
-
-__all__ = ["called", "number", "numbers", "path_of", "system_errors", "whole", "whole_numbers"]
+__all__ = [
+    "called",
+    "entries",
+    "flag",
+    "number",
+    "numbers",
+    "one_of",
+    "shown",
+    "whole",
+    "whole_numbers",
+]

@@ -5,6 +5,8 @@ from types import ModuleType
 
 from xcrack.errors import XcrackError
 
+_PIP_NAME = {"vtkmodules": "vtk", "PIL": "pillow"}  # where that is not the name of the module
+
 
 def required(name: str, purpose: str, instead: str = "") -> ModuleType:
     """Import a package that only some functions need; an error says how to install it.
@@ -32,11 +34,11 @@ def required(name: str, purpose: str, instead: str = "") -> ModuleType:
     >>> required("math", "an example").__name__
     'math'
     """
-    package = name.partition(".")[0]
+    package = _pip_name(name)
     try:
         return import_module(name)
     except ModuleNotFoundError as error:
-        missing = (error.name or package).partition(".")[0]
+        missing = _pip_name(error.name or name)
         needs = "" if missing == package else f" of the package {package}"
         problem = (
             f"{purpose} needs the package {missing}{needs}, which is not installed in this Python: "
@@ -51,6 +53,11 @@ def required(name: str, purpose: str, instead: str = "") -> ModuleType:
         )
         cause = error
     raise XcrackError(f"{problem} {instead}".rstrip()) from cause
+
+
+def _pip_name(module: str) -> str:
+    top = module.partition(".")[0]
+    return _PIP_NAME.get(top, top)
 
 
 __all__ = ["required"]

@@ -9,6 +9,7 @@ from xcrack.arrays import Floats
 from xcrack.errors import ProblemError
 from xcrack.growth.checks import wants
 from xcrack.growth.criteria import Criterion
+from xcrack.inputs import number, numbers, shown
 from xcrack.laws.law import Law
 
 _ROUND_OFF = 1e-9  # relative; a few operations on numbers of order one
@@ -40,6 +41,8 @@ def check_law(law: Law, dK_max: float = 100.0, a: float = 1.0) -> None:
     >>> from xcrack.laws.power import paris
     >>> check_law(paris(C=1e-11, m=3))
     """
+    _check_callable(law, "check_law: law")
+    dK_max = number(dK_max, "check_law: dK_max", above=0)
     wrong: list[str] = []
     ratios = [-2.0, -1.0, -0.3, -1e-9] if getattr(law, "ratio", None) == "nominal" else []
     ratios = [R for R in [*ratios, *_RATIOS] if _is_within(R, getattr(law, "R_range", None))]
@@ -89,9 +92,11 @@ def _check_rates(law: Law, dK: Floats, R: Floats, rate: Floats, wrong: list[str]
         wrong.append(
             f"da/dN falls when dK_eq grows from {dK[n * i]} to {dK[n * i + n]} at R = {R[j]}"
         )
-    one = np.array(
-        [np.asarray(law(dK[i : i + 1], R[i : i + 1])).reshape(-1)[0] for i in range(len(dK))]
-    )
+    alone = [_called(law, (dK[i : i + 1], R[i : i + 1]), wrong, "da/dN") for i in range(len(dK))]
+    if any(one is None or one.size != 1 for one in alone):
+        wrong.append("for one point it does not return one rate")
+        return
+    one = np.array([each.reshape(-1)[0] for each in alone])
     if not np.allclose(one, rate, rtol=_ROUND_OFF, atol=0):
         wrong.append(
             "a point alone gets another rate than among others: each must stand for itself"
@@ -121,6 +126,8 @@ def check_criterion(criterion: Criterion, nu: float = 0.3) -> None:
     >>> from xcrack.growth.criteria import weighted_angle
     >>> check_criterion(weighted_angle)
     """
+    _check_callable(criterion, "check_criterion: criterion")
+    nu = number(nu, "check_criterion: nu", above=-1, below=0.5)
     wrong: list[str] = []
     for modes in (2, 3):
         _check_modes(criterion, nu, modes, wrong)
@@ -178,7 +185,11 @@ def _answered(
         return None
     parts = []
     for name, part in zip(("angle", "dK_eq", "R"), answer):
-        values = np.asarray(part, dtype=float)
+        try:
+            values = numbers(part, name, finite=False)
+        except ProblemError as error:
+            wrong.append(str(error))
+            return None
         if values.shape != (K.shape[1],) or not np.isfinite(values).all():
             wrong.append(
                 f"{name} for K of shape {K.shape} must be finite, of shape ({K.shape[1]},): "
@@ -202,23 +213,30 @@ def _called(
             answer = function(*given)
         except Exception as error:
             shapes = ", ".join(str(a.shape) for a in arguments)
-            wrong.append(f"called with arrays of shape {shapes} it raises {error!r}")
+            wrong.append(f"called with arrays of shape {shapes} it raises {shown(error)}")
             return None
     if not all(np.array_equal(a, b) for a, b in zip(given, arguments)):
         wrong.append("it changes the arrays it is given: work on a copy")
     if name is None:
         return answer
     try:
-        return np.asarray(answer, dtype=float)
-    except (TypeError, ValueError):
-        wrong.append(f"{name} must be an array of numbers, not {answer!r}")
+        return numbers(answer, name, finite=False)
+    except ProblemError as error:
+        wrong.append(str(error))
         return None
+
+
+def _check_callable(function: object, what: str) -> None:
+    if not callable(function):
+        raise ProblemError(f"{what} = {shown(function)} cannot be called: give a function.")
 
 
 def _judge(kind: str, function: object, wrong: list[str]) -> None:
     if wrong:
-        name = getattr(function, "__name__", repr(function))
-        raise ProblemError(f"the {kind} {name} cannot be used:\n- " + "\n- ".join(wrong))
+        name = getattr(function, "__name__", None) or shown(function)
+        raise ProblemError(
+            f"the {kind} {name} cannot be used:\n- " + "\n- ".join(dict.fromkeys(wrong))
+        )
 
 
 __all__ = ["check_criterion", "check_law"]

@@ -329,16 +329,16 @@ def scene(n=3):
 
 
 BAD = {
-    "no problem": (lambda: xc.chart(3), "give a Problem, not int"),
+    "no problem": (lambda: xc.chart(3), "give a Problem.*not int"),
     "settings": (lambda: xc.chart(scene(), 3), "give a list of dicts"),
     "one dict": (lambda: xc.chart(scene(), {"order": 1}), "give a list of dicts"),
     "no dict": (lambda: xc.chart(scene(), ["order"]), "'order' is no dict of fields"),
     "field": (lambda: xc.chart(scene(), [{"odrer": 1}]), "'odrer' is no choice.*one of order"),
     "scene": (lambda: xc.chart(scene(), [{"mesh": 1}]), "Meshes go into meshes="),
     "twice": (lambda: xc.chart(scene(), [{"order": 1}, {"order": 1}]), "'order 1' stands.*twice"),
-    "wanted": (lambda: xc.chart(scene(), wanted=0), "wanted = 0: give a relative error"),
-    "repeat": (lambda: xc.chart(scene(), repeat=0), "repeat=0.*positive"),
-    "seconds": (lambda: xc.chart(scene(), seconds="1"), "seconds='1'.*positive"),
+    "wanted": (lambda: xc.chart(scene(), wanted=0), "wanted relative error = 0 is not possible"),
+    "repeat": (lambda: xc.chart(scene(), repeat=0), "repeat = 0.*whole number"),
+    "seconds": (lambda: xc.chart(scene(), seconds="1"), "seconds = '1'.*number above 0"),
     "quantity": (lambda: xc.chart(scene(), quantity="K"), "give a function"),
     "one mesh": (lambda: xc.chart(scene(), meshes=[scene().mesh]), "two or more meshes"),
     "no meshes": (lambda: xc.chart(scene(), meshes="fine"), "two or more meshes"),
@@ -357,7 +357,7 @@ BAD = {
     ),
     "words": (
         lambda: xc.chart(scene(), quantity=lambda s: "high", seconds=1e-6, repeat=1),
-        "no setting ran.*must return a number.*'high'",
+        "no setting ran.*quantity returned = 'high'",
     ),
     "nan": (
         lambda: xc.chart(scene(), quantity=lambda s: math.nan, seconds=1e-6, repeat=1),

@@ -97,7 +97,7 @@ def named(name, function):
         (lambda dK, R: dK * dK.max(), "each must stand for itself"),
         (lambda dK, R: np.multiply(dK, 2, out=dK), "changes the arrays"),
         (lambda dK: dK, "raises TypeError"),
-        (lambda dK, R: "fast", "array of numbers"),
+        (lambda dK, R: "fast", "array of real numbers"),
     ],
 )
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")

@@ -64,7 +64,7 @@ IMPORTED_IN = {
     "gmsh": {"mesh"},
     "meshio": {"mesh"},
     "pyvista": {"plotting"},
-    "matplotlib": {"plotting", "charting"},
+    "matplotlib": {"plotting"},
     "vtk": {"post", "plotting"},
     "vtkmodules": {"post", "plotting"},
     "pyamg": {"solvers"},

@@ -186,11 +186,11 @@ PROBLEMS = {
     ),
     "load shape": (
         lambda: xc.traction("top", (1, 2, 3, 4)),
-        "traction: give a vector of 2 or 3 numbers",
+        "traction: value = .*: give a vector of 2 or 3 numbers",
     ),
     "load of space": (
         lambda: solve(loads=[xc.traction("top", (1, 2, 3))], supports=HELD),
-        r"traction\('top'\): the value has shape .*vector of length 2",
+        r"traction: value = \[1.*\] does not suit a body in 2 dimensions: give 2 numbers",
     ),
     "load of a function shape": (
         lambda: solve(loads=[xc.traction("top", lambda x: x[:, 0])], supports=HELD),
@@ -219,7 +219,7 @@ PROBLEMS = {
     ),
     "displacement entries": (
         lambda: solve(supports=[xc.displacement("top", (None, 0.0, 0.0))]),
-        r"displacement\('top'\): 3 entries for 2 directions",
+        r"displacement: value = \(None, 0.0, 0.0\) does not suit a body in 2 dimensions",
     ),
     "supports that contradict": (
         lambda: solve(supports=[xc.fix("left"), xc.displacement("top", (1.0, 0.0))], loads=()),
@@ -229,7 +229,10 @@ PROBLEMS = {
         lambda: xc.fix("top", axis=3),
         r"fix\('top'\): axis = 3 is not possible: give .* at least 0 and of at most 2",
     ),
-    "axis of space": (lambda: solve(supports=[xc.fix("top", axis=2)]), "axis is 0 or 1"),
+    "axis of space": (
+        lambda: solve(supports=[xc.fix("top", axis=2)]),
+        "in 2 dimensions axis is 0 or 1",
+    ),
     "point of a support": (
         lambda: solve(supports=[xc.fix((9.0, 0.0))]),
         r"fix: \[9.0, 0.0\] is .* away from the nearest",
@@ -254,7 +257,7 @@ PROBLEMS = {
     ),
     "a load for loads": (
         lambda: xc.Problem(box(), STEEL, loads=PULL[0]),
-        r"loads: give a list, such as loads=\[...\], not Tr",
+        r"Problem: loads = Traction\(.*: give a list",
     ),
     "no mesh": (
         lambda: xc.Problem("plate.msh", STEEL),

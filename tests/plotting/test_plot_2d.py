@@ -285,7 +285,7 @@ def test_an_unknown_field_lists_the_known(pulled):
 
 
 def test_bad_options(pulled, tmp_path):
-    with pytest.raises(xc.ProblemError, match="renderer='vtk'"):
+    with pytest.raises(xc.ProblemError, match="renderer = 'vtk'"):
         xc.plot(pulled, renderer="vtk")
     with pytest.raises(xc.ProblemError, match="numbered from 0"):
         xc.plot(pulled, "pressure", crack=1)

@@ -212,7 +212,7 @@ def test_fronts_have_their_frames_and_K(tmp_path, penny):
     _, at_points, _, _ = read_poly(xc.write(penny, tmp_path / "b", sif=sif)[2])
     for k, name in enumerate(("K_I", "K_II", "K_III")):
         np.testing.assert_array_equal(at_points[name], K[:, k])
-    with pytest.raises(xc.ProblemError, match="2 SIF for 1"):
+    with pytest.raises(xc.ProblemError, match="one SIF for each of the 1"):
         xc.write(penny, tmp_path / "c", sif=[sif, sif])
 
 

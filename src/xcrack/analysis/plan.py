@@ -3,7 +3,9 @@
 from dataclasses import dataclass
 
 from xcrack.crack.placing import short_fronts
-from xcrack.scene.problem import Problem
+from xcrack.errors import ProblemError
+from xcrack.inputs import shown
+from xcrack.scene.problem import Problem, check_problem
 
 _MODES, _ENDS = {2: "II", 3: "III"}, {2: "tip(s)", 3: "front(s)"}
 
@@ -88,9 +90,10 @@ class Report:
 
     def __getitem__(self, name: str) -> Ingredient:
         for ingredient in self.ingredients:
-            if ingredient.name == name:
+            if isinstance(name, str) and ingredient.name == name:
                 return ingredient
-        raise KeyError(name)
+        known = ", ".join(f'"{ingredient.name}"' for ingredient in self.ingredients)
+        raise ProblemError(f"the report has no ingredient {shown(name)}: give one of {known}.")
 
 
 def plan(problem: Problem) -> Report:
@@ -105,6 +108,11 @@ def plan(problem: Problem) -> Report:
     Report
         Printed, it gives one line an ingredient: used or left out, and the reason.
 
+    Raises
+    ------
+    ProblemError
+        Not a problem.
+
     Examples
     --------
     >>> import xcrack as xc
@@ -113,6 +121,7 @@ def plan(problem: Problem) -> Report:
     >>> print(xc.plan(xc.Problem(mesh, steel))["tip functions"])
     tip functions           left out  no cracks
     """
+    check_problem(problem, "plan")
     n_tips = [crack.n_tips for crack in problem.placed]
     rows = [_heaviside(n_tips), _tips(problem, n_tips)]
     rows.extend(_multipliers(problem))

@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from numbers import Real
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,7 +12,7 @@ from xcrack.analysis.plan import Report
 from xcrack.arrays import Bools, Floats, Ints, lock
 from xcrack.contact.result import Contact
 from xcrack.errors import GeometryError, ProblemError
-from xcrack.inputs import numbers
+from xcrack.inputs import numbers, shown, whole_numbers
 from xcrack.mesh.locate import locate
 from xcrack.scene.conditions import InitialStress, Load, evaluate_stress
 from xcrack.scene.problem import Problem, crack_number
@@ -85,7 +86,21 @@ class Solution:
         """Displacement `(q, d)` and gradient `(q, d, d)` at points given by cell.
 
         The gradient's rows are components, its columns directions.
+
+        Parameters
+        ----------
+        cell : (q,) array of int
+        bary : (q, d + 1) array
+            Barycentric coordinates in the cell.
+        side : (q, cracks) array of {1, -1}
+            Side of each crack.
+
+        Raises
+        ------
+        ProblemError
+            Arrays of other shapes or values, or a cell that there is not.
         """
+        cell, bary, side = self._by_cell(cell, bary, side)
         u, gradient = fields_at(self.space, self.coefficients[..., None], cell, bary, side)
         return u[..., 0], gradient[..., 0]
 
@@ -124,12 +139,14 @@ class Solution:
         return sigma[0] if single else sigma
 
     def stress_at(self, cell: Ints, bary: Floats, side: Ints) -> Floats:
-        """Stress at points given by cell `(q, d, d)`."""
+        """Stress at points given by cell `(q, d, d)`; arguments as of `at`."""
+        cell, bary, side = self._by_cell(cell, bary, side)
         sigma = self.problem.material.stress(self.at(cell, bary, side)[1])
         return sigma + self.initial_stress(position(self.space, cell, bary))
 
     def initial_stress(self, x: Floats) -> Floats:
-        """Sum of the initial stresses at points `(q, d, d)`."""
+        """Sum of the initial stresses at points `(q, d)`: `(q, d, d)`."""
+        x = numbers(x, "initial_stress: x", (None, self.space.dim))
         total = np.zeros((len(x), self.space.dim, self.space.dim))
         for load in self.loads:
             if isinstance(load, InitialStress):
@@ -138,12 +155,13 @@ class Solution:
 
     def opening(self, crack: int = 0) -> Floats:
         """Normal opening n . [[u]] `(q,)` at the points `lips[crack].x`, length."""
-        jump = self.jump(crack)
-        return np.einsum("qd,qd->q", jump, self.lips[crack].normal)
+        crack = crack_number(self.problem, crack, "opening")
+        return np.einsum("qd,qd->q", self.jump(crack), self.lips[crack].normal)
 
     def jump(self, crack: int = 0) -> Floats:
         """Displacement of lip + minus that of lip - `(q, d)` at `lips[crack].x`, length."""
-        lips = self.lips[crack_number(self.problem, crack, "opening")]
+        crack = crack_number(self.problem, crack, "jump")
+        lips = self.lips[crack]
         jump = np.zeros((len(lips), self.space.dim))
         for functions, number, N in jump_values(self.space, crack, lips):
             jump[number] += np.einsum("qn,qni->qi", N, self.coefficients[functions])
@@ -167,10 +185,22 @@ class Solution:
             )
         return np.atleast_2d(points), points.ndim == 1
 
+    def _by_cell(self, cell: Ints, bary: Floats, side: Ints) -> tuple[Ints, Floats, Ints]:
+        """Places given by cell, checked."""
+        n, d = len(self.space.mesh.cells), self.space.dim
+        cell = whole_numbers(cell, "cell", (None,))
+        if cell.size and not 0 <= cell.min() <= cell.max() < n:
+            raise ProblemError(f"cell names cells outside 0 ... {n - 1}: the mesh has no others.")
+        bary = numbers(bary, "bary", (len(cell), d + 1))
+        side = whole_numbers(side, "side", (len(cell), len(self.space.cuts)))
+        if (np.abs(side) > 1).any():
+            raise ProblemError("side must hold 1 or -1, for each crack the side of the point.")
+        return cell, bary, side
+
     def _where(self, x: ArrayLike, side: int) -> tuple[Ints, Floats, Ints, bool]:
         points, single = self._points(x)
-        if isinstance(side, bool) or side not in (0, 1, -1):
-            raise ProblemError(f"side = {side!r:.80}: give 1 (lip +), -1 (lip -) or 0.")
+        if type(side) is bool or not isinstance(side, Real) or side not in (0, 1, -1):
+            raise ProblemError(f"side = {shown(side)}: give 1 (lip +), -1 (lip -) or 0.")
         cell, bary = locate(self.space.mesh, points)
         if (cell < 0).any():
             outside = points[np.argmax(cell < 0)]

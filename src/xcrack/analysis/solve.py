@@ -1,6 +1,6 @@
 """From a problem to solutions: one stiffness, one factor, any number of load states."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -13,6 +13,7 @@ from xcrack.analysis.solution import Solution
 from xcrack.arrays import Bools, Floats, lock
 from xcrack.contact.solve import contact_of, solve_contact
 from xcrack.errors import ProblemError
+from xcrack.inputs import entries, shown
 from xcrack.scene.conditions import Displacement, InitialStress, Load
 from xcrack.scene.problem import Problem, check_problem
 from xcrack.solvers.direct import Solver, system
@@ -27,6 +28,7 @@ from xcrack.xfem.supports import known_unknowns
 
 # Unknowns of a 3D body above which a factorisation costs more, by order (measured).
 _DIRECT = {1: 4_000, 2: 8_000}
+_LARGEST = 1e120  # force or displacement whose square, over a small stiffness, is still a number
 
 
 def solve(
@@ -58,14 +60,12 @@ def solve(
     check_problem(problem, "solve")
     if solver is not None and not callable(solver):
         raise ProblemError(
-            f"solver = {solver!r:.80} cannot be called: give a function of a sparse matrix that "
+            f"solver = {shown(solver)} cannot be called: give a function of a sparse matrix that "
             "returns a function of right-hand sides, such as xc.pardiso."
         )
-    if states is not None and (isinstance(states, str) or not isinstance(states, Iterable)):
-        raise ProblemError(
-            f"states = {states!r:.80}: give a list of load states, such as states=[1.0]."
-        )
-    solutions = solve_states(problem, [None] if states is None else list(states), solver=solver)
+    if states is not None:
+        states = entries(states, "states")
+    solutions = solve_states(problem, [None] if states is None else states, solver=solver)
     return solutions[0] if states is None else solutions
 
 
@@ -189,4 +189,11 @@ def _case(problem: Problem, model: Model, state: Any, known_loads: dict[int, Flo
     if moved:
         new = known_unknowns(model.space, moved)
         known = np.where(new.fixed & model.known.fixed, new.value, known)
-    return _Case(loads, factor, f, tuple(parts), factor * known)
+    known = factor * known
+    largest = max(np.abs(f).max(initial=0.0), np.abs(known).max(initial=0.0))
+    if not largest < _LARGEST:
+        raise ProblemError(
+            f"the loads of state {shown(state)} give forces or displacements of up to "
+            f"{largest:.3g}, whose squares are no numbers: take other units."
+        )
+    return _Case(loads, factor, f, tuple(parts), known)

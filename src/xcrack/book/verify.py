@@ -10,7 +10,7 @@ from xcrack.book.page import book_page
 from xcrack.book.run import Book, Result, chosen, line_of, run_cases
 from xcrack.errors import ProblemError
 from xcrack.history.versions import versions
-from xcrack.inputs import path_of, system_errors
+from xcrack.paths import path_of, system_errors
 
 
 def verify(

@@ -11,7 +11,7 @@ from xcrack.errors import ProblemError
 from xcrack.growth.run import grow
 from xcrack.history.collect import collect, resume
 from xcrack.history.history import History
-from xcrack.inputs import system_errors
+from xcrack.paths import system_errors
 from xcrack.plotting.plot import plot
 from xcrack.post.vtk import write
 from xcrack.reporting.report import report

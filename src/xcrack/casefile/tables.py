@@ -10,7 +10,7 @@ from typing import Any, NoReturn
 
 from xcrack.casefile.units import NUMBER, Dimension, Units
 from xcrack.errors import ProblemError, XcrackError
-from xcrack.inputs import system_errors
+from xcrack.paths import system_errors
 
 Key = tuple[str | int, ...]
 

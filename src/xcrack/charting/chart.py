@@ -5,7 +5,6 @@ import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import factorial
-from numbers import Real
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -19,10 +18,12 @@ from xcrack.charting.result import Chart, Row, checked_error
 from xcrack.charting.settings import IN_PROBLEM, default_settings, named_settings, with_lengths
 from xcrack.charting.values import K_of_all, Sampled, at_places, most_trusted, plain
 from xcrack.errors import ProblemError, XcrackError
+from xcrack.inputs import called, entries, flag, number, shown, whole
 from xcrack.mesh.mesh import Mesh
 from xcrack.mesh.refinement import refine
+from xcrack.paths import path_of
 from xcrack.scene.numerics import with_choices
-from xcrack.scene.problem import Problem
+from xcrack.scene.problem import Problem, check_problem
 
 Settings = Sequence[Mapping[str, Any]] | Mapping[str, Mapping[str, Any]]
 Meshes = Sequence[Mesh] | Callable[[float], Mesh]
@@ -107,20 +108,26 @@ def chart(
     >>> sorted({row.setting for row in chart.rows})
     ['as given', 'order 1']
     """
-    if not isinstance(problem, Problem):
-        raise ProblemError(f"chart: give a Problem, not {type(problem).__name__}.")
+    check_problem(problem, "chart")
     named = default_settings(problem) if settings is None else named_settings(settings)
     if wanted is not None:
         wanted = checked_error(wanted)
-    for name, value in (("repeat", repeat), ("seconds", seconds)):
-        if not (isinstance(value, Real) and 0 < value < float("inf")):
-            raise ProblemError(f"chart({name}={value!r}): give a positive number.")
+    repeat = whole(repeat, "chart: repeat", least=1)
+    seconds = number(seconds, "chart: seconds", above=0)
     if quantity is not None and not callable(quantity):
-        raise ProblemError(f"quantity = {quantity!r}: give a function of the solution.")
+        raise ProblemError(f"chart: quantity = {shown(quantity)}: give a function of the solution.")
+    if states is not None:
+        states = entries(states, "chart: states")
+        for state in states:
+            problem.state(state)
+    if not (isinstance(progress, str) and progress == "always"):
+        flag(progress, 'chart: progress, if it is not "always",')
+    if file is not None:
+        path_of(file, "chart: file", error=ProblemError)
     runs = _Runs(problem, named, states, quantity, progress)
-    every = _meshes(runs, meshes, max(int(repeat), 1), float(seconds))
-    outcomes = _timed(runs, every, max(int(repeat), 1))
-    result = _compared(runs, every, outcomes, wanted, max(int(repeat), 1))
+    every = _meshes(runs, meshes, repeat, seconds)
+    outcomes = _timed(runs, every, repeat)
+    result = _compared(runs, every, outcomes, wanted, repeat)
     if file is not None:
         result.plot(file)
     return result
@@ -169,7 +176,7 @@ def _run(runs: _Runs, mesh: Mesh, changes: dict[str, Any]) -> _Outcome:
             result = solve(scene, runs.states)
             solutions: list[Solution] = [result] if runs.states is None else result
             if runs.quantity is not None:
-                sample = plain(runs.quantity(result))
+                sample = plain(called(runs.quantity, "the quantity of chart", result))
             elif runs.has_tips:
                 sample = K_of_all(solutions)
             else:
@@ -223,7 +230,7 @@ def _meshes(runs: _Runs, given: Meshes | None, repeat: int, seconds: float) -> l
 
 
 def _made(maker: Callable[[float], Mesh], size: float) -> Mesh:
-    mesh = maker(size)
+    mesh = called(maker, "the meshes of chart", size)
     if not isinstance(mesh, Mesh):
         raise ProblemError(
             f"meshes({size:.6g}) returned {type(mesh).__name__}: the function must return a Mesh "

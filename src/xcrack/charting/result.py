@@ -6,10 +6,9 @@ from pathlib import Path
 from textwrap import shorten
 from typing import Any
 
-import numpy as np
-
 from xcrack.arrays import Floats
 from xcrack.errors import ProblemError
+from xcrack.inputs import number, shown
 from xcrack.scene.problem import Problem
 
 _DECADES = (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
@@ -155,7 +154,14 @@ class Chart:
         Parameters
         ----------
         row : Row
+
+        Raises
+        ------
+        ProblemError
+            Not a row of a chart.
         """
+        if not isinstance(row, Row):
+            raise ProblemError(f"Chart.shown: row = {shown(row)}: give one of the rows of a chart.")
         return max(row.error, self.reference_error)
 
     def best(self, wanted: float | None = None) -> Best:
@@ -242,7 +248,7 @@ class Chart:
         -------
         matplotlib figure, or the path of the file
         """
-        from xcrack.charting.figure import draw
+        from xcrack.plotting.chart import draw
 
         return draw(self, file, show)
 
@@ -274,13 +280,9 @@ def checked_error(wanted: Any) -> float:
     ProblemError
         No positive number.
     """
-    try:
-        value = float(wanted)
-    except (TypeError, ValueError):
-        value = np.nan
-    if not 0 < value < np.inf:
-        raise ProblemError(f"wanted = {wanted!r}: give a relative error, such as 1e-3.")
-    return value
+    if wanted is None:
+        raise ProblemError("wanted = None: give a relative error, such as 1e-3.")
+    return number(wanted, "the wanted relative error", above=0)
 
 
 def _time(seconds: float) -> str:

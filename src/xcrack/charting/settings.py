@@ -5,6 +5,7 @@ from dataclasses import dataclass, fields
 from typing import Any
 
 from xcrack.errors import ProblemError
+from xcrack.inputs import shown
 from xcrack.scene.numerics import Comparison, Numerics
 from xcrack.scene.problem import Problem
 
@@ -66,22 +67,24 @@ def named_settings(given: Any) -> dict[str, dict[str, Any]]:
         pairs = [(_name(changes), changes) for changes in given]
     else:
         raise ProblemError(
-            f'settings = {given!r:.80}: give a list of dicts, such as [{{"order": 1}}, '
+            f'settings = {shown(given)}: give a list of dicts, such as [{{"order": 1}}, '
             '{"radius": 0.2}].'
         )
+    if not pairs:
+        raise ProblemError("settings is empty: give at least one dict of fields, or leave it out.")
     named: dict[str, dict[str, Any]] = {}
     if not any(not changes for _, changes in pairs):
         named[_AS_GIVEN] = {}
     for name, changes in pairs:
         for field in changes:
-            if field not in (*IN_PROBLEM, *_METHOD):
+            if not isinstance(field, str) or field not in (*IN_PROBLEM, *_METHOD):
                 known = ", ".join((*IN_PROBLEM, *_METHOD))
                 raise ProblemError(
-                    f"settings: {field!r} is no choice of method; give one of {known}. Meshes go "
-                    "into meshes=, loads into states=."
+                    f"settings: {shown(field)} is no choice of method; give one of {known}. "
+                    "Meshes go into meshes=, loads into states=."
                 )
         if name in named:
-            raise ProblemError(f"settings: {name!r} stands there twice; leave one out.")
+            raise ProblemError(f"settings: {shown(name)} stands there twice; leave one out.")
         named[name] = dict(changes)
     return named
 
@@ -89,7 +92,7 @@ def named_settings(given: Any) -> dict[str, dict[str, Any]]:
 def _name(changes: Any) -> str:
     if not isinstance(changes, Mapping):
         raise ProblemError(
-            f'settings: {changes!r:.80} is no dict of fields, such as {{"order": 1}}.'
+            f'settings: {shown(changes)} is no dict of fields: give some such as {{"order": 1}}.'
         )
     return ", ".join(f"{field} {value}" for field, value in changes.items()) or _AS_GIVEN
 

@@ -9,6 +9,7 @@ import numpy as np
 from xcrack.analysis.solution import Solution
 from xcrack.arrays import Floats, Ints
 from xcrack.errors import ProblemError
+from xcrack.inputs import numbers
 from xcrack.sif.stress_intensity import stress_intensities
 
 # Rates that are believed between two meshes. What falls faster than by the second power is taken
@@ -65,15 +66,10 @@ def plain(values: Any) -> Sampled:
     ProblemError
         No numbers.
     """
-    try:
-        numbers = np.asarray(values, dtype=float).reshape(-1, 1)
-    except (TypeError, ValueError) as error:
-        raise ProblemError(
-            f"the quantity must return a number or an array of numbers, not {values!r:.80}."
-        ) from error
-    if not len(numbers):
+    flat = numbers(values, "chart: what the quantity returned", finite=False).reshape(-1, 1)
+    if not len(flat):
         raise ProblemError("the quantity returned an empty array: return at least one number.")
-    return Sampled(numbers)
+    return Sampled(flat)
 
 
 def at_places(sample: Sampled, places: Sampled) -> Floats:

@@ -8,9 +8,9 @@ from pathlib import Path
 from xcrack.analysis.solve import solve
 from xcrack.crack.lines import line_crack
 from xcrack.errors import ProblemError, XcrackWarning
-from xcrack.inputs import path_of
 from xcrack.mesh.files import read_mesh
 from xcrack.mesh.mesh import Mesh
+from xcrack.paths import path_of
 from xcrack.reporting.report import report
 from xcrack.scene.conditions import pressure
 from xcrack.scene.material import Isotropic

@@ -7,9 +7,9 @@ import scipy.sparse.linalg as sla
 
 from xcrack.arrays import Floats
 from xcrack.contact.multipliers import Multipliers, gap_rows, multipliers
-from xcrack.errors import ProblemError
+from xcrack.inputs import one_of
 from xcrack.mesh.sizes import leg_size
-from xcrack.scene.problem import Problem
+from xcrack.scene.problem import Problem, check_problem, crack_number
 from xcrack.solvers.direct import scaled_basis
 from xcrack.xfem.function_space import FunctionSpace
 from xcrack.xfem.lips import jump_values
@@ -40,16 +40,13 @@ def inf_sup(problem: Problem, crack: int = 0, *, norm: str = "h1") -> float:
     Raises
     ------
     ProblemError
-        No such crack, or another word for `norm`.
+        Not a problem, no such crack, or another word for `norm`.
     """
-    if norm not in ("h1", "energy"):
-        raise ProblemError(f'inf_sup(norm={norm!r}): give "h1" or "energy".')
+    check_problem(problem, "inf_sup")
+    crack = crack_number(problem, crack, "inf_sup")
+    one_of(norm, "inf_sup: norm", ("h1", "energy"))
     model = build(problem)
     space = model.space
-    if not 0 <= crack < len(space.cuts):
-        raise ProblemError(
-            f"crack {crack}: the problem has {len(space.cuts)} crack(s), numbered from 0."
-        )
     lips = model.lips[crack]
     chosen = multipliers(space, crack, lips, problem.numerics.multipliers)
     if norm == "h1":

@@ -22,6 +22,7 @@ from xcrack.crack.fronts_3d import Front, front_frames
 from xcrack.crack.polylines_3d import steps
 from xcrack.errors import GeometryError, warn
 from xcrack.geometry.distances import first_crossing, surface_distance, triangle_tree
+from xcrack.inputs import shown
 
 LOW, HIGH = 0.5, 1.5  # bounds of the spacing of front points, in sizes
 _LEAST = 0.02  # of the size, and at most a tenth of the largest: a smaller advance is ignored
@@ -114,7 +115,9 @@ def _check(crack: Crack, s: Floats, front: Ints, angle: Floats, da: Floats, size
             f"{angle.shape} and {da.shape}."
         )
     if not (np.isfinite(size) and size > 0):
-        raise GeometryError(f"the size {size!r} of a front's sides must be positive and finite.")
+        raise GeometryError(
+            f"the size {shown(size)} of a front's sides must be positive and finite."
+        )
     for name, values in (("s", s), ("angle", angle), ("da", da)):
         if not np.isfinite(values).all():
             bad = int(np.argmin(np.isfinite(values)))

@@ -1,6 +1,5 @@
 """Cracks as values: their faces and their ends; the mesh knows nothing of them."""
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -8,7 +7,7 @@ import numpy as np
 
 from xcrack.arrays import Floats, Ints, frozen
 from xcrack.errors import GeometryError
-from xcrack.inputs import Shape, whole_numbers
+from xcrack.inputs import Shape, entries, whole_numbers
 from xcrack.mesh.checks import coordinates
 
 
@@ -53,11 +52,8 @@ class Crack:
             own = self._numbers("tips", self.tips, (None,))
             object.__setattr__(self, "tips", tuple(own.tolist()))
         if self.fronts is not None:
-            if isinstance(self.fronts, str) or not isinstance(self.fronts, Iterable):
-                raise GeometryError(
-                    f"Crack: fronts = {self.fronts!r:.80} must be arrays, one a front."
-                )
-            fronts = [self._numbers(f"fronts[{k}]", f, (None,)) for k, f in enumerate(self.fronts)]
+            given = entries(self.fronts, "Crack: fronts", error=GeometryError)
+            fronts = [self._numbers(f"fronts[{k}]", f, (None,)) for k, f in enumerate(given)]
             object.__setattr__(self, "fronts", tuple(fronts))
 
     def _numbers(self, name: str, given: Any, shape: Shape) -> Ints:
@@ -66,7 +62,7 @@ class Crack:
         if array.size and (array.min() < 0 or array.max() >= len(self.points)):
             raise GeometryError(
                 f"Crack: {name} name points outside 0 ... {len(self.points) - 1}, such as "
-                f"{array.min() if array.min() < 0 else array.max()}."
+                f"{array.min() if array.min() < 0 else array.max()}: give numbers of its points."
             )
         return frozen(array, np.int64)
 

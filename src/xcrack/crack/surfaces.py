@@ -260,7 +260,7 @@ def surface_crack(points: ArrayLike, triangles: ArrayLike) -> Crack:
         bad = int(np.argmax(((faces < 0) | (faces >= len(x))).any(axis=1)))
         raise GeometryError(
             f"triangle {bad} {faces[bad].tolist()} of the surface crack names a point outside "
-            f"0 ... {len(x) - 1}."
+            f"0 ... {len(x) - 1}: points are numbered from 0."
         )
     used, inverse = np.unique(faces, return_inverse=True)
     x, faces = x[used], inverse.reshape(-1, 3)

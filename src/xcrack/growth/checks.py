@@ -8,7 +8,7 @@ import numpy as np
 from xcrack.arrays import Floats
 from xcrack.errors import ProblemError
 from xcrack.growth.criteria import Criterion
-from xcrack.inputs import called, numbers
+from xcrack.inputs import called, numbers, shown
 from xcrack.laws.law import NEEDS, Law, largest_K
 
 _RATIOS = (0.0, 0.5)  # a law that gives the same rate for both does not depend on R
@@ -45,11 +45,11 @@ def evaluate_criterion(
     result = called(criterion, f"the directions of crack {crack}", K.copy(), nu)
     try:
         parts = tuple(result)
-    except TypeError:
+    except Exception:  # whatever an object's own __iter__ raises
         parts = ()
     if len(parts) != 3 or isinstance(result, str):
         raise ProblemError(
-            f"the criterion must return three arrays (angle, dK_eq, R), not {result!r}."
+            f"the criterion must return three arrays (angle, dK_eq, R), not {shown(result)}."
         )
     angle, dK_eq, R = (
         _one_a_place(part, name, n, f"{place}s of crack {crack}")

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from xcrack.arrays import Floats
 from xcrack.errors import ProblemError, warn
-from xcrack.inputs import number, numbers
+from xcrack.inputs import number, numbers, shown
 
 Criterion = Callable[[Floats, float], tuple[Floats, Floats, Floats]]
 
@@ -182,7 +182,7 @@ def mean_reference(
     """
     K = _checked(K, nu, range)
     if not isinstance(reference, str) or reference not in ("mean", "max", "min"):
-        raise ProblemError(f'reference = {reference!r}: give "mean", "max" or "min".')
+        raise ProblemError(f'reference = {shown(reference)}: give "mean", "max" or "min".')
     if reference == "mean":
         mean = _sum(K) / len(K)
         return _rated(K, kink_angle(mean), nu, range)
@@ -255,7 +255,7 @@ def _checked(K: ArrayLike, nu: float, range: str) -> Floats:
         )
     number(nu, "Poisson's ratio nu", above=-1, below=0.5)
     if not isinstance(range, str) or range not in ("difference", "component"):
-        raise ProblemError(f'range = {range!r}: give "difference" or "component".')
+        raise ProblemError(f'range = {shown(range)}: give "difference" or "component".')
     # A closed tip has K_I = 0 up to discretisation: only a real overlap triggers a warning.
     negative = K[..., 0] < -_CLOSED * np.abs(K).max(initial=0.0)
     if negative.any():

@@ -55,7 +55,7 @@ def cycles_between(a0: ArrayLike, a1: ArrayLike, rate0: ArrayLike, rate1: ArrayL
     except ValueError as error:
         raise ProblemError(
             f"cycles_between: lengths and rates have the shapes {a0.shape}, {a1.shape}, "
-            f"{rate0.shape} and {rate1.shape}, which do not fit each other."
+            f"{rate0.shape} and {rate1.shape}, which do not fit: give arrays of one shape."
         ) from error
     if not (np.all(a0 > 0) and np.all(a1 >= a0)):
         raise ProblemError(f"crack lengths must be positive and not shrink: from {a0} to {a1}.")

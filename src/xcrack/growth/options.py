@@ -9,7 +9,7 @@ from xcrack.errors import ProblemError
 from xcrack.growth.criteria import Criterion
 from xcrack.growth.fingerprint import DEFAULTS, describe, with_defaults_of
 from xcrack.growth.step import Cycle
-from xcrack.inputs import number, whole
+from xcrack.inputs import number, shown, whole
 from xcrack.laws.law import Law
 from xcrack.scene.problem import Problem
 
@@ -66,12 +66,15 @@ class Run:
 
     def __post_init__(self) -> None:
         if not isinstance(self.problem, Problem):
-            raise ProblemError(f"grow: problem = {self.problem!r}: give a Problem.")
+            raise ProblemError(f"grow: problem = {shown(self.problem)}: give a Problem.")
         for name in ("law", "criterion"):
             if not callable(getattr(self, name)):
-                raise ProblemError(f"grow: {name} = {getattr(self, name)!r} cannot be called.")
+                raise ProblemError(
+                    f"grow: {name} = {shown(getattr(self, name))} cannot be called: give a "
+                    "function of two arguments."
+                )
         if not isinstance(self.cycle, Cycle):
-            raise ProblemError(f"grow: cycle = {self.cycle!r}: give Cycle(min, max).")
+            raise ProblemError(f"grow: cycle = {shown(self.cycle)}: give Cycle(min, max).")
         for state in self.cycle.load_states:
             self.problem.state(state)
         if not self.problem.cracks:
@@ -87,12 +90,16 @@ class Run:
             object.__setattr__(self, "max_steps", steps)
         object.__setattr__(self, "threshold", number(self.threshold, "grow: threshold", least=0))
         if not isinstance(self.scaling, str) or self.scaling not in ("law", "linear"):
-            raise ProblemError(f'grow: scaling = {self.scaling!r}: give "law" or "linear".')
+            raise ProblemError(f'grow: scaling = {shown(self.scaling)}: give "law" or "linear".')
         if self.solver is not None and not callable(self.solver):
-            raise ProblemError(f"grow: solver = {self.solver!r} cannot be called.")
+            raise ProblemError(
+                f"grow: solver = {shown(self.solver)} cannot be called: give a function, or None."
+            )
         always = isinstance(self.progress, str) and self.progress == "always"
         if not (isinstance(self.progress, bool) or always):
-            raise ProblemError(f'grow: progress = {self.progress!r}: give True, False or "always".')
+            raise ProblemError(
+                f'grow: progress = {shown(self.progress)}: give True, False or "always".'
+            )
 
     @property
     def settings(self) -> dict[str, str]:

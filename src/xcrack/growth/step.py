@@ -12,7 +12,7 @@ from xcrack.arrays import Floats
 from xcrack.crack.crack import Crack
 from xcrack.errors import ProblemError
 from xcrack.growth.advance import PerCrack
-from xcrack.inputs import number, numbers, whole
+from xcrack.inputs import entries, number, numbers, shown, whole
 from xcrack.scene.conditions import Load
 from xcrack.sif.sif import SIF
 from xcrack.solvers.reuse import Reuse
@@ -47,7 +47,7 @@ class Cycle:
     def __post_init__(self) -> None:
         if self.states is None:
             if self.min is None or self.max is None:
-                raise ProblemError("a cycle is Cycle(min, max) or Cycle(states=[...]).")
+                raise ProblemError("Cycle: give min and max, or states=[...].")
             for name in ("min", "max"):
                 factor = number(getattr(self, name), f"Cycle({name}=...)")
                 object.__setattr__(self, name, factor)
@@ -55,7 +55,7 @@ class Cycle:
                 raise ProblemError(f"Cycle({self.min}, {self.max}): give finite min <= max.")
             return
         if self.min is not None or self.max is not None:
-            raise ProblemError("a cycle is Cycle(min, max) or Cycle(states=[...]), not both.")
+            raise ProblemError("Cycle: give min and max, or states=[...], not both.")
         states = entries(self.states, "Cycle: states")
         if not states:
             raise ProblemError("Cycle(states=...) takes a list of at least one load state.")
@@ -79,22 +79,6 @@ class Cycle:
         return (self.min, self.max) if self.states is None else tuple(self.states)
 
 
-def entries(value: Any, what: str) -> tuple[Any, ...]:
-    """Entries of a list, tuple or whatever else can be gone through, but for text."""
-    try:
-        if not isinstance(value, str | bytes):
-            return tuple(value)
-    except TypeError:
-        pass
-    raise ProblemError(f"{what} = {shortened(value)}: give a list.")
-
-
-def shortened(value: Any) -> str:
-    """A value in a message, in one line."""
-    text = " ".join(repr(value).split())
-    return text if len(text) <= 80 else f"{text[:60]} … ({type(value).__name__})"
-
-
 def _load_state(state: Any, what: str) -> Any:
     """A load state, checked: a number, or a tuple of loads."""
     if isinstance(state, Real):
@@ -102,7 +86,7 @@ def _load_state(state: Any, what: str) -> Any:
     loads = entries(state, what)
     for load in loads:
         if not isinstance(load, Load):
-            raise ProblemError(f"{what} has {shortened(load)}, which is not a load: see traction.")
+            raise ProblemError(f"{what} has {shown(load)}, which is not a load: see traction.")
     return state if isinstance(state, list | tuple) else loads
 
 
@@ -179,10 +163,10 @@ class Step:
         whole(self.index, "Step: index", least=0)
         number(self.cycles, "Step: cycles", least=0)
         if not all(isinstance(crack, Crack) for crack in entries(self.cracks, "Step: cracks")):
-            raise ProblemError(f"Step: cracks = {shortened(self.cracks)}: give a tuple of Crack.")
+            raise ProblemError(f"Step: cracks = {shown(self.cracks)}: give a tuple of Crack.")
         states = [entries(state, "Step: sif") for state in entries(self.sif, "Step: sif")]
         if not all(isinstance(sif, SIF) for state in states for sif in state):
-            raise ProblemError(f"Step: sif = {shortened(self.sif)}: give SIF of states and cracks.")
+            raise ProblemError(f"Step: sif = {shown(self.sif)}: give SIF of states and cracks.")
         counts = [[len(sif.x) for sif in state] for state in states]
         for name in ("angle", "dK_eq", "R", "rate", "da"):
             parts = entries(getattr(self, name), f"Step: {name}")
@@ -195,7 +179,7 @@ class Step:
                 "one for each tip, or place along a front, of each crack."
             )
         if not isinstance(self.memory, Memory | None):
-            raise ProblemError(f"Step: memory = {shortened(self.memory)}: that is made by grow.")
+            raise ProblemError(f"Step: memory = {shown(self.memory)}: that is made by grow.")
 
     @property
     def n_tips(self) -> int:
@@ -226,8 +210,6 @@ __all__ = [
     "Memory",
     "Step",
     "directions",
-    "entries",
     "memory_of",
     "moved_places",
-    "shortened",
 ]

@@ -11,15 +11,16 @@ from xcrack.growth.criteria import Criterion
 from xcrack.growth.fingerprint import differences, only_compiled_differently
 from xcrack.growth.options import GrowOptions, Run, lists_options, run_of
 from xcrack.growth.run import steps_of
-from xcrack.growth.step import Cycle, Step, shortened
+from xcrack.growth.step import Cycle, Step
 from xcrack.history import run_folder
 from xcrack.history.history import History
 from xcrack.history.lock import locked
 from xcrack.history.run_folder import Header
 from xcrack.history.versions import versions
-from xcrack.inputs import called, path_of, system_errors
+from xcrack.inputs import called, flag, shown
 from xcrack.laws.law import Law
 from xcrack.mesh.mesh import Mesh
+from xcrack.paths import path_of, system_errors
 from xcrack.scene.problem import Problem
 
 Until = Callable[[Step], bool]
@@ -67,10 +68,8 @@ def collect(
     """
     try:
         iter(steps)
-    except TypeError as error:
-        raise ProblemError(
-            f"collect: steps = {shortened(steps)}: give what grow returns."
-        ) from error
+    except Exception as error:  # whatever an object's own __iter__ raises
+        raise ProblemError(f"collect: steps = {shown(steps)}: give what grow returns.") from error
     _check_options("collect", until, overwrite=overwrite, keep_solutions=keep_solutions)
     run = _Collection(until, keep_solutions)
     if path is None:
@@ -191,7 +190,10 @@ def load(path: str | Path) -> History:
     folder = path_of(path, "load: path", error=ProblemError)
     header, _ = run_folder.read_header(folder)
     if header is None:
-        raise ProblemError(f"{folder} holds no run: {folder / run_folder.HEADER} is missing.")
+        raise ProblemError(
+            f"load: path = {str(folder)!r} holds no run, {run_folder.HEADER} is missing: give the "
+            "folder that collect wrote to."
+        )
     stored = run_folder.read_steps(folder, header)
     if stored.rest:
         warn(
@@ -272,9 +274,7 @@ class _Collection:
             except StopIteration as stop:
                 return str(stop.value or "no more steps")
             if not isinstance(step, Step):
-                raise ProblemError(
-                    f"collect: {shortened(step)} is not a Step: give what grow returns."
-                )
+                raise ProblemError(f"collect: {shown(step)} is not a Step: give what grow returns.")
             if self.mesh is None and step.solutions:
                 self.mesh = step.solutions[0].problem.mesh
             self.taken.append(step if self.keep_solutions else replace(step, solutions=()))
@@ -286,7 +286,8 @@ class _Collection:
     def _is_enough(self, step: Step) -> bool:
         if self.until is None:
             return False
-        return bool(called(self.until, f"until, after step {step.index}", step))
+        enough = called(self.until, f"until, after step {step.index}", step)
+        return flag(enough, "collect: what until returned")
 
     def _stopped(self) -> str:
         return f"until was true at step {self.taken[-1].index}"
@@ -316,7 +317,10 @@ def _as_begun(run: Run, header: Header, folder: Path) -> Run:
     given = {**settings, **{key: header.settings[key] for key in compiled}}
     lines = differences(header.settings, given)
     if lines:
-        raise ProblemError(f"the run in {folder} was made with other settings: {_few(lines)}.")
+        raise ProblemError(
+            f"the run in {folder} was made with other settings: {_few(lines)}. Give those, or "
+            "begin another run in another folder."
+        )
     lines = differences(header.versions, now)
     lines += [f"{key}: its code cannot be compared between the two" for key in compiled]
     if lines:
@@ -377,10 +381,11 @@ def _move_aside(folder: Path, stored: run_folder.Stored, damaged: Path | None) -
 
 def _check_options(caller: str, until: Any, **flags: Any) -> None:
     if until is not None and not callable(until):
-        raise ProblemError(f"{caller}: until = {shortened(until)} cannot be called.")
+        raise ProblemError(
+            f"{caller}: until = {shown(until)} cannot be called: give a function of a Step."
+        )
     for name, value in flags.items():
-        if not isinstance(value, bool):
-            raise ProblemError(f"{caller}: {name} = {shortened(value)}: give True or False.")
+        flag(value, f"{caller}: {name}")
 
 
 def _few(lines: list[str]) -> str:

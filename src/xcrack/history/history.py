@@ -9,10 +9,11 @@ from numpy.typing import NDArray
 
 from xcrack.crack.crack import Crack
 from xcrack.errors import ProblemError
-from xcrack.growth.step import Step, entries, shortened
+from xcrack.growth.step import Step
 from xcrack.history.table import table
-from xcrack.inputs import path_of, system_errors
+from xcrack.inputs import entries, shown
 from xcrack.mesh.mesh import Mesh
+from xcrack.paths import path_of, system_errors
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,15 +45,17 @@ class History:
         steps = entries(self.steps, "History: steps")
         for step in steps:
             if not isinstance(step, Step):
-                raise ProblemError(f"History: {shortened(step)} among the steps is not a Step.")
+                raise ProblemError(
+                    f"History: {shown(step)} among the steps is not a Step: give those of grow."
+                )
         object.__setattr__(self, "steps", steps)
         if not isinstance(self.ended, str):
-            raise ProblemError(f"History: ended = {shortened(self.ended)}: give a text.")
+            raise ProblemError(f"History: ended = {shown(self.ended)}: give a text.")
         if self.path is not None:
             path = path_of(self.path, "History: path", error=ProblemError)
             object.__setattr__(self, "path", path)
         if not isinstance(self.mesh, Mesh | None):
-            raise ProblemError(f"History: mesh = {shortened(self.mesh)}: give a Mesh.")
+            raise ProblemError(f"History: mesh = {shown(self.mesh)}: give a Mesh.")
 
     @property
     def cracks(self) -> tuple[Crack, ...]:

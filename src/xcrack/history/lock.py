@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from xcrack.errors import ProblemError
-from xcrack.inputs import system_errors
+from xcrack.paths import system_errors
 
 NAME = "run.lock"
 

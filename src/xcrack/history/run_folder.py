@@ -17,7 +17,7 @@ from xcrack.growth.fingerprint import DEFAULTS
 from xcrack.growth.step import Memory, Step
 from xcrack.history import lock
 from xcrack.history.store import PART, load, save, write_whole
-from xcrack.inputs import system_errors
+from xcrack.paths import system_errors
 from xcrack.sif.sif import SIF
 from xcrack.solvers.reuse import Reuse
 

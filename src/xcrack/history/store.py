@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xcrack.errors import ProblemError
-from xcrack.inputs import system_errors
+from xcrack.paths import system_errors
 
 PART = ".part"  # ending of a file that is not whole yet
 Classes = Mapping[str, type]  # dataclasses that a file may hold, by the name they have in it

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from xcrack.arrays import Floats
 from xcrack.errors import ProblemError
-from xcrack.inputs import number, numbers
+from xcrack.inputs import number, numbers, shown
 from xcrack.laws.units import factors
 
 ROUND_OFF = 1e-9
@@ -75,8 +75,8 @@ def check_ratio(name: str, ratio: Any) -> None:
     """Refuse anything but the two kinds of R, and None for a choice that is not made."""
     if ratio is not None and not (isinstance(ratio, str) and ratio in ("contact", "nominal")):
         raise ProblemError(
-            f'{name}: ratio = {ratio!r}: give "contact" for constants that belong to the computed '
-            'K of a crack with contact, or "nominal" for those fitted with K_min < 0.'
+            f'{name}: ratio = {shown(ratio)}: give "contact" for constants that belong to the '
+            'computed K of a crack with contact, or "nominal" for those fitted with K_min < 0.'
         )
 
 
@@ -120,7 +120,7 @@ def range_and_ratio(
     if (dK < 0).any() or (ratio > 1 + ROUND_OFF).any():
         raise ProblemError(
             f"{name}: dK_eq from {dK.min():.6g} and R up to {ratio.max():.6g}: a range is not "
-            "negative, and R = K_min / K_max is at most 1."
+            "negative, and R = K_min / K_max is at most 1; check both, and their order."
         )
     if bounds is not None:
         _check_within(name, dK, ratio, bounds)

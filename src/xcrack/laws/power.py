@@ -159,8 +159,8 @@ class elber(WithUnits):  # noqa: N801 - it is used as a function
         set_floats(self, a=number(self.a, "elber: a"), b=number(self.b, "elber: b"))
         if max(self.a, self.a + self.b) <= 0:
             raise ProblemError(
-                f"elber: U = {self.a} + {self.b} R is not positive for any R in [0, 1]: nothing "
-                "would ever grow."
+                f"elber: U = {self.a} + {self.b} R is not positive for any R in [0, 1], so that "
+                "nothing would ever grow: give a or a + b above 0."
             )
 
     def _powers(self) -> Powers:

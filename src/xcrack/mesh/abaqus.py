@@ -8,6 +8,7 @@ import numpy as np
 
 from xcrack.arrays import Floats, Ints
 from xcrack.errors import MeshError
+from xcrack.inputs import shown
 from xcrack.mesh.linear import base_kind
 from xcrack.mesh.mesh import Mesh
 from xcrack.mesh.raw import RawMesh, sets_to_write
@@ -116,7 +117,7 @@ def abaqus_text(mesh: Mesh) -> str:
     facet_sets, cell_sets = sets_to_write(mesh)
     for name in (*facet_sets, *cell_sets):
         if not name or "," in name or "\n" in name or name != name.strip():
-            raise MeshError(f"set name {name!r}: Abaqus files take no commas or line breaks.")
+            raise MeshError(f"set name {shown(name)}: Abaqus files take no commas or line breaks.")
     numbers = {name: mesh.facet_numbers(facets) for name, facets in facet_sets.items()}
     rows = np.unique(np.concatenate([np.zeros(0, np.int64), *numbers.values()]))
     flat = ", 0." * (3 - mesh.dim)
@@ -169,7 +170,7 @@ def _sections(path: Path, outer: tuple[Path, ...] = ()) -> Iterator[Section]:
         if keyword == "INCLUDE" and "INPUT" in options:
             inner = path.parent / options["INPUT"]
             if not inner.is_file():
-                raise MeshError(f"{path.name} includes {str(inner)!r}, which does not exist.")
+                raise MeshError(f"{path.name} includes {shown(str(inner))}, which does not exist.")
             yield from _sections(inner, (*outer, own))
     if keyword:
         yield keyword, options, rows

@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 from xcrack.arrays import Floats, Ints, at, ranges
 from xcrack.errors import MeshError, XcrackError
 from xcrack.geometry.simplices import distance_to_simplices
-from xcrack.inputs import Shape, numbers, whole_numbers
+from xcrack.inputs import Shape, numbers, shown, whole_numbers
 
 _FLAT = 1e-12  # a cell whose volume is below this share of (longest edge)^d has no shape
 LARGEST = 1e90  # coordinate whose third power is still a number
@@ -87,7 +87,7 @@ def checked(points: Any, cells: Any) -> tuple[Floats, Ints]:
     if c.min() < 0 or c.max() >= len(x):
         raise MeshError(
             f"cell {int(np.argmax(((c < 0) | (c >= len(x))).any(axis=1)))} names a point outside "
-            f"0 ... {len(x) - 1}."
+            f"0 ... {len(x) - 1}: points are numbered from 0."
         )
     unused = np.bincount(c.ravel(), minlength=len(x)) == 0
     if unused.any():
@@ -148,7 +148,7 @@ def checked_sets(
             )
     facets, cells = {}, {}
     for name, members in facet_sets.items():
-        what = f"facet set {name!r}"
+        what = f"facet set {shown(name)}"
         array = whole_numbers(members, what, error=MeshError)
         facets[name] = (
             whole_numbers(array, what, (None, dim), error=MeshError)
@@ -161,7 +161,7 @@ def checked_sets(
                 "from 0."
             )
     for name, members in cell_sets.items():
-        what = f"cell set {name!r}"
+        what = f"cell set {shown(name)}"
         array = whole_numbers(members, what, (None,), error=MeshError)
         if array.size and (array.min() < 0 or array.max() >= n_cells):
             raise MeshError(

@@ -8,12 +8,13 @@ import numpy as np
 
 from xcrack.arrays import Floats, Ints, at, frozen
 from xcrack.errors import MeshError, ProblemError, warn
-from xcrack.inputs import numbers, system_errors
+from xcrack.inputs import numbers
 from xcrack.mesh.files import existing_file, meshio_read
 from xcrack.mesh.linear import SHAPES, base_kind, linearised
 from xcrack.mesh.locate import barycentric, locate
 from xcrack.mesh.mesh import Mesh, sound_mesh
 from xcrack.mesh.raw import RawMesh
+from xcrack.paths import system_errors
 
 _BESIDE = 0.5  # of a cell: a point this near to the mesh has the value at its boundary
 _NEAR = 8  # cells looked at for a point outside

@@ -2,7 +2,6 @@
 
 import contextlib
 import io
-import os
 import re
 import shlex
 import warnings
@@ -15,13 +14,14 @@ import numpy as np
 
 from xcrack.arrays import Floats, Ints
 from xcrack.errors import GeometryError, MeshError, XcrackError, warn
-from xcrack.inputs import path_of, system_errors
+from xcrack.inputs import one_of
 from xcrack.mesh.abaqus import abaqus_text, read_abaqus
 from xcrack.mesh.linear import SHAPES, base_kind, linearised
 from xcrack.mesh.mesh import Mesh
 from xcrack.mesh.msh import REST, msh_text
 from xcrack.mesh.raw import CELL_KIND, FACET_KIND, RawMesh, mesh_from_raw, sets_to_write
 from xcrack.optional import required
+from xcrack.paths import path_of, system_errors, written_whole
 
 _SET = "set:"  # prefix of the 0/1 cell data that carry a set in formats without sets
 _WITH_CELL_DATA = {".vtu", ".vtk", ".xdmf", ".xmf"}
@@ -159,14 +159,15 @@ def write_mesh(path: str | PathLike[str], mesh: Mesh, *, msh_version: str = "4.1
     Raises
     ------
     XcrackError
-        Unknown extension, a folder that does not exist, or what the system refuses (no space, no
-        permission).
+        Unknown extension or version, a folder that does not exist, or what the system refuses (no
+        space, no permission).
     MeshError
         A name of a set that the format cannot hold.
     """
     path = path_of(path, "write_mesh: path")
     if not isinstance(mesh, Mesh):
         raise MeshError(f"write_mesh: give a Mesh, not {type(mesh).__name__}.")
+    one_of(msh_version, "write_mesh: msh_version", ("4.1", "2.2"), error=XcrackError)
     with system_errors("cannot write", path):
         if not path.parent.is_dir():
             raise XcrackError(f"folder {str(path.parent)!r} does not exist: make it first.")
@@ -182,17 +183,9 @@ def write_mesh(path: str | PathLike[str], mesh: Mesh, *, msh_version: str = "4.1
 
 
 def _write_text(path: Path, text: str) -> None:
-    """Write a file wholly or not at all."""
-    whole = path.resolve()
-    part = whole.with_name(f".{whole.name}.{os.getpid()}.part")
-    with system_errors("the mesh is not written (an older file is left as it was) to", path):
-        try:
-            part.write_text(text, encoding="utf-8")
-            os.replace(part, whole)
-        except OSError:
-            with contextlib.suppress(OSError):
-                part.unlink()
-            raise
+    what = "the mesh is not written (an older file is left as it was) to"
+    with written_whole(path, what) as part:
+        part.write_text(text, encoding="utf-8")
 
 
 def existing_file(value: str | PathLike[str], what: str) -> Path:

@@ -8,7 +8,7 @@ import numpy as np
 
 from xcrack.arrays import Floats
 from xcrack.errors import GeometryError
-from xcrack.inputs import number
+from xcrack.inputs import number, shown
 from xcrack.mesh.checks import LARGEST, coordinates
 
 FINEST = 1e-6  # share of a body's length below which no cell size is taken
@@ -92,9 +92,9 @@ def polylines(along: Any) -> list[Floats]:
             coordinates(path, "along", (None, 2), error=GeometryError)
             for path in (along if many else [along])
         ]
-    except (TypeError, ValueError, IndexError, KeyError, GeometryError) as error:
+    except Exception as error:  # whatever an object's own methods raise
         raise GeometryError(
-            f"along = {along!r:.200} must be points of a polyline, [(x0, y0), (x1, y1), ...], or "
+            f"along = {shown(along)} must be points of a polyline, [(x0, y0), (x1, y1), ...], or "
             "a list of such polylines, with finite coordinates."
         ) from error
 

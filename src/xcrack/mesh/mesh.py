@@ -13,6 +13,7 @@ from scipy.spatial import cKDTree
 
 from xcrack.arrays import Floats, Ints, frozen, lock
 from xcrack.errors import MeshError, warn
+from xcrack.inputs import shown, whole_numbers
 from xcrack.mesh.checks import checked, checked_sets, doubts, unused_sets
 from xcrack.mesh.curves import Curves, check_on_curves, checked_curves
 
@@ -256,9 +257,16 @@ class Mesh:
         return cKDTree(self.points[self.boundary].mean(axis=1))
 
     def facet_numbers(self, facets: Ints) -> Ints:
-        """Numbers (rows of `facets`) of the given facets `(k, d)`; -1 where there is none."""
+        """Numbers (rows of `facets`) of the given facets `(k, d)`; -1 where there is none.
+
+        Raises
+        ------
+        MeshError
+            Not whole numbers of that shape.
+        """
+        facets = whole_numbers(facets, "facet_numbers: facets", (None, self.dim), error=MeshError)
         known = self._facet_keys
-        asked = _scalar_key(np.sort(np.asarray(facets, dtype=np.int64), axis=1), self.n_points)
+        asked = _scalar_key(np.sort(facets, axis=1), self.n_points)
         number = np.minimum(np.searchsorted(known, asked), len(known) - 1)
         return np.where(known[number] == asked, number, -1)
 
@@ -284,8 +292,9 @@ class Mesh:
         number = self.facet_numbers(facets)
         if (number < 0).any():
             raise MeshError(
-                f"facet set {name!r}: facet {facets[np.argmax(number < 0)].tolist()} is no facet "
-                f"of any cell ({int((number < 0).sum())} in all); mesh body and sets together."
+                f"facet set {shown(name)}: facet {facets[np.argmax(number < 0)].tolist()} is no "
+                f"facet of any cell ({int((number < 0).sum())} in all); mesh body and sets "
+                "together."
             )
         outer = np.nonzero(self.facet_to_cell[:, 1] < 0)[0]
         if name == "boundary" and not np.array_equal(np.unique(number), outer):

@@ -5,7 +5,8 @@ from collections.abc import Iterable
 import numpy as np
 
 from xcrack.arrays import Ints
-from xcrack.errors import MeshError, XcrackError
+from xcrack.errors import MeshError
+from xcrack.inputs import shown
 from xcrack.mesh.mesh import Mesh
 from xcrack.mesh.raw import sets_to_write
 
@@ -33,13 +34,9 @@ def msh_text(mesh: Mesh, version: str = "4.1") -> str:
 
     Raises
     ------
-    XcrackError
-        Another version.
     MeshError
         A name with a quotation mark or a line break in it.
     """
-    if version not in ("4.1", "2.2"):
-        raise XcrackError(f"msh_version = {version!r}: known are '4.1' and '2.2'.")
     facet_sets, cell_sets = sets_to_write(mesh)
     d = mesh.dim
     numbers = {name: mesh.facet_numbers(facets) for name, facets in facet_sets.items()}
@@ -77,7 +74,9 @@ def _groups(
 def _names(names: list[tuple[int, int, str]]) -> Iterable[str]:
     for _, _, name in names:
         if '"' in name or "\n" in name or "\\" in name:
-            raise MeshError(f"set name {name!r}: msh files take no quotation marks or backslashes.")
+            raise MeshError(
+                f"set name {shown(name)}: msh files take no quotation marks or backslashes."
+            )
     yield from ["$PhysicalNames", str(len(names))]
     yield from (f'{dim} {tag} "{name}"' for dim, tag, name in names)
     yield "$EndPhysicalNames"

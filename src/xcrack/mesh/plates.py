@@ -10,7 +10,7 @@ import numpy as np
 from xcrack.arrays import Floats, Ints
 from xcrack.errors import GeometryError, MeshError
 from xcrack.geometry.curves import Round
-from xcrack.inputs import number
+from xcrack.inputs import number, shown
 from xcrack.mesh.checks import coordinates
 from xcrack.mesh.gmsh_session import session
 from xcrack.mesh.grading import FINEST, graded_size, length_of, polylines
@@ -313,7 +313,7 @@ def _listed(holes: Any) -> list[Hole]:
         pairs = [(center, radius) for center, radius in holes]
     except (TypeError, ValueError) as error:
         raise GeometryError(
-            f"holes = {holes!r:.80} must be a list of centres and radii, such as "
+            f"holes = {shown(holes)} must be a list of centres and radii, such as "
             "[((x, y), radius)]."
         ) from error
     return pairs
@@ -334,6 +334,11 @@ def _check_sizes(width: float, height: float, size: float, near: float) -> None:
 
 def _check_holes(width: float, height: float, lower: Point, holes: Sequence[Hole]) -> None:
     for i, (center, radius) in enumerate(holes):
+        if radius < FINEST * max(width, height):
+            raise GeometryError(
+                f"the radius {radius:g} of hole {i} is too small for a plate of {width:g} x "
+                f"{height:g}: leave the hole out, or make it larger."
+            )
         x, y = center[0] - lower[0], center[1] - lower[1]
         gap = min(x, y, width - x, height - y) - radius
         if gap <= 0:

@@ -7,6 +7,7 @@ import numpy as np
 
 from xcrack.arrays import Floats, Ints
 from xcrack.errors import MeshError, warn
+from xcrack.inputs import shown
 from xcrack.mesh.mesh import Mesh, sound_mesh
 
 TOPOLOGICAL_DIM = {"vertex": 0, "line": 1, "triangle": 2, "tetra": 3}
@@ -111,7 +112,7 @@ def _without_own_boundary(facet_sets: dict[str, Ints], bare: Mesh, source: str) 
         facet_sets[name] = facets
         warn(
             f'{source}: the set "boundary" has {len(number)} facets, the boundary of the mesh has '
-            f'{len(outer)}: it is called {name!r} here, since "boundary" means all of them.'
+            f'{len(outer)}: it is called {shown(name)} here, since "boundary" means all of them.'
         )
     return facet_sets
 
@@ -130,8 +131,9 @@ def _facet_sets(raw: RawMesh, bare: Mesh, new: Ints, source: str) -> dict[str, I
         known = (facets >= 0).all(axis=1) & (bare.facet_numbers(facets) >= 0)
         if not known.all():
             warn(
-                f"{source}: {int((~known).sum())} of the {len(facets)} elements in set {name!r} "
-                "are no facets of any cell and are left out; mesh body and sets together."
+                f"{source}: {int((~known).sum())} of the {len(facets)} elements in set "
+                f"{shown(name)} are no facets of any cell and are left out; mesh body and sets "
+                "together."
             )
         if known.any():
             facet_sets[name] = _unique_rows(facets[known])

@@ -4,6 +4,7 @@ import numpy as np
 
 from xcrack.arrays import Floats, Ints
 from xcrack.errors import ProblemError
+from xcrack.inputs import shown
 from xcrack.mesh.mesh import Mesh
 
 
@@ -11,7 +12,7 @@ def facet_set(mesh: Mesh, name: str, what: str) -> Ints:
     """Facets of a set by name; an error lists the known names."""
     if name not in mesh.facet_sets:
         known = ", ".join(repr(n) for n in mesh.facet_sets)
-        raise ProblemError(f"{what}: the mesh has no facet set {name!r}; it has {known}.")
+        raise ProblemError(f"{what}: the mesh has no facet set {shown(name)}; it has {known}.")
     return mesh.facet_sets[name]
 
 

@@ -10,10 +10,11 @@ import numpy as np
 
 from xcrack.arrays import Bools, Floats
 from xcrack.errors import GeometryError, MeshError
-from xcrack.inputs import called, path_of, system_errors, whole_numbers
+from xcrack.inputs import called, whole_numbers
 from xcrack.mesh.gmsh_session import session
 from xcrack.mesh.grading import length_of
 from xcrack.mesh.mesh import Mesh, sound_mesh
+from xcrack.paths import path_of, system_errors
 
 Selector = Callable[[Floats], Any] | Sequence[int]
 _PLANE = 1e-7  # share of the size of a shape within which it lies in a plane z = constant

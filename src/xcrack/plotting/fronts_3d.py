@@ -16,9 +16,16 @@ from xcrack.crack.fronts_3d import is_closed
 from xcrack.errors import ProblemError
 from xcrack.growth.step import Step
 from xcrack.history.history import History
+from xcrack.inputs import entries, shown, whole
 from xcrack.mesh.mesh import Mesh
+from xcrack.plotting.figures import (
+    checked_title,
+    finished,
+    new_figure,
+    picture_path,
+    wants_window,
+)
 from xcrack.plotting.projection import View, best_plane, given_plane, on_plane, section_outline
-from xcrack.plotting.saving import save_figure
 from xcrack.sif.sif import SIF
 
 _MODES = ("I", "II", "III")
@@ -85,16 +92,26 @@ def draw_fronts(
     Raises
     ------
     ProblemError
-        No steps, no such crack, a 2D crack, labels of another number.
+        Arguments of another type, no steps, no such crack, a 2D crack, labels of another number, a
+        file that cannot be written.
     """
-    runs = _several(history, "steps")
+    runs = _several(history, History, "draw_fronts: history")
     names = _names(labels, len(runs), "draw_fronts")
-    figure, pyplot = _figure((6.4, 5.6), file, show)
+    crack = whole(crack, "draw_fronts: crack", least=0)
+    every = whole(every, "draw_fronts: every", least=1)
+    if not isinstance(mesh, Mesh | None):
+        raise ProblemError(f"draw_fronts: mesh = {shown(mesh)}: give a Mesh, or leave it out.")
+    for run in runs:
+        _check(run.steps, crack)
+    view = None if plane is None else given_plane(plane)
+    heading = checked_title(title, "draw_fronts")
+    target = picture_path(file, "draw_fronts")
+    window = wants_window(show, target, "draw_fronts")
+    figure = new_figure((6.4, 5.6), window, "draw_fronts")
     axes = figure.add_subplot()
     body = mesh if mesh is not None else next((r.mesh for r in runs if r.mesh is not None), None)
-    view = None if plane is None else given_plane(*plane)
     front_axes(axes, [run.steps for run in runs], crack, view, body, names, every)
-    return _done(figure, pyplot, axes, file, title)
+    return _done(figure, axes, target, window, heading)
 
 
 def draw_K(
@@ -134,21 +151,25 @@ def draw_K(
     Raises
     ------
     ProblemError
-        No such front or mode, K in 2D, labels of another number.
+        Arguments of another type, no such front or mode, K of a 2D crack, labels of another
+        number, a file that cannot be written.
     """
-    every = _several(sif, "K")
+    every = _several(sif, SIF, "draw_K: sif")
     names = _names(labels, len(every), "draw_K")
-    unknown = [m for m in modes if m not in _MODES]
-    if unknown or not len(modes):
-        raise ProblemError(f'draw_K(modes={list(modes)!r}): give some of "I", "II", "III".')
+    front = whole(front, "draw_K: front", least=0)
+    modes = (modes,) if isinstance(modes, str) else entries(modes, "draw_K: modes")
+    if not modes or not all(isinstance(mode, str) and mode in _MODES for mode in modes):
+        raise ProblemError(f'draw_K: modes = {shown(modes)}: give some of "I", "II", "III".')
+    heading = checked_title(title, "draw_K")
     for one in every:
         if one.K.shape[1] < 3 or not (one.front == front).any():
             known = sorted({int(f) for f in one.front}) if one.K.shape[1] > 2 else []
             raise ProblemError(
-                f"draw_K(front={front}): there is no such front in 3D, only {known}; in the "
-                "plane read sif.K."
+                f"draw_K(front={front}): there is no such 3D front, only {known}; in 2D read sif.K."
             )
-    figure, pyplot = _figure((6.4, 0.8 + 2.0 * len(modes)), file, show)
+    target = picture_path(file, "draw_K")
+    window = wants_window(show, target, "draw_K")
+    figure = new_figure((6.4, 0.8 + 2.0 * len(modes)), window, "draw_K")
     panels = figure.subplots(len(modes), 1, squeeze=False, sharex=True)[:, 0]
     largest = max(float(np.abs(one.K[one.front == front]).max()) for one in every)
     for axes, mode in zip(panels, modes, strict=True):
@@ -173,7 +194,7 @@ def draw_K(
             fontsize="small",
             frameon=False,
         )
-    return _done(figure, pyplot, panels[0], file, title)
+    return _done(figure, panels[0], target, window, heading)
 
 
 def front_axes(
@@ -206,10 +227,6 @@ def front_axes(
     from matplotlib.colors import Normalize
     from matplotlib.ticker import MaxNLocator
 
-    if every < 1:
-        raise ProblemError(f"draw_fronts(every={every}): give 1 or more.")
-    for steps in runs:
-        _check(steps, crack)
     view = best_plane(_surface(runs[0][0], crack)) if plane is None else plane
     if mesh is not None:
         rim = section_outline(mesh, view)
@@ -316,39 +333,34 @@ def _check(steps: Sequence[Step], crack: int) -> None:
     if not 0 <= crack < n:
         raise ProblemError(f"draw_fronts(crack={crack}): there are {n} crack(s), numbered from 0.")
     if steps[0].cracks[crack].fronts is None:
-        raise ProblemError('fronts are those of 3D cracks; in 2D plot "path".')
+        raise ProblemError('draw_fronts: only 3D cracks have fronts; in 2D plot "path".')
 
 
-def _several(value: Any, attribute: str) -> list[Any]:
-    return [value] if hasattr(value, attribute) else list(value)
+def _several(value: Any, kind: type, what: str) -> list[Any]:
+    """One value or several, checked."""
+    every = [value] if isinstance(value, kind) else list(entries(value, what))
+    if not every or not all(isinstance(one, kind) for one in every):
+        raise ProblemError(
+            f"{what} = {shown(value)}: give a {kind.__name__}, or a list of at least one."
+        )
+    return every
 
 
-def _names(labels: Sequence[str] | None, n: int, what: str) -> list[str]:
+def _names(labels: Any, n: int, caller: str) -> list[str]:
     if labels is None:
         return [""] * n if n == 1 else [str(k) for k in range(n)]
-    names = [labels] if isinstance(labels, str) else list(labels)
-    if len(names) != n or n == 0:
-        raise ProblemError(f"{what}(labels=...): {len(names)} labels for {n} curves.")
-    return names
+    names = (labels,) if isinstance(labels, str) else entries(labels, f"{caller}: labels")
+    if len(names) != n or not all(isinstance(name, str) for name in names):
+        raise ProblemError(
+            f"{caller}: labels = {shown(labels)} for {n} curve(s): give a text for each."
+        )
+    return list(names)
 
 
-def _figure(size: tuple[float, float], file: Any, show: bool | None) -> tuple[Any, Any]:
-    if file is None if show is None else show:
-        from matplotlib import pyplot
-
-        return pyplot.figure(figsize=size, layout="constrained"), pyplot
-    from matplotlib.figure import Figure
-
-    return Figure(figsize=size, layout="constrained"), None
-
-
-def _done(figure: Any, pyplot: Any, axes: Any, file: Any, title: str | None) -> Any:
+def _done(figure: Any, axes: Any, file: Path | None, window: bool, title: str | None) -> Any:
     if title:
         axes.set_title(title)
-    target = None if file is None else save_figure(figure, file, "file")
-    if pyplot is not None:
-        pyplot.show()
-    return figure if target is None else target
+    return finished(figure, file, window)
 
 
 __all__ = [

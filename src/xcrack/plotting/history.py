@@ -7,7 +7,8 @@ import numpy as np
 
 from xcrack.errors import ProblemError
 from xcrack.history.history import History
-from xcrack.plotting.saving import save_figure
+from xcrack.inputs import shown
+from xcrack.plotting.figures import finished, new_figure, picture_path
 
 
 def draw(history: History, kind: str, file: str | Path | None) -> Any:
@@ -19,22 +20,15 @@ def draw(history: History, kind: str, file: str | Path | None) -> Any:
     if isinstance(kind, str) and kind == "fronts" and kind not in kinds and history.steps:
         raise ProblemError('plot kind = "fronts": only 3D cracks have them; give "path".')
     if not isinstance(kind, str) or kind not in (*kinds, "fronts"):
-        raise ProblemError(f'plot kind = {kind!r}: give "K", "a" or "path", in 3D also "fronts".')
+        raise ProblemError(
+            f'plot kind = {shown(kind)}: give "K", "a" or "path", in 3D also "fronts".'
+        )
     if not history.steps:
         raise ProblemError("there is nothing to draw: the history has no steps.")
-    if file is None:
-        from matplotlib import pyplot
-
-        figure = pyplot.figure(figsize=(6.4, 4.8), layout="constrained")
-    else:
-        from matplotlib.figure import Figure
-
-        figure = Figure(figsize=(6.4, 4.8), layout="constrained")
+    target = picture_path(file, "plot")
+    figure = new_figure((6.4, 4.8), target is None, "History.plot")
     kinds[kind](history, figure.add_subplot())
-    if file is None:
-        pyplot.show()
-    else:
-        save_figure(figure, file, "plot: file")
+    finished(figure, target, target is None)
     return figure
 
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from xcrack.analysis.solution import Solution
 from xcrack.arrays import Floats
+from xcrack.plotting.figures import finished, new_figure
 from xcrack.plotting.scene_2d import CLOSED, Scene
 from xcrack.post.pieces import lips_of
 from xcrack.xfem.lips import arc_position
@@ -20,9 +21,9 @@ def draw(
     picture: Scene, file: Path | None, show: bool, title: str | None, edges: bool, cmap: str
 ) -> Any:
     """Draw a scene; returns the figure where there is no file."""
+    figure, axes = _body_axes(picture.box, show, bar=1.5)
     from matplotlib.collections import LineCollection
 
-    figure, axes = _body_axes(picture.box, show, bar=1.5)
     mapped = axes.tripcolor(
         *picture.points.T,
         picture.triangles,
@@ -64,12 +65,12 @@ def draw(
 
 def draw_mesh(solution: Solution, file: Path | None, show: bool, title: str | None) -> Any:
     """Mesh, cracks and enriched nodes."""
-    from matplotlib.collections import LineCollection
-    from matplotlib.patches import Circle
-
     space = solution.space
     mesh = space.mesh
     figure, axes = _body_axes(mesh.points, show, bar=0.4)
+    from matplotlib.collections import LineCollection
+    from matplotlib.patches import Circle
+
     axes.add_collection(
         LineCollection(list(mesh.points[mesh.edges]), colors="0.72", linewidths=0.4)
     )
@@ -109,7 +110,7 @@ def draw_along(
     title: str | None,
 ) -> Any:
     """Pressure or opening over the distance along each crack."""
-    figure = _figure(show, (6.4, 0.6 + 3.0 * len(cracks)))
+    figure = new_figure((6.4, 0.6 + 3.0 * len(cracks)), show, "plot")
     every = figure.subplots(len(cracks), 1, squeeze=False)[:, 0]
     for axes, c in zip(every, cracks, strict=True):
         _along(axes, solution, field, c)
@@ -187,20 +188,11 @@ def _from_zero(axes: Any, values: Floats) -> None:
     axes.set_ylim(low - 0.05 * reach if low < -1e-6 * reach else -0.03 * reach, 1.12 * reach)
 
 
-def _figure(show: bool, size: tuple[float, float]) -> Any:
-    if show:
-        from matplotlib import pyplot
-
-        return pyplot.figure(figsize=size, layout="constrained")
-    from matplotlib.figure import Figure
-
-    return Figure(figsize=size, layout="constrained")
-
-
 def _body_axes(points: Floats, show: bool, bar: float) -> tuple[Any, Any]:
     low, high = points.min(axis=0), points.max(axis=0)
     size = _LONGER * (high - low) / float((high - low).max())
-    figure = _figure(show, (max(size[0], 2.0) + 0.6 + bar, max(size[1], 2.4) + 0.7))
+    size = (max(size[0], 2.0) + 0.6 + bar, max(size[1], 2.4) + 0.7)
+    figure = new_figure(size, show, "plot")
     return figure, figure.add_subplot()
 
 
@@ -224,10 +216,4 @@ def _legend_below(axes: Any, columns: int) -> None:
 def _done(figure: Any, axes: Any, file: Path | None, show: bool, title: str | None) -> Any:
     if title:
         axes.set_title(title)
-    if file is not None:
-        figure.savefig(file, dpi=_DPI)
-    if show:
-        from matplotlib import pyplot
-
-        pyplot.show()
-    return figure if file is None else file
+    return finished(figure, file, show, _DPI)

@@ -7,6 +7,7 @@ import numpy as np
 
 from xcrack.analysis.solution import Solution
 from xcrack.arrays import Floats
+from xcrack.plotting.figures import finished, new_figure
 from xcrack.plotting.projection import View, best_plane, on_plane
 from xcrack.plotting.scene_2d import CLOSED, rounded
 from xcrack.plotting.scene_3d import LIP_FIELDS, is_coloured, lip_values
@@ -36,14 +37,7 @@ def draw_cracks(
     ]
     height = sum(max(1.7, min(1.0, span[1] / span[0]) * _SIZE) + 0.9 for span in spans)
     size = (_SIZE + 1.6, height + (0.4 if title else 0.0))
-    if show:
-        from matplotlib import pyplot
-
-        figure: Any = pyplot.figure(figsize=size, layout="constrained")
-    else:
-        from matplotlib.figure import Figure
-
-        figure = Figure(figsize=size, layout="constrained")
+    figure = new_figure(size, show, "plot")
     every = figure.subplots(len(cracks), 1, squeeze=False)[:, 0]
     values = np.concatenate([lip_values(each, field).ravel() for each in lips])
     low, high = rounded(float(values.min()), float(values.max()), field)
@@ -56,11 +50,7 @@ def draw_cracks(
             axes.set_title(f"crack {c}", fontsize="medium", loc="left")
     if title:
         figure.suptitle(title)
-    if file is not None:
-        figure.savefig(file, dpi=_DPI)
-    if show:
-        pyplot.show()
-    return figure if file is None else file
+    return finished(figure, file, show, _DPI)
 
 
 def _map(

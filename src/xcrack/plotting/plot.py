@@ -6,16 +6,31 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from xcrack.analysis.plan import Report
 from xcrack.analysis.solution import Solution
-from xcrack.errors import ProblemError
+from xcrack.arrays import Floats, lock
+from xcrack.errors import ProblemError, XcrackError
+from xcrack.inputs import flag, number, numbers, one_of, shown
+from xcrack.optional import required
+from xcrack.plotting.figures import checked_title, picture_path
+from xcrack.plotting.pyvista_2d import RASTER
 from xcrack.plotting.scene_2d import FIELDS, SPACE_FIELDS, scene
+from xcrack.plotting.scene_3d import LIP_FIELDS, clip_plane, direction
+from xcrack.plotting.section_3d import Plane
+from xcrack.scene.problem import Problem, crack_number
+from xcrack.solvers.reuse import Reuse
+from xcrack.xfem.model import discretised
 
 _GRAPHS = ("pressure", "opening")
-_KNOWN = (*FIELDS, "mesh", *_GRAPHS)
+_KNOWN = {2: (*FIELDS, "mesh", *_GRAPHS), 3: (*SPACE_FIELDS, "mesh", *LIP_FIELDS)}
+_ON_LIPS = {*_GRAPHS, *LIP_FIELDS}
+_NO_OPENGL = "it cannot draw here (no OpenGL): apt-get install libegl1 libgl1-mesa-dri"
 
 
 def plot(
-    solution: Solution,
+    solution: Solution | Problem,
     field: str = "von_mises",
     *,
     file: str | Path | None = None,
@@ -31,11 +46,12 @@ def plot(
     view: Any = None,
     loads: bool = False,
 ) -> Any:
-    """Draw a solution.
+    """Draw a solution, or the mesh and the cracks of a problem.
 
     Parameters
     ----------
-    solution : Solution
+    solution : Solution, or Problem
+        A problem has one picture only: the field "mesh".
     field : str
         On the body: "von_mises", "sxx", "syy", "sxy", "displacement" (its norm), "ux", "uy".
         Along the crack faces: "pressure" (of contact), "opening" (with the sliding); where the
@@ -77,99 +93,117 @@ def plot(
     Raises
     ------
     ProblemError
-        An unknown field or renderer, a crack that does not exist, a renderer that cannot draw, a
-        plane that leaves nothing.
+        Arguments of another type, an unknown field or renderer, a crack that does not exist, a
+        renderer that cannot draw, a plane that leaves nothing, a file that cannot be written.
+    XcrackError
+        The renderer that was asked for is not installed.
     """
-    if solution.space.dim == 3:
-        look = Look(warp, title, edges, limits, cmap, crack, clip, view, loads)
-        return _in_space(solution, field, file, show, renderer, look)
-    if clip is not None or view is not None or loads:
-        raise ProblemError("plot(clip=, view=, loads=): only 3D bodies know these.")
-    if field not in _KNOWN:
-        known = ", ".join(f'"{name}"' for name in _KNOWN)
-        raise ProblemError(f"plot(field={field!r}): there is no such field; give one of {known}.")
-    _check_renderer(renderer)
-    target = _target(file)
+    solution = _drawable(solution, field)
+    field = one_of(field, "plot: field", _KNOWN[solution.space.dim])
+    one_of(renderer, "plot: renderer", ("auto", "pyvista", "matplotlib"))
+    look = Look(
+        warp=number(warp, "plot: warp"),
+        title=checked_title(title, "plot"),
+        edges=flag(edges, "plot: edges"),
+        limits=_limits(limits),
+        cmap=_colour_map(cmap),
+        crack=None if crack is None else crack_number(solution.problem, crack, "plot"),
+        plane=clip_plane(clip),
+        view=direction(view),
+        loads=flag(loads, "plot: loads"),
+    )
+    if show is not None:
+        show = flag(show, "plot: show")
+    if field in _ON_LIPS and not solution.lips:
+        raise ProblemError(f'plot(field="{field}"): the body has no crack; draw another field.')
+    target = picture_path(file, "plot")
     window = (target is None and _has_display()) if show is None else show
-    if field in _GRAPHS:
-        from xcrack.plotting.matplotlib_2d import draw_along
-
-        return draw_along(solution, field, _cracks(solution, field, crack), target, window, title)
-    if field == "mesh":
-        from xcrack.plotting.matplotlib_2d import draw_mesh
-
-        return draw_mesh(solution, target, window, title)
-    picture = scene(solution, field, warp, limits)
-    colours = cmap or ("RdBu_r" if picture.signed else "viridis")
-    if _by_pyvista(renderer, target):
-        from xcrack.plotting import pyvista_2d as plot_pyvista
-
-        return plot_pyvista.draw(picture, target, window, title, edges, colours)
-    from xcrack.plotting import matplotlib_2d as plot_matplotlib
-
-    return plot_matplotlib.draw(picture, target, window, title, edges, colours)
+    draw = {2: _draw_2d, 3: _draw_3d}[solution.space.dim]
+    return draw(solution, field, target, window, renderer, look)
 
 
 @dataclass(frozen=True, eq=False)
 class Look:
-    """How a picture in 3D is to look: arguments of `plot`."""
+    """How a picture is to look: arguments of `plot`, checked."""
 
     warp: float
     title: str | None
     edges: bool
     limits: tuple[float, float] | None
-    cmap: str | None
+    cmap: Any
     crack: int | None
-    clip: Any
-    view: Any
+    plane: Plane | None
+    view: Floats | None
     loads: bool
 
+    def colours(self, signed: bool) -> Any:
+        """The colour map, or one that suits the values."""
+        return self.cmap or ("RdBu_r" if signed else "viridis")
 
-def _in_space(
-    solution: Solution,
-    field: str,
-    file: str | Path | None,
-    show: bool | None,
-    renderer: str,
-    look: Look,
+    def cracks(self, solution: Solution) -> list[int]:
+        """The cracks to draw."""
+        return list(range(len(solution.lips))) if self.crack is None else [self.crack]
+
+
+def _draw_2d(
+    solution: Solution, field: str, target: Path | None, window: bool, renderer: str, look: Look
 ) -> Any:
-    from xcrack.plotting.scene_3d import (
-        LIP_FIELDS,
-        clip_plane,
-        crack_scene,
-        direction,
-        mesh_scene,
-        space_scene,
+    if look.plane is not None or look.view is not None or look.loads:
+        raise ProblemError("plot(clip=, view=, loads=): only 3D bodies know these; leave them out.")
+    if field in _GRAPHS:
+        from xcrack.plotting.matplotlib_2d import draw_along
+
+        return draw_along(solution, field, look.cracks(solution), target, window, look.title)
+    if field == "mesh":
+        from xcrack.plotting.matplotlib_2d import draw_mesh
+
+        return draw_mesh(solution, target, window, look.title)
+    fault = "" if renderer == "matplotlib" else _fault_of_pyvista(target)
+    if renderer == "pyvista" and fault:
+        raise ProblemError(
+            f'plot(renderer="pyvista"): {fault}; or leave renderer out, and matplotlib draws it.'
+        )
+    picture = scene(solution, field, look.warp, look.limits)
+    if renderer == "matplotlib" or fault:
+        from xcrack.plotting import matplotlib_2d as plot_matplotlib
+
+        return plot_matplotlib.draw(
+            picture, target, window, look.title, look.edges, look.colours(picture.signed)
+        )
+    from xcrack.plotting import pyvista_2d as plot_pyvista
+
+    return plot_pyvista.draw(
+        picture, target, window, look.title, look.edges, look.colours(picture.signed)
     )
 
-    known = (*SPACE_FIELDS, "mesh", *LIP_FIELDS)
-    if field not in known:
-        names = ", ".join(f'"{name}"' for name in known)
-        raise ProblemError(f"plot(field={field!r}): there is no such field; give one of {names}.")
-    _check_renderer(renderer)
-    plane, view = clip_plane(look.clip), direction(look.view)
-    cracks = _cracks(solution, field, look.crack) if field in LIP_FIELDS else []
-    target = _target(file)
-    window = (target is None and _has_display()) if show is None else show
-    if not _by_pyvista(renderer, target):
-        from xcrack.plotting import matplotlib_3d as plot_matplotlib_space
-        from xcrack.plotting.pyvista_2d import RASTER
 
-        if cracks:
-            return plot_matplotlib_space.draw_cracks(
-                solution, field, cracks, target, window, look.title, look.limits, look.cmap
-            )
+def _draw_3d(
+    solution: Solution, field: str, target: Path | None, window: bool, renderer: str, look: Look
+) -> Any:
+    from xcrack.plotting.scene_3d import crack_scene, mesh_scene, space_scene
+
+    cracks = look.cracks(solution) if field in LIP_FIELDS else []
+    fault = "" if renderer == "matplotlib" else _fault_of_pyvista(target)
+    if cracks and (renderer == "matplotlib" or (renderer == "auto" and fault)):
+        from xcrack.plotting import matplotlib_3d as plot_matplotlib_space
+
+        return plot_matplotlib_space.draw_cracks(
+            solution, field, cracks, target, window, look.title, look.limits, look.cmap
+        )
+    if renderer == "matplotlib" or fault:
+        reason = fault or 'give renderer="auto"'
         raise ProblemError(
-            f'plot(field="{field}"): a 3D body is drawn by pyvista, as '
-            f"{', '.join(RASTER)}; matplotlib draws {', '.join(LIP_FIELDS)} only. Without OpenGL "
-            "install libEGL (apt-get install libegl1 libgl1-mesa-dri)."
+            f'plot(field="{field}"): a body in 3D is drawn by pyvista: {reason}. matplotlib draws '
+            f"{', '.join(LIP_FIELDS)} only."
         )
     if field == "mesh":
-        picture = mesh_scene(solution, plane, view)
+        picture = mesh_scene(solution, look.plane, look.view)
     elif cracks:
-        picture = crack_scene(solution, field, cracks, look.warp, look.limits, plane, view)
+        picture = crack_scene(
+            solution, field, cracks, look.warp, look.limits, look.plane, look.view
+        )
     else:
-        picture = space_scene(solution, field, look.warp, look.limits, plane, view)
+        picture = space_scene(solution, field, look.warp, look.limits, look.plane, look.view)
     arrows = None
     if look.loads:
         from xcrack.plotting.loads_3d import load_arrows
@@ -177,24 +211,60 @@ def _in_space(
         arrows = load_arrows(solution)
     from xcrack.plotting.pyvista_3d import draw_space
 
-    colours = look.cmap or ("RdBu_r" if picture.signed else "viridis")
     edges = look.edges or field == "mesh"
+    colours = look.colours(picture.signed)
     return draw_space(picture, arrows, target, window, look.title, edges, colours)
 
 
-def _check_renderer(renderer: str) -> None:
-    if renderer not in ("auto", "pyvista", "matplotlib"):
-        raise ProblemError(f'plot(renderer={renderer!r}): give "auto", "pyvista" or "matplotlib".')
+def _drawable(given: Any, field: Any) -> Solution:
+    """The solution, or that of a problem in which nothing acts, to draw its mesh and cracks."""
+    if isinstance(given, Solution):
+        return given
+    if not isinstance(given, Problem):
+        raise ProblemError(
+            f'plot: give a Solution, or a Problem with field="mesh", not {type(given).__name__}.'
+        )
+    if not (isinstance(field, str) and field == "mesh"):
+        raise ProblemError(
+            f"plot: a Problem has no field {shown(field)}: give what solve returns, or "
+            'field="mesh".'
+        )
+    space, lips = discretised(given)
+    return Solution(
+        problem=given,
+        state=None,
+        loads=(),
+        factor=0.0,
+        space=space,
+        u=lock(np.zeros(space.n_dof)),
+        lips=lips,
+        contact=(None,) * len(lips),
+        energy=0.0,
+        report=Report((), {}),
+        reuse=Reuse(),
+    )
 
 
-def _target(file: str | Path | None) -> Path | None:
-    if file is None:
+def _limits(limits: Any) -> tuple[float, float] | None:
+    if limits is None:
         return None
-    path = Path(file)
-    if not path.suffix:
-        path = path.with_name(path.name + ".png")
-    path.parent.mkdir(parents=True, exist_ok=True)
-    return path
+    low, high = numbers(limits, "plot: limits", (2,)).tolist()
+    if not low < high:
+        raise ProblemError(f"plot: limits = {shown(limits)}: give the lower one first.")
+    return low, high
+
+
+def _colour_map(cmap: Any) -> Any:
+    if cmap is None:
+        return None
+    matplotlib = required("matplotlib", "plot: cmap")
+    if isinstance(cmap, str) and cmap in matplotlib.colormaps:
+        return cmap
+    if isinstance(cmap, required("matplotlib.colors", "plot: cmap").Colormap):
+        return cmap
+    raise ProblemError(
+        f'plot: cmap = {shown(cmap)}: give the name of a colour map of matplotlib, such as "RdBu".'
+    )
 
 
 def _has_display() -> bool:
@@ -206,33 +276,20 @@ def _has_display() -> bool:
     return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
 
 
-def _cracks(solution: Solution, field: str, crack: int | None) -> list[int]:
-    n = len(solution.lips)
-    if n == 0:
-        raise ProblemError(
-            f'plot(field="{field}"): the body has no crack, so there are no crack faces.'
-        )
-    if crack is not None and not 0 <= crack < n:
-        raise ProblemError(f"plot(crack={crack}): the problem has {n} crack(s), numbered from 0.")
-    return list(range(n)) if crack is None else [crack]
+def _fault_of_pyvista(target: Path | None) -> str:
+    """Why pyvista cannot draw this file here, and what to do; empty if it can."""
+    from xcrack.plotting.pyvista_2d import renders
 
-
-def _by_pyvista(renderer: str, target: Path | None) -> bool:
-    from xcrack.plotting.pyvista_2d import RASTER, renders
-
-    if renderer == "matplotlib":
-        return False
-    known = target is None or target.suffix.lower() in RASTER
-    if renderer == "auto":
-        return known and renders()
-    if not known and target is not None:
-        raise ProblemError(
-            f'plot(file="{target}"): pyvista writes {", ".join(RASTER)}; take '
-            'renderer="matplotlib" for other kinds of files.'
-        )
-    if not renders():
-        raise ProblemError(
-            'plot(renderer="pyvista"): pyvista cannot draw here (no OpenGL); install libEGL '
-            '(apt-get install libegl1 libgl1-mesa-dri) or take renderer="matplotlib".'
-        )
-    return True
+    if target is not None and target.suffix.lower() not in RASTER:
+        return f"it writes {', '.join(RASTER)}, not {shown(target.suffix)}"
+    if renders():
+        try:
+            required("pyvista", "it")
+            return ""
+        except XcrackError as error:
+            return str(error).rstrip(".")
+    try:
+        required("pyvista", "it")
+    except XcrackError as error:
+        return str(error).rstrip(".")
+    return _NO_OPENGL

@@ -1,13 +1,14 @@
 """Planes onto which fronts and 3D cracks are projected, and sections of a body with them."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from xcrack.arrays import Floats, lock
 from xcrack.errors import ProblemError
+from xcrack.inputs import numbers, shown
 from xcrack.mesh.mesh import Mesh
 from xcrack.mesh.split import interface_simplices
 
@@ -42,15 +43,13 @@ class View:
         return ("" if value > 0 else "-") + "xyz"[axis]
 
 
-def given_plane(origin: ArrayLike, axes: Sequence[ArrayLike]) -> View:
+def given_plane(plane: Any) -> View:
     """A plane by a point and two directions; the second is made perpendicular to the first.
 
     Parameters
     ----------
-    origin : (3,) array, length
-        Drawn at (0, 0).
-    axes : two (3,) arrays
-        To the right and up.
+    plane : (origin, (right, up))
+        The point, which is drawn at (0, 0), and the directions to the right and up.
 
     Returns
     -------
@@ -62,19 +61,22 @@ def given_plane(origin: ArrayLike, axes: Sequence[ArrayLike]) -> View:
         Not a point and two directions that span a plane.
     """
     try:
-        x, two = np.asarray(origin, dtype=float), np.asarray(axes, dtype=float)
-        good = x.shape == (3,) and two.shape == (2, 3) and bool(np.isfinite(two).all())
-    except (TypeError, ValueError):
-        good = False
-    if good:
-        right = two[0] / max(float(np.linalg.norm(two[0])), 1e-300)
-        up = two[1] - (two[1] @ right) * right
+        origin, axes = plane
+        x, two = numbers(origin, "origin", (3,)), numbers(axes, "directions", (2, 3))
+        lengths = np.linalg.norm(two, axis=1, keepdims=True)
+        right, second = two / np.where((lengths > 0) & np.isfinite(lengths), lengths, np.inf)
+        up = second - (second @ right) * right
         length = float(np.linalg.norm(up))
-        if length > 1e-6 * float(np.linalg.norm(two[1])) > 0:
-            return View(lock(x), lock(np.stack([right, up / length])))
+        if length > 1e-6 and right.any():
+            return View(lock(np.array(x)), lock(np.stack([right, up / length])))
+        reason = "the two directions are parallel, or one is zero"
+    except (TypeError, ValueError):
+        reason = "that is no pair"
+    except ProblemError as error:
+        reason = str(error)[:-1]
     raise ProblemError(
-        f"plane=({origin!r}, {axes!r}): give a point and two directions, ((x, y, z), (right, up)), "
-        "that are not parallel."
+        f"plane = {shown(plane)}: give a point and two directions, ((x, y, z), (right, up)); "
+        f"{reason}."
     )
 
 

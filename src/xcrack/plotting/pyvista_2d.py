@@ -5,12 +5,16 @@ import functools
 import subprocess
 import sys
 from collections.abc import Iterator
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from xcrack.arrays import Floats, Ints
+from xcrack.errors import ProblemError
+from xcrack.optional import required
+from xcrack.paths import written_whole
 from xcrack.plotting.scene_2d import CLOSED, Scene
 
 RASTER = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")
@@ -44,8 +48,7 @@ def draw(
     picture: Scene, file: Path | None, show: bool, title: str | None, edges: bool, cmap: str
 ) -> Any:
     """Draw a scene; returns the plotter where there is no file."""
-    import pyvista as pv
-
+    pv = required("pyvista", 'plot(renderer="pyvista")')
     low, high = picture.box
     size = high - low
     scale = LONGER / float(size.max())
@@ -111,9 +114,16 @@ def shown(plotter: Any, file: Path | None, show: bool) -> Any:
         return plotter
     if show:
         plotter.show(screenshot=str(file))
-    else:
-        plotter.screenshot(str(file))
+        return file
+    try:
+        pixels = plotter.screenshot(None, return_img=True)
+    finally:
         plotter.close()
+    image = required("PIL.Image", "plot")
+    content = BytesIO()  # writers of pictures may keep to themselves that the disk is full
+    image.fromarray(pixels).save(content, image.registered_extensions()[file.suffix.lower()])
+    with written_whole(file, "the picture cannot be written to", error=ProblemError) as part:
+        part.write_bytes(content.getvalue())
     return file
 
 

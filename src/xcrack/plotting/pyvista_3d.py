@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from xcrack.arrays import Floats
+from xcrack.optional import required
 from xcrack.plotting.pyvista_2d import (
     BAR,
     LONGER,
@@ -35,8 +36,7 @@ def draw_space(
     cmap: str,
 ) -> Any:
     """Draw a scene; returns the plotter where there is no file."""
-    import pyvista as pv
-
+    pv = required("pyvista", 'plot(renderer="pyvista")')
     right, up, toward = _axes(picture.toward)
     box = picture.box if arrows is None else picture.body
     if arrows is not None:

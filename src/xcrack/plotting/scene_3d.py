@@ -1,12 +1,14 @@
 """What a picture of a 3D body shows, as arrays: triangles, lines, colours and arrows."""
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from xcrack.analysis.solution import Solution
 from xcrack.arrays import Bools, Floats
 from xcrack.errors import ProblemError
+from xcrack.inputs import numbers, shown
 from xcrack.plotting.scene_2d import SPACE_FIELDS, STRESSES, clipped, field_values, rounded
 from xcrack.plotting.section_3d import (
     Plane,
@@ -103,39 +105,39 @@ class SpaceScene:
         return np.concatenate([part.reshape(-1, 3) for part in parts])
 
 
-def clip_plane(clip: object) -> Plane | None:
+def clip_plane(clip: Any) -> Plane | None:
     """Point and unit normal of a plane, as the user gave them."""
     if clip is None:
         return None
     try:
-        point, normal = (np.asarray(part, dtype=float) for part in clip)  # type: ignore[attr-defined]
-        length = float(np.linalg.norm(normal))
-        good = point.shape == normal.shape == (3,) and 0 < length < np.inf
-        good = good and bool(np.isfinite(point).all())
+        point, normal = clip
+        x, n = numbers(point, "point", (3,)), numbers(normal, "normal", (3,))
+        length = float(np.linalg.norm(n))
+        if 0 < length < np.inf:
+            return x, n / length
+        reason = "the normal has no direction"
     except (TypeError, ValueError):
-        good = False
-    if not good:
-        raise ProblemError(
-            f"plot(clip={clip!r}): give a point and a normal, ((x, y, z), (nx, ny, nz)); what "
-            "lies on the side of the normal is left out."
-        )
-    return point, normal / length
+        reason = "that is no pair"
+    except ProblemError as error:
+        reason = str(error)[:-1]
+    raise ProblemError(
+        f"plot: clip = {shown(clip)}: give a point and a normal, ((x, y, z), (nx, ny, nz)); what "
+        f"lies on the side of the normal is left out. Here {reason}."
+    )
 
 
-def direction(view: object) -> Floats | None:
+def direction(view: Any) -> Floats | None:
     """Unit vector from the body to the viewer, as the user gave it."""
     if view is None:
         return None
-    try:
-        v = np.asarray(view, dtype=float)
-        good = v.shape == (3,) and 0 < float(np.linalg.norm(v)) < np.inf
-    except (TypeError, ValueError):
-        good = False
-    if not good:
+    v = numbers(view, "plot: view, the direction to the viewer", (3,))
+    length = float(np.linalg.norm(v))
+    if not 0 < length < np.inf:
         raise ProblemError(
-            f"plot(view={view!r}): give the direction from the body to the viewer, (x, y, z)."
+            f"plot: view = {shown(view)} has no direction: give that from the body to the viewer, "
+            "(x, y, z)."
         )
-    return np.asarray(v / np.linalg.norm(v))
+    return np.asarray(v / length)
 
 
 def space_scene(

@@ -12,10 +12,14 @@ import numpy as np
 from xcrack.analysis.solution import Solution
 from xcrack.arrays import Floats, Ints
 from xcrack.errors import ProblemError, XcrackError
+from xcrack.inputs import entries, shown
+from xcrack.optional import required
+from xcrack.paths import path_of, system_errors, written_whole
 from xcrack.post.lip_faces_3d import lip_faces
 from xcrack.post.pieces import Pieces, lips_of, pieces, von_mises
 from xcrack.sif.sif import SIF
 
+_UNSAVED = "the solution cannot be written to"
 # VTK's numbers of simplices, and the order of their nodes, by number of nodes.
 _KIND = {3: 5, 6: 22, 4: 10, 10: 24}
 _ORDER = {
@@ -65,17 +69,17 @@ def write(
     Raises
     ------
     ProblemError
-        A path that ends on the suffix of another kind of VTK file; not one SIF for each crack.
+        Arguments of another type, a path that ends on the suffix of another kind of VTK file, not
+        one SIF for each crack, or a file that cannot be written.
+    XcrackError
+        VTK is not installed.
     """
-    K = () if sif is None else (sif,) if isinstance(sif, SIF) else tuple(sif)
-    if K and len(K) != len(solution.lips):
-        raise ProblemError(f"write(sif=...): {len(K)} SIF for {len(solution.lips)} crack(s).")
-    target = Path(path)
-    if target.suffix in (".vtp", ".vtk", ".pvd", ".vtm"):
-        raise ProblemError(f"write(path={str(path)!r}): the grid is a .vtu file; give that suffix.")
-    if target.suffix != ".vtu":
-        target = target.with_name(target.name + ".vtu")
-    target.parent.mkdir(parents=True, exist_ok=True)
+    if not isinstance(solution, Solution):
+        raise ProblemError(
+            f"write: give a Solution as solve returns it, not {type(solution).__name__}."
+        )
+    K = _checked_sif(solution, sif)
+    target = _grid_path(path)
     _write_grid(pieces(solution), target)
     if not any(len(lips) for lips in solution.lips):
         return [target]
@@ -91,14 +95,42 @@ def write(
     return [target, lips, fronts]
 
 
-def _write_grid(body: Pieces, path: Path) -> None:
-    from vtkmodules.vtkCommonDataModel import vtkUnstructuredGrid
-    from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridWriter
+def _checked_sif(solution: Solution, sif: Any) -> tuple[SIF, ...]:
+    if sif is None:
+        return ()
+    K = (sif,) if isinstance(sif, SIF) else entries(sif, "write: sif")
+    n = len(solution.lips)
+    if len(K) != n or not all(isinstance(one, SIF) for one in K):
+        raise ProblemError(f"write: sif = {shown(sif)}: give one SIF for each of the {n} crack(s).")
+    for tip in solution.space.tips:
+        own = K[tip.crack]
+        if own.x.shape[1:] != (solution.space.dim,) or not (own.front == tip.number).any():
+            raise ProblemError(
+                f"write: sif of crack {tip.crack} has no K for its tip or front {tip.number}: give "
+                "what stress_intensity returns for this solution."
+            )
+    return K
 
+
+def _grid_path(path: Any) -> Path:
+    target = path_of(path, "write: path", error=ProblemError)
+    if target.suffix in (".vtp", ".vtk", ".pvd", ".vtm") or target.name in ("", ".."):
+        raise ProblemError(
+            f"write: path = {shown(str(target))}: the grid is a .vtu file; give that ending."
+        )
+    if target.suffix != ".vtu":
+        target = target.with_name(target.name + ".vtu")
+    with system_errors(_UNSAVED, target, error=ProblemError):
+        target.parent.mkdir(parents=True, exist_ok=True)
+    return target
+
+
+def _write_grid(body: Pieces, path: Path) -> None:
+    writer = _vtk("vtkIOXML").vtkXMLUnstructuredGridWriter()
     d = body.points.shape[1]
     blocks = [b[:, _ORDER[b.shape[1]]] for b in (body.plain, body.split)]
     kind = np.concatenate([np.full(len(b), _KIND[b.shape[1]], dtype=np.uint8) for b in blocks])
-    grid = vtkUnstructuredGrid()
+    grid = _vtk("vtkCommonDataModel").vtkUnstructuredGrid()
     grid.SetPoints(_points(body.points))
     grid.SetCells(_array(kind), _cells(blocks))
     at_points = {
@@ -114,13 +146,10 @@ def _write_grid(body: Pieces, path: Path) -> None:
         "enriched": body.enriched,
         "cell": body.cell,
     }
-    _save(vtkXMLUnstructuredGridWriter(), grid, at_points, at_cells, path)
+    _save(writer, grid, at_points, at_cells, path)
 
 
 def _write_lips(solution: Solution, path: Path) -> None:
-    from vtkmodules.vtkCommonDataModel import vtkPolyData
-    from vtkmodules.vtkIOXML import vtkXMLPolyDataWriter
-
     lips = [lips_of(solution, c) for c in range(len(solution.lips))]
     start = np.cumsum([0, *(len(each.s) for each in lips)])
     runs = [(c, start[c] + run) for c, each in enumerate(lips) for run in each.runs]
@@ -141,16 +170,19 @@ def _write_lips(solution: Solution, path: Path) -> None:
     at_points = {name: np.concatenate(values) for name, values in scalars.items()}
     for name, parts in vectors.items():
         at_points[name] = np.pad(np.concatenate(parts), ((0, 0), (0, 3 - d)))
-    data = vtkPolyData()
+    data = _vtk("vtkCommonDataModel").vtkPolyData()
     data.SetPoints(_points(np.concatenate([each.x for each in lips])))
     data.SetLines(_cells([run[None] for _, run in runs]))
-    _save(vtkXMLPolyDataWriter(), data, at_points, {"crack": np.array([c for c, _ in runs])}, path)
+    _save(
+        _vtk("vtkIOXML").vtkXMLPolyDataWriter(),
+        data,
+        at_points,
+        {"crack": np.array([c for c, _ in runs])},
+        path,
+    )
 
 
 def _write_lip_faces(solution: Solution, path: Path) -> None:
-    from vtkmodules.vtkCommonDataModel import vtkPolyData
-    from vtkmodules.vtkIOXML import vtkXMLPolyDataWriter
-
     lips = [lip_faces(solution, c) for c in range(len(solution.lips))]
     start = np.cumsum([0, *(len(each.points) for each in lips)])
 
@@ -167,17 +199,14 @@ def _write_lip_faces(solution: Solution, path: Path) -> None:
         "pressure_mean": joined("mean_pressure"),
         "gap_mean": joined("mean_gap"),
     }
-    data = vtkPolyData()
+    data = _vtk("vtkCommonDataModel").vtkPolyData()
     data.SetPoints(_points(joined("points")))
     faces = [each.triangles + begin for each, begin in zip(lips, start, strict=False)]
     data.SetPolys(_cells([np.concatenate(faces)]))
-    _save(vtkXMLPolyDataWriter(), data, at_points, at_cells, path)
+    _save(_vtk("vtkIOXML").vtkXMLPolyDataWriter(), data, at_points, at_cells, path)
 
 
 def _write_fronts(solution: Solution, sif: Sequence[SIF], path: Path) -> None:
-    from vtkmodules.vtkCommonDataModel import vtkPolyData
-    from vtkmodules.vtkIOXML import vtkXMLPolyDataWriter
-
     tips = solution.space.tips
     lines: list[dict[str, np.ndarray]] = []
     for tip in tips:
@@ -207,10 +236,14 @@ def _write_fronts(solution: Solution, sif: Sequence[SIF], path: Path) -> None:
         "crack": np.array([tip.crack for tip in tips]),
         "front": np.array([tip.number for tip in tips]),
     }
-    data = vtkPolyData()
+    data = _vtk("vtkCommonDataModel").vtkPolyData()
     data.SetPoints(_points(x))
     data.SetLines(_cells([run[None] for run in runs]))
-    _save(vtkXMLPolyDataWriter(), data, at_points, at_cells, path)
+    _save(_vtk("vtkIOXML").vtkXMLPolyDataWriter(), data, at_points, at_cells, path)
+
+
+def _vtk(part: str) -> Any:
+    return required(f"vtkmodules.{part}", "write")
 
 
 def _six(stress: Floats) -> Floats:
@@ -219,34 +252,26 @@ def _six(stress: Floats) -> Floats:
 
 
 def _array(values: np.ndarray, name: str | None = None) -> Any:
-    from vtkmodules.util.numpy_support import numpy_to_vtk
-
-    array = numpy_to_vtk(np.ascontiguousarray(values), deep=True)
+    array = _vtk("util.numpy_support").numpy_to_vtk(np.ascontiguousarray(values), deep=True)
     if name is not None:
         array.SetName(name)
     return array
 
 
 def _points(x: Floats) -> Any:
-    from vtkmodules.vtkCommonCore import vtkPoints
-
-    points = vtkPoints()
+    points = _vtk("vtkCommonCore").vtkPoints()
     points.SetData(_array(np.pad(x, ((0, 0), (0, 3 - x.shape[1])))))
     return points
 
 
 def _cells(blocks: Sequence[Ints]) -> Any:
     """Cells from blocks `(m, k)` of point numbers, each with its own k."""
-    from vtkmodules.util.numpy_support import numpy_to_vtkIdTypeArray
-    from vtkmodules.vtkCommonDataModel import vtkCellArray
-
+    as_numbers = _vtk("util.numpy_support").numpy_to_vtkIdTypeArray
     sizes = np.concatenate([np.full(len(b), b.shape[1], dtype=np.int64) for b in blocks])
     offsets = np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
     numbers = np.concatenate([b.ravel() for b in blocks]).astype(np.int64)
-    cells = vtkCellArray()
-    cells.SetData(
-        numpy_to_vtkIdTypeArray(offsets, deep=True), numpy_to_vtkIdTypeArray(numbers, deep=True)
-    )
+    cells = _vtk("vtkCommonDataModel").vtkCellArray()
+    cells.SetData(as_numbers(offsets, deep=True), as_numbers(numbers, deep=True))
     return cells
 
 
@@ -261,9 +286,12 @@ def _save(
         data.GetPointData().AddArray(_array(values, name))
     for name, values in at_cells.items():
         data.GetCellData().AddArray(_array(values, name))
-    # Text in base64, so that readers other than VTK's open the file too.
+    # Text in base64, so that readers other than VTK's open the file too. Python writes it: VTK's
+    # own writers may end the process where the disk is full.
     writer.SetDataModeToBinary()
-    writer.SetFileName(str(path))
+    writer.SetWriteToOutputString(True)
     writer.SetInputData(data)
     if writer.Write() != 1:
-        raise XcrackError(f"{path} could not be written: is there room, and may you write there?")
+        raise XcrackError(f"VTK made no text for {str(path)!r}: the memory may not suffice.")
+    with written_whole(path, _UNSAVED, error=ProblemError) as part:
+        part.write_text(writer.GetOutputString(), encoding="utf-8", newline="")

@@ -10,8 +10,9 @@ from typing import Any
 
 from xcrack.errors import ProblemError, XcrackError
 from xcrack.history.versions import versions
-from xcrack.inputs import number, path_of, system_errors
+from xcrack.inputs import number
 from xcrack.markup import Markup, element, joined, listed, page
+from xcrack.paths import path_of, system_errors
 from xcrack.plotting.report_pictures import Picture, history_pictures, solution_pictures
 from xcrack.plotting.view_3d import history_layers, packed, solution_layers
 from xcrack.reporting import results, scene

@@ -15,8 +15,8 @@ from xcrack.crack.crack import Crack
 from xcrack.errors import ProblemError, XcrackError, collected_warnings
 from xcrack.history.collect import load
 from xcrack.history.history import History
-from xcrack.inputs import path_of
 from xcrack.mesh.mesh import Mesh
+from xcrack.paths import path_of
 from xcrack.scene.problem import Problem
 from xcrack.sif.sif import SIF
 from xcrack.sif.stress_intensity import stress_intensities

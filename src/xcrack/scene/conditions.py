@@ -1,7 +1,8 @@
 """Supports and loads as values; they know neither mesh nor crack."""
 
 import inspect
-from collections.abc import Callable, Sequence
+import re
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from xcrack.arrays import Floats, frozen
 from xcrack.errors import ProblemError
-from xcrack.inputs import called, number, numbers, whole
+from xcrack.inputs import called, number, numbers, shown, whole
 from xcrack.scene.set_loads import Bearing, Resultant
 
 Value = Any  # vector, f(x) or f(x, normal)
@@ -101,7 +102,7 @@ def fix(where: Where, axis: int | None = None) -> Fix:
     place = _where(where, "fix")
     if axis is None:
         return Fix(place, None)
-    return Fix(place, whole(axis, f"fix({_name(where)}): axis", least=0, most=2))
+    return Fix(place, whole(axis, f"fix({shown(where)}): axis", least=0, most=2))
 
 
 def displacement(where: Where, value: Value) -> Displacement:
@@ -299,6 +300,28 @@ def evaluate_stress(value: Any, x: Floats) -> Floats:
     return result
 
 
+def check_vectors(given: Load | Support, dim: int) -> None:
+    """Raise where a point, vector or direction of a support or load does not suit the body.
+
+    Parameters
+    ----------
+    given : Load or Support
+    dim : int
+        Of the body.
+    """
+    kind = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", type(given).__name__).lower()  # as the function
+    for name in ("where", "value", "x", "force"):
+        value = getattr(given, name, None)
+        if isinstance(value, np.ndarray | tuple) and np.shape(value)[-1:] != (dim,):
+            raise ProblemError(
+                f"{kind}: {name} = {shown(value)} does not suit a body in {dim} dimensions: give "
+                f"{dim} numbers a row."
+            )
+    if isinstance(given, Fix) and given.axis is not None and given.axis >= dim:
+        axes = " or ".join(map(str, range(dim)))
+        raise ProblemError(f"fix: axis = {given.axis}: in {dim} dimensions axis is {axes}.")
+
+
 def _values(result: Any, what: str) -> Floats:
     """What a function returned: an array of real numbers; others are looked for later."""
     return numbers(result, f"{what}: the returned value", finite=False)
@@ -336,25 +359,22 @@ def _where(where: Where, what: str) -> Where:
 
 def _set_name(where: Any, what: str) -> str:
     if not isinstance(where, str):
-        raise ProblemError(f"{what}: {_name(where)} is not the name of a facet set.")
+        raise ProblemError(f"{what}: where = {shown(where)}: give the name of a facet set.")
     return where
-
-
-def _name(where: Any) -> str:
-    return f"{where!r:.80}"
 
 
 def _value(value: Value, what: str, none: bool = False) -> Value:
     if callable(value):
         return value
-    if none and isinstance(value, Sequence) and any(v is None for v in value):
+    given = none and isinstance(value, list | tuple) and any(v is None for v in value)
+    if given and len(value) in (2, 3):
         return tuple(
             None if v is None else number(v, f"{what}: value[{i}]") for i, v in enumerate(value)
         )
     vector = numbers(value, f"{what}: the value", (None,))
     if len(vector) not in (2, 3):
         raise ProblemError(
-            f"{what}: give a vector of 2 or 3 numbers or a function, not {_name(value)}."
+            f"{what}: value = {shown(value)}: give a vector of 2 or 3 numbers, or a function."
         )
     return frozen(vector)
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from xcrack.arrays import Floats
 from xcrack.errors import ProblemError
-from xcrack.inputs import number
+from xcrack.inputs import number, numbers, shown
 
 _PLANES = ("strain", "stress")
 
@@ -48,7 +48,7 @@ class Isotropic:
             )
         if not (self.plane is None or (isinstance(self.plane, str) and self.plane in _PLANES)):
             raise ProblemError(
-                f'Isotropic(plane={self.plane!r:.80}): give "strain" or "stress" in 2D, nothing '
+                f'Isotropic(plane={shown(self.plane)}): give "strain" or "stress" in 2D, nothing '
                 "in 3D."
             )
 
@@ -75,14 +75,25 @@ class Isotropic:
 
     def stress(self, gradient: Floats) -> Floats:
         """Stress `(..., d, d)` of a displacement gradient `(..., d, d)` (row: component)."""
+        gradient = _tensors(gradient, "Isotropic.stress: gradient")
         strain = 0.5 * (gradient + np.swapaxes(gradient, -1, -2))
         trace = np.trace(strain, axis1=-2, axis2=-1)
         return 2 * self.mu * strain + self.lam * trace[..., None, None] * np.eye(strain.shape[-1])
 
     def strain(self, stress: Floats) -> Floats:
         """Strain `(..., d, d)` of an in-plane (or 3D) stress `(..., d, d)`."""
+        stress = _tensors(stress, "Isotropic.strain: stress")
         d = stress.shape[-1]
         trace = np.trace(stress, axis1=-2, axis2=-1)[..., None, None]
         return (stress - self.lam / (d * self.lam + 2 * self.mu) * trace * np.eye(d)) / (
             2 * self.mu
         )
+
+
+def _tensors(value: object, what: str) -> Floats:
+    tensors = numbers(value, what)
+    if tensors.shape[-2:] not in ((2, 2), (3, 3)):
+        raise ProblemError(
+            f"{what} has the shape {tensors.shape}: give (..., 2, 2) or (..., 3, 3)."
+        )
+    return tensors

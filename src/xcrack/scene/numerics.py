@@ -6,7 +6,7 @@ from functools import wraps
 from typing import Any
 
 from xcrack.errors import ProblemError
-from xcrack.inputs import number, whole
+from xcrack.inputs import number, shown, whole
 
 
 def _check_choices(given: object, **choices: tuple[object, ...]) -> None:
@@ -15,7 +15,7 @@ def _check_choices(given: object, **choices: tuple[object, ...]) -> None:
         value = getattr(given, name)
         if not any(type(value) is type(a) and value == a for a in allowed):
             words = " or ".join(repr(a) for a in allowed)
-            raise ProblemError(f"{type(given).__name__}({name}={value!r:.80}): give {words}.")
+            raise ProblemError(f"{type(given).__name__}({name}={shown(value)}): give {words}.")
 
 
 @dataclass(frozen=True)
@@ -160,7 +160,7 @@ class Numerics:
             whole(self.threads, "Numerics: threads", least=1)
         if not isinstance(self.comparison, Comparison):
             raise ProblemError(
-                f"Numerics: comparison = {self.comparison!r}: give Comparison(lips=...)."
+                f"Numerics: comparison = {shown(self.comparison)}: give Comparison(lips=...)."
             )
         if self.comparison.tip_basis == "vectorial" and self.functions != 4:
             raise ProblemError(
@@ -185,7 +185,7 @@ def _name_moved(cls: type) -> None:
             if name in named:
                 raise ProblemError(
                     f"Numerics({name}=...) is for comparison with other methods: give "
-                    f"Numerics(comparison=Comparison({name}={named[name]!r}))."
+                    f"Numerics(comparison=Comparison({name}={shown(named[name])}))."
                 )
         make(self, *values, **named)
 

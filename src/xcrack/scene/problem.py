@@ -1,6 +1,6 @@
 """The scene: body, cracks, supports and loads, checked before anything is built."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from numbers import Real
@@ -11,7 +11,7 @@ import numpy as np
 from xcrack.crack.crack import Crack
 from xcrack.crack.placing import check_cracks, placed
 from xcrack.errors import ProblemError
-from xcrack.inputs import number, whole
+from xcrack.inputs import entries, number, shown, whole
 from xcrack.mesh.holes import round_hole
 from xcrack.mesh.mesh import Mesh
 from xcrack.mesh.sets import facet_set
@@ -22,6 +22,7 @@ from xcrack.scene.conditions import (
     InitialStress,
     Load,
     Support,
+    check_vectors,
 )
 from xcrack.scene.material import Isotropic
 from xcrack.scene.numerics import Numerics
@@ -81,19 +82,15 @@ class Problem:
                 )
         for name in ("cracks", "supports", "loads"):
             given = getattr(self, name)
-            if isinstance(given, str) or not isinstance(given, Iterable):
-                raise ProblemError(
-                    f"{name}: give a list, such as {name}=[...], not {type(given).__name__}."
-                )
-            object.__setattr__(self, name, tuple(given))
+            object.__setattr__(self, name, entries(given, f"Problem: {name}"))
         if (self.material.plane is None) is _PLANE[self.mesh.dim]:
             raise ProblemError(_WRONG_PLANE[self.mesh.dim].format(self.material.plane))
         if self.order is None:
             object.__setattr__(self, "order", _ORDER[self.mesh.dim])
-        if isinstance(self.order, bool) or self.order not in (1, 2):
-            raise ProblemError(f"order = {self.order!r:.80}: give 1 or 2.")
+        if type(self.order) is bool or not isinstance(self.order, Real) or self.order not in (1, 2):
+            raise ProblemError(f"order = {shown(self.order)}: give 1 or 2.")
         if not isinstance(self.contact, str) or self.contact not in ("auto", "on", "off"):
-            raise ProblemError(f'contact = {self.contact!r:.80}: give "auto", "on" or "off".')
+            raise ProblemError(f'contact = {shown(self.contact)}: give "auto", "on" or "off".')
         self._check_members()
         check_cracks(self.placed, self.mesh)
 
@@ -111,9 +108,10 @@ class Problem:
                 return self._acting, number(state, "load state")
             except ProblemError as error:
                 raise ProblemError(f"{str(error)[:-1]}, or a list of loads.") from None
-        if not isinstance(state, Iterable):
-            raise ProblemError(f"load state {state!r:.80}: give a number or a list of loads.")
-        loads = tuple(state)
+        try:
+            loads = entries(state, "load state")
+        except ProblemError as error:
+            raise ProblemError(f"{str(error)[:-1]} of loads, or a number.") from None
         for load in loads:
             self._check_load(load)
         body = tuple(load for load in self.loads if isinstance(load, InitialStress))
@@ -130,7 +128,7 @@ class Problem:
         for crack in self.cracks:
             if not isinstance(crack, Crack):
                 raise ProblemError(
-                    f"cracks: {crack!r} is not a Crack; make one by line_crack(...)."
+                    f"cracks: {shown(crack)} is not a Crack; make one by line_crack(...)."
                 )
         for support in self.supports:
             if not isinstance(support, Fix | Displacement):
@@ -138,6 +136,7 @@ class Problem:
                     f"supports: {type(support).__name__} is not a support; give fix(...) or "
                     "displacement(...), and put forces into loads."
                 )
+            check_vectors(support, self.mesh.dim)
             if isinstance(support.where, str):
                 facet_set(self.mesh, support.where, type(support).__name__.lower())
         for load in self.loads:
@@ -146,13 +145,15 @@ class Problem:
     def _check_load(self, load: Any) -> None:
         if not isinstance(load, Load):
             raise ProblemError(
-                f"loads: {load!r:.80} is not a load; see traction(...), pressure(...)."
+                f"loads: {shown(load)} is not a load; see traction(...), pressure(...)."
             )
         where = getattr(load, "where", None)
         if isinstance(where, str):
             facet_set(self.mesh, where, type(load).__name__.lower())
         if isinstance(load, Bearing | Resultant):
             check_dimension(load, self.mesh.dim)
+        else:
+            check_vectors(load, self.mesh.dim)
         if isinstance(load, Bearing):
             what = f"bearing({load.where!r})"
             round_hole(self.mesh, facet_set(self.mesh, load.where, what), what)
@@ -160,14 +161,14 @@ class Problem:
             supported = [s.where for s in self.supports]
             if not any(_same(where, h) for h in supported):
                 raise ProblemError(
-                    f"displacement({where!r}) among the loads gives a new value to a support, but "
-                    "nothing is supported there: put it into supports first."
+                    f"displacement({shown(where)}) among the loads gives a new value to a support, "
+                    "but nothing is supported there: put it into supports first."
                 )
         if isinstance(load, CrackPressure) and load.crack is not None:
             if not 0 <= load.crack < len(self.cracks):
                 raise ProblemError(
-                    f"crack_pressure(crack={load.crack}): the problem has {len(self.cracks)} "
-                    "crack(s), numbered from 0."
+                    f"crack_pressure(crack={shown(load.crack)}): the problem has "
+                    f"{len(self.cracks)} crack(s), numbered from 0."
                 )
 
 
@@ -183,8 +184,13 @@ def crack_number(problem: Problem, crack: Any, what: str) -> int:
     """A crack of the problem by number, checked."""
     n = len(problem.cracks)
     if not n:
-        raise ProblemError(f"{what}: crack {crack!r:.80}: the problem has no crack.")
-    return whole(crack, f"{what}: crack", least=0, most=n - 1)
+        raise ProblemError(f"{what}: crack {shown(crack)}: the problem has no crack.")
+    index = whole(crack, f"{what}: crack", least=0)
+    if index >= n:
+        raise ProblemError(
+            f"{what}: crack {shown(index)}: the problem has {n} crack(s), numbered from 0."
+        )
+    return index
 
 
 def _same(a: Any, b: Any) -> bool:

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from xcrack.arrays import Bools, Floats, Ints, lock
+from xcrack.errors import ProblemError
+from xcrack.inputs import numbers, shown, whole_numbers
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,6 +40,11 @@ class SIF:
         crack without multipliers.
     domain_cells : (f,) array
         Outer radius of the larger domain, in cells; few of them mean a domain that is clipped.
+
+    Raises
+    ------
+    ProblemError
+        Arrays of other types, or that do not fit each other.
     """
 
     x: Floats
@@ -50,6 +57,24 @@ class SIF:
     at_surface: Bools
     closed: Bools
     domain_cells: Floats
+
+    def __post_init__(self) -> None:
+        x = numbers(self.x, "SIF: x", (None, None))
+        n, d = x.shape
+        if d not in (2, 3):
+            raise ProblemError(f"SIF: x has the shape {x.shape}: give (n, 2) or (n, 3).")
+        numbers(self.frame, "SIF: frame", (n, d, d))
+        for name in ("K", "spread"):
+            numbers(getattr(self, name), f"SIF: {name}", (n, d), finite=False)
+        for name in ("T", "s", "domain_cells"):
+            numbers(getattr(self, name), f"SIF: {name}", (n,), finite=False)
+        whole_numbers(self.front, "SIF: front", (n,))
+        for name in ("at_surface", "closed"):
+            flags = getattr(self, name)
+            if not isinstance(flags, np.ndarray) or flags.dtype != bool or flags.shape != (n,):
+                raise ProblemError(
+                    f"SIF: {name} = {shown(flags)}: give an array of bool of shape ({n},)."
+                )
 
     @property
     def K_I(self) -> Floats:

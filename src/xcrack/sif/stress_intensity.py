@@ -8,7 +8,7 @@ import numpy as np
 
 from xcrack.analysis.solution import Solution
 from xcrack.errors import ProblemError
-from xcrack.inputs import whole
+from xcrack.inputs import shown, whole
 from xcrack.sif.domain_2d import tip_intensity
 from xcrack.sif.domain_3d import front_intensity
 from xcrack.sif.sif import SIF, joined
@@ -81,7 +81,7 @@ def stress_intensities(solutions: Sequence[Solution], crack: int = 0) -> list[SI
     crack = whole(crack, "crack")
     if not 0 <= crack < len(space.cuts):
         raise ProblemError(
-            f"crack {crack}: the problem has {len(space.cuts)} crack(s), numbered from 0."
+            f"crack {shown(crack)}: the problem has {len(space.cuts)} crack(s), numbered from 0."
         )
     # Cycles from nothing are the most common ones: their lower state has no K to look for.
     live = [s for s in solutions if not s.at_rest] or solutions[:1]
@@ -109,7 +109,7 @@ def _checked(solutions: Any) -> list[Solution]:
             f"stress_intensities takes a list of solutions, not a {type(solutions).__name__}."
         ) from None
     if not result:
-        raise ProblemError("stress_intensities: the list of solutions is empty.")
+        raise ProblemError("stress_intensities: the list of solutions is empty: give at least one.")
     for k, solution in enumerate(result):
         if not isinstance(solution, Solution):
             raise ProblemError(

@@ -9,7 +9,7 @@ import scipy.sparse as sp
 
 from xcrack.arrays import Bools, Floats, Ints
 from xcrack.errors import ConvergenceError, ProblemError, warn
-from xcrack.inputs import called, numbers
+from xcrack.inputs import called, numbers, shown
 from xcrack.scene.material import Isotropic
 from xcrack.scene.numerics import Numerics
 from xcrack.solvers.active_set import active_set
@@ -51,8 +51,11 @@ def pardiso(A: sp.csc_matrix) -> Solve:
     Raises
     ------
     ProblemError
-        pypardiso is not installed: the extra ``pardiso``, for x86-64.
+        Not a square sparse matrix, or pypardiso is not installed: the extra ``pardiso``, for
+        x86-64.
     """
+    if not sp.issparse(A) or A.ndim != 2 or A.shape[0] != A.shape[1]:
+        raise ProblemError(f"pardiso: A = {shown(A)}: give a sparse symmetric matrix (n, n).")
     if find_spec("pypardiso") is None:
         raise ProblemError("solver=pardiso needs pypardiso: pip install 'xcrack[pardiso]'.")
     import pypardiso
@@ -263,7 +266,7 @@ def _verified(solver: Solver, A: sp.csc_matrix) -> Solve:
     solve = called(solver, "solver=", A)
     if not callable(solve):
         raise ProblemError(
-            f"solver returned {solve!r:.80}: it must return a function of right-hand sides."
+            f"solver returned {shown(solve)}: it must return a function of right-hand sides."
         )
 
     def verified(b: Floats) -> Floats:

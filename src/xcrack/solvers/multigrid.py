@@ -17,6 +17,7 @@ import scipy.sparse as sp
 
 from xcrack.arrays import Bools, Floats, Ints, lock
 from xcrack.mesh.simplex import node_points
+from xcrack.optional import required
 from xcrack.solvers.basis import stars
 from xcrack.solvers.row_blocks import Bordered, RowBlocks, row_blocks
 from xcrack.solvers.schwarz import Patches
@@ -314,12 +315,12 @@ def _prolongator(
     A: sp.bsr_matrix, diagonal: Floats, largest: float, candidates: Floats
 ) -> tuple[sp.bsr_matrix, Floats]:
     """Aggregates whose motions are smoothed once, and the motions of the next level."""
-    from pyamg.aggregation import fit_candidates, standard_aggregation
-
+    instead = 'Numerics(linear="direct") does without it.'
+    aggregation = required("pyamg.aggregation", "a large 3D body", instead)
     n = A.shape[0] // A.blocksize[0]
     ones = np.ones(len(A.indices))
     graph = sp.csr_matrix((ones, A.indices, A.indptr), shape=(n, n))
-    T, coarse = fit_candidates(standard_aggregation(graph)[0], candidates)
+    T, coarse = aggregation.fit_candidates(aggregation.standard_aggregation(graph)[0], candidates)
     T = sp.bsr_matrix(T)
     damped = sp.diags(_OMEGA * _SAFETY / largest * _reciprocal(diagonal))
     P = T - sp.bsr_matrix(damped @ A, blocksize=A.blocksize) @ T

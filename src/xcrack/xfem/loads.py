@@ -4,6 +4,7 @@ import numpy as np
 
 from xcrack.arrays import Floats, Ints
 from xcrack.errors import ProblemError
+from xcrack.inputs import shown
 from xcrack.mesh.holes import round_hole
 from xcrack.mesh.sets import facet_set, nearest_point
 from xcrack.scene.conditions import (
@@ -106,7 +107,7 @@ def facet_points(space: FunctionSpace, facets: Ints, n: int = 6) -> tuple[Points
 
 
 def _add_traction(f: Floats, space: FunctionSpace, load: SetLoad) -> None:
-    what = f"{type(load).__name__.lower()}({load.where!r})"
+    what = f"{type(load).__name__.lower()}({shown(load.where)})"
     facets = facet_set(space.mesh, load.where, what)
     inner = space.mesh.facet_to_cell[space.mesh.facet_numbers(facets), 1] >= 0
     if inner.any():

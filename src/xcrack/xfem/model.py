@@ -48,11 +48,8 @@ class Model:
 
 def build(problem: Problem, bulk_: Bulk | None = None) -> Model:
     """Cut, number, integrate and assemble a problem, without solving it."""
-    mesh, order = problem.mesh, problem.order or 1
-    cracks = problem.placed
-    cuts = tuple(cut(mesh, levels(mesh, crack, problem.numerics)) for crack in cracks)
-    space = function_space(mesh, order, cracks, cuts, problem.numerics)
-    lips = tuple(lip_points(space, c) for c in range(len(cracks)))
+    space, lips = discretised(problem)
+    mesh, order = space.mesh, space.order
     if (
         bulk_ is None
         or bulk_.mesh is not mesh
@@ -71,6 +68,14 @@ def build(problem: Problem, bulk_: Bulk | None = None) -> Model:
         known_unknowns(space, tuple(problem.supports)),
         n_points,
     )
+
+
+def discretised(problem: Problem) -> tuple[FunctionSpace, tuple[LipPoints, ...]]:
+    """Function space of a problem, and the points on the faces of its cracks: nothing assembled."""
+    mesh, cracks = problem.mesh, problem.placed
+    cuts = tuple(cut(mesh, levels(mesh, crack, problem.numerics)) for crack in cracks)
+    space = function_space(mesh, problem.order or 1, cracks, cuts, problem.numerics)
+    return space, tuple(lip_points(space, c) for c in range(len(cracks)))
 
 
 def levels(mesh: Mesh, crack: Crack, numerics: Numerics) -> LevelSet:

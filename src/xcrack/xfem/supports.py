@@ -6,6 +6,7 @@ import numpy as np
 
 from xcrack.arrays import Bools, Floats, Ints
 from xcrack.errors import ProblemError
+from xcrack.inputs import shown
 from xcrack.mesh.sets import facet_set, nearest_point
 from xcrack.mesh.simplex import facet_nodes
 from xcrack.scene.conditions import Displacement, Fix, evaluate
@@ -54,8 +55,6 @@ def known_unknowns(space: FunctionSpace, supports: tuple[Fix | Displacement, ...
         if isinstance(support, Fix):
             functions = _functions_of(space, support.where, "fix")
             axes = range(space.dim) if support.axis is None else [support.axis]
-            if support.axis is not None and support.axis >= space.dim:
-                raise ProblemError(f"fix(axis={support.axis}): the body is plane, axis is 0 or 1.")
             for axis in axes:
                 _impose(space, fixed, value, fitted, functions, axis, np.zeros(len(functions)), 0)
         else:
@@ -138,9 +137,9 @@ def _check_ends(space: FunctionSpace, where: str, facets: Ints, what: str) -> No
         if bad.any():
             x = np.round(space.mesh.points[np.argmax(bad)], 6).tolist()
             raise ProblemError(
-                f"{what}({where!r}) ends at {x}, where crack {c} meets the boundary, and supports "
-                "its lip - only: give the points of the crack in the reverse order (the supported "
-                "lip is then lip +), or move its mouth by a thousandth of a cell."
+                f"{what}({shown(where)}) ends at {x}, where crack {c} meets the boundary, and "
+                "supports its lip - only: give the points of the crack in the reverse order (the "
+                "supported lip is then lip +), or move its mouth by a thousandth of a cell."
             )
 
 
@@ -164,7 +163,7 @@ def _traces(space: FunctionSpace, facets: Ints) -> tuple[Points, Ints, Ints, Flo
 def _imposed(space: FunctionSpace, support: Displacement) -> list[tuple[int, Ints, Floats, int]]:
     """Axis, functions, values and number of fitted values of an imposed displacement."""
     nodes = _set_nodes(space, support.where, "displacement")
-    what = f"displacement({support.where!r})"
+    what = f"displacement({shown(support.where)})"
     value = support.value
     axes = list(range(space.dim))
     if isinstance(value, tuple):

@@ -1,18 +1,18 @@
 """The picture of a chart: error against time."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from xcrack.charting.result import Chart, Row
+from xcrack.charting.result import Chart, Row
+from xcrack.plotting.figures import finished, new_figure, picture_path, wants_window
 
 _MARKERS = "osD^vP"
 _BELOW = 0.5  # the picture ends at this share of the error of the reference
 
 
-def draw(chart: "Chart", file: str | Path | None, show: bool | None) -> Any:
+def draw(chart: Chart, file: str | Path | None, show: bool | None) -> Any:
     """Draw a chart; returns the figure, or the path of the file where there is one.
 
     Parameters
@@ -21,32 +21,20 @@ def draw(chart: "Chart", file: str | Path | None, show: bool | None) -> Any:
     file : path or None
     show : bool or None
         None: only without a file.
+
+    Raises
+    ------
+    ProblemError
+        No path, a format that matplotlib does not know, or a file that cannot be written.
     """
-    show = file is None if show is None else show
-    size = (8.2, 4.9)
-    if show:
-        from matplotlib import pyplot
-
-        figure = pyplot.figure(figsize=size, layout="constrained")
-    else:
-        from matplotlib.figure import Figure
-
-        figure = Figure(figsize=size, layout="constrained")
+    target = picture_path(file, "Chart.plot")
+    window = wants_window(show, target, "Chart.plot")
+    figure = new_figure((8.2, 4.9), window, "Chart.plot")
     _axes(chart, figure.add_subplot())
-    path = None
-    if file is not None:
-        path = Path(file)
-        path = path if path.suffix else path.with_suffix(".png")
-        path.parent.mkdir(parents=True, exist_ok=True)
-        figure.savefig(path, dpi=160)
-    if show:
-        from matplotlib import pyplot
-
-        pyplot.show()
-    return figure if path is None else path
+    return finished(figure, target, window, dpi=160)
 
 
-def _axes(chart: "Chart", axes: Any) -> None:
+def _axes(chart: Chart, axes: Any) -> None:
     floor = chart.reference_error
     bottom, top = _limits(chart)
     axes.axhspan(bottom, floor, color="0.9", lw=0, zorder=0)
@@ -87,7 +75,7 @@ def _axes(chart: "Chart", axes: Any) -> None:
     _legend(chart, axes, names)
 
 
-def _setting(chart: "Chart", axes: Any, rows: list["Row"], color: str) -> None:
+def _setting(chart: Chart, axes: Any, rows: list[Row], color: str) -> None:
     """One curve a setting, one marker a mesh; hollow where the reference cannot tell."""
     if not rows:
         return
@@ -109,7 +97,7 @@ def _setting(chart: "Chart", axes: Any, rows: list["Row"], color: str) -> None:
         )
 
 
-def _wanted(chart: "Chart", axes: Any) -> None:
+def _wanted(chart: Chart, axes: Any) -> None:
     if chart.wanted is None:
         return
     axes.axhline(chart.wanted, color="black", lw=0.9, ls="--", zorder=1)
@@ -136,7 +124,7 @@ def _wanted(chart: "Chart", axes: Any) -> None:
         )
 
 
-def _legend(chart: "Chart", axes: Any, names: list[str]) -> None:
+def _legend(chart: Chart, axes: Any, names: list[str]) -> None:
     """Settings by colour, meshes by marker, and what else is drawn."""
     from matplotlib.lines import Line2D
 
@@ -181,7 +169,7 @@ def _time_ticks(axes: Any) -> None:
     axes.xaxis.set_minor_formatter(NullFormatter())
 
 
-def _limits(chart: "Chart") -> tuple[float, float]:
+def _limits(chart: Chart) -> tuple[float, float]:
     largest = max([chart.shown(row) for row in chart.good] + [chart.wanted or 0.0])
     lowest = min(chart.reference_error, chart.wanted or np.inf)
     return _BELOW * lowest, 2.0 * largest
