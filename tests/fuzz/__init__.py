@@ -1,0 +1,1 @@
+"""Wrong input for every public name."""

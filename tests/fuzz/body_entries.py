@@ -1,0 +1,322 @@
+"""Meshes, and files of them."""
+
+from pathlib import Path
+
+import numpy as np
+
+import xcrack as xc
+from fuzz import scenes
+from fuzz.entry import Entry, Late, arg
+from fuzz.kinds import (
+    Filename,
+    Number,
+    Numbers,
+    Of,
+    Seen,
+    Whole,
+    Word,
+)
+from fuzz.scene_rules import SQUARE
+from fuzz.values import paths
+
+TWO = ((0, 1, 2), (0, 2, 3))
+
+
+def square(x):
+    """Whether four points suit the two triangles."""
+    if x.shape != (4, 2):
+        return False
+    with np.errstate(over="ignore"):
+        one, two = (np.linalg.det(x[[b, c]] - x[0]) for b, c in ((1, 2), (2, 3)))
+    return bool(one * two > 0)
+
+
+def upper(x):
+    """Whether an upper corner of a box suits both lower ones, or one of them."""
+    return bool((x > 0).all()) or (None if (x > (-1.0, -0.5)).all() else False)
+
+
+def axis_sets(value):
+    """Whether a value may be sets by name: of none is known more."""
+    if not isinstance(value, dict):
+        return False
+    return (
+        True if not value else value.keys() == {"a"} and {} != value and value["a"] in ([(0, 1)],)
+    )
+
+
+def holes(value):
+    """Whether a value is a list of round holes; whether they fit is no business of this table."""
+    if isinstance(value, str | dict) or not hasattr(value, "__iter__"):
+        return False
+    if isinstance(value, np.ndarray) and not value.ndim:
+        return False
+    return True if not list(value) else False
+
+
+def _read_mesh(path):
+    xc.write_mesh("there.msh", scenes.mesh(), msh_version="2.2")
+    text = Path("there.msh").read_text()
+    for name, content in _damaged(text).items():
+        Path(f"{name}.msh").write_text(content)
+    return xc.read_mesh(path)
+
+
+def _damaged(text):
+    """Texts of mesh files that cannot be read."""
+    half = text[: len(text) // 2]
+    return {
+        "empty": "",
+        "half": half,
+        "words": "no mesh at all\n" * 20,
+        "letters": text.replace(".5", ".x"),
+        "points": text.replace("$Elements", "$Elementary"),
+        "number": text.replace(" 3 2 ", " 3 -7 "),
+    }
+
+
+DAMAGED = {name: lambda name=name: f"{name}.msh" for name in _damaged("")}
+
+
+def _read_surface(path):
+    corners = ((0, 0, 0), (1, 0, 0), (0, 1, 0))
+    lines = "\n".join("vertex {} {} {}".format(*x) for x in corners)
+    Path("there.stl").write_text(
+        f"solid a\nfacet normal 0 0 1\nouter loop\n{lines}\nendloop\nendfacet\nendsolid a\n"
+    )
+    return xc.read_surface(path)
+
+
+LINE = [(0.5, 0.0), (1.0, 0.0)]
+
+PLATE = {
+    "size": arg(Number(above=0, rule=lambda v: 0.5 <= v <= 1.0 or None), 1.0, 0.8),
+    "size_near": arg(
+        Number(optional=True, rule=lambda v: 0.3 <= v <= 0.8 or (None if 0 < v <= 1.0 else False)),
+        None,
+        0.5,
+    ),
+    "along": arg(Numbers((None, 2), optional=True, rule=lambda x: None), None, LINE, [LINE]),
+    "band": arg(Number(optional=True, rule=lambda v: v >= 0 and (v < 1 or None)), None, 0.3),
+    "transition": arg(Number(optional=True, rule=lambda v: v >= 0 and (v > 0.1 or None)), None, 2),
+}
+
+BAR = {
+    "diameter": 20.0,
+    "length": 140.0,
+    "notch_depth": 2.0,
+    "notch_angle": 1.0,
+    "outer_span": 120.0,
+    "inner_span": 40.0,
+    "size": 8.0,
+}
+
+ENTRIES = [
+    Entry(
+        "Mesh",
+        xc.Mesh,
+        {
+            "points": arg(
+                Numbers((None, 2), rule=square),
+                SQUARE,
+                near={
+                    "1e200": lambda: 1e200 * np.array(SQUARE),
+                    "ints": lambda: [[0, 0], [1, 0], [1, 1], [0, 1]],
+                    "same": lambda: [[0.5, 0.5]] * 4,
+                    "flat": lambda: [[k, 2.0 * k] for k in range(4)],
+                    "3D": lambda: np.ones((4, 3)),
+                    "one more": lambda: [*SQUARE, (2.0, 2.0)],
+                },
+            ),
+            "cells": arg(
+                Numbers(
+                    (None, 3),
+                    whole=True,
+                    least=0,
+                    most=3,
+                    rule=lambda c: (
+                        c.tolist() in ([list(row) for row in TWO], [[2, 1, 0], [0, 2, 3]])
+                    ),
+                ),
+                TWO,
+                [[2, 1, 0], [0, 2, 3]],
+                near={
+                    "twice": lambda: [(0, 1, 2), (0, 1, 2), (0, 2, 3)],
+                    "floats": lambda: np.array(TWO) + 0.5,
+                    "overlapping": lambda: [(0, 1, 2), (0, 1, 3)],
+                    "empty": lambda: np.zeros((0, 3), int),
+                },
+            ),
+            "facet_sets": arg(
+                Seen(rule=axis_sets),
+                {},
+                {"a": [(0, 1)]},
+                words=["facet set", "sets"],
+                near={
+                    "diagonal": lambda: {"a": [(1, 3)]},
+                    "no name": lambda: {1: [(0, 1)]},
+                    "list": lambda: [("a", [(0, 1)])],
+                    "boundary": lambda: {"boundary": [(0, 1)]},
+                },
+            ),
+            "cell_sets": arg(
+                Seen(rule=lambda v: isinstance(v, dict) and not v),
+                {},
+                words=["cell set", "sets"],
+                near={
+                    "beyond": lambda: {"a": [2]},
+                    "texts": lambda: {"a": ["b"]},
+                    "none": lambda: {"a": None},
+                },
+            ),
+        },
+    ),
+    Entry(
+        "Mesh",
+        lambda facets: scenes.mesh().facet_numbers(facets),
+        {
+            "facets": arg(
+                Numbers(
+                    (None, 2),
+                    whole=True,
+                    rule=lambda f: True if ((f >= 0) & (f < 49)).all() else None,
+                ),
+                [[0, 1]],
+                np.zeros((0, 2), int),
+            )
+        },
+    ),
+    Entry(
+        "box",
+        xc.box,
+        {
+            "lower": arg(
+                Numbers(
+                    (2,), rule=lambda x: bool(x[0] < 1 and x[1] < 2) and (bool(x[1] < 1.5) or None)
+                ),
+                (0, 0),
+                [-1.0, -0.5],
+            ),
+            "upper": arg(Numbers((2,), rule=upper), (1, 2), [1.0, 1.5]),
+            "n": arg(Whole(least=1, also=(Numbers((2,), whole=True, least=1),)), 3, (2, 3)),
+        },
+    ),
+    Entry("refine", xc.refine, {"mesh": arg(Of(type=xc.Mesh), Late(scenes.mesh))}),
+    Entry(
+        "read_mesh",
+        _read_mesh,
+        {
+            "path": arg(
+                Filename(known=("there.msh",)),
+                "there.msh",
+                near=paths(".msh", ".msh") | DAMAGED,
+                words=["mesh file", "triangles"],
+            )
+        },
+        in_folder=True,
+    ),
+    Entry(
+        "read_surface",
+        _read_surface,
+        {
+            "path": arg(
+                Filename(known=("there.stl",)),
+                "there.stl",
+                near=paths(".stl", ""),
+                words=["surface"],
+            )
+        },
+        in_folder=True,
+    ),
+    Entry(
+        "write_mesh",
+        xc.write_mesh,
+        {
+            "path": arg(
+                Filename(endings=(".msh", ".inp", ".vtu", ".vtk"), bare=False, makes=False),
+                "good.msh",
+                "good.vtu",
+                "good.inp",
+                near=paths(".msh", ".msh"),
+                words=["mesh file", "mesh cannot", "folder", "cannot write"],
+            ),
+            "mesh": arg(Of(type=xc.Mesh), Late(scenes.mesh), Late(lambda: scenes.mesh(3))),
+            "msh_version": arg(Word(words=("4.1", "2.2")), "4.1", "2.2", words=["version"]),
+        },
+        in_folder=True,
+    ),
+    Entry(
+        "plate",
+        lambda **named: xc.plate(named.pop("width"), named.pop("height"), **named),
+        {
+            "width": arg(
+                Number(above=0, rule=lambda v: 2 <= v <= 20 or None), 4.0, 5, words=["size", "hole"]
+            ),
+            "height": arg(
+                Number(above=0, rule=lambda v: 2 <= v <= 20 or None), 3.0, 4, words=["size", "hole"]
+            ),
+            "lower": arg(Numbers((2,), rule=lambda x: None), (0.0, 0.0)),
+            "holes": arg(
+                Seen(rule=holes),
+                (),
+                words=["hole"],
+                near={
+                    "far": lambda: [((50.0, 50.0), 1.0)],
+                    "negative": lambda: [((2, 1.5), -0.2)],
+                    "texts": lambda: [("a", 1.0)],
+                    "no pair": lambda: [(1.0, 2.0, 3.0)],
+                    "nan": lambda: [((np.nan, 1.0), 0.3)],
+                    "overlapping": lambda: [((2, 1.5), 0.5), ((2.2, 1.5), 0.5)],
+                },
+            ),
+            **PLATE,
+        },
+        cost=0.1,
+    ),
+    Entry(
+        "plate_with_hole",
+        xc.plate_with_hole,
+        {
+            "width": arg(
+                Number(above=0, rule=lambda v: 4 <= v <= 20 or None),
+                6.0,
+                words=["size", "hole", "plate"],
+            ),
+            "height": arg(
+                Number(above=0, rule=lambda v: 4 <= v <= 20 or None),
+                5.0,
+                words=["size", "hole", "plate"],
+            ),
+            "radius": arg(
+                Number(above=0.0, below=2.0, rule=lambda v: v >= 0.4 or None), 0.8, words=["hole"]
+            ),
+            "center": arg(
+                Numbers((2,), rule=lambda x: True if np.abs(x).max() < 1 else None),
+                (0.0, 0.0),
+                words=["centre"],
+            ),
+            **PLATE,
+        },
+        cost=0.2,
+    ),
+    Entry(
+        "notched_cylinder",
+        xc.notched_cylinder,
+        {
+            **{
+                name: arg(
+                    Number(rule=lambda v, good=value: None if 0 < v <= 2 * good else False),
+                    value,
+                    words=["station", "size", "notch", "bar", "patch", "span", "inner", "outer"],
+                )
+                for name, value in BAR.items()
+            },
+            **{
+                name: arg(Number(optional=True, rule=lambda v: None if v >= 0 else False), None)
+                for name in ("size_near", "patch_length", "crack_depth", "band", "transition")
+            },
+        },
+        cost=2.0,
+    ),
+]
+HOOKS = []

@@ -1,0 +1,388 @@
+"""Files, pictures and charts."""
+
+import numpy as np
+
+import xcrack as xc
+from fuzz import scenes
+from fuzz.entry import Entry, Hook, Late, arg
+from fuzz.kinds import (
+    Called,
+    Filename,
+    Flag,
+    ListOf,
+    Number,
+    Of,
+    Seen,
+    Whole,
+    Word,
+    array,
+)
+from fuzz.values import paths
+
+PICTURE = arg(
+    Filename(optional=True, endings=(".png", ".pdf", ".svg", ".jpg")),
+    "good.png",
+    near=paths(".png", ".png"),
+    words=["picture"],
+)
+NO_WINDOW = arg(Flag(optional=True, rule=None), False)
+TITLE = arg(Word(optional=True), None, "a title")
+HISTORIES = ListOf(item=Of(type=xc.History), least=1, also=(Of(type=xc.History),))
+SOLVED = Seen(rule=lambda v: isinstance(v, xc.Solution))
+FIELDS = (
+    "von_mises",
+    "sxx",
+    "syy",
+    "sxy",
+    "displacement",
+    "ux",
+    "uy",
+    "pressure",
+    "opening",
+    "mesh",
+)
+
+
+class Shown(Flag):
+    """A flag that must not open a window here."""
+
+    def _own(self, value):
+        from fuzz.kinds import SKIP
+
+        return SKIP if value is True or value is None else super()._own(value)
+
+    def verdict(self, value):
+        return self._own(value)
+
+
+WINDOW = arg(Shown(), False)
+
+
+def limits(value):
+    """Whether a value is a pair that grows."""
+    x = array(value)
+    return value is None or (
+        x is not None and x.shape == (2,) and bool(np.isfinite(x).all()) and bool(x[0] < x[1])
+    )
+
+
+def names(n):
+    """Kind of labels for n things."""
+    one = (Word(),) if n == 1 else ()
+    return ListOf(optional=True, item=Word(), least=n, most=n, also=one)
+
+
+def modes(value):
+    """Whether a value names modes."""
+    if isinstance(value, str):
+        return value in ("I", "II", "III")
+    return (
+        None
+        if isinstance(value, dict | set)
+        else isinstance(value, list | tuple)
+        and len(value) > 0
+        and all(isinstance(v, str) and v in ("I", "II", "III") for v in value)
+    )
+
+
+def settings(value):
+    """Whether a value is settings of a chart: of none of the general ones."""
+    return None if isinstance(value, dict) and not value else value is None or False
+
+
+def _three_d(value):
+    if isinstance(value, xc.History):
+        return bool(value.steps) and value.steps[0].cracks[0].dim == 3
+    return None if isinstance(value, list | tuple) else False
+
+
+def _charted(**changes):
+    given = {
+        "settings": [{"order": 1}],
+        "repeat": 1,
+        "seconds": 0.05,
+        "progress": False,
+        "meshes": [scenes.mesh(), scenes.fine_mesh()],
+    }
+    chart = xc.chart(scenes.problem(), **given | changes)
+    return [chart.reference_error, *(row.error for row in chart.rows if not row.failed)]
+
+
+ENTRIES = [
+    Entry(
+        "write",
+        xc.write,
+        {
+            "solution": arg(Of(type=xc.Solution), Late(scenes.solution), words=["Solution"]),
+            "path": arg(
+                Filename(rule=None, endings=()),
+                "good",
+                "good.vtu",
+                near=paths(".vtu", ".vtu"),
+                words=["solution cannot"],
+            ),
+            "sif": arg(
+                ListOf(
+                    optional=True, item=Of(type=xc.SIF), least=1, most=1, also=(Of(type=xc.SIF),)
+                ),
+                None,
+                Late(scenes.sif),
+            ),
+        },
+        in_folder=True,
+        cost=0.05,
+    ),
+    Entry(
+        "write",
+        lambda **named: xc.write(scenes.solution(3), **named),
+        {
+            "path": arg(Filename(), "good"),
+            "sif": arg(
+                Seen(rule=lambda v: v is None or v is scenes.sif(3)),
+                None,
+                Late(lambda: scenes.sif(3)),
+                words=["K"],
+            ),
+        },
+        in_folder=True,
+        cost=0.3,
+    ),
+    Entry(
+        "History",
+        lambda path: scenes.history().write(path),
+        {"path": arg(Filename(folder=True), "good", near=paths("", ""), words=["history"])},
+        in_folder=True,
+        cost=0.2,
+    ),
+    Entry(
+        "History",
+        lambda kind, file: scenes.history().plot(kind, file),
+        {
+            "kind": arg(Word(words=("K", "a", "path")), "K", "a", "path"),
+            "file": arg(
+                Filename(optional=True, endings=(".png", ".pdf", ".svg", ".jpg")),
+                "good.png",
+                near=paths(".png", ".png"),
+                words=["picture"],
+            ),
+        },
+        in_folder=True,
+        cost=0.4,
+    ),
+    Entry(
+        "plot",
+        xc.plot,
+        {
+            "solution": arg(SOLVED, Late(scenes.solution), words=["Solution", "Problem"]),
+            "field": arg(Word(words=FIELDS), "von_mises", "opening", "mesh", "ux"),
+            "file": PICTURE,
+            "warp": arg(Number(far=1e3), 0.0, 10.0),
+            "show": WINDOW,
+            "renderer": arg(Word(words=("auto", "pyvista", "matplotlib")), "matplotlib"),
+            "title": TITLE,
+            "edges": arg(Flag(), False, True),
+            "limits": arg(Seen(rule=limits), None, (0.0, 1.0)),
+            "cmap": arg(Word(optional=True, words=("RdBu", "viridis")), None, "RdBu"),
+            "crack": arg(Whole(optional=True, least=0, most=0), None, 0),
+            "clip": arg(Seen(rule=lambda v: v is None), None),
+            "view": arg(Seen(rule=lambda v: v is None), None),
+            "loads": arg(Flag(rule=None), False),
+        },
+        in_folder=True,
+        cost=0.6,
+    ),
+    Entry(
+        "plot",
+        lambda **named: xc.plot(
+            scenes.solution(3), "opening", file="a.png", show=False, renderer="matplotlib", **named
+        ),
+        {
+            "clip": arg(
+                Seen(rule=lambda v: True if v is None else False),
+                None,
+                near={
+                    "pair": lambda: ((0, 0, 0), (0, 0, 0)),
+                    "nan": lambda: ((0, 0, np.nan), (0, 0, 1)),
+                    "2D": lambda: ((0, 0), (0, 1)),
+                    "texts": lambda: ("a", "b"),
+                    "alone": lambda: ((0, 0, 0),),
+                },
+            ),
+            "view": arg(
+                Seen(
+                    rule=lambda v: (
+                        v is None
+                        or (
+                            (x := array(v)) is not None
+                            and x.shape == (3,)
+                            and bool(np.isfinite(x).all())
+                            and bool(x.any())
+                        )
+                    )
+                ),
+                None,
+            ),
+            "limits": arg(Seen(rule=limits), None),
+            "title": TITLE,
+            "crack": arg(Whole(optional=True, least=0, most=0), None),
+        },
+        in_folder=True,
+        cost=0.8,
+    ),
+    Entry(
+        "draw_fronts",
+        xc.draw_fronts,
+        {
+            "history": arg(
+                Seen(rule=_three_d), Late(lambda: scenes.history(3)), words=["steps", "crack"]
+            ),
+            "crack": arg(Whole(least=0, most=0), 0),
+            "plane": arg(
+                Seen(rule=lambda v: v is None),
+                None,
+                ((0, 0, 0), ((1, 0, 0), (0, 1, 0))),
+                near={
+                    "parallel": lambda: ((0, 0, 0), ((1, 0, 0), (2, 0, 0))),
+                    "nan": lambda: ((0, 0, np.nan), ((1, 0, 0), (0, 1, 0))),
+                    "2D": lambda: ((0, 0), ((1, 0), (0, 1))),
+                    "point": lambda: (0, 0, 0),
+                },
+            ),
+            "labels": arg(names(1), None, ["a"]),
+            "every": arg(Whole(least=1), 1),
+            "mesh": arg(Of(optional=True, type=xc.Mesh, rule=lambda v: v.dim == 3), None),
+            "file": PICTURE,
+            "show": WINDOW,
+            "title": TITLE,
+        },
+        in_folder=True,
+        cost=0.5,
+    ),
+    Entry(
+        "draw_K",
+        xc.draw_K,
+        {
+            "sif": arg(
+                Seen(rule=lambda v: isinstance(v, xc.SIF) and v.K.shape[1] == 3),
+                Late(lambda: scenes.sif(3)),
+                words=["K"],
+            ),
+            "front": arg(Whole(least=0, most=0), 0),
+            "labels": arg(names(1), None, ["a"]),
+            "modes": arg(Seen(rule=modes), ("I",), ("I", "II", "III")),
+            "file": PICTURE,
+            "show": WINDOW,
+            "title": TITLE,
+        },
+        in_folder=True,
+        cost=0.5,
+    ),
+    Entry(
+        "chart",
+        _charted,
+        {
+            "settings": arg(
+                Seen(rule=settings),
+                [{"order": 1}],
+                {"coarse": {"order": 1}},
+                near={
+                    "unknown field": lambda: [{"no_such": 1}],
+                    "mesh": lambda: [{"mesh": 1}],
+                    "twice": lambda: [{"order": 1}, {"order": 1}],
+                    "nonsense value": lambda: [{"order": 7}],
+                    "numbers": lambda: [{1: 2}],
+                    "texts": lambda: ["order"],
+                },
+                words=["order"],
+            ),
+            "meshes": arg(
+                Seen(rule=lambda v: None if v is None or callable(v) else False),
+                Late(lambda: [scenes.mesh(), scenes.fine_mesh()]),
+                near={
+                    "one": lambda: [scenes.mesh()],
+                    "falling": lambda: [scenes.fine_mesh(), scenes.mesh()],
+                    "3D": lambda: [scenes.mesh(3)] * 2,
+                },
+            ),
+            "states": arg(
+                ListOf(
+                    optional=True,
+                    item=Number(also=(Seen(rule=lambda v: v is None),)),
+                    least=1,
+                    rule=lambda v: None,
+                ),
+                None,
+                [1.0],
+                words=["load"],
+            ),
+            "quantity": arg(Called(optional=True), None, lambda found: 1.0 + np.size(found)),
+            "wanted": arg(Number(optional=True, above=0), None, 1e-2),
+            "repeat": arg(Whole(least=1, far=2), 1),
+            "seconds": arg(Number(above=0), 0.05),
+            "progress": arg(Flag(also=(Word(words=("always",)),)), False),
+            "file": arg(
+                Filename(optional=True, endings=(".png", ".pdf", ".svg", ".jpg")),
+                None,
+                near=paths(".png", ".png"),
+                words=["picture"],
+            ),
+        },
+        in_folder=True,
+        cost=0.6,
+    ),
+    Entry(
+        "chart",
+        lambda problem: xc.chart(problem),
+        {"problem": arg(Of(type=xc.Problem, rule=lambda v: None), near={"none": lambda: None})},
+        arity=False,
+        cost=8.0,
+    ),
+    Entry(
+        "chart",
+        lambda wanted: scenes.chart().best(wanted).wanted,
+        {"wanted": arg(Number(above=0), 1e-2)},
+    ),
+    Entry(
+        "chart",
+        lambda row: scenes.chart().shown(row),
+        {"row": arg(Seen(rule=lambda v: False), Late(lambda: scenes.chart().rows[0]))},
+    ),
+    Entry(
+        "chart",
+        lambda **named: scenes.chart().plot(**named),
+        {"file": PICTURE, "show": WINDOW},
+        in_folder=True,
+        cost=0.5,
+    ),
+    Entry(
+        "chart", lambda: [len(scenes.chart().table()), len(str(scenes.chart()))], {}, arity=False
+    ),
+]
+
+
+def _quantity(value):
+    """Whether a value is numbers, at least one."""
+    x = array(value)
+    return x is not None and bool(np.isfinite(x).all()) and x.size > 0 and bool(x.any())
+
+
+HOOKS = [
+    Hook(
+        "chart",
+        lambda f: _charted(quantity=f),
+        lambda found: found.energy,
+        Seen(rule=_quantity),
+        "quantity of chart",
+        cost=0.5,
+        in_folder=True,
+    ),
+    Hook(
+        "chart",
+        lambda f: _charted(meshes=f),
+        lambda size: xc.box((-1, -1), (1, 1), max(2, round(2 / size))),
+        Seen(rule=lambda v: False),
+        "meshes of chart",
+        cost=0.8,
+        in_folder=True,
+    ),
+]

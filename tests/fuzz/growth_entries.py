@@ -1,0 +1,324 @@
+"""Laws, cycles, steps, histories and runs."""
+
+import shutil
+from pathlib import Path
+
+import numpy as np
+
+import xcrack as xc
+from fuzz import scenes
+from fuzz.entry import Entry, Hook, Late, arg
+from fuzz.kinds import (
+    Called,
+    Filename,
+    Flag,
+    ListOf,
+    Number,
+    Numbers,
+    Of,
+    Seen,
+    Whole,
+    Word,
+    array,
+    items_of,
+)
+from fuzz.result_rules import LOAD, NOTHING, NU, fits
+from fuzz.values import paths
+from xcrack import testing
+
+ANY = Numbers()
+
+LAW = {
+    "dK_eq": arg(Numbers(None, least=0.0, rule=fits()), 1.0, [1.0, 2.0]),
+    "R": arg(
+        Numbers(
+            None,
+            most=1.0,
+            rule=lambda x: True if x.shape in ((), (1,)) and (x < 0.99).all() else None,
+        ),
+        0.1,
+    ),
+}
+
+CONSTANTS = {"C": arg(Number(above=0), 1e-3), "m": arg(Number(above=0), 3)}
+
+
+def _step(**changes):
+    given = scenes.history().steps[0]
+    every = {
+        name: getattr(given, name)
+        for name in ("index", "cycles", "cracks", "sif", "angle", "dK_eq", "R", "rate", "da")
+    }
+    return xc.Step(**every | changes)
+
+
+def _per_crack(value):
+    items = items_of(value)
+    if items is None or len(items) != 1:
+        return False
+    one = array(items[0])
+    return one is not None and one.shape == (1,)
+
+
+def _grow(**changes):
+    given = {
+        "problem": scenes.growing(),
+        "law": xc.paris(1e-3, 2.0),
+        "criterion": xc.max_hoop_stress,
+        "cycle": xc.Cycle(0.0, 1.0),
+        "da": 0.2,
+        "progress": False,
+        "max_steps": 1,
+    }
+    return list(xc.grow(**given | changes))
+
+
+def _collected(steps=None, **options):
+    return xc.collect(iter(scenes.history().steps) if steps is None else steps, **options)
+
+
+def _resumed(**changes):
+    shutil.copytree(scenes.stored(), "run")
+    given = {
+        "path": "run",
+        "problem": scenes.growing(),
+        "law": xc.paris(1e-3, 2.0),
+        "criterion": xc.max_hoop_stress,
+        "cycle": xc.Cycle(0.0, 1.0),
+        "da": 0.2,
+        "progress": False,
+        "max_steps": 2,
+    }
+    return xc.resume(**given | changes)
+
+
+def _loaded(path):
+    shutil.copytree(scenes.stored(), "run")
+    return xc.load(path)
+
+
+GROW = {
+    "problem": arg(
+        Seen(
+            rule=lambda v: (
+                isinstance(v, xc.Problem) and bool(v.cracks) and (v.mesh.dim == 2 or None)
+            )
+        ),
+        Late(scenes.growing),
+        words=["crack"],
+    ),
+    "law": arg(Called(), xc.paris(1e-3, 2.0), xc.walker(1e-3, 2.0, 0.5)),
+    "criterion": arg(Called(), xc.max_hoop_stress, xc.weighted_angle),
+    "cycle": arg(Of(type=xc.Cycle), xc.Cycle(0.0, 1.0), xc.Cycle(states=[1.0])),
+    "da": arg(
+        Number(optional=True, above=0, rule=lambda v: True if 0.1 <= v <= 0.3 else None), 0.2
+    ),
+    "cycles": arg(Number(optional=True, above=0, rule=lambda v: None), None),
+    "scaling": arg(Word(words=("law", "linear")), "law", "linear"),
+    "threshold": arg(Number(least=0), 0.0, 0.1),
+    "K_c": arg(Number(optional=True, above=0), None, 1e3),
+    "max_steps": arg(
+        Whole(
+            least=1,
+            rule=lambda v: v < 3 or None,
+            far=2,
+            also=(Seen(rule=lambda v: None if v is None else False),),
+        ),
+        1,
+        2,
+    ),
+    "max_cycles": arg(Number(optional=True, above=0), None, 1e6, 10.0),
+    "solver": arg(Called(optional=True), None),
+    "progress": arg(Flag(also=(Word(words=("always",)),)), False),
+}
+
+
+def _rates(v):
+    """Whether a value is a growth rate of one tip."""
+    x = array(v)
+    return x is not None and x.shape == (1,) and bool((x >= 0).all())
+
+
+ENTRIES = [
+    Entry("paris", xc.paris, CONSTANTS),
+    Entry(
+        "elber",
+        xc.elber,
+        CONSTANTS
+        | {
+            "a": arg(Number(rule=lambda v: v > 0 or None), 0.5),
+            "b": arg(Number(rule=lambda v: v >= 0 or None), 0.4),
+        },
+    ),
+    Entry("walker", xc.walker, CONSTANTS | {"gamma": arg(Number(least=0, most=1), 0.5)}),
+    Entry("paris", lambda dK_eq, R: xc.paris(1e-3, 3.0)(dK_eq, R), LAW),
+    Entry("elber", lambda dK_eq, R: xc.elber(1e-3, 3.0, 0.5, 0.4)(dK_eq, R), LAW),
+    Entry("walker", lambda dK_eq, R: xc.walker(1e-3, 3.0, 0.5)(dK_eq, R), LAW),
+    Entry("elber", lambda R: xc.elber(1e-3, 3.0, 0.5, 0.4).U(R), {"R": arg(ANY, 0.1, [0.1, 0.2])}),
+    Entry(
+        "cycles_between",
+        xc.cycles_between,
+        {
+            "a0": arg(
+                Numbers(None, rule=lambda a: bool((a > 0).all() and (a <= 2).all())),
+                1.0,
+                words=["length"],
+            ),
+            "a1": arg(Numbers(None, least=1.0), 2.0, [2.0, 3.0], words=["length"]),
+            "rate0": arg(
+                Numbers(
+                    None, rule=lambda a: bool((a > 0).all()) and (True if a.ndim == 0 else None)
+                ),
+                1e-3,
+                words=["rate"],
+            ),
+            "rate1": arg(
+                Seen(
+                    rule=lambda v: (
+                        (x := array(v)) is not None
+                        and bool((x >= 0).all())
+                        and (True if x.ndim == 0 else None)
+                    )
+                ),
+                2e-3,
+                0.0,
+                np.inf,
+                words=["rate"],
+            ),
+        },
+    ),
+    Entry(
+        "Cycle",
+        xc.Cycle,
+        {"min": arg(Number(most=1.0), 0.0, 0.5), "max": arg(Number(least=0.5), 1.0)},
+    ),
+    Entry(
+        "Cycle",
+        lambda states: xc.Cycle(states=states),
+        {
+            "states": arg(
+                ListOf(item=Number(also=(ListOf(item=LOAD),)), least=1),
+                [1.0],
+                [0.0, scenes.PULL],
+                words=["load", "cycle"],
+            )
+        },
+    ),
+    Entry(
+        "Step",
+        _step,
+        {
+            "index": arg(Whole(least=0), 0, 5),
+            "cycles": arg(Number(least=0), 0.0, 1e3),
+            "cracks": arg(
+                ListOf(item=Of(type=xc.Crack), least=1, most=1), Late(lambda: [scenes.crack()])
+            ),
+            "sif": arg(
+                ListOf(item=ListOf(item=Of(type=xc.SIF), least=1, most=1), least=1),
+                Late(lambda: [[scenes.sif()]]),
+                words=["K"],
+            ),
+            **{
+                name: arg(Seen(rule=_per_crack), [[0.1]])
+                for name in ("angle", "dK_eq", "R", "rate", "da")
+            },
+        },
+    ),
+    Entry(
+        "History",
+        xc.History,
+        {
+            "steps": arg(ListOf(item=Of(type=xc.Step)), Late(lambda: scenes.history().steps), ()),
+            "ended": arg(Word(), "max_steps"),
+            "path": arg(
+                Seen(
+                    rule=lambda v: (
+                        v is None or (isinstance(v, str | Path) and "\0" not in str(v) and v != "")
+                    )
+                ),
+                None,
+                "a",
+            ),
+            "mesh": arg(Of(optional=True, type=xc.Mesh), None, Late(scenes.mesh)),
+        },
+    ),
+    Entry("History", lambda: scenes.history().table(), {}, arity=False),
+    Entry("grow", _grow, GROW, cost=0.12),
+    Entry(
+        "collect",
+        _collected,
+        {
+            "steps": arg(
+                ListOf(item=Of(type=xc.Step)),
+                Late(lambda: iter(scenes.history().steps)),
+                words=["Step"],
+            ),
+            "path": arg(Filename(optional=True, folder=True), None, "good", near=paths("", "")),
+            "until": arg(Called(optional=True), None),
+            "overwrite": arg(Flag(), False, True),
+            "keep_solutions": arg(Flag(), True, False),
+        },
+        in_folder=True,
+        cost=0.02,
+    ),
+    Entry(
+        "resume",
+        _resumed,
+        {
+            "path": arg(
+                Filename(known=("run", "./run"), folder=True),
+                "run",
+                near=paths("", ""),
+                words=["run"],
+            ),
+            "problem": arg(Seen(rule=lambda v: v is scenes.growing()), Late(scenes.growing)),
+            "law": arg(Called(), xc.paris(1e-3, 2.0), near={"other": lambda: xc.paris(2e-3, 2.0)}),
+            "cycle": arg(
+                Seen(rule=lambda v: isinstance(v, xc.Cycle) and v.load_states == (0.0, 1.0)),
+                xc.Cycle(0.0, 1.0),
+            ),
+            "da": arg(Number(least=0.2, most=0.2), 0.2),
+            "scaling": arg(Word(words=("law",)), "law"),
+            "threshold": arg(Number(least=0, most=0), 0.0),
+            "keep_solutions": arg(Flag(), True),
+        },
+        in_folder=True,
+        cost=0.03,
+    ),
+    Entry(
+        "load",
+        _loaded,
+        {"path": arg(Filename(known=("run", "./run")), "run", near=paths("", ""), words=["run"])},
+        in_folder=True,
+        cost=0.02,
+    ),
+    Entry(
+        "testing.check_law",
+        testing.check_law,
+        {"law": arg(Called(), xc.paris(1e-3, 3)), "dK_max": arg(Number(above=0), 10.0)},
+    ),
+    Entry(
+        "testing.check_criterion",
+        testing.check_criterion,
+        {"criterion": arg(Called(), xc.max_hoop_stress), "nu": arg(NU, 0.3)},
+    ),
+]
+HOOKS = [
+    Hook(
+        "grow",
+        lambda f: _grow(law=f, max_steps=2),
+        lambda dK, R: 1e-3 * dK,
+        Seen(rule=_rates),
+        "growth rates",
+        cost=0.1,
+    ),
+    Hook(
+        "grow",
+        lambda f: _grow(criterion=f, max_steps=2),
+        lambda K, nu: (K[0, :, 0] * 0, K[1, :, 0], K[1, :, 0] * 0),
+        NOTHING,
+        "directions",
+        cost=0.1,
+    ),
+    Hook("collect", lambda f: _collected(until=f), lambda step: False, Flag(), "until"),
+]

@@ -1,0 +1,159 @@
+"""Materials, choices of method, problems."""
+
+import numpy as np
+
+import xcrack as xc
+from fuzz import scenes
+from fuzz.entry import Bad, Entry, Late, arg
+from fuzz.kinds import (
+    Choice,
+    Flag,
+    ListOf,
+    Number,
+    Numbers,
+    Of,
+    Seen,
+    Whole,
+    Word,
+)
+from fuzz.scene_rules import POSITIVE
+
+SUPPORTS = type(xc.fix("left")) | type(xc.displacement("left", (0, 0)))
+
+
+def _problem(**changes):
+    cracks = [scenes.crack()]
+    given = {"mesh": scenes.mesh(), "material": scenes.STEEL, "cracks": cracks, **changes}
+    return xc.Problem(**given)
+
+
+def _of_dim(kind, dim=2):
+    return Seen(rule=lambda value: isinstance(value, kind) and value.dim == dim)
+
+
+ENTRIES = [
+    Entry(
+        "Isotropic",
+        xc.Isotropic,
+        {
+            "E": arg(POSITIVE, 1.0, 210e3, words=["Young's modulus"]),
+            "nu": arg(Number(above=-1, below=0.5), 0.3, 0, words=["Poisson"]),
+            "plane": arg(Word(optional=True, words=("strain", "stress")), None, "strain", "stress"),
+        },
+    ),
+    Entry(
+        "Isotropic",
+        lambda gradient: scenes.STEEL.stress(gradient),
+        {
+            "gradient": arg(
+                Numbers(None, rule=lambda g: g.ndim > 1 and g.shape[-2:] in ((2, 2), (3, 3))),
+                np.eye(2),
+                np.ones((4, 3, 3)),
+            )
+        },
+    ),
+    Entry(
+        "Isotropic",
+        lambda stress: scenes.BODY.strain(stress),
+        {
+            "stress": arg(
+                Numbers(None, rule=lambda g: g.ndim > 1 and g.shape[-2:] in ((2, 2), (3, 3))),
+                np.eye(2),
+                np.ones((4, 3, 3)),
+            )
+        },
+    ),
+    Entry(
+        "Comparison",
+        xc.Comparison,
+        {
+            "tip_basis": arg(Word(words=("scalar", "vectorial")), "scalar", "vectorial"),
+            "update": arg(Word(words=("explicit", "nodal")), "nodal"),
+            "lips": arg(Word(words=("multipliers", "penalty", "augmented", "nitsche")), "penalty"),
+            "penalty": arg(Number(optional=True, above=0), None, 10.0),
+        },
+    ),
+    Entry(
+        "Numerics",
+        xc.Numerics,
+        {
+            "enrichment": arg(Word(words=("geometric", "topological")), "geometric"),
+            "radius": arg(Number(optional=True, above=0), None, 0.3),
+            "functions": arg(Choice(values=(4, 2)), 4, 2),
+            "multipliers": arg(Word(words=("reduced", "naive")), "naive"),
+            "consistent": arg(Flag(), True, False),
+            "orthonormal": arg(Word(words=("star", "node", "none")), "star"),
+            "patch": arg(Flag(), False),
+            "points": arg(Whole(least=2, most=32), 4),
+            "domain": arg(Number(optional=True, above=0), None, 0.5),
+            "linear": arg(Word(words=("auto", "direct", "iterative")), "auto"),
+            "initial_set": arg(Word(words=("closed", "open")), "open"),
+            "threads": arg(Whole(optional=True, least=1), None, 1),
+            "comparison": arg(Of(type=xc.Comparison), xc.Comparison()),
+        },
+    ),
+    Entry(
+        "Problem",
+        _problem,
+        {
+            "mesh": arg(
+                _of_dim(xc.Mesh), Late(scenes.mesh), words=["body", "dimensions", "2D", "3D"]
+            ),
+            "material": arg(Seen(rule=lambda v: v is scenes.STEEL), scenes.STEEL),
+            "cracks": arg(
+                ListOf(item=_of_dim(xc.Crack)),
+                Late(lambda: [scenes.crack()]),
+                (),
+                words=["crack"],
+                near={
+                    "twice": Bad(lambda: [scenes.crack(), scenes.crack()]),
+                    "outside": Bad(lambda: [xc.line_crack([(5, 5), (6, 6)])]),
+                    "3D": lambda: [scenes.crack(3)],
+                },
+            ),
+            "supports": arg(
+                ListOf(item=Seen(rule=lambda v: isinstance(v, SUPPORTS))),
+                [xc.fix("left")],
+                (),
+                words=["facet set", "fix"],
+                near={
+                    "unknown": Bad(lambda: [xc.fix("no such set")]),
+                    "3D point": Bad(lambda: [xc.fix((0, 0, 0))]),
+                    "axis": Bad(lambda: [xc.fix("left", 2)]),
+                    "forces": lambda: scenes.PULL,
+                },
+            ),
+            "loads": arg(
+                ListOf(item=Of(type=type(scenes.PULL[0]))),
+                scenes.PULL,
+                [],
+                words=["facet set", "load", "traction", "crack_pressure"],
+                near={
+                    "unknown": Bad(lambda: [xc.traction("no such set", (0, 1))]),
+                    "3D": Bad(lambda: [xc.traction("top", (0, 0, 1))]),
+                    "crack": Bad(lambda: [xc.crack_pressure(1.0, 7)]),
+                    "support": Bad(lambda: [xc.fix("left")]),
+                    "moved": Bad(lambda: [xc.displacement("top", (0, 1))]),
+                },
+            ),
+            "contact": arg(Word(words=("auto", "on", "off")), "auto", "on"),
+            "order": arg(Choice(optional=True, values=(1, 2)), None, 1, 2),
+            "numerics": arg(Of(type=xc.Numerics), xc.Numerics()),
+        },
+        cost=0.03,
+    ),
+    Entry(
+        "Problem",
+        lambda state: scenes.problem().state(state),
+        {
+            "state": arg(
+                Number(optional=True, also=(ListOf(item=Of(type=type(scenes.PULL[0]))),)),
+                None,
+                1.0,
+                scenes.PULL,
+                words=["load"],
+            )
+        },
+    ),
+]
+HOOKS = []

@@ -1,0 +1,86 @@
+"""No input ends in somebody else's traceback: drawn inputs for every public name, with verdicts."""
+
+import inspect
+
+import pytest
+
+import xcrack as xc
+from fuzz.kinds import NONSENSE, VALID
+from fuzz.run import PARTS, TABLE, drawn, run, table
+
+_EXEMPT = {
+    **dict.fromkeys(
+        ("XcrackError", "XcrackWarning", "MeshError", "GeometryError", "ProblemError",
+         "ConvergenceError"),
+        "raised by xcrack; its arguments are those of every exception",
+    ),
+}  # fmt: skip
+
+
+def report(counts, faults, capsys, seed):
+    with capsys.disabled():
+        print(f"\nfuzz, seed {seed}, {sum(counts.values())} inputs: {table(counts)}")
+    assert not faults, "\n" + "\n".join(faults)
+
+
+def test_two_hundred_inputs(capsys):
+    counts, faults, _ = run(87013, range(200))
+    report(counts, faults, capsys, 87013)
+
+
+@pytest.mark.slow
+@pytest.mark.mission
+@pytest.mark.timeout(3000)
+@pytest.mark.parametrize("seed", [31907, 55721, 90173])
+def test_many_inputs(seed, capsys):
+    """1600 inputs with a verdict of valid or nonsense; those on the edge come on top."""
+    count, decided = 0, 0
+    while decided < 1600:
+        decided += drawn(seed, count).verdict in (VALID, NONSENSE, "own")
+        count += 1
+    counts, faults, _ = run(seed, range(count))
+    report(counts, faults, capsys, seed)
+
+
+def test_every_public_name_is_in_the_table():
+    named = {one.name for one in TABLE}
+    public = set(xc.__all__)
+    assert public - named - set(_EXEMPT) == set()
+    assert not named & set(_EXEMPT)
+    assert {name for name in named if "." not in name} <= public
+
+
+def test_every_method_of_public_values_is_in_the_table():
+    """By a look at the source of the table: methods are called in it by their names."""
+    source = "".join(map(inspect.getsource, PARTS))
+    for name in xc.__all__:
+        value = getattr(xc, name)
+        if not isinstance(value, type) or issubclass(value, Exception):
+            continue
+        for method, function in vars(value).items():
+            if not method.startswith("_") and inspect.isfunction(function):
+                assert f".{method}(" in source or f'"{method}"' in source, f"{name}.{method}"
+
+
+def test_verdicts_know_what_they_judge():
+    """The rules themselves, on values whose verdict is beyond doubt."""
+    from fuzz.kinds import Filename, Number, Numbers, Whole, Word
+
+    good = [
+        (Number(above=0), (1, 0.5)),
+        (Whole(least=1), (1, 3.0)),
+        (Numbers((None, 2)), ([(0, 1)], [[0.5, 1], [2, 3]])),
+        (Word(words=("on", "off")), ("on",)),
+        (Filename(endings=(".png",)), ("a.png", "a")),
+    ]
+    bad = [
+        (Number(above=0), (0, True, None, "1", float("nan"), 1j, [1.0], 10**400)),
+        (Whole(least=1), (0, 2.5, True, "1", float("inf"))),
+        (Numbers((None, 2)), ([0, 1], [(0, None)], [[0, 1], [2]], "ab", None, [[0, float("nan")]])),
+        (Word(words=("on", "off")), ("On", 1, None, b"on")),
+        (Filename(endings=(".png",)), ("", "a\0.png", "a.xyz", 1, b"a.png", "file/a.png")),
+    ]
+    for cases, verdict in ((good, VALID), (bad, NONSENSE)):
+        for kind, values in cases:
+            for value in values:
+                assert kind.verdict(value) == verdict, (kind, value)
