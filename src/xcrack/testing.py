@@ -43,6 +43,7 @@ def check_law(law: Law, dK_max: float = 100.0, a: float = 1.0) -> None:
     """
     _check_callable(law, "check_law: law")
     dK_max = number(dK_max, "check_law: dK_max", above=0)
+    a = number(a, "check_law: a", above=0)
     wrong: list[str] = []
     ratios = [-2.0, -1.0, -0.3, -1e-9] if getattr(law, "ratio", None) == "nominal" else []
     ratios = [R for R in [*ratios, *_RATIOS] if _is_within(R, getattr(law, "R_range", None))]

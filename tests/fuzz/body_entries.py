@@ -1,13 +1,16 @@
 """Meshes, and files of them."""
 
+import math
+import shutil
 from pathlib import Path
 
 import numpy as np
 
 import xcrack as xc
 from fuzz import scenes
-from fuzz.entry import Entry, Late, arg
+from fuzz.entry import Entry, Hook, Late, arg
 from fuzz.kinds import (
+    Called,
     Filename,
     Number,
     Numbers,
@@ -15,6 +18,7 @@ from fuzz.kinds import (
     Seen,
     Whole,
     Word,
+    real,
 )
 from fuzz.scene_rules import SQUARE
 from fuzz.values import paths
@@ -76,6 +80,12 @@ def _damaged(text):
 
 
 DAMAGED = {name: lambda name=name: f"{name}.msh" for name in _damaged("")}
+
+
+def _mesh_step(**named):
+    shutil.copy(scenes.step_file(), "box.step")
+    Path("there.msh").write_text("no STEP file")
+    return xc.mesh_step(**named)
 
 
 def _read_surface(path):
@@ -203,6 +213,56 @@ ENTRIES = [
     ),
     Entry("refine", xc.refine, {"mesh": arg(Of(type=xc.Mesh), Late(scenes.mesh))}),
     Entry(
+        "refine",
+        lambda cells: xc.refine(scenes.mesh(), cells),
+        {
+            "cells": arg(
+                Numbers((None,), optional=True, whole=True, least=0, most=71),
+                [0, 5],
+                np.zeros(0, int),
+            )
+        },
+        cost=0.03,
+    ),
+    Entry(
+        "refine",
+        lambda size: xc.refine(scenes.mesh(), size=size),
+        {
+            "size": arg(
+                Number(optional=True, above=0, rule=lambda v: v >= 0.1 or None, also=(Called(),)),
+                0.3,
+            )
+        },
+        cost=0.05,
+    ),
+    Entry(
+        "mesh_step",
+        _mesh_step,
+        {
+            "path": arg(
+                Filename(known=("box.step", "./box.step")),
+                "box.step",
+                near=paths(".step", "") | {"a mesh": lambda: "there.msh"},
+                words=["STEP"],
+            ),
+            "size": arg(
+                Number(above=0, rule=lambda v: 0.3 <= v <= 2 or None, also=(Called(),)), 0.8
+            ),
+            "sets": arg(
+                Seen(rule=lambda v: v is None or v == {} if isinstance(v, dict | None) else False),
+                None,
+                near={
+                    "text": lambda: {"a": "b"},
+                    "no face": lambda: {"a": [99]},
+                    "list": lambda: [("a", [1])],
+                    "none": lambda: {"a": []},
+                },
+            ),
+        },
+        in_folder=True,
+        cost=0.3,
+    ),
+    Entry(
         "read_mesh",
         _read_mesh,
         {
@@ -319,4 +379,38 @@ ENTRIES = [
         cost=2.0,
     ),
 ]
-HOOKS = []
+HOOKS = [
+    Hook(
+        "refine",
+        lambda f: xc.refine(scenes.mesh(), size=f),
+        lambda x: 0.3 + 0 * x[:, 0],
+        Number(
+            above=0,
+            rule=lambda v: v >= 0.1 or None,
+            also=(Seen(rule=lambda v: None if real(v) == math.inf else False),),
+        ),
+        "size of refine",
+    ),
+    Hook(
+        "mesh_step",
+        lambda f: _mesh_step(path="box.step", size=f),
+        lambda x: 0.8 + 0 * x[:, 0],
+        Number(
+            above=0,
+            rule=lambda v: 0.3 <= v <= 2 or None,
+            also=(Numbers((1,), rule=lambda v: None),),
+        ),
+        "size",
+        cost=0.3,
+        in_folder=True,
+    ),
+    Hook(
+        "mesh_step",
+        lambda f: _mesh_step(path="box.step", size=0.8, sets={"a": f}),
+        lambda x: x[:, 0] < 1e-6,
+        Seen(rule=lambda v: False),
+        "sets",
+        cost=0.3,
+        in_folder=True,
+    ),
+]

@@ -6,6 +6,9 @@ import xcrack as xc
 from fuzz import scenes
 from fuzz.entry import Entry, Hook, Late, arg
 from fuzz.kinds import (
+    NONSENSE,
+    SKIP,
+    VALID,
     Called,
     Filename,
     Flag,
@@ -43,12 +46,19 @@ FIELDS = (
 )
 
 
+class Only(Word):
+    """Part of the name of a case; others would run for long."""
+
+    def verdict(self, value):
+        if isinstance(value, str) and "no such" not in value and value != "cycle-rule":
+            return SKIP
+        return VALID if isinstance(value, str) and value == "cycle-rule" else NONSENSE
+
+
 class Shown(Flag):
     """A flag that must not open a window here."""
 
     def _own(self, value):
-        from fuzz.kinds import SKIP
-
         return SKIP if value is True or value is None else super()._own(value)
 
     def verdict(self, value):
@@ -109,6 +119,26 @@ def _charted(**changes):
 
 
 ENTRIES = [
+    Entry(
+        "verify",
+        lambda **named: xc.verify(**named).passed,
+        {
+            "only": arg(
+                Only(), "cycle-rule", near={"unknown": lambda: "no such case"}, words=["case"]
+            ),
+            "quick": arg(Flag(), True),
+            "progress": arg(Flag(), False),
+            "file": arg(
+                Filename(optional=True, endings=(".html", ".md")),
+                None,
+                "good.html",
+                near=paths(".html", ""),
+                words=["book"],
+            ),
+        },
+        in_folder=True,
+        cost=0.2,
+    ),
     Entry(
         "write",
         xc.write,
@@ -317,7 +347,7 @@ ENTRIES = [
             ),
             "quantity": arg(Called(optional=True), None, lambda found: 1.0 + np.size(found)),
             "wanted": arg(Number(optional=True, above=0), None, 1e-2),
-            "repeat": arg(Whole(least=1, far=2), 1),
+            "repeat": arg(Whole(least=1, most=1000, far=2), 1),
             "seconds": arg(Number(above=0), 0.05),
             "progress": arg(Flag(also=(Word(words=("always",)),)), False),
             "file": arg(
@@ -361,9 +391,11 @@ ENTRIES = [
 
 
 def _quantity(value):
-    """Whether a value is numbers, at least one."""
+    """Whether a value is numbers, at least one of them not zero."""
     x = array(value)
-    return x is not None and bool(np.isfinite(x).all()) and x.size > 0 and bool(x.any())
+    if x is None or not np.isfinite(x).all() or not x.any():
+        return False
+    return None if np.abs(x).max() > 1e6 else True
 
 
 HOOKS = [

@@ -34,7 +34,7 @@ _FEWEST_WORDS = 5
 _MEND = re.compile(
     r"\b(give|gives|take|must|leave|use|make|needs?|put|choose|check|try|wanted|see|remove|"
     r"merge|draw|ask|install|move|describe|join|cut|must|know|takes?|read|knows|return|lies|"
-    r"numbered|symmetric|returns|has|only|every|remesh|mesh|supports?|resume|save|export|starts|computes)\b",
+    r"numbered|symmetric|returns|has|only|every|remesh|mesh|supports?|resume|save|export|starts|computes|call)\b",
     re.I,
 )
 # What numpy and others warn of by themselves is theirs, but a nan on its way must not pass.

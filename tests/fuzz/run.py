@@ -14,6 +14,7 @@ from fuzz import (
     crack_entries,
     file_entries,
     growth_entries,
+    law_entries,
     load_entries,
     problem_entries,
     solution_entries,
@@ -28,6 +29,7 @@ PARTS = (
     problem_entries,
     solution_entries,
     growth_entries,
+    law_entries,
     file_entries,
 )
 TABLE = [one for part in PARTS for one in (*part.ENTRIES, *part.HOOKS)]

@@ -97,3 +97,16 @@ def chart():
 def inside(dim=2):
     """Points of the body, none of them on the crack."""
     return np.random.default_rng(87129).uniform(-0.9, 0.9, (5, dim)) + 0.011
+
+
+@cache
+def step_file():
+    """A STEP file of a box."""
+    from xcrack.mesh.gmsh_session import session
+
+    path = Path(tempfile.mkdtemp(prefix="xcrack_fuzz_")) / "box.step"
+    with session() as gmsh:
+        gmsh.model.occ.addBox(0, 0, 0, 2, 1, 1)
+        gmsh.model.occ.synchronize()
+        gmsh.write(str(path))
+    return path

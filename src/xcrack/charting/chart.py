@@ -112,7 +112,7 @@ def chart(
     named = default_settings(problem) if settings is None else named_settings(settings)
     if wanted is not None:
         wanted = checked_error(wanted)
-    repeat = whole(repeat, "chart: repeat", least=1)
+    repeat = whole(repeat, "chart: repeat", least=1, most=1000)
     seconds = number(seconds, "chart: seconds", above=0)
     if quantity is not None and not callable(quantity):
         raise ProblemError(f"chart: quantity = {shown(quantity)}: give a function of the solution.")

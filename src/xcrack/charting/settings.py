@@ -1,11 +1,11 @@
 """Which settings a chart tries: those of the user, or a handful that matter."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import Any
 
 from xcrack.errors import ProblemError
-from xcrack.inputs import shown
+from xcrack.inputs import entries, shown
 from xcrack.scene.numerics import Comparison, Numerics
 from xcrack.scene.problem import Problem
 
@@ -63,13 +63,13 @@ def named_settings(given: Any) -> dict[str, dict[str, Any]]:
     """
     if isinstance(given, Mapping) and all(isinstance(v, Mapping) for v in given.values()):
         pairs = [(str(name), changes) for name, changes in given.items()]
-    elif isinstance(given, Iterable) and not isinstance(given, str | Mapping):
-        pairs = [(_name(changes), changes) for changes in given]
     else:
-        raise ProblemError(
-            f'settings = {shown(given)}: give a list of dicts, such as [{{"order": 1}}, '
-            '{"radius": 0.2}].'
-        )
+        try:
+            several = entries(given, "settings")
+        except ProblemError as error:
+            example = '[{"order": 1}, {"radius": 0.2}]'
+            raise ProblemError(f"{str(error)[:-1]} of dicts, such as {example}.") from None
+        pairs = [(_name(changes), changes) for changes in several]
     if not pairs:
         raise ProblemError("settings is empty: give at least one dict of fields, or leave it out.")
     named: dict[str, dict[str, Any]] = {}

@@ -16,6 +16,7 @@ from xcrack.sif.stress_intensity import stress_intensities
 # for luck, what falls slower than by the square root for scatter.
 _SLOWEST, _FASTEST = 0.5, 2.0
 _UNKNOWN = 1.0  # rate where two meshes do not tell it
+_LARGEST = 1e120
 _PEER = 5.0  # a setting that claims more than this multiple of the least error is no witness
 
 
@@ -69,6 +70,11 @@ def plain(values: Any) -> Sampled:
     flat = numbers(values, "chart: what the quantity returned", finite=False).reshape(-1, 1)
     if not len(flat):
         raise ProblemError("the quantity returned an empty array: return at least one number.")
+    if np.abs(flat[np.isfinite(flat)]).max(initial=0.0) > _LARGEST:
+        raise ProblemError(
+            f"the quantity returned values of up to {np.abs(flat).max():.3g}, whose squares are no "
+            "numbers: return it in another unit."
+        )
     return Sampled(flat)
 
 

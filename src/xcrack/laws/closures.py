@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike
 
 from xcrack.arrays import Floats
 from xcrack.errors import ProblemError
-from xcrack.inputs import number, numbers
-from xcrack.laws.law import Bounds, check_bounds, set_floats
+from xcrack.inputs import number, numbers, shown
+from xcrack.laws.law import Bounds, check_bounds, set_floats, stress_ratio
 
 _LOWEST = -2.0  # f of Newman is constant below
 
@@ -149,14 +149,15 @@ class newman_closure:  # noqa: N801
     def f(self, R: ArrayLike) -> Floats:
         """K at opening over K_max."""
         A0, A1, A2, A3 = self.A
-        ratio = numbers(R, "newman_closure: R")
-        above = np.maximum(ratio, A0 + ratio * (A1 + ratio * (A2 + ratio * A3)))
+        ratio = stress_ratio("newman_closure", R)
+        part = np.maximum(ratio, 0.0)
+        above = np.maximum(part, A0 + part * (A1 + part * (A2 + part * A3)))
         below = A0 + A1 * np.maximum(ratio, _LOWEST)
         return np.asarray(np.where(ratio >= 0, above, below))[()]
 
     def __call__(self, R: ArrayLike) -> Floats:
         """Share of the range that opens the crack, in [0, 1]; 1 for R = 1."""
-        ratio = numbers(R, "newman_closure: R")
+        ratio = stress_ratio("newman_closure", R)
         rest = 1 - ratio
         return np.asarray(
             np.divide(1 - self.f(ratio), rest, out=np.ones_like(rest), where=rest > 0)
@@ -170,7 +171,7 @@ def check_closure(name: str, closure: object) -> None:
     """Refuse what is no closure."""
     if closure is not None and not isinstance(closure, Closure):
         raise ProblemError(
-            f"{name}: closure = {closure!r:.80}: give linear_closure, schijve_closure or "
+            f"{name}: closure = {shown(closure)}: give linear_closure, schijve_closure or "
             "newman_closure."
         )
 
@@ -181,7 +182,7 @@ def _within(name: str, R: ArrayLike, bounds: Bounds) -> Floats:
     if outside.any():
         raise ProblemError(
             f"{name}: R = {ratio[outside].flat[0]:.6g} is outside {bounds[0]:g} to {bounds[1]:g}, "
-            "where U was measured."
+            "where U was measured: take another closure for it."
         )
     return ratio
 

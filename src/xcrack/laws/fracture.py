@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 
 from xcrack.arrays import Floats
 from xcrack.errors import ProblemError
-from xcrack.inputs import number
+from xcrack.inputs import number, shown
 from xcrack.laws.closures import newman_closure
 from xcrack.laws.law import (
     Bounds,
@@ -16,8 +16,10 @@ from xcrack.laws.law import (
     check_bounds,
     check_ratio,
     largest_K,
+    powered,
     range_and_ratio,
     set_floats,
+    sizes,
 )
 from xcrack.laws.shape import Approach, check_approach, shaped
 from xcrack.laws.thresholds import (
@@ -95,7 +97,7 @@ class forman(WithUnits):  # noqa: N801 - it is used as a function
 
         def rate(dK: Floats) -> Floats:
             left = np.asarray((1 - ratio) * self.K_c - dK)
-            rise = np.broadcast_to(self.C * dK**self.m, left.shape)
+            rise = np.broadcast_to(powered("forman", self.C, dK, self.m), left.shape)
             grows = np.broadcast_to(dK, left.shape) > 0
             unstable = np.where(grows, np.inf, 0.0)
             return np.divide(rise, left, out=unstable, where=grows & (left > 0))
@@ -168,7 +170,7 @@ class hartman_schijve(WithUnits):  # noqa: N801
         left = 1 - largest_K(dK, ratio) / self.A
         with np.errstate(divide="ignore"):
             over = np.maximum(dK - self.dK_thr, 0.0) / np.sqrt(np.maximum(left, 0.0))
-            rate = self.D * over**self.alpha
+            rate = self.D * over**self.alpha  # inf at the toughness
         return np.asarray(np.where(left > 0, rate, np.inf))[()]
 
 
@@ -225,10 +227,10 @@ class nasgro(WithUnits):  # noqa: N801
         for name in ("p", "q"):
             set_floats(self, **{name: number(getattr(self, name), f"nasgro: {name}", least=0)})
         if not isinstance(self.closure, newman_closure):
-            raise ProblemError(f"nasgro: closure = {self.closure!r:.80}: give newman_closure.")
+            raise ProblemError(f"nasgro: closure = {shown(self.closure)}: give newman_closure.")
         if not isinstance(self.threshold, nasgro3_threshold | nasgro4_threshold):
             raise ProblemError(
-                f"nasgro: threshold = {self.threshold!r:.80}: give nasgro3_threshold or "
+                f"nasgro: threshold = {shown(self.threshold)}: give nasgro3_threshold or "
                 "nasgro4_threshold, whichever the constants were published for."
             )
         check_ratio("nasgro", self.ratio)
@@ -251,11 +253,12 @@ class nasgro(WithUnits):  # noqa: N801
         """Growth a cycle of each point, length."""
         dK, ratio = range_and_ratio("nasgro", dK_eq, R, self.R_range)
         dK, ratio = np.broadcast_arrays(dK, ratio)
+        a = sizes("nasgro", a, dK.shape)
         least = np.broadcast_to(self.threshold.of(self.closure, ratio, a), dK.shape)
         left = 1 - largest_K(dK, ratio) / self.K_c
         grows = (dK > least) & (left > 0)
         above = np.where(grows, 1 - least / np.where(grows, dK, 1.0), 0.0)
-        rate = self.C * (self.closure(ratio) * dK) ** self.n * above**self.p
+        rate = powered("nasgro", self.C, self.closure(ratio) * dK, self.n) * above**self.p
         rate = np.divide(rate, np.maximum(left, 0.0) ** self.q, out=np.zeros(dK.shape), where=grows)
         return np.asarray(np.where(left > 0, rate, np.inf))[()]
 
@@ -299,8 +302,9 @@ def nasgro_K_c(K_Ic: float, sigma_y: float, t: float, A_k: float, B_k: float) ->
     )
     t, A_k = number(t, f"{name}: t", above=0), number(A_k, f"{name}: A_k", least=0)
     B_k = number(B_k, f"{name}: B_k", least=0)
-    t0 = 2.5 * (K_Ic / sigma_y) ** 2
-    return float(K_Ic * (1 + B_k * np.exp(-((A_k * t / t0) ** 2))))
+    with np.errstate(over="ignore", divide="ignore"):
+        t0 = 2.5 * np.square(K_Ic / sigma_y)
+        return float(K_Ic * (1 + B_k * np.exp(-np.square(A_k * t / t0))))
 
 
 __all__ = ["forman", "hartman_schijve", "nasgro", "nasgro_K_c"]

@@ -138,6 +138,47 @@ def _check_within(name: str, dK: Floats, ratio: Floats, bounds: Bounds) -> None:
         )
 
 
+def stress_ratio(name: str, R: ArrayLike) -> Floats:
+    """R as an array, at most 1."""
+    ratio = np.asarray(numbers(R, f"{name}: R"))
+    if (ratio > 1 + ROUND_OFF).any():
+        raise ProblemError(
+            f"{name}: R = {ratio.max():.6g}: give R = K_min / K_max, which is at most 1."
+        )
+    return ratio
+
+
+def sizes(name: str, a: ArrayLike | None, shape: tuple[int, ...]) -> Floats | None:
+    """Crack sizes for ranges of a shape, where they are given."""
+    if a is None:
+        return None
+    given = numbers(a, f"{name}: a")
+    if given.ndim and given.shape != shape:
+        raise ProblemError(
+            f"{name}: a has the shape {given.shape}: give one crack size for each range, of shape "
+            f"{shape}, or one for all."
+        )
+    return given
+
+
+def powered(name: str, C: Floats | float, base: Floats, m: Floats | float) -> Floats:
+    """C base^m, which must stay a number where the base is one.
+
+    Raises
+    ------
+    ProblemError
+        It does not: inf would say that the toughness is reached.
+    """
+    with np.errstate(over="ignore"):
+        rate = np.asarray(C * base**m)
+    if not np.isfinite(rate).all():
+        raise ProblemError(
+            f"{name}: a rate is too large for a number, dK_eq or its effective part is up to "
+            f"{np.max(base):.6g}: check the units of the constants, and R."
+        )
+    return rate
+
+
 def largest_K(dK: Floats, R: Floats) -> Floats:
     """K_max of a range and a ratio; inf where R is 1 and the range is not 0."""
     share = np.maximum(1.0 - R, np.finfo(float).tiny)
@@ -159,7 +200,10 @@ __all__ = [
     "check_bounds",
     "check_ratio",
     "largest_K",
+    "powered",
     "range_and_ratio",
     "set_floats",
+    "sizes",
+    "stress_ratio",
     "toughness",
 ]

@@ -15,6 +15,7 @@ from xcrack.laws.law import (
     WithUnits,
     check_bounds,
     check_ratio,
+    powered,
     range_and_ratio,
     set_floats,
     toughness,
@@ -107,7 +108,7 @@ class paris(WithUnits):  # noqa: N801 - it is used as a function: paris(C, m)(dK
         def rate(dK: Floats) -> Floats:
             if self.closure is not None:
                 dK = self.closure(ratio) * dK
-            return np.asarray(self.C * dK**self.m)
+            return powered("paris", self.C, dK, self.m)
 
         return shaped(
             rate, dK, ratio, a, threshold=self.threshold, approach=self.approach, K_c=self.K_c
@@ -173,7 +174,7 @@ class elber(WithUnits):  # noqa: N801 - it is used as a function
     def __call__(self, dK_eq: ArrayLike, R: ArrayLike) -> Floats:
         """Growth a cycle of each point, length."""
         dK, ratio = range_and_ratio("elber", dK_eq, R)
-        return np.asarray(self.C * (self.U(ratio) * dK) ** self.m)[()]
+        return powered("elber", self.C, self.U(ratio) * dK, self.m)[()]
 
 
 @dataclass(frozen=True)
@@ -257,8 +258,9 @@ class walker(WithUnits):  # noqa: N801 - it is used as a function
             gamma = np.where(ratio < 0, self.gamma_minus, self.gamma)
 
         def rate(dK: Floats) -> Floats:
-            effective = np.where(dK > 0, dK / share ** (1.0 - gamma), 0.0)
-            return np.asarray(self.C * effective**self.m)
+            with np.errstate(over="ignore"):
+                effective = np.where(dK > 0, dK / share ** (1.0 - gamma), 0.0)
+            return powered("walker", self.C, effective, self.m)
 
         return shaped(
             rate, dK, ratio, a, threshold=self.threshold, approach=self.approach, K_c=self.K_c
@@ -363,7 +365,7 @@ class piecewise(WithUnits):  # noqa: N801 - it is used as a function
 
         def rate(dK: Floats) -> Floats:
             piece = np.searchsorted(knees, dK, side="right")
-            return np.asarray(C[piece] * dK ** m[piece])
+            return powered("piecewise", C[piece], dK, m[piece])
 
         return shaped(
             rate, dK, ratio, a, threshold=self.threshold, approach=self.approach, K_c=self.K_c

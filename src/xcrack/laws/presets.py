@@ -8,6 +8,7 @@ from importlib.resources import files
 from typing import Any
 
 from xcrack.errors import ProblemError
+from xcrack.inputs import shown
 from xcrack.laws.closures import newman_closure
 from xcrack.laws.fracture import forman, hartman_schijve, nasgro
 from xcrack.laws.law import Bounds, Law, Ratio, check_ratio
@@ -94,12 +95,13 @@ def law(name: str, *, units: str, ratio: Ratio | None = None) -> Any:
     known = _presets()
     if not isinstance(name, str) or name not in known:
         raise ProblemError(
-            f"law: no preset {name!r:.80}: give one of {', '.join(map(repr, known))}."
+            f"law: no preset {shown(name)}: give one of {', '.join(map(repr, known))}."
         )
     wanted = Units.read(units)
     if not wanted.consistent:
         raise ProblemError(
-            f"law: units = {units!r}: K has the root of another length: no model has such units."
+            f"law: units = {shown(units)}: K has the root of another length, which no model has: "
+            "give one length, such as m, MPa√m."
         )
     check_ratio("law", ratio)
     preset = known[name]

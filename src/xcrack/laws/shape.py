@@ -8,8 +8,8 @@ from numpy.typing import ArrayLike
 
 from xcrack.arrays import Floats
 from xcrack.errors import ProblemError
-from xcrack.inputs import number
-from xcrack.laws.law import largest_K
+from xcrack.inputs import number, shown
+from xcrack.laws.law import largest_K, sizes
 from xcrack.laws.thresholds import Threshold
 
 Approach = str | float
@@ -20,12 +20,14 @@ def check_approach(name: str, approach: Any, threshold: Threshold | None) -> App
     if isinstance(approach, str):
         if approach not in ("cut", "difference"):
             raise ProblemError(
-                f'{name}: approach = {approach!r}: give "cut", "difference" or an exponent p.'
+                f'{name}: approach = {shown(approach)}: give "cut", "difference" or an exponent p.'
             )
     else:
         approach = number(approach, f"{name}: approach", above=0)
     if threshold is None and approach != "cut":
-        raise ProblemError(f"{name}: approach = {approach!r} without a threshold: give threshold=.")
+        raise ProblemError(
+            f"{name}: approach = {shown(approach)} without a threshold: give threshold=."
+        )
     return approach
 
 
@@ -51,6 +53,7 @@ def shaped(
     threshold, approach, K_c
         As of `paris`.
     """
+    a = sizes("the law", a, np.broadcast_shapes(dK.shape, R.shape))
     result = np.asarray(rate(dK))
     if threshold is not None:
         least = np.asarray(threshold(R, a))

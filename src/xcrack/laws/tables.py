@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from xcrack.arrays import Floats
 from xcrack.errors import ProblemError
-from xcrack.inputs import number, numbers
+from xcrack.inputs import number, numbers, one_of
 from xcrack.laws.law import Ratio, WithUnits, check_ratio, range_and_ratio
 from xcrack.laws.units import factors
 
@@ -59,10 +59,7 @@ class rate_table(WithUnits):  # noqa: N801 - it is used as a function
 
     def __post_init__(self) -> None:
         check_ratio("rate_table", self.ratio)
-        if self.outside not in ("refuse", "nearest"):
-            raise ProblemError(
-                f'rate_table: outside = {self.outside!r}: give "refuse" or "nearest".'
-            )
+        one_of(self.outside, "rate_table: outside", ("refuse", "nearest"))
         given: list[tuple[Any, Any]] = []
         if isinstance(self.curves, Mapping):
             given = list(self.curves.items())

@@ -7,9 +7,9 @@ from numpy.typing import ArrayLike
 
 from xcrack.arrays import Floats
 from xcrack.errors import ProblemError
-from xcrack.inputs import number, numbers
+from xcrack.inputs import number, numbers, shown
 from xcrack.laws.closures import newman_closure
-from xcrack.laws.law import WithUnits, set_floats
+from xcrack.laws.law import WithUnits, set_floats, sizes, stress_ratio
 from xcrack.laws.units import factors
 
 Powers = dict[str, tuple[float, float]]
@@ -58,7 +58,7 @@ class klesnil_lukas(WithUnits):  # noqa: N801 - it is used as a function
 
     def __call__(self, R: ArrayLike, a: ArrayLike | None = None) -> Floats:
         """Threshold for R, stress √length."""
-        ratio = numbers(R, "klesnil_lukas: R")
+        ratio = stress_ratio("klesnil_lukas", R)
         return np.asarray(self.dK0 * np.maximum(1.0 - ratio, 0.0) ** self.gamma)[()]
 
 
@@ -123,7 +123,7 @@ class stepped_threshold(WithUnits):  # noqa: N801
 
     def __call__(self, R: ArrayLike, a: ArrayLike | None = None) -> Floats:
         """Threshold for R, stress √length."""
-        ratio = numbers(R, "stepped_threshold: R")
+        ratio = stress_ratio("stepped_threshold", R)
         low, high = self.R
         falling = self.dK[1] - self.slope * (ratio - low)
         return np.asarray(
@@ -163,7 +163,7 @@ class el_haddad(WithUnits):  # noqa: N801
     def __post_init__(self) -> None:
         if not isinstance(self.long, klesnil_lukas | stepped_threshold):
             raise ProblemError(
-                f"el_haddad: long = {self.long!r:.80}: give klesnil_lukas or stepped_threshold."
+                f"el_haddad: long = {shown(self.long)}: give klesnil_lukas or stepped_threshold."
             )
         set_floats(self, a0=number(self.a0, "el_haddad: a0", above=0))
 
@@ -177,6 +177,8 @@ class el_haddad(WithUnits):  # noqa: N801
 
     def __call__(self, R: ArrayLike, a: ArrayLike | None = None) -> Floats:
         """Threshold for R of a crack of the size a, stress √length."""
+        ratio = stress_ratio("el_haddad", R)
+        a = sizes("el_haddad", a, ratio.shape) if ratio.ndim else a
         return np.asarray(self.long(R) * short(a, self.a0, "el_haddad"))[()]
 
 
@@ -225,7 +227,9 @@ class nasgro3_threshold(WithUnits):  # noqa: N801
 
     def of(self, closure: newman_closure, R: ArrayLike, a: ArrayLike | None = None) -> Floats:
         """Threshold of a law with this closure, for R and a crack of the size a."""
-        ratio = np.asarray(numbers(R, "nasgro3_threshold: R"))
+        _check_newman("nasgro3_threshold", closure)
+        ratio = stress_ratio("nasgro3_threshold", R)
+        a = sizes("nasgro3_threshold", a, ratio.shape) if ratio.ndim else a
         U = closure(ratio)
         inner = U / (1 - closure.A[0])
         size = short(a, self.a0, "nasgro3_threshold")
@@ -286,7 +290,9 @@ class nasgro4_threshold(WithUnits):  # noqa: N801
 
     def of(self, closure: newman_closure, R: ArrayLike, a: ArrayLike | None = None) -> Floats:
         """Threshold of a law with this closure, for R and a crack of the size a."""
-        ratio = np.asarray(numbers(R, "nasgro4_threshold: R"))
+        _check_newman("nasgro4_threshold", closure)
+        ratio = stress_ratio("nasgro4_threshold", R)
+        a = sizes("nasgro4_threshold", a, ratio.shape) if ratio.ndim else a
         if self.R_clip is not None:
             ratio = np.minimum(ratio, self.R_clip)
         by_range, open_at_0 = 1 / closure(ratio), 1 - closure.A[0]
@@ -304,9 +310,14 @@ def check_threshold(name: str, threshold: object) -> None:
     """Refuse what is no threshold of a law with a free closure."""
     if threshold is not None and not isinstance(threshold, Threshold):
         raise ProblemError(
-            f"{name}: threshold = {threshold!r:.80}: give klesnil_lukas, stepped_threshold or "
+            f"{name}: threshold = {shown(threshold)}: give klesnil_lukas, stepped_threshold or "
             "el_haddad; those of NASGRO belong to nasgro."
         )
+
+
+def _check_newman(name: str, closure: object) -> None:
+    if not isinstance(closure, newman_closure):
+        raise ProblemError(f"{name}: closure = {shown(closure)}: give newman_closure.")
 
 
 def short(a: ArrayLike | None, a0: float, name: str) -> Floats:
@@ -317,7 +328,9 @@ def short(a: ArrayLike | None, a0: float, name: str) -> Floats:
         raise ProblemError(f"{name}: the crack size a is needed: call the law with a=...")
     size = numbers(a, f"{name}: a")
     if (size <= 0).any():
-        raise ProblemError(f"{name}: a = {size.min():.6g}: a crack size is positive.")
+        raise ProblemError(
+            f"{name}: a = {size.min():.6g}: a crack size is positive, give one above 0."
+        )
     return np.asarray(np.sqrt(size / (size + a0)))
 
 

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from xcrack.errors import ProblemError
+from xcrack.inputs import shown
 
 _LENGTHS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "in": 0.0254, "inch": 0.0254}
 # International foot-pound units (NIST SP 811): 1 lbf = 4.4482216152605 N, 1 in = 0.0254 m.
@@ -45,11 +46,11 @@ class Units:
             It is no text, or not of this form, or a unit is not known.
         """
         if not isinstance(text, str):
-            raise ProblemError(f'units = {text!r}: give a text such as "mm, MPa√mm".')
+            raise ProblemError(f'units = {shown(text)}: give a text such as "mm, MPa√mm".')
         parts = [part.strip() for part in text.split(",")]
         if len(parts) != 2 or parts[0] not in _LENGTHS:
             raise ProblemError(
-                f'units = {text!r}: give length and K, such as "m, MPa√m" or "mm, N/mm^1.5"; '
+                f'units = {shown(text)}: give length and K, such as "m, MPa√m" or "mm, N/mm^1.5"; '
                 f"lengths are {', '.join(_LENGTHS)}."
             )
         length = _LENGTHS[parts[0]]
@@ -66,7 +67,7 @@ def _K_of(text: str, whole: str) -> tuple[float, float]:
     )
     if not root or stress.rstrip("*·") not in _STRESSES or length not in _LENGTHS:
         raise ProblemError(
-            f"units = {whole!r}: {text!r} is no unit of K that is known: give a stress "
+            f"units = {shown(whole)}: {shown(text)} is no unit of K that is known: give a stress "
             f"({', '.join(_STRESSES)}), √ and a length, such as MPa√m, or N/mm^1.5."
         )
     return _STRESSES[stress.rstrip("*·")] * np.sqrt(_LENGTHS[length]), _LENGTHS[length]

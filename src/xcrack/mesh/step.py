@@ -1,6 +1,7 @@
 """Bodies from CAD: a STEP file meshed by gmsh, with sets of its faces."""
 
 from collections.abc import Callable, Mapping, Sequence
+from math import log10
 from os import PathLike
 from pathlib import Path
 from types import ModuleType
@@ -17,6 +18,7 @@ from xcrack.mesh.mesh import Mesh, sound_mesh
 from xcrack.paths import path_of, system_errors
 
 Selector = Callable[[Floats], Any] | Sequence[int]
+_MOST_POINTS = 5_000_000
 _PLANE = 1e-7  # share of the size of a shape within which it lies in a plane z = constant
 
 
@@ -52,7 +54,7 @@ def mesh_step(
         The file is missing, or gmsh is.
     GeometryError
         No closed body in the file, a selector without a face or with other values than bools, a
-        size that is not positive.
+        size that is not positive, or so small that millions of points would be needed.
     MeshError
         gmsh cannot mesh the shape.
     """
@@ -72,6 +74,8 @@ def mesh_step(
         )
     with session() as gmsh:
         dim = _shape(gmsh, path)
+        if not callable(size_at):
+            _check_cost(gmsh, dim, size_at)
         failures = _set_size(gmsh, size_at)
         try:
             gmsh.model.mesh.generate(dim)
@@ -109,6 +113,16 @@ def _shape(gmsh: ModuleType, path: Path) -> int:
                 "Close the gaps in the CAD program and export the part as a solid."
             )
     return _joined(gmsh, 3)
+
+
+def _check_cost(gmsh: ModuleType, dim: int, size: float) -> None:
+    """Raise where a size asks for more points than any machine meshes."""
+    content = sum(gmsh.model.occ.getMass(dim, tag) for _, tag in gmsh.model.getEntities(dim))
+    if content > 0 and log10(content) - dim * log10(size) > log10(_MOST_POINTS):
+        raise GeometryError(
+            f"mesh_step: size = {size:g} asks for more than {_MOST_POINTS:.0e} points: enlarge it, "
+            "or give a function that is small only where cracks run."
+        )
 
 
 def _joined(gmsh: ModuleType, dim: int) -> int:

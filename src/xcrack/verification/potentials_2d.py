@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from xcrack.arrays import Floats
 from xcrack.errors import ProblemError
+from xcrack.inputs import shown
 
 Plane = Literal["strain", "stress"]
 Complexes = NDArray[np.complex128]
@@ -207,5 +208,5 @@ def _packed(w: Complexes, trace: Floats, syy: Floats, sxy: Floats) -> Values:
 
 def _is_strain(plane: str) -> bool:
     if plane not in ("strain", "stress"):
-        raise ProblemError(f'plane is "strain" or "stress", not {plane!r}')
+        raise ProblemError(f'plane is "strain" or "stress", not {shown(plane)}')
     return plane == "strain"
