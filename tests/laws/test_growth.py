@@ -7,7 +7,7 @@ from support.growth_fakes import mode_I, patch_respond, plate
 from xcrack.crack.lines import line_crack
 from xcrack.errors import ProblemError
 from xcrack.growth.criteria import max_hoop_stress
-from xcrack.growth.rating import nominal_range
+from xcrack.growth.nominal import nominal_range
 from xcrack.growth.run import grow
 from xcrack.growth.step import Cycle
 from xcrack.laws.closures import newman_closure

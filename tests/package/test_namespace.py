@@ -29,6 +29,8 @@ NAMES = [
     "presets", "rate_table", "schijve_closure", "stepped_threshold",
     # verification, reports, files of scenes
     "verify", "report", "read_case", "run", "info", "demo", "convert_mesh",
+    # spectra
+    "Spectrum", "rainflow", "read_spectrum", "twist",
     # errors
     "ConvergenceError", "GeometryError", "MeshError", "ProblemError", "XcrackError",
     "XcrackWarning",

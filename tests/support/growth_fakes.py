@@ -52,19 +52,23 @@ def patch_respond(monkeypatch, K_of, radius=1.5):
     def respond(problem, run, reuse):
         calls.append((problem.numerics, reuse))
         n = sum(crack.n_tips for crack in problem.placed)
-        solution = SimpleNamespace(
-            problem=problem,
-            space=SimpleNamespace(radius=np.full(n, radius)),
-            reuse=Reuse(
-                centre=(np.full((1, 2), 1.0 if not reuse.centre else reuse.centre[0] + 1),)
-            ),
+        solutions = tuple(
+            SimpleNamespace(
+                problem=problem,
+                state=load,
+                space=SimpleNamespace(radius=np.full(n, radius)),
+                reuse=Reuse(
+                    centre=(np.full((1, 2), 1.0 if not reuse.centre else reuse.centre[0] + 1),)
+                ),
+            )
+            for load in run.cycle.load_states
         )
         full = [K_of(problem, c) for c in range(len(problem.placed))]
         answers = tuple(
             tuple(sif(crack, load * np.asarray(K)) for crack, K in zip(problem.placed, full))
             for load in run.cycle.load_states
         )
-        return tuple(solution for _ in answers), answers, solution.reuse
+        return solutions, answers, solutions[0].reuse
 
     monkeypatch.setattr(growth, "respond", respond)
     return calls

@@ -3,15 +3,20 @@
 import inspect
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, replace
+from numbers import Real
 from typing import Any, TypedDict, TypeVar, cast
 
-from xcrack.errors import ProblemError
+import numpy as np
+
+from xcrack.errors import ProblemError, warn
 from xcrack.growth.criteria import Criterion
 from xcrack.growth.fingerprint import DEFAULTS, describe, with_defaults_of
 from xcrack.growth.step import Cycle
 from xcrack.inputs import number, shown, whole
 from xcrack.laws.law import Law
 from xcrack.scene.problem import Problem
+from xcrack.spectra.rainflow import turning_points
+from xcrack.spectra.spectrum import Spectrum
 
 _STOPS = {"changes_results": False}  # when a run stops, not how its cracks grow
 
@@ -52,7 +57,7 @@ class Run:
     problem: Problem
     law: Law
     criterion: Criterion
-    cycle: Cycle
+    cycle: Cycle | Spectrum
     da: float | None = None
     cycles: float | None = None
     scaling: str = "law"
@@ -73,10 +78,18 @@ class Run:
                     f"grow: {name} = {shown(getattr(self, name))} cannot be called: give a "
                     "function of two arguments."
                 )
-        if not isinstance(self.cycle, Cycle):
-            raise ProblemError(f"grow: cycle = {shown(self.cycle)}: give Cycle(min, max).")
+        if not isinstance(self.cycle, Cycle | Spectrum):
+            raise ProblemError(
+                f"grow: cycle = {shown(self.cycle)}: give Cycle(min, max), or a Spectrum."
+            )
         for state in self.cycle.load_states:
             self.problem.state(state)
+        if isinstance(self.cycle, Cycle) and looks_like_history(self.cycle):
+            warn(
+                f"Cycle(states=...) with {len(self.cycle.load_states)} factors turns more than "
+                "twice, but counts as one cycle from the smallest to the largest: a load history "
+                "is a Spectrum(factors)."
+            )
         if not self.problem.cracks:
             raise ProblemError("grow: the problem has no crack; growth does not start one.")
         if self.da is None and self.cycles is None:
@@ -112,12 +125,20 @@ class Run:
         return replace(with_defaults_of(self, defaults, stored), defaults=defaults)
 
 
+def looks_like_history(cycle: Cycle) -> bool:
+    """Whether the states of a cycle are factors that go up and down more than once."""
+    states = cycle.load_states
+    if not all(isinstance(state, Real) for state in states):
+        return False
+    return len(turning_points(np.array(states, dtype=float))) > 2
+
+
 def run_of(
     caller: str,
     problem: Problem,
     law: Law,
     criterion: Criterion,
-    cycle: Cycle,
+    cycle: Cycle | Spectrum,
     da: float | None,
     options: GrowOptions,
 ) -> Run:

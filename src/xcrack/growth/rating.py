@@ -2,26 +2,36 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
+from xcrack.analysis.solution import Solution
 from xcrack.analysis.solve import solve_states
 from xcrack.arrays import Floats
-from xcrack.errors import ProblemError
+from xcrack.errors import ProblemError, warn
 from xcrack.growth.advance import PerCrack
+from xcrack.growth.block import Answers, block_of, left_out_share, pairs_of, rated
 from xcrack.growth.checks import evaluate_criterion, evaluate_law
 from xcrack.growth.follow import following
+from xcrack.growth.ladder import factors_of, respond_to
+from xcrack.growth.nominal import nominal_range
 from xcrack.growth.options import Run
+from xcrack.growth.step import Cycle, Step
 from xcrack.laws.law import Law
 from xcrack.scene.problem import Problem
-from xcrack.sif.sif import SIF
 from xcrack.sif.stress_intensity import stress_intensities
+from xcrack.solvers.reuse import Reuse
+from xcrack.spectra.spectrum import Spectrum
+
+_LEFT_OUT = 1e-3  # share of the growth of a block
 
 Rates = tuple[PerCrack, PerCrack, PerCrack, PerCrack]
-Answers = Sequence[Sequence[SIF]]  # of each state, of each crack
+PerPlace = tuple[Floats, Floats, Floats, Floats]
+Response = tuple[Sequence[Solution], Answers]
 
 
-def rates_of(run: Run, problem: Problem, sif: Answers) -> Rates:
+def rates_of(run: Run, problem: Problem, sif: Answers, solutions: Sequence[Solution]) -> Rates:
     """Ask criterion and law of a run what K of all load states means.
 
     Parameters
@@ -31,59 +41,53 @@ def rates_of(run: Run, problem: Problem, sif: Answers) -> Rates:
         With the cracks that K belongs to.
     sif : sequence of sequence of SIF
         ``sif[state][crack]``.
+    solutions : sequence of Solution
+        One a state; their factors are the levels of a spectrum.
 
     Returns
     -------
     angle, dK_eq, R, law_rate : tuple of (f,) arrays
-        One array a crack; the rates before a threshold of the run.
+        One array a crack; the rates before a threshold of the run, but for a spectrum, whose cycles
+        are held against it one by one.
     """
-    place, nu = following(problem.mesh).PLACE, problem.material.nu
-    nominal = sif
-    if getattr(run.law, "ratio", None) == "nominal" and problem.contact != "off":
-        nominal = _without_contact(run, problem)
     _check_choice(run, sif)
-    parts = []
-    for c in range(len(problem.placed)):
-        K = np.stack([state[c].K for state in sif])
-        angle, dK, R = evaluate_criterion(run.criterion, K, nu, c, place)
-        if getattr(run.law, "ratio", None) == "nominal":
-            dK, R = nominal_range(np.stack([state[c].K for state in nominal]), angle, nu)
-        a = size_at_places(problem, c, len(dK))
-        parts.append((angle, dK, R, evaluate_law(run.law, dK, R, c, place, a)))
+    free = None
+    if getattr(run.law, "ratio", None) == "nominal":
+        free = (solutions, sif) if problem.contact == "off" else _without_contact(run, problem)
+    rate = _rates_of_blocks if isinstance(run.cycle, Spectrum) else _rates_of_cycle
+    parts = rate(run, problem, (solutions, sif), free)
     angles, ranges, ratios, rates = zip(*parts, strict=True)
     return angles, ranges, ratios, rates
 
 
-def nominal_range(K: Floats, angle: Floats, nu: float) -> tuple[Floats, Floats]:
-    """Range and ratio of a crack whose faces may overlap, R < 0 included.
+def _rates_of_cycle(
+    run: Run, problem: Problem, response: Response, free: Response | None
+) -> list[PerPlace]:
+    """Direction, range, ratio and rate of one cycle at the places of each crack."""
+    place, nu = following(problem.mesh).PLACE, problem.material.nu
+    parts = []
+    for c in range(len(problem.placed)):
+        K = np.stack([state[c].K for state in response[1]])
+        angle, dK, R = evaluate_criterion(run.criterion, K, nu, c, place)
+        if free is not None:
+            dK, R = nominal_range(np.stack([state[c].K for state in free[1]]), angle, nu)
+        a = size_at_places(problem, c, len(dK))
+        parts.append((angle, dK, R, evaluate_law(run.law, dK, R, c, place, a)))
+    return parts
 
-    Parameters
-    ----------
-    K : (s, f, 2 or 3) array, stress √length
-        Of the scene without contact.
-    angle : (f,) array, rad
-        Direction at each place.
-    nu : float
 
-    Returns
-    -------
-    dK_eq : (f,) array, stress √length
-    R : (f,) array
-        0 where no state opens the place; the range is 0 there too.
-
-    Notes
-    -----
-    K_eq as of `equivalent_K`, but for its sign: where the hoop stress is compressive it is the
-    bracket of Erdogan and Sih alone, and negative.
-    """
-    cos, sin = np.cos(angle / 2), np.sin(angle / 2)
-    K_eq = cos**2 * (K[..., 0] * cos - 3 * K[..., 1] * sin)
-    if K.shape[-1] == 3:
-        K_eq = np.where(K_eq >= 0, np.hypot(K_eq, K[..., 2] / np.sqrt(1 - nu)), K_eq)
-    largest, smallest = K_eq.max(axis=0), K_eq.min(axis=0)
-    opens = largest > 0
-    R = np.divide(smallest, largest, out=np.zeros_like(largest), where=opens)
-    return np.where(opens, largest - smallest, 0.0), R
+def _rates_of_blocks(
+    run: Run, problem: Problem, response: Response, free: Response | None
+) -> list[PerPlace]:
+    """The same of a block of cycles."""
+    place, nu = following(problem.mesh).PLACE, problem.material.nu
+    every = pairs_of(run, problem, *response)
+    nominal = [None] * len(every) if free is None else pairs_of(run, problem, *free)
+    parts = []
+    for c, (pairs, other) in enumerate(zip(every, nominal, strict=True)):
+        a = size_at_places(problem, c, pairs.K.shape[2])
+        parts.append(block_of(rated(run, pairs, nu, c, place, a, other), pairs.count))
+    return parts
 
 
 def size_at_places(problem: Problem, c: int, n: int) -> Floats:
@@ -96,6 +100,26 @@ def size_at_places(problem: Problem, c: int, n: int) -> Floats:
     size = following(problem.mesh).crack_size(crack, problem.mesh)
     tips = max(n, 1) if crack.fronts is None else 1
     return np.full(n, size / tips)
+
+
+def levels_of(cycle: Cycle | Spectrum, solutions: Sequence[Solution]) -> tuple[float, ...]:
+    """Factors of the solved states of a spectrum of factors."""
+    if not isinstance(cycle, Spectrum) or cycle.states is not None:
+        return ()
+    return tuple(factors_of(solutions).tolist())
+
+
+def warn_of_left_out(run: Run, first: Step) -> None:
+    """Say how much growth a spectrum leaves out with its small cycles, if it is worth a word."""
+    if not isinstance(run.cycle, Spectrum):
+        return
+    share = left_out_share(run, first.solutions[0].problem, first.solutions, first.sif)
+    if share > _LEFT_OUT:
+        warn(
+            f"the cycles that the spectrum leaves out are {share:.2%} of the growth of a block at "
+            "the place where they matter most, before the first step: lives are too long by as "
+            "much. Omit less to keep them."
+        )
 
 
 def check_choice(law: Law, ratio: float | None) -> None:
@@ -127,18 +151,39 @@ def _choice(reason: str, law: Law) -> str:
     )
 
 
-def _without_contact(run: Run, problem: Problem) -> tuple[tuple[SIF, ...], ...]:
-    """K of all states of the scene in which crack faces may overlap."""
+def _without_contact(run: Run, problem: Problem) -> Response:
+    """Solutions and K of the scene in which crack faces may overlap."""
     free = replace(problem, contact="off")
-    solutions = solve_states(free, run.cycle.load_states, solver=run.solver)
-    by_crack = [stress_intensities(solutions, c) for c in range(len(problem.cracks))]
-    return tuple(zip(*by_crack, strict=True))
+    return respond_to_cycle(free, run.cycle, run.solver, Reuse())[:2]
+
+
+def respond_to_cycle(
+    problem: Problem, cycle: Cycle | Spectrum, solver: Any, reuse: Reuse
+) -> tuple[tuple[Solution, ...], Answers, Reuse]:
+    """Solutions of all load states, K of each crack in each of them, and what serves the next.
+
+    The factor is handed on, but not kept with the solutions.
+    """
+
+    def solve(states: Sequence[Any], reuse: Reuse) -> tuple[tuple[Solution, ...], Answers, Reuse]:
+        solutions = solve_states(problem, states, reuse=reuse, solver=solver)
+        handed_on = solutions[0].reuse
+        light = handed_on.without_factor()
+        solutions = [replace(solution, reuse=light) for solution in solutions]
+        by_crack = [stress_intensities(solutions, c) for c in range(len(problem.cracks))]
+        return tuple(solutions), tuple(zip(*by_crack, strict=True)), handed_on
+
+    if isinstance(cycle, Spectrum) and cycle.states is None:
+        return respond_to(problem, cycle, solve, reuse)
+    return solve(cycle.load_states, reuse)
 
 
 __all__ = [
     "check_choice",
+    "levels_of",
     "must_choose",
-    "nominal_range",
     "rates_of",
+    "respond_to_cycle",
     "size_at_places",
+    "warn_of_left_out",
 ]

@@ -8,7 +8,6 @@ from typing import Unpack
 import numpy as np
 
 from xcrack.analysis.solution import Solution
-from xcrack.analysis.solve import solve_states
 from xcrack.crack.crack import Crack
 from xcrack.errors import GeometryError, ProblemError, XcrackError, warn
 from xcrack.growth.advance import LEAST, Advance, PerCrack, plan_advance
@@ -19,14 +18,20 @@ from xcrack.growth.follow import following
 from xcrack.growth.notices import Notices
 from xcrack.growth.options import GrowOptions, Run, lists_options, run_of
 from xcrack.growth.progress import report_end, report_step
-from xcrack.growth.rating import check_choice, rates_of
+from xcrack.growth.rating import (
+    check_choice,
+    levels_of,
+    rates_of,
+    respond_to_cycle,
+    warn_of_left_out,
+)
 from xcrack.growth.step import Cycle, Memory, Step, memory_of
 from xcrack.laws.law import Law
 from xcrack.mesh.locate import cell_sizes
 from xcrack.scene.problem import Problem
 from xcrack.sif.sif import SIF
-from xcrack.sif.stress_intensity import stress_intensities
 from xcrack.solvers.reuse import Reuse
+from xcrack.spectra.spectrum import Spectrum
 
 
 @lists_options
@@ -34,7 +39,7 @@ def grow(
     problem: Problem,
     law: Law,
     criterion: Criterion,
-    cycle: Cycle,
+    cycle: Cycle | Spectrum,
     da: float | None = None,
     **options: Unpack[GrowOptions],
 ) -> Generator[Step, None, str]:
@@ -54,7 +59,8 @@ def grow(
         without contact, in the direction that K with contact asks for: one more solve a step.
     criterion : callable (K, nu) -> (angle, dK_eq, R)
         `max_hoop_stress`, `mean_reference`, `weighted_angle` or your own; angles in rad.
-    cycle : Cycle
+    cycle : Cycle or Spectrum
+        Of a spectrum `cycles` and `max_cycles` count repetitions, and so do the cycles of a step.
     da : float, length, optional
         Largest advance of any tip in a step.
     cycles : float, optional
@@ -113,6 +119,7 @@ def steps_of(run: Run, last: Step | None = None) -> Generator[Step, None, str]:
             with notices.watch(0):
                 last, reuse = _next_step(run, run.problem, None, Reuse(), settings)
                 _warn_of_ratio(run, last)
+                warn_of_left_out(run, last)
             yield last
         else:
             reuse = memory_of(last).reuse
@@ -190,7 +197,7 @@ def _next_step(
     before = None if last is None else memory_of(last)
     cracks, mesh = problem.placed, problem.mesh
     solutions, sif, handed_on = respond(problem, run, reuse)
-    angle, dK_eq, R, law_rates = rates_of(run, problem, sif)
+    angle, dK_eq, R, law_rates = rates_of(run, problem, sif, solutions)
     rate = tuple(np.where(d < run.threshold, 0.0, r) for d, r in zip(dK_eq, law_rates))
     length = tuple(following(mesh).crack_size(crack, mesh) for crack in cracks)
     if last is None or before is None:
@@ -217,6 +224,7 @@ def _next_step(
         da=plan.da,
         solutions=solutions,
         memory=memory,
+        levels=levels_of(run.cycle, solutions),
     )
     since = n_cycles - (0.0 if last is None else last.cycles)
     report_step(run, step, since, time.perf_counter() - begin)
@@ -230,13 +238,7 @@ def respond(
 
     The factor is handed on, but not kept with the solutions.
     """
-    states = run.cycle.load_states
-    solutions = solve_states(problem, states, reuse=reuse, solver=run.solver)
-    handed_on = solutions[0].reuse
-    light = handed_on.without_factor()
-    solutions = [replace(solution, reuse=light) for solution in solutions]
-    by_crack = [stress_intensities(solutions, c) for c in range(len(problem.cracks))]
-    return tuple(solutions), tuple(zip(*by_crack, strict=True)), handed_on
+    return respond_to_cycle(problem, run.cycle, run.solver, reuse)
 
 
 def _plan(

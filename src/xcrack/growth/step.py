@@ -140,6 +140,8 @@ class Step:
         One for each load state; empty in a step that was read from disk.
     memory : Memory, optional
         What the next step needs.
+    levels : tuple of float
+        Factors of the load states of a spectrum of factors, in the order of `sif`.
 
     Raises
     ------
@@ -158,6 +160,7 @@ class Step:
     da: PerCrack
     solutions: tuple[Solution, ...] = ()
     memory: Memory | None = None
+    levels: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         whole(self.index, "Step: index", least=0)

@@ -22,6 +22,7 @@ from xcrack.laws.law import Law
 from xcrack.mesh.mesh import Mesh
 from xcrack.paths import path_of, system_errors
 from xcrack.scene.problem import Problem
+from xcrack.spectra.spectrum import Spectrum
 
 Until = Callable[[Step], bool]
 
@@ -93,7 +94,7 @@ def resume(
     problem: Problem,
     law: Law,
     criterion: Criterion,
-    cycle: Cycle,
+    cycle: Cycle | Spectrum,
     da: float | None = None,
     *,
     until: Until | None = None,

@@ -41,6 +41,7 @@ def _table_2d(steps: Sequence[Step]) -> tuple[list[str], list[tuple[Any, ...]]]:
             parts = [*(measure(step, c) for measure in quality.values()), *_parts(step, c)]
             for j in range(len(step.angle[c])):
                 K = [value for state in step.sif for value in state[c].K[j]]
+                K += [np.nan] * (2 * (len(states) - len(step.sif)))
                 own = [values[j] for values in parts]
                 rows.append((step.index, step.cycles, c, j, *x[j], _size(step, c), *K, *own))
     return names, rows

@@ -1,0 +1,1 @@
+"""Load histories: turning points, rainflow cycles, files, and the spectrum TWIST."""
