@@ -345,7 +345,7 @@ ENTRIES = [
                 [1.0],
                 words=["load"],
             ),
-            "quantity": arg(Called(optional=True), None, lambda found: 1.0 + np.size(found)),
+            "quantity": arg(Called(optional=True), None, lambda solution: 1.0 + np.size(solution)),
             "wanted": arg(Number(optional=True, above=0), None, 1e-2),
             "repeat": arg(Whole(least=1, most=1000, far=2), 1),
             "seconds": arg(Number(above=0), 0.05),
@@ -402,7 +402,7 @@ HOOKS = [
     Hook(
         "chart",
         lambda f: _charted(quantity=f),
-        lambda found: found.energy,
+        lambda solution: solution.energy,
         Seen(rule=_quantity),
         "quantity of chart",
         cost=0.5,

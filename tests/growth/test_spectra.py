@@ -209,7 +209,7 @@ def test_ratio_of_each_cycle_is_seen(monkeypatch):
     assert step.R[0] == pytest.approx(0.1, rel=1e-12)
 
 
-def test_omitted_growth_is_told(monkeypatch):
+def test_omitted_growth_warns(monkeypatch):
     patch_respond(monkeypatch, mode_I(stress=1.0))
     rows = Spectrum(rows=ROWS)
     with pytest.warns(XcrackWarning, match=r"leaves out are 0.37% of the growth"):
@@ -238,7 +238,7 @@ def test_named_states():
     )
 
 
-def test_a_cycle_that_looks_like_a_history_is_told(monkeypatch):
+def test_a_cycle_that_looks_like_a_history_warns(monkeypatch):
     patch_respond(monkeypatch, mode_I(stress=1.0))
     with pytest.warns(XcrackWarning, match="Spectrum"):
         first(Cycle(states=[0.0, 1.0, 0.4, 0.9]), plate())

@@ -11,9 +11,9 @@ import numpy as np
 from xcrack.analysis.solution import Solution
 from xcrack.errors import XcrackError
 from xcrack.history.history import History
+from xcrack.plotting.figures import finished
 from xcrack.plotting.fronts_3d import draw_K
 from xcrack.plotting.plot import plot
-from xcrack.plotting.saving import save_figure
 from xcrack.sif.sif import SIF
 
 Picture = tuple[str, bytes]  # words, PNG
@@ -110,7 +110,7 @@ def _rates(history: History, file: Path) -> None:
     axes.grid(True, which="both", alpha=0.3)
     if axes.get_legend_handles_labels()[0]:
         axes.legend(fontsize="small")
-    save_figure(figure, file, "report: picture")
+    finished(figure, Path(file), window=False)
 
 
 def _drawn(drawers: Sequence[tuple[str, Draw]]) -> tuple[list[Picture], list[str]]:

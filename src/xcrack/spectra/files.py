@@ -5,7 +5,8 @@ from pathlib import Path
 import numpy as np
 
 from xcrack.errors import ProblemError
-from xcrack.inputs import path_of, system_errors, whole
+from xcrack.inputs import whole
+from xcrack.paths import path_of, system_errors
 from xcrack.spectra.spectrum import Spectrum
 
 _COMMENTS = ("#", "%", "!", "//")
