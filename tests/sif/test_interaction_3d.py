@@ -380,8 +380,8 @@ def test_no_cell_of_a_domain_is_left_out(monkeypatch):
     result = xc.stress_intensity(solution)
     plain = FrontCurve.distance
 
-    def none(self, x):
-        return np.zeros(len(x)) if len(x) == len(mesh.cells) else plain(self, x)
+    def none(self, x, bound):
+        return np.zeros(len(x)) if len(x) == len(mesh.cells) else plain(self, x, bound)
 
     monkeypatch.setattr(FrontCurve, "distance", none)
     np.testing.assert_allclose(result.K, xc.stress_intensity(solution).K, atol=1e-10)

@@ -28,18 +28,17 @@ def set_gradients(gradient, number, slope, functions, row, coefficients):  # typ
         to = number[p]
         for i in range(d):
             for s in range(states):
-                x, y, z = 0.0, 0.0, 0.0
+                x, y, z = 0.0, 0.0, 0.0  # in 2D y and z are the same
                 for a in range(slope.shape[1]):
                     f = functions[row[p], a]
                     if f >= 0:
                         c = coefficients[f, i, s]
                         x += slope[p, a, 0] * c
                         y += slope[p, a, 1] * c
-                        if d == 3:
-                            z += slope[p, a, 2] * c
-                gradient[to, i, 0, s], gradient[to, i, 1, s] = x, y
-                if d == 3:
-                    gradient[to, i, 2, s] = z
+                        z += slope[p, a, d - 1] * c
+                gradient[to, i, 0, s] = x
+                gradient[to, i, 1, s] = y
+                gradient[to, i, d - 1, s] = z
 
 
 @kernel
