@@ -8,8 +8,9 @@ thread for the same reason.
 """
 
 import os
+from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from contextvars import ContextVar
 from functools import cache
@@ -100,6 +101,24 @@ def each(function: Callable[[Task], Result], tasks: Iterable[Task]) -> list[Resu
     if pool is None:
         return [function(task) for task in tasks]
     return list(pool.map(function, tasks))
+
+
+def streamed(function: Callable[[Task], Result], tasks: Iterable[Task]) -> Iterator[Result]:
+    """Results of `each` one by one, while later ones are made: at most two a thread wait.
+
+    What takes them, say the sum of chunks, runs beside the tasks, and memory is bounded.
+    """
+    pool = _pool.get()
+    if pool is None:
+        yield from map(function, tasks)
+        return
+    ahead: deque[Future[Result]] = deque()
+    for task in tasks:
+        ahead.append(pool.submit(function, task))
+        if len(ahead) > number_of_threads():
+            yield ahead.popleft().result()
+    while ahead:
+        yield ahead.popleft().result()
 
 
 class _Blas:

@@ -15,7 +15,10 @@ import threadpoolctl
 
 import xcrack as xc
 from xcrack import threads
+from xcrack.geometry import distances
+from xcrack.sif import domain_3d
 from xcrack.solvers import row_blocks
+from xcrack.xfem import assembly
 
 
 def plane(n=24):
@@ -44,7 +47,11 @@ def bits(problem, count=None):
 
 @pytest.mark.parametrize("scene", [plane, solid])
 def test_the_same_bits_for_any_number(scene, monkeypatch):
-    monkeypatch.setattr(row_blocks, "_LEAST", 1000)  # small matrices are shared too
+    # Small matrices are shared too, and few cells and points make many tasks.
+    monkeypatch.setattr(row_blocks, "_LEAST", 1000)
+    monkeypatch.setattr(assembly, "_CHUNK", 1500)
+    monkeypatch.setattr(domain_3d, "_CHUNK", 150)
+    monkeypatch.setattr(distances, "_AT_ONCE", 100)
     problem = scene()
     one = bits(problem, 1)
     for count in (2, 3, 7):
@@ -104,6 +111,41 @@ def test_each_keeps_the_order_and_its_errors():
             assert threads.number_of_threads() == 3
     assert threads.number_of_threads() == 1
     assert not any(thread.name.startswith("xcrack") for thread in threading.enumerate())
+
+
+def test_results_are_taken_while_others_are_made():
+    """In order, with as many at once as there are threads; an error comes where its task stands."""
+    running, most, lock = 0, 0, threading.Lock()
+
+    def slow(k):
+        nonlocal running, most
+        with lock:
+            running += 1
+            most = max(most, running)
+        time.sleep(0.02 * (3 - k % 3))
+        with lock:
+            running -= 1
+        return k
+
+    assert list(threads.streamed(slow, range(5))) == [0, 1, 2, 3, 4]
+    assert most == 1
+    started = []
+
+    def tasks():
+        for k in range(20):
+            started.append(k)
+            yield k
+
+    with threads.threads(3):
+        results = threads.streamed(slow, tasks())
+        assert next(results) == 0
+        assert len(started) <= 5  # memory is bounded
+        assert list(results) == list(range(1, 20))
+        assert 1 < most <= 3
+        results = threads.streamed(lambda k: 1 / k, [1, 2, 0, 4])
+        assert [next(results), next(results)] == [1.0, 0.5]
+        with pytest.raises(ZeroDivisionError):
+            next(results)
 
 
 # --- processes and threads of the user -----------------------------------------------------------

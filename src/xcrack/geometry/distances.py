@@ -1,12 +1,16 @@
 """Exact distances in 3D: to triangulated surfaces, with a sign, and to polylines."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from xcrack.arrays import Bools, Floats, Ints
 from xcrack.geometry.triangulation import face_normals, side_keys
+from xcrack.threads import each
 
+_AT_ONCE = 8192  # points of one task: the same for any number of threads
 _EQUAL = 1e-14  # share of the surface's extent below which two distances are the same
 
 
@@ -94,8 +98,20 @@ def closest_in(tree: TriangleTree, x: Floats, band: float = np.inf) -> Closest:
 
     # A copy is never read-only, for which the kernel would be compiled once more.
     own = np.array(x, dtype=float, order="C")
-    nearest = closest_triangle(own, tree.corners, tree.normal, *tree.boxes, float(band), tree.tiny)
+    nearest = _in_parts(
+        closest_triangle, own, tree.corners, tree.normal, *tree.boxes, float(band), tree.tiny
+    )
     return Closest(*nearest)
+
+
+def _in_parts(kernel: Callable[..., Any], x: Floats, *arguments: Any) -> tuple[Any, ...]:
+    """What a kernel returns for points, threads taking some of the points each."""
+
+    def part(first: int) -> tuple[Any, ...]:
+        return tuple(kernel(x[first : first + _AT_ONCE], *arguments))
+
+    parts = each(part, range(0, max(len(x), 1), _AT_ONCE))
+    return tuple(np.concatenate(some) for some in zip(*parts, strict=True))
 
 
 def signed_in(tree: TriangleTree, x: Floats, band: float = np.inf) -> tuple[Floats, Ints, Bools]:
@@ -205,5 +221,5 @@ def front_distance(
         start, stop = np.ascontiguousarray(start[:-1]), np.ascontiguousarray(stop[:-1])
     tree = box_tree(np.minimum(start, stop), np.maximum(start, stop))
     x = np.array(x, dtype=float, order="C")
-    r, segment, position = closest_segment(x, start, stop, *tree, float(band))
+    r, segment, position = _in_parts(closest_segment, x, start, stop, *tree, float(band))
     return r, segment, position

@@ -32,6 +32,7 @@ from xcrack.sif.interaction_3d import (
 )
 from xcrack.sif.sif import SIF
 from xcrack.sif.smoothing_3d import along, smoothed
+from xcrack.threads import streamed
 from xcrack.xfem.loads import position
 from xcrack.xfem.quadrature import cell_points, cell_side
 
@@ -47,7 +48,7 @@ _LEAST = 1.2  # legs; the radius of the smallest domain
 _POINTS, _DEGREE = 5, 4  # 6 takes twice the time and is as far from 8, which differs by 0.3 %
 _NARROW = 1.5  # legs; a domain clipped below gives a warning
 _DIFFER = 0.05  # difference of two domains, as a share of the largest K, that gives a warning
-_CHUNK = 2000  # cells integrated at once; bounds the memory
+_CHUNK = 1000  # cells integrated at once; bounds the memory
 _SAMPLES = 400  # points of an open front among which its way into the body is looked for
 
 
@@ -262,7 +263,7 @@ def _domain_parts(
     radii: Floats,
     turn: Floats,
 ) -> Iterator[tuple[Floats, Floats]]:
-    """Domain integrals of the hats and their measures, chunk by chunk."""
+    """Domain integrals of the hats and their measures, of the same chunks for any threads."""
     space = solutions[0].space
     tip = space.tips[t]
     mesh, psi = space.mesh, space.cuts[tip.crack].level_set.psi[tip.number]
@@ -275,16 +276,17 @@ def _domain_parts(
     cells = np.nonzero(distance <= mesh.cell_size)[0]
     reach = np.linalg.norm(mesh.points[mesh.cells[cells]] - middle[cells, None], axis=2).max(axis=1)
     cells = cells[distance[cells] <= reach]
-    for first in range(0, len(cells), _CHUNK):
+
+    def part(first: int) -> tuple[Floats, Floats] | None:
         points = cell_points(space, cells[first : first + _CHUNK], _POINTS, _DEGREE)
         x = position(space, points.cell, points.bary)
         near, feet = curve.near(x, outer)
         if not len(near):
-            continue
+            return None
         points = points.chosen(near)
         gradient = gradients_at(space, coefficients, points.cell, points.bary, points.side)
         behind = np.einsum("qb,qb->q", psi[mesh.cells[points.cell]], points.bary) < 0
-        yield integrals(
+        return integrals(
             curve,
             knots,
             feet,
@@ -297,6 +299,12 @@ def _domain_parts(
             force=_force(solutions, x[near]),
             initial=initial,
         )
+
+    chunks = range(0, len(cells), _CHUNK)
+    # Functions of the user are called by one thread alone.
+    own = acts(solutions, BodyForce, InitialStress)
+    parts = map(part, chunks) if own else streamed(part, chunks)
+    yield from (result for result in parts if result is not None)
 
 
 def _force(solutions: Sequence[Solution], x: Floats) -> Floats | None:

@@ -12,6 +12,7 @@ from xcrack.inputs import shown, whole
 from xcrack.sif.domain_2d import tip_intensity
 from xcrack.sif.domain_3d import front_intensity
 from xcrack.sif.sif import SIF, joined
+from xcrack.threads import threads
 
 
 def stress_intensity(solution: Solution, crack: int = 0) -> SIF:
@@ -87,7 +88,8 @@ def stress_intensities(solutions: Sequence[Solution], crack: int = 0) -> list[SI
     live = [s for s in solutions if not s.at_rest] or solutions[:1]
     intensity = front_intensity if space.dim == 3 else tip_intensity
     ends = [t for t, tip in enumerate(space.tips) if tip.crack == crack]
-    by_end = [intensity(live, t) for t in ends]
+    with threads(solutions[0].problem.numerics.threads):
+        by_end = [intensity(live, t) for t in ends]
     by_state = [joined([states[k] for states in by_end], space.dim) for k in range(len(live))]
     place = np.cumsum([not s.at_rest for s in solutions]) - 1
     K, T = np.zeros_like(by_state[0].K), np.where(np.isnan(by_state[0].T), np.nan, 0.0)

@@ -10,14 +10,14 @@ from xcrack.mesh.mesh import Mesh
 from xcrack.mesh.simplex import cell_nodes, shape_derivatives, simplex_rule
 from xcrack.scene.material import Isotropic
 from xcrack.scene.numerics import Numerics
-from xcrack.threads import one_blas_thread
+from xcrack.threads import one_blas_thread, streamed
 from xcrack.xfem.consistent import boundary_points, corrected
-from xcrack.xfem.function_space import FunctionSpace
+from xcrack.xfem.function_space import Batch, FunctionSpace
 from xcrack.xfem.lips import LipPoints
 from xcrack.xfem.quadrature import Points, cell_points
 from xcrack.xfem.reused_cells import ReusedCells, reused_cells, with_one_jump
 
-_CHUNK = 60_000  # integration points tabulated at once; bounds the memory
+_CHUNK = 20_000  # integration points tabulated at once; bounds the memory
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,26 +109,22 @@ def enriched_stiffness(
     for batch, rows in space.batches(reusable.cells):
         products = reusable.products[rows]
         add_products(data, indptr, indices, batch.functions, products, space.n_nodes, *lame)
-    for part in _chunks(space, points, others):
-        for batch, _ in space.batches(part):
-            number, row, first = points.of_cells(batch.cells)
-            bary, weight = points.bary[number], points.weight[number]
-            side = points.side[number]
-            N, G = space.tabulate(batch, row, bary, side)
-            if batch.tips and boundary is not None:
-                G = corrected(space, batch, (row, bary, weight, side), N, G, boundary)
-            with one_blas_thread():
-                add_stiffness(
-                    data,
-                    indptr,
-                    indices,
-                    batch.functions,
-                    first,
-                    weight,
-                    G,
-                    space.n_nodes,
-                    *lame,
-                )
+
+    def tabulated(batch: Batch) -> tuple[Ints, Ints, Floats, Floats]:
+        number, row, first = points.of_cells(batch.cells)
+        bary, weight, side = points.bary[number], points.weight[number], points.side[number]
+        N, G = space.tabulate(batch, row, bary, side)
+        if batch.tips and boundary is not None:
+            G = corrected(space, batch, (row, bary, weight, side), N, G, boundary)
+        return batch.functions, first, weight, G
+
+    chunks = _chunks(space, points, others)
+    for part in streamed(tabulated, (b for chunk in chunks for b, _ in space.batches(chunk))):
+        with one_blas_thread():
+            functions, first, weight, G = part
+            add_stiffness(
+                data, indptr, indices, functions, first, weight, G, space.n_nodes, *lame
+            )  # fmt: skip
     if d * d * len(indices) < np.iinfo(np.int32).max:
         indptr = indptr.astype(np.int32)
     matrix = sp.bsr_matrix((data, indices, indptr), shape=(n, n)).tocsr()
