@@ -132,6 +132,7 @@ for name, how in RUNS:
                 cycle,
                 da=1.25,
                 max_steps=3,
+                integrator="euler",  # of the source paper
             )
         )
     last = grown[name, how].steps[-1]

@@ -14,8 +14,8 @@ from benchmarks.scenes.settings import Settings
 def growth(quick: bool) -> list[Case]:
     """Over the cells with 15 steps, and over the steps with cells of one size."""
 
-    def ours(s: Settings, mesh: str, steps: int, seed: int) -> Outcome:
-        return scenes.growth(s, mesh, steps)
+    def ours(s: Settings, mesh: str, steps: int, seed: int, integrator: str = "euler") -> Outcome:
+        return scenes.growth(s, mesh, steps, integrator)
 
     def theirs(grading: Grading, steps: int, seed: int) -> Outcome:
         return conforming_growth.grown(grading, steps)
@@ -37,6 +37,13 @@ def growth(quick: bool) -> list[Case]:
         Case(
             "other steps, n = 31", "steps", f"{k} steps",
             partial(_path, partial(ours, fixed, "uniform", k)),
+        )
+        for k in some
+    ]  # fmt: skip
+    cases += [
+        Case(
+            "second order, n = 31", "steps", f"{k} steps",
+            partial(_path, partial(ours, fixed, "uniform", k, integrator="pec")),
         )
         for k in some
     ]  # fmt: skip

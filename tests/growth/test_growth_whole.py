@@ -24,12 +24,12 @@ def edge_crack(y, n=(20, 40), order=2, a=0.21):
 
 
 def test_straight_growth_stays_straight_on_a_mirrored_mesh():
-    """The mesh is its own mirror image about y = 0: 1e-6 of the length is quadrature of K_II."""
+    """The mesh is its own mirror image about y = 0: 2e-6 of the length is quadrature of K_II."""
     problem = edge_crack(0.0, a=0.31)
     steps = xc.grow(problem, LAW, xc.max_hoop_stress, xc.Cycle(0, 1), da=0.1, max_steps=4)
     table = xc.collect(steps).table()
     assert table["a"] == pytest.approx([0.31, 0.41, 0.51, 0.61], abs=1e-9)
-    assert (np.abs(table["y"]) <= 1e-6 * table["a"]).all()
+    assert (np.abs(table["y"]) <= 2e-6 * table["a"]).all()
 
 
 @pytest.mark.filterwarnings("ignore:the advance .* below one cell")

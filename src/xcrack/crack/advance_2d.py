@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import ArrayLike
 
-from xcrack.arrays import at
+from xcrack.arrays import Bools, Floats, at
 from xcrack.crack.crack import Crack
 from xcrack.crack.lines import crossing_points, polyline_crack
 from xcrack.crack.tips_2d import tip_frames
@@ -51,19 +51,55 @@ def advance(crack: Crack, angle: ArrayLike, da: ArrayLike) -> Crack:
     moved = x + step[:, None] * (
         np.cos(beta)[:, None] * frame[:, 0] + np.sin(beta)[:, None] * frame[:, 1]
     )
+    return with_tips(crack, moved, step != 0, np.zeros(len(x), dtype=bool))
+
+
+def with_tips(crack: Crack, x: Floats, moves: Bools, instead: Bools) -> Crack:
+    """A placed crack with its tips at other points.
+
+    Parameters
+    ----------
+    crack : Crack
+    x : (f, 2) array, length
+    moves : (f,) array of bool
+        The other tips stay to the last bit.
+    instead : (f,) array of bool
+        Whether the last point of a tip that moves is replaced; else a face is added to it.
+
+    Returns
+    -------
+    Crack
+
+    Raises
+    ------
+    GeometryError
+        It grows across itself, or turns back on itself.
+    """
     points = np.array(crack.points)
-    for k, tip in enumerate(crack.tips):
-        if step[k] != 0:
-            new = moved[k : k + 1]
-            points = np.concatenate([new, points] if tip == 0 else [points, new])
-    tips = [0 if tip == 0 else len(points) - 1 for tip in crack.tips]
-    for tip, da_ in zip(tips, step):
-        if da_ != 0:
-            new, rest = (points[:2], points[2:]) if tip == 0 else (points[-2:], points[:-2])
-            crossing = crossing_points(new, rest)
-            if len(crossing):
-                raise GeometryError(
-                    f"the crack grows across itself near {at(crossing[0])}: what lies between is "
-                    "cut out, which is not modelled. End growth before."
-                )
+    for k, tip in enumerate(crack.tips or ()):
+        if moves[k]:
+            new = x[k : k + 1]
+            old = points[1:] if tip == 0 and instead[k] else points
+            old = old[:-1] if tip != 0 and instead[k] else old
+            points = np.concatenate([new, old] if tip == 0 else [old, new])
+    tips = [0 if tip == 0 else len(points) - 1 for tip in crack.tips or ()]
+    for tip in (tip for tip, moved in zip(tips, moves) if moved):
+        line = points if tip == 0 else points[::-1]
+        if len(line) > 2 and _turns_back(line[0] - line[1], line[1] - line[2]):
+            raise GeometryError(f"the crack turns back on itself at {at(line[1])}.")
+        crossing = crossing_points(line[:2], line[2:])
+        if len(crossing):
+            raise GeometryError(
+                f"the crack grows across itself near {at(crossing[0])}: what lies between is "
+                "cut out, which is not modelled. End growth before."
+            )
     return polyline_crack(points, tuple(tips))
+
+
+def _turns_back(ahead: Floats, before: Floats) -> bool:
+    """Whether a face lies on the one before it."""
+    turn = np.arctan2(ahead[1] * before[0] - ahead[0] * before[1], ahead @ before)
+    return bool(abs(turn) > np.pi - _BACK)
+
+
+__all__ = ["advance", "with_tips"]

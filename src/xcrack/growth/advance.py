@@ -27,6 +27,8 @@ class Advance:
         Cell size at that tip.
     tip : (int, int)
         That tip: crack and number.
+    falls_to_zero : bool
+        Whether all growth is seen to stop within a tenth of that cell.
     """
 
     da: PerCrack
@@ -34,6 +36,7 @@ class Advance:
     largest: float
     size: float
     tip: tuple[int, int]
+    falls_to_zero: bool = False
 
 
 def plan_advance(

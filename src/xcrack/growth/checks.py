@@ -11,6 +11,8 @@ from xcrack.growth.criteria import Criterion
 from xcrack.inputs import called, numbers, shown
 from xcrack.laws.law import NEEDS, Law, largest_K
 
+_NEAR = 1e-3  # change of ln(range) over which the slope of a law is taken
+_USUAL, _EXPONENTS = 3.0, (1.0, 20.0)
 _RATIOS = (0.0, 0.5)  # a law that gives the same rate for both does not depend on R
 
 
@@ -153,4 +155,22 @@ def depends_on_ratio(law: Law, dK_eq: Floats) -> bool:
     return not np.array_equal(low, high)
 
 
-__all__ = ["depends_on_ratio", "evaluate_criterion", "evaluate_law", "wants"]
+def law_exponent(law: Law, dK_eq: Floats, R: Floats) -> float:
+    """Slope of ln(rate) over ln(range) of a law at its largest range, in [1, 20]; 3 if unknown.
+
+    Parameters
+    ----------
+    law : callable
+    dK_eq, R : (f,) arrays
+    """
+    if not len(dK_eq) or dK_eq.max() <= 0:
+        return _USUAL
+    j = int(np.argmax(dK_eq))
+    ranges = dK_eq[j] * np.exp(np.array([-_NEAR, _NEAR]))
+    rate = evaluate_law(law, ranges, np.full(2, R[j]), 0)
+    if not (np.isfinite(rate).all() and (rate > 0).all()):
+        return _USUAL
+    return float(np.clip(np.log(rate[1] / rate[0]) / (2 * _NEAR), *_EXPONENTS))
+
+
+__all__ = ["depends_on_ratio", "evaluate_criterion", "evaluate_law", "law_exponent", "wants"]

@@ -39,6 +39,19 @@ def end_at(run: Run, step: Step) -> str:
     return ""
 
 
+def falls_to_zero(run: Run, step: Step, plan: Advance) -> str:
+    """Why a run ends in which all growth is seen to stop within a tenth of a cell."""
+    what = (
+        f"dK_eq falls below the threshold {run.threshold:.6g}"
+        if run.threshold > 0
+        else "it falls to zero"
+    )
+    return (
+        f"rate is zero: {what} within a tenth of a cell at every tip, as of "
+        f"{place_name(run, step, *plan.tip)}"
+    )
+
+
 def too_short(run: Run, step: Step, plan: Advance) -> str:
     """Why a run ends whose advance is below a tenth of a cell."""
     remedy = "cycles" if run.da is None else "da"
@@ -77,4 +90,4 @@ def place_name(run: Run, step: Step, c: int, j: int) -> str:
     return f"crack {c}, {following(run.problem.mesh).PLACE} {j} at ({x})"
 
 
-__all__ = ["end_at", "left_the_body", "place_name", "short_kink", "too_short"]
+__all__ = ["end_at", "falls_to_zero", "left_the_body", "place_name", "short_kink", "too_short"]

@@ -28,6 +28,7 @@ class GrowOptions(TypedDict, total=False):
 
     cycles: float | None
     scaling: str
+    integrator: str
     threshold: float
     K_c: float | None
     max_steps: int | None
@@ -42,8 +43,8 @@ class Run:
 
     Parameters
     ----------
-    problem, law, criterion, cycle, da, cycles, scaling, threshold, solver, K_c, max_steps, \
-    max_cycles, progress
+    problem, law, criterion, cycle, da, cycles, scaling, integrator, threshold, solver, K_c, \
+    max_steps, max_cycles, progress
         As of `grow`.
     defaults : int
         Number of the set of defaults.
@@ -61,6 +62,7 @@ class Run:
     da: float | None = None
     cycles: float | None = None
     scaling: str = "law"
+    integrator: str = "pec"
     threshold: float = 0.0
     solver: Any = None
     K_c: float | None = field(default=None, metadata=_STOPS)
@@ -104,6 +106,15 @@ class Run:
         object.__setattr__(self, "threshold", number(self.threshold, "grow: threshold", least=0))
         if not isinstance(self.scaling, str) or self.scaling not in ("law", "linear"):
             raise ProblemError(f'grow: scaling = {shown(self.scaling)}: give "law" or "linear".')
+        if not isinstance(self.integrator, str) or self.integrator not in ("pec", "euler"):
+            raise ProblemError(
+                f'grow: integrator = {shown(self.integrator)}: give "pec" or "euler".'
+            )
+        if self.scaling == "linear" and self.integrator != "euler":
+            raise ProblemError(
+                'grow: scaling = "linear" contradicts the law, and leads to no path as steps get '
+                'shorter: only integrator="euler" has it, for comparison.'
+            )
         if self.solver is not None and not callable(self.solver):
             raise ProblemError(
                 f"grow: solver = {shown(self.solver)} cannot be called: give a function, or None."

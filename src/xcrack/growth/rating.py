@@ -1,6 +1,6 @@
 """From K of the load states to direction, range, ratio and rate at each place of the cracks."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -88,6 +88,47 @@ def _rates_of_blocks(
         a = size_at_places(problem, c, pairs.K.shape[2])
         parts.append(block_of(rated(run, pairs, nu, c, place, a, other), pairs.count))
     return parts
+
+
+def answering(
+    run: Run, problem: Problem, c: int, solutions: Sequence[Solution], sif: Answers
+) -> tuple[Floats, Callable[[Floats], PerPlace]]:
+    """K of crack c as criterion and law see it, and what they answer to other K of its shape.
+
+    Parameters
+    ----------
+    run : Run
+    problem : Problem
+    c : int
+    solutions : sequence of Solution
+    sif : sequence of sequence of SIF
+
+    Returns
+    -------
+    K : (s, f, 2 or 3) array, stress √length
+        Of the load states, or of both ends of each kind of cycle of a spectrum.
+    answer : callable
+        K like this -> direction, range, ratio, rate at the places, of the cycle or of the block.
+    """
+    place, nu = following(problem.mesh).PLACE, problem.material.nu
+    if not isinstance(run.cycle, Spectrum):
+        K = np.stack([state[c].K for state in sif])
+        a = size_at_places(problem, c, K.shape[1])
+
+        def of_cycle(K: Floats) -> PerPlace:
+            angle, dK, R = evaluate_criterion(run.criterion, K, nu, c, place)
+            return angle, dK, R, evaluate_law(run.law, dK, R, c, place, a)
+
+        return K, of_cycle
+    pairs = pairs_of(run, problem, solutions, sif)[c]
+    shape = pairs.K.shape
+    size = size_at_places(problem, c, shape[2])
+
+    def of_block(K: Floats) -> PerPlace:
+        turned = replace(pairs, K=K.reshape(shape))
+        return block_of(rated(run, turned, nu, c, place, size), pairs.count)
+
+    return pairs.K.reshape(-1, *shape[2:]), of_block
 
 
 def size_at_places(problem: Problem, c: int, n: int) -> Floats:
@@ -179,6 +220,7 @@ def respond_to_cycle(
 
 
 __all__ = [
+    "answering",
     "check_choice",
     "levels_of",
     "must_choose",

@@ -10,24 +10,19 @@ import numpy as np
 from xcrack.analysis.solution import Solution
 from xcrack.crack.crack import Crack
 from xcrack.errors import GeometryError, ProblemError, XcrackError, warn
-from xcrack.growth.advance import LEAST, Advance, PerCrack, plan_advance
+from xcrack.growth.advance import LEAST
 from xcrack.growth.checks import depends_on_ratio
 from xcrack.growth.criteria import Criterion
-from xcrack.growth.ending import end_at, left_the_body, short_kink, too_short
+from xcrack.growth.ending import end_at, falls_to_zero, left_the_body, short_kink, too_short
+from xcrack.growth.evaluation import evaluate
 from xcrack.growth.follow import following
+from xcrack.growth.integrators import integrator_of
 from xcrack.growth.notices import Notices
 from xcrack.growth.options import GrowOptions, Run, lists_options, run_of
 from xcrack.growth.progress import report_end, report_step
-from xcrack.growth.rating import (
-    check_choice,
-    levels_of,
-    rates_of,
-    respond_to_cycle,
-    warn_of_left_out,
-)
+from xcrack.growth.rating import check_choice, levels_of, respond_to_cycle, warn_of_left_out
 from xcrack.growth.step import Cycle, Memory, Step, memory_of
 from xcrack.laws.law import Law
-from xcrack.mesh.locate import cell_sizes
 from xcrack.scene.problem import Problem
 from xcrack.sif.sif import SIF
 from xcrack.solvers.reuse import Reuse
@@ -64,10 +59,16 @@ def grow(
     da : float, length, optional
         Largest advance of any tip in a step.
     cycles : float, optional
-        Cycles of a step: each tip advances by its rate times this, at most by `da`. The cycles
-        of the step are then counted with the rate at its end too.
+        Cycles of a step, as far as the last solves can tell; the fastest tip advances at most by
+        `da`. The cycles of the step are then counted with the rates at its end too.
     scaling : {"law", "linear"}
-        Advance of the slower tips: in proportion to their rate, or to dK_eq.
+        Advance of the slower tips: in proportion to their rate, or to dK_eq (with
+        ``integrator="euler"`` only).
+    integrator : {"pec", "euler"}
+        Predict, evaluate, correct: path, shares of the tips and life of second order in the length
+        of the steps, at one solve a step (in 2D; fronts in 3D grow by Euler's rule as yet). Or
+        Euler's rule, as in the source paper: each step goes on with the direction and rate at its
+        beginning, so that the path is of first order.
     threshold : float, stress √length
         Below this dK_eq a tip does not grow.
     K_c : float, stress √length, optional
@@ -125,7 +126,9 @@ def steps_of(run: Run, last: Step | None = None) -> Generator[Step, None, str]:
             reuse = memory_of(last).reuse
         while True:
             ended = end_at(run, last)
-            plan = _plan(run, last.sif[0], last.rate, last.dK_eq, memory_of(last).pending)
+            plan = integrator_of(run).planned(run, last)
+            if not ended and plan.falls_to_zero:
+                ended = falls_to_zero(run, last, plan)
             if not ended and plan.largest < LEAST * plan.size:
                 ended = too_short(run, last, plan)
                 if last.index == 0:
@@ -152,7 +155,7 @@ def steps_of(run: Run, last: Step | None = None) -> Generator[Step, None, str]:
 def _after(run: Run, last: Step, reuse: Reuse) -> tuple[Step | None, Reuse, str]:
     """The step after another one, or why there is none."""
     try:
-        cracks = _advanced(run, last)
+        cracks = integrator_of(run).advanced(run, last)
         problem = _problem(run, cracks, memory_of(last))
     except GeometryError as error:
         return None, reuse, f"the cracks cannot go on after step {last.index}: {error}"
@@ -194,39 +197,42 @@ def _next_step(
 ) -> tuple[Step, Reuse]:
     """Solve all load states of a problem and decide where and how fast its cracks grow."""
     begin = time.perf_counter()
-    before = None if last is None else memory_of(last)
-    cracks, mesh = problem.placed, problem.mesh
     solutions, sif, handed_on = respond(problem, run, reuse)
-    angle, dK_eq, R, law_rates = rates_of(run, problem, sif, solutions)
-    rate = tuple(np.where(d < run.threshold, 0.0, r) for d, r in zip(dK_eq, law_rates))
-    length = tuple(following(mesh).crack_size(crack, mesh) for crack in cracks)
-    if last is None or before is None:
-        n_cycles, index = 0.0, 0
-        pending = tuple(np.zeros_like(r) for r in rate)
-        radius = run.problem.numerics.radius
+    seen, integrator = evaluate(run, problem, sif, solutions), integrator_of(run)
+    if last is None:
+        index, radius = 0, run.problem.numerics.radius
+        settled = integrator.begun(run, seen)
         if radius is None and len(solutions[0].space.radius):
             radius = float(np.min(solutions[0].space.radius))
     else:
-        index, radius = last.index + 1, before.radius
-        since, pending = following(mesh).followed(last, cracks, sif[0], law_rates, length, mesh)
-        n_cycles = last.cycles + since
-    plan = _plan(run, sif[0], rate, dK_eq, pending)
-    memory = Memory(law_rates, length, plan.pending, radius, handed_on.without_matrices(), settings)
+        index, radius = last.index + 1, memory_of(last).radius
+        settled = integrator.settled(run, last, seen)
+    memory = Memory(
+        seen.law_rate,
+        seen.length,
+        settled.pending,
+        radius,
+        handed_on.without_matrices(),
+        settings,
+        settled.trail,
+    )
     step = Step(
         index=index,
-        cycles=n_cycles,
-        cracks=cracks,
+        cycles=settled.cycles,
+        cracks=seen.cracks,
         sif=sif,
-        angle=angle,
-        dK_eq=dK_eq,
-        R=R,
-        rate=rate,
-        da=plan.da,
+        angle=seen.angle,
+        dK_eq=seen.dK_eq,
+        R=seen.R,
+        rate=seen.rate,
+        da=settled.da,
         solutions=solutions,
         memory=memory,
         levels=levels_of(run.cycle, solutions),
+        corrected=settled.corrected,
+        error=settled.error,
     )
-    since = n_cycles - (0.0 if last is None else last.cycles)
+    since = step.cycles - (0.0 if last is None else last.cycles)
     report_step(run, step, since, time.perf_counter() - begin)
     return step, handed_on
 
@@ -239,31 +245,6 @@ def respond(
     The factor is handed on, but not kept with the solutions.
     """
     return respond_to_cycle(problem, run.cycle, run.solver, reuse)
-
-
-def _plan(
-    run: Run, sif: Sequence[SIF], rate: PerCrack, dK_eq: PerCrack, pending: PerCrack
-) -> Advance:
-    mesh = run.problem.mesh
-    return plan_advance(
-        rate,
-        dK_eq,
-        pending,
-        tuple(cell_sizes(mesh, crack_sif.x) for crack_sif in sif),
-        da=run.da,
-        cycles=run.cycles,
-        scaling=run.scaling,
-        least=following(mesh).WAITS_BELOW,
-    )
-
-
-def _advanced(run: Run, step: Step) -> list[Crack]:
-    """The cracks after the advance of a step."""
-    mesh = run.problem.mesh
-    return [
-        following(mesh).advanced(crack, step.sif[0][c], step.angle[c], step.da[c], mesh)
-        for c, crack in enumerate(step.cracks)
-    ]
 
 
 def _problem(run: Run, cracks: Sequence[Crack], memory: Memory) -> Problem:

@@ -12,6 +12,7 @@ from xcrack.arrays import Floats
 from xcrack.crack.crack import Crack
 from xcrack.errors import ProblemError
 from xcrack.growth.advance import PerCrack
+from xcrack.growth.trail import Trail
 from xcrack.inputs import entries, number, numbers, shown, whole
 from xcrack.scene.conditions import Load
 from xcrack.sif.sif import SIF
@@ -108,6 +109,8 @@ class Memory:
         What the next solve starts from, without matrices.
     settings : mapping of str to str
         What the run was asked to do.
+    trail : Trail, optional
+        What an integrator of second order remembers of the last solves.
     """
 
     law_rate: PerCrack
@@ -116,6 +119,23 @@ class Memory:
     radius: float | None
     reuse: Reuse
     settings: Mapping[str, str]
+    trail: Trail | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class StepError:
+    """What the length of the steps so far may have cost; errors of K come on top.
+
+    Attributes
+    ----------
+    place : tuple of (f,) arrays, length
+        Of each tip, one array a crack: how far it may be from where steps of no length lead.
+    cycles : float
+        Of the cycles so far.
+    """
+
+    place: PerCrack
+    cycles: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,8 +147,9 @@ class Step:
     index : int
         0 for the cracks as they were given.
     cycles : float
-        Cycles until the cracks look like this.
+        Cycles until the cracks look like `corrected`.
     cracks : tuple of Crack
+        As they were solved: K, angle, rates and the solutions belong to these.
     sif : tuple of tuple of SIF
         ``sif[state][crack]``.
     angle, dK_eq, R, rate, da : tuple of (f,) arrays
@@ -142,6 +163,11 @@ class Step:
         What the next step needs.
     levels : tuple of float
         Factors of the load states of a spectrum of factors, in the order of `sif`.
+    corrected : tuple of Crack
+        Where growth has come to, and goes on: with ``integrator="pec"`` the last points are moved
+        once K at the predicted ones is known. `cracks`, where it is left out.
+    error : StepError, optional
+        Estimate, where the integrator has one.
 
     Raises
     ------
@@ -161,12 +187,22 @@ class Step:
     solutions: tuple[Solution, ...] = ()
     memory: Memory | None = None
     levels: tuple[float, ...] = ()
+    corrected: tuple[Crack, ...] = ()
+    error: StepError | None = None
 
     def __post_init__(self) -> None:
         whole(self.index, "Step: index", least=0)
         number(self.cycles, "Step: cycles", least=0)
         if not all(isinstance(crack, Crack) for crack in entries(self.cracks, "Step: cracks")):
             raise ProblemError(f"Step: cracks = {shown(self.cracks)}: give a tuple of Crack.")
+        moved = entries(self.corrected, "Step: corrected") or entries(self.cracks, "Step: cracks")
+        if not all(isinstance(crack, Crack) for crack in moved) or len(moved) != len(self.cracks):
+            raise ProblemError(
+                f"Step: corrected = {shown(self.corrected)}: give a Crack for each of `cracks`."
+            )
+        object.__setattr__(self, "corrected", moved)
+        if not isinstance(self.error, StepError | None):
+            raise ProblemError(f"Step: error = {shown(self.error)}: that is made by grow.")
         states = [entries(state, "Step: sif") for state in entries(self.sif, "Step: sif")]
         if not all(isinstance(sif, SIF) for state in states for sif in state):
             raise ProblemError(f"Step: sif = {shown(self.sif)}: give SIF of states and cracks.")
@@ -212,6 +248,7 @@ __all__ = [
     "Cycle",
     "Memory",
     "Step",
+    "StepError",
     "directions",
     "memory_of",
     "moved_places",

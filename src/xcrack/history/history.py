@@ -59,8 +59,8 @@ class History:
 
     @property
     def cracks(self) -> tuple[Crack, ...]:
-        """The cracks of the last step."""
-        return self.steps[-1].cracks if self.steps else ()
+        """Where the cracks have come to at the last step (`Step.corrected`)."""
+        return self.steps[-1].corrected if self.steps else ()
 
     @property
     def life(self) -> float:

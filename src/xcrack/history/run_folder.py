@@ -14,7 +14,8 @@ from typing import Any
 from xcrack.crack.crack import Crack
 from xcrack.errors import ProblemError
 from xcrack.growth.fingerprint import DEFAULTS
-from xcrack.growth.step import Memory, Step
+from xcrack.growth.step import Memory, Step, StepError
+from xcrack.growth.trail import Trail
 from xcrack.history import lock
 from xcrack.history.store import PART, load, save, write_whole
 from xcrack.paths import system_errors
@@ -26,7 +27,7 @@ _FORMAT = 2
 _STEP = re.compile(r"step_(\d{5,})\.npz")
 CLASSES: dict[str, type] = {
     "Step": Step, "Memory": Memory, "Reuse": Reuse, "Crack": Crack,
-    "SIF": SIF,
+    "SIF": SIF, "StepError": StepError, "Trail": Trail,
 }  # fmt: skip
 
 

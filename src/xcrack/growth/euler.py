@@ -1,0 +1,62 @@
+"""Growth of first order: each step goes on with the directions and rates at its beginning."""
+
+import numpy as np
+
+from xcrack.crack.crack import Crack
+from xcrack.growth.advance import Advance, PerCrack, plan_advance
+from xcrack.growth.evaluation import Evaluation, Settled
+from xcrack.growth.follow import following
+from xcrack.growth.options import Run
+from xcrack.growth.step import Step, memory_of
+from xcrack.mesh.locate import cell_sizes
+
+
+def begun(run: Run, seen: Evaluation) -> Settled:
+    """The first step of a run."""
+    return _settled(run, seen, 0.0, tuple(np.zeros_like(r) for r in seen.rate))
+
+
+def settled(run: Run, last: Step, seen: Evaluation) -> Settled:
+    """What the cracks after an advance mean for the cycles and for the next advance."""
+    mesh = seen.problem.mesh
+    since, pending = following(mesh).followed(
+        last, seen.cracks, seen.sif[0], seen.law_rate, seen.length, mesh
+    )
+    return _settled(run, seen, last.cycles + since, pending)
+
+
+def planned(run: Run, step: Step) -> Advance:
+    """The advance after a step."""
+    sizes = tuple(cell_sizes(run.problem.mesh, sif.x) for sif in step.sif[0])
+    return _plan(run, sizes, step.rate, step.dK_eq, memory_of(step).pending)
+
+
+def advanced(run: Run, step: Step) -> list[Crack]:
+    """The cracks after the advance of a step."""
+    mesh = run.problem.mesh
+    return [
+        following(mesh).advanced(crack, step.sif[0][c], step.angle[c], step.da[c], mesh)
+        for c, crack in enumerate(step.cracks)
+    ]
+
+
+def _settled(run: Run, seen: Evaluation, cycles: float, pending: PerCrack) -> Settled:
+    sizes = tuple(cell_sizes(seen.problem.mesh, sif.x) for sif in seen.sif[0])
+    plan = _plan(run, sizes, seen.rate, seen.dK_eq, pending)
+    return Settled(cycles, seen.cracks, plan.da, plan.pending)
+
+
+def _plan(run: Run, sizes: PerCrack, rate: PerCrack, dK_eq: PerCrack, pending: PerCrack) -> Advance:
+    return plan_advance(
+        rate,
+        dK_eq,
+        pending,
+        sizes,
+        da=run.da,
+        cycles=run.cycles,
+        scaling=run.scaling,
+        least=following(run.problem.mesh).WAITS_BELOW,
+    )
+
+
+__all__ = ["advanced", "begun", "planned", "settled"]

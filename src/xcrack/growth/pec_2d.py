@@ -1,0 +1,288 @@
+"""Growth of second order at one solve a step: predict, evaluate, correct; tips of 2D cracks.
+
+From the corrected tips of a step the last two solves predict the next tips; there all states are
+solved; the parabola through the last three solves then moves the tips once more, without a solve.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from xcrack.arrays import Bools, Floats
+from xcrack.crack.crack import Crack
+from xcrack.errors import GeometryError, XcrackError
+from xcrack.growth.advance import LEAST, Advance
+from xcrack.growth.envelope import Growth, growing_length, growth_over, length_of_cycles
+from xcrack.growth.evaluation import Evaluation, Settled
+from xcrack.growth.options import Run
+from xcrack.growth.start_2d import directions_of, first_trail, turn_of_faces
+from xcrack.growth.step import Step, StepError, memory_of
+from xcrack.growth.tips_2d import ending_at, faces_of, moved_on, rows_of, split
+from xcrack.growth.trail import Trail
+from xcrack.mesh.locate import cell_sizes, contains
+from xcrack.mesh.mesh import Mesh
+
+_PASSES = 6  # of the correction, which turns the last face, which turns the direction
+_ERROR = 0.25  # of the correction: more than the error that is left, on nearly all scenes
+_FIRST = 0.5  # of that for the first step's cycles, of which no parabola is known yet
+_FASTER = 2.0  # times the last rate: what a step of prescribed cycles may reckon with
+_HALVINGS = 40
+
+
+@dataclass(frozen=True, eq=False)
+class Prediction:
+    """The next step as the last two solves see it.
+
+    Attributes
+    ----------
+    length : float, length
+        Of σ.
+    stops : bool
+        Whether all growth is seen to stop at its end.
+    growth : Growth
+    place : (n, 2) array, length
+        Where the tips come to.
+    cracks : list of Crack
+    moves : (n,) array of bool
+        Tips that move in the mesh; the others wait.
+    size : (n,) array, length
+        Of the cells at the tips before.
+    """
+
+    length: float
+    stops: bool
+    growth: Growth
+    place: Floats
+    cracks: list[Crack]
+    moves: Bools
+    size: Floats
+
+
+def begun(run: Run, seen: Evaluation) -> Settled:
+    """The first step of a run."""
+    faces = faces_of(seen.cracks)
+    trail = first_trail(run, seen, faces.tip, np.zeros(len(faces.tip), dtype=bool))
+    none = split(np.zeros(len(faces.tip)), seen.cracks)
+    return _settled(run, 0.0, seen.cracks, trail, StepError(none, 0.0))
+
+
+def settled(run: Run, last: Step, seen: Evaluation) -> Settled:
+    """Correct a predicted step by what was solved there, and predict the next."""
+    trail, error = _remembered(last)
+    before = _predict(run, last.corrected, trail)
+    stays = _stays(before.cracks, seen.cracks)
+    if not stays.all():
+        return _without_lost_tips(run, last, seen, before, stays)
+    if any(np.isinf(rate).any() for rate in seen.rate):
+        return _broken(run, last, seen, before)
+    return _corrected(run, last, seen, before, error)
+
+
+def planned(run: Run, step: Step) -> Advance:
+    """The advance after a step."""
+    trail, _ = _remembered(step)
+    still = split(np.zeros(len(trail.place)), step.corrected)
+    rate = np.concatenate(step.rate)
+    if not (rate > 0).any() or np.isinf(rate).any():
+        return Advance(still, still, 0.0, np.inf, (0, 0))
+    ahead = _predict(run, step.corrected, trail)
+    row = int(np.argmax(ahead.growth.arc))
+    c = next(c for c, rows in enumerate(rows_of(step.corrected)) if rows.start <= row < rows.stop)
+    size, first = float(ahead.size[row]), rows_of(step.corrected)[c].start
+    falls = ahead.stops and float(ahead.growth.arc[row]) < LEAST * size
+    return Advance(
+        step.da, memory_of(step).pending, ahead.length, size, (c, row - first), falls_to_zero=falls
+    )
+
+
+def advanced(run: Run, step: Step) -> list[Crack]:
+    """The cracks after the predicted advance of a step."""
+    trail, _ = _remembered(step)
+    return _predict(run, step.corrected, trail).cracks
+
+
+def _remembered(step: Step) -> tuple[Trail, StepError]:
+    trail, error = memory_of(step).trail, step.error
+    if trail is None or error is None:
+        raise XcrackError(f"step {step.index} was not made by integrator='pec'.")
+    return trail, error
+
+
+def _predict(run: Run, cracks: Sequence[Crack], trail: Trail) -> Prediction:
+    """Where the last two solves lead; from a first one straight on, at its rates."""
+    mesh, known, start = run.problem.mesh, trail.last(2), float(trail.sigma[-1])
+    length = np.inf if run.da is None else run.da
+    if run.cycles is not None:
+        fastest = float(trail.rate[-1].max(initial=0.0))
+        most = min(length, run.cycles * fastest * (1.0 if known.n_solves == 1 else _FASTER))
+        length = length_of_cycles(known, start, run.cycles, most, run.threshold)
+    size = cell_sizes(mesh, trail.place)
+    asked = length
+    length = growing_length(known, start, asked, run.threshold)
+    growth = growth_over(known, start, length, run.threshold)
+    place = trail.place + growth.move
+    after, moves = ending_at(cracks, place, trail.grown, size)
+    return Prediction(length, length < asked, growth, place, after, moves, size)
+
+
+def _settled(
+    run: Run, cycles: float, corrected: Sequence[Crack], trail: Trail, error: StepError
+) -> Settled:
+    """A step that is settled, with the advance that follows."""
+    waits = np.linalg.norm(trail.place - faces_of(corrected).tip, axis=1)
+    da = np.zeros(len(waits))
+    if np.isfinite(trail.rate[-1]).all() and (trail.rate[-1] > 0).any():
+        ahead = _predict(run, corrected, trail)
+        way = np.linalg.norm(ahead.place - faces_of(corrected).tip, axis=1)
+        da = np.where(ahead.moves, way, 0.0)
+    return Settled(
+        cycles, tuple(corrected), split(da, corrected), split(waits, corrected), trail, error
+    )
+
+
+def _corrected(
+    run: Run, last: Step, seen: Evaluation, before: Prediction, error: StepError
+) -> Settled:
+    """Correct the last points by the parabola through the last three solves."""
+    old, _ = _remembered(last)
+    faces = faces_of(seen.cracks)
+    direction, rate, dK_eq, exponent = directions_of(run, seen, faces)
+    start = float(old.sigma[-1])
+    trail = old.with_solve(start + before.length, direction, rate, dK_eq, exponent)
+    solved = trail.direction[-1]
+    gamma = np.where(before.moves, turn_of_faces(seen, faces), 0.0)
+    begin = _begins(last.corrected, old, before)
+    growth = before.growth
+    for _ in range(_PASSES):
+        growth = growth_over(trail, start, before.length, run.threshold)
+        face = old.place + growth.move - begin
+        turn = np.arctan2(face[:, 1], face[:, 0]) - faces.direction
+        turn -= 2 * np.pi * np.round(turn / (2 * np.pi))
+        trail = trail.with_direction(solved + gamma * turn)
+    place = old.place + growth.move
+    try:
+        corrected, moves = ending_at(last.corrected, place, old.grown, before.size)
+    except GeometryError:  # which the predicted cracks are free of
+        place, corrected, moves = before.place, list(seen.cracks), before.moves
+    off = _ERROR * np.linalg.norm(place - before.place, axis=1)
+    cycles, own = _cycles(run, trail, old, before, growth)
+    return _settled(
+        run,
+        last.cycles + cycles,
+        corrected,
+        replace(trail, place=place, grown=old.grown | moves),
+        StepError(
+            tuple(a + b for a, b in zip(error.place, split(off, corrected))), error.cycles + own
+        ),
+    )
+
+
+def _cycles(
+    run: Run, trail: Trail, old: Trail, before: Prediction, growth: Growth
+) -> tuple[float, float]:
+    """Cycles of a corrected step, and what they add to the estimated error."""
+    if old.n_solves == 1:
+        return growth.cycles, _FIRST * _ERROR * abs(growth.cycles - before.growth.cycles)
+    start = float(old.sigma[-1])
+    line = growth_over(trail.last(2), start, before.length, run.threshold).cycles
+    own = _ERROR * abs(growth.cycles - line)
+    if old.n_solves > 2:
+        return growth.cycles, own
+    # The second step: the parabola tells what the first one, along a line, was off.
+    span = float(old.sigma[1] - old.sigma[0])
+    first = float(old.sigma[0])
+    line = growth_over(old, first, span, run.threshold).cycles
+    curve = growth_over(trail, first, span, run.threshold).cycles
+    constant = growth_over(old.first(1), first, span, run.threshold).cycles
+    own += _ERROR * (abs(curve - line) - _FIRST * abs(line - constant))
+    return growth.cycles + curve - line, own
+
+
+def _begins(cracks: Sequence[Crack], trail: Trail, before: Prediction) -> Floats:
+    """Where the last faces of the predicted cracks begin `(n, 2)`."""
+    faces = faces_of(cracks)
+    instead = moved_on(faces, trail.grown, before.size)
+    return np.where(instead[:, None], faces.anchor, faces.tip)
+
+
+def _stays(advanced: Sequence[Crack], placed: Sequence[Crack]) -> Bools:
+    """Which tips are still in the body `(n,)`."""
+    pairs = zip(advanced, placed, strict=True)
+    return np.array(
+        [tip in (there.tips or ()) for crack, there in pairs for tip in crack.tips or ()],
+        dtype=bool,
+    )
+
+
+def _without_lost_tips(
+    run: Run, last: Step, seen: Evaluation, before: Prediction, stays: Bools
+) -> Settled:
+    """Begin anew after tips have left the body: their solves say nothing of the others now.
+
+    Up to the first exit the cycles are those that the solves before it predicted, behind it the
+    new rates count.
+    """
+    old, error = _remembered(last)
+    place = before.place[stays]
+    trail = first_trail(run, seen, place, (old.grown | before.moves)[stays])
+    start, exit_ = float(old.sigma[-1]), _exit(run, old, before, ~stays)
+    known = old.last(2)
+    cycles = growth_over(known, start, exit_, run.threshold).cycles
+    largest = max((float(rate.max(initial=0.0)) for rate in seen.rate), default=0.0)
+    rest = before.length - exit_
+    if 0 < largest < np.inf:
+        cycles += rest / largest
+    elif rest > 0:
+        cycles = before.growth.cycles
+    lost = np.concatenate(error.place)[stays]
+    return _settled(
+        run,
+        last.cycles + cycles,
+        seen.cracks,
+        trail,
+        StepError(split(lost, seen.cracks), error.cycles),
+    )
+
+
+def _exit(run: Run, trail: Trail, before: Prediction, lost: Bools) -> float:
+    """Piece of σ until the first of the lost tips is outside the body."""
+    mesh, known, start = run.problem.mesh, trail.last(2), float(trail.sigma[-1])
+    low, high = 0.0, before.length
+    if _inside(mesh, before.place[lost]):
+        return high
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        move = growth_over(known, start, middle, run.threshold).move
+        if _inside(mesh, (trail.place + move)[lost]):
+            low = middle
+        else:
+            high = middle
+    return high
+
+
+def _inside(mesh: Mesh, x: Floats) -> bool:
+    return bool(contains(mesh, x).all())
+
+
+def _broken(run: Run, last: Step, seen: Evaluation, before: Prediction) -> Settled:
+    """The last step of a run, at whose end a rate is infinite: no polynomial leads there.
+
+    The inverse of the largest rate is taken to fall to zero along the step, as `cycles_between`
+    does it.
+    """
+    old, error = _remembered(last)
+    largest = float(old.rate[-1].max())
+    cycles = 0.5 * before.length / largest
+    trail = replace(
+        old,
+        place=before.place,
+        grown=old.grown | before.moves,
+        rate=np.vstack([old.rate[:-1], np.concatenate(seen.law_rate)]),
+    )
+    return _settled(
+        run, last.cycles + cycles, seen.cracks, trail, StepError(error.place, error.cycles + cycles)
+    )
+
+
+__all__ = ["Prediction", "advanced", "begun", "planned", "settled"]
