@@ -27,6 +27,7 @@ _HOME = {
     "plane_crack": "crack.surfaces",
     "surface_crack": "crack.surfaces",
     "read_surface": "crack.surfaces",
+    "measures": "crack.measures",
     "fix": "scene.conditions",
     "displacement": "scene.conditions",
     "traction": "scene.conditions",

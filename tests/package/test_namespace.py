@@ -15,6 +15,7 @@ NAMES = [
     "penny_crack", "elliptic_crack", "plane_crack", "surface_crack", "read_surface",
     "notched_cylinder", "plate", "plate_with_hole", "point_force", "pressure", "read_mesh",
     "mesh_step", "read_field", "bearing", "resultant", "temperature",
+    "measures",
     "traction", "write_mesh",
     # solution
     "Solution", "chart", "energy_error", "inf_sup", "plan", "plot", "solve", "stress_intensity",

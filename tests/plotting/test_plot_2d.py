@@ -293,3 +293,25 @@ def test_bad_options(pulled, tmp_path):
         xc.plot(solved(cracks=False), "opening")
     with pytest.raises(xc.ProblemError, match=r"\.svg"):
         xc.plot(pulled, file=tmp_path / "p.svg", renderer="pyvista")
+
+
+def test_zoom_shows_the_crack_and_refuses_nonsense(tmp_path):
+    import xcrack as xc
+
+    mesh = xc.box((0, 0), (10, 10), 10)
+    body = xc.Isotropic(E=1.0, nu=0.3, plane="strain")
+    crack = xc.line_crack([(-0.1, 5.03), (3, 5.03)])
+    loads = [xc.traction("top", (0, 1.0)), xc.traction("bottom", (0, -1.0))]
+    solution = xc.solve(xc.Problem(mesh, body, cracks=[crack], loads=loads))
+    for field in ("syy", "mesh"):
+        figure = xc.plot(solution, field, zoom=1.5, show=False, renderer="matplotlib")
+        low, high = figure.axes[0].get_xlim()
+        # 1.5 times the crack of 3, and a margin of 2 % on both sides.
+        assert high - low == pytest.approx(1.04 * 4.5, rel=0.02)
+        assert low < 0 < 3 < high
+    for wrong in (0, -1.0, "near"):
+        with pytest.raises(xc.ProblemError, match="zoom"):
+            xc.plot(solution, zoom=wrong, file=tmp_path / "a.png")
+    whole = xc.solve(xc.Problem(mesh, body, loads=loads))
+    with pytest.raises(xc.ProblemError, match="no crack"):
+        xc.plot(whole, zoom=2.0, file=tmp_path / "a.png")

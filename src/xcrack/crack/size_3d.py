@@ -56,7 +56,7 @@ def _area_inside(crack: Crack, body: Body) -> float:
         corners = piece[small].reshape(-1, 3)
         share = _share_below_zero(body.depth(corners)[0].reshape(-1, 3))
         total += float((area[small] * share).sum())
-        piece = _halved(piece[near & ~small], side[near & ~small])
+        piece = halved(piece[near & ~small], side[near & ~small])
     if total <= 0:
         raise ProblemError(f"no part of the crack at {crack.points[0].tolist()} is in the body.")
     return total
@@ -121,7 +121,7 @@ def surface_size(crack: Crack, mesh: Mesh, body: Body | None = None) -> float:
     return area / length if length > 0 else float(np.sqrt(area))
 
 
-def _halved(piece: Floats, side: Floats) -> Floats:
+def halved(piece: Floats, side: Floats) -> Floats:
     """Triangles `(k, 3, 3)` cut through the middle of their longest sides."""
     turn = (np.argmax(side, axis=1)[:, None] + np.arange(3)) % 3
     a, b, c = np.take_along_axis(piece, turn[..., None], axis=1).transpose(1, 0, 2)
@@ -143,5 +143,6 @@ def _share_below_zero(values: Floats) -> Floats:
 __all__ = [
     "area_inside",
     "front_length_inside",
+    "halved",
     "surface_size",
 ]

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from xcrack.crack.crack import Crack
 from xcrack.errors import ProblemError
 from xcrack.growth.step import Step
+from xcrack.history.measures import measures_tables
 from xcrack.history.table import table
 from xcrack.inputs import entries, shown
 from xcrack.mesh.mesh import Mesh
@@ -87,6 +88,34 @@ class History:
         """
         return table(self.steps)
 
+    def measures(self, mesh: Mesh | None = None) -> tuple[NDArray[Any], NDArray[Any]]:
+        """What an engineer reads off the cracks: depth, surface lengths, area, ends by set.
+
+        Parameters
+        ----------
+        mesh : Mesh, optional
+            The body, for a run that was read without it; that of the run if omitted.
+
+        Returns
+        -------
+        measures : structured array
+            One row for each crack of each step: step, N, crack, area (in 2D the length),
+            front_length, depth, and for each facet set that a crack ever meets ``length_<set>``
+            and ``depth_<set>``; nan where it does not meet it.
+        ends : structured array
+            One row for each place where a front, in 2D a crack, meets the boundary: step, N, crack,
+            front, x, y (, z), set.
+
+        Raises
+        ------
+        ProblemError
+            No mesh is known.
+        """
+        body = self.mesh if mesh is None else mesh
+        if body is None:
+            raise ProblemError("History.measures: this run was read without its mesh: give mesh=.")
+        return measures_tables(self.steps, body)
+
     def plot(self, kind: str, file: str | Path | None = None) -> Any:
         """Draw the run.
 
@@ -115,8 +144,9 @@ class History:
     def write(self, path: str | Path) -> None:
         """Write a table and a series for ParaView into a folder.
 
-        ``history.csv`` is `table`; ``history.pvd`` lists for each step the solutions of all load
-        states with their faces, or the lines of the cracks where a step has no solutions any
+        ``history.csv`` is `table`; ``measures.csv`` and ``ends.csv`` are `measures` where the mesh
+        is known; ``history.pvd`` lists for each step the solutions of all load states with their
+        faces, or the lines of the cracks where a step has no solutions any
         more (it was read from disk).
 
         Parameters
@@ -137,11 +167,18 @@ class History:
             "the history cannot be written as a whole to", folder, error=ProblemError
         ):
             folder.mkdir(parents=True, exist_ok=True)
-            with open(folder / "history.csv", "w", newline="") as file:
-                writer = csv.writer(file, lineterminator="\n")
-                writer.writerow(rows.dtype.names or ())
-                writer.writerows(rows.tolist())
+            _write_csv(folder / "history.csv", rows)
+            if self.mesh is not None:
+                for name, each in zip(("measures", "ends"), self.measures(), strict=True):
+                    _write_csv(folder / f"{name}.csv", each)
             write_series(self.steps, folder)
+
+
+def _write_csv(path: Path, rows: NDArray[Any]) -> None:
+    with open(path, "w", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(rows.dtype.names or ())
+        writer.writerows(rows.tolist())
 
 
 __all__ = ["History"]

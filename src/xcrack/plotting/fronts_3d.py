@@ -13,10 +13,12 @@ from numpy.typing import ArrayLike
 
 from xcrack.arrays import Bools, Floats
 from xcrack.crack.fronts_3d import is_closed
+from xcrack.crack.measures_3d import front_ends
 from xcrack.errors import ProblemError
 from xcrack.growth.step import Step
 from xcrack.history.history import History
 from xcrack.inputs import entries, shown, whole
+from xcrack.mesh.body import Body
 from xcrack.mesh.mesh import Mesh
 from xcrack.plotting.figures import (
     checked_title,
@@ -235,6 +237,7 @@ def front_axes(
     edges = on_plane(first.points[_rim(first.faces)], view)
     if mesh is None:
         axes.add_collection(LineCollection(list(edges), colors="0.7", linewidths=0.8))
+    body = None if mesh is None else Body.of(mesh)
     single = len(runs) == 1
     last = max(steps[-1].index for steps in runs)
     colours, scale = colormaps["viridis"], Normalize(runs[0][0].index, max(last, 1))
@@ -244,9 +247,9 @@ def front_axes(
             newest = step is shown[-1]
             age = (last - step.index) / max(last, 1)
             color = colours(scale(step.index)) if single else f"C{k}"
-            for line in step_fronts(step, crack):
+            for x in _to_the_surface(step, crack, body):
                 axes.plot(
-                    *on_plane(line.x, view).T,
+                    *on_plane(x, view).T,
                     ("-", "--", "-.", ":")[k % 4],
                     color=color,
                     lw=2.0 if newest else 1.1,
@@ -299,6 +302,31 @@ def step_fronts(step: Step, crack: int) -> list[FrontLine]:
         FrontLine(body.points[front], whole, k)
         for k, (front, whole) in enumerate(zip(body.fronts or (), closed, strict=True))
     ]
+
+
+def _to_the_surface(step: Step, crack: int, body: Body | None) -> list[Floats]:
+    """Lines of the fronts of a step, with the places where they meet the boundary."""
+    lines = step_fronts(step, crack)
+    if body is None or not step.sif:
+        return [line.x for line in lines]
+    places = [x for _, x in front_ends(step.cracks[crack], body)]
+    result = []
+    for line in lines:
+        x = line.x
+        if not line.closed and len(x) > 1:
+            # Places of K end a share of their distance inside.
+            reach = 3 * float(np.linalg.norm(np.diff(x, axis=0), axis=1).max())
+            first, last = (_nearest(places, end, reach) for end in (x[0], x[-1]))
+            x = np.concatenate([first, x, last])
+        result.append(x)
+    return result
+
+
+def _nearest(places: list[Floats], x: Floats, reach: float) -> Floats:
+    """The nearest place within reach `(1, 3)`, or none `(0, 3)`."""
+    near = [place for place in places if np.linalg.norm(place - x) < reach]
+    near.sort(key=lambda place: float(np.linalg.norm(place - x)))
+    return np.reshape(near[:1], (-1, 3))
 
 
 def _along(sif: SIF, front: int, mode: int) -> tuple[Floats, Floats, Bools]:

@@ -63,11 +63,18 @@ def draw(
     return _done(figure, axes, file, show, title)
 
 
-def draw_mesh(solution: Solution, file: Path | None, show: bool, title: str | None) -> Any:
-    """Mesh, cracks and enriched nodes."""
+def draw_mesh(
+    solution: Solution,
+    file: Path | None,
+    show: bool,
+    title: str | None,
+    near: Floats | None = None,
+) -> Any:
+    """Mesh, cracks and enriched nodes, of the whole body or in a box `near` (2, 2)."""
     space = solution.space
     mesh = space.mesh
-    figure, axes = _body_axes(mesh.points, show, bar=0.4)
+    box = mesh.points if near is None else near
+    figure, axes = _body_axes(box, show, bar=0.4)
     from matplotlib.collections import LineCollection
     from matplotlib.patches import Circle
 
@@ -95,7 +102,7 @@ def draw_mesh(solution: Solution, file: Path | None, show: bool, title: str | No
         if np.isfinite(tip.radius):
             circle = Circle(tuple(tip.x), tip.radius, fill=False, ls="--", lw=0.8, ec="C1")
             axes.add_patch(circle)
-    _frame(axes, mesh.points)
+    _frame(axes, box)
     if space.cuts:
         _legend_below(axes, 3)
     return _done(figure, axes, file, show, title)

@@ -2,7 +2,7 @@
 
 import os
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -45,6 +45,7 @@ def plot(
     clip: tuple[Any, Any] | None = None,
     view: Any = None,
     loads: bool = False,
+    zoom: float | None = None,
 ) -> Any:
     """Draw a solution, or the mesh and the cracks of a problem.
 
@@ -85,6 +86,9 @@ def plot(
         crack is seen.
     loads : bool
         In 3D: draw arrows of tractions, pressures and point forces.
+    zoom : float, optional
+        Show a box around the cracks, or around `crack` alone, that is this many times as large as
+        they are. In 2D matplotlib then draws, which cuts the body off at the box.
 
     Returns
     -------
@@ -111,7 +115,10 @@ def plot(
         plane=clip_plane(clip),
         view=direction(view),
         loads=flag(loads, "plot: loads"),
+        near=None,
     )
+    if zoom is not None:
+        look = replace(look, near=crack_box(solution, look.cracks(solution), zoom))
     if show is not None:
         show = flag(show, "plot: show")
     if field in _ON_LIPS and not solution.lips:
@@ -135,6 +142,7 @@ class Look:
     plane: Plane | None
     view: Floats | None
     loads: bool
+    near: Floats | None
 
     def colours(self, signed: bool) -> Any:
         """The colour map, or one that suits the values."""
@@ -157,13 +165,17 @@ def _draw_2d(
     if field == "mesh":
         from xcrack.plotting.matplotlib_2d import draw_mesh
 
-        return draw_mesh(solution, target, window, look.title)
+        return draw_mesh(solution, target, window, look.title, look.near)
+    if look.near is not None and renderer == "pyvista":
+        raise ProblemError("plot(zoom=): in 2D matplotlib alone can cut off: leave renderer out.")
+    if look.near is not None:
+        renderer = "matplotlib"
     fault = "" if renderer == "matplotlib" else _fault_of_pyvista(target)
     if renderer == "pyvista" and fault:
         raise ProblemError(
             f'plot(renderer="pyvista"): {fault}; or leave renderer out, and matplotlib draws it.'
         )
-    picture = scene(solution, field, look.warp, look.limits)
+    picture = replace(scene(solution, field, look.warp, look.limits), near=look.near)
     if renderer == "matplotlib" or fault:
         from xcrack.plotting import matplotlib_2d as plot_matplotlib
 
@@ -204,6 +216,9 @@ def _draw_3d(
         )
     else:
         picture = space_scene(solution, field, look.warp, look.limits, look.plane, look.view)
+    if look.near is not None:
+        corners = np.stack(np.meshgrid(*look.near.T), axis=-1).reshape(-1, 3)
+        picture = replace(picture, near=corners)
     arrows = None
     if look.loads:
         from xcrack.plotting.loads_3d import load_arrows
@@ -214,6 +229,30 @@ def _draw_3d(
     edges = look.edges or field == "mesh"
     colours = look.colours(picture.signed)
     return draw_space(picture, arrows, target, window, look.title, edges, colours)
+
+
+def crack_box(solution: Solution, cracks: list[int], zoom: Any) -> Floats:
+    """Box around cracks, `zoom` times as large as they are `(2, d)`.
+
+    Parameters
+    ----------
+    solution : Solution
+    cracks : list of int
+    zoom : float
+
+    Raises
+    ------
+    ProblemError
+        No crack, or a zoom that is not positive.
+    """
+    factor = number(zoom, "plot: zoom", above=0)
+    if not cracks:
+        raise ProblemError("plot(zoom=): the body has no crack to zoom to; leave zoom out.")
+    x = np.concatenate([solution.lips[c].x for c in cracks])
+    low, high = x.min(axis=0), x.max(axis=0)
+    half = factor * max(float((high - low).max()), 1e-300) / 2
+    middle = (low + high) / 2
+    return np.stack([middle - half, middle + half])
 
 
 def _drawable(given: Any, field: Any) -> Solution:

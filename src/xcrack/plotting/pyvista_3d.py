@@ -1,5 +1,6 @@
 """Pictures of 3D bodies by pyvista, on screen or off."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,7 @@ from xcrack.plotting.pyvista_2d import (
 )
 from xcrack.plotting.scene_2d import CLOSED
 from xcrack.plotting.scene_3d import SpaceScene
+from xcrack.plotting.section_3d import Soup, segments_behind
 
 _APART = "#c9ccd1"  # lips that do not touch, where the pressure is drawn
 _LEGEND = 28  # pixels of a line of the legend
@@ -46,6 +48,9 @@ def draw_space(
     size = high - low
     extent = float(size[:2].max())
     scale = LONGER / extent
+    if picture.near is not None:
+        # What lies beyond the box would be drawn under the bar of the colours.
+        picture = _left_of(picture, right, float(high[0]) + MARGIN / scale)
     top = 70 if title else 0
     bar = BAR if picture.label or _legend(picture) else 0
     width = max(int(size[0] * scale) + 2 * MARGIN, SHORTEST) + bar
@@ -94,6 +99,27 @@ def _axes(toward: Floats) -> tuple[Floats, Floats, Floats]:
     right = np.cross(upright, toward)
     right /= np.linalg.norm(right)
     return right, np.cross(toward, right), toward
+
+
+def _left_of(picture: SpaceScene, right: Floats, limit: float) -> SpaceScene:
+    """A picture without what lies beyond a limit on the right."""
+
+    def cut(corners: Floats, values: Floats | None = None) -> tuple[Floats, Floats]:
+        k, v = corners.shape[:2]
+        number = np.arange(k * v).reshape(k, v)
+        x = corners.reshape(-1, 3)
+        level = x @ right - limit
+        parts = [Soup.of(number, None).behind(level)] if v > 2 else segments_behind(number, level)
+        shown = np.zeros(k * v) if values is None else values.ravel()
+        return (
+            np.concatenate([part.at(x) for part in parts]),
+            np.concatenate([part.at(shown[:, None])[..., 0] for part in parts]),
+        )
+
+    names = ("touching", "apart", "skin", "outline", "cell_edges", "faint", "rims", "fronts")
+    rest: dict[str, Any] = {name: cut(getattr(picture, name))[0] for name in names}
+    triangles, values = cut(picture.triangles, picture.values)
+    return replace(picture, triangles=triangles, values=values, **rest)
 
 
 def _add_faces(

@@ -52,6 +52,8 @@ class Scene:
     outline, lips, closed, cell_edges, at_rest : (k, 3, 2) arrays, length
         Edges as three points: of the body, of open crack faces, of closed crack faces, between
         cells of the mesh, and of the body that has not moved.
+    near : (2, 2) array, length, optional
+        Box to show instead of the whole body.
     """
 
     points: Floats
@@ -66,10 +68,13 @@ class Scene:
     closed: Floats
     cell_edges: Floats
     at_rest: Floats
+    near: Floats | None = None
 
     @property
     def box(self) -> Floats:
         """Lowest and highest coordinates of what is drawn `(2, 2)`, length."""
+        if self.near is not None:
+            return self.near
         x = np.concatenate([self.points, self.at_rest.reshape(-1, 2)])
         return np.stack([x.min(axis=0), x.max(axis=0)])
 

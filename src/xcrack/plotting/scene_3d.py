@@ -64,6 +64,8 @@ class SpaceScene:
         Unit vector from the body to the viewer.
     heaviside, tip : (k, 3) arrays, length
         Points that carry these functions.
+    near : (k, 3) array, length, optional
+        Points that have to be in the picture instead of the whole body.
     """
 
     triangles: Floats
@@ -82,10 +84,13 @@ class SpaceScene:
     toward: Floats
     heaviside: Floats
     tip: Floats
+    near: Floats | None = None
 
     @property
     def box(self) -> Floats:
         """Points that have to be in the picture `(k, 3)`, length: a small crack fills it."""
+        if self.near is not None:
+            return self.near
         body = self.body
         if not len(self.skin) or len(self.heaviside):
             return body

@@ -55,7 +55,8 @@ class Soup:
             return self
         values = level[self.number]
         low, high = values.min(axis=1), values.max(axis=1)
-        whole, split = np.nonzero(high <= 0)[0], np.nonzero((low < 0) & (high > 0))[0]
+        # The section has what lies in the plane, on the side that is drawn: lips lie there twice.
+        whole, split = np.nonzero((high <= 0) & (low < 0))[0], np.nonzero((low < 0) & (high > 0))[0]
         bary, _, side, parent = cut_simplices(values[split])
         mine = side < 0
         rows = np.concatenate([whole, split[parent[mine]]])
@@ -69,7 +70,9 @@ def levels(x: Floats, plane: Plane | None) -> Floats | None:
     if plane is None:
         return None
     level = (x - plane[0]) @ plane[1]
-    return np.where(np.abs(level) < 1e-9 * np.abs(level).max(), 0.0, level)
+    # Of points that all lie in the plane the distances are round-off only.
+    size = max(float(np.ptp(x, axis=0).max(initial=0.0)), float(np.abs(level).max(initial=0.0)))
+    return np.where(np.abs(level) < 1e-9 * size, 0.0, level)
 
 
 def segments_behind(number: Ints, level: Floats | None) -> list[Soup]:

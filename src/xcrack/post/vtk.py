@@ -11,6 +11,7 @@ import numpy as np
 
 from xcrack.analysis.solution import Solution
 from xcrack.arrays import Floats, Ints
+from xcrack.crack.measures import measures
 from xcrack.errors import ProblemError, XcrackError
 from xcrack.inputs import entries, shown
 from xcrack.optional import required
@@ -51,7 +52,8 @@ def write(
     fit, and cell data are ``crack``, ``closed`` (half of the triangle or more), ``closed_share``,
     ``pressure_mean`` and ``gap_mean``. A third file, ``<path>_fronts.vtp``, has a line for each
     front with its frames (``ahead``, ``normal``), its arc length ``s`` and, where they are given,
-    ``K_I``, ``K_II``, ``K_III`` and ``at_surface``.
+    ``K_I``, ``K_II``, ``K_III`` and ``at_surface``; cell data are ``crack``, ``front``, and
+    ``area`` and ``depth`` of its crack.
 
     Parameters
     ----------
@@ -235,6 +237,11 @@ def _write_fronts(solution: Solution, sif: Sequence[SIF], path: Path) -> None:
     at_cells = {
         "crack": np.array([tip.crack for tip in tips]),
         "front": np.array([tip.number for tip in tips]),
+    }
+    known = [measures(crack, solution.space.mesh) for crack in solution.space.cracks]
+    at_cells |= {
+        name: np.array([getattr(known[tip.crack], name) for tip in tips])
+        for name in ("area", "depth")
     }
     data = _vtk("vtkCommonDataModel").vtkPolyData()
     data.SetPoints(_points(x))
