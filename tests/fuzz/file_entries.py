@@ -106,6 +106,13 @@ def _three_d(value):
     return None if isinstance(value, list | tuple) else False
 
 
+def _body_of_history(value):
+    """None is the mesh of the run; another mesh may fit its cracks or not."""
+    if value is None:
+        return True
+    return None if isinstance(value, xc.Mesh) else False
+
+
 def _charted(**changes):
     given = {
         "settings": [{"order": 1}],
@@ -182,6 +189,12 @@ ENTRIES = [
         lambda path: scenes.history().write(path),
         {"path": arg(Filename(folder=True), "good", near=paths("", ""), words=["history"])},
         in_folder=True,
+        cost=0.2,
+    ),
+    Entry(
+        "History",
+        lambda mesh: len(scenes.history().measures(mesh)),
+        {"mesh": arg(Seen(rule=_body_of_history), None, Late(scenes.mesh), words=["crack"])},
         cost=0.2,
     ),
     Entry(
