@@ -117,6 +117,13 @@ def meshes() -> dict[str, Mesh]:
         40.0, 40.0, lower=(-20.0, -20.0), size=4.0, size_near=0.3,
         along=TURNING, band=0.6, transition=14.0,
     )  # fmt: skip
+    width = 50.0  # of compact_tension.py; the load line is at x = 0
+    made["compact_tension"] = plate(
+        1.25 * width, 1.2 * width, lower=(-0.25 * width, -0.6 * width),
+        holes=[((0.0, 0.275 * width), 0.125 * width), ((0.0, -0.275 * width), 0.125 * width)],
+        size=4.0, size_near=1.0, along=[(0.2 * width, 0.0), (0.85 * width, 0.0)], band=1.0,
+        transition=15.0,
+    )  # fmt: skip
     return {**{name: short(mesh) for name, mesh in made.items()}, "two_holes": two_holes()}
 
 
