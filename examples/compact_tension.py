@@ -32,7 +32,7 @@ MESH = xc.read_mesh(Path(__file__).parent / "meshes" / "compact_tension.msh")
 
 
 def standard(a):
-    """K of ASTM E399 (A4.5.3) and E647 (A1.5.1.1) for the crack length a from the load line."""
+    """K of ASTM E399 and E647, compact specimen, for the length a from the load line."""
     x = a / W
     f = (2 + x) * (0.886 + 4.64 * x - 13.32 * x**2 + 14.72 * x**3 - 5.6 * x**4) / (1 - x) ** 1.5
     return FORCE / np.sqrt(W) * f

@@ -1,4 +1,7 @@
-"""Griffith's crack with a part of its stress given as pressure on the faces or initial stress."""
+"""Griffith's crack with a part of its stress given as a load.
+
+The load is a pressure on the faces, an initial stress or a change of temperature.
+"""
 
 from collections.abc import Sequence
 from functools import partial
@@ -12,6 +15,7 @@ from xcrack.crack.lines import line_crack
 from xcrack.scene.conditions import Load, crack_pressure, displacement, initial_stress
 from xcrack.scene.material import Isotropic
 from xcrack.scene.problem import Problem
+from xcrack.scene.temperature import temperature
 from xcrack.sif.stress_intensity import stress_intensity
 from xcrack.verification import fields_2d, potentials_2d
 
@@ -19,6 +23,8 @@ _SYY, _SXY, _ANGLE = 1.0, 0.5, 0.21
 _WITHIN = {1: 8e-3, 2: 3e-4}
 _PRESSURE = 0.8
 _INITIAL = (0.3, 0.6, -0.2)
+_HEAT, _EXPANSION = 0.4, 0.25
+_THERMAL = -E / (1 - 2 * NU) * _EXPANSION * _HEAT  # of a body that cannot expand, plane strain
 _SOURCE = "superposition of Griffith's crack and a uniform stress"
 
 
@@ -58,11 +64,12 @@ def _initial() -> list[Load]:
 
 
 CASES = tuple(
-    Case(f"{name}-{order}", "loads", _SOURCE, "exact", 2, order, False,
+    Case(f"{name}-{order}", requirement, _SOURCE, "exact", 2, order, False,
          partial(_run, order=order, taken=taken, loads=loads), 2)
-    for name, taken, loads in (
-        ("face-pressure", (_PRESSURE, _PRESSURE, 0.0), [crack_pressure(_PRESSURE)]),
-        ("initial-stress", _INITIAL, _initial()),
+    for name, requirement, taken, loads in (
+        ("face-pressure", "loads", (_PRESSURE, _PRESSURE, 0.0), [crack_pressure(_PRESSURE)]),
+        ("initial-stress", "loads", _INITIAL, _initial()),
+        ("temperature", "temperature", (_THERMAL, _THERMAL, 0.0), [temperature(_HEAT, _EXPANSION)]),
     )
     for order in (1, 2)
 )  # fmt: skip
