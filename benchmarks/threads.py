@@ -22,11 +22,11 @@ from typing import Any
 for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(_name, "1")  # threads of BLAS are none of ours
 
-import numpy as np
+import numpy as np  # noqa: E402
 
-import xcrack as xc
-from xcrack import threads
-from xcrack.xfem.model import build
+import xcrack as xc  # noqa: E402
+from xcrack import threads  # noqa: E402
+from xcrack.xfem.model import build  # noqa: E402
 
 Times = dict[str, float]
 PARTS = ("matrices", "solution", "K", "whole")
