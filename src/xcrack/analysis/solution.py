@@ -8,6 +8,7 @@ from numbers import Real
 import numpy as np
 from numpy.typing import ArrayLike
 
+from xcrack.analysis.factored import Factored
 from xcrack.analysis.plan import Report
 from xcrack.arrays import Bools, Floats, Ints, lock
 from xcrack.contact.result import Contact
@@ -49,6 +50,10 @@ class Solution:
         What was modelled, what was left out, and why.
     reuse : Reuse
         What serves the next solve in the same mesh.
+    number : int
+        Which of the states of its solve.
+    factored : Factored, optional
+        The factor, of a solve with ``error=True``; lost where a solution is pickled.
     """
 
     problem: Problem
@@ -62,6 +67,8 @@ class Solution:
     energy: float
     report: Report
     reuse: Reuse
+    number: int = 0
+    factored: Factored | None = None
 
     def __repr__(self) -> str:
         return f"Solution(state={self.state!r}, n_dof={self.n_dof}, energy={self.energy:.6g})"

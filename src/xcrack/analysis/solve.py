@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from xcrack.analysis.factored import Factored
 from xcrack.analysis.relaxation import out_of_balance
 from xcrack.analysis.report import report
 from xcrack.analysis.resultants import resultants
@@ -13,7 +14,7 @@ from xcrack.analysis.solution import Solution
 from xcrack.arrays import Bools, Floats, lock
 from xcrack.contact.solve import contact_of, solve_contact
 from xcrack.errors import ProblemError
-from xcrack.inputs import entries, shown
+from xcrack.inputs import entries, flag, shown
 from xcrack.scene.conditions import Displacement, InitialStress, Load
 from xcrack.scene.problem import Problem, check_problem
 from xcrack.solvers.direct import Solver, system
@@ -32,7 +33,10 @@ _LARGEST = 1e120  # force or displacement whose square, over a small stiffness, 
 
 
 def solve(
-    problem: Problem, states: Sequence[Any] | None = None, solver: Solver | None = None
+    problem: Problem,
+    states: Sequence[Any] | None = None,
+    solver: Solver | None = None,
+    error: bool = False,
 ) -> Any:
     """Solve a problem for one load state or several, with one factorisation.
 
@@ -45,6 +49,10 @@ def solve(
     solver : callable, optional
         Given a sparse symmetric matrix, returns a function that solves for right-hand sides;
         a multifrontal factorisation if omitted.
+    error : bool
+        Keep the factor with the solutions: `stress_intensity` then gives an error bar with K, and
+        needs no second factorisation for it. The memory of the factor is free once the solutions
+        are.
 
     Returns
     -------
@@ -65,7 +73,9 @@ def solve(
         )
     if states is not None:
         states = entries(states, "states")
-    solutions = solve_states(problem, [None] if states is None else states, solver=solver)
+    error = flag(error, "solve: error")
+    wanted = [None] if states is None else states
+    solutions = solve_states(problem, wanted, solver=solver, error=error)
     return solutions[0] if states is None else solutions
 
 
@@ -75,19 +85,25 @@ def solve_states(
     *,
     reuse: Reuse | None = None,
     solver: Solver | None = None,
+    error: bool = False,
 ) -> list[Solution]:
     """Solve all load states; `reuse` of an earlier solution in the same mesh saves work.
 
     Give `Reuse()` at the first of several solves in one mesh: what serves the next is kept then.
+    With `error` the factor stays with the solutions.
     """
     if not len(states):
         raise ProblemError("states is empty: give at least one load state, or none at all.")
     with threads(problem.numerics.threads):
-        return _solve_states(problem, states, reuse, solver)
+        return _solve_states(problem, states, reuse, solver, error)
 
 
 def _solve_states(
-    problem: Problem, states: Sequence[Any], reuse: Reuse | None, solver: Solver | None
+    problem: Problem,
+    states: Sequence[Any],
+    reuse: Reuse | None,
+    solver: Solver | None,
+    error: bool,
 ) -> list[Solution]:
     model = build(problem, None if reuse is None else reuse.bulk)
     known_loads: dict[int, Floats] = {}
@@ -103,6 +119,7 @@ def _solve_states(
     if motion.modes.shape[1]:
         u = without_motion(motion, u)
     handed_on = engine.handed_on(replace(pressed.closed_sets(), bulk=model.bulk))
+    factored = Factored(model, engine, motion, pressed) if error else None
     # It depends on the mesh, not on the cracks: steps of a run leave it out.
     unbalanced = None if reuse is not None else out_of_balance(problem, model, cases[0].loads)
     summary = report(problem, model, engine, pressed, motion, imbalance, len(states), unbalanced)
@@ -123,6 +140,8 @@ def _solve_states(
                 energy=0.5 * float(u[:, k] @ forces),
                 report=replace(summary, resultants=rows),
                 reuse=handed_on,
+                number=k,
+                factored=factored,
             )
         )
     return solutions

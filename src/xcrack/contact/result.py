@@ -49,6 +49,9 @@ class ContactSolution:
     active : tuple of (states, g) arrays of bool or None
     sets : int
         Closed sets tried in the worst state.
+    dual : (g, g) array or None
+        F = N K^-1 N^T over the multipliers of all cracks in their order; None where no
+        factorisation made it.
     """
 
     u: Floats
@@ -56,6 +59,7 @@ class ContactSolution:
     pressure: tuple[Floats | None, ...]
     active: tuple[Bools | None, ...]
     sets: int
+    dual: Floats | None = None
 
     def closed_sets(self) -> Reuse:
         """Closed sets by place, for the next solve."""

@@ -54,7 +54,8 @@ def solve_contact(
     pressure: list[Floats | None] = [None] * n
     active: list[Bools | None] = [None] * n
     expected: list[int] = []
-    sets = 0
+    sets, dual = 0, None
+    chosen: list[Multipliers] = []
     if problem.contact == "off":
         u: Floats | None = engine.solve(f, known)
         pending: list[int] = []
@@ -75,7 +76,7 @@ def solve_contact(
         chosen = [m for m in spaces if m is not None]
         states = _solve_states(problem, model, engine, chosen, f, known, (u, opened), reuse, acting)
         u = np.stack([cast(Floats, state.u) for state in states], axis=1)
-        sets = max(state.sets for state in states)
+        sets, dual = max(state.sets for state in states), states[0].dual
         first = 0
         for m in chosen:
             last = first + len(m.measure)
@@ -88,7 +89,12 @@ def solve_contact(
         ever = active[c]
         if ever is not None and not ever.any() and problem.contact != "on":
             spaces[c] = pressure[c] = active[c] = None
-    return ContactSolution(u, tuple(spaces), tuple(pressure), tuple(active), sets)
+    if dual is not None and expected:
+        stays = np.repeat(
+            [spaces[m.crack] is not None for m in chosen], [len(m.measure) for m in chosen]
+        )
+        dual = dual[np.ix_(stays, stays)]
+    return ContactSolution(u, tuple(spaces), tuple(pressure), tuple(active), sets, dual)
 
 
 def _solve_states(

@@ -81,19 +81,19 @@ def _integrals(solutions: Sequence[Solution], t: int, radii: Floats) -> Floats:
     total = lip_terms(solutions, ring)
     # Within the inner radius grad q vanishes.
     hollow = float(ring.inner.min())
-    for cells, n, degree in _classes(space, tip.x, hollow, outer):
+    for cells, n, degree in ring_classes(space, tip.x, hollow, outer):
         plain = space.signature[cells] == 0
         total += plain_terms(solutions, ring, cells[plain], degree)
-        for points in _points(space, cells[~plain], n, degree):
+        for points in class_points(space, cells[~plain], n, degree):
             total += point_terms(solutions, ring, points)
     if acts(solutions, BodyForce, InitialStress):
-        for cells, n, degree in _classes(space, tip.x, 0.0, outer):
-            for points in _points(space, cells, n, degree):
+        for cells, n, degree in ring_classes(space, tip.x, 0.0, outer):
+            for points in class_points(space, cells, n, degree):
                 total += volume_terms(solutions, ring, points)
     return total
 
 
-def _classes(
+def ring_classes(
     space: FunctionSpace, centre: Floats, hollow: float, radius: float
 ) -> Iterator[tuple[Ints, int, int]]:
     """Cells between two radii by size, points a direction with tip functions, degree without."""
@@ -108,7 +108,7 @@ def _classes(
             yield cells, n, degree
 
 
-def _points(space: FunctionSpace, cells: Ints, n: int, degree: int) -> Iterator[Points]:
+def class_points(space: FunctionSpace, cells: Ints, n: int, degree: int) -> Iterator[Points]:
     """Integration points of cells, of some cells at once."""
     for first in range(0, len(cells), _CHUNK):
         yield cell_points(space, cells[first : first + _CHUNK], n, degree)

@@ -22,6 +22,7 @@ from xcrack.arrays import Floats, Ints
 from xcrack.mesh.mesh import local_edges
 from xcrack.mesh.simplex import simplex_rule
 from xcrack.scene.conditions import BodyForce, InitialStress, evaluate, evaluate_stress
+from xcrack.scene.material import Isotropic
 from xcrack.sif.common import acts, lip_pressure, mean_rotation, weight
 from xcrack.xfem.loads import position
 from xcrack.xfem.quadrature import Points, cell_side
@@ -163,13 +164,12 @@ def _auxiliary(solutions: Sequence[Solution], r: Floats, theta: Floats) -> list[
     gradients = unit_gradients(r, theta, material.kolosov, material.mu)
     curves = np.zeros((len(gradients), 0, 2, 2))
     if acts(solutions, InitialStress):
-        curves = _ahead_derivative(solutions[0], r, theta)
+        curves = ahead_derivative(solutions[0].problem.material, r, theta)
     return [_Field(g, material.stress(g), c) for g, c in zip(gradients, curves, strict=True)]
 
 
-def _ahead_derivative(solution: Solution, r: Floats, theta: Floats) -> Floats:
-    """Derivatives along ahead of the unit gradients, by central differences of size 1e-5 r."""
-    material = solution.problem.material
+def ahead_derivative(material: Isotropic, r: Floats, theta: Floats) -> Floats:
+    """Derivatives along ahead of the unit gradients `(3, q, 2, 2)`, by differences of 1e-5 r."""
     x, y = r * np.cos(theta), r * np.sin(theta)
     step = 1e-5 * r
     shifted = []

@@ -8,6 +8,7 @@ import numpy as np
 from xcrack.arrays import Bools, Floats, Ints, lock
 from xcrack.errors import ProblemError
 from xcrack.inputs import numbers, shown, whole_numbers
+from xcrack.sif.bars import Bars, no_bars
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,6 +41,8 @@ class SIF:
         crack without multipliers.
     domain_cells : (f,) array
         Outer radius of the larger domain, in cells; few of them mean a domain that is clipped.
+    errors : Bars, optional
+        Estimated errors, where they were asked for.
 
     Raises
     ------
@@ -57,6 +60,7 @@ class SIF:
     at_surface: Bools
     closed: Bools
     domain_cells: Floats
+    errors: Bars | None = None
 
     def __post_init__(self) -> None:
         x = numbers(self.x, "SIF: x", (None, None))
@@ -75,6 +79,34 @@ class SIF:
                 raise ProblemError(
                     f"SIF: {name} = {shown(flags)}: give an array of bool of shape ({n},)."
                 )
+        if self.errors is not None and not isinstance(self.errors, Bars):
+            raise ProblemError(f"SIF: errors = {shown(self.errors)}: give Bars or None.")
+
+    @property
+    def eta(self) -> Floats:
+        """Signed estimate of exact K less K `(f, 2 or 3)`, nan where there is none: `reasons`."""
+        return self._errors.eta
+
+    @property
+    def bar(self) -> Floats:
+        """Half-width of the error of `best` `(f, 2 or 3)`, nan where there is none: `reasons`."""
+        return self._errors.bar
+
+    @property
+    def best(self) -> Floats:
+        """K + eta `(f, 2 or 3)`, nan where there is no estimate."""
+        return self.K + self.eta
+
+    @property
+    def reasons(self) -> tuple[str, ...]:
+        """Why there is no estimate at a place, empty where there is one; one a place."""
+        return self._errors.reasons
+
+    @property
+    def _errors(self) -> Bars:
+        if self.errors is not None:
+            return self.errors
+        return no_bars(self.K.shape, "no estimate was asked for: stress_intensity(error=True)")
 
     @property
     def K_I(self) -> Floats:

@@ -8,14 +8,15 @@ import numpy as np
 
 from xcrack.analysis.solution import Solution
 from xcrack.errors import ProblemError
-from xcrack.inputs import shown, whole
+from xcrack.inputs import flag, shown, whole
 from xcrack.sif.domain_2d import tip_intensity
 from xcrack.sif.domain_3d import front_intensity
+from xcrack.sif.error import with_bars
 from xcrack.sif.sif import SIF, joined
 from xcrack.threads import threads
 
 
-def stress_intensity(solution: Solution, crack: int = 0) -> SIF:
+def stress_intensity(solution: Solution, crack: int = 0, error: bool | None = None) -> SIF:
     """K_I, K_II and T at the tips, or K_I to K_III along the fronts of a crack, from two domains.
 
     Parameters
@@ -23,6 +24,10 @@ def stress_intensity(solution: Solution, crack: int = 0) -> SIF:
     solution : Solution
     crack : int
         Its number in the problem.
+    error : bool, optional
+        Estimate the error: `eta`, `bar` and `best` of the result. By default where the solution
+        comes from ``solve(..., error=True)``. Of any other solution, as one that was stored, the
+        states are solved once more, since the factor is gone.
 
     Returns
     -------
@@ -49,10 +54,12 @@ def stress_intensity(solution: Solution, crack: int = 0) -> SIF:
             f"stress_intensity takes a Solution as solve returns it, not a "
             f"{type(solution).__name__}{hint}."
         )
-    return stress_intensities([solution], crack)[0]
+    return stress_intensities([solution], crack, error)[0]
 
 
-def stress_intensities(solutions: Sequence[Solution], crack: int = 0) -> list[SIF]:
+def stress_intensities(
+    solutions: Sequence[Solution], crack: int = 0, error: bool | None = None
+) -> list[SIF]:
     """K of several load states that one solve returned; what is geometry is made once.
 
     Parameters
@@ -61,6 +68,8 @@ def stress_intensities(solutions: Sequence[Solution], crack: int = 0) -> list[SI
         States of one problem, which share their space.
     crack : int
         Its number in the problem.
+    error : bool, optional
+        As of `stress_intensity`.
 
     Returns
     -------
@@ -94,7 +103,12 @@ def stress_intensities(solutions: Sequence[Solution], crack: int = 0) -> list[SI
     place = np.cumsum([not s.at_rest for s in solutions]) - 1
     K, T = np.zeros_like(by_state[0].K), np.where(np.isnan(by_state[0].T), np.nan, 0.0)
     rest = replace(by_state[0], K=K, T=T, spread=K, closed=np.zeros(len(K), dtype=bool))
-    return [rest if s.at_rest else by_state[k] for s, k in zip(solutions, place, strict=True)]
+    result = [rest if s.at_rest else by_state[k] for s, k in zip(solutions, place, strict=True)]
+    if error is None:
+        error = any(s.factored is not None for s in solutions)
+    elif not flag(error, "stress_intensity: error"):
+        return result
+    return with_bars(solutions, result, crack) if error else result
 
 
 def _checked(solutions: Any) -> list[Solution]:

@@ -42,7 +42,7 @@ def active_set(
     seen: set[bytes] = set()
     active = np.array(start, dtype=bool)
     for iteration in range(1, _MAX_SETS + 1):
-        pressure, gap = _of_set(F, d, active)
+        pressure, gap = of_set(F, d, active)
         # Values at round-off of zero (faces that only touch) must not make the set flicker.
         lam_scale = 1e-13 * float(np.abs(pressure).max(initial=0.0))
         trial = pressure - stiffness * gap / measure
@@ -57,7 +57,7 @@ def active_set(
     return _safe(F, d, len(seen))
 
 
-def _of_set(F: Floats, d: Floats, active: Bools) -> tuple[Floats, Floats]:
+def of_set(F: Floats, d: Floats, active: Bools) -> tuple[Floats, Floats]:
     """Pressures that close the groups of a set, and the gaps they leave."""
     pressure = np.zeros(len(d))
     if active.any():
@@ -97,7 +97,7 @@ def _safe(F: Floats, d: Floats, tried: int) -> StateContact:
     rhs = -(V[:, resolved].T @ (scale * d)) / root
     guess, _ = scipy.optimize.nnls(root[:, None] * V[:, resolved].T, rhs)
     active = guess > 0
-    pressure, gap = _of_set(F, d, active)
+    pressure, gap = of_set(F, d, active)
     size = float(np.abs(d).max(initial=0.0))
     if (gap < -1e-8 * size).any() or (pressure < -1e-8 * np.abs(pressure).max(initial=0)).any():
         raise ConvergenceError(

@@ -145,7 +145,7 @@ class System:
             y[places] += Y @ pressure
         self.count.solves += b.shape[1]
         u = self._expanded(self.factor.backward(y), known)
-        return [replace(state, u=u[:, k]) for k, state in enumerate(states)]
+        return [replace(state, u=u[:, k], dual=F) for k, state in enumerate(states)]
 
     def dual(self, N: sp.csr_matrix) -> Floats:
         """F = N K^-1 N^T `(g, g)`, in blocks of right-hand sides."""
@@ -168,10 +168,11 @@ class System:
         opened: Floats | None,
     ) -> list[StateContact]:
         d = rows.N @ (self.solve(f, known) if opened is None else opened)
-        states = self._sets(self.dual(rows.N), d, rows, start)
+        F = self.dual(rows.N)
+        states = self._sets(F, d, rows, start)
         pressure = np.stack([state.pressure for state in states], axis=1)
         u = self.solve(f + rows.N.T @ pressure, known)
-        return [replace(state, u=u[:, k]) for k, state in enumerate(states)]
+        return [replace(state, u=u[:, k], dual=F) for k, state in enumerate(states)]
 
     def _sets(
         self, F: Floats, d: Floats, rows: ContactRows, start: Sequence[Bools | None]

@@ -37,6 +37,8 @@ class StateContact:
         Displacements; None where only the pressures were solved for.
     fallback : bool
         The set cycled and was found by non-negative least squares instead.
+    dual : (g, g) array, optional
+        F = N K^-1 N^T, which all states share; None where it was never made.
     """
 
     pressure: Floats
@@ -45,6 +47,7 @@ class StateContact:
     sets: int
     u: Floats | None = None
     fallback: bool = False
+    dual: Floats | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,0 +1,1 @@
+"""Estimated errors of functionals of a solution, by dual solutions and a surplus space."""

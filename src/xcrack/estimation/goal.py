@@ -1,0 +1,72 @@
+"""Functionals that are affine in a solution: a sum over points, and pressures on crack faces."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from xcrack.analysis.solution import Solution
+from xcrack.arrays import Floats, Ints
+from xcrack.xfem.function_space import FunctionSpace
+
+
+@dataclass(frozen=True, eq=False)
+class GoalPoints:
+    """Points at which displacement gradients enter m functionals.
+
+    Attributes
+    ----------
+    cell : (q,) array of int
+    bary : (q, 3) array
+    side : (q, cracks) array of int
+    factor : (q, 2, 2, m) array
+        By component and derivative; weights included.
+    """
+
+    cell: Ints
+    bary: Floats
+    side: Ints
+    factor: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Goal:
+    """m functionals J = f . u + g . p + a constant of the loads.
+
+    Attributes
+    ----------
+    parts : tuple of GoalPoints
+    rotation : (n_points, 2) array
+        Mean rotation as a sum over the displacements of mesh points, which it is free of.
+    crack : int
+    pressure : (q, m) array
+        Factors of the pressures on the faces of that crack, at their integration points.
+    """
+
+    parts: tuple[GoalPoints, ...]
+    rotation: Floats
+    crack: int
+    pressure: Floats
+
+    def on_functions(self, space: FunctionSpace) -> Floats:
+        """The part f: each functional of each function and component `(n_dof, m)`."""
+        from xcrack.kernels.goal import add_to_functions
+
+        m = self.pressure.shape[1]
+        total = np.zeros((space.n_functions, space.dim, m))
+        turn = np.zeros(m)
+        for part in self.parts:
+            turn += (part.factor[:, 0, 1] - part.factor[:, 1, 0]).sum(axis=0)
+            for batch, number, row in space.batches_of_points(part.cell):
+                _, slope = space.tabulate(batch, row, part.bary[number], part.side[number])
+                add_to_functions(total, batch.functions, row, number, slope, part.factor)
+        total[: len(self.rotation)] += self.rotation[:, :, None] * turn
+        return total.reshape(-1, m)
+
+    def on_pressures(self, values: Floats) -> Floats:
+        """The part g: each functional of each pressure function `(g, m)`, from its values."""
+        return np.asarray(values.T @ self.pressure)
+
+    def of(self, solution: Solution, pressure: Floats) -> Floats:
+        """Value f . u + g . p, with pressures at the points of the faces `(m,)`."""
+        f = self.on_functions(solution.space)
+        return np.asarray(solution.u @ f + pressure @ self.pressure)

@@ -1,0 +1,175 @@
+"""What a shape that the mesh or the cut misses does to functionals, to first order.
+
+Where the boundary of the model must move outward by delta, a functional with the dual solution z
+changes by -int delta sigma(u) : eps(z) ds on boundaries free of traction (the shape derivative of
+an energy product; Sokolowski and Zolésio, 1992).
+"""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from xcrack.analysis.solution import Solution, gradients_at
+from xcrack.arrays import Floats, Ints
+from xcrack.mesh.mesh import Mesh
+from xcrack.xfem.loads import facet_points, position
+from xcrack.xfem.quadrature import Points, cell_side
+
+_ROUND = 0.9  # rad; facets that turn by more meet at a corner
+_ALIKE = 3.0  # ratio of the turns at both ends of a facet of a curve
+# Share of each absolute contribution of a crack's shape that is in doubt: where it is smooth, and
+# besides at kinks, all of it from a turn of so many rad on (measured: half of what a kink of 1 rad
+# changes is of first order).
+_SMOOTH, _KINK, _BLUNT = 0.3, 0.8, 0.5
+
+
+def crack_shape(
+    solutions: Sequence[Solution], z: Floats, c: int, singular: Callable[[], Floats]
+) -> tuple[Floats, Floats]:
+    """Crack c as it was given, not as the cells cut it: changes `(states, m)`, and their bars.
+
+    The cut is straight in each cell: it rounds kinks off and follows arcs by chords.
+
+    Parameters
+    ----------
+    solutions : sequence of Solution
+    z : (states, n_dof, m) array
+        Dual solutions.
+    c : int
+    singular : callable
+        Gradients on the faces - and + that z has and influence functions have not, `(2, q, 2,
+        2, m)`; called where the crack is not straight.
+    """
+    space, lips = solutions[0].space, solutions[0].lips[c]
+    nothing = np.zeros((len(solutions), z.shape[2]))
+    foot, turn = _nearest_on(space.cracks[c].points, lips.x)
+    away = _along_normal(foot - lips.x, lips.normal)
+    moved = np.nonzero(np.abs(away) > 1e-9 * space.mesh.extent)[0]
+    if not len(moved):
+        return nothing, nothing
+    more = singular()[:, moved]
+    jump = np.zeros((len(moved), *nothing.shape))
+    for s, sign in ((0, -1.0), (1, 1.0)):
+        cell = lips.cell[moved, s]
+        side = cell_side(space, cell)
+        side[:, c] = int(sign)
+        jump += sign * _products(solutions, z, (cell, lips.bary[moved, s], side), more[s])
+    parts = (lips.weight[moved] * away[moved])[:, None, None] * jump
+    doubt = _SMOOTH + _KINK * np.minimum(turn[moved] / _BLUNT, 1.0)
+    return parts.sum(axis=0), np.einsum("q,qkm->km", doubt, np.abs(parts))
+
+
+def rim_shape(solutions: Sequence[Solution], z: Floats) -> tuple[Floats, Floats]:
+    """Curved boundaries as they are, not as polygons: changes `(states, m)`.
+
+    Boundaries are taken as free of traction.
+
+    Returns
+    -------
+    known : (states, m) array
+        Where the mesh knows the curve.
+    guessed : (states, m) array
+        Where facets look like chords of a curve that it does not know.
+    """
+    mesh = solutions[0].space.mesh
+    sides = [(mesh.facet_sets[name], curve) for name, curve in mesh.curves.items()]
+    known = np.zeros((len(solutions), z.shape[2]))
+    for facets, curve in sides:
+        points, normal = facet_points(solutions[0].space, facets, 3)
+        x = position(solutions[0].space, points.cell, points.bary)
+        away = np.einsum("qd,qd->q", np.asarray(curve(x)) - x, normal)
+        known -= _moved(solutions, z, points, away)
+    facets, sagitta = _chords(mesh)
+    if len(facets) and sides:
+        curved = mesh.facet_numbers(np.concatenate([facets for facets, _ in sides]))
+        other = ~np.isin(mesh.facet_numbers(facets), curved)
+        facets, sagitta = facets[other], sagitta[other]
+    if not len(facets):
+        return known, np.zeros_like(known)
+    points, _ = facet_points(solutions[0].space, facets, 3)
+    of_cell = np.zeros(len(mesh.cells))
+    of_cell[mesh.facet_to_cell[mesh.facet_numbers(facets), 0]] = sagitta
+    return known, -_moved(solutions, z, points, of_cell[points.cell])
+
+
+def _moved(solutions: Sequence[Solution], z: Floats, points: Points, away: Floats) -> Floats:
+    """Integral of away sigma(u) : eps(z) over boundary points `(states, m)`."""
+    density = _products(solutions, z, (points.cell, points.bary, points.side))
+    return np.asarray(np.einsum("q,qkm->km", points.weight * away, density))
+
+
+def _nearest_on(polyline: Floats, x: Floats) -> tuple[Floats, Floats]:
+    """Nearest points on a polyline `(q, 2)`, and by how much it turns at the next vertex `(q,)`."""
+    a, along = polyline[:-1], np.diff(polyline, axis=0)
+    t = np.einsum("qsd,sd->qs", x[:, None] - a, along) / (along * along).sum(axis=1)
+    t = np.clip(t, 0.0, 1.0)
+    foot = a + t[..., None] * along
+    best = np.linalg.norm(x[:, None] - foot, axis=2).argmin(axis=1)
+    row = np.arange(len(x))
+    heading = np.unwrap(np.arctan2(along[:, 1], along[:, 0]))
+    turn = np.concatenate([[0.0], np.abs(np.diff(heading)), [0.0]])
+    return foot[row, best], turn[best + (t[row, best] > 0.5)]
+
+
+def _along_normal(way: Floats, normal: Floats) -> Floats:
+    """Distances along the normal to lines whose nearest points are given by the way there."""
+    across = np.einsum("qd,qd->q", way, normal)
+    square = np.einsum("qd,qd->q", way, way)
+    steep = across * across < 0.5 * square  # at a vertex, or far from parallel
+    return np.where(steep, across, square / np.where(steep, 1.0, across + (across == 0)))
+
+
+def _products(
+    solutions: Sequence[Solution],
+    z: Floats,
+    points: tuple[Ints, Floats, Ints],
+    more: Floats | None = None,
+) -> Floats:
+    """sigma(u) : eps(z) at points given by cell, place and side `(q, states, m)`.
+
+    Gradients `more` (q, 2, 2, m) are taken off those of z.
+    """
+    space, material = solutions[0].space, solutions[0].problem.material
+    states, _, m = z.shape
+    columns = [np.stack([s.u for s in solutions], axis=1), *z]
+    stacked = np.concatenate(columns, axis=1).reshape(space.n_functions, 2, -1)
+    stacked = np.concatenate([stacked, np.zeros((1, *stacked.shape[1:]))])
+    gradient = gradients_at(space, stacked, *points)
+    result = np.empty((len(points[0]), states, m))
+    for k in range(states):
+        first = states + k * m
+        dual = gradient[..., first : first + m]
+        dual = dual if more is None else dual - more
+        result[:, k] = np.einsum("qij,qijm->qm", material.stress(gradient[..., k]), dual)
+    return result
+
+
+def _chords(mesh: Mesh) -> tuple[Ints, Floats]:
+    """Boundary facets that look like chords of a curve, and how far it lies outward in the mean."""
+    facets = mesh.boundary
+    number = mesh.facet_numbers(facets)
+    cell = mesh.facet_to_cell[number, 0]
+    x = mesh.points[facets]
+    along = x[:, 1] - x[:, 0]
+    outward = x.mean(axis=1) - mesh.points[mesh.cells[cell]].mean(axis=1)
+    backward = along[:, 0] * outward[:, 1] - along[:, 1] * outward[:, 0] > 0
+    ends = np.where(backward[:, None], facets[:, ::-1], facets)  # the body on the left
+    along = np.where(backward[:, None], -along, along)
+    incoming, outgoing = np.full((2, mesh.n_points), -1)
+    incoming[ends[:, 1]], outgoing[ends[:, 0]] = np.arange(len(ends)), np.arange(len(ends))
+    heading = np.arctan2(along[:, 1], along[:, 0])
+    before, after = incoming[ends[:, 0]], outgoing[ends[:, 1]]
+
+    def turn(first: Ints, second: Ints) -> Floats:
+        difference = heading[second] - heading[first]
+        return np.asarray((difference + np.pi) % (2 * np.pi) - np.pi)
+
+    own = np.arange(len(ends))
+    low, high = turn(before, own), turn(own, after)
+    small, large = np.minimum(np.abs(low), np.abs(high)), np.maximum(np.abs(low), np.abs(high))
+    curved = (before >= 0) & (after >= 0) & (low * high > 0) & (small > 1e-6)
+    curved &= (large < _ROUND) & (large < _ALIKE * small)
+    length = np.linalg.norm(along, axis=1)
+    # An arc that turns by t over a chord of length L lies L t / 12 outside of it in the mean.
+    sagitta = (low + high) / 2 * length / 12
+    return ends[curved], sagitta[curved]

@@ -1,0 +1,43 @@
+"""Error bars of K: from the factor that a solve has kept, or from another one."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from xcrack.analysis.solution import Solution
+from xcrack.analysis.solve import solve_states
+from xcrack.sif.bars import Bars
+from xcrack.sif.bars_2d import tip_bars
+from xcrack.sif.sif import SIF
+
+_Estimate = Callable[[Sequence[Solution], Sequence[SIF], int], list[Bars]]
+
+
+def with_bars(solutions: Sequence[Solution], sifs: Sequence[SIF], crack: int) -> list[SIF]:
+    """K of one crack in some states with its error bars; zero in states at rest.
+
+    Parameters
+    ----------
+    solutions : sequence of Solution
+        Of one solve. Where it kept no factor, these states are solved again.
+    sifs : sequence of SIF
+        One for each.
+    crack : int
+    """
+    live = [k for k, s in enumerate(solutions) if not s.at_rest]
+    zero = np.zeros_like(sifs[0].K)
+    result = [replace(sif, errors=Bars(zero, zero, ("",) * len(zero))) for sif in sifs]
+    if not live:
+        return result
+    chosen = [solutions[k] for k in live]
+    if chosen[0].factored is None:
+        chosen = solve_states(chosen[0].problem, [s.state for s in chosen], error=True)
+    for k, bars in zip(
+        live, _BARS[chosen[0].space.dim](chosen, [sifs[k] for k in live], crack), strict=True
+    ):
+        result[k] = replace(sifs[k], errors=bars)
+    return result
+
+
+_BARS: dict[int, _Estimate] = {2: tip_bars}

@@ -1,0 +1,157 @@
+"""K_I and K_II at a tip as functionals of displacements and pressures, for estimates of error.
+
+What `interaction_2d` integrates, K = E'/2 I, is affine in the solution: the terms of the domain and
+of bent faces in the gradients, those of straight ones in the pressures, and a constant of given
+pressures, body forces and initial stress.
+"""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from xcrack.analysis.solution import Solution
+from xcrack.arrays import Floats
+from xcrack.estimation.goal import Goal, GoalPoints
+from xcrack.scene.conditions import BodyForce, InitialStress
+from xcrack.sif.common import acts, weight
+from xcrack.sif.domain_2d import class_points, domain_of, ring_classes
+from xcrack.sif.interaction_2d import ahead_derivative, inner_radii, ring_around, volume_terms
+from xcrack.xfem.function_space import FunctionSpace
+from xcrack.xfem.loads import position
+from xcrack.xfem.quadrature import Points, cell_side
+from xcrack.xfem.williams import continued_polar, mode_matrix, unit_gradients
+
+_STRAIGHT = 1e-9  # share of the radius below which a face is on the line through the tip
+
+
+def tip_goal(solution: Solution, t: int) -> Goal:
+    """K_I and K_II at tip t from the larger domain, as in `stress_intensity`.
+
+    Parameters
+    ----------
+    solution : Solution
+        Any state of a solve.
+    t : int
+        Number of the tip in `space.tips`.
+    """
+    from xcrack.kernels.goal import ring_factors
+
+    space, material = solution.space, solution.problem.material
+    tip = space.tips[t]
+    outer = domain_of(solution, t).outer
+    inner = float(inner_radii(space.order, np.array([outer]))[0])
+    psi = space.cuts[tip.crack].level_set.psi[tip.number]
+    parts = []
+    for points in _domain_points(space, tip.x, inner, outer):
+        xi = (position(space, points.cell, points.bary) - tip.x) @ tip.frame.T
+        behind = psi[space.mesh.cells[points.cell]].mean(axis=1) < 0
+        _, theta = continued_polar(xi, points.side[:, tip.crack], behind)
+        factor = ring_factors(
+            xi, theta, points.weight, outer, inner, np.ascontiguousarray(tip.frame),
+            mode_matrix(material.kolosov, material.mu), material.lam, material.mu,
+            0.5 * material.E_prime,
+        )  # fmt: skip
+        parts.append(GoalPoints(points.cell, points.bary, points.side, factor))
+    on_faces, pressure, _ = _faces(solution, t, outer, inner)
+    return Goal((*parts, *on_faces), _rotation(solution, t, outer), tip.crack, pressure)
+
+
+def constant(solution: Solution, t: int) -> Floats:
+    """What body forces and initial stress add to K_I and K_II `(2,)`, whatever the displacements.
+
+    Given pressures are no part of it: they enter `Goal.pressure` with those of the contact.
+    """
+    space, scale = solution.space, 0.5 * solution.problem.material.E_prime
+    total = np.zeros(2)
+    if not acts([solution], BodyForce, InitialStress):
+        return total
+    outer = domain_of(solution, t).outer
+    radii = np.array([outer])
+    ring = ring_around([solution], t, radii)
+    for points in _domain_points(space, space.tips[t].x, 0.0, outer):
+        total += scale * volume_terms([solution], ring, points)[0, 0, :2]
+    steady = solution.initial_stress(space.tips[t].x[None])[0]
+    _, _, per_stress = _faces(solution, t, outer, float(inner_radii(space.order, radii)[0]))
+    return np.asarray(total + np.einsum("ijm,ij->m", per_stress, steady))
+
+
+def _domain_points(
+    space: FunctionSpace, centre: Floats, hollow: float, radius: float
+) -> Iterator[Points]:
+    for cells, n, degree in ring_classes(space, centre, hollow, radius):
+        yield from class_points(space, cells, n, degree)
+
+
+def _rotation(solution: Solution, t: int, outer: float) -> Floats:
+    """Mean rotation of the mesh points around the tip as a functional; see `mean_rotation`."""
+    points = solution.space.mesh.points
+    result = np.zeros_like(points)
+    near = np.nonzero(np.linalg.norm(points - solution.space.tips[t].x, axis=1) < outer)[0]
+    if len(near) > points.shape[1]:
+        y = points[near] - points[near].mean(axis=0)
+        result[near] = np.stack([-y[:, 1], y[:, 0]], axis=1) / (y * y).sum()
+    return result
+
+
+def _faces(
+    solution: Solution, t: int, outer: float, inner: float
+) -> tuple[Sequence[GoalPoints], Floats, Floats]:
+    """Gradients on bent faces, factors of pressures `(q, 2)` and of the stress at the tip."""
+    space, material = solution.space, solution.problem.material
+    tip = space.tips[t]
+    lips, R, scale = solution.lips[tip.crack], tip.frame, 0.5 * material.E_prime
+    pressure, per_stress = np.zeros((len(lips), 2)), np.zeros((2, 2, 2))
+    near = np.nonzero(np.linalg.norm(lips.x - tip.x, axis=1) < outer)[0]
+    if not len(near):
+        return (), pressure, per_stress
+    xi = (lips.x[near] - tip.x) @ R.T
+    xi[np.abs(xi[:, 1]) < _STRAIGHT * outer, 1] = 0.0
+    bent = bool(xi[:, 1].any())
+    parts = []
+    for s, sign in ((0, -1), (1, 1)):
+        cell, bary = lips.cell[near, s], lips.bary[near, s]
+        side = cell_side(space, cell)
+        side[:, tip.crack] = sign
+        r, theta = continued_polar(xi, side[:, tip.crack], np.ones(len(xi), dtype=bool))
+        outward = -sign * lips.normal[near] @ R.T
+        q, _ = weight(r, xi, np.array([inner]), np.array([outer]))
+        w = scale * q[0] * lips.weight[near]
+        factor = np.zeros((len(near), 2, 2, 2))
+        for m, g in enumerate(unit_gradients(r, theta, material.kolosov, material.mu)[:2]):
+            pressure[near, m] += w * np.einsum("qi,qi->q", outward, g[:, :, 0])
+            if not bent:
+                continue
+            sigma = material.stress(g)
+            local = sigma * outward[:, :1, None]
+            per_stress[:, :, m] += R.T @ np.einsum("q,qij->ij", w * outward[:, 0], g) @ R
+            local[:, :, 0] -= np.einsum("qij,qj->qi", sigma, outward)
+            factor[..., m] = np.einsum("q,ai,qab,bj->qij", w, R, local, R)
+        if bent:
+            parts.append(GoalPoints(cell, bary, side, factor))
+    return parts, pressure, per_stress
+
+
+def on_faces(solution: Solution, t: int) -> Floats:
+    """Gradient of E'/2 q u^a_,1 on the faces of the crack `(2, q, 2, 2, modes)`, - and +.
+
+    The influence function of K is singular: the dual solution less this field (the weight functions
+    of Bueckner, 1970, behave as u^a_,1 at the tip). Where faces move, it is what counts.
+    """
+    space, material = solution.space, solution.problem.material
+    tip = space.tips[t]
+    lips, R = solution.lips[tip.crack], tip.frame
+    radius = domain_of(solution, t).outer
+    outer = np.array([radius])
+    result = np.zeros((2, len(lips), 2, 2, 2))
+    near = np.nonzero(np.linalg.norm(lips.x - tip.x, axis=1) < radius)[0]
+    xi = (lips.x[near] - tip.x) @ R.T
+    for s, sign in ((0, -1), (1, 1)):
+        side = np.full(len(near), sign)
+        r, theta = continued_polar(xi, side, np.ones(len(near), dtype=bool))
+        q, dq = weight(r, xi, inner_radii(space.order, outer), outer)
+        fields = unit_gradients(r, theta, material.kolosov, material.mu)[:2]
+        curves = ahead_derivative(material, r, theta)[:2]
+        for m, (g, curve) in enumerate(zip(fields, curves, strict=True)):
+            local = q[0][:, None, None] * curve + g[:, :, :1] * dq[0][:, None]
+            result[s, near, :, :, m] = 0.5 * material.E_prime * (R.T @ local @ R)
+    return result

@@ -1,0 +1,171 @@
+"""Error bars of K in 2D: against exact fields and finer meshes, and where there are none."""
+
+import pickle
+
+import numpy as np
+import pytest
+
+import xcrack as xc
+from support import exact
+from support import scenes_2d as scenes
+
+UNIT = xc.Isotropic(1.0, 0.3, "strain")
+PULLED = [xc.traction("top", (0.0, 1.0)), xc.traction("bottom", (0.0, -1.0))]
+
+
+def with_error(problem, crack=0):
+    return xc.stress_intensity(xc.solve(problem, error=True), crack)
+
+
+def holds(sif, wanted):
+    """Whether the bar of the best K holds in all components."""
+    return (np.abs(np.asarray(wanted) - sif.best) <= sif.bar).all()
+
+
+def on_all_sides(mesh, points, values, **options):
+    supports = [xc.displacement("boundary", lambda x: values(x)[0])]
+    return xc.Problem(mesh, UNIT, [xc.line_crack(points)], supports, order=2, **options)
+
+
+@pytest.mark.parametrize("n", [11, 14, 20])
+def test_griffith(n):
+    """Best is nearer than K by more than half; the bar holds and is not ten times too long."""
+    a, angle, shear = 0.45, 0.37, 0.4
+    along = scenes.rows(angle)[0]
+    values = scenes.turned(
+        lambda x, y: exact.griffith(x, y, a, 1.0, 0.3, 0.0, 1.0, shear), np.zeros(2), angle
+    )
+    mesh = scenes.perturbed(n, 631, 0.15)
+    sif = with_error(on_all_sides(mesh, [-a * along, a * along], values, contact="off"))
+    wanted = np.sqrt(np.pi * a) * np.array([[1.0, -shear], [1.0, shear]])
+    assert np.linalg.norm(wanted - sif.best) < 0.6 * np.linalg.norm(wanted - sif.K)
+    assert holds(sif, wanted)
+    assert sif.bar.max() < 2 * np.abs(wanted - sif.K).max()
+
+
+@pytest.mark.parametrize("n", [18, 24])
+def test_arc(n):
+    """Most of the error of a bent crack is that the cut is straight in each cell."""
+    radius, half = 0.8, 0.35
+    field = exact.ArcCrack(radius, half, 1.0, 0.3, 1.0, 0.2, 0.0)
+    t = np.linspace(-half, half, 2401)
+    origin = np.array([-0.6, -0.35])
+    points = origin + radius * np.stack([np.cos(t), np.sin(t)], axis=1) @ scenes.rows(0.4)
+    values = scenes.turned(field.field, origin, 0.4)
+    sif = with_error(on_all_sides(scenes.perturbed(n, 77, 0.15), points, values, contact="off"))
+    wanted = np.array([np.array(field.K_lower) * [1, -1], field.K_upper])
+    assert np.linalg.norm(wanted - sif.best) < 0.3 * np.linalg.norm(wanted - sif.K)
+    assert holds(sif, wanted)
+
+
+def test_half_closed():
+    """The end of contact is in the bar; K_I of the closed tip is zero and its eta too."""
+    a, mean = 0.5, 0.2
+    K = exact.partial_closure_params(a, mean, 1.0)[2]
+    values = scenes.turned(
+        lambda x, y: exact.partial_closure(x, y, a, 1.0, 0.3, mean, 1.0), np.zeros(2), 0.0
+    )
+    for n in (20, 31):
+        mesh = scenes.perturbed(n, 641, 0.1)
+        problem = on_all_sides(mesh, [(-a, 0.0), (a, 0.0)], values)
+        sif = with_error(problem)
+        assert sif.closed.tolist() == [True, False]
+        assert sif.best[0, 0] == sif.eta[0, 0] == 0
+        assert sif.bar[0, 0] == sif.spread[0, 0] > 0
+        assert holds(sif, [[0.0, 0.0], [K, 0.0]])
+
+
+def test_kink_against_a_finer_mesh():
+    points = [(-0.45, -0.1), (0.1, 0.05), (0.4, -0.2)]
+
+    def problem(n):
+        mesh = xc.box((-1, -1), (1, 1), n)
+        return xc.Problem(mesh, UNIT, [xc.line_crack(points)], loads=PULLED, order=2)
+
+    fine = with_error(problem(63))
+    for n in (11, 17):
+        sif = with_error(problem(n))
+        assert holds(sif, fine.best)
+        assert np.abs(sif.best - fine.best).max() < 0.6 * np.abs(sif.K - fine.best).max()
+
+
+def test_hole_whose_curve_is_known():
+    """A polygon of few sides: most of what it changes is in eta."""
+    K = {}
+    for size in (0.14, 0.03):
+        mesh = xc.plate_with_hole(width=2, height=2, radius=0.25, size=size, size_near=size / 2)
+        crack = xc.line_crack([(0.2, 0.01), (0.6, 0.01)])
+        K[size] = with_error(xc.Problem(mesh, UNIT, [crack], loads=PULLED))
+    coarse, wanted = K[0.14], K[0.03].best
+    assert np.abs(coarse.best - wanted).max() < 0.2 * np.abs(coarse.K - wanted).max()
+    assert holds(coarse, wanted)
+    unknown = xc.Mesh(mesh.points, mesh.cells, mesh.facet_sets)
+    sif = with_error(xc.Problem(unknown, UNIT, [crack], loads=PULLED))
+    assert np.isnan(sif.bar).all()
+    assert "chords of curves" in sif.reasons[0]
+
+
+def edge(n=10, **options):
+    mesh = xc.box((0, -1), (1, 1), (n, 2 * n))
+    crack = xc.line_crack([(-0.3, 0.01), (options.pop("tip", 0.4), 0.01)])
+    return xc.Problem(mesh, UNIT, [crack], loads=PULLED, **options)
+
+
+def test_states_scale_and_rest():
+    half, rest, one = xc.solve(edge(), states=[0.5, 0.0, 1.0], error=True)
+    small, zero, large = xc.stress_intensities([half, rest, one])
+    assert large.eta == pytest.approx(2 * small.eta, rel=1e-9)
+    assert large.bar == pytest.approx(2 * small.bar, rel=1e-6)
+    assert not zero.eta.any()
+    assert not zero.bar.any()
+
+
+def test_stored_solution_is_solved_again():
+    solution = xc.solve(edge(), error=True)
+    at_once = xc.stress_intensity(solution)
+    stored = pickle.loads(pickle.dumps(solution))
+    assert stored.factored is None
+    assert np.isnan(xc.stress_intensity(stored).eta).all()
+    later = xc.stress_intensity(stored, error=True)
+    assert later.eta == pytest.approx(at_once.eta, rel=1e-9)
+    assert later.K.tolist() == at_once.K.tolist()
+
+
+@pytest.mark.parametrize(
+    ("problem", "word"),
+    [
+        (edge(order=1), "order=2"),
+        (edge(n=8, tip=0.2), "cells long"),
+        (edge(n=8, tip=0.93), "cells away"),
+        (
+            edge(
+                contact="on",
+                numerics=xc.Numerics(comparison=xc.Comparison(lips="penalty")),
+            ),
+            "penalty",
+        ),
+    ],
+)
+def test_no_bar_and_why(problem, word):
+    sif = with_error(problem)
+    assert np.isnan(sif.eta).all()
+    assert np.isnan(sif.bar).all()
+    assert np.isnan(sif.best).all()
+    assert word in sif.reasons[0]
+
+
+def test_not_asked_for():
+    sif = xc.stress_intensity(xc.solve(edge()))
+    assert np.isnan(sif.bar).all()
+    assert "error=True" in sif.reasons[0]
+    solution = xc.solve(edge(), error=True)
+    assert np.isnan(xc.stress_intensity(solution, error=False).bar).all()
+
+
+@pytest.mark.parametrize("wrong", [1, "yes", None, np.array([True])])
+def test_wrong_choice(wrong):
+    with pytest.raises(xc.ProblemError, match="True or False"):
+        xc.solve(edge(n=4), error=wrong)
+    if wrong is not None:
+        with pytest.raises(xc.ProblemError, match="True or False"):
+            xc.stress_intensity(xc.solve(edge(n=4)), error=wrong)
