@@ -80,7 +80,8 @@ class History:
             Columns step, N, crack, tip; x, y of the tip; a (length of its crack inside the body);
             K_I, K_II of load state 0 as ``K_I_0`` and so on, then of state 1, ...; spread (largest
             difference of K between two domains, of all states and modes); domain_cells (smallest
-            radius of these domains, in cells, where K has it); angle, dK_eq, R, rate, da
+            radius of these domains, in cells, where K has it); bar (longest error bar of K, where
+            K has bars); angle, dK_eq, R, rate, da
             as in `Step`. In 3D ``front`` stands for ``tip``, x, y, z is the middle of the front and
             a the area of the crack over the length of its fronts; each K, K_III among them, and
             each of the others has three columns, its smallest value along the front, its mean over

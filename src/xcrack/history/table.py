@@ -87,6 +87,11 @@ def _spread(step: Step, c: int) -> Floats:
     return np.max(every, axis=0) if every else np.full(len(step.angle[c]), np.nan)
 
 
+def _bar(step: Step, c: int) -> Floats:
+    """Longest error bar of all states and modes `(f,)`; nan where one is unknown."""
+    return np.max([state[c].bar.max(axis=1, initial=0.0) for state in step.sif], axis=0)
+
+
 def _domain_cells(step: Step, c: int) -> Floats:
     """Smallest radius of the domains of all states, in cells `(f,)`."""
     return np.min([getattr(state[c], _CELLS) for state in step.sif], axis=0)
@@ -97,7 +102,11 @@ def _quality(steps: Sequence[Step]) -> Measures:
     every = [sif for step in steps for state in step.sif for sif in state]
     known = bool(every) and all(hasattr(sif, _CELLS) for sif in every)
     measures: Measures = {"spread": _spread}
-    return {**measures, _CELLS: _domain_cells} if known else measures
+    if known:
+        measures[_CELLS] = _domain_cells
+    if every and all(sif.errors is not None for sif in every):
+        measures["bar"] = _bar
+    return measures
 
 
 def _parts(step: Step, c: int) -> list[Floats]:

@@ -128,7 +128,8 @@ def draw_K(
 ) -> Any:
     """Draw K_I, K_II and K_III along a front over its arc length, from 0 to 1.
 
-    Points at a free surface, where K has no meaning, are hollow.
+    Points at a free surface, where K has no meaning, are hollow. Error bars, where K has them, are
+    a band around the best K.
 
     Parameters
     ----------
@@ -181,6 +182,9 @@ def draw_K(
             color, style = f"C{k}", ("-", "--", "-.", ":")[k % 4]
             axes.plot(share, K, style, color=color, lw=1.6, label=name or None)
             axes.plot(share[surface], K[surface], "o", mfc="white", mec=color, ms=5)
+            if one.errors is not None:
+                low, high = (_along(one, front, _MODES.index(mode), sign)[1] for sign in (-1, 1))
+                axes.fill_between(share, low, high, color=color, alpha=0.2, lw=0)
             reach = max(reach, float(np.abs(K).max()))
         axes.axhline(0, color="0.7", lw=0.8, zorder=0)
         axes.set_ylabel(f"$K_{{{mode}}}$")
@@ -329,11 +333,15 @@ def _nearest(places: list[Floats], x: Floats, reach: float) -> Floats:
     return np.reshape(near[:1], (-1, 3))
 
 
-def _along(sif: SIF, front: int, mode: int) -> tuple[Floats, Floats, Bools]:
-    """Share of the arc length, K of a mode, and which points lie at a free surface."""
+def _along(sif: SIF, front: int, mode: int, edge: int = 0) -> tuple[Floats, Floats, Bools]:
+    """Share of the arc length, K of a mode, and which points lie at a free surface.
+
+    With an edge of -1 or 1, in the place of K that end of the bar of the best K.
+    """
     mine = np.nonzero(sif.front == front)[0]
     mine = mine[np.argsort(sif.s[mine], kind="stable")]
-    x, K, surface = sif.x[mine], sif.K[mine, mode], sif.at_surface[mine]
+    K = sif.best[mine, mode] + edge * sif.bar[mine, mode] if edge else sif.K[mine, mode]
+    x, surface = sif.x[mine], sif.at_surface[mine]
     s = sif.s[mine] - sif.s[mine[0]]
     if is_closed(x) and not surface.any():
         s = np.append(s, s[-1] + np.linalg.norm(x[0] - x[-1]))

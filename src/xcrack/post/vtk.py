@@ -52,8 +52,8 @@ def write(
     fit, and cell data are ``crack``, ``closed`` (half of the triangle or more), ``closed_share``,
     ``pressure_mean`` and ``gap_mean``. A third file, ``<path>_fronts.vtp``, has a line for each
     front with its frames (``ahead``, ``normal``), its arc length ``s`` and, where they are given,
-    ``K_I``, ``K_II``, ``K_III`` and ``at_surface``; cell data are ``crack``, ``front``, and
-    ``area`` and ``depth`` of its crack.
+    ``K_I``, ``K_II``, ``K_III`` and ``at_surface``, with error bars ``bar_I`` to ``bar_III`` where
+    K has them; cell data are ``crack``, ``front``, and ``area`` and ``depth`` of its crack.
 
     Parameters
     ----------
@@ -217,6 +217,9 @@ def _write_fronts(solution: Solution, sif: Sequence[SIF], path: Path) -> None:
             mine = own.front == tip.number
             line = {"x": own.x[mine], "frame": own.frame[mine], "s": own.s[mine]}
             line |= {f"K_{name}": getattr(own, f"K_{name}")[mine] for name in ("I", "II", "III")}
+            if all(one.errors is not None for one in sif):
+                names = ("I", "II", "III")
+                line |= {f"bar_{m}": own.bar[mine, k] for k, m in enumerate(names)}
             line["at_surface"] = own.at_surface[mine].astype(np.int8)
         else:
             step = np.linalg.norm(np.diff(tip.x, axis=0), axis=1)

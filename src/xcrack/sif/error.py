@@ -9,6 +9,7 @@ from xcrack.analysis.solution import Solution
 from xcrack.analysis.solve import solve_states
 from xcrack.sif.bars import Bars
 from xcrack.sif.bars_2d import tip_bars
+from xcrack.sif.bars_3d import front_bars
 from xcrack.sif.sif import SIF
 
 _Estimate = Callable[[Sequence[Solution], Sequence[SIF], int], list[Bars]]
@@ -20,7 +21,7 @@ def with_bars(solutions: Sequence[Solution], sifs: Sequence[SIF], crack: int) ->
     Parameters
     ----------
     solutions : sequence of Solution
-        Of one solve. Where it kept no factor, these states are solved again.
+        Of one solve. Where it kept no factor, these states are solved again in 2D.
     sifs : sequence of SIF
         One for each.
     crack : int
@@ -31,13 +32,18 @@ def with_bars(solutions: Sequence[Solution], sifs: Sequence[SIF], crack: int) ->
     if not live:
         return result
     chosen = [solutions[k] for k in live]
-    if chosen[0].factored is None:
-        chosen = solve_states(chosen[0].problem, [s.state for s in chosen], error=True)
-    for k, bars in zip(
-        live, _BARS[chosen[0].space.dim](chosen, [sifs[k] for k in live], crack), strict=True
-    ):
+    of_dim = _BARS[chosen[0].space.dim]
+    for k, bars in zip(live, of_dim(chosen, [sifs[k] for k in live], crack), strict=True):
         result[k] = replace(sifs[k], errors=bars)
     return result
 
 
-_BARS: dict[int, _Estimate] = {2: tip_bars}
+def _of_tips(solutions: Sequence[Solution], sifs: Sequence[SIF], crack: int) -> list[Bars]:
+    """In 2D, from the factor."""
+    if solutions[0].factored is None:
+        problem, states = solutions[0].problem, [s.state for s in solutions]
+        solutions = solve_states(problem, states, error=True)
+    return tip_bars(solutions, sifs, crack)
+
+
+_BARS: dict[int, _Estimate] = {2: _of_tips, 3: front_bars}

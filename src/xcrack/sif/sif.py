@@ -137,7 +137,7 @@ class SIF:
             f"({k[0]:.6g}, {k[1]:.6g}){' closed' if closed else ''}"
             for k, closed in zip(self.K, self.closed, strict=True)
         )
-        return f"SIF(K = [{rows}])"
+        return f"SIF(K = [{rows}]{self._bars()})"
 
     def _along(self) -> str:
         if not len(self.K):
@@ -151,7 +151,21 @@ class SIF:
             if rows.any()
         )
         fronts = len(np.unique(self.front))
-        return f"SIF({len(self.K)} places on {fronts} front(s){notes}: {ranges})"
+        return f"SIF({len(self.K)} places on {fronts} front(s){notes}: {ranges}{self._bars()})"
+
+    def _bars(self) -> str:
+        """Best K with its bars for printing; along fronts the longest bars alone."""
+        if self.errors is None or not len(self.K):
+            return ""
+        if self.K.shape[1] == 3:
+            good = np.isfinite(self.bar).all(axis=1)
+            longest = self.bar[good].max(axis=0, initial=np.nan if not good.any() else 0.0)
+            return f"; bars of the best up to {', '.join(f'{b:.2g}' for b in longest)}"
+        rows = [
+            reason or ", ".join(f"{k:.6g} ± {b:.2g}" for k, b in zip(best, bar, strict=True))
+            for best, bar, reason in zip(self.best, self.bar, self.reasons, strict=True)
+        ]
+        return f", best = [{', '.join(f'({row})' for row in rows)}]"
 
 
 def joined(parts: Sequence[SIF], dim: int) -> SIF:

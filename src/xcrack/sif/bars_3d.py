@@ -1,0 +1,84 @@
+"""Bars of K along fronts in 3D: order 2 beside order 1, and two domains at order 2.
+
+Weighted residuals have the wrong sign or size there: fronts are chords, and the functionals know no
+curvature. What holds is another solution on the same mesh, which is best itself, and at order 2
+the difference of two domains, as half the width.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from xcrack.analysis.solution import Solution
+from xcrack.analysis.solve import solve_states
+from xcrack.arrays import Floats
+from xcrack.sif.bars import Bars, bars_of, no_bars
+from xcrack.sif.domain_3d import front_intensity
+from xcrack.sif.sif import SIF, joined
+
+_SPREAD = 2.0  # half-width over the spread of a place, or its root mean square along the front
+
+
+def front_bars(solutions: Sequence[Solution], sifs: Sequence[SIF], crack: int) -> list[Bars]:
+    """Bars along the fronts of one crack in some states of a solve.
+
+    Parameters
+    ----------
+    solutions : sequence of Solution
+        At order 1 their states are solved again at order 2 on the same mesh.
+    sifs : sequence of SIF
+        One for each.
+    crack : int
+    """
+    if not len(sifs[0].K):
+        return [no_bars(sifs[0].K.shape, "")] * len(sifs)
+    if solutions[0].space.order == 2:
+        return [_of_spread(sif) for sif in sifs]
+    problem = replace(solutions[0].problem, order=2)
+    finer = solve_states(problem, [s.state for s in solutions])
+    fronts = [t for t, tip in enumerate(finer[0].space.tips) if tip.crack == crack]
+    by_front = [front_intensity(finer, t) for t in fronts]
+    every = [joined([states[k] for states in by_front], 3) for k in range(len(finer))]
+    if any(
+        len(np.unique(a.front)) != len(np.unique(b.front)) for a, b in zip(sifs, every, strict=True)
+    ):
+        reason = "order 2 has other fronts than order 1: refine the mesh along them"
+        return [no_bars(sif.K.shape, reason) for sif in sifs]
+    return [_of_order_2(sif, other) for sif, other in zip(sifs, every, strict=True)]
+
+
+def _of_spread(sif: SIF) -> Bars:
+    """At order 2: two domains; K is best itself."""
+    spread = np.array(sif.spread)
+    spread[sif.closed, 0] = 0.0
+    return _completed(sif, np.zeros_like(sif.K), _SPREAD * _at_least_mean(sif, spread))
+
+
+def _of_order_2(sif: SIF, finer: SIF) -> Bars:
+    """At order 1: the K of order 2 is best, and the difference its bar."""
+    eta = np.empty_like(sif.K)
+    for front in np.unique(sif.front):
+        own, other = sif.front == front, finer.front == front
+        nearest = np.linalg.norm(sif.x[own][:, None] - finer.x[other], axis=2).argmin(axis=1)
+        eta[own] = finer.K[other][nearest] - sif.K[own]
+    eta[sif.closed, 0] = 0.0
+    return _completed(sif, eta, _at_least_mean(sif, np.abs(eta)))
+
+
+def _at_least_mean(sif: SIF, values: Floats) -> Floats:
+    """Values, but at least their root mean square along each front."""
+    result = np.array(values)
+    inner = ~sif.at_surface if not sif.at_surface.all() else sif.at_surface
+    for front in np.unique(sif.front):
+        own = sif.front == front
+        rows = values[own & inner] if (own & inner).any() else values[own]
+        result[own] = np.maximum(values[own], np.sqrt((rows**2).mean(axis=0)))
+    return result
+
+
+def _completed(sif: SIF, eta: Floats, bar: Floats) -> Bars:
+    """With K_I of closed places, and without what is beside a free surface."""
+    bar[sif.closed, 0] = np.abs(sif.K_integral[sif.closed, 0])
+    reason = "K has no meaning so close to a free surface: it is prolonged from inside"
+    return bars_of(eta, bar, [reason if at else "" for at in sif.at_surface])
