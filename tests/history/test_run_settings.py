@@ -313,10 +313,11 @@ def test_another_python_compiles_other_code(formula, tmp_path, monkeypatch):
 
 def test_a_run_goes_on_with_its_own_defaults(formula, whole, monkeypatch):
     """Of the set it began with, where the user left the choice to them."""
-    monkeypatch.setattr(settings, "DEFAULTS", 3)
+    number = settings.DEFAULTS + 1
+    monkeypatch.setattr(settings, "DEFAULTS", number)
     monkeypatch.setitem(
         settings.REPLACED,
-        3,
+        number,
         {"integrator": "euler", "problem.numerics.points": 6, "scaling": "linear"},
     )
     run = Run(**run_of())
@@ -328,8 +329,9 @@ def test_a_run_goes_on_with_its_own_defaults(formula, whole, monkeypatch):
 
 
 def test_a_choice_that_became_the_default_is_still_a_choice(whole, monkeypatch):
-    monkeypatch.setattr(settings, "DEFAULTS", 3)
-    monkeypatch.setitem(settings.REPLACED, 3, {"threshold": 1.0})
+    number = settings.DEFAULTS + 1
+    monkeypatch.setattr(settings, "DEFAULTS", number)
+    monkeypatch.setitem(settings.REPLACED, number, {"threshold": 1.0})
     stored = {**whole.steps[0].memory.settings, "threshold": "0.0"}
     assert Run(**run_of()).as_begun(stored).settings == stored
 

@@ -222,7 +222,8 @@ def test_closed_under_compression_and_shear(order):
     """K_I = 0 while K_II is not, on 41 by 41; a / h is 10 here.
 
     What the integral gives for K_I comes from pressures weighted by 1 / sqrt(r), so that it is no
-    better than the last groups' pressures. At order 2 every tip is below 0.05 %. At order 1 the
+    better than the last groups' pressures. At order 2 every tip is below 0.08 %; a uniform pressure
+    alone would do with fewer of them. At order 1 the
     typical tip is below half a per cent; one of these twelve, whose last group is half a cell long,
     has 5 %.
     """
@@ -237,9 +238,9 @@ def test_closed_under_compression_and_shear(order):
     assert (K[:, 1, 1] > 0).all()
     # discretisation
     assert np.median(K_I) <= 5e-3
-    assert K_I.max() <= (6e-2 if order == 1 else 5e-4)
+    assert K_I.max() <= (6e-2 if order == 1 else 8e-4)
     assert K_II.max() <= (5e-3 if order == 1 else 5e-5)
-    assert max(error_p) <= (0.4 if order == 1 else 5e-3)
+    assert max(error_p) <= (0.4 if order == 1 else 1e-2)
     for _, solution in result:
         assert solution.contact[0].closed.all()
         slip = np.abs(solution.jump(0)).max()

@@ -4,6 +4,8 @@ The family of Chapelle and Bathe (1993) for random lines, cuts next to mesh line
 naive space has to fail the same tests. All tolerances are properties of the discretisation.
 """
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -15,6 +17,9 @@ EPS = (0.5, 0.1, 1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12)
 _RNG = np.random.default_rng(90210617)
 # The same six lines on all meshes: angle and offset from the centre.
 LINES = [(_RNG.uniform(-0.7, 0.7), _RNG.uniform(-0.3, 0.3)) for _ in range(6)]
+# Order 2 has 1.6 pressures where order 1 has one; at twice as many the constant tends to zero.
+LEAST = {1: 0.45, 2: 0.3}
+SPREAD = {1: 0.05, 2: 0.2}
 TIPS = [(_RNG.uniform(-0.3, 0.3, 2), _RNG.uniform(-0.3, 0.3)) for _ in range(8)]
 
 
@@ -52,16 +57,16 @@ def test_flat_in_mesh_size(order, meshes):
         for n in meshes
     ]
     print(f"\ninf-sup order {order}, n = 8 ... {meshes[-1]}: {np.round(worst, 4).tolist()}")
-    assert min(worst) >= 0.45
-    assert np.ptp(worst) <= 0.05 * max(worst)
+    assert min(worst) >= LEAST[order]
+    assert np.ptp(worst) <= SPREAD[order] * max(worst)
 
 
 @pytest.mark.parametrize("order", [1, 2])
 def test_flat_in_cut_position(order):
     result = [xc.inf_sup(beside_a_row(eps, order)) for eps in (*EPS, 0.0)]
     print(f"\ninf-sup order {order}, eps = .5 ... 1e-12, 0: {np.round(result, 4).tolist()}")
-    assert min(result) >= 0.45
-    assert np.ptp(result) <= 0.1 * max(result)
+    assert min(result) >= LEAST[order]
+    assert np.ptp(result) <= 2 * SPREAD[order] * max(result)
 
 
 @pytest.mark.parametrize("order", [1, 2])
@@ -101,7 +106,47 @@ def test_with_tips_in_the_energy_norm(order, enrichment, meshes):
             )
         )
     print(f"\ninf-sup with tips, order {order} {enrichment}: {np.round(worst, 3).tolist()}")
-    assert min(worst) >= 0.45
+    assert min(worst) >= (0.45 if order == 1 else 0.4)
+
+
+def drawn(seed, kind):
+    """A crack anywhere, of order 2: inner, kinked, from an edge, or in a graded mesh."""
+    rng = np.random.default_rng(seed)
+    n, angle, x = int(rng.integers(10, 22)), rng.uniform(0, np.pi), rng.uniform(-0.2, 0.2, 2)
+    ahead, mesh = scenes.rows(angle)[0], scenes.perturbed(n, seed)
+    turned = scenes.rows(angle + np.radians(rng.uniform(30, 90)))[0]
+    a, b = rng.uniform(0.25, 0.5, 2)
+    if kind == "graded":
+        size, slope, tips = rng.uniform(0.03, 0.07), rng.uniform(0.2, 0.5), (x - a * ahead, x)
+        mesh = xc.refine(
+            scenes.perturbed(n // 2, seed),
+            size=lambda y: size + slope * np.min([np.hypot(*(y - t).T) for t in tips], axis=0),
+        )
+    crack = {
+        "inner": [x - a * ahead, x + b * ahead],
+        "graded": [x - a * ahead, x],
+        "kinked": [x - a * ahead, x, x + b * turned],
+    }
+    line = scenes.edge_line(x, rng.uniform(-0.5, 0.5), 1.8)
+    made = line if kind == "edge" else xc.line_crack(crack[kind])
+    return xc.Problem(mesh, STEEL, [made], order=2)
+
+
+@pytest.mark.parametrize("kind", ["inner", "kinked", "edge", "graded"])
+@pytest.mark.parametrize(
+    "count", [4, pytest.param(60, marks=[pytest.mark.slow, pytest.mark.mission])]
+)
+def test_drawn_cracks_at_order_2(kind, count):
+    """The knots of pressure follow no cell: stable for all that was drawn, on graded meshes too."""
+    worst = min(xc.inf_sup(drawn(seed, kind)) for seed in range(60, 60 + count))
+    print(f"\ninf-sup order 2, {count} {kind}: {worst:.3f}")
+    assert worst >= 0.25
+
+
+def test_sparse_pressures_are_more_stable_and_coarser():
+    problem = drawn(61, "inner")
+    sparse = replace(problem, numerics=xc.Numerics(multipliers="sparse"))
+    assert xc.inf_sup(sparse) > 1.2 * xc.inf_sup(problem)
 
 
 @pytest.mark.parametrize("order", [1, 2])

@@ -15,9 +15,12 @@ from xcrack.growth.description import Description, default_of, is_equal
 _FUNCTION = re.compile(r"([\w.<>]+ )?sha256:[0-9a-f]{16}")
 
 # Number of the set of defaults: raised whenever a changed default changes results.
-DEFAULTS = 2
+DEFAULTS = 3
 # For each set from 2 on, the defaults that it replaced: {2: {"problem.numerics.points": 4}}.
-REPLACED: dict[int, dict[str, Any]] = {2: {"integrator": "euler"}}
+REPLACED: dict[int, dict[str, Any]] = {
+    2: {"integrator": "euler"},
+    3: {"problem.numerics.multipliers": "sparse"},
+}
 
 Settings = TypeVar("Settings")
 

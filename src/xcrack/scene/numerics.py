@@ -82,9 +82,10 @@ class Numerics:
         another front, from 2.6 to 3.6 cells; two cells at order 2.
     functions : {4, 2}
         Tip functions; two (those of the modes' leading angular terms) cost accuracy.
-    multipliers : {"reduced", "naive"}
-        Space of the contact multipliers. Reduced: inf-sup stable for any cut. Naive: one unknown
-        for each node, for comparison only; it oscillates.
+    multipliers : {"reduced", "sparse", "naive"}
+        Space of the contact multipliers. Reduced: inf-sup stable for any cut. Sparse: in 2D at
+        order 2 only one pressure for each group of nodes instead of 1.6, otherwise the same.
+        Naive: one unknown for each node, for comparison only; it oscillates.
     consistent : bool
         Correct the gradients of the tip functions so that linear stress fields pass the patch
         test to round-off whatever the quadrature (variationally consistent integration). In 3D
@@ -145,7 +146,7 @@ class Numerics:
             self,
             enrichment=("geometric", "topological"),
             functions=(4, 2),
-            multipliers=("reduced", "naive"),
+            multipliers=("reduced", "sparse", "naive"),
             orthonormal=("star", "node", "none"),
             linear=("auto", "direct", "iterative"),
             initial_set=("closed", "open"),
