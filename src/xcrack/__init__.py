@@ -85,6 +85,7 @@ _HOME = {
     "collect": "history.collect",
     "resume": "history.collect",
     "load": "history.collect",
+    "save": "history.saved",
     "write": "post.vtk",
     "plot": "plotting.plot",
     "draw_fronts": "plotting.fronts_3d",

@@ -1,5 +1,6 @@
 """Packages that are imported only where they are used: gmsh, meshio, pyvista, matplotlib ..."""
 
+import sys
 from importlib import import_module
 from types import ModuleType
 
@@ -60,4 +61,10 @@ def _pip_name(module: str) -> str:
     return _PIP_NAME.get(top, top)
 
 
-__all__ = ["required"]
+def in_notebook() -> bool:
+    """Whether this is a cell of a notebook."""
+    shell = getattr(sys.modules.get("IPython"), "get_ipython", lambda: None)()
+    return shell is not None and hasattr(shell, "kernel")
+
+
+__all__ = ["in_notebook", "required"]

@@ -263,7 +263,7 @@ def test_time_that_is_left(monkeypatch, capsys):
     """Of 4 steps that take 90 s each: 270 s after the first, and none after the last."""
     patch_respond(monkeypatch, mode_I())
     clock = iter(90.0 * k for k in range(100))
-    monkeypatch.setattr(growth.time, "perf_counter", lambda: next(clock))
+    monkeypatch.setattr("xcrack.growth.progress.time.perf_counter", lambda: next(clock))
     run(grow(plate(), LAW, max_hoop_stress, CYCLE, da=2.0, max_steps=4, progress="always"))
     lines = capsys.readouterr().err.splitlines()
     assert [line.partition("about")[2] for line in lines] == [

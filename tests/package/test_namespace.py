@@ -32,6 +32,7 @@ NAMES = [
     "verify", "report", "read_case", "run", "info", "demo", "convert_mesh",
     # spectra
     "Spectrum", "rainflow", "read_spectrum", "twist",
+    "save",
     # errors
     "ConvergenceError", "GeometryError", "MeshError", "ProblemError", "XcrackError",
     "XcrackWarning",

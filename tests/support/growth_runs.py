@@ -12,6 +12,7 @@ from xcrack.growth.run import grow
 from xcrack.growth.step import Cycle
 from xcrack.history import store
 from xcrack.history.collect import collect
+from xcrack.history.run_folder import BODY
 from xcrack.laws.power import paris
 
 LAW = paris(C=1e-11, m=3.0)
@@ -49,8 +50,9 @@ def whole(formula, tmp_path):
 
 
 def content(folder):
-    """Files of a run, but for what was moved aside."""
-    return {path.name: path.read_bytes() for path in sorted(folder.iterdir()) if path.is_file()}
+    """Files of a run, but for what was moved aside, and the body that pictures are made with."""
+    files = sorted(path for path in folder.iterdir() if path.is_file() and path.name != BODY)
+    return {path.name: path.read_bytes() for path in files}
 
 
 def assert_same(history, expected):

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from xcrack.crack.placing import short_fronts
 from xcrack.errors import ProblemError
 from xcrack.inputs import shown
+from xcrack.markup import element
 from xcrack.scene.problem import Problem, check_problem
 
 _MODES, _ENDS = {2: "II", 3: "III"}, {2: "tip(s)", 3: "front(s)"}
@@ -87,6 +88,9 @@ class Report:
             counts = ", ".join(f"{v} {k.replace('_', ' ')}" for k, v in self.operations.items())
             lines.append(f"{'operations':<24}{counts}")
         return "\n".join(lines)
+
+    def _repr_html_(self) -> str:
+        return element("pre", str(self))
 
     def __getitem__(self, name: str) -> Ingredient:
         for ingredient in self.ingredients:

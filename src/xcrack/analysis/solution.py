@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from numbers import Real
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,6 +15,7 @@ from xcrack.arrays import Bools, Floats, Ints, lock
 from xcrack.contact.result import Contact
 from xcrack.errors import GeometryError, ProblemError
 from xcrack.inputs import numbers, shown, whole_numbers
+from xcrack.markup import element, joined, table
 from xcrack.mesh.locate import locate
 from xcrack.scene.conditions import InitialStress, Load, evaluate_stress
 from xcrack.scene.problem import Problem, crack_number
@@ -72,6 +74,21 @@ class Solution:
 
     def __repr__(self) -> str:
         return f"Solution(state={self.state!r}, n_dof={self.n_dof}, energy={self.energy:.6g})"
+
+    def _repr_html_(self) -> str:
+        rows: list[tuple[str, Any]] = [
+            ("load state", "as given" if self.state is None else shown(self.state)[:80]),
+            ("unknowns", self.n_dof),
+            ("strain energy", self.energy),
+        ]
+        for c, contact in enumerate(self.contact):
+            if contact is not None and len(contact.measure):
+                share = contact.measure[contact.closed].sum() / contact.measure.sum()
+                rows.append((f"crack {c} closed", f"{100 * share:.3g} %"))
+            else:
+                rows.append((f"crack {c}", "no multipliers"))
+        picture = self.problem.sketch()
+        return joined(element("b", "Solution"), picture, table((), rows), self.report._repr_html_())
 
     @property
     def at_rest(self) -> bool:

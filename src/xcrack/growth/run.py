@@ -1,6 +1,5 @@
 """Fatigue crack growth: one step after the other, from load states to cycles."""
 
-import time
 from collections.abc import Generator, Mapping, Sequence
 from dataclasses import replace
 from typing import Unpack
@@ -19,7 +18,7 @@ from xcrack.growth.follow import following
 from xcrack.growth.integrators import integrator_of
 from xcrack.growth.notices import Notices
 from xcrack.growth.options import GrowOptions, Run, lists_options, run_of
-from xcrack.growth.progress import report_end, report_step
+from xcrack.growth.progress import Progress
 from xcrack.growth.rating import check_choice, levels_of, respond_to_cycle, warn_of_left_out
 from xcrack.growth.step import Cycle, Memory, Step, memory_of
 from xcrack.laws.law import Law
@@ -112,7 +111,7 @@ def grow(
 def steps_of(run: Run, last: Step | None = None) -> Generator[Step, None, str]:
     """Steps of a run: from the beginning, or those that follow a step."""
     check_choice(run.law, run.cycle.ratio)
-    notices = Notices()
+    notices, progress = Notices(), Progress(run)
     kink = ""
     try:
         if last is None:
@@ -121,6 +120,7 @@ def steps_of(run: Run, last: Step | None = None) -> Generator[Step, None, str]:
                 last, reuse = _next_step(run, run.problem, None, Reuse(), settings)
                 _warn_of_ratio(run, last)
                 warn_of_left_out(run, last)
+            progress.step(last)
             yield last
         else:
             reuse = memory_of(last).reuse
@@ -145,10 +145,12 @@ def steps_of(run: Run, last: Step | None = None) -> Generator[Step, None, str]:
             if next_step is None:
                 break
             last = next_step
+            progress.step(last)
             yield last
     finally:
         notices.summarise()
-    report_end(run, ended)
+        progress.close()
+    progress.end(ended)
     return ended
 
 
@@ -196,7 +198,6 @@ def _next_step(
     settings: Mapping[str, str],
 ) -> tuple[Step, Reuse]:
     """Solve all load states of a problem and decide where and how fast its cracks grow."""
-    begin = time.perf_counter()
     solutions, sif, handed_on = respond(problem, run, reuse)
     seen, integrator = evaluate(run, problem, sif, solutions), integrator_of(run)
     if last is None:
@@ -232,8 +233,6 @@ def _next_step(
         corrected=settled.corrected,
         error=settled.error,
     )
-    since = step.cycles - (0.0 if last is None else last.cycles)
-    report_step(run, step, since, time.perf_counter() - begin)
     return step, handed_on
 
 

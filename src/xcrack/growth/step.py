@@ -14,6 +14,7 @@ from xcrack.errors import ProblemError
 from xcrack.growth.advance import PerCrack
 from xcrack.growth.trail import Trail
 from xcrack.inputs import entries, number, numbers, shown, whole
+from xcrack.markup import element, joined, table
 from xcrack.scene.conditions import Load
 from xcrack.sif.sif import SIF
 from xcrack.solvers.reuse import Reuse
@@ -219,6 +220,17 @@ class Step:
             )
         if not isinstance(self.memory, Memory | None):
             raise ProblemError(f"Step: memory = {shown(self.memory)}: that is made by grow.")
+
+    def _repr_html_(self) -> str:
+        parts = zip(self.angle, self.dK_eq, self.R, self.rate, self.da, strict=True)
+        rows = [
+            (c, j, *values)
+            for c, arrays in enumerate(parts)
+            for j, values in enumerate(zip(*(a.tolist() for a in arrays), strict=True))
+        ]
+        head = ("crack", "place", "angle", "ΔK_eq", "R", "da/dN", "da")
+        title = element("b", f"Step {self.index}, N = {self.cycles:.6g}")
+        return joined(title, table(head, rows, scroll=len(rows) > 12))
 
     @property
     def n_tips(self) -> int:

@@ -16,6 +16,8 @@ from xcrack.history import run_folder
 from xcrack.history.history import History
 from xcrack.history.lock import locked
 from xcrack.history.run_folder import Header
+from xcrack.history.run_store import RunStore
+from xcrack.history.saved import read_body, read_saved
 from xcrack.history.versions import versions
 from xcrack.inputs import called, flag, shown
 from xcrack.laws.law import Law
@@ -84,7 +86,7 @@ def collect(
         run_folder.sweep(folder)
         if not overwrite:
             _refuse_stored(folder)
-        run.store = _Store(folder, check)
+        run.store = RunStore(folder, check)
         return run.of(steps)
 
 
@@ -152,7 +154,7 @@ def resume(
         run_folder.sweep(folder)
         header, damaged = run_folder.read_header(folder)
         if header is None:  # killed before its first step
-            collection.store = _Store(folder, check)
+            collection.store = RunStore(folder, check)
             return collection.of(steps_of(run))
         run = _as_begun(run, header, folder)
         stored = run_folder.read_steps(folder, header)
@@ -160,23 +162,25 @@ def resume(
             _move_aside(folder, stored, damaged)
         header = replace(header, ended="")
         run_folder.write_header(folder, header)
-        collection.store = _Store(folder, check, header)
+        collection.store = RunStore(folder, check, header)
         collection.taken.extend(stored.steps)
         return collection.of(steps_of(run, stored.steps[-1] if stored.steps else None))
 
 
-def load(path: str | Path) -> History:
-    """Read a stored run without going on with it; another process may write to it meanwhile.
+def load(path: str | Path) -> Any:
+    """Read a stored run without going on with it, or what `save` wrote.
+
+    Another process may write to the folder of a run meanwhile.
 
     Parameters
     ----------
     path : path
-        Folder that `collect` wrote to.
+        Folder that `collect` wrote to, or file that `save` wrote.
 
     Returns
     -------
-    History
-        Its steps have no solutions.
+    History, or what was saved
+        Steps have no solutions.
 
     Raises
     ------
@@ -189,6 +193,10 @@ def load(path: str | Path) -> History:
         A step is missing or damaged: those behind it are left out.
     """
     folder = path_of(path, "load: path", error=ProblemError)
+    with system_errors("no run can be read from", folder, error=ProblemError):
+        is_file = folder.is_file()
+    if is_file:
+        return read_saved(folder)
     header, _ = run_folder.read_header(folder)
     if header is None:
         raise ProblemError(
@@ -202,30 +210,8 @@ def load(path: str | Path) -> History:
             "computes the others again."
         )
     ended = header.ended or "not ended: it is still going on, or was killed; resume goes on with it"
-    return History(stored.steps, ended, folder)
-
-
-@dataclass
-class _Store:
-    """Where the steps of a run go; the header is written with the first of them."""
-
-    folder: Path
-    check: Callable[[], None]  # raises where another process has taken over
-    header: Header | None = None
-
-    def write(self, step: Step) -> None:
-        self.check()
-        if self.header is None:
-            settings = {} if step.memory is None else dict(step.memory.settings)
-            _make_room(self.folder)
-            self.header = Header(settings, versions())
-            run_folder.write_header(self.folder, self.header)
-        run_folder.write_step(self.folder, step, self.header)
-
-    def end(self, ended: str) -> None:
-        if self.header is not None:
-            self.check()
-            run_folder.write_header(self.folder, replace(self.header, ended=ended))
+    body = read_body(folder / run_folder.BODY)
+    return History(stored.steps, ended, folder, None if body is None else body.mesh)
 
 
 @dataclass
@@ -235,7 +221,7 @@ class _Collection:
     until: Until | None
     keep_solutions: bool
     mesh: Mesh | None = None
-    store: _Store | None = None
+    store: RunStore | None = None
     taken: list[Step] = field(default_factory=list)
 
     def of(self, steps: Iterable[Step]) -> History:
@@ -344,25 +330,6 @@ def _refuse_stored(folder: Path) -> None:
         f"resume({str(folder)!r}, ...), take another path, or give overwrite=True, which moves it "
         "into a folder moved_aside_1 beside the new one."
     )
-
-
-def _make_room(folder: Path) -> None:
-    """Move aside what stands in the place of the files of a new run."""
-    files = run_folder.step_files(folder)[::-1]
-    header = folder / run_folder.HEADER
-    if header.exists() and (files or not _is_header(folder)):
-        files.append(header)
-    if files:
-        aside = run_folder.move_aside(folder, files)
-        warn(f"{len(files)} files that stood in {folder} were moved to {aside}.")
-
-
-def _is_header(folder: Path) -> bool:
-    """Whether the header of a folder can be read; one without steps may be written anew."""
-    try:
-        return run_folder.read_header(folder)[1] is None
-    except ProblemError:
-        return False
 
 
 def _move_aside(folder: Path, stored: run_folder.Stored, damaged: Path | None) -> None:

@@ -7,14 +7,18 @@ from typing import Any
 
 from numpy.typing import NDArray
 
+from xcrack import markup
 from xcrack.crack.crack import Crack
 from xcrack.errors import ProblemError
 from xcrack.growth.step import Step
 from xcrack.history.measures import measures_tables
 from xcrack.history.table import table
 from xcrack.inputs import entries, shown
+from xcrack.markup import element, joined
 from xcrack.mesh.mesh import Mesh
+from xcrack.optional import required
 from xcrack.paths import path_of, system_errors
+from xcrack.sketch import rim, sketch
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,6 +74,32 @@ class History:
 
     def __repr__(self) -> str:
         return f"History({len(self.steps)} steps, {self.life:.6g} cycles, ended: {self.ended})"
+
+    def _repr_html_(self) -> str:
+        rows = [("steps", len(self.steps)), ("cycles N", self.life), ("ended", self.ended)]
+        parts: list[Any] = [element("b", "History")]
+        if self.mesh is not None and self.cracks:
+            cracks = [rim(crack.points, crack.faces) for crack in self.cracks]
+            parts.append(sketch(self.mesh.points, self.mesh.boundary, cracks))
+        parts.append(markup.table((), rows))
+        if self.steps:
+            values = self.table()
+            parts.append(markup.table(values.dtype.names or (), values.tolist(), scroll=True))
+        return joined(*parts)
+
+    def to_pandas(self) -> Any:
+        """The numbers of `table` as a table of pandas.
+
+        Returns
+        -------
+        pandas.DataFrame
+
+        Raises
+        ------
+        XcrackError
+            pandas is not installed.
+        """
+        return required("pandas", "History.to_pandas").DataFrame(self.table())
 
     def table(self) -> NDArray[Any]:
         """All numbers, one row for each tip, in 3D for each front, of each step.

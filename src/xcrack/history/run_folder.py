@@ -23,6 +23,7 @@ from xcrack.sif.sif import SIF
 from xcrack.solvers.reuse import Reuse
 
 HEADER = "run.json"
+BODY = "body.npz"
 _FORMAT = 2
 _STEP = re.compile(r"step_(\d{5,})\.npz")
 CLASSES: dict[str, type] = {
@@ -253,6 +254,7 @@ def sweep(folder: Path) -> None:
 
 
 __all__ = [
+    "BODY",
     "CLASSES",
     "HEADER",
     "Header",

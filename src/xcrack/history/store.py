@@ -69,13 +69,18 @@ def save(path: Path, value: Any, classes: Classes) -> None:
     ProblemError
         Something in it is none of these.
     """
+    write_whole(path, packed(value, classes))
+
+
+def packed(value: Any, classes: Classes) -> bytes:
+    """Content of the file that `save` writes."""
     arrays: list[NDArray[Any]] = []
     names = {kind: name for name, kind in classes.items()}
     tree = _encoded(value, arrays, names)
     buffer = io.BytesIO()
     members = {f"array_{i}": array for i, array in enumerate(arrays)}
     np.savez(buffer, allow_pickle=False, tree=np.array(json.dumps(tree)), **members)
-    write_whole(path, buffer.getvalue())
+    return buffer.getvalue()
 
 
 def load(path: Path, classes: Classes) -> Any:
@@ -168,4 +173,4 @@ def _decoded(tree: Any, arrays: Mapping[str, NDArray[Any]], classes: Classes, pa
     return make(**values)
 
 
-__all__ = ["PART", "Classes", "load", "save", "write_whole"]
+__all__ = ["PART", "Classes", "load", "packed", "save", "write_whole"]

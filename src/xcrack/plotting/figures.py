@@ -6,14 +6,14 @@ from typing import Any
 
 from xcrack.errors import ProblemError
 from xcrack.inputs import flag, shown
-from xcrack.optional import required
+from xcrack.optional import in_notebook, required
 from xcrack.paths import path_of, system_errors, written_whole
 
 _UNSAVED = "the picture cannot be written to"
 
 
 def new_figure(size: tuple[float, float], window: bool, caller: str) -> Any:
-    """A figure; only one for a window is registered with pyplot.
+    """A figure; only one for a window is registered with pyplot, none in a notebook.
 
     Parameters
     ----------
@@ -33,10 +33,13 @@ def new_figure(size: tuple[float, float], window: bool, caller: str) -> Any:
     XcrackError
         Without matplotlib.
     """
-    if window:
+    if window and not in_notebook():
         pyplot = required("matplotlib.pyplot", caller)
         return pyplot.figure(figsize=size, layout="constrained")
-    return required("matplotlib.figure", caller).Figure(figsize=size, layout="constrained")
+    figure = required("matplotlib.figure", caller).Figure(figsize=size, layout="constrained")
+    if in_notebook():  # figures of pyplot would be shown at the end of the cell, too
+        figure._repr_png_ = lambda: _png(figure)
+    return figure
 
 
 def finished(figure: Any, file: Path | None, window: bool, dpi: int = 150) -> Any:
@@ -76,7 +79,7 @@ def finished(figure: Any, file: Path | None, window: bool, dpi: int = 150) -> An
             ) from error
         with written_whole(file, _UNSAVED, error=ProblemError) as part:
             part.write_bytes(picture.getvalue())
-    if window:
+    if window and not in_notebook():
         required("matplotlib.pyplot", "a window").show()
     return figure if file is None else file
 
@@ -139,6 +142,12 @@ def checked_title(title: Any, caller: str) -> str | None:
     if not isinstance(title, str | None):
         raise ProblemError(f"{caller}: title = {shown(title)}: give a text, or leave it out.")
     return title
+
+
+def _png(figure: Any) -> bytes:
+    buffer = BytesIO()
+    figure.savefig(buffer, format="png", dpi=100)
+    return buffer.getvalue()
 
 
 __all__ = ["checked_title", "finished", "new_figure", "picture_path", "wants_window"]

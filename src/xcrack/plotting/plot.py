@@ -13,7 +13,7 @@ from xcrack.analysis.solution import Solution
 from xcrack.arrays import Floats, lock
 from xcrack.errors import ProblemError, XcrackError
 from xcrack.inputs import flag, number, numbers, one_of, shown
-from xcrack.optional import required
+from xcrack.optional import in_notebook, required
 from xcrack.plotting.figures import checked_title, picture_path
 from xcrack.plotting.pyvista_2d import RASTER
 from xcrack.plotting.scene_2d import FIELDS, SPACE_FIELDS, scene
@@ -309,6 +309,8 @@ def _colour_map(cmap: Any) -> Any:
 def _has_display() -> bool:
     # Set for runs without windows: tests, batch jobs.
     if os.environ.get("PYVISTA_OFF_SCREEN", "").lower() in ("1", "true"):
+        return False
+    if in_notebook():
         return False
     if os.name == "nt" or sys.platform == "darwin":
         return True

@@ -13,8 +13,9 @@ import numpy as np
 
 from xcrack.arrays import Floats, Ints
 from xcrack.errors import ProblemError
-from xcrack.optional import required
+from xcrack.optional import in_notebook, required
 from xcrack.paths import written_whole
+from xcrack.plotting.inline import picture_of
 from xcrack.plotting.scene_2d import CLOSED, Scene
 
 RASTER = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")
@@ -108,6 +109,8 @@ def _add_body(pv: Any, plotter: Any, picture: Scene, cmap: str, window: tuple[in
 
 def shown(plotter: Any, file: Path | None, show: bool) -> Any:
     """Open the window, save the picture, or both: the file, or the plotter without one."""
+    if file is None and in_notebook():
+        return picture_of(plotter)
     if file is None:
         if show:
             plotter.show(auto_close=False)

@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 
 from xcrack.analysis.solution import Solution
+from xcrack.errors import XcrackError
 from xcrack.history.versions import versions
 from xcrack.markup import Markup, element, joined, listed, table
 from xcrack.reporting.section import Section
@@ -70,7 +71,8 @@ def _conditions(solution: Solution) -> Markup:
 
 def _value(value: Any) -> str:
     if callable(value):
-        return f"function {getattr(value, '__name__', type(value).__name__)}"
+        name = getattr(value, "__name__", getattr(value, "name", type(value).__name__))
+        return f"function {name}"
     array = np.asarray(value, dtype=object)
     return str(array.tolist() if array.ndim else value)
 
@@ -80,7 +82,10 @@ def _resultant(solution: Solution, load: Any) -> str:
     if isinstance(load, Displacement | InitialStress):
         return ""
     space = solution.space
-    f = load_vector(space, (load,), solution.lips).reshape(-1, space.dim)[: space.n_nodes]
+    try:
+        f = load_vector(space, (load,), solution.lips).reshape(-1, space.dim)[: space.n_nodes]
+    except XcrackError:  # a function that was not stored
+        return "unknown"
     total = f.sum(axis=0)
     largest = np.abs(f).max(initial=0.0)
     total = np.where(np.abs(total) < 1e-9 * largest, 0.0, total)

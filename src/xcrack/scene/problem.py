@@ -12,6 +12,7 @@ from xcrack.crack.crack import Crack
 from xcrack.crack.placing import check_cracks, placed
 from xcrack.errors import ProblemError
 from xcrack.inputs import entries, number, shown, whole
+from xcrack.markup import Markup, element, joined, table
 from xcrack.mesh.holes import round_hole
 from xcrack.mesh.mesh import Mesh
 from xcrack.mesh.sets import facet_set
@@ -28,6 +29,7 @@ from xcrack.scene.material import Isotropic
 from xcrack.scene.numerics import Numerics
 from xcrack.scene.set_loads import Bearing, Resultant, check_dimension
 from xcrack.scene.temperature import with_material
+from xcrack.sketch import rim, sketch
 
 _ORDER = {2: 2, 3: 1}  # of the standard functions, by dimension (measured)
 _PLANE = {2: True, 3: False}  # whether the material must name a plane state
@@ -124,6 +126,25 @@ class Problem:
         """The loads with all that depends on the material."""
         return tuple(with_material(load, self.material) for load in self.loads)
 
+    def _repr_html_(self) -> str:
+        loads = ", ".join(_named(load) for load in self.loads) or "none"
+        supports = ", ".join(_named(support) for support in self.supports) or "none"
+        sizes = f"{self.mesh.n_points} points, {len(self.mesh.cells)} cells"
+        rows = [
+            ("body", f"{self.mesh.dim}D, {sizes}"),
+            ("material", repr(self.material)),
+            ("cracks", len(self.cracks)),
+            ("supports", supports),
+            ("loads", loads),
+            ("contact, order", f"{self.contact}, {self.order}"),
+        ]
+        return joined(element("b", "Problem"), self.sketch(), table((), rows))
+
+    def sketch(self) -> Markup:
+        """Outline of the body and its cracks, as SVG."""
+        cracks = [rim(crack.points, crack.faces) for crack in self.placed]
+        return sketch(self.mesh.points, self.mesh.boundary, cracks)
+
     def _check_members(self) -> None:
         for crack in self.cracks:
             if not isinstance(crack, Crack):
@@ -170,6 +191,13 @@ class Problem:
                     f"crack_pressure(crack={shown(load.crack)}): the problem has "
                     f"{len(self.cracks)} crack(s), numbered from 0."
                 )
+
+
+def _named(condition: Any) -> str:
+    """A support or load in a few words."""
+    where = getattr(condition, "where", None)
+    name = type(condition).__name__.lower()
+    return f"{name} on {where}" if isinstance(where, str) else name
 
 
 def check_problem(problem: Any, what: str) -> None:

@@ -2,12 +2,15 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
+from xcrack import markup
 from xcrack.arrays import Bools, Floats, Ints, lock
 from xcrack.errors import ProblemError
 from xcrack.inputs import numbers, shown, whole_numbers
+from xcrack.optional import required
 from xcrack.sif.bars import Bars, no_bars
 
 
@@ -129,6 +132,42 @@ class SIF:
         K = np.array(self.K)
         K[self.closed, 0] = self.spread[self.closed, 0]
         return K
+
+    def to_pandas(self) -> Any:
+        """All values as a table of pandas: a row for each tip or place.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Columns front, s, x, y[, z], K_I, K_II[, K_III], T, spread_I and so on, at_surface,
+            closed, domain_cells.
+
+        Raises
+        ------
+        XcrackError
+            pandas is not installed.
+        """
+        return required("pandas", "SIF.to_pandas").DataFrame(self._columns())
+
+    def _columns(self) -> dict[str, Any]:
+        modes = ("I", "II", "III")[: self.K.shape[1]]
+        return {
+            "front": self.front,
+            "s": self.s,
+            **{name: self.x[:, i] for i, name in enumerate("xyz"[: self.x.shape[1]])},
+            **{f"K_{mode}": self.K[:, m] for m, mode in enumerate(modes)},
+            "T": self.T,
+            **{f"spread_{mode}": self.spread[:, m] for m, mode in enumerate(modes)},
+            "at_surface": self.at_surface,
+            "closed": self.closed,
+            "domain_cells": self.domain_cells,
+        }
+
+    def _repr_html_(self) -> str:
+        columns = self._columns()
+        rows = list(zip(*(np.asarray(c).tolist() for c in columns.values()), strict=True))
+        content = markup.table(tuple(columns), rows, scroll=len(rows) > 12)
+        return markup.joined(markup.element("b", "SIF"), content)
 
     def __repr__(self) -> str:
         if self.K.shape[1] == 3:

@@ -1,0 +1,65 @@
+"""Where the steps of a run go: its folder, with a header and the body beside them."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from xcrack.errors import ProblemError, warn
+from xcrack.growth.step import Step
+from xcrack.history import run_folder
+from xcrack.history.run_folder import Header
+from xcrack.history.saved import write_body
+from xcrack.history.versions import versions
+from xcrack.scene.problem import Problem
+
+
+@dataclass
+class RunStore:
+    """Where the steps of a run go; the header is written with the first of them."""
+
+    folder: Path
+    check: Callable[[], None]  # raises where another process has taken over
+    header: Header | None = None
+    has_body: bool = False  # written by this process: a killed one may have left half of it
+
+    def write(self, step: Step) -> None:
+        """Write a step; afterwards it is on disk as a whole."""
+        self.check()
+        if self.header is None:
+            settings = {} if step.memory is None else dict(step.memory.settings)
+            _make_room(self.folder)
+            self.header = Header(settings, versions())
+            run_folder.write_header(self.folder, self.header)
+        problem = step.solutions[0].problem if step.solutions else None
+        if not self.has_body and isinstance(problem, Problem):
+            write_body(self.folder / run_folder.BODY, problem)
+            self.has_body = True
+        run_folder.write_step(self.folder, step, self.header)
+
+    def end(self, ended: str) -> None:
+        """Write why the run ended."""
+        if self.header is not None:
+            self.check()
+            run_folder.write_header(self.folder, replace(self.header, ended=ended))
+
+
+def _make_room(folder: Path) -> None:
+    """Move aside what stands in the place of the files of a new run."""
+    files = run_folder.step_files(folder)[::-1]
+    header = folder / run_folder.HEADER
+    if header.exists() and (files or not _is_header(folder)):
+        files.append(header)
+    if files:
+        aside = run_folder.move_aside(folder, files)
+        warn(f"{len(files)} files that stood in {folder} were moved to {aside}.")
+
+
+def _is_header(folder: Path) -> bool:
+    """Whether the header of a folder can be read; one without steps may be written anew."""
+    try:
+        return run_folder.read_header(folder)[1] is None
+    except ProblemError:
+        return False
+
+
+__all__ = ["RunStore"]

@@ -1,0 +1,226 @@
+"""Solutions and histories in files, without pickle: what was solved, not matrices.
+
+Functions among loads and supports cannot be stored. A solution that comes back has a name in their
+place: pictures, K and reports work; solving again asks for the script.
+"""
+
+import contextlib
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from xcrack.analysis.plan import Ingredient, Report
+from xcrack.analysis.solution import Solution
+from xcrack.arrays import Floats, lock
+from xcrack.contact.result import Contact
+from xcrack.cutting.cut import cut
+from xcrack.errors import ProblemError
+from xcrack.history import run_folder, store
+from xcrack.history.history import History
+from xcrack.mesh.mesh import Mesh
+from xcrack.paths import path_of, system_errors
+from xcrack.scene import conditions
+from xcrack.scene.material import Isotropic
+from xcrack.scene.numerics import Comparison, Numerics
+from xcrack.scene.problem import Problem
+from xcrack.scene.set_loads import Bearing, Resultant
+from xcrack.scene.temperature import Temperature
+from xcrack.solvers.reuse import Reuse
+from xcrack.xfem.function_space import function_space
+from xcrack.xfem.lips import lip_points
+from xcrack.xfem.model import levels
+
+_FORMAT = 1
+_SUFFIX = ".npz"
+_CONDITIONS = (
+    conditions.Fix, conditions.Displacement, conditions.Traction, conditions.Pressure,
+    conditions.PointForce, conditions.BodyForce, conditions.CrackPressure,
+    conditions.InitialStress, Bearing, Resultant, Temperature,
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class NotStored:
+    """Stands for a function that a file could not hold.
+
+    Attributes
+    ----------
+    name : str
+    """
+
+    name: str
+
+    def __call__(self, *values: Any) -> Any:
+        """Refuse to be called."""
+        raise ProblemError(
+            f"the function {self.name} was not stored with the solution: make the problem again by "
+            "the script that made it."
+        )
+
+
+_CLASSES: dict[str, type] = {
+    **run_folder.CLASSES,
+    **{
+        kind.__name__: kind
+        for kind in (Problem, Mesh, Isotropic, Numerics, Comparison, Contact, Report, Ingredient,
+                     NotStored, *_CONDITIONS)
+    },
+}  # fmt: skip
+
+
+def save(result: Solution | Sequence[Solution] | History, path: str | PathLike[str]) -> Path:
+    """Save a solution, the solutions of one solve, or a history to a file.
+
+    Parameters
+    ----------
+    result : Solution, list of Solution, or History
+        Of a history without the solutions of its steps.
+    path : path
+        ``.npz`` is added to one without suffix. `load` reads it.
+
+    Returns
+    -------
+    Path
+
+    Raises
+    ------
+    ProblemError
+        Something else than these, or a file that cannot be written.
+    """
+    file = path_of(path, "save: path", error=ProblemError)
+    file = file if file.suffix else file.with_name(file.name + _SUFFIX)
+    content = {"format": _FORMAT, **_content(result)}
+    with system_errors("the result cannot be written to", file, error=ProblemError):
+        file.parent.mkdir(parents=True, exist_ok=True)
+        store.save(file, content, _CLASSES)
+    return file
+
+
+def read_saved(path: Path) -> Any:
+    """What `save` wrote.
+
+    Raises
+    ------
+    ProblemError
+        The file is not one of these, or of a newer xcrack.
+    """
+    content = store.load(path, _CLASSES)
+    if not isinstance(content, dict) or "format" not in content:
+        raise ProblemError(f"{path} is not a file that save wrote, or it is damaged.")
+    if content["format"] > _FORMAT:
+        raise ProblemError(f"{path} was written by a newer xcrack: update xcrack.")
+    if content["kind"] == "history":
+        return History(content["steps"], content["ended"], None, content["mesh"])
+    solutions = _solutions(content)
+    return solutions if content["several"] else solutions[0]
+
+
+def write_body(path: Path, problem: Problem) -> None:
+    """Write body, supports and loads of a run beside its steps, for pictures and reports.
+
+    A run does without it: where the system refuses, it is left out.
+    """
+    retained = _kept(replace(problem, cracks=(), numerics=Numerics()))
+    data = store.packed({"format": _FORMAT, "kind": "body", "problem": retained}, _CLASSES)
+    with contextlib.suppress(OSError):
+        path.write_bytes(data)
+
+
+def read_body(path: Path) -> Problem | None:
+    """The body of a run without its cracks; None where it is not there, or not whole."""
+    if not path.is_file():
+        return None
+    try:
+        content = store.load(path, _CLASSES)
+    except ProblemError:
+        return None
+    problem = content.get("problem") if isinstance(content, dict) else None
+    return problem if isinstance(problem, Problem) else None
+
+
+def stored_condition(condition: Any) -> Any:
+    """A support or load whose functions are replaced by their names."""
+    changes = {}
+    for name in ("where", "value", "field"):
+        value = getattr(condition, name, None)
+        if callable(value) and not isinstance(value, NotStored):
+            changes[name] = NotStored(getattr(value, "__name__", type(value).__name__))
+    return replace(condition, **changes) if changes else condition
+
+
+def _content(result: Any) -> dict[str, Any]:
+    if isinstance(result, History):
+        steps = tuple(replace(step, solutions=()) for step in result.steps)
+        return {"kind": "history", "steps": steps, "ended": result.ended, "mesh": result.mesh}
+    several = not isinstance(result, Solution)
+    solutions = list(result) if isinstance(result, list | tuple) else [result]
+    if not solutions or not all(isinstance(solution, Solution) for solution in solutions):
+        raise ProblemError(
+            f"save takes a Solution, a list of them, or a History, not a {type(result).__name__}."
+        )
+    if any(solution.space is not solutions[0].space for solution in solutions):
+        raise ProblemError("save: the solutions are of different solves: save each on its own.")
+    first = solutions[0]
+    return {
+        "kind": "solution",
+        "several": several,
+        "problem": _kept(first.problem),
+        "report": first.report,
+        "reuse": first.reuse.without_matrices(),
+        "states": [_state(solution) for solution in solutions],
+    }
+
+
+def _kept(problem: Problem) -> Problem:
+    """A problem whose functions are replaced by their names."""
+    return replace(
+        problem,
+        supports=tuple(map(stored_condition, problem.supports)),
+        loads=tuple(map(stored_condition, problem.loads)),
+    )
+
+
+def _state(solution: Solution) -> dict[str, Any]:
+    state = solution.state
+    if isinstance(state, list | tuple):
+        state = [stored_condition(load) for load in state]
+    return {
+        "state": state,
+        "loads": tuple(map(stored_condition, solution.loads)),
+        "factor": solution.factor,
+        "u": solution.u,
+        "contact": solution.contact,
+        "energy": solution.energy,
+    }
+
+
+def _solutions(content: dict[str, Any]) -> list[Solution]:
+    """Solutions on a space that is made anew: the same numbering for the same problem."""
+    problem: Problem = content["problem"]
+    mesh, numerics = problem.mesh, problem.numerics
+    cuts = tuple(cut(mesh, levels(mesh, crack, numerics)) for crack in problem.placed)
+    space = function_space(mesh, problem.order or 1, problem.placed, cuts, numerics)
+    lips = tuple(lip_points(space, c) for c in range(len(cuts)))
+    report: Report = content["report"]
+    reuse: Reuse = content["reuse"]
+    solutions = []
+    for state in content["states"]:
+        u: Floats = lock(np.asarray(state["u"]))
+        if u.shape != (space.n_dof,):
+            raise ProblemError(
+                f"the file holds {len(u)} unknowns, and its problem has {space.n_dof} in this "
+                "xcrack: read it with the version that wrote it."
+            )
+        parts = {name: state[name] for name in ("state", "loads", "factor", "contact", "energy")}
+        solutions.append(
+            Solution(problem=problem, space=space, u=u, lips=lips, report=report, reuse=reuse,
+                     **parts)
+        )  # fmt: skip
+    return solutions
+
+
+__all__ = ["NotStored", "read_body", "read_saved", "save", "write_body"]
