@@ -62,9 +62,8 @@ def test_a_sketch_shows_body_and_cracks():
 @pytest.fixture
 def notebook(monkeypatch):
     """What IPython looks like from a cell."""
-    from matplotlib import pyplot  # noqa: F401 - looks for IPython too, when it is imported
-
     module = types.ModuleType("IPython")
+    module.version_info = (8, 24, 0)  # matplotlib looks at it
     module.get_ipython = lambda: types.SimpleNamespace(kernel=object())
     monkeypatch.setitem(sys.modules, "IPython", module)
 
