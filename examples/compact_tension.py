@@ -3,8 +3,8 @@
 A standard specimen of width W = 50 mm is pulled at two pins. The standards give K as
 K = P / (B sqrt(W)) f(a/W), a polynomial within 0.5 % for 0.2 <= a/W <= 1. The pins press on the
 holes with a cosine: over 180° as a pin without clearance does, and over 60° as one that rolls on
-the flattened holes of E399 does. Then the crack grows from a/W = 0.3 to 0.7 under a constant force, and
-its life is compared with the integral of the polynomial.
+the flattened holes of E399 does. Then the crack grows from a/W = 0.3 to 0.7 under a constant force,
+and its life is compared with the integral of the polynomial.
 
 Units: N, mm, MPa; forces for a thickness of 1 mm. Pictures, ParaView files and tables go to
 out/compact_tension.

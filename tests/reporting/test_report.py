@@ -106,7 +106,7 @@ def test_report_of_a_solution(tmp_path):
     closed = [row["closed share"] for row in numbers["contact"]["rows"]]
     assert closed[0] == 0.0
     assert closed[1] > 0.9
-    assert "(0, 160)" in text  # resultant of 80 over the width of 2
+    assert "(0, 160)" in text  # resultant of 80 over the width of 2, in the last state reversed
     zone = next(note for note in numbers["assumptions"]["validity"] if "Plastic zone" in note)
     largest = np.abs(sif.K).max()
     assert f"{(largest / 300) ** 2 / (2 * np.pi):.4g}" in zone

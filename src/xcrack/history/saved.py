@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from xcrack.analysis import plan
 from xcrack.analysis.plan import Ingredient, Report
 from xcrack.analysis.solution import Solution
 from xcrack.arrays import Floats, lock
@@ -64,6 +65,7 @@ class NotStored:
 
 _CLASSES: dict[str, type] = {
     **run_folder.CLASSES,
+    "LoadResultant": plan.Resultant,
     **{
         kind.__name__: kind
         for kind in (Problem, Mesh, Isotropic, Numerics, Comparison, Contact, Report, Ingredient,
@@ -122,12 +124,12 @@ def read_saved(path: Path) -> Any:
 def write_body(path: Path, problem: Problem) -> None:
     """Write body, supports and loads of a run beside its steps, for pictures and reports.
 
-    A run does without it: where the system refuses, it is left out.
+    A run does without it: where it cannot be stored, or the system refuses, it is left out.
     """
-    retained = _kept(replace(problem, cracks=(), numerics=Numerics()))
-    data = store.packed({"format": _FORMAT, "kind": "body", "problem": retained}, _CLASSES)
-    with contextlib.suppress(OSError):
-        path.write_bytes(data)
+    storable = _storable(replace(problem, cracks=(), numerics=Numerics()))
+    content = {"format": _FORMAT, "kind": "body", "problem": storable}
+    with contextlib.suppress(OSError, ProblemError):
+        path.write_bytes(store.packed(content, _CLASSES))
 
 
 def read_body(path: Path) -> Problem | None:
@@ -168,14 +170,13 @@ def _content(result: Any) -> dict[str, Any]:
     return {
         "kind": "solution",
         "several": several,
-        "problem": _kept(first.problem),
-        "report": first.report,
+        "problem": _storable(first.problem),
         "reuse": first.reuse.without_matrices(),
         "states": [_state(solution) for solution in solutions],
     }
 
 
-def _kept(problem: Problem) -> Problem:
+def _storable(problem: Problem) -> Problem:
     """A problem whose functions are replaced by their names."""
     return replace(
         problem,
@@ -195,6 +196,7 @@ def _state(solution: Solution) -> dict[str, Any]:
         "u": solution.u,
         "contact": solution.contact,
         "energy": solution.energy,
+        "report": solution.report,
     }
 
 
@@ -205,7 +207,6 @@ def _solutions(content: dict[str, Any]) -> list[Solution]:
     cuts = tuple(cut(mesh, levels(mesh, crack, numerics)) for crack in problem.placed)
     space = function_space(mesh, problem.order or 1, problem.placed, cuts, numerics)
     lips = tuple(lip_points(space, c) for c in range(len(cuts)))
-    report: Report = content["report"]
     reuse: Reuse = content["reuse"]
     solutions = []
     for state in content["states"]:
@@ -215,9 +216,10 @@ def _solutions(content: dict[str, Any]) -> list[Solution]:
                 f"the file holds {len(u)} unknowns, and its problem has {space.n_dof} in this "
                 "xcrack: read it with the version that wrote it."
             )
-        parts = {name: state[name] for name in ("state", "loads", "factor", "contact", "energy")}
+        names = ("state", "loads", "factor", "contact", "energy", "report")
+        parts = {name: state[name] for name in names}
         solutions.append(
-            Solution(problem=problem, space=space, u=u, lips=lips, report=report, reuse=reuse,
+            Solution(problem=problem, space=space, u=u, lips=lips, reuse=reuse,
                      **parts)
         )  # fmt: skip
     return solutions

@@ -5,13 +5,10 @@ from typing import Any
 import numpy as np
 
 from xcrack.analysis.solution import Solution
-from xcrack.errors import XcrackError
 from xcrack.history.versions import versions
 from xcrack.markup import Markup, element, joined, listed, table
 from xcrack.reporting.section import Section
 from xcrack.reporting.source import Source
-from xcrack.scene.conditions import Displacement, Fix, InitialStress
-from xcrack.xfem.loads import load_vector
 
 _SMALL = 0.1  # share of a length up to which a plastic zone counts as small
 
@@ -32,7 +29,7 @@ def scene(source: Source) -> Section:
         rows.append((f"crack {c}", _crack(crack)))
     parts: list[Any] = [table((), rows)]
     if problem is not None and source.solutions:
-        parts.append(_conditions(source.solutions[0]))
+        parts.append(_conditions(source.solutions[-1]))
     else:
         parts.append(element("p", "The stored steps do not hold the loads: they are in the script "
                              "or the case file that made the run.", cls="soft"))  # fmt: skip
@@ -49,24 +46,34 @@ def _crack(crack: Any) -> str:
 
 
 def _conditions(solution: Solution) -> Markup:
-    rows = []
-    for support in solution.problem.supports:
-        where = (
-            support.where if isinstance(support.where, str) else f"{len(support.where)} point(s)"
-        )
-        if isinstance(support, Fix):
-            rows.append(("fix", where, "all axes" if support.axis is None else support.axis, ""))
-        else:
-            rows.append(("displacement", where, _value(support.value), ""))
-    for load in solution.loads:
-        where = getattr(load, "where", "")
-        value = next((_value(getattr(load, n)) for n in ("value", "force") if hasattr(load, n)), "")
-        name = type(load).__name__
-        rows.append((name, where if isinstance(where, str) else "points", value,
-                     _resultant(solution, load)))  # fmt: skip
+    """Supports and loads, and what they add up to in this state."""
+    rows = [_condition("support", each) for each in solution.problem.supports]
+    rows += [_condition("load", each) for each in solution.loads]
     if not rows:
         return element("p", "No supports and no loads.")
-    return table(("condition", "where", "value", "resultant, before load factors"), rows)
+    parts = [table(("", "kind", "where", "value"), rows)]
+    sums = [
+        (each.name, _vector(each.force), _vector(each.moment))
+        for each in solution.report.resultants
+    ]
+    if sums:
+        head = ("resultants and reactions", "force", "moment about the origin")
+        parts += [element("p", f"Scale of the loads in this state: {solution.factor:.6g}."),
+                  table(head, sums)]  # fmt: skip
+    return joined(*parts)
+
+
+def _condition(role: str, condition: Any) -> tuple[str, str, str, str]:
+    where = getattr(condition, "where", "")
+    names = ("value", "force", "axis", "field")
+    value = next((_value(getattr(condition, n)) for n in names if hasattr(condition, n)), "")
+    place = where if isinstance(where, str) else f"{len(where)} point(s)"
+    return role, type(condition).__name__, place, value
+
+
+def _vector(values: Any) -> str:
+    numbers = np.atleast_1d(np.asarray(values, dtype=float))
+    return "(" + ", ".join(f"{v:.6g}" for v in numbers) + ")"
 
 
 def _value(value: Any) -> str:
@@ -75,21 +82,6 @@ def _value(value: Any) -> str:
         return f"function {name}"
     array = np.asarray(value, dtype=object)
     return str(array.tolist() if array.ndim else value)
-
-
-def _resultant(solution: Solution, load: Any) -> str:
-    """Sum of the forces of a load: standard functions sum to one."""
-    if isinstance(load, Displacement | InitialStress):
-        return ""
-    space = solution.space
-    try:
-        f = load_vector(space, (load,), solution.lips).reshape(-1, space.dim)[: space.n_nodes]
-    except XcrackError:  # a function that was not stored
-        return "unknown"
-    total = f.sum(axis=0)
-    largest = np.abs(f).max(initial=0.0)
-    total = np.where(np.abs(total) < 1e-9 * largest, 0.0, total)
-    return "(" + ", ".join(f"{v:.6g}" for v in total) + ")"
 
 
 def assumptions(source: Source) -> Section:
