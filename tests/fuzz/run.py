@@ -18,6 +18,7 @@ from fuzz import (
     load_entries,
     problem_entries,
     solution_entries,
+    spectrum_entries,
 )
 from fuzz.entry import draw
 from fuzz.outcome import BAD, GOOD, Outcome, outcome_of
@@ -28,6 +29,7 @@ PARTS = (
     load_entries,
     problem_entries,
     solution_entries,
+    spectrum_entries,
     growth_entries,
     law_entries,
     file_entries,

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from xcrack.arrays import Floats, Ints, lock
 from xcrack.errors import ProblemError
-from xcrack.inputs import number, numbers, whole, whole_numbers
+from xcrack.inputs import number, numbers, shown, whole, whole_numbers
 from xcrack.scene.conditions import Load
 from xcrack.spectra.rainflow import CYCLE, rainflow
 
@@ -76,16 +76,18 @@ class Spectrum:
         forms = [name for name in ("factors", "rows", "states") if getattr(self, name) is not None]
         if len(forms) != 1 or (self.sequence is not None) != (self.states is not None):
             raise ProblemError(
-                "a spectrum is Spectrum(factors), Spectrum(rows=...) or Spectrum(states=[...], "
-                f"sequence=[...]), not {' and '.join(forms) or 'nothing'}."
+                f"Spectrum of {' and '.join(forms) or 'nothing'} alone: give Spectrum(factors), "
+                "Spectrum(rows=...) or Spectrum(states=[...], sequence=[...])."
             )
         if not isinstance(self.unit, str) or not self.unit:
-            raise ProblemError(f"Spectrum: unit = {self.unit!r}: give a word, such as 'flight'.")
+            raise ProblemError(
+                f"Spectrum: unit = {shown(self.unit)}: give a word, such as 'flight'."
+            )
         least = number(self.least_range, "Spectrum: least_range", least=0)
         object.__setattr__(self, "least_range", least)
         share = number(self.tolerance, "Spectrum: tolerance", above=0, below=1)
         object.__setattr__(self, "tolerance", share)
-        if self.levels != "auto":
+        if not (isinstance(self.levels, str) and self.levels == "auto"):
             object.__setattr__(self, "levels", whole(self.levels, "Spectrum: levels", least=2))
         steady = _loads(self.steady, "Spectrum: steady")
         object.__setattr__(self, "steady", steady)
@@ -111,7 +113,7 @@ class Spectrum:
 
     def _check_states(self) -> None:
         if isinstance(self.states, str) or not isinstance(self.states, Iterable):
-            raise ProblemError(f"Spectrum: states = {self.states!r:.80}: give a list.")
+            raise ProblemError(f"Spectrum: states = {shown(self.states)}: give a list.")
         states = tuple(
             number(state, f"Spectrum: states[{k}]")
             if isinstance(state, Real)
@@ -240,11 +242,11 @@ def distinct(cycles: NDArray[Any]) -> tuple[Floats, Floats, Ints]:
 
 def _loads(value: Any, what: str) -> tuple[Load, ...]:
     if isinstance(value, str) or not isinstance(value, Iterable):
-        raise ProblemError(f"{what} = {value!r:.80}: give a list of loads.")
+        raise ProblemError(f"{what} = {shown(value)}: give a list of loads.")
     loads = tuple(value)
     for load in loads:
         if not isinstance(load, Load):
-            raise ProblemError(f"{what} has {load!r:.80}, which is not a load: see traction.")
+            raise ProblemError(f"{what} has {shown(load)}, which is not a load: see traction.")
     return loads
 
 
