@@ -15,6 +15,7 @@ from fuzz import (
     file_entries,
     growth_entries,
     law_entries,
+    life_entries,
     load_entries,
     problem_entries,
     solution_entries,
@@ -32,6 +33,7 @@ PARTS = (
     spectrum_entries,
     growth_entries,
     law_entries,
+    life_entries,
     file_entries,
 )
 TABLE = [one for part in PARTS for one in (*part.ENTRIES, *part.HOOKS)]

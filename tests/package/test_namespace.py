@@ -30,6 +30,8 @@ NAMES = [
     "presets", "rate_table", "schijve_closure", "stepped_threshold",
     # verification, reports, files of scenes
     "verify", "report", "read_case", "run", "info", "demo", "convert_mesh",
+    # lives
+    "Scatter", "growth_curve", "inspection", "life", "logistic_pod", "lognormal", "normal",
     # spectra
     "Spectrum", "rainflow", "read_spectrum", "twist",
     "save",

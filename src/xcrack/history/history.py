@@ -12,8 +12,10 @@ from xcrack.crack.crack import Crack
 from xcrack.errors import ProblemError
 from xcrack.growth.step import Step
 from xcrack.history.measures import measures_tables
+from xcrack.history.rerating import Rerated, rerated
 from xcrack.history.table import table
 from xcrack.inputs import entries, shown
+from xcrack.laws.law import Law
 from xcrack.markup import element, joined
 from xcrack.mesh.mesh import Mesh
 from xcrack.optional import required
@@ -118,6 +120,29 @@ class History:
             the length and its largest: ``K_I_0_min``, ``K_I_0_mean``, ``K_I_0_max``.
         """
         return table(self.steps)
+
+    def rerate(self, law: Law, old: Law | None = None) -> Rerated:
+        """Cycles of the same steps by another growth law.
+
+        Parameters
+        ----------
+        law : callable (dK_eq, R) -> da/dN
+        old : callable, optional
+            Law of the run, to be sure that ranges and ratios of the steps are what it was given.
+
+        Returns
+        -------
+        Rerated
+            With `cycles` at each step, `life`, and the `bound` of what other shares of the tips
+            would change; exact for one tip.
+
+        Raises
+        ------
+        ProblemError
+            Several tips would have shared the advance another way, by more than 5 % in the mean; a
+            spectrum, whose steps have the largest cycle only; a law by which the driving tip stops.
+        """
+        return rerated(self.steps, law, old)
 
     def measures(self, mesh: Mesh | None = None) -> tuple[NDArray[Any], NDArray[Any]]:
         """What an engineer reads off the cracks: depth, surface lengths, area, ends by set.

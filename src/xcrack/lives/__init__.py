@@ -1,0 +1,1 @@
+"""Lives with an error bar: scatter, percentiles, inspections, probability of detection."""

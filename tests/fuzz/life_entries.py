@@ -1,0 +1,115 @@
+"""Lives and inspections of a run."""
+
+import numpy as np
+
+import xcrack as xc
+from fuzz.entry import Entry, arg
+from fuzz.kinds import Number, Numbers, Of, Seen, Whole, Word
+from support.growth_fakes import mode_I, plate, sif
+from xcrack.growth.step import Memory, Step
+from xcrack.solvers.reuse import Reuse
+
+LAW = xc.paris(1e-11, 3.0)
+
+
+def _step(n):
+    """Step n of an edge crack that grows by 3 a step, by the formula of an infinite plate."""
+    problem = plate([xc.line_crack([(0.0, 0.37), (5.0 + 3.0 * n, 0.37)])])
+    K = np.array(mode_I()(problem, 0))
+    dK = K[:, 0]
+    rate = np.asarray(LAW(dK, 0.0))
+    states = tuple((sif(problem.placed[0], load * K),) for load in (0.0, 1.0))
+    memory = Memory((rate,), (5.0 + 3.0 * n,), (np.zeros(1),), 1.5, Reuse(), {})
+    values = {
+        "angle": np.zeros(1),
+        "dK_eq": dK,
+        "R": np.zeros(1),
+        "rate": rate,
+        "da": np.full(1, 3.0),
+    }
+    parts = {name: (value,) for name, value in values.items()}
+    return Step(n, 1e4 * n, problem.placed, states, **parts, memory=memory)
+
+
+HISTORY = xc.History(tuple(_step(n) for n in range(5)), "max_steps")
+SCATTER = xc.Scatter(C=xc.lognormal(0.3))
+LIFE = xc.life(HISTORY, scatter=SCATTER, samples=200, seed=1)
+CURVE = xc.growth_curve(HISTORY)
+DISTRIBUTION = arg(
+    Of(optional=True, type=xc.lognormal | xc.normal), None, xc.lognormal(0.1), xc.normal(0.1)
+)
+RUN = arg(
+    Seen(rule=lambda v: None if isinstance(v, xc.History) and v is not HISTORY else v is HISTORY),
+    HISTORY,
+)
+
+ENTRIES = [
+    Entry(
+        "lognormal",
+        xc.lognormal,
+        {"sigma": arg(Number(least=0, most=100), 0.3), "median": arg(Number(above=0), 1.0, 5)},
+    ),
+    Entry("normal", xc.normal, {"sigma": arg(Number(least=0, most=0.2), 0.1)}),
+    Entry(
+        "lognormal",
+        lambda p: xc.lognormal(0.3).quantile(p) * xc.normal(0.1).quantile(p),
+        {"p": arg(Numbers(rule=lambda p: bool(((p > 0) & (p < 1)).all())), 0.5)},
+    ),
+    Entry(
+        "Scatter",
+        lambda K, load, a0: xc.Scatter(C=xc.lognormal(0.1), K=K, load=load, a0=a0),
+        {"K": DISTRIBUTION, "load": DISTRIBUTION, "a0": DISTRIBUTION},
+    ),
+    Entry(
+        "life",
+        lambda history, scatter, samples, seed: xc.life(
+            history, scatter=scatter, samples=samples, seed=seed
+        ),
+        {
+            "history": RUN,
+            "scatter": arg(Seen(rule=lambda v: v is SCATTER), SCATTER),
+            "samples": arg(Whole(least=100, far=1e4), 200),
+            "seed": arg(Whole(least=0), 3),
+        },
+    ),
+    Entry(
+        "life",
+        lambda p, N: (LIFE.percentile(p), LIFE.probability(N), LIFE.table())[0],
+        {"p": arg(Number(least=0, most=100), 5), "N": arg(Number(least=0), 1e4)},
+    ),
+    Entry(
+        "life",
+        lambda kind: LIFE.plot(kind, "life.png"),
+        {"kind": arg(Word(words=("cdf", "density")), "cdf")},
+        cost=0.5,
+        in_folder=True,
+    ),
+    Entry("growth_curve", xc.growth_curve, {"history": RUN}),
+    Entry(
+        "growth_curve",
+        lambda a, N: CURVE.cycles_at(a) + CURVE.length_at(N),
+        {"a": arg(Number(above=0), 7.0), "N": arg(Number(least=0), 1e4)},
+    ),
+    Entry(
+        "inspection",
+        lambda curve, interval: xc.inspection(curve, interval=interval),
+        {"curve": RUN, "interval": arg(Number(above=1e3), 1e4)},
+    ),
+    Entry(
+        "inspection",
+        lambda a_detect, factor: xc.inspection(HISTORY, a_detect=a_detect, factor=factor),
+        {"a_detect": arg(Number(least=5, below=17), 8.0), "factor": arg(Number(least=1), 3)},
+    ),
+    Entry(
+        "logistic_pod",
+        xc.logistic_pod,
+        {"a50": arg(Number(above=0), 2.0), "s": arg(Number(above=0), 0.4)},
+    ),
+    Entry("logistic_pod", lambda a: xc.logistic_pod(2.0, 0.4)(a), {"a": arg(Numbers(least=0), 3)}),
+    Entry(
+        "History",
+        lambda law: HISTORY.rerate(law).life,
+        {"law": arg(Seen(rule=lambda v: None if callable(v) else False), LAW)},
+    ),
+]
+HOOKS = []

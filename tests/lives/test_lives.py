@@ -1,0 +1,272 @@
+"""Lives with scatter against closed forms; rerating; inspections and what they miss."""
+
+import time
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from support import exact
+from support.growth_fakes import STRESS, mode_I, patch_respond, plate
+from xcrack.crack.lines import line_crack
+from xcrack.errors import ProblemError
+from xcrack.growth.criteria import max_hoop_stress, weighted_angle
+from xcrack.growth.run import grow
+from xcrack.growth.step import Cycle
+from xcrack.history.history import History
+from xcrack.laws.power import paris, walker
+from xcrack.laws.thresholds import klesnil_lukas
+from xcrack.lives.inspection import growth_curve, inspection, logistic_pod
+from xcrack.lives.life import life
+from xcrack.lives.scatter import Scatter, lognormal, normal
+from xcrack.spectra.spectrum import Spectrum
+
+LAW = paris(1e-11, 3.0)
+CYCLE = Cycle(0.0, 1.0)
+
+
+def run(problem=None, law=LAW, cycle=CYCLE, n=12, da=3.0, **options):
+    options = {"da": da, "max_steps": n, "progress": False, **options}
+    steps = list(grow(problem or plate(), law, max_hoop_stress, cycle, **options))
+    return History(tuple(steps), "max_steps")
+
+
+@pytest.fixture
+def history(monkeypatch):
+    patch_respond(monkeypatch, mode_I())
+    return run()
+
+
+def closed_form(a0=5.0, a1=38.0, m=3.0):
+    return exact.paris_life(a0, a1, 1e-11, m, STRESS)
+
+
+def test_scatter_of_C_is_lognormal(history):
+    """ln C normal with 0.3: the same width of ln N; factors of 5 and 95 %: 0.6105, 1.638."""
+    begin = time.perf_counter()
+    result = life(history, scatter=Scatter(C=lognormal(0.3)), samples=100_000, seed=71)
+    assert time.perf_counter() - begin < 2
+    N = closed_form()
+    assert result.life == pytest.approx(N, rel=1e-9)
+    for p, factor in ((5, 538371 / 881834), (50, 1.0), (95, 1444416 / 881834)):
+        assert result.percentile(p) == pytest.approx(N * factor, rel=1e-3)
+    assert result.N.std() > 0
+    assert np.log(result.N).std() == pytest.approx(0.3, rel=1e-3)
+    assert result.probability(N) == pytest.approx(0.5, abs=1e-3)
+    assert result.scatter["C"][0] == result.percentile(5)
+    assert "90 % of 100000 samples" in str(result)
+    assert (np.diff(result.table()["N"]) > 0).all()
+
+
+def test_K_and_load_count_to_the_power_m(history):
+    """d ln N / d ln K = -m, exactly for Paris."""
+    for name in ("K", "load"):
+        scatter = Scatter(**{name: lognormal(0.1)})
+        result = life(history, LAW, scatter=scatter, samples=20_000, seed=72)
+        expected = closed_form() * np.exp(-3 * 0.1 * 1.6448536)
+        assert result.percentile(5) == pytest.approx(expected, rel=2e-3)
+    both = Scatter(C=lognormal(0.3), K=lognormal(0.1))
+    result = life(history, LAW, scatter=both, samples=100_000, seed=73)
+    assert np.log(result.N).std() == pytest.approx(np.hypot(0.3, 0.3), rel=5e-3)  # statistical
+    assert set(result.scatter) == {"C", "K"}
+
+
+def test_first_length_by_the_closed_form(history):
+    """N(a0) at the quantiles of a0: rates are a power of the length, so round-off."""
+    scatter = Scatter(a0=lognormal(0.1, median=8.0))
+    result = life(history, scatter=scatter, samples=10_000, seed=74)
+    for p in (10, 50, 90):
+        a0 = float(scatter.a0.quantile(1 - p / 100))
+        assert result.percentile(p) == pytest.approx(closed_form(a0), rel=5e-4)
+    slope = (np.log(closed_form(8.0 * 1.001)) - np.log(closed_form(8.0))) / np.log(1.001)
+    step = life(history, scatter=Scatter(a0=lognormal(0.001, median=8.0)), samples=1000, seed=75)
+    assert np.log(step.N).std() == pytest.approx(-slope * 0.001, rel=5e-3)
+
+
+def test_worked_sensitivity_to_the_first_length():
+    """-(m/2 - 1) a0^(1-m/2) / (a0^(1-m/2) - af^(1-m/2)) = -0.644004, from 1 to 20 mm."""
+    N = [exact.paris_life(a, 20e-3, 1e-11, 3.0, 100.0) for a in (0.9999e-3, 1e-3, 1.0001e-3)]
+    assert N[1] == pytest.approx(881834.145, abs=1e-3)
+    assert (np.log(N[2]) - np.log(N[0])) / 2e-4 == pytest.approx(-0.644004, abs=1e-5)
+
+
+def test_samples_below_a_threshold_do_not_end(monkeypatch):
+    """With a hard threshold at K of the first crack half of the samples never grow."""
+    patch_respond(monkeypatch, mode_I())
+    first = STRESS * np.sqrt(np.pi * 5.0)
+    law = paris(1e-11, 3.0, threshold=klesnil_lukas(0.999999 * first, 0.0))
+    result = life(run(law=law), law, scatter=Scatter(K=normal(0.01)), samples=1000, seed=76)
+    assert np.isinf(result.N).mean() == pytest.approx(0.5, abs=0.01)
+    assert result.percentile(90) == np.inf
+
+
+def test_samples_that_reach_the_toughness_end_early(monkeypatch):
+    patch_respond(monkeypatch, mode_I())
+    law = paris(1e-11, 3.0, K_c=STRESS * np.sqrt(np.pi * 60.0))
+    result = life(run(law=law), law, scatter=Scatter(K=lognormal(0.3)), samples=2000, seed=77)
+    plain = life(run(), LAW, scatter=Scatter(K=lognormal(0.3)), samples=2000, seed=77)
+    assert result.percentile(5) < plain.percentile(5)
+    assert result.percentile(90) == pytest.approx(plain.percentile(90), rel=1e-9)
+
+
+def test_bounds_of_steps_and_of_K(history):
+    """Paris on a power of the length: no error of steps; a spread of 1 % is 3 % of life."""
+    result = life(history, LAW, scatter=Scatter(C=lognormal(0.1)), samples=100, seed=78)
+    assert result.bounds["steps"] < 1e-9
+    assert result.bounds["K"] == 0
+
+    def widened(state):
+        return tuple(replace(sif, spread=0.01 * np.abs(sif.K)) for sif in state)
+
+    wide = History(
+        tuple(replace(step, sif=tuple(map(widened, step.sif))) for step in history.steps), ""
+    )
+    result = life(wide, LAW, scatter=Scatter(C=lognormal(0.1)), samples=100, seed=78)
+    assert result.bounds["K"] == pytest.approx(0.99**-3 - 1, rel=1e-6)
+
+
+def test_of_a_spectrum_the_rate_can_vary(monkeypatch):
+    patch_respond(monkeypatch, mode_I())
+    history = run(cycle=Spectrum([0.0, 1.0, 0.4, 0.6]))
+    result = life(history, scatter=Scatter(C=lognormal(0.3)), samples=1000, seed=79, unit="flight")
+    assert result.percentile(50) == pytest.approx(history.life, rel=1e-3)
+    assert "flights" in str(result)
+    with pytest.raises(ProblemError, match="largest cycle only"):
+        life(history, LAW, scatter=Scatter(K=normal(0.01)), seed=79)
+    with pytest.raises(ProblemError, match="largest cycle only"):
+        history.rerate(LAW)
+
+
+# --- another law ---------------------------------------------------------------------------------
+
+
+def test_rerate_is_a_new_run_for_one_tip(monkeypatch):
+    patch_respond(monkeypatch, mode_I())
+    cycle = Cycle(0.2, 1.0)
+    old, new = run(cycle=cycle), walker(3e-11, 2.7, 0.4)
+    again = run(law=new, cycle=cycle)
+    result = old.rerate(new, LAW)
+    assert result.bound == 0
+    assert result.life == pytest.approx(again.life, rel=1e-12)
+    assert np.allclose(result.cycles, [step.cycles for step in again.steps], rtol=1e-12)
+    assert old.rerate(LAW).life == old.life  # to the bit
+    with pytest.raises(ProblemError, match="other rates than the law"):
+        old.rerate(new, new)
+
+
+def test_rerate_of_several_tips_has_a_bound(monkeypatch):
+    """A factor changes no share; another exponent does, and too much of it is refused."""
+    patch_respond(monkeypatch, mode_I())
+    cracks = [line_crack([(0, 8.3), (5, 8.3)]), line_crack([(0, -8.3), (4.6, -8.3)])]
+    history = run(plate(cracks), n=5)
+    double = history.rerate(paris(2e-11, 3.0))
+    assert double.bound < 1e-12
+    assert double.life == pytest.approx(history.life / 2, rel=1e-12)
+    steeper = paris(1e-11, 3.3)
+    result = history.rerate(steeper)
+    again = run(plate(cracks), law=steeper, n=5)
+    assert 0 < result.bound < 0.05
+    assert abs(result.life / again.life - 1) <= result.bound
+    with pytest.raises(ProblemError, match="the path would differ"):
+        history.rerate(paris(1e-11, 6.0))
+
+
+def test_rerate_that_stops_or_breaks(history):
+    with pytest.raises(ProblemError, match="does not grow at step 0"):
+        history.rerate(paris(1e-11, 3.0, threshold=klesnil_lukas(1e4, 0.0)))
+    broken = history.rerate(paris(1e-11, 3.0, K_c=STRESS * np.sqrt(np.pi * 12.0)))
+    assert "toughness is reached" in broken.ended
+    assert len(broken.cycles) < len(history.steps)
+
+
+# --- inspections ---------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def curve(monkeypatch):
+    """1 to 20 mm in m and MPa √m, the worked example: 881 834 cycles."""
+    patch_respond(monkeypatch, mode_I(factor=lambda a: np.sqrt(np.pi * a * 1e-3)))
+    problem = plate([line_crack([(0.0, 0.37), (1.0, 0.37)])], size=(60.0, 40.0), n=(120, 80))
+    law = paris(1e-8, 3.0)  # mm, MPa √m
+    steps = grow(problem, law, weighted_angle, CYCLE, da=1.0, max_steps=20, progress=False)
+    return growth_curve(History(tuple(steps), ""))
+
+
+def test_worked_inspections(curve):
+    assert curve.N[-1] == pytest.approx(881834.145, rel=1e-9)
+    three = inspection(curve, a_detect=3.0, factor=3)
+    assert 3 * three.interval == pytest.approx(401784.9, rel=1e-6)
+    assert three.interval == pytest.approx(133928, abs=0.5)
+    assert inspection(curve, a_detect=3.0).interval == pytest.approx(200892, abs=0.5)
+    assert three.first == pytest.approx(881834.145 / 2, rel=1e-9)
+    assert three.missed is None
+
+
+@pytest.mark.parametrize(
+    ("interval", "sizes", "missed"),
+    [
+        (200e3, [1.473, 2.383, 4.494, 11.44], 3.94e-4),
+        (300e3, [1.847, 4.494], 0.064165),
+        (100e3, None, 2e-6),
+    ],
+)
+def test_worked_chances_to_miss(curve, interval, sizes, missed):
+    result = inspection(curve, interval=interval, pod=logistic_pod(2.0, 0.4))
+    if sizes is not None:
+        assert np.allclose(result.a, sizes, rtol=5e-4)
+    assert result.missed == pytest.approx(missed, rel=0.01 if missed > 1e-5 else 0.3)
+
+
+def test_probability_of_detection():
+    pod = logistic_pod(2.0, 0.4)
+    assert pod(2.0) == 0.5
+    assert float(pod(2.0 * np.exp(0.4 * np.log(9)))) == pytest.approx(0.9, rel=1e-12)
+    assert pod(0.0) == 0
+
+
+def test_curve_there_and_back(curve):
+    for a in (1.0, 1.37, 7.77, 20.0):
+        N = exact.paris_life(1e-3, a * 1e-3, 1e-11, 3.0, 100.0)
+        assert curve.cycles_at(a) == pytest.approx(N, rel=1e-9, abs=1e-3)
+        assert curve.length_at(N) == pytest.approx(a, rel=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda h: lognormal(-0.1), "sigma"),
+        (lambda h: normal(0.3), "sigma = 0.3"),
+        (lambda h: Scatter(), "nothing varies"),
+        (lambda h: Scatter(C=0.3), "C = 0.3"),
+        (lambda h: life(h, scatter=0.3, seed=1), "scatter = 0.3"),
+        (lambda h: life(3, scatter=Scatter(C=lognormal(0.1)), seed=1), "history = 3"),
+        (lambda h: life(h, scatter=Scatter(K=normal(0.1)), seed=1), "give the law"),
+        (lambda h: life(h, paris(1e-11, 3.1), scatter=Scatter(K=normal(0.1)), seed=1), "rates"),
+        (lambda h: life(h, scatter=Scatter(a0=lognormal(0.1, 5.0)), seed=1), "smaller crack"),
+        (lambda h: life(h, scatter=Scatter(C=lognormal(0.1)), samples=10, seed=1), "samples = 10"),
+        (lambda h: life(History(h.steps[:1], ""), scatter=Scatter(C=normal(0.1)), seed=1), "two"),
+        (lambda h: inspection(h), "a_detect or interval"),
+        (lambda h: inspection(h, a_detect=50.0), "no length of the run"),
+        (lambda h: inspection(h, interval=1e4, a_critical=50.0), "beyond the last"),
+        (lambda h: inspection(h, interval=-1.0), "interval"),
+        (lambda h: inspection(h, interval=1e-9), "longer interval"),
+        (lambda h: inspection(3, interval=1.0), "curve = 3"),
+        (lambda h: growth_curve(3), "history = 3"),
+        (lambda h: logistic_pod(0, 1), "a50 = 0"),
+        (lambda h: logistic_pod(1, 1)(-1.0), "at least 0"),
+    ],
+)
+def test_bad_input(history, make, words):
+    with pytest.raises(ProblemError, match=words):
+        make(history)
+
+
+@pytest.mark.plot
+def test_pictures(history, tmp_path):
+    pytest.importorskip("matplotlib")
+    result = life(history, scatter=Scatter(C=lognormal(0.3)), samples=1000, seed=80)
+    for kind in ("cdf", "density"):
+        result.plot(kind, tmp_path / f"{kind}.png")
+        assert (tmp_path / f"{kind}.png").stat().st_size > 5000
+    with pytest.raises(ProblemError, match="cdf"):
+        result.plot("pie", tmp_path / "pie.png")
