@@ -11,7 +11,7 @@ from xcrack.kernels.cycle import first_step, next_step
 from xcrack.mesh.simplex import node_points
 from xcrack.solvers.multigrid import extended, hierarchy, largest_eigenvalue
 from xcrack.solvers.projected_cg import Operator, conjugate_gradients
-from xcrack.solvers.row_blocks import Bordered, row_blocks
+from xcrack.solvers.row_blocks import Bordered, row_blocks, stored
 from xcrack.xfem.assembly import bulk, rigid_modes
 
 
@@ -47,6 +47,42 @@ def test_a_matrix_in_parts():
     x = np.random.default_rng(4481).normal(size=12)
     assert A.shape == (12, 12)
     np.testing.assert_allclose(A.times(x), whole @ x, atol=1e-14)  # round-off
+
+
+@pytest.mark.parametrize("size", [(2, 2), (3, 3), (3, 6), (6, 3), (6, 6)])
+def test_blocks_are_stored_without_a_matrix_in_between(size):
+    """The same as by way of CSR, for blocks in any order and of any memory layout."""
+    rng = np.random.default_rng(7709)
+    rows, columns = size
+    A = sp.random(12 * rows, 9 * columns, 0.05, random_state=rng).tocsr()
+    A = sp.bsr_matrix(A, blocksize=size)
+    B = sp.bsr_matrix(sp.random(9 * columns, 12, 0.2, random_state=rng), blocksize=(columns, 3))
+    for M in (A, sp.bsr_matrix(A.T, blocksize=size[::-1]), A @ B):
+        first = np.arange(0, M.shape[0] + 1, M.blocksize[0])
+        for dtype in (np.float32, np.float64):
+            ours, wanted = stored(M, dtype), row_blocks([M.tocsr()], first, dtype)
+            assert ours.shape == wanted.shape
+            for name in ("first", "start", "offset", "columns", "values"):
+                found, other = getattr(ours, name), getattr(wanted, name)
+                assert found.dtype == other.dtype
+                np.testing.assert_array_equal(found, other)
+
+
+def test_nodes_without_free_unknowns_are_left_out():
+    """And unknowns that are not free keep their diagonal entry alone."""
+    rng = np.random.default_rng(7710)
+    A = bulk(xc.box((-1,) * 3, (1,) * 3, 3), xc.Isotropic(1.0, 0.3), 1).matrix
+    fixed = rng.random(A.shape[0]) < 0.3
+    fixed[6:12] = True
+    nodes = np.nonzero(~fixed.reshape(-1, 3).all(axis=1))[0]
+    unknowns = (nodes[:, None] * 3 + np.arange(3)).ravel()
+    free = ~fixed[unknowns]
+    wanted = A.toarray()[np.ix_(unknowns, unknowns)]
+    wanted = np.where(np.outer(free, free) | np.eye(len(free), dtype=bool), wanted, 0.0)
+    found = multigrid._decoupled(multigrid._of_nodes(A, nodes), free)
+    np.testing.assert_array_equal(found.toarray(), wanted)
+    every = np.arange(A.shape[0] // 3)
+    assert multigrid._decoupled(multigrid._of_nodes(A, every), np.ones(A.shape[0], bool)) is A
 
 
 def test_blocks_hold_each_column_once():

@@ -235,13 +235,14 @@ def iterative_system(
     whole = node_blocks(space, "star" if stars else "node")
     blocks = restricted(whole, in_use)
     enriched, starts, block = _enriched_basis(space, K, blocks, levels, combined)
-    parts = _Parts(levels, K, plain, enriched)
+    parts = _parts(levels, K, plain, enriched)
     stored, diagonal = parts.stored(starts), parts.diagonal
     patches = None
     if stars and len(block):
         home = np.where(levels.free, plain // d, -1)
         home = np.concatenate([home, whole.members[whole.offsets[block]] // d])
         patches = star_patches(space, home, len(plain), diagonal, parts.entries)
+    del parts  # before the cycle makes copies in single precision
     identity = sp.csr_matrix(
         (levels.free.astype(float), (plain, np.arange(len(plain)))),
         shape=(space.n_dof, len(plain)),
@@ -300,24 +301,24 @@ def _enriched_basis(
 
 @dataclass(frozen=True, eq=False)
 class _Parts:
-    """Stiffness in the solver's basis."""
+    """Stiffness in the solver's basis: that of the uncracked body with a border.
+
+    Attributes
+    ----------
+    levels : Hierarchy
+    K : sparse matrix (n_dof, n_dof)
+    plain : (n,) array of int
+        Unknowns of the hierarchy.
+    across : sparse matrix (n, e)
+        Between them and the enriched columns, CSR.
+    own : sparse matrix (e, e)
+    """
 
     levels: Hierarchy
     K: sp.csr_matrix
     plain: Ints
-    enriched: sp.csc_matrix
-
-    @cached_property
-    def across(self) -> sp.csr_matrix:
-        return sp.csr_matrix(sp.diags(self.levels.free.astype(float)) @ self.image[self.plain])
-
-    @cached_property
-    def image(self) -> sp.csr_matrix:
-        return sp.csr_matrix(self.K @ self.enriched)
-
-    @cached_property
-    def own(self) -> sp.csr_matrix:
-        return sp.csr_matrix(self.enriched.T @ self.image)
+    across: sp.csr_matrix
+    own: sp.csr_matrix
 
     @property
     def diagonal(self) -> Floats:
@@ -340,6 +341,15 @@ class _Parts:
         across = self.across[standard][:, rest]
         parts = [[self.K[known][:, known], across], [across.T, self.own[rest][:, rest]]]
         return sp.csr_matrix(sp.bmat(parts))
+
+
+def _parts(levels: Hierarchy, K: sp.csr_matrix, plain: Ints, enriched: sp.csc_matrix) -> _Parts:
+    image = sp.csr_matrix(K @ enriched)
+    own = sp.csr_matrix(enriched.T @ image)
+    across = image[plain]
+    if not levels.free.all():
+        across = sp.csr_matrix(sp.diags(levels.free.astype(float)) @ across)
+    return _Parts(levels, K, plain, across, own)
 
 
 def _nearby(K: sp.csr_matrix, changed: sp.csr_matrix, blocks: Blocks) -> sp.csr_matrix:

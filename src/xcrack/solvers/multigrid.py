@@ -19,7 +19,7 @@ from xcrack.arrays import Bools, Floats, Ints, lock
 from xcrack.mesh.simplex import node_points
 from xcrack.optional import required
 from xcrack.solvers.basis import stars
-from xcrack.solvers.row_blocks import Bordered, RowBlocks, row_blocks
+from xcrack.solvers.row_blocks import Bordered, RowBlocks, stored
 from xcrack.solvers.schwarz import Patches
 from xcrack.xfem.assembly import Bulk, bulk, rigid_modes
 
@@ -169,11 +169,11 @@ def hierarchy(bulk: Bulk, fixed: Bools) -> Hierarchy:
     nodes = np.nonzero(~fixed.reshape(-1, d).all(axis=1))[0]
     unknowns = (nodes[:, None] * d + np.arange(d)).ravel()
     free = ~fixed[unknowns]
-    matrix = _decoupled(bulk.matrix.tocsr()[unknowns][:, unknowns], free)
-    A = sp.bsr_matrix(matrix, blocksize=(d, d))
-    finest = _stored(A, np.float64)
+    A = _decoupled(_of_nodes(bulk.matrix, nodes), free)
+    diagonal = A.diagonal()
+    finest = stored(A, np.float64)
     if bulk.order == 2:
-        levels, coarsest = _over_linear(bulk, fixed, nodes, free, finest, matrix.diagonal())
+        levels, coarsest = _over_linear(bulk, fixed, nodes, free, finest, diagonal)
     else:
         motions = rigid_modes(node_points(bulk.mesh, bulk.order)[nodes]) * free[:, None]
         levels, coarsest = _aggregated(A, finest, motions)
@@ -183,7 +183,7 @@ def hierarchy(bulk: Bulk, fixed: Bools) -> Hierarchy:
         nodes=lock(nodes),
         free=lock(free),
         matrix=finest,
-        diagonal=lock(matrix.diagonal()),
+        diagonal=lock(diagonal),
         levels=levels,
         coarsest=coarsest,
     )
@@ -195,7 +195,7 @@ def _aggregated(
     """Levels of smoothed aggregation, and the inverse on the coarsest."""
     levels: list[Level] = []
     while A.shape[0] > _COARSEST or not levels:
-        blocks = _stored(A) if levels else finest.single()
+        blocks = stored(A) if levels else finest.single()
         diagonal = A.diagonal()
         largest = largest_eigenvalue(blocks, diagonal)
         P, candidates = _prolongator(A, diagonal, largest, candidates)
@@ -291,24 +291,33 @@ def largest_eigenvalue(
     return _SAFETY * float(np.linalg.eigvalsh(T)[-1])
 
 
-def _decoupled(A: sp.csr_matrix, free: Bools) -> sp.csr_matrix:
+def _of_nodes(A: sp.bsr_matrix, nodes: Ints) -> sp.bsr_matrix:
+    """Rows and columns of some nodes, given sorted; the matrix itself where they are all."""
+    n = A.shape[0] // A.blocksize[0]
+    if len(nodes) == n:
+        return A
+    number = np.arange(1, len(A.indices) + 1)
+    chosen = sp.csr_matrix((number, A.indices, A.indptr), shape=(n, n))[nodes][:, nodes]
+    shape = (len(nodes) * A.blocksize[0],) * 2
+    return sp.bsr_matrix((A.data[chosen.data - 1], chosen.indices, chosen.indptr), shape=shape)
+
+
+def _decoupled(A: sp.bsr_matrix, free: Bools) -> sp.bsr_matrix:
     """Matrix in which unknowns that are not free keep their diagonal entry alone."""
     if free.all():
-        return sp.csr_matrix(A)
-    keep = sp.diags(free.astype(float))
-    rest = sp.diags(np.where(free, 0.0, A.diagonal()))
-    return sp.csr_matrix(keep @ A @ keep + rest)
-
-
-def _stored(A: sp.bsr_matrix, dtype: Any = np.float32) -> RowBlocks:
-    first = np.arange(0, A.shape[0] + 1, A.blocksize[0])
-    return row_blocks([A.tocsr()], first, dtype)
+        return A
+    keep = free.reshape(-1, A.blocksize[0]).astype(float)
+    row = np.repeat(np.arange(len(keep)), np.diff(A.indptr))
+    data = A.data * keep[row][:, :, None] * keep[A.indices][:, None, :]
+    own = np.nonzero(row == A.indices)[0]
+    data[own] += (A.data[own] * np.eye(A.blocksize[0])) * (1 - keep[row[own]])[:, :, None]
+    return sp.bsr_matrix((data, A.indices, A.indptr), shape=A.shape)
 
 
 def _level(blocks: RowBlocks, diagonal: Floats, largest: float, P: sp.bsr_matrix) -> Level:
     R = sp.bsr_matrix(P.T, blocksize=P.blocksize[::-1])
     inverse = lock(_reciprocal(diagonal).astype(np.float32))
-    return Level(blocks, inverse, largest, _stored(P), _stored(R))
+    return Level(blocks, inverse, largest, stored(P), stored(R))
 
 
 def _prolongator(
@@ -322,9 +331,10 @@ def _prolongator(
     graph = sp.csr_matrix((ones, A.indices, A.indptr), shape=(n, n))
     T, coarse = aggregation.fit_candidates(aggregation.standard_aggregation(graph)[0], candidates)
     T = sp.bsr_matrix(T)
-    damped = sp.diags(_OMEGA * _SAFETY / largest * _reciprocal(diagonal))
-    P = T - sp.bsr_matrix(damped @ A, blocksize=A.blocksize) @ T
-    return sp.bsr_matrix(P, blocksize=T.blocksize), coarse
+    image = A @ T
+    damped = (_OMEGA * _SAFETY / largest * _reciprocal(diagonal)).reshape(n, -1)
+    image.data *= np.repeat(damped, np.diff(image.indptr), axis=0)[:, :, None]
+    return sp.bsr_matrix(T - image, blocksize=T.blocksize), coarse
 
 
 def _reciprocal(diagonal: Floats) -> Floats:

@@ -12,6 +12,7 @@ from xcrack.arrays import Ints, lock, offsets
 from xcrack.threads import each, number_of_threads
 
 _LEAST = 100_000  # values of a part of a product: less takes no longer than to hand it over
+_TOGETHER = 3  # rows that the kernel of products takes at once
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,6 +100,34 @@ def row_blocks(parts: Sequence[sp.csr_matrix], first: Ints, dtype: Any = np.floa
         left, shift = left + own, shift + A.shape[1]
     short = [each.astype(np.uint32) for each in (first, start, offset)]
     return RowBlocks((int(first[-1]), shift), *map(lock, (*short, columns, values)))
+
+
+def stored(A: sp.bsr_matrix, dtype: Any = np.float32) -> RowBlocks:
+    """Store a matrix of blocks: a block of its rows is one of ours.
+
+    The blocks of three rows of a body in 3D are taken as they are, without a matrix in between.
+
+    Parameters
+    ----------
+    A : sparse matrix (n, m)
+        BSR.
+    dtype : numpy type of the values
+    """
+    rows, columns = A.blocksize
+    if rows != _TOGETHER:
+        return row_blocks([A.tocsr()], np.arange(0, A.shape[0] + 1, rows), dtype)
+    blocks, indices = A.data.transpose(0, 2, 1), A.indices
+    if not A.has_sorted_indices:  # scipy's own sorting spoils blocks that are a transposed view
+        row = np.repeat(np.arange(len(A.indptr) - 1), np.diff(A.indptr))
+        order = np.lexsort((indices, row))
+        blocks, indices = blocks[order], indices[order]
+    values = np.ascontiguousarray(blocks, dtype).ravel()
+    every = np.empty((len(indices), columns), np.uint32)
+    every[:] = indices[:, None] * np.int64(columns) + np.arange(columns)
+    first = np.arange(0, A.shape[0] + 1, rows, dtype=np.uint32)
+    start = (A.indptr * np.int64(columns)).astype(np.uint32)
+    offset = (A.indptr * np.int64(rows * columns)).astype(np.uint32)
+    return RowBlocks(A.shape, *map(lock, (first, start, offset, every.ravel(), values)))
 
 
 @dataclass(frozen=True, eq=False)
