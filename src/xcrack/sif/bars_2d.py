@@ -17,8 +17,8 @@ from xcrack.sif.error_2d import TipErrors, tip_errors
 from xcrack.sif.sif import SIF
 
 _CAUGHT = 1.3  # exact error over what the blocks of the surplus space give of it, in the median
-_ETA, _SHARES, _SPREAD = 1.15, 0.3, 0.5  # half-width over eta, sum of the shares, and spread
-_RIM, _CHORDS, _END = 0.3, 1.0, 0.08  # of changes of shape, and of the contact's end
+_ETA, _SHARES, _SPREAD = 1.15, 0.22, 0.35  # half-width over eta, sum of the shares, and spread
+_RIM, _CHORDS, _END = 0.1, 1.0, 0.08  # of changes of shape, and of the contact's end
 # Cells, by their longest edges: the shortest crack between two tips and from a mouth to a tip, and
 # the room between a tip and the next boundary or crack. Of drawn cracks between two tips the bar
 # holds in 93 % from 2.8 cells on, in 60 % from 2.5 to 2.8, in 15 % below.
