@@ -1,8 +1,10 @@
 """Routines of scipy's BLAS and LAPACK for kernels; all arguments are addresses."""
 
+import ctypes
 from typing import Any
 
 import llvmlite.binding
+import numba
 from numba import types
 from numba.extending import get_cython_function_address, intrinsic
 
@@ -10,6 +12,8 @@ from numba.extending import get_cython_function_address, intrinsic
 def _external(module: str, name: str, count: int) -> Any:
     symbol = f"xcrack_{name}"
     address = get_cython_function_address(f"scipy.linalg.cython_{module}", name)
+    if numba.config.DISABLE_JIT:  # kernels run as Python then, to be debugged and measured
+        return ctypes.CFUNCTYPE(None, *([ctypes.c_size_t] * count))(address)
     llvmlite.binding.add_symbol(symbol, address)
     return types.ExternalFunction(symbol, types.void(*([types.uintp] * count)))
 
@@ -32,3 +36,11 @@ def doubles_at(context, address):  # type: ignore[no-untyped-def]
         return builder.inttoptr(arguments[0], kind)
 
     return types.CPointer(types.float64)(types.uint64), generate
+
+
+def _doubles_in_python(address: int) -> Any:
+    return ctypes.cast(int(address), ctypes.POINTER(ctypes.c_double))
+
+
+if numba.config.DISABLE_JIT:
+    doubles_at = _doubles_in_python
