@@ -53,8 +53,8 @@ def built(tmp_path_factory):
         target.parent.mkdir(parents=True, exist_ok=True)
         target.write_bytes((ROOT / name).read_bytes())
     code = (
-        "import setuptools.build_meta as b, sys; b.build_sdist(sys.argv[1]); "
-        "b.build_wheel(sys.argv[1])"
+        "import setuptools.build_meta as b, sys; to = sys.argv[1]; b.build_sdist(to); "
+        "b.build_wheel(to)"
     )
     run = subprocess.run([sys.executable, "-c", code, str(folder)], cwd=source,
                          capture_output=True, text=True, check=False)  # fmt: skip
