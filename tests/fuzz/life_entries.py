@@ -1,5 +1,7 @@
 """Lives and inspections of a run."""
 
+import dataclasses
+
 import numpy as np
 
 import xcrack as xc
@@ -43,7 +45,50 @@ RUN = arg(
     HISTORY,
 )
 
+ANY = Numbers(rule=lambda x: True if x.ndim == 0 and abs(x) < 15 else None)
+ZONE = xc.plastic_zone(400.0, 2)
+POSITIVE = arg(Number(above=0, far=1e4), 1.0, 2)
+SPECTRUM = xc.Spectrum([0.0, 1.0, 0.4, 0.6])
+FLIGHTS = xc.History(
+    tuple(dataclasses.replace(step, levels=(0.0, 1.0)) for step in HISTORY.steps), "max_steps"
+)
+
 ENTRIES = [
+    Entry("plastic_zone", xc.plastic_zone, {"sigma_y": POSITIVE, "beta": POSITIVE}),
+    Entry("plastic_zone", lambda K: ZONE(K), {"K": arg(Numbers(), 30.0)}),
+    Entry("wheeler", xc.wheeler, {"w": POSITIVE, "zone": arg(Of(type=xc.plastic_zone), ZONE)}),
+    Entry(
+        "wheeler",
+        lambda K, da: xc.wheeler(1.0, ZONE).factor(K, 30.0, da),
+        {"K": arg(ANY, 15.0), "da": arg(ANY, 1e-4)},
+    ),
+    Entry(
+        "willenborg",
+        lambda shutoff, dK_th, zone: xc.willenborg(shutoff, dK_th, zone),
+        {
+            "shutoff": arg(Number(above=1), 2.5),
+            "dK_th": arg(Number(least=0), 2.0),
+            "zone": arg(Of(type=xc.plastic_zone), ZONE),
+        },
+    ),
+    Entry(
+        "willenborg",
+        lambda K_min: xc.willenborg(2.5, 2.0, ZONE).reduction(K_min, 15.0, 30.0, 1e-4),
+        {"K_min": arg(ANY, 1.5)},
+    ),
+    Entry(
+        "retarded",
+        lambda model, nu, max_blocks: (
+            xc.retarded(FLIGHTS, LAW, SPECTRUM, model, nu=nu, max_blocks=max_blocks).life
+        ),
+        {
+            "model": arg(
+                Of(optional=True, type=xc.wheeler | xc.willenborg), None, xc.wheeler(1.0, ZONE)
+            ),
+            "nu": arg(Number(above=-1, below=0.5), 0.3),
+            "max_blocks": arg(Number(above=0, far=1e4), 5, 20.0),
+        },
+    ),
     Entry(
         "lognormal",
         xc.lognormal,
@@ -93,7 +138,10 @@ ENTRIES = [
     Entry(
         "inspection",
         lambda curve, interval: xc.inspection(curve, interval=interval),
-        {"curve": RUN, "interval": arg(Number(above=1e3), 1e4)},
+        {
+            "curve": RUN,
+            "interval": arg(Number(above=0, rule=lambda v: True if v >= 1e3 else None), 1e4),
+        },
     ),
     Entry(
         "inspection",

@@ -32,6 +32,7 @@ NAMES = [
     "verify", "report", "read_case", "run", "info", "demo", "convert_mesh",
     # lives
     "Scatter", "growth_curve", "inspection", "life", "logistic_pod", "lognormal", "normal",
+    "plastic_zone", "retarded", "wheeler", "willenborg",
     # spectra
     "Spectrum", "rainflow", "read_spectrum", "twist",
     "save",

@@ -11,7 +11,7 @@ from xcrack.history.driving import cycles_of, driving
 from xcrack.history.history import History
 from xcrack.inputs import number, numbers, shown
 
-_MOST_LOOKS = 100_000
+_MOST_LOOKS = 1000
 
 
 @dataclass(frozen=True)

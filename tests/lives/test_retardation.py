@@ -1,0 +1,237 @@
+"""Wheeler and Willenborg: worked numbers, the delay in closed form, shut-off, and runs."""
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+from support import exact
+from support.growth_fakes import STRESS, mode_I, patch_respond, plate
+from xcrack.errors import ProblemError
+from xcrack.growth.criteria import max_hoop_stress
+from xcrack.growth.run import grow
+from xcrack.growth.step import Cycle
+from xcrack.history.history import History
+from xcrack.kernels.retardation import advanced
+from xcrack.laws.power import paris, walker
+from xcrack.laws.thresholds import klesnil_lukas
+from xcrack.lives.retarded import retarded
+from xcrack.lives.zones import plastic_zone, wheeler, willenborg
+from xcrack.spectra.spectrum import Spectrum
+
+ZONE = plastic_zone(400.0, beta=2)  # MPa, MPa √m, m
+RATE = 1e-11 * 15.0**3
+
+
+def test_zones():
+    assert ZONE(30.0) * 1000 == pytest.approx(0.8952466, abs=5e-8)
+    assert ZONE(15.0) * 1000 == pytest.approx(0.2238116, abs=1e-7)
+    dugdale = plastic_zone(400.0, beta=8 / np.pi**2)
+    assert dugdale(30.0) == pytest.approx(np.pi / 8 * (30 / 400) ** 2, rel=1e-14)
+
+
+def test_worked_factors_of_wheeler():
+    da = np.array([0, 0.1, 0.3, 0.6, 0.671435]) * 1e-3
+    expected = [0.125, 0.149304, 0.230557, 0.660004, 1.0]
+    assert np.allclose(wheeler(1.5, ZONE).factor(15.0, 30.0, da), expected, atol=2e-6)
+
+
+def by_cycle(a, last, K, rate, model, state):
+    """The kernel for one kind of cycle of constant K."""
+    state = np.array(state)
+    largest, rate = np.full((2, 1), K), np.broadcast_to(rate, (2, 1, np.size(rate))).copy()
+    shifts = np.linspace(0, 1, rate.shape[2])
+    w = model.w if isinstance(model, wheeler) else 1.0
+    kind = 1 if isinstance(model, wheeler) else 2
+    shutoff = model.shutoff if kind == 2 else 2.0
+    share = np.full((2, 1), model.dK_th / 13.5 if kind == 2 else 0.0)
+    order = np.zeros(1, int)
+    zone = model.zone.factor
+    return advanced(
+        a, last, order, largest, rate, shifts, zone, kind, w, shutoff, share, state, 1e9
+    )
+
+
+def test_delay_of_wheeler_in_closed_form():
+    """Cycles to leave the zone: 82230.054 as an integral, 82232 cycle by cycle, 4.133 times."""
+    model, a = wheeler(1.5, ZONE), 0.01
+    z, z_over = float(ZONE(15.0)), float(ZONE(30.0))
+    closed = (z_over**2.5 - z**2.5) / (2.5 * z**1.5 * RATE)
+    by_quad = quad(lambda x: 1 / (RATE * model.factor(15.0, 30.0, x)), 0, z_over - z, epsrel=1e-12)
+    assert closed == pytest.approx(82230.054, abs=1e-3)
+    assert by_quad[0] == pytest.approx(closed, rel=1e-10)
+    cycles, end = by_cycle(a, a + z_over - z, 15.0, RATE, model, [a, z_over, 30.0, 0.0])
+    assert cycles == pytest.approx(82232, abs=1.5)
+    assert cycles / ((z_over - z) / RATE) == pytest.approx(4.133, abs=5e-4)
+    assert end == a + z_over - z
+
+
+WILLENBORG = {
+    0.0: (8.518519, 6.481481, -7.018519, -1.082857),
+    0.2: (6.495335, 8.504665, -4.995335, -0.587364),
+    0.5: (2.801751, 12.198249, -1.301751, -0.106716),
+    0.8: (0.0, 15.0, 1.5, 0.1),
+}
+
+
+@pytest.mark.parametrize("da", WILLENBORG)
+def test_worked_reductions_of_willenborg(da):
+    model = willenborg(2.5, 2.0, ZONE)
+    K_R, high, low, R = WILLENBORG[da]
+    reduction = float(model.reduction(1.5, 15.0, 30.0, da * 1e-3))
+    assert reduction == pytest.approx(K_R, abs=6e-7)
+    assert 15.0 - reduction == pytest.approx(high, abs=6e-7)
+    assert (1.5 - reduction) / (15.0 - reduction) == pytest.approx(R, abs=6e-7)
+    assert 1.5 - reduction == pytest.approx(low, abs=6e-7)
+
+
+def test_willenborg_at_shut_off():
+    """K_OL / K_max = S: K_max,eff = ΔK_th / (1 - R), 2.2222222 for 12, 1.2 and 30."""
+    model = willenborg(2.5, 2.0, ZONE)
+    assert 12.0 - float(model.reduction(1.2, 12.0, 30.0, 0.0)) == pytest.approx(
+        2.0 / 0.9, rel=1e-14
+    )
+
+
+def test_willenborg_cycle_by_cycle():
+    """Paris, K constant: the integral of 1 / rate(K - K_R) over the zone; table and cycles."""
+    model, a = willenborg(2.5, 2.0, ZONE), 0.01
+    law = paris(1e-11, 3.0)
+
+    def rate(da):
+        reduction = float(model.reduction(1.5, 15.0, 30.0, da))
+        return float(law(15.0 - reduction - max(1.5 - reduction, 0.0), 0.0))
+
+    z = float(ZONE(30.0))
+    expected = quad(lambda x: 1 / rate(x), 0, z, epsrel=1e-10, limit=200)[0]
+    shares = np.linspace(0, 1, 257)
+    table = law(15.0 * (1 - shares) - np.maximum(1.5 - 15.0 * shares, 0), 0.0)
+    cycles, _ = by_cycle(a, a + z, 15.0, table, model, [a, z, 30.0, 0.0])
+    assert cycles == pytest.approx(expected, rel=1e-4)
+    assert cycles > 2 * z / float(law(13.5, 0.1))
+
+
+# --- along the path of a run ---------------------------------------------------------------------
+
+
+def history_of(spectrum, law, n=6, da=1.0):
+    options = {"da": da, "max_steps": n, "progress": False}
+    return History(tuple(grow(plate(), law, max_hoop_stress, spectrum, **options)), "")
+
+
+@pytest.fixture
+def overload(monkeypatch):
+    """200 small cycles and one that is twice as large; mm and MPa √mm."""
+    patch_respond(monkeypatch, mode_I())
+    factors = [*([0.05, 0.5] * 200), 0.05, 1.0]
+    return Spectrum(factors)
+
+
+LAW = paris(5e-13, 3.0)
+ZONES = plastic_zone(300.0, beta=2)
+
+
+def test_without_a_model_it_is_the_run(overload):
+    """Block rates against cycle by cycle: the growth of a block is small against the length."""
+    history = history_of(overload, LAW)
+    result = retarded(history, LAW, overload, None, nu=0.3)
+    assert result.life == pytest.approx(history.life, rel=1e-3)
+    assert np.allclose(result.a, 5.0 + np.arange(6), rtol=1e-12)
+    assert result.ended == ""
+    closed = exact.paris_life(5, 10, 5e-13, 3, STRESS) / (200 * 0.45**3 + 0.95**3)
+    assert result.life == pytest.approx(closed, rel=1e-3)
+
+
+def test_wheeler_and_willenborg_retard(overload):
+    """Wheeler against an own loop; both slower than without, a larger w slower still."""
+    law = paris(5e-12, 3.0)
+    history = history_of(overload, law)
+    plain = retarded(history, law, overload, None, nu=0.3).life
+    lives = {}
+    for w in (0.5, 1.0, 1.5):
+        lives[w] = retarded(history, law, overload, wheeler(w, ZONES), nu=0.3).life
+    assert plain < lives[0.5] < lives[1.0] < lives[1.5]
+    slow = retarded(history, law, overload, willenborg(2.5, 10.0, ZONES), nu=0.3).life
+    assert slow > 1.2 * plain
+    assert lives[1.0] == pytest.approx(own_loop(law, 1.0), rel=2e-3)
+
+
+def own_loop(law, w):
+    """Wheeler with K = stress √(π a) and nothing of the kernel: blocks from 5 to 10."""
+    a, zone_end, cycles, n = 5.0, 0.0, 0, 201
+    order = [0.5] * 200 + [1.0]
+    while a < 10.0:
+        top = order[cycles % n]
+        K = top * STRESS * np.sqrt(np.pi * a)
+        own = ZONES.factor * K**2
+        grows = law.C * ((top - 0.05) * STRESS * np.sqrt(np.pi * a)) ** law.m
+        if a + own >= zone_end:
+            zone_end = a + own
+        else:
+            grows *= (own / (zone_end - a)) ** w
+        a += grows
+        cycles += 1
+    return cycles / n
+
+
+def test_a_large_overload_stops_the_crack(overload):
+    """Shut-off below the ratio of the overload: small cycles do nothing, the overloads all."""
+    law = paris(5e-12, 3.0)
+    history = history_of(overload, law, n=3)
+    stopped = retarded(history, law, overload, willenborg(1.5, 0.0, ZONES), nu=0.3)
+    assert stopped.ended == ""
+    alone = retarded(history, law, overload.omit(0.9), None, nu=0.3).life
+    assert stopped.life == pytest.approx(alone, rel=0.02)
+
+
+def test_why_it_ends(overload):
+    history = history_of(overload, LAW)
+    least = paris(5e-13, 3.0, threshold=klesnil_lukas(1e4, 0.0))
+    assert (
+        retarded(history, least, overload, None, nu=0.3).ended == "a whole block lets nothing grow"
+    )
+    short = retarded(history, LAW, overload, None, nu=0.3, max_blocks=3)
+    assert short.ended == "max_blocks = 3 reached"
+    assert short.life == pytest.approx(3)
+    brittle = paris(5e-13, 3.0, K_c=STRESS * np.sqrt(np.pi * 7.0))
+    result = retarded(history, brittle, overload, None, nu=0.3)
+    assert "toughness" in result.ended
+    assert 6.0 <= result.a[-1] <= 7.1
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"history": 3}, "history = 3"),
+        ({"law": 3}, "law = 3"),
+        ({"law": walker(1e-11, 3, 0.5, ratio="nominal")}, "nominal"),
+        ({"spectrum": Spectrum(rows=[(0, 1, 1)])}, "no order in time"),
+        ({"model": 1.5}, r"model = 1\.5"),
+        ({"nu": 0.5}, "nu"),
+        ({"max_blocks": 0}, "max_blocks"),
+    ],
+)
+def test_bad_input(overload, change, words):
+    given = {
+        "history": history_of(overload, LAW, n=2),
+        "law": LAW,
+        "spectrum": overload,
+        "model": None,
+        "nu": 0.3,
+        **change,
+    }
+    with pytest.raises(ProblemError, match=words):
+        retarded(**given)
+
+
+def test_other_bad_input(overload):
+    history = history_of(Cycle(0.0, 1.0), LAW, n=2)
+    with pytest.raises(ProblemError, match="not made with a Spectrum"):
+        retarded(history, LAW, overload, None, nu=0.3)
+    for make, words in (
+        (lambda: wheeler(0, ZONE), "w = 0"),
+        (lambda: wheeler(1, 3), "zone = 3"),
+        (lambda: willenborg(1.0, 1.0, ZONE), "shutoff"),
+        (lambda: plastic_zone(0, 1), "sigma_y"),
+    ):
+        with pytest.raises(ProblemError, match=words):
+            make()
