@@ -127,7 +127,37 @@ def meshes() -> dict[str, Mesh]:
     return {**{name: short(mesh) for name, mesh in made.items()}, "two_holes": two_holes()}
 
 
+def lug(path: Path) -> None:
+    """Lug of corner_crack_at_hole.py, of second order, in the form of Abaqus, written by gmsh."""
+    with session() as gmsh:
+        occ = gmsh.model.occ
+        head = occ.addCylinder(0, 0, 0, 0, 0, 8, 20)
+        shank = occ.addBox(-60, -20, 0, 60, 40, 8)
+        body, _ = occ.fuse([(3, head)], [(3, shank)])
+        occ.cut(body, [(3, occ.addCylinder(0, 0, -1, 0, 0, 10, 10))])
+        occ.synchronize()
+        faces = gmsh.model.getEntities(2)
+        boxes = {tag: np.array(gmsh.model.getBoundingBox(2, tag)) for _, tag in faces}
+        hole = [t for t, b in boxes.items() if np.abs(b[[0, 1, 3, 4]]).max() < 10.1]
+        end = [t for t, b in boxes.items() if b[3] < -59]
+        gmsh.model.addPhysicalGroup(2, hole, 1, "hole")
+        gmsh.model.addPhysicalGroup(2, end, 2, "end")
+        for z, name in ((0, "back"), (8, "front")):
+            flat = [t for t, b in boxes.items() if np.abs(b[[2, 5]] - z).max() < 0.1]
+            gmsh.model.addPhysicalGroup(2, flat, 3 + z, name)
+        gmsh.model.addPhysicalGroup(3, [gmsh.model.getEntities(3)[0][1]], 20, "lug")
+        gmsh.model.mesh.setSizeCallback(
+            lambda _dim, _tag, x, y, _z, _size: 3.0 + max(0.0, np.hypot(x, y) - 10.0) / 10.0
+        )
+        gmsh.model.mesh.generate(3)
+        gmsh.model.mesh.setOrder(2)
+        gmsh.option.setNumber("Mesh.SaveGroupsOfElements", 1)
+        gmsh.write(str(path))
+    path.write_text(path.read_text().replace(str(path), "lug"))  # its heading
+
+
 if __name__ == "__main__":
+    lug(HERE / "lug.inp")
     for name, mesh in meshes().items():
         path = HERE / f"{name}.msh"
         write_mesh(path, mesh)

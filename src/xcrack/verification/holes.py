@@ -101,3 +101,38 @@ def lame_cylinder(
 
 def _points(x: ArrayLike, y: ArrayLike) -> Complexes:
     return np.asarray(np.asarray(x, float) + 1j * np.asarray(y, float))
+
+
+def newman_raju_at_hole(phi: ArrayLike, a: float, c: float, t: float, R: float) -> Floats:
+    """K_I of one quarter-elliptical corner crack at a hole in a wide plate under unit tension.
+
+    The fit of Newman and Raju (1981, NASA TM 83200; Murakami's handbook, 1987, p. 716) for two
+    cracks, made one by the factor of Shah (1976). Coefficients of the hole, read in the program
+    easigrow (src/beta.rs): those of 1981; later fits differ by 2 %.
+
+    Parameters
+    ----------
+    phi : (...), radians
+        Parametric angle: 0 at the surface of the plate, pi / 2 at the wall of the hole.
+    a, c : float, length
+        Along the wall and along the surface, a <= c.
+    t, R : float, length
+        Thickness and radius of the hole.
+
+    Returns
+    -------
+    (...), stress √length
+    """
+    r, q = a / c, a / t
+    sine, cosine = np.sin(phi), np.cos(phi)
+    M1 = 1.13 - 0.09 * r
+    M2 = -0.54 + 0.89 / (0.2 + r)
+    M3 = 0.5 - 1 / (0.65 + r) + 14 * (1 - r) ** 24
+    g1 = 1 + (0.1 + 0.35 * q * q) * (1 - sine) ** 2
+    lam = 1 / (1 + c / R * np.cos(0.85 * np.asarray(phi, float)))
+    g2 = (1 - 0.15 * lam + 3.46 * lam**2 - 4.47 * lam**3 + 3.52 * lam**4) / (1 + 0.13 * lam**2)
+    g3 = (1 + 0.04 * r) * (1 + 0.1 * (1 - cosine) ** 2) * (0.8 + 0.2 * q**0.25)
+    ellipse = (r * r * cosine**2 + sine**2) ** 0.25
+    single = np.sqrt((4 / np.pi + a * c / (2 * t * R)) / (4 / np.pi + a * c / (t * R)))
+    F = (M1 + M2 * q**2 + M3 * q**4) * g1 * g2 * g3 * ellipse * single
+    return np.asarray(np.sqrt(np.pi * a / (1 + 1.464 * r**1.65)) * F)

@@ -11,7 +11,7 @@ from xcrack.scene.problem import Problem
 from xcrack.scene.set_loads import bearing
 from xcrack.sif.stress_intensity import stress_intensity
 
-_SOURCE = "ASTM E399 (annex on the compact specimen) and E647: a polynomial within 0.5 %"
+_SOURCE = "polynomial of ASTM E399 and E647 within 0.5 % (Srawley, 1976)"
 _SHARES = {0.3: 0.015, 0.45: 0.01, 0.5: 0.01, 0.55: 0.01, 0.7: 0.015}  # a/W and what is allowed
 _W = 50.0
 
