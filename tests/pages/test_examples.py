@@ -11,7 +11,12 @@ import matplotlib.image
 import pytest
 
 EXAMPLES = sorted((Path(__file__).resolve().parents[2] / "examples").glob("*.py"))
-IN_SPACE = ("cylinder_bending", "penny", "semi_elliptic_growth")  # seconds with --quick
+IN_SPACE = (
+    "cylinder_bending",
+    "penny",
+    "semi_elliptic_growth",
+    "corner_crack_at_hole",
+)  # seconds with --quick
 PLANE = [path for path in EXAMPLES if path.stem not in IN_SPACE]
 SPACE = [path for path in EXAMPLES if path.stem in IN_SPACE]
 

@@ -10,6 +10,7 @@ from xcrack.mesh.mesh import Mesh
 from xcrack.mesh.normals import outward_areas
 
 _ROUND = 0.02  # of the radius: points of a hole are no farther from its circle
+_STEPS = 8
 _ALONG = 0.01  # share of the squared normals along the axis of a cylinder
 
 
@@ -54,7 +55,7 @@ def round_hole(mesh: Mesh, facets: Ints, what: str) -> Hole:
     if not len(facets):
         raise ProblemError(f"{what}: the set has no facets.")
     area = outward_areas(mesh, facets, what)
-    section = _section(area, what)
+    section = _straightened(mesh.points[np.unique(facets)], _section(area, what))
     x = mesh.points[np.unique(facets)] @ section.T
     A = np.column_stack([2 * x, np.ones(len(x))])
     solution, _, rank, _ = np.linalg.lstsq(A, (x**2).sum(axis=1), rcond=1e-10)
@@ -77,6 +78,31 @@ def round_hole(mesh: Mesh, facets: Ints, what: str) -> Hole:
             "places. A pin presses on the wall of a hole."
         )
     return hole
+
+
+def _straightened(x: Floats, section: Floats) -> Floats:
+    """Directions across the axis of the cylinder that fits points best (Gauss and Newton)."""
+    if x.shape[1] < 3:
+        return section
+    for _ in range(_STEPS):
+        axis = np.cross(*section)
+        u = (x - x.mean(axis=0)) @ section.T
+        w = (x - x.mean(axis=0)) @ axis
+        centre = np.linalg.lstsq(
+            np.column_stack([2 * u, np.ones(len(u))]), (u**2).sum(axis=1), rcond=None
+        )[0][:2]
+        radial = u - centre
+        distance = np.maximum(np.linalg.norm(radial, axis=1), 1e-300)
+        radial = radial / distance[:, None]
+        # Unknowns: shift of the centre, tilt of the axis, radius.
+        slope = np.column_stack([radial, w[:, None] * radial, np.ones(len(u))])
+        tilt = np.linalg.lstsq(slope, distance, rcond=1e-10)[0][2:4]
+        axis = axis + tilt @ section
+        axis = axis / np.linalg.norm(axis)
+        first = section[0] - (section[0] @ axis) * axis
+        first = first / np.linalg.norm(first)
+        section = np.stack([first, np.cross(axis, first)])
+    return section
 
 
 def _section(area: Floats, what: str) -> Floats:

@@ -7,6 +7,7 @@ from xcrack.errors import ProblemError
 from xcrack.mesh.holes import Hole
 from xcrack.scene.set_loads import Bearing, Resultant
 
+_AXIAL = 1e-3  # share of a force along the axis that may stem from the fit of the axis
 _COVERED = 0.9  # share of the contact of a pin that must lie on the set
 
 
@@ -28,8 +29,9 @@ def bearing_traction(load: Bearing, hole: Hole, x: Floats, weight: Floats) -> Fl
     what = f"bearing({load.where!r})"
     force = hole.section @ load.force
     size = float(np.linalg.norm(load.force))
-    along = np.linalg.norm(load.force - force @ hole.section)
-    if along > 1e-6 * size:
+    rest = load.force - force @ hole.section
+    along = float(np.linalg.norm(rest))
+    if along > _AXIAL * size:
         raise ProblemError(
             f"{what}: {along:.4g} of the force {size:.4g} acts along the axis of the hole, where a "
             "pin does not press: give that part by traction or resultant."
@@ -56,7 +58,9 @@ def bearing_traction(load: Bearing, hole: Hole, x: Floats, weight: Floats) -> Fl
     shapes = np.stack([p, p * sine])[:, :, None] * radial
     sums = np.einsum("q,kqs->sk", weight, shapes)
     scale = np.linalg.solve(sums, force)
-    return np.asarray(np.einsum("k,kqs->qs", scale, shapes) @ hole.section)
+    across_axis = np.einsum("k,kqs->qs", scale, shapes) @ hole.section
+    # The rest is that of an axis that points know to a few digits only.
+    return np.asarray(across_axis + rest / weight.sum())
 
 
 def _axial(hole: Hole, x: Floats) -> Floats:
