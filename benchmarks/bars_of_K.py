@@ -1,12 +1,12 @@
 """Do the error bars of K hold, and are they short? Random scenes with known K.
 
-    python benchmarks/bars_of_K.py                      # fresh seeds up to 200 scenes, and the table
+    python benchmarks/bars_of_K.py   # fresh seeds up to 200 scenes, the table
     python benchmarks/bars_of_K.py --seeds 0:0          # the table of what is stored
 
 Scenes are those of tests/support/scenes_of_bars.py. The coefficients of the bars were fitted to
-other seeds (5000 to 5499 of the exact kinds, 7000 to 7063 of the referenced ones of scenes_of_K, drawn
-by an earlier script); cracks at and beside round holes and closed kinked ones were in no fit. Results
-add up in benchmarks/results/bars_of_K.json, seed by seed: a run that was stopped goes on.
+other seeds (5000 to 5499 of the exact kinds, 7000 to 7063 of the referenced ones of scenes_of_K,
+drawn by an earlier script); cracks at and beside round holes and closed kinked ones were in no fit.
+Results add up in benchmarks/results/bars_of_K.json, seed by seed: a run that was stopped goes on.
 """
 
 import argparse
@@ -16,6 +16,7 @@ import sys
 import time
 import warnings
 from pathlib import Path
+from typing import Any
 
 for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(name, "1")
@@ -48,7 +49,7 @@ def run(seeds: range, path: Path) -> None:
     write(path, stored)
 
 
-def short(value):
+def short(value: Any) -> Any:
     """Numbers of a few digits, nan as null."""
     if isinstance(value, dict):
         return {k: v if k == "known" else short(v) for k, v in value.items()}

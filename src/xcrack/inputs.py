@@ -114,6 +114,8 @@ def whole(
         result = int(rounded)
     if (least is not None and result < least) or (most is not None and result > most):
         raise error(f"{what} = {shown(value)} is not possible: give {wanted}.")
+    if abs(result) >= 2**63:
+        raise error(f"{what} = {shown(value)} is too large to count with: give {wanted}.")
     return result
 
 

@@ -139,6 +139,7 @@ def _entered(rng, entry):
             makers[name], verdicts[name] = (label, make), verdict
     bad = [name for name, verdict in verdicts.items() if verdict == NONSENSE]
     changed = [name for name, (label, _) in makers.items() if not label.startswith("valid ")]
+    blamed = bad if len(changed) < 2 else names  # one change may make another argument wrong
     verdict = NONSENSE if bad else VALID
     if not bad and (EDGE in verdicts.values() or len(changed) > 1):
         verdict = EDGE
@@ -147,7 +148,7 @@ def _entered(rng, entry):
         verdict=verdict,
         call=lambda: entry.call(**{name: make() for name, (_, make) in makers.items()}),
         text=", ".join(f"{name} = <{label}>" for name, (label, _) in makers.items()),
-        words=tuple(word for name in bad for word in (name, *entry.arguments[name].words)),
+        words=tuple(word for name in blamed for word in (name, *entry.arguments[name].words)),
         in_folder=entry.in_folder,
     )
 

@@ -31,10 +31,10 @@ BAD = ("foreign", "nan", "hang", "silent", "valid refused", "words", "note")
 SECONDS = 60
 
 _FEWEST_WORDS = 5
-_MEND = re.compile(
-    r"\b(give|gives|take|must|leave|use|make|needs?|put|choose|check|try|wanted|see|remove|"
-    r"merge|draw|ask|install|move|describe|join|cut|must|know|takes?|read|knows|return|lies|"
-    r"numbered|symmetric|returns|has|only|every|remesh|mesh|supports?|resume|save|export|starts|computes|call)\b",
+_MEND = re.compile(  # an order, or what would be right
+    r"\b(ask|call|check|choose|cut|describe|draw|enlarge|export|gives?|install|join|known are|"
+    r"leave|make|merge|mesh|move|must|needs?|numbered|put|remesh|remove|resume|return|rows are|"
+    r"save|see|such as|takes?|try|use|wanted|is no toml|is no text)\b",
     re.I,
 )
 # What numpy and others warn of by themselves is theirs, but a nan on its way must not pass.
@@ -100,7 +100,7 @@ def _of_error(drawn, error):
         return Outcome("foreign", f"{seen} at {place}")
     if drawn.verdict == VALID:
         return Outcome("valid refused", f"{seen} at {place}")
-    lack = lack_of_words(str(error), drawn.words)
+    lack = lack_of_words(str(error), drawn.words if drawn.verdict == NONSENSE else ())
     if lack:
         return Outcome("words", f"{lack}: {seen} at {place}")
     return Outcome("edge refused" if drawn.verdict == EDGE else "nonsense refused", seen)

@@ -11,13 +11,17 @@ import numpy as np
 
 from fuzz import (
     body_entries,
+    case_entries,
+    chart_entries,
     crack_entries,
     file_entries,
+    generator_entries,
     growth_entries,
     law_entries,
     life_entries,
     load_entries,
     problem_entries,
+    service_entries,
     solution_entries,
     spectrum_entries,
 )
@@ -26,9 +30,13 @@ from fuzz.outcome import BAD, GOOD, Outcome, outcome_of
 
 PARTS = (
     body_entries,
+    case_entries,
+    chart_entries,
+    generator_entries,
     crack_entries,
     load_entries,
     problem_entries,
+    service_entries,
     solution_entries,
     spectrum_entries,
     growth_entries,

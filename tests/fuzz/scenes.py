@@ -1,6 +1,7 @@
 """Small scenes, solved once, that inputs are made of."""
 
 import tempfile
+from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 
@@ -110,3 +111,10 @@ def step_file():
         gmsh.model.occ.synchronize()
         gmsh.write(str(path))
     return path
+
+
+@contextmanager
+def folder():
+    """A folder that is gone afterwards."""
+    with tempfile.TemporaryDirectory(prefix="xcrack_fuzz_") as path:
+        yield Path(path)

@@ -14,11 +14,7 @@ _EXEMPT = {
          "ConvergenceError"),
         "raised by xcrack; its arguments are those of every exception",
     ),
-    **dict.fromkeys(
-        ("Spectrum", "rainflow", "read_spectrum", "twist", "bearing", "resultant", "temperature",
-         "read_field", "measures", "run", "read_case", "report", "info", "demo", "convert_mesh"),
-        "of a younger package: its own tests refuse bad input; to be drawn here too",
-    ),
+    **dict.fromkeys(("save", "measures"), "tests/history/test_saved.py and tests/crack draw theirs"),
 }  # fmt: skip
 
 
@@ -63,7 +59,8 @@ def test_every_method_of_public_values_is_in_the_table():
         if not isinstance(value, type) or name in _EXEMPT:
             continue
         for method, function in vars(value).items():
-            if not method.startswith("_") and inspect.isfunction(function):
+            plain = method in ("to_pandas", "sketch")  # without arguments
+            if not method.startswith("_") and inspect.isfunction(function) and not plain:
                 assert f".{method}(" in source or f'"{method}"' in source, f"{name}.{method}"
 
 

@@ -319,7 +319,7 @@ PROBLEMS = {
         r"Numerics\(enrichment='some'\): give 'geometric' or 'topological'",
     ),
     "functions": (lambda: xc.Numerics(functions=3), r"functions=3\): give 4 or 2"),
-    "multipliers": (lambda: xc.Numerics(multipliers="all"), "'reduced' or 'naive'"),
+    "multipliers": (lambda: xc.Numerics(multipliers="all"), "'reduced' or 'sparse' or 'naive'"),
     "orthonormal": (lambda: xc.Numerics(orthonormal="yes"), "'star' or 'node' or 'none'"),
     "initial set": (lambda: xc.Numerics(initial_set="?"), "'closed' or 'open'"),
     "radius": (lambda: xc.Numerics(radius=-1.0), r"radius = -1.0 is not possible"),

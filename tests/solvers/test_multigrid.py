@@ -63,9 +63,9 @@ def test_blocks_are_stored_without_a_matrix_in_between(size):
             ours, wanted = stored(M, dtype), row_blocks([M.tocsr()], first, dtype)
             assert ours.shape == wanted.shape
             for name in ("first", "start", "offset", "columns", "values"):
-                found, other = getattr(ours, name), getattr(wanted, name)
-                assert found.dtype == other.dtype
-                np.testing.assert_array_equal(found, other)
+                result, other = getattr(ours, name), getattr(wanted, name)
+                assert result.dtype == other.dtype
+                np.testing.assert_array_equal(result, other)
 
 
 def test_nodes_without_free_unknowns_are_left_out():
@@ -79,8 +79,8 @@ def test_nodes_without_free_unknowns_are_left_out():
     free = ~fixed[unknowns]
     wanted = A.toarray()[np.ix_(unknowns, unknowns)]
     wanted = np.where(np.outer(free, free) | np.eye(len(free), dtype=bool), wanted, 0.0)
-    found = multigrid._decoupled(multigrid._of_nodes(A, nodes), free)
-    np.testing.assert_array_equal(found.toarray(), wanted)
+    result = multigrid._decoupled(multigrid._of_nodes(A, nodes), free)
+    np.testing.assert_array_equal(result.toarray(), wanted)
     every = np.arange(A.shape[0] // 3)
     assert multigrid._decoupled(multigrid._of_nodes(A, every), np.ones(A.shape[0], bool)) is A
 

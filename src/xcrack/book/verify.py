@@ -10,7 +10,7 @@ from xcrack.book.page import book_page
 from xcrack.book.run import Book, Result, chosen, line_of, run_cases
 from xcrack.errors import ProblemError
 from xcrack.history.versions import versions
-from xcrack.inputs import shown
+from xcrack.inputs import flag, shown
 from xcrack.paths import path_of, system_errors
 
 
@@ -53,8 +53,7 @@ def verify(
     if not isinstance(only, str):
         raise ProblemError(f"verify: only = {shown(only)}: give a part of the name of a case.")
     for name, value in (("quick", quick), ("progress", progress)):
-        if not isinstance(value, bool):
-            raise ProblemError(f"verify: {name} = {shown(value)}: give True or False.")
+        flag(value, f"verify: {name}")
     path = None if file is None else path_of(file, "verify: file", error=ProblemError)
 
     def after(result: Result) -> None:

@@ -11,6 +11,7 @@ from xcrack.errors import ProblemError
 from xcrack.growth.run import grow
 from xcrack.history.collect import collect, resume
 from xcrack.history.history import History
+from xcrack.inputs import flag
 from xcrack.paths import system_errors
 from xcrack.plotting.plot import plot
 from xcrack.post.vtk import write
@@ -44,8 +45,7 @@ def run(path: str | PathLike[str], *, resumed: bool = False, overwrite: bool = F
         As of `read_case`, `solve`, `grow` and `resume`.
     """
     for name, value in (("resumed", resumed), ("overwrite", overwrite)):
-        if not isinstance(value, bool):
-            raise ProblemError(f"run: {name} = {value!r:.80}: give True or False.")
+        flag(value, f"run: {name}")
     case = read_case(path)
     with system_errors("results cannot be written to", case.folder, error=ProblemError):
         case.folder.mkdir(parents=True, exist_ok=True)

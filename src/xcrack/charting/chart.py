@@ -175,15 +175,14 @@ def _run(runs: _Runs, mesh: Mesh, changes: dict[str, Any]) -> _Outcome:
             scene = _varied(runs.problem, mesh, changes)
             result = solve(scene, runs.states)
             solutions: list[Solution] = [result] if runs.states is None else result
-            if runs.quantity is not None:
-                sample = plain(called(runs.quantity, "the quantity of chart", result))
-            elif runs.has_tips:
-                sample = K_of_all(solutions)
-            else:
-                sample = plain([solution.energy for solution in solutions])
+            if runs.quantity is None:
+                own = K_of_all(solutions) if runs.has_tips else _energies(solutions)
         except (XcrackError, np.linalg.LinAlgError, MemoryError) as error:
-            reason = f"{type(error).__name__}: {error}"
-            return _Outcome(changes, failed=reason, problem=scene)
+            return _failed(changes, scene, error)
+        try:  # of the user's function no exception but ours is a run that failed
+            sample = own if runs.quantity is None else _of_user(runs.quantity, result)
+        except XcrackError as error:
+            return _failed(changes, scene, error)
         seconds = perf_counter() - start
     if not np.isfinite(sample.values).all():
         return _Outcome(changes, failed="the quantity is not finite", problem=scene)
@@ -197,6 +196,18 @@ def _run(runs: _Runs, mesh: Mesh, changes: dict[str, Any]) -> _Outcome:
         tuple(dict.fromkeys(str(one.message) for one in messages)),
         problem=scene,
     )
+
+
+def _failed(changes: dict[str, Any], scene: Problem | None, error: BaseException) -> _Outcome:
+    return _Outcome(changes, failed=f"{type(error).__name__}: {error}", problem=scene)
+
+
+def _energies(solutions: Sequence[Solution]) -> Sampled:
+    return plain([solution.energy for solution in solutions])
+
+
+def _of_user(quantity: Quantity, result: Any) -> Sampled:
+    return plain(called(quantity, "the quantity of chart", result))
 
 
 def _varied(problem: Problem, mesh: Mesh, changes: dict[str, Any]) -> Problem:

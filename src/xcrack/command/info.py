@@ -15,8 +15,9 @@ from xcrack.analysis.solve import solve
 from xcrack.crack.crack import Crack
 from xcrack.crack.lines import line_crack
 from xcrack.crack.surfaces import penny_crack
-from xcrack.errors import ProblemError, XcrackError, XcrackWarning
+from xcrack.errors import XcrackError, XcrackWarning
 from xcrack.history.versions import versions
+from xcrack.inputs import flag
 from xcrack.mesh.box import box
 from xcrack.mesh.mesh import Mesh
 from xcrack.optional import required
@@ -95,8 +96,7 @@ def info(*, warm: bool = False) -> Info:
     ProblemError
         `warm` is neither True nor False.
     """
-    if not isinstance(warm, bool):
-        raise ProblemError(f"info: warm = {warm!r:.80}: give True or False.")
+    warm = flag(warm, "info: warm")
     missing = []
     for name in _NEEDED:
         try:

@@ -197,7 +197,7 @@ def plane_crack(polygon: ArrayLike) -> Crack:
     if np.linalg.norm(vector) <= 1e-12 * size**2:
         raise GeometryError(
             f"the plane crack at {at(x[0])} has no area: its corners lie on a "
-            "line, or the polygon crosses itself."
+            "line, or the polygon crosses itself; give them in order around the crack."
         )
     normal = vector / np.linalg.norm(vector)
     height = local @ normal

@@ -6,7 +6,7 @@ from xcrack.kernels.jit import kernel
 
 
 @kernel
-def advanced(
+def advanced(  # type: ignore[no-untyped-def]
     a,
     last,
     order,

@@ -304,7 +304,8 @@ def nasgro_K_c(K_Ic: float, sigma_y: float, t: float, A_k: float, B_k: float) ->
     B_k = number(B_k, f"{name}: B_k", least=0)
     with np.errstate(over="ignore", divide="ignore"):
         t0 = 2.5 * np.square(K_Ic / sigma_y)
-        return float(K_Ic * (1 + B_k * np.exp(-np.square(A_k * t / t0))))
+        thickness = A_k * t / t0 if A_k else 0.0
+        return float(K_Ic * (1 + B_k * np.exp(-np.square(thickness))))
 
 
 __all__ = ["forman", "hartman_schijve", "nasgro", "nasgro_K_c"]

@@ -157,7 +157,7 @@ def _ends(
     c, j = rows.place[row].tolist()
     last_c, last_j = rows.place[min(row + 1, len(rows.step) - 1)].tolist()
     places = ((c, j), (last_c, last_j))
-    result = []
+    result: list[Floats] = []
     for step, (crack, place) in zip(ends, places):
         if place >= len(step.angle[crack]):  # it has left the body: K stays what it was
             result.append(result[-1])

@@ -8,7 +8,7 @@ import numpy as np
 
 from xcrack.arrays import Floats, Ints, at, frozen
 from xcrack.errors import MeshError, ProblemError, warn
-from xcrack.inputs import numbers
+from xcrack.inputs import numbers, shown
 from xcrack.mesh.files import existing_file, meshio_read
 from xcrack.mesh.linear import SHAPES, base_kind, linearised
 from xcrack.mesh.locate import barycentric, locate
@@ -56,7 +56,8 @@ class Field:
         x = numbers(x, f"field {self.name}: x", (None, None))
         if x.shape[1] != self.mesh.dim:
             raise ProblemError(
-                f"field {self.name} has {self.mesh.dim} dimensions, the points {x.shape[1]}."
+                f"field {self.name} has {self.mesh.dim} dimensions, the points {x.shape[1]}: give "
+                f"points (n, {self.mesh.dim})."
             )
         cell, bary = locate(self.mesh, x)
         outside = np.nonzero(cell < 0)[0]
@@ -139,6 +140,8 @@ def read_field(path: str | PathLike[str], name: str | None = None) -> Field:
     >>> read_field(path)(np.array([(0.5, 0.5)]))
     array([2.5])
     """
+    if not isinstance(name, str | None):
+        raise MeshError(f"read_field: name = {shown(name)}: give the name of a field, or None.")
     path = existing_file(path, "field")
     with system_errors("cannot read the field file", path):
         content = meshio_read(path, "field")

@@ -199,7 +199,7 @@ def _mesh(gmsh: ModuleType, dim: int, source: str, sets: Mapping[str, Selector])
             centres = [np.round(points[f].mean(axis=(0, 1)), 4).tolist() for f in faces.values()]
             raise GeometryError(
                 f"sets[{name!r}] selects none of the {len(faces)} faces of {source}, whose points "
-                f"have their middles at {centres[:12]}: a face is selected if all points on it are."
+                f"have their middles at {centres[:12]}: choose all points of a face."
             )
         facet_sets[name] = new[np.concatenate([faces[tag] for tag in members])]
     return sound_mesh(points[used][:, :dim], new[cells], facet_sets)

@@ -27,6 +27,7 @@ from xcrack.plotting.figures import (
     picture_path,
     wants_window,
 )
+from xcrack.plotting.front_ends import to_the_surface
 from xcrack.plotting.projection import View, best_plane, given_plane, on_plane, section_outline
 from xcrack.sif.sif import SIF
 
@@ -251,7 +252,7 @@ def front_axes(
             newest = step is shown[-1]
             age = (last - step.index) / max(last, 1)
             color = colours(scale(step.index)) if single else f"C{k}"
-            for x in _to_the_surface(step, crack, body):
+            for x in _drawn_lines(step, crack, body):
                 axes.plot(
                     *on_plane(x, view).T,
                     ("-", "--", "-.", ":")[k % 4],
@@ -308,29 +309,14 @@ def step_fronts(step: Step, crack: int) -> list[FrontLine]:
     ]
 
 
-def _to_the_surface(step: Step, crack: int, body: Body | None) -> list[Floats]:
+def _drawn_lines(step: Step, crack: int, body: Body | None) -> list[Floats]:
     """Lines of the fronts of a step, with the places where they meet the boundary."""
     lines = step_fronts(step, crack)
     if body is None or not step.sif:
         return [line.x for line in lines]
     places = [x for _, x in front_ends(step.cracks[crack], body)]
-    result = []
-    for line in lines:
-        x = line.x
-        if not line.closed and len(x) > 1:
-            # Places of K end a share of their distance inside.
-            reach = 3 * float(np.linalg.norm(np.diff(x, axis=0), axis=1).max())
-            first, last = (_nearest(places, end, reach) for end in (x[0], x[-1]))
-            x = np.concatenate([first, x, last])
-        result.append(x)
-    return result
-
-
-def _nearest(places: list[Floats], x: Floats, reach: float) -> Floats:
-    """The nearest place within reach `(1, 3)`, or none `(0, 3)`."""
-    near = [place for place in places if np.linalg.norm(place - x) < reach]
-    near.sort(key=lambda place: float(np.linalg.norm(place - x)))
-    return np.reshape(near[:1], (-1, 3))
+    whole = [line.closed or len(line.x) < 2 for line in lines]
+    return [a.x if b else to_the_surface(a.x, places) for a, b in zip(lines, whole, strict=True)]
 
 
 def _along(sif: SIF, front: int, mode: int, edge: int = 0) -> tuple[Floats, Floats, Bools]:

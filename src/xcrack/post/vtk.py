@@ -53,7 +53,8 @@ def write(
     ``pressure_mean`` and ``gap_mean``. A third file, ``<path>_fronts.vtp``, has a line for each
     front with its frames (``ahead``, ``normal``), its arc length ``s`` and, where they are given,
     ``K_I``, ``K_II``, ``K_III`` and ``at_surface``, with error bars ``bar_I`` to ``bar_III`` where
-    K has them; cell data are ``crack``, ``front``, and ``area`` and ``depth`` of its crack.
+    K has them; cell data are ``crack``, ``front``, ``area`` and, where all cracks meet the
+    boundary, ``depth``.
 
     Parameters
     ----------
@@ -242,10 +243,10 @@ def _write_fronts(solution: Solution, sif: Sequence[SIF], path: Path) -> None:
         "front": np.array([tip.number for tip in tips]),
     }
     known = [measures(crack, solution.space.mesh) for crack in solution.space.cracks]
-    at_cells |= {
-        name: np.array([getattr(known[tip.crack], name) for tip in tips])
-        for name in ("area", "depth")
-    }
+    for name in ("area", "depth"):
+        values = np.array([getattr(known[tip.crack], name) for tip in tips])
+        if np.isfinite(values).all():  # readers of text files stumble over nan
+            at_cells[name] = values
     data = _vtk("vtkCommonDataModel").vtkPolyData()
     data.SetPoints(_points(x))
     data.SetLines(_cells([run[None] for run in runs]))

@@ -10,7 +10,7 @@ from typing import Any
 
 from xcrack.errors import ProblemError, XcrackError
 from xcrack.history.versions import versions
-from xcrack.inputs import number
+from xcrack.inputs import number, shown
 from xcrack.markup import Markup, element, joined, listed, page
 from xcrack.paths import path_of, system_errors
 from xcrack.plotting.report_pictures import Picture, history_pictures, solution_pictures
@@ -57,9 +57,11 @@ def report(
         Something else than these, no run in the folder, or a file that cannot be written.
     """
     path = path_of(file, "report: file", error=ProblemError)
+    if path.name in ("", ".."):
+        raise ProblemError(f"report: file = {shown(str(file))} is a folder: give a file in it.")
     path = path if path.suffix else path.with_name(path.name + ".html")
     if not isinstance(title, str):
-        raise ProblemError(f"report: title = {title!r:.80}: give a text.")
+        raise ProblemError(f"report: title = {shown(title)}: give a text.")
     if yield_stress is not None:
         yield_stress = number(yield_stress, "report: yield_stress", above=0)
     source = source_of(result, title, yield_stress)

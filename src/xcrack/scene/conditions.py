@@ -230,7 +230,7 @@ def initial_stress(f: Any) -> InitialStress:
     if sigma.shape not in ((2, 2), (3, 3)):
         raise ProblemError(f"initial_stress has the shape {sigma.shape}: give (2, 2) or (3, 3).")
     if not np.allclose(sigma, sigma.T):
-        raise ProblemError(f"initial_stress: {sigma.tolist()} is not symmetric.")
+        raise ProblemError(f"initial_stress: {sigma.tolist()} is not symmetric: give a stress.")
     return InitialStress(frozen(sigma))
 
 
@@ -319,7 +319,9 @@ def check_vectors(given: Load | Support, dim: int) -> None:
             )
     if isinstance(given, Fix) and given.axis is not None and given.axis >= dim:
         axes = " or ".join(map(str, range(dim)))
-        raise ProblemError(f"fix: axis = {given.axis}: in {dim} dimensions axis is {axes}.")
+        raise ProblemError(
+            f"fix: axis = {given.axis}: in {dim} dimensions axis is {axes}: give one of them."
+        )
 
 
 def _values(result: Any, what: str) -> Floats:

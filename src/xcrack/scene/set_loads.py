@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from xcrack.arrays import Floats, frozen
 from xcrack.errors import ProblemError
-from xcrack.inputs import number, numbers
+from xcrack.inputs import number, numbers, shown
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,10 +63,10 @@ def bearing(where: str, force: ArrayLike, *, contact_angle: float = pi) -> Beari
     array([   0., 1200.])
     """
     name = _set_name(where, "bearing")
-    vector = _vector(force, f"bearing({name!r}): force")
+    vector = _vector(force, f"bearing({shown(name)}): force")
     if not vector.any():
-        raise ProblemError(f"bearing({name!r}): the force is zero: leave the load out.")
-    angle = number(contact_angle, f"bearing({name!r}): contact_angle", above=0, most=pi)
+        raise ProblemError(f"bearing({shown(name)}): the force is zero: leave the load out.")
+    angle = number(contact_angle, f"bearing({shown(name)}): contact_angle", above=0, most=pi)
     return Bearing(name, vector, angle)
 
 
@@ -107,7 +107,7 @@ def resultant(
     array([3.])
     """
     name = _set_name(where, "resultant")
-    what = f"resultant({name!r})"
+    what = f"resultant({shown(name)})"
     if force is None and moment is None:
         raise ProblemError(f"{what}: give a force, a moment or both.")
     f = None if force is None else _vector(force, f"{what}: force")
@@ -131,7 +131,7 @@ def check_dimension(load: Bearing | Resultant, dim: int) -> None:
         wanted = dim if name != "moment" else (1, 3)[dim - 2]
         if value is not None and len(value) != wanted:
             raise ProblemError(
-                f"{type(load).__name__.lower()}({load.where!r}): {name} has {len(value)} "
+                f"{type(load).__name__.lower()}({shown(load.where)}): {name} has {len(value)} "
                 f"number(s); this body of {dim} dimensions needs {wanted}."
             )
 
@@ -145,5 +145,5 @@ def _vector(value: ArrayLike, what: str) -> Floats:
 
 def _set_name(where: Any, what: str) -> str:
     if not isinstance(where, str):
-        raise ProblemError(f"{what}: {where!r:.80} is not the name of a facet set.")
+        raise ProblemError(f"{what}: where = {shown(where)}: give the name of a facet set.")
     return where

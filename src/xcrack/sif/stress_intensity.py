@@ -120,7 +120,7 @@ def _checked(solutions: Any) -> list[Solution]:
         )
     try:
         result = list(solutions)
-    except TypeError:
+    except Exception:  # whatever an object's own __iter__ raises
         raise ProblemError(
             f"stress_intensities takes a list of solutions, not a {type(solutions).__name__}."
         ) from None
@@ -129,8 +129,8 @@ def _checked(solutions: Any) -> list[Solution]:
     for k, solution in enumerate(result):
         if not isinstance(solution, Solution):
             raise ProblemError(
-                f"stress_intensities: item {k} is a {type(solution).__name__}, not a Solution as "
-                "solve returns it."
+                f"stress_intensities: item {k} is a {type(solution).__name__}: give solutions as "
+                "solve returns them."
             )
     if any(solution.space is not result[0].space for solution in result):
         raise ProblemError(

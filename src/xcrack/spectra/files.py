@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from xcrack.errors import ProblemError
-from xcrack.inputs import whole
+from xcrack.inputs import flag, whole
 from xcrack.paths import path_of, system_errors
 from xcrack.spectra.spectrum import Spectrum
 
@@ -39,6 +39,7 @@ def read_spectrum(
         A file that cannot be read, a line that does not fit (with its number), no such column.
     """
     file = path_of(path, "read_spectrum: path", error=ProblemError)
+    rows = flag(rows, "read_spectrum: rows")
     with system_errors("the spectrum cannot be read from", file, error=ProblemError):
         text = file.read_text(encoding="utf-8", errors="replace")
     table: list[list[float]] = []
@@ -61,7 +62,7 @@ def read_spectrum(
         if table and len(values) != len(table[0]):
             raise ProblemError(
                 f"{file}, line {n}: {len(values)} numbers, where the lines before have "
-                f"{len(table[0])}."
+                f"{len(table[0])}: give as many in each."
             )
         table.append(values)
     if not table:

@@ -26,7 +26,7 @@ def turning_points(values: Floats) -> Ints:
     """
     different = np.nonzero(values != np.roll(values, 1))[0]
     x = values[different]
-    turns = (x - np.roll(x, 1)) * (np.roll(x, -1) - x) < 0
+    turns = (x > np.roll(x, 1)) != (np.roll(x, -1) > x)  # neighbours differ
     return np.asarray(different[turns], dtype=np.int64)
 
 
@@ -98,9 +98,7 @@ def rainflow(values: ArrayLike) -> NDArray[Any]:
     history = numbers(values, "rainflow: values", (None,))
     pairs = closed_cycles(history)
     if not pairs:
-        raise ProblemError(
-            "rainflow: the values do not vary: a history has two that differ, at least."
-        )
+        raise ProblemError("rainflow: the values do not vary: give two that differ, at least.")
     cycles = np.zeros(len(pairs), dtype=CYCLE)
     ends = history[np.array(pairs)]
     cycles["min"], cycles["max"], cycles["count"] = ends.min(axis=1), ends.max(axis=1), 1.0

@@ -1,6 +1,6 @@
 """A load history as a value."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from numbers import Real
@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from xcrack.arrays import Floats, Ints, lock
 from xcrack.errors import ProblemError
-from xcrack.inputs import number, numbers, shown, whole, whole_numbers
+from xcrack.inputs import entries, number, numbers, shown, whole, whole_numbers
 from xcrack.scene.conditions import Load
 from xcrack.spectra.rainflow import CYCLE, rainflow
 
@@ -76,8 +76,8 @@ class Spectrum:
         forms = [name for name in ("factors", "rows", "states") if getattr(self, name) is not None]
         if len(forms) != 1 or (self.sequence is not None) != (self.states is not None):
             raise ProblemError(
-                f"Spectrum of {' and '.join(forms) or 'nothing'} alone: give Spectrum(factors), "
-                "Spectrum(rows=...) or Spectrum(states=[...], sequence=[...])."
+                "Spectrum: give factors, or rows=..., or states=[...] with sequence=[...], not "
+                f"{' and '.join(forms) or 'nothing'}."
             )
         if not isinstance(self.unit, str) or not self.unit:
             raise ProblemError(
@@ -96,9 +96,7 @@ class Spectrum:
     def _check_factors(self) -> None:
         factors = lock(np.array(numbers(self.factors, "Spectrum: factors", (None,))))
         if not len(factors) or factors.min() == factors.max():
-            raise ProblemError(
-                "Spectrum: the factors do not vary: a history has two that differ, at least."
-            )
+            raise ProblemError("Spectrum: the factors do not vary: give two that differ, at least.")
         object.__setattr__(self, "factors", factors)
 
     def _check_rows(self) -> None:
@@ -112,13 +110,12 @@ class Spectrum:
         object.__setattr__(self, "rows", rows)
 
     def _check_states(self) -> None:
-        if isinstance(self.states, str) or not isinstance(self.states, Iterable):
-            raise ProblemError(f"Spectrum: states = {shown(self.states)}: give a list.")
+        given = entries(self.states, "Spectrum: states")
         states = tuple(
             number(state, f"Spectrum: states[{k}]")
             if isinstance(state, Real)
             else _loads(state, f"Spectrum: states[{k}]")
-            for k, state in enumerate(self.states)
+            for k, state in enumerate(given)
         )
         sequence = lock(np.array(whole_numbers(self.sequence, "Spectrum: sequence", (None,))))
         if not len(states) or not len(sequence) or len(np.unique(sequence)) < 2:
@@ -211,7 +208,7 @@ class Spectrum:
         """
         result = replace(self, least_range=range)
         if not len(result.cycles):
-            raise ProblemError(f"Spectrum.omit: no cycle has a range of {range:g} or more.")
+            raise ProblemError(f"Spectrum.omit: no cycle has a range of {range:g}: give less.")
         return result
 
     def scaled(self, factor: float) -> "Spectrum":
@@ -241,9 +238,7 @@ def distinct(cycles: NDArray[Any]) -> tuple[Floats, Floats, Ints]:
 
 
 def _loads(value: Any, what: str) -> tuple[Load, ...]:
-    if isinstance(value, str) or not isinstance(value, Iterable):
-        raise ProblemError(f"{what} = {shown(value)}: give a list of loads.")
-    loads = tuple(value)
+    loads = entries(value, what)
     for load in loads:
         if not isinstance(load, Load):
             raise ProblemError(f"{what} has {shown(load)}, which is not a load: see traction.")
