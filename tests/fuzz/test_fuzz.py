@@ -14,7 +14,7 @@ _EXEMPT = {
          "ConvergenceError"),
         "raised by xcrack; its arguments are those of every exception",
     ),
-    **dict.fromkeys(("save", "measures"), "tests/history/test_saved.py and tests/crack draw theirs"),
+    **dict.fromkeys(("save", "measures"), "tests/history and tests/crack draw theirs"),
 }  # fmt: skip
 
 
