@@ -52,8 +52,48 @@ SPECTRUM = xc.Spectrum([0.0, 1.0, 0.4, 0.6])
 FLIGHTS = xc.History(
     tuple(dataclasses.replace(step, levels=(0.0, 1.0)) for step in HISTORY.steps), "max_steps"
 )
+LINE = xc.assessment_line(210e3, 355.0, 510.0)
+FLAT = HISTORY.steps[0].sif[1][0]
 
 ENTRIES = [
+    Entry(
+        "assessment_line",
+        lambda E, sigma_y, sigma_u: xc.assessment_line(E, sigma_y, sigma_u),
+        {
+            "E": POSITIVE,
+            "sigma_y": arg(Number(above=0, most=300), 200),
+            "sigma_u": arg(Number(least=300), 400),
+        },
+    ),
+    Entry("assessment_line", lambda L_r: LINE(L_r), {"L_r": arg(Numbers(least=0), 0.5)}),
+    Entry(
+        "assessment_line",
+        lambda K_r, L_r: LINE.reserve(K_r, L_r),
+        {"K_r": arg(Number(above=0), 0.5), "L_r": arg(Number(least=0), 0.5)},
+    ),
+    Entry(
+        "residual_strength",
+        lambda nu, K_c: xc.residual_strength(HISTORY, nu=nu, K_c=K_c)["by_toughness"],
+        {"nu": arg(Number(above=-1, below=0.5), 0.3), "K_c": arg(Number(above=0), 2000.0)},
+    ),
+    Entry(
+        "geometry_factors",
+        lambda history, stress: xc.geometry_factors(history, stress=stress)["beta"],
+        {"history": RUN, "stress": arg(Number(above=0), 100.0)},
+    ),
+    Entry(
+        "opening_load",
+        lambda step: xc.opening_load(step).level[0],
+        {"step": arg(Seen(rule=lambda v: v is FLIGHTS.steps[0]), FLIGHTS.steps[0])},
+    ),
+    Entry(
+        "energy_release_rate",
+        lambda sif, material: xc.energy_release_rate(sif, material),
+        {
+            "sif": arg(Seen(rule=lambda v: None if isinstance(v, xc.SIF) else False), FLAT),
+            "material": arg(Of(type=xc.Isotropic), xc.Isotropic(2e5, 0.3, "strain")),
+        },
+    ),
     Entry("plastic_zone", xc.plastic_zone, {"sigma_y": POSITIVE, "beta": POSITIVE}),
     Entry("plastic_zone", lambda K: ZONE(K), {"K": arg(Numbers(), 30.0)}),
     Entry("wheeler", xc.wheeler, {"w": POSITIVE, "zone": arg(Of(type=xc.plastic_zone), ZONE)}),

@@ -32,7 +32,8 @@ NAMES = [
     "verify", "report", "read_case", "run", "info", "demo", "convert_mesh",
     # lives
     "Scatter", "growth_curve", "inspection", "life", "logistic_pod", "lognormal", "normal",
-    "plastic_zone", "retarded", "wheeler", "willenborg",
+    "assessment_line", "energy_release_rate", "geometry_factors", "opening_load",
+    "residual_strength", "plastic_zone", "retarded", "wheeler", "willenborg",
     # spectra
     "Spectrum", "rainflow", "read_spectrum", "twist",
     "save",

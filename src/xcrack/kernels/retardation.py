@@ -20,7 +20,7 @@ def advanced(  # type: ignore[no-untyped-def]
     share,
     state,
     most,
-):  # type: ignore[no-untyped-def]
+):
     """Blocks of cycles until a crack has a length.
 
     Parameters

@@ -152,7 +152,7 @@ def life(
         raise ProblemError(f"life: scatter = {shown(scatter)}: give Scatter(C=...).")
     if not (law is None or callable(law)):
         raise ProblemError(f"life: law = {shown(law)} cannot be called: give a law.")
-    n = whole(samples, "life: samples", least=100)
+    n = whole(samples, "life: samples", least=100, most=10_000_000)
     rows = driving(history.steps)
     lead = _lead(rows)
     _check_law(rows, law, scatter, bool(history.steps[0].levels))

@@ -44,7 +44,8 @@ class plastic_zone:  # noqa: N801 - it is used as a function
 
     def __call__(self, K: ArrayLike) -> Floats:
         """Size for K, length."""
-        return np.asarray(self.factor * numbers(K, "plastic_zone: K") ** 2)[()]
+        with np.errstate(over="ignore"):
+            return np.asarray(self.factor * numbers(K, "plastic_zone: K") ** 2)[()]
 
     @property
     def factor(self) -> float:

@@ -1,0 +1,220 @@
+"""Residual strength: by toughness, by collapse of the section, and by both together."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import brentq
+
+from xcrack.arrays import Floats
+from xcrack.errors import ProblemError
+from xcrack.growth.criteria import clipped, equivalent_K
+from xcrack.history.driving import driving
+from xcrack.history.history import History
+from xcrack.inputs import called, number, numbers, shown
+
+
+@dataclass(frozen=True)
+class assessment_line:  # noqa: N801 - it is used as a function
+    """Failure assessment line of option 1: the largest K_r for L_r.
+
+    Parameters
+    ----------
+    E, sigma_y, sigma_u : float, stress
+        Young's modulus, yield stress and tensile strength, sigma_u >= sigma_y; for steels without
+        a yield plateau.
+
+    Raises
+    ------
+    ProblemError
+        A value that is not positive, or sigma_u < sigma_y.
+
+    Notes
+    -----
+    BS 7910:2013, 7.3.3, from memory: f = (1 + L_r²/2)^(-1/2) [0.3 + 0.7 exp(-µ L_r⁶)] up to
+    L_r = 1, µ = min(0.001 E/σ_y, 0.6); f(1) L_r^((N-1)/(2N)) beyond, N = 0.3 (1 - σ_y/σ_u); 0 from
+    L_r = (σ_y + σ_u)/(2 σ_y) on. Compare it with the document before you rely on it.
+
+    Examples
+    --------
+    >>> line = assessment_line(E=210e3, sigma_y=355.0, sigma_u=510.0)
+    >>> print(line([0.0, 0.5, 1.0]).round(4), round(line.L_max, 4))
+    [1.     0.9367 0.5613] 1.2183
+    """
+
+    E: float
+    sigma_y: float
+    sigma_u: float
+
+    def __post_init__(self) -> None:
+        for name in ("E", "sigma_y", "sigma_u"):
+            value = number(getattr(self, name), f"assessment_line: {name}", above=0)
+            object.__setattr__(self, name, value)
+        if self.sigma_u < self.sigma_y:
+            raise ProblemError(
+                f"assessment_line: sigma_u = {self.sigma_u:g} is below sigma_y = {self.sigma_y:g}: "
+                "give the tensile strength."
+            )
+
+    @property
+    def L_max(self) -> float:  # noqa: N802 - a symbol of the standard
+        """Load over that of yielding, from which the section collapses."""
+        return (self.sigma_y + self.sigma_u) / (2 * self.sigma_y)
+
+    def __call__(self, L_r: ArrayLike) -> Floats:
+        """Largest K_r for L_r."""
+        L = numbers(L_r, "assessment_line: L_r")
+        if (L < 0).any():
+            raise ProblemError(f"assessment_line: L_r = {L.min():g}: give values of at least 0.")
+        mu = min(0.001 * self.E / self.sigma_y, 0.6)
+        N = 0.3 * (1 - self.sigma_y / self.sigma_u)
+
+        def below(L: Floats) -> Floats:
+            return np.asarray((0.3 + 0.7 * np.exp(-mu * L**6)) / np.sqrt(1 + L**2 / 2))
+
+        beyond = 0.0
+        if N > 0:
+            beyond = below(np.ones(1))[0] * np.maximum(L, 1.0) ** ((N - 1) / (2 * N))
+        inside = np.where(L <= 1, below(np.minimum(L, 1.0)), beyond)
+        return np.asarray(np.where(L < self.L_max, inside, 0.0))[()]
+
+    def reserve(self, K_r: float, L_r: float) -> float:
+        """Factor on the load at which the point (K_r, L_r) comes to the line.
+
+        Parameters
+        ----------
+        K_r, L_r : float
+            At the present load, in proportion to it; not negative, not both 0.
+        """
+        K = number(K_r, "assessment_line.reserve: K_r", least=0)
+        L = number(L_r, "assessment_line.reserve: L_r", least=0)
+        if K == L == 0:
+            raise ProblemError("assessment_line.reserve: K_r and L_r are 0: give a load.")
+        if L == 0:
+            return 1.0 / K
+        most = self.L_max / L
+        if K == 0:
+            return most
+
+        def left(factor: float) -> float:
+            return (
+                float(self(np.asarray(min(factor * L, np.nextafter(self.L_max, 0))))) - factor * K
+            )
+
+        if left(most) > 0:
+            return most
+        return float(brentq(left, 0.0, most, xtol=1e-14 * most, rtol=1e-14))
+
+
+def residual_strength(
+    history: History,
+    *,
+    nu: float,
+    K_c: float,
+    collapse: Callable[[float], float] | None = None,
+    line: assessment_line | None = None,
+) -> NDArray[Any]:
+    """Factors on the largest load of a run at which each of its cracks breaks the body.
+
+    Parameters
+    ----------
+    history : History
+        Whose K is in proportion to the load: no steady loads and no initial stress.
+    nu : float
+        Poisson's ratio, for K_eq.
+    K_c : float, stress √length
+        Toughness.
+    collapse : callable a -> factor, optional
+        Factor on the largest load at which the net section yields throughout, for the length that
+        `table` calls a.
+    line : assessment_line, optional
+        With `collapse`: K_r = K/K_c and L_r are joined by it.
+
+    Returns
+    -------
+    (n,) structured array
+        Columns step, N, a, K (largest K_eq of the step), by_toughness (K_c/K), by_collapse and
+        by_line, nan where nothing was given for them.
+
+    Raises
+    ------
+    ProblemError
+        No history, values out of bounds, a line without collapse, a collapse that is not positive.
+    """
+    if not isinstance(history, History):
+        raise ProblemError(f"residual_strength: history = {shown(history)}: give a History.")
+    nu = number(nu, "residual_strength: nu", above=-1, below=0.5)
+    tough = number(K_c, "residual_strength: K_c", above=0)
+    if collapse is not None and not callable(collapse):
+        raise ProblemError(
+            f"residual_strength: collapse = {shown(collapse)}: give a function of a."
+        )
+    if line is not None and (collapse is None or not isinstance(line, assessment_line)):
+        raise ProblemError(
+            f"residual_strength: line = {shown(line)}: give assessment_line, and collapse with it."
+        )
+    rows = driving(history.steps)
+    names = ("step", "N", "a", "K", "by_toughness", "by_collapse", "by_line")
+    result = np.full(len(rows.cycles), np.nan, dtype=[(name, float) for name in names])
+    for n in range(len(rows.cycles)):
+        lead = np.nonzero((rows.step == n) & rows.drives)[0]
+        if not len(lead):
+            continue
+        c, j = rows.place[lead[0]].tolist()
+        step = history.steps[n]
+        K = np.stack([state[c].K[j] for state in step.sif])
+        top = float(equivalent_K(clipped(K), step.angle[c][j], nu).max())
+        a = step.memory.length[c] if step.memory is not None else np.nan
+        by_K = tough / top
+        by_section = by_line = np.nan
+        if collapse is not None:
+            by_section = number(
+                called(collapse, f"the collapse of step {n}", a),
+                "residual_strength: collapse",
+                above=0,
+            )
+        if line is not None:
+            by_line = line.reserve(1 / by_K, 1 / by_section)
+        result[n] = (n, step.cycles, a, top, by_K, by_section, by_line)
+    return result
+
+
+def geometry_factors(history: History, *, stress: float) -> NDArray[Any]:
+    """Table of K over the length, as life codes read it.
+
+    Parameters
+    ----------
+    history : History
+    stress : float, stress
+        Reference stress of the last load state.
+
+    Returns
+    -------
+    structured array
+        Columns step, crack, tip, a (the length that `table` has, over the number of tips), K_I of
+        the last state, and beta = K_I / (stress √(π a)); in 3D K_I is the largest along the front.
+
+    Raises
+    ------
+    ProblemError
+        No history, or a stress that is not positive.
+    """
+    if not isinstance(history, History):
+        raise ProblemError(f"geometry_factors: history = {shown(history)}: give a History.")
+    stress = number(stress, "geometry_factors: stress", above=0)
+    rows = []
+    for step in history.steps:
+        for c, crack in enumerate(step.cracks):
+            sif, tips = step.sif[-1][c], 1 if crack.fronts is not None else len(step.angle[c])
+            length = np.nan if step.memory is None else step.memory.length[c]
+            for place in np.unique(sif.front):
+                K = float(sif.K[sif.front == place, 0].max())
+                a = length / max(tips, 1)
+                rows.append((step.index, c, int(place), a, K, K / (stress * np.sqrt(np.pi * a))))
+    kinds = [(name, int) for name in ("step", "crack", "tip")]
+    return np.array(rows, dtype=[*kinds, *((name, float) for name in ("a", "K_I", "beta"))])
+
+
+__all__ = ["assessment_line", "geometry_factors", "residual_strength"]

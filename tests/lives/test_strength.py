@@ -1,0 +1,185 @@
+"""Residual strength, assessment line, factors of geometry, opening loads, energy release rate."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from support.growth_fakes import STRESS, mode_I, patch_respond, plate
+from xcrack.crack.lines import line_crack
+from xcrack.errors import ProblemError
+from xcrack.growth.criteria import max_hoop_stress
+from xcrack.growth.rating import respond_to_cycle
+from xcrack.growth.run import grow
+from xcrack.growth.step import Cycle
+from xcrack.history.history import History
+from xcrack.laws.power import paris
+from xcrack.lives.assessment import assessment_line, geometry_factors, residual_strength
+from xcrack.lives.opening import opening_load
+from xcrack.mesh.box import box
+from xcrack.scene.conditions import fix, traction
+from xcrack.scene.material import Isotropic
+from xcrack.scene.problem import Problem
+from xcrack.sif.energy import energy_release_rate
+from xcrack.solvers.reuse import Reuse
+from xcrack.spectra.spectrum import Spectrum
+
+LAW = paris(1e-11, 3.0)
+STEEL = assessment_line(E=210e3, sigma_y=355.0, sigma_u=510.0)
+
+
+@pytest.fixture
+def history(monkeypatch):
+    patch_respond(monkeypatch, mode_I())
+    steps = grow(
+        plate(), LAW, max_hoop_stress, Cycle(0.0, 1.0), da=3.0, max_steps=5, progress=False
+    )
+    return History(tuple(steps), "")
+
+
+def test_line_has_the_values_of_its_formula():
+    """(1 + L²/2)^(-1/2) [0.3 + 0.7 exp(-0.5915 L⁶)] worked by hand, and its ends."""
+    assert STEEL(0.0) == 1
+    assert float(STEEL(0.5)) == pytest.approx((0.3 + 0.7 * 0.990800) / np.sqrt(1.125), abs=1e-6)
+    at_1 = (0.3 + 0.7 * np.exp(-210 / 355)) / np.sqrt(1.5)
+    assert float(STEEL(1.0)) == pytest.approx(at_1, rel=1e-14)
+    assert float(STEEL(1 + 1e-9)) == pytest.approx(at_1, rel=1e-6)
+    N = 0.3 * (1 - 355 / 510)
+    assert float(STEEL(1.1)) == pytest.approx(at_1 * 1.1 ** ((N - 1) / (2 * N)), rel=1e-14)
+    assert STEEL.L_max == pytest.approx((355 + 510) / 710)
+    assert np.array_equal(STEEL([STEEL.L_max, 2.0]), [0.0, 0.0])
+    L = np.linspace(0, STEEL.L_max, 200)
+    assert (np.diff(STEEL(L)) <= 0).all()
+    soft = assessment_line(210e3, 200.0, 200.0)  # no hardening: collapse at yield
+    assert soft.L_max == 1
+
+
+@pytest.mark.parametrize(("K_r", "L_r"), [(0.3, 0.2), (0.9, 0.01), (0.01, 0.9), (2.0, 1.5)])
+def test_reserve_leads_to_the_line(K_r, L_r):
+    factor = STEEL.reserve(K_r, L_r)
+    if factor * L_r < STEEL.L_max * (1 - 1e-12):
+        assert factor * K_r == pytest.approx(float(STEEL(factor * L_r)), rel=1e-9)
+    else:
+        assert float(STEEL(STEEL.L_max * (1 - 1e-12))) > factor * K_r
+    assert STEEL.reserve(0.5, 0.0) == 2
+    assert STEEL.reserve(0.0, 0.5) == pytest.approx(STEEL.L_max / 0.5)
+
+
+def test_residual_strength(history):
+    """K = stress √(π a): factors by hand; the joint one is below both."""
+    table = residual_strength(
+        history, nu=0.3, K_c=2000.0, collapse=lambda a: 300.0 / STRESS * (1 - a / 60), line=STEEL
+    )
+    assert table["a"].tolist() == pytest.approx([5.0, 8.0, 11.0, 14.0])
+    assert np.allclose(table["by_toughness"], 2000 / (STRESS * np.sqrt(np.pi * table["a"])))
+    assert np.allclose(table["by_collapse"], 3.0 * (1 - table["a"] / 60))
+    assert (
+        table["by_line"] < np.minimum(table["by_toughness"], STEEL.L_max * table["by_collapse"])
+    ).all()
+    assert (np.diff(table["by_line"]) < 0).all()
+    alone = residual_strength(history, nu=0.3, K_c=2000.0)
+    assert np.isnan(alone["by_line"]).all()
+
+
+def test_factors_of_geometry(history, monkeypatch):
+    """beta = 1 where K = stress √(π a), for one tip and for two."""
+    table = geometry_factors(history, stress=STRESS)
+    assert np.allclose(table["beta"], 1, rtol=1e-12)
+    assert table["a"].tolist() == pytest.approx([5, 8, 11, 14, 17])
+    two = plate([line_crack([(25.0, 0.37), (35.0, 0.37)])])
+    step = next(grow(two, LAW, max_hoop_stress, Cycle(0.0, 1.0), da=1.0, progress=False))
+    assert np.allclose(geometry_factors(History((step,), ""), stress=STRESS)["beta"], 1, rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda h: assessment_line(1.0, 2.0, 1.0), "is below sigma_y"),
+        (lambda h: assessment_line(0.0, 2.0, 3.0), "E = 0"),
+        (lambda h: STEEL(-1.0), "at least 0"),
+        (lambda h: STEEL.reserve(0, 0), "give a load"),
+        (lambda h: STEEL.reserve(-1, 0), "K_r = -1"),
+        (lambda h: residual_strength(3, nu=0.3, K_c=1), "history = 3"),
+        (lambda h: residual_strength(h, nu=0.5, K_c=1), "nu"),
+        (lambda h: residual_strength(h, nu=0.3, K_c=0), "K_c = 0"),
+        (lambda h: residual_strength(h, nu=0.3, K_c=1, line=STEEL), "collapse with it"),
+        (lambda h: residual_strength(h, nu=0.3, K_c=1, collapse=3), "collapse = 3"),
+        (lambda h: residual_strength(h, nu=0.3, K_c=1, collapse=lambda a: -a), "not possible"),
+        (lambda h: geometry_factors(3, stress=1), "history = 3"),
+        (lambda h: geometry_factors(h, stress=0), "stress = 0"),
+        (lambda h: opening_load(3), "step = 3"),
+        (lambda h: opening_load(h.steps[0]), "no levels"),
+        (lambda h: energy_release_rate(3, Isotropic(1.0, 0.3)), "sif = 3"),
+        (lambda h: energy_release_rate(h.steps[0].sif[0][0], 3), "material = 3"),
+    ],
+)
+def test_bad_input(history, make, words):
+    with pytest.raises(ProblemError, match=words):
+        make(history)
+
+
+def test_energy_release_rate(history):
+    """Irwin's relation with K of 100, 50 and 30; plane stress has E, others E / (1 - nu²)."""
+    sif = history.steps[0].sif[1][0]
+    flat = replace(sif, K=np.array([[100.0, 50.0]]))
+    for plane, E in (("stress", 2e5), ("strain", 2e5 / 0.91)):
+        G = energy_release_rate(flat, Isotropic(2e5, 0.3, plane))
+        assert G == pytest.approx(12500.0 / E, rel=1e-14)
+
+
+# --- opening, with contact -----------------------------------------------------------------------
+
+
+def bent(levels="auto"):
+    """An edge crack in tension that steady bending presses shut."""
+    mesh = box((0.0, -10.0), (20.0, 10.0), (14, 15))
+
+    def bending(x):
+        return np.stack([0 * x[:, 0], 6.0 * (x[:, 0] - 10.0)], axis=1)
+
+    problem = Problem(
+        mesh,
+        Isotropic(E=210e3, nu=0.3, plane="strain"),
+        cracks=[line_crack([(0.0, 0.4), (6.0, 0.4)])],
+        supports=[fix((20.0, -10.0)), fix((20.0, 10.0), axis=0)],
+        loads=[traction("top", (0.0, 100.0)), traction("bottom", (0.0, -100.0))],
+    )
+    steady = [traction("top", bending), traction("bottom", lambda x: -bending(x))]
+    factors = np.random.default_rng(20265).uniform(0.0, 1.0, 60)
+    factors[[2, 5]] = 0.0, 1.0
+    return problem, Spectrum(factors, steady=steady, levels=levels)
+
+
+@pytest.mark.filterwarnings("ignore::xcrack.XcrackWarning")
+def test_opening_load_is_where_the_tip_opens():
+    """Against 65 levels; the refined ones are close to the knee. U as the share of the range."""
+    step = {}
+    for levels in ("auto", 65):
+        problem, spectrum = bent(levels)
+        step[levels] = next(grow(problem, LAW, max_hoop_stress, spectrum, da=1.0, progress=False))
+    coarse, fine = opening_load(step["auto"]), opening_load(step[65])
+    level = float(fine.level[0][0])
+    assert 0.05 < level < 0.6
+    assert float(coarse.level[0][0]) == pytest.approx(level, abs=0.02)
+    assert float(coarse.U[0][0]) == pytest.approx(1 - level, abs=0.02)
+    assert 0 < coarse.between[0][0] <= 0.25
+    K = {}
+    problem, spectrum = bent()
+    for factor in (level - 0.03, level + 0.03):
+        cycle = Spectrum([factor, 1.0], steady=spectrum.steady)
+        K[factor] = respond_to_cycle(problem, cycle, None, Reuse())[1][0][0].K[0, 0]
+    below, above = K.values()
+    assert below < 2e-2 * step[65].sif[-1][0].K[0, 0]
+    assert above > below
+
+
+@pytest.mark.filterwarnings("ignore::xcrack.XcrackWarning")
+def test_scaled_histories_open_at_zero():
+    problem, _ = bent()
+    plain = Spectrum([-0.5, 1.0, 0.2, 0.4])
+    step = next(grow(problem, LAW, max_hoop_stress, plain, da=1.0, progress=False))
+    assert opening_load(step).level[0][0] == 0
+    assert opening_load(step).U[0][0] == pytest.approx(2 / 3)
+    pulled = Spectrum([0.2, 1.0, 0.4, 0.6])
+    step = next(grow(problem, LAW, max_hoop_stress, pulled, da=1.0, progress=False))
+    assert opening_load(step).U[0][0] == 1
