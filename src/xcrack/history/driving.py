@@ -13,6 +13,7 @@ from xcrack.growth.cycles import cycles_between
 from xcrack.growth.step import Step, memory_of, moved_places
 from xcrack.laws.law import Law
 
+_FOLLOWS = 0.01  # of an advance: a crack that turns is a little shorter than the sum of its steps
 _NEAR = 0.5  # of an advance: a place that is taken for the one that it moved to
 
 
@@ -51,6 +52,13 @@ class Driving:
     size: Floats
     spread: Floats
     cycles: Floats
+
+    @property
+    def is_one_tip(self) -> bool:
+        """Whether the driving places of the steps follow each other, as those of one tip."""
+        lead = self.drives
+        a, da = self.a[lead], self.da[lead]
+        return bool((np.abs(a[1:, 0] - a[:-1, 1]) <= _FOLLOWS * da[1:]).all())
 
     def rates(self, law: Law, factor: float | Floats = 1.0) -> Floats:
         """What a law says of all rows `(k, 2)`, with ranges times a factor."""

@@ -148,7 +148,7 @@ def growth_curve(history: History) -> GrowthCurve:
     rows = driving(history.steps)
     lead = rows.drives
     a, rate, step = rows.a[lead], rows.rate[lead], rows.step[lead]
-    if not np.allclose(a[1:, 0], a[:-1, 1], rtol=1e-9):
+    if not rows.is_one_tip:
         raise ProblemError(
             "growth_curve: more than one tip drives the run: give the part of the history in which "
             "one does, History(history.steps[:n], ended='')."

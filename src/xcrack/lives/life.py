@@ -209,7 +209,7 @@ def _ranks(draw: np.random.Generator, n: int) -> Floats:
 
 
 def _checked_sizes(lead: Driving, sizes: Floats) -> Floats:
-    if len(np.unique(lead.place, axis=0)) > 1 or not np.allclose(lead.a[1:, 0], lead.a[:-1, 1]):
+    if len(np.unique(lead.place, axis=0)) > 1 or not lead.is_one_tip:
         raise ProblemError(
             "life: a0 varies, but several tips drive the run: its path belongs to the cracks "
             "that it began with. Run it for other cracks."
@@ -287,8 +287,7 @@ def _ends(N: Floats) -> tuple[float, float]:
 
 def _of_steps(lead: Driving) -> float:
     """A third of what every second step adds, as a share; nan where one place does not last."""
-    joined = np.allclose(lead.a[1:, 0], lead.a[:-1, 1], rtol=1e-9)
-    if len(lead.step) < 4 or not joined or not np.isfinite(lead.rate).all():
+    if len(lead.step) < 4 or not lead.is_one_tip or not np.isfinite(lead.rate).all():
         return float("nan")
     n = len(lead.step) // 2 * 2
     a = np.stack([lead.a[0:n:2, 0], lead.a[1:n:2, 1]], axis=1)

@@ -93,7 +93,7 @@ def retarded(
     limit = number(max_blocks, "retarded: max_blocks", above=0)
     nu = number(nu, "retarded: nu", above=-1, below=0.5)
     rows = driving(history.steps)
-    if len(np.unique(rows.step)) < len(rows.step) or not _joined(rows):
+    if len(np.unique(rows.step)) < len(rows.step) or not rows.is_one_tip:
         raise ProblemError(
             "retarded: several tips grow in this history: retardation along a stored path is for "
             "one tip, whose path does not depend on its rate."
@@ -139,10 +139,6 @@ def _check(history: object, law: object, spectrum: object, model: object) -> Non
         )
     if not all(step.levels for step in history.steps):
         raise ProblemError("retarded: the history was not made with a Spectrum of factors.")
-
-
-def _joined(rows: Driving) -> bool:
-    return bool(np.allclose(rows.a[1:, 0], rows.a[:-1, 1], rtol=1e-9))
 
 
 def _ends(
