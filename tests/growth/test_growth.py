@@ -282,7 +282,12 @@ def test_time_that_is_left(monkeypatch, capsys):
 def test_ends_where_the_tip_leaves_the_body(monkeypatch):
     patch_respond(monkeypatch, mode_I())
     steps, ended = run(grow(plate(), LAW, max_hoop_stress, CYCLE, da=20.0))
-    assert ended == "tip left the body: crack 0, tip 0 at (45, 0.37)"
+    assert ended.startswith(
+        "tip left the body: crack 0, tip 0 at (45, 0.37), 15 from 'right' at (60, 0.37): "
+    )
+    ligament = 15 / steps[-1].rate[0][0]
+    assert f"{ligament:.4g} cycles at its last rate" in ended
+    assert ended.endswith(f"N = {steps[-1].cycles + ligament:.6g}")
     assert len(steps) == 3
 
 
@@ -328,7 +333,8 @@ def test_cracks_that_meet_end_the_run(monkeypatch):
     monkeypatch.setattr(growth, "respond", respond)
     steps, ended = run(grow(two_cracks(), LAW, max_hoop_stress, CYCLE, da=3.0))
     assert len(steps) == 3
-    assert ended == "the cracks cannot go on after step 2: cracks 0 and 1 cross"
+    assert ended.startswith("the cracks cannot go on after step 2, N = ")
+    assert ended.endswith(": cracks 0 and 1 cross")
 
 
 def test_ends_where_nothing_grows(monkeypatch):

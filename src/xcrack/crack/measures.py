@@ -133,7 +133,7 @@ def measures(crack: Crack, mesh: Mesh) -> Measures:
     if crack.dim != mesh.dim:
         raise GeometryError(f"measures: a crack of {crack.dim}D in a body of {mesh.dim}D.")
     own = crack if crack.placed else placed(crack, mesh)
-    names, group = _named(mesh)
+    names, group = facet_names(mesh)
     area, front_length, traces, ends = _BY_DIMENSION[mesh.dim](own, mesh, group)
     rows = [Trace(names[k], *traces[k]) for k in sorted(traces, key=lambda k: names[k])]
     depth = max((row.depth for row in rows), default=float("nan"))
@@ -141,8 +141,19 @@ def measures(crack: Crack, mesh: Mesh) -> Measures:
     return Measures(area, front_length, depth, tuple(rows), tuple(points))
 
 
-def _named(mesh: Mesh) -> tuple[list[str], Ints]:
-    """Names of sets, and for each facet of the mesh the number of its smallest set."""
+def facet_names(mesh: Mesh) -> tuple[list[str], Ints]:
+    """Names of sets, and for each facet of the mesh the number of its smallest set.
+
+    Parameters
+    ----------
+    mesh : Mesh
+
+    Returns
+    -------
+    names : list of str
+    group : (f,) array of int
+        0, which is "boundary", for facets in no other set.
+    """
     sets = sorted(mesh.facet_sets.items(), key=lambda item: -len(item[1]))
     # "boundary" has all: any other set of as many facets is more telling.
     sets = sorted(sets, key=lambda item: item[0] != "boundary")

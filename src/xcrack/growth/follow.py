@@ -30,6 +30,9 @@ class Following(Protocol):
     def left(self, where: Sequence[str], cracks: Sequence[int]) -> str:
         """Why a run ends after these places of these cracks have left the body."""
 
+    def exit_ahead(self, x: Floats, ahead: Floats, mesh: Mesh) -> tuple[Floats, str] | None:
+        """Where a tip that runs straight meets the boundary, and the facet set there."""
+
     def followed(
         self,
         last: Step,

@@ -8,6 +8,7 @@ from scipy.spatial import cKDTree
 from xcrack.arrays import Floats, Ints
 from xcrack.crack.advance_2d import advance
 from xcrack.crack.crack import Crack
+from xcrack.crack.measures import facet_names
 from xcrack.crack.size_2d import length_inside
 from xcrack.growth.advance import LEAST, PerCrack
 from xcrack.growth.cycles import elapsed
@@ -43,6 +44,23 @@ def left(where: Sequence[str], cracks: Sequence[int]) -> str:
     return "tip left the body: " + "; ".join(where)
 
 
+def exit_ahead(x: Floats, ahead: Floats, mesh: Mesh) -> tuple[Floats, str] | None:
+    """Where a tip that runs straight meets the boundary, and the facet set there."""
+    facet = np.nonzero(mesh.facet_to_cell[:, 1] < 0)[0]
+    start, stop = mesh.points[mesh.facets[facet]].transpose(1, 0, 2)
+    side, gap = stop - start, start - x
+    cross = ahead[0] * side[:, 1] - ahead[1] * side[:, 0]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        far = (gap[:, 0] * side[:, 1] - gap[:, 1] * side[:, 0]) / cross
+        share = (gap[:, 0] * ahead[1] - gap[:, 1] * ahead[0]) / cross
+    hit = (cross != 0) & (share >= 0) & (share <= 1) & (far > 0)
+    if not hit.any():
+        return None
+    first = int(np.argmin(np.where(hit, far, np.inf)))
+    names, group = facet_names(mesh)
+    return x + far[first] * ahead, names[group[facet[first]]]
+
+
 def followed(
     last: Step,
     cracks: Sequence[Crack],
@@ -76,4 +94,13 @@ def _matched(moved: Floats, tips: Floats) -> Ints:
     return np.where(distance <= _SAME * np.abs(tips).max(), row, -1)
 
 
-__all__ = ["PLACE", "WAITS_BELOW", "advanced", "crack_size", "followed", "gone", "left"]
+__all__ = [
+    "PLACE",
+    "WAITS_BELOW",
+    "advanced",
+    "crack_size",
+    "exit_ahead",
+    "followed",
+    "gone",
+    "left",
+]

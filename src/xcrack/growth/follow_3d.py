@@ -47,6 +47,12 @@ def left(where: Sequence[str], cracks: Sequence[int]) -> str:
     return "front left the body: crack " + ", ".join(str(c) for c in cracks)
 
 
+def exit_ahead(x: Floats, ahead: Floats, mesh: Mesh) -> tuple[Floats, str] | None:
+    """None: a front leaves the body along a line, not at a place."""
+    del x, ahead, mesh
+    return None
+
+
 def followed(
     last: Step,
     cracks: Sequence[Crack],
@@ -126,4 +132,14 @@ def _closed(crack: Crack) -> list[bool]:
     return [bool(front[0] == front[-1]) for front in crack.fronts or ()]
 
 
-__all__ = ["PLACE", "WAITS_BELOW", "advanced", "carried", "crack_size", "followed", "gone", "left"]
+__all__ = [
+    "PLACE",
+    "WAITS_BELOW",
+    "advanced",
+    "carried",
+    "crack_size",
+    "exit_ahead",
+    "followed",
+    "gone",
+    "left",
+]

@@ -160,19 +160,23 @@ def _after(run: Run, last: Step, reuse: Reuse) -> tuple[Step | None, Reuse, str]
         cracks = integrator_of(run).advanced(run, last)
         problem = _problem(run, cracks, memory_of(last))
     except GeometryError as error:
-        return None, reuse, f"the cracks cannot go on after step {last.index}: {error}"
+        return None, reuse, _stopped(last, error)
     gone = _gone(run, cracks, problem.placed)
     if not any(placed.n_tips for placed in problem.placed):
         return None, reuse, left_the_body(run, last, gone)
     try:
         return *_next_step(run, problem, last, reuse, memory_of(last).settings), ""
     except GeometryError as error:
-        return None, reuse, f"the cracks cannot go on after step {last.index}: {error}"
+        return None, reuse, _stopped(last, error)
     except XcrackError as error:
         if not gone:
             raise
         left = left_the_body(run, last, gone)
         return None, reuse, f"{left}, and the body cannot be solved without it: {error}"
+
+
+def _stopped(last: Step, error: Exception) -> str:
+    return f"the cracks cannot go on after step {last.index}, N = {last.cycles:.6g}: {error}"
 
 
 def _warn_of_ratio(run: Run, first: Step) -> None:
