@@ -11,6 +11,7 @@ from fuzz.entry import Entry, Hook, Late, arg
 from fuzz.kinds import (
     Called,
     Filename,
+    Flag,
     Number,
     Numbers,
     Of,
@@ -48,12 +49,12 @@ def axis_sets(value):
     )
 
 
-def _read_mesh(path):
+def _read_mesh(path, **named):
     xc.write_mesh("there.msh", scenes.mesh(), msh_version="2.2")
     text = Path("there.msh").read_text()
     for name, content in _damaged(text).items():
         Path(f"{name}.msh").write_text(content)
-    return xc.read_mesh(path)
+    return xc.read_mesh(path, **named)
 
 
 def _damaged(text):
@@ -139,6 +140,11 @@ ENTRIES = [
                     "none": lambda: {"a": None},
                 },
             ),
+            "curves": arg(
+                Seen(rule=lambda v: isinstance(v, dict) and not v),
+                {},
+                near={"unknown": lambda: {"b": np.copy}, "no function": lambda: {"boundary": 1.0}},
+            ),
         },
     ),
     Entry(
@@ -205,7 +211,8 @@ ENTRIES = [
                 "there.msh",
                 near=paths(".msh", ".msh") | DAMAGED,
                 words=["mesh file", "triangles"],
-            )
+            ),
+            "strict": arg(Flag(), False, True),
         },
         in_folder=True,
     ),

@@ -159,6 +159,9 @@ ENTRIES = [
             "limits": arg(Seen(rule=limits), None, (0.0, 1.0)),
             "cmap": arg(Word(optional=True, words=("RdBu", "viridis")), None, "RdBu"),
             "crack": arg(Whole(optional=True, least=0, most=0), None, 0),
+            "zoom": arg(
+                Number(optional=True, above=0, rule=lambda v: 1 <= v <= 10 or None), None, 2.0
+            ),
             "clip": arg(Seen(rule=lambda v: v is None), None),
             "view": arg(Seen(rule=lambda v: v is None), None),
             "loads": arg(Flag(rule=None), False),

@@ -9,6 +9,7 @@ import xcrack as xc
 from fuzz import scenes
 from fuzz.entry import Entry, Hook, arg
 from fuzz.kinds import (
+    SKIP,
     Called,
     Filename,
     Number,
@@ -56,6 +57,14 @@ PLATE = {
     "band": arg(Number(optional=True, rule=lambda v: v >= 0 and (v < 1 or None)), None, 0.3),
     "transition": arg(Number(optional=True, rule=lambda v: v >= 0 and (v > 0.1 or None)), None, 2),
 }
+
+
+def _length(v, most=np.inf):
+    """A length of the bar may fit or not; cells between these sizes take gmsh minutes."""
+    if 1e-3 < v < 4:
+        return SKIP
+    return None if 0 <= v <= most else False
+
 
 BAR = {
     "diameter": 20.0,
@@ -155,14 +164,14 @@ ENTRIES = [
         {
             **{
                 name: arg(
-                    Number(rule=lambda v, good=value: None if 0 < v <= 2 * good else False),
+                    Number(rule=lambda v, good=value: _length(v, 2 * good)),
                     value,
                     words=["station", "size", "notch", "bar", "patch", "span", "inner", "outer"],
                 )
                 for name, value in BAR.items()
             },
             **{
-                name: arg(Number(optional=True, rule=lambda v: None if v >= 0 else False), None)
+                name: arg(Number(optional=True, rule=_length), None)
                 for name in ("size_near", "patch_length", "crack_depth", "band", "transition")
             },
         },

@@ -7,7 +7,7 @@ import numpy as np
 
 import xcrack as xc
 from fuzz import scenes
-from fuzz.entry import Entry, Hook, Late, arg
+from fuzz.entry import Bad, Entry, Hook, Late, arg
 from fuzz.kinds import (
     Called,
     Filename,
@@ -114,7 +114,8 @@ GROW = {
         Number(optional=True, above=0, rule=lambda v: True if 0.1 <= v <= 0.3 else None), 0.2
     ),
     "cycles": arg(Number(optional=True, above=0, rule=lambda v: None), None),
-    "scaling": arg(Word(words=("law",)), "law"),
+    "scaling": arg(Word(words=("law", "linear")), "law", "linear"),
+    "integrator": arg(Word(words=("pec", "euler")), "pec", "euler"),
     "threshold": arg(Number(least=0), 0.0, 0.1),
     "K_c": arg(Number(optional=True, above=0), None, 1e3),
     "max_steps": arg(
@@ -222,6 +223,17 @@ ENTRIES = [
                 name: arg(Seen(rule=_per_crack), [[0.1]])
                 for name in ("angle", "dK_eq", "R", "rate", "da")
             },
+            "solutions": arg(
+                ListOf(item=Of(type=xc.Solution)), (), Late(lambda: [scenes.solution()])
+            ),
+            "corrected": arg(
+                ListOf(item=Of(type=xc.Crack), rule=lambda v: len(v) < 2),
+                (),
+                Late(lambda: [scenes.crack()]),
+            ),
+            "levels": arg(Numbers((None,)), (), [0.0, 1.0]),
+            "memory": arg(Seen(rule=lambda v: v is None), None),
+            "error": arg(Seen(rule=lambda v: v is None), None),
         },
     ),
     Entry(
@@ -278,7 +290,20 @@ ENTRIES = [
                 words=["run"],
             ),
             "problem": arg(Seen(rule=lambda v: v is scenes.growing()), Late(scenes.growing)),
-            "law": arg(Called(), xc.paris(1e-3, 2.0), near={"other": lambda: xc.paris(2e-3, 2.0)}),
+            "law": arg(
+                Called(), xc.paris(1e-3, 2.0), near={"other": Bad(lambda: xc.paris(2e-3, 2.0))}
+            ),
+            "criterion": arg(
+                Called(), xc.max_hoop_stress, near={"other": Bad(lambda: xc.weighted_angle)}
+            ),
+            "cycles": arg(Seen(rule=lambda v: v is None), None),
+            "integrator": arg(Word(words=("pec",)), "pec"),
+            "solver": arg(Called(optional=True), None),
+            "progress": arg(Flag(also=(Word(words=("always",)),)), False),
+            "K_c": arg(Number(optional=True, above=0), None, 1e3),
+            "max_steps": arg(Whole(least=1, rule=lambda v: v < 3 or None, far=2), 2),
+            "max_cycles": arg(Number(optional=True, above=0), None, 1e6),
+            "until": arg(Called(optional=True), None),
             "cycle": arg(
                 Seen(rule=lambda v: isinstance(v, xc.Cycle) and v.load_states == (0.0, 1.0)),
                 xc.Cycle(0.0, 1.0),

@@ -76,6 +76,8 @@ class Kind:
         if thing is None:
             return NONSENSE
         answer = True if self.rule is None else self.rule(thing)
+        if isinstance(answer, str):
+            return answer
         return EDGE if answer is None else VALID if answer else NONSENSE
 
     def read(self, value):

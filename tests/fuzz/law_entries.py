@@ -52,7 +52,13 @@ THRESHOLD = arg(
     xc.klesnil_lukas(6.0, 0.5),
 )
 COMMON = {"ratio": RATIO, "R_range": R_RANGE}
-SHAPE = {"threshold": THRESHOLD, "K_c": K_c, **COMMON}
+WAY = arg(
+    Seen(
+        rule=lambda v: True if isinstance(v, str) and v == "cut" else None if approach(v) else False
+    ),
+    "cut",
+)
+SHAPE = {"threshold": THRESHOLD, "approach": WAY, "K_c": K_c, **COMMON}
 RANGES = arg(Numbers(least=0.0, rule=lambda x: x.ndim == 0 or None), 10.0, [20.0])
 RATES = {
     "dK_eq": RANGES,
@@ -194,6 +200,7 @@ ENTRIES = [
             "C": POSITIVE,
             "m": POSITIVE,
             "K_c": arg(Number(above=0), 80.0),
+            "approach": WAY,
             "threshold": THRESHOLD,
             **COMMON,
         },

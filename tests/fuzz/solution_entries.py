@@ -8,6 +8,7 @@ from fuzz import scenes
 from fuzz.entry import Entry, Hook, Late, arg
 from fuzz.kinds import (
     Called,
+    Flag,
     ListOf,
     Number,
     Numbers,
@@ -127,6 +128,7 @@ ENTRIES = [
             "problem": arg(Of(type=xc.Problem), Late(scenes.problem)),
             "states": arg(STATES, None, [1.0], [0.0, 0.5, scenes.PULL], words=["load"]),
             "solver": arg(Called(optional=True), None),
+            "error": arg(Flag(), False, True),
         },
         cost=0.06,
     ),
@@ -194,7 +196,10 @@ ENTRIES = [
         {"name": arg(Word(words=("tip functions", "supports")), "supports", words=["ingredient"])},
     ),
     Entry(
-        "stress_intensity", xc.stress_intensity, {"solution": WITH_CRACK, "crack": CRACK}, cost=0.03
+        "stress_intensity",
+        xc.stress_intensity,
+        {"solution": WITH_CRACK, "crack": CRACK, "error": arg(Flag(optional=True), None, False)},
+        cost=0.03,
     ),
     Entry(
         "stress_intensities",
@@ -206,10 +211,19 @@ ENTRIES = [
                 Late(lambda: [scenes.solution()]),
             ),
             "crack": CRACK,
+            "error": arg(Flag(optional=True), None, True),
         },
         cost=0.04,
     ),
-    Entry("SIF", xc.SIF, SIF),
+    Entry("SIF", xc.SIF, SIF | {"errors": arg(Seen(rule=lambda v: v is None), None)}),
+    Entry(
+        "measures",
+        xc.measures,
+        {
+            "crack": arg(Seen(rule=lambda v: v is scenes.crack()), Late(scenes.crack)),
+            "mesh": arg(Seen(rule=lambda v: v is scenes.mesh()), Late(scenes.mesh), words=["body"]),
+        },
+    ),
     Entry(
         "energy_error",
         xc.energy_error,

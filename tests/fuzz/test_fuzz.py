@@ -17,6 +17,8 @@ _EXEMPT = {
     **dict.fromkeys(("save", "measures"), "tests/history and tests/crack draw theirs"),
 }  # fmt: skip
 
+_MADE_BY_XCRACK = ("Solution",)  # by solve, from parts that users do not have
+
 
 def report(counts, faults, capsys, seed):
     with capsys.disabled():
@@ -49,6 +51,15 @@ def test_every_public_name_is_in_the_table():
     assert public - named - set(_EXEMPT) == set()
     assert not named & set(_EXEMPT)
     assert {name for name in named if "." not in name} <= public
+
+
+def test_every_argument_is_in_the_table():
+    arguments = {}
+    for one in TABLE:
+        arguments.setdefault(one.name, set()).update(getattr(one, "arguments", ()))
+    for name in set(xc.__all__) - set(_EXEMPT) - set(_MADE_BY_XCRACK):
+        missing = set(inspect.signature(getattr(xc, name)).parameters) - arguments[name]
+        assert not missing, f"{name}: {missing}"
 
 
 def test_every_method_of_public_values_is_in_the_table():

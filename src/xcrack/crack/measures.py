@@ -131,7 +131,9 @@ def measures(crack: Crack, mesh: Mesh) -> Measures:
             f"{type(mesh).__name__}."
         )
     if crack.dim != mesh.dim:
-        raise GeometryError(f"measures: a crack of {crack.dim}D in a body of {mesh.dim}D.")
+        raise GeometryError(
+            f"measures: a crack of {crack.dim}D needs a body of {crack.dim}D, not {mesh.dim}D."
+        )
     own = crack if crack.placed else placed(crack, mesh)
     names, group = facet_names(mesh)
     area, front_length, traces, ends = _BY_DIMENSION[mesh.dim](own, mesh, group)

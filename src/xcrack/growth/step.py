@@ -202,6 +202,12 @@ class Step:
                 f"Step: corrected = {shown(self.corrected)}: give a Crack for each of `cracks`."
             )
         object.__setattr__(self, "corrected", moved)
+        for solution in entries(self.solutions, "Step: solutions"):
+            if not isinstance(solution, Solution):
+                raise ProblemError(
+                    f"Step: solutions: {shown(solution)} is none: give what solve returns."
+                )
+        numbers(self.levels, "Step: levels", (None,))
         if not isinstance(self.error, StepError | None):
             raise ProblemError(f"Step: error = {shown(self.error)}: that is made by grow.")
         states = [entries(state, "Step: sif") for state in entries(self.sif, "Step: sif")]

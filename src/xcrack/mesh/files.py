@@ -14,7 +14,7 @@ import numpy as np
 
 from xcrack.arrays import Floats, Ints
 from xcrack.errors import GeometryError, MeshError, XcrackError, warn
-from xcrack.inputs import one_of
+from xcrack.inputs import flag, one_of
 from xcrack.mesh.abaqus import abaqus_text, read_abaqus
 from xcrack.mesh.linear import SHAPES, base_kind, linearised
 from xcrack.mesh.mesh import Mesh
@@ -87,6 +87,7 @@ def read_mesh(path: str | PathLike[str], *, strict: bool = False) -> Mesh:
     >>> read_mesh(path)
     Mesh(9 points, 8 triangles, facet sets: left, right, bottom, top, boundary)
     """
+    strict = flag(strict, "read_mesh: strict", error=MeshError)
     path = existing_file(path, "mesh")
     with system_errors("cannot read the mesh file", path):
         if path.suffix.lower() == ".inp":
