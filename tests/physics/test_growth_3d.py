@@ -56,9 +56,9 @@ def distance_to_line(x, line):
 
 
 def check_frozen(steps):
-    """Points and faces of a step are the first ones of the next, to the last bit."""
+    """Points and faces of a corrected step are the first ones of the next, to the last bit."""
     for old, new in zip(steps, steps[1:]):
-        for before, after in zip(old.cracks, new.cracks, strict=True):
+        for before, after in zip(old.corrected, new.cracks, strict=True):
             n, m = len(before.points), len(before.faces)
             assert after.points[:n].tobytes() == before.points.tobytes()
             assert after.faces[:m].tobytes() == before.faces.tobytes()
@@ -82,11 +82,11 @@ def check_front(step, size, *, closed=True):
 # An inclined penny turns across the load ------------------------------------------------------
 
 
-@pytest.fixture(scope="module")
-def turned_penny():
+@pytest.fixture(scope="module", params=["pec", "euler"])
+def turned_penny(request):
     run = xc.grow(
         inclined(14), LAW, xc.max_hoop_stress, xc.Cycle(0.0, 1.0), da=0.06, max_steps=5,
-        progress=False,
+        progress=False, integrator=request.param,
     )  # fmt: skip
     return list(run)
 
@@ -104,6 +104,8 @@ def test_inclined_penny_keeps_its_front_and_its_surface(turned_penny):
 @pytest.mark.mission
 def test_inclined_penny_moves_as_the_criterion_asks(turned_penny):
     """New fronts pass through x + da (cos b t + sin b n): fairing and spacing within 5 % of da."""
+    if turned_penny[0].memory.trail is not None:
+        pytest.skip("of second order the front starts from its corrected place")
     for old, new in zip(turned_penny, turned_penny[1:]):
         sif, beta, da = old.sif[0][0], old.angle[0][:, None], old.da[0][:, None]
         moved = sif.x + da * (np.cos(beta) * sif.frame[:, 0] + np.sin(beta) * sif.frame[:, 1])
@@ -172,6 +174,34 @@ def test_penny_across_the_load_stays_round():
     assert radius.mean() == pytest.approx(0.4 + first.da[0].mean(), abs=0.03 * 0.12)
     assert radius.std() <= 0.03 * 0.12
     assert np.abs(x[:, 2]).max() <= 0.1 * 0.12  # K_II of the mesh turns the path by that
+
+
+@pytest.mark.slow
+@pytest.mark.mission
+def test_an_ellipse_becomes_a_circle_in_few_steps():
+    """Four steps against eight: shape off by 0.4 % of the length grown, Euler's rule 1.9 %."""
+    x, y = CENTER[:2]
+    shape, life = {}, {}
+    for integrator, steps in (("pec", 4), ("euler", 4), ("pec", 8)):
+        crack = xc.elliptic_crack(CENTER, (0, 0, 1), (1, 0, 0), 0.42, 0.25, n=64)
+        run = xc.grow(
+            in_cube(16, crack, contact="off"), LAW, xc.max_hoop_stress, xc.Cycle(0.0, 1.0),
+            da=0.2 / steps, max_steps=steps + 1, progress=False, integrator=integrator,
+        )  # fmt: skip
+        history = xc.collect(run, keep_solutions=False)
+        front = history.cracks[0].points[history.cracks[0].fronts[0][:-1]]
+        angle = np.arctan2(front[:, 1] - y, front[:, 0] - x)
+        radius = np.hypot(front[:, 0] - x, front[:, 1] - y)
+        order = np.argsort(angle)
+        even = np.linspace(-np.pi, np.pi, 180, endpoint=False)
+        own = np.interp(even, angle[order], radius[order], period=2 * np.pi)
+        shape[integrator, steps], life[integrator, steps] = own, history.life
+    off = {key: np.sqrt(((r - shape["pec", 8]) ** 2).mean()) / 0.2 for key, r in shape.items()}
+    late = {key: N / life["pec", 8] - 1 for key, N in life.items()}
+    print({key: (f"{100 * off[key]:.2f} %", f"{100 * late[key]:+.2f} %") for key in off})
+    assert off["pec", 4] <= 7e-3
+    assert off["euler", 4] > 1.5e-2
+    assert abs(late["pec", 4]) <= 5e-3
 
 
 # Contact, and kill and resume -----------------------------------------------------------------

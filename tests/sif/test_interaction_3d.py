@@ -261,16 +261,29 @@ def test_mean_of_lumped_and_consistent_mass_is_of_order_four():
 
 @pytest.mark.parametrize("closed", [True, False])
 def test_smoothing_keeps_quadratics_and_damps_scatter(closed):
-    rng = np.random.default_rng(71)
-    s = np.sort(rng.uniform(0, 3, 20))
+    s = 0.15 * np.arange(20)
     K = np.stack([1 + s, s * s - 0.3, 2 - s + 3 * s * s], axis=1)
     if closed:
-        np.testing.assert_allclose(smoothed(0 * K + 2.5, s, 3.2), 2.5, rtol=1e-12)
-        return
-    np.testing.assert_allclose(smoothed(K, s, None), K, atol=1e-11)
-    s = np.linspace(0, 3, 200)
-    scatter = rng.normal(size=(200, 3))
-    assert smoothed(scatter, s, None).std() < 0.75 * scatter.std()  # sqrt(17/35) = 0.70
+        np.testing.assert_allclose(smoothed(0 * K + 2.5, s, 3.0), 2.5, rtol=1e-12)
+    else:
+        np.testing.assert_allclose(smoothed(K, s, None), K, atol=1e-11)
+        two = np.concatenate([s, s + 10])  # nothing is carried across a gap
+        both = np.concatenate([K, 7 * K])
+        np.testing.assert_allclose(smoothed(both, two, None), both, atol=1e-11)
+    scatter = np.random.default_rng(71).normal(size=(200, 3))
+    period = 3.0 if closed else None
+    assert smoothed(scatter, np.linspace(0, 3, 200), period).std() < 0.8 * scatter.std()
+
+
+def test_smoothing_turns_no_wave_over():
+    """Waves of n places by 1/(1 + 0.05 (2 sin(pi/n))^6): a zigzag falls to a quarter."""
+    n, s = 60, np.arange(60.0)
+    for waves in (1, 6, 10, 20, 30):
+        wave = np.cos(2 * np.pi * waves * s / n)
+        K = np.repeat(wave[:, None], 3, axis=1)
+        share = 1 / (1 + 0.05 * (2 * np.sin(np.pi * waves / n)) ** 6)
+        np.testing.assert_allclose(smoothed(K, s, 60.0)[:, 0], share * wave, atol=1e-12)
+        assert (smoothed(K, s, None)[:, 0] @ wave) > 0
 
 
 def test_values_along_the_front():

@@ -11,6 +11,7 @@ from xcrack.arrays import Floats
 from xcrack.crack.crack import Crack
 from xcrack.growth.advance import PerCrack
 from xcrack.growth.follow import following
+from xcrack.growth.front_trail import FrontTrail
 from xcrack.growth.options import Run
 from xcrack.growth.rating import rates_of
 from xcrack.growth.step import StepError
@@ -74,7 +75,7 @@ class Settled:
         Where growth goes on.
     da, pending : tuple of (f,) arrays, length
         As of `Step` and `Memory`.
-    trail : Trail, optional
+    trail : Trail or FrontTrail, optional
     error : StepError, optional
     """
 
@@ -82,7 +83,7 @@ class Settled:
     corrected: tuple[Crack, ...]
     da: PerCrack
     pending: PerCrack
-    trail: Trail | None = None
+    trail: Trail | FrontTrail | None = None
     error: StepError | None = None
 
 

@@ -3,7 +3,7 @@
 from typing import Protocol
 
 from xcrack.crack.crack import Crack
-from xcrack.growth import euler, pec_2d
+from xcrack.growth import euler, pec_2d, pec_3d
 from xcrack.growth.advance import Advance
 from xcrack.growth.evaluation import Evaluation, Settled
 from xcrack.growth.options import Run
@@ -11,7 +11,7 @@ from xcrack.growth.step import Step
 
 
 class Integrator(Protocol):
-    """What a run asks of an integrator; `euler` and `pec_2d` have it."""
+    """What a run asks of an integrator; `euler`, `pec_2d` and `pec_3d` have it."""
 
     def begun(self, run: Run, seen: Evaluation) -> Settled:
         """The first step of a run."""
@@ -35,7 +35,7 @@ _INTEGRATORS: dict[tuple[str, int], Integrator] = {
     ("euler", 2): euler,
     ("euler", 3): euler,
     ("pec", 2): pec_2d,
-    ("pec", 3): euler,
+    ("pec", 3): pec_3d,
 }
 
 __all__ = ["Integrator", "integrator_of"]

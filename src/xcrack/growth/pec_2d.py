@@ -104,7 +104,7 @@ def advanced(run: Run, step: Step) -> list[Crack]:
 
 def _remembered(step: Step) -> tuple[Trail, StepError]:
     trail, error = memory_of(step).trail, step.error
-    if trail is None or error is None:
+    if not isinstance(trail, Trail) or error is None:
         raise XcrackError(f"step {step.index} was not made by integrator='pec'.")
     return trail, error
 

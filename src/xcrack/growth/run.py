@@ -65,8 +65,8 @@ def grow(
         ``integrator="euler"`` only).
     integrator : {"pec", "euler"}
         Predict, evaluate, correct: path, shares of the tips and life of second order in the length
-        of the steps, at one solve a step (in 2D; fronts in 3D grow by Euler's rule as yet). Or
-        Euler's rule, as in the source paper: each step goes on with the direction and rate at its
+        of the steps, at one solve a step; fronts grow without the waves of long steps. Or Euler's
+        rule, as in the source paper: each step goes on with the direction and rate at its
         beginning, so that the path is of first order.
     threshold : float, stress √length
         Below this dK_eq a tip does not grow.

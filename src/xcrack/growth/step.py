@@ -12,6 +12,7 @@ from xcrack.arrays import Floats
 from xcrack.crack.crack import Crack
 from xcrack.errors import ProblemError
 from xcrack.growth.advance import PerCrack
+from xcrack.growth.front_trail import FrontTrail
 from xcrack.growth.trail import Trail
 from xcrack.inputs import entries, number, numbers, shown, whole
 from xcrack.markup import element, joined, table
@@ -110,7 +111,7 @@ class Memory:
         What the next solve starts from, without matrices.
     settings : mapping of str to str
         What the run was asked to do.
-    trail : Trail, optional
+    trail : Trail or FrontTrail, optional
         What an integrator of second order remembers of the last solves.
     """
 
@@ -120,7 +121,7 @@ class Memory:
     radius: float | None
     reuse: Reuse
     settings: Mapping[str, str]
-    trail: Trail | None = None
+    trail: Trail | FrontTrail | None = None
 
 
 @dataclass(frozen=True, eq=False)

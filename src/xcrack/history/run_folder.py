@@ -14,6 +14,7 @@ from typing import Any
 from xcrack.crack.crack import Crack
 from xcrack.errors import ProblemError
 from xcrack.growth.fingerprint import DEFAULTS
+from xcrack.growth.front_trail import FrontTrail, Places
 from xcrack.growth.step import Memory, Step, StepError
 from xcrack.growth.trail import Trail
 from xcrack.history import lock
@@ -28,7 +29,8 @@ _FORMAT = 2
 _STEP = re.compile(r"step_(\d{5,})\.npz")
 CLASSES: dict[str, type] = {
     "Step": Step, "Memory": Memory, "Reuse": Reuse, "Crack": Crack,
-    "SIF": SIF, "StepError": StepError, "Trail": Trail,
+    "SIF": SIF, "StepError": StepError, "Trail": Trail, "FrontTrail": FrontTrail,
+    "Places": Places,
 }  # fmt: skip
 
 

@@ -1,0 +1,370 @@
+"""Growth of second order at one solve a step, of fronts of 3D cracks.
+
+A step advances the corrected fronts of the last one by the rates known there, solves, and advances
+the same fronts again by the rates at both ends of the step. Rates and directions are carried along
+the strip between the two.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from xcrack.arrays import Bools, Floats
+from xcrack.crack.advance_3d import advance_fronts
+from xcrack.crack.crack import Crack
+from xcrack.crack.fronts_3d import front_frames
+from xcrack.crack.placing import placed
+from xcrack.errors import GeometryError, XcrackError
+from xcrack.growth import follow_3d
+from xcrack.growth.advance import Advance, PerCrack, plan_advance
+from xcrack.growth.checks import law_exponent
+from xcrack.growth.cycles_3d import elapsed_3d
+from xcrack.growth.evaluation import Evaluation, Settled
+from xcrack.growth.follow_3d import carried
+from xcrack.growth.front_filter import Response, corrected, predicted, response, turning_of
+from xcrack.growth.front_trail import FrontTrail, Places
+from xcrack.growth.options import Run
+from xcrack.growth.step import Step, StepError, memory_of
+from xcrack.mesh.locate import cell_sizes, contains
+from xcrack.mesh.mesh import Mesh
+
+_REACH = 2.0  # cells from a place along a front to those that values are carried from
+_SPACING = 0.5  # of a cell, between the points of a new front
+_ERROR = 0.25  # of a correction, as in 2D
+
+
+def begun(run: Run, seen: Evaluation) -> Settled:
+    """The first step of a run."""
+    parts = tuple(_solved_places(seen, c, None) for c in range(len(seen.cracks)))
+    none = tuple(np.zeros(len(part.s)) for part in parts)
+    return _settled(run, seen, 0.0, seen.cracks, _trail(run, seen, parts), StepError(none, 0.0))
+
+
+def settled(run: Run, last: Step, seen: Evaluation) -> Settled:
+    """Advance the fronts of the last step again, now by the rates at both ends of the step."""
+    trail, error = _remembered(last)
+    plan = _plan(run, trail)
+    ahead = _ahead(trail, plan)
+    after = [
+        _carried_back(seen, c, part, way) for c, (part, way) in enumerate(zip(trail.parts, ahead))
+    ]
+    fastest = [max((float(r.max(initial=0.0)) for r in rates), default=0.0) for rates in (
+        [part.rate for part in trail.parts], [part.rate for part in after])]  # fmt: skip
+    cycles, own = _cycles(trail, plan, seen)
+    parts, cracks, gaps = [], [], []
+    broken = any(np.isinf(rate).any() for rate in seen.rate)
+    for c, (part, later) in enumerate(zip(trail.parts, after)):
+        again = None
+        if not broken and fastest[1] > 0:
+            share = plan.largest / fastest[1] * later.rate
+            again = _again(run, trail, plan, c, last.corrected[c], seen.cracks[c], later, share)
+        if again is None:
+            crack, gap = seen.cracks[c], np.zeros(len(part.s))
+            new = _solved_places(seen, c, _waiting(seen, c, part, plan.pending[c]))
+        else:
+            crack, pending, gap = again
+            new = _corrected_places(seen, c, crack, part, pending)
+        cracks.append(crack)
+        parts.append(new)
+        gaps.append(gap)
+    place = tuple(
+        _onto(seen, c, part, last, error.place[c], gaps[c]) for c, part in enumerate(trail.parts)
+    )
+    return _settled(
+        run, seen, last.cycles + cycles, cracks, _trail(run, seen, tuple(parts)),
+        StepError(place, error.cycles + own),
+    )  # fmt: skip
+
+
+def planned(run: Run, step: Step) -> Advance:
+    """The advance after a step."""
+    trail, _ = _remembered(step)
+    plan = _plan(run, trail)
+    c, place = plan.tip
+    if plan.largest == 0 or not len(step.sif[0][c].x):
+        return plan
+    away = np.linalg.norm(step.sif[0][c].x - trail.parts[c].x[place], axis=1)
+    return replace(plan, tip=(c, int(np.argmin(away))))
+
+
+def advanced(run: Run, step: Step) -> list[Crack]:
+    """The cracks after the predicted advance of a step."""
+    trail, _ = _remembered(step)
+    ahead = _ahead(trail, _plan(run, trail))
+    return [
+        _advanced(crack, part, part.angle, way, run.problem.mesh)
+        for crack, part, way in zip(step.corrected, trail.parts, ahead)
+    ]
+
+
+def _remembered(step: Step) -> tuple[FrontTrail, StepError]:
+    trail, error = memory_of(step).trail, step.error
+    if not isinstance(trail, FrontTrail) or error is None:
+        raise XcrackError(f"step {step.index} was not made by integrator='pec'.")
+    return trail, error
+
+
+def _settled(
+    run: Run,
+    seen: Evaluation,
+    cycles: float,
+    cracks: Sequence[Crack],
+    trail: FrontTrail,
+    error: StepError,
+) -> Settled:
+    """A step that is settled, with the advance that follows at the places of its K."""
+    plan = _plan(run, trail)
+    ahead = _ahead(trail, plan)
+    mesh = seen.problem.mesh
+    da: list[Floats] = []
+    pending: list[Floats] = []
+    for c, (part, way) in enumerate(zip(trail.parts, ahead)):
+        x = seen.sif[0][c].x
+        for target, values in ((da, way), (pending, plan.pending[c])):
+            target.append(np.nan_to_num(_carried(part, part.closed, values, x, mesh)))
+    return Settled(cycles, tuple(cracks), tuple(da), tuple(pending), trail, error)
+
+
+def _trail(run: Run, seen: Evaluation, parts: tuple[Places, ...]) -> FrontTrail:
+    dK_eq, R = np.concatenate(seen.dK_eq), np.concatenate(seen.R)
+    return FrontTrail(parts, law_exponent(run.law, dK_eq, R))
+
+
+def _plan(run: Run, trail: FrontTrail) -> Advance:
+    mesh = run.problem.mesh
+    rate = tuple(part.rate for part in trail.parts)
+    return plan_advance(
+        rate,
+        rate,
+        tuple(part.pending for part in trail.parts),
+        tuple(cell_sizes(mesh, part.x) for part in trail.parts),
+        da=run.da,
+        cycles=run.cycles,
+        scaling="law",
+        least=follow_3d.WAITS_BELOW,
+    )
+
+
+def _responses(trail: FrontTrail, c: int, advance: Floats) -> list[tuple[Bools, Response | None]]:
+    """Places of each front of a crack, and its response."""
+    part = trail.parts[c]
+    result = []
+    for number in np.unique(part.front):
+        own = part.front == number
+        closed = bool(part.closed[number])
+        order = np.argsort(part.s[own])
+        turning = turning_of(part.x[own][order], closed) if own.sum() > 2 else 0.0
+        length = float(part.length[number])
+        result.append(
+            (own, response(part.s[own], advance[own], trail.exponent, turning, closed, length))
+        )
+    return result
+
+
+def _ahead(trail: FrontTrail, plan: Advance) -> PerCrack:
+    """Advance of all places by the rates at the beginning of a step."""
+    ways = []
+    for c, (part, da) in enumerate(zip(trail.parts, plan.da)):
+        way = np.array(da)
+        for own, front in _responses(trail, c, da):
+            way[own] = np.where(da[own] > 0, predicted(front, part.s[own], da[own]), 0.0)
+        ways.append(way)
+    return tuple(ways)
+
+
+def _advanced(crack: Crack, part: Places, angle: Floats, way: Floats, mesh: Mesh) -> Crack:
+    if not len(part.s):
+        return crack
+    size = _SPACING * float(cell_sizes(mesh, part.x).mean())
+    return advance_fronts(crack, part.s, part.front, angle, way, size)
+
+
+def _again(
+    run: Run,
+    trail: FrontTrail,
+    plan: Advance,
+    c: int,
+    crack: Crack,
+    solved: Crack,
+    later: "Later",
+    share: Floats,
+) -> tuple[Crack, Floats, Floats] | None:
+    """The corrected crack, growth that waits at the old places, and how far these are moved.
+
+    None where the crack that was solved has other fronts: there is nothing to correct.
+    """
+    part, mesh = trail.parts[c], run.problem.mesh
+    fastest = max(float(p.rate.max(initial=0.0)) for p in trail.parts)
+    if not len(part.s) or fastest == 0:
+        return None
+    first = plan.largest / fastest * part.rate
+    way = 0.5 * (first + share)
+    for own, front in _responses(trail, c, first):
+        way[own] = corrected(front, part.s[own], first[own], share[own])
+    wanted = part.pending + way
+    goes = wanted >= follow_3d.WAITS_BELOW * cell_sizes(mesh, part.x)
+    heading = first[:, None] * part.direction + share[:, None] * later.direction
+    t, n = part.frame[:, 0], part.frame[:, 1]
+    along, across = np.einsum("ij,ij->i", heading, t), np.einsum("ij,ij->i", heading, n)
+    still = np.hypot(along, across) == 0
+    angle = np.where(still, part.angle, np.arctan2(across, along))
+    try:
+        again = placed(_advanced(crack, part, angle, np.where(goes, wanted, 0.0), mesh), mesh)
+    except GeometryError:
+        return None
+    if _kinds(again) != _kinds(solved):
+        return None
+    gap = np.linalg.norm(_moves(part, part.angle, later.way) - _moves(part, angle, wanted), axis=1)
+    return again, np.where(goes, 0.0, wanted), np.where(goes, gap, 0.0)
+
+
+def _moves(part: Places, angle: Floats, way: Floats) -> Floats:
+    t, n = part.frame[:, 0], part.frame[:, 1]
+    return way[:, None] * (np.cos(angle)[:, None] * t + np.sin(angle)[:, None] * n)
+
+
+def _kinds(crack: Crack) -> list[bool]:
+    """Of each front whether it is closed."""
+    return [bool(front[0] == front[-1]) for front in crack.fronts or ()]
+
+
+@dataclass(frozen=True, eq=False)
+class Later:
+    """What was solved at the end of a step, at the places of its beginning.
+
+    Attributes
+    ----------
+    rate, law_rate : (f,) arrays, length/cycle
+        nan in law_rate where a place has left the body.
+    direction : (f, 3) array
+    way : (f,) array, length
+        Predicted advance.
+    """
+
+    rate: Floats
+    law_rate: Floats
+    direction: Floats
+    way: Floats
+
+
+def _carried_back(seen: Evaluation, c: int, part: Places, way: Floats) -> Later:
+    target = part.x + _moves(part, part.angle, way)
+    sif, mesh = seen.sif[0][c], seen.problem.mesh
+    here = _solved_places(seen, c, None)
+    closed = _kinds(seen.cracks[c])
+    size = float(cell_sizes(mesh, sif.x).mean()) if len(sif.x) else 0.0
+
+    def back(values: Floats) -> Floats:
+        return carried(sif.x, sif.front, closed, values, target, _REACH * size)
+
+    law_rate = back(seen.law_rate[c])
+    lost = np.isnan(law_rate)
+    rate = np.where(lost, part.rate, np.nan_to_num(back(seen.rate[c])))
+    direction = np.stack([back(here.direction[:, k]) for k in range(3)], axis=1)
+    direction = np.where(lost[:, None], part.direction, direction)
+    return Later(rate, law_rate, direction, way)
+
+
+def _solved_places(seen: Evaluation, c: int, pending: Floats | None) -> Places:
+    """Places of a crack as it was solved."""
+    sif, angle = seen.sif[0][c], seen.angle[c]
+    t, n = sif.frame[:, 0], sif.frame[:, 1]
+    return Places(
+        s=sif.s,
+        front=sif.front,
+        x=sif.x,
+        frame=sif.frame,
+        closed=np.array(_kinds(seen.cracks[c]), dtype=bool),
+        length=_lengths(seen.cracks[c]),
+        rate=seen.rate[c],
+        law_rate=seen.law_rate[c],
+        direction=np.cos(angle)[:, None] * t + np.sin(angle)[:, None] * n,
+        pending=np.zeros(len(sif.s)) if pending is None else pending,
+        size=float(seen.length[c]),
+    )
+
+
+def _corrected_places(
+    seen: Evaluation, c: int, crack: Crack, old: Places, pending: Floats
+) -> Places:
+    """Places of a corrected crack, with what was solved close by."""
+    here, mesh = _solved_places(seen, c, None), seen.problem.mesh
+    fronts = front_frames(crack)
+    x = np.concatenate([front.x for front in fronts])
+    s = np.concatenate([front.s[: len(front.x)] for front in fronts])
+    number = np.repeat(np.arange(len(fronts)), [len(front.x) for front in fronts])
+    frame = np.concatenate([front.frame for front in fronts])
+
+    def near(values: Floats) -> Floats:
+        return _carried(here, here.closed, values, x, mesh)
+
+    rate = near(here.rate)
+    there = ~np.isnan(rate) & contains(mesh, x)
+    direction = np.stack([near(here.direction[:, k]) for k in range(3)], axis=1)
+    waits = np.nan_to_num(_carried(old, old.closed, pending, x, mesh))
+    return Places(
+        s=s[there],
+        front=number[there],
+        x=x[there],
+        frame=frame[there],
+        closed=np.array(_kinds(crack), dtype=bool),
+        length=_lengths(crack),
+        rate=rate[there],
+        law_rate=near(here.law_rate)[there],
+        direction=direction[there],
+        pending=waits[there],
+        size=follow_3d.crack_size(crack, mesh),
+    )
+
+
+def _lengths(crack: Crack) -> Floats:
+    """Length of each front, length."""
+    fronts = [crack.points[front] for front in crack.fronts or ()]
+    return np.array([np.linalg.norm(np.diff(x, axis=0), axis=1).sum() for x in fronts])
+
+
+def _carried(part: Places, closed: Bools, values: Floats, x: Floats, mesh: Mesh) -> Floats:
+    if not len(part.x):
+        return np.full(len(x), np.nan)
+    reach = _REACH * float(cell_sizes(mesh, part.x).mean())
+    return carried(part.x, part.front, closed.tolist(), values, x, reach)
+
+
+def _waiting(seen: Evaluation, c: int, part: Places, pending: Floats) -> Floats:
+    x = seen.sif[0][c].x
+    return np.nan_to_num(_carried(part, part.closed, pending, x, seen.problem.mesh))
+
+
+def _onto(
+    seen: Evaluation, c: int, part: Places, last: Step, before: Floats, gap: Floats
+) -> Floats:
+    """Estimated error of the places that were solved, with what this step adds."""
+    x, mesh, old = seen.sif[0][c].x, seen.problem.mesh, last.sif[0][c]
+    own = np.nan_to_num(_carried(part, part.closed, _ERROR * gap, x, mesh))
+    if not len(old.x):
+        return own
+    reach = 2 * _REACH * float(cell_sizes(mesh, old.x).mean()) + float(gap.max(initial=0.0))
+    earlier = carried(old.x, old.front, _kinds(last.cracks[c]), before, x, reach)
+    return np.asarray(own + np.nan_to_num(earlier))
+
+
+def _cycles(trail: FrontTrail, plan: Advance, seen: Evaluation) -> tuple[float, float]:
+    """Cycles of a step by the largest rates at both ends, and what they add to the error.
+
+    All places advance in proportion to these, and without the response of the front: so the
+    scatter of the largest of many rates costs nothing.
+    """
+    c = plan.tip[0]
+    before = max(float(part.law_rate.max(initial=0.0)) for part in trail.parts)
+    later = max((float(rate.max(initial=0.0)) for rate in seen.law_rate), default=0.0)
+    size0, size1 = [trail.parts[c].size], [seen.length[c]]
+    one = [np.array([value]) for value in (plan.largest, before, later)]
+    cycles = elapsed_3d(size0, size1, one[:1], one[1:2], one[2:])
+    if not 0 < later < np.inf:
+        return cycles, 0.0
+    trapezoid = 0.5 * plan.largest * (1 / before + 1 / later)
+    return cycles, _ERROR * abs(cycles - trapezoid)
+
+
+__all__ = ["advanced", "begun", "planned", "settled"]

@@ -1,0 +1,97 @@
+"""Advance of fronts whose K answers to their own shape: orders, stability, what stays."""
+
+import numpy as np
+import pytest
+
+from xcrack.growth.front_filter import corrected, predicted, response, turning_of
+
+M = 3.0
+
+
+def places(closed, n=48, length=12.0):
+    s = np.arange(n) * length / n if closed else (np.arange(n) + 0.5) * length / n
+    return s, length
+
+
+def waves(closed, s, length, number):
+    """A wave along the front, and its wave number."""
+    k = (2 if closed else 1) * np.pi * number / length
+    return np.cos(k * s), k
+
+
+def grown(closed, number, steps, total=2.0):
+    """Height of a wave after a growth by `total`, of first 0.01, and the exact one.
+
+    The advance is `total`/`steps` (1 - m |k| u / 2), the linear response of K to the front.
+    """
+    s, length = places(closed)
+    wave, k = waves(closed, s, length, number)
+    da, height = total / steps, 0.01
+    turning = 0.0
+    for _ in range(steps):
+        advance = da * (1 - 0.5 * M * k * height * wave)
+        front = response(s, advance, M, turning, closed, length)
+        after = height * wave + predicted(front, s, advance) - da
+        later = da * (1 - 0.5 * M * k * (after @ wave) / (wave @ wave) * wave)
+        end = height * wave + corrected(front, s, advance, later) - da
+        height = (end @ wave) / (wave @ wave)
+    return height, 0.01 * np.exp(-0.5 * M * k * total)
+
+
+@pytest.mark.parametrize("closed", [False, True])
+def test_a_wave_falls_as_it_should_in_steps_of_any_length(closed):
+    """Exact but for the monotone cubics between places: 2 % of a wave of six places."""
+    for number, steps in ((2, 1), (2, 4), (8, 1), (8, 4)):
+        height, exact = grown(closed, number, steps)
+        assert height == pytest.approx(exact, abs=0.02 * 0.01)
+    for number in (8, 12):  # to four places a wave: hardly turned over
+        height, _ = grown(closed, number, 1, total=6.0)
+        assert abs(height) <= 0.3 * 0.01
+
+
+def test_euler_would_turn_the_same_waves_over():
+    """1 - m k da / 2 at the wave of six places, da of two places: what the filter is for."""
+    s, length = places(False)
+    _, k = waves(False, s, length, 16)
+    assert 1 - 0.5 * M * k * 2.0 < -5
+
+
+@pytest.mark.parametrize("closed", [False, True])
+def test_what_a_filter_leaves_alone(closed):
+    """An even advance; one that is zero somewhere does not become negative."""
+    s, length = places(closed)
+    even = np.full(len(s), 0.3)
+    front = response(s, even, M, 2 * np.pi * closed, closed, length)
+    assert predicted(front, s, even) == pytest.approx(even, abs=1e-12)
+    assert corrected(front, s, even, even) == pytest.approx(even, abs=1e-12)
+    partly = np.where(s < 5, 0.3, 0.0)
+    front = response(s, partly, M, 0.0, closed, length)
+    way = predicted(front, s, partly)
+    assert (way >= 0).all()
+    assert way[(s > 7) & (s < 11)] == pytest.approx(0, abs=1e-12)
+
+
+def test_a_circle_and_its_shift_stay():
+    """Growth by 1 + cos(phi)/10 shifts a circle: its wave number is the turning over the length."""
+    s, length = places(True)
+    shift = 0.3 * (1 + 0.1 * np.cos(2 * np.pi * s / length))
+    front = response(s, shift, M, 2 * np.pi, True, length)
+    assert predicted(front, s, shift) == pytest.approx(shift, abs=1e-5)
+
+
+def test_later_rates_enter_by_half_where_nothing_responds():
+    s, length = places(False)
+    one, two = np.full(len(s), 0.1), np.full(len(s), 0.2)
+    front = response(s, one, M, 0.0, False, length)
+    assert corrected(front, s, one, two) == pytest.approx(np.full(len(s), 0.15), abs=1e-12)
+    assert response(s[:3], one[:3], M, 0.0, False, length) is None
+    assert corrected(None, s, one, two) == pytest.approx(np.full(len(s), 0.15))
+
+
+def test_turning_of_an_arc():
+    angle = np.linspace(0, 1.2, 25)
+    arc = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+    assert turning_of(arc, False) == pytest.approx(1.2, abs=0.25)
+    assert turning_of(arc, True) == 2 * np.pi
+    line = np.stack([angle, 0.01 * (-1.0) ** np.arange(25), 0 * angle], axis=1)
+    assert turning_of(line, False) < 0.2
