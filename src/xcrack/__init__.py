@@ -109,6 +109,7 @@ _HOME = {
     "inf_sup": "contact.inf_sup",
     "plan": "analysis.plan",
     "chart": "charting.chart",
+    "adapt": "adaptivity.adapt",
     "verify": "book.verify",
     "report": "reporting.report",
     "read_case": "casefile.case",

@@ -231,6 +231,25 @@ ENTRIES = [
         cost=0.03,
     ),
     Entry(
+        "adapt",
+        lambda tolerance, max_unknowns: (
+            xc.adapt(scenes.problem(), tolerance, max_unknowns=max_unknowns, progress=False)
+            .rounds[-1]
+            .error
+        ),
+        {
+            "tolerance": arg(Number(above=0, below=1, rule=lambda v: v >= 1e-2 or None), 0.1),
+            "max_unknowns": arg(
+                Whole(
+                    least=1, most=10**7, far=1e9, optional=True, rule=lambda v: v >= 5000 or None
+                ),
+                None,
+                20_000,
+            ),
+        },
+        cost=0.3,
+    ),
+    Entry(
         "inf_sup",
         xc.inf_sup,
         {

@@ -18,7 +18,8 @@ NAMES = [
     "measures",
     "traction", "write_mesh",
     # solution
-    "Solution", "chart", "energy_error", "inf_sup", "plan", "plot", "solve", "stress_intensity",
+    "Solution", "adapt", "chart", "energy_error", "inf_sup", "plan", "plot", "solve",
+    "stress_intensity",
     "write", "SIF", "stress_intensities", "refine", "pardiso", "draw_K",
     # growth
     "Cycle", "History", "Step", "collect", "elber", "equivalent_K", "grow", "max_hoop_stress",

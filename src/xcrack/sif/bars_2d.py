@@ -36,16 +36,37 @@ def tip_bars(solutions: Sequence[Solution], sifs: Sequence[SIF], crack: int) -> 
         One for each.
     crack : int
     """
+    return bars_and_shares(solutions, sifs, crack)[0]
+
+
+def bars_and_shares(
+    solutions: Sequence[Solution], sifs: Sequence[SIF], crack: int
+) -> tuple[list[Bars], Floats]:
+    """Bars of the tips, and the absolute contributions of the cells to the estimates.
+
+    Parameters
+    ----------
+    solutions, sifs, crack
+        As of `tip_bars`.
+
+    Returns
+    -------
+    bars : list of Bars
+    shares : (states, tips, 2, cells) array, stress · √length
+        Zero where there are no estimates.
+    """
     shape = sifs[0].K.shape
     general = _unsuited(solutions[0], crack)
     if general or not shape[0]:
-        return [no_bars(shape, general)] * len(sifs)
+        cells = len(solutions[0].problem.mesh.cells)
+        return [no_bars(shape, general)] * len(sifs), np.zeros((len(sifs), *shape, cells))
     errors = tip_errors(solutions, crack)
     places = _unresolved(solutions[0], crack)
-    return [
+    bars = [
         _bars(sif, errors, k, places, s)
         for k, (sif, s) in enumerate(zip(sifs, solutions, strict=True))
     ]
+    return bars, errors.shares
 
 
 def _unsuited(solution: Solution, crack: int) -> str:

@@ -1,0 +1,70 @@
+"""First mesh: cells at tips and kinks that are smaller than what is around them."""
+
+import numpy as np
+
+from xcrack.arrays import Floats
+from xcrack.crack.size_2d import length_inside
+from xcrack.geometry.simplices import distance_to_simplices
+from xcrack.mesh.locate import cell_sizes
+from xcrack.mesh.mesh import Mesh
+from xcrack.mesh.refinement import refine
+from xcrack.scene.problem import Problem
+
+_CELLS = 4.0  # of a crack's length: less, and no estimate sees what is left out
+_ROOM = 2.5  # cells between a tip and the next boundary, crack or tip
+# Cells of a crack's length at its kinks: the pressure of faces has a corner singularity there.
+_KINK = {"off": 20.0, "auto": 100.0, "on": 100.0}
+_TURN = np.radians(15.0)  # from which on a turn is a kink, and no chord of a curve
+_SLOPE = 0.4  # growth of cells a length
+
+
+def first_mesh(problem: Problem) -> Mesh:
+    """The mesh of a scene in 2D, finer at tips and kinks where it is coarser than they are."""
+    spots, sizes = [], []
+    tips = [crack.points[i] for crack in problem.placed for i in crack.tips or ()]
+    for crack in problem.placed:
+        length = length_inside(crack, problem.mesh)
+        for i in crack.tips or ():
+            x = crack.points[i]
+            spots.append(x)
+            sizes.append(min(length / _CELLS, _room(problem, x, tips, crack.points) / _ROOM))
+        for x in kinks(crack.points):
+            spots.append(x)
+            sizes.append(length / _KINK[problem.contact])
+    if not spots:
+        return problem.mesh
+    place, size = np.array(spots), np.array(sizes)
+
+    def wanted(x: Floats) -> Floats:
+        distance = np.linalg.norm(x[:, None] - place, axis=2)
+        return np.asarray((size + _SLOPE * distance).min(axis=1))
+
+    # A mesh that is fine enough at its ends stays as it was given.
+    if (cell_sizes(problem.mesh, place) <= size).all():
+        return problem.mesh
+    return refine(problem.mesh, size=wanted)
+
+
+def _room(problem: Problem, x: Floats, tips: list[Floats], own: Floats) -> float:
+    """Distance of a tip to the boundary, to other cracks and tips."""
+    mesh = problem.mesh
+    walls = [mesh.points[mesh.boundary]]
+    walls += [
+        np.stack([crack.points[:-1], crack.points[1:]], axis=1)
+        for crack in problem.placed
+        if crack.points is not own
+    ]
+    distance = [float(distance_to_simplices(x, wall).min()) for wall in walls]
+    others = [float(np.linalg.norm(x - tip)) for tip in tips if (tip != x).any()]
+    return min(distance + others)
+
+
+def kinks(points: Floats) -> Floats:
+    """Inner points of a polyline at which it turns."""
+    along = np.diff(points, axis=0)
+    along = along / np.linalg.norm(along, axis=1)[:, None]
+    turn = np.arccos(np.clip((along[1:] * along[:-1]).sum(axis=1), -1, 1))
+    return np.asarray(points[1:-1][turn > _TURN])
+
+
+__all__ = ["first_mesh", "kinks"]
