@@ -1,9 +1,11 @@
 """The package as others get it: what wheel and sdist hold, oldest versions, entry points."""
 
 import os
+import re
 import subprocess
 import sys
 import tarfile
+import tomllib
 import zipfile
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -24,6 +26,22 @@ def test_lower_bounds_are_those_of_the_project():
     assert "numpy==1.26" in out
     assert "scipy==1.12" in out  # cg(rtol=) came with it
     assert lower_bounds.bounds(["a>=1.2; python_version > '3'", "b"]) == ["a==1.2"]
+
+
+def test_links_of_a_release_are_absolute():
+    import absolute_links
+
+    address = "https://example.org/owner/xcrack"
+    text = absolute_links.absolute((ROOT / "README.md").read_text("utf-8"), address, "v1.0")
+    links = re.findall(r"(!?)\[[^\]]*\]\(([^)\s]+)\)", text)
+    assert len(links) > 8
+    for mark, link in links:
+        assert link.startswith(f"{address}/{'raw' if mark else 'blob'}/v1.0/")
+        assert (ROOT / link.split("/v1.0/")[1].partition("#")[0]).exists()
+    project = absolute_links.with_addresses(
+        (ROOT / "pyproject.toml").read_text("utf-8"), address, "v1.0"
+    )
+    assert tomllib.loads(project)["project"]["urls"]["Repository"] == address
 
 
 def test_workflows_ask_for_what_there_is():
