@@ -79,6 +79,31 @@ def _body_of_history(value):
 
 ENTRIES = [
     Entry(
+        "save",
+        xc.save,
+        {
+            "result": arg(
+                Seen(
+                    rule=lambda v: (
+                        isinstance(v, xc.Solution | xc.History)
+                        or (None if isinstance(v, list | tuple) and len(v) else False)
+                    )
+                ),
+                Late(scenes.solution),
+                Late(lambda: scenes.history()),
+                words=["solution"],
+            ),
+            "path": arg(
+                Filename(endings=(".npz",)),
+                "good.npz",
+                near={k: v for k, v in paths(".npz", "").items() if "other" not in k},
+                words=["result"],
+            ),
+        },
+        in_folder=True,
+        cost=0.05,
+    ),
+    Entry(
         "write",
         xc.write,
         {

@@ -6,7 +6,7 @@ import numpy as np
 
 import xcrack as xc
 from fuzz.entry import Entry, arg
-from fuzz.kinds import Number, Numbers, Of, Seen, Whole, Word
+from fuzz.kinds import Called, Number, Numbers, Of, Seen, Whole, Word, real
 from support.growth_fakes import mode_I, plate, sif
 from xcrack.growth.step import Memory, Step
 from xcrack.solvers.reuse import Reuse
@@ -130,11 +130,36 @@ ENTRIES = [
         },
     ),
     Entry(
+        "retarded",
+        lambda history, law, spectrum: (
+            xc.retarded(history, law, spectrum, None, nu=0.3, max_blocks=5).life
+        ),
+        {
+            "history": arg(
+                Seen(
+                    rule=lambda v: (
+                        None if isinstance(v, xc.History) and v is not FLIGHTS else v is FLIGHTS
+                    )
+                ),
+                FLIGHTS,
+            ),
+            "law": arg(Called(), LAW),
+            "spectrum": arg(Of(type=xc.Spectrum), SPECTRUM),
+        },
+    ),
+    Entry(
         "lognormal",
         xc.lognormal,
         {"sigma": arg(Number(least=0, most=100), 0.3), "median": arg(Number(above=0), 1.0, 5)},
     ),
-    Entry("normal", xc.normal, {"sigma": arg(Number(least=0, most=0.2), 0.1)}),
+    Entry(
+        "normal",
+        xc.normal,
+        {
+            "sigma": arg(Number(least=0, most=0.2), 0.1),
+            "mean": arg(Number(rule=lambda v: v == 1 or None), 1.0),
+        },
+    ),
     Entry(
         "lognormal",
         lambda p: xc.lognormal(0.3).quantile(p) * xc.normal(0.1).quantile(p),
@@ -142,16 +167,21 @@ ENTRIES = [
     ),
     Entry(
         "Scatter",
-        lambda K, load, a0: xc.Scatter(C=xc.lognormal(0.1), K=K, load=load, a0=a0),
-        {"K": DISTRIBUTION, "load": DISTRIBUTION, "a0": DISTRIBUTION},
+        lambda C, K, load, a0: xc.Scatter(C=C, K=K, load=load, a0=a0),
+        {
+            "C": arg(Of(type=xc.lognormal), xc.lognormal(0.1)),
+            "K": DISTRIBUTION,
+            "load": DISTRIBUTION,
+            "a0": DISTRIBUTION,
+        },
     ),
     Entry(
         "life",
-        lambda history, scatter, samples, seed: xc.life(
-            history, scatter=scatter, samples=samples, seed=seed
-        ),
+        lambda history, **named: xc.life(history, **named),
         {
             "history": RUN,
+            "law": arg(Called(optional=True), None, LAW),
+            "unit": arg(Word(rule=bool), "cycle", "flight"),
             "scatter": arg(Seen(rule=lambda v: v is SCATTER), SCATTER),
             "samples": arg(Whole(least=100, far=1e4), 200),
             "seed": arg(Whole(least=0), 3),
@@ -185,8 +215,24 @@ ENTRIES = [
     ),
     Entry(
         "inspection",
-        lambda a_detect, factor: xc.inspection(HISTORY, a_detect=a_detect, factor=factor),
-        {"a_detect": arg(Number(least=5, below=17), 8.0), "factor": arg(Number(least=1), 3)},
+        lambda **named: xc.inspection(HISTORY, **named),
+        {
+            "a_critical": arg(
+                Seen(
+                    rule=lambda v: (
+                        True
+                        if v is None
+                        else None
+                        if real(v) is not None and 0 < real(v) < 1e300
+                        else False
+                    )
+                ),
+                None,
+            ),
+            "pod": arg(Of(optional=True, type=xc.logistic_pod, rule=lambda v: None), None),
+            "a_detect": arg(Number(least=5, below=17), 8.0),
+            "factor": arg(Number(least=1), 3),
+        },
     ),
     Entry(
         "logistic_pod",
@@ -197,7 +243,7 @@ ENTRIES = [
     Entry(
         "History",
         lambda law: HISTORY.rerate(law).life,
-        {"law": arg(Seen(rule=lambda v: None if callable(v) else False), LAW)},
+        {"law": arg(Called(), LAW)},
     ),
 ]
 HOOKS = []

@@ -205,7 +205,8 @@ def inspection(
     end = high if a_critical is None else number(a_critical, "inspection: a_critical", above=low)
     if end > high * (1 + 1e-12):
         raise ProblemError(
-            f"inspection: a_critical = {end:.6g} is beyond the last length of the run, {high:.6g}."
+            f"inspection: a_critical = {end:.6g} is beyond the last length of the run, {high:.6g}: "
+            "give at most that."
         )
     begin, last = float(curve.N[0]), curve.cycles_at(end)
     if a_detect is not None:

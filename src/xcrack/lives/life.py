@@ -152,6 +152,8 @@ def life(
         raise ProblemError(f"life: scatter = {shown(scatter)}: give Scatter(C=...).")
     if not (law is None or callable(law)):
         raise ProblemError(f"life: law = {shown(law)} cannot be called: give a law.")
+    if not isinstance(unit, str) or not unit:
+        raise ProblemError(f"life: unit = {shown(unit)}: give a word, such as 'flight'.")
     n = whole(samples, "life: samples", least=100, most=10_000_000)
     rows = driving(history.steps)
     lead = _lead(rows)
