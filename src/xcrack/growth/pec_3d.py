@@ -22,6 +22,7 @@ from xcrack.growth.checks import law_exponent
 from xcrack.growth.cycles_3d import elapsed_3d
 from xcrack.growth.evaluation import Evaluation, Settled
 from xcrack.growth.follow_3d import carried
+from xcrack.growth.front_angles import without_noise
 from xcrack.growth.front_filter import Response, corrected, predicted, response, turning_of
 from xcrack.growth.front_trail import FrontTrail, Places
 from xcrack.growth.options import Run
@@ -268,15 +269,18 @@ def _carried_back(seen: Evaluation, c: int, part: Places, way: Floats) -> Later:
 
 def _solved_places(seen: Evaluation, c: int, pending: Floats | None) -> Places:
     """Places of a crack as it was solved."""
-    sif, angle = seen.sif[0][c], seen.angle[c]
+    sif, closed = seen.sif[0][c], np.array(_kinds(seen.cracks[c]), dtype=bool)
+    length = _lengths(seen.cracks[c])
+    most = max((state[c] for state in seen.sif), key=lambda each: each.K_I.max(initial=-np.inf))
+    angle = without_noise(most, seen.angle[c], closed, length)
     t, n = sif.frame[:, 0], sif.frame[:, 1]
     return Places(
         s=sif.s,
         front=sif.front,
         x=sif.x,
         frame=sif.frame,
-        closed=np.array(_kinds(seen.cracks[c]), dtype=bool),
-        length=_lengths(seen.cracks[c]),
+        closed=closed,
+        length=length,
         rate=seen.rate[c],
         law_rate=seen.law_rate[c],
         direction=np.cos(angle)[:, None] * t + np.sin(angle)[:, None] * n,
