@@ -1,0 +1,117 @@
+"""The next mesh in 2D: cells that contribute much to the bars are bisected."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from xcrack.adaptivity.measured import Measured, live_states
+from xcrack.adaptivity.start_2d import first_mesh, kinks
+from xcrack.adaptivity.wanted import smaller
+from xcrack.arrays import Floats
+from xcrack.geometry.simplices import closest_on_segment
+from xcrack.mesh.mesh import Mesh
+from xcrack.mesh.refinement import refine_to
+from xcrack.sif.bars import Bars
+
+_ORDER = 2
+_SWEEPS = 5
+_GENTLER = 2  # times that the aim is doubled where the next mesh would be too large
+_LEAST = 1.05  # cells of the next mesh over those of this one
+
+
+def trusted(new: Measured, old: Measured | None) -> Measured:
+    """Bars that also cover what the last refinement has changed.
+
+    Two best values may differ by both bars. Where they differ by more, the estimates have missed
+    something, and the bar grows by as much. Where faces press on each other at a kink it is at
+    least the change itself.
+    """
+    if old is None:
+        return new
+    change = np.abs(new.best - old.best)
+    bent = np.repeat(np.isin(_cracks(new), _bent(new)), _ends(new))[:, None]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        growth = change / np.where(bent, new.bar, new.bar + old.bar)
+    growth = np.where(growth > 1, growth, 1.0)
+    if (growth == 1).all():
+        return new
+    rows = iter(np.split(growth, np.cumsum(_ends(new))[:-1]))
+    by_crack = [{k: next(rows) for k in live_states(new)} for _ in range(len(new.problem.cracks))]
+    sifs = tuple(
+        tuple(
+            replace(sif, errors=Bars(sif.eta, sif.bar * by_crack[c].get(k, 1.0), sif.reasons))
+            for c, sif in enumerate(state)
+        )
+        for k, state in enumerate(new.sifs)
+    )
+    return replace(new, sifs=sifs, bar=new.bar * growth)
+
+
+def _cracks(given: Measured) -> list[int]:
+    """Crack of each of these."""
+    return [c for c in range(len(given.problem.cracks)) for _ in live_states(given)]
+
+
+def _ends(given: Measured) -> list[int]:
+    """Number of tips of each crack and state, in the order of `best`."""
+    return [
+        len(given.sifs[k][c].K)
+        for c in range(len(given.problem.cracks))
+        for k in live_states(given)
+    ]
+
+
+def next_mesh(now: Measured, tolerance: float, aim: float, most: int) -> Mesh | None:
+    """A finer mesh, or None where it would have too many unknowns."""
+    mesh, scale = now.problem.mesh, float(np.abs(now.best).max(initial=0.0))
+    each = now.solutions[0].space.n_dof / len(mesh.cells)
+    for share in aim * 2.0 ** np.arange(1 + _GENTLER):
+        wanted = tolerance * scale * share
+        ratio = smaller(now.shares, now.bar.ravel(), wanted, _ORDER, mesh.dim)
+        ratio = np.minimum(ratio, np.minimum(_at_coarse_tips(now), _along_bent_cracks(now)))
+        fine = refine_to(mesh, ratio * mesh.cell_size, _SWEEPS)
+        while len(fine.cells) < _LEAST * len(mesh.cells):  # the bar does not follow the shares
+            largest = np.argsort(now.shares.max(axis=0, initial=0.0))[
+                -(len(mesh.cells) // 10) - 1 :
+            ]
+            ratio[largest] /= 2
+            fine = refine_to(mesh, ratio * mesh.cell_size, _SWEEPS)
+        if each * len(fine.cells) <= most:
+            return fine
+    return None
+
+
+def _at_coarse_tips(now: Measured) -> Floats:
+    """Half of the size around tips that have no bar."""
+    mesh = now.problem.mesh
+    ratio = np.ones(len(mesh.cells))
+    centre = mesh.points[mesh.cells].mean(axis=1)
+    for sif in (sif for state in now.sifs for sif in state):
+        for x, reason in zip(sif.x, sif.reasons, strict=True):
+            distance = np.linalg.norm(centre - x, axis=1)
+            near = distance <= 2 * mesh.cell_size[np.argmin(distance)]
+            ratio[near & bool(reason)] = 0.5
+    return ratio
+
+
+def _along_bent_cracks(now: Measured) -> Floats:
+    """Half of the size along cracks that press at kinks, a quarter at the kinks."""
+    mesh = now.problem.mesh
+    ratio = np.ones(len(mesh.cells))
+    centre = mesh.points[mesh.cells].mean(axis=1)
+    for c in _bent(now):
+        x = now.problem.placed[c].points
+        for a, b in zip(x[:-1], x[1:], strict=True):
+            distance = np.linalg.norm(centre - closest_on_segment(centre, a, b), axis=1)
+            ratio[distance <= mesh.cell_size] = 0.5
+        for kink in kinks(x):
+            ratio[np.linalg.norm(centre - kink, axis=1) <= 2 * mesh.cell_size] = 0.25
+    return ratio
+
+
+def _bent(given: Measured) -> tuple[int, ...]:
+    """Cracks that press and have kinks, of whose pressures the estimates see a part only."""
+    return tuple(c for c in given.pressed if len(kinks(given.problem.placed[c].points)))
+
+
+__all__ = ["first_mesh", "next_mesh", "trusted"]
