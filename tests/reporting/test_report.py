@@ -135,6 +135,29 @@ def test_report_of_a_run_and_of_its_folder(tmp_path):
     assert again["growth"]["whole"] is True
 
 
+def test_report_of_a_life_and_of_bars(tmp_path):
+    """The numbers are those of `xc.life` and of `SIF.bar`."""
+    law = xc.elber(C=1e-11, m=3, a=0.5, b=0.4)
+    history = growth(plate())
+    scatter = xc.Scatter(C=xc.lognormal(0.3), load=xc.lognormal(0.05))
+    life = xc.life(history, law, scatter=scatter, samples=2000, seed=811)
+    _, _, numbers = read(xc.report(history, tmp_path / "life.html", life=life))
+    assert numbers["life"]["quantiles"]["50"] == life.percentile(50)
+    assert numbers["life"]["scatter"].keys() == life.scatter.keys()
+    solution = xc.solve(plate())
+    sif = xc.stress_intensity(solution)
+    text, _, numbers = read(xc.report(solution, tmp_path / "bars.html"))
+    for k, row in enumerate(numbers["K"]["rows"]):
+        if np.isfinite(sif.bar[k, 0]):
+            assert row["± K_I"] == sif.bar[k, 0]
+            assert row["best K_I"] == sif.best[k, 0]
+        else:
+            assert row["± K_I"] == "nan"
+            assert sif.reasons[k] in text
+    with pytest.raises(xc.ProblemError, match=r"give what xc.life returns"):
+        xc.report(solution, tmp_path / "bars.html", life=3)
+
+
 def test_a_half_written_run_is_reported(tmp_path):
     growth(plate(), tmp_path / "run")
     header = tmp_path / "run" / "run.json"

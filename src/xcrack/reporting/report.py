@@ -11,6 +11,7 @@ from typing import Any
 from xcrack.errors import ProblemError, XcrackError
 from xcrack.history.versions import versions
 from xcrack.inputs import number, shown
+from xcrack.lives.life import Life
 from xcrack.markup import Markup, element, joined, listed, page
 from xcrack.paths import path_of, system_errors
 from xcrack.plotting.report_pictures import Picture, history_pictures, solution_pictures
@@ -29,6 +30,7 @@ def report(
     *,
     title: str = "",
     yield_stress: float | None = None,
+    life: Life | None = None,
 ) -> Path:
     """Write what was modelled and what came out, as one page that needs no network.
 
@@ -46,6 +48,8 @@ def report(
     title : str
     yield_stress : float, stress, optional
         Lets the report compare plastic zones with crack and cell.
+    life : Life, optional
+        What `xc.life` made of the run: the report shows it and what drives it.
 
     Returns
     -------
@@ -64,7 +68,9 @@ def report(
         raise ProblemError(f"report: title = {shown(title)}: give a text.")
     if yield_stress is not None:
         yield_stress = number(yield_stress, "report: yield_stress", above=0)
-    source = source_of(result, title, yield_stress)
+    if not isinstance(life, Life | None):
+        raise ProblemError(f"report: life = {shown(life)}: give what xc.life returns.")
+    source = source_of(result, title, yield_stress, life)
     sections = [made for make in SECTIONS if (made := make(source)) is not None]
     with system_errors("the report cannot be written to", path, error=ProblemError):
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -75,17 +81,17 @@ def report(
 
 def pictures(source: Source) -> Section:
     """Pictures; why some are missing is said."""
-    shown, missing = solution_pictures(source.solutions, source.sif)
+    drawn, missing = solution_pictures(source.solutions, source.sif)
     if source.history is not None:
         of_run, lost = history_pictures(source.history)
-        shown, missing = shown + of_run, missing + lost
-    parts: list[Any] = [_figure(picture) for picture in shown]
+        drawn, missing = drawn + of_run, missing + lost
+    parts: list[Any] = [_figure(picture) for picture in drawn]
     if missing:
         parts += [element("p", "Not drawn here:", cls="soft"), listed(missing)]
     if not parts:
         parts.append(element("p", "There is nothing to draw yet."))
     return Section("pictures", "Pictures", joined(*parts),
-                   {"drawn": [words for words, _ in shown], "missing": missing})  # fmt: skip
+                   {"drawn": [words for words, _ in drawn], "missing": missing})  # fmt: skip
 
 
 def space_view(source: Source) -> Section | None:
@@ -114,6 +120,7 @@ SECTIONS: Sequence[Callable[[Source], Section | None]] = (
     scene.scene,
     space_view,
     results.growth,
+    results.lives,
     results.intensity,
     results.contact,
     scene.assumptions,

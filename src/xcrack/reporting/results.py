@@ -32,7 +32,11 @@ def intensity(source: Source) -> Section | None:
                                 **dict(zip(head, map(_plain, row), strict=True))})  # fmt: skip
     first = ("state", "crack", _END[source.dim])
     note = ("spread: difference between two domains of the integral; domain: radius of the larger "
-            "one, in cells. K_I of closed places is exactly zero.")  # fmt: skip
+            "one, in cells. K_I of closed places is exactly zero. best ± bar: estimate of exact K "
+            "and half-width of its error, nan where there is none.")  # fmt: skip
+    reasons = {reason for state in source.sif for sif in state for reason in sif.reasons if reason}
+    if reasons:
+        note += f" No bars: {'; '.join(sorted(reasons))}."
     content = joined(table((*first, *head), rows, scroll=len(rows) > 12 or source.dim > 2),
                      element("p", note, cls="soft"))  # fmt: skip
     return Section("K", "Stress intensity factors", content, {"rows": numbers})
@@ -46,17 +50,23 @@ def _row(sif: SIF, mine: Any, dim: int) -> tuple[tuple[str, ...], tuple[Any, ...
 
 def _at_tip(sif: SIF, mine: Any, quality: Any) -> tuple[tuple[str, ...], tuple[Any, ...]]:
     K, closed = sif.K[mine][0], bool(sif.closed[mine].any())
+    best, bar = sif.best[mine][0], sif.bar[mine][0]
     place = "(" + ", ".join(f"{v:.6g}" for v in sif.x[mine][0]) + ")"
-    head = ("place", "K_I", "K_II", "T", "spread", "domain", "closed")
-    return head, (place, K[0], K[1], sif.T[mine][0], *quality, closed)
+    head = ("place", "K_I", "K_II", "T", "best K_I", "± K_I", "best K_II", "± K_II", "spread",
+            "domain", "closed")  # fmt: skip
+    bars = (best[0], bar[0], best[1], bar[1])
+    return head, (place, K[0], K[1], sif.T[mine][0], *bars, *quality, closed)
 
 
 def _along_front(sif: SIF, mine: Any, quality: Any) -> tuple[tuple[str, ...], tuple[Any, ...]]:
     K, closed = sif.K[mine], int(sif.closed[mine].sum())
     head = ("places", *(f"{mode} {end}" for mode in _MODES for end in ("min", "mean", "max")),
-            "spread", "domain", "closed places")  # fmt: skip
+            "largest ± K_I", "± K_II", "± K_III", "spread", "domain",
+            "closed places")  # fmt: skip
+    bar = sif.bar[mine]
+    bars = [float(np.nanmax(column)) if np.isfinite(column).any() else np.nan for column in bar.T]
     ends = [f(K[:, m]) for m in range(3) for f in (np.min, np.mean, np.max)]
-    return head, (int(mine.sum()), *map(float, ends), *quality, closed)
+    return head, (int(mine.sum()), *map(float, ends), *bars, *quality, closed)
 
 
 _ROW = {2: _at_tip, 3: _along_front}
@@ -124,6 +134,28 @@ def growth(source: Source) -> Section | None:
     return Section("growth", "Growth and life", joined(*parts), numbers)
 
 
+def lives(source: Source) -> Section | None:
+    """Life with its error bar, and what drives it."""
+    life = source.life
+    if life is None:
+        return None
+    levels = (1, 5, 50, 95, 99)
+    quantiles = [(f"{p} % of the samples end before", life.percentile(p)) for p in levels]
+    drivers = sorted(life.scatter.items(), key=lambda item: item[1][0] - item[1][1])
+    parts: list[Any] = [table((), [(f"life of the run, {life.unit}s", life.life), *quantiles])]
+    if drivers:
+        rows = [(name, low, high, high / low) for name, (low, high) in drivers]
+        head = ("what varies alone", "5 %", "95 %", "ratio")
+        parts += [element("h3", "What drives it"), table(head, rows)]
+    if life.bounds:
+        bounds = [(name, f"{100 * share:.3g} %") for name, share in life.bounds.items()]
+        parts += [element("h3", "Numerical bounds, as shares of the life"), table((), bounds)]
+    values = {"life": life.life, "quantiles": {str(p): _plain(life.percentile(p)) for p in levels},
+              "scatter": {k: list(map(_plain, v)) for k, v in life.scatter.items()},
+              "bounds": {k: _plain(v) for k, v in life.bounds.items()}}  # fmt: skip
+    return Section("life", "Life with its error bar", joined(*parts), values)
+
+
 def numbers(source: Source) -> Section | None:
     """The table of a run, to read and to save."""
     history = source.history
@@ -156,4 +188,4 @@ def _plain(value: Any) -> Any:
     return value
 
 
-__all__ = ["contact", "growth", "intensity", "numbers"]
+__all__ = ["contact", "growth", "intensity", "lives", "numbers"]

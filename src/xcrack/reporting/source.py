@@ -3,7 +3,7 @@
 import hashlib
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -15,6 +15,7 @@ from xcrack.crack.crack import Crack
 from xcrack.errors import ProblemError, XcrackError, collected_warnings
 from xcrack.history.collect import load
 from xcrack.history.history import History
+from xcrack.lives.life import Life
 from xcrack.mesh.mesh import Mesh
 from xcrack.paths import path_of
 from xcrack.scene.problem import Problem
@@ -37,6 +38,7 @@ class Source:
         ``sif[state][crack]`` of the same step.
     history : History, optional
     yield_stress : float, optional
+    life : Life, optional
     warnings : mapping of str to int
         What was warned of, and how often.
     """
@@ -47,6 +49,7 @@ class Source:
     history: History | None = None
     yield_stress: float | None = None
     warnings: Counter[str] = field(default_factory=Counter)
+    life: Life | None = None
 
     @property
     def problem(self) -> Problem | None:
@@ -96,7 +99,9 @@ class Source:
         }
 
 
-def source_of(given: Any, title: str, yield_stress: float | None) -> Source:
+def source_of(
+    given: Any, title: str, yield_stress: float | None, life: Life | None = None
+) -> Source:
     """Gather what a report is about.
 
     Raises
@@ -116,7 +121,7 @@ def source_of(given: Any, title: str, yield_stress: float | None) -> Source:
             solutions = _solutions(given)
             source = Source(title or "Solution", solutions, _sif(solutions), None, yield_stress)
     source.warnings.update(messages)
-    return source
+    return replace(source, life=life)
 
 
 def _of_history(history: History, title: str, yield_stress: float | None) -> Source:

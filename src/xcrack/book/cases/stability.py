@@ -21,7 +21,7 @@ def _flat(constants: dict[str, float]) -> list[Value]:
     return [
         Value(f"constant, {first[0]}", first[1], 0.5, 0.3, 1.0),
         *(
-            Value(f"share that is lost, {name}", max(1 - value / first[1], 0.0), 0.0, 0.15, 1.0)
+            Value(f"share that is lost, {name}", max(1 - value / first[1], 0.0), 0.0, 0.2, 1.0)
             for name, value in others
         ),
     ]

@@ -1,0 +1,39 @@
+"""The site is built without a warning: every link and anchor leads somewhere."""
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+NEEDS = ("sphinx", "myst_parser", "numpydoc")
+MISSING = [name for name in NEEDS if find_spec(name) is None]
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(bool(MISSING), reason=f"site not available: no {', '.join(MISSING)}")
+def test_the_site_has_no_warning(tmp_path):
+    """Without the examples, which `make docs` runs."""
+    for name in ("docs", "examples", "src"):
+        ignored = shutil.ignore_patterns("gallery", "reference", "about", "__pycache__", "out")
+        shutil.copytree(ROOT / name, tmp_path / name, ignore=ignored)
+    shutil.copytree(ROOT / "docs/figures", tmp_path / "docs/figures", dirs_exist_ok=True)
+    for name in ("CHANGELOG.md", "CONTRIBUTING.md"):
+        shutil.copy(ROOT / name, tmp_path / name)
+    command = [sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going", "-b", "html"]
+    run = subprocess.run([*command, "docs", "site"], cwd=tmp_path, capture_output=True, text=True,
+                         env={**os.environ, "XCRACK_DOCS_RUN": "0"}, check=False)  # fmt: skip
+    assert run.returncode == 0, run.stderr[-3000:]
+    pages = {
+        path.relative_to(tmp_path / "site"): path for path in (tmp_path / "site").rglob("*.html")
+    }
+    assert len(pages) > 30
+    for name, path in pages.items():
+        text = path.read_text(encoding="utf-8")
+        for link in re.findall(r'(?:href|src)="([^"#:]+)(?:#[^"]*)?"', text):
+            assert (path.parent / link.partition("?")[0]).exists(), f"{name} links to {link}"
