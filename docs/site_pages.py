@@ -15,7 +15,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-QUICK = ("edge_crack_growth", "plate_with_hole", "two_holes")
+QUICK = ("edge_crack_growth",)
 GROUPS = {
     "Bodies and meshes": ("mesh.",),
     "Cracks": ("crack.",),
