@@ -210,7 +210,7 @@ ENTRIES = [
                 Filename(known=("there.msh",)),
                 "there.msh",
                 near=paths(".msh", ".msh") | DAMAGED,
-                words=["mesh file", "triangles"],
+                words=["mesh file", "triangles", "cell"],
             ),
             "strict": arg(Flag(), False, True),
         },

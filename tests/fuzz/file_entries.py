@@ -94,7 +94,7 @@ ENTRIES = [
                 words=["solution"],
             ),
             "path": arg(
-                Filename(endings=(".npz",)),
+                Filename(),
                 "good.npz",
                 near={k: v for k, v in paths(".npz", "").items() if "other" not in k},
                 words=["result"],

@@ -114,7 +114,12 @@ GROW = {
         Number(optional=True, above=0, rule=lambda v: True if 0.1 <= v <= 0.3 else None), 0.2
     ),
     "cycles": arg(Number(optional=True, above=0, rule=lambda v: None), None),
-    "scaling": arg(Word(words=("law", "linear")), "law", "linear"),
+    "scaling": arg(
+        Seen(
+            rule=lambda v: isinstance(v, str) and (v == "law" or (None if v == "linear" else False))
+        ),
+        "law",
+    ),
     "integrator": arg(Word(words=("pec", "euler")), "pec", "euler"),
     "threshold": arg(Number(least=0), 0.0, 0.1),
     "K_c": arg(Number(optional=True, above=0), None, 1e3),

@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 
 import xcrack as xc
-from fuzz.entry import Entry, arg
+from fuzz.entry import Entry, Hook, arg
 from fuzz.kinds import Called, Number, Numbers, Of, Seen, Whole, Word, real
 from support.growth_fakes import mode_I, plate, sif
 from xcrack.growth.step import Memory, Step
@@ -203,7 +203,7 @@ ENTRIES = [
     Entry(
         "growth_curve",
         lambda a, N: CURVE.cycles_at(a) + CURVE.length_at(N),
-        {"a": arg(Number(above=0), 7.0), "N": arg(Number(least=0), 1e4)},
+        {"a": arg(Number(least=0), 7.0), "N": arg(Number(least=0), 1e4)},
     ),
     Entry(
         "inspection",
@@ -229,7 +229,7 @@ ENTRIES = [
                 ),
                 None,
             ),
-            "pod": arg(Of(optional=True, type=xc.logistic_pod, rule=lambda v: None), None),
+            "pod": arg(Called(optional=True), None),
             "a_detect": arg(Number(least=5, below=17), 8.0),
             "factor": arg(Number(least=1), 3),
         },
@@ -246,4 +246,12 @@ ENTRIES = [
         {"law": arg(Called(), LAW)},
     ),
 ]
-HOOKS = []
+HOOKS = [
+    Hook(
+        "inspection",
+        lambda f: xc.inspection(HISTORY, a_detect=8.0, pod=f).interval,
+        xc.logistic_pod(8.0, 0.4),
+        Number(least=0, most=1),
+        "probability of detection",
+    ),
+]

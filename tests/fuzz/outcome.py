@@ -177,8 +177,10 @@ def _folder(wanted):
         yield
         return
     before = os.getcwd()
-    with tempfile.TemporaryDirectory(prefix="xcrack_fuzz_") as folder:
-        prepare(Path(folder))
+    with tempfile.TemporaryDirectory(prefix="xcrack_fuzz_") as parent:
+        folder = Path(parent) / "inner"  # so that .. holds nothing of others
+        folder.mkdir()
+        prepare(folder)
         os.chdir(folder)
         try:
             yield

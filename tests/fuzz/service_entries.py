@@ -162,7 +162,7 @@ ENTRIES = [
                     name: lambda name=name: f"{name}.txt"
                     for name in ("words", "nan", "ragged", "empty", "still")
                 },
-                words=["spectrum", ".txt", "line"],
+                words=["spectrum", "txt", "line", "numbers"],
             ),
             "column": arg(Whole(least=0, most=1), 0, 1),
             "rows": arg(Flag(), False),

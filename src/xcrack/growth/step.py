@@ -210,7 +210,9 @@ class Step:
                 )
         numbers(self.levels, "Step: levels", (None,))
         if not isinstance(self.error, StepError | None):
-            raise ProblemError(f"Step: error = {shown(self.error)}: that is made by grow.")
+            raise ProblemError(
+                f"Step: error = {shown(self.error)}: that is made by grow: leave it out."
+            )
         states = [entries(state, "Step: sif") for state in entries(self.sif, "Step: sif")]
         if not all(isinstance(sif, SIF) for state in states for sif in state):
             raise ProblemError(f"Step: sif = {shown(self.sif)}: give SIF of states and cracks.")
@@ -226,7 +228,9 @@ class Step:
                 "one for each tip, or place along a front, of each crack."
             )
         if not isinstance(self.memory, Memory | None):
-            raise ProblemError(f"Step: memory = {shown(self.memory)}: that is made by grow.")
+            raise ProblemError(
+                f"Step: memory = {shown(self.memory)}: that is made by grow: leave it out."
+            )
 
     def _repr_html_(self) -> str:
         parts = zip(self.angle, self.dK_eq, self.R, self.rate, self.da, strict=True)

@@ -1,6 +1,7 @@
 """When to look, and what the chance is that all looks miss."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -9,7 +10,7 @@ from xcrack.arrays import Floats
 from xcrack.errors import ProblemError
 from xcrack.history.driving import cycles_of, driving
 from xcrack.history.history import History
-from xcrack.inputs import number, numbers, shown
+from xcrack.inputs import called, number, numbers, shown
 
 _MOST_LOOKS = 1000
 
@@ -231,8 +232,14 @@ def inspection(
     if pod is not None and not callable(pod):
         raise ProblemError(f"inspection: pod = {shown(pod)}: give logistic_pod.")
     a = np.array([curve.length_at(N) for N in at])
-    missed = None if pod is None else float(np.prod([1 - float(pod(each)) for each in a]))
+    missed = None if pod is None else float(np.prod([1 - _detected(pod, each) for each in a]))
     return Inspection(first, every, at, a, missed)
+
+
+def _detected(pod: Any, a: float) -> float:
+    """Probability of detection of a length, by a function of the user's."""
+    answer = called(pod, f"the probability of detection at a = {a:.6g}", a)
+    return number(answer, "inspection: what pod returned", least=0, most=1)
 
 
 __all__ = ["GrowthCurve", "Inspection", "growth_curve", "inspection", "logistic_pod"]

@@ -9,6 +9,8 @@ from xcrack.arrays import Floats
 from xcrack.errors import ProblemError
 from xcrack.inputs import number, numbers, shown
 
+_LARGEST = 1e120  # K whose square is a number
+
 
 @dataclass(frozen=True)
 class plastic_zone:  # noqa: N801 - it is used as a function
@@ -44,8 +46,12 @@ class plastic_zone:  # noqa: N801 - it is used as a function
 
     def __call__(self, K: ArrayLike) -> Floats:
         """Size for K, length."""
-        with np.errstate(over="ignore"):
-            return np.asarray(self.factor * numbers(K, "plastic_zone: K") ** 2)[()]
+        given = numbers(K, "plastic_zone: K")
+        if np.abs(given).max(initial=0.0) > _LARGEST:
+            raise ProblemError(
+                f"plastic_zone: K = {np.abs(given).max():.3g} has no square: take another unit."
+            )
+        return np.asarray(self.factor * given**2)[()]
 
     @property
     def factor(self) -> float:

@@ -11,7 +11,7 @@ import numpy as np
 
 from xcrack.arrays import Bools, Floats
 from xcrack.errors import GeometryError, MeshError
-from xcrack.inputs import called, whole_numbers
+from xcrack.inputs import called, shown, whole_numbers
 from xcrack.mesh.gmsh_session import session
 from xcrack.mesh.grading import length_of
 from xcrack.mesh.mesh import Mesh, sound_mesh
@@ -207,7 +207,13 @@ def _mesh(gmsh: ModuleType, dim: int, source: str, sets: Mapping[str, Selector])
 
 def _selected(selector: Callable[[Floats], Any], points: Floats, face: Any, name: str) -> bool:
     x = points[np.unique(face)]
-    inside = np.asarray(called(selector, f"sets[{name!r}]", x))
+    result = called(selector, f"sets[{name!r}]", x)
+    try:
+        inside = np.asarray(result)
+    except Exception as error:  # ragged rows, or what an object's own __array__ raises
+        raise GeometryError(
+            f"sets[{name!r}] returned {shown(result)}: return one bool for each point."
+        ) from error
     if inside.shape != (len(x),) or inside.dtype != bool:
         raise GeometryError(
             f"sets[{name!r}] returned shape {inside.shape} of {inside.dtype} for {len(x)} points: "

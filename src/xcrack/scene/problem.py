@@ -212,7 +212,9 @@ def crack_number(problem: Problem, crack: Any, what: str) -> int:
     """A crack of the problem by number, checked."""
     n = len(problem.cracks)
     if not n:
-        raise ProblemError(f"{what}: crack {shown(crack)}: the problem has no crack.")
+        raise ProblemError(
+            f"{what}: crack {shown(crack)}: the problem has no crack: give one with."
+        )
     index = whole(crack, f"{what}: crack", least=0)
     if index >= n:
         raise ProblemError(
