@@ -94,6 +94,8 @@ _HOME = {
     "residual_strength": "lives.assessment",
     "geometry_factors": "lives.assessment",
     "energy_release_rate": "sif.energy",
+    "campaign": "campaigns.campaign",
+    "grid": "campaigns.campaign",
     "growth_curve": "lives.inspection",
     "inspection": "lives.inspection",
     "logistic_pod": "lives.inspection",

@@ -11,6 +11,7 @@ import numpy as np
 
 from fuzz import (
     body_entries,
+    campaign_entries,
     case_entries,
     chart_entries,
     crack_entries,
@@ -33,6 +34,7 @@ PARTS = (
     case_entries,
     chart_entries,
     generator_entries,
+    campaign_entries,
     crack_entries,
     load_entries,
     problem_entries,

@@ -31,6 +31,8 @@ NAMES = [
     "presets", "rate_table", "schijve_closure", "stepped_threshold",
     # verification, reports, files of scenes
     "verify", "report", "read_case", "run", "info", "demo", "convert_mesh",
+    # campaigns
+    "campaign", "grid",
     # lives
     "Scatter", "growth_curve", "inspection", "life", "logistic_pod", "lognormal", "normal",
     "assessment_line", "energy_release_rate", "geometry_factors", "opening_load",

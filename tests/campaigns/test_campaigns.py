@@ -1,0 +1,160 @@
+"""Campaigns: rows, failures, resuming, workers that die, clients, and what is refused."""
+
+import json
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+
+from support import campaign_cases
+from xcrack.campaigns.campaign import campaign, grid
+from xcrack.campaigns.row import key_of
+from xcrack.errors import ProblemError
+
+
+def test_rows_and_failures(tmp_path):
+    cases = grid(a=[1, 2, 3, 4], load=[1.0, 2.0])
+    study = campaign(campaign_cases.formula, cases, path=tmp_path / "study")
+    table = study.table()
+    assert table["a"].tolist() == [1, 1, 2, 2, 3, 3, 4, 4]
+    assert table["life"][:4].tolist() == [1e6, 1.25e5, 5e5, 6.25e4]
+    assert np.isnan(table["life"][4:]).all()
+    assert [row["kind"] for row in study.failed] == [
+        *["ProblemError"] * 2,
+        *["ZeroDivisionError"] * 2,
+    ]
+    assert "nobody expected this" in study.failed[-1]["trace"]
+    assert study.failed[0]["trace"] == ""
+    assert table["error"][4] == "no crack of 3."
+
+
+def test_finished_cases_are_not_run_again(tmp_path):
+    cases = [{"a": a, "folder": str(tmp_path)} for a in range(3)]
+    for _ in range(3):
+        study = campaign(campaign_cases.counted, cases, path=tmp_path / "study")
+    more = [*cases, {"a": 7, "folder": str(tmp_path)}]
+    study = campaign(campaign_cases.counted, more, path=tmp_path / "study")
+    assert study.table()["twice"].tolist() == [0, 2, 4, 14]
+    assert all((tmp_path / f"ran_{a}").read_text() == "x" for a in (0, 1, 2, 7))
+    key = key_of(cases[1])  # a damaged row is run again
+    (tmp_path / "study" / f"row_{key}.json").write_text("{")
+    campaign(campaign_cases.counted, cases, path=tmp_path / "study")
+    assert (tmp_path / "ran_1").read_text() == "xx"
+
+
+def test_failures_are_repeated_on_demand(tmp_path):
+    cases = grid(a=[1, 3])
+    campaign(campaign_cases.formula, cases, path=tmp_path)
+    file = tmp_path / f"row_{key_of(cases[1])}.json"
+    before = file.stat().st_mtime_ns
+    campaign(campaign_cases.formula, cases, path=tmp_path)
+    assert file.stat().st_mtime_ns == before
+    campaign(campaign_cases.formula, cases, path=tmp_path, retry=True)
+    assert file.stat().st_mtime_ns > before
+
+
+def test_any_client_with_submit(tmp_path):
+    with ThreadPoolExecutor(2) as pool:
+        study = campaign(campaign_cases.formula, grid(a=[1, 2]), path=tmp_path, client=pool)
+    assert study.table()["life"].tolist() == [1e6, 5e5]
+
+
+class Dying:
+    """A client that answers some times, and then no more."""
+
+    def __init__(self, answers):
+        self.left = answers
+
+    def submit(self, function, *arguments):
+        self.left -= 1
+        lives = self.left >= 0
+
+        class Future:
+            def result(self):
+                if not lives:
+                    raise ConnectionError("the scheduler is gone")
+                return function(*arguments)
+
+        return Future()
+
+
+def test_a_client_that_dies_loses_nothing(tmp_path):
+    cases = grid(a=[1, 2, 5, 6])
+    with pytest.raises(ProblemError, match=r"no answer for the case .*the scheduler is gone"):
+        campaign(campaign_cases.formula, cases, path=tmp_path, client=Dying(2))
+    assert len(list(tmp_path.glob("row_*.json"))) == 2
+    study = campaign(campaign_cases.formula, cases, path=tmp_path)
+    assert not study.failed
+    assert study.table()["life"].tolist() == [1e6, 5e5, 2e5, 1e6 / 6]
+
+
+def test_names_of_cases_do_not_change():
+    """By the parameters alone: of these two since the first version."""
+    assert key_of({"a": 5, "load": 0.8}) == key_of({"load": 0.8, "a": 5})
+    assert key_of({"a": 5, "load": 0.8}) == "2238ff9b7d50a08d"
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"case": 3}, "case = 3"),
+        ({"cases": 3}, "cases = 3"),
+        ({"cases": []}, "empty"),
+        ({"cases": [3]}, r"cases\[0\] = 3"),
+        ({"cases": [{"a": np.nan}]}, "finite"),
+        ({"cases": [{"a": [1, 2]}]}, r"cases\[0\]\['a'\]"),
+        ({"workers": 0}, "workers = 0"),
+        ({"client": 3}, "client = 3"),
+        ({"path": ""}, "path"),
+    ],
+)
+def test_bad_input(tmp_path, change, words):
+    given = {"case": campaign_cases.formula, "cases": [{"a": 1}], "path": tmp_path, **change}
+    case, cases = given.pop("case"), given.pop("cases")
+    with pytest.raises(ProblemError, match=words):
+        campaign(case, cases, **given)
+
+
+def test_a_folder_of_another_case_is_refused(tmp_path):
+    campaign(campaign_cases.formula, grid(a=[1]), path=tmp_path)
+    with pytest.raises(ProblemError, match="another case"):
+        campaign(campaign_cases.plate, grid(a=[5.0], stress=[1.0]), path=tmp_path)
+    (tmp_path / "study.json").write_text("[]")
+    with pytest.raises(ProblemError, match="no header"):
+        campaign(campaign_cases.formula, grid(a=[1]), path=tmp_path)
+    with pytest.raises(ProblemError, match="a = 'low'"):
+        grid(a="low")
+
+
+def test_a_case_must_return_numbers(tmp_path):
+    study = campaign(dict, [{"a": "text"}], path=tmp_path / "one")
+    assert study.table()["a"][0] == "text"
+    study = campaign(lambda a: a, [{"a": 1}], path=tmp_path / "two")
+    assert "give a History" in study.failed[0]["error"]
+
+
+@pytest.mark.slow
+@pytest.mark.mission
+def test_two_workers_killed_twice_lose_and_repeat_nothing(tmp_path):
+    """Each killed worker ends the call with an error; the next call goes on."""
+    cases = [{"a": a, "folder": str(tmp_path)} for a in range(40)]
+    for victim in (9, 24):
+        (tmp_path / f"kill_{victim}").touch()
+    for _ in range(2):
+        with pytest.raises(ProblemError, match="a worker died"):
+            campaign(campaign_cases.counted, cases, path=tmp_path / "study", workers=2)
+    study = campaign(campaign_cases.counted, cases, path=tmp_path / "study", workers=2)
+    assert study.table()["twice"].tolist() == [2.0 * a for a in range(40)]
+    rows = [json.loads(f.read_text()) for f in (tmp_path / "study").glob("row_*.json")]
+    assert len(rows) == 40
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore::xcrack.XcrackWarning")
+def test_workers_have_the_numbers_of_one_process(tmp_path):
+    cases = campaign_cases.drawn(6, 20266)
+    one = campaign(campaign_cases.plate, cases, path=tmp_path / "one").table()
+    two = campaign(campaign_cases.plate, cases, path=tmp_path / "two", workers=2).table()
+    assert not any(one["error"])
+    assert np.array_equal(one["life"], two["life"])
+    assert one["ended"].tolist() == two["ended"].tolist()
