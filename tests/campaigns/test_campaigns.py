@@ -147,6 +147,10 @@ def test_two_workers_killed_twice_lose_and_repeat_nothing(tmp_path):
     assert study.table()["twice"].tolist() == [2.0 * a for a in range(40)]
     rows = [json.loads(f.read_text()) for f in (tmp_path / "study").glob("row_*.json")]
     assert len(rows) == 40
+    # only what was under way when a worker died is run again
+    again = [len((tmp_path / f"ran_{a}").read_text()) - 1 for a in range(40)]
+    assert 2 <= sum(again) <= 6
+    assert max(again) == 1
 
 
 @pytest.mark.slow

@@ -185,11 +185,22 @@ def _run(
         for key, future in futures:
             _finish(folder, key, every[key], future)
     except BaseException:
-        for _, future in futures:
-            cancel = getattr(future, "cancel", None)
-            if callable(cancel):
-                cancel()
+        _harvest(folder, every, futures)
         raise
+
+
+def _harvest(
+    folder: Path, every: Mapping[str, dict[str, Any]], futures: list[tuple[str, Any]]
+) -> None:
+    """Store what has been finished when a study is broken off, and call off the rest."""
+    for key, future in futures:
+        if isinstance(future, Future) and future.done() and not future.cancelled():
+            if future.exception() is None and _read(folder, key) is None:
+                _finish(folder, key, every[key], future)
+            continue
+        cancel = getattr(future, "cancel", None)
+        if callable(cancel):
+            cancel()
 
 
 def _finish(folder: Path, key: str, parameters: dict[str, Any], future: Any) -> None:
