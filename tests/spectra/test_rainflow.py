@@ -107,7 +107,7 @@ def test_turning_points_of_plateaus():
         (lambda: rainflow([2.0, 2.0]), "do not vary"),
         (lambda: rainflow([1.0, np.nan]), "must be finite"),
         (lambda: rainflow("wing"), "real numbers"),
-        (lambda: Spectrum(), "Spectrum of nothing"),
+        (lambda: Spectrum(), "not nothing"),
         (lambda: Spectrum([0, 1], rows=[(0, 1, 1)]), "factors and rows"),
         (lambda: Spectrum([1.0]), "do not vary"),
         (lambda: Spectrum([]), "do not vary"),
