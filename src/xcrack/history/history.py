@@ -134,7 +134,7 @@ class History:
         -------
         Rerated
             With `cycles` at each step, `life`, and the `bound` of what other shares of the tips
-            would change; exact for one tip.
+            would change; 0 for one tip, where the error is that of the steps.
 
         Raises
         ------

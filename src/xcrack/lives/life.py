@@ -113,7 +113,8 @@ def life(
     """Lives of many samples on the path of one run.
 
     The run is not repeated: its steps are integrated again with the rates of each sample. That is
-    exact for a factor on the rate, and for the others where one tip grows, or all tips alike.
+    exact for a factor on the rate, and for the others as good as `History.rerate` where one tip
+    grows, or all tips alike.
 
     Parameters
     ----------
