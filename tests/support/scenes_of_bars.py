@@ -176,7 +176,9 @@ def outcome(seed, known=None, kinds=KINDS):
         return {"kind": name, "refused": "other tips"}  # an end near a side is a mouth there
     row = np.linalg.norm(tips - x[:, None], axis=2).argmin(axis=1)
     size = np.abs(wanted).max()
-    joined = {k: np.concatenate([getattr(s, k) for s in sif]) for k in ("K", "best", "bar", "closed")}
+    joined = {
+        k: np.concatenate([getattr(s, k) for s in sif]) for k in ("K", "best", "bar", "closed")
+    }
     error = np.nan_to_num(np.abs(joined["best"] - wanted[row])) / size
     bar = joined["bar"] / size
     doubt = known[2] / size
