@@ -1,10 +1,12 @@
 """Sections on what was asked: scene, assumptions, validity, inputs and how to run it again."""
 
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
 from xcrack.analysis.solution import Solution
+from xcrack.crack.measures import Measures, measures
 from xcrack.history.versions import versions
 from xcrack.markup import Markup, element, joined, listed, table
 from xcrack.reporting.section import Section
@@ -28,6 +30,14 @@ def scene(source: Source) -> Section:
     for c, crack in enumerate(source.cracks):
         rows.append((f"crack {c}", _crack(crack)))
     parts: list[Any] = [table((), rows)]
+    known = [] if mesh is None else [measures(crack, mesh) for crack in source.cracks]
+    if known:
+        size = {2: "length", 3: "area"}[source.dim]
+        head = ("crack", size, "depth", "on the surfaces", "ends")
+        parts.append(table(head, [_measured(c, m) for c, m in enumerate(known)]))
+        numbers["measures"] = [
+            asdict(m) | {"depth": None if np.isnan(m.depth) else m.depth} for m in known
+        ]
     if problem is not None and source.solutions:
         parts.append(_conditions(source.solutions[-1]))
     else:
@@ -43,6 +53,14 @@ def _crack(crack: Any) -> str:
     length = float(np.linalg.norm(np.diff(crack.points, axis=0), axis=1).sum())
     tips = "not placed" if crack.tips is None else f"{len(crack.tips)} tip(s)"
     return f"{len(crack.points)} points, length {length:.6g}, {tips}"
+
+
+def _measured(c: int, m: Measures) -> tuple[str, ...]:
+    """A crack as it is read off: lengths and depths by facet set, ends by place and set."""
+    surfaces = "; ".join(f"{t.name}: length {t.length:.4g}, depth {t.depth:.4g}" for t in m.traces)
+    ends = "; ".join(f"{_vector(end.x)} on {end.name}" for end in m.ends)
+    depth = "" if np.isnan(m.depth) else f"{m.depth:.6g}"
+    return str(c), f"{m.area:.6g}", depth, surfaces or "none", ends or "none"
 
 
 def _conditions(solution: Solution) -> Markup:
