@@ -272,3 +272,29 @@ def test_report_in_a_browser(kind, tmp_path):
     if kind != "plane":  # colours are those of the view alone, above the pictures
         coloured = np.ptp(image[400:], axis=2) > 0.15
         assert coloured.mean() > 0.005
+
+
+def test_cracks_are_measured(tmp_path):
+    """A mouth with its set, in the page and in the numbers; a crack inside has no depth."""
+    crack = xc.line_crack([(-1.1, 0.02), (-0.4, 0.02)])
+    inside = xc.line_crack([(0.2, -0.5), (0.6, -0.45)])
+    problem = xc.Problem(plate().mesh, STEEL, [crack, inside], loads=plate().loads, order=1)
+    page = xc.report(xc.solve(problem), tmp_path / "r.html").read_text(encoding="utf-8")
+    assert "left: length 0, depth 0.6" in page
+    text = (tmp_path / "r.json").read_text(encoding="utf-8")
+    numbers = json.loads(text, parse_constant=lambda name: pytest.fail(name))
+    (own,) = (v for v in _all(numbers, "measures"))
+    assert own[0]["depth"] == pytest.approx(0.6)
+    assert own[0]["ends"][0]["name"] == "left"
+    assert own[1]["depth"] is None
+
+
+def _all(value, key):
+    if isinstance(value, dict):
+        if key in value:
+            yield value[key]
+        for each in value.values():
+            yield from _all(each, key)
+    elif isinstance(value, list):
+        for each in value:
+            yield from _all(each, key)
