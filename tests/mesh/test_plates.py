@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from xcrack import optional
-from xcrack.errors import GeometryError, MeshError, XcrackError
+from xcrack.errors import GeometryError, MeshError, XcrackError, XcrackWarning
 from xcrack.mesh.files import read_mesh
 from xcrack.mesh.gmsh_session import SYSTEM_LIBRARIES, import_gmsh, session
 from xcrack.mesh.grading import graded_size, polylines
@@ -256,6 +256,7 @@ FILES = {
     "two_holes": 1893,
     "two_holes_free": 1893,
     "turning_load": 1309,
+    "compact_tension": 1235,
 }
 
 
@@ -309,3 +310,10 @@ def test_script_makes_the_meshes_of_the_examples():
         # another release of gmsh places nodes differently: only the numbers must be alike
         assert mesh.n_points == pytest.approx(stored.n_points, rel=0.1)
         assert set(mesh.facet_sets) == set(stored.facet_sets)
+
+
+def test_the_lug_of_another_program_is_of_second_order():
+    with pytest.warns(XcrackWarning, match="1557 cells of second or higher order"):
+        mesh = read_mesh(EXAMPLES / "lug.inp")
+    assert {"hole", "end", "front", "back"} < set(mesh.facet_sets)
+    np.testing.assert_allclose(np.hypot(*rim(mesh, "hole")[:, :2].T), 10.0, atol=1e-6)
