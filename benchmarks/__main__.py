@@ -36,7 +36,12 @@ def main(arguments: list[str] | None = None) -> int:
         0; argparse ends the process on options that do not exist.
     """
     # One thread a solve, as in a growth run beside others; set before numpy is loaded.
-    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+    for name in (
+        "OMP_NUM_THREADS",
+        "OPENBLAS_NUM_THREADS",
+        "MKL_NUM_THREADS",
+        "XCRACK_THREADS",
+    ):
         os.environ.setdefault(name, "1")
     from benchmarks import charts, runs
     from benchmarks.baselines import conforming_2d, getfem_runs

@@ -166,7 +166,8 @@ def serve(name: str) -> None:
 
 
 def _process(checkout: Path, name: str) -> subprocess.Popen[str]:
-    one = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+    names = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "XCRACK_THREADS")
+    one = dict.fromkeys(names, "1")
     environment = {**os.environ, "PYTHONPATH": str(checkout / "src"), **one}
     return subprocess.Popen(
         [sys.executable, __file__, "--serve", name], env=environment, text=True,

@@ -19,7 +19,12 @@ from pathlib import Path
 from statistics import median
 from time import process_time
 
-for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+for name in (
+    "OMP_NUM_THREADS",
+    "OPENBLAS_NUM_THREADS",
+    "MKL_NUM_THREADS",
+    "XCRACK_THREADS",
+):
     os.environ.setdefault(name, "1")
 
 import numpy as np  # noqa: E402

@@ -21,7 +21,12 @@ import time
 import warnings
 from pathlib import Path
 
-for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+for name in (
+    "OMP_NUM_THREADS",
+    "OPENBLAS_NUM_THREADS",
+    "MKL_NUM_THREADS",
+    "XCRACK_THREADS",
+):
     os.environ.setdefault(name, "1")
 
 ROOT = Path(__file__).resolve().parent.parent

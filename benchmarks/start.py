@@ -14,7 +14,12 @@ import time
 from pathlib import Path
 from statistics import median
 
-for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+for name in (
+    "OMP_NUM_THREADS",
+    "OPENBLAS_NUM_THREADS",
+    "MKL_NUM_THREADS",
+    "XCRACK_THREADS",
+):
     os.environ.setdefault(name, "1")
 
 START = """

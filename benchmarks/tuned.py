@@ -20,7 +20,7 @@ from statistics import median
 from time import process_time
 from typing import Any
 
-for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "XCRACK_THREADS"):
     os.environ.setdefault(_name, "1")
 
 from benchmarks.baselines import conforming_2d  # noqa: E402

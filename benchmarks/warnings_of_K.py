@@ -16,7 +16,12 @@ import sys
 import time
 from pathlib import Path
 
-for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+for name in (
+    "OMP_NUM_THREADS",
+    "OPENBLAS_NUM_THREADS",
+    "MKL_NUM_THREADS",
+    "XCRACK_THREADS",
+):
     os.environ.setdefault(name, "1")
 
 ROOT = Path(__file__).resolve().parent.parent
