@@ -29,12 +29,34 @@ class GoalPoints:
 
 
 @dataclass(frozen=True, eq=False)
+class GoalCells:
+    """Plain cells over which m functionals are integrated with each function of order 2.
+
+    Attributes
+    ----------
+    cells : (k,) array of int
+    on_nodes : (k, 6, 2, m) array
+        By shape function and component.
+    on_surplus : (k, 4, 2, m) array
+        By surplus function, the edges' in their local directions.
+    turn : (m,) array
+        Of a rigid rotation by minus one.
+    """
+
+    cells: Ints
+    on_nodes: Floats
+    on_surplus: Floats
+    turn: Floats
+
+
+@dataclass(frozen=True, eq=False)
 class Goal:
     """m functionals J = f . u + g . p + a constant of the loads.
 
     Attributes
     ----------
     parts : tuple of GoalPoints
+    cells : tuple of GoalCells
     rotation : (n_points, 2) array
         Mean rotation as a sum over the displacements of mesh points, which it is free of.
     crack : int
@@ -43,13 +65,14 @@ class Goal:
     """
 
     parts: tuple[GoalPoints, ...]
+    cells: tuple[GoalCells, ...]
     rotation: Floats
     crack: int
     pressure: Floats
 
     def on_functions(self, space: FunctionSpace) -> Floats:
         """The part f: each functional of each function and component `(n_dof, m)`."""
-        from xcrack.kernels.goal import add_to_functions
+        from xcrack.kernels.goal import add_cells, add_to_functions
 
         m = self.pressure.shape[1]
         total = np.zeros((space.n_functions, space.dim, m))
@@ -59,6 +82,10 @@ class Goal:
             for batch, number, row in space.batches_of_points(part.cell):
                 _, slope = space.tabulate(batch, row, part.bary[number], part.side[number])
                 add_to_functions(total, batch.functions, row, number, slope, part.factor)
+        for plain in self.cells:
+            turn += plain.turn
+            nodes = space.cell_nodes[plain.cells]
+            add_cells(total, nodes, np.ones(nodes.shape), plain.on_nodes)
         total[: len(self.rotation)] += self.rotation[:, :, None] * turn
         return total.reshape(-1, m)
 

@@ -17,7 +17,7 @@ from xcrack.estimation.goal import Goal
 from xcrack.mesh.mesh import local_edges
 from xcrack.scene.material import Isotropic
 from xcrack.xfem.function_space import FunctionSpace
-from xcrack.xfem.quadrature import cell_points
+from xcrack.xfem.quadrature import cell_points, cell_side
 
 _POINTS, _DEGREE = 3, 4  # where tip functions act; of the products of a cubic and a quadratic
 
@@ -136,11 +136,22 @@ def residuals(surplus: Surplus, material: Isotropic, coefficients: Floats) -> tu
 
 def goal_residual(surplus: Surplus, goal: Goal) -> Floats:
     """The functionals of each surplus function `(n + copies, 2, m)`."""
+    from xcrack.kernels.goal import add_cells
     from xcrack.kernels.surplus import add_functional
 
     result = np.zeros((len(surplus.fixed), 2, goal.pressure.shape[1]))
     for part in goal.parts:
         add_functional(result, part.cell, part.bary, part.side, part.factor, *surplus.arrays)
+    for plain in goal.cells:
+        functions = surplus.functions[plain.cells]
+        factor = np.ones(functions.shape)
+        factor[:, :3] = surplus.sign[plain.cells]
+        add_cells(result, functions, factor, plain.on_surplus)
+        copy = surplus.copy[functions]
+        if (copy >= 0).any():
+            side = cell_side(surplus.space, plain.cells)
+            side = np.take_along_axis(side, surplus.crack[functions], axis=1)
+            add_cells(result, copy, factor * side, plain.on_surplus)
     return result
 
 

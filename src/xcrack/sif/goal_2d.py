@@ -5,20 +5,20 @@ of bent faces in the gradients, those of straight ones in the pressures, and a c
 pressures, body forces and initial stress.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
 from xcrack.analysis.solution import Solution
 from xcrack.arrays import Floats
-from xcrack.estimation.goal import Goal, GoalPoints
+from xcrack.estimation.goal import Goal, GoalCells, GoalPoints
+from xcrack.mesh.simplex import simplex_rule
 from xcrack.scene.conditions import BodyForce, InitialStress
 from xcrack.sif.common import acts, weight
 from xcrack.sif.domain_2d import class_points, domain_of, ring_classes
 from xcrack.sif.interaction_2d import ahead_derivative, inner_radii, ring_around, volume_terms
-from xcrack.xfem.function_space import FunctionSpace
 from xcrack.xfem.loads import position
-from xcrack.xfem.quadrature import Points, cell_side
+from xcrack.xfem.quadrature import cell_side
 from xcrack.xfem.williams import continued_polar, mode_matrix, unit_gradients
 
 _STRAIGHT = 1e-9  # share of the radius below which a face is on the line through the tip
@@ -34,26 +34,37 @@ def tip_goal(solution: Solution, t: int) -> Goal:
     t : int
         Number of the tip in `space.tips`.
     """
-    from xcrack.kernels.goal import ring_factors
+    from xcrack.kernels.goal import plain_ring, ring_factors
 
     space, material = solution.space, solution.problem.material
-    tip = space.tips[t]
+    mesh, tip = space.mesh, space.tips[t]
     outer = domain_of(solution, t).outer
     inner = float(inner_radii(space.order, np.array([outer]))[0])
-    psi = space.cuts[tip.crack].level_set.psi[tip.number]
-    parts = []
-    for points in _domain_points(space, tip.x, inner, outer):
-        xi = (position(space, points.cell, points.bary) - tip.x) @ tip.frame.T
-        behind = psi[space.mesh.cells[points.cell]].mean(axis=1) < 0
-        _, theta = continued_polar(xi, points.side[:, tip.crack], behind)
-        factor = ring_factors(
-            xi, theta, points.weight, outer, inner, np.ascontiguousarray(tip.frame),
-            mode_matrix(material.kolosov, material.mu), material.lam, material.mu,
-            0.5 * material.E_prime,
-        )  # fmt: skip
-        parts.append(GoalPoints(points.cell, points.bary, points.side, factor))
-    on_faces, pressure, _ = _faces(solution, t, outer, inner)
-    return Goal((*parts, *on_faces), _rotation(solution, t, outer), tip.crack, pressure)
+    cut = space.cuts[tip.crack]
+    psi = cut.level_set.psi[tip.number]
+    ring = (
+        outer, inner, np.ascontiguousarray(tip.frame),
+        0.5 * material.E_prime * mode_matrix(material.kolosov, material.mu),
+        material.lam, material.mu,
+    )  # fmt: skip
+    parts, plain_parts = [], []
+    for cells, n, degree in ring_classes(space, tip.x, inner, outer):
+        plain = space.signature[cells] == 0
+        if plain.any():
+            integrals = plain_ring(
+                cells[plain], mesh.points, mesh.cells, mesh.gradient, mesh.volume, cut.side, psi,
+                *simplex_rule(2, degree), tip.x, *ring,
+            )  # fmt: skip
+            plain_parts.append(GoalCells(cells[plain], *integrals))
+        for points in class_points(space, cells[~plain], n, degree):
+            xi = (position(space, points.cell, points.bary) - tip.x) @ tip.frame.T
+            behind = psi[mesh.cells[points.cell]].mean(axis=1) < 0
+            _, theta = continued_polar(xi, points.side[:, tip.crack], behind)
+            factor = ring_factors(xi, theta, points.weight, *ring)
+            parts.append(GoalPoints(points.cell, points.bary, points.side, factor))
+    on_crack, pressure, _ = _faces(solution, t, outer, inner)
+    rotation = _rotation(solution, t, outer)
+    return Goal((*parts, *on_crack), tuple(plain_parts), rotation, tip.crack, pressure)
 
 
 def constant(solution: Solution, t: int) -> Floats:
@@ -68,18 +79,12 @@ def constant(solution: Solution, t: int) -> Floats:
     outer = domain_of(solution, t).outer
     radii = np.array([outer])
     ring = ring_around([solution], t, radii)
-    for points in _domain_points(space, space.tips[t].x, 0.0, outer):
-        total += scale * volume_terms([solution], ring, points)[0, 0, :2]
+    for cells, n, degree in ring_classes(space, space.tips[t].x, 0.0, outer):
+        for points in class_points(space, cells, n, degree):
+            total += scale * volume_terms([solution], ring, points)[0, 0, :2]
     steady = solution.initial_stress(space.tips[t].x[None])[0]
     _, _, per_stress = _faces(solution, t, outer, float(inner_radii(space.order, radii)[0]))
     return np.asarray(total + np.einsum("ijm,ij->m", per_stress, steady))
-
-
-def _domain_points(
-    space: FunctionSpace, centre: Floats, hollow: float, radius: float
-) -> Iterator[Points]:
-    for cells, n, degree in ring_classes(space, centre, hollow, radius):
-        yield from class_points(space, cells, n, degree)
 
 
 def _rotation(solution: Solution, t: int, outer: float) -> Floats:
