@@ -4,8 +4,8 @@
     python benchmarks/bars_of_K.py --seeds 0:0       # the table of what is stored
 
 Scenes are those of tests/support/scenes_of_bars.py. The coefficients were fitted to other seeds:
-20000 to 20299 of these scenes, and some 400 of `scenes_of_K` at order 2. Results add up in
-benchmarks/results/bars_of_K.json, seed by seed: a run that was stopped goes on.
+20000 to 20299 and 30000 to 30279 of these scenes, and some 400 of `scenes_of_K` at order 2.
+Results add up in benchmarks/results/bars_of_K.json, seed by seed: a run that was stopped goes on.
 """
 
 import argparse
@@ -15,6 +15,7 @@ import sys
 import time
 import warnings
 from pathlib import Path
+from typing import Any
 
 for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(name, "1")
@@ -47,7 +48,7 @@ def run(seeds: range, path: Path) -> None:
     write(path, stored)
 
 
-def short(value):
+def short(value: Any) -> Any:
     """Numbers of a few digits, nan as null."""
     if isinstance(value, dict):
         return {k: v if k == "known" else short(v) for k, v in value.items()}
@@ -126,7 +127,7 @@ def table(stored: dict) -> str:
 def main() -> None:
     """Run seeds and print the table."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--seeds", default="30000:30280")
+    parser.add_argument("--seeds", default="40000:40255")
     parser.add_argument("--file", type=Path, default=RESULTS)
     options = parser.parse_args()
     first, last = (int(part) for part in options.seeds.split(":"))

@@ -89,6 +89,21 @@ def test_kink_against_a_finer_mesh():
         assert np.abs(sif.best - fine.best).max() < 0.6 * np.abs(sif.K - fine.best).max()
 
 
+def test_faces_that_press_at_a_kink_have_no_bar():
+    """A rounded kink slides where a sharp one locks; a smooth closed arc has a bar."""
+    mesh = xc.box((-1, -1), (1, 1), 14)
+    loads = [xc.traction("top", (0.0, -1.0)), xc.traction("bottom", (0.0, 1.0))]
+    kink = [(-0.45, -0.2), (0.1, 0.05), (0.4, 0.3)]
+    sif = with_error(xc.Problem(mesh, UNIT, [xc.line_crack(kink)], loads=loads, order=2))
+    assert np.isnan(sif.bar).all()
+    assert "press at the kink" in sif.reasons[0]
+    t = np.linspace(-0.4, 0.4, 61)
+    arc = np.stack([0.9 * np.sin(t), 0.9 * (np.cos(t) - 1) + 0.05], axis=1) @ scenes.rows(0.5)
+    sif = with_error(xc.Problem(mesh, UNIT, [xc.line_crack(arc)], loads=loads, order=2))
+    assert sif.closed.any()
+    assert np.isfinite(sif.bar).all()
+
+
 def test_hole_whose_curve_is_known():
     """A polygon of few sides: most of what it changes is in eta."""
     K = {}

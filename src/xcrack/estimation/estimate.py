@@ -36,12 +36,15 @@ class Estimate:
         `end_changes`.
     z : (states, n_dof, m) array
         Dual solutions.
+    mu : tuple of (states, q, m) arrays
+        Dual pressures on the faces of each crack, at their points.
     """
 
     eta: Floats
     shares: Floats
     end: Floats
     z: Floats
+    mu: tuple[Floats, ...]
 
 
 def estimate(factored: Factored, solutions: Sequence[Solution], goals: Sequence[Goal]) -> Estimate:
@@ -69,12 +72,13 @@ def estimate(factored: Factored, solutions: Sequence[Solution], goals: Sequence[
     for k, solution in enumerate(solutions):
         r_u[:, :, k] += load_residual(w, solution)
     for c, lips in enumerate(factored.model.lips):
-        pressure = np.stack([_pressure(s, c) for s in solutions], axis=1)
+        pressure = np.stack([pressure_on(s, c) for s in solutions], axis=1)
         if pressure.any():
             r_u += face_residual(w, lips, pressure)
     e_u = solved(w, blocks, r_u)
     given = [imposed(w, s) for s in solutions]
     goal = np.concatenate([goal_residual(w, g) for g in goals], axis=2)
+    mus = tuple(np.zeros((len(solutions), len(lips), m)) for lips in factored.model.lips)
     eta, end = np.zeros((2, len(solutions), m))
     parts = np.zeros((len(solutions), m, len(space.mesh.cells)))
     for k, solution in enumerate(solutions):
@@ -85,6 +89,7 @@ def estimate(factored: Factored, solutions: Sequence[Solution], goals: Sequence[
             contact = factored.contact.spaces[c]
             if groups is not None and contact is not None:
                 mu = contact.values @ dual.mu[which][groups.crack == c]
+                mus[c][k] = mu
                 if mu.any():
                     r -= face_residual(w, lips, mu)
         each = np.einsum("nim,ni->nm", r, e_u[:, :, k] + given[k])
@@ -93,10 +98,10 @@ def estimate(factored: Factored, solutions: Sequence[Solution], goals: Sequence[
         if groups is not None:
             end[k] = end_changes(groups, dual, groups.N @ solution.u, solution.number)
     numbers = [s.number for s in solutions]
-    return Estimate(eta, parts, end, dual.z[dual.which[numbers]])
+    return Estimate(eta, parts, end, dual.z[dual.which[numbers]], mus)
 
 
-def _pressure(solution: Solution, c: int) -> Floats:
+def pressure_on(solution: Solution, c: int) -> Floats:
     """Pressure on the faces of crack c at their points, of contact and given `(q,)`."""
     lips = solution.lips[c]
     contact: Contact | None = solution.contact[c]

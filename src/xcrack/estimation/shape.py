@@ -9,8 +9,9 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from xcrack.analysis.solution import Solution, gradients_at
+from xcrack.analysis.solution import Solution, fields_at, gradients_at
 from xcrack.arrays import Floats, Ints
+from xcrack.estimation.estimate import Estimate, pressure_on
 from xcrack.mesh.mesh import Mesh
 from xcrack.xfem.loads import facet_points, position
 from xcrack.xfem.quadrature import Points, cell_side
@@ -24,37 +25,59 @@ _SMOOTH, _KINK, _BLUNT = 0.3, 0.8, 0.5
 
 
 def crack_shape(
-    solutions: Sequence[Solution], z: Floats, c: int, singular: Callable[[], Floats]
+    solutions: Sequence[Solution],
+    estimated: Estimate,
+    c: int,
+    singular: Callable[[], tuple[Floats, Floats]],
 ) -> tuple[Floats, Floats]:
     """Crack c as it was given, not as the cells cut it: changes `(states, m)`, and their bars.
 
-    The cut is straight in each cell: it rounds kinks off and follows arcs by chords.
+    The cut is straight in each cell: it rounds kinks off and follows arcs by chords. Faces under a
+    pressure p that move by delta and turn by dn change a functional by int delta [[sigma(u) :
+    eps(z) + p n . grad z n - mu n . grad u n]] + dn . [[p z - mu u]] ds, mu the dual pressure.
 
     Parameters
     ----------
     solutions : sequence of Solution
-    z : (states, n_dof, m) array
-        Dual solutions.
+    estimated : Estimate
     c : int
     singular : callable
-        Gradients on the faces - and + that z has and influence functions have not, `(2, q, 2,
-        2, m)`; called where the crack is not straight.
+        Values `(2, q, 2, m)` and gradients `(2, q, 2, 2, m)` on the faces - and + that z has and
+        influence functions have not; called where the crack is not straight.
     """
     space, lips = solutions[0].space, solutions[0].lips[c]
+    z, mu = estimated.z, estimated.mu[c]
     nothing = np.zeros((len(solutions), z.shape[2]))
-    foot, turn = _nearest_on(space.cracks[c].points, lips.x)
+    foot, turn, normal = _nearest_on(space.cracks[c].points, lips.x)
     away = _along_normal(foot - lips.x, lips.normal)
+    n = lips.normal
+    normal = normal * np.sign(np.einsum("qd,qd->q", normal, n))[:, None]
     moved = np.nonzero(np.abs(away) > 1e-9 * space.mesh.extent)[0]
     if not len(moved):
         return nothing, nothing
-    more = singular()[:, moved]
-    jump = np.zeros((len(moved), *nothing.shape))
+    values, slopes = (part[:, moved] for part in singular())
+    n, turned = n[moved], (normal - n)[moved]
+    pressure = np.stack([pressure_on(s, c)[moved] for s in solutions], axis=1)
+    shifted, tilted = np.zeros((2, len(moved), *nothing.shape))
     for s, sign in ((0, -1.0), (1, 1.0)):
         cell = lips.cell[moved, s]
         side = cell_side(space, cell)
         side[:, c] = int(sign)
-        jump += sign * _products(solutions, z, (cell, lips.bary[moved, s], side), more[s])
-    parts = (lips.weight[moved] * away[moved])[:, None, None] * jump
+        u, gradient = fields_at(space, _columns(solutions, z), cell, lips.bary[moved, s], side)
+        for k, solution in enumerate(solutions):
+            own, first = gradient[..., k], len(solutions) + k * z.shape[2]
+            dual = gradient[..., first : first + z.shape[2]] - slopes[s]
+            weight = u[..., first : first + z.shape[2]] - values[s]
+            sigma = solution.problem.material.stress(own)
+            shifted[:, k] += sign * np.einsum("qij,qijm->qm", sigma, dual)
+            normals = np.einsum("qi,qijm,qj->qm", n, dual, n)
+            shifted[:, k] += sign * pressure[:, k, None] * normals
+            opening = np.einsum("qi,qij,qj->q", n, own, n)
+            shifted[:, k] -= sign * mu[k][moved] * opening[:, None]
+            slid = np.einsum("qi,qim->qm", turned, weight) * pressure[:, k, None]
+            slid -= np.einsum("qi,qi->q", turned, u[..., k])[:, None] * mu[k][moved]
+            tilted[:, k] += sign * slid
+    parts = lips.weight[moved][:, None, None] * (away[moved][:, None, None] * shifted + tilted)
     doubt = _SMOOTH + _KINK * np.minimum(turn[moved] / _BLUNT, 1.0)
     return parts.sum(axis=0), np.einsum("q,qkm->km", doubt, np.abs(parts))
 
@@ -98,8 +121,8 @@ def _moved(solutions: Sequence[Solution], z: Floats, points: Points, away: Float
     return np.asarray(np.einsum("q,qkm->km", points.weight * away, density))
 
 
-def _nearest_on(polyline: Floats, x: Floats) -> tuple[Floats, Floats]:
-    """Nearest points on a polyline `(q, 2)`, and by how much it turns at the next vertex `(q,)`."""
+def _nearest_on(polyline: Floats, x: Floats) -> tuple[Floats, Floats, Floats]:
+    """Nearest points on a polyline, its turn at the next vertex `(q,)`, its normal there."""
     a, along = polyline[:-1], np.diff(polyline, axis=0)
     t = np.einsum("qsd,sd->qs", x[:, None] - a, along) / (along * along).sum(axis=1)
     t = np.clip(t, 0.0, 1.0)
@@ -108,7 +131,9 @@ def _nearest_on(polyline: Floats, x: Floats) -> tuple[Floats, Floats]:
     row = np.arange(len(x))
     heading = np.unwrap(np.arctan2(along[:, 1], along[:, 0]))
     turn = np.concatenate([[0.0], np.abs(np.diff(heading)), [0.0]])
-    return foot[row, best], turn[best + (t[row, best] > 0.5)]
+    normal = np.stack([-along[:, 1], along[:, 0]], axis=1)
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    return foot[row, best], turn[best + (t[row, best] > 0.5)], normal[best]
 
 
 def _along_normal(way: Floats, normal: Floats) -> Floats:
@@ -119,27 +144,24 @@ def _along_normal(way: Floats, normal: Floats) -> Floats:
     return np.where(steep, across, square / np.where(steep, 1.0, across + (across == 0)))
 
 
-def _products(
-    solutions: Sequence[Solution],
-    z: Floats,
-    points: tuple[Ints, Floats, Ints],
-    more: Floats | None = None,
-) -> Floats:
-    """sigma(u) : eps(z) at points given by cell, place and side `(q, states, m)`.
+def _columns(solutions: Sequence[Solution], z: Floats) -> Floats:
+    """Coefficients of the states, then of their dual solutions, with a last row of zeros."""
+    columns = np.concatenate([np.stack([s.u for s in solutions], axis=1), *z], axis=1)
+    stacked = columns.reshape(solutions[0].space.n_functions, 2, -1)
+    return np.concatenate([stacked, np.zeros((1, *stacked.shape[1:]))])
 
-    Gradients `more` (q, 2, 2, m) are taken off those of z.
-    """
+
+def _products(
+    solutions: Sequence[Solution], z: Floats, points: tuple[Ints, Floats, Ints]
+) -> Floats:
+    """sigma(u) : eps(z) at points given by cell, place and side `(q, states, m)`."""
     space, material = solutions[0].space, solutions[0].problem.material
     states, _, m = z.shape
-    columns = [np.stack([s.u for s in solutions], axis=1), *z]
-    stacked = np.concatenate(columns, axis=1).reshape(space.n_functions, 2, -1)
-    stacked = np.concatenate([stacked, np.zeros((1, *stacked.shape[1:]))])
-    gradient = gradients_at(space, stacked, *points)
+    gradient = gradients_at(space, _columns(solutions, z), *points)
     result = np.empty((len(points[0]), states, m))
     for k in range(states):
         first = states + k * m
         dual = gradient[..., first : first + m]
-        dual = dual if more is None else dual - more
         result[:, k] = np.einsum("qij,qijm->qm", material.stress(gradient[..., k]), dual)
     return result
 

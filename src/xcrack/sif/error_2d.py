@@ -3,8 +3,6 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from xcrack.analysis.solution import Solution
 from xcrack.arrays import Floats
 from xcrack.errors import ProblemError
@@ -66,10 +64,7 @@ def tip_errors(solutions: Sequence[Solution], crack: int) -> TipErrors:
     tips = [t for t, tip in enumerate(space.tips) if tip.crack == crack]
     with threads(solutions[0].problem.numerics.threads):
         result = estimate(factored, solutions, [tip_goal(solutions[0], t) for t in tips])
-        bend, bend_bar = crack_shape(
-            solutions, result.z, crack,
-            lambda: np.concatenate([on_faces(solutions[0], t) for t in tips], axis=-1),
-        )  # fmt: skip
+        bend, bend_bar = crack_shape(solutions, result, crack, lambda: on_faces(solutions[0], tips))
         rim, chords = rim_shape(solutions, result.z)
     shape = (len(solutions), len(tips), 2)
     return TipErrors(

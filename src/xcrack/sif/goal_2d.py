@@ -136,18 +136,29 @@ def _faces(
     return parts, pressure, per_stress
 
 
-def on_faces(solution: Solution, t: int) -> Floats:
-    """Gradient of E'/2 q u^a_,1 on the faces of the crack `(2, q, 2, 2, modes)`, - and +.
+def on_faces(solution: Solution, tips: Sequence[int]) -> tuple[Floats, Floats]:
+    """E'/2 q u^a_,1 on the faces - and + of a crack: values and gradients, by tip and mode.
 
     The influence function of K is singular: the dual solution less this field (the weight functions
     of Bueckner, 1970, behave as u^a_,1 at the tip). Where faces move, it is what counts.
+
+    Returns
+    -------
+    values : (2, q, 2, 2 tips) array
+    gradients : (2, q, 2, 2, 2 tips) array
     """
+    both = [_singular(solution, t) for t in tips]
+    values, gradients = zip(*both, strict=True)
+    return np.concatenate(values, axis=-1), np.concatenate(gradients, axis=-1)
+
+
+def _singular(solution: Solution, t: int) -> tuple[Floats, Floats]:
     space, material = solution.space, solution.problem.material
     tip = space.tips[t]
     lips, R = solution.lips[tip.crack], tip.frame
     radius = domain_of(solution, t).outer
     outer = np.array([radius])
-    result = np.zeros((2, len(lips), 2, 2, 2))
+    values, gradients = np.zeros((2, len(lips), 2, 2)), np.zeros((2, len(lips), 2, 2, 2))
     near = np.nonzero(np.linalg.norm(lips.x - tip.x, axis=1) < radius)[0]
     xi = (lips.x[near] - tip.x) @ R.T
     for s, sign in ((0, -1), (1, 1)):
@@ -157,6 +168,8 @@ def on_faces(solution: Solution, t: int) -> Floats:
         fields = unit_gradients(r, theta, material.kolosov, material.mu)[:2]
         curves = ahead_derivative(material, r, theta)[:2]
         for m, (g, curve) in enumerate(zip(fields, curves, strict=True)):
+            scale = 0.5 * material.E_prime
+            values[s, near, :, m] = scale * q[0][:, None] * (g[:, :, 0] @ R)
             local = q[0][:, None, None] * curve + g[:, :, :1] * dq[0][:, None]
-            result[s, near, :, :, m] = 0.5 * material.E_prime * (R.T @ local @ R)
-    return result
+            gradients[s, near, :, :, m] = scale * (R.T @ local @ R)
+    return values, gradients
