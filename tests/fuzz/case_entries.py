@@ -176,7 +176,7 @@ ENTRIES = [
                 Seen(rule=lambda v: False if not isinstance(v, xc.Solution | xc.History) else True),
                 Late(scenes.solution),
                 near={"no run": Bad(lambda: "folder")},
-                words=["run", "solution"],
+                words=["run", "solution", "path"],
             ),
             "file": arg(
                 Filename(endings=(".html",)),
@@ -209,7 +209,7 @@ ENTRIES = [
     Entry(
         "info",
         lambda warm: str(xc.info(warm=warm)),
-        {"warm": arg(Seen(rule=lambda v: False if v is not False else True), False)},
+        {"warm": arg(Seen(rule=lambda v: "skip" if v is True else v is False), False)},
         cost=1.0,
         share=0.02,
     ),

@@ -262,7 +262,12 @@ class Seen(Kind):
         return ... if value is None else value
 
     def _own(self, value):
-        return {True: VALID, False: NONSENSE, None: EDGE}[self.rule(value)]
+        answer = self.rule(value)
+        return (
+            answer
+            if isinstance(answer, str)
+            else {True: VALID, False: NONSENSE, None: EDGE}[answer]
+        )
 
 
 @dataclass(frozen=True)

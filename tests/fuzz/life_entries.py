@@ -77,6 +77,18 @@ ENTRIES = [
         {"nu": arg(Number(above=-1, below=0.5), 0.3), "K_c": arg(Number(above=0), 2000.0)},
     ),
     Entry(
+        "residual_strength",
+        lambda history, line, collapse: xc.residual_strength(
+            history, nu=0.3, K_c=2000.0, line=line, collapse=collapse
+        )["by_toughness"],
+        {
+            "history": RUN,
+            "line": arg(Of(optional=True, type=xc.assessment_line, rule=lambda v: None), None),
+            "collapse": arg(Called(optional=True), None),
+        },
+        arity=False,
+    ),
+    Entry(
         "geometry_factors",
         lambda history, stress: xc.geometry_factors(history, stress=stress)["beta"],
         {"history": RUN, "stress": arg(Number(above=0), 100.0)},

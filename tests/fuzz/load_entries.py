@@ -166,7 +166,7 @@ ENTRIES = [
             (
                 xc.point_force,
                 {
-                    "x": arg(Numbers((2,)), (0.0, 1.0)),
+                    "x": arg(Numbers((2,), least=-1, most=1), (0.0, 1.0), words=["point"]),
                     "f": arg(Numbers((2,)), (1.0, 0.0), words=["point_force"]),
                 },
             ),

@@ -7,6 +7,7 @@ import xcrack as xc
 from fuzz import scenes
 from fuzz.entry import Entry, Hook, Late, arg
 from fuzz.kinds import (
+    SKIP,
     Called,
     Flag,
     ListOf,
@@ -229,6 +230,27 @@ ENTRIES = [
         xc.energy_error,
         {"solution": SOLVED, "stress": arg(Called(), lambda x: np.ones((len(x), 2, 2)))},
         cost=0.03,
+    ),
+    Entry(
+        "adapt",
+        lambda **named: xc.adapt(tolerance=0.5, max_unknowns=3000, **named).rounds[-1].error,
+        {
+            "problem": arg(
+                Seen(
+                    rule=lambda v: (
+                        (SKIP if isinstance(v, xc.Problem) else False)
+                        if v is not scenes.problem()
+                        else None
+                    )
+                ),
+                Late(scenes.problem),
+            ),
+            "states": arg(Seen(rule=lambda v: v is None), None),
+            "progress": arg(Flag(rule=None), False),
+        },
+        cost=0.5,
+        share=0.0,
+        arity=False,
     ),
     Entry(
         "adapt",

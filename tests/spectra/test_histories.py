@@ -35,7 +35,7 @@ def test_columns_and_rows(tmp_path):
         ("0\n1\nhigh\n", {}, "line 3: 'high' is no number"),
         ("0\nnan\n", {}, "line 2: 'nan': every number must be finite"),
         ("0 1\n2\n", {"column": 0}, "line 2: 1 numbers"),
-        ("0 1\n2 3\n", {}, "say which by column"),
+        ("0 1\n2 3\n", {}, "give column="),
         ("0 1\n2 3\n", {"column": 2}, "no column 2"),
         ("0 1\n2 3\n", {"rows": True}, "2 numbers a line"),
         ("1\n1\n", {}, "do not vary"),

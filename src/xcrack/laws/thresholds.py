@@ -233,7 +233,9 @@ class nasgro3_threshold(WithUnits):  # noqa: N801
         U = closure(ratio)
         inner = U / (1 - closure.A[0])
         size = short(a, self.a0, "nasgro3_threshold")
-        return np.asarray(self.dK0 * size / inner ** (1 + self.C_th * ratio))[()]
+        with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
+            value = np.asarray(self.dK0 * size / inner ** (1 + self.C_th * ratio))
+        return _finite("nasgro3_threshold", value, ratio)[()]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -295,12 +297,15 @@ class nasgro4_threshold(WithUnits):  # noqa: N801
         a = sizes("nasgro4_threshold", a, ratio.shape) if ratio.ndim else a
         if self.R_clip is not None:
             ratio = np.minimum(ratio, self.R_clip)
-        by_range, open_at_0 = 1 / closure(ratio), 1 - closure.A[0]
+        with np.errstate(over="ignore", divide="ignore"):
+            by_range, open_at_0 = 1 / closure(ratio), 1 - closure.A[0]
         plus, minus = self.C_th_plus, self.C_th_minus
-        above = by_range ** (1 + ratio * plus) / open_at_0 ** ((1 - ratio) * plus)
-        below = by_range ** (1 + ratio * minus) / open_at_0 ** (plus - ratio * minus)
         size = short(a, self.a0, "nasgro4_threshold")
-        return np.asarray(self.dK1 * size * np.where(ratio >= 0, above, below))[()]
+        with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
+            above = by_range ** (1 + ratio * plus) / open_at_0 ** ((1 - ratio) * plus)
+            below = by_range ** (1 + ratio * minus) / open_at_0 ** (plus - ratio * minus)
+            value = np.asarray(self.dK1 * size * np.where(ratio >= 0, above, below))
+        return _finite("nasgro4_threshold", value, ratio)[()]
 
 
 Threshold = klesnil_lukas | stepped_threshold | el_haddad
@@ -313,6 +318,15 @@ def check_threshold(name: str, threshold: object) -> None:
             f"{name}: threshold = {shown(threshold)}: give klesnil_lukas, stepped_threshold or "
             "el_haddad; those of NASGRO belong to nasgro."
         )
+
+
+def _finite(name: str, value: Floats, ratio: Floats) -> Floats:
+    if not np.isfinite(value).all():
+        raise ProblemError(
+            f"{name}: for R down to {ratio.min():.6g} the threshold is no number: give R of real "
+            "cycles."
+        )
+    return value
 
 
 def _check_newman(name: str, closure: object) -> None:

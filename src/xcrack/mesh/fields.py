@@ -174,7 +174,7 @@ def _data(content: Any, name: str | None, source: str) -> tuple[str, Any]:
         name = next(iter(known))
     if name not in known:
         names = ", ".join(map(repr, sorted(known))) or "none"
-        raise MeshError(f"{source} has no field {name!r}; it has {names}.")
+        raise MeshError(f"{source} has no field {shown(name)}: give one of {names}.")
     data = content.point_data if known[name] == "point" else content.cell_data
     return known[name], data[name]
 

@@ -73,7 +73,7 @@ def read_spectrum(
             raise ProblemError(f"{file}: {data.shape[1]} numbers a line: rows are min, max, count.")
         return Spectrum(rows=data, unit=unit)
     if column is None and data.shape[1] > 1:
-        raise ProblemError(f"{file}: {data.shape[1]} columns: say which by column=, or rows=True.")
+        raise ProblemError(f"{file}: {data.shape[1]} columns: give column= or rows=True.")
     number = 0 if column is None else whole(column, "read_spectrum: column", least=0)
     if number >= data.shape[1]:
         raise ProblemError(f"{file}: there is no column {number}: it has {data.shape[1]}, from 0.")
