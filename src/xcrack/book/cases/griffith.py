@@ -45,6 +45,18 @@ def _K_run(level: int, order: int) -> list[Value]:
     return _values(stress_intensity(solve(_scene(level, order)[0])), _K[order])
 
 
+def _bars_run(level: int, order: int) -> list[Value]:
+    """Distance of the best K from the exact one, in half-widths of its bar: at most one."""
+    sif = stress_intensity(solve(_scene(level, order)[0]), error=True)
+    exact = _ROOT * np.array([[_SYY, -_SXY], [_SYY, _SXY]])
+    share = (sif.best - exact) / sif.bar
+    return [
+        Value(f"K_{'I' * (m + 1)} at tip {k}, in bars", share[k, m], 0.0, 1.0, 1.0)
+        for k in (0, 1)
+        for m in (0, 1)
+    ]
+
+
 def _stress_run(level: int, order: int) -> list[Value]:
     T = stress_intensity(solve(_scene(level, order)[0])).T
     within = {1: 2e-2, 2: 5e-4}[order]
@@ -91,6 +103,7 @@ CASES = (
     _case("griffith-energy-2", "energy", partial(_energy_run, order=2)),
     _case("griffith-turned", "invariance", partial(_units_run, angle=2.3, E=1.0), levels=1),
     _case("griffith-pascal", "invariance", partial(_units_run, angle=0.21, E=210e9), levels=1),
+    _case("griffith-bars-2", "error_bars", partial(_bars_run, order=2), levels=1),
     _case("griffith-direction-1", "direction", partial(_direction_run, order=1),
           "largest hoop stress (Erdogan and Sih, 1963) of exact K", 1, 1),
     _case("griffith-direction-2", "direction", partial(_direction_run, order=2),
