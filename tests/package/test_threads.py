@@ -17,7 +17,7 @@ import xcrack as xc
 from xcrack import threads
 from xcrack.geometry import distances
 from xcrack.sif import domain_3d
-from xcrack.solvers import row_blocks
+from xcrack.solvers import multifrontal, row_blocks
 from xcrack.xfem import assembly
 
 
@@ -49,6 +49,7 @@ def bits(problem, count=None):
 def test_the_same_bits_for_any_number(scene, monkeypatch):
     # Small matrices are shared too, and few cells and points make many tasks.
     monkeypatch.setattr(row_blocks, "_LEAST", 1000)
+    monkeypatch.setattr(multifrontal, "_LEAST", 0)
     monkeypatch.setattr(assembly, "_CHUNK", 1500)
     monkeypatch.setattr(domain_3d, "_CHUNK", 150)
     monkeypatch.setattr(distances, "_AT_ONCE", 100)

@@ -21,6 +21,7 @@ from xcrack.threads import each, one_blas_thread
 _LEAF = 8  # cells of a part that is not halved any more
 _UNIT = 4  # levels of a subtree that is factored as a whole or not at all: 128 cells
 _SHARED = 4  # levels above the subtrees that threads take
+_LEAST = 100_000  # entries of a matrix below which handing subtrees over costs more than it saves
 _FEW = 4  # right-hand sides up to which each is quicker alone
 _SPREAD = 1.5  # times the numbers in use that arrays of earlier factorisations may hold
 _MOST = 1 << 27  # entries of update matrices, 1 GB, above which larger subtrees are the unit
@@ -272,7 +273,9 @@ def _factored(
         return int(factored(fronts, panel, update, wanted, begin, end))
 
     with one_blas_thread():
-        if any(each(subtree, np.nonzero(height == level)[0].tolist())):
+        roots = np.nonzero(height == level)[0].tolist()
+        few = len(fronts[5]) < _LEAST
+        if any(map(subtree, roots) if few else each(subtree, roots)):
             return True
         above = wanted & (height > level)
         return bool(above.any() and factored(fronts, panel, update, above, 0, len(height)))
