@@ -9,14 +9,19 @@ import pytest
 from support import scenes_of_bars
 
 STORED = Path(__file__).parents[2] / "benchmarks" / "results" / "bars_of_K.json"
-AGAIN = [k for k, row in json.loads(STORED.read_text()).items() if "error" in row][::40]
+OPEN = ("edge", "inner", "edge_at_a_hole", "under_pressure", "arc", "kinked", "towards_a_lip")
+AGAIN = [
+    seed
+    for seed, row in json.loads(STORED.read_text()).items()
+    if row["kind"] in OPEN and "error" in row
+][::10]
 
 
 @pytest.mark.parametrize("seed", AGAIN)
 @pytest.mark.filterwarnings("ignore::xcrack.XcrackWarning")
 def test_a_seed_gives_what_is_stored(seed):
-    """To three digits; references are taken from the file."""
+    """To two digits, of open cracks; references are taken from the file."""
     row = json.loads(STORED.read_text())[seed]
     new = scenes_of_bars.outcome(int(seed), row["known"])
     bar = np.array(row["bar"], dtype=float)
-    assert np.array(new["bar"]) == pytest.approx(bar, rel=2e-3, abs=1e-9, nan_ok=True)
+    assert np.array(new["bar"]) == pytest.approx(bar, rel=2e-2, abs=1e-7, nan_ok=True)
