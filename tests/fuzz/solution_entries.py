@@ -245,7 +245,9 @@ ENTRIES = [
                 ),
                 Late(scenes.problem),
             ),
-            "states": arg(Seen(rule=lambda v: v is None), None),
+            "states": arg(
+                Seen(rule=lambda v: SKIP if items_of(v) is not None else v is None), None
+            ),
             "progress": arg(Flag(rule=None), False),
         },
         cost=0.5,
