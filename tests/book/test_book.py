@@ -78,7 +78,7 @@ def test_a_broken_K_integral_fails(monkeypatch):
     def wrong(right):
         return lambda *given, **named: 1.03 * right(*given, **named)
 
-    failed = broken(monkeypatch, ("xcrack.sif.domain_2d.domain_terms", wrong))
+    failed = broken(monkeypatch, ("xcrack.sif.domain_2d.plain_terms", wrong))
     print(sorted(failed))
     kinds = {case.requirement for case in CASES if case.id in failed}
     assert len(failed) >= 3
@@ -105,13 +105,24 @@ def test_a_broken_multiplier_space_fails(monkeypatch):
 @pytest.mark.slow
 @pytest.mark.mission
 def test_a_broken_rule_for_cycles_fails(monkeypatch):
-    """The rate before a step stands for the whole of it (Euler's rule)."""
+    """Euler's rule, the rate before a step for the whole of it, and five per cent too many."""
 
     def wrong(right):
         return lambda a0, a1, rate0, rate1: (a1 - a0) / rate0
 
-    places = ("xcrack.growth.cycles.cycles_between", "xcrack.book.cases.lives.cycles_between")
-    failed = broken(monkeypatch, *((place, wrong) for place in places))
+    def too_many(right):  # what steps of second order take, by five per cent
+        def cycles(*given):
+            N, own = right(*given)
+            return 1.05 * N, own
+
+        return cycles
+
+    failed = broken(
+        monkeypatch,
+        ("xcrack.growth.cycles.cycles_between", wrong),
+        ("xcrack.book.cases.lives.cycles_between", wrong),
+        ("xcrack.growth.pec_2d._cycles", too_many),
+    )
     print(sorted(failed))
     kinds = {case.requirement for case in CASES if case.id in failed}
     assert len(failed) >= 3
