@@ -76,7 +76,7 @@ def read_spectrum(
         raise ProblemError(f"{file}: {data.shape[1]} columns: give column= or rows=True.")
     number = 0 if column is None else whole(column, "read_spectrum: column", least=0)
     if number >= data.shape[1]:
-        raise ProblemError(f"{file}: there is no column {number}: it has {data.shape[1]}, from 0.")
+        raise ProblemError(f"{file}: there is no column {number}: give 0 to {data.shape[1] - 1}.")
     return Spectrum(data[:, number], unit=unit)
 
 
