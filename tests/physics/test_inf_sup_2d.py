@@ -183,7 +183,7 @@ def test_units_do_not_matter():
 
 def test_refuses_what_it_does_not_know():
     problem = through(8, *LINES[0], 1)
-    with pytest.raises(xc.ProblemError, match=r'norm=.max.*"h1" or "energy"'):
+    with pytest.raises(xc.ProblemError, match=r'norm = .max.*"h1" or "energy"'):
         xc.inf_sup(problem, norm="max")
     with pytest.raises(xc.ProblemError, match=r"crack 3.*has 1 crack.*numbered from 0"):
         xc.inf_sup(problem, crack=3)

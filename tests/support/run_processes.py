@@ -43,6 +43,7 @@ def serve(dim):
     import xcrack as xc
 
     warnings.simplefilter("ignore")
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background job ignores it
     run = scene_of(dim)
     next(iter(xc.grow(**run)))  # kernels are compiled, or read, before the first fork
     signal.signal(signal.SIGCHLD, signal.SIG_IGN)  # nobody waits for a child: none is left over

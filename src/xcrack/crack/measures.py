@@ -82,7 +82,8 @@ class Measures:
             for t in self.traces
         ]
         lines += [
-            f"end at ({', '.join(f'{v:.6g}' for v in end.x)}) on {end.name!r}" for end in self.ends
+            f"end at ({', '.join(f'{v:.6g}' for v in _rounded(np.array(end.x)))}) on {end.name!r}"
+            for end in self.ends
         ]
         return "\n".join(lines)
 
@@ -92,6 +93,12 @@ _BY_DIMENSION: dict[int, Callable[[Crack, Mesh, Ints], _Raw]] = {
     2: measures_of_line,
     3: measures_of_surface,
 }
+
+
+def _rounded(x: Floats) -> Floats:
+    """Coordinates without the round-off beside zero."""
+    size = float(np.abs(x).max(initial=0.0))
+    return np.where(np.abs(x) < 1e-12 * size, 0.0, x)
 
 
 def measures(crack: Crack, mesh: Mesh) -> Measures:

@@ -170,7 +170,7 @@ def _sections(path: Path, outer: tuple[Path, ...] = ()) -> Iterator[Section]:
         if keyword == "INCLUDE" and "INPUT" in options:
             inner = path.parent / options["INPUT"]
             if not inner.is_file():
-                raise MeshError(f"{path.name} includes {shown(str(inner))}, which does not exist.")
+                raise MeshError(f"{path.name} includes {str(inner)!r}, which does not exist.")
             yield from _sections(inner, (*outer, own))
     if keyword:
         yield keyword, options, rows
