@@ -40,7 +40,9 @@ def read_spectrum(
     """
     file = path_of(path, "read_spectrum: path", error=ProblemError)
     rows = flag(rows, "read_spectrum: rows")
-    with system_errors("the spectrum cannot be read from", file, error=ProblemError):
+    with system_errors(
+        "read_spectrum: path: the spectrum cannot be read from", file, error=ProblemError
+    ):
         text = file.read_text(encoding="utf-8", errors="replace")
     table: list[list[float]] = []
     for n, line in enumerate(text.splitlines(), 1):
