@@ -21,18 +21,17 @@ from xcrack.laws.law import (
     set_floats,
     sizes,
 )
-from xcrack.laws.shape import Approach, check_approach, shaped
+from xcrack.laws.shape import Approach, Shaped, shaped
 from xcrack.laws.thresholds import (
     Powers,
     Threshold,
-    check_threshold,
     nasgro3_threshold,
     nasgro4_threshold,
 )
 
 
 @dataclass(frozen=True)
-class forman(WithUnits):  # noqa: N801 - it is used as a function
+class forman(Shaped):  # noqa: N801 - it is used as a function
     """Growth that rises without bound as K_max comes to the toughness.
 
     Parameters
@@ -72,16 +71,7 @@ class forman(WithUnits):  # noqa: N801 - it is used as a function
     def __post_init__(self) -> None:
         for name in ("C", "m", "K_c"):
             set_floats(self, **{name: number(getattr(self, name), f"forman: {name}", above=0)})
-        check_threshold("forman", self.threshold)
-        approach = check_approach("forman", self.approach, self.threshold)
-        object.__setattr__(self, "approach", approach)
-        check_ratio("forman", self.ratio)
-        object.__setattr__(self, "R_range", check_bounds("forman", self.R_range))
-
-    @property
-    def needs(self) -> tuple[str, ...]:
-        """What it asks for beside the range and R."""
-        return () if self.threshold is None else self.threshold.needs
+        self._check_shape()
 
     @property
     def knows_negative_ratios(self) -> bool:

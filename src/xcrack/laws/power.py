@@ -13,20 +13,17 @@ from xcrack.laws.law import (
     Bounds,
     Ratio,
     WithUnits,
-    check_bounds,
-    check_ratio,
     powered,
     range_and_ratio,
     set_floats,
-    toughness,
 )
-from xcrack.laws.shape import Approach, check_approach, shaped
-from xcrack.laws.thresholds import Powers, Threshold, check_threshold
+from xcrack.laws.shape import Approach, Shaped, shaped
+from xcrack.laws.thresholds import Powers, Threshold
 from xcrack.laws.units import factors
 
 
 @dataclass(frozen=True)
-class paris(WithUnits):  # noqa: N801 - it is used as a function: paris(C, m)(dK_eq, R)
+class paris(Shaped):  # noqa: N801 - it is used as a function: paris(C, m)(dK_eq, R)
     """Growth as a power of the range.
 
     Parameters
@@ -81,17 +78,7 @@ class paris(WithUnits):  # noqa: N801 - it is used as a function: paris(C, m)(dK
             self, C=number(self.C, "paris: C", above=0), m=number(self.m, "paris: m", above=0)
         )
         check_closure("paris", self.closure)
-        check_threshold("paris", self.threshold)
-        approach = check_approach("paris", self.approach, self.threshold)
-        object.__setattr__(self, "approach", approach)
-        object.__setattr__(self, "K_c", toughness("paris", self.K_c))
-        check_ratio("paris", self.ratio)
-        object.__setattr__(self, "R_range", check_bounds("paris", self.R_range))
-
-    @property
-    def needs(self) -> tuple[str, ...]:
-        """What it asks for beside the range and R."""
-        return () if self.threshold is None else self.threshold.needs
+        self._check_shape()
 
     @property
     def knows_negative_ratios(self) -> bool:
@@ -178,7 +165,7 @@ class elber(WithUnits):  # noqa: N801 - it is used as a function
 
 
 @dataclass(frozen=True)
-class walker(WithUnits):  # noqa: N801 - it is used as a function
+class walker(Shaped):  # noqa: N801 - it is used as a function
     """Growth by a range that the mean load raises.
 
     Parameters
@@ -228,17 +215,7 @@ class walker(WithUnits):  # noqa: N801 - it is used as a function
         if self.gamma_minus is not None:
             minus = number(self.gamma_minus, "walker: gamma_minus", least=0, most=1)
             set_floats(self, gamma_minus=minus)
-        check_threshold("walker", self.threshold)
-        approach = check_approach("walker", self.approach, self.threshold)
-        object.__setattr__(self, "approach", approach)
-        object.__setattr__(self, "K_c", toughness("walker", self.K_c))
-        check_ratio("walker", self.ratio)
-        object.__setattr__(self, "R_range", check_bounds("walker", self.R_range))
-
-    @property
-    def needs(self) -> tuple[str, ...]:
-        """What it asks for beside the range and R."""
-        return () if self.threshold is None else self.threshold.needs
+        self._check_shape()
 
     @property
     def knows_negative_ratios(self) -> bool:
@@ -268,7 +245,7 @@ class walker(WithUnits):  # noqa: N801 - it is used as a function
 
 
 @dataclass(frozen=True)
-class piecewise(WithUnits):  # noqa: N801 - it is used as a function
+class piecewise(Shaped):  # noqa: N801 - it is used as a function
     """Paris in pieces: each has its own constants, and they change at knees.
 
     Parameters
@@ -326,17 +303,7 @@ class piecewise(WithUnits):  # noqa: N801 - it is used as a function
         pieces = tuple((float(c), float(e)) for c, e in constants)
         object.__setattr__(self, "pieces", pieces)
         object.__setattr__(self, "knees", tuple(float(knee) for knee in knees))
-        check_threshold("piecewise", self.threshold)
-        approach = check_approach("piecewise", self.approach, self.threshold)
-        object.__setattr__(self, "approach", approach)
-        object.__setattr__(self, "K_c", toughness("piecewise", self.K_c))
-        check_ratio("piecewise", self.ratio)
-        object.__setattr__(self, "R_range", check_bounds("piecewise", self.R_range))
-
-    @property
-    def needs(self) -> tuple[str, ...]:
-        """What it asks for beside the range and R."""
-        return () if self.threshold is None else self.threshold.needs
+        self._check_shape()
 
     @property
     def knows_negative_ratios(self) -> bool:

@@ -9,13 +9,47 @@ from numpy.typing import ArrayLike
 from xcrack.arrays import Floats
 from xcrack.errors import ProblemError
 from xcrack.inputs import number, shown
-from xcrack.laws.law import largest_K, sizes
-from xcrack.laws.thresholds import Threshold
+from xcrack.laws.law import (
+    Bounds,
+    Ratio,
+    WithUnits,
+    check_bounds,
+    check_ratio,
+    largest_K,
+    sizes,
+    toughness,
+)
+from xcrack.laws.thresholds import Threshold, check_threshold
 
 Approach = str | float
 
 
-def check_approach(name: str, approach: Any, threshold: Threshold | None) -> Approach:
+class Shaped(WithUnits):
+    """A law that may have a threshold, and bounds of R: what `paris` shares with its kin."""
+
+    threshold: Threshold | None
+    approach: Approach
+    K_c: float | None
+    ratio: Ratio | None
+    R_range: Bounds | None
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """What it asks for beside the range and R."""
+        return () if self.threshold is None else self.threshold.needs
+
+    def _check_shape(self) -> None:
+        """Refuse parts that are none, at the end of a law's own checks."""
+        name = type(self).__name__
+        check_threshold(name, self.threshold)
+        approach = _check_approach(name, self.approach, self.threshold)
+        object.__setattr__(self, "approach", approach)
+        object.__setattr__(self, "K_c", toughness(name, self.K_c))
+        check_ratio(name, self.ratio)
+        object.__setattr__(self, "R_range", check_bounds(name, self.R_range))
+
+
+def _check_approach(name: str, approach: Any, threshold: Threshold | None) -> Approach:
     """The way to the threshold: "cut", "difference", or an exponent."""
     if isinstance(approach, str):
         if approach not in ("cut", "difference"):
@@ -68,4 +102,4 @@ def shaped(
     return np.asarray(result)
 
 
-__all__ = ["Approach", "check_approach", "shaped"]
+__all__ = ["Approach", "Shaped", "shaped"]
