@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import xcrack as xc
-from support import exact, outcomes_of_K
+from support import exact, outcomes_of_K, scenes_fronts
 from support import scenes_2d as scenes
 from support import scenes_3d as scenes_space
 from support.outcomes_of_K import CLIPPED
@@ -47,6 +47,15 @@ def test_a_clipped_domain_warns_where_errors_are_large(cells, order, warned, err
         assert np.abs(sif.K - [[1.0, 0.5]]).max() <= error  # discretisation
     if warned:
         assert f"{sif.domain_cells[0]:.1f} cells" in clipped[0]
+
+
+@pytest.mark.parametrize("seed", [3, 5])
+def test_a_contact_zone_without_weight_does_not_warn(seed):
+    """Under pure shear the errors of a mesh press a few places of a penny together."""
+    problem, _ = scenes_fronts.flat_scene(0.2, stress=(0.0, 1.0, 0.0), seed=seed, contact="auto")
+    warned, sif = messages(problem)
+    assert sif.closed.any()  # there is such a zone
+    assert not warned
 
 
 def test_the_narrowest_place_of_a_front_is_named():
