@@ -103,6 +103,23 @@ def test_path_of_an_inclined_crack_is_antisymmetric_and_turns_across_the_load():
     assert np.abs((points + points[::-1]) / 2 - middle).max() < 0.02
 
 
+def test_a_crack_along_compression_does_not_zigzag():
+    """T < 0 straightens a path (Cotterell and Rice, 1980); long steps must not swing about it.
+
+    T = -2 times the tension across the crack, steps of half of its half length. Faces swing by ten
+    degrees where the correction of directions for the turned last face is left out.
+    """
+    along = [xc.traction("right", (-1.0, 0.0)), xc.traction("left", (1.0, 0.0))]
+    crack = xc.line_crack([(-1.0, -0.06), (1.0, 0.06)])
+    mesh = xc.box((-6.0, -6.0), (6.0, 6.0), 40)
+    problem = xc.Problem(mesh, STEEL, [crack], loads=[*TENSION, *along], contact="off")
+    steps = xc.grow(problem, LAW, xc.max_hoop_stress, xc.Cycle(0, 1), da=0.5, max_steps=8)
+    path = xc.collect(steps).cracks[0].points
+    faces = np.diff(path[path[:, 0] > 0.99], axis=0)
+    turns = np.diff(np.degrees(np.arctan2(faces[:, 1], faces[:, 0])))
+    assert (np.abs(turns[-3:]) <= 1.0).all()  # discretisation: half a degree on this mesh
+
+
 def test_radius_of_the_first_step_stays():
     steps = list(
         xc.grow(edge_crack(0.0), LAW, xc.max_hoop_stress, xc.Cycle(0, 1), da=0.1, max_steps=3)
