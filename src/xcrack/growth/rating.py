@@ -1,7 +1,7 @@
 """From K of the load states to direction, range, ratio and rate at each place of the cracks."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -11,7 +11,7 @@ from xcrack.analysis.solve import solve_states
 from xcrack.arrays import Floats
 from xcrack.errors import ProblemError, warn
 from xcrack.growth.advance import PerCrack
-from xcrack.growth.block import Answers, block_of, left_out_share, pairs_of, rated
+from xcrack.growth.block import Answers, Pairs, block_of, left_out_share, pairs_of, rated
 from xcrack.growth.checks import evaluate_criterion, evaluate_law
 from xcrack.growth.follow import following
 from xcrack.growth.ladder import factors_of, respond_to
@@ -54,81 +54,91 @@ def rates_of(run: Run, problem: Problem, sif: Answers, solutions: Sequence[Solut
     free = None
     if getattr(run.law, "ratio", None) == "nominal":
         free = (solutions, sif) if problem.contact == "off" else _without_contact(run, problem)
-    rate = _rates_of_blocks if isinstance(run.cycle, Spectrum) else _rates_of_cycle
-    parts = rate(run, problem, (solutions, sif), free)
-    angles, ranges, ratios, rates = zip(*parts, strict=True)
+    asked = asked_of(run, problem, (solutions, sif), free)
+    angles, ranges, ratios, rates = zip(*(one.answer(one.K) for one in asked), strict=True)
     return angles, ranges, ratios, rates
 
 
-def _rates_of_cycle(
-    run: Run, problem: Problem, response: Response, free: Response | None
-) -> list[PerPlace]:
-    """Direction, range, ratio and rate of one cycle at the places of each crack."""
-    place, nu = following(problem.mesh).PLACE, problem.material.nu
-    parts = []
-    for c in range(len(problem.placed)):
-        K = np.stack([state[c].K for state in response[1]])
-        angle, dK, R = evaluate_criterion(run.criterion, K, nu, c, place)
-        if free is not None:
-            dK, R = nominal_range(np.stack([state[c].K for state in free[1]]), angle, nu)
-        a = size_at_places(problem, c, len(dK))
-        parts.append((angle, dK, R, evaluate_law(run.law, dK, R, c, place, a)))
-    return parts
+@dataclass(frozen=True, eq=False)
+class Asked:
+    """K of one crack as criterion and law see it, and what they say of K of this shape.
+
+    Attributes
+    ----------
+    K : (s, f, 2 or 3) array, stress √length
+        Of the load states, or of both ends of each kind of cycle of a spectrum.
+    answer : callable
+        K -> direction, range, ratio, rate at the places, of the cycle or of the block.
+    turn : callable
+        K -> direction alone.
+    """
+
+    K: Floats
+    answer: Callable[[Floats], PerPlace]
+    turn: Callable[[Floats], Floats]
 
 
-def _rates_of_blocks(
-    run: Run, problem: Problem, response: Response, free: Response | None
-) -> list[PerPlace]:
-    """The same of a block of cycles."""
-    place, nu = following(problem.mesh).PLACE, problem.material.nu
-    every = pairs_of(run, problem, *response)
-    nominal = [None] * len(every) if free is None else pairs_of(run, problem, *free)
-    parts = []
-    for c, (pairs, other) in enumerate(zip(every, nominal, strict=True)):
-        a = size_at_places(problem, c, pairs.K.shape[2])
-        parts.append(block_of(rated(run, pairs, nu, c, place, a, other), pairs.count))
-    return parts
-
-
-def answering(
-    run: Run, problem: Problem, c: int, solutions: Sequence[Solution], sif: Answers
-) -> tuple[Floats, Callable[[Floats], PerPlace]]:
-    """K of crack c as criterion and law see it, and what they answer to other K of its shape.
+def asked_of(
+    run: Run, problem: Problem, response: Response, free: Response | None = None
+) -> list[Asked]:
+    """What criterion and law are asked about each crack.
 
     Parameters
     ----------
     run : Run
     problem : Problem
-    c : int
-    solutions : sequence of Solution
-    sif : sequence of sequence of SIF
-
-    Returns
-    -------
-    K : (s, f, 2 or 3) array, stress √length
-        Of the load states, or of both ends of each kind of cycle of a spectrum.
-    answer : callable
-        K like this -> direction, range, ratio, rate at the places, of the cycle or of the block.
+    response : solutions and SIF of all states
+    free : the same, optional
+        Without contact, for a law with nominal R.
     """
-    place, nu = following(problem.mesh).PLACE, problem.material.nu
-    if not isinstance(run.cycle, Spectrum):
-        K = np.stack([state[c].K for state in sif])
-        a = size_at_places(problem, c, K.shape[1])
+    asked = _asked_of_blocks if isinstance(run.cycle, Spectrum) else _asked_of_cycle
+    return asked(run, problem, response, free)
 
-        def of_cycle(K: Floats) -> PerPlace:
+
+def _asked_of_cycle(
+    run: Run, problem: Problem, response: Response, free: Response | None
+) -> list[Asked]:
+    place, nu = following(problem.mesh).PLACE, problem.material.nu
+
+    def one(c: int) -> Asked:
+        given = np.stack([state[c].K for state in response[1]])
+        a = size_at_places(problem, c, given.shape[1])
+
+        def answer(K: Floats) -> PerPlace:
             angle, dK, R = evaluate_criterion(run.criterion, K, nu, c, place)
+            if free is not None:
+                dK, R = nominal_range(np.stack([state[c].K for state in free[1]]), angle, nu)
             return angle, dK, R, evaluate_law(run.law, dK, R, c, place, a)
 
-        return K, of_cycle
-    pairs = pairs_of(run, problem, solutions, sif)[c]
-    shape = pairs.K.shape
-    size = size_at_places(problem, c, shape[2])
+        def turn(K: Floats) -> Floats:
+            return evaluate_criterion(run.criterion, K, nu, c, place)[0]
 
-    def of_block(K: Floats) -> PerPlace:
-        turned = replace(pairs, K=K.reshape(shape))
-        return block_of(rated(run, turned, nu, c, place, size), pairs.count)
+        return Asked(given, answer, turn)
 
-    return pairs.K.reshape(-1, *shape[2:]), of_block
+    return [one(c) for c in range(len(problem.placed))]
+
+
+def _asked_of_blocks(
+    run: Run, problem: Problem, response: Response, free: Response | None
+) -> list[Asked]:
+    place, nu = following(problem.mesh).PLACE, problem.material.nu
+    every = pairs_of(run, problem, *response)
+    nominal = [None] * len(every) if free is None else pairs_of(run, problem, *free)
+
+    def one(c: int, pairs: Pairs, other: Pairs | None) -> Asked:
+        shape = pairs.K.shape
+        a = size_at_places(problem, c, shape[2])
+
+        def answer(K: Floats) -> PerPlace:
+            cycles = replace(pairs, K=K.reshape(shape))
+            return block_of(rated(run, cycles, nu, c, place, a, other), pairs.count)
+
+        def turn(K: Floats) -> Floats:  # the mean of the cycles' directions needs their rates
+            return answer(K)[0]
+
+        return Asked(pairs.K.reshape(-1, *shape[2:]), answer, turn)
+
+    return [one(c, *each) for c, each in enumerate(zip(every, nominal, strict=True))]
 
 
 def size_at_places(problem: Problem, c: int, n: int) -> Floats:
@@ -220,7 +230,8 @@ def respond_to_cycle(
 
 
 __all__ = [
-    "answering",
+    "Asked",
+    "asked_of",
     "check_choice",
     "levels_of",
     "must_choose",

@@ -1,7 +1,5 @@
 """Directions and rates of tips in 2D: at the beginning, behind a kink, and as a face turns."""
 
-from collections.abc import Callable
-
 import numpy as np
 
 from xcrack.arrays import Bools, Floats
@@ -11,9 +9,10 @@ from xcrack.growth.criteria import clipped
 from xcrack.growth.evaluation import Evaluation
 from xcrack.growth.kink import START, Turn, kinked_K, limit_angles
 from xcrack.growth.options import Run
-from xcrack.growth.rating import PerPlace, answering, size_at_places
+from xcrack.growth.rating import asked_of, size_at_places
 from xcrack.growth.tips_2d import Faces, faces_of
 from xcrack.growth.trail import Trail
+from xcrack.spectra.spectrum import Spectrum
 
 _COTTERELL_RICE = 4 * np.sqrt(2 / np.pi)
 _GEOMETRY = 0.65  # times the face's share of the crack: read off four scenes
@@ -47,21 +46,24 @@ def first_trail(run: Run, seen: Evaluation, place: Floats, grown: Bools) -> Trai
     faces = faces_of(seen.cracks)
     direction, rate, dK_eq, exponent = directions_of(run, seen, faces)
     row, bend = 0, np.zeros(len(rate))
+    # Of a law with nominal R the rates of a kinked crack are not known, nor a block's direction.
+    nominal = getattr(run.law, "ratio", None) == "nominal"
+    known = not (nominal and isinstance(run.cycle, Spectrum))
+    asked = asked_of(run, seen.problem, (seen.solutions, seen.sif)) if known else []
     for c, angle in enumerate(seen.angle):
         rows = slice(row, row + len(angle))
         row += len(angle)
         turns = (np.abs(angle) > START) & (seen.law_rate[c] > 0)
-        if not turns.any():
+        if not known or not turns.any():
             continue
-        given, answer = answering(run, seen.problem, c, seen.solutions, seen.sif)
-        K = clipped(given)
-        theta, converged = limit_angles(_turn(answer), K)
+        K = clipped(asked[c].K)
+        theta, converged = limit_angles(_quiet(asked[c].turn), K)
         turns &= converged
         kinked = clipped(kinked_K(K, np.where(turns, theta, 0.0)))
-        with collected_warnings([]):
-            _, dK, _, behind = answer(kinked)
-        if getattr(run.law, "ratio", None) == "nominal":  # which is not that of this K
-            dK, behind = seen.dK_eq[c], seen.law_rate[c]
+        dK, behind = seen.dK_eq[c], seen.law_rate[c]
+        if not nominal:
+            with collected_warnings([]):
+                _, dK, _, behind = asked[c].answer(kinked)
         turns &= (behind > 0) & np.isfinite(behind)
         direction[rows] += np.where(turns, faces.side[rows] * (theta - angle), 0.0)
         rate[rows] = np.where(turns, behind, rate[rows])
@@ -127,14 +129,14 @@ def _T(seen: Evaluation, c: int) -> Floats:  # noqa: N802
     return np.stack([state[c].T for state in seen.sif])
 
 
-def _turn(answer: Callable[[Floats], PerPlace]) -> Turn:
-    """The directions of growth alone; warnings are of cracks that nobody has."""
+def _quiet(turn: Turn) -> Turn:
+    """Directions by a criterion; its warnings are of cracks that nobody has."""
 
-    def turn(K: Floats) -> Floats:
+    def quiet(K: Floats) -> Floats:
         with collected_warnings([]):
-            return answer(clipped(K))[0]
+            return turn(clipped(K))
 
-    return turn
+    return quiet
 
 
 __all__ = ["crack_share", "directions_of", "first_trail", "turn_of_faces"]
