@@ -82,23 +82,17 @@ class Measures:
             for t in self.traces
         ]
         lines += [
-            f"end at ({', '.join(f'{v:.6g}' for v in _rounded(np.array(end.x)))}) on {end.name!r}"
-            for end in self.ends
+            f"end at ({', '.join(f'{v:.6g}' for v in end.x)}) on {end.name!r}" for end in self.ends
         ]
         return "\n".join(lines)
 
 
+_ROUND_OFF = 1e-12  # of the body: a place as near to zero is zero
 _Raw = tuple[float, float, dict[int, tuple[float, float]], list[tuple[Floats, int, int]]]
 _BY_DIMENSION: dict[int, Callable[[Crack, Mesh, Ints], _Raw]] = {
     2: measures_of_line,
     3: measures_of_surface,
 }
-
-
-def _rounded(x: Floats) -> Floats:
-    """Coordinates without the round-off beside zero."""
-    size = float(np.abs(x).max(initial=0.0))
-    return np.where(np.abs(x) < 1e-12 * size, 0.0, x)
 
 
 def measures(crack: Crack, mesh: Mesh) -> Measures:
@@ -146,7 +140,10 @@ def measures(crack: Crack, mesh: Mesh) -> Measures:
     area, front_length, traces, ends = _BY_DIMENSION[mesh.dim](own, mesh, group)
     rows = [Trace(names[k], *traces[k]) for k in sorted(traces, key=lambda k: names[k])]
     depth = max((row.depth for row in rows), default=float("nan"))
-    points = [End(tuple(x.tolist()), names[group[facet]], front) for x, facet, front in ends]
+    points = []
+    for x, facet, front in ends:
+        place = np.where(np.abs(x) < _ROUND_OFF * mesh.extent, 0.0, x)
+        points.append(End(tuple(place.tolist()), names[group[facet]], front))
     return Measures(area, front_length, depth, tuple(rows), tuple(points))
 
 
