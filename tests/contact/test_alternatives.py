@@ -30,7 +30,7 @@ from xcrack.solvers.rigid_motion import free_motion
 pytestmark = pytest.mark.filterwarnings("ignore::xcrack.XcrackWarning")
 
 MESHES = Path(__file__).parents[2] / "examples" / "meshes"
-OPPONENTS = ("penalty", "augmented", "nitsche")
+ALTERNATIVES = ("penalty", "augmented", "nitsche")
 P0 = 2.5
 uniform = scenes.turned(lambda x, y: exact.uniform_stress(x, y, -P0, -P0, 0.0, 1.0, 0.3), (0, 0))
 
@@ -129,7 +129,7 @@ def closing(order, **options):
 
 
 @pytest.mark.parametrize("order", [1, 2])
-@pytest.mark.parametrize("lips", ["multipliers", *OPPONENTS])
+@pytest.mark.parametrize("lips", ["multipliers", *ALTERNATIVES])
 def test_partial_closure(order, lips):
     """K_I of the open tip and the end of contact: all agree; the closed tip tells them apart."""
     x0, c, K = exact.partial_closure_params(1.0, 0.0, 1.0)
@@ -208,7 +208,7 @@ def pressed_hole(order, **options):
 @pytest.mark.parametrize("order", [1, 2])
 def test_pressure_at_a_hole(order):
     reduced = pressed_hole(order)
-    others = {lips: pressed_hole(order, lips=lips) for lips in OPPONENTS}
+    others = {lips: pressed_hole(order, lips=lips) for lips in ALTERNATIVES}
     others["naive"] = pressed_hole(order, multipliers="naive")
     words = ", ".join(f"{k} {v:.3f}" for k, v in others.items())
     print(f"\nhole order {order}: multipliers {reduced:.3f}, {words}")
@@ -254,11 +254,11 @@ def closed_condition(problem):
 def test_condition_numbers(order):
     """Multipliers leave the stiffness alone; springs do not, the less the stiffer they are."""
     result = {"multipliers": closed_condition(hole(order))}
-    for lips in OPPONENTS:
+    for lips in ALTERNATIVES:
         result[lips] = closed_condition(hole(order, lips=lips))
     result["stiff penalty"] = closed_condition(hole(order, lips="penalty", penalty=1e4))
     print(f"\ncondition order {order}: " + ", ".join(f"{k} {v:.1e}" for k, v in result.items()))
-    assert result["multipliers"] < min(result[lips] for lips in OPPONENTS)
+    assert result["multipliers"] < min(result[lips] for lips in ALTERNATIVES)
     assert result["stiff penalty"] > result["penalty"]
 
 
@@ -268,7 +268,7 @@ def test_updates_do_not_settle_on_naive_multipliers():
         xc.solve(closing(1, lips="augmented", multipliers="naive"))
 
 
-@pytest.mark.parametrize("lips", ["multipliers", *OPPONENTS])
+@pytest.mark.parametrize("lips", ["multipliers", *ALTERNATIVES])
 def test_closed_penny(lips):
     """Compression and shear: the pressure over the inner part of a penny of under two cells."""
     problem = scenes_space.flat_penny(
@@ -306,7 +306,7 @@ def edge(contact="auto", **options):
     )  # fmt: skip
 
 
-@pytest.mark.parametrize("lips", OPPONENTS)
+@pytest.mark.parametrize("lips", ALTERNATIVES)
 def test_states(lips):
     """Pulled and pushed together as alone; an open state has no pressure.
 
@@ -326,7 +326,7 @@ def test_states(lips):
     assert result[2].contact[0].pressure == pytest.approx(2 * p, abs=1e-6 * p.max())
 
 
-@pytest.mark.parametrize("lips", OPPONENTS)
+@pytest.mark.parametrize("lips", ALTERNATIVES)
 def test_contact_auto_and_off(lips):
     opened = xc.solve(edge(lips=lips))
     assert opened.contact == (None,)

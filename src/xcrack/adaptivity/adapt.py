@@ -168,7 +168,8 @@ def _check_scene(problem: Problem) -> None:
     lips = problem.numerics.comparison.lips
     if not any(crack.n_tips for crack in problem.placed):
         raise ProblemError(
-            "adapt: no crack has a tip in the body, so that there is no K to adapt to."
+            "adapt: no crack has a tip in the body, so that there is no K to adapt to: give a "
+            "crack that ends inside, or refine the mesh by hand (xc.refine)."
         )
     if lips in LIPS:
         raise ProblemError(
