@@ -239,6 +239,7 @@ ENTRIES = [
             "levels": arg(Numbers((None,)), (), [0.0, 1.0]),
             "memory": arg(Seen(rule=lambda v: v is None), None),
             "error": arg(Seen(rule=lambda v: v is None), None),
+            "warnings": arg(ListOf(item=Word(), optional=True), None, ["a domain is clipped"]),
         },
     ),
     Entry(

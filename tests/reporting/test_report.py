@@ -5,6 +5,7 @@ import json
 import re
 import shutil
 import subprocess
+from dataclasses import replace
 from functools import cache
 from html.parser import HTMLParser
 
@@ -272,6 +273,22 @@ def test_report_in_a_browser(kind, tmp_path):
     if kind != "plane":  # colours are those of the view alone, above the pictures
         coloured = np.ptp(image[400:], axis=2) > 0.15
         assert coloured.mean() > 0.002
+
+
+def test_a_stored_run_keeps_its_warnings(tmp_path):
+    """A report of the folder lists what the run warned of, step by step; an old one says so."""
+    crack = xc.line_crack([(-1.1, 0.02), (-0.7, 0.02)])  # two cells long: K warns
+    problem = xc.Problem(plate().mesh, STEEL, [crack], loads=plate().loads, order=1)
+    history = growth(problem, tmp_path / "run")
+    read_again = xc.load(tmp_path / "run")
+    assert history.warnings
+    assert read_again.warnings == history.warnings
+    assert [step.warnings for step in read_again.steps] == [s.warnings for s in history.steps]
+    page = xc.report(tmp_path / "run", tmp_path / "r.html").read_text(encoding="utf-8")
+    assert f"Warnings ({sum(history.warnings.values())})" in page
+    steps = tuple(replace(step, warnings=None, solutions=()) for step in history.steps)
+    old = replace(history, steps=steps)
+    assert "hold no warnings of K" in xc.report(old, tmp_path / "o.html").read_text("utf-8")
 
 
 def test_cracks_are_measured(tmp_path):

@@ -30,12 +30,12 @@ class Notices:
     n_steps: int = 0
 
     @contextmanager
-    def watch(self, step: int) -> Iterator[None]:
-        """Issue what is new of the warnings within a block, and count the rest."""
+    def watch(self, step: int) -> Iterator[list[str]]:
+        """Issue what is new of the warnings within a block, count the rest, and list them all."""
         messages: list[str] = []
         try:
             with collected_warnings(messages):
-                yield
+                yield messages
         finally:
             self.n_steps += 1
             for message in dict.fromkeys(messages):

@@ -116,10 +116,11 @@ def steps_of(run: Run, last: Step | None = None) -> Generator[Step, None, str]:
     try:
         if last is None:
             settings = run.settings  # before a law is called that may change what it reads
-            with notices.watch(0):
+            with notices.watch(0) as messages:
                 last, reuse = _next_step(run, run.problem, None, Reuse(), settings)
                 _warn_of_ratio(run, last)
                 warn_of_left_out(run, last)
+            last = replace(last, warnings=tuple(messages))
             progress.step(last)
             yield last
         else:
@@ -140,11 +141,11 @@ def steps_of(run: Run, last: Step | None = None) -> Generator[Step, None, str]:
                 kink = short_kink(run, last, plan)
                 if kink:
                     warn(kink)
-            with notices.watch(last.index + 1):
+            with notices.watch(last.index + 1) as messages:
                 next_step, reuse, ended = _after(run, last, reuse)
             if next_step is None:
                 break
-            last = next_step
+            last = replace(next_step, warnings=tuple(messages))
             progress.step(last)
             yield last
     finally:

@@ -170,6 +170,8 @@ class Step:
         once K at the predicted ones is known. `cracks`, where it is left out.
     error : StepError, optional
         Estimate, where the integrator has one.
+    warnings : tuple of str, optional
+        Messages of the warnings that its computation gave; None: not known.
 
     Raises
     ------
@@ -191,6 +193,7 @@ class Step:
     levels: tuple[float, ...] = ()
     corrected: tuple[Crack, ...] = ()
     error: StepError | None = None
+    warnings: tuple[str, ...] | None = None
 
     def __post_init__(self) -> None:
         whole(self.index, "Step: index", least=0)
@@ -213,6 +216,11 @@ class Step:
             raise ProblemError(
                 f"Step: error = {shown(self.error)}: that is made by grow: leave it out."
             )
+        if self.warnings is not None:
+            messages = entries(self.warnings, "Step: warnings")
+            if not all(isinstance(message, str) for message in messages):
+                raise ProblemError(f"Step: warnings = {shown(self.warnings)}: give texts.")
+            object.__setattr__(self, "warnings", messages)
         states = [entries(state, "Step: sif") for state in entries(self.sif, "Step: sif")]
         if not all(isinstance(sif, SIF) for state in states for sif in state):
             raise ProblemError(f"Step: sif = {shown(self.sif)}: give SIF of states and cracks.")

@@ -1,6 +1,7 @@
 """What became of the cracks in a growth run."""
 
 import csv
+from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -73,6 +74,12 @@ class History:
     def life(self) -> float:
         """Cycles at the last step."""
         return self.steps[-1].cycles if self.steps else 0.0
+
+    @property
+    def warnings(self) -> dict[str, int]:
+        """Warnings that the steps gave, and how often; the most frequent ones first."""
+        texts = (text for step in self.steps for text in step.warnings or ())
+        return dict(Counter(texts).most_common())
 
     def __repr__(self) -> str:
         return f"History({len(self.steps)} steps, {self.life:.6g} cycles, ended: {self.ended})"

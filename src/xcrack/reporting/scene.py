@@ -175,9 +175,10 @@ def warned(source: Source) -> Section:
         content = joined(table(("times", "warning"), rows))
     else:
         content = element("p", "There were none.")
-    if source.history is not None and not source.solutions:
-        hint = ("Steps read from a folder hold no warnings of K: columns spread and domain_cells "
-                "of the table show how far each K is to be trusted.")  # fmt: skip
+    history = source.history
+    if history is not None and any(s.warnings is None and not s.solutions for s in history.steps):
+        hint = ("Steps of this run, made by an older xcrack, hold no warnings of K: columns spread "
+                "and domain_cells of the table show how far each K is to be trusted.")  # fmt: skip
         content = joined(content, element("p", hint, cls="soft"))
     return Section("warnings", f"Warnings ({source.warnings.total()})", content,
                    {"messages": dict(source.warnings)})  # fmt: skip

@@ -121,6 +121,8 @@ def source_of(
             solutions = _solutions(given)
             source = Source(title or "Solution", solutions, _sif(solutions), None, yield_stress)
     source.warnings.update(messages)
+    if source.history is not None:
+        source.warnings.update(source.history.warnings)
     return replace(source, life=life)
 
 
@@ -131,7 +133,8 @@ def _of_history(history: History, title: str, yield_stress: float | None) -> Sou
         last = history.steps[-1]
         solutions, sif = last.solutions, last.sif
         for step in history.steps:
-            _sif(step.solutions)  # what is warned of is what counts here
+            if step.warnings is None:  # of a script, or of an older xcrack
+                _sif(step.solutions)  # what is warned of is what counts here
     return Source(title or "Growth run", solutions, sif, history, yield_stress)
 
 
