@@ -25,6 +25,7 @@ from fuzz.kinds import (
 from fuzz.result_rules import LOAD, NOTHING, NU, fits
 from fuzz.values import paths
 from xcrack import testing
+from xcrack.growth.arrival import Arrival
 
 ANY = Numbers()
 
@@ -240,6 +241,9 @@ ENTRIES = [
             "memory": arg(Seen(rule=lambda v: v is None), None),
             "error": arg(Seen(rule=lambda v: v is None), None),
             "warnings": arg(ListOf(item=Word(), optional=True), None, ["a domain is clipped"]),
+            "arrivals": arg(
+                ListOf(item=Of(type=Arrival)), (), (Arrival(0, 0, (1.0, 0.5), "right", 0.1, 9.0),)
+            ),
         },
     ),
     Entry(

@@ -58,7 +58,8 @@ def run(path: str | PathLike[str], *, resumed: bool = False, overwrite: bool = F
     else:
         result = _grown(case, resumed=resumed, overwrite=overwrite)
         result.write(case.folder)
-        solutions = list(result.steps[-1].solutions) if result.steps else []
+        solved = [step for step in result.steps if not step.has_left]
+        solutions = list(solved[-1].solutions) if solved else []
     _draw(case, solutions)
     report(result, case.folder / "report.html", title=case.title)
     return result

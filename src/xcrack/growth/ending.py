@@ -1,8 +1,11 @@
 """Why growth ends."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from xcrack.growth.advance import Advance
+from xcrack.growth.arrival import Arrival
 from xcrack.growth.criteria import clipped, equivalent_K
 from xcrack.growth.follow import following
 from xcrack.growth.options import Run
@@ -15,6 +18,8 @@ _TURN = np.radians(10.0)
 
 def end_at(run: Run, step: Step) -> str:
     """Why growth ends at this step; empty where it goes on."""
+    if step.has_left:
+        return left_the_body(run, step.arrivals)
     for c, rate in enumerate(step.rate):
         for j in np.nonzero(np.isinf(rate))[0].tolist():
             return (
@@ -78,32 +83,10 @@ def short_kink(run: Run, step: Step, plan: Advance) -> str:
     )
 
 
-def left_the_body(run: Run, step: Step, gone: list[tuple[int, int]]) -> str:
+def left_the_body(run: Run, arrivals: Sequence[Arrival]) -> str:
     """Why a run ends whose last tips or fronts have left the body."""
-    where = [place_name(run, step, *place) + exit_of(run, step, *place) for place in gone]
-    return following(run.problem.mesh).left(where, [c for c, _ in gone])
-
-
-def exit_of(run: Run, step: Step, c: int, j: int) -> str:
-    """Where a tip that leaves the body meets its boundary, and the cycles of that ligament.
-
-    The tip is taken to run straight, at the rate of its last step: where K grows in the ligament,
-    it breaks sooner. Empty for fronts, and where nothing lies ahead.
-    """
-    hit = following(run.problem.mesh).exit_ahead(
-        step.sif[0][c].x[j], directions(step, c)[j], run.problem.mesh
-    )
-    if hit is None:
-        return ""
-    place, name = hit
-    ligament = float(np.linalg.norm(place - step.sif[0][c].x[j]))
-    x = ", ".join(f"{v:.6g}" for v in place)
-    text = f", {ligament:.4g} from {name!r} at ({x})"
-    rate = float(step.rate[c][j])
-    if 0 < rate < np.inf:
-        cycles = ligament / rate
-        text += f": {cycles:.4g} cycles at its last rate, N = {step.cycles + cycles:.6g}"
-    return text
+    where = "; ".join(str(arrival) for arrival in arrivals)
+    return f"{following(run.problem.mesh).END} left the body: {where}"
 
 
 def place_name(run: Run, step: Step, c: int, j: int) -> str:

@@ -40,6 +40,15 @@ def advanced(run: Run, step: Step) -> list[Crack]:
     ]
 
 
+def cycles_to(run: Run, step: Step, share: float, after: float | None) -> float:
+    """Cycles of a share of the advance after a step, in proportion to it."""
+    if after is not None:
+        return share * after
+    plan = planned(run, step)
+    c, j = plan.tip
+    return share * plan.largest / float(step.rate[c][j])
+
+
 def _settled(run: Run, seen: Evaluation, cycles: float, pending: PerCrack) -> Settled:
     sizes = tuple(cell_sizes(seen.problem.mesh, sif.x) for sif in seen.sif[0])
     plan = _plan(run, sizes, seen.rate, seen.dK_eq, pending)
@@ -59,4 +68,4 @@ def _plan(run: Run, sizes: PerCrack, rate: PerCrack, dK_eq: PerCrack, pending: P
     )
 
 
-__all__ = ["advanced", "begun", "planned", "settled"]
+__all__ = ["advanced", "begun", "cycles_to", "planned", "settled"]

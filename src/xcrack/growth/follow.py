@@ -7,6 +7,7 @@ from xcrack.arrays import Floats
 from xcrack.crack.crack import Crack
 from xcrack.growth import follow_2d, follow_3d
 from xcrack.growth.advance import PerCrack
+from xcrack.growth.arrival import Arriving
 from xcrack.growth.step import Step
 from xcrack.mesh.mesh import Mesh
 from xcrack.sif.sif import SIF
@@ -16,6 +17,7 @@ class Following(Protocol):
     """What growth asks of cracks of one dimension; `follow_2d` and `follow_3d` have it."""
 
     PLACE: str  # what K, a rate and an advance belong to
+    END: str  # what leaves the body
     WAITS_BELOW: float  # share of a cell below which an advance waits
 
     def crack_size(self, crack: Crack, mesh: Mesh) -> float:
@@ -27,11 +29,13 @@ class Following(Protocol):
     def gone(self, advanced: Crack, placed: Crack) -> list[int]:
         """Numbers of the places of a crack that have left the body."""
 
-    def left(self, where: Sequence[str], cracks: Sequence[int]) -> str:
-        """Why a run ends after these places of these cracks have left the body."""
+    def arriving(
+        self, last: Step, advanced: Sequence[Crack], placed: Sequence[Crack], mesh: Mesh
+    ) -> list[Arriving]:
+        """Places that have come to the boundary in an advance, with the facet sets there."""
 
-    def exit_ahead(self, x: Floats, ahead: Floats, mesh: Mesh) -> tuple[Floats, str] | None:
-        """Where a tip that runs straight meets the boundary, and the facet set there."""
+    def ended(self, advanced: Crack, placed: Crack, arriving: Sequence[Arriving]) -> Crack:
+        """A crack that has wholly left the body, as it ends there."""
 
     def followed(
         self,

@@ -10,13 +10,16 @@ from xcrack.crack.advance_2d import advance
 from xcrack.crack.crack import Crack
 from xcrack.crack.measures import facet_names
 from xcrack.crack.size_2d import length_inside
+from xcrack.crack.tips_2d import tip_frames
 from xcrack.growth.advance import LEAST, PerCrack
+from xcrack.growth.arrival import Arriving
 from xcrack.growth.cycles import elapsed
 from xcrack.growth.step import Step, memory_of, moved_places
 from xcrack.mesh.mesh import Mesh
 from xcrack.sif.sif import SIF
 
 PLACE = "tip"
+END = "tip"
 WAITS_BELOW = LEAST
 
 _SAME = 1e-6  # of the coordinates: a tip recognised after its advance
@@ -38,10 +41,30 @@ def gone(advanced: Crack, placed: Crack) -> list[int]:
     return [j for j, tip in enumerate(advanced.tips or ()) if tip not in (placed.tips or ())]
 
 
-def left(where: Sequence[str], cracks: Sequence[int]) -> str:
-    """Why a run ends whose last tips have left the body."""
-    del cracks
-    return "tip left the body: " + "; ".join(where)
+def arriving(
+    last: Step, advanced: Sequence[Crack], placed: Sequence[Crack], mesh: Mesh
+) -> list[Arriving]:
+    """Tips that have left the body, and the part of their straight way that lies inside."""
+    result = []
+    for c, pair in enumerate(zip(advanced, placed, strict=True)):
+        start, _ = tip_frames(last.corrected[c])
+        for j in gone(*pair):
+            move = pair[0].points[(pair[0].tips or ())[j]] - start[j]
+            way = float(np.linalg.norm(move))
+            hit = exit_ahead(start[j], move / way, mesh) if way > 0 else None
+            if hit is not None:
+                x, name = hit
+                ligament = float(np.linalg.norm(x - start[j]))
+                result.append(Arriving(c, j, tuple(x.tolist()), name, ligament, ligament / way))
+    return result
+
+
+def ended(advanced: Crack, placed: Crack, arriving: Sequence[Arriving]) -> Crack:
+    """A crack whose tips have all left the body, with its last points where it meets that."""
+    points = np.array(placed.points)
+    for each in arriving:
+        points[(advanced.tips or ())[each.tip]] = each.x
+    return Crack(points, placed.faces, ())
 
 
 def exit_ahead(x: Floats, ahead: Floats, mesh: Mesh) -> tuple[Floats, str] | None:
@@ -95,12 +118,14 @@ def _matched(moved: Floats, tips: Floats) -> Ints:
 
 
 __all__ = [
+    "END",
     "PLACE",
     "WAITS_BELOW",
     "advanced",
+    "arriving",
     "crack_size",
+    "ended",
     "exit_ahead",
     "followed",
     "gone",
-    "left",
 ]

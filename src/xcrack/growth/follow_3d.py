@@ -7,20 +7,26 @@ import numpy as np
 from xcrack.arrays import Floats, Ints
 from xcrack.crack.advance_3d import advance_fronts
 from xcrack.crack.crack import Crack
+from xcrack.crack.measures import facet_names
+from xcrack.crack.measures_3d import front_ends
 from xcrack.crack.size_3d import surface_size
-from xcrack.geometry.distances import front_distance
+from xcrack.geometry.distances import front_distance, signed_in
 from xcrack.growth.advance import PerCrack
+from xcrack.growth.arrival import Arriving
 from xcrack.growth.cycles_3d import elapsed_3d
 from xcrack.growth.step import Step, memory_of, moved_places
+from xcrack.mesh.body import Body
 from xcrack.mesh.locate import cell_sizes
 from xcrack.mesh.mesh import Mesh
 from xcrack.sif.sif import SIF
 
 PLACE = "front place"
+END = "front"
 WAITS_BELOW = 0.02  # of a cell: neighbours along a front move on, so a slow part has to follow
 
 _SPACING = 0.5  # of a cell, between the points of a new front
 _REACH = 2.0  # cells from a place along a front to those of the step before
+_BISECTIONS = 40
 
 
 def crack_size(crack: Crack, mesh: Mesh) -> float:
@@ -41,16 +47,72 @@ def gone(advanced: Crack, placed: Crack) -> list[int]:
     return [0] if advanced.n_tips and not placed.n_tips else []
 
 
-def left(where: Sequence[str], cracks: Sequence[int]) -> str:
-    """Why a run ends whose last fronts have left the body."""
-    del where
-    return "front left the body: crack " + ", ".join(str(c) for c in cracks)
+def arriving(
+    last: Step, advanced: Sequence[Crack], placed: Sequence[Crack], mesh: Mesh
+) -> list[Arriving]:
+    """Facet sets that a front has come to, each with the place along it that was first.
+
+    A front that has left the body as a whole comes with its last place.
+    """
+    body, (names, group) = Body.of(mesh), facet_names(mesh)
+    outer = np.nonzero(mesh.facet_to_cell[:, 1] < 0)[0]
+
+    def name_at(x: Floats) -> str:
+        return names[group[outer[signed_in(body.boundary, x[None])[1][0]]]]
+
+    result = []
+    for c, pair in enumerate(zip(advanced, placed, strict=True)):
+        start, move = last.sif[0][c].x, moved_places(last, c) - last.sif[0][c].x
+        share = _shares(start, move, body)
+        x = start + np.minimum(share, 1.0)[:, None] * move
+        if gone(*pair):
+            if len(x):
+                far = np.where(np.isfinite(share), share, -1.0)
+                place = int(np.argmax(far))
+                part = float(share[place]) if far[place] >= 0 else 1.0
+                way = float(np.linalg.norm(x[place] - start[place]))
+                x_last = tuple(x[place].tolist())
+                result.append(Arriving(c, place, x_last, name_at(x[place]), way, part))
+            continue
+        before = [x for _, x in front_ends(last.corrected[c], body)]
+        known = {name_at(each) for each in before}
+        reach = 2.0 * float(np.linalg.norm(move, axis=1).max(initial=0.0))
+        for _, end in front_ends(pair[1], body):
+            name, near = name_at(end), reach + _REACH * float(body.cell_size(end[None])[0])
+            away = min((float(np.linalg.norm(end - each)) for each in before), default=np.inf)
+            if name in known and away <= near:
+                continue
+            known.add(name)
+            before.append(end)
+            gap = np.linalg.norm(x - end, axis=1)
+            out = np.isfinite(share) & (gap <= near + reach)
+            out &= np.array([bool(o) and name_at(each) == name for o, each in zip(out, x)], bool)
+            place = int(np.argmin(np.where(out, share, np.inf) if out.any() else gap))
+            there, part = (x[place], float(share[place])) if out.any() else (end, 1.0)
+            way = float(np.linalg.norm(there - start[place]))
+            result.append(Arriving(c, place, tuple(there.tolist()), name, way, part))
+    return result
 
 
-def exit_ahead(x: Floats, ahead: Floats, mesh: Mesh) -> tuple[Floats, str] | None:
-    """None: a front leaves the body along a line, not at a place."""
-    del x, ahead, mesh
-    return None
+def _shares(start: Floats, move: Floats, body: Body) -> Floats:
+    """Part of a move after which each place is outside the body; inf where it stays inside."""
+    share = np.full(len(start), np.inf)
+    if not len(start):
+        return share
+    out = np.nonzero((body.depth(start)[0] < 0) & (body.depth(start + move)[0] >= 0))[0]
+    low, high = np.zeros(len(out)), np.ones(len(out))
+    for _ in range(_BISECTIONS):
+        middle = 0.5 * (low + high)
+        outside = body.depth(start[out] + middle[:, None] * move[out])[0] >= 0
+        low, high = np.where(outside, low, middle), np.where(outside, middle, high)
+    share[out] = high
+    return share
+
+
+def ended(advanced: Crack, placed: Crack, arriving: Sequence[Arriving]) -> Crack:
+    """A crack whose fronts have all left the body: as it was placed."""
+    del advanced, arriving
+    return placed
 
 
 def followed(
@@ -133,13 +195,14 @@ def _closed(crack: Crack) -> list[bool]:
 
 
 __all__ = [
+    "END",
     "PLACE",
     "WAITS_BELOW",
     "advanced",
+    "arriving",
     "carried",
     "crack_size",
-    "exit_ahead",
+    "ended",
     "followed",
     "gone",
-    "left",
 ]

@@ -25,6 +25,12 @@ class Integrator(Protocol):
     def advanced(self, run: Run, step: Step) -> list[Crack]:
         """The cracks after the advance of a step."""
 
+    def cycles_to(self, run: Run, step: Step, share: float, after: float | None) -> float:
+        """Cycles of a share of the advance after a step, of which the whole takes `after`.
+
+        As the last solves see it, where no solve after it says what the whole takes.
+        """
+
 
 def integrator_of(run: Run) -> Integrator:
     """The integrator of a run."""

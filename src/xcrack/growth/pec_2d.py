@@ -102,6 +102,15 @@ def advanced(run: Run, step: Step) -> list[Crack]:
     return _predict(run, step.corrected, trail).cracks
 
 
+def cycles_to(run: Run, step: Step, share: float, after: float | None) -> float:
+    """Cycles of a share of the advance after a step, by the line through two solves."""
+    del after  # behind the first exit other rates count
+    trail, _ = _remembered(step)
+    ahead = _predict(run, step.corrected, trail)
+    known, start = trail.last(2), float(trail.sigma[-1])
+    return growth_over(known, start, share * ahead.length, run.threshold).cycles
+
+
 def _remembered(step: Step) -> tuple[Trail, StepError]:
     trail, error = memory_of(step).trail, step.error
     if not isinstance(trail, Trail) or error is None:
@@ -285,4 +294,4 @@ def _broken(run: Run, last: Step, seen: Evaluation, before: Prediction) -> Settl
     )
 
 
-__all__ = ["Prediction", "advanced", "begun", "planned", "settled"]
+__all__ = ["Prediction", "advanced", "begun", "cycles_to", "planned", "settled"]

@@ -99,6 +99,15 @@ def advanced(run: Run, step: Step) -> list[Crack]:
     ]
 
 
+def cycles_to(run: Run, step: Step, share: float, after: float | None) -> float:
+    """Cycles of a share of the advance after a step, in proportion to it."""
+    if after is not None:
+        return share * after
+    trail, _ = _remembered(step)
+    fastest = max(float(part.rate.max(initial=0.0)) for part in trail.parts)
+    return share * _plan(run, trail).largest / fastest
+
+
 def _remembered(step: Step) -> tuple[FrontTrail, StepError]:
     trail, error = memory_of(step).trail, step.error
     if not isinstance(trail, FrontTrail) or error is None:
@@ -371,4 +380,4 @@ def _cycles(trail: FrontTrail, plan: Advance, seen: Evaluation) -> tuple[float, 
     return cycles, _ERROR * abs(cycles - trapezoid)
 
 
-__all__ = ["advanced", "begun", "planned", "settled"]
+__all__ = ["advanced", "begun", "cycles_to", "planned", "settled"]

@@ -10,6 +10,7 @@ from xcrack.analysis.solution import Solution
 from xcrack.crack.crack import Crack
 from xcrack.errors import GeometryError, ProblemError, XcrackError, warn
 from xcrack.growth.advance import LEAST
+from xcrack.growth.arrivals import arrivals_of, last_step
 from xcrack.growth.checks import depends_on_ratio
 from xcrack.growth.criteria import Criterion
 from xcrack.growth.ending import end_at, falls_to_zero, left_the_body, short_kink, too_short
@@ -127,8 +128,10 @@ def steps_of(run: Run, last: Step | None = None) -> Generator[Step, None, str]:
             reuse = memory_of(last).reuse
         while True:
             ended = end_at(run, last)
+            if ended:
+                break
             plan = integrator_of(run).planned(run, last)
-            if not ended and plan.falls_to_zero:
+            if plan.falls_to_zero:
                 ended = falls_to_zero(run, last, plan)
             if not ended and plan.largest < LEAST * plan.size:
                 ended = too_short(run, last, plan)
@@ -162,17 +165,19 @@ def _after(run: Run, last: Step, reuse: Reuse) -> tuple[Step | None, Reuse, str]
         problem = _problem(run, cracks, memory_of(last))
     except GeometryError as error:
         return None, reuse, _stopped(last, error)
-    gone = _gone(run, cracks, problem.placed)
+    arriving = following(run.problem.mesh).arriving(last, cracks, problem.placed, run.problem.mesh)
     if not any(placed.n_tips for placed in problem.placed):
-        return None, reuse, left_the_body(run, last, gone)
+        return last_step(run, last, cracks, problem.placed, arriving), reuse, ""
     try:
-        return *_next_step(run, problem, last, reuse, memory_of(last).settings), ""
+        step, reuse = _next_step(run, problem, last, reuse, memory_of(last).settings)
+        arrivals = arrivals_of(run, last, arriving, step.cycles - last.cycles)
+        return replace(step, arrivals=arrivals), reuse, ""
     except GeometryError as error:
         return None, reuse, _stopped(last, error)
     except XcrackError as error:
-        if not gone:
+        if not _gone(run, cracks, problem.placed):
             raise
-        left = left_the_body(run, last, gone)
+        left = left_the_body(run, arrivals_of(run, last, arriving, None))
         return None, reuse, f"{left}, and the body cannot be solved without it: {error}"
 
 
@@ -259,10 +264,10 @@ def _problem(run: Run, cracks: Sequence[Crack], memory: Memory) -> Problem:
     return replace(run.problem, cracks=tuple(cracks), numerics=numerics)
 
 
-def _gone(run: Run, cracks: Sequence[Crack], placed: Sequence[Crack]) -> list[tuple[int, int]]:
-    """Tips, or fronts, that have left the body: crack and number."""
+def _gone(run: Run, cracks: Sequence[Crack], placed: Sequence[Crack]) -> bool:
+    """Whether tips, or fronts, have left the body."""
     twin = following(run.problem.mesh)
-    return [(c, j) for c, pair in enumerate(zip(cracks, placed)) for j in twin.gone(*pair)]
+    return any(twin.gone(*pair) for pair in zip(cracks, placed, strict=True))
 
 
 __all__ = ["grow", "respond", "steps_of"]

@@ -12,6 +12,7 @@ from xcrack.arrays import Floats
 from xcrack.crack.crack import Crack
 from xcrack.errors import ProblemError
 from xcrack.growth.advance import PerCrack
+from xcrack.growth.arrival import Arrival
 from xcrack.growth.front_trail import FrontTrail
 from xcrack.growth.trail import Trail
 from xcrack.inputs import entries, number, numbers, shown, whole
@@ -172,6 +173,9 @@ class Step:
         Estimate, where the integrator has one.
     warnings : tuple of str, optional
         Messages of the warnings that its computation gave; None: not known.
+    arrivals : tuple of Arrival
+        Tips and fronts that came to the boundary since the step before. Where no tip is left, the
+        step is the last one: it ends there, and has no K.
 
     Raises
     ------
@@ -194,6 +198,7 @@ class Step:
     corrected: tuple[Crack, ...] = ()
     error: StepError | None = None
     warnings: tuple[str, ...] | None = None
+    arrivals: tuple[Arrival, ...] = ()
 
     def __post_init__(self) -> None:
         whole(self.index, "Step: index", least=0)
@@ -212,6 +217,11 @@ class Step:
                     f"Step: solutions: {shown(solution)} is none: give what solve returns."
                 )
         numbers(self.levels, "Step: levels", (None,))
+        for arrival in entries(self.arrivals, "Step: arrivals"):
+            if not isinstance(arrival, Arrival):
+                raise ProblemError(
+                    f"Step: arrivals: {shown(arrival)} is none: those are made by grow."
+                )
         if not isinstance(self.error, StepError | None):
             raise ProblemError(
                 f"Step: error = {shown(self.error)}: that is made by grow: leave it out."
@@ -255,6 +265,11 @@ class Step:
     def n_tips(self) -> int:
         """Number of tips of all cracks."""
         return sum(len(a) for a in self.angle)
+
+    @property
+    def has_left(self) -> bool:
+        """Whether all tips have left the body: the last step of a run, which has no K."""
+        return bool(self.arrivals) and not self.n_tips
 
 
 def memory_of(step: Step) -> Memory:

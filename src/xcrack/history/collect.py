@@ -53,7 +53,8 @@ def collect(
         Folder in which each step is stored as soon as it is finished; `resume` goes on from it. One
         process at a time may write to it.
     until : callable Step -> bool, optional
-        Growth stops at the first step for which it is true.
+        Growth stops at the first step for which it is true; a step without tips is the last one
+        anyway, and is not asked.
     overwrite : bool
         Begin although a run is stored in the folder: that one is moved aside, into a folder
         ``moved_aside_1`` in it.
@@ -271,7 +272,8 @@ class _Collection:
                 return self._stopped()
 
     def _is_enough(self, step: Step) -> bool:
-        if self.until is None:
+        # Where no tip is left the run ends anyway, and functions of users look for K.
+        if self.until is None or step.has_left:
             return False
         enough = called(self.until, f"until, after step {step.index}", step)
         return flag(enough, "collect: what until returned")

@@ -102,6 +102,7 @@ def driving(steps: Sequence[Step]) -> Driving:
 
 def _of_step(number: int, step: Step, after: Step) -> list[tuple[float, ...]]:
     before, later = memory_of(step), memory_of(after)
+    ligament = {(arrival.crack, arrival.tip): arrival.ligament for arrival in after.arrivals}
     rows = []
     for c in range(len(step.cracks)):
         da, rate = step.da[c], before.law_rate[c]
@@ -110,14 +111,15 @@ def _of_step(number: int, step: Step, after: Step) -> list[tuple[float, ...]]:
             continue
         moved, there = moved_places(step, c), after.sif[0][c].x
         for j in grows.tolist():
-            a = before.length[c] * float(da[j] / da.sum())
+            a, way = before.length[c] * float(da[j] / da.sum()), float(da[j])
             first = _values(step, c, j, a, before.length[c])
             distance, k = cKDTree(there).query(moved[j]) if len(there) else (np.inf, 0)
             if distance <= _NEAR * da[j]:
                 last = _values(after, c, int(k), a + da[j], later.length[c])
             else:  # it has left the body: its rate stays what it was
-                last = (a + da[j], *first[1:])
-            rows.append((number, c, j, float(rate[j]), float(da[j]), *first, *last))
+                way = ligament.get((c, j), way)
+                last = (a + way, *first[1:])
+            rows.append((number, c, j, float(rate[j]), way, *first, *last))
     best = max((row[3] for row in rows), default=0.0)
     first_best = next((k for k, row in enumerate(rows) if row[3] == best), -1)
     return [(*row[:3], float(k == first_best), *row[4:]) for k, row in enumerate(rows)]

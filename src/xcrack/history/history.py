@@ -121,10 +121,12 @@ class History:
             difference of K between two domains, of all states and modes); domain_cells (smallest
             radius of these domains, in cells, where K has it); bar (longest error bar of K, where
             K has bars); angle, dK_eq, R, rate, da
-            as in `Step`. In 3D ``front`` stands for ``tip``, x, y, z is the middle of the front and
-            a the area of the crack over the length of its fronts; each K, K_III among them, and
-            each of the others has three columns, its smallest value along the front, its mean over
-            the length and its largest: ``K_I_0_min``, ``K_I_0_mean``, ``K_I_0_max``.
+            as in `Step`. A step at which no tip is left has a row for each `Arrival`, x and y where
+            it is, and nan for K and what follows from it. In 3D ``front`` stands for ``tip``, x, y,
+            z is the middle of the front and a the area of the crack over the length of its fronts;
+            each K, K_III among them, and each of the others has three columns, its smallest value
+            along the front, its mean over the length and its largest: ``K_I_0_min``,
+            ``K_I_0_mean``, ``K_I_0_max``.
         """
         return table(self.steps)
 

@@ -13,6 +13,7 @@ from typing import Any
 
 from xcrack.crack.crack import Crack
 from xcrack.errors import ProblemError
+from xcrack.growth.arrival import Arrival
 from xcrack.growth.fingerprint import DEFAULTS
 from xcrack.growth.front_trail import FrontTrail, Places
 from xcrack.growth.step import Memory, Step, StepError
@@ -30,7 +31,7 @@ _STEP = re.compile(r"step_(\d{5,})\.npz")
 CLASSES: dict[str, type] = {
     "Step": Step, "Memory": Memory, "Reuse": Reuse, "Crack": Crack,
     "SIF": SIF, "StepError": StepError, "Trail": Trail, "FrontTrail": FrontTrail,
-    "Places": Places,
+    "Places": Places, "Arrival": Arrival,
 }  # fmt: skip
 
 

@@ -44,6 +44,7 @@ def _table_2d(steps: Sequence[Step]) -> tuple[list[str], list[tuple[Any, ...]]]:
                 K += [np.nan] * (2 * (len(states) - len(step.sif)))
                 own = [values[j] for values in parts]
                 rows.append((step.index, step.cycles, c, j, *x[j], _size(step, c), *K, *own))
+        rows += _ended(step, len(names), with_size=True)
     return names, rows
 
 
@@ -55,7 +56,25 @@ def _table_3d(steps: Sequence[Step]) -> tuple[list[str], list[tuple[Any, ...]]]:
     values += [*quality, *_PARTS]
     names = ["step", "N", "crack", "front", "x", "y", "z", "a"]
     names += [f"{value}_{end}" for value in values for end in _ENDS]
-    return names, [row for step in steps for row in _rows_3d(step, n_states, quality)]
+    rows = [
+        row
+        for step in steps
+        for row in (*_rows_3d(step, n_states, quality), *_ended(step, len(names), with_size=False))
+    ]
+    return names, rows
+
+
+def _ended(step: Step, n_columns: int, *, with_size: bool) -> list[tuple[Any, ...]]:
+    """Rows of a step at which no tip is left: where they came to the boundary, without K."""
+    if not step.has_left:
+        return []
+    rows = []
+    for each in step.arrivals:
+        size = _size(step, each.crack) if with_size else np.nan
+        number = each.tip if with_size else 0
+        row = (step.index, step.cycles, each.crack, number, *each.x, size)
+        rows.append((*row, *[np.nan] * (n_columns - len(row))))
+    return rows
 
 
 def _rows_3d(step: Step, n_states: int, quality: Measures) -> list[tuple[Any, ...]]:

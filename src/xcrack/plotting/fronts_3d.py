@@ -234,6 +234,7 @@ def front_axes(
     from matplotlib.colors import Normalize
     from matplotlib.ticker import MaxNLocator
 
+    runs = [[step for step in steps if not step.has_left] for steps in runs]
     view = best_plane(_surface(runs[0][0], crack)) if plane is None else plane
     if mesh is not None:
         rim = section_outline(mesh, view)

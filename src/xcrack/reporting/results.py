@@ -118,6 +118,7 @@ def growth(source: Source) -> Section | None:
         ("cycles N at the last step", history.life),
         ("why it ended", history.ended),
     ]
+    rows += [("break-through", str(each)) for step in history.steps for each in step.arrivals]
     if rates and ranges:
         rows += [("ΔK_eq of the run", f"{min(ranges):.6g} to {max(ranges):.6g}"),
                  ("da/dN of the run", f"{min(rates):.4g} to {max(rates):.4g}")]  # fmt: skip
