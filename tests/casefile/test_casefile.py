@@ -208,3 +208,11 @@ def test_units_are_those_of_the_tables():
     ):  # fmt: skip
         assert mm.number(text, dimension) == pytest.approx(wanted, rel=1e-12), text
     assert Units("m", "MN").number("1 MPa", STRESS) == pytest.approx(1.0, rel=1e-12)
+
+
+def test_zones_of_link_up_are_a_table_with_units(tmp_path):
+    zone = 'link_up = { sigma_y = "0.345 GPa", beta = 2 }\n'
+    case = xc.read_case(written(tmp_path, GROWTH + zone))
+    assert case.growth["link_up"] == xc.plastic_zone(345.0, beta=2)
+    with pytest.raises(xc.ProblemError, match="beta"):
+        xc.read_case(written(tmp_path, GROWTH + zone.replace("beta = 2", "beta = -2")))

@@ -124,6 +124,7 @@ GROW = {
     "integrator": arg(Word(words=("pec", "euler")), "pec", "euler"),
     "threshold": arg(Number(least=0), 0.0, 0.1),
     "K_c": arg(Number(optional=True, above=0), None, 1e3),
+    "link_up": arg(Called(optional=True), None, xc.plastic_zone(400.0, 2)),
     "max_steps": arg(
         Whole(
             least=1,
@@ -311,6 +312,7 @@ ENTRIES = [
             "solver": arg(Called(optional=True), None),
             "progress": arg(Flag(also=(Word(words=("always",)),)), False),
             "K_c": arg(Number(optional=True, above=0), None, 1e3),
+            "link_up": arg(Called(optional=True), None, xc.plastic_zone(400.0, 2)),
             "max_steps": arg(Whole(least=1, rule=lambda v: v < 3 or None, far=2), 2),
             "max_cycles": arg(Number(optional=True, above=0), None, 1e6),
             "until": arg(Called(optional=True), None),

@@ -14,6 +14,7 @@ from xcrack.casefile.units import LENGTH, NUMBER, TOUGHNESS
 from xcrack.errors import ProblemError, XcrackError
 from xcrack.growth.options import GrowOptions
 from xcrack.growth.step import Cycle
+from xcrack.lives.zones import plastic_zone
 from xcrack.paths import path_of
 from xcrack.scene.material import Isotropic
 from xcrack.scene.numerics import Numerics
@@ -135,9 +136,12 @@ def _growth(table: Table) -> Mapping[str, Any]:
     given = {
         name: table.value(name, units.get(name))
         for name in table.content
-        if name not in ("law", "criterion", "cycle")
+        if name not in ("law", "criterion", "cycle", "link_up")
     }
     cycle = forms.called_with(table.table("cycle"), Form(Cycle, {"min": NUMBER, "max": NUMBER}))
+    if "link_up" in table:
+        zone = Form(plastic_zone, {"sigma_y": (-2.0, 1.0), "beta": NUMBER})
+        given["link_up"] = forms.called_with(table.table("link_up"), zone)
     return MappingProxyType({
         "law": forms.made(table.table("law"), forms.LAWS),
         "criterion": forms.CRITERIA[criterion],

@@ -8,6 +8,7 @@ from xcrack.growth.advance import Advance
 from xcrack.growth.arrival import Arrival
 from xcrack.growth.criteria import clipped, equivalent_K
 from xcrack.growth.follow import following
+from xcrack.growth.ligaments import yielded
 from xcrack.growth.options import Run
 from xcrack.growth.step import Step, directions, memory_of
 from xcrack.mesh.locate import cell_extents
@@ -33,6 +34,9 @@ def end_at(run: Run, step: Step) -> str:
             for j in np.nonzero(K_eq >= run.K_c)[0].tolist():
                 place = place_name(run, step, c, j)
                 return f"K_c reached: K_eq = {K_eq[j]:.6g} >= {run.K_c:.6g} at {place}"
+    full = yielded(run, step)
+    if full:
+        return full
     if run.max_cycles is not None and step.cycles >= run.max_cycles:
         return f"max_cycles = {run.max_cycles:.6g} reached: {step.cycles:.6g} cycles"
     if run.max_steps is not None and step.index + 1 >= run.max_steps:

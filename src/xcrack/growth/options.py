@@ -7,7 +7,9 @@ from numbers import Real
 from typing import Any, TypedDict, TypeVar, cast
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from xcrack.arrays import Floats
 from xcrack.errors import ProblemError, warn
 from xcrack.growth.criteria import Criterion
 from xcrack.growth.fingerprint import DEFAULTS, describe, with_defaults_of
@@ -31,6 +33,7 @@ class GrowOptions(TypedDict, total=False):
     integrator: str
     threshold: float
     K_c: float | None
+    link_up: Callable[[Floats], ArrayLike] | None
     max_steps: int | None
     max_cycles: float | None
     solver: Any
@@ -44,7 +47,7 @@ class Run:
     Parameters
     ----------
     problem, law, criterion, cycle, da, cycles, scaling, integrator, threshold, solver, K_c, \
-    max_steps, max_cycles, progress
+    link_up, max_steps, max_cycles, progress
         As of `grow`.
     defaults : int
         Number of the set of defaults.
@@ -66,6 +69,7 @@ class Run:
     threshold: float = 0.0
     solver: Any = None
     K_c: float | None = field(default=None, metadata=_STOPS)
+    link_up: Callable[[Floats], ArrayLike] | None = field(default=None, metadata=_STOPS)
     max_steps: int | None = field(default=None, metadata=_STOPS)
     max_cycles: float | None = field(default=None, metadata=_STOPS)
     progress: bool | str = field(default=True, metadata=_STOPS)
@@ -119,10 +123,25 @@ class Run:
             raise ProblemError(
                 f"grow: solver = {shown(self.solver)} cannot be called: give a function, or None."
             )
+        self._check_link_up()
         always = isinstance(self.progress, str) and self.progress == "always"
         if not (isinstance(self.progress, bool) or always):
             raise ProblemError(
                 f'grow: progress = {shown(self.progress)}: give True, False or "always".'
+            )
+
+    def _check_link_up(self) -> None:
+        if self.link_up is None:
+            return
+        if not callable(self.link_up):
+            raise ProblemError(
+                f"grow: link_up = {shown(self.link_up)}: give plastic_zone(sigma_y, beta), or a "
+                "function of K."
+            )
+        if self.problem.material.plane is None:
+            raise ProblemError(
+                "grow: link_up compares plastic zones with the ligaments between tips in a sheet: "
+                "a 3D body has no such ligaments. Leave it out, or model the sheet in 2D."
             )
 
     @property

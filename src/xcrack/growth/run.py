@@ -73,6 +73,10 @@ def grow(
         Below this dK_eq a tip does not grow.
     K_c : float, stress √length, optional
         Stop when the K_eq of any tip in any state reaches it.
+    link_up : plastic_zone or callable K -> length, optional
+        In 2D: stop when plastic zones fill a ligament: those of two tips that head for each other
+        add up, that of one tip reaches what lies straight ahead, a hole, a side or another crack.
+        Swift's criterion has ``plastic_zone(sigma_y, beta=2)``.
     max_steps : int, optional
         Stop after this many steps, the first included.
     max_cycles : float, optional

@@ -121,7 +121,7 @@ def resume(
         As in `collect`.
     cycles, scaling, integrator, threshold, solver, progress, keep_solutions
         As they were given to `grow` and `collect`.
-    K_c, max_steps, max_cycles
+    K_c, link_up, max_steps, max_cycles
         Rules that stop a run may be other ones than before.
 
     Returns
