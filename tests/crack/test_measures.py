@@ -98,6 +98,27 @@ def test_a_slanted_crack_at_a_bore() -> None:
     assert np.dot(ahead, normal) == 0
 
 
+def test_rows_of_fronts_have_their_measures_and_both_ends() -> None:
+    """A corner crack: one front that ends on two faces, and its depth below each of them."""
+    x = np.zeros((4, 3))
+    crack = xc.elliptic_crack((0, 5.03, 6), (0, 1, 0), (1, 0, 0), 3, 2)
+    problem = xc.Problem(BOX, xc.Isotropic(E=1e3, nu=0.3), [crack])
+    sif = xc.SIF(
+        x=x, frame=np.tile(np.eye(3), (4, 1, 1)), K=np.ones((4, 3)), T=x[:, 0], spread=x,
+        s=np.arange(4.0), front=np.zeros(4, int), at_surface=x[:, 0] > 0, closed=x[:, 0] > 0,
+        domain_cells=x[:, 0],
+    )  # fmt: skip
+    none = (np.zeros(4),)
+    step = xc.Step(0, 0.0, problem.placed, ((sif,),), none, none, none, none, none)
+    (row,) = xc.History((step,), "", mesh=BOX).table(measures=True)
+    assert (row["depth_top"], row["depth_left"]) == pytest.approx((2, 3), abs=0.01 * CELL)
+    assert (row["length_top"], row["length_left"]) == pytest.approx((3, 2), abs=0.01 * CELL)
+    assert row["area"] == pytest.approx(np.pi * 6 / 4, rel=2e-3)
+    ends = {row[f"end_{k}_set"]: [row[f"end_{k}_{i}"] for i in "xyz"] for k in range(2)}
+    assert ends["top"] == pytest.approx([3, 5.03, 6], abs=0.01 * CELL)
+    assert ends["left"] == pytest.approx([0, 5.03, 4], abs=0.01 * CELL)
+
+
 def test_lines_end_on_sets_by_name() -> None:
     mesh = xc.box((0, 0), (1, 1), 9)
     edge = xc.measures(xc.line_crack([(-0.1, 0.51), (0.3, 0.51), (0.4, 0.6)]), mesh)
@@ -136,6 +157,18 @@ def test_a_run_has_tables_of_measures(tmp_path: Path) -> None:
     assert rows["depth_left"] == pytest.approx([0.3, 0.4, 0.5][: len(rows)], abs=1e-3)
     assert set(ends["set"]) == {"left"}
     whole = xc.History(history.steps, history.ended, mesh=mesh)
+    table = whole.table(measures=True)
+    assert table.dtype.names[: len(whole.table().dtype.names)] == whole.table().dtype.names
+    assert table["depth"] == pytest.approx(rows["depth"])
+    assert table["depth_left"] == pytest.approx(table["a"], rel=1e-6)  # it turns a little
+    assert (table["end_0_set"] == "left").all()
+    assert table["end_0_x"] == pytest.approx(0.0, abs=1e-12)
+    assert table["end_0_y"] == pytest.approx(1.03, abs=1e-12)
+    assert (table["end_1_set"] == "").all()
+    assert np.isnan(table["end_1_x"]).all()
+    whole.plot("measures", file=tmp_path / "measures.png")
+    with pytest.raises(ProblemError, match="read without its mesh: give"):
+        xc.History(history.steps, history.ended).table(measures=True)
     whole.write(tmp_path / "out")
     with open(tmp_path / "out" / "ends.csv", newline="") as file:
         lines = list(csv.DictReader(file))

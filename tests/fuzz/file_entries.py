@@ -158,7 +158,7 @@ ENTRIES = [
         "History",
         lambda kind, file: scenes.history().plot(kind, file),
         {
-            "kind": arg(Word(words=("K", "a", "path")), "K", "a", "path"),
+            "kind": arg(Word(words=("K", "a", "path", "measures")), "K", "a", "path"),
             "file": arg(
                 Filename(optional=True, endings=(".png", ".pdf", ".svg", ".jpg")),
                 "good.png",

@@ -265,7 +265,11 @@ ENTRIES = [
             "mesh": arg(Of(optional=True, type=xc.Mesh), None, Late(scenes.mesh)),
         },
     ),
-    Entry("History", lambda: scenes.history().table(), {}, arity=False),
+    Entry(
+        "History",
+        lambda measures: scenes.history().table(measures),
+        {"measures": arg(Flag(), False, True)},
+    ),
     Entry("grow", _grow, GROW, cost=0.12),
     Entry(
         "collect",

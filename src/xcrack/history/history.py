@@ -12,10 +12,10 @@ from xcrack import markup
 from xcrack.crack.crack import Crack
 from xcrack.errors import ProblemError
 from xcrack.growth.step import Step
-from xcrack.history.measures import measures_tables
+from xcrack.history.measures import measured, measures_tables, with_measures
 from xcrack.history.rerating import Rerated, rerated
 from xcrack.history.table import table
-from xcrack.inputs import entries, shown
+from xcrack.inputs import entries, flag, shown
 from xcrack.laws.law import Law
 from xcrack.markup import element, joined
 from xcrack.mesh.mesh import Mesh
@@ -110,8 +110,16 @@ class History:
         """
         return required("pandas", "History.to_pandas").DataFrame(self.table())
 
-    def table(self) -> NDArray[Any]:
+    def table(self, measures: bool = False) -> NDArray[Any]:
         """All numbers, one row for each tip, in 3D for each front, of each step.
+
+        Parameters
+        ----------
+        measures : bool
+            With the `measures` of the crack of each row behind the others: area, depth,
+            ``length_<set>`` and ``depth_<set>`` for each facet set, and both ends of the front (in
+            2D the mouths of the crack), ``end_0_x``, ``end_0_y`` (, ``end_0_z``), ``end_0_set``,
+            ``end_1_x`` and so on.
 
         Returns
         -------
@@ -128,7 +136,11 @@ class History:
             along the front, its mean over the length and its largest: ``K_I_0_min``,
             ``K_I_0_mean``, ``K_I_0_max``.
         """
-        return table(self.steps)
+        rows = table(self.steps)
+        if not flag(measures, "History.table: measures"):
+            return rows
+        body = self._body(None, "History.table(measures=True)")
+        return with_measures(rows, measured(self.steps, body), body)
 
     def rerate(self, law: Law, old: Law | None = None) -> Rerated:
         """Cycles of the same steps by another growth law.
@@ -176,20 +188,29 @@ class History:
         ProblemError
             No mesh is known.
         """
+        body = self._body(mesh, "History.measures")
+        return measures_tables(measured(self.steps, body), body)
+
+    def _body(self, mesh: Mesh | None, what: str) -> Mesh:
         body = self.mesh if mesh is None else mesh
-        if body is None:
-            raise ProblemError("History.measures: this run was read without its mesh: give mesh=.")
-        return measures_tables(self.steps, body)
+        if not isinstance(body, Mesh):
+            raise ProblemError(
+                f"{what}: this run was read without its mesh: give measures(mesh=...), or make a "
+                "History with mesh=."
+                if body is None
+                else f"{what}: mesh = {shown(body)}: give a Mesh."
+            )
+        return body
 
     def plot(self, kind: str, file: str | Path | None = None) -> Any:
         """Draw the run.
 
         Parameters
         ----------
-        kind : {"K", "a", "path", "fronts"}
-            K of the most severe state over the crack length, length over cycles, or the cracks
-            in the body; in 3D the largest K along each front over cycles, and the fronts over the
-            section of the body.
+        kind : {"K", "a", "path", "fronts", "measures"}
+            K of the most severe state over the crack length, length over cycles, the cracks
+            in the body, or depth and surface lengths over cycles; in 3D the largest K along each
+            front over cycles, and the fronts over the section of the body.
         file : path, optional
             File to save the figure to; if omitted, the figure is shown.
 
@@ -209,10 +230,10 @@ class History:
     def write(self, path: str | Path) -> None:
         """Write a table and a series for ParaView into a folder.
 
-        ``history.csv`` is `table`; ``measures.csv`` and ``ends.csv`` are `measures` where the mesh
-        is known; ``history.pvd`` lists for each step the solutions of all load states with their
-        faces, or the lines of the cracks where a step has no solutions any
-        more (it was read from disk).
+        ``history.csv`` is `table`, with its measures where the mesh is known, and so are
+        ``measures.csv`` and ``ends.csv``, which are `measures`; ``history.pvd`` lists for each step
+        the solutions of all load states with their faces, or the lines of the cracks where a step
+        has no solutions any more (it was read from disk).
 
         Parameters
         ----------
@@ -227,14 +248,18 @@ class History:
         from xcrack.history.series import write_series
 
         folder = path_of(path, "History.write: path", error=ProblemError)
-        rows = self.table()
+        rows, mesh = self.table(), self.mesh
+        if mesh is not None:
+            every = measured(self.steps, mesh)
+            rows = with_measures(rows, every, mesh)
         with system_errors(
             "the history cannot be written as a whole to", folder, error=ProblemError
         ):
             folder.mkdir(parents=True, exist_ok=True)
             _write_csv(folder / "history.csv", rows)
-            if self.mesh is not None:
-                for name, each in zip(("measures", "ends"), self.measures(), strict=True):
+            if mesh is not None:
+                both = measures_tables(every, mesh)
+                for name, each in zip(("measures", "ends"), both, strict=True):
                     _write_csv(folder / f"{name}.csv", each)
             write_series(self.steps, folder)
 

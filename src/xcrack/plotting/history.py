@@ -17,11 +17,12 @@ def draw(history: History, kind: str, file: str | Path | None) -> Any:
     if history.cracks and history.cracks[0].fronts is not None:
         kinds = {"K": _draw_K_of_fronts, "a": _draw_a, "fronts": _draw_fronts}
         kinds["path"] = _draw_fronts
+    kinds["measures"] = _draw_measures
     if isinstance(kind, str) and kind == "fronts" and kind not in kinds and history.steps:
         raise ProblemError('plot kind = "fronts": only 3D cracks have them; give "path".')
     if not isinstance(kind, str) or kind not in (*kinds, "fronts"):
         raise ProblemError(
-            f'plot kind = {shown(kind)}: give "K", "a" or "path", in 3D also "fronts".'
+            f'plot kind = {shown(kind)}: give "K", "a", "path" or "measures", in 3D also "fronts".'
         )
     if not history.steps:
         raise ProblemError("there is nothing to draw: the history has no steps.")
@@ -95,6 +96,22 @@ def _draw_a(history: History, axes: Any) -> None:
         _, first = np.unique(rows["step"], return_index=True)
         axes.plot(rows["N"][first], rows["a"][first], "o-", ms=3, label=f"crack {crack}")
     axes.set(xlabel="cycles N", ylabel="crack length a")
+    axes.legend(fontsize="small")
+
+
+def _draw_measures(history: History, axes: Any) -> None:
+    """Depth, and the length on each facet set, over the cycles."""
+    rows, _ = history.measures()
+    lengths = [name for name in rows.dtype.names or () if name.startswith("length_")]
+    for crack in np.unique(rows["crack"]):
+        own, who = rows[rows["crack"] == crack], f"crack {crack}: "
+        axes.plot(own["N"], own["depth"], "o-", ms=3, color=f"C{crack}", label=who + "depth")
+        for name, style in zip(lengths, "sv^Dx<>P*" * len(lengths)):
+            if np.nanmax(np.append(own[name], 0.0)) > 0:
+                label = f"{who}length on {name.removeprefix('length_')}"
+                axes.plot(own["N"], own[name], f"{style}--", ms=4, color=f"C{crack}", label=label)
+    axes.set(xlabel="cycles N", ylabel="length")
+    axes.set_ylim(bottom=0.0)
     axes.legend(fontsize="small")
 
 

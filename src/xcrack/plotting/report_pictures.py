@@ -44,12 +44,16 @@ def history_pictures(history: History) -> tuple[list[Picture], list[str]]:
     """Pictures of a run, and why some could not be drawn."""
     if not history.steps:
         return [], []
-    return _drawn([
+    drawers: list[tuple[str, Draw]] = [
         ("Length of the cracks over cycles", lambda f: history.plot("a", f)),
         ("K over length, or along the fronts over cycles", lambda f: history.plot("K", f)),
         ("Path of the cracks", lambda f: history.plot("path", f)),
         ("Rate of growth over the range", lambda f: _rates(history, f)),
-    ])  # fmt: skip
+    ]
+    if history.mesh is not None:
+        measured = "Depth and surface lengths over cycles"
+        drawers.insert(3, (measured, lambda f: history.plot("measures", f)))
+    return _drawn(drawers)
 
 
 def _field(solution: Solution, field: str, warp: float | None = None) -> Draw:
