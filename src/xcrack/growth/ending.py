@@ -89,8 +89,8 @@ def short_kink(run: Run, step: Step, plan: Advance) -> str:
 
 def left_the_body(run: Run, arrivals: Sequence[Arrival]) -> str:
     """Why a run ends whose last tips or fronts have left the body."""
-    where = "; ".join(str(arrival) for arrival in arrivals)
-    return f"{following(run.problem.mesh).END} left the body: {where}"
+    end = following(run.problem.mesh).END
+    return ": ".join([f"{end} left the body", "; ".join(map(str, arrivals))]).removesuffix(": ")
 
 
 def place_name(run: Run, step: Step, c: int, j: int) -> str:

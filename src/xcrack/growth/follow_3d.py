@@ -27,6 +27,7 @@ WAITS_BELOW = 0.02  # of a cell: neighbours along a front move on, so a slow par
 _SPACING = 0.5  # of a cell, between the points of a new front
 _REACH = 2.0  # cells from a place along a front to those of the step before
 _BISECTIONS = 40
+_LONGER = (2.0, 4.0, 8.0)  # times an advance: ways on which the last pieces of a front leave
 
 
 def crack_size(crack: Crack, mesh: Mesh) -> float:
@@ -66,13 +67,10 @@ def arriving(
         share = _shares(start, move, body)
         x = start + np.minimum(share, 1.0)[:, None] * move
         if gone(*pair):
-            if len(x):
-                far = np.where(np.isfinite(share), share, -1.0)
-                place = int(np.argmax(far))
-                part = float(share[place]) if far[place] >= 0 else 1.0
-                way = float(np.linalg.norm(x[place] - start[place]))
-                x_last = tuple(x[place].tolist())
-                result.append(Arriving(c, place, x_last, name_at(x[place]), way, part))
+            result += [
+                Arriving(c, place, tuple(y.tolist()), name_at(y), way, part)
+                for place, y, way, part in _last_out(start, move, share, body)
+            ]
             continue
         before = [x for _, x in front_ends(last.corrected[c], body)]
         known = {name_at(each) for each in before}
@@ -92,6 +90,25 @@ def arriving(
             way = float(np.linalg.norm(there - start[place]))
             result.append(Arriving(c, place, tuple(there.tolist()), name, way, part))
     return result
+
+
+def _last_out(
+    start: Floats, move: Floats, share: Floats, body: Body
+) -> list[tuple[int, Floats, float, float]]:
+    """The place of a front that leaves the body last: number, where, its way, part of the move.
+
+    The last pieces of a front are too short for the mesh: they go on straight.
+    """
+    share = np.array(share)
+    for longer in _LONGER:
+        inside = np.isinf(share)
+        share[inside] = longer * _shares(start[inside], longer * move[inside], body)
+    share[np.isinf(share)] = -1.0  # it waits, or runs along a side
+    if not len(share) or share.max() < 0:
+        return []
+    place = int(np.argmax(share))
+    y = start[place] + share[place] * move[place]
+    return [(place, y, float(np.linalg.norm(y - start[place])), float(share[place]))]
 
 
 def _shares(start: Floats, move: Floats, body: Body) -> Floats:

@@ -269,7 +269,7 @@ class Step:
     @property
     def has_left(self) -> bool:
         """Whether all tips have left the body: the last step of a run, which has no K."""
-        return bool(self.arrivals) and not self.n_tips
+        return self.index > 0 and not self.n_tips
 
 
 def memory_of(step: Step) -> Memory:
