@@ -80,6 +80,7 @@ _HOME = {
     "twist": "spectra.twist",
     "Cycle": "growth.step",
     "Step": "growth.step",
+    "Join": "growth.joins",
     "grow": "growth.run",
     "life": "lives.life",
     "Scatter": "lives.scatter",

@@ -41,6 +41,8 @@ LAW = {
     ),
 }
 
+JOIN = xc.Join(1, 1e3, (0.5, 0.5), (0, 1))
+
 CONSTANTS = {"C": arg(Number(above=0), 1e-3), "m": arg(Number(above=0), 3)}
 
 
@@ -245,6 +247,17 @@ ENTRIES = [
             "arrivals": arg(
                 ListOf(item=Of(type=Arrival)), (), (Arrival(0, 0, (1.0, 0.5), "right", 0.1, 9.0),)
             ),
+            "joins": arg(ListOf(item=Of(type=xc.Join)), (), [JOIN]),
+        },
+    ),
+    Entry(
+        "Join",
+        xc.Join,
+        {
+            "step": arg(Whole(least=0), 0, 5),
+            "N": arg(Number(least=0), 0.0, 1e3),
+            "point": arg(Numbers((None,), rule=lambda x: len(x) in (2, 3)), (0.5, 1.0)),
+            "cracks": arg(ListOf(item=Whole(least=0), least=2, most=2), (0, 1)),
         },
     ),
     Entry(

@@ -14,6 +14,7 @@ from xcrack.errors import ProblemError
 from xcrack.growth.advance import PerCrack
 from xcrack.growth.arrival import Arrival
 from xcrack.growth.front_trail import FrontTrail
+from xcrack.growth.joins import Join, checked_joins
 from xcrack.growth.trail import Trail
 from xcrack.inputs import entries, number, numbers, shown, whole
 from xcrack.markup import element, joined, table
@@ -176,6 +177,8 @@ class Step:
     arrivals : tuple of Arrival
         Tips and fronts that came to the boundary since the step before. Where no tip is left, the
         step is the last one: it ends there, and has no K.
+    joins : tuple of Join
+        Cracks that became one since the step before.
 
     Raises
     ------
@@ -199,6 +202,7 @@ class Step:
     error: StepError | None = None
     warnings: tuple[str, ...] | None = None
     arrivals: tuple[Arrival, ...] = ()
+    joins: tuple[Join, ...] = ()
 
     def __post_init__(self) -> None:
         whole(self.index, "Step: index", least=0)
@@ -222,6 +226,7 @@ class Step:
                 raise ProblemError(
                     f"Step: arrivals: {shown(arrival)} is none: those are made by grow."
                 )
+        object.__setattr__(self, "joins", checked_joins(self.joins, "Step: joins"))
         if not isinstance(self.error, StepError | None):
             raise ProblemError(
                 f"Step: error = {shown(self.error)}: that is made by grow: leave it out."

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from xcrack import markup
 from xcrack.crack.crack import Crack
 from xcrack.errors import ProblemError
+from xcrack.growth.joins import Join
 from xcrack.growth.step import Step
 from xcrack.history.measures import measured, measures_tables, with_measures
 from xcrack.history.rerating import Rerated, rerated
@@ -81,11 +82,17 @@ class History:
         texts = (text for step in self.steps for text in step.warnings or ())
         return dict(Counter(texts).most_common())
 
+    @property
+    def joins(self) -> tuple[Join, ...]:
+        """Cracks that became one: where, and after how many cycles."""
+        return tuple(join for step in self.steps for join in step.joins)
+
     def __repr__(self) -> str:
         return f"History({len(self.steps)} steps, {self.life:.6g} cycles, ended: {self.ended})"
 
     def _repr_html_(self) -> str:
         rows = [("steps", len(self.steps)), ("cycles N", self.life), ("ended", self.ended)]
+        rows[2:2] = [("join", str(join)) for join in self.joins]
         parts: list[Any] = [element("b", "History")]
         if self.mesh is not None and self.cracks:
             cracks = [rim(crack.points, crack.faces) for crack in self.cracks]

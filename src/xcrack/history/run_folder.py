@@ -16,6 +16,7 @@ from xcrack.errors import ProblemError
 from xcrack.growth.arrival import Arrival
 from xcrack.growth.fingerprint import DEFAULTS
 from xcrack.growth.front_trail import FrontTrail, Places
+from xcrack.growth.joins import Join
 from xcrack.growth.step import Memory, Step, StepError
 from xcrack.growth.trail import Trail
 from xcrack.history import lock
@@ -31,7 +32,7 @@ _STEP = re.compile(r"step_(\d{5,})\.npz")
 CLASSES: dict[str, type] = {
     "Step": Step, "Memory": Memory, "Reuse": Reuse, "Crack": Crack,
     "SIF": SIF, "StepError": StepError, "Trail": Trail, "FrontTrail": FrontTrail,
-    "Places": Places, "Arrival": Arrival,
+    "Places": Places, "Arrival": Arrival, "Join": Join,
 }  # fmt: skip
 
 
