@@ -58,7 +58,7 @@ def pairs_of(
     if spectrum.states is not None:
         n = range(len(sif[0]))
         every = [np.stack([state[c].K for state in sif]) for c in n]
-        return [_pairs_of_states(K, spectrum, problem.material.nu) for K in every]
+        return [pairs_of_states(K, spectrum, problem.material.nu) for K in every]
     values, count, _ = distinct(spectrum.cycles)
     result = []
     for ladder in ladders(problem, spectrum, factors_of(solutions), sif):
@@ -67,7 +67,7 @@ def pairs_of(
     return result
 
 
-def _pairs_of_states(K: Floats, spectrum: Spectrum, nu: float) -> Pairs:
+def pairs_of_states(K: Floats, spectrum: Spectrum, nu: float) -> Pairs:
     """Cycles between named states, counted at each place by K_eq of the state's own direction."""
     opening = clipped(K)
     severity = equivalent_K(opening, kink_angle(opening), nu)
@@ -185,4 +185,13 @@ def left_out_share(
     return worst
 
 
-__all__ = ["Answers", "Pairs", "Rated", "block_of", "left_out_share", "pairs_of", "rated"]
+__all__ = [
+    "Answers",
+    "Pairs",
+    "Rated",
+    "block_of",
+    "left_out_share",
+    "pairs_of",
+    "pairs_of_states",
+    "rated",
+]

@@ -1,7 +1,7 @@
 """The place that drives each step of a run: its lengths, ranges and rates before and after."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -11,6 +11,7 @@ from xcrack.errors import ProblemError
 from xcrack.growth.checks import evaluate_law
 from xcrack.growth.cycles import cycles_between
 from xcrack.growth.step import Step, memory_of, moved_places
+from xcrack.history.block_rates import Block
 from xcrack.laws.law import Law
 
 _FOLLOWS = 0.01  # of an advance: a crack that turns is a little shorter than the sum of its steps
@@ -30,15 +31,20 @@ class Driving:
     place : (k, 2) array of int
         Crack and number.
     da : (k,) array, length
-    a, dK, R, rate : (k, 2) arrays
-        Length that cycles are counted with (length), equivalent range (stress √length), ratio and
-        growth a cycle before a threshold of the run (length/cycle), before and after the step.
+    a, rate : (k, 2) arrays
+        Length that cycles are counted with (length), and growth a cycle before a threshold of the
+        run (length/cycle), before and after the step.
+    dK, R, count : (k, 2, p) arrays
+        Equivalent range (stress √length), ratio and number of each kind of cycle, before and after
+        the step: one kind, but for a spectrum that `driving` is told of.
     size : (k, 2) array, length
         Crack size that a law is given.
     spread : (k, 2) array
         Difference of K between two domains over K, of the state with the largest K.
     cycles : (n,) array
         Of each step.
+    threshold : float, stress √length
+        Ranges of a spectrum below it do not count.
     """
 
     step: Ints
@@ -46,12 +52,14 @@ class Driving:
     place: Ints
     da: Floats
     a: Floats
-    dK: Floats
-    R: Floats
     rate: Floats
     size: Floats
     spread: Floats
+    dK: Floats
+    R: Floats
+    count: Floats
     cycles: Floats
+    threshold: float = 0.0
 
     @property
     def is_one_tip(self) -> bool:
@@ -60,14 +68,32 @@ class Driving:
         a, da = self.a[lead], self.da[lead]
         return bool((np.abs(a[1:, 0] - a[:-1, 1]) <= _FOLLOWS * da[1:]).all())
 
+    @property
+    def lead(self) -> "Driving":
+        """The driving place of each step only, and the cycles of the steps that have one."""
+        names = ("step", "drives", "place", "da", "a", "rate", "size", "spread", "dK", "R", "count")
+        parts = {name: getattr(self, name)[self.drives] for name in names}
+        return replace(self, **parts, cycles=self.cycles[self.step[self.drives]])
+
     def rates(self, law: Law, factor: float | Floats = 1.0) -> Floats:
-        """What a law says of all rows `(k, 2)`, with ranges times a factor."""
-        dK, R, a = (x.ravel() for x in (self.dK * factor, self.R, self.size))
-        return evaluate_law(law, dK, R, 0, "place of a step", a).reshape(self.dK.shape)
+        """What a law says of all rows `(..., k, 2)`, with ranges times a factor `(..., k, 2)`."""
+        dK = self.dK * np.asarray(factor)[..., None]
+        shape = dK.shape
+        R, a = (np.broadcast_to(x, shape).ravel() for x in (self.R, self.size[..., None]))
+        rate = evaluate_law(law, dK.ravel(), R, 0, "place of a step", a).reshape(shape)
+        there = (self.count > 0) & (dK >= self.threshold)
+        with np.errstate(invalid="ignore"):  # none of a kind that breaks the body
+            return np.asarray(np.where(there, self.count * rate, 0.0).sum(axis=-1))
 
 
-def driving(steps: Sequence[Step]) -> Driving:
+def driving(steps: Sequence[Step], block: Block | None = None) -> Driving:
     """Places that grow, of all steps but the last.
+
+    Parameters
+    ----------
+    steps : sequence of Step
+    block : Block, optional
+        Of a run under a spectrum: all of its cycles then, else the largest alone.
 
     Raises
     ------
@@ -82,22 +108,50 @@ def driving(steps: Sequence[Step]) -> Driving:
     if not rows:
         raise ProblemError("no place of the history grows: there is no life to look at.")
     table = np.array(rows)
-    number, crack, place, drives, da = table[:, :5].T
-    pairs = table[:, 5:].reshape(len(table), 2, 6)
+    number, crack, place, drives, da, there = table[:, :6].T
+    pairs = table[:, 6:].reshape(len(table), 2, 6)
     a, dK, R, rate, size, spread = np.moveaxis(pairs, 2, 0)
+    step, where = number.astype(np.int64), np.stack([crack, place, there], axis=1).astype(np.int64)
+    one = (dK[..., None], R[..., None], np.ones((*dK.shape, 1)))
+    ranges, ratios, count = one if block is None else _of_blocks(steps, block, step, where)
     return Driving(
-        step=number.astype(np.int64),
+        step=step,
         drives=drives.astype(bool),
-        place=np.stack([crack, place], axis=1).astype(np.int64),
+        place=where[:, :2],
         da=da,
         a=a,
-        dK=dK,
-        R=R,
         rate=rate,
         size=size,
         spread=spread,
-        cycles=np.diff([step.cycles for step in steps]),
+        dK=ranges,
+        R=ratios,
+        count=count,
+        cycles=np.diff([each.cycles for each in steps]),
+        threshold=0.0 if block is None else block.threshold,
     )
+
+
+def _of_blocks(
+    steps: Sequence[Step], block: Block, step: Ints, where: Ints
+) -> tuple[Floats, Floats, Floats]:
+    """Range, ratio and count of all cycles of a block at both ends of each row `(k, 2, p)`."""
+    answers: dict[tuple[int, int], tuple[Floats, Floats, Floats]] = {}
+
+    def at(n: int, c: int, j: int) -> tuple[Floats, ...]:
+        if (n, c) not in answers:
+            answers[n, c] = block.cycles(steps[n], c)
+        return tuple(part[:, j] for part in answers[n, c])
+
+    rows = []
+    for n, (c, j, there) in zip(step.tolist(), where.tolist()):
+        first = at(n, c, j)
+        rows += [first, first if there < 0 else at(n + 1, c, there)]
+    p = max(len(row[0]) for row in rows)
+    result = np.zeros((3, len(rows), p))  # kinds of cycles that a step does not have: none of them
+    for k, row in enumerate(rows):
+        result[:, k, : len(row[0])] = row
+    dK, R, count = result.reshape(3, len(step), 2, p)
+    return dK, R, count
 
 
 def _of_step(number: int, step: Step, after: Step) -> list[tuple[float, ...]]:
@@ -118,8 +172,8 @@ def _of_step(number: int, step: Step, after: Step) -> list[tuple[float, ...]]:
                 last = _values(after, c, int(k), a + da[j], later.length[c])
             else:  # it has left the body: its rate stays what it was
                 way = ligament.get((c, j), way)
-                last = (a + way, *first[1:])
-            rows.append((number, c, j, float(rate[j]), way, *first, *last))
+                k, last = -1, (a + way, *first[1:])
+            rows.append((number, c, j, float(rate[j]), way, int(k), *first, *last))
     best = max((row[3] for row in rows), default=0.0)
     first_best = next((k for k, row in enumerate(rows) if row[3] == best), -1)
     return [(*row[:3], float(k == first_best), *row[4:]) for k, row in enumerate(rows)]

@@ -11,8 +11,10 @@ from numpy.typing import NDArray
 from xcrack import markup
 from xcrack.crack.crack import Crack
 from xcrack.errors import ProblemError
+from xcrack.growth.criteria import Criterion
 from xcrack.growth.joins import Join
 from xcrack.growth.step import Step
+from xcrack.history.block_rates import block_of_run
 from xcrack.history.measures import measured, measures_tables, with_measures
 from xcrack.history.rerating import Rerated, rerated
 from xcrack.history.table import table
@@ -23,6 +25,7 @@ from xcrack.mesh.mesh import Mesh
 from xcrack.optional import required
 from xcrack.paths import path_of, system_errors
 from xcrack.sketch import rim, sketch
+from xcrack.spectra.spectrum import Spectrum
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,7 +152,16 @@ class History:
         body = self._body(None, "History.table(measures=True)")
         return with_measures(rows, measured(self.steps, body), body)
 
-    def rerate(self, law: Law, old: Law | None = None) -> Rerated:
+    def rerate(
+        self,
+        law: Law,
+        old: Law | None = None,
+        *,
+        spectrum: Spectrum | None = None,
+        criterion: Criterion | None = None,
+        nu: float | None = None,
+        threshold: float = 0.0,
+    ) -> Rerated:
         """Cycles of the same steps by another growth law.
 
         Parameters
@@ -157,6 +169,8 @@ class History:
         law : callable (dK_eq, R) -> da/dN
         old : callable, optional
             Law of the run, to be sure that ranges and ratios of the steps are what it was given.
+        spectrum, criterion, nu, threshold : optional
+            Of a run under a spectrum, as it had them: each cycle of a block is rated again.
 
         Returns
         -------
@@ -168,9 +182,10 @@ class History:
         ------
         ProblemError
             Several tips would have shared the advance another way, by more than 5 % in the mean; a
-            spectrum, whose steps have the largest cycle only; a law by which the driving tip stops.
+            spectrum that is not given, or is another one; a law by which the driving tip stops.
         """
-        return rerated(self.steps, law, old)
+        block = block_of_run("rerate", spectrum, criterion, nu, threshold)
+        return rerated(self.steps, law, old, block)
 
     def measures(self, mesh: Mesh | None = None) -> tuple[NDArray[Any], NDArray[Any]]:
         """What an engineer reads off the cracks: depth, surface lengths, area, ends by set.

@@ -5,10 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from xcrack.arrays import Floats, Ints
+from xcrack.arrays import Floats
 from xcrack.errors import ProblemError
 from xcrack.growth.step import Step
-from xcrack.history.driving import cycles_of, driving
+from xcrack.history.block_rates import Block
+from xcrack.history.driving import Driving, cycles_of, driving
 from xcrack.inputs import shown
 from xcrack.laws.law import Law
 
@@ -41,7 +42,9 @@ class Rerated:
         return float(self.cycles[-1])
 
 
-def rerated(steps: Sequence[Step], law: Law, old: Law | None = None) -> Rerated:
+def rerated(
+    steps: Sequence[Step], law: Law, old: Law | None = None, block: Block | None = None
+) -> Rerated:
     """Cycles of the same steps by another law.
 
     Parameters
@@ -50,22 +53,20 @@ def rerated(steps: Sequence[Step], law: Law, old: Law | None = None) -> Rerated:
     law : callable
     old : callable, optional
         Law of the run, to be sure that ranges and ratios of the steps are what it was given.
+    block : Block, optional
+        Of a run under a spectrum.
 
     Raises
     ------
     ProblemError
-        Several tips would have shared the advance another way, by more than 5 %; a spectrum; the
-        new law lets nothing grow.
+        Several tips would have shared the advance another way, by more than 5 %; a spectrum that is
+        not given, or another one; a law with nominal R under it; the new law lets nothing grow.
     """
-    if any(step.levels for step in steps):
-        raise ProblemError(
-            "rerate: the steps of a spectrum have the largest cycle only: run the spectrum again "
-            "with the other law."
-        )
     for name, value in (("law", law), ("old", old)):
         if not (callable(value) or (name == "old" and value is None)):
             raise ProblemError(f"rerate: {name} = {shown(value)} cannot be called: give a law.")
-    rows = driving(steps)
+    check_block(steps, block, law, "rerate")
+    rows = driving(steps, block)
     if old is not None and not np.allclose(rows.rates(old), rows.rate, rtol=1e-6, atol=0):
         raise ProblemError("rerate: the steps have other rates than the law they are said to have.")
     rate = rows.rates(law)
@@ -85,7 +86,7 @@ def rerated(steps: Sequence[Step], law: Law, old: Law | None = None) -> Rerated:
         last = int(np.argmax(broken))
         since = since[: last + 1]
         ended = f"the law returns inf in step {last}: its toughness is reached"
-    bound = _bound(rows.step, rows.drives, rows.da, rows.rate[:, 0], rate[:, 0], since)
+    bound = bound_of_shares(rows, rate[:, 0], since)
     if bound > _MOST:
         raise ProblemError(
             f"rerate: by this law the tips would have shared the advance another way, by "
@@ -95,19 +96,50 @@ def rerated(steps: Sequence[Step], law: Law, old: Law | None = None) -> Rerated:
     return Rerated(np.concatenate([[0.0], np.cumsum(since)]) + steps[0].cycles, bound, ended)
 
 
-def _bound(step: Ints, drives: Ints, da: Floats, old: Floats, new: Floats, since: Floats) -> float:
-    """Mean over the cycles of the largest change of an advance over that of the driving place."""
+def check_block(steps: Sequence[Step], block: Block | None, law: Law | None, what: str) -> None:
+    """Refuse steps of a spectrum without it, with another one, or with a law that it cannot serve.
+
+    Raises
+    ------
+    ProblemError
+    """
+    if block is None:
+        if any(step.levels for step in steps):
+            raise ProblemError(
+                f"{what}: the run has a spectrum, of whose cycles the steps have the largest only: "
+                "give spectrum=..., criterion=... and nu=... as the run had them."
+            )
+        return
+    for step in steps:
+        block.check(step, what)
+    if getattr(law, "ratio", None) == "nominal":
+        raise ProblemError(
+            f'{what}: the law has ratio="nominal", but the steps of a spectrum have K with contact '
+            "alone: run the spectrum with the law."
+        )
+
+
+def bound_of_shares(rows: Driving, new: Floats, since: Floats) -> float:
+    """Mean over the cycles of the largest change of an advance over that of the driving place.
+
+    Parameters
+    ----------
+    rows : Driving
+    new : (k,) array
+        Other rates before the steps.
+    since : (n,) array
+        Cycles by them of the steps that are reached.
+    """
+    old, first = rows.rate[:, 0], np.unique(rows.step)
     worst = np.zeros(len(since))
-    for n in range(len(since)):
-        mine = step == n
-        lead = mine & drives
-        if not lead.any():
-            continue
+    for n, number in enumerate(first[: len(since)].tolist()):
+        mine = rows.step == number
+        lead = mine & rows.drives
         with np.errstate(invalid="ignore"):
             change = np.abs((new[mine] / old[mine]) / (new[lead] / old[lead]) - 1)
-        worst[n] = np.nan_to_num(change * da[mine] / da[lead], nan=0.0, posinf=1.0).max()
+        worst[n] = np.nan_to_num(change * rows.da[mine] / rows.da[lead], nan=0.0, posinf=1.0).max()
     total = since.sum()
     return float(worst @ since / total) if total else 0.0
 
 
-__all__ = ["Rerated", "rerated"]
+__all__ = ["Rerated", "bound_of_shares", "check_block", "rerated"]

@@ -1,6 +1,6 @@
 """A life with an error bar."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -9,13 +9,19 @@ from numpy.typing import NDArray
 
 from xcrack.arrays import Floats, lock
 from xcrack.errors import ProblemError
+from xcrack.growth.criteria import Criterion
+from xcrack.history.block_rates import Block, block_of_run
 from xcrack.history.driving import Driving, cycles_of, driving
 from xcrack.history.history import History
+from xcrack.history.rerating import bound_of_shares, check_block
 from xcrack.inputs import number, shown, whole
 from xcrack.laws.law import Law
+from xcrack.lives.sampling import lives, varied
 from xcrack.lives.scatter import Scatter
+from xcrack.spectra.spectrum import Spectrum
 
-_CHUNK = 2_000_000  # samples times steps at once
+_ENDS = (0.05, 0.95)
+_MOST = 0.05  # change of shares of the advance, beyond which the path would differ
 _SAME = 1e-6  # relative: rates of a law that are those of the run
 
 
@@ -32,7 +38,9 @@ class Life:
     scatter : dict of str to (float, float)
         Lives between which 90 % of the samples lie if one source alone varies, by its name.
     bounds : dict of str to float
-        Numerical errors as shares of the life: ``steps`` and ``K``; they are bounds, not samples.
+        Numerical errors as shares of the life: ``steps``, ``K``, under a spectrum ``levels`` (of K
+        between solved factors), of several tips ``tips`` (other shares of the advance); they are
+        bounds, not samples.
     unit : str
     """
 
@@ -108,7 +116,11 @@ def life(
     scatter: Scatter,
     samples: int = 100_000,
     seed: int,
-    unit: str = "cycle",
+    unit: str | None = None,
+    spectrum: Spectrum | None = None,
+    criterion: Criterion | None = None,
+    nu: float | None = None,
+    threshold: float = 0.0,
 ) -> Life:
     """Lives of many samples on the path of one run.
 
@@ -120,14 +132,16 @@ def life(
     ----------
     history : History
     law : callable, optional
-        Law of the run: needed where K or load varies, and for the bound of K.
+        Law of the run: needed where K, load or a constant varies, and for the bound of K.
     scatter : Scatter
     samples : int
         At least 100.
     seed : int
         Of the draw.
-    unit : str
-        What a cycle is called.
+    unit : str, optional
+        What a cycle is called; if omitted, that of the spectrum, or "cycle".
+    spectrum, criterion, nu, threshold : optional
+        Of a run under a spectrum, as it had them: needed where the law is.
 
     Returns
     -------
@@ -136,16 +150,20 @@ def life(
     Raises
     ------
     ProblemError
-        A law that is not that of the run, or none where one is needed; K or load that varies
-        under a spectrum; a sampled a0 below the first crack (more than a hundredth of the samples),
-        or with several tips.
+        A law or a spectrum that is not that of the run, or none where one is needed; load that
+        varies where K is not in proportion to it; a constant that the law does not have; a sampled
+        a0 below the first crack (more than a hundredth of the samples), or with several tips;
+        several tips that would have shared the advance another way by more than 5 %.
 
     Notes
     -----
     Source "steps": a third of the difference to the life from every second step (Richardson, second
     order). Source "K": the life with all K larger and smaller by their spread over two domains.
-    Samples are drawn by ranks evenly spread over each distribution (Latin hypercube, McKay, Beckman
-    and Conover 1979), so percentiles of one source alone are exact to the number of samples.
+    Source "levels": a third of the difference to the life with every second level of a spectrum;
+    0 where its factors were solved, or K is in proportion to them. Source "tips": how the shares of
+    the advance of several tips change for the 5 and 95 % samples of each source alone. Samples are
+    those of `Scatter.draw`. With K or load under a spectrum the law is asked at 257 factors, with a
+    power of the factor between them; for constants of the law it is asked for each sample.
     """
     if not isinstance(history, History):
         raise ProblemError(f"life: history = {shown(history)}: give a History.")
@@ -153,62 +171,61 @@ def life(
         raise ProblemError(f"life: scatter = {shown(scatter)}: give Scatter(C=...).")
     if not (law is None or callable(law)):
         raise ProblemError(f"life: law = {shown(law)} cannot be called: give a law.")
-    if not isinstance(unit, str) or not unit:
+    if not (unit is None or (isinstance(unit, str) and unit)):
         raise ProblemError(f"life: unit = {shown(unit)}: give a word, such as 'flight'.")
     n = whole(samples, "life: samples", least=100, most=10_000_000)
-    rows = driving(history.steps)
-    lead = _lead(rows)
-    _check_law(rows, law, scatter, bool(history.steps[0].levels))
-    draw = np.random.default_rng(whole(seed, "life: seed", least=0))
-    given = {
-        name: part
-        for name in ("C", "K", "load", "a0")
-        if (part := getattr(scatter, name)) is not None
-    }
-    drawn = {name: part.quantile(_ranks(draw, n)) for name, part in given.items()}
+    block = block_of_run("life", spectrum, criterion, nu, threshold)
+    rows = _rows(history, law, scatter, block)
+    lead = rows.lead
+    drawn = scatter.draw(n, seed)
     if "a0" in drawn:
         drawn["a0"] = _checked_sizes(lead, drawn["a0"])
-    N = np.sort(_lives(lead, law, drawn, n))
+    N = np.sort(lives(lead, law, drawn, n))
     alone = {
-        name: _ends(_lives(lead, law, {name: values}, n)) if len(drawn) > 1 else _ends(N)
+        name: _ends(lives(lead, law, {name: values}, n)) if len(drawn) > 1 else _ends(N)
         for name, values in drawn.items()
     }
     bounds = {"steps": _of_steps(lead)}
-    if law is not None and not history.steps[0].levels:
+    if law is not None and (block is not None or not history.steps[0].levels):
         bounds["K"] = _of_K(lead, law)
-    return Life(lock(N + history.steps[0].cycles), history.life, alone, bounds, unit)
+        if not rows.is_one_tip or len(rows.step) > len(lead.step):
+            bounds["tips"] = _of_tips(rows, law, scatter)
+        if block is not None:
+            bounds["levels"] = _of_levels(history, lead, law, block)
+    word = unit or ("cycle" if block is None else block.spectrum.unit)
+    return Life(lock(N + history.steps[0].cycles), history.life, alone, bounds, word)
 
 
-def _lead(rows: Driving) -> Driving:
-    """The driving place of each step only."""
-    parts = {
-        name: getattr(rows, name)[rows.drives]
-        for name in ("step", "drives", "place", "da", "a", "dK", "R", "rate", "size", "spread")
-    }
-    return Driving(**parts, cycles=rows.cycles[rows.step[rows.drives]])
-
-
-def _check_law(rows: Driving, law: Law | None, scatter: Scatter, spectrum: bool) -> None:
-    needs = scatter.K is not None or scatter.load is not None
-    if spectrum and needs:
-        raise ProblemError(
-            "life: the steps of a spectrum have the largest cycle only: of its samples C and a0 "
-            "can vary. Run the spectrum with other loads, Spectrum.scaled, to see what they do."
-        )
+def _rows(history: History, law: Law | None, scatter: Scatter, block: Block | None) -> Driving:
+    """Places of the run, where the law and the spectrum are those that it had."""
+    needs = set(scatter.parts) - {"C", "a0"}
     if law is None:
         if needs:
-            raise ProblemError("life: K or load varies: give the law of the run.")
-        return
-    if not spectrum and not np.allclose(rows.rates(law), rows.rate, rtol=_SAME, atol=0):
+            raise ProblemError(f"life: {', '.join(sorted(needs))} varies: give the law of the run.")
+        return driving(history.steps)
+    if needs or block is not None:
+        check_block(history.steps, block, law, "life")
+    rows = driving(history.steps, block)
+    if (block is not None or not history.steps[0].levels) and not np.allclose(
+        rows.rates(law), rows.rate, rtol=_SAME, atol=0
+    ):
         raise ProblemError(
-            "life: the law gives other rates than those of the run: give the law that it had, or "
-            "take history.rerate(law)."
+            "life: the law gives other rates than those of the run: give the law that it had, and "
+            "its spectrum, or take history.rerate(law)."
         )
+    if block is not None and "load" in needs and not _is_proportional(history, block):
+        raise ProblemError(
+            "life: load varies, but K of this run is not in proportion to it: it has steady loads "
+            "or initial stress. Run it with other loads, Spectrum.scaled, to see what they do."
+        )
+    for name in scatter.constants:
+        varied(law, {name: 1.0})
+    return rows
 
 
-def _ranks(draw: np.random.Generator, n: int) -> Floats:
-    """Evenly spread shares in (0, 1), one in each of n parts, in random order."""
-    return np.asarray((draw.permutation(n) + draw.random(n)) / n)
+def _is_proportional(history: History, block: Block) -> bool:
+    chosen = block.spectrum.states is not None or block.spectrum.levels != "auto"
+    return not block.spectrum.steady and (chosen or len(history.steps[0].levels) <= 2)
 
 
 def _checked_sizes(lead: Driving, sizes: Floats) -> Floats:
@@ -227,64 +244,8 @@ def _checked_sizes(lead: Driving, sizes: Floats) -> Floats:
     return np.maximum(sizes, first)
 
 
-def _lives(lead: Driving, law: Law | None, drawn: dict[str, Floats], n: int) -> Floats:
-    """Cycles of each sample `(n,)`."""
-    stretch = drawn.get("K", np.ones(1)) * drawn.get("load", np.ones(1))
-    if law is None or not ({"K", "load"} & set(drawn)):
-        stretch = np.ones(1)
-    size = drawn.get("a0")
-    count = n if size is not None or len(stretch) > 1 else 1
-    N = np.empty(count)
-    steps = len(lead.step)
-    for begin in range(0, count, max(1, _CHUNK // steps)):
-        part = slice(begin, begin + max(1, _CHUNK // steps))
-        factor = stretch[part] if len(stretch) > 1 else stretch
-        rate = _stretched(lead, law, factor)
-        N[part] = _integrated(lead, rate, None if size is None else size[part])
-    return np.broadcast_to(N / drawn.get("C", np.ones(1)), (n,)).copy()
-
-
-def _stretched(lead: Driving, law: Law | None, factor: Floats) -> Floats:
-    """Rates `(m, steps, 2)` with K times a factor `(m,)`."""
-    if law is None or (len(factor) == 1 and factor[0] == 1):
-        return lead.rate[None]
-    m = len(factor)
-    wide = Driving(
-        **{
-            name: np.broadcast_to(getattr(lead, name), (m, *lead.dK.shape))
-            for name in ("a", "R", "rate", "size", "spread")
-        },
-        dK=lead.dK * factor[:, None, None],
-        **{name: getattr(lead, name) for name in ("step", "drives", "place", "da", "cycles")},
-    )
-    return wide.rates(law)
-
-
-def _integrated(lead: Driving, rate: Floats, size: Floats | None) -> Floats:
-    """Cycles over all steps by some rates, in proportion to those that the run counted."""
-    a = np.broadcast_to(lead.a, rate.shape)
-    counted = lead.cycles / cycles_of(lead.a, lead.rate)
-    if size is not None:
-        a, rate = _from(a, rate, size)
-    since = cycles_of(a, rate) * counted
-    broken = np.isinf(rate[..., 0]) | np.isinf(rate[..., 1])
-    later = np.cumsum(broken, axis=-1) - broken > 0  # steps after the toughness was reached
-    return np.asarray(np.where(later, 0.0, since).sum(axis=-1))
-
-
-def _from(a: Floats, rate: Floats, size: Floats) -> tuple[Floats, Floats]:
-    """Steps cut where a crack of some size begins, at the rate that the power law has there."""
-    first = np.clip(size[:, None], a[..., 0], a[..., 1])
-    with np.errstate(divide="ignore", invalid="ignore"):
-        power = np.log(rate[..., 1] / rate[..., 0]) / np.log(a[..., 1] / a[..., 0])
-        begin = rate[..., 0] * (first / a[..., 0]) ** power
-    begin = np.where(np.isfinite(begin), begin, rate[..., 0])
-    begin, end, last = np.broadcast_arrays(begin, rate[..., 1], a[..., 1])
-    return np.stack([first, last], axis=-1), np.stack([begin, end], axis=-1)
-
-
 def _ends(N: Floats) -> tuple[float, float]:
-    low, high = np.quantile(N, [0.05, 0.95], method="inverted_cdf")
+    low, high = np.quantile(N, _ENDS, method="inverted_cdf")
     return float(low), float(high)
 
 
@@ -299,15 +260,43 @@ def _of_steps(lead: Driving) -> float:
     return abs(float(cycles_of(a, rate).sum()) - whole_run) / 3 / whole_run
 
 
+def _changed(lead: Driving, rate: Floats) -> float:
+    """Share by which the life is another one with other rates."""
+    counted = lead.cycles / cycles_of(lead.a, lead.rate)
+    nominal = float(lead.cycles.sum())
+    return abs(float((cycles_of(lead.a, rate) * counted).sum()) - nominal) / nominal
+
+
 def _of_K(lead: Driving, law: Law) -> float:
     """Largest change of the life with all K larger or smaller by their spread."""
-    counted = lead.cycles / cycles_of(lead.a, lead.rate)
-    N = []
-    for sign in (-1.0, 1.0):
-        rate = lead.rates(law, 1.0 + sign * lead.spread)
-        N.append(float((cycles_of(lead.a, rate) * counted).sum()))
-    nominal = float(lead.cycles.sum())
-    return max(abs(each - nominal) for each in N) / nominal
+    return max(_changed(lead, lead.rates(law, 1.0 + s * lead.spread)) for s in (-1.0, 1.0))
+
+
+def _of_levels(history: History, lead: Driving, law: Law, block: Block) -> float:
+    """A third of the change of the life with every second level left out."""
+    if all(block.is_solved(step) for step in history.steps):
+        return 0.0
+    coarse = driving(history.steps, replace(block, coarse=True)).lead
+    return _changed(lead, coarse.rates(law)) / 3
+
+
+def _of_tips(rows: Driving, law: Law, scatter: Scatter) -> float:
+    """Largest change of shares of the advance, of the 5 and 95 % samples of each source alone."""
+    counted, worst = rows.cycles[rows.step[rows.drives]], 0.0
+    for name, part in scatter.parts.items():
+        if name in ("C", "a0"):
+            continue
+        for value in (float(part.quantile(p)) for p in _ENDS):
+            own = name in scatter.constants
+            rate = rows.rates(varied(law, {name: value})) if own else rows.rates(law, value)
+            worst = max(worst, bound_of_shares(rows, rate[:, 0], counted))
+    if worst > _MOST:
+        raise ProblemError(
+            f"life: some samples would have shared the advance of the tips another way, by "
+            f"{worst:.1%} in the mean (more than {_MOST:.0%}): the path would differ. Run them as "
+            "cases of a campaign."
+        )
+    return worst
 
 
 __all__ = ["Life", "life"]

@@ -1,12 +1,15 @@
 """Distributions of what is not known exactly, and which of them a life has."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from xcrack.arrays import Floats
 from xcrack.errors import ProblemError
-from xcrack.inputs import number, numbers, shown
+from xcrack.inputs import number, numbers, shown, whole
+
+_ROUND_OFF = 1e-12
 
 
 @dataclass(frozen=True)
@@ -96,6 +99,9 @@ def _deviate(p: float | Floats) -> Floats:
 Distribution = lognormal | normal
 
 
+_OWN = ("C", "K", "load", "a0")
+
+
 @dataclass(frozen=True)
 class Scatter:
     """What varies from one specimen, aircraft or flight to the next.
@@ -110,25 +116,151 @@ class Scatter:
         Factor on all loads. Its effect is that of K where K is in proportion to the load.
     a0 : lognormal or normal, optional
         Length of the crack at the begin, not below that of the run; for one tip.
+    constants : dict of str to lognormal or normal, optional
+        Factors on constants of the law, by their names: ``{"m": normal(0.02)}``; of a part of it as
+        ``"threshold.dK0"``.
+    correlation : dict of (str, str) to float, optional
+        Between two of these, by their names, in [-1, 1]: of the normal scores, which for lognormal
+        and normal factors are the logarithms and the factors themselves.
 
     Raises
     ------
     ProblemError
-        Another kind of value, or nothing that varies.
+        Another kind of value, nothing that varies, or correlations that no sample can have.
+
+    Notes
+    -----
+    A regression of measured rates gives ln C and m with a covariance, and a correlation that is
+    close to -1 unless C belongs to a range K_p in the middle of the data. Both say the same:
+    with ln C_p and m independent, ln C = ln C_p - m ln K_p has the variance
+    s(ln C_p)² + (ln K_p s(m))² and the correlation -ln K_p s(m) / s(ln C) with m. Independent
+    scatter of C and m overstates that of the life.
+
+    Examples
+    --------
+    >>> joint = Scatter(C=lognormal(1.2), constants={"m": normal(0.03)},
+    ...                 correlation={("C", "m"): -0.98})
+    >>> sorted(joint.parts)
+    ['C', 'm']
     """
 
     C: Distribution | None = None
     K: Distribution | None = None
     load: Distribution | None = None
     a0: Distribution | None = None
+    constants: Mapping[str, Distribution] = field(default_factory=dict)
+    correlation: Mapping[tuple[str, str], float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        parts = {name: getattr(self, name) for name in ("C", "K", "load", "a0")}
-        for name, part in parts.items():
-            if part is not None and not isinstance(part, Distribution):
+        if not isinstance(self.constants, Mapping):
+            raise ProblemError(
+                f'Scatter: constants = {shown(self.constants)}: give a dict, {{"m": normal(0.02)}}.'
+            )
+        for name in self.constants:
+            if not isinstance(name, str) or name in _OWN:
+                raise ProblemError(
+                    f"Scatter: constants has {shown(name)}: give the name of a constant of the "
+                    "law; C, K, load and a0 are arguments of their own."
+                )
+        object.__setattr__(self, "constants", dict(self.constants))
+        every = {name: getattr(self, name) for name in _OWN} | dict(self.constants)
+        for name, part in every.items():
+            wanted = name in self.constants or part is not None
+            if wanted and not isinstance(part, Distribution):
                 raise ProblemError(f"Scatter: {name} = {shown(part)}: give lognormal or normal.")
-        if all(part is None for part in parts.values()):
-            raise ProblemError("Scatter: nothing varies: give C, K, load or a0.")
+        if not self.parts:
+            raise ProblemError("Scatter: nothing varies: give C, K, load, a0 or constants.")
+        self._check_correlation()
+
+    def _check_correlation(self) -> None:
+        if not isinstance(self.correlation, Mapping):
+            raise ProblemError(
+                f"Scatter: correlation = {shown(self.correlation)}: give a dict, "
+                '{("C", "m"): -0.98}.'
+            )
+        checked = {}
+        for pair, value in self.correlation.items():
+            names = pair if isinstance(pair, tuple) else ()
+            if len(names) != 2 or not all(n in self.parts for n in names) or names[0] == names[1]:
+                raise ProblemError(
+                    f"Scatter: correlation has {shown(pair)}: give pairs of what varies, "
+                    f"{', '.join(self.parts)}."
+                )
+            rho = number(value, f"Scatter: correlation of {names[0]} and {names[1]}")
+            if not -1 <= rho <= 1:
+                raise ProblemError(
+                    f"Scatter: correlation of {names[0]} and {names[1]} = {rho:g}: give it in "
+                    "[-1, 1]."
+                )
+            checked[pair] = rho
+        object.__setattr__(self, "correlation", checked)
+        least = np.linalg.eigvalsh(self.matrix).min()
+        if least < -_ROUND_OFF:
+            raise ProblemError(
+                "Scatter: no sample has these correlations together, their matrix has the "
+                f"eigenvalue {least:.3g}: give those of one covariance."
+            )
+
+    @property
+    def parts(self) -> dict[str, Distribution]:
+        """What varies, by its name."""
+        own = {name: getattr(self, name) for name in _OWN if getattr(self, name) is not None}
+        return own | dict(self.constants)
+
+    @property
+    def matrix(self) -> Floats:
+        """Correlations of all parts `(n, n)`, in their order."""
+        names = list(self.parts)
+        result = np.eye(len(names))
+        for (one, other), rho in self.correlation.items():
+            i, j = names.index(one), names.index(other)
+            result[i, j] = result[j, i] = rho
+        return result
+
+    def draw(self, n: int, seed: int) -> dict[str, Floats]:
+        """Samples of all parts.
+
+        Parameters
+        ----------
+        n : int
+            At least 1.
+        seed : int
+
+        Returns
+        -------
+        dict of str to (n,) array
+
+        Notes
+        -----
+        Shares are spread evenly, one in each of n parts (Latin hypercube, McKay, Beckman and
+        Conover 1979), and put in the order of correlated scores (Iman and Conover 1982): each
+        part alone has the quantiles of its distribution to the number of samples.
+        """
+        count = whole(n, "Scatter.draw: n", least=1, most=10_000_000)
+        draw = np.random.default_rng(whole(seed, "Scatter.draw: seed", least=0))
+        shares = [_ranks(draw, count) for _ in self.parts]
+        if self.correlation:
+            shares = _ordered(shares, self.matrix)
+        return {
+            name: np.asarray(part.quantile(share))
+            for (name, part), share in zip(self.parts.items(), shares)
+        }
+
+
+def _ranks(draw: np.random.Generator, n: int) -> Floats:
+    """Evenly spread shares in (0, 1), one in each of n parts, in random order."""
+    return np.asarray((draw.permutation(n) + draw.uniform(1e-9, 1, n)) / n)
+
+
+def _ordered(shares: list[Floats], matrix: Floats) -> list[Floats]:
+    """The same shares in the order of scores that have a correlation."""
+    value, vector = np.linalg.eigh(matrix)
+    root = vector * np.sqrt(np.maximum(value, 0.0)) @ vector.T
+    scores = root @ np.stack([_deviate(share) for share in shares])
+    return [
+        np.sort(share)[np.argsort(np.argsort(score, kind="stable"), kind="stable")]
+        for share, score in zip(shares, scores)
+    ]
 
 
 __all__ = ["Distribution", "Scatter", "lognormal", "normal"]
