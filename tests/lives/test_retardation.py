@@ -14,7 +14,9 @@ from xcrack.history.history import History
 from xcrack.kernels.retardation import advanced
 from xcrack.laws.power import paris, walker
 from xcrack.laws.thresholds import klesnil_lukas
+from xcrack.lives.life import life
 from xcrack.lives.retarded import retarded
+from xcrack.lives.scatter import Scatter, lognormal, normal
 from xcrack.lives.zones import plastic_zone, wheeler, willenborg
 from xcrack.spectra.spectrum import Spectrum
 
@@ -181,6 +183,44 @@ def test_a_large_overload_stops_the_crack(overload):
     assert stopped.ended == ""
     alone = retarded(history, law, overload.omit(0.9), None, nu=0.3).life
     assert stopped.life == pytest.approx(alone, rel=0.02)
+
+
+def test_samples_go_cycle_by_cycle(overload):
+    """A factor on the rate is no factor on the life: each sample is a life of its own law."""
+    law = paris(5e-11, 3.0)
+    history, model = history_of(overload, law, n=4), wheeler(1.5, ZONES)
+    given = {"spectrum": overload, "criterion": max_hoop_stress, "nu": 0.3, "retardation": model}
+    scatter = Scatter(C=lognormal(0.3))
+    result = life(history, law, scatter=scatter, samples=100, seed=98, **given)
+    plain = retarded(history, law, overload, model, nu=0.3).life
+    assert result.life == plain
+    for k in (4, 50, 95):  # samples of C are one in each hundredth
+        C = scatter.draw(100, 98)["C"]
+        factor = np.sort(C)[::-1][k]
+        own = retarded(history, paris(5e-11 * factor, 3.0), overload, model, nu=0.3).life
+        assert result.N[k] == pytest.approx(own, rel=1e-12)
+    assert abs(np.log(result.N[95] / result.N[4]) / np.log(C.max() / C.min()) - 1) > 0.02
+    assert np.isnan(result.bounds["steps"])
+    assert "error of steps: not known" in str(result)
+    varies = Scatter(K=normal(0.02), constants={"m": normal(0.01)})
+    both = life(history, law, scatter=varies, samples=100, seed=99, **given)
+    assert both.percentile(5) < plain < both.percentile(95)
+    never = life(history, law, scatter=scatter, samples=100, seed=98, max_blocks=0.5, **given)
+    assert np.isinf(never.N).all()
+
+
+def test_samples_with_retardation_that_are_refused(overload):
+    law, model = paris(5e-11, 3.0), wheeler(1.0, ZONES)
+    history = history_of(overload, law, n=2)
+    given = {"spectrum": overload, "criterion": max_hoop_stress, "nu": 0.3, "retardation": model}
+    with pytest.raises(ProblemError, match="goes cycle by cycle: give law, spectrum"):
+        life(history, law, scatter=Scatter(C=lognormal(0.3)), seed=1, retardation=model)
+    with pytest.raises(ProblemError, match="a run of its own"):
+        life(history, law, scatter=Scatter(a0=lognormal(0.3, 9.0)), seed=1, **given)
+    with pytest.raises(ProblemError, match="model = 3"):
+        life(history, law, scatter=Scatter(C=lognormal(0.3)), seed=1, **{**given, "retardation": 3})
+    with pytest.raises(ProblemError, match="max_blocks"):
+        life(history, law, scatter=Scatter(C=lognormal(0.3)), seed=1, max_blocks=0, **given)
 
 
 def test_why_it_ends(overload):

@@ -16,10 +16,13 @@ from xcrack.history.history import History
 from xcrack.history.rerating import bound_of_shares, check_block
 from xcrack.inputs import number, shown, whole
 from xcrack.laws.law import Law
+from xcrack.lives.retarded_lives import RetardedLives
 from xcrack.lives.sampling import lives, varied
 from xcrack.lives.scatter import Scatter
+from xcrack.lives.zones import Retardation
 from xcrack.spectra.spectrum import Spectrum
 
+_SAMPLES, _FEW = 100_000, 200
 _ENDS = (0.05, 0.95)
 _MOST = 0.05  # change of shares of the advance, beyond which the path would differ
 _SAME = 1e-6  # relative: rates of a law that are those of the run
@@ -105,7 +108,8 @@ class Life:
         for name, (least, most) in self.scatter.items():
             lines.append(f"  {name} alone: from {least:.4g} to {most:.4g}")
         for name, share in self.bounds.items():
-            lines.append(f"  error of {name}: at most {share:.2%} of the life (a bound)")
+            bound = f"at most {share:.2%} of the life (a bound)" if share == share else "not known"
+            lines.append(f"  error of {name}: {bound}")
         return "\n".join(lines)
 
 
@@ -114,13 +118,15 @@ def life(
     law: Law | None = None,
     *,
     scatter: Scatter,
-    samples: int = 100_000,
+    samples: int | None = None,
     seed: int,
     unit: str | None = None,
     spectrum: Spectrum | None = None,
     criterion: Criterion | None = None,
     nu: float | None = None,
     threshold: float = 0.0,
+    retardation: Retardation | None = None,
+    max_blocks: float = 1e6,
 ) -> Life:
     """Lives of many samples on the path of one run.
 
@@ -134,14 +140,19 @@ def life(
     law : callable, optional
         Law of the run: needed where K, load or a constant varies, and for the bound of K.
     scatter : Scatter
-    samples : int
-        At least 100.
+    samples : int, optional
+        At least 100; 100 000 if omitted, with retardation 200.
     seed : int
         Of the draw.
     unit : str, optional
         What a cycle is called; if omitted, that of the spectrum, or "cycle".
     spectrum, criterion, nu, threshold : optional
         Of a run under a spectrum, as it had them: needed where the law is.
+    retardation : wheeler or willenborg, optional
+        Each sample goes cycle by cycle along the path then, as `retarded` does: an overload makes
+        another life of twice the rate than half of it.
+    max_blocks : float
+        With retardation: samples that are longer are taken not to end.
 
     Returns
     -------
@@ -173,8 +184,13 @@ def life(
         raise ProblemError(f"life: law = {shown(law)} cannot be called: give a law.")
     if not (unit is None or (isinstance(unit, str) and unit)):
         raise ProblemError(f"life: unit = {shown(unit)}: give a word, such as 'flight'.")
-    n = whole(samples, "life: samples", least=100, most=10_000_000)
+    wanted = (_SAMPLES if retardation is None else _FEW) if samples is None else samples
+    n = whole(wanted, "life: samples", least=100, most=10_000_000)
     block = block_of_run("life", spectrum, criterion, nu, threshold)
+    limit = number(max_blocks, "life: max_blocks", above=0)
+    if retardation is not None:
+        cycled = RetardedLives(history, law, block, retardation, limit)
+        return _retarded(cycled, history, law, scatter, block, n, seed, unit)
     rows = _rows(history, law, scatter, block)
     lead = rows.lead
     drawn = scatter.draw(n, seed)
@@ -194,6 +210,33 @@ def life(
             bounds["levels"] = _of_levels(history, lead, law, block)
     word = unit or ("cycle" if block is None else block.spectrum.unit)
     return Life(lock(N + history.steps[0].cycles), history.life, alone, bounds, word)
+
+
+def _retarded(
+    cycled: RetardedLives,
+    history: History,
+    law: Law | None,
+    scatter: Scatter,
+    block: Block | None,
+    n: int,
+    seed: int,
+    unit: str | None,
+) -> Life:
+    """Life of samples that go cycle by cycle."""
+    if scatter.a0 is not None:
+        raise ProblemError(
+            "life: a0 varies: with retardation each first crack is a run of its own."
+        )
+    _rows(history, law, scatter, block)
+    drawn = scatter.draw(n, seed)
+    N = np.sort(cycled.lives(drawn, n))
+    alone = {
+        name: _ends(cycled.lives({name: values}, n)) if len(drawn) > 1 else _ends(N)
+        for name, values in drawn.items()
+    }
+    bounds = {"steps": float("nan"), "K": cycled.of_K()}
+    word = unit or ("block" if block is None else block.spectrum.unit)
+    return Life(lock(N), cycled.life, alone, bounds, word)
 
 
 def _rows(history: History, law: Law | None, scatter: Scatter, block: Block | None) -> Driving:

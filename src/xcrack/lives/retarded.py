@@ -17,6 +17,7 @@ from xcrack.laws.law import Law
 from xcrack.lives.zones import Retardation, wheeler, willenborg
 from xcrack.spectra.spectrum import Spectrum, distinct
 
+_BREAKS = "the law returns inf: the toughness is reached"
 _SHIFTS = 257  # values of the reduction of K at which the law is asked
 
 
@@ -42,6 +43,11 @@ class Retarded:
     def life(self) -> float:
         """Blocks at the end."""
         return float(self.blocks[-1])
+
+    @property
+    def broken(self) -> bool:
+        """Whether the crack comes to its end: the last step, or the toughness."""
+        return self.ended in ("", _BREAKS)
 
 
 def retarded(
@@ -89,38 +95,84 @@ def retarded(
     Each cycle sits where its maximum occurs. The law is asked at both ends of each step for each
     kind of cycle, for Willenborg also at 257 values of the reduction of K.
     """
-    _check(history, law, spectrum, model)
+    check(history, law, spectrum, model)
     limit = number(max_blocks, "retarded: max_blocks", above=0)
     nu = number(nu, "retarded: nu", above=-1, below=0.5)
-    rows = driving(history.steps)
-    if len(np.unique(rows.step)) < len(rows.step) or not rows.is_one_tip:
-        raise ProblemError(
-            "retarded: several tips grow in this history: retardation along a stored path is for "
-            "one tip, whose path does not depend on its rate."
-        )
-    values, _, order = distinct(spectrum.cycles)
-    a, blocks, ended = [float(rows.a[0, 0])], [0.0], ""
-    state = np.array([-np.inf, 0.0, 0.0, 0.0])
-    state[0] = a[0]
-    for row, number_ in enumerate(rows.step.tolist()):
-        ends = (history.steps[number_], history.steps[number_ + 1])
-        K = _ends(rows, row, ends, values, spectrum, nu)
-        cycles, reached = _piece(rows, row, K, law, model, order, state, limit - blocks[-1])
-        blocks.append(blocks[-1] + cycles / len(order))
-        a.append(reached)
-        if reached < rows.a[row, 1]:
-            ended = (
-                f"max_blocks = {limit:.6g} reached"
-                if blocks[-1] >= limit
-                else "the law returns inf: the toughness is reached"
-                if _breaks(rows, row, K, law)
-                else "a whole block lets nothing grow"
+    return CycledPath.of(history, spectrum, nu).grown(law, model, limit)
+
+
+@dataclass(frozen=True, eq=False)
+class CycledPath:
+    """Path of one tip, with K_eq of each kind of cycle at the ends of each step.
+
+    Attributes
+    ----------
+    rows : Driving
+    K : tuple of (2, p, 2) arrays, stress √length
+        Before and after a step, of each kind of cycle, at its minimum and its maximum.
+    order : (n,) array of int
+        Kinds of the cycles of a block, in time.
+    """
+
+    rows: Driving
+    K: tuple[Floats, ...]
+    order: Ints
+
+    @classmethod
+    def of(cls, history: History, spectrum: Spectrum, nu: float) -> "CycledPath":
+        """Path of a run.
+
+        Raises
+        ------
+        ProblemError
+            Several tips grow.
+        """
+        rows = driving(history.steps)
+        if len(np.unique(rows.step)) < len(rows.step) or not rows.is_one_tip:
+            raise ProblemError(
+                "retarded: several tips grow in this history: retardation along a stored path is "
+                "for one tip, whose path does not depend on its rate."
             )
-            break
-    return Retarded(np.array(a), np.array(blocks), ended)
+        values, _, order = distinct(spectrum.cycles)
+        K = tuple(
+            _ends(rows, row, (history.steps[n], history.steps[n + 1]), values, spectrum, nu)
+            for row, n in enumerate(rows.step.tolist())
+        )
+        return cls(rows, K, order)
+
+    def grown(
+        self, law: Law, model: Retardation | None, limit: float, factor: float | Floats = 1.0
+    ) -> Retarded:
+        """Growth cycle by cycle, with K times a factor, of each step where it is an array."""
+        rows, order = self.rows, self.order
+        factors = np.broadcast_to(factor, len(self.K))
+        a, blocks, ended = [float(rows.a[0, 0])], [0.0], ""
+        state = np.array([-np.inf, 0.0, 0.0, 0.0])
+        state[0] = a[0]
+        for row, (ends, times) in enumerate(zip(self.K, factors)):
+            K = ends * times
+            cycles, reached = _piece(rows, row, K, law, model, order, state, limit - blocks[-1])
+            blocks.append(blocks[-1] + cycles / len(order))
+            a.append(reached)
+            if reached < rows.a[row, 1]:
+                ended = (
+                    f"max_blocks = {limit:.6g} reached"
+                    if blocks[-1] >= limit
+                    else _BREAKS
+                    if _breaks(rows, row, K, law)
+                    else "a whole block lets nothing grow"
+                )
+                break
+        return Retarded(np.array(a), np.array(blocks), ended)
 
 
-def _check(history: object, law: object, spectrum: object, model: object) -> None:
+def check(history: object, law: object, spectrum: object, model: object) -> None:
+    """Refuse what cannot be taken cycle by cycle.
+
+    Raises
+    ------
+    ProblemError
+    """
     if not isinstance(history, History):
         raise ProblemError(f"retarded: history = {shown(history)}: give a History.")
     if not callable(law):
@@ -222,4 +274,4 @@ def _breaks(rows: Driving, row: int, K: Floats, law: Law) -> bool:
     return bool(np.isinf(_rates(rows, row, K, law, np.zeros(1))).any())
 
 
-__all__ = ["Retarded", "retarded"]
+__all__ = ["CycledPath", "Retarded", "check", "retarded"]
