@@ -52,6 +52,17 @@ SPECTRUM = xc.Spectrum([0.0, 1.0, 0.4, 0.6])
 FLIGHTS = xc.History(
     tuple(dataclasses.replace(step, levels=(0.0, 1.0)) for step in HISTORY.steps), "max_steps"
 )
+CONSTANTS = {"m": xc.normal(0.1)}
+JOINT = {("C", "m"): -0.5}
+MODEL = xc.wheeler(1.0, ZONE)
+RATED = {"spectrum": SPECTRUM, "criterion": xc.max_hoop_stress, "nu": 0.3}
+
+
+def _empty(value):
+    """None for a dict, which may be empty and then says nothing."""
+    return None if isinstance(value, dict) else False
+
+
 LINE = xc.assessment_line(210e3, 355.0, 510.0)
 FLAT = HISTORY.steps[0].sif[1][0]
 
@@ -188,14 +199,72 @@ ENTRIES = [
         },
     ),
     Entry(
+        "Scatter",
+        lambda constants, correlation, n, seed: len(
+            xc.Scatter(C=xc.normal(0.1), constants=constants, correlation=correlation).draw(
+                n, seed
+            )["C"]
+        ),
+        {
+            "constants": arg(Seen(rule=lambda v: v is CONSTANTS or _empty(v)), CONSTANTS),
+            "correlation": arg(Seen(rule=lambda v: v is JOINT or _empty(v)), JOINT),
+            "n": arg(Whole(least=1, far=1e4), 5),
+            "seed": arg(Whole(least=0), 3),
+        },
+    ),
+    Entry(
+        "life",
+        lambda spectrum, criterion, nu, threshold: (
+            xc.life(
+                FLIGHTS,
+                scatter=SCATTER,
+                samples=200,
+                seed=1,
+                spectrum=spectrum,
+                criterion=criterion,
+                nu=nu,
+                threshold=threshold,
+            ).life
+        ),
+        {
+            "spectrum": arg(Of(type=xc.Spectrum), SPECTRUM),
+            "criterion": arg(Called(), xc.max_hoop_stress),
+            "nu": arg(Number(above=-1, below=0.5), 0.3),
+            "threshold": arg(Number(least=0), 0.0),
+        },
+        arity=False,
+    ),
+    Entry(
+        "life",
+        lambda retardation, max_blocks: (
+            xc.life(
+                FLIGHTS,
+                LAW,
+                scatter=SCATTER,
+                samples=100,
+                seed=1,
+                retardation=retardation,
+                max_blocks=max_blocks,
+                **(RATED if retardation is not None else {}),
+            ).life
+        ),
+        {
+            "retardation": arg(
+                Seen(rule=lambda v: v is None or v is MODEL or isinstance(v, type(MODEL))), MODEL
+            ),
+            "max_blocks": arg(Number(above=0, far=1e4), 2.0),
+        },
+        cost=0.5,
+    ),
+    Entry(
         "life",
         lambda history, **named: xc.life(history, **named),
         {
             "history": RUN,
             "law": arg(Called(optional=True), None, LAW),
-            "unit": arg(Word(rule=bool), "cycle", "flight"),
+            "unit": arg(Word(optional=True, rule=bool), "cycle", "flight"),
             "scatter": arg(Seen(rule=lambda v: v is SCATTER), SCATTER),
-            "samples": arg(Whole(least=100, far=1e4), 200),
+            "samples": arg(Whole(optional=True, least=100, far=1e4), 200),
             "seed": arg(Whole(least=0), 3),
         },
     ),

@@ -217,7 +217,7 @@ def test_samples_with_retardation_that_are_refused(overload):
         life(history, law, scatter=Scatter(C=lognormal(0.3)), seed=1, retardation=model)
     with pytest.raises(ProblemError, match="a run of its own"):
         life(history, law, scatter=Scatter(a0=lognormal(0.3, 9.0)), seed=1, **given)
-    with pytest.raises(ProblemError, match="model = 3"):
+    with pytest.raises(ProblemError, match="retardation = 3"):
         life(history, law, scatter=Scatter(C=lognormal(0.3)), seed=1, **{**given, "retardation": 3})
     with pytest.raises(ProblemError, match="max_blocks"):
         life(history, law, scatter=Scatter(C=lognormal(0.3)), seed=1, max_blocks=0, **given)

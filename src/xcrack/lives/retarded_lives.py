@@ -9,6 +9,7 @@ from xcrack.arrays import Floats
 from xcrack.errors import ProblemError
 from xcrack.history.block_rates import Block
 from xcrack.history.history import History
+from xcrack.inputs import shown
 from xcrack.laws.law import Law
 from xcrack.lives.retarded import CycledPath, Retarded, check
 from xcrack.lives.sampling import Samples, stretch_of, varied
@@ -42,6 +43,8 @@ class RetardedLives:
         model: Retardation,
         max_blocks: float,
     ) -> None:
+        if not isinstance(model, Retardation):
+            raise ProblemError(f"life: retardation = {shown(model)}: give wheeler or willenborg.")
         if block is None or law is None:
             raise ProblemError(
                 "life: retardation goes cycle by cycle: give law, spectrum, criterion and nu as "
