@@ -216,3 +216,38 @@ def test_zones_of_link_up_are_a_table_with_units(tmp_path):
     assert case.growth["link_up"] == xc.plastic_zone(345.0, beta=2)
     with pytest.raises(xc.ProblemError, match="beta"):
         xc.read_case(written(tmp_path, GROWTH + zone.replace("beta = 2", "beta = -2")))
+
+
+def test_run_in_a_folder_begins_goes_on_and_reads(tmp_path):
+    """The same call: a new run, one that lost its last step, one that has ended, one step more."""
+    given = (script(), xc.paris(1e-11, 3), xc.max_hoop_stress, xc.Cycle(0.1, 1.0), 2.0)
+    options = {"progress": False, "max_steps": 2}
+    folder = tmp_path / "run"
+    whole = xc.run(folder, *given, **options)
+    direct = xc.collect(xc.grow(*given, **options))
+    assert whole.table().tobytes() == direct.table().tobytes()
+    before = (folder / "step_00001.npz").stat().st_mtime_ns
+    assert xc.run(folder, *given, **options).table().tobytes() == whole.table().tobytes()
+    assert (folder / "step_00001.npz").stat().st_mtime_ns == before
+    (folder / "step_00001.npz").unlink()
+    assert xc.run(folder, *given, **options).table().tobytes() == whole.table().tobytes()
+    enough = xc.run(folder, *given, until=lambda step: True, **options)
+    assert enough.ended == "until was true at step 1"
+    with pytest.raises(xc.ProblemError, match="was made with other settings"):
+        xc.run(folder, *given[:4], 1.5, **options)
+    begun = xc.run(folder, *given[:4], 1.5, overwrite=True, progress=False, max_steps=1)
+    assert len(begun.steps) == 1
+
+
+def test_what_run_refuses(tmp_path):
+    path = written(tmp_path, PLATE)
+    with pytest.raises(xc.ProblemError, match="da, max_steps without a problem"):
+        xc.run(path, da=1.0, max_steps=3)
+    with pytest.raises(xc.ProblemError, match="keep_solutions without a problem"):
+        xc.run(path, keep_solutions=False)
+    with pytest.raises(xc.ProblemError, match="a case file is given alone"):
+        xc.run(path, script(), xc.paris(1e-11, 3), xc.max_hoop_stress, xc.Cycle(0.1, 1.0), 2.0)
+    with pytest.raises(xc.ProblemError, match="resumed belongs to a case file"):
+        xc.run(tmp_path / "run", script(), resumed=True)
+    with pytest.raises(xc.ProblemError, match="law = None"):
+        xc.run(tmp_path / "run", script(), progress=False)

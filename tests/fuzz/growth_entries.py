@@ -80,9 +80,8 @@ def _collected(steps=None, **options):
     return xc.collect(iter(scenes.history().steps) if steps is None else steps, **options)
 
 
-def _resumed(**changes):
-    shutil.copytree(scenes.stored(), "run")
-    given = {
+def _growing():
+    return {
         "path": "run",
         "problem": scenes.growing(),
         "law": xc.paris(1e-3, 2.0),
@@ -92,7 +91,16 @@ def _resumed(**changes):
         "progress": False,
         "max_steps": 2,
     }
-    return xc.resume(**given | changes)
+
+
+def _resumed(**changes):
+    shutil.copytree(scenes.stored(), "run")
+    return xc.resume(**_growing() | changes)
+
+
+def _run(**changes):
+    shutil.copytree(scenes.stored(), "run")
+    return xc.run(**_growing() | changes)
 
 
 def _loaded(path):
@@ -148,6 +156,35 @@ def _rates(v):
     x = array(v)
     return x is not None and x.shape == (1,) and bool((x >= 0).all())
 
+
+RESUME = {
+    "path": arg(
+        Filename(known=("run", "./run"), folder=True),
+        "run",
+        near=paths("", ""),
+        words=["run"],
+    ),
+    "problem": arg(Seen(rule=lambda v: v is scenes.growing()), Late(scenes.growing)),
+    "law": arg(Called(), xc.paris(1e-3, 2.0), near={"other": Bad(lambda: xc.paris(2e-3, 2.0))}),
+    "criterion": arg(Called(), xc.max_hoop_stress, near={"other": Bad(lambda: xc.weighted_angle)}),
+    "cycles": arg(Seen(rule=lambda v: v is None), None),
+    "integrator": arg(Word(words=("pec",)), "pec"),
+    "solver": arg(Called(optional=True), None),
+    "progress": arg(Flag(also=(Word(words=("always",)),)), False),
+    "K_c": arg(Number(optional=True, above=0), None, 1e3),
+    "link_up": arg(Called(optional=True), None, xc.plastic_zone(400.0, 2)),
+    "max_steps": arg(Whole(least=1, rule=lambda v: v < 3 or None, far=2), 2),
+    "max_cycles": arg(Number(optional=True, above=0), None, 1e6),
+    "until": arg(Called(optional=True), None),
+    "cycle": arg(
+        Seen(rule=lambda v: isinstance(v, xc.Cycle) and v.load_states == (0.0, 1.0)),
+        xc.Cycle(0.0, 1.0),
+    ),
+    "da": arg(Number(least=0.2, most=0.2), 0.2),
+    "scaling": arg(Word(words=("law",)), "law"),
+    "threshold": arg(Number(least=0, most=0), 0.0),
+    "keep_solutions": arg(Flag(), True),
+}
 
 ENTRIES = [
     Entry("paris", xc.paris, CONSTANTS),
@@ -310,38 +347,14 @@ ENTRIES = [
     Entry(
         "resume",
         _resumed,
-        {
-            "path": arg(
-                Filename(known=("run", "./run"), folder=True),
-                "run",
-                near=paths("", ""),
-                words=["run"],
-            ),
-            "problem": arg(Seen(rule=lambda v: v is scenes.growing()), Late(scenes.growing)),
-            "law": arg(
-                Called(), xc.paris(1e-3, 2.0), near={"other": Bad(lambda: xc.paris(2e-3, 2.0))}
-            ),
-            "criterion": arg(
-                Called(), xc.max_hoop_stress, near={"other": Bad(lambda: xc.weighted_angle)}
-            ),
-            "cycles": arg(Seen(rule=lambda v: v is None), None),
-            "integrator": arg(Word(words=("pec",)), "pec"),
-            "solver": arg(Called(optional=True), None),
-            "progress": arg(Flag(also=(Word(words=("always",)),)), False),
-            "K_c": arg(Number(optional=True, above=0), None, 1e3),
-            "link_up": arg(Called(optional=True), None, xc.plastic_zone(400.0, 2)),
-            "max_steps": arg(Whole(least=1, rule=lambda v: v < 3 or None, far=2), 2),
-            "max_cycles": arg(Number(optional=True, above=0), None, 1e6),
-            "until": arg(Called(optional=True), None),
-            "cycle": arg(
-                Seen(rule=lambda v: isinstance(v, xc.Cycle) and v.load_states == (0.0, 1.0)),
-                xc.Cycle(0.0, 1.0),
-            ),
-            "da": arg(Number(least=0.2, most=0.2), 0.2),
-            "scaling": arg(Word(words=("law",)), "law"),
-            "threshold": arg(Number(least=0, most=0), 0.0),
-            "keep_solutions": arg(Flag(), True),
-        },
+        RESUME,
+        in_folder=True,
+        cost=0.03,
+    ),
+    Entry(
+        "run",
+        _run,
+        {name: kind for name, kind in RESUME.items() if name != "path"},
         in_folder=True,
         cost=0.03,
     ),

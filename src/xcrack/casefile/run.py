@@ -1,51 +1,120 @@
-"""Run a case file: solve or grow, and leave table, pictures, files and report in its folder."""
+"""Run growth in a folder, or a case file, with table, pictures, files and report in its folder."""
 
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import Any, Unpack
 
 from xcrack.analysis.solution import Solution
 from xcrack.analysis.solve import solve
 from xcrack.casefile.case import CaseFile, read_case
 from xcrack.errors import ProblemError
+from xcrack.growth.criteria import Criterion
+from xcrack.growth.options import GrowOptions, lists_options
 from xcrack.growth.run import grow
-from xcrack.history.collect import collect, resume
+from xcrack.growth.step import Cycle
+from xcrack.history.collect import Until, collect, resume
 from xcrack.history.history import History
 from xcrack.inputs import flag
-from xcrack.paths import system_errors
+from xcrack.laws.law import Law
+from xcrack.paths import path_of, system_errors
 from xcrack.plotting.plot import plot
 from xcrack.post.vtk import write
 from xcrack.reporting.report import report
+from xcrack.scene.problem import Problem
+from xcrack.spectra.spectrum import Spectrum
 
 _STEPS = "steps"
 
 
-def run(path: str | PathLike[str], *, resumed: bool = False, overwrite: bool = False) -> Any:
-    """Run a case file.
+@lists_options
+def run(
+    path: str | PathLike[str],
+    problem: Problem | None = None,
+    law: Law | None = None,
+    criterion: Criterion | None = None,
+    cycle: Cycle | Spectrum | None = None,
+    da: float | None = None,
+    *,
+    resumed: bool = False,
+    overwrite: bool = False,
+    until: Until | None = None,
+    keep_solutions: bool = True,
+    **options: Unpack[GrowOptions],
+) -> Any:
+    """Run growth in a folder, to its end: begin, or go on with it. Or run a case file.
 
-    Its folder gets ``report.html`` and ``report.json``, files for ParaView and the pictures that
-    the file asks for; a growth run also has its steps there, from which it can go on.
+    With a problem, the same call begins a run, goes on with one that was killed, and reads one that
+    has ended. With a case file alone, its folder gets ``report.html`` and ``report.json``,
+    files for ParaView and the pictures that the file asks for; a growth run also has its steps
+    there, from which it can go on.
 
     Parameters
     ----------
     path : path
-        A toml file, as of `read_case`.
+        Folder of the run; or a toml file, as of `read_case`.
+    problem, law, criterion, cycle, da : optional
+        As of `grow`; left out with a case file.
     resumed : bool
-        Go on with the steps that are in the folder; where there are none, begin.
+        Of a case file: go on with the steps that are in the folder; where there are none, begin.
     overwrite : bool
         Begin anew although steps are there: they are moved aside.
+    until, keep_solutions : optional
+        As of `collect`.
+    cycles, scaling, integrator, threshold, solver, K_c, max_steps, max_cycles, progress
+        As of `grow`.
 
     Returns
     -------
-    History, or Solution, or a list of Solution where the file has states
+    History
+        Or what a case file asks for: a Solution, or a list of them where it has states.
 
     Raises
     ------
     ProblemError
-        As of `read_case`, `solve`, `grow` and `resume`.
+        As of `grow`, `collect` and `resume`: the folder holds a run with other settings. Of a case
+        file as of `read_case`, `solve`, `grow` and `resume`.
     """
     for name, value in (("resumed", resumed), ("overwrite", overwrite)):
         flag(value, f"run: {name}")
+    if problem is not None:
+        if resumed:
+            raise ProblemError("run: resumed belongs to a case file: a run in a folder goes on.")
+        given: dict[str, Any] = {"until": until, "keep_solutions": keep_solutions}
+        return _run_in(path, (problem, law, criterion, cycle, da), given, overwrite, options)
+    growing = {"law": law, "criterion": criterion, "cycle": cycle, "da": da, "until": until}
+    surplus = sorted([*options, *(name for name, value in growing.items() if value is not None)])
+    if surplus or keep_solutions is not True:
+        raise ProblemError(
+            f"run: {', '.join(surplus or ['keep_solutions'])} without a problem: give the problem "
+            "too, for a run in a folder, or a case file alone."
+        )
+    return _run_case(path, resumed=resumed, overwrite=overwrite)
+
+
+def _run_in(
+    path: str | PathLike[str],
+    scene: tuple[Any, ...],
+    given: dict[str, Any],
+    overwrite: bool,
+    options: GrowOptions,
+) -> History:
+    """History of the run in a folder: begun, gone on with, or read."""
+    problem, law, criterion, cycle, da = scene
+    folder = path_of(path, "run: path", error=ProblemError)
+    with system_errors("a folder for the run cannot be made at", folder, error=ProblemError):
+        if folder.is_file():
+            raise ProblemError(
+                f"run: path = {str(folder)!r} is a file: a run needs a folder of its own, and a "
+                "case file is given alone."
+            )
+        begun = folder.is_dir() and any(folder.iterdir())
+    if overwrite or not begun:
+        steps = grow(problem, law, criterion, cycle, da, **options)
+        return collect(steps, folder, overwrite=overwrite, **given)
+    return resume(folder, problem, law, criterion, cycle, da, **given, **options)
+
+
+def _run_case(path: str | PathLike[str], *, resumed: bool, overwrite: bool) -> Any:
     case = read_case(path)
     with system_errors("results cannot be written to", case.folder, error=ProblemError):
         case.folder.mkdir(parents=True, exist_ok=True)
