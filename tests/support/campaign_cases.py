@@ -1,7 +1,9 @@
 """Cases of campaigns: functions of a module, as processes need them."""
 
 import os
+import sys
 import time
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -31,9 +33,37 @@ def counted(a, folder):
     return {"twice": 2.0 * a}
 
 
-def plate(a, stress):
+def waiting(a, folder, wait):
+    """A case that takes its time."""
+    time.sleep(wait)
+    return {"twice": 2.0 * a}
+
+
+def process(a):
+    """Which process a case is run by; long enough for all to have one."""
+    time.sleep(0.1)
+    return {"pid": os.getpid()}
+
+
+def small_plate(a, marks):
+    """An edge crack in a coarse plate, and a mark that it was run."""
+    folder = Path(marks)
+    folder.mkdir(exist_ok=True)
+    with open(folder / f"{a:.15g}", "a") as file:
+        file.write("x")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        return plate(a, 100.0, cells=(6, 7), steps=2)
+
+
+def marked(n, marks):
+    """Parameters of `small_plate`."""
+    return [{"a": each["a"], "marks": str(marks)} for each in drawn(n, 20269)]
+
+
+def plate(a, stress, cells=(12, 13), steps=3):
     """A growing edge crack."""
-    mesh = xc.box((0, -10), (20, 10), (12, 13))
+    mesh = xc.box((0, -10), (20, 10), cells)
     problem = xc.Problem(
         mesh,
         xc.Isotropic(E=210e3, nu=0.3, plane="strain"),
@@ -44,7 +74,7 @@ def plate(a, stress):
     law = xc.paris(1e-13, 3.0)
     cycle = xc.Cycle(0.0, 1.0)
     return xc.collect(
-        xc.grow(problem, law, xc.max_hoop_stress, cycle, da=1.0, max_steps=3, progress=False)
+        xc.grow(problem, law, xc.max_hoop_stress, cycle, da=1.0, max_steps=steps, progress=False)
     )
 
 
@@ -52,3 +82,15 @@ def drawn(n, seed):
     """Parameters of random cracks."""
     rng = np.random.default_rng(seed)
     return [{"a": float(a), "stress": 100.0} for a in rng.uniform(4.0, 8.0, n)]
+
+
+if __name__ == "__main__":  # a script that a test kills
+    from support import campaign_cases
+
+    study, count, workers = Path(sys.argv[1]), int(sys.argv[2]), int(sys.argv[3])
+    xc.campaign(
+        campaign_cases.small_plate,
+        campaign_cases.marked(count, study.parent / "marks"),
+        path=study,
+        workers=workers,
+    )

@@ -1,11 +1,7 @@
 """Run a case for many parameters, and keep what became of each."""
 
 import json
-import multiprocessing
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from concurrent.futures import Future, ProcessPoolExecutor
-from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
@@ -14,7 +10,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from xcrack.campaigns.row import checked, key_of, run_case
+from xcrack.campaigns.engine import (
+    Engine,
+    answer_of,
+    call_off,
+    engine_of,
+    finished,
+    is_good,
+    submitted,
+)
+from xcrack.campaigns.row import checked, key_of
 from xcrack.errors import ProblemError
 from xcrack.growth.fingerprint import describe, differences
 from xcrack.history.lock import locked
@@ -85,7 +90,8 @@ def campaign(
         Processes of this machine; 1: all in this one.
     client : optional
         Instead of workers, anything with ``submit(function, *arguments)`` that returns futures with
-        ``result()``: an executor, a ``distributed.Client``.
+        ``result()``: an executor, or a ``distributed.Client`` of one thread a worker for many
+        machines.
     retry : bool
         Run those again that failed.
 
@@ -124,8 +130,8 @@ def campaign(
         wanted = [
             key for key, row in stored.items() if row is None or (again and bool(row["kind"]))
         ]
-        with _engine(count, client) as submit:
-            _run(folder, case, every, wanted, submit)
+        with engine_of(count, client) as engine:
+            _run(folder, case, every, wanted, engine)
     return Study(folder, tuple(_stored(folder, key) for key in every))
 
 
@@ -172,83 +178,44 @@ def _run(
     case: Callable[..., Any],
     every: Mapping[str, dict[str, Any]],
     wanted: list[str],
-    submit: Callable[..., Any],
+    engine: Engine,
 ) -> None:
-    """Run the cases; each is stored as soon as its turn comes."""
+    """Run the cases; each is stored as soon as it is finished, in whatever order."""
     if not wanted:
         return
     first, rest = wanted[0], wanted[1:]
-    _finish(folder, first, every[first], submit(run_case, case, every[first]))
-    futures: list[tuple[str, Any]] = []
+    _finish(engine, folder, first, every[first], submitted(engine, every[first], case))
+    futures: dict[str, Any] = {}
     try:
-        futures = [(key, submit(run_case, case, every[key])) for key in rest]
-        for key, future in futures:
-            _finish(folder, key, every[key], future)
+        for key in rest:
+            futures[key] = submitted(engine, every[key], case)
+        for key in finished(engine, futures):
+            _finish(engine, folder, key, every[key], futures[key])
     except BaseException:
-        _harvest(folder, every, futures)
+        _harvest(folder, every, engine, futures)
         raise
 
 
 def _harvest(
-    folder: Path, every: Mapping[str, dict[str, Any]], futures: list[tuple[str, Any]]
+    folder: Path, every: Mapping[str, dict[str, Any]], engine: Engine, futures: Mapping[str, Any]
 ) -> None:
     """Store what has been finished when a study is broken off, and call off the rest."""
-    for key, future in futures:
-        if isinstance(future, Future) and future.done() and not future.cancelled():
-            if future.exception() is None and _read(folder, key) is None:
-                _finish(folder, key, every[key], future)
-            continue
-        cancel = getattr(future, "cancel", None)
-        if callable(cancel):
-            cancel()
+    if engine.is_closed:  # it would wait for an answer that never comes
+        return
+    for key, future in futures.items():
+        if is_good(future) and _read(folder, key) is None:
+            _finish(engine, folder, key, every[key], future)
+        call_off(future)
 
 
-def _finish(folder: Path, key: str, parameters: dict[str, Any], future: Any) -> None:
-    try:
-        row = future.result()
-    except (KeyboardInterrupt, SystemExit):
-        raise
-    except BrokenProcessPool as error:
-        raise ProblemError(
-            f"campaign: a worker died at or near the case {parameters} (killed, or out of memory). "
-            "Finished cases are stored: call again to go on, with fewer workers if memory is short."
-        ) from error
-    except Exception as error:
-        raise ProblemError(
-            f"campaign: the client gave no answer for the case {parameters} "
-            f"({type(error).__name__}: {error}). Finished cases are stored: call again to go on."
-        ) from error
+def _finish(
+    engine: Engine, folder: Path, key: str, parameters: dict[str, Any], future: Any
+) -> None:
+    row = answer_of(engine, future, parameters)
     with written_whole(
         _file(folder, key), "a row cannot be written to", error=ProblemError
     ) as part:
         part.write_text(json.dumps(row, indent=1, allow_nan=True), encoding="utf-8")
-
-
-class _Done:
-    """Future of a call in this process."""
-
-    def __init__(self, value: Any) -> None:
-        self._value = value
-
-    def result(self) -> Any:
-        return self._value()
-
-
-@contextmanager
-def _engine(workers: int, client: Any) -> Iterator[Callable[..., Any]]:
-    """What takes the calls: this process, other ones, or a client."""
-    if client is not None:
-        yield client.submit
-    elif workers == 1:
-        yield lambda function, *arguments: _Done(lambda: function(*arguments))
-    else:
-        context = multiprocessing.get_context("spawn")
-        with ProcessPoolExecutor(workers, mp_context=context) as pool:
-
-            def submit(function: Callable[..., Any], *arguments: Any) -> Future[Any]:
-                return pool.submit(function, *arguments)
-
-            yield submit
 
 
 def _check_header(folder: Path, case: Callable[..., Any]) -> None:
