@@ -133,6 +133,7 @@ GROW = {
     ),
     "integrator": arg(Word(words=("pec", "euler")), "pec", "euler"),
     "threshold": arg(Number(least=0), 0.0, 0.1),
+    "retardation": arg(Seen(rule=lambda v: v is None), None),
     "K_c": arg(Number(optional=True, above=0), None, 1e3),
     "link_up": arg(Called(optional=True), None, xc.plastic_zone(400.0, 2)),
     "max_steps": arg(
@@ -172,6 +173,7 @@ RESUME = {
     "solver": arg(Called(optional=True), None),
     "progress": arg(Flag(also=(Word(words=("always",)),)), False),
     "K_c": arg(Number(optional=True, above=0), None, 1e3),
+    "retardation": arg(Seen(rule=lambda v: v is None), None),
     "link_up": arg(Called(optional=True), None, xc.plastic_zone(400.0, 2)),
     "max_steps": arg(Whole(least=1, rule=lambda v: v < 3 or None, far=2), 2),
     "max_cycles": arg(Number(optional=True, above=0), None, 1e6),
@@ -321,6 +323,21 @@ ENTRIES = [
         {"measures": arg(Flag(), False, True)},
     ),
     Entry("grow", _grow, GROW, cost=0.12),
+    Entry(
+        "grow",
+        lambda retardation: _grow(
+            cycle=xc.Spectrum([0.0, 0.5, 0.0, 1.0]), retardation=retardation, max_steps=1
+        ),
+        {
+            "retardation": arg(
+                Of(optional=True, type=xc.wheeler | xc.willenborg),
+                None,
+                xc.wheeler(1.0, xc.plastic_zone(400.0, beta=2)),
+            )
+        },
+        arity=False,
+        cost=0.1,
+    ),
     Entry(
         "collect",
         _collected,

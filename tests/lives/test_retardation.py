@@ -14,10 +14,10 @@ from xcrack.history.history import History
 from xcrack.kernels.retardation import advanced
 from xcrack.laws.power import paris, walker
 from xcrack.laws.thresholds import klesnil_lukas
+from xcrack.laws.zones import plastic_zone, wheeler, willenborg
 from xcrack.lives.life import life
 from xcrack.lives.retarded import retarded
 from xcrack.lives.scatter import Scatter, lognormal, normal
-from xcrack.lives.zones import plastic_zone, wheeler, willenborg
 from xcrack.spectra.spectrum import Spectrum
 
 ZONE = plastic_zone(400.0, beta=2)  # MPa, MPa √m, m

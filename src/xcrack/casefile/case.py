@@ -14,7 +14,7 @@ from xcrack.casefile.units import LENGTH, NUMBER, TOUGHNESS
 from xcrack.errors import ProblemError, XcrackError
 from xcrack.growth.options import GrowOptions
 from xcrack.growth.step import Cycle
-from xcrack.lives.zones import plastic_zone
+from xcrack.laws.zones import plastic_zone
 from xcrack.paths import path_of
 from xcrack.scene.material import Isotropic
 from xcrack.scene.numerics import Numerics

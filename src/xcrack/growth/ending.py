@@ -55,6 +55,8 @@ def falls_to_zero(run: Run, step: Step, plan: Advance) -> str:
         if run.threshold > 0
         else "it falls to zero"
     )
+    if run.retardation is not None:
+        what += ", or retardation all but stops it,"
     return (
         f"rate is zero: {what} within a tenth of a cell at every tip, as of "
         f"{place_name(run, step, *plan.tip)}"

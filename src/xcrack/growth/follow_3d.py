@@ -176,7 +176,7 @@ def carried(
         Which front.
     closed : sequence of bool
         Whether each front is closed.
-    values : (f,) array
+    values : (f,) or (f, m) array
     target : (g, 3) array, length
         Where values are sought.
     reach : float, length
@@ -184,10 +184,10 @@ def carried(
 
     Returns
     -------
-    (g,) array
+    (g,) or (g, m) array
         Linear between the places, nan beyond reach.
     """
-    result = np.full(len(target), np.nan)
+    result = np.full((len(target), *values.shape[1:]), np.nan)
     best = np.full(len(target), float(reach))
     for number in np.unique(front):
         own = front == number
@@ -197,7 +197,7 @@ def carried(
         shut = bool(closed[number]) and len(line) > 2
         r, segment, place = front_distance(target, line, shut)
         following = (segment + 1) % len(line)
-        place = np.nan_to_num(place)
+        place = np.nan_to_num(place).reshape(-1, *[1] * (values.ndim - 1))
         first, second = along[segment], along[following]
         with np.errstate(invalid="ignore"):  # inf where the toughness is reached
             between = (1 - place) * first + place * second

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from xcrack.arrays import Bools, Floats, Ints
+from xcrack.growth.overloads import Kinds, Zones
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,13 +25,17 @@ class Places:
     length : (k,) array, length
         Of each front.
     rate, law_rate : (f,) arrays, length/cycle
-        After and before the threshold.
+        After and before the threshold; with retardation both the mean over the step ahead.
     direction : (f, 3) array
         Of growth.
     pending : (f,) array, length
         Growth too short to be modelled yet.
     size : float, length
         `surface_size` of the crack.
+    kinds : Kinds, optional
+        Cycles of a block at the places, of one solve; with retardation.
+    zones : Zones, optional
+        What overloads have left.
     """
 
     s: Floats
@@ -44,6 +49,8 @@ class Places:
     direction: Floats
     pending: Floats
     size: float
+    kinds: Kinds | None = None
+    zones: Zones | None = None
 
     @property
     def angle(self) -> Floats:

@@ -13,9 +13,11 @@ from xcrack.arrays import Floats
 from xcrack.errors import ProblemError, warn
 from xcrack.growth.criteria import Criterion
 from xcrack.growth.fingerprint import DEFAULTS, describe, with_defaults_of
+from xcrack.growth.overloads import check_retardation
 from xcrack.growth.step import Cycle
 from xcrack.inputs import number, shown, whole
 from xcrack.laws.law import Law
+from xcrack.laws.zones import Retardation
 from xcrack.scene.problem import Problem
 from xcrack.spectra.rainflow import turning_points
 from xcrack.spectra.spectrum import Spectrum
@@ -32,6 +34,7 @@ class GrowOptions(TypedDict, total=False):
     scaling: str
     integrator: str
     threshold: float
+    retardation: Retardation | None
     K_c: float | None
     link_up: Callable[[Floats], ArrayLike] | None
     max_steps: int | None
@@ -46,8 +49,8 @@ class Run:
 
     Parameters
     ----------
-    problem, law, criterion, cycle, da, cycles, scaling, integrator, threshold, solver, K_c, \
-    link_up, max_steps, max_cycles, progress
+    problem, law, criterion, cycle, da, cycles, scaling, integrator, threshold, retardation, \
+    solver, K_c, link_up, max_steps, max_cycles, progress
         As of `grow`.
     defaults : int
         Number of the set of defaults.
@@ -67,6 +70,7 @@ class Run:
     scaling: str = "law"
     integrator: str = "pec"
     threshold: float = 0.0
+    retardation: Retardation | None = None
     solver: Any = None
     K_c: float | None = field(default=None, metadata=_STOPS)
     link_up: Callable[[Floats], ArrayLike] | None = field(default=None, metadata=_STOPS)
@@ -119,6 +123,7 @@ class Run:
                 'grow: scaling = "linear" contradicts the law, and leads to no path as steps get '
                 'shorter: only integrator="euler" has it, for comparison.'
             )
+        check_retardation(self.retardation, self.law, self.cycle, self.integrator)
         if self.solver is not None and not callable(self.solver):
             raise ProblemError(
                 f"grow: solver = {shown(self.solver)} cannot be called: give a function, or None."

@@ -13,9 +13,19 @@ from xcrack.arrays import Bools, Floats
 from xcrack.crack.crack import Crack
 from xcrack.errors import GeometryError, XcrackError
 from xcrack.growth.advance import LEAST, Advance
-from xcrack.growth.envelope import Growth, growing_length, growth_over, length_of_cycles
+from xcrack.growth.envelope import Growth
 from xcrack.growth.evaluation import Evaluation, Settled
 from xcrack.growth.options import Run
+from xcrack.growth.overloads import Zones
+from xcrack.growth.reach import (
+    growth_until,
+    looked_ahead,
+    overloads_begin,
+    overloads_go_on,
+    overloads_of_rest,
+    piece_of,
+    reach_of,
+)
 from xcrack.growth.start_2d import directions_of, first_trail, turn_of_faces
 from xcrack.growth.step import Step, StepError, memory_of
 from xcrack.growth.tips_2d import ending_at, faces_of, moved_on, rows_of, split
@@ -26,7 +36,6 @@ from xcrack.mesh.mesh import Mesh
 _PASSES = 6  # of the correction, which turns the last face, which turns the direction
 _ERROR = 0.25  # of the correction: more than the error that is left, on nearly all scenes
 _FIRST = 0.5  # of that for the first step's cycles, of which no parabola is known yet
-_FASTER = 2.0  # times the last rate: what a step of prescribed cycles may reckon with
 _HALVINGS = 40
 
 
@@ -63,6 +72,7 @@ def begun(run: Run, seen: Evaluation) -> Settled:
     """The first step of a run."""
     faces = faces_of(seen.cracks)
     trail = first_trail(run, seen, faces.tip, np.zeros(len(faces.tip), dtype=bool))
+    trail = looked_ahead(run, overloads_begin(run, seen, trail))
     none = split(np.zeros(len(faces.tip)), seen.cracks)
     return _settled(run, 0.0, seen.cracks, trail, StepError(none, 0.0))
 
@@ -120,19 +130,11 @@ def _remembered(step: Step) -> tuple[Trail, StepError]:
 
 def _predict(run: Run, cracks: Sequence[Crack], trail: Trail) -> Prediction:
     """Where the last two solves lead; from a first one straight on, at its rates."""
-    mesh, known, start = run.problem.mesh, trail.last(2), float(trail.sigma[-1])
-    length = np.inf if run.da is None else run.da
-    if run.cycles is not None:
-        fastest = float(trail.rate[-1].max(initial=0.0))
-        most = min(length, run.cycles * fastest * (1.0 if known.n_solves == 1 else _FASTER))
-        length = length_of_cycles(known, start, run.cycles, most, run.threshold)
-    size = cell_sizes(mesh, trail.place)
-    asked = length
-    length = growing_length(known, start, asked, run.threshold)
-    growth = growth_over(known, start, length, run.threshold)
-    place = trail.place + growth.move
+    size = cell_sizes(run.problem.mesh, trail.place)
+    reach = reach_of(run, trail)
+    place = trail.place + reach.growth.move
     after, moves = ending_at(cracks, place, trail.grown, size)
-    return Prediction(length, length < asked, growth, place, after, moves, size)
+    return Prediction(reach.length, reach.stops, reach.growth, place, after, moves, size)
 
 
 def _settled(
@@ -159,12 +161,14 @@ def _corrected(
     direction, rate, dK_eq, exponent = directions_of(run, seen, faces)
     start = float(old.sigma[-1])
     trail = old.with_solve(start + before.length, direction, rate, dK_eq, exponent)
+    trail = overloads_go_on(run, seen, old, trail)
+    piece = piece_of(run, trail, start, before.length, _zones(old))
     solved = trail.direction[-1]
     gamma = np.where(before.moves, turn_of_faces(seen, faces), 0.0)
     begin = _begins(last.corrected, old, before)
     growth = before.growth
     for _ in range(_PASSES):
-        growth = growth_over(trail, start, before.length, run.threshold)
+        growth = piece.over(trail)
         face = old.place + growth.move - begin
         turn = np.arctan2(face[:, 1], face[:, 0]) - faces.direction
         turn -= 2 * np.pi * np.round(turn / (2 * np.pi))
@@ -176,11 +180,12 @@ def _corrected(
         place, corrected, moves = before.place, list(seen.cracks), before.moves
     off = _ERROR * np.linalg.norm(place - before.place, axis=1)
     cycles, own = _cycles(run, trail, old, before, growth)
+    trail = replace(trail, place=place, grown=old.grown | moves)
     return _settled(
         run,
         last.cycles + cycles,
         corrected,
-        replace(trail, place=place, grown=old.grown | moves),
+        looked_ahead(run, _with_zones(trail, _zones(old), piece.after)),
         StepError(
             tuple(a + b for a, b in zip(error.place, split(off, corrected))), error.cycles + own
         ),
@@ -194,18 +199,32 @@ def _cycles(
     if old.n_solves == 1:
         return growth.cycles, _FIRST * _ERROR * abs(growth.cycles - before.growth.cycles)
     start = float(old.sigma[-1])
-    line = growth_over(trail.last(2), start, before.length, run.threshold).cycles
+    two = trail.last(2)
+    line = piece_of(run, two, start, before.length, _zones(old)).over(two).cycles
     own = _ERROR * abs(growth.cycles - line)
     if old.n_solves > 2:
         return growth.cycles, own
     # The second step: the parabola tells what the first one, along a line, was off.
     span = float(old.sigma[1] - old.sigma[0])
     first = float(old.sigma[0])
-    line = growth_over(old, first, span, run.threshold).cycles
-    curve = growth_over(trail, first, span, run.threshold).cycles
-    constant = growth_over(old.first(1), first, span, run.threshold).cycles
+    begin = None if old.overloads is None else old.overloads.earlier
+    line, curve, constant = (
+        piece_of(run, each, first, span, begin).over(each).cycles
+        for each in (old, trail, old.first(1))
+    )
     own += _ERROR * (abs(curve - line) - _FIRST * abs(line - constant))
     return growth.cycles + curve - line, own
+
+
+def _zones(trail: Trail) -> Zones | None:
+    return None if trail.overloads is None else trail.overloads.zones
+
+
+def _with_zones(trail: Trail, begin: Zones | None, after: Zones | None) -> Trail:
+    """The same after a step, with what overloads have left at its begin and at its end."""
+    if trail.overloads is None or after is None:
+        return trail
+    return replace(trail, overloads=replace(trail.overloads, zones=after, earlier=begin))
 
 
 def _begins(cracks: Sequence[Crack], trail: Trail, before: Prediction) -> Floats:
@@ -235,12 +254,12 @@ def _without_lost_tips(
     old, error = _remembered(last)
     place = before.place[stays]
     trail = first_trail(run, seen, place, (old.grown | before.moves)[stays])
-    start, exit_ = float(old.sigma[-1]), _exit(run, old, before, ~stays)
-    known = old.last(2)
-    cycles = growth_over(known, start, exit_, run.threshold).cycles
+    trail = looked_ahead(run, overloads_begin(run, seen, trail, overloads_of_rest(old, stays)))
+    exit_ = _exit(run, old, before, ~stays)
+    cycles = growth_until(run, old, exit_).cycles
     largest = max((float(rate.max(initial=0.0)) for rate in seen.rate), default=0.0)
     rest = before.length - exit_
-    if 0 < largest < np.inf:
+    if 0 < largest < np.inf and old.overloads is None:
         cycles += rest / largest
     elif rest > 0:
         cycles = before.growth.cycles
@@ -256,13 +275,12 @@ def _without_lost_tips(
 
 def _exit(run: Run, trail: Trail, before: Prediction, lost: Bools) -> float:
     """Piece of σ until the first of the lost tips is outside the body."""
-    mesh, known, start = run.problem.mesh, trail.last(2), float(trail.sigma[-1])
-    low, high = 0.0, before.length
+    mesh, low, high = run.problem.mesh, 0.0, before.length
     if _inside(mesh, before.place[lost]):
         return high
     for _ in range(_HALVINGS):
         middle = 0.5 * (low + high)
-        move = growth_over(known, start, middle, run.threshold).move
+        move = growth_until(run, trail, middle).move
         if _inside(mesh, (trail.place + move)[lost]):
             low = middle
         else:
@@ -283,6 +301,8 @@ def _broken(run: Run, last: Step, seen: Evaluation, before: Prediction) -> Settl
     old, error = _remembered(last)
     largest = float(old.rate[-1].max())
     cycles = 0.5 * before.length / largest
+    if old.overloads is not None:
+        cycles = 0.5 * before.growth.cycles
     trail = replace(
         old,
         place=before.place,

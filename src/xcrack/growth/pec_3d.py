@@ -26,6 +26,14 @@ from xcrack.growth.front_angles import without_noise
 from xcrack.growth.front_filter import Response, corrected, predicted, response, turning_of
 from xcrack.growth.front_trail import FrontTrail, Places
 from xcrack.growth.options import Run
+from xcrack.growth.overloads_3d import (
+    beyond_trapezoid,
+    overloads_between,
+    rate_at_end,
+    with_kinds,
+    with_mean_rates,
+    zones_onto,
+)
 from xcrack.growth.step import Step, StepError, memory_of
 from xcrack.mesh.locate import cell_sizes, contains
 from xcrack.mesh.mesh import Mesh
@@ -38,6 +46,7 @@ _ERROR = 0.25  # of a correction, as in 2D
 def begun(run: Run, seen: Evaluation) -> Settled:
     """The first step of a run."""
     parts = tuple(_solved_places(seen, c, None) for c in range(len(seen.cracks)))
+    parts = with_kinds(run, seen, parts)
     none = tuple(np.zeros(len(part.s)) for part in parts)
     return _settled(run, seen, 0.0, seen.cracks, _trail(run, seen, parts), StepError(none, 0.0))
 
@@ -53,6 +62,16 @@ def settled(run: Run, last: Step, seen: Evaluation) -> Settled:
     fastest = [max((float(r.max(initial=0.0)) for r in rates), default=0.0) for rates in (
         [part.rate for part in trail.parts], [part.rate for part in after])]  # fmt: skip
     cycles, own = _cycles(trail, plan, seen)
+    moved = [part.x + _moves(part, part.angle, way) for part, way in zip(trail.parts, ahead)]
+    marched = None
+    if run.retardation is not None and 0 < fastest[0] < np.inf:
+        marched = overloads_between(run, trail, seen, moved, plan.largest)
+        after = [
+            replace(later, rate=rate_at_end(part.rate, arc, plan.largest / fastest[0]))
+            for later, part, arc in zip(after, trail.parts, marched[0])
+        ]
+        fastest[1] = fastest[0]
+        cycles, own = marched[1], _ERROR * beyond_trapezoid(marched[1], plan.largest / fastest[0])
     parts, cracks, gaps = [], [], []
     broken = any(np.isinf(rate).any() for rate in seen.rate)
     for c, (part, later) in enumerate(zip(trail.parts, after)):
@@ -61,11 +80,14 @@ def settled(run: Run, last: Step, seen: Evaluation) -> Settled:
             share = plan.largest / fastest[1] * later.rate
             again = _again(run, trail, plan, c, last.corrected[c], seen.cracks[c], later, share)
         if again is None:
-            crack, gap = seen.cracks[c], np.zeros(len(part.s))
+            crack, gap, way = seen.cracks[c], np.zeros(len(part.s)), ahead[c]
             new = _solved_places(seen, c, _waiting(seen, c, part, plan.pending[c]))
         else:
-            crack, pending, gap = again
+            crack, pending, gap, way = again
             new = _corrected_places(seen, c, crack, part, pending)
+        if marched is not None:
+            left = zones_onto(marched[2][c], marched[0][c], way, moved[c], new.x)
+            new = replace(new, zones=left)
         cracks.append(crack)
         parts.append(new)
         gaps.append(gap)
@@ -73,7 +95,8 @@ def settled(run: Run, last: Step, seen: Evaluation) -> Settled:
         _onto(seen, c, part, last, error.place[c], gaps[c]) for c, part in enumerate(trail.parts)
     )
     return _settled(
-        run, seen, last.cycles + cycles, cracks, _trail(run, seen, tuple(parts)),
+        run, seen, last.cycles + cycles, cracks,
+        _trail(run, seen, with_kinds(run, seen, parts)),
         StepError(place, error.cycles + own),
     )  # fmt: skip
 
@@ -84,7 +107,8 @@ def planned(run: Run, step: Step) -> Advance:
     plan = _plan(run, trail)
     c, place = plan.tip
     if plan.largest == 0 or not len(step.sif[0][c].x):
-        return plan
+        stopped = run.retardation is not None and plan.largest == 0
+        return replace(plan, falls_to_zero=stopped)
     away = np.linalg.norm(step.sif[0][c].x - trail.parts[c].x[place], axis=1)
     return replace(plan, tip=(c, int(np.argmin(away))))
 
@@ -138,7 +162,7 @@ def _settled(
 
 def _trail(run: Run, seen: Evaluation, parts: tuple[Places, ...]) -> FrontTrail:
     dK_eq, R = np.concatenate(seen.dK_eq), np.concatenate(seen.R)
-    return FrontTrail(parts, law_exponent(run.law, dK_eq, R))
+    return with_mean_rates(run, FrontTrail(parts, law_exponent(run.law, dK_eq, R)))
 
 
 def _plan(run: Run, trail: FrontTrail) -> Advance:
@@ -199,8 +223,8 @@ def _again(
     solved: Crack,
     later: "Later",
     share: Floats,
-) -> tuple[Crack, Floats, Floats] | None:
-    """The corrected crack, growth that waits at the old places, and how far these are moved.
+) -> tuple[Crack, Floats, Floats, Floats] | None:
+    """The corrected crack, growth that waits at the old places, how far these are moved, and grow.
 
     None where the crack that was solved has other fronts: there is nothing to correct.
     """
@@ -226,7 +250,7 @@ def _again(
     if _kinds(again) != _kinds(solved):
         return None
     gap = np.linalg.norm(_moves(part, part.angle, later.way) - _moves(part, angle, wanted), axis=1)
-    return again, np.where(goes, 0.0, wanted), np.where(goes, gap, 0.0)
+    return again, np.where(goes, 0.0, wanted), np.where(goes, gap, 0.0), way
 
 
 def _moves(part: Places, angle: Floats, way: Floats) -> Floats:

@@ -136,7 +136,8 @@ def _asked_of_blocks(
         def turn(K: Floats) -> Floats:  # the mean of the cycles' directions needs their rates
             return answer(K)[0]
 
-        return Asked(pairs.K.reshape(-1, *shape[2:]), answer, turn)
+        flat = (shape[0] * shape[1], *shape[2:])  # -1 means nothing where no tip is left
+        return Asked(pairs.K.reshape(flat), answer, turn)
 
     return [one(c, *each) for c, each in enumerate(zip(every, nominal, strict=True))]
 

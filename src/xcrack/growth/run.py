@@ -71,6 +71,10 @@ def grow(
         beginning, so that the path is of first order.
     threshold : float, stress √length
         Below this dK_eq a tip does not grow.
+    retardation : wheeler or willenborg, optional
+        Of cycles after an overload: growth is then followed cycle by cycle under a `Spectrum` of
+        factors, with zones kept at each tip, or place along a front. `cycles` of a step are that;
+        its `rate` stays that of the law.
     K_c : float, stress √length, optional
         Stop when the K_eq of any tip in any state reaches it.
     link_up : plastic_zone or callable K -> length, optional

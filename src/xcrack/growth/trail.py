@@ -5,11 +5,38 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from xcrack.arrays import Bools, Floats
+from xcrack.growth.overloads import Kinds, March, Zones
 
 KEPT = 3  # solves: a parabola passes through three points
 
 _TINY = 1e-3  # of the largest rate: the logarithm of a smaller one says nothing between two solves
 _LEAST = 1e-300  # below every rate: keeps logarithms finite
+
+
+@dataclass(frozen=True, eq=False)
+class Overloads:
+    """What a run with retardation remembers besides.
+
+    Attributes
+    ----------
+    kinds : Kinds
+        At the solves of the trail.
+    zones : Zones
+        Where the tips are.
+    earlier : Zones, optional
+        At the begin of the last step, of which a later solve tells more.
+    ahead : March, optional
+        The next step as the last two solves see it.
+    """
+
+    kinds: Kinds
+    zones: Zones
+    earlier: Zones | None = None
+    ahead: March | None = None
+
+    def rows(self, which: slice) -> "Overloads":
+        """The same with some of the solves."""
+        return replace(self, kinds=self.kinds.rows(which))
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,6 +64,8 @@ class Trail:
         Where the tips are: of one that waits, ahead of where its crack ends.
     grown : (n,) array of bool
         Whether the last face of a tip was added by growth, so that it may be moved on.
+    overloads : Overloads, optional
+        With retardation.
     """
 
     sigma: Floats
@@ -48,6 +77,7 @@ class Trail:
     bend: Floats
     place: Floats
     grown: Bools
+    overloads: Overloads | None = None
 
     @property
     def n_solves(self) -> int:
@@ -56,23 +86,20 @@ class Trail:
 
     def last(self, count: int) -> "Trail":
         """The same with the last few solves only."""
-        rows = slice(max(self.n_solves - count, 0), None)
-        return replace(
-            self,
-            sigma=self.sigma[rows],
-            direction=self.direction[rows],
-            rate=self.rate[rows],
-            dK_eq=self.dK_eq[rows],
-        )
+        return self._rows(slice(max(self.n_solves - count, 0), None))
 
     def first(self, count: int) -> "Trail":
         """The same without the newest solves."""
+        return self._rows(slice(0, count))
+
+    def _rows(self, which: slice) -> "Trail":
         return replace(
             self,
-            sigma=self.sigma[:count],
-            direction=self.direction[:count],
-            rate=self.rate[:count],
-            dK_eq=self.dK_eq[:count],
+            sigma=self.sigma[which],
+            direction=self.direction[which],
+            rate=self.rate[which],
+            dK_eq=self.dK_eq[which],
+            overloads=None if self.overloads is None else self.overloads.rows(which),
         )
 
     def with_solve(
@@ -160,4 +187,4 @@ def lagrange(nodes: Floats, values: Floats, x: Floats) -> Floats:
     return result
 
 
-__all__ = ["KEPT", "Trail", "directions_at", "lagrange", "rates_at"]
+__all__ = ["KEPT", "Overloads", "Trail", "directions_at", "lagrange", "rates_at"]

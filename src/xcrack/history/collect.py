@@ -119,7 +119,7 @@ def resume(
         are compared by their code and by all that they read.
     until
         As in `collect`.
-    cycles, scaling, integrator, threshold, solver, progress, keep_solutions
+    cycles, scaling, integrator, threshold, retardation, solver, progress, keep_solutions
         As they were given to `grow` and `collect`.
     K_c, link_up, max_steps, max_cycles
         Rules that stop a run may be other ones than before.

@@ -98,10 +98,15 @@ def driving(steps: Sequence[Step], block: Block | None = None) -> Driving:
     Raises
     ------
     ProblemError
-        Fewer than two steps, or steps that no run made.
+        Fewer than two steps, steps that no run made, or a run with retardation.
     """
     if len(steps) < 2:
         raise ProblemError(f"the history has {len(steps)} steps: a life needs two, at least.")
+    if any(key.startswith("retardation") for key in memory_of(steps[0]).settings):
+        raise ProblemError(
+            "the history was grown with retardation: its cycles do not follow from its rates. Grow "
+            "without it, and take the model along that path by retarded."
+        )
     rows: list[tuple[float, ...]] = []
     for number, (step, after) in enumerate(zip(steps, steps[1:])):
         rows += _of_step(number, step, after)

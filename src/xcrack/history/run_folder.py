@@ -17,8 +17,9 @@ from xcrack.growth.arrival import Arrival
 from xcrack.growth.fingerprint import DEFAULTS
 from xcrack.growth.front_trail import FrontTrail, Places
 from xcrack.growth.joins import Join
+from xcrack.growth.overloads import Kinds, March, Zones
 from xcrack.growth.step import Memory, Step, StepError
-from xcrack.growth.trail import Trail
+from xcrack.growth.trail import Overloads, Trail
 from xcrack.history import lock
 from xcrack.history.store import PART, load, save, write_whole
 from xcrack.paths import system_errors
@@ -32,7 +33,8 @@ _STEP = re.compile(r"step_(\d{5,})\.npz")
 CLASSES: dict[str, type] = {
     "Step": Step, "Memory": Memory, "Reuse": Reuse, "Crack": Crack,
     "SIF": SIF, "StepError": StepError, "Trail": Trail, "FrontTrail": FrontTrail,
-    "Places": Places, "Arrival": Arrival, "Join": Join,
+    "Places": Places, "Arrival": Arrival, "Join": Join, "Overloads": Overloads, "Zones": Zones,
+    "Kinds": Kinds, "March": March,
 }  # fmt: skip
 
 

@@ -16,10 +16,10 @@ from xcrack.history.history import History
 from xcrack.history.rerating import bound_of_shares, check_block
 from xcrack.inputs import number, shown, whole
 from xcrack.laws.law import Law
+from xcrack.laws.zones import Retardation
 from xcrack.lives.retarded_lives import RetardedLives
 from xcrack.lives.sampling import lives, varied
 from xcrack.lives.scatter import Scatter
-from xcrack.lives.zones import Retardation
 from xcrack.spectra.spectrum import Spectrum
 
 _SAMPLES, _FEW = 100_000, 200

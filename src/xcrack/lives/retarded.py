@@ -14,7 +14,7 @@ from xcrack.history.driving import Driving, driving
 from xcrack.history.history import History
 from xcrack.inputs import number, shown
 from xcrack.laws.law import Law
-from xcrack.lives.zones import Retardation, wheeler, willenborg
+from xcrack.laws.zones import Retardation, wheeler, willenborg
 from xcrack.spectra.spectrum import Spectrum, distinct
 
 _BREAKS = "the law returns inf: the toughness is reached"

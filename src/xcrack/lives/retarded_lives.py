@@ -11,9 +11,9 @@ from xcrack.history.block_rates import Block
 from xcrack.history.history import History
 from xcrack.inputs import shown
 from xcrack.laws.law import Law
+from xcrack.laws.zones import Retardation
 from xcrack.lives.retarded import CycledPath, Retarded, check
 from xcrack.lives.sampling import Samples, stretch_of, varied
-from xcrack.lives.zones import Retardation
 
 
 class RetardedLives:
