@@ -117,8 +117,8 @@ def cycles_to(run: Run, step: Step, share: float, after: float | None) -> float:
     del after  # behind the first exit other rates count
     trail, _ = _remembered(step)
     ahead = _predict(run, step.corrected, trail)
-    known, start = trail.last(2), float(trail.sigma[-1])
-    return growth_over(known, start, share * ahead.length, run.threshold).cycles
+    two, start = trail.last(2), float(trail.sigma[-1])
+    return piece_of(run, two, start, share * ahead.length, _zones(trail)).over(two).cycles
 
 
 def _remembered(step: Step) -> tuple[Trail, StepError]:
