@@ -196,7 +196,7 @@ def test_two_hundred_cases_killed_twice(tmp_path):
     study = tmp_path / "study"
     command = [sys.executable, "-m", "support.campaign_cases", str(study), "200", "2"]
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(TESTS), *sys.path])}
-    kept = {}
+    stamps = {}
     for least in (60, 130):
         running = subprocess.Popen(command, env=environment, start_new_session=True, cwd=tmp_path)
         begin = time.monotonic()
@@ -206,11 +206,11 @@ def test_two_hundred_cases_killed_twice(tmp_path):
             time.sleep(0.02)
         os.killpg(running.pid, signal.SIGKILL)
         running.wait()
-        for file, stamp in kept.items():
+        for file, stamp in stamps.items():
             assert file.stat().st_mtime_ns == stamp  # no row was done twice
-        kept = {f: f.stat().st_mtime_ns for f in study.glob("row_*.json")}
+        stamps = {f: f.stat().st_mtime_ns for f in study.glob("row_*.json")}
     subprocess.run(command, env=environment, check=True, cwd=tmp_path)
-    assert all(file.stat().st_mtime_ns == stamp for file, stamp in kept.items())
+    assert all(file.stat().st_mtime_ns == stamp for file, stamp in stamps.items())
     assert len(list(study.glob("row_*.json"))) == 200
     ran = [len(f.read_text()) for f in (tmp_path / "marks").iterdir()]
     assert len(ran) == 200

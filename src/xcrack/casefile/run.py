@@ -60,7 +60,8 @@ def run(
         Begin anew although steps are there: they are moved aside.
     until, keep_solutions : optional
         As of `collect`.
-    cycles, scaling, integrator, threshold, solver, K_c, max_steps, max_cycles, progress
+    cycles, scaling, integrator, threshold, retardation, solver, K_c, link_up, max_steps, \
+    max_cycles, progress
         As of `grow`.
 
     Returns

@@ -6,7 +6,7 @@ the strip between the two.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -24,6 +24,14 @@ from xcrack.growth.evaluation import Evaluation, Settled
 from xcrack.growth.follow_3d import carried
 from xcrack.growth.front_angles import without_noise
 from xcrack.growth.front_filter import Response, corrected, predicted, response, turning_of
+from xcrack.growth.front_places import (
+    REACH,
+    Later,
+    closed_fronts,
+    front_lengths,
+    moved_by,
+    values_at,
+)
 from xcrack.growth.front_trail import FrontTrail, Places
 from xcrack.growth.options import Run
 from xcrack.growth.overloads_3d import (
@@ -38,7 +46,6 @@ from xcrack.growth.step import Step, StepError, memory_of
 from xcrack.mesh.locate import cell_sizes, contains
 from xcrack.mesh.mesh import Mesh
 
-_REACH = 2.0  # cells from a place along a front to those that values are carried from
 _SPACING = 0.5  # of a cell, between the points of a new front
 _ERROR = 0.25  # of a correction, as in 2D
 
@@ -62,7 +69,7 @@ def settled(run: Run, last: Step, seen: Evaluation) -> Settled:
     fastest = [max((float(r.max(initial=0.0)) for r in rates), default=0.0) for rates in (
         [part.rate for part in trail.parts], [part.rate for part in after])]  # fmt: skip
     cycles, own = _cycles(trail, plan, seen)
-    moved = [part.x + _moves(part, part.angle, way) for part, way in zip(trail.parts, ahead)]
+    moved = [part.x + moved_by(part, part.angle, way) for part, way in zip(trail.parts, ahead)]
     marched = None
     if run.retardation is not None and 0 < fastest[0] < np.inf:
         marched = overloads_between(run, trail, seen, moved, plan.largest)
@@ -156,7 +163,7 @@ def _settled(
     for c, (part, way) in enumerate(zip(trail.parts, ahead)):
         x = seen.sif[0][c].x
         for target, values in ((da, way), (pending, plan.pending[c])):
-            target.append(np.nan_to_num(_carried(part, part.closed, values, x, mesh)))
+            target.append(np.nan_to_num(values_at(part, part.closed, values, x, mesh)))
     return Settled(cycles, tuple(cracks), tuple(da), tuple(pending), trail, error)
 
 
@@ -221,7 +228,7 @@ def _again(
     c: int,
     crack: Crack,
     solved: Crack,
-    later: "Later",
+    later: Later,
     share: Floats,
 ) -> tuple[Crack, Floats, Floats, Floats] | None:
     """The corrected crack, growth that waits at the old places, how far these are moved, and grow.
@@ -247,50 +254,23 @@ def _again(
         again = placed(_advanced(crack, part, angle, np.where(goes, wanted, 0.0), mesh), mesh)
     except GeometryError:
         return None
-    if _kinds(again) != _kinds(solved):
+    if closed_fronts(again) != closed_fronts(solved):
         return None
-    gap = np.linalg.norm(_moves(part, part.angle, later.way) - _moves(part, angle, wanted), axis=1)
+    gap = np.linalg.norm(
+        moved_by(part, part.angle, later.way) - moved_by(part, angle, wanted), axis=1
+    )
     return again, np.where(goes, 0.0, wanted), np.where(goes, gap, 0.0), way
 
 
-def _moves(part: Places, angle: Floats, way: Floats) -> Floats:
-    t, n = part.frame[:, 0], part.frame[:, 1]
-    return way[:, None] * (np.cos(angle)[:, None] * t + np.sin(angle)[:, None] * n)
-
-
-def _kinds(crack: Crack) -> list[bool]:
-    """Of each front whether it is closed."""
-    return [bool(front[0] == front[-1]) for front in crack.fronts or ()]
-
-
-@dataclass(frozen=True, eq=False)
-class Later:
-    """What was solved at the end of a step, at the places of its beginning.
-
-    Attributes
-    ----------
-    rate, law_rate : (f,) arrays, length/cycle
-        nan in law_rate where a place has left the body.
-    direction : (f, 3) array
-    way : (f,) array, length
-        Predicted advance.
-    """
-
-    rate: Floats
-    law_rate: Floats
-    direction: Floats
-    way: Floats
-
-
 def _carried_back(seen: Evaluation, c: int, part: Places, way: Floats) -> Later:
-    target = part.x + _moves(part, part.angle, way)
+    target = part.x + moved_by(part, part.angle, way)
     sif, mesh = seen.sif[0][c], seen.problem.mesh
     here = _solved_places(seen, c, None)
-    closed = _kinds(seen.cracks[c])
+    closed = closed_fronts(seen.cracks[c])
     size = float(cell_sizes(mesh, sif.x).mean()) if len(sif.x) else 0.0
 
     def back(values: Floats) -> Floats:
-        return carried(sif.x, sif.front, closed, values, target, _REACH * size)
+        return carried(sif.x, sif.front, closed, values, target, REACH * size)
 
     law_rate = back(seen.law_rate[c])
     lost = np.isnan(law_rate)
@@ -302,8 +282,8 @@ def _carried_back(seen: Evaluation, c: int, part: Places, way: Floats) -> Later:
 
 def _solved_places(seen: Evaluation, c: int, pending: Floats | None) -> Places:
     """Places of a crack as it was solved."""
-    sif, closed = seen.sif[0][c], np.array(_kinds(seen.cracks[c]), dtype=bool)
-    length = _lengths(seen.cracks[c])
+    sif, closed = seen.sif[0][c], np.array(closed_fronts(seen.cracks[c]), dtype=bool)
+    length = front_lengths(seen.cracks[c])
     most = max((state[c] for state in seen.sif), key=lambda each: each.K_I.max(initial=-np.inf))
     angle = without_noise(most, seen.angle[c], closed, length)
     t, n = sif.frame[:, 0], sif.frame[:, 1]
@@ -334,19 +314,19 @@ def _corrected_places(
     frame = np.concatenate([front.frame for front in fronts])
 
     def near(values: Floats) -> Floats:
-        return _carried(here, here.closed, values, x, mesh)
+        return values_at(here, here.closed, values, x, mesh)
 
     rate = near(here.rate)
     there = ~np.isnan(rate) & contains(mesh, x)
     direction = np.stack([near(here.direction[:, k]) for k in range(3)], axis=1)
-    waits = np.nan_to_num(_carried(old, old.closed, pending, x, mesh))
+    waits = np.nan_to_num(values_at(old, old.closed, pending, x, mesh))
     return Places(
         s=s[there],
         front=number[there],
         x=x[there],
         frame=frame[there],
-        closed=np.array(_kinds(crack), dtype=bool),
-        length=_lengths(crack),
+        closed=np.array(closed_fronts(crack), dtype=bool),
+        length=front_lengths(crack),
         rate=rate[there],
         law_rate=near(here.law_rate)[there],
         direction=direction[there],
@@ -355,22 +335,9 @@ def _corrected_places(
     )
 
 
-def _lengths(crack: Crack) -> Floats:
-    """Length of each front, length."""
-    fronts = [crack.points[front] for front in crack.fronts or ()]
-    return np.array([np.linalg.norm(np.diff(x, axis=0), axis=1).sum() for x in fronts])
-
-
-def _carried(part: Places, closed: Bools, values: Floats, x: Floats, mesh: Mesh) -> Floats:
-    if not len(part.x):
-        return np.full(len(x), np.nan)
-    reach = _REACH * float(cell_sizes(mesh, part.x).mean())
-    return carried(part.x, part.front, closed.tolist(), values, x, reach)
-
-
 def _waiting(seen: Evaluation, c: int, part: Places, pending: Floats) -> Floats:
     x = seen.sif[0][c].x
-    return np.nan_to_num(_carried(part, part.closed, pending, x, seen.problem.mesh))
+    return np.nan_to_num(values_at(part, part.closed, pending, x, seen.problem.mesh))
 
 
 def _onto(
@@ -378,11 +345,11 @@ def _onto(
 ) -> Floats:
     """Estimated error of the places that were solved, with what this step adds."""
     x, mesh, old = seen.sif[0][c].x, seen.problem.mesh, last.sif[0][c]
-    own = np.nan_to_num(_carried(part, part.closed, _ERROR * gap, x, mesh))
+    own = np.nan_to_num(values_at(part, part.closed, _ERROR * gap, x, mesh))
     if not len(old.x):
         return own
-    reach = 2 * _REACH * float(cell_sizes(mesh, old.x).mean()) + float(gap.max(initial=0.0))
-    earlier = carried(old.x, old.front, _kinds(last.cracks[c]), before, x, reach)
+    reach = 2 * REACH * float(cell_sizes(mesh, old.x).mean()) + float(gap.max(initial=0.0))
+    earlier = carried(old.x, old.front, closed_fronts(last.cracks[c]), before, x, reach)
     return np.asarray(own + np.nan_to_num(earlier))
 
 
