@@ -107,8 +107,10 @@ def newman_raju_at_hole(phi: ArrayLike, a: float, c: float, t: float, R: float) 
     """K_I of one quarter-elliptical corner crack at a hole in a wide plate under unit tension.
 
     The fit of Newman and Raju (1981, NASA TM 83200; Murakami's handbook, 1987, p. 716) for two
-    cracks, made one by the factor of Shah (1976). Coefficients of the hole, read in the program
-    easigrow (src/beta.rs): those of 1981; later fits differ by 2 %.
+    cracks, made one by the factor of Shah (1976); later fits differ by 2 %. For a = c all terms
+    were read in the program easigrow (github.com/Easigrow/easigrow, commit ea8196f3, src/beta.rs,
+    "DoubleSidedCornerCrackHoleTensionNewman81"), which cites the paper. For a < c that program has
+    a factor c/a in g1 that the paper has not, and no last term of M3: there M3 is from memory.
 
     Parameters
     ----------
