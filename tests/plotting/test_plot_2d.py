@@ -68,6 +68,14 @@ def test_contours_at_rest(order):
     assert area(picture) == pytest.approx(4, rel=1e-12)
 
 
+def test_triangles_in_corners_show_both_their_sides():
+    mesh = xc.Mesh([(0, 0), (1, 0), (1, 1), (0, 1)], [(0, 1, 2), (0, 2, 3)])
+    pull = [xc.traction("boundary", lambda x, n: n)]
+    steel = xc.Isotropic(E=1.0, nu=0.3, plane="stress")
+    picture = scene(xc.solve(xc.Problem(mesh, steel, loads=pull)), "von_mises", 0.0, None)
+    assert length(picture.outline) == pytest.approx(4, rel=1e-12)
+
+
 def test_the_crack_opens_with_the_warp(pulled):
     """The mouth gapes by warp times the jump there; round-off."""
     warp = 0.013

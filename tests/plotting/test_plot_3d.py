@@ -62,6 +62,18 @@ def test_surface_and_lips_at_rest(solution):
     assert length(picture.rims) == pytest.approx(2 * (2 + 2 * (1 + TIP)), rel=1e-10)
 
 
+def test_cells_with_several_facets_on_the_boundary_show_them_all():
+    """Five tetrahedra of a cube: four of them have three facets on its sides."""
+    corners = np.array([(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)], dtype=float)
+    cells = np.array([(0, 1, 2, 4), (3, 1, 2, 7), (5, 1, 4, 7), (6, 2, 4, 7), (1, 2, 4, 7)])
+    mesh = xc.Mesh(corners, cells)
+    pull = [xc.traction("boundary", lambda x, n: n)]
+    solution = xc.solve(xc.Problem(mesh, xc.Isotropic(E=1.0, nu=0.3), loads=pull))
+    picture = space_scene(solution, "von_mises", 0.0, None, None, None)
+    assert area(picture.triangles) == pytest.approx(6.0, rel=1e-12)
+    assert length(picture.outline) == pytest.approx(12.0, rel=1e-12)
+
+
 @pytest.mark.parametrize("normal", [(0.0, 1.0, 0.0), (1.0, 0.3, -0.2), (0.0, 0.0, 1.0)])
 def test_a_plane_cuts_the_body_open(solution, normal):
     """What is left lies behind; its section and shell close the volume (divergence theorem)."""

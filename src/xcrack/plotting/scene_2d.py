@@ -220,10 +220,7 @@ def _on_facets(body: Pieces, edge: Ints, owner: Ints) -> tuple[Bools, Bools]:
     cell = body.cell[owner]
     a, b = (barycentric(mesh, cell, body.points[edge[:, k]]) for k in (0, 1))
     on = (np.abs(a) < _NEAR) & (np.abs(b) < _NEAR)
-    rim = np.zeros(mesh.cells.shape, dtype=bool)
-    outer = np.nonzero(mesh.facet_to_cell[:, 1] < 0)[0]
-    of = mesh.facet_to_cell[outer, 0]
-    rim[of] |= ~(mesh.cells[of][:, :, None] == mesh.facets[outer][:, None]).any(axis=2)
+    rim = mesh.facet_to_cell[mesh.cell_to_facet, 1] < 0  # opposite to each corner of a cell
     return np.asarray(on.any(axis=1)), np.asarray((on & rim[cell]).any(axis=1))
 
 

@@ -121,10 +121,7 @@ _Faces = tuple[Ints, Ints, Ints, Ints, Ints]
 def faces(body: Pieces, level: Floats | None) -> _Faces:
     """Triangles on boundary and crack faces, and segments: sharp, of crack faces, of cells."""
     mesh = body.solution.space.mesh
-    rim = np.zeros(mesh.cells.shape, dtype=bool)
-    outer = np.nonzero(mesh.facet_to_cell[:, 1] < 0)[0]
-    of = mesh.facet_to_cell[outer, 0]
-    rim[of] |= ~(mesh.cells[of][:, :, None] == mesh.facets[outer][:, None]).any(axis=2)
+    rim = mesh.facet_to_cell[mesh.cell_to_facet, 1] < 0  # opposite to each corner of a cell
     sharp = sharp_edges(mesh)
     on_lip = _lip_points(body)
     groups: list[list[Ints]] = [[np.zeros((0, 3), np.int64)], [np.zeros((0, 3), np.int64)]]
