@@ -25,6 +25,8 @@ PATH = np.array(
 PATHS = (PATH, TURN - PATH)
 HOLES = (((3.0, 7.0), 2.0), ((17.0, 3.0), 2.0))
 
+THREE_HOLES = (((14.0, 22.0), 4.0), ((34.0, 14.0), 5.0), ((48.0, 27.0), 3.0))  # flaw_campaign.py
+
 # The crack of turning_load.py, and the fan of directions in which its criteria let it grow.
 TURNING = (
     [(-7.0, 2.8), (-4.0, 0.0), (4.0, 0.0), (7.0, -2.8)],
@@ -124,6 +126,9 @@ def meshes() -> dict[str, Mesh]:
         size=4.0, size_near=1.0, along=[(0.2 * width, 0.0), (0.85 * width, 0.0)], band=1.0,
         transition=15.0,
     )  # fmt: skip
+    made["three_holes"] = plate(
+        60.0, 40.0, holes=THREE_HOLES, size=5.0, size_near=0.5, band=2.5, transition=10.0
+    )
     return {**{name: short(mesh) for name, mesh in made.items()}, "two_holes": two_holes()}
 
 

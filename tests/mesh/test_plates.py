@@ -257,6 +257,7 @@ FILES = {
     "two_holes_free": 1893,
     "turning_load": 1309,
     "compact_tension": 1235,
+    "three_holes": 2184,
 }
 
 

@@ -17,7 +17,8 @@ IN_SPACE = (
     "semi_elliptic_growth",
     "corner_crack_at_hole",
 )  # seconds with --quick
-PLANE = [path for path in EXAMPLES if path.stem not in IN_SPACE]
+MANY = ("flaw_campaign",)  # minutes without --quick
+PLANE = [path for path in EXAMPLES if path.stem not in (*IN_SPACE, *MANY)]
 SPACE = [path for path in EXAMPLES if path.stem in IN_SPACE]
 
 # An example that warns is a bad example.
@@ -67,6 +68,14 @@ def run_and_look(tmp_path, script, *options, timeout):
 @pytest.mark.parametrize("script", PLANE, ids=lambda path: path.stem)
 def test_example_runs_from_another_folder_and_leaves_pictures(script, tmp_path):
     run_and_look(tmp_path, script, timeout=500)
+
+
+@pytest.mark.slow
+@pytest.mark.mission
+@pytest.mark.parametrize("name", MANY)
+def test_campaign_runs_with_a_few_cases(name, tmp_path):
+    script = next(path for path in EXAMPLES if path.stem == name)
+    run_and_look(tmp_path, script, "--quick", timeout=500)
 
 
 @pytest.mark.slow

@@ -53,7 +53,7 @@ def small_plate(a, marks):
         file.write("x")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        return plate(a, 100.0, cells=(6, 7), steps=2)
+        return plate(a, 100.0, cells=(8, 9), steps=2)
 
 
 def marked(n, marks):
