@@ -30,6 +30,8 @@ class Reuse:
         Stiffness of the uncracked body, and cut cells that may serve the next crack.
     hierarchy : Hierarchy, optional
         Coarse levels of the iterative solver.
+    levels : tuple of float
+        Factors of a spectrum that the closed sets belong to, where levels were refined.
     """
 
     centre: tuple[Floats | None, ...] = ()
@@ -38,14 +40,17 @@ class Reuse:
     factor: Factor | None = None
     bulk: Bulk | None = None
     hierarchy: Hierarchy | None = None
+    levels: tuple[float, ...] = ()
 
     def __reduce__(self) -> tuple[Any, ...]:
         # A factor holds addresses: in another process they mean nothing.
-        return Reuse, (self.centre, self.active, None, None, self.bulk, self.hierarchy)
+        return Reuse, (
+            self.centre, self.active, None, None, self.bulk, self.hierarchy, self.levels,
+        )  # fmt: skip
 
     def without_matrices(self) -> "Reuse":
         """The part that fits into a file, and that decides the last bit of the next solve."""
-        return Reuse(self.centre, self.active)
+        return Reuse(self.centre, self.active, levels=self.levels)
 
     def without_factor(self) -> "Reuse":
         """The part that is small enough to be kept with each solution."""
