@@ -31,6 +31,10 @@ def _of_dim(kind, dim=2):
     return Seen(rule=lambda value: isinstance(value, kind) and value.dim == dim)
 
 
+_COEFFICIENT = Number(least=0, most=1e3)
+_each_crack = ListOf(item=_COEFFICIENT, rule=lambda values: len(values) == 1)
+
+
 ENTRIES = [
     Entry(
         "Isotropic",
@@ -88,6 +92,7 @@ ENTRIES = [
             "domain": arg(Number(optional=True, above=0), None, 0.5),
             "linear": arg(Word(words=("auto", "direct", "iterative")), "auto"),
             "initial_set": arg(Word(words=("closed", "open")), "open"),
+            "substeps": arg(Whole(least=1, most=10_000), 10, 1),
             "threads": arg(Whole(optional=True, least=1), None, 1),
             "comparison": arg(Of(type=xc.Comparison), xc.Comparison()),
         },
@@ -139,6 +144,7 @@ ENTRIES = [
             "contact": arg(Word(words=("auto", "on", "off")), "auto", "on"),
             "order": arg(Choice(optional=True, values=(1, 2)), None, 1, 2),
             "numerics": arg(Of(type=xc.Numerics), xc.Numerics()),
+            "friction": arg(Number(least=0, most=1e3, also=(_each_crack,)), 0.0, 0.3, [0.3]),
         },
         cost=0.03,
     ),

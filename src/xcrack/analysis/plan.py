@@ -129,6 +129,7 @@ def plan(problem: Problem) -> Report:
     n_tips = [crack.n_tips for crack in problem.placed]
     rows = [_heaviside(n_tips), _tips(problem, n_tips)]
     rows.extend(_multipliers(problem))
+    rows.extend(_friction(problem))
     rows.append(_third_mode(problem, n_tips))
     why = "the body is supported" if problem.supports else "none given; rigid motion is removed"
     rows.append(Ingredient("supports", bool(problem.supports), why))
@@ -180,6 +181,19 @@ def _tips(problem: Problem, n_tips: list[int]) -> Ingredient:
     )
     reason = f"{sum(n_tips)} {_ENDS[problem.mesh.dim]}, {what_each}, {reach}"
     return Ingredient("tip functions", True, reason + (f"; left out: {lost}" if lost else ""))
+
+
+def _friction(problem: Problem) -> list[Ingredient]:
+    """Nothing where no crack has friction."""
+    coefficients = sorted(set(problem.frictions) - {0.0})
+    if not coefficients:
+        return []
+    if problem.contact == "off":
+        why = "contact is switched off: crack faces that do not press do not rub"
+        return [Ingredient("friction", False, why)]
+    values = ", ".join(f"{mu:g}" for mu in coefficients)
+    why = f"Coulomb, mu = {values}, where crack faces press; load states in their order"
+    return [Ingredient("friction", True, why)]
 
 
 def _multipliers(problem: Problem) -> list[Ingredient]:

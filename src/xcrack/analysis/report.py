@@ -56,6 +56,8 @@ def report(
             row = replace(row, unknowns=n_tip, reason=f"{row.reason}; radius {radii}")
         elif row.name.startswith("multipliers of crack"):
             row = _multiplier_row(problem, contact, int(row.name.split()[-1]))
+        elif row.name == "friction" and row.used:
+            row = _friction_row(row, contact)
         elif row.name == "supports" and motion.modes.shape[1]:
             row = replace(
                 row,
@@ -112,6 +114,12 @@ def _multiplier_row(problem: Problem, contact: ContactSolution, c: int) -> Ingre
     if problem.contact == "off":
         return Ingredient(name, False, "contact is switched off: crack faces may overlap")
     return Ingredient(name, False, "the crack faces stay apart in every load state")
+
+
+def _friction_row(row: Ingredient, contact: ContactSolution) -> Ingredient:
+    if not contact.rubbing:
+        return replace(row, used=False, reason="no crack with friction has faces that press")
+    return replace(row, unknowns=sum(len(each.shear) for each in contact.rubbing))
 
 
 def _n_multipliers(problem: Problem, spaces: Sequence[Multipliers | None]) -> int:

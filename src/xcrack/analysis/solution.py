@@ -56,6 +56,8 @@ class Solution:
         Which of the states of its solve.
     factored : Factored, optional
         The factor, of a solve with ``error=True``; lost where a solution is pickled.
+    dissipated : float, energy (per thickness in 2D)
+        What friction took since the state before; 0 without.
     """
 
     problem: Problem
@@ -71,6 +73,7 @@ class Solution:
     reuse: Reuse
     number: int = 0
     factored: Factored | None = None
+    dissipated: float = 0.0
 
     def __repr__(self) -> str:
         return f"Solution(state={self.state!r}, n_dof={self.n_dof}, energy={self.energy:.6g})"
@@ -92,8 +95,13 @@ class Solution:
 
     @property
     def at_rest(self) -> bool:
-        """Whether nothing acts in this state: no load, no imposed displacement, no stress."""
-        return self.factor == 0 and not any(isinstance(x, InitialStress) for x in self.loads)
+        """Whether nothing acts in this state: no load, no displacement, no stress, no friction.
+
+        Faces that rub may hold slip without any load.
+        """
+        rubs = any(each is not None and each.shear is not None for each in self.contact)
+        stressed = any(isinstance(load, InitialStress) for load in self.loads)
+        return self.factor == 0 and not stressed and not rubs
 
     @property
     def n_dof(self) -> int:

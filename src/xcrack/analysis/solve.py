@@ -16,6 +16,7 @@ from xcrack.contact.solve import contact_of, solve_contact
 from xcrack.errors import ProblemError
 from xcrack.inputs import entries, flag, shown
 from xcrack.scene.conditions import Displacement, InitialStress, Load
+from xcrack.scene.friction import check_order
 from xcrack.scene.problem import Problem, check_problem
 from xcrack.solvers.direct import Solver, system
 from xcrack.solvers.engine import Engine
@@ -45,7 +46,8 @@ def solve(
     problem : Problem
     states : sequence, optional
         Load states: numbers that scale all loads and imposed displacements (but not an initial
-        stress), or lists of loads. None: the loads as they are.
+        stress), or lists of loads. None: the loads as they are. With friction each is reached from
+        the one before it, the first from the unloaded body.
     solver : callable, optional
         Given a sparse symmetric matrix, returns a function that solves for right-hand sides;
         a multifrontal factorisation if omitted.
@@ -61,7 +63,8 @@ def solve(
     Raises
     ------
     ProblemError
-        An unsupported body and loads out of balance, supports that contradict each other.
+        An unsupported body and loads out of balance, supports that contradict each other; states
+        without an order where there is friction.
     ConvergenceError
         A singular stiffness, or contact that finds no closed set.
     """
@@ -72,6 +75,7 @@ def solve(
             "returns a function of right-hand sides, such as xc.pardiso."
         )
     if states is not None:
+        check_order(problem.frictions, states)
         states = entries(states, "states")
     error = flag(error, "solve: error")
     wanted = [None] if states is None else states
@@ -142,6 +146,7 @@ def _solve_states(
                 reuse=handed_on,
                 number=k,
                 factored=factored,
+                dissipated=pressed.dissipated[k] if pressed.dissipated else 0.0,
             )
         )
     return solutions

@@ -83,7 +83,7 @@ def read_case(path: str | PathLike[str]) -> CaseFile:
     mesh = forms.made(root.table("mesh"), forms.MESHES)
     material = forms.called_with(root.table("material"), Form(Isotropic, {"E": (-2.0, 1.0)}))
     solving = root.table("solve")
-    solving.known(("contact", "order", "states"))
+    solving.known(("contact", "order", "friction", "states"))
     scene: dict[str, Any] = {
         name: [forms.made(table, known) for table in root.tables(name)]
         for name, known in (
@@ -91,7 +91,8 @@ def read_case(path: str | PathLike[str]) -> CaseFile:
         )
     }  # fmt: skip
     numerics = _numerics(root.table("numerics"))
-    chosen = {name: solving.value(name, None) for name in ("contact", "order") if name in solving}
+    named = [name for name in ("contact", "order", "friction") if name in solving]
+    chosen = {name: solving.value(name, None) for name in named}
     try:
         problem = Problem(mesh, material, **scene, **chosen, numerics=numerics)
     except XcrackError as error:

@@ -6,13 +6,14 @@ import scipy.sparse as sp
 import scipy.sparse.linalg as sla
 
 from xcrack.arrays import Floats
+from xcrack.contact.friction import rubs, tangent
 from xcrack.contact.multipliers import Multipliers, gap_rows, multipliers
 from xcrack.inputs import one_of
 from xcrack.mesh.sizes import leg_sizes
 from xcrack.scene.problem import Problem, check_problem, crack_number
 from xcrack.solvers.direct import scaled_basis
 from xcrack.xfem.function_space import FunctionSpace
-from xcrack.xfem.lips import jump_values
+from xcrack.xfem.lips import jump_matrix, jump_values
 from xcrack.xfem.model import Model, build
 from xcrack.xfem.quadrature import cell_points
 
@@ -29,7 +30,8 @@ def inf_sup(problem: Problem, crack: int = 0, *, norm: str = "h1") -> float:
     problem : Problem
     crack : int
     norm : {"h1", "energy"}
-        energy: normal gaps of the elastic problem in its energy norm (unit modulus) instead.
+        energy: gaps of the elastic problem in its energy norm (unit modulus) instead; with friction
+        normal and tangential ones together.
 
     Returns
     -------
@@ -58,10 +60,14 @@ def inf_sup(problem: Problem, crack: int = 0, *, norm: str = "h1") -> float:
         # A small mass makes the rigid motions regular without a support.
         A = A + 1e-8 * sp.diags(A.diagonal())
         B = gap_rows(chosen, lips, model.jumps[crack])
+        if rubs(problem, crack):
+            along = jump_matrix(space, crack, lips, tangent(lips))
+            B = sp.csr_matrix(sp.vstack([B, gap_rows(chosen, lips, along)]))
         basis = scaled_basis(space, sp.csr_matrix(A), fixed, problem.numerics, problem.material)
     L, d = space.mesh.extent, space.dim
     h = leg_sizes(space.mesh, lips.cell).mean(axis=1) / L
     gram = (chosen.values.T @ sp.diags(h * lips.weight) @ chosen.values).toarray() / L ** (d - 1)
+    gram = np.kron(np.eye(B.shape[0] // len(gram)), gram)
     # A grows like length^(d - 2), B and the mass like the area of the crack faces.
     schur = _schur(A, B / L ** (d - 1), basis, L ** (d - 2))
     return float(np.sqrt(max(_smallest(schur, gram), 0.0)))

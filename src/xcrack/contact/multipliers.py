@@ -47,18 +47,24 @@ class Multipliers:
 
 
 def multipliers(
-    space: FunctionSpace, c: int, lips: LipPoints, kind: str, fixed: Bools | None = None
+    space: FunctionSpace,
+    c: int,
+    lips: LipPoints,
+    kind: str,
+    fixed: Bools | None = None,
+    rubs: bool = False,
 ) -> Multipliers:
     """Multiplier space of crack c: "reduced", "sparse" or "naive".
 
     Where supports decide the jump, as at a mouth in a side whose displacement is imposed, a group
-    of its own would be redundant: with `fixed` (n_dof,) it joins its neighbour.
+    of its own would be redundant: with `fixed` (n_dof,) it joins its neighbour. Where the faces rub
+    the tangential jump counts as the normal one does.
     """
     nodes, traces = _traces(space, lips)
     if kind == "naive":
         group = np.arange(len(nodes))
     else:
-        supported = _supported(space, c, nodes, traces, lips, fixed)
+        supported = _supported(space, c, nodes, traces, lips, fixed, rubs)
         group = _groups(space, c, nodes, traces, lips.weight, supported)
     n_groups = int(group.max(initial=-1)) + 1
     gather = sp.csr_matrix(
@@ -94,14 +100,19 @@ def _supported(
     traces: sp.csr_matrix,
     lips: LipPoints,
     fixed: Bools | None,
+    rubs: bool,
 ) -> Bools:
-    """Which of the nodes have a normal jump that supports decide."""
+    """Which of the nodes have a jump, of those that count, that supports decide."""
     number = space.heaviside[c][nodes]
     if fixed is None:
         return np.zeros(len(nodes), dtype=bool)
     normal = np.asarray(traces.T @ (lips.weight[:, None] * lips.normal))
-    share = (normal**2 * fixed.reshape(-1, space.dim)[number]).sum(axis=1)
-    return np.asarray((number >= 0) & (share > 0.5 * (normal**2).sum(axis=1)))
+    given = fixed.reshape(-1, space.dim)[number]
+    whole = (normal**2).sum(axis=1)
+    decided = (normal**2 * given).sum(axis=1) > 0.5 * whole
+    if rubs:
+        decided |= ((whole[:, None] - normal**2) * given).sum(axis=1) > 0.5 * whole
+    return np.asarray((number >= 0) & decided)
 
 
 def _groups(

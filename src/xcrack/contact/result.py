@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+import scipy.sparse as sp
+
 from xcrack.arrays import Bools, Floats
 from xcrack.contact.multipliers import Multipliers
 from xcrack.solvers.reuse import Reuse
@@ -25,6 +27,15 @@ class Contact:
     closed : (q,) array of bool
     s : (q,) array, length
         Position along the crack from where it enters the body.
+    tangent : (q, 2) array, optional
+        With friction: direction of shear and slip, along the order of the crack's points. None
+        without, as the three that follow.
+    shear : (q,) array, stress, optional
+        Tangential traction on lip + along the tangent; lip - bears the opposite one.
+    slip : (q,) array, length, optional
+        Tangential jump, that of lip + less that of lip -.
+    stuck : (q,) array of bool, optional
+        Closed, and without slip since the substep before.
     """
 
     points: Floats
@@ -34,6 +45,32 @@ class Contact:
     gap: Floats
     closed: Bools
     s: Floats
+    tangent: Floats | None = None
+    shear: Floats | None = None
+    slip: Floats | None = None
+    stuck: Bools | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Rubbing:
+    """Friction on the faces of one crack in all load states.
+
+    Attributes
+    ----------
+    crack : int
+    tangent : (q, 2) array
+    jump : sparse matrix (q, n_dof)
+        Tangential jump at the lip points.
+    shear : (g, states) array, stress
+        Tangential traction of each multiplier function.
+    stuck : (states, g) array of bool
+    """
+
+    crack: int
+    tangent: Floats
+    jump: sp.csr_matrix
+    shear: Floats
+    stuck: Bools
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,6 +89,10 @@ class ContactSolution:
     dual : (g, g) array or None
         F = N K^-1 N^T over the multipliers of all cracks in their order; None where no
         factorisation made it.
+    rubbing : tuple of Rubbing
+        Of the cracks whose faces rub.
+    dissipated : tuple of float
+        Energy that friction took in each state since the one before; empty without.
     """
 
     u: Floats
@@ -60,6 +101,8 @@ class ContactSolution:
     active: tuple[Bools | None, ...]
     sets: int
     dual: Floats | None = None
+    rubbing: tuple[Rubbing, ...] = ()
+    dissipated: tuple[float, ...] = ()
 
     def closed_sets(self) -> Reuse:
         """Closed sets by place, for the next solve."""

@@ -1,14 +1,15 @@
 """Which cracks need multipliers, and the pressures on their faces in all load states."""
 
 from collections.abc import Sequence
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 import scipy.sparse as sp
 
 from xcrack.arrays import Bools, Floats, lock
+from xcrack.contact.friction import FrictionSolution, rubs, solve_friction
 from xcrack.contact.multipliers import Multipliers, gap_rows, multipliers
-from xcrack.contact.result import Contact, ContactSolution
+from xcrack.contact.result import Contact, ContactSolution, Rubbing
 from xcrack.scene.conditions import Load
 from xcrack.scene.problem import Problem
 from xcrack.solvers.direct import System
@@ -55,6 +56,7 @@ def solve_contact(
     active: list[Bools | None] = [None] * n
     expected: list[int] = []
     sets, dual = 0, None
+    rubbed: FrictionSolution | None = None
     chosen: list[Multipliers] = []
     if problem.contact == "off":
         u: Floats | None = engine.solve(f, known)
@@ -74,7 +76,13 @@ def solve_contact(
         for c in pending:
             spaces[c] = _space(problem, model, c)
         chosen = [m for m in spaces if m is not None]
-        states = _solve_states(problem, model, engine, chosen, f, known, (u, opened), reuse, acting)
+        if any(rubs(problem, m.crack) for m in chosen):
+            rubbed = _solve_friction(problem, model, engine, chosen, f, known, reuse)
+            states = rubbed.states
+        else:
+            states = _solve_states(
+                problem, model, engine, chosen, f, known, (u, opened), reuse, acting
+            )
         u = np.stack([cast(Floats, state.u) for state in states], axis=1)
         sets, dual = max(state.sets for state in states), states[0].dual
         first = 0
@@ -83,8 +91,14 @@ def solve_contact(
             pressure[m.crack] = np.stack([s.pressure[first:last] for s in states], axis=1)
             active[m.crack] = np.stack([s.active[first:last] for s in states])
             first = last
-        pending = _needing(problem, model, u, spaces)
+        seen = u if rubbed is None else np.concatenate([u, rubbed.between], axis=1)
+        pending = _needing(problem, model, seen, spaces)
     assert u is not None  # of the first look, or of the loop that it made begin
+    if rubbed is not None:
+        parts = tuple(spaces), tuple(pressure), tuple(active)
+        return ContactSolution(
+            u, *parts, sets, rubbing=tuple(rubbed.rubbing), dissipated=rubbed.dissipated
+        )
     for c in expected:
         ever = active[c]
         if ever is not None and not ever.any() and problem.contact != "on":
@@ -95,6 +109,24 @@ def solve_contact(
         )
         dual = dual[np.ix_(stays, stays)]
     return ContactSolution(u, tuple(spaces), tuple(pressure), tuple(active), sets, dual)
+
+
+def _solve_friction(
+    problem: Problem,
+    model: Model,
+    engine: Engine,
+    chosen: list[Multipliers],
+    f: Floats,
+    known: Floats,
+    reuse: Reuse,
+) -> FrictionSolution:
+    """The load path of all states; substeps count where a crack has no multipliers yet."""
+    closed = problem.numerics.initial_set == "closed"
+    having = {m.crack for m in chosen}
+    others = any(len(lips) and c not in having for c, lips in enumerate(model.lips))
+    start, size = _start(chosen, reuse, 0, closed), _face_size(model, chosen)
+    stiffness = problem.material.E / size
+    return solve_friction(problem, model, engine, chosen, f, known, start, stiffness, others)
 
 
 def _solve_states(
@@ -154,7 +186,8 @@ def _space(problem: Problem, model: Model, c: int) -> Multipliers:
 
         return lip_space(problem, model, c)
     kind = problem.numerics.multipliers
-    return multipliers(model.space, c, model.lips[c], kind, model.known.fixed)
+    fixed, rub = model.known.fixed, rubs(problem, c)
+    return multipliers(model.space, c, model.lips[c], kind, fixed, rub)
 
 
 def _start(chosen: list[Multipliers], reuse: Reuse, k: int, closed: bool) -> Bools | None:
@@ -178,12 +211,16 @@ def contact_of(
 ) -> tuple[Contact | None, ...]:
     """Contact of each crack in state k, None where it has no multipliers."""
     result: list[Contact | None] = []
+    rubbing = {each.crack: each for each in solution.rubbing}
     for c, lips in enumerate(model.lips):
         m, pressure, active = solution.spaces[c], solution.pressure[c], solution.active[c]
         if m is None or pressure is None or active is None:
             result.append(None)
             continue
         closed = np.asarray(m.values @ active[k].astype(float)) >= 0.5
+        own: dict[str, Any] = {}
+        if c in rubbing:
+            own = _rubbed(m, rubbing[c], u, k)
         result.append(
             Contact(
                 lips.x,
@@ -193,6 +230,18 @@ def contact_of(
                 lock(np.asarray(model.jumps[c] @ u)),
                 lock(closed),
                 lips.s,
+                **own,
             )
         )
     return tuple(result)
+
+
+def _rubbed(m: Multipliers, rubbing: Rubbing, u: Floats, k: int) -> dict[str, Any]:
+    """What friction adds to the contact of one crack in state k."""
+    stuck = np.asarray(m.values @ rubbing.stuck[k].astype(float)) >= 0.5
+    return {
+        "tangent": rubbing.tangent,
+        "shear": lock(np.asarray(m.values @ rubbing.shear[:, k])),
+        "slip": lock(np.asarray(rubbing.jump @ u)),
+        "stuck": lock(stuck),
+    }

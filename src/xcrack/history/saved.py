@@ -128,7 +128,7 @@ def write_body(path: Path, problem: Problem) -> None:
 
     A run does without it: where it cannot be stored, or the system refuses, it is left out.
     """
-    storable = _storable(replace(problem, cracks=(), numerics=Numerics()))
+    storable = _storable(replace(problem, cracks=(), friction=0.0, numerics=Numerics()))
     content = {"format": _FORMAT, "kind": "body", "problem": storable}
     with contextlib.suppress(OSError, ProblemError):
         path.write_bytes(store.packed(content, _CLASSES))
@@ -199,6 +199,7 @@ def _state(solution: Solution) -> dict[str, Any]:
         "contact": solution.contact,
         "energy": solution.energy,
         "report": solution.report,
+        "dissipated": solution.dissipated,
     }
 
 
@@ -220,6 +221,7 @@ def _solutions(content: dict[str, Any]) -> list[Solution]:
             )
         names = ("state", "loads", "factor", "contact", "energy", "report")
         parts = {name: state[name] for name in names}
+        parts["dissipated"] = state.get("dissipated", 0.0)  # files of before have none
         solutions.append(
             Solution(problem=problem, space=space, u=u, lips=lips, reuse=reuse,
                      **parts)

@@ -114,6 +114,9 @@ class Numerics:
         by star.
     initial_set : {"closed", "open"}
         State of the crack faces that the contact iteration starts from where nothing is known.
+    substeps : int
+        With friction: parts in which each load state is reached from the one before. A part in
+        which open faces close is halved, down to a hundredth of the state.
     threads : int, optional
         Threads that share a solve. None: as many processors as the process may use, by affinity
         and quota, at most 16, or the environment variable XCRACK_THREADS. Results have the same
@@ -138,6 +141,7 @@ class Numerics:
     domain: float | None = None
     linear: str = "auto"
     initial_set: str = "closed"
+    substeps: int = 10
     threads: int | None = field(default=None, metadata={"changes_results": False})
     comparison: Comparison = Comparison()
 
@@ -157,6 +161,7 @@ class Numerics:
             if getattr(self, name) is not None:
                 number(getattr(self, name), f"Numerics: {name}", above=0)
         whole(self.points, "Numerics: points", least=2, most=32)
+        whole(self.substeps, "Numerics: substeps", least=1, most=10_000)
         if self.threads is not None:
             whole(self.threads, "Numerics: threads", least=1)
         if not isinstance(self.comparison, Comparison):

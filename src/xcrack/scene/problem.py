@@ -25,6 +25,7 @@ from xcrack.scene.conditions import (
     Support,
     check_vectors,
 )
+from xcrack.scene.friction import checked_friction
 from xcrack.scene.material import Isotropic
 from xcrack.scene.numerics import Numerics
 from xcrack.scene.set_loads import Bearing, Resultant, check_dimension
@@ -59,6 +60,9 @@ class Problem:
         Degree of the standard and Heaviside functions. Where it is left out: 2 in 2D, 1 in
         3D.
     numerics : Numerics
+    friction : float, or a sequence of one a crack
+        Coulomb's coefficient of the crack faces: where they press, they stick until the shear is
+        that share of the pressure. The order of load states counts then.
 
     Raises
     ------
@@ -74,6 +78,7 @@ class Problem:
     contact: str = "auto"
     order: int | None = field(default=None, metadata={"resolved": lambda own: _ORDER[own.mesh.dim]})
     numerics: Numerics = field(default_factory=Numerics)
+    friction: float | Sequence[float] = 0.0
 
     def __post_init__(self) -> None:
         for name, kind in (("mesh", Mesh), ("material", Isotropic), ("numerics", Numerics)):
@@ -94,12 +99,22 @@ class Problem:
         if not isinstance(self.contact, str) or self.contact not in ("auto", "on", "off"):
             raise ProblemError(f'contact = {shown(self.contact)}: give "auto", "on" or "off".')
         self._check_members()
+        n, dim = len(self.cracks), self.mesh.dim
+        own = checked_friction(self.friction, n, dim, self.numerics)
+        object.__setattr__(self, "friction", own)
         check_cracks(self.placed, self.mesh)
 
     @cached_property
     def placed(self) -> tuple[Crack, ...]:
         """The cracks with tips and mouths decided in this mesh."""
         return tuple(placed(crack, self.mesh) for crack in self.cracks)
+
+    @property
+    def frictions(self) -> tuple[float, ...]:
+        """Coefficient of friction of each crack."""
+        if isinstance(self.friction, Sequence):
+            return tuple(self.friction)
+        return (float(self.friction),) * len(self.cracks)
 
     def state(self, state: Any) -> tuple[tuple[Load, ...], float]:
         """Loads and factor of a load state: a number, or a list of loads."""

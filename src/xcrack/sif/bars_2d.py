@@ -82,6 +82,8 @@ def _unsuited(solution: Solution, crack: int) -> str:
         return "order 1 has no estimate in 2D: give order=2"
     if solution.contact[crack] is not None and problem.numerics.comparison.lips in LIPS:
         return f"contact by {LIPS[problem.numerics.comparison.lips]} has no estimate"
+    if any(contact is not None and contact.shear is not None for contact in solution.contact):
+        return "friction has no estimate"
     return ""
 
 

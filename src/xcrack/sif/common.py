@@ -82,6 +82,20 @@ def lip_pressure(solution: Solution, c: int) -> Floats:
     return total
 
 
+def lip_shear(solution: Solution, c: int) -> Floats | None:
+    """Tangential traction on lip + of crack c at its points `(q, d)`; None without friction.
+
+    Parameters
+    ----------
+    solution : Solution
+    c : int
+    """
+    contact = solution.contact[c]
+    if contact is None or contact.shear is None or contact.tangent is None:
+        return None
+    return np.asarray(contact.shear[:, None] * contact.tangent)
+
+
 def acts(solutions: Sequence[Solution], *kinds: type[Load]) -> bool:
     """Whether loads of one of these kinds act in any of the states."""
     return any(isinstance(load, kinds) for s in solutions for load in s.loads)

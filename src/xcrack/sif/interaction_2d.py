@@ -3,12 +3,12 @@
 I = int P_kj t_k q_,j dA - int_lips (P_kj m_j t_k) q ds + volume terms, where
 P_kj = sigma_ij u^a_i,k + sigma^a_ij u_i,k - (sigma : eps^a) delta_kj, t is the direction ahead of
 the tip and m the outward normal of a lip, on which sigma m is the true traction: the multipliers
-or a given pressure. On crack faces that are not straight the auxiliary field of Williams is
-continued in angle to the side of the crack face, and its own traction counts (full lip term). K =
-E'/2 I with the unit fields; T = E' I / f with that of a point force f along the crack faces, less
-the pressure on the crack faces at the tip. An initial stress enters by its value at the tip, which
-is
-counted in sigma : eps^a, and by its change from there, times the derivative of eps^a.
+(pressure, and shear where the faces rub) or a given pressure. On crack faces that are not straight
+the auxiliary field of Williams is continued in angle to the side of the crack face, and its own
+traction counts (full lip term). K = E'/2 I with the unit fields; T = E' I / f with that of a point
+force f along the crack faces, less the pressure on the crack faces at the tip. An initial stress
+enters by its value at the tip, which is counted in sigma : eps^a, and by its change from there,
+times the derivative of eps^a.
 """
 
 from collections.abc import Sequence
@@ -23,7 +23,7 @@ from xcrack.mesh.mesh import local_edges
 from xcrack.mesh.simplex import simplex_rule
 from xcrack.scene.conditions import BodyForce, InitialStress, evaluate, evaluate_stress
 from xcrack.scene.material import Isotropic
-from xcrack.sif.common import acts, lip_pressure, mean_rotation, weight
+from xcrack.sif.common import acts, lip_pressure, lip_shear, mean_rotation, weight
 from xcrack.xfem.loads import position
 from xcrack.xfem.quadrature import Points, cell_side
 from xcrack.xfem.williams import continued_polar, mode_matrix, unit_gradients
@@ -213,13 +213,15 @@ def lip_terms(solutions: Sequence[Solution], ring: Ring) -> Floats:
     if not near.any():
         return result
     pressure = np.stack([lip_pressure(s, tip.crack)[near] for s in solutions])
+    shears = [None if x is None else x[near] for x in (lip_shear(s, tip.crack) for s in solutions)]
     R = tip.frame
     material = solutions[0].problem.material
     xi = (lips.x[near] - tip.x) @ R.T
     # The last piece is straight: what differs there is round-off, which 1 / r would magnify.
     xi[np.abs(xi[:, 1]) < 1e-9 * radii.max(), 1] = 0.0
     bent = bool(xi[:, 1].any())
-    if not bent and not pressure.any():
+    rubs = any(shear is not None and shear.any() for shear in shears)
+    if not bent and not pressure.any() and not rubs:
         return result
     behind = np.ones(len(xi), dtype=bool)
     w = lips.weight[near]
@@ -236,7 +238,9 @@ def lip_terms(solutions: Sequence[Solution], ring: Ring) -> Floats:
             gradient = gradients_at(space, ring.coefficients, cell, bary, side) - ring.turn
             local = np.einsum("ai,qijs,bj->sqab", R, gradient, R)
         for k, solution in enumerate(solutions):
-            traction = -pressure[k][:, None] * outward
+            traction, shear = -pressure[k][:, None] * outward, shears[k]
+            if shear is not None:
+                traction += sign * shear @ R.T
             for m, field in enumerate(aux):
                 density = np.einsum("qi,qi->q", traction, field.gradient[:, :, 0])
                 if local is not None:

@@ -20,7 +20,7 @@ from xcrack.solvers.basis import (
     patch_orthogonal,
     restricted,
 )
-from xcrack.solvers.engine import ContactRows, Count, StateContact
+from xcrack.solvers.engine import Condensed, ContactRows, Count, StateContact
 from xcrack.solvers.factor import Solve, superlu
 from xcrack.solvers.modal_basis import mode_columns
 from xcrack.solvers.multifrontal import Factor, Tree, factorised, tree
@@ -133,19 +133,31 @@ class System:
         del latest
         if self.factor is None:
             return self._contact_by_solves(rows, f, known, start, opened)
+        small = self.condensed(rows.N, f, known)
+        states = self._sets(small.dual, small.gap, rows, start)
+        u = small.displacements(np.stack([state.pressure for state in states], axis=1))
+        return [replace(state, u=u[:, k], dual=small.dual) for k, state in enumerate(states)]
+
+    def condensed(self, N: sp.csr_matrix, f: Floats, known: Floats) -> Condensed:
+        """The system as rows see it; see `Engine`. `displacements` can be asked once."""
+        if self.factor is None:
+            gap = N @ self.solve(f, known)
+            return Condensed(self.dual(N), gap, lambda lam: self.solve(f + N.T @ lam, known))
+        factor = self.factor
         b = self.basis.T @ (f - self.matrix @ known)
-        Y, places = self.factor.forward_sparse(sp.csr_matrix(rows.N @ self.basis))
-        y = self.factor.forward(b)
+        Y, places = factor.forward_sparse(sp.csr_matrix(N @ self.basis))
+        y = factor.forward(b)
         with one_blas_thread():
             F = Y.T @ Y
-            d = rows.N @ known + Y.T @ y[places]
-        states = self._sets(F, d, rows, start)
-        pressure = np.stack([state.pressure for state in states], axis=1)
-        with one_blas_thread():
-            y[places] += Y @ pressure
-        self.count.solves += b.shape[1]
-        u = self._expanded(self.factor.backward(y), known)
-        return [replace(state, u=u[:, k], dual=F) for k, state in enumerate(states)]
+            d = N @ known + Y.T @ y[places]
+
+        def displacements(lam: Floats) -> Floats:
+            with one_blas_thread():
+                y[places] += Y @ lam
+            self.count.solves += b.shape[1]
+            return self._expanded(factor.backward(y), known)
+
+        return Condensed(F, d, displacements)
 
     def dual(self, N: sp.csr_matrix) -> Floats:
         """F = N K^-1 N^T `(g, g)`, in blocks of right-hand sides."""

@@ -1,6 +1,6 @@
 """What load states and contact ask of a linear system, whether it is factored or iterated."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -73,6 +73,25 @@ class ContactRows:
     closed: bool
 
 
+@dataclass(frozen=True, eq=False)
+class Condensed:
+    """A system as rows of gaps see it.
+
+    Attributes
+    ----------
+    dual : (g, g) array
+        F = N K^-1 N^T.
+    gap : (g, states) array
+        Weak gaps of the load states without tractions.
+    displacements : callable
+        Displacements `(n_dof, states)` of the load states with tractions `(g, states)`.
+    """
+
+    dual: Floats
+    gap: Floats
+    displacements: Callable[[Floats], Floats]
+
+
 class Engine(Protocol):
     """A linear system in a basis of its own, which all load states share.
 
@@ -142,9 +161,13 @@ class Engine(Protocol):
         """
         ...
 
+    def condensed(self, N: sp.csr_matrix, f: Floats, known: Floats) -> Condensed:
+        """The system as rows `(g, n_dof)` see it, for load states `(n_dof, states)`."""
+        ...
+
     def handed_on(self, reuse: Reuse) -> Reuse:
         """What the next solve may use, with what this system adds to it."""
         ...
 
 
-__all__ = ["ContactRows", "Count", "Engine", "StateContact"]
+__all__ = ["Condensed", "ContactRows", "Count", "Engine", "StateContact"]

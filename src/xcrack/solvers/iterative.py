@@ -14,7 +14,7 @@ import scipy.sparse as sp
 from xcrack.arrays import Bools, Floats, Ints, lock, ranges
 from xcrack.scene.material import Isotropic
 from xcrack.solvers.basis import Blocks, node_blocks, orthonormal, patch_orthogonal, restricted
-from xcrack.solvers.engine import ContactRows, Count, StateContact
+from xcrack.solvers.engine import Condensed, ContactRows, Count, StateContact
 from xcrack.solvers.modal_basis import mode_columns
 from xcrack.solvers.multigrid import Hierarchy, extended, hierarchy
 from xcrack.solvers.projected_cg import (
@@ -134,6 +134,16 @@ class IterativeSystem:
             u = known[:, k] + self.basis @ state.y
             states.append(StateContact(state.pressure, state.gap, state.active, state.sets, u))
         return states
+
+    def condensed(self, N: sp.csr_matrix, f: Floats, known: Floats) -> Condensed:
+        """The system as rows see it; see `Engine`. A solve for each row."""
+        opened = self.solve(f, known)
+        F = N @ self.solve(np.asarray(N.T.todense()))
+        return Condensed(
+            (F + F.T) / 2,
+            N @ opened,
+            lambda lam: self.solve(f + N.T @ lam, known, opened),
+        )
 
     def handed_on(self, reuse: Reuse) -> Reuse:
         """With the levels of the mesh."""

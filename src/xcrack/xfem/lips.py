@@ -110,8 +110,11 @@ def jump_values(space: FunctionSpace, c: int, lips: LipPoints) -> list[tuple[Int
     return result
 
 
-def jump_matrix(space: FunctionSpace, c: int, lips: LipPoints) -> sp.csr_matrix:
-    """Normal jump n . [[u]] at the lip points `(q, n_dof)`."""
+def jump_matrix(
+    space: FunctionSpace, c: int, lips: LipPoints, along: Floats | None = None
+) -> sp.csr_matrix:
+    """Jump n . [[u]] at the lip points `(q, n_dof)`; with directions `along` (q, d), theirs."""
+    direction = lips.normal if along is None else along
     rows, columns, values = [], [], []
     for functions, number, N in jump_values(space, c, lips):
         acts = (functions >= 0) & (N != 0)
@@ -124,6 +127,6 @@ def jump_matrix(space: FunctionSpace, c: int, lips: LipPoints) -> sp.csr_matrix:
     jump.eliminate_zeros()  # standard functions take one value on both lips of a cell
     d = space.dim
     point = np.repeat(np.arange(len(lips)), np.diff(jump.indptr))
-    entries = (jump.data[:, None] * lips.normal[point]).ravel()
+    entries = (jump.data[:, None] * direction[point]).ravel()
     unknown = (jump.indices[:, None] * d + np.arange(d)).ravel()
     return sp.csr_matrix((entries, unknown, jump.indptr * d), shape=(len(lips), space.n_dof))

@@ -1,0 +1,170 @@
+"""Coulomb friction on crack faces: tangential multipliers, and the load path of all states.
+
+The functions of the pressures carry tangential tractions too: |shear| <= mu times pressure in each
+function, which are positive, so that it holds everywhere. The slip counts from the unloaded body,
+or from what an earlier crack state left behind.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+
+from xcrack.arrays import Bools, Floats, lock
+from xcrack.contact.friction_path import Place, at_rest, march
+from xcrack.contact.multipliers import Multipliers, gap_rows
+from xcrack.contact.result import Rubbing
+from xcrack.scene.problem import Problem
+from xcrack.solvers.coulomb import FrictionRows, Status, all_stuck
+from xcrack.solvers.engine import Engine, StateContact
+from xcrack.xfem.lips import LipPoints, jump_matrix
+from xcrack.xfem.model import Model
+
+
+@dataclass(frozen=True, eq=False)
+class FrictionSolution:
+    """Contact with friction in all load states.
+
+    Attributes
+    ----------
+    states : list of StateContact
+    rubbing : list of Rubbing
+        One for each crack with friction and multipliers.
+    dissipated : tuple of float
+        Energy since the state before.
+    between : (n_dof, k) array, length
+        Displacements of the substeps; none where nobody asked.
+    """
+
+    states: list[StateContact]
+    rubbing: list[Rubbing]
+    dissipated: tuple[float, ...]
+    between: Floats
+
+
+def rubs(problem: Problem, c: int) -> bool:
+    """Whether the faces of crack c rub where they press."""
+    return problem.contact != "off" and problem.frictions[c] > 0
+
+
+def tangent(lips: LipPoints) -> Floats:
+    """Direction of the shear at each point `(q, 2)`: along the order of the crack's points."""
+    return np.stack([lips.normal[:, 1], -lips.normal[:, 0]], axis=1)
+
+
+def solve_friction(
+    problem: Problem,
+    model: Model,
+    engine: Engine,
+    chosen: Sequence[Multipliers],
+    f: Floats,
+    known: Floats,
+    start: Bools | None,
+    stiffness: float,
+    between: bool,
+) -> FrictionSolution:
+    """Solve all load states in their order, from the unloaded body.
+
+    Parameters
+    ----------
+    problem : Problem
+    model : Model
+    engine : Engine
+    chosen : sequence of Multipliers
+        Of the cracks that need contact.
+    f, known : (n_dof, states) arrays
+    start : (g,) array of bool or None
+        First guess of the closed set.
+    stiffness : float, stress / length
+        As of `ContactRows`.
+    between : bool
+        Whether displacements of the substeps are asked for.
+
+    Raises
+    ------
+    ConvergenceError
+        A load for which no status of the functions stays.
+    """
+    faces = [_face(problem, model, m) for m in chosen]
+    rubbing = [face for face in faces if face.mu > 0]
+    N = sp.csr_matrix(sp.vstack([face.normal for face in faces] + [r.along for r in rubbing]))
+    small = engine.condensed(N, f, known)
+    rows = _rows(faces, small.dual, stiffness)
+    status = all_stuck(rows) if start is None else Status(start, all_stuck(rows).slip)
+    places = march(rows, small.gap, at_rest(rows, status), problem.numerics.substeps)
+    u = small.displacements(np.stack([place.lam for place in places], axis=1))
+    states = [
+        StateContact(p.lam[: rows.n], p.gap[: rows.n], p.status.closed, p.sets, u[:, k])
+        for k, p in enumerate(places)
+    ]
+    return FrictionSolution(
+        states,
+        _by_crack(rubbing, rows, places),
+        tuple(place.dissipated for place in places),
+        _between(engine, N, f, known, places) if between else np.zeros((len(f), 0)),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Face:
+    """Rows of one crack."""
+
+    space: Multipliers
+    mu: float
+    normal: sp.csr_matrix
+    tangent: Floats
+    jump: sp.csr_matrix
+    along: sp.csr_matrix
+
+
+def _face(problem: Problem, model: Model, m: Multipliers) -> _Face:
+    lips, mu = model.lips[m.crack], problem.frictions[m.crack]
+    normal = gap_rows(m, lips, model.jumps[m.crack])
+    if not mu:
+        nothing = normal[:0]
+        return _Face(m, mu, normal, np.zeros((0, 2)), nothing, nothing)
+    direction = tangent(lips)
+    jump = jump_matrix(model.space, m.crack, lips, direction)
+    return _Face(m, mu, normal, direction, jump, gap_rows(m, lips, jump))
+
+
+def _rows(faces: Sequence[_Face], dual: Floats, stiffness: float) -> FrictionRows:
+    measure = np.concatenate([face.space.measure for face in faces])
+    mu = np.concatenate([np.full(len(face.space.measure), face.mu) for face in faces])
+    rubbing = np.nonzero(mu > 0)[0]
+    return FrictionRows(dual, measure, rubbing, mu[rubbing], stiffness)
+
+
+def _by_crack(faces: Sequence[_Face], rows: FrictionRows, places: Sequence[Place]) -> list[Rubbing]:
+    shear = np.stack([place.lam[rows.n :] for place in places], axis=1)
+    stuck = np.stack(
+        [place.status.closed[rows.rubbing] & (place.status.slip == 0) for place in places]
+    )
+    result, first = [], 0
+    for face in faces:
+        own = slice(first, first + len(face.space.measure))
+        result.append(
+            Rubbing(face.space.crack, lock(face.tangent), face.jump, shear[own], stuck[:, own])
+        )
+        first = own.stop
+    return result
+
+
+def _between(
+    engine: Engine, N: sp.csr_matrix, f: Floats, known: Floats, places: Sequence[Place]
+) -> Floats:
+    """Displacements of all substeps: other faces may overlap in one of them."""
+    loads, given = [], []
+    before = np.zeros(len(f)), np.zeros(len(f))
+    for k, place in enumerate(places):
+        for share, lam in place.between[:-1]:
+            loads.append(before[0] + share * (f[:, k] - before[0]) + N.T @ lam)
+            given.append(before[1] + share * (known[:, k] - before[1]))
+        before = f[:, k], known[:, k]
+    if not loads:
+        return np.zeros((len(f), 0))
+    return engine.solve(np.stack(loads, axis=1), np.stack(given, axis=1))
+
+
+__all__ = ["FrictionSolution", "rubs", "solve_friction", "tangent"]

@@ -1,0 +1,242 @@
+"""Coulomb friction in 2D: stick, slip and opening on a small dense problem.
+
+With F = N K^-1 N^T over normal and tangential rows, and d the gaps and slips without tractions,
+every function of the multipliers is open (no traction), stuck (no gap, no slip) or slipping
+(no gap, traction mu times the pressure against the slip). A semi-smooth Newton iteration predicts
+the status of all functions at once (Alart and Curnier, 1991; in 2D each status is linear, so that
+it is an active set). Where it cycles, sweeps of non-smooth Gauss-Seidel with exact solutions of
+each function lead on (Jourdan, Alart and Jean, 1998).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg
+
+from xcrack.arrays import Bools, Floats, Ints
+from xcrack.errors import ConvergenceError
+
+_MOST = 60  # sets that Newton tries before sweeps
+_SWEEPS = (0, 3, 10, 30, 100, 300, 1000)  # before each attempt of Newton
+_ROUND_OFF = 1e-12
+_REDUNDANT = 1e-13  # smallest pivot of a scaled matrix whose solution is taken
+
+
+@dataclass(frozen=True, eq=False)
+class FrictionRows:
+    """A dense problem of contact with friction, without its loads.
+
+    Attributes
+    ----------
+    F : (g + r, g + r) array
+        N K^-1 N^T; first the normal rows of all functions, then the tangential ones of those that
+        rub.
+    measure : (g,) array
+        Integral of each function.
+    rubbing : (r,) array of int
+        Numbers of the functions with friction.
+    mu : (r,) array
+        Coefficients of friction, positive.
+    stiffness : float, stress / length
+        Weighs gaps against pressures in the prediction of the status; E / h is natural.
+    """
+
+    F: Floats
+    measure: Floats
+    rubbing: Ints
+    mu: Floats
+    stiffness: float
+
+    @property
+    def n(self) -> int:
+        """Number of functions."""
+        return len(self.measure)
+
+
+@dataclass(frozen=True, eq=False)
+class Status:
+    """Which functions are closed, and which of those that rub slip.
+
+    Attributes
+    ----------
+    closed : (g,) array of bool
+    slip : (r,) array of {-1, 0, 1}
+        Sign of the traction of a slipping function; 0 where it sticks or is open.
+    """
+
+    closed: Bools
+    slip: Ints
+
+    def key(self) -> bytes:
+        """Bytes that name it."""
+        return self.closed.tobytes() + self.slip.tobytes()
+
+
+@dataclass(frozen=True, eq=False)
+class FrictionState:
+    """Tractions and gaps of one load.
+
+    Attributes
+    ----------
+    lam : (g + r,) array, stress
+        Pressures, then tangential tractions.
+    gap : (g + r,) array
+        Weak gaps, then weak slips since the state before.
+    status : Status
+    sets : int
+        Sets tried.
+    """
+
+    lam: Floats
+    gap: Floats
+    status: Status
+    sets: int
+
+
+def all_stuck(rows: FrictionRows) -> Status:
+    """The status that is tried where nothing is known."""
+    return Status(np.ones(rows.n, dtype=bool), np.zeros(len(rows.mu), dtype=np.int64))
+
+
+def coulomb(rows: FrictionRows, d: Floats, start: Status) -> FrictionState:
+    """Tractions and gaps of one load.
+
+    Parameters
+    ----------
+    rows : FrictionRows
+    d : (g + r,) array
+        Weak gaps and slips since the state before, without tractions.
+    start : Status
+        First guess.
+
+    Raises
+    ------
+    ConvergenceError
+        Neither Newton nor Gauss-Seidel find a status that stays.
+    """
+    tried = 0
+    lam, status = np.zeros(len(d)), start
+    for sweeps in _SWEEPS:
+        if sweeps:
+            lam = _swept(rows, d, lam, sweeps)
+            status = _status_of(rows, lam)
+        state, sets = _newton(rows, d, status)
+        tried += sets
+        if state is not None:
+            return FrictionState(state.lam, state.gap, state.status, tried)
+    raise ConvergenceError(
+        f"contact with friction: after {tried} sets and {sum(_SWEEPS)} sweeps the status of "
+        f"{rows.n} groups still changes. Give a smaller friction (here up to {rows.mu.max():.3g}), "
+        "or refine the mesh along the crack."
+    )
+
+
+def of_status(rows: FrictionRows, d: Floats, status: Status) -> tuple[Floats, Floats]:
+    """Tractions that a status asks for, and the gaps and slips that they leave."""
+    g, closed, slip = rows.n, status.closed, status.slip
+    shut = np.nonzero(closed)[0]
+    touching = closed[rows.rubbing]
+    stuck = np.nonzero(touching & (slip == 0))[0]
+    slipping = np.nonzero(touching & (slip != 0))[0]
+    lam = np.zeros(len(d))
+    active = np.concatenate([shut, g + stuck])
+    if len(active):
+        place = np.zeros(g, dtype=np.int64)
+        place[shut] = np.arange(len(shut))
+        # The traction of a slipping function goes with its pressure.
+        spread = np.zeros((len(d), len(active)))
+        spread[active, np.arange(len(active))] = 1.0
+        pressed = place[rows.rubbing[slipping]]
+        spread[g + slipping, pressed] = slip[slipping] * rows.mu[slipping]
+        diagonal = np.diag(rows.F)[active]
+        moved = diagonal > 0
+        scale = np.where(moved, 1 / np.sqrt(np.where(moved, diagonal, 1.0)), 0.0)
+        A = (rows.F[active] @ spread) * scale[:, None] * scale
+        lam = spread @ (scale * _solved(A, -d[active] * scale))
+    gap = rows.F @ lam + d
+    gap[active] = 0.0
+    return lam, gap
+
+
+def _solved(A: Floats, b: Floats) -> Floats:
+    """Solution of a general system; the smallest one where groups are redundant."""
+    lu, order, info = scipy.linalg.lapack.dgetrf(A)
+    if info == 0 and np.abs(np.diag(lu)).min() > _REDUNDANT:
+        x = scipy.linalg.lapack.dgetrs(lu, order, b)[0]
+        if np.isfinite(x).all():
+            return np.asarray(x)
+    return np.asarray(scipy.linalg.lstsq(A, b, cond=_ROUND_OFF)[0])
+
+
+def _newton(rows: FrictionRows, d: Floats, status: Status) -> tuple[FrictionState | None, int]:
+    g, seen = rows.n, set()
+    weight = rows.stiffness / rows.measure
+    for sets in range(1, _MOST + 1):
+        lam, gap = of_status(rows, d, status)
+        tolerance = _ROUND_OFF * float(np.abs(lam).max(initial=0.0))
+        normal = lam[:g] - weight * gap[:g]
+        along = lam[g:] - weight[rows.rubbing] * gap[g:]
+        # Values at round-off of zero (faces that only touch) must not make the status flicker.
+        closed = normal > 0.1 * tolerance
+        bound = rows.mu * np.maximum(normal[rows.rubbing], 0.0)
+        slides = closed[rows.rubbing] & (np.abs(along) > bound + tolerance)
+        new = Status(closed, np.where(slides, np.sign(along), 0.0).astype(np.int64))
+        if new.key() == status.key():
+            return FrictionState(lam, gap, status, sets), sets
+        if new.key() in seen:
+            return None, sets
+        seen.add(new.key())
+        status = new
+    return None, _MOST
+
+
+def _status_of(rows: FrictionRows, lam: Floats) -> Status:
+    pressure, shear = lam[: rows.n], lam[rows.n :]
+    closed = pressure > 0
+    bound = rows.mu * pressure[rows.rubbing]
+    slides = closed[rows.rubbing] & (np.abs(shear) >= bound * (1 - 1e-9))
+    return Status(closed, np.where(slides, np.sign(shear), 0.0).astype(np.int64))
+
+
+def _swept(rows: FrictionRows, d: Floats, lam: Floats, sweeps: int) -> Floats:
+    """Sweeps of Gauss-Seidel: each function's own problem is solved exactly, one by one."""
+    F, g, lam = rows.F, rows.n, np.array(lam)
+    partner = np.full(g, -1)
+    partner[rows.rubbing] = np.arange(len(rows.rubbing))
+    gap = F @ lam + d
+    for _ in range(sweeps):
+        for i in range(g):
+            if F[i, i] <= 0:
+                continue
+            j = int(partner[i])
+            own = [i] if j < 0 else [i, g + j]
+            block = F[np.ix_(own, own)]
+            free = gap[own] - block @ lam[own]
+            new = _alone(block, free, 0.0 if j < 0 else float(rows.mu[j]))
+            change = new - lam[own]
+            if change.any():
+                gap += F[:, own] @ change
+                lam[own] = new
+    return lam
+
+
+def _alone(block: Floats, free: Floats, mu: float) -> Floats:
+    """Tractions of one function whose gap and slip without them are given."""
+    a, gap = float(block[0, 0]), float(free[0])
+    if len(free) == 1:
+        return np.array([max(-gap / a, 0.0)])
+    b, c, slip = float(block[0, 1]), float(block[1, 1]), float(free[1])
+    det = a * c - b * b
+    if det > 0:
+        pressure, shear = (-gap * c + slip * b) / det, (-slip * a + gap * b) / det
+        if pressure >= 0 and abs(shear) <= mu * pressure:
+            return np.array([pressure, shear])
+    for sign in (1, -1):
+        share = a + b * sign * mu
+        pressure = -gap / share if share > 0 else -1.0
+        if pressure > 0 and (slip + (b + c * sign * mu) * pressure) * sign <= 0:
+            return np.array([pressure, sign * mu * pressure])
+    return np.zeros(2)
+
+
+__all__ = ["FrictionRows", "FrictionState", "Status", "all_stuck", "coulomb", "of_status"]
