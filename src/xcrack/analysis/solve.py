@@ -12,6 +12,7 @@ from xcrack.analysis.report import report
 from xcrack.analysis.resultants import resultants
 from xcrack.analysis.solution import Solution
 from xcrack.arrays import Bools, Floats, lock
+from xcrack.contact.slip import slip_of
 from xcrack.contact.solve import contact_of, solve_contact
 from xcrack.errors import ProblemError
 from xcrack.inputs import entries, flag, shown
@@ -90,16 +91,18 @@ def solve_states(
     reuse: Reuse | None = None,
     solver: Solver | None = None,
     error: bool = False,
+    repeated: bool = False,
 ) -> list[Solution]:
     """Solve all load states; `reuse` of an earlier solution in the same mesh saves work.
 
     Give `Reuse()` at the first of several solves in one mesh: what serves the next is kept then.
-    With `error` the factor stays with the solutions.
+    With `error` the factor stays with the solutions. With `repeated` the states are a cycle: where
+    faces rub it goes on until slip returns, from what `reuse` left behind.
     """
     if not len(states):
         raise ProblemError("states is empty: give at least one load state, or none at all.")
     with threads(problem.numerics.threads):
-        return _solve_states(problem, states, reuse, solver, error)
+        return _solve_states(problem, states, reuse, solver, error, repeated)
 
 
 def _solve_states(
@@ -108,6 +111,7 @@ def _solve_states(
     reuse: Reuse | None,
     solver: Solver | None,
     error: bool,
+    repeated: bool,
 ) -> list[Solution]:
     model = build(problem, None if reuse is None else reuse.bulk)
     known_loads: dict[int, Floats] = {}
@@ -118,11 +122,15 @@ def _solve_states(
     f, imbalance = balanced(model.space, motion, np.stack([case.f for case in cases], axis=1))
     known = np.stack([case.known for case in cases], axis=1)
     acting = [(case.loads, case.factor) for case in cases]
-    pressed = solve_contact(problem, model, engine, f, known, reuse or Reuse(), acting)
+    start = reuse or Reuse()
+    pressed = solve_contact(problem, model, engine, f, known, start, acting, repeated)
     u = pressed.u
     if motion.modes.shape[1]:
         u = without_motion(motion, u)
-    handed_on = engine.handed_on(replace(pressed.closed_sets(), bulk=model.bulk))
+    left = replace(pressed.closed_sets(), bulk=model.bulk)
+    if pressed.rubbing:
+        left = replace(left, slip=slip_of(model, pressed.rubbing, u[:, -1]))
+    handed_on = engine.handed_on(left)
     factored = Factored(model, engine, motion, pressed) if error else None
     # It depends on the mesh, not on the cracks: steps of a run leave it out.
     unbalanced = None if reuse is not None else out_of_balance(problem, model, cases[0].loads)

@@ -12,12 +12,14 @@ import numpy as np
 import scipy.sparse as sp
 
 from xcrack.arrays import Bools, Floats, lock
-from xcrack.contact.friction_path import Place, at_rest, march
+from xcrack.contact.friction_path import Place, at_rest, march, shaken_down, with_slip
 from xcrack.contact.multipliers import Multipliers, gap_rows
 from xcrack.contact.result import Rubbing
+from xcrack.contact.slip import weak_slip
 from xcrack.scene.problem import Problem
 from xcrack.solvers.coulomb import FrictionRows, Status, all_stuck
 from xcrack.solvers.engine import Engine, StateContact
+from xcrack.solvers.reuse import Slip
 from xcrack.xfem.lips import LipPoints, jump_matrix
 from xcrack.xfem.model import Model
 
@@ -63,8 +65,9 @@ def solve_friction(
     start: Bools | None,
     stiffness: float,
     between: bool,
+    before: Sequence[Slip | None] | None,
 ) -> FrictionSolution:
-    """Solve all load states in their order, from the unloaded body.
+    """Solve all load states in their order, from the unloaded body; or a cycle that is repeated.
 
     Parameters
     ----------
@@ -80,6 +83,9 @@ def solve_friction(
         As of `ContactRows`.
     between : bool
         Whether displacements of the substeps are asked for.
+    before : sequence of Slip or None
+        Of all cracks, for a cycle that is repeated until slip returns: what its last state left
+        behind when the crack was shorter; empty where there was none. None: the path alone.
 
     Raises
     ------
@@ -92,7 +98,14 @@ def solve_friction(
     small = engine.condensed(N, f, known)
     rows = _rows(faces, small.dual, stiffness)
     status = all_stuck(rows) if start is None else Status(start, all_stuck(rows).slip)
-    places = march(rows, small.gap, at_rest(rows, status), problem.numerics.substeps)
+    begin, pass_through = at_rest(rows, status), march
+    if before is not None:
+        pass_through = shaken_down
+        slips = [before[r.space.crack] if before else None for r in rubbing]
+        if any(slip is not None for slip in slips):
+            weak = [weak_slip(model, r.space, s) for r, s in zip(rubbing, slips, strict=True)]
+            begin = with_slip(rows, small.gap[:, -1], np.concatenate(weak), status)
+    places = pass_through(rows, small.gap, begin, problem.numerics.substeps)
     u = small.displacements(np.stack([place.lam for place in places], axis=1))
     states = [
         StateContact(p.lam[: rows.n], p.gap[: rows.n], p.status.closed, p.sets, u[:, k])

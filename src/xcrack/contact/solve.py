@@ -30,6 +30,7 @@ def solve_contact(
     known: Floats,
     reuse: Reuse,
     acting: Acting,
+    repeated: bool = False,
 ) -> ContactSolution:
     """Solve, and give multipliers to cracks whose faces overlap, until none does.
 
@@ -49,6 +50,8 @@ def solve_contact(
     acting : sequence of (loads, factor)
         Loads of each state and their scale: some alternatives to multipliers need what acts on
         the faces besides.
+    repeated : bool
+        With friction: the states are a cycle, repeated until slip returns.
     """
     n = len(model.lips)
     spaces: list[Multipliers | None] = [None] * n
@@ -77,7 +80,7 @@ def solve_contact(
             spaces[c] = _space(problem, model, c)
         chosen = [m for m in spaces if m is not None]
         if any(rubs(problem, m.crack) for m in chosen):
-            rubbed = _solve_friction(problem, model, engine, chosen, f, known, reuse)
+            rubbed = _solve_friction(problem, model, engine, chosen, f, known, reuse, repeated)
             states = rubbed.states
         else:
             states = _solve_states(
@@ -119,6 +122,7 @@ def _solve_friction(
     f: Floats,
     known: Floats,
     reuse: Reuse,
+    repeated: bool,
 ) -> FrictionSolution:
     """The load path of all states; substeps count where a crack has no multipliers yet."""
     closed = problem.numerics.initial_set == "closed"
@@ -126,7 +130,10 @@ def _solve_friction(
     others = any(len(lips) and c not in having for c, lips in enumerate(model.lips))
     start, size = _start(chosen, reuse, 0, closed), _face_size(model, chosen)
     stiffness = problem.material.E / size
-    return solve_friction(problem, model, engine, chosen, f, known, start, stiffness, others)
+    before = reuse.slip if repeated else None
+    return solve_friction(
+        problem, model, engine, chosen, f, known, start, stiffness, others, before
+    )
 
 
 def _solve_states(

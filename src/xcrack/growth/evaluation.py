@@ -11,6 +11,7 @@ from xcrack.arrays import Floats
 from xcrack.crack.crack import Crack
 from xcrack.growth.advance import PerCrack
 from xcrack.growth.follow import following
+from xcrack.growth.friction import without_locked
 from xcrack.growth.front_trail import FrontTrail
 from xcrack.growth.options import Run
 from xcrack.growth.rating import rates_of
@@ -95,6 +96,7 @@ def evaluate(
 ) -> Evaluation:
     """Ask criterion and law of a run what K of all load states means."""
     angle, dK_eq, R, law_rate = rates_of(run, problem, sif, solutions)
+    dK_eq, law_rate = without_locked(problem, solutions, sif, dK_eq, law_rate)
     rate = tuple(np.where(d < run.threshold, 0.0, r) for d, r in zip(dK_eq, law_rate))
     return Evaluation(problem, sif, angle, dK_eq, R, law_rate, rate, tuple(solutions))
 

@@ -100,8 +100,6 @@ class Run:
                 "twice, but counts as one cycle from the smallest to the largest: a load history "
                 "is a Spectrum(factors)."
             )
-        if any(self.problem.frictions):
-            raise ProblemError("grow: growth with friction is not there yet: give friction=0.")
         if not self.problem.cracks:
             raise ProblemError("grow: the problem has no crack; growth does not start one.")
         if self.da is None and self.cycles is None:

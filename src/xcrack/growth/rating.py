@@ -14,6 +14,7 @@ from xcrack.growth.advance import PerCrack
 from xcrack.growth.block import Answers, Pairs, block_of, left_out_share, pairs_of, rated
 from xcrack.growth.checks import evaluate_criterion, evaluate_law
 from xcrack.growth.follow import following
+from xcrack.growth.friction import refuse_friction
 from xcrack.growth.ladder import factors_of, respond_to
 from xcrack.growth.nominal import nominal_range
 from xcrack.growth.options import Run
@@ -218,7 +219,9 @@ def respond_to_cycle(
     """
 
     def solve(states: Sequence[Any], reuse: Reuse) -> tuple[tuple[Solution, ...], Answers, Reuse]:
-        solutions = solve_states(problem, states, reuse=reuse, solver=solver)
+        solutions = solve_states(problem, states, reuse=reuse, solver=solver, repeated=True)
+        if isinstance(cycle, Spectrum):
+            refuse_friction(problem, solutions)
         handed_on = solutions[0].reuse
         light = handed_on.without_factor()
         solutions = [replace(solution, reuse=light) for solution in solutions]

@@ -24,14 +24,14 @@ from xcrack.history import lock
 from xcrack.history.store import PART, load, save, write_whole
 from xcrack.paths import system_errors
 from xcrack.sif.sif import SIF
-from xcrack.solvers.reuse import Reuse
+from xcrack.solvers.reuse import Reuse, Slip
 
 HEADER = "run.json"
 BODY = "body.npz"
 _FORMAT = 2
 _STEP = re.compile(r"step_(\d{5,})\.npz")
 CLASSES: dict[str, type] = {
-    "Step": Step, "Memory": Memory, "Reuse": Reuse, "Crack": Crack,
+    "Step": Step, "Memory": Memory, "Reuse": Reuse, "Slip": Slip, "Crack": Crack,
     "SIF": SIF, "StepError": StepError, "Trail": Trail, "FrontTrail": FrontTrail,
     "Places": Places, "Arrival": Arrival, "Join": Join, "Overloads": Overloads, "Zones": Zones,
     "Kinds": Kinds, "March": March,

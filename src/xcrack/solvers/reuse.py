@@ -13,6 +13,24 @@ from xcrack.xfem.assembly import Bulk
 
 
 @dataclass(frozen=True, eq=False)
+class Slip:
+    """Slip of the faces of one crack, by place along it.
+
+    Attributes
+    ----------
+    points : (n, 2) array, length
+        Of the crack.
+    place : (q,) array
+        Rising: number of the face, plus share of its length.
+    slip : (q,) array, length
+    """
+
+    points: Floats
+    place: Floats
+    slip: Floats
+
+
+@dataclass(frozen=True, eq=False)
 class Reuse:
     """Work of an earlier solve in the same mesh; an empty one is ``Reuse()``.
 
@@ -32,6 +50,8 @@ class Reuse:
         Coarse levels of the iterative solver.
     levels : tuple of float
         Factors of a spectrum that the closed sets belong to, where levels were refined.
+    slip : tuple of Slip or None
+        Of the last load state, with friction: where a repeated cycle of the grown crack begins.
     """
 
     centre: tuple[Floats | None, ...] = ()
@@ -41,16 +61,17 @@ class Reuse:
     bulk: Bulk | None = None
     hierarchy: Hierarchy | None = None
     levels: tuple[float, ...] = ()
+    slip: tuple[Slip | None, ...] = ()
 
     def __reduce__(self) -> tuple[Any, ...]:
         # A factor holds addresses: in another process they mean nothing.
         return Reuse, (
-            self.centre, self.active, None, None, self.bulk, self.hierarchy, self.levels,
+            self.centre, self.active, None, None, self.bulk, self.hierarchy, self.levels, self.slip,
         )  # fmt: skip
 
     def without_matrices(self) -> "Reuse":
         """The part that fits into a file, and that decides the last bit of the next solve."""
-        return Reuse(self.centre, self.active, levels=self.levels)
+        return Reuse(self.centre, self.active, levels=self.levels, slip=self.slip)
 
     def without_factor(self) -> "Reuse":
         """The part that is small enough to be kept with each solution."""
