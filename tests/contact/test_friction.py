@@ -394,3 +394,17 @@ def test_no_bars_with_friction():
     sif = xc.stress_intensity(solution, error=True)
     assert np.isnan(sif.bar).all()
     assert "friction" in sif.reasons[0]
+
+
+def test_report_page_and_files_have_the_shear(tmp_path):
+    problem, states = rubbing.drawn(80, 10, 2)
+    solutions = xc.solve(problem, states)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", xc.XcrackWarning)
+        page = xc.report(solutions, tmp_path / "page.html").read_text(encoding="utf-8")
+    assert "Coulomb friction" in page
+    assert "dissipated since the state before" in page
+    xc.write(solutions[0], tmp_path / "rubbed")
+    text = (tmp_path / "rubbed_lips.vtp").read_bytes()
+    assert b"shear" in text
+    assert b"stuck" in text

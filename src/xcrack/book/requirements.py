@@ -27,7 +27,7 @@ REQUIREMENTS: Mapping[str, str] = MappingProxyType({
     "ratio": "Cycles where the stress ratio or closure matters",
     "restart": "A run that was stopped goes on to the same result",
     "spectrum": "Cycles under variable amplitude and overloads",
-    "friction": "Friction between crack faces",
+    "friction": "Faces that rub: stick, slip along a path of loads, energy of a cycle",
     "error_bars": "Error bars of K and of lives hold the truth",
     "residual_strength": "Residual strength: toughness and net section",
     "temperature": "Thermal stress",

@@ -18,6 +18,7 @@ from xcrack.optional import required
 from xcrack.paths import path_of, system_errors, written_whole
 from xcrack.post.lip_faces_3d import lip_faces
 from xcrack.post.pieces import Pieces, lips_of, pieces, von_mises
+from xcrack.sif.common import lip_shear
 from xcrack.sif.sif import SIF
 
 _UNSAVED = "the solution cannot be written to"
@@ -45,7 +46,8 @@ def write(
     The lips of all cracks share one file, a line each with cell data ``crack``. Its point data
     are those of ``solution.contact``: ``pressure``, ``gap``, ``closed`` (0 or 1; pressure 0 and
     never closed where a crack has no multipliers), ``s``, ``normal``, ``weight``, and ``opening``
-    (the whole jump), ``displacement_minus`` and ``displacement_plus``, to warp by. Points are
+    (the whole jump; with friction also ``shear``, the tangential traction on lip +, and ``stuck``),
+    ``displacement_minus`` and ``displacement_plus``, to warp by. Points are
     those of the undeformed body.
 
     In 3D the lips are triangles: ``pressure`` is taken to their vertices by the best linear
@@ -169,6 +171,14 @@ def _write_lips(solution: Solution, path: Path) -> None:
         "s": [each.s for each in lips],
         "weight": [each.weight for each in solution.lips],
     }
+    if any(solution.problem.frictions):
+        shears = [(lip_shear(solution, c), len(each.s)) for c, each in enumerate(lips)]
+        vectors["shear"] = [np.zeros((n, 2)) if t is None else t for t, n in shears]
+        stuck = [None if c is None else c.stuck for c in solution.contact]
+        scalars["stuck"] = [
+            np.zeros(len(each.s), np.int8) if own is None else own.astype(np.int8)
+            for own, each in zip(stuck, lips, strict=True)
+        ]
     d = solution.space.dim
     at_points = {name: np.concatenate(values) for name, values in scalars.items()}
     for name, parts in vectors.items():

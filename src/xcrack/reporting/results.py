@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from xcrack.analysis.solution import Solution
+from xcrack.contact.result import Contact
 from xcrack.markup import Markup, element, joined, table
 from xcrack.reporting.section import Section
 from xcrack.reporting.source import Source
@@ -72,9 +74,28 @@ def _along_front(sif: SIF, mine: Any, quality: Any) -> tuple[tuple[str, ...], tu
 _ROW = {2: _at_tip, 3: _along_front}
 
 
+_RUBBED = ("stuck share", "largest shear", "largest slip", "dissipated since the state before")
+
+
+def _rubbed(solution: Solution, contact: Contact | None) -> tuple[float, ...]:
+    """What friction adds to a row: nothing in a scene without."""
+    if not any(solution.problem.frictions):
+        return ()
+    if contact is None or contact.shear is None or contact.slip is None or contact.stuck is None:
+        return 0.0, 0.0, 0.0, solution.dissipated
+    total = float(contact.measure.sum())
+    return (
+        float(contact.measure[contact.stuck].sum()) / total if total else 0.0,
+        float(np.abs(contact.shear).max(initial=0.0)),
+        float(np.abs(contact.slip).max(initial=0.0)),
+        solution.dissipated,
+    )
+
+
 def contact(source: Source) -> Section | None:
     """Share of each crack that is closed, largest pressure and opening."""
     rows = []
+    rubs = any(any(solution.problem.frictions) for solution in source.solutions)
     for k, solution in enumerate(source.solutions):
         for c, lips in enumerate(solution.lips):
             gap, pressed = solution.opening(c), solution.contact[c]
@@ -86,11 +107,13 @@ def contact(source: Source) -> Section | None:
                 largest = float(pressed.pressure.max(initial=0.0))
             low = float(gap.min(initial=np.inf)) if len(lips) else 0.0
             rows.append((k, solution.state, c, pressed is not None, share, largest, force,
-                         float(gap.max(initial=0.0)), low))  # fmt: skip
+                         float(gap.max(initial=0.0)), low,
+                         *_rubbed(solution, pressed)))  # fmt: skip
     if not rows:
         return None
     head = ("state", "load", "crack", "multipliers", "closed share", "largest pressure",
-            "contact force", "largest opening", "smallest opening")  # fmt: skip
+            "contact force", "largest opening", "smallest opening",
+            *(_RUBBED if rubs else ()))  # fmt: skip
     shown = [(k, _load(state), *rest) for k, state, *rest in rows]
     numbers = [{name: _plain(v) for name, v in zip(head, row, strict=True)} for row in shown]
     return Section("contact", "Contact of the crack faces", table(head, shown), {"rows": numbers})

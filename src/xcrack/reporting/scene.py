@@ -121,7 +121,9 @@ def assumptions(source: Source) -> Section:
 
 
 def _notes(source: Source) -> list[str]:
-    notes = ["Small strains, a linear elastic isotropic body, crack faces without friction."]
+    rubs = any(any(solution.problem.frictions) for solution in source.solutions)
+    faces = "with Coulomb friction" if rubs else "without friction"
+    notes = [f"Small strains, a linear elastic isotropic body, crack faces {faces}."]
     notes.append(_plastic_zone(source))
     history = source.history
     memory = history.steps[0].memory if history is not None and history.steps else None
