@@ -115,7 +115,7 @@ GEOMETRY = {
     ),
     "two cracks cross": (
         lambda: problem(cracks=[[(-0.5, 0.01), (0.5, 0.02)], [(0.01, -0.5), (0.02, 0.5)]]),
-        "cracks 0 and 1 cross near .*not supported; end one of them",
+        "cracks 0 and 1 cross near .*give crack 1 as two cracks that both end there",
     ),
     "two cracks in a cell": (
         lambda: solve(box(12), [[(-1.1, 0.02), (0.3, 0.02)], [(-0.3, 0.06), (1.1, 0.06)]]),

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from xcrack.analysis.plan import LIPS, Ingredient, Report, plan
+from xcrack.arrays import at
 from xcrack.contact.multipliers import Multipliers
 from xcrack.contact.result import ContactSolution
 from xcrack.crack.crack import Crack
@@ -72,8 +73,13 @@ def report(
         Ingredient("standard functions", True, f"order {model.space.order}", unknowns=standard)
     )
     for c, (given, placed) in enumerate(zip(problem.cracks, problem.placed, strict=True)):
-        if not given.placed and not np.array_equal(given.points, placed.points):
-            rows.append(Ingredient(f"mouths of crack {c}", True, _mouths(given, placed)))
+        met = sum(own.crack == c for own in problem.junctions)
+        moved = not given.placed and not np.array_equal(given.points, placed.points)
+        if moved and (placed.dim == 3 or 2 - placed.n_tips - met):
+            rows.append(Ingredient(f"mouths of crack {c}", True, _mouths(given, placed, met)))
+    if problem.junctions:
+        where = [f"{own.crack} on {own.on} at {at(own.x)}" for own in problem.junctions]
+        rows.append(Ingredient("ends on other cracks", True, ", ".join(where)))
     if unbalanced is not None:
         why = f"{unbalanced:.2%} of its energy is out of balance: it relaxes without any crack"
         rows.append(Ingredient("initial stress", True, why))
@@ -92,13 +98,13 @@ def report(
     return Report(tuple(rows), operations)
 
 
-def _mouths(given: Crack, placed: Crack) -> str:
+def _mouths(given: Crack, placed: Crack, met: int) -> str:
     if placed.dim == 3:
         words = "sides refined to the size of the cells, prolonged to the outside where open"
         present = {tuple(x) for x in placed.points.tolist()}
         lost = sum(tuple(x) not in present for x in given.points.tolist())
         return words + (f"; {lost} corner(s) of fronts rounded to two cells" if lost else "")
-    return f"{2 - placed.n_tips}, prolonged to one cell outside"
+    return f"{2 - placed.n_tips - met}, prolonged to one cell outside"
 
 
 def _multiplier_row(problem: Problem, contact: ContactSolution, c: int) -> Ingredient:

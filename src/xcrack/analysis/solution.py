@@ -23,7 +23,7 @@ from xcrack.solvers.reuse import Reuse
 from xcrack.xfem.function_space import FunctionSpace
 from xcrack.xfem.lips import LipPoints, jump_values
 from xcrack.xfem.loads import position
-from xcrack.xfem.quadrature import cell_side
+from xcrack.xfem.sides import at_joints, cell_side
 
 
 @dataclass(frozen=True, eq=False)
@@ -307,4 +307,4 @@ def sides_of(space: FunctionSpace, cell: Ints, bary: Floats, lip: int) -> Ints:
         on_lip = np.abs(phi) <= 1e-9 * space.mesh.cell_size[cell]
         own = np.where(on_lip & (lip != 0), lip, np.where(phi >= 0, 1, -1))
         side[:, c] = np.where(split, own, side[:, c])
-    return side
+    return at_joints(space, cell, bary, side) if space.joints else side

@@ -18,7 +18,7 @@ from xcrack.scene.conditions import (
 from xcrack.scene.material import Isotropic
 from xcrack.xfem.function_space import FunctionSpace
 from xcrack.xfem.lips import LipPoints
-from xcrack.xfem.quadrature import cell_side
+from xcrack.xfem.sides import lip_side
 
 
 def stress_matrix(
@@ -38,8 +38,7 @@ def stress_matrix(
     rows, columns, values = [], [], []
     for s, sign in ((0, -1), (1, 1)):
         cell = lips.cell[:, s]
-        side = cell_side(space, cell)
-        side[:, c] = sign
+        side = lip_side(space, c, cell, lips.bary[:, s], sign)
         for batch, number, row in space.batches_of_points(cell):
             _, G = space.tabulate(batch, row, lips.bary[number, s], side[number])
             functions = batch.functions[row]

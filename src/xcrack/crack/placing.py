@@ -1,8 +1,10 @@
 """Cracks put into a mesh: what of them is tip or front, what is mouth, and whether they meet."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
+from xcrack.crack import junctions_2d
 from xcrack.crack.crack import Crack
+from xcrack.crack.junctions_2d import Junction
 from xcrack.crack.placing_2d import check_lines, place_line
 from xcrack.crack.placing_3d import ShortFront, check_surfaces, place_surface
 from xcrack.crack.placing_3d import short_fronts as surface_short_fronts
@@ -12,6 +14,14 @@ from xcrack.mesh.mesh import Mesh
 _PLACE: dict[int, Callable[[Crack, Mesh], Crack]] = {2: place_line, 3: place_surface}
 _CHECK: dict[int, Callable[[tuple[Crack, ...], Mesh], None]] = {2: check_lines, 3: check_surfaces}
 
+_ON_OTHERS: dict[int, Callable[..., tuple[Crack, ...]]] = {
+    2: junctions_2d.on_others,
+    3: lambda given, cracks, mesh: cracks,
+}
+_JUNCTIONS: dict[int, Callable[..., tuple[Junction, ...]]] = {
+    2: junctions_2d.junctions,
+    3: lambda cracks, mesh: (),
+}
 _SHORT: dict[int, Callable[[Crack, Mesh], list[ShortFront]]] = {
     2: lambda crack, mesh: [],
     3: surface_short_fronts,
@@ -74,4 +84,14 @@ def check_cracks(cracks: tuple[Crack, ...], mesh: Mesh) -> None:
     _CHECK[mesh.dim](cracks, mesh)
 
 
-__all__ = ["check_cracks", "placed", "short_fronts"]
+def on_others(given: Sequence[Crack], cracks: tuple[Crack, ...], mesh: Mesh) -> tuple[Crack, ...]:
+    """Placed cracks whose ends on other cracks are no tips; see `junctions_2d.on_others`."""
+    return _ON_OTHERS[mesh.dim](given, cracks, mesh)
+
+
+def junctions(cracks: tuple[Crack, ...], mesh: Mesh) -> tuple[Junction, ...]:
+    """Where placed cracks end on others; see `junctions_2d.junctions`."""
+    return _JUNCTIONS[mesh.dim](cracks, mesh)
+
+
+__all__ = ["check_cracks", "junctions", "on_others", "placed", "short_fronts"]

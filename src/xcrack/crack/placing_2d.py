@@ -5,6 +5,7 @@ from scipy.spatial import cKDTree
 
 from xcrack.arrays import Floats, at
 from xcrack.crack.crack import Crack
+from xcrack.crack.junctions_2d import Junction, junctions
 from xcrack.crack.lines import crossing_points, touching_points
 from xcrack.crack.tips_2d import tip_frames
 from xcrack.errors import GeometryError, warn
@@ -17,6 +18,7 @@ _MEANT = 0.1  # share of a cell inside the boundary up to which nobody means a t
 _WAY = 3.0  # cells to the boundary, along the crack, from an end that is close to it
 _ROUND = 1.1  # a way outside the body that is this much longer than its chord goes out and back
 _OWN = 2.0  # cells along a crack within which it is close to its own tip
+_TOWARDS = 0.17  # cosine of the widest angle at which a tip points to another crack
 _TOUCH = 1e-6  # share of a cell within which cracks touch
 
 
@@ -161,6 +163,8 @@ def _prolonged(mesh: Mesh, end: Floats, out: Floats, size: float) -> tuple[float
 def check_lines(cracks: tuple[Crack, ...], mesh: Mesh) -> None:
     """Raise where cracks cross or touch, or a tip is closer than a cell to what it must not meet.
 
+    An end of a crack on another one is neither.
+
     Parameters
     ----------
     cracks : tuple of Crack
@@ -173,20 +177,59 @@ def check_lines(cracks: tuple[Crack, ...], mesh: Mesh) -> None:
         Two cracks cross or lie on each other, two tips are closer than a cell, or a tip is closer
         than half a cell to another part of its own crack.
     """
+    meeting = junctions(cracks, mesh)
     for i, crack in enumerate(cracks):
         for j in range(i):
             crossing = crossing_points(cracks[j].points, crack.points)
-            crossing = crossing[contains(mesh, crossing)] if len(crossing) else crossing
+            crossing = _elsewhere(crossing, i, j, meeting, mesh)
             if len(crossing):
+                x = ", ".join(f"{v:.6g}" for v in crossing[0])
                 raise GeometryError(
-                    f"cracks {j} and {i} cross near {at(crossing[0])}: crossing and "
-                    "branching cracks are not supported; end one of them a few cells before."
+                    f"cracks {j} and {i} cross near {at(crossing[0])}: give crack {i} as two "
+                    f"cracks that both end there on crack {j}, line_crack([..., ({x})]) and "
+                    f"line_crack([({x}), ...]); or end it a few cells before."
                 )
     _check_tips(cracks, mesh)
     for i, crack in enumerate(cracks):
         _check_own(i, crack, mesh)
         for j in range(i):
-            _check_touch((j, cracks[j]), (i, crack), mesh)
+            _check_touch((j, cracks[j]), (i, crack), meeting, mesh)
+    for i in range(len(cracks)):
+        _check_flanks(i, cracks, mesh)
+
+
+def _elsewhere(x: Floats, i: int, j: int, meeting: tuple[Junction, ...], mesh: Mesh) -> Floats:
+    """Those of the points in the body at which cracks i and j meet that are no junctions."""
+    if not len(x):
+        return x
+    x = x[contains(mesh, x)]
+    for own in meeting:
+        if i in (own.crack, own.on) or j in (own.crack, own.on):
+            x = x[np.linalg.norm(x - own.x, axis=1) > _MEANT * cell_sizes(mesh, own.x[None])[0]]
+    return x
+
+
+def _check_flanks(number: int, cracks: tuple[Crack, ...], mesh: Mesh) -> None:
+    """Raise where a tip that points to another crack ends less than half a cell before it."""
+    if len(cracks) < 2:
+        return
+    x, frame = tip_frames(cracks[number])
+    for end, size, ahead in zip(x, cell_sizes(mesh, x), frame[:, 0]):
+        for other, crack in enumerate(cracks):
+            if other == number:
+                continue
+            foot = closest_on_segment(end, crack.points[:-1], crack.points[1:])
+            distance = np.linalg.norm(foot - end, axis=1)
+            near = int(np.argmin(distance))
+            if (foot[near] - end) @ ahead < _TOWARDS * distance[near]:
+                continue
+            if distance[near] < _MOUTH * size and contains(mesh, foot[[near]])[0]:
+                raise GeometryError(
+                    f"a tip of crack {number} at {at(end)} is {distance[near]:.4g} from crack "
+                    f"{other}, less than half a cell ({size:.4g}), but does not end on it: to let "
+                    f"it end there give a point of crack {other}, such as {at(foot[near])}, as "
+                    "its end; else leave a few cells between, or refine the mesh there."
+                )
 
 
 def _check_tips(cracks: tuple[Crack, ...], mesh: Mesh) -> None:
@@ -240,7 +283,12 @@ def _check_own(number: int, crack: Crack, mesh: Mesh) -> None:
             )
 
 
-def _check_touch(one: tuple[int, Crack], other: tuple[int, Crack], mesh: Mesh) -> None:
+def _check_touch(
+    one: tuple[int, Crack],
+    other: tuple[int, Crack],
+    meeting: tuple[Junction, ...],
+    mesh: Mesh,
+) -> None:
     """Raise where two cracks lie on each other in the body: they cross nowhere."""
     (i, a), (j, b) = one, other
     reach = _TOUCH * float(mesh.cell_size.max())
@@ -249,7 +297,7 @@ def _check_touch(one: tuple[int, Crack], other: tuple[int, Crack], mesh: Mesh) -
     if (low > high).any():
         return
     touching = touching_points(a.points, b.points, reach)
-    touching = touching[contains(mesh, touching)] if len(touching) else touching
+    touching = _elsewhere(touching, i, j, meeting, mesh)
     if len(touching):
         raise GeometryError(
             f"cracks {i} and {j} touch or lie on each other near {at(touching[0])}: describe them "

@@ -14,7 +14,8 @@ from xcrack.arrays import Floats, Ints
 from xcrack.estimation.estimate import Estimate, pressure_on
 from xcrack.mesh.mesh import Mesh
 from xcrack.xfem.loads import facet_points, position
-from xcrack.xfem.quadrature import Points, cell_side
+from xcrack.xfem.quadrature import Points
+from xcrack.xfem.sides import lip_side
 
 _ROUND = 0.9  # rad; facets that turn by more meet at a corner
 _ALIKE = 3.0  # ratio of the turns at both ends of a facet of a curve
@@ -61,8 +62,7 @@ def crack_shape(
     shifted, tilted = np.zeros((2, len(moved), *nothing.shape))
     for s, sign in ((0, -1.0), (1, 1.0)):
         cell = lips.cell[moved, s]
-        side = cell_side(space, cell)
-        side[:, c] = int(sign)
+        side = lip_side(space, c, cell, lips.bary[moved, s], int(sign))
         u, gradient = fields_at(space, _columns(solutions, z), cell, lips.bary[moved, s], side)
         for k, solution in enumerate(solutions):
             own, first = gradient[..., k], len(solutions) + k * z.shape[2]

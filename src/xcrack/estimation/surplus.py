@@ -17,7 +17,8 @@ from xcrack.estimation.goal import Goal
 from xcrack.mesh.mesh import local_edges
 from xcrack.scene.material import Isotropic
 from xcrack.xfem.function_space import FunctionSpace
-from xcrack.xfem.quadrature import cell_points, cell_side
+from xcrack.xfem.quadrature import cell_points
+from xcrack.xfem.sides import cell_side
 
 _POINTS, _DEGREE = 3, 4  # where tip functions act; of the products of a cubic and a quadratic
 
@@ -74,6 +75,8 @@ def surplus(space: FunctionSpace, fixed: Bools) -> Surplus:
         mine = np.unique(np.concatenate([functions[cut.cells].ravel(), _along(space, c)]))
         jumps[mine], crack[mine] = True, c
         whole[functions[cut.is_tip]] = False
+    for joint in space.joints:
+        whole[functions[joint.both]] = False
     jumps &= whole
     copy = np.full(n, -1, dtype=np.int64)
     copy[jumps] = n + np.arange(int(jumps.sum()))

@@ -18,7 +18,6 @@ from xcrack.analysis.plan import Ingredient, Report
 from xcrack.analysis.solution import Solution
 from xcrack.arrays import Floats, lock
 from xcrack.contact.result import Contact
-from xcrack.cutting.cut import cut
 from xcrack.errors import ProblemError
 from xcrack.history import run_folder, store
 from xcrack.history.history import History
@@ -31,9 +30,7 @@ from xcrack.scene.problem import Problem
 from xcrack.scene.set_loads import Bearing, Resultant
 from xcrack.scene.temperature import Temperature
 from xcrack.solvers.reuse import Reuse
-from xcrack.xfem.function_space import function_space
-from xcrack.xfem.lips import lip_points
-from xcrack.xfem.model import levels
+from xcrack.xfem.model import discretised
 
 _FORMAT = 1
 _SUFFIX = ".npz"
@@ -206,10 +203,7 @@ def _state(solution: Solution) -> dict[str, Any]:
 def _solutions(content: dict[str, Any]) -> list[Solution]:
     """Solutions on a space that is made anew: the same numbering for the same problem."""
     problem: Problem = content["problem"]
-    mesh, numerics = problem.mesh, problem.numerics
-    cuts = tuple(cut(mesh, levels(mesh, crack, numerics)) for crack in problem.placed)
-    space = function_space(mesh, problem.order or 1, problem.placed, cuts, numerics)
-    lips = tuple(lip_points(space, c) for c in range(len(cuts)))
+    space, lips = discretised(problem)
     reuse: Reuse = content["reuse"]
     solutions = []
     for state in content["states"]:

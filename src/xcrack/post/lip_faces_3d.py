@@ -8,7 +8,7 @@ from scipy.spatial import cKDTree
 from xcrack.analysis.solution import Solution
 from xcrack.arrays import Bools, Floats, Ints, lock
 from xcrack.geometry.triangulation import rim
-from xcrack.post.pieces import lip_side
+from xcrack.xfem.sides import lip_side
 
 _SAME = 1e-9  # share of a cell within which vertices are one, or lie on a front
 
@@ -98,7 +98,7 @@ def lip_faces(solution: Solution, crack: int) -> LipFaces:
     for k in (0, 1):
         cell, bary = cut.lip_cell[owner, k], cut.lip_bary[owner, k, vertex]
         with np.errstate(divide="ignore", invalid="ignore"):  # gradients at a front, not looked at
-            side = lip_side(space, crack, cut.lip_cell[owner], k)
+            side = lip_side(space, crack, cell, bary, 2 * k - 1)
             moved.append(solution.at(cell, bary, side)[0])
 
     weight = np.maximum(np.bincount(lips.segment, lips.weight, len(area)), 1e-300)

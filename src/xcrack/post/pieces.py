@@ -19,7 +19,7 @@ from xcrack.mesh.simplex import n_shapes
 from xcrack.post.piece_cells import piece_cells
 from xcrack.xfem.function_space import FunctionSpace
 from xcrack.xfem.loads import position
-from xcrack.xfem.quadrature import cell_side
+from xcrack.xfem.sides import cell_side, lip_side
 
 _SAME = 1e-9  # share of a cell within which points are one, or lie on a lip
 
@@ -309,8 +309,8 @@ def lips_of(solution: Solution, crack: int) -> Lips:
     """Fields on the faces of a crack."""
     lips, contact = solution.lips[crack], solution.contact[crack]
     moved = [
-        solution.at(lips.cell[:, k], lips.bary[:, k], lip_side(solution.space, crack, lips.cell, k))
-        for k in (0, 1)
+        solution.at(cell, bary, lip_side(solution.space, crack, cell, bary, sign))
+        for cell, bary, sign in zip(lips.cell.T, lips.bary.transpose(1, 0, 2), (-1, 1))
     ]
     ends = solution.space.cuts[crack].lip_points(solution.space.mesh)[lips.segment]
     gaps = np.linalg.norm(ends[1:, :, None] - ends[:-1, None], axis=3).min(axis=(1, 2))
@@ -330,10 +330,3 @@ def lips_of(solution: Solution, crack: int) -> Lips:
         moved[1][0],
         tuple(run for run in runs if len(run)),
     )
-
-
-def lip_side(space: FunctionSpace, crack: int, lip_cell: Ints, k: int) -> Ints:
-    """Side of each crack `(q, cracks)` for points on lip - (k = 0) or lip + (k = 1)."""
-    side = cell_side(space, lip_cell[:, k]).copy()
-    side[:, crack] = 2 * k - 1
-    return side

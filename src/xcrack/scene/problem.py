@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from xcrack.crack.crack import Crack
-from xcrack.crack.placing import check_cracks, placed
+from xcrack.crack.junctions_2d import Junction
+from xcrack.crack.placing import check_cracks, junctions, on_others, placed
 from xcrack.errors import ProblemError
 from xcrack.inputs import entries, number, shown, whole
 from xcrack.markup import Markup, element, joined, table
@@ -107,7 +108,13 @@ class Problem:
     @cached_property
     def placed(self) -> tuple[Crack, ...]:
         """The cracks with tips and mouths decided in this mesh."""
-        return tuple(placed(crack, self.mesh) for crack in self.cracks)
+        cracks = tuple(placed(crack, self.mesh) for crack in self.cracks)
+        return on_others(self.cracks, cracks, self.mesh)
+
+    @cached_property
+    def junctions(self) -> tuple[Junction, ...]:
+        """In 2D: where cracks end on others."""
+        return junctions(self.placed, self.mesh)
 
     @property
     def frictions(self) -> tuple[float, ...]:

@@ -34,7 +34,8 @@ from xcrack.sif.sif import SIF
 from xcrack.sif.smoothing_3d import along, smoothed
 from xcrack.threads import streamed
 from xcrack.xfem.loads import position
-from xcrack.xfem.quadrature import cell_points, cell_side
+from xcrack.xfem.quadrature import cell_points
+from xcrack.xfem.sides import cell_side
 
 SECOND = 0.7  # outer radius of the second domain, as a share of the first
 _OUTER = 2.6  # least outer radius, in legs of the cells at the front

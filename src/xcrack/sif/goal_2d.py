@@ -18,7 +18,7 @@ from xcrack.sif.common import acts, weight
 from xcrack.sif.domain_2d import class_points, domain_of, ring_classes
 from xcrack.sif.interaction_2d import ahead_derivative, inner_radii, ring_around, volume_terms
 from xcrack.xfem.loads import position
-from xcrack.xfem.quadrature import cell_side
+from xcrack.xfem.sides import lip_side
 from xcrack.xfem.williams import continued_polar, mode_matrix, unit_gradients
 
 _STRAIGHT = 1e-9  # share of the radius below which a face is on the line through the tip
@@ -115,8 +115,7 @@ def _faces(
     parts = []
     for s, sign in ((0, -1), (1, 1)):
         cell, bary = lips.cell[near, s], lips.bary[near, s]
-        side = cell_side(space, cell)
-        side[:, tip.crack] = sign
+        side = lip_side(space, tip.crack, cell, bary, sign)
         r, theta = continued_polar(xi, side[:, tip.crack], np.ones(len(xi), dtype=bool))
         outward = -sign * lips.normal[near] @ R.T
         q, _ = weight(r, xi, np.array([inner]), np.array([outer]))

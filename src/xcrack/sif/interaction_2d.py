@@ -25,7 +25,8 @@ from xcrack.scene.conditions import BodyForce, InitialStress, evaluate, evaluate
 from xcrack.scene.material import Isotropic
 from xcrack.sif.common import acts, lip_pressure, lip_shear, mean_rotation, weight
 from xcrack.xfem.loads import position
-from xcrack.xfem.quadrature import Points, cell_side
+from xcrack.xfem.quadrature import Points
+from xcrack.xfem.sides import lip_side
 from xcrack.xfem.williams import continued_polar, mode_matrix, unit_gradients
 
 # Inner radius of the ring in which q falls, as a share of the outer one. At order 1 the ring stays
@@ -227,8 +228,7 @@ def lip_terms(solutions: Sequence[Solution], ring: Ring) -> Floats:
     w = lips.weight[near]
     for s, sign in ((0, -1), (1, 1)):
         cell, bary = lips.cell[near, s], lips.bary[near, s]
-        side = cell_side(space, cell)
-        side[:, tip.crack] = sign
+        side = lip_side(space, tip.crack, cell, bary, sign)
         r, theta = continued_polar(xi, side[:, tip.crack], behind)
         outward = -sign * lips.normal[near] @ R.T
         q, _ = weight(r, xi, ring.inner, radii)

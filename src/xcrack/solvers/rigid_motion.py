@@ -10,9 +10,12 @@ from scipy.sparse.csgraph import connected_components
 
 from xcrack.arrays import Bools, Floats, Ints
 from xcrack.errors import ProblemError
+from xcrack.mesh.locate import barycentric
 from xcrack.xfem.assembly import rigid_modes
 from xcrack.xfem.facets import split_facets
 from xcrack.xfem.function_space import FunctionSpace
+from xcrack.xfem.quadrature import sub_cells
+from xcrack.xfem.sides import at_joints, n_parts, part_numbers
 
 _IMBALANCE = 1e-3  # share of the sum of all forces above which loads count as out of balance
 
@@ -40,7 +43,7 @@ class Motion:
 
 def free_motion(space: FunctionSpace, fixed: Bools) -> Motion:
     """Rigid motions left by the supports, and far standard unknowns to pin."""
-    if any(cut.n_tips == 0 for cut in space.cuts):
+    if space.joints or any(cut.n_tips == 0 for cut in space.cuts):
         _check_pieces(space, fixed)
     n = space.n_nodes * space.dim
     R = np.linalg.qr(rigid_modes(space.node_points))[0]
@@ -143,50 +146,49 @@ def _check_pieces(space: FunctionSpace, fixed: Bools) -> None:
 
 def pieces(space: FunctionSpace) -> tuple[Ints, int, Floats]:
     """Connected pieces of the cut body: piece of each node, their number, shares of volume."""
-    mesh = space.mesh
-    m = len(mesh.cells)
-    inner = np.nonzero(mesh.facet_to_cell[:, 1] >= 0)[0]
-    ends = mesh.facets[inner]
-    parts = split_facets(space, ends)
-    part, sides = parts.number, parts.side
-    cells = mesh.facet_to_cell[inner][part]
-    on_lip = np.zeros(len(mesh.facets), dtype=bool)
-    is_cut = np.full(m, -1, dtype=np.int64)
-    for c, cut in enumerate(space.cuts):
-        is_cut[cut.cells] = c
-        own = cut.lip_cell[:, 0] != cut.lip_cell[:, 1]
-        for a, b in cut.lip_cell[own]:
-            both = np.intersect1d(mesh.cell_to_facet[a], mesh.cell_to_facet[b])
-            on_lip[both] = True
-    joined = ~on_lip[inner][part]
-    cells, sides = cells[joined], sides[joined]
-    crack = is_cut[cells]
-    own_side = np.take_along_axis(sides, np.maximum(crack, 0), axis=1) > 0
-    vertex = 2 * cells + ((crack >= 0) & own_side)
-    graph = sp.csr_matrix(
-        (np.ones(len(vertex)), (vertex[:, 0], vertex[:, 1])), shape=(2 * m, 2 * m)
-    )
+    mesh, parts = space.mesh, n_parts(space)
+    subs = sub_cells(space, np.arange(len(mesh.cells)))
+    of_sub = parts * subs.cell + part_numbers(space, subs.cell, subs.side)
+    one, other = _neighbours(space)
+    n = parts * len(mesh.cells)
+    graph = sp.csr_matrix((np.ones(len(one)), (one, other)), shape=(n, n))
     label = connected_components(graph, directed=False)[1]
-    used = np.zeros(2 * m, dtype=bool)
-    used[0::2] = True
-    used[1::2] = is_cut >= 0
-    names, number = np.unique(label[used], return_inverse=True)
-    piece = np.full(2 * m, -1, dtype=np.int64)
-    piece[used] = number
-    share = np.zeros(len(names))
-    np.add.at(share, piece[0::2][is_cut < 0], mesh.volume[is_cut < 0])
-    for cut in space.cuts:
-        mine = cut.is_cut[cut.sub_to_cell]
-        vertex_of = 2 * cut.sub_to_cell[mine] + (cut.sub_side[mine] > 0)
-        np.add.at(
-            share, piece[vertex_of], cut.sub_fraction[mine] * mesh.volume[cut.sub_to_cell[mine]]
-        )
-    of_node = np.zeros(space.n_nodes, dtype=np.int64)
+    names, number = np.unique(label[of_sub], return_inverse=True)
+    piece = np.zeros(n, dtype=np.int64)
+    piece[of_sub] = number
+    share = np.bincount(number, subs.fraction * mesh.volume[subs.cell], len(names))
     nodes = space.cell_nodes
-    plain = is_cut < 0
-    for c in range(len(space.cuts)):
-        rows = np.nonzero(is_cut == c)[0]
-        own = space.node_side[c][nodes[rows]] > 0
-        of_node[nodes[rows]] = piece[2 * rows[:, None] + own]
-    of_node[nodes[plain]] = piece[2 * np.nonzero(plain)[0]][:, None]
+    flat, cell = nodes.ravel(), np.repeat(np.arange(len(nodes)), nodes.shape[1])
+    sides = np.stack(space.node_side, axis=1)[flat]
+    of_node = np.zeros(space.n_nodes, dtype=np.int64)
+    of_node[flat] = piece[parts * cell + part_numbers(space, cell, sides)]
     return of_node, len(names), share / share.sum()
+
+
+def _neighbours(space: FunctionSpace) -> tuple[Ints, Ints]:
+    """Parts of cells that share a part of a facet on which no crack lies, by their numbers."""
+    mesh = space.mesh
+    inner = np.nonzero(mesh.facet_to_cell[:, 1] >= 0)[0]
+    parts = split_facets(space, mesh.facets[inner])
+    facet = inner[parts.number]
+    apart = np.zeros(len(facet), dtype=bool)
+    for c, cut in enumerate(space.cuts):
+        own = cut.lip_cell[:, 0] != cut.lip_cell[:, 1]
+        on_lip = np.zeros(len(mesh.facets), dtype=bool)
+        for a, b in cut.lip_cell[own]:
+            on_lip[np.intersect1d(mesh.cell_to_facet[a], mesh.cell_to_facet[b])] = True
+        mine = on_lip[facet]
+        for joint in space.joints:
+            if joint.crack == c:
+                mine &= parts.side[:, joint.on] != -joint.side
+        apart |= mine
+    facet, sides = facet[~apart], parts.side[~apart]
+    corners = mesh.points[mesh.facets[facet]]
+    x = np.einsum("svb,sbd->sd", parts.bary[~apart], corners) / mesh.dim
+    vertex = []
+    for cell in mesh.facet_to_cell[facet].T:
+        own_sides = sides
+        if space.joints:
+            own_sides = at_joints(space, cell, barycentric(mesh, cell, x), sides.copy())
+        vertex.append(n_parts(space) * cell + part_numbers(space, cell, own_sides))
+    return vertex[0], vertex[1]

@@ -12,11 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from xcrack.arrays import Floats, Ints, ranges
-from xcrack.cutting.cut import Cut
 from xcrack.xfem.facets import part_points, split_facets
 from xcrack.xfem.function_space import Batch, FunctionSpace
 from xcrack.xfem.lips import LipPoints
-from xcrack.xfem.quadrature import cell_side
+from xcrack.xfem.sides import at_joints, cell_side, lip_side, n_parts, part_numbers
 
 # Dimension and order at which the moments 1 and x are used: in 3D at order 1 only 1, since its
 # pressures cannot be linear to round-off anyway.
@@ -34,15 +33,12 @@ class BoundaryPoints:
     normal : (q, d) array, length^(d - 1)
         Outward normal of the piece times the weight.
     side : (q, cracks) array of int
-    piece_side : (q,) array of int
-        0 for a piece that is a whole cell, else the side of the cut.
     """
 
     cell: Ints
     bary: Floats
     normal: Floats
     side: Ints
-    piece_side: Ints
 
 
 def boundary_points(
@@ -52,14 +48,14 @@ def boundary_points(
     parts = [_facet_points(space, cells)]
     wanted = np.zeros(len(space.mesh.cells), dtype=bool)
     wanted[cells] = True
-    for c, (cut, points) in enumerate(zip(space.cuts, lips, strict=True)):
-        parts.extend(_lip_parts(space, c, cut, points, wanted))
-    cell, bary, normal, side, piece = (np.concatenate(p) for p in zip(*parts, strict=True))
+    for c, points in enumerate(lips):
+        parts.extend(_lip_parts(space, c, points, wanted))
+    cell, bary, normal, side = (np.concatenate(p) for p in zip(*parts, strict=True))
     order = np.argsort(cell, kind="stable")
-    return BoundaryPoints(cell[order], bary[order], normal[order], side[order], piece[order])
+    return BoundaryPoints(cell[order], bary[order], normal[order], side[order])
 
 
-_Part = tuple[Ints, Floats, Floats, Ints, Ints]
+_Part = tuple[Ints, Floats, Floats, Ints]
 
 
 def _facet_points(space: FunctionSpace, cells: Ints) -> _Part:
@@ -89,29 +85,23 @@ def _facet_points(space: FunctionSpace, cells: Ints) -> _Part:
     normal = outward[owner] * weight[point, None]
     cell = cells[owner // corners]
     side = cell_side(space, cell)
-    piece_side = np.zeros(len(owner), dtype=np.int64)
     for c, cut in enumerate(space.cuts):
         crossed = cut.is_cut[cell] | (cut.is_tip[cell] & (side[:, c] == 0))
         own = parts.side[piece[point], c]
         side[crossed, c] = own[crossed]
-        piece_side = np.where(cut.is_cut[cell], own, piece_side)
-    return cell, bary, normal, side, piece_side
+    return cell, bary, normal, at_joints(space, cell, bary, side)
 
 
-def _lip_parts(
-    space: FunctionSpace, c: int, cut: Cut, lips: LipPoints, wanted: np.ndarray
-) -> list[_Part]:
+def _lip_parts(space: FunctionSpace, c: int, lips: LipPoints, wanted: np.ndarray) -> list[_Part]:
     parts = []
     same = lips.cell[:, 0] == lips.cell[:, 1]
     for s, sign in ((0, -1), (1, 1)):
         cell = lips.cell[:, s]
         mine = same & wanted[cell]
-        side = cell_side(space, cell[mine])
-        side[:, c] = sign
+        side = lip_side(space, c, cell[mine], lips.bary[mine, s], sign)
         # The normal points from lip - to lip +: outward for the minus side, inward for the plus.
         normal = -sign * lips.normal[mine] * lips.weight[mine, None]
-        piece = np.where(cut.is_cut[cell[mine]], sign, 0)
-        parts.append((cell[mine], lips.bary[mine, s], normal, side, piece))
+        parts.append((cell[mine], lips.bary[mine, s], normal, side))
     return parts
 
 
@@ -142,16 +132,18 @@ def corrected(
     size = mesh.cell_size[batch.cells]
     corners = (corners - corners.mean(axis=1, keepdims=True)) / size[:, None, None]
     linear = (d, space.order) in _LINEAR
-    piece, n_pieces = _pieces(space, batch, row, side)
+    parts = n_parts(space)
+    piece = parts * row + part_numbers(space, batch.cells[row], side)
 
     chosen, brow = _of_batch(batch, boundary.cell)
     bary_, bside = boundary.bary[chosen], boundary.side[chosen]
     bvalues = space.tip_values(batch, brow, bary_, bside)
-    bpiece = 2 * brow + (boundary.piece_side[chosen] > 0)
+    bpiece = parts * brow + part_numbers(space, batch.cells[brow], bside)
 
     moments = moments_at(row, bary, corners, linear)
     bmoments = moments_at(brow, bary_, corners, linear)
     count = moments.shape[1]
+    n_pieces = parts * len(batch.cells)
     defect, gram = np.zeros((n_pieces, n_tip, d, count)), np.zeros((n_pieces, count, count))
     add_flux(defect, bpiece, bvalues, boundary.normal[chosen], bmoments)
     take_volume(
@@ -162,13 +154,6 @@ def corrected(
     coefficient = (defect.reshape(n_pieces, -1, count) @ inverse).reshape(defect.shape)
     add_correction(gradients, first, piece, row, coefficient, moments, batch.functions)
     return gradients
-
-
-def _pieces(space: FunctionSpace, batch: Batch, row: Ints, side: Ints) -> tuple[Ints, int]:
-    plus = np.zeros(len(row), dtype=bool)
-    for c, cut in enumerate(space.cuts):
-        plus |= cut.is_cut[batch.cells][row] & (side[:, c] > 0)
-    return 2 * row + plus, 2 * len(batch.cells)
 
 
 def _of_batch(batch: Batch, cell: Ints) -> tuple[Ints, Ints]:

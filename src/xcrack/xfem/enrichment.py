@@ -16,11 +16,29 @@ from xcrack.xfem.enrichment_3d import front_radii
 # at order 1 pressures of closed cracks gained nothing.
 _WHOLE = {(2, 2): 1.5}
 
-_RADII = {2: disc_radii, 3: front_radii}
+
+def _around_fronts(
+    mesh: Mesh,
+    cracks: tuple[Crack, ...],
+    cuts: tuple[Cut, ...],
+    order: int,
+    wanted: float | None,
+    meeting: Floats,
+) -> list[tuple[float, ...]]:
+    """Fronts meet no junctions."""
+    return front_radii(mesh, cracks, cuts, order, wanted)
+
+
+_RADII = {2: disc_radii, 3: _around_fronts}
 
 
 def tip_radii(
-    mesh: Mesh, cracks: tuple[Crack, ...], cuts: tuple[Cut, ...], order: int, wanted: float | None
+    mesh: Mesh,
+    cracks: tuple[Crack, ...],
+    cuts: tuple[Cut, ...],
+    order: int,
+    wanted: float | None,
+    meeting: Floats,
 ) -> list[tuple[float, ...]]:
     """Radius of the enriched disc around each tip, in 3D of the tube around each front, by crack.
 
@@ -34,8 +52,10 @@ def tip_radii(
     wanted : float, length, optional
         Shrunk only where the body or another tip demands; see `disc_radii` and `front_radii` for
         what is taken without it.
+    meeting : (k, d) array, length
+        Where cracks end on others.
     """
-    return _RADII[mesh.dim](mesh, cracks, cuts, order, wanted)
+    return _RADII[mesh.dim](mesh, cracks, cuts, order, wanted, meeting)
 
 
 def heaviside_nodes(mesh: Mesh, order: int, cut: Cut) -> Bools:

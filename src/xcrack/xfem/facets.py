@@ -95,15 +95,25 @@ def _split_segments(space: FunctionSpace, ends: Ints) -> FacetParts:
     edge = _edge_numbers(space, ends)
     k = len(ends)
     position = np.full(k, np.nan)
+    second = np.full(k, np.nan)  # next to a junction two cracks may cross one segment
     for cut in space.cuts:
         t = cut.cut_edge[edge]
         # cut_edge counts from the smaller point number.
         t = np.where(ends[:, 0] < ends[:, 1], t, 1 - t)
+        again = ~np.isnan(position) & ~np.isnan(t)
+        second[again] = np.maximum(position, t)[again]
+        position[again] = np.minimum(position, t)[again]
         position = np.where(np.isnan(position), t, position)
-    split = ~np.isnan(position)
-    number = np.concatenate([np.arange(k), np.nonzero(split)[0]])
-    begin = np.concatenate([np.zeros(k), position[split]])
-    end = np.concatenate([np.where(split, position, 1.0), np.ones(int(split.sum()))])
+    split, twice = ~np.isnan(position), ~np.isnan(second)
+    number = np.concatenate([np.arange(k), np.nonzero(split)[0], np.nonzero(twice)[0]])
+    begin = np.concatenate([np.zeros(k), position[split], second[twice]])
+    end = np.concatenate(
+        [
+            np.where(split, position, 1.0),
+            np.where(twice, second, 1.0)[split],
+            np.ones(int(twice.sum())),
+        ]
+    )
     bary = np.stack([np.stack([1 - p, p], axis=1) for p in (begin, end)], axis=1)
     side = np.zeros((len(number), len(space.cuts)), dtype=np.int64)
     for c, cut in enumerate(space.cuts):

@@ -15,12 +15,15 @@ from xcrack.arrays import Bools, Floats, Ints, lock
 from xcrack.crack.crack import Crack
 from xcrack.crack.ends import end_frames
 from xcrack.cutting.cut import Cut
+from xcrack.cutting.joints_2d import Joint
 from xcrack.errors import GeometryError
 from xcrack.mesh.mesh import Mesh, local_edges
 from xcrack.mesh.simplex import cell_nodes, node_points
 from xcrack.scene.numerics import Numerics
 from xcrack.xfem.enrichment import heaviside_nodes, node_level, tip_points, tip_radii
 from xcrack.xfem.williams import polar, tip_values
+
+_BESIDE = 1.5  # of the reach of a junction: nodes of cells within it lie within that
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,6 +88,8 @@ class FunctionSpace:
         Heaviside function of each node for each crack, or -1.
     tips : tuple of Tip
     n_nodes, n_functions : int
+    joints : tuple of Joint
+        In 2D: where cracks end on others.
     """
 
     mesh: Mesh
@@ -95,6 +100,7 @@ class FunctionSpace:
     tips: tuple[Tip, ...]
     n_nodes: int
     n_functions: int
+    joints: tuple[Joint, ...] = ()
 
     @property
     def dim(self) -> int:
@@ -123,9 +129,17 @@ class FunctionSpace:
 
     @cached_property
     def node_side(self) -> tuple[Ints, ...]:
-        """Side +1 or -1 of each node for each crack; a node on a lip counts as +."""
+        """Side +1 or -1 of each node for each crack; a node on a lip counts as +.
+
+        0 beyond a crack on which the crack ends.
+        """
         levels = [node_level(self.mesh, self.order, cut.level_set.phi) for cut in self.cuts]
-        return tuple(lock(np.where(phi >= 0, 1, -1).astype(np.int64)) for phi in levels)
+        sides = [np.where(phi >= 0, 1, -1).astype(np.int64) for phi in levels]
+        for joint in self.joints:
+            away = np.linalg.norm(self.node_points - joint.centre, axis=1)
+            beyond = (away < _BESIDE * joint.reach) & (sides[joint.on] != joint.side)
+            sides[joint.crack][beyond] = 0
+        return tuple(lock(side) for side in sides)
 
     @cached_property
     def signature(self) -> Ints:
@@ -135,6 +149,9 @@ class FunctionSpace:
             carries = self.heaviside[c][self.cell_nodes] >= 0
             differs = self.node_side[c][self.cell_nodes] == -cut.side[:, None]
             acts = (carries & (differs | cut.is_cut[:, None])).any(axis=1)
+            for joint in self.joints:
+                if joint.crack == c:
+                    acts |= joint.near & carries.any(axis=1)
             mask |= acts.astype(np.int64) << c
         for t, tip in enumerate(self.tips):
             acts = (tip.point_to_function[self.mesh.cells] >= 0).any(axis=1)
@@ -274,7 +291,12 @@ class FunctionSpace:
 
 
 def function_space(
-    mesh: Mesh, order: int, cracks: tuple[Crack, ...], cuts: tuple[Cut, ...], numerics: Numerics
+    mesh: Mesh,
+    order: int,
+    cracks: tuple[Crack, ...],
+    cuts: tuple[Cut, ...],
+    numerics: Numerics,
+    joints: tuple[Joint, ...] = (),
 ) -> FunctionSpace:
     """Number the functions: standard ones first, then Heaviside by crack, then tips."""
     for c, (crack, cut) in enumerate(zip(cracks, cuts, strict=True)):
@@ -294,7 +316,8 @@ def function_space(
         number[flag] = count + np.arange(int(flag.sum()))
         heaviside.append(lock(number))
         count += int(flag.sum())
-    radii = tip_radii(mesh, cracks, cuts, order, numerics.radius)
+    meeting = np.array([joint.centre for joint in joints]).reshape(-1, mesh.dim)
+    radii = tip_radii(mesh, cracks, cuts, order, numerics.radius, meeting)
     tips = []
     for c, cut in enumerate(cuts):
         x, frame = end_frames(cracks[c])
@@ -304,4 +327,5 @@ def function_space(
             number[flag] = count + numerics.functions * np.arange(int(flag.sum()))
             count += numerics.functions * int(flag.sum())
             tips.append(Tip(c, k, x[k], frame[k], radii[c][k], numerics.functions, lock(number)))
-    return FunctionSpace(mesh, order, cracks, cuts, tuple(heaviside), tuple(tips), n_nodes, count)
+    functions = tuple(heaviside), tuple(tips), n_nodes, count
+    return FunctionSpace(mesh, order, cracks, cuts, *functions, joints)

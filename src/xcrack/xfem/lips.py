@@ -8,7 +8,7 @@ import scipy.sparse as sp
 from xcrack.arrays import Floats, Ints
 from xcrack.xfem.facets import part_points
 from xcrack.xfem.function_space import FunctionSpace
-from xcrack.xfem.quadrature import cell_side
+from xcrack.xfem.sides import lip_side
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,8 +102,7 @@ def jump_values(space: FunctionSpace, c: int, lips: LipPoints) -> list[tuple[Int
     result = []
     for s, sign in ((0, -1), (1, 1)):
         cell = lips.cell[:, s]
-        side = cell_side(space, cell)
-        side[:, c] = sign
+        side = lip_side(space, c, cell, lips.bary[:, s], sign)
         for batch, number, row in space.batches_of_points(cell):
             N, _ = space.tabulate(batch, row, lips.bary[number, s], side[number], slopes=False)
             result.append((batch.functions[row], number, sign * N))

@@ -23,8 +23,9 @@ from xcrack.scene.set_loads import Bearing, Resultant
 from xcrack.xfem.facets import part_points, split_facets
 from xcrack.xfem.function_space import FunctionSpace
 from xcrack.xfem.lips import LipPoints, jump_values
-from xcrack.xfem.quadrature import Points, cell_points, cell_side
+from xcrack.xfem.quadrature import Points, cell_points
 from xcrack.xfem.set_loads import bearing_traction, resultant_traction
+from xcrack.xfem.sides import at_joints, cell_side
 
 
 def load_vector(
@@ -102,6 +103,7 @@ def facet_points(space: FunctionSpace, facets: Ints, n: int = 6) -> tuple[Points
     for i, cut in enumerate(space.cuts):
         crossed = cut.is_cut[c] | (cut.is_tip[c] & (side[:, i] == 0))
         side[crossed, i] = parts.side[k, i][crossed]
+    side = at_joints(space, c, bary, side)
     order = np.argsort(c, kind="stable")
     return Points(c[order], bary[order], weight[order], side[order]), normal[order]
 

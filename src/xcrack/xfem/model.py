@@ -5,7 +5,9 @@ from functools import cached_property
 from typing import Any
 
 from xcrack.crack.crack import Crack
+from xcrack.crack.junctions_2d import reaching
 from xcrack.cutting.cut import cut
+from xcrack.cutting.joints_2d import Joint, joined_cuts
 from xcrack.cutting.level_set import LevelSet
 from xcrack.cutting.level_sets import level_sets
 from xcrack.mesh.mesh import Mesh
@@ -72,9 +74,14 @@ def build(problem: Problem, bulk_: Bulk | None = None) -> Model:
 
 def discretised(problem: Problem) -> tuple[FunctionSpace, tuple[LipPoints, ...]]:
     """Function space of a problem, and the points on the faces of its cracks: nothing assembled."""
-    mesh, cracks = problem.mesh, problem.placed
-    cuts = tuple(cut(mesh, levels(mesh, crack, problem.numerics)) for crack in cracks)
-    space = function_space(mesh, problem.order or 1, cracks, cuts, problem.numerics)
+    mesh, cracks, numerics = problem.mesh, problem.placed, problem.numerics
+    junctions = problem.junctions
+    drawn = reaching(cracks, junctions) if junctions else cracks
+    cuts = tuple(cut(mesh, levels(mesh, crack, numerics)) for crack in drawn)
+    joints: tuple[Joint, ...] = ()
+    if junctions:
+        cuts, joints = joined_cuts(mesh, cuts, junctions)
+    space = function_space(mesh, problem.order or 1, cracks, cuts, numerics, joints)
     return space, tuple(lip_points(space, c) for c in range(len(cracks)))
 
 

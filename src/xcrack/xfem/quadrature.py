@@ -4,16 +4,20 @@ Plain cells need none (their stiffness is tabulated), Heaviside sub-cells the fe
 rule; what sub-cells with tip functions need depends on the dimension.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from xcrack.arrays import Bools, Floats, Ints, offsets, ranges
 from xcrack.errors import GeometryError
 from xcrack.mesh.simplex import simplex_rule
+from xcrack.mesh.split import cut_simplices
 from xcrack.xfem.function_space import FunctionSpace
 from xcrack.xfem.quadrature_2d import tip_points
 from xcrack.xfem.quadrature_3d import front_points
+from xcrack.xfem.sides import at_joints, cell_side
+
+_ROUND_OFF = 1e-13  # share of a sub-cell's largest level set below which a value is zero
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,14 +103,34 @@ def sub_cells(space: FunctionSpace, cells: Ints) -> SubCells:
     parts.append((rest, corner, np.ones(len(rest)), base[rest], np.zeros(len(rest), dtype=bool)))
     owner, bary, fraction, side, fan = (np.concatenate(p) for p in zip(*parts, strict=True))
     order = np.argsort(owner, kind="stable")
-    return SubCells(cells[owner[order]], bary[order], fraction[order], side[order], fan[order])
+    subs = SubCells(cells[owner[order]], bary[order], fraction[order], side[order], fan[order])
+    return _joined(space, subs) if space.joints else subs
 
 
-def cell_side(space: FunctionSpace, cells: Ints) -> Ints:
-    """Side of each crack on which cells lie `(k, cracks)`, 0 where a crack crosses them."""
-    if not space.cuts:
-        return np.zeros((len(cells), 0), dtype=np.int64)
-    return np.stack([cut.side[cells] for cut in space.cuts], axis=1)
+def _joined(space: FunctionSpace, subs: SubCells) -> SubCells:
+    """Sub-cells with the sides of cracks that end on others, split where both cut a cell."""
+    for joint in space.joints:
+        phi = space.cuts[joint.crack].level_set.phi
+        value = np.einsum("svb,sb->sv", subs.bary, phi[space.mesh.cells[subs.cell]])
+        small = np.abs(value) < _ROUND_OFF * np.abs(value).max(axis=1, keepdims=True)
+        value[small] = 0.0
+        split = joint.both[subs.cell] & (subs.side[:, joint.on] == joint.side)
+        split &= (value.min(axis=1) < 0) & (value.max(axis=1) > 0)
+        whole, rows = np.nonzero(~split)[0], np.nonzero(split)[0]
+        inner, share, _, parent = cut_simplices(value[rows])
+        source = np.concatenate([whole, rows[parent]])
+        order = np.argsort(source, kind="stable")
+        finer = np.einsum("svw,swb->svb", inner, subs.bary[rows[parent]])
+        source = source[order]
+        subs = SubCells(
+            subs.cell[source],
+            np.concatenate([subs.bary[whole], finer])[order],
+            subs.fraction[source] * np.concatenate([np.ones(len(whole)), share])[order],
+            subs.side[source],
+            subs.fan[source],
+        )
+    centre = subs.bary.mean(axis=1)
+    return replace(subs, side=at_joints(space, subs.cell, centre, subs.side))
 
 
 def cell_points(space: FunctionSpace, cells: Ints, n: int, degree: int) -> Points:

@@ -33,9 +33,15 @@ class ReusedCells:
 
 
 def with_one_jump(space: FunctionSpace, cells: Ints) -> Bools:
-    """On which cells the Heaviside functions of one crack act, and nothing else."""
+    """On which cells the Heaviside functions of one crack act, and nothing else.
+
+    Without those around junctions, where they depend on a second crack.
+    """
     mask = space.signature[cells]
-    return np.asarray((mask & (mask - 1) == 0) & (mask < 1 << len(space.cuts)))
+    one = (mask & (mask - 1) == 0) & (mask < 1 << len(space.cuts))
+    for joint in space.joints:
+        one &= ~joint.near[cells]
+    return np.asarray(one)
 
 
 def reused_cells(
