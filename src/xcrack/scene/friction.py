@@ -63,7 +63,7 @@ def _check_method(dim: int, numerics: Numerics) -> None:
             f'friction with Comparison(lips="{lips}"): multipliers alone carry it; leave lips out, '
             "or give friction=0."
         )
-    if dim == 3:
+    if dim > 2:
         raise ProblemError("friction in 3D is not there yet: give friction=0.")
 
 
