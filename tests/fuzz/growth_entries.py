@@ -9,6 +9,7 @@ import xcrack as xc
 from fuzz import scenes
 from fuzz.entry import Bad, Entry, Hook, Late, arg
 from fuzz.kinds import (
+    SKIP,
     Called,
     Filename,
     Flag,
@@ -169,6 +170,8 @@ RESUME = {
     "law": arg(Called(), xc.paris(1e-3, 2.0), near={"other": Bad(lambda: xc.paris(2e-3, 2.0))}),
     "criterion": arg(Called(), xc.max_hoop_stress, near={"other": Bad(lambda: xc.weighted_angle)}),
     "cycles": arg(Seen(rule=lambda v: v is None), None),
+    "tolerance": arg(Seen(rule=lambda v: v is None), None),
+    "max_unknowns": arg(Seen(rule=lambda v: v is None), None),
     "integrator": arg(Word(words=("pec",)), "pec"),
     "solver": arg(Called(optional=True), None),
     "progress": arg(Flag(also=(Word(words=("always",)),)), False),
@@ -337,6 +340,22 @@ ENTRIES = [
         },
         arity=False,
         cost=0.1,
+    ),
+    Entry(
+        "grow",
+        lambda **named: _grow(da=None, **named)[-1].cycles,
+        {
+            "tolerance": arg(Number(above=0, below=1, rule=lambda v: v >= 0.05 or SKIP), 0.2, 0.5),
+            "max_unknowns": arg(
+                Whole(
+                    least=1, most=10**7, far=1e9, optional=True, rule=lambda v: v >= 5000 or None
+                ),
+                None,
+                20_000,
+            ),
+        },
+        cost=0.6,
+        arity=False,
     ),
     Entry(
         "collect",

@@ -119,6 +119,9 @@ def test_report_of_a_solution(tmp_path):
 def test_report_of_a_run_and_of_its_folder(tmp_path):
     history = growth(plate(), tmp_path / "run")
     text, _, numbers = read(xc.report(history, tmp_path / "run.html"))
+    sources = numbers["growth"].pop("error of cycles")
+    assert sources["steps"] == history.life_bar.steps
+    assert sources["K"] == "nan"  # no tolerance was asked for
     assert numbers["growth"] == {"steps": 3, "cycles": history.life, "ended": history.ended,
                                  "whole": True}  # fmt: skip
     table = history.table()

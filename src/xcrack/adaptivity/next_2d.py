@@ -68,7 +68,7 @@ def next_mesh(now: Measured, tolerance: float, aim: float, most: int) -> Mesh | 
     for share in aim * 2.0 ** np.arange(1 + _GENTLER):
         wanted = tolerance * scale * share
         ratio = smaller(now.shares, now.bar.ravel(), wanted, _ORDER, mesh.dim)
-        ratio = np.minimum(ratio, np.minimum(_at_coarse_tips(now), _along_bent_cracks(now)))
+        ratio = np.minimum(ratio, np.minimum(at_coarse_tips(now), _along_bent_cracks(now)))
         fine = refine_to(mesh, ratio * mesh.cell_size, _SWEEPS)
         while len(fine.cells) < _LEAST * len(mesh.cells):  # the bar does not follow the shares
             largest = np.argsort(now.shares.max(axis=0, initial=0.0))[
@@ -81,7 +81,7 @@ def next_mesh(now: Measured, tolerance: float, aim: float, most: int) -> Mesh | 
     return None
 
 
-def _at_coarse_tips(now: Measured) -> Floats:
+def at_coarse_tips(now: Measured) -> Floats:
     """Half of the size around tips that have no bar."""
     mesh = now.problem.mesh
     ratio = np.ones(len(mesh.cells))
@@ -114,4 +114,4 @@ def _bent(given: Measured) -> tuple[int, ...]:
     return tuple(c for c in given.pressed if len(kinks(given.problem.placed[c].points)))
 
 
-__all__ = ["first_mesh", "next_mesh", "trusted"]
+__all__ = ["at_coarse_tips", "first_mesh", "next_mesh", "trusted"]

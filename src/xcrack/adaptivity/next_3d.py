@@ -12,6 +12,7 @@ from scipy.spatial import cKDTree
 
 from xcrack.adaptivity.measured import Measured, live_states
 from xcrack.arrays import Floats
+from xcrack.crack.crack import Crack
 from xcrack.crack.size_3d import surface_size
 from xcrack.mesh.locate import cell_sizes
 from xcrack.mesh.mesh import Mesh
@@ -28,10 +29,15 @@ _SLOPE = 0.5
 _FINER = 1.5
 
 
-def first_mesh(problem: Problem) -> Mesh:
+def first_mesh(problem: Problem, coarser: float = 1.0) -> Mesh:
     """The mesh of a scene in 3D, finer along fronts where it is coarser than the crack is small."""
-    size = [surface_size(crack, problem.mesh) / _CELLS for crack in problem.placed]
+    size = [coarser * first_size(crack, problem.mesh) for crack in problem.placed]
     return _graded(problem, size)
+
+
+def first_size(crack: Crack, mesh: Mesh) -> float:
+    """Longest edge of cells along the fronts of a placed crack that just see it, length."""
+    return float(surface_size(crack, mesh) / _CELLS)
 
 
 def next_mesh(now: Measured, tolerance: float, aim: float, most: int) -> Mesh | None:
@@ -107,4 +113,4 @@ def _graded(problem: Problem, size: list[float]) -> Mesh:
     return refine(problem.mesh, size=wanted)
 
 
-__all__ = ["first_mesh", "next_mesh", "trusted"]
+__all__ = ["first_mesh", "first_size", "next_mesh", "trusted"]

@@ -20,20 +20,17 @@ _SLOPE = 0.4  # growth of cells a length
 
 def first_mesh(problem: Problem) -> Mesh:
     """The mesh of a scene in 2D, finer at tips and kinks where it is coarser than they are."""
-    spots, sizes = [], []
-    tips = [crack.points[i] for crack in problem.placed for i in crack.tips or ()]
-    for crack in problem.placed:
-        length = length_inside(crack, problem.mesh)
-        for i in crack.tips or ():
-            x = crack.points[i]
-            spots.append(x)
-            sizes.append(min(length / _CELLS, _room(problem, x, tips, crack.points) / _ROOM))
-        for x in kinks(crack.points):
-            spots.append(x)
-            sizes.append(length / _KINK[problem.contact])
-    if not spots:
+    place, size = tip_sizes(problem)
+    bends = [
+        (x, length_inside(crack, problem.mesh) / _KINK[problem.contact])
+        for crack in problem.placed
+        for x in kinks(crack.points)
+    ]
+    if bends:
+        place = np.concatenate([place, [x for x, _ in bends]])
+        size = np.concatenate([size, [h for _, h in bends]])
+    if not len(place):
         return problem.mesh
-    place, size = np.array(spots), np.array(sizes)
 
     def wanted(x: Floats) -> Floats:
         distance = np.linalg.norm(x[:, None] - place, axis=2)
@@ -43,6 +40,19 @@ def first_mesh(problem: Problem) -> Mesh:
     if (cell_sizes(problem.mesh, place) <= size).all():
         return problem.mesh
     return refine(problem.mesh, size=wanted)
+
+
+def tip_sizes(problem: Problem) -> tuple[Floats, Floats]:
+    """All tips `(n, 2)`, and the longest edges of cells there that see crack and room `(n,)`."""
+    spots, sizes = [np.zeros((0, 2))], []
+    tips = [crack.points[i] for crack in problem.placed for i in crack.tips or ()]
+    for crack in problem.placed:
+        length = length_inside(crack, problem.mesh)
+        for i in crack.tips or ():
+            x = crack.points[i]
+            spots.append(x[None])
+            sizes.append(min(length / _CELLS, _room(problem, x, tips, crack.points) / _ROOM))
+    return np.concatenate(spots), np.array(sizes)
 
 
 def _room(problem: Problem, x: Floats, tips: list[Floats], own: Floats) -> float:
@@ -67,4 +77,4 @@ def kinks(points: Floats) -> Floats:
     return np.asarray(points[1:-1][turn > _TURN])
 
 
-__all__ = ["first_mesh", "kinks"]
+__all__ = ["first_mesh", "kinks", "tip_sizes"]

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from xcrack.crack.crack import Crack
+from xcrack.growth.advance import PerCrack
 from xcrack.growth.arrival import Arrival, Arriving
 from xcrack.growth.follow import following
 from xcrack.growth.integrators import integrator_of
@@ -57,9 +58,10 @@ def last_step(
         for c, (before, after) in enumerate(zip(advanced, placed, strict=True))
     )
     none = tuple(np.zeros(0) for _ in cracks)
+    cycles = max((arrival.cycles for arrival in arrivals), default=last.cycles)
     return Step(
         index=last.index + 1,
-        cycles=max((arrival.cycles for arrival in arrivals), default=last.cycles),
+        cycles=cycles,
         cracks=cracks,
         sif=tuple(tuple(map(_without_places, state)) for state in last.sif),
         angle=none,
@@ -75,9 +77,14 @@ def last_step(
             trail=None,
         ),
         levels=last.levels,
-        error=None if last.error is None else StepError(none, last.error.cycles),
+        error=None if last.error is None else _last_error(last.error, cycles - last.cycles, none),
         arrivals=arrivals,
     )
+
+
+def _last_error(error: StepError, cycles: float, none: PerCrack) -> StepError:
+    """Error at the end of a ligament whose cycles no K has been solved for: they count in full."""
+    return replace(error, place=none, unknown=error.unknown + cycles)
 
 
 def _without_places(sif: SIF) -> SIF:

@@ -14,7 +14,7 @@ from xcrack.growth.follow import following
 from xcrack.growth.friction import without_locked
 from xcrack.growth.front_trail import FrontTrail
 from xcrack.growth.options import Run
-from xcrack.growth.rating import rates_of
+from xcrack.growth.rating import Response, rates_of, response_without_contact
 from xcrack.growth.step import StepError
 from xcrack.growth.trail import Trail
 from xcrack.scene.problem import Problem
@@ -37,6 +37,8 @@ class Evaluation:
         Growth before and after the threshold.
     solutions : tuple of Solution
         One for each load state.
+    free : solutions and SIF, optional
+        Without contact, where the law asks for them.
     """
 
     problem: Problem
@@ -47,6 +49,7 @@ class Evaluation:
     law_rate: PerCrack
     rate: PerCrack
     solutions: tuple[Solution, ...] = ()
+    free: Response | None = None
 
     @property
     def cracks(self) -> tuple[Crack, ...]:
@@ -95,10 +98,11 @@ def evaluate(
     solutions: Sequence[Solution],
 ) -> Evaluation:
     """Ask criterion and law of a run what K of all load states means."""
-    angle, dK_eq, R, law_rate = rates_of(run, problem, sif, solutions)
+    free = response_without_contact(run, problem, sif, solutions)
+    angle, dK_eq, R, law_rate = rates_of(run, problem, sif, solutions, free)
     dK_eq, law_rate = without_locked(problem, solutions, sif, dK_eq, law_rate)
     rate = tuple(np.where(d < run.threshold, 0.0, r) for d, r in zip(dK_eq, law_rate))
-    return Evaluation(problem, sif, angle, dK_eq, R, law_rate, rate, tuple(solutions))
+    return Evaluation(problem, sif, angle, dK_eq, R, law_rate, rate, tuple(solutions), free)
 
 
 __all__ = ["Evaluation", "Settled", "evaluate"]

@@ -1,10 +1,11 @@
 """What a solve leaves to the growth of second order of fronts."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from xcrack.arrays import Bools, Floats, Ints
+from xcrack.growth.controller import Control
 from xcrack.growth.overloads import Kinds, Zones
 
 
@@ -70,10 +71,13 @@ class FrontTrail:
         One a crack.
     exponent : float
         Of the growth law.
+    control : Control
+        How long the next step may be.
     """
 
     parts: tuple[Places, ...]
     exponent: float
+    control: Control = field(default_factory=Control)
 
 
 __all__ = ["FrontTrail", "Places"]

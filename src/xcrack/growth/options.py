@@ -9,6 +9,7 @@ from typing import Any, TypedDict, TypeVar, cast
 import numpy as np
 from numpy.typing import ArrayLike
 
+from xcrack.analysis.plan import LIPS
 from xcrack.arrays import Floats
 from xcrack.errors import ProblemError, warn
 from xcrack.growth.criteria import Criterion
@@ -30,6 +31,8 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 class GrowOptions(TypedDict, total=False):
     """Options of `grow` and `resume` by name; `grow` describes them."""
 
+    tolerance: float | None
+    max_unknowns: int | None
     cycles: float | None
     scaling: str
     integrator: str
@@ -49,9 +52,11 @@ class Run:
 
     Parameters
     ----------
-    problem, law, criterion, cycle, da, cycles, scaling, integrator, threshold, retardation, \
-    solver, K_c, link_up, max_steps, max_cycles, progress
+    problem, law, criterion, cycle, da, cycles, tolerance, max_unknowns, scaling, integrator, \
+    threshold, retardation, solver, K_c, link_up, max_steps, max_cycles, progress
         As of `grow`.
+    scouts : bool
+        It is the scout of a run with a tolerance: nothing is estimated.
     defaults : int
         Number of the set of defaults.
 
@@ -67,6 +72,8 @@ class Run:
     cycle: Cycle | Spectrum
     da: float | None = None
     cycles: float | None = None
+    tolerance: float | None = None
+    max_unknowns: int | None = None
     scaling: str = "law"
     integrator: str = "pec"
     threshold: float = 0.0
@@ -78,6 +85,7 @@ class Run:
     max_cycles: float | None = field(default=None, metadata=_STOPS)
     progress: bool | str = field(default=True, metadata=_STOPS)
     defaults: int = field(default=DEFAULTS, metadata=_STOPS)
+    scouts: bool = field(default=False, metadata=_STOPS)
 
     def __post_init__(self) -> None:
         if not isinstance(self.problem, Problem):
@@ -102,8 +110,11 @@ class Run:
             )
         if not self.problem.cracks:
             raise ProblemError("grow: the problem has no crack; growth does not start one.")
-        if self.da is None and self.cycles is None:
-            raise ProblemError("grow needs da (largest advance a step) or cycles (cycles a step).")
+        if self.da is None and self.cycles is None and self.tolerance is None:
+            raise ProblemError(
+                "grow needs da (largest advance a step) or cycles (cycles a step), or a tolerance, "
+                "which chooses the steps and the mesh."
+            )
         for name in ("da", "cycles", "K_c", "max_cycles"):
             value = getattr(self, name)
             if value is not None:
@@ -124,6 +135,7 @@ class Run:
                 'shorter: only integrator="euler" has it, for comparison.'
             )
         check_retardation(self.retardation, self.law, self.cycle, self.integrator)
+        self._check_tolerance()
         if self.solver is not None and not callable(self.solver):
             raise ProblemError(
                 f"grow: solver = {shown(self.solver)} cannot be called: give a function, or None."
@@ -150,9 +162,43 @@ class Run:
             )
 
     @property
+    def estimates(self) -> bool:
+        """Whether K has error bars, which its growth is held against."""
+        return self.tolerance is not None and not self.scouts
+
+    def _check_tolerance(self) -> None:
+        if self.tolerance is None:
+            if self.max_unknowns is not None:
+                raise ProblemError(
+                    "grow: max_unknowns limits the mesh that a tolerance asks for: give tolerance "
+                    "too, or leave it out."
+                )
+            return
+        tolerance = number(self.tolerance, "grow: tolerance", above=0, below=1)
+        object.__setattr__(self, "tolerance", tolerance)
+        if self.max_unknowns is not None:
+            most = whole(self.max_unknowns, "grow: max_unknowns", least=1, most=10**9)
+            object.__setattr__(self, "max_unknowns", most)
+        if self.integrator != "pec":
+            raise ProblemError(
+                f'grow: tolerance needs the errors that integrator="pec" estimates, and '
+                f"{self.integrator!r} has none: leave integrator out, or give da."
+            )
+        lips = self.problem.numerics.comparison.lips
+        if lips in LIPS:
+            raise ProblemError(
+                f"grow: contact by {LIPS[lips]} has no estimate that a tolerance could be held "
+                f"against: leave Comparison(lips={lips!r}) out, or give da."
+            )
+
+    @property
     def settings(self) -> dict[str, str]:
         """Text of all that decides how the cracks grow; rules that stop a run are not in it."""
-        return {"defaults": str(self.defaults), **describe("", self, self.defaults)}
+        lines = {"defaults": str(self.defaults), **describe("", self, self.defaults)}
+        if self.tolerance is not None:  # curves shape the mesh that is refined
+            curves = self.problem.mesh.curves
+            lines |= describe("problem.mesh.curves", curves, self.defaults) if curves else {}
+        return lines
 
     def as_begun(self, stored: Mapping[str, str]) -> "Run":
         """The run with the defaults of a stored one, where it leaves a choice to them."""

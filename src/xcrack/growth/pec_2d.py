@@ -13,8 +13,12 @@ from xcrack.arrays import Bools, Floats
 from xcrack.crack.crack import Crack
 from xcrack.errors import GeometryError, XcrackError
 from xcrack.growth.advance import LEAST, Advance
+from xcrack.growth.controlled import first, following, share_left
+from xcrack.growth.controller import Control, shortest
 from xcrack.growth.envelope import Growth
 from xcrack.growth.evaluation import Evaluation, Settled
+from xcrack.growth.follow_2d import exit_ahead
+from xcrack.growth.kink import START
 from xcrack.growth.options import Run
 from xcrack.growth.overloads import Zones
 from xcrack.growth.reach import (
@@ -34,8 +38,8 @@ from xcrack.mesh.locate import cell_sizes, contains
 from xcrack.mesh.mesh import Mesh
 
 _PASSES = 6  # of the correction, which turns the last face, which turns the direction
-_ERROR = 0.25  # of the correction: more than the error that is left, on nearly all scenes
 _FIRST = 0.5  # of that for the first step's cycles, of which no parabola is known yet
+_MENDED = 0.1  # of that squared and relative: what is left once the second step has mended it
 _HALVINGS = 40
 
 
@@ -72,6 +76,7 @@ def begun(run: Run, seen: Evaluation) -> Settled:
     """The first step of a run."""
     faces = faces_of(seen.cracks)
     trail = first_trail(run, seen, faces.tip, np.zeros(len(faces.tip), dtype=bool))
+    trail = replace(trail, control=_first(run, trail, seen))
     trail = looked_ahead(run, overloads_begin(run, seen, trail))
     none = split(np.zeros(len(faces.tip)), seen.cracks)
     return _settled(run, 0.0, seen.cracks, trail, StepError(none, 0.0))
@@ -178,32 +183,56 @@ def _corrected(
         corrected, moves = ending_at(last.corrected, place, old.grown, before.size)
     except GeometryError:  # which the predicted cracks are free of
         place, corrected, moves = before.place, list(seen.cracks), before.moves
-    off = _ERROR * np.linalg.norm(place - before.place, axis=1)
-    cycles, own = _cycles(run, trail, old, before, growth)
+    off = share_left(run) * np.linalg.norm(place - before.place, axis=1)
+    cycles, own, alone = _cycles(run, trail, old, before, growth)
     trail = replace(trail, place=place, grown=old.grown | moves)
+    control = following(
+        run, old.control, before.length, float(off.max(initial=0.0)), alone, growth.cycles,
+        last.cycles, *_ahead(run, trail, seen),
+    )  # fmt: skip
     return _settled(
         run,
         last.cycles + cycles,
         corrected,
-        looked_ahead(run, _with_zones(trail, _zones(old), piece.after)),
+        looked_ahead(run, _with_zones(replace(trail, control=control), _zones(old), piece.after)),
         StepError(
             tuple(a + b for a, b in zip(error.place, split(off, corrected))), error.cycles + own
         ),
     )
 
 
+def _first(run: Run, trail: Trail, seen: Evaluation) -> Control:
+    """Length of the first step."""
+    return first(run, float(trail.scale.min(initial=np.inf)), *_ahead(run, trail, seen))
+
+
+def _ahead(run: Run, trail: Trail, seen: Evaluation) -> tuple[float, float]:
+    """Shortest step of the fastest tip, and the way to the boundary ahead of it, length."""
+    if not len(trail.place):
+        return 0.0, np.inf
+    tip = int(np.argmax(trail.rate[-1]))
+    x, angle, mesh = trail.place[tip], trail.direction[-1, tip], run.problem.mesh
+    hit = exit_ahead(x, np.array([np.cos(angle), np.sin(angle)]), mesh)
+    room = np.inf if hit is None else float(np.linalg.norm(hit[0] - x))
+    kinked = bool(abs(np.concatenate(seen.angle)[tip]) > START)
+    return shortest(float(cell_sizes(mesh, x[None])[0]), kinked), room
+
+
 def _cycles(
     run: Run, trail: Trail, old: Trail, before: Prediction, growth: Growth
-) -> tuple[float, float]:
-    """Cycles of a corrected step, and what they add to the estimated error."""
+) -> tuple[float, float, float]:
+    """Cycles of a corrected step, what they add to the estimated error, and that of them alone."""
     if old.n_solves == 1:
-        return growth.cycles, _FIRST * _ERROR * abs(growth.cycles - before.growth.cycles)
+        off = abs(growth.cycles - before.growth.cycles)
+        # The parabola of the next step mends it: of that, a square is left.
+        rest = _MENDED * share_left(run) * off**2 / growth.cycles if growth.cycles > 0 else 0.0
+        return growth.cycles, _FIRST * share_left(run) * off, rest
     start = float(old.sigma[-1])
     two = trail.last(2)
     line = piece_of(run, two, start, before.length, _zones(old)).over(two).cycles
-    own = _ERROR * abs(growth.cycles - line)
+    alone = own = share_left(run) * abs(growth.cycles - line)
     if old.n_solves > 2:
-        return growth.cycles, own
+        return growth.cycles, own, alone
     # The second step: the parabola tells what the first one, along a line, was off.
     span = float(old.sigma[1] - old.sigma[0])
     first = float(old.sigma[0])
@@ -212,8 +241,8 @@ def _cycles(
         piece_of(run, each, first, span, begin).over(each).cycles
         for each in (old, trail, old.first(1))
     )
-    own += _ERROR * (abs(curve - line) - _FIRST * abs(line - constant))
-    return growth.cycles + curve - line, own
+    own += share_left(run) * (abs(curve - line) - _FIRST * abs(line - constant))
+    return growth.cycles + curve - line, own, alone
 
 
 def _zones(trail: Trail) -> Zones | None:
@@ -254,6 +283,7 @@ def _without_lost_tips(
     old, error = _remembered(last)
     place = before.place[stays]
     trail = first_trail(run, seen, place, (old.grown | before.moves)[stays])
+    trail = replace(trail, control=_first(run, trail, seen))
     trail = looked_ahead(run, overloads_begin(run, seen, trail, overloads_of_rest(old, stays)))
     exit_ = _exit(run, old, before, ~stays)
     cycles = growth_until(run, old, exit_).cycles

@@ -19,6 +19,8 @@ from xcrack.errors import GeometryError, XcrackError
 from xcrack.growth import follow_3d
 from xcrack.growth.advance import Advance, PerCrack, plan_advance
 from xcrack.growth.checks import law_exponent
+from xcrack.growth.controlled import first, following, longest, share_left
+from xcrack.growth.controller import shortest
 from xcrack.growth.cycles_3d import elapsed_3d
 from xcrack.growth.evaluation import Evaluation, Settled
 from xcrack.growth.follow_3d import carried
@@ -47,7 +49,6 @@ from xcrack.mesh.locate import cell_sizes, contains
 from xcrack.mesh.mesh import Mesh
 
 _SPACING = 0.5  # of a cell, between the points of a new front
-_ERROR = 0.25  # of a correction, as in 2D
 
 
 def begun(run: Run, seen: Evaluation) -> Settled:
@@ -55,7 +56,10 @@ def begun(run: Run, seen: Evaluation) -> Settled:
     parts = tuple(_solved_places(seen, c, None) for c in range(len(seen.cracks)))
     parts = with_kinds(run, seen, parts)
     none = tuple(np.zeros(len(part.s)) for part in parts)
-    return _settled(run, seen, 0.0, seen.cracks, _trail(run, seen, parts), StepError(none, 0.0))
+    trail = _trail(run, seen, parts)
+    size = min((part.size for part in parts if len(part.s)), default=np.inf)
+    trail = replace(trail, control=first(run, size, _shortest(run, trail), np.inf))
+    return _settled(run, seen, 0.0, seen.cracks, trail, StepError(none, 0.0))
 
 
 def settled(run: Run, last: Step, seen: Evaluation) -> Settled:
@@ -68,7 +72,7 @@ def settled(run: Run, last: Step, seen: Evaluation) -> Settled:
     ]
     fastest = [max((float(r.max(initial=0.0)) for r in rates), default=0.0) for rates in (
         [part.rate for part in trail.parts], [part.rate for part in after])]  # fmt: skip
-    cycles, own = _cycles(trail, plan, seen)
+    cycles, own = _cycles(run, trail, plan, seen)
     moved = [part.x + moved_by(part, part.angle, way) for part, way in zip(trail.parts, ahead)]
     marched = None
     if run.retardation is not None and 0 < fastest[0] < np.inf:
@@ -78,7 +82,10 @@ def settled(run: Run, last: Step, seen: Evaluation) -> Settled:
             for later, part, arc in zip(after, trail.parts, marched[0])
         ]
         fastest[1] = fastest[0]
-        cycles, own = marched[1], _ERROR * beyond_trapezoid(marched[1], plan.largest / fastest[0])
+        cycles, own = (
+            marched[1],
+            share_left(run) * beyond_trapezoid(marched[1], plan.largest / fastest[0]),
+        )
     parts, cracks, gaps = [], [], []
     broken = any(np.isinf(rate).any() for rate in seen.rate)
     for c, (part, later) in enumerate(zip(trail.parts, after)):
@@ -99,11 +106,16 @@ def settled(run: Run, last: Step, seen: Evaluation) -> Settled:
         parts.append(new)
         gaps.append(gap)
     place = tuple(
-        _onto(seen, c, part, last, error.place[c], gaps[c]) for c, part in enumerate(trail.parts)
+        _onto(run, seen, c, part, last, error.place[c], gaps[c])
+        for c, part in enumerate(trail.parts)
+    )
+    now = _trail(run, seen, with_kinds(run, seen, parts))
+    off = share_left(run) * max((float(gap.max(initial=0.0)) for gap in gaps), default=0.0)
+    control = following(
+        run, trail.control, plan.largest, off, own, cycles, last.cycles, _shortest(run, now), np.inf
     )
     return _settled(
-        run, seen, last.cycles + cycles, cracks,
-        _trail(run, seen, with_kinds(run, seen, parts)),
+        run, seen, last.cycles + cycles, cracks, replace(now, control=control),
         StepError(place, error.cycles + own),
     )  # fmt: skip
 
@@ -172,6 +184,15 @@ def _trail(run: Run, seen: Evaluation, parts: tuple[Places, ...]) -> FrontTrail:
     return with_mean_rates(run, FrontTrail(parts, law_exponent(run.law, dK_eq, R)))
 
 
+def _shortest(run: Run, trail: FrontTrail) -> float:
+    """Shortest step of the fastest place, length."""
+    part = max(trail.parts, key=lambda each: float(each.rate.max(initial=-1.0)))
+    if not len(part.s):
+        return 0.0
+    fastest = part.x[[int(np.argmax(part.rate))]]
+    return shortest(float(cell_sizes(run.problem.mesh, fastest)[0]), kinked=False)
+
+
 def _plan(run: Run, trail: FrontTrail) -> Advance:
     mesh = run.problem.mesh
     rate = tuple(part.rate for part in trail.parts)
@@ -180,7 +201,7 @@ def _plan(run: Run, trail: FrontTrail) -> Advance:
         rate,
         tuple(part.pending for part in trail.parts),
         tuple(cell_sizes(mesh, part.x) for part in trail.parts),
-        da=run.da,
+        da=longest(run, trail.control),
         cycles=run.cycles,
         scaling="law",
         least=follow_3d.WAITS_BELOW,
@@ -341,11 +362,11 @@ def _waiting(seen: Evaluation, c: int, part: Places, pending: Floats) -> Floats:
 
 
 def _onto(
-    seen: Evaluation, c: int, part: Places, last: Step, before: Floats, gap: Floats
+    run: Run, seen: Evaluation, c: int, part: Places, last: Step, before: Floats, gap: Floats
 ) -> Floats:
     """Estimated error of the places that were solved, with what this step adds."""
     x, mesh, old = seen.sif[0][c].x, seen.problem.mesh, last.sif[0][c]
-    own = np.nan_to_num(values_at(part, part.closed, _ERROR * gap, x, mesh))
+    own = np.nan_to_num(values_at(part, part.closed, share_left(run) * gap, x, mesh))
     if not len(old.x):
         return own
     reach = 2 * REACH * float(cell_sizes(mesh, old.x).mean()) + float(gap.max(initial=0.0))
@@ -353,7 +374,7 @@ def _onto(
     return np.asarray(own + np.nan_to_num(earlier))
 
 
-def _cycles(trail: FrontTrail, plan: Advance, seen: Evaluation) -> tuple[float, float]:
+def _cycles(run: Run, trail: FrontTrail, plan: Advance, seen: Evaluation) -> tuple[float, float]:
     """Cycles of a step by the largest rates at both ends, and what they add to the error.
 
     All places advance in proportion to these, and without the response of the front: so the
@@ -368,7 +389,7 @@ def _cycles(trail: FrontTrail, plan: Advance, seen: Evaluation) -> tuple[float, 
     if not 0 < later < np.inf:
         return cycles, 0.0
     trapezoid = 0.5 * plan.largest * (1 / before + 1 / later)
-    return cycles, _ERROR * abs(cycles - trapezoid)
+    return cycles, share_left(run) * abs(cycles - trapezoid)
 
 
 __all__ = ["advanced", "begun", "cycles_to", "planned", "settled"]

@@ -32,7 +32,13 @@ PerPlace = tuple[Floats, Floats, Floats, Floats]
 Response = tuple[Sequence[Solution], Answers]
 
 
-def rates_of(run: Run, problem: Problem, sif: Answers, solutions: Sequence[Solution]) -> Rates:
+def rates_of(
+    run: Run,
+    problem: Problem,
+    sif: Answers,
+    solutions: Sequence[Solution],
+    free: Response | None = None,
+) -> Rates:
     """Ask criterion and law of a run what K of all load states means.
 
     Parameters
@@ -44,6 +50,8 @@ def rates_of(run: Run, problem: Problem, sif: Answers, solutions: Sequence[Solut
         ``sif[state][crack]``.
     solutions : sequence of Solution
         One a state; their factors are the levels of a spectrum.
+    free : solutions and SIF, optional
+        As of `response_without_contact`, where it is known already.
 
     Returns
     -------
@@ -52,12 +60,20 @@ def rates_of(run: Run, problem: Problem, sif: Answers, solutions: Sequence[Solut
         are held against it one by one.
     """
     _check_choice(run, sif)
-    free = None
-    if getattr(run.law, "ratio", None) == "nominal":
-        free = (solutions, sif) if problem.contact == "off" else _without_contact(run, problem)
+    if free is None:
+        free = response_without_contact(run, problem, sif, solutions)
     asked = asked_of(run, problem, (solutions, sif), free)
     angles, ranges, ratios, rates = zip(*(one.answer(one.K) for one in asked), strict=True)
     return angles, ranges, ratios, rates
+
+
+def response_without_contact(
+    run: Run, problem: Problem, sif: Answers, solutions: Sequence[Solution]
+) -> Response | None:
+    """Solutions and K of the scene in which faces may overlap; None where no law asks for them."""
+    if getattr(run.law, "ratio", None) != "nominal":
+        return None
+    return (solutions, sif) if problem.contact == "off" else _without_contact(run, problem)
 
 
 @dataclass(frozen=True, eq=False)
@@ -211,21 +227,25 @@ def _without_contact(run: Run, problem: Problem) -> Response:
 
 
 def respond_to_cycle(
-    problem: Problem, cycle: Cycle | Spectrum, solver: Any, reuse: Reuse
+    problem: Problem, cycle: Cycle | Spectrum, solver: Any, reuse: Reuse, error: bool = False
 ) -> tuple[tuple[Solution, ...], Answers, Reuse]:
     """Solutions of all load states, K of each crack in each of them, and what serves the next.
 
-    The factor is handed on, but not kept with the solutions.
+    The factor is handed on, but not kept with the solutions; with `error` K has its bars.
     """
 
     def solve(states: Sequence[Any], reuse: Reuse) -> tuple[tuple[Solution, ...], Answers, Reuse]:
-        solutions = solve_states(problem, states, reuse=reuse, solver=solver, repeated=True)
+        flat = problem.mesh.dim < 3  # of fronts, the bars need no factor
+        solutions = solve_states(
+            problem, states, reuse=reuse, solver=solver, repeated=True, error=error and flat
+        )
         if isinstance(cycle, Spectrum):
             refuse_friction(problem, solutions)
         handed_on = solutions[0].reuse
         light = handed_on.without_factor()
         solutions = [replace(solution, reuse=light) for solution in solutions]
-        by_crack = [stress_intensities(solutions, c) for c in range(len(problem.cracks))]
+        by_crack = [stress_intensities(solutions, c, error) for c in range(len(problem.cracks))]
+        solutions = [replace(solution, factored=None) for solution in solutions]
         return tuple(solutions), tuple(zip(*by_crack, strict=True)), handed_on
 
     if isinstance(cycle, Spectrum) and cycle.states is None:

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from xcrack.arrays import Bools
+from xcrack.growth.controlled import longest
 from xcrack.growth.envelope import Growth, growing_length, growth_over, length_of_cycles
 from xcrack.growth.evaluation import Evaluation
 from xcrack.growth.kinds import kinds_of
@@ -62,7 +63,7 @@ def piece_of(run: Run, trail: Trail, start: float, length: float, begin: Zones |
 def reach_of(run: Run, trail: Trail) -> Reach:
     """The next step as the last two solves see it; from a first one straight on, at its rates."""
     known, start = trail.last(2), float(trail.sigma[-1])
-    length = np.inf if run.da is None else run.da
+    length = longest(run, trail.control)
     if run.cycles is not None:
         fastest = float(trail.rate[-1].max(initial=0.0))
         most = min(length, run.cycles * fastest * (1.0 if known.n_solves == 1 else _FASTER))
@@ -127,7 +128,7 @@ def overloads_of_rest(before: Trail, stays: Bools) -> Zones | None:
 
 def _next_march(run: Run, trail: Trail) -> March:
     """The march of the next step."""
-    length = np.inf if run.da is None else run.da
+    length = longest(run, trail.control)
     if run.cycles is not None:
         fastest = float(trail.rate[-1].max(initial=0.0))
         length = min(length, run.cycles * fastest * (1.0 if trail.n_solves == 1 else _FASTER))

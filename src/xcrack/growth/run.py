@@ -12,6 +12,7 @@ from xcrack.errors import GeometryError, ProblemError, XcrackError, warn
 from xcrack.growth.advance import LEAST
 from xcrack.growth.arrivals import arrivals_of, last_step
 from xcrack.growth.checks import depends_on_ratio
+from xcrack.growth.controlled import shortened
 from xcrack.growth.criteria import Criterion
 from xcrack.growth.ending import end_at, falls_to_zero, left_the_body, short_kink, too_short
 from xcrack.growth.evaluation import evaluate
@@ -19,10 +20,13 @@ from xcrack.growth.follow import following
 from xcrack.growth.integrators import integrator_of
 from xcrack.growth.notices import Notices
 from xcrack.growth.options import GrowOptions, Run, lists_options, run_of
+from xcrack.growth.prepared import fingerprint, prepared
 from xcrack.growth.progress import Progress
 from xcrack.growth.rating import check_choice, levels_of, respond_to_cycle, warn_of_left_out
 from xcrack.growth.step import Cycle, Memory, Step, memory_of
+from xcrack.growth.uncertainty import best_known, shortfall, with_K
 from xcrack.laws.law import Law
+from xcrack.mesh.mesh import Mesh
 from xcrack.scene.problem import Problem
 from xcrack.sif.sif import SIF
 from xcrack.solvers.reuse import Reuse
@@ -39,6 +43,8 @@ def grow(
     **options: Unpack[GrowOptions],
 ) -> Generator[Step, None, str]:
     """Let the cracks of a problem grow under a repeated load cycle.
+
+    Say how long the steps are (`da`, `cycles`), or how accurate the result is to be (`tolerance`).
 
     A generator: each `Step` is complete when it is handed over, and the next one is computed only
     when it is asked for. The value it returns says why growth ended, as `History.ended` does.
@@ -58,6 +64,16 @@ def grow(
         Of a spectrum `cycles` and `max_cycles` count repetitions, and so do the cycles of a step.
     da : float, length, optional
         Largest advance of any tip in a step.
+    tolerance : float, optional
+        Wanted error of the life, relative, and of the path, over the length grown: in place of `da`
+        and `cycles`, which are upper bounds then. The mesh is refined for it, so it may be coarse:
+        a scout grows the cracks in long steps; where they run, cells become small enough for K;
+        that one mesh serves all steps, each as long as its estimated error allows. Solved at order
+        2; growth follows the best K where its error bar is known, K elsewhere. `History.life_bar`
+        says what came of it. The scout knows nothing of `max_steps`, `max_cycles`, `K_c` and
+        `until`: whatever stops the run, and resumes it, the mesh is the same.
+    max_unknowns : int, optional
+        Most unknowns of the mesh that a tolerance chooses; 300 000 if omitted.
     cycles : float, optional
         Cycles of a step, as far as the last solves can tell; the fastest tip advances at most by
         `da`. The cycles of the step are then counted with the rates at its end too.
@@ -100,11 +116,15 @@ def grow(
     ProblemError
         Options that do not fit; R < 0 under a law that must know how R is meant, and does not; a
         law that returns negative or nan; an angle of pi or more; an advance below a tenth of the
-        cell at the tip (later in a run: a warning, and the run ends).
+        cell at the tip (later in a run: a warning, and the run ends). A tolerance that is not
+        between 0 and 1, with ``integrator="euler"``, or with contact by a method without estimate;
+        `max_unknowns` below the first mesh.
 
     Warns
     -----
     XcrackWarning
+        A tolerance that is not met, with the source of the error and what to do; a mesh that would
+        have more than `max_unknowns`.
         A turn by more than 10 degrees with an advance below the cell along the path; R < 0 asked
         of a law that depends on R. Warnings that come again in later steps are counted, and
         summarised in one when the run ends.
@@ -113,18 +133,43 @@ def grow(
     -----
     Cycles between two steps: `cycles_between`, with the rates at both, so a step costs one
     analysis of all load states and the life of ten steps is good to a few tenths of a per cent.
+
+    Of a tolerance, half is for the steps and four tenths are for K: cells become smaller until the
+    bars of K of a few stages of the way are below that over the exponent of the law (at least 2).
+    Steps are controlled by their estimated error (proportional and integral: Gustafsson 1991, ACM
+    Trans. Math. Softw. 17, 533).
+
+    Examples
+    --------
+    >>> import xcrack as xc
+    >>> strip = xc.box((0, -1), (1, 1), (6, 12))
+    >>> pull = [xc.traction("top", (0, 1)), xc.traction("bottom", (0, -1))]
+    >>> crack = xc.line_crack([(-0.1, 0.02), (0.2, 0.02)])
+    >>> scene = xc.Problem(strip, xc.Isotropic(1.0, 0.3, "strain"), [crack], loads=pull)
+    >>> law, cycle = xc.paris(C=1e-3, m=3.0), xc.Cycle(0.0, 1.0)
+    >>> steps = xc.grow(scene, law, xc.max_hoop_stress, cycle, tolerance=0.05, progress=False)
+    >>> history = xc.collect(steps, until=lambda step: step.cycles > 50)
+    >>> bool(history.life_bar.relative < 0.05)
+    True
     """
     return steps_of(run_of("grow", problem, law, criterion, cycle, da, options))
 
 
-def steps_of(run: Run, last: Step | None = None) -> Generator[Step, None, str]:
-    """Steps of a run: from the beginning, or those that follow a step."""
+def steps_of(
+    run: Run, last: Step | None = None, mesh: Mesh | None = None
+) -> Generator[Step, None, str]:
+    """Steps of a run: from the beginning, or those that follow a step.
+
+    Of one with a tolerance, `mesh` may be the one that it has chosen before.
+    """
     check_choice(run.law, run.cycle.ratio)
+    settings = run.settings  # before a law is called that may change what it reads
+    if run.estimates:
+        run = prepared(run, steps_of, last, mesh)
     notices, progress = Notices(), Progress(run)
     kink = ""
     try:
         if last is None:
-            settings = run.settings  # before a law is called that may change what it reads
             with notices.watch(0) as messages:
                 last, reuse = _next_step(run, run.problem, None, Reuse(), settings)
                 _warn_of_ratio(run, last)
@@ -156,11 +201,18 @@ def steps_of(run: Run, last: Step | None = None) -> Generator[Step, None, str]:
                 next_step, reuse, ended = _after(run, last, reuse)
             if next_step is None:
                 break
+            again = shortened(last, next_step)
+            if again is not None:
+                last = again
+                continue
             last = replace(next_step, warnings=tuple(messages))
             progress.step(last)
             yield last
     finally:
         notices.summarise()
+        short = "" if last is None or not run.estimates else shortfall(run, last)
+        if short:
+            warn(short)
         progress.close()
     progress.end(ended)
     return ended
@@ -217,15 +269,17 @@ def _next_step(
 ) -> tuple[Step, Reuse]:
     """Solve all load states of a problem and decide where and how fast its cracks grow."""
     solutions, sif, handed_on = respond(problem, run, reuse)
-    seen, integrator = evaluate(run, problem, sif, solutions), integrator_of(run)
+    seen = evaluate(run, problem, best_known(sif), solutions)
+    integrator = integrator_of(run)
     if last is None:
         index, radius = 0, run.problem.numerics.radius
         settled = integrator.begun(run, seen)
-        if radius is None and len(solutions[0].space.radius):
+        if radius is None and run.tolerance is None and len(solutions[0].space.radius):
             radius = float(np.min(solutions[0].space.radius))
     else:
         index, radius = last.index + 1, memory_of(last).radius
         settled = integrator.settled(run, last, seen)
+    settled = with_K(run, last, settled, seen, sif)
     memory = Memory(
         seen.law_rate,
         seen.length,
@@ -234,6 +288,7 @@ def _next_step(
         handed_on.without_matrices(),
         settings,
         settled.trail,
+        fingerprint(problem.mesh) if run.estimates else "",
     )
     step = Step(
         index=index,
@@ -261,7 +316,7 @@ def respond(
 
     The factor is handed on, but not kept with the solutions.
     """
-    return respond_to_cycle(problem, run.cycle, run.solver, reuse)
+    return respond_to_cycle(problem, run.cycle, run.solver, reuse, run.estimates)
 
 
 def _problem(run: Run, cracks: Sequence[Crack], memory: Memory) -> Problem:

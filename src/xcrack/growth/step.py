@@ -113,6 +113,8 @@ class Memory:
         What the next solve starts from, without matrices.
     settings : mapping of str to str
         What the run was asked to do.
+    mesh : str
+        Fingerprint of the mesh that a tolerance has chosen; empty where none was asked for.
     trail : Trail or FrontTrail, optional
         What an integrator of second order remembers of the last solves.
     """
@@ -124,22 +126,55 @@ class Memory:
     reuse: Reuse
     settings: Mapping[str, str]
     trail: Trail | FrontTrail | None = None
+    mesh: str = ""
 
 
 @dataclass(frozen=True, eq=False)
 class StepError:
-    """What the length of the steps so far may have cost; errors of K come on top.
+    """What may be wrong with a step, by source; nan where it was not estimated.
 
     Attributes
     ----------
     place : tuple of (f,) arrays, length
         Of each tip, one array a crack: how far it may be from where steps of no length lead.
     cycles : float
-        Of the cycles so far.
+        Error of the cycles so far by the length of the steps.
+    K, contact : float
+        Error of the cycles so far by the bars of K: without the part that contact has in them, and
+        that part.
+    unknown : float
+        Cycles so far that passed at rates of which K has no bar.
+    K_place : float, length
+        How far a tip may be astray by the directions that K within its bars allows.
+    grown : float, length
+        Way of the fastest tips so far, which an error of the path is relative to.
+    rate, rate_contact : float
+        Relative error of the largest rate at this step by the bars of K, and contact's part of it.
+    turn : float, rad
+        Error of the directions at this step.
     """
 
     place: PerCrack
     cycles: float
+    K: float = np.nan
+    contact: float = np.nan
+    unknown: float = np.nan
+    K_place: float = np.nan
+    grown: float = np.nan
+    rate: float = np.nan
+    rate_contact: float = np.nan
+    turn: float = np.nan
+
+    @property
+    def life(self) -> float:
+        """Error of the cycles so far by all sources."""
+        return self.cycles + self.K + self.contact + self.unknown
+
+    @property
+    def path(self) -> float:
+        """Error of the places by all sources, length."""
+        steps = max((float(part.max(initial=0.0)) for part in self.place), default=0.0)
+        return steps + self.K_place
 
 
 @dataclass(frozen=True, eq=False)

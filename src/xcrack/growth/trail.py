@@ -1,10 +1,11 @@
 """What earlier solves leave to the growth of second order, and values between and beyond them."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from xcrack.arrays import Bools, Floats
+from xcrack.growth.controller import Control
 from xcrack.growth.overloads import Kinds, March, Zones
 
 KEPT = 3  # solves: a parabola passes through three points
@@ -66,6 +67,8 @@ class Trail:
         Whether the last face of a tip was added by growth, so that it may be moved on.
     overloads : Overloads, optional
         With retardation.
+    control : Control
+        How long the next step may be.
     """
 
     sigma: Floats
@@ -78,6 +81,7 @@ class Trail:
     place: Floats
     grown: Bools
     overloads: Overloads | None = None
+    control: Control = field(default_factory=Control)
 
     @property
     def n_solves(self) -> int:

@@ -121,6 +121,9 @@ def resume(
         As in `collect`.
     cycles, scaling, integrator, threshold, retardation, solver, progress, keep_solutions
         As they were given to `grow` and `collect`.
+    tolerance, max_unknowns
+        As they were given to `grow`. The mesh that a tolerance chose is read from the folder; where
+        it is lost it is made again.
     K_c, link_up, max_steps, max_cycles
         Rules that stop a run may be other ones than before.
 
@@ -165,7 +168,11 @@ def resume(
         run_folder.write_header(folder, header)
         collection.store = RunStore(folder, check, header)
         collection.taken.extend(stored.steps)
-        return collection.of(steps_of(run, stored.steps[-1] if stored.steps else None))
+        body = read_body(folder / run_folder.BODY) if run.tolerance is not None else None
+        mesh = None if body is None else body.mesh
+        if mesh is not None:
+            collection.mesh = mesh
+        return collection.of(steps_of(run, stored.steps[-1] if stored.steps else None, mesh))
 
 
 def load(path: str | Path) -> Any:

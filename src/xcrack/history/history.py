@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from numpy.typing import NDArray
 
 from xcrack import markup
@@ -15,6 +16,7 @@ from xcrack.growth.criteria import Criterion
 from xcrack.growth.joins import Join
 from xcrack.growth.step import Step
 from xcrack.history.block_rates import block_of_run
+from xcrack.history.life_bar import LifeBar, life_bar
 from xcrack.history.measures import measured, measures_tables, with_measures
 from xcrack.history.rerating import Rerated, rerated
 from xcrack.history.table import table
@@ -90,12 +92,20 @@ class History:
         """Cracks that became one: where, and after how many cycles."""
         return tuple(join for step in self.steps for join in step.joins)
 
+    @property
+    def life_bar(self) -> LifeBar:
+        """Numerical error of the life, by source: steps, K, contact; in full with a tolerance."""
+        return life_bar(self.steps)
+
     def __repr__(self) -> str:
-        return f"History({len(self.steps)} steps, {self.life:.6g} cycles, ended: {self.ended})"
+        bar = self.life_bar.total
+        life = f"{self.life:.6g}" + ("" if np.isnan(bar) else f" ± {bar:.2g}")
+        return f"History({len(self.steps)} steps, {life} cycles, ended: {self.ended})"
 
     def _repr_html_(self) -> str:
         rows = [("steps", len(self.steps)), ("cycles N", self.life), ("ended", self.ended)]
         rows[2:2] = [("join", str(join)) for join in self.joins]
+        rows.insert(2, ("error bar", str(self.life_bar)))
         parts: list[Any] = [element("b", "History")]
         if self.mesh is not None and self.cracks:
             cracks = [rim(crack.points, crack.faces) for crack in self.cracks]
@@ -137,8 +147,9 @@ class History:
             Columns step, N, crack, tip; x, y of the tip; a (length of its crack inside the body);
             K_I, K_II of load state 0 as ``K_I_0`` and so on, then of state 1, ...; spread (largest
             difference of K between two domains, of all states and modes); domain_cells (smallest
-            radius of these domains, in cells, where K has it); bar (longest error bar of K, where
-            K has bars); angle, dK_eq, R, rate, da
+            radius of these domains, in cells, where K has it); bar (longest error bar of K), best
+            (1 where growth followed the best K of all states, 0 where it followed K) and N_bar
+            (error bar of N), where K has bars; angle, dK_eq, R, rate, da
             as in `Step`. A step at which no tip is left has a row for each `Arrival`, x and y where
             it is, and nan for K and what follows from it. In 3D ``front`` stands for ``tip``, x, y,
             z is the middle of the front and a the area of the crack over the length of its fronts;

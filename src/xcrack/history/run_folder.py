@@ -14,6 +14,7 @@ from typing import Any
 from xcrack.crack.crack import Crack
 from xcrack.errors import ProblemError
 from xcrack.growth.arrival import Arrival
+from xcrack.growth.controller import Control
 from xcrack.growth.fingerprint import DEFAULTS
 from xcrack.growth.front_trail import FrontTrail, Places
 from xcrack.growth.joins import Join
@@ -23,6 +24,7 @@ from xcrack.growth.trail import Overloads, Trail
 from xcrack.history import lock
 from xcrack.history.store import PART, load, save, write_whole
 from xcrack.paths import system_errors
+from xcrack.sif.bars import Bars
 from xcrack.sif.sif import SIF
 from xcrack.solvers.reuse import Reuse, Slip
 
@@ -34,7 +36,7 @@ CLASSES: dict[str, type] = {
     "Step": Step, "Memory": Memory, "Reuse": Reuse, "Slip": Slip, "Crack": Crack,
     "SIF": SIF, "StepError": StepError, "Trail": Trail, "FrontTrail": FrontTrail,
     "Places": Places, "Arrival": Arrival, "Join": Join, "Overloads": Overloads, "Zones": Zones,
-    "Kinds": Kinds, "March": March,
+    "Kinds": Kinds, "March": March, "Control": Control, "Bars": Bars,
 }  # fmt: skip
 
 

@@ -19,6 +19,7 @@ from xcrack.analysis.solution import Solution
 from xcrack.arrays import Floats, lock
 from xcrack.contact.result import Contact
 from xcrack.errors import ProblemError
+from xcrack.geometry.curves import Round
 from xcrack.history import run_folder, store
 from xcrack.history.history import History
 from xcrack.mesh.mesh import Mesh
@@ -65,8 +66,8 @@ _CLASSES: dict[str, type] = {
     "LoadResultant": plan.Resultant,
     **{
         kind.__name__: kind
-        for kind in (Problem, Mesh, Isotropic, Numerics, Comparison, Contact, Report, Ingredient,
-                     NotStored, *_CONDITIONS)
+        for kind in (Problem, Mesh, Round, Isotropic, Numerics, Comparison, Contact, Report,
+                     Ingredient, NotStored, *_CONDITIONS)
     },
 }  # fmt: skip
 
@@ -176,9 +177,12 @@ def _content(result: Any) -> dict[str, Any]:
 
 
 def _storable(problem: Problem) -> Problem:
-    """A problem whose functions are replaced by their names."""
+    """A problem whose functions are replaced by their names; curves of the user are left out."""
+    curves = {k: c for k, c in problem.mesh.curves.items() if isinstance(c, Round)}
+    mesh = problem.mesh
     return replace(
         problem,
+        mesh=mesh if len(curves) == len(mesh.curves) else replace(mesh, curves=curves),
         supports=tuple(map(stored_condition, problem.supports)),
         loads=tuple(map(stored_condition, problem.loads)),
     )

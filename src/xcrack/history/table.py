@@ -10,6 +10,8 @@ from xcrack.arrays import Floats
 from xcrack.crack.fronts_3d import front_weights
 from xcrack.crack.tips_2d import tip_frames
 from xcrack.growth.step import Step
+from xcrack.growth.uncertainty import uses_best
+from xcrack.history.life_bar import life_bar
 
 Measures = dict[str, Callable[[Step, int], Floats]]
 
@@ -111,6 +113,16 @@ def _bar(step: Step, c: int) -> Floats:
     return np.max([state[c].bar.max(axis=1, initial=0.0) for state in step.sif], axis=0)
 
 
+def _best(step: Step, c: int) -> Floats:
+    """1 where growth followed the best K in all states, else 0 `(f,)`."""
+    return np.min([uses_best(state[c]) for state in step.sif], axis=0).astype(np.float64)
+
+
+def _of_N(step: Step, c: int) -> Floats:  # noqa: N802
+    """Error bar of the cycles so far `(f,)`."""
+    return np.full(len(step.angle[c]), life_bar([step]).total)
+
+
 def _domain_cells(step: Step, c: int) -> Floats:
     """Smallest radius of the domains of all states, in cells `(f,)`."""
     return np.min([getattr(state[c], _CELLS) for state in step.sif], axis=0)
@@ -118,13 +130,13 @@ def _domain_cells(step: Step, c: int) -> Floats:
 
 def _quality(steps: Sequence[Step]) -> Measures:
     """Columns that say how far K is to be trusted, of what the steps have."""
-    every = [sif for step in steps for state in step.sif for sif in state]
+    every = [sif for step in steps for state in step.sif for sif in state if len(sif.K)]
     known = bool(every) and all(hasattr(sif, _CELLS) for sif in every)
     measures: Measures = {"spread": _spread}
     if known:
         measures[_CELLS] = _domain_cells
     if every and all(sif.errors is not None for sif in every):
-        measures["bar"] = _bar
+        measures |= {"bar": _bar, "best": _best, "N_bar": _of_N}
     return measures
 
 

@@ -139,6 +139,7 @@ def growth(source: Source) -> Section | None:
     rows: list[tuple[str, Any]] = [
         ("steps", len(history.steps)),
         ("cycles N at the last step", history.life),
+        ("its numerical error", str(history.life_bar)),
         ("why it ended", history.ended),
     ]
     rows += [("break-through", str(each)) for step in history.steps for each in step.arrivals]
@@ -153,8 +154,10 @@ def growth(source: Source) -> Section | None:
     if not source.is_whole:
         words = "This run is not finished: the report shows the steps that are there."
         parts.insert(0, element("p", words, cls="bad"))
+    bar = history.life_bar
+    sources = {name: _plain(getattr(bar, name)) for name in ("steps", "K", "contact", "unknown")}
     numbers = {"steps": len(history.steps), "cycles": history.life, "ended": history.ended,
-               "whole": source.is_whole}  # fmt: skip
+               "error of cycles": sources, "whole": source.is_whole}  # fmt: skip
     return Section("growth", "Growth and life", joined(*parts), numbers)
 
 

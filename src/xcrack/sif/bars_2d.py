@@ -117,21 +117,25 @@ def _bars(sif: SIF, errors: TipErrors, k: int, places: Sequence[str], solution: 
     eta = own + shape
     shares = errors.shares[k].sum(axis=-1)
     bar = np.maximum(_ETA * np.abs(own), np.maximum(_SHARES * shares, _SPREAD * sif.spread))
-    bar += errors.bend_bar[k] + _RIM * np.abs(errors.rim[k]) + _END * errors.end[k]
+    contact = _END * errors.end[k]
+    bar += errors.bend_bar[k] + _RIM * np.abs(errors.rim[k]) + contact
     if solution.problem.contact != "off":  # negative K_I: faces overlap where contact is blind
         overlap = np.maximum(np.maximum(-sif.K_I, -sif.K_I - eta[:, 0]), 0.0)
         bar += _OVERLAP * overlap.max()
+        contact = contact + _OVERLAP * overlap.max()
+        contact[:, 0] += np.maximum(overlap - bar[:, 0], 0.0)
         bar[:, 0] = np.maximum(bar[:, 0], overlap)
     reasons = [place or _polygon(errors.chords[k][i], bar[i]) for i, place in enumerate(places)]
     bar += _CHORDS * np.abs(errors.chords[k])
     # K_I of closed tips is zero; its bar is what the integral gave.
     eta[sif.closed, 0] = 0.0
-    bar[sif.closed, 0] = np.abs(sif.K_integral[sif.closed, 0])
-    return bars_of(eta, bar, reasons)
+    bar[sif.closed, 0] = contact[sif.closed, 0] = np.abs(sif.K_integral[sif.closed, 0])
+    return bars_of(eta, bar, reasons, contact)
 
 
 def _without(bars: Bars, reason: str) -> Bars:
-    return bars_of(bars.eta, bars.bar, [own or reason for own in bars.reasons])
+    reasons = [own or reason for own in bars.reasons]
+    return bars_of(bars.eta, bars.bar, reasons, bars.contact)
 
 
 def _pressed_kink(solution: Solution, crack: int) -> str:

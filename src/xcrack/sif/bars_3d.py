@@ -79,6 +79,7 @@ def _at_least_mean(sif: SIF, values: Floats) -> Floats:
 
 def _completed(sif: SIF, eta: Floats, bar: Floats) -> Bars:
     """With K_I of closed places, and without what is beside a free surface."""
-    bar[sif.closed, 0] = np.abs(sif.K_integral[sif.closed, 0])
+    contact = np.zeros_like(bar)
+    bar[sif.closed, 0] = contact[sif.closed, 0] = np.abs(sif.K_integral[sif.closed, 0])
     reason = "K has no meaning so close to a free surface: it is prolonged from inside"
-    return bars_of(eta, bar, [reason if at else "" for at in sif.at_surface])
+    return bars_of(eta, bar, [reason if at else "" for at in sif.at_surface], contact)

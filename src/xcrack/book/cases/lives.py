@@ -12,7 +12,7 @@ from xcrack.crack.lines import line_crack
 from xcrack.growth.criteria import weighted_angle
 from xcrack.growth.cycles import cycles_between
 from xcrack.growth.run import grow
-from xcrack.growth.step import Cycle
+from xcrack.growth.step import Cycle, Step
 from xcrack.history.collect import collect
 from xcrack.laws.law import Law
 from xcrack.laws.power import elber, paris, walker
@@ -69,6 +69,27 @@ def _power(level: int, order: int) -> list[Value]:
     return [Value("cycles", N, wanted, {1: 4e-2, 2: 2e-3}[order])]
 
 
+def _to_a_tolerance(level: int) -> list[Value]:
+    """Mesh and steps by a tolerance: the life within it, and within its bar."""
+    law, tolerance = paris(_C, 3.0), 1e-2 * 10.0**-level
+    run = grow(
+        _row(9, 2), law, weighted_angle, _CYCLE, tolerance=tolerance, progress=False
+    )  # fmt: skip
+    history = collect(run, until=_has_grown, keep_solutions=False)
+    a = float(np.ptp(history.cracks[0].points[:, 0])) / 2
+    wanted = quad(lambda a: 1 / law(periodic_K(a, _W), 0.0), _A0, a, epsrel=1e-12)[0]
+    bar = history.life_bar
+    return [
+        Value("cycles", history.life, wanted, tolerance),
+        Value("error over its bar", abs(history.life - wanted) / bar.total, 0.0, 1.0, scale=1.0),
+        Value("bar over the cycles", bar.relative, 0.0, tolerance, scale=1.0),
+    ]
+
+
+def _has_grown(step: Step) -> bool:
+    return float(np.ptp(step.corrected[0].points[:, 0])) / 2 > _A0 + _GROWTH
+
+
 def _by_rule(rate: Callable[[Any], Any], n: int) -> float:
     a = np.linspace(1.0, 3.0, n + 1)
     return float(cycles_between(a[:-1], a[1:], rate(a[:-1]), rate(a[1:])).sum())
@@ -114,6 +135,7 @@ CASES = (
           partial(_life, order=2, law=walker(_C, 2.0, gamma=0.5), cycle=Cycle(_R, 1.0),
                   effective=(1 - _R) ** 0.5), 2,
           _EDGE + ", range ΔK / (1 - R)^(1 - γ) (Walker, 1970)"),
+    _case("row-tolerance-2", "error_bars", _to_a_tolerance, 2),
     Case("cycle-rule", "life", "integrals of the law (closed form, quadrature)", "exact", 0, 0,
          False, _rule, 3),
 )  # fmt: skip

@@ -1,0 +1,153 @@
+"""Growth to a wanted error: lives and paths against exact ones, bars, resuming, refusals."""
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+import xcrack as xc
+from xcrack.history import run_folder
+from xcrack.verification.plates import PLATE_EDGE
+
+STEEL = xc.Isotropic(210e3, 0.3, plane="strain")
+LAW = xc.paris(C=1e-3, m=3.0)
+PULL = (xc.traction("top", (0.0, 1.0)), xc.traction("bottom", (0.0, -1.0)))
+
+pytestmark = pytest.mark.filterwarnings("ignore::xcrack.XcrackWarning")
+
+A0 = 0.2
+_SQUARE = np.array([(a, F) for (h, a), F in PLATE_EDGE.items() if h == 1.0]).T
+# K grows like (1 - a)^(-3/2) towards the far edge; without it, a quartic passes the table.
+_QUARTIC = np.polyfit(_SQUARE[0], _SQUARE[1] * (1 - _SQUARE[0]) ** 1.5, 4)
+_TABLE = 3e-4  # of K: between the points of the table
+
+
+def strip(n=6, y=0.003, **options):
+    """Edge crack of 0.2 in the strip [0, 1] x [-1, 1] under tension, on a coarse mesh."""
+    mesh = xc.box((0.0, -1.0), (1.0, 1.0), (n, 2 * n))
+    crack = xc.line_crack([(-0.1, y), (A0, y)])
+    return xc.Problem(mesh, STEEL, [crack], loads=PULL, **options)
+
+
+def exact_life(a):
+    """Cycles from 0.2 to a by the table of K."""
+
+    def cycles(a):
+        K = np.sqrt(np.pi * a) * np.polyval(_QUARTIC, a) / (1 - a) ** 1.5
+        return float(1 / LAW(np.array([K]), np.zeros(1))[0])
+
+    return float(quad(cycles, A0, a, epsrel=1e-12)[0])
+
+
+def run_of(problem=None, **options):
+    given = {
+        "problem": problem or strip(),
+        "law": LAW,
+        "criterion": xc.max_hoop_stress,
+        "cycle": xc.Cycle(0.0, 1.0),
+        "progress": False,
+    }
+    return given | options
+
+
+def longer_than(a):
+    return lambda step: step.corrected[0].points[-1, 0] > a
+
+
+# Known lives -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("tolerance", [1e-2, pytest.param(1e-3, marks=pytest.mark.slow)])
+def test_life_of_an_edge_crack(tolerance):
+    """Paris's law integrated over K of the table; that is good to 3e-4, thrice in the life."""
+    history = xc.collect(
+        xc.grow(**run_of(tolerance=tolerance)), until=longer_than(0.5), keep_solutions=False
+    )
+    bar = history.life_bar
+    error = abs(history.life / exact_life(history.cracks[0].points[-1, 0]) - 1)
+    print(f"true {error:.1e}: {bar}")
+    assert error <= tolerance
+    assert error <= bar.relative + LAW.m * _TABLE
+    assert bar.relative <= tolerance
+    assert bar.best == bar.places == len(history.steps)
+    assert bar.contact == bar.unknown == 0.0
+    assert bar.path <= tolerance * 0.3
+
+
+def test_steps_are_chosen_by_the_tolerance():
+    """A tolerance ten times smaller: more and shorter steps; da and cycles stay upper bounds."""
+    few = xc.collect(xc.grow(**run_of(tolerance=0.05)), until=longer_than(0.4))
+    many = xc.collect(xc.grow(**run_of(tolerance=0.05, da=0.03)), until=longer_than(0.4))
+    assert len(many.steps) > len(few.steps)
+    ways = np.diff([step.corrected[0].points[-1, 0] for step in many.steps])
+    assert ways.max() <= 0.03 * (1 + 1e-9)
+    same = [h.steps[0].solutions[0].problem.mesh.points for h in (few, many)]
+    assert same[0].tobytes() == same[1].tobytes()  # the mesh does not depend on them
+    # The table of the run says which K was used, and how far N is known.
+    table = few.table()
+    assert (table["best"] == 1).all()
+    assert table["N_bar"][-1] == few.life_bar.total
+    assert "±" in repr(few)
+    assert "best K at" in str(few.life_bar)
+
+
+# What is stored --------------------------------------------------------------------------------
+
+
+def content(folder):
+    files = sorted(p for p in folder.iterdir() if p.is_file() and p.name != run_folder.BODY)
+    return {path.name: path.read_bytes() for path in files}
+
+
+@pytest.mark.parametrize("lost", ["", pytest.param(run_folder.BODY, marks=pytest.mark.slow)])
+def test_resumed_to_the_last_bit(tmp_path, lost):
+    """A run that is killed, also one that has lost its mesh: that is scouted and made again."""
+    given = run_of(tolerance=0.05)
+    whole = xc.collect(xc.grow(**given, max_steps=4), tmp_path / "whole")
+    xc.collect(xc.grow(**given, max_steps=2), tmp_path / "part")
+    if lost:
+        (tmp_path / "part" / lost).unlink()
+    resumed = xc.resume(tmp_path / "part", **given, max_steps=4)
+    assert resumed.table().tobytes() == whole.table().tobytes()
+    assert content(tmp_path / "part") == content(tmp_path / "whole")
+    stored = xc.load(tmp_path / "whole")
+    assert stored.life_bar.total == whole.life_bar.total
+    assert len(stored.mesh.cells) == len(whole.steps[0].solutions[0].problem.mesh.cells)
+
+
+def test_another_tolerance_is_another_run(tmp_path):
+    xc.collect(xc.grow(**run_of(tolerance=0.05), max_steps=1), tmp_path)
+    with pytest.raises(xc.ProblemError, match=r"other settings: tolerance: stored 0\.05, given 0"):
+        xc.resume(tmp_path, **run_of(tolerance=0.04), max_steps=2)
+
+
+# What cannot be --------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("options", "match"),
+    [
+        ({"tolerance": 0.0}, "tolerance"),
+        ({"tolerance": 1.0}, "tolerance"),
+        ({"tolerance": -0.1}, "tolerance"),
+        ({"tolerance": float("nan")}, "tolerance"),
+        ({"tolerance": "fine"}, "tolerance"),
+        ({"tolerance": 0.01, "integrator": "euler"}, "integrator"),
+        ({"da": 0.1, "max_unknowns": 1000}, "give tolerance too"),
+        ({"tolerance": 0.01, "max_unknowns": 0}, "max_unknowns"),
+        ({"tolerance": 0.01, "max_unknowns": 100}, "the first mesh"),
+        ({}, "or a tolerance"),
+    ],
+)
+def test_refused(options, match):
+    with pytest.raises(xc.ProblemError, match=match):
+        next(xc.grow(**run_of(**options)))
+
+
+@pytest.mark.filterwarnings("default::xcrack.XcrackWarning")
+def test_too_few_unknowns():
+    steps = xc.grow(**run_of(tolerance=1e-3, max_unknowns=4000))
+    with pytest.warns(xc.XcrackWarning) as caught:
+        xc.collect(steps, until=longer_than(0.25))
+    messages = [str(w.message) for w in caught]
+    assert any("would have more than 4000 unknowns" in m for m in messages)
+    assert any("tolerance = 0.001 is not met at step" in m for m in messages)
