@@ -43,6 +43,38 @@ def ear_clipped(polygon: Floats) -> Ints:
     return np.array(triangles, dtype=np.int64)
 
 
+def without_slivers(points: Floats, triangles: Ints) -> Ints:
+    """Triangles `(k, 3)` of points in a plane with diagonals flipped until they are Delaunay's.
+
+    The outline stays (Lawson, 1977, Software for C1 surface interpolation). Triangles run round
+    counter-clockwise before and after.
+    """
+    faces = [tuple(int(p) for p in face) for face in triangles]
+    for _ in range(len(faces) ** 2):
+        owner = {(f[k], f[k - 2]): n for n, f in enumerate(faces) for k in range(3)}
+        for (p, q), first in owner.items():
+            second = owner.get((q, p))
+            if second is None or p > q:
+                continue
+            a, b = sum(faces[first]) - p - q, sum(faces[second]) - p - q
+            if _in_circle(*points[[p, q, a, b]]):
+                faces[first], faces[second] = (a, p, b), (b, q, a)
+                break
+        else:
+            break
+    return np.array(faces, dtype=np.int64)
+
+
+def _in_circle(p: Floats, q: Floats, a: Floats, b: Floats) -> bool:
+    """Whether b lies inside the circle of p, q, a, beyond pq, and the diagonal ab may be cut."""
+    angles = []
+    for corner in (a, b):
+        one, other = p - corner, q - corner
+        angles.append(abs(np.arctan2(cross(one, other), one @ other)))
+    convex = cross(b - p, a - p) > 0 and cross(a - q, b - q) > 0
+    return bool(convex and sum(angles) > np.pi * (1 + 1e-9))
+
+
 def self_crossing(flat: Floats) -> tuple[int, int] | None:
     """Two sides of a closed 2D polygon that meet other than at their common end."""
     m = len(flat)

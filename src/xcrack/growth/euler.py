@@ -7,13 +7,19 @@ from xcrack.growth.advance import Advance, PerCrack, plan_advance
 from xcrack.growth.evaluation import Evaluation, Settled
 from xcrack.growth.follow import following
 from xcrack.growth.options import Run
-from xcrack.growth.step import Step, memory_of
+from xcrack.growth.step import Step, StepError, memory_of
 from xcrack.mesh.locate import cell_sizes
 
 
 def begun(run: Run, seen: Evaluation) -> Settled:
     """The first step of a run."""
-    return _settled(run, seen, 0.0, tuple(np.zeros_like(r) for r in seen.rate))
+    return begun_at(run, seen, 0.0)
+
+
+def begun_at(run: Run, seen: Evaluation, cycles: float, error: StepError | None = None) -> Settled:
+    """A step before which there is nothing to follow."""
+    del error
+    return _settled(run, seen, cycles, tuple(np.zeros_like(r) for r in seen.rate))
 
 
 def settled(run: Run, last: Step, seen: Evaluation) -> Settled:
@@ -31,11 +37,11 @@ def planned(run: Run, step: Step) -> Advance:
     return _plan(run, sizes, step.rate, step.dK_eq, memory_of(step).pending)
 
 
-def advanced(run: Run, step: Step) -> list[Crack]:
-    """The cracks after the advance of a step."""
+def advanced(run: Run, step: Step, share: float = 1.0) -> list[Crack]:
+    """The cracks after the advance of a step, or after a share of it."""
     mesh = run.problem.mesh
     return [
-        following(mesh).advanced(crack, step.sif[0][c], step.angle[c], step.da[c], mesh)
+        following(mesh).advanced(crack, step.sif[0][c], step.angle[c], share * step.da[c], mesh)
         for c, crack in enumerate(step.cracks)
     ]
 

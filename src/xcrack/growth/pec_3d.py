@@ -53,13 +53,18 @@ _SPACING = 0.5  # of a cell, between the points of a new front
 
 def begun(run: Run, seen: Evaluation) -> Settled:
     """The first step of a run."""
+    none = tuple(np.zeros(len(sif.x)) for sif in seen.sif[0])
+    return begun_at(run, seen, 0.0, StepError(none, 0.0))
+
+
+def begun_at(run: Run, seen: Evaluation, cycles: float, error: StepError) -> Settled:
+    """A step before which there is nothing to correct."""
     parts = tuple(_solved_places(seen, c, None) for c in range(len(seen.cracks)))
     parts = with_kinds(run, seen, parts)
-    none = tuple(np.zeros(len(part.s)) for part in parts)
     trail = _trail(run, seen, parts)
     size = min((part.size for part in parts if len(part.s)), default=np.inf)
     trail = replace(trail, control=first(run, size, _shortest(run, trail), np.inf))
-    return _settled(run, seen, 0.0, seen.cracks, trail, StepError(none, 0.0))
+    return _settled(run, seen, cycles, seen.cracks, trail, error)
 
 
 def settled(run: Run, last: Step, seen: Evaluation) -> Settled:
@@ -132,10 +137,11 @@ def planned(run: Run, step: Step) -> Advance:
     return replace(plan, tip=(c, int(np.argmin(away))))
 
 
-def advanced(run: Run, step: Step) -> list[Crack]:
-    """The cracks after the predicted advance of a step."""
+def advanced(run: Run, step: Step, share: float = 1.0) -> list[Crack]:
+    """The cracks after the predicted advance of a step, or after a share of it."""
     trail, _ = _remembered(step)
-    ahead = _ahead(trail, _plan(run, trail))
+    plan = _plan(run, trail)
+    ahead = _ahead(trail, replace(plan, da=tuple(share * da for da in plan.da)))
     return [
         _advanced(crack, part, part.angle, way, run.problem.mesh)
         for crack, part, way in zip(step.corrected, trail.parts, ahead)

@@ -9,6 +9,7 @@ import numpy as np
 from xcrack.analysis.solution import Solution
 from xcrack.crack.crack import Crack
 from xcrack.errors import GeometryError, ProblemError, XcrackError, warn
+from xcrack.growth import joining
 from xcrack.growth.advance import LEAST
 from xcrack.growth.arrivals import arrivals_of, last_step
 from xcrack.growth.checks import depends_on_ratio
@@ -18,6 +19,7 @@ from xcrack.growth.ending import end_at, falls_to_zero, left_the_body, short_kin
 from xcrack.growth.evaluation import evaluate
 from xcrack.growth.follow import following
 from xcrack.growth.integrators import integrator_of
+from xcrack.growth.joined import Joined
 from xcrack.growth.notices import Notices
 from xcrack.growth.options import GrowOptions, Run, lists_options, run_of
 from xcrack.growth.prepared import fingerprint, prepared
@@ -222,14 +224,21 @@ def _after(run: Run, last: Step, reuse: Reuse) -> tuple[Step | None, Reuse, str]
     """The step after another one, or why there is none."""
     try:
         cracks = integrator_of(run).advanced(run, last)
+        met = joining.joined(run, last, cracks)
+        if met is not None:
+            cracks, reuse = list(met.cracks), replace(reuse, centre=(), active=())
         problem = _problem(run, cracks, memory_of(last))
     except GeometryError as error:
         return None, reuse, _stopped(last, error)
-    arriving = following(run.problem.mesh).arriving(last, cracks, problem.placed, run.problem.mesh)
+    arriving = (
+        following(run.problem.mesh).arriving(last, cracks, problem.placed, run.problem.mesh)
+        if met is None
+        else joining.arriving(run, last, met)
+    )
     if not any(placed.n_tips for placed in problem.placed):
         return last_step(run, last, cracks, problem.placed, arriving), reuse, ""
     try:
-        step, reuse = _next_step(run, problem, last, reuse, memory_of(last).settings)
+        step, reuse = _next_step(run, problem, last, reuse, memory_of(last).settings, met)
         arrivals = arrivals_of(run, last, arriving, step.cycles - last.cycles)
         return replace(step, arrivals=arrivals), reuse, ""
     except GeometryError as error:
@@ -266,6 +275,7 @@ def _next_step(
     last: Step | None,
     reuse: Reuse,
     settings: Mapping[str, str],
+    met: Joined | None = None,
 ) -> tuple[Step, Reuse]:
     """Solve all load states of a problem and decide where and how fast its cracks grow."""
     solutions, sif, handed_on = respond(problem, run, reuse)
@@ -278,7 +288,11 @@ def _next_step(
             radius = float(np.min(solutions[0].space.radius))
     else:
         index, radius = last.index + 1, memory_of(last).radius
-        settled = integrator.settled(run, last, seen)
+        settled = (
+            integrator.settled(run, last, seen)
+            if met is None
+            else joining.settled(run, last, seen, met)
+        )
     settled = with_K(run, last, settled, seen, sif)
     memory = Memory(
         seen.law_rate,
@@ -305,6 +319,7 @@ def _next_step(
         levels=levels_of(run.cycle, solutions),
         corrected=settled.corrected,
         error=settled.error,
+        joins=() if met is None else met.joins,
     )
     return step, handed_on
 

@@ -1,0 +1,46 @@
+"""Cracks that meet during growth: the choice between 2D and 3D, and what they become."""
+
+from collections.abc import Sequence
+
+from xcrack.crack.crack import Crack
+from xcrack.growth import joins_3d
+from xcrack.growth.arrival import Arriving
+from xcrack.growth.evaluation import Evaluation, Settled
+from xcrack.growth.joined import Joined
+from xcrack.growth.options import Run
+from xcrack.growth.step import Step
+
+
+def joined(run: Run, last: Step, cracks: Sequence[Crack]) -> Joined | None:
+    """Cracks that meet within the advance after a step, joined; None where none do.
+
+    Parameters
+    ----------
+    run : Run
+    last : Step
+    cracks : sequence of Crack
+        After the whole advance.
+
+    Returns
+    -------
+    Joined or None
+
+    Raises
+    ------
+    GeometryError
+        They meet, and what they would become cannot be made.
+    """
+    return joins_3d.joined(run, last, cracks) if run.problem.mesh.dim == 3 else None
+
+
+def arriving(run: Run, last: Step, met: Joined) -> list[Arriving]:
+    """What comes to the boundary in an advance in which cracks join, numbered as before it."""
+    return joins_3d.arriving(run, last, met)
+
+
+def settled(run: Run, last: Step, seen: Evaluation, met: Joined) -> Settled:
+    """What the step means in which cracks have joined."""
+    return joins_3d.settled(run, last, seen, met)
+
+
+__all__ = ["arriving", "joined", "settled"]
