@@ -13,6 +13,9 @@ from support.scenes_fronts import graded, lines
 from xcrack.geometry.triangulation import face_areas
 from xcrack.growth import joins_3d
 from xcrack.growth.ligament_3d import amplification, part_of_time
+from xcrack.growth.lineage import lineage
+from xcrack.reporting.results import growth
+from xcrack.reporting.source import Source
 
 pytestmark = pytest.mark.filterwarnings("ignore::xcrack.XcrackWarning")
 
@@ -72,6 +75,19 @@ def test_two_pennies_become_one_by_euler():
     check(xc.collect(grow(pennies(), integrator="euler")))
 
 
+def test_pictures_and_tables_of_a_join(run, tmp_path):
+    history = run[2]
+    figure = history.plot("fronts", file=tmp_path / "fronts.png")
+    assert len(figure.axes[0].lines) == 4  # two fronts, then one in two steps
+    for kind in ("K", "a"):
+        legend = history.plot(kind, file=tmp_path / f"{kind}.png").axes[0].get_legend()
+        assert "cracks 0 and 1 join" in [text.get_text() for text in legend.get_texts()]
+    page = growth(Source("a run", (), (), history)).content
+    assert str(history.joins[0]) in str(page)
+    history.write(tmp_path / "files")
+    assert (tmp_path / "files" / "history.pvd").is_file()
+
+
 def check(history):
     first, joined, after = history.steps
     assert [len(step.cracks) for step in history.steps] == [2, 1, 1]
@@ -97,6 +113,9 @@ def check(history):
     assert table["crack"].tolist() == [0, 1, 0, 0]
     assert len(history.measures()[0]) == 4
     assert "join" in history._repr_html_()
+    assert lineage(history.steps, 0) == lineage(history.steps, 1) == [[0, 1], [0], [0]]
+    same = history.rerate(xc.paris(C=2e-3, m=3.0))
+    assert same.cycles == pytest.approx([step.cycles / 2 for step in history.steps])
 
 
 @pytest.mark.parametrize("steps", [1, pytest.param(2, marks=pytest.mark.slow)])

@@ -68,4 +68,13 @@ def checked_joins(given: Sequence[Join], what: str) -> tuple[Join, ...]:
     return joins
 
 
-__all__ = ["Join", "checked_joins"]
+def numbers_after(n: int, joins: Sequence[Join], left: int) -> list[int]:
+    """Number that each of n cracks has after joins that leave `left` cracks."""
+    number = list(range(n))
+    for join in joins if left < n else ():
+        one, other = sorted(number[c] for c in join.cracks)
+        number = [one if c == other else c - (c > other) for c in number]
+    return number
+
+
+__all__ = ["Join", "checked_joins", "numbers_after"]

@@ -10,6 +10,7 @@ from xcrack.arrays import Floats, Ints
 from xcrack.errors import ProblemError
 from xcrack.growth.checks import evaluate_law
 from xcrack.growth.cycles import cycles_between
+from xcrack.growth.joins import numbers_after
 from xcrack.growth.step import Step, memory_of, moved_places
 from xcrack.history.block_rates import Block
 from xcrack.laws.law import Law
@@ -150,7 +151,8 @@ def _of_blocks(
     rows = []
     for n, (c, j, there) in zip(step.tolist(), where.tolist()):
         first = at(n, c, j)
-        rows += [first, first if there < 0 else at(n + 1, c, there)]
+        now = _numbers(steps[n], steps[n + 1])[c]
+        rows += [first, first if there < 0 else at(n + 1, now, there)]
     p = max(len(row[0]) for row in rows)
     result = np.zeros((3, len(rows), p))  # kinds of cycles that a step does not have: none of them
     for k, row in enumerate(rows):
@@ -159,23 +161,29 @@ def _of_blocks(
     return dK, R, count
 
 
+def _numbers(step: Step, after: Step) -> list[int]:
+    """Number that each crack of a step has in the next one."""
+    return numbers_after(len(step.cracks), after.joins, len(after.cracks))
+
+
 def _of_step(number: int, step: Step, after: Step) -> list[tuple[float, ...]]:
     before, later = memory_of(step), memory_of(after)
     ligament = {(arrival.crack, arrival.tip): arrival.ligament for arrival in after.arrivals}
     rows = []
-    for c in range(len(step.cracks)):
+    joined = {c for join in after.joins for c in join.cracks}
+    for c, now in enumerate(_numbers(step, after)):
         da, rate = step.da[c], before.law_rate[c]
         grows = np.nonzero((da > 0) & (rate > 0))[0]
         if not len(grows):
             continue
-        moved, there = moved_places(step, c), after.sif[0][c].x
+        moved, there = moved_places(step, c), after.sif[0][now].x
         for j in grows.tolist():
             a, way = before.length[c] * float(da[j] / da.sum()), float(da[j])
             first = _values(step, c, j, a, before.length[c])
             distance, k = cKDTree(there).query(moved[j]) if len(there) else (np.inf, 0)
-            if distance <= _NEAR * da[j]:
-                last = _values(after, c, int(k), a + da[j], later.length[c])
-            else:  # it has left the body: its rate stays what it was
+            if distance <= _NEAR * da[j] and c not in joined:
+                last = _values(after, now, int(k), a + da[j], later.length[now])
+            else:  # it has left the body, or joined another crack: its rate stays what it was
                 way = ligament.get((c, j), way)
                 k, last = -1, (a + way, *first[1:])
             rows.append((number, c, j, float(rate[j]), way, int(k), *first, *last))

@@ -15,6 +15,7 @@ from xcrack.arrays import Bools, Floats
 from xcrack.crack.fronts_3d import is_closed
 from xcrack.crack.measures_3d import front_ends
 from xcrack.errors import ProblemError
+from xcrack.growth.lineage import lineage
 from xcrack.growth.step import Step
 from xcrack.history.history import History
 from xcrack.inputs import entries, shown, whole
@@ -73,6 +74,7 @@ def draw_fronts(
     ----------
     history : History or sequence of History
     crack : int
+        Number in the first step; cracks that it joins are drawn with it.
     plane : (origin, (right, up)), optional
         Point and two directions of the plane to draw on; left out: the plane that the first
         surface of the crack lies nearest to.
@@ -248,12 +250,12 @@ def front_axes(
     last = max(steps[-1].index for steps in runs)
     colours, scale = colormaps["viridis"], Normalize(runs[0][0].index, max(last, 1))
     for k, (steps, name) in enumerate(zip(runs, labels, strict=True)):
-        shown = [*steps[:-1:every], steps[-1]]
-        for step in shown:
-            newest = step is shown[-1]
+        every_step = list(zip(steps, lineage(steps, crack)))
+        for step, numbers in [*every_step[:-1:every], every_step[-1]]:
+            newest = step is steps[-1]
             age = (last - step.index) / max(last, 1)
             color = colours(scale(step.index)) if single else f"C{k}"
-            for x in _drawn_lines(step, crack, body):
+            for x in (x for c in numbers for x in _drawn_lines(step, c, body)):
                 axes.plot(
                     *on_plane(x, view).T,
                     ("-", "--", "-.", ":")[k % 4],

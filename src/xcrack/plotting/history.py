@@ -66,6 +66,7 @@ def _draw_K_of_fronts(history: History, axes: Any) -> None:
                 axes.fill_between(
                     rows["N"], low, high, color=f"C{number}", alpha=0.15, lw=0, label=name
                 )
+    _mark_joins(history, axes)
     axes.set(xlabel="cycles N", ylabel="largest K along the front")
     axes.axhline(0, color="0.7", lw=0.8, zorder=0)
     axes.legend(fontsize="small")
@@ -95,6 +96,7 @@ def _draw_a(history: History, axes: Any) -> None:
         rows = table[table["crack"] == crack]
         _, first = np.unique(rows["step"], return_index=True)
         axes.plot(rows["N"][first], rows["a"][first], "o-", ms=3, label=f"crack {crack}")
+    _mark_joins(history, axes)
     axes.set(xlabel="cycles N", ylabel="crack length a")
     axes.legend(fontsize="small")
 
@@ -110,9 +112,17 @@ def _draw_measures(history: History, axes: Any) -> None:
             if np.nanmax(np.append(own[name], 0.0)) > 0:
                 label = f"{who}length on {name.removeprefix('length_')}"
                 axes.plot(own["N"], own[name], f"{style}--", ms=4, color=f"C{crack}", label=label)
+    _mark_joins(history, axes)
     axes.set(xlabel="cycles N", ylabel="length")
     axes.set_ylim(bottom=0.0)
     axes.legend(fontsize="small")
+
+
+def _mark_joins(history: History, axes: Any) -> None:
+    """Lines at the cycles at which cracks joined."""
+    for join in history.joins:
+        name = f"cracks {join.cracks[0]} and {join.cracks[1]} join"
+        axes.axvline(join.N, color="0.5", lw=0.9, ls=(0, (4, 3)), zorder=0, label=name)
 
 
 def _draw_path(history: History, axes: Any) -> None:

@@ -140,6 +140,7 @@ def growth(source: Source) -> Section | None:
         ("steps", len(history.steps)),
         ("cycles N at the last step", history.life),
         ("its numerical error", str(history.life_bar)),
+        *(("join", str(join)) for join in history.joins),
         ("why it ended", history.ended),
     ]
     rows += [("break-through", str(each)) for step in history.steps for each in step.arrivals]
