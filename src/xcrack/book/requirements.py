@@ -23,6 +23,7 @@ REQUIREMENTS: Mapping[str, str] = MappingProxyType({
     "direction": "Angle at which a crack turns",
     "path": "Path of a growing crack",
     "fronts": "Shape of a growing front",
+    "joins": "Cracks that join: cycles, and K of the crack that goes on",
     "life": "Cycles under constant amplitude",
     "ratio": "Cycles where the stress ratio or closure matters",
     "restart": "A run that was stopped goes on to the same result",
