@@ -12,11 +12,10 @@ from support import scenes_2d as scenes
 from support import scenes_friction as rubbing
 from support.scenes_2d import SIDES
 from xcrack.analysis.solve import solve_states
-from xcrack.contact.multipliers import gap_rows
 from xcrack.contact.slip import weak_slip
 from xcrack.growth.rating import respond_to_cycle
 from xcrack.solvers.reuse import Reuse
-from xcrack.xfem.lips import arc_position, jump_matrix
+from xcrack.xfem.lips import arc_position
 from xcrack.xfem.model import build
 
 TURN = 0.31
@@ -73,13 +72,19 @@ def test_a_cycle_that_slips_back_from_its_memory_is_the_same():
 def slips_of(problem, before):
     """Weak slips that a memory gives the functions of a crack, and their rows."""
     model = build(problem)
-    from xcrack.contact.friction import tangent
+    from xcrack.contact.friction import tangential_rows, tangents
     from xcrack.contact.multipliers import multipliers
 
     lips = model.lips[0]
     m = multipliers(model.space, 0, lips, "reduced", model.known.fixed, rubs=True)
-    rows = gap_rows(m, lips, jump_matrix(model.space, 0, lips, tangent(lips)))
-    return weak_slip(model, m, before), rows, m, lips, model.space.cracks[0].points
+    rows = tangential_rows(model.space, m, lips)[0]
+    return (
+        weak_slip(model, m, tangents(lips), before)[0],
+        rows,
+        m,
+        lips,
+        model.space.cracks[0].points,
+    )
 
 
 def test_memory_of_the_same_crack_is_its_slip():

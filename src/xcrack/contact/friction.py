@@ -20,6 +20,7 @@ from xcrack.scene.problem import Problem
 from xcrack.solvers.coulomb import FrictionRows, Status, all_stuck
 from xcrack.solvers.engine import Engine, StateContact
 from xcrack.solvers.reuse import Slip
+from xcrack.xfem.function_space import FunctionSpace
 from xcrack.xfem.lips import LipPoints, jump_matrix
 from xcrack.xfem.model import Model
 
@@ -50,9 +51,47 @@ def rubs(problem: Problem, c: int) -> bool:
     return problem.contact != "off" and problem.frictions[c] > 0
 
 
-def tangent(lips: LipPoints) -> Floats:
-    """Direction of the shear at each point `(q, 2)`: along the order of the crack's points."""
-    return np.stack([lips.normal[:, 1], -lips.normal[:, 0]], axis=1)
+def tangents(lips: LipPoints) -> Floats:
+    """Directions of shear and slip at each point `(q, d - 1, d)`.
+
+    In 2D along the order of the crack's points. In 3D the first is the direction that most normals
+    are farthest from, laid onto the face, the second normal × first: both are continuous along
+    curved faces.
+    """
+    return _TANGENTS[lips.x.shape[1]](lips)
+
+
+def _tangents_2d(lips: LipPoints) -> Floats:
+    return np.stack([lips.normal[:, 1], -lips.normal[:, 0]], axis=1)[:, None]
+
+
+def _tangents_3d(lips: LipPoints) -> Floats:
+    n = lips.normal
+    along = np.linalg.eigh(n.T @ (lips.weight[:, None] * n))[1][:, 0]
+    along = along * np.sign(along[np.argmax(np.abs(along))])
+    first = along - (n @ along)[:, None] * n
+    size = np.linalg.norm(first, axis=1, keepdims=True)
+    first = np.where(size > 1e-6, first / np.maximum(size, 1e-300), np.roll(n, 1, axis=1))
+    first = first - np.einsum("qi,qi->q", first, n)[:, None] * n
+    first /= np.linalg.norm(first, axis=1, keepdims=True)
+    return np.stack([first, np.cross(n, first)], axis=1)
+
+
+_TANGENTS = {2: _tangents_2d, 3: _tangents_3d}
+
+
+def tangential_rows(space: FunctionSpace, m: Multipliers, lips: LipPoints) -> list[sp.csr_matrix]:
+    """Rows of the weak slips along each tangent `(g, n_dof)`."""
+    jumps = tangential_jumps(space, m.crack, lips, tangents(lips))
+    return [gap_rows(m, lips, jump) for jump in jumps]
+
+
+def tangential_jumps(
+    space: FunctionSpace, c: int, lips: LipPoints, directions: Floats
+) -> list[sp.csr_matrix]:
+    """Jumps along directions `(q, m, d)` at the lip points, each `(q, n_dof)`."""
+    every = np.moveaxis(directions, 1, 0)
+    return [jump_matrix(space, c, lips, along) for along in every]
 
 
 def solve_friction(
@@ -94,7 +133,8 @@ def solve_friction(
     """
     faces = [_face(problem, model, m) for m in chosen]
     rubbing = [face for face in faces if face.mu > 0]
-    N = sp.csr_matrix(sp.vstack([face.normal for face in faces] + [r.along for r in rubbing]))
+    along = [face.along[k] for k in range(model.space.dim - 1) for face in rubbing]
+    N = sp.csr_matrix(sp.vstack([face.normal for face in faces] + along))
     small = engine.condensed(N, f, known)
     rows = _rows(faces, small.dual, stiffness)
     status = all_stuck(rows) if start is None else Status(start, all_stuck(rows).slip)
@@ -103,8 +143,11 @@ def solve_friction(
         pass_through = shaken_down
         slips = [before[r.space.crack] if before else None for r in rubbing]
         if any(slip is not None for slip in slips):
-            weak = [weak_slip(model, r.space, s) for r, s in zip(rubbing, slips, strict=True)]
-            begin = with_slip(rows, small.gap[:, -1], np.concatenate(weak), status)
+            weak = [
+                weak_slip(model, r.space, r.tangents, s)
+                for r, s in zip(rubbing, slips, strict=True)
+            ]
+            begin = with_slip(rows, small.gap[:, -1], np.concatenate(weak, axis=1).ravel(), status)
     places = pass_through(rows, small.gap, begin, problem.numerics.substeps)
     u = small.displacements(np.stack([place.lam for place in places], axis=1))
     states = [
@@ -126,20 +169,20 @@ class _Face:
     space: Multipliers
     mu: float
     normal: sp.csr_matrix
-    tangent: Floats
-    jump: sp.csr_matrix
-    along: sp.csr_matrix
+    tangents: Floats
+    jumps: list[sp.csr_matrix]
+    along: list[sp.csr_matrix]
 
 
 def _face(problem: Problem, model: Model, m: Multipliers) -> _Face:
     lips, mu = model.lips[m.crack], problem.frictions[m.crack]
     normal = gap_rows(m, lips, model.jumps[m.crack])
     if not mu:
-        nothing = normal[:0]
-        return _Face(m, mu, normal, np.zeros((0, 2)), nothing, nothing)
-    direction = tangent(lips)
-    jump = jump_matrix(model.space, m.crack, lips, direction)
-    return _Face(m, mu, normal, direction, jump, gap_rows(m, lips, jump))
+        return _Face(m, mu, normal, np.zeros((0, 0, 0)), [], [])
+    directions = tangents(lips)
+    jumps = tangential_jumps(model.space, m.crack, lips, directions)
+    along = [gap_rows(m, lips, jump) for jump in jumps]
+    return _Face(m, mu, normal, directions, jumps, along)
 
 
 def _rows(faces: Sequence[_Face], dual: Floats, stiffness: float) -> FrictionRows:
@@ -150,15 +193,13 @@ def _rows(faces: Sequence[_Face], dual: Floats, stiffness: float) -> FrictionRow
 
 
 def _by_crack(faces: Sequence[_Face], rows: FrictionRows, places: Sequence[Place]) -> list[Rubbing]:
-    shear = np.stack([place.lam[rows.n :] for place in places], axis=1)
-    stuck = np.stack(
-        [place.status.closed[rows.rubbing] & (place.status.slip == 0) for place in places]
-    )
+    shear = np.stack([place.lam[rows.n :].reshape(rows.tangents, -1) for place in places], axis=2)
+    stuck = np.stack([p.status.closed[rows.rubbing] & ~p.status.slips for p in places])
     result, first = [], 0
     for face in faces:
         own = slice(first, first + len(face.space.measure))
         result.append(
-            Rubbing(face.space.crack, lock(face.tangent), face.jump, shear[own], stuck[:, own])
+            Rubbing(face.space.crack, lock(face.tangents), face.jumps, shear[:, own], stuck[:, own])
         )
         first = own.stop
     return result
@@ -180,4 +221,11 @@ def _between(
     return engine.solve(np.stack(loads, axis=1), np.stack(given, axis=1))
 
 
-__all__ = ["FrictionSolution", "rubs", "solve_friction", "tangent"]
+__all__ = [
+    "FrictionSolution",
+    "rubs",
+    "solve_friction",
+    "tangential_jumps",
+    "tangential_rows",
+    "tangents",
+]

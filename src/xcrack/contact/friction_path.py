@@ -14,11 +14,13 @@ import numpy as np
 from xcrack.arrays import Bools, Floats
 from xcrack.errors import warn
 from xcrack.solvers.coulomb import FrictionRows, FrictionState, Status, coulomb
+from xcrack.solvers.coulomb_3d import coulomb_3d
 
 _SHORTEST = 1e-2  # share of a state below which a substep is not halved
 _OPEN = 1e-9  # gap over the largest one above which a function is open
 _RETURNED = 1e-6  # change of slip over a cycle, of the largest jump, at which cycles end
 _MOST_CYCLES = 100
+_TWIN = {1: coulomb, 2: coulomb_3d}  # by the number of tangents
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +65,7 @@ def at_rest(rows: FrictionRows, status: Status) -> Place:
 def with_slip(rows: FrictionRows, d: Floats, slip: Floats, status: Status) -> Place:
     """A state whose weak slips `(r,)` before are given: faces that press stick there, or slide."""
     before = np.concatenate([np.zeros(rows.n), slip])
-    state = coulomb(rows, d - before, status)
+    state = _TWIN[rows.tangents](rows, d - before, status)
     return Place(d, state.lam, state.gap + before, state.status, sets=state.sets)
 
 
@@ -104,7 +106,7 @@ def shaken_down(rows: FrictionRows, d: Floats, begin: Place, substeps: int) -> l
     XcrackWarning
         Slip that still drifts after a hundred cycles.
     """
-    weight = np.concatenate([1 / rows.measure, 1 / rows.measure[rows.rubbing]])
+    weight = 1 / rows.sizes
     places = march(rows, d, begin, substeps)
     for _ in range(_MOST_CYCLES):
         before = places[-1]
@@ -150,21 +152,21 @@ def _reached(rows: FrictionRows, wanted: Floats, begin: Place, substeps: int) ->
 def _solved(rows: FrictionRows, d: Floats, place: Place) -> FrictionState:
     change = d.copy()
     change[rows.n :] -= place.gap[rows.n :]
-    return coulomb(rows, change, place.status)
+    return _TWIN[rows.tangents](rows, change, place.status)
 
 
 def _opened(rows: FrictionRows, place: Place) -> Bools:
     """Functions with a gap that is more than round-off."""
-    largest = float(np.abs(place.gap / np.concatenate([rows.measure, rows.measure[rows.rubbing]]))
-                    .max(initial=0.0))  # fmt: skip
+    largest = float(np.abs(place.gap / rows.sizes).max(initial=0.0))
     return np.asarray(place.gap[: rows.n] / rows.measure > _OPEN * largest)
 
 
 def _dissipated(rows: FrictionRows, before: Place, state: FrictionState) -> float:
     """Work of the tractions of slipping functions: their mean bound over the substep times slip."""
-    slips = state.status.slip != 0
+    slips = state.status.slips
     pressure = 0.5 * (np.maximum(before.lam, 0.0) + state.lam)[: rows.n][rows.rubbing]
-    return float((rows.mu * pressure * np.abs(state.gap[rows.n :]))[slips].sum())
+    slip = np.sqrt((state.gap[rows.n :].reshape(rows.tangents, -1) ** 2).sum(axis=0))
+    return float((rows.mu * pressure * slip)[slips].sum())
 
 
 __all__ = ["Place", "at_rest", "march", "shaken_down", "with_slip"]

@@ -6,14 +6,14 @@ import scipy.sparse as sp
 import scipy.sparse.linalg as sla
 
 from xcrack.arrays import Floats
-from xcrack.contact.friction import rubs, tangent
+from xcrack.contact.friction import rubs, tangential_rows
 from xcrack.contact.multipliers import Multipliers, gap_rows, multipliers
 from xcrack.inputs import one_of
 from xcrack.mesh.sizes import leg_sizes
 from xcrack.scene.problem import Problem, check_problem, crack_number
 from xcrack.solvers.direct import scaled_basis
 from xcrack.xfem.function_space import FunctionSpace
-from xcrack.xfem.lips import jump_matrix, jump_values
+from xcrack.xfem.lips import jump_values
 from xcrack.xfem.model import Model, build
 from xcrack.xfem.quadrature import cell_points
 
@@ -61,8 +61,7 @@ def inf_sup(problem: Problem, crack: int = 0, *, norm: str = "h1") -> float:
         A = A + 1e-8 * sp.diags(A.diagonal())
         B = gap_rows(chosen, lips, model.jumps[crack])
         if rubs(problem, crack):
-            along = jump_matrix(space, crack, lips, tangent(lips))
-            B = sp.csr_matrix(sp.vstack([B, gap_rows(chosen, lips, along)]))
+            B = sp.csr_matrix(sp.vstack([B, *tangential_rows(space, chosen, lips)]))
         basis = scaled_basis(space, sp.csr_matrix(A), fixed, problem.numerics, problem.material)
     L, d = space.mesh.extent, space.dim
     h = leg_sizes(space.mesh, lips.cell).mean(axis=1) / L

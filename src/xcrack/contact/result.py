@@ -27,12 +27,12 @@ class Contact:
     closed : (q,) array of bool
     s : (q,) array, length
         Position along the crack from where it enters the body.
-    tangent : (q, 2) array, optional
-        With friction: direction of shear and slip, along the order of the crack's points. None
-        without, as the three that follow.
-    shear : (q,) array, stress, optional
-        Tangential traction on lip + along the tangent; lip - bears the opposite one.
-    slip : (q,) array, length, optional
+    tangent : (q, 2) array, in 3D (q, 2, 3), optional
+        With friction: direction of shear and slip, along the order of the crack's points; in 3D two
+        directions. None without, as the three that follow.
+    shear : (q,) array, in 3D (q, 2), stress, optional
+        Tangential traction on lip + along the tangents; lip - bears the opposite one.
+    slip : (q,) array, in 3D (q, 2), length, optional
         Tangential jump, that of lip + less that of lip -.
     stuck : (q,) array of bool, optional
         Closed, and without slip since the substep before.
@@ -58,17 +58,18 @@ class Rubbing:
     Attributes
     ----------
     crack : int
-    tangent : (q, 2) array
-    jump : sparse matrix (q, n_dof)
-        Tangential jump at the lip points.
-    shear : (g, states) array, stress
-        Tangential traction of each multiplier function.
+    tangents : (q, m, d) array
+        One in 2D, two in 3D.
+    jumps : list of m sparse matrices (q, n_dof)
+        Tangential jumps at the lip points.
+    shear : (m, g, states) array, stress
+        Tangential tractions of each multiplier function.
     stuck : (states, g) array of bool
     """
 
     crack: int
-    tangent: Floats
-    jump: sp.csr_matrix
+    tangents: Floats
+    jumps: list[sp.csr_matrix]
     shear: Floats
     stuck: Bools
 

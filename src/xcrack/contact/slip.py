@@ -1,10 +1,12 @@
 """Slip that a crack state leaves to the next one of the grown crack.
 
-It is stored by face of the crack and share of the face's length: the last face, along which the
-crack was solved, may be corrected, and the slip goes with it. Faces that are new have none.
+In 2D it is stored by face of the crack and share of the face's length: the last face, along which
+the crack was solved, may be corrected, and the slip goes with it. In 3D it is stored at the points
+of the faces. Faces that are new have none.
 """
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from xcrack.arrays import Floats, lock
 from xcrack.contact.multipliers import Multipliers
@@ -25,30 +27,58 @@ def slip_of(model: Model, rubbing: tuple[Rubbing, ...], u: Floats) -> tuple[Slip
     """
     result: list[Slip | None] = [None] * len(model.lips)
     for each in rubbing:
-        points = model.space.cracks[each.crack].points
-        place = _places(points, model.lips[each.crack])
-        result[each.crack] = Slip(points, lock(place), lock(np.asarray(each.jump @ u)))
+        along = np.stack([jump @ u for jump in each.jumps], axis=1)
+        result[each.crack] = _LEFT[model.space.dim](model, each, along)
     return tuple(result)
 
 
-def weak_slip(model: Model, m: Multipliers, before: Slip | None) -> Floats:
-    """Integrals of each function times the slip that was left `(g,)`.
+def weak_slip(model: Model, m: Multipliers, tangents: Floats, before: Slip | None) -> Floats:
+    """Integrals of each function times the slip that was left `(d - 1, g)`.
 
     Parameters
     ----------
     model : Model
     m : Multipliers
+    tangents : (q, d - 1, d) array
     before : Slip or None
         None where nothing was left.
     """
     lips = model.lips[m.crack]
-    slip = np.zeros(len(lips))
-    if before is not None and len(before.place):
-        points = model.space.cracks[m.crack].points
-        place = _places(points, lips) - _first(before.points, points)
-        inside = (place >= 0) & (place <= len(before.points) - 1)
-        slip[inside] = np.interp(place[inside], before.place, before.slip)
-    return np.asarray(m.values.T @ (lips.weight * slip))
+    slip = np.zeros((len(lips), tangents.shape[1]))
+    if before is not None and len(before.slip):
+        slip = _AGAIN[model.space.dim](model, m.crack, tangents, before)
+    return np.asarray((m.values.T @ (lips.weight[:, None] * slip)).T)
+
+
+def _left_2d(model: Model, rubbing: Rubbing, along: Floats) -> Slip:
+    points = model.space.cracks[rubbing.crack].points
+    place = _places(points, model.lips[rubbing.crack])
+    return Slip(points, lock(place), lock(along[:, 0]))
+
+
+def _left_3d(model: Model, rubbing: Rubbing, along: Floats) -> Slip:
+    lips = model.lips[rubbing.crack]
+    slip = np.einsum("qm,qmd->qd", along, rubbing.tangents)
+    return Slip(lips.x, lock(np.sqrt(lips.weight)), lock(slip))
+
+
+def _again_2d(model: Model, c: int, tangents: Floats, before: Slip) -> Floats:
+    lips, points = model.lips[c], model.space.cracks[c].points
+    place = _places(points, lips) - _first(before.points, points)
+    inside = (place >= 0) & (place <= len(before.points) - 1)
+    slip = np.where(inside, np.interp(place, before.place, before.slip), 0.0)
+    return np.asarray(slip[:, None])
+
+
+def _again_3d(model: Model, c: int, tangents: Floats, before: Slip) -> Floats:
+    """Of the nearest point before, none farther than its own piece of face is wide."""
+    far, nearest = cKDTree(before.points).query(model.lips[c].x)
+    slip = np.where((far <= before.place[nearest])[:, None], before.slip[nearest], 0.0)
+    return np.einsum("qmd,qd->qm", tangents, slip)
+
+
+_LEFT = {2: _left_2d, 3: _left_3d}
+_AGAIN = {2: _again_2d, 3: _again_3d}
 
 
 def _places(points: Floats, lips: LipPoints) -> Floats:

@@ -246,9 +246,12 @@ def contact_of(
 def _rubbed(m: Multipliers, rubbing: Rubbing, u: Floats, k: int) -> dict[str, Any]:
     """What friction adds to the contact of one crack in state k."""
     stuck = np.asarray(m.values @ rubbing.stuck[k].astype(float)) >= 0.5
+    shear = np.stack([m.values @ own[:, k] for own in rubbing.shear], axis=1)
+    slip = np.stack([jump @ u for jump in rubbing.jumps], axis=1)
+    one = (slice(None), 0) if len(rubbing.jumps) == 1 else ()
     return {
-        "tangent": rubbing.tangent,
-        "shear": lock(np.asarray(m.values @ rubbing.shear[:, k])),
-        "slip": lock(np.asarray(rubbing.jump @ u)),
+        "tangent": lock(rubbing.tangents[one]),
+        "shear": lock(np.ascontiguousarray(shear[one])),
+        "slip": lock(np.ascontiguousarray(slip[one])),
         "stuck": lock(stuck),
     }

@@ -14,16 +14,13 @@ from xcrack.scene.numerics import Numerics
 _MOST = 1e3  # beyond, faces that press never slip
 
 
-def checked_friction(
-    value: Any, n_cracks: int, dim: int, numerics: Numerics
-) -> float | tuple[float, ...]:
+def checked_friction(value: Any, n_cracks: int, numerics: Numerics) -> float | tuple[float, ...]:
     """Coefficients of friction: one for all cracks, or one for each.
 
     Parameters
     ----------
     value : anything
     n_cracks : int
-    dim : int
     numerics : Numerics
 
     Raises
@@ -52,19 +49,17 @@ def checked_friction(
         )
         acts = any(mu > 0 for mu in result)
     if acts:
-        _check_method(dim, numerics)
+        _check_method(numerics)
     return result
 
 
-def _check_method(dim: int, numerics: Numerics) -> None:
+def _check_method(numerics: Numerics) -> None:
     lips = numerics.comparison.lips
     if lips != "multipliers":
         raise ProblemError(
             f'friction with Comparison(lips="{lips}"): multipliers alone carry it; leave lips out, '
             "or give friction=0."
         )
-    if dim > 2:
-        raise ProblemError("friction in 3D is not there yet: give friction=0.")
 
 
 def check_order(frictions: Sequence[float], states: Any) -> None:

@@ -33,6 +33,8 @@ def front_bars(solutions: Sequence[Solution], sifs: Sequence[SIF], crack: int) -
     """
     if not len(sifs[0].K):
         return [no_bars(sifs[0].K.shape, "")] * len(sifs)
+    if any(c is not None and c.shear is not None for c in solutions[0].contact):
+        return [no_bars(sifs[0].K.shape, "friction has no estimate")] * len(sifs)
     if solutions[0].space.order == 2:
         return [_of_spread(sif) for sif in sifs]
     problem = replace(solutions[0].problem, order=2)

@@ -93,7 +93,9 @@ def lip_shear(solution: Solution, c: int) -> Floats | None:
     contact = solution.contact[c]
     if contact is None or contact.shear is None or contact.tangent is None:
         return None
-    return np.asarray(contact.shear[:, None] * contact.tangent)
+    if contact.shear.ndim == 1:
+        return np.asarray(contact.shear[:, None] * contact.tangent)
+    return np.einsum("qm,qmd->qd", contact.shear, contact.tangent)
 
 
 def acts(solutions: Sequence[Solution], *kinds: type[Load]) -> bool:

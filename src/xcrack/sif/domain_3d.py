@@ -21,7 +21,7 @@ from xcrack.scene.conditions import (
 )
 from xcrack.sif.accuracy import Domain, check
 from xcrack.sif.closure import with_closed
-from xcrack.sif.common import acts, lip_pressure, mean_rotation
+from xcrack.sif.common import acts, lip_pressure, lip_shear, mean_rotation
 from xcrack.sif.interaction_3d import (
     front_nodes,
     full_measure,
@@ -342,7 +342,11 @@ def _lip_part(
     inside = feet.r < outer
     height = np.abs(feet.local[inside, 1]).max(initial=0.0)
     bent = height > 1e-9 * outer
-    if not bent and not np.abs(pressure).any():
+    traction = lips.normal[near][:, :, None] * pressure[:, None]
+    for k, shear in enumerate(lip_shear(solution, c) for solution in solutions):
+        if shear is not None:
+            traction[:, :, k] += shear[near]
+    if not bent and not traction.any():
         return np.zeros((len(solutions), len(radii), 3, len(knots)))
     gradient = None
     if bent:
@@ -358,7 +362,7 @@ def _lip_part(
         feet,
         lips.normal[near],
         lips.weight[near],
-        lips.normal[near][:, :, None] * pressure[:, None],
+        traction,
         solutions[0].problem.material,
         radii,
         gradient=gradient,

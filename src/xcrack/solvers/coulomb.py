@@ -28,9 +28,9 @@ class FrictionRows:
 
     Attributes
     ----------
-    F : (g + r, g + r) array
-        N K^-1 N^T; first the normal rows of all functions, then the tangential ones of those that
-        rub.
+    F : (g + m r, g + m r) array
+        N K^-1 N^T; first the normal rows of all functions, then those of those that rub along each
+        of m tangents: one in 2D, two in 3D.
     measure : (g,) array
         Integral of each function.
     rubbing : (r,) array of int
@@ -52,6 +52,16 @@ class FrictionRows:
         """Number of functions."""
         return len(self.measure)
 
+    @property
+    def tangents(self) -> int:
+        """Number of tangents."""
+        return (len(self.F) - self.n) // max(len(self.rubbing), 1)
+
+    @property
+    def sizes(self) -> Floats:
+        """Measure of each row's function `(g + m r,)`."""
+        return np.concatenate([self.measure, np.tile(self.measure[self.rubbing], self.tangents)])
+
 
 @dataclass(frozen=True, eq=False)
 class Status:
@@ -60,12 +70,18 @@ class Status:
     Attributes
     ----------
     closed : (g,) array of bool
-    slip : (r,) array of {-1, 0, 1}
-        Sign of the traction of a slipping function; 0 where it sticks or is open.
+    slip : (r,) array of {-1, 0, 1}, or (2, r) array
+        Sign of the traction of a slipping function, in 3D its direction; 0 where it sticks or is
+        open.
     """
 
     closed: Bools
-    slip: Ints
+    slip: Ints | Floats
+
+    @property
+    def slips(self) -> Bools:
+        """Which functions slip `(r,)`."""
+        return np.asarray(np.atleast_2d(self.slip).any(axis=0))
 
     def key(self) -> bytes:
         """Bytes that name it."""
@@ -95,7 +111,10 @@ class FrictionState:
 
 def all_stuck(rows: FrictionRows) -> Status:
     """The status that is tried where nothing is known."""
-    return Status(np.ones(rows.n, dtype=bool), np.zeros(len(rows.mu), dtype=np.int64))
+    closed, shape = np.ones(rows.n, dtype=bool), (rows.tangents, len(rows.mu))
+    if rows.tangents == 1:
+        return Status(closed, np.zeros(len(rows.mu), dtype=np.int64))
+    return Status(closed, np.zeros(shape))
 
 
 def coulomb(rows: FrictionRows, d: Floats, start: Status) -> FrictionState:

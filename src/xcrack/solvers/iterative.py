@@ -138,7 +138,10 @@ class IterativeSystem:
     def condensed(self, N: sp.csr_matrix, f: Floats, known: Floats) -> Condensed:
         """The system as rows see it; see `Engine`. A solve for each row."""
         opened = self.solve(f, known)
-        F = N @ self.solve(np.asarray(N.T.todense()))
+        F = np.empty((N.shape[0], N.shape[0]))
+        for k in range(N.shape[0]):
+            row = N[[k]].toarray()[0]
+            F[:, k] = N @ self.solve(row, start=np.zeros_like(row))
         return Condensed(
             (F + F.T) / 2,
             N @ opened,

@@ -18,11 +18,12 @@ class Slip:
 
     Attributes
     ----------
-    points : (n, 2) array, length
-        Of the crack.
+    points : (n, d) array, length
+        Of the crack; in 3D the points of its faces.
     place : (q,) array
-        Rising: number of the face, plus share of its length.
-    slip : (q,) array, length
+        Rising: number of the face, plus share of its length. In 3D the width of each point's piece
+        of face, length.
+    slip : (q,) array, in 3D (q, 3), length
     """
 
     points: Floats

@@ -1,0 +1,194 @@
+"""Coulomb friction in 3D against exact pennies: stick, slip, a path of loads, growth."""
+
+import warnings
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import xcrack as xc
+from support import exact
+from xcrack.book.scenes_3d import CENTRE, NU, E, flat_crack
+from xcrack.solvers.coulomb import FrictionRows, all_stuck, coulomb
+from xcrack.solvers.coulomb_3d import coulomb_3d
+
+A, STRESS = 0.5, (-1.0, 0.6, 0.5)
+TAU = float(np.hypot(*STRESS[1:]))
+DIRECT, CG = xc.Numerics(linear="direct"), xc.Numerics(linear="iterative")
+
+
+def pressed_penny(h, mu, *, order=1, numerics=DIRECT):
+    """Penny under pressure 1 and shear TAU, under its exact displacements."""
+    problem, Q = flat_crack(h, STRESS, contact="on", order=order, numerics=numerics)
+    return replace(problem, supports=[support(Q, TAU, mu=mu)], friction=mu), Q
+
+
+def support(Q, felt, rest=0.0, mu=None):
+    """Displacements of a penny that feels a shear, of which friction may take its part."""
+    ahead = np.array(STRESS[1:]) / TAU
+
+    def stress(shear, pressure):
+        S = np.zeros((3, 3))
+        S[2, 2] = -pressure
+        S[0, 2] = S[2, 0] = shear * ahead[0]
+        S[1, 2] = S[2, 1] = shear * ahead[1]
+        return S
+
+    def u(x):
+        local = (x - CENTRE) @ Q.T
+        moved = exact.penny(local, A, E, NU, stress(felt, 1.0), mu)
+        if rest:
+            moved = moved + exact.uniform_stress3(local, stress(rest, 0.0), E, NU)[0]
+        return moved @ Q
+
+    return xc.displacement("boundary", u)
+
+
+def K_errors(solution, Q, felt):
+    """Largest errors of K_II and K_III over the largest ones without friction."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", xc.XcrackWarning)
+        sif = xc.stress_intensity(solution)
+    local = (sif.x - CENTRE) @ Q.T
+    angle = np.arctan2(local[:, 1], local[:, 0]) - np.arctan2(STRESS[2], STRESS[1])
+    _, K_II, K_III = exact.penny_K(angle, A, NU, -1.0, 1.0)
+    wrong = sif.K[:, 1] - felt * K_II, sif.K[:, 2] + felt * K_III
+    size = TAU * np.abs(K_II).max(), TAU * np.abs(K_III).max()
+    return tuple(float(np.abs(w).max() / s) for w, s in zip(wrong, size, strict=True))
+
+
+def shear_vectors(contact):
+    return np.einsum("qm,qmd->qd", contact.shear, contact.tangent)
+
+
+def test_stick_is_the_uncracked_body():
+    problem, Q = pressed_penny(0.3, 1.0)
+    solution = xc.solve(problem)
+    contact = solution.contact[0]
+    assert contact.stuck.all()
+    # Round-off; measured 4e-14.
+    wanted = -(Q[0] * STRESS[1] + Q[1] * STRESS[2])
+    assert np.abs(contact.pressure - 1).max() <= 1e-10
+    assert min(np.abs(shear_vectors(contact) + s * wanted).max() for s in (1, -1)) <= 1e-10
+    assert np.abs(contact.slip).max() <= 1e-10
+    assert solution.dissipated == 0
+
+
+def test_slip_of_a_penny():
+    mu = 0.4
+    problem, Q = pressed_penny(0.25, mu)
+    solution = xc.solve(problem)
+    contact = solution.contact[0]
+    assert not contact.stuck.any()
+    bars = xc.stress_intensity(solution, error=True)
+    assert np.isnan(bars.bar).all()
+    assert "friction" in bars.reasons[0]
+    assert (np.linalg.norm(contact.shear, axis=1) <= mu * contact.pressure * (1 + 1e-9)).all()
+    assert max(K_errors(solution, Q, TAU - mu)) <= 6e-2  # a/h = 2; measured .026 and .046
+
+
+@pytest.mark.slow
+@pytest.mark.mission
+@pytest.mark.parametrize("mu", [0.4, 1.0])
+def test_penny_at_six_cells_a_radius(mu):
+    problem, Q = pressed_penny(A / 6, mu)
+    solution = xc.solve(problem)
+    wrong = K_errors(solution, Q, max(TAU - mu, 0.0))
+    print(f"\nmu {mu}: K_II {wrong[0]:.4f}, K_III {wrong[1]:.4f}")
+    assert max(wrong) <= 3e-2
+
+
+@pytest.mark.slow
+def test_stick_by_conjugate_gradients():
+    solution = xc.solve(pressed_penny(0.3, 1.0, numerics=CG)[0])
+    contact = solution.contact[0]
+    assert contact.stuck.all()
+    assert np.abs(contact.pressure - 1).max() <= 1e-6
+    assert np.abs(np.linalg.norm(contact.shear, axis=1) - TAU).max() <= 1e-6
+
+
+def test_a_path_of_shear():
+    """Up to TAU and down to -TAU: K_II follows what friction cannot carry."""
+    mu = 0.2
+    felt = TAU - mu
+    problem, Q = pressed_penny(0.3, mu)
+    states = [[support(Q, felt, TAU - felt)], [support(Q, -felt, -TAU + felt)]]
+    up, down = xc.solve(problem, states)
+    assert down.dissipated == pytest.approx(4 * up.dissipated, rel=0.1)
+    assert max(K_errors(up, Q, felt)) <= 8e-2
+    assert max(K_errors(down, Q, -felt)) <= 8e-2
+
+
+def test_growth_carries_slip():
+    mesh = xc.box((-1, -1, -1), (1, 1, 1), 5)
+    crack = xc.penny_crack((0, 0, 0.03), (0, 0, 1), 0.5)
+
+    def state(tau):
+        S = np.array([[0, 0, tau], [0, 0, 0], [tau, 0, -1.0]])
+        sides = ("left", "right", "front", "back", "bottom", "top")
+        return [xc.traction(side, lambda x, n: n @ S) for side in sides]
+
+    problem = xc.Problem(mesh, xc.Isotropic(E, NU), [crack], contact="on", friction=0.3)
+    cycle = xc.Cycle(states=[state(-0.6), state(0.6)])
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", xc.XcrackWarning)
+        law, planar = xc.paris(1e-3, 2.0), straight
+        steps = list(xc.grow(problem, law, planar, cycle, 0.1, progress=False, max_steps=2))
+    assert len(steps) == 2
+    assert steps[1].solutions[0].reuse.slip[0].slip.shape[1] == 3
+    assert all(step.dK_eq[0].min() > 0 for step in steps)
+
+
+def straight(K, nu):
+    """Growth in its plane by the range of K_II and K_III."""
+    size = np.sqrt(((K[1] - K[0])[:, 1:] ** 2).sum(axis=1))
+    return np.zeros(K.shape[1]), size, np.zeros(K.shape[1])
+
+
+# The dense problem --------------------------------------------------------------------------------
+
+
+def drawn(seed, g=10):
+    rng = np.random.default_rng(seed)
+    A_ = rng.normal(size=(3 * g, 9 * g)) / np.sqrt(9 * g)
+    size = 10 ** rng.uniform(-1, 0, g)
+    scale = np.tile(size, 3)
+    rows = FrictionRows(
+        scale[:, None] * (A_ @ A_.T) * scale,
+        size,
+        np.arange(g),
+        rng.choice([0.1, 0.3, 1.0], g),
+        1.0,
+    )
+    return rows, scale * rng.normal(size=3 * g)
+
+
+def test_drawn_problems():
+    for seed in range(60):
+        rows, d = drawn(seed + 808)
+        state = coulomb_3d(rows, d, all_stuck(rows))
+        g, largest = rows.n, np.abs(state.lam).max()
+        shear, slip = state.lam[g:].reshape(2, -1), state.gap[g:].reshape(2, -1)
+        bound = rows.mu * state.lam[:g]
+        assert state.lam[:g].min() >= -1e-12 * largest
+        assert state.gap[:g].min() >= -1e-9 * np.abs(d).max()
+        assert (np.linalg.norm(shear, axis=0) <= bound + 1e-7 * largest).all()
+        size = np.linalg.norm(slip, axis=0)
+        slides = size > 1e-7 * np.abs(d).max()
+        opposed = shear + bound * slip / np.where(slides, size, 1.0)
+        assert np.abs(opposed[:, slides]).max(initial=0.0) <= 1e-6 * largest
+
+
+def test_one_tangent_is_the_problem_of_2d():
+    for seed in range(20):
+        rows, d = drawn(seed + 202)
+        g = rows.n
+        F = rows.F.copy()
+        F[: 2 * g, 2 * g :] = F[2 * g :, : 2 * g] = 0.0
+        d[2 * g :] = 0.0
+        three = FrictionRows(F, rows.measure, rows.rubbing, rows.mu, 1.0)
+        two = FrictionRows(F[: 2 * g, : 2 * g], rows.measure, rows.rubbing, rows.mu, 1.0)
+        expected = coulomb(two, d[: 2 * g], all_stuck(two)).lam
+        lam = coulomb_3d(three, d, all_stuck(three)).lam
+        assert np.abs(lam[: 2 * g] - expected).max() <= 1e-7 * np.abs(expected).max()
+        assert np.abs(lam[2 * g :]).max() <= 1e-9 * np.abs(expected).max()
