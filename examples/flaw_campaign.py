@@ -105,7 +105,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--quick", action="store_true", help="12 flaws")
     parser.add_argument("--workers", type=int, default=1)
-    options = parser.parse_args()
+    options, _ = parser.parse_known_args()
     OUT.mkdir(parents=True, exist_ok=True)
     cases = flaws(12 if options.quick else 200)
 

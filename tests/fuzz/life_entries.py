@@ -6,7 +6,7 @@ import numpy as np
 
 import xcrack as xc
 from fuzz.entry import Entry, Hook, arg
-from fuzz.kinds import Called, Number, Numbers, Of, Seen, Whole, Word, real
+from fuzz.kinds import Called, Filename, Number, Numbers, Of, Seen, Whole, Word, real
 from support.growth_fakes import mode_I, plate, sif
 from xcrack.growth.step import Memory, Step
 from xcrack.solvers.reuse import Reuse
@@ -103,6 +103,20 @@ ENTRIES = [
         "geometry_factors",
         lambda history, stress: xc.geometry_factors(history, stress=stress)["beta"],
         {"history": RUN, "stress": arg(Number(above=0), 100.0)},
+    ),
+    Entry(
+        "write_factors",
+        lambda history, file, stress, crack, tip: xc.write_factors(
+            history, file, stress=stress, crack=crack, tip=tip
+        ),
+        {
+            "history": RUN,
+            "file": arg(Filename(rule=lambda v: None), "beta.txt"),
+            "stress": arg(Number(above=0), 100.0),
+            "crack": arg(Whole(least=0, most=0), 0),
+            "tip": arg(Whole(least=0, most=0), 0),
+        },
+        in_folder=True,
     ),
     Entry(
         "opening_load",

@@ -123,6 +123,24 @@ def _superlu(A):
 
 ENTRIES = [
     Entry(
+        "crack_opening",
+        lambda solution, crack: xc.crack_opening(solution, crack=crack),
+        {"solution": WITH_CRACK, "crack": arg(Whole(least=0, most=0), 0)},
+        cost=0.05,
+    ),
+    Entry(
+        "crack_opening",
+        lambda x: xc.crack_opening(scenes.solution(), x),
+        {"x": arg(Seen(rule=lambda v: None), None)},
+        cost=0.05,
+    ),
+    Entry(
+        "compliance",
+        xc.compliance,
+        {"solution": SOLVED, "force": arg(Number(rule=lambda v: v != 0), 1.0, -2.5)},
+        cost=0.05,
+    ),
+    Entry(
         "solve",
         xc.solve,
         {

@@ -7,6 +7,7 @@ import pytest
 
 from support.growth_fakes import STRESS, mode_I, patch_respond, plate
 from xcrack.crack.lines import line_crack
+from xcrack.crack.surfaces import elliptic_crack
 from xcrack.errors import ProblemError
 from xcrack.growth.criteria import max_hoop_stress
 from xcrack.growth.rating import respond_to_cycle
@@ -15,6 +16,7 @@ from xcrack.growth.step import Cycle
 from xcrack.history.history import History
 from xcrack.laws.power import paris
 from xcrack.lives.assessment import assessment_line, geometry_factors, residual_strength
+from xcrack.lives.factors import write_factors
 from xcrack.lives.opening import opening_load
 from xcrack.mesh.box import box
 from xcrack.scene.conditions import fix, traction
@@ -183,3 +185,43 @@ def test_scaled_histories_open_at_zero():
     pulled = Spectrum([0.2, 1.0, 0.4, 0.6])
     step = next(grow(problem, LAW, max_hoop_stress, pulled, da=1.0, progress=False))
     assert opening_load(step).U[0][0] == 1
+
+
+def test_table_of_factors_for_life_codes(history, tmp_path):
+    """Columns a, c, K, beta; beta is 1 in the formula of these steps."""
+    file = write_factors(history, tmp_path / "new" / "beta.txt", stress=STRESS)
+    head = file.read_text().splitlines()[:3]
+    assert head[2].split() == ["#", "a", "c", "K", "beta"]
+    a, c, K, beta = np.loadtxt(file).T
+    assert np.allclose(a, 5.0 + 3.0 * np.arange(5), rtol=1e-8)
+    assert np.isnan(c).all()
+    assert np.allclose(beta, 1, rtol=1e-7)
+    assert np.allclose(K, STRESS * np.sqrt(np.pi * a), rtol=1e-7)
+    with pytest.raises(ProblemError, match="has no crack 3 with a tip 0"):
+        write_factors(history, tmp_path / "beta.txt", stress=STRESS, crack=3)
+    with pytest.raises(ProblemError, match="stress = 0"):
+        write_factors(history, tmp_path / "beta.txt", stress=0)
+    with pytest.raises(ProblemError, match="history = 3"):
+        write_factors(3, tmp_path / "beta.txt", stress=1)
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore::xcrack.XcrackWarning")
+def test_table_of_factors_of_a_surface_crack(tmp_path):
+    """Depth and half of the surface length of a half-disc, which are both its radius."""
+    mesh = box((-1.0, -1.0, -1.0), (1.0, 1.0, 0.0), (13, 13, 7))
+    crack = elliptic_crack((0.013, 0.017, 0.0), (0, 1.0, 0), (1.0, 0, 0), 0.4, 0.4)
+    problem = Problem(
+        mesh,
+        Isotropic(E=2e5, nu=0.3),
+        cracks=[crack],
+        loads=[traction("back", (0, 100.0, 0)), traction("front", (0, -100.0, 0))],
+    )
+    steps = grow(
+        problem, LAW, max_hoop_stress, Cycle(0.0, 1.0), da=0.05, max_steps=1, progress=False
+    )
+    history = History(tuple(steps), "", mesh=mesh)
+    a, c, K, beta = np.loadtxt(write_factors(history, tmp_path / "b.txt", stress=100.0))
+    assert a == pytest.approx(0.4, rel=0.02)
+    assert c == pytest.approx(0.4, rel=0.02)
+    assert beta == pytest.approx(K / (100 * np.sqrt(np.pi * a)), rel=1e-6)

@@ -35,7 +35,8 @@ NAMES = [
     "campaign", "grid",
     # lives
     "Scatter", "growth_curve", "inspection", "life", "logistic_pod", "lognormal", "normal",
-    "assessment_line", "energy_release_rate", "geometry_factors", "opening_load",
+    "assessment_line", "compliance", "crack_opening", "energy_release_rate", "geometry_factors",
+    "opening_load", "write_factors",
     "residual_strength", "plastic_zone", "retarded", "wheeler", "willenborg",
     # spectra
     "Spectrum", "rainflow", "read_spectrum", "twist",

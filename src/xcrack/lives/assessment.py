@@ -33,9 +33,10 @@ class assessment_line:  # noqa: N801 - it is used as a function
 
     Notes
     -----
-    BS 7910:2013, 7.3.3, from memory: f = (1 + L_r²/2)^(-1/2) [0.3 + 0.7 exp(-µ L_r⁶)] up to
+    BS 7910, 7.3.3: f = (1 + L_r²/2)^(-1/2) [0.3 + 0.7 exp(-µ L_r⁶)] up to
     L_r = 1, µ = min(0.001 E/σ_y, 0.6); f(1) L_r^((N-1)/(2N)) beyond, N = 0.3 (1 - σ_y/σ_u); 0 from
-    L_r = (σ_y + σ_u)/(2 σ_y) on. Compare it with the document before you rely on it.
+    L_r = (σ_y + σ_u)/(2 σ_y) on. From memory; the document was not at hand, but a public program
+    that quotes equations 7.25 to 7.28 of its edition of 2019 has the same, term by term.
 
     Examples
     --------
