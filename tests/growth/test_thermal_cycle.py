@@ -87,3 +87,15 @@ def test_a_temperature_of_the_problem_is_there_in_every_state():
     K = [xc.stress_intensity(s).K_I[0] for s in xc.solve(problem, states=states)]
     assert K[0] < -10
     assert abs(K[1]) < 1e-9 * abs(K[0])
+
+
+def test_states_that_do_not_differ_are_named():
+    """A temperature of the problem that is given as a state too, beside one of no degrees."""
+    warm = xc.temperature(-10.0, ALPHA)
+    states = [[xc.temperature(0.0, ALPHA)], [warm]]
+    problem = strip(2, [warm], contact="off")
+    run = {"law": xc.paris(1e-11, 3.0), "criterion": xc.max_hoop_stress, "da": 0.1}
+    with pytest.warns(xc.XcrackWarning, match=r"state 0 .* leave it out of Problem\(loads"):
+        steps = xc.grow(problem, cycle=xc.Cycle(states=states), progress=False, **run)
+    history = xc.collect(steps)
+    assert history.ended.startswith("rate is zero at every tip: K is the same in all 2 load states")

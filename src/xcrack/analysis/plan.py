@@ -61,7 +61,7 @@ class Resultant:
         force = ", ".join(f"{f:.6g}" for f in self.force)
         parts = (self.moment,) if isinstance(self.moment, float) else self.moment
         moment = ", ".join(f"{m:.6g}" for m in parts)
-        return f"{self.name:<34}force ({force}), moment about the origin ({moment})"
+        return f"{self.name:<33} force ({force}), moment about the origin ({moment})"
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ from xcrack.growth.options import Run
 from xcrack.growth.step import Step, directions, memory_of
 from xcrack.mesh.locate import cell_extents
 
+_SAME = 1e-9  # of the largest K: states that do not differ
 # A turn by more puts K 0.1 % off where the advance is 0.3 cells, 0.3 % at 20 degrees (measured).
 _TURN = np.radians(10.0)
 
@@ -44,8 +45,21 @@ def end_at(run: Run, step: Step) -> str:
     if not any((r > 0).any() for r in step.rate):
         if any((r > 0).any() for r in memory_of(step).law_rate):
             return f"rate is zero: dK_eq is below the threshold {run.threshold:.6g} at every tip"
-        return "rate is zero at every tip"
+        return "rate is zero at every tip" + _same_states(step)
     return ""
+
+
+def _same_states(step: Step) -> str:
+    """What to say where K is the same in all load states; empty where it is not, or is zero."""
+    K = np.stack([np.concatenate([sif.K for sif in state]) for state in step.sif])
+    size = float(np.abs(K).max(initial=0.0))
+    if len(K) < 2 or size == 0 or float(np.ptp(K, axis=0).max(initial=0.0)) > _SAME * size:
+        return ""
+    return (
+        f": K is the same in all {len(K)} load states of the cycle. An initial stress or a "
+        "temperature among the loads of the problem acts in each of them: leave it out there if "
+        "the states give others."
+    )
 
 
 def falls_to_zero(run: Run, step: Step, plan: Advance) -> str:

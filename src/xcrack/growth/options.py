@@ -20,6 +20,7 @@ from xcrack.inputs import number, shown, whole
 from xcrack.laws.law import Law
 from xcrack.laws.zones import Retardation
 from xcrack.scene.problem import Problem
+from xcrack.scene.temperature import Temperature
 from xcrack.spectra.rainflow import turning_points
 from xcrack.spectra.spectrum import Spectrum
 
@@ -141,6 +142,7 @@ class Run:
                 f"grow: solver = {shown(self.solver)} cannot be called: give a function, or None."
             )
         self._check_link_up()
+        self._check_temperatures()
         always = isinstance(self.progress, str) and self.progress == "always"
         if not (isinstance(self.progress, bool) or always):
             raise ProblemError(
@@ -160,6 +162,20 @@ class Run:
                 "grow: link_up compares plastic zones with the ligaments between tips in a sheet: "
                 "a 3D body has no such ligaments. Leave it out, or model the sheet in 2D."
             )
+
+    def _check_temperatures(self) -> None:
+        steady = [load for load in self.problem.loads if isinstance(load, Temperature)]
+        for k, state in enumerate(self.cycle.load_states):
+            own = (
+                [] if isinstance(state, Real) else [x for x in state if isinstance(x, Temperature)]
+            )
+            if steady and any(load not in steady for load in own):
+                warn(
+                    f"state {k} of the cycle has a temperature of its own, and the problem has "
+                    "one that acts in all states: the two add up. If the states are to replace it, "
+                    "leave it out of Problem(loads=...)."
+                )
+                return
 
     @property
     def estimates(self) -> bool:
