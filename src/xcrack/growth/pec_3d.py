@@ -1,8 +1,7 @@
 """Growth of second order at one solve a step, of fronts of 3D cracks.
 
 A step advances the corrected fronts of the last one by the rates known there, solves, and advances
-the same fronts again by the rates at both ends of the step. Rates and directions are carried along
-the strip between the two.
+the same fronts again by the rates at both ends, which are carried along the strip between the two.
 """
 
 from collections.abc import Sequence
