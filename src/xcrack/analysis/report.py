@@ -75,7 +75,7 @@ def report(
     for c, (given, placed) in enumerate(zip(problem.cracks, problem.placed, strict=True)):
         met = sum(own.crack == c for own in problem.junctions)
         moved = not given.placed and not np.array_equal(given.points, placed.points)
-        if moved and (placed.dim == 3 or 2 - placed.n_tips - met):
+        if moved and (placed.fronts is not None or 2 - placed.n_tips - met):
             rows.append(Ingredient(f"mouths of crack {c}", True, _mouths(given, placed, met)))
     if problem.junctions:
         where = [f"{own.crack} on {own.on} at {at(own.x)}" for own in problem.junctions]

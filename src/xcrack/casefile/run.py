@@ -61,7 +61,7 @@ def run(
     until, keep_solutions : optional
         As of `collect`.
     cycles, scaling, integrator, threshold, retardation, solver, K_c, link_up, max_steps, \
-    max_cycles, progress
+    max_cycles, tolerance, max_unknowns, progress
         As of `grow`.
 
     Returns
