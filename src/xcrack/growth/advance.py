@@ -29,6 +29,8 @@ class Advance:
         That tip: crack and number.
     falls_to_zero : bool
         Whether all growth is seen to stop within a tenth of that cell.
+    cycles : float
+        That it is seen to take; 0 where the integrator cannot tell.
     """
 
     da: PerCrack
@@ -37,6 +39,7 @@ class Advance:
     size: float
     tip: tuple[int, int]
     falls_to_zero: bool = False
+    cycles: float = 0.0
 
 
 def plan_advance(

@@ -63,7 +63,8 @@ def last_step(
         index=last.index + 1,
         cycles=cycles,
         cracks=cracks,
-        sif=tuple(tuple(map(_without_places, state)) for state in last.sif),
+        # Two cracks may have become one.
+        sif=tuple(tuple(map(_without_places, state[: len(cracks)])) for state in last.sif),
         angle=none,
         dK_eq=none,
         R=none,

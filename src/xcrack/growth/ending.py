@@ -4,14 +4,20 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from xcrack.arrays import Floats
 from xcrack.growth.advance import Advance
 from xcrack.growth.arrival import Arrival
 from xcrack.growth.criteria import clipped, equivalent_K
 from xcrack.growth.follow import following
+from xcrack.growth.joins import Join
 from xcrack.growth.ligaments import yielded
 from xcrack.growth.options import Run
 from xcrack.growth.step import Step, directions, memory_of
+from xcrack.growth.unions import new_ends, new_unions
 from xcrack.mesh.locate import cell_extents
+from xcrack.scene.problem import Problem
+from xcrack.solvers.rigid_motion import pieces
+from xcrack.xfem.model import discretised
 
 _SAME = 1e-9  # of the largest K: states that do not differ
 # A turn by more puts K 0.1 % off where the advance is 0.3 cells, 0.3 % at 20 degrees (measured).
@@ -20,6 +26,8 @@ _TURN = np.radians(10.0)
 
 def end_at(run: Run, step: Step) -> str:
     """Why growth ends at this step; empty where it goes on."""
+    if step.has_left and step.joins and not step.arrivals:
+        return "no tip is left: " + "; ".join(map(str, step.joins))
     if step.has_left:
         return left_the_body(run, step.arrivals)
     for c, rate in enumerate(step.rate):
@@ -109,10 +117,50 @@ def left_the_body(run: Run, arrivals: Sequence[Arrival]) -> str:
     return ": ".join([f"{end} left the body", "; ".join(map(str, arrivals))]).removesuffix(": ")
 
 
+def joins_of(step: Step, problem: Problem, cycles: float) -> tuple[Join, ...]:
+    """Cracks that meet at the end of an advance of so many cycles after a step, in 2D."""
+    N, index = step.cycles + cycles, step.index + 1
+    ends = new_ends(step.corrected, problem.placed)
+    unions = new_unions(step.corrected, problem.placed)
+    return tuple(
+        [Join(index, N, tuple(x.tolist()), (min(c, on), max(c, on))) for c, on, x in ends]
+        + [Join(index, N, tuple(x.tolist()), pair) for pair, x in unions]
+    )
+
+
+def cut_off(step: Step, problem: Problem, joins: Sequence[Join]) -> str:
+    """Why a run ends in which cracks that met cut a piece off; empty where they do not."""
+    space, _ = discretised(problem)
+    piece, n, share = pieces(space)
+    if n < 2 or n <= _pieces_before(step):
+        return ""
+    k = int(np.argmin(share))
+    x = _at(space.node_points[piece == k].mean(axis=0))
+    words = "; ".join(map(str, joins))
+    return f"{words}: the piece around {x}, {100 * share[k]:.3g} % of the body, is cut off"
+
+
+def _pieces_before(step: Step) -> int:
+    return pieces(step.solutions[0].space)[1] if step.solutions else 1
+
+
+def _at(x: Floats) -> str:
+    return "(" + ", ".join(f"{v:.6g}" for v in x) + ")"
+
+
 def place_name(run: Run, step: Step, c: int, j: int) -> str:
     """Number and coordinates of a tip, or of a place along a front, for a message."""
     x = ", ".join(f"{v:.6g}" for v in step.sif[0][c].x[j])
     return f"crack {c}, {following(run.problem.mesh).PLACE} {j} at ({x})"
 
 
-__all__ = ["end_at", "falls_to_zero", "left_the_body", "place_name", "short_kink", "too_short"]
+__all__ = [
+    "cut_off",
+    "end_at",
+    "falls_to_zero",
+    "joins_of",
+    "left_the_body",
+    "place_name",
+    "short_kink",
+    "too_short",
+]

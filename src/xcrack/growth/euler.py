@@ -40,10 +40,11 @@ def planned(run: Run, step: Step) -> Advance:
 def advanced(run: Run, step: Step, share: float = 1.0) -> list[Crack]:
     """The cracks after the advance of a step, or after a share of it."""
     mesh = run.problem.mesh
-    return [
+    moved = [
         following(mesh).advanced(crack, step.sif[0][c], step.angle[c], share * step.da[c], mesh)
         for c, crack in enumerate(step.cracks)
     ]
+    return moved if run.link_up is not None else following(mesh).met(moved, step.da, mesh)
 
 
 def cycles_to(run: Run, step: Step, share: float, after: float | None) -> float:

@@ -26,6 +26,9 @@ class Following(Protocol):
     def advanced(self, crack: Crack, sif: SIF, angle: Floats, da: Floats, mesh: Mesh) -> Crack:
         """A crack after the advance `da` of its places in the directions `angle`."""
 
+    def met(self, cracks: list[Crack], da: PerCrack, mesh: Mesh) -> list[Crack]:
+        """Cracks after an advance, with tips that have met others ended or joined there."""
+
     def gone(self, advanced: Crack, placed: Crack) -> list[int]:
         """Numbers of the places of a crack that have left the body."""
 

@@ -14,6 +14,7 @@ from xcrack.crack.tips_2d import tip_frames
 from xcrack.growth.advance import LEAST, PerCrack
 from xcrack.growth.arrival import Arriving
 from xcrack.growth.cycles import elapsed
+from xcrack.growth.meeting_2d import SOON, joined, meetings
 from xcrack.growth.step import Step, memory_of, moved_places
 from xcrack.mesh.mesh import Mesh
 from xcrack.sif.sif import SIF
@@ -36,6 +37,13 @@ def advanced(crack: Crack, sif: SIF, angle: Floats, da: Floats, mesh: Mesh) -> C
     return advance(crack, angle, da)
 
 
+def met(cracks: list[Crack], da: PerCrack, mesh: Mesh) -> list[Crack]:
+    """Cracks whose tips have met others, or will within a cell, are ended or joined there."""
+    now = [own for own in meetings(cracks, mesh) if own.away <= SOON * own.size]
+    moved = [float(way) > 0 for own in da for way in own]
+    return joined(cracks, moved, now) if now else cracks
+
+
 def gone(advanced: Crack, placed: Crack) -> list[int]:
     """Numbers of the tips that have left the body."""
     return [j for j, tip in enumerate(advanced.tips or ()) if tip not in (placed.tips or ())]
@@ -47,7 +55,7 @@ def arriving(
     """Tips that have left the body, and the part of their straight way that lies inside."""
     result = []
     for c, pair in enumerate(zip(advanced, placed, strict=True)):
-        start, _ = tip_frames(last.corrected[c])
+        start = _starts(last, advanced, c)
         for j in gone(*pair):
             move = pair[0].points[(pair[0].tips or ())[j]] - start[j]
             way = float(np.linalg.norm(move))
@@ -57,6 +65,17 @@ def arriving(
                 ligament = float(np.linalg.norm(x - start[j]))
                 result.append(Arriving(c, j, tuple(x.tolist()), name, ligament, ligament / way))
     return result
+
+
+def _starts(last: Step, advanced: Sequence[Crack], c: int) -> Floats:
+    """Where the tips of an advanced crack were before `(f, 2)`."""
+    before = last.corrected
+    if [crack.n_tips for crack in before] == [crack.n_tips for crack in advanced]:
+        return tip_frames(before[c])[0]
+    # Tips have met and are gone: the nearest that was is the same one.
+    every = np.concatenate([tip_frames(crack)[0] for crack in before])
+    now = tip_frames(advanced[c])[0]
+    return every[[int(np.argmin(np.linalg.norm(every - x, axis=1))) for x in now]]
 
 
 def ended(advanced: Crack, placed: Crack, arriving: Sequence[Arriving]) -> Crack:
@@ -96,17 +115,20 @@ def followed(
 
     Parameters and results are those of `Following.followed`.
     """
-    del length, mesh
+    del length, mesh, cracks
     before = memory_of(last)
-    rate1, pending = [], []
-    for c in range(len(cracks)):
-        new_of_old = _matched(moved_places(last, c), sif[c].x)
-        rate1.append([None if n < 0 else float(law_rate[c][n]) for n in new_of_old])
-        waits = np.zeros(len(sif[c].x))
+    # All tips together: where two cracks have become one, their numbers have changed.
+    tips, rates = np.concatenate([own.x for own in sif]), np.concatenate(law_rate)
+    waits = np.zeros(len(tips))
+    rate1 = []
+    for c in range(len(last.cracks)):
+        new_of_old = _matched(moved_places(last, c), tips)
+        rate1.append([None if n < 0 else float(rates[n]) for n in new_of_old])
         there = new_of_old >= 0
         waits[new_of_old[there]] = before.pending[c][there]
-        pending.append(waits)
-    return elapsed(before.length, last.da, before.law_rate, rate1), tuple(pending)
+    ends = np.cumsum([len(own.x) for own in sif])[:-1]
+    pending = tuple(np.split(waits, ends))
+    return elapsed(before.length, last.da, before.law_rate, rate1), pending
 
 
 def _matched(moved: Floats, tips: Floats) -> Ints:
@@ -128,4 +150,5 @@ __all__ = [
     "exit_ahead",
     "followed",
     "gone",
+    "met",
 ]

@@ -43,6 +43,12 @@ def advanced(crack: Crack, sif: SIF, angle: Floats, da: Floats, mesh: Mesh) -> C
     return advance_fronts(crack, sif.s, sif.front, angle, da, size)
 
 
+def met(cracks: list[Crack], da: PerCrack, mesh: Mesh) -> list[Crack]:
+    """Fronts that meet others end the run with the place."""
+    del da, mesh
+    return cracks
+
+
 def gone(advanced: Crack, placed: Crack) -> list[int]:
     """[0] where all fronts have left the body."""
     return [0] if advanced.n_tips and not placed.n_tips else []
@@ -222,4 +228,5 @@ __all__ = [
     "ended",
     "followed",
     "gone",
+    "met",
 ]

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from xcrack.arrays import Bools, Floats
+from xcrack.arrays import Bools, Floats, Ints
 from xcrack.errors import ProblemError
 from xcrack.inputs import shown
 from xcrack.laws.law import Law
@@ -36,7 +36,7 @@ class Zones:
     position: int = 0
     part: float = 0.0
 
-    def at(self, places: Bools) -> "Zones":
+    def at(self, places: Bools | Ints) -> "Zones":
         """The same for some places."""
         return replace(self, since=self.since[places], size=self.size[places], K=self.K[places])
 
@@ -61,7 +61,7 @@ class Kinds:
         """Some of the solves."""
         return Kinds(self.dK[which], self.R[which], self.a[which])
 
-    def at(self, places: Bools) -> "Kinds":
+    def at(self, places: Bools | Ints) -> "Kinds":
         """Some of the places."""
         return Kinds(self.dK[:, places], self.R[:, places], self.a[:, places])
 

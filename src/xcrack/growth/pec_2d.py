@@ -5,11 +5,11 @@ solved; the parabola through the last three solves then moves the tips once more
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
-from xcrack.arrays import Bools, Floats
+from xcrack.arrays import Floats, Ints
 from xcrack.crack.crack import Crack
 from xcrack.errors import GeometryError, XcrackError
 from xcrack.growth.advance import LEAST, Advance
@@ -21,6 +21,7 @@ from xcrack.growth.follow_2d import exit_ahead
 from xcrack.growth.kink import START
 from xcrack.growth.options import Run
 from xcrack.growth.overloads import Zones
+from xcrack.growth.prediction_2d import Prediction, predict
 from xcrack.growth.reach import (
     growth_until,
     looked_ahead,
@@ -28,7 +29,6 @@ from xcrack.growth.reach import (
     overloads_go_on,
     overloads_of_rest,
     piece_of,
-    reach_of,
 )
 from xcrack.growth.start_2d import directions_of, first_trail, turn_of_faces
 from xcrack.growth.step import Step, StepError, memory_of
@@ -41,35 +41,6 @@ _PASSES = 6  # of the correction, which turns the last face, which turns the dir
 _FIRST = 0.5  # of that for the first step's cycles, of which no parabola is known yet
 _MENDED = 0.1  # of that squared and relative: what is left once the second step has mended it
 _HALVINGS = 40
-
-
-@dataclass(frozen=True, eq=False)
-class Prediction:
-    """The next step as the last two solves see it.
-
-    Attributes
-    ----------
-    length : float, length
-        Of σ.
-    stops : bool
-        Whether all growth is seen to stop at its end.
-    growth : Growth
-    place : (n, 2) array, length
-        Where the tips come to.
-    cracks : list of Crack
-    moves : (n,) array of bool
-        Tips that move in the mesh; the others wait.
-    size : (n,) array, length
-        Of the cells at the tips before.
-    """
-
-    length: float
-    stops: bool
-    growth: Growth
-    place: Floats
-    cracks: list[Crack]
-    moves: Bools
-    size: Floats
 
 
 def begun(run: Run, seen: Evaluation) -> Settled:
@@ -85,10 +56,10 @@ def begun(run: Run, seen: Evaluation) -> Settled:
 def settled(run: Run, last: Step, seen: Evaluation) -> Settled:
     """Correct a predicted step by what was solved there, and predict the next."""
     trail, error = _remembered(last)
-    before = _predict(run, last.corrected, trail)
-    stays = _stays(before.cracks, seen.cracks)
-    if not stays.all():
-        return _without_lost_tips(run, last, seen, before, stays)
+    before = predict(run, last.corrected, trail)
+    rows = _rows_that_stay(before.apart, seen.cracks)
+    if len(rows) < len(before.place):
+        return _without_lost_tips(run, last, seen, before, rows)
     if any(np.isinf(rate).any() for rate in seen.rate):
         return _broken(run, last, seen, before)
     return _corrected(run, last, seen, before, error)
@@ -101,27 +72,33 @@ def planned(run: Run, step: Step) -> Advance:
     rate = np.concatenate(step.rate)
     if not (rate > 0).any() or np.isinf(rate).any():
         return Advance(still, still, 0.0, np.inf, (0, 0))
-    ahead = _predict(run, step.corrected, trail)
+    ahead = predict(run, step.corrected, trail)
     row = int(np.argmax(ahead.growth.arc))
     c = next(c for c, rows in enumerate(rows_of(step.corrected)) if rows.start <= row < rows.stop)
     size, first = float(ahead.size[row]), rows_of(step.corrected)[c].start
     falls = ahead.stops and float(ahead.growth.arc[row]) < LEAST * size
     return Advance(
-        step.da, memory_of(step).pending, ahead.length, size, (c, row - first), falls_to_zero=falls
+        step.da,
+        memory_of(step).pending,
+        ahead.asked,
+        size,
+        (c, row - first),
+        falls_to_zero=falls,
+        cycles=ahead.growth.cycles,
     )
 
 
 def advanced(run: Run, step: Step) -> list[Crack]:
     """The cracks after the predicted advance of a step."""
     trail, _ = _remembered(step)
-    return _predict(run, step.corrected, trail).cracks
+    return predict(run, step.corrected, trail).cracks
 
 
 def cycles_to(run: Run, step: Step, share: float, after: float | None) -> float:
     """Cycles of a share of the advance after a step, by the line through two solves."""
     del after  # behind the first exit other rates count
     trail, _ = _remembered(step)
-    ahead = _predict(run, step.corrected, trail)
+    ahead = predict(run, step.corrected, trail)
     two, start = trail.last(2), float(trail.sigma[-1])
     return piece_of(run, two, start, share * ahead.length, _zones(trail)).over(two).cycles
 
@@ -133,15 +110,6 @@ def _remembered(step: Step) -> tuple[Trail, StepError]:
     return trail, error
 
 
-def _predict(run: Run, cracks: Sequence[Crack], trail: Trail) -> Prediction:
-    """Where the last two solves lead; from a first one straight on, at its rates."""
-    size = cell_sizes(run.problem.mesh, trail.place)
-    reach = reach_of(run, trail)
-    place = trail.place + reach.growth.move
-    after, moves = ending_at(cracks, place, trail.grown, size)
-    return Prediction(reach.length, reach.stops, reach.growth, place, after, moves, size)
-
-
 def _settled(
     run: Run, cycles: float, corrected: Sequence[Crack], trail: Trail, error: StepError
 ) -> Settled:
@@ -149,7 +117,7 @@ def _settled(
     waits = np.linalg.norm(trail.place - faces_of(corrected).tip, axis=1)
     da = np.zeros(len(waits))
     if np.isfinite(trail.rate[-1]).all() and (trail.rate[-1] > 0).any():
-        ahead = _predict(run, corrected, trail)
+        ahead = predict(run, corrected, trail)
         way = np.linalg.norm(ahead.place - faces_of(corrected).tip, axis=1)
         da = np.where(ahead.moves, way, 0.0)
     return Settled(
@@ -263,19 +231,16 @@ def _begins(cracks: Sequence[Crack], trail: Trail, before: Prediction) -> Floats
     return np.where(instead[:, None], faces.anchor, faces.tip)
 
 
-def _stays(advanced: Sequence[Crack], placed: Sequence[Crack]) -> Bools:
-    """Which tips are still in the body `(n,)`."""
-    pairs = zip(advanced, placed, strict=True)
-    return np.array(
-        [tip in (there.tips or ()) for crack, there in pairs for tip in crack.tips or ()],
-        dtype=bool,
-    )
+def _rows_that_stay(advanced: Sequence[Crack], placed: Sequence[Crack]) -> Ints:
+    """Rows of the advanced tips that the placed ones are `(n,)`: some have left or joined."""
+    row = {tuple(x): k for k, x in enumerate(faces_of(advanced).tip.tolist())}
+    return np.array([row[tuple(x)] for x in faces_of(placed).tip.tolist()], dtype=np.int64)
 
 
 def _without_lost_tips(
-    run: Run, last: Step, seen: Evaluation, before: Prediction, stays: Bools
+    run: Run, last: Step, seen: Evaluation, before: Prediction, stays: Ints
 ) -> Settled:
-    """Begin anew after tips have left the body: their solves say nothing of the others now.
+    """Begin anew after tips have left the body or met: their solves say nothing of the others now.
 
     Up to the first exit the cycles are those that the solves before it predicted, behind it the
     new rates count.
@@ -283,9 +248,10 @@ def _without_lost_tips(
     old, error = _remembered(last)
     place = before.place[stays]
     trail = first_trail(run, seen, place, (old.grown | before.moves)[stays])
+    lost_rows = np.setdiff1d(np.arange(len(before.place)), stays)
     trail = replace(trail, control=_first(run, trail, seen))
     trail = looked_ahead(run, overloads_begin(run, seen, trail, overloads_of_rest(old, stays)))
-    exit_ = _exit(run, old, before, ~stays)
+    exit_ = _exit(run, old, before, lost_rows)
     cycles = growth_until(run, old, exit_).cycles
     largest = max((float(rate.max(initial=0.0)) for rate in seen.rate), default=0.0)
     rest = before.length - exit_
@@ -303,8 +269,8 @@ def _without_lost_tips(
     )
 
 
-def _exit(run: Run, trail: Trail, before: Prediction, lost: Bools) -> float:
-    """Piece of σ until the first of the lost tips is outside the body."""
+def _exit(run: Run, trail: Trail, before: Prediction, lost: Ints) -> float:
+    """Piece of σ until the first of the lost tips is outside the body; all of it where none is."""
     mesh, low, high = run.problem.mesh, 0.0, before.length
     if _inside(mesh, before.place[lost]):
         return high
@@ -344,4 +310,4 @@ def _broken(run: Run, last: Step, seen: Evaluation, before: Prediction) -> Settl
     )
 
 
-__all__ = ["Prediction", "advanced", "begun", "cycles_to", "planned", "settled"]
+__all__ = ["advanced", "begun", "cycles_to", "planned", "settled"]

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from xcrack.arrays import Bools
+from xcrack.arrays import Bools, Ints
 from xcrack.growth.controlled import longest
 from xcrack.growth.envelope import Growth, growing_length, growth_over, length_of_cycles
 from xcrack.growth.evaluation import Evaluation
@@ -118,7 +118,7 @@ def overloads_go_on(run: Run, seen: Evaluation, old: Trail, trail: Trail) -> Tra
     return replace(trail, overloads=Overloads(kinds, own.zones, own.earlier))
 
 
-def overloads_of_rest(before: Trail, stays: Bools) -> Zones | None:
+def overloads_of_rest(before: Trail, stays: Bools | Ints) -> Zones | None:
     """What overloads have left after a predicted step at the tips that are still there."""
     own = before.overloads
     if own is None:

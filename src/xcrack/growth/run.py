@@ -15,7 +15,15 @@ from xcrack.growth.arrivals import arrivals_of, last_step
 from xcrack.growth.checks import depends_on_ratio
 from xcrack.growth.controlled import shortened
 from xcrack.growth.criteria import Criterion
-from xcrack.growth.ending import end_at, falls_to_zero, left_the_body, short_kink, too_short
+from xcrack.growth.ending import (
+    cut_off,
+    end_at,
+    falls_to_zero,
+    joins_of,
+    left_the_body,
+    short_kink,
+    too_short,
+)
 from xcrack.growth.evaluation import evaluate
 from xcrack.growth.follow import following
 from xcrack.growth.integrators import integrator_of
@@ -210,6 +218,8 @@ def steps_of(
             last = replace(next_step, warnings=tuple(messages))
             progress.step(last)
             yield last
+            if ended:
+                break
     finally:
         notices.summarise()
         short = "" if last is None or not run.estimates else shortfall(run, last)
@@ -230,17 +240,26 @@ def _after(run: Run, last: Step, reuse: Reuse) -> tuple[Step | None, Reuse, str]
         problem = _problem(run, cracks, memory_of(last))
     except GeometryError as error:
         return None, reuse, _stopped(last, error)
+    joins = joins_of(last, problem, integrator_of(run).planned(run, last).cycles)
+    ended = cut_off(last, problem, joins) if joins else ""
+    if joins:
+        reuse = Reuse()  # two cracks have become one: what belongs to numbers of cracks is void
     arriving = (
         following(run.problem.mesh).arriving(last, cracks, problem.placed, run.problem.mesh)
         if met is None
         else joining.arriving(run, last, met)
     )
     if not any(placed.n_tips for placed in problem.placed):
-        return last_step(run, last, cracks, problem.placed, arriving), reuse, ""
+        step = last_step(run, last, cracks, problem.placed, arriving)
+        when = max([step.cycles, *(join.N for join in joins)])
+        return replace(step, cycles=when, joins=joins), reuse, ended
+    if ended:
+        return None, reuse, ended
     try:
         step, reuse = _next_step(run, problem, last, reuse, memory_of(last).settings, met)
         arrivals = arrivals_of(run, last, arriving, step.cycles - last.cycles)
-        return replace(step, arrivals=arrivals), reuse, ""
+        own = tuple(replace(join, N=step.cycles) for join in joins)
+        return replace(step, arrivals=arrivals, joins=own or step.joins), reuse, ""
     except GeometryError as error:
         return None, reuse, _stopped(last, error)
     except XcrackError as error:
