@@ -32,6 +32,7 @@ RUN = (
 def test_there_are_examples():
     assert {path.stem for path in EXAMPLES} >= {
         "plate_with_hole", "edge_crack_growth", "two_holes", "turning_load", "compressed_crack",
+        "link_up",
         *IN_SPACE,
     }  # fmt: skip
 
