@@ -35,11 +35,12 @@ from xcrack.cutting.cut import cut  # noqa: E402
 from xcrack.solvers.engine import ContactRows  # noqa: E402
 from xcrack.solvers.iterative import iterative_system  # noqa: E402
 from xcrack.solvers.rigid_motion import balanced, free_motion  # noqa: E402
-from xcrack.xfem.assembly import bulk, enriched_stiffness, total_stiffness  # noqa: E402
+from xcrack.xfem.assembly import bulk, enriched_stiffness  # noqa: E402
 from xcrack.xfem.function_space import function_space  # noqa: E402
 from xcrack.xfem.lips import lip_points  # noqa: E402
 from xcrack.xfem.loads import load_vector  # noqa: E402
 from xcrack.xfem.model import Model, levels  # noqa: E402
+from xcrack.xfem.stiffness import Stiffness, next_to_enriched  # noqa: E402
 from xcrack.xfem.supports import known_unknowns  # noqa: E402
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -88,11 +89,14 @@ def measure(n: int) -> dict[str, object]:
     enriched, n_points, _ = timed(
         "enriched cells", enriched_stiffness, where, problem.material, numerics, lips
     )
-    K = timed("enriched cells", total_stiffness, plain, enriched)
+    K = Stiffness(plain.matrix, enriched)
+    near = timed("set-up", K.joined, next_to_enriched(where))
     known = known_unknowns(where, ())
-    model = Model(where, lips, plain, K, known, n_points)
+    model = Model(where, lips, plain, enriched, known, n_points)
     motion = timed("set-up", free_motion, where, known.fixed)
-    engine = timed("set-up", iterative_system, where, K, plain, known.fixed, None, motion.modes)
+    engine = timed(
+        "set-up", iterative_system, where, K, plain, known.fixed, None, motion.modes, None, near
+    )
     loads = np.stack([load_vector(where, tuple(s), lips) for s in STATES.values()], axis=1)
     f = balanced(where, motion, loads)[0]
     u = timed("open solves", engine.solve, f)

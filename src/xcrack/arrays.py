@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
+Shape = tuple[int | None, ...]
 
 
 def frozen(values: ArrayLike, dtype: Any = None) -> NDArray[Any]:
@@ -23,6 +24,18 @@ def lock(values: NDArray[Any]) -> NDArray[Any]:
     return values
 
 
+def fits(shape: tuple[int, ...], wanted: Shape | None) -> bool:
+    """Whether a shape is the wanted one, in which None stands for any length."""
+    if wanted is None:
+        return True
+    if len(shape) != len(wanted):
+        return False
+    for side, other in zip(shape, wanted):
+        if other is not None and side != other:
+            return False
+    return True
+
+
 def at(x: ArrayLike) -> list[float]:
     """A place for a message: coordinates with six digits."""
     return list((np.round(np.asarray(x, dtype=float), 6) + 0.0).tolist())  # no -0.0
@@ -34,12 +47,13 @@ def ranges(counts: Ints) -> tuple[Ints, Ints]:
     >>> ranges(np.array([2, 0, 3]))
     (array([0, 0, 2, 2, 2]), array([0, 1, 0, 1, 2]))
     """
-    counts = np.asarray(counts, dtype=np.int64)
-    row = np.repeat(np.arange(len(counts)), counts)
-    start = np.concatenate([[0], np.cumsum(counts)[:-1]]) if len(counts) else np.zeros(0, np.int64)
+    row = np.arange(len(counts)).repeat(counts)
+    start = offsets(counts)
     return row, np.arange(len(row)) - start[row]
 
 
 def offsets(counts: Ints) -> Ints:
     """Offsets `(n + 1,)` of ragged rows of the given lengths."""
-    return np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
+    result = np.zeros(len(counts) + 1, dtype=np.int64)
+    np.add.accumulate(counts, out=result[1:])
+    return result

@@ -3,15 +3,14 @@
 import operator
 import re
 from collections.abc import Callable, Mapping, Sequence
+from functools import cache
 from numbers import Real
 from typing import Any
 
 import numpy as np
 
-from xcrack.arrays import Floats, Ints
+from xcrack.arrays import Floats, Ints, Shape, fits
 from xcrack.errors import ProblemError, XcrackError
-
-Shape = tuple[int | None, ...]
 
 
 def number(
@@ -157,9 +156,11 @@ def numbers(
     array([[0., 1.],
            [2., 3.]])
     """
-    wanted = "an array of real numbers" + _of_shape(shape)
-    result = _real_array(value, what, wanted, error).astype(np.float64, copy=False)
-    _check_shape(result, what, shape, wanted, error)
+    if type(value) is not np.ndarray or value.dtype != np.float64 or not fits(value.shape, shape):
+        wanted = "an array of real numbers" + _of_shape(shape)
+        value = _real_array(value, what, wanted, error).astype(np.float64, copy=False)
+        _check_shape(value, what, shape, wanted, error)
+    result: Floats = value
     if finite and not np.isfinite(result).all():
         where = np.unravel_index(int(np.argmin(np.isfinite(result))), result.shape)
         place = "" if result.ndim == 0 else f"[{', '.join(str(int(i)) for i in where)}]"
@@ -195,6 +196,8 @@ def whole_numbers(
     >>> whole_numbers([(0, 1, 2)], "cells", (None, 3))
     array([[0, 1, 2]])
     """
+    if type(value) is np.ndarray and value.dtype == np.int64 and fits(value.shape, shape):
+        return value
     wanted = "an array of whole numbers" + _of_shape(shape)
     result = _real_array(value, what, wanted, error)
     _check_shape(result, what, shape, wanted, error)
@@ -306,6 +309,8 @@ def shown(value: Any) -> str:
     >>> shown([1.5, None])
     '[1.5, None]'
     """
+    if type(value) is str and len(value) < 60 and value.isidentifier():
+        return repr(value)
     try:
         text = re.sub(r"\barray\((.*?)(, dtype=\w+)?\)", r"\1", " ".join(repr(value).split()))
     except Exception:
@@ -356,15 +361,11 @@ def _real_array(value: Any, what: str, wanted: str, error: type[XcrackError]) ->
 def _check_shape(
     result: Any, what: str, shape: Shape | None, wanted: str, error: type[XcrackError]
 ) -> None:
-    if shape is None:
-        return
-    fits = result.ndim == len(shape) and all(
-        b is None or a == b for a, b in zip(result.shape, shape)
-    )
-    if not fits:
+    if not fits(result.shape, shape):
         raise error(f"{what} has the shape {result.shape}: give {wanted}.")
 
 
+@cache
 def _of_shape(shape: Shape | None) -> str:
     if shape is None:
         return ""

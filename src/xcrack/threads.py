@@ -137,22 +137,24 @@ class _Blas:
         with self.lock:
             if self.users == 0:
                 self.before = [library.get_num_threads() for library in self.libraries]
-                self._set([1] * len(self.libraries))
+                self._set(1, self.before)
             self.users += 1
 
     def leave(self) -> None:
         with self.lock:
             self.users -= 1
             if self.users == 0:
-                self._set(self.before)
+                self._set(None, self.before)
 
-    def _set(self, numbers: Sequence[int | None]) -> None:
-        for library, number in zip(self.libraries, numbers):
+    def _set(self, wanted: int | None, before: Sequence[int | None]) -> None:
+        """Let libraries that had other numbers of threads use a number, or what they had."""
+        for library, number in zip(self.libraries, before):
+            if number is None or number == 1:
+                continue
             # threadpoolctl lets one thread alone change the number, to settle what is settled
             # here: it is this process' own, and the last to leave may not be the first to enter.
             change = getattr(library, "_real_set_num_threads", library.set_num_threads)
-            if number is not None:
-                change(number)
+            change(number if wanted is None else wanted)
 
 
 _blas = cache(_Blas)

@@ -87,33 +87,6 @@ def test_dense_blocks():
     np.testing.assert_array_equal(result, np.concatenate([first.ravel(), second.ravel()]))
 
 
-def test_bordered():
-    """Rows that do not count are left out, and both sides are scaled."""
-    from xcrack.kernels.bordered import bordered
-
-    rng = np.random.default_rng(4411)
-    import scipy.sparse as sp
-
-    A = rng.normal(size=(7, 7)) * (rng.random((7, 7)) < 0.6)
-    A, Y = A + A.T, rng.normal(size=(2, 2))
-    X = rng.normal(size=(7, 2)) * (rng.random((7, 2)) < 0.6)
-    retained, scale = np.array([0, 2, 3]), rng.random(5)  # of the first five rows
-    number = np.full(5, -1)
-    number[retained] = np.arange(3)
-
-    def arrays(M):
-        return M.indptr, M.indices, M.data
-
-    across, down, own = sp.csr_matrix(X), sp.csc_matrix(X), sp.csc_matrix(Y + Y.T)
-    result = bordered(
-        *arrays(sp.csr_matrix(A)), number, scale, arrays(across), arrays(down), arrays(own)
-    )
-    expected = np.block([[A[np.ix_(retained, retained)], X[retained]], [X[retained].T, Y + Y.T]])
-    matrix = sp.csc_matrix((result[2], result[1], result[0]), shape=(5, 5))
-    assert matrix.has_sorted_indices
-    np.testing.assert_allclose(matrix.toarray(), scale[:, None] * expected * scale, rtol=1e-15)
-
-
 def test_bisect_fills_triangles_and_stops_at_tips():
     """Parts add up to their triangle; none is larger than its distance to a tip but the marked."""
     from xcrack.kernels.bisect import bisect

@@ -92,13 +92,15 @@ def test_graded_segments_integrate_polynomials_and_roots():
     space = model([(-1.2, 0.03), (0.083, 0.047)]).space
     begin = np.array([[0.083, 0.047], [0.05, 0.05], [0.6, 0.6]])
     end = np.array([[0.2, 0.1], [0.2, 0.05], [0.7, 0.6]])
-    rule = segment_points(space, begin, end)
+    segment, place, weight = segment_points(space, begin, end)
+    np.testing.assert_allclose(place.sum(axis=1), 1, rtol=1e-15)
     for k in range(3):
-        t, w = rule.position[rule.segment == k], rule.weight[rule.segment == k]
+        t = place[segment == k, 1]
+        w = weight[segment == k] / np.linalg.norm(end[k] - begin[k])
         for p in range(5):
             assert w @ t**p == pytest.approx(1 / (p + 1), rel=1e-12)
-    t, w = rule.position[rule.segment == 0], rule.weight[rule.segment == 0]
-    assert w @ np.sqrt(t) == pytest.approx(2 / 3, rel=1e-12)  # starts at the tip: r = u² is exact
+        if k == 0:  # starts at the tip: r = u² is exact
+            assert w @ np.sqrt(t) == pytest.approx(2 / 3, rel=1e-12)
 
 
 @pytest.mark.parametrize("tip", [(0.083, 0.047), (0.0, 0.0), (0.2, 0.111)])

@@ -49,14 +49,13 @@ def _resultant(model: Model, name: str, f: Floats) -> Resultant:
     x = model.space.node_points
     forces = f.reshape(-1, x.shape[1])[: len(x)]
     force = tuple(forces.sum(axis=0).tolist())
-    moment = np.cross(_in_3d(x), _in_3d(forces)).sum(axis=0)
-    return Resultant(name, force, float(moment[2]) if len(force) < 3 else tuple(moment.tolist()))
-
-
-def _in_3d(x: Floats) -> Floats:
-    full = np.zeros((len(x), 3))
-    full[:, : x.shape[1]] = x
-    return full
+    product = x.T @ forces
+    turning = product - product.T
+    if len(force) < 3:
+        return Resultant(name, force, float(turning[0, 1]))
+    return Resultant(
+        name, force, (float(turning[1, 2]), float(turning[2, 0]), float(turning[0, 1]))
+    )
 
 
 def _name(load: Load | Support) -> str:

@@ -22,11 +22,13 @@ from xcrack.scene.problem import Problem, check_problem
 from xcrack.solvers.direct import Solver, system
 from xcrack.solvers.engine import Engine
 from xcrack.solvers.iterative import iterative_system
+from xcrack.solvers.products import times
 from xcrack.solvers.reuse import Reuse
 from xcrack.solvers.rigid_motion import Motion, balanced, free_motion, without_motion
-from xcrack.threads import threads
+from xcrack.threads import one_blas_thread, threads
 from xcrack.xfem.loads import load_vector
 from xcrack.xfem.model import Model, build
+from xcrack.xfem.stiffness import next_to_enriched
 from xcrack.xfem.supports import known_unknowns
 
 # Unknowns of a 3D body above which a factorisation costs more, by order (measured).
@@ -102,7 +104,10 @@ def solve_states(
     if not len(states):
         raise ProblemError("states is empty: give at least one load state, or none at all.")
     with threads(problem.numerics.threads):
-        return _solve_states(problem, states, reuse, solver, error, repeated)
+        if solver is not None:  # a user's solver may use threads of BLAS
+            return _solve_states(problem, states, reuse, solver, error, repeated)
+        with one_blas_thread():  # entered anew by every factorisation, which then costs nothing
+            return _solve_states(problem, states, reuse, solver, error, repeated)
 
 
 def _solve_states(
@@ -136,8 +141,9 @@ def _solve_states(
     unbalanced = None if reuse is not None else out_of_balance(problem, model, cases[0].loads)
     summary = report(problem, model, engine, pressed, motion, imbalance, len(states), unbalanced)
     solutions = []
+    inner = times(engine.matrix, u)
     for k, (state, case) in enumerate(zip(states, cases, strict=True)):
-        forces = model.stiffness @ u[:, k]
+        forces = inner[:, k]
         rows = resultants(problem, model, case.loads, case.parts, forces - case.f)
         solutions.append(
             Solution(
@@ -174,14 +180,17 @@ def _engine(
     comparison = problem.numerics.comparison
     large = large and comparison.lips == "multipliers"  # others change the matrix
     if solver is None and (wanted == "iterative" or (wanted == "auto" and large)):
+        # Rows beside the crack are enough where no basis is changed but that of single nodes.
+        apart = space_.order == 1 and comparison.tip_basis != "vectorial"
         return iterative_system(
             space_,
-            model.stiffness,
+            model.parts if apart else model.stiffness,
             model.bulk,
             fixed,
             None if reuse is None else reuse.hierarchy,
             motion.modes,
             problem.material if comparison.tip_basis == "vectorial" else None,
+            model.parts.joined(next_to_enriched(space_)) if apart else None,
         )
     fixed[motion.pins] = True
     return system(

@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from xcrack.arrays import Floats, Ints, frozen
+from xcrack.arrays import Floats, Ints, Shape, frozen
 from xcrack.errors import GeometryError
-from xcrack.inputs import Shape, entries, whole_numbers
+from xcrack.inputs import entries, whole_numbers
 from xcrack.mesh.checks import coordinates
 
 

@@ -9,11 +9,11 @@ degrees keeps all its faces, where a purely nodal update loses some.
 
 import numpy as np
 
-from xcrack.arrays import Bools, Floats, Ints, lock
+from xcrack.arrays import Bools, Floats, lock
 from xcrack.crack.crack import Crack
 from xcrack.crack.tips_2d import tip_frames
 from xcrack.cutting.level_set import SNAP, LevelSet, near_edges, snapped
-from xcrack.mesh.locate import barycentric
+from xcrack.mesh.locate import cells_around
 from xcrack.mesh.mesh import Mesh
 
 
@@ -56,7 +56,7 @@ def tied_to_tips(
     last kink is less than a cell away.
     """
     x, frame = tip_frames(crack)
-    tip_cells = tuple(_cells_at(mesh, point) for point in x)
+    tip_cells = tuple(cells_around(mesh, point, SNAP) for point in x)
     for k, cells in enumerate(tip_cells):
         nodes = np.unique(mesh.cells[cells])
         local = mesh.points[nodes] - x[k]
@@ -97,11 +97,3 @@ def _free_reach(origin: Floats, direction: Floats, polyline: Floats, reach: floa
 
 def _unit(v: Floats) -> Floats:
     return np.asarray(v / np.linalg.norm(v))
-
-
-def _cells_at(mesh: Mesh, x: Floats) -> Ints:
-    """Cells whose closed set contains x, with a tolerance of 1e-10 of a cell."""
-    near = np.array(mesh.cell_tree.query_ball_point(x, float(mesh.cell_size.max())), dtype=np.int64)
-    near.sort()
-    bary = barycentric(mesh, near, np.broadcast_to(x, (len(near), mesh.dim)))
-    return near[bary.min(axis=1) >= -SNAP]

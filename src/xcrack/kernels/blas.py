@@ -19,6 +19,8 @@ def _external(module: str, name: str, count: int) -> Any:
 
 
 dpotrf = _external("lapack", "dpotrf", 5)
+dgesv = _external("lapack", "dgesv", 8)
+dsyev = _external("lapack", "dsyev", 9)
 dtrsm = _external("blas", "dtrsm", 11)
 dsyrk = _external("blas", "dsyrk", 10)
 dgemm = _external("blas", "dgemm", 13)

@@ -1,7 +1,8 @@
-"""Dense blocks of a sparse matrix."""
+"""Dense blocks of a sparse matrix, and columns that are orthonormal within them."""
 
 import numpy as np
 
+from xcrack.kernels.blas import dgesv, dsyev
 from xcrack.kernels.jit import kernel
 
 
@@ -43,3 +44,130 @@ def dense_blocks(indptr, indices, data, members, offsets):  # type: ignore[no-un
             place[members[k]] = -1
         start += size * size
     return result
+
+
+@kernel
+def orthonormal_columns(  # type: ignore[no-untyped-def]
+    indptr, indices, data, members, offsets, n_standard, least
+):
+    """Columns that replace the enriched unknowns of blocks, orthonormal in the energy of K.
+
+    Of each block, the enriched unknowns are made orthogonal to its standard ones, scaled by the
+    diagonal, and turned into eigenvectors; those of small eigenvalues are dropped.
+
+    Parameters
+    ----------
+    indptr, indices, data : CSR arrays of K, (n, n)
+    members, offsets : arrays of int
+        As of `dense_blocks`; standard unknowns first.
+    n_standard : (b,) array of int
+    least : float
+        Share of the largest eigenvalue of a block up to which others are dropped.
+
+    Returns
+    -------
+    start, column, value : CSR arrays of the columns, (n, k)
+    count : int
+        k; -1 where a block cannot be factored.
+    """
+    n, blocks = len(indptr) - 1, len(offsets) - 1
+    widest, room = 0, 0
+    for b in range(blocks):
+        size = offsets[b + 1] - offsets[b]
+        if size > widest:
+            widest = size
+        room += size * (size - n_standard[b])
+    place = np.full(n, -1, np.int64)
+    k, Z = np.empty((widest, widest)), np.empty(room)
+    Q, C = np.empty(widest * widest), np.empty(widest * widest)
+    ss, w, D = np.empty(widest * widest), np.empty(widest), np.empty(widest)
+    work, pivots = np.empty(34 * widest + 1), np.empty(widest + 1, np.int32)
+    sizes, letters = np.zeros(4, np.int32), np.array([86, 76], dtype=np.uint8)  # V L
+    sizes[2] = len(work)
+    at = sizes.ctypes.data
+    start = np.zeros(n + 1, np.int32)
+    begin = 0
+    for b in range(blocks):
+        first, last = offsets[b], offsets[b + 1]
+        size, s = last - first, n_standard[b]
+        e = size - s
+        if e == 0:
+            continue
+        for i in range(size):
+            for j in range(size):
+                k[i, j] = 0.0
+            place[members[first + i]] = i
+        for i in range(size):
+            row = members[first + i]
+            for j in range(indptr[row], indptr[row + 1]):
+                if place[indices[j]] >= 0:
+                    k[i, place[indices[j]]] += data[j]
+        for i in range(size):
+            place[members[first + i]] = -1
+        for j in range(e):
+            for i in range(s):
+                C[j * s + i] = k[i, s + j]
+        if s > 0:
+            for j in range(s):
+                for i in range(s):
+                    ss[j * s + i] = k[i, j]
+            sizes[0], sizes[1] = s, e
+            dgesv(
+                at, at + 4, ss.ctypes.data, at, pivots.ctypes.data, C.ctypes.data, at, at + 12
+            )  # fmt: skip
+            if sizes[3] != 0:
+                return start, np.empty(0, np.int32), Z[:0], -1
+        for j in range(e):
+            D[j] = 1 / np.sqrt(k[s + j, s + j]) if k[s + j, s + j] > 0 else 0.0
+        for j in range(e):
+            for i in range(e):
+                schur = k[s + i, s + j]
+                for m in range(s):
+                    schur -= k[m, s + i] * C[j * s + m]
+                Q[j * e + i] = D[i] * schur * D[j]
+        sizes[0] = e
+        dsyev(
+            letters.ctypes.data, letters.ctypes.data + 1, at, Q.ctypes.data, at, w.ctypes.data,
+            work.ctypes.data, at + 8, at + 12,
+        )  # fmt: skip
+        if sizes[3] != 0:
+            return start, np.empty(0, np.int32), Z[:0], -1
+        own = Z[begin : begin + size * e].reshape(size, e)
+        for j in range(e):
+            scale = 1 / np.sqrt(w[j]) if w[j] > least * w[e - 1] else 0.0
+            for i in range(e):
+                own[s + i, j] = D[i] * Q[j * e + i] * scale
+            for i in range(s):
+                total = 0.0
+                for m in range(e):
+                    total += C[m * s + i] * own[s + m, j]
+                own[i, j] = -total
+        for i in range(size):
+            for j in range(e):
+                if own[i, j] != 0:
+                    start[members[first + i] + 1] += 1
+        begin += size * e
+    for i in range(n):
+        start[i + 1] += start[i]
+    column, value = np.empty(start[n], np.int32), np.empty(start[n])
+    fill = start[:-1].copy()
+    begin, count = 0, 0
+    for b in range(blocks):
+        first, size = offsets[b], offsets[b + 1] - offsets[b]
+        e = size - n_standard[b]
+        own = Z[begin : begin + size * e].reshape(size, e)
+        for j in range(e):
+            alive = False
+            for i in range(size):
+                if own[i, j] != 0:
+                    row = members[first + i]
+                    column[fill[row]], value[fill[row]] = count, own[i, j]
+                    fill[row] += 1
+                    alive = True
+            if alive:
+                count += 1
+        begin += size * e
+    # Addresses alone keep no array alive: numba frees it after its last use.
+    if letters[0] != 86 or len(work) < 1 or len(pivots) < 1 or len(ss) + len(w) + len(Q) < 0:
+        count = -1
+    return start, column, value, count

@@ -134,3 +134,78 @@ def block_stiffness(slot, n_blocks, gradient, volume, derivative, weight, lam, m
                             block[i, j] += w * (lam * G[a, i] * G[b, j] + mu * G[a, j] * G[b, i])
                         block[i, i] += dot
     return data
+
+
+@kernel
+def joined(  # type: ignore[no-untyped-def]
+    indptr, indices, data, over_indptr, over_indices, over_data, wanted
+):
+    """Sum of two matrices of blocks of which no block is in both, without its zeros.
+
+    Parameters
+    ----------
+    indptr, indices, data : BSR arrays, (m, m) blocks
+        Sorted.
+    over_indptr, over_indices, over_data : BSR arrays, (n, n) blocks, n >= m
+        Sorted; in the first m rows its columns come after those of the other.
+    wanted : (n,) array of bool
+        Rows of blocks to take.
+
+    Returns
+    -------
+    indptr, indices, data : CSR arrays
+        Sorted, of the type of the first `indptr`.
+    """
+    m, n, d = len(indptr) - 1, len(over_indptr) - 1, data.shape[1]
+    start = np.zeros(n * d + 1, indptr.dtype)
+    for i in range(n):
+        for a in range(d):
+            count = 0
+            if i < m and wanted[i]:
+                for k in range(indptr[i], indptr[i + 1]):
+                    for b in range(d):
+                        count += data[k, a, b] != 0.0
+            if wanted[i]:
+                for k in range(over_indptr[i], over_indptr[i + 1]):
+                    for b in range(d):
+                        count += over_data[k, a, b] != 0.0
+            start[i * d + a + 1] = start[i * d + a] + count
+    column, value = np.empty(start[n * d], indptr.dtype), np.empty(start[n * d])
+    for i in range(n):
+        if not wanted[i]:
+            continue
+        for a in range(d):
+            to = start[i * d + a]
+            if i < m:
+                for k in range(indptr[i], indptr[i + 1]):
+                    for b in range(d):
+                        if data[k, a, b] != 0.0:
+                            column[to], value[to] = indices[k] * d + b, data[k, a, b]
+                            to += 1
+            for k in range(over_indptr[i], over_indptr[i + 1]):
+                for b in range(d):
+                    if over_data[k, a, b] != 0.0:
+                        column[to], value[to] = over_indices[k] * d + b, over_data[k, a, b]
+                        to += 1
+    return start, column, value
+
+
+@kernel
+def add_block_product(indptr, indices, data, x, result):  # type: ignore[no-untyped-def]
+    """Add A x to a result.
+
+    Parameters
+    ----------
+    indptr, indices, data : BSR arrays of A, (n, m) blocks (d, d)
+    x : (>= m d, k) array
+    result : (>= n d, k) array
+        Changed in place.
+    """
+    d = data.shape[1]
+    for i in range(len(indptr) - 1):
+        for k in range(indptr[i], indptr[i + 1]):
+            for a in range(d):
+                for b in range(d):
+                    value = data[k, a, b]
+                    for c in range(x.shape[1]):
+                        result[i * d + a, c] += value * x[indices[k] * d + b, c]

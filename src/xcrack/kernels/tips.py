@@ -173,6 +173,80 @@ def take_volume(defect, gram, piece, weight, value, slope, moment, scale):  # ty
 
 
 @kernel
+def _pseudo_inverse(A, least, result):  # type: ignore[no-untyped-def]
+    """Set the pseudo-inverse of a small symmetric matrix, which is changed (Jacobi rotations)."""
+    n = len(A)
+    V = np.eye(n)
+    for _ in range(60):
+        off, size = 0.0, 0.0
+        for i in range(n):
+            size += A[i, i] ** 2
+            for j in range(i):
+                off += A[i, j] ** 2
+        if not off > 1e-34 * size:
+            break
+        for i in range(n):
+            for j in range(i):
+                if A[i, j] == 0.0:
+                    continue
+                ratio = (A[j, j] - A[i, i]) / (2 * A[i, j])
+                t = 1 / (abs(ratio) + math.sqrt(ratio * ratio + 1))
+                t = -t if ratio < 0 else t
+                c = 1 / math.sqrt(t * t + 1)
+                s = t * c
+                for k in range(n):
+                    a, b = A[k, i], A[k, j]
+                    A[k, i], A[k, j] = c * a - s * b, s * a + c * b
+                for k in range(n):
+                    a, b = A[i, k], A[j, k]
+                    A[i, k], A[j, k] = c * a - s * b, s * a + c * b
+                    a, b = V[k, i], V[k, j]
+                    V[k, i], V[k, j] = c * a - s * b, s * a + c * b
+    largest = 0.0
+    for i in range(n):
+        if abs(A[i, i]) > largest:
+            largest = abs(A[i, i])
+        for j in range(n):
+            result[i, j] = 0.0
+    for k in range(n):
+        if abs(A[k, k]) > least * largest:
+            for i in range(n):
+                for j in range(n):
+                    result[i, j] += V[i, k] * V[j, k] / A[k, k]
+
+
+@kernel
+def solve_moments(defect, gram, least):  # type: ignore[no-untyped-def]
+    """Multiply the defects of each piece by the pseudo-inverse of its Gram matrix.
+
+    Parameters
+    ----------
+    defect : (p, f, d, a) array
+        Changed in place.
+    gram : (p, a, a) array
+        Changed.
+    least : float
+        Share of the largest eigenvalue up to which others count as zero.
+    """
+    count = gram.shape[1]
+    inverse, row = np.empty((count, count)), np.empty(count)
+    for k in range(len(gram)):
+        total = gram[k, 0, 0] if gram[k, 0, 0] > 1e-300 else 1e-300
+        for a in range(count):
+            for b in range(count):
+                gram[k, a, b] /= total
+        _pseudo_inverse(gram[k], least, inverse)
+        for f in range(defect.shape[1]):
+            for j in range(defect.shape[2]):
+                for b in range(count):
+                    row[b] = 0.0
+                    for a in range(count):
+                        row[b] += defect[k, f, j, a] * inverse[a, b]
+                for b in range(count):
+                    defect[k, f, j, b] = row[b] / total
+
+
+@kernel
 def add_correction(slope, first, piece, row, coefficient, moment, functions):  # type: ignore[no-untyped-def]
     """Add coefficient . moment to the gradients from function `first` on, where they act.
 

@@ -100,13 +100,14 @@ def node_parts(cell_nodes, leaf, depth, n):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def column_parts(indptr, indices, owner, d, part):  # type: ignore[no-untyped-def]
+def column_parts(indptr, indices, n_columns, owner, d, part):  # type: ignore[no-untyped-def]
     """Lowest part that holds the support of each column of a basis.
 
     Parameters
     ----------
     indptr, indices : arrays
-        Columns of the basis, CSC.
+        Rows of the basis, CSR.
+    n_columns : int
     owner : (n_functions,) array of int
         Node of each function; unknown i belongs to function i // d.
     d : int
@@ -114,14 +115,14 @@ def column_parts(indptr, indices, owner, d, part):  # type: ignore[no-untyped-de
 
     Returns
     -------
-    (k,) array of int
+    (n_columns,) array of int
     """
-    result = np.zeros(len(indptr) - 1, dtype=np.int64)
-    for column in range(len(result)):
-        common = 0
-        for k in range(indptr[column], indptr[column + 1]):
-            common = _ancestor(common, part[owner[indices[k] // d]])
-        result[column] = max(common, 1)
+    result = np.zeros(n_columns, dtype=np.int64)
+    for i in range(len(indptr) - 1):
+        for k in range(indptr[i], indptr[i + 1]):
+            result[indices[k]] = _ancestor(result[indices[k]], part[owner[i // d]])
+    for column in range(n_columns):
+        result[column] = max(result[column], 1)
     return result
 
 

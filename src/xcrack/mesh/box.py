@@ -62,26 +62,28 @@ def box(lower: ArrayLike, upper: ArrayLike, n: int | tuple[int, ...]) -> Mesh:
             f"box: n = {count.tolist()} asks for more than {_MOST_CELLS:.0e} cells: take fewer."
         )
     axes = [np.linspace(a, b, k + 1) for a, b, k in zip(low, high, count, strict=True)]
-    points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, d)
-    number = np.arange(len(points)).reshape(count + 1)
-    place = np.stack(np.meshgrid(*[np.arange(k) for k in count], indexing="ij"), -1).reshape(-1, d)
-    simplices = []
-    for path in permutations(range(d)):
-        corners = [np.zeros((len(place), d), dtype=np.int64)]
-        for axis in path:
-            corners.append(corners[-1] + np.eye(d, dtype=np.int64)[axis])
-        # Mirroring every second block keeps the mesh conforming and lets the diagonals alternate.
-        simplices.append(np.stack([_mirrored(place, c, number) for c in corners], axis=1))
-    stacked = np.stack(simplices, axis=1).reshape(-1, d + 1)
+    index = np.indices(tuple(count + 1)).reshape(d, -1)
+    points = np.stack([axis[i] for axis, i in zip(axes, index)], axis=1)
+    stride = np.append(np.cumprod((count + 1)[:0:-1])[::-1], 1)
+    place = np.indices(tuple(count)).reshape(d, -1).T
+    first, odd = place @ stride, place % 2 == 1
+    simplices = np.empty((len(place), factorial(d), d + 1), dtype=np.int64)
+    for p, path in enumerate(permutations(range(d))):
+        corner = np.zeros(d, dtype=np.int64)
+        for v in range(d + 1):
+            # Mirroring every second block keeps the mesh conforming, with alternating diagonals.
+            simplices[:, p, v] = first + np.where(odd, 1 - corner, corner) @ stride
+            if v < d:
+                corner[path[v]] = 1
+    stacked = simplices.reshape(-1, d + 1)
     x = points[stacked]
     with np.errstate(all="ignore"):  # sides too short for a number are refused by the mesh
         turn = np.linalg.det(x[:, 1:] - x[:, :1]) < 0
     stacked[turn] = stacked[turn][:, [1, 0, *range(2, d + 1)]]
-    index = np.stack(np.unravel_index(np.arange(len(points)), tuple(count + 1)), axis=1)
     sets = {}
     for axis, both in enumerate(_SIDES[d]):
         for name, end in zip(both, (0, count[axis]), strict=True):
-            sets[name] = _facets_on(stacked, index[:, axis] == end)
+            sets[name] = _facets_on(stacked, index[axis] == end)
     return sound_mesh(points, stacked, sets)
 
 
@@ -90,9 +92,3 @@ def _facets_on(cells: Ints, on_side: Bools) -> Ints:
     near = cells[on_side[cells].sum(axis=1) == cells.shape[1] - 1]
     facets = np.sort(near[on_side[near]].reshape(len(near), -1), axis=1)
     return facets[np.lexsort(facets.T[::-1])]
-
-
-def _mirrored(place: Ints, corner: Ints, number: Ints) -> Ints:
-    odd = place % 2 == 1
-    inside = np.where(odd, 1 - corner, corner)
-    return np.asarray(number[tuple((place + inside).T)])

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
-from xcrack.arrays import Floats, Ints, at, ranges
+from xcrack.arrays import Floats, Ints, Shape, at, ranges
 from xcrack.errors import MeshError, XcrackError
 from xcrack.geometry.simplices import distance_to_simplices
-from xcrack.inputs import Shape, numbers, shown, whole_numbers
+from xcrack.inputs import numbers, shown, whole_numbers
 
 _FLAT = 1e-12  # a cell whose volume is below this share of (longest edge)^d has no shape
 LARGEST = 1e90  # coordinate whose third power is still a number

@@ -3,7 +3,6 @@
 import numpy as np
 
 from xcrack.arrays import Bools, Floats, Ints
-from xcrack.geometry.simplices import distance_to_simplices
 from xcrack.mesh.mesh import Mesh
 
 _TOLERANCE = 1e-10  # barycentric; a point this close to a cell belongs to it (round-off)
@@ -19,30 +18,13 @@ def barycentric(mesh: Mesh, cell: Ints, x: Floats) -> Floats:
 def locate(mesh: Mesh, x: Floats) -> tuple[Ints, Floats]:
     """Cell of each point `(k,)`, -1 outside, and its barycentric coordinates `(k, d + 1)`.
 
-    Candidates are taken by the distance of their centroids, among cells of like size, more and
-    more of them until no cell farther away could still reach the point.
+    Of several cells that a point belongs to, it is the one with the nearest centroid.
     """
-    x = np.atleast_2d(np.asarray(x, dtype=float))
-    cell = np.full(len(x), -1, dtype=np.int64)
-    bary = np.zeros((len(x), mesh.dim + 1))
-    boxed = ((x >= mesh.lower) & (x <= mesh.upper)).all(axis=1)
-    for number, tree, reach in mesh.cell_classes:
-        open_points = np.nonzero((cell < 0) & boxed)[0]
-        count, seen = 8, 0
-        while len(open_points) and seen < len(number):
-            count = min(count, len(number))
-            distance, near = tree.query(x[open_points], k=np.arange(seen + 1, count + 1))
-            n_new = near.shape[1]
-            flat = number[near.ravel()]
-            trial = barycentric(mesh, flat, np.repeat(x[open_points], n_new, axis=0))
-            inside = (trial.min(axis=1) >= -_TOLERANCE).reshape(-1, n_new)
-            hit = inside.any(axis=1)
-            pick = np.argmax(inside, axis=1)
-            rows = np.nonzero(hit)[0]
-            cell[open_points[rows]] = number[near[rows, pick[rows]]]
-            bary[open_points[rows]] = trial.reshape(-1, n_new, mesh.dim + 1)[rows, pick[rows]]
-            open_points = open_points[~hit & (distance[:, -1] <= reach)]
-            seen, count = count, 4 * count
+    from xcrack.kernels.location import located
+
+    x = np.ascontiguousarray(np.atleast_2d(np.asarray(x, dtype=float)))
+    cell, bary = located(mesh.points, mesh.cells, mesh.gradient, *mesh.cell_grid, x, _TOLERANCE)
+    cell[~((x >= mesh.lower) & (x <= mesh.upper)).all(axis=1)] = -1  # nan too
     return cell, bary
 
 
@@ -72,17 +54,24 @@ def cell_extents(mesh: Mesh, x: Floats, direction: Floats) -> Floats:
     return np.asarray(np.ptp(np.einsum("kid,kd->ki", corners, direction), axis=1))
 
 
+def cells_around(mesh: Mesh, x: Floats, tolerance: float) -> Ints:
+    """Cells whose closed set contains one point, with a tolerance in barycentric coordinates."""
+    (origin, width, start, member), shape = mesh.cell_grid
+    place = np.clip((x - origin) / width, 0, shape - 1).astype(np.int64)
+    number = 0
+    for j, side in zip(place.tolist(), shape.tolist()):
+        number = number * side + j
+    cells = member[start[number] : start[number + 1]].astype(np.int64)
+    bary = barycentric(mesh, cells, np.broadcast_to(x, (len(cells), mesh.dim)))
+    return cells[bary.min(axis=1) >= -tolerance]
+
+
 def nearest_boundary(mesh: Mesh, x: Floats) -> tuple[float, float]:
-    """Distance of one point to the boundary, and the size of the cell there."""
-    facets = mesh.boundary
-    tree = mesh.boundary_tree
-    first, _ = tree.query(x)
-    near = tree.query_ball_point(x, first + float(mesh.cell_size.max()))
-    distance = distance_to_simplices(np.asarray(x, dtype=float), mesh.points[facets[near]])
-    best = int(np.argmin(distance))
-    corners = mesh.points[facets[near[best]]]
-    size = np.linalg.norm(corners[:, None] - corners[None], axis=-1).max()
-    return float(distance[best]), float(size)
+    """Distance of one point to the boundary of a 2D mesh, and the size of the cell there."""
+    from xcrack.kernels.location import nearest_segment
+
+    distance, size = nearest_segment(mesh.points, mesh.boundary, np.ascontiguousarray(x))
+    return float(distance), float(size)
 
 
 def parts_inside(mesh: Mesh, polyline: Floats) -> list[Floats]:
@@ -119,11 +108,7 @@ def cells_within(mesh: Mesh, x: Floats, radius: float) -> Ints:
 
     A cell that contains the point is among them only if its sides are near enough.
     """
-    parts = []
-    for number, tree, reach in mesh.cell_classes:
-        near = number[np.sort(np.array(tree.query_ball_point(x, radius + reach), dtype=np.int64))]
-        corners = mesh.points[mesh.cells[near]]
-        sides = [corners[:, pair] for pair in ([0, 1], [1, 2], [2, 0])]
-        distance = np.min([distance_to_simplices(x, side) for side in sides], axis=0)
-        parts.append(near[distance <= radius])
-    return np.concatenate(parts)
+    from xcrack.kernels import location
+
+    x = np.ascontiguousarray(x)
+    return np.asarray(location.cells_within(mesh.points, mesh.cells, x, radius))

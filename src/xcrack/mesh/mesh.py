@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cache, cached_property
 from itertools import combinations
 from math import factorial
 from types import MappingProxyType
@@ -103,12 +103,12 @@ class Mesh:
         cells = f"{len(self.cells)} {_CELLS[self.dim]}"
         return f"Mesh({self.n_points} points, {cells}, facet sets: {names})"
 
-    @property
+    @cached_property
     def dim(self) -> int:
         """Number of dimensions, 2 or 3."""
         return int(self.points.shape[1])
 
-    @property
+    @cached_property
     def n_points(self) -> int:
         """Number of points."""
         return len(self.points)
@@ -126,6 +126,8 @@ class Mesh:
     @cached_property
     def _edges_and_map(self) -> tuple[Ints, Ints]:
         local = local_edges(self.dim)
+        if self.facets.shape[1] == local.shape[1]:  # in 2D each edge is a facet
+            return self.facets, lock(np.ascontiguousarray(self.cell_to_facet[:, ::-1]))
         pairs = np.sort(self.cells[:, local].reshape(-1, 2), axis=1)
         key = pairs[:, 0] * np.int64(self.n_points) + pairs[:, 1]
         unique, inverse = np.unique(key, return_inverse=True)
@@ -159,17 +161,17 @@ class Mesh:
         cells_of[two, 1] = owner[begin[two] + 1]
         return lock(all_facets[first]), lock(cells_of), lock(inverse.reshape(-1, d + 1))
 
-    @property
+    @cached_property
     def facets(self) -> Ints:
         """Point numbers of every facet, sorted `(f, d)`."""
         return self._facets[0]
 
-    @property
+    @cached_property
     def facet_to_cell(self) -> Ints:
         """Cells on both sides of each facet `(f, 2)`; -1 where there is none."""
         return self._facets[1]
 
-    @property
+    @cached_property
     def cell_to_facet(self) -> Ints:
         """Facet numbers of each cell, opposite to its vertices 0 ... d, `(m, d + 1)`."""
         return self._facets[2]
@@ -184,7 +186,6 @@ class Mesh:
         """Facets that belong to one cell only, as sorted point numbers `(k, d)`."""
         return lock(self.facets[self.facet_to_cell[:, 1] < 0])
 
-    @cached_property
     def _edge_matrices(self) -> Floats:
         x = self.points[self.cells]
         return x[:, 1:] - x[:, :1]
@@ -192,12 +193,12 @@ class Mesh:
     @cached_property
     def volume(self) -> Floats:
         """Area or volume of each cell `(m,)`."""
-        return lock(np.linalg.det(self._edge_matrices) / factorial(self.dim))
+        return lock(np.linalg.det(self._edge_matrices()) / factorial(self.dim))
 
     @cached_property
     def gradient(self) -> Floats:
         """Gradients of the barycentric coordinates of each cell `(m, d + 1, d)`, 1/length."""
-        inverse = np.linalg.inv(self._edge_matrices)
+        inverse = np.linalg.inv(self._edge_matrices())
         last = np.swapaxes(inverse, 1, 2)
         return lock(np.concatenate([-last.sum(axis=1, keepdims=True), last], axis=1))
 
@@ -237,24 +238,15 @@ class Mesh:
         return cKDTree(self.points[self.cells].mean(axis=1))
 
     @cached_property
-    def cell_classes(self) -> tuple[tuple[Ints, cKDTree, float], ...]:
-        """Cells of like size: their numbers, a search tree of centroids, the largest size.
+    def cell_grid(self) -> tuple[tuple[Floats, Floats, Ints, Ints], Ints]:
+        """Cells in the bins of a regular grid, about as many bins as cells, and its shape."""
+        from xcrack.kernels.location import binned
 
-        One class where sizes differ by less than four: in a graded mesh a search that reaches as
-        far as the largest cell would look at thousands of small ones.
-        """
-        size = self.cell_size
-        if size.max() < 4 * size.min():
-            return ((np.arange(len(size)), self.cell_tree, float(size.max())),)
-        step = np.floor(np.log2(size / size.min())).astype(np.int64)
-        centre = self.points[self.cells].mean(axis=1)
-        rows = [np.nonzero(step == k)[0] for k in np.unique(step)]
-        return tuple((r, cKDTree(centre[r]), float(size[r].max())) for r in rows)
-
-    @cached_property
-    def boundary_tree(self) -> cKDTree:
-        """Search tree of the centroids of the boundary facets."""
-        return cKDTree(self.points[self.boundary].mean(axis=1))
+        every = np.stack([self.points.min(axis=0), self.points.max(axis=0)])
+        side = np.maximum(every[1] - every[0], 1e-300)
+        edge = (np.prod(side / side.max()) / len(self.cells)) ** (1 / self.dim) * side.max()
+        shape = np.clip(side / edge, 1, len(self.cells)).astype(np.int64)
+        return binned(self.points, self.cells, every, shape), shape
 
     def facet_numbers(self, facets: Ints) -> Ints:
         """Numbers (rows of `facets`) of the given facets `(k, d)`; -1 where there is none.
@@ -265,10 +257,7 @@ class Mesh:
             Not whole numbers of that shape.
         """
         facets = whole_numbers(facets, "facet_numbers: facets", (None, self.dim), error=MeshError)
-        known = self._facet_keys
-        asked = _scalar_key(np.sort(facets, axis=1), self.n_points)
-        number = np.minimum(np.searchsorted(known, asked), len(known) - 1)
-        return np.where(known[number] == asked, number, -1)
+        return numbers_of(self, facets)
 
     def _check_folds(self) -> None:
         """Cells on both sides of a facet must lie on different sides of it."""
@@ -289,7 +278,7 @@ class Mesh:
             )
 
     def _check_facets(self, name: str, facets: Ints) -> None:
-        number = self.facet_numbers(facets)
+        number = numbers_of(self, facets)
         if (number < 0).any():
             raise MeshError(
                 f"facet set {shown(name)}: facet {facets[np.argmax(number < 0)].tolist()} is no "
@@ -336,19 +325,31 @@ def sound_mesh(
     return mesh
 
 
+def numbers_of(mesh: Mesh, facets: Ints) -> Ints:
+    """`Mesh.facet_numbers` of facets that need no check."""
+    known = mesh._facet_keys
+    asked = np.array(facets)
+    asked.sort(axis=1)
+    asked = _scalar_key(asked, mesh.n_points)
+    number = np.minimum(known.searchsorted(asked), len(known) - 1)
+    return np.where(known[number] == asked, number, -1)
+
+
 def _scalar_key(facets: Ints, n_points: int) -> Ints:
-    key = facets[:, 0].astype(np.int64)
+    key = facets[:, 0]
     for column in facets.T[1:]:
         key = key * np.int64(n_points) + column
     return key
 
 
+@cache
 def local_edges(dim: int) -> Ints:
     """Pairs of local vertex numbers of a simplex, `(d (d + 1) / 2, 2)`."""
-    return np.array(list(combinations(range(dim + 1), 2)), dtype=np.int64)
+    return lock(np.array(list(combinations(range(dim + 1), 2)), dtype=np.int64))
 
 
+@cache
 def local_facets(dim: int) -> Ints:
     """Local vertex numbers of the facet opposite to each vertex, `(d + 1, d)`."""
     every = range(dim + 1)
-    return np.array([[j for j in every if j != i] for i in every], dtype=np.int64)
+    return lock(np.array([[j for j in every if j != i] for i in every], dtype=np.int64))

@@ -59,9 +59,13 @@ def mean_rotation(solution: Solution, distance: Floats, radius: float) -> Floats
     if len(near) <= d:
         return np.zeros((d, d))
     y, u = np.zeros((2, len(near), 3))  # 2D turns about the third axis
-    y[:, :d], u[:, :d] = points[near] - points[near].mean(axis=0), solution.coefficients[near]
-    inertia = (y * y).sum() * np.eye(3) - y.T @ y
-    w = np.linalg.solve(inertia, np.cross(y, u).sum(axis=0))
+    x = points[near]
+    y[:, :d], u[:, :d] = x - x.mean(axis=0), solution.coefficients[near]
+    square, product = y.T @ y, y.T @ u
+    inertia = square.trace() * np.eye(3) - square
+    turning = product - product.T
+    moment = np.array([turning[1, 2], turning[2, 0], turning[0, 1]])
+    w = np.linalg.solve(inertia, moment)
     return np.array([[0.0, -w[2], w[1]], [w[2], 0.0, -w[0]], [-w[1], w[0], 0.0]])[:d, :d]
 
 

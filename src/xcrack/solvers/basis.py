@@ -14,6 +14,7 @@ import scipy.sparse as sp
 
 from xcrack.arrays import Bools, Floats, Ints, offsets, ranges
 from xcrack.mesh.mesh import Mesh
+from xcrack.threads import one_blas_thread
 from xcrack.xfem.function_space import FunctionSpace
 
 _DEPENDENT = 1e-10  # eigenvalues below this share of a block's largest are dropped
@@ -97,23 +98,16 @@ def restricted(blocks: Blocks, free: Bools) -> Blocks:
 
 def orthonormal(K: sp.csr_matrix, blocks: Blocks) -> sp.csr_matrix:
     """The functions that replace the enriched unknowns of blocks, in the old basis `(n, k)`."""
-    rows, columns, values = [], [], []
-    count = 0
-    for members, k, n_standard in _by_shape(K, blocks):
-        Z = _block_basis(k, n_standard)
-        used = Z != 0
-        alive = used.any(axis=1)
-        number = np.full(alive.shape, -1, dtype=np.int64)
-        number[alive] = count + np.arange(int(alive.sum()))
-        count += int(alive.sum())
-        b, i, j = np.nonzero(used)
-        rows.append(members[b, i])
-        columns.append(number[b, j])
-        values.append(Z[b, i, j])
-    if not count:
-        return sp.csr_matrix((K.shape[0], 0))
-    triplets = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
-    return sp.csr_matrix(triplets, shape=(K.shape[0], count))
+    from xcrack.kernels.blocks import orthonormal_columns
+
+    with one_blas_thread():
+        indptr, indices, data, count = orthonormal_columns(
+            K.indptr, K.indices, K.data, blocks.members, blocks.offsets, blocks.n_standard,
+            _DEPENDENT,
+        )  # fmt: skip
+    if count < 0:
+        raise np.linalg.LinAlgError("the stiffness of a block of unknowns is singular")
+    return sp.csr_matrix((data, indices, indptr), shape=(K.shape[0], count))
 
 
 def _by_shape(K: sp.csr_matrix, blocks: Blocks) -> list[tuple[Ints, Floats, int]]:
@@ -132,25 +126,6 @@ def _by_shape(K: sp.csr_matrix, blocks: Blocks) -> list[tuple[Ints, Floats, int]
         k = flat[start[which][:, None] + np.arange(s * s)].reshape(-1, s, s)
         groups.append((members, k, n_standard))
     return groups
-
-
-def _block_basis(k: Floats, n_standard: int) -> Floats:
-    """Basis of the enriched part of blocks `(b, s, s - n_standard)`; dropped columns are zero."""
-    ss, se, ee = (
-        k[:, :n_standard, :n_standard],
-        k[:, :n_standard, n_standard:],
-        k[:, n_standard:, n_standard:],
-    )
-    C = np.linalg.solve(ss, se) if n_standard else np.zeros_like(se)
-    schur = ee - np.einsum("bsi,bsj->bij", se, C)
-    diagonal = np.einsum("bii->bi", ee)
-    D = 1 / np.sqrt(np.maximum(diagonal, 1e-300))
-    D = np.where(diagonal > 0, D, 0.0)
-    w, Q = np.linalg.eigh(D[:, :, None] * schur * D[:, None, :])
-    good = w > _DEPENDENT * w.max(axis=1, keepdims=True)
-    scale = np.where(good, 1 / np.sqrt(np.where(good, w, 1.0)), 0.0)
-    Z = D[:, :, None] * Q * scale[:, None, :]
-    return np.concatenate([-np.einsum("bsi,bij->bsj", C, Z), Z], axis=1)
 
 
 def stars(mesh: Mesh, order: int) -> sp.csr_matrix:

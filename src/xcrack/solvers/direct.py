@@ -7,7 +7,7 @@ from importlib.util import find_spec
 import numpy as np
 import scipy.sparse as sp
 
-from xcrack.arrays import Bools, Floats, Ints
+from xcrack.arrays import Bools, Floats
 from xcrack.errors import ConvergenceError, ProblemError, warn
 from xcrack.inputs import called, numbers, shown
 from xcrack.scene.material import Isotropic
@@ -24,6 +24,7 @@ from xcrack.solvers.engine import Condensed, ContactRows, Count, StateContact
 from xcrack.solvers.factor import Solve, superlu
 from xcrack.solvers.modal_basis import mode_columns
 from xcrack.solvers.multifrontal import Factor, Tree, factorised, tree
+from xcrack.solvers.products import proportional, times, times_transposed
 from xcrack.solvers.reuse import Reuse
 from xcrack.threads import one_blas_thread
 from xcrack.xfem.function_space import FunctionSpace
@@ -103,9 +104,14 @@ class System:
     def solve(self, f: Floats, known: Floats | None = None, start: Floats | None = None) -> Floats:
         """Displacements for loads `(n_dof,)` or `(n_dof, k)` and known values of the same shape."""
         del start
-        residual = f if known is None else f - self.matrix @ known
         self.count.solves += 1 if f.ndim == 1 else f.shape[1]
-        return self._expanded(self.apply_inverse(self.basis.T @ residual), known)
+        b = self._loads(f, known)
+        if f.ndim == 1:
+            return self._expanded(self.apply_inverse(b), known)
+        first, scale = proportional(b)
+        alone = np.unique(first)
+        y = self.apply_inverse(b if len(alone) == b.shape[1] else b[:, alone])
+        return self._expanded(y[:, np.searchsorted(alone, first)] * scale, known)
 
     def first_look(
         self, f: Floats, known: Floats, closed_before: bool
@@ -144,7 +150,7 @@ class System:
             gap = N @ self.solve(f, known)
             return Condensed(self.dual(N), gap, lambda lam: self.solve(f + N.T @ lam, known))
         factor = self.factor
-        b = self.basis.T @ (f - self.matrix @ known)
+        b = self._loads(f, known)
         Y, places = factor.forward_sparse(sp.csr_matrix(N @ self.basis))
         y = factor.forward(b)
         with one_blas_thread():
@@ -197,9 +203,15 @@ class System:
             for k, first in enumerate(start)
         ]
 
+    def _loads(self, f: Floats, known: Floats | None) -> Floats:
+        """Loads and what imposed displacements add to them, in the solver's basis."""
+        if known is not None and known.any():
+            f = f - times(self.matrix, known)
+        return times_transposed(self.basis, f)
+
     def _expanded(self, y: Floats, known: Floats | None) -> Floats:
         """Displacements of coefficients in the solver's basis."""
-        u = self.basis @ y
+        u = times(self.basis, y)
         u = u if known is None else known + u
         if not np.isfinite(u).all():
             raise ConvergenceError(
@@ -241,8 +253,7 @@ def system(
     halves = None if reuse is None else reuse.tree
     if halves is None or halves.mesh is not space.mesh or halves.order != space.order:
         halves = tree(space.mesh, space.order)
-    columns = sp.csc_matrix(basis)
-    support = columns.indptr, columns.indices, function_nodes(space), space.dim
+    support = basis.indptr, basis.indices, basis.shape[1], function_nodes(space), space.dim
     before = None if reuse is None else reuse.factor
     factor = factorised(reduced, support, halves, before, keep=reuse is not None)
     if factor is None:  # a pivot that is not positive: SuperLU needs none
@@ -268,10 +279,11 @@ def _checked(factor: Factor, A: sp.csc_matrix, count: Count) -> Solve:
 
 
 def _residual(A: sp.csc_matrix, x: Floats, b: Floats) -> float:
-    """Largest residual of right-hand sides, relative to their size."""
-    r = b - A @ x
-    size, residual = (np.sqrt(np.einsum("i...,i...->...", v, v)) for v in (b, r))
-    return float(np.max(residual / np.where(size > 0, size, 1.0), initial=0.0))
+    """Largest residual of right-hand sides, relative to their size; A is symmetric."""
+    from xcrack.kernels.sparse import residual
+
+    x, b = (np.ascontiguousarray(v).reshape(len(v), -1) for v in (x, b))
+    return float(residual(A.indptr, A.indices, A.data, x, b))
 
 
 def _verified(solver: Solver, A: sp.csc_matrix) -> Solve:
@@ -332,43 +344,18 @@ def _reduced(
 
     first = space.n_nodes * space.dim
     enriched = _enriched_columns(space, K, ~fixed, numerics, material)
-    across = sp.csr_matrix(K @ enriched)
-    down = sp.csc_matrix(across)
-    own = sp.csc_matrix(enriched.T @ down)
-    plain, border = K.diagonal()[:first], own.diagonal()
-    alive = np.nonzero(border > 0)[0]
-    if len(alive) < len(border):
-        enriched, across, down = enriched[:, alive], across[:, alive], down[:, alive]
-        own, border = own[alive][:, alive], border[alive]
-    standard = np.nonzero(~fixed[:first] & (plain > 0))[0]
-    number = np.full(first, -1, dtype=np.int64)
-    number[standard] = np.arange(len(standard))
-    scale = 1 / np.sqrt(np.concatenate([plain[standard], border]))
-    for part in (across, down, own):
-        part.sort_indices()
-    indptr, rows, values = bordered(
-        K.indptr, K.indices, K.data, number, scale, _arrays(across), _arrays(down), _arrays(own)
-    )
-    reduced = sp.csc_matrix((values, rows, indptr), shape=(len(scale), len(scale)))
-    return _beside_identity(standard, enriched, scale), reduced
-
-
-def _beside_identity(standard: Ints, enriched: sp.csr_matrix, scale: Floats) -> sp.csr_matrix:
-    """Columns of the identity, then enriched ones `(n, k)`, all of them scaled."""
-    n = enriched.shape[0]
-    row = np.zeros(n, dtype=np.int64)
-    row[standard] = 1
-    ends = np.concatenate([[0], np.cumsum(row + np.diff(enriched.indptr))])
-    other = np.ones(ends[-1], dtype=bool)
-    other[ends[standard]] = False
-    column, value = np.empty(ends[-1], dtype=np.int64), np.ones(ends[-1])
-    column[~other], column[other] = np.arange(len(standard)), len(standard) + enriched.indices
-    value[other] = enriched.data
-    return sp.csr_matrix((value * scale[column], column, ends), shape=(n, len(scale)))
-
-
-def _arrays(A: sp.csr_matrix | sp.csc_matrix) -> tuple[Ints, Ints, Floats]:
-    return A.indptr, A.indices, A.data
+    while True:
+        Z = enriched.indptr, enriched.indices, enriched.data
+        matrix, columns, energy = bordered(
+            K.indptr, K.indices, K.data, Z, enriched.shape[1], fixed, first
+        )
+        alive = energy > 0
+        if alive.all():
+            break
+        enriched = sp.csr_matrix(enriched[:, alive])
+    size = len(matrix[0]) - 1
+    basis = sp.csr_matrix((columns[2], columns[1], columns[0]), shape=(K.shape[0], size))
+    return basis, sp.csc_matrix((matrix[2], matrix[1], matrix[0]), shape=(size, size))
 
 
 def _enriched_columns(

@@ -8,6 +8,7 @@ import scipy.sparse as sp
 
 from xcrack.arrays import Bools, Floats
 from xcrack.solvers.reuse import Reuse
+from xcrack.xfem.stiffness import Stiffness
 
 
 @dataclass
@@ -109,7 +110,7 @@ class Engine(Protocol):
     """
 
     @property
-    def matrix(self) -> sp.csr_matrix: ...  # noqa: D102
+    def matrix(self) -> sp.csr_matrix | Stiffness: ...  # noqa: D102
 
     @property
     def basis(self) -> sp.csr_matrix: ...  # noqa: D102

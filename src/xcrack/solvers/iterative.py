@@ -17,6 +17,7 @@ from xcrack.solvers.basis import Blocks, node_blocks, orthonormal, patch_orthogo
 from xcrack.solvers.engine import Condensed, ContactRows, Count, StateContact
 from xcrack.solvers.modal_basis import mode_columns
 from xcrack.solvers.multigrid import Hierarchy, extended, hierarchy
+from xcrack.solvers.products import best_guess
 from xcrack.solvers.projected_cg import (
     TOLERANCE,
     Operator,
@@ -29,6 +30,7 @@ from xcrack.solvers.row_blocks import Bordered, row_blocks
 from xcrack.solvers.schwarz import star_patches
 from xcrack.xfem.assembly import Bulk
 from xcrack.xfem.function_space import FunctionSpace
+from xcrack.xfem.stiffness import Stiffness
 
 _ROUGH = 0.02  # residual of a first solution that only shows which faces overlap
 _LEAST_SHARE = 1e-4  # of the load, to which forces are resolved; round-off forbids much less
@@ -40,8 +42,10 @@ class IterativeSystem:
 
     Attributes
     ----------
-    matrix : sparse matrix (n_dof, n_dof)
-        Stiffness in the basis of the space.
+    matrix : Stiffness or sparse matrix (n_dof, n_dof)
+        In the basis of the space.
+    near : sparse matrix (n_dof, n_dof)
+        Its rows next to enriched functions, and maybe others.
     free : (n_dof,) array of bool
     basis : sparse matrix (n_dof, k)
         Columns of the solver's basis; zero in the rows of known unknowns.
@@ -55,7 +59,8 @@ class IterativeSystem:
     count : Count
     """
 
-    matrix: sp.csr_matrix
+    matrix: sp.csr_matrix | Stiffness
+    near: sp.csr_matrix
     free: Bools
     basis: sp.csr_matrix
     hierarchy: Hierarchy
@@ -91,7 +96,7 @@ class IterativeSystem:
         if start is not None:
             y = self.coordinates(start.reshape(columns.shape) - given)
         for k in range(b.shape[1]):
-            guess = _best_guess(self.operator, y[:, :k], b[:, k]) if start is None else y[:, k]
+            guess = best_guess(self.operator, y[:, :k], b[:, k]) if start is None else y[:, k]
             y[:, k] = self._apart(b[:, k], given[:, k], guess, tolerance)
         return np.asarray(given + self.basis @ y).reshape(f.shape)
 
@@ -125,7 +130,7 @@ class IterativeSystem:
         for k in range(b.shape[1]):
             gap = rows.N @ known[:, k]
             if latest is None:
-                guess[:, k] = _best_guess(self.operator, guess[:, :k], b[:, k])
+                guess[:, k] = best_guess(self.operator, guess[:, :k], b[:, k])
             first = start[k]
             active = own @ guess[:, k] + gap < 0 if first is None else first
             run = partial(projected, self.operator, b[:, k], own, gap, rows.measure, rows.stiffness)
@@ -202,27 +207,28 @@ class IterativeSystem:
     def _within(self) -> sp.csr_matrix:
         """Entries of the stiffness between unknowns of one node."""
         if self.combined is None or self.back is None:
-            return _within_blocks(self.matrix, self.blocks)
-        K = _nearby(self.matrix, self.combined, self.blocks)
+            return _within_blocks(self.near, self.blocks)
+        K = _nearby(self.near, self.combined, self.blocks)
         return sp.csr_matrix(self.back.T @ _within_blocks(K, self.blocks) @ self.back)
 
 
 def iterative_system(
     space: FunctionSpace,
-    K: sp.csr_matrix,
+    K: sp.csr_matrix | Stiffness,
     bulk: Bulk,
     fixed: Bools,
     levels: Hierarchy | None = None,
     modes: Floats | None = None,
     vectorial: Isotropic | None = None,
+    near: sp.csr_matrix | None = None,
 ) -> IterativeSystem:
     """Change the basis and put the enriched matrix on top of the levels of the uncracked body.
 
     Parameters
     ----------
     space : FunctionSpace
-    K : sparse matrix (n_dof, n_dof)
-        Stiffness of all unknowns.
+    K : Stiffness or sparse matrix (n_dof, n_dof)
+        Of all unknowns.
     bulk : Bulk
         Stiffness of the uncracked body, of which K's standard block is a copy.
     fixed : (n_dof,) array of bool
@@ -233,7 +239,11 @@ def iterative_system(
         Rigid motions that nothing prevents; loads have to be in balance with them.
     vectorial : Isotropic, optional
         The material where the tip basis is vectorial.
+    near : sparse matrix (n_dof, n_dof), optional
+        Rows of K next to enriched functions, enough at order 1; K itself where it is omitted.
     """
+    if near is None:
+        near = K.joined() if isinstance(K, Stiffness) else K
     if levels is None or not levels.fits(bulk, fixed):
         levels = hierarchy(bulk, fixed)
     free = ~fixed
@@ -244,11 +254,11 @@ def iterative_system(
     if vectorial is not None and space.tips:
         combined, in_use = mode_columns(space, vectorial, free)
     if stars and space.tips:
-        combined, back = _apart(space, K, combined, in_use)
+        combined, back = _apart(space, near, combined, in_use)
     whole = node_blocks(space, "star" if stars else "node")
     blocks = restricted(whole, in_use)
-    enriched, starts, block = _enriched_basis(space, K, blocks, levels, combined)
-    parts = _parts(levels, K, plain, enriched)
+    enriched, starts, block = _enriched_basis(space, near, blocks, levels, combined)
+    parts = _parts(levels, near, plain, enriched)
     stored, diagonal = parts.stored(starts), parts.diagonal
     patches = None
     if stars and len(block):
@@ -265,7 +275,7 @@ def iterative_system(
     if modes is not None and modes.shape[1]:
         null[: len(plain)] = np.linalg.qr(modes[plain] * levels.free[:, None])[0]
     operator = Operator(stored.times, extended(levels, stored, diagonal, patches), diagonal, null)
-    return IterativeSystem(K, lock(free), basis, levels, operator, blocks, combined, back)
+    return IterativeSystem(K, near, lock(free), basis, levels, operator, blocks, combined, back)
 
 
 def _apart(
@@ -385,12 +395,3 @@ def _within_blocks(K: sp.csr_matrix, blocks: Blocks) -> sp.csr_matrix:
     first = blocks.offsets[block]
     triplets = (values, (blocks.members[first + row], blocks.members[first + column]))
     return sp.csr_matrix(triplets, shape=K.shape)
-
-
-def _best_guess(K: Operator, solved: Floats, b: Floats) -> Floats:
-    """The combination of other solutions with the least energy: exact for proportional loads."""
-    y = np.zeros(len(b))
-    if not solved.shape[1]:
-        return y
-    image = np.stack([K.times(v) for v in solved.T], axis=1)
-    return np.asarray(solved @ (np.linalg.pinv(solved.T @ image, 1e-12, True) @ (solved.T @ b)))

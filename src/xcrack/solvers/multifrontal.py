@@ -179,7 +179,7 @@ class Factor:
 
 def factorised(
     A: sp.csc_matrix,
-    columns: tuple[Ints, Ints, Ints, int],
+    columns: tuple[Ints, Ints, int, Ints, int],
     tree: Tree,
     before: Factor | None = None,
     keep: bool = False,
@@ -190,9 +190,9 @@ def factorised(
     ----------
     A : sparse matrix (n, n)
         CSC, both triangles.
-    columns : indptr, indices, owner, d
-        Columns of the basis that A belongs to, CSC; the node of each function, and the number of
-        components.
+    columns : indptr, indices, n, owner, d
+        Rows of the basis that A belongs to, CSR, and its number of columns; the node of each
+        function, and the number of components.
     tree : Tree
     before : Factor, optional
         Of an earlier crack on the same tree, made to be kept.

@@ -1,6 +1,7 @@
 """Stiffness: the uncracked body once a mesh, enriched cells once a crack."""
 
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 import scipy.sparse as sp
@@ -16,6 +17,7 @@ from xcrack.xfem.function_space import Batch, FunctionSpace
 from xcrack.xfem.lips import LipPoints
 from xcrack.xfem.quadrature import Points, cell_points
 from xcrack.xfem.reused_cells import ReusedCells, reused_cells, with_one_jump
+from xcrack.xfem.stiffness import Enriched, Stiffness
 
 _CHUNK = 20_000  # integration points tabulated at once; bounds the memory
 
@@ -70,8 +72,8 @@ def enriched_stiffness(
     numerics: Numerics,
     lips: tuple[LipPoints, ...],
     known: ReusedCells | None = None,
-) -> tuple[sp.csr_matrix, int, ReusedCells | None]:
-    """Entries with an enriched function, as a matrix of all unknowns.
+) -> tuple[Enriched, int, ReusedCells | None]:
+    """Entries with an enriched function.
 
     Entries of two standard functions are left out: they are those of the uncracked body.
 
@@ -82,7 +84,7 @@ def enriched_stiffness(
 
     Returns
     -------
-    matrix : sparse matrix (n_dof, n_dof)
+    enriched : Enriched
     n_points : int
         Integration points used.
     reusable : ReusedCells or None
@@ -90,10 +92,10 @@ def enriched_stiffness(
     """
     from xcrack.kernels.enriched import add_products, add_stiffness, enriched_pattern
 
-    cells = space.enriched
-    n = space.n_dof
+    cells, d = space.enriched, space.dim
     if not len(cells):
-        return sp.csr_matrix((n, n)), 0, None
+        indptr, indices = np.zeros(space.n_functions + 1, np.int64), np.zeros(0, np.int32)
+        return Enriched(indptr, indices, np.zeros((0, d, d))), 0, None
     simple = with_one_jump(space, cells)
     reusable, n_points = reused_cells(space, cells[simple], known)
     others = cells[~simple]
@@ -103,7 +105,6 @@ def enriched_stiffness(
     if numerics.consistent and len(with_tip):
         boundary = boundary_points(space, with_tip, lips)
     indptr, indices = enriched_pattern(_functions(space, cells), space.n_functions, space.n_nodes)
-    d = space.dim
     data = np.zeros((len(indices), d, d))
     lame = material.lam, material.mu
     for batch, rows in space.batches(reusable.cells):
@@ -125,18 +126,18 @@ def enriched_stiffness(
             add_stiffness(
                 data, indptr, indices, functions, first, weight, G, space.n_nodes, *lame
             )  # fmt: skip
-    if d * d * len(indices) < np.iinfo(np.int32).max:
-        indptr = indptr.astype(np.int32)
-    matrix = sp.bsr_matrix((data, indices, indptr), shape=(n, n)).tocsr()
-    return matrix, n_points + len(points.weight), reusable
+    return Enriched(indptr, indices, data), n_points + len(points.weight), reusable
 
 
 def _functions(space: FunctionSpace, cells: Ints) -> Ints:
     """Functions that act on cells, in rows of one length."""
     parts = [batch.functions for batch, _ in space.batches(cells)]
-    width = max(part.shape[1] for part in parts)
-    filled = [np.pad(p, ((0, 0), (0, width - p.shape[1])), constant_values=-1) for p in parts]
-    return np.concatenate(filled)
+    filled = np.full((len(cells), max(part.shape[1] for part in parts)), -1, dtype=np.int64)
+    first = 0
+    for part in parts:
+        filled[first : first + len(part), : part.shape[1]] = part
+        first += len(part)
+    return filled
 
 
 def _chunks(space: FunctionSpace, points: Points, cells: Ints) -> list[Ints]:
@@ -145,24 +146,19 @@ def _chunks(space: FunctionSpace, points: Points, cells: Ints) -> list[Ints]:
     return [cells[group == g] for g in np.unique(group)]
 
 
-def total_stiffness(bulk_: Bulk, enriched: sp.csr_matrix) -> sp.csr_matrix:
+def total_stiffness(bulk_: Bulk, enriched: Enriched) -> sp.csr_matrix:
     """Stiffness of all unknowns."""
-    n, m = enriched.shape[0], bulk_.matrix.shape[0]
-    plain = bulk_.matrix.tocsr()
-    indptr = np.concatenate([plain.indptr, np.full(n - m, plain.indptr[-1], plain.indptr.dtype)])
-    padded = sp.csr_matrix((plain.data, plain.indices, indptr), shape=(n, n))
-    return (padded + enriched).tocsr()
+    return Stiffness(bulk_.matrix, enriched).joined()
 
 
 def rigid_modes(x: Floats) -> Floats:
     """Rigid motions of points `(n, d)`: `(n d, 3)` in 2D, `(n d, 6)` in 3D."""
     n, d = x.shape
-    centre = x.mean(axis=0)
-    y = x - centre
-    modes = [np.tile(np.eye(d)[i], n) for i in range(d)]
+    y = x - x.mean(axis=0)
+    turns = list(combinations(range(d), 2))
+    modes = np.zeros((n, d, d + len(turns)))
     for i in range(d):
-        for j in range(i + 1, d):
-            turn = np.zeros((n, d))
-            turn[:, i], turn[:, j] = -y[:, j], y[:, i]
-            modes.append(turn.ravel())
-    return np.stack(modes, axis=1)
+        modes[:, i, i] = 1.0
+    for k, (i, j) in enumerate(turns):
+        modes[:, i, d + k], modes[:, j, d + k] = -y[:, j], y[:, i]
+    return modes.reshape(n * d, -1)

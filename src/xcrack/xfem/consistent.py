@@ -121,7 +121,7 @@ def corrected(
     values, gradients : tabulated functions at these points; gradients are changed in place
     boundary : points on the boundary of all pieces
     """
-    from xcrack.kernels.tips import add_correction, add_flux, moments_at, take_volume
+    from xcrack.kernels.tips import add_correction, add_flux, moments_at, solve_moments, take_volume
 
     row, bary, weight, side = points
     mesh, d = space.mesh, space.dim
@@ -149,15 +149,12 @@ def corrected(
     take_volume(
         defect, gram, piece, weight, values[:, first:], gradients[:, first:], moments, 1 / size[row]
     )
-    total = np.maximum(gram[:, :1, :1], 1e-300)
-    inverse = np.linalg.pinv(gram / total, rcond=1e-12, hermitian=True) / total
-    coefficient = (defect.reshape(n_pieces, -1, count) @ inverse).reshape(defect.shape)
-    add_correction(gradients, first, piece, row, coefficient, moments, batch.functions)
+    solve_moments(defect, gram, 1e-12)
+    add_correction(gradients, first, piece, row, defect, moments, batch.functions)
     return gradients
 
 
 def _of_batch(batch: Batch, cell: Ints) -> tuple[Ints, Ints]:
-    place = np.searchsorted(batch.cells, cell)
-    place = np.minimum(place, len(batch.cells) - 1)
-    chosen = np.nonzero(batch.cells[place] == cell)[0]
+    place = np.minimum(batch.cells.searchsorted(cell), len(batch.cells) - 1)
+    chosen = (batch.cells[place] == cell).nonzero()[0]
     return chosen, place[chosen]

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from xcrack.arrays import Bools, Floats, Ints
+from xcrack.mesh.mesh import numbers_of
 from xcrack.mesh.split import cut_simplices
 from xcrack.xfem.function_space import FunctionSpace
 from xcrack.xfem.quadrature_2d import segment_points
@@ -73,10 +74,7 @@ def part_points(
 def _on_segments(
     space: FunctionSpace, x: Floats, nodes: Ints, bary: Floats, n: int
 ) -> tuple[Ints, Floats, Floats]:
-    rule = segment_points(space, x[:, 0], x[:, 1], n)
-    place = np.stack([1 - rule.position, rule.position], axis=1)
-    length = np.linalg.norm(x[:, 1] - x[:, 0], axis=1)
-    return rule.segment, place, length[rule.segment] * rule.weight
+    return segment_points(space, np.ascontiguousarray(x[:, 0]), np.ascontiguousarray(x[:, 1]), n)
 
 
 def _on_triangles(
@@ -92,45 +90,16 @@ def _on_triangles(
 
 
 def _split_segments(space: FunctionSpace, ends: Ints) -> FacetParts:
-    edge = _edge_numbers(space, ends)
-    k = len(ends)
-    position = np.full(k, np.nan)
-    second = np.full(k, np.nan)  # next to a junction two cracks may cross one segment
-    for cut in space.cuts:
-        t = cut.cut_edge[edge]
-        # cut_edge counts from the smaller point number.
-        t = np.where(ends[:, 0] < ends[:, 1], t, 1 - t)
-        again = ~np.isnan(position) & ~np.isnan(t)
-        second[again] = np.maximum(position, t)[again]
-        position[again] = np.minimum(position, t)[again]
-        position = np.where(np.isnan(position), t, position)
-    split, twice = ~np.isnan(position), ~np.isnan(second)
-    number = np.concatenate([np.arange(k), np.nonzero(split)[0], np.nonzero(twice)[0]])
-    begin = np.concatenate([np.zeros(k), position[split], second[twice]])
-    end = np.concatenate(
-        [
-            np.where(split, position, 1.0),
-            np.where(twice, second, 1.0)[split],
-            np.ones(int(twice.sum())),
-        ]
+    from xcrack.kernels.segments import split
+
+    edge = numbers_of(space.mesh, ends)  # in 2D facets are edges
+    position, level = (
+        np.empty((len(space.cuts), len(ends))),
+        np.empty((len(space.cuts), *ends.shape)),
     )
-    bary = np.stack([np.stack([1 - p, p], axis=1) for p in (begin, end)], axis=1)
-    side = np.zeros((len(number), len(space.cuts)), dtype=np.int64)
     for c, cut in enumerate(space.cuts):
-        values = cut.level_set.phi[ends[number]]
-        middle = (begin + end) / 2
-        at = (1 - middle) * values[:, 0] + middle * values[:, 1]
-        # Ahead of a tip phi changes its sign on a facet that no crack splits.
-        ahead = np.isnan(cut.cut_edge[edge])[number] & (values[:, 0] * values[:, 1] < 0)
-        side[:, c] = np.where(ahead, 0, np.sign(at))
-    return FacetParts(number, bary, side)
-
-
-def _edge_numbers(space: FunctionSpace, ends: Ints) -> Ints:
-    edges, n = space.mesh.edges, space.mesh.n_points
-    key = edges[:, 0] * np.int64(n) + edges[:, 1]
-    low, high = np.sort(ends, axis=1).T
-    return np.searchsorted(key, low * np.int64(n) + high)
+        position[c], level[c] = cut.cut_edge[edge], cut.level_set.phi[ends]
+    return FacetParts(*split(np.array(ends), position, level))
 
 
 def _split_triangles(space: FunctionSpace, ends: Ints) -> FacetParts:

@@ -102,12 +102,12 @@ class FunctionSpace:
     n_functions: int
     joints: tuple[Joint, ...] = ()
 
-    @property
+    @cached_property
     def dim(self) -> int:
         """Number of dimensions, 2 or 3."""
         return self.mesh.dim
 
-    @property
+    @cached_property
     def n_dof(self) -> int:
         """Number of unknowns."""
         return self.n_functions * self.dim
@@ -172,13 +172,21 @@ class FunctionSpace:
         """Group cells by what acts on them; with each batch the positions in `cells`."""
         signature = self.signature[cells]
         groups = []
-        for value in np.unique(signature):
-            rows = np.nonzero(signature == value)[0]
-            bits = [b for b in range(len(self.cuts) + len(self.tips)) if value >> b & 1]
-            cracks = tuple(b for b in bits if b < len(self.cuts))
-            tips = tuple(b - len(self.cuts) for b in bits if b >= len(self.cuts))
-            groups.append((self._batch(cells[rows], cracks, tips), rows))
+        for value, cracks, tips in self._combinations:
+            rows = (signature == value).nonzero()[0]
+            if len(rows):
+                groups.append((self._batch(cells[rows], cracks, tips), rows))
         return groups
+
+    @cached_property
+    def _combinations(self) -> tuple[tuple[int, tuple[int, ...], tuple[int, ...]], ...]:
+        """What acts together on cells: the bit mask, and the cracks and tips in it."""
+        n = len(self.cuts)
+        every = []
+        for value in np.unique(self.signature).tolist():
+            bits = [b for b in range(n + len(self.tips)) if value >> b & 1]
+            every.append((value, [b for b in bits if b < n], [b - n for b in bits if b >= n]))
+        return tuple((value, tuple(cracks), tuple(tips)) for value, cracks, tips in every)
 
     def batches_of_points(self, cell: Ints) -> list[tuple[Batch, Ints, Ints]]:
         """Batches that serve points in the given cells `(q,)`, in any order and repeated.
@@ -188,24 +196,36 @@ class FunctionSpace:
         list of (batch, numbers of its points, row in the batch of the cell of each)
         """
         cells, inverse = np.unique(cell, return_inverse=True)
+        groups = self.batches(cells)
+        if len(groups) == 1:
+            return [(groups[0][0], np.arange(len(cell)), inverse)]
         served = []
-        for batch, rows in self.batches(cells):
+        for batch, rows in groups:
             place = np.full(len(cells), -1, dtype=np.int64)
             place[rows] = np.arange(len(rows))
-            number = np.nonzero(place[inverse] >= 0)[0]
-            served.append((batch, number, place[inverse][number]))
+            own = place[inverse]
+            number = (own >= 0).nonzero()[0]
+            served.append((batch, number, own[number]))
         return served
 
     def _batch(self, cells: Ints, cracks: tuple[int, ...], tips: tuple[int, ...]) -> Batch:
         nodes = self.cell_nodes[cells]
-        columns = [nodes]
-        columns.extend(self.heaviside[c][nodes] for c in cracks)
+        corners, n = self.mesh.cells.shape[1], nodes.shape[1]
+        width = n * (1 + len(cracks)) + corners * sum([self.tips[t].functions for t in tips])
+        functions = np.empty((len(cells), width), dtype=np.int64)
+        functions[:, :n] = nodes
+        at = n
+        for c in cracks:
+            functions[:, at : at + n] = self.heaviside[c][nodes]
+            at += n
         for t in tips:
             tip = self.tips[t]
             first = tip.point_to_function[self.mesh.cells[cells]]
-            each = first[:, :, None] + np.arange(tip.functions)
-            columns.append(np.where(first[:, :, None] >= 0, each, -1).reshape(len(cells), -1))
-        return Batch(cells, cracks, tips, np.ascontiguousarray(np.concatenate(columns, axis=1)))
+            for k in range(tip.functions):
+                own = functions[:, at + k : at + corners * tip.functions : tip.functions]
+                own[:] = first + k * (first >= 0)
+            at += corners * tip.functions
+        return Batch(cells, cracks, tips, functions)
 
     def tabulate(
         self, batch: Batch, row: Ints, bary: Floats, side: Ints, slopes: bool = True

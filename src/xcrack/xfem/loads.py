@@ -6,6 +6,7 @@ from xcrack.arrays import Floats, Ints
 from xcrack.errors import ProblemError
 from xcrack.inputs import shown
 from xcrack.mesh.holes import round_hole
+from xcrack.mesh.mesh import numbers_of
 from xcrack.mesh.sets import facet_set, nearest_point
 from xcrack.scene.conditions import (
     BodyForce,
@@ -86,7 +87,7 @@ def body_points(space: FunctionSpace) -> Points:
 def facet_points(space: FunctionSpace, facets: Ints, n: int = 6) -> tuple[Points, Floats]:
     """Points on boundary facets with their outward normals; weights are lengths or areas."""
     mesh = space.mesh
-    number = mesh.facet_numbers(facets)
+    number = numbers_of(mesh, facets)
     cell = mesh.facet_to_cell[number, 0]
     parts = split_facets(space, facets)
     k, place, weight = part_points(space, facets[parts.number], parts.bary, n)
@@ -111,7 +112,7 @@ def facet_points(space: FunctionSpace, facets: Ints, n: int = 6) -> tuple[Points
 def _add_traction(f: Floats, space: FunctionSpace, load: SetLoad) -> None:
     what = f"{type(load).__name__.lower()}({shown(load.where)})"
     facets = facet_set(space.mesh, load.where, what)
-    inner = space.mesh.facet_to_cell[space.mesh.facet_numbers(facets), 1] >= 0
+    inner = space.mesh.facet_to_cell[numbers_of(space.mesh, facets), 1] >= 0
     if inner.any():
         raise ProblemError(
             f"{what}: {int(inner.sum())} of its facets lie inside the body; loads act on the "

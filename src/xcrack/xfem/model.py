@@ -13,10 +13,11 @@ from xcrack.cutting.level_sets import level_sets
 from xcrack.mesh.mesh import Mesh
 from xcrack.scene.numerics import Numerics
 from xcrack.scene.problem import Problem
-from xcrack.xfem.assembly import Bulk, bulk, enriched_stiffness, total_stiffness
+from xcrack.xfem.assembly import Bulk, bulk, enriched_stiffness
 from xcrack.xfem.enrichment_3d import front_reach
 from xcrack.xfem.function_space import FunctionSpace, function_space
 from xcrack.xfem.lips import LipPoints, jump_matrix, lip_points
+from xcrack.xfem.stiffness import Enriched, Stiffness
 from xcrack.xfem.supports import Known, known_unknowns
 
 
@@ -29,7 +30,8 @@ class Model:
     space : FunctionSpace
     lips : tuple of LipPoints
     bulk : Bulk
-    stiffness : sparse matrix
+    enriched : Enriched
+        Entries of enriched functions.
     known : Known
     n_points : int
         Integration points of the enriched cells.
@@ -38,9 +40,19 @@ class Model:
     space: FunctionSpace
     lips: tuple[LipPoints, ...]
     bulk: Bulk
-    stiffness: Any
+    enriched: Enriched
     known: Known
     n_points: int
+
+    @cached_property
+    def parts(self) -> Stiffness:
+        """Stiffness of all unknowns, of body and enriched functions apart."""
+        return Stiffness(self.bulk.matrix, self.enriched)
+
+    @cached_property
+    def stiffness(self) -> Any:
+        """Stiffness of all unknowns, a sparse matrix made when first asked for."""
+        return self.parts.joined()
 
     @cached_property
     def jumps(self) -> tuple[Any, ...]:
@@ -66,7 +78,7 @@ def build(problem: Problem, bulk_: Bulk | None = None) -> Model:
         space,
         lips,
         replace(bulk_, cells=reusable),
-        total_stiffness(bulk_, enriched),
+        enriched,
         known_unknowns(space, tuple(problem.supports)),
         n_points,
     )

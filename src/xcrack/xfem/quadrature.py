@@ -44,8 +44,8 @@ class Points:
 
     def of_cells(self, cells: Ints) -> tuple[Ints, Ints, Ints]:
         """Points of the given cells: their numbers, row of their cell, offsets by cell."""
-        first = np.searchsorted(self.cell, cells, side="left")
-        counts = np.searchsorted(self.cell, cells, side="right") - first
+        first = self.cell.searchsorted(cells)
+        counts = self.cell.searchsorted(cells, side="right") - first
         row, place = ranges(counts)
         return first[row] + place, row, offsets(counts)
 
@@ -86,7 +86,7 @@ def sub_cells(space: FunctionSpace, cells: Ints) -> SubCells:
         rows = place[cut.sub_to_cell]
         mine = rows >= 0
         owner = rows[mine]
-        if (~whole[owner]).any():
+        if not whole[owner].all():
             bad = cells[owner[~whole[owner]][0]]
             raise GeometryError(
                 f"two cracks run through the cell at "
@@ -98,11 +98,14 @@ def sub_cells(space: FunctionSpace, cells: Ints) -> SubCells:
         tip = cut.is_tip[cut.sub_to_cell[mine]]
         parts.append((owner, cut.sub_bary[mine], cut.sub_fraction[mine], side, tip))
         whole[owner] = False
-    rest = np.nonzero(whole)[0]
-    corner = np.broadcast_to(np.eye(mesh.dim + 1), (len(rest), mesh.dim + 1, mesh.dim + 1))
-    parts.append((rest, corner, np.ones(len(rest)), base[rest], np.zeros(len(rest), dtype=bool)))
-    owner, bary, fraction, side, fan = (np.concatenate(p) for p in zip(*parts, strict=True))
-    order = np.argsort(owner, kind="stable")
+    rest = whole.nonzero()[0]
+    if len(rest) or not parts:
+        corner = np.zeros((len(rest), mesh.dim + 1, mesh.dim + 1))
+        corner[:, range(mesh.dim + 1), range(mesh.dim + 1)] = 1.0
+        share, fan = np.ones(len(rest)), np.zeros(len(rest), dtype=bool)
+        parts.append((rest, corner, share, base[rest], fan))
+    owner, bary, fraction, side, fan = map(np.concatenate, zip(*parts, strict=True))
+    order = owner.argsort(kind="stable")
     subs = SubCells(cells[owner[order]], bary[order], fraction[order], side[order], fan[order])
     return _joined(space, subs) if space.joints else subs
 
@@ -147,12 +150,12 @@ def cell_points(space: FunctionSpace, cells: Ints, n: int, degree: int) -> Point
     """
     subs = sub_cells(space, cells)
     with_tip = space.has_tip[subs.cell]
-    plain = np.nonzero(~with_tip)[0]
+    plain = (~with_tip).nonzero()[0]
     bary, weight = simplex_rule(space.dim, degree)
     number = np.repeat(plain, len(weight))
     where = np.einsum("pv,svb->spb", bary, subs.bary[plain]).reshape(-1, space.dim + 1)
     share = np.outer(subs.fraction[plain], weight).ravel()
-    rows = np.nonzero(with_tip)[0]
+    rows = with_tip.nonzero()[0]
     if not len(rows):
         return _sorted(space, subs, number, where, share)
     near, place, part = _NEAR_TIPS[space.dim](

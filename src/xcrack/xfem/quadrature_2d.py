@@ -4,8 +4,6 @@ Sub-cells with tip functions are bisected towards the tip; those that touch it a
 sectors with r = s², in which both the root of r and polynomials are integrated well.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from xcrack.arrays import Bools, Floats, Ints, ranges
@@ -15,7 +13,6 @@ from xcrack.xfem.function_space import FunctionSpace
 
 _LEVELS = 5  # bisections towards a tip before the fan takes over
 _SECTOR = 0.6  # rad, widest sector of a fan
-_FOOT = 1e-9  # a foot this close to an end is the end: round-off of coordinates far from 0
 _EDGE_POINTS = 6  # Gauss points of a boundary piece
 
 
@@ -173,46 +170,24 @@ def _fan_points(
     return np.repeat(number[row], each), points.reshape(-1, 3), weight.ravel()
 
 
-@dataclass(frozen=True, eq=False)
-class SegmentPoints:
-    """Points on segments: number of the segment, position in [0, 1], weight summing to 1."""
-
-    segment: Ints
-    position: Floats
-    weight: Floats
-
-
 def segment_points(
     space: FunctionSpace, begin: Floats, end: Floats, n: int = _EDGE_POINTS
-) -> SegmentPoints:
+) -> tuple[Ints, Floats, Floats]:
     """Gauss points on segments `(k, 2)`, graded towards a tip that is closer than their length.
 
     The segment is split at the foot of the nearest tip, with r = u² from there. The rule depends
     only on the segment, so that the cells on both sides of an edge share it; plain Gauss points
     near a tip spoil order 2.
+
+    Returns
+    -------
+    segment : (q,) array of int
+    place : (q, 2) array
+        Barycentric coordinates in the segment.
+    weight : (q,) array, length
     """
-    k = len(begin)
+    from xcrack.kernels.segments import graded_points
+
     tips = np.array([tip.x for tip in space.tips]).reshape(-1, space.dim)
-    length = np.linalg.norm(end - begin, axis=1)
-    near = np.zeros(k, dtype=bool)
-    foot = np.zeros(k)
-    if len(tips) and k:
-        middle = (begin + end) / 2
-        nearest = tips[np.argmin(np.linalg.norm(middle[:, None] - tips, axis=2), axis=1)]
-        along = end - begin
-        square = np.maximum((along * along).sum(axis=1), 1e-300)
-        foot = np.clip(((nearest - begin) * along).sum(axis=1) / square, 0, 1)
-        foot = np.where(foot < _FOOT, 0.0, np.where(foot > 1 - _FOOT, 1.0, foot))
-        distance = np.linalg.norm(begin + foot[:, None] * along - nearest, axis=1)
-        near = distance < length
-    u, w = gauss(n)
-    far_rows = np.nonzero(~near)[0]
-    parts = [(np.repeat(far_rows, n), np.tile(u, len(far_rows)), np.tile(w, len(far_rows)))]
-    for reach in (-foot, 1 - foot):
-        rows = np.nonzero(near & (np.abs(reach) > 0))[0]
-        position = foot[rows, None] + reach[rows, None] * u**2
-        weight = np.abs(reach[rows])[:, None] * (2 * u * w)
-        parts.append((np.repeat(rows, n), position.ravel(), weight.ravel()))
-    segment, position, weight = (np.concatenate(p) for p in zip(*parts, strict=True))
-    order = np.argsort(segment, kind="stable")
-    return SegmentPoints(segment[order], position[order], weight[order])
+    number, place, weight = graded_points(begin, end, tips, *gauss(n))
+    return number, place, weight

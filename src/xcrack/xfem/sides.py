@@ -12,9 +12,10 @@ from xcrack.xfem.function_space import FunctionSpace
 
 def cell_side(space: FunctionSpace, cells: Ints) -> Ints:
     """Side of each crack on which cells lie `(k, cracks)`, 0 where a crack crosses them."""
-    if not space.cuts:
-        return np.zeros((len(cells), 0), dtype=np.int64)
-    return np.stack([cut.side[cells] for cut in space.cuts], axis=1)
+    side = np.empty((len(cells), len(space.cuts)), dtype=np.int64)
+    for c, cut in enumerate(space.cuts):
+        side[:, c] = cut.side[cells]
+    return side
 
 
 def lip_side(space: FunctionSpace, c: int, cell: Ints, bary: Floats, side: int) -> Ints:

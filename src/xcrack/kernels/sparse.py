@@ -1,0 +1,67 @@
+"""Products of a sparse matrix with columns: sums in the order of scipy's, with fewer calls."""
+
+import numpy as np
+
+from xcrack.kernels.jit import kernel
+
+
+@kernel
+def times(indptr, indices, data, x):  # type: ignore[no-untyped-def]
+    """A x.
+
+    Parameters
+    ----------
+    indptr, indices, data : CSR arrays of A, (n, m)
+    x : (m, k) array
+
+    Returns
+    -------
+    (n, k) array
+    """
+    result = np.zeros((len(indptr) - 1, x.shape[1]))
+    for i in range(len(result)):
+        for k in range(indptr[i], indptr[i + 1]):
+            for c in range(x.shape[1]):
+                result[i, c] += data[k] * x[indices[k], c]
+    return result
+
+
+@kernel
+def times_transposed(indptr, indices, data, n_columns, x):  # type: ignore[no-untyped-def]
+    """Aᵀ x; see `times`.
+
+    Parameters
+    ----------
+    n_columns : int
+        m.
+    x : (n, k) array
+
+    Returns
+    -------
+    (m, k) array
+    """
+    result = np.zeros((n_columns, x.shape[1]))
+    for i in range(len(indptr) - 1):
+        for k in range(indptr[i], indptr[i + 1]):
+            for c in range(x.shape[1]):
+                result[indices[k], c] += data[k] * x[i, c]
+    return result
+
+
+@kernel
+def residual(indptr, indices, data, x, b):  # type: ignore[no-untyped-def]
+    """Largest norm of b - A x over that of b, of all columns `(n, k)`."""
+    largest = 0.0
+    for c in range(x.shape[1]):
+        rest, size = 0.0, 0.0
+        for i in range(len(indptr) - 1):
+            total = 0.0
+            for k in range(indptr[i], indptr[i + 1]):
+                total += data[k] * x[indices[k], c]
+            rest += (b[i, c] - total) ** 2
+            size += b[i, c] ** 2
+        share = np.sqrt(rest / size) if size > 0 else np.sqrt(rest)
+        if np.isnan(share):
+            return share
+        largest = max(largest, share)
+    return largest
