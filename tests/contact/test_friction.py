@@ -408,3 +408,71 @@ def test_report_page_and_files_have_the_shear(tmp_path):
     text = (tmp_path / "rubbed_lips.vtp").read_bytes()
     assert b"shear" in text
     assert b"stuck" in text
+
+
+# Other scenes -------------------------------------------------------------------------------------
+
+PLATE = xc.Problem(
+    xc.box((-20, -20), (20, 20), 12), xc.Isotropic(210e3, 0.3, "strain"),
+    [xc.line_crack([(-7, -4), (7, 4)])], friction=0.3,
+    loads=[xc.pressure("top", 1.0), xc.pressure("bottom", 1.0)],
+)  # fmt: skip
+
+
+def test_any_solver_and_first_set_give_the_same():
+    import scipy.sparse.linalg as sla
+
+    states = [100.0, 30.0]
+    expected = K_of(xc.solve(PLATE, states))
+    assert np.abs(expected).max() > 10
+    opened = replace(PLATE, numerics=xc.Numerics(initial_set="open"))
+    for solutions in (
+        xc.solve(PLATE, states, solver=lambda A: sla.splu(A).solve),
+        xc.solve(opened, states),
+    ):
+        assert K_of(solutions) == pytest.approx(expected, rel=1e-9, abs=1e-9)
+
+
+def test_each_crack_has_its_own_friction():
+    """Far apart, each crack is as it is alone with its coefficient."""
+    other = xc.line_crack([(-5, 12), (4, 16)])
+    both = replace(PLATE, cracks=[*PLATE.cracks, other])
+    mixed, rubbed, smooth = (
+        xc.solve(replace(both, friction=mu), [100.0])[0] for mu in ([0.3, 0.0], 0.3, 0.0)
+    )
+    assert mixed.contact[0].shear is not None
+    assert mixed.contact[1].shear is None
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", xc.XcrackWarning)
+        K = [[xc.stress_intensity(s, c).K_II for c in (0, 1)] for s in (mixed, rubbed, smooth)]
+    assert np.abs(K[0][0] - K[1][0]).max() <= 0.1 * np.abs(K[2][0]).max()
+    assert np.abs(K[0][1] - K[2][1]).max() <= 0.1 * np.abs(K[2][1]).max()
+
+
+def test_nothing_acts_at_zero_load():
+    """Closed at zero load: no traction, no slip, K = 0; and again after loads that stick."""
+    loads = replace(PLATE, contact="on", friction=5.0)
+    solutions = xc.solve(loads, [0.0, 100.0, 0.0])
+    assert np.abs(K_of(solutions)).max() <= 1e-2
+    assert max(np.abs(solutions[k].u).max() for k in (0, 2)) <= 1e-12
+    assert max(s.dissipated for s in solutions) == 0
+
+
+def test_halves_slide_at_the_bound():
+    """A body in two halves, the upper one pressed and pushed along: shear is mu times pressure."""
+    mesh = xc.box((-1, -1), (1, 1), 9)
+    problem = xc.Problem(
+        mesh, xc.Isotropic(1.0, 0.3, "strain"), [xc.line_crack([(-2, 0.03), (2, 0.03)])],
+        supports=[xc.fix("bottom"), xc.displacement("top", (0.3, -0.1))], contact="on",
+        friction=0.4,
+    )  # fmt: skip
+    contact = xc.solve(problem).contact[0]
+    pressure, shear = contact.measure @ contact.pressure, contact.measure @ contact.shear
+    assert pressure > 0.05
+    assert not contact.stuck.any()
+    assert abs(shear) == pytest.approx(0.4 * pressure, rel=1e-9)
+
+
+def test_adapt_says_that_friction_has_no_bars():
+    with pytest.raises(xc.ProblemError, match="friction"):
+        xc.adapt(PLATE, 0.05, states=[100.0], progress=False)

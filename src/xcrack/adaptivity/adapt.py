@@ -69,7 +69,7 @@ def adapt(
     ------
     ProblemError
         A scene without tips or fronts, a tolerance that is not between 0 and 1, fewer unknowns than
-        the first mesh has, contact by a method that has no estimate.
+        the first mesh has, contact by a method that has no estimate, faces that press and rub.
     ConvergenceError, GeometryError
         The first mesh cannot be solved.
 

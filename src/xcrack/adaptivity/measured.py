@@ -9,6 +9,7 @@ import numpy as np
 from xcrack.analysis.solution import Solution
 from xcrack.analysis.solve import solve_states
 from xcrack.arrays import Floats
+from xcrack.errors import ProblemError
 from xcrack.scene.problem import Problem
 from xcrack.sif.bars import Bars
 from xcrack.sif.bars_2d import bars_and_shares
@@ -74,6 +75,11 @@ def measured(problem: Problem, states: Sequence[Any]) -> Measured:
     """Solutions of a scene at order 2, K and its errors; of fronts no shares."""
     flat = problem.mesh.dim < 3
     solutions = solve_states(problem, states, error=flat)
+    if any(each is not None and each.shear is not None for each in solutions[0].contact):
+        raise ProblemError(
+            "adapt: crack faces press and rub, and K with friction has no error bars: adapt the "
+            "mesh with friction=0, and compare two meshes with friction."
+        )
     live = [k for k, s in enumerate(solutions) if not s.at_rest]
     by_crack: list[list[SIF]] = []
     shares = [np.zeros((0, len(problem.mesh.cells)))]

@@ -137,7 +137,11 @@ def solve_friction(
     N = sp.csr_matrix(sp.vstack([face.normal for face in faces] + along))
     small = engine.condensed(N, f, known)
     rows = _rows(faces, small.dual, stiffness)
-    status = all_stuck(rows) if start is None else Status(start, all_stuck(rows).slip)
+    status = all_stuck(rows)
+    if start is not None:
+        status = Status(start, status.slip)
+    elif problem.numerics.initial_set == "open":
+        status = Status(np.zeros_like(status.closed), status.slip)
     begin, pass_through = at_rest(rows, status), march
     if before is not None:
         pass_through = shaken_down
