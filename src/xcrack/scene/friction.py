@@ -48,6 +48,8 @@ def checked_friction(value: Any, n_cracks: int, numerics: Numerics) -> float | t
             number(mu, f"friction[{c}]", least=0, most=_MOST) for c, mu in enumerate(given)
         )
         acts = any(mu > 0 for mu in result)
+        if len(set(result)) == 1:  # cracks that join in growth then need no numbers of their own
+            result = result[0]
     if acts:
         _check_method(numerics)
     return result
