@@ -19,6 +19,7 @@ import xcrack as xc
 from support import exact
 from support import scenes_2d as scenes
 from support import scenes_3d as scenes_space
+from support import scenes_friction as rubbing
 from support.scenes_2d import numerics_of
 from xcrack.analysis.solve import build, solve_states
 from xcrack.contact.alternatives import _springs, lip_space
@@ -439,3 +440,42 @@ def test_choices_by_name():
     numerics = numerics_of(lips="penalty", penalty=3.0, points=5)
     assert numerics == xc.Numerics(points=5, comparison=xc.Comparison(lips="penalty", penalty=3.0))
     assert with_choices(numerics, {"points": 6}).comparison == numerics.comparison
+
+
+# With friction ------------------------------------------------------------------------------------
+
+
+def rubbed_K(order, lips, penalty=None):
+    """K_II of the right tip over a cycle of shear, and what was dissipated in its last part."""
+    numerics = xc.Numerics(comparison=xc.Comparison(lips=lips, penalty=penalty))
+    problem, states, _ = rubbing.path(15, [0.9, -0.9], [1.0, 1.0], 0.3, order, numerics=numerics)
+    solutions = xc.solve(problem, states)
+    K = np.array([sif.K[1, 1] for sif in xc.stress_intensities(solutions)])
+    return K, solutions[-1].dissipated
+
+
+@pytest.mark.filterwarnings("ignore::xcrack.XcrackWarning")
+@pytest.mark.parametrize("order", [1, 2])
+def test_alternatives_with_friction(order):
+    """An augmented Lagrangian finds what the multipliers find; a penalty stays beside it."""
+    K, taken = rubbed_K(order, "multipliers")
+    K_augmented, taken_augmented = rubbed_K(order, "augmented")
+    assert K_augmented == pytest.approx(K, rel=1e-6)
+    assert taken_augmented == pytest.approx(taken, rel=1e-6)
+    K_penalty, taken_penalty = rubbed_K(order, "penalty", 30.0)
+    assert K_penalty == pytest.approx(K, rel=0.15)
+    assert np.abs(K_penalty - K).max() > 1e-4 * np.abs(K).max()
+    assert taken_penalty == pytest.approx(taken, rel=0.15)
+
+
+def test_alternatives_that_have_no_friction():
+    mesh, crack = xc.box((-1, -1), (1, 1), 6), xc.line_crack([(-0.3, 0.03), (0.3, 0.1)])
+    numerics = xc.Numerics(comparison=xc.Comparison(lips="nitsche"))
+    with pytest.raises(xc.ProblemError, match="nitsche"):
+        xc.Problem(mesh, xc.Isotropic(1.0, 0.3, "strain"), [crack], friction=0.3,
+                   numerics=numerics)  # fmt: skip
+    body = xc.box((-1, -1, -1), (1, 1, 1), 3)
+    penny = xc.penny_crack((0, 0, 0.03), (0, 0, 1), 0.5)
+    numerics = xc.Numerics(comparison=xc.Comparison(lips="penalty"))
+    with pytest.raises(xc.ProblemError, match="in 3D"):
+        xc.Problem(body, xc.Isotropic(1.0, 0.3), [penny], friction=0.3, numerics=numerics)

@@ -120,6 +120,15 @@ class _Rows:
     measure: Floats  # (g,)
 
 
+def compliance(problem: Problem, model: Model, m: Multipliers) -> Floats:
+    """Weak gap over traction of each spring of a penalty or an augmented Lagrangian `(g,)`.
+
+    With the rows N of the springs N u + compliance λ = 0 where one presses or sticks: penalties are
+    multipliers with a diagonal added to F = N K^-1 N^T.
+    """
+    return m.measure / _rows(problem, model, m).eps
+
+
 def _rows(problem: Problem, model: Model, m: Multipliers) -> _Rows:
     method, c = problem.numerics.comparison, m.crack
     lips, jump = model.lips[c], model.jumps[c]

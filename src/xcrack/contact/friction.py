@@ -6,7 +6,7 @@ or from what an earlier crack state left behind.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
@@ -105,6 +105,7 @@ def solve_friction(
     stiffness: float,
     between: bool,
     before: Sequence[Slip | None] | None,
+    springs: Sequence[Floats] | None = None,
 ) -> FrictionSolution:
     """Solve all load states in their order, from the unloaded body; or a cycle that is repeated.
 
@@ -125,6 +126,8 @@ def solve_friction(
     before : sequence of Slip or None
         Of all cracks, for a cycle that is repeated until slip returns: what its last state left
         behind when the crack was shorter; empty where there was none. None: the path alone.
+    springs : sequence of (g,) arrays, optional
+        Compliances of the springs of an alternative to multipliers, one array a crack.
 
     Raises
     ------
@@ -137,6 +140,11 @@ def solve_friction(
     N = sp.csr_matrix(sp.vstack([face.normal for face in faces] + along))
     small = engine.condensed(N, f, known)
     rows = _rows(faces, small.dual, stiffness)
+    if springs is not None:
+        every = np.concatenate(springs)
+        diagonal = np.concatenate([every, np.tile(every[rows.rubbing], rows.tangents)])
+        augmented = problem.numerics.comparison.lips == "augmented"
+        rows = replace(rows, F=rows.F + np.diag(diagonal), compliance=diagonal, augmented=augmented)
     status = all_stuck(rows)
     if start is not None:
         status = Status(start, status.slip)
@@ -145,7 +153,8 @@ def solve_friction(
     begin, pass_through = at_rest(rows, status), march
     if before is not None:
         pass_through = shaken_down
-        slips = [before[r.space.crack] if before else None for r in rubbing]
+        left = {c: slip for c, slip in enumerate(before)}
+        slips = [left.get(r.space.crack) for r in rubbing]  # cracks may have joined others
         if any(slip is not None for slip in slips):
             weak = [
                 weak_slip(model, r.space, r.tangents, s)

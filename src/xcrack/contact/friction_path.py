@@ -7,12 +7,12 @@ substep in which an open function closes is halved: it sticks at the slip that i
 substep began.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from xcrack.arrays import Bools, Floats
-from xcrack.errors import warn
+from xcrack.errors import ConvergenceError, warn
 from xcrack.solvers.coulomb import FrictionRows, FrictionState, Status, coulomb
 from xcrack.solvers.coulomb_3d import coulomb_3d
 
@@ -20,6 +20,8 @@ _SHORTEST = 1e-2  # share of a state below which a substep is not halved
 _OPEN = 1e-9  # gap over the largest one above which a function is open
 _RETURNED = 1e-6  # change of slip over a cycle, of the largest jump, at which cycles end
 _MOST_CYCLES = 100
+_MOST_UPDATES = 500
+_UPDATED = 1e-8  # change of tractions, of the largest, that ends the updates
 _TWIN = {1: coulomb, 2: coulomb_3d}  # by the number of tangents
 
 
@@ -65,7 +67,7 @@ def at_rest(rows: FrictionRows, status: Status) -> Place:
 def with_slip(rows: FrictionRows, d: Floats, slip: Floats, status: Status) -> Place:
     """A state whose weak slips `(r,)` before are given: faces that press stick there, or slide."""
     before = np.concatenate([np.zeros(rows.n), slip])
-    state = _TWIN[rows.tangents](rows, d - before, status)
+    state = _tractions(rows, d - before, status)
     return Place(d, state.lam, state.gap + before, state.status, sets=state.sets)
 
 
@@ -152,7 +154,34 @@ def _reached(rows: FrictionRows, wanted: Floats, begin: Place, substeps: int) ->
 def _solved(rows: FrictionRows, d: Floats, place: Place) -> FrictionState:
     change = d.copy()
     change[rows.n :] -= place.gap[rows.n :]
-    return _TWIN[rows.tangents](rows, change, place.status)
+    return _tractions(rows, change, place.status)
+
+
+def _tractions(rows: FrictionRows, d: Floats, status: Status) -> FrictionState:
+    """Of one load; by an augmented Lagrangian in updates (Simo and Laursen, 1992)."""
+    solve = _TWIN[rows.tangents]
+    if rows.compliance is None:
+        return solve(rows, d, status)
+    if not rows.augmented:
+        try:
+            return solve(rows, d, status)
+        except ConvergenceError as error:
+            raise ConvergenceError(
+                f"{error} Or a smaller Comparison(penalty=...): stiff springs at single points "
+                "oscillate."
+            ) from None
+    lam, sets = np.zeros(len(d)), 0
+    for _ in range(_MOST_UPDATES):
+        state = solve(rows, d - rows.compliance * lam, status)
+        sets += state.sets
+        change = float(np.abs(state.lam - lam).max(initial=0.0))
+        lam, status = state.lam, state.status
+        if change <= _UPDATED * float(np.abs(lam).max(initial=0.0)):
+            return replace(state, sets=sets)
+    raise ConvergenceError(
+        f"contact with friction: after {_MOST_UPDATES} updates the tractions still change by "
+        f"{change:.3g}. Give a larger Comparison(penalty=...)."
+    )
 
 
 def _opened(rows: FrictionRows, place: Place) -> Bools:

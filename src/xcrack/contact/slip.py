@@ -15,6 +15,8 @@ from xcrack.solvers.reuse import Slip
 from xcrack.xfem.lips import LipPoints, arc_position
 from xcrack.xfem.model import Model
 
+_OTHER = 0.1  # distance over the length of a crack from which on it is another crack
+
 
 def slip_of(model: Model, rubbing: tuple[Rubbing, ...], u: Floats) -> tuple[Slip | None, ...]:
     """Slip of all cracks in one state, None where nothing rubs.
@@ -64,7 +66,11 @@ def _left_3d(model: Model, rubbing: Rubbing, along: Floats) -> Slip:
 
 def _again_2d(model: Model, c: int, tangents: Floats, before: Slip) -> Floats:
     lips, points = model.lips[c], model.space.cracks[c].points
-    place = _places(points, lips) - _first(before.points, points)
+    first = _first(before.points, points)
+    whole = np.linalg.norm(np.diff(before.points, axis=0), axis=1).sum()
+    if _distance(before.points, points, first) > _OTHER * whole:
+        return np.zeros((len(lips), 1))
+    place = _places(points, lips) - first
     inside = (place >= 0) & (place <= len(before.points) - 1)
     slip = np.where(inside, np.interp(place, before.place, before.slip), 0.0)
     return np.asarray(slip[:, None])

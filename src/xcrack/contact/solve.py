@@ -131,8 +131,13 @@ def _solve_friction(
     start, size = _start(chosen, reuse, 0, closed), _face_size(model, chosen)
     stiffness = problem.material.E / size
     before = reuse.slip if repeated else None
+    springs = None
+    if problem.numerics.comparison.lips != "multipliers":
+        from xcrack.contact.alternatives import compliance
+
+        springs = [compliance(problem, model, m) for m in chosen]
     return solve_friction(
-        problem, model, engine, chosen, f, known, start, stiffness, others, before
+        problem, model, engine, chosen, f, known, start, stiffness, others, before, springs
     )
 
 

@@ -14,13 +14,16 @@ from xcrack.scene.numerics import Numerics
 _MOST = 1e3  # beyond, faces that press never slip
 
 
-def checked_friction(value: Any, n_cracks: int, numerics: Numerics) -> float | tuple[float, ...]:
+def checked_friction(
+    value: Any, n_cracks: int, dim: int, numerics: Numerics
+) -> float | tuple[float, ...]:
     """Coefficients of friction: one for all cracks, or one for each.
 
     Parameters
     ----------
     value : anything
     n_cracks : int
+    dim : int
     numerics : Numerics
 
     Raises
@@ -51,16 +54,17 @@ def checked_friction(value: Any, n_cracks: int, numerics: Numerics) -> float | t
         if len(set(result)) == 1:  # cracks that join in growth then need no numbers of their own
             result = result[0]
     if acts:
-        _check_method(numerics)
+        _check_method(dim, numerics)
     return result
 
 
-def _check_method(numerics: Numerics) -> None:
+def _check_method(dim: int, numerics: Numerics) -> None:
     lips = numerics.comparison.lips
-    if lips != "multipliers":
+    if lips == "nitsche" or (lips != "multipliers" and dim > 2):
+        where = "" if lips == "nitsche" else " in 3D"
         raise ProblemError(
-            f'friction with Comparison(lips="{lips}"): multipliers alone carry it; leave lips out, '
-            "or give friction=0."
+            f'friction{where} with Comparison(lips="{lips}"): multipliers carry it, and in 2D a '
+            "penalty and an augmented Lagrangian; leave lips out, or give friction=0."
         )
 
 

@@ -100,7 +100,7 @@ class Problem:
         if not isinstance(self.contact, str) or self.contact not in ("auto", "on", "off"):
             raise ProblemError(f'contact = {shown(self.contact)}: give "auto", "on" or "off".')
         self._check_members()
-        own = checked_friction(self.friction, len(self.cracks), self.numerics)
+        own = checked_friction(self.friction, len(self.cracks), self.mesh.dim, self.numerics)
         object.__setattr__(self, "friction", own)
         check_cracks(self.placed, self.mesh)
 

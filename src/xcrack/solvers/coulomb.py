@@ -39,6 +39,10 @@ class FrictionRows:
         Coefficients of friction, positive.
     stiffness : float, stress / length
         Weighs gaps against pressures in the prediction of the status; E / h is natural.
+    compliance : (g + m r,) array, optional
+        Of the springs of a penalty or an augmented Lagrangian, which F contains on its diagonal.
+    augmented : bool
+        Whether tractions are updated until the springs bear nothing.
     """
 
     F: Floats
@@ -46,6 +50,8 @@ class FrictionRows:
     rubbing: Ints
     mu: Floats
     stiffness: float
+    compliance: Floats | None = None
+    augmented: bool = False
 
     @property
     def n(self) -> int:
