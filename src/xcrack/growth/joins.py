@@ -69,9 +69,12 @@ def checked_joins(given: Sequence[Join], what: str) -> tuple[Join, ...]:
 
 
 def numbers_after(n: int, joins: Sequence[Join], left: int) -> list[int]:
-    """Number that each of n cracks has after joins that leave `left` cracks."""
+    """Number that each of n cracks has after joins that leave `left` cracks.
+
+    Joins in which both cracks stay, because one ends on the other, come first.
+    """
     number = list(range(n))
-    for join in joins if left < n else ():
+    for join in joins[len(joins) - (n - left) :]:
         one, other = sorted(number[c] for c in join.cracks)
         number = [one if c == other else c - (c > other) for c in number]
     return number
