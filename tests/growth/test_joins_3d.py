@@ -151,7 +151,7 @@ def test_three_in_a_row_join_at_once():
 
 
 def test_cracks_beside_one_surface_end_the_run_with_the_place():
-    history = xc.collect(grow(pennies(height=0.3)))
+    history = xc.collect(grow(pennies(height=0.45)))
     assert "cracks cannot go on" in history.ended
     assert "closer than a cell" in history.ended
     assert len(history.steps[-1].cracks) == 2

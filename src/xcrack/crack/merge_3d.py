@@ -20,7 +20,7 @@ from xcrack.geometry.triangulation import unit
 from xcrack.mesh.body import Body
 
 _ANGLE = np.cos(np.radians(20.0))  # normals of both cracks may differ by as much
-_OFFSET = 0.25  # of a cell: one crack may lie as far beside the surface of the other
+OFFSET = 0.5  # of a cell: one crack may lie as far beside the surface of the other
 _LOOSE = 3.0  # radii from the end of an open front within which the other one ends too
 
 
@@ -45,9 +45,9 @@ class Gap:
     turn: float
     x: Floats
 
-    def in_surface(self, size: float) -> bool:
+    def in_surface(self, size: float, most: float = OFFSET) -> bool:
         """Whether both lie in one surface, up to a share of a size."""
-        return abs(self.turn) >= _ANGLE and self.offset <= _OFFSET * size
+        return abs(self.turn) >= _ANGLE and self.offset <= most * size
 
 
 def gap_between(one: Crack, other: Crack, body: Body, reach: float) -> Gap | None:
@@ -328,4 +328,4 @@ def _chains(following: dict[int, int]) -> list[Ints]:
     return sorted(result, key=lambda line: int(line.min()))
 
 
-__all__ = ["Gap", "gap_between", "merged", "turned"]
+__all__ = ["OFFSET", "Gap", "gap_between", "merged", "turned"]

@@ -9,7 +9,7 @@ from scipy.special import exprel
 
 from xcrack.arrays import Floats, at
 from xcrack.crack.crack import Crack
-from xcrack.crack.merge_3d import Gap, gap_between, merged, turned
+from xcrack.crack.merge_3d import OFFSET, Gap, gap_between, merged, turned
 from xcrack.crack.placing import placed
 from xcrack.errors import GeometryError
 from xcrack.growth import euler, follow_3d, pec_3d
@@ -30,6 +30,7 @@ from xcrack.mesh.mesh import Mesh
 from xcrack.scene.conditions import CrackPressure
 
 _NEAR = 1.1  # cells between fronts below which they join: closer ones cannot be solved
+_BESIDE = 1.0  # cells that fronts may pass beside each other at the end of the whole advance
 _LEFT = 0.25  # of a cell: the gap that is closed at once
 _RADIUS = 1.0  # cells: of the disc that rounds hollow corners of the joined front
 _SPACING = 0.5  # of a cell, between the points of a new front
@@ -73,7 +74,7 @@ def joined(run: Run, last: Step, cracks: Sequence[Crack]) -> Joined | None:
     if len(cracks) < 2:
         return None
     body = Body.of(run.problem.mesh)
-    close = _close(cracks, body)
+    close = _close(cracks, body, _BESIDE)
     if not close:
         return None
     hindrance = _hindrance(run)
@@ -81,7 +82,7 @@ def joined(run: Run, last: Step, cracks: Sequence[Crack]) -> Joined | None:
         i, k = close[0][0]
         raise GeometryError(f"cracks {i} and {k} meet near {at(close[0][1].x)}, and {hindrance}")
     m = law_exponent(run.law, np.concatenate(last.dK_eq), np.concatenate(last.R))
-    met = [_met(run, last, cracks, pair, size, body, m) for pair, _, size in close]
+    met = [_met(run, last, cracks, *each, body, m) for each in close]
     share, way, plain = min(met)
     now = _ADVANCED[run.integrator](run, last, way)
     by_first_rate = integrator_of(run).planned(run, last).largest / _fastest(last)
@@ -89,7 +90,7 @@ def joined(run: Run, last: Step, cracks: Sequence[Crack]) -> Joined | None:
     unsure = _UNKNOWN * abs(plain * by_first_rate - cycles)
     apart, joins = tuple(now), []
     number = list(range(len(now)))
-    while pairs := _close(now, body):
+    while pairs := _close(now, body, OFFSET):
         (i, k), gap, size = pairs[0]
         other = now[k] if gap.turn > 0 else turned(now[k])
         now[i] = merged(now[i], other, _RADIUS * size, _SPACING * size)
@@ -114,8 +115,12 @@ def settled(run: Run, last: Step, seen: Evaluation, met: Joined) -> Settled:
     return _BEGUN[run.integrator](run, seen, last.cycles + met.cycles, error)
 
 
-def _close(cracks: Sequence[Crack], body: Body) -> list[tuple[tuple[int, int], Gap, float]]:
+def _close(
+    cracks: Sequence[Crack], body: Body, beside: float
+) -> list[tuple[tuple[int, int], Gap, float]]:
     """Pairs of cracks in one surface whose fronts are too close to be solved, nearest first.
+
+    In one surface: within `beside` cells of each other across it.
 
     With each pair the gap between them, and the size of the cell there.
     """
@@ -128,7 +133,7 @@ def _close(cracks: Sequence[Crack], body: Body) -> list[tuple[tuple[int, int], G
         if gap is None:
             continue
         size = float(body.cell_size(gap.x[None])[0])
-        if gap.width < _NEAR * size and gap.in_surface(size):
+        if gap.width < _NEAR * size and gap.in_surface(size, beside):
             result.append(((i, k), gap, size))
     return sorted(result, key=lambda each: each[1].width / each[2])
 
@@ -138,6 +143,7 @@ def _met(
     last: Step,
     cracks: Sequence[Crack],
     pair: tuple[int, int],
+    near: Gap,
     size: float,
     body: Body,
     exponent: float,
@@ -157,9 +163,11 @@ def _met(
         Time at the rates of the beginning.
     """
     i, k = pair
-    way = _share(run, last, cracks, pair, size, body)
+    # Over an offset a wider gap is closed, so that no face stands steeper than 45 degrees.
+    share_left = float(np.clip(near.offset / size, _LEFT, OFFSET))
+    way = _share(run, last, cracks, pair, size, share_left, body)
     first = gap_between(last.corrected[i], last.corrected[k], body, np.inf)
-    gap, left = (0.0 if first is None else first.width), _LEFT * size
+    gap, left = (0.0 if first is None else first.width), share_left * size
     if gap <= left:
         return way, way, way
     a = 2 * float(np.mean([memory_of(last).length[c] for c in pair]))  # of a penny: its radius
@@ -187,9 +195,10 @@ def _share(
     cracks: Sequence[Crack],
     pair: tuple[int, int],
     size: float,
+    left: float,
     body: Body,
 ) -> float:
-    """Share of an advance after which a gap is closed but for a quarter of a cell.
+    """Share of an advance after which a gap is closed but for `left` cells.
 
     At most the whole advance, or one of a cell where that is longer: what is left then is less
     than a cell wide, or the fronts do not come closer.
@@ -201,7 +210,7 @@ def _share(
     def excess(share: float) -> float:
         now = cracks if share == 1.0 else _ADVANCED[run.integrator](run, last, share)
         gap = gap_between(now[i], now[k], body, 10 * size + 2 * share * plan.largest)
-        return np.inf if gap is None else gap.width / size - _LEFT
+        return np.inf if gap is None else gap.width / size - left
 
     low, at_low = 0.0, excess(0.0)
     high, at_high = 1.0, excess(1.0)
@@ -213,7 +222,7 @@ def _share(
         return high
     for _ in range(_TRIES):
         # Where fronts overlap the gap is zero and says nothing of how far: then halve.
-        part = at_low / (at_low - at_high) if at_high > -0.99 * _LEFT else 0.5
+        part = at_low / (at_low - at_high) if at_high > -0.99 * left else 0.5
         share = low + part * (high - low)
         value = excess(share)
         if abs(value) < _WITHIN:
