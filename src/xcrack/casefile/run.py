@@ -60,6 +60,8 @@ def run(
         Begin anew although steps are there: they are moved aside.
     until, keep_solutions : optional
         As of `collect`.
+    tolerance, max_unknowns : optional
+        As of `grow`.
     cycles, scaling, integrator, threshold, retardation, solver, K_c, link_up, max_steps, \
     max_cycles, tolerance, max_unknowns, progress
         As of `grow`.

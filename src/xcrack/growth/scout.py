@@ -85,6 +85,7 @@ def scouted(
             tolerance=TOLERANCE,
             max_unknowns=None,
             K_c=None,
+            link_up=None,
             max_cycles=None,
             max_steps=_MOST_STEPS,
             progress=False,

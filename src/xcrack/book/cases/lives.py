@@ -28,9 +28,9 @@ _CYCLE, _R = Cycle(0.0, 1.0), 0.3
 _EDGE = "integral of the law over K = s √(W tan(π a / W)) (Westergaard, 1939; Paris, 1963)"
 
 
-def _row(cells: int, order: int) -> Problem:
+def _row(cells: int, order: int, height: int = 1) -> Problem:
     """One crack of a row: between mirror planes, far ends under traction."""
-    mesh = box((-_W / 2, -_W), (_W / 2, _W), (cells, 2 * cells + 1))
+    mesh = box((-_W / 2, -height * _W), (_W / 2, height * _W), (cells, 2 * height * cells + 1))
     return Problem(
         mesh,
         Isotropic(1.0, 0.3, "strain"),
@@ -73,7 +73,7 @@ def _to_a_tolerance(level: int) -> list[Value]:
     """Mesh and steps by a tolerance: the life within it, and within its bar."""
     law, tolerance = paris(_C, 3.0), 1e-2 * 10.0**-level
     run = grow(
-        _row(9, 2), law, weighted_angle, _CYCLE, tolerance=tolerance, progress=False
+        _row(9, 2, 2), law, weighted_angle, _CYCLE, tolerance=tolerance, progress=False
     )  # fmt: skip
     history = collect(run, until=_has_grown, keep_solutions=False)
     a = float(np.ptp(history.cracks[0].points[:, 0])) / 2
