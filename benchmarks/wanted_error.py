@@ -1,0 +1,142 @@
+"""Lives and paths to a wanted error: the true error beside the bar, and the cost.
+
+``python -m benchmarks.wanted_error`` prints the table of docs/wanted_error.md and stores it in
+``benchmarks/results/wanted_error.json``. Truth is a run with a tolerance of 1e-3 in steps of 0.03.
+"""
+
+import json
+import warnings
+from collections.abc import Callable
+from pathlib import Path
+from time import process_time
+from typing import Any
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+import xcrack as xc
+from xcrack.arrays import Floats
+
+RESULT = Path(__file__).parent / "results" / "wanted_error.json"
+LAW = xc.paris(C=1e-3, m=3.0)
+STEEL = xc.Isotropic(210e3, 0.3, plane="strain")
+UP = (xc.traction("top", (0.0, 1.0)), xc.traction("bottom", (0.0, -1.0)))
+TOLERANCES = (3e-2, 1e-2, 3e-3)
+_FARTHER = 0.3  # that the truth runs past the end of a run
+
+
+def square(n: int = 8) -> xc.Mesh:
+    """The plate [-1, 1]²."""
+    return xc.box((-1.0, -1.0), (1.0, 1.0), n)
+
+
+def turned(degrees: float) -> list[Any]:
+    """Tension that is turned from the y-axis, on all four sides."""
+    angle = np.radians(degrees)
+    along = np.array([-np.sin(angle), np.cos(angle)])
+    stress = np.outer(along, along)
+    sides = ("left", "right", "bottom", "top")
+    return [xc.traction(side, lambda x, n: n @ stress) for side in sides]
+
+
+def scene(name: str) -> tuple[xc.Problem, float]:
+    """A scene on a coarse mesh, and x of the last tip of its first crack where runs stop."""
+    line = xc.line_crack
+    match name:
+        case "a crack that turns by 29°":
+            return xc.Problem(square(), STEEL, [line([(-1.1, -0.04), (-0.5, 0.2)])], loads=UP), 0.25
+        case "an inner crack that turns by 52°":
+            h = 0.25 / np.sqrt(2)
+            crack = line([(-h, -h + 0.007), (h, h + 0.007)])
+            return xc.Problem(square(10), STEEL, [crack], loads=UP), 0.6
+        case "an edge crack in tension and shear":
+            crack = line([(-1.1, 0.013), (-0.5, 0.013)])
+            return xc.Problem(square(), STEEL, [crack], loads=turned(20.0)), 0.3
+        case "past a hole":
+            body = xc.plate_with_hole(width=2, height=2, radius=0.2, size=0.25)
+            return xc.Problem(body, STEEL, [line([(-1.1, 0.25), (-0.6, 0.25)])], loads=UP), 0.1
+        case "from a hole":
+            body = xc.plate_with_hole(width=4, height=4, radius=0.5, size=0.6)
+            crack = line([(0.3, 0.05), (0.65, 0.05)])
+            return xc.Problem(body, STEEL, [crack], loads=turned(10.0)), 1.4
+        case _:
+            cracks = [line([(-1.1, 0.1), (-0.55, 0.1)]), line([(1.1, -0.15), (0.65, -0.15)])]
+            return xc.Problem(square(10), STEEL, cracks, loads=UP), -0.2
+
+
+SCENES = (
+    "a crack that turns by 29°", "an inner crack that turns by 52°",
+    "an edge crack in tension and shear", "past a hole", "from a hole", "two cracks, one faster",
+)  # fmt: skip
+
+
+def run(problem: xc.Problem, end: float, **options: Any) -> tuple[xc.History, float]:
+    """A run, and its processor time."""
+    start = process_time()
+
+    def there(step: xc.Step) -> bool:
+        return float(step.corrected[0].points[-1, 0]) > end
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", xc.XcrackWarning)
+        steps = xc.grow(
+            problem, LAW, xc.max_hoop_stress, xc.Cycle(0.0, 1.0), progress=False, **options
+        )
+        return xc.collect(steps, until=there, keep_solutions=False), process_time() - start
+
+
+def against(truth: xc.History) -> Callable[[xc.History], tuple[float, float]]:
+    """Errors of path, over the length grown, and of life of a run, where its last tip is."""
+    solved = [step for step in truth.steps if step.n_tips]
+    x = np.array([step.corrected[0].points[-1] for step in solved])
+    s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(x, axis=0), axis=1))])
+    curve = CubicSpline(s, np.column_stack([x, [step.cycles for step in solved]]))
+    fine = np.linspace(0.0, s[-1], 20001)
+    way: Floats = curve(fine)
+
+    def errors(history: xc.History) -> tuple[float, float]:
+        last = [step for step in history.steps if step.n_tips][-1]
+        away = np.linalg.norm(way[:, :2] - last.corrected[0].points[-1], axis=1)
+        near = int(np.argmin(away))
+        return float(away[near] / fine[near]), abs(float(last.cycles / way[near, 2] - 1))
+
+    return errors
+
+
+def measured(name: str) -> list[dict[str, Any]]:
+    """Rows of one scene."""
+    problem, end = scene(name)
+    truth, _ = run(problem, end + _FARTHER, tolerance=1e-3, da=0.03)
+    errors, rows = against(truth), []
+    for tolerance in TOLERANCES:
+        history, seconds = run(problem, end, tolerance=tolerance)
+        path, life = errors(history)
+        last = [step for step in history.steps if step.n_tips][-1]
+        error = last.error
+        assert error is not None
+        rows.append({
+            "scene": name, "tolerance": tolerance, "life": life,
+            "bar": float(error.life / last.cycles), "path": path,
+            "path bar": float(error.path / error.grown), "steps": len(history.steps),
+            "seconds": round(seconds, 2),
+        })  # fmt: skip
+    return rows
+
+
+def main() -> None:
+    """Print and store the table."""
+    run(*scene(SCENES[0]), tolerance=0.1)  # kernels are compiled
+    rows = []
+    for name in SCENES:
+        for row in measured(name):
+            rows.append(row)
+            print(
+                f"| {row['scene']} | {row['tolerance']:g} | {row['life']:.1e} ({row['bar']:.1e}) | "
+                f"{row['path']:.1e} ({row['path bar']:.1e}) | {row['steps']} | {row['seconds']} |",
+                flush=True,
+            )
+    RESULT.write_text(json.dumps(rows, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
