@@ -129,6 +129,10 @@ def meshes() -> dict[str, Mesh]:
     made["three_holes"] = plate(
         60.0, 40.0, holes=THREE_HOLES, size=5.0, size_near=0.5, band=2.5, transition=10.0
     )
+    made["lug_spectrum"] = plate(
+        40.0, 60.0, lower=(-20.0, -40.0), holes=[((0.0, 0.0), 10.0)], size=3.0, size_near=0.4,
+        along=[(10.0, 0.0), (20.0, 0.0)], band=0.8, transition=15.0,
+    )  # fmt: skip
     return {**{name: short(mesh) for name, mesh in made.items()}, "two_holes": two_holes()}
 
 

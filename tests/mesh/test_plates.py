@@ -258,6 +258,7 @@ FILES = {
     "turning_load": 1309,
     "compact_tension": 1235,
     "three_holes": 2184,
+    "lug_spectrum": 2149,
 }
 
 
