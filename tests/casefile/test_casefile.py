@@ -218,6 +218,66 @@ def test_zones_of_link_up_are_a_table_with_units(tmp_path):
         xc.read_case(written(tmp_path, GROWTH + zone.replace("beta = 2", "beta = -2")))
 
 
+SPECTRUM = """
+spectrum = { factors = [0.0, 1.0, 0.4, 0.9, 0.0, 0.6], unit = "flight", least_range = 0.2 }
+retardation = { kind = "wheeler", w = 1.2, zone = { sigma_y = "0.35 GPa", beta = 2 } }
+"""
+
+
+def test_spectrum_and_retardation_are_tables(tmp_path):
+    text = GROWTH.replace("cycle = { min = 0.1, max = 1.0 }", SPECTRUM)
+    case = xc.read_case(written(tmp_path, text))
+    spectrum = case.growth["cycle"]
+    assert (spectrum.unit, spectrum.least_range) == ("flight", 0.2)
+    assert spectrum.cycles["max"].tolist() == [1.0, 0.9, 0.6]
+    assert case.growth["retardation"] == xc.wheeler(1.2, xc.plastic_zone(350.0, beta=2))
+    path = tmp_path / "case.toml"
+    history = xc.run(path)
+    plain = xc.run(written(tmp_path, text.replace("retardation", "# "), "plain.toml"))
+    assert history.life > plain.life > 0
+    (tmp_path / "gusts.txt").write_text("0 1\n1 2\n0.5 3\n0.9 4\n")
+    lines = """
+[growth.spectrum]
+kind = "file"
+path = "gusts.txt"
+column = 0
+levels = 5
+[[growth.spectrum.steady]]
+kind = "traction"
+where = "top"
+value = [0.0, "-5 MPa"]
+[growth.retardation]
+kind = "willenborg"
+shutoff = 2.5
+dK_th = "2 MPa*sqrt(m)"
+zone = { sigma_y = 350, beta = 2 }
+"""
+    cut = GROWTH.replace("cycle = { min = 0.1, max = 1.0 }", "") + lines
+    growth = xc.read_case(written(tmp_path, cut)).growth
+    assert growth["cycle"].factors.tolist() == [0.0, 1.0, 0.5, 0.9]
+    assert growth["cycle"].levels == 5
+    assert growth["cycle"].steady[0].where == "top"
+    assert growth["retardation"].dK_th == pytest.approx(2 * np.sqrt(1000))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("w = 1.2, ", "", "line 4.*retardation: the key 'w' of 'wheeler' is missing"),
+        ('kind = "wheeler"', 'kind = "walker"', "known are wheeler, willenborg"),
+        (', zone = { sigma_y = "0.35 GPa", beta = 2 }', "", "the key 'zone' is missing"),
+        ("factors = [0.0, 1.0, 0.4, 0.9, 0.0, 0.6]", "factors = [1.0, 1.0]", "do not vary"),
+        ("least_range", "least", "no such key of 'factors': did you mean"),
+        ("unit = ", "levels = 1, unit = ", "levels"),
+        ("retardation", "cycle = { min = 0, max = 1 }\nretardation", "not both"),
+    ],
+)
+def test_messages_of_spectra(tmp_path, old, new, words):
+    text = GROWTH.replace("cycle = { min = 0.1, max = 1.0 }", SPECTRUM.replace(old, new))
+    with pytest.raises(xc.ProblemError, match=words):
+        xc.read_case(written(tmp_path, text))
+
+
 def test_run_in_a_folder_begins_goes_on_and_reads(tmp_path):
     """The same call: a new run, one that lost its last step, one that has ended, one step more."""
     given = (script(), xc.paris(1e-11, 3), xc.max_hoop_stress, xc.Cycle(0.1, 1.0), 2.0)

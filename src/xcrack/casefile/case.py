@@ -9,11 +9,11 @@ from typing import Any
 
 from xcrack.casefile import forms
 from xcrack.casefile.forms import Form
+from xcrack.casefile.histories import loading, retardation_of
 from xcrack.casefile.tables import Table, read_tables
 from xcrack.casefile.units import LENGTH, NUMBER, TOUGHNESS
 from xcrack.errors import ProblemError, XcrackError
 from xcrack.growth.options import GrowOptions
-from xcrack.growth.step import Cycle
 from xcrack.laws.zones import plastic_zone
 from xcrack.paths import path_of
 from xcrack.scene.material import Isotropic
@@ -23,6 +23,7 @@ from xcrack.scene.problem import Problem
 _SECTIONS = ("title", "units", "mesh", "material", "cracks", "supports", "loads", "solve",
              "numerics", "growth", "output")  # fmt: skip
 _OPTIONS = {"K_c": TOUGHNESS}  # of grow, that have a unit
+_TABLES = ("law", "criterion", "cycle", "spectrum", "retardation", "link_up")  # of growth
 _OUTPUT = ("folder", "pictures", "warp")
 
 
@@ -126,27 +127,25 @@ def _numerics(table: Table) -> Numerics:
 def _growth(table: Table) -> Mapping[str, Any]:
     """Arguments of `grow`."""
     options = [name for name in GrowOptions.__annotations__ if name != "solver"]
-    table.known(("law", "criterion", "cycle", "da", *options))
-    for name in ("law", "cycle"):
-        if name not in table:
-            table.refuse("", f"the key {name!r} is missing.")
+    table.known(("law", "criterion", "cycle", "spectrum", "da", *options))
+    if "law" not in table:
+        table.refuse("", "the key 'law' is missing.")
     criterion = table.text("criterion", "max_hoop_stress")
     if criterion not in forms.CRITERIA:
         table.refuse("criterion", f"known are {', '.join(forms.CRITERIA)}.")
     units = {"da": LENGTH, **_OPTIONS}
     given = {
-        name: table.value(name, units.get(name))
-        for name in table.content
-        if name not in ("law", "criterion", "cycle", "link_up")
+        name: table.value(name, units.get(name)) for name in table.content if name not in _TABLES
     }
-    cycle = forms.called_with(table.table("cycle"), Form(Cycle, {"min": NUMBER, "max": NUMBER}))
+    if "retardation" in table:
+        given["retardation"] = retardation_of(table.table("retardation"))
     if "link_up" in table:
         zone = Form(plastic_zone, {"sigma_y": (-2.0, 1.0), "beta": NUMBER})
         given["link_up"] = forms.called_with(table.table("link_up"), zone)
     return MappingProxyType({
         "law": forms.made(table.table("law"), forms.LAWS),
         "criterion": forms.CRITERIA[criterion],
-        "cycle": cycle,
+        "cycle": loading(table),
         **given,
     })  # fmt: skip
 

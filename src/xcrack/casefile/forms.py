@@ -6,12 +6,12 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from xcrack.casefile.tables import Table
-from xcrack.casefile.units import BODY_FORCE, FORCE, LENGTH, NUMBER, STRESS, Dimension
+from xcrack.casefile.units import BODY_FORCE, FORCE, LENGTH, NUMBER, STRESS, TOUGHNESS, Dimension
 from xcrack.crack.lines import line_crack
 from xcrack.crack.surfaces import elliptic_crack, penny_crack, plane_crack, read_surface
 from xcrack.errors import ProblemError, XcrackError
 from xcrack.growth import criteria
-from xcrack.laws import power
+from xcrack.laws import fracture, power
 from xcrack.mesh.box import box
 from xcrack.mesh.cylinder import notched_cylinder
 from xcrack.mesh.files import read_mesh
@@ -80,6 +80,8 @@ LAWS = {
     "paris": Form(power.paris),
     "elber": Form(power.elber),
     "walker": Form(power.walker),
+    "forman": Form(fracture.forman, {"K_c": TOUGHNESS}),
+    "hartman_schijve": Form(fracture.hartman_schijve, {"A": TOUGHNESS, "dK_thr": TOUGHNESS}),
 }
 CRITERIA: dict[str, Callable[..., Any]] = {
     "max_hoop_stress": criteria.max_hoop_stress,
