@@ -318,3 +318,25 @@ def _all(value, key):
     elif isinstance(value, list):
         for each in value:
             yield from _all(each, key)
+
+
+def test_spectrum_and_retardation_have_a_section(tmp_path):
+    """Unit, levels, model and its zones; no section for a plain cycle."""
+    spectrum = xc.Spectrum([0.0, 1.0, *[0.0, 0.5] * 20], unit="flight")
+    model = xc.wheeler(1.5, xc.plastic_zone(400.0, beta=2))
+    law = xc.paris(C=1e-9, m=3.0)
+    options = {"da": 0.2, "max_steps": 2, "progress": False, "retardation": model}
+    path = tmp_path / "run"
+    xc.collect(xc.grow(plate(), law, xc.max_hoop_stress, spectrum, **options), path)
+    page = xc.report(path, tmp_path / "report.html").read_text(encoding="utf-8")
+    section = json.loads((tmp_path / "report.json").read_text())["spectrum"]
+    assert section["unit"] == "flight"
+    assert section["levels"] == [0.0, 1.0]
+    assert section["retardation"] == "wheeler"
+    (zone,) = section["zones"]
+    assert zone["places"] == 2
+    for words in ("Load history", "flights at the last step", "What overloads have left"):
+        assert words in page
+    history = growth(plate(), tmp_path / "plain", max_steps=1)
+    xc.report(history, tmp_path / "plain.html")
+    assert "spectrum" not in json.loads((tmp_path / "plain.json").read_text())

@@ -16,7 +16,7 @@ from xcrack.markup import Markup, element, joined, listed, page
 from xcrack.paths import path_of, system_errors
 from xcrack.plotting.report_pictures import Picture, history_pictures, solution_pictures
 from xcrack.plotting.view_3d import history_layers, packed, solution_layers
-from xcrack.reporting import results, scene
+from xcrack.reporting import histories, results, scene
 from xcrack.reporting.section import Section
 from xcrack.reporting.source import Source, source_of
 from xcrack.reporting.viewer import viewer
@@ -120,6 +120,7 @@ SECTIONS: Sequence[Callable[[Source], Section | None]] = (
     scene.scene,
     space_view,
     results.growth,
+    histories.spectrum,
     results.lives,
     results.intensity,
     results.contact,
