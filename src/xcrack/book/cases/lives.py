@@ -28,7 +28,7 @@ _CYCLE, _R = Cycle(0.0, 1.0), 0.3
 _EDGE = "integral of the law over K = s √(W tan(π a / W)) (Westergaard, 1939; Paris, 1963)"
 
 
-def _row(cells: int, order: int, height: int = 1) -> Problem:
+def row_of_cracks(cells: int, order: int, height: int = 1) -> Problem:
     """One crack of a row: between mirror planes, far ends under traction."""
     mesh = box((-_W / 2, -height * _W), (_W / 2, height * _W), (cells, 2 * height * cells + 1))
     return Problem(
@@ -52,7 +52,7 @@ def _grown(problem: Problem, law: Law, cycle: Cycle, n: int) -> tuple[float, flo
 def _life(level: int, order: int, law: Law, cycle: Cycle, effective: float) -> list[Value]:
     """Cycles of the row by a law that sees a share of the range; exact for m = 2."""
     cells = {1: 31, 2: 15}[order] * 2**level
-    a, N = _grown(_row(cells, order), law, cycle, 4 * 2**level)
+    a, N = _grown(row_of_cracks(cells, order), law, cycle, 4 * 2**level)
     wanted = lives.paris_life_periodic(_A0, a, _W, _C, effective)
     return [
         Value("half length", a, _A0 + _GROWTH, 1e-3),
@@ -64,7 +64,7 @@ def _life(level: int, order: int, law: Law, cycle: Cycle, effective: float) -> l
 def _power(level: int, order: int) -> list[Value]:
     """The same with m = 3, by quadrature."""
     law = paris(_C, 3.0)
-    a, N = _grown(_row({1: 31, 2: 15}[order] * 2**level, order), law, _CYCLE, 4 * 2**level)
+    a, N = _grown(row_of_cracks({1: 31, 2: 15}[order] * 2**level, order), law, _CYCLE, 4 * 2**level)
     wanted = quad(lambda a: 1 / law(periodic_K(a, _W), 0.0), _A0, a, epsrel=1e-12)[0]
     return [Value("cycles", N, wanted, {1: 4e-2, 2: 2e-3}[order])]
 
@@ -73,7 +73,7 @@ def _to_a_tolerance(level: int) -> list[Value]:
     """Mesh and steps by a tolerance: the life within it, and within its bar."""
     law, tolerance = paris(_C, 3.0), 1e-2 * 10.0**-level
     run = grow(
-        _row(9, 2, 2), law, weighted_angle, _CYCLE, tolerance=tolerance, progress=False
+        row_of_cracks(9, 2, 2), law, weighted_angle, _CYCLE, tolerance=tolerance, progress=False
     )  # fmt: skip
     history = collect(run, until=_has_grown, keep_solutions=False)
     a = float(np.ptp(history.cracks[0].points[:, 0])) / 2
@@ -141,4 +141,4 @@ CASES = (
 )  # fmt: skip
 
 
-__all__ = ["CASES"]
+__all__ = ["CASES", "row_of_cracks"]
