@@ -63,6 +63,8 @@ _HOME = {
     "nasgro": "laws.fracture",
     "nasgro_K_c": "laws.fracture",
     "rate_table": "laws.tables",
+    "time_rate": "laws.time",
+    "with_time": "laws.time",
     "law": "laws.presets",
     "presets": "laws.presets",
     "linear_closure": "laws.closures",

@@ -4,7 +4,7 @@ import numpy as np
 
 import xcrack as xc
 from fuzz.entry import Entry, arg
-from fuzz.kinds import Number, Numbers, Of, Seen, Word, array, real
+from fuzz.kinds import Called, Number, Numbers, Of, Seen, Word, array, real
 
 POSITIVE = arg(Number(above=0), 1.0, 2)
 AT_LEAST_0 = arg(Number(least=0), 0.0, 0.5)
@@ -212,6 +212,32 @@ ENTRIES = [
         {"D": POSITIVE, "alpha": POSITIVE, "A": POSITIVE, "dK_thr": AT_LEAST_0, **COMMON},
     ),
     Entry("hartman_schijve", _called(xc.hartman_schijve(7e-10, 2, A=47.0, dK_thr=0.1)), RATES),
+    Entry(
+        "time_rate",
+        xc.time_rate,
+        {
+            "C": POSITIVE,
+            "n": arg(Number(least=0), 3.0),
+            "K_th": AT_LEAST_0,
+            "plateau": arg(Number(optional=True, above=0), None, 1.0),
+        },
+    ),
+    Entry("time_rate", lambda K: xc.time_rate(1e-9, 3.0, 10.0)(K), {"K": arg(Numbers(), 20.0)}),
+    Entry(
+        "with_time",
+        lambda law, rate, period, wave: xc.with_time(law, rate, period, wave),
+        {
+            "law": arg(Called(), xc.paris(1e-8, 3.0)),
+            "rate": arg(Of(type=xc.time_rate), xc.time_rate(1e-9, 3.0)),
+            "period": POSITIVE,
+            "wave": arg(Word(words=("hold", "triangle", "sine")), "hold"),
+        },
+    ),
+    Entry(
+        "with_time",
+        _called(xc.with_time(xc.paris(1e-8, 3.0), xc.time_rate(1e-9, 3.0), 2.0, "sine")),
+        RATES,
+    ),
     Entry(
         "nasgro",
         xc.nasgro,

@@ -29,6 +29,7 @@ NAMES = [
     "el_haddad", "forman", "hartman_schijve", "klesnil_lukas", "law", "linear_closure", "nasgro",
     "nasgro_K_c", "nasgro3_threshold", "nasgro4_threshold", "newman_closure", "piecewise",
     "presets", "rate_table", "schijve_closure", "stepped_threshold",
+    "time_rate", "with_time",
     # verification, reports, files of scenes
     "verify", "report", "read_case", "run", "info", "demo", "convert_mesh",
     # campaigns
