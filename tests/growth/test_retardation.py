@@ -4,6 +4,7 @@ from dataclasses import fields
 
 import numpy as np
 import pytest
+from scipy.interpolate import PchipInterpolator
 
 from support.growth_fakes import STRESS, mode_I, patch_respond, plate
 from xcrack.crack.lines import line_crack
@@ -17,7 +18,9 @@ from xcrack.history.history import History
 from xcrack.laws.closures import newman_closure
 from xcrack.laws.power import paris, walker
 from xcrack.laws.zones import plastic_zone, wheeler, willenborg
+from xcrack.lives.life import life
 from xcrack.lives.retarded import retarded
+from xcrack.lives.scatter import Scatter, lognormal
 from xcrack.mesh.box import box
 from xcrack.scene.conditions import traction
 from xcrack.scene.material import Isotropic
@@ -128,6 +131,34 @@ def test_a_tip_leaves_the_body_and_the_other_goes_on(monkeypatch):
     assert len(steps) == 6
     assert steps[-1].cracks[0].n_tips == 0
     assert steps[-1].cycles > steps[3].cycles > 0
+
+
+@pytest.mark.filterwarnings("ignore::xcrack.XcrackWarning")
+def test_steps_of_a_tolerance(monkeypatch):
+    """Steps that choose their own length, against short ones."""
+    patch_respond(monkeypatch, mode_I())
+    model = wheeler(1.0, ZONES)
+    chosen = steps_of(model, da=None, tolerance=1e-2, max_steps=4)
+    short = steps_of(model, da=0.2, max_steps=17)
+    at = PchipInterpolator(
+        [step.corrected[0].points[-1, 0] for step in short], [step.cycles for step in short]
+    )
+    length = float(chosen[-1].corrected[0].points[-1, 0])
+    assert 7.0 < length < 8.2
+    assert chosen[-1].cycles == pytest.approx(float(at(length)), rel=2e-3)
+
+
+def test_other_lives_want_a_history_without(monkeypatch):
+    patch_respond(monkeypatch, mode_I())
+    history = History(tuple(steps_of(wheeler(1.0, ZONES), max_steps=3)), "")
+    given = {"spectrum": OVERLOAD, "criterion": max_hoop_stress, "nu": 0.3}
+    for ask in (
+        lambda: retarded(history, LAW, OVERLOAD, None, nu=0.3),
+        lambda: history.rerate(LAW, **given),
+        lambda: life(history, LAW, scatter=Scatter(C=lognormal(0.1)), seed=3, **given),
+    ):
+        with pytest.raises(ProblemError, match="grown with retardation"):
+            ask()
 
 
 @pytest.mark.filterwarnings("ignore::xcrack.XcrackWarning")
