@@ -71,6 +71,29 @@ def test_mesh_converts(tmp_path, capsys):
     assert "none.msh" in capsys.readouterr().err
 
 
+@pytest.mark.filterwarnings("ignore::xcrack.XcrackWarning")
+def test_life_of_a_stored_run(tmp_path, capsys):
+    from reporting.test_report import edge
+
+    folder = tmp_path / "run"
+    history = edge(path=folder)
+    looks = ["--interval", str(0.3 * history.life), "--pod", "0.7", "0.3"]
+    strength = ["--toughness", "200", "--nu", "0.3"]
+    page = tmp_path / "life.html"
+    given = ["life", str(folder), "--scatter", "0.3", "--samples", "1000", "--unit", "flight"]
+    assert main([*given, *looks, *strength, "-o", str(page)]) == 0
+    out = capsys.readouterr().out
+    for words in (f"life {history.life:.4g} flights", "chance that all of them miss", "at last"):
+        assert words in out
+    assert page.is_file()
+    assert main([*given, "--toughness", "200"]) == 2
+    assert "give --nu" in capsys.readouterr().err
+    assert main([*given, "--pod", "0.7", "0.3"]) == 2
+    assert "give --detect or --interval" in capsys.readouterr().err
+    assert main(["life", str(tmp_path / "none"), "--scatter", "0.3"]) == 2
+    assert "holds no run" in capsys.readouterr().err
+
+
 @pytest.mark.slow
 @pytest.mark.mission
 def test_run_report_and_chart(tmp_path, capsys):

@@ -186,6 +186,8 @@ ENTRIES = [
             ),
             "title": arg(Word(), "a"),
             "yield_stress": arg(Number(optional=True, above=0), None, 1.0),
+            "inspection": arg(Seen(rule=lambda v: v is None), None),
+            "strength": arg(Seen(rule=lambda v: v is None), None),
         },
         in_folder=True,
         cost=3.0,

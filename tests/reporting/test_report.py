@@ -162,6 +162,34 @@ def test_report_of_a_life_and_of_bars(tmp_path):
         xc.report(solution, tmp_path / "bars.html", life=3)
 
 
+def edge(**options):
+    loads = [xc.traction("top", (0.0, 80.0)), xc.traction("bottom", (0.0, -80.0))]
+    crack = xc.line_crack([(-1, 0.07), (-0.4, 0.07)])
+    problem = xc.Problem(xc.box((-1, -1), (1, 1), 8), STEEL, [crack], loads=loads, order=1)
+    steps = xc.grow(problem, xc.paris(1e-11, 3), xc.max_hoop_stress, xc.Cycle(0, 1), da=0.2,
+                    max_steps=3, progress=False)  # fmt: skip
+    return xc.collect(steps, **options)
+
+
+def test_report_of_looks_and_of_strength(tmp_path):
+    """The numbers are those of `xc.inspection` and of `xc.residual_strength`."""
+    history = edge()
+    pod = xc.logistic_pod(0.7, 0.3)
+    look = xc.inspection(history, interval=0.3 * history.life, pod=pod)
+    rows = xc.residual_strength(history, nu=0.3, K_c=200.0)
+    file = tmp_path / "safe.html"
+    text, _, numbers = read(xc.report(history, file, inspection=look, strength=rows))
+    assert numbers["inspection"]["a"] == look.a.tolist()
+    assert numbers["inspection"]["missed"] == look.missed
+    assert numbers["strength"]["by_toughness"] == rows["by_toughness"].tolist()
+    assert "by_collapse" not in numbers["strength"]
+    assert "The largest load breaks the body from step" in text or "the body bears" in text
+    with pytest.raises(xc.ProblemError, match=r"give what xc.inspection returns"):
+        xc.report(history, file, inspection=3)
+    with pytest.raises(xc.ProblemError, match=r"give what xc.residual_strength returns"):
+        xc.report(history, file, strength=np.zeros(3))
+
+
 def test_a_half_written_run_is_reported(tmp_path):
     growth(plate(), tmp_path / "run")
     header = tmp_path / "run" / "run.json"

@@ -65,6 +65,31 @@ def _parser() -> argparse.ArgumentParser:
     own.add_argument("folder", type=Path, help="the folder of the run")
     own.add_argument("-o", "--output", type=Path, help="the page; left out: report.html in it")
     own.add_argument("--yield-stress", type=float, help="to judge plastic zones by")
+    own = add("life", _life, "lives, inspections and strength of a stored growth run")
+    own.add_argument("folder", type=Path, help="the folder of the run")
+    own.add_argument(
+        "--scatter",
+        type=float,
+        metavar="SIGMA",
+        required=True,
+        help="of ln C: standard deviation of the logarithm of the growth rate",
+    )
+    own.add_argument("--samples", type=int, default=100_000)
+    own.add_argument("--seed", type=int, default=1, help="of the draw")
+    own.add_argument("--unit", default="cycle", help="what a cycle is called, such as flight")
+    own.add_argument("--detect", type=float, metavar="A", help="length that a look finds for sure")
+    own.add_argument("--factor", type=float, default=2.0, help="looks from there to the end")
+    own.add_argument("--interval", type=float, metavar="N", help="cycles between looks instead")
+    own.add_argument(
+        "--pod",
+        type=float,
+        nargs=2,
+        metavar=("A50", "S"),
+        help="of a logistic probability of detection: chance that all looks miss",
+    )
+    own.add_argument("--toughness", type=float, metavar="K_C", help="for the strength that is left")
+    own.add_argument("--nu", type=float, help="Poisson's ratio, with --toughness")
+    own.add_argument("-o", "--output", type=Path, help="write a report with these sections")
     own = add("verify", _verify, "compare this installation with what is known")
     own.add_argument("--quick", action="store_true", help="coarsest meshes of the quick cases")
     own.add_argument("-k", dest="only", default="", metavar="NAME", help="cases of this name")
@@ -100,6 +125,36 @@ def _report(options: argparse.Namespace) -> int:
     target = options.output or options.folder / "report.html"
     path = xcrack.report(options.folder, target, yield_stress=options.yield_stress)
     print(f"the report is {path.resolve()}")
+    return 0
+
+
+def _life(options: argparse.Namespace) -> int:
+    history = xcrack.load(options.folder)
+    scatter = xcrack.Scatter(C=xcrack.lognormal(options.scatter))
+    life = xcrack.life(history, scatter=scatter, samples=options.samples, seed=options.seed,
+                       unit=options.unit)  # fmt: skip
+    print(life)
+    plan = strength = None
+    if options.detect is not None or options.interval is not None:
+        pod = None if options.pod is None else xcrack.logistic_pod(*options.pod)
+        plan = xcrack.inspection(history, a_detect=options.detect, factor=options.factor,
+                                 interval=options.interval, pod=pod)  # fmt: skip
+        print(f"first look after {plan.first:.6g}, then every {plan.interval:.6g} {options.unit}s: "
+              f"{len(plan.at)} looks")  # fmt: skip
+        if plan.missed is not None:
+            print(f"chance that all of them miss: {plan.missed:.3g}")
+    elif options.pod is not None:
+        raise XcrackError("life: --pod belongs to looks: give --detect or --interval too.")
+    if options.toughness is not None:
+        if options.nu is None:
+            raise XcrackError("life: --toughness needs Poisson's ratio for K_eq: give --nu.")
+        strength = xcrack.residual_strength(history, nu=options.nu, K_c=options.toughness)
+        factors = strength["by_toughness"]
+        print(f"factor on the largest load: {factors[0]:.4g} at first, {factors[-1]:.4g} at last")
+    if options.output is not None:
+        path = xcrack.report(options.folder, options.output, life=life, inspection=plan,
+                             strength=strength)  # fmt: skip
+        print(f"the report is {path.resolve()}")
     return 0
 
 

@@ -106,7 +106,7 @@ def driving(steps: Sequence[Step], block: Block | None = None) -> Driving:
     if any(key.startswith("retardation") for key in memory_of(steps[0]).settings):
         raise ProblemError(
             "the history was grown with retardation: its cycles do not follow from its rates. Grow "
-            "without it, and take the model along that path by retarded."
+            "without it, and take the model along that path by retarded, or life(retardation=...)."
         )
     rows: list[tuple[float, ...]] = []
     for number, (step, after) in enumerate(zip(steps, steps[1:])):

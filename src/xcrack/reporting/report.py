@@ -4,19 +4,23 @@ import base64
 import datetime
 import json
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
+from numpy.typing import NDArray
+
 from xcrack.errors import ProblemError, XcrackError
 from xcrack.history.versions import versions
 from xcrack.inputs import number, shown
+from xcrack.lives.inspection import Inspection
 from xcrack.lives.life import Life
 from xcrack.markup import Markup, element, joined, listed, page
 from xcrack.paths import path_of, system_errors
 from xcrack.plotting.report_pictures import Picture, history_pictures, solution_pictures
 from xcrack.plotting.view_3d import history_layers, packed, solution_layers
-from xcrack.reporting import histories, results, scene
+from xcrack.reporting import histories, results, safety, scene
 from xcrack.reporting.section import Section
 from xcrack.reporting.source import Source, source_of
 from xcrack.reporting.viewer import viewer
@@ -31,6 +35,8 @@ def report(
     title: str = "",
     yield_stress: float | None = None,
     life: Life | None = None,
+    inspection: Inspection | None = None,
+    strength: NDArray[Any] | None = None,
 ) -> Path:
     """Write what was modelled and what came out, as one page that needs no network.
 
@@ -50,6 +56,10 @@ def report(
         Lets the report compare plastic zones with crack and cell.
     life : Life, optional
         What `xc.life` made of the run: the report shows it and what drives it.
+    inspection : Inspection, optional
+        What `xc.inspection` made of the run: when to look.
+    strength : structured array, optional
+        What `xc.residual_strength` made of the run.
 
     Returns
     -------
@@ -70,7 +80,17 @@ def report(
         yield_stress = number(yield_stress, "report: yield_stress", above=0)
     if not isinstance(life, Life | None):
         raise ProblemError(f"report: life = {shown(life)}: give what xc.life returns.")
+    if not isinstance(inspection, Inspection | None):
+        raise ProblemError(
+            f"report: inspection = {shown(inspection)}: give what xc.inspection returns."
+        )
+    names = getattr(getattr(strength, "dtype", None), "names", None) or ()
+    if strength is not None and not {"step", "by_toughness"} <= set(names):
+        raise ProblemError(
+            f"report: strength = {shown(strength)}: give what xc.residual_strength returns."
+        )
     source = source_of(result, title, yield_stress, life)
+    source = replace(source, inspection=inspection, strength=strength)
     sections = [made for make in SECTIONS if (made := make(source)) is not None]
     with system_errors("the report cannot be written to", path, error=ProblemError):
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -122,6 +142,8 @@ SECTIONS: Sequence[Callable[[Source], Section | None]] = (
     results.growth,
     histories.spectrum,
     results.lives,
+    safety.inspections,
+    safety.strength,
     results.intensity,
     results.contact,
     scene.assumptions,

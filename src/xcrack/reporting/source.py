@@ -9,12 +9,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from xcrack.analysis.solution import Solution
 from xcrack.crack.crack import Crack
 from xcrack.errors import ProblemError, XcrackError, collected_warnings
 from xcrack.history.collect import load
 from xcrack.history.history import History
+from xcrack.lives.inspection import Inspection
 from xcrack.lives.life import Life
 from xcrack.mesh.mesh import Mesh
 from xcrack.paths import path_of
@@ -39,6 +41,9 @@ class Source:
     history : History, optional
     yield_stress : float, optional
     life : Life, optional
+    inspection : Inspection, optional
+    strength : structured array, optional
+        What `residual_strength` returned.
     warnings : mapping of str to int
         What was warned of, and how often.
     """
@@ -50,6 +55,8 @@ class Source:
     yield_stress: float | None = None
     warnings: Counter[str] = field(default_factory=Counter)
     life: Life | None = None
+    inspection: Inspection | None = None
+    strength: NDArray[Any] | None = None
 
     @property
     def problem(self) -> Problem | None:
