@@ -28,6 +28,8 @@ REQUIREMENTS: Mapping[str, str] = MappingProxyType({
     "ratio": "Cycles where the stress ratio or closure matters",
     "restart": "A run that was stopped goes on to the same result",
     "spectrum": "Cycles under variable amplitude and overloads",
+    "scatter": "Lives with scatter, and chances that inspections miss",
+    "opening": "Opening of crack mouths",
     "friction": "Faces that rub: stick, slip along a path of loads, energy of a cycle",
     "error_bars": "Error bars of K and of lives hold the truth",
     "residual_strength": "Residual strength: toughness and net section",

@@ -5,7 +5,9 @@ import numpy as np
 from xcrack.analysis.solve import solve
 from xcrack.book.case import Case, Value
 from xcrack.crack.lines import line_crack
+from xcrack.mesh.mesh import Mesh
 from xcrack.mesh.plates import plate
+from xcrack.post.opening import crack_opening
 from xcrack.scene.material import Isotropic
 from xcrack.scene.problem import Problem
 from xcrack.scene.set_loads import bearing
@@ -22,9 +24,15 @@ def _standard(x: float) -> float:
     return float((2 + x) * series / (1 - x) ** 1.5)
 
 
-def _run(level: int) -> list[Value]:
+def _gauge(x: float, first: float, *others: float) -> float:
+    """E' B V / P of Saxena and Hudak for a/W = x."""
+    series = sum(c * x**k for k, c in enumerate((first, *others)))
+    return ((1 + x) / (1 - x)) ** 2 * series
+
+
+def _mesh(level: int) -> Mesh:
     h = 1.5 / 2**level
-    mesh = plate(
+    return plate(
         1.25 * _W,
         1.2 * _W,
         lower=(-0.25 * _W, -0.6 * _W),
@@ -35,7 +43,10 @@ def _run(level: int) -> list[Value]:
         band=1.0,
         transition=15.0,
     )
-    values = []
+
+
+def _run(level: int) -> list[Value]:
+    mesh, values = _mesh(level), []
     for share, allowed in _SHARES.items():
         problem = Problem(
             mesh,
@@ -48,7 +59,31 @@ def _run(level: int) -> list[Value]:
     return values
 
 
+def _openings(level: int) -> list[Value]:
+    """Clip gauges on the load line and at the front face; pins that roll on flattened holes."""
+    mesh, steel, values = _mesh(level), Isotropic(210e3, 0.3, "strain"), []
+    for x in (0.45, 0.6):
+        loads = [
+            bearing(f"hole_{k}", (0.0, side), contact_angle=np.pi / 3)
+            for k, side in enumerate((1.0, -1.0))
+        ]
+        crack = line_crack([(-0.26 * _W, 0.0), (x * _W, 0.0)])
+        solution = solve(Problem(mesh, steel, [crack], loads=loads))
+        line = float(crack_opening(solution, (0.0, 0.0))) * steel.E_prime
+        face = float(crack_opening(solution)[0]) * steel.E_prime
+        wanted = _gauge(x, 2.1630, 12.219, -20.065, -0.9925, 20.609, -9.9314)
+        values.append(Value(f"load line, a/W = {x:g}", line, wanted, 0.01))
+        wanted = _gauge(x, 1.6137, 12.678, -14.231, -16.610, 35.050, -14.494) * (1 + 0.25 / x)
+        values.append(Value(f"front face, a/W = {x:g}", face, wanted, 0.01))
+    return values
+
+
+_GAUGES = "clip gauges of a compact specimen (Saxena and Hudak, 1978; ASTM E647), from memory"
+
 CASES = (
+    Case(
+        "compact-opening", "opening", _GAUGES, "published", 2, 2, False, _openings, 2, needs="gmsh"
+    ),
     Case("compact-tension", "K_tables", _SOURCE, "published", 2, 2, False, _run, 2, needs="gmsh"),
 )
 
