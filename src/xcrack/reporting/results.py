@@ -176,7 +176,10 @@ def lives(source: Source) -> Section | None:
         head = ("what varies alone", "5 %", "95 %", "ratio")
         parts += [element("h3", "What drives it"), table(head, rows)]
     if life.bounds:
-        bounds = [(name, f"{100 * share:.3g} %") for name, share in life.bounds.items()]
+        bounds = [
+            (name, f"{100 * share:.3g} %" if np.isfinite(share) else "not known")
+            for name, share in life.bounds.items()
+        ]
         parts += [element("h3", "Numerical bounds, as shares of the life"), table((), bounds)]
     values = {"life": life.life, "quantiles": {str(p): _plain(life.percentile(p)) for p in levels},
               "scatter": {k: list(map(_plain, v)) for k, v in life.scatter.items()},
