@@ -2,6 +2,7 @@
 
 import pickle
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from support import exact
 from support.growth_fakes import STRESS, mode_I, patch_respond, plate
 from xcrack.crack.lines import line_crack
 from xcrack.errors import ProblemError
+from xcrack.growth import run as growth
 from xcrack.growth.criteria import max_hoop_stress
 from xcrack.growth.run import grow
 from xcrack.growth.step import Cycle
@@ -22,6 +24,7 @@ from xcrack.mesh.box import box
 from xcrack.scene.conditions import fix, traction
 from xcrack.scene.material import Isotropic
 from xcrack.scene.problem import Problem
+from xcrack.sif.bars import Bars
 from xcrack.spectra.spectrum import Spectrum
 
 LAW = paris(1e-11, 3.0)
@@ -159,6 +162,37 @@ def test_levels_are_a_source_of_their_own():
     assert 1e-5 < result.bounds["levels"] < 0.05
     with pytest.raises(ProblemError, match="not in proportion"):
         life(history, LAW, scatter=Scatter(load=normal(0.02)), seed=93, **given)
+
+
+def test_best_K_of_a_spectrum_is_rated_again(monkeypatch):
+    """Where K has bars growth follows the best K, and so does rerating."""
+    respond = growth.respond
+
+    def with_bars(problem, run, reuse):
+        solutions, answers, handed_on = respond(problem, run, reuse)
+        bars = [
+            [replace(sif, errors=Bars(0.1 * sif.K, 0.01 * np.abs(sif.K), ("",))) for sif in state]
+            for state in answers
+        ]
+        return solutions, tuple(map(tuple, bars)), handed_on
+
+    monkeypatch.setattr(growth, "respond", with_bars)
+    history = run(n=5)
+    assert history.life == pytest.approx(
+        exact.paris_life(5.0, 17.0, 1e-11, 3.0, 1.1 * STRESS) / equivalent(3.0), rel=1e-9
+    )
+    again = history.rerate(LAW, LAW, spectrum=FLIGHT, **GIVEN)
+    assert again.life == pytest.approx(history.life, rel=1e-12)
+
+
+def test_steps_and_K_are_those_of_the_run_where_it_estimated_them():
+    history = run(cycle=Cycle(0.0, 1.0), n=5)
+    last = history.steps[-1]
+    error = replace(last.error, cycles=0.01 * last.cycles, K=30.0, contact=2.0, unknown=1.0)
+    known = History((*history.steps[:-1], replace(last, error=error)), "")
+    bounds = life(known, LAW, scatter=Scatter(C=normal(0.1)), samples=100, seed=1).bounds
+    assert bounds["steps"] == pytest.approx(0.01, rel=1e-12)
+    assert bounds["K"] == pytest.approx(33.0 / last.cycles, rel=1e-12)
 
 
 # --- constants of the law ------------------------------------------------------------------------

@@ -12,6 +12,7 @@ from xcrack.growth.checks import evaluate_criterion
 from xcrack.growth.criteria import Criterion
 from xcrack.growth.ladder import Ladder
 from xcrack.growth.step import Step
+from xcrack.growth.uncertainty import best_known
 from xcrack.inputs import number, shown
 from xcrack.spectra.spectrum import Spectrum, distinct
 
@@ -52,7 +53,7 @@ class Block:
 
     def cycles(self, step: Step, c: int) -> tuple[Floats, Floats, Floats]:
         """Range, ratio and count of each kind of cycle at the places of a crack, each `(p, f)`."""
-        K = np.stack([state[c].K for state in step.sif])
+        K = np.stack([state[c].K for state in best_known(step.sif)])
         if self.spectrum.states is not None:
             pairs = pairs_of_states(K, self.spectrum, self.nu)
             ends, count = pairs.K, pairs.count

@@ -168,8 +168,10 @@ def life(
 
     Notes
     -----
-    Source "steps": a third of the difference to the life from every second step (Richardson, second
-    order). Source "K": the life with all K larger and smaller by their spread over two domains.
+    Sources "steps" and "K": those of `History.life_bar` where the run estimated them, contact and
+    rates without a bar in that of K. Else "steps" is a third of the difference to the life from
+    every second step (Richardson, second order), and "K" the life with all K larger and smaller by
+    their spread over two domains.
     Source "levels": a third of the difference to the life with every second level of a spectrum;
     0 where its factors were solved, or K is in proportion to them. Source "tips": how the shares of
     the advance of several tips change for the 5 and 95 % samples of each source alone. Samples are
@@ -201,9 +203,13 @@ def life(
         name: _ends(lives(lead, law, {name: values}, n)) if len(drawn) > 1 else _ends(N)
         for name, values in drawn.items()
     }
-    bounds = {"steps": _of_steps(lead)}
+    bar = history.life_bar
+    known = np.isfinite(bar.steps) and bar.life > 0
+    bounds = {"steps": bar.steps / bar.life if known else _of_steps(lead)}
+    if np.isfinite(bar.K) and bar.life > 0:
+        bounds["K"] = (bar.K + bar.contact + bar.unknown) / bar.life
     if law is not None and (block is not None or not history.steps[0].levels):
-        bounds["K"] = _of_K(lead, law)
+        bounds.setdefault("K", _of_K(lead, law))
         if not rows.is_one_tip or len(rows.step) > len(lead.step):
             bounds["tips"] = _of_tips(rows, law, scatter)
         if block is not None:

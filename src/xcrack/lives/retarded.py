@@ -10,6 +10,7 @@ from xcrack.growth.checks import evaluate_law
 from xcrack.growth.criteria import clipped, equivalent_K
 from xcrack.growth.ladder import Ladder
 from xcrack.growth.step import Step
+from xcrack.growth.uncertainty import best_known
 from xcrack.history.driving import Driving, driving
 from xcrack.history.history import History
 from xcrack.inputs import number, shown
@@ -211,7 +212,7 @@ def _ends(
             result.append(result[-1])
             continue
         levels = np.array(step.levels)
-        K = np.stack([state[crack].K[place] for state in step.sif])[:, None]
+        K = np.stack([state[crack].K[place] for state in best_known(step.sif)])[:, None]
         if len(levels) == 2 and levels[0] < 0 < levels[1] and not spectrum.steady:
             levels = np.array([levels[0], 0.0, levels[1]])
             K = np.stack([K[0], np.zeros_like(K[0]), K[1]])
