@@ -34,6 +34,9 @@ REQUIREMENTS: Mapping[str, str] = MappingProxyType({
     "error_bars": "Error bars of K and of lives hold the truth",
     "residual_strength": "Residual strength: toughness and net section",
     "temperature": "Thermal stress",
+    "resultants": "Resultants of bearing loads, forces and moments, and reactions",
+    "measures": "Depth, lengths on surfaces and area of a crack in a body",
+    "submodel": "K of a part whose cut sides move as the whole does",
 })  # fmt: skip
 
 
