@@ -101,7 +101,7 @@ right.plot(N / 1000, a, "C0o", ms=4, label="xcrack")
 right.set(xlabel="thousand cycles", ylabel="crack length a, mm")
 right.legend(frameon=False)
 figure.savefig(OUT / "K_and_life.png", dpi=150)
-last = history.steps[-1].solutions[-1]
+last = history.solved[-1].solutions[-1]
 xc.plot(last, "von_mises", warp=100.0, file=OUT / "von_mises.png", renderer="matplotlib")
 xc.plot(last, "syy", zoom=1.1, file=OUT / "tip.png")
 history.write(OUT)

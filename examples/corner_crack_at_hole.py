@@ -121,7 +121,7 @@ for end in ends[ends["step"] == ends["step"].max()]:
 # %% Pictures and files
 history.write(OUT)
 xc.draw_fronts(history, mesh=mesh, file=OUT / "fronts.png")
-last = history.steps[-1].solutions[-1]
+last = history.solved[-1].solutions[-1]
 xc.plot(
     last, "opening", zoom=2.0, file=OUT / "opening.png",
     renderer="matplotlib",

@@ -97,7 +97,7 @@ options = {
 history = xc.collect(xc.grow(plate, **options))
 table = history.table()
 K, a, y = table["K_I_1"], table["a"], table["y"]
-print(history.steps[-1].solutions[-1].report)
+print(history.solved[-1].solutions[-1].report)
 
 # %% The same run, stopped and resumed from disk
 shutil.rmtree(OUT / "run", ignore_errors=True)  # collect does not replace a run
@@ -146,7 +146,7 @@ gap.set(xlabel="thousand cycles", ylabel="error of N, %", ylim=(-0.5, 0.5))
 figure.savefig(OUT / "life.png", dpi=150)
 
 # %% The last step, and a series for ParaView
-last = history.steps[-1].solutions[-1]
+last = history.solved[-1].solutions[-1]
 xc.plot(last, "von_mises", warp=50.0, file=OUT / "von_mises.png")
 history.write(OUT)
 

@@ -173,7 +173,7 @@ def main():
     worst = cases[int(np.argmin(life))]
     history = grown(**worst)
     history.write(OUT)
-    xc.plot(history.steps[-1].solutions[-1], "von_mises", warp=40.0, file=OUT / "worst.png")
+    xc.plot(history.solved[-1].solutions[-1], "von_mises", warp=40.0, file=OUT / "worst.png")
 
     # %% Checks
     assert history.life == life.min()  # a case is the same run, wherever it is run

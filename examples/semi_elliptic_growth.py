@@ -188,8 +188,8 @@ axes[1].plot([], [], "k-", lw=1, label="from the equations")
 axes[1].set(xlabel="thousand cycles", ylabel="mm")
 axes[1].legend(frameon=False, fontsize="small")
 figure.savefig(OUT / "K_and_life.png", dpi=150)
-xc.plot(history.steps[-1].solutions[-1], "opening", file=OUT / "opening.png")
-xc.write(history.steps[-1].solutions[-1], OUT / "last")
+xc.plot(history.solved[-1].solutions[-1], "opening", file=OUT / "opening.png")
+xc.write(history.solved[-1].solutions[-1], OUT / "last")
 
 # %% Checks
 off = np.array([row[7] for row in rows])

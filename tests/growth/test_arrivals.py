@@ -38,6 +38,7 @@ def test_the_last_step_ends_on_the_side_with_its_cycles(monkeypatch, integrator,
     assert history.life == arrival.cycles == pytest.approx(exact(5.0, 60.0), rel=rel)
     assert history.cracks[0].points[-1] == pytest.approx([60.0, 0.37], rel=1e-12)
     assert history.cracks[0].tips == ()
+    assert history.solved == history.steps[:-1]
     assert all(not step.arrivals for step in history.steps[:-1])
 
 

@@ -130,8 +130,7 @@ def _run_case(path: str | PathLike[str], *, resumed: bool, overwrite: bool) -> A
     else:
         result = _grown(case, resumed=resumed, overwrite=overwrite)
         result.write(case.folder)
-        solved = [step for step in result.steps if not step.has_left]
-        solutions = list(solved[-1].solutions) if solved else []
+        solutions = list(result.solved[-1].solutions) if result.solved else []
     _draw(case, solutions)
     report(result, case.folder / "report.html", title=case.title)
     return result

@@ -77,6 +77,11 @@ class History:
         return self.steps[-1].corrected if self.steps else ()
 
     @property
+    def solved(self) -> tuple[Step, ...]:
+        """Steps with K: all but a last one at which no tip is left in the body."""
+        return tuple(step for step in self.steps if not step.has_left)
+
+    @property
     def life(self) -> float:
         """Cycles at the last step."""
         return self.steps[-1].cycles if self.steps else 0.0

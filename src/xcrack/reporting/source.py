@@ -137,7 +137,7 @@ def _of_history(history: History, title: str, yield_stress: float | None) -> Sou
     solutions: tuple[Solution, ...] = ()
     sif: tuple[tuple[SIF, ...], ...] = ()
     if history.steps:
-        last = next((s for s in reversed(history.steps) if not s.has_left), history.steps[-1])
+        last = (history.solved or history.steps)[-1]
         solutions, sif = last.solutions, last.sif
         for step in history.steps:
             if step.warnings is None:  # of a script, or of an older xcrack
