@@ -4,6 +4,8 @@ Coarse meshes: K is good to a few per cent, the ligament of a cell is closed at 
 """
 
 import shutil
+from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -157,11 +159,30 @@ def test_cracks_beside_one_surface_end_the_run_with_the_place():
     assert len(history.steps[-1].cracks) == 2
 
 
+@pytest.mark.parametrize(
+    ("changes", "options", "words"),
+    [
+        ({"loads": [xc.crack_pressure(1.0, crack=0), xc.crack_pressure(1.0, crack=1)]}, {},
+         "a load names a crack by its number"),
+        ({"friction": 0.3}, {}, "what slip has left"),
+        ({"friction": (0.0, 0.0)}, {}, "what slip has left"),
+        ({}, {"retardation": object()}, "what overloads have left"),
+    ],
+)  # fmt: skip
+def test_what_belongs_to_one_of_two_cracks_ends_the_run(changes, options, words):
+    """The one crack would have none of it, or another's."""
+    problem = replace(pennies(), **changes)
+    run = SimpleNamespace(problem=problem, cycle=xc.Cycle(0.0, 1.0), retardation=None)
+    run.__dict__.update(options)
+    assert words in joins_3d._hindrance(run)
+
+
+@pytest.mark.slow
 def test_a_load_of_one_crack_ends_the_run():
-    """Its number would be another crack's."""
     loads = [xc.crack_pressure(1.0, crack=0), xc.crack_pressure(1.0, crack=1)]
     history = xc.collect(grow(pennies(loads=loads)))
     assert len(history.steps[-1].cracks) == 2
+    assert "cracks 0 and 1 meet near" in history.ended
     assert "a load names a crack by its number" in history.ended
 
 

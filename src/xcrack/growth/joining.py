@@ -1,6 +1,6 @@
 """Cracks that meet during growth: the choice between 2D and 3D, and what they become."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from xcrack.crack.crack import Crack
 from xcrack.growth import joins_3d
@@ -30,7 +30,8 @@ def joined(run: Run, last: Step, cracks: Sequence[Crack]) -> Joined | None:
     GeometryError
         They meet, and what they would become cannot be made.
     """
-    return joins_3d.joined(run, last, cracks) if run.problem.mesh.dim == 3 else None
+    join = _JOINED.get(run.problem.mesh.dim)
+    return None if join is None else join(run, last, cracks)
 
 
 def arriving(run: Run, last: Step, met: Joined) -> list[Arriving]:
@@ -41,6 +42,9 @@ def arriving(run: Run, last: Step, met: Joined) -> list[Arriving]:
 def settled(run: Run, last: Step, seen: Evaluation, met: Joined) -> Settled:
     """What the step means in which cracks have joined."""
     return joins_3d.settled(run, last, seen, met)
+
+
+_JOINED: dict[int, Callable[[Run, Step, Sequence[Crack]], Joined | None]] = {3: joins_3d.joined}
 
 
 __all__ = ["arriving", "joined", "settled"]

@@ -265,6 +265,11 @@ def _hindrance(run: Run) -> str:
             "a load names a crack by its number, which is another one's after they have joined: "
             "give crack_pressure without crack."
         )
+    if isinstance(run.problem.friction, Sequence) or any(run.problem.frictions):
+        return (
+            "what slip has left on the faces of two cracks is not carried on to one: go on with "
+            "friction=0, or with a new run from there."
+        )
     if run.retardation is not None:
         return (
             "what overloads have left at two fronts is not carried on to one: go on without "
