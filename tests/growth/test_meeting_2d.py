@@ -60,7 +60,7 @@ def test_cycles_of_a_join_do_not_depend_on_mesh_and_step():
     coarse = run(lines, 30, 0.8, 2, max_steps=6).joins[0]
     fine = run(lines, 60, 0.5, 2, max_steps=10).joins[0]
     assert coarse.N == pytest.approx(fine.N, rel=0.01)
-    np.testing.assert_allclose(coarse.point, fine.point, atol=0.05)
+    np.testing.assert_allclose(coarse.point, fine.point, atol=0.1)  # a fifth of a cell
 
 
 def test_a_piece_cut_off_ends_the_run():

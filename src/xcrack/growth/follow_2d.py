@@ -14,7 +14,7 @@ from xcrack.crack.tips_2d import tip_frames
 from xcrack.growth.advance import LEAST, PerCrack
 from xcrack.growth.arrival import Arriving
 from xcrack.growth.cycles import elapsed
-from xcrack.growth.meeting_2d import SOON, joined, meetings
+from xcrack.growth.meeting_2d import joined, meetings
 from xcrack.growth.step import Step, memory_of, moved_places
 from xcrack.mesh.mesh import Mesh
 from xcrack.sif.sif import SIF
@@ -39,7 +39,7 @@ def advanced(crack: Crack, sif: SIF, angle: Floats, da: Floats, mesh: Mesh) -> C
 
 def met(cracks: list[Crack], da: PerCrack, mesh: Mesh) -> list[Crack]:
     """Cracks whose tips have met others, or will within a cell, are ended or joined there."""
-    now = [own for own in meetings(cracks, mesh) if own.away <= SOON * own.size]
+    now = [own for own in meetings(cracks, mesh) if own.soon]
     moved = [float(way) > 0 for own in da for way in own]
     return joined(cracks, moved, now) if now else cracks
 

@@ -1,7 +1,7 @@
 """Tips in 2D that meet other cracks: they end on them, or two facing tips become one crack.
 
 Close before another crack K is no longer that of the tip alone, and within a cell nothing resolves
-it. A tip whose straight prolongation meets another crack within a cell and a half of its advance
+it. A tip whose straight prolongation meets another crack within a cell and a quarter of its advance
 ends there: it keeps its direction, and the step ends when it arrives.
 """
 
@@ -14,13 +14,14 @@ from xcrack.arrays import Floats, Ints
 from xcrack.crack.crack import Crack
 from xcrack.crack.lines import crossing_points, polyline_crack
 from xcrack.geometry.simplices import closest_on_segment
-from xcrack.growth.tips_2d import faces_of, rows_of
+from xcrack.growth.tips_2d import Faces, faces_of, rows_of
 from xcrack.mesh.locate import cell_sizes, contains
 from xcrack.mesh.mesh import Mesh
 
-AHEAD = 1.5  # cells beyond the advance within which a tip is taken to meet what lies ahead
-SOON = 1.0  # cells: tips closer than that to what they meet join in the same step
-_BESIDE = 0.5  # cells by which facing tips may miss each other and still become one crack
+AHEAD = 1.25  # cells beyond the advance within which a tip is taken to meet what lies ahead
+_FACING = 0.6  # of that for each of two facing tips
+_SOON = 1.0  # cells: tips closer than that to what they meet join in the same step
+_BESIDE = 1.2  # cells by which facing tips may miss each other and still become one crack
 _BEHIND = 1.3  # cells behind a tip at which others end that would meet it closer
 
 
@@ -51,6 +52,11 @@ class Meeting:
     other: int
     size: float
 
+    @property
+    def soon(self) -> bool:
+        """Whether the tip is too close to what it meets for another step."""
+        return self.away <= _SOON * self.size * (1.0 if self.other < 0 else _FACING)
+
 
 def meetings(cracks: Sequence[Crack], mesh: Mesh, ahead: float = AHEAD) -> list[Meeting]:
     """What tips meet within some cells ahead of them, or have run across, the nearest first.
@@ -72,7 +78,7 @@ def meetings(cracks: Sequence[Crack], mesh: Mesh, ahead: float = AHEAD) -> list[
     for row in range(len(owner)):
         h, x = float(size[row]), faces.tip[row]
         along = np.array([np.cos(faces.direction[row]), np.sin(faces.direction[row])])
-        facing = _facing(row, faces.tip, faces.direction, owner, ahead * h, h)
+        facing = _facing(row, faces, owner, 2 * _FACING * ahead * h, _BESIDE * h)
         if facing is not None:
             middle = (x + faces.tip[facing]) / 2
             away = float((faces.tip[facing] - x) @ along) / 2
@@ -86,16 +92,15 @@ def meetings(cracks: Sequence[Crack], mesh: Mesh, ahead: float = AHEAD) -> list[
     return sorted(result, key=lambda met: met.away)
 
 
-def _facing(
-    row: int, tips: Floats, direction: Floats, owner: Ints, reach: float, size: float
-) -> int | None:
-    """The tip of another crack that comes towards this one."""
+def _facing(row: int, faces: Faces, owner: Ints, reach: float, room: float) -> int | None:
+    """The tip of another crack that comes towards this one, or has come past it just now."""
+    direction = faces.direction
     along = np.array([np.cos(direction[row]), np.sin(direction[row])])
-    gap = tips - tips[row]
+    gap = faces.tip - faces.tip[row]
     ahead, beside = gap @ along, np.abs(gap @ np.array([-along[1], along[0]]))
     opposite = np.cos(direction - direction[row]) < -0.5
-    # The other one advances as well, and may be ahead or already past.
-    near = (ahead < 2 * reach) & (ahead > -2 * reach) & (beside <= _BESIDE * size)
+    before = (faces.anchor - faces.anchor[row]) @ along > 0
+    near = (ahead < reach) & before & (beside <= room)
     rows = np.nonzero(near & opposite & (owner != owner[row]))[0]
     return int(rows[np.argmin(np.abs(ahead[rows]))]) if len(rows) else None
 
@@ -209,4 +214,4 @@ def _one(one: Crack, two: Crack, x: Floats) -> Crack:
     return polyline_crack(points, tuple(tips))
 
 
-__all__ = ["AHEAD", "SOON", "Meeting", "joined", "meetings"]
+__all__ = ["AHEAD", "Meeting", "joined", "meetings"]

@@ -9,7 +9,7 @@ import numpy as np
 from xcrack.arrays import Bools, Floats
 from xcrack.crack.crack import Crack
 from xcrack.growth.envelope import Growth
-from xcrack.growth.meeting_2d import AHEAD, SOON, Meeting, joined, meetings
+from xcrack.growth.meeting_2d import AHEAD, Meeting, joined, meetings
 from xcrack.growth.options import Run
 from xcrack.growth.reach import growth_until, reach_of
 from xcrack.growth.tips_2d import ending_at, faces_of
@@ -83,7 +83,7 @@ def _met(
     most = ahead.length + max(AHEAD * own.size for own in met)
     arrival = [_arrival(partial(left, own), most) for own in met]
     first = min(arrival)
-    if first == np.inf and min(own.away - SOON * own.size for own in met) > 0:
+    if first == np.inf and not any(own.soon for own in met):
         return ahead
     length = ahead.length if first == np.inf else first
     growth = growth_until(run, trail, length)
@@ -93,7 +93,7 @@ def _met(
     now = [
         own
         for own in meetings(apart, run.problem.mesh, 2 * AHEAD)
-        if own.away <= SOON * own.size or own.tip in arrived
+        if own.soon or own.tip in arrived
     ]
     if not now:
         return ahead
