@@ -18,6 +18,7 @@ REQUIREMENTS: Mapping[str, str] = MappingProxyType({
     "partial": "Partly closed cracks: K, and where contact ends",
     "sliding": "Closed cracks slide without friction: K_I = 0, and K_II",
     "stability": "The multipliers are stable: inf-sup constant",
+    "junctions": "K of cracks that end on others",
     "cut": "Results do not depend on where a crack cuts the cells",
     "invariance": "Results do not depend on units, position and direction",
     "direction": "Angle at which a crack turns",
