@@ -5,6 +5,7 @@ import pytest
 from scipy.integrate import quad
 
 import xcrack as xc
+from benchmarks.wanted_error import SCENES, against, run, scene
 from xcrack.history import run_folder
 from xcrack.verification.plates import PLATE_EDGE
 
@@ -88,6 +89,46 @@ def test_steps_are_chosen_by_the_tolerance():
     assert table["N_bar"][-1] == few.life_bar.total
     assert "±" in repr(few)
     assert "best K at" in str(few.life_bar)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("tolerance", [3e-2, 1e-2])
+@pytest.mark.parametrize("name", SCENES[:3])
+def test_path_and_life_of_scenes_without_exact_solution(name, tolerance):
+    """Against a run with a tolerance of 1e-3 in steps of 0.03; that is good to 2e-3 itself."""
+    problem, end = scene(name)
+    truth, _ = run(problem, end + 0.3, tolerance=1e-3, da=0.03)
+    history, _ = run(problem, end, tolerance=tolerance)
+    path, life = against(truth)(history)
+    error = history.steps[-1].error
+    print(f"{name}: life {life:.1e} of {history.life_bar.relative:.1e}, path {path:.1e}")
+    assert max(path, life) <= tolerance
+    assert life <= history.life_bar.relative
+    assert path <= error.path / error.grown
+
+
+@pytest.mark.slow
+def test_life_of_a_penny():
+    """K of an infinite body: the block is 3 to 6 times as wide, and K up to 4 % larger in it."""
+    centre = np.array([0.01, 0.013, 0.017])
+    penny = xc.penny_crack(tuple(centre), (0, 0, 1), 0.25)
+    pull = [xc.traction("top", (0, 0, 1.0)), xc.traction("bottom", (0, 0, -1.0))]
+    steel = xc.Isotropic(210e3, 0.3)
+    problem = xc.Problem(xc.box((-1.5,) * 3, (1.5,) * 3, 11), steel, [penny], loads=pull)
+
+    def radius(step):
+        return np.linalg.norm(step.corrected[0].points - centre, axis=1).max()
+
+    steps = xc.grow(**run_of(problem, tolerance=0.1))
+    history = xc.collect(steps, until=lambda step: radius(step) > 0.4, keep_solutions=False)
+
+    def cycles(a):
+        return float(1 / LAW(np.array([2 * np.sqrt(a / np.pi)]), np.zeros(1))[0])
+
+    exact = quad(cycles, 0.25, radius(history.steps[-1]))[0]
+    print(f"{history.life / exact - 1:+.1e}: {history.life_bar}")
+    assert abs(history.life / exact - 1) <= 0.1
+    assert history.life_bar.relative <= 0.1
 
 
 # What is stored --------------------------------------------------------------------------------
