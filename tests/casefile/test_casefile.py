@@ -103,6 +103,24 @@ def test_run_solves_and_reports(tmp_path):
     assert json.loads((tmp_path / "out" / "report.json").read_text())["title"] == "Edge crack"
 
 
+def test_a_tolerance_is_read(tmp_path):
+    text = GROWTH.replace('da = "2 mm"', "tolerance = 0.1")
+    assert xc.read_case(written(tmp_path, text)).growth["tolerance"] == 0.1
+
+
+@pytest.mark.slow
+def test_a_tolerance_stands_where_da_stands(tmp_path):
+    """The file is run to one step; its report has the error of the cycles by source."""
+    text = GROWTH.replace('da = "2 mm"', "tolerance = 0.1").replace(
+        "max_steps = 3", "max_steps = 1"
+    )
+    path = written(tmp_path, text)
+    history = xc.run(path)
+    assert history.life_bar.K == 0.0  # estimated, and nothing has grown yet
+    numbers = json.loads((tmp_path / "case_results" / "report.json").read_text(encoding="utf-8"))
+    assert set(numbers["growth"]["error of cycles"]) == {"steps", "K", "contact", "unknown"}
+
+
 @pytest.mark.slow
 @pytest.mark.mission
 def test_run_grows_and_goes_on_to_the_same_result(tmp_path):

@@ -16,8 +16,8 @@ from xcrack.sif.sif import SIF
 
 _FAST = 0.5  # of the largest rate: places that count for the error of life
 _REMEDY = {
-    "steps": "The first steps weigh most, and cells allow none that are shorter: refine the mesh "
-    "at the tips (xc.refine), or let the crack grow farther.",
+    "steps": "The first step is known better once a second one is done; later ones are as short as "
+    "cells allow: refine the mesh along the way (xc.refine).",
     "K": "Give a smaller tolerance or a larger max_unknowns: the mesh was chosen for a few stages "
     "of the way only.",
     "contact": "Refine the mesh along the faces that touch (xc.refine).",

@@ -66,7 +66,8 @@ class LifeBar:
         parts = f"steps {self.steps:.2g}, K {self.K:.2g}, contact {self.contact:.2g}"
         if self.unknown > 0:
             parts += f", at rates without a bar {self.unknown:.2g}"
-        text = f"{self.life:.6g} ± {self.total:.2g} cycles ({self.relative:.1e}): {parts}; "
+        share = f" ({self.relative:.1e})" if self.life > 0 else ""
+        text = f"{self.life:.6g} ± {self.total:.2g} cycles{share}: {parts}; "
         text += f"best K at {self.best} of {self.places} places"
         return text + (f", K elsewhere: {'; '.join(self.reasons)}" if self.reasons else "")
 
