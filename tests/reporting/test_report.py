@@ -351,7 +351,7 @@ def _all(value, key):
 
 
 def test_spectrum_and_retardation_have_a_section(tmp_path):
-    """Unit, levels, model and its zones; no section for a plain cycle."""
+    """Unit, levels, model and its zones."""
     spectrum = xc.Spectrum([0.0, 1.0, *[0.0, 0.5] * 20], unit="flight")
     model = xc.wheeler(1.5, xc.plastic_zone(400.0, beta=2))
     law = xc.paris(C=1e-9, m=3.0)
@@ -367,6 +367,3 @@ def test_spectrum_and_retardation_have_a_section(tmp_path):
     assert zone["places"] == 2
     for words in ("Load history", "flights at the last step", "What overloads have left"):
         assert words in page
-    history = growth(plate(), tmp_path / "plain", max_steps=1)
-    xc.report(history, tmp_path / "plain.html")
-    assert "spectrum" not in json.loads((tmp_path / "plain.json").read_text())

@@ -13,7 +13,7 @@ from xcrack.spectra.spectrum import Spectrum, distinct
 POINTS = 65  # of a march, at which growth and cycles are known
 _SHIFTS, _FEWEST = 257, 17  # values of the reduction of K at which the law is asked
 _TABLE = 4_000_000  # rates of a march
-_MOST = 1e9  # cycles of a step, times places
+_MOST = 3e8  # cycles of a step, times places
 _LEAST = 1e-9  # of a step: a block that grows less does not grow
 _TINY = 1e-3  # as of `trail`
 _SMALLEST = 1e-300
