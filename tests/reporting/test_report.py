@@ -365,5 +365,5 @@ def test_spectrum_and_retardation_have_a_section(tmp_path):
     assert section["retardation"] == "wheeler"
     (zone,) = section["zones"]
     assert zone["places"] == 2
-    for words in ("Load history", "flights at the last step", "What overloads have left"):
+    for words in ("Load history", "repetitions at the last step", "What overloads have left"):
         assert words in page

@@ -23,13 +23,16 @@ def spectrum(source: Source) -> Section | None:
     if settings.get("cycle") != "Spectrum":
         return None
     unit = settings.get("cycle.unit", "'block'").strip("'")
-    rows: list[tuple[str, Any]] = [(f"{unit}s at the last step", last.cycles)]
+    rows: list[tuple[str, Any]] = [
+        ("one repetition", unit),
+        ("repetitions at the last step", last.cycles),
+    ]
     rows += _rows(settings, "cycle.", besides=("cycle.unit",))
     counts = [len(step.levels) for step in steps if step.levels]
     if counts:
         levels = last.levels
         rows += [("levels of K a step", f"{min(counts)} to {max(counts)}"),
-                 ("factors", f"{min(levels):.6g} to {max(levels):.6g}")]  # fmt: skip
+                 ("their factors", f"{min(levels):.6g} to {max(levels):.6g}")]  # fmt: skip
     parts: list[Any] = [table((), rows)]
     values: dict[str, Any] = {"unit": unit, "blocks": last.cycles, "levels": list(last.levels)}
     model = settings.get("retardation")
