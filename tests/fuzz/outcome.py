@@ -17,6 +17,7 @@ import xcrack as xc
 from fuzz.entry import ARITY, OWN
 from fuzz.kinds import EDGE, NONSENSE, VALID
 from fuzz.values import prepare
+from xcrack.growth.step import StepError
 
 GOOD = (
     "valid finite",
@@ -147,6 +148,8 @@ def numbers_in(result, depth=0):
         yield from (result.u, np.array(result.energy))
     elif isinstance(result, xc.SIF):
         yield from (result.x, result.frame, result.K, result.spread, result.s)
+    elif isinstance(result, StepError):  # its other parts are nan where no bar of K was asked for
+        yield from (*result.place, np.array(result.cycles))
     elif isinstance(result, xc.Mesh):
         yield from (result.points, result.volume)
     elif isinstance(result, xc.Isotropic):
