@@ -264,7 +264,9 @@ class nasgro4_threshold(WithUnits):  # noqa: N801
     ΔK_th = ΔK_1* [(1 - R)/(1 - f)]^(1 + R C+) / (1 - A0)^((1 - R) C+) for R >= 0,
     ΔK_th = ΔK_1* [(1 - R)/(1 - f)]^(1 + R C-) / (1 - A0)^(C+ - R C-) for R < 0 (Forman et al. 2005,
     DOT/FAA/AR-05/15, from memory). Its text was not at hand: what was checked is that both branches
-    meet at R = 0 and that R → 1 gives ΔK_1*, which wrong exponents would not.
+    meet at R = 0 and that R → 1 gives ΔK_1*, which wrong exponents would not. No copy was
+    found to compare with: three public programs with constants of this generation, easigrow among
+    them, put them into the form of version 3 or into one of their own.
     """
 
     dK1: float
