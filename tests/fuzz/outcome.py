@@ -133,7 +133,7 @@ def numbers_in(result, depth=0):
     if isinstance(result, np.ndarray):
         if result.dtype.names:
             for name in result.dtype.names:
-                yield result[name]
+                yield from numbers_in(result[name], depth + 1)
         elif result.dtype.kind in "fiu":
             yield result
     elif isinstance(result, float | np.floating):
@@ -154,6 +154,8 @@ def numbers_in(result, depth=0):
         yield from (result.points, result.volume)
     elif isinstance(result, xc.Isotropic):
         yield np.array([result.mu, result.lam, result.kolosov, result.E_prime])
+    elif isinstance(result, StepError):  # nan: not estimated
+        return
     elif is_dataclass(result) and type(result).__module__.startswith("xcrack"):
         for one in fields(result):
             yield from numbers_in(getattr(result, one.name), depth + 1)

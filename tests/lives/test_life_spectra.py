@@ -84,12 +84,12 @@ def test_a_threshold_of_the_run_is_that_of_the_rerating():
 def test_several_tips_under_a_spectrum():
     """Two cracks: within the printed bound of a new run, refused where the path would differ."""
     cracks = [line_crack([(0.0, y), (a, y)]) for y, a in ((-9.63, 5.0), (9.63, 4.9))]
-    history = run(problem=plate(cracks), n=4, da=0.8)
+    history = run(problem=plate(cracks, n=(24, 16)), n=3, da=0.8)
     given = {"spectrum": FLIGHT, **GIVEN}
     other = paris(1e-11, 3.1)
     again, new = (
         history.rerate(other, LAW, **given),
-        run(law=other, problem=plate(cracks), n=4, da=0.8),
+        run(law=other, problem=plate(cracks, n=(24, 16)), n=3, da=0.8),
     )
     assert 0 < again.bound < 0.02
     assert abs(again.life / new.life - 1) <= again.bound
@@ -219,7 +219,7 @@ def test_C_and_m_of_one_regression():
     scatter = Scatter(
         C=lognormal(s_C), constants={"m": normal(s_m / 3.0)}, correlation={("C", "m"): rho}
     )
-    result = life(history, LAW, scatter=scatter, samples=8_000, seed=95)
+    result = life(history, LAW, scatter=scatter, samples=4_000, seed=95)
     draw = np.random.default_rng(95)
     m = 3.0 + s_m * draw.standard_normal(400_000)
     C = 1e-11 * K_p**3.0 / K_p**m * np.exp(s_p * draw.standard_normal(len(m)))

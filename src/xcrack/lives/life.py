@@ -198,24 +198,33 @@ def life(
     drawn = scatter.draw(n, seed)
     if "a0" in drawn:
         drawn["a0"] = _checked_sizes(lead, drawn["a0"])
+    bounds = _bounds(history, rows, law, scatter, block)
     N = np.sort(lives(lead, law, drawn, n))
     alone = {
         name: _ends(lives(lead, law, {name: values}, n)) if len(drawn) > 1 else _ends(N)
         for name, values in drawn.items()
     }
-    bar = history.life_bar
+    word = unit or ("cycle" if block is None else block.spectrum.unit)
+    return Life(lock(N + history.steps[0].cycles), history.life, alone, bounds, word)
+
+
+def _bounds(
+    history: History, rows: Driving, law: Law | None, scatter: Scatter, block: Block | None
+) -> dict[str, float]:
+    """Numerical errors as shares of the life, by source."""
+    lead, bar = rows.lead, history.life_bar
     known = np.isfinite(bar.steps) and bar.life > 0
     bounds = {"steps": bar.steps / bar.life if known else _of_steps(lead)}
     if np.isfinite(bar.K) and bar.life > 0:
         bounds["K"] = (bar.K + bar.contact + bar.unknown) / bar.life
-    if law is not None and (block is not None or not history.steps[0].levels):
-        bounds.setdefault("K", _of_K(lead, law))
-        if not rows.is_one_tip or len(rows.step) > len(lead.step):
-            bounds["tips"] = _of_tips(rows, law, scatter)
-        if block is not None:
-            bounds["levels"] = _of_levels(history, lead, law, block)
-    word = unit or ("cycle" if block is None else block.spectrum.unit)
-    return Life(lock(N + history.steps[0].cycles), history.life, alone, bounds, word)
+    if law is None or (block is None and history.steps[0].levels):
+        return bounds
+    bounds.setdefault("K", _of_K(lead, law))
+    if not rows.is_one_tip or len(rows.step) > len(lead.step):
+        bounds["tips"] = _of_tips(rows, law, scatter)
+    if block is not None:
+        bounds["levels"] = _of_levels(history, lead, law, block)
+    return bounds
 
 
 def _retarded(
