@@ -322,7 +322,7 @@ ENTRIES = [
     ),
     Entry(
         "History",
-        lambda measures: scenes.history().table(measures),
+        lambda measures: scenes.history().table(measures)["N"],
         {"measures": arg(Flag(), False, True)},
     ),
     Entry("grow", _grow, GROW, cost=0.12),

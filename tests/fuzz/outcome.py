@@ -17,6 +17,7 @@ import xcrack as xc
 from fuzz.entry import ARITY, OWN
 from fuzz.kinds import EDGE, NONSENSE, VALID
 from fuzz.values import prepare
+from xcrack.growth.controller import Control
 from xcrack.growth.step import StepError
 
 GOOD = (
@@ -154,7 +155,7 @@ def numbers_in(result, depth=0):
         yield from (result.points, result.volume)
     elif isinstance(result, xc.Isotropic):
         yield np.array([result.mu, result.lam, result.kolosov, result.E_prime])
-    elif isinstance(result, StepError):  # nan: not estimated
+    elif isinstance(result, StepError | Control):  # nan: not estimated, inf: no length yet
         return
     elif is_dataclass(result) and type(result).__module__.startswith("xcrack"):
         for one in fields(result):
