@@ -91,9 +91,8 @@ with warnings.catch_warnings():
         until=through,
     )  # fmt: skip
 print(history)
-for step in history.steps:
-    for arrival in step.arrivals:
-        print(arrival)
+for arrival in history.arrivals:
+    print(arrival)
 pull = {row.name: row.force for row in history.steps[0].solutions[-1].report.resultants}
 for name, force in pull.items():
     print(f"{name:<24} force {np.round(force, 3)}")

@@ -31,7 +31,8 @@ def test_the_last_step_ends_on_the_side_with_its_cycles(monkeypatch, integrator,
     assert last.n_tips == 0
     assert len(last.sif) == 2
     assert last.sif[0][0].K.shape == (0, 2)
-    (arrival,) = last.arrivals
+    (arrival,) = history.arrivals
+    assert last.arrivals == (arrival,)
     assert (arrival.crack, arrival.tip, arrival.name) == (0, 0, "right")
     assert arrival.x == pytest.approx((60.0, 0.37), rel=1e-12)
     assert arrival.ligament == pytest.approx(60.0 - history.steps[-2].sif[0][0].x[0, 0], rel=1e-9)

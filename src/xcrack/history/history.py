@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from xcrack import markup
 from xcrack.crack.crack import Crack
 from xcrack.errors import ProblemError
+from xcrack.growth.arrival import Arrival
 from xcrack.growth.criteria import Criterion
 from xcrack.growth.joins import Join
 from xcrack.growth.step import Step
@@ -75,6 +76,11 @@ class History:
     def cracks(self) -> tuple[Crack, ...]:
         """Where the cracks have come to at the last step (`Step.corrected`)."""
         return self.steps[-1].corrected if self.steps else ()
+
+    @property
+    def arrivals(self) -> tuple[Arrival, ...]:
+        """Where and when tips and fronts came to the boundary, in all steps."""
+        return tuple(arrival for step in self.steps for arrival in step.arrivals)
 
     @property
     def solved(self) -> tuple[Step, ...]:

@@ -143,7 +143,7 @@ def growth(source: Source) -> Section | None:
         *(("join", str(join)) for join in history.joins),
         ("why it ended", history.ended),
     ]
-    rows += [("break-through", str(each)) for step in history.steps for each in step.arrivals]
+    rows += [("break-through", str(each)) for each in history.arrivals]
     if rates and ranges:
         rows += [("ΔK_eq of the run", f"{min(ranges):.6g} to {max(ranges):.6g}"),
                  ("da/dN of the run", f"{min(rates):.4g} to {max(rates):.4g}")]  # fmt: skip
