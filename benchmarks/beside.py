@@ -1,11 +1,13 @@
 """Processor time of this code beside that of another checkout, scene by scene, in turns.
 
-    python -m benchmarks.beside /path/to/other/checkout [--scenes edge hole] [--rounds 7] [--json F]
+    python -m benchmarks.beside /path/to/other/checkout [--scenes "edge 53 k" ...] [--rounds 7]
+    python -m benchmarks.beside /path/to/other/checkout --sizes [--most 120000] [--rounds 1]
 
 One process for each of the two stays alive; rounds alternate, so that transient load on
 the machine affects both. Scenes use public names that both have. Printed are medians of processor
 seconds, the ratio of each pair of rounds (median, smallest, largest), and how far K and pressures
-are apart, relative to the largest. One thread.
+are apart, relative to the largest. One thread. With `--sizes` scenes have 10 thousand to a
+million unknowns, and seconds are told by part: mesh, problem, solution, K.
 """
 
 from __future__ import annotations
@@ -49,17 +51,39 @@ def _numbers(solutions: list[Any]) -> Numbers:
     }
 
 
+class _Parts:
+    """Processor seconds of the parts of a round."""
+
+    def __init__(self) -> None:
+        self.last = time.process_time()
+        self.seconds: dict[str, float] = {}
+
+    def end(self, name: str) -> None:
+        now = time.process_time()
+        self.seconds[name], self.last = now - self.last, now
+
+    def numbers(self, solutions: list[Any]) -> Numbers:
+        numbers = _numbers(solutions)
+        self.end("K")
+        return numbers | {"parts": self.seconds}
+
+
 def edge(n: int, contact: str = "off", states: tuple[float, ...] = (1.0,)) -> Iterator[Numbers]:
     """Edge crack in 2D, order 2, from mesh to K."""
     import xcrack as xc
 
     while True:
+        parts = _Parts()
         mesh = xc.box((-1, -1), (1, 1), n)
+        parts.end("mesh")
         problem = xc.Problem(
             mesh, xc.Isotropic(210e3, 0.3, "strain"),
             [xc.line_crack([(-1.2, 0.013), (-0.1, 0.041)])], loads=_pull(2), contact=contact,
         )  # fmt: skip
-        yield _numbers(xc.solve(problem, states=list(states)))
+        parts.end("problem")
+        solutions = xc.solve(problem, states=list(states))
+        parts.end("solution")
+        yield parts.numbers(solutions)
 
 
 def growth(n: int, contact: str, first: bool = False) -> Iterator[Numbers]:
@@ -118,12 +142,17 @@ def bending(n: int) -> Iterator[Numbers]:
         ]  # fmt: skip
 
     while True:
+        parts = _Parts()
         mesh = xc.box((-1,) * 3, (1,) * 3, n)
+        parts.end("mesh")
         crack = xc.plane_crack(
             [(-1.5, -1.5, 0.03), (-0.1, -1.5, 0.03), (-0.1, 1.5, 0.03), (-1.5, 1.5, 0.03)]
         )
         problem = xc.Problem(mesh, xc.Isotropic(210e3, 0.3), [crack], loads=_pull(3))
-        yield _numbers(xc.solve(problem, states=[1.0, bend(1.0), bend(-1.0)]))
+        parts.end("problem")
+        solutions = xc.solve(problem, states=[1.0, bend(1.0), bend(-1.0)])
+        parts.end("solution")
+        yield parts.numbers(solutions)
 
 
 CLOSED = (-1.0,)
@@ -148,6 +177,20 @@ SCENES: dict[str, Callable[[], Iterator[Numbers]]] = {
     "bending 30 k": lambda: bending(20),
     "bending 104 k": lambda: bending(31),
     "bending 310 k": lambda: bending(45),
+}
+
+SIZES: dict[str, int] = {  # scenes with parts, and about how many unknowns
+    "2D 10 k": 10_000, "2D 100 k": 100_000, "2D 500 k": 500_000,
+    "3D 30 k": 30_000, "3D 100 k": 100_000, "3D 300 k": 300_000, "3D 1 M": 1_000_000,
+}  # fmt: skip
+SCENES |= {
+    "2D 10 k": lambda: edge(33),
+    "2D 100 k": lambda: edge(105),
+    "2D 500 k": lambda: edge(237),
+    "3D 30 k": lambda: bending(20),
+    "3D 100 k": lambda: bending(31),
+    "3D 300 k": lambda: bending(45),
+    "3D 1 M": lambda: bending(67),
 }
 
 
@@ -213,6 +256,10 @@ def compare(name: str, other: Path, rounds: int) -> Numbers:
         "K_apart": _apart(last[0]["K"], last[1]["K"]),
         "pressure_apart": _apart(last[0]["pressure"], last[1]["pressure"]),
         "same_sets": last[0]["closed"] == last[1]["closed"],
+        "parts": {
+            part: [median(r["parts"][part] for r in runs) for runs in results]
+            for part in new[0].get("parts", {})
+        },
     }
 
 
@@ -220,7 +267,9 @@ def main() -> None:
     """Compare scenes and print a table."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("other", nargs="?", type=Path)
-    parser.add_argument("--scenes", nargs="*", default=list(SCENES))
+    parser.add_argument("--scenes", nargs="*", default=[s for s in SCENES if s not in SIZES])
+    parser.add_argument("--sizes", action="store_true", help="scenes by size, with parts")
+    parser.add_argument("--most", type=int, default=120_000, help="unknowns of --sizes")
     parser.add_argument("--rounds", type=int, default=7)
     parser.add_argument("--json", type=Path)
     parser.add_argument("--serve", help=argparse.SUPPRESS)
@@ -228,6 +277,8 @@ def main() -> None:
     if options.serve:
         serve(options.serve)
         return
+    if options.sizes:
+        options.scenes = [name for name, size in SIZES.items() if size <= options.most]
     table: dict[str, Numbers] = {}
     print(f"{'scene':28} unknowns   seconds  other   ratio (range)      peak MB      K     p  sets")
     for name in options.scenes:
@@ -240,6 +291,9 @@ def main() -> None:
             f"{'same' if row['same_sets'] else 'other'}",
             flush=True,
         )
+        if options.sizes:
+            parts = [f"{part} {a:.3f} ({b:.3f})" for part, (a, b) in row["parts"].items()]
+            print("    " + ", ".join(parts), flush=True)
     if options.json:
         options.json.write_text(json.dumps(table, indent=1) + "\n")
 

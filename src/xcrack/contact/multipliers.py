@@ -80,7 +80,8 @@ def multipliers(
         values = _hats(values, lips.weight, lips.s, *hats)
     measure = np.asarray(values.T @ lips.weight).ravel()
     keep = measure > 1e-14 * measure.max(initial=0.0)
-    values = sp.csr_matrix(values[:, np.nonzero(keep)[0]])
+    if not keep.all():
+        values = sp.csr_matrix(values[:, np.nonzero(keep)[0]])
     centre = np.asarray(values.T @ (lips.weight[:, None] * lips.x)) / measure[keep][:, None]
     return Multipliers(c, values, measure[keep], centre)
 
@@ -137,9 +138,10 @@ def _traces(space: FunctionSpace, lips: LipPoints) -> tuple[Ints, sp.csr_matrix]
     row = np.repeat(np.arange(len(cell)), corners.shape[1])
     entry = lips.bary[:, 1].ravel()
     acts = np.abs(entry) > 1e-13
-    matrix = sp.csr_matrix((entry[acts], (row[acts], place[acts])), shape=(len(cell), len(nodes)))
-    reached = np.asarray((matrix != 0).sum(axis=0)).ravel() > 0
-    return nodes[reached], sp.csr_matrix(matrix[:, np.nonzero(reached)[0]])
+    reached = np.bincount(place[acts], minlength=len(nodes)) > 0
+    column = (np.cumsum(reached) - 1)[place[acts]]
+    shape = (len(cell), int(reached.sum()))
+    return nodes[reached], sp.csr_matrix((entry[acts], (row[acts], column)), shape=shape)
 
 
 def _supported(
@@ -210,12 +212,13 @@ def _groups(
         covered &= np.bincount(roots, mass * supported, len(nodes))[roots] < 0.5 * total[roots]
         parent[~covered] = np.nonzero(~covered)[0]
     if covered.any() and not covered.all():
-        alone, choices = np.nonzero(~covered)[0], np.nonzero(covered)[0]
-        weighted = sp.diags(weight) @ traces
-        overlap = sp.csr_matrix(weighted[:, alone].T @ traces[:, choices])
-        for k, row in zip(alone, overlap, strict=True):
-            if row.nnz:
-                parent[k] = root(int(choices[row.indices[np.argmax(row.data)]]))
+        overlap = sp.csr_matrix(_weighted(traces, weight).T @ traces)
+        for k in np.nonzero(~covered)[0].tolist():
+            row = slice(overlap.indptr[k], overlap.indptr[k + 1])
+            choices, shared = overlap.indices[row], overlap.data[row]
+            chosen = covered[choices]
+            if chosen.any():
+                parent[k] = root(int(choices[chosen][np.argmax(shared[chosen])]))
     roots = np.array([root(i) for i in range(len(nodes))])
     return np.unique(roots, return_inverse=True)[1]
 
@@ -301,14 +304,17 @@ def _hats(
     knots = _knots(knots, (float(s.min()), float(s.max())), last)
     place = np.clip(np.searchsorted(knots, s, side="right") - 1, 0, len(knots) - 2)
     t = (s - knots[place]) / (knots[place + 1] - knots[place])
-    row = np.arange(len(s))
-    return sp.csr_matrix(
-        (
-            np.concatenate([1 - t, t]),
-            (np.concatenate([row, row]), np.concatenate([place, place + 1])),
-        ),
-        shape=(len(row), len(knots)),
+    both, columns = (
+        np.stack([1 - t, t], axis=1).ravel(),
+        np.stack([place, place + 1], axis=1).ravel(),
     )
+    return sp.csr_matrix((both, columns, np.arange(0, 2 * len(s) + 1, 2)), (len(s), len(knots)))
+
+
+def _weighted(values: sp.csr_matrix, weight: Floats) -> sp.csr_matrix:
+    """Values at points times the weights of the points."""
+    entries = values.data * weight.repeat(np.diff(values.indptr))
+    return sp.csr_matrix((entries, values.indices, values.indptr), shape=values.shape)
 
 
 def gap_rows(space_of: Multipliers, lips: LipPoints, jump: sp.csr_matrix) -> sp.csr_matrix:
@@ -321,4 +327,4 @@ def gap_rows(space_of: Multipliers, lips: LipPoints, jump: sp.csr_matrix) -> sp.
     jump : sparse matrix (q, n_dof)
         Normal jump at the lip points, from `jump_matrix`.
     """
-    return sp.csr_matrix(space_of.values.T @ sp.diags(lips.weight) @ jump)
+    return sp.csr_matrix(_weighted(space_of.values, lips.weight).T @ jump)
