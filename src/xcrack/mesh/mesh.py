@@ -200,7 +200,8 @@ class Mesh:
         """Gradients of the barycentric coordinates of each cell `(m, d + 1, d)`, 1/length."""
         inverse = np.linalg.inv(self._edge_matrices())
         last = np.swapaxes(inverse, 1, 2)
-        return lock(np.concatenate([-last.sum(axis=1, keepdims=True), last], axis=1))
+        gradient = np.concatenate([-last.sum(axis=1, keepdims=True), last], axis=1)
+        return lock(np.ascontiguousarray(gradient))  # kernels compile for each memory layout
 
     @cached_property
     def cell_size(self) -> Floats:
