@@ -269,6 +269,40 @@ def test_solution_with_a_junction_from_a_file(tmp_path):
         np.testing.assert_array_equal(one.K, other.K)
 
 
+def test_error_bars_hold_at_junctions():
+    """The estimate follows the error: K + eta is nearer to the reference than K is."""
+    solution = xc.solve(pulled(perturbed(16, 3), SCENES["T"][0], contact="off"), error=True)
+    sif = xc.stress_intensity(solution, 0, error=True)
+    wrong = np.abs(np.abs(sif.best) - np.abs(K_T[:2]))
+    assert (wrong <= sif.bar).all()
+    assert wrong.max() < 0.3 * np.abs(np.abs(sif.K) - np.abs(K_T[:2])).max()
+
+
+def test_faces_that_stick_at_a_junction_are_no_crack():
+    """Round-off: pressure and shear on all faces are those of the uncracked body."""
+    stress = np.array([[-0.7, 0.25], [0.25, -1.2]])
+    shear = STEEL.E / (2 * (1 + STEEL.nu))
+    trace = np.trace(stress) * (1 - 2 * STEEL.nu) / (2 * shear)
+    strain = (stress - STEEL.nu * np.trace(stress) * np.eye(2)) / (2 * shear)
+    assert np.trace(strain) == pytest.approx(trace)
+    supports = [xc.displacement(side, lambda x: x @ strain) for side in ("left", "right")]
+    loads = [
+        xc.traction(side, tuple(stress @ n))
+        for side, n in (("top", [0, 1.0]), ("bottom", [0, -1.0]))
+    ]
+    cracks = [xc.line_crack(line) for line in through(np.array([0.07, -0.11]), 0.3, 1.1)]
+    problem = xc.Problem(
+        perturbed(10, 3), STEEL, cracks, supports, loads, contact="on", friction=5.0
+    )
+    for contact in xc.solve(problem).contact:
+        n = contact.normal
+        t = np.stack([n[:, 1], -n[:, 0]], axis=1)
+        pressure, traction = (np.einsum("qi,ij,qj->q", own, stress, n) for own in (n, t))
+        np.testing.assert_allclose(contact.pressure, -pressure, atol=1e-11)
+        np.testing.assert_allclose(np.abs(contact.shear), np.abs(traction), atol=1e-11)
+        assert np.abs(contact.slip).max() < 1e-11
+
+
 def test_an_end_close_to_a_crack_is_moved_onto_it():
     """A tenth of a cell short or beyond is an end on the crack: rounded coordinates."""
     mesh = xc.box((-1, -1), (1, 1), 20)
