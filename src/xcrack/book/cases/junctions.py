@@ -25,7 +25,7 @@ _ARMS = [
     _FORK + 0.45 * np.array([np.cos(0.6), -np.sin(0.6)]),
     _FORK + 0.42 * np.array([np.cos(0.7), np.sin(0.7)]),
 ]
-_LINES = {
+_LINES: dict[str, list[tuple[Floats, ...]]] = {
     "T": [(_LEFT, _RIGHT), (_ON, _UP)],
     "X": [(_LEFT, _RIGHT), (_ON, _UP), (_DOWN, _ON)],
     "Y": [(_ARMS[0], _FORK, _ARMS[1]), (_FORK, _ARMS[2])],
