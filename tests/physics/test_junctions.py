@@ -216,15 +216,17 @@ def drawn(seeds):
 
 @pytest.mark.filterwarnings("ignore::xcrack.XcrackWarning")
 def test_drawn_junctions():
-    assert drawn(range(7100, 7103)).max() < 0.01
+    assert drawn(range(7100, 7103)).max() < 2e-3
 
 
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::xcrack.XcrackWarning")
 def test_many_drawn_junctions():
+    """All are solved; of 128 whose tips have room the median is 1.5e-4, the largest 1.3e-3."""
     changes = drawn(range(7200, 7400))
-    assert np.median(changes) < 5e-4
-    assert np.quantile(changes, 0.95) < 5e-3
+    assert np.median(changes) < 3e-4
+    assert np.quantile(changes, 0.95) < 6e-4
+    assert changes.max() < 3e-3
 
 
 def test_pieces_of_the_body():
