@@ -333,6 +333,14 @@ def test_refused_junctions(lines, message):
         pulled(xc.box((-1, -1), (1, 1), 20), lines)
 
 
+def test_a_crack_that_ends_on_the_boundary_itself():
+    """As those of a run's last step do: it is a mouth, whatever round-off says."""
+    mesh = xc.box((-1, -1), (1, 1), 20)
+    for x in (1.0, 1.0 - 1e-12):
+        problem = xc.Problem(mesh, STEEL, [xc.Crack([(0.0, 0.01), (x, 0.01)], [(0, 1)], tips=(0,))])
+        assert problem.junctions == ()
+
+
 def test_a_crack_that_ends_on_nothing():
     """Only a crack with tips given can: line_crack makes a tip of such an end."""
     with pytest.raises(xc.GeometryError, match="neither a tip nor on another crack"):

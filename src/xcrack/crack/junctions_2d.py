@@ -15,7 +15,7 @@ from xcrack.crack.crack import Crack
 from xcrack.crack.lines import crossing_points, polyline_crack
 from xcrack.errors import GeometryError
 from xcrack.geometry.simplices import closest_on_segment
-from xcrack.mesh.locate import cells_at, contains
+from xcrack.mesh.locate import cells_at, contains, nearest_boundary
 from xcrack.mesh.mesh import Mesh
 from xcrack.mesh.sizes import leg_size
 
@@ -141,10 +141,16 @@ def junctions(cracks: tuple[Crack, ...], mesh: Mesh) -> tuple[Junction, ...]:
         if not ends:
             continue
         for end, inside in zip(ends, contains(mesh, crack.points[ends]).tolist()):
-            if inside:
+            # The last step of a run has cracks that end on the boundary itself.
+            if inside and not _on_boundary(crack.points[end], mesh):
                 result.append(_junction(c, end, cracks, mesh))
     _check_apart(result, cracks, mesh)
     return tuple(result)
+
+
+def _on_boundary(x: Floats, mesh: Mesh) -> bool:
+    gap, size = nearest_boundary(mesh, x)
+    return gap <= _SAME * size
 
 
 def _junction(c: int, end: int, cracks: tuple[Crack, ...], mesh: Mesh) -> Junction:
