@@ -37,7 +37,7 @@ def part_of_time(x: float, exponent: float) -> float:
     Examples
     --------
     >>> print(round(part_of_time(0.5, 3.0), 2), round(part_of_time(4.0, 3.0), 2))
-    0.7 0.95
+    0.73 0.93
     """
     u, weight = np.polynomial.legendre.leggauss(_POINTS)
     u = (u + 1) / 2
