@@ -82,6 +82,8 @@ def system_errors(
         For an OSError; it names the path, what the system said, and what to do.
     """
     try:
+        if "read" in what and path.is_char_device():  # some give bytes without end
+            raise error(f"{what} {_shown_path(path)}: it is a device: give the path of a file.")
         yield
     except OSError as cause:
         reason = cause.strerror or str(cause) or type(cause).__name__

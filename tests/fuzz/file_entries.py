@@ -96,7 +96,11 @@ ENTRIES = [
             "path": arg(
                 Filename(),
                 "good.npz",
-                near={k: v for k, v in paths(".npz", "").items() if "other" not in k},
+                near={
+                    k: v
+                    for k, v in paths(".npz", "").items()
+                    if "other" not in k and "full" not in k
+                },
                 words=["result"],
             ),
         },

@@ -144,7 +144,7 @@ ENTRIES = [
             "contact": arg(Word(words=("auto", "on", "off")), "auto", "on"),
             "order": arg(Choice(optional=True, values=(1, 2)), None, 1, 2),
             "numerics": arg(Of(type=xc.Numerics), xc.Numerics()),
-            "friction": arg(Number(least=0, most=1e3, also=(_each_crack,)), 0.0, 0.3, [0.3]),
+            "friction": arg(Number(least=0, most=1e3, also=(_each_crack,)), 0.0, 0.3),
         },
         cost=0.03,
     ),

@@ -9,6 +9,7 @@ import xcrack as xc
 from fuzz import scenes
 from fuzz.entry import Entry, Hook, Late, arg
 from fuzz.kinds import (
+    EDGE,
     NONSENSE,
     Called,
     Filename,
@@ -94,6 +95,13 @@ OF_SPECTRUM = {
     ),
     "tolerance": arg(Number(above=0, below=1), 0.01),
 }
+
+
+def _force(v):
+    """A force is valid, or nothing where there is a moment."""
+    verdict = EDGE if v is None else Numbers((2,)).verdict(v)
+    return verdict
+
 
 ENTRIES = [
     Entry(
@@ -208,7 +216,7 @@ ENTRIES = [
         ),
         {
             "where": arg(Word(words=("top", "left", "right")), "top", words=["facet set"]),
-            "force": arg(Numbers((2,)), (0, 1)),
+            "force": arg(Seen(rule=_force), (0, 1)),
             "moment": arg(
                 Numbers(None, optional=True, rule=lambda m: m.shape in ((), (1,))), None, 1.0
             ),

@@ -144,3 +144,8 @@ def test_laws_pass_the_public_check(ratio):
     check_law(paris(1e-11, 3, R_range=(0.5, 1.0), ratio=ratio))
     with pytest.raises(ProblemError, match="nothing can be tried"):
         check_law(paris(1e-11, 3, R_range=(0.2, 0.3), ratio=ratio))
+
+
+def test_a_wrong_range_without_ratios_is_an_error_in_words():
+    with pytest.raises(ProblemError, match="a range is not negative"):
+        paris(1e-11, 3)(np.array([[-1.0], [2.0]]), np.zeros((2, 0)))

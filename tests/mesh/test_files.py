@@ -277,3 +277,10 @@ def test_gmsh_reads_what_we_write(d, version, tmp_path):
         np.testing.assert_array_equal(np.sort(nodes) - 1, np.unique(mesh.facet_sets["left"]))
         place = xyz.reshape(-1, 3)[np.argsort(nodes), :d]
         np.testing.assert_array_equal(place, mesh.points[np.unique(mesh.facet_sets["left"])])
+
+
+@pytest.mark.skipif(not Path("/dev/zero").is_char_device(), reason="device not available")
+def test_a_device_is_not_read_without_end(tmp_path):
+    (tmp_path / "zeros.msh").symlink_to("/dev/zero")
+    with pytest.raises(XcrackError, match="it is a device: give the path of a file"):
+        read_mesh(tmp_path / "zeros.msh")

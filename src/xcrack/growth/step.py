@@ -259,7 +259,8 @@ class Step:
         for arrival in entries(self.arrivals, "Step: arrivals"):
             if not isinstance(arrival, Arrival):
                 raise ProblemError(
-                    f"Step: arrivals: {shown(arrival)} is none: those are made by grow."
+                    f"Step: arrivals: {shown(arrival)} is no Arrival: leave them out, grow makes "
+                    "them."
                 )
         object.__setattr__(self, "joins", checked_joins(self.joins, "Step: joins"))
         if not isinstance(self.error, StepError | None):

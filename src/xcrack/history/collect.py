@@ -74,6 +74,8 @@ def collect(
         iter(steps)
     except Exception as error:  # whatever an object's own __iter__ raises
         raise ProblemError(f"collect: steps = {shown(steps)}: give what grow returns.") from error
+    if isinstance(steps, str | bytes):
+        raise ProblemError(f"collect: steps = {shown(steps)} is a text: give what grow returns.")
     _check_options("collect", until, overwrite=overwrite, keep_solutions=keep_solutions)
     run = _Collection(until, keep_solutions)
     if path is None:

@@ -118,8 +118,9 @@ def range_and_ratio(
             "each range, or one for all."
         ) from error
     if (dK < 0).any() or (ratio > 1 + ROUND_OFF).any():
+        least, most = dK.min(initial=np.inf), ratio.max(initial=-np.inf)
         raise ProblemError(
-            f"{name}: dK_eq from {dK.min():.6g} and R up to {ratio.max():.6g}: a range is not "
+            f"{name}: dK_eq from {least:.6g} and R up to {most:.6g}: a range is not "
             "negative, and R = K_min / K_max is at most 1; check both, and their order."
         )
     if bounds is not None:

@@ -146,7 +146,7 @@ class with_time(WithUnits):  # noqa: N801
         dK, ratio = range_and_ratio("with_time", dK_eq, R)
         high = largest_K(dK, ratio)
         if not np.isfinite(high).all():
-            raise ProblemError("with_time: R = 1 with a range: K_max is not known.")
+            raise ProblemError("with_time: R = 1 with a range, K_max is not known: give R < 1.")
         by_cycle = np.asarray(self.law(dK_eq, R, **wanted))
         return np.asarray(by_cycle + self.period * self._mean(high, high - dK))[()]
 

@@ -192,7 +192,7 @@ def _mesh(gmsh: ModuleType, dim: int, source: str, sets: Mapping[str, Selector])
             unknown = sorted(set(asked.tolist()) - set(members))
             if unknown:
                 raise GeometryError(
-                    f"sets[{name!r}]: {source} has no faces {unknown}; it has {members}."
+                    f"sets[{name!r}]: {source} has no faces {unknown}: give some of {members}."
                 )
             members = asked.tolist()
         if not members:

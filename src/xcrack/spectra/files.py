@@ -68,7 +68,9 @@ def read_spectrum(
             )
         table.append(values)
     if not table:
-        raise ProblemError(f"{file}: there are no numbers in it.")
+        raise ProblemError(
+            f"{file}: there are no numbers in it: give a file with a level in each line."
+        )
     data = np.array(table)
     if rows:
         if data.shape[1] != 3:
