@@ -99,7 +99,7 @@ def test_what_is_no_body_says_so(tmp_path: Path) -> None:
         xc.mesh_step(tmp_path / "none.step", size=1.0)
     for sets, says in [
         ({"far": lambda x: x[:, 0] > 99}, r"sets\['far'\] selects none of the 7 faces"),
-        ({"far": [99]}, r"no faces \[99\]; it has \[1, 2"),
+        ({"far": [99]}, r"no faces \[99\]: give some of \[1, 2"),
         ({"far": lambda _x: True}, "one bool for each"),
         ([1], "dict of names and selectors"),
     ]:
