@@ -18,6 +18,8 @@ _WANTED: dict[str, dict[str, tuple[float, ...]]] = {
     "penny": {"K_I": (3e-2, 1e-2, 3e-3)},
     "penny_closed": {"K_II, K_III": (3e-2,)},
     "cylinder": {"K_I": (1e-2, 6e-3)},
+    "rubbing": {"K_II": (1e-2, 1e-3, 1e-4)},
+    "unloading": {"K_II": (1e-2, 1e-3, 1e-4)},
 }
 _OLD_KINDS = {"opponent": "baseline"}  # words of records that were measured before
 

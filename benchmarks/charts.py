@@ -19,6 +19,8 @@ _TITLES = {
     "penny": "Penny under tension",
     "penny_closed": "Penny, closed and sheared",
     "cylinder": "Notched bar bent across its crack (mesh not timed)",
+    "rubbing": "Closed inclined crack that slips, friction 0.3",
+    "unloading": "The crack with friction after its shear is taken off",
 }
 _ERRORS = {
     "tip": "end of the tip, in advances",

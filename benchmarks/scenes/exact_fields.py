@@ -36,6 +36,38 @@ def edge_fields(K: tuple[float, float], pressure: float = 0.0) -> tuple[Field, F
     return (lambda x: both(x)[0]), (lambda x: _tensor(both(x)[1]))
 
 
+def sliding(
+    effective: float, tau: float, p: float, middle: tuple[float, float], angle: float
+) -> Field:
+    """Displacement around a crack of half length 1 that has slipped with friction.
+
+    The slip is Griffith's under the effective shear; the rest of the shear is locked.
+
+    Parameters
+    ----------
+    effective, tau, p : float
+        Shear that moves the faces, remote shear and pressure, in the frame of the crack.
+    middle : (float, float)
+        Of the crack.
+    angle : float, radians
+        Of the crack.
+
+    Returns
+    -------
+    callable (n, 2) -> (n, 2)
+    """
+    cos, sin = np.cos(angle), np.sin(angle)
+    rows = np.array([[cos, sin], [-sin, cos]])
+
+    def displacement(x: Floats) -> Floats:
+        local = (x - middle) @ rows.T
+        u = fields_2d.griffith(local[:, 0], local[:, 1], 1.0, E, NU, 0.0, 0.0, effective)[0]
+        v = uniform_stress(local[:, 0], local[:, 1], 0.0, -p, tau - effective, E, NU)[0]
+        return np.asarray((u + v) @ rows)
+
+    return displacement
+
+
 def partial_closure(s_m: float, s_b: float = 1.0) -> tuple[Field, float, float]:
     """Displacement, K_I at the right tip and end of contact of a crack [-1, 1] partly closed.
 

@@ -3,12 +3,13 @@
 from collections.abc import Callable
 
 from benchmarks.runs import Case
-from benchmarks.suites import bodies, growth, penny, plane
+from benchmarks.suites import bodies, friction, growth, penny, plane
 
 _SUITES: dict[str, Callable[[bool], list[Case]]] = {
     "edge": plane.edge, "half_closed": plane.half_closed, "closed": plane.closed,
     "hole": bodies.hole, "growth": growth.growth, "life": growth.life, "penny": penny.penny,
     "penny_closed": penny.penny_closed, "cylinder": bodies.cylinder,
+    "rubbing": friction.rubbing, "unloading": friction.unloading,
 }  # fmt: skip
 ALL = tuple(_SUITES)
 

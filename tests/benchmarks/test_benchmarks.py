@@ -16,9 +16,10 @@ import pytest
 from benchmarks import __main__, charts, pareto, runs
 from benchmarks.baselines import conforming_2d, conforming_growth
 from benchmarks.runs import Outcome
-from benchmarks.scenes import bodies, exact_fields, growth, material
+from benchmarks.scenes import bodies, exact_fields, friction, growth, material
 from benchmarks.suites import cases
 from support import scenes_2d as scenes
+from support import scenes_friction
 from xcrack.verification import holes, plates
 from xcrack.xfem.williams import mode_matrix, tip_values, unit_gradients
 
@@ -84,6 +85,18 @@ def test_field_of_the_hole_is_that_of_the_package():
     assert traction == pytest.approx(-pressure[:, None] * across, abs=1e-12)
 
 
+def test_field_of_the_crack_that_slips_is_that_of_the_package():
+    """Round-off; what is locked after the load is gone is what sliding backwards leaves."""
+    x = np.random.default_rng(40961).uniform(-2, 2, (40, 2))
+    path = (friction.LOADED, friction.UNLOADED)
+    locked = scenes_friction.effective_shear([tau for tau, _ in path], [1.0, 1.0], 0.3)
+    assert locked == pytest.approx([effective for _, effective in path])
+    for tau, effective in path:
+        wanted = scenes.turned(scenes_friction.sliding(effective, tau, 1.0), (0.05, -0.07), 0.31)
+        field = exact_fields.sliding(effective, tau, 1.0, (0.05, -0.07), 0.31)
+        assert field(x) == pytest.approx(wanted(x)[0], abs=1e-12)
+
+
 def busy(seconds):
     """Use the processor."""
     end = process_time() + seconds
@@ -127,6 +140,8 @@ def first(scene, series="default"):
     [
         ("edge", {"K": 1.5e-3, "energy": 0.04}),
         ("half_closed", {"K_I": 2e-3, "K_I, closed tip": 0.05, "pressure": 0.2}),
+        ("rubbing", {"K_II": 8e-4, "pressure": 1.5e-3}),
+        ("unloading", {"K_II": 8e-4, "pressure": 1e-3}),
         ("penny_closed", {"K_II, K_III": 0.025, "K_I": 0.2}),
         pytest.param("hole", {"pressure": 0.01, "energy": 0.02}, marks=pytest.mark.gmsh),
         ("growth", {"tip": 0.03, "path": 0.02}),
