@@ -243,12 +243,13 @@ class _Collection:
             try:
                 ended = self._take(steps)
             except KeyboardInterrupt:
-                if not self.taken:
-                    raise
-                ended = f"interrupted after step {self.taken[-1].index}"
+                ended = self._interrupted()
             except Exception as error:
-                self._attach(error)
-                raise
+                # Ctrl-C within a compiled kernel is the cause of a SystemError.
+                if not _is_interrupt(error):
+                    self._attach(error)
+                    raise
+                ended = self._interrupted()
         history = self._history(ended)
         if self.store is not None:
             try:
@@ -287,6 +288,11 @@ class _Collection:
         enough = called(self.until, f"until, after step {step.index}", step)
         return flag(enough, "collect: what until returned")
 
+    def _interrupted(self) -> str:
+        if not self.taken:
+            raise KeyboardInterrupt
+        return f"interrupted after step {self.taken[-1].index}"
+
     def _stopped(self) -> str:
         return f"until was true at step {self.taken[-1].index}"
 
@@ -303,6 +309,13 @@ class _Collection:
     def _history(self, ended: str) -> History:
         folder = None if self.store is None else self.store.folder
         return History(tuple(self.taken), ended, folder, self.mesh)
+
+
+def _is_interrupt(error: BaseException) -> bool:
+    if isinstance(error, KeyboardInterrupt):
+        return True
+    before = error.__cause__ or error.__context__
+    return isinstance(error, SystemError) and before is not None and _is_interrupt(before)
 
 
 def _as_begun(run: Run, header: Header, folder: Path) -> Run:
