@@ -1,5 +1,6 @@
 """Small helpers for read-only arrays, ragged rows and places in messages."""
 
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -39,6 +40,15 @@ def fits(shape: tuple[int, ...], wanted: Shape | None) -> bool:
 def at(x: ArrayLike) -> list[float]:
     """A place for a message: coordinates with six digits."""
     return list((np.round(np.asarray(x, dtype=float), 6) + 0.0).tolist())  # no -0.0
+
+
+def coordinates(x: Iterable[float]) -> str:
+    """A place as text: its coordinates with six digits, in brackets.
+
+    >>> coordinates((0.5, 2.0))
+    '(0.5, 2)'
+    """
+    return "(" + ", ".join(f"{v:.6g}" for v in x) + ")"
 
 
 def ranges(counts: Ints) -> tuple[Ints, Ints]:

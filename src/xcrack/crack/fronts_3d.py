@@ -37,6 +37,11 @@ class Front:
     number: Ints
 
 
+def closed_fronts(crack: Crack) -> list[bool]:
+    """Of each front whether it is closed."""
+    return [bool(front[0] == front[-1]) for front in crack.fronts or ()]
+
+
 def front_frames(crack: Crack) -> list[Front]:
     """Vertices, frames and arc lengths of the fronts of a placed 3D crack.
 

@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.spatial import cKDTree
 
-from xcrack.arrays import Floats, at
+from xcrack.arrays import Floats, at, coordinates
 from xcrack.crack.crack import Crack
 from xcrack.crack.junctions_2d import Junction, junctions
 from xcrack.crack.lines import crossing_points, touching_points
@@ -183,11 +183,11 @@ def check_lines(cracks: tuple[Crack, ...], mesh: Mesh) -> None:
             crossing = crossing_points(cracks[j].points, crack.points)
             crossing = _elsewhere(crossing, i, j, meeting, mesh)
             if len(crossing):
-                x = ", ".join(f"{v:.6g}" for v in crossing[0])
+                x = coordinates(crossing[0])
                 raise GeometryError(
                     f"cracks {j} and {i} cross near {at(crossing[0])}: give crack {i} as two "
-                    f"cracks that both end there on crack {j}, line_crack([..., ({x})]) and "
-                    f"line_crack([({x}), ...]); or end it a few cells before."
+                    f"cracks that both end there on crack {j}, line_crack([..., {x}]) and "
+                    f"line_crack([{x}, ...]); or end it a few cells before."
                 )
     _check_tips(cracks, mesh)
     for i, crack in enumerate(cracks):

@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+from xcrack.arrays import coordinates
+
 
 @dataclass(frozen=True)
 class Arrival:
@@ -31,10 +33,9 @@ class Arrival:
     cycles: float
 
     def __str__(self) -> str:
-        place = ", ".join(f"{v:.6g}" for v in self.x)
         return (
-            f"crack {self.crack} reached {self.name!r} at ({place}), N = {self.cycles:.6g} (the "
-            f"last {self.ligament:.4g} at predicted rates)"
+            f"crack {self.crack} reached {self.name!r} at {coordinates(self.x)}, "
+            f"N = {self.cycles:.6g} (the last {self.ligament:.4g} at predicted rates)"
         )
 
 

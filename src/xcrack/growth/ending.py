@@ -4,11 +4,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from xcrack.arrays import Floats
+from xcrack.arrays import coordinates
 from xcrack.growth.advance import Advance
 from xcrack.growth.arrival import Arrival
 from xcrack.growth.criteria import clipped, equivalent_K
-from xcrack.growth.follow import following
+from xcrack.growth.follow import following, place_name
 from xcrack.growth.joins import Join
 from xcrack.growth.ligaments import yielded
 from xcrack.growth.options import Run
@@ -34,14 +34,14 @@ def end_at(run: Run, step: Step) -> str:
         for j in np.nonzero(np.isinf(rate))[0].tolist():
             return (
                 f"K_c reached: the law returned da/dN = inf for dK_eq = {step.dK_eq[c][j]:.6g}, "
-                f"R = {step.R[c][j]:.6g} at {place_name(run, step, c, j)}"
+                f"R = {step.R[c][j]:.6g} at {place_name(run.problem.mesh, step, c, j)}"
             )
     if run.K_c is not None:
         for c in range(len(step.cracks)):
             K = clipped(np.stack([state[c].K for state in step.sif]))
             K_eq = equivalent_K(K, step.angle[c], run.problem.material.nu).max(axis=0)
             for j in np.nonzero(K_eq >= run.K_c)[0].tolist():
-                place = place_name(run, step, c, j)
+                place = place_name(run.problem.mesh, step, c, j)
                 return f"K_c reached: K_eq = {K_eq[j]:.6g} >= {run.K_c:.6g} at {place}"
     full = yielded(run, step)
     if full:
@@ -81,17 +81,18 @@ def falls_to_zero(run: Run, step: Step, plan: Advance) -> str:
         what += ", or retardation all but stops it,"
     return (
         f"rate is zero: {what} within a tenth of a cell at every tip, as of "
-        f"{place_name(run, step, *plan.tip)}"
+        f"{place_name(run.problem.mesh, step, *plan.tip)}"
     )
 
 
 def too_short(run: Run, step: Step, plan: Advance) -> str:
     """Why a run ends whose advance is below a tenth of a cell."""
     remedy = "cycles" if run.da is None else "da"
+    place = place_name(run.problem.mesh, step, *plan.tip)
     return (
-        f"the advance {plan.largest:.4g} at {place_name(run, step, *plan.tip)} is below a tenth of "
-        f"the cell there (cell size {plan.size:.4g}): the mesh cannot see it. Take a larger "
-        f"{remedy} or a finer mesh around the tip."
+        f"the advance {plan.largest:.4g} at {place} is below a tenth of the cell there (cell size "
+        f"{plan.size:.4g}): the mesh cannot see it. Take a larger {remedy} or a finer mesh around "
+        "the tip."
     )
 
 
@@ -104,9 +105,10 @@ def short_kink(run: Run, step: Step, plan: Advance) -> str:
     extent = float(cell_extents(run.problem.mesh, middle, ahead)[0])
     if da >= extent or abs(angle) <= _TURN:
         return ""
+    place = place_name(run.problem.mesh, step, c, j)
     return (
-        f"the advance {da:.4g} at {place_name(run, step, c, j)} is below one cell along the path "
-        f"({extent:.4g}) and turns by {np.degrees(angle):.3g} degrees: K of the next step feels "
+        f"the advance {da:.4g} at {place} is below one cell along the path ({extent:.4g}) and "
+        f"turns by {np.degrees(angle):.3g} degrees: K of the next step feels "
         "the kink through one cell only. Take a larger da or a finer mesh around the tip."
     )
 
@@ -135,7 +137,7 @@ def cut_off(step: Step, problem: Problem, joins: Sequence[Join]) -> str:
     if n < 2 or n <= _pieces_before(step):
         return ""
     k = int(np.argmin(share))
-    x = _at(space.node_points[piece == k].mean(axis=0))
+    x = coordinates(space.node_points[piece == k].mean(axis=0))
     words = "; ".join(map(str, joins))
     return f"{words}: the piece around {x}, {100 * share[k]:.3g} % of the body, is cut off"
 
@@ -144,23 +146,12 @@ def _pieces_before(step: Step) -> int:
     return pieces(step.solutions[0].space)[1] if step.solutions else 1
 
 
-def _at(x: Floats) -> str:
-    return "(" + ", ".join(f"{v:.6g}" for v in x) + ")"
-
-
-def place_name(run: Run, step: Step, c: int, j: int) -> str:
-    """Number and coordinates of a tip, or of a place along a front, for a message."""
-    x = ", ".join(f"{v:.6g}" for v in step.sif[0][c].x[j])
-    return f"crack {c}, {following(run.problem.mesh).PLACE} {j} at ({x})"
-
-
 __all__ = [
     "cut_off",
     "end_at",
     "falls_to_zero",
     "joins_of",
     "left_the_body",
-    "place_name",
     "short_kink",
     "too_short",
 ]

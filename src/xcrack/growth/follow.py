@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import Protocol
 
-from xcrack.arrays import Floats
+from xcrack.arrays import Floats, coordinates
 from xcrack.crack.crack import Crack
 from xcrack.growth import follow_2d, follow_3d
 from xcrack.growth.advance import PerCrack
@@ -23,7 +23,7 @@ class Following(Protocol):
     def crack_size(self, crack: Crack, mesh: Mesh) -> float:
         """Size of a crack in the body, length."""
 
-    def advanced(self, crack: Crack, sif: SIF, angle: Floats, da: Floats, mesh: Mesh) -> Crack:
+    def advanced(self, crack: Crack, places: SIF, angle: Floats, da: Floats, mesh: Mesh) -> Crack:
         """A crack after the advance `da` of its places in the directions `angle`."""
 
     def met(self, cracks: list[Crack], da: PerCrack, mesh: Mesh) -> list[Crack]:
@@ -69,6 +69,11 @@ class Following(Protocol):
 def following(mesh: Mesh) -> Following:
     """How the cracks in a mesh are followed."""
     return _TWINS[mesh.dim]
+
+
+def place_name(mesh: Mesh, step: Step, c: int, j: int) -> str:
+    """Name of a tip, or of a place along a front, of crack c in a message."""
+    return f"crack {c}, {following(mesh).PLACE} {j} at {coordinates(step.sif[0][c].x[j])}"
 
 
 _TWINS: dict[int, Following] = {2: follow_2d, 3: follow_3d}

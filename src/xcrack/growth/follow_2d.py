@@ -31,9 +31,9 @@ def crack_size(crack: Crack, mesh: Mesh) -> float:
     return length_inside(crack, mesh)
 
 
-def advanced(crack: Crack, sif: SIF, angle: Floats, da: Floats, mesh: Mesh) -> Crack:
+def advanced(crack: Crack, places: SIF, angle: Floats, da: Floats, mesh: Mesh) -> Crack:
     """A crack after the advance of its tips."""
-    del sif, mesh
+    del places, mesh
     return advance(crack, angle, da)
 
 

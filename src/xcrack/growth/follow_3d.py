@@ -7,6 +7,7 @@ import numpy as np
 from xcrack.arrays import Floats, Ints
 from xcrack.crack.advance_3d import advance_fronts
 from xcrack.crack.crack import Crack
+from xcrack.crack.fronts_3d import closed_fronts
 from xcrack.crack.measures import facet_names
 from xcrack.crack.measures_3d import front_ends
 from xcrack.crack.size_3d import surface_size
@@ -14,6 +15,7 @@ from xcrack.geometry.distances import front_distance, signed_in
 from xcrack.growth.advance import PerCrack
 from xcrack.growth.arrival import Arriving
 from xcrack.growth.cycles_3d import elapsed_3d
+from xcrack.growth.front_trail import Places
 from xcrack.growth.step import Step, memory_of, moved_places
 from xcrack.mesh.body import Body
 from xcrack.mesh.locate import cell_sizes
@@ -35,12 +37,12 @@ def crack_size(crack: Crack, mesh: Mesh) -> float:
     return surface_size(crack, mesh)
 
 
-def advanced(crack: Crack, sif: SIF, angle: Floats, da: Floats, mesh: Mesh) -> Crack:
-    """A crack after the advance of its fronts."""
-    if not len(sif.s):
+def advanced(crack: Crack, places: SIF | Places, angle: Floats, da: Floats, mesh: Mesh) -> Crack:
+    """A crack after the advance of its fronts by `da` at places along them."""
+    if not len(places.s):
         return crack
-    size = _SPACING * float(cell_sizes(mesh, sif.x).mean())
-    return advance_fronts(crack, sif.s, sif.front, angle, da, size)
+    size = _SPACING * float(cell_sizes(mesh, places.x).mean())
+    return advance_fronts(crack, places.s, places.front, angle, da, size)
 
 
 def met(cracks: list[Crack], da: PerCrack, mesh: Mesh) -> list[Crack]:
@@ -156,7 +158,7 @@ def followed(
         old, new, moved = last.sif[0][c], sif[c], moved_places(last, c)
         size = cell_sizes(mesh, new.x).mean() if len(new.x) else 0.0
         reach = _REACH * float(size)
-        new_closed, old_closed = _closed(cracks[c]), _closed(last.cracks[c])
+        new_closed, old_closed = closed_fronts(cracks[c]), closed_fronts(last.cracks[c])
         after.append(carried(new.x, new.front, new_closed, law_rate[c], moved, reach))
         waits = carried(moved, old.front, old_closed, before.pending[c], new.x, reach)
         pending.append(np.nan_to_num(waits))
@@ -211,10 +213,6 @@ def carried(
         nearer = r <= best
         result[nearer], best[nearer] = value[nearer], r[nearer]
     return result
-
-
-def _closed(crack: Crack) -> list[bool]:
-    return [bool(front[0] == front[-1]) for front in crack.fronts or ()]
 
 
 __all__ = [

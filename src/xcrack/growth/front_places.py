@@ -39,11 +39,6 @@ def moved_by(part: Places, angle: Floats, way: Floats) -> Floats:
     return way[:, None] * (np.cos(angle)[:, None] * t + np.sin(angle)[:, None] * n)
 
 
-def closed_fronts(crack: Crack) -> list[bool]:
-    """Of each front whether it is closed."""
-    return [bool(front[0] == front[-1]) for front in crack.fronts or ()]
-
-
 def front_lengths(crack: Crack) -> Floats:
     """Length of each front, length."""
     fronts = [crack.points[front] for front in crack.fronts or ()]
@@ -58,4 +53,4 @@ def values_at(part: Places, closed: Bools, values: Floats, x: Floats, mesh: Mesh
     return carried(part.x, part.front, closed.tolist(), values, x, reach)
 
 
-__all__ = ["REACH", "Later", "closed_fronts", "front_lengths", "moved_by", "values_at"]
+__all__ = ["REACH", "Later", "front_lengths", "moved_by", "values_at"]

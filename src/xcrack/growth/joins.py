@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from xcrack.arrays import coordinates
 from xcrack.errors import ProblemError
 from xcrack.inputs import entries, number, numbers, shown, whole
 
@@ -48,9 +49,9 @@ class Join:
         object.__setattr__(self, "cracks", (first, second))
 
     def __str__(self) -> str:
-        x = ", ".join(f"{v:.6g}" for v in self.point)
         first, second = self.cracks
-        return f"cracks {first} and {second} join at ({x}), N = {self.N:.6g}"
+        place = coordinates(self.point)
+        return f"cracks {first} and {second} join at {place}, N = {self.N:.6g}"
 
 
 def checked_joins(given: Sequence[Join], what: str) -> tuple[Join, ...]:

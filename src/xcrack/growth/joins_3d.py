@@ -9,6 +9,7 @@ from scipy.special import exprel
 
 from xcrack.arrays import Floats, at
 from xcrack.crack.crack import Crack
+from xcrack.crack.fronts_3d import closed_fronts
 from xcrack.crack.merge_3d import OFFSET, Gap, gap_between, merged, turned
 from xcrack.crack.placing import placed
 from xcrack.errors import GeometryError
@@ -249,9 +250,8 @@ def _errors(last: Step, x: Floats, mesh: Mesh) -> Floats:
         old = last.sif[0][c]
         if own is None or not len(old.x):
             continue
-        closed = [bool(front[0] == front[-1]) for front in crack.fronts or ()]
         reach = _REACH * float(cell_sizes(mesh, old.x).mean())
-        near = carried(old.x, old.front, closed, own, x, reach)
+        near = carried(old.x, old.front, closed_fronts(crack), own, x, reach)
         result = np.maximum(result, np.nan_to_num(near))
     return result
 

@@ -9,6 +9,7 @@ import numpy as np
 from xcrack.arrays import Floats
 from xcrack.crack.lines import crossing_points
 from xcrack.growth.criteria import clipped, equivalent_K
+from xcrack.growth.follow import place_name
 from xcrack.growth.follow_2d import exit_ahead
 from xcrack.growth.options import Run
 from xcrack.growth.step import Step, directions
@@ -83,12 +84,12 @@ def yielded(run: Run, step: Step) -> str:
     if not full or max(full) < 1:
         return ""
     one = known[int(np.argmax(full))]
-    first = f"of {_named(step, one.tip)}, {size(one.tip):.4g}"
+    first = f"of {place_name(run.problem.mesh, step, *one.tip)}, {size(one.tip):.4g}"
     if one.other is None:
         what = f"the plastic zone {first}, fills the {one.length:.4g} to {one.name}"
     else:
         what = (
-            f"the plastic zones {first}, and of {_named(step, one.other)}, "
+            f"the plastic zones {first}, and of {place_name(run.problem.mesh, step, *one.other)}, "
             f"{size(one.other):.4g}, fill the {one.length:.4g} between them"
         )
     return f"ligament yield: {what}"
@@ -99,12 +100,6 @@ def _zones(link_up: Callable[..., Any], run: Run, step: Step, c: int) -> Floats:
     K_eq = equivalent_K(K, step.angle[c], run.problem.material.nu).max(axis=0, initial=0.0)
     zone = called(link_up, f"link_up at step {step.index}", K_eq)
     return numbers(zone, "what link_up returned", K_eq.shape)
-
-
-def _named(step: Step, place: _Place) -> str:
-    c, j = place
-    x = ", ".join(f"{v:.6g}" for v in step.sif[0][c].x[j])
-    return f"crack {c}, tip {j} at ({x})"
 
 
 __all__ = ["Ligament", "ligaments", "yielded"]

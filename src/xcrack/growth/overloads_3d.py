@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from xcrack.arrays import Floats
+from xcrack.crack.fronts_3d import closed_fronts
 from xcrack.growth.advance import PerCrack
 from xcrack.growth.evaluation import Evaluation
 from xcrack.growth.follow_3d import carried
@@ -134,7 +135,7 @@ def _kinds(part: Places) -> Kinds:
 
 def _near(seen: Evaluation, c: int, kinds: Kinds, x: Floats, lost: Kinds | None = None) -> Kinds:
     """Cycles of a block at some places, linear between those that were solved."""
-    sif, closed = seen.sif[0][c], _closed(seen, c)
+    sif, closed = seen.sif[0][c], closed_fronts(seen.cracks[c])
     if not len(sif.x):
         return kinds if lost is None else lost
     p = kinds.dK.shape[2]
@@ -142,10 +143,6 @@ def _near(seen: Evaluation, c: int, kinds: Kinds, x: Floats, lost: Kinds | None 
     near = carried(sif.x, sif.front, closed, values, x, np.inf)
     a = np.full((1, len(x)), float(kinds.a.flat[0]))
     return Kinds(near[None, :, :p], near[None, :, p:], a)
-
-
-def _closed(seen: Evaluation, c: int) -> list[bool]:
-    return [bool(front[0] == front[-1]) for front in seen.cracks[c].fronts or ()]
 
 
 def _marched(

@@ -10,9 +10,8 @@ from dataclasses import replace
 import numpy as np
 
 from xcrack.arrays import Bools, Floats
-from xcrack.crack.advance_3d import advance_fronts
 from xcrack.crack.crack import Crack
-from xcrack.crack.fronts_3d import front_frames
+from xcrack.crack.fronts_3d import closed_fronts, front_frames
 from xcrack.crack.placing import placed
 from xcrack.errors import GeometryError, XcrackError
 from xcrack.growth import follow_3d
@@ -28,7 +27,6 @@ from xcrack.growth.front_filter import Response, corrected, predicted, response,
 from xcrack.growth.front_places import (
     REACH,
     Later,
-    closed_fronts,
     front_lengths,
     moved_by,
     values_at,
@@ -45,9 +43,6 @@ from xcrack.growth.overloads_3d import (
 )
 from xcrack.growth.step import Step, StepError, memory_of
 from xcrack.mesh.locate import cell_sizes, contains
-from xcrack.mesh.mesh import Mesh
-
-_SPACING = 0.5  # of a cell, between the points of a new front
 
 
 def begun(run: Run, seen: Evaluation) -> Settled:
@@ -142,7 +137,7 @@ def advanced(run: Run, step: Step, share: float = 1.0) -> list[Crack]:
     plan = _plan(run, trail)
     ahead = _ahead(trail, replace(plan, da=tuple(share * da for da in plan.da)))
     return [
-        _advanced(crack, part, part.angle, way, run.problem.mesh)
+        follow_3d.advanced(crack, part, part.angle, way, run.problem.mesh)
         for crack, part, way in zip(step.corrected, trail.parts, ahead)
     ]
 
@@ -240,13 +235,6 @@ def _ahead(trail: FrontTrail, plan: Advance) -> PerCrack:
     return tuple(ways)
 
 
-def _advanced(crack: Crack, part: Places, angle: Floats, way: Floats, mesh: Mesh) -> Crack:
-    if not len(part.s):
-        return crack
-    size = _SPACING * float(cell_sizes(mesh, part.x).mean())
-    return advance_fronts(crack, part.s, part.front, angle, way, size)
-
-
 def _again(
     run: Run,
     trail: FrontTrail,
@@ -277,7 +265,9 @@ def _again(
     still = np.hypot(along, across) == 0
     angle = np.where(still, part.angle, np.arctan2(across, along))
     try:
-        again = placed(_advanced(crack, part, angle, np.where(goes, wanted, 0.0), mesh), mesh)
+        again = placed(
+            follow_3d.advanced(crack, part, angle, np.where(goes, wanted, 0.0), mesh), mesh
+        )
     except GeometryError:
         return None
     if closed_fronts(again) != closed_fronts(solved):

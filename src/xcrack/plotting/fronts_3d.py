@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from xcrack.arrays import Bools, Floats
-from xcrack.crack.fronts_3d import is_closed
+from xcrack.crack.fronts_3d import closed_fronts, is_closed
 from xcrack.crack.measures_3d import front_ends
 from xcrack.errors import ProblemError
 from xcrack.growth.lineage import lineage
@@ -296,7 +296,7 @@ def step_fronts(step: Step, crack: int) -> list[FrontLine]:
     list of FrontLine
     """
     body = step.cracks[crack]
-    closed = [bool(front[0] == front[-1]) for front in body.fronts or ()]
+    closed = closed_fronts(body)
     lines = []
     evaluated = step.sif[0][crack] if step.sif else None
     if evaluated is not None and len(evaluated.x):

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from xcrack.analysis.solution import Solution
+from xcrack.arrays import coordinates
 from xcrack.contact.result import Contact
 from xcrack.markup import Markup, element, joined, table
 from xcrack.reporting.section import Section
@@ -53,7 +54,7 @@ def _row(sif: SIF, mine: Any, dim: int) -> tuple[tuple[str, ...], tuple[Any, ...
 def _at_tip(sif: SIF, mine: Any, quality: Any) -> tuple[tuple[str, ...], tuple[Any, ...]]:
     K, closed = sif.K[mine][0], bool(sif.closed[mine].any())
     best, bar = sif.best[mine][0], sif.bar[mine][0]
-    place = "(" + ", ".join(f"{v:.6g}" for v in sif.x[mine][0]) + ")"
+    place = coordinates(sif.x[mine][0])
     head = ("place", "K_I", "K_II", "T", "best K_I", "± K_I", "best K_II", "± K_II", "spread",
             "domain", "closed")  # fmt: skip
     bars = (best[0], bar[0], best[1], bar[1])

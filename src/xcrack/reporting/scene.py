@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from xcrack.analysis.solution import Solution
+from xcrack.arrays import coordinates
 from xcrack.crack.measures import Measures, measures
 from xcrack.history.versions import versions
 from xcrack.markup import Markup, element, joined, listed, table
@@ -90,8 +91,7 @@ def _condition(role: str, condition: Any) -> tuple[str, str, str, str]:
 
 
 def _vector(values: Any) -> str:
-    numbers = np.atleast_1d(np.asarray(values, dtype=float))
-    return "(" + ", ".join(f"{v:.6g}" for v in numbers) + ")"
+    return coordinates(np.atleast_1d(np.asarray(values, dtype=float)))
 
 
 def _value(value: Any) -> str:
