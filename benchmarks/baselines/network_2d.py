@@ -2,8 +2,8 @@
 
 Quadratic triangles with quarter points at the tips; nodes on cracks are split into as many as the
 cracks part the triangles round them into. Closed cracks get hats of normal pressure along each
-piece and the exact solution of the small contact problem. References of tests/physics/
-test_junctions.py.
+piece and the exact solution of the small contact problem. References of the
+book's junctions.
 
     python -m benchmarks.baselines.network_2d
 """
@@ -18,6 +18,7 @@ from scipy.sparse.linalg import splu
 from benchmarks.baselines.conforming_2d import Grading, interaction, stiffness, traction_vector
 from benchmarks.scenes.material import E_PRIME, KOLOSOV, MU
 from xcrack.arrays import Floats, Ints
+from xcrack.book.cases.junctions import LINES, OPEN, PRESSED
 from xcrack.mesh.gmsh_session import session
 from xcrack.xfem.williams import unit_gradients
 
@@ -236,16 +237,6 @@ def _face_terms(
     return 0.5 * E_PRIME * total
 
 
-OPEN = np.array([[0.8, 0.15], [0.15, 1.0]])
-PRESSED = np.array([[-0.5, 0.6], [0.6, -1.0]])
-A, B = np.array([-0.5, -0.1]), np.array([0.45, 0.05])
-X = A + 0.55 * (B - A)
-UP, DOWN = X + np.array([0.12, 0.5]), X - np.array([0.1, 0.4])
-FORK = np.array([0.013, 0.027])
-Y = [np.array([-0.52, -0.06]), FORK + 0.45 * np.array([np.cos(0.6), -np.sin(0.6)]),
-     FORK + 0.42 * np.array([np.cos(0.7), np.sin(0.7)])]  # fmt: skip
-
-
 def star(centre: Floats, tips: list[Floats], stress: Floats) -> Network:
     """Straight arms from one point."""
     ends = np.array(tips)
@@ -253,10 +244,13 @@ def star(centre: Floats, tips: list[Floats], stress: Floats) -> Network:
     return Network(pieces, ends, ends - centre, stress)
 
 
+(A, B), (X, UP) = LINES["T"]
+DOWN = LINES["X"][2][0]
+(LEFT, FORK, RIGHT), (_, ABOVE) = LINES["Y"]
 SCENES = {
     "T": (star(X, [A, B, UP], OPEN), False),
     "X": (star(X, [A, B, UP, DOWN], OPEN), False),
-    "Y": (star(FORK, Y, OPEN), False),
+    "Y": (star(FORK, [LEFT, RIGHT, ABOVE], OPEN), False),
     "pressed T": (star(X, [A, B, UP], PRESSED), True),
 }
 

@@ -6,33 +6,19 @@ import pytest
 import xcrack as xc
 from support.scenes_2d import perturbed
 from xcrack.arrays import Floats
+from xcrack.book.cases.junctions import K_PRESSED, LINES, OPEN, PRESSED
+from xcrack.book.cases.junctions import K as WANTED
 from xcrack.post.pieces import pieces as drawn_pieces
 from xcrack.solvers.rigid_motion import pieces
 from xcrack.xfem.model import build
 from xcrack.xfem.quadrature import sub_cells
 
 STEEL = xc.Isotropic(1.0, 0.3, "strain")
-# The same cracks as in benchmarks/baselines/network_2d.py, whose conforming quadratic triangles
-# with quarter points gave these K (`python -m benchmarks.baselines.network_2d`; its own error, from
-# a coarser mesh, is 1e-5).
-OPEN = np.array([[0.8, 0.15], [0.15, 1.0]])
-PRESSED = np.array([[-0.5, 0.6], [0.6, -1.0]])
-A, B = np.array([-0.5, -0.1]), np.array([0.45, 0.05])
-X = A + 0.55 * (B - A)
-UP, DOWN = X + np.array([0.12, 0.5]), X - np.array([0.1, 0.4])
-FORK = np.array([0.013, 0.027])
-LEFT = np.array([-0.52, -0.06])
-RIGHT = FORK + 0.45 * np.array([np.cos(0.6), -np.sin(0.6)])
-ABOVE = FORK + 0.42 * np.array([np.cos(0.7), np.sin(0.7)])
-K_T = [[1.52422, 0.16310], [1.43119, 0.32776], [0.70267, -0.03382]]
-K_X = [[1.45963, 0.19838], [1.36237, 0.29217], [0.77859, -0.04820], [0.53847, -0.20531]]
-K_Y = [[1.53050, 0.39460], [1.44002, -0.16761], [0.93288, 0.06428]]
-K_PRESSED = [0.68230, 0.72207, 0.66095]
-SCENES = {
-    "T": ([(A, B), (X, UP)], K_T),
-    "X": ([(A, B), (X, UP), (DOWN, X)], K_X),
-    "Y": ([(LEFT, FORK, RIGHT), (FORK, ABOVE)], K_Y),
-}
+# Conforming quadratic triangles with quarter points gave K (`python -m
+# benchmarks.baselines.network_2d`; its own error, from a coarser mesh, is 1e-5).
+(A, B), (X, UP) = LINES["T"]
+DOWN = LINES["X"][2][0]
+SCENES = {name: (LINES[name], WANTED[name]) for name in LINES}
 
 
 def pulled(mesh, lines, stress=OPEN, **options):
@@ -278,9 +264,9 @@ def test_error_bars_hold_at_junctions():
     """The estimate follows the error: K + eta is nearer to the reference than K is."""
     solution = xc.solve(pulled(perturbed(16, 3), SCENES["T"][0], contact="off"), error=True)
     sif = xc.stress_intensity(solution, 0, error=True)
-    wrong = np.abs(np.abs(sif.best) - np.abs(K_T[:2]))
+    wrong = np.abs(np.abs(sif.best) - np.abs(WANTED["T"][:2]))
     assert (wrong <= sif.bar).all()
-    assert wrong.max() < 0.3 * np.abs(np.abs(sif.K) - np.abs(K_T[:2])).max()
+    assert wrong.max() < 0.3 * np.abs(np.abs(sif.K) - np.abs(WANTED["T"][:2])).max()
 
 
 def test_faces_that_stick_at_a_junction_are_no_crack():

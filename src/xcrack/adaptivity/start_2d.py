@@ -1,5 +1,7 @@
 """First mesh: cells at tips and kinks that are smaller than what is around them."""
 
+from collections.abc import Callable
+
 import numpy as np
 
 from xcrack.arrays import Floats
@@ -31,15 +33,20 @@ def first_mesh(problem: Problem) -> Mesh:
         size = np.concatenate([size, [h for _, h in bends]])
     if not len(place):
         return problem.mesh
-
-    def wanted(x: Floats) -> Floats:
-        distance = np.linalg.norm(x[:, None] - place, axis=2)
-        return np.asarray((size + _SLOPE * distance).min(axis=1))
-
     # A mesh that is fine enough at its ends stays as it was given.
     if (cell_sizes(problem.mesh, place) <= size).all():
         return problem.mesh
-    return refine(problem.mesh, size=wanted)
+    return refine(problem.mesh, size=growing(place, size, _SLOPE))
+
+
+def growing(place: Floats, size: Floats, slope: float) -> Callable[[Floats], Floats]:
+    """Sizes of cells at points that grow with the distance from places `(n, 2)` by a slope."""
+
+    def wanted(x: Floats) -> Floats:
+        distance = np.linalg.norm(x[:, None] - place, axis=2)
+        return np.asarray((size + slope * distance).min(axis=1))
+
+    return wanted
 
 
 def tip_sizes(problem: Problem) -> tuple[Floats, Floats]:
@@ -77,4 +84,4 @@ def kinks(points: Floats) -> Floats:
     return np.asarray(points[1:-1][turn > _TURN])
 
 
-__all__ = ["first_mesh", "kinks", "tip_sizes"]
+__all__ = ["first_mesh", "growing", "kinks", "tip_sizes"]

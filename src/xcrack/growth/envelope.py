@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from xcrack.arrays import Floats
+from xcrack.growth.halving import halved
 from xcrack.growth.trail import Trail, directions_at, rates_at
 
 _PIECES = 4  # a step's: rates may start, stop or overtake each other inside it
@@ -71,28 +72,18 @@ def length_of_cycles(
     """Piece of σ that takes a number of cycles, at most `most`, length."""
     if growth_over(trail, start, most, threshold).cycles <= cycles:
         return most
-    low, high = 0.0, most
-    for _ in range(_PASSES):
-        middle = 0.5 * (low + high)
-        if growth_over(trail, start, middle, threshold).cycles < cycles:
-            low = middle
-        else:
-            high = middle
-    return high
+
+    def holds(length: float) -> bool:
+        return growth_over(trail, start, length, threshold).cycles < cycles
+
+    return halved(holds, most, _PASSES)[1]
 
 
 def growing_length(trail: Trail, start: float, length: float, threshold: float) -> float:
     """Part of a piece of σ up to which any tip grows, length."""
     if _grows(trail, start + length, threshold):
         return length
-    low, high = 0.0, length
-    for _ in range(_PASSES):
-        middle = 0.5 * (low + high)
-        if _grows(trail, start + middle, threshold):
-            low = middle
-        else:
-            high = middle
-    return low
+    return halved(lambda part: _grows(trail, start + part, threshold), length, _PASSES)[0]
 
 
 def _grows(trail: Trail, s: float, threshold: float) -> bool:

@@ -18,6 +18,7 @@ from xcrack.growth.controller import Control, shortest
 from xcrack.growth.envelope import Growth
 from xcrack.growth.evaluation import Evaluation, Settled
 from xcrack.growth.follow_2d import exit_ahead
+from xcrack.growth.halving import halved
 from xcrack.growth.kink import START
 from xcrack.growth.options import Run
 from xcrack.growth.overloads import Zones
@@ -40,7 +41,6 @@ from xcrack.mesh.mesh import Mesh
 _PASSES = 6  # of the correction, which turns the last face, which turns the direction
 _FIRST = 0.5  # of that for the first step's cycles, of which no parabola is known yet
 _MENDED = 0.1  # of that squared and relative: what is left once the second step has mended it
-_HALVINGS = 40
 
 
 def begun(run: Run, seen: Evaluation) -> Settled:
@@ -271,17 +271,14 @@ def _without_lost_tips(
 
 def _exit(run: Run, trail: Trail, before: Prediction, lost: Ints) -> float:
     """Piece of σ until the first of the lost tips is outside the body; all of it where none is."""
-    mesh, low, high = run.problem.mesh, 0.0, before.length
+    mesh = run.problem.mesh
     if _inside(mesh, before.place[lost]):
-        return high
-    for _ in range(_HALVINGS):
-        middle = 0.5 * (low + high)
-        move = growth_until(run, trail, middle).move
-        if _inside(mesh, (trail.place + move)[lost]):
-            low = middle
-        else:
-            high = middle
-    return high
+        return before.length
+
+    def holds(length: float) -> bool:
+        return _inside(mesh, (trail.place + growth_until(run, trail, length).move)[lost])
+
+    return halved(holds, before.length)[1]
 
 
 def _inside(mesh: Mesh, x: Floats) -> bool:

@@ -9,14 +9,13 @@ import numpy as np
 from xcrack.arrays import Bools, Floats
 from xcrack.crack.crack import Crack
 from xcrack.growth.envelope import Growth
+from xcrack.growth.halving import halved
 from xcrack.growth.meeting_2d import AHEAD, Meeting, joined, meetings
 from xcrack.growth.options import Run
 from xcrack.growth.reach import growth_until, reach_of
 from xcrack.growth.tips_2d import ending_at, faces_of
 from xcrack.growth.trail import Trail
 from xcrack.mesh.locate import cell_sizes
-
-_HALVINGS = 40
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,14 +106,7 @@ def _arrival(left: Callable[[float], float], most: float) -> float:
     """Length of σ after which nothing is left of a way; inf where that takes too long."""
     if left(most) > 0:
         return np.inf
-    low, high = 0.0, most
-    for _ in range(_HALVINGS):
-        middle = 0.5 * (low + high)
-        if left(middle) > 0:
-            low = middle
-        else:
-            high = middle
-    return high
+    return halved(lambda length: left(length) > 0, most)[1]
 
 
 __all__ = ["Prediction", "predict"]

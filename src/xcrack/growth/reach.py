@@ -63,19 +63,14 @@ def piece_of(run: Run, trail: Trail, start: float, length: float, begin: Zones |
 def reach_of(run: Run, trail: Trail) -> Reach:
     """The next step as the last two solves see it; from a first one straight on, at its rates."""
     known, start = trail.last(2), float(trail.sigma[-1])
-    length = longest(run, trail.control)
-    if run.cycles is not None:
-        fastest = float(trail.rate[-1].max(initial=0.0))
-        most = min(length, run.cycles * fastest * (1.0 if known.n_solves == 1 else _FASTER))
-        if trail.overloads is not None:
-            length = most
-        else:
-            length = length_of_cycles(known, start, run.cycles, most, run.threshold)
+    length = _farthest(run, trail)
     if trail.overloads is not None:
         ahead = _ahead(run, trail, length)
         came = min(length, ahead.reached)
         over = run.cycles is not None and ahead.until(came)[1] >= run.cycles * (1 - 1e-9)
         return Reach(came, came < length and not over, _along(ahead, known, start, came))
+    if run.cycles is not None:
+        length = length_of_cycles(known, start, run.cycles, length, run.threshold)
     grows = growing_length(known, start, length, run.threshold)
     return Reach(grows, grows < length, growth_over(known, start, grows, run.threshold))
 
@@ -93,7 +88,7 @@ def looked_ahead(run: Run, trail: Trail) -> Trail:
     own = trail.overloads
     if own is None or not _can_grow(trail):
         return trail
-    ahead = _next_march(run, trail)
+    ahead = _ahead(run, trail, _farthest(run, trail))
     return replace(trail, overloads=replace(own, ahead=ahead))
 
 
@@ -126,13 +121,13 @@ def overloads_of_rest(before: Trail, stays: Bools | Ints) -> Zones | None:
     return (own.zones if own.ahead is None else own.ahead.zones).at(stays)
 
 
-def _next_march(run: Run, trail: Trail) -> March:
-    """The march of the next step."""
+def _farthest(run: Run, trail: Trail) -> float:
+    """Piece of σ that the next step does not exceed, length."""
     length = longest(run, trail.control)
-    if run.cycles is not None:
-        fastest = float(trail.rate[-1].max(initial=0.0))
-        length = min(length, run.cycles * fastest * (1.0 if trail.n_solves == 1 else _FASTER))
-    return _ahead(run, trail, length)
+    if run.cycles is None:
+        return length
+    fastest = float(trail.rate[-1].max(initial=0.0))
+    return min(length, run.cycles * fastest * (1.0 if trail.n_solves == 1 else _FASTER))
 
 
 def _ahead(run: Run, trail: Trail, length: float) -> March:

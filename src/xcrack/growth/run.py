@@ -10,7 +10,7 @@ from xcrack.analysis.solution import Solution
 from xcrack.crack.crack import Crack
 from xcrack.errors import GeometryError, ProblemError, XcrackError, warn
 from xcrack.growth import joining
-from xcrack.growth.advance import LEAST
+from xcrack.growth.advance import LEAST, Advance
 from xcrack.growth.arrivals import arrivals_of, last_step
 from xcrack.growth.checks import depends_on_ratio
 from xcrack.growth.controlled import shortened
@@ -208,7 +208,7 @@ def steps_of(
                 if kink:
                     warn(kink)
             with notices.watch(last.index + 1) as messages:
-                next_step, reuse, ended = _after(run, last, reuse)
+                next_step, reuse, ended = _after(run, last, plan, reuse)
             if next_step is None:
                 break
             again = shortened(last, next_step)
@@ -230,7 +230,7 @@ def steps_of(
     return ended
 
 
-def _after(run: Run, last: Step, reuse: Reuse) -> tuple[Step | None, Reuse, str]:
+def _after(run: Run, last: Step, plan: Advance, reuse: Reuse) -> tuple[Step | None, Reuse, str]:
     """The step after another one, or why there is none."""
     try:
         cracks = integrator_of(run).advanced(run, last)
@@ -240,7 +240,7 @@ def _after(run: Run, last: Step, reuse: Reuse) -> tuple[Step | None, Reuse, str]
         problem = _problem(run, cracks, memory_of(last))
     except GeometryError as error:
         return None, reuse, _stopped(last, error)
-    joins = joins_of(last, problem, integrator_of(run).planned(run, last).cycles)
+    joins = joins_of(last, problem, plan.cycles)
     ended = cut_off(last, problem, joins) if joins else ""
     if joins:
         reuse = Reuse()  # two cracks have become one: what belongs to numbers of cracks is void

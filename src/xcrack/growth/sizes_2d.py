@@ -7,7 +7,7 @@ import numpy as np
 
 from xcrack.adaptivity.joint_2d import joint_mesh
 from xcrack.adaptivity.measured import Measured
-from xcrack.adaptivity.start_2d import tip_sizes
+from xcrack.adaptivity.start_2d import growing, tip_sizes
 from xcrack.arrays import Floats
 from xcrack.growth.scout import Stage
 from xcrack.mesh.locate import cell_sizes
@@ -26,12 +26,9 @@ _AIM = 0.6  # of the wanted half-widths: bars are foretold to a factor of two
 def scout_mesh(problem: Problem) -> Mesh:
     """The mesh of a scene, finer around tips where it is coarser than their cracks are short."""
     place, size = tip_sizes(problem)
-
-    def wanted(x: Floats) -> Floats:
-        distance = np.linalg.norm(x[:, None] - place, axis=2)
-        return np.asarray((size + _SLOPE * distance).min(axis=1))
-
-    return refine(problem.mesh, size=wanted) if len(place) else problem.mesh
+    if not len(place):
+        return problem.mesh
+    return refine(problem.mesh, size=growing(place, size, _SLOPE))
 
 
 def first_sizes(problem: Problem, stage: Stage) -> Floats:

@@ -250,7 +250,7 @@ def _retarded(
         for name, values in drawn.items()
     }
     bounds = {"steps": float("nan"), "K": cycled.of_K()}
-    word = unit or ("block" if block is None else block.spectrum.unit)
+    word = unit or cycled.unit
     return Life(lock(N), cycled.life, alone, bounds, word)
 
 

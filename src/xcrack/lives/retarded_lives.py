@@ -53,6 +53,7 @@ class RetardedLives:
         check(history, law, block.spectrum, model)
         self.path = CycledPath.of(history, block.spectrum, block.nu)
         self.law, self.model, self.limit = law, model, max_blocks
+        self.unit = block.spectrum.unit
 
     @property
     def life(self) -> float:

@@ -177,13 +177,13 @@ def of_status(rows: FrictionRows, d: Floats, status: Status) -> tuple[Floats, Fl
         moved = diagonal > 0
         scale = np.where(moved, 1 / np.sqrt(np.where(moved, diagonal, 1.0)), 0.0)
         A = (rows.F[active] @ spread) * scale[:, None] * scale
-        lam = spread @ (scale * _solved(A, -d[active] * scale))
+        lam = spread @ (scale * solved(A, -d[active] * scale))
     gap = rows.F @ lam + d
     gap[active] = 0.0
     return lam, gap
 
 
-def _solved(A: Floats, b: Floats) -> Floats:
+def solved(A: Floats, b: Floats) -> Floats:
     """Solution of a general system; the smallest one where groups are redundant."""
     lu, order, info = scipy.linalg.lapack.dgetrf(A)
     if info == 0 and np.abs(np.diag(lu)).min() > _REDUNDANT:
@@ -264,4 +264,4 @@ def _alone(block: Floats, free: Floats, mu: float) -> Floats:
     return np.zeros(2)
 
 
-__all__ = ["FrictionRows", "FrictionState", "Status", "all_stuck", "coulomb", "of_status"]
+__all__ = ["FrictionRows", "FrictionState", "Status", "all_stuck", "coulomb", "of_status", "solved"]

@@ -9,17 +9,15 @@ function after the other lead on.
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.linalg
 
 from xcrack.arrays import Bools, Floats, Ints
 from xcrack.errors import ConvergenceError
-from xcrack.solvers.coulomb import FrictionRows, FrictionState, Status
+from xcrack.solvers.coulomb import FrictionRows, FrictionState, Status, solved
 
 _MOST = 60
 _SWEEPS = (0, 10, 30, 100, 300, 1000)
 _CHANGE = 1e-12  # of the tractions, as a share of the largest, at which they stay
 _STALL = 1e-8  # one that round-off keeps from falling further
-_REDUNDANT = 1e-13
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,7 +126,7 @@ def _solved(rows: FrictionRows, d: Floats, guess: _Guess) -> tuple[Floats, Float
         A = rows.F[np.ix_(active, active)] * scale[:, None] * scale
         b = -d[active] * scale
         _slide(rows, guess, A, b, shut, touching, slides, scale)
-        lam[active] = scale * _inverse(A, b)
+        lam[active] = scale * solved(A, b)
     gap = rows.F @ lam + d
     gap[shut] = 0.0
     for part in (g, g + r):
@@ -172,15 +170,6 @@ def _slide(
             right += across * weight * free[j]
         A[t[i]] = row / own[i][:, None]
         b[t[i]] = right / own[i]
-
-
-def _inverse(A: Floats, b: Floats) -> Floats:
-    lu, order, info = scipy.linalg.lapack.dgetrf(A)
-    if info == 0 and np.abs(np.diag(lu)).min() > _REDUNDANT:
-        x = scipy.linalg.lapack.dgetrs(lu, order, b)[0]
-        if np.isfinite(x).all():
-            return np.asarray(x)
-    return np.asarray(scipy.linalg.lstsq(A, b, cond=1e-12)[0])
 
 
 def _swept(rows: FrictionRows, d: Floats, lam: Floats, sweeps: int) -> Floats:

@@ -17,19 +17,7 @@ from xcrack.xfem.enrichment_3d import front_radii
 _WHOLE = {(2, 2): 1.5}
 
 
-def _around_fronts(
-    mesh: Mesh,
-    cracks: tuple[Crack, ...],
-    cuts: tuple[Cut, ...],
-    order: int,
-    wanted: float | None,
-    meeting: Floats,
-) -> list[tuple[float, ...]]:
-    """Fronts meet no junctions."""
-    return front_radii(mesh, cracks, cuts, order, wanted)
-
-
-_RADII = {2: disc_radii, 3: _around_fronts}
+_RADII = {2: disc_radii, 3: front_radii}
 
 
 def tip_radii(

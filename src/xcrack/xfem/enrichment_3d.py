@@ -33,7 +33,12 @@ def front_reach(mesh: Mesh, crack: Crack, wanted: float | None) -> float:
 
 
 def front_radii(
-    mesh: Mesh, cracks: tuple[Crack, ...], cuts: tuple[Cut, ...], order: int, wanted: float | None
+    mesh: Mesh,
+    cracks: tuple[Crack, ...],
+    cuts: tuple[Cut, ...],
+    order: int,
+    wanted: float | None,
+    meeting: Floats,
 ) -> list[tuple[float, ...]]:
     """Radius of the enriched tube around each front of each crack, length.
 
@@ -49,7 +54,10 @@ def front_radii(
     cuts : tuple of Cut
     order : int
     wanted : float, length, optional
+    meeting : (0, 3) array
+        Fronts meet no junctions.
     """
+    del meeting
     least, most = _RANGE[order]
     every = [[crack.points[front] for front in crack.fronts or ()] for crack in cracks]
     if not any(every):
