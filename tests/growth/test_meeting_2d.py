@@ -1,5 +1,7 @@
 """Tips that meet other cracks in a run, in 2D: ends on flanks, unions of tips, pieces cut off."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -51,6 +53,23 @@ def test_facing_tips_become_one_crack(integrator):
     x = step.cracks[0].points
     assert (np.diff(x[:, 0]) > 0).all()  # as the first crack runs; the second was given reversed
     assert any(np.array_equal(point, join.point) for point in x[1:-1])
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"loads": [*PULL, xc.crack_pressure(1.0, crack=1)]}, "names a crack by its number"),
+        ({"friction": (0.0, 0.3)}, "friction differs between them"),
+    ],
+)
+def test_what_belongs_to_a_number_ends_the_run_where_tips_meet(changes, words):
+    """The crack behind the two would have the load, or the friction, of one of them."""
+    steps = xc.grow(replace(scene(FACING), **changes), *ARGS, da=0.8, progress=False, max_steps=5)
+    history = xc.collect(steps)
+    assert history.ended.startswith("the cracks cannot go on after step")
+    assert "cracks 0 and 1 meet near [" in history.ended
+    assert words in history.ended
+    assert len(history.steps[-1].cracks) == 2
 
 
 @pytest.mark.slow

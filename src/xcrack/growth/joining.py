@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 
 from xcrack.crack.crack import Crack
-from xcrack.growth import joins_3d
+from xcrack.growth import joins_2d, joins_3d
 from xcrack.growth.arrival import Arriving
 from xcrack.growth.evaluation import Evaluation, Settled
 from xcrack.growth.joined import Joined
@@ -12,7 +12,9 @@ from xcrack.growth.step import Step
 
 
 def joined(run: Run, last: Step, cracks: Sequence[Crack]) -> Joined | None:
-    """Cracks that meet within the advance after a step, joined; None where none do.
+    """Cracks in 3D that meet within the advance after a step, joined; None where none do.
+
+    In 2D tips have met in the advance itself.
 
     Parameters
     ----------
@@ -28,10 +30,9 @@ def joined(run: Run, last: Step, cracks: Sequence[Crack]) -> Joined | None:
     Raises
     ------
     GeometryError
-        They meet, and what they would become cannot be made.
+        They meet, and what they would become cannot be made, or a load belongs to one of them.
     """
-    join = _JOINED.get(run.problem.mesh.dim)
-    return None if join is None else join(run, last, cracks)
+    return _JOINED[run.problem.mesh.dim](run, last, cracks)
 
 
 def arriving(run: Run, last: Step, met: Joined) -> list[Arriving]:
@@ -44,7 +45,10 @@ def settled(run: Run, last: Step, seen: Evaluation, met: Joined) -> Settled:
     return joins_3d.settled(run, last, seen, met)
 
 
-_JOINED: dict[int, Callable[[Run, Step, Sequence[Crack]], Joined | None]] = {3: joins_3d.joined}
+_JOINED: dict[int, Callable[[Run, Step, Sequence[Crack]], Joined | None]] = {
+    2: joins_2d.joined,
+    3: joins_3d.joined,
+}
 
 
 __all__ = ["arriving", "joined", "settled"]

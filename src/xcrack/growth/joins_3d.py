@@ -22,13 +22,13 @@ from xcrack.growth.front_trail import FrontTrail
 from xcrack.growth.integrators import integrator_of
 from xcrack.growth.joined import Joined
 from xcrack.growth.joins import Join
+from xcrack.growth.joins_2d import named_by_number
 from xcrack.growth.ligament_3d import part_of_time
 from xcrack.growth.options import Run
 from xcrack.growth.step import Step, StepError, memory_of
 from xcrack.mesh.body import Body
 from xcrack.mesh.locate import cell_sizes
 from xcrack.mesh.mesh import Mesh
-from xcrack.scene.conditions import CrackPressure
 
 _NEAR = 1.1  # cells between fronts below which they join: closer ones cannot be solved
 _BESIDE = 1.0  # cells that fronts may pass beside each other at the end of the whole advance
@@ -258,13 +258,9 @@ def _errors(last: Step, x: Floats, mesh: Mesh) -> Floats:
 
 def _hindrance(run: Run) -> str:
     """Why cracks cannot join in a run; empty where they can."""
-    states = [state for state in run.cycle.load_states if isinstance(state, list | tuple)]
-    loads = [*run.problem.loads, *(load for state in states for load in state)]
-    if any(isinstance(load, CrackPressure) and load.crack is not None for load in loads):
-        return (
-            "a load names a crack by its number, which is another one's after they have joined: "
-            "give crack_pressure without crack."
-        )
+    hindrance = named_by_number(run)
+    if hindrance:
+        return hindrance
     if isinstance(run.problem.friction, Sequence) or any(run.problem.frictions):
         return (
             "what slip has left on the faces of two cracks is not carried on to one: go on with "
