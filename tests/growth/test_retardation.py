@@ -229,6 +229,7 @@ def disc():
 
 
 @pytest.mark.slow
+@pytest.mark.mission
 @pytest.mark.filterwarnings("ignore::xcrack.XcrackWarning")
 def test_a_front(tmp_path):
     """A disc: as slow as a point whose K is that of a disc; without an exponent as without."""

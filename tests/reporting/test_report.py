@@ -315,6 +315,7 @@ def test_a_stored_run_keeps_its_warnings(tmp_path):
     history = growth(problem, tmp_path / "run")
     read_again = xc.load(tmp_path / "run")
     assert history.warnings
+    assert all(step.warnings is not None for step in history.steps)
     assert read_again.warnings == history.warnings
     assert [step.warnings for step in read_again.steps] == [s.warnings for s in history.steps]
     page = xc.report(tmp_path / "run", tmp_path / "r.html").read_text(encoding="utf-8")
