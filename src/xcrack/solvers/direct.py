@@ -145,7 +145,7 @@ class System:
         return [replace(state, u=u[:, k], dual=small.dual) for k, state in enumerate(states)]
 
     def condensed(self, N: sp.csr_matrix, f: Floats, known: Floats) -> Condensed:
-        """The system as rows see it; see `Engine`. `displacements` can be asked once."""
+        """The system as rows see it; see `Engine`."""
         if self.factor is None:
             gap = N @ self.solve(f, known)
             return Condensed(self.dual(N), gap, lambda lam: self.solve(f + N.T @ lam, known))
@@ -158,10 +158,11 @@ class System:
             d = N @ known + Y.T @ y[places]
 
         def displacements(lam: Floats) -> Floats:
+            loaded = y.copy()
             with one_blas_thread():
-                y[places] += Y @ lam
+                loaded[places] += Y @ lam
             self.count.solves += b.shape[1]
-            return self._expanded(factor.backward(y), known)
+            return self._expanded(factor.backward(loaded), known)
 
         return Condensed(F, d, displacements)
 
