@@ -15,11 +15,11 @@ from physics import (
     test_contact_closed,
     test_contact_partial,
     test_contact_patch,
-    test_degenerate,
-    test_infsup,
-    test_space_degenerate,
-    test_space_infsup,
-    test_space_patch,
+    test_degenerate_2d,
+    test_degenerate_3d,
+    test_inf_sup_2d,
+    test_inf_sup_3d,
+    test_patch_3d,
 )
 from support import scenes_2d as scenes
 from support import scenes_3d as scenes_space
@@ -71,14 +71,14 @@ def infsup() -> Results:
             results[f"plane, order {order}, {kind}"] = {
                 "size": [
                     min(
-                        xc.inf_sup(test_infsup.through(n, *line, order, kind, seed))
-                        for seed, line in enumerate(test_infsup.LINES[:4], 11)
+                        xc.inf_sup(test_inf_sup_2d.through(n, *line, order, kind, seed))
+                        for seed, line in enumerate(test_inf_sup_2d.LINES[:4], 11)
                     )
                     for n in plane
                 ],
-                "cut": [xc.inf_sup(test_infsup.beside_a_row(e, order, kind)) for e in EPS],
+                "cut": [xc.inf_sup(test_inf_sup_2d.beside_a_row(e, order, kind)) for e in EPS],
             }
-        s = test_space_infsup
+        s = test_inf_sup_3d
         results[f"space, {kind}"] = {
             "size": [min(xc.inf_sup(s.through(n, k, multipliers=kind)) for k in range(3))
                      for n in space],
@@ -151,7 +151,7 @@ def condition() -> Results:
             ]
     for kind in ("none", "node", "star"):
         results["space over cut"][kind] = [
-            tried(scenes.condition, test_space_degenerate.front_problem(e, orthonormal=kind))
+            tried(scenes.condition, test_degenerate_3d.front_problem(e, orthonormal=kind))
             for e in eps
         ]
     return short(results)
@@ -193,17 +193,17 @@ def slivers() -> Results:
         ]
         for kind in ("star", "none"):
             results[f"K, order {order}, {kind}"] = [K(e, order, kind) for e in EPS]
-    s = test_space_patch
+    s = test_patch_3d
     penny = [xc.penny_crack((0, 0, e * s.CELL), (0, 0, 1), 0.55) for e in EPS]
     results["pressure, space"] = [tried(s.patch, s.structured(), [c]) for c in penny]
-    opened = np.array([test_space_degenerate.opened(e)[1] for e in EPS])
+    opened = np.array([test_degenerate_3d.opened(e)[1] for e in EPS])
     results["opening of a penny, space, over the median"] = opened / np.median(opened)
     return short(results)
 
 
 def places() -> Results:
     """Tips on nodes, edges and faces, cracks along mesh lines: error and spread of K."""
-    d = test_degenerate
+    d = test_degenerate_2d
     results: Results = {"plane": {}, "space": {}}
     n, h = 20, 0.1
     options = {"geometric": {}, "topological": {"enrichment": "topological"}}
@@ -222,7 +222,7 @@ def places() -> Results:
                     "scenes": len(K), "error": np.abs(np.array(K) - 1).max(),
                     "spread": np.ptp(K, axis=0).max(),
                 }  # fmt: skip
-    s = test_space_degenerate
+    s = test_degenerate_3d
     for name, (x, z) in s.PLACES.items():
         problem = s.through_crack(8, x, z, scenes_space.SIX)
         results["space"][name] = s.opening_error(problem, x)
@@ -234,7 +234,7 @@ def places() -> Results:
 
 def shapes() -> Results:
     """Kinks, tight arcs, arcs that turn back, tips beside a free edge."""
-    d = test_degenerate
+    d = test_degenerate_2d
     results: Results = {"kinks": {}, "arcs": {}, "free edge": {}}
     for degrees in (90, 120, -120):
         fine = np.array([scenes.K_of(d.kinked(degrees, 2, 60, r))[0] for r in (0.15, 0.3, 0.6)])
@@ -353,10 +353,10 @@ def anything() -> Results:
     """Cracks drawn without care: polylines that cross, leave and close in on each other."""
     solved, refused, failed = 0, 0, {}
     for seed in range(57000, 57200):
-        mesh, cracks, loads, order = test_degenerate.random_scene(seed)
+        mesh, cracks, loads, order = test_degenerate_2d.random_scene(seed)
         try:
             problem = xc.Problem(
-                mesh, test_degenerate.STEEL, [xc.line_crack(c) for c in cracks], loads=loads,
+                mesh, test_degenerate_2d.STEEL, [xc.line_crack(c) for c in cracks], loads=loads,
                 order=order,
             )  # fmt: skip
             solution = xc.solve(problem)

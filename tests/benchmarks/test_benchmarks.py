@@ -27,6 +27,22 @@ ROOT = Path(__file__).resolve().parents[2]
 WITHIN = 1.2  # of the least time: two runs of one case on a busy machine differ by as much
 
 
+def test_every_script_finds_what_it_imports():
+    """Scenes of tests that move take nothing along; in a process of its own, since scripts set up
+    theirs."""
+    script = (
+        "import importlib, pkgutil, sys, benchmarks\n"
+        "sys.path.insert(0, 'tests')\n"
+        "for each in pkgutil.walk_packages(benchmarks.__path__, 'benchmarks.'):\n"
+        "    if 'getfem_script' not in each.name:\n"  # it runs in a Python that has GetFEM
+        "        importlib.import_module(each.name)\n"
+    )
+    result = subprocess.run(
+        [sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True
+    )
+    assert result.returncode == 0, result.stderr
+
+
 def test_front_keeps_what_nothing_beats():
     points = [(3.0, 0.1), (1.0, 1.0), (2.0, 2.0), (4.0, 0.2), (5.0, 0.01)]
     assert pareto.front(points) == [(1.0, 1.0), (3.0, 0.1), (5.0, 0.01)]
