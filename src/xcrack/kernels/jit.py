@@ -51,10 +51,21 @@ def kernel(function: Callable[..., Any]) -> Any:
     ----------
     function : callable
     """
-    compiled = numba.njit(error_model="numpy", nogil=True)(function)
+    compiled = numba.njit(error_model="numpy", nogil=True, no_cfunc_wrapper=True)(function)
     if not numba.config.DISABLE_JIT:
         compiled._cache = _cache_of(function)
+        compiled.get_call_template = _of_types(compiled.get_call_template)
     return compiled
+
+
+def _of_types(get_call_template: Callable[..., Any]) -> Callable[..., Any]:
+    """A helper called with a constant is compiled for its type; numba does it for its value."""
+
+    def without_values(args: Any, kws: Any) -> Any:
+        types = {name: numba.types.unliteral(value) for name, value in kws.items()}
+        return get_call_template(tuple(numba.types.unliteral(each) for each in args), types)
+
+    return without_values
 
 
 def _cache_of(function: Callable[..., Any]) -> Any:
