@@ -4,29 +4,24 @@ It needs no factor: memory and time grow with the number of
 unknowns, and the levels below the finest one serve every crack in a mesh.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property, partial
+from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
 
-from xcrack.arrays import Bools, Floats, Ints, lock, ranges
+from xcrack.arrays import Bools, Floats, Ints, lock
 from xcrack.scene.material import Isotropic
-from xcrack.solvers.basis import Blocks, node_blocks, orthonormal, patch_orthogonal, restricted
+from xcrack.solvers.basis import Blocks, node_blocks, patch_orthogonal, restricted
 from xcrack.solvers.engine import Condensed, ContactRows, Count, StateContact
+from xcrack.solvers.iterative_basis import enriched_basis, nearby, parts_of, within_blocks
+from xcrack.solvers.lockstep import Iteration, Operator, in_lockstep
 from xcrack.solvers.modal_basis import mode_columns
 from xcrack.solvers.multigrid import Hierarchy, extended, hierarchy
-from xcrack.solvers.products import best_guess
-from xcrack.solvers.projected_cg import (
-    TOLERANCE,
-    Operator,
-    ProjectedState,
-    conjugate_gradients,
-    projected,
-)
+from xcrack.solvers.products import best_guesses, independent, proportional
+from xcrack.solvers.projected_cg import TOLERANCE, ProjectedState, descending, projecting
 from xcrack.solvers.reuse import Reuse
-from xcrack.solvers.row_blocks import Bordered, row_blocks
 from xcrack.solvers.schwarz import star_patches
 from xcrack.xfem.assembly import Bulk
 from xcrack.xfem.function_space import FunctionSpace
@@ -34,6 +29,8 @@ from xcrack.xfem.stiffness import Stiffness
 
 _ROUGH = 0.02  # residual of a first solution that only shows which faces overlap
 _LEAST_SHARE = 1e-4  # of the load, to which forces are resolved; round-off forbids much less
+_MULTIPLE = 1e-13  # share of the largest entry up to which a load is another one, scaled
+_COLUMNS = 64  # of the dual matrix that are solved for at a time
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,14 +88,18 @@ class IterativeSystem:
         """
         columns = f.reshape(len(f), -1)
         given = np.zeros_like(columns) if known is None else known.reshape(columns.shape)
-        b = self.basis.T @ (columns - self.matrix @ given)
-        y = np.zeros_like(b)
+        b, known_of = _vectors(self._reduced(columns, given)), _vectors(given)
+        y: list[Floats] = [np.zeros_like(each) for each in b]
         if start is not None:
-            y = self.coordinates(start.reshape(columns.shape) - given)
-        for k in range(b.shape[1]):
-            guess = best_guess(self.operator, y[:, :k], b[:, k]) if start is None else y[:, k]
-            y[:, k] = self._apart(b[:, k], given[:, k], guess, tolerance)
-        return np.asarray(given + self.basis @ y).reshape(f.shape)
+            y = _vectors(self.coordinates(start.reshape(columns.shape) - given))
+        first = independent(b)
+        rest = [k for k in range(len(b)) if k not in first]
+        self._solve_apart(first, b, known_of, y, tolerance)
+        guesses = best_guesses(self.operator, [y[k] for k in first], [b[k] for k in rest])
+        for k, guess in zip(rest, guesses, strict=True):
+            y[k] = guess
+        self._solve_apart(rest, b, known_of, y, tolerance)
+        return np.asarray(given + self.basis @ np.stack(y, axis=1)).reshape(f.shape)
 
     def first_look(
         self, f: Floats, known: Floats, closed_before: bool
@@ -124,29 +125,40 @@ class IterativeSystem:
         """
         del opened
         own = sp.csr_matrix(rows.N @ self.basis)
-        b = self.basis.T @ (f - self.matrix @ known)
-        guess = np.zeros_like(b) if latest is None else self.coordinates(latest - known)
-        states = []
-        for k in range(b.shape[1]):
-            gap = rows.N @ known[:, k]
-            if latest is None:
-                guess[:, k] = best_guess(self.operator, guess[:, :k], b[:, k])
-            first = start[k]
-            active = own @ guess[:, k] + gap < 0 if first is None else first
-            run = partial(projected, self.operator, b[:, k], own, gap, rows.measure, rows.stiffness)
-            state = self._together(run, b[:, k], known[:, k], active, guess[:, k])
-            guess[:, k] = state.y
-            u = known[:, k] + self.basis @ state.y
-            states.append(StateContact(state.pressure, state.gap, state.active, state.sets, u))
-        return states
+        b = _vectors(self._reduced(f, known))
+        gaps = _vectors(rows.N @ known)
+        y = [np.zeros_like(each) for each in b]
+        if latest is not None:
+            y = _vectors(self.coordinates(latest - known))
+        # What a pressure closes, a multiple of the load closes too, and nothing else.
+        whole = np.concatenate([np.stack(b, axis=1), known])
+        like, scale = proportional(whole, _MULTIPLE)
+        solved: dict[int, ProjectedState] = {}
+        for chosen in _in_turn(like, scale):
+            runs = []
+            for k in chosen:
+                model = solved.get(int(like[k]))
+                first = start[k]
+                if model is not None:
+                    y[k], first = scale[k] * model.y, model.active
+                active = own @ y[k] + gaps[k] < 0 if first is None else first
+                conditions = own, gaps[k], rows.measure, rows.stiffness
+                runs.append(self._together(b[k], known[:, k], conditions, active, y[k]))
+            for k, state in zip(chosen, in_lockstep(self.operator, runs), strict=True):
+                solved[k] = state
+                self._counted(state.iterations)
+        return [
+            StateContact(s.pressure, s.gap, s.active, s.sets, known[:, k] + self.basis @ s.y)
+            for k, s in sorted(solved.items())
+        ]
 
     def condensed(self, N: sp.csr_matrix, f: Floats, known: Floats) -> Condensed:
         """The system as rows see it; see `Engine`. A solve for each row."""
         opened = self.solve(f, known)
         F = np.empty((N.shape[0], N.shape[0]))
-        for k in range(N.shape[0]):
-            row = N[[k]].toarray()[0]
-            F[:, k] = N @ self.solve(row, start=np.zeros_like(row))
+        for k in range(0, len(F), _COLUMNS):
+            some = N[k : k + _COLUMNS].toarray().T
+            F[:, k : k + _COLUMNS] = N @ self.solve(some, start=np.zeros_like(some))
         return Condensed(
             (F + F.T) / 2,
             N @ opened,
@@ -157,28 +169,55 @@ class IterativeSystem:
         """With the levels of the mesh."""
         return replace(reuse, hierarchy=self.hierarchy)
 
-    def _apart(self, b: Floats, known: Floats, start: Floats, tolerance: float) -> Floats:
-        y, steps = conjugate_gradients(self.operator, b, start, tolerance)
+    def _reduced(self, f: Floats, known: Floats) -> Floats:
+        """Loads `(n_dof, k)` on the unknowns of the solver."""
+        return np.asarray(self.basis.T @ (f - self.matrix @ known if known.any() else f))
+
+    def _solve_apart(
+        self,
+        chosen: Sequence[int],
+        b: Sequence[Floats],
+        known: Sequence[Floats],
+        y: list[Floats],
+        tolerance: float,
+    ) -> None:
+        """Put solutions of some states in the place of their guesses."""
+        runs = [self._apart(b[k], known[k], y[k], tolerance) for k in chosen]
+        for k, (solved, steps) in zip(chosen, in_lockstep(self.operator, runs), strict=True):
+            y[k] = solved
+            self._counted(steps)
+
+    def _counted(self, steps: int) -> None:
+        self.count.solves += 1
+        self.count.iterations += steps
+
+    def _apart(
+        self, b: Floats, known: Floats, start: Floats, tolerance: float
+    ) -> Iteration[tuple[Floats, int]]:
+        y, steps = yield from descending(self.operator, b, start, tolerance)
         share = self._share(y, b, known)
         if share < 1:
-            y, more = conjugate_gradients(self.operator, b, y, share * tolerance)
+            y, more = yield from descending(self.operator, b, y, share * tolerance)
             steps += more
-        self.count.solves += 1
-        self.count.iterations += steps
-        return y
+        return y, steps
 
     def _together(
-        self, run: Callable[..., ProjectedState], b: Floats, known: Floats, active: Bools, y: Floats
-    ) -> ProjectedState:
-        state = run(active, y)
-        sets, steps = state.sets, state.iterations
+        self,
+        b: Floats,
+        known: Floats,
+        rows: tuple[sp.csr_matrix, Floats, Floats, float],
+        active: Bools,
+        y: Floats,
+    ) -> Iteration[ProjectedState]:
+        state = yield from projecting(self.operator, b, *rows, active, y, TOLERANCE)
         share = self._share(state.y, b, known)
-        if share < 1:
-            state = run(state.active, state.y, share * TOLERANCE)
-            sets, steps = sets + state.sets - 1, steps + state.iterations
-        self.count.solves += 1
-        self.count.iterations += steps
-        return replace(state, sets=sets, iterations=steps)
+        if share == 1:
+            return state
+        more = yield from projecting(
+            self.operator, b, *rows, state.active, state.y, share * TOLERANCE
+        )
+        sets, steps = state.sets + more.sets - 1, state.iterations + more.iterations
+        return replace(more, sets=sets, iterations=steps)
 
     def _share(self, y: Floats, b: Floats, known: Floats) -> float:
         """Size of the forces in the body relative to b.
@@ -207,9 +246,9 @@ class IterativeSystem:
     def _within(self) -> sp.csr_matrix:
         """Entries of the stiffness between unknowns of one node."""
         if self.combined is None or self.back is None:
-            return _within_blocks(self.near, self.blocks)
-        K = _nearby(self.near, self.combined, self.blocks)
-        return sp.csr_matrix(self.back.T @ _within_blocks(K, self.blocks) @ self.back)
+            return within_blocks(self.near, self.blocks)
+        K = nearby(self.near, self.combined, self.blocks)
+        return sp.csr_matrix(self.back.T @ within_blocks(K, self.blocks) @ self.back)
 
 
 def iterative_system(
@@ -257,8 +296,8 @@ def iterative_system(
         combined, back = _apart(space, near, combined, in_use)
     whole = node_blocks(space, "star" if stars else "node")
     blocks = restricted(whole, in_use)
-    enriched, starts, block = _enriched_basis(space, near, blocks, levels, combined)
-    parts = _parts(levels, near, plain, enriched)
+    enriched, starts, block = enriched_basis(space, near, blocks, levels, combined)
+    parts = parts_of(levels, near, plain, enriched)
     stored, diagonal = parts.stored(starts), parts.diagonal
     patches = None
     if stars and len(block):
@@ -274,8 +313,21 @@ def iterative_system(
     null = np.zeros((len(diagonal), 0 if modes is None else modes.shape[1]))
     if modes is not None and modes.shape[1]:
         null[: len(plain)] = np.linalg.qr(modes[plain] * levels.free[:, None])[0]
-    operator = Operator(stored.times, extended(levels, stored, diagonal, patches), diagonal, null)
+    cycle = extended(levels, stored, diagonal, patches)
+    operator = Operator(stored.times, cycle, diagonal, null, stored.times_all, cycle.of_all)
     return IterativeSystem(K, near, lock(free), basis, levels, operator, blocks, combined, back)
+
+
+def _vectors(columns: Floats) -> list[Floats]:
+    return list(np.ascontiguousarray(columns.T))
+
+
+def _in_turn(like: Ints, scale: Floats) -> Iterator[list[int]]:
+    """States that are solved first, and positive multiples of theirs."""
+    multiple = (like != np.arange(len(like))) & (scale > 0)
+    multiple &= ~multiple[like]
+    yield [int(k) for k in np.nonzero(~multiple)[0]]
+    yield [int(k) for k in np.nonzero(multiple)[0]]
 
 
 def _apart(
@@ -292,106 +344,3 @@ def _apart(
     own = sp.diags(1 / np.where(size > 0, size, 1.0)) @ modes.T
     back = (2 * sp.identity(space.n_dof) - apart) @ own
     return sp.csr_matrix(modes @ apart), sp.csr_matrix(back)
-
-
-def _enriched_basis(
-    space: FunctionSpace,
-    K: sp.csr_matrix,
-    blocks: Blocks,
-    levels: Hierarchy,
-    combined: sp.csr_matrix | None,
-) -> tuple[sp.csc_matrix, Ints, Ints]:
-    """Orthonormal enriched columns, node by node, the first column of each node, and their blocks.
-
-    Their diagonal entries are made the mean one of the standard unknowns: the norm of a residual
-    then weighs both alike.
-    """
-    if combined is not None:
-        K = _nearby(K, combined, blocks)
-    Z = sp.csc_matrix(orthonormal(K, blocks))
-    owner = np.repeat(np.arange(len(blocks.n_standard)), np.diff(blocks.offsets))
-    block_of = np.full(space.n_dof, -1, dtype=np.int64)
-    block_of[blocks.members] = owner
-    node = block_of[Z.indices[Z.indptr[:-1]]]
-    order = np.argsort(node, kind="stable")
-    size = np.sqrt(levels.diagonal.mean())
-    Z = sp.csc_matrix(Z[:, order] * size)
-    Z = Z if combined is None else sp.csc_matrix(combined @ Z)
-    node = node[order]
-    starts = np.nonzero(np.concatenate([[True], node[1:] != node[:-1]]))[0] if len(node) else node
-    return Z, starts, node
-
-
-@dataclass(frozen=True, eq=False)
-class _Parts:
-    """Stiffness in the solver's basis: that of the uncracked body with a border.
-
-    Attributes
-    ----------
-    levels : Hierarchy
-    K : sparse matrix (n_dof, n_dof)
-    plain : (n,) array of int
-        Unknowns of the hierarchy.
-    across : sparse matrix (n, e)
-        Between them and the enriched columns, CSR.
-    own : sparse matrix (e, e)
-    """
-
-    levels: Hierarchy
-    K: sp.csr_matrix
-    plain: Ints
-    across: sp.csr_matrix
-    own: sp.csr_matrix
-
-    @property
-    def diagonal(self) -> Floats:
-        return np.concatenate([self.levels.diagonal, self.own.diagonal()])
-
-    def stored(self, starts: Ints) -> Bordered:
-        """The whole matrix; `starts` are the first columns of the enriched nodes."""
-        first = np.concatenate([starts, [self.own.shape[0]]])
-        return Bordered(
-            self.levels.matrix,
-            row_blocks([self.across], self.levels.matrix.first),
-            row_blocks([self.across.T.tocsr(), self.own], first),
-        )
-
-    def entries(self, chosen: Ints) -> sp.csr_matrix:
-        """Entries between free unknowns, given sorted."""
-        n = len(self.plain)
-        standard, rest = chosen[chosen < n], chosen[chosen >= n] - n
-        known = self.plain[standard]
-        across = self.across[standard][:, rest]
-        parts = [[self.K[known][:, known], across], [across.T, self.own[rest][:, rest]]]
-        return sp.csr_matrix(sp.bmat(parts))
-
-
-def _parts(levels: Hierarchy, K: sp.csr_matrix, plain: Ints, enriched: sp.csc_matrix) -> _Parts:
-    image = sp.csr_matrix(K @ enriched)
-    own = sp.csr_matrix(enriched.T @ image)
-    across = image[plain]
-    if not levels.free.all():
-        across = sp.csr_matrix(sp.diags(levels.free.astype(float)) @ across)
-    return _Parts(levels, K, plain, across, own)
-
-
-def _nearby(K: sp.csr_matrix, changed: sp.csr_matrix, blocks: Blocks) -> sp.csr_matrix:
-    """Stiffness in a changed basis: entries between the unknowns of blocks."""
-    own = np.unique(blocks.members)
-    columns = sp.csc_matrix(changed[:, own])
-    near = np.unique(columns.indices)
-    columns = columns[near]
-    small = sp.coo_matrix(columns.T @ (K[near][:, near] @ columns))
-    return sp.csr_matrix((small.data, (own[small.row], own[small.col])), shape=K.shape)
-
-
-def _within_blocks(K: sp.csr_matrix, blocks: Blocks) -> sp.csr_matrix:
-    from xcrack.kernels.blocks import dense_blocks
-
-    values = dense_blocks(K.indptr, K.indices, K.data, blocks.members, blocks.offsets)
-    size = np.diff(blocks.offsets)
-    block, place = ranges(size**2)
-    row, column = np.divmod(place, size[block])
-    first = blocks.offsets[block]
-    triplets = (values, (blocks.members[first + row], blocks.members[first + column]))
-    return sp.csr_matrix(triplets, shape=K.shape)

@@ -1,14 +1,17 @@
 """Products of sparse matrices with vectors, those of scipy to the bit; proportional vectors."""
 
+from collections.abc import Sequence
+
 import numpy as np
 import scipy.sparse as sp
 
 from xcrack.arrays import Floats, Ints
 from xcrack.kernels import sparse
-from xcrack.solvers.projected_cg import Operator
+from xcrack.solvers.lockstep import Ask, Operator
 from xcrack.xfem.stiffness import Stiffness
 
 _SAME = 1e-15  # share of the largest entry up to which vectors are multiples of each other
+_NEARLY = 1e-5  # share of a load beside the combinations of others, up to which those come first
 
 
 def times(A: sp.csr_matrix | Stiffness, x: Floats) -> Floats:
@@ -27,10 +30,11 @@ def times_transposed(A: sp.csr_matrix, x: Floats) -> Floats:
     return np.asarray(result.reshape(n, *x.shape[1:]))
 
 
-def proportional(b: Floats) -> tuple[Ints, Floats]:
+def proportional(b: Floats, same: float = _SAME) -> tuple[Ints, Floats]:
     """First column that each of `(n, k)` is a multiple of, to round-off, and the factor `(k,)`.
 
-    Load states are often one load, scaled.
+    Load states are often one load, scaled. `same` is the share of the largest entry by which they
+    may differ.
     """
     first, scale = np.arange(b.shape[1]), np.ones(b.shape[1])
     for k in range(1, len(first)):
@@ -40,16 +44,34 @@ def proportional(b: Floats) -> tuple[Ints, Floats]:
                 continue
             factor = b[at, k] / b[at, i]
             away = np.abs(b[:, k] - factor * b[:, i]).max()
-            if away <= _SAME * np.abs(b[at, k]):
+            if away <= same * np.abs(b[at, k]):
                 first[k], scale[k] = i, factor
                 break
     return first, scale
 
 
-def best_guess(K: Operator, solved: Floats, b: Floats) -> Floats:
-    """The combination of other solutions with the least energy: exact for proportional loads."""
-    y = np.zeros(len(b))
-    if not solved.shape[1]:
-        return y
-    image = np.stack([K.times(v) for v in solved.T], axis=1)
-    return np.asarray(solved @ (np.linalg.pinv(solved.T @ image, 1e-12, True) @ (solved.T @ b)))
+def independent(vectors: Sequence[Floats]) -> list[int]:
+    """Those that are no combination of others before them, nearly."""
+    chosen, directions = [], list[Floats]()
+    for k, vector in enumerate(vectors):
+        rest, size = vector.copy(), _norm(vector)
+        for q in directions * 2:  # twice: what is left of nearly parallel vectors is small
+            rest -= np.einsum("i,i", q, rest) * q
+        if not _norm(rest) <= _NEARLY * size:
+            chosen.append(k)
+            directions.append(rest / _norm(rest))
+    return chosen
+
+
+def _norm(vector: Floats) -> float:
+    return float(np.sqrt(np.einsum("i,i", vector, vector)))
+
+
+def best_guesses(K: Operator, solved: Sequence[Floats], b: Sequence[Floats]) -> list[Floats]:
+    """Combinations of solutions with the least energy: exact for combinations of their loads."""
+    if not solved:
+        return [np.zeros_like(own) for own in b]
+    y = np.stack(solved, axis=1)
+    image = np.stack(K.answers(Ask.TIMES, solved), axis=1)
+    inverse = np.linalg.pinv(y.T @ image, 1e-12, True)
+    return [y @ (inverse @ (y.T @ own)) for own in b]

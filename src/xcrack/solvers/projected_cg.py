@@ -7,7 +7,6 @@ Hribar and Nocedal, 2001). The set is corrected on the way, long before the disp
 converged: a wrong set is seen early, and most sets cost one or two steps.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,8 +16,7 @@ import scipy.sparse.linalg as sla
 
 from xcrack.arrays import Bools, Floats
 from xcrack.errors import ConvergenceError
-
-Apply = Callable[[Floats], Floats]
+from xcrack.solvers.lockstep import Apply, Ask, Iteration, Operator, in_lockstep
 
 TOLERANCE = 1e-8  # residual relative to the load: displacements and pressures to about as much
 MOST_STEPS = 2000
@@ -26,27 +24,6 @@ _MOST_SETS = 400
 _FIRST_CHECK = 0.1  # relative residual at which the set is looked at first, then every factor 0.1
 _DENSE = 400  # closed groups up to which a dense factor is quicker
 _REDUNDANT = 1e-10  # eigenvalues below which closed groups count as dependent
-
-
-@dataclass(frozen=True, eq=False)
-class Operator:
-    """A symmetric positive matrix and what is needed to solve with it.
-
-    Attributes
-    ----------
-    times : callable
-        v -> K v.
-    cycle : callable
-        r -> V r, an approximate inverse, symmetric and positive.
-    diagonal : (n,) array
-    null : (n, k) array
-        Orthonormal vectors that K sends to zero; k = 0 for a regular matrix.
-    """
-
-    times: Apply
-    cycle: Apply
-    diagonal: Floats
-    null: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,12 +68,9 @@ class _Plane:
     def along(self, z: Floats) -> Floats:
         return z - self.lifted @ self.solve(self.rows @ z)
 
-    def force(self, r: Floats) -> Floats:
-        """Residual without the part that pressures carry."""
-        return r - self.rows.T @ self.solve(self.lifted.T @ r)
-
-    def pressure(self, r: Floats) -> Floats:
-        return -self.scale * self.solve(self.lifted.T @ r)
+    def carried(self, r: Floats) -> Floats:
+        """Multipliers of the part of a residual that pressures carry."""
+        return self.solve(self.lifted.T @ r)
 
 
 def _plane(N: sp.csr_matrix, d: Floats, scale: Floats, diagonal: Floats) -> _Plane:
@@ -134,39 +108,57 @@ class _Descent:
 
     def __init__(self, K: Operator, b: Floats, plane: _Plane | None, y: Floats) -> None:
         self.K, self.b, self.plane = K, b, plane
-        self.y = y if plane is None else plane.nearest(y)
-        self.r = self._force(b - K.times(self.y))
+        self.y = y.copy() if plane is None else plane.nearest(y)
+        self.carried = np.zeros(0 if plane is None else len(plane.scale))
         self.p: Floats | None = None
-        self.rz = 1.0
+        self.rz, self.norm = 1.0, np.inf
 
     @property
-    def norm(self) -> float:
-        return _norm(self.r)
+    def pressure(self) -> Floats:
+        """Of the closed groups: all that was taken off the residual."""
+        return np.zeros(0) if self.plane is None else -self.plane.scale * self.carried
 
-    def _force(self, r: Floats) -> Floats:
-        r = r if self.plane is None else self.plane.force(r)
-        return r - self.K.null @ (self.K.null.T @ r)
+    def begin(self) -> Iteration[None]:
+        image = (yield Ask.TIMES, self.y) if self.y.any() else 0.0
+        self._goes_on(self.b - image)
 
-    def _direction(self) -> Floats:
-        z = self.K.cycle(self.r)
+    def step(self) -> Iteration[None]:
+        z = yield Ask.CYCLE, self.r
         z = z if self.plane is None else self.plane.along(z)
-        return z - self.K.null @ (self.K.null.T @ z)
-
-    def step(self) -> None:
-        z = self._direction()
         rz = _dot(self.r, z)
-        p = z if self.p is None else z + (rz / self.rz) * self.p
-        q = self.K.times(p)
-        curvature = _dot(p, q)
+        if self.p is None:
+            self.p = z
+        else:
+            self.p *= rz / self.rz
+            self.p += z
+        q = yield Ask.TIMES, self.p
+        curvature = _dot(self.p, q)
         if not curvature > 0 or not np.isfinite(rz):
             raise ConvergenceError(
                 "the conjugate gradients broke down: the stiffness is singular. Is the body "
                 "supported, or does a crack cut off a piece that nothing supports?"
             )
         a = rz / curvature
-        self.y = self.y + a * p
-        self.r = self._force(self.r - a * q)
-        self.p, self.rz = p, rz
+        self.y += a * self.p
+        q *= a
+        self.rz = rz
+        self._goes_on(np.subtract(self.r, q, out=q))
+
+    def _goes_on(self, r: Floats) -> None:
+        """Take off what pressures carry and what would move the body."""
+        if self.plane is not None:
+            more = self.plane.carried(r)
+            r -= self.plane.rows.T @ more
+            self.carried += more
+        self.r = _without(self.K.null, r)
+        self.norm = _norm(r)
+
+
+def _without(null: Floats, r: Floats) -> Floats:
+    """Take rigid motions off a vector, which is changed."""
+    if null.shape[1]:
+        r -= null @ (null.T @ r)
+    return r
 
 
 def _dot(a: Floats, b: Floats) -> float:
@@ -199,10 +191,18 @@ def conjugate_gradients(
     ConvergenceError
         No solution after so many steps; the message carries the residual.
     """
+    return in_lockstep(K, [descending(K, b, start, tolerance, limit)])[0]
+
+
+def descending(
+    K: Operator, b: Floats, start: Floats, tolerance: float = TOLERANCE, limit: int = MOST_STEPS
+) -> Iteration[tuple[Floats, int]]:
+    """Run `conjugate_gradients` in lockstep with others."""
     size = _norm(b)
     if size == 0:
         return np.zeros_like(b), 0
-    descent = _Descent(K, b, None, np.array(start))
+    descent = _Descent(K, b, None, start)
+    yield from descent.begin()
     steps = 0
     while not descent.norm <= tolerance * size:
         if steps == limit:
@@ -211,9 +211,9 @@ def conjugate_gradients(
                 f"{descent.norm / size:.3g} of the load, not {tolerance:.3g}. Is the body "
                 "supported? A direct solver, or a mesh without flat cells, may help."
             )
-        descent.step()
+        yield from descent.step()
         steps += 1
-    return descent.y, steps
+    return _without(K.null, descent.y), steps
 
 
 def projected(
@@ -256,12 +256,29 @@ def projected(
     ConvergenceError
         No solution within so many steps or sets; the message carries residual and set.
     """
+    run = projecting(K, b, N, d, measure, stiffness, start, y, tolerance, limit)
+    return in_lockstep(K, [run])[0]
+
+
+def projecting(
+    K: Operator,
+    b: Floats,
+    N: sp.csr_matrix,
+    d: Floats,
+    measure: Floats,
+    stiffness: float,
+    start: Bools,
+    y: Floats,
+    tolerance: float = TOLERANCE,
+    limit: int = MOST_STEPS,
+) -> Iteration[ProjectedState]:
+    """Run `projected` in lockstep with others."""
     N = sp.csr_matrix(N)
     weight = np.asarray(N.multiply(N) @ (1 / K.diagonal)).ravel()
     movable = weight > 0
     scale = np.where(movable, 1 / np.sqrt(np.where(movable, weight, 1.0)), 0.0)
     loop = _Loop(K, b, N, d, measure, stiffness, movable, scale, tolerance, limit)
-    return loop.run(np.array(start, dtype=bool) & movable, np.array(y))
+    return (yield from loop.run(np.array(start, dtype=bool) & movable, y))
 
 
 @dataclass(eq=False)
@@ -279,10 +296,10 @@ class _Loop:
     steps: int = 0
     sets: int = 0
 
-    def run(self, active: Bools, y: Floats) -> ProjectedState:
+    def run(self, active: Bools, y: Floats) -> Iteration[ProjectedState]:
         if not (np.isfinite(self.b).all() and np.isfinite(self.d).all()):
             self._give_up(float("nan"), active)
-        size = self._size()
+        size = yield from self._size()
         if size == 0:
             y = np.zeros_like(y)
         check = _FIRST_CHECK
@@ -291,9 +308,11 @@ class _Loop:
         while True:
             self.sets += 1
             descent = _Descent(self.K, self.b, self._plane_of(active), y)
-            pressure, gap, new = self._settle(descent, active, size, check)
+            yield from descent.begin()
+            pressure, gap, new = yield from self._settle(descent, active, size, check)
             if np.array_equal(new, active):
-                return self._result(descent.y, pressure, gap, active)
+                y = _without(self.K.null, descent.y)
+                return self._result(y, pressure, gap, active)
             y = descent.y
             reached = max(self.tolerance, descent.norm / size)
             if singly:
@@ -312,7 +331,7 @@ class _Loop:
 
     def _settle(
         self, descent: _Descent, active: Bools, size: float, check: float
-    ) -> tuple[Floats, Floats, Bools]:
+    ) -> Iteration[tuple[Floats, Floats, Bools]]:
         """Go down until the set is seen to be wrong, or has been right to the end."""
         fresh = True
         while True:
@@ -321,7 +340,7 @@ class _Loop:
             ):
                 if self.steps == self.limit:
                     self._give_up(descent.norm / size, active)
-                descent.step()
+                yield from descent.step()
                 self.steps += 1
                 fresh = False
             pressure, gap, new = self._predicted(descent, active)
@@ -331,9 +350,7 @@ class _Loop:
 
     def _predicted(self, descent: _Descent, active: Bools) -> tuple[Floats, Floats, Bools]:
         pressure = np.zeros(len(active))
-        if descent.plane is not None:
-            r = self.b - self.K.times(descent.y)
-            pressure[active] = descent.plane.pressure(r)
+        pressure[active] = descent.pressure
         gap = self.N @ descent.y + self.d
         gap[active] = 0.0
         trial = np.where(self.movable, pressure - self.stiffness * gap / self.measure, 0.0)
@@ -348,13 +365,13 @@ class _Loop:
         rows = np.nonzero(active)[0]
         return _plane(self.N[rows], self.d[rows], self.scale[rows], self.K.diagonal)
 
-    def _size(self) -> float:
+    def _size(self) -> Iteration[float]:
         """Size of the load; where only gaps are imposed, of the forces that close them."""
         size = _norm(self.b)
         plane = self._plane_of(self.movable)
         if size > 0 or plane is None:
             return size
-        return _norm(self.K.times(plane.nearest(np.zeros(len(self.b)))))
+        return _norm((yield Ask.TIMES, plane.nearest(np.zeros(len(self.b)))))
 
     def _result(self, y: Floats, pressure: Floats, gap: Floats, active: Bools) -> ProjectedState:
         length = np.abs(gap / self.measure).max(initial=0.0)

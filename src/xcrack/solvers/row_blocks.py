@@ -1,7 +1,7 @@
 """Matrices of the multigrid cycle: rows that share a pattern, and an enriched border."""
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,6 +13,26 @@ from xcrack.threads import each, number_of_threads
 
 _LEAST = 100_000  # values of a part of a product: less takes no longer than to hand it over
 _TOGETHER = 3  # rows that the kernel of products takes at once
+_FOUR = 4  # vectors that the kernel of several takes: what a processor multiplies at once
+
+
+def in_fours(function: Callable[[Any], Any], vectors: Sequence[Any]) -> list[Any]:
+    """Results for vectors of a function of a vector, or of four that stand side by side `(n, 4)`.
+
+    One that is left goes alone; where two or three are left the others are zero.
+    """
+    results: list[Any] = []
+    for first in range(0, len(vectors), _FOUR):
+        some = vectors[first : first + _FOUR]
+        if len(some) == 1:
+            results.append(function(some[0]))
+            continue
+        columns = np.zeros((len(some[0]), _FOUR), some[0].dtype)
+        for k, vector in enumerate(some):
+            columns[:, k] = vector
+        columns = function(columns)
+        results += [np.ascontiguousarray(columns[:, k]) for k in range(len(some))]
+    return results
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,22 +61,26 @@ class RowBlocks:
         return self.values.dtype
 
     def times(self, x: Any) -> Any:
-        """A x, in the type of the values."""
-        return self.added(np.zeros(self.shape[0], self.dtype), 1, x)
+        """A x, in the type of the values; see `added`."""
+        return self.added(np.zeros((self.shape[0], *x.shape[1:]), self.dtype), 1, x)
 
     def added(self, y: Any, scale: float, x: Any) -> Any:
-        """Write y + scale A x over y, and return it."""
-        from xcrack.kernels.cycle import product
-
+        """Write y + scale A x over y, and return it, for a vector or four `(n, 4)`."""
+        if x.ndim == 1:
+            from xcrack.kernels.cycle import product as multiply
+        else:
+            from xcrack.kernels.wide import product_of_four as multiply
         number = self.dtype.type(scale)
 
         def rows(stretch: slice) -> None:
-            product(
+            multiply(
                 self.first[stretch], self.start[stretch], self.offset[stretch], self.columns,
                 self.values, x, y, number, y,
             )  # fmt: skip
 
-        each(rows, self._stretches(min(number_of_threads(), len(self.values) // _LEAST)))
+        entries = len(self.values) * (1 if x.ndim == 1 else _FOUR)
+        count = min(number_of_threads(), entries // _LEAST)
+        each(rows, self._stretches(count))
         return y
 
     def _stretches(self, count: int) -> list[slice]:
@@ -157,11 +181,15 @@ class Bordered:
         return self.standard.dtype
 
     def times(self, x: Any) -> Any:
-        """A x, in the type of the values."""
-        return self.added(np.zeros(len(x), self.dtype), 1, x)
+        """A x, in the type of the values; see `RowBlocks.added`."""
+        return self.added(np.zeros_like(x, self.dtype), 1, x)
+
+    def times_all(self, vectors: Sequence[Any]) -> list[Any]:
+        """A x of several vectors, four at a time."""
+        return in_fours(self.times, vectors)
 
     def added(self, y: Any, scale: float, x: Any) -> Any:
-        """Write y + scale A x over y, and return it."""
+        """Write y + scale A x over y, and return it; see `RowBlocks.added`."""
         n = self.standard.shape[0]
         self.standard.added(y[:n], scale, x[:n])
         self.across.added(y[:n], scale, x[n:])
