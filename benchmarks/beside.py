@@ -2,12 +2,15 @@
 
     python -m benchmarks.beside /path/to/other/checkout [--scenes "edge 53 k" ...] [--rounds 7]
     python -m benchmarks.beside /path/to/other/checkout --sizes [--most 120000] [--rounds 1]
+    python -m benchmarks.beside /path/to/other/checkout --bars
 
 One process for each of the two stays alive; rounds alternate, so that transient load on
 the machine affects both. Scenes use public names that both have. Printed are medians of processor
 seconds, the ratio of each pair of rounds (median, smallest, largest), and how far K and pressures
 are apart, relative to the largest. One thread. With `--sizes` scenes have 10 thousand to a
-million unknowns, and seconds are told by part: mesh, problem, solution, K.
+million unknowns, and seconds are told by part: mesh, problem, solution, K. With `--bars` the error
+bars of K are made besides, by the code that has them, and printed is what they take of the time of
+solution and K of this code and of the other.
 """
 
 from __future__ import annotations
@@ -84,6 +87,37 @@ def edge(n: int, contact: str = "off", states: tuple[float, ...] = (1.0,)) -> It
         solutions = xc.solve(problem, states=list(states))
         parts.end("solution")
         yield parts.numbers(solutions)
+
+
+def bars(n: int, tips: int = 1) -> Iterator[Numbers]:
+    """Crack with one tip or two in 2D, order 2: solution and K, and the error bars of K."""
+    from inspect import signature
+
+    import xcrack as xc
+
+    start = (-1.2, 0.013) if tips == 1 else (-0.52, 0.013)
+    known = {"error"} & set(signature(xc.solve).parameters)
+    while True:
+        mesh = xc.box((-1, -1), (1, 1), n)
+        problem = xc.Problem(
+            mesh, xc.Isotropic(210e3, 0.3, "strain"), [xc.line_crack([start, (-0.1, 0.041)])],
+            loads=_pull(2), contact="off",
+        )  # fmt: skip
+        parts = _Parts()
+        solutions = xc.solve(problem, states=[1.0], **dict.fromkeys(known, True))
+        parts.end("solution")
+        sifs = xc.stress_intensities(solutions, **dict.fromkeys(known, False))
+        parts.end("K")
+        if known:
+            from xcrack.sif.error import with_bars
+
+            with_bars(solutions, sifs, 0)
+            parts.end("bars")
+        K = np.concatenate([s.K.ravel() for s in sifs]).tolist()
+        yield {
+            "K": K, "pressure": [], "closed": [], "unknowns": solutions[0].n_dof,
+            "parts": parts.seconds,
+        }  # fmt: skip
 
 
 def growth(n: int, contact: str, first: bool = False) -> Iterator[Numbers]:
@@ -194,6 +228,19 @@ SCENES |= {
 }
 
 
+BARS: dict[str, Callable[[], Iterator[Numbers]]] = {  # with error bars of K
+    "bars 5 k": lambda: bars(22),
+    "bars 10 k": lambda: bars(33),
+    "bars 20 k": lambda: bars(48),
+    "bars 39 k": lambda: bars(67),
+    "bars 5 k, two tips": lambda: bars(22, 2),
+    "bars 10 k, two tips": lambda: bars(33, 2),
+    "bars 20 k, two tips": lambda: bars(48, 2),
+    "bars 39 k, two tips": lambda: bars(67, 2),
+}
+SCENES |= BARS
+
+
 def serve(name: str) -> None:
     """Run a round for each line read; print its processor time, memory and numbers."""
     import resource
@@ -255,21 +302,34 @@ def compare(name: str, other: Path, rounds: int) -> Numbers:
         "peak_MB": [last[0]["peak"], last[1]["peak"]],
         "K_apart": _apart(last[0]["K"], last[1]["K"]),
         "pressure_apart": _apart(last[0]["pressure"], last[1]["pressure"]),
+        "bars": _share(results) if name in BARS else [],
         "same_sets": last[0]["closed"] == last[1]["closed"],
         "parts": {
-            part: [median(r["parts"][part] for r in runs) for runs in results]
+            part: [median(r["parts"].get(part, 0.0) for r in runs) for runs in results]
             for part in new[0].get("parts", {})
         },
     }
+
+
+def _share(runs: list[list[Numbers]]) -> list[float]:
+    """What bars take of the time of solution and K of this code, and of the other's."""
+    shares = []
+    for other in runs:
+        pairs = [(a["parts"], b["parts"]) for a, b in zip(runs[0], other)]
+        shares.append(median(a["bars"] / (b["solution"] + b["K"]) for a, b in pairs))
+    return shares
 
 
 def main() -> None:
     """Compare scenes and print a table."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("other", nargs="?", type=Path)
-    parser.add_argument("--scenes", nargs="*", default=[s for s in SCENES if s not in SIZES])
+    parser.add_argument(
+        "--scenes", nargs="*", default=[s for s in SCENES if s not in {**SIZES, **BARS}]
+    )
     parser.add_argument("--sizes", action="store_true", help="scenes by size, with parts")
     parser.add_argument("--most", type=int, default=120_000, help="unknowns of --sizes")
+    parser.add_argument("--bars", action="store_true", help="what error bars of K take")
     parser.add_argument("--rounds", type=int, default=7)
     parser.add_argument("--json", type=Path)
     parser.add_argument("--serve", help=argparse.SUPPRESS)
@@ -279,6 +339,8 @@ def main() -> None:
         return
     if options.sizes:
         options.scenes = [name for name, size in SIZES.items() if size <= options.most]
+    if options.bars:
+        options.scenes = list(BARS)
     table: dict[str, Numbers] = {}
     print(f"{'scene':28} unknowns   seconds  other   ratio (range)      peak MB      K     p  sets")
     for name in options.scenes:
@@ -291,6 +353,8 @@ def main() -> None:
             f"{'same' if row['same_sets'] else 'other'}",
             flush=True,
         )
+        if row["bars"]:
+            print("    bars: {:.1%} of solution and K, {:.1%} of the other's".format(*row["bars"]))
         if options.sizes:
             parts = [f"{part} {a:.3f} ({b:.3f})" for part, (a, b) in row["parts"].items()]
             print("    " + ", ".join(parts), flush=True)

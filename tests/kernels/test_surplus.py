@@ -22,7 +22,17 @@ def test_factors_of_the_ring():
     r, theta = np.hypot(*xi.T), np.arctan2(xi[:, 1], xi[:, 0])
     frame = np.array([[0.6, 0.8], [-0.8, 0.6]])
     modes = mode_matrix(STEEL.kolosov, STEEL.mu)
-    result = ring_factors(xi, theta, w, 0.9, 0.2, frame, modes, STEEL.lam, STEEL.mu)
+    corners, cells, tip = (
+        np.array([[-3.0, -3.0], [5.0, -3.0], [-3.0, 5.0]]),
+        np.arange(3),
+        [0.3, 0.2],
+    )
+    local = (xi @ frame + tip - corners[0]) / 8
+    bary = np.column_stack([1 - local.sum(axis=1), local])
+    result = ring_factors(
+        np.zeros(40, dtype=int), bary, np.zeros(40, dtype=int), w, corners, cells[None],
+        np.ones(3), np.array(tip), 0.9, 0.2, frame, modes, STEEL.lam, STEEL.mu,
+    )  # fmt: skip
     _, dq = weight(r, xi, np.array([0.2]), np.array([0.9]))
     for m, g in enumerate(unit_gradients(r, theta, STEEL.kolosov, STEEL.mu)[:2]):
         sigma = STEEL.stress(g)

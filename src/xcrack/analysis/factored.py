@@ -1,6 +1,6 @@
 """What a solve keeps where errors are asked for: its factor, and the contact of all states."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from xcrack.contact.result import ContactSolution
@@ -21,12 +21,15 @@ class Factored:
         Rigid motions that were removed.
     contact : ContactSolution
         Of all states.
+    around_tips : dict
+        Points around tips with the functions there, once K has asked for them.
     """
 
     model: Model
     engine: Engine
     motion: Motion
     contact: ContactSolution
+    around_tips: dict[Any, Any] = field(default_factory=dict)
 
     def __reduce__(self) -> tuple[Any, ...]:
         # A factor holds addresses: a solution in another process has none.

@@ -7,6 +7,7 @@ import numpy as np
 from xcrack.analysis.solution import Solution
 from xcrack.arrays import Floats, Ints
 from xcrack.xfem.function_space import FunctionSpace
+from xcrack.xfem.tabulated import Tabulated
 
 
 @dataclass(frozen=True, eq=False)
@@ -15,16 +16,12 @@ class GoalPoints:
 
     Attributes
     ----------
-    cell : (q,) array of int
-    bary : (q, 3) array
-    side : (q, cracks) array of int
+    at : Tabulated
     factor : (q, 2, 2, m) array
         By component and derivative; weights included.
     """
 
-    cell: Ints
-    bary: Floats
-    side: Ints
+    at: Tabulated
     factor: Floats
 
 
@@ -79,8 +76,7 @@ class Goal:
         turn = np.zeros(m)
         for part in self.parts:
             turn += (part.factor[:, 0, 1] - part.factor[:, 1, 0]).sum(axis=0)
-            for batch, number, row in space.batches_of_points(part.cell):
-                _, slope = space.tabulate(batch, row, part.bary[number], part.side[number])
+            for batch, number, row, slope in part.at.batches:
                 add_to_functions(total, batch.functions, row, number, slope, part.factor)
         for plain in self.cells:
             turn += plain.turn

@@ -144,7 +144,8 @@ def goal_residual(surplus: Surplus, goal: Goal) -> Floats:
 
     result = np.zeros((len(surplus.fixed), 2, goal.pressure.shape[1]))
     for part in goal.parts:
-        add_functional(result, part.cell, part.bary, part.side, part.factor, *surplus.arrays)
+        at = part.at.points
+        add_functional(result, at.cell, at.bary, at.side, part.factor, *surplus.arrays)
     for plain in goal.cells:
         functions = surplus.functions[plain.cells]
         factor = np.ones(functions.shape)

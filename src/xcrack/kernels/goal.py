@@ -8,47 +8,70 @@ from xcrack.kernels.jit import kernel
 
 
 @kernel
+def _half_angle(x, y, r, behind, side):  # type: ignore[no-untyped-def]
+    """Cosine and sine of half the angle, continued along a lip that bends.
+
+    Without trigonometry; the larger of the two by the root.
+    """
+    if x >= 0.0:
+        c = math.sqrt(0.5 * (1.0 + x / r))
+        s = 0.5 * y / (r * c)
+    else:
+        s = math.copysign(math.sqrt(0.5 * (1.0 - x / r)), y)
+        c = 0.5 * y / (r * s)
+    if behind and side * s < 0.0:
+        return -c, -s
+    return c, s
+
+
+@kernel
 def _factor(  # type: ignore[no-untyped-def]
-    x, y, c, s, weight, outer, inner, frame, modes, lam, mu, g, result
-):
-    """Set the factors (2, 2, 2) of one point at half the angle (c, s); False where grad q is 0."""
+    x, y, behind, side, weight, outer, inner, frame, modes, lam, mu, result
+):  # fmt: skip
+    """Set the factors (2, 2, 2) of one point; False where grad q is 0."""
     r = math.sqrt(x * x + y * y)
     if r >= outer or r <= inner:
         return False
+    c, s = _half_angle(x, y, r, behind, side)
     width = outer - inner
     z = (r - inner) / width
     fall = -30.0 * z * z * (1.0 - z) * (1.0 - z) / (width * r) * weight
     dx, dy = fall * x, fall * y
     C, S = c * c - s * s, 2.0 * s * c
     root = 1.0 / math.sqrt(r)
-    value = (c, s, s * S, c * S)
-    slope = (-s / 2, c / 2, c * S / 2 + s * C, -s * S / 2 + c * C)
+    half_c, half_s = 0.5 * c, 0.5 * s
+    # Derivatives of the four tip functions along (ahead, normal).
+    x0, y0 = root * (half_c * C + half_s * S), root * (half_c * S - half_s * C)
+    x1, y1 = root * (half_s * C - half_c * S), root * (half_s * S + half_c * C)
+    slope = half_c * S + s * C
+    x2, y2 = root * (half_s * S * C - slope * S), root * (half_s * S * S + slope * C)
+    slope = c * C - half_s * S
+    x3, y3 = root * (half_c * S * C - slope * S), root * (half_c * S * S + slope * C)
     for m in range(2):
-        for i in range(2):
-            g[i, 0] = 0.0
-            g[i, 1] = 0.0
-            for f in range(4):
-                g[i, 0] += modes[m, i, f] * root * (0.5 * value[f] * C - slope[f] * S)
-                g[i, 1] += modes[m, i, f] * root * (0.5 * value[f] * S + slope[f] * C)
-        trace = lam * (g[0, 0] + g[1, 1])
-        s22 = trace + 2.0 * mu * g[1, 1]
-        s12 = mu * (g[0, 1] + g[1, 0])
-        a, b = g[0, 0], g[1, 0]
+        M = modes[m]
+        a = M[0, 0] * x0 + M[0, 1] * x1 + M[0, 2] * x2 + M[0, 3] * x3
+        b = M[1, 0] * x0 + M[1, 1] * x1 + M[1, 2] * x2 + M[1, 3] * x3
+        g01 = M[0, 0] * y0 + M[0, 1] * y1 + M[0, 2] * y2 + M[0, 3] * y3
+        g11 = M[1, 0] * y0 + M[1, 1] * y1 + M[1, 2] * y2 + M[1, 3] * y3
+        s22 = lam * (a + g11) + 2.0 * mu * g11
+        s12 = mu * (g01 + b)
         trace = lam * (a * dx + b * dy)
         f00 = trace + 2.0 * mu * a * dx + s12 * dy
         f11 = trace + 2.0 * mu * b * dy - dx * s22
         f01 = mu * (a * dy + b * dx) - dx * s12
         f10 = mu * (a * dy + b * dx) + s22 * dy
         for i in range(2):
+            first = frame[0, i] * f00 + frame[1, i] * f10
+            second = frame[0, i] * f01 + frame[1, i] * f11
             for j in range(2):
-                result[i, j, m] = frame[0, i] * (f00 * frame[0, j] + f01 * frame[1, j]) + frame[
-                    1, i
-                ] * (f10 * frame[0, j] + f11 * frame[1, j])
+                result[i, j, m] = first * frame[0, j] + second * frame[1, j]
     return True
 
 
 @kernel
-def ring_factors(xi, theta, weight, outer, inner, frame, modes, lam, mu):  # type: ignore[no-untyped-def]
+def ring_factors(  # type: ignore[no-untyped-def]
+    cell, bary, side, weight, points, cells, psi, tip, outer, inner, frame, modes, lam, mu
+):  # fmt: skip
     """Factors B of the displacement gradient in the domain integrals of modes I and II.
 
     With the unit field u^a, its stress and the weight q: B = C : (u^a_,1 x grad q) +
@@ -56,11 +79,13 @@ def ring_factors(xi, theta, weight, outer, inner, frame, modes, lam, mu):  # typ
 
     Parameters
     ----------
-    xi : (q, 2) array, length
-        Places from the tip, in its frame.
-    theta : (q,) array
-        Angle, continued along the lips.
+    cell, bary : (q,) array of int and (q, 3) array
+    side : (q,) array of int
+        Side of the crack, 0 where unknown; it counts in cells behind the tip, where psi < 0.
     weight : (q,) array
+    points, cells : (n, 2) and (m, 3) arrays
+    psi : (n,) array
+    tip : (2,) array, length
     outer, inner : float, length
         The weight q falls from one to zero by a quintic between inner and outer.
     frame : (2, 2) array
@@ -73,12 +98,18 @@ def ring_factors(xi, theta, weight, outer, inner, frame, modes, lam, mu):  # typ
     (q, 2, 2, 2) array
         Component, derivative, mode; zero where grad q is.
     """
-    result, g = np.zeros((len(weight), 2, 2, 2)), np.empty((2, 2))
+    result = np.zeros((len(weight), 2, 2, 2))
     for p in range(len(weight)):
-        c, s = math.cos(0.5 * theta[p]), math.sin(0.5 * theta[p])
+        dx, dy, psi_sum = -tip[0], -tip[1], 0.0
+        for b in range(3):
+            node = cells[cell[p], b]
+            dx += bary[p, b] * points[node, 0]
+            dy += bary[p, b] * points[node, 1]
+            psi_sum += psi[node]
+        x, y = frame[0, 0] * dx + frame[0, 1] * dy, frame[1, 0] * dx + frame[1, 1] * dy
         _factor(
-            xi[p, 0], xi[p, 1], c, s, weight[p], outer, inner, frame, modes, lam, mu, g, result[p]
-        )
+            x, y, psi_sum < 0.0, side[p], weight[p], outer, inner, frame, modes, lam, mu, result[p]
+        )  # fmt: skip
     return result
 
 
@@ -112,7 +143,7 @@ def plain_ring(  # type: ignore[no-untyped-def]
         Integral of B_12 - B_21 of each mode.
     """
     nodal, extra = np.zeros((len(chosen), 6, 2, 2)), np.zeros((len(chosen), 4, 2, 2))
-    turn, g, B, d = np.zeros(2), np.empty((2, 2)), np.empty((2, 2, 2)), np.empty((10, 2))
+    turn, B, d = np.zeros(2), np.empty((2, 2, 2)), np.empty((10, 2))
     for k in range(len(chosen)):
         e = chosen[k]
         G = slopes[e]
@@ -125,14 +156,8 @@ def plain_ring(  # type: ignore[no-untyped-def]
             if not inner * inner < dx * dx + dy * dy < outer * outer:
                 continue
             x, y = frame[0, 0] * dx + frame[0, 1] * dy, frame[1, 0] * dx + frame[1, 1] * dy
-            angle = math.atan2(y, x)
-            if behind and side[e] > 0 and angle < 0.0:
-                angle += 2.0 * math.pi
-            elif behind and side[e] < 0 and angle > 0.0:
-                angle -= 2.0 * math.pi
-            c, s = math.cos(0.5 * angle), math.sin(0.5 * angle)
             if not _factor(
-                x, y, c, s, share[p] * volume[e], outer, inner, frame, modes, lam, mu, g, B
+                x, y, behind, side[e], share[p] * volume[e], outer, inner, frame, modes, lam, mu, B
             ):
                 continue
             u, v, w = bary[p, 0], bary[p, 1], bary[p, 2]
@@ -199,16 +224,21 @@ def add_to_functions(total, functions, row, number, slope, factor):  # type: ign
     factor : (p, d, d, m) array
         Component, derivative, functional.
     """
-    d, functionals = factor.shape[1], factor.shape[3]
+    d, functionals, width = factor.shape[1], factor.shape[3], slope.shape[1]
+    part = np.zeros((d, functionals, width))  # of a cell: its points mostly follow one another
     for q in range(len(row)):
-        p = number[q]
-        for a in range(slope.shape[1]):
+        for i in range(d):
+            for m in range(functionals):
+                for j in range(d):
+                    B = factor[number[q], i, j, m]
+                    if B != 0.0:
+                        for a in range(width):
+                            part[i, m, a] += B * slope[q, a, j]
+        if q + 1 < len(row) and row[q + 1] == row[q]:
+            continue
+        for a in range(width):
             f = functions[row[q], a]
-            if f < 0:
-                continue
-            for i in range(d):
+            for i in range(d if f >= 0 else 0):
                 for m in range(functionals):
-                    value = 0.0
-                    for j in range(d):
-                        value += factor[p, i, j, m] * slope[q, a, j]
-                    total[f, i, m] += value
+                    total[f, i, m] += part[i, m, a]
+        part[:] = 0.0

@@ -51,17 +51,22 @@ def times_transposed(indptr, indices, data, n_columns, x):  # type: ignore[no-un
 @kernel
 def residual(indptr, indices, data, x, b):  # type: ignore[no-untyped-def]
     """Largest norm of b - A x over that of b, of all columns `(n, k)`."""
-    largest = 0.0
-    for c in range(x.shape[1]):
-        rest, size = 0.0, 0.0
+    largest, columns = 0.0, x.shape[1]
+    for first in range(0, columns, 2):  # two at once: reading A is what takes the time
+        second = min(first + 1, columns - 1)
+        rest, size, other_rest, other_size = 0.0, 0.0, 0.0, 0.0
         for i in range(len(indptr) - 1):
-            total = 0.0
+            total, other = 0.0, 0.0
             for k in range(indptr[i], indptr[i + 1]):
-                total += data[k] * x[indices[k], c]
-            rest += (b[i, c] - total) ** 2
-            size += b[i, c] ** 2
-        share = np.sqrt(rest / size) if size > 0 else np.sqrt(rest)
-        if np.isnan(share):
-            return share
-        largest = max(largest, share)
+                total += data[k] * x[indices[k], first]
+                other += data[k] * x[indices[k], second]
+            rest += (b[i, first] - total) ** 2
+            size += b[i, first] ** 2
+            other_rest += (b[i, second] - other) ** 2
+            other_size += b[i, second] ** 2
+        for r, n in ((rest, size), (other_rest, other_size)):
+            share = np.sqrt(r / n) if n > 0 else np.sqrt(r)
+            if np.isnan(share):
+                return share
+            largest = max(largest, share)
     return largest

@@ -9,18 +9,38 @@ from xcrack.kernels.jit import kernel
 def _slopes(bary, gradient, sign, out):  # type: ignore[no-untyped-def]
     """Gradients of the four functions of a cell at a point, into `out` (4, 2)."""
     x, y, z = bary[0], bary[1], bary[2]
-    factor = np.empty((4, 3))
-    factor[0] = (sign[0] * (2 * x * y - y * y), sign[0] * (x * x - 2 * x * y), 0.0)
-    factor[1] = (sign[1] * (2 * x * z - z * z), 0.0, sign[1] * (x * x - 2 * x * z))
-    factor[2] = (0.0, sign[2] * (2 * y * z - z * z), sign[2] * (y * y - 2 * y * z))
-    factor[3] = (y * z, x * z, x * y)
+    for j in range(2):
+        gx, gy, gz = gradient[0, j], gradient[1, j], gradient[2, j]
+        out[0, j] = sign[0] * ((2 * x * y - y * y) * gx + (x * x - 2 * x * y) * gy)
+        out[1, j] = sign[1] * ((2 * x * z - z * z) * gx + (x * x - 2 * x * z) * gz)
+        out[2, j] = sign[2] * ((2 * y * z - z * z) * gy + (y * y - 2 * y * z) * gz)
+        out[3, j] = y * z * gx + x * z * gy + x * y * gz
+
+
+@kernel
+def _same(cell, side, q):  # type: ignore[no-untyped-def]
+    """Whether the next point lies in the same cell, on the same sides."""
+    if q + 1 == len(cell) or cell[q + 1] != cell[q]:
+        return False
+    for c in range(side.shape[1]):
+        if side[q + 1, c] != side[q, c]:
+            return False
+    return True
+
+
+@kernel
+def _hand_over(part, residual, functions, copy, crack, side):  # type: ignore[no-untyped-def]
+    """Add the part (2, m, 4) of a cell to its functions and their copies, and clear it."""
     for a in range(4):
-        for j in range(2):
-            out[a, j] = (
-                factor[a, 0] * gradient[0, j]
-                + factor[a, 1] * gradient[1, j]
-                + factor[a, 2] * gradient[2, j]
-            )
+        f = functions[a]
+        h = copy[f]
+        jump = float(side[crack[f]])
+        for i in range(2):
+            for m in range(part.shape[1]):
+                residual[f, i, m] += part[i, m, a]
+                if h >= 0:
+                    residual[h, i, m] += jump * part[i, m, a]
+    part[:] = 0.0
 
 
 @kernel
@@ -42,20 +62,18 @@ def add_functional(residual, cell, bary, side, factor, functions, sign, copy, cr
         Number of each function's copy, negative where there is none, and whose side it takes.
     gradient : (cells, 3, 2) array
     """
-    slope = np.empty((4, 2))
+    slope, part = np.empty((4, 2)), np.zeros((2, factor.shape[3], 4))
     for q in range(len(cell)):
         e = cell[q]
-        _slopes(bary[q], gradient[e], sign[e], slope)
-        for a in range(4):
-            f = functions[e, a]
-            h = copy[f]
-            jump = float(side[q, crack[f]]) if h >= 0 else 0.0
+        if factor[q, 0, 0, 0] != 0.0 or factor[q].any():
+            _slopes(bary[q], gradient[e], sign[e], slope)
             for i in range(2):
                 for m in range(factor.shape[3]):
-                    value = factor[q, i, 0, m] * slope[a, 0] + factor[q, i, 1, m] * slope[a, 1]
-                    residual[f, i, m] += value
-                    if h >= 0:
-                        residual[h, i, m] += jump * value
+                    first, second = factor[q, i, 0, m], factor[q, i, 1, m]
+                    for a in range(4):
+                        part[i, m, a] += first * slope[a, 0] + second * slope[a, 1]
+        if not _same(cell, side, q):
+            _hand_over(part, residual, functions[e], copy, crack, side[q])
 
 
 @kernel
@@ -90,8 +108,8 @@ def take_stress(  # type: ignore[no-untyped-def]
         Gradients of the displacements of each column.
     lam, mu : float
     """
-    slope = np.empty((4, 2))
-    both = lam + 2.0 * mu
+    slope, part = np.empty((4, 2)), np.zeros((2, strain.shape[3], 4))
+    both, own = lam + 2.0 * mu, np.zeros((4, 3))
     for q in range(len(cell)):
         e, w = cell[q], weight[q]
         _slopes(bary[q], gradient[e], sign[e], slope)
@@ -102,21 +120,19 @@ def take_stress(  # type: ignore[no-untyped-def]
             s00, s11 = w * (trace + 2.0 * mu * g00), w * (trace + 2.0 * mu * g11)
             s01 = w * mu * (g01 + g10)
             for a in range(4):
-                f = functions[e, a]
-                first = s00 * slope[a, 0] + s01 * slope[a, 1]
-                second = s01 * slope[a, 0] + s11 * slope[a, 1]
-                residual[f, 0, m] -= first
-                residual[f, 1, m] -= second
-                h = copy[f]
-                if h >= 0:
-                    jump = float(side[q, crack[f]])
-                    residual[h, 0, m] -= jump * first
-                    residual[h, 1, m] -= jump * second
+                part[0, m, a] -= s00 * slope[a, 0] + s01 * slope[a, 1]
+                part[1, m, a] -= s01 * slope[a, 0] + s11 * slope[a, 1]
+        for a in range(4):
+            x, y = slope[a, 0], slope[a, 1]
+            own[a, 0] += w * (both * x * x + mu * y * y)
+            own[a, 1] += w * (both * y * y + mu * x * x)
+            own[a, 2] += w * (lam + mu) * x * y
+        if _same(cell, side, q):
+            continue
+        _hand_over(part, residual, functions[e], copy, crack, side[q])
         for a in range(4):
             f = functions[e, a]
-            x, y = slope[a, 0], slope[a, 1]
-            k00, k11 = w * (both * x * x + mu * y * y), w * (both * y * y + mu * x * x)
-            k01 = w * (lam + mu) * x * y
+            k00, k11, k01 = own[a, 0], own[a, 1], own[a, 2]
             block = blocks[f]
             block[0, 0] += k00
             block[1, 1] += k11
@@ -136,6 +152,7 @@ def take_stress(  # type: ignore[no-untyped-def]
                 block[3, 0] += jump * k01
                 block[1, 2] += jump * k01
                 block[2, 1] += jump * k01
+        own[:] = 0.0
 
 
 @kernel

@@ -1,11 +1,11 @@
 """K at a tip of a solution in 2D: the domain of the integrals, its points, and the SIF."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
 from xcrack.analysis.solution import Solution
-from xcrack.arrays import Floats, Ints
+from xcrack.arrays import Floats
 from xcrack.mesh.locate import nearest_boundary
 from xcrack.scene.conditions import BodyForce, InitialStress
 from xcrack.sif.accuracy import Domain, check
@@ -19,9 +19,8 @@ from xcrack.sif.interaction_2d import (
     ring_around,
     volume_terms,
 )
+from xcrack.sif.ring_2d import class_points, ring_classes, ring_parts
 from xcrack.sif.sif import SIF
-from xcrack.xfem.function_space import FunctionSpace
-from xcrack.xfem.quadrature import Points, cell_points
 
 _OUTER = {1: 2.5, 2: 2.5}  # outer radius, as a multiple of the enriched radius
 _SECOND = 0.7  # outer radius of the second domain, as a share of the first
@@ -32,9 +31,6 @@ _DIFFER = 0.01  # difference of the two domains, as a share of K, that gives a w
 # the former and in no more of the latter (benchmarks/warnings_of_K.py).
 _ROOM = {1: 3.5, 2: 0.9}
 _SHORT_OPEN, _SHORT_CONTACT = 2.0, 3.5
-# Cells up to a share of the outer radius: points a direction with tip functions, degree without.
-_DEGREES = ((0.0, 0.03, 4, 4), (0.03, 0.1, 5, 6), (0.1, 0.25, 5, 8), (0.25, np.inf, 5, 10))
-_CHUNK = 4000  # cells integrated at once; bounds the memory
 
 
 def tip_intensity(solutions: Sequence[Solution], t: int) -> list[SIF]:
@@ -50,7 +46,7 @@ def tip_intensity(solutions: Sequence[Solution], t: int) -> list[SIF]:
     tip = solutions[0].space.tips[t]
     domain = domain_of(solutions[0], t)
     outer = domain.outer
-    radii = np.array([outer, max(_SECOND * outer, min(outer, 1.5 * domain.size))])
+    radii = radii_of(domain)
     E_prime = solutions[0].problem.material.E_prime
     result = []
     for solution, values in zip(solutions, _integrals(solutions, t, radii), strict=True):
@@ -73,6 +69,12 @@ def tip_intensity(solutions: Sequence[Solution], t: int) -> list[SIF]:
     return result
 
 
+def radii_of(domain: Domain) -> Floats:
+    """Outer radii of the two domains `(2,)`."""
+    outer = domain.outer
+    return np.array([outer, max(_SECOND * outer, min(outer, 1.5 * domain.size))])
+
+
 def _integrals(solutions: Sequence[Solution], t: int, radii: Floats) -> Floats:
     """I of modes I, II and of the point force for each state and domain `(s, radii, 3)`."""
     space, tip = solutions[0].space, solutions[0].space.tips[t]
@@ -81,37 +83,15 @@ def _integrals(solutions: Sequence[Solution], t: int, radii: Floats) -> Floats:
     total = lip_terms(solutions, ring)
     # Within the inner radius grad q vanishes.
     hollow = float(ring.inner.min())
-    for cells, n, degree in ring_classes(space, tip.x, hollow, outer):
-        plain = space.signature[cells] == 0
-        total += plain_terms(solutions, ring, cells[plain], degree)
-        for points in class_points(space, cells[~plain], n, degree):
-            total += point_terms(solutions, ring, points)
+    for part in ring_parts(solutions[0], t, hollow, outer):
+        total += plain_terms(solutions, ring, part.plain, part.degree)
+        for tabulated in part.others:
+            total += point_terms(solutions, ring, tabulated)
     if acts(solutions, BodyForce, InitialStress):
         for cells, n, degree in ring_classes(space, tip.x, 0.0, outer):
             for points in class_points(space, cells, n, degree):
                 total += volume_terms(solutions, ring, points)
     return total
-
-
-def ring_classes(
-    space: FunctionSpace, centre: Floats, hollow: float, radius: float
-) -> Iterator[tuple[Ints, int, int]]:
-    """Cells between two radii by size, points a direction with tip functions, degree without."""
-    from xcrack.kernels.ring import cells_between
-
-    mesh = space.mesh
-    near = cells_between(mesh.points, mesh.cells, mesh.cell_size, centre, hollow, radius)
-    share = mesh.cell_size[near] / radius
-    for low, high, n, degree in _DEGREES:
-        cells = near[(share > low) & (share <= high)]
-        if len(cells):
-            yield cells, n, degree
-
-
-def class_points(space: FunctionSpace, cells: Ints, n: int, degree: int) -> Iterator[Points]:
-    """Integration points of cells, of some cells at once."""
-    for first in range(0, len(cells), _CHUNK):
-        yield cell_points(space, cells[first : first + _CHUNK], n, degree)
 
 
 def domain_of(solution: Solution, t: int) -> Domain:

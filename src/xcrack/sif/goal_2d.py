@@ -15,10 +15,12 @@ from xcrack.estimation.goal import Goal, GoalCells, GoalPoints
 from xcrack.mesh.simplex import simplex_rule
 from xcrack.scene.conditions import BodyForce, InitialStress
 from xcrack.sif.common import acts, weight
-from xcrack.sif.domain_2d import class_points, domain_of, ring_classes
+from xcrack.sif.domain_2d import domain_of, radii_of
 from xcrack.sif.interaction_2d import ahead_derivative, inner_radii, ring_around, volume_terms
-from xcrack.xfem.loads import position
+from xcrack.sif.ring_2d import class_points, ring_classes, ring_parts
+from xcrack.xfem.quadrature import Points
 from xcrack.xfem.sides import lip_side
+from xcrack.xfem.tabulated import tabulated
 from xcrack.xfem.williams import continued_polar, mode_matrix, unit_gradients
 
 _STRAIGHT = 1e-9  # share of the radius below which a face is on the line through the tip
@@ -38,8 +40,9 @@ def tip_goal(solution: Solution, t: int) -> Goal:
 
     space, material = solution.space, solution.problem.material
     mesh, tip = space.mesh, space.tips[t]
-    outer = domain_of(solution, t).outer
-    inner = float(inner_radii(space.order, np.array([outer]))[0])
+    radii = radii_of(domain_of(solution, t))
+    outer, hollow = float(radii.max()), float(inner_radii(space.order, radii).min())
+    inner = float(inner_radii(space.order, radii[:1])[0])
     cut = space.cuts[tip.crack]
     psi = cut.level_set.psi[tip.number]
     ring = (
@@ -48,20 +51,20 @@ def tip_goal(solution: Solution, t: int) -> Goal:
         material.lam, material.mu,
     )  # fmt: skip
     parts, plain_parts = [], []
-    for cells, n, degree in ring_classes(space, tip.x, inner, outer):
-        plain = space.signature[cells] == 0
-        if plain.any():
+    for part in ring_parts(solution, t, hollow, outer):
+        if len(part.plain):
             integrals = plain_ring(
-                cells[plain], mesh.points, mesh.cells, mesh.gradient, mesh.volume, cut.side, psi,
-                *simplex_rule(2, degree), tip.x, *ring,
+                part.plain, mesh.points, mesh.cells, mesh.gradient, mesh.volume, cut.side, psi,
+                *simplex_rule(2, part.degree), tip.x, *ring,
             )  # fmt: skip
-            plain_parts.append(GoalCells(cells[plain], *integrals))
-        for points in class_points(space, cells[~plain], n, degree):
-            xi = (position(space, points.cell, points.bary) - tip.x) @ tip.frame.T
-            behind = psi[mesh.cells[points.cell]].mean(axis=1) < 0
-            _, theta = continued_polar(xi, points.side[:, tip.crack], behind)
-            factor = ring_factors(xi, theta, points.weight, *ring)
-            parts.append(GoalPoints(points.cell, points.bary, points.side, factor))
+            plain_parts.append(GoalCells(part.plain, *integrals))
+        for at in part.others:
+            points = at.points
+            factor = ring_factors(
+                points.cell, points.bary, points.side[:, tip.crack], points.weight,
+                mesh.points, mesh.cells, psi, tip.x, *ring,
+            )  # fmt: skip
+            parts.append(GoalPoints(at, factor))
     on_crack, pressure, _ = _faces(solution, t, outer, inner)
     rotation = _rotation(solution, t, outer)
     return Goal((*parts, *on_crack), tuple(plain_parts), rotation, tip.crack, pressure)
@@ -131,7 +134,8 @@ def _faces(
             local[:, :, 0] -= np.einsum("qij,qj->qi", sigma, outward)
             factor[..., m] = np.einsum("q,ai,qab,bj->qij", w, R, local, R)
         if bent:
-            parts.append(GoalPoints(cell, bary, side, factor))
+            at = tabulated(space, Points(cell, bary, lips.weight[near], side))
+            parts.append(GoalPoints(at, factor))
     return parts, pressure, per_stress
 
 

@@ -27,6 +27,7 @@ from xcrack.sif.common import acts, lip_pressure, lip_shear, mean_rotation, weig
 from xcrack.xfem.loads import position
 from xcrack.xfem.quadrature import Points
 from xcrack.xfem.sides import lip_side
+from xcrack.xfem.tabulated import Tabulated
 from xcrack.xfem.williams import continued_polar, mode_matrix, unit_gradients
 
 # Inner radius of the ring in which q falls, as a share of the outer one. At order 1 the ring stays
@@ -116,13 +117,13 @@ def plain_terms(solutions: Sequence[Solution], ring: Ring, cells: Ints, degree: 
     return result
 
 
-def point_terms(solutions: Sequence[Solution], ring: Ring, points: Points) -> Floats:
+def point_terms(solutions: Sequence[Solution], ring: Ring, tabulated: Tabulated) -> Floats:
     """Domain integrals over points of any cells `(s, radii, 3)`."""
     from xcrack.kernels.ring import add_points
 
     space = solutions[0].space
     mesh, tip = space.mesh, space.tips[ring.t]
-    gradient = gradients_at(space, ring.coefficients, points.cell, points.bary, points.side)
+    points, gradient = tabulated.points, tabulated.gradients(ring.coefficients)
     result = np.zeros((len(solutions), len(ring.radii), 3))
     add_points(
         result, gradient, points.cell, points.bary, points.side[:, tip.crack], points.weight,
