@@ -25,6 +25,10 @@ class GeometryError(XcrackError):
     """A crack that cannot be modelled: outside the body, of zero length, crossing itself."""
 
 
+class CoarseMeshError(GeometryError):
+    """A crack that the mesh is too coarse for: a finer one, as `adapt` makes it, may hold it."""
+
+
 class ProblemError(XcrackError):
     """A scene that is not well posed: supports, loads, material or options that do not fit."""
 

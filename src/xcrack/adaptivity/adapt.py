@@ -11,6 +11,7 @@ import numpy as np
 from xcrack.adaptivity import next_2d, next_3d
 from xcrack.adaptivity.adapted import Adapted, Round
 from xcrack.adaptivity.measured import Measured, measured
+from xcrack.adaptivity.resolved import resolved
 from xcrack.analysis.plan import LIPS
 from xcrack.errors import GeometryError, ProblemError, collected_warnings, warn
 from xcrack.inputs import entries, flag, number, whole
@@ -90,6 +91,7 @@ def adapt(
         most = whole(max_unknowns, "adapt: max_unknowns", least=1, most=10**9)
     if not (isinstance(progress, str) and progress == "always"):
         flag(progress, 'adapt: progress, if it is not "always",')
+    problem = resolved(problem)
     _check_scene(problem)
     wanted = [None] if states is None else entries(states, "states")
     scene = replace(problem, mesh=_FIRST[problem.mesh.dim](problem), order=_ORDER)

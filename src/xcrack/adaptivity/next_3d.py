@@ -10,7 +10,10 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial import cKDTree
 
+from xcrack.adaptivity.fronts_3d import between, graded, with_room
 from xcrack.adaptivity.measured import Measured, live_states
+from xcrack.adaptivity.outlines_3d import CELLS
+from xcrack.adaptivity.resolved import resolved
 from xcrack.arrays import Floats
 from xcrack.crack.crack import Crack
 from xcrack.crack.size_3d import surface_size
@@ -21,36 +24,60 @@ from xcrack.scene.problem import Problem
 from xcrack.sif.bars import Bars
 from xcrack.sif.sif import SIF
 
-# Cells of a crack's size (half the radius of a penny) along its fronts in the first mesh, by their
-# longest edges.
-_CELLS = 1.25
-_PLATEAU = 2.0  # cells around a front that are as small as those at it
-_SLOPE = 0.5
-_FINER = 1.5
+_LEAST, _MOST = 1.5, 2.0  # times finer in a round: what less changes is no bar
+_POWER = 2.5  # of the cells' size with which bars fall at order 2, on graded meshes (measured)
+_SMALLER = 1.3  # times finer that cells are at least where 1.5 was asked for
 
 
 def first_mesh(problem: Problem, coarser: float = 1.0) -> Mesh:
     """The mesh of a scene in 3D, finer along fronts where it is coarser than the crack is small."""
-    size = [coarser * first_size(crack, problem.mesh) for crack in problem.placed]
-    return _graded(problem, size)
+    problem = resolved(problem)
+    places, sizes = _first_sizes(problem)
+    return refine(problem.mesh, size=graded(places, [coarser * size for size in sizes]))
 
 
 def first_size(crack: Crack, mesh: Mesh) -> float:
     """Longest edge of cells along the fronts of a placed crack that just see it, length."""
-    return float(surface_size(crack, mesh) / _CELLS)
+    return float(surface_size(crack, mesh) / CELLS)
 
 
 def next_mesh(now: Measured, tolerance: float, aim: float, most: int) -> Mesh | None:
-    """A finer mesh, or None where it would have too many unknowns."""
-    del tolerance, aim
+    """A finer mesh along fronts whose bars are too long, or None where it would be too large."""
     problem = now.problem
-    size = [
-        float(np.median(cell_sizes(problem.mesh, _front(problem, c)))) / _FINER
-        for c in range(len(problem.cracks))
-    ]
-    mesh = _graded(problem, size)
+    places, first = _first_sizes(problem)
+    sizes = []
+    for c, (x, size) in enumerate(zip(places, first, strict=True)):
+        if len(x):
+            present = float(np.median(cell_sizes(problem.mesh, x) / size))
+            size = size * min(present, 1.0) / _finer(now, c, tolerance, aim)
+        sizes.append(size)
+    mesh = refine(problem.mesh, size=graded(places, sizes))
     each = now.solutions[0].space.n_dof / len(problem.mesh.cells)
     return mesh if each * len(mesh.cells) <= most else None
+
+
+def _finer(now: Measured, c: int, tolerance: float, aim: float) -> float:
+    """How many times smaller the cells along the fronts of a crack are to be."""
+    error = error_of(now, c)
+    if error <= tolerance:
+        return 1.0
+    if not np.isfinite(error):
+        return _LEAST
+    return float(np.clip((error / (aim * tolerance)) ** (1 / _POWER), _LEAST, _MOST))
+
+
+def error_of(given: Measured, c: int) -> float:
+    """Largest half-width of K along the fronts of a crack, over the largest K of all.
+
+    Nan where there is none.
+    """
+    bars = [np.zeros(1)]
+    for k in live_states(given):
+        sif = given.sifs[k][c]
+        own = sif.bar[~sif.at_surface]
+        bars.append(own.max(axis=1) if len(own) or not len(sif.K) else np.full(1, np.nan))
+    scale = np.abs(given.best).max(initial=0.0)
+    return float(np.concatenate(bars).max() / scale) if scale > 0 else float("nan")
 
 
 def trusted(new: Measured, old: Measured | None) -> Measured:
@@ -58,15 +85,19 @@ def trusted(new: Measured, old: Measured | None) -> Measured:
 
     At order 2 the error falls by more than half where cells become smaller by 1.5, so that the
     change is above the error that is left. One place may agree by chance: the root mean square
-    along the front is the least.
+    along the front is the least. Fronts whose cells have stayed keep the bars that they had, or
+    take what the finer cells elsewhere have changed.
     """
     if old is None:
         return new
     live = live_states(new)
+    finer = [
+        _sizes_at(old, c) >= _SMALLER * _sizes_at(new, c) for c in range(len(new.problem.cracks))
+    ]
     sifs = tuple(
         tuple(
-            _shorter(sif, before) if k in live else sif
-            for sif, before in zip(state, states_before, strict=True)
+            _shorter(sif, before, finer[c]) if k in live else sif
+            for c, (sif, before) in enumerate(zip(state, states_before, strict=True))
         )
         for k, (state, states_before) in enumerate(zip(new.sifs, old.sifs, strict=True))
     )
@@ -76,41 +107,46 @@ def trusted(new: Measured, old: Measured | None) -> Measured:
     return replace(new, sifs=sifs, bar=np.concatenate(rows))
 
 
-def _shorter(sif: SIF, before: SIF) -> SIF:
+def _sizes_at(given: Measured, c: int) -> float:
+    """Median of the cells along the fronts of a crack, length; 0 where there is none."""
+    x = _front(given.problem.placed[c])
+    return float(np.median(cell_sizes(given.problem.mesh, x))) if len(x) else 0.0
+
+
+def _shorter(sif: SIF, before: SIF, finer: bool) -> SIF:
+    """Bars by the change, as far as two meshes have K at the same places."""
     bar = np.array(sif.bar)
-    inside = ~sif.at_surface
+    inside, there = ~sif.at_surface, ~before.at_surface
+    if not there.any():
+        return sif
+    nearest = np.nonzero(there)[0][cKDTree(before.x[there]).query(sif.x)[1]]
+    every = np.abs(sif.best - before.best[nearest])
     for front in np.unique(sif.front):
-        own, other = (sif.front == front) & inside, (before.front == front) & ~before.at_surface
-        if not own.any() or not other.any():
+        own = (sif.front == front) & inside
+        if not own.any():
             continue
-        nearest = cKDTree(before.x[other]).query(sif.x[own])[1]
-        change = np.abs(sif.best[own] - before.best[other][nearest])
-        bar[own] = np.minimum(bar[own], np.maximum(change, np.sqrt((change**2).mean(axis=0))))
+        change = every[own]
+        change = np.maximum(change, np.sqrt((change**2).mean(axis=0)))
+        if not finer:
+            change = np.maximum(change, before.bar[nearest][own])
+        bar[own] = np.fmin(bar[own], change)
     bar[sif.closed, 0] = sif.bar[sif.closed, 0]
     return replace(sif, errors=Bars(sif.eta, bar, sif.reasons))
 
 
-def _front(problem: Problem, c: int) -> Floats:
-    """Points of the fronts of a crack, closer than its edges."""
-    crack = problem.placed[c]
-    parts = [np.zeros((0, 3))]
-    for front in crack.fronts or ():
-        x = crack.points[front]
-        share = np.linspace(0, 1, 4)[:, None, None]
-        parts.append((x[:-1] + share * (x[1:] - x[:-1])).reshape(-1, 3))
-    return np.concatenate(parts)
-
-
-def _graded(problem: Problem, size: list[float]) -> Mesh:
-    trees = [
-        (cKDTree(_front(problem, c)), h) for c, h in enumerate(size) if len(_front(problem, c))
+def _first_sizes(problem: Problem) -> tuple[list[Floats], list[Floats]]:
+    """Places along the fronts of each crack, and the longest edges of the first mesh there."""
+    places = [_front(crack) for crack in problem.placed]
+    sizes = [
+        np.full(len(x), first_size(crack, problem.mesh))
+        for x, crack in zip(places, problem.placed, strict=True)
     ]
+    return places, with_room(places, sizes)
 
-    def wanted(x: Floats) -> Floats:
-        each = [h + _SLOPE * np.maximum(tree.query(x)[0] - _PLATEAU * h, 0) for tree, h in trees]
-        return np.asarray(np.min(each, axis=0))
 
-    return refine(problem.mesh, size=wanted)
+def _front(crack: Crack) -> Floats:
+    """Points of the fronts of a placed crack, closer than its edges."""
+    return between([crack.points[front] for front in crack.fronts or ()])
 
 
 __all__ = ["first_mesh", "first_size", "next_mesh", "trusted"]

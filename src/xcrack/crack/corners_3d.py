@@ -4,7 +4,7 @@ import numpy as np
 from scipy.spatial import Delaunay, cKDTree
 
 from xcrack.arrays import Bools, Floats, Ints, at
-from xcrack.errors import GeometryError
+from xcrack.errors import CoarseMeshError
 from xcrack.geometry.polygon import cross, within
 from xcrack.geometry.triangulation import face_normals, loops, on_rim
 
@@ -151,7 +151,7 @@ def _triangulated(
             (np.sort(rim, axis=1) @ np.array([len(points), 1])),
         )
         outlines = _halved(outlines, ~present)
-    raise GeometryError(
+    raise CoarseMeshError(
         f"the plane crack at {at(origin)} has an outline too narrow for rounded "
         "corners: refine the mesh there, or simplify the crack."
     )

@@ -13,7 +13,7 @@ import numpy as np
 from xcrack.arrays import Floats, at
 from xcrack.crack.crack import Crack
 from xcrack.crack.lines import crossing_points, polyline_crack
-from xcrack.errors import GeometryError
+from xcrack.errors import CoarseMeshError, GeometryError
 from xcrack.geometry.simplices import closest_on_segment
 from xcrack.mesh.locate import cells_at, contains, nearest_boundary
 from xcrack.mesh.mesh import Mesh
@@ -173,7 +173,7 @@ def _junction(c: int, end: int, cracks: tuple[Crack, ...], mesh: Mesh) -> Juncti
     again = crossing_points(np.stack([x + 1e-3 * h * ahead, x + 2 * way * ahead]), line)
     free = float(np.linalg.norm(again - x, axis=1).min(initial=np.inf)) / 2
     if free < _LEAST * h:
-        raise GeometryError(
+        raise CoarseMeshError(
             f"crack {on}, on which crack {c} ends at {at(x)}, turns back to it within "
             f"{2 * free:.4g}, two cells ({h:.4g}) or less: refine the mesh there."
         )
@@ -231,7 +231,7 @@ def _check_apart(result: list[Junction], cracks: tuple[Crack, ...], mesh: Mesh) 
             for tip in crack.tips or ():
                 apart = float(np.linalg.norm(crack.points[tip] - own.x))
                 if apart < least:
-                    raise GeometryError(
+                    raise CoarseMeshError(
                         f"crack {own.crack} ends on crack {own.on} at {at(own.x)}, {apart:.4g} "
                         f"from a tip of crack {c} at {at(crack.points[tip])} and closer than a "
                         f"cell ({least:.4g}): move it away from the tip, refine the mesh there, "

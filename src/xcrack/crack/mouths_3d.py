@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from xcrack.arrays import Bools, Floats, Ints
-from xcrack.errors import GeometryError
+from xcrack.errors import CoarseMeshError
 from xcrack.geometry.triangulation import face_normals, rim, ruled, unit
 from xcrack.mesh.body import ON, Body
 
@@ -268,7 +268,7 @@ def _check_nick(x: Floats, way: Floats, depth: Floats, size: Floats, body: Body)
     ahead, _ = body.depth(x[inside] + 0.25 * size[inside, None] * way[inside])
     bad = inside[ahead < depth[inside] - 0.01 * size[inside]]
     if len(bad):
-        raise GeometryError(
+        raise CoarseMeshError(
             f"the crack ends at {np.round(x[bad[0]], 6).tolist()}, {-depth[bad[0]]:.4g} inside the "
             f"boundary that it comes from, which is less than half a cell ({size[bad[0]]:.4g}): "
             "refine the mesh there, or leave this part of the crack out."

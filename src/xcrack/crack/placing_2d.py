@@ -8,7 +8,7 @@ from xcrack.crack.crack import Crack
 from xcrack.crack.junctions_2d import Junction, junctions
 from xcrack.crack.lines import crossing_points, touching_points
 from xcrack.crack.tips_2d import tip_frames
-from xcrack.errors import GeometryError, warn
+from xcrack.errors import CoarseMeshError, GeometryError, warn
 from xcrack.geometry.simplices import closest_on_segment
 from xcrack.mesh.locate import cell_sizes, cells_at, contains, nearest_boundary, parts_inside
 from xcrack.mesh.mesh import Mesh
@@ -73,9 +73,10 @@ def place_line(crack: Crack, mesh: Mesh) -> Crack:
     if tips:
         h = cell_sizes(mesh, points[tips])
         if length.sum() < h.min():
-            raise GeometryError(
+            raise CoarseMeshError(
                 f"the crack at {points[tips[0]].tolist()} has length {length.sum():.4g}, less than "
-                f"the cell there ({h.min():.4g}): refine the mesh around it or leave it out."
+                f"the cell there ({h.min():.4g}): refine the mesh around it (adapt does), or leave "
+                "it out."
             )
     return placed
 
@@ -105,7 +106,7 @@ def _check_inside(points: Floats, mesh: Mesh) -> None:
             continue  # across a hole or a notch
         _, size = nearest_boundary(mesh, ends[0])
         if chord < size:
-            raise GeometryError(
+            raise CoarseMeshError(
                 f"the crack leaves the body by its kink at {at(kinks[0])} and comes back only "
                 f"{chord:.4g} beside, less than a cell ({size:.4g}): refine the mesh there, or "
                 "move the kink inside."
@@ -120,7 +121,7 @@ def _check_inside(points: Floats, mesh: Mesh) -> None:
 def _check_mouth(end: Floats, gap: float, size: float, way: float) -> None:
     """Raise or warn where an end inside the body is taken for a mouth, but may not be meant so."""
     if way > _WAY * size:
-        raise GeometryError(
+        raise CoarseMeshError(
             f"the crack runs along the boundary: it ends at {at(end)}, {gap:.4g} from it and less "
             f"than half a cell ({size:.4g}), but would leave the body only after {way:.4g}. Move "
             "it inside or refine the mesh there. A crack on the symmetry plane of a half model "
@@ -138,7 +139,7 @@ def _check_nick(mesh: Mesh, end: Floats, out: Floats, gap: float, size: float) -
     """Raise where a crack has just come in through the boundary that its end is close to."""
     ahead = end + 0.25 * size * out
     if contains(mesh, ahead[None])[0] and nearest_boundary(mesh, ahead)[0] > gap + 0.01 * size:
-        raise GeometryError(
+        raise CoarseMeshError(
             f"the crack ends at {at(end)}, {gap:.4g} inside the boundary that it "
             f"comes from, which is less than half a cell ({size:.4g}): refine the mesh there, or "
             "leave this part of the crack out."
@@ -224,7 +225,7 @@ def _check_flanks(number: int, cracks: tuple[Crack, ...], mesh: Mesh) -> None:
             if (foot[near] - end) @ ahead < _TOWARDS * distance[near]:
                 continue
             if distance[near] < _MOUTH * size and contains(mesh, foot[[near]])[0]:
-                raise GeometryError(
+                raise CoarseMeshError(
                     f"a tip of crack {number} at {at(end)} is {distance[near]:.4g} from crack "
                     f"{other}, less than half a cell ({size:.4g}), but does not end on it: to let "
                     f"it end there give a point of crack {other}, such as {at(foot[near])}, as "
@@ -245,12 +246,12 @@ def _check_tips(cracks: tuple[Crack, ...], mesh: Mesh) -> None:
         apart = float(np.linalg.norm(x[i] - x[j]))
         if apart < min(size[i], size[j]) or cell[i] == cell[j]:
             if owner[i] == owner[j]:
-                raise GeometryError(
+                raise CoarseMeshError(
                     f"the tips of crack {owner[i]} at {at(x[i])} and {at(x[j])} are {apart:.4g} "
                     f"apart, closer than a cell ({size[i]:.4g}): a crack that closes cuts a piece "
                     "out of the body. Refine the mesh between them, or leave a gap of a few cells."
                 )
-            raise GeometryError(
+            raise CoarseMeshError(
                 f"a tip of crack {owner[i]} at {at(x[i])} and one of crack {owner[j]} at "
                 f"{at(x[j])} are {apart:.4g} apart, closer than a "
                 f"cell ({size[i]:.4g}): refine the mesh between them, or join the cracks."
@@ -276,7 +277,7 @@ def _check_own(number: int, crack: Crack, mesh: Mesh) -> None:
         distance = np.linalg.norm(foot - end, axis=1)
         near = int(np.argmin(distance))
         if distance[near] < _MOUTH * size:
-            raise GeometryError(
+            raise CoarseMeshError(
                 f"a tip of crack {number} at {at(end)} is {distance[near]:.4g} from another part "
                 f"of the same crack at {at(foot[near])}, less than half a cell ({size:.4g}): what "
                 "lies between is all but cut out. End growth before, or refine the mesh there."

@@ -9,7 +9,7 @@ from xcrack.arrays import Bools, Floats, Ints, at
 from xcrack.crack.corners_3d import rounded
 from xcrack.crack.crack import Crack
 from xcrack.crack.mouths_3d import OUTSIDE, SIDE, SMOOTH, Outline, open_fronts, runs_of
-from xcrack.errors import GeometryError, warn
+from xcrack.errors import CoarseMeshError, GeometryError, warn
 from xcrack.geometry.distances import closest_in, first_crossing, triangle_tree
 from xcrack.geometry.triangulation import (
     components,
@@ -185,9 +185,10 @@ def _check_size(points: Floats, faces: Ints, body: Body) -> None:
         inside = depth < -_MOUTH * size
         cell = float(body.cell_size(x).min())
         if width[k] < cell and inside.any():
-            raise GeometryError(
+            raise CoarseMeshError(
                 f"the crack at {at(x[inside][0])} is {width[k]:.4g} wide, less "
-                f"than the cell there ({cell:.4g}): refine the mesh around it or leave it out."
+                f"than the cell there ({cell:.4g}): refine the mesh around it (adapt does), or "
+                "leave it out."
             )
 
 
@@ -307,7 +308,7 @@ def _check_apart(cracks: tuple[Crack, ...], body: Body) -> None:
     if len(close):
         k = close[np.argmin(apart[close])]
         i, j = pairs[k]
-        raise GeometryError(
+        raise CoarseMeshError(
             f"the front of crack {owner[i]} at {at(x[i])} and that of crack "
             f"{owner[j]} at {at(x[j])} are {apart[k]:.4g} apart, closer than a "
             f"cell ({size[i]:.4g}): refine the mesh between them, or join the cracks."

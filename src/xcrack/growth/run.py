@@ -358,7 +358,9 @@ def _problem(run: Run, cracks: Sequence[Crack], memory: Memory) -> Problem:
     numerics = run.problem.numerics
     if memory.radius is not None:
         numerics = replace(numerics, radius=memory.radius)
-    return replace(run.problem, cracks=tuple(cracks), numerics=numerics)
+    problem = replace(run.problem, cracks=tuple(cracks), numerics=numerics)
+    _ = problem.placed  # an error here ends a run
+    return problem
 
 
 def _gone(run: Run, cracks: Sequence[Crack], placed: Sequence[Crack]) -> bool:

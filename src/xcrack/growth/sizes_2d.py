@@ -7,6 +7,7 @@ import numpy as np
 
 from xcrack.adaptivity.joint_2d import joint_mesh
 from xcrack.adaptivity.measured import Measured
+from xcrack.adaptivity.resolved import resolved
 from xcrack.adaptivity.start_2d import growing, tip_sizes
 from xcrack.arrays import Floats
 from xcrack.growth.scout import Stage
@@ -25,6 +26,7 @@ _AIM = 0.6  # of the wanted half-widths: bars are foretold to a factor of two
 
 def scout_mesh(problem: Problem) -> Mesh:
     """The mesh of a scene, finer around tips where it is coarser than their cracks are short."""
+    problem = resolved(problem)
     place, size = tip_sizes(problem)
     if not len(place):
         return problem.mesh

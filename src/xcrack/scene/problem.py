@@ -1,6 +1,7 @@
 """The scene: body, cracks, supports and loads, checked before anything is built."""
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
 from numbers import Real
@@ -11,7 +12,7 @@ import numpy as np
 from xcrack.crack.crack import Crack
 from xcrack.crack.junctions_2d import Junction
 from xcrack.crack.placing import check_cracks, junctions, on_others, placed
-from xcrack.errors import ProblemError
+from xcrack.errors import CoarseMeshError, ProblemError
 from xcrack.inputs import entries, number, shown, whole
 from xcrack.markup import Markup, element, joined, table
 from xcrack.mesh.holes import round_hole
@@ -68,7 +69,8 @@ class Problem:
     Raises
     ------
     ProblemError, GeometryError
-        A scene that is not well posed; the message names object, value and remedy.
+        A scene that is not well posed; the message names object, value and remedy. A mesh that is
+        too coarse for a crack is refused by what solves on it: `adapt` makes it finer first.
     """
 
     mesh: Mesh
@@ -102,13 +104,22 @@ class Problem:
         self._check_members()
         own = checked_friction(self.friction, len(self.cracks), self.mesh.dim, self.numerics)
         object.__setattr__(self, "friction", own)
-        check_cracks(self.placed, self.mesh)
+        with suppress(CoarseMeshError):  # `adapt` refines such a mesh; all else asks for `placed`
+            _ = self.placed
 
     @cached_property
     def placed(self) -> tuple[Crack, ...]:
-        """The cracks with tips and mouths decided in this mesh."""
+        """The cracks with tips and mouths decided in this mesh.
+
+        Raises
+        ------
+        CoarseMeshError
+            The mesh is too coarse for them.
+        """
         cracks = tuple(placed(crack, self.mesh) for crack in self.cracks)
-        return on_others(self.cracks, cracks, self.mesh)
+        cracks = on_others(self.cracks, cracks, self.mesh)
+        check_cracks(cracks, self.mesh)
+        return cracks
 
     @cached_property
     def junctions(self) -> tuple[Junction, ...]:
@@ -163,7 +174,10 @@ class Problem:
 
     def sketch(self) -> Markup:
         """Outline of the body and its cracks, as SVG."""
-        cracks = [rim(crack.points, crack.faces) for crack in self.placed]
+        with suppress(CoarseMeshError):  # then as they were given
+            _ = self.placed
+        shown = self.__dict__.get("placed", self.cracks)
+        cracks = [rim(crack.points, crack.faces) for crack in shown]
         return sketch(self.mesh.points, self.mesh.boundary, cracks)
 
     def _check_members(self) -> None:
