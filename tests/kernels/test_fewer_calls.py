@@ -37,9 +37,9 @@ def test_bordered():
     Z[6:, 0], Z[[1, 7], 1] = rng.normal(size=3), rng.normal(size=2)
     fixed = np.zeros(9, dtype=bool)
     fixed[4] = True
-    matrix, basis, energy = bordered(
-        *arrays(sp.csr_matrix(A)), arrays(sp.csr_matrix(Z)), 2, fixed, 6
-    )
+    products = (Z, A @ Z, Z.T @ A, Z.T @ A @ Z)
+    parts = (arrays(sp.csr_matrix(each)) for each in products)
+    matrix, basis, energy = bordered(*arrays(sp.csr_matrix(A)), *parts, fixed, 6)
     columns = np.concatenate([np.eye(9)[:, [0, 1, 3, 5]], Z], axis=1)
     expected = columns / np.sqrt(np.diag(columns.T @ A @ columns))
     result = sp.csr_matrix((basis[2], basis[1], basis[0]), shape=(9, 6)).toarray()

@@ -30,13 +30,14 @@ def block_pattern(nodes, n_nodes):  # type: ignore[no-untyped-def]
     for i in range(n_nodes):
         count[i + 1] += count[i]
     around = np.empty(count[n_nodes], np.int64)
-    fill = count[:-1].copy()
+    place, mark = np.empty(n_nodes, np.int64), np.empty(n_nodes, np.int64)
+    for i in range(n_nodes):
+        place[i], mark[i] = count[i], -1
     for e in range(m):
         for a in range(n):
             node = nodes[e, a]
-            around[fill[node]] = e
-            fill[node] += 1
-    mark = np.full(n_nodes, -1, np.int64)
+            around[place[node]] = e
+            place[node] += 1
     indptr = np.zeros(n_nodes + 1, np.int32)
     for i in range(n_nodes):
         entries = 0
@@ -47,9 +48,9 @@ def block_pattern(nodes, n_nodes):  # type: ignore[no-untyped-def]
                     mark[nodes[e, a]] = i
                     entries += 1
         indptr[i + 1] = indptr[i] + entries
+        place[i] = indptr[i]
     # The pattern is symmetric: nodes that go to their neighbours in turn fill sorted rows.
     indices = np.empty(indptr[n_nodes], np.int32)
-    place = indptr[:-1].copy()
     for i in range(n_nodes):
         for k in range(count[i], count[i + 1]):
             e = around[k]
@@ -154,10 +155,10 @@ def joined(  # type: ignore[no-untyped-def]
     Returns
     -------
     indptr, indices, data : CSR arrays
-        Sorted, of the type of the first `indptr`.
+        Sorted, int32.
     """
     m, n, d = len(indptr) - 1, len(over_indptr) - 1, data.shape[1]
-    start = np.zeros(n * d + 1, indptr.dtype)
+    start = np.zeros(n * d + 1, np.int32)
     for i in range(n):
         for a in range(d):
             count = 0
@@ -170,7 +171,7 @@ def joined(  # type: ignore[no-untyped-def]
                     for b in range(d):
                         count += over_data[k, a, b] != 0.0
             start[i * d + a + 1] = start[i * d + a] + count
-    column, value = np.empty(start[n * d], indptr.dtype), np.empty(start[n * d])
+    column, value = np.empty(start[n * d], np.int32), np.empty(start[n * d])
     for i in range(n):
         if not wanted[i]:
             continue

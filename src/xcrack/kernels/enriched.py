@@ -33,14 +33,15 @@ def enriched_pattern(functions, n_functions, n_standard):  # type: ignore[no-unt
     for i in range(n_functions):
         count[i + 1] += count[i]
     around = np.empty(count[n_functions], np.int64)
-    fill = count[:-1].copy()
+    place, mark = np.empty(n_functions, np.int64), np.empty(n_functions, np.int64)
+    for i in range(n_functions):
+        place[i], mark[i] = count[i], -1
     for e in range(m):
         for a in range(n):
             f = functions[e, a]
             if f >= 0:
-                around[fill[f]] = e
-                fill[f] += 1
-    mark = np.full(n_functions, -1, np.int64)
+                around[place[f]] = e
+                place[f] += 1
     indptr = np.zeros(n_functions + 1, np.int64)
     for i in range(n_functions):
         entries = 0
@@ -52,9 +53,9 @@ def enriched_pattern(functions, n_functions, n_standard):  # type: ignore[no-unt
                     mark[f] = i
                     entries += 1
         indptr[i + 1] = indptr[i] + entries
+        place[i] = indptr[i]
     # The pattern is symmetric: functions that go to their neighbours in turn fill sorted rows.
     indices = np.empty(indptr[n_functions], np.int32)
-    place = indptr[:-1].copy()
     for i in range(n_functions):
         for k in range(count[i], count[i + 1]):
             e = around[k]
@@ -122,9 +123,10 @@ def _products_by_blas(begin, end, weight, gradient, place, active, rows, block):
         for a in range(active):
             for i in range(d):
                 rows[at + a * d + i] = root * gradient[q, place[a], i]
-    size = np.array([k, end - begin, width], dtype=np.int32)
-    scalar = np.array([1.0, 0.0])
-    letter = np.array([76, 78], dtype=np.uint8)  # L N
+    size, scalar, letter = np.empty(3, np.int32), np.empty(2), np.empty(2, np.uint8)
+    size[0], size[1], size[2] = k, end - begin, width
+    scalar[0], scalar[1] = 1.0, 0.0
+    letter[0], letter[1] = 76, 78  # L N
     integer, real, text = size.ctypes.data, scalar.ctypes.data, letter.ctypes.data
     dsyrk(
         text,
@@ -147,27 +149,26 @@ def _products_by_blas(begin, end, weight, gradient, place, active, rows, block):
 
 @kernel
 def _scatter(  # type: ignore[no-untyped-def]
-    data, indptr, indices, functions, place, active, plain, block, lam, mu
+    data, indptr, indices, functions, place, at, active, plain, block, lam, mu
 ):
-    """Add the stiffness that follows from the products of a cell."""
+    """Add the stiffness that follows from the products of a cell, in which functions stand `at`."""
     d = data.shape[1]
     for a in range(active):
-        fa = functions[place[a]]
+        fa, k = functions[place[a]], at[a] * d
         for b in range(max(a, plain), active):
-            fb = functions[place[b]]
+            fb, m = functions[place[b]], at[b] * d
+            one, other = _slot(indptr, indices, fa, fb), _slot(indptr, indices, fb, fa)
             trace = 0.0
             for i in range(d):
-                trace += block[a * d + i, b * d + i]
-            one = data[_slot(indptr, indices, fa, fb)]
-            other = data[_slot(indptr, indices, fb, fa)]
+                trace += block[k + i, m + i]
             for i in range(d):
                 for j in range(d):
-                    v = lam * block[a * d + i, b * d + j] + mu * block[a * d + j, b * d + i]
+                    v = lam * block[k + i, m + j] + mu * block[k + j, m + i]
                     if i == j:
                         v += mu * trace
-                    one[i, j] += v
+                    data[one, i, j] += v
                     if a != b:
-                        other[j, i] += v
+                        data[other, j, i] += v
 
 
 @kernel
@@ -196,8 +197,10 @@ def add_stiffness(  # type: ignore[no-untyped-def]
     """
     m, n = functions.shape
     d = gradient.shape[2]
-    place = np.empty(n, np.int64)
+    place, at = np.empty(n, np.int64), np.empty(n, np.int64)
     block, row = np.zeros((n * d, n * d)), np.empty(n * d)
+    for a in range(n):
+        at[a] = a
     most = 0
     for e in range(m):
         most = max(most, offsets[e + 1] - offsets[e])
@@ -212,7 +215,7 @@ def add_stiffness(  # type: ignore[no-untyped-def]
             _products(begin, end, weight, gradient, place, active, plain, row, block)
         else:
             _products_by_blas(begin, end, weight, gradient, place, active, rows, block)
-        _scatter(data, indptr, indices, functions[e], place, active, plain, block, lam, mu)
+        _scatter(data, indptr, indices, functions[e], place, at, active, plain, block, lam, mu)
 
 
 @kernel
@@ -233,10 +236,11 @@ def gradient_products(offsets, weight, gradient, plain):  # type: ignore[no-unty
     (m, n d, n d) array
         Zero where b < a.
     """
-    n, d = gradient.shape[1:]
-    m = len(offsets) - 1
-    place, row = np.arange(n), np.empty(n * d)
-    result = np.zeros((m, n * d, n * d))
+    n, d, m = gradient.shape[1], gradient.shape[2], len(offsets) - 1
+    place, row = np.empty(n, np.int64), np.empty(n * d)
+    for a in range(n):
+        place[a] = a
+    result = np.empty((m, n * d, n * d))
     for e in range(m):
         _products(offsets[e], offsets[e + 1], weight, gradient, place, n, plain, row, result[e])
     return result
@@ -255,15 +259,8 @@ def add_products(  # type: ignore[no-untyped-def]
         As of `gradient_products`.
     """
     m, n = functions.shape
-    d = data.shape[1]
     place = np.empty(n, np.int64)
-    block = np.zeros((n * d, n * d))
     for e in range(m):
         active, plain = _active(functions[e], n_standard, place)
-        for a in range(active):
-            for i in range(d):
-                for b in range(max(a, plain), active):
-                    for j in range(d):
-                        to = products[e, place[a] * d + i, place[b] * d + j]
-                        block[a * d + i, b * d + j] = to
-        _scatter(data, indptr, indices, functions[e], place, active, plain, block, lam, mu)
+        block = products[e]
+        _scatter(data, indptr, indices, functions[e], place, place, active, plain, block, lam, mu)

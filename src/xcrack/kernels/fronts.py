@@ -58,7 +58,7 @@ def arranged(indptr, indices, data, first, order, rank, perm, place):  # type: i
     capacity = 8 * n + 1000
     boundary = np.empty(capacity, dtype=np.int32)
     in_parent = np.empty(capacity, dtype=np.int32)
-    mark, local = np.full(n, -1, dtype=np.int32), np.empty(n, dtype=np.int32)
+    mark, local = np.zeros(n, dtype=np.int32), np.empty(n, dtype=np.int32)
     to = 0
     for t in range(parts):
         low, high, top = first[t], first[t + 1], begin[t]
@@ -74,8 +74,8 @@ def arranged(indptr, indices, data, first, order, rank, perm, place):  # type: i
                 if i >= c:
                     row[to], value[to] = i, data[k]
                     to += 1
-                    if i >= high and mark[i] != t:
-                        mark[i] = t
+                    if i >= high and mark[i] != t + 1:
+                        mark[i] = t + 1
                         boundary[top] = i
                         top += 1
             start[c + 1] = to
@@ -84,8 +84,8 @@ def arranged(indptr, indices, data, first, order, rank, perm, place):  # type: i
             for child in (rank[2 * p], rank[2 * p + 1]):
                 for k in range(begin[child], begin[child + 1]):
                     i = boundary[k]
-                    if i >= high and mark[i] != t:
-                        mark[i] = t
+                    if i >= high and mark[i] != t + 1:
+                        mark[i] = t + 1
                         boundary[top] = i
                         top += 1
         _sort(boundary, begin[t], top)

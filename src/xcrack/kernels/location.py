@@ -132,11 +132,11 @@ def located(points, cells, gradient, grid, shape, x, tolerance):  # type: ignore
     bary : (k, d + 1) array
     """
     d = points.shape[1]
-    cell, bary = np.full(len(x), -1, np.int64), np.zeros((len(x), d + 1))
+    cell, bary = np.empty(len(x), np.int64), np.zeros((len(x), d + 1))
     own = np.empty(d + 1)
     begin, end = np.empty(d, np.int64), np.empty(d, np.int64)
     for q in range(len(x)):
-        best = np.inf
+        best, cell[q] = np.inf, -1
         _span(x[q], x[q], grid[0], grid[1], shape, begin, end)
         number = _bin(0, begin, end, shape)
         for k in range(grid[2][number], grid[2][number + 1]):

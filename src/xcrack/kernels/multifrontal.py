@@ -60,9 +60,9 @@ def factored(fronts, panel, update, wanted, low_part, high_part):  # type: ignor
     for t in range(low_part, high_part):
         largest = max(largest, first[t + 1] - first[t] + begin[t + 1] - begin[t])
     F = np.empty(largest * largest)
-    size = np.zeros(4, dtype=np.int32)
-    scalar = np.array([1.0, -1.0])
-    letter = np.array([76, 78, 84, 82], dtype=np.uint8)  # L N T R
+    size, scalar, letter = np.empty(4, np.int32), np.empty(2), np.empty(4, np.uint8)
+    scalar[0], scalar[1] = 1.0, -1.0
+    letter[0], letter[1], letter[2], letter[3] = 76, 78, 84, 82  # L N T R
     lower, plain = letter.ctypes.data, letter.ctypes.data + 1
     transposed, right = lower + 2, lower + 3
     one, minus = scalar.ctypes.data, scalar.ctypes.data + 8
@@ -147,9 +147,10 @@ def substituted_one(first, begin, boundary, panel, x, forward, backward):  # typ
     for t in range(parts):
         largest = max(largest, begin[t + 1] - begin[t])
     B = np.empty(largest)
-    size = np.array([0, 0, 0, 1], dtype=np.int32)
-    scalar = np.array([1.0, -1.0, 0.0])
-    letter = np.array([76, 78, 84], dtype=np.uint8)  # L N T
+    size, scalar, letter = np.empty(4, np.int32), np.empty(3), np.empty(3, np.uint8)
+    size[3] = 1
+    scalar[0], scalar[1], scalar[2] = 1.0, -1.0, 0.0
+    letter[0], letter[1], letter[2] = 76, 78, 84  # L N T
     lower, plain, transposed = letter.ctypes.data, letter.ctypes.data + 1, letter.ctypes.data + 2
     one, minus, zero = scalar.ctypes.data, scalar.ctypes.data + 8, scalar.ctypes.data + 16
     pivots, rows, rest, step = (
@@ -225,9 +226,9 @@ def substituted(first, begin, boundary, order, rank, panel, X, touched, forward,
         Halves to do: L^-1 X, and L^-T of that.
     """
     parts, r = len(order), X.shape[1]
-    size = np.zeros(4, dtype=np.int32)
-    scalar = np.array([1.0, -1.0, 0.0])
-    letter = np.array([76, 78, 84, 82], dtype=np.uint8)
+    size, scalar, letter = np.empty(4, np.int32), np.empty(3), np.empty(4, np.uint8)
+    scalar[0], scalar[1], scalar[2] = 1.0, -1.0, 0.0
+    letter[0], letter[1], letter[2], letter[3] = 76, 78, 84, 82
     lower, plain = letter.ctypes.data, letter.ctypes.data + 1
     transposed, right = lower + 2, lower + 3
     one, minus, zero = scalar.ctypes.data, scalar.ctypes.data + 8, scalar.ctypes.data + 16

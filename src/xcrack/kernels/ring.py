@@ -43,7 +43,7 @@ def cells_between(points, cells, size, centre, hollow, radius):  # type: ignore[
             continue
         chosen[count] = e
         count += 1
-    return chosen[:count].copy()
+    return chosen[:count]
 
 
 @kernel
@@ -160,7 +160,9 @@ def add_points(  # type: ignore[no-untyped-def]
     """
     g, sigma, fall = np.empty((3, 2, 2)), np.empty((3, 2, 2)), np.empty(len(radii))
     local = np.empty((2, 2, total.shape[0]))
-    largest, smallest = radii.max(), inner.min()
+    largest, smallest = radii[0], inner[0]
+    for k in range(1, len(radii)):
+        largest, smallest = max(largest, radii[k]), min(smallest, inner[k])
     for p in range(len(weight)):
         dx, dy, psi_sum = -tip[0], -tip[1], 0.0
         for b in range(3):
@@ -209,13 +211,15 @@ def add_plain_cells(  # type: ignore[no-untyped-def]
     g, sigma, fall = np.empty((3, 2, 2)), np.empty((3, 2, 2)), np.empty(len(radii))
     gradient, corner = np.empty((2, 2, states)), np.empty((3, 2, 2, states))
     local = np.empty((2, 2, states))
-    largest, smallest = radii.max(), inner.min()
+    largest, smallest = radii[0], inner[0]
+    for k in range(1, len(radii)):
+        largest, smallest = max(largest, radii[k]), min(smallest, inner[k])
     for e in chosen:
         behind = psi[cells[e, 0]] + psi[cells[e, 1]] + psi[cells[e, 2]] < 0.0
         for b in range(3):
-            gradient[:] = 0.0
             for i in range(2):
                 for s in range(states):
+                    gradient[i, 0, s] = gradient[i, 1, s] = 0.0
                     for a in range(3):
                         rise = 1.0 if len(edges) == 0 else 3.0 if a == b else -1.0
                         u = rise * coefficients[nodes[e, a], i, s]

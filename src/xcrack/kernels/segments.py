@@ -67,7 +67,7 @@ def graded_points(begin, end, tips, u, w):  # type: ignore[no-untyped-def]
                 number[to], weight[to] = s, length * share
                 place[to, 0], place[to, 1] = 1 - p, p
                 to += 1
-    return number[:to].copy(), place[:to].copy(), weight[:to].copy()
+    return number[:to], place[:to], weight[:to]
 
 
 @kernel
@@ -93,9 +93,10 @@ def split(ends, cut, level):  # type: ignore[no-untyped-def]
         0 where phi changes its sign though no crack cuts.
     """
     cracks, k = cut.shape
-    first, second = np.full(k, np.nan), np.full(k, np.nan)
+    first, second = np.empty(k), np.empty(k)
     once, twice = 0, 0
     for e in range(k):
+        first[e] = second[e] = np.nan
         for c in range(cracks):
             t = cut[c, e]
             if np.isnan(t):

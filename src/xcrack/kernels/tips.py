@@ -126,9 +126,10 @@ def moments_at(row, bary, corners, linear):  # type: ignore[no-untyped-def]
     linear : bool
     """
     d = corners.shape[2]
-    moment = np.ones((len(row), d + 1 if linear else 1))
-    if linear:
-        for q in range(len(row)):
+    moment = np.empty((len(row), d + 1 if linear else 1))
+    for q in range(len(row)):
+        moment[q, 0] = 1.0
+        if linear:
             for j in range(d):
                 x = 0.0
                 for b in range(d + 1):
@@ -173,77 +174,69 @@ def take_volume(defect, gram, piece, weight, value, slope, moment, scale):  # ty
 
 
 @kernel
-def _pseudo_inverse(A, least, result):  # type: ignore[no-untyped-def]
-    """Set the pseudo-inverse of a small symmetric matrix, which is changed (Jacobi rotations)."""
-    n = len(A)
-    V = np.eye(n)
-    for _ in range(60):
-        off, size = 0.0, 0.0
-        for i in range(n):
-            size += A[i, i] ** 2
-            for j in range(i):
-                off += A[i, j] ** 2
-        if not off > 1e-34 * size:
-            break
-        for i in range(n):
-            for j in range(i):
-                if A[i, j] == 0.0:
-                    continue
-                ratio = (A[j, j] - A[i, i]) / (2 * A[i, j])
-                t = 1 / (abs(ratio) + math.sqrt(ratio * ratio + 1))
-                t = -t if ratio < 0 else t
-                c = 1 / math.sqrt(t * t + 1)
-                s = t * c
-                for k in range(n):
-                    a, b = A[k, i], A[k, j]
-                    A[k, i], A[k, j] = c * a - s * b, s * a + c * b
-                for k in range(n):
-                    a, b = A[i, k], A[j, k]
-                    A[i, k], A[j, k] = c * a - s * b, s * a + c * b
-                    a, b = V[k, i], V[k, j]
-                    V[k, i], V[k, j] = c * a - s * b, s * a + c * b
-    largest = 0.0
-    for i in range(n):
-        if abs(A[i, i]) > largest:
-            largest = abs(A[i, i])
-        for j in range(n):
-            result[i, j] = 0.0
-    for k in range(n):
-        if abs(A[k, k]) > least * largest:
-            for i in range(n):
-                for j in range(n):
-                    result[i, j] += V[i, k] * V[j, k] / A[k, k]
-
-
-@kernel
 def solve_moments(defect, gram, least):  # type: ignore[no-untyped-def]
     """Multiply the defects of each piece by the pseudo-inverse of its Gram matrix.
+
+    By Jacobi rotations, which are as accurate for small eigenvalues as for large ones.
 
     Parameters
     ----------
     defect : (p, f, d, a) array
         Changed in place.
     gram : (p, a, a) array
-        Changed.
     least : float
         Share of the largest eigenvalue up to which others count as zero.
     """
-    count = gram.shape[1]
-    inverse, row = np.empty((count, count)), np.empty(count)
-    for k in range(len(gram)):
-        total = gram[k, 0, 0] if gram[k, 0, 0] > 1e-300 else 1e-300
-        for a in range(count):
-            for b in range(count):
-                gram[k, a, b] /= total
-        _pseudo_inverse(gram[k], least, inverse)
+    n = gram.shape[1]
+    A, V, inverse, row = np.empty((n, n)), np.empty((n, n)), np.empty((n, n)), np.empty(n)
+    for p in range(len(gram)):
+        total = gram[p, 0, 0] if gram[p, 0, 0] > 1e-300 else 1e-300
+        for i in range(n):
+            for j in range(n):
+                A[i, j] = gram[p, i, j] / total
+                V[i, j] = i == j
+                inverse[i, j] = 0.0
+        for _ in range(60):
+            off, size = 0.0, 0.0
+            for i in range(n):
+                size += A[i, i] ** 2
+                for j in range(i):
+                    off += A[i, j] ** 2
+            if not off > 1e-34 * size:
+                break
+            for i in range(n):
+                for j in range(i):
+                    if A[i, j] == 0.0:
+                        continue
+                    ratio = (A[j, j] - A[i, i]) / (2 * A[i, j])
+                    t = 1 / (abs(ratio) + math.sqrt(ratio * ratio + 1))
+                    t = -t if ratio < 0 else t
+                    c = 1 / math.sqrt(t * t + 1)
+                    s = t * c
+                    for k in range(n):
+                        a, b = A[k, i], A[k, j]
+                        A[k, i], A[k, j] = c * a - s * b, s * a + c * b
+                    for k in range(n):
+                        a, b = A[i, k], A[j, k]
+                        A[i, k], A[j, k] = c * a - s * b, s * a + c * b
+                        a, b = V[k, i], V[k, j]
+                        V[k, i], V[k, j] = c * a - s * b, s * a + c * b
+        largest = 0.0
+        for i in range(n):
+            largest = max(largest, abs(A[i, i]))
+        for k in range(n):
+            if abs(A[k, k]) > least * largest:
+                for i in range(n):
+                    for j in range(n):
+                        inverse[i, j] += V[i, k] * V[j, k] / A[k, k]
         for f in range(defect.shape[1]):
             for j in range(defect.shape[2]):
-                for b in range(count):
-                    row[b] = 0.0
-                    for a in range(count):
-                        row[b] += defect[k, f, j, a] * inverse[a, b]
-                for b in range(count):
-                    defect[k, f, j, b] = row[b] / total
+                for k in range(n):
+                    row[k] = 0.0
+                    for i in range(n):
+                        row[k] += defect[p, f, j, i] * inverse[i, k]
+                for k in range(n):
+                    defect[p, f, j, k] = row[k] / total
 
 
 @kernel

@@ -27,8 +27,9 @@ def bisected(ranked, centre, depth):  # type: ignore[no-untyped-def]
     """
     d, n = ranked.shape
     leaf = np.empty(n, dtype=np.int64)
-    low, high = np.zeros(1, dtype=np.int64), np.full(1, n)
-    lower = np.zeros(n, dtype=np.bool_)
+    low, high = np.zeros(1, dtype=np.int64), np.zeros(1, dtype=np.int64)
+    high[0] = n
+    lower = np.empty(n, dtype=np.bool_)
     spare = np.empty(n, dtype=np.int64)
     for _ in range(depth):
         m = len(low)

@@ -346,10 +346,13 @@ def _reduced(
     first = space.n_nodes * space.dim
     enriched = _enriched_columns(space, K, ~fixed, numerics, material)
     while True:
-        Z = enriched.indptr, enriched.indices, enriched.data
-        matrix, columns, energy = bordered(
-            K.indptr, K.indices, K.data, Z, enriched.shape[1], fixed, first
-        )
+        across = K @ enriched
+        across.sort_indices()
+        down = across.T.tocsr()
+        own = down @ enriched
+        own.sort_indices()
+        parts = ((each.indptr, each.indices, each.data) for each in (enriched, across, down, own))
+        matrix, columns, energy = bordered(K.indptr, K.indices, K.data, *parts, fixed, first)
         alive = energy > 0
         if alive.all():
             break
