@@ -90,12 +90,12 @@ def measure(n: int) -> dict[str, object]:
         "enriched cells", enriched_stiffness, where, problem.material, numerics, lips
     )
     K = Stiffness(plain.matrix, enriched)
-    near = timed("set-up", K.joined, next_to_enriched(where))
+    beside = next_to_enriched(where)
     known = known_unknowns(where, ())
     model = Model(where, lips, plain, enriched, known, n_points)
     motion = timed("set-up", free_motion, where, known.fixed)
     engine = timed(
-        "set-up", iterative_system, where, K, plain, known.fixed, None, motion.modes, None, near
+        "set-up", iterative_system, where, K, plain, known.fixed, None, motion.modes, None, beside
     )
     loads = np.stack([load_vector(where, tuple(s), lips) for s in STATES.values()], axis=1)
     f = balanced(where, motion, loads)[0]

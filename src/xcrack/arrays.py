@@ -1,6 +1,6 @@
 """Small helpers for read-only arrays, ragged rows and places in messages."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 import numpy as np
@@ -49,6 +49,16 @@ def coordinates(x: Iterable[float]) -> str:
     '(0.5, 2)'
     """
     return "(" + ", ".join(f"{v:.6g}" for v in x) + ")"
+
+
+def stretches(count: int, length: int = 50_000) -> Iterator[slice]:
+    """Stretches of so many rows one after the other: what is computed on all at once takes memory.
+
+    >>> [(part.start, part.stop) for part in stretches(5, 2)]
+    [(0, 2), (2, 4), (4, 5)]
+    """
+    for first in range(0, count, length):
+        yield slice(first, min(first + length, count))
 
 
 def ranges(counts: Ints) -> tuple[Ints, Ints]:

@@ -190,7 +190,7 @@ def _engine(
             None if reuse is None else reuse.hierarchy,
             motion.modes,
             problem.material if comparison.tip_basis == "vectorial" else None,
-            model.parts.joined(next_to_enriched(space_)) if apart else None,
+            next_to_enriched(space_) if apart else None,
         )
     fixed[motion.pins] = True
     return system(

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
-from xcrack.arrays import Floats, Ints, Shape, at, ranges
+from xcrack.arrays import Floats, Ints, Shape, at, ranges, stretches
 from xcrack.errors import MeshError, XcrackError
 from xcrack.geometry.simplices import distance_to_simplices
 from xcrack.inputs import numbers, shown, whole_numbers
@@ -107,16 +107,18 @@ def checked(points: Any, cells: Any) -> tuple[Floats, Ints]:
 
 
 def _oriented(points: Floats, cells: Ints) -> Ints:
-    x = points[cells]
-    with np.errstate(all="ignore"):  # lengths whose products are too small for a number
-        volume = np.linalg.det(x[:, 1:] - x[:, :1])
     one, other = np.array(list(combinations(range(cells.shape[1]), 2))).T
-    longest = np.sqrt(((x[:, one] - x[:, other]) ** 2).sum(axis=2).max(axis=1))
+    volume, longest = np.empty(len(cells)), np.empty(len(cells))
+    for part in stretches(len(cells)):
+        x = points[cells[part]]
+        with np.errstate(all="ignore"):  # lengths whose products are too small for a number
+            volume[part] = np.linalg.det(x[:, 1:] - x[:, :1])
+        longest[part] = np.sqrt(((x[:, one] - x[:, other]) ** 2).sum(axis=2).max(axis=1))
     flat = np.abs(volume) <= _FLAT * longest ** points.shape[1]
     if flat.any():
         worst = int(np.argmax(flat))
         raise MeshError(
-            f"cell {worst} at {at(x[worst].mean(axis=0))} has no volume "
+            f"cell {worst} at {at(points[cells[worst]].mean(axis=0))} has no volume "
             f"({int(flat.sum())} such cells): remesh, or merge its points."
         )
     turned = np.array(cells)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
-from xcrack.arrays import Floats, Ints, frozen, lock
+from xcrack.arrays import Floats, Ints, frozen, lock, stretches
 from xcrack.errors import MeshError, warn
 from xcrack.inputs import shown, whole_numbers
 from xcrack.mesh.checks import checked, checked_sets, doubts, unused_sets
@@ -128,8 +128,10 @@ class Mesh:
         local = local_edges(self.dim)
         if self.facets.shape[1] == local.shape[1]:  # in 2D each edge is a facet
             return self.facets, lock(np.ascontiguousarray(self.cell_to_facet[:, ::-1]))
-        pairs = np.sort(self.cells[:, local].reshape(-1, 2), axis=1)
-        key = pairs[:, 0] * np.int64(self.n_points) + pairs[:, 1]
+        key = np.empty((len(self.cells), len(local)), dtype=np.int64)
+        for part in stretches(len(self.cells)):
+            pairs = np.sort(self.cells[part][:, local], axis=2)
+            key[part] = pairs[:, :, 0] * np.int64(self.n_points) + pairs[:, :, 1]
         unique, inverse = np.unique(key, return_inverse=True)
         edges = np.stack([unique // self.n_points, unique % self.n_points], axis=1)
         return lock(edges), lock(inverse.reshape(len(self.cells), len(local)))
@@ -139,27 +141,30 @@ class Mesh:
         """Sorted facets `(f, d)`, their cells `(f, 2)` (-1: none), facet numbers `(m, d + 1)`."""
         d = self.dim
         local = local_facets(d)
-        all_facets = np.sort(self.cells[:, local].reshape(-1, d), axis=1)
-        _, first, inverse, counts = np.unique(
-            _scalar_key(all_facets, self.n_points),
-            return_index=True,
-            return_inverse=True,
-            return_counts=True,
-        )
+        key = np.empty((len(self.cells), d + 1), dtype=np.int64)
+        for part in stretches(len(self.cells)):
+            facets = np.sort(self.cells[part][:, local], axis=2)
+            key[part] = _scalar_key(facets.reshape(-1, d), self.n_points).reshape(-1, d + 1)
+        flat = key.ravel()
+        order = np.argsort(flat, kind="stable")
+        flat = flat[order]
+        begins = np.concatenate([[True], flat[1:] != flat[:-1]])
+        begin = np.nonzero(begins)[0]
+        counts = np.diff(np.append(begin, len(flat)))
+        first = order[begin]
+        unique = np.sort(self.cells[first[:, None] // (d + 1), local[first % (d + 1)]], axis=1)
         if counts.max(initial=0) > 2:
-            bad = all_facets[first[np.argmax(counts)]]
             raise MeshError(
-                f"facet {bad.tolist()} belongs to {counts.max()} cells, at most two are possible: "
-                "some cells are doubled or overlap; remove them."
+                f"facet {unique[np.argmax(counts)].tolist()} belongs to {counts.max()} cells, at "
+                "most two are possible: some cells are doubled or overlap; remove them."
             )
+        number = key.reshape(-1)
+        number[order] = np.cumsum(begins) - 1
         cells_of = np.full((len(first), 2), -1, dtype=np.int64)
-        order = np.argsort(inverse, kind="stable")
-        owner = order // (d + 1)
-        begin = np.concatenate([[0], np.cumsum(counts)[:-1]])
-        cells_of[:, 0] = owner[begin]
+        cells_of[:, 0] = first // (d + 1)
         two = counts == 2
-        cells_of[two, 1] = owner[begin[two] + 1]
-        return lock(all_facets[first]), lock(cells_of), lock(inverse.reshape(-1, d + 1))
+        cells_of[two, 1] = order[begin[two] + 1] // (d + 1)
+        return lock(unique), lock(cells_of), lock(key)
 
     @cached_property
     def facets(self) -> Ints:
@@ -186,22 +191,27 @@ class Mesh:
         """Facets that belong to one cell only, as sorted point numbers `(k, d)`."""
         return lock(self.facets[self.facet_to_cell[:, 1] < 0])
 
-    def _edge_matrices(self) -> Floats:
-        x = self.points[self.cells]
+    def _edge_matrices(self, part: slice) -> Floats:
+        x = self.points[self.cells[part]]
         return x[:, 1:] - x[:, :1]
 
     @cached_property
     def volume(self) -> Floats:
         """Area or volume of each cell `(m,)`."""
-        return lock(np.linalg.det(self._edge_matrices()) / factorial(self.dim))
+        volume = np.empty(len(self.cells))
+        for part in stretches(len(volume)):
+            volume[part] = np.linalg.det(self._edge_matrices(part)) / factorial(self.dim)
+        return lock(volume)
 
     @cached_property
     def gradient(self) -> Floats:
         """Gradients of the barycentric coordinates of each cell `(m, d + 1, d)`, 1/length."""
-        inverse = np.linalg.inv(self._edge_matrices())
-        last = np.swapaxes(inverse, 1, 2)
-        gradient = np.concatenate([-last.sum(axis=1, keepdims=True), last], axis=1)
-        return lock(np.ascontiguousarray(gradient))  # kernels compile for each memory layout
+        gradient = np.empty((*self.cells.shape, self.dim))
+        for part in stretches(len(gradient)):
+            last = np.swapaxes(np.linalg.inv(self._edge_matrices(part)), 1, 2)
+            gradient[part, 1:] = last
+            gradient[part, 0] = -last.sum(axis=1)
+        return lock(gradient)
 
     @cached_property
     def cell_size(self) -> Floats:
@@ -240,12 +250,17 @@ class Mesh:
 
     @cached_property
     def cell_grid(self) -> tuple[tuple[Floats, Floats, Ints, Ints], Ints]:
-        """Cells in the bins of a regular grid, about as many bins as cells, and its shape."""
+        """Cells in the bins of a regular grid, and its shape.
+
+        About as many bins as triangles, and a third as many as tetrahedra, whose boxes meet about
+        twelve bins each then, and 22 where there are as many.
+        """
         from xcrack.kernels.location import binned
 
         every = np.stack([self.points.min(axis=0), self.points.max(axis=0)])
         side = np.maximum(every[1] - every[0], 1e-300)
-        edge = (np.prod(side / side.max()) / len(self.cells)) ** (1 / self.dim) * side.max()
+        bins = len(self.cells) / (1 if self.dim == 2 else 3)
+        edge = (np.prod(side / side.max()) / bins) ** (1 / self.dim) * side.max()
         shape = np.clip(side / edge, 1, len(self.cells)).astype(np.int64)
         return binned(self.points, self.cells, every, shape), shape
 
@@ -262,20 +277,22 @@ class Mesh:
 
     def _check_folds(self) -> None:
         """Cells on both sides of a facet must lie on different sides of it."""
-        inner = self.facet_to_cell[:, 1] >= 0
-        one, other = self.facet_to_cell[inner].T
-        place = np.argmax(self.cell_to_facet[one] == np.nonzero(inner)[0][:, None], axis=1)
-        across = np.argmax(self.cell_to_facet[other] == np.nonzero(inner)[0][:, None], axis=1)
-        corner = self.points[self.cells[other, across]] - self.points[self.cells[one, place]]
-        # The barycentric coordinate is 1 at the cell's own corner, 0 on the facet.
-        coordinate = 1 + np.einsum("fd,fd->f", self.gradient[one, place], corner)
-        folded = coordinate >= 0
+        inner = np.nonzero(self.facet_to_cell[:, 1] >= 0)[0]
+        folded = np.empty(len(inner), dtype=bool)
+        for part in stretches(len(inner)):
+            facet = inner[part]
+            one, other = self.facet_to_cell[facet].T
+            place = np.argmax(self.cell_to_facet[one] == facet[:, None], axis=1)
+            across = np.argmax(self.cell_to_facet[other] == facet[:, None], axis=1)
+            corner = self.points[self.cells[other, across]] - self.points[self.cells[one, place]]
+            # The barycentric coordinate is 1 at the cell's own corner, 0 on the facet.
+            folded[part] = 1 + np.einsum("fd,fd->f", self.gradient[one, place], corner) >= 0
         if folded.any():
-            i = int(np.argmax(folded))
-            where = np.round(self.points[self.cells[other[i]]].mean(axis=0), 6).tolist()
+            one, other = self.facet_to_cell[inner[np.argmax(folded)]].tolist()
+            where = np.round(self.points[self.cells[other]].mean(axis=0), 6).tolist()
             raise MeshError(
-                f"cell {int(other[i])} at {where} is inverted: it folds over its neighbour "
-                f"{int(one[i])} ({int(folded.sum())} such pairs). Move its points back or remesh."
+                f"cell {other} at {where} is inverted: it folds over its neighbour {one} "
+                f"({int(folded.sum())} such pairs). Move its points back or remesh."
             )
 
     def _check_facets(self, name: str, facets: Ints) -> None:

@@ -41,8 +41,8 @@ class IterativeSystem:
     ----------
     matrix : Stiffness or sparse matrix (n_dof, n_dof)
         In the basis of the space.
-    near : sparse matrix (n_dof, n_dof)
-        Its rows next to enriched functions, and maybe others.
+    within : sparse matrix (n_dof, n_dof), optional
+        Its entries between the unknowns of one node; made of the matrix where they are not given.
     free : (n_dof,) array of bool
     basis : sparse matrix (n_dof, k)
         Columns of the solver's basis; zero in the rows of known unknowns.
@@ -57,7 +57,7 @@ class IterativeSystem:
     """
 
     matrix: sp.csr_matrix | Stiffness
-    near: sp.csr_matrix
+    within: sp.csr_matrix | None
     free: Bools
     basis: sp.csr_matrix
     hierarchy: Hierarchy
@@ -245,10 +245,16 @@ class IterativeSystem:
     @cached_property
     def _within(self) -> sp.csr_matrix:
         """Entries of the stiffness between unknowns of one node."""
-        if self.combined is None or self.back is None:
-            return within_blocks(self.near, self.blocks)
-        K = nearby(self.near, self.combined, self.blocks)
+        if self.within is not None:
+            return self.within
+        assert self.combined is not None
+        assert self.back is not None
+        K = nearby(_joined(self.matrix), self.combined, self.blocks)
         return sp.csr_matrix(self.back.T @ within_blocks(K, self.blocks) @ self.back)
+
+
+def _joined(K: sp.csr_matrix | Stiffness, rows: Bools | None = None) -> sp.csr_matrix:
+    return K.joined(rows) if isinstance(K, Stiffness) else K
 
 
 def iterative_system(
@@ -259,7 +265,7 @@ def iterative_system(
     levels: Hierarchy | None = None,
     modes: Floats | None = None,
     vectorial: Isotropic | None = None,
-    near: sp.csr_matrix | None = None,
+    rows: Bools | None = None,
 ) -> IterativeSystem:
     """Change the basis and put the enriched matrix on top of the levels of the uncracked body.
 
@@ -278,13 +284,12 @@ def iterative_system(
         Rigid motions that nothing prevents; loads have to be in balance with them.
     vectorial : Isotropic, optional
         The material where the tip basis is vectorial.
-    near : sparse matrix (n_dof, n_dof), optional
-        Rows of K next to enriched functions, enough at order 1; K itself where it is omitted.
+    rows : (n_functions,) array of bool, optional
+        Functions next to enriched ones, whose rows of a `Stiffness` are enough at order 1.
     """
-    if near is None:
-        near = K.joined() if isinstance(K, Stiffness) else K
     if levels is None or not levels.fits(bulk, fixed):
         levels = hierarchy(bulk, fixed)
+    near = _joined(K, rows)  # after the levels, whose making needs the most memory
     free = ~fixed
     d = space.dim
     plain = (levels.nodes[:, None] * d + np.arange(d)).ravel()
@@ -304,7 +309,8 @@ def iterative_system(
         home = np.where(levels.free, plain // d, -1)
         home = np.concatenate([home, whole.members[whole.offsets[block]] // d])
         patches = star_patches(space, home, len(plain), diagonal, parts.entries)
-    del parts  # before the cycle makes copies in single precision
+    within = within_blocks(near, blocks) if combined is None else None
+    del parts, near  # before the cycle makes copies in single precision
     identity = sp.csr_matrix(
         (levels.free.astype(float), (plain, np.arange(len(plain)))),
         shape=(space.n_dof, len(plain)),
@@ -315,7 +321,7 @@ def iterative_system(
         null[: len(plain)] = np.linalg.qr(modes[plain] * levels.free[:, None])[0]
     cycle = extended(levels, stored, diagonal, patches)
     operator = Operator(stored.times, cycle, diagonal, null, stored.times_all, cycle.of_all)
-    return IterativeSystem(K, near, lock(free), basis, levels, operator, blocks, combined, back)
+    return IterativeSystem(K, within, lock(free), basis, levels, operator, blocks, combined, back)
 
 
 def _vectors(columns: Floats) -> list[Floats]:

@@ -30,6 +30,7 @@ _SAFETY = 1.1  # by which it is enlarged: Lanczos gives a lower bound
 _SHARE = 0.1  # of the spectrum's upper end from which Chebyshev smooths
 _OMEGA = 4 / 3  # damping of the step that smooths the prolongator
 _START = 613_077  # seed of the vector that Lanczos starts from
+_ROWS = 20_000  # of blocks, taken at once where a coarse matrix is made
 _NULL = 1e-11  # eigenvalues of the coarsest matrix below this share are rigid motions
 
 
@@ -222,12 +223,31 @@ def _aggregated(
         diagonal = A.diagonal()
         largest = largest_eigenvalue(blocks, diagonal)
         P, candidates = _prolongator(A, diagonal, largest, candidates)
-        levels.append(_level(blocks, diagonal, largest, P))
         scale = float(diagonal.max())
-        A = sp.bsr_matrix(P.T @ (A @ P), blocksize=(P.blocksize[1],) * 2)
-        if A.shape[0] > 0.7 * P.shape[0]:
+        A, small = _coarse(A, P), sp.bsr_matrix(P, dtype=np.float32)
+        del P
+        levels.append(_level(blocks, diagonal, largest, small))
+        if A.shape[0] > 0.7 * small.shape[0]:
             break
     return tuple(levels), _inverse(A.toarray(), scale)
+
+
+def _coarse(A: sp.bsr_matrix, P: sp.bsr_matrix) -> sp.bsr_matrix:
+    """P^T A P, summed over stretches of rows: A P takes more memory than A."""
+    size = P.blocksize[1]
+    total = sp.bsr_matrix((P.shape[1],) * 2, blocksize=(size, size))
+    for first in range(0, len(P.indptr) - 1, _ROWS):
+        own = _rows(P, first)
+        total = total + sp.bsr_matrix(own.T @ (_rows(A, first) @ P), blocksize=(size, size))
+    return total
+
+
+def _rows(A: sp.bsr_matrix, first: int) -> sp.bsr_matrix:
+    """Some rows of blocks, which share the memory of the matrix."""
+    indptr = A.indptr[first : first + _ROWS + 1]
+    part = slice(indptr[0], indptr[-1])
+    shape = (len(indptr) - 1) * A.blocksize[0], A.shape[1]
+    return sp.bsr_matrix((A.data[part], A.indices[part], indptr - indptr[0]), shape=shape)
 
 
 def _over_linear(
