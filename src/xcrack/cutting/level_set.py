@@ -47,20 +47,14 @@ class LevelSet:
 
 def near_edges(mesh: Mesh, phi: Floats) -> Bools:
     """Edges short enough to be crossed where phi changes its sign `(e,)`."""
-    x = mesh.points[mesh.edges]
-    length = np.linalg.norm(x[:, 1] - x[:, 0], axis=1)
-    return np.asarray(np.abs(phi[mesh.edges]).sum(axis=1) <= length * (1 + 1e-6))
+    ends = np.abs(phi)[mesh.edges]
+    return np.asarray(ends[:, 0] + ends[:, 1] <= mesh.edge_length * (1 + 1e-6))
 
 
 def snapped(mesh: Mesh, phi: Floats) -> Floats:
     """Move cut points within 1e-10 of an edge's end onto that end, until nothing changes."""
     phi = np.array(phi)
-    longest = np.zeros(mesh.n_points)
-    x = mesh.points[mesh.edges]
-    length = np.linalg.norm(x[:, 1] - x[:, 0], axis=1)
-    for end in (0, 1):
-        np.maximum.at(longest, mesh.edges[:, end], length)
-    phi[np.abs(phi) < 1e-15 * longest] = 0.0
+    phi[np.abs(phi) < 1e-15 * mesh.longest_edge] = 0.0
     while True:
         a, b = phi[mesh.edges].T
         crossed = a * b < 0

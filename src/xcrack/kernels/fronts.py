@@ -71,14 +71,15 @@ def arranged(indptr, indices, data, first, order, rank, perm, place):  # type: i
         for c in range(low, high):
             for k in range(indptr[perm[c]], indptr[perm[c] + 1]):
                 i = place[indices[k]]
-                if i >= c:
-                    row[to], value[to] = i, data[k]
-                    to += 1
-                    if i >= high and mark[i] != t + 1:
-                        mark[i] = t + 1
-                        boundary[top] = i
-                        top += 1
+                row[to], value[to] = i, data[k]
+                to += i >= c  # without a branch, which no processor foresees
             start[c + 1] = to
+        for k in range(start[low], to):
+            i = row[k]
+            if i >= high and mark[i] != t + 1:
+                mark[i] = t + 1
+                boundary[top] = i
+                top += 1
         p = order[t]
         if 2 * p <= parts:
             for child in (rank[2 * p], rank[2 * p + 1]):

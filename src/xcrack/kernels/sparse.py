@@ -18,11 +18,16 @@ def times(indptr, indices, data, x):  # type: ignore[no-untyped-def]
     -------
     (n, k) array
     """
-    result = np.zeros((len(indptr) - 1, x.shape[1]))
+    columns = x.shape[1]
+    result = np.empty((len(indptr) - 1, columns))
     for i in range(len(result)):
-        for k in range(indptr[i], indptr[i + 1]):
-            for c in range(x.shape[1]):
-                result[i, c] += data[k] * x[indices[k], c]
+        for first in range(0, columns, 2):  # two at once, which stay in registers
+            second = min(first + 1, columns - 1)
+            total, other = 0.0, 0.0
+            for k in range(indptr[i], indptr[i + 1]):
+                total += data[k] * x[indices[k], first]
+                other += data[k] * x[indices[k], second]
+            result[i, first], result[i, second] = total, other
     return result
 
 

@@ -89,18 +89,20 @@ def parts_inside(mesh: Mesh, polyline: Floats) -> list[Floats]:
     """
     corner = mesh.points[mesh.boundary]
     q, s = corner[:, 0], corner[:, 1] - corner[:, 0]
-    parts = []
-    for p, r in zip(polyline, np.diff(polyline, axis=0)):
-        cross = r[0] * s[:, 1] - r[1] * s[:, 0]
-        gap = q - p
-        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+    pairs, middles = [], []
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        for p, r in zip(polyline, np.diff(polyline, axis=0)):
+            cross = r[0] * s[:, 1] - r[1] * s[:, 0]
+            gap = q - p
             t = (gap[:, 0] * s[:, 1] - gap[:, 1] * s[:, 0]) / cross
             u = (gap[:, 0] * r[1] - gap[:, 1] * r[0]) / cross
-        hits = t[(cross != 0) & (u >= 0) & (u <= 1) & (t > 0) & (t < 1)]
-        ends = np.concatenate([[0.0], np.sort(hits), [1.0]])
-        pairs = np.stack([ends[:-1], ends[1:]], axis=1)
-        parts.append(pairs[contains(mesh, p + pairs.mean(axis=1)[:, None] * r)])
-    return parts
+            hits = t[(cross != 0) & (u >= 0) & (u <= 1) & (t > 0) & (t < 1)]
+            ends = np.concatenate([[0.0], np.sort(hits), [1.0]])
+            pairs.append(np.stack([ends[:-1], ends[1:]], axis=1))
+            middles.append(p + pairs[-1].mean(axis=1)[:, None] * r)
+    inside = contains(mesh, np.concatenate(middles))
+    first = np.cumsum([len(each) for each in pairs])[:-1]
+    return [each[own] for each, own in zip(pairs, np.split(inside, first), strict=True)]
 
 
 def cells_within(mesh: Mesh, x: Floats, radius: float) -> Ints:

@@ -124,6 +124,30 @@ class Mesh:
         return self._edges_and_map[1]
 
     @cached_property
+    def edge_middles(self) -> Floats:
+        """Middle of each edge `(e, d)`, length."""
+        return lock(np.asarray(self.points[self.edges].mean(axis=1)))
+
+    @cached_property
+    def edge_length(self) -> Floats:
+        """Length of each edge `(e,)`."""
+        x = self.points[self.edges]
+        return lock(np.asarray(np.linalg.norm(x[:, 1] - x[:, 0], axis=1)))
+
+    @cached_property
+    def longest_edge(self) -> Floats:
+        """Length of the longest edge at each point `(n,)`."""
+        longest = np.zeros(self.n_points)
+        for end in (0, 1):
+            np.maximum.at(longest, self.edges[:, end], self.edge_length)
+        return lock(longest)
+
+    @cached_property
+    def corners_and_edges(self) -> Ints:
+        """Points of each cell, then its edges, numbered after all points `(m, n)`."""
+        return lock(np.concatenate([self.cells, self.n_points + self.cell_to_edge], axis=1))
+
+    @cached_property
     def _edges_and_map(self) -> tuple[Ints, Ints]:
         local = local_edges(self.dim)
         if self.facets.shape[1] == local.shape[1]:  # in 2D each edge is a facet

@@ -19,14 +19,14 @@ def cell_nodes(mesh: Mesh, order: int) -> Ints:
     """Node numbers of each cell `(m, n_shapes)`: points first, then edge midpoints."""
     if order == 1:
         return mesh.cells
-    return np.concatenate([mesh.cells, mesh.n_points + mesh.cell_to_edge], axis=1)
+    return mesh.corners_and_edges
 
 
 def node_points(mesh: Mesh, order: int) -> Floats:
     """Coordinates of the nodes `(n, d)`: points first, then edge midpoints."""
     if order == 1:
         return mesh.points
-    return np.concatenate([mesh.points, mesh.points[mesh.edges].mean(axis=1)])
+    return np.concatenate([mesh.points, mesh.edge_middles])
 
 
 def facet_nodes(mesh: Mesh, order: int, facets: Ints) -> Ints:

@@ -226,7 +226,7 @@ def lip_terms(solutions: Sequence[Solution], ring: Ring) -> Floats:
     if not bent and not pressure.any() and not rubs:
         return result
     behind = np.ones(len(xi), dtype=bool)
-    w = lips.weight[near]
+    w, steady = lips.weight[near], [_steady(solution, t) for solution in solutions]
     for s, sign in ((0, -1), (1, 1)):
         cell, bary = lips.cell[near, s], lips.bary[near, s]
         side = lip_side(space, tip.crack, cell, bary, sign)
@@ -238,15 +238,15 @@ def lip_terms(solutions: Sequence[Solution], ring: Ring) -> Floats:
         if bent:
             gradient = gradients_at(space, ring.coefficients, cell, bary, side) - ring.turn
             local = np.einsum("ai,qijs,bj->sqab", R, gradient, R)
-        for k, solution in enumerate(solutions):
+        for k in range(len(solutions)):
             traction, shear = -pressure[k][:, None] * outward, shears[k]
             if shear is not None:
                 traction += sign * shear @ R.T
+            sigma = None if local is None else material.stress(local[k]) + steady[k]
             for m, field in enumerate(aux):
                 density = np.einsum("qi,qi->q", traction, field.gradient[:, :, 0])
-                if local is not None:
+                if local is not None and sigma is not None:
                     density += np.einsum("qij,qj,qi->q", field.stress, outward, local[k][:, :, 0])
-                    sigma = material.stress(local[k]) + _steady(solution, t)
                     density -= np.einsum("qij,qij->q", sigma, field.gradient) * outward[:, 0]
                 result[k, :, m] -= q @ (w * density)
     return result

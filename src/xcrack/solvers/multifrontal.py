@@ -23,7 +23,7 @@ _UNIT = 4  # levels of a subtree that is factored as a whole or not at all: 128 
 _SHARED = 4  # levels above the subtrees that threads take
 _LEAST = 100_000  # entries of a matrix below which handing subtrees over costs more than it saves
 _FEW = 3  # right-hand sides up to which each is quicker alone
-_SPREAD = 1.5  # times the numbers in use that arrays of earlier factorisations may hold
+_SPREAD = 2.2  # times the numbers in use that arrays of earlier factorisations may hold
 _MOST = 1 << 27  # entries of update matrices, 1 GB, above which larger subtrees are the unit
 
 

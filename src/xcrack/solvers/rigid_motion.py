@@ -38,7 +38,7 @@ class Motion:
     @cached_property
     def size(self) -> Floats:
         """Largest entry of each motion `(k,)`."""
-        return np.abs(self.modes).max(axis=0)
+        return np.abs(np.ascontiguousarray(self.modes.T)).max(axis=1)
 
 
 def free_motion(space: FunctionSpace, fixed: Bools) -> Motion:
