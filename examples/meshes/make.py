@@ -25,6 +25,7 @@ PATH = np.array(
 PATHS = (PATH, TURN - PATH)
 HOLES = (((3.0, 7.0), 2.0), ((17.0, 3.0), 2.0))
 
+BORES = ((-8.0, 0.0, 3.0), (10.0, 8.0, 4.0), (9.0, -11.0, 2.5))  # of small_crack.py: x, y, radius
 THREE_HOLES = (((14.0, 22.0), 4.0), ((34.0, 14.0), 5.0), ((48.0, 27.0), 3.0))  # flaw_campaign.py
 
 # The crack of turning_load.py, and the fan of directions in which its criteria let it grow.
@@ -165,8 +166,32 @@ def lug(path: Path) -> None:
     path.write_text(path.read_text().replace(str(path), "lug"))  # its heading
 
 
+def small_crack(path: Path) -> None:
+    """Plate of small_crack.py: 50 × 50 × 10 with three holes, coarse tetrahedra of gmsh."""
+    with session() as gmsh:
+        occ = gmsh.model.occ
+        plate = occ.addBox(-25, -25, 0, 50, 50, 10)
+        occ.cut([(3, plate)], [(3, occ.addCylinder(x, y, -1, 0, 0, 12, r)) for x, y, r in BORES])
+        occ.synchronize()
+        for k, (x, y, r) in enumerate(BORES):
+            box = (x - r - 0.1, y - r - 0.1, -0.1, x + r + 0.1, y + r + 0.1, 10.1)
+            faces = [tag for _, tag in gmsh.model.getEntitiesInBoundingBox(*box, dim=2)]
+            gmsh.model.addPhysicalGroup(2, faces, 1 + k, f"hole_{k}")
+        for k, (name, y) in enumerate((("bottom", -25), ("top", 25))):
+            box = (-25.1, y - 0.1, -0.1, 25.1, y + 0.1, 10.1)
+            faces = [tag for _, tag in gmsh.model.getEntitiesInBoundingBox(*box, dim=2)]
+            gmsh.model.addPhysicalGroup(2, faces, 10 + k, name)
+        gmsh.model.addPhysicalGroup(3, [gmsh.model.getEntities(3)[0][1]], 20, "plate")
+        gmsh.option.setNumber("Mesh.MeshSizeMax", 6.0)
+        gmsh.option.setNumber("Mesh.MeshSizeMin", 2.0)
+        gmsh.option.setNumber("Mesh.MeshSizeFromCurvature", 10)
+        gmsh.model.mesh.generate(3)
+        gmsh.write(str(path))
+
+
 if __name__ == "__main__":
     lug(HERE / "lug.inp")
+    small_crack(HERE / "small_crack.msh")
     for name, mesh in meshes().items():
         path = HERE / f"{name}.msh"
         write_mesh(path, mesh)

@@ -115,8 +115,10 @@ def _rounds(
     aim, reason = _AIM, ""
     while True:
         _tell(progress, len(rounds) - 1, rounds[-1])
-        if now.error <= tolerance and (len(rounds) > 1 or not now.pressed):
-            break  # estimates are blind to parts of contact: there, two meshes have to agree
+        # Estimates are blind to parts of contact: there, two meshes have to agree.
+        met = now.error <= tolerance and (len(rounds) > 1 or not now.pressed)
+        if met:
+            break
         if len(rounds) == _MOST_ROUNDS[scene.mesh.dim]:
             reason = f"{len(rounds)} rounds have not been enough"
             break
@@ -136,8 +138,7 @@ def _rounds(
         now = new
     for message in messages:
         warn(message)
-    met = bool(now.error <= tolerance)
-    reason = "" if met else "; ".join([reason, *now.reasons])
+    reason = "" if met else "; ".join(part for part in (reason, now.worst, *now.reasons) if part)
     if not met and not np.abs(now.best).max(initial=0.0) > 0:
         reason += "; K is zero at every tip"
     return Adapted(now.problem, now.solutions, now.sifs, tolerance, met, reason, tuple(rounds))

@@ -1,6 +1,6 @@
 """One round: solve, K with error bars, and what the cells contribute to them."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -8,7 +8,8 @@ import numpy as np
 
 from xcrack.analysis.solution import Solution
 from xcrack.analysis.solve import solve_states
-from xcrack.arrays import Floats
+from xcrack.arrays import Bools, Floats, at
+from xcrack.crack.size_3d import surface_size
 from xcrack.errors import ProblemError
 from xcrack.scene.problem import Problem
 from xcrack.sif.bars import Bars
@@ -33,6 +34,8 @@ class Measured:
         those at rest.
     shares : (2 k, cells) array, stress · √length
         Absolute contributions of the cells to K_I and K_II of each.
+    beside : tuple of float, length
+        Of each crack: places of its fronts closer than this to a free surface do not count.
     """
 
     problem: Problem
@@ -41,12 +44,32 @@ class Measured:
     best: Floats
     bar: Floats
     shares: Floats
+    beside: tuple[float, ...]
 
     @property
     def error(self) -> float:
         """Largest half-width over the largest best K; nan where one of them is missing."""
         scale = np.abs(self.best).max(initial=0.0)
         return float(self.bar.max(initial=0.0) / scale) if scale > 0 else float("nan")
+
+    @property
+    def worst(self) -> str:
+        """Where bars are longest, in words; empty where there is no bar."""
+        for k in live_states(self):
+            for c, sif in enumerate(self.sifs[k]):
+                if len(sif.K) and not counted(sif, self.beside[c]).any():
+                    return f"no place of crack {c} is away from free surfaces: its fronts are short"
+        ends = [
+            (float(sif.bar[own].max()), c, sif.x[own][int(sif.bar[own].max(axis=1).argmax())])
+            for k in live_states(self)
+            for c, sif in enumerate(self.sifs[k])
+            for own in [counted(sif, self.beside[c])]
+            if np.isfinite(sif.bar[own]).all() and own.any()
+        ]
+        if not ends:
+            return ""
+        _, c, x = max(ends, key=lambda end: end[0])
+        return f"bars are longest at {at(x)} of crack {c}"
 
     @property
     def pressed(self) -> tuple[int, ...]:
@@ -95,17 +118,58 @@ def measured(problem: Problem, states: Sequence[Any]) -> Measured:
                 rows[k] = replace(sifs[k], errors=errors)
             shares.append(own.reshape(-1, own.shape[-1]))
         by_crack.append(rows)
-    ends = [sif for rows in by_crack for sif in (rows[k] for k in live)]
-    inside = [~sif.at_surface for sif in ends]
-    empty = np.zeros((0, problem.mesh.dim))
+    beside = _BESIDE[problem.mesh.dim](problem)
+    sifs_of = tuple(tuple(rows[k] for rows in by_crack) for k in range(len(solutions)))
+    best, bar = values(sifs_of, live, beside)
     return Measured(
         problem,
         tuple(replace(s, factored=None) for s in solutions),
-        tuple(tuple(rows[k] for rows in by_crack) for k in range(len(solutions))),
-        np.concatenate([empty, *(s.best[i] for s, i in zip(ends, inside))]),
-        np.concatenate([empty, *(s.bar[i] for s, i in zip(ends, inside))]),
+        sifs_of,
+        best,
+        bar,
         np.concatenate(shares),
+        beside,
     )
+
+
+def values(
+    sifs: Sequence[Sequence[SIF]], live: Sequence[int], beside: Sequence[float]
+) -> tuple[Floats, Floats]:
+    """Best K and its half-widths at all places that count, crack by crack in all live states.
+
+    Of a crack none of whose places count, K is one zero and its half-width nan.
+    """
+    best, bar = [], []
+    for c in range(len(beside)):
+        for sif in (sifs[k][c] for k in live):
+            own = counted(sif, beside[c])
+            nothing = np.zeros((int(len(sif.K) > 0 and not own.any()), sif.K.shape[1]))
+            best += [sif.best[own], nothing]
+            bar += [sif.bar[own], nothing + np.nan]
+    if not best:
+        return np.zeros((0, 2)), np.zeros((0, 2))
+    return np.concatenate(best), np.concatenate(bar)
+
+
+def counted(sif: SIF, beside: float) -> Bools:
+    """Places of a crack whose K the tolerance is asked of: those away from free surfaces."""
+    result = ~sif.at_surface
+    for front in np.unique(sif.front[sif.at_surface]):
+        own = sif.front == front
+        s = sif.s[own]
+        result[own] &= np.minimum(s - s.min(), s.max() - s) >= beside
+    return np.asarray(result)
+
+
+def _beside_in_3d(problem: Problem) -> tuple[float, ...]:
+    return tuple(_SHARE * surface_size(crack, problem.mesh) for crack in problem.placed)
+
+
+_SHARE = 0.5  # of a crack's size, half the radius of a penny
+_BESIDE: dict[int, Callable[[Problem], tuple[float, ...]]] = {
+    2: lambda problem: (0.0,) * len(problem.cracks),
+    3: _beside_in_3d,
+}
 
 
 def live_states(given: Measured) -> list[int]:
@@ -113,4 +177,4 @@ def live_states(given: Measured) -> list[int]:
     return [k for k, s in enumerate(given.solutions) if not s.at_rest]
 
 
-__all__ = ["Measured", "live_states", "measured"]
+__all__ = ["Measured", "counted", "live_states", "measured", "values"]

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from xcrack.adaptivity.fronts_3d import between, graded, with_room
-from xcrack.adaptivity.measured import Measured, live_states
+from xcrack.adaptivity.measured import Measured, counted, live_states, values
 from xcrack.adaptivity.outlines_3d import CELLS
 from xcrack.adaptivity.resolved import resolved
 from xcrack.arrays import Floats
@@ -59,9 +59,9 @@ def next_mesh(now: Measured, tolerance: float, aim: float, most: int) -> Mesh | 
 def _finer(now: Measured, c: int, tolerance: float, aim: float) -> float:
     """How many times smaller the cells along the fronts of a crack are to be."""
     error = error_of(now, c)
-    if error <= tolerance:
+    if error <= tolerance and c not in now.pressed:
         return 1.0
-    if not np.isfinite(error):
+    if error <= tolerance or not np.isfinite(error):
         return _LEAST
     return float(np.clip((error / (aim * tolerance)) ** (1 / _POWER), _LEAST, _MOST))
 
@@ -74,7 +74,7 @@ def error_of(given: Measured, c: int) -> float:
     bars = [np.zeros(1)]
     for k in live_states(given):
         sif = given.sifs[k][c]
-        own = sif.bar[~sif.at_surface]
+        own = sif.bar[counted(sif, given.beside[c])]
         bars.append(own.max(axis=1) if len(own) or not len(sif.K) else np.full(1, np.nan))
     scale = np.abs(given.best).max(initial=0.0)
     return float(np.concatenate(bars).max() / scale) if scale > 0 else float("nan")
@@ -101,10 +101,7 @@ def trusted(new: Measured, old: Measured | None) -> Measured:
         )
         for k, (state, states_before) in enumerate(zip(new.sifs, old.sifs, strict=True))
     )
-    rows = [
-        sifs[k][c].bar[~sifs[k][c].at_surface] for c in range(len(new.problem.cracks)) for k in live
-    ]
-    return replace(new, sifs=sifs, bar=np.concatenate(rows))
+    return replace(new, sifs=sifs, bar=values(sifs, live, new.beside)[1])
 
 
 def _sizes_at(given: Measured, c: int) -> float:
