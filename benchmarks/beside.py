@@ -89,19 +89,19 @@ def edge(n: int, contact: str = "off", states: tuple[float, ...] = (1.0,)) -> It
         yield parts.numbers(solutions)
 
 
-def bars(n: int, tips: int = 1) -> Iterator[Numbers]:
+def bars(n: int, start: float = -1.2, stop: float = -0.1) -> Iterator[Numbers]:
     """Crack with one tip or two in 2D, order 2: solution and K, and the error bars of K."""
     from inspect import signature
 
     import xcrack as xc
 
-    start = (-1.2, 0.013) if tips == 1 else (-0.52, 0.013)
+    line = [(start, 0.013), (stop, 0.041)]
     known = {"error"} & set(signature(xc.solve).parameters)
     while True:
         mesh = xc.box((-1, -1), (1, 1), n)
         problem = xc.Problem(
-            mesh, xc.Isotropic(210e3, 0.3, "strain"), [xc.line_crack([start, (-0.1, 0.041)])],
-            loads=_pull(2), contact="off",
+            mesh, xc.Isotropic(210e3, 0.3, "strain"), [xc.line_crack(line)], loads=_pull(2),
+            contact="off",
         )  # fmt: skip
         parts = _Parts()
         solutions = xc.solve(problem, states=[1.0], **dict.fromkeys(known, True))
@@ -236,15 +236,12 @@ SCENES |= {
 
 
 BARS: dict[str, Callable[[], Iterator[Numbers]]] = {  # with error bars of K
-    "bars 5 k": lambda: bars(22),
-    "bars 10 k": lambda: bars(33),
-    "bars 20 k": lambda: bars(48),
-    "bars 39 k": lambda: bars(67),
-    "bars 5 k, two tips": lambda: bars(22, 2),
-    "bars 10 k, two tips": lambda: bars(33, 2),
-    "bars 20 k, two tips": lambda: bars(48, 2),
-    "bars 39 k, two tips": lambda: bars(67, 2),
-}
+    f"bars {size} k{name}": lambda n=n, ends=ends: bars(n, *ends)  # type: ignore[misc]
+    for name, ends in (
+        ("", (-1.2, -0.1)), (", two tips", (-0.52, 0.43)), (", short, two tips", (-0.52, -0.1)),
+    )
+    for size, n in ((5, 22), (10, 33), (20, 48), (39, 67))
+}  # fmt: skip
 SCENES |= BARS
 
 

@@ -127,7 +127,7 @@ def _on_groups(factored: Factored, groups: Groups, goals: Sequence[Goal]) -> Flo
     """g_J of the goals `(g, m)`."""
     columns = []
     for goal in goals:
-        part = np.zeros((len(groups.crack), goal.pressure.shape[1]))
+        part = np.zeros((len(groups.crack), goal.m))
         space = factored.contact.spaces[goal.crack]
         if space is not None:
             part[groups.crack == goal.crack] = goal.on_pressures(space.values)

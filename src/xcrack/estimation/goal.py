@@ -1,6 +1,8 @@
 """Functionals that are affine in a solution: a sum over points, and pressures on crack faces."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -57,23 +59,30 @@ class Goal:
     rotation : (n_points, 2) array
         Mean rotation as a sum over the displacements of mesh points, which it is free of.
     crack : int
-    pressure : (q, m) array
-        Factors of the pressures on the faces of that crack, at their integration points.
+    m : int
+        Number of functionals.
+    on_faces : callable
+        Makes `pressure`, which few estimates need.
     """
 
     parts: tuple[GoalPoints, ...]
     cells: tuple[GoalCells, ...]
     rotation: Floats
     crack: int
-    pressure: Floats
+    m: int
+    on_faces: Callable[[], Floats]
+
+    @cached_property
+    def pressure(self) -> Floats:
+        """Factors of pressures on the faces of that crack, at their integration points `(q, m)`."""
+        return self.on_faces()
 
     def on_functions(self, space: FunctionSpace) -> Floats:
         """The part f: each functional of each function and component `(n_dof, m)`."""
         from xcrack.kernels.goal import add_cells, add_to_functions
 
-        m = self.pressure.shape[1]
-        total = np.zeros((space.n_functions, space.dim, m))
-        turn = np.zeros(m)
+        total = np.zeros((space.n_functions, space.dim, self.m))
+        turn = np.zeros(self.m)
         for part in self.parts:
             turn += (part.factor[:, 0, 1] - part.factor[:, 1, 0]).sum(axis=0)
             for batch, number, row, slope in part.at.batches:
@@ -83,7 +92,7 @@ class Goal:
             nodes = space.cell_nodes[plain.cells]
             add_cells(total, nodes, np.ones(nodes.shape), plain.on_nodes)
         total[: len(self.rotation)] += self.rotation[:, :, None] * turn
-        return total.reshape(-1, m)
+        return total.reshape(-1, self.m)
 
     def on_pressures(self, values: Floats) -> Floats:
         """The part g: each functional of each pressure function `(g, m)`, from its values."""

@@ -93,8 +93,10 @@ def _along(space: FunctionSpace, c: int) -> Ints:
     """Edges on which crack c lies."""
     cut, to_edge = space.cuts[c], space.mesh.cell_to_edge
     pairs = cut.lip_cell[cut.lip_cell[:, 0] != cut.lip_cell[:, 1]]
+    if not len(pairs):
+        return np.zeros(0, dtype=np.int64)
     shared = [np.intersect1d(to_edge[a], to_edge[b]) for a, b in np.unique(pairs, axis=0)]
-    return np.concatenate([np.zeros(0, dtype=np.int64), *shared])
+    return np.concatenate(shared)
 
 
 def residuals(surplus: Surplus, material: Isotropic, coefficients: Floats) -> tuple[Floats, Floats]:
@@ -142,7 +144,7 @@ def goal_residual(surplus: Surplus, goal: Goal) -> Floats:
     from xcrack.kernels.goal import add_cells
     from xcrack.kernels.surplus import add_functional
 
-    result = np.zeros((len(surplus.fixed), 2, goal.pressure.shape[1]))
+    result = np.zeros((len(surplus.fixed), 2, goal.m))
     for part in goal.parts:
         at = part.at.points
         add_functional(result, at.cell, at.bary, at.side, part.factor, *surplus.arrays)
@@ -205,12 +207,12 @@ def shares(surplus: Surplus, parts: Floats) -> Floats:
     -------
     (cells, m) array
     """
-    n = len(surplus.copy)
+    n, mesh = len(surplus.copy), surplus.space.mesh
     own = np.abs(parts[:n])
     copied = np.nonzero(surplus.copy >= 0)[0]
     own[copied] += np.abs(parts[surplus.copy[copied]])
-    count = np.bincount(surplus.functions.ravel(), minlength=n)
-    return np.asarray((own / count[:, None])[surplus.functions].sum(axis=1))
+    own[: len(mesh.edges)][mesh.facet_to_cell[:, 1] >= 0] /= 2
+    return np.asarray(own[surplus.functions].sum(axis=1))
 
 
 @lru_cache(maxsize=1)

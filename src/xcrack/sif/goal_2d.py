@@ -6,6 +6,7 @@ pressures, body forces and initial stress.
 """
 
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 
@@ -65,9 +66,13 @@ def tip_goal(solution: Solution, t: int) -> Goal:
                 mesh.points, mesh.cells, psi, tip.x, *ring,
             )  # fmt: skip
             parts.append(GoalPoints(at, factor))
-    on_crack, pressure, _ = _faces(solution, t, outer, inner)
     rotation = _rotation(solution, t, outer)
-    return Goal((*parts, *on_crack), tuple(plain_parts), rotation, tip.crack, pressure)
+    faces = partial(_faces, solution, t, outer, inner)
+    if _bent(solution, t, outer):
+        on_crack, pressure, _ = faces()
+        parts.extend(on_crack)
+        return Goal(tuple(parts), tuple(plain_parts), rotation, tip.crack, 2, lambda: pressure)
+    return Goal(tuple(parts), tuple(plain_parts), rotation, tip.crack, 2, lambda: faces()[1])
 
 
 def constant(solution: Solution, t: int) -> Floats:
@@ -99,6 +104,14 @@ def _rotation(solution: Solution, t: int, outer: float) -> Floats:
         y = points[near] - points[near].mean(axis=0)
         result[near] = np.stack([-y[:, 1], y[:, 0]], axis=1) / (y * y).sum()
     return result
+
+
+def _bent(solution: Solution, t: int, outer: float) -> bool:
+    """Whether faces in the domain leave the line through the tip."""
+    tip = solution.space.tips[t]
+    way = solution.lips[tip.crack].x - tip.x
+    across = np.abs(way @ tip.frame[1])[np.linalg.norm(way, axis=1) < outer]
+    return bool((across >= _STRAIGHT * outer).any())
 
 
 def _faces(
