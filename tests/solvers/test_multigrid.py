@@ -9,7 +9,8 @@ import xcrack as xc
 import xcrack.solvers.multigrid as multigrid
 from xcrack.kernels.cycle import first_step, next_step
 from xcrack.mesh.simplex import node_points
-from xcrack.solvers.multigrid import extended, hierarchy, largest_eigenvalue
+from xcrack.solvers.cycle import largest_eigenvalue
+from xcrack.solvers.multigrid import extended, hierarchy
 from xcrack.solvers.projected_cg import Operator, conjugate_gradients
 from xcrack.solvers.row_blocks import Bordered, row_blocks, stored
 from xcrack.xfem.assembly import bulk, rigid_modes
@@ -68,21 +69,42 @@ def test_blocks_are_stored_without_a_matrix_in_between(size):
                 np.testing.assert_array_equal(result, other)
 
 
-def test_nodes_without_free_unknowns_are_left_out():
-    """And unknowns that are not free keep their diagonal entry alone."""
+def test_unknowns_that_are_not_free_take_no_part(monkeypatch):
+    """The body's matrix serves as it is, with any supports: nothing of it is copied."""
+    monkeypatch.setattr(multigrid, "_COARSEST", 6)
     rng = np.random.default_rng(7710)
-    A = bulk(xc.box((-1,) * 3, (1,) * 3, 3), xc.Isotropic(1.0, 0.3), 1).matrix
+    stiffness = bulk(xc.box((-1,) * 3, (1,) * 3, 6), xc.Isotropic(1.0, 0.3), 1)
+    A = stiffness.matrix
     fixed = rng.random(A.shape[0]) < 0.3
-    fixed[6:12] = True
-    nodes = np.nonzero(~fixed.reshape(-1, 3).all(axis=1))[0]
-    unknowns = (nodes[:, None] * 3 + np.arange(3)).ravel()
-    free = ~fixed[unknowns]
-    wanted = A.toarray()[np.ix_(unknowns, unknowns)]
-    wanted = np.where(np.outer(free, free) | np.eye(len(free), dtype=bool), wanted, 0.0)
-    result = multigrid._decoupled(multigrid._of_nodes(A, nodes), free)
-    np.testing.assert_array_equal(result.toarray(), wanted)
-    every = np.arange(A.shape[0] // 3)
-    assert multigrid._decoupled(multigrid._of_nodes(A, every), np.ones(A.shape[0], bool)) is A
+    fixed[6:60] = True
+    levels = hierarchy(stiffness, fixed)
+    assert np.shares_memory(levels.matrix.values, A.data)
+    free = sp.diags(~fixed * 1.0)
+    left = (free @ A @ free).toarray()
+    x = rng.normal(size=A.shape[0]) * ~fixed
+    size = np.abs(left).max()
+    assert np.abs(levels.matrix.times(x) - left @ x).max() <= 1e-14 * size  # round-off
+    y = rng.normal(size=A.shape[0])
+    assert (levels.matrix.added(y.copy(), 2, x)[fixed] == y[fixed]).all()
+    top, below = levels.levels[0], levels.levels[1]
+    P = np.array([top.prolong.times(e) for e in np.eye(top.prolong.shape[1], dtype=np.float32)]).T
+    assert (P[fixed] == 0).all()
+    coarse = np.array([below.matrix.times(e) for e in np.eye(len(P.T), dtype=np.float32)]).T
+    assert np.abs(coarse - P.T @ left @ P).max() <= 1e-5 * np.abs(coarse).max()  # single precision
+
+
+def test_a_coarse_matrix_in_stretches(monkeypatch):
+    """Prolongators to the bit; what they make of the matrix to round-off in single precision."""
+    monkeypatch.setattr(multigrid, "_COARSEST", 6)
+    stiffness, fixed = body((7, 6, 5))
+    whole = hierarchy(stiffness, fixed)
+    monkeypatch.setattr(multigrid, "_ROWS", 37)
+    parts = hierarchy(stiffness, fixed)
+    for one, other in zip(whole.levels, parts.levels, strict=True):
+        if one is whole.levels[0]:
+            assert np.array_equal(one.prolong.values, other.prolong.values)
+        size = np.abs(one.matrix.values).max()
+        assert np.abs(one.matrix.values - other.matrix.values).max() <= 1e-6 * size
 
 
 def test_blocks_hold_each_column_once():
@@ -129,10 +151,9 @@ def body(n, *, supported="foot", E=1.0, nu=0.3, size=1.0, seed=2203, order=1):
 def operator_of(stiffness, fixed, null=None):
     """Levels, their finest matrix and the operator of a body without a crack."""
     levels = hierarchy(stiffness, fixed)
-    d, n = stiffness.mesh.dim, len(levels.free)
-    unknowns = (levels.nodes[:, None] * d + np.arange(d)).ravel()
+    n = len(levels.free)
     free = sp.diags(levels.free.astype(float))
-    A = free @ stiffness.matrix.tocsr()[unknowns][:, unknowns] @ free
+    A = free @ stiffness.matrix.tocsr() @ free
     A = sp.csr_matrix(A + sp.diags(levels.diagonal * ~levels.free))
     nothing = np.zeros(1, dtype=np.int64)
     border = [
@@ -180,7 +201,7 @@ def test_steps_hardly_grow_with_the_mesh():
     for n in (4, 8, 14):
         A, levels, K = operator_of(*body((n, n, n)))
         b = np.zeros(len(levels.free)).reshape(-1, 3)
-        top = levels.bulk.mesh.points[levels.nodes, 2] > 1 - 1e-9
+        top = levels.bulk.mesh.points[:, 2] > 1 - 1e-9
         b[top] = (1.0, 0.3, 0.5)
         b = b.ravel()
         y, count = conjugate_gradients(K, b, np.zeros_like(b))

@@ -8,8 +8,8 @@ import scipy.sparse as sp
 import xcrack as xc
 from xcrack.kernels.patches import add_solved
 from xcrack.solvers.basis import patch_orthogonal, stars
+from xcrack.solvers.cycle import largest_eigenvalue
 from xcrack.solvers.iterative import iterative_system
-from xcrack.solvers.multigrid import largest_eigenvalue
 from xcrack.solvers.schwarz import _inverse
 from xcrack.xfem.model import build
 

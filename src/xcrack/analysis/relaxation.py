@@ -11,6 +11,7 @@ from xcrack.scene.problem import Problem
 from xcrack.scene.temperature import Temperature
 from xcrack.xfem.loads import body_points, load_vector, position
 from xcrack.xfem.model import Model
+from xcrack.xfem.stiffness import body_forces
 
 _RESIDUAL = 1e-3  # of the conjugate gradients: the energy is then known to far better than 1 %
 _MOST = 2000
@@ -54,7 +55,9 @@ def out_of_balance(problem: Problem, model: Model, loads: Sequence[Load]) -> flo
     matrix = model.bulk.matrix
     keep = sp.diags(free.astype(float))
     scale = np.where(free, 1 / matrix.diagonal(), 0.0)
-    operator = LinearOperator((n, n), matvec=lambda v: keep @ (matrix @ (keep @ v)), dtype=float)
+    operator = LinearOperator(
+        (n, n), matvec=lambda v: keep @ body_forces(matrix, keep @ v), dtype=float
+    )
     smooth = LinearOperator((n, n), matvec=lambda v: scale * v, dtype=float)
     u = cg(operator, f, rtol=_RESIDUAL, maxiter=_MOST, M=smooth)[0]
     return float(np.clip(f @ u / stored, 0.0, 1.0))

@@ -283,7 +283,7 @@ class Mesh:
 
         every = np.stack([self.points.min(axis=0), self.points.max(axis=0)])
         side = np.maximum(every[1] - every[0], 1e-300)
-        bins = len(self.cells) / (1 if self.dim == 2 else 3)
+        bins = 2 * len(self.cells) / factorial(self.dim)
         edge = (np.prod(side / side.max()) / bins) ** (1 / self.dim) * side.max()
         shape = np.clip(side / edge, 1, len(self.cells)).astype(np.int64)
         return binned(self.points, self.cells, every, shape), shape

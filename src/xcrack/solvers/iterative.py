@@ -292,7 +292,7 @@ def iterative_system(
     near = _joined(K, rows)  # after the levels, whose making needs the most memory
     free = ~fixed
     d = space.dim
-    plain = (levels.nodes[:, None] * d + np.arange(d)).ravel()
+    plain = np.arange(len(levels.free))
     stars = space.order == 2 and space.n_functions > space.n_nodes
     combined, in_use, back = None, free, None
     if vectorial is not None and space.tips:

@@ -2,7 +2,7 @@
 
 import itertools
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -46,6 +46,8 @@ class RowBlocks:
         First row, column list and values of each block.
     columns : array of uint32
     values : array, float32 or float64
+    idle : (k,) array of int, optional
+        Rows that count as zero whatever the values.
     """
 
     shape: tuple[int, int]
@@ -54,6 +56,7 @@ class RowBlocks:
     offset: Any
     columns: Any
     values: Any
+    idle: Ints | None = None
 
     @property
     def dtype(self) -> Any:
@@ -71,6 +74,7 @@ class RowBlocks:
         else:
             from xcrack.kernels.wide import product_of_four as multiply
         number = self.dtype.type(scale)
+        unchanged = None if self.idle is None else y[self.idle]
 
         def rows(stretch: slice) -> None:
             multiply(
@@ -81,6 +85,8 @@ class RowBlocks:
         entries = len(self.values) * (1 if x.ndim == 1 else _FOUR)
         count = min(number_of_threads(), entries // _LEAST)
         each(rows, self._stretches(count))
+        if unchanged is not None:
+            y[self.idle] = unchanged
         return y
 
     def _stretches(self, count: int) -> list[slice]:
@@ -93,8 +99,7 @@ class RowBlocks:
 
     def single(self) -> "RowBlocks":
         """The same matrix in single precision; it shares the pattern."""
-        values = lock(self.values.astype(np.float32))
-        return RowBlocks(self.shape, self.first, self.start, self.offset, self.columns, values)
+        return replace(self, values=lock(self.values.astype(np.float32)))
 
 
 def row_blocks(parts: Sequence[sp.csr_matrix], first: Ints, dtype: Any = np.float64) -> RowBlocks:
@@ -129,7 +134,8 @@ def row_blocks(parts: Sequence[sp.csr_matrix], first: Ints, dtype: Any = np.floa
 def stored(A: sp.bsr_matrix, dtype: Any = np.float32) -> RowBlocks:
     """Store a matrix of blocks: a block of its rows is one of ours.
 
-    The blocks of three rows of a body in 3D are taken as they are, without a matrix in between.
+    The blocks of three rows of a body in 3D are taken as they are, without a matrix in between,
+    and share its memory where they are stored column by column in the type that is asked for.
 
     Parameters
     ----------
@@ -168,6 +174,11 @@ class Bordered:
     standard: RowBlocks
     across: RowBlocks
     below: RowBlocks
+
+    @property
+    def idle(self) -> Ints | None:
+        """Rows that count as zero."""
+        return self.standard.idle
 
     @property
     def shape(self) -> tuple[int, int]:

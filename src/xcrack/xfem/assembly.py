@@ -32,7 +32,7 @@ class Bulk:
     material : Isotropic
     order : int
     matrix : sparse matrix (n, n), stress · length^(d - 2)
-        Node blocks, BSR.
+        Node blocks, BSR; in 3D each is stored column by column, as products of the solvers read it.
     cells : ReusedCells, optional
         Cut cells of the last crack that may serve the next.
     """
@@ -51,6 +51,9 @@ def bulk(mesh: Mesh, material: Isotropic, order: int) -> Bulk:
     nodes = np.ascontiguousarray(cell_nodes(mesh, order))
     n_nodes = mesh.n_points + (len(mesh.edges) if order == 2 else 0)
     indptr, indices, slot = block_pattern(nodes, n_nodes)
+    by_columns = mesh.dim == 3
+    if by_columns:  # a block on the other side of the diagonal is the transposed one
+        slot = np.ascontiguousarray(slot.transpose(0, 2, 1))
     bary, weight = simplex_rule(mesh.dim, 2 * (order - 1))
     data = block_stiffness(
         slot,
@@ -62,6 +65,7 @@ def bulk(mesh: Mesh, material: Isotropic, order: int) -> Bulk:
         material.lam,
         material.mu,
     )
+    data = data.transpose(0, 2, 1) if by_columns else data
     size = n_nodes * mesh.dim
     return Bulk(mesh, material, order, sp.bsr_matrix((data, indices, indptr), shape=(size, size)))
 

@@ -49,13 +49,7 @@ class Stiffness:
 
     def __matmul__(self, x: Floats) -> Floats:
         """Forces `(n_dof,)` or `(n_dof, k)` of displacements of the same shape."""
-        from xcrack.kernels.bulk import add_block_product
-
-        columns = np.ascontiguousarray(x).reshape(len(x), -1)
-        result = np.zeros_like(columns)
-        for part in (self.body, self.enriched):
-            add_block_product(part.indptr, part.indices, part.data, columns, result)
-        return result.reshape(x.shape)
+        return _product((self.body, self.enriched), x)
 
     def joined(self, rows: Bools | None = None) -> sp.csr_matrix:
         """The sum, of all rows or of some functions `(n_functions,)`; others are empty."""
@@ -70,6 +64,21 @@ class Stiffness:
             over.indices, over.data, wanted,
         )  # fmt: skip
         return sp.csr_matrix((data, indices, indptr), shape=self.shape)
+
+
+def body_forces(body: sp.bsr_matrix, x: Floats) -> Floats:
+    """Forces `(n,)` or `(n, k)` of displacements of the uncracked body of the same shape."""
+    return _product((body,), x)
+
+
+def _product(parts: tuple[sp.bsr_matrix | Enriched, ...], x: Floats) -> Floats:
+    from xcrack.kernels.bulk import add_block_product
+
+    columns = np.ascontiguousarray(x).reshape(len(x), -1)
+    result = np.zeros_like(columns)
+    for part in parts:
+        add_block_product(part.indptr, part.indices, part.data, columns, result)
+    return result.reshape(x.shape)
 
 
 def next_to_enriched(space: FunctionSpace) -> Bools:
