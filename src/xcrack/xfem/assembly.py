@@ -6,7 +6,7 @@ from itertools import combinations
 import numpy as np
 import scipy.sparse as sp
 
-from xcrack.arrays import Floats, Ints
+from xcrack.arrays import Floats, Ints, stretches
 from xcrack.mesh.mesh import Mesh
 from xcrack.mesh.simplex import cell_nodes, shape_derivatives, simplex_rule
 from xcrack.scene.material import Isotropic
@@ -51,9 +51,6 @@ def bulk(mesh: Mesh, material: Isotropic, order: int) -> Bulk:
     nodes = np.ascontiguousarray(cell_nodes(mesh, order))
     n_nodes = mesh.n_points + (len(mesh.edges) if order == 2 else 0)
     indptr, indices, slot = block_pattern(nodes, n_nodes)
-    by_columns = mesh.dim == 3
-    if by_columns:  # a block on the other side of the diagonal is the transposed one
-        slot = np.ascontiguousarray(slot.transpose(0, 2, 1))
     bary, weight = simplex_rule(mesh.dim, 2 * (order - 1))
     data = block_stiffness(
         slot,
@@ -65,7 +62,10 @@ def bulk(mesh: Mesh, material: Isotropic, order: int) -> Bulk:
         material.lam,
         material.mu,
     )
-    data = data.transpose(0, 2, 1) if by_columns else data
+    if mesh.dim == 3:
+        for part in stretches(len(data)):
+            data[part] = data[part].transpose(0, 2, 1).copy()
+        data = data.transpose(0, 2, 1)
     size = n_nodes * mesh.dim
     return Bulk(mesh, material, order, sp.bsr_matrix((data, indices, indptr), shape=(size, size)))
 
