@@ -39,7 +39,7 @@ def set_tips(value, slope, first, row, bary, side, nodes, gradient, phi, psi, ac
     k = shift.shape[1]
     slopes = len(slope) > 0
     F, ahead, normal = np.empty(4), np.empty(4), np.empty(4)
-    to_psi, to_phi = np.empty(d), np.empty(d)
+    to_psi, to_phi, steep = np.empty(d), np.empty(d), np.empty((k, d))
     for p in range(q):
         e = row[p]
         x = 0.0
@@ -75,17 +75,22 @@ def set_tips(value, slope, first, row, bary, side, nodes, gradient, phi, psi, ac
                 turn = ahead[f]
                 ahead[f] = (0.5 * F[f] * C - turn * S) / root
                 normal[f] = (0.5 * F[f] * S + turn * C) / root
+        for f in range(k):
+            for j in range(d if slopes else 0):
+                steep[f, j] = ahead[f] * to_psi[j] + normal[f] * to_phi[j]
         for b in range(corners):
-            node = nodes[e, b]
+            node, to, share = nodes[e, b], first + b * k, bary[p, b]
+            if not active[node]:
+                for f in range(k):
+                    value[p, to + f] = 0.0
+                    for j in range(d if slopes else 0):
+                        slope[p, to + f, j] = 0.0
+                continue
             for f in range(k):
-                to = first + b * k + f
-                lifted = root * F[f] - shift[node, f] if active[node] else 0.0
-                value[p, to] = bary[p, b] * lifted
-                if slopes:
-                    for j in range(d):
-                        steep = ahead[f] * to_psi[j] + normal[f] * to_phi[j]
-                        total = lifted * gradient[e, b, j] + bary[p, b] * steep
-                        slope[p, to, j] = total if active[node] else 0.0
+                lifted = root * F[f] - shift[node, f]
+                value[p, to + f] = share * lifted
+                for j in range(d if slopes else 0):
+                    slope[p, to + f, j] = lifted * gradient[e, b, j] + share * steep[f, j]
 
 
 @kernel

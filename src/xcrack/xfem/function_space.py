@@ -218,13 +218,14 @@ class FunctionSpace:
         for c in cracks:
             functions[:, at : at + n] = self.heaviside[c][nodes]
             at += n
+        points = self.mesh.cells[cells]
         for t in tips:
             tip = self.tips[t]
-            first = tip.point_to_function[self.mesh.cells[cells]]
-            for k in range(tip.functions):
-                own = functions[:, at + k : at + corners * tip.functions : tip.functions]
-                own[:] = first + k * (first >= 0)
-            at += corners * tip.functions
+            first = tip.point_to_function[points][:, :, None]
+            every = first + (first >= 0) * np.arange(tip.functions)
+            width = corners * tip.functions
+            functions[:, at : at + width] = every.reshape(-1, width)
+            at += width
         return Batch(cells, cracks, tips, functions)
 
     def tabulate(
