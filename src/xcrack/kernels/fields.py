@@ -24,19 +24,21 @@ def set_gradients(gradient, number, slope, functions, row, coefficients):  # typ
     coefficients : (f, d, s) array
     """
     d, states = coefficients.shape[1], coefficients.shape[2]
-    total = np.empty((d, d, states))
     for p in range(len(number)):
-        total[:] = 0.0
-        for a in range(slope.shape[1]):
-            f = functions[row[p], a]
-            if f < 0:
-                continue
-            for j in range(d):
-                steep = slope[p, a, j]
-                for i in range(d):
-                    for s in range(states):
-                        total[i, j, s] += steep * coefficients[f, i, s]
-        gradient[number[p]] = total
+        to = number[p]
+        for i in range(d):
+            for s in range(states):
+                x, y, z = 0.0, 0.0, 0.0  # in 2D y and z are the same
+                for a in range(slope.shape[1]):
+                    f = functions[row[p], a]
+                    if f >= 0:
+                        c = coefficients[f, i, s]
+                        x += slope[p, a, 0] * c
+                        y += slope[p, a, 1] * c
+                        z += slope[p, a, d - 1] * c
+                gradient[to, i, 0, s] = x
+                gradient[to, i, 1, s] = y
+                gradient[to, i, d - 1, s] = z
 
 
 @kernel

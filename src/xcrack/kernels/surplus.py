@@ -188,7 +188,7 @@ def take_plain_stress(  # type: ignore[no-untyped-def]
     columns = coefficients.shape[2]
     both = lam + 2.0 * mu
     stress = np.empty((columns, 3, 3))  # corner; xx, yy, xy
-    d, moved, total = np.empty((6, 2)), np.empty((4, 3, 2)), np.empty((4, columns))
+    d, moved = np.empty((6, 2)), np.empty((4, 3, 2))
     for k in range(len(cells)):
         e = cells[k]
         G, V = gradient[e], volume[e]
@@ -200,16 +200,15 @@ def take_plain_stress(  # type: ignore[no-untyped-def]
                 d[3, j] = 4.0 * (G[1, j] if b == 0 else (G[0, j] if b == 1 else 0.0))
                 d[4, j] = 4.0 * (G[2, j] if b == 0 else (G[0, j] if b == 2 else 0.0))
                 d[5, j] = 4.0 * (G[2, j] if b == 1 else (G[1, j] if b == 2 else 0.0))
-            total[:] = 0.0
-            for a in range(6):
-                n, x, y = nodes[e, a], d[a, 0], d[a, 1]
-                for m in range(columns):
-                    total[0, m] += x * coefficients[n, 0, m]
-                    total[1, m] += y * coefficients[n, 0, m]
-                    total[2, m] += x * coefficients[n, 1, m]
-                    total[3, m] += y * coefficients[n, 1, m]
             for m in range(columns):
-                g00, g01, g10, g11 = total[0, m], total[1, m], total[2, m], total[3, m]
+                g00, g01, g10, g11 = 0.0, 0.0, 0.0, 0.0
+                for a in range(6):
+                    n = nodes[e, a]
+                    u, v = coefficients[n, 0, m], coefficients[n, 1, m]
+                    g00 += d[a, 0] * u
+                    g01 += d[a, 1] * u
+                    g10 += d[a, 0] * v
+                    g11 += d[a, 1] * v
                 trace = lam * (g00 + g11)
                 stress[m, b, 0] = V * (trace + 2.0 * mu * g00)
                 stress[m, b, 1] = V * (trace + 2.0 * mu * g11)
