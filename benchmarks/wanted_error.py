@@ -52,7 +52,7 @@ def scene(name: str) -> tuple[xc.Problem, float]:
         case "an edge crack in tension and shear":
             crack = line([(-1.1, 0.013), (-0.5, 0.013)])
             return xc.Problem(square(), STEEL, [crack], loads=turned(20.0)), 0.3
-        case "past a hole":
+        case "into a hole":
             body = xc.plate_with_hole(width=2, height=2, radius=0.2, size=0.25)
             return xc.Problem(body, STEEL, [line([(-1.1, 0.25), (-0.6, 0.25)])], loads=UP), 0.1
         case "from a hole":
@@ -66,7 +66,7 @@ def scene(name: str) -> tuple[xc.Problem, float]:
 
 SCENES = (
     "a crack that turns by 29°", "an inner crack that turns by 52°",
-    "an edge crack in tension and shear", "past a hole", "from a hole", "two cracks, one faster",
+    "an edge crack in tension and shear", "into a hole", "from a hole", "two cracks, one faster",
 )  # fmt: skip
 
 

@@ -1,11 +1,15 @@
 """Growth to a wanted error: lives and paths against exact ones, bars, resuming, refusals."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.integrate import quad
 
 import xcrack as xc
 from benchmarks.wanted_error import SCENES, against, run, scene
+from xcrack.growth import outgrown, prepared
+from xcrack.growth.sizes_2d import given_mesh
 from xcrack.history import run_folder
 from xcrack.verification.plates import PLATE_EDGE
 
@@ -81,8 +85,8 @@ def test_steps_are_chosen_by_the_tolerance():
     assert len(many.steps) > len(few.steps)
     ways = np.diff([step.corrected[0].points[-1, 0] for step in many.steps])
     assert ways.max() <= 0.03 * (1 + 1e-9)
-    same = [h.steps[0].solutions[0].problem.mesh.points for h in (few, many)]
-    assert same[0].tobytes() == same[1].tobytes()  # the mesh does not depend on them
+    # The first mesh is fine enough for that, on which the crack is four cells long.
+    assert meshes_of(few) == meshes_of(many) == [prepared.fingerprint(given_mesh(strip()))]
     # The table of the run says which K was used, and how far N is known.
     table = few.table()
     assert (table["best"] == 1).all()
@@ -131,6 +135,74 @@ def test_life_of_a_penny():
     assert history.life_bar.relative <= 0.1
 
 
+# Meshes ----------------------------------------------------------------------------------------
+
+
+def meshes_of(history):
+    """Fingerprints of the meshes of a run, each once."""
+    return list(dict.fromkeys(step.memory.mesh for step in history.steps))
+
+
+def resumed(folder, given, whole, stops):
+    """A run that is killed behind some steps, and taken up again each time."""
+    xc.collect(xc.grow(**given, max_steps=stops[0]), folder)
+    for stop in stops[1:]:
+        xc.resume(folder, **given, max_steps=stop)
+    other = xc.resume(folder, **given, max_steps=len(whole.steps))
+    assert other.table().tobytes() == whole.table().tobytes()
+    return other
+
+
+def test_mesh_is_refined_at_the_first_step_that_needs_it(tmp_path):
+    """The first step is good enough on the mesh as given, the second is not; resumed on each."""
+    given = run_of(strip(5), tolerance=1e-3)
+    whole = xc.collect(xc.grow(**given, max_steps=3), tmp_path / "whole")
+    assert [step.memory.meshes for step in whole.steps] == [0, 1, 1]
+    cells = [len(step.solutions[0].problem.mesh.cells) for step in whole.steps]
+    assert cells[0] < cells[1] == cells[2]
+    assert whole.steps[1].error.rate < 0.5 * whole.steps[0].error.rate
+    other = resumed(tmp_path / "part", given, whole, (1, 2))
+    assert content(tmp_path / "part") == content(tmp_path / "whole")
+    assert len(other.mesh.cells) == len(xc.load(tmp_path / "whole").mesh.cells) == cells[-1]
+
+
+@pytest.mark.slow
+@pytest.mark.mission
+def test_mesh_is_refined_again_where_the_scout_was_misled(tmp_path, monkeypatch):
+    """A scout that has seen nothing of the way: a second one goes on from where that shows.
+
+    Without the stricter rule here the run holds its tolerance on the first mesh: most of the life
+    is over when the tip has left the fine cells.
+    """
+    monkeypatch.setattr(outgrown, "_FORGIVEN", 1.0)
+    monkeypatch.setattr(outgrown, "_WHOLE", 0.5)
+    real, begins = prepared.scouted, []
+
+    def blind(run, scene, steps_of, begin=0):
+        begins.append(begin)
+        seen = real(run, scene, steps_of, begin)
+        return seen if begin else replace(seen, stages=seen.stages[:1])
+
+    monkeypatch.setattr(prepared, "scouted", blind)
+    given = run_of(tolerance=1e-3)
+    whole = xc.collect(xc.grow(**given, max_steps=17), tmp_path / "whole")
+    made = [step.memory.meshes for step in whole.steps]
+    assert len(begins) == 2
+    assert begins[0] == 0 < begins[1]
+    assert len(meshes_of(whole)) == 2
+    assert made == [1] * (begins[1] + 1) + [2] * (len(made) - begins[1] - 1)
+    assert whole.life_bar.relative <= 1e-3
+    assert abs(whole.life / exact_life(whole.cracks[0].points[-1, 0]) - 1) <= 1e-3 + 3 * _TABLE
+    resumed(tmp_path / "part", given, whole, (begins[1], begins[1] + 1, begins[1] + 2))
+    assert content(tmp_path / "part") == content(tmp_path / "whole")
+    # Without its second mesh it is made again, from the step before.
+    for body in run_folder.body_files(tmp_path / "part")[1:]:
+        body.unlink()
+    again = xc.resume(tmp_path / "part", **given, max_steps=len(whole.steps) + 1)
+    longer = xc.resume(tmp_path / "whole", **given, max_steps=len(whole.steps) + 1)
+    assert again.table().tobytes() == longer.table().tobytes()
+
+
 # What is stored --------------------------------------------------------------------------------
 
 
@@ -142,7 +214,7 @@ def content(folder):
 @pytest.mark.parametrize("lost", ["", pytest.param(run_folder.BODY, marks=pytest.mark.slow)])
 def test_resumed_to_the_last_bit(tmp_path, lost):
     """A run that is killed, also one that has lost its mesh: that is scouted and made again."""
-    given = run_of(tolerance=0.05)
+    given = run_of(tolerance=0.05 if not lost else 1e-3)
     whole = xc.collect(xc.grow(**given, max_steps=4), tmp_path / "whole")
     xc.collect(xc.grow(**given, max_steps=2), tmp_path / "part")
     if lost:
@@ -186,9 +258,9 @@ def test_refused(options, match):
 
 @pytest.mark.filterwarnings("default::xcrack.XcrackWarning")
 def test_too_few_unknowns():
-    steps = xc.grow(**run_of(tolerance=1e-3, max_unknowns=4000))
+    steps = xc.grow(**run_of(tolerance=3e-4, max_unknowns=2500))
     with pytest.warns(xc.XcrackWarning) as caught:
         xc.collect(steps, until=longer_than(0.25))
     messages = [str(w.message) for w in caught]
-    assert any("would have more than 4000 unknowns" in m for m in messages)
-    assert any("tolerance = 0.001 is not met at step" in m for m in messages)
+    assert any("would have more than 2500 unknowns" in m for m in messages)
+    assert any("tolerance = 0.0003 is not met at step" in m for m in messages)

@@ -16,6 +16,7 @@ from xcrack.growth.controller import (
 from xcrack.growth.options import Run
 from xcrack.growth.step import Step, memory_of
 
+PATH = 0.75  # of it in the path, which K has less in
 STEPS = 0.5  # of the tolerance: what the length of the steps may take
 # Of a correction: more than the error that is left, on nearly all scenes, in equal steps and in
 # those of a tolerance, which are fewer and change their length.
@@ -74,7 +75,9 @@ def following(
     """
     if run.tolerance is None:
         return Control()
-    error = step_error(off, length, off_cycles, cycles, before, STEPS * run.tolerance)
+    error = step_error(
+        off * STEPS / PATH, length, off_cycles, cycles, before, STEPS * run.tolerance
+    )
     wanted = next_length(length, error, last.error, least)
     return Control(within(wanted, room, least), error, least)
 
@@ -95,4 +98,19 @@ def shortened(last: Step, next_step: Step) -> Step | None:
     return replace(last, memory=replace(memory_of(last), trail=trail))
 
 
-__all__ = ["STEPS", "first", "following", "longest", "share_left", "shortened"]
+def can_be_shortened(last: Step) -> bool:
+    """Whether cells leave room for a shorter step after one."""
+    trail = memory_of(last).trail
+    return trail is not None and trail.control.can_shorten
+
+
+__all__ = [
+    "PATH",
+    "STEPS",
+    "can_be_shortened",
+    "first",
+    "following",
+    "longest",
+    "share_left",
+    "shortened",
+]

@@ -5,13 +5,14 @@ from dataclasses import dataclass
 import numpy as np
 
 _LEAST = 1e-3  # a step without any correction does not ask for an endless next one
-_SAFE = 0.9
+_SAFE = 0.95
 _NOW, _BEFORE = 0.35, 0.15  # exponents of the last error and of the one before
+_BEGIN = 2.0  # of the crack, times the root of the tolerance: the first step
 _FIRST = 0.5  # exponent after the first step, whose predictor is of first order
 _CHANGE, _FIRST_CHANGE = (0.4, 1.6), (0.5, 1.6)
-# Cells of the shortest step: behind a kink K on a shorter face is that of a kink between two cells;
-# straight on, it ends where no face of its own would begin.
-_KINKED, _STRAIGHT = 2.0, 0.6
+# Cells of the shortest step: straight on, and more behind a right-angled kink, where K on a shorter
+# face is that of a kink between two cells.
+_STRAIGHT, _KINKED = 0.12, 1.6
 _PAST = 0.05  # of the cycles so far: a step of fewer cycles may err by a share of this many
 _AHEAD = 0.5  # of the way to the boundary ahead: the longest step
 REJECTED = 2.0  # errors from which on a step is done again with a shorter one
@@ -41,9 +42,9 @@ class Control:
         return self.length > 1.001 * self.least
 
 
-def shortest(cell: float, kinked: bool) -> float:
-    """Shortest step in cells of some size, straight on or behind a kink."""
-    return (_KINKED if kinked else _STRAIGHT) * cell
+def shortest(cell: float, turn: float) -> float:
+    """Shortest step in cells of some size, behind a kink of some angle (rad)."""
+    return (_STRAIGHT + _KINKED * float(np.sin(min(abs(turn), np.pi / 2))) ** 2) * cell
 
 
 def step_error(
@@ -72,7 +73,7 @@ def step_error(
 
 def first_length(size: float, tolerance: float, least: float) -> float:
     """Length of the first step for a crack of some size, and no less than the least."""
-    return float(max(0.8 * size * np.sqrt(tolerance), least))
+    return float(max(_BEGIN * size * np.sqrt(tolerance), least))
 
 
 def next_length(length: float, error: float, before: float | None, least: float) -> float:

@@ -58,6 +58,8 @@ class Run:
         As of `grow`.
     scouts : bool
         It is the scout of a run with a tolerance: nothing is estimated.
+    meshes : int
+        Number of meshes that a tolerance has made so far.
     defaults : int
         Number of the set of defaults.
 
@@ -87,6 +89,7 @@ class Run:
     progress: bool | str = field(default=True, metadata=_STOPS)
     defaults: int = field(default=DEFAULTS, metadata=_STOPS)
     scouts: bool = field(default=False, metadata=_STOPS)
+    meshes: int = field(default=0, metadata=_STOPS)
 
     def __post_init__(self) -> None:
         if not isinstance(self.problem, Problem):

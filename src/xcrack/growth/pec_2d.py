@@ -15,11 +15,10 @@ from xcrack.errors import GeometryError, XcrackError
 from xcrack.growth.advance import LEAST, Advance
 from xcrack.growth.controlled import first, following, share_left
 from xcrack.growth.controller import Control, shortest
-from xcrack.growth.envelope import Growth
+from xcrack.growth.envelope import Growth, growth_over
 from xcrack.growth.evaluation import Evaluation, Settled
 from xcrack.growth.follow_2d import exit_ahead
 from xcrack.growth.halving import halved
-from xcrack.growth.kink import START
 from xcrack.growth.options import Run
 from xcrack.growth.overloads import Zones
 from xcrack.growth.prediction_2d import Prediction, predict
@@ -39,7 +38,9 @@ from xcrack.mesh.locate import cell_sizes, contains
 from xcrack.mesh.mesh import Mesh
 
 _PASSES = 6  # of the correction, which turns the last face, which turns the direction
+_OF_LENGTH = 0.5  # relative change of K with that of the length of a crack, also of another one
 _FIRST = 0.5  # of that for the first step's cycles, of which no parabola is known yet
+_LEAST_RATIO = 0.2  # of what two parabolas say of a step to what the first of them did
 _MENDED = 0.1  # of that squared and relative: what is left once the second step has mended it
 
 
@@ -152,7 +153,13 @@ def _corrected(
     except GeometryError:  # which the predicted cracks are free of
         place, corrected, moves = before.place, list(seen.cracks), before.moves
     off = share_left(run) * np.linalg.norm(place - before.place, axis=1)
+    if old.n_solves == 1:
+        off *= _FIRST
     cycles, own, alone = _cycles(run, trail, old, before, growth)
+    along = np.stack([np.cos(trail.direction[-1]), np.sin(trail.direction[-1])], axis=1)
+    ahead = share_left(run) * np.abs(((place - before.place) * along).sum(axis=1))
+    behind = error.behind + float((_OF_LENGTH * ahead / trail.scale).max(initial=0.0))
+    own += trail.exponent * behind * cycles
     trail = replace(trail, place=place, grown=old.grown | moves)
     control = following(
         run, old.control, before.length, float(off.max(initial=0.0)), alone, growth.cycles,
@@ -164,7 +171,9 @@ def _corrected(
         corrected,
         looked_ahead(run, _with_zones(replace(trail, control=control), _zones(old), piece.after)),
         StepError(
-            tuple(a + b for a, b in zip(error.place, split(off, corrected))), error.cycles + own
+            tuple(a + b for a, b in zip(error.place, split(off, corrected))),
+            error.cycles + own,
+            behind=behind,
         ),
     )
 
@@ -182,8 +191,8 @@ def _ahead(run: Run, trail: Trail, seen: Evaluation) -> tuple[float, float]:
     x, angle, mesh = trail.place[tip], trail.direction[-1, tip], run.problem.mesh
     hit = exit_ahead(x, np.array([np.cos(angle), np.sin(angle)]), mesh)
     room = np.inf if hit is None else float(np.linalg.norm(hit[0] - x))
-    kinked = bool(abs(np.concatenate(seen.angle)[tip]) > START)
-    return shortest(float(cell_sizes(mesh, x[None])[0]), kinked), room
+    turn = float(np.concatenate(seen.angle)[tip])
+    return shortest(float(cell_sizes(mesh, x[None])[0]), turn), room
 
 
 def _cycles(
@@ -200,7 +209,7 @@ def _cycles(
     line = piece_of(run, two, start, before.length, _zones(old)).over(two).cycles
     alone = own = share_left(run) * abs(growth.cycles - line)
     if old.n_solves > 2:
-        return growth.cycles, own, alone
+        return growth.cycles, *_better_known(run, trail, old, own)
     # The second step: the parabola tells what the first one, along a line, was off.
     span = float(old.sigma[1] - old.sigma[0])
     first = float(old.sigma[0])
@@ -211,6 +220,30 @@ def _cycles(
     )
     own += share_left(run) * (abs(curve - line) - _FIRST * abs(line - constant))
     return growth.cycles + curve - line, own, alone
+
+
+def _better_known(run: Run, trail: Trail, old: Trail, own: float) -> tuple[float, float]:
+    """What a step adds to the estimated error of the cycles, and that of the step alone.
+
+    Two parabolas span the step before: that of its own, and that of the step behind it. The error
+    is between them, so that their difference takes the place of what was reckoned with then; the
+    error of this step, of which no second parabola is known yet, is taken to be smaller likewise.
+    """
+    if old.overloads is not None:
+        return own, own
+
+    def cycles(each: Trail, k: int) -> float:
+        begin, end = old.sigma[k], old.sigma[k + 1]
+        return growth_over(each, float(begin), float(end - begin), run.threshold).cycles
+
+    was = share_left(run) * abs(cycles(old, 1) - cycles(old.last(2), 1))
+    now = abs(cycles(old, 1) - cycles(trail, 1))
+    ratio = float(np.clip(now / was, _LEAST_RATIO, 1.0)) if was > 0 else 1.0
+    change = now - was
+    if old.sigma[0] == 0:  # the first step of all is spanned by one parabola: the next is prolonged
+        was = share_left(run) * abs(cycles(old, 0) - cycles(old.first(2), 0))
+        change += min(abs(cycles(old, 0) - cycles(trail, 0)), was) - was
+    return change + own, ratio * own
 
 
 def _zones(trail: Trail) -> Zones | None:
@@ -265,7 +298,7 @@ def _without_lost_tips(
         last.cycles + cycles,
         seen.cracks,
         trail,
-        StepError(split(lost, seen.cracks), error.cycles),
+        StepError(split(lost, seen.cracks), error.cycles, behind=error.behind),
     )
 
 

@@ -18,7 +18,6 @@ from xcrack.growth import follow_3d
 from xcrack.growth.advance import Advance, PerCrack, plan_advance
 from xcrack.growth.checks import law_exponent
 from xcrack.growth.controlled import first, following, longest, share_left
-from xcrack.growth.controller import shortest
 from xcrack.growth.cycles_3d import elapsed_3d
 from xcrack.growth.evaluation import Evaluation, Settled
 from xcrack.growth.follow_3d import carried
@@ -43,6 +42,8 @@ from xcrack.growth.overloads_3d import (
 )
 from xcrack.growth.step import Step, StepError, memory_of
 from xcrack.mesh.locate import cell_sizes, contains
+
+_SHORTEST = 0.6  # cells: a shorter step of a front would end in those in which it began
 
 
 def begun(run: Run, seen: Evaluation) -> Settled:
@@ -190,7 +191,7 @@ def _shortest(run: Run, trail: FrontTrail) -> float:
     if not len(part.s):
         return 0.0
     fastest = part.x[[int(np.argmax(part.rate))]]
-    return shortest(float(cell_sizes(run.problem.mesh, fastest)[0]), kinked=False)
+    return _SHORTEST * float(cell_sizes(run.problem.mesh, fastest)[0])
 
 
 def _plan(run: Run, trail: FrontTrail) -> Advance:

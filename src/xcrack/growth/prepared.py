@@ -1,4 +1,4 @@
-"""The mesh of a run with a tolerance: coarse for a scout, then fine where that has been."""
+"""The meshes of a run with a tolerance: as given, and fine where a scout has been."""
 
 import hashlib
 import sys
@@ -17,6 +17,7 @@ from xcrack.growth.corridor import corridor, ways_of
 from xcrack.growth.options import Run
 from xcrack.growth.scout import Stage, samples, scouted
 from xcrack.growth.step import Step, memory_of
+from xcrack.growth.uncertainty import TOGETHER
 from xcrack.mesh.mesh import Mesh
 from xcrack.mesh.refinement import refine
 from xcrack.scene.problem import Problem
@@ -37,6 +38,9 @@ class Sizes(Protocol):
     LIFE: float  # share of it at the last of these
     SCOUT_ORDER: int
 
+    def given_mesh(self, problem: Problem) -> Mesh:
+        """The mesh of a scene to begin with."""
+
     def scout_mesh(self, problem: Problem) -> Mesh:
         """The mesh of a scene for a scout."""
 
@@ -56,35 +60,63 @@ class Sizes(Protocol):
         """The next mesh but for the corridor, and the sizes along that."""
 
 
-def prepared(run: Run, steps_of: Steps, last: Step | None = None, mesh: Mesh | None = None) -> Run:
-    """A run on the mesh that its tolerance asks for.
+def prepared(
+    run: Run, steps_of: Steps, done: Sequence[Step] = (), stored: Sequence[Mesh] = ()
+) -> Run:
+    """A run on the mesh that it begins with, or goes on with.
 
     Parameters
     ----------
     run : Run
+        On the mesh as it was given.
     steps_of : callable
         What makes the steps of a run.
-    last : Step, optional
-        The one that a run goes on from.
-    mesh : Mesh, optional
-        The mesh that it may have had; where it is another one, it is made again.
+    done : sequence of Step, optional
+        Those that a run goes on from.
+    stored : sequence of Mesh, optional
+        Meshes that it has had; where the last one is not among them, it is made again.
 
     Returns
     -------
     Run
-        The same for the same scene and tolerance, whatever stops it.
     """
-    known = "" if last is None else memory_of(last).mesh
-    if mesh is None or fingerprint(mesh) != known:
-        mesh = _chosen(run, steps_of)
-        if known and fingerprint(mesh) != known:
-            warn(
-                "the mesh that the run had is not stored, and the one that was made again differs "
-                "from it in the last bits: so may the steps that follow."
-            )
-    else:
-        mesh = replace(mesh, curves=run.problem.mesh.curves)
+    first = _first_mesh(run)
+    if not done:
+        _check_unknowns(run, first)
+        return on(run, first)
+    known = memory_of(done[-1]).mesh
+    run = replace(run, meshes=memory_of(done[-1]).meshes)
+    for mesh in (first, *stored):
+        if fingerprint(mesh) == known:
+            return on(run, replace(mesh, curves=run.problem.mesh.curves))
+    earlier = [step for step in done if memory_of(step).mesh != known]
+    mesh, _ = finer(run, steps_of, earlier[-1] if earlier else None)
+    if fingerprint(mesh) != known:
+        warn(
+            "the mesh that the run had is not stored, and the one that was made again differs "
+            "from it in the last bits: so may the steps that follow."
+        )
+    return on(run, mesh)
+
+
+def on(run: Run, mesh: Mesh) -> Run:
+    """A run on another mesh."""
     return replace(run, problem=replace(run.problem, mesh=mesh, order=2))
+
+
+def _first_mesh(run: Run) -> Mesh:
+    """The mesh as given, where error bars can be had on it: else finer at the tips, or fronts."""
+    return _TWINS[run.problem.mesh.dim].given_mesh(run.problem)
+
+
+def _check_unknowns(run: Run, mesh: Mesh) -> None:
+    """Refuse a first mesh that has too many unknowns before anything is solved on it."""
+    least = mesh.dim * (mesh.n_points + len(mesh.edges))
+    if run.max_unknowns is not None and least > run.max_unknowns:
+        raise ProblemError(
+            f"grow: max_unknowns = {run.max_unknowns}, and the first mesh, on which cracks are a "
+            f"few cells long, has {least} at least: allow more, or give a coarser mesh."
+        )
 
 
 def fingerprint(mesh: Mesh) -> str:
@@ -94,21 +126,44 @@ def fingerprint(mesh: Mesh) -> str:
     return digest.hexdigest()[:16]
 
 
-def _chosen(run: Run, steps_of: Steps) -> Mesh:
-    """A mesh on which bars of K are as wanted along all of the way of a scout."""
+def finer(run: Run, steps_of: Steps, last: Step | None) -> tuple[Mesh, bool]:
+    """A mesh on which bars of K are as wanted along all of the way that a scout finds.
+
+    Parameters
+    ----------
+    run : Run
+        On the mesh as it was given.
+    steps_of : callable
+        What makes the steps of a run.
+    last : Step, optional
+        From which on the cracks are to grow; from their start, where it is left out.
+
+    Returns
+    -------
+    Mesh
+    bool
+        Whether it would have more unknowns than it may.
+    """
     twin, start = _TWINS[run.problem.mesh.dim], perf_counter()
+    before = _first_mesh(run)
+    if last is not None:
+        run = replace(run, problem=replace(run.problem, cracks=last.corrected))
     most = run.max_unknowns or twin.MOST_UNKNOWNS
     mesh = twin.scout_mesh(run.problem)
     _tell(run, f"scout: on {len(mesh.cells)} cells", start)
     scene = replace(run.problem, mesh=mesh, order=twin.SCOUT_ORDER)
-    seen = scouted(run, scene, steps_of)
+    seen = scouted(run, scene, steps_of, 0 if last is None else last.index)
+    if not seen.stages:
+        return mesh, False
     _tell(run, f"scout: {len(seen.stages)} steps, N = {seen.stages[-1].cycles:.4g}", start)
-    ways, chosen = ways_of(seen), samples(seen, twin.STAGES, twin.LIFE)
+    ways = ways_of(seen)
+    # Of one that has begun long ago, most of the life is over.
+    chosen = samples(seen, twin.STAGES, 1.0 if last is not None and last.index else twin.LIFE)
     stages = [seen.stages[k] for k in chosen]
     sizes = [twin.first_sizes(scene, stage) for stage in stages]
     sizes[0] = np.minimum(sizes[0], seen.step)
     mesh = refine(mesh, size=corridor(seen, ways, chosen, sizes))
-    wanted = SHARE * float(run.tolerance or 0.0) / max(seen.exponent, _LEAST_EXPONENT)
+    wanted = SHARE / TOGETHER * float(run.tolerance or 0.0) / max(seen.exponent, _LEAST_EXPONENT)
     for number in range(twin.ROUNDS):
         each = [_measured(run, mesh, stage) for stage in stages]
         there = [k for k, now in enumerate(each) if now is not None]
@@ -119,32 +174,36 @@ def _chosen(run: Run, steps_of: Steps) -> Mesh:
         unknowns = max(now.solutions[0].space.n_dof for now in good)
         text = f"{unknowns} unknowns, K within {error:.1e}, wanted {wanted:.1e}"
         _tell(run, f"mesh {number}: {text}", start)
-        if number == 0 and run.max_unknowns is not None and unknowns > most:
-            raise ProblemError(
-                f"grow: max_unknowns = {most}, and the first mesh, on which cracks are a few cells "
-                f"long all along their way, has {unknowns}: allow more."
-            )
+        if number == 0 and unknowns > most:
+            instead = f"{unknowns} are the fewest for the way ahead; growth keeps the mesh it has"
+            _warn_of_most(run, most, instead)
+            return before, True
         if error <= wanted:
             break
         goals = [wanted * float(np.abs(now.best).max(initial=0.0)) for now in good]
         places = [stages[k].places for k in there]
-        finer, smaller = twin.finer(good, goals, places, [sizes[k] for k in there])
-        for k, size in zip(there, smaller, strict=True):
+        smaller, own = twin.finer(good, goals, places, [sizes[k] for k in there])
+        for k, size in zip(there, own, strict=True):
             sizes[k] = size
-        finer = refine(finer, size=corridor(seen, ways, chosen, sizes))
-        if unknowns * len(finer.cells) > most * len(mesh.cells):
-            warn(
-                f"grow: the mesh that tolerance = {run.tolerance:g} asks for would have more than "
-                f"{most} unknowns: growth goes on with {unknowns}, on which K is known to "
-                f"{error:.1e} of its largest value, where {wanted:.1e} was wanted. Allow more with "
-                "max_unknowns; life_bar says what it costs."
-            )
-            break
-        same, mesh = len(finer.cells) == len(mesh.cells), finer
+        smaller = refine(smaller, size=corridor(seen, ways, chosen, sizes))
+        if unknowns * len(smaller.cells) > most * len(mesh.cells):
+            _warn_of_most(
+                run, most, f"growth goes on with {unknowns}, on which K is known to {error:.1e} of "
+                f"its largest value, where {wanted:.1e} was wanted",
+            )  # fmt: skip
+            return mesh, True
+        same, mesh = len(smaller.cells) == len(mesh.cells), smaller
         if error <= _FORETOLD * wanted or same:
             break
     _tell(run, f"mesh: {len(mesh.cells)} cells", start)
-    return mesh
+    return mesh, False
+
+
+def _warn_of_most(run: Run, most: int, instead: str) -> None:
+    warn(
+        f"grow: the mesh that tolerance = {run.tolerance:g} asks for would have more than {most} "
+        f"unknowns: {instead}. Allow more with max_unknowns; life_bar says what it costs."
+    )
 
 
 def _measured(run: Run, mesh: Mesh, stage: Stage) -> Measured | None:
@@ -164,4 +223,4 @@ def _tell(run: Run, line: str, start: float) -> None:
 
 _TWINS: dict[int, Sizes] = {2: sizes_2d, 3: sizes_3d}
 
-__all__ = ["fingerprint", "prepared"]
+__all__ = ["SHARE", "finer", "fingerprint", "on", "prepared"]

@@ -13,7 +13,6 @@ from xcrack.growth import joining
 from xcrack.growth.advance import LEAST, Advance
 from xcrack.growth.arrivals import arrivals_of, last_step
 from xcrack.growth.checks import depends_on_ratio
-from xcrack.growth.controlled import shortened
 from xcrack.growth.criteria import Criterion
 from xcrack.growth.ending import (
     cut_off,
@@ -30,6 +29,7 @@ from xcrack.growth.integrators import integrator_of
 from xcrack.growth.joined import Joined
 from xcrack.growth.notices import Notices
 from xcrack.growth.options import GrowOptions, Run, lists_options, run_of
+from xcrack.growth.outgrown import again
 from xcrack.growth.prepared import fingerprint, prepared
 from xcrack.growth.progress import Progress
 from xcrack.growth.rating import check_choice, levels_of, respond_to_cycle, warn_of_left_out
@@ -166,25 +166,32 @@ def grow(
 
 
 def steps_of(
-    run: Run, last: Step | None = None, mesh: Mesh | None = None
+    run: Run, done: Sequence[Step] = (), meshes: Sequence[Mesh] = ()
 ) -> Generator[Step, None, str]:
-    """Steps of a run: from the beginning, or those that follow a step.
+    """Steps of a run: from the beginning, or those that follow the steps that are done.
 
-    Of one with a tolerance, `mesh` may be the one that it has chosen before.
+    Of one with a tolerance, `meshes` are those that it has had.
     """
     check_choice(run.law, run.cycle.ratio)
     settings = run.settings  # before a law is called that may change what it reads
+    asked, last = run, done[-1] if done else None
     if run.estimates:
-        run = prepared(run, steps_of, last, mesh)
+        run = prepared(run, steps_of, done, meshes)
     notices, progress = Notices(), Progress(run)
     kink = ""
     try:
         if last is None:
             with notices.watch(0) as messages:
-                last, reuse = _next_step(run, run.problem, None, Reuse(), settings)
-                _warn_of_ratio(run, last)
-                warn_of_left_out(run, last)
-            last = replace(last, warnings=tuple(messages))
+                first, reuse = _next_step(run, run.problem, None, Reuse(), settings)
+                own = len(messages)
+                other = again(asked, run, steps_of, None, first)
+                if other is not None:
+                    run = other[0]
+                    del messages[:own]  # of a mesh that nobody has
+                    first, reuse = _next_step(run, run.problem, None, Reuse(), settings)
+                _warn_of_ratio(run, first)
+                warn_of_left_out(run, first)
+            last = replace(first, warnings=tuple(messages))
             progress.step(last)
             yield last
         else:
@@ -209,11 +216,15 @@ def steps_of(
                     warn(kink)
             with notices.watch(last.index + 1) as messages:
                 next_step, reuse, ended = _after(run, last, plan, reuse)
-            if next_step is None:
-                break
-            again = shortened(last, next_step)
-            if again is not None:
-                last = again
+                if next_step is None:
+                    break
+                own = len(messages)
+                other = again(asked, run, steps_of, last, next_step)
+                if other is not None:
+                    del messages[:own]  # of a step that nobody has
+            if other is not None:
+                reuse = reuse if other[0] is run else memory_of(last).reuse
+                run, last = other[0], other[1] or last
                 continue
             last = replace(next_step, warnings=tuple(messages))
             progress.step(last)
@@ -322,6 +333,7 @@ def _next_step(
         settings,
         settled.trail,
         fingerprint(problem.mesh) if run.estimates else "",
+        run.meshes,
     )
     step = Step(
         index=index,

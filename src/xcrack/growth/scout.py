@@ -19,7 +19,7 @@ from xcrack.scene.problem import Problem
 
 TOLERANCE = 0.1  # of the scout: its path only says where cells are to be small
 _MOST_STEPS = 60
-_KINKED, _STRAIGHT = 2.0, 6.0  # first steps to cells; those behind a kink are two cells at least
+_KINKED, _STRAIGHT = 1.0, 8.0  # first steps to cells; those behind a kink are two cells at least
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +62,7 @@ class Scouted:
 
 
 def scouted(
-    run: Run, scene: Problem, steps_of: Callable[[Run], Generator[Step, None, str]]
+    run: Run, scene: Problem, steps_of: Callable[[Run], Generator[Step, None, str]], begin: int = 0
 ) -> Scouted:
     """Grow the cracks of a run in long steps, as far as they go, whatever stops the run itself.
 
@@ -73,6 +73,8 @@ def scouted(
         On a coarse mesh.
     steps_of : callable
         What makes the steps of a run.
+    begin : int
+        Number of the step that it goes on from.
     """
     stages: list[Stage] = []
     exponent, first = 1.0, np.zeros(0)
@@ -96,6 +98,8 @@ def scouted(
                 dK_eq, R = np.concatenate(step.dK_eq), np.concatenate(step.R)
                 exponent = law_exponent(run.law, dK_eq, R)
                 first = _first_cells(run, step)
+                if begin:  # the run goes on in steps of its own length
+                    first = np.full(len(first), np.inf)
             places = np.concatenate([sif.x for sif in step.sif[0]])
             if not len(places):  # all have left the body
                 continue

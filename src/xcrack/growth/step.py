@@ -114,7 +114,9 @@ class Memory:
     settings : mapping of str to str
         What the run was asked to do.
     mesh : str
-        Fingerprint of the mesh that a tolerance has chosen; empty where none was asked for.
+        Fingerprint of the mesh of a run with a tolerance; empty where none was asked for.
+    meshes : int
+        Number of meshes that the tolerance has made; 0 on the one as given.
     trail : Trail or FrontTrail, optional
         What an integrator of second order remembers of the last solves.
     """
@@ -127,6 +129,7 @@ class Memory:
     settings: Mapping[str, str]
     trail: Trail | FrontTrail | None = None
     mesh: str = ""
+    meshes: int = 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,6 +155,9 @@ class StepError:
         Relative error of the largest rate at this step by the bars of K, and contact's part of it.
     turn : float, rad
         Error of the directions at this step.
+    behind : float
+        Relative error of K by the lengths of cracks whose tips do not drive: how far these are
+        ahead of or behind where they should be is known to the length of the steps only.
     """
 
     place: PerCrack
@@ -164,6 +170,7 @@ class StepError:
     rate: float = np.nan
     rate_contact: float = np.nan
     turn: float = np.nan
+    behind: float = 0.0
 
     @property
     def life(self) -> float:

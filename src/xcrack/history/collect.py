@@ -1,6 +1,6 @@
 """Growth run to its end: steps collected, stored one by one, and taken up again after a kill."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -168,13 +168,15 @@ def resume(
             _move_aside(folder, stored, damaged)
         header = replace(header, ended="")
         run_folder.write_header(folder, header)
-        collection.store = RunStore(folder, check, header)
         collection.taken.extend(stored.steps)
-        body = read_body(folder / run_folder.BODY) if run.tolerance is not None else None
-        mesh = None if body is None else body.mesh
-        if mesh is not None:
-            collection.mesh = mesh
-        return collection.of(steps_of(run, stored.steps[-1] if stored.steps else None, mesh))
+        memory = stored.steps[0].memory if stored.steps else None
+        collection.store = RunStore(folder, check, header, "" if memory is None else memory.mesh)
+        meshes: list[Mesh] = []
+        if run.tolerance is not None and stored.steps:
+            bodies = (read_body(path) for path in run_folder.body_files(folder))
+            meshes = [body.mesh for body in bodies if body is not None]
+            collection.mesh = _last_mesh(folder, stored.steps) or problem.mesh
+        return collection.of(steps_of(run, stored.steps, meshes))
 
 
 def load(path: str | Path) -> Any:
@@ -220,8 +222,15 @@ def load(path: str | Path) -> Any:
             "computes the others again."
         )
     ended = header.ended or "not ended: it is still going on, or was killed; resume goes on with it"
-    body = read_body(folder / run_folder.BODY)
-    return History(stored.steps, ended, folder, None if body is None else body.mesh)
+    return History(stored.steps, ended, folder, _last_mesh(folder, stored.steps))
+
+
+def _last_mesh(folder: Path, steps: Sequence[Step]) -> Mesh | None:
+    """The mesh of the last step of a run, where it is stored."""
+    memories = [step.memory for step in steps if step.memory is not None]
+    other = bool(memories) and memories[-1].mesh != memories[0].mesh
+    body = read_body(run_folder.body_path(folder, memories[-1].mesh if other else ""))
+    return None if body is None else body.mesh
 
 
 @dataclass
@@ -273,7 +282,8 @@ class _Collection:
                 return str(stop.value or "no more steps")
             if not isinstance(step, Step):
                 raise ProblemError(f"collect: {shown(step)} is not a Step: give what grow returns.")
-            if self.mesh is None and step.solutions:
+            has_own = step.memory is not None and bool(step.memory.mesh)
+            if step.solutions and (self.mesh is None or has_own):
                 self.mesh = step.solutions[0].problem.mesh
             self.taken.append(step if self.keep_solutions else replace(step, solutions=()))
             if self.store is not None:

@@ -1,5 +1,6 @@
 """Numerical error bar of a life: by the length of the steps, by K, and by contact."""
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -7,6 +8,8 @@ import numpy as np
 
 from xcrack.growth.step import Step
 from xcrack.growth.uncertainty import uses_best
+
+_NUMBER = re.compile(r"\d+(\.\d+)?")
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,11 +79,16 @@ def life_bar(steps: Sequence[Step]) -> LifeBar:
     """Error bar of the life of a run."""
     nan = float("nan")
     every = [sif for step in steps for sif in (step.sif[0] if step.sif else ())]
-    best = sum(int(np.count_nonzero(uses_best(sif))) for sif in every)
+    states = [state for step in steps for state in zip(*step.sif)]
+    known = [np.all([uses_best(sif) for sif in crack], axis=0) for crack in states]
+    best = sum(int(np.count_nonzero(own)) for own in known)
     places = sum(len(sif.K) for sif in every)
-    reasons = dict.fromkeys(
-        reason for sif in every if sif.errors is not None for reason in sif.reasons if reason
-    )
+    texts = [
+        reason for step in steps for state in step.sif for sif in state
+        if sif.errors is not None for reason in sif.reasons if reason
+    ]  # fmt: skip
+    # One of each kind: they may differ in their numbers alone.
+    reasons = {_NUMBER.sub("#", reason): reason for reason in reversed(texts)}
     last = steps[-1] if steps else None
     error = None if last is None else last.error
     if last is None or error is None:
@@ -95,7 +103,7 @@ def life_bar(steps: Sequence[Step]) -> LifeBar:
         error.path,
         best,
         places,
-        tuple(reasons),
+        tuple(reversed(reasons.values())),
     )
 
 

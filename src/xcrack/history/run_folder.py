@@ -30,6 +30,7 @@ from xcrack.solvers.reuse import Reuse, Slip
 
 HEADER = "run.json"
 BODY = "body.npz"
+_OTHER_BODY = "body_{}.npz"  # on a mesh that growth has asked for, by its fingerprint
 _FORMAT = 2
 _STEP = re.compile(r"step_(\d{5,})\.npz")
 CLASSES: dict[str, type] = {
@@ -168,6 +169,17 @@ def step_path(folder: Path, index: int) -> Path:
     return folder / f"step_{index:05d}.npz"
 
 
+def body_path(folder: Path, mesh: str) -> Path:
+    """File of the body on its first mesh, or on the one with a fingerprint."""
+    return folder / (_OTHER_BODY.format(mesh) if mesh else BODY)
+
+
+def body_files(folder: Path) -> list[Path]:
+    """All files of bodies: on the first mesh, and on others."""
+    with system_errors("the run cannot be read from", folder, error=ProblemError):
+        return [folder / BODY, *sorted(folder.glob(_OTHER_BODY.format("*")))]
+
+
 def step_files(folder: Path) -> list[Path]:
     """All files, and whatever else, in the place of steps, by their number."""
     with system_errors("the run cannot be read from", folder, error=ProblemError):
@@ -267,6 +279,8 @@ __all__ = [
     "HEADER",
     "Header",
     "Stored",
+    "body_files",
+    "body_path",
     "move_aside",
     "read_header",
     "read_steps",

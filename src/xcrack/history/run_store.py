@@ -1,7 +1,7 @@
 """Where the steps of a run go: its folder, with a header and the body beside them."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from xcrack.errors import ProblemError, warn
@@ -20,7 +20,9 @@ class RunStore:
     folder: Path
     check: Callable[[], None]  # raises where another process has taken over
     header: Header | None = None
-    has_body: bool = False  # written by this process: a killed one may have left half of it
+    first: str = ""  # fingerprint of the mesh that a run with a tolerance has begun with
+    # Written by this process: a killed one may have left half of them.
+    bodies: set[Path] = field(default_factory=set)
 
     def write(self, step: Step) -> None:
         """Write a step; afterwards it is on disk as a whole."""
@@ -31,9 +33,13 @@ class RunStore:
             self.header = Header(settings, versions())
             run_folder.write_header(self.folder, self.header)
         problem = step.solutions[0].problem if step.solutions else None
-        if not self.has_body and isinstance(problem, Problem):
-            write_body(self.folder / run_folder.BODY, problem)
-            self.has_body = True
+        mesh = "" if step.memory is None else step.memory.mesh
+        if step.index == 0:
+            self.first = mesh
+        body = run_folder.body_path(self.folder, "" if mesh == self.first else mesh)
+        if body not in self.bodies and isinstance(problem, Problem):
+            write_body(body, problem)
+            self.bodies.add(body)
         run_folder.write_step(self.folder, step, self.header)
 
     def end(self, ended: str) -> None:
@@ -46,6 +52,8 @@ class RunStore:
 def _make_room(folder: Path) -> None:
     """Move aside what stands in the place of the files of a new run."""
     files = run_folder.step_files(folder)[::-1]
+    if files:
+        files += run_folder.body_files(folder)[1:]
     header = folder / run_folder.HEADER
     if header.exists() and (files or not _is_header(folder)):
         files.append(header)
