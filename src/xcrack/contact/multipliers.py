@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from xcrack.arrays import Bools, Floats, Ints
+from xcrack.arrays import Bools, Floats, Ints, offsets, ranges
 from xcrack.xfem.function_space import FunctionSpace
 from xcrack.xfem.lips import LipPoints, arc_position
 
@@ -62,28 +62,35 @@ def multipliers(
     the tangential jump counts as the normal one does.
     """
     nodes, traces = _traces(space, lips)
-    if kind == "naive":
-        group = np.arange(len(nodes))
-    else:
-        supported = _supported(space, c, nodes, traces, lips, fixed, rubs)
-        group = _groups(space, c, nodes, traces, lips.weight, supported)
-    n_groups = int(group.max(initial=-1)) + 1
-    gather = sp.csr_matrix(
-        (np.ones(len(nodes)), (np.arange(len(nodes)), group)), shape=(len(nodes), n_groups)
-    )
-    values = sp.csr_matrix(traces @ gather)
     hats = _HATS[kind] if kind != "naive" and space.order == 2 and space.dim == 2 else None
     parts = _parts(space, c, lips) if kind != "naive" else []
+    values = traces
+    if kind != "naive":
+        supported = _supported(space, c, nodes, traces, lips, fixed, rubs)
+        group = _groups(space, c, nodes, traces, lips.weight, supported)
+        shape = (len(lips), int(group.max(initial=-1)) + 1)
+        column = group.astype(np.int32)[traces.indices]
+        values = sp.csr_matrix((traces.data, column, traces.indptr), shape=shape)
     if len(parts) > 1:
         values = _broken(values, lips, parts, hats)
-    elif hats is not None and n_groups > 1:
-        values = _hats(values, lips.weight, lips.s, *hats)
-    measure = np.asarray(values.T @ lips.weight).ravel()
+    elif hats is not None and values.shape[1] > 1:
+        mass = _sums(values, lips.weight)
+        centre = _sums(values, lips.weight * lips.s) / np.maximum(mass, 1e-300)
+        values = _hats(mass, centre, lips.s, *hats)
+    elif kind != "naive":
+        values.sum_duplicates()
+    measure = _sums(values, lips.weight)
     keep = measure > 1e-14 * measure.max(initial=0.0)
     if not keep.all():
-        values = sp.csr_matrix(values[:, np.nonzero(keep)[0]])
-    centre = np.asarray(values.T @ (lips.weight[:, None] * lips.x)) / measure[keep][:, None]
-    return Multipliers(c, values, measure[keep], centre)
+        values, measure = sp.csr_matrix(values[:, np.nonzero(keep)[0]]), measure[keep]
+    centres = [_sums(values, lips.weight * x) / measure for x in lips.x.T]
+    return Multipliers(c, values, measure, np.stack(centres, axis=1))
+
+
+def _sums(values: sp.csr_matrix, x: Floats) -> Floats:
+    """Sum of each function times what is given at the points `(q,)`."""
+    at_entries = values.data * x.repeat(np.diff(values.indptr))
+    return np.asarray(np.bincount(values.indices, at_entries, values.shape[1]), dtype=float)
 
 
 def _parts(space: FunctionSpace, c: int, lips: LipPoints) -> list[Ints]:
@@ -114,7 +121,8 @@ def _broken(
         while True:
             mass = own.T @ weight
             centre = (own.T @ (weight * s)) / mass
-            own, mass = own[:, np.argsort(centre)], mass[np.argsort(centre)]
+            order = np.argsort(centre)
+            own, mass, centre = own[:, order], mass[order], centre[order]
             k = int(np.argmin(mass))
             if len(mass) == 1 or mass[k] >= _SMALL * typical:
                 break
@@ -124,7 +132,7 @@ def _broken(
             own = np.delete(own, k, axis=1)
         part = sp.csr_matrix(own)
         if hats is not None and len(mass) > 1:
-            part = _hats(part, weight, s, *hats)
+            part = _hats(mass, centre, s, *hats)
         place = (np.ones(len(rows)), (rows, np.arange(len(rows))))
         columns.append(sp.csr_matrix(place, shape=(len(lips), len(rows))) @ part)
     return sp.csr_matrix(sp.hstack(columns))
@@ -135,13 +143,16 @@ def _traces(space: FunctionSpace, lips: LipPoints) -> tuple[Ints, sp.csr_matrix]
     cell = lips.cell[:, 1]
     corners = space.mesh.cells[cell]
     nodes, place = np.unique(corners.ravel(), return_inverse=True)
-    row = np.repeat(np.arange(len(cell)), corners.shape[1])
-    entry = lips.bary[:, 1].ravel()
+    place = place.reshape(corners.shape)
+    order = place.argsort(axis=1)
+    place = np.take_along_axis(place, order, axis=1)
+    entry = np.take_along_axis(lips.bary[:, 1], order, axis=1)
     acts = np.abs(entry) > 1e-13
     reached = np.bincount(place[acts], minlength=len(nodes)) > 0
-    column = (np.cumsum(reached) - 1)[place[acts]]
+    column = (reached.cumsum() - 1).astype(np.int32)[place[acts]]
+    start = offsets(acts.sum(axis=1)).astype(np.int32)
     shape = (len(cell), int(reached.sum()))
-    return nodes[reached], sp.csr_matrix((entry[acts], (row[acts], column)), shape=shape)
+    return nodes[reached], sp.csr_matrix((entry[acts], column, start), shape=shape)
 
 
 def _supported(
@@ -157,7 +168,7 @@ def _supported(
     number = space.heaviside[c][nodes]
     if fixed is None:
         return np.zeros(len(nodes), dtype=bool)
-    normal = np.asarray(traces.T @ (lips.weight[:, None] * lips.normal))
+    normal = np.stack([_sums(traces, lips.weight * n) for n in lips.normal.T], axis=1)
     given = fixed.reshape(-1, space.dim)[number]
     whole = (normal**2).sum(axis=1)
     decided = (normal**2 * given).sum(axis=1) > 0.5 * whole
@@ -207,20 +218,38 @@ def _groups(
     covered |= own
     if supported.any():
         roots = np.array([root(i) for i in range(len(nodes))])
-        mass = np.asarray(traces.T @ weight).ravel()
+        mass = _sums(traces, weight)
         total = np.bincount(roots, mass, len(nodes))
         covered &= np.bincount(roots, mass * supported, len(nodes))[roots] < 0.5 * total[roots]
         parent[~covered] = np.nonzero(~covered)[0]
     if covered.any() and not covered.all():
-        overlap = sp.csr_matrix(_weighted(traces, weight).T @ traces)
-        for k in np.nonzero(~covered)[0].tolist():
-            row = slice(overlap.indptr[k], overlap.indptr[k + 1])
-            choices, shared = overlap.indices[row], overlap.data[row]
-            chosen = covered[choices]
-            if chosen.any():
-                parent[k] = root(int(choices[chosen][np.argmax(shared[chosen])]))
+        for k, to in _nearest(traces, weight, covered):
+            parent[k] = root(to)
     roots = np.array([root(i) for i in range(len(nodes))])
     return np.unique(roots, return_inverse=True)[1]
+
+
+def _nearest(traces: sp.csr_matrix, weight: Floats, covered: Bools) -> list[tuple[int, int]]:
+    """Nodes that are not covered, each with the covered node of which the trace overlaps most.
+
+    The first of equal ones counts; a node that overlaps none is left out.
+    """
+    counts = np.diff(traces.indptr)
+    point = np.arange(len(counts)).repeat(counts)
+    own = np.nonzero(~covered[traces.indices])[0]
+    row, place = ranges(counts[point[own]])
+    own, other = own[row], traces.indptr[point[own]][row] + place
+    shared = covered[traces.indices[other]]
+    own, other = own[shared], other[shared]
+    pair, number = np.unique(
+        traces.indices[own] * np.int64(len(covered)) + traces.indices[other], return_inverse=True
+    )
+    products = traces.data[own] * weight[point[own]] * traces.data[other]
+    overlap = np.bincount(number, products, len(pair))
+    node, to = np.divmod(pair, len(covered))
+    best = np.lexsort((to, -overlap, node))
+    first = np.unique(node[best], return_index=True)[1]
+    return list(zip(node[best][first].tolist(), to[best][first].tolist()))
 
 
 def vital_edges(pairs: Ints, length: Floats) -> Ints:
@@ -240,13 +269,14 @@ def vital_edges(pairs: Ints, length: Floats) -> Ints:
         Rows of `pairs` that are kept.
     """
     degree: dict[int, int] = {}
-    for a, b in pairs.tolist():
+    ends, lengths = pairs.tolist(), length.tolist()
+    for a, b in ends:
         degree[a] = degree.get(a, 0) + 1
         degree[b] = degree.get(b, 0) + 1
 
     def entry(e: int) -> tuple[int, float, int, int, int]:
-        a, b = pairs[e].tolist()
-        return (-min(degree[a], degree[b]), -float(length[e]), min(a, b), max(a, b), e)
+        a, b = ends[e]
+        return (-min(degree[a], degree[b]), -lengths[e], min(a, b), max(a, b), e)
 
     heap = [entry(e) for e in range(len(pairs))]
     heapq.heapify(heap)
@@ -261,7 +291,7 @@ def vital_edges(pairs: Ints, length: Floats) -> Ints:
         if now[0] >= -1:
             break
         vital[e] = False
-        for end in pairs[e].tolist():
+        for end in ends[e]:
             degree[end] -= 1
     return np.nonzero(vital)[0]
 
@@ -288,15 +318,11 @@ def _knots(centre: Floats, ends: tuple[float, float], last: float) -> Floats:
     return knots
 
 
-def _hats(
-    values: sp.csr_matrix, weight: Floats, s: Floats, denser: float, last: float
-) -> sp.csr_matrix:
+def _hats(mass: Floats, centre: Floats, s: Floats, denser: float, last: float) -> sp.csr_matrix:
     """Piecewise linear hats along the crack, with knots spread like the groups' centres.
 
     They reach the ends of the crack, so that linear pressures are exact.
     """
-    mass = np.asarray(values.T @ weight).ravel()
-    centre = np.asarray(values.T @ (weight * s)).ravel() / np.maximum(mass, 1e-300)
     knots = np.unique(centre[mass > 1e-14 * mass.max()])
     if denser > 1:
         place = np.linspace(0, len(knots) - 1, max(int(denser * (len(knots) - 1) + 1e-9), 1) + 1)
@@ -304,17 +330,10 @@ def _hats(
     knots = _knots(knots, (float(s.min()), float(s.max())), last)
     place = np.clip(np.searchsorted(knots, s, side="right") - 1, 0, len(knots) - 2)
     t = (s - knots[place]) / (knots[place + 1] - knots[place])
-    both, columns = (
-        np.stack([1 - t, t], axis=1).ravel(),
-        np.stack([place, place + 1], axis=1).ravel(),
-    )
-    return sp.csr_matrix((both, columns, np.arange(0, 2 * len(s) + 1, 2)), (len(s), len(knots)))
-
-
-def _weighted(values: sp.csr_matrix, weight: Floats) -> sp.csr_matrix:
-    """Values at points times the weights of the points."""
-    entries = values.data * weight.repeat(np.diff(values.indptr))
-    return sp.csr_matrix((entries, values.indices, values.indptr), shape=values.shape)
+    both = np.stack([1 - t, t], axis=1).ravel()
+    columns = np.stack([place, place + 1], axis=1).ravel().astype(np.int32)
+    start = np.arange(0, 2 * len(s) + 1, 2, dtype=np.int32)
+    return sp.csr_matrix((both, columns, start), shape=(len(s), len(knots)))
 
 
 def gap_rows(space_of: Multipliers, lips: LipPoints, jump: sp.csr_matrix) -> sp.csr_matrix:
@@ -327,4 +346,13 @@ def gap_rows(space_of: Multipliers, lips: LipPoints, jump: sp.csr_matrix) -> sp.
     jump : sparse matrix (q, n_dof)
         Normal jump at the lip points, from `jump_matrix`.
     """
-    return sp.csr_matrix(_weighted(space_of.values, lips.weight).T @ jump)
+    values = space_of.values
+    counts = np.diff(values.indptr)
+    order = np.argsort(values.indices, kind="stable")
+    point = np.arange(len(counts), dtype=np.int32).repeat(counts)
+    start = offsets(np.bincount(values.indices, minlength=values.shape[1])).astype(np.int32)
+    entries = (values.data * lips.weight[point])[order]
+    turned = sp.csr_matrix((entries, point[order], start), shape=values.shape[::-1])
+    rows = turned @ jump
+    rows.sort_indices()
+    return rows

@@ -65,7 +65,10 @@ def pressure_at(sif: SIF, solution: Solution, c: int) -> Floats:
     contact = solution.contact[c]
     if contact is None or not len(contact.points):
         return np.zeros(len(sif.x))
-    _, nearest = cKDTree(contact.points).query(sif.x)
+    if len(sif.x) == 1:  # of a 2D crack; a tree takes longer to build than to look at all
+        nearest = ((contact.points - sif.x) ** 2).sum(axis=1).argmin(keepdims=True)
+    else:
+        nearest = cKDTree(contact.points).query(sif.x)[1]
     return np.where(contact.closed[nearest], np.maximum(contact.pressure[nearest], 0.0), 0.0)
 
 

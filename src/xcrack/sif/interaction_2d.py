@@ -153,10 +153,9 @@ def volume_terms(solutions: Sequence[Solution], ring: Ring, points: Points) -> F
 
 @dataclass(frozen=True, eq=False)
 class _Field:
-    """A unit field: gradient `(q, d, d)`, stress, derivative of the gradient ahead (if needed)."""
+    """A unit field: gradient `(q, d, d)`, derivative of the gradient ahead (if needed)."""
 
     gradient: Floats
-    stress: Floats
     curve: Floats
 
 
@@ -167,7 +166,7 @@ def _auxiliary(solutions: Sequence[Solution], r: Floats, theta: Floats) -> list[
     curves = np.zeros((len(gradients), 0, 2, 2))
     if acts(solutions, InitialStress):
         curves = ahead_derivative(solutions[0].problem.material, r, theta)
-    return [_Field(g, material.stress(g), c) for g, c in zip(gradients, curves, strict=True)]
+    return [_Field(g, c) for g, c in zip(gradients, curves, strict=True)]
 
 
 def ahead_derivative(material: Isotropic, r: Floats, theta: Floats) -> Floats:
@@ -234,8 +233,9 @@ def lip_terms(solutions: Sequence[Solution], ring: Ring) -> Floats:
         outward = -sign * lips.normal[near] @ R.T
         q, _ = weight(r, xi, ring.inner, radii)
         aux = _auxiliary(solutions, r, theta)
-        local = None
+        local, stresses = None, []
         if bent:
+            stresses = [material.stress(field.gradient) for field in aux]
             gradient = gradients_at(space, ring.coefficients, cell, bary, side) - ring.turn
             local = np.einsum("ai,qijs,bj->sqab", R, gradient, R)
         for k in range(len(solutions)):
@@ -246,7 +246,7 @@ def lip_terms(solutions: Sequence[Solution], ring: Ring) -> Floats:
             for m, field in enumerate(aux):
                 density = np.einsum("qi,qi->q", traction, field.gradient[:, :, 0])
                 if local is not None and sigma is not None:
-                    density += np.einsum("qij,qj,qi->q", field.stress, outward, local[k][:, :, 0])
+                    density += np.einsum("qij,qj,qi->q", stresses[m], outward, local[k][:, :, 0])
                     density -= np.einsum("qij,qij->q", sigma, field.gradient) * outward[:, 0]
                 result[k, :, m] -= q @ (w * density)
     return result

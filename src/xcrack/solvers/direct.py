@@ -151,7 +151,7 @@ class System:
             return Condensed(self.dual(N), gap, lambda lam: self.solve(f + N.T @ lam, known))
         factor = self.factor
         b = self._loads(f, known)
-        Y, places = factor.forward_sparse(sp.csr_matrix(N @ self.basis))
+        Y, places = factor.forward_sparse(N @ self.basis)
         y = factor.forward(b)
         with one_blas_thread():
             F = Y.T @ Y

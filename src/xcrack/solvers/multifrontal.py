@@ -131,12 +131,12 @@ class Factor:
         """L^-1 P B^T for sparse rows B `(r, n)`: the rows that are not zero, and their places."""
         inverse = np.empty(len(self.perm), dtype=np.int64)
         inverse[self.perm] = np.arange(len(self.perm))
-        entries = sp.coo_matrix(B)
+        place = inverse[B.indices]
         X = np.zeros((len(self.perm), B.shape[0]))
-        X[inverse[entries.col], entries.row] = entries.data
+        X[place, np.arange(B.shape[0]).repeat(np.diff(B.indptr))] = B.data
         part = np.repeat(np.arange(len(self.first) - 1), np.diff(self.first))
         touched = np.zeros(len(self.first) - 1, dtype=bool)
-        touched[part[inverse[entries.col]]] = True
+        touched[part[place]] = True
         self._halves(X, True, False, touched)
         rows = np.nonzero(touched[part])[0]
         return X[rows], rows

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from xcrack.arrays import Floats, Ints
+from xcrack.arrays import Floats, Ints, offsets
 from xcrack.xfem.facets import part_points
 from xcrack.xfem.function_space import FunctionSpace
 from xcrack.xfem.sides import lip_side
@@ -120,12 +120,13 @@ def jump_matrix(
         rows.append(np.broadcast_to(number[:, None], functions.shape)[acts])
         columns.append(functions[acts])
         values.append(N[acts])
-    triplets = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
-    jump = sp.csr_matrix(triplets, shape=(len(lips), space.n_functions))
-    jump.sum_duplicates()
-    jump.eliminate_zeros()  # standard functions take one value on both lips of a cell
+    place = np.concatenate(rows) * np.int64(space.n_functions) + np.concatenate(columns)
+    place, number = np.unique(place, return_inverse=True)
+    jump = np.bincount(number, np.concatenate(values), len(place))
+    differs = jump != 0  # standard functions take one value on both lips of a cell
+    point, function = np.divmod(place[differs], space.n_functions)
     d = space.dim
-    point = np.repeat(np.arange(len(lips)), np.diff(jump.indptr))
-    entries = (jump.data[:, None] * direction[point]).ravel()
-    unknown = (jump.indices[:, None] * d + np.arange(d)).ravel()
-    return sp.csr_matrix((entries, unknown, jump.indptr * d), shape=(len(lips), space.n_dof))
+    entries = (jump[differs, None] * direction[point]).ravel()
+    unknown = (function[:, None] * d + np.arange(d)).ravel().astype(np.int32)
+    start = offsets(np.bincount(point, minlength=len(lips)) * d).astype(np.int32)
+    return sp.csr_matrix((entries, unknown, start), shape=(len(lips), space.n_dof))
