@@ -139,7 +139,7 @@ class FrontCurve:
 
         s, samples = self._guesses
         step = float(np.diff(s).max())
-        sample, _ = nearest_vertices(x, samples, radius + step)
+        sample, _ = nearest_vertices(lock(x.view()), samples, radius + step)
         rows = np.nonzero(sample >= 0)[0]
         picked = np.ascontiguousarray(x[rows], dtype=float)
         curve = (self.breaks, self.place, self.normal, self.closed)
@@ -152,7 +152,8 @@ class FrontCurve:
         """
         from xcrack.kernels.distance import nearest_vertices
 
-        return np.asarray(nearest_vertices(x, self._guesses[1], bound)[1])
+        # Read-only as everywhere: a kernel is compiled once more for arrays that are not.
+        return np.asarray(nearest_vertices(lock(x.view()), self._guesses[1], bound)[1])
 
     def sharpest(self, first: float = -np.inf, last: float = np.inf, over: float = 0.0) -> float:
         """Smallest radius of curvature among the samples; inf for a straight front.

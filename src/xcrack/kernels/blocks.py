@@ -77,16 +77,19 @@ def orthonormal_columns(  # type: ignore[no-untyped-def]
         if size > widest:
             widest = size
         room += size * (size - n_standard[b])
-    place = np.full(n, -1, np.int64)
+    place = np.empty(n, np.int64)
+    for i in range(n):
+        place[i] = -1
     k, Z = np.empty((widest, widest)), np.empty(room)
     Q, C = np.empty(widest * widest), np.empty(widest * widest)
     ss, w, D = np.empty(widest * widest), np.empty(widest), np.empty(widest)
     work, pivots = np.empty(34 * widest + 1), np.empty(widest + 1, np.int32)
-    sizes, letters = np.zeros(4, np.int32), np.array([86, 76], dtype=np.uint8)  # V L
+    sizes, letters = np.empty(4, np.int32), np.empty(2, np.uint8)
     sizes[2] = len(work)
+    letters[0], letters[1] = 86, 76  # V L
     at = sizes.ctypes.data
     start = np.zeros(n + 1, np.int32)
-    begin = 0
+    begin, failed = 0, False
     for b in range(blocks):
         first, last = offsets[b], offsets[b + 1]
         size, s = last - first, n_standard[b]
@@ -94,11 +97,11 @@ def orthonormal_columns(  # type: ignore[no-untyped-def]
         if e == 0:
             continue
         for i in range(size):
-            for j in range(size):
-                k[i, j] = 0.0
             place[members[first + i]] = i
         for i in range(size):
             row = members[first + i]
+            for j in range(size):
+                k[i, j] = 0.0
             for j in range(indptr[row], indptr[row + 1]):
                 if place[indices[j]] >= 0:
                     k[i, place[indices[j]]] += data[j]
@@ -115,8 +118,7 @@ def orthonormal_columns(  # type: ignore[no-untyped-def]
             dgesv(
                 at, at + 4, ss.ctypes.data, at, pivots.ctypes.data, C.ctypes.data, at, at + 12
             )  # fmt: skip
-            if sizes[3] != 0:
-                return start, np.empty(0, np.int32), Z[:0], -1
+            failed = failed or sizes[3] != 0
         for j in range(e):
             D[j] = 1 / np.sqrt(k[s + j, s + j]) if k[s + j, s + j] > 0 else 0.0
         for j in range(e):
@@ -130,44 +132,39 @@ def orthonormal_columns(  # type: ignore[no-untyped-def]
             letters.ctypes.data, letters.ctypes.data + 1, at, Q.ctypes.data, at, w.ctypes.data,
             work.ctypes.data, at + 8, at + 12,
         )  # fmt: skip
-        if sizes[3] != 0:
-            return start, np.empty(0, np.int32), Z[:0], -1
-        own = Z[begin : begin + size * e].reshape(size, e)
+        failed = failed or sizes[3] != 0
         for j in range(e):
             scale = 1 / np.sqrt(w[j]) if w[j] > least * w[e - 1] else 0.0
             for i in range(e):
-                own[s + i, j] = D[i] * Q[j * e + i] * scale
+                Z[begin + (s + i) * e + j] = D[i] * Q[j * e + i] * scale
             for i in range(s):
                 total = 0.0
                 for m in range(e):
-                    total += C[m * s + i] * own[s + m, j]
-                own[i, j] = -total
-        for i in range(size):
-            for j in range(e):
-                if own[i, j] != 0:
-                    start[members[first + i] + 1] += 1
+                    total += C[m * s + i] * Z[begin + (s + m) * e + j]
+                Z[begin + i * e + j] = -total
+            for i in range(size):
+                start[members[first + i] + 1] += Z[begin + i * e + j] != 0
         begin += size * e
     for i in range(n):
+        place[i] = start[i]
         start[i + 1] += start[i]
     column, value = np.empty(start[n], np.int32), np.empty(start[n])
-    fill = start[:-1].copy()
     begin, count = 0, 0
     for b in range(blocks):
         first, size = offsets[b], offsets[b + 1] - offsets[b]
         e = size - n_standard[b]
-        own = Z[begin : begin + size * e].reshape(size, e)
         for j in range(e):
             alive = False
             for i in range(size):
-                if own[i, j] != 0:
-                    row = members[first + i]
-                    column[fill[row]], value[fill[row]] = count, own[i, j]
-                    fill[row] += 1
+                entry = Z[begin + i * e + j]
+                if entry != 0:
+                    to = place[members[first + i]]
+                    column[to], value[to] = count, entry
+                    place[members[first + i]] += 1
                     alive = True
-            if alive:
-                count += 1
+            count += alive
         begin += size * e
     # Addresses alone keep no array alive: numba frees it after its last use.
-    if letters[0] != 86 or len(work) < 1 or len(pivots) < 1 or len(ss) + len(w) + len(Q) < 0:
+    if failed or letters[0] + len(work) + len(pivots) + len(ss) + len(w) + len(Q) < 1:
         count = -1
     return start, column, value, count
