@@ -8,6 +8,7 @@ import scipy.sparse as sp
 from xcrack.arrays import Floats, Ints, ranges
 from xcrack.solvers.basis import Blocks, orthonormal
 from xcrack.solvers.multigrid import Hierarchy
+from xcrack.solvers.products import product
 from xcrack.solvers.row_blocks import Bordered, row_blocks
 from xcrack.xfem.function_space import FunctionSpace
 
@@ -87,8 +88,8 @@ class Parts:
 
 def parts_of(levels: Hierarchy, K: sp.csr_matrix, plain: Ints, enriched: sp.csc_matrix) -> Parts:
     """Stiffness between the unknowns of a hierarchy and enriched columns."""
-    image = sp.csr_matrix(K @ enriched)
-    own = sp.csr_matrix(enriched.T @ image)
+    image = product(K, sp.csr_matrix(enriched))
+    own = product(sp.csr_matrix(enriched.T), image)
     across = image[plain]
     if not levels.free.all():
         across = sp.csr_matrix(sp.diags(levels.free.astype(float)) @ across)

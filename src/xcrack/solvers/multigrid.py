@@ -21,11 +21,12 @@ from xcrack.solvers.basis import stars
 from xcrack.solvers.cycle import SAFETY, Cycle, Level, largest_eigenvalue, reciprocal
 from xcrack.solvers.row_blocks import Bordered, RowBlocks, stored
 from xcrack.solvers.schwarz import Patches
+from xcrack.threads import streamed
 from xcrack.xfem.assembly import Bulk, bulk, rigid_modes
 
 _COARSEST = 300  # unknowns below which a dense inverse ends the hierarchy
 _OMEGA = 4 / 3  # damping of the step that smooths the prolongator
-_ROWS = 20_000  # of blocks, taken at once where a coarse matrix is made
+_ROWS = 10_000  # of blocks, taken at once where a coarse matrix is made
 _NULL = 1e-11  # eigenvalues of the coarsest matrix below this share are rigid motions
 
 
@@ -123,9 +124,13 @@ def _coarse(A: sp.bsr_matrix, P: sp.bsr_matrix) -> sp.bsr_matrix:
     """P^T A P, summed over stretches of rows: A P takes more memory than A."""
     size = P.blocksize[1]
     total = sp.bsr_matrix((P.shape[1],) * 2, blocksize=(size, size))
-    for first in range(0, len(P.indptr) - 1, _ROWS):
-        own = _rows(P, first)
-        total = total + sp.bsr_matrix(own.T @ (_rows(A, first) @ P), blocksize=(size, size))
+
+    def part(first: int) -> sp.bsr_matrix:
+        own = _rows(P, first).T @ (_rows(A, first) @ P)
+        return sp.bsr_matrix(own, blocksize=(size, size))
+
+    for own in streamed(part, range(0, len(P.indptr) - 1, _ROWS)):
+        total = total + own
     return total
 
 
@@ -220,13 +225,15 @@ def _prolongator(
     if idle is not None:
         factor[idle] = 0.0
     damped = factor.reshape(n, -1)
-    parts = []
-    for first in range(0, n, _ROWS):  # of all rows at once it takes more memory than the result
+
+    def smoothed(first: int) -> sp.bsr_matrix:
         image = _rows(A, first) @ T
         own = damped[first : first + _ROWS]
         image.data *= np.repeat(own, np.diff(image.indptr), axis=0)[:, :, None]
-        parts.append(_rows(T, first) - image)
-    return _stacked(parts), coarse
+        return _rows(T, first) - image
+
+    # Of all rows at once the image takes more memory than the result.
+    return _stacked(list(streamed(smoothed, range(0, n, _ROWS)))), coarse
 
 
 def _stacked(parts: list[sp.bsr_matrix]) -> sp.bsr_matrix:

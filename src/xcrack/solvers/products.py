@@ -1,5 +1,6 @@
 """Products of sparse matrices with vectors, those of scipy to the bit; proportional vectors."""
 
+import itertools
 from collections.abc import Sequence
 
 import numpy as np
@@ -8,8 +9,10 @@ import scipy.sparse as sp
 from xcrack.arrays import Floats, Ints
 from xcrack.kernels import sparse
 from xcrack.solvers.lockstep import Ask, Operator
+from xcrack.threads import each, number_of_threads
 from xcrack.xfem.stiffness import Stiffness
 
+_LEAST = 100_000  # entries of a factor that a thread is worth
 _SAME = 1e-15  # share of the largest entry up to which vectors are multiples of each other
 _NEARLY = 1e-5  # share of a load beside the combinations of others, up to which those come first
 
@@ -28,6 +31,23 @@ def times_transposed(A: sp.csr_matrix, x: Floats) -> Floats:
     x, n = np.ascontiguousarray(x), A.shape[1]
     result = sparse.times_transposed(A.indptr, A.indices, A.data, n, x.reshape(len(x), -1))
     return np.asarray(result.reshape(n, *x.shape[1:]))
+
+
+def product(A: sp.csr_matrix, B: sp.csr_matrix) -> sp.csr_matrix:
+    """A B of sparse matrices, stretches of rows by threads: the same bits for any number."""
+    count = min(number_of_threads(), A.nnz // _LEAST)
+    if count < 2:
+        return sp.csr_matrix(A @ B)
+    inner = np.searchsorted(A.indptr, np.linspace(0, A.nnz, count + 1)[1:-1])
+    ends = [0, *inner.tolist(), A.shape[0]]
+
+    def rows(span: tuple[int, int]) -> sp.csr_matrix:
+        indptr = A.indptr[span[0] : span[1] + 1]
+        own = slice(indptr[0], indptr[-1])
+        shape = span[1] - span[0], A.shape[1]
+        return sp.csr_matrix((A.data[own], A.indices[own], indptr - indptr[0]), shape=shape) @ B
+
+    return sp.csr_matrix(sp.vstack(each(rows, list(itertools.pairwise(ends))), format="csr"))
 
 
 def proportional(b: Floats, same: float = _SAME) -> tuple[Ints, Floats]:

@@ -11,7 +11,7 @@ import scipy.sparse as sp
 from xcrack.arrays import Ints, lock, offsets
 from xcrack.threads import each, number_of_threads
 
-_LEAST = 100_000  # values of a part of a product: less takes no longer than to hand it over
+_LEAST = 300_000  # values of a part of a product: less takes no longer than to hand it over
 _TOGETHER = 3  # rows that the kernel of products takes at once
 _FOUR = 4  # vectors that the kernel of several takes: what a processor multiplies at once
 
@@ -82,7 +82,7 @@ class RowBlocks:
                 self.values, x, y, number, y,
             )  # fmt: skip
 
-        entries = len(self.values) * (1 if x.ndim == 1 else _FOUR)
+        entries = len(self.values) * (1 if x.ndim == 1 else 2)
         count = min(number_of_threads(), entries // _LEAST)
         each(rows, self._stretches(count))
         if unchanged is not None:
@@ -116,18 +116,43 @@ def row_blocks(parts: Sequence[sp.csr_matrix], first: Ints, dtype: Any = np.floa
     from xcrack.kernels.cycle import fill_blocks, pattern_sizes
 
     first = np.asarray(first, dtype=np.int64)
-    sizes = [pattern_sizes(A.indptr, A.indices, first, A.shape[1]) for A in parts]
+    entries = sum(A.nnz for A in parts)
+    count = max(1, min(number_of_threads(), entries // _LEAST))
+    ends = np.linspace(0, len(first) - 1, count + 1).astype(int).tolist()
+    spans = list(itertools.pairwise(ends))
+
+    def sizes_of(A: sp.csr_matrix) -> Ints:
+        def own(span: tuple[int, int]) -> Ints:
+            return np.asarray(
+                pattern_sizes(A.indptr, A.indices, first[span[0] : span[1] + 1], A.shape[1])
+            )
+
+        return np.concatenate(each(own, spans))
+
+    sizes = [sizes_of(A) for A in parts]
     whole = np.asarray(np.sum(sizes, axis=0, dtype=np.int64))
     start, offset = offsets(whole), offsets(whole * np.diff(first))
     columns, values = np.empty(start[-1], np.uint32), np.zeros(offset[-1], dtype)
     left, shift = np.zeros_like(whole), 0
     for A, own in zip(parts, sizes):
-        fill_blocks(
-            A.indptr, A.indices, A.data, first, start[:-1] + left, np.stack([left, whole], axis=1),
-            offset[:-1], A.shape[1], shift, columns, values,
-        )  # fmt: skip
+        begin, size = start[:-1] + left, np.stack([left, whole], axis=1)
+
+        def fill(
+            span: tuple[int, int],
+            A: sp.csr_matrix = A,
+            begin: Ints = begin,
+            size: Ints = size,
+            shift: int = shift,
+        ) -> None:
+            part = slice(*span)
+            fill_blocks(
+                A.indptr, A.indices, A.data, first[span[0] : span[1] + 1], begin[part],
+                size[part], offset[part], A.shape[1], shift, columns, values,
+            )  # fmt: skip
+
+        each(fill, spans)
         left, shift = left + own, shift + A.shape[1]
-    short = [each.astype(np.uint32) for each in (first, start, offset)]
+    short = [array.astype(np.uint32) for array in (first, start, offset)]
     return RowBlocks((int(first[-1]), shift), *map(lock, (*short, columns, values)))
 
 
