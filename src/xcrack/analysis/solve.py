@@ -24,9 +24,17 @@ from xcrack.solvers.engine import Engine
 from xcrack.solvers.iterative import iterative_system
 from xcrack.solvers.products import times
 from xcrack.solvers.reuse import Reuse
-from xcrack.solvers.rigid_motion import Motion, balanced, free_motion, without_motion
+from xcrack.solvers.rigid_motion import (
+    Motion,
+    balanced,
+    free_modes,
+    free_motion,
+    without_motion,
+)
 from xcrack.threads import one_blas_thread, threads
+from xcrack.xfem.assembly import MeshLoad
 from xcrack.xfem.loads import load_vector
+from xcrack.xfem.mesh_loads import mesh_loads, on_mesh
 from xcrack.xfem.model import Model, build
 from xcrack.xfem.stiffness import next_to_enriched
 from xcrack.xfem.supports import known_unknowns
@@ -119,10 +127,11 @@ def _solve_states(
     repeated: bool,
 ) -> list[Solution]:
     model = build(problem, None if reuse is None else reuse.bulk)
-    known_loads: dict[int, Floats] = {}
+    known_loads = mesh_loads(model.space, model.bulk.loads)
     cases = [_case(problem, model, state, known_loads) for state in states]
     fixed = model.known.fixed.copy()
-    motion = free_motion(model.space, fixed)
+    free = _free(model, fixed)
+    motion = free_motion(model.space, fixed, free[1])
     engine = _engine(problem, model, fixed, motion, solver, reuse)
     f, imbalance = balanced(model.space, motion, np.stack([case.f for case in cases], axis=1))
     known = np.stack([case.known for case in cases], axis=1)
@@ -132,7 +141,12 @@ def _solve_states(
     u = pressed.u
     if motion.modes.shape[1]:
         u = without_motion(motion, u)
-    left = replace(pressed.closed_sets(), bulk=model.bulk)
+    loads: tuple[MeshLoad, ...] = ()
+    if reuse is not None:  # else there is no next step
+        acted = {id(load): load for case in cases for load in case.loads}.values()
+        vectors = [(load, known_loads[id(load)]) for load in acted]
+        loads = on_mesh(model.space, vectors, model.bulk.loads)
+    left = replace(pressed.closed_sets(), bulk=replace(model.bulk, loads=loads, free=free))
     if pressed.rubbing:
         left = replace(left, slip=slip_of(model, pressed.rubbing, u[:, -1]))
     handed_on = engine.handed_on(left)
@@ -164,6 +178,15 @@ def _solve_states(
             )
         )
     return solutions
+
+
+def _free(model: Model, fixed: Bools) -> tuple[Bools, Floats]:
+    """Fixed standard unknowns and the rigid motions left: those of the last solve, or new ones."""
+    space, free = model.space, model.bulk.free
+    standard = fixed[: space.n_nodes * space.dim]
+    if free is not None and np.array_equal(free[0], standard):
+        return free
+    return lock(standard.copy()), lock(free_modes(space, standard))
 
 
 def _engine(

@@ -41,19 +41,33 @@ class Motion:
         return np.abs(np.ascontiguousarray(self.modes.T)).max(axis=1)
 
 
-def free_motion(space: FunctionSpace, fixed: Bools) -> Motion:
-    """Rigid motions left by the supports, and far standard unknowns to pin."""
-    if space.joints or any(cut.n_tips == 0 for cut in space.cuts):
-        _check_pieces(space, fixed)
-    n = space.n_nodes * space.dim
+def free_modes(space: FunctionSpace, fixed: Bools) -> Floats:
+    """Orthonormal rigid motions left by supports of standard unknowns `(n,)`: `(n, k)`."""
     R = np.linalg.qr(rigid_modes(space.node_points))[0]
-    supported = R[fixed[:n]]
+    supported = R[fixed]
     gram = supported.T @ supported
     w, V = np.linalg.eigh(gram)
-    null = V[:, w < 1e-10 * max(float(w.max(initial=0.0)), 1.0 / len(R))]
-    modes = np.zeros((space.n_dof, null.shape[1]))
-    modes[:n] = R @ null
-    if null.shape[1] == 0:
+    return np.asarray(R @ V[:, w < 1e-10 * max(float(w.max(initial=0.0)), 1.0 / len(R))])
+
+
+def free_motion(space: FunctionSpace, fixed: Bools, free: Floats | None = None) -> Motion:
+    """Rigid motions left by the supports, and far standard unknowns to pin.
+
+    Parameters
+    ----------
+    space : FunctionSpace
+    fixed : (n_dof,) array of bool
+        Unknowns that supports decide.
+    free : (n, k) array, optional
+        As of `free_modes`, where it is known.
+    """
+    if space.joints or any(cut.n_tips == 0 for cut in space.cuts):
+        _check_pieces(space, fixed)
+    if free is None:
+        free = free_modes(space, fixed[: space.n_nodes * space.dim])
+    modes = np.zeros((space.n_dof, free.shape[1]))
+    modes[: len(free)] = free
+    if free.shape[1] == 0:
         return Motion(modes, np.zeros(0, dtype=np.int64))
     plain = np.ones(space.n_nodes, dtype=bool)
     plain[space.cell_nodes[space.enriched]] = False
@@ -63,14 +77,14 @@ def free_motion(space: FunctionSpace, fixed: Bools) -> Motion:
     for chosen in (plain, every):
         candidates = (np.nonzero(chosen)[0][:, None] * space.dim + np.arange(space.dim)).ravel()
         candidates = candidates[~fixed[candidates]]
-        if len(candidates) < null.shape[1]:
+        if len(candidates) < free.shape[1]:
             continue
         triangle, pivots = scipy.linalg.qr(modes[candidates].T, mode="r", pivoting=True)
         diagonal = np.abs(np.diag(triangle))
         # Two points in 3D leave the turn about their line free.
         if diagonal[-1] > 1e-6 * diagonal[0]:
             break
-    return Motion(modes, candidates[pivots[: null.shape[1]]])
+    return Motion(modes, candidates[pivots[: free.shape[1]]])
 
 
 def balanced(space: FunctionSpace, motion: Motion, f: Floats) -> tuple[Floats, float]:
@@ -108,7 +122,8 @@ def balanced(space: FunctionSpace, motion: Motion, f: Floats) -> tuple[Floats, f
 
 def _total(space: FunctionSpace, f: Floats) -> float:
     """Sum of all forces; pressure on crack faces acts on the jumps of enriched functions alone."""
-    size = np.linalg.norm(f.reshape(-1, space.dim), axis=1)
+    by_function = f.reshape(-1, space.dim)
+    size = np.sqrt(np.einsum("ni,ni->n", by_function, by_function))
     total = float(size[: space.n_nodes].sum())
     for number in space.heaviside:
         total += float(size[number[number >= 0]].sum())

@@ -6,9 +6,10 @@ from itertools import combinations
 import numpy as np
 import scipy.sparse as sp
 
-from xcrack.arrays import Floats, Ints, stretches
+from xcrack.arrays import Bools, Floats, Ints, stretches
 from xcrack.mesh.mesh import Mesh
 from xcrack.mesh.simplex import cell_nodes, shape_derivatives, simplex_rule
+from xcrack.scene.conditions import Load
 from xcrack.scene.material import Isotropic
 from xcrack.scene.numerics import Numerics
 from xcrack.threads import one_blas_thread, streamed
@@ -20,6 +21,24 @@ from xcrack.xfem.reused_cells import ReusedCells, reused_cells, with_one_jump
 from xcrack.xfem.stiffness import Enriched, Stiffness
 
 _CHUNK = 20_000  # integration points tabulated at once; bounds the memory
+
+
+@dataclass(frozen=True, eq=False)
+class MeshLoad:
+    """The vector of a load on facets of plain cells: it belongs to the mesh, not to the cracks.
+
+    Attributes
+    ----------
+    load : Load
+    cells : (k,) array of int
+        Of its facets.
+    f : (n,) array, force
+        By standard unknown.
+    """
+
+    load: Load
+    cells: Ints
+    f: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,6 +54,10 @@ class Bulk:
         Node blocks, BSR; in 3D each is stored column by column, as products of the solvers read it.
     cells : ReusedCells, optional
         Cut cells of the last crack that may serve the next.
+    loads : tuple of MeshLoad
+        Of the last solve, that do not act beside a crack.
+    free : (fixed, modes), optional
+        Standard unknowns that supports decide, and the rigid motions that they leave free.
     """
 
     mesh: Mesh
@@ -42,6 +65,8 @@ class Bulk:
     order: int
     matrix: sp.bsr_matrix
     cells: ReusedCells | None = None
+    loads: tuple[MeshLoad, ...] = ()
+    free: tuple[Bools, Floats] | None = None
 
 
 def bulk(mesh: Mesh, material: Isotropic, order: int) -> Bulk:
