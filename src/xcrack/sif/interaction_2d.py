@@ -224,29 +224,34 @@ def lip_terms(solutions: Sequence[Solution], ring: Ring) -> Floats:
     rubs = any(shear is not None and shear.any() for shear in shears)
     if not bent and not pressure.any() and not rubs:
         return result
-    behind = np.ones(len(xi), dtype=bool)
-    w, steady = lips.weight[near], [_steady(solution, t) for solution in solutions]
-    for s, sign in ((0, -1), (1, 1)):
-        cell, bary = lips.cell[near, s], lips.bary[near, s]
-        side = lip_side(space, tip.crack, cell, bary, sign)
-        r, theta = continued_polar(xi, side[:, tip.crack], behind)
-        outward = -sign * lips.normal[near] @ R.T
-        q, _ = weight(r, xi, ring.inner, radii)
-        aux = _auxiliary(solutions, r, theta)
-        local, stresses = None, []
-        if bent:
-            stresses = [material.stress(field.gradient) for field in aux]
-            gradient = gradients_at(space, ring.coefficients, cell, bary, side) - ring.turn
-            local = np.einsum("ai,qijs,bj->sqab", R, gradient, R)
-        for k in range(len(solutions)):
-            traction, shear = -pressure[k][:, None] * outward, shears[k]
-            if shear is not None:
-                traction += sign * shear @ R.T
-            sigma = None if local is None else material.stress(local[k]) + steady[k]
-            for m, field in enumerate(aux):
-                density = np.einsum("qi,qi->q", traction, field.gradient[:, :, 0])
-                if local is not None and sigma is not None:
-                    density += np.einsum("qij,qj,qi->q", stresses[m], outward, local[k][:, :, 0])
-                    density -= np.einsum("qij,qij->q", sigma, field.gradient) * outward[:, 0]
-                result[k, :, m] -= q @ (w * density)
+    # Both faces at once, face - first.
+    n, w, steady = len(xi), lips.weight[near], [_steady(solution, t) for solution in solutions]
+    cell, bary = lips.cell[near], lips.bary[near]
+    faces = [lip_side(space, tip.crack, cell[:, s], bary[:, s], 2 * s - 1) for s in (0, 1)]
+    side = np.concatenate(faces)
+    xi = np.concatenate([xi, xi])
+    r, theta = continued_polar(xi, side[:, tip.crack], np.ones(2 * n, dtype=bool))
+    outward = lips.normal[near] @ R.T
+    outward = np.concatenate([outward, -outward])
+    q, _ = weight(r, xi, ring.inner, radii)
+    aux = _auxiliary(solutions, r, theta)
+    local, stresses = None, []
+    if bent:
+        stresses = [material.stress(field.gradient) for field in aux]
+        places = cell.T.ravel(), np.concatenate([bary[:, 0], bary[:, 1]])
+        gradient = gradients_at(space, ring.coefficients, *places, side) - ring.turn
+        local = np.einsum("ai,qijs,bj->sqab", R, gradient, R)
+    for k in range(len(solutions)):
+        traction, shear = -np.concatenate([pressure[k], pressure[k]])[:, None] * outward, shears[k]
+        if shear is not None:
+            shear = shear @ R.T
+            traction += np.concatenate([-shear, shear])
+        sigma = None if local is None else material.stress(local[k]) + steady[k]
+        for m, field in enumerate(aux):
+            density = np.einsum("qi,qi->q", traction, field.gradient[:, :, 0])
+            if local is not None and sigma is not None:
+                density += np.einsum("qij,qj,qi->q", stresses[m], outward, local[k][:, :, 0])
+                density -= np.einsum("qij,qij->q", sigma, field.gradient) * outward[:, 0]
+            for face in (slice(n), slice(n, None)):
+                result[k, :, m] -= q[:, face] @ (w * density[face])
     return result
