@@ -260,12 +260,54 @@ def test_default_settings_vary_what_is_there():
     result = xc.chart(scene, repeat=1, seconds=1e-6, progress=False)
     names = {row.setting for row in result.rows}
     assert names == {"as given", "order 1", "radius × 0.7", "radius × 1.4", "topological",
-                     "domain 1.5 radii", "2 functions"}  # fmt: skip
+                     "domain 1.5 radii", "2 functions", "adapt"}  # fmt: skip
     assert not result.failed
     by_name = {row.setting: row for row in result.rows if row.mesh == 1}
     ratio = by_name["radius × 1.4"].fields["radius"] / by_name["radius × 0.7"].fields["radius"]
     assert ratio == pytest.approx(2.0)
     assert any(row.warnings for row in result.rows if row.mesh == 0)
+
+
+def edge_plate(n=5):
+    crack = xc.line_crack([(-1.2, 0.03), (0.0, 0.03)])
+    return xc.Problem(xc.box((-1, -1), (1, 1), n), STEEL, [crack], loads=PULL)
+
+
+def test_adapt_is_a_line_of_the_chart(tmp_path):
+    """Each tolerance a row with a mesh of its own; its best K is nearer than the tolerance."""
+    tolerances = [1e-2, 3e-4]
+    result = xc.chart(
+        edge_plate(), [{"functions": 2}], tolerances=tolerances, wanted=2e-3, repeat=1, seconds=1e-6,
+        meshes=[xc.box((-1, -1), (1, 1), n) for n in (8, 16, 32)], progress=False,
+        file=tmp_path / "chart.png",
+    )  # fmt: skip
+    rows = [row for row in result.rows if row.setting == "adapt"]
+    assert [row.fields["tolerance"] for row in rows] == tolerances
+    assert not result.failed
+    for row in rows:
+        assert row.mesh == -1
+        assert row.seconds > 0
+        assert row.error <= row.fields["tolerance"] + result.reference_error
+        assert row.problem.order == 2
+    assert rows[1].unknowns >= rows[0].unknowns
+    assert "adapt 0.01" in result.table()
+    assert "'adapt 0.0003' (h = " in str(rows[1])
+    assert result.reference.setting == "as given"
+    alone = Chart(tuple(rows), result.reference, result.reference_error, "K")
+    assert "Take xc.adapt(problem, tolerance=0.0" in str(alone.best(1e-2))
+    assert (tmp_path / "chart.png").stat().st_size > 10_000
+
+
+def test_adapt_with_states_and_a_quantity_of_ones_own():
+    """A quantity sees what solve would return: a list where there are states."""
+    result = xc.chart(
+        edge_plate(), [{"functions": 2}], tolerances=[0.05], states=[0.5, 1.0], repeat=1, seconds=1e-6,
+        quantity=lambda states: [s.energy for s in states], progress=False,
+    )  # fmt: skip
+    row = result.rows[-1]
+    assert row.setting == "adapt"
+    assert row.values[1] == pytest.approx(4 * row.values[0])
+    assert row.error < 0.1
 
 
 def test_contact_is_compared_but_no_reference():
@@ -336,6 +378,9 @@ BAD = {
     "field": (lambda: xc.chart(scene(), [{"odrer": 1}]), "'odrer' is no choice.*one of order"),
     "scene": (lambda: xc.chart(scene(), [{"mesh": 1}]), "Meshes go into meshes="),
     "twice": (lambda: xc.chart(scene(), [{"order": 1}, {"order": 1}]), "'order 1' stands.*twice"),
+    "tolerance": (lambda: xc.chart(scene(), tolerances=[2.0]), "chart: tolerance = 2.0"),
+    "tiny": (lambda: xc.chart(edge_plate(), tolerances=[1e-9]), "give 1e-06 or more"),
+    "no tips": (lambda: xc.chart(scene(), tolerances=[0.1]), "no crack has a tip"),
     "wanted": (lambda: xc.chart(scene(), wanted=0), "wanted relative error = 0 is not possible"),
     "repeat": (lambda: xc.chart(scene(), repeat=0), "repeat = 0.*whole number"),
     "seconds": (lambda: xc.chart(scene(), seconds="1"), "seconds = '1'.*number above 0"),

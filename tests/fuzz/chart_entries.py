@@ -119,6 +119,11 @@ ENTRIES = [
             "quantity": arg(
                 Called(optional=True), None, lambda solutions: 1.0 + np.size(solutions)
             ),
+            "tolerances": arg(
+                ListOf(optional=True, item=Number(above=0, below=1, rule=lambda v: None), least=1),
+                None,
+                [0.1, 0.05],
+            ),
             "wanted": arg(Number(optional=True, above=0), None, 1e-2),
             "repeat": arg(Whole(least=1, most=1000, far=2), 1),
             "seconds": arg(Number(above=0), 0.05),

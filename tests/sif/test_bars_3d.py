@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import xcrack as xc
+from xcrack.sif.finer_3d import finer_along
 from xcrack.verification.fields_3d import penny, penny_K
 
 MATERIAL = xc.Isotropic(1.0, 0.3)
@@ -56,3 +57,51 @@ def test_places_at_a_free_surface_have_none():
     assert np.isnan(sif.bar[sif.at_surface]).all()
     assert np.isfinite(sif.bar[~sif.at_surface]).all()
     assert all(("surface" in r) == at for r, at in zip(sif.reasons, sif.at_surface, strict=True))
+
+
+@pytest.mark.parametrize(
+    ("n", "tilt"), [(6, 0.3), pytest.param(9, 0.3, marks=pytest.mark.slow),
+                    pytest.param(9, 0.0, marks=pytest.mark.slow)]
+)  # fmt: skip
+def test_finer_cells_at_the_front(n, tilt):
+    """In all three modes: the difference is the error, and its K is nearer to the exact one."""
+    solution = xc.solve(imposed(2, n, tilt))
+    own, finer = xc.stress_intensity(solution), xc.stress_intensity(solution, error="front")
+    assert np.array_equal(own.K, finer.K)
+    exact = np.array([float(np.max(penny_K(0.0, RADIUS, 0.3, szz=1.0)[0])), 0.0, 0.0])
+    for mode in range(3):
+        error, rest = exact[mode] - own.K[:, mode], exact[mode] - finer.best[:, mode]
+        assert 0.5 < rms(finer.eta[:, mode]) / rms(error) < 2
+        assert rms(rest) < rms(finer.bar[:, mode])
+    assert rms(exact - finer.best) < 0.5 * rms(exact - own.K)
+
+
+def test_finer_cells_at_the_front_of_a_surface_crack_and_of_states():
+    """Order 1 takes order 2 along; places at a free surface and states at rest have none."""
+    mesh = xc.box((-1, -1, -1), (1, 1, 1), 5)
+    loads = [xc.traction("top", (0, 0, 1.0)), xc.traction("bottom", (0, 0, -1.0))]
+    crack = xc.plane_crack(
+        [(-1.5, -1.5, 0.03), (0.1, -1.5, 0.03), (0.1, 1.5, 0.03), (-1.5, 1.5, 0.03)]
+    )
+    problem = xc.Problem(mesh, MATERIAL, [crack], loads=loads, contact="off", order=1)
+    rest, whole, half = xc.stress_intensities(xc.solve(problem, [0.0, 1.0, 0.5]), error="front")
+    inside = ~whole.at_surface
+    assert np.isnan(whole.bar[~inside]).all()
+    assert np.isfinite(whole.bar[inside]).all()
+    assert not rest.bar.any()
+    assert np.allclose(2 * half.eta[inside], whole.eta[inside], rtol=1e-6, atol=1e-9)
+    finer = finer_along(problem, 0)
+    at, before = (m.cell_tree.query([(0.1, 0.0, 0.03)])[1] for m in (finer, mesh))
+    assert finer.cell_size[at] <= mesh.cell_size[before] / 1.5 * (1 + 1e-9)
+    assert len(finer.cells) < 8 * len(mesh.cells)
+
+
+def test_finer_cells_at_tips_are_refused():
+    crack = xc.line_crack([(-0.4, 0.01), (0.3, 0.01)])
+    pull = [xc.traction("top", (0, 1.0)), xc.traction("bottom", (0, -1.0))]
+    plane = xc.Isotropic(1.0, 0.3, "strain")
+    solution = xc.solve(xc.Problem(xc.box((-1, -1), (1, 1), 8), plane, [crack], loads=pull))
+    with pytest.raises(xc.ProblemError, match=r'error="front" is for fronts in 3D: give True'):
+        xc.stress_intensity(solution, error="front")
+    with pytest.raises(xc.ProblemError, match=r'error, if it is not "front",'):
+        xc.stress_intensity(solution, error="tips")

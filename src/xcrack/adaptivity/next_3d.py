@@ -10,13 +10,13 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial import cKDTree
 
-from xcrack.adaptivity.fronts_3d import between, graded, with_room
 from xcrack.adaptivity.measured import Measured, counted, live_states, values
 from xcrack.adaptivity.outlines_3d import CELLS
 from xcrack.adaptivity.resolved import resolved
 from xcrack.arrays import Floats
 from xcrack.crack.crack import Crack
 from xcrack.crack.size_3d import surface_size
+from xcrack.geometry.around import between, graded, radii, with_room
 from xcrack.mesh.locate import cell_sizes
 from xcrack.mesh.mesh import Mesh
 from xcrack.mesh.refinement import refine
@@ -26,6 +26,8 @@ from xcrack.sif.sif import SIF
 
 _LEAST, _MOST = 1.5, 2.0  # times finer in a round: what less changes is no bar
 _POWER = 2.5  # of the cells' size with which bars fall at order 2, on graded meshes (measured)
+_BEND = 0.6  # of the radius of curvature of a front: the domains of K have to fit into it
+_SHARPEST = 0.4  # of the cells along a front: least where it turns
 _SMALLER = 1.3  # times finer that cells are at least where 1.5 was asked for
 
 
@@ -133,11 +135,13 @@ def _shorter(sif: SIF, before: SIF, finer: bool) -> SIF:
 
 def _first_sizes(problem: Problem) -> tuple[list[Floats], list[Floats]]:
     """Places along the fronts of each crack, and the longest edges of the first mesh there."""
-    places = [_front(crack) for crack in problem.placed]
-    sizes = [
-        np.full(len(x), first_size(crack, problem.mesh))
-        for x, crack in zip(places, problem.placed, strict=True)
-    ]
+    places, sizes = [], []
+    for crack in problem.placed:
+        size = first_size(crack, problem.mesh)
+        lines = [crack.points[front] for front in crack.fronts or ()]
+        bend = np.maximum(_BEND * radii(lines, CELLS * size), _SHARPEST * size)
+        places.append(between(lines))
+        sizes.append(np.minimum(size, bend))
     return places, with_room(places, sizes)
 
 

@@ -4,10 +4,10 @@ from collections.abc import Callable
 
 import numpy as np
 
-from xcrack.adaptivity.fronts_3d import graded, with_room
 from xcrack.arrays import Floats, ranges
 from xcrack.crack.crack import Crack
 from xcrack.crack.size_3d import area_inside
+from xcrack.geometry.around import graded, with_room
 from xcrack.geometry.triangulation import loops
 from xcrack.mesh.body import Body
 from xcrack.scene.problem import Problem

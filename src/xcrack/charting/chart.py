@@ -2,9 +2,9 @@
 
 import sys
 import warnings
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from math import factorial
+from functools import partial
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -14,6 +14,8 @@ import numpy as np
 from xcrack.analysis.solution import Solution
 from xcrack.analysis.solve import solve
 from xcrack.arrays import Floats, lock
+from xcrack.charting.adapted import Run, adapted_runs, row_of, wanted_of
+from xcrack.charting.meshes import checked_meshes, made, mean_size, smallest
 from xcrack.charting.result import Chart, Row, checked_error
 from xcrack.charting.settings import IN_PROBLEM, default_settings, named_settings, with_lengths
 from xcrack.charting.values import K_of_all, Sampled, at_places, most_trusted, plain
@@ -43,6 +45,7 @@ def chart(
     meshes: Meshes | None = None,
     states: Sequence[Any] | None = None,
     quantity: Quantity | None = None,
+    tolerances: Sequence[float] | None = None,
     wanted: float | None = None,
     repeat: int = 3,
     seconds: float = 60.0,
@@ -73,6 +76,9 @@ def chart(
     quantity : callable, optional
         ``quantity(solution) -> number or array``, given the list of solutions where there are
         states. Left out: K of all cracks; the strain energy where there are no tips.
+    tolerances : sequence of float, optional
+        Runs of `adapt` from the mesh of the problem, of which all rounds count as time, with its
+        best K. Left out: 3e-2 to 1e-3 in 2D where settings are left out too, none in 3D.
     wanted : float, optional
         Relative error for which the cheapest run is named and marked.
     repeat : int
@@ -124,10 +130,13 @@ def chart(
         flag(progress, 'chart: progress, if it is not "always",')
     if file is not None:
         path_of(file, "chart: file", error=ProblemError)
+    aims = wanted_of(tolerances, problem, settings is None)
     runs = _Runs(problem, named, states, quantity, progress)
     every = _meshes(runs, meshes, repeat, seconds)
     outcomes = _timed(runs, every, repeat)
-    result = _compared(runs, every, outcomes, wanted, repeat)
+    own = None if quantity is None else partial(_of_user, quantity)
+    others = adapted_runs(problem, aims, states, own, repeat, runs.say)
+    result = _compared(runs, every, outcomes, others, wanted, repeat)
     if file is not None:
         result.plot(file)
     return result
@@ -219,10 +228,10 @@ def _varied(problem: Problem, mesh: Mesh, changes: dict[str, Any]) -> Problem:
 def _meshes(runs: _Runs, given: Meshes | None, repeat: int, seconds: float) -> list[Mesh]:
     """All meshes; where they are made here, as many as time and memory are likely to allow."""
     if given is not None and not callable(given):
-        return _checked_meshes(runs.problem, given)
+        return checked_meshes(runs.problem, given)
     first = runs.problem.mesh
-    size = _smallest(first)
-    every = [first if given is None else _made(given, size)]
+    size = smallest(first)
+    every = [first if given is None else made(given, size)]
     _run(runs, every[0], {})  # compiles kernels: its time says nothing about finer meshes
     spent, before = 0.0, None
     while len(every) < _MOST_MESHES:
@@ -235,50 +244,9 @@ def _meshes(runs: _Runs, given: Meshes | None, repeat: int, seconds: float) -> l
             total = (spent + growth * base.seconds) * len(runs.named) * (repeat + 0.5)
             if base.failed or total > seconds or base.unknowns * 2**d > _MOST_UNKNOWNS[d]:
                 break
-        every.append(refine(every[-1]) if given is None else _made(given, size / 2 ** len(every)))
+        every.append(refine(every[-1]) if given is None else made(given, size / 2 ** len(every)))
     runs.say(f"{len(every)} meshes, {len(runs.named)} settings, {repeat} timed runs of each")
     return every
-
-
-def _made(maker: Callable[[float], Mesh], size: float) -> Mesh:
-    mesh = called(maker, "the meshes of chart", size)
-    if not isinstance(mesh, Mesh):
-        raise ProblemError(
-            f"meshes({size:.6g}) returned {type(mesh).__name__}: the function must return a Mesh "
-            "whose smallest cells have this size."
-        )
-    return mesh
-
-
-def _checked_meshes(problem: Problem, given: Any) -> list[Mesh]:
-    every = list(given) if isinstance(given, Iterable) and not isinstance(given, str) else []
-    if len(every) < 2 or not all(isinstance(mesh, Mesh) for mesh in every):
-        raise ProblemError(
-            "meshes: give two or more meshes from coarse to fine, or a function of the size: the "
-            "error of the reference is read from the last two."
-        )
-    if any(mesh.dim != problem.mesh.dim for mesh in every):
-        raise ProblemError(f"meshes: all must have {problem.mesh.dim} dimensions, as the problem.")
-    size = [_mean_size(mesh) for mesh in every]
-    for k, (a, b) in enumerate(zip(size[:-1], size[1:], strict=True)):
-        if b > a / 1.05:
-            raise ProblemError(
-                f"meshes: number {k + 1} has cells of {b:.4g} in the mean, the one before it of "
-                f"{a:.4g}; give them from coarse to fine, each at least 5 % finer."
-            )
-    return every
-
-
-def _smallest(mesh: Mesh) -> float:
-    """Edge of the simplex with right angles that is as large as the smallest cell.
-
-    Unlike the longest edge it is halved by a refinement, whatever shapes the parts have.
-    """
-    return float((factorial(mesh.dim) * mesh.volume.min()) ** (1 / mesh.dim))
-
-
-def _mean_size(mesh: Mesh) -> float:
-    return float(mesh.volume.mean() ** (1 / mesh.dim))
 
 
 def _timed(
@@ -317,6 +285,7 @@ def _compared(
     runs: _Runs,
     every: list[Mesh],
     outcomes: dict[tuple[int, int], tuple[_Outcome, float]],
+    others: Sequence[Run],
     wanted: float | None,
     repeat: int,
 ) -> Chart:
@@ -335,7 +304,7 @@ def _compared(
     # Without contact, say, it is another scene, which converges to other values.
     other = [s for s, changes in enumerate(runs.named.values()) if "contact" in changes]
     try:
-        best, left = most_trusted(values, [_mean_size(mesh) for mesh in every], other)
+        best, left = most_trusted(values, [mean_size(mesh) for mesh in every], other)
     except ProblemError as error:
         reasons = "; ".join(dict.fromkeys(failed.values()))
         raise ProblemError(f"{error} {reasons}".strip()) from error
@@ -351,7 +320,7 @@ def _compared(
             setting=names[s],
             fields=outcome.fields,
             mesh=k,
-            size=_smallest(every[k]),
+            size=smallest(every[k]),
             unknowns=outcome.unknowns,
             seconds=time,
             error=float(np.linalg.norm(values[k, s] - values[best])) / scale
@@ -364,8 +333,11 @@ def _compared(
         )
         for (k, s), (outcome, time) in outcomes.items()
     }
+    assert places is not None
+    adapted = [row_of(run, places, values[best], scale) for run in others]
     what = "quantity" if runs.quantity is not None else "K" if runs.has_tips else "strain energy"
-    return Chart(tuple(rows.values()), rows[best], max(left / scale, 1e-15), what, wanted, repeat)
+    every_row = (*rows.values(), *adapted)
+    return Chart(every_row, rows[best], max(left / scale, 1e-15), what, wanted, repeat)
 
 
 def _places(outcomes: dict[tuple[int, int], tuple[_Outcome, float]]) -> Sampled | None:

@@ -25,7 +25,7 @@ class Row:
     fields : mapping
         What it changes in Problem and Numerics, with the numbers that were used.
     mesh : int
-        Number of the mesh, from 0 for the coarsest.
+        Number of the mesh, from 0 for the coarsest; -1 for one that `adapt` has made.
     size : float, length
         Edge of the square or cube, cut into simplices, of which the smallest cell is one.
     unknowns : int
@@ -57,7 +57,7 @@ class Row:
     problem: Problem | None = field(repr=False, default=None)
 
     def __str__(self) -> str:
-        where = f"{self.setting!r} on mesh {self.mesh} (h = {self.size:.3g})"
+        where = f"{_what(self)} (h = {self.size:.3g})"
         if self.failed:
             return f"{where}: failed: {self.failed}"
         return f"{where}: {self.unknowns} unknowns, {_time(self.seconds)}, error {self.error:.2g}"
@@ -193,7 +193,7 @@ class Chart:
             )
             words = (
                 f"None of the {len(self.good)} runs reaches {wanted:.2g}: "
-                f"{closest.setting!r} on mesh {closest.mesh} comes closest, with an error of at "
+                f"{_what(closest)} comes closest, with an error of at "
                 f"most {closest.error + self.reference_error:.2g}. {limit} finer meshes "
                 "(meshes=...)."
             )
@@ -203,17 +203,17 @@ class Chart:
         return Best(
             wanted,
             row,
-            f"{self.quantity} to {wanted:.2g}: {row.setting!r} on mesh {row.mesh} "
+            f"{self.quantity} to {wanted:.2g}: {_what(row)} "
             f"(h = {row.size:.3g}, {row.unknowns} unknowns), {_time(row.seconds)}, error at most "
             f"{row.error + self.reference_error:.2g}. {_recipe(row)}{caution}",
         )
 
     def table(self) -> str:
         """All runs as text, a line each, the fastest of a mesh first."""
-        width = max([len(row.setting) for row in self.rows] + [7])
+        width = max([len(_name(row)) for row in self.rows] + [7])
         front = self.pareto
         lines = [f"{'mesh':>4} {'h':>9} {'unknowns':>9}  {'setting':<{width}}  seconds     error"]
-        for row in sorted(self.rows, key=lambda row: (row.mesh, bool(row.failed), row.seconds)):
+        for row in sorted(self.rows, key=_place):
             if row.failed:
                 count, numbers = "–", f"failed: {row.failed}"
             else:
@@ -230,7 +230,8 @@ class Chart:
                     if holds
                 ]
                 numbers += "  " + ", ".join(marks)
-            line = f"{row.mesh:>4} {row.size:>9.3g} {count:>9}  {row.setting:<{width}}  {numbers}"
+            name, mesh = _name(row), "–" if row.mesh < 0 else row.mesh
+            line = f"{mesh:>4} {row.size:>9.3g} {count:>9}  {name:<{width}}  {numbers}"
             lines.append(line.rstrip())
         return "\n".join(lines)
 
@@ -285,11 +286,28 @@ def checked_error(wanted: Any) -> float:
     return number(wanted, "the wanted relative error", above=0)
 
 
+def _place(row: Row) -> tuple[bool, int, bool, float]:
+    """Order in the table: by mesh, those of `adapt` last."""
+    return row.mesh < 0, row.mesh, bool(row.failed), row.seconds
+
+
+def _name(row: Row) -> str:
+    """Setting, with the tolerance where that is what made the mesh."""
+    return f"{row.setting} {row.fields['tolerance']:g}" if row.mesh < 0 else row.setting
+
+
+def _what(row: Row) -> str:
+    """Setting and mesh in words."""
+    return repr(_name(row)) if row.mesh < 0 else f"{row.setting!r} on mesh {row.mesh}"
+
+
 def _time(seconds: float) -> str:
     return f"{seconds:.3g} s" if seconds >= 1 else f"{1e3 * seconds:.3g} ms"
 
 
 def _recipe(row: Row) -> str:
+    if row.mesh < 0:
+        return f"Take xc.adapt(problem, tolerance={row.fields['tolerance']:g}), whose best K it is."
     whole = [f"{k}={v!r}" for k, v in row.fields.items() if k in ("order", "contact")]
     method = [
         f"{k}={float(f'{v:.4g}') if isinstance(v, float) else v!r}"

@@ -10,6 +10,7 @@ from xcrack.analysis.solution import Solution
 from xcrack.arrays import Floats, Ints
 from xcrack.errors import ProblemError
 from xcrack.inputs import numbers
+from xcrack.sif.sif import SIF
 from xcrack.sif.stress_intensity import stress_intensities
 
 # Rates that are believed between two meshes. What falls faster than by the second power is taken
@@ -49,10 +50,23 @@ def K_of_all(solutions: Sequence[Solution]) -> Sampled:
     solutions : sequence of Solution
         States of one solve.
     """
+    every = [stress_intensities(solutions, c) for c in range(len(solutions[0].space.cuts))]
+    return sampled(list(zip(*every, strict=True)))
+
+
+def sampled(sifs: Sequence[Sequence[SIF]], best: bool = False) -> Sampled:
+    """The same of K that is there, of each state and crack.
+
+    Parameters
+    ----------
+    sifs : sequence of sequence of SIF
+    best : bool
+        K with its estimated error, where there is an estimate.
+    """
     values, points, group, surface = [], [], [], []
-    for c in range(len(solutions[0].space.cuts)):
-        states = stress_intensities(solutions, c)
-        values.append(np.concatenate([sif.K for sif in states], axis=1))
+    for c, states in enumerate(zip(*sifs, strict=True)):
+        K = [np.where(best & np.isfinite(sif.best), sif.best, sif.K) for sif in states]
+        values.append(np.concatenate(K, axis=1))
         points.append(states[0].x)
         group.append(np.stack([np.full(len(states[0].x), c), states[0].front], axis=1))
         surface.append(states[0].at_surface)
@@ -217,4 +231,4 @@ def most_trusted(
     return (finest, best), error
 
 
-__all__ = ["K_of_all", "Sampled", "at_places", "most_trusted", "plain", "remaining"]
+__all__ = ["K_of_all", "Sampled", "at_places", "most_trusted", "plain", "remaining", "sampled"]

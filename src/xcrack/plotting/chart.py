@@ -9,6 +9,7 @@ from xcrack.charting.result import Chart, Row
 from xcrack.plotting.figures import finished, new_figure, picture_path, wants_window
 
 _MARKERS = "osD^vP"
+_OWN = "X"  # a mesh that a run has made for itself
 _BELOW = 0.5  # the picture ends at this share of the error of the reference
 
 
@@ -40,7 +41,8 @@ def _axes(chart: Chart, axes: Any) -> None:
     axes.axhspan(bottom, floor, color="0.9", lw=0, zorder=0)
     names = list(dict.fromkeys(row.setting for row in chart.rows))
     for number, name in enumerate(names):
-        _setting(chart, axes, [r for r in chart.good if r.setting == name], f"C{number % 10}")
+        own = [r for r in chart.good if r.setting == name]
+        _setting(chart, axes, own, _color(chart, name, number))
     front = chart.pareto
     axes.plot(
         [row.seconds for row in front],
@@ -75,11 +77,17 @@ def _axes(chart: Chart, axes: Any) -> None:
     _legend(chart, axes, names)
 
 
+def _color(chart: Chart, name: str, number: int) -> str:
+    """Of a setting; black for runs that make their meshes themselves."""
+    own = any(row.mesh < 0 for row in chart.rows if row.setting == name)
+    return "black" if own else f"C{number % 10}"
+
+
 def _setting(chart: Chart, axes: Any, rows: list[Row], color: str) -> None:
     """One curve a setting, one marker a mesh; hollow where the reference cannot tell."""
     if not rows:
         return
-    rows = sorted(rows, key=lambda row: row.mesh)
+    rows = sorted(rows, key=lambda row: (row.mesh, row.unknowns))
     x, y = [row.seconds for row in rows], [chart.shown(row) for row in rows]
     axes.plot(x, y, "-", color=color, lw=1.1, zorder=2)
     for row, t, error in zip(rows, x, y, strict=True):
@@ -89,7 +97,7 @@ def _setting(chart: Chart, axes: Any, rows: list[Row], color: str) -> None:
         axes.plot(
             t,
             error,
-            _MARKERS[row.mesh % len(_MARKERS)],
+            _OWN if row.mesh < 0 else _MARKERS[row.mesh % len(_MARKERS)],
             ms=6,
             color=color,
             mfc="white" if row.error < chart.reference_error else color,
@@ -130,14 +138,23 @@ def _legend(chart: Chart, axes: Any, names: list[str]) -> None:
 
     failed = {row.setting for row in chart.failed}
     handles = [
-        Line2D([], [], color=f"C{k % 10}", lw=2, label=name + (" (failed)" * (name in failed)))
+        Line2D(
+            [],
+            [],
+            color=_color(chart, name, k),
+            lw=2,
+            label=name + (" (failed)" * (name in failed)),
+        )
         for k, name in enumerate(names)
     ]
-    sizes = dict(sorted({row.mesh: row.size for row in chart.rows}.items()))
+    sizes = dict(sorted({row.mesh: row.size for row in chart.rows if row.mesh >= 0}.items()))
     handles += [
         Line2D([], [], color="0.4", ls="", marker=_MARKERS[k % len(_MARKERS)], label=f"h = {h:.3g}")
         for k, h in sizes.items()
     ]
+    if any(row.mesh < 0 for row in chart.good):
+        label = "a mesh of its own"
+        handles.append(Line2D([], [], color="0.4", ls="", marker=_OWN, label=label))
     star = {"ls": "", "marker": "*", "ms": 12, "mfc": "white", "mec": "black"}
     handles.append(Line2D([], [], label="reference", **star))
     handles.append(Line2D([], [], color="0.75", lw=6, alpha=0.6, label="cheapest for its error"))

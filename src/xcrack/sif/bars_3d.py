@@ -31,10 +31,9 @@ def front_bars(solutions: Sequence[Solution], sifs: Sequence[SIF], crack: int) -
         One for each.
     crack : int
     """
-    if not len(sifs[0].K):
-        return [no_bars(sifs[0].K.shape, "")] * len(sifs)
-    if any(c is not None and c.shear is not None for c in solutions[0].contact):
-        return [no_bars(sifs[0].K.shape, "friction has no estimate")] * len(sifs)
+    missing = without_estimate(solutions, sifs)
+    if missing is not None:
+        return missing
     if solutions[0].space.order == 2:
         return [_of_spread(sif) for sif in sifs]
     problem = replace(solutions[0].problem, order=2)
@@ -42,12 +41,35 @@ def front_bars(solutions: Sequence[Solution], sifs: Sequence[SIF], crack: int) -
     fronts = [t for t, tip in enumerate(finer[0].space.tips) if tip.crack == crack]
     by_front = [front_intensity(finer, t) for t in fronts]
     every = [joined([states[k] for states in by_front], 3) for k in range(len(finer))]
+    reason = "order 2 has other fronts than order 1: refine the mesh along them"
+    return bars_beside(sifs, every, reason)
+
+
+def without_estimate(solutions: Sequence[Solution], sifs: Sequence[SIF]) -> list[Bars] | None:
+    """Empty bars where nothing can be estimated, else None."""
+    if not len(sifs[0].K):
+        return [no_bars(sifs[0].K.shape, "")] * len(sifs)
+    if any(c is not None and c.shear is not None for c in solutions[0].contact):
+        return [no_bars(sifs[0].K.shape, "friction has no estimate")] * len(sifs)
+    return None
+
+
+def bars_beside(sifs: Sequence[SIF], better: Sequence[SIF], reason: str) -> list[Bars]:
+    """Bars of K that are the difference to a better one, which is best.
+
+    Parameters
+    ----------
+    sifs, better : sequences of SIF
+        One a state, along the fronts of one crack.
+    reason : str
+        Why there is none, where the better one has other fronts.
+    """
     if any(
-        len(np.unique(a.front)) != len(np.unique(b.front)) for a, b in zip(sifs, every, strict=True)
+        len(np.unique(a.front)) != len(np.unique(b.front))
+        for a, b in zip(sifs, better, strict=True)
     ):
-        reason = "order 2 has other fronts than order 1: refine the mesh along them"
         return [no_bars(sif.K.shape, reason) for sif in sifs]
-    return [_of_order_2(sif, other) for sif, other in zip(sifs, every, strict=True)]
+    return [_of_difference(sif, other) for sif, other in zip(sifs, better, strict=True)]
 
 
 def _of_spread(sif: SIF) -> Bars:
@@ -57,15 +79,32 @@ def _of_spread(sif: SIF) -> Bars:
     return _completed(sif, np.zeros_like(sif.K), _SPREAD * _at_least_mean(sif, spread))
 
 
-def _of_order_2(sif: SIF, finer: SIF) -> Bars:
-    """At order 1: the K of order 2 is best, and the difference its bar."""
+def _of_difference(sif: SIF, finer: SIF) -> Bars:
+    """K of the other solution is best, and the difference its bar."""
     eta = np.empty_like(sif.K)
     for front in np.unique(sif.front):
         own, other = sif.front == front, finer.front == front
-        nearest = np.linalg.norm(sif.x[own][:, None] - finer.x[other], axis=2).argmin(axis=1)
-        eta[own] = finer.K[other][nearest] - sif.K[own]
+        eta[own] = _at(sif.x[own], finer.x[other], finer.K[other]) - sif.K[own]
     eta[sif.closed, 0] = 0.0
     return _completed(sif, eta, _at_least_mean(sif, np.abs(eta)))
+
+
+def _at(x: Floats, vertices: Floats, values: Floats) -> Floats:
+    """Values between the vertices of a front, at the places nearest to points."""
+    nearest = np.linalg.norm(x[:, None] - vertices, axis=2).argmin(axis=1)
+    result, distance = values[nearest], np.linalg.norm(x - vertices[nearest], axis=1)
+    for step in (-1, 1):
+        next_to = (nearest + step) % len(vertices)  # beyond the ends the nearest stays nearer
+        side = vertices[next_to] - vertices[nearest]
+        square = np.einsum("ij,ij->i", side, side)
+        share = np.einsum("ij,ij->i", x - vertices[nearest], side)
+        share = np.clip(share / np.where(square > 0, square, 1.0), 0.0, 1.0)[:, None]
+        apart = np.linalg.norm(x - vertices[nearest] - share * side, axis=1)
+        nearer = apart < distance
+        between = (1 - share) * values[nearest] + share * values[next_to]
+        result = np.where(nearer[:, None], between, result)
+        distance = np.minimum(distance, apart)
+    return np.asarray(result)
 
 
 def _at_least_mean(sif: SIF, values: Floats) -> Floats:

@@ -7,15 +7,19 @@ import numpy as np
 
 from xcrack.analysis.solution import Solution
 from xcrack.analysis.solve import solve_states
+from xcrack.errors import ProblemError
 from xcrack.sif.bars import Bars
 from xcrack.sif.bars_2d import tip_bars
 from xcrack.sif.bars_3d import front_bars
+from xcrack.sif.finer_3d import finer_bars
 from xcrack.sif.sif import SIF
 
 _Estimate = Callable[[Sequence[Solution], Sequence[SIF], int], list[Bars]]
 
 
-def with_bars(solutions: Sequence[Solution], sifs: Sequence[SIF], crack: int) -> list[SIF]:
+def with_bars(
+    solutions: Sequence[Solution], sifs: Sequence[SIF], crack: int, by: str = ""
+) -> list[SIF]:
     """K of one crack in some states with its error bars; zero in states at rest.
 
     Parameters
@@ -25,6 +29,13 @@ def with_bars(solutions: Sequence[Solution], sifs: Sequence[SIF], crack: int) ->
     sifs : sequence of SIF
         One for each.
     crack : int
+    by : {"", "front"}
+        "front": from a solution with smaller cells along the fronts, in 3D.
+
+    Raises
+    ------
+    ProblemError
+        "front" in 2D.
     """
     live = [k for k, s in enumerate(solutions) if not s.at_rest]
     zero = np.zeros_like(sifs[0].K)
@@ -32,7 +43,11 @@ def with_bars(solutions: Sequence[Solution], sifs: Sequence[SIF], crack: int) ->
     if not live:
         return result
     chosen = [solutions[k] for k in live]
-    of_dim = _BARS[chosen[0].space.dim]
+    of_dim = _BARS[by].get(chosen[0].space.dim)
+    if of_dim is None:
+        raise ProblemError(
+            'stress_intensity: error="front" is for fronts in 3D: give True, from one solve.'
+        )
     for k, bars in zip(live, of_dim(chosen, [sifs[k] for k in live], crack), strict=True):
         result[k] = replace(sifs[k], errors=bars)
     return result
@@ -46,4 +61,7 @@ def _of_tips(solutions: Sequence[Solution], sifs: Sequence[SIF], crack: int) -> 
     return tip_bars(solutions, sifs, crack)
 
 
-_BARS: dict[int, _Estimate] = {2: _of_tips, 3: front_bars}
+_BARS: dict[str, dict[int, _Estimate]] = {
+    "": {2: _of_tips, 3: front_bars},
+    "front": {3: finer_bars},
+}

@@ -16,7 +16,7 @@ from xcrack.sif.sif import SIF, joined
 from xcrack.threads import threads
 
 
-def stress_intensity(solution: Solution, crack: int = 0, error: bool | None = None) -> SIF:
+def stress_intensity(solution: Solution, crack: int = 0, error: bool | str | None = None) -> SIF:
     """K_I, K_II and T at the tips, or K_I to K_III along the fronts of a crack, from two domains.
 
     Parameters
@@ -24,10 +24,12 @@ def stress_intensity(solution: Solution, crack: int = 0, error: bool | None = No
     solution : Solution
     crack : int
         Its number in the problem.
-    error : bool, optional
+    error : bool or "front", optional
         Estimate the error: `eta`, `bar` and `best` of the result. By default where the solution
         comes from ``solve(..., error=True)``. Of any other solution, as one that was stored, the
-        states are solved once more, since the factor is gone.
+        states are solved once more, since the factor is gone. "front", in 3D: solve them again at
+        order 2 with cells along the fronts that are 1.5 times smaller; that K is best, and the
+        bar is the difference.
 
     Returns
     -------
@@ -37,7 +39,7 @@ def stress_intensity(solution: Solution, crack: int = 0, error: bool | None = No
     Raises
     ------
     ProblemError
-        Not a solution, or no such crack.
+        Not a solution, no such crack, or "front" in 2D.
 
     Warns
     -----
@@ -58,7 +60,7 @@ def stress_intensity(solution: Solution, crack: int = 0, error: bool | None = No
 
 
 def stress_intensities(
-    solutions: Sequence[Solution], crack: int = 0, error: bool | None = None
+    solutions: Sequence[Solution], crack: int = 0, error: bool | str | None = None
 ) -> list[SIF]:
     """K of several load states that one solve returned; what is geometry is made once.
 
@@ -68,7 +70,7 @@ def stress_intensities(
         States of one problem, which share their space.
     crack : int
         Its number in the problem.
-    error : bool, optional
+    error : bool or "front", optional
         As of `stress_intensity`.
 
     Returns
@@ -104,9 +106,11 @@ def stress_intensities(
     K, T = np.zeros_like(by_state[0].K), np.where(np.isnan(by_state[0].T), np.nan, 0.0)
     rest = replace(by_state[0], K=K, T=T, spread=K, closed=np.zeros(len(K), dtype=bool))
     result = [rest if s.at_rest else by_state[k] for s, k in zip(solutions, place, strict=True)]
+    if isinstance(error, str) and error == "front":
+        return with_bars(solutions, result, crack, error)
     if error is None:
         error = any(s.factored is not None for s in solutions)
-    elif not flag(error, "stress_intensity: error"):
+    elif not flag(error, 'stress_intensity: error, if it is not "front",'):
         return result
     return with_bars(solutions, result, crack) if error else result
 

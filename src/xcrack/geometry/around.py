@@ -1,4 +1,4 @@
-"""Cells along fronts: places, room between fronts, and sizes that grow with the distance."""
+"""Sizes of cells around lines: room between lines, and sizes that grow with the distance."""
 
 from collections.abc import Callable, Sequence
 
@@ -19,6 +19,28 @@ def between(lines: Sequence[Floats]) -> Floats:
     share = np.linspace(0, 1, 4)[:, None, None]
     parts = [(x[:-1] + share * (x[1:] - x[:-1])).reshape(-1, 3) for x in lines]
     return np.concatenate([np.zeros((0, 3)), *parts])
+
+
+def radii(lines: Sequence[Floats], over: float) -> Floats:
+    """Radius of curvature at the points of `between`, from the turn over a length."""
+    result = [np.zeros(0)]
+    for x in lines:
+        side = np.diff(x, axis=0)
+        length = np.linalg.norm(side, axis=1)
+        arc = np.concatenate([[0.0], np.cumsum(length)])
+        middle, along = (arc[1:] + arc[:-1]) / 2, side / np.maximum(length, 1e-300)[:, None]
+        if (x[0] == x[-1]).all():
+            middle = np.concatenate([middle - arc[-1], middle, middle + arc[-1]])
+            along = np.concatenate([along, along, along])
+        s = (arc[:-1] + np.linspace(0, 1, 4)[:, None] * length).ravel()
+        before, after = (
+            np.stack([np.interp(s + way, middle, part) for part in along.T], axis=1)
+            for way in (-over / 2, over / 2)
+        )
+        cosine = np.einsum("ij,ij->i", before, after)
+        cosine /= np.linalg.norm(before, axis=1) * np.linalg.norm(after, axis=1) + 1e-300
+        result.append(over / np.maximum(np.arccos(np.clip(cosine, -1, 1)), 1e-12))
+    return np.concatenate(result)
 
 
 def with_room(places: Sequence[Floats], sizes: Sequence[Floats]) -> list[Floats]:
