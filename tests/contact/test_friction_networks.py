@@ -59,10 +59,11 @@ def test_stuck_branches_are_the_uncracked_body(order):
     assert np.abs(K).max() <= 5e-3  # quadrature
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(("n", "within"), [(41, 0.06), (81, 0.03)])
+@pytest.mark.parametrize(
+    ("n", "within"), [(21, 6e-3), pytest.param(41, 1e-3, marks=pytest.mark.slow)]
+)
 def test_kink_that_rubs(n, within):
-    """Sharp kinks of pressed cracks limit K, since the cut rounds them: measured 4.9 and 2.2 %."""
+    """The cut follows the kink: measured 3e-3 and 4e-4, which is what the reference is good for."""
     mesh = scenes.perturbed(n, 3, lower=(-1.5, -1.5), upper=(1.5, 1.5))
     _, K = solved(pressed(mesh, [KINK], KINK_STRESS, 0.3))
     assert np.abs(K - KINK_K).max() <= within * 0.76

@@ -86,20 +86,43 @@ def test_kink_against_a_finer_mesh():
     for n in (11, 17):
         sif = with_error(problem(n))
         assert holds(sif, fine.best)
-        assert np.abs(sif.best - fine.best).max() < 0.6 * np.abs(sif.K - fine.best).max()
+        # Of a cut that rounds the kink off K is 4.5e-3 off, and eta sees two thirds of it.
+        assert np.abs(sif.K - fine.best).max() < 2.2e-3
+        assert np.abs(sif.best - fine.best).max() < 2.2e-3
 
 
-def test_faces_that_press_at_a_kink_have_no_bar():
-    """A rounded kink slides where a sharp one locks; a smooth closed arc has a bar."""
-    mesh = xc.box((-1, -1), (1, 1), 14)
-    loads = [xc.traction("top", (0.0, -1.0)), xc.traction("bottom", (0.0, 1.0))]
-    kink = [(-0.45, -0.2), (0.1, 0.05), (0.4, 0.3)]
-    sif = with_error(xc.Problem(mesh, UNIT, [xc.line_crack(kink)], loads=loads, order=2))
+def pressed(mesh, line, stress=((-1.0, -0.5), (-0.5, -1.0))):
+    loads = [xc.traction(side, lambda x, n: n @ np.array(stress)) for side in scenes.SIDES]
+    return with_error(xc.Problem(mesh, UNIT, [xc.line_crack(line)], loads=loads, order=2))
+
+
+@pytest.mark.parametrize("turn", [-0.5, 0.7])
+def test_faces_that_press_at_a_kink(turn):
+    """The cut follows the kink, and the bar holds, against a mesh that is fine there."""
+    kink, coarse = np.array([0.1, 0.05]), xc.box((-1, -1), (1, 1), 24)
+    line = [(-0.45, -0.1), kink, kink + 0.4 * scenes.rows(0.25 + turn)[0]]
+    fine = xc.refine(
+        coarse, size=lambda x: np.maximum(1e-3, 0.2 * np.linalg.norm(x - kink, axis=1))
+    )
+    wanted = pressed(fine, line).K
+    for n in (13, 20):
+        sif = pressed(xc.box((-1, -1), (1, 1), n), line)
+        assert sif.closed.all()
+        assert (sif.eta == 0).all()  # no estimate has a sign there
+        assert (np.abs(sif.K - wanted) <= sif.bar).all()
+        assert np.abs(sif.K - wanted).max() < 0.01 * np.abs(wanted).max()
+
+
+def test_no_bar_where_faces_press_at_a_kink_that_is_rounded():
+    """One sharper than 100 degrees; a smooth closed arc has a bar."""
+    kink, mesh = np.array([0.1, 0.05]), xc.box((-1, -1), (1, 1), 14)
+    line = [(-0.45, -0.1), kink, kink + 0.4 * scenes.rows(0.25 + 1.9)[0]]
+    sif = pressed(mesh, line, ((-1.0, -0.2), (-0.2, -1.0)))
     assert np.isnan(sif.bar).all()
     assert "press at the kink" in sif.reasons[0]
     t = np.linspace(-0.4, 0.4, 61)
     arc = np.stack([0.9 * np.sin(t), 0.9 * (np.cos(t) - 1) + 0.05], axis=1) @ scenes.rows(0.5)
-    sif = with_error(xc.Problem(mesh, UNIT, [xc.line_crack(arc)], loads=loads, order=2))
+    sif = pressed(mesh, arc)
     assert sif.closed.any()
     assert np.isfinite(sif.bar).all()
 

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 
 from xcrack.adaptivity.measured import Measured, live_states
-from xcrack.adaptivity.start_2d import first_mesh, kinks
+from xcrack.adaptivity.start_2d import first_mesh
 from xcrack.adaptivity.wanted import smaller
 from xcrack.arrays import Floats
-from xcrack.geometry.simplices import closest_on_segment
+from xcrack.crack.kinks_2d import kink_numbers
 from xcrack.mesh.mesh import Mesh
 from xcrack.mesh.refinement import refine_to
 from xcrack.sif.bars import Bars
@@ -68,7 +68,7 @@ def next_mesh(now: Measured, tolerance: float, aim: float, most: int) -> Mesh | 
     for share in aim * 2.0 ** np.arange(1 + _GENTLER):
         wanted = tolerance * scale * share
         ratio = smaller(now.shares, now.bar.ravel(), wanted, _ORDER, mesh.dim)
-        ratio = np.minimum(ratio, np.minimum(at_coarse_tips(now), _along_bent_cracks(now)))
+        ratio = np.minimum(ratio, at_coarse_tips(now))
         fine = refine_to(mesh, ratio * mesh.cell_size, _SWEEPS)
         while len(fine.cells) < _LEAST * len(mesh.cells):  # the bar does not follow the shares
             largest = np.argsort(now.shares.max(axis=0, initial=0.0))[
@@ -94,24 +94,9 @@ def at_coarse_tips(now: Measured) -> Floats:
     return ratio
 
 
-def _along_bent_cracks(now: Measured) -> Floats:
-    """Half of the size along cracks that press at kinks, a quarter at the kinks."""
-    mesh = now.problem.mesh
-    ratio = np.ones(len(mesh.cells))
-    centre = mesh.points[mesh.cells].mean(axis=1)
-    for c in _bent(now):
-        x = now.problem.placed[c].points
-        for a, b in zip(x[:-1], x[1:], strict=True):
-            distance = np.linalg.norm(centre - closest_on_segment(centre, a, b), axis=1)
-            ratio[distance <= mesh.cell_size] = 0.5
-        for kink in kinks(x):
-            ratio[np.linalg.norm(centre - kink, axis=1) <= 2 * mesh.cell_size] = 0.25
-    return ratio
-
-
 def _bent(given: Measured) -> tuple[int, ...]:
     """Cracks that press and have kinks, of whose pressures the estimates see a part only."""
-    return tuple(c for c in given.pressed if len(kinks(given.problem.placed[c].points)))
+    return tuple(c for c in given.pressed if len(kink_numbers(given.problem.placed[c].points)))
 
 
 __all__ = ["at_coarse_tips", "first_mesh", "next_mesh", "trusted"]

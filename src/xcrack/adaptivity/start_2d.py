@@ -5,6 +5,7 @@ from collections.abc import Callable
 import numpy as np
 
 from xcrack.arrays import Floats
+from xcrack.crack.kinks_2d import kink_numbers
 from xcrack.crack.size_2d import length_inside
 from xcrack.geometry.simplices import distance_to_simplices
 from xcrack.mesh.locate import cell_sizes
@@ -14,9 +15,7 @@ from xcrack.scene.problem import Problem
 
 _CELLS = 4.0  # of a crack's length: less, and no estimate sees what is left out
 _ROOM = 2.5  # cells between a tip and the next boundary, crack or tip
-# Cells of a crack's length at its kinks: the pressure of faces has a corner singularity there.
-_KINK = {"off": 20.0, "auto": 100.0, "on": 100.0}
-_TURN = np.radians(15.0)  # from which on a turn is a kink, and no chord of a curve
+_KINK = 20.0  # cells of a crack's length at its kinks: stresses are singular there
 _SLOPE = 0.4  # growth of cells a length
 
 
@@ -24,9 +23,9 @@ def first_mesh(problem: Problem) -> Mesh:
     """The mesh of a scene in 2D, finer at tips and kinks where it is coarser than they are."""
     place, size = tip_sizes(problem)
     bends = [
-        (x, length_inside(crack, problem.mesh) / _KINK[problem.contact])
+        (x, length_inside(crack, problem.mesh) / _KINK)
         for crack in problem.placed
-        for x in kinks(crack.points)
+        for x in crack.points[kink_numbers(crack.points)]
     ]
     if bends:
         place = np.concatenate([place, [x for x, _ in bends]])
@@ -76,12 +75,4 @@ def _room(problem: Problem, x: Floats, tips: list[Floats], own: Floats) -> float
     return min(distance + others)
 
 
-def kinks(points: Floats) -> Floats:
-    """Inner points of a polyline at which it turns."""
-    along = np.diff(points, axis=0)
-    along = along / np.linalg.norm(along, axis=1)[:, None]
-    turn = np.arccos(np.clip((along[1:] * along[:-1]).sum(axis=1), -1, 1))
-    return np.asarray(points[1:-1][turn > _TURN])
-
-
-__all__ = ["first_mesh", "growing", "kinks", "tip_sizes"]
+__all__ = ["first_mesh", "growing", "tip_sizes"]

@@ -302,7 +302,7 @@ def sides_of(space: FunctionSpace, cell: Ints, bary: Floats, lip: int) -> Ints:
     """Side of each crack of points in cells `(q, cracks)`; `lip` decides on a crack."""
     side = cell_side(space, cell)
     for c, cut in enumerate(space.cuts):
-        phi = np.einsum("qb,qb->q", bary, cut.level_set.phi[space.mesh.cells[cell]])
+        phi = cut.level(space.mesh, cell, bary)
         split = (cut.is_cut | cut.is_tip)[cell]
         on_lip = np.abs(phi) <= 1e-9 * space.mesh.cell_size[cell]
         own = np.where(on_lip & (lip != 0), lip, np.where(phi >= 0, 1, -1))

@@ -19,6 +19,7 @@ from xcrack.xfem.function_space import FunctionSpace
 from xcrack.xfem.lips import LipPoints, arc_position
 
 _SMALL = 0.5  # share of the median below which a function cut off at a junction is none
+_AT_KINKS = 1.5  # knots besides those by groups: inf-sup .43, .38 with 2 (24 drawn short legs)
 _PASSES = 5  # in which knots are moved; each looks one knot to either side
 # At order 2 in 2D: knots over groups, and share of the last piece in the last two. The inf-sup
 # constant of 560 drawn cracks is .29 or more with 1.6; it is .23 at 1.75, .18 at 2, and tends to
@@ -72,7 +73,7 @@ def multipliers(
         column = group.astype(np.int32)[traces.indices]
         values = sp.csr_matrix((traces.data, column, traces.indptr), shape=shape)
     if len(parts) > 1:
-        values = _broken(values, lips, parts, hats)
+        values = _broken(values, lips, parts, hats, len(space.cuts[c].kinks.points) > 0)
     elif hats is not None and values.shape[1] > 1:
         mass = _sums(values, lips.weight)
         centre = _sums(values, lips.weight * lips.s) / np.maximum(mass, 1e-300)
@@ -94,9 +95,10 @@ def _sums(values: sp.csr_matrix, x: Floats) -> Floats:
 
 
 def _parts(space: FunctionSpace, c: int, lips: LipPoints) -> list[Ints]:
-    """Numbers of the lip points between the junctions at which other cracks end on crack c."""
+    """Numbers of the lip points between kinks of crack c and ends of other cracks on it."""
     line = space.cracks[c].points
-    ends = np.array([joint.x for joint in space.joints if joint.on == c])
+    kinks = space.cuts[c].kinks.points
+    ends = np.array([*(joint.x for joint in space.joints if joint.on == c), *kinks])
     if not len(ends):
         return []
     begin = arc_position(line, lips.x[:1])[0] - lips.s[0]
@@ -109,11 +111,12 @@ def _broken(
     lips: LipPoints,
     parts: list[Ints],
     hats: tuple[float, float] | None,
+    kinked: bool,
 ) -> sp.csr_matrix:
-    """Functions that end at junctions, where pressures jump; what is small joins its neighbour."""
+    """Functions that end where pressures jump: junctions, kinks; what is small joins another."""
     typical = float(np.median(np.asarray(values.T @ lips.weight).ravel()))
     columns = []
-    for rows in parts:
+    for rows in _long_enough(parts, lips.weight, _SMALL * typical) if kinked else parts:
         weight, s = lips.weight[rows], lips.s[rows]
         own = values[rows].toarray()
         mass = own.T @ weight
@@ -131,11 +134,30 @@ def _broken(
             own[:, to] += own[:, k]
             own = np.delete(own, k, axis=1)
         part = sp.csr_matrix(own)
-        if hats is not None and len(mass) > 1:
+        if hats is not None and kinked:
+            # Faces between kinks are whole cracks to pressures: so many groups long.
+            wanted = max(int(hats[0] * (mass.sum() / typical - 1) + _AT_KINKS), 2)
+            denser = (wanted - 1) / max(len(mass) - 1, 0.5)
+            part = _hats(mass, centre, s, denser + 1e-9, hats[1])
+        elif hats is not None and len(mass) > 1:
             part = _hats(mass, centre, s, *hats)
         place = (np.ones(len(rows)), (rows, np.arange(len(rows))))
         columns.append(sp.csr_matrix(place, shape=(len(lips), len(rows))) @ part)
     return sp.csr_matrix(sp.hstack(columns))
+
+
+def _long_enough(parts: list[Ints], weight: Floats, least: float) -> list[Ints]:
+    """Parts of the crack faces, those shorter than a length joined to the shorter neighbour."""
+    parts = list(parts)
+    while len(parts) > 1:
+        length = [float(weight[rows].sum()) for rows in parts]
+        k = int(np.argmin(length))
+        if length[k] >= least:
+            break
+        beside = [j for j in (k - 1, k + 1) if 0 <= j < len(parts)]
+        first = min(k, beside[int(np.argmin([length[j] for j in beside]))])
+        parts[first : first + 2] = [np.concatenate(parts[first : first + 2])]
+    return parts
 
 
 def _traces(space: FunctionSpace, lips: LipPoints) -> tuple[Ints, sp.csr_matrix]:

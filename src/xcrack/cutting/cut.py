@@ -5,18 +5,21 @@ from cell to cell. Sub-cell fractions are products of positive cut positions (no
 tiny pieces keep their relative accuracy.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 
 from xcrack.arrays import Bools, Floats, Ints, lock
 from xcrack.cutting.fronts_3d import front_parts, lips_up_to_fronts
+from xcrack.cutting.kinks_2d import Kinks, no_kinks, sharpened
 from xcrack.cutting.level_set import LevelSet
 from xcrack.cutting.tips_2d import lips_up_to_tips, tip_parts
 from xcrack.mesh.locate import barycentric
 from xcrack.mesh.mesh import Mesh
 from xcrack.mesh.split import cut_simplices, interface_simplices
+
+_Subs = tuple[Ints, Floats, Floats, Ints]  # cell, barycentric vertices, share, side
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,6 +46,8 @@ class Cut:
         Cut position on each mesh edge, from its first point, nan where the crack does not cross.
     side : (m,) array of int
         Side of each cell, 0 where phi changes its sign in it.
+    kinks : Kinks
+        In 2D: where the crack is not cut as phi says.
     """
 
     level_set: LevelSet
@@ -56,6 +61,7 @@ class Cut:
     lip_normal: Floats
     cut_edge: Floats
     side: Ints
+    kinks: Kinks = field(default_factory=no_kinks)
 
     @cached_property
     def is_cut(self) -> Bools:
@@ -72,6 +78,16 @@ class Cut:
             flag[cells] = True
         return lock(flag)
 
+    def level(self, mesh: Mesh, cell: Ints, bary: Floats) -> Floats:
+        """A level set whose zero is the cut, at points of cells `(q,)`, length."""
+        result = np.einsum("qb,qb->q", bary, self.level_set.phi[mesh.cells[cell]])
+        if len(self.kinks.cells):
+            row = np.full(len(mesh.cells), -1)
+            row[self.kinks.cells] = np.arange(len(self.kinks.cells))
+            bent = np.nonzero(row[cell] >= 0)[0]
+            result[bent] = self.kinks.level(row[cell[bent]], bary[bent])
+        return np.asarray(result)
+
     @property
     def n_tips(self) -> int:
         """Number of tips of the crack."""
@@ -82,6 +98,12 @@ class Cut:
         return np.einsum(
             "lvb,lbd->lvd", self.lip_bary[:, 1], mesh.points[mesh.cells[self.lip_cell[:, 1]]]
         )
+
+
+@dataclass(frozen=True, eq=False)
+class _Lips:
+    cell: Ints
+    bary: Floats
 
 
 def cut(mesh: Mesh, level_set: LevelSet) -> Cut:
@@ -101,11 +123,19 @@ def cut(mesh: Mesh, level_set: LevelSet) -> Cut:
     through = close & (np.bincount(owner, psi, len(candidates)) < 0)
     cells = candidates[through]
 
-    bary, fraction, side, parent = cut_simplices(values[cells])
-    lips = [_both(candidates[owner[through[owner]]], lip[through[owner]])]
     edge_flag = np.zeros(len(mesh.edges), dtype=bool)
     edge_flag[mesh.cell_to_edge[cells]] = True
-    subs = [(cells[parent], bary, fraction, side)]
+    kinks = no_kinks()
+    if len(level_set.line) > 2:
+        at = np.where(edge_flag, positions, np.nan)
+        kinks, at = sharpened(mesh, level_set, cells, at)
+        positions = np.where(edge_flag, at, positions)
+    if len(kinks.cells):
+        subs, lips = _kinked_parts(kinks, values, cells)
+    else:
+        bary, fraction, side, parent = cut_simplices(values[cells])
+        subs = [(cells[parent], bary, fraction, side)]
+        lips = [_both(candidates[owner[through[owner]]], lip[through[owner]])]
     for end_subs, end_lips, entry in _END_PARTS[mesh.dim](mesh, level_set, positions, exists):
         subs.append(end_subs)
         lips.append(_both(*end_lips))
@@ -125,13 +155,27 @@ def cut(mesh: Mesh, level_set: LevelSet) -> Cut:
         lip_normal=lock(_lip_normals(mesh, phi, lip_cell, lip_bary)),
         cut_edge=lock(np.where(edge_flag & exists, positions, np.nan)),
         side=lock(np.where(crossed, 0, _cell_sides(values))),
+        kinks=kinks,
     )
 
 
-@dataclass(frozen=True, eq=False)
-class _Lips:
-    cell: Ints
-    bary: Floats
+def _kinked_parts(kinks: Kinks, values: Floats, cells: Ints) -> tuple[list[_Subs], list[_Lips]]:
+    """Sub-cells and crack faces of cut cells, in some of which the crack has a kink."""
+    values = np.array(values)
+    values[kinks.cells] = kinks.values
+    rows, split = kinks.split()
+    bent = kinks.cells[rows]
+    bary, fraction, side, parent = cut_simplices(values[cells])
+    straight = ~np.isin(cells[parent], bent)
+    whole = (cells[parent][straight], bary[straight], fraction[straight], side[straight])
+    lip, owner = interface_simplices(values[cells])
+    straight = ~np.isin(cells[owner], bent)
+    parts = [(cells[owner][straight], lip[straight])]
+    parts += [(bent, kinks.faces(rows)[:, k]) for k in (0, 1)]
+    owner, lip = (np.concatenate(part) for part in zip(*parts, strict=True))
+    length = np.abs(lip[:, 1] - lip[:, 0]).max(axis=1)
+    keep = length > 1e-13
+    return [whole, split], [_both(owner[keep], lip[keep])]
 
 
 def _both(cell: Ints, bary: Floats) -> _Lips:

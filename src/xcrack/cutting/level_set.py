@@ -1,10 +1,10 @@
 """Level sets of one crack at the points of a mesh, and what both dimensions do to them."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from xcrack.arrays import Bools, Floats, Ints
+from xcrack.arrays import Bools, Floats, Ints, lock
 from xcrack.mesh.mesh import Mesh
 
 SNAP = 1e-10  # share of an edge below which a cut point is moved onto its end
@@ -30,6 +30,8 @@ class LevelSet:
     near : (e,) array of bool
         Edges short enough to be crossed by the crack where phi changes its sign; a change far
         from the crack (behind a strong turn) is no cut.
+    line : (n, 2) array, length
+        In 2D: the crack itself, whose kinks the cut follows; without points where it does not.
     """
 
     phi: Floats
@@ -38,6 +40,7 @@ class LevelSet:
     tip: Floats
     mouth: Floats
     near: Bools
+    line: Floats = field(default_factory=lambda: lock(np.zeros((0, 2))))
 
     @property
     def inside(self) -> Floats:

@@ -7,6 +7,8 @@ is frozen by construction (the aim of Duflot, 2007), and a crack that turns by m
 degrees keeps all its faces, where a purely nodal update loses some.
 """
 
+from dataclasses import replace
+
 import numpy as np
 
 from xcrack.arrays import Bools, Floats, lock
@@ -44,7 +46,8 @@ def line_levels(mesh: Mesh, crack: Crack) -> LevelSet:
         if end not in (crack.tips or ()):
             beyond = segment == ray
             mouth[beyond] = np.linalg.norm(mesh.points[beyond] - crack.points[end], axis=1)
-    return tied_to_tips(mesh, crack, phi, psi, mouth, near_edges(mesh, phi))
+    levels = tied_to_tips(mesh, crack, phi, psi, mouth, near_edges(mesh, phi))
+    return replace(levels, line=crack.points)
 
 
 def tied_to_tips(

@@ -14,7 +14,7 @@ def end_changes(groups: Groups, duals: Duals, gap: Floats, k: int) -> Floats:
     """|dJ with a group more closed + dJ with one less|, summed over the ends of contact `(m,)`.
 
     The first-order terms of the two are opposite where the end is right: what is left is of second
-    order, as the error is.
+    order, as the error is. Contact that ends at a kink ends where it should.
 
     Parameters
     ----------
@@ -31,8 +31,9 @@ def end_changes(groups: Groups, duals: Duals, gap: Floats, k: int) -> Floats:
         return total
     opened = gap - groups.dual @ pressure
     order = np.lexsort((groups.position, groups.crack))
-    along, crack = active[order], groups.crack[order]
-    ends = np.nonzero((along[1:] != along[:-1]) & (crack[1:] == crack[:-1]))[0]
+    along, crack, piece = active[order], groups.crack[order], groups.piece[order]
+    same = (crack[1:] == crack[:-1]) & (piece[1:] == piece[:-1])
+    ends = np.nonzero((along[1:] != along[:-1]) & same)[0]
     for end in ends:
         change = np.zeros(len(total))
         for group in (order[end], order[end + 1]):

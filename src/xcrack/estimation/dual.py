@@ -17,6 +17,8 @@ from xcrack.contact.multipliers import gap_rows
 from xcrack.estimation.goal import Goal
 from xcrack.solvers.active_set import of_set
 from xcrack.solvers.rigid_motion import without_motion
+from xcrack.xfem.function_space import FunctionSpace
+from xcrack.xfem.lips import LipPoints, arc_position
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,6 +37,8 @@ class Groups:
     crack : (g,) array of int
     position : (g,) array, length
         Of each along its crack.
+    piece : (g,) array of int
+        Of the crack, between kinks.
     """
 
     N: sp.csr_matrix
@@ -43,6 +47,7 @@ class Groups:
     pressure: Floats
     crack: Ints
     position: Floats
+    piece: Ints
 
 
 def groups_of(factored: Factored) -> Groups | None:
@@ -54,20 +59,30 @@ def groups_of(factored: Factored) -> Groups | None:
             lips = model.lips[m.crack]
             position = (m.values.T @ (lips.weight * lips.s)) / m.measure
             number = np.full(len(m.measure), m.crack)
-            parts.append(
-                (gap_rows(m, lips, model.jumps[m.crack]), active, pressure, number, position)
-            )
+            rows = gap_rows(m, lips, model.jumps[m.crack])
+            piece = np.searchsorted(_kinks(model.space, m.crack, lips), position)
+            parts.append((rows, active, pressure, number, position, piece))
     if not parts or contact.dual is None:
         return None
-    rows, closed, pressures, crack, position = zip(*parts, strict=True)
+    every, closed, pressures, crack, position, piece = zip(*parts, strict=True)
     return Groups(
-        sp.csr_matrix(sp.vstack(rows)),
+        sp.csr_matrix(sp.vstack(every)),
         contact.dual,
         np.concatenate(closed, axis=1),
         np.concatenate(pressures),
         np.concatenate(crack),
         np.concatenate(position),
+        np.concatenate(piece),
     )
+
+
+def _kinks(space: FunctionSpace, c: int, lips: LipPoints) -> Floats:
+    """Positions of the kinks of a cut, as those of the points on its faces."""
+    line, kinks = space.cracks[c].points, space.cuts[c].kinks.points
+    if not len(kinks):
+        return np.zeros(0)
+    begin = arc_position(line, lips.x[:1])[0] - lips.s[0]
+    return np.asarray(np.sort(arc_position(line, kinks) - begin))
 
 
 @dataclass(frozen=True, eq=False)

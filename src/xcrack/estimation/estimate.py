@@ -17,7 +17,14 @@ from xcrack.estimation.contact_end import end_changes
 from xcrack.estimation.dual import duals, groups_of
 from xcrack.estimation.goal import Goal
 from xcrack.estimation.loads import face_residual, imposed, load_residual
-from xcrack.estimation.surplus import goal_residual, residuals, shares, solved, surplus
+from xcrack.estimation.surplus import (
+    Surplus,
+    goal_residual,
+    residuals,
+    shares,
+    solved,
+    surplus,
+)
 from xcrack.scene.conditions import CrackPressure, evaluate_scalar
 
 
@@ -31,6 +38,9 @@ class Estimate:
         Exact value less computed one.
     shares : (states, m, cells) array
         Absolute contributions of the cells to eta: they add up to more than it.
+    surplus : Surplus
+    parts : (states, n, m) array
+        Contributions of the surplus functions to eta.
     end : (states, m) array
         Change of the functionals where the contact is a group longer and shorter; see
         `end_changes`.
@@ -42,6 +52,8 @@ class Estimate:
 
     eta: Floats
     shares: Floats
+    surplus: Surplus
+    parts: Floats
     end: Floats
     z: Floats
     mu: tuple[Floats, ...]
@@ -80,7 +92,8 @@ def estimate(factored: Factored, solutions: Sequence[Solution], goals: Sequence[
     goal = np.concatenate([goal_residual(w, g) for g in goals], axis=2)
     mus = tuple(np.zeros((len(solutions), len(lips), m)) for lips in factored.model.lips)
     eta, end = np.zeros((2, len(solutions), m))
-    parts = np.zeros((len(solutions), m, len(space.mesh.cells)))
+    by_cell = np.zeros((len(solutions), m, len(space.mesh.cells)))
+    parts = np.zeros((len(solutions), len(w.fixed), m))
     for k, solution in enumerate(solutions):
         which = int(dual.which[solution.number])
         place = int(np.searchsorted(sets, which)) * m
@@ -94,11 +107,11 @@ def estimate(factored: Factored, solutions: Sequence[Solution], goals: Sequence[
                     r -= face_residual(w, lips, mu)
         each = np.einsum("nim,ni->nm", r, e_u[:, :, k] + given[k])
         eta[k] = each.sum(axis=0)
-        parts[k] = shares(w, each).T
+        parts[k], by_cell[k] = each, shares(w, each).T
         if groups is not None:
             end[k] = end_changes(groups, dual, groups.N @ solution.u, solution.number)
     numbers = [s.number for s in solutions]
-    return Estimate(eta, parts, end, dual.z[dual.which[numbers]], mus)
+    return Estimate(eta, by_cell, w, parts, end, dual.z[dual.which[numbers]], mus)
 
 
 def pressure_on(solution: Solution, c: int) -> Floats:

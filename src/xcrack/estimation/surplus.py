@@ -195,22 +195,26 @@ def _regular(blocks: Floats, right: Floats, fixed: Bools) -> Floats:
     return np.asarray(x * scale[:, :, None])
 
 
-def shares(surplus: Surplus, parts: Floats) -> Floats:
+def shares(surplus: Surplus, parts: Floats, together: bool = False) -> Floats:
     """Absolute contributions of functions, by cell: an edge's is halved between its cells.
 
     Parameters
     ----------
     surplus : Surplus
     parts : (n + copies, m) array
+    together : bool
+        A function and its copy count as one: on a sliver both are large and cancel.
 
     Returns
     -------
     (cells, m) array
     """
     n, mesh = len(surplus.copy), surplus.space.mesh
-    own = np.abs(parts[:n])
+    size = np.array if together else np.abs
+    own = size(parts[:n])
     copied = np.nonzero(surplus.copy >= 0)[0]
-    own[copied] += np.abs(parts[surplus.copy[copied]])
+    own[copied] += size(parts[surplus.copy[copied]])
+    own = np.abs(own)
     own[: len(mesh.edges)][mesh.facet_to_cell[:, 1] >= 0] /= 2
     return np.asarray(own[surplus.functions].sum(axis=1))
 

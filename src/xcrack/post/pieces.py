@@ -224,7 +224,7 @@ def _lip(space: FunctionSpace, cell: Ints, bary: Floats, side: Ints) -> Ints:
     near = _SAME * space.mesh.cell_size[cell]
     corner = space.mesh.cells[cell]
     for c, cut in enumerate(space.cuts):
-        phi = (bary * cut.level_set.phi[corner]).sum(axis=1)
+        phi = cut.level(space.mesh, cell, bary)
         # A crack without tips lies behind them everywhere.
         inside = (bary * np.maximum(cut.level_set.inside, -1e300)[corner]).sum(axis=1)
         lip[:, c] = np.where((np.abs(phi) <= near) & (inside < -near), side[:, c], 0)

@@ -11,9 +11,10 @@ import numpy as np
 from xcrack.analysis.plan import LIPS
 from xcrack.analysis.solution import Solution
 from xcrack.arrays import Floats, at
+from xcrack.mesh.locate import cell_sizes
 from xcrack.sif.bars import Bars, bars_of, no_bars
 from xcrack.sif.domain_2d import domain_of
-from xcrack.sif.error_2d import TipErrors, tip_errors
+from xcrack.sif.error_2d import TipErrors, kinks_inside, tip_errors
 from xcrack.sif.sif import SIF
 
 _CAUGHT = 1.3  # exact error over what the blocks of the surplus space give of it, in the median
@@ -25,7 +26,9 @@ _RIM, _CHORDS, _END = 0.1, 1.0, 0.1  # of changes of shape, and of the contact's
 _SHORTEST = {1: 2.0, 2: 2.8}
 _ROOM = 1.5
 _OVERLAP = 0.02  # share of an overlap at one tip, as its negative K_I, that counts at all tips
-_KINK = 0.1  # rad; a crack that turns by less at a vertex is smooth
+# Of the shares of cells at kinks, whose functions catch a part only of what is singular, and of
+# what moving the crack onto its kinks changes where faces press: no estimate has a sign there.
+_AT_KINKS, _MOVED = 4.0, 2.0
 
 
 def tip_bars(solutions: Sequence[Solution], sifs: Sequence[SIF], crack: int) -> list[Bars]:
@@ -39,7 +42,7 @@ def tip_bars(solutions: Sequence[Solution], sifs: Sequence[SIF], crack: int) -> 
     crack : int
     """
     bars = bars_and_shares(solutions, sifs, crack)[0]
-    every = zip(bars, [_pressed_kink(s, crack) for s in solutions], strict=True)
+    every = zip(bars, [_rounded(s, crack) for s in solutions], strict=True)
     return [_without(one, reason) if reason else one for one, reason in every]
 
 
@@ -48,7 +51,8 @@ def bars_and_shares(
 ) -> tuple[list[Bars], Floats]:
     """Bars of the tips, and the absolute contributions of the cells to the estimates.
 
-    Bars of cracks whose faces press at kinks are too short there: `tip_bars` has none.
+    Bars of cracks whose faces press at kinks that the cut rounds off are too short: `tip_bars` has
+    none there.
 
     Parameters
     ----------
@@ -69,7 +73,7 @@ def bars_and_shares(
     errors = tip_errors(solutions, crack)
     places = _unresolved(solutions[0], crack)
     bars = [
-        _bars(sif, errors, k, places, s)
+        _bars(sif, errors, k, places, s, crack)
         for k, (sif, s) in enumerate(zip(sifs, solutions, strict=True))
     ]
     return bars, errors.shares
@@ -110,13 +114,19 @@ def _unresolved(solution: Solution, crack: int) -> list[str]:
     return reasons
 
 
-def _bars(sif: SIF, errors: TipErrors, k: int, places: Sequence[str], solution: Solution) -> Bars:
+def _bars(
+    sif: SIF, errors: TipErrors, k: int, places: Sequence[str], solution: Solution, crack: int
+) -> Bars:
     """Bars of one state."""
     own = _CAUGHT * errors.eta[k]
     shape = errors.bend[k] + errors.rim[k]
     eta = own + shape
     shares = errors.shares[k].sum(axis=-1)
     bar = np.maximum(_ETA * np.abs(own), np.maximum(_SHARES * shares, _SPREAD * sif.spread))
+    bar = np.maximum(bar, _AT_KINKS * errors.kinks[k])
+    if any(_presses(solution, crack, x) for x in kinks_inside(solution, crack)):
+        eta = errors.rim[k].copy()
+        bar += _MOVED * np.abs(errors.bend[k])
     contact = _END * errors.end[k]
     bar += errors.bend_bar[k] + _RIM * np.abs(errors.rim[k]) + contact
     if solution.problem.contact != "off":  # negative K_I: faces overlap where contact is blind
@@ -138,22 +148,28 @@ def _without(bars: Bars, reason: str) -> Bars:
     return bars_of(bars.eta, bars.bar, reasons, bars.contact)
 
 
-def _pressed_kink(solution: Solution, crack: int) -> str:
+def _presses(solution: Solution, crack: int, x: Floats) -> bool:
+    """Whether the faces press at a point of a crack."""
+    contact = solution.contact[crack]
+    if contact is None:
+        return False
+    near = np.linalg.norm(contact.points - x, axis=1) <= cell_sizes(solution.problem.mesh, x[None])
+    return bool((contact.closed & (contact.pressure > 0))[near].any())
+
+
+def _rounded(solution: Solution, crack: int) -> str:
     """Why faces that press at a kink leave no estimate, or nothing.
 
-    A sharp kink locks where the rounded one of the cut slides: no first-order estimate sees that.
+    A sharp kink locks where one that the cut rounds off slides: no first-order estimate sees that.
     """
-    contact, points = solution.contact[crack], solution.space.cracks[crack].points
-    if contact is None or len(points) < 3:
-        return ""
-    along = np.diff(points, axis=0)
-    turn = np.abs(np.diff(np.unwrap(np.arctan2(along[:, 1], along[:, 0]))))
-    for kink in np.nonzero(turn > _KINK)[0]:
-        x = points[kink + 1]
-        nearest = np.argmin(np.linalg.norm(contact.points - x, axis=1))
-        if contact.closed[nearest] and contact.pressure[nearest] > 0:
+    cut = solution.space.cuts[crack]
+    for x in kinks_inside(solution, crack):
+        size = cell_sizes(solution.problem.mesh, x[None])[0]
+        away = np.linalg.norm(cut.kinks.points - x, axis=1).min(initial=np.inf)
+        if away > size and _presses(solution, crack, x):
             return (
-                f"the faces press at the kink at {at(x)}, which the cut rounds off: compare with a "
+                f"the faces press at the kink at {at(x)}, which the cut rounds off because it is "
+                "sharper than 100° or less than a cell from a tip or another kink: compare with a "
                 "mesh that is finer there"
             )
     return ""

@@ -3,13 +3,20 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from xcrack.analysis.solution import Solution
 from xcrack.arrays import Floats
+from xcrack.crack.kinks_2d import kink_numbers
 from xcrack.errors import ProblemError
-from xcrack.estimation.estimate import estimate
+from xcrack.estimation.estimate import Estimate, estimate
 from xcrack.estimation.shape import crack_shape, rim_shape
+from xcrack.estimation.surplus import shares
+from xcrack.mesh.locate import cell_sizes, contains
 from xcrack.sif.goal_2d import on_faces, tip_goal
 from xcrack.threads import threads
+
+_NEAR = 1.5  # cells: the middles of those at a kink
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,6 +29,8 @@ class TipErrors:
         Signed estimate of exact K less K as the integrals gave it.
     shares : (states, tips, 2, cells) array, stress · √length
         Absolute contributions of the cells to it.
+    kinks : (states, tips, 2) array, stress · √length
+        Those of the cells at kinks, with functions and their copies taken together.
     end : (states, tips, 2) array, stress · √length
         What moving the ends of contact by a group does; see `contact_end.end_changes`.
     bend, rim : (states, tips, 2) arrays, stress · √length
@@ -35,6 +44,7 @@ class TipErrors:
 
     eta: Floats
     shares: Floats
+    kinks: Floats
     end: Floats
     bend: Floats
     bend_bar: Floats
@@ -70,9 +80,29 @@ def tip_errors(solutions: Sequence[Solution], crack: int) -> TipErrors:
     return TipErrors(
         result.eta.reshape(shape),
         result.shares.reshape(*shape, -1),
+        _at_kinks(solutions[0], result, crack).reshape(shape),
         result.end.reshape(shape),
         bend.reshape(shape),
         bend_bar.reshape(shape),
         rim.reshape(shape),
         chords.reshape(shape),
     )
+
+
+def kinks_inside(solution: Solution, crack: int) -> Floats:
+    """Kinks of a crack in the body `(k, 2)`."""
+    points = solution.space.cracks[crack].points
+    kinks = points[kink_numbers(points)]
+    return np.asarray(kinks[contains(solution.problem.mesh, kinks)] if len(kinks) else kinks)
+
+
+def _at_kinks(solution: Solution, result: Estimate, crack: int) -> Floats:
+    """Absolute contributions of the cells at the kinks of a crack `(states, m)`."""
+    mesh, kinks = solution.problem.mesh, kinks_inside(solution, crack)
+    if not len(kinks):
+        return np.zeros_like(result.eta)
+    middle = mesh.points[mesh.cells].mean(axis=1)
+    away = np.linalg.norm(middle[:, None] - kinks, axis=2)
+    near = (away < _NEAR * cell_sizes(mesh, kinks)).any(axis=1)
+    every = [shares(result.surplus, parts, together=True)[near] for parts in result.parts]
+    return np.asarray(np.sum(every, axis=1))

@@ -84,17 +84,23 @@ def reused_cells(
 def _keys(space: FunctionSpace, cells: Ints) -> Floats:
     """Crack, its level set, the nodes with its function.
 
-    Side and sub-cells of a cell without a tip follow from the level set at its corners alone, and
-    where functions jump in a cell whose level set changes its sign, the crack cuts it.
+    Side and sub-cells of a cell without a tip follow from the level set at its corners alone, at
+    kinks from that of the cut and from where the kink is, and where functions jump in a cell whose
+    level set changes its sign, the crack cuts it.
     """
     mesh = space.mesh
     crack = np.log2(space.signature[cells]).astype(np.int64)
-    end = 1 + mesh.cells.shape[1]
-    key = np.empty((len(cells), end + space.cell_nodes.shape[1]))
+    end, nodes = 1 + mesh.cells.shape[1], space.cell_nodes.shape[1]
+    key = np.zeros((len(cells), 2 * end + nodes - 1))
     for c in np.unique(crack):
         rows = np.nonzero(crack == c)[0]
         own = cells[rows]
         key[rows, 0] = c
         key[rows, 1:end] = space.cuts[c].level_set.phi[mesh.cells[own]]
-        key[rows, end:] = space.heaviside[c][space.cell_nodes[own]] >= 0
+        key[rows, end : end + nodes] = space.heaviside[c][space.cell_nodes[own]] >= 0
+        kinks = space.cuts[c].kinks
+        _, bent, row = np.intersect1d(own, kinks.cells, return_indices=True)
+        if len(bent):
+            key[rows[bent], 1:end] = kinks.values[row]
+            key[rows[bent], end + nodes :] = np.nan_to_num(kinks.vertex[row])
     return key

@@ -1,0 +1,134 @@
+"""Cuts at kinks: the crack as it is given, to round-off, wherever the kink lies in the mesh."""
+
+import numpy as np
+import pytest
+
+import xcrack as xc
+from support import scenes_2d as scenes
+from xcrack.analysis.solution import sides_of
+from xcrack.crack.kinks_2d import kink_numbers
+from xcrack.xfem.model import discretised
+
+STEEL = xc.Isotropic(1.0, 0.3, "strain")
+
+
+def scene(seed, kink=None, turn=None):
+    """An inner crack with a kink of 16 to 95 degrees anywhere in a cell."""
+    rng = np.random.default_rng(seed)
+    mesh = scenes.perturbed(int(rng.integers(9, 16)), seed, 0.15)
+    angle = rng.uniform(0, 2 * np.pi)
+    turn = np.radians(rng.uniform(16, 95)) * rng.choice((-1, 1)) if turn is None else turn
+    x = rng.uniform(-0.1, 0.1, 2) if kink is None else kink(mesh)
+    line = [x - 0.6 * scenes.rows(angle)[0], x, x + 0.5 * scenes.rows(angle + turn)[0]]
+    return xc.Problem(mesh, STEEL, [xc.line_crack(line)], order=2), np.array(line)
+
+
+def area_beside(space, line, radius):
+    """Areas of both sides within the cells at the kink, from sub-cells."""
+    cut, mesh = space.cuts[0], space.mesh
+    away = np.linalg.norm(mesh.points[mesh.cells].mean(axis=1) - line[1], axis=1)
+    near = (cut.is_cut & (away < radius))[cut.sub_to_cell]
+    size = cut.sub_fraction * mesh.volume[cut.sub_to_cell]
+    return [size[near & (cut.sub_side == side)].sum() for side in (1, -1)]
+
+
+def inside_of_cells(space, line, radius):
+    """The same by points of a fine rule, each on its side of the polyline."""
+    cut, mesh = space.cuts[0], space.mesh
+    away = np.linalg.norm(mesh.points[mesh.cells].mean(axis=1) - line[1], axis=1)
+    cells = np.nonzero(cut.is_cut & (away < radius))[0]
+    k = 60
+    i, j = np.meshgrid(np.arange(k), np.arange(k))
+    lower = np.stack([(i + 1 / 3).ravel() / k, (j + 1 / 3).ravel() / k], axis=1)
+    upper = np.stack([(i + 2 / 3).ravel() / k, (j + 2 / 3).ravel() / k], axis=1)
+    t = np.concatenate([lower[lower.sum(1) < 1], upper[upper.sum(1) < 1]])
+    bary = np.column_stack([1 - t.sum(axis=1), t])
+    x = np.einsum("qb,cbd->cqd", bary, mesh.points[mesh.cells[cells]])
+    u, v = np.diff(line, axis=0)
+    d = x - line[1]
+    one, two = u[0] * d[..., 1] - u[1] * d[..., 0], v[0] * d[..., 1] - v[1] * d[..., 0]
+    left = u[0] * v[1] - u[1] * v[0] > 0
+    plus = (np.minimum(one, two) if left else np.maximum(one, two)) > 0
+    share = plus.mean(axis=1)
+    return [mesh.volume[cells] @ share, mesh.volume[cells] @ (1 - share)], len(cells) / k**1.5
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_sides_and_lengths_are_those_of_the_polyline(seed):
+    """Areas to the error of the reference; lengths of the faces to round-off."""
+    problem, line = scene(seed)
+    space, lips = discretised(problem)
+    cut, mesh = space.cuts[0], space.mesh
+    assert len(cut.kinks.points) == 1
+    sticks_out = np.linalg.norm(cut.kinks.points[0] - line[1]) > 1e-9
+    size = mesh.cell_size.max()
+    area = mesh.volume[np.unique(cut.sub_to_cell)]
+    total = np.bincount(np.searchsorted(np.unique(cut.sub_to_cell), cut.sub_to_cell),
+                        cut.sub_fraction)  # fmt: skip
+    assert np.abs(total - 1).max() <= 1e-12
+    assert area.min() > 0
+    if sticks_out:
+        return
+    assert lips[0].weight.sum() == pytest.approx(1.1, abs=1e-12)
+    wanted, doubt = inside_of_cells(space, line, 1.5 * size)
+    assert area_beside(space, line, 1.5 * size) == pytest.approx(
+        wanted, abs=doubt * mesh.volume.max()
+    )
+
+
+def test_a_point_is_on_its_side_of_the_kink():
+    """`level` is zero on the faces, and its sign is that of the sub-cells."""
+    for seed in range(6):
+        space, lips = discretised(scene(seed)[0])
+        cut, mesh = space.cuts[0], space.mesh
+        phi = cut.level(mesh, lips[0].cell[:, 1], lips[0].bary[:, 1])
+        assert np.abs(phi).max() <= 1e-12
+        centre = cut.sub_bary.mean(axis=1)
+        level = cut.level(mesh, cut.sub_to_cell, centre)
+        inner = cut.is_cut[cut.sub_to_cell]
+        assert (np.sign(level) == cut.sub_side)[inner].all()
+        side = sides_of(space, cut.sub_to_cell, centre, 0)[:, 0]
+        assert (side == cut.sub_side)[inner].all()
+
+
+@pytest.mark.parametrize("where", ["node", "edge", "beside a node", "beside an edge"])
+def test_kinks_on_mesh_points_and_edges(where):
+    def kink(mesh):
+        edge = mesh.edges[np.argmin(np.linalg.norm(mesh.points[mesh.edges].mean(axis=1), axis=1))]
+        a, b = mesh.points[edge]
+        x = a if "node" in where else 0.3 * a + 0.7 * b
+        return x + ([3e-12, -4e-12] if "beside" in where else 0)
+
+    for seed in range(20, 26):
+        problem, _ = scene(seed, kink)
+        space, lips = discretised(problem)
+        assert len(space.cuts[0].kinks.points) == 1
+        assert lips[0].weight.sum() == pytest.approx(1.1, abs=1e-9)
+        assert xc.inf_sup(problem) >= 0.25
+
+
+def test_what_is_no_kink_is_cut_as_before():
+    """Chords of a curve, kinks sharper than 100 degrees, and kinks less than a cell from a tip."""
+    t = np.linspace(0, 1.2, 9)
+    arc = np.stack([0.6 * np.sin(t) - 0.3, 0.6 * np.cos(t) - 0.4], axis=1)
+    assert not len(kink_numbers(arc))
+    mesh = scenes.perturbed(11, 5)
+    sharp = [(-0.5, 0.02), (0.1, 0.03), (-0.1, 0.4)]
+    close = [(-0.5, 0.02), (0.1, 0.03), (0.103, 0.04)]
+    for line in (arc, sharp, close):
+        space, _ = discretised(xc.Problem(mesh, STEEL, [xc.line_crack(line)], order=2))
+        assert not len(space.cuts[0].kinks.points)
+
+
+@pytest.mark.parametrize("n", [12, 24])
+def test_two_kinks_side_by_side(n):
+    """Half a cell to three cells apart: a closed constant patch stays exact, pressures stable."""
+    for leg in (0.05, 0.1, 0.2, 0.4):
+        turned = np.array([0.05, 0.03]) + leg * scenes.rows(0.9)[0]
+        line = [(-0.5, 0.01), (0.05, 0.03), turned, turned + 0.4 * scenes.rows(0.1)[0]]
+        mesh = scenes.perturbed(n, 7)
+        loads = [xc.traction(s, lambda x, normal: -normal) for s in scenes.SIDES]
+        problem = xc.Problem(mesh, STEEL, [xc.line_crack(line)], order=2, loads=loads)
+        solution = xc.solve(problem)
+        assert np.abs(solution.contact[0].pressure - 1).max() <= 1e-9
+        assert xc.inf_sup(problem) >= 0.25
