@@ -27,6 +27,7 @@ _AIM = 1.0  # of the wanted half-widths: bars become shorter than foretold
 
 def given_mesh(problem: Problem) -> Mesh:
     """The mesh as it was given, where cracks are long enough in it; else finer at the tips."""
+    problem = resolved(problem)
     place, size = tip_sizes(problem)
     if (cell_sizes(problem.mesh, place) <= _COARSEST * size).all():
         return problem.mesh
