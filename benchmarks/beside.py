@@ -193,7 +193,9 @@ def bending(n: int) -> Iterator[Numbers]:
         parts.end("problem")
         solutions = xc.solve(problem, states=[1.0, bend(1.0), bend(-1.0)])
         parts.end("solution")
-        yield parts.numbers(solutions)
+        numbers = parts.numbers(solutions)
+        del mesh, problem, solutions  # the next round has its own peak of memory
+        yield numbers
 
 
 CLOSED = (-1.0,)

@@ -246,7 +246,8 @@ def _case(problem: Problem, model: Model, state: Any, known_loads: dict[int, Flo
         if id(load) not in known_loads:
             known_loads[id(load)] = load_vector(model.space, (load,), model.lips)
         scale = 1.0 if isinstance(load, InitialStress) else factor
-        parts.append(scale * known_loads[id(load)])
+        own = known_loads[id(load)]
+        parts.append(own if scale == 1 else scale * own)
     f = sum(parts, np.zeros(model.space.n_dof))
     known = model.known.value
     moved = tuple(load for load in loads if isinstance(load, Displacement))

@@ -85,7 +85,7 @@ class Cycle:
         if number == len(self.levels):
             return _by_column(self.coarsest.__matmul__, b)
         level = self.levels[number]
-        x, r = np.zeros_like(b), b.copy()
+        x, r = np.zeros_like(b), b  # nobody needs b any more
         d = _smoothed(level, r, x)
         level.matrix.added(r, -1, d)
         n = level.prolong.shape[0]

@@ -316,9 +316,9 @@ def iterative_system(
         shape=(space.n_dof, len(plain)),
     )
     basis = sp.csr_matrix(sp.hstack([identity, enriched]))
-    null = np.zeros((len(diagonal), 0 if modes is None else modes.shape[1]))
-    if modes is not None and modes.shape[1]:
-        null[: len(plain)] = np.linalg.qr(modes[plain] * levels.free[:, None])[0]
+    null = np.zeros((0, 0)) if modes is None else modes[: len(plain)]
+    if null.shape[1] and not levels.free.all():
+        null = np.linalg.qr(null * levels.free[:, None])[0]
     cycle = extended(levels, stored, diagonal, patches)
     operator = Operator(stored.times, cycle, diagonal, null, stored.times_all, cycle.of_all)
     return IterativeSystem(K, within, lock(free), basis, levels, operator, blocks, combined, back)

@@ -43,8 +43,9 @@ class Operator:
     cycle : callable
         r -> V r, an approximate inverse, symmetric and positive.
     diagonal : (n,) array
-    null : (n, k) array
-        Orthonormal vectors that K sends to zero; k = 0 for a regular matrix.
+    null : (m, k) array
+        Orthonormal vectors that K sends to zero, in the first m unknowns: the others of theirs are
+        zero. k = 0 for a regular matrix.
     times_all, cycle_all : callable, optional
         The same of several vectors, with the same bits.
     """

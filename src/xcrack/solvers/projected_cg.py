@@ -131,6 +131,7 @@ class _Descent:
         else:
             self.p *= rz / self.rz
             self.p += z
+        del z  # memory counts while others are answered
         q = yield Ask.TIMES, self.p
         curvature = _dot(self.p, q)
         if not curvature > 0 or not np.isfinite(rz):
@@ -157,7 +158,7 @@ class _Descent:
 def _without(null: Floats, r: Floats) -> Floats:
     """Take rigid motions off a vector, which is changed."""
     if null.shape[1]:
-        r -= null @ (null.T @ r)
+        r[: len(null)] -= null @ (null.T @ r[: len(null)])
     return r
 
 

@@ -159,8 +159,8 @@ def row_blocks(parts: Sequence[sp.csr_matrix], first: Ints, dtype: Any = np.floa
 def stored(A: sp.bsr_matrix, dtype: Any = np.float32) -> RowBlocks:
     """Store a matrix of blocks: a block of its rows is one of ours.
 
-    The blocks of three rows of a body in 3D are taken as they are, without a matrix in between,
-    and share its memory where they are stored column by column in the type that is asked for.
+    Blocks of three rows, or multiples of it, are taken as they are, without a matrix in between;
+    those of three share its memory where they are stored column by column in the type asked for.
 
     Parameters
     ----------
@@ -169,14 +169,23 @@ def stored(A: sp.bsr_matrix, dtype: Any = np.float32) -> RowBlocks:
     dtype : numpy type of the values
     """
     rows, columns = A.blocksize
-    if rows != _TOGETHER:
+    if rows % _TOGETHER:
         return row_blocks([A.tocsr()], np.arange(0, A.shape[0] + 1, rows), dtype)
     blocks, indices = A.data.transpose(0, 2, 1), A.indices
+    row = np.repeat(np.arange(len(A.indptr) - 1), np.diff(A.indptr))
     if not A.has_sorted_indices:  # scipy's own sorting spoils blocks that are a transposed view
-        row = np.repeat(np.arange(len(A.indptr) - 1), np.diff(A.indptr))
         order = np.lexsort((indices, row))
         blocks, indices = blocks[order], indices[order]
-    values = np.ascontiguousarray(blocks, dtype).ravel()
+    chunks = rows // _TOGETHER
+    if chunks == 1:
+        values = np.ascontiguousarray(blocks, dtype).ravel()
+    else:
+        values = np.empty(blocks.size, dtype)
+        stretch = values.reshape(-1, columns, _TOGETHER)
+        place = np.arange(len(row)) + (chunks - 1) * A.indptr[row].astype(np.int64)
+        for k in range(chunks):  # of a block's rows, which are stored one after the other
+            stretch[place] = blocks[:, :, k * _TOGETHER : (k + 1) * _TOGETHER]
+            place += np.diff(A.indptr)[row]
     every = np.empty((len(indices), columns), np.uint32)
     every[:] = indices[:, None] * np.int64(columns) + np.arange(columns)
     first = np.arange(0, A.shape[0] + 1, rows, dtype=np.uint32)
