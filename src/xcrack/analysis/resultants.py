@@ -48,7 +48,7 @@ def _resultant(model: Model, name: str, f: Floats) -> Resultant:
     """Sums over the standard functions, which together are one everywhere."""
     x = model.space.node_points
     forces = f.reshape(-1, x.shape[1])[: len(x)]
-    force = tuple(forces.sum(axis=0).tolist())
+    force = tuple(np.ascontiguousarray(forces.T).sum(axis=1).tolist())
     product = x.T @ forces
     turning = product - product.T
     if len(force) < 3:

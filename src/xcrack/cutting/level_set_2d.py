@@ -65,7 +65,9 @@ def tied_to_tips(
         local = mesh.points[nodes] - x[k]
         phi[nodes] = local @ frame[k, 1]
         psi[k, nodes] = local @ frame[k, 0]
-        near[np.isin(mesh.edges, nodes).any(axis=1)] = True
+        there = np.zeros(mesh.n_points, dtype=bool)
+        there[nodes] = True
+        near |= there[mesh.edges[:, 0]] | there[mesh.edges[:, 1]]
     phi = snapped(mesh, phi)
     return LevelSet(lock(phi), lock(psi), tip_cells, lock(x), lock(mouth), lock(near))
 

@@ -99,7 +99,7 @@ def parts_inside(mesh: Mesh, polyline: Floats) -> list[Floats]:
             hits = t[(cross != 0) & (u >= 0) & (u <= 1) & (t > 0) & (t < 1)]
             ends = np.concatenate([[0.0], np.sort(hits), [1.0]])
             pairs.append(np.stack([ends[:-1], ends[1:]], axis=1))
-            middles.append(p + pairs[-1].mean(axis=1)[:, None] * r)
+            middles.append(p + ((ends[:-1] + ends[1:]) / 2)[:, None] * r)
     inside = contains(mesh, np.concatenate(middles))
     first = np.cumsum([len(each) for each in pairs])[:-1]
     return [each[own] for each, own in zip(pairs, np.split(inside, first), strict=True)]

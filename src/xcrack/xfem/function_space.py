@@ -146,16 +146,18 @@ class FunctionSpace:
         """Bit mask of what acts on each cell: cracks first, then tips; 0 for a plain cell."""
         mask = np.zeros(len(self.mesh.cells), dtype=np.int64)
         for c, cut in enumerate(self.cuts):
-            carries = self.heaviside[c][self.cell_nodes] >= 0
-            differs = self.node_side[c][self.cell_nodes] == -cut.side[:, None]
-            acts = (carries & (differs | cut.is_cut[:, None])).any(axis=1)
+            cells = _with_any(self.heaviside[c] >= 0, self.cell_nodes)
+            nodes = self.cell_nodes[cells]
+            carries = self.heaviside[c][nodes] >= 0
+            differs = self.node_side[c][nodes] == -cut.side[cells, None]
+            acts = (carries & (differs | cut.is_cut[cells, None])).any(axis=1)
             for joint in self.joints:
                 if joint.crack == c:
-                    acts |= joint.near & carries.any(axis=1)
-            mask |= acts.astype(np.int64) << c
+                    acts |= joint.near[cells]
+            mask[cells] |= acts.astype(np.int64) << c
         for t, tip in enumerate(self.tips):
-            acts = (tip.point_to_function[self.mesh.cells] >= 0).any(axis=1)
-            mask |= acts.astype(np.int64) << (len(self.cuts) + t)
+            cells = _with_any(tip.point_to_function >= 0, self.mesh.cells)
+            mask[cells] |= 1 << (len(self.cuts) + t)
         return lock(mask)
 
     @cached_property
@@ -309,6 +311,14 @@ class FunctionSpace:
             r, theta = polar(levels.psi[tip.number], phi, np.where(phi == 0, 1, 0))
             shifts.append(lock(tip_values(r, theta, tip.functions)))
         return tuple(shifts)
+
+
+def _with_any(flag: Bools, nodes: Ints) -> Ints:
+    """Rows `(k,)` of the nodes of cells `(m, n)` with a flagged one."""
+    result = flag[nodes[:, 0]]
+    for column in nodes.T[1:]:
+        result |= flag[column]
+    return np.asarray(result.nonzero()[0])
 
 
 def function_space(
