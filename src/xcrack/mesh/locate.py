@@ -2,9 +2,11 @@
 
 import numpy as np
 
-from xcrack.arrays import Bools, Floats, Ints
+from xcrack.arrays import Bools, Floats, Ints, lock
 from xcrack.mesh.mesh import Mesh
 
+_CROSSINGS = 1_000_000  # pairs of a piece and a boundary facet that are looked at at once
+_WHOLE = lock(np.array([0.0, 1.0]))
 _TOLERANCE = 1e-10  # barycentric; a point this close to a cell belongs to it (round-off)
 
 
@@ -89,20 +91,26 @@ def parts_inside(mesh: Mesh, polyline: Floats) -> list[Floats]:
     """
     corner = mesh.points[mesh.boundary]
     q, s = corner[:, 0], corner[:, 1] - corner[:, 0]
+    p, r = polyline[:-1], np.diff(polyline, axis=0)
     pairs, middles = [], []
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        for p, r in zip(polyline, np.diff(polyline, axis=0)):
-            cross = r[0] * s[:, 1] - r[1] * s[:, 0]
-            gap = q - p
-            t = (gap[:, 0] * s[:, 1] - gap[:, 1] * s[:, 0]) / cross
-            u = (gap[:, 0] * r[1] - gap[:, 1] * r[0]) / cross
-            hits = t[(cross != 0) & (u >= 0) & (u <= 1) & (t > 0) & (t < 1)]
-            ends = np.concatenate([[0.0], np.sort(hits), [1.0]])
+    chunk = max(_CROSSINGS // max(len(s), 1), 1)
+    for first in range(0, len(p), chunk):
+        own = slice(first, first + chunk)
+        x, y = r[own, 0, None], r[own, 1, None]
+        gap_x, gap_y = q[:, 0] - p[own, 0, None], q[:, 1] - p[own, 1, None]
+        cross = x * s[:, 1] - y * s[:, 0]
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            t = (gap_x * s[:, 1] - gap_y * s[:, 0]) / cross
+            u = (gap_x * y - gap_y * x) / cross
+        hit = (cross != 0) & (u >= 0) & (u <= 1) & (t > 0) & (t < 1)
+        for k, any_hit in enumerate(hit.any(axis=1)):
+            ends = np.concatenate([[0.0], np.sort(t[k, hit[k]]), [1.0]]) if any_hit else _WHOLE
             pairs.append(np.stack([ends[:-1], ends[1:]], axis=1))
-            middles.append(p + ((ends[:-1] + ends[1:]) / 2)[:, None] * r)
+            middle = (ends[:-1] + ends[1:]) / 2
+            middles.append(p[first + k] + middle[:, None] * r[first + k])
     inside = contains(mesh, np.concatenate(middles))
-    first = np.cumsum([len(each) for each in pairs])[:-1]
-    return [each[own] for each, own in zip(pairs, np.split(inside, first), strict=True)]
+    last = np.cumsum([len(each) for each in pairs])[:-1]
+    return [each[own] for each, own in zip(pairs, np.split(inside, last), strict=True)]
 
 
 def cells_within(mesh: Mesh, x: Floats, radius: float) -> Ints:
