@@ -104,7 +104,7 @@ def adapted(scene: Scene2d, tolerance: float) -> Row:
     for _ in SEEDS:
         start = process_time()
         mesh = xc.box((-1.0, -1.0), (1.0, 1.0), 4)
-        if scene is not edge:  # a mesh has to have a cell that is shorter than its crack
+        if scene is not edge:  # as the table was measured; a coarse one would do
             mesh = xc.refine(mesh, size=lambda x: 0.06 + 0.5 * np.linalg.norm(x, axis=1))
         problem, exact = scene(mesh)
         result = xc.adapt(problem, tolerance, progress=False)

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 import xcrack as xc
+from xcrack.adaptivity.adapted import Adapted
 
 
 @dataclass(frozen=True)
@@ -52,6 +53,13 @@ def mesh_of(s: Settings, half: float, dim: int, seed: int) -> xc.Mesh:
     x[inner] += 0.15 * 2 / s.n * move
     x = half * np.sign(x) * np.abs(x) ** s.grading
     return xc.Mesh(x, plain.cells, plain.facet_sets)
+
+
+def adapted(problem: xc.Problem, tolerance: float) -> Adapted:
+    """The scene on the mesh that `adapt` makes, without warnings."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", xc.XcrackWarning)
+        return xc.adapt(problem, tolerance, progress=False)
 
 
 def quiet(problem: xc.Problem) -> tuple[xc.Solution, xc.SIF]:

@@ -1,5 +1,6 @@
 """Cases of the edge crack, open and closed, and of the crack in bending."""
 
+from collections.abc import Callable
 from functools import partial
 
 from benchmarks.baselines import conforming_2d, getfem_runs
@@ -31,7 +32,14 @@ def edge(quick: bool) -> list[Case]:
         cases += variant(run, "patch basis", some, patch=True)
         cases += variant(run, "not consistent", some, consistent=False)
         cases += series(run, "graded cells", "mesh", (5, 7, 9, 13, 17, 23, 31), grading=1.4)
+    cases += _adapted(scenes.edge_adapted, quick)
     return cases + _conforming_edge(quick) + _getfem("edge", quick)
+
+
+def _adapted(run: Callable[[float, int], Outcome], quick: bool) -> list[Case]:
+    """A point a tolerance, its mesh being its own."""
+    tolerances = (1e-2, 1e-3) if quick else (1e-2, 1e-3, 3e-4, 1e-4, 3e-5, 1e-5)
+    return [Case("adapt", "mesh", f"to {t:g}", partial(run, t)) for t in tolerances]
 
 
 def _conforming_edge(quick: bool) -> list[Case]:
@@ -76,6 +84,7 @@ def half_closed(quick: bool) -> list[Case]:
         cases += variant(run, "penalty", sizes, lips="penalty")
         cases += variant(run, "augmented Lagrangian", sizes, lips="augmented")
         cases += variant(run, "Nitsche", sizes, lips="nitsche")
+    cases += _adapted(scenes.half_closed_adapted, quick)
     cases += _getfem("half_closed", quick)
     return cases + series(run, "contact off", "off", sizes, contact="off")
 

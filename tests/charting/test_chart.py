@@ -277,8 +277,9 @@ def test_adapt_is_a_line_of_the_chart(tmp_path):
     """Each tolerance a row with a mesh of its own; its best K is nearer than the tolerance."""
     tolerances = [1e-2, 3e-4]
     result = xc.chart(
-        edge_plate(), [{"functions": 2}], tolerances=tolerances, wanted=2e-3, repeat=1,
-        seconds=1e-6, meshes=[xc.box((-1, -1), (1, 1), n) for n in (8, 16, 32)], progress=False,
+        edge_plate(), [{"functions": 2}], tolerances=tolerances, wanted=2e-3,
+        repeat=1, seconds=1e-6,
+        meshes=[xc.box((-1, -1), (1, 1), n) for n in (8, 16, 32)], progress=False,
         file=tmp_path / "chart.png",
     )  # fmt: skip
     rows = [row for row in result.rows if row.setting == "adapt"]
@@ -301,8 +302,8 @@ def test_adapt_is_a_line_of_the_chart(tmp_path):
 def test_adapt_with_states_and_a_quantity_of_ones_own():
     """A quantity sees what solve would return: a list where there are states."""
     result = xc.chart(
-        edge_plate(), [{"functions": 2}], tolerances=[0.05], states=[0.5, 1.0], repeat=1,
-        seconds=1e-6,
+        edge_plate(), [{"functions": 2}], tolerances=[0.05], states=[0.5, 1.0],
+        repeat=1, seconds=1e-6,
         quantity=lambda states: [s.energy for s in states], progress=False,
     )  # fmt: skip
     row = result.rows[-1]
