@@ -293,12 +293,14 @@ def _without_lost_tips(
     elif rest > 0:
         cycles = before.growth.cycles
     lost = np.concatenate(error.place)[stays]
+    own = share_left(run) * abs(cycles - before.growth.cycles)
+    own += trail.exponent * error.behind * cycles
     return _settled(
         run,
         last.cycles + cycles,
         seen.cracks,
         trail,
-        StepError(split(lost, seen.cracks), error.cycles, behind=error.behind),
+        StepError(split(lost, seen.cracks), error.cycles + own, behind=error.behind),
     )
 
 
