@@ -48,7 +48,9 @@ def set_tips(value, slope, first, row, bary, side, nodes, gradient, phi, psi, ac
             x += bary[p, b] * psi[nodes[e, b]]
             y += bary[p, b] * phi[nodes[e, b]]
         r = math.sqrt(x * x + y * y)
-        if side[p] != 0 and y * side[p] <= 0.0:
+        # Between the level set and a kink that the cut follows, the angle goes on beyond pi.
+        beyond = x < 0.0 and -y * side[p] > 1e-9 * r
+        if side[p] != 0 and y * side[p] <= 0.0 and not beyond:
             y = side[p] * 1e-300
         # Half the angle without trigonometry; the larger of its sine and cosine by the root.
         c, s, C, S = 1.0, 0.0, 1.0, 0.0
@@ -58,7 +60,7 @@ def set_tips(value, slope, first, row, bary, side, nodes, gradient, phi, psi, ac
                 c = math.sqrt(0.5 * (1.0 + C))
                 s = 0.5 * S / c
             else:
-                s = math.copysign(math.sqrt(0.5 * (1.0 - C)), y)
+                s = math.copysign(math.sqrt(0.5 * (1.0 - C)), side[p] if beyond else y)
                 c = 0.5 * S / s
         root = math.sqrt(r)
         F[0], F[1], F[2], F[3] = c, s, s * S, c * S

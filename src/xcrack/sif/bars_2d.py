@@ -28,7 +28,7 @@ _ROOM = 1.5
 _OVERLAP = 0.02  # share of an overlap at one tip, as its negative K_I, that counts at all tips
 # Of the shares of cells at kinks, whose functions catch a part only of what is singular, and of
 # what moving the crack onto its kinks changes where faces press: no estimate has a sign there.
-_AT_KINKS, _MOVED = 4.0, 2.0
+_AT_KINKS, _MOVED = 6.0, 2.0
 
 
 def tip_bars(solutions: Sequence[Solution], sifs: Sequence[SIF], crack: int) -> list[Bars]:
