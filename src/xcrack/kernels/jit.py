@@ -4,8 +4,10 @@ numba keeps compiled code beside the source or in the user's cache folder. It ra
 may be written to (containers, clusters), and at every later run once a cache file is damaged.
 """
 
+import logging
 import os
 import stat
+import sys
 import tempfile
 from collections.abc import Callable
 from functools import cache
@@ -25,9 +27,12 @@ class _Cache(caching.FunctionCache):
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         try:
-            return super().load_overload(sig, target_context)
+            loaded = super().load_overload(sig, target_context)
         except _DAMAGE:
-            return None
+            loaded = None
+        if loaded is None:
+            _announce()
+        return loaded
 
     def save_overload(self, sig: Any, data: Any) -> None:
         try:
@@ -38,6 +43,15 @@ class _Cache(caching.FunctionCache):
                 super().save_overload(sig, data)
             except _DAMAGE:
                 self.disable()  # a full disk, for one; the compiled code is in memory
+
+
+@cache
+def _announce() -> None:
+    """Say once in a process why what follows takes longer than it will the next time."""
+    line = "xcrack compiles kernels that were not needed here before: up to half a minute, once"
+    logging.getLogger("xcrack").info(line)
+    if sys.stderr.isatty():
+        print(line, file=sys.stderr)
 
 
 def kernel(function: Callable[..., Any]) -> Any:
