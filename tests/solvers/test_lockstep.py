@@ -7,11 +7,14 @@ import pytest
 import scipy.sparse as sp
 
 import xcrack as xc
+import xcrack.solvers.row_blocks as row_blocks_file
 from xcrack.errors import ConvergenceError
+from xcrack.solvers import products
 from xcrack.solvers.lockstep import Ask, Operator, in_lockstep
 from xcrack.solvers.products import best_guesses, independent
 from xcrack.solvers.projected_cg import descending
 from xcrack.solvers.row_blocks import row_blocks
+from xcrack.threads import threads
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
@@ -34,6 +37,31 @@ def test_products_of_several_vectors_are_those_of_each(dtype, count):
             assert result[:, c].tobytes() == own.tobytes()
     exact = y[0] - 2.5 * (A @ x[0])
     np.testing.assert_allclose(alone[0], exact, rtol=0, atol=40 * np.finfo(dtype).eps)
+
+
+def test_matrices_made_by_threads_have_the_same_bits(monkeypatch):
+    """Products of sparse matrices and blocks of rows, in stretches however short."""
+    rng = np.random.default_rng(91)
+    A = sp.random(41, 30, 0.2, format="csr", rng=rng)
+    B = sp.random(30, 23, 0.3, format="csr", rng=rng)
+    first = np.cumsum([0, 3, 1, 6, 2, 0, 5, 3, 9, 12])
+
+    def made():
+        blocks = row_blocks([A, A @ B], first)
+        return products.product(A, B), blocks, blocks.times(np.ones(53))
+
+    alone, blocks, image = made()
+    np.testing.assert_allclose(alone.toarray(), A.toarray() @ B.toarray(), rtol=0, atol=1e-14)
+    monkeypatch.setattr(products, "_LEAST", 1)
+    monkeypatch.setattr(row_blocks_file, "_LEAST", 1)
+    for count in (2, 3, 16):
+        with threads(count):
+            shared, other, forces = made()
+        for name in ("indptr", "indices", "data"):
+            assert np.array_equal(getattr(shared, name), getattr(alone, name))
+        for name in ("first", "start", "offset", "columns", "values"):
+            assert np.array_equal(getattr(other, name), getattr(blocks, name))
+        assert forces.tobytes() == image.tobytes()
 
 
 def dense(seed, n=30):
