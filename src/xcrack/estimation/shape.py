@@ -169,8 +169,7 @@ def _products(
 def _chords(mesh: Mesh) -> tuple[Ints, Floats]:
     """Boundary facets that look like chords of a curve, and how far it lies outward in the mean."""
     facets = mesh.boundary
-    number = mesh.facet_numbers(facets)
-    cell = mesh.facet_to_cell[number, 0]
+    cell = mesh.facet_to_cell[mesh.facet_to_cell[:, 1] < 0, 0]
     x = mesh.points[facets]
     along = x[:, 1] - x[:, 0]
     outward = x.mean(axis=1) - mesh.points[mesh.cells[cell]].mean(axis=1)
