@@ -28,6 +28,7 @@ _LEAST, _MOST = 1.5, 2.0  # times finer in a round: what less changes is no bar
 _POWER = 2.5  # of the cells' size with which bars fall at order 2, on graded meshes (measured)
 _BEND = 0.6  # of the radius of curvature of a front: the domains of K have to fit into it
 _SHARPEST = 0.4  # of the cells along a front: least where it turns
+_OPEN = 1.5  # error of K beside a free surface over the bar of two domains (measured)
 _SMALLER = 1.3  # times finer that cells are at least where 1.5 was asked for
 
 
@@ -88,22 +89,33 @@ def trusted(new: Measured, old: Measured | None) -> Measured:
     At order 2 the error falls by more than half where cells become smaller by 1.5, so that the
     change is above the error that is left. One place may agree by chance: the root mean square
     along the front is the least. Fronts whose cells have stayed keep the bars that they had, or
-    take what the finer cells elsewhere have changed.
+    take what the finer cells elsewhere have changed. Before, bars of fronts that end at a free
+    surface are longer by a half than two domains tell.
     """
-    if old is None:
-        return new
     live = live_states(new)
+    if old is None:
+        sifs = tuple(tuple(map(_longer, state)) for state in new.sifs)
+        return replace(new, sifs=sifs, bar=values(sifs, live, new.beside)[1])
     finer = [
         _sizes_at(old, c) >= _SMALLER * _sizes_at(new, c) for c in range(len(new.problem.cracks))
     ]
     sifs = tuple(
         tuple(
-            _shorter(sif, before, finer[c]) if k in live else sif
+            _shorter(_longer(sif), before, finer[c]) if k in live else sif
             for c, (sif, before) in enumerate(zip(state, states_before, strict=True))
         )
         for k, (state, states_before) in enumerate(zip(new.sifs, old.sifs, strict=True))
     )
     return replace(new, sifs=sifs, bar=values(sifs, live, new.beside)[1])
+
+
+def _longer(sif: SIF) -> SIF:
+    """Bars as long as corner cracks on coarse cells ask for."""
+    ends = np.isin(sif.front, np.unique(sif.front[sif.at_surface]))
+    if not ends.any():
+        return sif
+    bar = np.where(ends[:, None], _OPEN, 1.0) * sif.bar
+    return replace(sif, errors=Bars(sif.eta, bar, sif.reasons))
 
 
 def _sizes_at(given: Measured, c: int) -> float:
