@@ -132,3 +132,53 @@ def test_two_kinks_side_by_side(n):
         solution = xc.solve(problem)
         assert np.abs(solution.contact[0].pressure - 1).max() <= 1e-9
         assert xc.inf_sup(problem) >= 0.25
+
+
+def test_tip_functions_go_on_beyond_pi():
+    """Between the level set and the crack gradients are those of the values, by differences."""
+    checked = 0
+    for seed in range(8):
+        rng = np.random.default_rng(seed)
+        x, angle = rng.uniform(-0.1, 0.1, 2), rng.uniform(0, 2 * np.pi)
+        line = [x - 0.6 * scenes.rows(angle)[0], x, x + 0.3 * scenes.rows(angle + 0.9)[0]]
+        problem = xc.Problem(scenes.perturbed(15, seed), STEEL, [xc.line_crack(line)], order=2)
+        space, _ = discretised(problem)
+        cut, mesh = space.cuts[0], space.mesh
+        centre, cell = cut.sub_bary.mean(axis=1), cut.sub_to_cell
+        inner = np.concatenate([(centre + 2 * cut.sub_bary[:, v]) / 3 for v in range(3)])
+        cell, side = np.tile(cell, 3), np.tile(cut.sub_side, 3)
+        phi = np.einsum("qb,qb->q", inner, cut.level_set.phi[mesh.cells[cell]])
+        psi = np.einsum("qb,qb->q", inner, cut.level_set.inside[mesh.cells[cell]])
+        beyond = (phi * side < -1e-3 * np.abs(psi)) & (psi < 0) & cut.is_cut[cell]
+        for batch, number, row in space.batches_of_points(cell[beyond]):
+            if not batch.tips:
+                continue
+            bary, own = inner[beyond][number], side[beyond][number][:, None]
+            _, slope = space.tabulate(batch, row, bary, own)
+            for along in np.eye(2):
+                shift = np.einsum("qbd,d->qb", mesh.gradient[batch.cells][row], 1e-6 * along)
+                up = space.tabulate(batch, row, bary + shift, own)[0]
+                down = space.tabulate(batch, row, bary - shift, own)[0]
+                assert np.abs((up - down) / 2e-6 - slope @ along).max() <= 1e-5
+                checked += len(number)
+    assert checked > 10
+
+
+@pytest.mark.parametrize("turn", [0.6, -0.9])
+def test_K_behind_a_kink_in_the_disc_of_the_tip(turn):
+    """The last leg is three cells long; K changes by 1 % at most on a mesh that is fine there."""
+    kink = np.array([0.013, 0.027])
+    tip = kink + 0.2 * scenes.rows(0.1 + turn)[0]
+    loads = [xc.traction("top", (0.0, 1.0)), xc.traction("bottom", (0.0, -1.0))]
+
+    def K(mesh):
+        crack = xc.line_crack([(-0.5, -0.01), kink, tip])
+        problem = xc.Problem(mesh, STEEL, [crack], loads=loads, order=2, contact="off")
+        return xc.stress_intensity(xc.solve(problem), 0).K
+
+    coarse = scenes.perturbed(30, 3)
+    fine = xc.refine(
+        coarse, size=lambda x: np.maximum(2e-3, 0.2 * np.linalg.norm(x - kink, axis=1))
+    )
+    wanted = K(fine)
+    assert np.abs(K(coarse) - wanted).max() <= 1e-2 * np.abs(wanted).max()
