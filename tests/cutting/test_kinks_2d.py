@@ -53,7 +53,7 @@ def inside_of_cells(space, line, radius):
     return [mesh.volume[cells] @ share, mesh.volume[cells] @ (1 - share)], len(cells) / k**1.5
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", range(6))
 def test_sides_and_lengths_are_those_of_the_polyline(seed):
     """Areas to the error of the reference; lengths of the faces to round-off."""
     problem, line = scene(seed)
@@ -78,7 +78,7 @@ def test_sides_and_lengths_are_those_of_the_polyline(seed):
 
 def test_a_point_is_on_its_side_of_the_kink():
     """`level` is zero on the faces, and its sign is that of the sub-cells."""
-    for seed in range(6):
+    for seed in range(3):
         space, lips = discretised(scene(seed)[0])
         cut, mesh = space.cuts[0], space.mesh
         phi = cut.level(mesh, lips[0].cell[:, 1], lips[0].bary[:, 1])
@@ -99,7 +99,7 @@ def test_kinks_on_mesh_points_and_edges(where):
         x = a if "node" in where else 0.3 * a + 0.7 * b
         return x + ([3e-12, -4e-12] if "beside" in where else 0)
 
-    for seed in range(20, 26):
+    for seed in (20, 21):
         problem, _ = scene(seed, kink)
         space, lips = discretised(problem)
         assert len(space.cuts[0].kinks.points) == 1
@@ -120,7 +120,7 @@ def test_what_is_no_kink_is_cut_as_before():
         assert not len(space.cuts[0].kinks.points)
 
 
-@pytest.mark.parametrize("n", [12, 24])
+@pytest.mark.parametrize("n", [12, pytest.param(24, marks=pytest.mark.slow)])
 def test_two_kinks_side_by_side(n):
     """Half a cell to three cells apart: a closed constant patch stays exact, pressures stable."""
     for leg in (0.05, 0.1, 0.2, 0.4):
