@@ -76,12 +76,13 @@ def grow(
         Largest advance of any tip in a step.
     tolerance : float, optional
         Wanted error of the life, relative, and of the path, over the length grown: in place of `da`
-        and `cycles`, which are upper bounds then. The mesh is refined for it, so it may be coarse:
-        a scout grows the cracks in long steps; where they run, cells become small enough for K;
-        that one mesh serves all steps, each as long as its estimated error allows. Solved at order
+        and `cycles`, which are upper bounds then. The mesh may be coarse: at the first step whose
+        error bars ask for it a scout grows the cracks from there in long steps, and where they
+        run, cells become small enough for K; once more where the path leaves these cells. Each
+        step is as long as its estimated error allows. Solved at order
         2; growth follows the best K where its error bar is known, K elsewhere. `History.life_bar`
         says what came of it. The scout knows nothing of `max_steps`, `max_cycles`, `K_c` and
-        `until`: whatever stops the run, and resumes it, the mesh is the same.
+        `until`: whatever stops the run, and resumes it, the meshes are the same.
     max_unknowns : int, optional
         Most unknowns of the mesh that a tolerance chooses; 300 000 if omitted.
     cycles : float, optional
@@ -144,8 +145,8 @@ def grow(
     Cycles between two steps: `cycles_between`, with the rates at both, so a step costs one
     analysis of all load states and the life of ten steps is good to a few tenths of a per cent.
 
-    Of a tolerance, half is for the steps and four tenths are for K: cells become smaller until the
-    bars of K of a few stages of the way are below that over the exponent of the law (at least 2).
+    Of a tolerance of the life, half is for the steps and four tenths are for K: where the bars of K
+    ask for more, cells become smaller until those of a few stages of the way are as wanted.
     Steps are controlled by their estimated error (proportional and integral: Gustafsson 1991, ACM
     Trans. Math. Softw. 17, 533).
 
