@@ -140,7 +140,7 @@ def pieces(solution: Solution) -> Pieces:
         side=lock(np.concatenate([cell_side(space, plain), cells.side])),
         center_stress=lock(np.concatenate(center)),
         phi=lock(
-            np.array([(bary[source] * s.phi[corner]).sum(axis=1) for s in levels]).reshape(-1, n)
+            np.array([c.level(mesh, cell[source], bary[source]) for c in space.cuts]).reshape(-1, n)
         ),
         psi=tuple(np.einsum("nb,fnb->fn", bary[source], s.psi[:, corner]) for s in levels),
     )
