@@ -306,7 +306,8 @@ def test_script_makes_the_meshes_of_the_examples():
     script = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(script)
     made = script.meshes()
-    assert set(made) == {path.stem for path in EXAMPLES.glob("*.msh")} == set(FILES)
+    stored = {path.stem for path in EXAMPLES.glob("*.msh")} - {"small_crack"}  # 3D, by gmsh alone
+    assert set(made) == stored == set(FILES)
     for name, mesh in made.items():
         stored = read_mesh(EXAMPLES / f"{name}.msh")
         # another release of gmsh places nodes differently: only the numbers must be alike

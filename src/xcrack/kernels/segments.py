@@ -137,9 +137,11 @@ def split(ends, cut, level):  # type: ignore[no-untyped-def]
             middle = (begin + end) / 2
             for c in range(cracks):
                 a, b = level[c, e, 0], level[c, e, 1]
-                at = (1 - middle) * a + middle * b
+                at, t = (1 - middle) * a + middle * b, cut[c, e]
+                if a * b < 0:
+                    # The end on the same side of the cut, which at a kink is not where phi is zero.
+                    # Ahead of a tip phi changes its sign on an edge that no crack splits.
+                    t = 1 - t if ends[e, 0] >= ends[e, 1] else t
+                    at = 0.0 if np.isnan(t) else (a if middle < t else b)
                 side[row, c] = 0 if at == 0 else (1 if at > 0 else -1)
-                # Ahead of a tip phi changes its sign on an edge that no crack splits.
-                if np.isnan(cut[c, e]) and a * b < 0:
-                    side[row, c] = 0
     return number, bary, side
