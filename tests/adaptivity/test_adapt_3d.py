@@ -1,7 +1,7 @@
 """Fronts in 3D: surface and corner cracks, several cracks, closed ones, from coarse cells.
 
 References: Newman and Raju (1983, 5 %) for surface and corner cracks, the penny in an infinite body
-(radius .12 of half the block: .3 %), and finer runs of 230 000 to 370 000 unknowns of the same code.
+(radius .12 of half the block: .3 %), and finer runs of 230 000 to 370 000 unknowns of this code.
 """
 
 import math
