@@ -7,7 +7,12 @@ from benchmarks.stability_parts import Results, short
 from physics import test_contact_partial
 from support import scenes_2d as scenes
 from xcrack.arrays import Floats
-from xcrack.growth.criteria import kink_angle, max_hoop_stress, mean_reference, weighted_angle
+from xcrack.growth.directions.criteria import (
+    kink_angle,
+    max_hoop_stress,
+    mean_reference,
+    weighted_angle,
+)
 
 SEQUENCES: dict[str, list[tuple[float, float]]] = {
     "proportional, (0, 0) (1, .5)": [(0, 0), (1, 0.5)],

@@ -7,8 +7,8 @@ import numpy as np
 
 from xcrack.arrays import Floats
 from xcrack.errors import ProblemError
-from xcrack.growth.checks import wants
-from xcrack.growth.criteria import Criterion
+from xcrack.growth.directions.checks import wants
+from xcrack.growth.directions.criteria import Criterion
 from xcrack.inputs import number, numbers, shown
 from xcrack.laws.law import Law
 
@@ -124,7 +124,7 @@ def check_criterion(criterion: Criterion, nu: float = 0.3) -> None:
 
     Examples
     --------
-    >>> from xcrack.growth.criteria import weighted_angle
+    >>> from xcrack.growth.directions.criteria import weighted_angle
     >>> check_criterion(weighted_angle)
     """
     _check_callable(criterion, "check_criterion: criterion")

@@ -119,9 +119,9 @@ def test_a_broken_rule_for_cycles_fails(monkeypatch):
 
     failed = broken(
         monkeypatch,
-        ("xcrack.growth.cycles.cycles_between", wrong),
+        ("xcrack.growth.tracking.cycles.cycles_between", wrong),
         ("xcrack.book.cases.lives.cycles_between", wrong),
-        ("xcrack.growth.pec_2d._cycles", too_many),
+        ("xcrack.growth.integration.pec_2d._cycles", too_many),
     )
     print(sorted(failed))
     kinds = {case.requirement for case in CASES if case.id in failed}

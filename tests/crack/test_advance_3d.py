@@ -14,9 +14,9 @@ from xcrack.crack.size_3d import area_inside, front_length_inside, surface_size
 from xcrack.crack.surfaces import elliptic_crack, penny_crack
 from xcrack.errors import GeometryError, XcrackWarning
 from xcrack.geometry.triangulation import face_areas, face_normals, loops, oriented, side_keys
-from xcrack.growth.cycles import cycles_between
-from xcrack.growth.cycles_3d import elapsed_3d
-from xcrack.growth.follow_3d import carried
+from xcrack.growth.tracking.cycles import cycles_between
+from xcrack.growth.tracking.cycles_3d import elapsed_3d
+from xcrack.growth.tracking.follow_3d import carried
 from xcrack.mesh.box import box
 
 

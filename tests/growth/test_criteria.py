@@ -9,7 +9,7 @@ from scipy.optimize import minimize_scalar
 
 from support import exact
 from xcrack.errors import ProblemError, XcrackWarning
-from xcrack.growth.criteria import (
+from xcrack.growth.directions.criteria import (
     equivalent_K,
     kink_angle,
     max_hoop_stress,

@@ -13,7 +13,7 @@ from support import scenes_friction as rubbing
 from support.scenes_2d import SIDES
 from xcrack.analysis.solve import solve_states
 from xcrack.contact.slip import weak_slip
-from xcrack.growth.rating import respond_to_cycle
+from xcrack.growth.rates.rating import respond_to_cycle
 from xcrack.solvers.reuse import Reuse
 from xcrack.xfem.lips import arc_position
 from xcrack.xfem.model import build

@@ -11,9 +11,9 @@ from xcrack.crack.size_2d import length_inside
 from xcrack.crack.tips_2d import tip_frames
 from xcrack.errors import ProblemError
 from xcrack.growth import run as growth
-from xcrack.growth.criteria import max_hoop_stress, weighted_angle
+from xcrack.growth.directions.criteria import max_hoop_stress, weighted_angle
 from xcrack.growth.run import grow
-from xcrack.growth.step import Cycle
+from xcrack.growth.steps.step import Cycle
 from xcrack.laws.power import elber, paris
 from xcrack.scene.conditions import traction
 

@@ -9,9 +9,9 @@ from support.growth_fakes import STRESS, mode_I, patch_respond, plate
 from xcrack.crack.size_2d import length_inside
 from xcrack.errors import ProblemError, XcrackWarning, warn
 from xcrack.growth import run as growth
-from xcrack.growth.criteria import max_hoop_stress
+from xcrack.growth.directions.criteria import max_hoop_stress
 from xcrack.growth.run import grow
-from xcrack.growth.step import Cycle
+from xcrack.growth.steps.step import Cycle
 from xcrack.laws.power import elber, paris, walker
 
 LAW = paris(C=1e-11, m=3.0)

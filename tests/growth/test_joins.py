@@ -4,7 +4,7 @@ import pytest
 
 import xcrack as xc
 from xcrack.errors import ProblemError
-from xcrack.growth.joins import numbers_after
+from xcrack.growth.steps.joins import numbers_after
 
 
 def test_a_join_says_where_and_when():

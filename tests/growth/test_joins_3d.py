@@ -13,9 +13,9 @@ import pytest
 import xcrack as xc
 from support.scenes_fronts import graded, lines
 from xcrack.geometry.triangulation import face_areas
-from xcrack.growth import joins_3d
-from xcrack.growth.ligament_3d import amplification, part_of_time
-from xcrack.growth.lineage import lineage
+from xcrack.growth.events import joins_3d
+from xcrack.growth.events.ligament_3d import amplification, part_of_time
+from xcrack.growth.steps.lineage import lineage
 from xcrack.reporting.results import growth
 from xcrack.reporting.source import Source
 

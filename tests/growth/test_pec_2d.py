@@ -10,11 +10,11 @@ from support.growth_runs import run_of as stored_run
 from xcrack.crack.lines import line_crack
 from xcrack.crack.tips_2d import tip_frames
 from xcrack.errors import ProblemError
-from xcrack.growth.controller import first_length, next_length, step_error
-from xcrack.growth.criteria import max_hoop_stress
-from xcrack.growth.options import Run
+from xcrack.growth.directions.criteria import max_hoop_stress
 from xcrack.growth.run import grow
-from xcrack.growth.step import Cycle
+from xcrack.growth.steps.controller import first_length, next_length, step_error
+from xcrack.growth.steps.options import Run
+from xcrack.growth.steps.step import Cycle
 from xcrack.history.collect import collect, load
 from xcrack.laws.power import paris
 

@@ -10,12 +10,12 @@ from support.growth_fakes import mode_I, patch_respond, plate
 from xcrack.crack.lines import line_crack
 from xcrack.crack.surfaces import penny_crack
 from xcrack.errors import ProblemError, XcrackWarning
-from xcrack.growth import ladder, levels
-from xcrack.growth.criteria import max_hoop_stress, weighted_angle
-from xcrack.growth.ladder import factors_of, ladders
-from xcrack.growth.rating import respond_to_cycle
+from xcrack.growth.directions.criteria import max_hoop_stress, weighted_angle
+from xcrack.growth.rates import ladder, levels
+from xcrack.growth.rates.ladder import factors_of, ladders
+from xcrack.growth.rates.rating import respond_to_cycle
 from xcrack.growth.run import grow
-from xcrack.growth.step import Cycle
+from xcrack.growth.steps.step import Cycle
 from xcrack.history.collect import collect, resume
 from xcrack.laws.closures import newman_closure
 from xcrack.laws.power import paris, walker

@@ -8,8 +8,8 @@ from scipy.integrate import quad
 
 import xcrack as xc
 from benchmarks.wanted_error import SCENES, against, run, scene
-from xcrack.growth import outgrown, prepared
-from xcrack.growth.sizes_2d import given_mesh
+from xcrack.growth.tolerance import outgrown, prepared
+from xcrack.growth.tolerance.sizes_2d import given_mesh
 from xcrack.history import run_folder
 from xcrack.verification.plates import PLATE_EDGE
 

@@ -15,13 +15,13 @@ from support.growth_fakes import plate
 from support.growth_runs import *  # noqa: F403 - fixtures come by name
 from support.growth_runs import content, run_of, scene
 from xcrack.errors import ProblemError, XcrackWarning
-from xcrack.growth import description
-from xcrack.growth import fingerprint as settings
-from xcrack.growth.criteria import max_hoop_stress
-from xcrack.growth.fingerprint import describe, differences
-from xcrack.growth.options import Run
+from xcrack.growth.directions.criteria import max_hoop_stress
 from xcrack.growth.run import grow
-from xcrack.growth.step import Cycle
+from xcrack.growth.steps import description
+from xcrack.growth.steps import fingerprint as settings
+from xcrack.growth.steps.fingerprint import describe, differences
+from xcrack.growth.steps.options import Run
+from xcrack.growth.steps.step import Cycle
 from xcrack.history import collect as collecting
 from xcrack.history.collect import collect, resume
 from xcrack.history.versions import versions
@@ -190,7 +190,8 @@ def test_what_is_the_same_has_the_same_text():
     assert described(("def law(dK, R):", documented)) == described(
         ("def law(dK, R):", documented.replace("A law.", "Another text."))
     )
-    code = f"{SCRIPT}\nfrom xcrack.growth.fingerprint import describe\nprint(describe('law', law))"
+    imported = "from xcrack.growth.steps.fingerprint import describe"
+    code = f"{SCRIPT}\n{imported}\nprint(describe('law', law))"
     for seed in ("1", "2"):
         child = subprocess.run(
             [sys.executable, "-c", code],

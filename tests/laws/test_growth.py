@@ -6,10 +6,10 @@ import pytest
 from support.growth_fakes import mode_I, patch_respond, plate
 from xcrack.crack.lines import line_crack
 from xcrack.errors import ProblemError
-from xcrack.growth.criteria import max_hoop_stress
-from xcrack.growth.nominal import nominal_range
+from xcrack.growth.directions.criteria import max_hoop_stress
+from xcrack.growth.directions.nominal import nominal_range
 from xcrack.growth.run import grow
-from xcrack.growth.step import Cycle
+from xcrack.growth.steps.step import Cycle
 from xcrack.laws.closures import newman_closure
 from xcrack.laws.fracture import forman, nasgro
 from xcrack.laws.power import elber, paris, walker

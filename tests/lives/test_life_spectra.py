@@ -12,9 +12,9 @@ from support.growth_fakes import STRESS, mode_I, patch_respond, plate
 from xcrack.crack.lines import line_crack
 from xcrack.errors import ProblemError
 from xcrack.growth import run as growth
-from xcrack.growth.criteria import max_hoop_stress
+from xcrack.growth.directions.criteria import max_hoop_stress
 from xcrack.growth.run import grow
-from xcrack.growth.step import Cycle
+from xcrack.growth.steps.step import Cycle
 from xcrack.history.history import History
 from xcrack.laws.power import paris, walker
 from xcrack.laws.thresholds import klesnil_lukas

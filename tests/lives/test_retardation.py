@@ -7,9 +7,9 @@ from scipy.integrate import quad
 from support import exact
 from support.growth_fakes import STRESS, mode_I, patch_respond, plate
 from xcrack.errors import ProblemError
-from xcrack.growth.criteria import max_hoop_stress
+from xcrack.growth.directions.criteria import max_hoop_stress
 from xcrack.growth.run import grow
-from xcrack.growth.step import Cycle
+from xcrack.growth.steps.step import Cycle
 from xcrack.history.history import History
 from xcrack.kernels.retardation import advanced
 from xcrack.laws.power import paris, walker

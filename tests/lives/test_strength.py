@@ -9,10 +9,10 @@ from support.growth_fakes import STRESS, mode_I, patch_respond, plate
 from xcrack.crack.lines import line_crack
 from xcrack.crack.surfaces import elliptic_crack
 from xcrack.errors import ProblemError
-from xcrack.growth.criteria import max_hoop_stress
-from xcrack.growth.rating import respond_to_cycle
+from xcrack.growth.directions.criteria import max_hoop_stress
+from xcrack.growth.rates.rating import respond_to_cycle
 from xcrack.growth.run import grow
-from xcrack.growth.step import Cycle
+from xcrack.growth.steps.step import Cycle
 from xcrack.history.history import History
 from xcrack.laws.power import paris
 from xcrack.lives.assessment import assessment_line, geometry_factors, residual_strength

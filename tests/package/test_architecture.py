@@ -58,7 +58,7 @@ def test_layers_are_one_way() -> None:
         check=False,
     )
     assert run.returncode == 0, run.stdout + run.stderr
-    assert "7 kept, 0 broken" in run.stdout
+    assert "8 kept, 0 broken" in run.stdout
 
 
 IMPORTED_IN = {
@@ -162,7 +162,7 @@ def test_public_name_is_documented(name: str) -> None:
 
 def test_options_of_growth_stand_once() -> None:
     """Names in `GrowOptions`, defaults on `Run`; signatures of both functions list them."""
-    from xcrack.growth.options import GrowOptions, Run
+    from xcrack.growth.steps.options import GrowOptions, Run
 
     options = GrowOptions.__annotations__
     defaults = {f.name: f.default for f in fields(Run) if f.name in options}

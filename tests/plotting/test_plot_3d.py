@@ -7,7 +7,7 @@ from scipy.spatial import cKDTree
 
 import xcrack as xc
 from xcrack.crack.fronts_3d import front_weights, is_closed
-from xcrack.growth.step import Step
+from xcrack.growth.steps.step import Step
 from xcrack.history.history import History
 from xcrack.plotting import pyvista_2d as plot_pyvista
 from xcrack.plotting.fronts_3d import draw_fronts, draw_K, step_fronts

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import xcrack as xc
-from xcrack.growth.step import Step
+from xcrack.growth.steps.step import Step
 from xcrack.history.history import History
 from xcrack.history.series import polylines
 from xcrack.post.lip_faces_3d import lip_faces

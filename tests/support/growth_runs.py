@@ -7,9 +7,9 @@ import pytest
 
 from support.growth_fakes import mode_I, patch_respond, plate
 from xcrack.crack.lines import line_crack
-from xcrack.growth.criteria import weighted_angle
+from xcrack.growth.directions.criteria import weighted_angle
 from xcrack.growth.run import grow
-from xcrack.growth.step import Cycle
+from xcrack.growth.steps.step import Cycle
 from xcrack.history import store
 from xcrack.history.collect import collect
 from xcrack.history.run_folder import BODY

@@ -21,7 +21,7 @@ from xcrack.campaigns.engine import (
 )
 from xcrack.campaigns.row import checked, key_of
 from xcrack.errors import ProblemError
-from xcrack.growth.fingerprint import describe, differences
+from xcrack.growth.steps.fingerprint import describe, differences
 from xcrack.history.lock import locked
 from xcrack.inputs import flag, shown, whole
 from xcrack.paths import path_of, system_errors, written_whole

@@ -13,7 +13,7 @@ from xcrack.casefile.histories import loading, retardation_of
 from xcrack.casefile.tables import Table, read_tables
 from xcrack.casefile.units import LENGTH, NUMBER, TOUGHNESS
 from xcrack.errors import ProblemError, XcrackError
-from xcrack.growth.options import GrowOptions
+from xcrack.growth.steps.options import GrowOptions
 from xcrack.laws.zones import plastic_zone
 from xcrack.paths import path_of
 from xcrack.scene.material import Isotropic

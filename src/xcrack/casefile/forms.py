@@ -10,7 +10,7 @@ from xcrack.casefile.units import BODY_FORCE, FORCE, LENGTH, NUMBER, STRESS, TOU
 from xcrack.crack.lines import line_crack
 from xcrack.crack.surfaces import elliptic_crack, penny_crack, plane_crack, read_surface
 from xcrack.errors import ProblemError, XcrackError
-from xcrack.growth import criteria
+from xcrack.growth.directions import criteria
 from xcrack.laws import fracture, power
 from xcrack.mesh.box import box
 from xcrack.mesh.cylinder import notched_cylinder

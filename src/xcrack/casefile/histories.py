@@ -9,7 +9,7 @@ from xcrack.casefile.forms import LOADS, Form, called_with, made
 from xcrack.casefile.tables import Table
 from xcrack.casefile.units import NUMBER, STRESS, TOUGHNESS
 from xcrack.errors import XcrackError
-from xcrack.growth.step import Cycle
+from xcrack.growth.steps.step import Cycle
 from xcrack.laws.zones import Retardation, plastic_zone, wheeler, willenborg
 from xcrack.spectra.files import read_spectrum
 from xcrack.spectra.spectrum import Spectrum

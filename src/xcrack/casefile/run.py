@@ -8,10 +8,10 @@ from xcrack.analysis.solution import Solution
 from xcrack.analysis.solve import solve
 from xcrack.casefile.case import CaseFile, read_case
 from xcrack.errors import ProblemError
-from xcrack.growth.criteria import Criterion
-from xcrack.growth.options import GrowOptions, lists_options
+from xcrack.growth.directions.criteria import Criterion
 from xcrack.growth.run import grow
-from xcrack.growth.step import Cycle
+from xcrack.growth.steps.options import GrowOptions, lists_options
+from xcrack.growth.steps.step import Cycle
 from xcrack.history.collect import Until, collect, resume
 from xcrack.history.history import History
 from xcrack.inputs import flag

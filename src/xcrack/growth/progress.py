@@ -6,9 +6,9 @@ import time
 from dataclasses import dataclass, field
 from typing import Any
 
-from xcrack.growth.follow import following
-from xcrack.growth.options import Run
-from xcrack.growth.step import Step
+from xcrack.growth.steps.options import Run
+from xcrack.growth.steps.step import Step
+from xcrack.growth.tracking.follow import following
 from xcrack.optional import in_notebook
 
 _LOG = logging.getLogger("xcrack")

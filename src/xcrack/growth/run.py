@@ -9,12 +9,11 @@ import numpy as np
 from xcrack.analysis.solution import Solution
 from xcrack.crack.crack import Crack
 from xcrack.errors import GeometryError, ProblemError, XcrackError, warn
-from xcrack.growth import joining
-from xcrack.growth.advance import LEAST, Advance
-from xcrack.growth.arrivals import arrivals_of, last_step
-from xcrack.growth.checks import depends_on_ratio
-from xcrack.growth.criteria import Criterion
-from xcrack.growth.ending import (
+from xcrack.growth.directions.checks import depends_on_ratio
+from xcrack.growth.directions.criteria import Criterion
+from xcrack.growth.events import joining
+from xcrack.growth.events.arrivals import arrivals_of, last_step
+from xcrack.growth.events.ending import (
     cut_off,
     end_at,
     falls_to_zero,
@@ -23,18 +22,19 @@ from xcrack.growth.ending import (
     short_kink,
     too_short,
 )
-from xcrack.growth.evaluation import evaluate
-from xcrack.growth.follow import following
-from xcrack.growth.integrators import integrator_of
-from xcrack.growth.joined import Joined
+from xcrack.growth.integration.integrators import integrator_of
 from xcrack.growth.notices import Notices
-from xcrack.growth.options import GrowOptions, Run, lists_options, run_of
-from xcrack.growth.outgrown import again
-from xcrack.growth.prepared import fingerprint, prepared
 from xcrack.growth.progress import Progress
-from xcrack.growth.rating import check_choice, levels_of, respond_to_cycle, warn_of_left_out
-from xcrack.growth.step import Cycle, Memory, Step, memory_of
-from xcrack.growth.uncertainty import best_known, shortfall, with_K
+from xcrack.growth.rates.evaluation import evaluate
+from xcrack.growth.rates.rating import check_choice, levels_of, respond_to_cycle, warn_of_left_out
+from xcrack.growth.rates.uncertainty import best_known, shortfall, with_K
+from xcrack.growth.steps.advance import LEAST, Advance
+from xcrack.growth.steps.joined import Joined
+from xcrack.growth.steps.options import GrowOptions, Run, lists_options, run_of
+from xcrack.growth.steps.step import Cycle, Memory, Step, memory_of
+from xcrack.growth.tolerance.outgrown import again
+from xcrack.growth.tolerance.prepared import fingerprint, prepared
+from xcrack.growth.tracking.follow import following
 from xcrack.laws.law import Law
 from xcrack.mesh.mesh import Mesh
 from xcrack.scene.problem import Problem

@@ -7,12 +7,12 @@ import numpy as np
 
 from xcrack.arrays import Floats
 from xcrack.errors import ProblemError
-from xcrack.growth.block import pairs_of_states
-from xcrack.growth.checks import evaluate_criterion
-from xcrack.growth.criteria import Criterion
-from xcrack.growth.ladder import Ladder
-from xcrack.growth.step import Step
-from xcrack.growth.uncertainty import best_known
+from xcrack.growth.directions.checks import evaluate_criterion
+from xcrack.growth.directions.criteria import Criterion
+from xcrack.growth.rates.block import pairs_of_states
+from xcrack.growth.rates.ladder import Ladder
+from xcrack.growth.rates.uncertainty import best_known
+from xcrack.growth.steps.step import Step
 from xcrack.inputs import number, shown
 from xcrack.spectra.spectrum import Spectrum, distinct
 

@@ -7,11 +7,11 @@ from pathlib import Path
 from typing import Any, Unpack
 
 from xcrack.errors import ProblemError, warn
-from xcrack.growth.criteria import Criterion
-from xcrack.growth.fingerprint import differences, only_compiled_differently
-from xcrack.growth.options import GrowOptions, Run, lists_options, run_of
+from xcrack.growth.directions.criteria import Criterion
 from xcrack.growth.run import steps_of
-from xcrack.growth.step import Cycle, Step
+from xcrack.growth.steps.fingerprint import differences, only_compiled_differently
+from xcrack.growth.steps.options import GrowOptions, Run, lists_options, run_of
+from xcrack.growth.steps.step import Cycle, Step
 from xcrack.history import run_folder
 from xcrack.history.history import History
 from xcrack.history.lock import locked

@@ -8,10 +8,10 @@ from scipy.spatial import cKDTree
 
 from xcrack.arrays import Floats, Ints
 from xcrack.errors import ProblemError
-from xcrack.growth.checks import evaluate_law
-from xcrack.growth.cycles import cycles_between
-from xcrack.growth.joins import numbers_after
-from xcrack.growth.step import Step, memory_of, moved_places
+from xcrack.growth.directions.checks import evaluate_law
+from xcrack.growth.steps.joins import numbers_after
+from xcrack.growth.steps.step import Step, memory_of, moved_places
+from xcrack.growth.tracking.cycles import cycles_between
 from xcrack.history.block_rates import Block
 from xcrack.laws.law import Law
 

@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from xcrack import markup
 from xcrack.crack.crack import Crack
 from xcrack.errors import ProblemError
-from xcrack.growth.arrival import Arrival
-from xcrack.growth.criteria import Criterion
-from xcrack.growth.joins import Join
-from xcrack.growth.step import Step
+from xcrack.growth.directions.criteria import Criterion
+from xcrack.growth.steps.arrival import Arrival
+from xcrack.growth.steps.joins import Join
+from xcrack.growth.steps.step import Step
 from xcrack.history.block_rates import block_of_run
 from xcrack.history.life_bar import LifeBar, life_bar
 from xcrack.history.measures import measured, measures_tables, with_measures

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from xcrack.growth.step import Step
-from xcrack.growth.uncertainty import uses_best
+from xcrack.growth.rates.uncertainty import uses_best
+from xcrack.growth.steps.step import Step
 
 _NUMBER = re.compile(r"\d+(\.\d+)?")
 

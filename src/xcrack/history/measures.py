@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xcrack.crack.measures import Measures, measures
-from xcrack.growth.step import Step
+from xcrack.growth.steps.step import Step
 from xcrack.mesh.mesh import Mesh
 
 Measured = list[tuple[Step, int, Measures]]  # of each crack of each step

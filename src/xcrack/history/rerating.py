@@ -7,7 +7,7 @@ import numpy as np
 
 from xcrack.arrays import Floats
 from xcrack.errors import ProblemError
-from xcrack.growth.step import Step
+from xcrack.growth.steps.step import Step
 from xcrack.history.block_rates import Block
 from xcrack.history.driving import Driving, cycles_of, driving
 from xcrack.inputs import shown

@@ -13,14 +13,14 @@ from typing import Any
 
 from xcrack.crack.crack import Crack
 from xcrack.errors import ProblemError
-from xcrack.growth.arrival import Arrival
-from xcrack.growth.controller import Control
-from xcrack.growth.fingerprint import DEFAULTS
-from xcrack.growth.front_trail import FrontTrail, Places
-from xcrack.growth.joins import Join
-from xcrack.growth.overloads import Kinds, March, Zones
-from xcrack.growth.step import Memory, Step, StepError
-from xcrack.growth.trail import Overloads, Trail
+from xcrack.growth.steps.arrival import Arrival
+from xcrack.growth.steps.controller import Control
+from xcrack.growth.steps.fingerprint import DEFAULTS
+from xcrack.growth.steps.front_trail import FrontTrail, Places
+from xcrack.growth.steps.joins import Join
+from xcrack.growth.steps.overloads import Kinds, March, Zones
+from xcrack.growth.steps.step import Memory, Step, StepError
+from xcrack.growth.steps.trail import Overloads, Trail
 from xcrack.history import lock
 from xcrack.history.store import PART, load, save, write_whole
 from xcrack.paths import system_errors

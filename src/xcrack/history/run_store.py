@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from xcrack.errors import ProblemError, warn
-from xcrack.growth.step import Step
+from xcrack.growth.steps.step import Step
 from xcrack.history import run_folder
 from xcrack.history.run_folder import Header
 from xcrack.history.saved import write_body

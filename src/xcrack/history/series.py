@@ -7,7 +7,7 @@ import numpy as np
 
 from xcrack.arrays import Ints
 from xcrack.crack.crack import Crack
-from xcrack.growth.step import Step
+from xcrack.growth.steps.step import Step
 
 
 def write_series(steps: Sequence[Step], folder: Path) -> Path:

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from xcrack.arrays import Floats
 from xcrack.crack.fronts_3d import front_weights
 from xcrack.crack.tips_2d import tip_frames
-from xcrack.growth.step import Step
-from xcrack.growth.uncertainty import uses_best
+from xcrack.growth.rates.uncertainty import uses_best
+from xcrack.growth.steps.step import Step
 from xcrack.history.life_bar import life_bar
 
 Measures = dict[str, Callable[[Step, int], Floats]]

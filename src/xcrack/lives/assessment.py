@@ -10,7 +10,7 @@ from scipy.optimize import brentq
 
 from xcrack.arrays import Floats
 from xcrack.errors import ProblemError
-from xcrack.growth.criteria import clipped, equivalent_K
+from xcrack.growth.directions.criteria import clipped, equivalent_K
 from xcrack.history.driving import driving
 from xcrack.history.history import History
 from xcrack.inputs import called, number, numbers, shown

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from xcrack.arrays import Floats, lock
 from xcrack.errors import ProblemError
-from xcrack.growth.criteria import Criterion
+from xcrack.growth.directions.criteria import Criterion
 from xcrack.history.block_rates import Block, block_of_run
 from xcrack.history.driving import Driving, cycles_of, driving
 from xcrack.history.history import History

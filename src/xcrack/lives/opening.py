@@ -6,7 +6,7 @@ import numpy as np
 
 from xcrack.arrays import Floats
 from xcrack.errors import ProblemError
-from xcrack.growth.step import Step
+from xcrack.growth.steps.step import Step
 from xcrack.inputs import shown
 
 _CLOSED = 1e-3  # of the largest K: below it a tip is closed

@@ -6,11 +6,11 @@ import numpy as np
 
 from xcrack.arrays import Floats, Ints
 from xcrack.errors import ProblemError
-from xcrack.growth.checks import evaluate_law
-from xcrack.growth.criteria import clipped, equivalent_K
-from xcrack.growth.ladder import Ladder
-from xcrack.growth.step import Step
-from xcrack.growth.uncertainty import best_known
+from xcrack.growth.directions.checks import evaluate_law
+from xcrack.growth.directions.criteria import clipped, equivalent_K
+from xcrack.growth.rates.ladder import Ladder
+from xcrack.growth.rates.uncertainty import best_known
+from xcrack.growth.steps.step import Step
 from xcrack.history.driving import Driving, driving
 from xcrack.history.history import History
 from xcrack.inputs import number, shown

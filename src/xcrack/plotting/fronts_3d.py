@@ -15,8 +15,8 @@ from xcrack.arrays import Bools, Floats
 from xcrack.crack.fronts_3d import closed_fronts, is_closed
 from xcrack.crack.measures_3d import front_ends
 from xcrack.errors import ProblemError
-from xcrack.growth.lineage import lineage
-from xcrack.growth.step import Step
+from xcrack.growth.steps.lineage import lineage
+from xcrack.growth.steps.step import Step
 from xcrack.history.history import History
 from xcrack.inputs import entries, shown, whole
 from xcrack.mesh.body import Body

@@ -4,10 +4,10 @@ from typing import Any
 
 import numpy as np
 
-from xcrack.growth.front_trail import FrontTrail
-from xcrack.growth.overloads import Zones
-from xcrack.growth.step import Memory, Step
-from xcrack.growth.trail import Trail
+from xcrack.growth.steps.front_trail import FrontTrail
+from xcrack.growth.steps.overloads import Zones
+from xcrack.growth.steps.step import Memory, Step
+from xcrack.growth.steps.trail import Trail
 from xcrack.markup import element, joined, table
 from xcrack.reporting.section import Section
 from xcrack.reporting.source import Source

@@ -8,7 +8,7 @@ import numpy as np
 from xcrack.analysis.solve import solve
 from xcrack.book.case import Case, Value
 from xcrack.book.scenes_2d import NU, centre_crack
-from xcrack.growth.criteria import max_hoop_stress
+from xcrack.growth.directions.criteria import max_hoop_stress
 from xcrack.post.norms import energy_error
 from xcrack.scene.numerics import Numerics
 from xcrack.sif.sif import SIF

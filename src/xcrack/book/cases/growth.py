@@ -9,9 +9,9 @@ import numpy as np
 from xcrack.book.case import Case, Value
 from xcrack.crack.lines import line_crack
 from xcrack.crack.surfaces import penny_crack
-from xcrack.growth.criteria import max_hoop_stress, weighted_angle
+from xcrack.growth.directions.criteria import max_hoop_stress, weighted_angle
 from xcrack.growth.run import grow
-from xcrack.growth.step import Cycle
+from xcrack.growth.steps.step import Cycle
 from xcrack.history.collect import collect, resume
 from xcrack.laws.power import paris
 from xcrack.mesh.box import box

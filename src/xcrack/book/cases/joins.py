@@ -9,10 +9,10 @@ from xcrack.book.scenes_3d import graded, lines
 from xcrack.crack.crack import Crack
 from xcrack.crack.surfaces import penny_crack
 from xcrack.geometry.triangulation import face_areas
-from xcrack.growth.criteria import max_hoop_stress
-from xcrack.growth.ligament_3d import amplification
+from xcrack.growth.directions.criteria import max_hoop_stress
+from xcrack.growth.events.ligament_3d import amplification
 from xcrack.growth.run import grow
-from xcrack.growth.step import Cycle
+from xcrack.growth.steps.step import Cycle
 from xcrack.history.collect import collect
 from xcrack.laws.power import paris
 from xcrack.scene.conditions import traction

@@ -9,10 +9,10 @@ from scipy.integrate import quad
 
 from xcrack.book.case import Case, Value
 from xcrack.crack.lines import line_crack
-from xcrack.growth.criteria import weighted_angle
-from xcrack.growth.cycles import cycles_between
+from xcrack.growth.directions.criteria import weighted_angle
 from xcrack.growth.run import grow
-from xcrack.growth.step import Cycle, Step
+from xcrack.growth.steps.step import Cycle, Step
+from xcrack.growth.tracking.cycles import cycles_between
 from xcrack.history.collect import collect
 from xcrack.laws.law import Law
 from xcrack.laws.power import elber, paris, walker

@@ -8,9 +8,9 @@ from scipy.special import ndtri
 from xcrack.arrays import Floats
 from xcrack.book.case import Case, Value
 from xcrack.crack.lines import line_crack
-from xcrack.growth.criteria import weighted_angle
+from xcrack.growth.directions.criteria import weighted_angle
 from xcrack.growth.run import grow
-from xcrack.growth.step import Cycle
+from xcrack.growth.steps.step import Cycle
 from xcrack.history.collect import collect
 from xcrack.history.history import History
 from xcrack.laws.power import paris

@@ -8,7 +8,7 @@ import numpy as np
 
 from xcrack.book.case import Case, Value
 from xcrack.book.cases.lives import row_of_cracks
-from xcrack.growth.criteria import weighted_angle
+from xcrack.growth.directions.criteria import weighted_angle
 from xcrack.growth.run import grow
 from xcrack.history.collect import collect
 from xcrack.laws.law import Law

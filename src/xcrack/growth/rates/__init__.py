@@ -1,0 +1,1 @@
+"""From K to rates: ladders of K, blocks of cycles, evaluation, uncertainty."""

@@ -1,0 +1,1 @@
+"""Mesh and steps from a tolerance: scout, corridor, sizes."""

@@ -1,0 +1,1 @@
+"""Where tips and fronts go: advance, cycles, what they meet."""
