@@ -208,14 +208,11 @@ def test_drawn_junctions():
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::xcrack.XcrackWarning")
 def test_many_drawn_junctions():
-    """All are solved; of 128 whose tips have room the median is 1.5e-4, the largest 1.3e-3.
-
-    127 are within three medians of their mesh; docs/measured.md tells of the other one.
-    """
+    """All are solved; of 128 whose tips have room the median is 1.5e-4, the largest 5.6e-4."""
     changes = drawn(range(7200, 7400))
     assert np.median(changes) < 3e-4
     assert np.quantile(changes, 0.95) < 6e-4
-    assert changes.max() < 3e-3
+    assert changes.max() < 8e-4
 
 
 def test_pieces_of_the_body():

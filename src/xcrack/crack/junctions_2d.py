@@ -25,7 +25,7 @@ _SINE = np.sin(np.radians(10.0))  # of the smallest angle between two cracks tha
 _BEYOND = 1.6  # cells by which a crack is prolonged beyond the other one, across it
 _LEAST = 1.0  # cells to a third crack beyond it below which nothing can be resolved
 _APART = 1.0  # cells between a junction and a tip, or another junction on the same side
-_REACH = 3.2  # cells around a junction in which sides are those of the junction
+REACH = 3.2  # cells around a junction in which sides are those of the junction
 
 
 @dataclass(frozen=True, eq=False)
@@ -177,7 +177,7 @@ def _junction(c: int, end: int, cracks: tuple[Crack, ...], mesh: Mesh) -> Juncti
             f"crack {on}, on which crack {c} ends at {at(x)}, turns back to it within "
             f"{2 * free:.4g}, two cells ({h:.4g}) or less: refine the mesh there."
         )
-    reach = max(_REACH, 2 / sine + 2) * h
+    reach = max(REACH, 2 / sine + 2) * h
     return Junction(c, end, on, x, side, x + min(way, free) * ahead, reach)
 
 

@@ -10,9 +10,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from xcrack.arrays import Bools, Floats, Ints, lock
-from xcrack.crack.junctions_2d import Junction
+from xcrack.crack.junctions_2d import REACH, Junction
 from xcrack.cutting.cut import Cut
+from xcrack.mesh.locate import cells_around
 from xcrack.mesh.mesh import Mesh
+
+_ROOM, _LEAST = 0.7, 0.1  # cells by which nodes of both cracks are within the reach, or must be
+_FROM_TIP = 0.5  # cells between the reach and the next tip
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,6 +79,7 @@ def joined_cuts(
 def _joined(mesh: Mesh, through: Cut, ending: Cut, own: Junction) -> tuple[Cut, Cut, Joint]:
     """Cuts of the crack that runs through and of the one that ends on it."""
     centre = mesh.points[mesh.cells].mean(axis=1)
+    own = replace(own, reach=_reach(mesh, through, ending, own))
     near = np.linalg.norm(centre - own.x, axis=1) < own.reach
     split = _split(mesh, through, ending, own, near)
     lips = split.lip_points(mesh)
@@ -84,6 +89,23 @@ def _joined(mesh: Mesh, through: Cut, ending: Cut, own: Junction) -> tuple[Cut, 
     clipped, both = _clipped(mesh, through, ending, own, near)
     joint = Joint(own.crack, own.on, own.side, lock(x), own.x, own.reach, lock(near), lock(both))
     return split, clipped, joint
+
+
+def _reach(mesh: Mesh, through: Cut, ending: Cut, own: Junction) -> float:
+    """Radius that holds all points whose cells both cracks cut, and no tip.
+
+    Cells that both cracks cut lie farther from a shallow junction than their mean size tells.
+    """
+    h = float(mesh.cell_size[cells_around(mesh, own.x, 1e-9)].mean())
+    flags = np.zeros((2, mesh.n_points), dtype=bool)
+    for flag, cut in zip(flags, (through, ending), strict=True):
+        flag[mesh.cells[cut.cells]] = True
+    away = np.linalg.norm(mesh.points[flags.all(axis=0)] - own.x, axis=1)
+    common = float(away[away < 2 * own.reach].max(initial=0.0))
+    tips = [*through.level_set.tip, *ending.level_set.tip]
+    tip = min((float(np.linalg.norm(x - own.x)) for x in tips), default=np.inf)
+    wanted = min(max(own.reach, common + _ROOM * h), tip - _FROM_TIP * h)
+    return max(wanted, min(max(common + _LEAST * h, REACH * h), own.reach))
 
 
 def _at(mesh: Mesh, values: Floats, cell: Ints, bary: Floats) -> Floats:
