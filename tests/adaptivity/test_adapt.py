@@ -279,3 +279,15 @@ def test_errors_that_are_small_enough_ask_for_nothing():
     shares = np.array([[1.0, 2.0], [0.0, 0.0]])
     assert (smaller(shares, np.array([3.0, np.nan]), 4.0, 2, 2) == 1).all()
     assert (smaller(shares, np.array([np.nan, np.nan]), 1e-30, 2, 2) == 2.0**-2.5).all()
+
+
+def test_a_scene_at_rest_is_not_refined():
+    """No load, no K: cells would become smaller up to the largest number of unknowns."""
+    pull = [xc.traction("top", (0.0, 1.0)), xc.traction("bottom", (0.0, -1.0))]
+    crack = xc.line_crack([(-1.1, 0.01), (0.1, 0.03)])
+    body = xc.box((-1, -1), (1, 1), 8)
+    scene = xc.Problem(body, xc.Isotropic(1.0, 0.3, "strain"), [crack], loads=pull)
+    adapted = xc.adapt(scene, 1e-3, states=[0.0, 0.0], progress=False)
+    assert not adapted.met
+    assert len(adapted.rounds) == 1
+    assert adapted.reason == "K is zero at every tip"

@@ -122,6 +122,8 @@ def _rounds(
         if len(rounds) == _MOST_ROUNDS[scene.mesh.dim]:
             reason = f"{len(rounds)} rounds have not been enough"
             break
+        if not now.best.any():
+            break  # at rest, or shut everywhere: no cell brings K, nor a scale for its error
         mesh = _NEXT[scene.mesh.dim](now, tolerance, aim, most)
         if mesh is None:
             reason = (
@@ -138,9 +140,9 @@ def _rounds(
         now = new
     for message in messages:
         warn(message)
-    reason = "" if met else "; ".join(part for part in (reason, now.worst, *now.reasons) if part)
-    if not met and not np.abs(now.best).max(initial=0.0) > 0:
-        reason += "; K is zero at every tip"
+    zero = "" if np.abs(now.best).max(initial=0.0) > 0 else "K is zero at every tip"
+    parts = [part for part in (reason, now.worst, *now.reasons, zero) if part]
+    reason = "" if met else "; ".join(parts)
     return Adapted(now.problem, now.solutions, now.sifs, tolerance, met, reason, tuple(rounds))
 
 
