@@ -68,11 +68,12 @@ def test_reserve_leads_to_the_line(K_r, L_r):
 
 
 def test_residual_strength(history):
-    """K = stress √(π a): factors by hand; the joint one is below both."""
+    """K = stress √(π a): factors by hand, of every step; the joint one is below both."""
     table = residual_strength(
         history, nu=0.3, K_c=2000.0, collapse=lambda a: 300.0 / STRESS * (1 - a / 60), line=STEEL
     )
-    assert table["a"].tolist() == pytest.approx([5.0, 8.0, 11.0, 14.0])
+    assert table["a"].tolist() == pytest.approx([5.0, 8.0, 11.0, 14.0, 17.0])
+    assert table["N"].tolist() == [step.cycles for step in history.steps]
     assert np.allclose(table["by_toughness"], 2000 / (STRESS * np.sqrt(np.pi * table["a"])))
     assert np.allclose(table["by_collapse"], 3.0 * (1 - table["a"] / 60))
     assert (

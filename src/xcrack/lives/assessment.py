@@ -11,7 +11,7 @@ from scipy.optimize import brentq
 from xcrack.arrays import Floats
 from xcrack.errors import ProblemError
 from xcrack.growth.directions.criteria import clipped, equivalent_K
-from xcrack.history.driving import driving
+from xcrack.growth.steps.step import Step
 from xcrack.history.history import History
 from xcrack.inputs import called, number, numbers, shown
 
@@ -117,7 +117,7 @@ def residual_strength(
     collapse: Callable[[float], float] | None = None,
     line: assessment_line | None = None,
 ) -> NDArray[Any]:
-    """Factors on the largest load of a run at which each of its cracks breaks the body.
+    """Factors on the largest load of a run at which its cracks break the body, step by step.
 
     Parameters
     ----------
@@ -136,8 +136,9 @@ def residual_strength(
     Returns
     -------
     (n,) structured array
-        Columns step, N, a, K (largest K_eq of the step), by_toughness (K_c/K), by_collapse and
-        by_line, nan where nothing was given for them.
+        A row for each step with K, the last one included: step, N, K (largest K_eq of all load
+        states and tips), a of the crack that has it, by_toughness (K_c/K; inf where K is
+        0), by_collapse and by_line, nan where nothing was given for them.
 
     Raises
     ------
@@ -156,30 +157,33 @@ def residual_strength(
         raise ProblemError(
             f"residual_strength: line = {shown(line)}: give assessment_line, and collapse with it."
         )
-    rows = driving(history.steps)
     names = ("step", "N", "a", "K", "by_toughness", "by_collapse", "by_line")
-    result = np.full(len(rows.cycles), np.nan, dtype=[(name, float) for name in names])
-    for n in range(len(rows.cycles)):
-        lead = np.nonzero((rows.step == n) & rows.drives)[0]
-        if not len(lead):
-            continue
-        c, j = rows.place[lead[0]].tolist()
-        step = history.steps[n]
-        K = np.stack([state[c].K[j] for state in step.sif])
-        top = float(equivalent_K(clipped(K), step.angle[c][j], nu).max())
+    result = np.zeros(len(history.solved), dtype=[(name, float) for name in names])
+    for n, step in enumerate(history.solved):
+        K, c = _largest_K(step, nu)
         a = step.memory.length[c] if step.memory is not None else np.nan
-        by_K = tough / top
+        by_K = tough / K if K > 0 else np.inf
         by_section = by_line = np.nan
         if collapse is not None:
             by_section = number(
-                called(collapse, f"the collapse of step {n}", a),
+                called(collapse, f"the collapse of step {step.index}", a),
                 "residual_strength: collapse",
                 above=0,
             )
         if line is not None:
             by_line = line.reserve(1 / by_K, 1 / by_section)
-        result[n] = (n, step.cycles, a, top, by_K, by_section, by_line)
+        result[n] = (step.index, step.cycles, a, K, by_K, by_section, by_line)
     return result
+
+
+def _largest_K(step: Step, nu: float) -> tuple[float, int]:
+    """Largest K_eq of all load states at all tips of a step, and the crack that has it."""
+    largest = [
+        float(equivalent_K(clipped(np.stack([s[c].K for s in step.sif])), angle, nu).max(initial=0))
+        for c, angle in enumerate(step.angle)
+    ]
+    c = int(np.argmax(largest))
+    return largest[c], c
 
 
 def geometry_factors(history: History, *, stress: float) -> NDArray[Any]:

@@ -107,7 +107,7 @@ def _strength(level: int) -> list[Value]:
     rows = residual_strength(_run(level, flights=False), nu=0.3, K_c=2.5)
     values = []
     for n in (0, len(rows) - 1):
-        half = _A0 + _GROWTH * n / len(rows)
+        half = _A0 + _GROWTH * n / (len(rows) - 1)
         wanted = 2.5 / float(periodic_K(half, _W))
         values.append(Value(f"factor at a = {half:.3g}", rows["by_toughness"][n], wanted, 2e-3))
     return values
