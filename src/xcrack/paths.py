@@ -2,8 +2,8 @@
 
 import errno
 import os
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -133,4 +133,30 @@ def written_whole(
                 part.unlink()
 
 
-__all__ = ["path_of", "system_errors", "written_whole"]
+def write_texts(
+    texts: Mapping[Path, str], what: str, *, error: type[XcrackError] = XcrackError
+) -> None:
+    """Write files of text in UTF-8; none takes the place of an older one before all are whole.
+
+    Parameters
+    ----------
+    texts : mapping of Path to str
+        Their folders are made if they are not there.
+    what : str
+        As of `system_errors`.
+    error : type of XcrackError
+
+    Raises
+    ------
+    error
+        For an OSError; older files stay as they were.
+    """
+    with ExitStack() as parts:
+        for path, text in texts.items():
+            with system_errors(what, path, error=error):
+                path.parent.mkdir(parents=True, exist_ok=True)
+            part = parts.enter_context(written_whole(path, what, error=error))
+            part.write_text(text, encoding="utf-8", newline="")
+
+
+__all__ = ["path_of", "system_errors", "write_texts", "written_whole"]

@@ -4,7 +4,9 @@ import base64
 import json
 import re
 import shutil
+import signal
 import subprocess
+import warnings
 from dataclasses import replace
 from functools import cache
 from html.parser import HTMLParser
@@ -368,3 +370,39 @@ def test_spectrum_and_retardation_have_a_section(tmp_path):
     assert zone["places"] == 2
     for words in ("Load history", "repetitions at the last step", "What overloads have left"):
         assert words in page
+
+
+def test_an_older_page_outlives_a_full_disk(tmp_path):
+    """A limit on the size of files stands for a full disk."""
+    resource = pytest.importorskip("resource")
+    solution = xc.solve(plate())
+    page = xc.report(solution, tmp_path / "r.html")
+    older = page.read_bytes(), page.with_suffix(".json").read_bytes()
+    handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (len(older[0]) - 20_000, limits[1]))
+    try:
+        with pytest.raises(xc.ProblemError, match=r"cannot be written to .*r\.html.*make room"):
+            xc.report(solution, page)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+        signal.signal(signal.SIGXFSZ, handler)
+    assert (page.read_bytes(), page.with_suffix(".json").read_bytes()) == older
+    assert sorted(file.name for file in tmp_path.iterdir()) == ["r.html", "r.json"]
+
+
+def test_a_plastic_zone_as_large_as_the_crack_is_a_warning(tmp_path):
+    """(K/yield)²/2π of a far stress above yield, against the crack inside the body."""
+    loads = [xc.traction("top", (0, 400.0)), xc.traction("bottom", (0, -400.0))]
+    crack = xc.line_crack([(-3, 0.3), (4, 0.3)])
+    problem = xc.Problem(xc.box((0, -20), (20, 20), (20, 40)), STEEL, [crack], loads=loads)
+    solution = xc.solve(problem)
+    with pytest.warns(xc.XcrackWarning, match=r"% of the shortest crack.* does not hold") as said:
+        _, _, numbers = read(xc.report(solution, tmp_path / "r.html", yield_stress=345.0))
+    K = np.abs(xc.stress_intensity(solution).K[:, :2]).max()
+    share = re.search(r"([\d.]+) % of the shortest crack", str(said[0].message))
+    assert float(share[1]) == pytest.approx(100 * (K / 345) ** 2 / (2 * np.pi) / 4.0, rel=5e-3)
+    assert any("does not hold" in text for text in numbers["warnings"]["messages"])
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", xc.XcrackWarning)
+        xc.report(solution, tmp_path / "r.html", yield_stress=3450.0)

@@ -11,7 +11,7 @@ from xcrack.book.run import Book, Result, chosen, line_of, run_cases
 from xcrack.errors import ProblemError
 from xcrack.history.versions import versions
 from xcrack.inputs import flag, shown
-from xcrack.paths import path_of, system_errors
+from xcrack.paths import path_of, write_texts
 
 
 def verify(
@@ -78,11 +78,9 @@ def write_book(book: Book, path: Path) -> None:
     numbers = {"quick": book.quick, "passed": book.passed, "versions": known,
                "cases": [_content(result) for result in book.results],
                "uncovered": list(book.uncovered)}  # fmt: skip
-    with system_errors("the book cannot be written to", path, error=ProblemError):
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(book_page(book, known), encoding="utf-8")
-        text = json.dumps(numbers, indent=1, ensure_ascii=False)
-        path.with_suffix(".json").write_text(text + "\n", encoding="utf-8")
+    text = json.dumps(numbers, indent=1, ensure_ascii=False)
+    texts = {path: book_page(book, known), path.with_suffix(".json"): text + "\n"}
+    write_texts(texts, "the book cannot be written to", error=ProblemError)
 
 
 def _content(result: Result) -> dict[str, Any]:

@@ -1,6 +1,7 @@
 """What became of the cracks in a growth run."""
 
 import csv
+import io
 from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
@@ -26,7 +27,7 @@ from xcrack.laws.law import Law
 from xcrack.markup import element, joined
 from xcrack.mesh.mesh import Mesh
 from xcrack.optional import required
-from xcrack.paths import path_of, system_errors
+from xcrack.paths import path_of, system_errors, write_texts
 from xcrack.sketch import rim, sketch
 from xcrack.spectra.spectrum import Spectrum
 
@@ -293,26 +294,25 @@ class History:
 
         folder = path_of(path, "History.write: path", error=ProblemError)
         rows, mesh = self.table(), self.mesh
+        tables = {"history": rows}
         if mesh is not None:
             every = measured(self.steps, mesh)
-            rows = with_measures(rows, every, mesh)
-        with system_errors(
-            "the history cannot be written as a whole to", folder, error=ProblemError
-        ):
+            tables["history"] = with_measures(rows, every, mesh)
+            tables["measures"], tables["ends"] = measures_tables(every, mesh)
+        texts = {folder / f"{name}.csv": _csv_text(each) for name, each in tables.items()}
+        what = "the history cannot be written as a whole to"
+        with system_errors(what, folder, error=ProblemError):
             folder.mkdir(parents=True, exist_ok=True)
-            _write_csv(folder / "history.csv", rows)
-            if mesh is not None:
-                both = measures_tables(every, mesh)
-                for name, each in zip(("measures", "ends"), both, strict=True):
-                    _write_csv(folder / f"{name}.csv", each)
+            write_texts(texts, what, error=ProblemError)
             write_series(self.steps, folder)
 
 
-def _write_csv(path: Path, rows: NDArray[Any]) -> None:
-    with open(path, "w", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(rows.dtype.names or ())
-        writer.writerows(rows.tolist())
+def _csv_text(rows: NDArray[Any]) -> str:
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(rows.dtype.names or ())
+    writer.writerows(rows.tolist())
+    return text.getvalue()
 
 
 __all__ = ["History"]

@@ -7,7 +7,11 @@ import numpy as np
 
 from xcrack.arrays import Ints
 from xcrack.crack.crack import Crack
+from xcrack.errors import ProblemError
 from xcrack.growth.steps.step import Step
+from xcrack.paths import write_texts
+
+_UNWRITTEN = "the history cannot be written as a whole to"
 
 
 def write_series(steps: Sequence[Step], folder: Path) -> Path:
@@ -29,18 +33,19 @@ def write_series(steps: Sequence[Step], folder: Path) -> Path:
             names += [file.name for file in write(solution, stem, **K)]
         if not names:
             name = f"step_{step.index:05d}_cracks.vtp"
-            (parts / name).write_text(polylines(step.cracks))
+            write_texts({parts / name: polylines(step.cracks)}, _UNWRITTEN, error=ProblemError)
             names.append(name)
         entries += [
             f'    <DataSet timestep="{step.index}" part="{part}" file="steps/{name}"/>'
             for part, name in enumerate(names)
         ]
     target = folder / "history.pvd"
-    target.write_text(
+    text = (
         '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1">\n  <Collection>\n'
         + "\n".join(entries)
         + "\n  </Collection>\n</VTKFile>\n"
     )
+    write_texts({target: text}, _UNWRITTEN, error=ProblemError)
     return target
 
 

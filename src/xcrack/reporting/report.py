@@ -11,13 +11,13 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from xcrack.errors import ProblemError, XcrackError
+from xcrack.errors import ProblemError, XcrackError, warn
 from xcrack.history.versions import versions
 from xcrack.inputs import number, shown
 from xcrack.lives.inspection import Inspection
 from xcrack.lives.life import Life
 from xcrack.markup import Markup, element, joined, listed, page
-from xcrack.paths import path_of, system_errors
+from xcrack.paths import path_of, write_texts
 from xcrack.plotting.report_pictures import Picture, history_pictures, solution_pictures
 from xcrack.plotting.view_3d import history_layers, packed, solution_layers
 from xcrack.reporting import histories, results, safety, scene
@@ -53,7 +53,8 @@ def report(
         Of the page; ``.html`` is added where it has no suffix.
     title : str
     yield_stress : float, stress, optional
-        Lets the report compare plastic zones with crack and cell.
+        Lets the report compare plastic zones with crack and cell; a zone above 15 % of the
+        shortest crack, where K of linear elasticity does not hold, is a warning.
     life : Life, optional
         What `xc.life` made of the run: the report shows it and what drives it.
     inspection : Inspection, optional
@@ -91,11 +92,13 @@ def report(
         )
     source = source_of(result, title, yield_stress, life)
     source = replace(source, inspection=inspection, strength=strength)
+    words, is_small = scene.plastic_zone(source)
+    if not is_small:
+        warn(words)
+        source.warnings.update([words])
     sections = [made for make in SECTIONS if (made := make(source)) is not None]
-    with system_errors("the report cannot be written to", path, error=ProblemError):
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(_page(source, sections), encoding="utf-8")
-        path.with_suffix(".json").write_text(_json(source, sections), encoding="utf-8")
+    texts = {path: _page(source, sections), path.with_suffix(".json"): _json(source, sections)}
+    write_texts(texts, "the report cannot be written to", error=ProblemError)
     return path
 
 

@@ -13,7 +13,7 @@ from xcrack.markup import Markup, element, joined, listed, table
 from xcrack.reporting.section import Section
 from xcrack.reporting.source import Source
 
-_SMALL = 0.1  # share of a length up to which a plastic zone counts as small
+_SMALL = 0.15  # share of the crack up to which a plastic zone counts as small
 
 
 def scene(source: Source) -> Section:
@@ -124,7 +124,7 @@ def _notes(source: Source) -> list[str]:
     rubs = any(any(solution.problem.frictions) for solution in source.solutions)
     faces = "with Coulomb friction" if rubs else "without friction"
     notes = [f"Small strains, a linear elastic isotropic body, crack faces {faces}."]
-    notes.append(_plastic_zone(source))
+    notes.append(plastic_zone(source)[0])
     history = source.history
     memory = history.steps[0].memory if history is not None and history.steps else None
     if history is not None and memory is not None:
@@ -144,24 +144,29 @@ def _notes(source: Source) -> list[str]:
     return notes
 
 
-def _plastic_zone(source: Source) -> str:
-    """Size of the plastic zone against the shortest crack, and what it is judged by."""
+def plastic_zone(source: Source) -> tuple[str, bool]:
+    """Size of the plastic zone against the shortest crack, and whether elastic K holds with it."""
     if source.yield_stress is None:
-        return ("Plastic zones were not judged: give report(..., yield_stress=...) to have them "
-                "compared with crack, ligament and cell.")  # fmt: skip
+        words = ("Plastic zones were not judged: give report(..., yield_stress=...) to have them "
+                 "compared with crack and cell.")  # fmt: skip
+        return words, True
     every = [sif.K[:, :2] for state in source.sif for sif in state]
     largest = max((float(np.abs(K).max(initial=0.0)) for K in every), default=0.0)
     radius = (largest / source.yield_stress) ** 2 / (2 * np.pi)
-    lengths = {"crack": _shortest(source), "cell": _cell(source)}
+    lengths = {"shortest crack": _shortest(source), "smallest cell": _cell(source)}
     words = ", ".join(f"{100 * radius / v:.3g} % of the {name}" for name, v in lengths.items()
                       if v > 0)  # fmt: skip
-    small = lengths["crack"] <= 0 or radius <= _SMALL * lengths["crack"]
-    verdict = "small" if small else "NOT small: linear elastic K is not valid"
+    is_small = radius <= _SMALL * lengths["shortest crack"] or not source.cracks
+    verdict = "small" if is_small else "NOT small: linear elastic K does not hold"
     return (f"Plastic zone (Irwin, plane stress) (K/yield)²/2π = {radius:.4g} for the largest K "
-            f"{largest:.6g}: {words}; {verdict}.")  # fmt: skip
+            f"{largest:.6g}: {words}; {verdict}."), is_small  # fmt: skip
 
 
 def _shortest(source: Source) -> float:
+    """Smallest size of a crack: its length inside the body in 2D, its extent in 3D."""
+    mesh = source.mesh
+    if source.dim == 2 and mesh is not None:
+        return min((measures(crack, mesh).area for crack in source.cracks), default=0.0)
     sizes = [float(np.ptp(crack.points, axis=0).max()) for crack in source.cracks]
     return min(sizes, default=0.0)
 
@@ -211,4 +216,4 @@ def again(source: Source) -> Section:
                    {"versions": known, "hashes": hashes, "settings": settings})  # fmt: skip
 
 
-__all__ = ["again", "assumptions", "scene", "warned"]
+__all__ = ["again", "assumptions", "plastic_zone", "scene", "warned"]
