@@ -133,6 +133,17 @@ def test_a_case_must_return_numbers(tmp_path):
     assert "give a History" in study.failed[0]["error"]
 
 
+def test_a_result_cannot_take_the_column_of_a_parameter(tmp_path):
+    study = campaign(lambda a: {"a": 7.0}, [{"a": 1.0}, {"a": 7.0}], path=tmp_path / "one")
+    assert study.table()["a"].tolist() == [1.0, 7.0]
+    assert "'a', which is a parameter" in study.rows[0]["error"]
+    assert not study.rows[1]["error"]
+    study = campaign(lambda a: {"seconds": 7.0}, [{"a": 1.0}], path=tmp_path / "two")
+    assert "'seconds', which is" in study.rows[0]["error"]
+    with pytest.raises(ProblemError, match="parameter 'error', which is a column"):
+        campaign(lambda error: {}, [{"error": 1.0}], path=tmp_path / "three")
+
+
 @pytest.mark.slow
 @pytest.mark.mission
 def test_two_workers_killed_twice_lose_and_repeat_nothing(tmp_path):

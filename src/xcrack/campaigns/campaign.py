@@ -19,7 +19,7 @@ from xcrack.campaigns.engine import (
     is_good,
     submitted,
 )
-from xcrack.campaigns.row import checked, key_of
+from xcrack.campaigns.row import COLUMNS, checked, key_of
 from xcrack.errors import ProblemError
 from xcrack.growth.steps.fingerprint import describe, differences
 from xcrack.history.lock import locked
@@ -54,7 +54,7 @@ class Study:
         names: dict[str, list[Any]] = {}
         for n, row in enumerate(self.rows):
             values = {**row["parameters"], **row["result"]}
-            values |= {"error": row["error"], "seconds": row["seconds"]}
+            values |= {name: row[name] for name in COLUMNS}
             for name, value in values.items():
                 names.setdefault(name, [None] * len(self.rows))[n] = value
         columns = {name: _column(values) for name, values in names.items()}
@@ -102,14 +102,16 @@ def campaign(
     Raises
     ------
     ProblemError
-        Cases that a file cannot hold, a folder of another case, a folder that another process
-        writes to, or a worker that died: finished cases stay, and the same call goes on.
+        Cases that a file cannot hold, a parameter called error or seconds, a folder of another
+        case, a folder that another process writes to, or a worker that died: finished cases stay,
+        and the same call goes on.
 
     Notes
     -----
     Errors in a case are rows, with their text; a run is never stopped by one. The first case is run
     alone, so that kernels are compiled once and not by each worker. A case is known by its
-    parameters alone: options of xcrack that are added later change no name.
+    parameters alone: options of xcrack that are added later change no name. A result with the name
+    of a parameter and another value is an error of its case.
     """
     folder = path_of(path, "campaign: path", error=ProblemError)
     if not callable(case):

@@ -17,6 +17,9 @@ from xcrack.inputs import shown
 
 Parameters = Mapping[str, Any]
 
+COLUMNS = ("error", "seconds")
+"""Columns of the table of a study that no parameter and no result may be named like."""
+
 
 def key_of(parameters: Parameters) -> str:
     """Name of a case: the same for the same parameters, whatever their order."""
@@ -29,7 +32,7 @@ def checked(parameters: Any, number: int) -> dict[str, Any]:
     Raises
     ------
     ProblemError
-        No mapping of names to finite numbers, texts, flags or None.
+        No mapping of names to finite numbers, texts, flags or None, or a name of `COLUMNS`.
     """
     if not isinstance(parameters, Mapping):
         raise ProblemError(
@@ -39,6 +42,11 @@ def checked(parameters: Any, number: int) -> dict[str, Any]:
     result: dict[str, Any] = {}
     for name, given in parameters.items():
         value = given.item() if isinstance(given, np.generic) else given
+        if name in COLUMNS:
+            raise ProblemError(
+                f"campaign: cases[{number}] has a parameter {name!r}, which is a column of the "
+                "table: give it another name."
+            )
         fits = value is None or isinstance(value, bool | str)
         fits = fits or (isinstance(value, int | float) and bool(np.isfinite(value)))
         if not isinstance(name, str) or not fits:
@@ -65,7 +73,7 @@ def run_case(case: Callable[..., Any], parameters: dict[str, Any]) -> dict[str, 
     with warnings.catch_warnings(record=True) as seen:
         warnings.simplefilter("always")
         try:
-            row["result"] = _numbers(case(**parameters))
+            row["result"] = _numbers(case(**parameters), parameters)
         except XcrackError as error:
             row["error"], row["kind"] = str(error), type(error).__name__
         except Exception as error:
@@ -76,11 +84,11 @@ def run_case(case: Callable[..., Any], parameters: dict[str, Any]) -> dict[str, 
     return row
 
 
-def _numbers(value: Any) -> dict[str, Any]:
+def _numbers(value: Any, parameters: Parameters) -> dict[str, Any]:
     """Result of a case: life and end of a history, or the numbers that the case returned."""
     if isinstance(value, History):
         last = value.steps[-1].index if value.steps else -1
-        return {"life": value.life, "steps": last + 1, "ended": value.ended}
+        value = {"life": value.life, "steps": last + 1, "ended": value.ended}
     if isinstance(value, Mapping):
         result = {}
         for name, given in value.items():
@@ -90,6 +98,11 @@ def _numbers(value: Any) -> dict[str, Any]:
                     f"campaign: a case returned {name!r:.40} = {shown(given)}: give numbers "
                     "and texts."
                 )
+            if name in COLUMNS or (name in parameters and number != parameters[name]):
+                raise ProblemError(
+                    f"campaign: a case returned {str(name)!r:.40}, which is a parameter or a "
+                    "column of the table: give the result another name."
+                )
             result[str(name)] = number
         return result
     raise ProblemError(
@@ -97,4 +110,4 @@ def _numbers(value: Any) -> dict[str, Any]:
     )
 
 
-__all__ = ["Parameters", "checked", "key_of", "run_case"]
+__all__ = ["COLUMNS", "Parameters", "checked", "key_of", "run_case"]
