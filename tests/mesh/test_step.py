@@ -118,3 +118,11 @@ def test_what_is_no_body_says_so(tmp_path: Path) -> None:
 def test_wrong_sizes_are_errors(tmp_path: Path, size: Any, error: type, says: str) -> None:
     with pytest.raises(error, match=says):
         xc.mesh_step(step(tmp_path, plate), size=size)
+
+
+def test_a_file_that_gmsh_dies_of_is_refused(tmp_path: Path) -> None:
+    path = step(tmp_path, two_parts)
+    damaged = path.read_bytes().replace(b"MANIFOLD_SOLID_BREP", b"SHELL_BASED_SURFACE_MODEL")
+    (tmp_path / "bad.step").write_bytes(damaged)
+    with pytest.raises(GeometryError, match=r"reads bad\.step .*damaged\. Export the part anew"):
+        xc.mesh_step(tmp_path / "bad.step", size=0.4)

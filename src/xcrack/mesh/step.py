@@ -1,5 +1,8 @@
 """Bodies from CAD: a STEP file meshed by gmsh, with sets of its faces."""
 
+import os
+import subprocess
+import sys
 from collections.abc import Callable, Mapping, Sequence
 from math import log10
 from os import PathLike
@@ -53,8 +56,8 @@ def mesh_step(
     XcrackError
         The file is missing, or gmsh is.
     GeometryError
-        No closed body in the file, a selector without a face or with other values than bools, a
-        size that is not positive, or so small that millions of points would be needed.
+        A damaged file, no closed body in it, a selector without a face or with other values than
+        bools, a size that is not positive, or so small that millions of points would be needed.
     MeshError
         gmsh cannot mesh the shape.
     """
@@ -72,6 +75,7 @@ def mesh_step(
             "mesh_step: sets must be a dict of names and selectors, such as sets={'hole': lambda "
             f"x: np.hypot(x[:, 0], x[:, 1]) < 5.01}}, not {type(sets).__name__}."
         )
+    _check_reading(path)
     with session() as gmsh:
         dim = _shape(gmsh, path)
         if not callable(size_at):
@@ -89,6 +93,29 @@ def mesh_step(
         if failures:
             raise failures[0]
         return _mesh(gmsh, dim, path.name, sets or {})
+
+
+def _check_reading(path: Path) -> None:
+    """Raise where gmsh dies while it reads a file: a process of its own tries that first."""
+    if not sys.executable:  # Python within another program
+        return
+    code = "import pathlib, sys; from xcrack.mesh.step import _try; _try(pathlib.Path(sys.argv[1]))"
+    run = subprocess.run(
+        [sys.executable, "-P", "-c", code, str(path)],
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
+        capture_output=True,
+        check=False,
+    )
+    if run.returncode not in (0, 1):  # 1: an error in Python, which is raised again here
+        raise GeometryError(
+            f"gmsh dies while it reads {path.name} (exit status {run.returncode}): the file is "
+            "damaged. Export the part anew as STEP AP203, AP214 or AP242."
+        )
+
+
+def _try(path: Path) -> None:
+    with session() as gmsh:
+        _shape(gmsh, path)
 
 
 def _shape(gmsh: ModuleType, path: Path) -> int:
