@@ -1,5 +1,7 @@
 """Pins, forces and moments on sets, temperature, fields of files, and what the report says."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -269,3 +271,66 @@ def test_the_part_of_a_stress_out_of_balance() -> None:
     share = [float(r.split("%")[0]) for r in reasons]
     assert share[0] < 0.01  # discretisation
     assert share[1] == pytest.approx(100, abs=0.1)
+
+
+def strip(loads, mesh=None, crack=((-0.1, 0.013), (0.3, 0.013))) -> xc.Problem:
+    mesh = xc.box((0, -1), (1, 2), (8, 24)) if mesh is None else mesh
+    support = [xc.fix("bottom")] if "bottom" in mesh.facet_sets else [xc.fix("rim")]
+    return xc.Problem(mesh, STEEL, [xc.line_crack(crack)], supports=support, loads=loads)
+
+
+def same_bars(first: xc.Problem, second: xc.Problem, rtol: float) -> None:
+    a, b = (xc.stress_intensity(xc.solve(each, error=True), 0) for each in (first, second))
+    np.testing.assert_allclose(a.K[:, :2], b.K[:, :2], rtol=rtol)
+    np.testing.assert_allclose(a.eta, b.eta, rtol=rtol, atol=rtol * np.abs(a.K).max())
+    np.testing.assert_allclose(a.bar, b.bar, rtol=rtol, atol=rtol * np.abs(a.K).max())
+
+
+def test_bars_of_K_know_resultants() -> None:
+    """Force and moment on a side are a linear traction there: K and bars are those of it."""
+    inertia = 1 / 12
+
+    def traction(x: np.ndarray) -> np.ndarray:
+        stress = 3.0 - 0.4 / inertia * (x[:, 0] - 0.5)
+        return np.column_stack([np.full(len(x), 0.7), stress])
+
+    given = xc.resultant("top", force=(0.7, 3.0), moment=-0.4)
+    same_bars(strip([given]), strip([xc.traction("top", traction)]), rtol=1e-8)  # round-off
+
+
+def test_bars_of_K_know_bearings() -> None:
+    """A pin is a cosine pressure: its discrete scale is that of the polygon, 2e-3 away."""
+    mesh = xc.refine(ring(48))
+    crack = ((4.9, -0.97), (6.4, -0.97))
+    force = np.array([0.0, 60.0])
+
+    def traction(x: np.ndarray) -> np.ndarray:
+        radial = x - [3.0, -1.0]
+        radial /= np.linalg.norm(radial, axis=1)[:, None]
+        return np.maximum(radial[:, 1:], 0) * radial * (60.0 / (np.pi * 2.0 / 2))
+
+    pin = strip([xc.bearing("hole", force)], mesh, crack)
+    same_bars(pin, strip([xc.traction("hole", traction)], mesh, crack), rtol=5e-3)
+
+
+@pytest.mark.filterwarnings("ignore::xcrack.XcrackWarning")
+@pytest.mark.parametrize("kind", ["resultant", "bearing"])
+@pytest.mark.parametrize("factors", [(0.0, 1.0, 0.4, 0.9), (-0.5, 1.0)])
+def test_a_spectrum_scales_resultants_and_pins_beside_steady_loads(kind, factors) -> None:
+    """Each level is the factor times K of the load and K of the steady one (no contact)."""
+    mesh, crack = (ring(48), ((4.9, -0.97), (6.4, -0.97)))
+    if kind == "bearing":
+        load, steady = xc.bearing("hole", (0.0, 60.0)), xc.traction("hole", (3.0, 9.0))
+    else:
+        mesh, crack = None, ((-0.1, 0.013), (0.3, 0.013))
+        load, steady = xc.resultant("top", (0.5, 3.0), 0.2), xc.body_force((0.1, 0.4))
+    for one, other in ((load, steady), (steady, load)):
+        problem = replace(strip([one], mesh, crack), contact="off")
+        spectrum = xc.Spectrum(factors, steady=[other], levels=3)
+        options = {"da": 0.1, "progress": False}
+        step = next(xc.grow(problem, xc.paris(1e-9, 3.0), xc.max_hoop_stress, spectrum, **options))
+        K_one = xc.stress_intensity(xc.solve(problem), 0).K
+        K_other = xc.stress_intensity(xc.solve(replace(problem, loads=[other])), 0).K
+        for factor, state in zip(step.levels, step.sif, strict=True):
+            scale = np.abs(K_one).max() + np.abs(K_other).max()
+            np.testing.assert_allclose(state[0].K, factor * K_one + K_other, atol=1e-9 * scale)

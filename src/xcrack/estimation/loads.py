@@ -13,13 +13,13 @@ from xcrack.scene.conditions import (
     InitialStress,
     Load,
     Pressure,
+    SetLoad,
     Traction,
     evaluate,
-    evaluate_scalar,
     evaluate_stress,
 )
 from xcrack.xfem.lips import LipPoints
-from xcrack.xfem.loads import facet_points, position
+from xcrack.xfem.loads import facet_points, name_of, position, traction_of
 from xcrack.xfem.quadrature import Points, cell_points
 
 _BODY = 5  # degree of the rule for body forces and initial stress
@@ -32,29 +32,24 @@ def load_residual(surplus: Surplus, solution: Solution) -> Floats:
     """
     result = np.zeros((len(surplus.fixed), 2))
     for load in solution.loads:
-        if isinstance(load, Traction | Pressure):
+        if isinstance(load, SetLoad):
             _add_traction(result, surplus, load, solution.factor)
         elif isinstance(load, BodyForce | InitialStress):
             _add_volume(result, surplus, load, solution.factor)
     return result
 
 
-def _add_traction(result: Floats, surplus: Surplus, load: Traction | Pressure, by: float) -> None:
+def _add_traction(result: Floats, surplus: Surplus, load: SetLoad, by: float) -> None:
     """Constant tractions do no work on the cubic of an edge, which is odd, unless it is cut."""
-    space, what = surplus.space, f"{type(load).__name__.lower()}({load.where!r})"
-    facets = facet_set(space.mesh, load.where, what)
-    if not callable(load.value):
+    space = surplus.space
+    facets = facet_set(space.mesh, load.where, name_of(load))
+    if isinstance(load, Traction | Pressure) and not callable(load.value):
         owner = space.mesh.facet_to_cell[space.mesh.facet_numbers(facets), 0]
         facets = facets[(surplus.copy[surplus.functions[owner]] >= 0).any(axis=1)]
     if not len(facets):
         return
     points, normal = facet_points(space, facets)
-    x = position(space, points.cell, points.bary)
-    if isinstance(load, Pressure):
-        density = -evaluate_scalar(load.value, x, what)[:, None] * normal
-    else:
-        density = evaluate(load.value, x, what, normal)
-    _add(result, surplus, points, by * density)
+    _add(result, surplus, points, by * traction_of(load, space, facets, points, normal))
 
 
 def _add_volume(result: Floats, surplus: Surplus, load: Load, by: float) -> None:

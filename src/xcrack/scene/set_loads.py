@@ -14,21 +14,23 @@ from xcrack.inputs import number, numbers, shown
 
 @dataclass(frozen=True, eq=False)
 class Bearing:
-    """Pressure of a pin on a round hole, by its resultant."""
+    """Pressure of a pin on a round hole, by its resultant; a factor multiplies the tractions."""
 
     where: str
     force: Floats
     contact_angle: float
+    factor: float = 1.0
 
 
 @dataclass(frozen=True, eq=False)
 class Resultant:
-    """Tractions on a set with a given resultant force and moment."""
+    """Tractions on a set with a given force and moment; a factor multiplies the tractions."""
 
     where: str
     force: Floats | None
     moment: Floats | None
     about: Floats | None
+    factor: float = 1.0
 
 
 def bearing(where: str, force: ArrayLike, *, contact_angle: float = pi) -> Bearing:

@@ -17,6 +17,7 @@ from xcrack.scene.conditions import (
     Pressure,
     Traction,
 )
+from xcrack.scene.set_loads import Bearing, Resultant
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,6 +49,8 @@ def scaled(load: Load, factor: float) -> Load:
             return load
         case PointForce():
             return replace(load, force=np.asarray(load.force) * factor)
+        case Bearing() | Resultant():  # the tractions: a pin that pulls is what factors mean here
+            return replace(load, factor=load.factor * factor)
         case Displacement() | Traction() | Pressure() | BodyForce() | CrackPressure():
             return replace(load, value=_times(load.value, factor))
     raise AssertionError(load)

@@ -110,7 +110,7 @@ def facet_points(space: FunctionSpace, facets: Ints, n: int = 6) -> tuple[Points
 
 
 def _add_traction(f: Floats, space: FunctionSpace, load: SetLoad) -> None:
-    what = f"{type(load).__name__.lower()}({shown(load.where)})"
+    what = name_of(load)
     facets = facet_set(space.mesh, load.where, what)
     inner = space.mesh.facet_to_cell[numbers_of(space.mesh, facets), 1] >= 0
     if inner.any():
@@ -119,17 +119,27 @@ def _add_traction(f: Floats, space: FunctionSpace, load: SetLoad) -> None:
             "boundary only."
         )
     points, normal = facet_points(space, facets)
-    x = position(space, points.cell, points.bary)
+    _add(f, space, points, traction_of(load, space, facets, points, normal))
+
+
+def name_of(load: SetLoad) -> str:
+    """What messages call a load on a facet set."""
+    return f"{type(load).__name__.lower()}({shown(load.where)})"
+
+
+def traction_of(
+    load: SetLoad, space: FunctionSpace, facets: Ints, points: Points, normal: Floats
+) -> Floats:
+    """Tractions `(q, d)` of a load at the integration points of all facets of its set."""
+    what, x = name_of(load), position(space, points.cell, points.bary)
     if isinstance(load, Pressure):
-        density = -evaluate_scalar(load.value, x, what)[:, None] * normal
-    elif isinstance(load, Bearing):
+        return np.asarray(-evaluate_scalar(load.value, x, what)[:, None] * normal)
+    if isinstance(load, Bearing):
         hole = round_hole(space.mesh, facets, what)
-        density = bearing_traction(load, hole, x, points.weight)
-    elif isinstance(load, Resultant):
-        density = resultant_traction(load, x, points.weight)
-    else:
-        density = evaluate(load.value, x, what, normal)
-    _add(f, space, points, density)
+        return load.factor * bearing_traction(load, hole, x, points.weight)
+    if isinstance(load, Resultant):
+        return load.factor * resultant_traction(load, x, points.weight)
+    return evaluate(load.value, x, what, normal)
 
 
 def _add_initial_stress(f: Floats, space: FunctionSpace, load: InitialStress) -> None:
