@@ -29,8 +29,8 @@ from benchmarks.runs import machine  # noqa: E402
 from benchmarks.scenes.exact_fields import edge_fields, penny, penny_K_I  # noqa: E402
 from benchmarks.scenes.material import NU, STEEL, E  # noqa: E402
 from benchmarks.scenes.settings import Settings, mesh_of  # noqa: E402
-from xcrack.arrays import Floats  # noqa: E402
-from xcrack.verification import fields_2d  # noqa: E402
+from xcrack.base.arrays import Floats  # noqa: E402
+from xcrack.verification.exact import fields_2d  # noqa: E402
 
 RESULT = Path(__file__).parent / "results" / "defaults.json"
 FIGURE = Path(__file__).parent.parent / "docs" / "figures" / "defaults.png"

@@ -41,7 +41,7 @@ from benchmarks.scenes.exact_fields import (  # noqa: E402
 from benchmarks.scenes.material import STEEL  # noqa: E402
 from benchmarks.scenes.settings import Settings, mesh_of  # noqa: E402
 from xcrack.analysis.solve import solve_states  # noqa: E402
-from xcrack.scene.numerics import with_choices  # noqa: E402
+from xcrack.model.numerics import with_choices  # noqa: E402
 
 ROOT = Path(__file__).resolve().parent.parent
 RESULTS = ROOT / "benchmarks" / "results" / "economy.json"

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 import xcrack as xc
-from xcrack.arrays import Floats
+from xcrack.base.arrays import Floats
 
 RESULT = Path(__file__).parent / "results" / "front_waves.json"
 DIAMETER, NOTCH, DEPTH = 20.0, 2.0, 3.0

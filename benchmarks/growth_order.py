@@ -15,7 +15,7 @@ import xcrack as xc
 from benchmarks.scenes.growth import GROWN, PATH_END, TURNING, life
 from benchmarks.scenes.material import STEEL
 from benchmarks.scenes.settings import Settings
-from xcrack.arrays import Floats
+from xcrack.base.arrays import Floats
 
 Row = dict[str, list[float]]
 

@@ -17,17 +17,17 @@ from pathlib import Path
 import numpy as np
 
 import xcrack as xc
-from xcrack.contact.multipliers import gap_rows, multipliers
-from xcrack.cutting.cut import cut
-from xcrack.cutting.level_set_2d import line_levels
-from xcrack.solvers import direct as linear
-from xcrack.solvers.engine import ContactRows
-from xcrack.solvers.rigid_motion import free_motion
-from xcrack.xfem.assembly import bulk, enriched_stiffness, total_stiffness
-from xcrack.xfem.function_space import function_space
-from xcrack.xfem.lips import jump_matrix, lip_points
-from xcrack.xfem.loads import load_vector
-from xcrack.xfem.supports import known_unknowns
+from xcrack.analysis.multipliers import gap_rows, multipliers
+from xcrack.fem.assembly import bulk, enriched_stiffness, total_stiffness
+from xcrack.fem.cut import cut
+from xcrack.fem.facets import jump_matrix, lip_points
+from xcrack.fem.function_space import function_space
+from xcrack.fem.level_set import line_levels
+from xcrack.fem.loads import load_vector
+from xcrack.fem.supports import known_unknowns
+from xcrack.linalg import direct as linear
+from xcrack.linalg.engine import ContactRows
+from xcrack.linalg.rigid_motion import free_motion
 
 ROOT = Path(__file__).resolve().parent.parent
 PARTS = ("mesh", "level sets", "cut and space", "bulk", "enriched cells", "loads", "factor",

@@ -15,7 +15,7 @@ from statistics import median
 from time import perf_counter, process_time
 from typing import Any
 
-from xcrack.errors import XcrackError
+from xcrack.base.errors import XcrackError
 
 Row = dict[str, Any]
 _PACKAGES = ("xcrack", "numpy", "scipy", "numba", "gmsh", "scikit-fem", "pyamg", "matplotlib")

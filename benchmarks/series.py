@@ -5,7 +5,7 @@ from functools import partial
 
 from benchmarks.runs import Case, Outcome
 from benchmarks.scenes.settings import Settings
-from xcrack.scene.numerics import Numerics, with_choices
+from xcrack.model.numerics import Numerics, with_choices
 
 Scene = Callable[[Settings, int], Outcome]
 

@@ -29,19 +29,18 @@ for name in (
 import numpy as np  # noqa: E402
 
 import xcrack as xc  # noqa: E402
+from xcrack.analysis.multipliers import gap_rows, multipliers  # noqa: E402
 from xcrack.analysis.solve import solve_states  # noqa: E402
-from xcrack.contact.multipliers import gap_rows, multipliers  # noqa: E402
-from xcrack.cutting.cut import cut  # noqa: E402
-from xcrack.solvers.engine import ContactRows  # noqa: E402
-from xcrack.solvers.iterative import iterative_system  # noqa: E402
-from xcrack.solvers.rigid_motion import balanced, free_motion  # noqa: E402
-from xcrack.xfem.assembly import bulk, enriched_stiffness  # noqa: E402
-from xcrack.xfem.function_space import function_space  # noqa: E402
-from xcrack.xfem.lips import lip_points  # noqa: E402
-from xcrack.xfem.loads import load_vector  # noqa: E402
-from xcrack.xfem.model import Model, levels  # noqa: E402
-from xcrack.xfem.stiffness import Stiffness, next_to_enriched  # noqa: E402
-from xcrack.xfem.supports import known_unknowns  # noqa: E402
+from xcrack.fem.assembly import Stiffness, bulk, enriched_stiffness, next_to_enriched  # noqa: E402  # noqa: E402
+from xcrack.fem.cut import cut  # noqa: E402
+from xcrack.fem.facets import lip_points  # noqa: E402
+from xcrack.fem.function_space import function_space  # noqa: E402
+from xcrack.fem.loads import load_vector  # noqa: E402
+from xcrack.fem.supports import known_unknowns  # noqa: E402
+from xcrack.fem.system import Model, levels  # noqa: E402
+from xcrack.linalg.engine import ContactRows  # noqa: E402
+from xcrack.linalg.iterative import iterative_system  # noqa: E402
+from xcrack.linalg.rigid_motion import balanced, free_motion  # noqa: E402
 
 ROOT = Path(__file__).resolve().parent.parent
 SIZES = (18, 29, 44, 67)

@@ -7,7 +7,7 @@
     python -m benchmarks.stability --only drawn --seeds 510137:510138   # one scene again
 
 Each part adds its numbers to benchmarks/results/stability.json; seeds may be run in pieces and add
-up. The scenes are those of tests/, their exact solutions those of xcrack.verification.
+up. The scenes are those of tests/, their exact solutions those of xcrack.verification.exact.
 """
 
 import argparse

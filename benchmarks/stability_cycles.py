@@ -6,8 +6,8 @@ import xcrack as xc
 from benchmarks.stability_parts import Results, short
 from physics import test_contact_partial
 from support import scenes_2d as scenes
-from xcrack.arrays import Floats
-from xcrack.growth.directions.criteria import (
+from xcrack.base.arrays import Floats
+from xcrack.fatigue.criteria import (
     kink_angle,
     max_hoop_stress,
     mean_reference,

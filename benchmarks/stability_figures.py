@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from xcrack.arrays import Floats, Ints
+from xcrack.base.arrays import Floats, Ints
 
 Part = dict[str, Any]
 

@@ -31,9 +31,9 @@ from support.scenes_stability import (
     beside_an_edge,
     cut_condition,
 )
-from xcrack.scene.numerics import with_choices
-from xcrack.verification import closed, fields_2d
-from xcrack.verification.potentials_2d import uniform_stress
+from xcrack.model.numerics import with_choices
+from xcrack.verification.exact import closed, fields_2d
+from xcrack.verification.exact.potentials_2d import uniform_stress
 
 Results = dict[str, Any]
 EPS = (0.5, 0.1, 1e-2, 1e-3, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12, 1e-14, 0.0, -1e-12, -1e-6, -1e-2)

@@ -25,8 +25,8 @@ for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 import numpy as np  # noqa: E402
 
 import xcrack as xc  # noqa: E402
-from xcrack import threads  # noqa: E402
-from xcrack.xfem.model import build  # noqa: E402
+from xcrack.base import threads  # noqa: E402
+from xcrack.fem.system import build  # noqa: E402
 
 Times = dict[str, float]
 PARTS = ("matrices", "solution", "K", "whole")

@@ -17,7 +17,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 import xcrack as xc
-from xcrack.arrays import Floats
+from xcrack.base.arrays import Floats
 
 RESULT = Path(__file__).parent / "results" / "wanted_error.json"
 LAW = xc.paris(C=1e-3, m=3.0)

@@ -22,7 +22,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 import xcrack as xc
-from xcrack.arrays import Floats
+from xcrack.base.arrays import Floats
 
 RESULT = Path(__file__).parent / "results" / "wanted_examples.json"
 FOLDER = Path(__file__).parent.parent / "examples"

@@ -32,8 +32,8 @@ LAW = xc.elber(C=1.4e-11, m=2.9, a=0.5, b=0.4)
 
 # F = K / (sigma sqrt(pi a)) of a plate of height 2 W under uniform traction, over a / W. From a
 # least-squares solution of the boundary value problem, good to 1e-5 (`PLATE_EDGE` of
-# xcrack.verification.plates); it lies within 0.1 % of Kaya and Erdogan's (1987) values for the long
-# strip.
+# xcrack.verification.exact.plates); it lies within 0.1 % of Kaya and Erdogan's (1987) values for
+# the long strip.
 TABLE = {0.2: 1.36822, 0.3: 1.66114, 0.4: 2.11277, 0.5: 2.82547, 0.6: 4.03334}
 share = np.array(list(TABLE))
 # F grows like (1 - a/W)^(-3/2) towards the far edge; a quartic interpolates the rest.

@@ -283,8 +283,8 @@ xc.write(shown, OUT / "largest_compression")
 
 # %% Checks
 # K of the straight crack: sigma sqrt(pi a) 1.05538 for 2 a / W = 0.2 in a square plate (table
-# `PLATE_CENTRE` of xcrack.verification.plates); the faces carry all of the compression, so that K_I
-# is 0 instead of negative.
+# `PLATE_CENTRE` of xcrack.verification.exact.plates); the faces carry all of the compression, so
+# that K_I is 0 instead of negative.
 F = 1.05538
 K_contact, K_overlap = (straight[how][1][:, TIP] for how in CONTACT)
 scale = 100.0 * np.sqrt(np.pi * A)

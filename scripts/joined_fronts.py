@@ -10,9 +10,9 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 
 import xcrack as xc
-from xcrack.book.cases import corner_at_hole as hole
-from xcrack.book.scenes_3d import graded, lines
-from xcrack.plotting.fronts_3d import front_axes
+from xcrack.verification.book.cases import corner_at_hole as hole
+from xcrack.verification.book.scenes_3d import graded, lines
+from xcrack.view.fronts_3d import front_axes
 
 
 def two_pennies() -> xc.History:

@@ -18,7 +18,7 @@ ROOT = Path(__file__).resolve().parent.parent
 
 def _kernels_key() -> str:
     digest = hashlib.sha256()
-    for path in sorted((ROOT / "src" / "xcrack" / "kernels").glob("*.py")):
+    for path in sorted((ROOT / "src" / "xcrack").glob("*/kernels/*.py")):
         digest.update(path.name.encode() + path.read_bytes())
     return digest.hexdigest()[:16]
 

@@ -17,9 +17,18 @@ from pathlib import Path
 
 import numpy as np
 
-from xcrack.arrays import Floats, Ints
-from xcrack.book.cases.programs import ANGLE, CRACK, HALF, HOLE, LENGTH, MATERIAL, RADIUS, STRESS
+from xcrack.base.arrays import Floats, Ints
 from xcrack.mesh.gmsh_session import session
+from xcrack.verification.book.cases.programs import (
+    ANGLE,
+    CRACK,
+    HALF,
+    HOLE,
+    LENGTH,
+    MATERIAL,
+    RADIUS,
+    STRESS,
+)
 
 _SHIFT = 2e-3  # of the tip, as a share of the crack
 _REACH = (0.1, 0.3)  # where the shift falls to zero, as shares of the crack

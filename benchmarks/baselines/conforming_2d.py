@@ -12,9 +12,9 @@ import numpy as np
 
 from benchmarks.scenes.exact_fields import Field, edge_fields
 from benchmarks.scenes.material import E_PRIME, KOLOSOV, LAMBDA, MU, energy, stress_of
-from xcrack.arrays import Floats, Ints
+from xcrack.base.arrays import Floats, Ints
+from xcrack.fem.williams import unit_gradients
 from xcrack.mesh.gmsh_session import session
-from xcrack.xfem.williams import unit_gradients
 
 _RING = (0.2, 0.9)  # of the radius given: where the weight falls from 1 to 0
 

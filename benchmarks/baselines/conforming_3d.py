@@ -15,7 +15,7 @@ from benchmarks.scenes.exact_fields import penny as exact
 from benchmarks.scenes.exact_fields import penny_K_I
 from benchmarks.scenes.material import E_PRIME, LAMBDA, MU, stress_of
 from benchmarks.scenes.penny import RADIUS
-from xcrack.arrays import Bools, Floats, Ints
+from xcrack.base.arrays import Bools, Floats, Ints
 from xcrack.mesh.gmsh_session import session
 
 _REACH = 0.35  # of the weight, from the front

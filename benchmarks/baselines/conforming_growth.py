@@ -9,8 +9,8 @@ from benchmarks.baselines.conforming_2d import Grading, pulled
 from benchmarks.runs import Outcome
 from benchmarks.scenes.growth import A0, A1, GROWN, LAW, N_STEPS, TURNING, exact_life, tip_errors
 from benchmarks.scenes.material import NU
-from xcrack.growth.directions.criteria import kink_angle
-from xcrack.growth.tracking.cycles import cycles_between
+from xcrack.fatigue.criteria import kink_angle
+from xcrack.growth.cycles import cycles_between
 
 
 def grown(grading: Grading, steps: int = N_STEPS) -> Outcome:

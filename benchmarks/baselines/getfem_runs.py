@@ -21,7 +21,7 @@ from time import monotonic
 from typing import IO, Any
 
 from benchmarks.runs import Case, Outcome, peak
-from xcrack.errors import XcrackError
+from xcrack.base.errors import XcrackError
 
 VARIABLE = "XCRACK_GETFEM_PYTHON"
 SCRIPT = Path(__file__).with_name("getfem_script.py")

@@ -17,10 +17,10 @@ from scipy.sparse.linalg import splu
 
 from benchmarks.baselines.conforming_2d import Grading, interaction, stiffness, traction_vector
 from benchmarks.scenes.material import E_PRIME, KOLOSOV, MU
-from xcrack.arrays import Floats, Ints
-from xcrack.book.cases.junctions import LINES, OPEN, PRESSED
+from xcrack.base.arrays import Floats, Ints
+from xcrack.fem.williams import unit_gradients
 from xcrack.mesh.gmsh_session import session
-from xcrack.xfem.williams import unit_gradients
+from xcrack.verification.book.cases.junctions import LINES, OPEN, PRESSED
 
 _FINE = Grading(0.0015, 0.12, 0.04)
 

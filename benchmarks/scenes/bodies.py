@@ -14,7 +14,7 @@ from benchmarks.runs import Outcome
 from benchmarks.scenes.exact_fields import kirsch, kirsch_pressure
 from benchmarks.scenes.material import STEEL
 from benchmarks.scenes.settings import Settings, quiet
-from xcrack.arrays import Floats
+from xcrack.base.arrays import Floats
 
 _D, _NOTCH, _OUTER, _INNER = 20.0, 2.0, 120.0, 40.0  # of the bar
 _TURN = 6  # faces of 15° by which the bar is turned under its loads

@@ -1,13 +1,13 @@
-"""Exact fields of `xcrack.verification` as functions of points, for the material of the charts."""
+"""Exact fields of `xcrack.verification.exact` as functions of points, for the charts."""
 
 from collections.abc import Callable
 
 import numpy as np
 
 from benchmarks.scenes.material import NU, E
-from xcrack.arrays import Floats
-from xcrack.verification import closed, fields_2d, fields_3d, holes
-from xcrack.verification.potentials_2d import uniform_stress
+from xcrack.base.arrays import Floats
+from xcrack.verification.exact import closed, fields_2d, fields_3d, holes
+from xcrack.verification.exact.potentials_2d import uniform_stress
 
 Field = Callable[[Floats], Floats]
 

@@ -11,8 +11,8 @@ import xcrack as xc
 from benchmarks.runs import Outcome
 from benchmarks.scenes.material import STEEL
 from benchmarks.scenes.settings import Settings
-from xcrack.arrays import Floats
-from xcrack.verification.plates import PLATE_EDGE
+from xcrack.base.arrays import Floats
+from xcrack.verification.exact.plates import PLATE_EDGE
 
 TURNING = ((-1.0, 0.0), (-0.5, 0.2))  # crack of the growth, under tension along y
 DA, N_STEPS = 0.05, 15

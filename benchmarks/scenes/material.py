@@ -3,8 +3,8 @@
 import numpy as np
 
 import xcrack as xc
-from xcrack.arrays import Floats
-from xcrack.verification.potentials_2d import kolosov, plane_modulus, shear_modulus
+from xcrack.base.arrays import Floats
+from xcrack.verification.exact.potentials_2d import kolosov, plane_modulus, shear_modulus
 
 E, NU = 1.0, 0.3
 MU = shear_modulus(E, NU)

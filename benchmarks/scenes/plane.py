@@ -9,14 +9,14 @@ from benchmarks.runs import Outcome
 from benchmarks.scenes.exact_fields import Field, closure_pressure, edge_fields, partial_closure
 from benchmarks.scenes.material import STEEL
 from benchmarks.scenes.settings import Settings, adapted, mesh_of, quiet
-from xcrack.arrays import Floats
+from xcrack.base.arrays import Floats
 
 _SQUARE = ("left", "right", "bottom", "top")
 COARSE = 5  # cells a side from which `adapt` starts
 MODES = (1.0, 0.5)  # K_I and K_II of the open edge crack
 
 
-def _imposed(sides: Sequence[str], u: Field) -> list[xc.scene.conditions.Displacement]:
+def _imposed(sides: Sequence[str], u: Field) -> list[xc.model.conditions.Displacement]:
     return [xc.displacement(side, lambda x: u(x)) for side in sides]
 
 

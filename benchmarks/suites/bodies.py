@@ -6,7 +6,7 @@ from benchmarks.runs import Case, Outcome
 from benchmarks.scenes import bodies
 from benchmarks.scenes.settings import Settings
 from benchmarks.series import series, variant
-from xcrack.scene.numerics import Numerics
+from xcrack.model.numerics import Numerics
 
 
 def hole(quick: bool) -> list[Case]:

@@ -3,7 +3,7 @@
 from benchmarks.runs import Case
 from benchmarks.scenes import friction as scenes
 from benchmarks.series import Scene, series, variant
-from xcrack.scene.numerics import Numerics, with_choices
+from xcrack.model.numerics import Numerics, with_choices
 
 
 def rubbing(quick: bool) -> list[Case]:

@@ -9,8 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from xcrack.mesh.files import write_mesh
-from xcrack.mesh.gmsh_session import session
-from xcrack.mesh.grading import graded_size
+from xcrack.mesh.gmsh_session import graded_size, session
 from xcrack.mesh.mesh import Mesh
 from xcrack.mesh.plates import mesh_model, plate, plate_with_hole
 

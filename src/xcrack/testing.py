@@ -5,12 +5,12 @@ from typing import Any
 
 import numpy as np
 
-from xcrack.arrays import Floats
-from xcrack.errors import ProblemError
-from xcrack.growth.directions.checks import wants
-from xcrack.growth.directions.criteria import Criterion
-from xcrack.inputs import number, numbers, shown
-from xcrack.laws.law import Law
+from xcrack.base.arrays import Floats
+from xcrack.base.checks import number, numbers, shown
+from xcrack.base.errors import ProblemError
+from xcrack.fatigue.checks import wants
+from xcrack.fatigue.criteria import Criterion
+from xcrack.fatigue.law import Law
 
 _ROUND_OFF = 1e-9  # relative; a few operations on numbers of order one
 _RATIOS = [0.0, 0.1, 0.5, 0.8, 0.95]
@@ -38,7 +38,7 @@ def check_law(law: Law, dK_max: float = 100.0, a: float = 1.0) -> None:
 
     Examples
     --------
-    >>> from xcrack.laws.power import paris
+    >>> from xcrack.fatigue.power import paris
     >>> check_law(paris(C=1e-11, m=3))
     """
     _check_callable(law, "check_law: law")
@@ -124,7 +124,7 @@ def check_criterion(criterion: Criterion, nu: float = 0.3) -> None:
 
     Examples
     --------
-    >>> from xcrack.growth.directions.criteria import weighted_angle
+    >>> from xcrack.fatigue.criteria import weighted_angle
     >>> check_criterion(weighted_angle)
     """
     _check_callable(criterion, "check_criterion: criterion")

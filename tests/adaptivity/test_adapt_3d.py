@@ -14,7 +14,7 @@ import xcrack as xc
 from xcrack.adaptivity import next_3d
 from xcrack.adaptivity.measured import counted, values
 from xcrack.adaptivity.resolved import resolved
-from xcrack.sif.bars import Bars
+from xcrack.sif.sif import Bars
 
 STEEL = xc.Isotropic(1.0, 0.3)
 PULL = [xc.traction("top", (0, 0, 1.0)), xc.traction("bottom", (0, 0, -1.0))]

@@ -11,7 +11,7 @@ import pytest
 import xcrack as xc
 from xcrack.adaptivity import next_3d
 from xcrack.adaptivity.resolved import resolved
-from xcrack.errors import CoarseMeshError
+from xcrack.base.errors import CoarseMeshError
 
 STEEL = xc.Isotropic(1.0, 0.3, plane="strain")
 PULL = [xc.traction("top", (0.0, 1.0)), xc.traction("bottom", (0.0, -1.0))]

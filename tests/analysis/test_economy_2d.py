@@ -11,7 +11,7 @@ import xcrack as xc
 from support import scenes_2d as scenes
 from support.scenes_2d import numerics_of
 from xcrack.analysis.solve import build, solve_states
-from xcrack.solvers.reuse import Reuse
+from xcrack.linalg.reuse import Reuse
 
 STEEL = xc.Isotropic(1.3, 0.27, plane="strain")
 PULL = (xc.traction("top", (0.0, 1.0)), xc.traction("bottom", (0.0, -1.0)))
@@ -273,7 +273,7 @@ def test_cheaper_choices_cost_less():
 def test_plan_names_every_ingredient_before_anything_is_built(monkeypatch):
     """One line an ingredient, without cutting or assembling; the report has the same and more."""
     import xcrack.analysis.solve
-    import xcrack.xfem.model
+    import xcrack.fem.system
 
     def forbidden(*args, **options):
         raise AssertionError("plan built something")
@@ -281,7 +281,7 @@ def test_plan_names_every_ingredient_before_anything_is_built(monkeypatch):
     scene = problem(EDGE, INNER)
     with monkeypatch.context() as patch:
         for name in ("cut", "function_space", "bulk"):
-            patch.setattr(xcrack.xfem.model, name, forbidden)
+            patch.setattr(xcrack.fem.system, name, forbidden)
         patch.setattr(xcrack.analysis.solve, "system", forbidden)
         planned = xc.plan(scene)
     lines = str(planned).splitlines()

@@ -207,7 +207,7 @@ def test_unknowns_in_the_report_add_up():
 
 def test_plan_names_every_ingredient_before_anything_is_built(monkeypatch):
     import xcrack.analysis.solve
-    import xcrack.xfem.model
+    import xcrack.fem.system
 
     def forbidden(*args, **options):
         raise AssertionError("plan built something")
@@ -215,7 +215,7 @@ def test_plan_names_every_ingredient_before_anything_is_built(monkeypatch):
     scene = problem(PENNY)
     with monkeypatch.context() as patch:
         for name in ("cut", "function_space", "bulk"):
-            patch.setattr(xcrack.xfem.model, name, forbidden)
+            patch.setattr(xcrack.fem.system, name, forbidden)
         for name in ("system", "iterative_system"):
             patch.setattr(xcrack.analysis.solve, name, forbidden)
         planned = xc.plan(scene)

@@ -20,8 +20,8 @@ from benchmarks.scenes import bodies, exact_fields, friction, growth, material
 from benchmarks.suites import cases
 from support import scenes_2d as scenes
 from support import scenes_friction
-from xcrack.verification import holes, plates
-from xcrack.xfem.williams import mode_matrix, tip_values, unit_gradients
+from xcrack.fem.williams import mode_matrix, tip_values, unit_gradients
+from xcrack.verification.exact import holes, plates
 
 ROOT = Path(__file__).resolve().parents[2]
 WITHIN = 1.2  # of the least time: two runs of one case on a busy machine differ by as much

@@ -6,10 +6,10 @@ import re
 import pytest
 
 import xcrack as xc
-from xcrack.book import run as runner
-from xcrack.book.case import Case, Value
-from xcrack.book.requirements import REQUIREMENTS
-from xcrack.book.run import Book, chosen, find_cases, run_case, run_cases
+from xcrack.verification.book import run as runner
+from xcrack.verification.book.case import Case, Value
+from xcrack.verification.book.requirements import REQUIREMENTS
+from xcrack.verification.book.run import Book, chosen, find_cases, run_case, run_cases
 
 CASES = find_cases()
 PLANE = [case for case in CASES if case.dim != 3 and case.quick]
@@ -93,7 +93,7 @@ def test_a_broken_multiplier_space_fails(monkeypatch):
     def wrong(right):
         return lambda space, c, lips, kind, fixed=None: right(space, c, lips, "naive", fixed)
 
-    places = ("xcrack.contact.solve.multipliers", "xcrack.contact.inf_sup.multipliers")
+    places = ("xcrack.analysis.contact.multipliers", "xcrack.analysis.inf_sup.multipliers")
     failed = broken(monkeypatch, *((place, wrong) for place in places))
     print(sorted(failed))
     kinds = {case.requirement for case in CASES if case.id in failed}
@@ -119,9 +119,9 @@ def test_a_broken_rule_for_cycles_fails(monkeypatch):
 
     failed = broken(
         monkeypatch,
-        ("xcrack.growth.tracking.cycles.cycles_between", wrong),
-        ("xcrack.book.cases.lives.cycles_between", wrong),
-        ("xcrack.growth.integration.pec_2d._cycles", too_many),
+        ("xcrack.growth.cycles.cycles_between", wrong),
+        ("xcrack.verification.book.cases.lives.cycles_between", wrong),
+        ("xcrack.growth.pec_2d._cycles", too_many),
     )
     print(sorted(failed))
     kinds = {case.requirement for case in CASES if case.id in failed}

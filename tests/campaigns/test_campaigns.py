@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 
 from support import campaign_cases
-from xcrack.campaigns.campaign import campaign, grid
-from xcrack.campaigns.row import key_of
-from xcrack.errors import ProblemError
+from xcrack.base.errors import ProblemError
+from xcrack.runs.campaign import campaign, grid, key_of
 
 
 def test_rows_and_failures(tmp_path):

@@ -15,8 +15,8 @@ import numpy as np
 import pytest
 
 from support import campaign_cases
-from xcrack.campaigns.campaign import campaign, grid
-from xcrack.errors import ProblemError, XcrackWarning
+from xcrack.base.errors import ProblemError, XcrackWarning
+from xcrack.runs.campaign import campaign, grid
 
 TESTS = Path(__file__).parents[1]
 
@@ -79,7 +79,7 @@ class Closing:
 
 
 def test_a_client_that_is_closed(tmp_path, monkeypatch):
-    monkeypatch.setattr("xcrack.campaigns.engine._LOOK", 0.01)
+    monkeypatch.setattr("xcrack.runs.campaign._LOOK", 0.01)
     with pytest.raises(ProblemError, match="client is closed, and 2 cases are not finished"):
         campaign(campaign_cases.formula, grid(a=[1, 2, 5]), path=tmp_path, client=Closing())
     assert len(list(tmp_path.glob("row_*.json"))) == 1

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import xcrack as xc
-from xcrack.casefile.units import FORCE, LENGTH, STRESS, TOUGHNESS, Units
+from xcrack.app.case_tables import FORCE, LENGTH, STRESS, TOUGHNESS, Units
 
 pytestmark = pytest.mark.filterwarnings("ignore::xcrack.XcrackWarning")
 
@@ -66,7 +66,7 @@ progress = false
 
 @pytest.fixture(autouse=True)
 def _by_matplotlib(monkeypatch):
-    monkeypatch.setattr("xcrack.plotting.pyvista_2d.renders", lambda: False)
+    monkeypatch.setattr("xcrack.view.pyvista_2d.renders", lambda: False)
 
 
 def written(folder, text, name="case.toml"):

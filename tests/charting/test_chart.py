@@ -7,9 +7,9 @@ import pytest
 
 import xcrack as xc
 from support import scenes_2d as scenes
-from xcrack.charting.result import Chart, Row
-from xcrack.charting.values import Sampled, at_places, most_trusted, remaining
 from xcrack.mesh.refinement import refine
+from xcrack.verification.charting.result import Chart, Row
+from xcrack.verification.charting.values import Sampled, at_places, most_trusted, remaining
 
 PULL = [xc.traction("top", (0.0, 1.0)), xc.traction("bottom", (0.0, -1.0))]
 STEEL = xc.Isotropic(1.0, 0.3, plane="strain")

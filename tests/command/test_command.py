@@ -7,15 +7,15 @@ import sys
 import pytest
 
 import xcrack as xc
-from xcrack.command.main import main
+from xcrack.app.main import main
 
 pytestmark = pytest.mark.filterwarnings("ignore::xcrack.XcrackWarning")
 
 
 @pytest.fixture(autouse=True)
 def _by_matplotlib(monkeypatch):
-    monkeypatch.setattr("xcrack.plotting.pyvista_2d.renders", lambda: False)
-    monkeypatch.setattr("xcrack.command.info.renders", lambda: False)
+    monkeypatch.setattr("xcrack.view.pyvista_2d.renders", lambda: False)
+    monkeypatch.setattr("xcrack.app.info.renders", lambda: False)
 
 
 def test_info_lists_what_there_is(capsys):
@@ -54,7 +54,7 @@ def test_verify_says_how_it_went(tmp_path, capsys, monkeypatch):
     assert main(["verify", "--quick", "-k", "cycle-rule", "-o", str(tmp_path / "book.html")]) == 0
     assert "1 cases in 0 s: all right" in capsys.readouterr().out
     assert (tmp_path / "book.html").is_file()
-    from xcrack.book.cases import lives
+    from xcrack.verification.book.cases import lives
 
     monkeypatch.setattr(lives, "cycles_between", lambda a0, a1, r0, r1: (a1 - a0) / r0)
     assert main(["verify", "--quick", "-k", "cycle-rule"]) == 1
@@ -123,7 +123,7 @@ def test_ctrl_c_ends_it(monkeypatch, capsys):
     def interrupted(**options):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("xcrack.command.info.info", interrupted)
+    monkeypatch.setattr("xcrack.app.info.info", interrupted)
     assert main(["info"]) == 130
     assert "interrupted" in capsys.readouterr().err
 

@@ -21,12 +21,12 @@ from support import scenes_2d as scenes
 from support import scenes_3d as scenes_space
 from support import scenes_friction as rubbing
 from support.scenes_2d import numerics_of
+from xcrack.analysis.alternatives import _springs, lip_space
+from xcrack.analysis.nitsche import averaging, lip_shares, stress_matrix
 from xcrack.analysis.solve import build, solve_states
-from xcrack.contact.alternatives import _springs, lip_space
-from xcrack.contact.nitsche import averaging, lip_shares, stress_matrix
-from xcrack.scene.numerics import with_choices
-from xcrack.solvers.direct import system
-from xcrack.solvers.rigid_motion import free_motion
+from xcrack.linalg.direct import system
+from xcrack.linalg.rigid_motion import free_motion
+from xcrack.model.numerics import with_choices
 
 pytestmark = pytest.mark.filterwarnings("ignore::xcrack.XcrackWarning")
 

@@ -11,9 +11,9 @@ from support import exact
 from support import scenes_2d as scenes
 from support import scenes_friction as rubbing
 from support.scenes_2d import SIDES
-from xcrack.contact.multipliers import gap_rows, multipliers
-from xcrack.xfem.loads import load_vector
-from xcrack.xfem.model import build
+from xcrack.analysis.multipliers import gap_rows, multipliers
+from xcrack.fem.loads import load_vector
+from xcrack.fem.system import build
 
 STUCK = 1e-10  # round-off; measured 1e-13 to 5e-12
 ROOT = np.sqrt(np.pi)

@@ -8,9 +8,8 @@ import pytest
 
 import xcrack as xc
 from support import exact
-from xcrack.book.scenes_3d import CENTRE, NU, E, flat_crack
-from xcrack.solvers.coulomb import FrictionRows, all_stuck, coulomb
-from xcrack.solvers.coulomb_3d import coulomb_3d
+from xcrack.linalg.coulomb import FrictionRows, all_stuck, coulomb, coulomb_3d
+from xcrack.verification.book.scenes_3d import CENTRE, NU, E, flat_crack
 
 A, STRESS = 0.5, (-1.0, 0.6, 0.5)
 TAU = float(np.hypot(*STRESS[1:]))

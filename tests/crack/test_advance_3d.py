@@ -4,20 +4,19 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
+from xcrack.base.errors import GeometryError, XcrackWarning
 from xcrack.crack.advance_3d import advance_fronts
 from xcrack.crack.crack import Crack
-from xcrack.crack.front_stitching import along_front
+from xcrack.crack.front_chain import along_front
 from xcrack.crack.fronts_3d import front_frames
 from xcrack.crack.lines import crossing_points
+from xcrack.crack.measures import area_inside, front_length_inside, surface_size
 from xcrack.crack.placing_3d import place_surface
-from xcrack.crack.size_3d import area_inside, front_length_inside, surface_size
 from xcrack.crack.surfaces import elliptic_crack, penny_crack
-from xcrack.errors import GeometryError, XcrackWarning
-from xcrack.geometry.triangulation import face_areas, face_normals, loops, oriented, side_keys
-from xcrack.growth.tracking.cycles import cycles_between
-from xcrack.growth.tracking.cycles_3d import elapsed_3d
-from xcrack.growth.tracking.follow_3d import carried
+from xcrack.growth.cycles import cycles_between, elapsed_3d
+from xcrack.growth.follow_3d import carried
 from xcrack.mesh.box import box
+from xcrack.mesh.triangulation import face_areas, face_normals, loops, oriented, side_keys
 
 
 def whole(crack):
@@ -329,7 +328,7 @@ def test_fronts_of_a_crack_that_meet(da):
         advance_fronts(two, *places, [da, da], 0.1)
 
 
-@pytest.mark.filterwarnings("ignore:fairing:xcrack.errors.XcrackWarning")
+@pytest.mark.filterwarnings("ignore:fairing:xcrack.base.errors.XcrackWarning")
 def test_opposite_kinks_of_neighbours_make_no_broken_surface():
     """Angles of +-60 degrees from point to point have no meaning; fairing takes a part of them."""
     crack = penny()

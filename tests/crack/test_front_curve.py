@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from support.front_fields import ellipse_front, flat_front
+from xcrack.base.errors import GeometryError
 from xcrack.crack.front_curve import front_curve
-from xcrack.errors import GeometryError
 
 TURN = 2 * np.pi
 

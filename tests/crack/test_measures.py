@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import xcrack as xc
+from xcrack.base.errors import GeometryError, ProblemError
 from xcrack.crack.measures import Measures
-from xcrack.errors import GeometryError, ProblemError
 
 BOX = xc.box((0, 0, 0), (10, 10, 6), (14, 14, 9))
 CELL = 10 / 14

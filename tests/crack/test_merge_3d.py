@@ -7,15 +7,15 @@ up to a side farther out than a circle would touch it.
 import numpy as np
 import pytest
 
+from xcrack.base.errors import GeometryError
 from xcrack.crack.crack import Crack
 from xcrack.crack.fronts_3d import front_frames
-from xcrack.crack.merge_3d import gap_between, merged, turned
+from xcrack.crack.merging import gap_between, merged, turned
 from xcrack.crack.placing_3d import place_surface
 from xcrack.crack.surfaces import penny_crack, plane_crack, surface_crack
-from xcrack.errors import GeometryError
-from xcrack.geometry.triangulation import face_areas, face_normals, loops, oriented
-from xcrack.mesh.body import Body
 from xcrack.mesh.box import box
+from xcrack.mesh.locate import Body
+from xcrack.mesh.triangulation import face_areas, face_normals, loops, oriented
 
 A = 1.0
 

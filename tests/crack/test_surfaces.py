@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import xcrack as xc
+from xcrack.base.errors import GeometryError, XcrackError
 from xcrack.crack.crack import Crack
 from xcrack.crack.fronts_3d import front_frames
 from xcrack.crack.mouths_3d import Body
@@ -16,9 +17,8 @@ from xcrack.crack.surfaces import (
     read_surface,
     surface_crack,
 )
-from xcrack.cutting.extension_3d import extended
-from xcrack.errors import GeometryError, XcrackError
-from xcrack.geometry.triangulation import face_areas, face_normals, loops, rim, ruled, side_keys
+from xcrack.fem.level_set import extended
+from xcrack.mesh.triangulation import face_areas, face_normals, loops, rim, ruled, side_keys
 
 SQUARE = [(-0.5, -0.5, 0.03), (0.5, -0.5, 0.03), (0.5, 0.5, 0.03), (-0.5, 0.5, 0.03)]
 

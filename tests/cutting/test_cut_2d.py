@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 import xcrack as xc
 from support import scenes_2d as scenes
 from xcrack.crack.placing_2d import place_line
-from xcrack.cutting.cut import cut, cut_simplices
-from xcrack.cutting.level_set_2d import line_levels
+from xcrack.fem.cut import cut, cut_simplices
+from xcrack.fem.level_set import line_levels
 
 
 @pytest.mark.parametrize("n", [3, 4])

@@ -6,9 +6,9 @@ import pytest
 import xcrack as xc
 from support import scenes_2d as scenes
 from xcrack.analysis.solution import sides_of
-from xcrack.crack.kinks_2d import kink_numbers
-from xcrack.xfem.consistent import boundary_points
-from xcrack.xfem.model import discretised
+from xcrack.crack.crack import kink_numbers
+from xcrack.fem.consistent import boundary_points
+from xcrack.fem.system import discretised
 
 STEEL = xc.Isotropic(1.0, 0.3, "strain")
 

@@ -8,12 +8,12 @@ import pytest
 import xcrack as xc
 from support import scenes_2d as scenes
 from xcrack.crack.advance_2d import advance
+from xcrack.crack.crack import tip_frames
 from xcrack.crack.placing_2d import place_line
-from xcrack.crack.tips_2d import tip_frames
-from xcrack.cutting.cut import cut
-from xcrack.cutting.level_set_2d import line_levels
-from xcrack.geometry.simplices import closest_on_segment
-from xcrack.kernels.distance import polyline_distance
+from xcrack.fem.cut import cut
+from xcrack.fem.level_set import line_levels
+from xcrack.mesh.kernels.distance import polyline_distance
+from xcrack.mesh.polygon import closest_on_segment
 
 EXAMPLE_MESHES = Path(__file__).parents[2] / "examples" / "meshes"
 

@@ -10,12 +10,12 @@ from support import scenes_2d as scenes
 from support import scenes_3d as scenes_space
 from support.scenes_2d import numerics_of
 from xcrack.crack.advance_2d import advance
+from xcrack.crack.crack import tip_frames
 from xcrack.crack.placing_2d import place_line
-from xcrack.crack.tips_2d import tip_frames
-from xcrack.cutting.cut import cut
-from xcrack.cutting.level_set_2d import line_levels
-from xcrack.cutting.level_set_nodal import Nodal, nodal_level_set, nodal_update
-from xcrack.geometry.simplices import closest_on_segment
+from xcrack.fem.cut import cut
+from xcrack.fem.level_set import line_levels
+from xcrack.fem.level_set_nodal import Nodal, nodal_level_set, nodal_update
+from xcrack.mesh.polygon import closest_on_segment
 
 STEP = np.radians(5.0)
 STEEL = xc.Isotropic(1.3, 0.27, plane="strain")

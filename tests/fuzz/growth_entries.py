@@ -26,7 +26,7 @@ from fuzz.kinds import (
 from fuzz.result_rules import LOAD, NOTHING, NU, fits
 from fuzz.values import paths
 from xcrack import testing
-from xcrack.growth.steps.arrival import Arrival
+from xcrack.growth.step import Arrival
 
 ANY = Numbers()
 

@@ -8,8 +8,8 @@ import xcrack as xc
 from fuzz.entry import Entry, Hook, arg
 from fuzz.kinds import Called, Filename, Number, Numbers, Of, Seen, Whole, Word, real
 from support.growth_fakes import mode_I, plate, sif
-from xcrack.growth.steps.step import Memory, Step
-from xcrack.solvers.reuse import Reuse
+from xcrack.growth.step import Memory, Step
+from xcrack.linalg.reuse import Reuse
 
 LAW = xc.paris(1e-11, 3.0)
 

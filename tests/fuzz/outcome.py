@@ -17,8 +17,8 @@ import xcrack as xc
 from fuzz.entry import ARITY, OWN
 from fuzz.kinds import EDGE, NONSENSE, VALID
 from fuzz.values import prepare
-from xcrack.growth.steps.controller import Control
-from xcrack.growth.steps.step import StepError
+from xcrack.growth.step import StepError
+from xcrack.growth.trail import Control
 
 GOOD = (
     "valid finite",

@@ -86,7 +86,7 @@ def stored():
 
 @cache
 def chart():
-    from xcrack.charting.result import Chart, Row
+    from xcrack.verification.charting.result import Chart, Row
 
     rows = tuple(
         Row("as given", {}, k, 0.5**k, 100 * 4**k, 0.01 * 4**k, 0.1 * 0.25**k, np.ones(1))

@@ -8,8 +8,8 @@ from xcrack.crack.crack import Crack
 from xcrack.crack.fronts_3d import front_frames
 from xcrack.crack.placing_3d import place_surface
 from xcrack.crack.surfaces import elliptic_crack, penny_crack, plane_crack, surface_crack
-from xcrack.cutting.extension_3d import extended
-from xcrack.geometry.distances import (
+from xcrack.fem.level_set import extended
+from xcrack.mesh.distances import (
     closest_in,
     first_crossing,
     front_distance,
@@ -17,8 +17,8 @@ from xcrack.geometry.distances import (
     surface_distance,
     triangle_tree,
 )
-from xcrack.geometry.simplices import closest_on_segment, distance_to_simplices
-from xcrack.geometry.triangulation import face_normals, rim, split_sides
+from xcrack.mesh.polygon import closest_on_segment, distance_to_simplices
+from xcrack.mesh.triangulation import face_normals, rim, split_sides
 
 ROUND_OFF = 1e-14
 

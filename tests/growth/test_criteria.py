@@ -8,8 +8,8 @@ from hypothesis.extra.numpy import arrays
 from scipy.optimize import minimize_scalar
 
 from support import exact
-from xcrack.errors import ProblemError, XcrackWarning
-from xcrack.growth.directions.criteria import (
+from xcrack.base.errors import ProblemError, XcrackWarning
+from xcrack.fatigue.criteria import (
     equivalent_K,
     kink_angle,
     max_hoop_stress,

@@ -11,12 +11,12 @@ from support import exact
 from support import scenes_2d as scenes
 from support import scenes_friction as rubbing
 from support.scenes_2d import SIDES
+from xcrack.analysis.friction import weak_slip
 from xcrack.analysis.solve import solve_states
-from xcrack.contact.slip import weak_slip
-from xcrack.growth.rates.rating import respond_to_cycle
-from xcrack.solvers.reuse import Reuse
-from xcrack.xfem.lips import arc_position
-from xcrack.xfem.model import build
+from xcrack.fem.facets import arc_position
+from xcrack.fem.system import build
+from xcrack.growth.rates import respond_to_cycle
+from xcrack.linalg.reuse import Reuse
 
 TURN = 0.31
 
@@ -72,8 +72,8 @@ def test_a_cycle_that_slips_back_from_its_memory_is_the_same():
 def slips_of(problem, before):
     """Weak slips that a memory gives the functions of a crack, and their rows."""
     model = build(problem)
-    from xcrack.contact.friction import tangential_rows, tangents
-    from xcrack.contact.multipliers import multipliers
+    from xcrack.analysis.friction import tangential_rows, tangents
+    from xcrack.analysis.multipliers import multipliers
 
     lips = model.lips[0]
     m = multipliers(model.space, 0, lips, "reduced", model.known.fixed, rubs=True)

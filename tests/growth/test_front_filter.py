@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from xcrack.growth.integration.front_filter import corrected, predicted, response, turning_of
+from xcrack.growth.front_filter import corrected, predicted, response, turning_of
 
 M = 3.0
 

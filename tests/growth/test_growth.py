@@ -6,16 +6,16 @@ from scipy.integrate import quad
 
 from support import exact
 from support.growth_fakes import STRESS, mode_I, patch_respond, plate
+from xcrack.base.errors import ProblemError
+from xcrack.crack.crack import tip_frames
 from xcrack.crack.lines import line_crack
-from xcrack.crack.size_2d import length_inside
-from xcrack.crack.tips_2d import tip_frames
-from xcrack.errors import ProblemError
+from xcrack.crack.measures import length_inside
+from xcrack.fatigue.criteria import max_hoop_stress, weighted_angle
+from xcrack.fatigue.power import elber, paris
 from xcrack.growth import run as growth
-from xcrack.growth.directions.criteria import max_hoop_stress, weighted_angle
 from xcrack.growth.run import grow
-from xcrack.growth.steps.step import Cycle
-from xcrack.laws.power import elber, paris
-from xcrack.scene.conditions import traction
+from xcrack.growth.step import Cycle
+from xcrack.model.conditions import traction
 
 LAW = paris(C=1e-11, m=3.0)
 CYCLE = Cycle(0.0, 1.0)
@@ -318,7 +318,7 @@ def test_a_body_that_falls_apart_ends_the_run(monkeypatch):
 
 
 def test_cracks_that_meet_end_the_run(monkeypatch):
-    from xcrack.errors import GeometryError
+    from xcrack.base.errors import GeometryError
 
     patch_respond(monkeypatch, mode_I())
     whole = growth.respond

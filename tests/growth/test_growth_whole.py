@@ -7,7 +7,7 @@ from scipy.interpolate import CubicSpline
 
 import xcrack as xc
 from support import exact
-from xcrack.history.collect import load
+from xcrack.runs.collect import load
 
 # small meshes: domains of K are clipped by the boundary, which the tolerances allow for
 pytestmark = pytest.mark.filterwarnings("ignore:K at .* domain:xcrack.XcrackWarning")

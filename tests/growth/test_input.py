@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from support.growth_fakes import STRESS, mode_I, patch_respond, plate
-from xcrack.crack.size_2d import length_inside
-from xcrack.errors import ProblemError, XcrackWarning, warn
+from xcrack.base.errors import ProblemError, XcrackWarning, warn
+from xcrack.crack.measures import length_inside
+from xcrack.fatigue.criteria import max_hoop_stress
+from xcrack.fatigue.power import elber, paris, walker
 from xcrack.growth import run as growth
-from xcrack.growth.directions.criteria import max_hoop_stress
 from xcrack.growth.run import grow
-from xcrack.growth.steps.step import Cycle
-from xcrack.laws.power import elber, paris, walker
+from xcrack.growth.step import Cycle
 
 LAW = paris(C=1e-11, m=3.0)
 CYCLE = Cycle(0.0, 1.0)

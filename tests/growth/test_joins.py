@@ -3,8 +3,8 @@
 import pytest
 
 import xcrack as xc
-from xcrack.errors import ProblemError
-from xcrack.growth.steps.joins import numbers_after
+from xcrack.base.errors import ProblemError
+from xcrack.growth.step import numbers_after
 
 
 def test_a_join_says_where_and_when():

@@ -12,12 +12,12 @@ import pytest
 
 import xcrack as xc
 from support.scenes_fronts import graded, lines
-from xcrack.geometry.triangulation import face_areas
-from xcrack.growth.events import joins_3d
-from xcrack.growth.events.ligament_3d import amplification, part_of_time
-from xcrack.growth.steps.lineage import lineage
-from xcrack.reporting.results import growth
-from xcrack.reporting.source import Source
+from xcrack.growth import joins_3d
+from xcrack.growth.ending import amplification, part_of_time
+from xcrack.growth.step import lineage
+from xcrack.mesh.triangulation import face_areas
+from xcrack.view.report_results import growth
+from xcrack.view.report_source import Source
 
 pytestmark = pytest.mark.filterwarnings("ignore::xcrack.XcrackWarning")
 

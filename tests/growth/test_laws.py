@@ -5,8 +5,8 @@ import pytest
 from scipy.integrate import quad
 
 from support import exact
-from xcrack.errors import ProblemError
-from xcrack.laws.power import elber, paris, walker
+from xcrack.base.errors import ProblemError
+from xcrack.fatigue.power import elber, paris, walker
 from xcrack.testing import check_criterion, check_law
 
 A0, A1, STRESS, C = 1e-3, 1e-2, 100.0, 1e-11
@@ -195,7 +195,7 @@ def test_check_criterion_names_the_fault(criterion, words):
 
 
 def test_criteria_pass_their_own_check():
-    from xcrack.growth.directions.criteria import max_hoop_stress, mean_reference, weighted_angle
+    from xcrack.fatigue.criteria import max_hoop_stress, mean_reference, weighted_angle
 
     for criterion in (max_hoop_stress, mean_reference, weighted_angle):
         check_criterion(criterion, nu=0.25)

@@ -7,16 +7,16 @@ from scipy.integrate import quad, solve_ivp
 from support.growth_fakes import STRESS, patch_respond, plate
 from support.growth_runs import *  # noqa: F403 - fixtures come by name
 from support.growth_runs import run_of as stored_run
+from xcrack.base.errors import ProblemError
+from xcrack.crack.crack import tip_frames
 from xcrack.crack.lines import line_crack
-from xcrack.crack.tips_2d import tip_frames
-from xcrack.errors import ProblemError
-from xcrack.growth.directions.criteria import max_hoop_stress
+from xcrack.fatigue.criteria import max_hoop_stress
+from xcrack.fatigue.power import paris
+from xcrack.growth.options import Run
 from xcrack.growth.run import grow
-from xcrack.growth.steps.controller import first_length, next_length, step_error
-from xcrack.growth.steps.options import Run
-from xcrack.growth.steps.step import Cycle
-from xcrack.history.collect import collect, load
-from xcrack.laws.power import paris
+from xcrack.growth.step import Cycle
+from xcrack.growth.trail import first_length, next_length, step_error
+from xcrack.runs.collect import collect, load
 
 LAW = paris(C=1e-11, m=3.0)
 CYCLE = Cycle(0.0, 1.0)

@@ -7,25 +7,25 @@ import pytest
 from scipy.interpolate import PchipInterpolator
 
 from support.growth_fakes import STRESS, mode_I, patch_respond, plate
+from xcrack.base.errors import ProblemError
 from xcrack.crack.lines import line_crack
 from xcrack.crack.surfaces import penny_crack
-from xcrack.errors import ProblemError
-from xcrack.growth.directions.criteria import max_hoop_stress
+from xcrack.fatigue.closures import newman_closure
+from xcrack.fatigue.criteria import max_hoop_stress
+from xcrack.fatigue.power import paris, walker
+from xcrack.fatigue.spectrum import Spectrum
+from xcrack.fatigue.zones import plastic_zone, wheeler, willenborg
 from xcrack.growth.run import grow
-from xcrack.growth.steps.step import Cycle
-from xcrack.history.collect import collect, resume
-from xcrack.history.history import History
-from xcrack.laws.closures import newman_closure
-from xcrack.laws.power import paris, walker
-from xcrack.laws.zones import plastic_zone, wheeler, willenborg
-from xcrack.lives.life import life
-from xcrack.lives.retarded import retarded
-from xcrack.lives.scatter import Scatter, lognormal
+from xcrack.growth.step import Cycle
 from xcrack.mesh.box import box
-from xcrack.scene.conditions import traction
-from xcrack.scene.material import Isotropic
-from xcrack.scene.problem import Problem
-from xcrack.spectra.spectrum import Spectrum
+from xcrack.model.conditions import traction
+from xcrack.model.material import Isotropic
+from xcrack.model.problem import Problem
+from xcrack.runs.collect import collect, resume
+from xcrack.runs.history import History
+from xcrack.runs.life import life
+from xcrack.runs.retarded import retarded
+from xcrack.runs.scatter import Scatter, lognormal
 
 LAW = paris(5e-12, 3.0)
 ZONES = plastic_zone(300.0, beta=2)  # MPa, mm

@@ -7,26 +7,26 @@ import pytest
 
 from support import exact
 from support.growth_fakes import mode_I, patch_respond, plate
+from xcrack.base.errors import ProblemError, XcrackWarning
 from xcrack.crack.lines import line_crack
 from xcrack.crack.surfaces import penny_crack
-from xcrack.errors import ProblemError, XcrackWarning
-from xcrack.growth.directions.criteria import max_hoop_stress, weighted_angle
-from xcrack.growth.rates import ladder, levels
-from xcrack.growth.rates.ladder import factors_of, ladders
-from xcrack.growth.rates.rating import respond_to_cycle
+from xcrack.fatigue.closures import newman_closure
+from xcrack.fatigue.criteria import max_hoop_stress, weighted_angle
+from xcrack.fatigue.power import paris, walker
+from xcrack.fatigue.spectrum import Spectrum, scaled
+from xcrack.fatigue.thresholds import klesnil_lukas
+from xcrack.growth import levels
+from xcrack.growth import levels as ladder
+from xcrack.growth.levels import factors_of, ladders
+from xcrack.growth.rates import respond_to_cycle
 from xcrack.growth.run import grow
-from xcrack.growth.steps.step import Cycle
-from xcrack.history.collect import collect, resume
-from xcrack.laws.closures import newman_closure
-from xcrack.laws.power import paris, walker
-from xcrack.laws.thresholds import klesnil_lukas
+from xcrack.growth.step import Cycle
+from xcrack.linalg.reuse import Reuse
 from xcrack.mesh.box import box
-from xcrack.scene.conditions import fix, initial_stress, traction
-from xcrack.scene.material import Isotropic
-from xcrack.scene.problem import Problem
-from xcrack.solvers.reuse import Reuse
-from xcrack.spectra.scaling import scaled
-from xcrack.spectra.spectrum import Spectrum
+from xcrack.model.conditions import fix, initial_stress, traction
+from xcrack.model.material import Isotropic
+from xcrack.model.problem import Problem
+from xcrack.runs.collect import collect, resume
 
 LAW = paris(1e-11, 3.0)
 COARSE = pytest.mark.filterwarnings("ignore::xcrack.XcrackWarning")

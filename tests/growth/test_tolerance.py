@@ -8,10 +8,11 @@ from scipy.integrate import quad
 
 import xcrack as xc
 from benchmarks.wanted_error import SCENES, against, run, scene
-from xcrack.growth.tolerance import outgrown, prepared
-from xcrack.growth.tolerance.sizes_2d import given_mesh
-from xcrack.history import run_folder
-from xcrack.verification.plates import PLATE_EDGE
+from xcrack.growth import prepared
+from xcrack.growth import prepared as outgrown
+from xcrack.growth.sizes_2d import given_mesh
+from xcrack.runs import run_folder
+from xcrack.verification.exact.plates import PLATE_EDGE
 
 STEEL = xc.Isotropic(210e3, 0.3, plane="strain")
 LAW = xc.paris(C=1e-3, m=3.0)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import xcrack as xc
-from xcrack.growth.tolerance import outgrown
+from xcrack.growth import prepared as outgrown
 
 STEEL = xc.Isotropic(210e3, 0.3)
 LAW = xc.paris(C=1e-3, m=3.0)

@@ -11,10 +11,10 @@ import pytest
 
 from support.growth_runs import *  # noqa: F403 - fixtures come by name
 from support.growth_runs import N_STEPS, run_of
-from xcrack.errors import ProblemError
+from xcrack.base.errors import ProblemError
 from xcrack.growth.run import grow
-from xcrack.history.collect import collect, load
-from xcrack.history.history import History
+from xcrack.runs.collect import collect, load
+from xcrack.runs.history import History
 
 
 def test_table(whole, tmp_path):
@@ -94,7 +94,7 @@ def test_write_with_solutions_and_without(whole, tmp_path, monkeypatch):
             file.write_text("<VTKFile/>")
         return files
 
-    monkeypatch.setitem(sys.modules, "xcrack.post.vtk", SimpleNamespace(write=write))
+    monkeypatch.setitem(sys.modules, "xcrack.output.vtk", SimpleNamespace(write=write))
     mixed = replace(whole, steps=(load(whole.path).steps[0], *whole.steps[1:2]))
     mixed.write(tmp_path / "out")
     with open(tmp_path / "out" / "history.csv", newline="") as file:

@@ -11,11 +11,11 @@ import pytest
 
 from support.growth_runs import *  # noqa: F403 - fixtures come by name
 from support.growth_runs import N_STEPS, Killed, Saboteur, assert_same, content, run_of
-from xcrack.errors import ProblemError, XcrackWarning
+from xcrack.base.errors import ProblemError, XcrackWarning
 from xcrack.growth.run import grow
-from xcrack.history import run_folder as run_files
-from xcrack.history import store
-from xcrack.history.collect import collect, load, resume
+from xcrack.runs import run_folder as run_files
+from xcrack.runs import store
+from xcrack.runs.collect import collect, load, resume
 
 # --- to disk and on ----------------------------------------------------------------------------
 

@@ -8,9 +8,9 @@ import pytest
 
 from support.growth_runs import *  # noqa: F403 - fixtures come by name
 from support.growth_runs import N_STEPS, Saboteur, assert_same, run_of
-from xcrack.errors import ProblemError, XcrackWarning
+from xcrack.base.errors import ProblemError, XcrackWarning
 from xcrack.growth.run import grow
-from xcrack.history.collect import collect, load, resume
+from xcrack.runs.collect import collect, load, resume
 
 # --- the system refuses --------------------------------------------------------------------------
 

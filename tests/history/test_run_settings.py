@@ -14,19 +14,19 @@ from scipy.interpolate import CubicSpline
 from support.growth_fakes import plate
 from support.growth_runs import *  # noqa: F403 - fixtures come by name
 from support.growth_runs import content, run_of, scene
-from xcrack.errors import ProblemError, XcrackWarning
-from xcrack.growth.directions.criteria import max_hoop_stress
+from xcrack.base.errors import ProblemError, XcrackWarning
+from xcrack.fatigue.criteria import max_hoop_stress
+from xcrack.fatigue.power import paris
+from xcrack.growth import description
+from xcrack.growth import description as settings
+from xcrack.growth.description import describe, differences
+from xcrack.growth.options import Run
 from xcrack.growth.run import grow
-from xcrack.growth.steps import description
-from xcrack.growth.steps import fingerprint as settings
-from xcrack.growth.steps.fingerprint import describe, differences
-from xcrack.growth.steps.options import Run
-from xcrack.growth.steps.step import Cycle
-from xcrack.history import collect as collecting
-from xcrack.history.collect import collect, resume
-from xcrack.history.versions import versions
-from xcrack.laws.power import paris
-from xcrack.scene import conditions
+from xcrack.growth.step import Cycle
+from xcrack.model import conditions
+from xcrack.runs import collect as collecting
+from xcrack.runs.collect import collect, resume
+from xcrack.runs.versions import versions
 
 
 def push(size):
@@ -190,7 +190,7 @@ def test_what_is_the_same_has_the_same_text():
     assert described(("def law(dK, R):", documented)) == described(
         ("def law(dK, R):", documented.replace("A law.", "Another text."))
     )
-    imported = "from xcrack.growth.steps.fingerprint import describe"
+    imported = "from xcrack.growth.description import describe"
     code = f"{SCRIPT}\n{imported}\nprint(describe('law', law))"
     for seed in ("1", "2"):
         child = subprocess.run(
@@ -282,7 +282,7 @@ def test_the_number_of_threads_is_recorded_and_reported(whole, monkeypatch):
 
 def test_threads_of_a_process_are_counted():
     """As OpenBLAS counts them, in a process that was given another number."""
-    code = "from xcrack.history.versions import versions; print(versions()['BLAS threads'])"
+    code = "from xcrack.runs.versions import versions; print(versions()['BLAS threads'])"
     for count in ("1", "2"):
         names = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
         child = subprocess.run(

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from xcrack.kernels.distance import nearest_vertices
+from xcrack.mesh.kernels.distance import nearest_vertices
 
 
 def _curve(kind, count):

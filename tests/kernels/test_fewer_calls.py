@@ -7,16 +7,16 @@ from scipy.spatial import Delaunay
 
 import xcrack as xc
 from tests.support import scenes_2d as scenes
-from xcrack.geometry.simplices import distance_to_simplices
-from xcrack.kernels.blocks import orthonormal_columns
-from xcrack.kernels.bordered import bordered
-from xcrack.kernels.bulk import joined
-from xcrack.kernels.location import cells_within, located, nearest_segment
-from xcrack.kernels.segments import graded_points, split
-from xcrack.kernels.sparse import residual, times, times_transposed
-from xcrack.kernels.splitting import cut_simplices, interface_simplices
-from xcrack.kernels.tips import solve_moments
+from xcrack.fem.kernels.bulk import joined
+from xcrack.fem.kernels.tips import solve_moments
+from xcrack.linalg.kernels.blocks import orthonormal_columns
+from xcrack.linalg.kernels.bordered import bordered
+from xcrack.linalg.kernels.sparse import residual, times, times_transposed
+from xcrack.mesh.kernels.location import cells_within, located, nearest_segment
+from xcrack.mesh.kernels.segments import graded_points, split
+from xcrack.mesh.kernels.splitting import cut_simplices, interface_simplices
 from xcrack.mesh.locate import cells_around
+from xcrack.mesh.polygon import distance_to_simplices
 
 
 def spd(rng, n):

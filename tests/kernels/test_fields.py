@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 
 import xcrack as xc
-from xcrack.kernels.fields import places, set_gradients
-from xcrack.kernels.ring import add_plain_cells, add_points, cells_between
-from xcrack.kernels.shapes import set_jumps, set_standard
+from xcrack.fem.kernels.fields import places, set_gradients
+from xcrack.fem.kernels.shapes import set_jumps, set_standard
+from xcrack.fem.williams import continued_polar, mode_matrix, unit_gradients
 from xcrack.mesh.locate import locate
 from xcrack.mesh.mesh import local_edges
 from xcrack.mesh.simplex import cell_nodes, n_shapes, shape_derivatives, simplex_rule
 from xcrack.sif.common import weight
-from xcrack.xfem.williams import continued_polar, mode_matrix, unit_gradients
+from xcrack.sif.kernels.ring import add_plain_cells, add_points, cells_between
 
 STEEL = xc.Isotropic(E=3.0, nu=0.27, plane="strain")
 

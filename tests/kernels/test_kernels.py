@@ -6,11 +6,11 @@ import scipy.sparse as sp
 
 import xcrack as xc
 from support import scenes_2d as scenes
-from xcrack.kernels.blocks import dense_blocks
-from xcrack.kernels.bulk import block_pattern
-from xcrack.kernels.enriched import add_stiffness, enriched_pattern
+from xcrack.fem.assembly import bulk
+from xcrack.fem.kernels.bulk import block_pattern
+from xcrack.fem.kernels.enriched import add_stiffness, enriched_pattern
+from xcrack.linalg.kernels.blocks import dense_blocks
 from xcrack.mesh.simplex import cell_nodes, shape_derivatives, simplex_rule
-from xcrack.xfem.assembly import bulk
 
 
 def elastic_block(G, weight, lam, mu):
@@ -89,7 +89,7 @@ def test_dense_blocks():
 
 def test_bisect_fills_triangles_and_stops_at_tips():
     """Parts add up to their triangle; none is larger than its distance to a tip but the marked."""
-    from xcrack.kernels.bisect import bisect
+    from xcrack.fem.kernels.bisect import bisect
 
     rng = np.random.default_rng(4410)
     x, tips = rng.uniform(size=(20, 3, 2)), rng.uniform(size=(2, 2))

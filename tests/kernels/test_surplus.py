@@ -6,12 +6,12 @@ import pytest
 import xcrack as xc
 from xcrack.analysis.solution import gradients_at
 from xcrack.analysis.solve import solve_states
-from xcrack.estimation.surplus import residuals, surplus
-from xcrack.kernels.goal import add_to_functions, ring_factors
-from xcrack.kernels.surplus import add_functional
+from xcrack.estimate.kernels.goal import add_to_functions, ring_factors
+from xcrack.estimate.kernels.surplus import add_functional
+from xcrack.estimate.surplus import residuals, surplus
+from xcrack.fem.quadrature import cell_points
+from xcrack.fem.williams import mode_matrix, unit_gradients
 from xcrack.sif.common import weight
-from xcrack.xfem.quadrature import cell_points
-from xcrack.xfem.williams import mode_matrix, unit_gradients
 
 STEEL = xc.Isotropic(1.0, 0.3, "strain")
 

@@ -4,20 +4,19 @@ import numpy as np
 import pytest
 
 from support.growth_fakes import mode_I, patch_respond, plate
+from xcrack.base.errors import ProblemError
 from xcrack.crack.lines import line_crack
-from xcrack.errors import ProblemError
-from xcrack.growth.directions.criteria import max_hoop_stress
-from xcrack.growth.directions.nominal import nominal_range
+from xcrack.fatigue.closures import newman_closure
+from xcrack.fatigue.criteria import max_hoop_stress, nominal_range
+from xcrack.fatigue.fracture import forman, nasgro
+from xcrack.fatigue.power import elber, paris, walker
+from xcrack.fatigue.thresholds import el_haddad, klesnil_lukas, nasgro4_threshold
 from xcrack.growth.run import grow
-from xcrack.growth.steps.step import Cycle
-from xcrack.laws.closures import newman_closure
-from xcrack.laws.fracture import forman, nasgro
-from xcrack.laws.power import elber, paris, walker
-from xcrack.laws.thresholds import el_haddad, klesnil_lukas, nasgro4_threshold
+from xcrack.growth.step import Cycle
 from xcrack.mesh.box import box
-from xcrack.scene.conditions import fix, traction
-from xcrack.scene.material import Isotropic
-from xcrack.scene.problem import Problem
+from xcrack.model.conditions import fix, traction
+from xcrack.model.material import Isotropic
+from xcrack.model.problem import Problem
 from xcrack.testing import check_law
 
 CYCLE = Cycle(0.1, 1.0)

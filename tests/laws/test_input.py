@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from xcrack.errors import ProblemError
-from xcrack.laws.closures import linear_closure, newman_closure, schijve_closure
-from xcrack.laws.fracture import forman, hartman_schijve, nasgro, nasgro_K_c
-from xcrack.laws.power import paris, piecewise, walker
-from xcrack.laws.presets import law
-from xcrack.laws.tables import rate_table
-from xcrack.laws.thresholds import (
+from xcrack.base.errors import ProblemError
+from xcrack.fatigue.closures import linear_closure, newman_closure, schijve_closure
+from xcrack.fatigue.fracture import forman, hartman_schijve, nasgro, nasgro_K_c
+from xcrack.fatigue.power import paris, piecewise, walker
+from xcrack.fatigue.presets import law
+from xcrack.fatigue.tables import rate_table
+from xcrack.fatigue.thresholds import (
     el_haddad,
     klesnil_lukas,
     nasgro3_threshold,

@@ -5,14 +5,14 @@ import pytest
 from scipy.integrate import quad
 
 from support.growth_fakes import STRESS, mode_I, patch_respond, plate
-from xcrack.errors import ProblemError
-from xcrack.growth.directions.criteria import max_hoop_stress
+from xcrack.base.errors import ProblemError
+from xcrack.fatigue.closures import newman_closure
+from xcrack.fatigue.criteria import max_hoop_stress
+from xcrack.fatigue.power import paris, walker
+from xcrack.fatigue.thresholds import el_haddad, klesnil_lukas
+from xcrack.fatigue.time import time_rate, with_time
 from xcrack.growth.run import grow
-from xcrack.growth.steps.step import Cycle
-from xcrack.laws.closures import newman_closure
-from xcrack.laws.power import paris, walker
-from xcrack.laws.thresholds import el_haddad, klesnil_lukas
-from xcrack.laws.time import time_rate, with_time
+from xcrack.growth.step import Cycle
 from xcrack.testing import check_law
 
 BASE = paris(1e-8, 3.0)

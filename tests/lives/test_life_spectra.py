@@ -9,23 +9,23 @@ import pytest
 
 from support import exact
 from support.growth_fakes import STRESS, mode_I, patch_respond, plate
+from xcrack.base.errors import ProblemError
 from xcrack.crack.lines import line_crack
-from xcrack.errors import ProblemError
+from xcrack.fatigue.criteria import max_hoop_stress
+from xcrack.fatigue.power import paris, walker
+from xcrack.fatigue.spectrum import Spectrum
+from xcrack.fatigue.thresholds import klesnil_lukas
 from xcrack.growth import run as growth
-from xcrack.growth.directions.criteria import max_hoop_stress
 from xcrack.growth.run import grow
-from xcrack.growth.steps.step import Cycle
-from xcrack.history.history import History
-from xcrack.laws.power import paris, walker
-from xcrack.laws.thresholds import klesnil_lukas
-from xcrack.lives.life import life
-from xcrack.lives.scatter import Scatter, lognormal, normal
+from xcrack.growth.step import Cycle
 from xcrack.mesh.box import box
-from xcrack.scene.conditions import fix, traction
-from xcrack.scene.material import Isotropic
-from xcrack.scene.problem import Problem
-from xcrack.sif.bars import Bars
-from xcrack.spectra.spectrum import Spectrum
+from xcrack.model.conditions import fix, traction
+from xcrack.model.material import Isotropic
+from xcrack.model.problem import Problem
+from xcrack.runs.history import History
+from xcrack.runs.life import life
+from xcrack.runs.scatter import Scatter, lognormal, normal
+from xcrack.sif.sif import Bars
 
 LAW = paris(1e-11, 3.0)
 FLIGHT = Spectrum([0.0, 1.0, 0.4, 0.6, 0.1, 0.9, 0.3], unit="flight")

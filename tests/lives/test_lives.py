@@ -8,22 +8,22 @@ import pytest
 
 from support import exact
 from support.growth_fakes import STRESS, mode_I, patch_respond, plate
+from xcrack.base.errors import ProblemError
 from xcrack.crack.lines import line_crack
-from xcrack.errors import ProblemError
-from xcrack.growth.directions.criteria import max_hoop_stress, weighted_angle
+from xcrack.fatigue.criteria import max_hoop_stress, weighted_angle
+from xcrack.fatigue.power import paris, walker
+from xcrack.fatigue.spectrum import Spectrum
+from xcrack.fatigue.thresholds import klesnil_lukas
 from xcrack.growth.run import grow
-from xcrack.growth.steps.step import Cycle
-from xcrack.history.history import History
-from xcrack.laws.power import paris, walker
-from xcrack.laws.thresholds import klesnil_lukas
-from xcrack.lives.inspection import growth_curve, inspection, logistic_pod
-from xcrack.lives.life import life
-from xcrack.lives.scatter import Scatter, lognormal, normal
+from xcrack.growth.step import Cycle
 from xcrack.mesh.box import box
-from xcrack.scene.conditions import fix, traction
-from xcrack.scene.material import Isotropic
-from xcrack.scene.problem import Problem
-from xcrack.spectra.spectrum import Spectrum
+from xcrack.model.conditions import fix, traction
+from xcrack.model.material import Isotropic
+from xcrack.model.problem import Problem
+from xcrack.runs.history import History
+from xcrack.runs.inspection import growth_curve, inspection, logistic_pod
+from xcrack.runs.life import life
+from xcrack.runs.scatter import Scatter, lognormal, normal
 
 LAW = paris(1e-11, 3.0)
 CYCLE = Cycle(0.0, 1.0)

@@ -6,19 +6,19 @@ from scipy.integrate import quad
 
 from support import exact
 from support.growth_fakes import STRESS, mode_I, patch_respond, plate
-from xcrack.errors import ProblemError
-from xcrack.growth.directions.criteria import max_hoop_stress
+from xcrack.base.errors import ProblemError
+from xcrack.fatigue.criteria import max_hoop_stress
+from xcrack.fatigue.kernels.retardation import advanced
+from xcrack.fatigue.power import paris, walker
+from xcrack.fatigue.spectrum import Spectrum
+from xcrack.fatigue.thresholds import klesnil_lukas
+from xcrack.fatigue.zones import plastic_zone, wheeler, willenborg
 from xcrack.growth.run import grow
-from xcrack.growth.steps.step import Cycle
-from xcrack.history.history import History
-from xcrack.kernels.retardation import advanced
-from xcrack.laws.power import paris, walker
-from xcrack.laws.thresholds import klesnil_lukas
-from xcrack.laws.zones import plastic_zone, wheeler, willenborg
-from xcrack.lives.life import life
-from xcrack.lives.retarded import retarded
-from xcrack.lives.scatter import Scatter, lognormal, normal
-from xcrack.spectra.spectrum import Spectrum
+from xcrack.growth.step import Cycle
+from xcrack.runs.history import History
+from xcrack.runs.life import life
+from xcrack.runs.retarded import retarded
+from xcrack.runs.scatter import Scatter, lognormal, normal
 
 ZONE = plastic_zone(400.0, beta=2)  # MPa, MPa √m, m
 RATE = 1e-11 * 15.0**3

@@ -6,25 +6,29 @@ import numpy as np
 import pytest
 
 from support.growth_fakes import STRESS, mode_I, patch_respond, plate
+from xcrack.base.errors import ProblemError
 from xcrack.crack.lines import line_crack
 from xcrack.crack.surfaces import elliptic_crack
-from xcrack.errors import ProblemError
-from xcrack.growth.directions.criteria import max_hoop_stress
-from xcrack.growth.rates.rating import respond_to_cycle
+from xcrack.fatigue.criteria import max_hoop_stress
+from xcrack.fatigue.power import paris
+from xcrack.fatigue.spectrum import Spectrum
+from xcrack.growth.rates import respond_to_cycle
 from xcrack.growth.run import grow
-from xcrack.growth.steps.step import Cycle
-from xcrack.history.history import History
-from xcrack.laws.power import paris
-from xcrack.lives.assessment import assessment_line, geometry_factors, residual_strength
-from xcrack.lives.factors import write_factors
-from xcrack.lives.opening import opening_load
+from xcrack.growth.step import Cycle
+from xcrack.linalg.reuse import Reuse
 from xcrack.mesh.box import box
-from xcrack.scene.conditions import fix, traction
-from xcrack.scene.material import Isotropic
-from xcrack.scene.problem import Problem
-from xcrack.sif.energy import energy_release_rate
-from xcrack.solvers.reuse import Reuse
-from xcrack.spectra.spectrum import Spectrum
+from xcrack.model.conditions import fix, traction
+from xcrack.model.material import Isotropic
+from xcrack.model.problem import Problem
+from xcrack.runs.assessment import (
+    assessment_line,
+    geometry_factors,
+    residual_strength,
+    write_factors,
+)
+from xcrack.runs.history import History
+from xcrack.runs.opening import opening_load
+from xcrack.sif.stress_intensity import energy_release_rate
 
 LAW = paris(1e-11, 3.0)
 STEEL = assessment_line(E=210e3, sigma_y=355.0, sigma_u=510.0)

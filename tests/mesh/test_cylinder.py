@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from xcrack.errors import GeometryError, MeshError
+from xcrack.base.errors import GeometryError, MeshError
 from xcrack.mesh.cylinder import notched_cylinder
 from xcrack.mesh.gmsh_session import import_gmsh, session
 from xcrack.mesh.mesh import Mesh

@@ -3,7 +3,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from xcrack.errors import MeshError, XcrackError, XcrackWarning
+from xcrack.base.errors import MeshError, XcrackError, XcrackWarning
 from xcrack.mesh.box import box
 from xcrack.mesh.files import read_mesh, write_mesh
 from xcrack.mesh.mesh import Mesh

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import xcrack as xc
-from xcrack.errors import MeshError, XcrackError, XcrackWarning
+from xcrack.base.errors import MeshError, XcrackError, XcrackWarning
 from xcrack.mesh.linear import SHAPES, linearised
 from xcrack.mesh.raw import RawMesh, mesh_from_raw
 

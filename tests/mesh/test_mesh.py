@@ -3,7 +3,7 @@ import pickle
 import numpy as np
 import pytest
 
-from xcrack.errors import MeshError
+from xcrack.base.errors import MeshError
 from xcrack.mesh.box import box
 from xcrack.mesh.mesh import Mesh, local_edges, local_facets
 

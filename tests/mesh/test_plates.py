@@ -6,11 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from xcrack import optional
-from xcrack.errors import GeometryError, MeshError, XcrackError, XcrackWarning
+from xcrack.base import optional
+from xcrack.base.errors import GeometryError, MeshError, XcrackError, XcrackWarning
 from xcrack.mesh.files import read_mesh
-from xcrack.mesh.gmsh_session import SYSTEM_LIBRARIES, import_gmsh, session
-from xcrack.mesh.grading import graded_size, polylines
+from xcrack.mesh.gmsh_session import SYSTEM_LIBRARIES, graded_size, import_gmsh, polylines, session
 from xcrack.mesh.mesh import Mesh
 from xcrack.mesh.plates import plate, plate_with_hole
 

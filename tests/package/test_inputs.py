@@ -6,8 +6,8 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from xcrack.errors import MeshError, ProblemError
-from xcrack.inputs import called, number, numbers, whole, whole_numbers
+from xcrack.base.checks import called, number, numbers, whole, whole_numbers
+from xcrack.base.errors import MeshError, ProblemError
 
 
 class Hostile:

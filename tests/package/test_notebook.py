@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import xcrack as xc
-from xcrack.plotting.inline import Picture
-from xcrack.sketch import sketch
+from xcrack.base.svg import sketch
+from xcrack.view.figures import Picture
 
 pytestmark = pytest.mark.filterwarnings("ignore::xcrack.XcrackWarning")
 

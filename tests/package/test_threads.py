@@ -14,11 +14,11 @@ import pytest
 import threadpoolctl
 
 import xcrack as xc
-from xcrack import threads
-from xcrack.geometry import distances
+from xcrack.base import threads
+from xcrack.fem import assembly
+from xcrack.linalg import multifrontal, row_blocks
+from xcrack.mesh import distances
 from xcrack.sif import domain_3d
-from xcrack.solvers import multifrontal, row_blocks
-from xcrack.xfem import assembly
 
 
 def plane(n=24):
@@ -65,7 +65,7 @@ def test_the_same_bits_for_any_number(scene, monkeypatch):
 def test_threads_are_no_setting_of_a_run():
     problem = plane()
     other = replace(problem, numerics=xc.Numerics(threads=3))
-    from xcrack.growth.steps.fingerprint import describe
+    from xcrack.growth.description import describe
 
     assert describe("problem", problem) == describe("problem", other)
 

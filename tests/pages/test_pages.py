@@ -3,7 +3,7 @@
 A number that a page takes from the code has a comment beside it that names the constant,
 `<!-- xcrack.sif.domain_3d._OUTER = 2.6 -->`; semicolons separate several. The code must have the
 value, and the paragraph must state it, as written in the comment or in the words that follow it:
-`xcrack.growth.steps.advance.LEAST = 0.1: "a tenth of a cell"`.
+`xcrack.growth.step.LEAST = 0.1: "a tenth of a cell"`.
 """
 
 import importlib
@@ -128,4 +128,4 @@ def test_glossary():
 
 def contact_class(name):
     """Classes of results that users meet but never make."""
-    return getattr(importlib.import_module("xcrack.contact.result"), name)
+    return getattr(importlib.import_module("xcrack.analysis.contact_result"), name)

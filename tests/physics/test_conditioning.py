@@ -144,7 +144,7 @@ def test_cracks_just_above_and_below_a_row_agree():
 def test_star_drops_what_is_dependent_and_nothing_else():
     """On the row and far from it the basis has as many columns as there are free unknowns."""
     from xcrack.analysis.solve import build
-    from xcrack.solvers.direct import scaled_basis
+    from xcrack.linalg.direct import scaled_basis
 
     def columns(eps):
         problem = beside_a_row(eps, 2)

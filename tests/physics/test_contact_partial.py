@@ -34,7 +34,7 @@ def lips(solution, angle=0.0, origin=(0.0, 0.0)):
 
 def group_gaps(solution):
     """Mean gap of each multiplier group, which contact holds at or above zero."""
-    from xcrack.contact.multipliers import multipliers
+    from xcrack.analysis.multipliers import multipliers
 
     space, points = solution.space, solution.lips[0]
     m = multipliers(space, 0, points, solution.problem.numerics.multipliers)

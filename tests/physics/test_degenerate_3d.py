@@ -76,7 +76,7 @@ def apart(mesh, crack):
         supports=[xc.fix("bottom"), xc.displacement("top", moved)], contact="off",
     )  # fmt: skip
     solution = xc.solve(problem)
-    from xcrack.xfem.lips import jump_matrix
+    from xcrack.fem.facets import jump_matrix
 
     lips = solution.lips[0]
     jump = jump_matrix(solution.space, 0, lips) @ solution.u

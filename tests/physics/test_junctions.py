@@ -5,13 +5,13 @@ import pytest
 
 import xcrack as xc
 from support.scenes_2d import perturbed
-from xcrack.arrays import Floats
-from xcrack.book.cases.junctions import K_PRESSED, LINES, OPEN, PRESSED
-from xcrack.book.cases.junctions import K as WANTED
-from xcrack.post.pieces import pieces as drawn_pieces
-from xcrack.solvers.rigid_motion import pieces
-from xcrack.xfem.model import build
-from xcrack.xfem.quadrature import sub_cells
+from xcrack.base.arrays import Floats
+from xcrack.fem.quadrature import sub_cells
+from xcrack.fem.system import build
+from xcrack.linalg.rigid_motion import pieces
+from xcrack.output.pieces import pieces as drawn_pieces
+from xcrack.verification.book.cases.junctions import K_PRESSED, LINES, OPEN, PRESSED
+from xcrack.verification.book.cases.junctions import K as WANTED
 
 STEEL = xc.Isotropic(1.0, 0.3, "strain")
 # Conforming quadratic triangles with quarter points gave K (`python -m

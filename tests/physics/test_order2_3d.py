@@ -11,10 +11,10 @@ import xcrack as xc
 from support import exact
 from support import scenes_3d as scenes
 from support.scenes_2d import numerics_of
-from xcrack.mesh.sizes import leg_size
-from xcrack.solvers import iterative
-from xcrack.solvers.direct import scaled_basis
-from xcrack.xfem.model import build
+from xcrack.fem.system import build
+from xcrack.linalg import iterative
+from xcrack.linalg.direct import scaled_basis
+from xcrack.mesh.simplex import leg_size
 
 C = np.array([0.013, -0.021, 0.0317])
 

@@ -6,8 +6,8 @@ import pytest
 from matplotlib.figure import Figure
 
 import xcrack as xc
-from xcrack.plotting import pyvista_2d as plot_pyvista
-from xcrack.plotting.scene_2d import FIELDS, scene
+from xcrack.view import pyvista_2d as plot_pyvista
+from xcrack.view.scene_2d import FIELDS, scene
 
 
 def solved(sign=1.0, order=2, cracks=True):

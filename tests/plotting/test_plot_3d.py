@@ -7,14 +7,20 @@ from scipy.spatial import cKDTree
 
 import xcrack as xc
 from xcrack.crack.fronts_3d import front_weights, is_closed
-from xcrack.growth.steps.step import Step
-from xcrack.history.history import History
-from xcrack.plotting import pyvista_2d as plot_pyvista
-from xcrack.plotting.fronts_3d import draw_fronts, draw_K, step_fronts
-from xcrack.plotting.loads_3d import load_arrows
-from xcrack.plotting.projection import best_plane, given_plane, on_plane, section_outline
-from xcrack.plotting.scene_2d import SPACE_FIELDS
-from xcrack.plotting.scene_3d import LIP_FIELDS, clip_plane, crack_scene, mesh_scene, space_scene
+from xcrack.growth.step import Step
+from xcrack.runs.history import History
+from xcrack.view import pyvista_2d as plot_pyvista
+from xcrack.view.fronts_3d import draw_fronts, draw_K, step_fronts
+from xcrack.view.projection import best_plane, given_plane, on_plane, section_outline
+from xcrack.view.scene_2d import SPACE_FIELDS
+from xcrack.view.scene_3d import (
+    LIP_FIELDS,
+    clip_plane,
+    crack_scene,
+    load_arrows,
+    mesh_scene,
+    space_scene,
+)
 
 TIP = 0.083
 

@@ -5,12 +5,11 @@ import numpy as np
 import pytest
 
 import xcrack as xc
-from xcrack.growth.steps.step import Step
-from xcrack.history.history import History
-from xcrack.history.series import polylines
-from xcrack.post.lip_faces_3d import lip_faces
-from xcrack.post.piece_cells import piece_cells
-from xcrack.post.pieces import pieces
+from xcrack.growth.step import Step
+from xcrack.output.lip_faces_3d import lip_faces
+from xcrack.output.pieces import piece_cells, pieces
+from xcrack.runs.history import History
+from xcrack.runs.table import polylines
 
 N = 6
 

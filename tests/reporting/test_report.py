@@ -16,8 +16,8 @@ import numpy as np
 import pytest
 
 import xcrack as xc
-from xcrack.plotting.view_3d import packed
-from xcrack.reporting import report as reporting
+from xcrack.view import report as reporting
+from xcrack.view.view_3d import packed
 
 STEEL = xc.Isotropic(E=210e3, nu=0.3, plane="strain")
 pytestmark = pytest.mark.filterwarnings("ignore::xcrack.XcrackWarning")
@@ -27,7 +27,7 @@ pytestmark = pytest.mark.filterwarnings("ignore::xcrack.XcrackWarning")
 def _by_matplotlib(monkeypatch, request):
     """No renderer where a test does not ask for one: quick, and the same everywhere."""
     if not request.node.get_closest_marker("plot"):
-        monkeypatch.setattr("xcrack.plotting.pyvista_2d.renders", lambda: False)
+        monkeypatch.setattr("xcrack.view.pyvista_2d.renders", lambda: False)
 
 
 def plate():
@@ -222,7 +222,7 @@ def test_report_of_a_run_in_space(tmp_path):
 
 
 def test_too_much_is_left_out_and_named(monkeypatch, tmp_path):
-    monkeypatch.setattr("xcrack.plotting.view_3d.MOST", 10)
+    monkeypatch.setattr("xcrack.view.view_3d.MOST", 10)
     text, _, numbers = read(xc.report(penny(), tmp_path / "large.html"))
     assert numbers["view"] == {"layers": 0}
     assert "too much for a page" in text
@@ -233,8 +233,8 @@ def test_too_much_is_left_out_and_named(monkeypatch, tmp_path):
 
 def test_a_section_of_ones_own(monkeypatch, tmp_path):
     """How later features add theirs."""
-    from xcrack.markup import element
-    from xcrack.reporting.section import Section
+    from xcrack.base.markup import element
+    from xcrack.view.report_source import Section
 
     def own(source):
         return Section("own", "Own", element("p", f"{len(source.cracks)} crack"), {"n": 1})
@@ -397,10 +397,10 @@ def test_a_plastic_zone_as_large_as_the_crack_is_a_warning(tmp_path):
     crack = xc.line_crack([(-3, 0.3), (4, 0.3)])
     problem = xc.Problem(xc.box((0, -20), (20, 20), (20, 40)), STEEL, [crack], loads=loads)
     solution = xc.solve(problem)
-    with pytest.warns(xc.XcrackWarning, match=r"% of the shortest crack.* does not hold") as said:
+    with pytest.warns(xc.XcrackWarning, match=r"% of the shortest crack.* does not hold") as record:
         _, _, numbers = read(xc.report(solution, tmp_path / "r.html", yield_stress=345.0))
     K = np.abs(xc.stress_intensity(solution).K[:, :2]).max()
-    share = re.search(r"([\d.]+) % of the shortest crack", str(said[0].message))
+    share = re.search(r"([\d.]+) % of the shortest crack", str(record[0].message))
     assert float(share[1]) == pytest.approx(100 * (K / 345) ** 2 / (2 * np.pi) / 4.0, rel=5e-3)
     assert any("does not hold" in text for text in numbers["warnings"]["messages"])
     with warnings.catch_warnings():

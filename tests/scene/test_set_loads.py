@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import xcrack as xc
-from xcrack.errors import ProblemError
+from xcrack.base.errors import ProblemError
 
 ROUND_OFF = 1e-9
 SEED = 8314
@@ -92,8 +92,8 @@ def test_a_pin_in_3d_has_its_resultant_whatever_the_axis() -> None:
 
 def test_the_pressure_is_a_cosine() -> None:
     """A full cosine on a circle has the peak 2 F / (pi R); here as force on each side of 5°."""
+    from xcrack.fem.loads import bearing_traction
     from xcrack.mesh.holes import round_hole
-    from xcrack.xfem.set_loads import bearing_traction
 
     mesh = ring(72)
     hole = round_hole(mesh, mesh.facet_sets["hole"], "test")

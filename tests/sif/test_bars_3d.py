@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import xcrack as xc
-from xcrack.sif.finer_3d import finer_along
-from xcrack.verification.fields_3d import penny, penny_K
+from xcrack.sif.error import finer_along
+from xcrack.verification.exact.fields_3d import penny, penny_K
 
 MATERIAL = xc.Isotropic(1.0, 0.3)
 RADIUS = 0.5

@@ -16,7 +16,7 @@ from support.front_fields import (
     tube,
 )
 from xcrack.crack.front_curve import FrontCurve, front_curve
-from xcrack.scene.material import Isotropic
+from xcrack.model.material import Isotropic
 from xcrack.sif.domain_3d import front_intensity
 from xcrack.sif.interaction_3d import (
     front_nodes,

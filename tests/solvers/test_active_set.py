@@ -8,8 +8,8 @@ import scipy.optimize
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from xcrack.errors import ConvergenceError
-from xcrack.solvers.active_set import active_set
+from xcrack.base.errors import ConvergenceError
+from xcrack.linalg.active_set import active_set
 
 
 def solve(F, d, start=True, measure=None, stiffness=1.0):

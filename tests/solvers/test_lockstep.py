@@ -7,14 +7,13 @@ import pytest
 import scipy.sparse as sp
 
 import xcrack as xc
-import xcrack.solvers.row_blocks as row_blocks_file
-from xcrack.errors import ConvergenceError
-from xcrack.solvers import products
-from xcrack.solvers.lockstep import Ask, Operator, in_lockstep
-from xcrack.solvers.products import best_guesses, independent
-from xcrack.solvers.projected_cg import descending
-from xcrack.solvers.row_blocks import row_blocks
-from xcrack.threads import threads
+import xcrack.linalg.row_blocks as row_blocks_file
+from xcrack.base.errors import ConvergenceError
+from xcrack.base.threads import threads
+from xcrack.linalg import products
+from xcrack.linalg.products import best_guesses, independent
+from xcrack.linalg.projected_cg import Ask, Operator, descending, in_lockstep
+from xcrack.linalg.row_blocks import row_blocks
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])

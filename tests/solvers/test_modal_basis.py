@@ -10,10 +10,10 @@ from support import exact
 from support import scenes_2d as scenes
 from support import scenes_fronts as fronts
 from support.scenes_2d import numerics_of
-from xcrack.solvers.direct import scaled_basis
-from xcrack.solvers.modal_basis import local_modes, mode_columns
-from xcrack.xfem.model import build
-from xcrack.xfem.williams import tip_values
+from xcrack.fem.system import build
+from xcrack.fem.williams import tip_values
+from xcrack.linalg.direct import scaled_basis
+from xcrack.linalg.modal_basis import local_modes, mode_columns
 
 MIXED = (1.0, 0.3, 0.2)
 

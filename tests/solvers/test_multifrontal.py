@@ -15,14 +15,14 @@ import threadpoolctl
 import xcrack as xc
 from support import scenes_2d as scenes
 from xcrack.analysis.solve import solve_states
-from xcrack.kernels.tree import postorder
-from xcrack.solvers import direct, multifrontal
-from xcrack.solvers.basis import function_nodes
-from xcrack.solvers.multifrontal import factorised, tree
-from xcrack.solvers.reuse import Reuse
-from xcrack.solvers.rigid_motion import free_motion
-from xcrack.threads import one_blas_thread
-from xcrack.xfem.model import build
+from xcrack.base.threads import one_blas_thread
+from xcrack.fem.system import build
+from xcrack.linalg import direct, multifrontal
+from xcrack.linalg.basis import function_nodes
+from xcrack.linalg.kernels.tree import postorder
+from xcrack.linalg.multifrontal import factorised, tree
+from xcrack.linalg.reuse import Reuse
+from xcrack.linalg.rigid_motion import free_motion
 
 STEEL = xc.Isotropic(1.0, 0.3, "strain")
 

@@ -6,14 +6,14 @@ import scipy.sparse as sp
 import scipy.sparse.linalg as sla
 
 import xcrack as xc
-import xcrack.solvers.multigrid as multigrid
-from xcrack.kernels.cycle import first_step, next_step
+import xcrack.linalg.multigrid as multigrid
+from xcrack.fem.assembly import bulk, rigid_modes
+from xcrack.linalg.cycle import largest_eigenvalue
+from xcrack.linalg.kernels.cycle import first_step, next_step
+from xcrack.linalg.multigrid import extended, hierarchy
+from xcrack.linalg.projected_cg import Operator, conjugate_gradients
+from xcrack.linalg.row_blocks import Bordered, row_blocks, stored
 from xcrack.mesh.simplex import node_points
-from xcrack.solvers.cycle import largest_eigenvalue
-from xcrack.solvers.multigrid import extended, hierarchy
-from xcrack.solvers.projected_cg import Operator, conjugate_gradients
-from xcrack.solvers.row_blocks import Bordered, row_blocks, stored
-from xcrack.xfem.assembly import bulk, rigid_modes
 
 
 def drawn(shape, share, seed):

@@ -10,16 +10,16 @@ from hypothesis import strategies as st
 
 import xcrack as xc
 from support import scenes_2d as scenes
+from xcrack.analysis.multipliers import gap_rows, multipliers
 from xcrack.analysis.solve import build
-from xcrack.contact.multipliers import gap_rows, multipliers
-from xcrack.errors import ConvergenceError
-from xcrack.solvers.active_set import active_set
-from xcrack.solvers.direct import system
-from xcrack.solvers.engine import ContactRows
-from xcrack.solvers.iterative import iterative_system
-from xcrack.solvers.projected_cg import Operator, conjugate_gradients, projected
-from xcrack.solvers.rigid_motion import balanced, free_motion, without_motion
-from xcrack.xfem.loads import load_vector
+from xcrack.base.errors import ConvergenceError
+from xcrack.fem.loads import load_vector
+from xcrack.linalg.active_set import active_set
+from xcrack.linalg.direct import system
+from xcrack.linalg.engine import ContactRows
+from xcrack.linalg.iterative import iterative_system
+from xcrack.linalg.projected_cg import Operator, conjugate_gradients, projected
+from xcrack.linalg.rigid_motion import balanced, free_motion, without_motion
 
 
 def dense(K, null=None):

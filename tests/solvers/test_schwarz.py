@@ -6,12 +6,12 @@ import scipy.linalg
 import scipy.sparse as sp
 
 import xcrack as xc
-from xcrack.kernels.patches import add_solved
-from xcrack.solvers.basis import patch_orthogonal, stars
-from xcrack.solvers.cycle import largest_eigenvalue
-from xcrack.solvers.iterative import iterative_system
-from xcrack.solvers.schwarz import _inverse
-from xcrack.xfem.model import build
+from xcrack.fem.system import build
+from xcrack.linalg.basis import patch_orthogonal, stars
+from xcrack.linalg.cycle import largest_eigenvalue
+from xcrack.linalg.iterative import iterative_system
+from xcrack.linalg.kernels.patches import add_solved
+from xcrack.linalg.schwarz import _inverse
 
 
 def test_blocks_are_solved_and_summed():

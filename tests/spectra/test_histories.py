@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 
-from xcrack.errors import ProblemError
-from xcrack.spectra.files import read_spectrum
-from xcrack.spectra.spectrum import Spectrum
-from xcrack.spectra.twist import twist
+from xcrack.base.errors import ProblemError
+from xcrack.fatigue.files import read_spectrum, twist
+from xcrack.fatigue.spectrum import Spectrum
 
 
 def test_one_column(tmp_path):

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from xcrack.errors import ProblemError
-from xcrack.spectra.rainflow import rainflow, turning_points
-from xcrack.spectra.spectrum import Spectrum
+from xcrack.base.errors import ProblemError
+from xcrack.fatigue.rainflow import rainflow, turning_points
+from xcrack.fatigue.spectrum import Spectrum
 
 ASTM = [-2, 1, -3, 5, -1, 3, -4, 4, -2]  # figure 6 of ASTM E1049-85
 

@@ -5,15 +5,15 @@ from types import SimpleNamespace
 import numpy as np
 
 from xcrack.analysis.solution import Solution
+from xcrack.crack.crack import tip_frames
 from xcrack.crack.lines import line_crack
-from xcrack.crack.size_2d import length_inside
-from xcrack.crack.tips_2d import tip_frames
+from xcrack.crack.measures import length_inside
 from xcrack.growth import run as growth
+from xcrack.linalg.reuse import Reuse
 from xcrack.mesh.box import box
-from xcrack.scene.material import Isotropic
-from xcrack.scene.problem import Problem
+from xcrack.model.material import Isotropic
+from xcrack.model.problem import Problem
 from xcrack.sif.sif import SIF
-from xcrack.solvers.reuse import Reuse
 
 STRESS = 100.0
 

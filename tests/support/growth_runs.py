@@ -7,13 +7,13 @@ import pytest
 
 from support.growth_fakes import mode_I, patch_respond, plate
 from xcrack.crack.lines import line_crack
-from xcrack.growth.directions.criteria import weighted_angle
+from xcrack.fatigue.criteria import weighted_angle
+from xcrack.fatigue.power import paris
 from xcrack.growth.run import grow
-from xcrack.growth.steps.step import Cycle
-from xcrack.history import store
-from xcrack.history.collect import collect
-from xcrack.history.run_folder import BODY
-from xcrack.laws.power import paris
+from xcrack.growth.step import Cycle
+from xcrack.runs import store
+from xcrack.runs.collect import collect
+from xcrack.runs.run_folder import BODY
 
 LAW = paris(C=1e-11, m=3.0)
 CYCLE = Cycle(0.0, 1.0)

@@ -6,7 +6,8 @@ import numpy as np
 
 import xcrack as xc
 from support import exact
-from xcrack.book.scenes_2d import (
+from xcrack.model.numerics import with_choices
+from xcrack.verification.book.scenes_2d import (
     SIDES,
     annulus,
     edge_line,
@@ -19,7 +20,6 @@ from xcrack.book.scenes_2d import (
     tractions,
     turned,
 )
-from xcrack.scene.numerics import with_choices
 
 UNIT = {"E": 1.0, "nu": 0.3}
 Field = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
@@ -108,7 +108,7 @@ def condition(problem):
     import scipy.sparse.linalg as sla
 
     from xcrack.analysis.solve import build
-    from xcrack.solvers.direct import scaled_basis
+    from xcrack.linalg.direct import scaled_basis
 
     model = build(problem)
     basis = scaled_basis(

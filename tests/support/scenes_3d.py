@@ -100,7 +100,7 @@ def flat_penny(n, z, a, stress, *, seed=None, contact="off", **options):
 
 def opening(solution, crack=0):
     """Volume between the crack faces, and the integral of the squared normal jump."""
-    from xcrack.xfem.lips import jump_matrix
+    from xcrack.fem.facets import jump_matrix
 
     lips = solution.lips[crack]
     jump = jump_matrix(solution.space, crack, lips) @ solution.u

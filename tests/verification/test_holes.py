@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from xcrack.verification import holes
+from xcrack.verification.exact import holes
 
 
 def test_a_small_crack_at_a_large_hole_feels_its_stress_concentration():

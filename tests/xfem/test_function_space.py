@@ -6,8 +6,8 @@ import pytest
 import xcrack as xc
 from support import scenes_2d as scenes
 from xcrack.analysis.solve import build
+from xcrack.fem.quadrature import cell_points
 from xcrack.mesh.simplex import node_points
-from xcrack.xfem.quadrature import cell_points
 
 
 def spaces():

@@ -8,12 +8,10 @@ import pytest
 import xcrack as xc
 from support import scenes_2d as scenes
 from xcrack.analysis.solve import build
+from xcrack.fem.consistent import boundary_points
+from xcrack.fem.loads import position
+from xcrack.fem.quadrature import cell_points, n_parts, part_numbers, segment_points
 from xcrack.mesh.simplex import conical, simplex_rule
-from xcrack.xfem.consistent import boundary_points
-from xcrack.xfem.loads import position
-from xcrack.xfem.quadrature import cell_points
-from xcrack.xfem.quadrature_2d import segment_points
-from xcrack.xfem.sides import n_parts, part_numbers
 
 
 def moment(powers):

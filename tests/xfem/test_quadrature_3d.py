@@ -7,12 +7,19 @@ import xcrack as xc
 from support import scenes_3d as scenes
 from support.scenes_2d import numerics_of
 from xcrack.analysis.solve import build
+from xcrack.fem.consistent import boundary_points, corrected
+from xcrack.fem.loads import position
+from xcrack.fem.quadrature import (
+    Points,
+    cell_points,
+    front_points,
+    n_parts,
+    part_numbers,
+    radius_at,
+    sub_cells,
+    triangle_points,
+)
 from xcrack.mesh.simplex import conical
-from xcrack.xfem.consistent import boundary_points, corrected
-from xcrack.xfem.loads import position
-from xcrack.xfem.quadrature import Points, cell_points, sub_cells
-from xcrack.xfem.quadrature_3d import front_points, radius_at, triangle_points
-from xcrack.xfem.sides import n_parts, part_numbers
 
 CRACKS = {
     "oblique": xc.penny_crack((0.013, 0.021, 0.034), (0.1, 0.2, 1.0), 0.5),

@@ -8,8 +8,8 @@ import pytest
 import xcrack as xc
 from support import scenes_2d as scenes
 from support import scenes_3d as scenes_space
-from xcrack.xfem.model import build
-from xcrack.xfem.reused_cells import reused_cells, with_one_jump
+from xcrack.fem.assembly import reused_cells, with_one_jump
+from xcrack.fem.system import build
 
 STEEL = xc.Isotropic(1.0, 0.3, "strain")
 ROOT = [(-1.2, 0.013), (-0.5, 0.03)]

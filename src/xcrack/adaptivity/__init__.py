@@ -1,1 +1,1 @@
-"""Meshes that choose themselves: refined until the errors of K are as small as wanted."""
+"""Meshes whose cells are as small as a wanted error of K asks for."""

@@ -13,10 +13,10 @@ from xcrack.adaptivity.adapted import Adapted, Round
 from xcrack.adaptivity.measured import Measured, measured
 from xcrack.adaptivity.resolved import resolved
 from xcrack.analysis.plan import LIPS
-from xcrack.errors import GeometryError, ProblemError, collected_warnings, warn
-from xcrack.inputs import entries, flag, number, whole
+from xcrack.base.checks import entries, flag, number, whole
+from xcrack.base.errors import GeometryError, ProblemError, collected_warnings, warn
 from xcrack.mesh.mesh import Mesh
-from xcrack.scene.problem import Problem, check_problem
+from xcrack.model.problem import Problem, check_problem
 
 _FIRST: dict[int, Callable[[Problem], Mesh]] = {2: next_2d.first_mesh, 3: next_3d.first_mesh}
 _NEXT: dict[int, Callable[[Measured, float, float, int], Mesh | None]] = {

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from xcrack.analysis.solution import Solution
-from xcrack.arrays import Floats
-from xcrack.errors import ProblemError
-from xcrack.scene.problem import Problem
+from xcrack.base.arrays import Floats
+from xcrack.base.errors import ProblemError
+from xcrack.model.problem import Problem
 from xcrack.sif.sif import SIF
 
 

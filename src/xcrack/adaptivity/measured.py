@@ -8,13 +8,12 @@ import numpy as np
 
 from xcrack.analysis.solution import Solution
 from xcrack.analysis.solve import solve_states
-from xcrack.arrays import Bools, Floats, at
-from xcrack.crack.size_3d import surface_size
-from xcrack.errors import ProblemError
-from xcrack.scene.problem import Problem
-from xcrack.sif.bars import Bars
-from xcrack.sif.bars_2d import bars_and_shares
-from xcrack.sif.sif import SIF
+from xcrack.base.arrays import Bools, Floats, at
+from xcrack.base.errors import ProblemError
+from xcrack.crack.measures import surface_size
+from xcrack.model.problem import Problem
+from xcrack.sif.error import bars_and_shares
+from xcrack.sif.sif import SIF, Bars
 from xcrack.sif.stress_intensity import stress_intensities
 
 

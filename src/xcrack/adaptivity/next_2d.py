@@ -7,11 +7,11 @@ import numpy as np
 from xcrack.adaptivity.measured import Measured, live_states
 from xcrack.adaptivity.start_2d import first_mesh
 from xcrack.adaptivity.wanted import smaller
-from xcrack.arrays import Floats
-from xcrack.crack.kinks_2d import kink_numbers
+from xcrack.base.arrays import Floats
+from xcrack.crack.crack import kink_numbers
 from xcrack.mesh.mesh import Mesh
 from xcrack.mesh.refinement import refine_to
-from xcrack.sif.bars import Bars
+from xcrack.sif.sif import Bars
 
 _ORDER = 2
 _SWEEPS = 5

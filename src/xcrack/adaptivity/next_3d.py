@@ -13,16 +13,15 @@ from scipy.spatial import cKDTree
 from xcrack.adaptivity.measured import Measured, counted, live_states, values
 from xcrack.adaptivity.outlines_3d import CELLS
 from xcrack.adaptivity.resolved import resolved
-from xcrack.arrays import Floats
+from xcrack.base.arrays import Floats
 from xcrack.crack.crack import Crack
-from xcrack.crack.size_3d import surface_size
-from xcrack.geometry.around import between, graded, radii, with_room
+from xcrack.crack.measures import surface_size
 from xcrack.mesh.locate import cell_sizes
 from xcrack.mesh.mesh import Mesh
+from xcrack.mesh.polygon import between, graded, radii, with_room
 from xcrack.mesh.refinement import refine
-from xcrack.scene.problem import Problem
-from xcrack.sif.bars import Bars
-from xcrack.sif.sif import SIF
+from xcrack.model.problem import Problem
+from xcrack.sif.sif import SIF, Bars
 
 _LEAST, _MOST = 1.5, 2.0  # times finer in a round: what less changes is no bar
 _POWER = 2.5  # of the cells' size with which bars fall at order 2, on graded meshes (measured)

@@ -5,12 +5,12 @@ from collections.abc import Callable
 import numpy as np
 
 from xcrack.adaptivity.start_2d import growing
-from xcrack.arrays import Floats
+from xcrack.base.arrays import Floats
 from xcrack.crack.crack import Crack
-from xcrack.crack.size_2d import length_inside
+from xcrack.crack.measures import length_inside
 from xcrack.mesh.locate import contains, nearest_boundary
 from xcrack.mesh.mesh import Mesh
-from xcrack.scene.problem import Problem
+from xcrack.model.problem import Problem
 
 _CELLS = 4.0  # of a crack's length
 _ROOM = 2.5  # cells between two ends

@@ -4,13 +4,13 @@ from collections.abc import Callable
 
 import numpy as np
 
-from xcrack.arrays import Floats, ranges
+from xcrack.base.arrays import Floats, ranges
 from xcrack.crack.crack import Crack
-from xcrack.crack.size_3d import area_inside
-from xcrack.geometry.around import graded, with_room
-from xcrack.geometry.triangulation import loops
-from xcrack.mesh.body import Body
-from xcrack.scene.problem import Problem
+from xcrack.crack.measures import area_inside
+from xcrack.mesh.locate import Body
+from xcrack.mesh.polygon import graded, with_room
+from xcrack.mesh.triangulation import loops
+from xcrack.model.problem import Problem
 
 # Cells of a crack's size (half the radius of a penny) along its outline, by their longest edges.
 CELLS = 1.25

@@ -4,9 +4,9 @@ from dataclasses import replace
 from types import ModuleType
 
 from xcrack.adaptivity import outlines_2d, outlines_3d
-from xcrack.errors import CoarseMeshError
+from xcrack.base.errors import CoarseMeshError
 from xcrack.mesh.refinement import refine
-from xcrack.scene.problem import Problem
+from xcrack.model.problem import Problem
 
 _TWINS: dict[int, ModuleType] = {2: outlines_2d, 3: outlines_3d}
 _TRIALS = 5  # each on cells of half the size

@@ -4,14 +4,14 @@ from collections.abc import Callable
 
 import numpy as np
 
-from xcrack.arrays import Floats
-from xcrack.crack.kinks_2d import kink_numbers
-from xcrack.crack.size_2d import length_inside
-from xcrack.geometry.simplices import distance_to_simplices
+from xcrack.base.arrays import Floats
+from xcrack.crack.crack import kink_numbers
+from xcrack.crack.measures import length_inside
 from xcrack.mesh.locate import cell_sizes
 from xcrack.mesh.mesh import Mesh
+from xcrack.mesh.polygon import distance_to_simplices
 from xcrack.mesh.refinement import refine
-from xcrack.scene.problem import Problem
+from xcrack.model.problem import Problem
 
 _CELLS = 4.0  # of a crack's length: less, and no estimate sees what is left out
 _ROOM = 2.5  # cells between a tip and the next boundary, crack or tip

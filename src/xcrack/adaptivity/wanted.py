@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from xcrack.arrays import Floats
+from xcrack.base.arrays import Floats
 
 _MOST = 5  # bisections of a cell in one round
 _STEPS = 60  # in which a threshold is halved in on

@@ -1,1 +1,1 @@
-"""From a problem to its solutions."""
+"""From a problem to its solutions, contact included."""

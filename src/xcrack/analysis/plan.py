@@ -2,11 +2,11 @@
 
 from dataclasses import dataclass
 
+from xcrack.base.checks import shown
+from xcrack.base.errors import ProblemError
+from xcrack.base.markup import element
 from xcrack.crack.placing import short_fronts
-from xcrack.errors import ProblemError
-from xcrack.inputs import shown
-from xcrack.markup import element
-from xcrack.scene.problem import Problem, check_problem
+from xcrack.model.problem import Problem, check_problem
 
 _MODES, _ENDS = {2: "II", 3: "III"}, {2: "tip(s)", 3: "front(s)"}
 

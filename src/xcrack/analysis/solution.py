@@ -1,7 +1,7 @@
 """What a solve returns: displacements, stresses, openings and contact, anywhere in the body."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from numbers import Real
 from typing import Any
@@ -9,21 +9,52 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from xcrack.analysis.factored import Factored
+from xcrack.analysis.contact_result import Contact, ContactSolution
 from xcrack.analysis.plan import Report
-from xcrack.arrays import Bools, Floats, Ints, lock
-from xcrack.contact.result import Contact
-from xcrack.errors import GeometryError, ProblemError
-from xcrack.inputs import numbers, shown, whole_numbers
-from xcrack.markup import element, joined, table
+from xcrack.base.arrays import Bools, Floats, Ints, lock
+from xcrack.base.checks import numbers, shown, whole_numbers
+from xcrack.base.errors import GeometryError, ProblemError
+from xcrack.base.markup import element, joined, table
+from xcrack.fem.facets import LipPoints, jump_values
+from xcrack.fem.function_space import FunctionSpace
+from xcrack.fem.loads import position
+from xcrack.fem.quadrature import at_joints, cell_side
+from xcrack.fem.system import Model
+from xcrack.linalg.engine import Engine
+from xcrack.linalg.reuse import Reuse
+from xcrack.linalg.rigid_motion import Motion
 from xcrack.mesh.locate import locate
-from xcrack.scene.conditions import InitialStress, Load, evaluate_stress
-from xcrack.scene.problem import Problem, crack_number
-from xcrack.solvers.reuse import Reuse
-from xcrack.xfem.function_space import FunctionSpace
-from xcrack.xfem.lips import LipPoints, jump_values
-from xcrack.xfem.loads import position
-from xcrack.xfem.sides import at_joints, cell_side
+from xcrack.model.conditions import InitialStress, Load, evaluate_stress
+from xcrack.model.problem import Problem, crack_number
+
+# What a solve keeps where errors are asked for: its factor, and the contact of all states.
+
+
+@dataclass(frozen=True, eq=False)
+class Factored:
+    """A system that is still factored; all states of a solve share one.
+
+    Attributes
+    ----------
+    model : Model
+    engine : Engine
+    motion : Motion
+        Rigid motions that were removed.
+    contact : ContactSolution
+        Of all states.
+    around_tips : dict
+        Points around tips with the functions there, once K has asked for them.
+    """
+
+    model: Model
+    engine: Engine
+    motion: Motion
+    contact: ContactSolution
+    around_tips: dict[Any, Any] = field(default_factory=dict)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        # A factor holds addresses: a solution in another process has none.
+        return type(None), ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -258,7 +289,7 @@ def fields_at(
     cell, bary, side : arrays
         Points, as in `Solution.at`.
     """
-    from xcrack.kernels.fields import set_gradients
+    from xcrack.fem.kernels.fields import set_gradients
 
     coefficients = np.ascontiguousarray(coefficients)
     d, states = coefficients.shape[1:]
@@ -279,7 +310,7 @@ def gradients_at(
     ----------
     space, coefficients, cell, bary, side : as in `fields_at`
     """
-    from xcrack.kernels.fields import set_gradients
+    from xcrack.fem.kernels.fields import set_gradients
 
     coefficients = np.ascontiguousarray(coefficients)
     d, states = coefficients.shape[1:]
@@ -308,3 +339,6 @@ def sides_of(space: FunctionSpace, cell: Ints, bary: Floats, lip: int) -> Ints:
         own = np.where(on_lip & (lip != 0), lip, np.where(phi >= 0, 1, -1))
         side[:, c] = np.where(split, own, side[:, c])
     return at_joints(space, cell, bary, side) if space.joints else side
+
+
+__all__ = []

@@ -5,39 +5,88 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+import scipy.sparse as sp
+from scipy.sparse.linalg import LinearOperator, cg
 
-from xcrack.analysis.factored import Factored
-from xcrack.analysis.relaxation import out_of_balance
-from xcrack.analysis.report import report
-from xcrack.analysis.resultants import resultants
-from xcrack.analysis.solution import Solution
-from xcrack.arrays import Bools, Floats, lock
-from xcrack.contact.slip import slip_of
-from xcrack.contact.solve import contact_of, solve_contact
-from xcrack.errors import ProblemError
-from xcrack.inputs import entries, flag, shown
-from xcrack.scene.conditions import Displacement, InitialStress, Load
-from xcrack.scene.friction import check_order
-from xcrack.scene.problem import Problem, check_problem
-from xcrack.solvers.direct import Solver, system
-from xcrack.solvers.engine import Engine
-from xcrack.solvers.iterative import iterative_system
-from xcrack.solvers.products import times
-from xcrack.solvers.reuse import Reuse
-from xcrack.solvers.rigid_motion import (
+from xcrack.analysis.contact import contact_of, solve_contact
+from xcrack.analysis.friction import slip_of
+from xcrack.analysis.report import report, resultants
+from xcrack.analysis.solution import Factored, Solution
+from xcrack.base.arrays import Bools, Floats, lock
+from xcrack.base.checks import entries, flag, shown
+from xcrack.base.errors import ProblemError
+from xcrack.base.threads import one_blas_thread, threads
+from xcrack.fem.assembly import MeshLoad, body_forces, next_to_enriched
+from xcrack.fem.loads import body_points, load_vector, mesh_loads, on_mesh, position
+from xcrack.fem.supports import known_unknowns
+from xcrack.fem.system import Model, build
+from xcrack.linalg.direct import Solver, system
+from xcrack.linalg.engine import Engine
+from xcrack.linalg.iterative import iterative_system
+from xcrack.linalg.products import times
+from xcrack.linalg.reuse import Reuse
+from xcrack.linalg.rigid_motion import (
     Motion,
     balanced,
     free_modes,
     free_motion,
     without_motion,
 )
-from xcrack.threads import one_blas_thread, threads
-from xcrack.xfem.assembly import MeshLoad
-from xcrack.xfem.loads import load_vector
-from xcrack.xfem.mesh_loads import mesh_loads, on_mesh
-from xcrack.xfem.model import Model, build
-from xcrack.xfem.stiffness import next_to_enriched
-from xcrack.xfem.supports import known_unknowns
+from xcrack.model.conditions import Displacement, InitialStress, Load, Temperature, evaluate_stress
+from xcrack.model.friction import check_order
+from xcrack.model.problem import Problem, check_problem
+
+# How much of an initial stress the body cannot bear: its part out of balance.
+
+_RESIDUAL = 1e-3  # of the conjugate gradients: the energy is then known to far better than 1 %
+_MOST = 2000
+
+
+def out_of_balance(problem: Problem, model: Model, loads: Sequence[Load]) -> float | None:
+    """Share of the energy of the initial stress that relaxes in the body without cracks.
+
+    A stress in equilibrium with free sides keeps all of its energy, one that is a strain in
+    disguise keeps nothing (projection theorem). A change of temperature is left out: what it does
+    is meant.
+
+    Parameters
+    ----------
+    problem : Problem
+    model : Model
+    loads : sequence of loads
+
+    Returns
+    -------
+    float or None
+        Between 0 and 1; None where no such stress acts.
+    """
+    own = tuple(
+        load
+        for load in loads
+        if isinstance(load, InitialStress) and not isinstance(load, Temperature)
+    )
+    if not own:
+        return None
+    space = model.space
+    n = space.n_nodes * space.dim
+    points = body_points(space)
+    x = position(space, points.cell, points.bary)
+    sigma = sum((evaluate_stress(load.value, x) for load in own), np.zeros((1, 1, 1)))
+    stored = np.einsum("q,qij,qij->", points.weight, sigma, problem.material.strain(sigma))
+    if stored <= 0:
+        return None
+    free = ~model.known.fixed[:n]
+    f = np.where(free, load_vector(space, own, ())[:n], 0.0)
+    matrix = model.bulk.matrix
+    keep = sp.diags(free.astype(float))
+    scale = np.where(free, 1 / matrix.diagonal(), 0.0)
+    operator = LinearOperator(
+        (n, n), matvec=lambda v: keep @ body_forces(matrix, keep @ v), dtype=float
+    )
+    smooth = LinearOperator((n, n), matvec=lambda v: scale * v, dtype=float)
+    u = cg(operator, f, rtol=_RESIDUAL, maxiter=_MOST, M=smooth)[0]
+    return float(np.clip(f @ u / stored, 0.0, 1.0))
+
 
 # Unknowns of a 3D body above which a factorisation costs more, by order (measured).
 _DIRECT = {1: 4_000, 2: 8_000}
@@ -262,3 +311,6 @@ def _case(problem: Problem, model: Model, state: Any, known_loads: dict[int, Flo
             f"{largest:.3g}, whose squares are no numbers: take other units."
         )
     return _Case(loads, factor, f, tuple(parts), known)
+
+
+__all__ = []

@@ -1,1 +1,1 @@
-"""Cracks: their shapes, their place in a body, their fronts and how these advance."""
+"""Cracks: shapes, place in a body, tips and fronts, advance, junctions."""

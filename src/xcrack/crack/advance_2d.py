@@ -3,12 +3,11 @@
 import numpy as np
 from numpy.typing import ArrayLike
 
-from xcrack.arrays import Bools, Floats, at
-from xcrack.crack.crack import Crack
+from xcrack.base.arrays import Bools, Floats, at
+from xcrack.base.checks import numbers
+from xcrack.base.errors import GeometryError
+from xcrack.crack.crack import Crack, tip_frames
 from xcrack.crack.lines import crossing_points, polyline_crack
-from xcrack.crack.tips_2d import tip_frames
-from xcrack.errors import GeometryError
-from xcrack.inputs import numbers
 
 _BACK = 1e-6  # rad from a half turn: a crack that turns back runs over itself
 

@@ -5,24 +5,25 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from xcrack.arrays import Bools, Floats, Ints
+from xcrack.base.arrays import Bools, Floats, Ints
+from xcrack.base.checks import shown
+from xcrack.base.errors import GeometryError, warn
 from xcrack.crack.crack import Crack
 from xcrack.crack.front_chain import (
     Chain,
+    along_front,
     chain,
+    divided,
     faired,
     spaced,
+    stitched,
     without_loops,
     without_notches,
     without_sides,
 )
 from xcrack.crack.front_curve import front_curve
-from xcrack.crack.front_stitching import along_front, divided, stitched
-from xcrack.crack.fronts_3d import Front, front_frames
-from xcrack.crack.polylines_3d import steps
-from xcrack.errors import GeometryError, warn
-from xcrack.geometry.distances import first_crossing, surface_distance, triangle_tree
-from xcrack.inputs import shown
+from xcrack.crack.fronts_3d import Front, front_frames, steps
+from xcrack.mesh.distances import first_crossing, surface_distance, triangle_tree
 
 LOW, HIGH = 0.5, 1.5  # bounds of the spacing of front points, in sizes
 _LEAST = 0.02  # of the size, and at most a tenth of the largest: a smaller advance is ignored

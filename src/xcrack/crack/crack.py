@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from xcrack.arrays import Floats, Ints, Shape, frozen
-from xcrack.errors import GeometryError
-from xcrack.inputs import entries, whole_numbers
+from xcrack.base.arrays import Floats, Ints, Shape, frozen
+from xcrack.base.checks import entries, whole_numbers
+from xcrack.base.errors import GeometryError
 from xcrack.mesh.checks import coordinates
 
 
@@ -93,3 +93,48 @@ class Crack:
 def crack_length(crack: Crack) -> float:
     """Arc length of all faces of a 2D crack, length."""
     return float(np.linalg.norm(np.diff(crack.points, axis=0), axis=1).sum())
+
+
+# Tips of cracks in 2D and their frames.
+
+
+def tip_frames(crack: Crack) -> tuple[Floats, Floats]:
+    """Tip points and frames of a placed crack.
+
+    Returns
+    -------
+    points : (f, d) array, length
+    frame : (f, d, d) array
+        Rows (ahead, normal); the normal points from lip - to lip + at every tip.
+    """
+    tips = crack.tips or ()
+    x = np.zeros((len(tips), 2))
+    frame = np.zeros((len(tips), 2, 2))
+    for k, tip in enumerate(tips):
+        first, second = (1, 0) if tip == 0 else (tip - 1, tip)
+        along = crack.points[second] - crack.points[first]
+        ahead = along / np.linalg.norm(along)
+        left = np.array([-ahead[1], ahead[0]])
+        x[k] = crack.points[tip]
+        frame[k] = ahead, (-left if tip == 0 else left)
+    return x, frame
+
+
+# Kinks of cracks in 2D: vertices at which a polyline turns by more than a curve's chords do.
+
+TURN = np.radians(15.0)  # from which on a turn is a kink, and no chord of a curve
+
+
+def turns(points: Floats) -> Floats:
+    """Angles by which a polyline `(n, 2)` turns at its inner points `(n - 2,)`, 0 to pi."""
+    along = np.diff(points, axis=0)
+    along = along / np.linalg.norm(along, axis=1)[:, None]
+    return np.arccos(np.clip((along[1:] * along[:-1]).sum(axis=1), -1, 1))
+
+
+def kink_numbers(points: Floats) -> Ints:
+    """Numbers of the points of a polyline `(n, 2)` at which it has a kink."""
+    return np.nonzero(turns(points) > TURN)[0] + 1
+
+
+__all__ = ["TURN", "kink_numbers", "turns"]

@@ -2,10 +2,9 @@
 
 from collections.abc import Callable, Sequence
 
-from xcrack.arrays import Floats
-from xcrack.crack.crack import Crack
+from xcrack.base.arrays import Floats
+from xcrack.crack.crack import Crack, tip_frames
 from xcrack.crack.fronts_3d import front_frames
-from xcrack.crack.tips_2d import tip_frames
 
 _Ends = tuple[Sequence[Floats], Sequence[Floats]]
 

@@ -6,8 +6,8 @@ from functools import cached_property
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from xcrack.arrays import Bools, Floats, Ints, lock
-from xcrack.errors import GeometryError
+from xcrack.base.arrays import Bools, Floats, Ints, lock
+from xcrack.base.errors import GeometryError
 
 # Points among which the first guess of a foot is looked for: in all, and at least on a piece.
 _SAMPLES, _LEAST = 400, 3
@@ -99,7 +99,7 @@ class FrontCurve:
         turn : (q, 4) array
             Curvatures kt, kn, twist, speed.
         """
-        from xcrack.kernels.front import frames_at
+        from xcrack.crack.kernels.front import frames_at
 
         u = np.ascontiguousarray(s, dtype=float)
         u = np.mod(u, self.length) if self.closed else np.clip(u, 0.0, self.length)
@@ -134,8 +134,8 @@ class FrontCurve:
         feet : Feet
             Theirs.
         """
-        from xcrack.kernels.distance import nearest_vertices
-        from xcrack.kernels.front import feet
+        from xcrack.crack.kernels.front import feet
+        from xcrack.mesh.kernels.distance import nearest_vertices
 
         s, samples = self._guesses
         step = float(np.diff(s).max())
@@ -150,7 +150,7 @@ class FrontCurve:
 
         It bounds the distance to the front from above.
         """
-        from xcrack.kernels.distance import nearest_vertices
+        from xcrack.mesh.kernels.distance import nearest_vertices
 
         # Read-only as everywhere: a kernel is compiled once more for arrays that are not.
         return np.asarray(nearest_vertices(lock(x.view()), self._guesses[1], bound)[1])

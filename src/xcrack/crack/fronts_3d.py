@@ -4,11 +4,30 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from xcrack.arrays import Floats, Ints, lock
+from xcrack.base.arrays import Floats, Ints, lock
 from xcrack.crack.crack import Crack
-from xcrack.crack.polylines_3d import tangents
-from xcrack.geometry.distances import corner_normals
-from xcrack.geometry.triangulation import unit
+from xcrack.mesh.distances import corner_normals
+from xcrack.mesh.triangulation import unit
+
+# Sides and tangents of polylines in 3D, open or closed.
+
+
+def steps(x: Floats, closed: bool) -> Floats:
+    """Vectors from each point of a polyline to the next one."""
+    return np.asarray(np.roll(x, -1, axis=0) - x if closed else np.diff(x, axis=0))
+
+
+def tangents(x: Floats, closed: bool) -> Floats:
+    """Unit tangents of the circles through three points in a row, of the sides at open ends."""
+    side = steps(x, closed)
+    ahead = side if closed else np.concatenate([side, side[-1:]])
+    back = np.roll(side, 1, axis=0) if closed else np.concatenate([side[:1], side])
+    ahead_length = np.linalg.norm(ahead, axis=1, keepdims=True)
+    back_length = np.linalg.norm(back, axis=1, keepdims=True)
+    tangent = ahead / ahead_length * back_length + back / back_length * ahead_length
+    length = np.linalg.norm(tangent, axis=1, keepdims=True)
+    return np.asarray(tangent / np.where(length > 0, length, 1.0))
+
 
 _FAR = 2.5  # median spacings that still close a front, from its last point to its first
 
@@ -92,3 +111,6 @@ def front_weights(x: Floats) -> Floats:
         weight = np.append(along, 0.0) + np.append(0.0, along)
     total = float(weight.sum())
     return np.asarray(weight / total if total else np.full(len(x), 1 / len(x)))
+
+
+__all__ = []

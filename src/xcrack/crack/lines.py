@@ -3,11 +3,11 @@
 import numpy as np
 from numpy.typing import ArrayLike
 
-from xcrack.arrays import Bools, Floats, at
+from xcrack.base.arrays import Bools, Floats, at
+from xcrack.base.errors import GeometryError
 from xcrack.crack.crack import Crack
-from xcrack.errors import GeometryError
-from xcrack.geometry.simplices import closest_on_segment
 from xcrack.mesh.checks import coordinates
+from xcrack.mesh.polygon import closest_on_segment
 
 _SAME = 1e-9  # share of its length within which a line touches itself or is closed
 _AT_ONCE = 1_000_000  # pairs of pieces looked at together

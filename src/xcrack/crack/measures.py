@@ -5,13 +5,373 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from xcrack.arrays import Floats, Ints
-from xcrack.crack.crack import Crack
-from xcrack.crack.measures_2d import measures_of_line
-from xcrack.crack.measures_3d import measures_of_surface
+from xcrack.base.arrays import Bools, Floats, Ints, ranges
+from xcrack.base.errors import GeometryError, ProblemError
+from xcrack.crack.crack import Crack, tip_frames
 from xcrack.crack.placing import placed
-from xcrack.errors import GeometryError
+from xcrack.mesh.distances import signed_in
+from xcrack.mesh.locate import Body, parts_inside
 from xcrack.mesh.mesh import Mesh
+from xcrack.mesh.polygon import distance_to_simplices
+
+# Length of a 2D crack in the body.
+
+
+def length_inside(crack: Crack, mesh: Mesh) -> float:
+    """Length of the part of a 2D crack that lies in the body.
+
+    A mouth lies outside, as far as the crack was prolonged; that part does not count.
+    """
+    length = np.linalg.norm(np.diff(crack.points, axis=0), axis=1)
+    share = [float(np.diff(parts, axis=1).sum()) for parts in parts_inside(mesh, crack.points)]
+    total = float(length @ share)
+    if total <= 0:
+        raise ProblemError(f"no part of the crack from {crack.points[0].tolist()} is in the body.")
+    return total
+
+
+# Length of a line in a body, and where it meets the boundary.
+
+_END = 1e-9  # share of a piece of a line within which it begins or ends
+
+
+def measures_of_line(
+    crack: Crack, mesh: Mesh, group: Ints
+) -> tuple[float, float, dict[int, tuple[float, float]], list[tuple[Floats, int, int]]]:
+    """Length inside, depth by set, and mouths of a placed 2D crack.
+
+    Parameters
+    ----------
+    crack : Crack
+    mesh : Mesh
+    group : (f,) array of int
+        Number of the set of each facet of the mesh.
+
+    Returns
+    -------
+    length : float, length
+    front_length : float
+        0.
+    traces : dict of set to (0, depth)
+    ends : list of (x, facet, -1)
+    """
+    outer = np.nonzero(mesh.facet_to_cell[:, 1] < 0)[0]
+    sides = mesh.points[mesh.facets[outer]]
+    tips, _ = tip_frames(crack)
+    ends: list[tuple[Floats, int, int]] = []
+    pieces = list(zip(crack.points, np.diff(crack.points, axis=0), strict=False))
+    for (p, r), parts in zip(pieces, parts_inside(mesh, crack.points), strict=True):
+        for t in np.unique(parts):
+            x = p + t * r
+            distance = distance_to_simplices(x, sides)
+            best = int(np.argmin(distance))
+            # Pieces meet inside the body, and tips lie there: neither is a mouth.
+            if distance[best] <= _END * mesh.extent and not _is_tip(x, tips, mesh.extent):
+                if not any(np.linalg.norm(x - y) <= _END * mesh.extent for y, _, _ in ends):
+                    ends.append((x, int(outer[best]), -1))
+    traces: dict[int, tuple[float, float]] = {}
+    for x, facet, _ in ends:
+        away = np.linalg.norm(tips - x, axis=1).max(initial=0.0)
+        far = max((float(np.linalg.norm(x - y)) for y, _, _ in ends), default=0.0)
+        k = int(group[facet])
+        depth = float(away) if len(tips) else far
+        traces[k] = (0.0, max(depth, traces.get(k, (0.0, 0.0))[1]))
+    return length_inside(crack, mesh), 0.0, traces, ends
+
+
+def _is_tip(x: Floats, tips: Floats, extent: float) -> bool:
+    return bool((np.linalg.norm(tips - x, axis=1) <= _END * extent).any())
+
+
+# Area of a 3D crack and length of its fronts in the body.
+
+_FINE = 0.25  # of a cell: sides of the pieces that the boundary of the body clips
+_MOST = 1000  # parts of a side of a front
+
+
+def area_inside(crack: Crack, mesh: Mesh) -> float:
+    """Area of the part of a 3D crack that lies in the body.
+
+    Faces near the boundary are halved until their sides are a quarter of a cell, and what the
+    boundary then still crosses is clipped as if it were plane there.
+
+    Parameters
+    ----------
+    crack : Crack
+        3D.
+    mesh : Mesh
+
+    Returns
+    -------
+    float
+        length².
+
+    Raises
+    ------
+    ProblemError
+        No part of the crack lies in the body.
+    """
+    return _area_inside(crack, Body.of(mesh))
+
+
+def _area_inside(crack: Crack, body: Body) -> float:
+    piece = crack.points[crack.faces]
+    total = 0.0
+    while len(piece):
+        area = np.linalg.norm(
+            np.cross(piece[:, 1] - piece[:, 0], piece[:, 2] - piece[:, 0]), axis=1
+        )
+        area /= 2
+        centre = piece.mean(axis=1)
+        radius = np.linalg.norm(piece - centre[:, None], axis=2).max(axis=1)
+        depth = body.depth(centre)[0]
+        near = np.abs(depth) < radius
+        total += float(area[~near & (depth < 0)].sum())
+        side = np.linalg.norm(np.roll(piece, -1, axis=1) - piece, axis=2)
+        cell = body.cell_size(centre)
+        small = near & (side.max(axis=1) <= _FINE * cell)
+        corners = piece[small].reshape(-1, 3)
+        share = _share_below_zero(body.depth(corners)[0].reshape(-1, 3))
+        total += float((area[small] * share).sum())
+        piece = halved(piece[near & ~small], side[near & ~small])
+    if total <= 0:
+        raise ProblemError(f"no part of the crack at {crack.points[0].tolist()} is in the body.")
+    return total
+
+
+def front_length_inside(crack: Crack, mesh: Mesh) -> float:
+    """Length of all fronts of a 3D crack within the body.
+
+    Parameters
+    ----------
+    crack : Crack
+        3D, placed.
+    mesh : Mesh
+
+    Returns
+    -------
+    float
+        length; 0 where no front is left.
+    """
+    return _front_length_inside(crack, Body.of(mesh))
+
+
+def _front_length_inside(crack: Crack, body: Body) -> float:
+    finest = _FINE * float(body.mesh.cell_size.min())
+    total = 0.0
+    for front in crack.fronts or ():
+        x = crack.points[front]
+        side = np.diff(x, axis=0)
+        length = np.linalg.norm(side, axis=1)
+        parts = np.clip(np.ceil(length / finest), 1, _MOST).astype(np.int64)
+        row, part = ranges(parts)
+        one, other = (
+            body.depth(x[row] + ((part + end) / parts[row])[:, None] * side[row])[0]
+            for end in (0, 1)
+        )
+        low, high = np.minimum(one, other), np.maximum(one, other)
+        width = np.where(high > low, high - low, 1.0)
+        share = np.where(high <= 0, 1.0, np.where(low >= 0, 0.0, -low / width))
+        total += float(share @ (length / parts)[row])
+    return total
+
+
+def surface_size(crack: Crack, mesh: Mesh, body: Body | None = None) -> float:
+    """Area of a 3D crack over the length of its fronts, within the body.
+
+    Parameters
+    ----------
+    crack : Crack
+        3D, placed.
+    mesh : Mesh
+    body : Body, optional
+        Of the mesh, where it is known.
+
+    Returns
+    -------
+    float
+        length: that of a crack with a straight front, half the radius of a penny; the root of the
+        area where all fronts have left the body.
+    """
+    body = body or Body.of(mesh)
+    area, length = _area_inside(crack, body), _front_length_inside(crack, body)
+    return area / length if length > 0 else float(np.sqrt(area))
+
+
+def halved(piece: Floats, side: Floats) -> Floats:
+    """Triangles `(k, 3, 3)` cut through the middle of their longest sides."""
+    turn = (np.argmax(side, axis=1)[:, None] + np.arange(3)) % 3
+    a, b, c = np.take_along_axis(piece, turn[..., None], axis=1).transpose(1, 0, 2)
+    middle = (a + b) / 2
+    return np.concatenate([np.stack([a, middle, c], axis=1), np.stack([middle, b, c], axis=1)])
+
+
+def _share_below_zero(values: Floats) -> Floats:
+    """Share of each triangle in which the linear function with these corner values is < 0."""
+    below = (values < 0).sum(axis=1)
+    ordered = np.sort(values, axis=1)
+    low, middle, high = ordered.T
+    spread = np.where(high > low, high - low, 1.0)
+    one = low**2 / (np.where(middle > low, middle - low, 1.0) * spread)
+    two = 1 - high**2 / (spread * np.where(high > middle, high - middle, 1.0))
+    return np.asarray(np.choose(below, [np.zeros_like(low), one, two, np.ones_like(low)]))
+
+
+# Lines in which a surface meets the boundary of a body, and what lies how deep below them.
+
+_FINE_SURFACE = (
+    0.1  # of a facet of the boundary: pieces of the crack that meet it, steps along fronts
+)
+_MOST_TRIANGLES = 2000  # steps on a side of a front
+_REACH = 1.5  # cells up to which a front that ends inside is prolonged to the boundary
+_BISECTIONS = 60
+
+
+def measures_of_surface(
+    crack: Crack, mesh: Mesh, group: Ints
+) -> tuple[float, float, dict[int, tuple[float, float]], list[tuple[Floats, int, int]]]:
+    """Area, length of fronts, length and depth by set, and ends of fronts of a placed 3D crack.
+
+    Parameters
+    ----------
+    crack : Crack
+    mesh : Mesh
+    group : (f,) array of int
+        Number of the set of each facet of the mesh.
+
+    Returns
+    -------
+    area : float, length²
+    front_length : float, length
+    traces : dict of set to (length, depth)
+    ends : list of (x, facet, number of the front)
+    """
+    body = Body.of(mesh)
+    outer = np.nonzero(mesh.facet_to_cell[:, 1] < 0)[0]
+    segment = _trace(crack, body)
+    facet = outer[signed_in(body.boundary, segment.mean(axis=1))[1]] if len(segment) else outer[:0]
+    fronts = [_front_points(crack, front, body) for front in crack.fronts or ()]
+    deepest = np.concatenate([np.zeros((0, 3)), *fronts])
+    ends = [
+        (x, int(outer[signed_in(body.boundary, x[None])[1][0]]), k)
+        for k, x in front_ends(crack, body)
+    ]
+    # Traces and fronts end at the same places.
+    deepest = np.concatenate([deepest, *(x[None] for x, _, _ in ends)])
+    if not len(deepest):
+        deepest = segment.reshape(-1, 3)
+    of = group[facet]
+    traces = {}
+    for k in np.unique(of).tolist():
+        own = segment[of == k]
+        length = float(np.linalg.norm(own[:, 1] - own[:, 0], axis=1).sum())
+        depth = max((float(distance_to_simplices(x, own).min()) for x in deepest), default=0.0)
+        traces[k] = (length, depth)
+    return area_inside(crack, mesh), front_length_inside(crack, mesh), traces, ends
+
+
+def front_ends(crack: Crack, body: Body) -> list[tuple[int, Floats]]:
+    """Where the fronts of a placed crack meet the boundary: number of the front, place.
+
+    Parameters
+    ----------
+    crack : Crack
+    body : Body
+
+    Returns
+    -------
+    list of (int, (3,) array)
+        Places in the direction of the front.
+    """
+    return [
+        (k, x)
+        for k, front in enumerate(crack.fronts or ())
+        for x in _ends(crack.points[front], body)
+    ]
+
+
+def _trace(crack: Crack, body: Body) -> Floats:
+    """Segments in which the faces of a crack meet the boundary `(k, 2, 3)`."""
+    piece = crack.points[crack.faces]
+    parts = [np.zeros((0, 2, 3))]
+    while len(piece):
+        centre = piece.mean(axis=1)
+        radius = np.linalg.norm(piece - centre[:, None], axis=2).max(axis=1)
+        depth, size = body.depth(centre)
+        near = np.abs(depth) < radius
+        piece, size = piece[near], size[near]
+        side = np.linalg.norm(np.roll(piece, -1, axis=1) - piece, axis=2)
+        small = side.max(axis=1) <= _FINE_SURFACE * size
+        parts.append(_zero_lines(piece[small], body))
+        piece = halved(piece[~small], side[~small])
+    return np.concatenate(parts)
+
+
+def _zero_lines(piece: Floats, body: Body) -> Floats:
+    """Segments of small triangles where the depth, linear between their corners, is zero."""
+    if not len(piece):
+        return np.zeros((0, 2, 3))
+    depth = body.depth(piece.reshape(-1, 3))[0].reshape(-1, 3)
+    outside: Bools = depth >= 0
+    count = outside.sum(axis=1)
+    crossed = (count == 1) | (count == 2)
+    piece, depth, outside, count = piece[crossed], depth[crossed], outside[crossed], count[crossed]
+    # The corner alone on its side first, the two others after it.
+    alone = np.argmax(outside == (count == 1)[:, None], axis=1)
+    order = (alone[:, None] + np.arange(3)) % 3
+    x = np.take_along_axis(piece, order[..., None], axis=1)
+    d = np.take_along_axis(depth, order, axis=1)
+    t = d[:, :1] / (d[:, :1] - d[:, 1:])
+    return np.asarray(x[:, :1] + t[..., None] * (x[:, 1:] - x[:, :1]))
+
+
+def _front_points(crack: Crack, front: Ints, body: Body) -> Floats:
+    """Points along a front inside the body."""
+    x = _dense(crack.points[front], body)
+    return x[body.depth(x)[0] <= 0]
+
+
+def _dense(x: Floats, body: Body) -> Floats:
+    side = np.diff(x, axis=0)
+    length = np.linalg.norm(side, axis=1)
+    size = body.depth((x[1:] + x[:-1]) / 2)[1]
+    parts = np.clip(np.ceil(length / (_FINE_SURFACE * size)), 1, _MOST_TRIANGLES).astype(np.int64)
+    row, part = ranges(parts)
+    points = x[row] + (part / parts[row])[:, None] * side[row]
+    return np.concatenate([points, x[-1:]])
+
+
+def _ends(x: Floats, body: Body) -> list[Floats]:
+    """Where an open front meets the boundary, or would if its end were prolonged."""
+    closed = bool((x[0] == x[-1]).all())
+    points = _dense(x, body)
+    inside = body.depth(points)[0] < 0
+    if not inside.any():
+        return []
+    change = np.nonzero(inside[1:] != inside[:-1])[0]
+    result = [_crossing(points[i], points[i + 1], body) for i in change]
+    if closed:
+        return result
+    for end, before in ((points[0], points[1]), (points[-1], points[-2])):
+        if body.depth(end[None])[0][0] >= 0:
+            continue
+        ahead = (end - before) / max(float(np.linalg.norm(end - before)), 1e-300)
+        far = end + _REACH * body.cell_size(end[None])[0] * ahead
+        if body.depth(far[None])[0][0] >= 0:
+            result.append(_crossing(end, far, body))
+    return result
+
+
+def _crossing(one: Floats, other: Floats, body: Body) -> Floats:
+    """Place on the boundary between a point inside and one outside."""
+    inside = body.depth(one[None])[0][0] < 0
+    for _ in range(_BISECTIONS):
+        middle = (one + other) / 2
+        if (body.depth(middle[None])[0][0] < 0) == inside:
+            one = middle
+        else:
+            other = middle
+    return np.asarray((one + other) / 2)
 
 
 @dataclass(frozen=True)
@@ -168,3 +528,6 @@ def facet_names(mesh: Mesh) -> tuple[list[str], Ints]:
         if len(facets):
             group[mesh.facet_numbers(facets)] = k
     return [name for name, _ in sets], group
+
+
+__all__ = ["area_inside", "front_length_inside", "halved", "length_inside", "surface_size"]

@@ -4,10 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from xcrack.arrays import Bools, Floats, Ints
-from xcrack.errors import CoarseMeshError
-from xcrack.geometry.triangulation import face_normals, rim, ruled, unit
-from xcrack.mesh.body import ON, Body
+from xcrack.base.arrays import Bools, Floats, Ints
+from xcrack.base.errors import CoarseMeshError
+from xcrack.mesh.locate import ON, Body
+from xcrack.mesh.triangulation import face_normals, rim, ruled, unit
 
 SIDE = 0.75  # sides of a front are at most this share of a cell long
 OUTSIDE = 2.0  # cells by which an open front leaves the body

@@ -2,13 +2,13 @@
 
 from collections.abc import Callable, Sequence
 
-from xcrack.crack import junctions_2d
+from xcrack.base.errors import GeometryError
+from xcrack.crack import junctions as junctions_2d
 from xcrack.crack.crack import Crack
-from xcrack.crack.junctions_2d import Junction
+from xcrack.crack.junctions import Junction
 from xcrack.crack.placing_2d import check_lines, place_line
 from xcrack.crack.placing_3d import ShortFront, check_surfaces, place_surface
 from xcrack.crack.placing_3d import short_fronts as surface_short_fronts
-from xcrack.errors import GeometryError
 from xcrack.mesh.mesh import Mesh
 
 _PLACE: dict[int, Callable[[Crack, Mesh], Crack]] = {2: place_line, 3: place_surface}

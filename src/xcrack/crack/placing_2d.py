@@ -3,15 +3,14 @@
 import numpy as np
 from scipy.spatial import cKDTree
 
-from xcrack.arrays import Floats, at, coordinates
-from xcrack.crack.crack import Crack
-from xcrack.crack.junctions_2d import Junction, junctions
+from xcrack.base.arrays import Floats, at, coordinates
+from xcrack.base.errors import CoarseMeshError, GeometryError, warn
+from xcrack.crack.crack import Crack, tip_frames
+from xcrack.crack.junctions import Junction, junctions
 from xcrack.crack.lines import crossing_points, touching_points
-from xcrack.crack.tips_2d import tip_frames
-from xcrack.errors import CoarseMeshError, GeometryError, warn
-from xcrack.geometry.simplices import closest_on_segment
 from xcrack.mesh.locate import cell_sizes, cells_at, contains, nearest_boundary, parts_inside
 from xcrack.mesh.mesh import Mesh
+from xcrack.mesh.polygon import closest_on_segment
 
 _MOUTH = 0.5  # an end within this share of a cell from the boundary is a mouth
 _MEANT = 0.1  # share of a cell inside the boundary up to which nobody means a tip

@@ -5,14 +5,14 @@ from os import PathLike
 import numpy as np
 from numpy.typing import ArrayLike
 
-from xcrack.arrays import Floats, Ints, at
+from xcrack.base.arrays import Floats, Ints, at
+from xcrack.base.checks import number, numbers, whole, whole_numbers
+from xcrack.base.errors import GeometryError
 from xcrack.crack.crack import Crack
-from xcrack.errors import GeometryError
-from xcrack.geometry.polygon import ear_clipped, self_crossing
-from xcrack.geometry.triangulation import face_areas, oriented, rim, side_keys
-from xcrack.inputs import number, numbers, whole, whole_numbers
 from xcrack.mesh.checks import LARGEST, coordinates
 from xcrack.mesh.files import read_triangles
+from xcrack.mesh.polygon import ear_clipped, self_crossing
+from xcrack.mesh.triangulation import face_areas, oriented, rim, side_keys
 
 _FLAT = 1e-9  # share of its size by which a plane polygon may leave its plane
 _FEWEST, _MOST = 8, 100_000  # boundary points of a disc

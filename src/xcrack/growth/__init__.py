@@ -1,1 +1,1 @@
-"""Criteria, laws, and the growth of cracks step by step."""
+"""Growth of cracks, step by step."""

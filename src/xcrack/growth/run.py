@@ -7,13 +7,15 @@ from typing import Unpack
 import numpy as np
 
 from xcrack.analysis.solution import Solution
+from xcrack.base.errors import GeometryError, ProblemError, XcrackError, warn
 from xcrack.crack.crack import Crack
-from xcrack.errors import GeometryError, ProblemError, XcrackError, warn
-from xcrack.growth.directions.checks import depends_on_ratio
-from xcrack.growth.directions.criteria import Criterion
-from xcrack.growth.events import joining
-from xcrack.growth.events.arrivals import arrivals_of, last_step
-from xcrack.growth.events.ending import (
+from xcrack.fatigue.checks import depends_on_ratio
+from xcrack.fatigue.criteria import Criterion
+from xcrack.fatigue.law import Law
+from xcrack.fatigue.spectrum import Spectrum
+from xcrack.growth import joining
+from xcrack.growth.arrivals import arrivals_of, last_step
+from xcrack.growth.ending import (
     cut_off,
     end_at,
     falls_to_zero,
@@ -22,25 +24,24 @@ from xcrack.growth.events.ending import (
     short_kink,
     too_short,
 )
-from xcrack.growth.integration.integrators import integrator_of
-from xcrack.growth.notices import Notices
-from xcrack.growth.progress import Progress
-from xcrack.growth.rates.evaluation import evaluate
-from xcrack.growth.rates.rating import check_choice, levels_of, respond_to_cycle, warn_of_left_out
-from xcrack.growth.rates.uncertainty import best_known, shortfall, with_K
-from xcrack.growth.steps.advance import LEAST, Advance
-from xcrack.growth.steps.joined import Joined
-from xcrack.growth.steps.options import GrowOptions, Run, lists_options, run_of
-from xcrack.growth.steps.step import Cycle, Memory, Step, memory_of
-from xcrack.growth.tolerance.outgrown import again
-from xcrack.growth.tolerance.prepared import fingerprint, prepared
-from xcrack.growth.tracking.follow import following
-from xcrack.laws.law import Law
+from xcrack.growth.follow import following
+from xcrack.growth.integrators import integrator_of
+from xcrack.growth.options import GrowOptions, Run, lists_options, run_of
+from xcrack.growth.prepared import again, fingerprint, prepared
+from xcrack.growth.progress import Notices, Progress
+from xcrack.growth.rates import (
+    check_choice,
+    evaluate,
+    levels_of,
+    respond_to_cycle,
+    warn_of_left_out,
+)
+from xcrack.growth.step import LEAST, Advance, Cycle, Joined, Memory, Step, memory_of
+from xcrack.growth.uncertainty import best_known, shortfall, with_K
+from xcrack.linalg.reuse import Reuse
 from xcrack.mesh.mesh import Mesh
-from xcrack.scene.problem import Problem
+from xcrack.model.problem import Problem
 from xcrack.sif.sif import SIF
-from xcrack.solvers.reuse import Reuse
-from xcrack.spectra.spectrum import Spectrum
 
 
 @lists_options

@@ -1,1 +1,1 @@
-"""Meshes of simplices: their values, generators, files, and where points lie in them."""
+"""Meshes of simplices: values, generators, files, refinement, location of points."""

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
-from xcrack.arrays import Floats, Ints
-from xcrack.errors import MeshError
-from xcrack.inputs import shown
+from xcrack.base.arrays import Floats, Ints
+from xcrack.base.checks import shown
+from xcrack.base.errors import MeshError
 from xcrack.mesh.linear import base_kind
 from xcrack.mesh.mesh import Mesh
 from xcrack.mesh.raw import RawMesh, sets_to_write

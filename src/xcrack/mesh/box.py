@@ -6,9 +6,9 @@ from math import factorial
 import numpy as np
 from numpy.typing import ArrayLike
 
-from xcrack.arrays import Bools, Ints
-from xcrack.errors import MeshError
-from xcrack.inputs import whole_numbers
+from xcrack.base.arrays import Bools, Ints
+from xcrack.base.checks import whole_numbers
+from xcrack.base.errors import MeshError
 from xcrack.mesh.checks import coordinates
 from xcrack.mesh.mesh import Mesh, sound_mesh
 

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
-from xcrack.arrays import Floats, Ints, Shape, at, ranges, stretches
-from xcrack.errors import MeshError, XcrackError
-from xcrack.geometry.simplices import distance_to_simplices
-from xcrack.inputs import numbers, shown, whole_numbers
+from xcrack.base.arrays import Floats, Ints, Shape, at, ranges, stretches
+from xcrack.base.checks import numbers, shown, whole_numbers
+from xcrack.base.errors import MeshError, XcrackError
+from xcrack.mesh.polygon import distance_to_simplices
 
 _FLAT = 1e-12  # a cell whose volume is below this share of (longest edge)^d has no shape
 LARGEST = 1e90  # coordinate whose third power is still a number
@@ -31,7 +31,7 @@ def coordinates(
     Parameters
     ----------
     value, what, shape, error
-        As of `xcrack.inputs.numbers`.
+        As of `xcrack.base.checks.numbers`.
 
     Returns
     -------

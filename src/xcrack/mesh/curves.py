@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from xcrack.arrays import Bools, Floats, Ints, at
-from xcrack.errors import MeshError, warn
-from xcrack.inputs import called, numbers
+from xcrack.base.arrays import Bools, Floats, Ints, at
+from xcrack.base.checks import called, numbers
+from xcrack.base.errors import MeshError, warn
 from xcrack.mesh.checks import LARGEST
 
 Curve = Callable[[Floats], Any]

@@ -5,13 +5,12 @@ from types import ModuleType
 
 import numpy as np
 
-from xcrack.arrays import Floats, Ints
-from xcrack.errors import GeometryError, MeshError
-from xcrack.geometry.curves import Round
-from xcrack.inputs import number
-from xcrack.mesh.gmsh_session import session
-from xcrack.mesh.grading import FINEST, graded_size, length_of
+from xcrack.base.arrays import Floats, Ints
+from xcrack.base.checks import number
+from xcrack.base.errors import GeometryError, MeshError
+from xcrack.mesh.gmsh_session import FINEST, graded_size, length_of, session
 from xcrack.mesh.mesh import Mesh, sound_mesh
+from xcrack.mesh.polygon import Round
 
 _FACES = 24
 _TURN = 2 * pi / _FACES  # from one face of an end to the next

@@ -6,15 +6,15 @@ from typing import Any
 
 import numpy as np
 
-from xcrack.arrays import Floats, Ints, at, frozen
-from xcrack.errors import MeshError, ProblemError, warn
-from xcrack.inputs import numbers, shown
+from xcrack.base.arrays import Floats, Ints, at, frozen
+from xcrack.base.checks import numbers, shown
+from xcrack.base.errors import MeshError, ProblemError, warn
+from xcrack.base.paths import system_errors
 from xcrack.mesh.files import existing_file, meshio_read
 from xcrack.mesh.linear import SHAPES, base_kind, linearised
 from xcrack.mesh.locate import barycentric, locate
 from xcrack.mesh.mesh import Mesh, sound_mesh
 from xcrack.mesh.raw import RawMesh
-from xcrack.paths import system_errors
 
 _BESIDE = 0.5  # of a cell: a point this near to the mesh has the value at its boundary
 _NEAR = 8  # cells looked at for a point outside
@@ -259,7 +259,7 @@ def _field(
 
 def _split(raw: RawMesh, name: str) -> RawMesh:
     """Cells as simplices; how they are divided matters to nobody who interpolates."""
-    from xcrack.errors import collected_warnings
+    from xcrack.base.errors import collected_warnings
 
     messages: list[str] = []
     with collected_warnings(messages):

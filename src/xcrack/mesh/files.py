@@ -12,16 +12,16 @@ from urllib.parse import quote, unquote
 
 import numpy as np
 
-from xcrack.arrays import Floats, Ints
-from xcrack.errors import GeometryError, MeshError, XcrackError, warn
-from xcrack.inputs import flag, one_of
+from xcrack.base.arrays import Floats, Ints
+from xcrack.base.checks import flag, one_of
+from xcrack.base.errors import GeometryError, MeshError, XcrackError, warn
+from xcrack.base.optional import required
+from xcrack.base.paths import path_of, system_errors, written_whole
 from xcrack.mesh.abaqus import abaqus_text, read_abaqus
 from xcrack.mesh.linear import SHAPES, base_kind, linearised
 from xcrack.mesh.mesh import Mesh
 from xcrack.mesh.msh import REST, msh_text
 from xcrack.mesh.raw import CELL_KIND, FACET_KIND, RawMesh, mesh_from_raw, sets_to_write
-from xcrack.optional import required
-from xcrack.paths import path_of, system_errors, written_whole
 
 _SET = "set:"  # prefix of the 0/1 cell data that carry a set in formats without sets
 _WITH_CELL_DATA = {".vtu", ".vtk", ".xdmf", ".xmf"}

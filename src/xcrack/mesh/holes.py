@@ -4,10 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from xcrack.arrays import Floats, Ints
-from xcrack.errors import ProblemError
+from xcrack.base.arrays import Floats, Ints
+from xcrack.base.errors import ProblemError
 from xcrack.mesh.mesh import Mesh
-from xcrack.mesh.normals import outward_areas
+from xcrack.mesh.simplex import outward_areas
 
 _ROUND = 0.02  # of the radius: points of a hole are no farther from its circle
 _STEPS = 8

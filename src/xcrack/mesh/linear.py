@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from xcrack.arrays import Bools, Floats, Ints, at
-from xcrack.errors import MeshError, warn
+from xcrack.base.arrays import Bools, Floats, Ints, at
+from xcrack.base.errors import MeshError, warn
 from xcrack.mesh.raw import RawMesh
 
 _Faces = tuple[tuple[int, ...], ...]

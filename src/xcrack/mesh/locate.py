@@ -1,8 +1,11 @@
 """Where points lie in a mesh."""
 
+from dataclasses import dataclass
+
 import numpy as np
 
-from xcrack.arrays import Bools, Floats, Ints, lock
+from xcrack.base.arrays import Bools, Floats, Ints, lock
+from xcrack.mesh.distances import TriangleTree, signed_in, triangle_tree
 from xcrack.mesh.mesh import Mesh
 
 _CROSSINGS = 1_000_000  # pairs of a piece and a boundary facet that are looked at at once
@@ -22,7 +25,7 @@ def locate(mesh: Mesh, x: Floats) -> tuple[Ints, Floats]:
 
     Of several cells that a point belongs to, it is the one with the nearest centroid.
     """
-    from xcrack.kernels.location import located
+    from xcrack.mesh.kernels.location import located
 
     x = np.ascontiguousarray(np.atleast_2d(np.asarray(x, dtype=float)))
     cell, bary = located(mesh.points, mesh.cells, mesh.gradient, *mesh.cell_grid, x, _TOLERANCE)
@@ -70,7 +73,7 @@ def cells_around(mesh: Mesh, x: Floats, tolerance: float) -> Ints:
 
 def nearest_boundary(mesh: Mesh, x: Floats) -> tuple[float, float]:
     """Distance of one point to the boundary of a 2D mesh, and the size of the cell there."""
-    from xcrack.kernels.location import nearest_segment
+    from xcrack.mesh.kernels.location import nearest_segment
 
     distance, size = nearest_segment(mesh.points, mesh.boundary, np.ascontiguousarray(x))
     return float(distance), float(size)
@@ -118,7 +121,54 @@ def cells_within(mesh: Mesh, x: Floats, radius: float) -> Ints:
 
     A cell that contains the point is among them only if its sides are near enough.
     """
-    from xcrack.kernels import location
+    from xcrack.mesh.kernels import location
 
     x = np.ascontiguousarray(x)
     return np.asarray(location.cells_within(mesh.points, mesh.cells, x, radius))
+
+
+# The body that a 3D mesh fills: how deep points lie in it, and how large its cells are.
+
+ON = 1e-9  # share of a cell within which a point lies on the boundary
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """A mesh and the search tree of its boundary."""
+
+    mesh: Mesh
+    boundary: TriangleTree
+    facet_size: Floats
+
+    @staticmethod
+    def of(mesh: Mesh) -> "Body":
+        """The body that a mesh fills."""
+        place = np.nonzero(mesh.facet_to_cell[:, 1] < 0)[0]
+        cell = mesh.facet_to_cell[place, 0]
+        facets = mesh.facets[place]
+        corner = mesh.points[facets]
+        # Barycentric coordinates decrease towards the facet opposite to their corner.
+        local = np.argmax(mesh.cell_to_facet[cell] == place[:, None], axis=1)
+        inward = mesh.gradient[cell, local]
+        normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+        turned = np.einsum("ij,ij->i", normal, inward) > 0
+        facets = np.where(turned[:, None], facets[:, ::-1], facets)
+        size = np.linalg.norm(corner - np.roll(corner, 1, axis=1), axis=2).max(axis=1)
+        return Body(mesh, triangle_tree(mesh.points, facets), size)
+
+    def depth(self, x: Floats) -> tuple[Floats, Floats]:
+        """Distance to the boundary, negative inside, and the size of the facet there."""
+        distance, facet, _ = signed_in(self.boundary, x)
+        return distance, self.facet_size[facet]
+
+    def contains(self, x: Floats) -> Bools:
+        """Which points lie in the body, its boundary included."""
+        distance, size = self.depth(x)
+        return np.asarray(distance <= ON * size)
+
+    def cell_size(self, x: Floats) -> Floats:
+        """Size of the cell with the nearest centroid, outside the body as well."""
+        return np.asarray(self.mesh.cell_size[self.mesh.cell_tree.query(x)[1]])
+
+
+__all__ = []

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
-from xcrack.arrays import Floats, Ints, frozen, lock, stretches
-from xcrack.errors import MeshError, warn
-from xcrack.inputs import shown, whole_numbers
+from xcrack.base.arrays import Floats, Ints, frozen, lock, stretches
+from xcrack.base.checks import shown, whole_numbers
+from xcrack.base.errors import MeshError, ProblemError, warn
 from xcrack.mesh.checks import checked, checked_sets, doubts, unused_sets
 from xcrack.mesh.curves import Curves, check_on_curves, checked_curves
 
@@ -279,7 +279,7 @@ class Mesh:
         About as many bins as triangles, and a third as many as tetrahedra, whose boxes meet about
         twelve bins each then, and 22 where there are as many.
         """
-        from xcrack.kernels.location import binned
+        from xcrack.mesh.kernels.location import binned
 
         every = np.stack([self.points.min(axis=0), self.points.max(axis=0)])
         side = np.maximum(every[1] - every[0], 1e-300)
@@ -395,3 +395,31 @@ def local_facets(dim: int) -> Ints:
     """Local vertex numbers of the facet opposite to each vertex, `(d + 1, d)`."""
     every = range(dim + 1)
     return lock(np.array([[j for j in every if j != i] for i in every], dtype=np.int64))
+
+
+# Named sets of facets, and the mesh point nearest to a place.
+
+
+def facet_set(mesh: Mesh, name: str, what: str) -> Ints:
+    """Facets of a set by name; an error lists the known names."""
+    if name not in mesh.facet_sets:
+        known = ", ".join(repr(n) for n in mesh.facet_sets)
+        raise ProblemError(f"{what}: the mesh has no facet set {shown(name)}; it has {known}.")
+    return mesh.facet_sets[name]
+
+
+def nearest_point(mesh: Mesh, x: Floats, what: str) -> int:
+    """Number of the mesh point nearest to x; an error where x is not in or at the body."""
+    if len(x) != mesh.dim:
+        raise ProblemError(f"{what}: the point {x.tolist()} needs {mesh.dim} coordinates.")
+    distance = np.linalg.norm(mesh.points - x, axis=1)
+    best = int(np.argmin(distance))
+    if distance[best] > mesh.cell_size.max():
+        raise ProblemError(
+            f"{what}: {x.tolist()} is {distance[best]:.4g} away from the nearest mesh point "
+            f"{mesh.points[best].tolist()}: give a point of the body."
+        )
+    return best
+
+
+__all__ = []

@@ -4,9 +4,9 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from xcrack.arrays import Ints
-from xcrack.errors import MeshError
-from xcrack.inputs import shown
+from xcrack.base.arrays import Ints
+from xcrack.base.checks import shown
+from xcrack.base.errors import MeshError
 from xcrack.mesh.mesh import Mesh
 from xcrack.mesh.raw import sets_to_write
 

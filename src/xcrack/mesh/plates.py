@@ -7,14 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from xcrack.arrays import Floats, Ints
-from xcrack.errors import GeometryError, MeshError
-from xcrack.geometry.curves import Round
-from xcrack.inputs import number, shown
+from xcrack.base.arrays import Floats, Ints
+from xcrack.base.checks import number, shown
+from xcrack.base.errors import GeometryError, MeshError
 from xcrack.mesh.checks import coordinates
-from xcrack.mesh.gmsh_session import session
-from xcrack.mesh.grading import FINEST, graded_size, length_of, polylines
+from xcrack.mesh.gmsh_session import FINEST, graded_size, length_of, polylines, session
 from xcrack.mesh.mesh import Mesh, sound_mesh
+from xcrack.mesh.polygon import Round
 
 Point = tuple[float, float]
 Hole = tuple[Point, float]

@@ -5,9 +5,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from xcrack.arrays import Floats, Ints
-from xcrack.errors import MeshError, warn
-from xcrack.inputs import shown
+from xcrack.base.arrays import Floats, Ints
+from xcrack.base.checks import shown
+from xcrack.base.errors import MeshError, warn
 from xcrack.mesh.mesh import Mesh, sound_mesh
 
 TOPOLOGICAL_DIM = {"vertex": 0, "line": 1, "triangle": 2, "tetra": 3}

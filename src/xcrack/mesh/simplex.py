@@ -2,11 +2,13 @@
 
 from functools import lru_cache
 from itertools import permutations
+from math import factorial
 
 import numpy as np
 from scipy.special import roots_jacobi
 
-from xcrack.arrays import Floats, Ints, lock
+from xcrack.base.arrays import Floats, Ints, lock
+from xcrack.base.errors import ProblemError
 from xcrack.mesh.mesh import Mesh, local_edges
 
 
@@ -158,3 +160,50 @@ def simplex_rule(dim: int, degree: int) -> tuple[Floats, Floats]:
         if degree <= known:
             return _symmetric(dim, known)
     return conical(dim, degree // 2 + 1)
+
+
+# Sizes of cells.
+
+
+def leg_size(mesh: Mesh, cells: Ints) -> float:
+    """Size of the simplex with right angles that has the mean volume of the cells, length."""
+    return float((factorial(mesh.dim) * mesh.volume[cells].mean()) ** (1 / mesh.dim))
+
+
+def leg_sizes(mesh: Mesh, cells: Ints) -> Floats:
+    """Size of the simplex with right angles that has the volume of each cell, length."""
+    return np.asarray((factorial(mesh.dim) * mesh.volume[cells]) ** (1 / mesh.dim))
+
+
+# Area vectors of boundary facets.
+
+
+def outward_areas(mesh: Mesh, facets: Ints, what: str) -> Floats:
+    """Outward normal of each facet times its length (2D) or area (3D), `(k, d)`.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    facets : (k, d) array of int
+    what : str
+        For messages.
+
+    Raises
+    ------
+    ProblemError
+        Facets inside the body.
+    """
+    number = mesh.facet_numbers(facets)
+    cell = mesh.facet_to_cell[number, 0]
+    inner = mesh.facet_to_cell[number, 1] >= 0
+    if inner.any():
+        raise ProblemError(
+            f"{what}: {int(inner.sum())} of its facets lie inside the body; loads act on the "
+            "boundary only."
+        )
+    place = np.argmax(mesh.cell_to_facet[cell] == number[:, None], axis=1)
+    # The gradient of the corner across is the inward normal over the height above the facet.
+    return np.asarray(-mesh.dim * mesh.volume[cell, None] * mesh.gradient[cell, place])
+
+
+__all__ = []

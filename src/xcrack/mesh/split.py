@@ -6,7 +6,7 @@ relative accuracy.
 
 import numpy as np
 
-from xcrack.arrays import Floats, Ints
+from xcrack.base.arrays import Floats, Ints
 
 _NOTHING = 1e-30  # sub-cells below this share of their cell are left out
 
@@ -23,7 +23,7 @@ def cut_simplices(phi: Floats) -> tuple[Floats, Floats, Ints, Ints]:
     side : (s,) array of int
     parent : (s,) array of int
     """
-    from xcrack.kernels import splitting
+    from xcrack.mesh.kernels import splitting
 
     bary, fraction, side, parent = splitting.cut_simplices(np.ascontiguousarray(phi), _NOTHING)
     return bary, fraction, side, parent
@@ -38,7 +38,7 @@ def interface_simplices(phi: Floats) -> tuple[Floats, Ints]:
         Vertices in the barycentric coordinates of the parent.
     parent : (s,) array of int
     """
-    from xcrack.kernels import splitting
+    from xcrack.mesh.kernels import splitting
 
     bary, parent = splitting.interface_simplices(np.ascontiguousarray(phi))
     return bary, parent

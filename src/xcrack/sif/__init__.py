@@ -1,1 +1,1 @@
-"""Stress intensity factors at tips and along fronts."""
+"""Stress intensity factors at tips and along fronts, with their error bars."""

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from xcrack.analysis.solution import Solution
-from xcrack.arrays import Floats
-from xcrack.errors import warn
-from xcrack.sif.closure import pressure_at, shallow
+from xcrack.base.arrays import Floats
+from xcrack.base.errors import warn
+from xcrack.sif.common import pressure_at, shallow
 from xcrack.sif.sif import SIF
 
 _LOAD = 0.1  # share of K of the mean stress of the body that counts where K is next to nothing

@@ -1,16 +1,19 @@
 """K at a tip of a solution in 2D: the domain of the integrals, its points, and the SIF."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from xcrack.analysis.solution import Solution
-from xcrack.arrays import Floats
+from xcrack.base.arrays import Floats, Ints
+from xcrack.fem.assembly import Tabulated, tabulated
+from xcrack.fem.function_space import FunctionSpace
+from xcrack.fem.quadrature import Points, cell_points
 from xcrack.mesh.locate import nearest_boundary
-from xcrack.scene.conditions import BodyForce, InitialStress
+from xcrack.model.conditions import BodyForce, InitialStress
 from xcrack.sif.accuracy import Domain, check
-from xcrack.sif.closure import with_closed
-from xcrack.sif.common import acts
+from xcrack.sif.common import acts, with_closed
 from xcrack.sif.interaction_2d import (
     constant_part,
     lip_terms,
@@ -19,8 +22,90 @@ from xcrack.sif.interaction_2d import (
     ring_around,
     volume_terms,
 )
-from xcrack.sif.ring_2d import class_points, ring_classes, ring_parts
 from xcrack.sif.sif import SIF
+
+# Cells and points of the domain around a tip, for K and for the estimate of its error.
+
+# Cells up to a share of the outer radius: points a direction with tip functions, degree without.
+_DEGREES = ((0.0, 0.03, 4, 4), (0.03, 0.1, 5, 6), (0.1, 0.25, 5, 8), (0.25, np.inf, 5, 10))
+_CHUNK = 4000  # cells integrated at once; bounds the memory
+
+
+@dataclass(frozen=True, eq=False)
+class RingPart:
+    """Cells of one class.
+
+    Attributes
+    ----------
+    plain : (k,) array of int
+        On which no enriched function acts.
+    degree : int
+        Of the rule for them.
+    others : iterable of Tabulated
+        Points of the other cells.
+    """
+
+    plain: Ints
+    degree: int
+    others: Iterable[Tabulated]
+
+
+def ring_parts(solution: Solution, t: int, hollow: float, outer: float) -> Iterable[RingPart]:
+    """Cells around tip t by class, with points and functions where functions are enriched.
+
+    Where the solve keeps its factor for estimates, these points stay with it too: K and the
+    estimate of its error share them.
+
+    Parameters
+    ----------
+    solution : Solution
+    t : int
+        Number of the tip in `space.tips`.
+    hollow, outer : float, length
+        Radii between which the cells lie.
+    """
+    parts, factored = _ring_parts(solution.space, t, hollow, outer), solution.factored
+    if factored is None:
+        return parts
+    key = t, hollow, outer
+    stored: Iterable[RingPart] | None = factored.around_tips.get(key)
+    if stored is None:
+        stored = tuple(parts)
+        # More than one chunk of cells is too much to be stored.
+        if all(isinstance(part.others, tuple) for part in stored):
+            factored.around_tips[key] = stored
+    return stored
+
+
+def _ring_parts(space: FunctionSpace, t: int, hollow: float, outer: float) -> Iterator[RingPart]:
+    for cells, n, degree in ring_classes(space, space.tips[t].x, hollow, outer):
+        plain = space.signature[cells] == 0
+        others = cells[~plain]
+        points = (tabulated(space, p) for p in class_points(space, others, n, degree))
+        few = len(others) <= _CHUNK
+        yield RingPart(cells[plain], degree, tuple(points) if few else points)
+
+
+def ring_classes(
+    space: FunctionSpace, centre: Floats, hollow: float, radius: float
+) -> Iterator[tuple[Ints, int, int]]:
+    """Cells between two radii by size, points a direction with tip functions, degree without."""
+    from xcrack.sif.kernels.ring import cells_between
+
+    mesh = space.mesh
+    near = cells_between(mesh.points, mesh.cells, mesh.cell_size, centre, hollow, radius)
+    share = mesh.cell_size[near] / radius
+    for low, high, n, degree in _DEGREES:
+        cells = near[(share > low) & (share <= high)]
+        if len(cells):
+            yield cells, n, degree
+
+
+def class_points(space: FunctionSpace, cells: Ints, n: int, degree: int) -> Iterator[Points]:
+    """Integration points of cells, of some cells at once."""
+    for first in range(0, len(cells), _CHUNK):
+        yield cell_points(space, cells[first : first + _CHUNK], n, degree)
+
 
 _OUTER = {1: 2.5, 2: 2.5}  # outer radius, as a multiple of the enriched radius
 _SECOND = 0.7  # outer radius of the second domain, as a share of the first
@@ -85,8 +170,8 @@ def _integrals(solutions: Sequence[Solution], t: int, radii: Floats) -> Floats:
     hollow = float(ring.inner.min())
     for part in ring_parts(solutions[0], t, hollow, outer):
         total += plain_terms(solutions, ring, part.plain, part.degree)
-        for tabulated in part.others:
-            total += point_terms(solutions, ring, tabulated)
+        for values in part.others:
+            total += point_terms(solutions, ring, values)
     if acts(solutions, BodyForce, InitialStress):
         for cells, n, degree in ring_classes(space, tip.x, 0.0, outer):
             for points in class_points(space, cells, n, degree):
@@ -136,3 +221,6 @@ def domain_of(solution: Solution, t: int) -> Domain:
         differ=_DIFFER,
         label="K at",
     )
+
+
+__all__ = []

@@ -8,20 +8,21 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from xcrack.analysis.solution import Solution, gradients_at
-from xcrack.arrays import Bools, Floats, Ints
+from xcrack.base.arrays import Bools, Floats, Ints
+from xcrack.base.errors import warn
+from xcrack.base.threads import streamed
 from xcrack.crack.front_curve import Feet, FrontCurve, front_curve
-from xcrack.errors import warn
-from xcrack.mesh.body import Body
-from xcrack.mesh.locate import contains
-from xcrack.mesh.sizes import leg_size
-from xcrack.scene.conditions import (
+from xcrack.fem.loads import position
+from xcrack.fem.quadrature import cell_points, cell_side
+from xcrack.mesh.locate import Body, contains
+from xcrack.mesh.simplex import leg_size
+from xcrack.model.conditions import (
     BodyForce,
     InitialStress,
     evaluate,
 )
 from xcrack.sif.accuracy import Domain, check
-from xcrack.sif.closure import with_closed
-from xcrack.sif.common import acts, lip_pressure, lip_shear, mean_rotation
+from xcrack.sif.common import acts, lip_pressure, lip_shear, mean_rotation, with_closed
 from xcrack.sif.interaction_3d import (
     front_nodes,
     full_measure,
@@ -32,10 +33,6 @@ from xcrack.sif.interaction_3d import (
 )
 from xcrack.sif.sif import SIF
 from xcrack.sif.smoothing_3d import along, smoothed
-from xcrack.threads import streamed
-from xcrack.xfem.loads import position
-from xcrack.xfem.quadrature import cell_points
-from xcrack.xfem.sides import cell_side
 
 SECOND = 0.7  # outer radius of the second domain, as a share of the first
 _OUTER = 2.6  # least outer radius, in legs of the cells at the front

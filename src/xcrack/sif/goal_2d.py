@@ -11,18 +11,16 @@ from functools import partial
 import numpy as np
 
 from xcrack.analysis.solution import Solution
-from xcrack.arrays import Floats
-from xcrack.estimation.goal import Goal, GoalCells, GoalPoints
+from xcrack.base.arrays import Floats
+from xcrack.estimate.dual import Goal, GoalCells, GoalPoints
+from xcrack.fem.assembly import tabulated
+from xcrack.fem.quadrature import Points, lip_side
+from xcrack.fem.williams import continued_polar, mode_matrix, unit_gradients
 from xcrack.mesh.simplex import simplex_rule
-from xcrack.scene.conditions import BodyForce, InitialStress
+from xcrack.model.conditions import BodyForce, InitialStress
 from xcrack.sif.common import acts, weight
-from xcrack.sif.domain_2d import domain_of, radii_of
+from xcrack.sif.domain_2d import class_points, domain_of, radii_of, ring_classes, ring_parts
 from xcrack.sif.interaction_2d import ahead_derivative, inner_radii, ring_around, volume_terms
-from xcrack.sif.ring_2d import class_points, ring_classes, ring_parts
-from xcrack.xfem.quadrature import Points
-from xcrack.xfem.sides import lip_side
-from xcrack.xfem.tabulated import tabulated
-from xcrack.xfem.williams import continued_polar, mode_matrix, unit_gradients
 
 _STRAIGHT = 1e-9  # share of the radius below which a face is on the line through the tip
 
@@ -37,7 +35,7 @@ def tip_goal(solution: Solution, t: int) -> Goal:
     t : int
         Number of the tip in `space.tips`.
     """
-    from xcrack.kernels.goal import plain_ring, ring_factors
+    from xcrack.estimate.kernels.goal import plain_ring, ring_factors
 
     space, material = solution.space, solution.problem.material
     mesh, tip = space.mesh, space.tips[t]

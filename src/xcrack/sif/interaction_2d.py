@@ -18,17 +18,16 @@ from typing import Any
 import numpy as np
 
 from xcrack.analysis.solution import Solution, gradients_at
-from xcrack.arrays import Floats, Ints
+from xcrack.base.arrays import Floats, Ints
+from xcrack.fem.assembly import Tabulated
+from xcrack.fem.loads import position
+from xcrack.fem.quadrature import Points, lip_side
+from xcrack.fem.williams import continued_polar, mode_matrix, unit_gradients
 from xcrack.mesh.mesh import local_edges
 from xcrack.mesh.simplex import simplex_rule
-from xcrack.scene.conditions import BodyForce, InitialStress, evaluate, evaluate_stress
-from xcrack.scene.material import Isotropic
+from xcrack.model.conditions import BodyForce, InitialStress, evaluate, evaluate_stress
+from xcrack.model.material import Isotropic
 from xcrack.sif.common import acts, lip_pressure, lip_shear, mean_rotation, weight
-from xcrack.xfem.loads import position
-from xcrack.xfem.quadrature import Points
-from xcrack.xfem.sides import lip_side
-from xcrack.xfem.tabulated import Tabulated
-from xcrack.xfem.williams import continued_polar, mode_matrix, unit_gradients
 
 # Inner radius of the ring in which q falls, as a share of the outer one. At order 1 the ring stays
 # outside the enriched disc; at order 2 a wide ring saves digits on coarse meshes (measured).
@@ -103,7 +102,7 @@ def _constants(solution: Solution, ring: Ring) -> tuple[Any, ...]:
 
 def plain_terms(solutions: Sequence[Solution], ring: Ring, cells: Ints, degree: int) -> Floats:
     """Domain integrals over plain cells `(s, radii, 3)`, by a rule of the given degree."""
-    from xcrack.kernels.ring import add_plain_cells
+    from xcrack.sif.kernels.ring import add_plain_cells
 
     space = solutions[0].space
     mesh, tip = space.mesh, space.tips[ring.t]
@@ -119,7 +118,7 @@ def plain_terms(solutions: Sequence[Solution], ring: Ring, cells: Ints, degree: 
 
 def point_terms(solutions: Sequence[Solution], ring: Ring, tabulated: Tabulated) -> Floats:
     """Domain integrals over points of any cells `(s, radii, 3)`."""
-    from xcrack.kernels.ring import add_points
+    from xcrack.sif.kernels.ring import add_points
 
     space = solutions[0].space
     mesh, tip = space.mesh, space.tips[ring.t]

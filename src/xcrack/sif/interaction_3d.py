@@ -14,11 +14,11 @@ from collections.abc import Callable
 
 import numpy as np
 
-from xcrack.arrays import Bools, Floats, Ints
+from xcrack.base.arrays import Bools, Floats, Ints
 from xcrack.crack.front_curve import Feet, FrontCurve
-from xcrack.scene.material import Isotropic
+from xcrack.fem.williams import continued_polar
+from xcrack.model.material import Isotropic
 from xcrack.sif.common import weight_integral
-from xcrack.xfem.williams import continued_polar
 
 RING = 0.4  # share of a radius at which the weight starts to fall; 1 inside
 _FEWEST = 6  # hats a front
@@ -132,7 +132,7 @@ def integrals(
     measure : (k, p) array, length³
         Integral of hat q over these points; over the whole domain see `full_measure`.
     """
-    from xcrack.kernels.front import front_terms
+    from xcrack.crack.kernels.front import front_terms
 
     radii = np.ascontiguousarray(radii, dtype=float)
     states = gradient.shape[3]
@@ -218,7 +218,7 @@ def lip_integrals(
     -------
     (n, k, 3, p) array
     """
-    from xcrack.kernels.front import lip_terms
+    from xcrack.crack.kernels.front import lip_terms
 
     radii = np.ascontiguousarray(radii, dtype=float)
     states = traction.shape[2]

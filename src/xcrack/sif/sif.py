@@ -6,12 +6,55 @@ from typing import Any
 
 import numpy as np
 
-from xcrack import markup
-from xcrack.arrays import Bools, Floats, Ints, lock
-from xcrack.errors import ProblemError
-from xcrack.inputs import numbers, shown, whole_numbers
-from xcrack.optional import required
-from xcrack.sif.bars import Bars, no_bars
+from xcrack.base import markup
+from xcrack.base.arrays import Bools, Floats, Ints, lock
+from xcrack.base.checks import numbers, shown, whole_numbers
+from xcrack.base.errors import ProblemError
+from xcrack.base.optional import required
+
+# Estimated errors of K, with a reason where there is none.
+
+
+@dataclass(frozen=True, eq=False)
+class Bars:
+    """Estimated errors of K of one crack in one state.
+
+    Attributes
+    ----------
+    eta : (f, 2 or 3) array, stress · √length
+        Signed estimate of exact K less K; nan where there is none.
+    bar : (f, 2 or 3) array, stress · √length
+        Half-width of the error of K + eta; nan where there is none.
+    reasons : tuple of str
+        One a place: why there is no estimate, empty where there is one.
+    contact : (f, 2 or 3) array, optional, stress · √length
+        Part of `bar` that contact of the faces has: its end, overlaps it is blind to, closed tips.
+    """
+
+    eta: Floats
+    bar: Floats
+    reasons: tuple[str, ...]
+    contact: Floats | None = None
+
+
+def no_bars(shape: tuple[int, ...], reason: str) -> Bars:
+    """No estimate at any place, for one reason."""
+    nothing = lock(np.full(shape, np.nan))
+    return Bars(nothing, nothing, (reason,) * shape[0])
+
+
+def bars_of(
+    eta: Floats, bar: Floats, reasons: Sequence[str], contact: Floats | None = None
+) -> Bars:
+    """Estimates with nan where there is a reason against them."""
+    against = np.array([bool(reason) for reason in reasons], dtype=bool)[:, None]
+    part = None if contact is None else lock(np.where(against, np.nan, contact))
+    return Bars(
+        lock(np.where(against, np.nan, eta)),
+        lock(np.where(against, np.nan, bar)),
+        tuple(reasons),
+        part,
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -235,3 +278,6 @@ def joined(parts: Sequence[SIF], dim: int) -> SIF:
         closed=lock(rows("closed").astype(bool)),
         domain_cells=rows("domain_cells"),
     )
+
+
+__all__ = []

@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from xcrack.arrays import Bools, Floats
+from xcrack.base.arrays import Bools, Floats
 from xcrack.crack.front_curve import FrontCurve
 
 _RISE = 0.1  # of the largest value, by which a prolonged one may differ from the last

@@ -7,13 +7,15 @@ from typing import Any
 import numpy as np
 
 from xcrack.analysis.solution import Solution
-from xcrack.errors import ProblemError
-from xcrack.inputs import flag, shown, whole
+from xcrack.base.arrays import Floats
+from xcrack.base.checks import flag, shown, whole
+from xcrack.base.errors import ProblemError
+from xcrack.base.threads import threads
+from xcrack.model.material import Isotropic
 from xcrack.sif.domain_2d import tip_intensity
 from xcrack.sif.domain_3d import front_intensity
 from xcrack.sif.error import with_bars
 from xcrack.sif.sif import SIF, joined
-from xcrack.threads import threads
 
 
 def stress_intensity(solution: Solution, crack: int = 0, error: bool | str | None = None) -> SIF:
@@ -142,3 +144,44 @@ def _checked(solutions: Any) -> list[Solution]:
             "another solve to another call."
         )
     return result
+
+
+# Energy release rate from K.
+
+
+def energy_release_rate(sif: SIF, material: Isotropic) -> Floats:
+    """Energy that is released per area of new crack straight ahead; J of an elastic body.
+
+    Parameters
+    ----------
+    sif : SIF
+    material : Isotropic
+
+    Returns
+    -------
+    (f,) array, stress length
+
+    Raises
+    ------
+    ProblemError
+        Other kinds of value.
+
+    Notes
+    -----
+    G = J = (K_I² + K_II²) / E' + K_III² / (2 µ) (Irwin 1957), E' = E / (1 - nu²) in plane strain
+    and 3D, E in plane stress. At a tip that is closed K_I is zero.
+    """
+    if not isinstance(sif, SIF):
+        raise ProblemError(
+            f"energy_release_rate: sif = {shown(sif)}: give what stress_intensity returns."
+        )
+    if not isinstance(material, Isotropic):
+        raise ProblemError(f"energy_release_rate: material = {shown(material)}: give Isotropic.")
+    K = sif.K
+    G = (K[:, 0] ** 2 + K[:, 1] ** 2) / material.E_prime
+    if K.shape[1] == 3:
+        G = G + K[:, 2] ** 2 / (2 * material.mu)
+    return np.asarray(G)
+
+
+__all__ = ["energy_release_rate"]

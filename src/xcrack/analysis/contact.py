@@ -1,0 +1,264 @@
+"""Which cracks need multipliers, and the pressures on their faces in all load states."""
+
+from collections.abc import Sequence
+from typing import Any, cast
+
+import numpy as np
+import scipy.sparse as sp
+
+from xcrack.analysis.contact_result import Contact, ContactSolution, Rubbing
+from xcrack.analysis.friction import FrictionSolution, rubs, solve_friction
+from xcrack.analysis.multipliers import Multipliers, gap_rows, multipliers
+from xcrack.base.arrays import Bools, Floats, lock
+from xcrack.fem.system import Model
+from xcrack.linalg.direct import System
+from xcrack.linalg.engine import ContactRows, Engine, StateContact
+from xcrack.linalg.reuse import Reuse
+from xcrack.model.conditions import Load
+from xcrack.model.problem import Problem
+
+Acting = Sequence[tuple[tuple[Load, ...], float]]
+
+_OVERLAP = 1e-9  # share of the largest displacement by which faces must overlap to need contact
+
+
+def solve_contact(
+    problem: Problem,
+    model: Model,
+    engine: Engine,
+    f: Floats,
+    known: Floats,
+    reuse: Reuse,
+    acting: Acting,
+    repeated: bool = False,
+) -> ContactSolution:
+    """Solve, and give multipliers to cracks whose faces overlap, until none does.
+
+    Conjugate gradients spend as few steps as they can on faces that are not to overlap: a crack
+    that was closed in the step before gets its multipliers at once, and without any such crack
+    the first solution is a rough one, made exact where nothing overlaps.
+
+    Parameters
+    ----------
+    problem : Problem
+    model : Model
+    engine : Engine
+    f, known : (n_dof, states) arrays
+        Loads, and displacements that supports impose.
+    reuse : Reuse
+        Of an earlier step.
+    acting : sequence of (loads, factor)
+        Loads of each state and their scale: some alternatives to multipliers need what acts on
+        the faces besides.
+    repeated : bool
+        With friction: the states are a cycle, repeated until slip returns.
+    """
+    n = len(model.lips)
+    spaces: list[Multipliers | None] = [None] * n
+    pressure: list[Floats | None] = [None] * n
+    active: list[Bools | None] = [None] * n
+    expected: list[int] = []
+    sets, dual = 0, None
+    rubbed: FrictionSolution | None = None
+    chosen: list[Multipliers] = []
+    if problem.contact == "off":
+        u: Floats | None = engine.solve(f, known)
+        pending: list[int] = []
+    else:
+        # A factorisation needs no look at open faces where all cracks get multipliers anyway.
+        sure = problem.contact == "on" and isinstance(engine, System)
+        closed = [c for c in range(n) if len(model.lips[c]) and (sure or reuse.was_closed(c))]
+        u, exact = engine.first_look(f, known, bool(closed))
+        if u is None:
+            pending = expected = closed
+        else:
+            pending = _needing(problem, model, u, spaces)
+            if not pending and not exact:
+                u = engine.solve(f, known, u)
+                pending = _needing(problem, model, u, spaces)
+    opened = u
+    while pending:
+        for c in pending:
+            spaces[c] = _space(problem, model, c)
+        chosen = [m for m in spaces if m is not None]
+        if any(rubs(problem, m.crack) for m in chosen):
+            rubbed = _solve_friction(problem, model, engine, chosen, f, known, reuse, repeated)
+            states = rubbed.states
+        else:
+            states = _solve_states(
+                problem, model, engine, chosen, f, known, (u, opened), reuse, acting
+            )
+        u = np.stack([cast(Floats, state.u) for state in states], axis=1)
+        sets, dual = max(state.sets for state in states), states[0].dual
+        first = 0
+        for m in chosen:
+            last = first + len(m.measure)
+            pressure[m.crack] = np.stack([s.pressure[first:last] for s in states], axis=1)
+            active[m.crack] = np.stack([s.active[first:last] for s in states])
+            first = last
+        seen = u if rubbed is None else np.concatenate([u, rubbed.between], axis=1)
+        pending = _needing(problem, model, seen, spaces)
+    assert u is not None  # of the first look, or of the loop that it made begin
+    if rubbed is not None:
+        parts = tuple(spaces), tuple(pressure), tuple(active)
+        return ContactSolution(
+            u, *parts, sets, rubbing=tuple(rubbed.rubbing), dissipated=rubbed.dissipated
+        )
+    for c in expected:
+        ever = active[c]
+        if ever is not None and not ever.any() and problem.contact != "on":
+            spaces[c] = pressure[c] = active[c] = None
+    if dual is not None and expected:
+        stays = np.repeat(
+            [spaces[m.crack] is not None for m in chosen], [len(m.measure) for m in chosen]
+        )
+        dual = dual[np.ix_(stays, stays)]
+    return ContactSolution(u, tuple(spaces), tuple(pressure), tuple(active), sets, dual)
+
+
+def _solve_friction(
+    problem: Problem,
+    model: Model,
+    engine: Engine,
+    chosen: list[Multipliers],
+    f: Floats,
+    known: Floats,
+    reuse: Reuse,
+    repeated: bool,
+) -> FrictionSolution:
+    """The load path of all states; substeps count where a crack has no multipliers yet."""
+    closed = problem.numerics.initial_set == "closed"
+    having = {m.crack for m in chosen}
+    others = any(len(lips) and c not in having for c, lips in enumerate(model.lips))
+    start, size = _start(chosen, reuse, 0, closed), _face_size(model, chosen)
+    stiffness = problem.material.E / size
+    before = reuse.slip if repeated else None
+    springs = None
+    if problem.numerics.comparison.lips != "multipliers":
+        from xcrack.analysis.alternatives import compliance
+
+        springs = [compliance(problem, model, m) for m in chosen]
+    return solve_friction(
+        problem, model, engine, chosen, f, known, start, stiffness, others, before, springs
+    )
+
+
+def _solve_states(
+    problem: Problem,
+    model: Model,
+    engine: Engine,
+    chosen: list[Multipliers],
+    f: Floats,
+    known: Floats,
+    guess: tuple[Floats | None, Floats | None],
+    reuse: Reuse,
+    acting: Acting,
+) -> list[StateContact]:
+    """Contact of all load states; `guess` is the latest u and that of open faces."""
+    closed = problem.numerics.initial_set == "closed"
+    start = [_start(chosen, reuse, k, closed) for k in range(f.shape[1])]
+    if problem.numerics.comparison.lips != "multipliers":
+        from xcrack.analysis.alternatives import solve_alternative
+
+        # These change the matrix itself, for which `solve` takes a factorisation always.
+        system = cast(System, engine)
+        return solve_alternative(problem, model, system, chosen, f, known, start, closed, acting)
+    rows = [gap_rows(m, model.lips[m.crack], model.jumps[m.crack]) for m in chosen]
+    N = rows[0] if len(rows) == 1 else sp.csr_matrix(sp.vstack(rows))
+    measure = np.concatenate([m.measure for m in chosen])
+    stiffness = problem.material.E / _face_size(model, chosen)
+    conditions = ContactRows(N, measure, stiffness, closed)
+    return engine.contact(conditions, f, known, start, *guess)
+
+
+def _needing(
+    problem: Problem, model: Model, u: Floats, spaces: Sequence[Multipliers | None]
+) -> list[int]:
+    """Cracks without multipliers whose faces overlap in some load state."""
+    needing = []
+    for c, lips in enumerate(model.lips):
+        if spaces[c] is not None or not len(lips):
+            continue
+        if problem.contact == "on":
+            needing.append(c)
+            continue
+        gap = model.jumps[c] @ u
+        limit = -_OVERLAP * np.abs(u[: model.space.n_nodes * model.space.dim]).max(axis=0)
+        if (gap.min(axis=0) >= limit).all():
+            continue
+        trial = multipliers(model.space, c, lips, problem.numerics.multipliers, model.known.fixed)
+        weak = (trial.values.T @ (lips.weight[:, None] * gap)) / trial.measure[:, None]
+        if (weak.min(axis=0) < limit).any():
+            needing.append(c)
+    return needing
+
+
+def _space(problem: Problem, model: Model, c: int) -> Multipliers:
+    """Where the pressures of a crack live."""
+    if problem.numerics.comparison.lips != "multipliers":
+        from xcrack.analysis.alternatives import lip_space
+
+        return lip_space(problem, model, c)
+    kind = problem.numerics.multipliers
+    fixed, rub = model.known.fixed, rubs(problem, c)
+    return multipliers(model.space, c, model.lips[c], kind, fixed, rub)
+
+
+def _start(chosen: list[Multipliers], reuse: Reuse, k: int, closed: bool) -> Bools | None:
+    """Closed set that state k starts from; None where no step came before."""
+    if not reuse.centre:
+        return None
+    parts = []
+    for m in chosen:
+        before = reuse.start(m.crack, m.centre, k)
+        parts.append(np.full(len(m.measure), closed) if before is None else before)
+    return np.concatenate(parts)
+
+
+def _face_size(model: Model, chosen: list[Multipliers]) -> float:
+    cells = np.unique(np.concatenate([model.lips[m.crack].cell.ravel() for m in chosen]))
+    return float(model.space.mesh.cell_size[cells].mean())
+
+
+def contact_of(
+    model: Model, solution: ContactSolution, u: Floats, k: int
+) -> tuple[Contact | None, ...]:
+    """Contact of each crack in state k, None where it has no multipliers."""
+    result: list[Contact | None] = []
+    rubbing = {each.crack: each for each in solution.rubbing}
+    for c, lips in enumerate(model.lips):
+        m, pressure, active = solution.spaces[c], solution.pressure[c], solution.active[c]
+        if m is None or pressure is None or active is None:
+            result.append(None)
+            continue
+        closed = np.asarray(m.values @ active[k].astype(float)) >= 0.5
+        own: dict[str, Any] = {}
+        if c in rubbing:
+            own = _rubbed(m, rubbing[c], u, k)
+        result.append(
+            Contact(
+                lips.x,
+                lips.normal,
+                lips.weight,
+                lock(np.asarray(m.values @ pressure[:, k])),
+                lock(np.asarray(model.jumps[c] @ u)),
+                lock(closed),
+                lips.s,
+                **own,
+            )
+        )
+    return tuple(result)
+
+
+def _rubbed(m: Multipliers, rubbing: Rubbing, u: Floats, k: int) -> dict[str, Any]:
+    """What friction adds to the contact of one crack in state k."""
+    stuck = np.asarray(m.values @ rubbing.stuck[k].astype(float)) >= 0.5
+    shear = np.stack([m.values @ own[:, k] for own in rubbing.shear], axis=1)
+    slip = np.stack([jump @ u for jump in rubbing.jumps], axis=1)
+    one = (slice(None), 0) if len(rubbing.jumps) == 1 else ()
+    return {
+        "tangent": lock(rubbing.tangents[one]),
+        "shear": lock(np.ascontiguousarray(shear[one])),
+        "slip": lock(np.ascontiguousarray(slip[one])),
+        "stuck": lock(stuck),
+    }

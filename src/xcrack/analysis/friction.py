@@ -1,0 +1,538 @@
+"""Coulomb friction on crack faces: tangential multipliers, and the load path of all states.
+
+The functions of the pressures carry tangential tractions too: |shear| <= mu times pressure in each
+function, which are positive, so that it holds everywhere. The slip counts from the unloaded body,
+or from what an earlier crack state left behind.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.spatial import cKDTree
+
+from xcrack.analysis.contact_result import Rubbing
+from xcrack.analysis.multipliers import Multipliers, gap_rows
+from xcrack.base.arrays import Bools, Floats, lock
+from xcrack.base.errors import ConvergenceError, warn
+from xcrack.fem.facets import LipPoints, arc_position, jump_matrix
+from xcrack.fem.function_space import FunctionSpace
+from xcrack.fem.system import Model
+from xcrack.linalg.coulomb import (
+    FrictionRows,
+    FrictionState,
+    Status,
+    all_stuck,
+    coulomb,
+    coulomb_3d,
+)
+from xcrack.linalg.engine import Engine, StateContact
+from xcrack.linalg.reuse import Slip
+from xcrack.model.problem import Problem
+
+# Slip that a crack state leaves to the next one of the grown crack.
+
+_OTHER = 0.1  # distance over the length of a crack from which on it is another crack
+
+
+def slip_of(model: Model, rubbing: tuple[Rubbing, ...], u: Floats) -> tuple[Slip | None, ...]:
+    """Slip of all cracks in one state, None where nothing rubs.
+
+    Parameters
+    ----------
+    model : Model
+    rubbing : tuple of Rubbing
+    u : (n_dof,) array, length
+    """
+    result: list[Slip | None] = [None] * len(model.lips)
+    for each in rubbing:
+        along = np.stack([jump @ u for jump in each.jumps], axis=1)
+        result[each.crack] = _LEFT[model.space.dim](model, each, along)
+    return tuple(result)
+
+
+def weak_slip(model: Model, m: Multipliers, tangents: Floats, before: Slip | None) -> Floats:
+    """Integrals of each function times the slip that was left `(d - 1, g)`.
+
+    Parameters
+    ----------
+    model : Model
+    m : Multipliers
+    tangents : (q, d - 1, d) array
+    before : Slip or None
+        None where nothing was left.
+    """
+    lips = model.lips[m.crack]
+    slip = np.zeros((len(lips), tangents.shape[1]))
+    if before is not None and len(before.slip):
+        slip = _AGAIN[model.space.dim](model, m.crack, tangents, before)
+    return np.asarray((m.values.T @ (lips.weight[:, None] * slip)).T)
+
+
+def _left_2d(model: Model, rubbing: Rubbing, along: Floats) -> Slip:
+    points = model.space.cracks[rubbing.crack].points
+    place = _places(points, model.lips[rubbing.crack])
+    return Slip(points, lock(place), lock(along[:, 0]))
+
+
+def _left_3d(model: Model, rubbing: Rubbing, along: Floats) -> Slip:
+    lips = model.lips[rubbing.crack]
+    slip = np.einsum("qm,qmd->qd", along, rubbing.tangents)
+    return Slip(lips.x, lock(np.sqrt(lips.weight)), lock(slip))
+
+
+def _again_2d(model: Model, c: int, tangents: Floats, before: Slip) -> Floats:
+    lips, points = model.lips[c], model.space.cracks[c].points
+    first = _first(before.points, points)
+    whole = np.linalg.norm(np.diff(before.points, axis=0), axis=1).sum()
+    if _distance(before.points, points, first) > _OTHER * whole:
+        return np.zeros((len(lips), 1))
+    place = _places(points, lips) - first
+    inside = (place >= 0) & (place <= len(before.points) - 1)
+    slip = np.where(inside, np.interp(place, before.place, before.slip), 0.0)
+    return np.asarray(slip[:, None])
+
+
+def _again_3d(model: Model, c: int, tangents: Floats, before: Slip) -> Floats:
+    """Of the nearest point before, none farther than its own piece of face is wide."""
+    far, nearest = cKDTree(before.points).query(model.lips[c].x)
+    slip = np.where((far <= before.place[nearest])[:, None], before.slip[nearest], 0.0)
+    return np.einsum("qmd,qd->qm", tangents, slip)
+
+
+_LEFT = {2: _left_2d, 3: _left_3d}
+_AGAIN = {2: _again_2d, 3: _again_3d}
+
+
+def _places(points: Floats, lips: LipPoints) -> Floats:
+    """Number of the face, plus share of its length `(q,)`."""
+    ends = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+    return np.interp(arc_position(points, lips.x), ends, np.arange(len(points)))
+
+
+def _first(old: Floats, new: Floats) -> int:
+    """Number of the new point that the first old one is.
+
+    Cracks grow by points at their ends, and corrections move the last ones a little.
+    """
+    shifts = range(min(0, len(new) - len(old)), max(1, len(new) - len(old) + 1))
+    return min(shifts, key=lambda shift: _distance(old, new, shift))
+
+
+def _distance(old: Floats, new: Floats, shift: int) -> float:
+    """Median distance of old points to the new ones that they would be."""
+    first, last = max(0, -shift), min(len(old), len(new) - shift)
+    return float(
+        np.median(np.linalg.norm(old[first:last] - new[first + shift : last + shift], axis=1))
+    )
+
+
+# The load path of crack faces with friction: states in their order, in substeps.
+
+_SHORTEST = 1e-2  # share of a state below which a substep is not halved
+_OPEN = 1e-9  # gap over the largest one above which a function is open
+_RETURNED = 1e-6  # change of slip over a cycle, of the largest jump, at which cycles end
+_MOST_CYCLES = 100
+_MOST_UPDATES = 500
+_UPDATED = 1e-8  # change of tractions, of the largest, that ends the updates
+_TWIN = {1: coulomb, 2: coulomb_3d}  # by the number of tangents
+
+
+@dataclass(frozen=True, eq=False)
+class Place:
+    """Where a path stands.
+
+    Attributes
+    ----------
+    d : (g + r,) array
+        Weak gaps and slips of the load without tractions.
+    lam : (g + r,) array, stress
+        Pressures and tangential tractions.
+    gap : (g + r,) array
+        Weak gaps and slips.
+    status : Status
+    dissipated : float, energy (per thickness in 2D)
+        Since the state before.
+    sets : int
+        Sets tried since then, in the worst substep.
+    between : tuple of (share, lam)
+        Tractions of all substeps, and where they lie between the state before (0) and this one (1).
+    at_rest : bool
+        Nothing has acted so far.
+    """
+
+    d: Floats
+    lam: Floats
+    gap: Floats
+    status: Status
+    dissipated: float = 0.0
+    sets: int = 0
+    between: tuple[tuple[float, Floats], ...] = ()
+    at_rest: bool = False
+
+
+def at_rest(rows: FrictionRows, status: Status) -> Place:
+    """The unloaded body; `status` is where the first guess comes from."""
+    nothing = np.zeros(len(rows.F))
+    return Place(nothing, nothing, nothing, status, at_rest=True)
+
+
+def with_slip(rows: FrictionRows, d: Floats, slip: Floats, status: Status) -> Place:
+    """A state whose weak slips `(r,)` before are given: faces that press stick there, or slide."""
+    before = np.concatenate([np.zeros(rows.n), slip])
+    state = _tractions(rows, d - before, status)
+    return Place(d, state.lam, state.gap + before, state.status, sets=state.sets)
+
+
+def march(rows: FrictionRows, d: Floats, begin: Place, substeps: int) -> list[Place]:
+    """All states in their order.
+
+    Parameters
+    ----------
+    rows : FrictionRows
+    d : (g + r, states) array
+        Weak gaps and slips of the states without tractions.
+    begin : Place
+    substeps : int
+        From one state to the next.
+
+    Raises
+    ------
+    ConvergenceError
+        As of `coulomb`.
+    """
+    places, place = [], begin
+    for wanted in d.T:
+        place = _reached(rows, wanted, place, substeps)
+        places.append(place)
+    return places
+
+
+def shaken_down(rows: FrictionRows, d: Floats, begin: Place, substeps: int) -> list[Place]:
+    """Cycles through all states until slip returns; the states of the last one.
+
+    Parameters
+    ----------
+    rows, d, begin, substeps
+        As of `march`.
+
+    Warns
+    -----
+    XcrackWarning
+        Slip that still drifts after a hundred cycles.
+    """
+    weight = 1 / rows.sizes
+    places = march(rows, d, begin, substeps)
+    for _ in range(_MOST_CYCLES):
+        before = places[-1]
+        places = march(rows, d, before, substeps)
+        drift = float(np.abs((places[-1].gap - before.gap)[rows.n :] * weight[rows.n :]).max())
+        largest = max(float(np.abs(place.gap * weight).max()) for place in places)
+        if drift <= _RETURNED * largest:
+            return places
+    warn(
+        f"friction: after {_MOST_CYCLES} cycles the slip of the crack faces still changes by "
+        f"{drift:.3g} a cycle, where the largest jump is {largest:.3g}; K is "
+        "that of the last cycle."
+    )
+    return places
+
+
+def _reached(rows: FrictionRows, wanted: Floats, begin: Place, substeps: int) -> Place:
+    """The next state."""
+    longest = 1.0 if begin.at_rest else 1.0 / substeps
+    shortest = min(longest, _SHORTEST)
+    t, step, place = 0.0, longest, begin
+    dissipated, sets = 0.0, 0
+    between: list[tuple[float, Floats]] = []
+    while t < 1.0:
+        end = t + step
+        end = 1.0 if end > 1.0 - 1e-9 else end
+        d = begin.d + end * (wanted - begin.d)
+        state = _solved(rows, d, place)
+        sets = max(sets, state.sets)
+        closing = state.status.closed & _opened(rows, place)
+        if closing.any() and step > shortest:
+            step = max(step / 2, shortest)
+            continue
+        dissipated += _dissipated(rows, place, state)
+        gap = state.gap.copy()
+        gap[rows.n :] += place.gap[rows.n :]
+        place = Place(d, state.lam, gap, state.status)
+        between.append((end, state.lam))
+        t, step = end, min(2 * step, longest)
+    return Place(place.d, place.lam, place.gap, place.status, dissipated, sets, tuple(between))
+
+
+def _solved(rows: FrictionRows, d: Floats, place: Place) -> FrictionState:
+    change = d.copy()
+    change[rows.n :] -= place.gap[rows.n :]
+    return _tractions(rows, change, place.status)
+
+
+def _tractions(rows: FrictionRows, d: Floats, status: Status) -> FrictionState:
+    """Of one load; by an augmented Lagrangian in updates (Simo and Laursen, 1992)."""
+    solve = _TWIN[rows.tangents]
+    if rows.compliance is None:
+        return solve(rows, d, status)
+    if not rows.augmented:
+        try:
+            return solve(rows, d, status)
+        except ConvergenceError as error:
+            raise ConvergenceError(
+                f"{error} Or a smaller Comparison(penalty=...): stiff springs at single points "
+                "oscillate."
+            ) from None
+    lam, sets = np.zeros(len(d)), 0
+    for _ in range(_MOST_UPDATES):
+        state = solve(rows, d - rows.compliance * lam, status)
+        sets += state.sets
+        change = float(np.abs(state.lam - lam).max(initial=0.0))
+        lam, status = state.lam, state.status
+        if change <= _UPDATED * float(np.abs(lam).max(initial=0.0)):
+            return replace(state, sets=sets)
+    raise ConvergenceError(
+        f"contact with friction: after {_MOST_UPDATES} updates the tractions still change by "
+        f"{change:.3g}. Give a larger Comparison(penalty=...)."
+    )
+
+
+def _opened(rows: FrictionRows, place: Place) -> Bools:
+    """Functions with a gap that is more than round-off."""
+    largest = float(np.abs(place.gap / rows.sizes).max(initial=0.0))
+    return np.asarray(place.gap[: rows.n] / rows.measure > _OPEN * largest)
+
+
+def _dissipated(rows: FrictionRows, before: Place, state: FrictionState) -> float:
+    """Work of the tractions of slipping functions: their mean bound over the substep times slip."""
+    slips = state.status.slips
+    pressure = 0.5 * (np.maximum(before.lam, 0.0) + state.lam)[: rows.n][rows.rubbing]
+    slip = np.sqrt((state.gap[rows.n :].reshape(rows.tangents, -1) ** 2).sum(axis=0))
+    return float((rows.mu * pressure * slip)[slips].sum())
+
+
+@dataclass(frozen=True, eq=False)
+class FrictionSolution:
+    """Contact with friction in all load states.
+
+    Attributes
+    ----------
+    states : list of StateContact
+    rubbing : list of Rubbing
+        One for each crack with friction and multipliers.
+    dissipated : tuple of float
+        Energy since the state before.
+    between : (n_dof, k) array, length
+        Displacements of the substeps; none where nobody asked.
+    """
+
+    states: list[StateContact]
+    rubbing: list[Rubbing]
+    dissipated: tuple[float, ...]
+    between: Floats
+
+
+def rubs(problem: Problem, c: int) -> bool:
+    """Whether the faces of crack c rub where they press."""
+    return problem.contact != "off" and problem.frictions[c] > 0
+
+
+def tangents(lips: LipPoints) -> Floats:
+    """Directions of shear and slip at each point `(q, d - 1, d)`.
+
+    In 2D along the order of the crack's points. In 3D the first is the direction that most normals
+    are farthest from, laid onto the face, the second normal × first: both are continuous along
+    curved faces.
+    """
+    return _TANGENTS[lips.x.shape[1]](lips)
+
+
+def _tangents_2d(lips: LipPoints) -> Floats:
+    return np.stack([lips.normal[:, 1], -lips.normal[:, 0]], axis=1)[:, None]
+
+
+def _tangents_3d(lips: LipPoints) -> Floats:
+    n = lips.normal
+    along = np.linalg.eigh(n.T @ (lips.weight[:, None] * n))[1][:, 0]
+    along = along * np.sign(along[np.argmax(np.abs(along))])
+    first = along - (n @ along)[:, None] * n
+    size = np.linalg.norm(first, axis=1, keepdims=True)
+    first = np.where(size > 1e-6, first / np.maximum(size, 1e-300), np.roll(n, 1, axis=1))
+    first = first - np.einsum("qi,qi->q", first, n)[:, None] * n
+    first /= np.linalg.norm(first, axis=1, keepdims=True)
+    return np.stack([first, np.cross(n, first)], axis=1)
+
+
+_TANGENTS = {2: _tangents_2d, 3: _tangents_3d}
+
+
+def tangential_rows(space: FunctionSpace, m: Multipliers, lips: LipPoints) -> list[sp.csr_matrix]:
+    """Rows of the weak slips along each tangent `(g, n_dof)`."""
+    jumps = tangential_jumps(space, m.crack, lips, tangents(lips))
+    return [gap_rows(m, lips, jump) for jump in jumps]
+
+
+def tangential_jumps(
+    space: FunctionSpace, c: int, lips: LipPoints, directions: Floats
+) -> list[sp.csr_matrix]:
+    """Jumps along directions `(q, m, d)` at the lip points, each `(q, n_dof)`."""
+    every = np.moveaxis(directions, 1, 0)
+    return [jump_matrix(space, c, lips, along) for along in every]
+
+
+def solve_friction(
+    problem: Problem,
+    model: Model,
+    engine: Engine,
+    chosen: Sequence[Multipliers],
+    f: Floats,
+    known: Floats,
+    start: Bools | None,
+    stiffness: float,
+    between: bool,
+    before: Sequence[Slip | None] | None,
+    springs: Sequence[Floats] | None = None,
+) -> FrictionSolution:
+    """Solve all load states in their order, from the unloaded body; or a cycle that is repeated.
+
+    Parameters
+    ----------
+    problem : Problem
+    model : Model
+    engine : Engine
+    chosen : sequence of Multipliers
+        Of the cracks that need contact.
+    f, known : (n_dof, states) arrays
+    start : (g,) array of bool or None
+        First guess of the closed set.
+    stiffness : float, stress / length
+        As of `ContactRows`.
+    between : bool
+        Whether displacements of the substeps are asked for.
+    before : sequence of Slip or None
+        Of all cracks, for a cycle that is repeated until slip returns: what its last state left
+        behind when the crack was shorter; empty where there was none. None: the path alone.
+    springs : sequence of (g,) arrays, optional
+        Compliances of the springs of an alternative to multipliers, one array a crack.
+
+    Raises
+    ------
+    ConvergenceError
+        A load for which no status of the functions stays.
+    """
+    faces = [_face(problem, model, m) for m in chosen]
+    rubbing = [face for face in faces if face.mu > 0]
+    along = [face.along[k] for k in range(model.space.dim - 1) for face in rubbing]
+    N = sp.csr_matrix(sp.vstack([face.normal for face in faces] + along))
+    small = engine.condensed(N, f, known)
+    rows = _rows(faces, small.dual, stiffness)
+    if springs is not None:
+        every = np.concatenate(springs)
+        diagonal = np.concatenate([every, np.tile(every[rows.rubbing], rows.tangents)])
+        augmented = problem.numerics.comparison.lips == "augmented"
+        rows = replace(rows, F=rows.F + np.diag(diagonal), compliance=diagonal, augmented=augmented)
+    status = all_stuck(rows)
+    if start is not None:
+        status = Status(start, status.slip)
+    elif problem.numerics.initial_set == "open":
+        status = Status(np.zeros_like(status.closed), status.slip)
+    begin, pass_through = at_rest(rows, status), march
+    if before is not None:
+        pass_through = shaken_down
+        left = {c: slip for c, slip in enumerate(before)}
+        slips = [left.get(r.space.crack) for r in rubbing]  # cracks may have joined others
+        if any(slip is not None for slip in slips):
+            weak = [
+                weak_slip(model, r.space, r.tangents, s)
+                for r, s in zip(rubbing, slips, strict=True)
+            ]
+            begin = with_slip(rows, small.gap[:, -1], np.concatenate(weak, axis=1).ravel(), status)
+    places = pass_through(rows, small.gap, begin, problem.numerics.substeps)
+    u = small.displacements(np.stack([place.lam for place in places], axis=1))
+    states = [
+        StateContact(p.lam[: rows.n], p.gap[: rows.n], p.status.closed, p.sets, u[:, k])
+        for k, p in enumerate(places)
+    ]
+    return FrictionSolution(
+        states,
+        _by_crack(rubbing, rows, places),
+        tuple(place.dissipated for place in places),
+        _between(engine, N, f, known, places) if between else np.zeros((len(f), 0)),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Face:
+    """Rows of one crack."""
+
+    space: Multipliers
+    mu: float
+    normal: sp.csr_matrix
+    tangents: Floats
+    jumps: list[sp.csr_matrix]
+    along: list[sp.csr_matrix]
+
+
+def _face(problem: Problem, model: Model, m: Multipliers) -> _Face:
+    lips, mu = model.lips[m.crack], problem.frictions[m.crack]
+    normal = gap_rows(m, lips, model.jumps[m.crack])
+    if not mu:
+        return _Face(m, mu, normal, np.zeros((0, 0, 0)), [], [])
+    directions = tangents(lips)
+    jumps = tangential_jumps(model.space, m.crack, lips, directions)
+    along = [gap_rows(m, lips, jump) for jump in jumps]
+    return _Face(m, mu, normal, directions, jumps, along)
+
+
+def _rows(faces: Sequence[_Face], dual: Floats, stiffness: float) -> FrictionRows:
+    measure = np.concatenate([face.space.measure for face in faces])
+    mu = np.concatenate([np.full(len(face.space.measure), face.mu) for face in faces])
+    rubbing = np.nonzero(mu > 0)[0]
+    return FrictionRows(dual, measure, rubbing, mu[rubbing], stiffness)
+
+
+def _by_crack(faces: Sequence[_Face], rows: FrictionRows, places: Sequence[Place]) -> list[Rubbing]:
+    shear = np.stack([place.lam[rows.n :].reshape(rows.tangents, -1) for place in places], axis=2)
+    stuck = np.stack([p.status.closed[rows.rubbing] & ~p.status.slips for p in places])
+    result, first = [], 0
+    for face in faces:
+        own = slice(first, first + len(face.space.measure))
+        result.append(
+            Rubbing(face.space.crack, lock(face.tangents), face.jumps, shear[:, own], stuck[:, own])
+        )
+        first = own.stop
+    return result
+
+
+def _between(
+    engine: Engine, N: sp.csr_matrix, f: Floats, known: Floats, places: Sequence[Place]
+) -> Floats:
+    """Displacements of all substeps: other faces may overlap in one of them."""
+    loads, given = [], []
+    before = np.zeros(len(f)), np.zeros(len(f))
+    for k, place in enumerate(places):
+        for share, lam in place.between[:-1]:
+            loads.append(before[0] + share * (f[:, k] - before[0]) + N.T @ lam)
+            given.append(before[1] + share * (known[:, k] - before[1]))
+        before = f[:, k], known[:, k]
+    if not loads:
+        return np.zeros((len(f), 0))
+    return engine.solve(np.stack(loads, axis=1), np.stack(given, axis=1))
+
+
+__all__ = [
+    "FrictionSolution",
+    "Place",
+    "at_rest",
+    "march",
+    "rubs",
+    "shaken_down",
+    "slip_of",
+    "solve_friction",
+    "tangential_jumps",
+    "tangential_rows",
+    "tangents",
+    "weak_slip",
+    "with_slip",
+]

@@ -1,0 +1,175 @@
+"""A case file read: problem, load states, growth, and where the results go."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from os import PathLike
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+from xcrack.app import case_forms as forms
+from xcrack.app.case_forms import Form
+from xcrack.app.case_histories import loading, retardation_of
+from xcrack.app.case_tables import LENGTH, NUMBER, TOUGHNESS, Table, read_tables
+from xcrack.base.errors import ProblemError, XcrackError
+from xcrack.base.paths import path_of
+from xcrack.fatigue.zones import plastic_zone
+from xcrack.growth.options import GrowOptions
+from xcrack.model.material import Isotropic
+from xcrack.model.numerics import Numerics
+from xcrack.model.problem import Problem
+
+_SECTIONS = ("title", "units", "mesh", "material", "cracks", "supports", "loads", "solve",
+             "numerics", "growth", "output")  # fmt: skip
+_OPTIONS = {"K_c": TOUGHNESS}  # of grow, that have a unit
+_TABLES = ("law", "criterion", "cycle", "spectrum", "retardation", "link_up")  # of growth
+_OUTPUT = ("folder", "pictures", "warp")
+
+
+@dataclass(frozen=True, eq=False)
+class CaseFile:
+    """A scene as its file tells it.
+
+    Attributes
+    ----------
+    path : Path
+    title : str
+    problem : Problem
+    states : tuple of float, optional
+        Factors of the loads to solve for; None: the loads as they are.
+    growth : mapping, optional
+        Arguments of `grow` beside the problem; None where nothing grows.
+    folder : Path
+        Where results go.
+    pictures : tuple of str
+        Fields to draw.
+    warp : float
+        Displacements are drawn this many times as large.
+    """
+
+    path: Path
+    title: str
+    problem: Problem
+    states: tuple[float, ...] | None
+    growth: Mapping[str, Any] | None
+    folder: Path
+    pictures: tuple[str, ...]
+    warp: float
+
+
+def read_case(path: str | PathLike[str]) -> CaseFile:
+    """Read a scene from a toml file.
+
+    Parameters
+    ----------
+    path : path
+
+    Returns
+    -------
+    CaseFile
+
+    Raises
+    ------
+    ProblemError, GeometryError, MeshError
+        No such file, no toml, a wrong key, unit or file, or a scene that is not well posed: the
+        message has file, line, and how to mend it.
+    """
+    file = path_of(path, "read_case: path", error=ProblemError)
+    root = read_tables(file)
+    root.known(_SECTIONS)
+    for name in ("mesh", "material"):
+        if name not in root:
+            root.refuse("", f"the table [{name}] is missing.")
+    mesh = forms.made(root.table("mesh"), forms.MESHES)
+    material = forms.called_with(root.table("material"), Form(Isotropic, {"E": (-2.0, 1.0)}))
+    solving = root.table("solve")
+    solving.known(("contact", "order", "friction", "states"))
+    scene: dict[str, Any] = {
+        name: [forms.made(table, known) for table in root.tables(name)]
+        for name, known in (
+            ("cracks", forms.CRACKS), ("supports", forms.SUPPORTS), ("loads", forms.LOADS),
+        )
+    }  # fmt: skip
+    numerics = _numerics(root.table("numerics"))
+    named = [name for name in ("contact", "order", "friction") if name in solving]
+    chosen = {name: solving.value(name, None) for name in named}
+    try:
+        problem = Problem(mesh, material, **scene, **chosen, numerics=numerics)
+    except XcrackError as error:
+        (solving if chosen else root).wrap(error)
+    output = root.table("output")
+    output.known(_OUTPUT)
+    return CaseFile(
+        path=file,
+        title=root.text("title", file.stem),
+        problem=problem,
+        states=_states(solving),
+        growth=_growth(root.table("growth")) if "growth" in root else None,
+        folder=file.parent / output.text("folder", f"{file.stem}_results"),
+        pictures=tuple(_texts(output, "pictures")),
+        warp=_number(output, "warp", 0.0),
+    )
+
+
+def _numerics(table: Table) -> Numerics:
+    """Choices of method; those for comparison stay in scripts."""
+    names = [f.name for f in fields(Numerics) if f.name != "comparison"]
+    table.known(names)
+    lengths = {"radius": LENGTH, "domain": LENGTH}
+    given = {name: table.value(name, lengths.get(name)) for name in table.content}
+    try:
+        return Numerics(**given)
+    except XcrackError as error:
+        table.wrap(error)
+
+
+def _growth(table: Table) -> Mapping[str, Any]:
+    """Arguments of `grow`."""
+    options = [name for name in GrowOptions.__annotations__ if name != "solver"]
+    table.known(("law", "criterion", "cycle", "spectrum", "da", *options))
+    if "law" not in table:
+        table.refuse("", "the key 'law' is missing.")
+    criterion = table.text("criterion", "max_hoop_stress")
+    if criterion not in forms.CRITERIA:
+        table.refuse("criterion", f"known are {', '.join(forms.CRITERIA)}.")
+    units = {"da": LENGTH, **_OPTIONS}
+    given = {
+        name: table.value(name, units.get(name)) for name in table.content if name not in _TABLES
+    }
+    if "retardation" in table:
+        given["retardation"] = retardation_of(table.table("retardation"))
+    if "link_up" in table:
+        zone = Form(plastic_zone, {"sigma_y": (-2.0, 1.0), "beta": NUMBER})
+        given["link_up"] = forms.called_with(table.table("link_up"), zone)
+    return MappingProxyType({
+        "law": forms.made(table.table("law"), forms.LAWS),
+        "criterion": forms.CRITERIA[criterion],
+        "cycle": loading(table),
+        **given,
+    })  # fmt: skip
+
+
+def _states(table: Table) -> tuple[float, ...] | None:
+    if "states" not in table:
+        return None
+    value = table.value("states", NUMBER)
+    if not isinstance(value, list) or not value:
+        table.refuse("states", f"{value!r:.60}: give a list of factors, such as [0.1, 1.0].")
+    return tuple(value)
+
+
+def _texts(table: Table, name: str) -> list[str]:
+    value = table.content.get(name, [])
+    if not isinstance(value, list) or not all(isinstance(item, str) for item in value):
+        table.refuse(name, f'{value!r:.60}: give a list of texts, such as ["von_mises"].')
+    return list(value)
+
+
+def _number(table: Table, name: str, default: float) -> float:
+    value = table.content.get(name, default)
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        table.refuse(name, f"{value!r:.60}: give a number.")
+    return float(value)
+
+
+__all__ = ["CaseFile", "read_case"]

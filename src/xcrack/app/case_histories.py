@@ -1,0 +1,88 @@
+"""Load histories, and retardation after overloads, as tables of a case file give them."""
+
+import inspect
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from xcrack.app.case_forms import LOADS, Form, called_with, made
+from xcrack.app.case_tables import NUMBER, STRESS, TOUGHNESS, Table
+from xcrack.base.errors import XcrackError
+from xcrack.fatigue.files import read_spectrum, twist
+from xcrack.fatigue.spectrum import Spectrum
+from xcrack.fatigue.zones import Retardation, plastic_zone, wheeler, willenborg
+from xcrack.growth.step import Cycle
+
+_CHOICES = ("unit", "least_range", "levels", "tolerance", "steady")
+_ZONE = {"sigma_y": STRESS, "beta": NUMBER}
+
+
+def _factors(factors: Any) -> Spectrum:
+    return Spectrum(factors)
+
+
+def _rows(rows: Any) -> Spectrum:
+    return Spectrum(rows=rows)
+
+
+def _file(path: Path, column: int | None = None, rows: bool = False) -> Spectrum:
+    return read_spectrum(path, column=column, rows=rows)
+
+
+_HISTORIES = {
+    "factors": Form(_factors),
+    "rows": Form(_rows),
+    "file": Form(_file, files=("path",)),
+    "twist": Form(twist),
+}
+_MODELS = {
+    "wheeler": Form(wheeler),
+    "willenborg": Form(willenborg, {"dK_th": TOUGHNESS}),
+}
+
+
+def loading(table: Table) -> Cycle | Spectrum:
+    """The cycle of a growth table, or its spectrum.
+
+    Raises
+    ------
+    ProblemError
+        Neither or both are there, or one that does not fit; with file and line.
+    """
+    if "spectrum" not in table:
+        if "cycle" not in table:
+            table.refuse("", "the key 'cycle' is missing; or give 'spectrum'.")
+        return called_with(table.table("cycle"), Form(Cycle, {"min": NUMBER, "max": NUMBER}))
+    if "cycle" in table:
+        table.refuse("spectrum", "give cycle or spectrum, not both.")
+    given = table.table("spectrum")
+    kind = given.text("kind", next((name for name in _HISTORIES if name in given), "factors"))
+    if kind in _HISTORIES:
+        own = inspect.signature(_HISTORIES[kind].function).parameters
+        given.known(["kind", *own, *_CHOICES], f" of {kind!r}")
+    rest = {name: value for name, value in given.content.items() if name not in _CHOICES}
+    spectrum = made(Table(given.source, given.key, {"kind": kind, **rest}), _HISTORIES)
+    choices = {name: given.value(name, NUMBER) for name in _CHOICES[1:4] if name in given
+               and name != "levels"}  # fmt: skip
+    if "levels" in given:
+        choices["levels"] = given.content["levels"]
+    if "unit" in given:
+        choices["unit"] = given.text("unit")
+    if "steady" in given:
+        choices["steady"] = tuple(made(load, LOADS) for load in given.tables("steady"))
+    try:
+        return replace(spectrum, **choices)
+    except XcrackError as error:
+        given.wrap(error)
+
+
+def retardation_of(table: Table) -> Retardation:
+    """The model of a table, whose zone is a table of its own."""
+    if "zone" not in table:
+        table.refuse("", "the key 'zone' is missing: zone = { sigma_y = ..., beta = ... }.")
+    zone = called_with(table.table("zone"), Form(plastic_zone, _ZONE))
+    content = {**table.content, "zone": zone}
+    return made(Table(table.source, table.key, content), _MODELS)
+
+
+__all__ = ["loading", "retardation_of"]

@@ -1,0 +1,160 @@
+"""Run growth in a folder, or a case file, with table, pictures, files and report in its folder."""
+
+from os import PathLike
+from pathlib import Path
+from typing import Any, Unpack
+
+from xcrack.analysis.solution import Solution
+from xcrack.analysis.solve import solve
+from xcrack.app.case import CaseFile, read_case
+from xcrack.base.checks import flag
+from xcrack.base.errors import ProblemError
+from xcrack.base.paths import path_of, system_errors
+from xcrack.fatigue.criteria import Criterion
+from xcrack.fatigue.law import Law
+from xcrack.fatigue.spectrum import Spectrum
+from xcrack.growth.options import GrowOptions, lists_options
+from xcrack.growth.run import grow
+from xcrack.growth.step import Cycle
+from xcrack.model.problem import Problem
+from xcrack.output.vtk import write
+from xcrack.runs.collect import Until, collect, resume
+from xcrack.runs.history import History
+from xcrack.view.plot import plot
+from xcrack.view.report import report
+
+_STEPS = "steps"
+
+
+@lists_options
+def run(
+    path: str | PathLike[str],
+    problem: Problem | None = None,
+    law: Law | None = None,
+    criterion: Criterion | None = None,
+    cycle: Cycle | Spectrum | None = None,
+    da: float | None = None,
+    *,
+    resumed: bool = False,
+    overwrite: bool = False,
+    until: Until | None = None,
+    keep_solutions: bool = True,
+    **options: Unpack[GrowOptions],
+) -> Any:
+    """Run growth in a folder, to its end: begin, or go on with it. Or run a case file.
+
+    With a problem, the same call begins a run, goes on with one that was killed, and reads one that
+    has ended. With a case file alone, its folder gets ``report.html`` and ``report.json``,
+    files for ParaView and the pictures that the file asks for; a growth run also has its steps
+    there, from which it can go on.
+
+    Parameters
+    ----------
+    path : path
+        Folder of the run; or a toml file, as of `read_case`.
+    problem, law, criterion, cycle, da : optional
+        As of `grow`; left out with a case file.
+    resumed : bool
+        Of a case file: go on with the steps that are in the folder; where there are none, begin.
+    overwrite : bool
+        Begin anew although steps are there: they are moved aside.
+    until, keep_solutions : optional
+        As of `collect`.
+    tolerance, max_unknowns : optional
+        As of `grow`.
+    cycles, scaling, integrator, threshold, retardation, solver, K_c, link_up, max_steps, \
+    max_cycles, tolerance, max_unknowns, progress
+        As of `grow`.
+
+    Returns
+    -------
+    History
+        Or what a case file asks for: a Solution, or a list of them where it has states.
+
+    Raises
+    ------
+    ProblemError
+        As of `grow`, `collect` and `resume`: the folder holds a run with other settings. Of a case
+        file as of `read_case`, `solve`, `grow` and `resume`.
+    """
+    for name, value in (("resumed", resumed), ("overwrite", overwrite)):
+        flag(value, f"run: {name}")
+    if problem is not None:
+        if resumed:
+            raise ProblemError("run: resumed belongs to a case file: a run in a folder goes on.")
+        given: dict[str, Any] = {"until": until, "keep_solutions": keep_solutions}
+        return _run_in(path, (problem, law, criterion, cycle, da), given, overwrite, options)
+    growing = {"law": law, "criterion": criterion, "cycle": cycle, "da": da, "until": until}
+    surplus = sorted([*options, *(name for name, value in growing.items() if value is not None)])
+    if surplus or keep_solutions is not True:
+        raise ProblemError(
+            f"run: {', '.join(surplus or ['keep_solutions'])} without a problem: give the problem "
+            "too, for a run in a folder, or a case file alone."
+        )
+    return _run_case(path, resumed=resumed, overwrite=overwrite)
+
+
+def _run_in(
+    path: str | PathLike[str],
+    scene: tuple[Any, ...],
+    given: dict[str, Any],
+    overwrite: bool,
+    options: GrowOptions,
+) -> History:
+    """History of the run in a folder: begun, gone on with, or read."""
+    problem, law, criterion, cycle, da = scene
+    folder = path_of(path, "run: path", error=ProblemError)
+    with system_errors("a folder for the run cannot be made at", folder, error=ProblemError):
+        if folder.is_file():
+            raise ProblemError(
+                f"run: path = {str(folder)!r} is a file: a run needs a folder of its own, and a "
+                "case file is given alone."
+            )
+        begun = folder.is_dir() and any(folder.iterdir())
+    if overwrite or not begun:
+        steps = grow(problem, law, criterion, cycle, da, **options)
+        return collect(steps, folder, overwrite=overwrite, **given)
+    return resume(folder, problem, law, criterion, cycle, da, **given, **options)
+
+
+def _run_case(path: str | PathLike[str], *, resumed: bool, overwrite: bool) -> Any:
+    case = read_case(path)
+    with system_errors("results cannot be written to", case.folder, error=ProblemError):
+        case.folder.mkdir(parents=True, exist_ok=True)
+    result: Any
+    if case.growth is None:
+        result = solve(case.problem, case.states)
+        solutions = [result] if isinstance(result, Solution) else list(result)
+        for k, solution in enumerate(solutions):
+            write(solution, case.folder / ("solution" if len(solutions) == 1 else f"state_{k}"))
+    else:
+        result = _grown(case, resumed=resumed, overwrite=overwrite)
+        result.write(case.folder)
+        solutions = list(result.solved[-1].solutions) if result.solved else []
+    _draw(case, solutions)
+    report(result, case.folder / "report.html", title=case.title)
+    return result
+
+
+def _grown(case: CaseFile, *, resumed: bool, overwrite: bool) -> History:
+    folder = case.folder / _STEPS
+    given = dict(case.growth or {})
+    if resumed and _begun(folder):
+        law, criterion, cycle = (given.pop(name) for name in ("law", "criterion", "cycle"))
+        return resume(folder, case.problem, law, criterion, cycle, given.pop("da", None), **given)
+    return collect(grow(case.problem, **given), folder, overwrite=overwrite)
+
+
+def _begun(folder: Path) -> bool:
+    with system_errors("a run cannot be read from", folder, error=ProblemError):
+        return folder.is_dir() and any(folder.glob("step_*.npz"))
+
+
+def _draw(case: CaseFile, solutions: list[Solution]) -> None:
+    for k, solution in enumerate(solutions):
+        for field in case.pictures:
+            name = field if len(solutions) == 1 else f"{field}_{k}"
+            plot(solution, field, file=case.folder / f"{name}.png", warp=case.warp)
+
+
+__all__ = ["run"]

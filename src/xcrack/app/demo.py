@@ -1,0 +1,60 @@
+"""A closed crack at a hole, from data of the package: no mesh generator needed."""
+
+import warnings
+from importlib.resources import as_file, files
+from os import PathLike
+from pathlib import Path
+
+from xcrack.analysis.solve import solve
+from xcrack.base.errors import ProblemError, XcrackWarning
+from xcrack.base.paths import path_of
+from xcrack.crack.lines import line_crack
+from xcrack.mesh.files import read_mesh
+from xcrack.mesh.mesh import Mesh
+from xcrack.model.conditions import pressure
+from xcrack.model.material import Isotropic
+from xcrack.model.problem import Problem
+from xcrack.view.report import report
+
+_RADIUS, _TIP, _PRESSURE = 5.0, 12.0, 80.0  # mm, mm, MPa
+
+
+def demo(folder: str | PathLike[str] = "xcrack_demo") -> Path:
+    """Solve a plate with a hole whose crack is pressed together, and report on it.
+
+    Parameters
+    ----------
+    folder : path
+        Where the report goes.
+
+    Returns
+    -------
+    Path
+        Of the report.
+
+    Raises
+    ------
+    ProblemError
+        The folder cannot be written.
+    """
+    path = path_of(folder, "demo: folder", error=ProblemError)
+    problem = Problem(
+        demo_mesh(),
+        Isotropic(E=210e3, nu=0.3, plane="strain"),
+        cracks=[line_crack([(_RADIUS, 0.0), (_TIP, 0.0)])],
+        loads=[pressure("top", _PRESSURE), pressure("bottom", _PRESSURE)],
+    )
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", XcrackWarning)  # the report lists them
+        solution = solve(problem)
+    title = "A closed crack at a hole  [N, mm, MPa]"
+    return report(solution, path / "report.html", title=title)
+
+
+def demo_mesh() -> Mesh:
+    """The plate of the demonstration."""
+    with as_file(files("xcrack") / "data" / "plate_with_hole.msh") as file:
+        return read_mesh(file)
+
+
+__all__ = ["demo", "demo_mesh"]

@@ -1,0 +1,1 @@
+"""What every package needs: arrays, errors, checked input, threads, optional packages."""

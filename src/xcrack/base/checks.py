@@ -1,0 +1,397 @@
+"""Checks of numbers, arrays and words where users give them, and calls of users' functions."""
+
+import operator
+import re
+from collections.abc import Callable, Mapping, Sequence
+from functools import cache
+from numbers import Real
+from typing import Any
+
+import numpy as np
+
+from xcrack.base.arrays import Floats, Ints, Shape, fits
+from xcrack.base.errors import ProblemError, XcrackError
+
+
+def number(
+    value: Any,
+    what: str,
+    *,
+    above: float | None = None,
+    least: float | None = None,
+    below: float | None = None,
+    most: float | None = None,
+    error: type[XcrackError] = ProblemError,
+) -> float:
+    """Check that a value is one finite real number, and return it.
+
+    Parameters
+    ----------
+    value : anything
+    what : str
+        Its name in the message, such as ``"paris: C"``.
+    above, least, below, most : float, optional
+        Bounds: exclusive from below, inclusive, exclusive from above, inclusive.
+    error : type of XcrackError
+
+    Returns
+    -------
+    float
+
+    Raises
+    ------
+    error
+        It is a bool, a string, complex, an array, nan, infinite or out of bounds.
+
+    Examples
+    --------
+    >>> number(3, "paris: m", above=0)
+    3.0
+    """
+    wanted = "a finite number" + _bounds(above, least, below, most)
+    if isinstance(value, np.ndarray) and value.ndim == 0:
+        value = value[()]
+    if isinstance(value, bool | np.bool_) or not isinstance(value, Real):
+        raise error(f"{what} = {shown(value)} is not a number: give {wanted}.")
+    try:
+        result = float(value)
+    except OverflowError:
+        result = np.inf
+    if not (
+        np.isfinite(result)
+        and (above is None or result > above)
+        and (least is None or result >= least)
+        and (below is None or result < below)
+        and (most is None or result <= most)
+    ):
+        raise error(f"{what} = {shown(value)} is not possible: give {wanted}.")
+    return result
+
+
+def whole(
+    value: Any,
+    what: str,
+    *,
+    least: int | None = None,
+    most: int | None = None,
+    error: type[XcrackError] = ProblemError,
+) -> int:
+    """Check that a value is a whole number, and return it; 3.0 counts, 2.5 and True do not.
+
+    Parameters
+    ----------
+    value, what, error
+        As of `number`.
+    least, most : int, optional
+        Inclusive bounds.
+
+    Returns
+    -------
+    int
+
+    Raises
+    ------
+    error
+        It is not a whole number, or out of bounds.
+
+    Examples
+    --------
+    >>> whole(4, "box: n", least=1)
+    4
+    """
+    wanted = "a whole number" + _bounds(None, least, None, most)
+    if isinstance(value, np.ndarray) and value.ndim == 0:
+        value = value[()]
+    if isinstance(value, bool | np.bool_) or not isinstance(value, Real):
+        raise error(f"{what} = {shown(value)} is not a number: give {wanted}.")
+    try:
+        result = operator.index(value)  # type: ignore[arg-type]
+    except TypeError:
+        rounded = float(value)
+        if not rounded.is_integer():  # nan and inf are not either
+            raise error(f"{what} = {shown(value)} is not possible: give {wanted}.") from None
+        result = int(rounded)
+    if (least is not None and result < least) or (most is not None and result > most):
+        raise error(f"{what} = {shown(value)} is not possible: give {wanted}.")
+    if abs(result) >= 2**63:
+        raise error(f"{what} = {shown(value)} is too large to count with: give {wanted}.")
+    return result
+
+
+def numbers(
+    value: Any,
+    what: str,
+    shape: Shape | None = None,
+    *,
+    finite: bool = True,
+    error: type[XcrackError] = ProblemError,
+) -> Floats:
+    """Check that a value is an array of real numbers of a shape, and return it.
+
+    Parameters
+    ----------
+    value : anything
+    what : str
+        Its name in the message.
+    shape : tuple of int or None, optional
+        Wanted shape, None where any length will do; any shape if omitted.
+    finite : bool
+        Refuse nan and infinite entries.
+    error : type of XcrackError
+
+    Returns
+    -------
+    array of float
+        Of the given shape; it may share memory with `value`.
+
+    Raises
+    ------
+    error
+        Ragged rows, strings, objects, None, complex or masked entries, another shape, or entries
+        that are not finite; the message names the first of these.
+
+    Examples
+    --------
+    >>> numbers([(0, 1), (2, 3)], "points", (None, 2))
+    array([[0., 1.],
+           [2., 3.]])
+    """
+    if type(value) is not np.ndarray or value.dtype != np.float64 or not fits(value.shape, shape):
+        wanted = "an array of real numbers" + _of_shape(shape)
+        value = _real_array(value, what, wanted, error).astype(np.float64, copy=False)
+        _check_shape(value, what, shape, wanted, error)
+    result: Floats = value
+    if finite and not np.isfinite(result).all():
+        where = np.unravel_index(int(np.argmin(np.isfinite(result))), result.shape)
+        place = "" if result.ndim == 0 else f"[{', '.join(str(int(i)) for i in where)}]"
+        raise error(f"{what}{place} = {result[where]}: every number must be finite.")
+    return result
+
+
+def whole_numbers(
+    value: Any,
+    what: str,
+    shape: Shape | None = None,
+    *,
+    error: type[XcrackError] = ProblemError,
+) -> Ints:
+    """Check that a value is an array of whole numbers of a shape, and return it.
+
+    Parameters
+    ----------
+    value, what, shape, error
+        As of `numbers`.
+
+    Returns
+    -------
+    array of int64
+
+    Raises
+    ------
+    error
+        As of `numbers`, or an entry that is not whole.
+
+    Examples
+    --------
+    >>> whole_numbers([(0, 1, 2)], "cells", (None, 3))
+    array([[0, 1, 2]])
+    """
+    if type(value) is np.ndarray and value.dtype == np.int64 and fits(value.shape, shape):
+        return value
+    wanted = "an array of whole numbers" + _of_shape(shape)
+    result = _real_array(value, what, wanted, error)
+    _check_shape(result, what, shape, wanted, error)
+    if result.dtype.kind == "f":
+        result = result.astype(np.float64, copy=False)  # a half float ends at 65504
+        odd = ~(np.isfinite(result) & (result == np.round(result)) & (np.abs(result) < 2**53))
+        if odd.any():
+            raise error(f"{what} holds {result[odd].flat[0]}: give {wanted}.")
+    return result.astype(np.int64, copy=False)
+
+
+def one_of(
+    value: Any, what: str, words: Sequence[str], *, error: type[XcrackError] = ProblemError
+) -> str:
+    """Check that a value is one of some words, and return it.
+
+    Parameters
+    ----------
+    value, what, error
+        As of `number`.
+    words : sequence of str
+
+    Returns
+    -------
+    str
+
+    Raises
+    ------
+    error
+        It is another word, or no text.
+
+    Examples
+    --------
+    >>> one_of("on", "contact", ("auto", "on", "off"))
+    'on'
+    """
+    if not isinstance(value, str) or value not in words:
+        known = " or ".join([", ".join(f'"{word}"' for word in words[:-1]), f'"{words[-1]}"'])
+        raise error(f"{what} = {shown(value)} is not known: give {known}.")
+    return value
+
+
+def flag(value: Any, what: str, *, error: type[XcrackError] = ProblemError) -> bool:
+    """Check that a value is True or False, and return it; 1 and "no" are neither.
+
+    Parameters
+    ----------
+    value, what, error
+        As of `number`.
+
+    Returns
+    -------
+    bool
+
+    Raises
+    ------
+    error
+        It is neither.
+
+    Examples
+    --------
+    >>> flag(False, "plot: edges")
+    False
+    """
+    if not isinstance(value, bool | np.bool_):
+        raise error(f"{what} = {shown(value)}: give True or False.")
+    return bool(value)
+
+
+def entries(value: Any, what: str, *, error: type[XcrackError] = ProblemError) -> tuple[Any, ...]:
+    """Entries of a list, tuple or whatever else can be gone through, but for text and mappings.
+
+    Parameters
+    ----------
+    value, what, error
+        As of `number`.
+
+    Returns
+    -------
+    tuple
+
+    Raises
+    ------
+    error
+        It cannot be gone through.
+    """
+    try:
+        items = None if isinstance(value, str | bytes | bytearray | Mapping) else iter(value)
+    except Exception:  # whatever an object's own __iter__ raises
+        items = None
+    if items is None:
+        raise error(f"{what} = {shown(value)}: give a list.")
+    return tuple(items)
+
+
+def shown(value: Any) -> str:
+    """A value in a message: one short line, whatever it is.
+
+    Parameters
+    ----------
+    value : anything
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> shown([1.5, None])
+    '[1.5, None]'
+    """
+    if type(value) is str and len(value) < 60 and value.isidentifier():
+        return repr(value)
+    try:
+        text = re.sub(r"\barray\((.*?)(, dtype=\w+)?\)", r"\1", " ".join(repr(value).split()))
+    except Exception:
+        text = object.__repr__(value)
+    return text if len(text) <= 80 else f"{text[:60]} … ({type(value).__name__})"
+
+
+def called(function: Callable[..., Any], what: str, *arguments: Any) -> Any:
+    """Call a user's function; an exception in it keeps its type and says where it was called.
+
+    Parameters
+    ----------
+    function : callable
+    what : str
+        What xcrack needed it for, such as ``"the value of traction('top')"``.
+    *arguments
+        Passed on.
+    """
+    try:
+        return function(*arguments)
+    except Exception as error:
+        name = getattr(function, "__qualname__", None) or repr(function)
+        error.add_note(f"raised in {name}, which xcrack called for {what}.")
+        raise
+
+
+def _real_array(value: Any, what: str, wanted: str, error: type[XcrackError]) -> Any:
+    if isinstance(value, np.ma.MaskedArray):
+        if np.ma.getmaskarray(value).any():
+            raise error(f"{what} has masked entries: give {wanted}, without a mask.")
+        value = value.data
+    if isinstance(value, bytes | bytearray):  # numpy takes the second for numbers
+        raise error(f"{what} = {shown(value)} is text: give {wanted}.")
+    try:
+        result = np.asarray(value)
+    except Exception as cause:  # ragged rows, or whatever an object's own __array__ raises
+        raise error(f"{what} = {shown(value)}: give {wanted} ({cause}).") from cause
+    if result.size == 0 and result.dtype.kind in "Of":
+        return result.astype(float)
+    if result.dtype.kind not in "iuf":
+        kind = {"c": "complex", "b": "bool", "U": "str", "S": "bytes"}.get(
+            result.dtype.kind, str(result.dtype)
+        )
+        raise error(f"{what} = {shown(value)} holds {kind} entries: give {wanted}.")
+    return result
+
+
+def _check_shape(
+    result: Any, what: str, shape: Shape | None, wanted: str, error: type[XcrackError]
+) -> None:
+    if not fits(result.shape, shape):
+        raise error(f"{what} has the shape {result.shape}: give {wanted}.")
+
+
+@cache
+def _of_shape(shape: Shape | None) -> str:
+    if shape is None:
+        return ""
+    sides = ", ".join("n" if side is None else str(side) for side in shape)
+    return f" of shape ({sides}{',' if len(shape) == 1 else ''})"
+
+
+def _bounds(
+    above: float | None, least: float | None, below: float | None, most: float | None
+) -> str:
+    low = f"above {above:g}" if above is not None else ""
+    low = f"of at least {least:g}" if least is not None else low
+    high = f"below {below:g}" if below is not None else ""
+    high = f"of at most {most:g}" if most is not None else high
+    text = " and ".join(part for part in (low, high) if part)
+    return f" {text}" if text else ""
+
+
+__all__ = [
+    "called",
+    "entries",
+    "flag",
+    "number",
+    "numbers",
+    "one_of",
+    "shown",
+    "whole",
+    "whole_numbers",
+]

@@ -1,0 +1,130 @@
+"""Compilation of kernels, with a cache on disk that never stands in the way.
+
+numba keeps compiled code beside the source or in the user's cache folder. It raises where neither
+may be written to (containers, clusters), and at every later run once a cache file is damaged.
+"""
+
+import logging
+import os
+import stat
+import sys
+import tempfile
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numba
+from numba.core import caching
+
+from xcrack.base.errors import warn
+
+_DAMAGE = (Exception,)  # what unpickling damaged bytes raises is anybody's guess
+
+
+class _Cache(caching.FunctionCache):
+    """numba's cache of one function; files that cannot be read or written are compiled anew."""
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        try:
+            loaded = super().load_overload(sig, target_context)
+        except _DAMAGE:
+            loaded = None
+        if loaded is None:
+            _announce()
+        return loaded
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        try:
+            super().save_overload(sig, data)
+        except _DAMAGE:
+            try:  # the index may be what is damaged
+                self.flush()
+                super().save_overload(sig, data)
+            except _DAMAGE:
+                self.disable()  # a full disk, for one; the compiled code is in memory
+
+
+@cache
+def _announce() -> None:
+    """Say once in a process why what follows takes longer than it will the next time."""
+    line = "xcrack compiles kernels that were not needed here before: up to half a minute, once"
+    logging.getLogger("xcrack").info(line)
+    if sys.stderr.isatty():
+        print(line, file=sys.stderr)
+
+
+def kernel(function: Callable[..., Any]) -> Any:
+    """Compile a function of arrays; its machine code is kept on disk.
+
+    Division by zero gives inf or nan as in numpy. Python's lock is released, so that threads run
+    kernels side by side. The helpers that a kernel calls stand in its own
+    file: numba notices changes of that file alone.
+
+    Parameters
+    ----------
+    function : callable
+    """
+    compiled = numba.njit(error_model="numpy", nogil=True, no_cfunc_wrapper=True)(function)
+    if not numba.config.DISABLE_JIT:
+        compiled._cache = _cache_of(function)
+        compiled.get_call_template = _of_types(compiled.get_call_template)
+    return compiled
+
+
+def _of_types(get_call_template: Callable[..., Any]) -> Callable[..., Any]:
+    """A helper called with a constant is compiled for its type; numba does it for its value."""
+
+    def without_values(args: Any, kws: Any) -> Any:
+        types = {name: numba.types.unliteral(value) for name, value in kws.items()}
+        return get_call_template(tuple(numba.types.unliteral(each) for each in args), types)
+
+    return without_values
+
+
+def _cache_of(function: Callable[..., Any]) -> Any:
+    """The cache of a function: where numba wants it, in a temporary folder, or none."""
+    try:
+        return _Cache(function)
+    except RuntimeError:  # no folder that numba knows of may be written to
+        folder = _instead()
+    if folder is None:
+        return caching.NullCache()
+    numba.config.CACHE_DIR = str(folder)
+    return _Cache(function)
+
+
+@cache
+def _instead() -> Path | None:
+    """A temporary folder, with one warning for all kernels."""
+    folder = _own_folder()
+    remedy = "Set NUMBA_CACHE_DIR to a folder that may be written to and stays."
+    if folder is None:
+        warn(
+            "neither xcrack's folder, the user's cache folder nor a temporary one may be written "
+            f"to: each process compiles its kernels, which takes some seconds. {remedy}"
+        )
+    else:
+        warn(
+            "neither xcrack's folder nor the user's cache folder may be written to: compiled "
+            f"kernels are stored in {folder}. {remedy}"
+        )
+    return folder
+
+
+def _own_folder() -> Path | None:
+    """Temporary folder that belongs to this user alone: what lies in it will be executed."""
+    user = os.getuid() if hasattr(os, "getuid") else "user"
+    try:
+        folder = Path(tempfile.gettempdir()) / f"xcrack-kernels-{user}"
+        folder.mkdir(mode=0o700, exist_ok=True)
+        about = folder.lstat()
+        foreign = stat.S_IMODE(about.st_mode) & 0o022 or not stat.S_ISDIR(about.st_mode)
+        if foreign or (hasattr(os, "getuid") and about.st_uid != user):
+            return Path(tempfile.mkdtemp(prefix="xcrack-kernels-"))
+        return folder
+    except OSError:
+        return None
+
+
+__all__ = ["kernel"]

@@ -1,0 +1,162 @@
+"""Paths that users give, files written whole, and what the system refuses as an error of ours."""
+
+import errno
+import os
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, contextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+from xcrack.base.checks import shown
+from xcrack.base.errors import XcrackError
+
+_NO_ROOM = "make room, or give a folder on another disk"
+_NO_RIGHT = "give a path where you may read and write"
+_MEND = {
+    errno.EISDIR: "it is a folder, so give the path of a file",
+    errno.ENOTDIR: "a part of the path is a file, so give another folder",
+    errno.EEXIST: "a file stands where a folder is needed, so give another path",
+    errno.ENOENT: "check the path",
+    errno.ENAMETOOLONG: "give a shorter name",
+    errno.ENOSPC: _NO_ROOM,
+    errno.EDQUOT: _NO_ROOM,
+    errno.EFBIG: _NO_ROOM,
+    errno.EACCES: _NO_RIGHT,
+    errno.EPERM: _NO_RIGHT,
+    errno.EROFS: _NO_RIGHT,
+}
+
+
+def path_of(value: Any, what: str, *, error: type[XcrackError] = XcrackError) -> Path:
+    """Check that a value can be the path of a file, and return it.
+
+    Parameters
+    ----------
+    value : anything
+    what : str
+        Its name in the message, such as ``"write_mesh: path"``.
+    error : type of XcrackError
+
+    Returns
+    -------
+    Path
+
+    Raises
+    ------
+    error
+        Neither a string nor a path, empty, or with a NUL character.
+
+    Examples
+    --------
+    >>> path_of("plate.msh", "read_mesh: path").suffix
+    '.msh'
+    """
+    try:
+        text = os.fspath(value)
+    except Exception:  # whatever an object's own __fspath__ raises
+        text = None
+    if not isinstance(text, str):
+        raise error(f"{what} = {shown(value)} is not a path: give a string or a pathlib.Path.")
+    if not text or "\0" in text:
+        reason = "holds a NUL character" if text else "is empty"
+        raise error(f"{what} = {shown(value)} {reason}: give the path of a file.")
+    return Path(text)
+
+
+@contextmanager
+def system_errors(
+    what: str, path: Path, *, error: type[XcrackError] = XcrackError
+) -> Iterator[None]:
+    """Turn what the system refuses (no space, no permission, a folder) into an error of ours.
+
+    Parameters
+    ----------
+    what : str
+        What failed, such as ``"the mesh cannot be written to"``; the path follows.
+    path : Path
+    error : type of XcrackError
+
+    Raises
+    ------
+    error
+        For an OSError; it names the path, what the system said, and what to do.
+    """
+    try:
+        if "read" in what and path.is_char_device():  # some give bytes without end
+            raise error(f"{what} {_shown_path(path)}: it is a device: give the path of a file.")
+        yield
+    except OSError as cause:
+        reason = cause.strerror or str(cause) or type(cause).__name__
+        mend = _MEND.get(cause.errno or 0, "check the path")
+        raise error(f"{what} {_shown_path(path)}: {reason}: {mend}.") from cause
+
+
+def _shown_path(path: Path) -> str:
+    text = repr(str(path))
+    return text if len(text) <= 300 else f"{text[:100]} … {text[-150:]}"
+
+
+@contextmanager
+def written_whole(
+    path: Path, what: str, *, error: type[XcrackError] = XcrackError
+) -> Iterator[Path]:
+    """Write a file wholly or not at all: an older one stays as it was where that fails.
+
+    Yields the path to write to: beside the file, with the same ending. It becomes the file at the
+    end.
+
+    Parameters
+    ----------
+    path : Path
+    what : str
+        As of `system_errors`.
+    error : type of XcrackError
+
+    Raises
+    ------
+    error
+        For an OSError; nothing is left of the attempt.
+    """
+    with system_errors(what, path, error=error):
+        target = path.resolve()
+        if target.is_dir():
+            raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
+        if target.exists() and not target.is_file():  # a device, which must stay what it is
+            yield target
+            return
+        part = target.with_name(f".{target.stem[:200]}.{os.getpid()}.part{target.suffix}")
+        try:
+            yield part
+            os.replace(part, target)
+        finally:
+            with suppress(OSError):
+                part.unlink()
+
+
+def write_texts(
+    texts: Mapping[Path, str], what: str, *, error: type[XcrackError] = XcrackError
+) -> None:
+    """Write files of text in UTF-8; none takes the place of an older one before all are whole.
+
+    Parameters
+    ----------
+    texts : mapping of Path to str
+        Their folders are made if they are not there.
+    what : str
+        As of `system_errors`.
+    error : type of XcrackError
+
+    Raises
+    ------
+    error
+        For an OSError; older files stay as they were.
+    """
+    with ExitStack() as parts:
+        for path, text in texts.items():
+            with system_errors(what, path, error=error):
+                path.parent.mkdir(parents=True, exist_ok=True)
+            part = parts.enter_context(written_whole(path, what, error=error))
+            part.write_text(text, encoding="utf-8", newline="")
+
+
+__all__ = ["path_of", "system_errors", "write_texts", "written_whole"]

@@ -1,0 +1,178 @@
+"""Threads: how many a process may use, and loops whose tasks run beside one another.
+
+Kernels release Python's lock, so plain threads of Python run them side by side. A pool lives only
+as long as one solve: nothing is left that a fork could break, and several threads of the user may
+solve at once. Every task does the same whoever runs it, and results are taken in the order of the
+tasks: results have the same bits for any number of threads. BLAS within our own loops has one
+thread for the same reason.
+"""
+
+import os
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import contextmanager
+from contextvars import ContextVar
+from functools import cache
+from pathlib import Path
+from threading import Lock
+from typing import TypeVar
+
+from xcrack.base.errors import ProblemError
+
+Task = TypeVar("Task")
+Result = TypeVar("Result")
+
+_MOST = 16  # threads where nobody asked for more: products are bound by memory before
+_QUOTA = Path("/sys/fs/cgroup/cpu.max")
+
+_pool: ContextVar[ThreadPoolExecutor | None] = ContextVar("xcrack threads", default=None)
+
+
+def available() -> int:
+    """Processors that this process may use, by affinity and quota, at most 16.
+
+    The environment variable XCRACK_THREADS takes precedence.
+
+    Raises
+    ------
+    ProblemError
+        XCRACK_THREADS is not a whole number above 0.
+    """
+    wanted = os.environ.get("XCRACK_THREADS")
+    if wanted is not None:
+        if not (wanted.isascii() and wanted.isdigit() and int(wanted) > 0):
+            raise ProblemError(
+                f"XCRACK_THREADS = {wanted!r} in the environment: give a whole number above 0."
+            )
+        return int(wanted)
+    try:
+        count = len(os.sched_getaffinity(0))
+    except AttributeError:  # not on this system
+        count = os.cpu_count() or 1
+    return max(1, min(count, _quota(), _MOST))
+
+
+def _quota() -> int:
+    """Processors that the control group of this process grants."""
+    try:
+        limit, period = _QUOTA.read_text().split()[:2]
+        return max(1, -(-int(limit) // int(period)))
+    except (OSError, ValueError):  # no such file, or "max"
+        return _MOST
+
+
+@contextmanager
+def threads(count: int | None) -> Iterator[int]:
+    """Let `each` use a number of threads within the block; None: as many as are available.
+
+    Parameters
+    ----------
+    count : int, optional
+    """
+    number = available() if count is None else count
+    if number == 1 or _pool.get() is not None:
+        yield number
+        return
+    with ThreadPoolExecutor(number, thread_name_prefix="xcrack") as pool:
+        token = _pool.set(pool)
+        try:
+            yield number
+        finally:
+            _pool.reset(token)
+
+
+def number_of_threads() -> int:
+    """Threads that `each` would use here."""
+    pool = _pool.get()
+    return 1 if pool is None else int(pool._max_workers)
+
+
+def each(function: Callable[[Task], Result], tasks: Iterable[Task]) -> list[Result]:
+    """Results of a function for tasks, in their order; tasks must not depend on each other.
+
+    Parameters
+    ----------
+    function : callable
+        Spends its time where Python's lock is released.
+    tasks : iterable
+    """
+    pool = _pool.get()
+    if pool is None:
+        return [function(task) for task in tasks]
+    return list(pool.map(function, tasks))
+
+
+def streamed(function: Callable[[Task], Result], tasks: Iterable[Task]) -> Iterator[Result]:
+    """Results of `each` one by one, while later ones are made: at most two a thread wait.
+
+    What takes them, say the sum of chunks, runs beside the tasks, and memory is bounded.
+    """
+    pool = _pool.get()
+    if pool is None:
+        yield from map(function, tasks)
+        return
+    ahead: deque[Future[Result]] = deque()
+    for task in tasks:
+        ahead.append(pool.submit(function, task))
+        if len(ahead) > number_of_threads():
+            yield ahead.popleft().result()
+    while ahead:
+        yield ahead.popleft().result()
+
+
+class _Blas:
+    """Numbers of threads of the libraries of BLAS, one while anybody needs it."""
+
+    def __init__(self) -> None:
+        import scipy.linalg  # noqa: F401 - so that its BLAS is among those that are found
+        import threadpoolctl
+
+        every = threadpoolctl.ThreadpoolController().select(user_api="blas")
+        self.libraries = every.lib_controllers
+        self.lock, self.users = Lock(), 0
+        self.before: list[int | None] = []
+
+    def enter(self) -> None:
+        with self.lock:
+            if self.users == 0:
+                self.before = [library.get_num_threads() for library in self.libraries]
+                self._set(1, self.before)
+            self.users += 1
+
+    def leave(self) -> None:
+        with self.lock:
+            self.users -= 1
+            if self.users == 0:
+                self._set(None, self.before)
+
+    def _set(self, wanted: int | None, before: Sequence[int | None]) -> None:
+        """Let libraries that had other numbers of threads use a number, or what they had."""
+        for library, number in zip(self.libraries, before):
+            if number is None or number == 1:
+                continue
+            # threadpoolctl lets one thread alone change the number, to settle what is settled
+            # here: it is this process' own, and the last to leave may not be the first to enter.
+            change = getattr(library, "_real_set_num_threads", library.set_num_threads)
+            change(number if wanted is None else wanted)
+
+
+_blas = cache(_Blas)
+
+
+@contextmanager
+def one_blas_thread() -> Iterator[None]:
+    """BLAS with one thread, and afterwards with as many as before: the same bits everywhere.
+
+    The number belongs to the whole process: it is restored when the last of several threads of the
+    user that solve at once has left.
+    """
+    blas = _blas()
+    blas.enter()
+    try:
+        yield
+    finally:
+        blas.leave()
+
+
+__all__ = ["available", "each", "number_of_threads", "one_blas_thread", "threads"]

@@ -1,1 +1,0 @@
-"""Scenes as toml files: read into the same dataclasses that a script makes, errors by line."""

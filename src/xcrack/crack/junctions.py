@@ -1,0 +1,263 @@
+"""Cracks in 2D that end on other cracks: where, from which side, and what lies too close.
+
+A placed crack whose end lies inside the body and is no tip ends there on another crack. The end is
+a point of its polyline, so that cracks alone say which of them meet: growth, run files and meshes
+need to know nothing besides.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from xcrack.base.arrays import Floats, at
+from xcrack.base.errors import CoarseMeshError, GeometryError
+from xcrack.crack.crack import Crack
+from xcrack.crack.lines import crossing_points, polyline_crack
+from xcrack.mesh.locate import cells_at, contains, nearest_boundary
+from xcrack.mesh.mesh import Mesh
+from xcrack.mesh.polygon import closest_on_segment
+from xcrack.mesh.simplex import leg_size
+
+_ON = 0.1  # share of a cell within which an end is meant to lie on another crack
+_SAME = 1e-6  # share of a cell within which the end of a placed crack lies on another one
+_SINE = np.sin(np.radians(10.0))  # of the smallest angle between two cracks that meet
+_BEYOND = 1.6  # cells by which a crack is prolonged beyond the other one, across it
+_LEAST = 1.0  # cells to a third crack beyond it below which nothing can be resolved
+_APART = 1.0  # cells between a junction and a tip, or another junction on the same side
+REACH = 3.2  # cells around a junction in which sides are those of the junction
+
+
+@dataclass(frozen=True, eq=False)
+class Junction:
+    """An end of one crack on another one.
+
+    Attributes
+    ----------
+    crack, end : int
+        The crack that ends, and the number of the point.
+    on : int
+        The crack that it ends on.
+    x : (2,) array, length
+    side : int
+        Side of the other crack, +1 or -1, from which it comes.
+    beyond : (2,) array, length
+        Point on the other side up to which the level set of the crack is prolonged.
+    reach : float, length
+        Radius of the neighbourhood in which the crack is cut off by the other one.
+    """
+
+    crack: int
+    end: int
+    on: int
+    x: Floats
+    side: int
+    beyond: Floats
+    reach: float
+
+
+def on_others(given: Sequence[Crack], cracks: tuple[Crack, ...], mesh: Mesh) -> tuple[Crack, ...]:
+    """Cracks whose ends on other cracks are no tips, moved onto them exactly.
+
+    Parameters
+    ----------
+    given : sequence of Crack
+        Cracks whose tips are known there keep them.
+    cracks : tuple of Crack
+        The same ones, placed in the mesh.
+    mesh : Mesh
+    """
+    if len(cracks) < 2:
+        return cracks
+    result = list(cracks)
+    for c, crack in enumerate(cracks):
+        for tip in (crack.tips or ()) if given[c].tips is None else ():
+            end, before = crack.points[tip], crack.points[1 if tip == 0 else tip - 1]
+            foot, distance = _nearest_flank(c, end, result)
+            ahead = (end - before) / np.linalg.norm(end - before)
+            if distance > _ON * _size(mesh, end) or _along(ahead, foot, c, result):
+                continue
+            points = np.array(result[c].points)
+            points[tip] = _on_line(before, end, foot, result, c)
+            tips = tuple(t for t in result[c].tips or () if t != tip)
+            result[c] = Crack(points, crack.faces, tips)
+    return tuple(result)
+
+
+def _nearest_flank(c: int, x: Floats, cracks: Sequence[Crack]) -> tuple[Floats, float]:
+    """Point of all other cracks that is nearest to x, and its distance."""
+    best, distance = x, np.inf
+    for other, crack in enumerate(cracks):
+        if other == c:
+            continue
+        foot = closest_on_segment(x, crack.points[:-1], crack.points[1:])
+        away = np.linalg.norm(foot - x, axis=1)
+        k = int(np.argmin(away))
+        if away[k] < distance:
+            best, distance = foot[k], float(away[k])
+    return best, distance
+
+
+def _along(ahead: Floats, x: Floats, c: int, cracks: Sequence[Crack]) -> bool:
+    """Whether a crack lies on another one at its end, which placing refuses."""
+    return any(
+        _sine(ahead, arms) < 1e-3
+        for other, crack in enumerate(cracks)
+        if other != c and len(arms := _arms(x, crack.points, float(np.abs(x).max(initial=1.0))))
+    )
+
+
+def _on_line(before: Floats, end: Floats, foot: Floats, cracks: Sequence[Crack], c: int) -> Floats:
+    """Where the last piece of a crack, prolonged, meets the crack that it ends close to."""
+    if np.array_equal(foot, end):
+        return end
+    ahead = np.stack([before, end + (end - before)])
+    hits = [crossing_points(ahead, crack.points) for k, crack in enumerate(cracks) if k != c]
+    every = np.concatenate(hits)
+    away = np.linalg.norm(every - end, axis=1)
+    # A crack that comes in at a small angle meets the other one far from the foot of its end.
+    if len(every) and away.min() <= np.linalg.norm(foot - end) / _SINE:
+        return np.asarray(every[int(np.argmin(away))])
+    return foot
+
+
+def _size(mesh: Mesh, x: Floats) -> float:
+    return leg_size(mesh, cells_at(mesh, x[None]))
+
+
+def junctions(cracks: tuple[Crack, ...], mesh: Mesh) -> tuple[Junction, ...]:
+    """Where placed cracks end on others, by crack and end.
+
+    Raises
+    ------
+    GeometryError
+        An end in the body that is neither a tip nor on another crack, or on the end of one; a
+        junction close to a tip or to another one; two cracks that meet at less than 10 degrees.
+    """
+    result = []
+    for c, crack in enumerate(cracks):
+        last = len(crack.points) - 1
+        ends = [end for end in (0, last) if end not in (crack.tips or ())]
+        if not ends:
+            continue
+        for end, inside in zip(ends, contains(mesh, crack.points[ends]).tolist()):
+            # The last step of a run has cracks that end on the boundary itself.
+            if inside and not _on_boundary(crack.points[end], mesh):
+                result.append(_junction(c, end, cracks, mesh))
+    _check_apart(result, cracks, mesh)
+    return tuple(result)
+
+
+def _on_boundary(x: Floats, mesh: Mesh) -> bool:
+    gap, size = nearest_boundary(mesh, x)
+    return gap <= _SAME * size
+
+
+def _junction(c: int, end: int, cracks: tuple[Crack, ...], mesh: Mesh) -> Junction:
+    x, h = cracks[c].points[end], _size(mesh, cracks[c].points[end])
+    on = _other(c, x, cracks, h)
+    before = cracks[c].points[1 if end == 0 else end - 1]
+    length = float(np.linalg.norm(x - before))
+    ahead = (x - before) / length
+    line = cracks[on].points
+    sine = _sine(ahead, _arms(x, line, h))
+    if sine < _SINE:
+        raise GeometryError(
+            f"crack {c} ends on crack {on} at {at(x)} at an angle of "
+            f"{np.degrees(np.arcsin(sine)):.3g} degrees, or runs on along it: below 10 degrees "
+            "they are not told apart. Of three arms give the two that are nearly in line as one "
+            "crack, and let the third end on it."
+        )
+    side = _side(x - min(0.1 * h * sine, 0.5 * length) * ahead, line)
+    way = _BEYOND * h / sine
+    again = crossing_points(np.stack([x + 1e-3 * h * ahead, x + 2 * way * ahead]), line)
+    free = float(np.linalg.norm(again - x, axis=1).min(initial=np.inf)) / 2
+    if free < _LEAST * h:
+        raise CoarseMeshError(
+            f"crack {on}, on which crack {c} ends at {at(x)}, turns back to it within "
+            f"{2 * free:.4g}, two cells ({h:.4g}) or less: refine the mesh there."
+        )
+    reach = max(REACH, 2 / sine + 2) * h
+    return Junction(c, end, on, x, side, x + min(way, free) * ahead, reach)
+
+
+def _other(c: int, x: Floats, cracks: tuple[Crack, ...], h: float) -> int:
+    """The crack on which x lies between its ends."""
+    at_end = -1
+    for other, crack in enumerate(cracks):
+        if other == c:
+            continue
+        foot = closest_on_segment(x, crack.points[:-1], crack.points[1:])
+        if np.linalg.norm(foot - x, axis=1).min() > _SAME * h:
+            continue
+        if np.linalg.norm(crack.points[[0, -1]] - x, axis=1).min() > _SAME * h:
+            return other
+        at_end = other
+    if at_end >= 0:
+        raise GeometryError(
+            f"crack {c} ends at {at(x)} on the end of crack {at_end}: give both as one crack; of "
+            "three arms give two as one crack, and let the third end between its ends."
+        )
+    raise GeometryError(
+        f"crack {c} ends at {at(x)} inside the body, but this end is neither a tip nor on another "
+        "crack: end it on one, or make it with line_crack, which leaves that to the mesh."
+    )
+
+
+def _arms(x: Floats, line: Floats, h: float) -> Floats:
+    """Directions of the pieces of a polyline at one of its points."""
+    foot = closest_on_segment(x, line[:-1], line[1:])
+    pieces = np.linalg.norm(foot - x, axis=1) <= _SAME * h
+    along = np.diff(line, axis=0)[pieces]
+    return np.asarray(along / np.linalg.norm(along, axis=1, keepdims=True))
+
+
+def _sine(ahead: Floats, arms: Floats) -> float:
+    return float(np.abs(ahead[0] * arms[:, 1] - ahead[1] * arms[:, 0]).min())
+
+
+def _side(x: Floats, line: Floats) -> int:
+    """Side of a polyline on which a point next to it lies."""
+    from xcrack.mesh.kernels.distance import polyline_distance
+
+    return 1 if polyline_distance(x[None], line)[0][0] > 0 else -1
+
+
+def _check_apart(result: list[Junction], cracks: tuple[Crack, ...], mesh: Mesh) -> None:
+    """Raise where a junction is closer than a cell to a tip, an end or a junction beside it."""
+    for i, own in enumerate(result):
+        least = _APART * _size(mesh, own.x)
+        for c, crack in enumerate(cracks):
+            for tip in crack.tips or ():
+                apart = float(np.linalg.norm(crack.points[tip] - own.x))
+                if apart < least:
+                    raise CoarseMeshError(
+                        f"crack {own.crack} ends on crack {own.on} at {at(own.x)}, {apart:.4g} "
+                        f"from a tip of crack {c} at {at(crack.points[tip])} and closer than a "
+                        f"cell ({least:.4g}): move it away from the tip, refine the mesh there, "
+                        "or let both cracks be one that runs through."
+                    )
+        for other in result[:i]:
+            apart = float(np.linalg.norm(other.x - own.x))
+            opposite = other.on == own.on and other.side != own.side
+            if apart < least and not opposite:
+                raise GeometryError(
+                    f"cracks {other.crack} and {own.crack} end {apart:.4g} from each other at "
+                    f"{at(own.x)}, closer than a cell ({least:.4g}) and from the same side: let "
+                    "them end on each other's continuation, a cell or more apart, or on opposite "
+                    "sides of one crack."
+                )
+
+
+def reaching(cracks: tuple[Crack, ...], ends: tuple[Junction, ...]) -> tuple[Crack, ...]:
+    """Cracks prolonged beyond those on which they end: what level sets are made of."""
+    result = list(cracks)
+    for own in ends:
+        crack = result[own.crack]
+        points, tips = crack.points, crack.tips or ()
+        if own.end == 0:
+            points, tips = np.concatenate([own.beyond[None], points]), tuple(t + 1 for t in tips)
+        else:
+            points = np.concatenate([points, own.beyond[None]])
+        result[own.crack] = polyline_crack(points, tips)
+    return tuple(result)

@@ -1,0 +1,420 @@
+"""Points around a curved crack front: feet on it, and the interaction integrand there."""
+
+import math
+
+import numpy as np
+
+from xcrack.base.kernels.jit import kernel
+
+
+@kernel
+def _curve_at(s, breaks, place, value, slope, bend):  # type: ignore[no-untyped-def]
+    """Value and two derivatives of a cubic spline; coefficients as of scipy, highest first."""
+    low, high = 0, len(breaks) - 2
+    while low < high:
+        middle = (low + high + 1) // 2
+        if breaks[middle] <= s:
+            low = middle
+        else:
+            high = middle - 1
+    t = s - breaks[low]
+    for i in range(3):
+        c3, c2 = place[0, low, i], place[1, low, i]
+        c1, c0 = place[2, low, i], place[3, low, i]
+        value[i] = ((c3 * t + c2) * t + c1) * t + c0
+        slope[i] = (3 * c3 * t + 2 * c2) * t + c1
+        bend[i] = 6 * c3 * t + 2 * c2
+
+
+@kernel
+def frames_at(s, breaks, place, normal):  # type: ignore[no-untyped-def]
+    """Points of a front and how its frame turns there.
+
+    Parameters
+    ----------
+    s, breaks : (q,) array, (m + 1,) array
+        Parameters within the breaks.
+    place, normal : (4, m, 3) arrays
+        Spline coefficients of the points and of the normals.
+
+    Returns
+    -------
+    x : (q, 3) array
+    frame : (q, 3, 3) array
+        Rows (t, n, b).
+    turn : (q, 4) array
+        Curvatures b'.t and b'.n, twist t'.n (by arc length), and the speed ds/dparameter.
+    """
+    count = len(s)
+    x = np.empty((count, 3))
+    frame = np.empty((count, 3, 3))
+    turn = np.empty((count, 4))
+    dx, ddx = np.empty(3), np.empty(3)
+    N, dN, ddN = np.empty(3), np.empty(3), np.empty(3)
+    for q in range(count):
+        _curve_at(s[q], breaks, place, x[q], dx, ddx)
+        _curve_at(s[q], breaks, normal, N, dN, ddN)
+        _frame(dx, ddx, N, dN, frame[q], turn[q])
+    return x, frame, turn
+
+
+@kernel
+def _frame(dx, ddx, N, dN, frame, turn):  # type: ignore[no-untyped-def]
+    speed = math.sqrt(dx[0] * dx[0] + dx[1] * dx[1] + dx[2] * dx[2])
+    along = 0.0
+    for i in range(3):
+        frame[2, i] = dx[i] / speed
+        along += N[i] * frame[2, i]
+    size = 0.0
+    for i in range(3):
+        frame[1, i] = N[i] - along * frame[2, i]
+        size += frame[1, i] ** 2
+    size = math.sqrt(size)
+    for i in range(3):
+        frame[1, i] /= size
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        frame[0, i] = frame[1, j] * frame[2, k] - frame[1, k] * frame[2, j]
+    kt, kn, moved = 0.0, 0.0, 0.0
+    for i in range(3):
+        kt += ddx[i] * frame[0, i]
+        kn += ddx[i] * frame[1, i]
+        moved += dN[i] * frame[0, i]
+    turn[0] = kt / speed**2
+    turn[1] = kn / speed**2
+    turn[2] = -(moved / speed - along * turn[0]) / size
+    turn[3] = speed
+
+
+@kernel
+def feet(x, start, reach, breaks, place, normal, closed):  # type: ignore[no-untyped-def]
+    """Project points onto a front: (x - X(s)) . X'(s) = 0 by Newton's method.
+
+    Parameters
+    ----------
+    x : (q, 3) array
+    start : (q,) array
+        First guesses of the parameter.
+    reach : float
+        Longest step of an iteration, in the parameter.
+    breaks : (m + 1,) array
+    place, normal : (4, m, 3) arrays
+        Spline coefficients of the points and of the normals.
+    closed : bool
+
+    Returns
+    -------
+    s : (q,) array
+        Parameter of the foot.
+    local : (q, 2) array
+        Coordinates along t and n.
+    frame : (q, 3, 3) array
+    turn : (q, 4) array
+        As of `frames_at`.
+    beyond : (q,) array of bool
+        Past the end of an open front.
+    """
+    count = len(x)
+    s, local = np.empty(count), np.empty((count, 2))
+    frame, turn = np.empty((count, 3, 3)), np.empty((count, 4))
+    beyond = np.zeros(count, np.bool_)
+    X, dX, ddX = np.empty(3), np.empty(3), np.empty(3)
+    N, dN, ddN = np.empty(3), np.empty(3), np.empty(3)
+    first, last = breaks[0], breaks[-1]
+    period = last - first
+    for q in range(count):
+        u = start[q]
+        for _ in range(30):
+            _curve_at(u, breaks, place, X, dX, ddX)
+            f, df, square = 0.0, 0.0, 0.0
+            for i in range(3):
+                gap = x[q, i] - X[i]
+                f += gap * dX[i]
+                square += dX[i] * dX[i]
+                df += gap * ddX[i]
+            df = square - df
+            step = f / (df if df > 0.1 * square else square)
+            step = min(max(step, -reach), reach)
+            old = u
+            u += step
+            if closed:
+                if u < first:
+                    u += period
+                elif u > last:
+                    u -= period
+            else:
+                u = min(max(u, first), last)
+            if abs(step) <= 1e-14 * period or u == old:
+                break
+        _curve_at(u, breaks, place, X, dX, ddX)
+        _curve_at(u, breaks, normal, N, dN, ddN)
+        _frame(dX, ddX, N, dN, frame[q], turn[q])
+        s[q] = u
+        x1, x2, off = 0.0, 0.0, 0.0
+        for i in range(3):
+            gap = x[q, i] - X[i]
+            x1 += gap * frame[q, 0, i]
+            x2 += gap * frame[q, 1, i]
+            off += gap * frame[q, 2, i]
+        local[q, 0], local[q, 1] = x1, x2
+        beyond[q] = not closed and (u == first or u == last) and abs(off) > 1e-9 * period
+    return s, local, frame, turn, beyond
+
+
+@kernel
+def _unit_field(mode, r, ch, sh, kolosov, scale, U, turned, G, slope, spin, bend):  # type: ignore[no-untyped-def]
+    """Field of Williams of one mode, and more, from the cosine and sine of half the angle.
+
+    U (t, n, b), its gradient G along t, n; d/dtheta: turned, spin; d/dx1: slope (of turned), bend.
+    """
+    c, s = ch * ch - sh * sh, 2.0 * sh * ch
+    c3, s3 = ch * c - sh * s, sh * c + ch * s
+    root = math.sqrt(r)
+    for i in range(3):
+        a = b = e = d = 0.0  # of cos, sin of theta / 2, then of 3 theta / 2
+        if mode == 0 and i == 0:
+            a, e = kolosov - 0.5, -0.5
+        elif mode == 0 and i == 1:
+            b, d = kolosov + 0.5, -0.5
+        elif mode == 1 and i == 0:
+            b, d = kolosov + 1.5, 0.5
+        elif mode == 1 and i == 1:
+            a, e = 1.5 - kolosov, -0.5
+        elif mode == 2 and i == 2:
+            b = 4.0
+        g = scale * (a * ch + b * sh + e * c3 + d * s3)
+        g1 = scale * (0.5 * (b * ch - a * sh) + 1.5 * (d * c3 - e * s3))
+        g2 = -scale * (0.25 * (a * ch + b * sh) + 2.25 * (e * c3 + d * s3))
+        U[i] = root * g
+        turned[i] = root * g1
+        p0, p1 = 0.5 * g * c - g1 * s, 0.5 * g * s + g1 * c
+        d0 = -0.5 * (g1 * c + g * s) - g2 * s
+        d1 = 0.5 * (g * c - g1 * s) + g2 * c
+        G[i, 0], G[i, 1] = p0 / root, p1 / root
+        slope[i] = (0.5 * g1 * c - g2 * s) / root
+        spin[i, 0], spin[i, 1] = d0 / root, d1 / root
+        bend[i, 0] = -(0.5 * p0 * c + d0 * s) / (root * r)
+        bend[i, 1] = -(0.5 * p1 * c + d1 * s) / (root * r)
+
+
+@kernel
+def _unit_stress(G, lam, mu, S):  # type: ignore[no-untyped-def]
+    """Stress of a gradient that has no part along b."""
+    trace = G[0, 0] + G[1, 1]
+    S[0, 0] = lam * trace + 2 * mu * G[0, 0]
+    S[1, 1] = lam * trace + 2 * mu * G[1, 1]
+    S[2, 2] = lam * trace
+    S[0, 1] = S[1, 0] = mu * (G[0, 1] + G[1, 0])
+    S[0, 2] = S[2, 0] = mu * G[2, 0]
+    S[1, 2] = S[2, 1] = mu * G[2, 1]
+
+
+@kernel
+def _weight(r, radius, ring):  # type: ignore[no-untyped-def]
+    """One inside, zero outside, a quintic in the ring between; and its slope."""
+    width = (1.0 - ring) * radius
+    z = min(max((r - ring * radius) / width, 0.0), 1.0)
+    return 1.0 - z**3 * (10.0 - 15.0 * z + 6.0 * z * z), -30.0 * (z * (1.0 - z)) ** 2 / width
+
+
+@kernel
+def _into_frame(frame, tensor, result):  # type: ignore[no-untyped-def]
+    """Components of a tensor along the rows of a frame."""
+    for a in range(3):
+        x, y, z = frame[a, 0], frame[a, 1], frame[a, 2]
+        first = x * tensor[0, 0] + y * tensor[1, 0] + z * tensor[2, 0]
+        second = x * tensor[0, 1] + y * tensor[1, 1] + z * tensor[2, 1]
+        third = x * tensor[0, 2] + y * tensor[1, 2] + z * tensor[2, 2]
+        for b in range(3):
+            result[a, b] = first * frame[b, 0] + second * frame[b, 1] + third * frame[b, 2]
+
+
+@kernel
+def front_terms(  # type: ignore[no-untyped-def]
+    weight, gradient, force, initial, change, polar, frame, turn, hat, share, step, radii, ring,
+    lam, mu, curved, result, measure,
+):  # fmt: skip
+    """Add the domain integrals of points to those of the hats.
+
+    Parameters
+    ----------
+    weight : (q,) array
+        Volume of each point.
+    gradient : (q, 3, 3, n) array
+        Displacement gradients of n states; rows are components.
+    force : (q or 0, 3, n) array
+        Body force, if any.
+    initial, change : (q or 0, 3, 3, n) arrays
+        Initial stress, if any, and how it differs from that at the foot.
+    polar, frame, turn : (q, 2), (q, 3, 3) and (q, 4) arrays
+        Radius and angle; frame and its curvatures at the foot.
+    hat : (q, 2) array of int
+        The two hats that overlap there; -1: none.
+    share : (q,) array
+        Value of the second hat; the first has the rest.
+    step : (q,) array
+        Derivative of the second hat by the parameter.
+    radii : (k,) array
+    ring, lam, mu : float
+        Share of a radius at which the weight starts to fall; Lamé constants.
+    curved : bool
+        Count the curvatures and the twist; without, for comparison, they are taken as zero.
+    result : (n, k, 3, hats) array
+        Added to.
+    measure : (k, hats) array
+        Added to: integrals of the weight.
+    """
+    states = gradient.shape[3]
+    kolosov = (lam + 3 * mu) / (lam + mu)
+    scale = 1.0 / (2.0 * mu * math.sqrt(2.0 * math.pi))
+    U, turned, slope = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
+    G, spin, bend = np.empty((3, 3, 2)), np.empty((3, 3, 2)), np.empty((3, 3, 2))
+    S, dS = np.empty((3, 3, 3)), np.empty((3, 3))
+    X, X1, D = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
+    g, sigma = np.empty((3, 3)), np.empty((3, 3))
+    S0, more = np.zeros((3, 3)), np.zeros((3, 3))
+    Q, dQ = np.empty(len(radii)), np.empty(len(radii))
+    for q in range(len(weight)):
+        r, theta = polar[q, 0], polar[q, 1]
+        if hat[q, 0] < 0 or r >= radii.max() or r <= 0.0:
+            continue
+        ch, sh = math.cos(0.5 * theta), math.sin(0.5 * theta)
+        c, s = ch * ch - sh * sh, 2.0 * sh * ch
+        kt, kn, w = turn[q, 0], turn[q, 1], turn[q, 2]
+        if not curved:
+            kt = kn = w = 0.0
+        hs = 1.0 - r * (kt * c + kn * s)
+        for k in range(len(radii)):
+            Q[k], dQ[k] = _weight(r, radii[k], ring)
+            measure[k, hat[q, 0]] += weight[q] * Q[k] * (1.0 - share[q])
+            measure[k, hat[q, 1]] += weight[q] * Q[k] * share[q]
+        for m in range(3):
+            _unit_field(
+                m, r, ch, sh, kolosov, scale, U[m], turned[m], G[m], slope[m], spin[m], bend[m]
+            )
+            _unit_stress(G[m], lam, mu, S[m])
+            _unit_stress(spin[m], lam, mu, dS)
+            X[m, 0] = (kt * U[m, 2] - w * (U[m, 1] + turned[m, 0])) / hs
+            X[m, 1] = (kn * U[m, 2] + w * (U[m, 0] - turned[m, 1])) / hs
+            X[m, 2] = -(kt * U[m, 0] + kn * U[m, 1] + w * turned[m, 2]) / hs
+            X1[m, 0] = (kt * G[m, 2, 0] - w * (G[m, 1, 0] + slope[m, 0])) / hs
+            X1[m, 1] = (kn * G[m, 2, 0] + w * (G[m, 0, 0] - slope[m, 1])) / hs
+            X1[m, 2] = -(kt * G[m, 0, 0] + kn * G[m, 1, 0] + w * slope[m, 2]) / hs
+            for i in range(3):
+                X1[m, i] += X[m, i] * kt / hs
+                D[m, i] = -w * dS[i, 2] - kt * S[m, i, 0] - kn * S[m, i, 1]
+            D[m, 0] += kt * S[m, 2, 2] - w * S[m, 1, 2]
+            D[m, 1] += kn * S[m, 2, 2] + w * S[m, 0, 2]
+            D[m, 2] -= kt * S[m, 0, 2] + kn * S[m, 1, 2]
+            for i in range(3):
+                D[m, i] /= hs
+        for n in range(states):
+            _into_frame(frame[q], gradient[q, :, :, n], g)
+            trace = lam * (g[0, 0] + g[1, 1] + g[2, 2])
+            for a in range(3):
+                for b in range(3):
+                    sigma[a, b] = mu * (g[a, b] + g[b, a])
+                sigma[a, a] += trace
+            if len(initial) > 0:
+                _into_frame(frame[q], initial[q, :, :, n], S0)
+                _into_frame(frame[q], change[q, :, :, n], more)
+                sigma += S0
+            for m in range(3):
+                W, p0, p1, p2, p12, p22, volume = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+                for i in range(3):
+                    G0, G1, X2 = G[m, i, 0], G[m, i, 1], X[m, i]
+                    W += (sigma[i, 0] - more[i, 0]) * G0 + (sigma[i, 1] - more[i, 1]) * G1
+                    p0 += sigma[i, 0] * G0 + S[m, i, 0] * g[i, 0]
+                    p1 += sigma[i, 1] * G0 + S[m, i, 1] * g[i, 0]
+                    p2 += sigma[i, 2] * G0 + S[m, i, 2] * g[i, 0]
+                    p12 += sigma[i, 2] * G1 + S[m, i, 2] * g[i, 1]
+                    p22 += sigma[i, 2] * X2 + S[m, i, 2] * g[i, 2]
+                    volume += sigma[i, 2] * X1[m, i] + D[m, i] * g[i, 0]
+                    volume += more[i, 0] * bend[m, i, 0] + more[i, 1] * bend[m, i, 1]
+                p0 -= W
+                p22 -= W
+                volume += (w * p12 - kt * p22) / hs
+                if len(force) > 0:
+                    for a in range(3):
+                        f = 0.0
+                        for i in range(3):
+                            f += frame[q, a, i] * force[q, i, n]
+                        volume -= f * G[m, a, 0]
+                radial = p0 * c + p1 * s
+                along = p2 / hs * step[q] / turn[q, 3]
+                for k in range(len(radii)):
+                    every = weight[q] * (Q[k] * volume + dQ[k] * radial)
+                    change_k = weight[q] * Q[k] * along
+                    result[n, k, m, hat[q, 0]] += every * (1.0 - share[q]) - change_k
+                    result[n, k, m, hat[q, 1]] += every * share[q] + change_k
+
+
+@kernel
+def lip_terms(  # type: ignore[no-untyped-def]
+    weight, outward, traction, gradient, initial, polar, frame, hat, share, radii, ring, lam, mu,
+    result,
+):  # fmt: skip
+    """Subtract the integrals of P_kj m_j V_k over a lip from those of the hats.
+
+    Parameters
+    ----------
+    weight : (q,) array
+        Area of each point.
+    outward : (q, 3) array
+        Normal m that points out of the body.
+    traction : (q, 3, n) array
+        True traction on this lip, of n states.
+    gradient : (q or 0, 3, 3, n) array
+        Displacement gradients; without them the faces count as free of auxiliary traction.
+    initial : (q or 0, 3, 3, n) array
+        Initial stress at the foot, if any.
+    polar, frame, hat, share, radii, ring, lam, mu
+        As of `front_terms`.
+    result : (n, k, 3, hats) array
+        Added to.
+    """
+    states = traction.shape[2]
+    kolosov = (lam + 3 * mu) / (lam + mu)
+    scale = 1.0 / (2.0 * mu * math.sqrt(2.0 * math.pi))
+    U, turned, slope = np.empty(3), np.empty(3), np.empty(3)
+    G, spin, bend, S = np.empty((3, 2)), np.empty((3, 2)), np.empty((3, 2)), np.empty((3, 3))
+    g, sigma, m_out, t = np.empty((3, 3)), np.empty((3, 3)), np.empty(3), np.empty(3)
+    for q in range(len(weight)):
+        r = polar[q, 0]
+        if hat[q, 0] < 0 or r >= radii.max() or r <= 0.0:
+            continue
+        for a in range(3):
+            m_out[a] = 0.0
+            for i in range(3):
+                m_out[a] += frame[q, a, i] * outward[q, i]
+        ch, sh = math.cos(0.5 * polar[q, 1]), math.sin(0.5 * polar[q, 1])
+        for mode in range(3):
+            _unit_field(mode, r, ch, sh, kolosov, scale, U, turned, G, slope, spin, bend)
+            _unit_stress(G, lam, mu, S)
+            for n in range(states):
+                density = 0.0
+                for a in range(3):
+                    t[a] = 0.0
+                    for i in range(3):
+                        t[a] += frame[q, a, i] * traction[q, i, n]
+                    density += t[a] * G[a, 0]
+                if len(gradient) > 0:
+                    _into_frame(frame[q], gradient[q, :, :, n], g)
+                    for a in range(3):
+                        for b in range(3):
+                            sigma[a, b] = 0.0
+                    if len(initial) > 0:
+                        _into_frame(frame[q], initial[q, :, :, n], sigma)
+                    trace = lam * (g[0, 0] + g[1, 1] + g[2, 2])
+                    W = 0.0
+                    for a in range(3):
+                        for b in range(3):
+                            sigma[a, b] += mu * (g[a, b] + g[b, a])
+                            density += S[a, b] * m_out[b] * g[a, 0]
+                        sigma[a, a] += trace
+                        W += sigma[a, 0] * G[a, 0] + sigma[a, 1] * G[a, 1]
+                    density -= W * m_out[0]
+                for k in range(len(radii)):
+                    Q, _ = _weight(r, radii[k], ring)
+                    result[n, k, mode, hat[q, 0]] -= weight[q] * density * Q * (1.0 - share[q])
+                    result[n, k, mode, hat[q, 1]] -= weight[q] * density * Q * share[q]

@@ -1,1 +1,0 @@
-"""Level sets of a crack, and the mesh cut by them."""

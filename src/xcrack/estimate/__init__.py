@@ -1,0 +1,1 @@
+"""Error of a linear goal of a solution."""

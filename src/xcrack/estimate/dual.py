@@ -1,0 +1,286 @@
+"""Dual solutions: influence functions of functionals, with closed crack faces kept closed.
+
+In a state A u - N' p = f, N u = 0 on the closed groups; the functional is f_J . u + g_J . p. Then
+A z + N' mu = f_J, N z = -g_J: of z0 = A^-1 f_J follow mu = F^-1 (N z0 + g_J) with F = N A^-1 N',
+which the contact has made already, and z = z0 - A^-1 N' mu. One factor serves all of it.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import scipy.sparse as sp
+
+from xcrack.analysis.multipliers import gap_rows
+from xcrack.analysis.solution import Factored, Solution
+from xcrack.base.arrays import Bools, Floats, Ints
+from xcrack.fem.assembly import Tabulated
+from xcrack.fem.facets import LipPoints, arc_position
+from xcrack.fem.function_space import FunctionSpace
+from xcrack.linalg.active_set import of_set
+from xcrack.linalg.rigid_motion import without_motion
+
+# Functionals that are affine in a solution: a sum over points, and pressures on crack faces.
+
+
+@dataclass(frozen=True, eq=False)
+class GoalPoints:
+    """Points at which displacement gradients enter m functionals.
+
+    Attributes
+    ----------
+    at : Tabulated
+    factor : (q, 2, 2, m) array
+        By component and derivative; weights included.
+    """
+
+    at: Tabulated
+    factor: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class GoalCells:
+    """Plain cells over which m functionals are integrated with each function of order 2.
+
+    Attributes
+    ----------
+    cells : (k,) array of int
+    on_nodes : (k, 6, 2, m) array
+        By shape function and component.
+    on_surplus : (k, 4, 2, m) array
+        By surplus function, the edges' in their local directions.
+    turn : (m,) array
+        Of a rigid rotation by minus one.
+    """
+
+    cells: Ints
+    on_nodes: Floats
+    on_surplus: Floats
+    turn: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Goal:
+    """m functionals J = f . u + g . p + a constant of the loads.
+
+    Attributes
+    ----------
+    parts : tuple of GoalPoints
+    cells : tuple of GoalCells
+    rotation : (n_points, 2) array
+        Mean rotation as a sum over the displacements of mesh points, which it is free of.
+    crack : int
+    m : int
+        Number of functionals.
+    on_faces : callable
+        Makes `pressure`, which few estimates need.
+    """
+
+    parts: tuple[GoalPoints, ...]
+    cells: tuple[GoalCells, ...]
+    rotation: Floats
+    crack: int
+    m: int
+    on_faces: Callable[[], Floats]
+
+    @cached_property
+    def pressure(self) -> Floats:
+        """Factors of pressures on the faces of that crack, at their integration points `(q, m)`."""
+        return self.on_faces()
+
+    def on_functions(self, space: FunctionSpace) -> Floats:
+        """The part f: each functional of each function and component `(n_dof, m)`."""
+        from xcrack.estimate.kernels.goal import add_cells, add_to_functions
+
+        total = np.zeros((space.n_functions, space.dim, self.m))
+        turn = np.zeros(self.m)
+        for part in self.parts:
+            turn += (part.factor[:, 0, 1] - part.factor[:, 1, 0]).sum(axis=0)
+            for batch, number, row, slope in part.at.batches:
+                add_to_functions(total, batch.functions, row, number, slope, part.factor)
+        for plain in self.cells:
+            turn += plain.turn
+            nodes = space.cell_nodes[plain.cells]
+            add_cells(total, nodes, np.ones(nodes.shape), plain.on_nodes)
+        total[: len(self.rotation)] += self.rotation[:, :, None] * turn
+        return total.reshape(-1, self.m)
+
+    def on_pressures(self, values: Floats) -> Floats:
+        """The part g: each functional of each pressure function `(g, m)`, from its values."""
+        return np.asarray(values.T @ self.pressure)
+
+    def of(self, solution: Solution, pressure: Floats) -> Floats:
+        """Value f . u + g . p, with pressures at the points of the faces `(m,)`."""
+        f = self.on_functions(solution.space)
+        return np.asarray(solution.u @ f + pressure @ self.pressure)
+
+
+@dataclass(frozen=True, eq=False)
+class Groups:
+    """Contact groups of all cracks, one after the other.
+
+    Attributes
+    ----------
+    N : sparse matrix (g, n_dof)
+        Rows of the weak gaps.
+    dual : (g, g) array
+        F = N A^-1 N'.
+    active : (states, g) array of bool
+        The closed ones.
+    pressure : (g, states) array, stress
+    crack : (g,) array of int
+    position : (g,) array, length
+        Of each along its crack.
+    piece : (g,) array of int
+        Of the crack, between kinks.
+    """
+
+    N: sp.csr_matrix
+    dual: Floats
+    active: Bools
+    pressure: Floats
+    crack: Ints
+    position: Floats
+    piece: Ints
+
+
+def groups_of(factored: Factored) -> Groups | None:
+    """Contact groups of a solve; None where no crack has multipliers."""
+    model, contact = factored.model, factored.contact
+    parts = []
+    for m, pressure, active in zip(contact.spaces, contact.pressure, contact.active, strict=True):
+        if m is not None and pressure is not None and active is not None:
+            lips = model.lips[m.crack]
+            position = (m.values.T @ (lips.weight * lips.s)) / m.measure
+            number = np.full(len(m.measure), m.crack)
+            rows = gap_rows(m, lips, model.jumps[m.crack])
+            piece = np.searchsorted(_kinks(model.space, m.crack, lips), position)
+            parts.append((rows, active, pressure, number, position, piece))
+    if not parts or contact.dual is None:
+        return None
+    every, closed, pressures, crack, position, piece = zip(*parts, strict=True)
+    return Groups(
+        sp.csr_matrix(sp.vstack(every)),
+        contact.dual,
+        np.concatenate(closed, axis=1),
+        np.concatenate(pressures),
+        np.concatenate(crack),
+        np.concatenate(position),
+        np.concatenate(piece),
+    )
+
+
+def _kinks(space: FunctionSpace, c: int, lips: LipPoints) -> Floats:
+    """Positions of the kinks of a cut, as those of the points on its faces."""
+    line, kinks = space.cracks[c].points, space.cuts[c].kinks.points
+    if not len(kinks):
+        return np.zeros(0)
+    begin = arc_position(line, lips.x[:1])[0] - lips.s[0]
+    return np.asarray(np.sort(arc_position(line, kinks) - begin))
+
+
+@dataclass(frozen=True, eq=False)
+class Duals:
+    """Dual solutions of all functionals in all states.
+
+    Attributes
+    ----------
+    z : (sets, n_dof, m) array
+    which : (states,) array of int
+        States with the same closed groups share a set.
+    mu : (sets, g, m) array
+        Dual pressures of the groups.
+    per_pressure : (g, m) array
+        Change of each functional with the pressures, the displacements following: N z0 + g_J.
+    """
+
+    z: Floats
+    which: Ints
+    mu: Floats
+    per_pressure: Floats
+
+
+def duals(factored: Factored, groups: Groups | None, goals: Sequence[Goal]) -> Duals:
+    """Dual solutions of the functionals of goals, one after the other in m.
+
+    Parameters
+    ----------
+    factored : Factored
+    groups : Groups or None
+    goals : sequence of Goal
+    """
+    model, motion = factored.model, factored.motion
+    f = np.concatenate([goal.on_functions(model.space) for goal in goals], axis=1)
+    # Loads of a functional that no rigid motion changes: what is left of them is round-off.
+    z0 = factored.engine.solve(f - motion.modes @ (motion.modes.T @ f))
+    if groups is None:
+        z = without_motion(motion, z0)[None]
+        states = factored.contact.u.shape[1]
+        nothing = np.zeros((0, f.shape[1]))
+        return Duals(z, np.zeros(states, dtype=np.int64), nothing[None], nothing)
+    per_pressure = groups.N @ z0 + _on_groups(factored, groups, goals)
+    sets, which = np.unique(groups.active, axis=0, return_inverse=True)
+    every, mus = [], []
+    for active in sets:
+        z, mu = z0, np.zeros_like(per_pressure)
+        if active.any():
+            columns = [of_set(groups.dual, -d, active)[0] for d in per_pressure.T]
+            mu = np.stack(columns, axis=1)
+            z = z0 - factored.engine.solve(groups.N.T @ mu)
+        every.append(without_motion(motion, z))
+        mus.append(mu)
+    return Duals(np.stack(every), which.ravel(), np.stack(mus), per_pressure)
+
+
+def _on_groups(factored: Factored, groups: Groups, goals: Sequence[Goal]) -> Floats:
+    """g_J of the goals `(g, m)`."""
+    columns = []
+    for goal in goals:
+        part = np.zeros((len(groups.crack), goal.m))
+        space = factored.contact.spaces[goal.crack]
+        if space is not None:
+            part[groups.crack == goal.crack] = goal.on_pressures(space.values)
+        columns.append(part)
+    return np.concatenate(columns, axis=1)
+
+
+# The end of contact: what functionals would be with the contact a group longer or shorter.
+
+
+def end_changes(groups: Groups, duals: Duals, gap: Floats, k: int) -> Floats:
+    """|dJ with a group more closed + dJ with one less|, summed over the ends of contact `(m,)`.
+
+    The first-order terms of the two are opposite where the end is right: what is left is of second
+    order, as the error is. Contact that ends at a kink ends where it should.
+
+    Parameters
+    ----------
+    groups : Groups
+    duals : Duals
+    gap : (g,) array
+        Weak gaps of the state.
+    k : int
+        State.
+    """
+    active, pressure = groups.active[k], groups.pressure[:, k]
+    total = np.zeros(duals.per_pressure.shape[1])
+    if not active.any():
+        return total
+    opened = gap - groups.dual @ pressure
+    order = np.lexsort((groups.position, groups.crack))
+    along, crack, piece = active[order], groups.crack[order], groups.piece[order]
+    same = (crack[1:] == crack[:-1]) & (piece[1:] == piece[:-1])
+    ends = np.nonzero((along[1:] != along[:-1]) & same)[0]
+    for end in ends:
+        change = np.zeros(len(total))
+        for group in (order[end], order[end + 1]):
+            other = active.copy()
+            other[group] = ~other[group]
+            moved = of_set(groups.dual, opened, other)[0] - pressure
+            change += duals.per_pressure.T @ moved
+        total += np.abs(change)
+    return total
+
+
+__all__ = []

@@ -1,0 +1,124 @@
+"""Dual-weighted residuals in the surplus space: signed estimates, and their shares by cell.
+
+eta = r_z . e_u with the residuals of the solution and of the dual one in the surplus space and
+e_u = (blocks of its stiffness)^-1 r_u (after Becker and Rannacher, 2001, Acta Numerica 10, 1).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from xcrack.analysis.contact_result import Contact
+from xcrack.analysis.solution import Factored, Solution
+from xcrack.base.arrays import Floats
+from xcrack.estimate.dual import Goal, duals, end_changes, groups_of
+from xcrack.estimate.surplus import (
+    Surplus,
+    face_residual,
+    goal_residual,
+    imposed,
+    load_residual,
+    residuals,
+    shares,
+    solved,
+    surplus,
+)
+from xcrack.model.conditions import CrackPressure, evaluate_scalar
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """Estimated errors of m functionals in some states.
+
+    Attributes
+    ----------
+    eta : (states, m) array
+        Exact value less computed one.
+    shares : (states, m, cells) array
+        Absolute contributions of the cells to eta: they add up to more than it.
+    surplus : Surplus
+    parts : (states, n, m) array
+        Contributions of the surplus functions to eta.
+    end : (states, m) array
+        Change of the functionals where the contact is a group longer and shorter; see
+        `end_changes`.
+    z : (states, n_dof, m) array
+        Dual solutions.
+    mu : tuple of (states, q, m) arrays
+        Dual pressures on the faces of each crack, at their points.
+    """
+
+    eta: Floats
+    shares: Floats
+    surplus: Surplus
+    parts: Floats
+    end: Floats
+    z: Floats
+    mu: tuple[Floats, ...]
+
+
+def estimate(factored: Factored, solutions: Sequence[Solution], goals: Sequence[Goal]) -> Estimate:
+    """Estimated errors of the functionals of goals, one after the other in m.
+
+    Parameters
+    ----------
+    factored : Factored
+        Of the solve that gave the solutions.
+    solutions : sequence of Solution
+        Some of its states; order 2 in 2D.
+    goals : sequence of Goal
+    """
+    space, material = factored.model.space, solutions[0].problem.material
+    groups = groups_of(factored)
+    dual = duals(factored, groups, goals)
+    w = surplus(space, factored.model.known.fixed)
+    m = dual.z.shape[2]
+    sets = np.unique(dual.which[[s.number for s in solutions]])
+    columns = [np.stack([s.u for s in solutions], axis=1), *dual.z[sets]]
+    stacked = np.concatenate(columns, axis=1).reshape(space.n_functions, 2, -1)
+    stacked = np.concatenate([stacked, np.zeros((1, *stacked.shape[1:]))])
+    residual, blocks = residuals(w, material, stacked)
+    r_u, r_z = residual[:, :, : len(solutions)], residual[:, :, len(solutions) :]
+    for k, solution in enumerate(solutions):
+        r_u[:, :, k] += load_residual(w, solution)
+    for c, lips in enumerate(factored.model.lips):
+        pressure = np.stack([pressure_on(s, c) for s in solutions], axis=1)
+        if pressure.any():
+            r_u += face_residual(w, lips, pressure)
+    e_u = solved(w, blocks, r_u)
+    given = [imposed(w, s) for s in solutions]
+    goal = np.concatenate([goal_residual(w, g) for g in goals], axis=2)
+    mus = tuple(np.zeros((len(solutions), len(lips), m)) for lips in factored.model.lips)
+    eta, end = np.zeros((2, len(solutions), m))
+    by_cell = np.zeros((len(solutions), m, len(space.mesh.cells)))
+    parts = np.zeros((len(solutions), len(w.fixed), m))
+    for k, solution in enumerate(solutions):
+        which = int(dual.which[solution.number])
+        place = int(np.searchsorted(sets, which)) * m
+        r = r_z[:, :, place : place + m] + goal
+        for c, lips in enumerate(factored.model.lips):
+            contact = factored.contact.spaces[c]
+            if groups is not None and contact is not None:
+                mu = contact.values @ dual.mu[which][groups.crack == c]
+                mus[c][k] = mu
+                if mu.any():
+                    r -= face_residual(w, lips, mu)
+        each = np.einsum("nim,ni->nm", r, e_u[:, :, k] + given[k])
+        eta[k] = each.sum(axis=0)
+        parts[k], by_cell[k] = each, shares(w, each).T
+        if groups is not None:
+            end[k] = end_changes(groups, dual, groups.N @ solution.u, solution.number)
+    numbers = [s.number for s in solutions]
+    return Estimate(eta, by_cell, w, parts, end, dual.z[dual.which[numbers]], mus)
+
+
+def pressure_on(solution: Solution, c: int) -> Floats:
+    """Pressure on the faces of crack c at their points, of contact and given `(q,)`."""
+    lips = solution.lips[c]
+    contact: Contact | None = solution.contact[c]
+    total = np.zeros(len(lips)) if contact is None else np.array(contact.pressure)
+    for load in solution.loads:
+        if isinstance(load, CrackPressure) and load.crack in (None, c):
+            total += solution.factor * evaluate_scalar(load.value, lips.x, "crack_pressure")
+    return total

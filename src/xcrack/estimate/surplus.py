@@ -1,0 +1,400 @@
+"""The surplus space: what a solution of order 2 in 2D is tested with besides its own functions.
+
+A cubic on each edge, Li Lj (Li - Lj), and a bubble L1 L2 L3 in each triangle; those of cells that a
+crack cuts from side to side also times the side of the crack, none in the cell of a tip. Residuals
+of a solution in this space, and blocks of the stiffness in it, make estimates (after Bank and
+Smith, 1993, SIAM J. Numer. Anal. 30, 921, whose hierarchical bases these are).
+"""
+
+from dataclasses import dataclass
+from functools import lru_cache
+from math import factorial
+
+import numpy as np
+
+from xcrack.analysis.solution import Solution
+from xcrack.base.arrays import Bools, Floats, Ints, lock
+from xcrack.estimate.dual import Goal
+from xcrack.fem.facets import LipPoints
+from xcrack.fem.function_space import FunctionSpace
+from xcrack.fem.loads import facet_points, name_of, position, traction_of
+from xcrack.fem.quadrature import Points, cell_points, cell_side
+from xcrack.mesh.mesh import facet_set, local_edges
+from xcrack.model.conditions import (
+    BodyForce,
+    Displacement,
+    InitialStress,
+    Load,
+    Pressure,
+    SetLoad,
+    Traction,
+    evaluate,
+    evaluate_stress,
+)
+from xcrack.model.material import Isotropic
+
+_POINTS, _DEGREE = 3, 4  # where tip functions act; of the products of a cubic and a quadratic
+
+
+@dataclass(frozen=True, eq=False)
+class Surplus:
+    """Surplus functions on a mesh with cracks, numbered: edges, bubbles, copies.
+
+    Attributes
+    ----------
+    space : FunctionSpace
+    functions : (cells, 4) array of int
+        Those of the three edges of each cell, and its bubble.
+    sign : (cells, 3) array
+        +1 where the local direction of an edge is the one of its function, else -1.
+    copy : (n,) array of int
+        Number of the copy that jumps, -1 where there is none; n functions without copies.
+    crack : (n,) array of int
+        Across which crack it jumps.
+    fixed : (n + copies, 2) array of bool
+        Components that supports decide.
+    """
+
+    space: FunctionSpace
+    functions: Ints
+    sign: Floats
+    copy: Ints
+    crack: Ints
+    fixed: Bools
+
+    @property
+    def arrays(self) -> tuple[Ints, Floats, Ints, Ints, Floats]:
+        """What the kernels need."""
+        return self.functions, self.sign, self.copy, self.crack, self.space.mesh.gradient
+
+
+def surplus(space: FunctionSpace, fixed: Bools) -> Surplus:
+    """The surplus space of a function space.
+
+    Parameters
+    ----------
+    space : FunctionSpace
+        Of order 2 in 2D.
+    fixed : (n_dof,) array of bool
+        Unknowns that supports decide.
+    """
+    mesh = space.mesh
+    cells, edges = len(mesh.cells), len(mesh.edges)
+    functions = np.concatenate([mesh.cell_to_edge, edges + np.arange(cells)[:, None]], axis=1)
+    n = edges + cells
+    jumps, whole = np.zeros(n, dtype=bool), np.ones(n, dtype=bool)
+    crack = np.zeros(n, dtype=np.int64)
+    for c, cut in enumerate(space.cuts):
+        mine = np.unique(np.concatenate([functions[cut.cells].ravel(), _along(space, c)]))
+        jumps[mine], crack[mine] = True, c
+        whole[functions[cut.is_tip]] = False
+    for joint in space.joints:
+        whole[functions[joint.both]] = False
+    jumps &= whole
+    copy = np.full(n, -1, dtype=np.int64)
+    copy[jumps] = n + np.arange(int(jumps.sum()))
+    components = np.zeros((n + int(jumps.sum()), 2), dtype=bool)
+    middles = slice(mesh.n_points, mesh.n_points + edges)
+    components[:edges] = fixed.reshape(-1, 2)[middles]
+    components[copy[jumps]] = components[:n][jumps]
+    i, j = local_edges(2).T
+    sign = np.where(mesh.cells[:, i] < mesh.cells[:, j], 1.0, -1.0)
+    return Surplus(space, lock(functions), lock(sign), lock(copy), lock(crack), lock(components))
+
+
+def _along(space: FunctionSpace, c: int) -> Ints:
+    """Edges on which crack c lies."""
+    cut, to_edge = space.cuts[c], space.mesh.cell_to_edge
+    pairs = cut.lip_cell[cut.lip_cell[:, 0] != cut.lip_cell[:, 1]]
+    if not len(pairs):
+        return np.zeros(0, dtype=np.int64)
+    shared = [np.intersect1d(to_edge[a], to_edge[b]) for a, b in np.unique(pairs, axis=0)]
+    return np.concatenate(shared)
+
+
+def residuals(surplus: Surplus, material: Isotropic, coefficients: Floats) -> tuple[Floats, Floats]:
+    """-a(u, w) of columns of displacements, and the stiffness of each function with its copy.
+
+    Parameters
+    ----------
+    surplus : Surplus
+    material : Isotropic
+    coefficients : (functions of the space + 1, 2, m) array, length
+        The last row is zero.
+
+    Returns
+    -------
+    residual : (n + copies, 2, m) array
+    blocks : (n, 4, 4) array
+        Two components of each function, and two of its copy.
+    """
+    from xcrack.analysis.solution import gradients_at
+    from xcrack.estimate.kernels.surplus import take_plain_stress, take_stress
+
+    space = surplus.space
+    mesh, lame = space.mesh, (material.lam, material.mu)
+    residual = np.zeros((len(surplus.fixed), 2, coefficients.shape[2]))
+    blocks = np.zeros((len(surplus.copy), 4, 4))
+    special = space.signature != 0
+    special |= (surplus.copy[surplus.functions] >= 0).any(axis=1)
+    linear, square = _reference()
+    take_plain_stress(
+        residual, blocks, np.nonzero(~special)[0], space.cell_nodes, coefficients,
+        mesh.gradient, mesh.volume, surplus.functions, surplus.sign, linear, square, *lame,
+    )  # fmt: skip
+    points = cell_points(space, np.nonzero(special)[0], _POINTS, _DEGREE)
+    if len(points.cell):
+        strain = gradients_at(space, coefficients, points.cell, points.bary, points.side)
+        take_stress(
+            residual, blocks, points.cell, points.bary, points.weight, points.side, strain,
+            *surplus.arrays, *lame,
+        )  # fmt: skip
+    return residual, blocks
+
+
+def goal_residual(surplus: Surplus, goal: Goal) -> Floats:
+    """The functionals of each surplus function `(n + copies, 2, m)`."""
+    from xcrack.estimate.kernels.goal import add_cells
+    from xcrack.estimate.kernels.surplus import add_functional
+
+    result = np.zeros((len(surplus.fixed), 2, goal.m))
+    for part in goal.parts:
+        at = part.at.points
+        add_functional(result, at.cell, at.bary, at.side, part.factor, *surplus.arrays)
+    for plain in goal.cells:
+        functions = surplus.functions[plain.cells]
+        factor = np.ones(functions.shape)
+        factor[:, :3] = surplus.sign[plain.cells]
+        add_cells(result, functions, factor, plain.on_surplus)
+        copy = surplus.copy[functions]
+        if (copy >= 0).any():
+            side = cell_side(surplus.space, plain.cells)
+            side = np.take_along_axis(side, surplus.crack[functions], axis=1)
+            add_cells(result, copy, factor * side, plain.on_surplus)
+    return result
+
+
+def solved(surplus: Surplus, blocks: Floats, residual: Floats) -> Floats:
+    """Each function with its copy alone: block^-1 residual `(n + copies, 2, m)`, 0 where fixed."""
+    copied = np.nonzero(surplus.copy >= 0)[0]
+    copies = surplus.copy[copied]
+    n = len(surplus.copy)
+    result = np.where(surplus.fixed[:, :, None], 0.0, residual)
+    a, b, c = blocks[:, 0, 0, None], blocks[:, 0, 1, None], blocks[:, 1, 1, None]
+    loose = surplus.fixed[:n].sum(axis=1) == 0
+    x, y = result[:n, 0], result[:n, 1]
+    coupling = np.where(loose[:, None], b, 0.0)
+    determinant = a * c - coupling * coupling
+    result[:n] = np.stack([c * x - coupling * y, a * y - coupling * x], axis=1)
+    result[:n] /= determinant[:, None]
+    if len(copied):
+        right = np.concatenate([residual[copied], residual[copies]], axis=1)
+        fixed = np.concatenate([surplus.fixed[copied], surplus.fixed[copies]], axis=1)
+        four = _regular(blocks[copied], right, fixed)
+        result[copied], result[copies] = four[:, :2], four[:, 2:]
+    return result
+
+
+def _regular(blocks: Floats, right: Floats, fixed: Bools) -> Floats:
+    """Solutions of blocks of four; a copy on a sliver hardly differs from its function."""
+    k = np.arange(4)
+    free: Bools = np.logical_not(fixed)
+    A = blocks * (free[:, :, None] & free[:, None, :])
+    A[:, k, k] += fixed
+    scale = 1 / np.sqrt(A[:, k, k])
+    A = A * scale[:, :, None] * scale[:, None, :]
+    A[:, k, k] += 1e-9
+    x = np.linalg.solve(A, right * (free * scale)[:, :, None])
+    return np.asarray(x * scale[:, :, None])
+
+
+def shares(surplus: Surplus, parts: Floats, together: bool = False) -> Floats:
+    """Absolute contributions of functions, by cell: an edge's is halved between its cells.
+
+    Parameters
+    ----------
+    surplus : Surplus
+    parts : (n + copies, m) array
+    together : bool
+        A function and its copy count as one: on a sliver both are large and cancel.
+
+    Returns
+    -------
+    (cells, m) array
+    """
+    n, mesh = len(surplus.copy), surplus.space.mesh
+    size = np.array if together else np.abs
+    own = size(parts[:n])
+    copied = np.nonzero(surplus.copy >= 0)[0]
+    own[copied] += size(parts[surplus.copy[copied]])
+    own = np.abs(own)
+    own[: len(mesh.edges)][mesh.facet_to_cell[:, 1] >= 0] /= 2
+    return np.asarray(own[surplus.functions].sum(axis=1))
+
+
+@lru_cache(maxsize=1)
+def _reference() -> tuple[Floats, Floats]:
+    """Means over a triangle of w_,b times L_c, and of w_,a times w_,b, `(4, 3, 3)` each.
+
+    w_,b is the derivative with respect to the barycentric coordinate L_b.
+    """
+    cubic = {0: [((2, 1, 0), 1.0), ((1, 2, 0), -1.0)], 1: [((2, 0, 1), 1.0), ((1, 0, 2), -1.0)],
+             2: [((0, 2, 1), 1.0), ((0, 1, 2), -1.0)], 3: [((1, 1, 1), 1.0)]}  # fmt: skip
+    linear, square = np.zeros((4, 3, 3)), np.zeros((4, 3, 3))
+    for a, terms in cubic.items():
+        slopes = [[_derivative(power, b, f) for power, f in terms] for b in range(3)]
+        for b in range(3):
+            for power, f in slopes[b]:
+                for c in range(3):
+                    linear[a, b, c] += f * _mean(np.add(power, np.eye(3, dtype=int)[c]))
+            for c in range(3):
+                for p, f in slopes[b]:
+                    square[a, b, c] += sum(f * g * _mean(np.add(p, q)) for q, g in slopes[c])
+    return lock(linear), lock(square)
+
+
+def _derivative(power: tuple[int, ...], b: int, factor: float) -> tuple[tuple[int, ...], float]:
+    """Derivative of a monomial with respect to L_b; factor 0 where it vanishes."""
+    lower = tuple(p - (k == b) for k, p in enumerate(power))
+    return (lower, factor * power[b]) if power[b] else (power, 0.0)
+
+
+def _mean(power: Ints) -> float:
+    """Mean of a monomial of barycentric coordinates over a triangle: 2 a! b! c! / (a+b+c+2)!."""
+    a, b, c = (int(p) for p in power)
+    return 2 * factorial(a) * factorial(b) * factorial(c) / factorial(a + b + c + 2)
+
+
+# What loads, pressures on crack faces and imposed displacements do to the surplus functions.
+
+_BODY = 5  # degree of the rule for body forces and initial stress
+
+
+def load_residual(surplus: Surplus, solution: Solution) -> Floats:
+    """The loads of a state, tested with the surplus functions `(n + copies, 2)`.
+
+    Pressures on crack faces are left out: see `face_residual`.
+    """
+    result = np.zeros((len(surplus.fixed), 2))
+    for load in solution.loads:
+        if isinstance(load, SetLoad):
+            _add_traction(result, surplus, load, solution.factor)
+        elif isinstance(load, BodyForce | InitialStress):
+            _add_volume(result, surplus, load, solution.factor)
+    return result
+
+
+def _add_traction(result: Floats, surplus: Surplus, load: SetLoad, by: float) -> None:
+    """Constant tractions do no work on the cubic of an edge, which is odd, unless it is cut."""
+    space = surplus.space
+    facets = facet_set(space.mesh, load.where, name_of(load))
+    if isinstance(load, Traction | Pressure) and not callable(load.value):
+        owner = space.mesh.facet_to_cell[space.mesh.facet_numbers(facets), 0]
+        facets = facets[(surplus.copy[surplus.functions[owner]] >= 0).any(axis=1)]
+    if not len(facets):
+        return
+    points, normal = facet_points(space, facets)
+    _add(result, surplus, points, by * traction_of(load, space, facets, points, normal))
+
+
+def _add_volume(result: Floats, surplus: Surplus, load: Load, by: float) -> None:
+    from xcrack.estimate.kernels.surplus import add_functional
+
+    space = surplus.space
+    points = cell_points(space, np.arange(len(space.mesh.cells)), 4, _BODY)
+    x = position(space, points.cell, points.bary)
+    if isinstance(load, BodyForce):
+        _add(result, surplus, points, by * evaluate(load.value, x, "body_force"))
+    elif isinstance(load, InitialStress):
+        factor = -points.weight[:, None, None] * evaluate_stress(load.value, x)
+        add_functional(
+            result[:, :, None], points.cell, points.bary, points.side, factor[..., None],
+            *surplus.arrays,
+        )  # fmt: skip
+
+
+def _add(result: Floats, surplus: Surplus, points: Points, density: Floats) -> None:
+    """Add the integral of density . w over points."""
+    functions = surplus.functions[points.cell]
+    values = _values(surplus, points.cell, points.bary)
+    force = (values * points.weight[:, None])[:, :, None] * density[:, None]
+    np.add.at(result, functions, force)
+    copy = surplus.copy[functions]
+    jumps = copy >= 0
+    if jumps.any():
+        row, place = np.nonzero(jumps)
+        side = points.side[row, surplus.crack[functions[row, place]]]
+        np.add.at(result, copy[row, place], side[:, None] * force[row, place])
+
+
+def _values(surplus: Surplus, cell: Ints, bary: Floats) -> Floats:
+    """The functions of cells at points `(q, 4)`."""
+    i, j = local_edges(2).T
+    edges = bary[:, i] * bary[:, j] * (bary[:, i] - bary[:, j]) * surplus.sign[cell]
+    return np.concatenate([edges, bary.prod(axis=1)[:, None]], axis=1)
+
+
+def face_residual(surplus: Surplus, lips: LipPoints, pressure: Floats) -> Floats:
+    """Pressures on the faces of a crack, tested with the jumps `(n + copies, 2, m)`.
+
+    Parameters
+    ----------
+    surplus : Surplus
+    lips : LipPoints
+    pressure : (q, m) array, stress
+        Positive where it opens the crack.
+    """
+    result = np.zeros((len(surplus.fixed), 2, pressure.shape[1]))
+    force = (lips.weight[:, None] * lips.normal)[:, :, None] * pressure[:, None]
+    for s in (0, 1):  # a copy is w on face + and -w on face -, and the force turns its sign too
+        cell = lips.cell[:, s]
+        values = _values(surplus, cell, lips.bary[:, s])
+        copy = surplus.copy[surplus.functions[cell]]
+        row, place = np.nonzero(copy >= 0)
+        np.add.at(result, copy[row, place], values[row, place, None, None] * force[row])
+    return result
+
+
+def imposed(surplus: Surplus, solution: Solution) -> Floats:
+    """Imposed displacements less their interpolant, as surplus coefficients `(n + copies, 2)`.
+
+    Displacements that are fitted beside a crack count as exact.
+    """
+    result = np.zeros((len(surplus.fixed), 2))
+    taken = np.zeros((len(surplus.fixed), 2), dtype=bool)
+    again = {str(x.where): x for x in solution.loads if isinstance(x, Displacement)}
+    for support in solution.problem.supports:
+        if isinstance(support, Displacement) and isinstance(support.where, str):
+            support = again.get(support.where, support)
+            if callable(support.value):
+                _impose(result, taken, surplus, support)
+    return solution.factor * result
+
+
+def _impose(result: Floats, taken: Bools, surplus: Surplus, support: Displacement) -> None:
+    mesh = surplus.space.mesh
+    facets = facet_set(mesh, support.where, "displacement")
+    owner = mesh.facet_to_cell[mesh.facet_numbers(facets), 0]
+    ends = np.sort(facets[surplus.space.signature[owner] == 0], axis=1)
+    if not len(ends):
+        return
+    i, j = mesh.points[ends[:, 0]], mesh.points[ends[:, 1]]
+    key = mesh.edges[:, 0] * np.int64(mesh.n_points) + mesh.edges[:, 1]
+    edge = np.searchsorted(key, ends[:, 0] * np.int64(mesh.n_points) + ends[:, 1])
+    what = f"displacement({support.where!r})"
+    at = {
+        t: evaluate(support.value, t * i + (1 - t) * j, what) for t in (0.0, 0.25, 0.5, 0.75, 1.0)
+    }
+
+    def rest(t: float) -> Floats:
+        quadratic = at[1.0] * t * (2 * t - 1) + at[0.0] * (1 - t) * (1 - 2 * t)
+        return at[t] - quadratic - at[0.5] * 4 * t * (1 - t)
+
+    # Li Lj (Li - Lj) is 3/32 at Li = 3/4 and -3/32 at 1/4.
+    coefficient = (rest(0.75) - rest(0.25)) / 2 * (32 / 3)
+    new = surplus.fixed[edge] & ~taken[edge]
+    result[edge] = np.where(new, coefficient, result[edge])
+    taken[edge] = True
+
+
+__all__ = []

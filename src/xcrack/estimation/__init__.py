@@ -1,1 +1,0 @@
-"""Estimated errors of functionals of a solution, by dual solutions and a surplus space."""

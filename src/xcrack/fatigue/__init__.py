@@ -1,0 +1,1 @@
+"""From K to growth a cycle: criteria, laws, closure, thresholds, spectra."""

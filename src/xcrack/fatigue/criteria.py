@@ -1,0 +1,365 @@
+"""Where a crack turns, and the one number that a growth law sees: arrays in, arrays out.
+
+Every criterion is called ``(K, nu)`` with the stress intensity factors of all load states of one
+cycle, and returns the kink angle, the equivalent range and the ratio R of each front point.
+A criterion of your own is any function of that form; `xcrack.testing.check_criterion` tries it.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from xcrack.base.arrays import Floats
+from xcrack.base.checks import number, numbers, shown
+from xcrack.base.errors import ProblemError, warn
+
+Criterion = Callable[[Floats, float], tuple[Floats, Floats, Floats]]
+
+_TIE = 1e-12  # relative: two states whose K_eq differ by round-off only are a tie
+_CLOSED = 1e-3  # share of the largest K below which a negative K_I is that of a closed tip
+_DIFFER = 0.2  # share by which the two kinds of range may differ before a warning
+
+
+def kink_angle(K: ArrayLike) -> Floats:
+    """Angle of the largest hoop stress around a front point.
+
+    Parameters
+    ----------
+    K : (..., 2) or (..., 3) array, stress √length
+        Stress intensity factors, columns I, II[, III]; K_I < 0 counts as 0, III does not turn
+        the crack.
+
+    Returns
+    -------
+    (...) array, rad
+        Positive towards the crack normal; 0 where K_I and K_II are 0.
+
+    Notes
+    -----
+    θ = -2 atan(2 K_II / (K_I + √(K_I² + 8 K_II²))), the root of K_I sin θ + K_II (3 cos θ - 1) = 0
+    that maximises the hoop stress (Erdogan and Sih 1963), written without a division by K_II.
+
+    Examples
+    --------
+    >>> np.degrees(kink_angle([0.0, 1.0])).round(4)       # pure mode II
+    np.float64(-70.5288)
+    """
+    K = _columns(K)
+    K_I, K_II = np.maximum(K[..., 0], 0.0), K[..., 1]
+    angle = -2 * np.arctan2(2 * K_II, K_I + np.hypot(K_I, np.sqrt(8.0) * K_II))
+    return angle + 0.0  # no -0.0: straight ahead is one number
+
+
+def equivalent_K(K: ArrayLike, angle: ArrayLike, nu: float) -> Floats:
+    """Equivalent stress intensity factor in a direction.
+
+    Parameters
+    ----------
+    K : (..., 2) or (..., 3) array, stress √length
+        Columns I, II[, III].
+    angle : (...) array, rad
+        Direction of the kink, positive towards the crack normal; broadcast against K.
+    nu : float
+        Poisson's ratio.
+
+    Returns
+    -------
+    (...) array, stress √length
+        Never negative: where the hoop stress is compressive only mode III remains.
+
+    Raises
+    ------
+    ProblemError
+        Factors or angles that are not finite or do not fit each other, an angle beyond pi, nu
+        outside (-1, 0.5).
+
+    Notes
+    -----
+    K_eq² = ⟨cos²(θ/2) [K_I cos(θ/2) - 3 K_II sin(θ/2)]⟩² + K_III² / (1 - ν): hoop stress of
+    Erdogan and Sih (1963), mode III at equal energy release rate.
+
+    Examples
+    --------
+    >>> K = [1.0, 0.5, 0.4]
+    >>> equivalent_K(K, kink_angle(K), nu=0.3).round(6)
+    np.float64(1.36899)
+    """
+    K, angle = _columns(K), numbers(angle, "angle")
+    if (np.abs(angle) > np.pi).any():
+        raise ProblemError(
+            f"angle = {angle.flat[np.argmax(np.abs(angle))]:.6g}: angles are in rad, from -pi to "
+            "pi; for degrees use numpy.radians."
+        )
+    nu = number(nu, "Poisson's ratio nu", above=-1, below=0.5)
+    try:
+        np.broadcast_shapes(K.shape[:-1], angle.shape)
+    except ValueError as error:
+        raise ProblemError(
+            f"K of shape {K.shape} and angles of shape {angle.shape} do not fit: give one angle "
+            "for each row of K, or one for all."
+        ) from error
+    half = angle / 2
+    cos, sin = np.cos(half), np.sin(half)
+    bracket = np.maximum(cos**2 * (K[..., 0] * cos - 3 * K[..., 1] * sin), 0.0)
+    if K.shape[-1] == 2:
+        return bracket
+    return np.hypot(bracket, K[..., 2] / np.sqrt(1 - nu))
+
+
+def max_hoop_stress(
+    K: ArrayLike, nu: float, *, range: str = "difference"
+) -> tuple[Floats, Floats, Floats]:
+    """Kink in the direction that the most severe load state asks for.
+
+    The angle is that of the state with the largest K_eq in its own direction; of states that
+    tie, the smaller value of the angle, so that the order of the states never matters.
+
+    Parameters
+    ----------
+    K : (s, f, 2) or (s, f, 3) array, stress √length
+        Factors of s load states at f front points; K_I < 0 counts as 0 and is flagged.
+    nu : float
+        Poisson's ratio.
+    range : {"difference", "component"}
+        See `mean_reference`.
+
+    Returns
+    -------
+    angle : (f,) array, rad
+    dK_eq : (f,) array, stress √length
+    R : (f,) array
+
+    Examples
+    --------
+    >>> angle, dK_eq, R = max_hoop_stress([[[0.2, 0.0]], [[1.0, 0.0]]], nu=0.3)
+    >>> print(angle, dK_eq, R)
+    [0.] [0.8] [0.2]
+    """
+    K = _checked(K, nu, range)
+    own = kink_angle(K)
+    return _rated(K, _angle_of_largest(equivalent_K(K, own, nu), own), nu, range)
+
+
+def mean_reference(
+    K: ArrayLike, nu: float, *, reference: str = "mean", range: str = "difference"
+) -> tuple[Floats, Floats, Floats]:
+    """Kink in the direction of one reference state of the cycle.
+
+    Parameters
+    ----------
+    K : (s, f, 2) or (s, f, 3) array, stress √length
+        Factors of s load states at f front points; K_I < 0 counts as 0 and is flagged.
+    nu : float
+        Poisson's ratio.
+    reference : {"mean", "max", "min"}
+        The mean of all states, or the state with the largest or the smallest K_eq in its own
+        direction (ties: the smaller value of the angle).
+    range : {"difference", "component"}
+        "difference": the largest minus the smallest K_eq of the states in the chosen direction.
+        "component": the largest K_eq of the difference of any two states, which also sees a
+        reversed mode II. The first is warned of where the two differ by more than 20 %.
+
+    Returns
+    -------
+    angle : (f,) array, rad
+        0 where all K are 0.
+    dK_eq : (f,) array, stress √length
+        Equivalent range.
+    R : (f,) array
+        Smallest over largest K_eq in the chosen direction, in [0, 1]; 0 where the largest is 0.
+
+    Notes
+    -----
+    Pierard, Jin, Wyart, Dompierre, Béchet, "Simulation of contact on crack lips and its
+    influence on fatigue life prediction", eq. 14, for any number of states.
+
+    Examples
+    --------
+    >>> angle, _, _ = mean_reference([[[1.0, 0.3]], [[1.0, -0.3]]], nu=0.3)
+    >>> print(angle)
+    [0.]
+    """
+    K = _checked(K, nu, range)
+    if not isinstance(reference, str) or reference not in ("mean", "max", "min"):
+        raise ProblemError(f'reference = {shown(reference)}: give "mean", "max" or "min".')
+    if reference == "mean":
+        mean = _sum(K) / len(K)
+        return _rated(K, kink_angle(mean), nu, range)
+    own = kink_angle(K)
+    K_eq = equivalent_K(K, own, nu)
+    return _rated(K, _angle_of_largest(K_eq if reference == "max" else -K_eq, own), nu, range)
+
+
+def weighted_angle(
+    K: ArrayLike, nu: float, *, range: str = "difference"
+) -> tuple[Floats, Floats, Floats]:
+    """Kink in the mean direction of all load states, each weighted with its K_eq.
+
+    The weight of a state is its K_eq in its own direction; the range is then taken in the mean
+    direction. A state that is listed twice counts twice; a state without load counts nothing.
+
+    Parameters
+    ----------
+    K : (s, f, 2) or (s, f, 3) array, stress √length
+        Factors of s load states at f front points; K_I < 0 counts as 0 and is flagged.
+    nu : float
+        Poisson's ratio.
+    range : {"difference", "component"}
+        See `mean_reference`.
+
+    Returns
+    -------
+    angle : (f,) array, rad
+    dK_eq : (f,) array, stress √length
+    R : (f,) array
+
+    Notes
+    -----
+    θ = atan2(Σ K_eq sin θ_i, Σ K_eq cos θ_i): eq. 15 of the paper named in `mean_reference`,
+    whose print has the arctangent of a ratio.
+
+    Examples
+    --------
+    >>> angle, _, _ = weighted_angle([[[0, 0]], [[1, 0]], [[0.6, 0.5]]], nu=0.3)
+    >>> print(np.degrees(angle).round(4))
+    [-24.6401]
+    """
+    K = _checked(K, nu, range)
+    own = kink_angle(K)
+    weight = equivalent_K(K, own, nu)
+    angle = np.arctan2(_sum(weight * np.sin(own)), _sum(weight * np.cos(own))) + 0.0
+    return _rated(K, angle, nu, range)
+
+
+def clipped(K: ArrayLike) -> Floats:
+    """Copy of K `(..., 2 or 3)` with every negative K_I set to 0: a crack does not open inwards."""
+    K = np.array(K, dtype=float)
+    K[..., 0] = np.maximum(K[..., 0], 0.0)
+    return K
+
+
+def _checked(K: ArrayLike, nu: float, range: str) -> Floats:
+    """K as `(s, f, 2 or 3)` with K_I >= 0, after all that a caller can get wrong."""
+    K = numbers(K, "K", finite=False)
+    if K.ndim != 3 or K.shape[-1] not in (2, 3) or len(K) == 0:
+        raise ProblemError(
+            f"a criterion takes K of shape (states, front points, 2 or 3), not {K.shape}; "
+            "a single state is K[None]."
+        )
+    if not np.isfinite(K).all():
+        state, point, mode = np.argwhere(~np.isfinite(K))[0]
+        raise ProblemError(
+            f"K of state {state}, front point {point}, mode {mode + 1} is "
+            f"{K[state, point, mode]}: no direction can be chosen."
+        )
+    number(nu, "Poisson's ratio nu", above=-1, below=0.5)
+    if not isinstance(range, str) or range not in ("difference", "component"):
+        raise ProblemError(f'range = {shown(range)}: give "difference" or "component".')
+    # A closed tip has K_I = 0 up to discretisation: only a real overlap triggers a warning.
+    negative = K[..., 0] < -_CLOSED * np.abs(K).max(initial=0.0)
+    if negative.any():
+        state, point = np.unravel_index(np.argmin(K[..., 0]), negative.shape)
+        warn(
+            f"K_I < 0 in {np.count_nonzero(negative)} of {negative.size} values counts as 0; the "
+            f"smallest is {K[state, point, 0]:.4g} (state {state}, front point {point}). With "
+            "contact it is discretisation error; without, the crack faces overlap there."
+        )
+    return clipped(K)
+
+
+def _columns(K: ArrayLike) -> Floats:
+    """K as `(..., 2 or 3)` array of finite numbers."""
+    K = numbers(K, "K")
+    if K.ndim < 1 or K.shape[-1] not in (2, 3):
+        raise ProblemError(f"K must have 2 or 3 columns (I, II[, III]), not shape {K.shape}.")
+    return K
+
+
+def _sum(values: Floats) -> Floats:
+    """Sum over the states `(s, ...)`, the same to the last bit in whatever order they come."""
+    return np.asarray(np.sort(values, axis=0).sum(axis=0))
+
+
+def _angle_of_largest(score: Floats, angle: Floats) -> Floats:
+    """Angle `(f,)` of the state with the largest score `(s, f)`; the smallest of those that tie."""
+    largest = score.max(axis=0)
+    tied = score >= largest - _TIE * np.abs(score).max(axis=0)
+    return np.asarray(np.where(tied, angle, np.inf).min(axis=0))
+
+
+def _rated(K: Floats, angle: Floats, nu: float, range: str) -> tuple[Floats, Floats, Floats]:
+    """The chosen angle with the range and the ratio R that go with it."""
+    K_eq = equivalent_K(K, angle, nu)
+    largest, smallest = K_eq.max(axis=0), K_eq.min(axis=0)
+    R = np.divide(smallest, largest, out=np.zeros_like(largest), where=largest > 0)
+    difference = largest - smallest
+    component = _component_range(K, angle, nu)
+    if range == "component":
+        return angle, component, R
+    gap = np.abs(component - difference)
+    apart = gap > _DIFFER * np.maximum(component, difference)
+    if apart.any():
+        point = int(np.argmax(gap))
+        warn(
+            f"the difference of the extreme K_eq ({difference[point]:.4g}) and the K_eq of the "
+            f"difference of two states ({component[point]:.4g}) are more than 20 % apart at "
+            f"{np.count_nonzero(apart)} of {len(apart)} front points (first at {point}): a mode "
+            'is reversed within the cycle; range="component" takes the second.'
+        )
+    return angle, difference, R
+
+
+def _component_range(K: Floats, angle: Floats, nu: float) -> Floats:
+    """Largest K_eq of the difference of two states, in both orders."""
+    largest = np.zeros(K.shape[1])
+    for state in K:
+        np.maximum(largest, equivalent_K(clipped(K - state), angle, nu).max(axis=0), out=largest)
+    return largest
+
+
+# Range and ratio of a crack whose faces may overlap.
+
+
+def nominal_range(K: Floats, angle: Floats, nu: float) -> tuple[Floats, Floats]:
+    """Range and ratio of a crack whose faces may overlap, R < 0 included.
+
+    Parameters
+    ----------
+    K : (s, f, 2 or 3) array, stress √length
+        Of the scene without contact.
+    angle : (f,) array, rad
+        Direction at each place.
+    nu : float
+
+    Returns
+    -------
+    dK_eq : (f,) array, stress √length
+    R : (f,) array
+        0 where no state opens the place; the range is 0 there too.
+
+    Notes
+    -----
+    K_eq as of `equivalent_K`, but for its sign: where the hoop stress is compressive it is the
+    bracket of Erdogan and Sih alone, and negative.
+    """
+    cos, sin = np.cos(angle / 2), np.sin(angle / 2)
+    K_eq = cos**2 * (K[..., 0] * cos - 3 * K[..., 1] * sin)
+    if K.shape[-1] == 3:
+        K_eq = np.where(K_eq >= 0, np.hypot(K_eq, K[..., 2] / np.sqrt(1 - nu)), K_eq)
+    largest, smallest = K_eq.max(axis=0), K_eq.min(axis=0)
+    opens = largest > 0
+    R = np.divide(smallest, largest, out=np.zeros_like(largest), where=opens)
+    return np.where(opens, largest - smallest, 0.0), R
+
+
+__all__ = [
+    "Criterion",
+    "clipped",
+    "equivalent_K",
+    "kink_angle",
+    "max_hoop_stress",
+    "mean_reference",
+    "nominal_range",
+    "weighted_angle",
+]

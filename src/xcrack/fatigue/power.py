@@ -1,0 +1,342 @@
+"""Laws that are powers of a range: Paris, Elber, Walker, and Paris in pieces."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from xcrack.base.arrays import Floats
+from xcrack.base.checks import number, numbers
+from xcrack.base.errors import ProblemError
+from xcrack.fatigue.closures import Closure, check_closure
+from xcrack.fatigue.law import (
+    Bounds,
+    Ratio,
+    WithUnits,
+    powered,
+    range_and_ratio,
+    set_floats,
+)
+from xcrack.fatigue.shape import Approach, Shaped, shaped
+from xcrack.fatigue.thresholds import Powers, Threshold
+from xcrack.fatigue.units import factors
+
+
+@dataclass(frozen=True)
+class paris(Shaped):  # noqa: N801 - it is used as a function: paris(C, m)(dK_eq, R)
+    """Growth as a power of the range.
+
+    Parameters
+    ----------
+    C : float, length/cycle / (stress √length)^m
+        Positive.
+    m : float
+        Exponent, positive.
+    closure : linear_closure, schijve_closure or newman_closure, optional
+        U ΔK stands for ΔK then.
+    threshold : klesnil_lukas, stepped_threshold or el_haddad, optional
+        Range below which nothing grows.
+    approach : {"cut", "difference"} or float
+        How growth begins above the threshold: at once, as C (ΔK^m - ΔK_th^m), or times
+        (1 - ΔK_th / ΔK)^p with the given p.
+    K_c : float, stress √length, optional
+        Toughness: inf where K_max reaches it, which ends a run.
+    ratio : {"contact", "nominal"}, optional
+        Which ΔK and R the constants belong to; to be given where R < 0 is asked for and the law
+        depends on R.
+    R_range : (float, float), optional
+        Lowest and highest R for which the constants were fitted: others are an error.
+
+    Raises
+    ------
+    ProblemError
+        C, m or K_c not positive and finite, or a part that does not fit.
+
+    Notes
+    -----
+    da/dN = C ΔK^m (Paris and Erdogan 1963); the difference of two powers is that of Klesnil and
+    Lukáš (1972).
+
+    Examples
+    --------
+    >>> law = paris(C=1e-11, m=3)
+    >>> print(f"{law(10.0, 0.0):.3g}")
+    1e-08
+    """
+
+    C: float
+    m: float
+    closure: Closure | None = None
+    threshold: Threshold | None = None
+    approach: Approach = "cut"
+    K_c: float | None = None
+    ratio: Ratio | None = None
+    R_range: Bounds | None = None
+
+    def __post_init__(self) -> None:
+        set_floats(
+            self, C=number(self.C, "paris: C", above=0), m=number(self.m, "paris: m", above=0)
+        )
+        check_closure("paris", self.closure)
+        self._check_shape()
+
+    @property
+    def knows_negative_ratios(self) -> bool:
+        """Whether its answer for R < 0 depends on how R is meant."""
+        return self.closure is not None or self.threshold is not None
+
+    def _powers(self) -> Powers:
+        return {"C": (-self.m, 1), "K_c": (1, 0)}
+
+    def __call__(self, dK_eq: ArrayLike, R: ArrayLike, a: ArrayLike | None = None) -> Floats:
+        """Growth a cycle of each point, length."""
+        dK, ratio = range_and_ratio("paris", dK_eq, R, self.R_range)
+
+        def rate(dK: Floats) -> Floats:
+            if self.closure is not None:
+                dK = self.closure(ratio) * dK
+            return powered("paris", self.C, dK, self.m)
+
+        return shaped(
+            rate, dK, ratio, a, threshold=self.threshold, approach=self.approach, K_c=self.K_c
+        )[()]
+
+
+@dataclass(frozen=True)
+class elber(WithUnits):  # noqa: N801 - it is used as a function
+    """Growth by the part of the range in which the plastic wake lets the crack open.
+
+    Where contact of the lips is computed, the smallest K is that of the closed crack already;
+    U then stands for the closure by plasticity only.
+
+    Parameters
+    ----------
+    C : float, length/cycle / (stress √length)^m
+        Positive.
+    m : float
+        Exponent, positive.
+    a, b : float
+        U = a + b R, cut to [0, 1].
+
+    Raises
+    ------
+    ProblemError
+        C or m not positive, a or b not finite, or U = 0 for all R in [0, 1].
+
+    Notes
+    -----
+    da/dN = C (U ΔK)^m (Elber 1971). His own a = 0.5, b = 0.4 were fitted on the alloy 2024-T3 for
+    -0.1 < R < 0.7.
+
+    Examples
+    --------
+    >>> law = elber(C=1e-11, m=3, a=0.5, b=0.4)
+    >>> print(f"{law(10.0, 0.0):.4g}")
+    1.25e-09
+    """
+
+    C: float
+    m: float
+    a: float
+    b: float
+
+    def __post_init__(self) -> None:
+        set_floats(
+            self, C=number(self.C, "elber: C", above=0), m=number(self.m, "elber: m", above=0)
+        )
+        set_floats(self, a=number(self.a, "elber: a"), b=number(self.b, "elber: b"))
+        if max(self.a, self.a + self.b) <= 0:
+            raise ProblemError(
+                f"elber: U = {self.a} + {self.b} R is not positive for any R in [0, 1], so that "
+                "nothing would ever grow: give a or a + b above 0."
+            )
+
+    def _powers(self) -> Powers:
+        return {"C": (-self.m, 1)}
+
+    def U(self, R: ArrayLike) -> Floats:  # noqa: N802 - Elber's own name
+        """Share of the range that opens the crack, in [0, 1]."""
+        return np.asarray(np.clip(self.a + self.b * numbers(R, "elber: R"), 0.0, 1.0))[()]
+
+    def __call__(self, dK_eq: ArrayLike, R: ArrayLike) -> Floats:
+        """Growth a cycle of each point, length."""
+        dK, ratio = range_and_ratio("elber", dK_eq, R)
+        return powered("elber", self.C, self.U(ratio) * dK, self.m)[()]
+
+
+@dataclass(frozen=True)
+class walker(Shaped):  # noqa: N801 - it is used as a function
+    """Growth by a range that the mean load raises.
+
+    Parameters
+    ----------
+    C : float, length/cycle / (stress √length)^m
+        Positive; valid for R = 0.
+    m : float
+        Exponent, positive.
+    gamma : float
+        In [0, 1]; 1 makes it the law of Paris.
+    gamma_minus : float, optional
+        Exponent for R < 0, in [0, 1]: 0 is growth by K_max alone. `gamma`, where it is left out.
+    threshold, approach, K_c, ratio, R_range
+        As of `paris`.
+
+    Raises
+    ------
+    ProblemError
+        C or m not positive, an exponent outside [0, 1], or a part that does not fit.
+
+    Notes
+    -----
+    da/dN = C (ΔK / (1 - R)^(1 - γ))^m (Walker 1970).
+
+    Examples
+    --------
+    >>> law = walker(C=1e-11, m=2, gamma=0.5)
+    >>> print(f"{law(10.0, 0.75):.3g}")
+    4e-09
+    """
+
+    C: float
+    m: float
+    gamma: float
+    gamma_minus: float | None = None
+    threshold: Threshold | None = None
+    approach: Approach = "cut"
+    K_c: float | None = None
+    ratio: Ratio | None = None
+    R_range: Bounds | None = None
+
+    def __post_init__(self) -> None:
+        set_floats(
+            self, C=number(self.C, "walker: C", above=0), m=number(self.m, "walker: m", above=0)
+        )
+        set_floats(self, gamma=number(self.gamma, "walker: gamma", least=0, most=1))
+        if self.gamma_minus is not None:
+            minus = number(self.gamma_minus, "walker: gamma_minus", least=0, most=1)
+            set_floats(self, gamma_minus=minus)
+        self._check_shape()
+
+    @property
+    def knows_negative_ratios(self) -> bool:
+        """Whether its answer for R < 0 depends on how R is meant."""
+        return self.gamma_minus is not None or self.threshold is not None
+
+    def _powers(self) -> Powers:
+        return {"C": (-self.m, 1), "K_c": (1, 0)}
+
+    def __call__(self, dK_eq: ArrayLike, R: ArrayLike, a: ArrayLike | None = None) -> Floats:
+        """Growth a cycle of each point, length."""
+        dK, ratio = range_and_ratio("walker", dK_eq, R, self.R_range)
+        # R = 1 is a load that does not vary: ΔK = 0, and 0/0 must not become nan
+        share = np.maximum(1.0 - ratio, np.finfo(float).tiny)
+        gamma: float | Floats = self.gamma
+        if self.gamma_minus is not None:
+            gamma = np.where(ratio < 0, self.gamma_minus, self.gamma)
+
+        def rate(dK: Floats) -> Floats:
+            with np.errstate(over="ignore"):
+                effective = np.where(dK > 0, dK / share ** (1.0 - gamma), 0.0)
+            return powered("walker", self.C, effective, self.m)
+
+        return shaped(
+            rate, dK, ratio, a, threshold=self.threshold, approach=self.approach, K_c=self.K_c
+        )[()]
+
+
+@dataclass(frozen=True)
+class piecewise(Shaped):  # noqa: N801 - it is used as a function
+    """Paris in pieces: each has its own constants, and they change at knees.
+
+    Parameters
+    ----------
+    pieces : sequence of (C, m)
+        From small ranges to large ones.
+    knees : sequence of float, stress √length, optional
+        Ranges at which one piece takes over from the one before; where the lines cross, if
+        omitted, which makes the law continuous.
+    threshold, approach, K_c, ratio, R_range
+        As of `paris`.
+
+    Raises
+    ------
+    ProblemError
+        Constants that are not positive, lines that do not cross in this order.
+
+    Notes
+    -----
+    The two-stage laws of BS 7910 have this form; its table rounds the knees.
+
+    Examples
+    --------
+    >>> law = piecewise([(1.21e-26, 8.16), (3.98e-13, 2.88)])        # N/mm^1.5, mm
+    >>> print(f"{law.knees[0]:.2f}", f"{law(500.0, 0.1):.5g}")
+    363.13 2.36e-05
+    """
+
+    pieces: tuple[tuple[float, float], ...]
+    knees: tuple[float, ...] | None = None
+    threshold: Threshold | None = None
+    approach: Approach = "cut"
+    K_c: float | None = None
+    ratio: Ratio | None = None
+    R_range: Bounds | None = None
+
+    def __post_init__(self) -> None:
+        constants = numbers(self.pieces, "piecewise: pieces", (None, 2))
+        if not len(constants) or (constants <= 0).any():
+            raise ProblemError("piecewise: pieces: give positive pairs (C, m).")
+        C, m = constants.T
+        if self.knees is None:
+            if (np.diff(m) == 0).any():
+                raise ProblemError(
+                    "piecewise: two pieces with the same m do not cross: give knees."
+                )
+            knees = np.exp(np.diff(np.log(C)) / -np.diff(m))
+        else:
+            knees = numbers(self.knees, "piecewise: knees", (len(C) - 1,))
+        if (knees <= 0).any() or (np.diff(knees) <= 0).any():
+            raise ProblemError(
+                f"piecewise: the knees {knees} do not rise: order the pieces from small ranges to "
+                "large ones."
+            )
+        pieces = tuple((float(c), float(e)) for c, e in constants)
+        object.__setattr__(self, "pieces", pieces)
+        object.__setattr__(self, "knees", tuple(float(knee) for knee in knees))
+        self._check_shape()
+
+    @property
+    def knows_negative_ratios(self) -> bool:
+        """Whether its answer for R < 0 depends on how R is meant."""
+        return self.threshold is not None
+
+    def _powers(self) -> Powers:
+        return {"K_c": (1, 0)}
+
+    def to(self, units: str, new: str) -> "piecewise":
+        """The same law in other units; see `WithUnits.to`."""
+        rest = super().to(units, new)
+        pieces = tuple((paris(C, m).to(units, new).C, m) for C, m in self.pieces)
+        by_K, _ = factors(units, new)
+        knees = tuple(knee * by_K for knee in self.knees or ())
+        return piecewise(
+            pieces, knees, rest.threshold, rest.approach, rest.K_c, self.ratio, self.R_range
+        )
+
+    def __call__(self, dK_eq: ArrayLike, R: ArrayLike, a: ArrayLike | None = None) -> Floats:
+        """Growth a cycle of each point, length."""
+        dK, ratio = range_and_ratio("piecewise", dK_eq, R, self.R_range)
+        dK, ratio = np.broadcast_arrays(dK, ratio)
+        C, m = np.array(self.pieces).T
+        knees = np.array(self.knees)
+
+        def rate(dK: Floats) -> Floats:
+            piece = np.searchsorted(knees, dK, side="right")
+            return powered("piecewise", C[piece], dK, m[piece])
+
+        return shaped(
+            rate, dK, ratio, a, threshold=self.threshold, approach=self.approach, K_c=self.K_c
+        )[()]
+
+
+__all__ = ["elber", "paris", "piecewise", "walker"]

@@ -1,0 +1,180 @@
+"""Growth laws given as points."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from xcrack.base.arrays import Floats
+from xcrack.base.checks import number, numbers, one_of
+from xcrack.base.errors import ProblemError
+from xcrack.fatigue.law import Ratio, WithUnits, check_ratio, range_and_ratio
+from xcrack.fatigue.units import factors
+
+Curve = tuple[float, tuple[float, ...], tuple[float, ...]]
+_ROUND_OFF = 1e-12
+
+
+@dataclass(frozen=True)
+class rate_table(WithUnits):  # noqa: N801 - it is used as a function
+    """Measured points, straight lines between them over logarithms.
+
+    Below the first point of a curve nothing grows, above the last the answer is inf, which ends a
+    run: nothing is extrapolated.
+
+    Parameters
+    ----------
+    curves : mapping of R to (dK, rate)
+        Points of each R, both rising: stress √length and length/cycle.
+    outside : {"refuse", "nearest"}
+        What to do for R below or above all curves. A closed crack has R = 0 where contact is
+        computed: give a curve for it, or "nearest".
+    ratio
+        As of `paris`.
+
+    Raises
+    ------
+    ProblemError
+        Fewer than two points, points that do not rise or are not positive, two curves of one R, or
+        curves that a larger R does not make faster, or faster than growth by K_max alone; called
+        for an R outside of all curves.
+
+    Notes
+    -----
+    Between two curves ΔK at equal rate follows Walker's relation: ΔK (1 - R)^(m - 1) is constant,
+    with m from both curves, the T-method of Harter (AFGROW manual). m must lie in [0, 1].
+
+    Examples
+    --------
+    >>> law = rate_table({0.1: ([10, 20], [1e-8, 1e-7]), 0.5: ([7.5, 15], [1e-8, 1e-7])})
+    >>> print(f"{law(17.685246, 0.3):.4g}")
+    1e-07
+    """
+
+    curves: Any
+    outside: str = "refuse"
+    ratio: Ratio | None = None
+
+    def __post_init__(self) -> None:
+        check_ratio("rate_table", self.ratio)
+        one_of(self.outside, "rate_table: outside", ("refuse", "nearest"))
+        given: list[tuple[Any, Any]] = []
+        if isinstance(self.curves, Mapping):
+            given = list(self.curves.items())
+        elif isinstance(self.curves, tuple):  # a law that is made from another one
+            given = [(R, (dK, rate)) for R, dK, rate in self.curves]
+        if not given:
+            raise ProblemError("rate_table: curves: give a dict of R to (dK, rate).")
+        curves = tuple(sorted(_curve(R, points) for R, points in given))
+        for low, high in zip(curves, curves[1:]):
+            _check_pair(low, high)
+        object.__setattr__(self, "curves", curves)
+
+    @property
+    def knows_negative_ratios(self) -> bool:
+        """Whether it has a curve for R < 0, or takes the nearest one."""
+        return len(self.curves) > 1
+
+    def to(self, units: str, new: str) -> "rate_table":
+        """The same law in other units; see `WithUnits.to`."""
+        by_K, by_length = factors(units, new)
+        curves = {
+            R: (np.array(dK) * by_K, np.array(rate) * by_length) for R, dK, rate in self.curves
+        }
+        return rate_table(curves, self.outside, self.ratio)
+
+    def __call__(self, dK_eq: ArrayLike, R: ArrayLike) -> Floats:
+        """Growth a cycle of each point, length."""
+        lowest, highest = self.curves[0][0], self.curves[-1][0]
+        bounds = (lowest, highest) if self.outside == "refuse" and len(self.curves) > 1 else None
+        dK, ratio = range_and_ratio("rate_table", dK_eq, R, bounds)
+        dK, ratio = np.broadcast_arrays(dK, ratio)
+        ratio = np.clip(ratio, lowest, highest)
+        result = np.zeros(dK.shape)
+        left = np.ones(dK.shape, dtype=bool)
+        for low, high in zip(self.curves, self.curves[1:] or self.curves):
+            mine = left & (ratio <= high[0] + (high is low))
+            result[mine] = _between(low, high, dK[mine], ratio[mine])
+            left &= ~mine
+        return result[()]
+
+
+def _curve(R: Any, points: Any) -> Curve:
+    """One curve, checked."""
+    ratio = number(R, "rate_table: R", below=1)
+    try:
+        dK, rate = points
+    except (TypeError, ValueError):
+        raise ProblemError(f"rate_table: curve of R = {ratio:g}: give (dK, rate).") from None
+    dK = numbers(dK, f"rate_table: dK of R = {ratio:g}", (None,))
+    rate = numbers(rate, f"rate_table: rate of R = {ratio:g}", (len(dK),))
+    rises = all(len(x) > 1 and x[0] > 0 and (np.diff(x) > 0).all() for x in (dK, rate))
+    if not rises:
+        raise ProblemError(
+            f"rate_table: curve of R = {ratio:g}: give two or more points, ranges and rates "
+            "positive and rising."
+        )
+    return ratio, tuple(dK.tolist()), tuple(rate.tolist())
+
+
+def _knots(low: Curve, high: Curve) -> tuple[Floats, Floats, Floats]:
+    """Logarithms of the rates that both curves have, and of the range of each there."""
+    first, last = max(low[2][0], high[2][0]), min(low[2][-1], high[2][-1])
+    rates = np.union1d(low[2], high[2])
+    rates = np.log(rates[(rates >= first) & (rates <= last)])
+    one, other = (np.interp(rates, np.log(c[2]), np.log(c[1])) for c in (low, high))
+    return rates, one, other
+
+
+def _check_pair(low: Curve, high: Curve) -> None:
+    """Refuse neighbours whose curves cross, or are too far apart."""
+    if low[0] == high[0]:
+        raise ProblemError(f"rate_table: two curves of R = {low[0]:g}.")
+    rates, one, other = _knots(low, high)
+    if len(rates) < 2:
+        raise ProblemError(
+            f"rate_table: the curves of R = {low[0]:g} and {high[0]:g} have no rates in common."
+        )
+    m = 1 + (one - other) / np.log((1 - high[0]) / (1 - low[0]))
+    if (m < -_ROUND_OFF).any() or (m > 1 + _ROUND_OFF).any():
+        worst = int(np.argmax(np.abs(m - 0.5)))
+        raise ProblemError(
+            f"rate_table: the curves of R = {low[0]:g} and {high[0]:g} have Walker's exponent "
+            f"{m[worst]:.3g} at the rate {np.exp(rates[worst]):.3g}: it must lie in [0, 1]."
+        )
+
+
+def _between(low: Curve, high: Curve, dK: Floats, R: Floats) -> Floats:
+    """Rates of points `(n,)` with R between those of two curves, or on one curve."""
+    if high[0] == low[0]:
+        rates, one = np.log(low[2]), np.log(low[1])
+        weight, other = np.zeros(len(R)), one
+    else:
+        rates, one, other = _knots(low, high)
+        weight = np.log((1 - low[0]) / (1 - R)) / np.log((1 - low[0]) / (1 - high[0]))
+        # on a curve all of it counts, not only the rates that its neighbour has too
+        on_low, on_high = R <= low[0], R >= high[0]
+        if on_low.any() or on_high.any():
+            result = np.zeros(len(R))
+            for curve, mine in ((low, on_low), (high, on_high)):
+                result[mine] = _between(curve, curve, dK[mine], R[mine])
+            rest = ~(on_low | on_high)
+            if rest.any():
+                result[rest] = _between(low, high, dK[rest], R[rest])
+            return result
+    knots = one + weight[:, None] * (other - one)
+    with np.errstate(divide="ignore"):
+        x = np.log(dK)
+    piece = np.clip((knots <= x[:, None]).sum(axis=1), 1, len(rates) - 1)
+    row = np.arange(len(x))
+    left, right = knots[row, piece - 1], knots[row, piece]
+    x_inside = np.clip(x, knots[:, 0], knots[:, -1])
+    share = (x_inside - left) / (right - left)
+    rate = np.exp(rates[piece - 1] + share * (rates[piece] - rates[piece - 1]))
+    below, above = x < knots[:, 0] - _ROUND_OFF, x > knots[:, -1] + _ROUND_OFF
+    return np.asarray(np.where(below, 0.0, np.where(above, np.inf, rate)))
+
+
+__all__ = ["rate_table"]

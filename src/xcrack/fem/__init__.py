@@ -1,0 +1,1 @@
+"""Cut cells, enriched functions, quadrature and matrices."""

@@ -1,0 +1,253 @@
+"""Cut of a mesh by a crack: sub-cells, lips and the cells at tips and fronts.
+
+All topology comes from the linear interpolant of the nodal level set, so that it is watertight
+from cell to cell. Sub-cell fractions are products of positive cut positions (no cancellation):
+tiny pieces keep their relative accuracy.
+"""
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from xcrack.base.arrays import Bools, Floats, Ints, lock
+from xcrack.fem.cut_ends import front_parts, lips_up_to_fronts, lips_up_to_tips, tip_parts
+from xcrack.fem.kinks_2d import Kinks, no_kinks, sharpened
+from xcrack.fem.level_set import LevelSet
+from xcrack.mesh.locate import barycentric
+from xcrack.mesh.mesh import Mesh
+from xcrack.mesh.split import cut_simplices, interface_simplices
+
+_Subs = tuple[Ints, Floats, Floats, Ints]  # cell, barycentric vertices, share, side
+
+
+@dataclass(frozen=True, eq=False)
+class Cut:
+    """Where one crack runs through a mesh.
+
+    Attributes
+    ----------
+    level_set : LevelSet
+    cells : (k,) array of int
+        Cells cut from side to side (cells at tips and fronts are not among them).
+    sub_to_cell, sub_bary, sub_fraction, sub_side : arrays
+        Sub-cells of the cut cells and of the tip cells: mesh cell, barycentric coordinates of the
+        vertices `(s, d + 1, d + 1)`, share of the cell's volume, side +1 or -1. In 2D vertex 0
+        of every sub-cell of a tip cell is the tip; in 3D no sub-cell at a front has parts both
+        ahead of it and behind.
+    lip_cell : (l, 2) array of int
+        Cell on side - and on side + of each lip segment or triangle; twice the same inside a cell.
+    lip_bary : (l, 2, d, d + 1) array
+        Its vertices in the barycentric coordinates of these cells.
+    lip_normal : (l, d) array
+        From lip - to lip +.
+    cut_edge : (e,) array
+        Cut position on each mesh edge, from its first point, nan where the crack does not cross.
+    side : (m,) array of int
+        Side of each cell, 0 where phi changes its sign in it.
+    kinks : Kinks
+        In 2D: where the crack is not cut as phi says.
+    """
+
+    level_set: LevelSet
+    cells: Ints
+    sub_to_cell: Ints
+    sub_bary: Floats
+    sub_fraction: Floats
+    sub_side: Ints
+    lip_cell: Ints
+    lip_bary: Floats
+    lip_normal: Floats
+    cut_edge: Floats
+    side: Ints
+    kinks: Kinks = field(default_factory=no_kinks)
+
+    @cached_property
+    def is_cut(self) -> Bools:
+        """Which cells are cut from side to side `(m,)`."""
+        flag = np.zeros(len(self.side), dtype=bool)
+        flag[self.cells] = True
+        return lock(flag)
+
+    @cached_property
+    def is_tip(self) -> Bools:
+        """Which cells contain a tip `(m,)`."""
+        flag = np.zeros(len(self.side), dtype=bool)
+        for cells in self.level_set.tip_cells:
+            flag[cells] = True
+        return lock(flag)
+
+    def level(self, mesh: Mesh, cell: Ints, bary: Floats) -> Floats:
+        """A level set whose zero is the cut, at points of cells `(q,)`, length."""
+        result = np.einsum("qb,qb->q", bary, self.level_set.phi[mesh.cells[cell]])
+        if len(self.kinks.cells):
+            row = np.full(len(mesh.cells), -1)
+            row[self.kinks.cells] = np.arange(len(self.kinks.cells))
+            bent = np.nonzero(row[cell] >= 0)[0]
+            result[bent] = self.kinks.level(row[cell[bent]], bary[bent])
+        return np.asarray(result)
+
+    @property
+    def n_tips(self) -> int:
+        """Number of tips of the crack."""
+        return len(self.level_set.psi)
+
+    def lip_points(self, mesh: Mesh) -> Floats:
+        """Vertices of the segments or triangles of the crack faces `(l, d, d)`, length."""
+        return np.einsum(
+            "lvb,lbd->lvd", self.lip_bary[:, 1], mesh.points[mesh.cells[self.lip_cell[:, 1]]]
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class _Lips:
+    cell: Ints
+    bary: Floats
+
+
+def cut(mesh: Mesh, level_set: LevelSet) -> Cut:
+    """Cut a mesh along the level sets of a crack."""
+    phi = level_set.phi
+    values = phi[mesh.cells]
+    columns = np.ascontiguousarray(values.T)  # minima of few values are quick along the first axis
+    low = columns.min(axis=0)
+    crossed = (low < 0) & (columns.max(axis=0) > 0)
+    positions, exists = _edge_positions(mesh, phi)
+    is_tip = np.zeros(len(mesh.cells), dtype=bool)
+    for cells in level_set.tip_cells:
+        is_tip[cells] = True
+    candidates = np.nonzero(crossed & ~is_tip)[0]
+    lip, owner = interface_simplices(values[candidates])
+    psi = np.einsum("svb,sb->s", lip, level_set.inside[mesh.cells[candidates[owner]]])
+    sign_change = exists[mesh.cell_to_edge[candidates]]
+    close = (level_set.near[mesh.cell_to_edge[candidates]] | ~sign_change).all(axis=1)
+    through = close & (np.bincount(owner, psi, len(candidates)) < 0)
+    cells = candidates[through]
+
+    edge_flag = np.zeros(len(mesh.edges), dtype=bool)
+    edge_flag[mesh.cell_to_edge[cells]] = True
+    kinks = no_kinks()
+    if len(level_set.line) > 2:
+        at = np.where(edge_flag, positions, np.nan)
+        kinks, at = sharpened(mesh, level_set, cells, at)
+        positions = np.where(edge_flag, at, positions)
+    if len(kinks.cells):
+        subs, lips = _kinked_parts(kinks, values, cells)
+    else:
+        bary, fraction, side, parent = cut_simplices(values[cells])
+        subs = [(cells[parent], bary, fraction, side)]
+        lips = [_both(candidates[owner[through[owner]]], lip[through[owner]])]
+    for end_subs, end_lips, entry in _END_PARTS[mesh.dim](mesh, level_set, positions, exists):
+        subs.append(end_subs)
+        lips.append(_both(*end_lips))
+        edge_flag[entry] = True
+    lips.append(_facet_lips(mesh, level_set))
+    lip_cell = np.concatenate([part.cell for part in lips])
+    lip_bary = np.concatenate([part.bary for part in lips])
+    return Cut(
+        level_set=level_set,
+        cells=lock(cells),
+        sub_to_cell=lock(np.concatenate([s[0] for s in subs])),
+        sub_bary=lock(np.concatenate([s[1] for s in subs])),
+        sub_fraction=lock(np.concatenate([s[2] for s in subs])),
+        sub_side=lock(np.concatenate([s[3] for s in subs])),
+        lip_cell=lock(lip_cell),
+        lip_bary=lock(lip_bary),
+        lip_normal=lock(_lip_normals(mesh, phi, lip_cell, lip_bary)),
+        cut_edge=lock(np.where(edge_flag & exists, positions, np.nan)),
+        side=lock(np.where(crossed, 0, np.where(low >= 0, 1, -1))),
+        kinks=kinks,
+    )
+
+
+def _kinked_parts(kinks: Kinks, values: Floats, cells: Ints) -> tuple[list[_Subs], list[_Lips]]:
+    """Sub-cells and crack faces of cut cells, in some of which the crack has a kink."""
+    values = np.array(values)
+    values[kinks.cells] = kinks.values
+    rows, split = kinks.split()
+    bent = kinks.cells[rows]
+    bary, fraction, side, parent = cut_simplices(values[cells])
+    straight = ~np.isin(cells[parent], bent)
+    whole = (cells[parent][straight], bary[straight], fraction[straight], side[straight])
+    lip, owner = interface_simplices(values[cells])
+    straight = ~np.isin(cells[owner], bent)
+    parts = [(cells[owner][straight], lip[straight])]
+    parts += [(bent, kinks.faces(rows)[:, k]) for k in (0, 1)]
+    owner, lip = (np.concatenate(part) for part in zip(*parts, strict=True))
+    length = np.abs(lip[:, 1] - lip[:, 0]).max(axis=1)
+    keep = length > 1e-13
+    return [whole, split], [_both(owner[keep], lip[keep])]
+
+
+def _both(cell: Ints, bary: Floats) -> _Lips:
+    """Lips inside cells: the same cell on both sides."""
+    return _Lips(np.stack([cell, cell], axis=1), np.stack([bary, bary], axis=1))
+
+
+def _cell_sides(values: Floats) -> Ints:
+    largest = np.take_along_axis(values, np.abs(values).argmax(axis=1)[:, None], 1)[:, 0]
+    return np.where(largest >= 0, 1, -1).astype(np.int64)
+
+
+def _edge_positions(mesh: Mesh, phi: Floats) -> tuple[Floats, Bools]:
+    a, b = phi[mesh.edges].T
+    exists = a * b < 0
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(exists, a / (a - b), np.nan), exists
+
+
+def _facet_lips(mesh: Mesh, level_set: LevelSet) -> _Lips:
+    """Crack faces that lie on facets of the mesh, each assembled once from its two cells."""
+    d = mesh.dim
+    on_crack = level_set.phi == 0
+    empty = _Lips(np.zeros((0, 2), np.int64), np.zeros((0, 2, d, d + 1)))
+    if on_crack.sum() < d:
+        return empty
+    zero = on_crack[mesh.facets].all(axis=1)
+    facets = np.nonzero(zero & (mesh.facet_to_cell[:, 1] >= 0))[0]
+    if not len(facets):
+        return empty
+    cells = mesh.facet_to_cell[facets]
+    side = _cell_sides(level_set.phi[mesh.cells[cells.ravel()]]).reshape(-1, 2)
+    psi = level_set.inside[mesh.facets[facets]]
+    keep = (psi.min(axis=1) < 0) & (side[:, 0] != side[:, 1])
+    facets, cells, side, psi = facets[keep], cells[keep], side[keep], psi[keep]
+    if not len(facets):
+        return empty
+    cells = np.where(side[:, :1] > 0, cells[:, ::-1], cells)
+    x, row = _UP_TO_ENDS[d](mesh, level_set, facets, cells, psi)
+    cells = cells[row]
+    bary = np.stack(
+        [
+            np.stack([barycentric(mesh, cells[:, s], x[:, v]) for v in range(d)], axis=1)
+            for s in (0, 1)
+        ],
+        axis=1,
+    )
+    return _Lips(cells, np.where(np.abs(bary) < 1e-14, 0.0, bary))
+
+
+def _lip_normals(mesh: Mesh, phi: Floats, cell: Ints, bary: Floats) -> Floats:
+    """Unit normals of lip segments, exactly perpendicular to them, towards growing phi."""
+    corners = np.einsum("lvb,lbd->lvd", bary[:, 1], mesh.points[mesh.cells[cell[:, 1]]])
+    slope = np.einsum("lb,lbd->ld", phi[mesh.cells[cell[:, 1]]], mesh.gradient[cell[:, 1]])
+    normal = _ACROSS[mesh.dim](corners)
+    length = np.linalg.norm(normal, axis=1, keepdims=True)
+    normal = normal / np.maximum(length, 1e-300)
+    return np.asarray(normal * np.sign(np.einsum("ld,ld->l", normal, slope))[:, None])
+
+
+def _across_segments(corners: Floats) -> Floats:
+    along = corners[:, 1] - corners[:, 0]
+    return np.stack([-along[:, 1], along[:, 0]], axis=1)
+
+
+def _across_triangles(corners: Floats) -> Floats:
+    return np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+
+
+# What differs with the dimension: the cells at tips and fronts, where lips on facets of the mesh
+# end, and a vector across a lip.
+_END_PARTS = {2: tip_parts, 3: front_parts}
+_UP_TO_ENDS = {2: lips_up_to_tips, 3: lips_up_to_fronts}
+_ACROSS = {2: _across_segments, 3: _across_triangles}

@@ -1,0 +1,278 @@
+"""Facets split where cracks cross them, and the integration points that neighbours share."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+
+from xcrack.base.arrays import Bools, Floats, Ints, offsets
+from xcrack.fem.function_space import FunctionSpace
+from xcrack.fem.quadrature import lip_side, radius_at, segment_points, triangle_points
+from xcrack.mesh.mesh import numbers_of
+from xcrack.mesh.split import cut_simplices
+
+_AT = 1e-10  # share of a facet's level set below which a value is zero
+
+
+@dataclass(frozen=True, eq=False)
+class FacetParts:
+    """Parts of facets.
+
+    Attributes
+    ----------
+    number : (s,) array of int
+        Row of the facet that each part belongs to.
+    bary : (s, d, d) array
+        Vertices in barycentric coordinates of the facet.
+    side : (s, cracks) array of int
+        Side of the part, 0 where it lies on the crack or phi changes its sign on it.
+    """
+
+    number: Ints
+    bary: Floats
+    side: Ints
+
+
+def split_facets(space: FunctionSpace, ends: Ints) -> FacetParts:
+    """Split facets `(k, d)`, given by their points, where cracks cross them.
+
+    In 3D those of cells at a front are split along psi too.
+    """
+    return _SPLIT[space.dim](space, ends)
+
+
+def part_points(
+    space: FunctionSpace, nodes: Ints, bary: Floats, n: int = 6
+) -> tuple[Ints, Floats, Floats]:
+    """Integration points on segments or triangles inside simplices, graded towards tips.
+
+    The rule depends only on the part, so that the cells on both sides of a facet share it.
+
+    Parameters
+    ----------
+    space : FunctionSpace
+    nodes : (s, m) array of int
+        Points of the facets or cells that the parts lie in.
+    bary : (s, d, m) array
+        Vertices of the parts in them.
+    n : int
+        Gauss points of a segment.
+
+    Returns
+    -------
+    number : (q,) array of int
+        Part of each point.
+    place : (q, d) array
+        Barycentric coordinates in the part.
+    weight : (q,) array
+        Length or area.
+    """
+    x = np.einsum("svm,smd->svd", bary, space.mesh.points[nodes])
+    return _POINTS[space.dim](space, x, nodes, bary, n)
+
+
+def _on_segments(
+    space: FunctionSpace, x: Floats, nodes: Ints, bary: Floats, n: int
+) -> tuple[Ints, Floats, Floats]:
+    return segment_points(space, np.ascontiguousarray(x[:, 0]), np.ascontiguousarray(x[:, 1]), n)
+
+
+def _on_triangles(
+    space: FunctionSpace, x: Floats, nodes: Ints, bary: Floats, n: int
+) -> tuple[Ints, Floats, Floats]:
+    sides = x[:, [1, 2, 0]] - x
+    size = np.linalg.norm(sides, axis=2).max(axis=1)
+    number, place, share = triangle_points(radius_at(space, nodes, bary), size)
+    area = np.linalg.norm(np.cross(sides[:, 0], sides[:, 2]), axis=1) / 2
+    order = np.argsort(number, kind="stable")
+    number = number[order]
+    return number, place[order], area[number] * share[order]
+
+
+def _split_segments(space: FunctionSpace, ends: Ints) -> FacetParts:
+    from xcrack.mesh.kernels.segments import split
+
+    edge = numbers_of(space.mesh, ends)  # in 2D facets are edges
+    position, level = (
+        np.empty((len(space.cuts), len(ends))),
+        np.empty((len(space.cuts), *ends.shape)),
+    )
+    for c, cut in enumerate(space.cuts):
+        position[c], level[c] = cut.cut_edge[edge], cut.level_set.phi[ends]
+    return FacetParts(*split(np.array(ends), position, level))
+
+
+def _split_triangles(space: FunctionSpace, ends: Ints) -> FacetParts:
+    k = len(ends)
+    number, bary = np.arange(k), np.broadcast_to(np.eye(3), (k, 3, 3))
+    side = np.zeros((k, len(space.cuts)), dtype=np.int64)
+    facet = space.mesh.facet_numbers(ends)
+    for c, cut in enumerate(space.cuts):
+        touched, at_front = _touched(space, c)
+        levels = [(cut.level_set.phi, touched)]
+        levels += [(psi, at_front) for psi in cut.level_set.psi]
+        for values, where in levels:
+            chosen = where[facet[number]]
+            number, bary, side = _split(number, bary, side, values[ends], chosen)
+        at = np.einsum("svb,sb->sv", bary, cut.level_set.phi[ends[number]])
+        largest = np.take_along_axis(at, np.abs(at).argmax(axis=1)[:, None], 1)[:, 0]
+        changes = (at.min(axis=1) < 0) & (at.max(axis=1) > 0) & ~touched[facet[number]]
+        side[:, c] = np.where(changes, 0, np.sign(largest))
+    return FacetParts(number, bary, side)
+
+
+def _touched(space: FunctionSpace, c: int) -> tuple[Bools, Bools]:
+    """Facets of the cells that crack c cuts or ends in, and of the latter alone."""
+    mesh, cut = space.mesh, space.cuts[c]
+    flags = []
+    for cells in (cut.is_cut | cut.is_tip, cut.is_tip):
+        flag = np.zeros(len(mesh.facets), dtype=bool)
+        flag[mesh.cell_to_facet[cells]] = True
+        flags.append(flag)
+    return flags[0], flags[1]
+
+
+_SPLIT = {2: _split_segments, 3: _split_triangles}
+_POINTS = {2: _on_segments, 3: _on_triangles}
+
+
+def _split(
+    number: Ints, bary: Floats, side: Ints, values: Floats, chosen: Bools
+) -> tuple[Ints, Floats, Ints]:
+    """Split those of the chosen parts on which a function of the facet changes its sign."""
+    at = np.einsum("svb,sb->sv", bary, values[number])
+    small = _AT * np.abs(values[number]).max(axis=1, keepdims=True)
+    at = np.where(np.abs(at) < small, 0.0, at)
+    cut = chosen & (at.min(axis=1) < 0) & (at.max(axis=1) > 0)
+    same, rows = np.nonzero(~cut)[0], np.nonzero(cut)[0]
+    inner, _, _, parent = cut_simplices(at[rows])
+    source = np.concatenate([same, rows[parent]])
+    finer = np.einsum("svw,swb->svb", inner, bary[rows[parent]])
+    return number[source], np.concatenate([bary[same], finer]), side[source]
+
+
+# Integration points on the faces of a crack, shared by contact, loads and K.
+
+
+@dataclass(frozen=True, eq=False)
+class LipPoints:
+    """Integration points on the faces of one crack.
+
+    Attributes
+    ----------
+    segment : (q,) array of int
+        Lip segment or triangle of the cut.
+    cell : (q, 2) array of int
+        Cell on side - and on side +.
+    bary : (q, 2, d + 1) array
+    weight : (q,) array, length^(d - 1)
+    normal : (q, d) array
+        From lip - to lip +.
+    x : (q, d) array, length
+    s : (q,) array, length
+        In 2D: position along the crack from where it enters the body; zero in 3D.
+    """
+
+    segment: Ints
+    cell: Ints
+    bary: Floats
+    weight: Floats
+    normal: Floats
+    x: Floats
+    s: Floats
+
+    def __len__(self) -> int:
+        return len(self.weight)
+
+
+def lip_points(space: FunctionSpace, c: int, n: int = 6) -> LipPoints:
+    """Points on the faces of crack c, graded towards its tips, in the order of the crack."""
+    cut, mesh = space.cuts[c], space.mesh
+    bary = cut.lip_bary
+    # The ends of a segment on a facet are sorted as the boundary rule sorts them.
+    k, place, weight = part_points(space, mesh.cells[cut.lip_cell[:, 1]], bary[:, 1], n)
+    at = np.einsum("qv,qsvb->qsb", place, bary[k])
+    corners = cut.lip_points(mesh)
+    x = np.einsum("qv,qvd->qd", place, corners[k])
+    s = _POSITION[mesh.dim](space.cracks[c].points, x, corners)
+    order = np.argsort(s, kind="stable")
+    k = k[order]
+    return LipPoints(
+        k,
+        cut.lip_cell[k],
+        at[order],
+        weight[order],
+        cut.lip_normal[k],
+        x[order],
+        s[order],
+    )
+
+
+def _along_line(polyline: Floats, x: Floats, corners: Floats) -> Floats:
+    ends = arc_position(polyline, corners.reshape(-1, 2))
+    return arc_position(polyline, x) - ends.min(initial=np.inf)
+
+
+def _nowhere(points: Floats, x: Floats, corners: Floats) -> Floats:
+    """A surface has no order of its points."""
+    return np.zeros(len(x))
+
+
+_POSITION = {2: _along_line, 3: _nowhere}
+
+
+def arc_position(polyline: Floats, x: Floats) -> Floats:
+    """Position of points along a polyline, from its first point `(k,)`, length."""
+    a, along = polyline[:-1], np.diff(polyline, axis=0)
+    length = np.linalg.norm(along, axis=1)
+    start = np.concatenate([[0.0], np.cumsum(length)[:-1]])
+    t = np.einsum("ksd,sd->ks", x[:, None] - a, along) / length**2
+    t = np.clip(t, 0.0, 1.0)
+    foot = a + t[..., None] * along
+    best = np.argmin(np.linalg.norm(x[:, None] - foot, axis=2), axis=1)
+    row = np.arange(len(x))
+    return start[best] + t[row, best] * length[best]
+
+
+def jump_values(space: FunctionSpace, c: int, lips: LipPoints) -> list[tuple[Ints, Ints, Floats]]:
+    """Signed traces of the functions on both crack faces: + lip minus - lip.
+
+    Returns
+    -------
+    list of (functions (k, n), numbers of the points (k,), values (k, n))
+        For each lip and batch; the jump at a point is the sum over all entries of the point.
+    """
+    result = []
+    for s, sign in ((0, -1), (1, 1)):
+        cell = lips.cell[:, s]
+        side = lip_side(space, c, cell, lips.bary[:, s], sign)
+        for batch, number, row in space.batches_of_points(cell):
+            N, _ = space.tabulate(batch, row, lips.bary[number, s], side[number], slopes=False)
+            result.append((batch.functions[row], number, sign * N))
+    return result
+
+
+def jump_matrix(
+    space: FunctionSpace, c: int, lips: LipPoints, along: Floats | None = None
+) -> sp.csr_matrix:
+    """Jump n . [[u]] at the lip points `(q, n_dof)`; with directions `along` (q, d), theirs."""
+    direction = lips.normal if along is None else along
+    rows, columns, values = [], [], []
+    for functions, number, N in jump_values(space, c, lips):
+        acts = (functions >= 0) & (N != 0)
+        rows.append(np.broadcast_to(number[:, None], functions.shape)[acts])
+        columns.append(functions[acts])
+        values.append(N[acts])
+    place = np.concatenate(rows) * np.int64(space.n_functions) + np.concatenate(columns)
+    place, number = np.unique(place, return_inverse=True)
+    jump = np.bincount(number, np.concatenate(values), len(place))
+    differs = jump != 0  # standard functions take one value on both lips of a cell
+    point, function = np.divmod(place[differs], space.n_functions)
+    d = space.dim
+    entries = (jump[differs, None] * direction[point]).ravel()
+    unknown = (function[:, None] * d + np.arange(d)).ravel().astype(np.int32)
+    start = offsets(np.bincount(point, minlength=len(lips)) * d).astype(np.int32)
+    return sp.csr_matrix((entries, unknown, start), shape=(len(lips), space.n_dof))
+
+
+__all__ = []

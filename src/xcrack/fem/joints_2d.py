@@ -1,0 +1,183 @@
+"""Cuts of cracks that end on others in 2D.
+
+The crack that ends is cut a little beyond the other one, as if it ran on, and that part is taken
+away again: then both end on the same linear level set, and nothing depends on where in a cell
+they meet. Beyond the other crack its side is 0: the junction function of Daux et al. (2000).
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from xcrack.base.arrays import Bools, Floats, Ints, lock
+from xcrack.crack.junctions import REACH, Junction
+from xcrack.fem.cut import Cut
+from xcrack.mesh.locate import cells_around
+from xcrack.mesh.mesh import Mesh
+
+_ROOM, _LEAST = 0.7, 0.1  # cells by which nodes of both cracks are within the reach, or must be
+_FROM_TIP = 0.5  # cells between the reach and the next tip
+
+
+@dataclass(frozen=True, eq=False)
+class Joint:
+    """Where one crack of a mesh ends on another one.
+
+    Attributes
+    ----------
+    crack, on : int
+        The crack that ends, and the one that it ends on.
+    side : int
+        Side of the latter, +1 or -1, from which the former comes.
+    x : (2,) array, length
+        Where their cuts meet.
+    centre : (2,) array, length
+        Where the cracks meet.
+    reach : float, length
+        Around the centre.
+    near : (m,) array of bool
+        Cells in which sides are those of the junction.
+    both : (m,) array of bool
+        Cells cut by both cracks.
+    """
+
+    crack: int
+    on: int
+    side: int
+    x: Floats
+    centre: Floats
+    reach: float
+    near: Bools
+    both: Bools
+
+
+def joined_cuts(
+    mesh: Mesh, cuts: tuple[Cut, ...], junctions: tuple[Junction, ...]
+) -> tuple[tuple[Cut, ...], tuple[Joint, ...]]:
+    """Cuts without what lies beyond junctions, and the junctions in the mesh.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    cuts : tuple of Cut
+        Of cracks prolonged beyond those on which they end.
+    junctions : tuple of Junction
+
+    Returns
+    -------
+    cuts : tuple of Cut
+    joints : tuple of Joint
+    """
+    result, joints = list(cuts), []
+    for own in junctions:
+        through, ending, joint = _joined(mesh, result[own.on], result[own.crack], own)
+        result[own.on], result[own.crack] = through, ending
+        joints.append(joint)
+    return tuple(result), tuple(joints)
+
+
+def _joined(mesh: Mesh, through: Cut, ending: Cut, own: Junction) -> tuple[Cut, Cut, Joint]:
+    """Cuts of the crack that runs through and of the one that ends on it."""
+    centre = mesh.points[mesh.cells].mean(axis=1)
+    own = replace(own, reach=_reach(mesh, through, ending, own))
+    near = np.linalg.norm(centre - own.x, axis=1) < own.reach
+    split = _split(mesh, through, ending, own, near)
+    lips = split.lip_points(mesh)
+    values = np.abs(_at(mesh, ending.level_set.phi, split.lip_cell[:, 1], split.lip_bary[:, 1]))
+    away = np.linalg.norm(lips - own.x, axis=2) + values
+    x = lips.reshape(-1, 2)[int(np.argmin(away))]
+    clipped, both = _clipped(mesh, through, ending, own, near)
+    joint = Joint(own.crack, own.on, own.side, lock(x), own.x, own.reach, lock(near), lock(both))
+    return split, clipped, joint
+
+
+def _reach(mesh: Mesh, through: Cut, ending: Cut, own: Junction) -> float:
+    """Radius that holds all points whose cells both cracks cut, and no tip.
+
+    Cells that both cracks cut lie farther from a shallow junction than their mean size tells.
+    """
+    h = float(mesh.cell_size[cells_around(mesh, own.x, 1e-9)].mean())
+    flags = np.zeros((2, mesh.n_points), dtype=bool)
+    for flag, cut in zip(flags, (through, ending), strict=True):
+        flag[mesh.cells[cut.cells]] = True
+    away = np.linalg.norm(mesh.points[flags.all(axis=0)] - own.x, axis=1)
+    common = float(away[away < 2 * own.reach].max(initial=0.0))
+    tips = [*through.level_set.tip, *ending.level_set.tip]
+    tip = min((float(np.linalg.norm(x - own.x)) for x in tips), default=np.inf)
+    wanted = min(max(own.reach, common + _ROOM * h), tip - _FROM_TIP * h)
+    return max(wanted, min(max(common + _LEAST * h, REACH * h), own.reach))
+
+
+def _at(mesh: Mesh, values: Floats, cell: Ints, bary: Floats) -> Floats:
+    """A linear function at points of cells `(k, v)`."""
+    return np.asarray(np.einsum("kvb,kb->kv", bary, values[mesh.cells[cell]]))
+
+
+def _between(bary: Floats, share: Floats) -> Floats:
+    """Points on segments `(k, 2, 2, 3)` at a share of their way `(k, 2, 3)`."""
+    t = share[:, None, None]
+    return np.asarray((1 - t) * bary[:, :, 0] + t * bary[:, :, 1])
+
+
+def _clipped(
+    mesh: Mesh, through: Cut, ending: Cut, own: Junction, near: Bools
+) -> tuple[Cut, Bools]:
+    """The cut of the crack that ends, without what lies beyond the other, and the cells of both."""
+    phi, side = through.level_set.phi, own.side
+    cell = ending.lip_cell[:, 0]
+    value = _at(mesh, phi, cell, ending.lip_bary[:, 0]) * side
+    value[np.abs(value) < 1e-13 * mesh.cell_size[cell, None]] = 0.0
+    keep = ~near[cell] | (value > 0).any(axis=1)
+    shorten = near[cell] & keep & (value < 0).any(axis=1)
+    bary = np.array(ending.lip_bary)
+    rows = np.nonzero(shorten)[0]
+    a, b = value[rows].T
+    bary[rows, :, (b < 0).astype(np.int64)] = _between(bary[rows], a / (a - b))
+    gone = np.zeros(len(mesh.cells), dtype=bool)
+    gone[cell[~keep & (cell == ending.lip_cell[:, 1])]] = True
+    cells = ending.cells[~gone[ending.cells]]
+    both = np.zeros(len(mesh.cells), dtype=bool)
+    both[cells] = through.is_cut[cells] & near[cells]
+    subs = ~(gone | both)[ending.sub_to_cell]
+    one, two = mesh.edges.T
+    t = ending.cut_edge
+    at_cut = ((1 - t) * phi[one] + t * phi[two]) * side
+    close = np.linalg.norm(mesh.points[mesh.edges].mean(axis=1) - own.x, axis=1) < own.reach
+    with np.errstate(invalid="ignore"):
+        cut_edge = np.where(close & (at_cut < 0), np.nan, t)
+    sides = np.where(near & (through.side == -side), 0, ending.side)
+    return replace(
+        ending,
+        cells=lock(cells),
+        sub_to_cell=lock(ending.sub_to_cell[subs]),
+        sub_bary=lock(ending.sub_bary[subs]),
+        sub_fraction=lock(ending.sub_fraction[subs]),
+        sub_side=lock(ending.sub_side[subs]),
+        lip_cell=lock(ending.lip_cell[keep]),
+        lip_bary=lock(bary[keep]),
+        lip_normal=lock(ending.lip_normal[keep]),
+        cut_edge=lock(cut_edge),
+        side=lock(sides),
+    ), both
+
+
+def _split(mesh: Mesh, through: Cut, ending: Cut, own: Junction, near: Bools) -> Cut:
+    """The cut of the crack that runs through, its faces split where the other one meets them."""
+    cell = through.lip_cell[:, (own.side + 1) // 2]
+    bary = through.lip_bary[np.arange(len(cell)), (own.side + 1) // 2]
+    value = _at(mesh, ending.level_set.phi, cell, bary)
+    value[np.abs(value) < 1e-13 * mesh.cell_size[cell, None]] = 0.0
+    rows = np.nonzero(
+        near[cell] & ending.is_cut[cell] & (value.min(axis=1) < 0) & (value.max(axis=1) > 0)
+    )[0]
+    a, b = value[rows].T
+    middle = _between(through.lip_bary[rows], a / (a - b))
+    first, second = np.array(through.lip_bary), np.array(through.lip_bary[rows])
+    first[rows, :, 1] = middle
+    second[:, :, 0] = middle
+    return replace(
+        through,
+        lip_cell=lock(np.concatenate([through.lip_cell, through.lip_cell[rows]])),
+        lip_bary=lock(np.concatenate([first, second])),
+        lip_normal=lock(np.concatenate([through.lip_normal, through.lip_normal[rows]])),
+    )

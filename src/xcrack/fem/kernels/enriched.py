@@ -1,0 +1,266 @@
+"""Element stiffness from functions tabulated at integration points, summed into blocks."""
+
+import math
+
+import numpy as np
+
+from xcrack.base.kernels.blas import dsyrk
+from xcrack.base.kernels.jit import kernel
+
+
+@kernel
+def enriched_pattern(functions, n_functions, n_standard):  # type: ignore[no-untyped-def]
+    """Pattern of the blocks of function pairs of which one is enriched.
+
+    Parameters
+    ----------
+    functions : (m, n) array of int
+        Function numbers, -1 for an empty place; below n_standard: standard functions.
+    n_functions, n_standard : int
+
+    Returns
+    -------
+    indptr : (n_functions + 1,) array of int64
+    indices : (k,) array of int32
+        Sorted in each row.
+    """
+    m, n = functions.shape
+    count = np.zeros(n_functions + 1, np.int64)
+    for e in range(m):
+        for a in range(n):
+            if functions[e, a] >= 0:
+                count[functions[e, a] + 1] += 1
+    for i in range(n_functions):
+        count[i + 1] += count[i]
+    around = np.empty(count[n_functions], np.int64)
+    place, mark = np.empty(n_functions, np.int64), np.empty(n_functions, np.int64)
+    for i in range(n_functions):
+        place[i], mark[i] = count[i], -1
+    for e in range(m):
+        for a in range(n):
+            f = functions[e, a]
+            if f >= 0:
+                around[place[f]] = e
+                place[f] += 1
+    indptr = np.zeros(n_functions + 1, np.int64)
+    for i in range(n_functions):
+        entries = 0
+        for k in range(count[i], count[i + 1]):
+            e = around[k]
+            for a in range(n):
+                f = functions[e, a]
+                if f >= 0 and (f >= n_standard or i >= n_standard) and mark[f] != i:
+                    mark[f] = i
+                    entries += 1
+        indptr[i + 1] = indptr[i] + entries
+        place[i] = indptr[i]
+    # The pattern is symmetric: functions that go to their neighbours in turn fill sorted rows.
+    indices = np.empty(indptr[n_functions], np.int32)
+    for i in range(n_functions):
+        for k in range(count[i], count[i + 1]):
+            e = around[k]
+            for a in range(n):
+                f = functions[e, a]
+                if f >= 0 and (f >= n_standard or i >= n_standard) and mark[f] != n_functions + i:
+                    mark[f] = n_functions + i
+                    indices[place[f]] = i
+                    place[f] += 1
+    return indptr, indices
+
+
+@kernel
+def _slot(indptr, indices, row, column):  # type: ignore[no-untyped-def]
+    low, high = indptr[row], indptr[row + 1] - 1
+    while low < high:
+        middle = (low + high) // 2
+        if indices[middle] < column:
+            low = middle + 1
+        else:
+            high = middle
+    return low
+
+
+@kernel
+def _active(functions, n_standard, place):  # type: ignore[no-untyped-def]
+    """Set the places of the functions of a cell; their number, and that of standard ones."""
+    active, plain = 0, 0  # standard functions come first
+    for a in range(len(functions)):
+        if functions[a] >= 0:
+            place[active] = a
+            active += 1
+            if functions[a] < n_standard:
+                plain = active
+    return active, plain
+
+
+@kernel
+def _products(begin, end, weight, gradient, place, active, plain, row, block):  # type: ignore[no-untyped-def]
+    """Integrals of G_ai G_bj over the points of a cell, b >= a, b enriched."""
+    d = gradient.shape[2]
+    for k in range(active * d):
+        for j in range(active * d):
+            block[k, j] = 0.0
+    for q in range(begin, end):
+        for a in range(active):
+            for i in range(d):
+                row[a * d + i] = gradient[q, place[a], i]
+        for a in range(active):
+            start = d * max(a, plain)
+            for i in range(d):
+                scaled = weight[q] * row[a * d + i]
+                line = block[a * d + i]
+                for k in range(start, active * d):
+                    line[k] += scaled * row[k]
+
+
+@kernel
+def _products_by_blas(begin, end, weight, gradient, place, active, rows, block):  # type: ignore[no-untyped-def]
+    """The same products as those of rows of gradients times the root of the weight, by dsyrk."""
+    d, width = gradient.shape[2], block.shape[1]
+    k = active * d
+    for q in range(begin, end):
+        root, at = math.sqrt(weight[q]), (q - begin) * k
+        for a in range(active):
+            for i in range(d):
+                rows[at + a * d + i] = root * gradient[q, place[a], i]
+    size, scalar, letter = np.empty(3, np.int32), np.empty(2), np.empty(2, np.uint8)
+    size[0], size[1], size[2] = k, end - begin, width
+    scalar[0], scalar[1] = 1.0, 0.0
+    letter[0], letter[1] = 76, 78  # L N
+    integer, real, text = size.ctypes.data, scalar.ctypes.data, letter.ctypes.data
+    dsyrk(
+        text,
+        text + 1,
+        integer,
+        integer + 4,
+        real,
+        rows.ctypes.data,
+        integer,
+        real + 8,
+        block.ctypes.data,
+        integer + 8,
+    )
+    for a in range(active):
+        for i in range(d):
+            for j in range(i):
+                block[a * d + i, a * d + j] = block[a * d + j, a * d + i]
+    return size[0] + letter[0] + scalar[0]  # addresses alone keep no array alive
+
+
+@kernel
+def _scatter(  # type: ignore[no-untyped-def]
+    data, indptr, indices, functions, place, at, active, plain, block, lam, mu
+):
+    """Add the stiffness that follows from the products of a cell, in which functions stand `at`."""
+    d = data.shape[1]
+    for a in range(active):
+        fa, k = functions[place[a]], at[a] * d
+        for b in range(max(a, plain), active):
+            fb, m = functions[place[b]], at[b] * d
+            one, other = _slot(indptr, indices, fa, fb), _slot(indptr, indices, fb, fa)
+            trace = 0.0
+            for i in range(d):
+                trace += block[k + i, m + i]
+            for i in range(d):
+                for j in range(d):
+                    v = lam * block[k + i, m + j] + mu * block[k + j, m + i]
+                    if i == j:
+                        v += mu * trace
+                    data[one, i, j] += v
+                    if a != b:
+                        data[other, j, i] += v
+
+
+@kernel
+def add_stiffness(  # type: ignore[no-untyped-def]
+    data, indptr, indices, functions, offsets, weight, gradient, n_standard, lam, mu
+):
+    """Add the elastic stiffness of cells with enriched functions.
+
+    Entry of functions a, b and components i, j: the integral of
+    lam G_ai G_bj + mu G_aj G_bi + mu delta_ij G_a . G_b.
+
+    Parameters
+    ----------
+    data : (k, d, d) array
+        Changed in place.
+    indptr, indices : pattern of the blocks
+    functions : (m, n) array of int
+        Function numbers, -1 for an empty place; below n_standard: standard functions.
+    offsets : (m + 1,) array of int
+        Points of each cell.
+    weight : (q,) array
+    gradient : (q, n, d) array
+    n_standard : int
+    lam, mu : float
+        Lamé constants.
+    """
+    m, n = functions.shape
+    d = gradient.shape[2]
+    place, at = np.empty(n, np.int64), np.empty(n, np.int64)
+    block, row = np.zeros((n * d, n * d)), np.empty(n * d)
+    for a in range(n):
+        at[a] = a
+    most = 0
+    for e in range(m):
+        most = max(most, offsets[e + 1] - offsets[e])
+    rows = np.empty(most * n * d)
+    for e in range(m):
+        active, plain = _active(functions[e], n_standard, place)
+        begin, end = offsets[e], offsets[e + 1]
+        least = 0.0
+        for q in range(begin, end):
+            least = min(least, weight[q])
+        if least < 0.0:
+            _products(begin, end, weight, gradient, place, active, plain, row, block)
+        else:
+            _products_by_blas(begin, end, weight, gradient, place, active, rows, block)
+        _scatter(data, indptr, indices, functions[e], place, at, active, plain, block, lam, mu)
+
+
+@kernel
+def gradient_products(offsets, weight, gradient, plain):  # type: ignore[no-untyped-def]
+    """Integrals of G_ai G_bj in cells, from which their stiffness follows for any material.
+
+    Parameters
+    ----------
+    offsets : (m + 1,) array of int
+        Points of each cell.
+    weight : (q,) array
+    gradient : (q, n, d) array
+    plain : int
+        Leading functions that are standard ones: their products are left out.
+
+    Returns
+    -------
+    (m, n d, n d) array
+        Zero where b < a.
+    """
+    n, d, m = gradient.shape[1], gradient.shape[2], len(offsets) - 1
+    place, row = np.empty(n, np.int64), np.empty(n * d)
+    for a in range(n):
+        place[a] = a
+    result = np.empty((m, n * d, n * d))
+    for e in range(m):
+        _products(offsets[e], offsets[e + 1], weight, gradient, place, n, plain, row, result[e])
+    return result
+
+
+@kernel
+def add_products(  # type: ignore[no-untyped-def]
+    data, indptr, indices, functions, products, n_standard, lam, mu
+):
+    """Add the stiffness of cells whose products are known.
+
+    Parameters
+    ----------
+    data, indptr, indices, functions, n_standard, lam, mu : as of `add_stiffness`
+    products : (m, n d, n d) array
+        As of `gradient_products`.
+    """
+    m, n = functions.shape
+    place = np.empty(n, np.int64)
+    for e in range(m):
+        active, plain = _active(functions[e], n_standard, place)
+        block = products[e]
+        _scatter(data, indptr, indices, functions[e], place, place, active, plain, block, lam, mu)

@@ -1,0 +1,271 @@
+"""Tip functions on hats, tabulated at points, and the correction of their gradients."""
+
+import math
+
+import numpy as np
+
+from xcrack.base.kernels.jit import kernel
+
+
+@kernel
+def set_tips(value, slope, first, row, bary, side, nodes, gradient, phi, psi, active, shift):  # type: ignore[no-untyped-def]
+    """Set shifted tip functions times hats from column `first` on, and their gradients.
+
+    F = sqrt(r) {cos(t/2), sin(t/2), sin(t/2) sin(t), cos(t/2) sin(t)}, the first k of them.
+
+    Parameters
+    ----------
+    value : (q, n) array
+        Changed in place.
+    slope : (q or 0, n, d) array
+        Changed in place; of length 0 where it is not wanted.
+    first : int
+    row : (q,) array of int
+        Cell of each point.
+    bary : (q, d + 1) array
+    side : (q,) array of int
+        Side of the crack, 0 where unknown: it decides the angle on a lip.
+    nodes : (m, d + 1) array of int
+    gradient : (m, d + 1, d) array
+        Gradients of the barycentric coordinates.
+    phi, psi : (n,) arrays
+    active : (n,) array of bool
+        Points that carry the functions.
+    shift : (n, k) array
+        The functions at the points.
+    """
+    q, corners = bary.shape
+    d = corners - 1
+    k = shift.shape[1]
+    slopes = len(slope) > 0
+    F, ahead, normal = np.empty(4), np.empty(4), np.empty(4)
+    to_psi, to_phi, steep = np.empty(d), np.empty(d), np.empty((k, d))
+    for p in range(q):
+        e = row[p]
+        x = 0.0
+        y = 0.0
+        for b in range(corners):
+            x += bary[p, b] * psi[nodes[e, b]]
+            y += bary[p, b] * phi[nodes[e, b]]
+        r = math.sqrt(x * x + y * y)
+        # Between the level set and a kink that the cut follows, the angle goes on beyond pi.
+        beyond = x < 0.0 and -y * side[p] > 1e-9 * r
+        if side[p] != 0 and y * side[p] <= 0.0 and not beyond:
+            y = side[p] * 1e-300
+        # Half the angle without trigonometry; the larger of its sine and cosine by the root.
+        c, s, C, S = 1.0, 0.0, 1.0, 0.0
+        if r > 0.0:
+            C, S = x / r, y / r
+            if x >= 0.0:
+                c = math.sqrt(0.5 * (1.0 + C))
+                s = 0.5 * S / c
+            else:
+                s = math.copysign(math.sqrt(0.5 * (1.0 - C)), side[p] if beyond else y)
+                c = 0.5 * S / s
+        root = math.sqrt(r)
+        F[0], F[1], F[2], F[3] = c, s, s * S, c * S
+        if slopes:
+            ahead[0], ahead[1] = -s / 2, c / 2
+            ahead[2], ahead[3] = c * S / 2 + s * C, -s * S / 2 + c * C
+            for j in range(d):
+                to_psi[j] = 0.0
+                to_phi[j] = 0.0
+                for b in range(corners):
+                    to_psi[j] += psi[nodes[e, b]] * gradient[e, b, j]
+                    to_phi[j] += phi[nodes[e, b]] * gradient[e, b, j]
+            for f in range(4):
+                turn = ahead[f]
+                ahead[f] = (0.5 * F[f] * C - turn * S) / root
+                normal[f] = (0.5 * F[f] * S + turn * C) / root
+        for f in range(k):
+            for j in range(d if slopes else 0):
+                steep[f, j] = ahead[f] * to_psi[j] + normal[f] * to_phi[j]
+        for b in range(corners):
+            node, to, share = nodes[e, b], first + b * k, bary[p, b]
+            if not active[node]:
+                for f in range(k):
+                    value[p, to + f] = 0.0
+                    for j in range(d if slopes else 0):
+                        slope[p, to + f, j] = 0.0
+                continue
+            for f in range(k):
+                lifted = root * F[f] - shift[node, f]
+                value[p, to + f] = share * lifted
+                for j in range(d if slopes else 0):
+                    slope[p, to + f, j] = lifted * gradient[e, b, j] + share * steep[f, j]
+
+
+@kernel
+def add_flux(defect, piece, value, normal, moment):  # type: ignore[no-untyped-def]
+    """Add the boundary integral of value x normal x moment to each piece.
+
+    Parameters
+    ----------
+    defect : (p, f, d, a) array
+        Changed in place.
+    piece : (q,) array of int
+    value : (q, f) array
+    normal : (q, d) array
+        Times the weight.
+    moment : (q, a) array
+    """
+    for q in range(len(piece)):
+        k = piece[q]
+        for f in range(value.shape[1]):
+            v = value[q, f]
+            if v != 0.0:
+                for j in range(normal.shape[1]):
+                    for a in range(moment.shape[1]):
+                        defect[k, f, j, a] += v * normal[q, j] * moment[q, a]
+
+
+@kernel
+def moments_at(row, bary, corners, linear):  # type: ignore[no-untyped-def]
+    """1 and, where wanted, the coordinates at points `(q, 1)` or `(q, d + 1)`.
+
+    Parameters
+    ----------
+    row : (q,) array of int
+        Cell of each point.
+    bary : (q, d + 1) array
+    corners : (m, d + 1, d) array
+        Corners of the cells, from their centre and in units of their size.
+    linear : bool
+    """
+    d = corners.shape[2]
+    moment = np.empty((len(row), d + 1 if linear else 1))
+    for q in range(len(row)):
+        moment[q, 0] = 1.0
+        if linear:
+            for j in range(d):
+                x = 0.0
+                for b in range(d + 1):
+                    x += bary[q, b] * corners[row[q], b, j]
+                moment[q, 1 + j] = x
+    return moment
+
+
+@kernel
+def take_volume(defect, gram, piece, weight, value, slope, moment, scale):  # type: ignore[no-untyped-def]
+    """Subtract the volume integral of the gradient of value x moment from each piece.
+
+    The integrals of the products of moments are added to `gram`.
+
+    Parameters
+    ----------
+    defect : (p, f, d, a) array
+        Changed in place.
+    gram : (p, a, a) array
+        Changed in place.
+    piece : (q,) array of int
+    weight : (q,) array
+    value : (q, f) array
+    slope : (q, f, d) array
+    moment : (q, a) array
+        1 and, if a > 1, the coordinates in units of the size of the cell.
+    scale : (q,) array, 1/length
+        One over that size.
+    """
+    for q in range(len(piece)):
+        k = piece[q]
+        w = weight[q]
+        for a in range(moment.shape[1]):
+            for b in range(moment.shape[1]):
+                gram[k, a, b] += w * moment[q, a] * moment[q, b]
+        for f in range(value.shape[1]):
+            for j in range(slope.shape[2]):
+                for a in range(moment.shape[1]):
+                    defect[k, f, j, a] -= w * slope[q, f, j] * moment[q, a]
+                if moment.shape[1] > 1:
+                    defect[k, f, j, 1 + j] -= w * value[q, f] * scale[q]
+
+
+@kernel
+def solve_moments(defect, gram, least):  # type: ignore[no-untyped-def]
+    """Multiply the defects of each piece by the pseudo-inverse of its Gram matrix.
+
+    By Jacobi rotations, which are as accurate for small eigenvalues as for large ones.
+
+    Parameters
+    ----------
+    defect : (p, f, d, a) array
+        Changed in place.
+    gram : (p, a, a) array
+    least : float
+        Share of the largest eigenvalue up to which others count as zero.
+    """
+    n = gram.shape[1]
+    A, V, inverse, row = np.empty((n, n)), np.empty((n, n)), np.empty((n, n)), np.empty(n)
+    for p in range(len(gram)):
+        total = gram[p, 0, 0] if gram[p, 0, 0] > 1e-300 else 1e-300
+        for i in range(n):
+            for j in range(n):
+                A[i, j] = gram[p, i, j] / total
+                V[i, j] = i == j
+                inverse[i, j] = 0.0
+        for _ in range(60):
+            off, size = 0.0, 0.0
+            for i in range(n):
+                size += A[i, i] ** 2
+                for j in range(i):
+                    off += A[i, j] ** 2
+            if not off > 1e-34 * size:
+                break
+            for i in range(n):
+                for j in range(i):
+                    if A[i, j] == 0.0:
+                        continue
+                    ratio = (A[j, j] - A[i, i]) / (2 * A[i, j])
+                    t = 1 / (abs(ratio) + math.sqrt(ratio * ratio + 1))
+                    t = -t if ratio < 0 else t
+                    c = 1 / math.sqrt(t * t + 1)
+                    s = t * c
+                    for k in range(n):
+                        a, b = A[k, i], A[k, j]
+                        A[k, i], A[k, j] = c * a - s * b, s * a + c * b
+                    for k in range(n):
+                        a, b = A[i, k], A[j, k]
+                        A[i, k], A[j, k] = c * a - s * b, s * a + c * b
+                        a, b = V[k, i], V[k, j]
+                        V[k, i], V[k, j] = c * a - s * b, s * a + c * b
+        largest = 0.0
+        for i in range(n):
+            largest = max(largest, abs(A[i, i]))
+        for k in range(n):
+            if abs(A[k, k]) > least * largest:
+                for i in range(n):
+                    for j in range(n):
+                        inverse[i, j] += V[i, k] * V[j, k] / A[k, k]
+        for f in range(defect.shape[1]):
+            for j in range(defect.shape[2]):
+                for k in range(n):
+                    row[k] = 0.0
+                    for i in range(n):
+                        row[k] += defect[p, f, j, i] * inverse[i, k]
+                for k in range(n):
+                    defect[p, f, j, k] = row[k] / total
+
+
+@kernel
+def add_correction(slope, first, piece, row, coefficient, moment, functions):  # type: ignore[no-untyped-def]
+    """Add coefficient . moment to the gradients from function `first` on, where they act.
+
+    Parameters
+    ----------
+    slope : (q, n, d) array
+        Changed in place.
+    first : int
+    piece, row : (q,) arrays of int
+    coefficient : (p, f, d, a) array
+    moment : (q, a) array
+    functions : (m, n) array of int
+        Negative where a function does not act on a cell.
+    """
+    for q in range(len(piece)):
+        k = piece[q]
+        for f in range(coefficient.shape[1]):
+            if functions[row[q], first + f] < 0:
+                continue
+            for j in range(slope.shape[2]):
+                for a in range(moment.shape[1]):
+                    slope[q, first + f, j] += coefficient[k, f, j, a] * moment[q, a]

@@ -1,0 +1,428 @@
+"""Level sets of one crack at the points of a mesh, and what both dimensions do to them."""
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from xcrack.base.arrays import Bools, Floats, Ints, lock
+from xcrack.crack.crack import Crack, tip_frames
+from xcrack.crack.fronts_3d import Front, front_frames
+from xcrack.mesh.distances import front_distance, surface_distance
+from xcrack.mesh.locate import cells_around
+from xcrack.mesh.mesh import Mesh, local_facets
+from xcrack.mesh.triangulation import face_normals, rim, ruled, unit
+
+SNAP = 1e-10  # share of an edge below which a cut point is moved onto its end
+
+
+@dataclass(frozen=True, eq=False)
+class LevelSet:
+    """Level sets of one crack.
+
+    Attributes
+    ----------
+    phi : (n,) array, length
+        Signed distance, positive on the side of lip +, zero where snapped.
+    psi : (f, n) array, length
+        Signed distance to each tip along the crack; the crack is where all are negative.
+    tip_cells : tuple of (k,) arrays of int
+        Cells whose closed set meets the tip or the front, for each of them.
+    tip : (f, d) array, length
+        Tip points; in 3D a point of each front.
+    mouth : (n,) array, length
+        Positive where a point is nearest to the prolongation of a mouth: across a hole, say, the
+        line of a crack runs on, but not the crack.
+    near : (e,) array of bool
+        Edges short enough to be crossed by the crack where phi changes its sign; a change far
+        from the crack (behind a strong turn) is no cut.
+    line : (n, 2) array, length
+        In 2D: the crack itself, whose kinks the cut follows; without points where it does not.
+    """
+
+    phi: Floats
+    psi: Floats
+    tip_cells: tuple[Ints, ...]
+    tip: Floats
+    mouth: Floats
+    near: Bools
+    line: Floats = field(default_factory=lambda: lock(np.zeros((0, 2))))
+
+    @property
+    def inside(self) -> Floats:
+        """Negative along the crack: the largest psi of all its ends `(n,)`."""
+        return np.asarray(np.vstack([self.psi, self.mouth[None]]).max(axis=0))
+
+
+def near_edges(mesh: Mesh, phi: Floats) -> Bools:
+    """Edges short enough to be crossed where phi changes its sign `(e,)`."""
+    ends = np.abs(phi)[mesh.edges]
+    return np.asarray(ends[:, 0] + ends[:, 1] <= mesh.edge_length * (1 + 1e-6))
+
+
+def snapped(mesh: Mesh, phi: Floats) -> Floats:
+    """Move cut points within 1e-10 of an edge's end onto that end, until nothing changes."""
+    phi = np.array(phi)
+    phi[np.abs(phi) < 1e-15 * mesh.longest_edge] = 0.0
+    while True:
+        a, b = phi[mesh.edges].T
+        crossed = a * b < 0
+        with np.errstate(divide="ignore", invalid="ignore"):
+            share = np.where(crossed, a / (a - b), 0.5)
+        low, high = crossed & (share < SNAP), crossed & (share > 1 - SNAP)
+        if not (low.any() or high.any()):
+            return phi
+        phi[mesh.edges[low, 0]] = 0.0
+        phi[mesh.edges[high, 1]] = 0.0
+
+
+# Level sets of a polyline at the points of a mesh.
+
+
+def line_levels(mesh: Mesh, crack: Crack) -> LevelSet:
+    """Level sets of a placed crack in 2D at the points of a mesh."""
+    from xcrack.mesh.kernels.distance import polyline_distance
+
+    reach = 10 * mesh.extent + float(np.abs(crack.points - mesh.points[0]).max())
+    start, stop = _prolongation(crack.points, reach)
+    vertices = np.concatenate([[start], crack.points, [stop]])
+    phi, segment = polyline_distance(mesh.points, vertices)
+    x, frame = tip_frames(crack)
+    psi = np.empty((len(x), mesh.n_points))
+    n_segments = len(vertices) - 1
+    for k, tip in enumerate(crack.tips or ()):
+        from_tip = mesh.points - x[k]
+        straight = from_tip @ frame[k, 0]
+        r = np.linalg.norm(from_tip, axis=1)
+        behind = -np.sqrt(np.maximum((r - np.abs(phi)) * (r + np.abs(phi)), 0.0))
+        ray, neighbour = (0, 1) if tip == 0 else (n_segments - 1, n_segments - 2)
+        # Points nearest to the kink behind the last piece are as near to one piece as to the
+        # other: round-off must not decide.
+        last = np.linalg.norm(vertices[neighbour + 1] - vertices[neighbour])
+        along = (segment == ray) | ((segment == neighbour) & (straight > -last))
+        psi[k] = np.where(along, straight, behind)
+    mouth = np.full(mesh.n_points, -reach)
+    for end, ray in ((0, 0), (len(crack.points) - 1, n_segments - 1)):
+        if end not in (crack.tips or ()):
+            beyond = segment == ray
+            mouth[beyond] = np.linalg.norm(mesh.points[beyond] - crack.points[end], axis=1)
+    levels = tied_to_tips(mesh, crack, phi, psi, mouth, near_edges(mesh, phi))
+    return replace(levels, line=crack.points)
+
+
+def tied_to_tips(
+    mesh: Mesh, crack: Crack, phi: Floats, psi: Floats, mouth: Floats, near: Bools
+) -> LevelSet:
+    """Level sets of a placed crack in 2D from values at the points, which are changed.
+
+    Around a tip they become those of its frame, so that the tip stays where it is even when the
+    last kink is less than a cell away.
+    """
+    x, frame = tip_frames(crack)
+    tip_cells = tuple(cells_around(mesh, point, SNAP) for point in x)
+    for k, cells in enumerate(tip_cells):
+        nodes = np.unique(mesh.cells[cells])
+        local = mesh.points[nodes] - x[k]
+        phi[nodes] = local @ frame[k, 1]
+        psi[k, nodes] = local @ frame[k, 0]
+        there = np.zeros(mesh.n_points, dtype=bool)
+        there[nodes] = True
+        near |= there[mesh.edges[:, 0]] | there[mesh.edges[:, 1]]
+    phi = snapped(mesh, phi)
+    return LevelSet(lock(phi), lock(psi), tip_cells, lock(x), lock(mouth), lock(near))
+
+
+def _prolongation(points: Floats, reach: float) -> tuple[Floats, Floats]:
+    """Ends of the rays that prolong a polyline, where they meet it or each other at the latest.
+
+    Beyond such a crossing of a crack that turns by more than half a circle the sides of the two
+    pieces contradict each other.
+    """
+    first, last = points[0], points[-1]
+    back, on = _unit(first - points[1]), _unit(last - points[-2])
+    near = _free_reach(first, back, points[1:], reach)
+    far = _free_reach(last, on, points[:-1], reach)
+    ahead = np.stack([last, last + far * on])
+    near = _free_reach(first, back, ahead, near)
+    far = _free_reach(last, on, np.stack([first, first + near * back]), far)
+    return first + near * back, last + far * on
+
+
+def _free_reach(origin: Floats, direction: Floats, polyline: Floats, reach: float) -> float:
+    """Length up to which a ray runs before it meets a polyline."""
+    a, along = polyline[:-1], np.diff(polyline, axis=0)
+    gap = a - origin
+    cross = direction[0] * along[:, 1] - direction[1] * along[:, 0]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        t = (gap[:, 0] * along[:, 1] - gap[:, 1] * along[:, 0]) / cross
+        u = (gap[:, 0] * direction[1] - gap[:, 1] * direction[0]) / cross
+    hit = (cross != 0) & (t > 0) & (u >= -1e-9) & (u <= 1 + 1e-9)
+    return float(min(reach, np.min(t[hit], initial=np.inf)))
+
+
+def _unit(v: Floats) -> Floats:
+    return np.asarray(v / np.linalg.norm(v))
+
+
+# Strips of triangles that prolong cracks in 3D ahead of their fronts, for their level sets.
+
+_FAN = np.radians(30.0)  # a front that turns away by more gets rays between
+
+
+@dataclass(frozen=True, eq=False)
+class Extended:
+    """A 3D crack prolonged ahead of its fronts.
+
+    Attributes
+    ----------
+    points : (p, 3) array, length
+        First those of the crack.
+    triangles : (k, 3) array of int
+        First the faces of the crack.
+    label : (k,) array of int
+        0 for a face of the crack, f + 1 for the strip ahead of front f.
+    """
+
+    points: Floats
+    triangles: Ints
+    label: Ints
+
+
+def extended(crack: Crack, mesh: Mesh, width: float) -> Extended:
+    """A placed crack with a strip of triangles ahead of each front, tangential to it.
+
+    Where a front is hollow the rays of the strip cross; what would be turned over is left out,
+    and parts may lie over each other. Where it is sharp, rays fan out.
+
+    Parameters
+    ----------
+    crack : Crack
+        Placed in the mesh.
+    mesh : Mesh
+        Its cells give the length of the triangles where the front has long sides.
+    width : float, length
+        How far the strip reaches.
+
+    Returns
+    -------
+    Extended
+    """
+    points, triangles = [crack.points], [crack.faces]
+    label = [np.zeros(len(crack.faces), dtype=np.int64)]
+    n_points = len(crack.points)
+    edges, owner = rim(crack.faces)
+    side_normal = dict(
+        zip(
+            map(tuple, edges.tolist()),
+            face_normals(crack.points, crack.faces)[owner],
+            strict=True,
+        )
+    )
+    for f, front in enumerate(front_frames(crack)):
+        base, direction, n = _rays(front, side_normal)
+        side = np.linalg.norm(np.diff(front.x, axis=0), axis=1)
+        cell = mesh.cell_size[mesh.cell_tree.query(front.x)[1]]
+        edge = max(float(np.median(side)), 0.25 * float(cell.min()))
+        layers = int(np.clip(np.ceil(width / edge), 1, 64))
+        origin = crack.points[base]
+        new, faces = ruled(n_points, base, origin, width * direction, layers, front.closed)
+        points.append(new)
+        everything = np.concatenate(points)
+        reference = np.zeros((n_points + len(new), 3))
+        reference[base] = n
+        reference[n_points:] = np.repeat(n, layers, axis=0)
+        expected = reference[faces].sum(axis=1)
+        upright = np.einsum("ij,ij->i", face_normals(everything, faces), unit(expected)) > 0.2
+        triangles.append(faces[upright])
+        label.append(np.full(int(upright.sum()), f + 1))
+        n_points += len(new)
+    return Extended(
+        lock(np.concatenate(points)), lock(np.concatenate(triangles)), lock(np.concatenate(label))
+    )
+
+
+def _rays(front: Front, side_normal: dict[tuple[int, int], Floats]) -> tuple[Ints, Floats, Floats]:
+    """Point numbers, directions and normals of the rays of a strip, with fans at sharp places."""
+    m = len(front.x)
+    following = np.roll(front.number, -1)
+    n_sides = m if front.closed else m - 1
+    along = np.roll(front.x, -1, axis=0) - front.x
+    # The faces run against the direction of the front.
+    normal = [
+        side_normal.get((int(following[j]), int(front.number[j])), front.frame[j, 1])
+        for j in range(n_sides)
+    ]
+    out = unit(np.cross(normal, along[:n_sides]))
+    previous = np.roll(out, 1, axis=0)
+    angles = np.arccos(np.clip(np.einsum("ij,ij->i", previous, out), -1, 1))
+    base, direction, normals = [], [], []
+    for j in range(m):
+        t, n, b = front.frame[j]
+        rays = [t]
+        if front.closed or 0 < j < m - 1:
+            before, after, angle = previous[j], out[j], float(angles[j])
+            if angle > _FAN and (after - before) @ b > 0:
+                pieces = int(np.ceil(angle / _FAN))
+                share = np.arange(pieces + 1) / pieces
+                rays = [
+                    (np.sin((1 - c) * angle) * before + np.sin(c * angle) * after) / np.sin(angle)
+                    for c in share
+                ]
+        base.extend([int(front.number[j])] * len(rays))
+        direction.extend(rays)
+        normals.extend([n] * len(rays))
+    return np.array(base), np.array(direction), np.array(normals)
+
+
+# Level sets of a crack surface at the points of a mesh.
+
+_FLAT = 0.03  # share |psi| / r below which the root of r² - phi² loses digits
+_AT = 1e-10  # share of a cell below which a psi on the crack is zero
+_STRAIGHT = 1e-6  # offset of the chords, as a share of a cell, below which a front is straight
+_CHORDS = 12  # chords over which their offset is averaged
+
+
+def surface_levels(mesh: Mesh, crack: Crack, reach: float) -> LevelSet:
+    """Level sets of a placed 3D crack.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    crack : Crack
+        With its fronts decided.
+    reach : float, length
+        Distance from the fronts up to which phi and psi are needed.
+
+    Returns
+    -------
+    LevelSet
+    """
+    size = _largest_cells(mesh, crack)
+    band = reach + 2 * size
+    surface = extended(crack, mesh, band + size)
+    phi, triangle, at_end = surface_distance(mesh.points, surface.points, surface.triangles, band)
+    label = np.where(triangle >= 0, surface.label[triangle], 0)
+    fronts = front_frames(crack)
+    far = 10 * mesh.extent
+    psi = np.empty((len(fronts), mesh.n_points))
+    for k, front in enumerate(fronts):
+        psi[k] = _along(mesh.points, phi, label == k + 1, front, band, far)
+    phi = snapped(mesh, phi)
+    near = near_edges(mesh, phi)
+    for k, front in enumerate(fronts):
+        psi[k] = _unbiased(mesh, phi, psi[k], near, front, band)
+    mouth = np.where(at_end & (label == 0), np.abs(phi), -far)
+    tip_cells = tuple(_front_cells(mesh, phi, p, near) for p in psi)
+    one = np.array([front.x[0] for front in fronts]).reshape(-1, mesh.dim)
+    return LevelSet(lock(phi), lock(psi), tip_cells, lock(one), lock(mouth), lock(near))
+
+
+def _largest_cells(mesh: Mesh, crack: Crack) -> float:
+    """Largest cell that the surface runs through, length."""
+    near = mesh.cell_tree.query(crack.points[crack.faces].mean(axis=1))[1]
+    return float(mesh.cell_size[near].max())
+
+
+def _along(
+    points: Floats,
+    phi: Floats,
+    ahead: Bools,
+    front: Front,
+    band: float,
+    far: float,
+) -> Floats:
+    """Distance to one front along the surface, positive ahead."""
+    r, segment, position = front_distance(points, front.x, front.closed, band)
+    near = segment >= 0
+    psi = np.where(ahead, far, -far)
+    rows = np.nonzero(near)[0]
+    root = np.sqrt(np.maximum((r[rows] - np.abs(phi[rows])) * (r[rows] + np.abs(phi[rows])), 0.0))
+    psi[rows] = np.where(ahead[rows], root, -root)
+    flat = rows[root < _FLAT * r[rows]]
+    foot, direction = _foot(front, segment[flat], position[flat])
+    psi[flat] = np.einsum("qd,qd->q", points[flat] - foot, direction)
+    return psi
+
+
+def _unbiased(
+    mesh: Mesh, phi: Floats, psi: Floats, near: Bools, front: Front, band: float
+) -> Floats:
+    """Shift psi so that the front that the cells see is the given one in the mean.
+
+    In a cell the front is straight: a curved one would lose the slivers between chords and arc,
+    1 % of the radius of a penny of five cells. The loss is measured at the middle of each chord.
+    """
+    cells = _front_cells(mesh, phi, psi, near)
+    middle, length = _chords(mesh, phi, psi, cells)
+    if not len(middle):
+        return psi
+    _, segment, position = front_distance(middle, front.x, front.closed)
+    foot, ahead = _foot(front, segment, position)
+    offset = np.einsum("qd,qd->q", middle - foot, ahead)
+    if np.abs(offset).max() < _STRAIGHT * mesh.cell_size[cells].mean():
+        return psi
+    rows = np.nonzero(np.abs(psi) < 2 * band)[0]
+    distance, nearest = cKDTree(middle).query(mesh.points[rows], k=min(_CHORDS, len(middle)))
+    distance, nearest = (a.reshape(len(rows), -1) for a in (distance, nearest))
+    # Chords beside a bend must not move the straight part next to it.
+    beyond = (distance**2 - distance[:, :1] ** 2) / mesh.cell_size[cells].mean() ** 2
+    share = length[nearest] * np.exp(-np.minimum(beyond, 50.0))
+    shifted = psi.copy()
+    shifted[rows] += (share * offset[nearest]).sum(axis=1) / share.sum(axis=1)
+    return shifted
+
+
+def _chords(mesh: Mesh, phi: Floats, psi: Floats, cells: Ints) -> tuple[Floats, Floats]:
+    """Middle and length of the line phi = psi = 0 in cells that have one."""
+    ends = []
+    for facet in local_facets(3):
+        corner = mesh.cells[cells][:, facet]
+        system = np.stack([phi[corner], psi[corner], np.ones(corner.shape)], axis=1)
+        size = np.abs(system).max(axis=2, keepdims=True)
+        system = system / np.maximum(size, 1e-300)
+        regular = np.abs(np.linalg.det(system)) > 1e-12
+        bary = np.full(corner.shape, np.nan)
+        rhs = np.zeros((int(regular.sum()), 3, 1))
+        rhs[:, 2] = 1.0
+        bary[regular] = np.linalg.solve(system[regular], rhs)[..., 0]
+        hit = bary.min(axis=1) > -_AT
+        x = np.einsum("kv,kvd->kd", bary, mesh.points[corner])
+        ends.append(np.where(hit[:, None], x, np.nan))
+    points = np.stack(ends, axis=1)
+    hits = ~np.isnan(points[:, :, 0])
+    two = np.nonzero(hits.sum(axis=1) == 2)[0]
+    pair = points[two][hits[two]].reshape(-1, 2, 3)
+    length = np.linalg.norm(pair[:, 1] - pair[:, 0], axis=1)
+    return pair.mean(axis=1)[length > 0], length[length > 0]
+
+
+def _foot(front: Front, segment: Ints, position: Floats) -> tuple[Floats, Floats]:
+    """Points on a front and the directions ahead of it there."""
+    t = position[:, None]
+    second = (segment + 1) % len(front.x)
+    foot = (1 - t) * front.x[segment] + t * front.x[second]
+    ahead = (1 - t) * front.frame[segment, 0] + t * front.frame[second, 0]
+    return foot, ahead / np.linalg.norm(ahead, axis=1, keepdims=True)
+
+
+def _front_cells(mesh: Mesh, phi: Floats, psi: Floats, near: Bools) -> Ints:
+    """Cells whose closed set meets phi = psi = 0."""
+    values = phi[mesh.cells]
+    rows = np.nonzero((values.min(axis=1) <= 0) & (values.max(axis=1) >= 0))[0]
+    edge = mesh.cell_to_edge[rows]
+    a, b = mesh.edges[edge, 0], mesh.edges[edge, 1]
+    crossed = phi[a] * phi[b] < 0
+    close = (near[edge] | ~crossed).all(axis=1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        t = phi[a] / (phi[a] - phi[b])
+        at_edge = np.where(crossed, (1 - t) * psi[a] + t * psi[b], np.nan)
+    corner = mesh.cells[rows]
+    at_corner = np.where(phi[corner] == 0, psi[corner], np.nan)
+    every = np.concatenate([at_edge, at_corner], axis=1)
+    every = np.where(np.abs(every) < _AT * mesh.cell_size[rows][:, None], 0.0, every)
+    low = np.where(np.isnan(every), np.inf, every).min(axis=1)
+    high = np.where(np.isnan(every), -np.inf, every).max(axis=1)
+    return rows[close & (low <= 0) & (high >= 0)]
+
+
+__all__ = []

@@ -1,0 +1,641 @@
+"""Integration points: no more than a function needs, and polynomials exactly.
+
+Plain cells need none (their stiffness is tabulated), Heaviside sub-cells the few of a polynomial
+rule; what sub-cells with tip functions need depends on the dimension.
+"""
+
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+
+from xcrack.base.arrays import Bools, Floats, Ints, lock, offsets, ranges
+from xcrack.base.errors import GeometryError
+from xcrack.fem.function_space import FunctionSpace
+from xcrack.mesh.mesh import local_edges
+from xcrack.mesh.polygon import closest_on_segment
+from xcrack.mesh.simplex import SYMMETRIC, gauss, simplex_rule
+from xcrack.mesh.split import cut_simplices
+
+# Integration points around the tips of cracks in 2D.
+
+_LEVELS = 5  # bisections towards a tip before the fan takes over
+_SECTOR = 0.6  # rad, widest sector of a fan
+_EDGE_POINTS = 6  # Gauss points of a boundary piece
+
+
+def tip_points(
+    space: FunctionSpace, cell: Ints, bary: Floats, share: Floats, fan: Bools, n: int
+) -> tuple[Ints, Floats, Floats]:
+    """Points in sub-cells on which tip functions act.
+
+    Parameters
+    ----------
+    space : FunctionSpace
+    cell : (s,) array of int
+    bary : (s, 3, 3) array
+        Vertices of the sub-cells in their cells.
+    share : (s,) array
+        Of the cell's volume.
+    fan : (s,) array of bool
+        Vertex 0 is a tip.
+    n : int
+        Points a direction.
+
+    Returns
+    -------
+    number : (q,) array of int
+        Sub-cell of each point.
+    place : (q, 3) array
+        In barycentric coordinates of the cell.
+    weight : (q,) array
+        As a share of the cell's volume.
+    """
+    regular, regular_bary, regular_share, fans = _towards_tips(space, cell, bary, share, fan)
+    # Bisected, they are no larger than their distance to a tip: a lower degree than in the fans is
+    # enough (K is the same to its error with half of the points, measured).
+    enough = max(2 * n - 3, 3)
+    rule, weight = simplex_rule(space.dim, enough)
+    if enough > SYMMETRIC:
+        regular_bary = _from_tips(space, cell[regular], regular_bary)
+    place = np.einsum("pv,svb->spb", rule, regular_bary).reshape(-1, space.dim + 1)
+    sub, swept, swept_share = _fan_points(space, cell, fans, n)
+    return (
+        np.concatenate([np.repeat(regular, len(weight)), sub]),
+        np.concatenate([place, swept]),
+        np.concatenate([np.outer(regular_share, weight).ravel(), swept_share]),
+    )
+
+
+def _from_tips(space: FunctionSpace, cell: Ints, bary: Floats) -> Floats:
+    """Vertices of simplices, those nearer to a tip first.
+
+    A conical rule is not symmetric: with an order that geometry decides, points do not depend
+    on how nodes are numbered.
+    """
+    x = np.einsum("svb,sbd->svd", bary, space.mesh.points[space.mesh.cells[cell]])
+    distance = np.min([np.linalg.norm(x - tip.x, axis=2) for tip in space.tips], axis=0)
+    order = np.argsort(distance, axis=1, kind="stable")
+    return np.take_along_axis(bary, order[:, :, None], axis=1)
+
+
+_Fans = tuple[Ints, Floats, Floats]
+
+
+def _towards_tips(
+    space: FunctionSpace, cell: Ints, bary: Floats, share: Floats, fan: Bools
+) -> tuple[Ints, Floats, Floats, _Fans]:
+    """Bisect sub-cells until they are no larger than their distance to a tip."""
+    from xcrack.fem.kernels.bisect import bisect
+
+    mesh = space.mesh
+    tips = np.array([tip.x for tip in space.tips]).reshape(-1, mesh.dim)
+    fan_rows, others = np.nonzero(fan)[0], np.nonzero(~fan)[0]
+    fans = [(fan_rows, bary[fan_rows], share[fan_rows])]
+    x = bary[others] @ mesh.points[mesh.cells[cell[others]]]
+
+    def parts(n: int) -> tuple[Ints, Floats, Ints, Bools]:
+        integers = np.empty((2, n), dtype=np.int64)
+        return integers[0], np.empty((n, 3, 3)), integers[1], np.empty(n, dtype=bool)
+
+    pieces = parts(bisect(x, tips, _LEVELS, False, *parts(0)))
+    bisect(x, tips, _LEVELS, True, *pieces)
+    owner, local, depth, near = pieces
+    number = others[owner]
+    bary, share = local @ bary[number], share[number] / 4.0**depth
+    if near.any():
+        x = local[near] @ x[owner[near]]
+        middle = x.mean(axis=1)
+        nearest = np.argmin(np.linalg.norm(middle[:, None] - tips, axis=2), axis=1)
+        fans.append(_fan_around(number[near], bary[near], share[near], x, tips[nearest]))
+    f = tuple(np.concatenate(p) for p in zip(*fans, strict=True))
+    return number[~near], bary[~near], share[~near], (f[0], f[1], f[2])
+
+
+def _cross(a: Floats, b: Floats) -> Floats:
+    return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
+
+
+def _fan_around(number: Ints, bary: Floats, share: Floats, x: Floats, tip: Floats) -> _Fans:
+    """Split triangles into fans around their points nearest to a tip outside them."""
+    pairs = [(0, 1), (1, 2), (2, 0)]
+    foot = np.stack([closest_on_segment(tip, x[:, i], x[:, j]) for i, j in pairs], axis=1)
+    best = np.argmin(np.linalg.norm(foot - tip[:, None], axis=2), axis=1)
+    row = np.arange(len(x))
+    i, j = np.array(pairs)[best].T
+    along = x[row, j] - x[row, i]
+    t = np.clip(
+        ((foot[row, best] - x[row, i]) * along).sum(axis=1) / (along * along).sum(axis=1), 0, 1
+    )[:, None]
+    apex = (1 - t) * bary[row, i] + t * bary[row, j]
+    k = 3 - i - j
+    both = [
+        (np.stack([apex, bary[row, k], bary[row, i]], axis=1), share * t[:, 0]),
+        (np.stack([apex, bary[row, j], bary[row, k]], axis=1), share * (1 - t[:, 0])),
+    ]
+    keep = [s > 1e-14 * share for _, s in both]
+    return (
+        np.concatenate([number[k] for k in keep]),
+        np.concatenate([b[k] for (b, _), k in zip(both, keep, strict=True)]),
+        np.concatenate([s[k] for (_, s), k in zip(both, keep, strict=True)]),
+    )
+
+
+def _fan_points(
+    space: FunctionSpace, cell: Ints, fans: _Fans, n: int
+) -> tuple[Ints, Floats, Floats]:
+    """Sweep triangles from vertex 0 in sectors, x = A + s² (E - A), E on the far side.
+
+    Exact for polynomials, and for products of derivatives of the tip functions along r; the
+    angle is resolved by sectors of at most 0.6 rad.
+    """
+    number, bary, share = fans
+    mesh = space.mesh
+    x = np.einsum("svb,sbd->svd", bary, mesh.points[mesh.cells[cell[number]]])
+    left, right = x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]
+    a, b = np.linalg.norm(left, axis=1), np.linalg.norm(right, axis=1)
+    angle = np.abs(np.arctan2(_cross(left, right), (left * right).sum(axis=1)))
+    sectors = np.maximum(np.ceil(angle / _SECTOR), 1).astype(np.int64)
+    row, k = ranges(sectors)
+
+    def position(part: Floats) -> Floats:
+        part = np.clip(part, 0.0, 1.0)
+        first, last = a[row] * np.sin(part * angle[row]), b[row] * np.sin((1 - part) * angle[row])
+        total = first + last
+        return np.where(total > 0, first / np.where(total > 0, total, 1.0), part)
+
+    begin, end = position(k / sectors[row]), position((k + 1) / sectors[row])
+    s, ws = gauss(n + 1)
+    t, wt = gauss(n + 4)
+    tau = begin[:, None] + (end - begin)[:, None] * t
+    far = (1 - tau)[..., None] * bary[row, 1][:, None] + tau[..., None] * bary[row, 2][:, None]
+    u = (s * s)[None, :, None, None]
+    points = (1 - u) * bary[row, 0][:, None, None] + u * far[:, None]
+    # dV = 2 area u du dtau with u = s².
+    radial = 4 * s**3 * ws
+    weight = (share[row] * (end - begin))[:, None, None] * radial[None, :, None] * wt
+    each = len(s) * len(t)
+    return np.repeat(number[row], each), points.reshape(-1, 3), weight.ravel()
+
+
+def segment_points(
+    space: FunctionSpace, begin: Floats, end: Floats, n: int = _EDGE_POINTS
+) -> tuple[Ints, Floats, Floats]:
+    """Gauss points on segments `(k, 2)`, graded towards a tip that is closer than their length.
+
+    The segment is split at the foot of the nearest tip, with r = u² from there. The rule depends
+    only on the segment, so that the cells on both sides of an edge share it; plain Gauss points
+    near a tip spoil order 2.
+
+    Returns
+    -------
+    segment : (q,) array of int
+    place : (q, 2) array
+        Barycentric coordinates in the segment.
+    weight : (q,) array, length
+    """
+    from xcrack.mesh.kernels.segments import graded_points
+
+    tips = np.array([tip.x for tip in space.tips]).reshape(-1, space.dim)
+    number, place, weight = graded_points(begin, end, tips, *gauss(n))
+    return number, place, weight
+
+
+# Integration points around the fronts of cracks in 3D.
+
+_AT = 1e-9  # share of a sub-cell's size below which a vertex lies on the front
+_FAR = 0.7  # distance to the front, in sizes of the sub-cell, beyond which a rule of degree 2 does
+_TINY = 0.01  # sub-cells below this share of their cell get fewer points
+_NEAR = 0.5  # triangles closer to the front, in their sizes, are cut in four
+
+
+def radius_at(space: FunctionSpace, nodes: Ints, bary: Floats) -> Floats:
+    """Distance to the nearest front `(k, v)`, from the level sets as they are interpolated.
+
+    Parameters
+    ----------
+    space : FunctionSpace
+    nodes : (k, m) array of int
+        Mesh points of simplices.
+    bary : (k, v, m) array
+        Places in them.
+    """
+    result = np.full(bary.shape[:2], np.inf)
+    for tip in space.tips:
+        levels = space.cuts[tip.crack].level_set
+        phi = np.einsum("kvm,km->kv", bary, levels.phi[nodes])
+        psi = np.einsum("kvm,km->kv", bary, levels.psi[tip.number][nodes])
+        result = np.minimum(result, np.hypot(phi, psi))
+    return result
+
+
+def front_points(
+    space: FunctionSpace, cell: Ints, bary: Floats, share: Floats, fan: Bools, n: int
+) -> tuple[Ints, Floats, Floats]:
+    """Points in sub-cells on which tip functions act.
+
+    Parameters
+    ----------
+    space : FunctionSpace
+    cell : (s,) array of int
+    bary : (s, 4, 4) array
+        Vertices of the sub-cells in their cells.
+    share : (s,) array
+        Of the cell's volume.
+    fan : (s,) array of bool
+        Not used: which vertices lie on the front follows from the level sets.
+    n : int
+        Gauss points along the angle at a front; at order 2 one more.
+
+    Returns
+    -------
+    number : (q,) array of int
+        Sub-cell of each point.
+    place : (q, 4) array
+        In barycentric coordinates of the cell.
+    weight : (q,) array
+        As a share of the cell's volume.
+    """
+    nodes = space.mesh.cells[cell]
+    r = radius_at(space, nodes, bary)
+    x = np.einsum("svb,sbd->svd", bary, space.mesh.points[nodes])
+    i, j = local_edges(3).T
+    size = np.linalg.norm(x[:, i] - x[:, j], axis=2).max(axis=1)
+    at = r < _AT * size[:, None]
+    corner = np.take_along_axis(bary, np.argsort(~at, axis=1, kind="stable")[:, :, None], axis=1)
+    touches = at.sum(axis=1)
+    edge, free = touches == 2, touches == 0
+    vertex = ~edge & ~free
+    tiny = share < _TINY
+    coarse = free & (tiny | (r.min(axis=1) > _FAR * size)) & (space.order == 1)
+    along = n if space.order == 1 else n + 1
+    parts = []
+    for chosen, rule in (
+        (edge & ~tiny, _edge_rule(along)),
+        (edge & tiny, _edge_rule(max(along - 1, 2))),
+        (vertex & ~tiny, _vertex_rule(along)),
+        (vertex & tiny, _vertex_rule(max(along - 1, 2))),
+        (free & ~coarse, simplex_rule(3, 2 * n - 3)),
+        (coarse, simplex_rule(3, max(n - 2, 1))),
+    ):
+        rows = np.nonzero(chosen)[0]
+        place = np.einsum("pv,svb->spb", rule[0], corner[rows])
+        weight = share[rows, None] * rule[1]
+        parts.append((np.repeat(rows, len(rule[1])), place.reshape(-1, 4), weight.ravel()))
+    a, b, c = (np.concatenate(p) for p in zip(*parts, strict=True))
+    return a, b, c
+
+
+@lru_cache(maxsize=8)
+def _edge_rule(n: int) -> tuple[Floats, Floats]:
+    """Rule on a tetrahedron whose first two vertices lie on the front.
+
+    x = (1 - u) [(1 - v) T0 + v T1] + u [(1 - w) T2 + w T3], u = s², dV = 6 V u (1 - u) du dv dw.
+    """
+    (s, ws), (v, wv), (w, ww) = gauss(n - 1), gauss(max(n - 2, 2)), gauss(n)
+    s, v, w = (a.ravel() for a in np.meshgrid(s, v, w, indexing="ij"))
+    u = s * s
+    weight = np.einsum("i,j,k->ijk", ws, wv, ww).ravel() * 12 * s * u * (1 - u)
+    bary = np.stack([(1 - u) * (1 - v), (1 - u) * v, u * (1 - w), u * w], axis=1)
+    return lock(bary), lock(weight / weight.sum())
+
+
+@lru_cache(maxsize=8)
+def _vertex_rule(n: int) -> tuple[Floats, Floats]:
+    """Rule on a tetrahedron whose first vertex lies on the front, u = s² from there."""
+    s, ws = gauss(n - 1)
+    far, share = simplex_rule(2, 4)
+    u = np.repeat(s * s, len(share))
+    weight = np.outer(ws * s**5, share).ravel()
+    bary = np.concatenate([(1 - u)[:, None], u[:, None] * np.tile(far, (len(s), 1))], axis=1)
+    return lock(bary), lock(weight / weight.sum())
+
+
+def triangle_points(r: Floats, size: Floats, degree: int = 4) -> tuple[Ints, Floats, Floats]:
+    """Points on triangles on which tip functions may act, denser towards the front.
+
+    Parameters
+    ----------
+    r : (k, 3) array, length
+        Distance to the front at the corners; inf where there is none.
+    size : (k,) array, length
+        Longest side.
+    degree : int
+        Degree of polynomials integrated exactly away from the front.
+
+    Returns
+    -------
+    number : (q,) array of int
+    bary : (q, 3) array
+    weight : (q,) array
+        Share of the area.
+    """
+    number = np.arange(len(r))
+    corner = np.broadcast_to(np.eye(3), (len(r), 3, 3))
+    share = np.ones(len(r))
+    parts = []
+    for level in (0, 1):
+        at = r < _AT * size[:, None]
+        touches = at.sum(axis=1)
+        first = np.argsort(~at, axis=1, kind="stable")
+        corner = np.take_along_axis(corner, first[:, :, None], axis=1)
+        r = np.take_along_axis(r, first, axis=1)
+        near = (touches == 0) & (r.min(axis=1) < _NEAR * size) & (level == 0)
+        for chosen, rule in (
+            (touches == 2, _side_rule()),
+            ((touches == 1) | (touches == 3), _corner_rule()),
+            ((touches == 0) & ~near, simplex_rule(2, degree)),
+        ):
+            rows = np.nonzero(chosen)[0]
+            place = np.einsum("pv,svb->spb", rule[0], corner[rows])
+            weight = share[rows, None] * rule[1]
+            parts.append(
+                (np.repeat(number[rows], len(rule[1])), place.reshape(-1, 3), weight.ravel())
+            )
+        rows = np.nonzero(near)[0]
+        number, share = np.repeat(number[rows], 4), np.repeat(share[rows] / 4, 4)
+        size = np.repeat(size[rows] / 2, 4)
+        corner = np.einsum("cvw,swb->scvb", _quarters(), corner[rows]).reshape(-1, 3, 3)
+        r = np.einsum("cvw,sw->scv", _quarters(), r[rows]).reshape(-1, 3)
+    a, b, c = (np.concatenate(p) for p in zip(*parts, strict=True))
+    return a, b, c
+
+
+@lru_cache(maxsize=1)
+def _side_rule() -> tuple[Floats, Floats]:
+    """Rule on a triangle whose first two corners lie on the front."""
+    (s, ws), (v, wv) = gauss(4), gauss(3)
+    s, v = (a.ravel() for a in np.meshgrid(s, v, indexing="ij"))
+    u = s * s
+    weight = np.outer(ws, wv).ravel() * s * (1 - u)
+    return lock(np.stack([(1 - u) * (1 - v), (1 - u) * v, u], axis=1)), lock(weight / weight.sum())
+
+
+@lru_cache(maxsize=1)
+def _corner_rule() -> tuple[Floats, Floats]:
+    """Rule on a triangle whose first corner lies on the front."""
+    (s, ws), (v, wv) = gauss(4), gauss(4)
+    s, v = (a.ravel() for a in np.meshgrid(s, v, indexing="ij"))
+    u = s * s
+    weight = np.outer(ws, wv).ravel() * s**3
+    return lock(np.stack([1 - u, u * (1 - v), u * v], axis=1)), lock(weight / weight.sum())
+
+
+@lru_cache(maxsize=1)
+def _quarters() -> Floats:
+    a, b, c = np.eye(3)
+    ab, bc, ca = (a + b) / 2, (b + c) / 2, (c + a) / 2
+    return lock(np.array([[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]))
+
+
+# Sides of the cracks on which points lie: of cells, of crack faces, and at junctions.
+
+
+def cell_side(space: FunctionSpace, cells: Ints) -> Ints:
+    """Side of each crack on which cells lie `(k, cracks)`, 0 where a crack crosses them."""
+    side = np.empty((len(cells), len(space.cuts)), dtype=np.int64)
+    for c, cut in enumerate(space.cuts):
+        side[:, c] = cut.side[cells]
+    return side
+
+
+def lip_side(space: FunctionSpace, c: int, cell: Ints, bary: Floats, side: int) -> Ints:
+    """Side of each crack `(k, cracks)` for points on lip + or lip - of crack c.
+
+    Parameters
+    ----------
+    space : FunctionSpace
+    c : int
+    cell : (k,) array of int
+        On that side of the crack.
+    bary : (k, d + 1) array
+        Of the points in the cells.
+    side : {1, -1}
+    """
+    sides = cell_side(space, cell)
+    sides[:, c] = side
+    for joint in space.joints:
+        if joint.crack == c:
+            sides[joint.near[cell], joint.on] = joint.side
+    return at_joints(space, cell, bary, sides, c)
+
+
+def at_joints(
+    space: FunctionSpace, cell: Ints, bary: Floats, sides: Ints, c: int | None = None
+) -> Ints:
+    """Sides `(k, cracks)` of points at junctions, changed in place: of cracks that end there.
+
+    Parameters
+    ----------
+    space : FunctionSpace
+    cell : (k,) array of int
+    bary : (k, d + 1) array
+        Inside what is on one side of each crack, or on a face of a crack.
+    sides : (k, cracks) array of int
+        Right for cracks that run through.
+    c : int, optional
+        A crack whose sides stay.
+    """
+    for joint in space.joints:
+        if joint.crack == c:
+            continue
+        near = np.nonzero(joint.near[cell])[0]
+        through = sides[near, joint.on]
+        phi = space.cuts[joint.crack].level_set.phi[space.mesh.cells[cell[near]]]
+        own = np.where(np.einsum("kb,kb->k", bary[near], phi) >= 0, 1, -1)
+        whole = ~space.cuts[joint.on].is_cut[cell[near]]
+        changed = np.where(through == -joint.side, 0, own)
+        keep = (through == 0) | ((through == joint.side) & whole & (c != joint.on))
+        sides[near, joint.crack] = np.where(keep, sides[near, joint.crack], changed)
+    return sides
+
+
+def part_numbers(space: FunctionSpace, cell: Ints, sides: Ints) -> Ints:
+    """Which part of its cell a point lies in `(k,)`, from 0 to `n_parts` - 1, by its sides."""
+    plus = np.zeros(len(cell), dtype=bool)
+    beside = np.zeros(len(cell), dtype=bool)
+    for c, cut in enumerate(space.cuts):
+        above = cut.is_cut[cell] & (sides[:, c] > 0)
+        for joint in space.joints:
+            if joint.crack == c:
+                beside |= above & joint.both[cell]
+                above = above & ~joint.both[cell]
+        plus |= above
+    return plus + 2 * beside.astype(np.int64)
+
+
+def n_parts(space: FunctionSpace) -> int:
+    """Into how many parts cracks cut a cell at most: two, or four at a junction."""
+    return 4 if space.joints else 2
+
+
+_ROUND_OFF = 1e-13  # share of a sub-cell's largest level set below which a value is zero
+
+
+@dataclass(frozen=True, eq=False)
+class Points:
+    """Integration points in cells, sorted by cell and piece.
+
+    Attributes
+    ----------
+    cell : (q,) array of int
+    bary : (q, d + 1) array
+    weight : (q,) array, length^d
+    side : (q, cracks) array of int
+        Side of each crack; 0 where that means nothing.
+    """
+
+    cell: Ints
+    bary: Floats
+    weight: Floats
+    side: Ints
+
+    def chosen(self, wanted: Bools | Ints) -> "Points":
+        """Some of the points, by a mask or by their numbers."""
+        return Points(self.cell[wanted], self.bary[wanted], self.weight[wanted], self.side[wanted])
+
+    def of_cells(self, cells: Ints) -> tuple[Ints, Ints, Ints]:
+        """Points of the given cells: their numbers, row of their cell, offsets by cell."""
+        first = self.cell.searchsorted(cells)
+        counts = self.cell.searchsorted(cells, side="right") - first
+        row, place = ranges(counts)
+        return first[row] + place, row, offsets(counts)
+
+
+@dataclass(frozen=True, eq=False)
+class SubCells:
+    """Simplices into which cells are split, each wholly on one side of each crack.
+
+    Attributes
+    ----------
+    cell : (s,) array of int
+    bary : (s, d + 1, d + 1) array
+        Vertices in barycentric coordinates of the cell.
+    fraction : (s,) array
+        Share of the cell's volume.
+    side : (s, cracks) array of int
+    fan : (s,) array of bool
+        Vertex 0 is a tip.
+    """
+
+    cell: Ints
+    bary: Floats
+    fraction: Floats
+    side: Ints
+    fan: np.ndarray
+
+
+def sub_cells(space: FunctionSpace, cells: Ints) -> SubCells:
+    """Sub-cells of the given cells, in their order."""
+    mesh = space.mesh
+    base = cell_side(space, cells)
+    whole = np.ones(len(cells), dtype=bool)
+    parts = []
+    for c, cut in enumerate(space.cuts):
+        # Cells split by this crack hand over their sub-cells.
+        place = np.full(len(mesh.cells), -1, dtype=np.int64)
+        place[cells] = np.arange(len(cells))
+        rows = place[cut.sub_to_cell]
+        mine = rows >= 0
+        owner = rows[mine]
+        if not whole[owner].all():
+            bad = cells[owner[~whole[owner]][0]]
+            raise GeometryError(
+                f"two cracks run through the cell at "
+                f"{np.round(mesh.points[mesh.cells[bad]].mean(axis=0), 6).tolist()}: refine the "
+                "mesh between them until at least one cell lies in between."
+            )
+        side = base[owner].copy()
+        side[:, c] = cut.sub_side[mine]
+        tip = cut.is_tip[cut.sub_to_cell[mine]]
+        parts.append((owner, cut.sub_bary[mine], cut.sub_fraction[mine], side, tip))
+        whole[owner] = False
+    rest = whole.nonzero()[0]
+    if len(rest) or not parts:
+        corner = np.zeros((len(rest), mesh.dim + 1, mesh.dim + 1))
+        corner[:, range(mesh.dim + 1), range(mesh.dim + 1)] = 1.0
+        share, fan = np.ones(len(rest)), np.zeros(len(rest), dtype=bool)
+        parts.append((rest, corner, share, base[rest], fan))
+    owner, bary, fraction, side, fan = map(np.concatenate, zip(*parts, strict=True))
+    order = owner.argsort(kind="stable")
+    subs = SubCells(cells[owner[order]], bary[order], fraction[order], side[order], fan[order])
+    return _joined(space, subs) if space.joints else subs
+
+
+def _joined(space: FunctionSpace, subs: SubCells) -> SubCells:
+    """Sub-cells with the sides of cracks that end on others, split where both cut a cell."""
+    for joint in space.joints:
+        phi = space.cuts[joint.crack].level_set.phi
+        value = np.einsum("svb,sb->sv", subs.bary, phi[space.mesh.cells[subs.cell]])
+        small = np.abs(value) < _ROUND_OFF * np.abs(value).max(axis=1, keepdims=True)
+        value[small] = 0.0
+        split = joint.both[subs.cell] & (subs.side[:, joint.on] == joint.side)
+        split &= (value.min(axis=1) < 0) & (value.max(axis=1) > 0)
+        whole, rows = np.nonzero(~split)[0], np.nonzero(split)[0]
+        inner, share, _, parent = cut_simplices(value[rows])
+        source = np.concatenate([whole, rows[parent]])
+        order = np.argsort(source, kind="stable")
+        finer = np.einsum("svw,swb->svb", inner, subs.bary[rows[parent]])
+        source = source[order]
+        subs = SubCells(
+            subs.cell[source],
+            np.concatenate([subs.bary[whole], finer])[order],
+            subs.fraction[source] * np.concatenate([np.ones(len(whole)), share])[order],
+            subs.side[source],
+            subs.fan[source],
+        )
+    centre = subs.bary.mean(axis=1)
+    return replace(subs, side=at_joints(space, subs.cell, centre, subs.side))
+
+
+def cell_points(space: FunctionSpace, cells: Ints, n: int, degree: int) -> Points:
+    """Integration points of cells, sorted by cell.
+
+    Parameters
+    ----------
+    space : FunctionSpace
+    cells : (k,) array of int, increasing
+    n : int
+        Points a direction where tip functions act.
+    degree : int
+        Degree of polynomials integrated exactly elsewhere.
+    """
+    subs = sub_cells(space, cells)
+    with_tip = space.has_tip[subs.cell]
+    plain = (~with_tip).nonzero()[0]
+    bary, weight = simplex_rule(space.dim, degree)
+    number = np.repeat(plain, len(weight))
+    where = np.einsum("pv,svb->spb", bary, subs.bary[plain]).reshape(-1, space.dim + 1)
+    share = np.outer(subs.fraction[plain], weight).ravel()
+    rows = with_tip.nonzero()[0]
+    if not len(rows):
+        return _sorted(space, subs, number, where, share)
+    near, place, part = _NEAR_TIPS[space.dim](
+        space, subs.cell[rows], subs.bary[rows], subs.fraction[rows], subs.fan[rows], n
+    )
+    return _sorted(
+        space,
+        subs,
+        np.concatenate([number, rows[near]]),
+        np.concatenate([where, place]),
+        np.concatenate([share, part]),
+    )
+
+
+# Points in sub-cells on which tip functions act.
+_NEAR_TIPS = {2: tip_points, 3: front_points}
+
+
+def _sorted(
+    space: FunctionSpace, subs: SubCells, numbers: Ints, every: Floats, part: Floats
+) -> Points:
+    """Points of sub-cells, sorted by cell and sub-cell."""
+    cell = subs.cell[numbers]
+    order = np.lexsort((numbers, cell))
+    cell = cell[order]
+    return Points(
+        cell, every[order], part[order] * space.mesh.volume[cell], subs.side[numbers[order]]
+    )
+
+
+__all__ = []

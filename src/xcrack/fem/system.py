@@ -1,0 +1,102 @@
+"""From a problem to matrices: cut, numbered, integrated and assembled, but not solved."""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+from xcrack.crack.crack import Crack
+from xcrack.crack.junctions import reaching
+from xcrack.fem.assembly import Bulk, Enriched, Stiffness, bulk, enriched_stiffness
+from xcrack.fem.cut import cut
+from xcrack.fem.enrichment import front_reach
+from xcrack.fem.facets import LipPoints, jump_matrix, lip_points
+from xcrack.fem.function_space import FunctionSpace, function_space
+from xcrack.fem.joints_2d import Joint, joined_cuts
+from xcrack.fem.level_set import LevelSet
+from xcrack.fem.level_sets import level_sets
+from xcrack.fem.supports import Known, known_unknowns
+from xcrack.mesh.mesh import Mesh
+from xcrack.model.numerics import Numerics
+from xcrack.model.problem import Problem
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """Everything that load states share.
+
+    Attributes
+    ----------
+    space : FunctionSpace
+    lips : tuple of LipPoints
+    bulk : Bulk
+    enriched : Enriched
+        Entries of enriched functions.
+    known : Known
+    n_points : int
+        Integration points of the enriched cells.
+    """
+
+    space: FunctionSpace
+    lips: tuple[LipPoints, ...]
+    bulk: Bulk
+    enriched: Enriched
+    known: Known
+    n_points: int
+
+    @cached_property
+    def parts(self) -> Stiffness:
+        """Stiffness of all unknowns, of body and enriched functions apart."""
+        return Stiffness(self.bulk.matrix, self.enriched)
+
+    @cached_property
+    def stiffness(self) -> Any:
+        """Stiffness of all unknowns, a sparse matrix made when first asked for."""
+        return self.parts.joined()
+
+    @cached_property
+    def jumps(self) -> tuple[Any, ...]:
+        """Normal jumps at the lip points of each crack, made when first asked for."""
+        return tuple(jump_matrix(self.space, c, lips) for c, lips in enumerate(self.lips))
+
+
+def build(problem: Problem, bulk_: Bulk | None = None) -> Model:
+    """Cut, number, integrate and assemble a problem, without solving it."""
+    space, lips = discretised(problem)
+    mesh, order = space.mesh, space.order
+    if (
+        bulk_ is None
+        or bulk_.mesh is not mesh
+        or bulk_.order != order
+        or bulk_.material != problem.material
+    ):
+        bulk_ = bulk(mesh, problem.material, order)
+    enriched, n_points, reusable = enriched_stiffness(
+        space, problem.material, problem.numerics, lips, bulk_.cells
+    )
+    return Model(
+        space,
+        lips,
+        replace(bulk_, cells=reusable),
+        enriched,
+        known_unknowns(space, tuple(problem.supports)),
+        n_points,
+    )
+
+
+def discretised(problem: Problem) -> tuple[FunctionSpace, tuple[LipPoints, ...]]:
+    """Function space of a problem, and the points on the faces of its cracks: nothing assembled."""
+    mesh, cracks, numerics = problem.mesh, problem.placed, problem.numerics
+    junctions = problem.junctions
+    drawn = reaching(cracks, junctions) if junctions else cracks
+    cuts = tuple(cut(mesh, levels(mesh, crack, numerics)) for crack in drawn)
+    joints: tuple[Joint, ...] = ()
+    if junctions:
+        cuts, joints = joined_cuts(mesh, cuts, junctions)
+    space = function_space(mesh, problem.order or 1, cracks, cuts, numerics, joints)
+    return space, tuple(lip_points(space, c) for c in range(len(cracks)))
+
+
+def levels(mesh: Mesh, crack: Crack, numerics: Numerics) -> LevelSet:
+    """Level sets of a placed crack; in 3D up to where its functions may reach."""
+    reach = front_reach(mesh, crack, numerics.radius)
+    return level_sets(mesh, crack, reach, nodal=numerics.comparison.update == "nodal")

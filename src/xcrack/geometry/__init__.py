@@ -1,1 +1,0 @@
-"""Triangles, polygons and distances as arrays; no mesh, no crack."""

@@ -1,0 +1,183 @@
+"""Advance of a front over a step, with the response of K to the shape that the advance changes.
+
+Where a front lags behind, K is larger: a wave of wave number k and height u changes K by the
+share u |k|/2 (Rice 1985), so that growth flattens it. A long step by the K of its beginning
+overshoots: waves turn over, and grow. The exponential of the linear response does not, at any
+length of a step.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from xcrack.base.arrays import Floats
+from xcrack.crack.front_chain import along_front
+
+_TINY = 1e-3  # of the largest advance: what hardly moves has no waves
+_FEWEST = 4  # places of a front
+
+
+@dataclass(frozen=True, eq=False)
+class Response:
+    """How the advance of one front answers to its own change of shape.
+
+    Attributes
+    ----------
+    place : (n,) array, length
+        Even points along the front.
+    root : (n,) array, √length
+        √(m a/2) at these, a the advance at the beginning of the step.
+    modes : (n, n) array
+        Columns: waves that keep their shape.
+    decay : (n,) array
+        By which exponent each of them falls over the step.
+    closed : bool
+    length : float, length
+    """
+
+    place: Floats
+    root: Floats
+    modes: Floats
+    decay: Floats
+    closed: bool
+    length: float
+
+
+def response(
+    s: Floats, advance: Floats, exponent: float, turning: float, closed: bool, length: float
+) -> Response | None:
+    """Response of one front; None where it is too short to have any.
+
+    Parameters
+    ----------
+    s : (f,) array, length
+        Places.
+    advance : (f,) array, length
+        By the rates at the beginning of the step.
+    exponent : float
+        Of the growth law.
+    turning : float, rad
+        By which the front turns from its first place to its last one: a circle stays one.
+    closed : bool
+    length : float, length
+        Of the whole front.
+
+    Notes
+    -----
+    With B the operator of max(|k| - κ, 0), κ the turning over the length, r = √(m a/2) and
+    S = r B r = E Λ Eᵀ, a disturbance u of the front obeys du/dt = -r S (u/r) over the step.
+    """
+    if len(s) < _FEWEST or advance.max() <= 0:
+        return None
+    n = 2 * len(s)
+    span = length if closed else float(s.max() - s.min())
+    if span <= 0:
+        return None
+    place = np.arange(n) * span / n if closed else s.min() + (np.arange(n) + 0.5) * span / n
+    even = along_front(s, advance, place, closed, length)
+    root = np.sqrt(0.5 * exponent * np.where(even > _TINY * even.max(), even, 0.0))
+    S = root[:, None] * _wave_operator(n, span, closed, turning / span) * root
+    decay, modes = np.linalg.eigh((S + S.T) / 2)
+    return Response(place, root, modes, np.maximum(decay, 0.0), closed, length)
+
+
+def _wave_operator(n: int, span: float, closed: bool, kappa: float) -> Floats:
+    """Matrix `(n, n)` of max(|k| - κ, 0) on even points: by Fourier, or mirrored at both ends."""
+    if closed:
+        number = np.abs(np.fft.fftfreq(n, 1 / n))
+        wave = np.exp(2j * np.pi * np.outer(np.arange(n), np.fft.fftfreq(n, 1 / n)) / n) / np.sqrt(
+            n
+        )
+        factor = np.maximum(2 * np.pi * number / span - kappa, 0.0)
+        return np.asarray(((wave * factor) @ wave.conj().T).real)
+    number = np.arange(n)
+    cosine = np.cos(np.pi * np.outer(np.arange(n) + 0.5, number) / n) * np.sqrt(2 / n)
+    cosine[:, 0] /= np.sqrt(2)
+    factor = np.maximum(np.pi * number / span - kappa, 0.0)
+    return np.asarray((cosine * factor) @ cosine.T)
+
+
+def predicted(front: Response | None, s: Floats, advance: Floats) -> Floats:
+    """Advance of a step by the rates at its beginning `(f,)`, length."""
+    if front is None:
+        return advance
+
+    def change(even: Floats) -> Floats:
+        return _weighted(front, even, _phi_1(front.decay) - 1)
+
+    return _changed(front, s, advance, advance, change)
+
+
+def corrected(front: Response | None, s: Floats, advance: Floats, later: Floats) -> Floats:
+    """Advance of a step by the rates at its beginning and those at its predicted end.
+
+    Notes
+    -----
+    r E [φ₁ ã₀ + φ₂ (ã* - e^-Λ ã₀)], ã = Eᵀ(a/r): of second order, and stable.
+    """
+    mean = 0.5 * (advance + later)
+    if front is None:
+        return mean
+
+    def change(even: Floats) -> Floats:
+        after = along_front(s, later, front.place, front.closed, front.length)
+        phi_1, phi_2 = _phi_1(front.decay), _phi_2(front.decay)
+        first = _weighted(front, even, phi_1 - phi_2 * np.exp(-front.decay) - 0.5)
+        return first + _weighted(front, after, phi_2 - 0.5)
+
+    return _changed(front, s, advance, mean, change)
+
+
+def _changed(
+    front: Response,
+    s: Floats,
+    advance: Floats,
+    plain: Floats,
+    change: Callable[[Floats], Floats],
+) -> Floats:
+    """A plain advance with the change that the response makes on even points."""
+    even = along_front(s, advance, front.place, front.closed, front.length)
+    less = along_front(front.place, change(even), s, front.closed, front.length)
+    return np.asarray(np.maximum(plain + less, 0.0))
+
+
+def _weighted(front: Response, values: Floats, factor: Floats) -> Floats:
+    """Value r E f Eᵀ (values/r), zero where nothing grows."""
+    grows = front.root > 0
+    scaled = np.where(grows, values / np.where(grows, front.root, 1.0), 0.0)
+    return np.asarray(front.root * (front.modes @ (factor * (front.modes.T @ scaled))))
+
+
+def _phi_1(q: Floats) -> Floats:
+    """(1 - e^-q)/q."""
+    small = q < 1e-6
+    safe = np.where(small, 1.0, q)
+    return np.where(small, 1 - q / 2, -np.expm1(-safe) / safe)
+
+
+def _phi_2(q: Floats) -> Floats:
+    """(e^-q - 1 + q)/q²."""
+    small = q < 1e-3
+    safe = np.where(small, 1.0, q)
+    return np.where(small, 0.5 - q / 6 + q**2 / 24, (np.expm1(-safe) + safe) / safe**2)
+
+
+def turning_of(x: Floats, closed: bool) -> float:
+    """By how much a front turns as a whole, rad: not by its zigzag.
+
+    Parameters
+    ----------
+    x : (f, 3) array, length
+        Points in order.
+    closed : bool
+    """
+    if closed:
+        return 2 * np.pi
+    j = max(1, len(x) // 6)
+    first, last = x[j] - x[0], x[-1] - x[-1 - j]
+    cosine = first @ last / (np.linalg.norm(first) * np.linalg.norm(last))
+    return float(np.arccos(np.clip(cosine, -1.0, 1.0)))
+
+
+__all__ = ["Response", "corrected", "predicted", "response", "turning_of"]

@@ -1,1 +1,0 @@
-"""Integrators: Euler's rule, and growth of second order at one solve a step."""

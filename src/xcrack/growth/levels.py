@@ -1,0 +1,284 @@
+"""Levels of a factor at which K is solved, refined where contact bends K between them."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from scipy.interpolate import PchipInterpolator
+
+from xcrack.analysis.solution import Solution
+from xcrack.base.arrays import Bools, Floats, Ints
+from xcrack.fatigue.criteria import clipped
+from xcrack.fatigue.spectrum import Level, Spectrum, distinct, level
+from xcrack.linalg.reuse import Reuse
+from xcrack.model.conditions import InitialStress
+from xcrack.model.problem import Problem
+from xcrack.sif.sif import SIF
+
+_MOST = 33
+_EXPONENT = 3.0  # of growth, to tell which ranges matter
+_GROWTH = 0.25  # of the tolerance: what a middle must change of the growth of a block, to matter
+_POINTS = 65  # factors at which ends of cycles are counted for that
+
+Answers = tuple[tuple[SIF, ...], ...]
+Solve = Callable[[Sequence[Any], Reuse], tuple[tuple[Solution, ...], Answers, Reuse]]
+
+
+@dataclass(frozen=True, eq=False)
+class Ladder:
+    """K of one crack over the factor.
+
+    Attributes
+    ----------
+    levels : (n,) array
+        Rising.
+    K : (n, f, 2 or 3) array, stress √length
+    smooth : bool
+        Between the levels a monotone cubic (Fritsch and Butland 1984), else straight lines.
+    """
+
+    levels: Floats
+    K: Floats
+    smooth: bool
+
+    def at(self, factors: Floats) -> Floats:
+        """K for some factors `(k,)`: `(k, f, 2 or 3)`; at a level the solved one, to the bit."""
+        n = len(self.levels)
+        left = np.clip(np.searchsorted(self.levels, factors, side="right") - 1, 0, n - 2)
+        if self.smooth and n > 2:
+            result = np.asarray(PchipInterpolator(self.levels, self.K, axis=0)(factors))
+        else:
+            share = (factors - self.levels[left]) / (self.levels[left + 1] - self.levels[left])
+            low, high = self.K[left], self.K[left + 1]
+            result = low + share[:, None, None] * (high - low)
+        nearest = left + (factors == self.levels[left + 1])
+        solved = factors == self.levels[nearest]
+        result[solved] = self.K[nearest[solved]]
+        return result
+
+
+@dataclass(frozen=True, eq=False)
+class Solved:
+    """What was solved for one factor: its solution, K, and the closed sets it leaves.
+
+    Attributes
+    ----------
+    solution : Solution
+    sif : tuple of SIF
+        One a crack.
+    reuse : Reuse
+        Of the solve of several factors that it is one of.
+    row : int
+        Which of them.
+    """
+
+    solution: Solution
+    sif: tuple[SIF, ...]
+    reuse: Reuse
+    row: int
+
+
+def refined(
+    problem: Problem, spectrum: Spectrum, first: Floats, solve: Solve, reuse: Reuse
+) -> tuple[tuple[Solution, ...], Answers, Reuse]:
+    """Solutions and K at levels that are as dense as K and the growth of a block ask for.
+
+    Parameters
+    ----------
+    problem : Problem
+    spectrum : Spectrum
+    first : (n,) array
+        Levels to begin with.
+    solve : callable (states, reuse) -> (solutions, sif, reuse)
+    reuse : Reuse
+        Of the step before, with the levels that were wanted there: they are solved at once.
+
+    Notes
+    -----
+    Each interval is halved once; its halves are halved too where, at the middle of the interval, K
+    of some place is off by more than the tolerance, and matters: the middle changes the growth of a
+    block there by more than a quarter of the tolerance, of that of the fastest place.
+    """
+    low, high = float(first[0]), float(first[-1])
+    earlier = [x for x in reuse.levels if low <= x <= high]
+    solved: dict[float, Solved] = {}
+    handed_on = reuse
+
+    def solve_at(factors: Sequence[float]) -> Reuse:
+        new = sorted(set(factors) - set(solved))
+        if not new:
+            return handed_on
+        start = handed_on if not solved else _nearest(handed_on, solved, new)
+        solutions, answers, after = solve(states_of(problem, spectrum, np.array(new)), start)
+        for row, (factor, solution, sif) in enumerate(zip(new, solutions, answers)):
+            solved[factor] = Solved(solution, sif, after, row)
+        return after
+
+    handed_on = solve_at([*first.tolist(), *earlier])
+    levels = first.tolist()
+    active = np.ones(len(levels) - 1, dtype=bool)
+    if all(part is None for each in solved.values() for part in each.solution.contact):
+        active[:] = False  # no crack has contact in any state: its gaps are lines over the factor
+    ends = _ends(spectrum, low, high)
+    while active.any() and len(levels) < _MOST:
+        wanted = np.nonzero(active)[0][: _MOST - len(levels)]
+        middle = [0.5 * (levels[k] + levels[k + 1]) for k in wanted]
+        handed_on = solve_at(middle)
+        matters = _matters(spectrum, solved, levels, wanted, middle, ends)
+        bent = {m for m, off in zip(middle, matters) if off}
+        levels = sorted([*levels, *middle])
+        active = np.array([a in bent or b in bent for a, b in zip(levels, levels[1:])])
+    every = [solved[factor] for factor in sorted(solved)]
+    handed_on = replace(_nearest(handed_on, solved, levels), levels=tuple(levels))
+    return tuple(each.solution for each in every), tuple(each.sif for each in every), handed_on
+
+
+def states_of(problem: Problem, spectrum: Spectrum, factors: Floats) -> list[float | Level]:
+    """Load states of some factors."""
+    if not spectrum.steady:
+        return [float(factor) for factor in factors]
+    return [level(problem.loads, spectrum.steady, float(factor)) for factor in factors]
+
+
+def _nearest(reuse: Reuse, solved: dict[float, Solved], factors: Sequence[float]) -> Reuse:
+    """The same with the closed sets of the factors that are nearest to some others."""
+    known = np.array(sorted(solved))
+    near = [solved[float(known[np.abs(known - factor).argmin()])] for factor in factors]
+    active: list[Bools | None] = []
+    for c in range(len(reuse.centre)):
+        sets = [each.reuse.active[c] for each in near]
+        rows = [part[each.row] for part, each in zip(sets, near) if part is not None]
+        active.append(np.stack(rows) if len(rows) == len(near) else None)
+    centre = tuple(x if a is not None else None for x, a in zip(reuse.centre, active))
+    return replace(reuse, centre=centre, active=tuple(active))
+
+
+def _ends(spectrum: Spectrum, low: float, high: float) -> tuple[Floats, Ints, Floats]:
+    """Even factors, both ends of the kinds of cycles among them `(2, p)`, and how often."""
+    values, count, _ = distinct(spectrum.cycles)
+    rows = np.rint((values - low) / (high - low) * (_POINTS - 1)).astype(np.int64)
+    pairs, which = np.unique(rows, axis=0, return_inverse=True)
+    number = np.bincount(which.reshape(-1), weights=count, minlength=len(pairs)).astype(float)
+    return np.linspace(low, high, _POINTS), pairs.T, number
+
+
+def _matters(
+    spectrum: Spectrum,
+    solved: dict[float, Solved],
+    levels: Sequence[float],
+    wanted: Ints,
+    middle: Sequence[float],
+    ends: tuple[Floats, Ints, Floats],
+) -> Bools:
+    """Middles `(k,)` at which K of some place is off, so that growth of a block changes."""
+    factors, pairs, count = ends
+    more = sorted([*levels, *middle])
+    solved_K = [np.stack([solved[x].sif[c].K for x in more]) for c in _cracks(solved)]
+    off = np.zeros((len(middle), 0))
+    changed, grown = np.zeros((len(middle), 0)), np.zeros(0)
+    old = np.isin(more, levels)
+    for K in solved_K:
+        if K.shape[1] == 0:
+            continue
+        before = Ladder(np.array(levels), K[old], smooth=True)
+        after = Ladder(np.array(more), K, smooth=True)
+        largest = max(float(np.abs(K).max()), np.finfo(float).tiny)
+        error = np.abs(K[~old] - before.at(np.array(middle))).max(axis=2) / largest
+        one, two = (_growths(ladder, factors, pairs, count) for ladder in (before, after))
+        difference = np.abs(two - one)
+        rows = []
+        for k in wanted:
+            inside = (factors > levels[k]) & (factors < levels[k + 1])
+            rows.append(difference[inside[pairs].any(axis=0)].sum(axis=0))
+        off = np.concatenate([off, error], axis=1)
+        changed = np.concatenate([changed, np.array(rows).reshape(len(middle), -1)], axis=1)
+        grown = np.concatenate([grown, two.sum(axis=0)])
+    least = _GROWTH * spectrum.tolerance * float(grown.max(initial=0.0))
+    return np.asarray(((off > spectrum.tolerance) & (changed > least)).any(axis=1))
+
+
+def _growths(ladder: Ladder, factors: Floats, pairs: Ints, count: Floats) -> Floats:
+    """Growth of each kind of cycle at each place `(p, f)`, but for a constant."""
+    K = clipped(ladder.at(factors))
+    dK = np.linalg.norm(K[pairs[1]] - K[pairs[0]], axis=2)
+    return np.asarray(count[:, None] * dK**_EXPONENT)
+
+
+def _cracks(solved: dict[float, Solved]) -> range:
+    return range(len(next(iter(solved.values())).sif))
+
+
+# K over the factor of a load: solved at some levels, interpolated between them.
+
+_FIRST = 5  # levels before the first look at what lies between them
+
+
+def respond_to(
+    problem: Problem, spectrum: Spectrum, solve: Solve, reuse: Reuse
+) -> tuple[tuple[Solution, ...], Answers, Reuse]:
+    """Solutions and K at the levels of a spectrum, in the order of their factors.
+
+    Parameters
+    ----------
+    problem : Problem
+    spectrum : Spectrum
+        Of factors or rows.
+    solve : callable (states, reuse) -> (solutions, sif, reuse)
+    reuse : Reuse
+        Of the step before.
+    """
+    low, high = spectrum.extremes
+    every = np.unique([spectrum.cycles["min"], spectrum.cycles["max"]])
+    exact = is_homogeneous(problem, spectrum) or problem.contact == "off"
+    if spectrum.levels != "auto":
+        factors = np.linspace(low, high, int(spectrum.levels))
+    elif exact:
+        factors = np.array([low, high])
+    elif len(every) <= _FIRST:
+        factors, exact = every, True  # all that is asked for is solved
+    else:
+        factors = np.linspace(low, high, _FIRST)
+    if exact or spectrum.levels != "auto":
+        return solve(states_of(problem, spectrum, factors), reuse)
+    return refined(problem, spectrum, factors, solve, reuse)
+
+
+def ladders(problem: Problem, spectrum: Spectrum, factors: Floats, sif: Answers) -> list[Ladder]:
+    """Ladder of each crack, from K at the levels that were solved."""
+    linear = len(factors) == 2
+    origin = linear and is_homogeneous(problem, spectrum) and factors[0] < 0 < factors[1]
+    result = []
+    for c in range(len(sif[0])):
+        K = np.stack([state[c].K for state in sif])
+        if origin:  # K is in proportion to the factor, on both sides with a slope of its own
+            K = np.stack([K[0], np.zeros_like(K[0]), K[1]])
+            result.append(Ladder(np.array([factors[0], 0.0, factors[1]]), K, smooth=False))
+        else:
+            result.append(Ladder(factors, K, smooth=not linear))
+    return result
+
+
+def factors_of(solutions: Sequence[Solution]) -> Floats:
+    """Factor of each solved level."""
+    states = [solution.state for solution in solutions]
+    return np.array([s.factor if isinstance(s, Level) else s for s in states], dtype=float)
+
+
+def is_homogeneous(problem: Problem, spectrum: Spectrum) -> bool:
+    """Whether twice the factor gives twice the answer, with contact too."""
+    stressed = any(isinstance(load, InitialStress) for load in problem.loads)
+    return not spectrum.steady and not stressed
+
+
+__all__ = [
+    "Answers",
+    "Ladder",
+    "Solve",
+    "factors_of",
+    "is_homogeneous",
+    "ladders",
+    "refined",
+    "respond_to",
+    "states_of",
+]

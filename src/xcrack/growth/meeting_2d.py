@@ -1,0 +1,328 @@
+"""Tips in 2D that meet other cracks: they end on them, or two facing tips become one crack.
+
+Close before another crack K is no longer that of the tip alone, and within a cell nothing resolves
+it. A tip whose straight prolongation meets another crack within a cell and a quarter of its advance
+ends there: it keeps its direction, and the step ends when it arrives.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from xcrack.base.arrays import Bools, Floats, Ints
+from xcrack.crack.advance_2d import with_tips
+from xcrack.crack.crack import Crack, tip_frames
+from xcrack.crack.lines import crossing_points, polyline_crack
+from xcrack.growth.step import LEAST, PerCrack
+from xcrack.mesh.locate import cell_sizes, contains
+from xcrack.mesh.mesh import Mesh
+from xcrack.mesh.polygon import closest_on_segment
+
+# Tips of all 2D cracks as rows of one array, and cracks that end at given places.
+
+_WHOLE = 0.5  # cells: a shorter face is not left behind, its end moves on with the tip
+
+
+@dataclass(frozen=True, eq=False)
+class Faces:
+    """Last faces of cracks, a row for each tip.
+
+    Attributes
+    ----------
+    tip, anchor : (n, 2) arrays, length
+        Where they end and begin.
+    length : (n,) array, length
+    direction : (n,) array, rad
+        From the x-axis.
+    side : (n,) array
+        1, or -1 where the tip's frame is left-handed.
+    """
+
+    tip: Floats
+    anchor: Floats
+    length: Floats
+    direction: Floats
+    side: Floats
+
+
+def faces_of(cracks: Sequence[Crack]) -> Faces:
+    """The last faces of all tips of placed cracks."""
+    tip, anchor, side = [np.zeros((0, 2))], [np.zeros((0, 2))], [np.zeros(0)]
+    for crack in cracks:
+        x, frame = tip_frames(crack)
+        before = [crack.points[1 if tip == 0 else tip - 1] for tip in crack.tips or ()]
+        tip.append(x)
+        anchor.append(np.array(before).reshape(-1, 2))
+        side.append(np.sign(np.linalg.det(frame)) if len(x) else np.zeros(0))
+    ends, begins = np.concatenate(tip), np.concatenate(anchor)
+    along = ends - begins
+    return Faces(
+        ends,
+        begins,
+        np.linalg.norm(along, axis=1),
+        np.arctan2(along[:, 1], along[:, 0]),
+        np.concatenate(side),
+    )
+
+
+def moved_on(faces: Faces, grown: Bools, size: Floats) -> Bools:
+    """Whether the last point of each tip moves on with it: its face was added, and is short."""
+    return np.asarray(grown & (faces.length < _WHOLE * size))
+
+
+def ending_at(
+    cracks: Sequence[Crack], place: Floats, grown: Bools, size: Floats
+) -> tuple[list[Crack], Bools]:
+    """Cracks that go on to given places.
+
+    Parameters
+    ----------
+    cracks : sequence of Crack
+        Placed.
+    place : (n, 2) array, length
+        Where the tips of all of them are to be.
+    grown : (n,) array of bool
+        Whether the last face was added by growth.
+    size : (n,) array, length
+        Of the cells there.
+
+    Returns
+    -------
+    cracks : list of Crack
+        The last face of a tip moves on until it is half a cell long; then another one begins, once
+        that is a tenth of a cell long.
+    moves : (n,) array of bool
+        Tips that moved; the others wait.
+    """
+    faces = faces_of(cracks)
+    instead = moved_on(faces, grown, size)
+    begin = np.where(instead[:, None], faces.anchor, faces.tip)
+    moves = np.linalg.norm(place - begin, axis=1) >= LEAST * size
+    result = []
+    for crack, rows in zip(cracks, rows_of(cracks)):
+        result.append(
+            with_tips(crack, place[rows], moves[rows], instead[rows]) if crack.n_tips else crack
+        )
+    return result, moves
+
+
+def rows_of(cracks: Sequence[Crack]) -> list[slice]:
+    """Rows of the tips of each crack."""
+    end = np.cumsum([0, *(crack.n_tips for crack in cracks)])
+    return [slice(int(a), int(b)) for a, b in zip(end, end[1:])]
+
+
+def split(values: Floats, cracks: Sequence[Crack]) -> PerCrack:
+    """Rows of all tips as one array a crack."""
+    return tuple(np.array(values[rows]) for rows in rows_of(cracks))
+
+
+AHEAD = 1.25  # cells beyond the advance within which a tip is taken to meet what lies ahead
+_FACING = 0.6  # of that for each of two facing tips
+_SOON = 1.0  # cells: tips closer than that to what they meet join in the same step
+_BESIDE = 1.2  # cells by which facing tips may miss each other and still become one crack
+_BEHIND = 1.3  # cells behind a tip at which others end that would meet it closer
+
+
+@dataclass(frozen=True, eq=False)
+class Meeting:
+    """What a tip meets.
+
+    Attributes
+    ----------
+    tip : int
+        Row of the tip among those of all cracks.
+    x : (2,) array, length
+        Where it ends.
+    away : float, length
+        From the tip to there; negative where it lies beyond.
+    crack : int
+        The other crack.
+    other : int
+        Row of the facing tip, or -1 for a flank.
+    size : float, length
+        Of the cell there.
+    """
+
+    tip: int
+    x: Floats
+    away: float
+    crack: int
+    other: int
+    size: float
+
+    @property
+    def soon(self) -> bool:
+        """Whether the tip is too close to what it meets for another step."""
+        return self.away <= _SOON * self.size * (1.0 if self.other < 0 else _FACING)
+
+
+def meetings(cracks: Sequence[Crack], mesh: Mesh, ahead: float = AHEAD) -> list[Meeting]:
+    """What tips meet within some cells ahead of them, or have run across, the nearest first.
+
+    Parameters
+    ----------
+    cracks : sequence of Crack
+        Placed, or advanced from placed ones.
+    mesh : Mesh
+    ahead : float
+        In cells.
+    """
+    if len(cracks) < 2:
+        return []
+    faces = faces_of(cracks)
+    owner = np.repeat(np.arange(len(cracks)), [crack.n_tips for crack in cracks])
+    size = cell_sizes(mesh, faces.tip)
+    result = []
+    for row in range(len(owner)):
+        h, x = float(size[row]), faces.tip[row]
+        along = np.array([np.cos(faces.direction[row]), np.sin(faces.direction[row])])
+        facing = _facing(row, faces, owner, 2 * _FACING * ahead * h, _BESIDE * h)
+        if facing is not None:
+            middle = (x + faces.tip[facing]) / 2
+            away = float((faces.tip[facing] - x) @ along) / 2
+            result.append(Meeting(row, middle, away, int(owner[facing]), facing, h))
+            continue
+        flank = _flank(int(owner[row]), faces.anchor[row], x + ahead * h * along, cracks, mesh)
+        if flank is not None:
+            end, other = flank
+            end = _behind_tips(end, cracks[other], _BEHIND * h)
+            result.append(Meeting(row, end, float((end - x) @ along), other, -1, h))
+    return sorted(result, key=lambda met: met.away)
+
+
+def _facing(row: int, faces: Faces, owner: Ints, reach: float, room: float) -> int | None:
+    """The tip of another crack that comes towards this one, or has come past it just now."""
+    direction = faces.direction
+    along = np.array([np.cos(direction[row]), np.sin(direction[row])])
+    gap = faces.tip - faces.tip[row]
+    ahead, beside = gap @ along, np.abs(gap @ np.array([-along[1], along[0]]))
+    opposite = np.cos(direction - direction[row]) < -0.5
+    before = (faces.anchor - faces.anchor[row]) @ along > 0
+    near = (ahead < reach) & before & (beside <= room)
+    rows = np.nonzero(near & opposite & (owner != owner[row]))[0]
+    return int(rows[np.argmin(np.abs(ahead[rows]))]) if len(rows) else None
+
+
+def _flank(
+    c: int, begin: Floats, end: Floats, cracks: Sequence[Crack], mesh: Mesh
+) -> tuple[Floats, int] | None:
+    """Where the last face of crack c, prolonged, first crosses another crack in the body."""
+    best, distance = None, np.inf
+    for other, crack in enumerate(cracks):
+        if other == c:
+            continue
+        x = crossing_points(np.stack([begin, end]), crack.points)
+        x = x[contains(mesh, x)] if len(x) else x
+        away = np.linalg.norm(x - begin, axis=1)
+        away = np.where(away > 1e-9 * np.linalg.norm(end - begin), away, np.inf)
+        if len(x) and away.min() < distance:
+            k = int(np.argmin(away))
+            best, distance = (x[k], other), float(away[k])
+    return best
+
+
+def _behind_tips(x: Floats, crack: Crack, room: float) -> Floats:
+    """A point of a crack, moved along it until its tips are not too close."""
+    for tip in crack.tips or ():
+        line = crack.points if tip == 0 else crack.points[::-1]
+        length = np.linalg.norm(np.diff(line, axis=0), axis=1)
+        at_vertex = np.concatenate([[0.0], np.cumsum(length)])
+        foot = closest_on_segment(x, line[:-1], line[1:])
+        piece = int(np.argmin(np.linalg.norm(foot - x, axis=1)))
+        along = at_vertex[piece] + float(np.linalg.norm(foot[piece] - line[piece]))
+        if along < room < at_vertex[-1]:
+            piece = int(np.searchsorted(at_vertex, room, side="right")) - 1
+            share = (room - at_vertex[piece]) / length[piece]
+            x = (1 - share) * line[piece] + share * line[piece + 1]
+    return x
+
+
+def joined(cracks: Sequence[Crack], moved: Sequence[bool], met: Sequence[Meeting]) -> list[Crack]:
+    """Cracks after meetings: tips that end on others are none, facing ones are gone.
+
+    Parameters
+    ----------
+    cracks : sequence of Crack
+        As the meetings were found with.
+    moved : sequence of bool
+        For each tip whether its last point was added, so that it may be replaced.
+    met : sequence of Meeting
+    """
+    result: list[Crack | None] = list(cracks)
+    tip_of = [
+        (c, k) for c, rows in enumerate(rows_of(cracks)) for k in range(rows.stop - rows.start)
+    ]
+    at_end = {}  # crack and whether it is the first point: where a facing pair meets
+    pairs = []
+    for own in met:
+        c, k = tip_of[own.tip]
+        first = (cracks[c].tips or ())[k] == 0
+        if own.other < 0:
+            crack = result[c]
+            assert crack is not None
+            result[c] = _ended(crack, first, own.x, moved[own.tip], True)
+        elif own.tip < own.other and (c, first) not in at_end:
+            other, there = tip_of[own.other]
+            last = (cracks[other].tips or ())[there] == 0
+            if (other, last) in at_end:
+                continue
+            for key, row in (((c, first), own.tip), ((other, last), own.other)):
+                at_end[key] = own.x
+                crack = result[key[0]]
+                assert crack is not None
+                result[key[0]] = _ended(crack, key[1], own.x, moved[row], False)
+            pairs.append(((c, first), (other, last), own.x))
+    number = list(range(len(cracks)))
+    for (c, _), (other, _), x in pairs:
+        low, high = sorted((number[c], number[other]))
+        if low == high:
+            continue  # they are one crack by now: it closes, which placing refuses
+        one, two = result[low], result[high]
+        assert one is not None
+        assert two is not None
+        result[low], result[high] = _one(one, two, x), None
+        number = [low if n == high else n for n in number]
+    return [crack for crack in result if crack is not None]
+
+
+def _ended(crack: Crack, first: bool, x: Floats, replace: bool, drop: bool) -> Crack:
+    """A crack with another end, which is a tip no more where asked for."""
+    points = crack.points[::-1] if first else crack.points
+    points = np.concatenate([points[:-1] if replace and len(points) > 2 else points, x[None]])
+    last = len(points) - 1
+    others = [tip for tip in crack.tips or () if (tip == 0) != first]
+    tips = [0 if tip == 0 else last for tip in others]
+    if not drop:
+        tips.append(0 if first else last)
+    return polyline_crack(points[::-1] if first else points, tuple(sorted(tips)))
+
+
+def _one(one: Crack, two: Crack, x: Floats) -> Crack:
+    """Two cracks that end at x as one, in the direction of the first."""
+    begins = np.array_equal(one.points[0], x)
+    ends = two.points[::-1] if np.array_equal(two.points[0], x) == begins else two.points
+    free = [k for k in (0, len(two.points) - 1) if not np.array_equal(two.points[k], x)]
+    tip_beyond = any(k in (two.tips or ()) for k in free)
+    if begins:
+        points = np.concatenate([ends, one.points[1:]])
+        tips = [0] * tip_beyond + [len(points) - 1] * (len(one.points) - 1 in (one.tips or ()))
+    else:
+        points = np.concatenate([one.points, ends[1:]])
+        tips = [0] * (0 in (one.tips or ())) + [len(points) - 1] * tip_beyond
+    return polyline_crack(points, tuple(tips))
+
+
+__all__ = [
+    "AHEAD",
+    "Faces",
+    "Meeting",
+    "ending_at",
+    "faces_of",
+    "joined",
+    "meetings",
+    "moved_on",
+    "rows_of",
+    "split",
+]

@@ -1,0 +1,331 @@
+"""The meshes of a run with a tolerance: as given, and fine where a scout has been."""
+
+import hashlib
+import sys
+from collections.abc import Callable, Generator, Sequence
+from dataclasses import replace
+from time import perf_counter
+from typing import Any, Protocol
+
+import numpy as np
+
+from xcrack.adaptivity.measured import Measured, measured
+from xcrack.base.arrays import Floats
+from xcrack.base.errors import ProblemError, XcrackError, collected_warnings, warn
+from xcrack.growth import sizes_2d, sizes_3d
+from xcrack.growth.controlled import PATH, can_be_shortened, shortened
+from xcrack.growth.corridor import corridor, ways_of
+from xcrack.growth.options import Run
+from xcrack.growth.scout import Stage, samples, scouted
+from xcrack.growth.step import Step, memory_of
+from xcrack.growth.trail import REJECTED, next_length
+from xcrack.growth.uncertainty import TOGETHER
+from xcrack.mesh.locate import cell_sizes
+from xcrack.mesh.mesh import Mesh
+from xcrack.mesh.refinement import refine
+from xcrack.model.problem import Problem
+
+SHARE = 0.4  # of the tolerance: what K may take
+_LEAST_EXPONENT = 2.0  # of the law, in the error of life; directions err by twice that of K_II
+_FORETOLD = 4.0  # times the wanted bar: from there the next mesh need not be looked at again
+
+Steps = Callable[[Run], Generator[Step, None, str]]
+
+
+class Sizes(Protocol):
+    """What decides the sizes of cells in one dimension; `sizes_2d` and `sizes_3d` have it."""
+
+    MOST_UNKNOWNS: int
+    STAGES: int  # that stand for the path
+    ROUNDS: int
+    LIFE: float  # share of it at the last of these
+    SCOUT_ORDER: int
+
+    def given_mesh(self, problem: Problem) -> Mesh:
+        """The mesh of a scene to begin with."""
+
+    def scout_mesh(self, problem: Problem) -> Mesh:
+        """The mesh of a scene for a scout."""
+
+    def first_sizes(self, problem: Problem, stage: Stage) -> Floats:
+        """Sizes of cells at the places of a stage, before any bar is known."""
+
+    def error(self, now: Measured) -> float:
+        """Half-width of K over the largest K."""
+
+    def finer(
+        self,
+        each: Sequence[Measured],
+        wanted: Sequence[float],
+        places: Sequence[Floats],
+        sizes: list[Floats],
+    ) -> tuple[Mesh, list[Floats]]:
+        """The next mesh but for the corridor, and the sizes along that."""
+
+
+def prepared(
+    run: Run, steps_of: Steps, done: Sequence[Step] = (), stored: Sequence[Mesh] = ()
+) -> Run:
+    """A run on the mesh that it begins with, or goes on with.
+
+    Parameters
+    ----------
+    run : Run
+        On the mesh as it was given.
+    steps_of : callable
+        What makes the steps of a run.
+    done : sequence of Step, optional
+        Those that a run goes on from.
+    stored : sequence of Mesh, optional
+        Meshes that it has had; where the last one is not among them, it is made again.
+
+    Returns
+    -------
+    Run
+    """
+    first = _first_mesh(run)
+    if not done:
+        _check_unknowns(run, first)
+        return on(run, first)
+    known = memory_of(done[-1]).mesh
+    run = replace(run, meshes=memory_of(done[-1]).meshes)
+    for mesh in (first, *stored):
+        if fingerprint(mesh) == known:
+            return on(run, replace(mesh, curves=run.problem.mesh.curves))
+    earlier = [step for step in done if memory_of(step).mesh != known]
+    mesh, _ = finer(run, steps_of, earlier[-1] if earlier else None)
+    if fingerprint(mesh) != known:
+        warn(
+            "the mesh that the run had is not stored, and the one that was made again differs "
+            "from it in the last bits: so may the steps that follow."
+        )
+    return on(run, mesh)
+
+
+def on(run: Run, mesh: Mesh) -> Run:
+    """A run on another mesh."""
+    return replace(run, problem=replace(run.problem, mesh=mesh, order=2))
+
+
+def _first_mesh(run: Run) -> Mesh:
+    """The mesh as given, where error bars can be had on it: else finer at the tips, or fronts."""
+    return _TWINS[run.problem.mesh.dim].given_mesh(run.problem)
+
+
+def _check_unknowns(run: Run, mesh: Mesh) -> None:
+    """Refuse a first mesh that has too many unknowns before anything is solved on it."""
+    least = mesh.dim * (mesh.n_points + len(mesh.edges))
+    if run.max_unknowns is not None and least > run.max_unknowns:
+        raise ProblemError(
+            f"grow: max_unknowns = {run.max_unknowns}, and the first mesh, on which cracks are a "
+            f"few cells long, has {least} at least: allow more, or give a coarser mesh."
+        )
+
+
+def fingerprint(mesh: Mesh) -> str:
+    """Text that two meshes share if they are the same to the last bit."""
+    digest = hashlib.sha256(np.ascontiguousarray(mesh.points).tobytes())
+    digest.update(np.ascontiguousarray(mesh.cells).tobytes())
+    return digest.hexdigest()[:16]
+
+
+def finer(run: Run, steps_of: Steps, last: Step | None) -> tuple[Mesh, bool]:
+    """A mesh on which bars of K are as wanted along all of the way that a scout finds.
+
+    Parameters
+    ----------
+    run : Run
+        On the mesh as it was given.
+    steps_of : callable
+        What makes the steps of a run.
+    last : Step, optional
+        From which on the cracks are to grow; from their start, where it is left out.
+
+    Returns
+    -------
+    Mesh
+    bool
+        Whether it would have more unknowns than it may.
+    """
+    twin, start = _TWINS[run.problem.mesh.dim], perf_counter()
+    before = _first_mesh(run)
+    if last is not None:
+        run = replace(run, problem=replace(run.problem, cracks=last.corrected))
+    most = run.max_unknowns or twin.MOST_UNKNOWNS
+    mesh = twin.scout_mesh(run.problem)
+    _tell(run, f"scout: on {len(mesh.cells)} cells", start)
+    scene = replace(run.problem, mesh=mesh, order=twin.SCOUT_ORDER)
+    seen = scouted(run, scene, steps_of, 0 if last is None else last.index)
+    if not seen.stages:
+        return mesh, False
+    _tell(run, f"scout: {len(seen.stages)} steps, N = {seen.stages[-1].cycles:.4g}", start)
+    ways = ways_of(seen)
+    # Of one that has begun long ago, most of the life is over.
+    chosen = samples(seen, twin.STAGES, 1.0 if last is not None and last.index else twin.LIFE)
+    stages = [seen.stages[k] for k in chosen]
+    sizes = [twin.first_sizes(scene, stage) for stage in stages]
+    sizes[0] = np.minimum(sizes[0], seen.step)
+    mesh = refine(mesh, size=corridor(seen, ways, chosen, sizes))
+    wanted = SHARE / TOGETHER * float(run.tolerance or 0.0) / max(seen.exponent, _LEAST_EXPONENT)
+    for number in range(twin.ROUNDS):
+        each = [_measured(run, mesh, stage) for stage in stages]
+        there = [k for k, now in enumerate(each) if now is not None]
+        good = [now for now in each if now is not None]
+        if not good:
+            break
+        error = max(map(twin.error, good))
+        unknowns = max(now.solutions[0].space.n_dof for now in good)
+        text = f"{unknowns} unknowns, K within {error:.1e}, wanted {wanted:.1e}"
+        _tell(run, f"mesh {number}: {text}", start)
+        if number == 0 and unknowns > most:
+            instead = f"{unknowns} are the fewest for the way ahead; growth keeps the mesh it has"
+            _warn_of_most(run, most, instead)
+            return before, True
+        if error <= wanted:
+            break
+        goals = [wanted * float(np.abs(now.best).max(initial=0.0)) for now in good]
+        places = [stages[k].places for k in there]
+        smaller, own = twin.finer(good, goals, places, [sizes[k] for k in there])
+        for k, size in zip(there, own, strict=True):
+            sizes[k] = size
+        smaller = refine(smaller, size=corridor(seen, ways, chosen, sizes))
+        if unknowns * len(smaller.cells) > most * len(mesh.cells):
+            _warn_of_most(
+                run, most, f"growth goes on with {unknowns}, on which K is known to {error:.1e} of "
+                f"its largest value, where {wanted:.1e} was wanted",
+            )  # fmt: skip
+            return mesh, True
+        same, mesh = len(smaller.cells) == len(mesh.cells), smaller
+        if error <= _FORETOLD * wanted or same:
+            break
+    _tell(run, f"mesh: {len(mesh.cells)} cells", start)
+    return mesh, False
+
+
+def _warn_of_most(run: Run, most: int, instead: str) -> None:
+    warn(
+        f"grow: the mesh that tolerance = {run.tolerance:g} asks for would have more than {most} "
+        f"unknowns: {instead}. Allow more with max_unknowns; life_bar says what it costs."
+    )
+
+
+def _measured(run: Run, mesh: Mesh, stage: Stage) -> Measured | None:
+    """K of a stage with its bars; None where that mesh has none."""
+    with collected_warnings([]):  # they come again in the run
+        try:
+            scene = replace(run.problem, mesh=mesh, cracks=stage.cracks, order=2)
+            return measured(scene, run.cycle.load_states)
+        except XcrackError:
+            return None
+
+
+def _tell(run: Run, line: str, start: float) -> None:
+    if run.progress == "always" or (run.progress and sys.stderr.isatty()):
+        print(f"{line}, {perf_counter() - start:.2g} s", file=sys.stderr)
+
+
+_TWINS: dict[int, Sizes] = {2: sizes_2d, 3: sizes_3d}
+
+
+# When a step asks for a finer mesh than it was computed on, and is computed again on that.
+
+_MOST = 4  # meshes that a run makes: behind that it goes on, and its bars say how well
+_FORGIVEN = 3.0  # times the share of K: bars along the way were foretold, not measured
+
+_SETTLED = 4  # steps: before, bars are wide behind a kink whose face is short, on any mesh
+_SIZE = 0.5  # of a crack: of less growth than that a path may err by a share of as much
+_HALF, _WHOLE = 0.5, 0.8  # of the tolerance, by all sources: below that no finer mesh is worth it
+_BEGIN = 1.5  # times the share of K at the first step: bars of a crack that grows become shorter
+
+
+def again(
+    asked: Run, run: Run, steps_of: Steps, last: Step | None, step: Step
+) -> tuple[Run, Step | None] | None:
+    """The run and the step from which one is to be computed again; None where that is good.
+
+    It follows from what is stored with the step before: a run that is taken up again does the same.
+
+    Parameters
+    ----------
+    asked : Run
+        On the mesh as it was given.
+    run : Run
+        On the one of the step.
+    steps_of : callable
+        What makes the steps of a run.
+    last : Step or None
+        The one before, which is handed over.
+    step : Step
+    """
+    if _outgrown(run, last, step):
+        mesh, is_largest = finer(asked, steps_of, last)
+        other = replace(on(run, mesh), meshes=_MOST if is_largest else run.meshes + 1)
+        return other, last if last is None else _with_room(run, other, last, step)
+    if last is None:
+        return None
+    shorter = shortened(last, step)
+    return None if shorter is None else (run, shorter)
+
+
+def _outgrown(run: Run, last: Step | None, step: Step) -> bool:
+    """Whether the bars of K are too wide on the mesh of a step, or its cells too long."""
+    error = step.error
+    if not run.estimates or error is None or not step.n_tips or run.meshes >= _MOST:
+        return False
+    before = 0 if last is None else memory_of(last).meshes
+    if run.meshes > before or (run.meshes and step.index < _SETTLED):
+        return False  # it was made for this step, or for a kink just behind it
+    tolerance = float(run.tolerance or 0.0)
+    forgiven = 1.0 if run.meshes == 0 else _FORGIVEN
+    rate, turn = _local(run, step)
+    before_it = (np.inf, np.inf) if run.meshes == 0 or last is None else _local(run, last)
+    rate, turn = min(rate, before_it[0]), min(turn, before_it[1])
+    of_life, of_path = SHARE * tolerance, (1 - PATH) * tolerance
+    if last is None:
+        return rate > _BEGIN * of_life or turn > _BEGIN * of_path
+    cycles, way = step.cycles, max(error.grown, _SIZE * min(memory_of(step).length, default=0.0))
+    if not (cycles > 0 and way > 0):
+        return False
+    whole = (_WHOLE if run.meshes else _HALF) * tolerance
+    short_of_life = (error.K + error.contact + error.unknown) / cycles > of_life
+    short_of_path = error.K_place / way > of_path
+    return bool(
+        (rate > forgiven * of_life and short_of_life and error.life / cycles > whole)
+        or (turn > forgiven * of_path and short_of_path and error.path / way > whole)
+        or (run.meshes == 0 and _has_no_room(last, step))
+    )
+
+
+def _local(run: Run, step: Step) -> tuple[float, float]:
+    """Errors of rate and direction at a step by K, as they count for life and path."""
+    error = step.error
+    # No bar: a finer mesh may have one, but once.
+    unknown = 1.0 if run.meshes == 0 else 0.0
+    if error is None or np.isnan(error.rate):
+        return unknown, unknown
+    return TOGETHER * error.rate, error.turn
+
+
+def _has_no_room(last: Step, step: Step) -> bool:
+    """Whether a step is too long, and the cells leave no room for a shorter one."""
+    control = memory_of(step).trail
+    error = None if control is None else control.control.error
+    return error is not None and error > REJECTED and not can_be_shortened(last)
+
+
+def _with_room(run: Run, other: Run, last: Step, step: Step) -> Step:
+    """The step before, with the way ahead that a finer mesh allows."""
+    trail: Any = memory_of(last).trail
+    own: Any = memory_of(step).trail
+    places = np.concatenate([sif.x for sif in step.sif[0]])
+    sizes = [cell_sizes(each.problem.mesh, places) for each in (run, other)]
+    control = trail.control
+    least = control.least * min(float(np.median(sizes[1] / sizes[0])), 1.0)
+    length = control.length
+    if own.control.error is not None and own.control.error > REJECTED:
+        length = next_length(length, own.control.error, None, least)
+    control = replace(control, length=length, least=least)
+    return replace(last, memory=replace(memory_of(last), trail=replace(trail, control=control)))
+
+
+__all__ = ["SHARE", "again", "finer", "fingerprint", "on", "prepared"]

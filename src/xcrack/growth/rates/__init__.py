@@ -1,1 +1,0 @@
-"""From K to rates: ladders of K, blocks of cycles, evaluation, uncertainty."""

@@ -1,1 +1,0 @@
-"""Mesh and steps from a tolerance: scout, corridor, sizes."""

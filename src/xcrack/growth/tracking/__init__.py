@@ -1,1 +1,0 @@
-"""Where tips and fronts go: advance, cycles, what they meet."""

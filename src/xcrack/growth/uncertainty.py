@@ -1,0 +1,243 @@
+"""What the error bars of K mean for growth: best K where it is known, errors of rate and place."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+
+from xcrack.base.arrays import Bools, Floats
+from xcrack.base.errors import collected_warnings
+from xcrack.fatigue.spectrum import Spectrum
+from xcrack.growth.block import Answers
+from xcrack.growth.options import Run
+from xcrack.growth.rates import Evaluation, Settled, asked_of, rates_of
+from xcrack.growth.step import Step
+from xcrack.sif.sif import SIF
+
+# Of the sum of all steps with one sign: each bar holds for almost all single K, and what they err
+# by cancels in part. On fifteen uniform meshes (five scenes) lives erred by a quarter of the sum.
+TOGETHER = 0.5
+_ASTRAY = 2.0  # times the turn of a step: where T > 0 a crack that is astray goes on to be so
+_FAST = 0.5  # of the largest rate: places that count for the error of life
+_REMEDY = {
+    "steps": "The first step is known better once a second one is done; later ones are as short as "
+    "cells allow: refine the mesh along the way (xc.refine).",
+    "K": "Give a smaller tolerance or a larger max_unknowns: the mesh was chosen for a few stages "
+    "of the way only.",
+    "contact": "Refine the mesh along the faces that touch (xc.refine).",
+    "no bar": "The steps at which K has no error bar count in full.",
+}
+_WHOLE = 1.0  # relative error of a rate that may as well be zero, or infinite
+
+
+def best_known(sif: Answers) -> Answers:
+    """K of all states and cracks, replaced by the best one wherever that is known."""
+    return tuple(tuple(_best(crack) for crack in state) for state in sif)
+
+
+def uses_best(sif: SIF) -> Bools:
+    """Places whose growth follows the best K, not K `(f,)`."""
+    if sif.errors is None:
+        return np.zeros(len(sif.K), dtype=bool)
+    return np.asarray(np.isfinite(sif.best).all(axis=1))
+
+
+def _best(sif: SIF) -> SIF:
+    known = uses_best(sif)
+    return replace(sif, K=np.where(known[:, None], sif.best, sif.K)) if known.any() else sif
+
+
+@dataclass(frozen=True, eq=False)
+class RateError:
+    """Errors of growth at one solve by the bars of K.
+
+    Attributes
+    ----------
+    rate, contact : float
+        Of the largest rate, relative; nan where K has no bar there. Contact's part of it.
+    turn : float, rad
+        Of the direction there.
+    """
+
+    rate: float
+    contact: float
+    turn: float
+
+
+def rate_error(run: Run, seen: Evaluation, sif: Answers) -> RateError:
+    """How much rates and directions change as K moves within its bars.
+
+    Each mode in turn is moved by its bar, up and down, in all states at once, and the changes are
+    added. The place with the largest error counts, among those that grow at least half as fast as
+    the fastest one.
+
+    Parameters
+    ----------
+    run : Run
+    seen : Evaluation
+        By the best K.
+    sif : sequence of sequence of SIF
+        With bars.
+    """
+    bar = [_stacked(sif, c, lambda s: s.bar) for c in range(len(seen.cracks))]
+    own = [_stacked(sif, c, _contact_part) for c in range(len(seen.cracks))]
+    known = np.concatenate([np.isfinite(b).all(axis=(0, 2)) for b in bar])
+    surface = np.concatenate([crack.at_surface for crack in sif[0]])
+    rate, angle = np.concatenate(seen.law_rate), np.concatenate(seen.angle)
+    n = len(rate)
+    total, contact, turn = np.zeros(n), np.zeros(n), np.zeros(n)
+    answer = _answers(run, seen)
+    for mode in range(sif[0][0].K.shape[1] if sif and sif[0] else 0):
+        change, turned = np.zeros(n), np.zeros(n)
+        for sign in (1.0, -1.0):
+            other_angle, other = answer(bar, mode, sign)
+            change = np.maximum(change, _relative(rate, other))
+            turned = np.maximum(turned, np.abs(other_angle - angle))
+        share = np.concatenate([_share(o[..., mode], b[..., mode]) for o, b in zip(own, bar)])
+        total, contact, turn = total + change, contact + share * change, turn + turned
+    fastest = float(rate[np.isfinite(rate)].max(initial=0.0))
+    counts = (rate >= _FAST * fastest) & (rate > 0) & ~surface
+    if not counts.any():
+        return RateError(np.nan, 0.0, np.nan)
+    if not known[counts].all() or np.isinf(rate[counts]).any():
+        return RateError(np.nan, 0.0, np.nan)
+    worst = int(np.argmax(np.where(counts, total, -1.0)))
+    return RateError(float(total[worst]), float(contact[worst]), float(turn[counts].max()))
+
+
+def with_K(
+    run: Run, last: Step | None, settled: Settled, seen: Evaluation, sif: Answers
+) -> Settled:
+    """A settled step whose error also has what the bars of K have cost so far."""
+    if not run.estimates or settled.error is None:
+        return settled
+    now = rate_error(run, seen, sif)
+    if last is None or last.error is None:
+        error = replace(settled.error, K=0.0, contact=0.0, unknown=0.0, K_place=0.0, grown=0.0)
+    else:
+        before, cycles = last.error, settled.cycles - last.cycles
+        rates, parts = [before.rate, now.rate], [before.rate_contact, now.contact]
+        turns = [turn for turn in (before.turn, now.turn) if np.isfinite(turn)]
+        way = max((float(da.max(initial=0.0)) for da in last.da), default=0.0)
+        of_K = [rate - part for rate, part in zip(rates, parts) if np.isfinite(rate)]
+        of_contact = [part for rate, part in zip(rates, parts) if np.isfinite(rate)]
+        error = replace(
+            settled.error,
+            K=before.K + TOGETHER * 0.5 * cycles * sum(of_K),
+            contact=before.contact + 0.5 * cycles * sum(of_contact),
+            unknown=before.unknown + 0.5 * cycles * (2 - len(of_K)),
+            K_place=before.K_place + _ASTRAY * way * float(np.mean(turns) if turns else 0.0),
+            grown=before.grown + way,
+        )
+    return replace(
+        settled, error=replace(error, rate=now.rate, rate_contact=now.contact, turn=now.turn)
+    )
+
+
+def shortfall(run: Run, last: Step) -> str:
+    """Why a tolerance is not met at a step, and what to do; empty where it is met."""
+    error = last.error
+    if error is None or run.tolerance is None or not error.grown > 0:
+        return ""
+    life = error.life / last.cycles if last.cycles > 0 else 0.0
+    path = error.path / error.grown
+    if max(life, path) <= run.tolerance:
+        return ""
+    steps = error.path - error.K_place
+    shares = {
+        "steps": max(error.cycles / max(last.cycles, 1e-300), steps / error.grown),
+        "K": max(error.K / max(last.cycles, 1e-300), error.K_place / error.grown),
+        "contact": error.contact / max(last.cycles, 1e-300),
+        "no bar": error.unknown / max(last.cycles, 1e-300),
+    }
+    worst = max(shares, key=lambda name: shares[name])
+    parts = ", ".join(f"{name} {share:.1e}" for name, share in shares.items() if share > 0)
+    reasons = dict.fromkeys(r for state in last.sif for sif in state for r in sif.reasons if r)
+    why = f" ({'; '.join(reasons)})" if reasons and worst == "no bar" else ""
+    return (
+        f"tolerance = {run.tolerance:g} is not met at step {last.index}: the life is known to "
+        f"{life:.1e}, the path to {path:.1e} of the length grown, by {parts}. {_REMEDY[worst]}{why}"
+    )
+
+
+def _answers(
+    run: Run, seen: Evaluation
+) -> Callable[[Sequence[Floats], int, float], tuple[Floats, Floats]]:
+    """Directions and rates with one mode of K moved by its bars."""
+    if isinstance(run.cycle, Spectrum) or seen.free is not None:
+        return partial(_moved, run, seen)
+    # Of a cycle, K of its states is all that changes.
+    asked = asked_of(run, seen.problem, (seen.solutions, seen.sif))
+
+    def answer(bar: Sequence[Floats], mode: int, sign: float) -> tuple[Floats, Floats]:
+        with collected_warnings([]):  # they are of cracks that nobody has
+            every = [one.answer(_moved_K(one.K, bar[c], mode, sign)) for c, one in enumerate(asked)]
+        return (
+            np.concatenate([angle for angle, _, _, _ in every]),
+            np.concatenate([rate for _, _, _, rate in every]),
+        )
+
+    return answer
+
+
+def _moved(
+    run: Run, seen: Evaluation, bar: Sequence[Floats], mode: int, sign: float
+) -> tuple[Floats, Floats]:
+    """Directions and rates with one mode of K moved by its bars."""
+
+    def moved(answers: Answers) -> Answers:
+        return tuple(
+            tuple(
+                _with_K(crack, bar[c][min(k, len(bar[c]) - 1)], mode, sign)
+                for c, crack in enumerate(state)
+            )
+            for k, state in enumerate(answers)
+        )
+
+    free = None
+    if seen.free is not None:
+        free = (seen.free[0], moved(seen.free[1]))
+    with collected_warnings([]):  # they are of cracks that nobody has
+        angle, _, _, rate = rates_of(run, seen.problem, moved(seen.sif), seen.solutions, free)
+    return np.concatenate(angle), np.concatenate(rate)
+
+
+def _with_K(sif: SIF, bar: Floats, mode: int, sign: float) -> SIF:
+    return replace(sif, K=_moved_K(sif.K, bar, mode, sign))
+
+
+def _moved_K(given: Floats, bar: Floats, mode: int, sign: float) -> Floats:
+    K = np.array(given)
+    own = K[..., mode]
+    changed = own + np.where(own < 0, -sign, sign) * np.nan_to_num(bar[..., mode])
+    if mode == 0:  # what is open does not overlap
+        changed = np.where(own >= 0, np.maximum(changed, 0.0), changed)
+    K[..., mode] = changed
+    return K
+
+
+def _relative(rate: Floats, other: Floats) -> Floats:
+    """|ln| of the ratio of two rates; at most a whole where one of them is zero or infinite."""
+    good = (rate > 0) & np.isfinite(rate) & (other > 0) & np.isfinite(other)
+    ratio = np.where(good, other, 1.0) / np.where(good, rate, 1.0)
+    return np.asarray(np.where(good, np.abs(np.log(ratio)), np.where(rate == other, 0.0, _WHOLE)))
+
+
+def _stacked(sif: Answers, c: int, part: Callable[[SIF], Floats]) -> Floats:
+    return np.stack([part(state[c]) for state in sif])
+
+
+def _contact_part(sif: SIF) -> Floats:
+    part = None if sif.errors is None else sif.errors.contact
+    return np.zeros_like(sif.K) if part is None else part
+
+
+def _share(part: Floats, bar: Floats) -> Floats:
+    """Largest share of contact in the bars of all states `(f,)`."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = np.nan_to_num(np.where(bar > 0, part / bar, 0.0))
+    return np.asarray(np.clip(share.max(axis=0), 0.0, 1.0))
+
+
+__all__ = ["TOGETHER", "RateError", "best_known", "rate_error", "shortfall", "uses_best", "with_K"]

@@ -1,1 +1,0 @@
-"""Runs collected, stored on disk and taken up again."""

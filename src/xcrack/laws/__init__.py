@@ -1,1 +1,0 @@
-"""Growth laws, closures and thresholds: values that are called, and presets with their sources."""

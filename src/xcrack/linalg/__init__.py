@@ -1,0 +1,1 @@
+"""Linear systems and complementarity: bases, factors, multigrid, active sets."""

@@ -1,0 +1,194 @@
+"""Change of basis that keeps the condition number that of plain finite elements.
+
+For each node, its enriched unknowns are made orthogonal in energy to its standard ones and
+orthonormal among themselves; dependent combinations are dropped. At order 2 a thin sliver makes
+4 N_c plus the Heaviside functions of the midpoints of its cut edges nearly vanish, though they
+sit on different nodes: the unknowns of each cut edge therefore join the block of the edge's end
+that is farther from the crack (star).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+
+from xcrack.base.arrays import Bools, Floats, Ints, offsets, ranges
+from xcrack.base.threads import one_blas_thread
+from xcrack.fem.function_space import FunctionSpace
+from xcrack.mesh.mesh import Mesh
+
+_DEPENDENT = 1e-10  # eigenvalues below this share of a block's largest are dropped
+
+
+@dataclass(frozen=True, eq=False)
+class Blocks:
+    """Blocks of unknowns: standard ones first, then enriched ones, ragged.
+
+    Attributes
+    ----------
+    members : (k,) array of int
+    offsets : (b + 1,) array of int
+    n_standard : (b,) array of int
+        Leading members of each block that are kept as they are.
+    """
+
+    members: Ints
+    offsets: Ints
+    n_standard: Ints
+
+
+def function_nodes(space: FunctionSpace) -> Ints:
+    """Node of each function `(n_functions,)`."""
+    owner = np.arange(space.n_functions)
+    for number in space.heaviside:
+        nodes = np.nonzero(number >= 0)[0]
+        owner[number[nodes]] = nodes
+    for tip in space.tips:
+        points = np.nonzero(tip.point_to_function >= 0)[0]
+        each = tip.point_to_function[points][:, None] + np.arange(tip.functions)
+        owner[each] = points[:, None]
+    return owner
+
+
+def node_blocks(space: FunctionSpace, kind: str) -> Blocks:
+    """Unknowns of each enriched node, in blocks: "node" or "star"."""
+    owner = function_nodes(space)
+    if kind == "star" and space.order == 2:
+        for c, number in enumerate(space.heaviside):
+            nodes = np.nonzero(number >= 0)[0]
+            owner[number[nodes]] = _star_home(space, c, nodes)
+    enriched = np.arange(space.n_nodes, space.n_functions)
+    order = np.argsort(owner[enriched], kind="stable")
+    functions = enriched[order]
+    nodes, counts = np.unique(owner[functions], return_counts=True)
+    d = space.dim
+    row, place = ranges(1 + counts)
+    first = offsets(counts)[:-1]
+    function = np.where(
+        place == 0, nodes[row], functions[np.minimum(first[row] + place - 1, len(functions) - 1)]
+    )
+    members = (function[:, None] * d + np.arange(d)).ravel()
+    return Blocks(members, offsets((1 + counts) * d), np.full(len(nodes), d))
+
+
+def _star_home(space: FunctionSpace, c: int, nodes: Ints) -> Ints:
+    mesh, cut = space.mesh, space.cuts[c]
+    n = mesh.n_points
+    home = nodes.copy()
+    is_edge = nodes >= n
+    edge = nodes[is_edge] - n
+    ends = mesh.edges[edge]
+    far = np.argmax(np.abs(cut.level_set.phi[ends]), axis=1)
+    end = ends[np.arange(len(ends)), far]
+    move = ~np.isnan(cut.cut_edge[edge]) & (space.heaviside[c][end] >= 0)
+    home[is_edge] = np.where(move, end, nodes[is_edge])
+    return home
+
+
+def restricted(blocks: Blocks, free: Bools) -> Blocks:
+    """Blocks without the unknowns that supports decide."""
+    keep = free[blocks.members]
+    block, place = ranges(np.diff(blocks.offsets))
+    standard = np.bincount(
+        block[keep & (place < blocks.n_standard[block])], minlength=len(blocks.n_standard)
+    )
+    counts = np.bincount(block[keep], minlength=len(blocks.n_standard))
+    return Blocks(blocks.members[keep], offsets(counts), standard)
+
+
+def orthonormal(K: sp.csr_matrix, blocks: Blocks) -> sp.csr_matrix:
+    """The functions that replace the enriched unknowns of blocks, in the old basis `(n, k)`."""
+    from xcrack.linalg.kernels.blocks import orthonormal_columns
+
+    with one_blas_thread():
+        indptr, indices, data, count = orthonormal_columns(
+            K.indptr, K.indices, K.data, blocks.members, blocks.offsets, blocks.n_standard,
+            _DEPENDENT,
+        )  # fmt: skip
+    if count < 0:
+        raise np.linalg.LinAlgError("the stiffness of a block of unknowns is singular")
+    return sp.csr_matrix((data, indices, indptr), shape=(K.shape[0], count))
+
+
+def _by_shape(K: sp.csr_matrix, blocks: Blocks) -> list[tuple[Ints, Floats, int]]:
+    """Dense blocks of K, grouped by size and number of standard unknowns."""
+    from xcrack.linalg.kernels.blocks import dense_blocks
+
+    size = np.diff(blocks.offsets)
+    flat = dense_blocks(K.indptr, K.indices, K.data, blocks.members, blocks.offsets)
+    start = offsets(size**2)
+    groups = []
+    for s, n_standard in sorted(set(zip(size.tolist(), blocks.n_standard.tolist(), strict=True))):
+        if s == n_standard:
+            continue
+        which = np.nonzero((size == s) & (blocks.n_standard == n_standard))[0]
+        members = blocks.members[blocks.offsets[which][:, None] + np.arange(s)]
+        k = flat[start[which][:, None] + np.arange(s * s)].reshape(-1, s, s)
+        groups.append((members, k, n_standard))
+    return groups
+
+
+def stars(mesh: Mesh, order: int) -> sp.csr_matrix:
+    """Pattern `(n_points, n_nodes)`: each point and, at order 2, the midpoints of its edges.
+
+    Their functions are those that end inside the cells around the point.
+    """
+    n = mesh.n_points
+    rows, columns = [np.arange(n)], [np.arange(n)]
+    if order == 2:
+        rows.append(mesh.edges.T.ravel())
+        columns.append(n + np.tile(np.arange(len(mesh.edges)), 2))
+    row, column = np.concatenate(rows), np.concatenate(columns)
+    shape = (n, int(column.max()) + 1)
+    return sp.csr_matrix((np.ones(len(row), np.int8), (row, column)), shape=shape)
+
+
+def patch_orthogonal(
+    space: FunctionSpace, K: sp.csr_matrix, free: Bools, around: str = "cells"
+) -> sp.csr_matrix:
+    """Basis in which tip functions are orthogonal to the functions around them.
+
+    F_i minus its projection in energy on standard and Heaviside functions, all those of the cells
+    round point i ("cells") or those that end inside these cells ("star"); the latter couple it
+    with no further unknown. Columns of all other unknowns are those of the identity `(n, n)`.
+    """
+    d = space.dim
+    start, cells = space.mesh.point_to_cell
+    star = stars(space.mesh, space.order) if around == "star" else None
+    rows, columns, values = (
+        [np.arange(space.n_dof)],
+        [np.arange(space.n_dof)],
+        [np.ones(space.n_dof)],
+    )
+    members, counts, n_patch = [], [], []
+    for tip in space.tips:
+        for point in np.nonzero(tip.point_to_function >= 0)[0]:
+            if star is not None:
+                nodes = star.indices[star.indptr[point] : star.indptr[point + 1]]
+            else:
+                nodes = np.unique(space.cell_nodes[cells[start[point] : start[point + 1]]])
+            functions = [nodes, *[h[nodes][h[nodes] >= 0] for h in space.heaviside]]
+            patch = (np.concatenate(functions)[:, None] * d + np.arange(d)).ravel()
+            own = tip.point_to_function[point] + np.arange(tip.functions)
+            F = (own[:, None] * d + np.arange(d)).ravel()
+            patch, F = patch[free[patch]], F[free[F]]
+            members.append(np.concatenate([patch, F]))
+            counts.append(len(patch) + len(F))
+            n_patch.append(len(patch))
+    if members:
+        blocks = Blocks(np.concatenate(members), offsets(np.array(counts)), np.array(n_patch))
+        for group, k, n_p in _by_shape(K, blocks):
+            pp, pf = k[:, :n_p, :n_p], k[:, :n_p, n_p:]
+            diagonal = np.einsum("bii->bi", pp)
+            # Functions of a sliver may have no energy but round-off.
+            D = np.where(diagonal > 0, 1 / np.sqrt(np.maximum(diagonal, 1e-300)), 0.0)
+            inverse = np.linalg.pinv(
+                D[:, :, None] * pp * D[:, None, :], rcond=1e-10, hermitian=True
+            )
+            C = D[:, :, None] * (inverse @ (D[:, :, None] * pf))
+            n_f = group.shape[1] - n_p
+            rows.append(np.repeat(group[:, :n_p], n_f, axis=1).ravel())
+            columns.append(np.tile(group[:, n_p:], (1, n_p)).ravel())
+            values.append(-C.reshape(-1))
+    triplets = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
+    return sp.csr_matrix(triplets, shape=(space.n_dof, space.n_dof))

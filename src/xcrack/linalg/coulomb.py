@@ -1,0 +1,465 @@
+"""Coulomb friction in 2D: stick, slip and opening on a small dense problem.
+
+With F = N K^-1 N^T over normal and tangential rows, and d the gaps and slips without tractions,
+every function of the multipliers is open (no traction), stuck (no gap, no slip) or slipping
+(no gap, traction mu times the pressure against the slip). A semi-smooth Newton iteration predicts
+the status of all functions at once (Alart and Curnier, 1991; in 2D each status is linear, so that
+it is an active set). Where it cycles, sweeps of non-smooth Gauss-Seidel with exact solutions of
+each function lead on (Jourdan, Alart and Jean, 1998).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg
+
+from xcrack.base.arrays import Bools, Floats, Ints
+from xcrack.base.errors import ConvergenceError
+
+_MOST = 60  # sets that Newton tries before sweeps
+_SWEEPS = (0, 3, 10, 30, 100, 300, 1000)  # before each attempt of Newton
+_ROUND_OFF = 1e-12
+_REDUNDANT = 1e-13  # smallest pivot of a scaled matrix whose solution is taken
+
+
+@dataclass(frozen=True, eq=False)
+class FrictionRows:
+    """A dense problem of contact with friction, without its loads.
+
+    Attributes
+    ----------
+    F : (g + m r, g + m r) array
+        N K^-1 N^T; first the normal rows of all functions, then those of those that rub along each
+        of m tangents: one in 2D, two in 3D.
+    measure : (g,) array
+        Integral of each function.
+    rubbing : (r,) array of int
+        Numbers of the functions with friction.
+    mu : (r,) array
+        Coefficients of friction, positive.
+    stiffness : float, stress / length
+        Weighs gaps against pressures in the prediction of the status; E / h is natural.
+    compliance : (g + m r,) array, optional
+        Of the springs of a penalty or an augmented Lagrangian, which F contains on its diagonal.
+    augmented : bool
+        Whether tractions are updated until the springs bear nothing.
+    """
+
+    F: Floats
+    measure: Floats
+    rubbing: Ints
+    mu: Floats
+    stiffness: float
+    compliance: Floats | None = None
+    augmented: bool = False
+
+    @property
+    def n(self) -> int:
+        """Number of functions."""
+        return len(self.measure)
+
+    @property
+    def tangents(self) -> int:
+        """Number of tangents."""
+        return (len(self.F) - self.n) // max(len(self.rubbing), 1)
+
+    @property
+    def sizes(self) -> Floats:
+        """Measure of each row's function `(g + m r,)`."""
+        return np.concatenate([self.measure, np.tile(self.measure[self.rubbing], self.tangents)])
+
+
+@dataclass(frozen=True, eq=False)
+class Status:
+    """Which functions are closed, and which of those that rub slip.
+
+    Attributes
+    ----------
+    closed : (g,) array of bool
+    slip : (r,) array of {-1, 0, 1}, or (2, r) array
+        Sign of the traction of a slipping function, in 3D its direction; 0 where it sticks or is
+        open.
+    """
+
+    closed: Bools
+    slip: Ints | Floats
+
+    @property
+    def slips(self) -> Bools:
+        """Which functions slip `(r,)`."""
+        return np.asarray(np.atleast_2d(self.slip).any(axis=0))
+
+    def key(self) -> bytes:
+        """Bytes that name it."""
+        return self.closed.tobytes() + self.slip.tobytes()
+
+
+@dataclass(frozen=True, eq=False)
+class FrictionState:
+    """Tractions and gaps of one load.
+
+    Attributes
+    ----------
+    lam : (g + r,) array, stress
+        Pressures, then tangential tractions.
+    gap : (g + r,) array
+        Weak gaps, then weak slips since the state before.
+    status : Status
+    sets : int
+        Sets tried.
+    """
+
+    lam: Floats
+    gap: Floats
+    status: Status
+    sets: int
+
+
+def all_stuck(rows: FrictionRows) -> Status:
+    """The status that is tried where nothing is known."""
+    closed, shape = np.ones(rows.n, dtype=bool), (rows.tangents, len(rows.mu))
+    if rows.tangents == 1:
+        return Status(closed, np.zeros(len(rows.mu), dtype=np.int64))
+    return Status(closed, np.zeros(shape))
+
+
+def coulomb(rows: FrictionRows, d: Floats, start: Status) -> FrictionState:
+    """Tractions and gaps of one load.
+
+    Parameters
+    ----------
+    rows : FrictionRows
+    d : (g + r,) array
+        Weak gaps and slips since the state before, without tractions.
+    start : Status
+        First guess.
+
+    Raises
+    ------
+    ConvergenceError
+        Neither Newton nor Gauss-Seidel find a status that stays.
+    """
+    tried = 0
+    lam, status = np.zeros(len(d)), start
+    for sweeps in _SWEEPS:
+        if sweeps:
+            lam = _swept(rows, d, lam, sweeps)
+            status = _status_of(rows, lam)
+        state, sets = _newton(rows, d, status)
+        tried += sets
+        if state is not None:
+            return FrictionState(state.lam, state.gap, state.status, tried)
+    raise ConvergenceError(
+        f"contact with friction: after {tried} sets and {sum(_SWEEPS)} sweeps the status of "
+        f"{rows.n} groups still changes. Give a smaller friction (here up to {rows.mu.max():.3g}), "
+        "or refine the mesh along the crack."
+    )
+
+
+def of_status(rows: FrictionRows, d: Floats, status: Status) -> tuple[Floats, Floats]:
+    """Tractions that a status asks for, and the gaps and slips that they leave."""
+    g, closed, slip = rows.n, status.closed, status.slip
+    shut = np.nonzero(closed)[0]
+    touching = closed[rows.rubbing]
+    stuck = np.nonzero(touching & (slip == 0))[0]
+    slipping = np.nonzero(touching & (slip != 0))[0]
+    lam = np.zeros(len(d))
+    active = np.concatenate([shut, g + stuck])
+    if len(active):
+        place = np.zeros(g, dtype=np.int64)
+        place[shut] = np.arange(len(shut))
+        # The traction of a slipping function goes with its pressure.
+        spread = np.zeros((len(d), len(active)))
+        spread[active, np.arange(len(active))] = 1.0
+        pressed = place[rows.rubbing[slipping]]
+        spread[g + slipping, pressed] = slip[slipping] * rows.mu[slipping]
+        diagonal = np.diag(rows.F)[active]
+        moved = diagonal > 0
+        scale = np.where(moved, 1 / np.sqrt(np.where(moved, diagonal, 1.0)), 0.0)
+        A = (rows.F[active] @ spread) * scale[:, None] * scale
+        lam = spread @ (scale * solved(A, -d[active] * scale))
+    gap = rows.F @ lam + d
+    gap[active] = 0.0
+    return lam, gap
+
+
+def solved(A: Floats, b: Floats) -> Floats:
+    """Solution of a general system; the smallest one where groups are redundant."""
+    lu, order, info = scipy.linalg.lapack.dgetrf(A)
+    if info == 0 and np.abs(np.diag(lu)).min() > _REDUNDANT:
+        x = scipy.linalg.lapack.dgetrs(lu, order, b)[0]
+        if np.isfinite(x).all():
+            return np.asarray(x)
+    return np.asarray(scipy.linalg.lstsq(A, b, cond=_ROUND_OFF)[0])
+
+
+def _newton(rows: FrictionRows, d: Floats, status: Status) -> tuple[FrictionState | None, int]:
+    g, seen = rows.n, set()
+    weight = rows.stiffness / rows.measure
+    for sets in range(1, _MOST + 1):
+        lam, gap = of_status(rows, d, status)
+        tolerance = _ROUND_OFF * float(np.abs(lam).max(initial=0.0))
+        normal = lam[:g] - weight * gap[:g]
+        along = lam[g:] - weight[rows.rubbing] * gap[g:]
+        # Values at round-off of zero (faces that only touch) must not make the status flicker.
+        closed = normal > 0.1 * tolerance
+        bound = rows.mu * np.maximum(normal[rows.rubbing], 0.0)
+        slides = closed[rows.rubbing] & (np.abs(along) > bound + tolerance)
+        new = Status(closed, np.where(slides, np.sign(along), 0.0).astype(np.int64))
+        if new.key() == status.key():
+            return FrictionState(lam, gap, status, sets), sets
+        if new.key() in seen:
+            return None, sets
+        seen.add(new.key())
+        status = new
+    return None, _MOST
+
+
+def _status_of(rows: FrictionRows, lam: Floats) -> Status:
+    pressure, shear = lam[: rows.n], lam[rows.n :]
+    closed = pressure > 0
+    bound = rows.mu * pressure[rows.rubbing]
+    slides = closed[rows.rubbing] & (np.abs(shear) >= bound * (1 - 1e-9))
+    return Status(closed, np.where(slides, np.sign(shear), 0.0).astype(np.int64))
+
+
+def _swept(rows: FrictionRows, d: Floats, lam: Floats, sweeps: int) -> Floats:
+    """Sweeps of Gauss-Seidel: each function's own problem is solved exactly, one by one."""
+    F, g, lam = rows.F, rows.n, np.array(lam)
+    partner = np.full(g, -1)
+    partner[rows.rubbing] = np.arange(len(rows.rubbing))
+    gap = F @ lam + d
+    for _ in range(sweeps):
+        for i in range(g):
+            if F[i, i] <= 0:
+                continue
+            j = int(partner[i])
+            own = [i] if j < 0 else [i, g + j]
+            block = F[np.ix_(own, own)]
+            free = gap[own] - block @ lam[own]
+            new = _alone(block, free, 0.0 if j < 0 else float(rows.mu[j]))
+            change = new - lam[own]
+            if change.any():
+                gap += F[:, own] @ change
+                lam[own] = new
+    return lam
+
+
+def _alone(block: Floats, free: Floats, mu: float) -> Floats:
+    """Tractions of one function whose gap and slip without them are given."""
+    a, gap = float(block[0, 0]), float(free[0])
+    if len(free) == 1:
+        return np.array([max(-gap / a, 0.0)])
+    b, c, slip = float(block[0, 1]), float(block[1, 1]), float(free[1])
+    det = a * c - b * b
+    if det > 0:
+        pressure, shear = (-gap * c + slip * b) / det, (-slip * a + gap * b) / det
+        if pressure >= 0 and abs(shear) <= mu * pressure:
+            return np.array([pressure, shear])
+    for sign in (1, -1):
+        share = a + b * sign * mu
+        pressure = -gap / share if share > 0 else -1.0
+        if pressure > 0 and (slip + (b + c * sign * mu) * pressure) * sign <= 0:
+            return np.array([pressure, sign * mu * pressure])
+    return np.zeros(2)
+
+
+# Coulomb friction in 3D: two tangential tractions a function, within a disc.
+
+_MOST_CONES = 60
+_SWEEPS_OVER_CONES = (0, 10, 30, 100, 300, 1000)
+_CHANGE = 1e-12  # of the tractions, as a share of the largest, at which they stay
+_STALL = 1e-8  # one that round-off keeps from falling further
+
+
+@dataclass(frozen=True, eq=False)
+class _Guess:
+    """What a step of Newton is linearised at.
+
+    Attributes
+    ----------
+    closed : (g,) array of bool
+    direction : (2, r) array
+        Of slip tractions; zero where a function sticks.
+    share : (r,) array
+        Bound over the size of the trial: how far the direction follows the slip; 0 fixes it.
+    """
+
+    closed: Bools
+    direction: Floats
+    share: Floats
+
+
+def coulomb_3d(rows: FrictionRows, d: Floats, start: Status) -> FrictionState:
+    """Tractions and gaps of one load.
+
+    Parameters
+    ----------
+    rows : FrictionRows
+        With two tangential rows a function that rubs.
+    d : (g + 2 r,) array
+        Weak gaps and slips since the state before, without tractions.
+    start : Status
+        First guess.
+
+    Raises
+    ------
+    ConvergenceError
+        Neither Newton nor projections settle.
+    """
+    tried = 0
+    guess = _Guess(start.closed, start.slip.astype(float), np.zeros(len(rows.mu)))
+    lam = np.zeros(len(d))
+    for sweeps in _SWEEPS_OVER_CONES:
+        if sweeps:
+            lam = _swept_cones(rows, d, lam, sweeps)
+            guess = _next(rows, lam, rows.F @ lam + d)
+        state, sets = _newton_on_cones(rows, d, guess)
+        tried += sets
+        if state is not None:
+            return FrictionState(state.lam, state.gap, state.status, tried)
+    raise ConvergenceError(
+        f"contact with friction: after {tried} steps of Newton and {sum(_SWEEPS_OVER_CONES)} "
+        f"sweeps the tractions of {rows.n} groups still change. Give a smaller friction (here up "
+        f"to {rows.mu.max():.3g}), or refine the mesh along the crack."
+    )
+
+
+def _newton_on_cones(
+    rows: FrictionRows, d: Floats, guess: _Guess
+) -> tuple[FrictionState | None, int]:
+    before, last = np.full(len(d), np.inf), np.inf
+    for sets in range(1, _MOST_CONES + 1):
+        lam, gap = _solved(rows, d, guess)
+        new = _next(rows, lam, gap)
+        largest = float(np.abs(lam).max(initial=0.0))
+        change = float(np.abs(lam - before).max(initial=0.0)) if sets > 1 else np.inf
+        same = np.array_equal(new.closed, guess.closed) and np.array_equal(
+            new.direction.any(axis=0), guess.direction.any(axis=0)
+        )
+        turned = new.direction - guess.direction
+        bound = rows.mu * np.maximum(lam[: rows.n], 0.0)[rows.rubbing]
+        wrong = float(np.abs(bound * turned).max(initial=0.0))
+        settled = wrong <= _CHANGE * largest
+        stalled = wrong <= _STALL * largest and change >= 0.5 * last
+        if same and (settled or stalled):
+            return FrictionState(lam, gap, Status(new.closed, new.direction), sets), sets
+        before, last, guess = lam, change, new
+    return None, _MOST_CONES
+
+
+def _next(rows: FrictionRows, lam: Floats, gap: Floats) -> _Guess:
+    """Status that tractions and gaps ask for, and how directions follow the slip."""
+    g, weight = rows.n, rows.stiffness / rows.measure
+    tolerance = 1e-12 * float(np.abs(lam).max(initial=0.0))
+    normal = lam[:g] - weight * gap[:g]
+    trial = (lam[g:] - np.tile(weight[rows.rubbing], 2) * gap[g:]).reshape(2, -1)
+    closed = normal > 0.1 * tolerance
+    bound = rows.mu * np.maximum(normal[rows.rubbing], 0.0)
+    size = np.sqrt((trial**2).sum(axis=0))
+    slides = closed[rows.rubbing] & (size > bound + tolerance)
+    length = np.where(slides, size, 1.0)
+    pressed = rows.mu * np.maximum(lam[:g], 0.0)[rows.rubbing]
+    share = np.where(slides, np.minimum(pressed / length, 1.0), 0.0)
+    return _Guess(closed, np.where(slides, trial / length, 0.0), share)
+
+
+def _solved(rows: FrictionRows, d: Floats, guess: _Guess) -> tuple[Floats, Floats]:
+    """Tractions of the linearised conditions, and the gaps and slips that they leave."""
+    g, r = rows.n, len(rows.mu)
+    shut = np.nonzero(guess.closed)[0]
+    touching = np.nonzero(guess.closed[rows.rubbing])[0]
+    active = np.concatenate([shut, g + touching, g + r + touching])
+    lam = np.zeros(len(d))
+    slides = np.asarray(guess.direction.any(axis=0))[touching]
+    if len(active):
+        diagonal = rows.F.diagonal()
+        one = np.concatenate([shut, g + touching, g + touching])  # one scale for both tangents
+        size = diagonal[one]
+        scale = np.where(size > 0, 1 / np.sqrt(np.where(size > 0, size, 1.0)), 0.0)
+        A = rows.F[np.ix_(active, active)] * scale[:, None] * scale
+        b = -d[active] * scale
+        _slide(rows, guess, A, b, shut, touching, slides, scale)
+        lam[active] = scale * solved(A, b)
+    gap = rows.F @ lam + d
+    gap[shut] = 0.0
+    for part in (g, g + r):
+        gap[part + touching[~slides]] = 0.0
+    return lam, gap
+
+
+def _slide(
+    rows: FrictionRows, guess: _Guess, A: Floats, b: Floats, shut: Ints, touching: Ints,
+    slides: Bools, scale: Floats,
+) -> None:  # fmt: skip
+    """Put the conditions of slipping functions in the place of those of stuck ones.
+
+    Scaled tractions x = lam / scale; k weighs slips, so that both terms are tractions:
+    x_t - mu s x_n - share (1 - s s') (x_t - k (A x - b)_t) = 0.
+    """
+    m, n = len(shut), len(touching)
+    chosen = np.nonzero(slides)[0]
+    if not len(chosen):
+        return
+    place = np.zeros(rows.n, dtype=np.int64)
+    place[shut] = np.arange(m)
+    number = touching[chosen]
+    s, share, mu = guess.direction[:, number], guess.share[number], rows.mu[number]
+    t = [m + chosen, m + n + chosen]
+    pressed = place[rows.rubbing[number]]
+    own = np.array([scale[t[0]], scale[t[1]]])
+    weight = (rows.stiffness / rows.measure)[rows.rubbing[number]]
+    slip = np.stack([A[t[0]] / own[0][:, None], A[t[1]] / own[1][:, None]])
+    free = np.stack([b[t[0]] / own[0], b[t[1]] / own[1]])
+    line = np.arange(len(chosen))
+    for i in (0, 1):
+        row = np.zeros((len(chosen), A.shape[1]))
+        right = np.zeros(len(chosen))
+        row[line, t[i]] += own[i]
+        row[line, pressed] -= mu * s[i] * scale[pressed]
+        for j in (0, 1):
+            across = share * ((i == j) - s[i] * s[j])
+            row[line, t[j]] -= across * own[j]
+            row += (across * weight)[:, None] * slip[j]
+            right += across * weight * free[j]
+        A[t[i]] = row / own[i][:, None]
+        b[t[i]] = right / own[i]
+
+
+def _swept_cones(rows: FrictionRows, d: Floats, lam: Floats, sweeps: int) -> Floats:
+    """Sweeps of projections: each function's tractions are corrected by its own gap and slip."""
+    F, g, r, lam = rows.F, rows.n, len(rows.mu), np.array(lam)
+    partner = np.full(g, -1)
+    partner[rows.rubbing] = np.arange(r)
+    gap = F @ lam + d
+    for _ in range(sweeps):
+        for i in range(g):
+            if F[i, i] <= 0:
+                continue
+            pressure = max(lam[i] - gap[i] / F[i, i], 0.0)
+            gap += F[:, i] * (pressure - lam[i])
+            lam[i], j = pressure, int(partner[i])
+            if j < 0:
+                continue
+            own = np.array([g + j, g + r + j])
+            stiff = float(np.linalg.eigvalsh(F[np.ix_(own, own)])[-1])
+            if stiff <= 0:
+                continue
+            trial = lam[own] - gap[own] / stiff
+            size, bound = float(np.hypot(*trial)), float(rows.mu[j]) * pressure
+            new = trial if size <= bound else trial * (bound / size)
+            gap += F[:, own] @ (new - lam[own])
+            lam[own] = new
+    return lam
+
+
+__all__ = [
+    "FrictionRows",
+    "FrictionState",
+    "Status",
+    "all_stuck",
+    "coulomb",
+    "coulomb_3d",
+    "of_status",
+    "solved",
+]

@@ -1,0 +1,420 @@
+"""Linear systems: supports eliminated, a well-conditioned basis, one factor for all states."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from importlib.util import find_spec
+
+import numpy as np
+import scipy.sparse as sp
+import scipy.sparse.linalg as sla
+
+from xcrack.base.arrays import Bools, Floats
+from xcrack.base.checks import called, numbers, shown
+from xcrack.base.errors import ConvergenceError, ProblemError, warn
+from xcrack.base.threads import one_blas_thread
+from xcrack.fem.function_space import FunctionSpace
+from xcrack.linalg.active_set import active_set
+from xcrack.linalg.basis import (
+    function_nodes,
+    node_blocks,
+    orthonormal,
+    patch_orthogonal,
+    restricted,
+)
+from xcrack.linalg.engine import Condensed, ContactRows, Count, StateContact
+from xcrack.linalg.modal_basis import mode_columns
+from xcrack.linalg.multifrontal import Factor, Tree, factorised, tree
+from xcrack.linalg.products import proportional, times, times_transposed
+from xcrack.linalg.reuse import Reuse
+from xcrack.model.material import Isotropic
+from xcrack.model.numerics import Numerics
+
+# SuperLU, for matrices that are not positive definite and for methods that change the matrix.
+
+Solve = Callable[[Floats], Floats]
+
+
+def superlu(A: sp.csc_matrix) -> Solve:
+    """Factor a symmetric matrix with SuperLU, minimum degree, symmetric mode.
+
+    Off-diagonal pivoting is switched off: on a scaled symmetric matrix it buys no digit and costs
+    up to sixty times. Narrow panels and no artificial supernodes: an eighth of the time in 2D.
+    """
+    factor = sla.splu(
+        A,
+        permc_spec="MMD_AT_PLUS_A",
+        diag_pivot_thresh=0.0,
+        panel_size=2,
+        relax=1,
+        options={"SymmetricMode": True},
+    )
+    return lambda b: np.asarray(factor.solve(b))
+
+
+_WRONG = 1e-3  # residual of a user's solver, relative, that is not a solution
+_COARSE = 1e-8  # and one that limits what follows
+_LOST = 1e-3  # residual of our own factor that asks for another
+_BLOCK = 16  # right-hand sides solved at once for the dual matrix; bounds the memory
+
+Solver = Callable[[sp.csc_matrix], Solve]
+
+
+def pardiso(A: sp.csc_matrix) -> Solve:
+    """Factor a symmetric positive matrix with MKL PARDISO, as ``solve(problem, solver=pardiso)``.
+
+    Parameters
+    ----------
+    A : sparse matrix (n, n)
+
+    Returns
+    -------
+    callable
+        Solves for right-hand sides `(n,)` or `(n, k)`.
+
+    Raises
+    ------
+    ProblemError
+        Not a square sparse matrix, or pypardiso is not installed: the extra ``pardiso``, for
+        x86-64.
+    """
+    if not sp.issparse(A) or A.ndim != 2 or A.shape[0] != A.shape[1]:
+        raise ProblemError(f"pardiso: A = {shown(A)}: give a sparse symmetric matrix (n, n).")
+    if find_spec("pypardiso") is None:
+        raise ProblemError("solver=pardiso needs pypardiso: pip install 'xcrack[pardiso]'.")
+    import pypardiso
+
+    solver = pypardiso.PyPardisoSolver(mtype=2)
+    upper = sp.triu(A, format="csr")
+    solver.factorize(upper)
+    return lambda b: np.asarray(solver.solve(upper, np.ascontiguousarray(b)))
+
+
+@dataclass(frozen=True, eq=False)
+class System:
+    """A factored system.
+
+    Attributes
+    ----------
+    matrix : sparse matrix (n_dof, n_dof)
+        Stiffness in the basis of the space.
+    free : (n_dof,) array of bool
+    basis : sparse matrix (n_dof, k)
+        Columns of the solver's basis, scaled; zero in the rows of known unknowns.
+    reduced : sparse matrix (k, k)
+        Stiffness in that basis.
+    apply_inverse : callable
+    factor : Factor, optional
+        Whose halves serve contact; None for SuperLU and a user's solver.
+    tree : Tree, optional
+    hand_on : bool
+        Whether the next solve in the same mesh is to use the factor.
+    count : Count
+    """
+
+    matrix: sp.csr_matrix
+    free: Bools
+    basis: sp.csr_matrix
+    reduced: sp.csc_matrix
+    apply_inverse: Solve
+    factor: Factor | None = None
+    tree: Tree | None = None
+    hand_on: bool = False
+    count: Count = field(default_factory=Count)
+    shared: str = "factorisation"
+    reason: str = ""
+
+    def solve(self, f: Floats, known: Floats | None = None, start: Floats | None = None) -> Floats:
+        """Displacements for loads `(n_dof,)` or `(n_dof, k)` and known values of the same shape."""
+        del start
+        self.count.solves += 1 if f.ndim == 1 else f.shape[1]
+        b = self._loads(f, known)
+        if f.ndim == 1:
+            return self._expanded(self.apply_inverse(b), known)
+        first, scale = proportional(b)
+        alone = np.unique(first)
+        y = self.apply_inverse(b if len(alone) == b.shape[1] else b[:, alone])
+        return self._expanded(y[:, np.searchsorted(alone, first)] * scale, known)
+
+    def first_look(
+        self, f: Floats, known: Floats, closed_before: bool
+    ) -> tuple[Floats | None, bool]:
+        """The solution with open faces; none after closed sets where the factor has halves."""
+        if closed_before and self.factor is not None:
+            return None, False
+        return self.solve(f, known), True
+
+    def contact(
+        self,
+        rows: ContactRows,
+        f: Floats,
+        known: Floats,
+        start: Sequence[Bools | None],
+        latest: Floats | None = None,
+        opened: Floats | None = None,
+    ) -> list[StateContact]:
+        """Solve load states with crack faces that may touch; see `Engine`.
+
+        F = N K^-1 N^T is made once for all states: of Y = L^-1 N^T, the forward half of the rows
+        alone, F = Y^T Y and the gaps of the open faces are Y^T (L^-1 f). One backward half then
+        gives the displacements with contact.
+        """
+        del latest
+        if self.factor is None:
+            return self._contact_by_solves(rows, f, known, start, opened)
+        small = self.condensed(rows.N, f, known)
+        states = self._sets(small.dual, small.gap, rows, start)
+        u = small.displacements(np.stack([state.pressure for state in states], axis=1))
+        return [replace(state, u=u[:, k], dual=small.dual) for k, state in enumerate(states)]
+
+    def condensed(self, N: sp.csr_matrix, f: Floats, known: Floats) -> Condensed:
+        """The system as rows see it; see `Engine`."""
+        if self.factor is None:
+            gap = N @ self.solve(f, known)
+            return Condensed(self.dual(N), gap, lambda lam: self.solve(f + N.T @ lam, known))
+        factor = self.factor
+        b = self._loads(f, known)
+        Y, places = factor.forward_sparse(N @ self.basis)
+        y = factor.forward(b)
+        with one_blas_thread():
+            F = Y.T @ Y
+            d = N @ known + Y.T @ y[places]
+
+        def displacements(lam: Floats) -> Floats:
+            loaded = y.copy()
+            with one_blas_thread():
+                loaded[places] += Y @ lam
+            self.count.solves += b.shape[1]
+            return self._expanded(factor.backward(loaded), known)
+
+        return Condensed(F, d, displacements)
+
+    def dual(self, N: sp.csr_matrix) -> Floats:
+        """F = N K^-1 N^T `(g, g)`, in blocks of right-hand sides."""
+        F = np.empty((N.shape[0], N.shape[0]))
+        for first in range(0, N.shape[0], _BLOCK):
+            rhs = N[first : first + _BLOCK].T.toarray()
+            F[:, first : first + _BLOCK] = N @ self.solve(rhs)
+        return (F + F.T) / 2
+
+    def handed_on(self, reuse: Reuse) -> Reuse:
+        """With the tree of the mesh, and the factor where it may serve again."""
+        return replace(reuse, tree=self.tree, factor=self.factor if self.hand_on else None)
+
+    def _contact_by_solves(
+        self,
+        rows: ContactRows,
+        f: Floats,
+        known: Floats,
+        start: Sequence[Bools | None],
+        opened: Floats | None,
+    ) -> list[StateContact]:
+        d = rows.N @ (self.solve(f, known) if opened is None else opened)
+        F = self.dual(rows.N)
+        states = self._sets(F, d, rows, start)
+        pressure = np.stack([state.pressure for state in states], axis=1)
+        u = self.solve(f + rows.N.T @ pressure, known)
+        return [replace(state, u=u[:, k], dual=F) for k, state in enumerate(states)]
+
+    def _sets(
+        self, F: Floats, d: Floats, rows: ContactRows, start: Sequence[Bools | None]
+    ) -> list[StateContact]:
+        unknown = np.full(len(rows.measure), rows.closed)
+        return [
+            active_set(
+                F, d[:, k], rows.measure, rows.stiffness, unknown if first is None else first
+            )
+            for k, first in enumerate(start)
+        ]
+
+    def _loads(self, f: Floats, known: Floats | None) -> Floats:
+        """Loads and what imposed displacements add to them, in the solver's basis."""
+        if known is not None and known.any():
+            f = f - times(self.matrix, known)
+        return times_transposed(self.basis, f)
+
+    def _expanded(self, y: Floats, known: Floats | None) -> Floats:
+        """Displacements of coefficients in the solver's basis."""
+        u = times(self.basis, y)
+        u = u if known is None else known + u
+        if not np.isfinite(u).all():
+            raise ConvergenceError(
+                "the linear solve returned nan: the stiffness is singular. Is the body supported, "
+                "or does a crack cut off a piece that nothing supports?"
+            )
+        return np.asarray(u)
+
+
+def system(
+    space: FunctionSpace,
+    K: sp.csr_matrix,
+    fixed: Bools,
+    numerics: Numerics,
+    solver: Solver | None = None,
+    material: Isotropic | None = None,
+    reuse: Reuse | None = None,
+) -> System:
+    """Eliminate known unknowns, change the basis, scale by the diagonal and factor.
+
+    Parameters
+    ----------
+    space : Space
+    K : sparse matrix (n_dof, n_dof)
+    fixed : (n_dof,) array of bool
+        Unknowns that supports decide, and pins.
+    numerics : Numerics
+    solver : callable, optional
+        In the place of the factorisation.
+    material : Isotropic, optional
+        For the vectorial tip basis alone.
+    reuse : Reuse, optional
+        Of an earlier solve. Where it is given, the next one may use this factor.
+    """
+    basis, reduced = _reduced(space, K, fixed, numerics, material)
+    count = Count(factorisations=1)
+    if solver is not None:
+        return System(K, ~fixed, basis, reduced, _verified(solver, reduced), count=count)
+    halves = None if reuse is None else reuse.tree
+    if halves is None or halves.mesh is not space.mesh or halves.order != space.order:
+        halves = tree(space.mesh, space.order)
+    support = basis.indptr, basis.indices, basis.shape[1], function_nodes(space), space.dim
+    before = None if reuse is None else reuse.factor
+    factor = factorised(reduced, support, halves, before, keep=reuse is not None)
+    if factor is None:  # a pivot that is not positive: SuperLU needs none
+        return System(K, ~fixed, basis, reduced, superlu(reduced), tree=halves, count=count)
+    inverse = _checked(factor, reduced, count)
+    return System(K, ~fixed, basis, reduced, inverse, factor, halves, reuse is not None, count)
+
+
+def _checked(factor: Factor, A: sp.csc_matrix, count: Count) -> Solve:
+    """Solve by a factor; by SuperLU where the residual says that it has lost its digits.
+
+    The first right-hand sides are all looked at; of later ones one is enough.
+    """
+    fallback: list[Solve] = []
+    sound: list[bool] = []
+
+    def solve(b: Floats) -> Floats:
+        if not fallback:
+            x = factor.solve(b)
+            some = slice(1) if sound and b.ndim > 1 else slice(None)
+            if _residual(A, x[..., some], b[..., some]) <= _LOST:
+                sound.append(True)
+                return x
+            count.factorisations += 1
+            fallback.append(superlu(A))
+        return fallback[0](b)
+
+    return solve
+
+
+def _residual(A: sp.csc_matrix, x: Floats, b: Floats) -> float:
+    """Largest residual of right-hand sides, relative to their size; A is symmetric."""
+    from xcrack.linalg.kernels.sparse import residual
+
+    x, b = (np.ascontiguousarray(v).reshape(len(v), -1) for v in (x, b))
+    return float(residual(A.indptr, A.indices, A.data, x, b))
+
+
+def _verified(solver: Solver, A: sp.csc_matrix) -> Solve:
+    """A user's solver, with a look at what it returns: a residual costs one product."""
+    solve = called(solver, "solver=", A)
+    if not callable(solve):
+        raise ProblemError(
+            f"solver returned {shown(solve)}: it must return a function of right-hand sides."
+        )
+
+    def verified(b: Floats) -> Floats:
+        x = numbers(called(solve, "solver=", b), "what the solver returned", b.shape, finite=False)
+        if not np.isfinite(x).all():
+            return x  # a singular stiffness, which has its own error
+        share = _residual(A, x, b)
+        if share > _WRONG:
+            raise ConvergenceError(
+                f"the given solver leaves a residual of {share:.3g} of the right-hand side: what "
+                "it returned is not the solution. Try it on a small matrix, or leave solver out."
+            )
+        if share > _COARSE:
+            warn(
+                f"the given solver leaves a residual of {share:.3g} of the right-hand side; K and "
+                "contact are no better. Give it a smaller tolerance."
+            )
+        return x
+
+    return verified
+
+
+def scaled_basis(
+    space: FunctionSpace,
+    K: sp.csr_matrix,
+    fixed: Bools,
+    numerics: Numerics,
+    material: Isotropic | None = None,
+) -> sp.csr_matrix:
+    """Columns of the solver's basis in the basis of the space `(n_dof, k)`.
+
+    The material counts for the vectorial tip basis alone.
+    """
+    return _reduced(space, K, fixed, numerics, material)[0]
+
+
+def _reduced(
+    space: FunctionSpace,
+    K: sp.csr_matrix,
+    fixed: Bools,
+    numerics: Numerics,
+    material: Isotropic | None,
+) -> tuple[sp.csr_matrix, sp.csc_matrix]:
+    """Columns scaled to energy one, and K in them.
+
+    Standard columns are those of the identity: only the border of enriched ones is multiplied
+    out. Columns without energy are left out.
+    """
+    from xcrack.linalg.kernels.bordered import bordered
+
+    first = space.n_nodes * space.dim
+    enriched = _enriched_columns(space, K, ~fixed, numerics, material)
+    while True:
+        across = K @ enriched
+        across.sort_indices()
+        down = across.T.tocsr()
+        own = down @ enriched
+        own.sort_indices()
+        parts = ((each.indptr, each.indices, each.data) for each in (enriched, across, down, own))
+        matrix, columns, energy = bordered(K.indptr, K.indices, K.data, *parts, fixed, first)
+        alive = energy > 0
+        if alive.all():
+            break
+        enriched = sp.csr_matrix(enriched[:, alive])
+    size = len(matrix[0]) - 1
+    basis = sp.csr_matrix((columns[2], columns[1], columns[0]), shape=(K.shape[0], size))
+    return basis, sp.csc_matrix((matrix[2], matrix[1], matrix[0]), shape=(size, size))
+
+
+def _enriched_columns(
+    space: FunctionSpace,
+    K: sp.csr_matrix,
+    free: Bools,
+    numerics: Numerics,
+    material: Isotropic | None,
+) -> sp.csr_matrix:
+    """The columns of the solver's basis for enriched unknowns `(n_dof, k)`, not yet scaled."""
+    n = space.n_dof
+    first = space.n_nodes * space.dim
+    changed = None
+    if numerics.comparison.tip_basis == "vectorial" and space.tips:
+        changed, free = mode_columns(space, material, free)
+        K = sp.csr_matrix(changed.T @ K @ changed)
+    if numerics.patch and space.tips:
+        patch = patch_orthogonal(space, K, free)
+        changed = sp.csr_matrix(patch if changed is None else changed @ patch)
+        K = sp.csr_matrix(patch.T @ K @ patch)
+    if numerics.orthonormal != "none" and n > first:
+        Z = orthonormal(K, restricted(node_blocks(space, numerics.orthonormal), free))
+    else:
+        chosen = first + np.nonzero(free[first:])[0]
+        ones = (np.ones(len(chosen)), (chosen, np.arange(len(chosen))))
+        Z = sp.csr_matrix(ones, shape=(n, len(chosen)))
+    return Z if changed is None else sp.csr_matrix(changed @ Z)
+
+
+__all__ = []

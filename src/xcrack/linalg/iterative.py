@@ -1,0 +1,358 @@
+"""The iterative engine for large bodies in 3D: conjugate gradients with a multigrid cycle.
+
+It needs no factor: memory and time grow with the number of
+unknowns, and the levels below the finest one serve every crack in a mesh.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+import scipy.sparse as sp
+
+from xcrack.base.arrays import Bools, Floats, Ints, lock
+from xcrack.fem.assembly import Bulk, Stiffness
+from xcrack.fem.function_space import FunctionSpace
+from xcrack.linalg.basis import Blocks, node_blocks, patch_orthogonal, restricted
+from xcrack.linalg.engine import Condensed, ContactRows, Count, StateContact
+from xcrack.linalg.iterative_basis import enriched_basis, nearby, parts_of, within_blocks
+from xcrack.linalg.modal_basis import mode_columns
+from xcrack.linalg.multigrid import Hierarchy, extended, hierarchy
+from xcrack.linalg.products import best_guesses, independent, proportional
+from xcrack.linalg.projected_cg import (
+    TOLERANCE,
+    Iteration,
+    Operator,
+    ProjectedState,
+    descending,
+    in_lockstep,
+    projecting,
+)
+from xcrack.linalg.reuse import Reuse
+from xcrack.linalg.schwarz import star_patches
+from xcrack.model.material import Isotropic
+
+_ROUGH = 0.02  # residual of a first solution that only shows which faces overlap
+_LEAST_SHARE = 1e-4  # of the load, to which forces are resolved; round-off forbids much less
+_MULTIPLE = 1e-13  # share of the largest entry up to which a load is another one, scaled
+_COLUMNS = 64  # of the dual matrix that are solved for at a time
+
+
+@dataclass(frozen=True, eq=False)
+class IterativeSystem:
+    """A system that is solved by conjugate gradients.
+
+    Attributes
+    ----------
+    matrix : Stiffness or sparse matrix (n_dof, n_dof)
+        In the basis of the space.
+    within : sparse matrix (n_dof, n_dof), optional
+        Its entries between the unknowns of one node; made of the matrix where they are not given.
+    free : (n_dof,) array of bool
+    basis : sparse matrix (n_dof, k)
+        Columns of the solver's basis; zero in the rows of known unknowns.
+    hierarchy : Hierarchy
+        Serves the next crack in the same mesh too.
+    operator : Operator
+    blocks : Blocks
+        Unknowns of each enriched node.
+    combined, back : sparse matrices (n_dof, n_dof), optional
+        Basis to which the blocks belong where it is not that of the space, and its inverse.
+    count : Count
+    """
+
+    matrix: sp.csr_matrix | Stiffness
+    within: sp.csr_matrix | None
+    free: Bools
+    basis: sp.csr_matrix
+    hierarchy: Hierarchy
+    operator: Operator
+    blocks: Blocks
+    combined: sp.csr_matrix | None = None
+    back: sp.csr_matrix | None = None
+    count: Count = field(default_factory=Count)
+    shared: str = "multigrid hierarchy"
+    reason: str = "conjugate gradients: a large body in 3D"
+
+    def solve(
+        self,
+        f: Floats,
+        known: Floats | None = None,
+        start: Floats | None = None,
+        tolerance: float = TOLERANCE,
+    ) -> Floats:
+        """Displacements for loads `(n_dof,)` or `(n_dof, k)` and known values of the same shape.
+
+        Parameters
+        ----------
+        f, known : arrays
+        start : array of the same shape, optional
+            First guess of the displacements.
+        tolerance : float
+            Residual relative to the load at which to stop.
+        """
+        columns = f.reshape(len(f), -1)
+        given = np.zeros_like(columns) if known is None else known.reshape(columns.shape)
+        b, known_of = _vectors(self._reduced(columns, given)), _vectors(given)
+        y: list[Floats] = [np.zeros_like(each) for each in b]
+        if start is not None:
+            y = _vectors(self.coordinates(start.reshape(columns.shape) - given))
+        first = independent(b)
+        rest = [k for k in range(len(b)) if k not in first]
+        self._solve_apart(first, b, known_of, y, tolerance)
+        guesses = best_guesses(self.operator, [y[k] for k in first], [b[k] for k in rest])
+        for k, guess in zip(rest, guesses, strict=True):
+            y[k] = guess
+        self._solve_apart(rest, b, known_of, y, tolerance)
+        return np.asarray(given + self.basis @ np.stack(y, axis=1)).reshape(f.shape)
+
+    def first_look(
+        self, f: Floats, known: Floats, closed_before: bool
+    ) -> tuple[Floats | None, bool]:
+        """Rough displacements, as few steps as show which faces overlap; none after closed sets."""
+        if closed_before:
+            return None, False
+        return self.solve(f, known, tolerance=_ROUGH), False
+
+    def contact(
+        self,
+        rows: ContactRows,
+        f: Floats,
+        known: Floats,
+        start: Sequence[Bools | None],
+        latest: Floats | None = None,
+        opened: Floats | None = None,
+    ) -> list[StateContact]:
+        """Solve load states with crack faces that may touch; see `Engine`.
+
+        Without a first set, that of the groups that overlap in the latest displacements is the
+        best guess. Without displacements each state starts from those before it.
+        """
+        del opened
+        own = sp.csr_matrix(rows.N @ self.basis)
+        b = _vectors(self._reduced(f, known))
+        gaps = _vectors(rows.N @ known)
+        y = [np.zeros_like(each) for each in b]
+        if latest is not None:
+            y = _vectors(self.coordinates(latest - known))
+        # What a pressure closes, a multiple of the load closes too, and nothing else.
+        whole = np.concatenate([np.stack(b, axis=1), known])
+        like, scale = proportional(whole, _MULTIPLE)
+        solved: dict[int, ProjectedState] = {}
+        for chosen in _in_turn(like, scale):
+            runs = []
+            for k in chosen:
+                model = solved.get(int(like[k]))
+                first = start[k]
+                if model is not None:
+                    y[k], first = scale[k] * model.y, model.active
+                active = own @ y[k] + gaps[k] < 0 if first is None else first
+                conditions = own, gaps[k], rows.measure, rows.stiffness
+                runs.append(self._together(b[k], known[:, k], conditions, active, y[k]))
+            for k, state in zip(chosen, in_lockstep(self.operator, runs), strict=True):
+                solved[k] = state
+                self._counted(state.iterations)
+        return [
+            StateContact(s.pressure, s.gap, s.active, s.sets, known[:, k] + self.basis @ s.y)
+            for k, s in sorted(solved.items())
+        ]
+
+    def condensed(self, N: sp.csr_matrix, f: Floats, known: Floats) -> Condensed:
+        """The system as rows see it; see `Engine`. A solve for each row."""
+        opened = self.solve(f, known)
+        F = np.empty((N.shape[0], N.shape[0]))
+        for k in range(0, len(F), _COLUMNS):
+            some = N[k : k + _COLUMNS].toarray().T
+            F[:, k : k + _COLUMNS] = N @ self.solve(some, start=np.zeros_like(some))
+        return Condensed(
+            (F + F.T) / 2,
+            N @ opened,
+            lambda lam: self.solve(f + N.T @ lam, known, opened),
+        )
+
+    def handed_on(self, reuse: Reuse) -> Reuse:
+        """With the levels of the mesh."""
+        return replace(reuse, hierarchy=self.hierarchy)
+
+    def _reduced(self, f: Floats, known: Floats) -> Floats:
+        """Loads `(n_dof, k)` on the unknowns of the solver."""
+        return np.asarray(self.basis.T @ (f - self.matrix @ known if known.any() else f))
+
+    def _solve_apart(
+        self,
+        chosen: Sequence[int],
+        b: Sequence[Floats],
+        known: Sequence[Floats],
+        y: list[Floats],
+        tolerance: float,
+    ) -> None:
+        """Put solutions of some states in the place of their guesses."""
+        runs = [self._apart(b[k], known[k], y[k], tolerance) for k in chosen]
+        for k, (solved, steps) in zip(chosen, in_lockstep(self.operator, runs), strict=True):
+            y[k] = solved
+            self._counted(steps)
+
+    def _counted(self, steps: int) -> None:
+        self.count.solves += 1
+        self.count.iterations += steps
+
+    def _apart(
+        self, b: Floats, known: Floats, start: Floats, tolerance: float
+    ) -> Iteration[tuple[Floats, int]]:
+        y, steps = yield from descending(self.operator, b, start, tolerance)
+        share = self._share(y, b, known)
+        if share < 1:
+            y, more = yield from descending(self.operator, b, y, share * tolerance)
+            steps += more
+        return y, steps
+
+    def _together(
+        self,
+        b: Floats,
+        known: Floats,
+        rows: tuple[sp.csr_matrix, Floats, Floats, float],
+        active: Bools,
+        y: Floats,
+    ) -> Iteration[ProjectedState]:
+        state = yield from projecting(self.operator, b, *rows, active, y, TOLERANCE)
+        share = self._share(state.y, b, known)
+        if share == 1:
+            return state
+        more = yield from projecting(
+            self.operator, b, *rows, state.active, state.y, share * TOLERANCE
+        )
+        sets, steps = state.sets + more.sets - 1, state.iterations + more.iterations
+        return replace(more, sets=sets, iterations=steps)
+
+    def _share(self, y: Floats, b: Floats, known: Floats) -> float:
+        """Size of the forces in the body relative to b.
+
+        Imposed displacements act through b on the cells next to the support alone, as if the rest
+        did not give way: b is then far larger than the forces that are looked for.
+        """
+        if not known.any():
+            return 1.0
+        forces = (self.matrix @ (known + self.basis @ y))[: len(self.hierarchy.fixed)]
+        size = float(np.sqrt(np.einsum("i,i", b, b)))
+        share = float(np.sqrt(np.einsum("i,i", forces, forces))) / size if size > 0 else 1.0
+        return min(1.0, max(share, _LEAST_SHARE))
+
+    def coordinates(self, u: Floats) -> Floats:
+        """Coefficients in the solver's basis of displacements `(n_dof,)` or `(n_dof, k)`.
+
+        Known unknowns count as zero.
+        """
+        n = len(self.hierarchy.free)
+        enriched = self.basis[:, n:]
+        y = ((enriched.T @ (self._within @ u)).T / self.operator.diagonal[n:]).T
+        return np.concatenate([self.basis[:, :n].T @ (u - enriched @ y), y])
+
+    @cached_property
+    def _within(self) -> sp.csr_matrix:
+        """Entries of the stiffness between unknowns of one node."""
+        if self.within is not None:
+            return self.within
+        assert self.combined is not None
+        assert self.back is not None
+        K = nearby(_joined(self.matrix), self.combined, self.blocks)
+        return sp.csr_matrix(self.back.T @ within_blocks(K, self.blocks) @ self.back)
+
+
+def _joined(K: sp.csr_matrix | Stiffness, rows: Bools | None = None) -> sp.csr_matrix:
+    return K.joined(rows) if isinstance(K, Stiffness) else K
+
+
+def iterative_system(
+    space: FunctionSpace,
+    K: sp.csr_matrix | Stiffness,
+    bulk: Bulk,
+    fixed: Bools,
+    levels: Hierarchy | None = None,
+    modes: Floats | None = None,
+    vectorial: Isotropic | None = None,
+    rows: Bools | None = None,
+) -> IterativeSystem:
+    """Change the basis and put the enriched matrix on top of the levels of the uncracked body.
+
+    Parameters
+    ----------
+    space : FunctionSpace
+    K : Stiffness or sparse matrix (n_dof, n_dof)
+        Of all unknowns.
+    bulk : Bulk
+        Stiffness of the uncracked body, of which K's standard block is a copy.
+    fixed : (n_dof,) array of bool
+        Unknowns that supports decide; no pins.
+    levels : Hierarchy, optional
+        Of an earlier crack in the same mesh; made anew where it does not fit.
+    modes : (n_dof, k) array, optional
+        Rigid motions that nothing prevents; loads have to be in balance with them.
+    vectorial : Isotropic, optional
+        The material where the tip basis is vectorial.
+    rows : (n_functions,) array of bool, optional
+        Functions next to enriched ones, whose rows of a `Stiffness` are enough at order 1.
+    """
+    if levels is None or not levels.fits(bulk, fixed):
+        levels = hierarchy(bulk, fixed)
+    near = _joined(K, rows)  # after the levels, whose making needs the most memory
+    free = ~fixed
+    d = space.dim
+    plain = np.arange(len(levels.free))
+    stars = space.order == 2 and space.n_functions > space.n_nodes
+    combined, in_use, back = None, free, None
+    if vectorial is not None and space.tips:
+        combined, in_use = mode_columns(space, vectorial, free)
+    if stars and space.tips:
+        combined, back = _apart(space, near, combined, in_use)
+    whole = node_blocks(space, "star" if stars else "node")
+    blocks = restricted(whole, in_use)
+    enriched, starts, block = enriched_basis(space, near, blocks, levels, combined)
+    parts = parts_of(levels, near, plain, enriched)
+    stored, diagonal = parts.stored(starts), parts.diagonal
+    patches = None
+    if stars and len(block):
+        home = np.where(levels.free, plain // d, -1)
+        home = np.concatenate([home, whole.members[whole.offsets[block]] // d])
+        patches = star_patches(space, home, len(plain), diagonal, parts.entries)
+    within = within_blocks(near, blocks) if combined is None else None
+    del parts, near  # before the cycle makes copies in single precision
+    identity = sp.csr_matrix(
+        (levels.free.astype(float), (plain, np.arange(len(plain)))),
+        shape=(space.n_dof, len(plain)),
+    )
+    basis = sp.csr_matrix(sp.hstack([identity, enriched]))
+    null = np.zeros((0, 0)) if modes is None else modes[: len(plain)]
+    if null.shape[1] and not levels.free.all():
+        null = np.linalg.qr(null * levels.free[:, None])[0]
+    cycle = extended(levels, stored, diagonal, patches)
+    operator = Operator(stored.times, cycle, diagonal, null, stored.times_all, cycle.of_all)
+    return IterativeSystem(K, within, lock(free), basis, levels, operator, blocks, combined, back)
+
+
+def _vectors(columns: Floats) -> list[Floats]:
+    return list(np.ascontiguousarray(columns.T))
+
+
+def _in_turn(like: Ints, scale: Floats) -> Iterator[list[int]]:
+    """States that are solved first, and positive multiples of theirs."""
+    multiple = (like != np.arange(len(like))) & (scale > 0)
+    multiple &= ~multiple[like]
+    yield [int(k) for k in np.nonzero(~multiple)[0]]
+    yield [int(k) for k in np.nonzero(multiple)[0]]
+
+
+def _apart(
+    space: FunctionSpace, K: sp.csr_matrix, modes: sp.csr_matrix | None, free: Bools
+) -> tuple[sp.csr_matrix, sp.csr_matrix]:
+    """Basis in which tip functions are orthogonal to the functions of their star; its inverse."""
+    if modes is None:
+        apart = patch_orthogonal(space, K, free, "star")
+        # What is taken off belongs to unknowns from which nothing is taken.
+        return apart, sp.csr_matrix(2 * sp.identity(space.n_dof) - apart)
+    apart = patch_orthogonal(space, sp.csr_matrix(modes.T @ K @ modes), free, "star")
+    # The modes of a point are orthogonal to each other: no two share a function of a component.
+    size = np.asarray(modes.multiply(modes).sum(axis=0)).ravel()
+    own = sp.diags(1 / np.where(size > 0, size, 1.0)) @ modes.T
+    back = (2 * sp.identity(space.n_dof) - apart) @ own
+    return sp.csr_matrix(modes @ apart), sp.csr_matrix(back)

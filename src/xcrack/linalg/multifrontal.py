@@ -1,0 +1,311 @@
+"""Multifrontal Cholesky factorisation on the tree of the mesh, and only of what has changed.
+
+Cells are halved by the medians of their centroids until eight are left; an unknown belongs to the
+lowest part of that tree that holds its whole support (nested dissection, George 1973, by geometry).
+Unknowns couple where they share a cell, so every coupling lies on one path to the root, whatever
+basis the enriched unknowns are in, and the tree serves every crack in the mesh. A part whose own
+entries and whose children are the same bits as before has the same panel: it is taken over.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from xcrack.base.arrays import Bools, Floats, Ints, lock
+from xcrack.base.threads import each, one_blas_thread
+from xcrack.mesh.mesh import Mesh
+from xcrack.mesh.simplex import cell_nodes
+
+_LEAF = 8  # cells of a part that is not halved any more
+_UNIT = 4  # levels of a subtree that is factored as a whole or not at all: 128 cells
+_SHARED = 4  # levels above the subtrees that threads take
+_LEAST = 100_000  # entries of a matrix below which handing subtrees over costs more than it saves
+_FEW = 3  # right-hand sides up to which each is quicker alone
+_SPREAD = 2.2  # times the numbers in use that arrays of earlier factorisations may hold
+_MOST = 1 << 27  # entries of update matrices, 1 GB, above which larger subtrees are the unit
+
+
+@dataclass(frozen=True, eq=False)
+class Tree:
+    """Halves of a mesh, and the part that each node belongs to.
+
+    Attributes
+    ----------
+    mesh : Mesh
+    order : int
+        Of the shape functions.
+    node_to_part : (n_nodes,) array of int
+        Heap numbers: 1 is the whole mesh, 2 p and 2 p + 1 are the halves of p.
+    postorder, rank : arrays of int
+        Parts, children first, and the place of each part.
+    """
+
+    mesh: Mesh
+    order: int
+    node_to_part: Ints
+    postorder: Ints
+    rank: Ints
+
+
+def tree(mesh: Mesh, order: int) -> Tree:
+    """Halve a mesh; the same mesh gives the same tree on every machine.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    order : int
+    """
+    from xcrack.linalg.kernels.tree import bisected, node_parts, postorder
+
+    centre = mesh.points[mesh.cells].mean(axis=1)
+    depth = max(0, int(np.ceil(np.log2(len(mesh.cells) / _LEAF))))
+    ranked = np.stack([np.argsort(x, kind="stable") for x in centre.T])
+    leaf = bisected(ranked, centre, depth)
+    nodes = np.ascontiguousarray(cell_nodes(mesh, order))
+    part = node_parts(nodes, leaf, depth, int(nodes.max()) + 1)
+    parts, rank = postorder(depth)
+    return Tree(mesh, order, lock(part), lock(parts), lock(rank))
+
+
+@dataclass(frozen=True, eq=False)
+class Factor:
+    """A factored symmetric positive matrix.
+
+    Attributes
+    ----------
+    tree : Tree
+    perm : (n,) array of int
+        Unknown at each permuted place.
+    first : (parts + 1,) array of int
+        First permuted unknown of each part.
+    begin, boundary, in_parent : arrays of int
+        Rows below each part, and their places in its parent's front.
+    start, row, value : arrays
+        Entries of the matrix by their place in a front.
+    panel, update : (parts,) arrays of uint64
+        Addresses of the columns of each part, and of its update matrix where that is kept for the
+        next factorisation.
+    memory : tuple of arrays
+        What the addresses lie in: numbers of this factorisation, and of earlier ones.
+    used : int
+        Numbers in them that belong to this factor.
+    lowest : int
+        Levels of the subtrees that are factored as a whole; -1 where nothing is kept for the next.
+    """
+
+    tree: Tree
+    perm: Ints
+    first: Ints
+    begin: Ints
+    boundary: Ints
+    in_parent: Ints
+    start: Ints
+    row: Ints
+    value: Floats
+    panel: Ints
+    update: Ints
+    memory: tuple[Floats, ...]
+    used: int
+    lowest: int
+
+    @property
+    def fronts(self) -> tuple[Any, ...]:
+        """What the kernels need to assemble fronts."""
+        tree = self.tree
+        return (
+            self.first, self.begin, self.in_parent, self.start, self.row, self.value,
+            tree.postorder, tree.rank,
+        )  # fmt: skip
+
+    def solve(self, b: Floats) -> Floats:
+        """Solution for right-hand sides `(n,)` or `(n, r)`."""
+        return self._unpermuted(self._halves(self._permuted(b), True, True), b.shape)
+
+    def forward(self, b: Floats) -> Floats:
+        """L^-1 P b for right-hand sides `(n, r)`, in permuted order."""
+        return self._halves(self._permuted(b), True, False)
+
+    def forward_sparse(self, B: sp.csr_matrix) -> tuple[Floats, Ints]:
+        """L^-1 P B^T for sparse rows B `(r, n)`: the rows that are not zero, and their places."""
+        inverse = np.empty(len(self.perm), dtype=np.int64)
+        inverse[self.perm] = np.arange(len(self.perm))
+        place = inverse[B.indices]
+        X = np.zeros((len(self.perm), B.shape[0]))
+        X[place, np.arange(B.shape[0]).repeat(np.diff(B.indptr))] = B.data
+        part = np.repeat(np.arange(len(self.first) - 1), np.diff(self.first))
+        touched = np.zeros(len(self.first) - 1, dtype=bool)
+        touched[part[place]] = True
+        self._halves(X, True, False, touched)
+        rows = np.nonzero(touched[part])[0]
+        return X[rows], rows
+
+    def backward(self, y: Floats) -> Floats:
+        """Solution from its forward half `(n, r)`."""
+        return self._unpermuted(self._halves(np.array(y), False, True), y.shape)
+
+    def _permuted(self, b: Floats) -> Floats:
+        return np.ascontiguousarray(b.reshape(len(b), -1)[self.perm])
+
+    def _unpermuted(self, X: Floats, shape: tuple[int, ...]) -> Floats:
+        x = np.empty_like(X)
+        x[self.perm] = X
+        return x.reshape(shape)
+
+    def _halves(
+        self, X: Floats, forward: bool, backward: bool, touched: Bools | None = None
+    ) -> Floats:
+        from xcrack.linalg.kernels.multifrontal import substituted, substituted_one
+
+        if X.shape[1] <= _FEW and touched is None:
+            columns = np.ascontiguousarray(X.T)
+            with one_blas_thread():
+                for x in columns:
+                    substituted_one(
+                        self.first, self.begin, self.boundary, self.panel, x, forward, backward
+                    )
+            return np.ascontiguousarray(columns.T)
+        if touched is None:
+            touched = np.ones(len(self.first) - 1, dtype=bool)
+        tree = self.tree
+        with one_blas_thread():
+            substituted(
+                self.first, self.begin, self.boundary, tree.postorder, tree.rank, self.panel, X,
+                touched, forward, backward,
+            )  # fmt: skip
+        return X
+
+
+def factorised(
+    A: sp.csc_matrix,
+    columns: tuple[Ints, Ints, int, Ints, int],
+    tree: Tree,
+    before: Factor | None = None,
+    keep: bool = False,
+) -> Factor | None:
+    """Factor a symmetric matrix; None where it is not positive definite.
+
+    Parameters
+    ----------
+    A : sparse matrix (n, n)
+        CSC, both triangles.
+    columns : indptr, indices, n, owner, d
+        Rows of the basis that A belongs to, CSR, and its number of columns; the node of each
+        function, and the number of components.
+    tree : Tree
+    before : Factor, optional
+        Of an earlier crack on the same tree, made to be kept.
+    keep : bool
+        Keep what the next factorisation may take over.
+    """
+    from xcrack.linalg.kernels.fronts import arranged, places_of_updates, sizes, unchanged
+    from xcrack.linalg.kernels.tree import column_parts
+
+    order, rank = tree.postorder, tree.rank
+    part = rank[column_parts(*columns, tree.node_to_part)]
+    perm = np.argsort(part, kind="stable")
+    place = np.empty(len(perm), dtype=np.int32)
+    place[perm] = np.arange(len(perm))
+    first = np.searchsorted(part[perm], np.arange(len(order) + 1))
+    begin, boundary, in_parent, start, row, value = arranged(
+        A.indptr, A.indices, A.data, first, order, rank, perm, place
+    )
+    fronts = first, begin, in_parent, start, row, value, order, rank
+    panel_size, update_size, _ = sizes(first, begin)
+    depth = len(order).bit_length() - 1
+    # Subtrees of that many levels have a stack each; above them update matrices are stored.
+    lowest = min(_UNIT, depth) if keep else max(depth - _SHARED, min(_UNIT, depth))
+    place, height, stack = places_of_updates(order, rank, update_size, lowest)
+    while lowest <= depth and update_size[place < 0].sum() > _MOST:
+        lowest += 1
+        place, height, stack = places_of_updates(order, rank, update_size, lowest)
+    own_size = np.where(place < 0, update_size, 0)
+    used = int(panel_size.sum() + (own_size.sum() if keep else 0))
+    wanted = np.ones(len(order), dtype=bool)
+    earlier: tuple[Floats, ...] = ()
+    if before is not None and before.tree is tree and before.lowest == lowest <= depth:
+        wanted = _wanted(~unchanged(fronts, before.fronts), order, rank, height, lowest)
+        earlier = before.memory
+    panels, panel = _room(np.where(wanted, panel_size, 0))
+    updates, update = _room(np.where(wanted, own_size, 0))
+    if earlier and before is not None:
+        panel = np.where(wanted, panel, before.panel)
+        update = np.where(wanted, update, before.update)
+    if _factored(fronts, panel, update, (place, height, wanted), stack, lowest):
+        return None
+    memory = (*earlier, lock(panels), lock(updates)) if keep else (lock(panels),)
+    if sum(len(part) for part in memory) > _SPREAD * used:
+        panels, panel = _gathered(panel, panel_size)
+        updates, update = _gathered(update, own_size)
+        memory = (lock(panels), lock(updates))
+    return Factor(
+        tree, lock(perm), lock(first), lock(begin), lock(boundary), lock(in_parent), lock(start),
+        lock(row), lock(value), lock(panel), lock(update), memory, used, lowest if keep else -1,
+    )  # fmt: skip
+
+
+def _factored(
+    fronts: tuple[Any, ...],
+    panel: Ints,
+    update: Ints,
+    parts: tuple[Ints, Ints, Bools],
+    stack: int,
+    lowest: int,
+) -> bool:
+    """Factor subtrees side by side, then what is above them; whether a pivot was not positive.
+
+    `parts` are the places of update matrices in a stack, heights, and which parts to factor.
+    """
+    from xcrack.linalg.kernels.multifrontal import factored
+
+    place, height, wanted = parts
+    depth = int(height[-1])
+    level = min(max(depth - _SHARED, lowest), depth)
+
+    def subtree(root: int) -> int:
+        begin, end = root + 2 - (2 << level), root + 1
+        if not wanted[begin:end].any():
+            return 0
+        scratch = np.empty(stack)
+        at = np.uint64(scratch.ctypes.data) + np.uint64(8) * place[begin:end].astype(np.uint64)
+        update[begin:end] = np.where(place[begin:end] >= 0, at, update[begin:end])
+        return int(factored(fronts, panel, update, wanted, begin, end))
+
+    with one_blas_thread():
+        roots = np.nonzero(height == level)[0].tolist()
+        few = len(fronts[5]) < _LEAST
+        if any(map(subtree, roots) if few else each(subtree, roots)):
+            return True
+        above = wanted & (height > level)
+        return bool(above.any() and factored(fronts, panel, update, above, 0, len(height)))
+
+
+def _room(size: Ints) -> tuple[Floats, Any]:
+    """An array for numbers of parts, and the address of those of each."""
+    numbers = np.empty(int(size.sum()))
+    begin = np.concatenate([[0], np.cumsum(size)[:-1]]).astype(np.uint64)
+    return numbers, np.uint64(numbers.ctypes.data) + np.uint64(8) * begin
+
+
+def _gathered(old: Ints, size: Ints) -> tuple[Floats, Any]:
+    """The numbers of all parts copied into one array, and their addresses."""
+    from xcrack.linalg.kernels.multifrontal import copied
+
+    numbers, new = _room(size)
+    copied(old, new, size)
+    return numbers, new
+
+
+def _wanted(changed: Bools, order: Ints, rank: Ints, height: Ints, lowest: int) -> Bools:
+    """Parts to factor again: those that changed, their ancestors, and whole units of them."""
+    wanted = np.array(changed)
+    p = order[np.nonzero(wanted)[0]]
+    while len(p):
+        wanted[rank[p]] = True
+        p = np.unique(p[p > 1] >> 1)
+    # A unit's root stands for all of it.
+    above = order.copy()
+    low = height < lowest
+    steps = np.where(low, lowest - height, 0)
+    return np.asarray(wanted[rank[above >> steps]])

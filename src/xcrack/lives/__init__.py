@@ -1,1 +1,0 @@
-"""Lives with an error bar: scatter, percentiles, inspections, probability of detection."""

@@ -1,0 +1,215 @@
+"""Where points lie among cells, found by a grid; what is near to a point, by a pass over all."""
+
+import math
+
+import numpy as np
+
+from xcrack.base.kernels.jit import kernel
+
+_MARGIN = 1e-8  # share of a cell's extent: its box holds what lies in it but for round-off
+
+
+@kernel
+def _boxed(points, cells, e, x, low, high):  # type: ignore[no-untyped-def]
+    """Whether the box of a cell, set in `low` and `high`, meets that of points; a margin wider."""
+    for j in range(points.shape[1]):
+        low[j] = high[j] = points[cells[e, 0], j]
+        for b in range(1, cells.shape[1]):
+            value = points[cells[e, b], j]
+            if value < low[j]:
+                low[j] = value
+            elif value > high[j]:
+                high[j] = value
+        margin = _MARGIN * (high[j] - low[j])
+        low[j] -= margin
+        high[j] += margin
+        if low[j] > x[1, j] or high[j] < x[0, j]:
+            return False
+    return True
+
+
+@kernel
+def _span(low, high, origin, width, shape, begin, end):  # type: ignore[no-untyped-def]
+    """Set the range of bins that a box meets; their number."""
+    count = 1
+    for j in range(len(shape)):
+        for bound, place in ((low, begin), (high, end)):
+            at = (bound[j] - origin[j]) / width[j]
+            place[j] = 0
+            if at >= shape[j] - 1:
+                place[j] = shape[j] - 1
+            elif at > 0:
+                place[j] = int(at)
+        count *= end[j] - begin[j] + 1
+    return count
+
+
+@kernel
+def _bin(k, begin, end, shape):  # type: ignore[no-untyped-def]
+    """Number of the k-th bin of a range."""
+    number = 0
+    for j in range(len(shape)):
+        side = end[j] - begin[j] + 1
+        number = number * shape[j] + begin[j] + k % side
+        k //= side
+    return number
+
+
+@kernel
+def binned(points, cells, every, shape):  # type: ignore[no-untyped-def]
+    """Cells in the bins of a regular grid over the box of a mesh.
+
+    Parameters
+    ----------
+    points : (n, d) array
+    cells : (m, d + 1) array of int
+    every : (2, d) array
+        Corners of the box around all points.
+    shape : (d,) array of int
+        Bins in each direction.
+
+    Returns
+    -------
+    origin, width : (d,) arrays
+    start : array of int
+        Where the cells of each bin begin.
+    member : array of int32
+        Cells whose boxes meet a bin, growing.
+    """
+    d = points.shape[1]
+    origin, width = every[0], np.empty(d)
+    for j in range(d):
+        width[j] = (every[1, j] - every[0, j]) / shape[j]
+    low, high = np.empty(d), np.empty(d)
+    begin, end = np.empty(d, np.int64), np.empty(d, np.int64)
+    bins = 1
+    for j in range(d):
+        bins *= shape[j]
+    start = np.zeros(bins + 1, np.int64)
+    member = np.empty(0, np.int32)
+    for filling in range(2):
+        if filling == 1:
+            for k in range(bins, 0, -1):
+                start[k] = start[k - 1]
+            start[0] = 0
+            for k in range(bins):
+                start[k + 1] += start[k]
+            member = np.empty(start[bins], np.int32)
+            for k in range(bins, 0, -1):
+                start[k] = start[k - 1]
+        for e in range(len(cells)):
+            _boxed(points, cells, e, every, low, high)
+            for k in range(_span(low, high, origin, width, shape, begin, end)):
+                number = _bin(k, begin, end, shape)
+                if filling == 0:
+                    start[number] += 1
+                else:
+                    member[start[number + 1]] = e
+                    start[number + 1] += 1
+    return origin.copy(), width, start, member
+
+
+@kernel
+def located(points, cells, gradient, grid, shape, x, tolerance):  # type: ignore[no-untyped-def]
+    """Cell of each point, the one with the nearest centroid where several have it.
+
+    Parameters
+    ----------
+    points : (n, d) array
+    cells : (m, d + 1) array of int
+    gradient : (m, d + 1, d) array
+        Of the barycentric coordinates of the cells.
+    grid, shape
+        Of `binned`.
+    x : (k, d) array
+    tolerance : float
+        Barycentric coordinate below zero up to which a point belongs to a cell.
+
+    Returns
+    -------
+    cell : (k,) array of int
+        -1 outside.
+    bary : (k, d + 1) array
+    """
+    d = points.shape[1]
+    cell, bary = np.empty(len(x), np.int64), np.zeros((len(x), d + 1))
+    own = np.empty(d + 1)
+    begin, end = np.empty(d, np.int64), np.empty(d, np.int64)
+    for q in range(len(x)):
+        best, cell[q] = np.inf, -1
+        _span(x[q], x[q], grid[0], grid[1], shape, begin, end)
+        number = _bin(0, begin, end, shape)
+        for k in range(grid[2][number], grid[2][number + 1]):
+            e = grid[3][k]
+            if not _inside(points, cells, gradient, e, x[q], tolerance, own):
+                continue
+            away = 0.0
+            for j in range(d):
+                mean = 0.0
+                for b in range(d + 1):
+                    mean += points[cells[e, b], j]
+                away += (mean / (d + 1) - x[q, j]) ** 2
+            if away < best:
+                best, cell[q] = away, e
+                for i in range(d + 1):
+                    bary[q, i] = own[i]
+    return cell, bary
+
+
+@kernel
+def _inside(points, cells, gradient, e, x, tolerance, own):  # type: ignore[no-untyped-def]
+    """Whether a cell has a point, whose barycentric coordinates are set."""
+    d, total, least = points.shape[1], 0.0, 1.0
+    for i in range(1, d + 1):
+        own[i] = 0.0
+        for j in range(d):
+            own[i] += gradient[e, i, j] * (x[j] - points[cells[e, 0], j])
+        total += own[i]
+        if own[i] < least:
+            least = own[i]
+    own[0] = 1 - total
+    return least >= -tolerance and own[0] >= -tolerance
+
+
+@kernel
+def _from_segment(points, a, b, x):  # type: ignore[no-untyped-def]
+    """Distance of a point in 2D to the segment between two points."""
+    along0, along1 = points[b, 0] - points[a, 0], points[b, 1] - points[a, 1]
+    gap0, gap1 = x[0] - points[a, 0], x[1] - points[a, 1]
+    square = along0 * along0 + along1 * along1
+    t = (gap0 * along0 + gap1 * along1) / square if square > 1e-300 else 0.0
+    if t < 0.0:
+        t = 0.0
+    elif t > 1.0:
+        t = 1.0
+    away0, away1 = points[a, 0] + t * along0 - x[0], points[a, 1] + t * along1 - x[1]
+    return math.sqrt(away0 * away0 + away1 * away1)
+
+
+@kernel
+def cells_within(points, cells, x, radius):  # type: ignore[no-untyped-def]
+    """Triangles one of whose sides comes nearer to a point than a radius `(k,)`, growing."""
+    low, high, box = np.empty(2), np.empty(2), np.empty((2, 2))
+    for j in range(2):
+        box[0, j], box[1, j] = x[j] - radius, x[j] + radius
+    chosen, count = np.empty(len(cells), np.int64), 0
+    for e in range(len(cells)):
+        if _boxed(points, cells, e, box, low, high):
+            for i in range(3):
+                if _from_segment(points, cells[e, i], cells[e, (i + 1) % 3], x) <= radius:
+                    chosen[count] = e
+                    count += 1
+                    break
+    return chosen[:count].copy()
+
+
+@kernel
+def nearest_segment(points, segments, x):  # type: ignore[no-untyped-def]
+    """Distance of a point in 2D to the nearest of segments `(k, 2)`, and the length of that one."""
+    best, nearest = np.inf, 0
+    for k in range(len(segments)):
+        away = _from_segment(points, segments[k, 0], segments[k, 1], x)
+        if away < best:
+            best, nearest = away, k
+    a, b = segments[nearest, 0], segments[nearest, 1]
+    return best, math.hypot(points[b, 0] - points[a, 0], points[b, 1] - points[a, 1])

@@ -1,0 +1,147 @@
+"""Segments: split where cracks cross them, and points on them that are graded towards tips."""
+
+import math
+
+import numpy as np
+
+from xcrack.base.kernels.jit import kernel
+
+_FOOT = 1e-9  # a foot this close to an end is the end: round-off of coordinates far from 0
+
+
+@kernel
+def graded_points(begin, end, tips, u, w):  # type: ignore[no-untyped-def]
+    """Gauss points on segments, graded towards a tip that is closer than their length.
+
+    A segment is split at the foot of the nearest tip, with r = u² from there.
+
+    Parameters
+    ----------
+    begin, end : (k, 2) arrays
+    tips : (t, 2) array
+    u, w : (n,) arrays
+        Gauss rule on [0, 1].
+
+    Returns
+    -------
+    segment : (q,) array of int
+    place : (q, 2) array
+        Barycentric coordinates in the segment.
+    weight : (q,) array
+        Summing to the length of each segment.
+    """
+    k, n = len(begin), len(u)
+    number = np.empty(2 * n * k, np.int64)
+    place, weight = np.empty((2 * n * k, 2)), np.empty(2 * n * k)
+    to = 0
+    for s in range(k):
+        x, y = end[s, 0] - begin[s, 0], end[s, 1] - begin[s, 1]
+        length = math.sqrt(x * x + y * y)
+        middle0, middle1 = (begin[s, 0] + end[s, 0]) / 2, (begin[s, 1] + end[s, 1]) / 2
+        nearest, least = -1, np.inf
+        for t in range(len(tips)):
+            a, b = middle0 - tips[t, 0], middle1 - tips[t, 1]
+            away = math.sqrt(a * a + b * b)
+            if away < least:
+                nearest, least = t, away
+        near, foot = False, 0.0
+        if nearest >= 0:
+            a, b = tips[nearest, 0] - begin[s, 0], tips[nearest, 1] - begin[s, 1]
+            square = x * x + y * y
+            foot = (a * x + b * y) / square if square > 1e-300 else 0.0
+            if foot < _FOOT:
+                foot = 0.0
+            elif foot > 1 - _FOOT:
+                foot = 1.0
+            a = begin[s, 0] + foot * x - tips[nearest, 0]
+            b = begin[s, 1] + foot * y - tips[nearest, 1]
+            near = math.sqrt(a * a + b * b) < length
+        for part in range(2):
+            reach = 1 - foot if part == 1 else -foot
+            if (near and reach == 0) or (not near and part == 1):
+                continue
+            for i in range(n):
+                p, share = u[i], w[i]
+                if near:
+                    p, share = foot + reach * (u[i] * u[i]), abs(reach) * (2 * u[i] * w[i])
+                number[to], weight[to] = s, length * share
+                place[to, 0], place[to, 1] = 1 - p, p
+                to += 1
+    return number[:to], place[:to], weight[:to]
+
+
+@kernel
+def split(ends, cut, level):  # type: ignore[no-untyped-def]
+    """Parts of edges of a mesh: first parts of all, then second ones, then third ones.
+
+    Parameters
+    ----------
+    ends : (k, 2) array of int
+        Points of the edges.
+    cut : (c, k) array
+        Where each crack cuts the edge, counted from the smaller point number; nan: nowhere. Next
+        to a junction two cracks may cross one edge.
+    level : (c, k, 2) array
+        Level sets of the cracks at the ends.
+
+    Returns
+    -------
+    number : (s,) array of int
+    bary : (s, 2, 2) array
+        Vertices of the part in the edge.
+    side : (s, c) array of int
+        0 where phi changes its sign though no crack cuts.
+    """
+    cracks, k = cut.shape
+    first, second = np.empty(k), np.empty(k)
+    once, twice = 0, 0
+    for e in range(k):
+        first[e] = second[e] = np.nan
+        for c in range(cracks):
+            t = cut[c, e]
+            if np.isnan(t):
+                continue
+            if ends[e, 0] >= ends[e, 1]:
+                t = 1 - t
+            if np.isnan(first[e]):
+                first[e] = t
+            elif t > first[e]:
+                second[e] = t
+            else:
+                second[e] = first[e]
+                first[e] = t
+        once += not np.isnan(first[e])
+        twice += not np.isnan(second[e])
+    number = np.empty(k + once + twice, np.int64)
+    bary, side = np.empty((len(number), 2, 2)), np.empty((len(number), cracks), np.int64)
+    at_second, at_third = k, k + once
+    for e in range(k):
+        for part in range(3):
+            row, begin, end = e, 0.0, 1.0
+            if part == 0:
+                end = 1.0 if np.isnan(first[e]) else first[e]
+            elif part == 1:
+                if np.isnan(first[e]):
+                    break
+                row, begin = at_second, first[e]
+                end = 1.0 if np.isnan(second[e]) else second[e]
+                at_second += 1
+            else:
+                if np.isnan(second[e]):
+                    break
+                row, begin = at_third, second[e]
+                at_third += 1
+            number[row] = e
+            bary[row, 0, 0], bary[row, 0, 1] = 1 - begin, begin
+            bary[row, 1, 0], bary[row, 1, 1] = 1 - end, end
+            middle = (begin + end) / 2
+            for c in range(cracks):
+                a, b = level[c, e, 0], level[c, e, 1]
+                at, t = (1 - middle) * a + middle * b, cut[c, e]
+                if a * b < 0:
+                    # The end on the same side of the cut, which at a kink is not where phi is zero.
+                    # Ahead of a tip phi changes its sign on an edge that no crack splits.
+                    t = 1 - t if ends[e, 0] >= ends[e, 1] else t
+                    at = 0.0 if np.isnan(t) else (a if middle < t else b)
+                side[row, c] = 0 if at == 0 else (1 if at > 0 else -1)
+    return number, bary, side

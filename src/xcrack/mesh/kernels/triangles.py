@@ -1,0 +1,408 @@
+"""Closest points on triangles and segments in 3D, found in a tree of boxes."""
+
+import numpy as np
+
+from xcrack.base.kernels.jit import kernel
+
+LEAF = 4  # boxes a leaf of the tree
+
+
+@kernel
+def _sort(order, first, last, lower, upper, axis):  # type: ignore[no-untyped-def]
+    """Sort a stretch of the items by the middles of their boxes, equal ones by number (Shell).
+
+    numba's own sorts take longer to compile than all of the tree.
+    """
+    gap = 1
+    while 3 * gap + 1 < last - first:
+        gap = 3 * gap + 1
+    while gap > 0:
+        for place in range(first + gap, last):
+            item = order[place]
+            key = lower[item, axis] + upper[item, axis]
+            at = place
+            while at >= first + gap:
+                other = order[at - gap]
+                rival = lower[other, axis] + upper[other, axis]
+                if rival < key or (rival == key and other < item):
+                    break
+                order[at] = other
+                at -= gap
+            order[at] = item
+        gap //= 3
+
+
+@kernel
+def box_tree(lower, upper):  # type: ignore[no-untyped-def]
+    """Tree of boxes by halving at the median of the longest side.
+
+    Parameters
+    ----------
+    lower, upper : (k, 3) arrays
+        Corners of the boxes of the items.
+
+    Returns
+    -------
+    order : (k,) array of int
+        Items in the order of the leaves.
+    node : (q, 3) array of int
+        First child (the second one follows it; -1: a leaf), first and last place in `order`.
+    low, high : (q, 3) arrays
+        Box of each node.
+    """
+    k = len(lower)
+    order = np.arange(k)
+    node = np.empty((2 * k + 1, 3), np.int64)
+    low = np.empty((2 * k + 1, 3))
+    high = np.empty((2 * k + 1, 3))
+    node[0, 1], node[0, 2] = 0, k
+    used = 1
+    at = 0
+    while at < used:
+        first, last = node[at, 1], node[at, 2]
+        widest, axis = -1.0, 0
+        for d in range(3):
+            bottom, top = np.inf, -np.inf
+            middle_low, middle_high = np.inf, -np.inf
+            for place in range(first, last):
+                i = order[place]
+                bottom = min(bottom, lower[i, d])
+                top = max(top, upper[i, d])
+                middle = lower[i, d] + upper[i, d]
+                middle_low = min(middle_low, middle)
+                middle_high = max(middle_high, middle)
+            low[at, d], high[at, d] = bottom, top
+            if middle_high - middle_low > widest:
+                widest, axis = middle_high - middle_low, d
+        node[at, 0] = -1
+        if last - first > LEAF:
+            _sort(order, first, last, lower, upper, axis)
+            half = (first + last) // 2
+            node[at, 0] = used
+            node[used, 1], node[used, 2] = first, half
+            node[used + 1, 1], node[used + 1, 2] = half, last
+            used += 2
+        at += 1
+    return order, node[:used].copy(), low[:used].copy(), high[:used].copy()
+
+
+@kernel
+def _to_box(p, low, high):  # type: ignore[no-untyped-def]
+    """Squared distance of a point to a box."""
+    square = 0.0
+    for d in range(3):
+        gap = max(low[d] - p[d], p[d] - high[d])
+        if gap > 0.0:
+            square += gap * gap
+    return square
+
+
+@kernel
+def _on_edge(p, a, b, foot):  # type: ignore[no-untyped-def]
+    """Position in [0, 1] of the point of an edge closest to p, put into foot."""
+    along = 0.0
+    square = 0.0
+    for d in range(3):
+        along += (p[d] - a[d]) * (b[d] - a[d])
+        square += (b[d] - a[d]) * (b[d] - a[d])
+    position = along / square
+    if not position > 0.0:
+        position = 0.0
+    elif position > 1.0:
+        position = 1.0
+    for d in range(3):
+        if position == 1.0:
+            foot[d] = b[d]
+        else:
+            foot[d] = a[d] + position * (b[d] - a[d])
+    return position
+
+
+@kernel
+def _to_triangle(p, corner, normal, foot, trial):  # type: ignore[no-untyped-def]
+    """Squared distance to a triangle and the part of it that is closest; foot is filled."""
+    height = 0.0
+    for d in range(3):
+        height += (p[d] - corner[0, d]) * normal[d]
+    inside = True
+    for i in range(3):
+        j = (i + 1) % 3
+        # Sign of the area spanned by edge i j and the point, seen along the normal.
+        ex = corner[j, 0] - corner[i, 0]
+        ey = corner[j, 1] - corner[i, 1]
+        ez = corner[j, 2] - corner[i, 2]
+        gx, gy, gz = p[0] - corner[i, 0], p[1] - corner[i, 1], p[2] - corner[i, 2]
+        area = (
+            (ey * gz - ez * gy) * normal[0]
+            + (ez * gx - ex * gz) * normal[1]
+            + (ex * gy - ey * gx) * normal[2]
+        )
+        if not area > 0.0:
+            inside = False
+    if inside:
+        for d in range(3):
+            foot[d] = p[d] - height * normal[d]
+        return height * height, 0
+    best = np.inf
+    part = 0
+    for i in range(3):
+        j = (i + 1) % 3
+        position = _on_edge(p, corner[i], corner[j], trial)
+        square = 0.0
+        for d in range(3):
+            square += (p[d] - trial[d]) * (p[d] - trial[d])
+        if square < best:
+            best = square
+            for d in range(3):
+                foot[d] = trial[d]
+            if position == 0.0:
+                part = 1 + i
+            elif position == 1.0:
+                part = 1 + j
+            else:
+                part = 4 + i
+    return best, part
+
+
+@kernel
+def _descend(p, child, low, high, stack, stack_square, top):  # type: ignore[no-untyped-def]
+    """Put two children on the stack, the nearer one on top, and return the new top."""
+    one = _to_box(p, low[child], high[child])
+    two = _to_box(p, low[child + 1], high[child + 1])
+    near, other = child, child + 1
+    if two < one:
+        near, other = other, near
+        one, two = two, one
+    stack[top + 1], stack_square[top + 1] = other, two
+    stack[top + 2], stack_square[top + 2] = near, one
+    return top + 2
+
+
+@kernel
+def closest_triangle(x, corners, normal, order, node, low, high, band, tiny):  # type: ignore[no-untyped-def]
+    """Closest triangle of each point, and the part of it that is closest.
+
+    Of triangles equally far (coplanar ones that overlap, say) the one with the lowest number
+    counts.
+
+    Parameters
+    ----------
+    x : (n, 3) array
+    corners : (k, 3, 3) array
+    normal : (k, 3) array
+        Unit normals.
+    order, node, low, high : arrays
+        Tree of the boxes of the triangles, from `box_tree`.
+    band : float
+        Points farther away than this find nothing.
+    tiny : float
+        Distances that differ by less than this are equal.
+
+    Returns
+    -------
+    distance : (n,) array
+        `band` where nothing is found.
+    triangle : (n,) array of int
+        -1 where nothing is found.
+    part : (n,) array of int
+        0 the face, 1 ... 3 a corner, 4 ... 6 the edge from corner 0, 1, 2 to the next.
+    foot : (n, 3) array
+        Closest points.
+    """
+    n = len(x)
+    distance = np.empty(n)
+    triangle = np.empty(n, np.int64)
+    part = np.zeros(n, np.int64)
+    foot = np.empty((n, 3))
+    stack = np.empty(128, np.int64)
+    stack_square = np.empty(128)
+    here = np.empty(3)
+    trial = np.empty(3)
+    for i in range(n):
+        p = x[i]
+        best = band
+        reach = (best + tiny) * (best + tiny)
+        nearest = -1
+        top = 0
+        stack[0] = 0
+        stack_square[0] = _to_box(p, low[0], high[0])
+        while top >= 0:
+            at = stack[top]
+            far = stack_square[top]
+            top -= 1
+            if far > reach:
+                continue
+            child = node[at, 0]
+            if child >= 0:
+                top = _descend(p, child, low, high, stack, stack_square, top)
+                continue
+            for place in range(node[at, 1], node[at, 2]):
+                k = order[place]
+                square, which = _to_triangle(p, corners[k], normal[k], here, trial)
+                gap = np.sqrt(square)
+                if gap < best - tiny or (gap <= best + tiny and k < nearest):
+                    better = True
+                else:
+                    better = nearest < 0 and gap <= best
+                if better:
+                    best = min(best, gap)
+                    reach = (best + tiny) * (best + tiny)
+                    nearest = k
+                    distance[i] = gap
+                    part[i] = which
+                    for d in range(3):
+                        foot[i, d] = here[d]
+        triangle[i] = nearest
+        if nearest < 0:
+            distance[i] = band
+            for d in range(3):
+                foot[i, d] = p[d]
+    return distance, triangle, part, foot
+
+
+@kernel
+def closest_segment(x, start, stop, order, node, low, high, band):  # type: ignore[no-untyped-def]
+    """Closest segment of each point; of two equally far the one with the lower number.
+
+    Parameters
+    ----------
+    x : (n, 3) array
+    start, stop : (k, 3) arrays
+        Ends of the segments.
+    order, node, low, high : arrays
+        Tree of the boxes of the segments, from `box_tree`.
+    band : float
+        Points farther away than this find nothing.
+
+    Returns
+    -------
+    distance : (n,) array
+        `band` where nothing is found.
+    segment : (n,) array of int
+        -1 where nothing is found.
+    position : (n,) array
+        Place of the closest point along the segment, in [0, 1].
+    """
+    n = len(x)
+    distance = np.empty(n)
+    segment = np.empty(n, np.int64)
+    position = np.zeros(n)
+    stack = np.empty(128, np.int64)
+    stack_square = np.empty(128)
+    foot = np.empty(3)
+    for i in range(n):
+        p = x[i]
+        best = band * band
+        nearest = -1
+        top = 0
+        stack[0] = 0
+        stack_square[0] = _to_box(p, low[0], high[0])
+        while top >= 0:
+            at = stack[top]
+            far = stack_square[top]
+            top -= 1
+            if far > best:
+                continue
+            child = node[at, 0]
+            if child >= 0:
+                top = _descend(p, child, low, high, stack, stack_square, top)
+                continue
+            for place in range(node[at, 1], node[at, 2]):
+                k = order[place]
+                along = _on_edge(p, start[k], stop[k], foot)
+                square = 0.0
+                for d in range(3):
+                    square += (p[d] - foot[d]) * (p[d] - foot[d])
+                if square < best or (square == best and (nearest < 0 or k < nearest)):
+                    best = square
+                    nearest = k
+                    position[i] = along
+        segment[i] = nearest
+        distance[i] = np.sqrt(best) if nearest >= 0 else band
+    return distance, segment, position
+
+
+@kernel
+def crossed_triangle(start, stop, corners, normal, order, node, low, high):  # type: ignore[no-untyped-def]
+    """First triangle that each segment crosses; a triangle's sides belong to it.
+
+    A segment in the plane of a triangle crosses nothing.
+
+    Parameters
+    ----------
+    start, stop : (n, 3) arrays
+        Ends of the segments.
+    corners : (k, 3, 3) array
+    normal : (k, 3) array
+        Unit normals.
+    order, node, low, high : arrays
+        Tree of the boxes of the triangles, from `box_tree`.
+
+    Returns
+    -------
+    triangle : (n,) array of int
+        -1 where none is crossed.
+    position : (n,) array
+        Place of the crossing along the segment, in [0, 1].
+    """
+    n = len(start)
+    triangle = np.full(n, -1)
+    position = np.zeros(n)
+    stack = np.empty(128, np.int64)
+    point = np.empty(3)
+    for i in range(n):
+        best = np.inf
+        top = 0
+        stack[0] = 0
+        while top >= 0:
+            at = stack[top]
+            top -= 1
+            apart = False
+            for d in range(3):
+                if (
+                    min(start[i, d], stop[i, d]) > high[at, d]
+                    or max(start[i, d], stop[i, d]) < low[at, d]
+                ):
+                    apart = True
+            if apart:
+                continue
+            child = node[at, 0]
+            if child >= 0:
+                stack[top + 1] = child
+                stack[top + 2] = child + 1
+                top += 2
+                continue
+            for place in range(node[at, 1], node[at, 2]):
+                k = order[place]
+                before, after = 0.0, 0.0
+                for d in range(3):
+                    before += (start[i, d] - corners[k, 0, d]) * normal[k, d]
+                    after += (stop[i, d] - corners[k, 0, d]) * normal[k, d]
+                if before * after > 0.0 or before == after:
+                    continue
+                share = before / (before - after)
+                if share >= best:
+                    continue
+                for d in range(3):
+                    point[d] = start[i, d] + share * (stop[i, d] - start[i, d])
+                inside = True
+                for a in range(3):
+                    b = (a + 1) % 3
+                    ex = corners[k, b, 0] - corners[k, a, 0]
+                    ey = corners[k, b, 1] - corners[k, a, 1]
+                    ez = corners[k, b, 2] - corners[k, a, 2]
+                    gx = point[0] - corners[k, a, 0]
+                    gy = point[1] - corners[k, a, 1]
+                    gz = point[2] - corners[k, a, 2]
+                    area = (
+                        (ey * gz - ez * gy) * normal[k, 0]
+                        + (ez * gx - ex * gz) * normal[k, 1]
+                        + (ex * gy - ey * gx) * normal[k, 2]
+                    )
+                    if area < -1e-12 * (ex * ex + ey * ey + ez * ez):
+                        inside = False
+                if inside:
+                    best = share
+                    triangle[i] = k
+                    position[i] = share
+    return triangle, position

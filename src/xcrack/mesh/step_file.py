@@ -1,0 +1,252 @@
+"""Bodies from CAD: a STEP file meshed by gmsh, with sets of its faces."""
+
+import os
+import subprocess
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from math import log10
+from os import PathLike
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+from xcrack.base.arrays import Bools, Floats
+from xcrack.base.checks import called, shown, whole_numbers
+from xcrack.base.errors import GeometryError, MeshError
+from xcrack.base.paths import path_of, system_errors
+from xcrack.mesh.gmsh_session import length_of, session
+from xcrack.mesh.mesh import Mesh, sound_mesh
+
+Selector = Callable[[Floats], Any] | Sequence[int]
+_MOST_POINTS = 5_000_000
+_PLANE = 1e-7  # share of the size of a shape within which it lies in a plane z = constant
+
+
+def mesh_step(
+    path: str | PathLike[str],
+    *,
+    size: float | Callable[[Floats], Any],
+    sets: Mapping[str, Selector] | None = None,
+) -> Mesh:
+    """Mesh the body in a STEP file with gmsh: tetrahedra, or triangles for a plane sheet.
+
+    Parts that touch are joined. Faces that do not close are sewn where they meet; faces in a plane
+    z = constant are a 2D body.
+
+    Parameters
+    ----------
+    path : path
+        The file, ``.step`` or ``.stp``.
+    size : float or callable, length
+        Cell size, or f(x) -> (n,) for points x (n, 3).
+    sets : mapping of name to selector, optional
+        A selector is f(x) -> (n,) bool for points x (n, 3): a face of the shape (in 2D: an edge)
+        belongs to the set if all mesh points on it do. Or the numbers that gmsh gives to the faces.
+
+    Returns
+    -------
+    Mesh
+        In the unit of the file's writer as gmsh takes it, which is mm unless told otherwise.
+
+    Raises
+    ------
+    XcrackError
+        The file is missing, or gmsh is.
+    GeometryError
+        A damaged file, no closed body in it, a selector without a face or with other values than
+        bools, a size that is not positive, or so small that millions of points would be needed.
+    MeshError
+        gmsh cannot mesh the shape.
+    """
+    path = path_of(path, "mesh_step: path")
+    with system_errors("cannot read the STEP file", path):
+        head = path.read_bytes()[:1000]
+    if b"ISO-10303-21" not in head:
+        raise GeometryError(
+            f"{path.name} is no STEP file (it does not begin with ISO-10303-21): export the part "
+            "as STEP AP203, AP214 or AP242."
+        )
+    size_at = size if callable(size) else length_of(size, "size")
+    if sets is not None and not isinstance(sets, Mapping):
+        raise GeometryError(
+            "mesh_step: sets must be a dict of names and selectors, such as sets={'hole': lambda "
+            f"x: np.hypot(x[:, 0], x[:, 1]) < 5.01}}, not {type(sets).__name__}."
+        )
+    _check_reading(path)
+    with session() as gmsh:
+        dim = _shape(gmsh, path)
+        if not callable(size_at):
+            _check_cost(gmsh, dim, size_at)
+        failures = _set_size(gmsh, size_at)
+        try:
+            gmsh.model.mesh.generate(dim)
+        except Exception as error:  # gmsh has no other class
+            if failures:
+                raise failures[0] from None
+            raise MeshError(
+                f"gmsh cannot mesh {path.name} ({error}): take a smaller size, or remove slivers "
+                "and gaps between faces in the CAD program."
+            ) from error
+        if failures:
+            raise failures[0]
+        return _mesh(gmsh, dim, path.name, sets or {})
+
+
+def _check_reading(path: Path) -> None:
+    """Raise where gmsh dies while it reads a file: a process of its own tries that first."""
+    if not sys.executable:  # Python within another program
+        return
+    code = (
+        "import pathlib, sys; from xcrack.mesh.step_file import _try; "
+        "_try(pathlib.Path(sys.argv[1]))"
+    )
+    run = subprocess.run(
+        [sys.executable, "-P", "-c", code, str(path)],
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
+        capture_output=True,
+        check=False,
+    )
+    if run.returncode not in (0, 1):  # 1: an error in Python, which is raised again here
+        raise GeometryError(
+            f"gmsh dies while it reads {path.name} (exit status {run.returncode}): the file is "
+            "damaged. Export the part anew as STEP AP203, AP214 or AP242."
+        )
+
+
+def _try(path: Path) -> None:
+    with session() as gmsh:
+        _shape(gmsh, path)
+
+
+def _shape(gmsh: ModuleType, path: Path) -> int:
+    """Load the shape, make one conforming body of it, and return its dimension."""
+    occ = gmsh.model.occ
+    try:
+        entities = occ.importShapes(str(path))
+    except Exception as error:  # gmsh has no other class
+        raise GeometryError(f"gmsh cannot read {path.name} ({error}): export it anew.") from error
+    occ.synchronize()
+    if not gmsh.model.getEntities(3):
+        box = np.array(gmsh.model.getBoundingBox(-1, -1)) if entities else np.zeros(6)
+        extent = box[3:] - box[:3]
+        if gmsh.model.getEntities(2) and extent[2] <= _PLANE * extent.max():
+            return _joined(gmsh, 2)
+        n_faces = len(gmsh.model.getEntities(2))
+        occ.healShapes(sewFaces=True, makeSolids=True)
+        occ.synchronize()
+        if not gmsh.model.getEntities(3):
+            raise GeometryError(
+                f"{path.name} has no closed body: its {n_faces} faces do not enclose a volume. "
+                "Close the gaps in the CAD program and export the part as a solid."
+            )
+    return _joined(gmsh, 3)
+
+
+def _check_cost(gmsh: ModuleType, dim: int, size: float) -> None:
+    """Raise where a size asks for more points than any machine meshes."""
+    content = sum(gmsh.model.occ.getMass(dim, tag) for _, tag in gmsh.model.getEntities(dim))
+    if content > 0 and log10(content) - dim * log10(size) > log10(_MOST_POINTS):
+        raise GeometryError(
+            f"mesh_step: size = {size:g} asks for more than {_MOST_POINTS:.0e} points: enlarge it, "
+            "or give a function that is small only where cracks run."
+        )
+
+
+def _joined(gmsh: ModuleType, dim: int) -> int:
+    """Join touching parts so that their meshes share points."""
+    occ = gmsh.model.occ
+    occ.synchronize()
+    parts = gmsh.model.getEntities(dim)
+    if len(parts) > 1:
+        occ.fragment(parts[:1], parts[1:])
+        occ.synchronize()
+    if any(occ.getMass(3, tag) <= 0 for _, tag in gmsh.model.getEntities(3)):
+        raise GeometryError(
+            "a solid of the STEP file has no volume: its faces do not close, or are turned inside "
+            "out. Mend it in the CAD program."
+        )
+    return dim
+
+
+def _set_size(gmsh: ModuleType, size: float | Callable[[Floats], Any]) -> list[BaseException]:
+    """Tell gmsh the cell size; errors of the user's function gather in the list returned."""
+    failures: list[BaseException] = []
+    if not callable(size):
+        gmsh.option.setNumber("Mesh.MeshSizeMax", size)
+        return failures
+
+    def at(_dim: int, _tag: int, x: float, y: float, z: float, _size: float) -> float:
+        # gmsh asks point by point, and an error raised here would be lost in its code.
+        if not failures:
+            try:
+                value = np.ravel(called(size, "size", np.array([[x, y, z]])))
+                return length_of(
+                    value.tolist()[0] if len(value) == 1 else value, f"size at {[x, y, z]}"
+                )
+            except BaseException as error:
+                failures.append(error)
+        return 1e22
+
+    gmsh.model.mesh.setSizeCallback(at)
+    return failures
+
+
+def _mesh(gmsh: ModuleType, dim: int, source: str, sets: Mapping[str, Selector]) -> Mesh:
+    tags, xyz, _ = gmsh.model.mesh.getNodes()
+    number = np.zeros(int(tags.max()) + 1, dtype=np.int64)
+    number[tags.astype(np.int64)] = np.arange(len(tags))
+    points = xyz.reshape(-1, 3)
+
+    def elements(of_dim: int, tag: int = -1) -> Any:
+        kind = {1: 1, 2: 2, 3: 4}[of_dim]
+        _, nodes = gmsh.model.mesh.getElementsByType(kind, tag)
+        return number[nodes.astype(np.int64)].reshape(-1, of_dim + 1)
+
+    cells = elements(dim)
+    if not len(cells):
+        raise MeshError(f"gmsh made no cells of {source}: take a smaller size.")
+    faces = {tag: elements(dim - 1, tag) for _, tag in gmsh.model.getEntities(dim - 1)}
+    used = np.unique(cells)
+    new = np.full(len(points), -1, dtype=np.int64)
+    new[used] = np.arange(len(used))
+    facet_sets = {}
+    for name, selector in sets.items():
+        members = [tag for tag in faces if len(faces[tag])]
+        if callable(selector):
+            members = [tag for tag in members if _selected(selector, points, faces[tag], name)]
+        else:
+            asked = whole_numbers(selector, f"sets[{name!r}]", (None,), error=GeometryError)
+            unknown = sorted(set(asked.tolist()) - set(members))
+            if unknown:
+                raise GeometryError(
+                    f"sets[{name!r}]: {source} has no faces {unknown}: give some of {members}."
+                )
+            members = asked.tolist()
+        if not members:
+            centres = [np.round(points[f].mean(axis=(0, 1)), 4).tolist() for f in faces.values()]
+            raise GeometryError(
+                f"sets[{name!r}] selects none of the {len(faces)} faces of {source}, whose points "
+                f"have their middles at {centres[:12]}: choose all points of a face."
+            )
+        facet_sets[name] = new[np.concatenate([faces[tag] for tag in members])]
+    return sound_mesh(points[used][:, :dim], new[cells], facet_sets)
+
+
+def _selected(selector: Callable[[Floats], Any], points: Floats, face: Any, name: str) -> bool:
+    x = points[np.unique(face)]
+    result = called(selector, f"sets[{name!r}]", x)
+    try:
+        inside = np.asarray(result)
+    except Exception as error:  # ragged rows, or what an object's own __array__ raises
+        raise GeometryError(
+            f"sets[{name!r}] returned {shown(result)}: return one bool for each point."
+        ) from error
+    if inside.shape != (len(x),) or inside.dtype != bool:
+        raise GeometryError(
+            f"sets[{name!r}] returned shape {inside.shape} of {inside.dtype} for {len(x)} points: "
+            "return one bool for each."
+        )
+    chosen: Bools = inside
+    return bool(chosen.all())

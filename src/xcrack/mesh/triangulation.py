@@ -1,0 +1,197 @@
+"""Triangulated surfaces in 3D as arrays: normals, sides, boundary loops, refinement."""
+
+import numpy as np
+
+from xcrack.base.arrays import Bools, Floats, Ints
+
+
+def unit(vector: Floats) -> Floats:
+    """Vectors `(..., d)` divided by their length."""
+    return np.asarray(vector / np.linalg.norm(vector, axis=-1, keepdims=True))
+
+
+def face_vectors(points: Floats, faces: Ints) -> Floats:
+    """Right-hand normals of length 2 area `(f, 3)`."""
+    corner = points[faces]
+    return np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+
+
+def face_normals(points: Floats, faces: Ints) -> Floats:
+    """Right-hand unit normals `(f, 3)`; zero for a face without area."""
+    vector = face_vectors(points, faces)
+    length = np.linalg.norm(vector, axis=1, keepdims=True)
+    return np.asarray(vector / np.where(length > 0, length, 1.0))
+
+
+def face_areas(points: Floats, faces: Ints) -> Floats:
+    """Areas of the faces `(f,)`."""
+    return np.asarray(np.linalg.norm(face_vectors(points, faces), axis=1) / 2)
+
+
+def sides(faces: Ints) -> Ints:
+    """Sides of every face in its own direction, `(f, 3, 2)`: 0-1, 1-2, 2-0."""
+    return np.asarray(np.stack([faces, np.roll(faces, -1, axis=1)], axis=2))
+
+
+def side_keys(faces: Ints) -> Ints:
+    """One number a side, the same from both faces `(f, 3)`."""
+    pairs = np.sort(sides(faces), axis=2)
+    return np.asarray(pairs[..., 0] * (int(faces.max(initial=0)) + 1) + pairs[..., 1])
+
+
+def on_rim(faces: Ints) -> Bools:
+    """Which sides of the faces are boundary `(f, 3)`."""
+    _, inverse, count = np.unique(side_keys(faces), return_inverse=True, return_counts=True)
+    return np.asarray(count[inverse.reshape(-1, 3)] == 1)
+
+
+def rim(faces: Ints) -> tuple[Ints, Ints]:
+    """Boundary sides in the direction of their faces `(k, 2)`, and these faces `(k,)`."""
+    alone = on_rim(faces)
+    return sides(faces)[alone], np.nonzero(alone)[0]
+
+
+def loops(faces: Ints) -> list[Ints]:
+    """Boundary loops against the direction of the faces, the first point not repeated.
+
+    This is the direction of b = t x n where t points out of the surface. A loop starts at its
+    lowest point number.
+    """
+    edges, _ = rim(faces)
+    follower = {int(b): int(a) for a, b in edges}
+    result = []
+    while follower:
+        start = min(follower)
+        loop = [start]
+        current = follower.pop(start)
+        while current != start:
+            loop.append(current)
+            current = follower.pop(current)
+        result.append(np.array(loop, dtype=np.int64))
+    return result
+
+
+def ruled(
+    n_points: int, base: Ints, origin: Floats, offset: Floats, layers: int, closed: bool
+) -> tuple[Floats, Ints]:
+    """Strip of triangles on one side of a polyline, spanned by a ray from each of its points.
+
+    Parameters
+    ----------
+    n_points : int
+        Number that the first new point gets.
+    base : (m,) array of int
+        Point numbers of the polyline in the direction of a front; a repeated one makes a fan.
+    origin, offset : (m, 3) arrays, length
+        Points of the polyline and the rays; a ray of zero length adds no points.
+    layers : int
+        Rows of triangles.
+    closed : bool
+        Whether the last ray is joined with the first.
+
+    Returns
+    -------
+    points : (q, 3) array, length
+        New points.
+    faces : (k, 3) array of int
+        Oriented like a surface whose front the polyline is.
+    """
+    grid = np.repeat(base[:, None], layers + 1, axis=1)
+    long = np.nonzero(np.abs(offset).max(axis=1) > 0)[0]
+    share = np.arange(1, layers + 1) / layers
+    grid[long, 1:] = n_points + np.arange(len(long) * layers).reshape(-1, layers)
+    points = origin[long, None] + share[:, None] * offset[long, None]
+    first = grid if closed else grid[:-1]
+    second = np.roll(grid, -1, axis=0) if closed else grid[1:]
+    a, b, c, d = first[:, :-1], second[:, :-1], second[:, 1:], first[:, 1:]
+    faces = np.stack([np.stack([a, b, c], axis=-1), np.stack([a, c, d], axis=-1)], axis=2)
+    faces = faces.reshape(-1, 3)
+    real = (faces != np.roll(faces, 1, axis=1)).all(axis=1)
+    return points.reshape(-1, 3), faces[real]
+
+
+def split_sides(points: Floats, faces: Ints, marked: Bools) -> tuple[Floats, Ints]:
+    """Halve the marked sides `(f, 3)` and what must go with them, without hanging points.
+
+    A face is cut through its longest side first (Rivara, 1984), so that angles stay bounded.
+    """
+    key, inverse = np.unique(side_keys(faces), return_inverse=True)
+    inverse = inverse.reshape(-1, 3)
+    pairs = np.zeros((len(key), 2), dtype=np.int64)
+    pairs[inverse.ravel()] = np.sort(sides(faces), axis=2).reshape(-1, 2)
+    length = np.linalg.norm(points[pairs[:, 1]] - points[pairs[:, 0]], axis=1)
+    longest = np.argmax(length[inverse] * (1 - 1e-12 * np.arange(3)), axis=1)
+    longest_side = inverse[np.arange(len(faces)), longest]
+    cut = np.zeros(len(key), dtype=bool)
+    cut[inverse[marked]] = True
+    while True:
+        pulled = cut[inverse].any(axis=1) & ~cut[longest_side]
+        if not pulled.any():
+            break
+        cut[longest_side[pulled]] = True
+    number = np.full(len(key), -1)
+    number[cut] = len(points) + np.arange(int(cut.sum()))
+    middle = (points[pairs[cut, 0]] + points[pairs[cut, 1]]) / 2
+    # Turned so that the longest side is the first one of every face.
+    column = (longest[:, None] + np.arange(3)) % 3
+    corner = np.take_along_axis(faces, column, axis=1)
+    centre = number[np.take_along_axis(inverse, column, axis=1)]
+    (a, b, c), (ab, bc, ca) = corner.T, centre.T
+    whole, two, three = ab < 0, bc >= 0, ca >= 0
+    parts = [
+        faces[whole],
+        np.stack([b, c, ab], axis=1)[~whole & ~two],
+        np.stack([b, bc, ab], axis=1)[~whole & two],
+        np.stack([bc, c, ab], axis=1)[~whole & two],
+        np.stack([c, a, ab], axis=1)[~whole & ~three],
+        np.stack([c, ca, ab], axis=1)[~whole & three],
+        np.stack([ca, a, ab], axis=1)[~whole & three],
+    ]
+    return np.concatenate([points, middle]), np.concatenate(parts)
+
+
+def components(faces: Ints) -> Ints:
+    """Number of the connected piece of each face `(f,)`, joined by common sides."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    _, inverse = np.unique(side_keys(faces), return_inverse=True)
+    flat = inverse.ravel()
+    face = np.repeat(np.arange(len(faces)), 3)
+    order = np.argsort(flat, kind="stable")
+    same = flat[order][1:] == flat[order][:-1]
+    one, other = face[order][:-1][same], face[order][1:][same]
+    graph = coo_array((np.ones(len(one)), (one, other)), shape=(len(faces),) * 2)
+    return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
+
+
+def oriented(faces: Ints) -> Ints | None:
+    """Faces turned so that neighbours agree, the first of each piece as it is; None: one-sided."""
+    _, inverse = np.unique(side_keys(faces), return_inverse=True)
+    flat = inverse.ravel()
+    pairs = sides(faces).reshape(-1, 2)
+    forward = pairs[:, 0] < pairs[:, 1]
+    order = np.argsort(flat, kind="stable")
+    same = flat[order][1:] == flat[order][:-1]
+    one, other = order[:-1][same], order[1:][same]
+    differ = forward[one] == forward[other]
+    neighbours: list[list[tuple[int, bool]]] = [[] for _ in faces]
+    for i, j, turn in zip(one // 3, other // 3, differ, strict=True):
+        neighbours[i].append((int(j), bool(turn)))
+        neighbours[j].append((int(i), bool(turn)))
+    turned = np.full(len(faces), -1)
+    for start in range(len(faces)):
+        if turned[start] >= 0:
+            continue
+        turned[start] = 0
+        queue = [start]
+        while queue:
+            i = queue.pop()
+            for j, turn in neighbours[i]:
+                wanted = int(turned[i]) ^ int(turn)
+                if turned[j] < 0:
+                    turned[j] = wanted
+                    queue.append(j)
+                elif turned[j] != wanted:
+                    return None
+    return np.where(turned[:, None] == 1, faces[:, ::-1], faces)

@@ -1,0 +1,1 @@
+"""What a user states: material, loads, supports, choices of method, and the problem."""

@@ -1,0 +1,1 @@
+"""Solutions as pieces that are written, drawn and compared."""

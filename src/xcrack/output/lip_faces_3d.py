@@ -1,0 +1,200 @@
+"""Faces of a 3D crack as triangles that share their vertices, with the fields on them."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from xcrack.analysis.solution import Solution
+from xcrack.base.arrays import Bools, Floats, Ints, lock
+from xcrack.fem.quadrature import lip_side
+from xcrack.mesh.triangulation import rim
+
+_SAME = 1e-9  # share of a cell within which vertices are one, or lie on a front
+
+
+@dataclass(frozen=True, eq=False)
+class LipFaces:
+    """Faces of one crack in 3D.
+
+    Attributes
+    ----------
+    points : (n, 3) array, length
+        Vertices, each once.
+    triangles : (t, 3) array of int
+        Turning by the right hand around the normal from lip - to lip +.
+    normal : (n, 3) array
+    pressure : (n,) array, stress
+        Of contact, 0 without; at each vertex the mean of the triangles there, weighted by area.
+    minus, plus : (n, 3) arrays, length
+        Displacement of each lip.
+    area : (t,) array, length²
+    mean_pressure, mean_gap : (t,) arrays
+        Means over each triangle.
+    closed : (t,) array
+        Share of each triangle on which the crack faces touch.
+    front : (k, 2) array of int
+        Edges on the fronts.
+    mouth : (m, 2) array of int
+        The other edges with one triangle: where the crack leaves the body.
+    """
+
+    points: Floats
+    triangles: Ints
+    normal: Floats
+    pressure: Floats
+    minus: Floats
+    plus: Floats
+    area: Floats
+    mean_pressure: Floats
+    mean_gap: Floats
+    closed: Floats
+    front: Ints
+    mouth: Ints
+
+    @property
+    def jump(self) -> Floats:
+        """Displacement of lip + minus that of lip - `(n, 3)`, length."""
+        return self.plus - self.minus
+
+    @property
+    def gap(self) -> Floats:
+        """Normal opening `(n,)`, length."""
+        return np.einsum("nd,nd->n", self.jump, self.normal)
+
+    @property
+    def sliding(self) -> Floats:
+        """Length of the tangential jump `(n,)`, length."""
+        along = self.jump - self.gap[:, None] * self.normal
+        return np.asarray(np.linalg.norm(along, axis=1))
+
+
+def lip_faces(solution: Solution, crack: int) -> LipFaces:
+    """Triangles of the faces of a 3D crack, and the fields on them.
+
+    Parameters
+    ----------
+    solution : Solution
+    crack : int
+
+    Returns
+    -------
+    LipFaces
+    """
+    space, lips = solution.space, solution.lips[crack]
+    cut, mesh = space.cuts[crack], space.mesh
+    corners = cut.lip_points(mesh)
+    turned = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    area = np.linalg.norm(turned, axis=1) / 2
+    over = np.einsum("td,td->t", turned, cut.lip_normal) < 0
+    number = _merged(corners.reshape(-1, 3), _SAME * float(mesh.cell_size.min()))
+    n = int(number.max(initial=-1)) + 1
+    one = np.zeros(n, dtype=np.int64)
+    one[number] = np.arange(len(number))
+    triangles = number.reshape(-1, 3)
+    triangles = np.where(over[:, None], triangles[:, [0, 2, 1]], triangles)
+    owner, vertex = one // 3, one % 3
+    moved = []
+    for k in (0, 1):
+        cell, bary = cut.lip_cell[owner, k], cut.lip_bary[owner, k, vertex]
+        with np.errstate(divide="ignore", invalid="ignore"):  # gradients at a front, not looked at
+            side = lip_side(space, crack, cell, bary, 2 * k - 1)
+            moved.append(solution.at(cell, bary, side)[0])
+
+    weight = np.maximum(np.bincount(lips.segment, lips.weight, len(area)), 1e-300)
+
+    def mean(values: Floats) -> Floats:
+        return lock(np.bincount(lips.segment, lips.weight * values, len(area)) / weight)
+
+    contact = solution.contact[crack]
+    nothing = np.zeros(len(lips))
+    pressure = nothing if contact is None else contact.pressure
+    share = np.repeat(area, 3)
+    around = np.maximum(np.bincount(number, share, n), 1e-300)
+    normal = np.stack(
+        [np.bincount(number, share * np.repeat(v, 3), n) for v in cut.lip_normal.T], axis=1
+    )
+    at_corner = _at_corners(solution, crack, pressure)
+    edges, row = rim(triangles)
+    on_front = _on_front(solution, crack, one)
+    ahead = on_front[edges].all(axis=1) & (area[row] > 0)
+    return LipFaces(
+        points=lock(corners.reshape(-1, 3)[one]),
+        triangles=lock(triangles),
+        normal=lock(normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)),
+        pressure=lock(np.bincount(number, share * at_corner.ravel(), n) / around),
+        minus=lock(moved[0]),
+        plus=lock(moved[1]),
+        area=lock(area),
+        mean_pressure=mean(pressure),
+        mean_gap=mean(solution.opening(crack) if contact is None else contact.gap),
+        closed=mean(nothing if contact is None else contact.closed.astype(float)),
+        front=lock(edges[ahead]),
+        mouth=lock(edges[~ahead]),
+    )
+
+
+def _merged(x: Floats, distance: float) -> Ints:
+    """Number of the place of each point: those closer than a distance share it."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    pairs = cKDTree(x).query_pairs(distance, output_type="ndarray")
+    n = len(x)
+    links = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(n, n))
+    _, group = connected_components(links, directed=False)
+    return np.asarray(group, dtype=np.int64)
+
+
+def _at_corners(solution: Solution, crack: int, values: Floats) -> Floats:
+    """Values at the vertices of the triangles `(t, 3)`: the best linear fit in each of them.
+
+    Pressures are linear in a cell, so that the fit is exact where a triangle is not tiny.
+    """
+    cut, lips = solution.space.cuts[crack], solution.lips[crack]
+    corners = cut.lip_points(solution.space.mesh)
+    place = _in_triangles(corners[lips.segment], lips.x)
+    t = len(corners)
+    mass, right = np.zeros((t, 3, 3)), np.zeros((t, 3))
+    weight = lips.weight / np.maximum(
+        np.bincount(lips.segment, lips.weight, t)[lips.segment], 1e-300
+    )
+    np.add.at(mass, lips.segment, weight[:, None, None] * place[:, :, None] * place[:, None])
+    np.add.at(right, lips.segment, (weight * values)[:, None] * place)
+    # A rule with few points, or a triangle that is nearly a line, would leave the fit open.
+    mean = right.sum(axis=1) / np.maximum(mass.sum(axis=(1, 2)), 1e-300)
+    small = 1e-9 * np.eye(3)
+    fit = np.linalg.solve(mass + small, (right + 1e-9 * mean[:, None])[..., None])[..., 0]
+    low = np.full(t, np.inf)
+    high = np.full(t, -np.inf)
+    np.minimum.at(low, lips.segment, values)
+    np.maximum.at(high, lips.segment, values)
+    reach = (high - low)[:, None]
+    inside = np.clip(fit, low[:, None] - reach, high[:, None] + reach)
+    return np.where(np.isfinite(inside), inside, mean[:, None])
+
+
+def _in_triangles(corners: Floats, x: Floats) -> Floats:
+    """Barycentric coordinates `(q, 3)` of points in the planes of triangles `(q, 3, 3)`."""
+    a, b = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    normal = np.cross(a, b)
+    square = np.maximum(np.einsum("qd,qd->q", normal, normal), 1e-300)
+    y = x - corners[:, 0]
+    second = np.einsum("qd,qd->q", np.cross(y, b), normal) / square
+    third = np.einsum("qd,qd->q", np.cross(a, y), normal) / square
+    return np.stack([1 - second - third, second, third], axis=1)
+
+
+def _on_front(solution: Solution, crack: int, one: Ints) -> Bools:
+    """Which vertices lie on a front; `one` are their places in the list of all corners."""
+    cut, mesh = solution.space.cuts[crack], solution.space.mesh
+    cell = cut.lip_cell[one // 3, 1]
+    bary = cut.lip_bary[one // 3, 1, one % 3]
+    flag = np.zeros(len(one), dtype=bool)
+    for psi in cut.level_set.psi:
+        at = np.einsum("qb,qb->q", bary, psi[mesh.cells[cell]])
+        flag |= np.abs(at) < 1e-8 * mesh.cell_size[cell]
+    return flag
+
+
+__all__ = ["LipFaces", "lip_faces"]

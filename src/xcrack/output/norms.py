@@ -1,0 +1,65 @@
+"""Errors of a solution against a known field."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from xcrack.analysis.solution import Solution
+from xcrack.base.arrays import Floats
+from xcrack.base.checks import called, numbers, shown
+from xcrack.base.errors import ProblemError
+from xcrack.fem.loads import position
+from xcrack.fem.quadrature import cell_points
+
+_CHUNK = 20_000  # cells integrated at once; bounds the memory
+
+
+def energy_error(solution: Solution, stress: Callable[[Floats], Floats]) -> float:
+    """Relative error in the energy norm, integrated on the cut sub-cells.
+
+    Parameters
+    ----------
+    solution : Solution
+    stress : callable
+        f(x) -> (n, d, d), the exact stress at points (n, d).
+
+    Returns
+    -------
+    float
+        sqrt(int (sigma - sigma_h) : C^-1 : (sigma - sigma_h)) / sqrt(int sigma : C^-1 : sigma).
+
+    Raises
+    ------
+    ProblemError
+        Not a solution, not a function, values of another shape or not finite, or an exact stress
+        that is zero everywhere.
+    """
+    if not isinstance(solution, Solution):
+        raise ProblemError(
+            f"energy_error: give a Solution as solve returns it, not {type(solution).__name__}."
+        )
+    if not callable(stress):
+        raise ProblemError(
+            f"energy_error: stress = {shown(stress)} cannot be called: give a function f(x) of "
+            "points (n, d) that returns (n, d, d)."
+        )
+    space, material = solution.space, solution.problem.material
+    error = total = 0.0
+    for first in range(0, len(space.mesh.cells), _CHUNK):
+        cells = np.arange(first, min(first + _CHUNK, len(space.mesh.cells)))
+        points = cell_points(space, cells, 8, 2 * space.order + 2)
+        x = position(space, points.cell, points.bary)
+        result = called(stress, "the exact stress of energy_error", x)
+        exact = numbers(result, "energy_error: the stress at points (n, d)", (*x.shape, x.shape[1]))
+        difference = exact - solution.stress_at(points.cell, points.bary, points.side)
+        error += _energy(material.strain(difference), difference, points.weight)
+        total += _energy(material.strain(exact), exact, points.weight)
+    if not total > 0:
+        raise ProblemError(
+            "energy_error: the exact stress is zero everywhere, so there is no relative error."
+        )
+    return float(np.sqrt(error / total))
+
+
+def _energy(strain: Floats, stress: Floats, weight: Floats) -> float:
+    return float(np.einsum("q,qij,qij->", weight, strain, stress))

@@ -1,1 +1,0 @@
-"""Solutions as pieces that can be drawn, written and compared."""

@@ -1,0 +1,576 @@
+"""Run a case for many parameters, and keep what became of each."""
+
+import contextlib
+import hashlib
+import json
+import multiprocessing
+import queue
+import time
+import traceback
+import warnings
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from functools import partial
+from itertools import product
+from numbers import Real
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xcrack.base.checks import flag, shown, whole
+from xcrack.base.errors import ProblemError, XcrackError, warn
+from xcrack.base.paths import path_of, system_errors, written_whole
+from xcrack.growth.description import describe, differences
+from xcrack.runs.history import History
+from xcrack.runs.lock import locked
+
+# One case of a campaign: run, and what became of it as a row that can be stored.
+
+Parameters = Mapping[str, Any]
+
+COLUMNS = ("error", "seconds")
+"""Columns of the table of a study that no parameter and no result may be named like."""
+
+
+def key_of(parameters: Parameters) -> str:
+    """Name of a case: the same for the same parameters, whatever their order."""
+    return hashlib.sha256(json.dumps(parameters, sort_keys=True).encode()).hexdigest()[:16]
+
+
+def checked(parameters: Any, number: int) -> dict[str, Any]:
+    """Parameters of a case as values that a file can hold.
+
+    Raises
+    ------
+    ProblemError
+        No mapping of names to finite numbers, texts, flags or None, or a name of `COLUMNS`.
+    """
+    if not isinstance(parameters, Mapping):
+        raise ProblemError(
+            f"campaign: cases[{number}] = {shown(parameters)}: give a dict of the arguments "
+            "of a case."
+        )
+    result: dict[str, Any] = {}
+    for name, given in parameters.items():
+        value = given.item() if isinstance(given, np.generic) else given
+        if name in COLUMNS:
+            raise ProblemError(
+                f"campaign: cases[{number}] has a parameter {name!r}, which is a column of the "
+                "table: give it another name."
+            )
+        fits = value is None or isinstance(value, bool | str)
+        fits = fits or (isinstance(value, int | float) and bool(np.isfinite(value)))
+        if not isinstance(name, str) or not fits:
+            raise ProblemError(
+                f"campaign: cases[{number}][{name!r:.40}] = {shown(given)}: give names, and finite "
+                "numbers, texts, True, False or None; make meshes and laws within the case."
+            )
+        result[name] = value
+    return result
+
+
+def run_case(case: Callable[..., Any], parameters: dict[str, Any]) -> dict[str, Any]:
+    """Run one case; what it raises becomes part of its row.
+
+    Returns
+    -------
+    dict
+        parameters, result (numbers and texts by name), error, kind, trace, warnings, seconds of the
+        processor.
+    """
+    begin = time.process_time()
+    row: dict[str, Any] = {"parameters": parameters, "result": {}, "error": "", "kind": ""}
+    row["trace"] = ""
+    with warnings.catch_warnings(record=True) as seen:
+        warnings.simplefilter("always")
+        try:
+            row["result"] = _numbers(case(**parameters), parameters)
+        except XcrackError as error:
+            row["error"], row["kind"] = str(error), type(error).__name__
+        except Exception as error:
+            row["error"], row["kind"] = str(error) or repr(error), type(error).__name__
+            row["trace"] = traceback.format_exc()
+    row["warnings"] = sorted({str(warning.message) for warning in seen})
+    row["seconds"] = time.process_time() - begin
+    return row
+
+
+def _numbers(value: Any, parameters: Parameters) -> dict[str, Any]:
+    """Result of a case: life and end of a history, or the numbers that the case returned."""
+    if isinstance(value, History):
+        last = value.steps[-1].index if value.steps else -1
+        value = {"life": value.life, "steps": last + 1, "ended": value.ended}
+    if isinstance(value, Mapping):
+        result = {}
+        for name, given in value.items():
+            number = given.item() if isinstance(given, np.generic) else given
+            if not isinstance(number, Real | str) or isinstance(number, complex):
+                raise ProblemError(
+                    f"campaign: a case returned {name!r:.40} = {shown(given)}: give numbers "
+                    "and texts."
+                )
+            if name in COLUMNS or (name in parameters and number != parameters[name]):
+                raise ProblemError(
+                    f"campaign: a case returned {str(name)!r:.40}, which is a parameter or a "
+                    "column of the table: give the result another name."
+                )
+            result[str(name)] = number
+        return result
+    raise ProblemError(
+        f"campaign: a case returned {shown(value)}: give a History, or a dict of numbers."
+    )
+
+
+# What takes the cases of a campaign: this process, other ones, or a client beyond one machine.
+
+_LOOK = 2.0  # seconds between two looks at whether a client still lives
+_GONE = ("cancelled", "lost")  # status of a future of dask
+_CLOSED = ("closed", "closing", "failed")
+
+
+@dataclass(frozen=True, eq=False)
+class Engine:
+    """Something that takes calls.
+
+    Attributes
+    ----------
+    submit : callable (function, *arguments) -> future
+    client : optional
+        Of the user, which may die.
+    """
+
+    submit: Callable[..., Any]
+    client: Any = None
+
+    @property
+    def is_dask(self) -> bool:
+        """Whether the client is one of dask.distributed."""
+        return type(self.client).__module__.partition(".")[0] == "distributed"
+
+    @property
+    def is_closed(self) -> bool:
+        """Whether the client says that it takes and gives nothing any more."""
+        return str(getattr(self.client, "status", "")) in _CLOSED
+
+
+class _Done:
+    """Future of a call in this process."""
+
+    def __init__(self, call: Callable[[], Any]) -> None:
+        self._call = call
+
+    def result(self) -> Any:
+        return self._call()
+
+
+@contextmanager
+def engine_of(workers: int, client: Any) -> Iterator[Engine]:
+    """Engine of this process, of other ones, or of a client.
+
+    Parameters
+    ----------
+    workers : int
+    client : anything with submit, or None
+    """
+    if client is not None:
+        engine = Engine(client.submit, client)
+        yield replace(engine, submit=_submit_of(client)) if engine.is_dask else engine
+    elif workers == 1:
+        yield Engine(lambda function, *arguments: _Done(partial(function, *arguments)))
+    else:
+        context = multiprocessing.get_context("spawn")
+        with ProcessPoolExecutor(workers, mp_context=context) as pool:
+            yield Engine(pool.submit)
+
+
+def _submit_of(client: Any) -> Callable[..., Any]:
+    """How dask takes a call: a case is no pure function, whose answer it may use again."""
+    with contextlib.suppress(Exception):
+        threads = max(client.nthreads().values(), default=1)
+        if threads > 1:
+            warn(
+                f"campaign: workers of this client have {threads} threads: gmsh and warnings "
+                "belong to a process, so cases disturb each other. Give one thread a worker: "
+                "LocalCluster(threads_per_worker=1), or dask worker --nthreads 1."
+            )
+    return partial(client.submit, pure=False)
+
+
+def submitted(engine: Engine, parameters: dict[str, Any], case: Callable[..., Any]) -> Any:
+    """Future of a case.
+
+    Raises
+    ------
+    ProblemError
+        The engine takes none any more.
+    """
+    try:
+        return engine.submit(run_case, case, parameters)
+    except (KeyboardInterrupt, SystemExit):
+        raise
+    except BrokenProcessPool as error:
+        raise ProblemError(_died(parameters)) from error
+    except Exception as error:
+        raise ProblemError(
+            f"campaign: the client did not take the case {parameters} "
+            f"({type(error).__name__}: {error}). Finished cases are stored: call again to go on."
+        ) from error
+
+
+def finished(engine: Engine, futures: Mapping[str, Any]) -> Iterator[str]:
+    """Names of futures as they finish, where they can say so, else in their order.
+
+    Raises
+    ------
+    ProblemError
+        The client is closed before all have finished.
+    """
+    done: queue.SimpleQueue[str] = queue.SimpleQueue()
+    tells = [callable(getattr(future, "add_done_callback", None)) for future in futures.values()]
+    if not tells or not all(tells):
+        yield from futures
+        return
+    for key, future in futures.items():
+        future.add_done_callback(lambda _, key=key: done.put(key))
+    left = set(futures)
+    while left:
+        try:
+            key = done.get(timeout=_LOOK)
+        except queue.Empty:
+            if engine.is_closed:
+                raise ProblemError(
+                    f"campaign: the client is closed, and {len(left)} cases are not finished. "
+                    "Finished cases are stored: call again with another client to go on."
+                ) from None
+            continue
+        left.discard(key)
+        yield key
+
+
+def answer_of(engine: Engine, future: Any, parameters: dict[str, Any]) -> Any:
+    """Row of a case.
+
+    Raises
+    ------
+    ProblemError
+        Its worker died, or the client gives no answer.
+    """
+    if getattr(future, "status", "") in _GONE:  # a closed client would be waited for
+        raise ProblemError(
+            f"campaign: the client lost the case {parameters}, its scheduler or its workers are "
+            "gone. Finished cases are stored: call again to go on."
+        )
+    try:
+        return _awaited(engine, future)
+    except (KeyboardInterrupt, SystemExit):
+        raise
+    except BrokenProcessPool as error:
+        raise ProblemError(_died(parameters)) from error
+    except BaseException as error:  # futures of a client that is cancelled raise no Exception
+        raise ProblemError(
+            f"campaign: the client gave no answer for the case {parameters} "
+            f"({type(error).__name__}: {error}). Finished cases are stored: call again to go on."
+        ) from error
+
+
+def _awaited(engine: Engine, future: Any) -> Any:
+    """Answer of a future; one of dask may say that it has one, whose scheduler then dies."""
+    while engine.is_dask:
+        try:
+            return future.result(timeout=_LOOK)
+        except TimeoutError:
+            if engine.is_closed:
+                raise
+    return future.result()
+
+
+def _died(parameters: dict[str, Any]) -> str:
+    return (
+        f"campaign: a worker died at or near the case {parameters} (killed, or out of memory). "
+        "Finished cases are stored: call again to go on, with fewer workers if memory is short."
+    )
+
+
+def is_good(future: Any) -> bool:
+    """Whether a future has its answer, and no error; False where it cannot say so at once."""
+    if isinstance(future, Future):
+        return future.done() and not future.cancelled() and future.exception() is None
+    return getattr(future, "status", "") == "finished"
+
+
+def call_off(future: Any) -> None:
+    """Cancel a future, if it can be."""
+    cancel = getattr(future, "cancel", None)
+    if callable(cancel):
+        with contextlib.suppress(Exception):  # its client may be dead
+            cancel()
+
+
+_HEADER = "study.json"
+
+
+@dataclass(frozen=True, eq=False)
+class Study:
+    """What became of the cases of a campaign.
+
+    Attributes
+    ----------
+    path : Path
+    rows : tuple of dict
+        In the order of the cases: parameters, result, error (empty where all went well), kind of
+        the error, trace (of errors that are not xcrack's), warnings, seconds of the processor.
+    """
+
+    path: Path
+    rows: tuple[dict[str, Any], ...]
+
+    @property
+    def failed(self) -> tuple[dict[str, Any], ...]:
+        """Rows of the cases that raised an error."""
+        return tuple(row for row in self.rows if row["kind"])
+
+    def table(self) -> NDArray[Any]:
+        """One row a case: parameters, results, error and seconds; numbers are nan where none is."""
+        names: dict[str, list[Any]] = {}
+        for n, row in enumerate(self.rows):
+            values = {**row["parameters"], **row["result"]}
+            values |= {name: row[name] for name in COLUMNS}
+            for name, value in values.items():
+                names.setdefault(name, [None] * len(self.rows))[n] = value
+        columns = {name: _column(values) for name, values in names.items()}
+        kinds = [(name, column.dtype) for name, column in columns.items()]
+        result = np.empty(len(self.rows), dtype=kinds)
+        for name, column in columns.items():
+            result[name] = column
+        return result
+
+
+def campaign(
+    case: Callable[..., Any],
+    cases: Iterable[Mapping[str, Any]],
+    *,
+    path: str | Path,
+    workers: int = 1,
+    client: Any = None,
+    retry: bool = False,
+) -> Study:
+    """Run a case for many parameters; begin a study or go on with one.
+
+    Parameters
+    ----------
+    case : callable
+        Takes the parameters of one case by name and returns a History or a dict of numbers and
+        texts. With several workers a function of a module, not one of a notebook, and the script
+        that calls guarded by ``if __name__ == "__main__":``.
+    cases : iterable of dict
+        Parameters: finite numbers, texts, flags; see `grid`.
+    path : path
+        Folder of the study. Each finished case is a file there before the next one is counted.
+    workers : int
+        Processes of this machine; 1: all in this one.
+    client : optional
+        Instead of workers, anything with ``submit(function, *arguments)`` that returns futures with
+        ``result()``: an executor, or a ``distributed.Client`` of one thread a worker for many
+        machines.
+    retry : bool
+        Run those again that failed.
+
+    Returns
+    -------
+    Study
+
+    Raises
+    ------
+    ProblemError
+        Cases that a file cannot hold, a parameter called error or seconds, a folder of another
+        case, a folder that another process writes to, or a worker that died: finished cases stay,
+        and the same call goes on.
+
+    Notes
+    -----
+    Errors in a case are rows, with their text; a run is never stopped by one. The first case is run
+    alone, so that kernels are compiled once and not by each worker. A case is known by its
+    parameters alone: options of xcrack that are added later change no name. A result with the name
+    of a parameter and another value is an error of its case.
+    """
+    folder = path_of(path, "campaign: path", error=ProblemError)
+    if not callable(case):
+        raise ProblemError(f"campaign: case = {shown(case)} cannot be called: give a function.")
+    again = flag(retry, "campaign: retry")
+    listed = _listed(cases, "campaign: cases", "a list of dicts")
+    count = whole(workers, "campaign: workers", least=1, most=1024)
+    if client is not None and not callable(getattr(client, "submit", None)):
+        raise ProblemError(f"campaign: client = {shown(client)}: give one that has submit(...).")
+    every = {key_of(each): each for each in (checked(c, n) for n, c in enumerate(listed))}
+    if not every:
+        raise ProblemError("campaign: cases is empty: give one, at least.")
+    with system_errors("the study cannot be written to", folder, error=ProblemError):
+        folder.mkdir(parents=True, exist_ok=True)
+    with locked(folder):
+        _check_header(folder, case)
+        stored = {key: _read(folder, key) for key in every}
+        wanted = [
+            key for key, row in stored.items() if row is None or (again and bool(row["kind"]))
+        ]
+        with engine_of(count, client) as engine:
+            _run(folder, case, every, wanted, engine)
+    return Study(folder, tuple(_stored(folder, key) for key in every))
+
+
+def grid(**parameters: Iterable[Any]) -> list[dict[str, Any]]:
+    """All combinations of some values.
+
+    Parameters
+    ----------
+    **parameters
+        Values of each parameter.
+
+    Returns
+    -------
+    list of dict
+
+    Raises
+    ------
+    ProblemError
+        A parameter that is no list.
+
+    Examples
+    --------
+    >>> grid(a=[5, 6], load=[0.8, 1.0])[1]
+    {'a': 5, 'load': 1.0}
+    """
+    lists = {}
+    for name, values in parameters.items():
+        lists[name] = _listed(values, f"grid: {name}", "a list of values")
+    return [dict(zip(lists, each)) for each in product(*lists.values())]
+
+
+def _listed(values: Any, what: str, wanted: str) -> list[Any]:
+    """Entries of whatever can be gone through, but for text and dicts."""
+    if not isinstance(values, str | bytes | Mapping):
+        try:
+            return list(values)
+        except TypeError:
+            pass
+    raise ProblemError(f"{what} = {shown(values)}: give {wanted}.")
+
+
+def _run(
+    folder: Path,
+    case: Callable[..., Any],
+    every: Mapping[str, dict[str, Any]],
+    wanted: list[str],
+    engine: Engine,
+) -> None:
+    """Run the cases; each is stored as soon as it is finished, in whatever order."""
+    if not wanted:
+        return
+    first, rest = wanted[0], wanted[1:]
+    _finish(engine, folder, first, every[first], submitted(engine, every[first], case))
+    futures: dict[str, Any] = {}
+    try:
+        for key in rest:
+            futures[key] = submitted(engine, every[key], case)
+        for key in finished(engine, futures):
+            _finish(engine, folder, key, every[key], futures[key])
+    except BaseException:
+        _harvest(folder, every, engine, futures)
+        raise
+
+
+def _harvest(
+    folder: Path, every: Mapping[str, dict[str, Any]], engine: Engine, futures: Mapping[str, Any]
+) -> None:
+    """Store what has been finished when a study is broken off, and call off the rest."""
+    if engine.is_closed:  # it would wait for an answer that never comes
+        return
+    for key, future in futures.items():
+        if is_good(future) and _read(folder, key) is None:
+            _finish(engine, folder, key, every[key], future)
+        call_off(future)
+
+
+def _finish(
+    engine: Engine, folder: Path, key: str, parameters: dict[str, Any], future: Any
+) -> None:
+    row = answer_of(engine, future, parameters)
+    with written_whole(
+        _file(folder, key), "a row cannot be written to", error=ProblemError
+    ) as part:
+        part.write_text(json.dumps(row, indent=1, allow_nan=True), encoding="utf-8")
+
+
+def _check_header(folder: Path, case: Callable[..., Any]) -> None:
+    """Write what the case is, or refuse a folder of another one."""
+    given, file = describe("case", case), folder / _HEADER
+    if file.exists():
+        with system_errors("the study cannot be read from", file, error=ProblemError):
+            text = file.read_text(encoding="utf-8")
+        try:
+            stored = json.loads(text)["case"]
+        except (ValueError, KeyError, TypeError) as error:
+            raise ProblemError(f"{file} is no header of a study: take another folder.") from error
+        changed = differences(stored, given)
+        if changed:
+            raise ProblemError(
+                f"{folder} holds a study of another case: take another folder.\n- "
+                + "\n- ".join(changed)
+            )
+        return
+    with written_whole(file, "the study cannot be written to", error=ProblemError) as part:
+        part.write_text(json.dumps({"case": given}, indent=1), encoding="utf-8")
+
+
+def _file(folder: Path, key: str) -> Path:
+    return folder / f"row_{key}.json"
+
+
+def _read(folder: Path, key: str) -> dict[str, Any] | None:
+    """A stored row; None where there is none, or it is damaged."""
+    file = _file(folder, key)
+    if not file.exists():
+        return None
+    try:
+        row = json.loads(file.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+    whole_row = isinstance(row, dict) and {"parameters", "result", "kind", "seconds"} <= set(row)
+    return row if whole_row else None
+
+
+def _stored(folder: Path, key: str) -> dict[str, Any]:
+    row = _read(folder, key)
+    if row is None:
+        raise ProblemError(f"{_file(folder, key)} has gone while the study was running.")
+    return row
+
+
+def _column(values: list[Any]) -> NDArray[Any]:
+    """Values of one name, None where a case has none."""
+    if all(value is None or (isinstance(value, int | float)) for value in values):
+        return np.array([np.nan if value is None else float(value) for value in values])
+    return np.array(["" if value is None else str(value) for value in values])
+
+
+__all__ = [
+    "COLUMNS",
+    "Engine",
+    "Parameters",
+    "Study",
+    "answer_of",
+    "call_off",
+    "campaign",
+    "checked",
+    "engine_of",
+    "finished",
+    "grid",
+    "is_good",
+    "key_of",
+    "run_case",
+    "submitted",
+]

@@ -1,0 +1,399 @@
+"""Growth run to its end: steps collected, stored one by one, and taken up again after a kill."""
+
+from collections.abc import Callable, Iterable, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, Unpack
+
+from xcrack.base.checks import called, flag, shown
+from xcrack.base.errors import ProblemError, warn
+from xcrack.base.paths import path_of, system_errors
+from xcrack.fatigue.criteria import Criterion
+from xcrack.fatigue.law import Law
+from xcrack.fatigue.spectrum import Spectrum
+from xcrack.growth.description import differences, only_compiled_differently
+from xcrack.growth.options import GrowOptions, Run, lists_options, run_of
+from xcrack.growth.run import steps_of
+from xcrack.growth.step import Cycle, Step
+from xcrack.mesh.mesh import Mesh
+from xcrack.model.problem import Problem
+from xcrack.runs import run_folder
+from xcrack.runs.history import History
+from xcrack.runs.lock import locked
+from xcrack.runs.run_folder import Header
+from xcrack.runs.run_store import RunStore
+from xcrack.runs.saved import read_body, read_saved
+from xcrack.runs.versions import versions
+
+Until = Callable[[Step], bool]
+
+_SHOWN = 5  # differences that a message lists
+
+
+def collect(
+    steps: Iterable[Step],
+    path: str | Path | None = None,
+    until: Until | None = None,
+    *,
+    overwrite: bool = False,
+    keep_solutions: bool = True,
+) -> History:
+    """Run growth to its end.
+
+    Ctrl-C ends it too, once a step is finished: the history of all finished steps is returned, with
+    `ended` that begins with "interrupted", and a warning. Where an error ends it, the error carries
+    the history of the finished steps as its attribute `history`.
+
+    Parameters
+    ----------
+    steps : iterable of Step
+        What `grow` returns.
+    path : path, optional
+        Folder in which each step is stored as soon as it is finished; `resume` goes on from it. One
+        process at a time may write to it.
+    until : callable Step -> bool, optional
+        Growth stops at the first step for which it is true; a step without tips is the last one
+        anyway, and is not asked.
+    overwrite : bool
+        Begin although a run is stored in the folder: that one is moved aside, into a folder
+        ``moved_aside_1`` in it.
+    keep_solutions : bool
+        Keep the solutions of all steps in memory, for `History.write`.
+
+    Returns
+    -------
+    History
+
+    Raises
+    ------
+    ProblemError
+        `path` holds a run, is in use by another process, is a file, or cannot be written.
+    """
+    try:
+        iter(steps)
+    except Exception as error:  # whatever an object's own __iter__ raises
+        raise ProblemError(f"collect: steps = {shown(steps)}: give what grow returns.") from error
+    if isinstance(steps, str | bytes):
+        raise ProblemError(f"collect: steps = {shown(steps)} is a text: give what grow returns.")
+    _check_options("collect", until, overwrite=overwrite, keep_solutions=keep_solutions)
+    run = _Collection(until, keep_solutions)
+    if path is None:
+        return run.of(steps)
+    folder = path_of(path, "collect: path", error=ProblemError)
+    with system_errors("a folder for the run cannot be made at", folder, error=ProblemError):
+        if folder.exists() and not folder.is_dir():
+            raise ProblemError(f"{folder} is a file; a run needs a folder of its own.")
+        folder.mkdir(parents=True, exist_ok=True)
+    with locked(folder) as check:
+        run_folder.sweep(folder)
+        if not overwrite:
+            _refuse_stored(folder)
+        run.store = RunStore(folder, check)
+        return run.of(steps)
+
+
+@lists_options
+def resume(
+    path: str | Path,
+    problem: Problem,
+    law: Law,
+    criterion: Criterion,
+    cycle: Cycle | Spectrum,
+    da: float | None = None,
+    *,
+    until: Until | None = None,
+    keep_solutions: bool = True,
+    **options: Unpack[GrowOptions],
+) -> History:
+    """Go on with a run that is on disk, to the history it would have had, to the last bit.
+
+    A step that is missing or damaged is computed again, and so are those behind it; their files are
+    moved into a folder ``moved_aside_1`` beside them, with a warning. A lost or damaged header is
+    made again from the steps. Ctrl-C is handled as in `collect`.
+
+    Parameters
+    ----------
+    path : path
+        Folder that `collect` wrote to.
+    problem, law, criterion, cycle, da
+        As they were given to `grow`; the problem has the cracks as they were at first. Functions
+        are compared by their code and by all that they read.
+    until
+        As in `collect`.
+    cycles, scaling, integrator, threshold, retardation, solver, progress, keep_solutions
+        As they were given to `grow` and `collect`.
+    tolerance, max_unknowns
+        As they were given to `grow`. The mesh that a tolerance chose is read from the folder; where
+        it is lost it is made again.
+    K_c, link_up, max_steps, max_cycles
+        Rules that stop a run may be other ones than before.
+
+    Returns
+    -------
+    History
+        With all steps; those from disk have no solutions.
+
+    Raises
+    ------
+    ProblemError
+        No run is there, or it was made with other settings: the message names them. It is in use by
+        another process, or cannot be written.
+
+    Warns
+    -----
+    XcrackWarning
+        Versions, the processor or the number of threads of the BLAS are others than those that the
+        run was begun with, so that its last bits may differ.
+    """
+    run = run_of("resume", problem, law, criterion, cycle, da, options)
+    _check_options("resume", until, keep_solutions=keep_solutions)
+    folder = path_of(path, "resume: path", error=ProblemError)
+    with system_errors("no run can be read from", folder, error=ProblemError):
+        there = folder.is_dir()
+    if not there:
+        raise ProblemError(
+            f"no run to go on with in {folder}: collect(grow(...), path=...) starts one."
+        )
+    collection = _Collection(until, keep_solutions, mesh=problem.mesh)
+    with locked(folder) as check:
+        run_folder.sweep(folder)
+        header, damaged = run_folder.read_header(folder)
+        if header is None:  # killed before its first step
+            collection.store = RunStore(folder, check)
+            return collection.of(steps_of(run))
+        run = _as_begun(run, header, folder)
+        stored = run_folder.read_steps(folder, header)
+        if stored.rest or damaged is not None:
+            _move_aside(folder, stored, damaged)
+        header = replace(header, ended="")
+        run_folder.write_header(folder, header)
+        collection.taken.extend(stored.steps)
+        memory = stored.steps[0].memory if stored.steps else None
+        collection.store = RunStore(folder, check, header, "" if memory is None else memory.mesh)
+        meshes: list[Mesh] = []
+        if run.tolerance is not None and stored.steps:
+            bodies = (read_body(path) for path in run_folder.body_files(folder))
+            meshes = [body.mesh for body in bodies if body is not None]
+            collection.mesh = _last_mesh(folder, stored.steps) or problem.mesh
+        return collection.of(steps_of(run, stored.steps, meshes))
+
+
+def load(path: str | Path) -> Any:
+    """Read a stored run without going on with it, or what `save` wrote.
+
+    Another process may write to the folder of a run meanwhile.
+
+    Parameters
+    ----------
+    path : path
+        Folder that `collect` wrote to, or file that `save` wrote.
+
+    Returns
+    -------
+    History, or what was saved
+        Steps have no solutions.
+
+    Raises
+    ------
+    ProblemError
+        No run is there, or it cannot be read.
+
+    Warns
+    -----
+    XcrackWarning
+        A step is missing or damaged: those behind it are left out.
+    """
+    folder = path_of(path, "load: path", error=ProblemError)
+    with system_errors("no run can be read from", folder, error=ProblemError):
+        is_file = folder.is_file()
+    if is_file:
+        return read_saved(folder)
+    header, _ = run_folder.read_header(folder)
+    if header is None:
+        raise ProblemError(
+            f"load: path = {str(folder)!r} holds no run, {run_folder.HEADER} is missing: give the "
+            "folder that collect wrote to."
+        )
+    stored = run_folder.read_steps(folder, header)
+    if stored.rest:
+        warn(
+            f"{stored.fault} in {folder}: the {len(stored.steps)} steps before it are read. resume "
+            "computes the others again."
+        )
+    ended = header.ended or "not ended: it is still going on, or was killed; resume goes on with it"
+    return History(stored.steps, ended, folder, _last_mesh(folder, stored.steps))
+
+
+def _last_mesh(folder: Path, steps: Sequence[Step]) -> Mesh | None:
+    """The mesh of the last step of a run, where it is stored."""
+    memories = [step.memory for step in steps if step.memory is not None]
+    other = bool(memories) and memories[-1].mesh != memories[0].mesh
+    body = read_body(run_folder.body_path(folder, memories[-1].mesh if other else ""))
+    return None if body is None else body.mesh
+
+
+@dataclass
+class _Collection:
+    """Steps that are taken until they end, each on disk before the next is asked for."""
+
+    until: Until | None
+    keep_solutions: bool
+    mesh: Mesh | None = None
+    store: RunStore | None = None
+    taken: list[Step] = field(default_factory=list)
+
+    def of(self, steps: Iterable[Step]) -> History:
+        """Take all steps of an iterable; Ctrl-C and errors lose none of those taken."""
+        with ExitStack() as stack:
+            close = getattr(steps, "close", None)
+            if close is not None:
+                stack.callback(close)
+            try:
+                ended = self._take(steps)
+            except KeyboardInterrupt:
+                ended = self._interrupted()
+            except Exception as error:
+                # Ctrl-C within a compiled kernel is the cause of a SystemError.
+                if not _is_interrupt(error):
+                    self._attach(error)
+                    raise
+                ended = self._interrupted()
+        history = self._history(ended)
+        if self.store is not None:
+            try:
+                self.store.end(ended)
+            except ProblemError as error:
+                self._attach(error)
+                raise
+        if ended.startswith("interrupted"):
+            warn(f"growth was {ended}: {len(self.taken)} finished steps are handed back.")
+        return history
+
+    def _take(self, steps: Iterable[Step]) -> str:
+        """Take steps, and return why they ended."""
+        if self.taken and self._is_enough(self.taken[-1]):  # killed before it could write so
+            return self._stopped()
+        iterator = iter(steps)
+        while True:
+            try:
+                step = next(iterator)
+            except StopIteration as stop:
+                return str(stop.value or "no more steps")
+            if not isinstance(step, Step):
+                raise ProblemError(f"collect: {shown(step)} is not a Step: give what grow returns.")
+            has_own = step.memory is not None and bool(step.memory.mesh)
+            if step.solutions and (self.mesh is None or has_own):
+                self.mesh = step.solutions[0].problem.mesh
+            self.taken.append(step if self.keep_solutions else replace(step, solutions=()))
+            if self.store is not None:
+                self.store.write(step)
+            if self._is_enough(step):
+                return self._stopped()
+
+    def _is_enough(self, step: Step) -> bool:
+        # Where no tip is left the run ends anyway, and functions of users look for K.
+        if self.until is None or step.has_left:
+            return False
+        enough = called(self.until, f"until, after step {step.index}", step)
+        return flag(enough, "collect: what until returned")
+
+    def _interrupted(self) -> str:
+        if not self.taken:
+            raise KeyboardInterrupt
+        return f"interrupted after step {self.taken[-1].index}"
+
+    def _stopped(self) -> str:
+        return f"until was true at step {self.taken[-1].index}"
+
+    def _attach(self, error: Exception) -> None:
+        """Hand the finished steps over with an error."""
+        if not self.taken:
+            return
+        error.history = self._history(f"an error: {error}")  # type: ignore[attr-defined]
+        error.add_note(
+            f"{len(self.taken)} finished steps are in the attribute `history` of this error"
+            + ("." if self.store is None else f", and in {self.store.folder}: see resume.")
+        )
+
+    def _history(self, ended: str) -> History:
+        folder = None if self.store is None else self.store.folder
+        return History(tuple(self.taken), ended, folder, self.mesh)
+
+
+def _is_interrupt(error: BaseException) -> bool:
+    if isinstance(error, KeyboardInterrupt):
+        return True
+    before = error.__cause__ or error.__context__
+    return isinstance(error, SystemError) and before is not None and _is_interrupt(before)
+
+
+def _as_begun(run: Run, header: Header, folder: Path) -> Run:
+    """The run with the defaults of a stored one, whose settings must be the same."""
+    run = run.as_begun(header.settings)
+    settings, now = run.settings, versions()
+    compiled: list[str] = []
+    if header.versions.get("python") != now["python"]:
+        compiled = only_compiled_differently(header.settings, settings)
+    given = {**settings, **{key: header.settings[key] for key in compiled}}
+    lines = differences(header.settings, given)
+    if lines:
+        raise ProblemError(
+            f"the run in {folder} was made with other settings: {_few(lines)}. Give those, or "
+            "begin another run in another folder."
+        )
+    lines = differences(header.versions, now)
+    lines += [f"{key}: its code cannot be compared between the two" for key in compiled]
+    if lines:
+        warn(
+            f"the run in {folder} was made with other versions, on another processor or with "
+            f"other threads, its last bits may differ: {_few(lines)}."
+        )
+    # What is stored stands for the run, however another python compiles its functions.
+    return run
+
+
+def _refuse_stored(folder: Path) -> None:
+    """Raise where a folder holds a run of which a step is finished."""
+    header, _ = run_folder.read_header(folder)
+    steps = run_folder.step_files(folder)
+    if header is None or not steps:
+        return
+    raise ProblemError(
+        f"{folder} holds a run of {len(steps)} steps already: go on with it by "
+        f"resume({str(folder)!r}, ...), take another path, or give overwrite=True, which moves it "
+        "into a folder moved_aside_1 beside the new one."
+    )
+
+
+def _move_aside(folder: Path, stored: run_folder.Stored, damaged: Path | None) -> None:
+    """Move aside what does not belong to the part of a run that is whole, and warn of it."""
+    files = [*stored.rest, *([] if damaged is None else [damaged])]
+    aside = run_folder.move_aside(folder, files)
+    if stored.rest:
+        last = len(stored.steps) - 1
+        begin = f"growth goes on from step {last}" if stored.steps else "growth begins anew"
+        warn(
+            f"{stored.fault} in {folder}: {begin}; {len(stored.rest)} files of steps were moved to "
+            f"{aside}."
+        )
+    if damaged is not None:
+        warn(f"{damaged} was damaged: it was moved to {aside}, and made again from the steps.")
+
+
+def _check_options(caller: str, until: Any, **flags: Any) -> None:
+    if until is not None and not callable(until):
+        raise ProblemError(
+            f"{caller}: until = {shown(until)} cannot be called: give a function of a Step."
+        )
+    for name, value in flags.items():
+        flag(value, f"{caller}: {name}")
+
+
+def _few(lines: list[str]) -> str:
+    """The first few of many differences, in one line."""
+    more = len(lines) - _SHOWN
+    return "; ".join(lines[:_SHOWN]) + (f"; and {more} more" if more > 0 else "")
+
+
+__all__ = ["collect", "load", "resume"]

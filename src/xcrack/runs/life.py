@@ -1,0 +1,365 @@
+"""A life with an error bar."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xcrack.base.arrays import Floats, lock
+from xcrack.base.checks import number, shown, whole
+from xcrack.base.errors import ProblemError
+from xcrack.fatigue.criteria import Criterion
+from xcrack.fatigue.law import Law
+from xcrack.fatigue.spectrum import Spectrum
+from xcrack.fatigue.zones import Retardation
+from xcrack.runs.history import History
+from xcrack.runs.rerating import (
+    Block,
+    Driving,
+    block_of_run,
+    bound_of_shares,
+    check_block,
+    cycles_of,
+    driving,
+)
+from xcrack.runs.retarded import RetardedLives
+from xcrack.runs.scatter import Scatter, lives, varied
+
+_SAMPLES, _FEW = 100_000, 200
+_ENDS = (0.05, 0.95)
+_MOST = 0.05  # change of shares of the advance, beyond which the path would differ
+_SAME = 1e-6  # relative: rates of a law that are those of the run
+
+
+@dataclass(frozen=True, eq=False)
+class Life:
+    """Lives of many samples, and what of their width comes from where.
+
+    Attributes
+    ----------
+    N : (n,) array
+        Cycles of the samples, rising; inf for those that do not grow.
+    life : float
+        Of the run itself.
+    scatter : dict of str to (float, float)
+        Lives between which 90 % of the samples lie if one source alone varies, by its name.
+    bounds : dict of str to float
+        Numerical errors as shares of the life: ``steps``, ``K``, under a spectrum ``levels`` (of K
+        between solved factors), of several tips ``tips`` (other shares of the advance); they are
+        bounds, not samples.
+    unit : str
+    """
+
+    N: Floats
+    life: float
+    scatter: dict[str, tuple[float, float]]
+    bounds: dict[str, float]
+    unit: str
+
+    def percentile(self, p: float) -> float:
+        """Cycles that p per cent of the samples do not reach.
+
+        Parameters
+        ----------
+        p : float
+            In [0, 100].
+        """
+        p = number(p, "Life.percentile: p", least=0, most=100)
+        return float(np.quantile(self.N, p / 100, method="inverted_cdf"))
+
+    def probability(self, N: float) -> float:
+        """Share of the samples that end within N cycles.
+
+        Parameters
+        ----------
+        N : float
+            Not negative.
+        """
+        N = number(N, "Life.probability: N", least=0)
+        return float(np.searchsorted(self.N, N, side="right") / len(self.N))
+
+    def table(self) -> NDArray[Any]:
+        """Percentiles: columns percent and N."""
+        levels = (0.1, 1, 5, 10, 25, 50, 75, 90, 95, 99)
+        rows = [(p, self.percentile(p)) for p in levels]
+        return np.array(rows, dtype=[("percent", float), ("N", float)])
+
+    def plot(self, kind: str = "cdf", file: str | Path | None = None) -> Any:
+        """Draw the lives.
+
+        Parameters
+        ----------
+        kind : {"cdf", "density"}
+            Share that has ended over cycles, or how many end where.
+        file : path, optional
+            File to save the figure to; if omitted, the figure is shown.
+
+        Returns
+        -------
+        matplotlib figure
+        """
+        from xcrack.view.lives import draw_life
+
+        return draw_life(self, kind, file)
+
+    def __str__(self) -> str:
+        low, middle, high = (self.percentile(p) for p in (5, 50, 95))
+        lines = [
+            f"life {self.life:.4g} {self.unit}s; median {middle:.4g}, 90 % of {len(self.N)} "
+            f"samples from {low:.4g} to {high:.4g}"
+        ]
+        for name, (least, most) in self.scatter.items():
+            lines.append(f"  {name} alone: from {least:.4g} to {most:.4g}")
+        for name, share in self.bounds.items():
+            bound = f"at most {share:.2%} of the life (a bound)" if share == share else "not known"
+            lines.append(f"  error of {name}: {bound}")
+        return "\n".join(lines)
+
+
+def life(
+    history: History,
+    law: Law | None = None,
+    *,
+    scatter: Scatter,
+    samples: int | None = None,
+    seed: int,
+    unit: str | None = None,
+    spectrum: Spectrum | None = None,
+    criterion: Criterion | None = None,
+    nu: float | None = None,
+    threshold: float = 0.0,
+    retardation: Retardation | None = None,
+    max_blocks: float = 1e6,
+) -> Life:
+    """Lives of many samples on the path of one run.
+
+    The run is not repeated: its steps are integrated again with the rates of each sample. That is
+    exact for a factor on the rate, and for the others as good as `History.rerate` where one tip
+    grows, or all tips alike.
+
+    Parameters
+    ----------
+    history : History
+    law : callable, optional
+        Law of the run: needed where K, load or a constant varies, and for the bound of K.
+    scatter : Scatter
+    samples : int, optional
+        At least 100; 100 000 if omitted, with retardation 200.
+    seed : int
+        Of the draw.
+    unit : str, optional
+        What a cycle is called; if omitted, that of the spectrum, or "cycle".
+    spectrum, criterion, nu, threshold : optional
+        Of a run under a spectrum, as it had them: needed where the law is.
+    retardation : wheeler or willenborg, optional
+        Each sample goes cycle by cycle along the path then, as `retarded` does: an overload makes
+        another life of twice the rate than half of it.
+    max_blocks : float
+        With retardation: samples that are longer are taken not to end.
+
+    Returns
+    -------
+    Life
+
+    Raises
+    ------
+    ProblemError
+        A law or a spectrum that is not that of the run, or none where one is needed; load that
+        varies where K is not in proportion to it; a constant that the law does not have; a sampled
+        a0 below the first crack (more than a hundredth of the samples), or with several tips;
+        several tips that would have shared the advance another way by more than 5 %.
+
+    Notes
+    -----
+    Sources "steps" and "K": those of `History.life_bar` where the run estimated them, contact and
+    rates without a bar in that of K. Else "steps" is a third of the difference to the life from
+    every second step (Richardson, second order), and "K" the life with all K larger and smaller by
+    their spread over two domains.
+    Source "levels": a third of the difference to the life with every second level of a spectrum;
+    0 where its factors were solved, or K is in proportion to them. Source "tips": how the shares of
+    the advance of several tips change for the 5 and 95 % samples of each source alone. Samples are
+    those of `Scatter.draw`. With K or load under a spectrum the law is asked at 257 factors, with a
+    power of the factor between them; for constants of the law it is asked for each sample.
+    """
+    if not isinstance(history, History):
+        raise ProblemError(f"life: history = {shown(history)}: give a History.")
+    if not isinstance(scatter, Scatter):
+        raise ProblemError(f"life: scatter = {shown(scatter)}: give Scatter(C=...).")
+    if not (law is None or callable(law)):
+        raise ProblemError(f"life: law = {shown(law)} cannot be called: give a law.")
+    if not (unit is None or (isinstance(unit, str) and unit)):
+        raise ProblemError(f"life: unit = {shown(unit)}: give a word, such as 'flight'.")
+    wanted = (_SAMPLES if retardation is None else _FEW) if samples is None else samples
+    n = whole(wanted, "life: samples", least=100, most=10_000_000)
+    block = block_of_run("life", spectrum, criterion, nu, threshold)
+    limit = number(max_blocks, "life: max_blocks", above=0)
+    if retardation is not None:
+        cycled = RetardedLives(history, law, block, retardation, limit)
+        return _retarded(cycled, history, law, scatter, block, n, seed, unit)
+    rows = _rows(history, law, scatter, block)
+    lead = rows.lead
+    drawn = scatter.draw(n, seed)
+    if "a0" in drawn:
+        drawn["a0"] = _checked_sizes(lead, drawn["a0"])
+    bounds = _bounds(history, rows, law, scatter, block)
+    N = np.sort(lives(lead, law, drawn, n))
+    alone = {
+        name: _ends(lives(lead, law, {name: values}, n)) if len(drawn) > 1 else _ends(N)
+        for name, values in drawn.items()
+    }
+    word = unit or ("cycle" if block is None else block.spectrum.unit)
+    return Life(lock(N + history.steps[0].cycles), history.life, alone, bounds, word)
+
+
+def _bounds(
+    history: History, rows: Driving, law: Law | None, scatter: Scatter, block: Block | None
+) -> dict[str, float]:
+    """Numerical errors as shares of the life, by source."""
+    lead, bar = rows.lead, history.life_bar
+    known = np.isfinite(bar.steps) and bar.life > 0
+    bounds = {"steps": bar.steps / bar.life if known else _of_steps(lead)}
+    if np.isfinite(bar.K) and bar.life > 0:
+        bounds["K"] = (bar.K + bar.contact + bar.unknown) / bar.life
+    if law is None or (block is None and history.steps[0].levels):
+        return bounds
+    bounds.setdefault("K", _of_K(lead, law))
+    if not rows.is_one_tip or len(rows.step) > len(lead.step):
+        bounds["tips"] = _of_tips(rows, law, scatter)
+    if block is not None:
+        bounds["levels"] = _of_levels(history, lead, law, block)
+    return bounds
+
+
+def _retarded(
+    cycled: RetardedLives,
+    history: History,
+    law: Law | None,
+    scatter: Scatter,
+    block: Block | None,
+    n: int,
+    seed: int,
+    unit: str | None,
+) -> Life:
+    """Life of samples that go cycle by cycle."""
+    if scatter.a0 is not None:
+        raise ProblemError(
+            "life: a0 varies: with retardation each first crack is a run of its own."
+        )
+    _rows(history, law, scatter, block)
+    drawn = scatter.draw(n, seed)
+    N = np.sort(cycled.lives(drawn, n))
+    alone = {
+        name: _ends(cycled.lives({name: values}, n)) if len(drawn) > 1 else _ends(N)
+        for name, values in drawn.items()
+    }
+    bounds = {"steps": float("nan"), "K": cycled.of_K()}
+    word = unit or cycled.unit
+    return Life(lock(N), cycled.life, alone, bounds, word)
+
+
+def _rows(history: History, law: Law | None, scatter: Scatter, block: Block | None) -> Driving:
+    """Places of the run, where the law and the spectrum are those that it had."""
+    needs = set(scatter.parts) - {"C", "a0"}
+    if law is None:
+        if needs:
+            raise ProblemError(f"life: {', '.join(sorted(needs))} varies: give the law of the run.")
+        return driving(history.steps)
+    if needs or block is not None:
+        check_block(history.steps, block, law, "life")
+    rows = driving(history.steps, block)
+    if (block is not None or not history.steps[0].levels) and not np.allclose(
+        rows.rates(law), rows.rate, rtol=_SAME, atol=0
+    ):
+        raise ProblemError(
+            "life: the law gives other rates than those of the run: give the law that it had, and "
+            "its spectrum, or take history.rerate(law)."
+        )
+    if block is not None and "load" in needs and not _is_proportional(history, block):
+        raise ProblemError(
+            "life: load varies, but K of this run is not in proportion to it: it has steady loads "
+            "or initial stress. Run it with other loads, Spectrum.scaled, to see what they do."
+        )
+    for name in scatter.constants:
+        varied(law, {name: 1.0})
+    return rows
+
+
+def _is_proportional(history: History, block: Block) -> bool:
+    chosen = block.spectrum.states is not None or block.spectrum.levels != "auto"
+    return not block.spectrum.steady and (chosen or len(history.steps[0].levels) <= 2)
+
+
+def _checked_sizes(lead: Driving, sizes: Floats) -> Floats:
+    if len(np.unique(lead.place, axis=0)) > 1 or not lead.is_one_tip:
+        raise ProblemError(
+            "life: a0 varies, but several tips drive the run: its path belongs to the cracks "
+            "that it began with. Run it for other cracks."
+        )
+    first = float(lead.a[0, 0])
+    below = float((sizes < first).mean())
+    if below > 0.01:
+        raise ProblemError(
+            f"life: {below:.1%} of the samples of a0 are below {first:.6g}, the first crack of the "
+            "run: begin the run with a smaller crack."
+        )
+    return np.maximum(sizes, first)
+
+
+def _ends(N: Floats) -> tuple[float, float]:
+    low, high = np.quantile(N, _ENDS, method="inverted_cdf")
+    return float(low), float(high)
+
+
+def _of_steps(lead: Driving) -> float:
+    """A third of what every second step adds, as a share; nan where one place does not last."""
+    if len(lead.step) < 4 or not lead.is_one_tip or not np.isfinite(lead.rate).all():
+        return float("nan")
+    n = len(lead.step) // 2 * 2
+    a = np.stack([lead.a[0:n:2, 0], lead.a[1:n:2, 1]], axis=1)
+    rate = np.stack([lead.rate[0:n:2, 0], lead.rate[1:n:2, 1]], axis=1)
+    whole_run = float(cycles_of(lead.a[:n], lead.rate[:n]).sum())
+    return abs(float(cycles_of(a, rate).sum()) - whole_run) / 3 / whole_run
+
+
+def _changed(lead: Driving, rate: Floats) -> float:
+    """Share by which the life is another one with other rates."""
+    counted = lead.cycles / cycles_of(lead.a, lead.rate)
+    nominal = float(lead.cycles.sum())
+    return abs(float((cycles_of(lead.a, rate) * counted).sum()) - nominal) / nominal
+
+
+def _of_K(lead: Driving, law: Law) -> float:
+    """Largest change of the life with all K larger or smaller by their spread."""
+    return max(_changed(lead, lead.rates(law, 1.0 + s * lead.spread)) for s in (-1.0, 1.0))
+
+
+def _of_levels(history: History, lead: Driving, law: Law, block: Block) -> float:
+    """A third of the change of the life with every second level left out."""
+    if all(block.is_solved(step) for step in history.steps):
+        return 0.0
+    coarse = driving(history.steps, replace(block, coarse=True)).lead
+    return _changed(lead, coarse.rates(law)) / 3
+
+
+def _of_tips(rows: Driving, law: Law, scatter: Scatter) -> float:
+    """Largest change of shares of the advance, of the 5 and 95 % samples of each source alone."""
+    counted, worst = rows.cycles[rows.step[rows.drives]], 0.0
+    for name, part in scatter.parts.items():
+        if name in ("C", "a0"):
+            continue
+        for value in (float(part.quantile(p)) for p in _ENDS):
+            own = name in scatter.constants
+            rate = rows.rates(varied(law, {name: value})) if own else rows.rates(law, value)
+            worst = max(worst, bound_of_shares(rows, rate[:, 0], counted))
+    if worst > _MOST:
+        raise ProblemError(
+            f"life: some samples would have shared the advance of the tips another way, by "
+            f"{worst:.1%} in the mean (more than {_MOST:.0%}): the path would differ. Run them as "
+            "cases of a campaign."
+        )
+    return worst
+
+
+__all__ = ["Life", "life"]

@@ -1,0 +1,203 @@
+"""A lock on a folder that names its owner, and that outlives a kill without blocking anybody."""
+
+import contextlib
+import ctypes
+import json
+import os
+import platform
+import secrets
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from xcrack.base.errors import ProblemError
+from xcrack.base.paths import system_errors
+
+NAME = "run.lock"
+
+_NAMELESS = ("", "localhost", "localhost.localdomain")  # any machine may be called so
+_TRIES = 20  # others may take or leave the lock meanwhile
+
+
+@contextmanager
+def locked(folder: Path) -> Iterator[Callable[[], None]]:
+    """Keep other processes from writing to a folder within a block.
+
+    The lock is a file that appears with its whole content. It is left behind by a kill; the next
+    process finds that its owner is dead, by id, start and machine, and takes it over. Of an owner
+    on another machine nobody can tell: there the user has to decide.
+
+    Yields
+    ------
+    callable
+        Raises a ProblemError if the lock is not ours any more.
+
+    Raises
+    ------
+    ProblemError
+        Another process, or this one elsewhere, writes to the folder.
+    """
+    path = folder / NAME
+    owner = {**_this_process(), "token": secrets.token_hex(8), "taken": _now()}
+    _take(path, owner)
+
+    def check() -> None:
+        if _read(path) != owner:
+            state = "is that of another process" if path.exists() else "is gone"
+            raise ProblemError(
+                f"{path} {state}: the folder was taken over or removed meanwhile, and this process "
+                "stops writing to it."
+            )
+
+    try:
+        yield check
+    finally:
+        with contextlib.suppress(OSError):
+            if _read(path) == owner:
+                path.unlink()
+
+
+def _take(path: Path, owner: dict[str, Any]) -> None:
+    for _ in range(_TRIES):
+        if _created(path, owner):
+            return
+        other = _read(path)
+        if other is None and not path.exists():
+            continue  # it was given back meanwhile
+        if other is None:
+            raise ProblemError(
+                f"{path} is no lock that xcrack can read: delete it if no run writes to "
+                f"{path.parent}."
+            )
+        if _may_live(other):
+            raise ProblemError(_in_use(path, other))
+        _remove(path, other)
+    raise ProblemError(f"{path}: other processes take and leave the lock all the time; try again.")
+
+
+def _created(path: Path, owner: dict[str, Any]) -> bool:
+    """Create the lock with its content in one go; False where there is one."""
+    part = path.with_name(f".{path.name}.{owner['pid']}_{owner['token']}.part")
+    with system_errors("the run cannot be locked by", path, error=ProblemError):
+        try:
+            part.write_text(json.dumps(owner) + "\n")
+            try:
+                os.link(part, path)
+            except FileExistsError:
+                return False
+            except OSError:  # a file system without links
+                try:
+                    with open(path, "x") as file:
+                        file.write(json.dumps(owner) + "\n")
+                except FileExistsError:
+                    return False
+        finally:
+            with contextlib.suppress(OSError):
+                part.unlink()
+    return True
+
+
+def _remove(path: Path, stale: dict[str, Any]) -> None:
+    """Remove the lock of a dead owner, and no other one that appeared meanwhile."""
+    aside = path.with_name(f".{path.name}.{secrets.token_hex(8)}.part")
+    try:
+        os.rename(path, aside)  # of several who try, one succeeds
+    except FileNotFoundError:
+        return
+    if _read(aside) != stale:  # a new owner was faster: give the lock back
+        with contextlib.suppress(OSError):
+            os.link(aside, path)
+    with contextlib.suppress(OSError):
+        aside.unlink()
+
+
+def _read(path: Path) -> dict[str, Any] | None:
+    """Owner of a lock; None where there is none, or none that can be read."""
+    try:
+        content = json.loads(path.read_text())
+    except (OSError, ValueError):
+        return None
+    return content if isinstance(content, dict) and "pid" in content else None
+
+
+def _in_use(path: Path, owner: dict[str, Any]) -> str:
+    this = _this_process()
+    if not _is_here(owner, this):
+        return (
+            f"{path.parent} is in use by process {owner['pid']} on {owner.get('host')} since "
+            f"{owner.get('taken')}. If that process has ended, delete {path}; resume then goes on "
+            "with the run."
+        )
+    who = "this process" if owner["pid"] == this["pid"] else f"process {owner['pid']}"
+    return (
+        f"{path.parent} is in use by {who} since {owner.get('taken')}: wait for its end, or give "
+        "each run a folder of its own."
+    )
+
+
+def _may_live(owner: dict[str, Any]) -> bool:
+    """Whether the owner of a lock may still write; of another machine it may."""
+    this = _this_process()
+    if _is_here(owner, this):
+        started = _started(owner["pid"])
+        return started is not None and started == owner.get("started")
+    restarted = owner.get("host") == this["host"] and owner.get("boot") != this["boot"]
+    return not restarted or this["host"] in _NAMELESS
+
+
+def _is_here(owner: dict[str, Any], this: dict[str, Any]) -> bool:
+    """Whether process ids mean the same to both."""
+    same = ("host", "boot", "namespace")
+    return all(owner.get(key) == this[key] for key in same)
+
+
+def _this_process() -> dict[str, Any]:
+    """Id and start of this process, and where ids mean the same: machine, its start, container."""
+    boot = namespace = ""
+    with contextlib.suppress(OSError):
+        boot = Path("/proc/sys/kernel/random/boot_id").read_text().strip()
+    with contextlib.suppress(OSError):
+        namespace = os.readlink("/proc/self/ns/pid")
+    return {
+        "pid": os.getpid(),
+        "started": _started(os.getpid()),
+        "host": platform.node(),
+        "boot": boot,
+        "namespace": namespace,
+    }
+
+
+def _started(pid: Any) -> str | None:
+    """When a process of this machine started, in whatever unit; None where there is none."""
+    if not isinstance(pid, int) or pid <= 0:
+        return None
+    if sys.platform == "linux":
+        try:
+            fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+        except OSError:
+            return None
+        return None if fields[0] in "ZX" else fields[19]  # a zombie writes nothing
+    if sys.platform == "win32":
+        handle = ctypes.windll.kernel32.OpenProcess(0x1000, False, pid)  # only to ask
+        if not handle:
+            return None
+        times = (ctypes.c_uint64 * 4)()
+        pointers = [ctypes.byref(times, 8 * k) for k in range(4)]
+        ctypes.windll.kernel32.GetProcessTimes(handle, *pointers)
+        ctypes.windll.kernel32.CloseHandle(handle)
+        return None if times[1] else str(times[0])
+    listed = subprocess.run(
+        ["ps", "-o", "lstart=", "-p", str(pid)], capture_output=True, text=True, check=False
+    )
+    return listed.stdout.strip() or None
+
+
+def _now() -> str:
+    return time.strftime("%Y-%m-%d %H:%M:%S")
+
+
+__all__ = ["NAME", "locked"]

@@ -1,0 +1,484 @@
+"""Cycles of a run by another law, on the path of the first."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from xcrack.base.arrays import Floats, Ints
+from xcrack.base.checks import number, shown
+from xcrack.base.errors import ProblemError
+from xcrack.fatigue.checks import evaluate_criterion, evaluate_law
+from xcrack.fatigue.criteria import Criterion
+from xcrack.fatigue.law import Law
+from xcrack.fatigue.spectrum import Spectrum, distinct
+from xcrack.growth.block import pairs_of_states
+from xcrack.growth.cycles import cycles_between
+from xcrack.growth.levels import Ladder
+from xcrack.growth.step import Step, memory_of, moved_places, numbers_after
+from xcrack.growth.uncertainty import best_known
+
+# Ranges and ratios of all cycles of a spectrum, from K at the levels that a step has stored.
+
+_NEAR = 1e-9  # relative: a stored level is the factor that a spectrum has
+
+
+@dataclass(frozen=True, eq=False)
+class Block:
+    """What made rates of the K of a run under a spectrum, beside its law.
+
+    Attributes
+    ----------
+    spectrum : Spectrum
+    criterion : callable
+    nu : float
+    threshold : float, stress √length
+        Of the run: cycles below it do not count.
+    coarse : bool
+        Leave every second level out, to see what the levels are worth.
+    """
+
+    spectrum: Spectrum
+    criterion: Criterion
+    nu: float
+    threshold: float = 0.0
+    coarse: bool = False
+
+    @property
+    def values(self) -> Floats:
+        """Pairs of factors that differ `(p, 2)`."""
+        return distinct(self.spectrum.cycles)[0]
+
+    def is_solved(self, step: Step) -> bool:
+        """Whether K of each factor was solved, or is in proportion to one that was."""
+        if self.spectrum.states is not None or len(step.levels) <= 2:
+            return True
+        return bool(np.isin(self.values, step.levels).all())
+
+    def cycles(self, step: Step, c: int) -> tuple[Floats, Floats, Floats]:
+        """Range, ratio and count of each kind of cycle at the places of a crack, each `(p, f)`."""
+        K = np.stack([state[c].K for state in best_known(step.sif)])
+        if self.spectrum.states is not None:
+            pairs = pairs_of_states(K, self.spectrum, self.nu)
+            ends, count = pairs.K, pairs.count
+        else:
+            values, count, _ = distinct(self.spectrum.cycles)
+            ladder = self._ladder(step, K)
+            ends = np.stack([ladder.at(values[:, 0]), ladder.at(values[:, 1])])
+            count = np.repeat(count[:, None], K.shape[1], axis=1)
+        _, p, f, modes = ends.shape
+        flat = ends.reshape(2, p * f, modes)
+        _, dK, R = evaluate_criterion(self.criterion, flat, self.nu, c, "place of a cycle")
+        return dK.reshape(p, f), R.reshape(p, f), count
+
+    def _ladder(self, step: Step, K: Floats) -> Ladder:
+        levels = np.array(step.levels)
+        if len(levels) == 2 and levels[0] < 0 < levels[1] and not self.spectrum.steady:
+            levels = np.array([levels[0], 0.0, levels[1]])
+            return Ladder(levels, np.stack([K[0], np.zeros_like(K[0]), K[1]]), smooth=False)
+        if self.coarse and len(levels) > 2:
+            chosen = np.unique([*range(0, len(levels), 2), len(levels) - 1])
+            levels, K = levels[chosen], K[chosen]
+        return Ladder(levels, K, smooth=len(levels) > 2)
+
+    def check(self, step: Step, what: str) -> None:
+        """Refuse a spectrum that is not that of a step.
+
+        Raises
+        ------
+        ProblemError
+        """
+        spectrum = self.spectrum
+        if spectrum.states is not None:
+            fits = not step.levels and len(spectrum.states) == len(step.sif)
+        else:
+            low, high = spectrum.extremes
+            size = _NEAR * max(abs(low), abs(high))
+            fits = bool(step.levels) and len(step.levels) == len(step.sif)
+            fits = (
+                fits and abs(step.levels[0] - low) <= size and abs(step.levels[-1] - high) <= size
+            )
+        if not fits:
+            raise ProblemError(
+                f"{what}: spectrum is another one than that of step {step.index}, whose load "
+                f"states are {list(step.levels) or len(step.sif)}: give that of the run."
+            )
+
+
+def block_of_run(
+    what: str,
+    spectrum: Any,
+    criterion: Any,
+    nu: Any,
+    threshold: Any = 0.0,
+) -> Block | None:
+    """What a caller said of the spectrum of a run, checked; None where there was none.
+
+    Parameters
+    ----------
+    what : str
+        Name of the function, for messages.
+    spectrum, criterion, nu, threshold
+        As of `Block`, or None.
+
+    Raises
+    ------
+    ProblemError
+        Some of them without the others, or of another type.
+    """
+    least = number(threshold, f"{what}: threshold", least=0)
+    if spectrum is None and criterion is None and nu is None:
+        if least:
+            raise ProblemError(f"{what}: threshold belongs to a spectrum: give spectrum=... too.")
+        return None
+    if not isinstance(spectrum, Spectrum):
+        raise ProblemError(f"{what}: spectrum = {shown(spectrum)}: give that of the run.")
+    if not callable(criterion):
+        raise ProblemError(
+            f"{what}: criterion = {shown(criterion)}: give that of the run; each cycle of the "
+            "spectrum is held against it again."
+        )
+    return Block(spectrum, criterion, number(nu, f"{what}: nu", above=-1, below=0.5), least)
+
+
+# The place that drives each step of a run: its lengths, ranges and rates before and after.
+
+_FOLLOWS = 0.01  # of an advance: a crack that turns is a little shorter than the sum of its steps
+_NEAR_ADVANCE = 0.5  # of an advance: a place that is taken for the one that it moved to
+
+
+@dataclass(frozen=True, eq=False)
+class Driving:
+    """Places of all steps that grow, at the begin and at the end of each step.
+
+    Attributes
+    ----------
+    step : (k,) array of int
+        Which step a row belongs to.
+    drives : (k,) array of bool
+        The place with the largest rate of its step, by which cycles are counted.
+    place : (k, 2) array of int
+        Crack and number.
+    da : (k,) array, length
+    a, rate : (k, 2) arrays
+        Length that cycles are counted with (length), and growth a cycle before a threshold of the
+        run (length/cycle), before and after the step.
+    dK, R, count : (k, 2, p) arrays
+        Equivalent range (stress √length), ratio and number of each kind of cycle, before and after
+        the step: one kind, but for a spectrum that `driving` is told of.
+    size : (k, 2) array, length
+        Crack size that a law is given.
+    spread : (k, 2) array
+        Difference of K between two domains over K, of the state with the largest K.
+    cycles : (n,) array
+        Of each step.
+    threshold : float, stress √length
+        Ranges of a spectrum below it do not count.
+    """
+
+    step: Ints
+    drives: Ints
+    place: Ints
+    da: Floats
+    a: Floats
+    rate: Floats
+    size: Floats
+    spread: Floats
+    dK: Floats
+    R: Floats
+    count: Floats
+    cycles: Floats
+    threshold: float = 0.0
+
+    @property
+    def is_one_tip(self) -> bool:
+        """Whether the driving places of the steps follow each other, as those of one tip."""
+        lead = self.drives
+        a, da = self.a[lead], self.da[lead]
+        return bool((np.abs(a[1:, 0] - a[:-1, 1]) <= _FOLLOWS * da[1:]).all())
+
+    @property
+    def lead(self) -> "Driving":
+        """The driving place of each step only, and the cycles of the steps that have one."""
+        names = ("step", "drives", "place", "da", "a", "rate", "size", "spread", "dK", "R", "count")
+        parts = {name: getattr(self, name)[self.drives] for name in names}
+        return replace(self, **parts, cycles=self.cycles[self.step[self.drives]])
+
+    def rates(self, law: Law, factor: float | Floats = 1.0) -> Floats:
+        """What a law says of all rows `(..., k, 2)`, with ranges times a factor `(..., k, 2)`."""
+        dK = self.dK * np.asarray(factor)[..., None]
+        shape = dK.shape
+        R, a = (np.broadcast_to(x, shape).ravel() for x in (self.R, self.size[..., None]))
+        rate = evaluate_law(law, dK.ravel(), R, 0, "place of a step", a).reshape(shape)
+        there = (self.count > 0) & (dK >= self.threshold)
+        with np.errstate(invalid="ignore"):  # none of a kind that breaks the body
+            return np.asarray(np.where(there, self.count * rate, 0.0).sum(axis=-1))
+
+
+def driving(steps: Sequence[Step], block: Block | None = None) -> Driving:
+    """Places that grow, of all steps but the last.
+
+    Parameters
+    ----------
+    steps : sequence of Step
+    block : Block, optional
+        Of a run under a spectrum: all of its cycles then, else the largest alone.
+
+    Raises
+    ------
+    ProblemError
+        Fewer than two steps, steps that no run made, or a run with retardation.
+    """
+    if len(steps) < 2:
+        raise ProblemError(f"the history has {len(steps)} steps: a life needs two, at least.")
+    if any(key.startswith("retardation") for key in memory_of(steps[0]).settings):
+        raise ProblemError(
+            "the history was grown with retardation: its cycles do not follow from its rates. Grow "
+            "without it, and take the model along that path by retarded, or life(retardation=...)."
+        )
+    rows: list[tuple[float, ...]] = []
+    for n, (step, after) in enumerate(zip(steps, steps[1:])):
+        rows += _of_step(n, step, after)
+    if not rows:
+        raise ProblemError("no place of the history grows: there is no life to look at.")
+    table = np.array(rows)
+    index, crack, place, drives, da, there = table[:, :6].T
+    pairs = table[:, 6:].reshape(len(table), 2, 6)
+    a, dK, R, rate, size, spread = np.moveaxis(pairs, 2, 0)
+    step, where = index.astype(np.int64), np.stack([crack, place, there], axis=1).astype(np.int64)
+    one = (dK[..., None], R[..., None], np.ones((*dK.shape, 1)))
+    ranges, ratios, count = one if block is None else _of_blocks(steps, block, step, where)
+    return Driving(
+        step=step,
+        drives=drives.astype(bool),
+        place=where[:, :2],
+        da=da,
+        a=a,
+        rate=rate,
+        size=size,
+        spread=spread,
+        dK=ranges,
+        R=ratios,
+        count=count,
+        cycles=np.diff([each.cycles for each in steps]),
+        threshold=0.0 if block is None else block.threshold,
+    )
+
+
+def _of_blocks(
+    steps: Sequence[Step], block: Block, step: Ints, where: Ints
+) -> tuple[Floats, Floats, Floats]:
+    """Range, ratio and count of all cycles of a block at both ends of each row `(k, 2, p)`."""
+    answers: dict[tuple[int, int], tuple[Floats, Floats, Floats]] = {}
+
+    def at(n: int, c: int, j: int) -> tuple[Floats, ...]:
+        if (n, c) not in answers:
+            answers[n, c] = block.cycles(steps[n], c)
+        return tuple(part[:, j] for part in answers[n, c])
+
+    rows = []
+    for n, (c, j, there) in zip(step.tolist(), where.tolist()):
+        first = at(n, c, j)
+        now = _numbers(steps[n], steps[n + 1])[c]
+        rows += [first, first if there < 0 else at(n + 1, now, there)]
+    p = max(len(row[0]) for row in rows)
+    result = np.zeros((3, len(rows), p))  # kinds of cycles that a step does not have: none of them
+    for k, row in enumerate(rows):
+        result[:, k, : len(row[0])] = row
+    dK, R, count = result.reshape(3, len(step), 2, p)
+    return dK, R, count
+
+
+def _numbers(step: Step, after: Step) -> list[int]:
+    """Number that each crack of a step has in the next one."""
+    return numbers_after(len(step.cracks), after.joins, len(after.cracks))
+
+
+def _of_step(number: int, step: Step, after: Step) -> list[tuple[float, ...]]:
+    before, later = memory_of(step), memory_of(after)
+    ligament = {(arrival.crack, arrival.tip): arrival.ligament for arrival in after.arrivals}
+    rows = []
+    joined = {c for join in after.joins for c in join.cracks}
+    for c, now in enumerate(_numbers(step, after)):
+        da, rate = step.da[c], before.law_rate[c]
+        grows = np.nonzero((da > 0) & (rate > 0))[0]
+        if not len(grows):
+            continue
+        moved, there = moved_places(step, c), after.sif[0][now].x
+        for j in grows.tolist():
+            a, way = before.length[c] * float(da[j] / da.sum()), float(da[j])
+            first = _values(step, c, j, a, before.length[c])
+            distance, k = cKDTree(there).query(moved[j]) if len(there) else (np.inf, 0)
+            if distance <= _NEAR_ADVANCE * da[j] and c not in joined:
+                last = _values(after, now, int(k), a + da[j], later.length[now])
+            else:  # it has left the body, or joined another crack: its rate stays what it was
+                way = ligament.get((c, j), way)
+                k, last = -1, (a + way, *first[1:])
+            rows.append((number, c, j, float(rate[j]), way, int(k), *first, *last))
+    best = max((row[3] for row in rows), default=0.0)
+    first_best = next((k for k, row in enumerate(rows) if row[3] == best), -1)
+    return [(*row[:3], float(k == first_best), *row[4:]) for k, row in enumerate(rows)]
+
+
+def _values(step: Step, c: int, j: int, a: float, length: float) -> tuple[float, ...]:
+    """Length, range, ratio, rate, size and share of error of a place."""
+    tips = 1 if step.cracks[c].fronts is not None else max(len(step.da[c]), 1)
+    K = np.stack([state[c].K[j] for state in step.sif])
+    spread = np.stack([state[c].spread[j] for state in step.sif])
+    largest = int(np.argmax(np.abs(K).max(axis=1)))
+    share = spread[largest].max() / max(np.abs(K[largest]).max(), np.finfo(float).tiny)
+    dK, R, rate = (x[c][j] for x in (step.dK_eq, step.R, memory_of(step).law_rate))
+    return float(a), float(dK), float(R), float(rate), length / tips, float(share)
+
+
+def cycles_of(a: Floats, rate: Floats) -> Floats:
+    """Cycles from a[..., 0] to a[..., 1]; inf where nothing grows, 0 beyond the toughness."""
+    first, last = rate[..., 0], rate[..., 1]
+    grows = (first > 0) & np.isfinite(first)
+    safe = np.where(grows, first, 1.0)
+    cycles = cycles_between(a[..., 0], a[..., 1], safe, np.where(grows, last, 1.0))
+    return np.where(grows, cycles, np.where(first > 0, 0.0, np.inf))
+
+
+_MOST = 0.05
+
+
+@dataclass(frozen=True, eq=False)
+class Rerated:
+    """Cycles of the steps of a run by another law.
+
+    Attributes
+    ----------
+    cycles : (n,) array
+        At each step that the law reaches.
+    bound : float
+        Share by which other tips would have moved another way against the driving one, the mean
+        over the cycles; 0 for a single tip. The life is uncertain by no more where K of a tip
+        depends on the others no more than on itself.
+    ended : str
+        Empty, or why the new law ends before the last step.
+    """
+
+    cycles: Floats
+    bound: float
+    ended: str = ""
+
+    @property
+    def life(self) -> float:
+        """Cycles at the last step."""
+        return float(self.cycles[-1])
+
+
+def rerated(
+    steps: Sequence[Step], law: Law, old: Law | None = None, block: Block | None = None
+) -> Rerated:
+    """Cycles of the same steps by another law.
+
+    Parameters
+    ----------
+    steps : sequence of Step
+    law : callable
+    old : callable, optional
+        Law of the run, to be sure that ranges and ratios of the steps are what it was given.
+    block : Block, optional
+        Of a run under a spectrum.
+
+    Raises
+    ------
+    ProblemError
+        Several tips would have shared the advance another way, by more than 5 %; a spectrum that is
+        not given, or another one; a law with nominal R under it; the new law lets nothing grow.
+    """
+    for name, value in (("law", law), ("old", old)):
+        if not (callable(value) or (name == "old" and value is None)):
+            raise ProblemError(f"rerate: {name} = {shown(value)} cannot be called: give a law.")
+    check_block(steps, block, law, "rerate")
+    rows = driving(steps, block)
+    if old is not None and not np.allclose(rows.rates(old), rows.rate, rtol=1e-6, atol=0):
+        raise ProblemError("rerate: the steps have other rates than the law they are said to have.")
+    rate = rows.rates(law)
+    first = rows.drives
+    if not (rate[first][:, 0] > 0).all():
+        stopped = int(np.argmin(rate[first][:, 0] > 0))
+        raise ProblemError(
+            f"rerate: by this law the driving tip does not grow at step {stopped}: the path ends "
+            "there. Run it with the law to see where."
+        )
+    with np.errstate(invalid="ignore"):
+        share = cycles_of(rows.a[first], rate[first]) / cycles_of(rows.a[first], rows.rate[first])
+    since = rows.cycles[rows.step[first]] * share
+    broken = np.isinf(rate[first]).any(axis=1)
+    ended = ""
+    if broken.any():
+        last = int(np.argmax(broken))
+        since = since[: last + 1]
+        ended = f"the law returns inf in step {last}: its toughness is reached"
+    bound = bound_of_shares(rows, rate[:, 0], since)
+    if bound > _MOST:
+        raise ProblemError(
+            f"rerate: by this law the tips would have shared the advance another way, by "
+            f"{bound:.1%} in the mean (more than {_MOST:.0%}): the path would differ. Run it with "
+            "the law."
+        )
+    return Rerated(np.concatenate([[0.0], np.cumsum(since)]) + steps[0].cycles, bound, ended)
+
+
+def check_block(steps: Sequence[Step], block: Block | None, law: Law | None, what: str) -> None:
+    """Refuse steps of a spectrum without it, with another one, or with a law that it cannot serve.
+
+    Raises
+    ------
+    ProblemError
+    """
+    if block is None:
+        if any(step.levels for step in steps):
+            raise ProblemError(
+                f"{what}: the run has a spectrum, of whose cycles the steps have the largest only: "
+                "give spectrum=..., criterion=... and nu=... as the run had them."
+            )
+        return
+    for step in steps:
+        block.check(step, what)
+    if getattr(law, "ratio", None) == "nominal":
+        raise ProblemError(
+            f'{what}: the law has ratio="nominal", but the steps of a spectrum have K with contact '
+            "alone: run the spectrum with the law."
+        )
+
+
+def bound_of_shares(rows: Driving, new: Floats, since: Floats) -> float:
+    """Mean over the cycles of the largest change of an advance over that of the driving place.
+
+    Parameters
+    ----------
+    rows : Driving
+    new : (k,) array
+        Other rates before the steps.
+    since : (n,) array
+        Cycles by them of the steps that are reached.
+    """
+    old, first = rows.rate[:, 0], np.unique(rows.step)
+    worst = np.zeros(len(since))
+    for n, step in enumerate(first[: len(since)].tolist()):
+        mine = rows.step == step
+        lead = mine & rows.drives
+        with np.errstate(invalid="ignore"):
+            change = np.abs((new[mine] / old[mine]) / (new[lead] / old[lead]) - 1)
+        worst[n] = np.nan_to_num(change * rows.da[mine] / rows.da[lead], nan=0.0, posinf=1.0).max()
+    total = since.sum()
+    return float(worst @ since / total) if total else 0.0
+
+
+__all__ = [
+    "Block",
+    "Driving",
+    "Rerated",
+    "block_of_run",
+    "bound_of_shares",
+    "check_block",
+    "cycles_of",
+    "driving",
+    "rerated",
+]

@@ -1,0 +1,366 @@
+"""Growth cycle by cycle along the path of a run, with what overloads leave behind."""
+
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from xcrack.base.arrays import Floats, Ints
+from xcrack.base.checks import number, shown
+from xcrack.base.errors import ProblemError
+from xcrack.fatigue.checks import evaluate_law
+from xcrack.fatigue.criteria import clipped, equivalent_K
+from xcrack.fatigue.law import Law
+from xcrack.fatigue.spectrum import Spectrum, distinct
+from xcrack.fatigue.zones import Retardation, wheeler, willenborg
+from xcrack.growth.levels import Ladder
+from xcrack.growth.step import Step
+from xcrack.growth.uncertainty import best_known
+from xcrack.runs.history import History
+from xcrack.runs.rerating import Block, Driving, driving
+from xcrack.runs.scatter import Samples, stretch_of, varied
+
+_BREAKS = "the law returns inf: the toughness is reached"
+_SHIFTS = 257  # values of the reduction of K at which the law is asked
+
+
+@dataclass(frozen=True, eq=False)
+class Retarded:
+    """Growth of one tip, cycle by cycle.
+
+    Attributes
+    ----------
+    a : (n,) array, length
+        At the steps of the run that are reached, and where growth ends.
+    blocks : (n,) array
+        Blocks of cycles until then.
+    ended : str
+        Empty where the crack reaches the last step; else why it does not.
+    """
+
+    a: Floats
+    blocks: Floats
+    ended: str = ""
+
+    @property
+    def life(self) -> float:
+        """Blocks at the end."""
+        return float(self.blocks[-1])
+
+    @property
+    def broken(self) -> bool:
+        """Whether the crack comes to its end: the last step, or the toughness."""
+        return self.ended in ("", _BREAKS)
+
+
+def retarded(
+    history: History,
+    law: Law,
+    spectrum: Spectrum,
+    model: Retardation | None,
+    *,
+    nu: float,
+    max_blocks: float = 1e6,
+) -> Retarded:
+    """Life of one tip under a spectrum, cycle by cycle, with retardation after overloads.
+
+    Along the path of a run of the same spectrum, whose K at the levels of each step is linear in
+    the length between two steps. The path itself is that of growth without retardation: with one
+    tip that is the same one.
+
+    Parameters
+    ----------
+    history : History
+        Of `spectrum`, with one tip that grows.
+    law : callable
+        For K as computed with contact.
+    spectrum : Spectrum
+        Of factors, in time.
+    model : wheeler or willenborg, or None
+        None: cycle by cycle without retardation, to compare with.
+    nu : float
+        Poisson's ratio, for K_eq.
+    max_blocks : float
+        Blocks after which to stop.
+
+    Returns
+    -------
+    Retarded
+
+    Raises
+    ------
+    ProblemError
+        A history of something else or with several tips, rows without an order, a law with nominal
+        R: zones and reductions belong to the K that acts.
+
+    Notes
+    -----
+    Each cycle sits where its maximum occurs. The law is asked at both ends of each step for each
+    kind of cycle, for Willenborg also at 257 values of the reduction of K.
+    """
+    check(history, law, spectrum, model)
+    limit = number(max_blocks, "retarded: max_blocks", above=0)
+    nu = number(nu, "retarded: nu", above=-1, below=0.5)
+    return CycledPath.of(history, spectrum, nu).grown(law, model, limit)
+
+
+@dataclass(frozen=True, eq=False)
+class CycledPath:
+    """Path of one tip, with K_eq of each kind of cycle at the ends of each step.
+
+    Attributes
+    ----------
+    rows : Driving
+    K : tuple of (2, p, 2) arrays, stress √length
+        Before and after a step, of each kind of cycle, at its minimum and its maximum.
+    order : (n,) array of int
+        Kinds of the cycles of a block, in time.
+    """
+
+    rows: Driving
+    K: tuple[Floats, ...]
+    order: Ints
+
+    @classmethod
+    def of(cls, history: History, spectrum: Spectrum, nu: float) -> "CycledPath":
+        """Path of a run.
+
+        Raises
+        ------
+        ProblemError
+            Several tips grow.
+        """
+        rows = driving(history.steps)
+        if len(np.unique(rows.step)) < len(rows.step) or not rows.is_one_tip:
+            raise ProblemError(
+                "retarded: several tips grow in this history: retardation along a stored path is "
+                "for one tip, whose path does not depend on its rate."
+            )
+        values, _, order = distinct(spectrum.cycles)
+        K = tuple(
+            _ends(rows, row, (history.steps[n], history.steps[n + 1]), values, spectrum, nu)
+            for row, n in enumerate(rows.step.tolist())
+        )
+        return cls(rows, K, order)
+
+    def grown(
+        self, law: Law, model: Retardation | None, limit: float, factor: float | Floats = 1.0
+    ) -> Retarded:
+        """Growth cycle by cycle, with K times a factor, of each step where it is an array."""
+        rows, order = self.rows, self.order
+        factors = np.broadcast_to(factor, len(self.K))
+        a, blocks, ended = [float(rows.a[0, 0])], [0.0], ""
+        state = np.array([-np.inf, 0.0, 0.0, 0.0])
+        state[0] = a[0]
+        for row, (ends, times) in enumerate(zip(self.K, factors)):
+            K = ends * times
+            cycles, reached = _piece(rows, row, K, law, model, order, state, limit - blocks[-1])
+            blocks.append(blocks[-1] + cycles / len(order))
+            a.append(reached)
+            if reached < rows.a[row, 1]:
+                ended = (
+                    f"max_blocks = {limit:.6g} reached"
+                    if blocks[-1] >= limit
+                    else _BREAKS
+                    if _breaks(rows, row, K, law)
+                    else "a whole block lets nothing grow"
+                )
+                break
+        return Retarded(np.array(a), np.array(blocks), ended)
+
+
+def check(history: object, law: object, spectrum: object, model: object) -> None:
+    """Refuse what cannot be taken cycle by cycle.
+
+    Raises
+    ------
+    ProblemError
+    """
+    if not isinstance(history, History):
+        raise ProblemError(f"retarded: history = {shown(history)}: give a History.")
+    if not callable(law):
+        raise ProblemError(f"retarded: law = {shown(law)} cannot be called: give a law.")
+    if not isinstance(spectrum, Spectrum) or spectrum.factors is None:
+        raise ProblemError(
+            f"retarded: spectrum = {shown(spectrum)}: give Spectrum(factors): rows and states have "
+            "no order in time."
+        )
+    if not (model is None or isinstance(model, Retardation)):
+        raise ProblemError(f"retarded: model = {shown(model)}: give wheeler or willenborg.")
+    if getattr(law, "ratio", None) == "nominal":
+        raise ProblemError(
+            'retarded: the law has ratio="nominal", but zones and reductions belong to K with '
+            'contact: give a law for it, with ratio="contact".'
+        )
+    if not all(step.levels for step in history.steps):
+        raise ProblemError("retarded: the history was not made with a Spectrum of factors.")
+
+
+def _ends(
+    rows: Driving,
+    row: int,
+    ends: tuple[Step, Step],
+    values: Floats,
+    spectrum: Spectrum,
+    nu: float,
+) -> Floats:
+    """K_eq of both ends of each kind of cycle, before and after a step `(2, p, 2)`."""
+    c, j = rows.place[row].tolist()
+    last_c, last_j = rows.place[min(row + 1, len(rows.step) - 1)].tolist()
+    places = ((c, j), (last_c, last_j))
+    result: list[Floats] = []
+    for step, (crack, place) in zip(ends, places):
+        if place >= len(step.angle[crack]):  # it has left the body: K stays what it was
+            result.append(result[-1])
+            continue
+        levels = np.array(step.levels)
+        K = np.stack([state[crack].K[place] for state in best_known(step.sif)])[:, None]
+        if len(levels) == 2 and levels[0] < 0 < levels[1] and not spectrum.steady:
+            levels = np.array([levels[0], 0.0, levels[1]])
+            K = np.stack([K[0], np.zeros_like(K[0]), K[1]])
+        ladder = Ladder(levels, K, smooth=len(levels) > 3)
+        angle = step.angle[crack][place]
+        both = [equivalent_K(clipped(ladder.at(values[:, k])), angle, nu)[:, 0] for k in (0, 1)]
+        result.append(np.stack([np.minimum(*both), np.maximum(*both)], axis=1))
+    return np.stack(result)
+
+
+def _piece(
+    rows: Driving,
+    row: int,
+    K: Floats,
+    law: Law,
+    model: Retardation | None,
+    order: Ints,
+    state: Floats,
+    left: float,
+) -> tuple[float, float]:
+    """Cycles of one step, and where the crack comes to; the state is changed."""
+    from xcrack.fatigue.kernels.retardation import advanced
+
+    shifts = np.linspace(0, 1, _SHIFTS) if isinstance(model, willenborg) else np.zeros(1)
+    rate = _rates(rows, row, K, law, shifts)
+    dK = K[..., 1] - K[..., 0]
+    threshold = model.dK_th if isinstance(model, willenborg) else 0.0
+    share = np.divide(threshold, dK, out=np.ones_like(dK), where=dK > 0)
+    kind = 1 if isinstance(model, wheeler) else 2 if isinstance(model, willenborg) else 0
+    cycles, a = advanced(
+        float(rows.a[row, 0]),
+        float(rows.a[row, 1]),
+        order,
+        np.ascontiguousarray(K[..., 1]),
+        rate,
+        shifts,
+        0.0 if model is None else model.zone.factor,
+        kind,
+        model.w if isinstance(model, wheeler) else 1.0,
+        model.shutoff if isinstance(model, willenborg) else 2.0,
+        share,
+        state,
+        left,
+    )
+    return float(cycles), float(a)
+
+
+def _rates(rows: Driving, row: int, K: Floats, law: Law, shifts: Floats) -> Floats:
+    """Rates of each kind of cycle at both ends, for each share of K that is taken away."""
+    largest = K[..., 1, None] * (1 - shifts)
+    smallest = np.maximum(K[..., 0, None] - K[..., 1, None] * shifts, 0.0)
+    R = np.divide(smallest, largest, out=np.zeros_like(largest), where=largest > 0)
+    size = np.broadcast_to(rows.size[row][:, None, None], largest.shape)
+    parts = (largest - smallest, R, size)
+    dK, ratio, a = (np.ascontiguousarray(part).ravel() for part in parts)
+    return evaluate_law(law, dK, ratio, 0, "cycle", a).reshape(largest.shape)
+
+
+def _breaks(rows: Driving, row: int, K: Floats, law: Law) -> bool:
+    return bool(np.isinf(_rates(rows, row, K, law, np.zeros(1))).any())
+
+
+# Lives of samples with retardation: each sample cycle by cycle, on K that a run has stored.
+
+
+class RetardedLives:
+    """What lives with retardation are made of.
+
+    Parameters
+    ----------
+    history : History
+    law : callable or None
+    block : Block or None
+        Of the run.
+    model : wheeler or willenborg
+    max_blocks : float
+        Samples that are longer do not end.
+
+    Raises
+    ------
+    ProblemError
+        Parts that are not given, several tips.
+    """
+
+    def __init__(
+        self,
+        history: History,
+        law: Law | None,
+        block: Block | None,
+        model: Retardation,
+        max_blocks: float,
+    ) -> None:
+        if not isinstance(model, Retardation):
+            raise ProblemError(f"life: retardation = {shown(model)}: give wheeler or willenborg.")
+        if block is None or law is None:
+            raise ProblemError(
+                "life: retardation goes cycle by cycle: give law, spectrum, criterion and nu as "
+                "the run had them."
+            )
+        check(history, law, block.spectrum, model)
+        self.path = CycledPath.of(history, block.spectrum, block.nu)
+        self.law, self.model, self.limit = law, model, max_blocks
+        self.unit = block.spectrum.unit
+
+    @property
+    def life(self) -> float:
+        """Blocks with nothing varied."""
+        return self._blocks(self.path.grown(self.law, self.model, self.limit))
+
+    def lives(self, drawn: Samples, n: int) -> Floats:
+        """Blocks of each sample `(n,)`; inf for those that do not end."""
+        names = [name for name in drawn if name not in ("C", "K", "load")]
+        stretch = np.broadcast_to(stretch_of(drawn), n)
+        C = np.broadcast_to(drawn.get("C", np.ones(1)), n)
+        N = np.empty(n)
+        for k in range(n):
+            law = varied(self.law, {name: float(drawn[name][k]) for name in names})
+            grown = self.path.grown(_times(law, float(C[k])), self.model, self.limit, stretch[k])
+            N[k] = self._blocks(grown)
+        return N
+
+    def of_K(self) -> float:
+        """Largest change of the life with all K larger or smaller by their spread."""
+        life, share = self.life, self.path.rows.spread.max(axis=1)
+        return max(
+            abs(self._blocks(self.path.grown(self.law, self.model, self.limit, 1 + s * share))
+                - life) / life
+            for s in (-1.0, 1.0)
+        )  # fmt: skip
+
+    def _blocks(self, grown: Retarded) -> float:
+        return grown.life if grown.broken else float("inf")
+
+
+def _times(law: Law, factor: float) -> Law:
+    """A law times a factor; it asks for what the law asks for."""
+    if factor == 1:
+        return law
+    result = partial(_scaled, law, factor)
+    result.needs = getattr(law, "needs", ())  # type: ignore[attr-defined]
+    return result
+
+
+def _scaled(law: Law, factor: float, *given: Any, **named: Any) -> Floats:
+    return np.asarray(factor * law(*given, **named))
+
+
+__all__ = ["CycledPath", "Retarded", "RetardedLives", "check", "retarded"]

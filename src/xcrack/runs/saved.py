@@ -1,0 +1,229 @@
+"""Solutions and histories in files, without pickle: what was solved, not matrices.
+
+Functions among loads and supports cannot be stored. A solution that comes back has a name in their
+place: pictures, K and reports work; solving again asks for the script.
+"""
+
+import contextlib
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from xcrack.analysis import plan
+from xcrack.analysis.contact_result import Contact
+from xcrack.analysis.plan import Ingredient, Report
+from xcrack.analysis.solution import Solution
+from xcrack.base.arrays import Floats, lock
+from xcrack.base.errors import ProblemError
+from xcrack.base.paths import path_of, system_errors
+from xcrack.fem.system import discretised
+from xcrack.linalg.reuse import Reuse
+from xcrack.mesh.mesh import Mesh
+from xcrack.mesh.polygon import Round
+from xcrack.model import conditions
+from xcrack.model.conditions import Bearing, Resultant, Temperature
+from xcrack.model.material import Isotropic
+from xcrack.model.numerics import Comparison, Numerics
+from xcrack.model.problem import Problem
+from xcrack.runs import run_folder, store
+from xcrack.runs.history import History
+
+_FORMAT = 1
+_SUFFIX = ".npz"
+_CONDITIONS = (
+    conditions.Fix, conditions.Displacement, conditions.Traction, conditions.Pressure,
+    conditions.PointForce, conditions.BodyForce, conditions.CrackPressure,
+    conditions.InitialStress, Bearing, Resultant, Temperature,
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class NotStored:
+    """Stands for a function that a file could not hold.
+
+    Attributes
+    ----------
+    name : str
+    """
+
+    name: str
+
+    def __call__(self, *values: Any) -> Any:
+        """Refuse to be called."""
+        raise ProblemError(
+            f"the function {self.name} was not stored with the solution: make the problem again by "
+            "the script that made it."
+        )
+
+
+_CLASSES: dict[str, type] = {
+    **run_folder.CLASSES,
+    "LoadResultant": plan.Resultant,
+    **{
+        kind.__name__: kind
+        for kind in (Problem, Mesh, Round, Isotropic, Numerics, Comparison, Contact, Report,
+                     Ingredient, NotStored, *_CONDITIONS)
+    },
+}  # fmt: skip
+
+
+def save(result: Solution | Sequence[Solution] | History, path: str | PathLike[str]) -> Path:
+    """Save a solution, the solutions of one solve, or a history to a file.
+
+    Parameters
+    ----------
+    result : Solution, list of Solution, or History
+        Of a history without the solutions of its steps.
+    path : path
+        ``.npz`` is added to one without suffix. `load` reads it.
+
+    Returns
+    -------
+    Path
+
+    Raises
+    ------
+    ProblemError
+        Something else than these, or a file that cannot be written.
+    """
+    file = path_of(path, "save: path", error=ProblemError)
+    if file.name in ("", ".."):
+        raise ProblemError(f"save: path = {str(file)!r} is a folder: give a file in it.")
+    file = file if file.suffix else file.with_name(file.name + _SUFFIX)
+    content = {"format": _FORMAT, **_content(result)}
+    with system_errors("the result cannot be written to", file, error=ProblemError):
+        file.parent.mkdir(parents=True, exist_ok=True)
+        store.save(file, content, _CLASSES)
+    return file
+
+
+def read_saved(path: Path) -> Any:
+    """What `save` wrote.
+
+    Raises
+    ------
+    ProblemError
+        The file is not one of these, or of a newer xcrack.
+    """
+    content = store.load(path, _CLASSES)
+    if not isinstance(content, dict) or "format" not in content:
+        raise ProblemError(f"{path} is not a file that save wrote, or it is damaged.")
+    if content["format"] > _FORMAT:
+        raise ProblemError(f"{path} was written by a newer xcrack: update xcrack.")
+    if content["kind"] == "history":
+        return History(content["steps"], content["ended"], None, content["mesh"])
+    solutions = _solutions(content)
+    return solutions if content["several"] else solutions[0]
+
+
+def write_body(path: Path, problem: Problem) -> None:
+    """Write body, supports and loads of a run beside its steps, for pictures and reports.
+
+    A run does without it: where it cannot be stored, or the system refuses, it is left out.
+    """
+    storable = _storable(replace(problem, cracks=(), friction=0.0, numerics=Numerics()))
+    content = {"format": _FORMAT, "kind": "body", "problem": storable}
+    with contextlib.suppress(OSError, ProblemError):
+        path.write_bytes(store.packed(content, _CLASSES))
+
+
+def read_body(path: Path) -> Problem | None:
+    """The body of a run without its cracks; None where it is not there, or not whole."""
+    if not path.is_file():
+        return None
+    try:
+        content = store.load(path, _CLASSES)
+    except ProblemError:
+        return None
+    problem = content.get("problem") if isinstance(content, dict) else None
+    return problem if isinstance(problem, Problem) else None
+
+
+def stored_condition(condition: Any) -> Any:
+    """A support or load whose functions are replaced by their names."""
+    changes = {}
+    for name in ("where", "value", "field"):
+        value = getattr(condition, name, None)
+        if callable(value) and not isinstance(value, NotStored):
+            changes[name] = NotStored(getattr(value, "__name__", type(value).__name__))
+    return replace(condition, **changes) if changes else condition
+
+
+def _content(result: Any) -> dict[str, Any]:
+    if isinstance(result, History):
+        steps = tuple(replace(step, solutions=()) for step in result.steps)
+        return {"kind": "history", "steps": steps, "ended": result.ended, "mesh": result.mesh}
+    several = not isinstance(result, Solution)
+    solutions = list(result) if isinstance(result, list | tuple) else [result]
+    if not solutions or not all(isinstance(solution, Solution) for solution in solutions):
+        raise ProblemError(
+            f"save takes a Solution, a list of them, or a History, not a {type(result).__name__}."
+        )
+    if any(solution.space is not solutions[0].space for solution in solutions):
+        raise ProblemError("save: the solutions are of different solves: save each on its own.")
+    first = solutions[0]
+    return {
+        "kind": "solution",
+        "several": several,
+        "problem": _storable(first.problem),
+        "reuse": first.reuse.without_matrices(),
+        "states": [_state(solution) for solution in solutions],
+    }
+
+
+def _storable(problem: Problem) -> Problem:
+    """A problem whose functions are replaced by their names; curves of the user are left out."""
+    curves = {k: c for k, c in problem.mesh.curves.items() if isinstance(c, Round)}
+    mesh = problem.mesh
+    return replace(
+        problem,
+        mesh=mesh if len(curves) == len(mesh.curves) else replace(mesh, curves=curves),
+        supports=tuple(map(stored_condition, problem.supports)),
+        loads=tuple(map(stored_condition, problem.loads)),
+    )
+
+
+def _state(solution: Solution) -> dict[str, Any]:
+    state = solution.state
+    if isinstance(state, list | tuple):
+        state = [stored_condition(load) for load in state]
+    return {
+        "state": state,
+        "loads": tuple(map(stored_condition, solution.loads)),
+        "factor": solution.factor,
+        "u": solution.u,
+        "contact": solution.contact,
+        "energy": solution.energy,
+        "report": solution.report,
+        "dissipated": solution.dissipated,
+    }
+
+
+def _solutions(content: dict[str, Any]) -> list[Solution]:
+    """Solutions on a space that is made anew: the same numbering for the same problem."""
+    problem: Problem = content["problem"]
+    space, lips = discretised(problem)
+    reuse: Reuse = content["reuse"]
+    solutions = []
+    for state in content["states"]:
+        u: Floats = lock(np.asarray(state["u"]))
+        if u.shape != (space.n_dof,):
+            raise ProblemError(
+                f"the file holds {len(u)} unknowns, and its problem has {space.n_dof} in this "
+                "xcrack: read it with the version that wrote it."
+            )
+        names = ("state", "loads", "factor", "contact", "energy", "report")
+        parts = {name: state[name] for name in names}
+        parts["dissipated"] = state.get("dissipated", 0.0)  # files of before have none
+        solutions.append(
+            Solution(problem=problem, space=space, u=u, lips=lips, reuse=reuse,
+                     **parts)
+        )  # fmt: skip
+    return solutions
+
+
+__all__ = ["NotStored", "read_body", "read_saved", "save", "write_body"]

@@ -1,0 +1,253 @@
+"""The interaction integral in 2D: cells that it needs, and its sum over their points."""
+
+import math
+
+import numpy as np
+
+from xcrack.base.kernels.jit import kernel
+
+
+@kernel
+def cells_between(points, cells, size, centre, hollow, radius):  # type: ignore[no-untyped-def]
+    """Cells that may have points between two radii, increasing `(k,)`.
+
+    Parameters
+    ----------
+    points : (n, d) array, length
+    cells : (m, d + 1) array of int
+    size : (m,) array, length
+        Longest edge of each cell.
+    centre : (d,) array
+    hollow, radius : float, length
+        A cell is left out where all its corners are within `hollow`, or its centroid is farther
+        than its size outside `radius`.
+    """
+    corners, d = cells.shape[1], points.shape[1]
+    chosen = np.empty(len(cells), np.int64)
+    count = 0
+    for e in range(len(cells)):
+        far, away = 0.0, 0.0
+        for j in range(d):
+            mean = 0.0
+            for b in range(corners):
+                mean += points[cells[e, b], j]
+            away += (mean / corners - centre[j]) ** 2
+        if math.sqrt(away) > radius + size[e]:
+            continue
+        for b in range(corners):
+            apart = 0.0
+            for j in range(d):
+                apart += (points[cells[e, b], j] - centre[j]) ** 2
+            far = max(far, apart)
+        if math.sqrt(far) <= hollow:
+            continue
+        chosen[count] = e
+        count += 1
+    return chosen[:count]
+
+
+@kernel
+def _unit_fields(r, c, s, modes, kolosov, lam, mu, g, sigma):  # type: ignore[no-untyped-def]
+    """Gradients and stresses of modes I and II and of the point force, at half the angle (c, s)."""
+    root, C, S = 1.0 / math.sqrt(r), c * c - s * s, 2.0 * s * c
+    value = (c, s, s * S, c * S)
+    slope = (-s / 2, c / 2, c * S / 2 + s * C, -s * S / 2 + c * C)
+    for m in range(2):
+        for i in range(2):
+            g[m, i, 0] = 0.0
+            g[m, i, 1] = 0.0
+            for f in range(4):
+                g[m, i, 0] += modes[m, i, f] * root * (0.5 * value[f] * C - slope[f] * S)
+                g[m, i, 1] += modes[m, i, f] * root * (0.5 * value[f] * S + slope[f] * C)
+    radial = -C / (math.pi * r)
+    mean = (3.0 - kolosov) / 4.0 * radial
+    turn = (kolosov + 1.0) / (8.0 * mu * math.pi) * S / r
+    g[2, 0, 0] = (radial * C * C - mean) / (2.0 * mu)
+    g[2, 0, 1] = radial * C * S / (2.0 * mu) - turn
+    g[2, 1, 0] = radial * C * S / (2.0 * mu) + turn
+    g[2, 1, 1] = (radial * S * S - mean) / (2.0 * mu)
+    for m in range(3):
+        trace = lam * (g[m, 0, 0] + g[m, 1, 1])
+        sigma[m, 0, 0] = trace + 2.0 * mu * g[m, 0, 0]
+        sigma[m, 1, 1] = trace + 2.0 * mu * g[m, 1, 1]
+        sigma[m, 0, 1] = mu * (g[m, 0, 1] + g[m, 1, 0])
+        sigma[m, 1, 0] = sigma[m, 0, 1]
+
+
+@kernel
+def _into_frame(frame, tensor, turn, local):  # type: ignore[no-untyped-def]
+    """Components along the rows of a frame of a tensor less another one; (2, 2, s)."""
+    for state in range(tensor.shape[2]):
+        a, b = tensor[0, 0, state] - turn[0, 0, state], tensor[0, 1, state] - turn[0, 1, state]
+        c, d = tensor[1, 0, state] - turn[1, 0, state], tensor[1, 1, state] - turn[1, 1, state]
+        for i in range(2):
+            first = frame[i, 0] * a + frame[i, 1] * c
+            second = frame[i, 0] * b + frame[i, 1] * d
+            for j in range(2):
+                local[i, j, state] = first * frame[j, 0] + second * frame[j, 1]
+
+
+@kernel
+def _add_point(  # type: ignore[no-untyped-def]
+    total, local, dx, dy, side, behind, weight, radii, inner, frame, modes, kolosov, lam, mu, g,
+    sigma, fall,
+):  # fmt: skip
+    """Add what one point contributes; local: gradients in the frame, dx and dy from the tip."""
+    r = math.sqrt(dx * dx + dy * dy)
+    x = frame[0, 0] * dx + frame[0, 1] * dy
+    y = frame[1, 0] * dx + frame[1, 1] * dy
+    # Half the angle without trigonometry; the larger of its sine and cosine by the root.
+    if x >= 0.0:
+        c = math.sqrt(0.5 * (1.0 + x / r))
+        s = 0.5 * y / (r * c)
+    else:
+        s = math.copysign(math.sqrt(0.5 * (1.0 - x / r)), y)
+        c = 0.5 * y / (r * s)
+    if behind and side * s < 0.0:  # a lip that bends: the angle is continued by a turn
+        c, s = -c, -s
+    _unit_fields(r, c, s, modes, kolosov, lam, mu, g, sigma)
+    for k in range(len(radii)):
+        width = radii[k] - inner[k]
+        z = min(max((r - inner[k]) / width, 0.0), 1.0)
+        fall[k] = -30.0 * weight * (z * (1.0 - z)) ** 2 / (width * r)
+    for state in range(local.shape[2]):
+        a, b = local[0, 0, state], local[1, 0, state]
+        across = lam * a + (lam + 2.0 * mu) * local[1, 1, state]
+        shear = mu * (local[0, 1, state] + b)
+        for m in range(3):
+            # P_11 and P_12 of P_kj t_k, t along the first axis.
+            flux = x * (
+                sigma[m, 0, 0] * a + sigma[m, 1, 0] * b - shear * g[m, 0, 1] - across * g[m, 1, 1]
+            )
+            flux += y * (
+                sigma[m, 0, 1] * a + sigma[m, 1, 1] * b + shear * g[m, 0, 0] + across * g[m, 1, 0]
+            )
+            for k in range(len(radii)):
+                total[state, k, m] += fall[k] * flux
+
+
+@kernel
+def add_points(  # type: ignore[no-untyped-def]
+    total, gradient, cell, bary, side, weight, points, cells, psi, tip, turn, radii, inner, frame,
+    modes, kolosov, lam, mu,
+):  # fmt: skip
+    """Add the domain integrals of modes I, II and of the point force over points.
+
+    P_kj t_k q_,j in the frame (ahead, normal), without trigonometry. A left-handed frame changes
+    no formula.
+
+    Parameters
+    ----------
+    total : (s, k, 3) array
+        By state, domain and field; changed in place.
+    gradient : (q, 2, 2, s) array
+        Of the displacements (component, derivative), global axes.
+    cell, bary : (q,) array of int and (q, 3) array
+    side : (q,) array of int
+        Side of the crack, 0 where unknown: it counts in cells behind the tip, where psi < 0.
+    weight : (q,) array
+    points, cells : (n, 2) and (m, 3) arrays
+    psi : (n,) array
+    tip : (2,) array, length
+    turn : (2, 2, s) array
+        Mean rotation, subtracted from the gradients.
+    radii, inner : (k,) arrays, length
+        q falls from one to zero by a quintic between inner and radii.
+    frame : (2, 2) array
+    modes : (2, 2, 4) array
+        Displacements of modes I and II by tip function.
+    kolosov, lam, mu : float
+    """
+    g, sigma, fall = np.empty((3, 2, 2)), np.empty((3, 2, 2)), np.empty(len(radii))
+    local = np.empty((2, 2, total.shape[0]))
+    largest, smallest = radii[0], inner[0]
+    for k in range(1, len(radii)):
+        largest, smallest = max(largest, radii[k]), min(smallest, inner[k])
+    for p in range(len(weight)):
+        dx, dy, psi_sum = -tip[0], -tip[1], 0.0
+        for b in range(3):
+            node = cells[cell[p], b]
+            dx += bary[p, b] * points[node, 0]
+            dy += bary[p, b] * points[node, 1]
+            psi_sum += psi[node]
+        if smallest * smallest < dx * dx + dy * dy < largest * largest:
+            _into_frame(frame, gradient[p], turn, local)
+            _add_point(
+                total, local, dx, dy, side[p], psi_sum < 0.0, weight[p], radii, inner, frame, modes,
+                kolosov, lam, mu, g, sigma, fall,
+            )  # fmt: skip
+
+
+@kernel
+def add_plain_cells(  # type: ignore[no-untyped-def]
+    total, chosen, points, cells, slopes, volume, nodes, edges, coefficients, side, psi, bary,
+    share, tip, turn, radii, inner, frame, modes, kolosov, lam, mu,
+):  # fmt: skip
+    """Add the domain integrals over plain cells: places, gradients and terms in one pass.
+
+    Gradients are those at the corners, between which they are linear at both orders.
+
+    Parameters
+    ----------
+    total, tip, turn, radii, inner, frame, modes, kolosov, lam, mu
+        As of `add_points`.
+    chosen : (k,) array of int
+        Cells on which no enriched function acts.
+    points, cells : (n, 2) and (m, 3) arrays
+    slopes : (m, 3, 2) array
+        Gradients of the barycentric coordinates.
+    volume : (m,) array
+    nodes : (m, n) array of int
+    edges : (e, 2) array of int
+        Ends of the edges that carry a node; none at order 1.
+    coefficients : (f, 2, s) array
+    side : (m,) array of int
+        Side of the crack on which a cell lies.
+    psi : (n,) array
+    bary, share : (q, 3) and (q,) arrays
+        Points of a cell and their share of its volume.
+    """
+    states = total.shape[0]
+    g, sigma, fall = np.empty((3, 2, 2)), np.empty((3, 2, 2)), np.empty(len(radii))
+    gradient, corner = np.empty((2, 2, states)), np.empty((3, 2, 2, states))
+    local = np.empty((2, 2, states))
+    largest, smallest = radii[0], inner[0]
+    for k in range(1, len(radii)):
+        largest, smallest = max(largest, radii[k]), min(smallest, inner[k])
+    for e in chosen:
+        behind = psi[cells[e, 0]] + psi[cells[e, 1]] + psi[cells[e, 2]] < 0.0
+        for b in range(3):
+            for i in range(2):
+                for s in range(states):
+                    gradient[i, 0, s] = gradient[i, 1, s] = 0.0
+                    for a in range(3):
+                        rise = 1.0 if len(edges) == 0 else 3.0 if a == b else -1.0
+                        u = rise * coefficients[nodes[e, a], i, s]
+                        gradient[i, 0, s] += slopes[e, a, 0] * u
+                        gradient[i, 1, s] += slopes[e, a, 1] * u
+                    for k in range(len(edges)):
+                        other = edges[k, 0] + edges[k, 1] - b
+                        if edges[k, 0] == b or edges[k, 1] == b:
+                            u = 4.0 * coefficients[nodes[e, 3 + k], i, s]
+                            gradient[i, 0, s] += slopes[e, other, 0] * u
+                            gradient[i, 1, s] += slopes[e, other, 1] * u
+            _into_frame(frame, gradient, turn, corner[b])
+        for p in range(len(share)):
+            dx, dy = -tip[0], -tip[1]
+            for b in range(3):
+                dx += bary[p, b] * points[cells[e, b], 0]
+                dy += bary[p, b] * points[cells[e, b], 1]
+            if not smallest * smallest < dx * dx + dy * dy < largest * largest:
+                continue
+            for i in range(2):
+                for j in range(2):
+                    for s in range(states):
+                        local[i, j, s] = (
+                            bary[p, 0] * corner[0, i, j, s]
+                            + bary[p, 1] * corner[1, i, j, s]
+                            + bary[p, 2] * corner[2, i, j, s]
+                        )
+            _add_point(
+                total, local, dx, dy, side[e], behind, share[p] * volume[e], radii, inner, frame,
+                modes, kolosov, lam, mu, g, sigma, fall,
+            )  # fmt: skip

@@ -1,1 +1,0 @@
-"""Load histories: turning points, rainflow cycles, files, and the spectrum TWIST."""

@@ -1,0 +1,68 @@
+"""K along fronts: pennies and ellipses under tension and shear, open and pressed together."""
+
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from xcrack.analysis.solve import solve
+from xcrack.sif.stress_intensity import stress_intensity
+from xcrack.verification.book.case import Case, Value
+from xcrack.verification.book.scenes_3d import Stress, exact_K, flat_crack
+
+_MIXED: Stress = (1.0, 0.3, 0.2)
+_CLOSED: Stress = (-1.0, 0.3, 0.2)
+_PENNY = "penny-shaped crack in an infinite body (Sneddon, 1946; Segedin, 1951)"
+_ELLIPSE = "elliptic crack in an infinite body (Irwin, 1962; Kassir and Sih, 1966)"
+
+
+def _open(level: int, h: float, b: float | None, order: int, **shape: Any) -> list[Value]:
+    a = 0.5 if b is None else 0.6
+    problem, Q = flat_crack(h / 2**level, _MIXED, a=a, b=b, order=order, contact="off", **shape)
+    sif = stress_intensity(solve(problem))
+    wanted = exact_K(sif, Q, _MIXED, a=a, b=b)
+    error, size = sif.K - wanted, np.abs(wanted).max(axis=0)
+    mean, worst = {1: (2e-2, 5e-2), 2: (2e-2, 5e-2)}[order]
+    values = [
+        Value("mean of K_I", float(sif.K_I.mean()), float(wanted[:, 0].mean()), mean),
+    ]
+    for m, mode in enumerate(("I", "II", "III")):
+        values.append(
+            Value(f"largest error of K_{mode}", float(np.abs(error[:, m]).max() / size[m]), 0.0,
+                  worst, 1.0)
+        )  # fmt: skip
+    return values
+
+
+def _closed(level: int) -> list[Value]:
+    problem, Q = flat_crack(0.17 / 2**level, _CLOSED)
+    solution = solve(problem)
+    sif, contact = stress_intensity(solution), solution.contact[0]
+    assert contact is not None
+    wanted = exact_K(sif, Q, _CLOSED)
+    size = float(np.abs(wanted[:, 1:]).max())
+    mean = float(contact.measure @ contact.pressure / contact.measure.sum())
+    return [
+        Value("mean pressure", mean, 1.0, 1e-2),
+        Value("largest K_I", float(np.abs(sif.K_I).max()), 0.0, 1e-9, size),
+        *(
+            Value(f"mean error of K_{mode}", float(np.abs(sif.K - wanted)[:, m].mean()), 0.0, 5e-2,
+                  size)
+            for m, mode in ((1, "II"), (2, "III"))
+        ),
+    ]  # fmt: skip
+
+
+CASES = (
+    Case("penny-1", "K_fronts", _PENNY, "exact", 3, 1, False,
+         partial(_open, h=0.17, b=None, order=1), 2),
+    Case("penny-2", "K_fronts", _PENNY, "exact", 3, 2, False,
+         partial(_open, h=0.25, b=None, order=2), 1, quick=False),
+    Case("ellipse-1", "K_fronts", _ELLIPSE, "exact", 3, 1, False,
+         partial(_open, h=0.06, b=0.3, order=1, half=1.2, margin=0.11, depth=0.17), 1,
+         quick=False),
+    Case("penny-closed-1", "sliding", _PENNY, "exact", 3, 1, True, _closed, 2),
+)  # fmt: skip
+
+
+__all__ = ["CASES"]

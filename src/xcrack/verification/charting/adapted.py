@@ -1,0 +1,134 @@
+"""Runs of `adapt` as a line of a chart: the wanted error in, in place of a mesh."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from xcrack.adaptivity.adapt import adapt
+from xcrack.adaptivity.adapted import Adapted
+from xcrack.base.arrays import Floats, lock
+from xcrack.base.checks import entries, number
+from xcrack.base.errors import ProblemError, XcrackError, collected_warnings
+from xcrack.model.problem import Problem
+from xcrack.verification.charting.meshes import smallest
+from xcrack.verification.charting.result import Row
+from xcrack.verification.charting.values import Sampled, at_places, sampled
+
+_NAME = "adapt"
+_MESH = -1  # number of a mesh that is a run's own
+_TOLERANCES = {2: (3e-2, 1e-2, 3e-3, 1e-3), 3: ()}  # in 3D rounds take minutes
+_STRONGEST = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """One tolerance: the result and the median time of it, or why there is none."""
+
+    tolerance: float
+    seconds: float = np.nan
+    sample: Sampled | None = None
+    result: Adapted | None = None
+    warnings: tuple[str, ...] = ()
+    failed: str = ""
+
+
+def wanted_of(given: Sequence[float] | None, problem: Problem, varied: bool) -> tuple[float, ...]:
+    """Tolerances to run, from large to small.
+
+    Parameters
+    ----------
+    given : sequence of float, or None
+    problem : Problem
+    varied : bool
+        Whether settings are those that a chart takes by itself.
+
+    Raises
+    ------
+    ProblemError
+        No numbers between 0 and 1, or no K to adapt to.
+    """
+    tips = any(crack.n_tips for crack in problem.placed)
+    if given is None:
+        return _TOLERANCES[problem.mesh.dim] if varied and tips else ()
+    values = {number(t, "chart: tolerance", above=0, below=1) for t in entries(given, "tolerances")}
+    if min(values) < _STRONGEST:
+        raise ProblemError(f"chart: tolerance = {min(values):g}: give {_STRONGEST:g} or more.")
+    if not tips:
+        raise ProblemError("chart: tolerances are those of K, and no crack has a tip in the body.")
+    return tuple(sorted(values, reverse=True))
+
+
+def adapted_runs(
+    problem: Problem,
+    tolerances: Sequence[float],
+    states: Sequence[Any] | None,
+    quantity: Callable[[Any], Sampled] | None,
+    repeat: int,
+    say: Callable[[str], None],
+) -> list[Run]:
+    """Each tolerance, so many times, from the mesh of the problem."""
+    result = []
+    for tolerance in tolerances:
+        say(f"adapt to {tolerance:g}, {repeat} times")
+        times: list[float] = []
+        run = _run(problem, tolerance, states, quantity)  # without a clock: kernels compile
+        while not run.failed and len(times) < repeat:
+            run = _run(problem, tolerance, states, quantity)
+            times.append(run.seconds)
+        result.append(replace(run, seconds=float(np.median(times)) if times else np.nan))
+    return result
+
+
+def _run(
+    problem: Problem,
+    tolerance: float,
+    states: Sequence[Any] | None,
+    quantity: Callable[[Any], Sampled] | None,
+) -> Run:
+    messages: list[str] = []
+    start = perf_counter()
+    try:
+        with collected_warnings(messages):
+            result = adapt(problem, tolerance, states, progress=False)
+            if quantity is None:
+                sample = sampled(result.sifs, best=True)
+            else:
+                sample = quantity(result.solution if states is None else list(result.solutions))
+    except (XcrackError, np.linalg.LinAlgError, MemoryError) as error:
+        return Run(tolerance, failed=f"{type(error).__name__}: {error}")
+    seconds = perf_counter() - start
+    if not np.isfinite(sample.values).all():
+        return Run(tolerance, failed="the quantity is not finite", result=result)
+    if not result.met:
+        messages.append(f"the tolerance is not met: {result.reason}")
+    return Run(tolerance, seconds, sample, result, tuple(dict.fromkeys(messages)))
+
+
+def row_of(run: Run, places: Sampled, reference: Floats, scale: float) -> Row:
+    """A run of `adapt` against the reference."""
+    values, failed = np.zeros(0), run.failed
+    if run.sample is not None:
+        try:
+            values = lock(at_places(run.sample, places))
+        except ProblemError as error:
+            failed = str(error)
+    last = None if run.result is None else run.result.problem
+    return Row(
+        setting=_NAME,
+        fields={"tolerance": run.tolerance},
+        mesh=_MESH,
+        size=np.nan if last is None else smallest(last.mesh),
+        unknowns=0 if run.result is None else run.result.rounds[-1].unknowns,
+        seconds=run.seconds,
+        error=np.nan if failed else float(np.linalg.norm(values - reference)) / scale,
+        values=values,
+        warnings=run.warnings,
+        failed=failed,
+        problem=last,
+    )
+
+
+__all__ = ["Run", "adapted_runs", "row_of", "wanted_of"]

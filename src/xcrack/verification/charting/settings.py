@@ -1,0 +1,142 @@
+"""Which settings a chart tries: those of the user, or a handful that matter."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import Any
+
+from xcrack.base.checks import entries, shown
+from xcrack.base.errors import ProblemError
+from xcrack.model.numerics import Comparison, Numerics
+from xcrack.model.problem import Problem
+
+IN_PROBLEM = ("order", "contact")  # what a setting may change in Problem; all else is the scene
+_METHOD = tuple(
+    item.name
+    for kind in (Numerics, Comparison)
+    for item in fields(kind)
+    if item.name != "comparison"
+)
+_AS_GIVEN = "as given"
+
+
+@dataclass(frozen=True)
+class _Share:
+    """A length as a multiple of the smallest enriched radius on the same mesh."""
+
+    factor: float
+
+
+# In 3D order 2 pays for a high accuracy alone. The default domain is 2.5 radii in 2D,
+# about one in 3D.
+_DEFAULT: dict[int, dict[str, dict[str, Any]]] = {
+    2: {
+        "other order": {},
+        "radius × 0.7": {"radius": _Share(0.7)},
+        "radius × 1.4": {"radius": _Share(1.4)},
+        "topological": {"enrichment": "topological"},
+        "geometric": {"enrichment": "geometric"},
+        "domain 1.5 radii": {"domain": _Share(1.5)},
+        "2 functions": {"functions": 2},
+    },
+    3: {
+        "radius × 0.7": {"radius": _Share(0.7)},
+        "radius × 1.4": {"radius": _Share(1.4)},
+        "topological": {"enrichment": "topological"},
+        "geometric": {"enrichment": "geometric"},
+        "domain 1.4 radii": {"domain": _Share(1.4)},
+        "2 functions": {"functions": 2},
+    },
+}
+
+
+def named_settings(given: Any) -> dict[str, dict[str, Any]]:
+    """Settings by name, after a look at them; those of the problem are always among them.
+
+    Parameters
+    ----------
+    given : sequence of mappings, or mapping of name to mapping
+
+    Raises
+    ------
+    ProblemError
+        Fields that are no choice of method, names that stand there twice.
+    """
+    if isinstance(given, Mapping) and all(isinstance(v, Mapping) for v in given.values()):
+        pairs = [(str(name), changes) for name, changes in given.items()]
+    else:
+        try:
+            several = entries(given, "settings")
+        except ProblemError as error:
+            example = '[{"order": 1}, {"radius": 0.2}]'
+            raise ProblemError(f"{str(error)[:-1]} of dicts, such as {example}.") from None
+        pairs = [(_name(changes), changes) for changes in several]
+    if not pairs:
+        raise ProblemError("settings is empty: give at least one dict of fields, or leave it out.")
+    named: dict[str, dict[str, Any]] = {}
+    if not any(not changes for _, changes in pairs):
+        named[_AS_GIVEN] = {}
+    for name, changes in pairs:
+        for field in changes:
+            if not isinstance(field, str) or field not in (*IN_PROBLEM, *_METHOD):
+                known = ", ".join((*IN_PROBLEM, *_METHOD))
+                raise ProblemError(
+                    f"settings: {shown(field)} is no choice of method; give one of {known}. "
+                    "Meshes go into meshes=, loads into states=."
+                )
+        if name in named:
+            raise ProblemError(f"settings: {shown(name)} stands there twice; leave one out.")
+        named[name] = dict(changes)
+    return named
+
+
+def _name(changes: Any) -> str:
+    if not isinstance(changes, Mapping):
+        raise ProblemError(
+            f'settings: {shown(changes)} is no dict of fields: give some such as {{"order": 1}}.'
+        )
+    return ", ".join(f"{field} {value}" for field, value in changes.items()) or _AS_GIVEN
+
+
+def default_settings(problem: Problem) -> dict[str, dict[str, Any]]:
+    """Variations that may matter for a scene; without tips only the order does.
+
+    Parameters
+    ----------
+    problem : Problem
+    """
+    named: dict[str, dict[str, Any]] = {_AS_GIVEN: {}}
+    for name, changes in _DEFAULT[problem.mesh.dim].items():
+        if name == "other order":
+            other = 3 - (problem.order or 1)
+            named[f"order {other}"] = {"order": other}
+        elif any(crack.n_tips for crack in problem.placed) and not _same(problem, changes):
+            named[name] = changes
+    return named
+
+
+def _same(problem: Problem, changes: dict[str, Any]) -> bool:
+    """Whether the problem has these settings already, or no radius that they could vary."""
+    method = problem.numerics
+    if method.enrichment == "topological" and "enrichment" not in changes:
+        return any(isinstance(value, _Share) for value in changes.values())
+    return all(getattr(method, name) == value for name, value in changes.items())
+
+
+def with_lengths(changes: dict[str, Any], radius: float | None) -> tuple[dict[str, Any], str]:
+    """Settings with shares of the radius as lengths, and why that cannot be done.
+
+    Parameters
+    ----------
+    changes : dict
+    radius : float, length, or None
+        Smallest enriched radius of the scene as it is, on the same mesh.
+    """
+    if radius is None and any(isinstance(value, _Share) for value in changes.values()):
+        return {}, "there are no tip functions whose radius could be varied"
+    return {
+        name: value.factor * (radius or 0.0) if isinstance(value, _Share) else value
+        for name, value in changes.items()
+    }, ""
+
+
+__all__ = ["IN_PROBLEM", "default_settings", "named_settings", "with_lengths"]

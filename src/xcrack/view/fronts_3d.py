@@ -1,0 +1,396 @@
+"""Drawings of fronts in 3D: over the section of the body, and K along them.
+
+By matplotlib, without a renderer; for one run or one state, or for several side by side.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from xcrack.base.arrays import Bools, Floats
+from xcrack.base.checks import entries, shown, whole
+from xcrack.base.errors import ProblemError
+from xcrack.crack.fronts_3d import closed_fronts, is_closed
+from xcrack.crack.measures import front_ends
+from xcrack.growth.step import Step, lineage
+from xcrack.mesh.locate import Body
+from xcrack.mesh.mesh import Mesh
+from xcrack.runs.history import History
+from xcrack.sif.sif import SIF
+from xcrack.view.figures import (
+    checked_title,
+    finished,
+    new_figure,
+    picture_path,
+    wants_window,
+)
+from xcrack.view.front_ends import to_the_surface
+from xcrack.view.projection import View, best_plane, given_plane, on_plane, section_outline
+
+_MODES = ("I", "II", "III")
+_NOISE = 0.1  # share of the largest K that a panel reaches at least: noise should not fill it
+
+
+@dataclass(frozen=True, eq=False)
+class FrontLine:
+    """One front as it is drawn.
+
+    Attributes
+    ----------
+    x : (m, 3) array, length
+        A closed front repeats its first point at the end.
+    closed : bool
+    number : int
+        Which front of the crack.
+    """
+
+    x: Floats
+    closed: bool
+    number: int
+
+
+def draw_fronts(
+    history: History | Sequence[History],
+    *,
+    crack: int = 0,
+    plane: tuple[ArrayLike, Sequence[ArrayLike]] | None = None,
+    labels: Sequence[str] | None = None,
+    every: int = 1,
+    mesh: Mesh | None = None,
+    file: str | Path | None = None,
+    show: bool | None = None,
+    title: str | None = None,
+) -> Any:
+    """Draw the fronts of growth runs over the section of the body.
+
+    One run is coloured by its steps, several have a colour each, paler for older fronts.
+
+    Parameters
+    ----------
+    history : History or sequence of History
+    crack : int
+        Number in the first step; cracks that it joins are drawn with it.
+    plane : (origin, (right, up)), optional
+        Point and two directions of the plane to draw on; left out: the plane that the first
+        surface of the crack lies nearest to.
+    labels : sequence of str, optional
+        A name for each run.
+    every : int
+        Draw each n-th step, and the last.
+    mesh : Mesh, optional
+        For the outline of the body; left out: that of the history.
+    file : path, optional
+        Where to save the picture.
+    show : bool, optional
+        Open a window; left out: only without a file.
+    title : str, optional
+
+    Returns
+    -------
+    Path, or a matplotlib figure where there is no file
+
+    Raises
+    ------
+    ProblemError
+        Arguments of another type, no steps, no such crack, a 2D crack, labels of another number, a
+        file that cannot be written.
+    """
+    runs = _several(history, History, "draw_fronts: history")
+    names = _names(labels, len(runs), "draw_fronts")
+    crack = whole(crack, "draw_fronts: crack", least=0)
+    every = whole(every, "draw_fronts: every", least=1)
+    if not isinstance(mesh, Mesh | None):
+        raise ProblemError(f"draw_fronts: mesh = {shown(mesh)}: give a Mesh, or leave it out.")
+    for run in runs:
+        _check(run.steps, crack)
+    view = None if plane is None else given_plane(plane)
+    heading = checked_title(title, "draw_fronts")
+    target = picture_path(file, "draw_fronts")
+    window = wants_window(show, target, "draw_fronts")
+    figure = new_figure((6.4, 5.6), window, "draw_fronts")
+    axes = figure.add_subplot()
+    body = mesh if mesh is not None else next((r.mesh for r in runs if r.mesh is not None), None)
+    front_axes(axes, [run.steps for run in runs], crack, view, body, names, every)
+    return _done(figure, axes, target, window, heading)
+
+
+def draw_K(
+    sif: SIF | Sequence[SIF],
+    *,
+    front: int = 0,
+    labels: Sequence[str] | None = None,
+    modes: Sequence[str] = _MODES,
+    file: str | Path | None = None,
+    show: bool | None = None,
+    title: str | None = None,
+) -> Any:
+    """Draw K_I, K_II and K_III along a front over its arc length, from 0 to 1.
+
+    Points at a free surface, where K has no meaning, are hollow. Error bars, where K has them, are
+    a band around the best K.
+
+    Parameters
+    ----------
+    sif : SIF or sequence of SIF
+        Of one front, or of the same front in several states, runs or meshes.
+    front : int
+        Which front of the crack.
+    labels : sequence of str, optional
+        A name for each SIF.
+    modes : sequence of {"I", "II", "III"}
+        A panel each.
+    file : path, optional
+        Where to save the picture.
+    show : bool, optional
+        Open a window; left out: only without a file.
+    title : str, optional
+
+    Returns
+    -------
+    Path, or a matplotlib figure where there is no file
+
+    Raises
+    ------
+    ProblemError
+        Arguments of another type, no such front or mode, K of a 2D crack, labels of another
+        number, a file that cannot be written.
+    """
+    every = _several(sif, SIF, "draw_K: sif")
+    names = _names(labels, len(every), "draw_K")
+    front = whole(front, "draw_K: front", least=0)
+    modes = (modes,) if isinstance(modes, str) else entries(modes, "draw_K: modes")
+    if not modes or not all(isinstance(mode, str) and mode in _MODES for mode in modes):
+        raise ProblemError(f'draw_K: modes = {shown(modes)}: give some of "I", "II", "III".')
+    heading = checked_title(title, "draw_K")
+    for one in every:
+        if one.K.shape[1] < 3 or not (one.front == front).any():
+            known = sorted({int(f) for f in one.front}) if one.K.shape[1] > 2 else []
+            raise ProblemError(
+                f"draw_K(front={front}): there is no such 3D front, only {known}; in 2D read sif.K."
+            )
+    target = picture_path(file, "draw_K")
+    window = wants_window(show, target, "draw_K")
+    figure = new_figure((6.4, 0.8 + 2.0 * len(modes)), window, "draw_K")
+    panels = figure.subplots(len(modes), 1, squeeze=False, sharex=True)[:, 0]
+    largest = max(float(np.abs(one.K[one.front == front]).max()) for one in every)
+    for axes, mode in zip(panels, modes, strict=True):
+        reach = 0.0
+        for k, (one, name) in enumerate(zip(every, names, strict=True)):
+            share, K, surface = _along(one, front, _MODES.index(mode))
+            color, style = f"C{k}", ("-", "--", "-.", ":")[k % 4]
+            axes.plot(share, K, style, color=color, lw=1.6, label=name or None)
+            axes.plot(share[surface], K[surface], "o", mfc="white", mec=color, ms=5)
+            if one.errors is not None:
+                low, high = (_along(one, front, _MODES.index(mode), sign)[1] for sign in (-1, 1))
+                axes.fill_between(share, low, high, color=color, alpha=0.2, lw=0)
+            reach = max(reach, float(np.abs(K).max()))
+        axes.axhline(0, color="0.7", lw=0.8, zorder=0)
+        axes.set_ylabel(f"$K_{{{mode}}}$")
+        axes.margins(x=0.02)
+        if reach <= _NOISE * largest:
+            axes.set_ylim(-_NOISE * (largest or 1), _NOISE * (largest or 1))
+    panels[-1].set_xlabel("s / length of the front")
+    if any(names):
+        figure.legend(
+            *panels[0].get_legend_handles_labels(),
+            loc="outside lower center",
+            ncols=min(len(every), 3),
+            fontsize="small",
+            frameon=False,
+        )
+    return _done(figure, panels[0], target, window, heading)
+
+
+def front_axes(
+    axes: Any,
+    runs: Sequence[Sequence[Step]],
+    crack: int,
+    plane: View | None,
+    mesh: Mesh | None,
+    labels: Sequence[str],
+    every: int = 1,
+) -> None:
+    """Draw the fronts of runs into axes of matplotlib, with the section of the body.
+
+    Parameters
+    ----------
+    axes : axes of matplotlib
+    runs : sequence of sequences of Step
+    crack : int
+    plane : View, optional
+        Left out: the best one through the first surface.
+    mesh : Mesh, optional
+    labels : sequence of str
+        A name for each run; may be empty.
+    every : int
+        Draw each n-th step, and the last.
+    """
+    from matplotlib import colormaps
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.collections import LineCollection
+    from matplotlib.colors import Normalize
+    from matplotlib.ticker import MaxNLocator
+
+    runs = [[step for step in steps if not step.has_left] for steps in runs]
+    view = best_plane(_surface(runs[0][0], crack)) if plane is None else plane
+    if mesh is not None:
+        rim = section_outline(mesh, view)
+        axes.add_collection(LineCollection(list(rim), colors="0.45", linewidths=1.0))
+    first = runs[0][0].cracks[crack]
+    edges = on_plane(first.points[_rim(first.faces)], view)
+    if mesh is None:
+        axes.add_collection(LineCollection(list(edges), colors="0.7", linewidths=0.8))
+    body = None if mesh is None else Body.of(mesh)
+    single = len(runs) == 1
+    last = max(steps[-1].index for steps in runs)
+    colours, scale = colormaps["viridis"], Normalize(runs[0][0].index, max(last, 1))
+    for k, (steps, name) in enumerate(zip(runs, labels, strict=True)):
+        every_step = list(zip(steps, lineage(steps, crack)))
+        for step, numbers in [*every_step[:-1:every], every_step[-1]]:
+            newest = step is steps[-1]
+            age = (last - step.index) / max(last, 1)
+            color = colours(scale(step.index)) if single else f"C{k}"
+            for x in (x for c in numbers for x in _drawn_lines(step, c, body)):
+                axes.plot(
+                    *on_plane(x, view).T,
+                    ("-", "--", "-.", ":")[k % 4],
+                    color=color,
+                    lw=2.0 if newest else 1.1,
+                    alpha=1.0 if single else 1.0 - 0.65 * age,
+                )
+        if name:
+            axes.plot([], [], ("-", "--", "-.", ":")[k % 4], color=f"C{k}", label=name)
+    axes.set_aspect("equal")
+    axes.autoscale_view()
+    axes.set(xlabel=view.label(0), ylabel=view.label(1))
+    axes.spines[["top", "right"]].set_visible(False)
+    if single and len(runs[0]) > 1:
+        bar = ScalarMappable(scale, colours)
+        whole = MaxNLocator(integer=True)
+        axes.figure.colorbar(bar, ax=axes, label="step", shrink=0.8, aspect=25, ticks=whole)
+    elif any(labels):
+        axes.legend(
+            fontsize="small",
+            frameon=False,
+            loc="upper center",
+            bbox_to_anchor=(0.5, -0.13),
+            ncols=min(len(runs), 3),
+        )
+
+
+def step_fronts(step: Step, crack: int) -> list[FrontLine]:
+    """Fronts of a crack in a step: where K was found, or else as the crack has them.
+
+    Parameters
+    ----------
+    step : Step
+    crack : int
+
+    Returns
+    -------
+    list of FrontLine
+    """
+    body = step.cracks[crack]
+    closed = closed_fronts(body)
+    lines = []
+    evaluated = step.sif[0][crack] if step.sif else None
+    if evaluated is not None and len(evaluated.x):
+        for number in np.unique(evaluated.front):
+            x = evaluated.x[evaluated.front == number]
+            # A closed front that leaves the body in part has K on the rest of it.
+            whole = (number >= len(closed) or closed[number]) and is_closed(x)
+            lines.append(FrontLine(np.concatenate([x, x[:1]]) if whole else x, whole, int(number)))
+        return lines
+    return [
+        FrontLine(body.points[front], whole, k)
+        for k, (front, whole) in enumerate(zip(body.fronts or (), closed, strict=True))
+    ]
+
+
+def _drawn_lines(step: Step, crack: int, body: Body | None) -> list[Floats]:
+    """Lines of the fronts of a step, with the places where they meet the boundary."""
+    lines = step_fronts(step, crack)
+    if body is None or not step.sif:
+        return [line.x for line in lines]
+    places = [x for _, x in front_ends(step.cracks[crack], body)]
+    whole = [line.closed or len(line.x) < 2 for line in lines]
+    return [a.x if b else to_the_surface(a.x, places) for a, b in zip(lines, whole, strict=True)]
+
+
+def _along(sif: SIF, front: int, mode: int, edge: int = 0) -> tuple[Floats, Floats, Bools]:
+    """Share of the arc length, K of a mode, and which points lie at a free surface.
+
+    With an edge of -1 or 1, in the place of K that end of the bar of the best K.
+    """
+    mine = np.nonzero(sif.front == front)[0]
+    mine = mine[np.argsort(sif.s[mine], kind="stable")]
+    K = sif.best[mine, mode] + edge * sif.bar[mine, mode] if edge else sif.K[mine, mode]
+    x, surface = sif.x[mine], sif.at_surface[mine]
+    s = sif.s[mine] - sif.s[mine[0]]
+    if is_closed(x) and not surface.any():
+        s = np.append(s, s[-1] + np.linalg.norm(x[0] - x[-1]))
+        K, surface = np.append(K, K[0]), np.append(surface, surface[0])
+    total = float(s[-1])
+    return s / total if total else s, K, surface
+
+
+def _surface(step: Step, crack: int) -> Floats:
+    body = step.cracks[crack]
+    x = [line.x for line in step_fronts(step, crack)]
+    return np.concatenate([body.points[np.unique(body.faces)], *x])
+
+
+def _rim(faces: Any) -> Any:
+    from xcrack.mesh.triangulation import rim
+
+    return rim(faces)[0]
+
+
+def _check(steps: Sequence[Step], crack: int) -> None:
+    if not steps:
+        raise ProblemError("there is nothing to draw: the history has no steps.")
+    n = len(steps[0].cracks)
+    if not 0 <= crack < n:
+        raise ProblemError(f"draw_fronts(crack={crack}): there are {n} crack(s), numbered from 0.")
+    if steps[0].cracks[crack].fronts is None:
+        raise ProblemError('draw_fronts: only 3D cracks have fronts; in 2D plot "path".')
+
+
+def _several(value: Any, kind: type, what: str) -> list[Any]:
+    """One value or several, checked."""
+    every = [value] if isinstance(value, kind) else list(entries(value, what))
+    if not every or not all(isinstance(one, kind) for one in every):
+        raise ProblemError(
+            f"{what} = {shown(value)}: give a {kind.__name__}, or a list of at least one."
+        )
+    return every
+
+
+def _names(labels: Any, n: int, caller: str) -> list[str]:
+    if labels is None:
+        return [""] * n if n == 1 else [str(k) for k in range(n)]
+    names = (labels,) if isinstance(labels, str) else entries(labels, f"{caller}: labels")
+    if len(names) != n or not all(isinstance(name, str) for name in names):
+        raise ProblemError(
+            f"{caller}: labels = {shown(labels)} for {n} curve(s): give a text for each."
+        )
+    return list(names)
+
+
+def _done(figure: Any, axes: Any, file: Path | None, window: bool, title: str | None) -> Any:
+    if title:
+        axes.set_title(title)
+    return finished(figure, file, window)
+
+
+__all__ = [
+    "FrontLine",
+    "draw_K",
+    "draw_fronts",
+    "front_axes",
+    "step_fronts",
+]

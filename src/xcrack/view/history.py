@@ -1,0 +1,153 @@
+"""Pictures of a growth run."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from xcrack.base.checks import shown
+from xcrack.base.errors import ProblemError
+from xcrack.runs.history import History
+from xcrack.view.figures import finished, new_figure, picture_path
+
+
+def draw(history: History, kind: str, file: str | Path | None) -> Any:
+    """Figure of K, of length over cycles, of the paths or the fronts; saved or shown."""
+    kinds = {"K": _draw_K, "a": _draw_a, "path": _draw_path}
+    if history.cracks and history.cracks[0].fronts is not None:
+        kinds = {"K": _draw_K_of_fronts, "a": _draw_a, "fronts": _draw_fronts}
+        kinds["path"] = _draw_fronts
+    kinds["measures"] = _draw_measures
+    if isinstance(kind, str) and kind == "fronts" and kind not in kinds and history.steps:
+        raise ProblemError('plot kind = "fronts": only 3D cracks have them; give "path".')
+    if not isinstance(kind, str) or kind not in (*kinds, "fronts"):
+        raise ProblemError(
+            f'plot kind = {shown(kind)}: give "K", "a", "path" or "measures", in 3D also "fronts".'
+        )
+    if not history.steps:
+        raise ProblemError("there is nothing to draw: the history has no steps.")
+    target = picture_path(file, "plot")
+    figure = new_figure((6.4, 4.8), target is None, "History.plot")
+    kinds[kind](history, figure.add_subplot())
+    finished(figure, target, target is None)
+    return figure
+
+
+def _draw_K(history: History, axes: Any) -> None:
+    table = history.table()
+    n_states = sum(name.startswith("K_I_") for name in table.dtype.names or ())
+    for number, (crack, tip) in enumerate(_rows_of(table, "tip")):
+        rows = table[(table["crack"] == crack) & (table["tip"] == tip)]
+        every = np.array([[rows[f"K_{m}_{s}"] for m in ("I", "II")] for s in range(n_states)])
+        severe = np.argmax(np.hypot(every[:, 0], every[:, 1]), axis=0)
+        K_I, K_II = every[severe, :, np.arange(len(rows))].T
+        label = f"crack {crack}, tip {tip}"
+        axes.plot(rows["a"], K_I, "o-", ms=3, color=f"C{number}", label=f"$K_I$, {label}")
+        axes.plot(rows["a"], K_II, "s--", ms=3, color=f"C{number}", label=f"$K_{{II}}$, {label}")
+    axes.set(xlabel="crack length a", ylabel="K of the most severe state")
+    axes.axhline(0, color="0.7", lw=0.8, zorder=0)
+    axes.legend(fontsize="small")
+
+
+def _draw_K_of_fronts(history: History, axes: Any) -> None:
+    """Largest and smallest K along each front, of the state that is most severe there."""
+    table = history.table()
+    for number, (crack, front) in enumerate(_rows_of(table, "front")):
+        rows = table[(table["crack"] == crack) & (table["front"] == front)]
+        label = f"crack {crack}, front {front}"
+        for mode, style in (("I", "o-"), ("II", "s--"), ("III", "^:")):
+            low, high = (_extreme(rows, mode, end) for end in ("min", "max"))
+            # The sign of modes II and III goes round with the front.
+            largest = high if mode == "I" else np.maximum(np.abs(low), np.abs(high))
+            name = f"$K_I$, {label}" if mode == "I" else f"$|K_{{{mode}}}|$, {label}"
+            axes.plot(rows["N"], largest, style, ms=3, color=f"C{number}", label=name)
+            if mode == "I":
+                name = "all $K_I$ along it"
+                axes.fill_between(
+                    rows["N"], low, high, color=f"C{number}", alpha=0.15, lw=0, label=name
+                )
+    _mark_joins(history, axes)
+    axes.set(xlabel="cycles N", ylabel="largest K along the front")
+    axes.axhline(0, color="0.7", lw=0.8, zorder=0)
+    axes.legend(fontsize="small")
+
+
+def _extreme(rows: Any, mode: str, end: str) -> Any:
+    """Smallest or largest K of a mode in the state whose K is largest in size `(k,)`."""
+    n_states = sum(name.startswith("K_I_") and name.endswith("_max") for name in rows.dtype.names)
+    ends = [
+        np.array([[rows[f"K_{m}_{s}_{e}"] for e in ("min", "max")] for m in ("I", "II", "III")])
+        for s in range(n_states)
+    ]
+    severe = np.argmax([np.abs(each).max(axis=(0, 1)) for each in ends], axis=0)
+    return np.array([rows[f"K_{mode}_{s}_{end}"][k] for k, s in enumerate(severe)])
+
+
+def _draw_fronts(history: History, axes: Any) -> None:
+    from xcrack.view.fronts_3d import front_axes
+
+    # One picture, one plane: further cracks are drawn by draw_fronts(crack=...).
+    front_axes(axes, [history.steps], 0, None, history.mesh, [""])
+
+
+def _draw_a(history: History, axes: Any) -> None:
+    table = history.table()
+    for crack in np.unique(table["crack"]):
+        rows = table[table["crack"] == crack]
+        _, first = np.unique(rows["step"], return_index=True)
+        axes.plot(rows["N"][first], rows["a"][first], "o-", ms=3, label=f"crack {crack}")
+    _mark_joins(history, axes)
+    axes.set(xlabel="cycles N", ylabel="crack length a")
+    axes.legend(fontsize="small")
+
+
+def _draw_measures(history: History, axes: Any) -> None:
+    """Depth, and the length on each facet set, over the cycles."""
+    rows, _ = history.measures()
+    lengths = [name for name in rows.dtype.names or () if name.startswith("length_")]
+    for crack in np.unique(rows["crack"]):
+        own, who = rows[rows["crack"] == crack], f"crack {crack}: "
+        axes.plot(own["N"], own["depth"], "o-", ms=3, color=f"C{crack}", label=who + "depth")
+        for name, style in zip(lengths, "sv^Dx<>P*" * len(lengths)):
+            if np.nanmax(np.append(own[name], 0.0)) > 0:
+                label = f"{who}length on {name.removeprefix('length_')}"
+                axes.plot(own["N"], own[name], f"{style}--", ms=4, color=f"C{crack}", label=label)
+    _mark_joins(history, axes)
+    axes.set(xlabel="cycles N", ylabel="length")
+    axes.set_ylim(bottom=0.0)
+    axes.legend(fontsize="small")
+
+
+def _mark_joins(history: History, axes: Any) -> None:
+    """Lines at the cycles at which cracks joined."""
+    for join in history.joins:
+        name = f"cracks {join.cracks[0]} and {join.cracks[1]} join"
+        axes.axvline(join.N, color="0.5", lw=0.9, ls=(0, (4, 3)), zorder=0, label=name)
+
+
+def _draw_path(history: History, axes: Any) -> None:
+    if history.mesh is not None:
+        from matplotlib.collections import LineCollection
+
+        facets = history.mesh.points[history.mesh.boundary]
+        axes.add_collection(LineCollection(list(facets[..., :2]), colors="0.6", linewidths=1))
+        axes.autoscale_view()
+        low, high = history.mesh.points.min(axis=0), history.mesh.points.max(axis=0)
+        margin = 0.03 * float((high - low).max())
+        axes.set(xlim=(low[0] - margin, high[0] + margin), ylim=(low[1] - margin, high[1] + margin))
+    for number, crack in enumerate(history.cracks):
+        axes.plot(*crack.points[:, :2].T, "-", color=f"C{number}", label=f"crack {number}")
+        start = history.steps[0].cracks[number].points
+        axes.plot(*start[:, :2].T, "-", color=f"C{number}", lw=3.5, solid_capstyle="butt")
+        tips = history.table()
+        own = tips[tips["crack"] == number]
+        axes.plot(own["x"], own["y"], ".", ms=4, color=f"C{number}")
+    axes.set(xlabel="x", ylabel="y", aspect="equal")
+    axes.legend(fontsize="small")
+
+
+def _rows_of(table: Any, what: str) -> list[tuple[int, int]]:
+    return sorted({(int(row["crack"]), int(row[what])) for row in table})
+
+
+__all__ = ["draw"]

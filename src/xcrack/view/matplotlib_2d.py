@@ -1,0 +1,226 @@
+"""Pictures by matplotlib: 2D fields without a renderer, meshes, graphs along cracks."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from xcrack.analysis.solution import Solution
+from xcrack.base.arrays import Floats
+from xcrack.fem.facets import arc_position
+from xcrack.output.pieces import lips_of
+from xcrack.view.figures import finished, new_figure
+from xcrack.view.scene_2d import CLOSED, Scene
+
+_LONGER = 6.4  # inch, longer side of the body
+_DPI = 180
+
+
+def draw(
+    picture: Scene, file: Path | None, show: bool, title: str | None, edges: bool, cmap: str
+) -> Any:
+    """Draw a scene; returns the figure where there is no file."""
+    figure, axes = _body_axes(picture.box, show, bar=1.5)
+    from matplotlib.collections import LineCollection
+
+    mapped = axes.tripcolor(
+        *picture.points.T,
+        picture.triangles,
+        picture.values,
+        shading="gouraud",
+        cmap=cmap,
+        vmin=picture.limits[0],
+        vmax=picture.limits[1],
+        rasterized=True,
+    )
+    lines = [
+        (picture.at_rest, "0.6", 0.6, 0.5),
+        (picture.cell_edges if edges else picture.cell_edges[:0], "0.2", 0.25, 2),
+        (picture.outline, "black", 0.9, 3),
+        (picture.lips, "black", 0.9, 3),
+        (picture.closed, CLOSED, 2.2, 4),
+    ]
+    for curves, color, width, level in lines:
+        axes.add_collection(
+            LineCollection(
+                list(curves), colors=color, linewidths=width, zorder=level, capstyle="round"
+            )
+        )
+    _frame(axes, picture.box)
+    if len(picture.closed):
+        axes.plot([], [], color=CLOSED, lw=2.2, label="crack faces touch")
+        _legend_below(axes, 1)
+    extend = {(False, False): "neither", (True, False): "min", (False, True): "max"}
+    figure.colorbar(
+        mapped,
+        ax=axes,
+        label=picture.label,
+        extend=extend.get(picture.beyond, "both"),
+        shrink=0.9,
+        aspect=25,
+    )
+    return _done(figure, axes, file, show, title)
+
+
+def draw_mesh(
+    solution: Solution,
+    file: Path | None,
+    show: bool,
+    title: str | None,
+    near: Floats | None = None,
+) -> Any:
+    """Mesh, cracks and enriched nodes, of the whole body or in a box `near` (2, 2)."""
+    space = solution.space
+    mesh = space.mesh
+    box = mesh.points if near is None else near
+    figure, axes = _body_axes(box, show, bar=0.4)
+    from matplotlib.collections import LineCollection
+    from matplotlib.patches import Circle
+
+    axes.add_collection(
+        LineCollection(list(mesh.points[mesh.edges]), colors="0.72", linewidths=0.4)
+    )
+    rim = mesh.points[mesh.boundary]
+    axes.add_collection(LineCollection(list(rim), colors="black", linewidths=0.9))
+    carries = [number >= 0 for number in space.heaviside]
+    if carries:
+        x = space.node_points[np.any(carries, axis=0)]
+        axes.plot(*x.T, "s", ms=3.2, mfc="none", mec="C0", mew=0.8, label="Heaviside", zorder=3)
+    around = [tip.point_to_function >= 0 for tip in space.tips]
+    if around:
+        x = mesh.points[np.any(around, axis=0)]
+        axes.plot(*x.T, "o", ms=4.6, mfc="none", mec="C1", mew=0.8, label="tip functions", zorder=3)
+    for c, cut in enumerate(space.cuts):
+        axes.add_collection(
+            LineCollection(list(cut.lip_points(mesh)), colors=CLOSED, linewidths=1.8, zorder=4)
+        )
+        if c == 0:
+            axes.plot([], [], color=CLOSED, lw=1.8, label="crack")
+    for tip in space.tips:
+        axes.plot(*tip.x, "x", ms=6, mew=1.6, color=CLOSED, zorder=5)
+        if np.isfinite(tip.radius):
+            circle = Circle(tuple(tip.x), tip.radius, fill=False, ls="--", lw=0.8, ec="C1")
+            axes.add_patch(circle)
+    _frame(axes, box)
+    if space.cuts:
+        _legend_below(axes, 3)
+    return _done(figure, axes, file, show, title)
+
+
+def draw_along(
+    solution: Solution,
+    field: str,
+    cracks: Sequence[int],
+    file: Path | None,
+    show: bool,
+    title: str | None,
+) -> Any:
+    """Pressure or opening over the distance along each crack."""
+    figure = new_figure((6.4, 0.6 + 3.0 * len(cracks)), show, "plot")
+    every = figure.subplots(len(cracks), 1, squeeze=False)[:, 0]
+    for axes, c in zip(every, cracks, strict=True):
+        _along(axes, solution, field, c)
+        name = f"crack {c}: " if len(solution.lips) > 1 else ""
+        axes.set_xlabel(f"{name}distance s along the crack")
+    return _done(figure, every[0], file, show, title)
+
+
+def _along(axes: Any, solution: Solution, field: str, c: int) -> None:
+    space, lips = solution.space, lips_of(solution, c)
+    cut, crack = space.cuts[c], space.cracks[c]
+    ends = arc_position(crack.points, cut.lip_points(space.mesh).reshape(-1, space.dim))
+    start = float(ends.min()) if len(ends) else 0.0
+    s = lips.s
+    if field == "pressure":
+        curves = [("contact pressure p", lips.pressure, "C0", "-")]
+    else:
+        along = np.stack([lips.normal[:, 1], -lips.normal[:, 0]], axis=1)
+        slip = np.einsum("qd,qd->q", lips.jump, along)
+        curves = [
+            ("opening n·⟦u⟧", np.einsum("qd,qd->q", lips.jump, lips.normal), "C0", "-"),
+            ("sliding t·⟦u⟧", slip, "C1", "--"),
+        ]
+    for label, values, color, style in curves:
+        for i, run in enumerate(lips.runs):
+            name = label if i == 0 else None
+            axes.plot(s[run], values[run], style, color=color, lw=1.6, label=name)
+    first = True
+    for a, b in _closed_parts(lips.closed, s):
+        axes.axvspan(
+            a, b, color=CLOSED, alpha=0.12, lw=0, label="crack faces touch" if first else None
+        )
+        first = False
+    for x in crack.points[list(crack.tips or ())]:
+        at = float(arc_position(crack.points, x[None])[0]) - start
+        axes.axvline(at, color="0.3", lw=0.8, ls=":")
+        axes.annotate(
+            "tip",
+            (at, 1),
+            xycoords=("data", "axes fraction"),
+            xytext=(0, 3),
+            textcoords="offset points",
+            ha="center",
+            fontsize="small",
+            color="0.3",
+        )
+    axes.axhline(0, color="0.6", lw=0.7, zorder=0)
+    if field == "pressure":
+        _from_zero(axes, lips.pressure)
+    if field == "pressure" and solution.contact[c] is None:
+        note = (
+            "no multipliers: the crack faces stay apart"
+            if solution.problem.contact != "off"
+            else ("contact is switched off")
+        )
+        axes.annotate(note, (0.02, 0.5), xycoords="axes fraction", fontsize="small", color="0.3")
+    axes.set_ylabel("pressure" if field == "pressure" else "jump of the displacement")
+    axes.margins(x=0.01)
+    axes.legend(fontsize="small", loc="best")
+
+
+def _closed_parts(closed: np.ndarray, s: Floats) -> list[tuple[float, float]]:
+    """Stretches of s on which the crack faces touch, up to half way to the next open point."""
+    change = np.diff(np.concatenate([[0], closed.astype(np.int64), [0]]))
+    begin, end = np.nonzero(change > 0)[0], np.nonzero(change < 0)[0] - 1
+    middle = np.concatenate([s[:1], (s[1:] + s[:-1]) / 2, s[-1:]])
+    return [(float(middle[a]), float(middle[b + 1])) for a, b in zip(begin, end, strict=True)]
+
+
+def _from_zero(axes: Any, values: Floats) -> None:
+    """A range that begins at zero: noise of a constant pressure should not fill the picture."""
+    top = float(np.max(values, initial=0.0))
+    low = float(np.min(values, initial=0.0))
+    reach = max(top, -low) or 1.0
+    axes.set_ylim(low - 0.05 * reach if low < -1e-6 * reach else -0.03 * reach, 1.12 * reach)
+
+
+def _body_axes(points: Floats, show: bool, bar: float) -> tuple[Any, Any]:
+    low, high = points.min(axis=0), points.max(axis=0)
+    size = _LONGER * (high - low) / float((high - low).max())
+    size = (max(size[0], 2.0) + 0.6 + bar, max(size[1], 2.4) + 0.7)
+    figure = new_figure(size, show, "plot")
+    return figure, figure.add_subplot()
+
+
+def _frame(axes: Any, points: Floats) -> None:
+    low, high = points.min(axis=0), points.max(axis=0)
+    margin = 0.02 * float((high - low).max())
+    axes.set(
+        xlim=(low[0] - margin, high[0] + margin),
+        ylim=(low[1] - margin, high[1] + margin),
+        xlabel="x",
+        ylabel="y",
+    )
+    axes.set_aspect("equal")
+    axes.spines[["top", "right"]].set_visible(False)
+
+
+def _legend_below(axes: Any, columns: int) -> None:
+    axes.figure.legend(loc="outside lower center", ncols=columns, fontsize="small", frameon=False)
+
+
+def _done(figure: Any, axes: Any, file: Path | None, show: bool, title: str | None) -> Any:
+    if title:
+        axes.set_title(title)
+    return finished(figure, file, show, _DPI)

@@ -1,0 +1,336 @@
+"""One picture of a solution: a field on the opened crack, the mesh, or a graph along the crack."""
+
+import os
+import sys
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from xcrack.analysis.plan import Report
+from xcrack.analysis.solution import Solution
+from xcrack.base.arrays import Floats, lock
+from xcrack.base.checks import flag, number, numbers, one_of, shown
+from xcrack.base.errors import ProblemError, XcrackError
+from xcrack.base.optional import in_notebook, required
+from xcrack.fem.system import discretised
+from xcrack.linalg.reuse import Reuse
+from xcrack.model.problem import Problem, crack_number
+from xcrack.view.figures import checked_title, picture_path
+from xcrack.view.pyvista_2d import RASTER
+from xcrack.view.scene_2d import FIELDS, SPACE_FIELDS, scene
+from xcrack.view.scene_3d import LIP_FIELDS, clip_plane, direction
+from xcrack.view.section_3d import Plane
+
+_GRAPHS = ("pressure", "opening")
+_KNOWN = {2: (*FIELDS, "mesh", *_GRAPHS), 3: (*SPACE_FIELDS, "mesh", *LIP_FIELDS)}
+_ON_LIPS = {*_GRAPHS, *LIP_FIELDS}
+_NO_OPENGL = "it cannot draw here (no OpenGL): apt-get install libegl1 libgl1-mesa-dri"
+
+
+def plot(
+    solution: Solution | Problem,
+    field: str = "von_mises",
+    *,
+    file: str | Path | None = None,
+    warp: float = 0.0,
+    show: bool | None = None,
+    renderer: str = "auto",
+    title: str | None = None,
+    edges: bool = False,
+    limits: tuple[float, float] | None = None,
+    cmap: str | None = None,
+    crack: int | None = None,
+    clip: tuple[Any, Any] | None = None,
+    view: Any = None,
+    loads: bool = False,
+    zoom: float | None = None,
+) -> Any:
+    """Draw a solution, or the mesh and the cracks of a problem.
+
+    Parameters
+    ----------
+    solution : Solution, or Problem
+        A problem has one picture only: the field "mesh".
+    field : str
+        On the body: "von_mises", "sxx", "syy", "sxy", "displacement" (its norm), "ux", "uy".
+        Along the crack faces: "pressure" (of contact), "opening" (with the sliding); where the
+        crack faces touch the graph is shaded. "mesh": the mesh with its cracks and enriched nodes.
+        In 3D also "szz", "syz", "sxz" and "uz"; "pressure", "opening" (or "gap") and "sliding"
+        colour the cracks, with their fronts, in a body that is seen through.
+    file : path, optional
+        Where to save the picture; ``.png`` is added to a path without suffix.
+    warp : float
+        Displacements are drawn this many times as large as they are; 0: the body at rest.
+    show : bool, optional
+        Open a window; left out: only without a file, and where there is a display.
+    renderer : {"auto", "pyvista", "matplotlib"}
+        Of a field on the body. auto: pyvista where it can draw (off screen without a display)
+        and knows the kind of file, else matplotlib, which alone draws meshes and graphs.
+    title : str, optional
+    edges : bool
+        Draw the edges of the mesh.
+    limits : (float, float), optional
+        Ends of the colours. Left out: all values; of a stress, which is unbounded at a tip, those
+        of at least 99 % of the area and of all cells without tip functions, and the colour bar
+        says what share.
+    cmap : str, optional
+        Colour map of matplotlib; left out: one that parts at zero for a field of both signs.
+    crack : int, optional
+        Draw the graphs, or in 3D the colours, of this crack only.
+    clip : (point, normal), optional
+        In 3D: leave out what lies on the side of the normal of this plane, to see inside.
+    view : (3,) array, optional
+        In 3D: direction from the body to the viewer; left out: one from which the cut or the
+        crack is seen.
+    loads : bool
+        In 3D: draw arrows of tractions, pressures and point forces.
+    zoom : float, optional
+        Show a box around the cracks, or around `crack` alone, that is this many times as large as
+        they are. In 2D matplotlib then draws, which cuts the body off at the box.
+
+    Returns
+    -------
+    Path, or a matplotlib figure or pyvista plotter where there is no file
+
+    Raises
+    ------
+    ProblemError
+        Arguments of another type, an unknown field or renderer, a crack that does not exist, a
+        renderer that cannot draw, a plane that leaves nothing, a file that cannot be written.
+    XcrackError
+        The renderer that was asked for is not installed.
+    """
+    solution = _drawable(solution, field)
+    field = one_of(field, "plot: field", _KNOWN[solution.space.dim])
+    one_of(renderer, "plot: renderer", ("auto", "pyvista", "matplotlib"))
+    look = Look(
+        warp=number(warp, "plot: warp"),
+        title=checked_title(title, "plot"),
+        edges=flag(edges, "plot: edges"),
+        limits=_limits(limits),
+        cmap=_colour_map(cmap),
+        crack=None if crack is None else crack_number(solution.problem, crack, "plot"),
+        plane=clip_plane(clip),
+        view=direction(view),
+        loads=flag(loads, "plot: loads"),
+        near=None,
+    )
+    if zoom is not None:
+        look = replace(look, near=crack_box(solution, look.cracks(solution), zoom))
+    if show is not None:
+        show = flag(show, "plot: show")
+    if field in _ON_LIPS and not solution.lips:
+        raise ProblemError(f'plot(field="{field}"): the body has no crack; draw another field.')
+    target = picture_path(file, "plot")
+    window = (target is None and _has_display()) if show is None else show
+    draw = {2: _draw_2d, 3: _draw_3d}[solution.space.dim]
+    return draw(solution, field, target, window, renderer, look)
+
+
+@dataclass(frozen=True, eq=False)
+class Look:
+    """How a picture is to look: arguments of `plot`, checked."""
+
+    warp: float
+    title: str | None
+    edges: bool
+    limits: tuple[float, float] | None
+    cmap: Any
+    crack: int | None
+    plane: Plane | None
+    view: Floats | None
+    loads: bool
+    near: Floats | None
+
+    def colours(self, signed: bool) -> Any:
+        """The colour map, or one that suits the values."""
+        return self.cmap or ("RdBu_r" if signed else "viridis")
+
+    def cracks(self, solution: Solution) -> list[int]:
+        """The cracks to draw."""
+        return list(range(len(solution.lips))) if self.crack is None else [self.crack]
+
+
+def _draw_2d(
+    solution: Solution, field: str, target: Path | None, window: bool, renderer: str, look: Look
+) -> Any:
+    if look.plane is not None or look.view is not None or look.loads:
+        raise ProblemError("plot(clip=, view=, loads=): only 3D bodies know these; leave them out.")
+    if field in _GRAPHS:
+        from xcrack.view.matplotlib_2d import draw_along
+
+        return draw_along(solution, field, look.cracks(solution), target, window, look.title)
+    if field == "mesh":
+        from xcrack.view.matplotlib_2d import draw_mesh
+
+        return draw_mesh(solution, target, window, look.title, look.near)
+    if look.near is not None and renderer == "pyvista":
+        raise ProblemError("plot(zoom=): in 2D matplotlib alone can cut off: leave renderer out.")
+    if look.near is not None:
+        renderer = "matplotlib"
+    fault = "" if renderer == "matplotlib" else _fault_of_pyvista(target)
+    if renderer == "pyvista" and fault:
+        raise ProblemError(
+            f'plot(renderer="pyvista"): {fault}; or leave renderer out, and matplotlib draws it.'
+        )
+    picture = replace(scene(solution, field, look.warp, look.limits), near=look.near)
+    if renderer == "matplotlib" or fault:
+        from xcrack.view import matplotlib_2d as plot_matplotlib
+
+        return plot_matplotlib.draw(
+            picture, target, window, look.title, look.edges, look.colours(picture.signed)
+        )
+    from xcrack.view import pyvista_2d as plot_pyvista
+
+    return plot_pyvista.draw(
+        picture, target, window, look.title, look.edges, look.colours(picture.signed)
+    )
+
+
+def _draw_3d(
+    solution: Solution, field: str, target: Path | None, window: bool, renderer: str, look: Look
+) -> Any:
+    from xcrack.view.scene_3d import crack_scene, mesh_scene, space_scene
+
+    cracks = look.cracks(solution) if field in LIP_FIELDS else []
+    fault = "" if renderer == "matplotlib" else _fault_of_pyvista(target)
+    if cracks and (renderer == "matplotlib" or (renderer == "auto" and fault)):
+        from xcrack.view import matplotlib_3d as plot_matplotlib_space
+
+        return plot_matplotlib_space.draw_cracks(
+            solution, field, cracks, target, window, look.title, look.limits, look.cmap
+        )
+    if renderer == "matplotlib" or fault:
+        reason = fault or 'give renderer="auto"'
+        raise ProblemError(
+            f'plot(field="{field}"): a body in 3D is drawn by pyvista: {reason}. matplotlib draws '
+            f"{', '.join(LIP_FIELDS)} only."
+        )
+    if field == "mesh":
+        picture = mesh_scene(solution, look.plane, look.view)
+    elif cracks:
+        picture = crack_scene(
+            solution, field, cracks, look.warp, look.limits, look.plane, look.view
+        )
+    else:
+        picture = space_scene(solution, field, look.warp, look.limits, look.plane, look.view)
+    if look.near is not None:
+        corners = np.stack(np.meshgrid(*look.near.T), axis=-1).reshape(-1, 3)
+        picture = replace(picture, near=corners)
+    arrows = None
+    if look.loads:
+        from xcrack.view.scene_3d import load_arrows
+
+        arrows = load_arrows(solution)
+    from xcrack.view.pyvista_3d import draw_space
+
+    edges = look.edges or field == "mesh"
+    colours = look.colours(picture.signed)
+    return draw_space(picture, arrows, target, window, look.title, edges, colours)
+
+
+def crack_box(solution: Solution, cracks: list[int], zoom: Any) -> Floats:
+    """Box around cracks, `zoom` times as large as they are `(2, d)`.
+
+    Parameters
+    ----------
+    solution : Solution
+    cracks : list of int
+    zoom : float
+
+    Raises
+    ------
+    ProblemError
+        No crack, or a zoom that is not positive.
+    """
+    factor = number(zoom, "plot: zoom", above=0)
+    if not cracks:
+        raise ProblemError("plot(zoom=): the body has no crack to zoom to; leave zoom out.")
+    x = np.concatenate([solution.lips[c].x for c in cracks])
+    low, high = x.min(axis=0), x.max(axis=0)
+    half = factor * max(float((high - low).max()), 1e-300) / 2
+    middle = (low + high) / 2
+    return np.stack([middle - half, middle + half])
+
+
+def _drawable(given: Any, field: Any) -> Solution:
+    """The solution, or that of a problem in which nothing acts, to draw its mesh and cracks."""
+    if isinstance(given, Solution):
+        return given
+    if not isinstance(given, Problem):
+        raise ProblemError(
+            f'plot: give a Solution, or a Problem with field="mesh", not {type(given).__name__}.'
+        )
+    if not (isinstance(field, str) and field == "mesh"):
+        raise ProblemError(
+            f"plot: a Problem has no field {shown(field)}: give what solve returns, or "
+            'field="mesh".'
+        )
+    space, lips = discretised(given)
+    return Solution(
+        problem=given,
+        state=None,
+        loads=(),
+        factor=0.0,
+        space=space,
+        u=lock(np.zeros(space.n_dof)),
+        lips=lips,
+        contact=(None,) * len(lips),
+        energy=0.0,
+        report=Report((), {}),
+        reuse=Reuse(),
+    )
+
+
+def _limits(limits: Any) -> tuple[float, float] | None:
+    if limits is None:
+        return None
+    low, high = numbers(limits, "plot: limits", (2,)).tolist()
+    if not low < high:
+        raise ProblemError(f"plot: limits = {shown(limits)}: give the lower one first.")
+    return low, high
+
+
+def _colour_map(cmap: Any) -> Any:
+    if cmap is None:
+        return None
+    matplotlib = required("matplotlib", "plot: cmap")
+    if isinstance(cmap, str) and cmap in matplotlib.colormaps:
+        return cmap
+    if isinstance(cmap, required("matplotlib.colors", "plot: cmap").Colormap):
+        return cmap
+    raise ProblemError(
+        f'plot: cmap = {shown(cmap)}: give the name of a colour map of matplotlib, such as "RdBu".'
+    )
+
+
+def _has_display() -> bool:
+    # Set for runs without windows: tests, batch jobs.
+    if os.environ.get("PYVISTA_OFF_SCREEN", "").lower() in ("1", "true"):
+        return False
+    if in_notebook():
+        return False
+    if os.name == "nt" or sys.platform == "darwin":
+        return True
+    return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
+
+
+def _fault_of_pyvista(target: Path | None) -> str:
+    """Why pyvista cannot draw this file here, and what to do; empty if it can."""
+    from xcrack.view.pyvista_2d import renders
+
+    if target is not None and target.suffix.lower() not in RASTER:
+        return f"it writes {', '.join(RASTER)}, not {shown(target.suffix)}"
+    if renders():
+        try:
+            required("pyvista", "it")
+            return ""
+        except XcrackError as error:
+            return str(error).rstrip(".")
+    try:
+        required("pyvista", "it")
+    except XcrackError as error:
+        return str(error).rstrip(".")
+    return _NO_OPENGL

@@ -1,0 +1,132 @@
+"""Planes onto which fronts and 3D cracks are projected, and sections of a body with them."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from xcrack.base.arrays import Floats, lock
+from xcrack.base.checks import numbers, shown
+from xcrack.base.errors import ProblemError
+from xcrack.mesh.mesh import Mesh
+from xcrack.mesh.split import interface_simplices
+
+_AXIS = 0.999  # cosine from which a direction is called an axis
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """A plane to look at.
+
+    Attributes
+    ----------
+    origin : (3,) array, length
+    axes : (2, 3) array
+        Unit vectors to the right and up, perpendicular to each other.
+    """
+
+    origin: Floats
+    axes: Floats
+
+    @property
+    def normal(self) -> Floats:
+        """Unit vector towards the viewer."""
+        return np.asarray(np.cross(self.axes[0], self.axes[1]))
+
+    def label(self, k: int) -> str:
+        """Name of an axis of the picture: x, y or z where it is one."""
+        axis = int(np.argmax(np.abs(self.axes[k])))
+        value = float(self.axes[k, axis])
+        if abs(value) < _AXIS or np.any(self.origin[axis] != 0):
+            return "along (" + ", ".join(f"{v:.3g}" for v in self.axes[k].round(3) + 0.0) + ")"
+        return ("" if value > 0 else "-") + "xyz"[axis]
+
+
+def given_plane(plane: Any) -> View:
+    """A plane by a point and two directions; the second is made perpendicular to the first.
+
+    Parameters
+    ----------
+    plane : (origin, (right, up))
+        The point, which is drawn at (0, 0), and the directions to the right and up.
+
+    Returns
+    -------
+    View
+
+    Raises
+    ------
+    ProblemError
+        Not a point and two directions that span a plane.
+    """
+    try:
+        origin, axes = plane
+        x, two = numbers(origin, "origin", (3,)), numbers(axes, "directions", (2, 3))
+        lengths = np.linalg.norm(two, axis=1, keepdims=True)
+        right, second = two / np.where((lengths > 0) & np.isfinite(lengths), lengths, np.inf)
+        up = second - (second @ right) * right
+        length = float(np.linalg.norm(up))
+        if length > 1e-6 and right.any():
+            return View(lock(np.array(x)), lock(np.stack([right, up / length])))
+        reason = "the two directions are parallel, or one is zero"
+    except (TypeError, ValueError):
+        reason = "that is no pair"
+    except ProblemError as error:
+        reason = str(error)[:-1]
+    raise ProblemError(
+        f"plane = {shown(plane)}: give a point and two directions, ((x, y, z), (right, up)); "
+        f"{reason}."
+    )
+
+
+def best_plane(x: Floats, normal: ArrayLike | None = None) -> View:
+    """Plane that points `(n, 3)` lie nearest to; a main plane keeps its coordinates.
+
+    Parameters
+    ----------
+    x : (n, 3) array, length
+    normal : (3,) array, optional
+        Seen from this side; left out: from the side of the larger coordinates.
+
+    Returns
+    -------
+    View
+    """
+    middle = x.mean(axis=0)
+    n = np.linalg.svd(x - middle, full_matrices=False)[2][-1]
+    toward = np.asarray([1.0, -1.1, 1.2] if normal is None else normal)
+    n = n if n @ toward >= 0 else -n
+    axis = int(np.argmax(np.abs(n)))
+    if abs(n[axis]) > _AXIS:
+        # Seen along an axis: x to the right or y, and the usual letters up.
+        right, up = np.eye(3)[[(1, 0, 0)[axis], (2, 2, 1)[axis]]]
+        right = right if np.cross(right, up) @ n > 0 else -right
+        origin = np.where(np.arange(3) == axis, middle, 0.0)
+        return View(lock(origin), lock(np.stack([right, up])))
+    upright = np.eye(3)[1 if abs(n[2]) > 0.9 else 2]
+    right = np.cross(upright, n)
+    right /= np.linalg.norm(right)
+    two = np.stack([right, np.cross(n, right)])
+    # A direction along an axis shows the coordinate itself.
+    along = np.abs(two).max(axis=1) > _AXIS
+    return View(lock(middle - (along * (two @ middle)) @ two), lock(two))
+
+
+def on_plane(x: Floats, plane: View) -> Floats:
+    """Coordinates `(..., 2)` of points `(..., 3)` in a plane."""
+    return np.asarray((x - plane.origin) @ plane.axes.T)
+
+
+def section_outline(mesh: Mesh, plane: View) -> Floats:
+    """Segments in which a plane meets the boundary of a body, in the plane `(k, 2, 2)`."""
+    facets = mesh.boundary
+    level = (mesh.points - plane.origin) @ plane.normal
+    level = np.where(np.abs(level) < 1e-9 * np.abs(level).max(), 0.0, level)[facets]
+    rows = np.nonzero((level.min(axis=1) < 0) & (level.max(axis=1) >= 0))[0]
+    bary, parent = interface_simplices(level[rows])
+    corners = mesh.points[facets[rows[parent]]]
+    return on_plane(np.einsum("kwv,kvd->kwd", bary, corners), plane)
+
+
+__all__ = ["View", "best_plane", "given_plane", "on_plane", "section_outline"]

@@ -1,0 +1,232 @@
+"""Pictures of 3D bodies by pyvista, on screen or off."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from xcrack.base.arrays import Floats
+from xcrack.base.optional import required
+from xcrack.view.pyvista_2d import (
+    BAR,
+    LONGER,
+    MARGIN,
+    SHORTEST,
+    add_bar,
+    font_size,
+    quiet,
+    shown,
+)
+from xcrack.view.scene_2d import CLOSED
+from xcrack.view.scene_3d import SpaceScene
+from xcrack.view.section_3d import Soup, segments_behind
+
+_APART = "#c9ccd1"  # lips that do not touch, where the pressure is drawn
+_LEGEND = 28  # pixels of a line of the legend
+_LOADS = "#1b4f9c"
+_FRONT = "#d95f02"
+
+
+def draw_space(
+    picture: SpaceScene,
+    arrows: tuple[Floats, Floats] | None,
+    file: Path | None,
+    show: bool,
+    title: str | None,
+    edges: bool,
+    cmap: str,
+) -> Any:
+    """Draw a scene; returns the plotter where there is no file."""
+    pv = required("pyvista", 'plot(renderer="pyvista")')
+    right, up, toward = _axes(picture.toward)
+    box = picture.box if arrows is None else picture.body
+    if arrows is not None:
+        box = np.concatenate([box, arrows[0], arrows[0] + arrows[1]])
+    flat = box @ np.stack([right, up, toward], axis=1)
+    low, high = flat.min(axis=0), flat.max(axis=0)
+    size = high - low
+    extent = float(size[:2].max())
+    scale = LONGER / extent
+    if picture.near is not None:
+        # What lies beyond the box would be drawn under the bar of the colours.
+        picture = _left_of(picture, right, float(high[0]) + MARGIN / scale)
+    top = 70 if title else 0
+    bar = BAR if picture.label or _legend(picture) else 0
+    width = max(int(size[0] * scale) + 2 * MARGIN, SHORTEST) + bar
+    height = max(int(size[1] * scale) + 2 * MARGIN, SHORTEST) + top
+    with quiet():
+        plotter = pv.Plotter(off_screen=not show, window_size=[width, height])
+        plotter.set_background("white")
+        plotter.enable_anti_aliasing("ssaa")
+        if len(picture.skin):
+            # See-through surfaces have to be sorted by depth, or they hide each other.
+            plotter.enable_depth_peeling(10)
+        _add_faces(pv, plotter, picture, cmap, (width, height))
+        _add_lines(pv, plotter, picture, edges, toward * 2e-3 * extent)
+        _add_points(plotter, picture, toward * 3e-3 * extent)
+        if arrows is not None:
+            _add_arrows(pv, plotter, arrows)
+        _add_legend(plotter, picture, (width, height))
+        if title:
+            plotter.add_text(
+                title,
+                position=(MARGIN / width, 1 - 50 / height),
+                viewport=True,
+                font_size=font_size(26),
+                color="black",
+            )
+        camera = plotter.camera
+        camera.parallel_projection = True
+        # The body fills the window but for the bar on the right and the title above.
+        x = (low[0] + high[0]) / 2 + bar / 2 / scale
+        y = (low[1] + high[1]) / 2 + top / 2 / scale
+        # From close by, too, the whole body lies before the camera.
+        depth = picture.body @ toward
+        far = extent + float(depth.max() - depth.min())
+        middle = x * right + y * up + (depth.min() + depth.max()) / 2 * toward
+        camera.focal_point, camera.position = tuple(middle), tuple(middle + far * toward)
+        camera.up = tuple(up)
+        camera.parallel_scale = height / 2 / scale
+        camera.clipping_range = (0.01 * far, 2.5 * far)
+        plotter.add_axes(viewport=(0.0, 0.0, 130 / width, 130 / height), line_width=3)
+        return shown(plotter, file, show)
+
+
+def _axes(toward: Floats) -> tuple[Floats, Floats, Floats]:
+    """Unit vectors right, up (along z if that can be seen) and towards the viewer."""
+    upright = np.array([0.0, 0.0, 1.0] if abs(toward[2]) < 0.98 else [0.0, 1.0, 0.0])
+    right = np.cross(upright, toward)
+    right /= np.linalg.norm(right)
+    return right, np.cross(toward, right), toward
+
+
+def _left_of(picture: SpaceScene, right: Floats, limit: float) -> SpaceScene:
+    """A picture without what lies beyond a limit on the right."""
+
+    def cut(corners: Floats, values: Floats | None = None) -> tuple[Floats, Floats]:
+        k, v = corners.shape[:2]
+        number = np.arange(k * v).reshape(k, v)
+        x = corners.reshape(-1, 3)
+        level = x @ right - limit
+        parts = [Soup.of(number, None).behind(level)] if v > 2 else segments_behind(number, level)
+        shown = np.zeros(k * v) if values is None else values.ravel()
+        return (
+            np.concatenate([part.at(x) for part in parts]),
+            np.concatenate([part.at(shown[:, None])[..., 0] for part in parts]),
+        )
+
+    names = ("touching", "apart", "skin", "outline", "cell_edges", "faint", "rims", "fronts")
+    rest: dict[str, Any] = {name: cut(getattr(picture, name))[0] for name in names}
+    triangles, values = cut(picture.triangles, picture.values)
+    return replace(picture, triangles=triangles, values=values, **rest)
+
+
+def _add_faces(
+    pv: Any, plotter: Any, picture: SpaceScene, cmap: str, window: tuple[int, int]
+) -> None:
+    if picture.label:
+        body = _surface(pv, picture.triangles)
+        if len(picture.triangles):
+            body.point_data["values"] = picture.values.ravel()
+        else:  # all lips are apart, or all touch: the bar still says which field it is
+            body = pv.PolyData(np.zeros((1, 3)))
+            body.point_data["values"] = [picture.limits[0]]
+        actor = plotter.add_mesh(
+            body,
+            scalars="values",
+            cmap=cmap,
+            clim=picture.limits,
+            interpolate_before_map=True,
+            show_scalar_bar=False,
+            point_size=0.001,
+            **_LIGHT,
+        )
+        bottom = max(0.1, (_LEGEND * (len(_legend(picture)) + 1.2)) / window[1])
+        add_bar(plotter, actor, picture.label, picture.limits, window, bottom)
+    for corners, color in ((picture.touching, CLOSED), (picture.apart, _APART)):
+        if len(corners):
+            plotter.add_mesh(_surface(pv, corners), color=color, **_LIGHT)
+    if len(picture.skin):
+        plotter.add_mesh(_surface(pv, picture.skin), color="#8fa3b8", opacity=0.13, lighting=False)
+
+
+# Enough shade to tell the faces, not so much that colours leave the bar.
+_LIGHT = {"ambient": 0.55, "diffuse": 0.5, "specular": 0.0}
+
+
+def _add_lines(pv: Any, plotter: Any, picture: SpaceScene, edges: bool, step: Floats) -> None:
+    nothing = picture.cell_edges[:0]
+    lines = [
+        (picture.faint, "#a5a9ae", 1.5, 0),
+        (picture.cell_edges if edges else nothing, "#303030", 1.0, 1),
+        (picture.outline, "#404040" if len(picture.skin) else "black", 2.0, 1.5),
+        (picture.rims, "black", 2.5, 2),
+        (picture.fronts, _FRONT, 6.0, 3),
+    ]
+    for segments, color, width, level in lines:
+        if len(segments):
+            number = np.arange(2 * len(segments)).reshape(-1, 2)
+            cells = np.concatenate([np.full((len(segments), 1), 2), number], axis=1)
+            line = pv.PolyData(segments.reshape(-1, 3) + level * step, lines=cells.ravel())
+            plotter.add_mesh(line, color=color, line_width=width, lighting=False)
+
+
+def _add_points(plotter: Any, picture: SpaceScene, step: Floats) -> None:
+    for x, color, size in ((picture.heaviside, "#1f77b4", 18), (picture.tip, "#ff7f0e", 11)):
+        if len(x):
+            plotter.add_points(x + step, color=color, point_size=size, lighting=False)
+
+
+def _add_arrows(pv: Any, plotter: Any, arrows: tuple[Floats, Floats]) -> None:
+    start, vector = arrows
+    longest = float(np.linalg.norm(vector, axis=1).max(initial=0.0))
+    parts = []
+    for x, v in zip(start, vector, strict=True):
+        length = float(np.linalg.norm(v))
+        # Arrows of all lengths are as thick as each other.
+        parts.append(
+            pv.Arrow(
+                start=x,
+                direction=v,
+                scale=length,
+                tip_length=min(0.35 * longest / length, 0.8),
+                tip_radius=0.11 * longest / length,
+                shaft_radius=0.04 * longest / length,
+            )
+        )
+    if parts:
+        plotter.add_mesh(pv.merge(parts), color=_LOADS, **_LIGHT)
+
+
+def _legend(picture: SpaceScene) -> list[tuple[str, str]]:
+    """Words of the legend and their colours."""
+    crack = "crack" if len(picture.heaviside) else "crack faces touch"
+    entries = [
+        (len(picture.touching), crack, CLOSED),
+        (len(picture.apart), "crack faces apart", "#8d9299"),
+        (len(picture.fronts), "front", _FRONT),
+        (len(picture.heaviside), "Heaviside", "#1f77b4"),
+        (len(picture.tip), "tip functions", "#ff7f0e"),
+    ]
+    return [(text, color) for count, text, color in entries if count]
+
+
+def _add_legend(plotter: Any, picture: SpaceScene, window: tuple[int, int]) -> None:
+    width, height = window
+    for k, (text, color) in enumerate(reversed(_legend(picture))):
+        plotter.add_text(
+            text,
+            position=(1 - BAR / width, (14 + k * _LEGEND) / height),
+            viewport=True,
+            font_size=font_size(24),
+            color=color,
+        )
+
+
+def _surface(pv: Any, corners: Floats) -> Any:
+    number = np.arange(3 * len(corners)).reshape(-1, 3)
+    return pv.PolyData.from_regular_faces(corners.reshape(-1, 3), number)
+
+
+__all__ = ["draw_space"]

@@ -1,0 +1,192 @@
+"""Write a report: sections, pictures and the interactive view in one file."""
+
+import base64
+import datetime
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+from numpy.typing import NDArray
+
+from xcrack.base.checks import number, shown
+from xcrack.base.errors import ProblemError, XcrackError, warn
+from xcrack.base.markup import Markup, element, joined, listed, page
+from xcrack.base.paths import path_of, write_texts
+from xcrack.runs.inspection import Inspection
+from xcrack.runs.life import Life
+from xcrack.runs.versions import versions
+from xcrack.view import report_histories as histories
+from xcrack.view import report_results as results
+from xcrack.view import report_safety as safety
+from xcrack.view import report_scene as scene
+from xcrack.view.report_pictures import Picture, history_pictures, solution_pictures
+from xcrack.view.report_source import Section, Source, source_of
+from xcrack.view.report_viewer import viewer
+from xcrack.view.view_3d import history_layers, packed, solution_layers
+
+_FORMAT = 1
+
+
+def report(
+    result: Any,
+    file: str | PathLike[str],
+    *,
+    title: str = "",
+    yield_stress: float | None = None,
+    life: Life | None = None,
+    inspection: Inspection | None = None,
+    strength: NDArray[Any] | None = None,
+) -> Path:
+    """Write what was modelled and what came out, as one page that needs no network.
+
+    The page has the scene, assumptions and their validity, K, contact, growth, all warnings, the
+    table of a run as CSV, pictures, for bodies in space a view to turn, and how to run it again.
+    A ``.json`` file beside it has the numbers.
+
+    Parameters
+    ----------
+    result : Solution, list of Solution, History, or path
+        A path is the folder that `collect` wrote to; a run that is half written is reported as far
+        as it is there.
+    file : path
+        Of the page; ``.html`` is added where it has no suffix.
+    title : str
+    yield_stress : float, stress, optional
+        Lets the report compare plastic zones with crack and cell; a zone above 15 % of the
+        shortest crack, where K of linear elasticity does not hold, is a warning.
+    life : Life, optional
+        What `xc.life` made of the run: the report shows it and what drives it.
+    inspection : Inspection, optional
+        What `xc.inspection` made of the run: when to look.
+    strength : structured array, optional
+        What `xc.residual_strength` made of the run.
+
+    Returns
+    -------
+    Path
+
+    Raises
+    ------
+    ProblemError
+        Something else than these, no run in the folder, or a file that cannot be written.
+    """
+    path = path_of(file, "report: file", error=ProblemError)
+    if path.name in ("", ".."):
+        raise ProblemError(f"report: file = {shown(str(file))} is a folder: give a file in it.")
+    path = path if path.suffix else path.with_name(path.name + ".html")
+    if not isinstance(title, str):
+        raise ProblemError(f"report: title = {shown(title)}: give a text.")
+    if yield_stress is not None:
+        yield_stress = number(yield_stress, "report: yield_stress", above=0)
+    if not isinstance(life, Life | None):
+        raise ProblemError(f"report: life = {shown(life)}: give what xc.life returns.")
+    if not isinstance(inspection, Inspection | None):
+        raise ProblemError(
+            f"report: inspection = {shown(inspection)}: give what xc.inspection returns."
+        )
+    names = getattr(getattr(strength, "dtype", None), "names", None) or ()
+    if strength is not None and not {"step", "by_toughness"} <= set(names):
+        raise ProblemError(
+            f"report: strength = {shown(strength)}: give what xc.residual_strength returns."
+        )
+    source = source_of(result, title, yield_stress, life)
+    source = replace(source, inspection=inspection, strength=strength)
+    words, is_small = scene.plastic_zone(source)
+    if not is_small:
+        warn(words)
+        source.warnings.update([words])
+    sections = [made for make in SECTIONS if (made := make(source)) is not None]
+    texts = {path: _page(source, sections), path.with_suffix(".json"): _json(source, sections)}
+    write_texts(texts, "the report cannot be written to", error=ProblemError)
+    return path
+
+
+def pictures(source: Source) -> Section:
+    """Pictures; why some are missing is said."""
+    drawn, missing = solution_pictures(source.solutions, source.sif)
+    if source.history is not None:
+        of_run, lost = history_pictures(source.history)
+        drawn, missing = drawn + of_run, missing + lost
+    parts: list[Any] = [_figure(picture) for picture in drawn]
+    if missing:
+        parts += [element("p", "Not drawn here:", cls="soft"), listed(missing)]
+    if not parts:
+        parts.append(element("p", "There is nothing to draw yet."))
+    return Section("pictures", "Pictures", joined(*parts),
+                   {"drawn": [words for words, _ in drawn], "missing": missing})  # fmt: skip
+
+
+def space_view(source: Source) -> Section | None:
+    """The interactive view of a body in space."""
+    layers: list[dict[str, Any]] = []
+    if source.dim < 3:
+        return None
+    history = source.history
+    try:
+        if history is not None and len(history.steps) > 1:
+            layers = history_layers(history)
+        elif source.solutions:
+            layers = solution_layers(source.solutions[-1])
+    except XcrackError:
+        layers = []
+    content = packed(layers)
+    if content is None:
+        words = (
+            "No view to turn: there is nothing to draw, or too much for a page; see the pictures."
+        )
+        return Section("view", "View", element("p", words, cls="soft"), {"layers": 0})
+    return Section("view", "View", viewer(content), {"layers": len(content["layers"])})
+
+
+SECTIONS: Sequence[Callable[[Source], Section | None]] = (
+    scene.scene,
+    space_view,
+    results.growth,
+    histories.spectrum,
+    results.lives,
+    safety.inspections,
+    safety.strength,
+    results.intensity,
+    results.contact,
+    scene.assumptions,
+    scene.warned,
+    pictures,
+    results.numbers,
+    scene.again,
+)
+"""Parts of a report in their order; a new one is a function of the source, and an entry here."""
+
+
+def _page(source: Source, sections: Sequence[Section]) -> str:
+    today = datetime.date.today().isoformat()
+    links = Markup(" ".join(f'<a href="#{s.key}">{s.title}</a>' for s in sections))
+    parts: list[Any] = [
+        element("h1", source.title),
+        element("p", f"xcrack {versions()['xcrack']} · {today}", cls="soft"),
+    ]
+    if not source.is_whole:
+        words = "This run is not finished; the report shows what is there."
+        parts.append(element("p", words, cls="bad"))
+    parts.append(element("nav", links))
+    for section in sections:
+        parts += [Markup(f'<h2 id="{section.key}">{section.title}</h2>'), section.content]
+    return page(source.title, *parts)
+
+
+def _figure(picture: Picture) -> Markup:
+    words, data = picture
+    coded = base64.b64encode(data).decode()
+    text = element("figcaption", words)
+    return Markup(f'<figure><img alt="{words}" src="data:image/png;base64,{coded}">{text}</figure>')
+
+
+def _json(source: Source, sections: Sequence[Section]) -> str:
+    content = {"format": _FORMAT, "title": source.title, "whole": source.is_whole,
+               **{section.key: dict(section.numbers) for section in sections}}  # fmt: skip
+    return json.dumps(content, indent=1, ensure_ascii=False, default=str) + "\n"
+
+
+__all__ = ["SECTIONS", "report"]

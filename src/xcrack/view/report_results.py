@@ -1,0 +1,222 @@
+"""Sections on what came out: K, contact, growth, table."""
+
+import base64
+import csv
+import io
+from typing import Any
+
+import numpy as np
+
+from xcrack.analysis.contact_result import Contact
+from xcrack.analysis.solution import Solution
+from xcrack.base.arrays import coordinates
+from xcrack.base.markup import Markup, element, joined, table
+from xcrack.sif.sif import SIF
+from xcrack.view.report_source import Section, Source
+
+_MODES = ("K_I", "K_II", "K_III")
+_END = {2: "tip", 3: "front"}
+
+
+def intensity(source: Source) -> Section | None:
+    """K of every state, crack and tip; along fronts its ends and mean."""
+    if not any(len(sif.K) for state in source.sif for sif in state):
+        return None
+    rows, numbers = [], []
+    head: tuple[str, ...] = ()
+    for k, state in enumerate(source.sif):
+        for c, sif in enumerate(state):
+            for tip in np.unique(sif.front):
+                mine = sif.front == tip
+                head, row = _row(sif, mine, source.dim)
+                rows.append((k, c, int(tip), *row))
+                numbers.append({"state": k, "crack": c, "tip": int(tip),
+                                **dict(zip(head, map(_plain, row), strict=True))})  # fmt: skip
+    first = ("state", "crack", _END[source.dim])
+    note = ("spread: difference between two domains of the integral; domain: radius of the larger "
+            "one, in cells. K_I of closed places is exactly zero. best ± bar: estimate of exact K "
+            "and half-width of its error, nan where there is none.")  # fmt: skip
+    reasons = {reason for state in source.sif for sif in state for reason in sif.reasons if reason}
+    if reasons:
+        note += f" No bars: {'; '.join(sorted(reasons))}."
+    content = joined(table((*first, *head), rows, scroll=len(rows) > 12 or source.dim > 2),
+                     element("p", note, cls="soft"))  # fmt: skip
+    return Section("K", "Stress intensity factors", content, {"rows": numbers})
+
+
+def _row(sif: SIF, mine: Any, dim: int) -> tuple[tuple[str, ...], tuple[Any, ...]]:
+    """Names and values of one tip or front."""
+    quality = float(sif.spread[mine].max(initial=0.0)), float(sif.domain_cells[mine].min())
+    return _ROW[dim](sif, mine, quality)
+
+
+def _at_tip(sif: SIF, mine: Any, quality: Any) -> tuple[tuple[str, ...], tuple[Any, ...]]:
+    K, closed = sif.K[mine][0], bool(sif.closed[mine].any())
+    best, bar = sif.best[mine][0], sif.bar[mine][0]
+    place = coordinates(sif.x[mine][0])
+    head = ("place", "K_I", "K_II", "T", "best K_I", "± K_I", "best K_II", "± K_II", "spread",
+            "domain", "closed")  # fmt: skip
+    bars = (best[0], bar[0], best[1], bar[1])
+    return head, (place, K[0], K[1], sif.T[mine][0], *bars, *quality, closed)
+
+
+def _along_front(sif: SIF, mine: Any, quality: Any) -> tuple[tuple[str, ...], tuple[Any, ...]]:
+    K, closed = sif.K[mine], int(sif.closed[mine].sum())
+    head = ("places", *(f"{mode} {end}" for mode in _MODES for end in ("min", "mean", "max")),
+            "largest ± K_I", "± K_II", "± K_III", "spread", "domain",
+            "closed places")  # fmt: skip
+    bar = sif.bar[mine]
+    bars = [float(np.nanmax(column)) if np.isfinite(column).any() else np.nan for column in bar.T]
+    ends = [f(K[:, m]) for m in range(3) for f in (np.min, np.mean, np.max)]
+    return head, (int(mine.sum()), *map(float, ends), *bars, *quality, closed)
+
+
+_ROW = {2: _at_tip, 3: _along_front}
+
+
+_RUBBED = ("stuck share", "largest shear", "largest slip", "dissipated since the state before")
+
+
+def _rubbed(solution: Solution, contact: Contact | None) -> tuple[float, ...]:
+    """What friction adds to a row: nothing in a scene without."""
+    if not any(solution.problem.frictions):
+        return ()
+    if contact is None or contact.shear is None or contact.slip is None or contact.stuck is None:
+        return 0.0, 0.0, 0.0, solution.dissipated
+    total = float(contact.measure.sum())
+    return (
+        float(contact.measure[contact.stuck].sum()) / total if total else 0.0,
+        float(np.abs(contact.shear).max(initial=0.0)),
+        float(np.abs(contact.slip).max(initial=0.0)),
+        solution.dissipated,
+    )
+
+
+def contact(source: Source) -> Section | None:
+    """Share of each crack that is closed, largest pressure and opening."""
+    rows = []
+    rubs = any(any(solution.problem.frictions) for solution in source.solutions)
+    for k, solution in enumerate(source.solutions):
+        for c, lips in enumerate(solution.lips):
+            gap, pressed = solution.opening(c), solution.contact[c]
+            share, force, largest = 0.0, 0.0, 0.0
+            if pressed is not None:
+                total = float(pressed.measure.sum())
+                share = float(pressed.measure[pressed.closed].sum()) / total if total else 0.0
+                force = float(pressed.measure @ pressed.pressure)
+                largest = float(pressed.pressure.max(initial=0.0))
+            low = float(gap.min(initial=np.inf)) if len(lips) else 0.0
+            rows.append((k, solution.state, c, pressed is not None, share, largest, force,
+                         float(gap.max(initial=0.0)), low,
+                         *_rubbed(solution, pressed)))  # fmt: skip
+    if not rows:
+        return None
+    head = ("state", "load", "crack", "multipliers", "closed share", "largest pressure",
+            "contact force", "largest opening", "smallest opening",
+            *(_RUBBED if rubs else ()))  # fmt: skip
+    shown = [(k, _load(state), *rest) for k, state, *rest in rows]
+    numbers = [{name: _plain(v) for name, v in zip(head, row, strict=True)} for row in shown]
+    return Section("contact", "Contact of the crack faces", table(head, shown), {"rows": numbers})
+
+
+def _load(state: Any) -> str:
+    if state is None:
+        return "as given"
+    return f"{len(state)} loads" if isinstance(state, list | tuple) else f"× {state}"
+
+
+def growth(source: Source) -> Section | None:
+    """Steps, cycles, and why the run ended."""
+    history = source.history
+    if history is None:
+        return None
+    if not history.steps:
+        return Section("growth", "Growth", element("p", "No step is finished yet.", cls="bad"),
+                       {"steps": 0, "ended": history.ended})  # fmt: skip
+    last = history.steps[-1]
+    rates = [r for step in history.steps for part in step.rate for r in part if np.isfinite(r)]
+    ranges = [r for step in history.steps for part in step.dK_eq for r in part]
+    rows: list[tuple[str, Any]] = [
+        ("steps", len(history.steps)),
+        ("cycles N at the last step", history.life),
+        ("its numerical error", str(history.life_bar)),
+        *(("join", str(join)) for join in history.joins),
+        ("why it ended", history.ended),
+    ]
+    rows += [("break-through", str(each)) for each in history.arrivals]
+    if rates and ranges:
+        rows += [("ΔK_eq of the run", f"{min(ranges):.6g} to {max(ranges):.6g}"),
+                 ("da/dN of the run", f"{min(rates):.4g} to {max(rates):.4g}")]  # fmt: skip
+    if last.memory is not None:
+        law = {k: v for k, v in last.memory.settings.items() if k == "law" or k.startswith("law.")}
+        rows += [(name, text) for name, text in law.items()]
+        rows += [(f"size of crack {c} at the end", v) for c, v in enumerate(last.memory.length)]
+    parts: list[Any] = [table((), rows)]
+    if not source.is_whole:
+        words = "This run is not finished: the report shows the steps that are there."
+        parts.insert(0, element("p", words, cls="bad"))
+    bar = history.life_bar
+    sources = {name: _plain(getattr(bar, name)) for name in ("steps", "K", "contact", "unknown")}
+    numbers = {"steps": len(history.steps), "cycles": history.life, "ended": history.ended,
+               "error of cycles": sources, "whole": source.is_whole}  # fmt: skip
+    return Section("growth", "Growth and life", joined(*parts), numbers)
+
+
+def lives(source: Source) -> Section | None:
+    """Life with its error bar, and what drives it."""
+    life = source.life
+    if life is None:
+        return None
+    levels = (1, 5, 50, 95, 99)
+    quantiles = [(f"{p} % of the samples end before", life.percentile(p)) for p in levels]
+    drivers = sorted(life.scatter.items(), key=lambda item: item[1][0] - item[1][1])
+    parts: list[Any] = [table((), [(f"life of the run, {life.unit}s", life.life), *quantiles])]
+    if drivers:
+        rows = [(name, low, high, high / low) for name, (low, high) in drivers]
+        head = ("what varies alone", "5 %", "95 %", "ratio")
+        parts += [element("h3", "What drives it"), table(head, rows)]
+    if life.bounds:
+        bounds = [
+            (name, f"{100 * share:.3g} %" if np.isfinite(share) else "not known")
+            for name, share in life.bounds.items()
+        ]
+        parts += [element("h3", "Numerical bounds, as shares of the life"), table((), bounds)]
+    values = {"life": life.life, "quantiles": {str(p): _plain(life.percentile(p)) for p in levels},
+              "scatter": {k: list(map(_plain, v)) for k, v in life.scatter.items()},
+              "bounds": {k: _plain(v) for k, v in life.bounds.items()}}  # fmt: skip
+    return Section("life", "Life with its error bar", joined(*parts), values)
+
+
+def numbers(source: Source) -> Section | None:
+    """The table of a run, to read and to save."""
+    history = source.history
+    if history is None or not history.steps:
+        return None
+    rows = history.table()
+    names = list(rows.dtype.names or ())
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(names)
+    writer.writerows(rows.tolist())
+    coded = base64.b64encode(text.getvalue().encode()).decode()
+    link = Markup(f'<a download="history.csv" href="data:text/csv;base64,{coded}">history.csv</a>')
+    content = joined(element("p", joined("Save it as ", link)),
+                     table(names, rows.tolist(), scroll=True))  # fmt: skip
+    return Section(
+        "table",
+        "Table of all steps",
+        content,
+        {"columns": names, "rows": [[_plain(v) for v in row] for row in rows.tolist()]},
+    )
+
+
+def _plain(value: Any) -> Any:
+    """A value that json has; nan and inf are texts."""
+    if isinstance(value, np.generic):
+        value = value.item()
+    if isinstance(value, float) and not np.isfinite(value):
+        return str(value)
+    return value
+
+
+__all__ = ["contact", "growth", "intensity", "lives", "numbers"]

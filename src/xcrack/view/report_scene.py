@@ -1,0 +1,218 @@
+"""Sections on what was asked: scene, assumptions, validity, inputs and how to run it again."""
+
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from xcrack.analysis.solution import Solution
+from xcrack.base.arrays import coordinates
+from xcrack.base.markup import Markup, element, joined, listed, table
+from xcrack.crack.measures import Measures, measures
+from xcrack.runs.versions import versions
+from xcrack.view.report_source import Section, Source
+
+_SMALL = 0.15  # share of the crack up to which a plastic zone counts as small
+
+
+def scene(source: Source) -> Section:
+    """Body, material, cracks, supports, and each load with its resultant."""
+    rows: list[tuple[Any, Any]] = []
+    numbers: dict[str, Any] = {"dim": source.dim, "cracks": len(source.cracks)}
+    mesh, problem = source.mesh, source.problem
+    if mesh is not None:
+        size = " × ".join(f"{v:.6g}" for v in np.ptp(mesh.points, axis=0))
+        rows += [("body", size), ("mesh", f"{mesh.n_points} points, {len(mesh.cells)} cells")]
+        numbers |= {"points": mesh.n_points, "cells": len(mesh.cells)}
+    if problem is not None:
+        rows += [("material", repr(problem.material)), ("order of the elements", problem.order),
+                 ("contact", problem.contact)]  # fmt: skip
+    for c, crack in enumerate(source.cracks):
+        rows.append((f"crack {c}", _crack(crack)))
+    parts: list[Any] = [table((), rows)]
+    known = [] if mesh is None else [measures(crack, mesh) for crack in source.cracks]
+    if known:
+        size = {2: "length", 3: "area"}[source.dim]
+        head = ("crack", size, "depth", "on the surfaces", "ends")
+        parts.append(table(head, [_measured(c, m) for c, m in enumerate(known)]))
+        numbers["measures"] = [
+            asdict(m) | {"depth": None if np.isnan(m.depth) else m.depth} for m in known
+        ]
+    if problem is not None and source.solutions:
+        parts.append(_conditions(source.solutions[-1]))
+    else:
+        parts.append(element("p", "The stored steps do not hold the loads: they are in the script "
+                             "or the case file that made the run.", cls="soft"))  # fmt: skip
+    return Section("scene", "Scene", joined(*parts), numbers)
+
+
+def _crack(crack: Any) -> str:
+    if crack.fronts is not None:
+        n = [len(front) for front in crack.fronts]
+        return f"{len(crack.faces)} triangles, {len(n)} front(s) of {', '.join(map(str, n))} points"
+    length = float(np.linalg.norm(np.diff(crack.points, axis=0), axis=1).sum())
+    tips = "not placed" if crack.tips is None else f"{len(crack.tips)} tip(s)"
+    return f"{len(crack.points)} points, length {length:.6g}, {tips}"
+
+
+def _measured(c: int, m: Measures) -> tuple[str, ...]:
+    """A crack as it is read off: lengths and depths by facet set, ends by place and set."""
+    surfaces = "; ".join(f"{t.name}: length {t.length:.4g}, depth {t.depth:.4g}" for t in m.traces)
+    ends = "; ".join(f"{_vector(end.x)} on {end.name}" for end in m.ends)
+    depth = "" if np.isnan(m.depth) else f"{m.depth:.6g}"
+    return str(c), f"{m.area:.6g}", depth, surfaces or "none", ends or "none"
+
+
+def _conditions(solution: Solution) -> Markup:
+    """Supports and loads, and what they add up to in this state."""
+    rows = [_condition("support", each) for each in solution.problem.supports]
+    rows += [_condition("load", each) for each in solution.loads]
+    if not rows:
+        return element("p", "No supports and no loads.")
+    parts = [table(("", "kind", "where", "value"), rows)]
+    sums = [
+        (each.name, _vector(each.force), _vector(each.moment))
+        for each in solution.report.resultants
+    ]
+    if sums:
+        head = ("resultants and reactions", "force", "moment about the origin")
+        parts += [element("p", f"Scale of the loads in this state: {solution.factor:.6g}."),
+                  table(head, sums)]  # fmt: skip
+    return joined(*parts)
+
+
+def _condition(role: str, condition: Any) -> tuple[str, str, str, str]:
+    where = getattr(condition, "where", "")
+    names = ("value", "force", "axis", "field")
+    value = next((_value(getattr(condition, n)) for n in names if hasattr(condition, n)), "")
+    place = where if isinstance(where, str) else f"{len(where)} point(s)"
+    return role, type(condition).__name__, place, value
+
+
+def _vector(values: Any) -> str:
+    return coordinates(np.atleast_1d(np.asarray(values, dtype=float)))
+
+
+def _value(value: Any) -> str:
+    if callable(value):
+        name = getattr(value, "__name__", getattr(value, "name", type(value).__name__))
+        return f"function {name}"
+    array = np.asarray(value, dtype=object)
+    return str(array.tolist() if array.ndim else value)
+
+
+def assumptions(source: Source) -> Section:
+    """What was modelled and what was left out, and why; where linear elasticity holds."""
+    rows, numbers = [], {}
+    if source.solutions:
+        for row in source.solutions[0].report.ingredients:
+            rows.append((row.name, "used" if row.used else "left out", row.reason,
+                         row.unknowns or ""))  # fmt: skip
+            numbers[row.name] = {"used": row.used, "reason": row.reason}
+    parts: list[Any] = []
+    if rows:
+        parts.append(table(("ingredient", "", "reason", "unknowns"), rows))
+    notes = _notes(source)
+    parts.append(element("h3", "Validity of linear elastic fracture mechanics"))
+    parts.append(listed(notes))
+    return Section("assumptions", "Assumptions", joined(*parts),
+                   {"ingredients": numbers, "validity": notes})  # fmt: skip
+
+
+def _notes(source: Source) -> list[str]:
+    rubs = any(any(solution.problem.frictions) for solution in source.solutions)
+    faces = "with Coulomb friction" if rubs else "without friction"
+    notes = [f"Small strains, a linear elastic isotropic body, crack faces {faces}."]
+    notes.append(plastic_zone(source)[0])
+    history = source.history
+    memory = history.steps[0].memory if history is not None and history.steps else None
+    if history is not None and memory is not None:
+        law = memory.settings.get("law", "")
+        ratios = [R for step in history.steps for R in step.R if len(R)]
+        if ratios:
+            every = np.concatenate(ratios)
+            every = every[np.isfinite(every)]
+            if len(every):
+                notes.append(f"R of the run is {every.min():.3g} to {every.max():.3g}: compare it "
+                             "with the range that the growth law was fitted for.")  # fmt: skip
+        touching = any(state[c].closed.any() for step in history.steps for state in step.sif
+                       for c in range(len(state)))  # fmt: skip
+        if "elber" in law and touching:
+            notes.append("Closure may be counted twice: the law has a share U of the range, and "
+                         "contact of the crack faces was computed too.")  # fmt: skip
+    return notes
+
+
+def plastic_zone(source: Source) -> tuple[str, bool]:
+    """Size of the plastic zone against the shortest crack, and whether elastic K holds with it."""
+    if source.yield_stress is None:
+        words = ("Plastic zones were not judged: give report(..., yield_stress=...) to have them "
+                 "compared with crack and cell.")  # fmt: skip
+        return words, True
+    every = [sif.K[:, :2] for state in source.sif for sif in state]
+    largest = max((float(np.abs(K).max(initial=0.0)) for K in every), default=0.0)
+    radius = (largest / source.yield_stress) ** 2 / (2 * np.pi)
+    lengths = {"shortest crack": _shortest(source), "smallest cell": _cell(source)}
+    words = ", ".join(f"{100 * radius / v:.3g} % of the {name}" for name, v in lengths.items()
+                      if v > 0)  # fmt: skip
+    is_small = radius <= _SMALL * lengths["shortest crack"] or not source.cracks
+    verdict = "small" if is_small else "NOT small: linear elastic K does not hold"
+    return (f"Plastic zone (Irwin, plane stress) (K/yield)²/2π = {radius:.4g} for the largest K "
+            f"{largest:.6g}: {words}; {verdict}."), is_small  # fmt: skip
+
+
+def _shortest(source: Source) -> float:
+    """Smallest size of a crack: its length inside the body in 2D, its extent in 3D."""
+    mesh = source.mesh
+    if source.dim == 2 and mesh is not None:
+        return min((measures(crack, mesh).area for crack in source.cracks), default=0.0)
+    sizes = [float(np.ptp(crack.points, axis=0).max()) for crack in source.cracks]
+    return min(sizes, default=0.0)
+
+
+def _cell(source: Source) -> float:
+    return 0.0 if source.mesh is None else float(source.mesh.cell_size.min())
+
+
+def warned(source: Source) -> Section:
+    """All warnings, counted."""
+    if source.warnings:
+        rows = [(n, text) for text, n in source.warnings.most_common()]
+        content = joined(table(("times", "warning"), rows))
+    else:
+        content = element("p", "There were none.")
+    history = source.history
+    if history is not None and any(s.warnings is None and not s.solutions for s in history.steps):
+        hint = ("Steps of this run, made by an older xcrack, hold no warnings of K: columns spread "
+                "and domain_cells of the table show how far each K is to be trusted.")  # fmt: skip
+        content = joined(content, element("p", hint, cls="soft"))
+    return Section("warnings", f"Warnings ({source.warnings.total()})", content,
+                   {"messages": dict(source.warnings)})  # fmt: skip
+
+
+def again(source: Source) -> Section:
+    """Inputs, versions, and how to run it again."""
+    known, hashes = versions(), source.hashes()
+    settings: dict[str, str] = {}
+    history = source.history
+    if history is not None and history.steps and history.steps[0].memory is not None:
+        settings = dict(history.steps[0].memory.settings)
+    parts: list[Any] = [table((), [*known.items(), *hashes.items()])]
+    if history is not None and history.path is not None:
+        text = f"history = xc.load({str(history.path)!r})\nxc.report(history, 'report.html')"
+        if not source.is_whole:
+            text += (
+                f"\n# go on: xc.resume({str(history.path)!r}, problem, law, criterion, cycle, ...)"
+            )
+        parts.append(element("pre", text))
+    else:
+        parts.append(element("p", "Run the script or the case file that made this again; equal "
+                             "hashes say that mesh and cracks are the same."))  # fmt: skip
+    if settings:
+        body = table((), sorted(settings.items()), scroll=True)
+        parts.append(Markup(f"<details><summary>settings of the run</summary>{body}</details>"))
+    return Section("again", "Inputs, versions, and how to run it again", joined(*parts),
+                   {"versions": known, "hashes": hashes, "settings": settings})  # fmt: skip
+
+
+__all__ = ["again", "assumptions", "plastic_zone", "scene", "warned"]

@@ -1,0 +1,204 @@
+"""What a report is about, gathered from a solution, a history, or the folder of a run."""
+
+import hashlib
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xcrack.analysis.solution import Solution
+from xcrack.base.errors import ProblemError, XcrackError, collected_warnings
+from xcrack.base.markup import Markup
+from xcrack.base.paths import path_of
+from xcrack.crack.crack import Crack
+from xcrack.mesh.mesh import Mesh
+from xcrack.model.problem import Problem
+from xcrack.runs.collect import load
+from xcrack.runs.history import History
+from xcrack.runs.inspection import Inspection
+from xcrack.runs.life import Life
+from xcrack.sif.sif import SIF
+from xcrack.sif.stress_intensity import stress_intensities
+
+_HALF = "not ended"  # how `load` begins the reason of a run that goes on or was killed
+
+
+@dataclass(frozen=True, eq=False)
+class Source:
+    """All that the sections of a report may draw on.
+
+    Attributes
+    ----------
+    title : str
+    solutions : tuple of Solution
+        Of the last step, one for each load state; empty where only a stored run is there.
+    sif : tuple of tuple of SIF
+        ``sif[state][crack]`` of the same step.
+    history : History, optional
+    yield_stress : float, optional
+    life : Life, optional
+    inspection : Inspection, optional
+    strength : structured array, optional
+        What `residual_strength` returned.
+    warnings : mapping of str to int
+        What was warned of, and how often.
+    """
+
+    title: str
+    solutions: tuple[Solution, ...]
+    sif: tuple[tuple[SIF, ...], ...]
+    history: History | None = None
+    yield_stress: float | None = None
+    warnings: Counter[str] = field(default_factory=Counter)
+    life: Life | None = None
+    inspection: Inspection | None = None
+    strength: NDArray[Any] | None = None
+
+    @property
+    def problem(self) -> Problem | None:
+        """The scene, where it is known."""
+        return self.solutions[0].problem if self.solutions else None
+
+    @property
+    def mesh(self) -> Mesh | None:
+        """The mesh, where it is known."""
+        if self.solutions:
+            return self.solutions[0].space.mesh
+        return None if self.history is None else self.history.mesh
+
+    @property
+    def cracks(self) -> tuple[Crack, ...]:
+        """The cracks at the end."""
+        if self.history is not None:
+            return self.history.cracks
+        return self.solutions[0].space.cracks
+
+    @property
+    def dim(self) -> int:
+        """Dimension of the body."""
+        if self.cracks:
+            return int(self.cracks[0].points.shape[1])
+        return 2 if self.mesh is None else self.mesh.dim
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether the run has ended."""
+        return self.history is None or not self.history.ended.startswith(_HALF)
+
+    def hashes(self) -> dict[str, str]:
+        """Hashes of the inputs."""
+        if self.history is not None and self.history.steps:
+            memory = self.history.steps[0].memory
+            if memory is not None:
+                text = "\n".join(f"{k}={v}" for k, v in sorted(memory.settings.items()))
+                return {"settings of the run": _hash(text.encode())}
+        if self.problem is None:
+            return {}
+        mesh = self.problem.mesh
+        cracks = [np.ascontiguousarray(c.points).tobytes() for c in self.problem.cracks]
+        return {
+            "mesh": _hash(mesh.points.tobytes() + mesh.cells.tobytes()),
+            "cracks": _hash(b"".join(cracks)),
+        }
+
+
+def source_of(
+    given: Any, title: str, yield_stress: float | None, life: Life | None = None
+) -> Source:
+    """Gather what a report is about.
+
+    Raises
+    ------
+    ProblemError
+        Neither a solution, nor a history, nor the folder of a run.
+    """
+    messages: list[str] = []
+    with collected_warnings(messages):
+        if isinstance(given, str | PathLike):
+            folder = path_of(given, "report: path", error=ProblemError)
+            given = load(_run_folder(folder))
+            title = title or folder.name
+        if isinstance(given, History):
+            source = _of_history(given, title, yield_stress)
+        else:
+            solutions = _solutions(given)
+            source = Source(title or "Solution", solutions, _sif(solutions), None, yield_stress)
+    source.warnings.update(messages)
+    if source.history is not None:
+        source.warnings.update(source.history.warnings)
+    return replace(source, life=life)
+
+
+def _of_history(history: History, title: str, yield_stress: float | None) -> Source:
+    solutions: tuple[Solution, ...] = ()
+    sif: tuple[tuple[SIF, ...], ...] = ()
+    if history.steps:
+        last = (history.solved or history.steps)[-1]
+        solutions, sif = last.solutions, last.sif
+        for step in history.steps:
+            if step.warnings is None:  # of a script, or of an older xcrack
+                _sif(step.solutions)  # what is warned of is what counts here
+    return Source(title or "Growth run", solutions, sif, history, yield_stress)
+
+
+def _sif(solutions: Sequence[Solution]) -> tuple[tuple[SIF, ...], ...]:
+    """K of all states and cracks; where K cannot be had there is none."""
+    if not solutions:
+        return ()
+    n = len(solutions[0].space.cuts)
+    try:
+        by_crack = [stress_intensities(solutions, c) for c in range(n)]
+    except XcrackError:
+        return ()
+    return tuple(tuple(by_crack[c][k] for c in range(n)) for k in range(len(solutions)))
+
+
+def _solutions(given: Any) -> tuple[Solution, ...]:
+    result = [given] if isinstance(given, Solution) else given
+    if isinstance(result, list | tuple) and result and all(isinstance(s, Solution) for s in result):
+        return tuple(result)
+    raise ProblemError(
+        f"report takes a Solution or a list of them, a History, or the folder of a run, not a "
+        f"{type(given).__name__}."
+    )
+
+
+def _run_folder(folder: Path) -> Path:
+    """The folder itself, or the one in it where a case file has its steps."""
+    inner = folder / "steps"
+    return inner if inner.is_dir() and not (folder / "run.json").is_file() else folder
+
+
+def _hash(content: bytes) -> str:
+    return f"sha256:{hashlib.sha256(content).hexdigest()[:16]}"
+
+
+# A part of a report: HTML for readers, numbers for programs.
+
+
+@dataclass(frozen=True)
+class Section:
+    """A part of a report.
+
+    Attributes
+    ----------
+    key : str
+        Its name in the json file, and the anchor of the page.
+    title : str
+    content : Markup
+    numbers : mapping
+        What the json file has of it.
+    """
+
+    key: str
+    title: str
+    content: Markup
+    numbers: Mapping[str, Any] = field(default_factory=dict)
+
+
+__all__ = ["Section", "Source", "source_of"]

@@ -1,0 +1,109 @@
+"""An interactive view in a page: WebGL of a few lines, with all that it draws inside the page."""
+
+import json
+from typing import Any
+
+from xcrack.base.markup import Markup
+
+_SCRIPT = """
+(function () {
+const data = JSON.parse(document.getElementById("view-data").textContent);
+const canvas = document.getElementById("view-canvas"), bar = document.getElementById("view-bar");
+const gl = canvas.getContext("webgl", {alpha: false, antialias: true, preserveDrawingBuffer: true});
+if (!gl) { bar.textContent = "This browser draws no WebGL: see the pictures."; return; }
+gl.getExtension("OES_standard_derivatives");
+function shader(kind, text) { const s = gl.createShader(kind); gl.shaderSource(s, text);
+  gl.compileShader(s); if (!gl.getShaderParameter(s, gl.COMPILE_STATUS))
+  throw new Error(gl.getShaderInfoLog(s)); return s; }
+const program = gl.createProgram();
+gl.attachShader(program, shader(gl.VERTEX_SHADER, `attribute vec3 place; attribute vec3 colour;
+uniform mat4 turn; uniform vec3 middle; uniform float nearer; varying vec3 tint; varying vec3 at;
+void main() { vec4 p = turn * vec4(place - middle, 1.0); at = p.xyz; tint = colour;
+gl_Position = vec4(p.xy, -0.4 * p.z - nearer, 1.0); }`));
+gl.attachShader(program, shader(gl.FRAGMENT_SHADER, `#extension GL_OES_standard_derivatives : enable
+precision mediump float; varying vec3 tint; varying vec3 at; uniform float opacity, lit;
+void main() { vec3 n = cross(dFdx(at), dFdy(at)); float l = length(n);
+float light = lit > 0.5 && l > 0.0 ? 0.55 + 0.45 * abs(n.z / l) : 1.0;
+gl_FragColor = vec4(tint * light, opacity); }`));
+gl.linkProgram(program); gl.useProgram(program);
+const where = n => gl.getUniformLocation(program, n);
+const attribute = n => gl.getAttribLocation(program, n);
+function bytes(text) { const s = atob(text), a = new Uint8Array(s.length);
+  for (let i = 0; i < s.length; i++) a[i] = s.charCodeAt(i); return a; }
+function buffer(content) { const b = gl.createBuffer(); gl.bindBuffer(gl.ARRAY_BUFFER, b);
+  gl.bufferData(gl.ARRAY_BUFFER, content, gl.STATIC_DRAW); return b; }
+let last = -1;
+for (const layer of data.layers) {
+  const places = new Uint16Array(bytes(layer.places).buffer);
+  layer.count = places.length / 3; layer.on = true; last = Math.max(last, layer.step);
+  layer.place = buffer(places); layer.colour = buffer(bytes(layer.colours));
+}
+let step = last;
+const names = [...new Set(data.layers.map(l => l.name))];
+for (const name of names) {
+  const mine = data.layers.filter(l => l.name === name), label = document.createElement("label");
+  const box = document.createElement("input"); box.type = "checkbox"; box.checked = true;
+  box.onchange = () => { mine.forEach(l => l.on = box.checked); draw(); };
+  label.append(box, " " + name + " ");
+  if (mine[0].opacity < 1) { const range = document.createElement("input"); range.type = "range";
+    range.min = 0.05; range.max = 1; range.step = 0.05; range.value = mine[0].opacity;
+    range.oninput = () => { mine.forEach(l => l.opacity = +range.value); draw(); };
+    label.append(range); }
+  bar.append(label);
+}
+if (last > 0) { const label = document.createElement("label"), out = document.createElement("b");
+  const range = document.createElement("input"); range.type = "range"; range.min = 0;
+  range.max = last; range.value = last; out.textContent = last;
+  range.oninput = () => { step = +range.value; out.textContent = step; draw(); };
+  label.append(" step ", range, out); bar.append(label); }
+let yaw = -0.6, pitch = -1.1, zoom = 1.1, moveX = 0, moveY = 0;
+function draw() {
+  const w = canvas.clientWidth, h = canvas.clientHeight, ratio = window.devicePixelRatio || 1;
+  canvas.width = w * ratio; canvas.height = h * ratio;
+  gl.viewport(0, 0, canvas.width, canvas.height);
+  const cy = Math.cos(yaw), sy = Math.sin(yaw), cp = Math.cos(pitch), sp = Math.sin(pitch);
+  const x = zoom * Math.min(1, h / w), y = zoom * Math.min(1, w / h);
+  gl.uniformMatrix4fv(where("turn"), false, [x * cy, y * cp * sy, sp * sy, 0,
+    -x * sy, y * cp * cy, sp * cy, 0, 0, -y * sp, cp, 0, moveX, moveY, 0, 1]);
+  gl.uniform3fv(where("middle"), data.middle);
+  gl.clearColor(1, 1, 1, 1); gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
+  gl.enable(gl.DEPTH_TEST); gl.blendFunc(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA);
+  const shown = data.layers.filter(l => l.on && (l.step < 0 || l.step === step));
+  shown.sort((a, b) => b.opacity - a.opacity);
+  for (const l of shown) {
+    const clear = l.opacity < 1; clear ? gl.enable(gl.BLEND) : gl.disable(gl.BLEND);
+    gl.depthMask(!clear); gl.uniform1f(where("opacity"), l.opacity);
+    gl.uniform1f(where("lit"), l.kind === "triangles" ? 1 : 0);
+    gl.uniform1f(where("nearer"), l.kind === "triangles" ? 0 : 0.004);
+    gl.bindBuffer(gl.ARRAY_BUFFER, l.place); gl.enableVertexAttribArray(attribute("place"));
+    gl.vertexAttribPointer(attribute("place"), 3, gl.UNSIGNED_SHORT, true, 0, 0);
+    gl.bindBuffer(gl.ARRAY_BUFFER, l.colour); gl.enableVertexAttribArray(attribute("colour"));
+    gl.vertexAttribPointer(attribute("colour"), 3, gl.UNSIGNED_BYTE, true, 0, 0);
+    gl.drawArrays(l.kind === "triangles" ? gl.TRIANGLES : gl.LINES, 0, l.count);
+  }
+  gl.depthMask(true); canvas.dataset.drawn = shown.length;
+}
+canvas.onpointerdown = e => canvas.setPointerCapture(e.pointerId);
+canvas.onpointermove = e => { if (!e.buttons) return;
+  if (e.shiftKey || e.buttons > 1) { moveX += 2 * e.movementX / canvas.clientWidth;
+    moveY -= 2 * e.movementY / canvas.clientHeight; }
+  else { yaw += e.movementX / 150; pitch += e.movementY / 150; } draw(); };
+canvas.oncontextmenu = e => e.preventDefault();
+canvas.onwheel = e => { e.preventDefault(); zoom *= Math.exp(-e.deltaY / 600); draw(); };
+window.addEventListener("resize", draw); draw();
+})();
+"""
+
+
+def viewer(content: dict[str, Any]) -> Markup:
+    """The view, its data and its script."""
+    data = json.dumps(content).replace("<", "\\u003c")
+    return Markup(
+        '<p class="soft">Drag to turn, wheel to zoom, shift and drag to move.</p>'
+        '<div id="view-bar"></div><canvas id="view-canvas"></canvas>'
+        f'<script type="application/json" id="view-data">{data}</script>'
+        f"<script>{_SCRIPT}</script>"
+    )
+
+
+__all__ = ["viewer"]

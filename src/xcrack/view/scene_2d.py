@@ -1,0 +1,249 @@
+"""What a picture of a solution shows, as arrays: triangles, contours, lips and colours."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from xcrack.analysis.solution import Solution
+from xcrack.base.arrays import Bools, Floats, Ints
+from xcrack.mesh.locate import barycentric
+from xcrack.mesh.mesh import local_edges
+from xcrack.output.pieces import Pieces, pieces, von_mises
+
+FIELDS = {
+    "von_mises": "von Mises stress",
+    "sxx": "stress xx",
+    "syy": "stress yy",
+    "sxy": "stress xy",
+    "displacement": "displacement",
+    "ux": "displacement x",
+    "uy": "displacement y",
+}
+SPACE_FIELDS = FIELDS | {
+    "szz": "stress zz",
+    "syz": "stress yz",
+    "sxz": "stress xz",
+    "uz": "displacement z",
+}
+CLOSED = "#d6006c"  # colour of lips that touch
+STRESSES = ("von_mises", "sxx", "syy", "sxy", "szz", "syz", "sxz")
+_SHARE = 99.0  # % of the area at least whose stress stays within the colours
+_NEAR = 1e-8  # share of a cell within which a point lies on a crack
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """A field on the moved body, ready to draw.
+
+    Attributes
+    ----------
+    points : (n, 2) array, length
+    triangles : (t, 3) array of int
+    values : (n,) array
+    label : str
+        What the colour bar says.
+    limits : (float, float)
+        Ends of the colours.
+    beyond : (bool, bool)
+        Whether values lie below or above the colours.
+    signed : bool
+        The field has a sign: its colours part at zero.
+    outline, lips, closed, cell_edges, at_rest : (k, 3, 2) arrays, length
+        Edges as three points: of the body, of open crack faces, of closed crack faces, between
+        cells of the mesh, and of the body that has not moved.
+    near : (2, 2) array, length, optional
+        Box to show instead of the whole body.
+    """
+
+    points: Floats
+    triangles: Ints
+    values: Floats
+    label: str
+    limits: tuple[float, float]
+    beyond: tuple[bool, bool]
+    signed: bool
+    outline: Floats
+    lips: Floats
+    closed: Floats
+    cell_edges: Floats
+    at_rest: Floats
+    near: Floats | None = None
+
+    @property
+    def box(self) -> Floats:
+        """Lowest and highest coordinates of what is drawn `(2, 2)`, length."""
+        if self.near is not None:
+            return self.near
+        x = np.concatenate([self.points, self.at_rest.reshape(-1, 2)])
+        return np.stack([x.min(axis=0), x.max(axis=0)])
+
+
+def scene(solution: Solution, field: str, warp: float, limits: tuple[float, float] | None) -> Scene:
+    """Field on the moved body, each piece with its own side of the crack."""
+    body = pieces(solution)
+    moved = body.points + warp * body.displacement
+    values = field_values(body, field)
+    low, high, share = _range(body, field, values, limits)
+    # Rounded down: "100 %" would not be true.
+    label = FIELDS[field] + (f", clipped at {int(10 * share) / 10:g} %" if share < 100 else "")
+    edge, owner = _edges(body)
+    curve = _curves(body, edge, moved)
+    crack, closed = _on_lips(body, edge)
+    lip = crack >= 0
+    on_facet, rim = _on_facets(body, edge, owner)
+    rim &= ~lip
+    return Scene(
+        points=moved,
+        triangles=_triangles(body),
+        values=values,
+        label=label,
+        limits=(low, high),
+        beyond=(
+            bool(values.min() < low - 1e-9 * (high - low)),
+            bool(values.max() > high + 1e-9 * (high - low)),
+        ),
+        signed=low < 0 < high,
+        outline=curve[rim],
+        lips=curve[lip & ~closed],
+        closed=curve[lip & closed],
+        cell_edges=curve[on_facet & ~lip & ~rim],
+        at_rest=_curves(body, edge, body.points)[rim],
+    )
+
+
+def field_values(body: Pieces, field: str) -> Floats:
+    """Values of a field at the points of the pieces `(n,)`."""
+    if field == "von_mises":
+        return von_mises(body.stress)
+    if field in STRESSES:
+        i, j = ("xyz".index(letter) for letter in field[1:])
+        return np.array(body.stress[:, i, j])
+    if field == "displacement":
+        return np.asarray(np.linalg.norm(body.displacement, axis=1))
+    return np.array(body.displacement[:, "xyz".index(field[1])])
+
+
+def _range(
+    body: Pieces, field: str, values: Floats, limits: tuple[float, float] | None
+) -> tuple[float, float, float]:
+    """Ends of the colours, and the share of the area (%) within them."""
+    if limits is not None:
+        return float(limits[0]), float(limits[1]), 100.0
+    if field in STRESSES and body.solution.space.tips:
+        regular = values[body.corners[~body.solution.space.has_tip[body.cell]]]
+        low, high, share = clipped(
+            values[body.corners], body.volume, float(np.abs(regular).max(initial=0.0))
+        )
+        low, high = max(low, float(values.min())), min(high, float(values.max()))
+    else:
+        low, high, share = float(values.min()), float(values.max()), 100.0
+    return *rounded(low, high, field), share
+
+
+def clipped(values: Floats, measure: Floats, regular: float = 0.0) -> tuple[float, float, float]:
+    """Lowest and highest value without the few that are very large, and the share kept (%).
+
+    Parameters
+    ----------
+    values : (k, v) array
+        At the vertices of simplices.
+    measure : (k,) array
+        Their areas or volumes: otherwise small pieces around a tip would count for more than
+        they cover.
+    regular : float
+        Values up to this size are kept at any rate.
+    """
+    low, high = float(values.min()), float(values.max())
+    size = np.abs(values)
+    order = np.argsort(size, axis=None)
+    area = np.cumsum(np.repeat(measure / size.shape[1], size.shape[1])[order])
+    size_sorted = size.ravel()[order]
+    enough = size_sorted[min(np.searchsorted(area, _SHARE / 100 * area[-1]), len(area) - 1)]
+    top = max(regular, float(enough))
+    if max(-low, high) <= top:
+        return low, high, 100.0
+    within = np.searchsorted(size_sorted, top, side="right") - 1
+    return max(low, -top), min(high, top), 100 * float(area[within] / area[-1])
+
+
+def rounded(low: float, high: float, field: str) -> tuple[float, float]:
+    """Ends of the colours for values from low to high."""
+    if low < 0 < high and min(-low, high) > 0.05 * max(-low, high):
+        high = max(-low, high)
+        low = -high
+    if field in ("von_mises", "displacement"):
+        low = 0.0
+    if high - low <= 1e-6 * max(abs(low), abs(high)):
+        # One value everywhere: noise should not be spread over all the colours.
+        middle, reach = (low + high) / 2, 0.05 * max(abs(low), abs(high), 1e-300)
+        low, high = middle - reach, middle + reach
+    return low, high
+
+
+def _triangles(body: Pieces) -> Ints:
+    """Straight triangles between all nodes of the pieces."""
+    parts = []
+    for block in (body.plain, body.split):
+        if block.shape[1] == 6:
+            a, b, c, ab, ac, bc = block.T
+            small = [(a, ab, ac), (ab, b, bc), (ac, bc, c), (ab, bc, ac)]
+            parts.append(np.stack([np.stack(t, axis=1) for t in small], axis=1).reshape(-1, 3))
+        else:
+            parts.append(block)
+    return np.concatenate(parts)
+
+
+def _edges(body: Pieces) -> tuple[Ints, Ints]:
+    """Edges of pieces: vertices and midpoint (-1: straight), and one of their pieces."""
+    pairs = local_edges(2)
+    parts = []
+    for block in (body.plain, body.split):
+        middle = block[:, 3:] if block.shape[1] == 6 else np.full((len(block), 3), -1)
+        parts.append(np.concatenate([block[:, pairs], middle[:, :, None]], axis=2).reshape(-1, 3))
+    edge = np.concatenate(parts)
+    owner = np.repeat(np.arange(len(body.cell)), 3)
+    ends = np.sort(edge[:, :2], axis=1)
+    order = np.lexsort((edge[:, 2], ends[:, 1], ends[:, 0]))
+    ends = ends[order]
+    # The last of a group knows the midpoint if any does.
+    last = np.append((ends[1:] != ends[:-1]).any(axis=1), True)
+    return edge[order][last], owner[order][last]
+
+
+def _on_facets(body: Pieces, edge: Ints, owner: Ints) -> tuple[Bools, Bools]:
+    """Which edges lie on facets of the mesh, and which on its boundary.
+
+    Counting the pieces at an edge would not tell: sub-cells of neighbours need not match.
+    """
+    mesh = body.solution.space.mesh
+    cell = body.cell[owner]
+    a, b = (barycentric(mesh, cell, body.points[edge[:, k]]) for k in (0, 1))
+    on = (np.abs(a) < _NEAR) & (np.abs(b) < _NEAR)
+    rim = mesh.facet_to_cell[mesh.cell_to_facet, 1] < 0  # opposite to each corner of a cell
+    return np.asarray(on.any(axis=1)), np.asarray((on & rim[cell]).any(axis=1))
+
+
+def _curves(body: Pieces, edge: Ints, points: Floats) -> Floats:
+    a, b = points[edge[:, 0]], points[edge[:, 1]]
+    middle = np.where(edge[:, 2:] >= 0, points[edge[:, 2]], (a + b) / 2)
+    return np.stack([a, middle, b], axis=1)
+
+
+def _on_lips(body: Pieces, edge: Ints) -> tuple[Ints, Bools]:
+    """Crack on which each edge lies, or -1, and whether its faces touch there."""
+    crack = np.full(len(edge), -1, dtype=np.int64)
+    closed = np.zeros(len(edge), dtype=bool)
+    a, b = body.points[edge[:, 0]], body.points[edge[:, 1]]
+    near = _NEAR * float(body.solution.space.mesh.cell_size.min())
+    for c, phi in enumerate(body.phi):
+        mine = (np.abs(phi[edge[:, :2]]) <= near).all(axis=1)
+        # Ahead of a tip phi is zero as well.
+        for psi in body.psi[c]:
+            mine &= (psi[edge[:, :2]] <= near).all(axis=1)
+        crack[mine] = c
+        contact = body.solution.contact[c]
+        if contact is not None and mine.any():
+            nearest = cKDTree(contact.points).query((a[mine] + b[mine]) / 2)[1]
+            closed[mine] = contact.closed[nearest]
+    return crack, closed

@@ -1,0 +1,454 @@
+"""What a picture of a 3D body shows, as arrays: triangles, lines, colours and arrows."""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from xcrack.analysis.solution import Solution
+from xcrack.base.arrays import Bools, Floats, Ints
+from xcrack.base.checks import numbers, shown
+from xcrack.base.errors import ProblemError
+from xcrack.mesh.mesh import Mesh
+from xcrack.model.conditions import (
+    Bearing,
+    PointForce,
+    Pressure,
+    Resultant,
+    Traction,
+    evaluate,
+    evaluate_scalar,
+)
+from xcrack.output.lip_faces_3d import LipFaces, lip_faces
+from xcrack.output.pieces import pieces
+from xcrack.view.scene_2d import SPACE_FIELDS, STRESSES, clipped, field_values, rounded
+from xcrack.view.section_3d import (
+    Plane,
+    Soup,
+    areas,
+    crossing,
+    edges_of,
+    faces,
+    levels,
+    on_facets,
+    section,
+    segments_behind,
+    sharp_edges,
+)
+
+LIP_FIELDS = {
+    "pressure": "contact pressure",
+    "opening": "normal opening",
+    "gap": "normal opening",
+    "sliding": "sliding of the crack faces",
+}
+_CLOSE = 0.3  # share of the body below which a crack is looked at from close by
+_AROUND = 0.25  # share of its size that is seen around it
+_TOUCH = 0.5  # share of a triangle on which the lips touch that counts as closed
+
+
+@dataclass(frozen=True, eq=False)
+class SpaceScene:
+    """A field on a 3D body, or on its cracks, ready to draw.
+
+    Attributes
+    ----------
+    triangles : (t, 3, 3) array, length
+        Coloured ones: surface of the body, its section and its faces; or the cracks.
+    values : (t, 3) array
+    label : str
+        What the colour bar says; empty where nothing is coloured by a field.
+    limits : (float, float)
+        Ends of the colours.
+    signed : bool
+        The field has a sign: its colours part at zero.
+    touching, apart : (k, 3, 3) arrays, length
+        Triangles of a crack that are not coloured: its faces touch there, or do not.
+    skin : (s, 3, 3) array, length
+        Surface of a body that is seen through.
+    outline, cell_edges, faint, rims, fronts : (k, 2, 3) arrays, length
+        Lines: sharp edges of the body and its section, edges of cells, what is only hinted at
+        (the body that has not moved, the edges of cells behind the rest), edges of the crack faces,
+        fronts.
+    toward : (3,) array
+        Unit vector from the body to the viewer.
+    heaviside, tip : (k, 3) arrays, length
+        Points that carry these functions.
+    near : (k, 3) array, length, optional
+        Points that have to be in the picture instead of the whole body.
+    """
+
+    triangles: Floats
+    values: Floats
+    label: str
+    limits: tuple[float, float]
+    signed: bool
+    touching: Floats
+    apart: Floats
+    skin: Floats
+    outline: Floats
+    cell_edges: Floats
+    faint: Floats
+    rims: Floats
+    fronts: Floats
+    toward: Floats
+    heaviside: Floats
+    tip: Floats
+    near: Floats | None = None
+
+    @property
+    def box(self) -> Floats:
+        """Points that have to be in the picture `(k, 3)`, length: a small crack fills it."""
+        if self.near is not None:
+            return self.near
+        body = self.body
+        if not len(self.skin) or len(self.heaviside):
+            return body
+        parts = (self.triangles, self.touching, self.apart)
+        x = np.concatenate([part.reshape(-1, 3) for part in parts])
+        low, high = x.min(axis=0), x.max(axis=0)
+        size = float((high - low).max())
+        if size > _CLOSE * float(np.ptp(body, axis=0).max()):
+            return body
+        ends = np.stack([low - _AROUND * size, high + _AROUND * size])
+        return np.stack(np.meshgrid(*ends.T), axis=-1).reshape(-1, 3)
+
+    @property
+    def body(self) -> Floats:
+        """Points of all that is drawn `(k, 3)`, length."""
+        parts = (self.triangles, self.touching, self.skin, self.outline, self.faint)
+        return np.concatenate([part.reshape(-1, 3) for part in parts])
+
+
+def clip_plane(clip: Any) -> Plane | None:
+    """Point and unit normal of a plane, as the user gave them."""
+    if clip is None:
+        return None
+    try:
+        point, normal = clip
+        x, n = numbers(point, "point", (3,)), numbers(normal, "normal", (3,))
+        length = float(np.linalg.norm(n))
+        if 0 < length < np.inf:
+            return x, n / length
+        reason = "the normal has no direction"
+    except (TypeError, ValueError):
+        reason = "that is no pair"
+    except ProblemError as error:
+        reason = str(error)[:-1]
+    raise ProblemError(
+        f"plot: clip = {shown(clip)}: give a point and a normal, ((x, y, z), (nx, ny, nz)); what "
+        f"lies on the side of the normal is left out. Here {reason}."
+    )
+
+
+def direction(view: Any) -> Floats | None:
+    """Unit vector from the body to the viewer, as the user gave it."""
+    if view is None:
+        return None
+    v = numbers(view, "plot: view, the direction to the viewer", (3,))
+    length = float(np.linalg.norm(v))
+    if not 0 < length < np.inf:
+        raise ProblemError(
+            f"plot: view = {shown(view)} has no direction: give that from the body to the viewer, "
+            "(x, y, z)."
+        )
+    return np.asarray(v / length)
+
+
+def space_scene(
+    solution: Solution,
+    field: str,
+    warp: float,
+    limits: tuple[float, float] | None,
+    plane: Plane | None,
+    view: Floats | None,
+) -> SpaceScene:
+    """Field on the moved body: its surface, and with a plane its section, crack faces behind."""
+    body = pieces(solution)
+    moved = body.points + warp * body.displacement
+    shown = field_values(body, field)
+    level = levels(body.points, plane)
+    shell, lip, outline, rims, cell_edges = faces(body, level)
+    drawn = [Soup.of(f, None).behind(level) for f in (shell, lip)]
+    lines = [segments_behind(part, level) for part in (outline, rims, cell_edges)]
+    if plane is not None:
+        drawn.append(section(body, level))
+        lines[0] += crossing(shell, level)
+        lines[1] += crossing(lip, level)
+        lines[2] += crossing(on_facets(body, level), level)
+    corners = np.concatenate([part.at(moved) for part in drawn])
+    values = np.concatenate([part.at(shown[:, None])[..., 0] for part in drawn])
+    if not len(corners):
+        raise ProblemError("plot(clip=...): the plane leaves nothing of the body; turn its normal.")
+    share = 100.0
+    low, high = float(values.min()), float(values.max())
+    if field in STRESSES and solution.space.tips:
+        low, high, share = clipped(values, areas(corners))
+    low, high = rounded(low, high, field) if limits is None else limits
+    clip = limits is None and share < 100
+    nothing = np.zeros((0, 3, 3))
+    curves = [
+        np.concatenate([part.at(moved) for part in group] or [np.zeros((0, 2, 3))])
+        for group in lines
+    ]
+    outline_rest = np.concatenate([part.at(body.points) for part in lines[0]])
+    return SpaceScene(
+        triangles=corners,
+        values=values,
+        label=SPACE_FIELDS[field] + (f", clipped at {int(10 * share) / 10:g} %" if clip else ""),
+        limits=(low, high),
+        signed=low < 0 < high,
+        touching=nothing,
+        apart=nothing,
+        skin=nothing,
+        outline=curves[0],
+        cell_edges=curves[2],
+        faint=outline_rest if warp else np.zeros((0, 2, 3)),
+        rims=curves[1],
+        fronts=_front_lines(solution, warp, plane)[: None if plane is not None else 0],
+        toward=_toward(plane, view, None),
+        heaviside=np.zeros((0, 3)),
+        tip=np.zeros((0, 3)),
+    )
+
+
+def crack_scene(
+    solution: Solution,
+    field: str,
+    cracks: list[int],
+    warp: float,
+    limits: tuple[float, float] | None,
+    plane: Plane | None,
+    view: Floats | None,
+) -> SpaceScene:
+    """Field on cracks, in a body that is seen through."""
+    lips = [lip_faces(solution, c) for c in cracks]
+    corners = np.concatenate([_middle(each, warp)[each.triangles] for each in lips])
+    values = np.concatenate([lip_values(each, field) for each in lips])
+    coloured = np.concatenate([is_coloured(each, field) for each in lips])
+    nothing = np.zeros((0, 3, 3))
+    low, high = (0.0, 1.0)
+    if coloured.any():
+        low, high = float(values[coloured].min()), float(values[coloured].max())
+    # Gaps are closed in the mean of a cell only: near contact some points lie a bit too deep.
+    if field != "pressure" and low > -0.3 * high:
+        low = 0.0
+    if field == "pressure":
+        low = min(low, 0.0)
+    low, high = rounded(low, high, field) if limits is None else limits
+    return replace(
+        _seen_through(solution, warp, plane),
+        triangles=corners[coloured],
+        values=values[coloured],
+        label=LIP_FIELDS[field],
+        limits=(low, high),
+        signed=low < 0 < high,
+        touching=nothing if field == "pressure" else corners[~coloured],
+        apart=corners[~coloured] if field == "pressure" else nothing,
+        rims=np.concatenate([_middle(each, warp)[each.mouth] for each in lips]),
+        cell_edges=edges_of(corners),
+        toward=_toward(plane, view, lips),
+    )
+
+
+def mesh_scene(solution: Solution, plane: Plane | None, view: Floats | None) -> SpaceScene:
+    """Mesh, cracks and enriched points."""
+    space = solution.space
+    lips = [lip_faces(solution, c) for c in range(len(space.cuts))]
+    corners = [each.points[each.triangles] for each in lips]
+    through = _seen_through(solution, 0.0, plane)
+    carries = np.zeros(space.n_nodes, dtype=bool)
+    for number in space.heaviside:
+        carries |= number >= 0
+    around = np.zeros(space.mesh.n_points, dtype=bool)
+    for tip in space.tips:
+        around |= tip.point_to_function >= 0
+    every = np.concatenate([np.zeros((0, 3, 3)), *corners])
+    return replace(
+        through,
+        touching=every,
+        cell_edges=edges_of(every),
+        faint=edges_of(through.skin),
+        toward=_toward(plane, view, lips),
+        heaviside=space.node_points[carries],
+        tip=space.mesh.points[around],
+    )
+
+
+def _seen_through(solution: Solution, warp: float, plane: Plane | None) -> SpaceScene:
+    """The body and its fronts without colours."""
+    mesh = solution.space.mesh
+    moved = mesh.points + warp * solution.coefficients[: mesh.n_points]
+    level = levels(mesh.points, plane)
+    facets = mesh.boundary
+    skin = Soup.of(facets, None).behind(level).at(moved)
+    sharp = segments_behind(mesh.edges[sharp_edges(mesh)], level)
+    if plane is not None:
+        sharp += crossing(facets, level)
+    empty = np.zeros((0, 2, 3))
+    outline = np.concatenate([part.at(moved) for part in sharp] or [empty])
+    return SpaceScene(
+        triangles=np.zeros((0, 3, 3)),
+        values=np.zeros((0, 3)),
+        label="",
+        limits=(0.0, 1.0),
+        signed=False,
+        touching=np.zeros((0, 3, 3)),
+        apart=np.zeros((0, 3, 3)),
+        skin=skin,
+        outline=outline,
+        cell_edges=empty,
+        faint=empty,
+        rims=empty,
+        fronts=_front_lines(solution, warp, None),
+        toward=np.array([0.0, -1.0, 0.0]),
+        heaviside=np.zeros((0, 3)),
+        tip=np.zeros((0, 3)),
+    )
+
+
+def lip_values(lips: LipFaces, field: str) -> Floats:
+    """Values at the vertices of the triangles of a crack `(t, 3)`."""
+    values = lips.gap if field in ("opening", "gap") else getattr(lips, field)
+    return np.asarray(values[lips.triangles])
+
+
+def is_coloured(lips: LipFaces, field: str) -> Bools:
+    """Triangles of a crack that show a field `(t,)`; the others touch, or bear no pressure.
+
+    Crack faces that touch slide without friction: sliding is shown everywhere.
+    """
+    if field == "pressure":
+        bears = lips.mean_pressure > 1e-6 * float(lips.mean_pressure.max(initial=0.0))
+        return np.asarray(bears | (lips.closed >= _TOUCH))
+    return np.asarray(lips.closed < _TOUCH) | (field == "sliding")
+
+
+def _middle(lips: LipFaces, warp: float) -> Floats:
+    return np.asarray(lips.points + warp * (lips.minus + lips.plus) / 2)
+
+
+def _front_lines(solution: Solution, warp: float, plane: Plane | None) -> Floats:
+    parts = [np.zeros((0, 2, 3))]
+    for c in range(len(solution.lips)):
+        lips = lip_faces(solution, c)
+        behind = segments_behind(lips.front, levels(lips.points, plane))
+        parts += [part.at(_middle(lips, warp)) for part in behind]
+    return np.concatenate(parts)
+
+
+def _toward(plane: Plane | None, view: Floats | None, lips: list[LipFaces] | None) -> Floats:
+    """From the body to the viewer: what was cut open, or the faces of the crack, is seen."""
+    if view is not None:
+        return view
+    usual = np.array([0.45, -0.75, 0.48])
+    if plane is not None:
+        ahead = plane[1]
+    elif lips:
+        ahead = np.sum([(each.area[:, None] * _face_normals(each)).sum(axis=0) for each in lips], 0)
+        length = float(np.linalg.norm(ahead))
+        ahead = ahead / length if length else usual
+        ahead = ahead if ahead @ usual >= 0 else -ahead
+    else:
+        return np.asarray(usual / np.linalg.norm(usual))
+    side = usual - 0.999 * (usual @ ahead) * ahead
+    both = ahead + 0.75 * side / np.linalg.norm(side)
+    return np.asarray(both / np.linalg.norm(both))
+
+
+def _face_normals(lips: LipFaces) -> Floats:
+    normal = lips.normal[lips.triangles].sum(axis=1)
+    return np.asarray(normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300))
+
+
+# Arrows that show the loads of a solution in 3D.
+
+_SMALL = 0.25  # share of the body up to which a loaded set has one arrow, its resultant
+_LENGTH = 0.16  # share of the body of the longest arrow
+_MANY = 13  # arrows on a large set
+
+
+def load_arrows(solution: Solution) -> tuple[Floats, Floats]:
+    """Arrows of tractions, pressures and point forces: where they begin, and their vectors.
+
+    A small set has one arrow, the resultant; a large one has several, its tractions. The longest
+    of each kind have the same length. Those that press on the body end on it.
+
+    Returns
+    -------
+    start, vector : (k, 3) arrays, length
+    """
+    mesh = solution.space.mesh
+    forces, tractions = [np.zeros((0, 3, 3))], [np.zeros((0, 3, 3))]
+    for load in solution.loads:
+        if isinstance(load, PointForce):
+            forces.append(np.stack([load.x, load.force, np.zeros(3)])[None])
+        elif isinstance(load, Bearing | Resultant):
+            facets = mesh.facet_sets[load.where]
+            area = np.linalg.norm(_outward(mesh, facets), axis=1)
+            middle = area @ mesh.points[facets].mean(axis=1) / area.sum()
+            force = np.zeros(3) if load.force is None else load.force
+            forces.append(np.stack([middle, force, np.zeros(3)])[None])
+        elif isinstance(load, Traction | Pressure):
+            facets = mesh.facet_sets[load.where]
+            x = mesh.points[facets].mean(axis=1)
+            turned = _outward(mesh, facets)
+            area = np.linalg.norm(turned, axis=1)
+            out = turned / area[:, None]
+            if isinstance(load, Traction):
+                t = evaluate(load.value, x, "traction", out)
+            else:
+                t = -evaluate_scalar(load.value, x, "pressure")[:, None] * out
+            if np.ptp(x, axis=0).max() < _SMALL * mesh.extent:
+                force = area @ t
+                middle = area @ x / area.sum()
+                forces.append(np.stack([middle, force, area @ out])[None])
+            else:
+                chosen = _spread(x, _MANY)
+                tractions.append(np.stack([x, t, out], axis=1)[chosen])
+    start, vector = [], []
+    for group in (np.concatenate(forces), np.concatenate(tractions)):
+        size = np.linalg.norm(group[:, 1], axis=1)
+        shown = size > 1e-3 * size.max(initial=0.0)
+        x, v, out = np.swapaxes(group[shown], 0, 1)
+        v = np.sign(solution.factor) * v * (_LENGTH * mesh.extent / size.max(initial=1e-300))
+        pressing = np.einsum("kd,kd->k", v, out) < -1e-6 * np.linalg.norm(v, axis=1)
+        start.append(np.where(pressing[:, None], x - v, x))
+        vector.append(v)
+    return np.concatenate(start), np.concatenate(vector)
+
+
+def _outward(mesh: Mesh, facets: Ints) -> Floats:
+    """Area vectors of boundary facets, out of the body `(k, 3)`."""
+    x = mesh.points[facets]
+    normal = np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]) / 2
+    key = {tuple(f): i for i, f in enumerate(np.sort(mesh.facets, axis=1).tolist())}
+    number = np.array([key[tuple(f)] for f in np.sort(facets, axis=1).tolist()], dtype=np.int64)
+    inner = mesh.points[mesh.cells[mesh.facet_to_cell[number, 0]]].mean(axis=1)
+    sign = np.sign(np.einsum("kd,kd->k", normal, x.mean(axis=1) - inner))
+    return np.asarray(sign[:, None] * normal)
+
+
+def _spread(x: Floats, n: int) -> Ints:
+    """Up to n points far from each other, by their numbers."""
+    chosen = [int(np.argmin(np.linalg.norm(x - x.mean(axis=0), axis=1)))]
+    distance = np.linalg.norm(x - x[chosen[0]], axis=1)
+    while len(chosen) < min(n, len(x)):
+        chosen.append(int(np.argmax(distance)))
+        distance = np.minimum(distance, np.linalg.norm(x - x[chosen[-1]], axis=1))
+    return np.array(chosen)
+
+
+__all__ = [
+    "LIP_FIELDS",
+    "Plane",
+    "SpaceScene",
+    "clip_plane",
+    "crack_scene",
+    "direction",
+    "is_coloured",
+    "lip_values",
+    "load_arrows",
+    "mesh_scene",
+    "space_scene",
+]

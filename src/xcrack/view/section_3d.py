@@ -1,0 +1,257 @@
+"""Triangles and lines of a 3D body, cut open by a plane."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from xcrack.base.arrays import Bools, Floats, Ints
+from xcrack.mesh.locate import barycentric
+from xcrack.mesh.mesh import Mesh, local_edges, local_facets
+from xcrack.mesh.split import cut_simplices, interface_simplices
+from xcrack.output.pieces import Pieces
+
+Plane = tuple[Floats, Floats]  # a point and the unit normal; what lies behind it is drawn
+_NEAR = 1e-8  # share of a cell within which a point lies on a facet, on a crack, in a plane
+_SHARP = np.cos(np.radians(25.0))  # an edge whose facets turn by more is drawn
+# Parts of a triangle and of a tetrahedron with midpoints, in the order of their edges.
+_SMALL = {
+    6: np.array([(0, 3, 4), (3, 1, 5), (4, 5, 2), (3, 5, 4)]),
+    10: np.array(
+        [
+            [0, 4, 5, 6],
+            [4, 1, 7, 8],
+            [5, 7, 2, 9],
+            [6, 8, 9, 3],
+            [4, 9, 5, 6],
+            [4, 9, 6, 8],
+            [4, 9, 8, 7],
+            [4, 9, 7, 5],
+        ],
+    ),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Soup:
+    """Simplices whose vertices are mixtures of points: numbers `(k, v)`, shares `(k, w, v)`."""
+
+    number: Ints
+    share: Floats
+
+    @classmethod
+    def of(cls, number: Ints, share: Floats | None) -> "Soup":
+        """Simplices of points; without shares their vertices are these."""
+        v = number.shape[1]
+        whole = np.broadcast_to(np.eye(v), (len(number), v, v))
+        return cls(number, whole if share is None else share)
+
+    def at(self, x: Floats) -> Floats:
+        """Values at the vertices `(k, w, m)` of what is given at points `(n, m)`."""
+        return np.einsum("kwv,kvm->kwm", self.share, x[self.number])
+
+    def behind(self, level: Floats | None) -> "Soup":
+        """What is left of triangles behind a plane."""
+        if level is None:
+            return self
+        values = level[self.number]
+        low, high = values.min(axis=1), values.max(axis=1)
+        # The section has what lies in the plane, on the side that is drawn: lips lie there twice.
+        whole, split = np.nonzero((high <= 0) & (low < 0))[0], np.nonzero((low < 0) & (high > 0))[0]
+        bary, _, side, parent = cut_simplices(values[split])
+        mine = side < 0
+        rows = np.concatenate([whole, split[parent[mine]]])
+        v = self.number.shape[1]
+        corner = np.broadcast_to(np.eye(v), (len(whole), v, v))
+        return Soup(self.number[rows], np.concatenate([corner, bary[mine]]))
+
+
+def levels(x: Floats, plane: Plane | None) -> Floats | None:
+    """Signed distances to a plane, round-off removed."""
+    if plane is None:
+        return None
+    level = (x - plane[0]) @ plane[1]
+    # Of points that all lie in the plane the distances are round-off only.
+    size = max(float(np.ptp(x, axis=0).max(initial=0.0)), float(np.abs(level).max(initial=0.0)))
+    return np.where(np.abs(level) < 1e-9 * size, 0.0, level)
+
+
+def segments_behind(number: Ints, level: Floats | None) -> list[Soup]:
+    """What is left of segments behind a plane."""
+    if level is None:
+        return [Soup.of(number, None)]
+    a, b = level[number].T
+    whole = (a <= 0) & (b <= 0)
+    crossed = a * b < 0
+    t = a[crossed] / (a[crossed] - b[crossed])
+    # Both vertices on the side that is kept, one of them the cut point.
+    share = np.zeros((len(t), 2, 2))
+    share[:, 0] = np.stack([1 - t, t], axis=1)
+    retained = np.where(a[crossed] < 0, 0, 1)
+    share[np.arange(len(t)), 1, retained] = 1.0
+    return [Soup.of(number[whole], None), Soup(number[crossed], share)]
+
+
+def crossing(triangles: Ints, level: Floats | None) -> list[Soup]:
+    """Segments in which triangles meet a plane."""
+    if level is None:
+        return []
+    values = level[triangles]
+    rows = np.nonzero((values.min(axis=1) < 0) & (values.max(axis=1) >= 0))[0]
+    bary, parent = interface_simplices(values[rows])
+    return [Soup(triangles[rows[parent]], bary)]
+
+
+def section(body: Pieces, level: Floats | None) -> Soup:
+    """Triangles in which the pieces meet a plane."""
+    assert level is not None
+    blocks = [body.plain]
+    if body.plain.shape[1] == 10:
+        blocks = [body.plain[:, _SMALL[10]].reshape(-1, 4)]
+    blocks.append(body.split[:, _SMALL[10]].reshape(-1, 4))
+    tetrahedra = np.concatenate(blocks)
+    values = level[tetrahedra]
+    rows = np.nonzero((values.min(axis=1) < 0) & (values.max(axis=1) >= 0))[0]
+    bary, parent = interface_simplices(values[rows])
+    return Soup(tetrahedra[rows[parent]], bary)
+
+
+_Faces = tuple[Ints, Ints, Ints, Ints, Ints]
+
+
+def faces(body: Pieces, level: Floats | None) -> _Faces:
+    """Triangles on boundary and crack faces, and segments: sharp, of crack faces, of cells."""
+    mesh = body.solution.space.mesh
+    rim = mesh.facet_to_cell[mesh.cell_to_facet, 1] < 0  # opposite to each corner of a cell
+    sharp = sharp_edges(mesh)
+    on_lip = _lip_points(body)
+    groups: list[list[Ints]] = [[np.zeros((0, 3), np.int64)], [np.zeros((0, 3), np.int64)]]
+    lines: list[list[Ints]] = [[np.zeros((0, 2), np.int64)] for _ in range(3)]
+    first = 0
+    for block in (body.plain, body.split):
+        cell = body.cell[first : first + len(block)]
+        first += len(block)
+        near = rim[cell].any(axis=1) | on_lip[block[:, :4]].sum(axis=1).astype(bool)
+        rows = np.nonzero(near)[0]
+        block, cell = block[rows], cell[rows]
+        zero = _zero(mesh, body, block, cell)
+        for face in local_facets(3):
+            at = zero[:, face].all(axis=1) & rim[cell]
+            outside = at.any(axis=1)
+            touches = on_lip[block[:, face]].all(axis=1) & ~outside
+            groups[0].append(_small_faces(block[outside], face))
+            groups[1].append(_small_faces(block[touches], face))
+            for i, j in ((0, 1), (1, 2), (0, 2)):
+                a, b = face[i], face[j]
+                two = zero[:, a] & zero[:, b]
+                edge = np.zeros(len(block), dtype=bool)
+                feature = np.zeros(len(block), dtype=bool)
+                for e, (p, q) in enumerate(local_edges(3)):
+                    r, s = (v for v in range(4) if v not in (p, q))
+                    on = two[:, r] & two[:, s]
+                    edge |= on
+                    feature |= on & sharp[mesh.cell_to_edge[cell, e]]
+                lines[0].append(_halves(block[outside & feature], a, b))
+                lines[2].append(_halves(block[outside & edge], a, b))
+                mouth = touches & (two & rim[cell]).any(axis=1)
+                lines[1].append(_halves(block[mouth], a, b))
+    shell, lip = (np.concatenate(group) for group in groups)
+    outline, rims, cells = (np.unique(np.sort(np.concatenate(p), axis=1), axis=0) for p in lines)
+    return shell, lip, outline, rims, cells
+
+
+def _zero(mesh: Mesh, body: Pieces, block: Ints, cell: Ints) -> Bools:
+    """Which barycentric coordinates of the vertices of pieces vanish `(k, 4, 4)`."""
+    bary = [barycentric(mesh, cell, body.points[block[:, v]]) for v in range(4)]
+    return np.asarray(np.abs(np.stack(bary, axis=1)) < _NEAR)
+
+
+def _lip_points(body: Pieces) -> Bools:
+    """Which points lie on a crack or on its front `(n,)`."""
+    near = _NEAR * float(body.solution.space.mesh.cell_size.min())
+    flag = np.zeros(len(body.points), dtype=bool)
+    for phi, psi in zip(body.phi, body.psi, strict=True):
+        flag |= (np.abs(phi) <= near) & (psi <= near).all(axis=0)
+    return flag
+
+
+def on_facets(body: Pieces, level: Floats | None) -> Ints:
+    """Faces of pieces that a plane meets and that lie on facets of the mesh."""
+    assert level is not None
+    parts = [np.zeros((0, 3), np.int64)]
+    mesh, first = body.solution.space.mesh, 0
+    for block in (body.plain, body.split):
+        cell = body.cell[first : first + len(block)]
+        first += len(block)
+        values = level[block[:, :4]]
+        rows = np.nonzero((values.min(axis=1) < 0) & (values.max(axis=1) >= 0))[0]
+        zero = _zero(mesh, body, block[rows], cell[rows])
+        for face in local_facets(3):
+            on = np.any(zero[:, face].all(axis=1), axis=1)
+            parts.append(block[rows[on]][:, face])
+    return np.concatenate(parts)
+
+
+def _small_faces(block: Ints, face: Ints) -> Ints:
+    """Triangles of one face of pieces, between its midpoints too."""
+    if block.shape[1] == 4:
+        return block[:, face]
+    a, b, c = face
+    nodes = [a, b, c, _middle_of(a, b), _middle_of(a, c), _middle_of(b, c)]
+    return block[:, nodes][:, _SMALL[6]].reshape(-1, 3)
+
+
+def _halves(block: Ints, a: int, b: int) -> Ints:
+    """An edge of pieces as one segment, or as two."""
+    if block.shape[1] == 4:
+        return block[:, [a, b]]
+    m = _middle_of(a, b)
+    return np.concatenate([block[:, [a, m]], block[:, [m, b]]])
+
+
+def _middle_of(a: int, b: int) -> int:
+    pair = sorted((int(a), int(b)))
+    return 4 + local_edges(3).tolist().index(pair)
+
+
+def sharp_edges(mesh: Mesh) -> Bools:
+    """Edges of the mesh at which its boundary turns `(e,)`."""
+    facets = mesh.boundary
+    x = mesh.points[facets]
+    normal = np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0])
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    pairs = np.sort(facets[:, [[0, 1], [1, 2], [0, 2]]].reshape(-1, 2), axis=1)
+    key = pairs[:, 0] * mesh.n_points + pairs[:, 1]
+    order = np.argsort(key, kind="stable")
+    owner = np.repeat(np.arange(len(facets)), 3)[order]
+    same = np.nonzero(key[order][1:] == key[order][:-1])[0]
+    # Facets need not turn alike: only the angle between their planes counts.
+    turn = np.abs(np.einsum("kd,kd->k", normal[owner[same]], normal[owner[same + 1]]))
+    sharp = np.unique(key[order][same[turn < _SHARP]])
+    edges = np.sort(mesh.edges, axis=1)
+    return np.isin(edges[:, 0] * mesh.n_points + edges[:, 1], sharp)
+
+
+def areas(corners: Floats) -> Floats:
+    """Areas of triangles `(k, 3, 3)`."""
+    turned = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    return np.asarray(np.linalg.norm(turned, axis=1) / 2)
+
+
+def edges_of(corners: Floats) -> Floats:
+    """Edges `(3 k, 2, 3)` of triangles `(k, 3, 3)`."""
+    return corners[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2, 3)
+
+
+__all__ = [
+    "Plane",
+    "Soup",
+    "areas",
+    "crossing",
+    "edges_of",
+    "faces",
+    "levels",
+    "on_facets",
+    "section",
+    "segments_behind",
+    "sharp_edges",
+]

@@ -1,1 +1,0 @@
-"""Enriched functions, their integration and their matrices."""
