@@ -41,7 +41,7 @@ from benchmarks.scenes.exact_fields import (  # noqa: E402
 from benchmarks.scenes.material import STEEL  # noqa: E402
 from benchmarks.scenes.settings import Settings, mesh_of  # noqa: E402
 from xcrack.analysis.solve import solve_states  # noqa: E402
-from xcrack.model.numerics import with_choices  # noqa: E402
+from xcrack.verification import methods  # noqa: E402
 
 ROOT = Path(__file__).resolve().parent.parent
 RESULTS = ROOT / "benchmarks" / "results" / "economy.json"
@@ -109,7 +109,7 @@ def edge(
             body, STEEL[2], [xc.line_crack([(-1.3, 0.0), (-0.04 * shorter, 0.0)])],
             supports=[xc.displacement(s, lambda x: u(x)) for s in ("right", "bottom", "top")],
             loads=[xc.traction("left", lambda x, n: np.einsum("qij,qj->qi", sigma(x), n))],
-            contact=contact, order=order, numerics=with_choices(xc.Numerics(), numerics),
+            contact=contact, order=order, numerics=xc.Numerics(**numerics),
         )  # fmt: skip
 
     def judge(solution: xc.Solution, sif: xc.SIF) -> Errors:
@@ -171,7 +171,7 @@ def disc(
         crack = xc.penny_crack((0, 0, 0), (0, 0, 1), 0.5 - 0.02 * shorter)
         return xc.Problem(
             mesh, STEEL[3], [crack], supports=[xc.displacement("boundary", lambda x: u(x))],
-            contact=contact, numerics=with_choices(xc.Numerics(), numerics),
+            contact=contact, numerics=xc.Numerics(**numerics),
         )  # fmt: skip
 
     def judge(solution: xc.Solution, sif: xc.SIF) -> Errors:
@@ -197,7 +197,7 @@ SCENES: dict[str, tuple[Variant, list[Part]]] = {
         ("search for overlap", True, edge(contact="off")),
         ("tip functions beyond the tip's cell", True, edge(enrichment="topological")),
         ("tip functions: four, not two", True, edge(functions=2)),
-        ("tip functions beside the modes", True, edge(tip_basis="vectorial")),
+        ("tip functions beside the modes", True, edge(tip_basis=methods.modal_basis())),
         ("corrected gradients", True, edge(consistent=False)),
         ("points a direction: 4, not 2", True, edge(points=2)),
         ("points a direction: 8, not 4", False, edge(points=8)),
@@ -230,7 +230,7 @@ SCENES: dict[str, tuple[Variant, list[Part]]] = {
         ("multipliers on open lips", False, disc(contact="on")),
         ("search for overlap", True, disc(contact="off")),
         ("tip functions beyond the front's cells", True, disc(enrichment="topological")),
-        ("tip functions beside the modes", True, disc(tip_basis="vectorial")),
+        ("tip functions beside the modes", True, disc(tip_basis=methods.modal_basis())),
         ("corrected gradients", True, disc(consistent=False)),
         ("points a direction: 4, not 2", True, disc(points=2)),
         ("points a direction: 6, not 4", False, disc(points=6)),

@@ -5,7 +5,7 @@ from functools import partial
 
 from benchmarks.runs import Case, Outcome
 from benchmarks.scenes.settings import Settings
-from xcrack.model.numerics import Numerics, with_choices
+from xcrack.model.numerics import Numerics
 
 Scene = Callable[[Settings, int], Outcome]
 
@@ -39,5 +39,5 @@ def variant(
     prepare: Callable[[int], object] | None = None, **choices: object,
 ) -> list[Case]:  # fmt: skip
     """The curve of other choices of method than the defaults."""
-    numerics = with_choices(Numerics(), choices)
+    numerics = Numerics(**choices)  # type: ignore[arg-type]
     return series(run, name, "setting", sizes, prepare, numerics=numerics)

@@ -31,7 +31,7 @@ from support.scenes_stability import (
     beside_an_edge,
     cut_condition,
 )
-from xcrack.model.numerics import with_choices
+from xcrack.verification import methods
 from xcrack.verification.exact import closed, fields_2d
 from xcrack.verification.exact.potentials_2d import uniform_stress
 
@@ -141,7 +141,7 @@ def condition() -> Results:
                             tip,
                             angle,
                             order=order,
-                            numerics=with_choices(xc.Numerics(), {**enrichment, **basis}),
+                            numerics=xc.Numerics(**enrichment, **basis),
                         )[0],
                     )
                     for n in sizes
@@ -170,7 +170,7 @@ def slivers() -> Results:
         crack = xc.line_crack([(-1.5, eps * row.CELL), (0.37, eps * row.CELL)])
         problem = scenes.on_box(
             mesh, [crack], row.uniform, traction=("left", "top"), order=order, contact="on",
-            numerics=with_choices(xc.Numerics(), options),
+            numerics=xc.Numerics(**options),
         )  # fmt: skip
         solution = tried(xc.solve, problem)
         if solution is None:
@@ -266,15 +266,8 @@ def turned() -> Results:
     Share of the crack's length that the mesh sees, and the error of K, on an exact arc.
     """
     results: Results = {"degrees": (60, 90, 120, 150, 180, 200, 240, 300)}
-    for update in ("explicit", "nodal"):
-        if "update" in xc.Numerics.__dataclass_fields__:
-            numerics = xc.Numerics(
-                radius=0.15, domain=0.25, comparison=xc.Comparison(update=update)
-            )
-        elif update == "explicit":
-            numerics = xc.Numerics(radius=0.15, domain=0.25)
-        else:
-            continue
+    for update, level_sets in (("explicit", None), ("nodal", methods.nodal_level_sets())):
+        numerics = xc.Numerics(radius=0.15, domain=0.25, level_sets=level_sets)
         for key, measure in (("length", arc_length), ("error of K", arc_error)):
             results[f"{key}, {update}"] = [
                 tried(measure, 0.6, degrees, 40, pieces=48, numerics=numerics)

@@ -7,6 +7,7 @@ from benchmarks.scenes import bodies
 from benchmarks.scenes.settings import Settings
 from benchmarks.series import series, variant
 from xcrack.model.numerics import Numerics
+from xcrack.verification import methods
 
 
 def hole(quick: bool) -> list[Case]:
@@ -18,9 +19,15 @@ def hole(quick: bool) -> list[Case]:
     cases += variant(run, "naive multipliers", sizes, prepare, multipliers="naive")
     if not quick:
         cases += variant(run, "start from open", sizes, prepare, initial_set="open")
-        cases += variant(run, "penalty", sizes, prepare, lips="penalty")
-        cases += variant(run, "augmented Lagrangian", sizes, prepare, lips="augmented")
-        cases += variant(run, "Nitsche", sizes, prepare, lips="nitsche")
+        cases += variant(run, "penalty", sizes, prepare, contact_method=methods.penalty())
+        cases += variant(
+            run,
+            "augmented Lagrangian",
+            sizes,
+            prepare,
+            contact_method=methods.augmented_lagrangian(),
+        )
+        cases += variant(run, "Nitsche", sizes, prepare, contact_method=methods.nitsche())
     return cases + series(run, "contact off", "off", sizes, prepare, contact="off")
 
 

@@ -3,7 +3,8 @@
 from benchmarks.runs import Case
 from benchmarks.scenes import friction as scenes
 from benchmarks.series import Scene, series, variant
-from xcrack.model.numerics import Numerics, with_choices
+from xcrack.model.numerics import Numerics
+from xcrack.verification import methods
 
 
 def rubbing(quick: bool) -> list[Case]:
@@ -19,10 +20,14 @@ def unloading(quick: bool) -> list[Case]:
 def _cases(run: Scene, sizes: tuple[int, ...]) -> list[Case]:
     cases = series(run, "default", "default", sizes)
     cases += series(run, "order 1", "setting", sizes, order=1)
-    for stiffness, name in ((10.0, "penalty 10"), (None, "penalty"), (1000.0, "penalty 1000")):
-        cases += variant(run, name, sizes, lips="penalty", penalty=stiffness)
-    cases += variant(run, "augmented Lagrangian", sizes, lips="augmented")
-    for name, lips in (("penalty, order 1", "penalty"), ("augmented, order 1", "augmented")):
-        numerics = with_choices(Numerics(), {"lips": lips})
+    for stiffness, name in ((10.0, "penalty 10"), (100.0, "penalty"), (1000.0, "penalty 1000")):
+        cases += variant(run, name, sizes, contact_method=methods.penalty(stiffness))
+    augmented = methods.augmented_lagrangian()
+    cases += variant(run, "augmented Lagrangian", sizes, contact_method=augmented)
+    for name, method in (
+        ("penalty, order 1", methods.penalty()),
+        ("augmented, order 1", augmented),
+    ):
+        numerics = Numerics(contact_method=method)
         cases += series(run, name, "setting", sizes, order=1, numerics=numerics)
     return cases

@@ -10,6 +10,7 @@ from benchmarks.scenes import plane as scenes
 from benchmarks.scenes.exact_fields import edge_fields
 from benchmarks.scenes.plane import MODES, worst
 from benchmarks.series import series, variant
+from xcrack.verification import methods
 
 
 def edge(quick: bool) -> list[Case]:
@@ -26,7 +27,7 @@ def edge(quick: bool) -> list[Case]:
         cases += variant(run, "radius 0.55", some, radius=0.55)
         cases += variant(run, "points 6", some, points=6)
         cases += variant(run, "two functions", some, functions=2)
-        cases += variant(run, "vectorial functions", some, tip_basis="vectorial")
+        cases += variant(run, "vectorial functions", some, tip_basis=methods.modal_basis())
         cases += variant(run, "domain 0.5", some, domain=0.5)
         cases += variant(run, "domain 0.7", some, domain=0.7)
         cases += variant(run, "patch basis", some, patch=True)
@@ -81,9 +82,11 @@ def half_closed(quick: bool) -> list[Case]:
     cases += variant(run, "naive multipliers", sizes, multipliers="naive")
     cases += variant(run, "start from open", sizes, initial_set="open")
     if not quick:
-        cases += variant(run, "penalty", sizes, lips="penalty")
-        cases += variant(run, "augmented Lagrangian", sizes, lips="augmented")
-        cases += variant(run, "Nitsche", sizes, lips="nitsche")
+        cases += variant(run, "penalty", sizes, contact_method=methods.penalty())
+        cases += variant(
+            run, "augmented Lagrangian", sizes, contact_method=methods.augmented_lagrangian()
+        )
+        cases += variant(run, "Nitsche", sizes, contact_method=methods.nitsche())
     cases += _adapted(scenes.half_closed_adapted, quick)
     cases += _getfem("half_closed", quick)
     return cases + series(run, "contact off", "off", sizes, contact="off")
@@ -96,8 +99,13 @@ def closed(quick: bool) -> list[Case]:
     if not quick:
         cases += series(scenes.closed, "order 1", "setting", (21, 41, 81), order=1)
         cases += variant(scenes.closed, "naive multipliers", sizes[:3], multipliers="naive")
-        cases += variant(scenes.closed, "penalty", sizes[:3], lips="penalty")
-        cases += variant(scenes.closed, "augmented Lagrangian", sizes[:3], lips="augmented")
-        cases += variant(scenes.closed, "Nitsche", sizes[:3], lips="nitsche")
+        cases += variant(scenes.closed, "penalty", sizes[:3], contact_method=methods.penalty())
+        cases += variant(
+            scenes.closed,
+            "augmented Lagrangian",
+            sizes[:3],
+            contact_method=methods.augmented_lagrangian(),
+        )
+        cases += variant(scenes.closed, "Nitsche", sizes[:3], contact_method=methods.nitsche())
     cases += _getfem("closed", quick)
     return cases + series(scenes.closed, "contact off", "off", sizes, contact="off")

@@ -14,6 +14,7 @@ from support import scenes_2d as scenes
 from xcrack.adaptivity import next_3d
 from xcrack.adaptivity.adapt import _MOST_ROUNDS
 from xcrack.adaptivity.wanted import smaller
+from xcrack.verification import methods
 
 STEEL = xc.Isotropic(1.0, 0.3, plane="strain")
 PULL = [xc.traction("top", (0.0, 1.0)), xc.traction("bottom", (0.0, -1.0))]
@@ -253,7 +254,7 @@ def test_scenes_without_an_estimate():
     )
     with pytest.raises(xc.ProblemError, match="no crack has a tip"):
         xc.adapt(through, 1e-3)
-    numerics = xc.Numerics(comparison=xc.Comparison(lips="penalty"))
+    numerics = xc.Numerics(contact_method=methods.penalty())
     with pytest.raises(xc.ProblemError, match="no estimate"):
         xc.adapt(edge(numerics=numerics), 1e-3)
 

@@ -5,7 +5,6 @@ Exact solutions are imposed on boxes. Bounds are of discretisation unless they s
 tolerance; those that show a failing are lower bounds.
 """
 
-import inspect
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -21,19 +20,27 @@ from support import scenes_2d as scenes
 from support import scenes_3d as scenes_space
 from support import scenes_friction as rubbing
 from support.scenes_2d import numerics_of
-from xcrack.analysis.alternatives import _springs, lip_space
-from xcrack.analysis.nitsche import averaging, lip_shares, stress_matrix
 from xcrack.analysis.solve import build, solve_states
 from xcrack.linalg.direct import system
 from xcrack.linalg.rigid_motion import free_motion
-from xcrack.model.numerics import with_choices
+from xcrack.verification import methods
+from xcrack.verification.methods.face_stress import averaging, lip_shares, stress_matrix
 
 pytestmark = pytest.mark.filterwarnings("ignore::xcrack.XcrackWarning")
 
 MESHES = Path(__file__).parents[2] / "examples" / "meshes"
-ALTERNATIVES = ("penalty", "augmented", "nitsche")
+ALTERNATIVES = {
+    "penalty": methods.penalty,
+    "augmented": methods.augmented_lagrangian,
+    "nitsche": methods.nitsche,
+}
 P0 = 2.5
 uniform = scenes.turned(lambda x, y: exact.uniform_stress(x, y, -P0, -P0, 0.0, 1.0, 0.3), (0, 0))
+
+
+def by(name, *factor):
+    """Choice of method by name; multipliers are none."""
+    return {"contact_method": ALTERNATIVES[name](*factor) if name in ALTERNATIVES else None}
 
 
 def patch(seed, order, loads=(), **options):
@@ -63,7 +70,7 @@ def deviation(problem, p=P0):
 def test_overlap_of_a_penalty_falls_with_its_stiffness(order):
     """Like 1 / eps; the pressure itself stays wrong at the tips, where no gap can be."""
     factors = (1e2, 1e3, 1e4)
-    result = [xc.solve(patch(641, order, lips="penalty", penalty=p)).contact[0] for p in factors]
+    result = [xc.solve(patch(641, order, **by("penalty", p))).contact[0] for p in factors]
     overlap = [-c.gap.min() for c in result]
     assert scenes.rate(overlap, factors) == pytest.approx(-1, abs=0.02)
     for c in result:
@@ -71,18 +78,18 @@ def test_overlap_of_a_penalty_falls_with_its_stiffness(order):
 
 
 @pytest.mark.parametrize("order", [1, 2])
-@pytest.mark.parametrize("penalty", [None, 100.0])
+@pytest.mark.parametrize("penalty", [10.0, 100.0])
 def test_an_augmented_lagrangian_is_exact_to_its_tolerance(order, penalty):
     for seed in (640, 641, 642, 643):
-        assert deviation(patch(seed, order, lips="augmented", penalty=penalty)) <= 1e-7, seed
+        assert deviation(patch(seed, order, **by("augmented", penalty))) <= 1e-7, seed
 
 
 @pytest.mark.parametrize("order", [1, 2])
-@pytest.mark.parametrize("penalty", [None, 1000.0])
+@pytest.mark.parametrize("penalty", [40.0, 1000.0])
 def test_nitsche_is_exact(order, penalty):
     """Round-off: the exact stress is a polynomial that the mean on each segment keeps."""
     for seed in (640, 641, 642, 643):
-        assert deviation(patch(seed, order, lips="nitsche", penalty=penalty)) <= 1e-8, seed
+        assert deviation(patch(seed, order, **by("nitsche", penalty))) <= 1e-8, seed
 
 
 def test_nitsche_is_exact_for_linear_pressure_at_order_2():
@@ -90,7 +97,7 @@ def test_nitsche_is_exact_for_linear_pressure_at_order_2():
     field = scenes.turned(lambda x, y: scenes.polynomial_pressure(x, y, terms), (0, 0))
     problem = scenes.on_box(
         scenes.perturbed(11, 712), [xc.line_crack([(-0.41, 0.0), (0.37, 0.0)])], field,
-        traction=scenes.SIDES, contact="on", numerics=numerics_of(lips="nitsche"),
+        traction=scenes.SIDES, contact="on", numerics=numerics_of(contact_method=methods.nitsche()),
     )  # fmt: skip
     result = xc.solve(problem).contact[0]
     assert result.pressure == pytest.approx(
@@ -105,7 +112,7 @@ def test_nitsche_at_slivers(order):
         crack = xc.line_crack([(-0.43, eps * 0.2), (0.37, eps * 0.2)])
         problem = scenes.on_box(
             xc.box((-1, -1), (1, 1), 10), [crack], uniform, traction=scenes.SIDES, order=order,
-            contact="on", numerics=numerics_of(lips="nitsche"),
+            contact="on", numerics=numerics_of(contact_method=methods.nitsche()),
         )  # fmt: skip
         assert deviation(problem) <= 1e-8, eps
         model = build(problem)
@@ -134,7 +141,7 @@ def closing(order, **options):
 def test_partial_closure(order, lips):
     """K_I of the open tip and the end of contact: all agree; the closed tip tells them apart."""
     x0, c, K = exact.partial_closure_params(1.0, 0.0, 1.0)
-    solution = half_closed(order, lips=lips)
+    solution = half_closed(order, **by(lips))
     result = solution.contact[0]
     x = (result.points - [0.05, -0.07]) @ scenes.rows(0.21)[0]
     sif = xc.stress_intensity(solution)
@@ -155,7 +162,10 @@ def test_partial_closure(order, lips):
 @pytest.mark.parametrize("order", [1, 2])
 def test_an_augmented_lagrangian_ends_at_the_multipliers(order):
     """The same discrete problem: only the way differs. 1e-6: the tolerance of the updates."""
-    one, other = half_closed(order), half_closed(order, lips="augmented")
+    one, other = (
+        half_closed(order),
+        half_closed(order, **by("augmented")),
+    )
     p = one.contact[0].pressure
     assert other.contact[0].pressure == pytest.approx(p, abs=1e-6 * p.max())
     assert other.u == pytest.approx(one.u, abs=1e-7 * np.abs(one.u).max())
@@ -165,13 +175,13 @@ def test_an_augmented_lagrangian_ends_at_the_multipliers(order):
 @pytest.mark.parametrize("lips", ["penalty", "nitsche"])
 def test_both_starts_of_the_set_agree(lips):
     """The minimum of a convex energy does not know where the search began: round-off."""
-    closed, opened = (half_closed(1, lips=lips, initial_set=s) for s in ("closed", "open"))
+    closed, opened = (half_closed(1, **by(lips), initial_set=s) for s in ("closed", "open"))
     assert opened.u == pytest.approx(closed.u, abs=1e-9 * np.abs(closed.u).max())
 
 
 def test_a_known_set_saves_factorisations():
-    first = half_closed(1, lips="penalty")
-    again = solve_states(closing(1, lips="penalty"), [None], reuse=first.reuse)[0]
+    first = half_closed(1, contact_method=methods.penalty())
+    again = solve_states(closing(1, contact_method=methods.penalty()), [None], reuse=first.reuse)[0]
     assert again.report.operations["contact_iterations"] == 1
     assert first.report.operations["contact_iterations"] > 2
     assert again.u == pytest.approx(first.u, abs=1e-12 * np.abs(first.u).max())
@@ -209,19 +219,19 @@ def pressed_hole(order, **options):
 @pytest.mark.parametrize("order", [1, 2])
 def test_pressure_at_a_hole(order):
     reduced = pressed_hole(order)
-    others = {lips: pressed_hole(order, lips=lips) for lips in ALTERNATIVES}
+    others = {lips: pressed_hole(order, **by(lips)) for lips in ALTERNATIVES}
     others["naive"] = pressed_hole(order, multipliers="naive")
     words = ", ".join(f"{k} {v:.3f}" for k, v in others.items())
     print(f"\nhole order {order}: multipliers {reduced:.3f}, {words}")
     assert reduced <= (0.1 if order == 1 else 0.03)
-    assert pressed_hole(order, lips="augmented") == pytest.approx(reduced, rel=1e-4)
-    assert reduced < pressed_hole(order, lips="penalty") <= 0.5
-    assert pressed_hole(order, lips="nitsche") <= (0.5 if order == 1 else 0.03)
+    assert pressed_hole(order, **by("augmented")) == pytest.approx(reduced, rel=1e-4)
+    assert reduced < pressed_hole(order, contact_method=methods.penalty()) <= 0.5
+    assert pressed_hole(order, contact_method=methods.nitsche()) <= (0.5 if order == 1 else 0.03)
 
 
 def test_a_stiff_penalty_oscillates():
     """Order 1: the points hold the crack faces at more places than the jump can follow."""
-    soft, stiff = (pressed_hole(1, lips="penalty", penalty=p) for p in (10.0, 1e4))
+    soft, stiff = (pressed_hole(1, **by("penalty", p)) for p in (10.0, 1e4))
     print(f"\npenalty 10: {soft:.2f}, 1e4: {stiff:.2f}")
     assert soft < 0.2
     assert stiff > 2 * soft
@@ -234,8 +244,10 @@ def closed_condition(problem):
     fixed[free_motion(model.space, fixed).pins] = True
     engine = system(model.space, model.stiffness, fixed, problem.numerics)
     A = engine.reduced
-    if problem.numerics.comparison.lips != "multipliers":
-        springs = _springs(problem, model, engine, [lip_space(problem, model, 0)])[1]
+    method = problem.numerics.contact_method
+    if method is not None:
+        rows = method.rows(problem, model, method.pressure_space(problem, model, 0))
+        springs = method.system(engine, rows)
         A = springs.closed(np.ones(len(springs.c), dtype=bool))
     D = sp.diags(1 / np.sqrt(A.diagonal()))
     A = sp.csc_matrix(D @ A @ D)
@@ -256,8 +268,8 @@ def test_condition_numbers(order):
     """Multipliers leave the stiffness alone; springs do not, the less the stiffer they are."""
     result = {"multipliers": closed_condition(hole(order))}
     for lips in ALTERNATIVES:
-        result[lips] = closed_condition(hole(order, lips=lips))
-    result["stiff penalty"] = closed_condition(hole(order, lips="penalty", penalty=1e4))
+        result[lips] = closed_condition(hole(order, **by(lips)))
+    result["stiff penalty"] = closed_condition(hole(order, **by("penalty", 1e4)))
     print(f"\ncondition order {order}: " + ", ".join(f"{k} {v:.1e}" for k, v in result.items()))
     assert result["multipliers"] < min(result[lips] for lips in ALTERNATIVES)
     assert result["stiff penalty"] > result["penalty"]
@@ -266,14 +278,14 @@ def test_condition_numbers(order):
 def test_updates_do_not_settle_on_naive_multipliers():
     """Combinations of multipliers that move no gap get no answer: Uzawa's method needs inf-sup."""
     with pytest.raises(xc.ConvergenceError, match="updates the multipliers still change"):
-        xc.solve(closing(1, lips="augmented", multipliers="naive"))
+        xc.solve(closing(1, contact_method=methods.augmented_lagrangian(), multipliers="naive"))
 
 
 @pytest.mark.parametrize("lips", ["multipliers", *ALTERNATIVES])
 def test_closed_penny(lips):
     """Compression and shear: the pressure over the inner part of a penny of under two cells."""
     problem = scenes_space.flat_penny(
-        6, 0.05, 0.55, (-1.0, 0.5), seed=7, contact="on", lips=lips, linear="direct"
+        6, 0.05, 0.55, (-1.0, 0.5), seed=7, contact="on", **by(lips), linear="direct"
     )
     result = xc.solve(problem).contact[0]
     inner = np.linalg.norm(result.points[:, :2], axis=1) < 0.4
@@ -289,7 +301,10 @@ def test_nitsche_in_space_keeps_uniform_pressure():
     S = -np.eye(3)
     sides = [xc.traction(side, lambda x, n: n @ S) for side in scenes_space.SIX]
     problem = replace(
-        problem, supports=[], loads=sides, numerics=numerics_of(lips="nitsche", linear="direct")
+        problem,
+        supports=[],
+        loads=sides,
+        numerics=numerics_of(contact_method=methods.nitsche(), linear="direct"),
     )
     assert deviation(problem, 1.0) <= 1e-8
 
@@ -315,9 +330,9 @@ def test_states(lips):
     error.
     """
     states = [1.0, -1.0, -2.0]
-    result = xc.solve(edge("on", lips=lips), states=states)
+    result = xc.solve(edge("on", **by(lips)), states=states)
     for state, together in zip(states, result, strict=True):
-        alone = xc.solve(edge("on", lips=lips), states=[state])[0]
+        alone = xc.solve(edge("on", **by(lips)), states=[state])[0]
         assert together.u == pytest.approx(alone.u, abs=1e-7 * np.abs(alone.u).max())
     assert not result[0].contact[0].pressure.any()
     assert not result[0].contact[0].closed.any()
@@ -329,38 +344,40 @@ def test_states(lips):
 
 @pytest.mark.parametrize("lips", ALTERNATIVES)
 def test_contact_auto_and_off(lips):
-    opened = xc.solve(edge(lips=lips))
+    opened = xc.solve(edge(**by(lips)))
     assert opened.contact == (None,)
     assert opened.report.operations["factorisations"] == 1
     assert (opened.u == xc.solve(edge()).u).all()
-    off = xc.solve(edge("off", lips=lips), states=[-1.0])[0]
+    off = xc.solve(edge("off", **by(lips)), states=[-1.0])[0]
     assert off.contact == (None,)
     assert (off.opening(0) < 0).any()
 
 
 def test_report_names_the_method():
     for lips, name in (("penalty", "a penalty"), ("nitsche", "Nitsche's method")):
-        row = xc.solve(edge("on", lips=lips)).report["multipliers of crack 0"]
+        row = xc.solve(edge("on", **by(lips))).report["multipliers of crack 0"]
         assert row.used
         assert row.unknowns == 0
         assert name in row.reason
-        assert name in xc.plan(edge("on", lips=lips))["multipliers of crack 0"].reason
-    solution = xc.solve(edge("on", lips="augmented"))
+        assert name in xc.plan(edge("on", **by(lips)))["multipliers of crack 0"].reason
+    solution = xc.solve(edge("on", contact_method=methods.augmented_lagrangian()))
     row = solution.report["multipliers of crack 0"]
     assert row.unknowns == solution.report.operations["multipliers"] > 0
 
 
 def test_what_is_refused():
     with pytest.raises(xc.ProblemError, match="multipliers only"):
-        numerics_of(lips="penalty", linear="iterative")
-    with pytest.raises(xc.ProblemError, match="penalty = -1"):
-        numerics_of(lips="penalty", penalty=-1.0)
-    with pytest.raises(xc.ProblemError, match="'multipliers' or 'penalty'"):
-        numerics_of(lips="glue")
+        numerics_of(contact_method=methods.penalty(), linear="iterative")
+    with pytest.raises(xc.ProblemError, match="penalty: factor = -1"):
+        methods.penalty(-1.0)
+    with pytest.raises(xc.ProblemError, match="contact_method = 'glue': give a ContactMethod"):
+        xc.Numerics(contact_method="glue")
 
 
 def test_a_large_body_in_space_is_factored():
-    problem = scenes_space.flat_penny(7, 0.05, 0.55, (-1.0, 0.0), contact="on", lips="penalty")
+    problem = scenes_space.flat_penny(
+        7, 0.05, 0.55, (-1.0, 0.0), contact="on", contact_method=methods.penalty()
+    )
     solution = xc.solve(problem)
     assert solution.n_dof > 4000
     assert solution.report.operations["factorisations"] > 0
@@ -369,7 +386,7 @@ def test_a_large_body_in_space_is_factored():
 @pytest.mark.parametrize("lips", ["penalty", "augmented"])
 def test_pressure_given_on_the_lips(lips):
     """What is given takes its part of the load: contact carries the rest."""
-    given = patch(641, 2, [xc.crack_pressure(0.7)], lips=lips, penalty=1e3)
+    given = patch(641, 2, [xc.crack_pressure(0.7)], **by(lips, 1e3))
     result = xc.solve(given).contact[0]
     middle = scenes.inner_part(result.s, 0.5)
     assert result.pressure[middle] == pytest.approx(P0 - 0.7, rel=0.1)
@@ -382,7 +399,7 @@ def test_nitsche_counts_what_acts_on_the_lips(order, steady):
 
     Exact to round-off; an initial stress to the quadrature of its load, which is not corrected.
     """
-    problem = patch(641, order, [xc.crack_pressure(0.7)], lips="nitsche")
+    problem = patch(641, order, [xc.crack_pressure(0.7)], contact_method=methods.nitsche())
     if steady:
         extra = xc.initial_stress(np.array([[0.4, 0.0], [0.0, -0.3]]))
         problem = replace(problem, loads=[*problem.loads, extra])
@@ -425,29 +442,12 @@ def test_averaging_keeps_polynomials(order):
     assert lips.weight @ (mean @ drawn) == pytest.approx(lips.weight @ drawn)
 
 
-@pytest.mark.parametrize("name", ["tip_basis", "update", "lips", "penalty"])
-def test_an_option_that_moved_says_where_to(name):
-    with pytest.raises(xc.ProblemError, match=rf"give Numerics\(comparison=Comparison\({name}=7\)"):
-        xc.Numerics(**{name: 7})
-    with pytest.raises(TypeError, match="unexpected keyword argument 'lip'"):
-        xc.Numerics(lip="penalty")
-    assert name not in inspect.signature(xc.Numerics).parameters
-    with pytest.raises(xc.ProblemError, match="comparison = 'nitsche': give Comparison"):
-        xc.Numerics(comparison="nitsche")
-
-
-def test_choices_by_name():
-    numerics = numerics_of(lips="penalty", penalty=3.0, points=5)
-    assert numerics == xc.Numerics(points=5, comparison=xc.Comparison(lips="penalty", penalty=3.0))
-    assert with_choices(numerics, {"points": 6}).comparison == numerics.comparison
-
-
 # With friction ------------------------------------------------------------------------------------
 
 
-def rubbed_K(order, lips, penalty=None):
+def rubbed_K(order, lips, *factor):
     """K_II of the right tip over a cycle of shear, and what was dissipated in its last part."""
-    numerics = xc.Numerics(comparison=xc.Comparison(lips=lips, penalty=penalty))
+    numerics = xc.Numerics(**by(lips, *factor))
     problem, states, _ = rubbing.path(15, [0.9, -0.9], [1.0, 1.0], 0.3, order, numerics=numerics)
     solutions = xc.solve(problem, states)
     K = np.array([sif.K[1, 1] for sif in xc.stress_intensities(solutions)])
@@ -470,12 +470,12 @@ def test_alternatives_with_friction(order):
 
 def test_alternatives_that_have_no_friction():
     mesh, crack = xc.box((-1, -1), (1, 1), 6), xc.line_crack([(-0.3, 0.03), (0.3, 0.1)])
-    numerics = xc.Numerics(comparison=xc.Comparison(lips="nitsche"))
-    with pytest.raises(xc.ProblemError, match="nitsche"):
+    numerics = xc.Numerics(**by("nitsche"))
+    with pytest.raises(xc.ProblemError, match="Nitsche"):
         xc.Problem(mesh, xc.Isotropic(1.0, 0.3, "strain"), [crack], friction=0.3,
                    numerics=numerics)  # fmt: skip
     body = xc.box((-1, -1, -1), (1, 1, 1), 3)
     penny = xc.penny_crack((0, 0, 0.03), (0, 0, 1), 0.5)
-    numerics = xc.Numerics(comparison=xc.Comparison(lips="penalty"))
+    numerics = xc.Numerics(**by("penalty"))
     with pytest.raises(xc.ProblemError, match="in 3D"):
         xc.Problem(body, xc.Isotropic(1.0, 0.3), [penny], friction=0.3, numerics=numerics)

@@ -14,14 +14,16 @@ from xcrack.crack.crack import tip_frames
 from xcrack.crack.placing_2d import place_line
 from xcrack.fem.cut import cut
 from xcrack.fem.level_set import line_levels
-from xcrack.fem.level_set_nodal import Nodal, nodal_level_set, nodal_update
 from xcrack.mesh.polygon import closest_on_segment
+from xcrack.verification import methods
+from xcrack.verification.methods.level_sets import Nodal, nodal_level_set, nodal_update
 
 STEP = np.radians(5.0)
 STEEL = xc.Isotropic(1.3, 0.27, plane="strain")
 PULL = (xc.traction("top", (0.0, 1.0)), xc.traction("bottom", (0.0, -1.0)))
 N = 50
 H = 2 / N
+LEVELS = (None, methods.nodal_level_sets())  # of the polyline, and purely nodal ones
 
 
 def turned(degrees, *, start=0.15, mouth=False, radius=0.4):
@@ -91,10 +93,10 @@ def test_updates_near_the_tip_leave_phantoms():
     assert gaps(explicit.mean(axis=1), crack.points[:-1], crack.points[1:]).max() < 0.05 * H
 
 
-def K_by(update, mesh, crack, order):
+def K_by(levels, mesh, crack, order):
     problem = xc.Problem(
         mesh, STEEL, [crack], loads=PULL, order=order, contact="off",
-        numerics=numerics_of(update=update),
+        numerics=numerics_of(level_sets=levels),
     )  # fmt: skip
     return scenes.K_of(problem)[0]
 
@@ -106,7 +108,7 @@ def test_K_of_a_moderately_turned_crack(kinks, order):
     crack = place_line(xc.line_crack([(-1.0, -0.103), (-0.4, -0.103)]), mesh)
     for _ in range(kinks):
         crack = advance(crack, [STEP], [0.06])
-    explicit, nodal = (K_by(update, mesh, crack, order) for update in ("explicit", "nodal"))
+    explicit, nodal = (K_by(levels, mesh, crack, order) for levels in LEVELS)
     apart = np.abs(nodal - explicit).max() / np.linalg.norm(explicit)
     print(f"\n{5 * kinks} degrees, order {order}: K {apart:.1e} apart")
     assert apart <= 0.01  # discretisation
@@ -157,10 +159,10 @@ def test_cracks_that_have_not_grown_are_the_same():
 
 def test_growth_follows_the_same_path():
     tips = []
-    for update in ("explicit", "nodal"):
+    for levels in LEVELS:
         problem = xc.Problem(
             scenes.perturbed(20, seed=81), STEEL, [xc.line_crack([(-1.1, -0.203), (-0.3, 0.05)])],
-            loads=PULL, numerics=numerics_of(update=update),
+            loads=PULL, numerics=numerics_of(level_sets=levels),
         )  # fmt: skip
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", xc.XcrackWarning)
@@ -176,6 +178,8 @@ def test_growth_follows_the_same_path():
 
 
 def test_in_space_there_is_none():
-    problem = scenes_space.flat_penny(4, 0.013, 0.5, (1.0, 0.0), update="nodal")
+    problem = scenes_space.flat_penny(
+        4, 0.013, 0.5, (1.0, 0.0), level_sets=methods.nodal_level_sets()
+    )
     with pytest.raises(xc.ProblemError, match="2D only"):
         xc.solve(problem)

@@ -17,6 +17,8 @@ from fuzz.kinds import (
     Word,
 )
 from fuzz.scene_rules import POSITIVE
+from xcrack.model.numerics import ContactMethod, LevelSets, TipBasis
+from xcrack.verification import methods
 
 SUPPORTS = type(xc.fix("left")) | type(xc.displacement("left", (0, 0)))
 
@@ -68,16 +70,6 @@ ENTRIES = [
         },
     ),
     Entry(
-        "Comparison",
-        xc.Comparison,
-        {
-            "tip_basis": arg(Word(words=("scalar", "vectorial")), "scalar", "vectorial"),
-            "update": arg(Word(words=("explicit", "nodal")), "nodal"),
-            "lips": arg(Word(words=("multipliers", "penalty", "augmented", "nitsche")), "penalty"),
-            "penalty": arg(Number(optional=True, above=0), None, 10.0),
-        },
-    ),
-    Entry(
         "Numerics",
         xc.Numerics,
         {
@@ -94,7 +86,11 @@ ENTRIES = [
             "initial_set": arg(Word(words=("closed", "open")), "open"),
             "substeps": arg(Whole(least=1, most=10_000), 10, 1),
             "threads": arg(Whole(optional=True, least=1), None, 1),
-            "comparison": arg(Of(type=xc.Comparison), xc.Comparison()),
+            "contact_method": arg(
+                Of(type=ContactMethod, optional=True), methods.penalty(3.0), None
+            ),
+            "tip_basis": arg(Of(type=TipBasis, optional=True), methods.modal_basis(), None),
+            "level_sets": arg(Of(type=LevelSets, optional=True), methods.nodal_level_sets(), None),
         },
     ),
     Entry(

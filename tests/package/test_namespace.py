@@ -10,7 +10,7 @@ import xcrack
 
 NAMES = [
     # scene
-    "Comparison", "Crack", "Isotropic", "Mesh", "Numerics", "Problem",
+    "Crack", "Isotropic", "Mesh", "Numerics", "Problem",
     "body_force", "box", "crack_pressure", "displacement", "fix", "initial_stress", "line_crack",
     "penny_crack", "elliptic_crack", "plane_crack", "surface_crack", "read_surface",
     "notched_cylinder", "plate", "plate_with_hole", "point_force", "pressure", "read_mesh",

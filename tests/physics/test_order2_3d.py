@@ -15,6 +15,7 @@ from xcrack.fem.system import build
 from xcrack.linalg import iterative
 from xcrack.linalg.direct import scaled_basis
 from xcrack.mesh.simplex import leg_size
+from xcrack.verification import methods
 
 C = np.array([0.013, -0.021, 0.0317])
 
@@ -202,7 +203,9 @@ def test_choice_of_the_solver(order, few, many):
 
 
 def test_modes_in_the_place_of_tip_functions():
-    counts = [steps(tilted(n, numerics=numerics_of(tip_basis="vectorial"))) for n in (5, 8)]
+    counts = [
+        steps(tilted(n, numerics=numerics_of(tip_basis=methods.modal_basis()))) for n in (5, 8)
+    ]
     assert max(counts) <= 30
 
 

@@ -8,6 +8,7 @@ import pytest
 import xcrack as xc
 from support import exact
 from support import scenes_2d as scenes
+from xcrack.verification import methods
 
 UNIT = xc.Isotropic(1.0, 0.3, "strain")
 PULLED = [xc.traction("top", (0.0, 1.0)), xc.traction("bottom", (0.0, -1.0))]
@@ -178,7 +179,7 @@ def test_stored_solution_is_solved_again():
         (
             edge(
                 contact="on",
-                numerics=xc.Numerics(comparison=xc.Comparison(lips="penalty")),
+                numerics=xc.Numerics(contact_method=methods.penalty()),
             ),
             "penalty",
         ),

@@ -1,4 +1,4 @@
-"""The vectorial tip basis: modes alone, against the functions one by one."""
+"""A tip basis of modes alone, against the functions one by one."""
 
 from functools import cache
 
@@ -13,7 +13,10 @@ from support.scenes_2d import numerics_of
 from xcrack.fem.system import build
 from xcrack.fem.williams import tip_values
 from xcrack.linalg.direct import scaled_basis
-from xcrack.linalg.modal_basis import local_modes, mode_columns
+from xcrack.verification import methods
+from xcrack.verification.methods.tip_basis import local_modes, mode_columns
+
+MODES = methods.modal_basis()
 
 MIXED = (1.0, 0.3, 0.2)
 
@@ -61,7 +64,7 @@ def measured(n, order, tip_basis):
 
 @pytest.mark.parametrize(("n", "order"), [(20, 1), (40, 1), (10, 2), (20, 2)])
 def test_a_fifth_more_error_with_fewer_unknowns(n, order):
-    scalar, vectorial = measured(n, order, "scalar"), measured(n, order, "vectorial")
+    scalar, vectorial = measured(n, order, None), measured(n, order, MODES)
     assert 1.1 <= vectorial[1] / scalar[1] <= 1.35  # discretisation
     assert vectorial[2] < scalar[2]
     assert vectorial[0] <= {1: 8e-3, 2: 2e-4}[order]
@@ -70,7 +73,7 @@ def test_a_fifth_more_error_with_fewer_unknowns(n, order):
 def test_order_1_keeps_rate_one():
     """The disc of 0.3 is larger than two cells from n = 14 on."""
     sizes = (14, 20, 40)
-    errors = [measured(n, 1, "vectorial")[1] for n in sizes]
+    errors = [measured(n, 1, MODES)[1] for n in sizes]
     rate = scenes.rate(errors, [2 / n for n in sizes])
     print(f"\nrate of the vectorial basis: {rate:.2f}")
     assert rate >= 0.9
@@ -88,12 +91,12 @@ def condition(n, tip_basis, orthonormal):
 def test_condition_number_without_blocks():
     """Scaled by the diagonal alone; blocks of nodes make both like plain elements."""
     sizes = (20, 40)
-    scalar = [condition(n, "scalar", "none") for n in sizes]
-    vectorial = [condition(n, "vectorial", "none") for n in sizes]
+    scalar = [condition(n, None, "none") for n in sizes]
+    vectorial = [condition(n, MODES, "none") for n in sizes]
     print(f"\ncondition by the diagonal: {scalar} one by one, {vectorial} modes")
     assert vectorial[1] < scalar[1] / 100
     assert np.log2(vectorial[1] / vectorial[0]) <= 3.0 < np.log2(scalar[1] / scalar[0])
-    for tip_basis in ("scalar", "vectorial"):
+    for tip_basis in (None, MODES):
         blocks = condition(40, tip_basis, "node")
         print(f"with blocks of nodes: {blocks:.3g}, {tip_basis}")
         assert blocks <= 2.5 * 40**2
@@ -102,7 +105,7 @@ def test_condition_number_without_blocks():
 def test_unknowns_in_use_are_reported():
     tip, angle = scenes.TIPS[1]
     problem, _ = scenes.williams_edge(
-        14, tip, angle, order=1, numerics=numerics_of(tip_basis="vectorial")
+        14, tip, angle, order=1, numerics=numerics_of(tip_basis=MODES)
     )
     solution = xc.solve(problem)
     space = solution.space
@@ -119,7 +122,7 @@ def test_unknowns_in_use_are_reported():
 def test_columns_are_the_modes_in_the_frame_of_the_tip():
     tip, angle = scenes.TIPS[2]
     problem, _ = scenes.williams_edge(
-        10, tip, angle, order=2, numerics=numerics_of(tip_basis="vectorial")
+        10, tip, angle, order=2, numerics=numerics_of(tip_basis=MODES)
     )
     space = build(problem).space
     free = np.ones(space.n_dof, dtype=bool)
@@ -140,7 +143,7 @@ def test_columns_are_the_modes_in_the_frame_of_the_tip():
 def test_a_point_that_a_support_decides_goes_without():
     tip, angle = scenes.TIPS[0]
     problem, _ = scenes.williams_edge(
-        10, tip, angle, order=1, numerics=numerics_of(tip_basis="vectorial")
+        10, tip, angle, order=1, numerics=numerics_of(tip_basis=MODES)
     )
     model = build(problem)
     first = 2 * model.space.tips[0].point_to_function.max()
@@ -158,8 +161,8 @@ def test_the_basis_of_the_solver_changes_no_digit(orthonormal, patch):
     K = [
         scenes.K_of(scenes.williams_edge(12, tip, angle, numerics=numerics_of(**options))[0])[0]
         for options in (
-            {"tip_basis": "vectorial"},
-            {"tip_basis": "vectorial", "orthonormal": orthonormal, "patch": patch},
+            {"tip_basis": MODES},
+            {"tip_basis": MODES, "orthonormal": orthonormal, "patch": patch},
         )
     ]
     np.testing.assert_allclose(K[1], K[0], atol=1e-8)  # round-off times the condition number
@@ -172,7 +175,7 @@ def test_closed_lips_carry_the_pressure():
         xc.Isotropic(1.3, 0.27, plane="strain"),
         [xc.line_crack([(-0.41, 0.013), (0.37, 0.013)])],
         loads=(xc.traction("top", (0.0, -1.0)), xc.traction("bottom", (0.0, 1.0))),
-        numerics=numerics_of(tip_basis="vectorial"),
+        numerics=numerics_of(tip_basis=MODES),
     )
     contact = xc.solve(problem).contact[0]
     np.testing.assert_allclose(contact.pressure[contact.closed], 1.0, atol=1e-8)
@@ -184,8 +187,8 @@ def test_in_space_both_solvers_agree():
     K, energy = [], []
     for options in (
         {"linear": "direct"},
-        {"tip_basis": "vectorial", "linear": "direct"},
-        {"tip_basis": "vectorial", "linear": "iterative"},
+        {"tip_basis": MODES, "linear": "direct"},
+        {"tip_basis": MODES, "linear": "iterative"},
     ):
         problem, place = fronts.flat_scene(
             0.25, a=0.5, stress=MIXED, seed=3107, points=48, **options
@@ -214,6 +217,6 @@ def test_in_space_both_solvers_agree():
 
 def test_what_does_not_go_together():
     with pytest.raises(xc.ProblemError, match="functions = 2"):
-        numerics_of(tip_basis="vectorial", functions=2)
-    with pytest.raises(xc.ProblemError, match="'scalar' or 'vectorial'"):
+        numerics_of(tip_basis=MODES, functions=2)
+    with pytest.raises(xc.ProblemError, match="tip_basis = 'modes': give a TipBasis"):
         numerics_of(tip_basis="modes")

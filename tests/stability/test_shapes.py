@@ -9,6 +9,7 @@ import pytest
 import xcrack as xc
 from support import scenes_stability as scenes
 from support.scenes_2d import numerics_of
+from xcrack.verification import methods
 
 pytestmark = pytest.mark.filterwarnings("ignore::xcrack.XcrackWarning")
 CELL = 2.4 / 30
@@ -40,7 +41,7 @@ def test_a_crack_that_has_turned_back(degrees):
 
 def test_nodal_level_sets_lose_it():
     """The alternative: as good up to 150°, without the beginning of the crack from 180° on."""
-    numerics = numerics_of(radius=0.15, domain=0.25, update="nodal")
+    numerics = numerics_of(radius=0.15, domain=0.25, level_sets=methods.nodal_level_sets())
     assert scenes.arc_error(0.6, 90, 40, pieces=48, numerics=numerics) <= 2e-3
     assert scenes.arc_length(0.6, 240, 40, pieces=48, numerics=numerics) <= 0.9
 

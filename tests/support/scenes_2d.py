@@ -6,7 +6,6 @@ import numpy as np
 
 import xcrack as xc
 from support import exact
-from xcrack.model.numerics import with_choices
 from xcrack.verification.book.scenes_2d import (
     SIDES,
     annulus,
@@ -26,8 +25,8 @@ Field = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 
 
 def numerics_of(**choices):
-    """Choices of method by name, those for comparison among them."""
-    return with_choices(xc.Numerics(), choices)
+    """Choices of method by name."""
+    return xc.Numerics(**choices)
 
 
 def williams_edge(

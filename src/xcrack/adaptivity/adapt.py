@@ -12,7 +12,6 @@ from xcrack.adaptivity import next_2d, next_3d
 from xcrack.adaptivity.adapted import Adapted, Round
 from xcrack.adaptivity.measured import Measured, measured
 from xcrack.adaptivity.resolved import resolved
-from xcrack.analysis.plan import LIPS
 from xcrack.base.checks import entries, flag, number, whole
 from xcrack.base.errors import GeometryError, ProblemError, collected_warnings, warn
 from xcrack.mesh.mesh import Mesh
@@ -170,15 +169,15 @@ def _tell(progress: bool | str, number: int, row: Round) -> None:
 
 def _check_scene(problem: Problem) -> None:
     """Raise where no error of K can be estimated, whatever the mesh."""
-    lips = problem.numerics.comparison.lips
+    method = problem.numerics.contact_method
     if not any(crack.n_tips for crack in problem.placed):
         raise ProblemError(
             "adapt: no crack has a tip in the body, so that there is no K to adapt to: give a "
             "crack that ends inside, or refine the mesh by hand (xc.refine)."
         )
-    if lips in LIPS:
+    if method is not None:
         raise ProblemError(
-            f"adapt: contact by {LIPS[lips]} has no estimate: leave Comparison(lips={lips!r}) out."
+            f"adapt: contact by {method.label} has no estimate: leave contact_method out."
         )
 
 

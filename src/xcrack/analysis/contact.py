@@ -134,10 +134,9 @@ def _solve_friction(
     stiffness = problem.material.E / size
     before = reuse.slip if repeated else None
     springs = None
-    if problem.numerics.comparison.lips != "multipliers":
-        from xcrack.analysis.alternatives import compliance
-
-        springs = [compliance(problem, model, m) for m in chosen]
+    method = problem.numerics.contact_method
+    if method is not None:
+        springs = [method.compliance(problem, model, m) for m in chosen]
     return solve_friction(
         problem, model, engine, chosen, f, known, start, stiffness, others, before, springs
     )
@@ -157,12 +156,12 @@ def _solve_states(
     """Contact of all load states; `guess` is the latest u and that of open faces."""
     closed = problem.numerics.initial_set == "closed"
     start = [_start(chosen, reuse, k, closed) for k in range(f.shape[1])]
-    if problem.numerics.comparison.lips != "multipliers":
-        from xcrack.analysis.alternatives import solve_alternative
-
-        # These change the matrix itself, for which `solve` takes a factorisation always.
-        system = cast(System, engine)
-        return solve_alternative(problem, model, system, chosen, f, known, start, closed, acting)
+    method = problem.numerics.contact_method
+    if method is not None:
+        return cast(
+            list[StateContact],
+            method.solve_states(problem, model, engine, chosen, f, known, start, closed, acting),
+        )
     rows = [gap_rows(m, model.lips[m.crack], model.jumps[m.crack]) for m in chosen]
     N = rows[0] if len(rows) == 1 else sp.csr_matrix(sp.vstack(rows))
     measure = np.concatenate([m.measure for m in chosen])
@@ -195,10 +194,9 @@ def _needing(
 
 def _space(problem: Problem, model: Model, c: int) -> Multipliers:
     """Where the pressures of a crack live."""
-    if problem.numerics.comparison.lips != "multipliers":
-        from xcrack.analysis.alternatives import lip_space
-
-        return lip_space(problem, model, c)
+    method = problem.numerics.contact_method
+    if method is not None:
+        return cast(Multipliers, method.pressure_space(problem, model, c))
     kind = problem.numerics.multipliers
     fixed, rub = model.known.fixed, rubs(problem, c)
     return multipliers(model.space, c, model.lips[c], kind, fixed, rub)

@@ -281,7 +281,7 @@ def _tractions(rows: FrictionRows, d: Floats, status: Status) -> FrictionState:
             return solve(rows, d, status)
         except ConvergenceError as error:
             raise ConvergenceError(
-                f"{error} Or a smaller Comparison(penalty=...): stiff springs at single points "
+                f"{error} Or a smaller factor of the penalty: stiff springs at single points "
                 "oscillate."
             ) from None
     lam, sets = np.zeros(len(d)), 0
@@ -294,7 +294,7 @@ def _tractions(rows: FrictionRows, d: Floats, status: Status) -> FrictionState:
             return replace(state, sets=sets)
     raise ConvergenceError(
         f"contact with friction: after {_MOST_UPDATES} updates the tractions still change by "
-        f"{change:.3g}. Give a larger Comparison(penalty=...)."
+        f"{change:.3g}. Give a larger factor of the springs."
     )
 
 
@@ -430,7 +430,8 @@ def solve_friction(
     if springs is not None:
         every = np.concatenate(springs)
         diagonal = np.concatenate([every, np.tile(every[rows.rubbing], rows.tangents)])
-        augmented = problem.numerics.comparison.lips == "augmented"
+        method = problem.numerics.contact_method
+        augmented = method is not None and method.updates
         rows = replace(rows, F=rows.F + np.diag(diagonal), compliance=diagonal, augmented=augmented)
     status = all_stuck(rows)
     if start is not None:

@@ -8,13 +8,7 @@ from xcrack.base.markup import element
 from xcrack.crack.placing import short_fronts
 from xcrack.model.problem import Problem, check_problem
 
-_MODES, _ENDS = {2: "II", 3: "III"}, {2: "tip(s)", 3: "front(s)"}
-
-LIPS = {
-    "penalty": "a penalty",
-    "augmented": "an augmented Lagrangian",
-    "nitsche": "Nitsche's method",
-}
+_ENDS = {2: "tip(s)", 3: "front(s)"}
 
 
 @dataclass(frozen=True)
@@ -147,7 +141,7 @@ def plan(problem: Problem) -> Report:
 
 
 def _third_mode(problem: Problem, n_tips: list[int]) -> Ingredient:
-    if _MODES[problem.mesh.dim] == "II":
+    if problem.mesh.dim == 2:
         return Ingredient("third mode", False, "a 2D problem has modes I and II only")
     if not sum(n_tips):
         return Ingredient("third mode", False, "no front to tear along")
@@ -174,8 +168,8 @@ def _tips(problem: Problem, n_tips: list[int]) -> Ingredient:
             "tip functions", False, lost or "every crack cuts through: there is no tip"
         )
     what_each = f"{problem.numerics.functions} functions"
-    if problem.numerics.comparison.tip_basis == "vectorial":
-        what_each = f"modes I to {_MODES[problem.mesh.dim]} only"
+    if problem.numerics.tip_basis is not None:
+        what_each = problem.numerics.tip_basis.label(problem.mesh.dim)
     reach = (
         "within a fixed radius" if problem.numerics.enrichment == "geometric" else "tip cells only"
     )
@@ -203,8 +197,8 @@ def _multipliers(problem: Problem) -> list[Ingredient]:
         "auto": (False, "none until the crack faces of the open solution overlap"),
     }
     used, reason = reasons[problem.contact]
-    if used and problem.numerics.comparison.lips in LIPS:
-        reason += f"; by {LIPS[problem.numerics.comparison.lips]}"
+    if used and problem.numerics.contact_method is not None:
+        reason += f"; by {problem.numerics.contact_method.label}"
     return [
         Ingredient(f"multipliers of crack {c}", used, reason) for c in range(len(problem.cracks))
     ]

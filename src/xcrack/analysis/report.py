@@ -7,7 +7,7 @@ import numpy as np
 
 from xcrack.analysis.contact_result import ContactSolution
 from xcrack.analysis.multipliers import Multipliers
-from xcrack.analysis.plan import LIPS, Ingredient, Report, Resultant, plan
+from xcrack.analysis.plan import Ingredient, Report, Resultant, plan
 from xcrack.base.arrays import Floats, at
 from xcrack.crack.crack import Crack
 from xcrack.fem.system import Model
@@ -46,8 +46,8 @@ def report(
     d = model.space.dim
     rows = []
     n_heaviside = sum(int((h >= 0).sum()) for h in model.space.heaviside) * d
-    modes = problem.numerics.comparison.tip_basis == "vectorial"
-    each = [d if modes else d * tip.functions for tip in model.space.tips]
+    basis = problem.numerics.tip_basis
+    each = [d * tip.functions if basis is None else basis.unknowns(d) for tip in model.space.tips]
     n_points = [int((tip.point_to_function >= 0).sum()) for tip in model.space.tips]
     n_tip = sum(n * k for n, k in zip(n_points, each, strict=True))
     for row in plan(problem).ingredients:
@@ -115,8 +115,8 @@ def _multiplier_row(problem: Problem, contact: ContactSolution, c: int) -> Ingre
         why = (
             "contact is switched on" if problem.contact == "on" else "the open crack faces overlap"
         )
-        if problem.numerics.comparison.lips != "multipliers":
-            why += f"; by {LIPS[problem.numerics.comparison.lips]}"
+        if problem.numerics.contact_method is not None:
+            why += f"; by {problem.numerics.contact_method.label}"
         return Ingredient(name, True, why, unknowns=_n_multipliers(problem, [m]))
     if problem.contact == "off":
         return Ingredient(name, False, "contact is switched off: crack faces may overlap")
@@ -130,8 +130,9 @@ def _friction_row(row: Ingredient, contact: ContactSolution) -> Ingredient:
 
 
 def _n_multipliers(problem: Problem, spaces: Sequence[Multipliers | None]) -> int:
-    """Unknowns of the crack faces: a penalty and Nitsche's method have none."""
-    if problem.numerics.comparison.lips in ("penalty", "nitsche"):
+    """Unknowns of the crack faces: some methods have none."""
+    method = problem.numerics.contact_method
+    if method is not None and not method.has_unknowns:
         return 0
     return sum(len(m.measure) for m in spaces if m is not None)
 

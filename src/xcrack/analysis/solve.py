@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -249,11 +250,11 @@ def _engine(
     """A factorisation, or in 3D above some size conjugate gradients."""
     space_, wanted = model.space, problem.numerics.linear
     large = space_.dim == 3 and space_.n_dof > _DIRECT[space_.order]
-    comparison = problem.numerics.comparison
-    large = large and comparison.lips == "multipliers"  # others change the matrix
+    basis = problem.numerics.tip_basis
+    large = large and problem.numerics.contact_method is None  # others change the matrix
     if solver is None and (wanted == "iterative" or (wanted == "auto" and large)):
         # Rows beside the crack are enough where no basis is changed but that of single nodes.
-        apart = space_.order == 1 and comparison.tip_basis != "vectorial"
+        apart = space_.order == 1 and basis is None
         return iterative_system(
             space_,
             model.parts if apart else model.stiffness,
@@ -261,7 +262,7 @@ def _engine(
             fixed,
             None if reuse is None else reuse.hierarchy,
             motion.modes,
-            problem.material if comparison.tip_basis == "vectorial" else None,
+            None if basis is None else partial(basis.columns, space_, problem.material),
             next_to_enriched(space_) if apart else None,
         )
     fixed[motion.pins] = True

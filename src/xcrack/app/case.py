@@ -24,6 +24,7 @@ _SECTIONS = ("title", "units", "mesh", "material", "cracks", "supports", "loads"
 _OPTIONS = {"K_c": TOUGHNESS}  # of grow, that have a unit
 _TABLES = ("law", "criterion", "cycle", "spectrum", "retardation", "link_up")  # of growth
 _OUTPUT = ("folder", "pictures", "warp")
+_METHODS = ("contact_method", "tip_basis", "level_sets")  # of numerics, to compare with
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,7 +114,7 @@ def read_case(path: str | PathLike[str]) -> CaseFile:
 
 def _numerics(table: Table) -> Numerics:
     """Choices of method; those for comparison stay in scripts."""
-    names = [f.name for f in fields(Numerics) if f.name != "comparison"]
+    names = [f.name for f in fields(Numerics) if f.name not in _METHODS]
     table.known(names)
     lengths = {"radius": LENGTH, "domain": LENGTH}
     given = {name: table.value(name, lengths.get(name)) for name in table.content}

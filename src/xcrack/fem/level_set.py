@@ -54,6 +54,19 @@ class LevelSet:
         return np.asarray(np.vstack([self.psi, self.mouth[None]]).max(axis=0))
 
 
+def level_set(mesh: Mesh, crack: Crack, reach: float) -> "LevelSet":
+    """Level sets of a placed crack at the points of a mesh.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    crack : Crack
+    reach : float, length
+        In 3D: distance from the fronts up to which phi and psi are needed.
+    """
+    return line_levels(mesh, crack) if mesh.dim == 2 else surface_levels(mesh, crack, reach)
+
+
 def near_edges(mesh: Mesh, phi: Floats) -> Bools:
     """Edges short enough to be crossed where phi changes its sign `(e,)`."""
     ends = np.abs(phi)[mesh.edges]

@@ -12,8 +12,7 @@ from xcrack.fem.enrichment import front_reach
 from xcrack.fem.facets import LipPoints, jump_matrix, lip_points
 from xcrack.fem.function_space import FunctionSpace, function_space
 from xcrack.fem.joints_2d import Joint, joined_cuts
-from xcrack.fem.level_set import LevelSet
-from xcrack.fem.level_sets import level_sets
+from xcrack.fem.level_set import LevelSet, level_set
 from xcrack.fem.supports import Known, known_unknowns
 from xcrack.mesh.mesh import Mesh
 from xcrack.model.numerics import Numerics
@@ -98,5 +97,7 @@ def discretised(problem: Problem) -> tuple[FunctionSpace, tuple[LipPoints, ...]]
 
 def levels(mesh: Mesh, crack: Crack, numerics: Numerics) -> LevelSet:
     """Level sets of a placed crack; in 3D up to where its functions may reach."""
-    reach = front_reach(mesh, crack, numerics.radius)
-    return level_sets(mesh, crack, reach, nodal=numerics.comparison.update == "nodal")
+    if numerics.level_sets is not None:
+        result: LevelSet = numerics.level_sets.of(mesh, crack)
+        return result
+    return level_set(mesh, crack, front_reach(mesh, crack, numerics.radius))

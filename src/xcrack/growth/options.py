@@ -9,7 +9,6 @@ from typing import Any, TypedDict, TypeVar, cast
 import numpy as np
 from numpy.typing import ArrayLike
 
-from xcrack.analysis.plan import LIPS
 from xcrack.base.arrays import Floats
 from xcrack.base.checks import number, shown, whole
 from xcrack.base.errors import ProblemError, warn
@@ -203,11 +202,11 @@ class Run:
                 f'grow: tolerance needs the errors that integrator="pec" estimates, and '
                 f"{self.integrator!r} has none: leave integrator out, or give da."
             )
-        lips = self.problem.numerics.comparison.lips
-        if lips in LIPS:
+        method = self.problem.numerics.contact_method
+        if method is not None:
             raise ProblemError(
-                f"grow: contact by {LIPS[lips]} has no estimate that a tolerance could be held "
-                f"against: leave Comparison(lips={lips!r}) out, or give da."
+                f"grow: contact by {method.label} has no estimate that a tolerance could be held "
+                "against: leave contact_method out, or give da."
             )
 
     @property

@@ -22,7 +22,6 @@ from xcrack.linalg.basis import (
     restricted,
 )
 from xcrack.linalg.engine import Condensed, ContactRows, Count, StateContact
-from xcrack.linalg.modal_basis import mode_columns
 from xcrack.linalg.multifrontal import Factor, Tree, factorised, tree
 from xcrack.linalg.products import proportional, times, times_transposed
 from xcrack.linalg.reuse import Reuse
@@ -265,7 +264,7 @@ def system(
     solver : callable, optional
         In the place of the factorisation.
     material : Isotropic, optional
-        For the vectorial tip basis alone.
+        For a tip basis that depends on it.
     reuse : Reuse, optional
         Of an earlier solve. Where it is given, the next one may use this factor.
     """
@@ -352,7 +351,7 @@ def scaled_basis(
 ) -> sp.csr_matrix:
     """Columns of the solver's basis in the basis of the space `(n_dof, k)`.
 
-    The material counts for the vectorial tip basis alone.
+    The material counts for a tip basis that depends on it.
     """
     return _reduced(space, K, fixed, numerics, material)[0]
 
@@ -401,8 +400,8 @@ def _enriched_columns(
     n = space.n_dof
     first = space.n_nodes * space.dim
     changed = None
-    if numerics.comparison.tip_basis == "vectorial" and space.tips:
-        changed, free = mode_columns(space, material, free)
+    if numerics.tip_basis is not None and space.tips:
+        changed, free = numerics.tip_basis.columns(space, material, free)
         K = sp.csr_matrix(changed.T @ K @ changed)
     if numerics.patch and space.tips:
         patch = patch_orthogonal(space, K, free)

@@ -4,9 +4,10 @@ It needs no factor: memory and time grow with the number of
 unknowns, and the levels below the finest one serve every crack in a mesh.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -17,7 +18,6 @@ from xcrack.fem.function_space import FunctionSpace
 from xcrack.linalg.basis import Blocks, node_blocks, patch_orthogonal, restricted
 from xcrack.linalg.engine import Condensed, ContactRows, Count, StateContact
 from xcrack.linalg.iterative_basis import enriched_basis, nearby, parts_of, within_blocks
-from xcrack.linalg.modal_basis import mode_columns
 from xcrack.linalg.multigrid import Hierarchy, extended, hierarchy
 from xcrack.linalg.products import best_guesses, independent, proportional
 from xcrack.linalg.projected_cg import (
@@ -31,7 +31,6 @@ from xcrack.linalg.projected_cg import (
 )
 from xcrack.linalg.reuse import Reuse
 from xcrack.linalg.schwarz import star_patches
-from xcrack.model.material import Isotropic
 
 _ROUGH = 0.02  # residual of a first solution that only shows which faces overlap
 _LEAST_SHARE = 1e-4  # of the load, to which forces are resolved; round-off forbids much less
@@ -270,7 +269,7 @@ def iterative_system(
     fixed: Bools,
     levels: Hierarchy | None = None,
     modes: Floats | None = None,
-    vectorial: Isotropic | None = None,
+    tip_columns: Callable[[Bools], tuple[Any, Bools]] | None = None,
     rows: Bools | None = None,
 ) -> IterativeSystem:
     """Change the basis and put the enriched matrix on top of the levels of the uncracked body.
@@ -288,8 +287,8 @@ def iterative_system(
         Of an earlier crack in the same mesh; made anew where it does not fit.
     modes : (n_dof, k) array, optional
         Rigid motions that nothing prevents; loads have to be in balance with them.
-    vectorial : Isotropic, optional
-        The material where the tip basis is vectorial.
+    tip_columns : callable, optional
+        Combinations of the tip functions for free unknowns, of `Numerics.tip_basis`.
     rows : (n_functions,) array of bool, optional
         Functions next to enriched ones, whose rows of a `Stiffness` are enough at order 1.
     """
@@ -301,8 +300,8 @@ def iterative_system(
     plain = np.arange(len(levels.free))
     stars = space.order == 2 and space.n_functions > space.n_nodes
     combined, in_use, back = None, free, None
-    if vectorial is not None and space.tips:
-        combined, in_use = mode_columns(space, vectorial, free)
+    if tip_columns is not None and space.tips:
+        combined, in_use = tip_columns(free)
     if stars and space.tips:
         combined, back = _apart(space, near, combined, in_use)
     whole = node_blocks(space, "star" if stars else "node")

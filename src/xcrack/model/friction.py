@@ -59,12 +59,11 @@ def checked_friction(
 
 
 def _check_method(dim: int, numerics: Numerics) -> None:
-    lips = numerics.comparison.lips
-    if lips == "nitsche" or (lips != "multipliers" and dim > 2):
-        where = "" if lips == "nitsche" else " in 3D"
+    method = numerics.contact_method
+    if method is not None and dim not in method.friction_dims:
         raise ProblemError(
-            f'friction{where} with Comparison(lips="{lips}"): multipliers carry it, and in 2D a '
-            "penalty and an augmented Lagrangian; leave lips out, or give friction=0."
+            f"friction in {dim}D with {method.label}: multipliers carry it; leave contact_method "
+            "out, or give friction=0."
         )
 
 

@@ -1,10 +1,9 @@
 """Everything that is method, not scene, in one place."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field, fields, replace
-from functools import wraps
-from typing import Any
+from dataclasses import dataclass, field
+from typing import Any, ClassVar
 
+from xcrack.base.arrays import Bools, Floats
 from xcrack.base.checks import number, shown, whole
 from xcrack.base.errors import ProblemError
 
@@ -18,52 +17,66 @@ def _check_choices(given: object, **choices: tuple[object, ...]) -> None:
             raise ProblemError(f"{type(given).__name__}({name}={shown(value)}): give {words}.")
 
 
-@dataclass(frozen=True)
-class Comparison:
-    """Methods that xcrack does not use, to compare it with; reachable only through `Numerics`.
+class ContactMethod:
+    """Another way than multipliers to keep crack faces apart, as a value that `Numerics` takes.
 
-    Parameters
+    `analysis.contact` asks it for the space of its pressures and for the solutions of all load
+    states; `xcrack.verification.methods` has a penalty, an augmented Lagrangian and Nitsche's
+    method. All need a factorisation, and have no estimate of the error.
+
+    Attributes
     ----------
-    tip_basis : {"scalar", "vectorial"}
-        Unknowns of a point with tip functions. Scalar: one for each function and component.
-        Vectorial: one a mode, two in 2D and three in 3D, the leading fields of K_I to K_III; fewer
-        unknowns, but nothing beside the modes.
-    update : {"explicit", "nodal"}
-        Where the level sets of a crack in 2D come from. Explicit: distances to its polyline.
-        Nodal: stored at the nodes and changed by the frame of each advance (after Duflot, 2007);
-        it loses cracks that turn by more than about 120 degrees.
-    lips : {"multipliers", "penalty", "augmented", "nitsche"}
-        What prevents crack faces from overlapping. The alternatives to multipliers need a
-        factorisation. Penalty: a spring at each point of the faces that overlaps. Augmented: an
-        augmented Lagrangian, whose multipliers live in the space that `Numerics.multipliers` names
-        and are updated until they stay. Nitsche: the stress of the faces instead of multipliers,
-        with a penalty that makes it stable (symmetric).
-    penalty : float, optional
-        Stiffness of the springs per area of crack face, as a factor of E over the size of a cell.
-        None: 100 (penalty), 10 (augmented), 40 (nitsche). The overlap of a penalty falls with it,
-        and the pressure starts to oscillate; an augmented Lagrangian takes fewer updates; Nitsche
-        is unstable below a bound that depends on order and cells.
-
-    Raises
-    ------
-    ProblemError
-        A word or number that is not one of these.
+    label : str
+        What reports and messages call it.
+    has_unknowns : bool
+        Whether its pressures are unknowns.
+    friction_dims : tuple of int
+        Dimensions in which it carries friction.
+    updates : bool
+        With friction: whether springs are made rigid by updates, as in an augmented Lagrangian.
     """
 
-    tip_basis: str = "scalar"
-    update: str = "explicit"
-    lips: str = "multipliers"
-    penalty: float | None = None
+    label: ClassVar[str]
+    has_unknowns: ClassVar[bool] = False
+    friction_dims: ClassVar[tuple[int, ...]] = ()
+    updates: ClassVar[bool] = False
 
-    def __post_init__(self) -> None:
-        _check_choices(
-            self,
-            tip_basis=("scalar", "vectorial"),
-            update=("explicit", "nodal"),
-            lips=("multipliers", "penalty", "augmented", "nitsche"),
-        )
-        if self.penalty is not None:
-            number(self.penalty, "Comparison: penalty", above=0)
+    def pressure_space(self, problem: Any, model: Any, c: int) -> Any:
+        """Where the pressures of crack c live: `Multipliers`."""
+        raise NotImplementedError
+
+    def solve_states(self, problem: Any, model: Any, engine: Any, chosen: Any, f: Floats,
+                     known: Floats, start: Any, closed: bool, acting: Any) -> Any:  # fmt: skip
+        """Contact of all load states, a list of `StateContact`."""
+        raise NotImplementedError
+
+    def compliance(self, problem: Any, model: Any, chosen: Any) -> Floats:
+        """Weak gap over traction of each spring `(g,)`, for friction."""
+        raise NotImplementedError
+
+
+class TipBasis:
+    """Combinations of the tip functions that replace them in the solver's basis."""
+
+    def label(self, dim: int) -> str:
+        """What reports call it."""
+        raise NotImplementedError
+
+    def unknowns(self, dim: int) -> int:
+        """Unknowns of a point."""
+        raise NotImplementedError
+
+    def columns(self, space: Any, material: Any, free: Bools) -> tuple[Any, Bools]:
+        """Matrix `(n_dof, n_dof)` of the combinations, and which of its columns are in use."""
+        raise NotImplementedError
+
+
+class LevelSets:
+    """Level sets of a crack from elsewhere than its polyline or surface."""
+
+    def of(self, mesh: Any, crack: Any) -> Any:
+        """`LevelSet` of a placed crack."""
+        raise NotImplementedError
 
 
 @dataclass(frozen=True)
@@ -121,8 +134,12 @@ class Numerics:
         Threads that share a solve. None: as many processors as the process may use, by affinity
         and quota, at most 16, or the environment variable XCRACK_THREADS. Results have the same
         bits for any number.
-    comparison : Comparison
-        Methods to compare with.
+    contact_method : ContactMethod, optional
+        Instead of multipliers, to compare with: see `xcrack.verification.methods`.
+    tip_basis : TipBasis, optional
+        Instead of the tip functions one by one, to compare with.
+    level_sets : LevelSets, optional
+        Instead of those of the polyline in 2D, to compare with.
 
     Raises
     ------
@@ -143,7 +160,9 @@ class Numerics:
     initial_set: str = "closed"
     substeps: int = 10
     threads: int | None = field(default=None, metadata={"changes_results": False})
-    comparison: Comparison = Comparison()
+    contact_method: ContactMethod | None = None
+    tip_basis: TipBasis | None = None
+    level_sets: LevelSets | None = None
 
     def __post_init__(self) -> None:
         _check_choices(
@@ -164,57 +183,25 @@ class Numerics:
         whole(self.substeps, "Numerics: substeps", least=1, most=10_000)
         if self.threads is not None:
             whole(self.threads, "Numerics: threads", least=1)
-        if not isinstance(self.comparison, Comparison):
-            raise ProblemError(
-                f"Numerics: comparison = {shown(self.comparison)}: give Comparison(lips=...)."
-            )
-        if self.comparison.tip_basis == "vectorial" and self.functions != 4:
-            raise ProblemError(
-                'Comparison(tip_basis="vectorial") combines all four tip functions: leave '
-                f"functions = {self.functions} out."
-            )
-        if self.comparison.lips != "multipliers" and self.linear == "iterative":
-            raise ProblemError(
-                f'Comparison(lips="{self.comparison.lips}") with linear="iterative": conjugate '
-                'gradients know multipliers only; give linear="direct", or leave lips out.'
-            )
-
-
-def _name_moved(cls: type) -> None:
-    """Let keywords that have moved to `Comparison` say so instead of being unknown."""
-    make = cls.__init__  # type: ignore[misc]
-    moved = [field.name for field in fields(Comparison)]
-
-    @wraps(make)
-    def checked(self: object, *values: object, **named: object) -> None:
-        for name in moved:
-            if name in named:
+        methods = {"contact_method": ContactMethod, "tip_basis": TipBasis, "level_sets": LevelSets}
+        for name, kind in methods.items():
+            method = getattr(self, name)
+            if method is not None and not isinstance(method, kind):
                 raise ProblemError(
-                    f"Numerics({name}=...) is for comparison with other methods: give "
-                    f"Numerics(comparison=Comparison({name}={shown(named[name])}))."
+                    f"Numerics: {name} = {shown(method)}: give a {kind.__name__}, such as those of "
+                    "xcrack.verification.methods, or leave it out."
                 )
-        make(self, *values, **named)
-
-    cls.__init__ = checked  # type: ignore[misc]
-
-
-_name_moved(Numerics)
-
-
-def with_choices(numerics: Numerics, choices: Mapping[str, Any]) -> Numerics:
-    """Other choices of method by name, those of `Comparison` among them.
-
-    Parameters
-    ----------
-    numerics : Numerics
-    choices : mapping of name to value
-    """
-    inner = {field.name for field in fields(Comparison)} & set(choices)
-    outer = {name: value for name, value in choices.items() if name not in inner}
-    if inner:
-        own = {name: choices[name] for name in inner}
-        outer["comparison"] = replace(numerics.comparison, **own)
-    return replace(numerics, **outer)
+        if self.tip_basis is not None and self.functions != 4:
+            raise ProblemError(
+                f"Numerics: a tip_basis combines all four tip functions: leave functions = "
+                f"{self.functions} out."
+            )
+        if self.contact_method is not None and self.linear == "iterative":
+            raise ProblemError(
+                f'Numerics: {self.contact_method.label} with linear="iterative": conjugate '
+                'gradients know multipliers only; give linear="direct", or leave contact_method '
+                "out."
+            )
 
 
-__all__ = ["Comparison", "Numerics", "with_choices"]
+__all__ = ["ContactMethod", "LevelSets", "Numerics", "TipBasis"]

@@ -27,7 +27,7 @@ from xcrack.mesh.polygon import Round
 from xcrack.model import conditions
 from xcrack.model.conditions import Bearing, Resultant, Temperature
 from xcrack.model.material import Isotropic
-from xcrack.model.numerics import Comparison, Numerics
+from xcrack.model.numerics import Numerics
 from xcrack.model.problem import Problem
 from xcrack.runs import run_folder, store
 from xcrack.runs.history import History
@@ -65,7 +65,7 @@ _CLASSES: dict[str, type] = {
     "LoadResultant": plan.Resultant,
     **{
         kind.__name__: kind
-        for kind in (Problem, Mesh, Round, Isotropic, Numerics, Comparison, Contact, Report,
+        for kind in (Problem, Mesh, Round, Isotropic, Numerics, Contact, Report,
                      Ingredient, NotStored, *_CONDITIONS)
     },
 }  # fmt: skip

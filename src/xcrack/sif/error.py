@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial import cKDTree
 
-from xcrack.analysis.plan import LIPS
 from xcrack.analysis.solution import Solution
 from xcrack.analysis.solve import solve_states
 from xcrack.base.arrays import Floats, at
@@ -189,8 +188,9 @@ def _unsuited(solution: Solution, crack: int) -> str:
     problem = solution.problem
     if solution.space.order == 1:
         return "order 1 has no estimate in 2D: give order=2"
-    if solution.contact[crack] is not None and problem.numerics.comparison.lips in LIPS:
-        return f"contact by {LIPS[problem.numerics.comparison.lips]} has no estimate"
+    method = problem.numerics.contact_method
+    if solution.contact[crack] is not None and method is not None:
+        return f"contact by {method.label} has no estimate"
     if any(contact is not None and contact.shear is not None for contact in solution.contact):
         return "friction has no estimate"
     return ""

@@ -19,7 +19,6 @@ from xcrack.base.errors import ProblemError, XcrackError
 from xcrack.base.paths import path_of
 from xcrack.mesh.mesh import Mesh
 from xcrack.mesh.refinement import refine
-from xcrack.model.numerics import with_choices
 from xcrack.model.problem import Problem, check_problem
 from xcrack.verification.charting.adapted import Run, adapted_runs, row_of, wanted_of
 from xcrack.verification.charting.meshes import checked_meshes, made, mean_size, smallest
@@ -227,7 +226,7 @@ def _of_user(quantity: Quantity, result: Any) -> Sampled:
 def _varied(problem: Problem, mesh: Mesh, changes: dict[str, Any]) -> Problem:
     whole = {name: value for name, value in changes.items() if name in IN_PROBLEM}
     method = {name: value for name, value in changes.items() if name not in IN_PROBLEM}
-    return replace(problem, mesh=mesh, numerics=with_choices(problem.numerics, method), **whole)
+    return replace(problem, mesh=mesh, numerics=replace(problem.numerics, **method), **whole)
 
 
 def _meshes(runs: _Runs, given: Meshes | None, repeat: int, seconds: float) -> list[Mesh]:

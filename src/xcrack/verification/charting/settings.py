@@ -6,16 +6,11 @@ from typing import Any
 
 from xcrack.base.checks import entries, shown
 from xcrack.base.errors import ProblemError
-from xcrack.model.numerics import Comparison, Numerics
+from xcrack.model.numerics import Numerics
 from xcrack.model.problem import Problem
 
 IN_PROBLEM = ("order", "contact")  # what a setting may change in Problem; all else is the scene
-_METHOD = tuple(
-    item.name
-    for kind in (Numerics, Comparison)
-    for item in fields(kind)
-    if item.name != "comparison"
-)
+_METHOD = tuple(item.name for item in fields(Numerics))
 _AS_GIVEN = "as given"
 
 

@@ -2,7 +2,6 @@
 
 from functools import partial
 
-from xcrack.analysis.inf_sup import inf_sup
 from xcrack.crack.lines import line_crack
 from xcrack.crack.surfaces import plane_crack
 from xcrack.mesh.box import box
@@ -10,6 +9,7 @@ from xcrack.model.material import Isotropic
 from xcrack.model.problem import Problem
 from xcrack.verification.book.case import Case, Value
 from xcrack.verification.book.scenes_2d import perturbed, rows
+from xcrack.verification.methods import inf_sup
 
 _SOURCE = "numerical inf-sup test (Chapelle and Bathe, 1993): the constant does not fall"
 _MATERIAL = Isotropic(1.0, 0.3, plane="strain")

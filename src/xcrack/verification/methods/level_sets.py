@@ -13,10 +13,25 @@ from dataclasses import dataclass
 import numpy as np
 
 from xcrack.base.arrays import Floats, lock
+from xcrack.base.errors import ProblemError
 from xcrack.crack.advance_2d import advance
 from xcrack.crack.crack import Crack, tip_frames
 from xcrack.fem.level_set import LevelSet, line_levels, tied_to_tips
 from xcrack.mesh.mesh import Mesh
+from xcrack.model.numerics import LevelSets
+
+
+@dataclass(frozen=True)
+class nodal_level_sets(LevelSets):  # noqa: N801 - it is used as a function
+    """Level sets that nodal updates would have given a crack in 2D; see `nodal_level_set`."""
+
+    def of(self, mesh: Mesh, crack: Crack) -> LevelSet:
+        """Level sets of a placed crack."""
+        if mesh.dim != 2:
+            raise ProblemError(
+                "nodal_level_sets are for 2D only: leave level_sets out for a crack in 3D."
+            )
+        return nodal_level_set(mesh, crack)
 
 
 @dataclass(frozen=True, eq=False)

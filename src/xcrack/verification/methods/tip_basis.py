@@ -1,10 +1,12 @@
-"""The vectorial tip basis: the modes of a tip alone, as a restriction of the solver's basis.
+"""A basis of modes: the fields of K alone at a tip, as a restriction of the solver's basis.
 
 The four tip functions times the d components of the displacement contain the fields of modes I
 and II, and III in 3D. Their span at a point has d columns instead of 4 d: cheaper and better
 conditioned, but blind to every field near a tip that is not one of its modes. It is there to be
 compared with the functions one by one.
 """
+
+from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
@@ -15,6 +17,26 @@ from xcrack.base.errors import ProblemError
 from xcrack.fem.function_space import FunctionSpace, Tip
 from xcrack.fem.williams import mode_matrix
 from xcrack.model.material import Isotropic
+from xcrack.model.numerics import TipBasis
+
+
+@dataclass(frozen=True)
+class modal_basis(TipBasis):  # noqa: N801 - it is used as a function
+    """One unknown a mode at each point, two in 2D and three in 3D, instead of one a function."""
+
+    def label(self, dim: int) -> str:
+        """What reports call it."""
+        return f"modes I to {'II' if dim == 2 else 'III'} only"
+
+    def unknowns(self, dim: int) -> int:
+        """Unknowns of a point: one a mode."""
+        return dim
+
+    def columns(
+        self, space: FunctionSpace, material: Isotropic | None, free: Bools
+    ) -> tuple[sp.csr_matrix, Bools]:
+        """See `mode_columns`."""
+        return mode_columns(space, material, free)
 
 
 def mode_columns(
@@ -43,7 +65,7 @@ def mode_columns(
         Columns that stand for an unknown.
     """
     if material is None:
-        raise ProblemError('Comparison(tip_basis="vectorial") needs the material of the body.')
+        raise ProblemError("modal_basis needs the material of the body.")
     d = space.dim
     modes = local_modes(material.kolosov, d)
     rows, columns, values = [], [], []

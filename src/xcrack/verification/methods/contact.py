@@ -1,0 +1,395 @@
+"""Alternatives to multipliers, for comparison: penalty, augmented Lagrangian, Nitsche.
+
+Each minimises  u K u / 2 - f u + sum c <-(R u + r)>² / 2  by a semi-smooth Newton iteration over
+the set where R u + r < 0 (Alart and Curnier, 1991); they differ in K, f, R, r and c alone:
+
+* penalty: R u the gaps at the lip points, r = 0, c = eps times weight;
+* augmented Lagrangian (Simo and Laursen, 1992): R u the weak gaps of the multiplier groups,
+  r = -lam measure / eps, c = eps / measure, and lam <- <lam - eps gap> until it stays;
+* Nitsche (Chouly and Hild, 2013, theta = 1): with the stress S u + s of the crack faces, R u + r =
+  S u + s + gamma gap, c = weight / gamma, K less S' (weight / gamma) S. S is a mean on each lip
+  segment; gamma grows towards a tip, where the stress of the tip functions does.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+
+import numpy as np
+import scipy.optimize
+import scipy.sparse as sp
+
+from xcrack.analysis.multipliers import Multipliers, gap_rows, multipliers
+from xcrack.base.arrays import Bools, Floats
+from xcrack.base.checks import number
+from xcrack.base.errors import ConvergenceError
+from xcrack.fem.facets import LipPoints
+from xcrack.fem.system import Model
+from xcrack.linalg.direct import Solve, System, superlu
+from xcrack.linalg.engine import StateContact
+from xcrack.model.conditions import Load
+from xcrack.model.numerics import ContactMethod
+from xcrack.model.problem import Problem
+from xcrack.verification.methods.face_stress import (
+    averaging,
+    steady_stress,
+    stress_matrix,
+    tip_distance,
+)
+
+_MAX_SETS = 100
+_MAX_UPDATES = 500
+_TOLERANCE = 1e-8  # change of the multipliers, as a share of the largest, that ends their updates
+
+
+@dataclass(frozen=True)
+class Springs(ContactMethod):
+    """What the methods share: springs or stresses on rows of gaps, and Newton's iteration."""
+
+    factor: float
+
+    def __post_init__(self) -> None:
+        name = type(self).__name__
+        object.__setattr__(self, "factor", number(self.factor, f"{name}: factor", above=0))
+
+    def pressure_space(self, problem: Problem, model: Model, c: int) -> Multipliers:
+        """The points on the crack faces, one by one."""
+        lips = model.lips[c]
+        each = sp.csr_matrix(sp.identity(len(lips), format="csr"))
+        return Multipliers(c, each, lips.weight, lips.x)
+
+    def compliance(self, problem: Problem, model: Model, chosen: Multipliers) -> Floats:
+        """Weak gap over traction of each spring `(g,)`.
+
+        With the rows N of the springs N u + compliance λ = 0 where one presses or sticks: penalties
+        are multipliers with a diagonal added to F = N K^-1 N^T.
+        """
+        return chosen.measure / self.rows(problem, model, chosen).eps
+
+    def rows(self, problem: Problem, model: Model, m: Multipliers) -> "Rows":
+        """Gaps at the points of one crack, and the stiffness there."""
+        size = _size(model, model.lips[m.crack])
+        stress = sp.csr_matrix((len(m.measure), model.space.n_dof))
+        eps = self.factor * problem.material.E / size
+        return Rows(model.jumps[m.crack], stress, eps, m.measure)
+
+    def solve_states(
+        self,
+        problem: Problem,
+        model: Model,
+        engine: System,
+        chosen: Sequence[Multipliers],
+        f: Floats,
+        known: Floats,
+        start: Sequence[Bools | None],
+        closed: bool,
+        acting: Sequence[tuple[tuple[Load, ...], float]],
+    ) -> list[StateContact]:
+        """Contact of all load states.
+
+        Parameters
+        ----------
+        problem : Problem
+        model : Model
+        engine : System
+        chosen : sequence of Multipliers
+            Of the cracks that need contact, from `pressure_space`.
+        f, known : (n_dof, states) arrays
+        start : sequence of (g,) arrays of bool or None
+            First guess of each state's closed set.
+        closed : bool
+            State of all rows where there is no guess.
+        acting : sequence of (loads, factor)
+            Loads of each state and their scale: Nitsche counts pressures that are given on the
+            faces, and initial stress.
+
+        Raises
+        ------
+        ConvergenceError
+            A set or multipliers that do not settle; a penalty so small that Nitsche is unstable.
+        """
+        parts = [self.rows(problem, model, m) for m in chosen]
+        rows = Rows(
+            sp.csr_matrix(sp.vstack([p.jump for p in parts])),
+            sp.csr_matrix(sp.vstack([p.stress for p in parts])),
+            np.concatenate([p.eps for p in parts]),
+            np.concatenate([p.measure for p in parts]),
+        )
+        system = self.system(engine, rows)
+        states = []
+        for k in range(f.shape[1]):
+            first = start[k]
+            guess = np.full(len(rows.eps), closed) if first is None else first
+            given = partial(face_tractions, model, chosen, *acting[k])
+            u, pressure, sets = self.solution(system, rows, f[:, k], known[:, k], guess, given)
+            states.append(StateContact(pressure, rows.jump @ u, pressure > 0, sets, u))
+        return states
+
+    def system(self, engine: System, rows: "Rows") -> "ClosedSystem":
+        """Stiffness and rows of the iteration."""
+        c = rows.eps * rows.measure
+        return ClosedSystem(engine, engine.matrix, rows.jump, c, engine.reduced)
+
+    def solution(
+        self, system: "ClosedSystem", rows: "Rows", f: Floats, known: Floats, start: Bools,
+        given: Callable[[], Floats],
+    ) -> tuple[Floats, Floats, int]:  # fmt: skip
+        """Displacements, pressures, and the number of sets of one state."""
+        state = _newton(system, f, known, np.zeros(len(rows.eps)), start)
+        return state.u, np.maximum(-state.residual * rows.eps, 0.0), state.sets
+
+
+@dataclass(frozen=True)
+class penalty(Springs):  # noqa: N801 - it is used as a function
+    """A spring at each point of the crack faces that overlaps.
+
+    Parameters
+    ----------
+    factor : float
+        Stiffness per area of crack face over E / size of a cell. The overlap falls with it, and
+        the pressure starts to oscillate.
+
+    Raises
+    ------
+    ProblemError
+        A factor that is not positive.
+    """
+
+    label = "a penalty"
+    friction_dims = (2,)
+    factor: float = 100.0
+
+
+@dataclass(frozen=True)
+class augmented_lagrangian(Springs):  # noqa: N801
+    """Multipliers in the space that `Numerics.multipliers` names, updated until they stay.
+
+    Parameters
+    ----------
+    factor : float
+        As of `penalty`: stiffer springs take fewer updates.
+
+    Raises
+    ------
+    ProblemError
+        A factor that is not positive.
+
+    Notes
+    -----
+    Simo and Laursen (1992).
+    """
+
+    label = "an augmented Lagrangian"
+    has_unknowns = True
+    friction_dims = (2,)
+    updates = True
+    factor: float = 10.0
+
+    def pressure_space(self, problem: Problem, model: Model, c: int) -> Multipliers:
+        """Groups of points, as multipliers have them."""
+        kind = problem.numerics.multipliers
+        return multipliers(model.space, c, model.lips[c], kind, model.known.fixed)
+
+    def rows(self, problem: Problem, model: Model, m: Multipliers) -> "Rows":
+        """Weak gaps of the groups."""
+        lips = model.lips[m.crack]
+        size = np.asarray(m.values.T @ (lips.weight * _size(model, lips))) / m.measure
+        stress = sp.csr_matrix((len(m.measure), model.space.n_dof))
+        eps = self.factor * problem.material.E / size
+        return Rows(gap_rows(m, lips, model.jumps[m.crack]), stress, eps, m.measure)
+
+    def system(self, engine: System, rows: "Rows") -> "ClosedSystem":
+        """Springs on weak gaps."""
+        c = rows.eps / rows.measure
+        return ClosedSystem(engine, engine.matrix, rows.jump, c, engine.reduced)
+
+    def solution(
+        self, system: "ClosedSystem", rows: "Rows", f: Floats, known: Floats, start: Bools,
+        given: Callable[[], Floats],
+    ) -> tuple[Floats, Floats, int]:  # fmt: skip
+        """Updates of the multipliers (Uzawa) until they stay."""
+        eps, measure = rows.eps, rows.measure
+        lam, sets, active = np.zeros(len(eps)), 0, start
+        for _ in range(_MAX_UPDATES):
+            state = _newton(system, f, known, -lam * measure / eps, active)
+            sets += state.sets
+            new = np.maximum(-state.residual * eps / measure, 0.0)
+            change = float(np.abs(new - lam).max(initial=0.0))
+            lam, active = new, state.active
+            if change <= _TOLERANCE * float(np.abs(lam).max(initial=0.0)):
+                return state.u, lam, sets
+        raise ConvergenceError(
+            f"contact: after {_MAX_UPDATES} updates the multipliers still change by {change:.3g}, "
+            f"where the largest is {lam.max():.3g}. Give a larger factor of augmented_lagrangian."
+        )
+
+
+@dataclass(frozen=True)
+class nitsche(Springs):  # noqa: N801
+    """The stress of the crack faces instead of multipliers, with a penalty that makes it stable.
+
+    Parameters
+    ----------
+    factor : float
+        As of `penalty`: the method is unstable below a bound that depends on order and cells.
+
+    Raises
+    ------
+    ProblemError
+        A factor that is not positive.
+
+    Notes
+    -----
+    Symmetric (Chouly and Hild, 2013, theta = 1). The stress is a mean on each segment of a face;
+    the stiffness grows towards a tip, where the stress of the tip functions does.
+    """
+
+    label = "Nitsche's method"
+    factor: float = 40.0
+
+    def rows(self, problem: Problem, model: Model, m: Multipliers) -> "Rows":
+        """Gaps and mean stresses at the points."""
+        lips, c = model.lips[m.crack], m.crack
+        mean = averaging(model.space, lips)
+        size = np.minimum(_size(model, lips), tip_distance(model.space, c, lips))
+        stress = sp.csr_matrix(mean @ stress_matrix(model.space, problem.material, c, lips))
+        eps = self.factor * problem.material.E / size
+        return Rows(model.jumps[c], stress, eps, m.measure)
+
+    def system(self, engine: System, rows: "Rows") -> "ClosedSystem":
+        """The stiffness less that of the stresses, on rows of stress and gap."""
+        c = rows.measure / rows.eps
+        R = sp.csr_matrix(rows.stress + sp.diags(rows.eps) @ rows.jump)
+        own = sp.csr_matrix(rows.stress @ engine.basis)
+        K = sp.csr_matrix(engine.matrix - rows.stress.T @ sp.diags(c) @ rows.stress)
+        reduced = sp.csc_matrix(engine.reduced - own.T @ sp.diags(c) @ own)
+        return ClosedSystem(engine, K, R, c, reduced)
+
+    def solution(
+        self, system: "ClosedSystem", rows: "Rows", f: Floats, known: Floats, start: Bools,
+        given: Callable[[], Floats],
+    ) -> tuple[Floats, Floats, int]:  # fmt: skip
+        """The residual holds stresses: pressures as they are."""
+        r = given()
+        load = f + rows.stress.T @ (rows.measure / rows.eps * r)
+        state = _newton(system, load, known, r, start)
+        return state.u, np.maximum(-state.residual, 0.0), state.sets
+
+
+def face_tractions(
+    model: Model, chosen: Sequence[Multipliers], loads: tuple[Load, ...], factor: float
+) -> Floats:
+    """Normal stress that loads add to that of the strain, at the points of all cracks `(q,)`."""
+    parts = []
+    for m in chosen:
+        lips = model.lips[m.crack]
+        given = steady_stress(lips, m.crack, loads, factor)
+        parts.append(averaging(model.space, lips) @ given if given.any() else given)
+    return np.concatenate(parts)
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """Rows of a method on the crack faces.
+
+    Attributes
+    ----------
+    jump : (g, n_dof) sparse matrix
+        Gaps at the points, weak gaps of groups.
+    stress : (g, n_dof) sparse matrix
+        Stress of the faces, for Nitsche.
+    eps : (g,) array, stress / length
+    measure : (g,) array
+    """
+
+    jump: sp.csr_matrix
+    stress: sp.csr_matrix
+    eps: Floats
+    measure: Floats
+
+
+def _size(model: Model, lips: LipPoints) -> Floats:
+    return np.asarray(model.space.mesh.cell_size[lips.cell].mean(axis=1))
+
+
+@dataclass
+class ClosedSystem:
+    """Stiffness, rows and their weights c, with the last factor."""
+
+    engine: System
+    stiffness: sp.csr_matrix
+    rows: sp.csr_matrix
+    c: Floats
+    reduced: sp.csc_matrix
+    last: tuple[bytes, Solve] | None = field(default=None)
+
+    def __post_init__(self) -> None:
+        self.reduced_rows = sp.csr_matrix(self.rows @ self.engine.basis)
+
+    def closed(self, active: Bools) -> sp.csc_matrix:
+        """The matrix with the rows of a set."""
+        R = self.reduced_rows[active]
+        return sp.csc_matrix(self.reduced + R.T @ sp.diags(self.c[active]) @ R)
+
+    def solver(self, active: Bools) -> Solve:
+        """Solves with the rows of a set; kept while the set stays."""
+        key = active.tobytes()
+        if self.last is None or self.last[0] != key:
+            self.last = key, superlu(self.closed(active))
+            self.engine.count.factorisations += 1
+        return self.last[1]
+
+
+@dataclass(frozen=True, eq=False)
+class _State:
+    u: Floats
+    residual: Floats  # R u + r
+    active: Bools
+    sets: int
+
+
+def _newton(system: ClosedSystem, f: Floats, known: Floats, r: Floats, start: Bools) -> _State:
+    """Sets of closed rows until one stays; where one comes back, steps are cut by a line search."""
+    K, R, c, basis = system.stiffness, system.rows, system.c, system.engine.basis
+    active, u = np.array(start, dtype=bool), None
+    seen: set[bytes] = set()
+    for sets in range(1, _MAX_SETS + 1):
+        part = R[active]
+        loads = f - K @ known - part.T @ (c[active] * (r[active] + part @ known))
+        new = known + basis @ system.solver(active)(basis.T @ loads)
+        system.engine.count.solves += 1
+        if not np.isfinite(new).all():
+            break
+        gap = np.asarray(R @ new + r)
+        # Values at round-off of zero (crack faces that only touch) must not make the set flicker.
+        floor = 1e-13 * float(np.abs(gap).max(initial=0.0))
+        if ((gap < -floor) == active).all():
+            return _State(new, gap, active, sets)
+        if active.tobytes() in seen and u is not None:
+            t = _step(system, f, r, u, new - u)
+            new = u + t * (new - u)
+            gap = np.asarray(R @ new + r)
+        seen.add(active.tobytes())
+        u, active = new, gap < -floor
+    raise ConvergenceError(
+        f"contact: after {sets} sets of {len(c)} places the set of closed ones still changes. Give "
+        "another factor of the contact method: less for a penalty, more for Nitsche's method; or "
+        "leave the method out."
+    )
+
+
+def _step(system: ClosedSystem, f: Floats, r: Floats, u: Floats, step: Floats) -> float:
+    """Length of a step in (0, 1] at which the energy is least: its slope is monotone."""
+    K, R, c = system.stiffness, system.rows, system.c
+    Kstep, gap, change = K @ step, R @ u + r, R @ step
+    first, second = float(u @ Kstep - f @ step), float(step @ Kstep)
+
+    def slope(t: float) -> float:
+        return float(first + t * second + change @ (c * np.minimum(gap + t * change, 0.0)))
+
+    if slope(1.0) <= 0 or slope(0.0) >= 0:
+        return 1.0
+    return float(scipy.optimize.brentq(slope, 0.0, 1.0))
+
+
+__all__ = ["augmented_lagrangian", "nitsche", "penalty"]
