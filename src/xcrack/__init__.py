@@ -83,6 +83,8 @@ _HOME = {
     "Step": "growth.step",
     "Join": "growth.step",
     "grow": "growth.run",
+    "Response": "growth.response",
+    "respond": "growth.response",
     "life": "runs.life",
     "Scatter": "runs.scatter",
     "lognormal": "runs.scatter",

@@ -27,6 +27,7 @@ from fuzz.result_rules import LOAD, NOTHING, NU, fits
 from fuzz.values import paths
 from xcrack import testing
 from xcrack.growth.step import Arrival
+from xcrack.linalg.reuse import Reuse
 
 ANY = Numbers()
 
@@ -149,6 +150,7 @@ GROW = {
     ),
     "max_cycles": arg(Number(optional=True, above=0), None, 1e6, 10.0),
     "solver": arg(Called(optional=True), None),
+    "response": arg(Called(optional=True), None, xc.respond),
     "progress": arg(Flag(also=(Word(words=("always",)),)), False),
 }
 
@@ -174,6 +176,7 @@ RESUME = {
     "max_unknowns": arg(Seen(rule=lambda v: v is None), None),
     "integrator": arg(Word(words=("pec",)), "pec"),
     "solver": arg(Called(optional=True), None),
+    "response": arg(Seen(rule=lambda v: v is None), None),
     "progress": arg(Flag(also=(Word(words=("always",)),)), False),
     "K_c": arg(Number(optional=True, above=0), None, 1e3),
     "retardation": arg(Seen(rule=lambda v: v is None), None),
@@ -255,6 +258,46 @@ ENTRIES = [
                 words=["load", "cycle"],
             )
         },
+    ),
+    Entry(
+        "Response",
+        xc.Response,
+        {
+            "states": arg(ListOf(rule=lambda v: len(v) == 1), [1.0], (0.5,)),
+            "sif": arg(
+                ListOf(item=ListOf(item=Of(type=xc.SIF)), least=1, most=1),
+                Late(lambda: [[scenes.sif()]]),
+                words=["K"],
+            ),
+            "solutions": arg(
+                ListOf(item=Of(type=xc.Solution), rule=lambda v: len(v) < 2),
+                (),
+                Late(lambda: [scenes.solution()]),
+            ),
+            "reuse": arg(Of(type=Reuse), Reuse()),
+        },
+    ),
+    Entry(
+        "Response",
+        lambda problem, states, K, T: xc.Response.of_K(problem, states, K, T).sif[0][0].K,
+        {
+            "problem": arg(Of(type=xc.Problem), Late(scenes.problem)),
+            "states": arg(ListOf(rule=lambda v: len(v) == 1), [1.0]),
+            "K": arg(Numbers((1, 1, 2)), np.ones((1, 1, 2))),
+            "T": arg(Numbers((1, 1), optional=True), None, [[3.0]]),
+        },
+    ),
+    Entry(
+        "respond",
+        lambda **given: xc.respond(**given).sif[0][0].K,
+        {
+            "problem": arg(Of(type=xc.Problem), Late(scenes.problem)),
+            "states": arg(ListOf(item=Number(also=(ListOf(item=LOAD),)), least=1), [1.0]),
+            "reuse": arg(Of(type=Reuse, optional=True), None, Reuse()),
+            "bars": arg(Flag(), False, True),
+            "solver": arg(Called(optional=True), None),
+        },
+        cost=0.08,
     ),
     Entry(
         "Step",
@@ -427,6 +470,14 @@ HOOKS = [
         lambda K, nu: (K[0, :, 0] * 0, K[1, :, 0], K[1, :, 0] * 0),
         NOTHING,
         "directions",
+        cost=0.1,
+    ),
+    Hook(
+        "grow",
+        lambda f: _grow(response=f, max_steps=2),
+        xc.respond,
+        Of(type=xc.Response),
+        "response",
         cost=0.1,
     ),
     Hook("collect", lambda f: _collected(until=f), lambda step: False, Flag(), "until"),

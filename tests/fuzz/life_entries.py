@@ -7,7 +7,7 @@ import numpy as np
 import xcrack as xc
 from fuzz.entry import Entry, Hook, arg
 from fuzz.kinds import Called, Filename, Number, Numbers, Of, Seen, Whole, Word, real
-from support.growth_fakes import mode_I, plate, sif
+from support.growth_fakes import mode_I, plate
 from xcrack.growth.step import Memory, Step
 from xcrack.linalg.reuse import Reuse
 
@@ -20,7 +20,8 @@ def _step(n):
     K = np.array(mode_I()(problem, 0))
     dK = K[:, 0]
     rate = np.asarray(LAW(dK, 0.0))
-    states = tuple((sif(problem.placed[0], load * K),) for load in (0.0, 1.0))
+    factors = (0.0, 1.0)
+    states = xc.Response.of_K(problem, factors, [factor * K for factor in factors]).sif
     memory = Memory((rate,), (5.0 + 3.0 * n,), (np.zeros(1),), 1.5, Reuse(), {})
     values = {
         "angle": np.zeros(1),

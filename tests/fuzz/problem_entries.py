@@ -89,7 +89,7 @@ ENTRIES = [
             "contact_method": arg(
                 Of(type=ContactMethod, optional=True), methods.penalty(3.0), None
             ),
-            "tip_basis": arg(Of(type=TipBasis, optional=True), methods.modal_basis(), None),
+            "tip_basis": arg(Of(type=TipBasis, optional=True), None),
             "level_sets": arg(Of(type=LevelSets, optional=True), methods.nodal_level_sets(), None),
         },
     ),

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import xcrack as xc
-from support.growth_fakes import STRESS, mode_I, patch_respond, plate
+from support.growth_fakes import STRESS, formula, mode_I, plate
 
 LAW = xc.paris(C=1e-12, m=3.0)
 CYCLE = xc.Cycle(0.0, 1.0)
@@ -23,10 +23,10 @@ def grown(problem, **options):
 
 
 @pytest.mark.parametrize(("integrator", "rel"), [("pec", 1e-9), ("euler", 1e-3)])
-def test_the_last_step_ends_on_the_side_with_its_cycles(monkeypatch, integrator, rel):
+def test_the_last_step_ends_on_the_side_with_its_cycles(integrator, rel):
     """The crack is 60 long there. Rates are a power of the length, which pec follows exactly."""
-    patch_respond(monkeypatch, mode_I())
-    history = grown(plate(), da=4.1, integrator=integrator)
+    response = formula(mode_I())
+    history = grown(plate(), da=4.1, integrator=integrator, response=response)
     last = history.steps[-1]
     assert last.n_tips == 0
     assert len(last.sif) == 2
@@ -43,12 +43,12 @@ def test_the_last_step_ends_on_the_side_with_its_cycles(monkeypatch, integrator,
     assert all(not step.arrivals for step in history.steps[:-1])
 
 
-def test_a_tip_in_a_hole_names_its_set(monkeypatch):
+def test_a_tip_in_a_hole_names_its_set():
     mesh = xc.plate_with_hole(width=60, height=40, radius=5, size=1.5, size_near=0.5)
     crack = xc.line_crack([(-30.0, 0.3), (-20.0, 0.3)])
     material = xc.Isotropic(E=210e3, nu=0.3, plane="strain")
-    patch_respond(monkeypatch, mode_I())
-    history = grown(xc.Problem(mesh, material, [crack]), da=4.0)
+    response = formula(mode_I())
+    history = grown(xc.Problem(mesh, material, [crack]), da=4.0, response=response)
     (arrival,) = history.steps[-1].arrivals
     assert arrival.name == "hole"
     rim = -np.sqrt(25 - 0.3**2)
@@ -57,11 +57,11 @@ def test_a_tip_in_a_hole_names_its_set(monkeypatch):
     assert history.life == pytest.approx(exact(10.0, 30 + rim), rel=2e-3)
 
 
-def test_one_tip_arrives_and_the_other_goes_on(monkeypatch):
+def test_one_tip_arrives_and_the_other_goes_on():
     """The left tip has 8 to go; both grow evenly until then."""
     problem = plate([xc.line_crack([(8.0, 0.37), (20.0, 0.37)])])
-    patch_respond(monkeypatch, mode_I(factor=lambda a: 1.0))
-    history = grown(problem, da=6.0, max_steps=4)
+    response = formula(mode_I(factor=lambda a: 1.0))
+    history = grown(problem, da=6.0, max_steps=4, response=response)
     with_one = [step for step in history.steps if step.arrivals]
     assert [step.index for step in with_one] == [2]
     (arrival,) = with_one[0].arrivals
@@ -69,14 +69,17 @@ def test_one_tip_arrives_and_the_other_goes_on(monkeypatch):
     assert arrival.cycles == pytest.approx(8.0 / (1e-12 * STRESS**3), rel=1e-9)
 
 
-def test_the_last_step_is_stored_and_nothing_follows_it(monkeypatch, tmp_path):
-    patch_respond(monkeypatch, mode_I())
+def test_the_last_step_is_stored_and_nothing_follows_it(tmp_path):
+    response = formula(mode_I())
     options = {"da": 20.0, "progress": False}
     run = xc.collect(
-        xc.grow(plate(), LAW, xc.max_hoop_stress, CYCLE, **options), path=tmp_path / "run"
+        xc.grow(plate(), LAW, xc.max_hoop_stress, CYCLE, **options, response=response),
+        path=tmp_path / "run",
     )
     read = xc.load(tmp_path / "run")
-    again = xc.resume(tmp_path / "run", plate(), LAW, xc.max_hoop_stress, CYCLE, **options)
+    again = xc.resume(
+        tmp_path / "run", plate(), LAW, xc.max_hoop_stress, CYCLE, **options, response=response
+    )
     for history in (read, again):
         assert history.ended == run.ended
         assert history.life == run.life
@@ -84,20 +87,22 @@ def test_the_last_step_is_stored_and_nothing_follows_it(monkeypatch, tmp_path):
         assert (history.cracks[0].points == run.cracks[0].points).all()
 
 
-def test_until_is_not_asked_of_a_step_without_tips(monkeypatch):
+def test_until_is_not_asked_of_a_step_without_tips():
     """What users write there looks for K at the tips."""
-    patch_respond(monkeypatch, mode_I())
+    response = formula(mode_I())
     history = xc.collect(
-        xc.grow(plate(), LAW, xc.max_hoop_stress, CYCLE, da=20.0, progress=False),
+        xc.grow(
+            plate(), LAW, xc.max_hoop_stress, CYCLE, da=20.0, progress=False, response=response
+        ),
         until=lambda step: step.sif[-1][0].K_I.max() > 1e9,
     )
     assert history.ended.startswith("tip left the body")
 
 
-def test_tables_pictures_and_files_take_the_last_step(monkeypatch, tmp_path):
+def test_tables_pictures_and_files_take_the_last_step(tmp_path):
     problem = plate()
-    patch_respond(monkeypatch, mode_I())
-    history = grown(problem, da=20.0)
+    response = formula(mode_I())
+    history = grown(problem, da=20.0, response=response)
     history = xc.History(history.steps, history.ended, mesh=problem.mesh)
     rows = history.table()
     assert rows["N"][-1] == history.life
@@ -114,9 +119,9 @@ def test_tables_pictures_and_files_take_the_last_step(monkeypatch, tmp_path):
     assert history._repr_html_()
 
 
-def test_lives_go_up_to_the_side(monkeypatch):
-    patch_respond(monkeypatch, mode_I())
-    history = grown(plate(), da=4.1)
+def test_lives_go_up_to_the_side():
+    response = formula(mode_I())
+    history = grown(plate(), da=4.1, response=response)
     assert history.rerate(LAW).life == pytest.approx(history.life, rel=1e-12)
     assert history.rerate(xc.paris(C=2e-12, m=3.0)).life == pytest.approx(history.life / 2)
     curve = xc.growth_curve(history)
@@ -125,9 +130,9 @@ def test_lives_go_up_to_the_side(monkeypatch):
     assert len(xc.residual_strength(history, nu=0.3, K_c=4000.0)) == len(history.steps) - 1
 
 
-def test_a_report_shows_the_last_K_and_the_break_through(monkeypatch, tmp_path):
-    patch_respond(monkeypatch, mode_I())
-    history = grown(plate(), da=20.0)
+def test_a_report_shows_the_last_K_and_the_break_through(tmp_path):
+    response = formula(mode_I())
+    history = grown(plate(), da=20.0, response=response)
     file = xc.report(history, tmp_path / "report.html")
     text = file.read_text()
     assert "break-through" in text

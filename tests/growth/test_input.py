@@ -5,12 +5,11 @@ import warnings
 import numpy as np
 import pytest
 
-from support.growth_fakes import STRESS, mode_I, patch_respond, plate
+from support.growth_fakes import STRESS, formula, mode_I, plate
 from xcrack.base.errors import ProblemError, XcrackWarning, warn
 from xcrack.crack.measures import length_inside
 from xcrack.fatigue.criteria import max_hoop_stress
 from xcrack.fatigue.power import elber, paris, walker
-from xcrack.growth import run as growth
 from xcrack.growth.run import grow
 from xcrack.growth.step import Cycle
 
@@ -31,9 +30,9 @@ def run(steps):
 # --- advances, laws, criteria ------------------------------------------------------------------
 
 
-def test_advance_below_a_tenth_of_a_cell(monkeypatch):
-    patch_respond(monkeypatch, mode_I())
-    steps = grow(plate(), LAW, max_hoop_stress, CYCLE, da=0.14)
+def test_advance_below_a_tenth_of_a_cell():
+    response = formula(mode_I())
+    steps = grow(plate(), LAW, max_hoop_stress, CYCLE, da=0.14, response=response)
     next(steps)
     with pytest.raises(ProblemError, match=r"0\.14 at crack 0, tip 0 .* tenth .* size 1\.414"):
         next(steps)
@@ -49,10 +48,10 @@ def turning(share):
     return K_of
 
 
-def test_a_kink_within_one_cell_is_warned_of_once(monkeypatch):
+def test_a_kink_within_one_cell_is_warned_of_once():
     """A turn by 25 degrees, and an advance of half the extent of a cell along the path."""
-    patch_respond(monkeypatch, turning(0.25))
-    steps = grow(plate(), LAW, max_hoop_stress, CYCLE, da=0.5, max_steps=4)
+    response = formula(turning(0.25))
+    steps = grow(plate(), LAW, max_hoop_stress, CYCLE, da=0.5, max_steps=4, response=response)
     with pytest.warns(XcrackWarning, match=r"below one cell along the path .* -25.* deg") as caught:
         run(steps)
     assert len(caught) == 1
@@ -63,16 +62,18 @@ def test_a_kink_within_one_cell_is_warned_of_once(monkeypatch):
     [(0.0, 0.5), (0.05, 0.5), (0.25, 1.36)],
     ids=["straight", "turning by six degrees", "longer than the cell, not than its longest edge"],
 )
-def test_an_advance_below_one_cell_is_not_warned_of_where_it_does_no_harm(monkeypatch, share, da):
-    patch_respond(monkeypatch, turning(share))
+def test_an_advance_below_one_cell_is_not_warned_of_where_it_does_no_harm(share, da):
+    response = formula(turning(share))
     with warnings.catch_warnings():
         warnings.simplefilter("error", XcrackWarning)
-        run(grow(plate(), LAW, max_hoop_stress, CYCLE, da=da, max_steps=2))
+        run(grow(plate(), LAW, max_hoop_stress, CYCLE, da=da, max_steps=2, response=response))
 
 
-def test_advance_that_becomes_too_short_ends_the_run(monkeypatch):
-    patch_respond(monkeypatch, mode_I(lambda a: (5.0 / a) ** 8))
-    steps = grow(plate(), LAW, max_hoop_stress, CYCLE, cycles=1.0 / LAW(STRESS, 0))
+def test_advance_that_becomes_too_short_ends_the_run():
+    response = formula(mode_I(lambda a: (5.0 / a) ** 8))
+    steps = grow(
+        plate(), LAW, max_hoop_stress, CYCLE, cycles=1.0 / LAW(STRESS, 0), response=response
+    )
     with pytest.warns(XcrackWarning, match="below a tenth"):
         taken, ended = run(steps)
     assert len(taken) == 2
@@ -91,10 +92,10 @@ def test_advance_that_becomes_too_short_ends_the_run(monkeypatch):
         (lambda dK, R: 1.0, r"returned shape \(\) for 1 tips"),
     ],
 )
-def test_bad_law(monkeypatch, law, words):
-    patch_respond(monkeypatch, mode_I())
+def test_bad_law(law, words):
+    response = formula(mode_I())
     with pytest.raises(ProblemError, match=words):
-        next(grow(plate(), law, max_hoop_stress, CYCLE, da=2.0))
+        next(grow(plate(), law, max_hoop_stress, CYCLE, da=2.0, response=response))
 
 
 @pytest.mark.parametrize(
@@ -110,10 +111,10 @@ def test_bad_law(monkeypatch, law, words):
         (lambda K, nu: (0 * K[0, :, 0], -K[1, :, 0], K[0, :, 0]), "negative range"),
     ],
 )
-def test_bad_criterion(monkeypatch, criterion, words):
-    patch_respond(monkeypatch, mode_I())
+def test_bad_criterion(criterion, words):
+    response = formula(mode_I())
     with pytest.raises(ProblemError, match=words):
-        next(grow(plate(), LAW, criterion, CYCLE, da=2.0))
+        next(grow(plate(), LAW, criterion, CYCLE, da=2.0, response=response))
 
 
 @pytest.mark.parametrize(
@@ -149,28 +150,28 @@ def test_bad_arguments():
         grow(plate(), LAW, max_hoop_stress, CYCLE, da=1.0, progress="often")
 
 
-def test_what_a_law_or_a_criterion_raises_names_where_it_was_called(monkeypatch):
+def test_what_a_law_or_a_criterion_raises_names_where_it_was_called():
     def broken(*arguments):
         raise ZeroDivisionError("mine")
 
-    patch_respond(monkeypatch, mode_I())
+    response = formula(mode_I())
     for law, criterion, words in (
         (broken, max_hoop_stress, "the growth rates of crack 0"),
         (LAW, broken, "the directions of crack 0"),
     ):
         with pytest.raises(ZeroDivisionError, match="mine") as caught:
-            next(grow(plate(), law, criterion, CYCLE, da=2.0))
+            next(grow(plate(), law, criterion, CYCLE, da=2.0, response=response))
         assert any(words in note for note in caught.value.__notes__)
 
 
-def test_a_law_may_change_the_arrays_it_gets(monkeypatch):
+def test_a_law_may_change_the_arrays_it_gets():
     def careless(dK, R):
         dK -= 1.0
         dK[dK < 0] = 0.0
         return 1e-11 * dK**3
 
-    patch_respond(monkeypatch, mode_I())
-    step = next(grow(plate(), careless, max_hoop_stress, CYCLE, da=2.0))
+    response = formula(mode_I())
+    step = next(grow(plate(), careless, max_hoop_stress, CYCLE, da=2.0, response=response))
     assert step.dK_eq[0][0] == pytest.approx(STRESS * np.sqrt(np.pi * 5.0), rel=1e-12)
 
 
@@ -183,10 +184,10 @@ def forman(dK, R, K_c=600.0):
     return np.where(left > 0, 1e-9 * dK**3 / np.where(left > 0, left, 1.0), np.inf)
 
 
-def test_a_law_without_a_finite_rate_ends_the_run(monkeypatch):
+def test_a_law_without_a_finite_rate_ends_the_run():
     """K_c between the lengths 11 and 13: the last step is there, its rate inf, its advance 0."""
-    patch_respond(monkeypatch, mode_I())
-    steps, ended = run(grow(plate(), forman, max_hoop_stress, CYCLE, da=2.0))
+    response = formula(mode_I())
+    steps, ended = run(grow(plate(), forman, max_hoop_stress, CYCLE, da=2.0, response=response))
     assert ended.startswith("K_c reached: the law returned da/dN = inf for dK_eq = 639.")
     assert "crack 0, tip 0 at (13, 0.37)" in ended
     last, before = steps[-1], steps[-2]
@@ -196,10 +197,10 @@ def test_a_law_without_a_finite_rate_ends_the_run(monkeypatch):
     assert last.cycles - before.cycles == pytest.approx(1.0 / before.rate[0][0], rel=1e-12)
 
 
-def test_a_first_step_beyond_the_toughness(monkeypatch):
-    patch_respond(monkeypatch, mode_I())
+def test_a_first_step_beyond_the_toughness():
+    response = formula(mode_I())
     law = lambda dK, R: forman(dK, R, 10.0)  # noqa: E731
-    steps, ended = run(grow(plate(), law, max_hoop_stress, CYCLE, da=2.0))
+    steps, ended = run(grow(plate(), law, max_hoop_stress, CYCLE, da=2.0, response=response))
     assert (len(steps), steps[0].cycles) == (1, 0)
     assert ended.startswith("K_c reached")
 
@@ -219,11 +220,11 @@ def test_a_first_step_beyond_the_toughness(monkeypatch):
     ],
     ids=["elber", "walker", "own", "R = 0", "walker as paris", "paris"],
 )
-def test_a_negative_ratio_is_warned_of_where_the_law_depends_on_it(monkeypatch, law, cycle, warned):
-    patch_respond(monkeypatch, lambda problem, c: [[100.0, 0.0]])
+def test_a_negative_ratio_is_warned_of_where_the_law_depends_on_it(law, cycle, warned):
+    response = formula(lambda problem, c: [[100.0, 0.0]])
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        next(grow(plate(), law, max_hoop_stress, cycle, da=2.0))
+        next(grow(plate(), law, max_hoop_stress, cycle, da=2.0, response=response))
     texts = [str(w.message) for w in caught if "the cycle has R = -" in str(w.message)]
     assert len(texts) == warned
 
@@ -232,22 +233,20 @@ def test_a_negative_ratio_is_warned_of_where_the_law_depends_on_it(monkeypatch, 
 
 
 @pytest.mark.parametrize("stop", [None, 3])
-def test_a_repeated_warning_is_summarised_once(monkeypatch, stop):
+def test_a_repeated_warning_is_summarised_once(stop):
     """Each kind when it comes first, and one summary, whether the run ends or is left."""
-    patch_respond(monkeypatch, mode_I())
-    whole = growth.respond
+    whole = formula(mode_I())
 
-    def respond(problem, *rest):
+    def response(problem, *rest):
         a = float(problem.placed[0].points[-1, 0])
         warn(f"K at [{a}, 0.37]: the domain is clipped to {1 / a:.4g} (2.3 cells)")
         if a > 12:
             warn("a crack is long")
         return whole(problem, *rest)
 
-    monkeypatch.setattr(growth, "respond", respond)
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        steps = grow(plate(), LAW, max_hoop_stress, CYCLE, da=2.0, max_steps=6)
+        steps = grow(plate(), LAW, max_hoop_stress, CYCLE, da=2.0, max_steps=6, response=response)
         for step in steps:
             if step.index == stop:
                 break
@@ -262,13 +261,13 @@ def test_a_repeated_warning_is_summarised_once(monkeypatch, stop):
     assert ("a crack is long" in texts[-1]) == (stop is None)
 
 
-def test_a_warning_that_comes_once_is_not_in_the_summary(monkeypatch):
+def test_a_warning_that_comes_once_is_not_in_the_summary():
     """R < 0 is warned of at first, K_I < 0 of the state -1 in each step."""
-    patch_respond(monkeypatch, mode_I())
+    response = formula(mode_I())
     law, cycle = elber(1e-11, 3.0, 0.5, 0.4), Cycle(-1, 1)
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        run(grow(plate(), law, max_hoop_stress, cycle, 2.0, max_steps=3))
+        run(grow(plate(), law, max_hoop_stress, cycle, 2.0, max_steps=3, response=response))
     first, second, summary = (str(w.message) for w in caught)
     assert first.startswith("K_I < 0 in 1 of 2 values")
     assert second.startswith("the cycle has R = -1")
@@ -276,11 +275,11 @@ def test_a_warning_that_comes_once_is_not_in_the_summary(monkeypatch):
     assert "the cycle has R" not in summary
 
 
-def test_a_kind_that_is_ignored_is_not_in_the_summary(monkeypatch):
-    patch_respond(monkeypatch, mode_I())
+def test_a_kind_that_is_ignored_is_not_in_the_summary():
+    response = formula(mode_I())
     law, cycle = elber(1e-11, 3.0, 0.5, 0.4), Cycle(-1, 1)
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         warnings.filterwarnings("ignore", "K_I < 0", XcrackWarning)
-        run(grow(plate(), law, max_hoop_stress, cycle, 2.0, max_steps=3))
+        run(grow(plate(), law, max_hoop_stress, cycle, 2.0, max_steps=3, response=response))
     assert [str(w.message)[:19] for w in caught] == ["the cycle has R = -"]

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import xcrack as xc
-from support.growth_fakes import STRESS, mode_I, patch_respond, plate
+from support.growth_fakes import STRESS, formula, mode_I, plate
 
 LAW = xc.paris(C=1e-12, m=3.0)
 CYCLE = xc.Cycle(0.0, 1.0)
@@ -25,13 +25,13 @@ def two(gap=8.0):
     return plate([xc.line_crack(line) for line in lines])
 
 
-def test_two_tips_link_up_by_the_formula_of_swift(monkeypatch):
+def test_two_tips_link_up_by_the_formula_of_swift():
     """σ_link = σ_y √(2 L / (a β_a² + b β_b²)): Swift's criterion solved for the stress.
 
     Here K = σ √(π a) for the whole length a of each crack: β = 1.
     """
-    patch_respond(monkeypatch, mode_I())
-    history = run(two())
+    response = formula(mode_I())
+    history = run(two(), response=response)
     assert history.ended.startswith("ligament yield: the plastic zones of crack 1, tip 0 at (")
     assert "of crack 0, tip 0 at (" in history.ended
     assert "between them" in history.ended
@@ -44,18 +44,18 @@ def test_two_tips_link_up_by_the_formula_of_swift(monkeypatch):
     assert min(strength[:-1]) > STRESS >= strength[-1]
 
 
-def test_without_zones_the_same_run_goes_on(monkeypatch):
-    patch_respond(monkeypatch, mode_I())
-    with_zone, without = run(two()), run(two(), link_up=None)
+def test_without_zones_the_same_run_goes_on():
+    response = formula(mode_I())
+    with_zone, without = run(two(), response=response), run(two(), link_up=None, response=response)
     assert with_zone.ended.startswith("ligament yield")
     assert len(without.steps) >= len(with_zone.steps)
     assert not without.ended.startswith("ligament yield")
 
 
-def test_one_tip_and_the_side(monkeypatch):
+def test_one_tip_and_the_side():
     """The zone (K/σ_y)²/2π = a (σ/σ_y)²/2 reaches the side where a (1 + 1/8) = 60."""
-    patch_respond(monkeypatch, mode_I())
-    history = run(plate(), da=4.0)
+    response = formula(mode_I())
+    history = run(plate(), da=4.0, response=response)
     a = [step.sif[1][0].x[0, 0] for step in history.steps]
     assert a[-2] < 60 / (1 + 1 / 8) <= a[-1]
     zone = a[-1] / 8
@@ -63,19 +63,19 @@ def test_one_tip_and_the_side(monkeypatch):
     assert history.ended.endswith(f", {zone:.4g}, fills the {60 - a[-1]:.4g} to 'right'")
 
 
-def test_one_tip_and_the_flank_of_another_crack(monkeypatch):
+def test_one_tip_and_the_flank_of_another_crack():
     across = xc.line_crack([(25.3, -8.0), (25.3, 9.0)])
-    patch_respond(monkeypatch, mode_I(stress=10.0))
+    response = formula(mode_I(stress=10.0))
     first = xc.line_crack([(0.0, 0.37), (20.0, 0.37)])
-    history = run(plate([first, across]), link_up=lambda K: 0.01 * K)
+    history = run(plate([first, across]), link_up=lambda K: 0.01 * K, response=response)
     assert " to crack 1" in history.ended or " to crack 0" in history.ended
 
 
-def test_tips_that_have_passed_each_other_do_not_link_up(monkeypatch):
+def test_tips_that_have_passed_each_other_do_not_link_up():
     lines = [[(0.0, 3.37), (30.0, 3.37)], [(20.0, -3.37), (60.0, -3.37)]]
-    patch_respond(monkeypatch, mode_I(stress=10.0))
+    response = formula(mode_I(stress=10.0))
     cracks = [xc.line_crack(line) for line in lines]
-    history = run(plate(cracks), link_up=lambda K: 0.0 * K + 12.5, max_steps=1)
+    history = run(plate(cracks), link_up=lambda K: 0.0 * K + 12.5, max_steps=1, response=response)
     assert history.ended.startswith("max_steps")
 
 
@@ -105,10 +105,10 @@ def test_what_is_no_function_is_refused(wrong):
         run(two(), link_up=wrong)
 
 
-def test_wrong_zones_are_named(monkeypatch):
-    patch_respond(monkeypatch, mode_I())
+def test_wrong_zones_are_named():
+    response = formula(mode_I())
     with pytest.raises(xc.ProblemError, match="what link_up returned"):
-        run(two(), link_up=lambda K: np.append(K, np.nan))
+        run(two(), link_up=lambda K: np.append(K, np.nan), response=response)
 
 
 def test_a_3D_body_is_refused():

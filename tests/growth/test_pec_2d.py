@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad, solve_ivp
 
-from support.growth_fakes import STRESS, patch_respond, plate
+from support.growth_fakes import STRESS, formula, plate
 from support.growth_runs import *  # noqa: F403 - fixtures come by name
 from support.growth_runs import run_of as stored_run
 from xcrack.base.errors import ProblemError
@@ -54,9 +54,9 @@ def along_a_field(problem, c):
     return [[K_I, -K_I * np.sin(angle) / (3 * np.cos(angle) - 1)]]
 
 
-def test_path_and_life_are_of_second_order(monkeypatch):
+def test_path_and_life_are_of_second_order():
     """Against the path and life of the field to round-off: no mesh is in it."""
-    patch_respond(monkeypatch, along_a_field)
+    response = formula(along_a_field)
     G = 30.0
 
     def slope(s, z):
@@ -70,7 +70,7 @@ def test_path_and_life_are_of_second_order(monkeypatch):
         error, life = [], []
         for n in steps:
             options = {"da": G / n, "max_steps": int(n) + 1, "integrator": name}
-            step = end_of(plate(), **options)
+            step = end_of(plate(), **options, response=response)
             tip = tip_frames(step.corrected[0])[0][0]
             error.append(np.linalg.norm(tip - exact[:2]) / G)
             life.append(abs(step.cycles / exact[2] - 1))
@@ -93,9 +93,9 @@ def of_length(*factors):
 
 
 @pytest.mark.parametrize(("da", "aim"), [(0.16, 0.03), (0.08, 0.01)])
-def test_a_slow_tip_beside_a_fast_one(monkeypatch, da, aim):
+def test_a_slow_tip_beside_a_fast_one(da, aim):
     """Two cracks whose rates are known: da_2/da_1 = 0.9^3 (a_2/a_1)^(3/2), a_1 from 5 to 15."""
-    patch_respond(monkeypatch, of_length(STRESS, 0.9 * STRESS))
+    response = formula(of_length(STRESS, 0.9 * STRESS))
     begin, end = 5.0, 5.0 + 10.0
     problem = plate([line_crack([(0, y), (begin, y)]) for y in (8.3, -8.3)])
     # separable: a_2^(-1/2) = b^(-1/2) - 0.9³ (b^(-1/2) - a_1^(-1/2))
@@ -103,7 +103,7 @@ def test_a_slow_tip_beside_a_fast_one(monkeypatch, da, aim):
     n = round(10.0 / (5.0 * da))
     error = {}
     for name in ("euler", "pec"):
-        step = end_of(problem, da=10.0 / n, max_steps=n + 1, integrator=name)
+        step = end_of(problem, da=10.0 / n, max_steps=n + 1, integrator=name, response=response)
         grown = [length_of(crack) - begin for crack in step.corrected]
         assert grown[0] == pytest.approx(10.0, rel=1e-12)
         error[name] = grown[1] / (slow - begin) - 1
@@ -112,18 +112,18 @@ def test_a_slow_tip_beside_a_fast_one(monkeypatch, da, aim):
     assert abs(error["euler"]) > aim
 
 
-def test_a_tip_that_is_overtaken_is_no_event(monkeypatch):
+def test_a_tip_that_is_overtaken_is_no_event():
     """The driver changes within a step; lengths and life against the exact ones."""
 
     def K_of(problem, c):
         a = length_of(problem.placed[c])
         return [[(10.0, 6.0)[c] * (a / 5.0) ** (0.0, 1.0)[c], 0.0]]
 
-    patch_respond(monkeypatch, K_of)
+    response = formula(K_of)
     problem = plate([line_crack([(0, y), (5.0, y)]) for y in (8.3, -8.3)])
     error = []
     for da in (1.5, 0.75):
-        step = end_of(problem, da=da, max_steps=round(15 / da) + 1)
+        step = end_of(problem, da=da, max_steps=round(15 / da) + 1, response=response)
         first, second = (length_of(crack) for crack in step.corrected)
         N, _ = quad(lambda a: 1 / LAW(6.0 * a / 5.0, 0.0), 5.0, second)
         error.append(abs(step.cycles / N - 1))
@@ -146,11 +146,11 @@ def leaving(problem, c):
     return [[(10.0 + 0.2 * x) * (1.3 if gone else 1.0) if c == 0 else 12.0, 0.0]]
 
 
-def test_a_tip_that_leaves_ends_what_its_solves_can_say(monkeypatch):
+def test_a_tip_that_leaves_ends_what_its_solves_can_say():
     """Cycles until it leaves by the rates before, from there by those of the other."""
-    patch_respond(monkeypatch, leaving)
+    response = formula(leaving)
     problem = plate([line_crack([(0, 8.3), (5.0, 8.3)]), line_crack([(0, -8.3), (52.0, -8.3)])])
-    step = end_of(problem, da=3.0, max_steps=6)
+    step = end_of(problem, da=3.0, max_steps=6, response=response)
     assert [crack.n_tips for crack in step.cracks] == [1, 0]
     x = tip_frames(step.corrected[0])[0][0, 0]
     exit_ = 8.0 / LAW(12.0, 0.0)
@@ -167,14 +167,14 @@ def test_a_tip_that_leaves_ends_what_its_solves_can_say(monkeypatch):
     assert step.memory.trail.n_solves == 3
 
 
-def test_an_infinite_rate_at_the_end_of_a_step(monkeypatch):
+def test_an_infinite_rate_at_the_end_of_a_step():
     """The inverse of the rate falls to zero: half of what the first rate says."""
-    patch_respond(monkeypatch, of_length(STRESS))
+    response = formula(of_length(STRESS))
 
     def law(dK, R):
         return np.where(dK > 500.0, np.inf, LAW(dK, R))
 
-    run = grow(plate(), law, max_hoop_stress, CYCLE, da=4.0, progress=False)
+    run = grow(plate(), law, max_hoop_stress, CYCLE, da=4.0, progress=False, response=response)
     history = collect(run)
     assert history.ended.startswith("K_c reached")
     assert len(history.steps) == 2
@@ -182,10 +182,10 @@ def test_an_infinite_rate_at_the_end_of_a_step(monkeypatch):
     assert length_of(history.cracks[0]) == pytest.approx(9.0)
 
 
-def test_a_short_last_face_is_moved_on(monkeypatch):
+def test_a_short_last_face_is_moved_on():
     """Advances of a third of a cell, 1.41: no face but the last is shorter than half a cell."""
-    patch_respond(monkeypatch, along_a_field)
-    step = end_of(plate(), da=0.47, max_steps=14)
+    response = formula(along_a_field)
+    step = end_of(plate(), da=0.47, max_steps=14, response=response)
     face = np.linalg.norm(np.diff(step.corrected[0].points, axis=0), axis=1)
     assert (face[1:-1] >= 0.705).all()
     assert len(face) == 8
@@ -193,12 +193,12 @@ def test_a_short_last_face_is_moved_on(monkeypatch):
 
 
 @pytest.mark.filterwarnings("ignore:the advance .* below one cell")
-def test_a_first_kink_begins_in_its_limit(monkeypatch):
+def test_a_first_kink_begins_in_its_limit():
     def K_of(problem, c):
         return [[0.0, 100.0]] if len(problem.placed[c].points) == 2 else [[100.0, 0.0]]
 
-    patch_respond(monkeypatch, K_of)
-    step = end_of(plate(), da=2.0, max_steps=1)
+    response = formula(K_of)
+    step = end_of(plate(), da=2.0, max_steps=1, response=response)
     direction = step.memory.trail.direction[0, 0]
     assert np.degrees(direction) == pytest.approx(-77.33, abs=5e-3)
     assert np.degrees(step.angle[0][0]) == pytest.approx(-70.53, abs=5e-3)  # what K says
@@ -223,7 +223,7 @@ def test_steps_say_how_they_were_solved_and_corrected(whole):
     assert moved[0] == 0 < min(moved[1:])
 
 
-def test_a_run_of_the_first_set_of_defaults_goes_on_by_eulers_rule(formula, tmp_path):
+def test_a_run_of_the_first_set_of_defaults_goes_on_by_eulers_rule(tmp_path):
     run = Run(**stored_run())
     assert run.integrator == "pec"
     begun = run.as_begun({"defaults": "1"})

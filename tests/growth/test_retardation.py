@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import PchipInterpolator
 
-from support.growth_fakes import STRESS, mode_I, patch_respond, plate
+from support.growth_fakes import STRESS, formula, mode_I, plate
 from xcrack.base.errors import ProblemError
 from xcrack.crack.lines import line_crack
 from xcrack.crack.surfaces import penny_crack
@@ -46,32 +46,33 @@ def steps_of(model, spectrum=OVERLOAD, problem=None, law=LAW, **options):
         willenborg(2.5, 100.0, ZONES),
     ],
 )
-def test_one_tip_against_its_stored_path(monkeypatch, model):
+def test_one_tip_against_its_stored_path(model):
     """Cycle by cycle along a run without retardation; its K is a line from step to step."""
-    patch_respond(monkeypatch, mode_I())
-    plain = History(tuple(steps_of(None)), "")
-    steps = steps_of(model)
+    response = formula(mode_I())
+    plain = History(tuple(steps_of(None, response=response)), "")
+    steps = steps_of(model, response=response)
     along = retarded(plain, LAW, OVERLOAD, model, nu=0.3)
     assert steps[-1].cycles == pytest.approx(along.life, rel=2e-3)
     assert steps[-1].cycles > 1.5 * plain.life
     assert np.allclose(steps[-1].cracks[0].points, plain.steps[-1].cracks[0].points)
 
 
-def test_an_exponent_of_nothing_is_no_retardation(monkeypatch):
+def test_an_exponent_of_nothing_is_no_retardation():
     """Cycle by cycle against block rates: what a block grows is small against the crack."""
-    patch_respond(monkeypatch, mode_I())
-    plain, other = steps_of(None), steps_of(wheeler(1e-9, ZONES))
+    response = formula(mode_I())
+    plain, other = (
+        steps_of(None, response=response),
+        steps_of(wheeler(1e-9, ZONES), response=response),
+    )
     for a, b in zip(plain, other, strict=True):
         assert b.cycles == pytest.approx(a.cycles, rel=5e-4)  # 0.05 blocks: where it ends
 
 
-def constant(monkeypatch):
-    patch_respond(monkeypatch, mode_I(factor=lambda a: 4.0))
+CONSTANT = formula(mode_I(factor=lambda a: 4.0))
 
 
-def test_delay_of_wheeler_in_closed_form(monkeypatch):
+def test_delay_of_wheeler_in_closed_form():
     """K constant: the zone is left after an integral; the rest of the way is at the law's rate."""
-    constant(monkeypatch)
     factors = np.tile([0.0, 1.0], 60_000)
     factors[1] = 2.0
     model, K = wheeler(1.5, ZONES), 4.0 * STRESS
@@ -79,43 +80,45 @@ def test_delay_of_wheeler_in_closed_form(monkeypatch):
     left = zone - 8 * rate  # after the overload has grown too
     delay = (left ** (w + 1) - own ** (w + 1)) / ((w + 1) * own**w * rate)
     da = zone - own + 2.0
-    step = steps_of(model, Spectrum(factors), da=da, max_steps=2)[1]
+    step = steps_of(model, Spectrum(factors), da=da, max_steps=2, response=CONSTANT)[1]
     cycles = 1 + delay + 2.0 / rate
     assert cycles < 60_000
     assert step.cycles * 60_000 == pytest.approx(cycles, rel=2e-4)  # a cycle is no differential
 
 
-def test_willenborg_at_shut_off(monkeypatch):
+def test_willenborg_at_shut_off():
     """An overload of the ratio that stops the crack: nothing but the overloads grows."""
-    constant(monkeypatch)
     model = willenborg(2.0, 0.0, ZONES)
     rate = LAW.C * (8.0 * STRESS) ** 3
-    step = steps_of(model, Spectrum([0.0, 2.0, *[0.0, 1.0] * 50]), max_steps=2)[1]
+    spectrum = Spectrum([0.0, 2.0, *[0.0, 1.0] * 50])
+    step = steps_of(model, spectrum, max_steps=2, response=CONSTANT)[1]
     whole, part = divmod(1.0 / rate, 1.0)  # the step ends within an overload, the first of 51
     assert step.cycles == pytest.approx(whole + part / 51, rel=1e-4)
 
 
-def test_each_tip_has_its_own_zone(monkeypatch):
+def test_each_tip_has_its_own_zone():
     """Two cracks whose K does not know of the other: each like alone, at the same blocks."""
-    patch_respond(monkeypatch, mode_I())
+    response = formula(mode_I())
     lines = [line_crack([(0.0, y), (x, y)]) for x, y in ((5.0, 8.37), (3.0, -8.37))]
     model = wheeler(1.0, ZONES)
-    both = steps_of(model, problem=plate(lines))
+    both = steps_of(model, problem=plate(lines), response=response)
     for c, line in enumerate(lines):
-        alone = steps_of(model, problem=plate([line]), max_steps=9, da=0.5 if c else 1.0)
+        alone = steps_of(
+            model, problem=plate([line]), max_steps=9, da=0.5 if c else 1.0, response=response
+        )
         blocks = [step.cycles for step in alone]
         lengths = [float(step.corrected[0].points[:, 0].max()) for step in alone]
         length = float(both[-1].corrected[c].points[:, 0].max())
         assert np.interp(both[-1].cycles, blocks, lengths) == pytest.approx(length, abs=0.01)
 
 
-def test_blocks_of_a_step_as_asked(monkeypatch):
-    patch_respond(monkeypatch, mode_I())
-    steps = steps_of(wheeler(1.0, ZONES), da=None, cycles=250.0, max_steps=5)
+def test_blocks_of_a_step_as_asked():
+    response = formula(mode_I())
+    steps = steps_of(wheeler(1.0, ZONES), da=None, cycles=250.0, max_steps=5, response=response)
     blocks = np.diff([step.cycles for step in steps])
     assert np.allclose(blocks[1:], 250.0, rtol=2e-3)
     assert blocks[0] == pytest.approx(250.0, rel=0.1)  # of one solve only
-    by_length = steps_of(wheeler(1.0, ZONES), da=0.4, max_steps=9)
+    by_length = steps_of(wheeler(1.0, ZONES), da=0.4, max_steps=9, response=response)
     at = np.interp(
         [step.cycles for step in steps],
         [step.cycles for step in by_length],
@@ -124,22 +127,24 @@ def test_blocks_of_a_step_as_asked(monkeypatch):
     assert np.allclose([step.corrected[0].points[-1, 0] for step in steps], at, atol=0.02)
 
 
-def test_a_tip_leaves_the_body_and_the_other_goes_on(monkeypatch):
-    patch_respond(monkeypatch, mode_I())
+def test_a_tip_leaves_the_body_and_the_other_goes_on():
+    response = formula(mode_I())
     lines = [line_crack([(0.0, 8.37), (58.0, 8.37)]), line_crack([(0.0, -8.37), (3.0, -8.37)])]
-    steps = steps_of(wheeler(1.0, ZONES), problem=plate(lines), da=1.5, max_steps=6)
+    steps = steps_of(
+        wheeler(1.0, ZONES), problem=plate(lines), da=1.5, max_steps=6, response=response
+    )
     assert len(steps) == 6
     assert steps[-1].cracks[0].n_tips == 0
     assert steps[-1].cycles > steps[3].cycles > 0
 
 
 @pytest.mark.filterwarnings("ignore::xcrack.XcrackWarning")
-def test_steps_of_a_tolerance(monkeypatch):
+def test_steps_of_a_tolerance():
     """Steps that choose their own length, against short ones."""
-    patch_respond(monkeypatch, mode_I())
+    response = formula(mode_I())
     model = wheeler(1.0, ZONES)
-    chosen = steps_of(model, da=None, tolerance=1e-2, max_steps=3)
-    short = steps_of(model, da=0.4, max_steps=6)
+    chosen = steps_of(model, da=None, tolerance=1e-2, max_steps=3, response=response)
+    short = steps_of(model, da=0.4, max_steps=6, response=response)
     at = PchipInterpolator(
         [step.corrected[0].points[-1, 0] for step in short], [step.cycles for step in short]
     )
@@ -148,9 +153,9 @@ def test_steps_of_a_tolerance(monkeypatch):
     assert chosen[-1].cycles == pytest.approx(float(at(length)), rel=2e-3)
 
 
-def test_other_lives_want_a_history_without(monkeypatch):
-    patch_respond(monkeypatch, mode_I())
-    history = History(tuple(steps_of(wheeler(1.0, ZONES), max_steps=3)), "")
+def test_other_lives_want_a_history_without():
+    response = formula(mode_I())
+    history = History(tuple(steps_of(wheeler(1.0, ZONES), max_steps=3, response=response)), "")
     given = {"spectrum": OVERLOAD, "criterion": max_hoop_stress, "nu": 0.3}
     for ask in (
         lambda: retarded(history, LAW, OVERLOAD, None, nu=0.3),
@@ -162,12 +167,12 @@ def test_other_lives_want_a_history_without(monkeypatch):
 
 
 @pytest.mark.filterwarnings("ignore::xcrack.XcrackWarning")
-def test_threshold_of_the_run(monkeypatch):
+def test_threshold_of_the_run():
     """Small cycles below it do not grow, with or without retardation."""
-    patch_respond(monkeypatch, mode_I())
+    response = formula(mode_I())
     model = wheeler(1.0, ZONES)
-    steps = steps_of(model, threshold=250.0, max_steps=3)
-    alone = steps_of(None, OVERLOAD.omit(0.9), max_steps=3)
+    steps = steps_of(model, threshold=250.0, max_steps=3, response=response)
+    alone = steps_of(None, OVERLOAD.omit(0.9), max_steps=3, response=response)
     assert steps[-1].cycles == pytest.approx(alone[-1].cycles, rel=1e-3)
 
 
@@ -181,17 +186,17 @@ def same(one, other):
             assert np.array_equal(x.points, y.points)
 
 
-def test_resumed_to_the_bit(monkeypatch, tmp_path):
-    patch_respond(monkeypatch, mode_I())
+def test_resumed_to_the_bit(tmp_path):
+    response = formula(mode_I())
     arguments = (plate(), LAW, max_hoop_stress, OVERLOAD)
     options = {"da": 1.0, "progress": False, "retardation": willenborg(2.5, 10.0, ZONES)}
-    whole = collect(grow(*arguments, **options, max_steps=5))
+    whole = collect(grow(*arguments, **options, max_steps=5, response=response))
     folder = tmp_path / "part"
-    collect(grow(*arguments, **options, max_steps=2), path=folder)
-    same(whole, resume(folder, *arguments, **options, max_steps=5))
+    collect(grow(*arguments, **options, max_steps=2, response=response), path=folder)
+    same(whole, resume(folder, *arguments, **options, max_steps=5, response=response))
     changed = {**options, "retardation": willenborg(2.4, 10.0, ZONES)}
     with pytest.raises(ProblemError, match=r"retardation\.shutoff: stored 2\.5, given 2\.4"):
-        resume(folder, *arguments, **changed, max_steps=6)
+        resume(folder, *arguments, **changed, max_steps=6, response=response)
 
 
 @pytest.mark.parametrize(
@@ -264,10 +269,13 @@ def test_a_front(tmp_path):
     same(History(tuple(steps[1.0]), ""), rest)
 
 
-def test_what_a_step_carries(monkeypatch):
+def test_what_a_step_carries():
     """Its rate is that of the law; what overloads left is in its memory."""
-    patch_respond(monkeypatch, mode_I())
-    plain, slow = steps_of(None)[2], steps_of(wheeler(1.0, ZONES))[2]
+    response = formula(mode_I())
+    plain, slow = (
+        steps_of(None, response=response)[2],
+        steps_of(wheeler(1.0, ZONES), response=response)[2],
+    )
     assert slow.rate[0] == pytest.approx(plain.rate[0], rel=1e-9)
     zones = slow.memory.trail.overloads.zones
     assert [f.name for f in fields(zones)] == ["since", "size", "K", "position", "part"]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from support import exact
-from support.growth_fakes import mode_I, patch_respond, plate
+from support.growth_fakes import formula, mode_I, plate
 from xcrack.base.errors import ProblemError, XcrackWarning
 from xcrack.crack.lines import line_crack
 from xcrack.crack.surfaces import penny_crack
@@ -15,10 +15,8 @@ from xcrack.fatigue.criteria import max_hoop_stress, weighted_angle
 from xcrack.fatigue.power import paris, walker
 from xcrack.fatigue.spectrum import Spectrum, scaled
 from xcrack.fatigue.thresholds import klesnil_lukas
-from xcrack.growth import levels
-from xcrack.growth import levels as ladder
-from xcrack.growth.levels import factors_of, ladders
-from xcrack.growth.rates import respond_to_cycle
+from xcrack.growth.levels import ladders
+from xcrack.growth.response import Response, respond
 from xcrack.growth.run import grow
 from xcrack.growth.step import Cycle
 from xcrack.linalg.reuse import Reuse
@@ -93,11 +91,11 @@ def test_scaled_histories_need_two_states(contact):
     """K at any factor against a solve of its own: round-off of the solver."""
     problem = scene(contact=contact)
     spectrum = Spectrum(history(300))
-    solutions, sif, _ = respond_to_cycle(problem, spectrum, None, Reuse())
-    assert factors_of(solutions).tolist() == [-0.3, 1.0]
-    (ladder,) = ladders(problem, spectrum, factors_of(solutions), sif)
+    step = first(spectrum, problem)
+    assert step.levels == (-0.3, 1.0)
+    (ladder,) = ladders(problem, spectrum, Response(step.levels, step.sif))
     wanted = np.array([-0.2, -0.01, 0.0, 0.03, 0.77])
-    _, solved, _ = respond_to_cycle(problem, Cycle(states=[-0.2, 0.03, 0.77]), None, Reuse())
+    solved = respond(problem, [-0.2, 0.03, 0.77], Reuse()).sif
     K = ladder.at(wanted)
     for k, state in zip((0, 3, 4), solved):
         assert np.allclose(K[k], state[0].K, rtol=1e-8, atol=1e-7)
@@ -141,21 +139,16 @@ def test_growth_of_a_block_is_that_of_801_levels(stress):
 
 
 @COARSE
-def test_a_step_begins_with_the_levels_of_the_one_before(monkeypatch):
+def test_a_step_begins_with_the_levels_of_the_one_before():
     """One solve of many levels a step, but for the first; dropped where they do not matter."""
     rounds = []
-    solve = levels.refined
 
-    def counted(problem, spectrum, first, respond, reuse):
-        def once(states, reuse):
-            rounds.append(len(states))
-            return respond(states, reuse)
+    def counted(problem, states, reuse, bars):
+        rounds.append(len(states))
+        return respond(problem, states, reuse, bars)
 
-        return solve(problem, spectrum, first, once, reuse)
-
-    monkeypatch.setattr(ladder, "refined", counted)
     spectrum = Spectrum(history(500), steady=bending(60.0))
-    options = {"da": 0.3, "max_steps": 3, "progress": False}
+    options = {"da": 0.3, "max_steps": 3, "progress": False, "response": counted}
     steps = list(grow(scene(), LAW, max_hoop_stress, spectrum, **options))
     first = rounds.index(max(rounds))
     assert rounds[0] == 5
@@ -175,8 +168,8 @@ def test_scaled_loads_add_up():
     """The whole state by a list of scaled loads, and by a factor."""
     problem = scene(contact="off", loads=[*tension(100.0), *bending(30.0)])
     half = [scaled(load, 0.5) for load in problem.loads]
-    by_list = respond_to_cycle(problem, Cycle(states=[half]), None, Reuse())[1]
-    by_factor = respond_to_cycle(problem, Cycle(states=[0.5]), None, Reuse())[1]
+    by_list = respond(problem, [half], Reuse()).sif
+    by_factor = respond(problem, [0.5], Reuse()).sif
     assert np.allclose(by_list[0][0].K, by_factor[0][0].K, rtol=1e-11)
 
 
@@ -185,7 +178,7 @@ def test_scaled_loads_add_up():
 ROWS = [(0.0, 90.0, 10.0), (0.0, 80.0, 100.0), (0.0, 60.0, 1.0)]
 
 
-def test_life_of_blocks(monkeypatch):
+def test_life_of_blocks():
     """Closed form with Δσ_eq = (Σ n Δσ^m / Σ n)^(1/m) = 80.869825; and its own worked number."""
     counts, stress = np.array([10, 100, 1]), np.array([90.0, 80.0, 60.0])
     equal = (counts @ stress**3 / counts.sum()) ** (1 / 3)
@@ -193,20 +186,32 @@ def test_life_of_blocks(monkeypatch):
     assert exact.paris_life(1e-3, 20e-3, 1e-11, 3.0, equal) / 111 == pytest.approx(
         15021.193, abs=1e-3
     )
-    patch_respond(monkeypatch, mode_I(stress=1.0))
-    steps = list(grow(plate(), LAW, max_hoop_stress, Spectrum(rows=ROWS), da=5.0, max_steps=9))
+    response = formula(mode_I(stress=1.0))
+    steps = list(
+        grow(
+            plate(),
+            LAW,
+            max_hoop_stress,
+            Spectrum(rows=ROWS),
+            da=5.0,
+            max_steps=9,
+            response=response,
+        )
+    )
     assert len(steps) == 9
     for step in steps[1:]:
         N = exact.paris_life(5.0, 5.0 + 5.0 * step.index, 1e-11, 3.0, equal) / 111
         assert step.cycles == pytest.approx(N, rel=1e-9)
 
 
-def test_eight_steps_of_block_rates_against_block_by_block(monkeypatch):
+def test_eight_steps_of_block_rates_against_block_by_block():
     """With a threshold rates are no power of the length; promised: 0.2 %."""
     law = paris(1e-12, 3.0, threshold=klesnil_lukas(100.0, 0.0), approach=1.0)
-    patch_respond(monkeypatch, mode_I(stress=1.0))
+    response = formula(mode_I(stress=1.0))
     spectrum = Spectrum(rows=ROWS)
-    steps = list(grow(plate(), law, max_hoop_stress, spectrum, da=2.0, max_steps=9))
+    steps = list(
+        grow(plate(), law, max_hoop_stress, spectrum, da=2.0, max_steps=9, response=response)
+    )
     a, blocks = 5.0, 0
     while a < 5.0 + 2.0 * 8:
         a += sum(n * float(law(high * np.sqrt(np.pi * a), 0.0)) for _, high, n in ROWS)
@@ -214,32 +219,34 @@ def test_eight_steps_of_block_rates_against_block_by_block(monkeypatch):
     assert steps[-1].cycles == pytest.approx(blocks, rel=2e-3)
 
 
-def test_the_stricter_threshold_acts_cycle_by_cycle(monkeypatch):
-    patch_respond(monkeypatch, mode_I(stress=1.0))
+def test_the_stricter_threshold_acts_cycle_by_cycle():
+    response = formula(mode_I(stress=1.0))
     root = np.sqrt(np.pi * 5.0)
-    step = first(Spectrum(rows=ROWS), plate(), threshold=85.0 * root)
+    step = first(Spectrum(rows=ROWS), plate(), threshold=85.0 * root, response=response)
     assert step.rate[0] == pytest.approx(10 * LAW(90.0 * root, 0.0), rel=1e-12)
     assert step.dK_eq[0] == pytest.approx(90.0 * root, rel=1e-12)
-    step = first(Spectrum(rows=ROWS), plate(), law=paris(1e-11, 3.0, K_c=85.0 * root))
+    step = first(
+        Spectrum(rows=ROWS), plate(), law=paris(1e-11, 3.0, K_c=85.0 * root), response=response
+    )
     assert np.isinf(step.rate[0])
 
 
-def test_ratio_of_each_cycle_is_seen(monkeypatch):
+def test_ratio_of_each_cycle_is_seen():
     """Walker, one tip, by hand."""
     law, root = walker(1e-11, 3, 0.5), np.sqrt(np.pi * 5.0)
-    patch_respond(monkeypatch, mode_I(stress=1.0))
-    step = first(Spectrum([10.0, 100.0, 60.0, 80.0]), plate(), law=law)
+    response = formula(mode_I(stress=1.0))
+    step = first(Spectrum([10.0, 100.0, 60.0, 80.0]), plate(), law=law, response=response)
     by_hand = law(90.0 * root, 0.1) + law(20.0 * root, 0.75)
     assert step.rate[0] == pytest.approx(by_hand, rel=1e-12)
     assert step.R[0] == pytest.approx(0.1, rel=1e-12)
 
 
-def test_omitted_growth_warns(monkeypatch):
-    patch_respond(monkeypatch, mode_I(stress=1.0))
+def test_omitted_growth_warns():
+    response = formula(mode_I(stress=1.0))
     rows = Spectrum(rows=ROWS)
     with pytest.warns(XcrackWarning, match=r"leaves out are 0.37% of the growth"):
-        first(rows.omit(70.0), plate())  # 60³ / (10 90³ + 100 80³)
-    first(rows.omit(50.0), plate())
+        first(rows.omit(70.0), plate(), response=response)  # 60³ / (10 90³ + 100 80³)
+    first(rows.omit(50.0), plate(), response=response)
 
 
 def test_named_states():
@@ -263,19 +270,19 @@ def test_named_states():
     )
 
 
-def test_a_cycle_that_looks_like_a_history_warns(monkeypatch):
-    patch_respond(monkeypatch, mode_I(stress=1.0))
+def test_a_cycle_that_looks_like_a_history_warns():
+    response = formula(mode_I(stress=1.0))
     with pytest.warns(XcrackWarning, match="Spectrum"):
-        first(Cycle(states=[0.0, 1.0, 0.4, 0.9]), plate())
-    first(Cycle(states=[0.0, 0.5, 1.0, 0.5]), plate())
+        first(Cycle(states=[0.0, 1.0, 0.4, 0.9]), plate(), response=response)
+    first(Cycle(states=[0.0, 0.5, 1.0, 0.5]), plate(), response=response)
 
 
-def test_negative_ratios_of_a_spectrum_need_a_choice(monkeypatch):
-    patch_respond(monkeypatch, mode_I())
+def test_negative_ratios_of_a_spectrum_need_a_choice():
+    response = formula(mode_I())
     law = paris(1e-11, 3, closure=newman_closure(2.0, 0.3))
     with pytest.raises(ProblemError, match=r"R = -0\.3.*ratio"):
-        first(Spectrum([-0.3, 1.0, 0.4, 0.5]), plate(), law=law)
-    first(Spectrum([0.0, 1.0, 0.4, 0.5]), plate(), law=law)
+        first(Spectrum([-0.3, 1.0, 0.4, 0.5]), plate(), law=law, response=response)
+    first(Spectrum([0.0, 1.0, 0.4, 0.5]), plate(), law=law, response=response)
 
 
 @COARSE

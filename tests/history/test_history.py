@@ -9,6 +9,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
+from support.growth_fakes import fake_solution
 from support.growth_runs import *  # noqa: F403 - fixtures come by name
 from support.growth_runs import N_STEPS, run_of
 from xcrack.base.errors import ProblemError
@@ -95,7 +96,8 @@ def test_write_with_solutions_and_without(whole, tmp_path, monkeypatch):
         return files
 
     monkeypatch.setitem(sys.modules, "xcrack.output.vtk", SimpleNamespace(write=write))
-    mixed = replace(whole, steps=(load(whole.path).steps[0], *whole.steps[1:2]))
+    solved = replace(whole.steps[1], solutions=(fake_solution(), fake_solution()))
+    mixed = replace(whole, steps=(load(whole.path).steps[0], solved))
     mixed.write(tmp_path / "out")
     with open(tmp_path / "out" / "history.csv", newline="") as file:
         rows = list(csv.DictReader(file))

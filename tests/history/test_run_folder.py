@@ -20,7 +20,7 @@ from xcrack.runs.collect import collect, load, resume
 # --- to disk and on ----------------------------------------------------------------------------
 
 
-def test_each_step_is_on_disk_before_the_next_begins(formula, tmp_path):
+def test_each_step_is_on_disk_before_the_next_begins(tmp_path):
     seen = []
 
     def steps():
@@ -69,7 +69,7 @@ def test_killed_again_while_it_resumes(whole, tmp_path):
     assert_same(history, whole)
 
 
-def test_until_and_the_rules_that_stop_a_run_may_change(formula, whole, tmp_path):
+def test_until_and_the_rules_that_stop_a_run_may_change(whole, tmp_path):
     folder = tmp_path / "short"
     first = collect(grow(**run_of()), folder, until=lambda step: step.index == 1)
     assert first.ended == "until was true at step 1"
@@ -81,7 +81,7 @@ def test_until_and_the_rules_that_stop_a_run_may_change(formula, whole, tmp_path
     assert_same(resume(folder, **run_of(K_c=1e9)), whole)
 
 
-def test_no_step_is_computed_after_until_was_true(formula):
+def test_no_step_is_computed_after_until_was_true():
     steps = grow(**run_of())
     collect(steps, until=lambda step: True)
     assert list(steps) == []
@@ -272,7 +272,7 @@ def test_flipped_bits_are_noticed(whole):
     assert content(whole.path) == before
 
 
-def test_a_step_of_another_run(formula, whole, tmp_path):
+def test_a_step_of_another_run(whole, tmp_path):
     other = collect(grow(**run_of(da=1.8)), tmp_path / "other")
     before = content(whole.path)
     path = run_files.step_path(whole.path, 3)
@@ -296,7 +296,7 @@ def test_left_over_parts_are_swept_away_and_nothing_else(whole):
     assert "moved_aside_1" not in names
 
 
-def test_a_folder_that_holds_something_else(formula, tmp_path):
+def test_a_folder_that_holds_something_else(tmp_path):
     with pytest.raises(ProblemError, match="no run to go on with"):
         resume(tmp_path / "nowhere", **run_of())
     (tmp_path / "file").write_text("")

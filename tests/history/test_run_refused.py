@@ -53,14 +53,14 @@ def test_what_the_system_refuses_at_any_write(whole, tmp_path, number, at):
     ],
     ids=["NUL", "too long", "number", "bytes", "empty"],
 )
-def test_paths_that_cannot_be(formula, tmp_path, monkeypatch, make, path, words):
+def test_paths_that_cannot_be(tmp_path, monkeypatch, make, path, words):
     monkeypatch.chdir(tmp_path)
     arguments = {collect: lambda: (grow(**run_of()), path), load: lambda: (path,)}
     with pytest.raises(ProblemError, match=words):
         resume(path, **run_of()) if make is resume else make(*arguments[make]())
 
 
-def test_folders_in_the_place_of_files(formula, whole, tmp_path):
+def test_folders_in_the_place_of_files(whole, tmp_path):
     """Of a step, of the header, of the parent folder."""
     folder = tmp_path / "step"
     (folder / "step_00001.npz" / "inner").mkdir(parents=True)
@@ -75,7 +75,7 @@ def test_folders_in_the_place_of_files(formula, whole, tmp_path):
         collect(grow(**run_of()), tmp_path / "file" / "run")
 
 
-def test_a_folder_that_vanishes_while_a_run_writes_to_it(formula, tmp_path):
+def test_a_folder_that_vanishes_while_a_run_writes_to_it(tmp_path):
     def until(step):
         if step.index == 2:
             shutil.rmtree(tmp_path / "run")
@@ -104,7 +104,7 @@ def test_bad_arguments_of_collect(steps, options, words):
         collect(steps(), **options)
 
 
-def test_what_until_raises_names_where_it_was_called(formula):
+def test_what_until_raises_names_where_it_was_called():
     def until(step):
         return step.life > 3
 
@@ -139,13 +139,13 @@ def test_ctrl_c_hands_back_what_was_finished(whole, tmp_path, stored):
         assert_same(resume(folder, **run_of()), whole)
 
 
-def test_ctrl_c_before_the_first_step_is_ctrl_c(formula, tmp_path):
+def test_ctrl_c_before_the_first_step_is_ctrl_c(tmp_path):
     with pytest.raises(KeyboardInterrupt):
         collect(interrupted(0), tmp_path)
     assert not list(tmp_path.iterdir())
 
 
-def test_ctrl_c_while_a_step_is_written(whole, tmp_path, monkeypatch):
+def test_ctrl_c_while_a_step_is_written(whole, tmp_path):
     """Anywhere in it: the step is handed back; on disk it is there as a whole or not at all."""
     for n in range(1, 6):
         folder = tmp_path / f"run_{n}"
@@ -157,7 +157,7 @@ def test_ctrl_c_while_a_step_is_written(whole, tmp_path, monkeypatch):
         assert_same(resume(folder, **run_of()), whole)
 
 
-def test_ctrl_c_in_resume(whole, tmp_path, monkeypatch):
+def test_ctrl_c_in_resume(whole, tmp_path):
     folder = tmp_path / "run"
     collect(grow(**run_of()), folder, until=lambda step: step.index == 1)
     calls = []
@@ -175,7 +175,7 @@ def test_ctrl_c_in_resume(whole, tmp_path, monkeypatch):
     assert_same(resume(folder, **run_of()), whole)
 
 
-def test_an_error_hands_over_what_was_finished(formula, tmp_path):
+def test_an_error_hands_over_what_was_finished(tmp_path):
     """Without a path too."""
 
     def law(dK, R):

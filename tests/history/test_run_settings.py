@@ -243,14 +243,14 @@ class Growing:
         return 1e-11 * dK**3
 
 
-def test_settings_are_those_before_the_first_call(formula, tmp_path):
+def test_settings_are_those_before_the_first_call(tmp_path):
     run = run_of(law=Growing([]), max_steps=2)
     collect(grow(**run), tmp_path)
     history = resume(tmp_path, **run_of(law=Growing([])), until=lambda step: step.index == 3)
     assert len(history.steps) == 4
 
 
-def test_a_run_with_a_law_of_the_user_says_what_changed(formula, tmp_path):
+def test_a_run_with_a_law_of_the_user_says_what_changed(tmp_path):
     constants = {"C": 1e-11}
 
     def law(dK, R):
@@ -295,7 +295,7 @@ def test_threads_of_a_process_are_counted():
         assert child.stdout.strip() == count
 
 
-def test_another_python_compiles_other_code(formula, tmp_path, monkeypatch):
+def test_another_python_compiles_other_code(tmp_path, monkeypatch):
     """Then code cannot be compared: a warning, where the same python refuses."""
 
     def law(dK, R):
@@ -312,7 +312,7 @@ def test_another_python_compiles_other_code(formula, tmp_path, monkeypatch):
     assert content(whole.path) == before
 
 
-def test_a_run_goes_on_with_its_own_defaults(formula, whole, monkeypatch):
+def test_a_run_goes_on_with_its_own_defaults(whole, monkeypatch):
     """Of the set it began with, where the user left the choice to them."""
     number = settings.DEFAULTS + 1
     monkeypatch.setattr(settings, "DEFAULTS", number)

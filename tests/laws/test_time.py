@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from support.growth_fakes import STRESS, mode_I, patch_respond, plate
+from support.growth_fakes import STRESS, formula, mode_I, plate
 from xcrack.base.errors import ProblemError
 from xcrack.fatigue.closures import newman_closure
 from xcrack.fatigue.criteria import max_hoop_stress
@@ -75,12 +75,21 @@ def test_what_a_law_asks_for_is_handed_on():
     assert (plain.needs, plain.ratio, plain.knows_negative_ratios) == ((), None, False)
 
 
-def test_a_run(monkeypatch):
+def test_a_run():
     """Cycles against quadrature of both rates over the length: second order in the steps."""
-    patch_respond(monkeypatch, mode_I())
+    response = formula(mode_I())
     law = with_time(paris(1e-12, 3.0), time_rate(1e-9, 2.0), period=2.0)
     steps = list(
-        grow(plate(), law, max_hoop_stress, Cycle(0.1, 1.0), da=1.0, max_steps=6, progress=False)
+        grow(
+            plate(),
+            law,
+            max_hoop_stress,
+            Cycle(0.1, 1.0),
+            da=1.0,
+            max_steps=6,
+            progress=False,
+            response=response,
+        )
     )
 
     def K(a):

@@ -8,14 +8,13 @@ import numpy as np
 import pytest
 
 from support import exact
-from support.growth_fakes import STRESS, mode_I, patch_respond, plate
+from support.growth_fakes import STRESS, formula, mode_I, plate
 from xcrack.base.errors import ProblemError
 from xcrack.crack.lines import line_crack
 from xcrack.fatigue.criteria import max_hoop_stress
 from xcrack.fatigue.power import paris, walker
 from xcrack.fatigue.spectrum import Spectrum
 from xcrack.fatigue.thresholds import klesnil_lukas
-from xcrack.growth import run as growth
 from xcrack.growth.run import grow
 from xcrack.growth.step import Cycle
 from xcrack.mesh.box import box
@@ -31,16 +30,12 @@ LAW = paris(1e-11, 3.0)
 FLIGHT = Spectrum([0.0, 1.0, 0.4, 0.6, 0.1, 0.9, 0.3], unit="flight")
 GIVEN = {"criterion": max_hoop_stress, "nu": 0.3}
 
+FORMULA = formula(mode_I())
+
 
 def run(law=LAW, cycle=FLIGHT, n=12, da=3.0, problem=None, **options):
-    options = {"da": da, "max_steps": n, "progress": False, **options}
+    options = {"da": da, "max_steps": n, "progress": False, "response": FORMULA, **options}
     return History(tuple(grow(problem or plate(), law, max_hoop_stress, cycle, **options)), "")
-
-
-@pytest.fixture(autouse=True)
-def formula(monkeypatch, request):
-    if "levels_are" not in request.node.name:  # that one has elements
-        patch_respond(monkeypatch, mode_I())
 
 
 def equivalent(m, spectrum=FLIGHT):
@@ -164,20 +159,18 @@ def test_levels_are_a_source_of_their_own():
         life(history, LAW, scatter=Scatter(load=normal(0.02)), seed=93, **given)
 
 
-def test_best_K_of_a_spectrum_is_rated_again(monkeypatch):
+def test_best_K_of_a_spectrum_is_rated_again():
     """Where K has bars growth follows the best K, and so does rerating."""
-    respond = growth.respond
 
-    def with_bars(problem, run, reuse):
-        solutions, answers, handed_on = respond(problem, run, reuse)
+    def with_bars(*given):
+        response = FORMULA(*given)
         bars = [
             [replace(sif, errors=Bars(0.1 * sif.K, 0.01 * np.abs(sif.K), ("",))) for sif in state]
-            for state in answers
+            for state in response.sif
         ]
-        return solutions, tuple(map(tuple, bars)), handed_on
+        return replace(response, sif=bars)
 
-    monkeypatch.setattr(growth, "respond", with_bars)
-    history = run(n=5)
+    history = run(n=5, response=with_bars)
     assert history.life == pytest.approx(
         exact.paris_life(5.0, 17.0, 1e-11, 3.0, 1.1 * STRESS) / equivalent(3.0), rel=1e-9
     )

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from support import exact
-from support.growth_fakes import STRESS, mode_I, patch_respond, plate
+from support.growth_fakes import STRESS, formula, mode_I, plate
 from xcrack.base.errors import ProblemError
 from xcrack.crack.lines import line_crack
 from xcrack.fatigue.criteria import max_hoop_stress, weighted_angle
@@ -36,9 +36,9 @@ def run(problem=None, law=LAW, cycle=CYCLE, n=12, da=3.0, **options):
 
 
 @pytest.fixture
-def history(monkeypatch):
-    patch_respond(monkeypatch, mode_I())
-    return run()
+def history():
+    response = formula(mode_I())
+    return run(response=response)
 
 
 def closed_form(a0=5.0, a1=38.0, m=3.0):
@@ -94,21 +94,31 @@ def test_worked_sensitivity_to_the_first_length():
     assert (np.log(N[2]) - np.log(N[0])) / 2e-4 == pytest.approx(-0.644004, abs=1e-5)
 
 
-def test_samples_below_a_threshold_do_not_end(monkeypatch):
+def test_samples_below_a_threshold_do_not_end():
     """With a hard threshold at K of the first crack half of the samples never grow."""
-    patch_respond(monkeypatch, mode_I())
+    response = formula(mode_I())
     first = STRESS * np.sqrt(np.pi * 5.0)
     law = paris(1e-11, 3.0, threshold=klesnil_lukas(0.999999 * first, 0.0))
-    result = life(run(law=law), law, scatter=Scatter(K=normal(0.01)), samples=1000, seed=76)
+    result = life(
+        run(law=law, response=response), law, scatter=Scatter(K=normal(0.01)), samples=1000, seed=76
+    )
     assert np.isinf(result.N).mean() == pytest.approx(0.5, abs=0.01)
     assert result.percentile(90) == np.inf
 
 
-def test_samples_that_reach_the_toughness_end_early(monkeypatch):
-    patch_respond(monkeypatch, mode_I())
+def test_samples_that_reach_the_toughness_end_early():
+    response = formula(mode_I())
     law = paris(1e-11, 3.0, K_c=STRESS * np.sqrt(np.pi * 60.0))
-    result = life(run(law=law), law, scatter=Scatter(K=lognormal(0.3)), samples=2000, seed=77)
-    plain = life(run(), LAW, scatter=Scatter(K=lognormal(0.3)), samples=2000, seed=77)
+    result = life(
+        run(law=law, response=response),
+        law,
+        scatter=Scatter(K=lognormal(0.3)),
+        samples=2000,
+        seed=77,
+    )
+    plain = life(
+        run(response=response), LAW, scatter=Scatter(K=lognormal(0.3)), samples=2000, seed=77
+    )
     assert result.percentile(5) < plain.percentile(5)
     assert result.percentile(90) == pytest.approx(plain.percentile(90), rel=1e-9)
 
@@ -129,9 +139,9 @@ def test_bounds_of_steps_and_of_K(history):
     assert result.bounds["K"] == pytest.approx(0.99**-3 - 1, rel=1e-6)
 
 
-def test_of_a_spectrum_the_rate_can_vary(monkeypatch):
-    patch_respond(monkeypatch, mode_I())
-    history = run(cycle=Spectrum([0.0, 1.0, 0.4, 0.6]))
+def test_of_a_spectrum_the_rate_can_vary():
+    response = formula(mode_I())
+    history = run(cycle=Spectrum([0.0, 1.0, 0.4, 0.6]), response=response)
     result = life(history, scatter=Scatter(C=lognormal(0.3)), samples=1000, seed=79, unit="flight")
     assert result.percentile(50) == pytest.approx(history.life, rel=1e-3)
     assert "flights" in str(result)
@@ -144,11 +154,11 @@ def test_of_a_spectrum_the_rate_can_vary(monkeypatch):
 # --- another law ---------------------------------------------------------------------------------
 
 
-def test_rerate_is_a_new_run_for_one_tip(monkeypatch):
-    patch_respond(monkeypatch, mode_I())
+def test_rerate_is_a_new_run_for_one_tip():
+    response = formula(mode_I())
     cycle = Cycle(0.2, 1.0)
-    old, new = run(cycle=cycle), walker(3e-11, 2.7, 0.4)
-    again = run(law=new, cycle=cycle)
+    old, new = run(cycle=cycle, response=response), walker(3e-11, 2.7, 0.4)
+    again = run(law=new, cycle=cycle, response=response)
     result = old.rerate(new, LAW)
     assert result.bound == 0
     assert result.life == pytest.approx(again.life, rel=1e-12)
@@ -158,17 +168,17 @@ def test_rerate_is_a_new_run_for_one_tip(monkeypatch):
         old.rerate(new, new)
 
 
-def test_rerate_of_several_tips_has_a_bound(monkeypatch):
+def test_rerate_of_several_tips_has_a_bound():
     """A factor changes no share; another exponent does, and too much of it is refused."""
-    patch_respond(monkeypatch, mode_I())
+    response = formula(mode_I())
     cracks = [line_crack([(0, 8.3), (5, 8.3)]), line_crack([(0, -8.3), (4.6, -8.3)])]
-    history = run(plate(cracks), n=5)
+    history = run(plate(cracks), n=5, response=response)
     double = history.rerate(paris(2e-11, 3.0))
     assert double.bound < 1e-12
     assert double.life == pytest.approx(history.life / 2, rel=1e-12)
     steeper = paris(1e-11, 3.3)
     result = history.rerate(steeper)
-    again = run(plate(cracks), law=steeper, n=5)
+    again = run(plate(cracks), law=steeper, n=5, response=response)
     assert 0 < result.bound < 0.05
     assert abs(result.life / again.life - 1) <= result.bound
     with pytest.raises(ProblemError, match="the path would differ"):
@@ -187,12 +197,14 @@ def test_rerate_that_stops_or_breaks(history):
 
 
 @pytest.fixture
-def curve(monkeypatch):
+def curve():
     """1 to 20 mm in m and MPa √m, the worked example: 881 834 cycles."""
-    patch_respond(monkeypatch, mode_I(factor=lambda a: np.sqrt(np.pi * a * 1e-3)))
+    response = formula(mode_I(factor=lambda a: np.sqrt(np.pi * a * 0.001)))
     problem = plate([line_crack([(0.0, 0.37), (1.0, 0.37)])], size=(60.0, 40.0), n=(120, 80))
     law = paris(1e-8, 3.0)  # mm, MPa √m
-    steps = grow(problem, law, weighted_angle, CYCLE, da=1.0, max_steps=20, progress=False)
+    steps = grow(
+        problem, law, weighted_angle, CYCLE, da=1.0, max_steps=20, progress=False, response=response
+    )
     return growth_curve(History(tuple(steps), ""))
 
 

@@ -5,7 +5,7 @@ import pytest
 from scipy.integrate import quad
 
 from support import exact
-from support.growth_fakes import STRESS, mode_I, patch_respond, plate
+from support.growth_fakes import STRESS, formula, mode_I, plate
 from xcrack.base.errors import ProblemError
 from xcrack.fatigue.criteria import max_hoop_stress
 from xcrack.fatigue.kernels.retardation import advanced
@@ -116,14 +116,13 @@ def test_willenborg_cycle_by_cycle():
 
 
 def history_of(spectrum, law, n=6, da=1.0):
-    options = {"da": da, "max_steps": n, "progress": False}
+    options = {"da": da, "max_steps": n, "progress": False, "response": formula(mode_I())}
     return History(tuple(grow(plate(), law, max_hoop_stress, spectrum, **options)), "")
 
 
 @pytest.fixture
-def overload(monkeypatch):
+def overload():
     """200 small cycles and one that is twice as large; mm and MPa √mm."""
-    patch_respond(monkeypatch, mode_I())
     factors = [*([0.05, 0.5] * 200), 0.05, 1.0]
     return Spectrum(factors)
 

@@ -5,14 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from support.growth_fakes import STRESS, mode_I, patch_respond, plate
+from support.growth_fakes import STRESS, formula, mode_I, plate
 from xcrack.base.errors import ProblemError
 from xcrack.crack.lines import line_crack
 from xcrack.crack.surfaces import elliptic_crack
 from xcrack.fatigue.criteria import max_hoop_stress
 from xcrack.fatigue.power import paris
-from xcrack.fatigue.spectrum import Spectrum
-from xcrack.growth.rates import respond_to_cycle
+from xcrack.fatigue.spectrum import Spectrum, scaled
+from xcrack.growth.response import respond
 from xcrack.growth.run import grow
 from xcrack.growth.step import Cycle
 from xcrack.linalg.reuse import Reuse
@@ -35,10 +35,17 @@ STEEL = assessment_line(E=210e3, sigma_y=355.0, sigma_u=510.0)
 
 
 @pytest.fixture
-def history(monkeypatch):
-    patch_respond(monkeypatch, mode_I())
+def history():
+    response = formula(mode_I())
     steps = grow(
-        plate(), LAW, max_hoop_stress, Cycle(0.0, 1.0), da=3.0, max_steps=5, progress=False
+        plate(),
+        LAW,
+        max_hoop_stress,
+        Cycle(0.0, 1.0),
+        da=3.0,
+        max_steps=5,
+        progress=False,
+        response=response,
     )
     return History(tuple(steps), "")
 
@@ -88,13 +95,14 @@ def test_residual_strength(history):
     assert np.isnan(alone["by_line"]).all()
 
 
-def test_factors_of_geometry(history, monkeypatch):
+def test_factors_of_geometry(history):
     """beta = 1 where K = stress √(π a), for one tip and for two."""
     table = geometry_factors(history, stress=STRESS)
     assert np.allclose(table["beta"], 1, rtol=1e-12)
     assert table["a"].tolist() == pytest.approx([5, 8, 11, 14, 17])
     two = plate([line_crack([(25.0, 0.37), (35.0, 0.37)])])
-    step = next(grow(two, LAW, max_hoop_stress, Cycle(0.0, 1.0), da=1.0, progress=False))
+    options = {"da": 1.0, "progress": False, "response": formula(mode_I())}
+    step = next(grow(two, LAW, max_hoop_stress, Cycle(0.0, 1.0), **options))
     assert np.allclose(geometry_factors(History((step,), ""), stress=STRESS)["beta"], 1, rtol=1e-12)
 
 
@@ -173,8 +181,8 @@ def test_opening_load_is_where_the_tip_opens():
     K = {}
     problem, spectrum = bent()
     for factor in (level - 0.03, level + 0.03):
-        cycle = Spectrum([factor, 1.0], steady=spectrum.steady)
-        K[factor] = respond_to_cycle(problem, cycle, None, Reuse())[1][0][0].K[0, 0]
+        state = [*(scaled(load, factor) for load in problem.loads), *spectrum.steady]
+        K[factor] = respond(problem, [state], Reuse()).sif[0][0].K[0, 0]
     below, above = K.values()
     assert below < 2e-2 * step[65].sif[-1][0].K[0, 0]
     assert above > below

@@ -300,7 +300,7 @@ def test_steps_of_a_run_keep_no_factor():
 # --- threads of BLAS -----------------------------------------------------------------------------
 
 
-def test_blas_has_one_thread_inside_and_as_many_as_before_outside(monkeypatch):
+def test_blas_has_one_thread_inside_and_as_many_as_before_outside():
     def threads():
         return [
             p["num_threads"] for p in threadpoolctl.threadpool_info() if p["user_api"] == "blas"

@@ -1,19 +1,18 @@
 """Growth with K from a formula in place of an analysis: what is tested is the growth alone."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 
 from xcrack.analysis.solution import Solution
-from xcrack.crack.crack import tip_frames
 from xcrack.crack.lines import line_crack
 from xcrack.crack.measures import length_inside
-from xcrack.growth import run as growth
+from xcrack.growth.response import Response
 from xcrack.linalg.reuse import Reuse
 from xcrack.mesh.box import box
 from xcrack.model.material import Isotropic
 from xcrack.model.problem import Problem
-from xcrack.sif.sif import SIF
 
 STRESS = 100.0
 
@@ -26,21 +25,28 @@ def plate(cracks=None, size=(60.0, 40.0), n=(60, 40)):
     return Problem(mesh, Isotropic(E=210e3, nu=0.3, plane="strain"), cracks=cracks)
 
 
-def sif(crack, K):
-    x, frame = tip_frames(crack)
-    n = len(x)
-    return SIF(
-        x=x,
-        frame=frame,
-        K=np.asarray(K, dtype=float).reshape(n, 2),
-        T=np.zeros(n),
-        spread=np.zeros((n, 2)),
-        s=np.zeros(n),
-        front=np.arange(n),
-        at_surface=np.zeros(n, dtype=bool),
-        closed=np.zeros(n, dtype=bool),
-        domain_cells=np.full(n, 4.0),
-    )
+def formula(K_of, radius=None):
+    """Response whose K `(f, 2)` under full load is ``K_of(problem, crack number)``.
+
+    Its attribute `calls` has the numerics and the warm start of each call. With a radius it also
+    has solutions that know it, and nothing else.
+    """
+
+    def response(problem, states, reuse, bars):
+        response.calls.append((problem.numerics, reuse))
+        full = [np.reshape(K_of(problem, c), (-1, 2)) for c in range(len(problem.placed))]
+        K = np.stack([float(state) * np.concatenate(full) for state in states])
+        count = 1.0 if not reuse.centre else reuse.centre[0][0, 0] + 1
+        after = Reuse(centre=(np.full((1, 2), count),), active=(None,))
+        answer = replace(Response.of_K(problem, states, K), reuse=after)
+        if radius is None:
+            return answer
+        space = SimpleNamespace(radius=np.full(K.shape[1], radius))
+        one = fake_solution(problem=problem, space=space, reuse=after, contact=(None,))
+        return replace(answer, solutions=(one,) * len(states))
+
+    response.calls = []
+    return response
 
 
 def fake_solution(**values):
@@ -49,38 +55,6 @@ def fake_solution(**values):
     for name, value in values.items():
         object.__setattr__(solution, name, value)
     return solution
-
-
-def patch_respond(monkeypatch, K_of, radius=1.5):
-    """Let growth take K `(f, 2)` under full load from ``K_of(problem, crack number)``.
-
-    Returns a list that the numerics and warm start of each call are appended to.
-    """
-    calls = []
-
-    def respond(problem, run, reuse):
-        calls.append((problem.numerics, reuse))
-        n = sum(crack.n_tips for crack in problem.placed)
-        solutions = tuple(
-            fake_solution(
-                problem=problem,
-                state=load,
-                space=SimpleNamespace(radius=np.full(n, radius)),
-                reuse=Reuse(
-                    centre=(np.full((1, 2), 1.0 if not reuse.centre else reuse.centre[0] + 1),)
-                ),
-            )
-            for load in run.cycle.load_states
-        )
-        full = [K_of(problem, c) for c in range(len(problem.placed))]
-        answers = tuple(
-            tuple(sif(crack, load * np.asarray(K)) for crack, K in zip(problem.placed, full))
-            for load in run.cycle.load_states
-        )
-        return solutions, answers, solutions[0].reuse
-
-    monkeypatch.setattr(growth, "respond", respond)
-    return calls
 
 
 def mode_I(factor=lambda a: np.sqrt(np.pi * a), stress=STRESS):

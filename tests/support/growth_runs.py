@@ -5,7 +5,7 @@ from functools import cache
 
 import pytest
 
-from support.growth_fakes import mode_I, patch_respond, plate
+from support.growth_fakes import formula, mode_I, plate
 from xcrack.crack.lines import line_crack
 from xcrack.fatigue.criteria import weighted_angle
 from xcrack.fatigue.power import paris
@@ -26,6 +26,9 @@ def both_modes(problem, c):
     return [[K_I * (1.0 + 0.31 * c), K_I * 0.217 * (-1) ** len(problem.placed[c].points)]]
 
 
+RESPONSE = formula(both_modes)
+
+
 @cache
 def scene():
     return plate([line_crack([(0, 8.3), (5, 8.3)]), line_crack([(0, -8.3), (4.1, -8.5)])])
@@ -34,17 +37,12 @@ def scene():
 def run_of(problem=None, **changes):
     """Arguments of a run, the same for grow and resume."""
     options = {"da": 1.7, "max_steps": N_STEPS, "law": LAW, "criterion": weighted_angle}
-    options |= {"cycle": CYCLE, "problem": problem or scene(), **changes}
+    options |= {"cycle": CYCLE, "problem": problem or scene(), "response": RESPONSE, **changes}
     return options
 
 
 @pytest.fixture
-def formula(monkeypatch):
-    patch_respond(monkeypatch, both_modes)
-
-
-@pytest.fixture
-def whole(formula, tmp_path):
+def whole(tmp_path):
     """A run that nothing disturbed."""
     return collect(grow(**run_of()), tmp_path / "whole")
 
@@ -118,5 +116,5 @@ class Half:
 
 __all__ = [
     *("CYCLE", "LAW", "N_STEPS", "Killed", "Saboteur", "assert_same", "both_modes", "content"),
-    *("formula", "run_of", "scene", "whole"),
+    *("run_of", "scene", "whole"),
 ]

@@ -126,7 +126,7 @@ def _numerics(table: Table) -> Numerics:
 
 def _growth(table: Table) -> Mapping[str, Any]:
     """Arguments of `grow`."""
-    options = [name for name in GrowOptions.__annotations__ if name != "solver"]
+    options = [name for name in GrowOptions.__annotations__ if name not in ("solver", "response")]
     table.known(("law", "criterion", "cycle", "spectrum", "da", *options))
     if "law" not in table:
         table.refuse("", "the key 'law' is missing.")

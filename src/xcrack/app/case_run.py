@@ -62,8 +62,8 @@ def run(
         As of `collect`.
     tolerance, max_unknowns : optional
         As of `grow`.
-    cycles, scaling, integrator, threshold, retardation, solver, K_c, link_up, max_steps, \
-    max_cycles, tolerance, max_unknowns, progress
+    cycles, scaling, integrator, threshold, retardation, solver, response, K_c, link_up, \
+    max_steps, max_cycles, tolerance, max_unknowns, progress
         As of `grow`.
 
     Returns

@@ -27,7 +27,9 @@ _MEND = {
 }
 
 
-def path_of(value: Any, what: str, *, error: type[XcrackError] = XcrackError) -> Path:
+def path_of(
+    value: Any, what: str, *, error: type[XcrackError] = XcrackError, is_file: bool = False
+) -> Path:
     """Check that a value can be the path of a file, and return it.
 
     Parameters
@@ -36,6 +38,8 @@ def path_of(value: Any, what: str, *, error: type[XcrackError] = XcrackError) ->
     what : str
         Its name in the message, such as ``"write_mesh: path"``.
     error : type of XcrackError
+    is_file : bool
+        Refuse what can be a folder only.
 
     Returns
     -------
@@ -44,7 +48,7 @@ def path_of(value: Any, what: str, *, error: type[XcrackError] = XcrackError) ->
     Raises
     ------
     error
-        Neither a string nor a path, empty, or with a NUL character.
+        Neither a string nor a path, empty, with a NUL character, or a folder.
 
     Examples
     --------
@@ -60,7 +64,10 @@ def path_of(value: Any, what: str, *, error: type[XcrackError] = XcrackError) ->
     if not text or "\0" in text:
         reason = "holds a NUL character" if text else "is empty"
         raise error(f"{what} = {shown(value)} {reason}: give the path of a file.")
-    return Path(text)
+    path = Path(text)
+    if is_file and path.name in ("", ".."):
+        raise error(f"{what} = {shown(str(path))} is a folder: give a file in it.")
+    return path
 
 
 @contextmanager

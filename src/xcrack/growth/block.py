@@ -1,24 +1,20 @@
 """Direction, range and rate of a block of cycles: each cycle is rated, and their growth added."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from xcrack.analysis.solution import Solution
 from xcrack.base.arrays import Floats
 from xcrack.fatigue.checks import evaluate_criterion, evaluate_law
 from xcrack.fatigue.criteria import clipped, equivalent_K, kink_angle, nominal_range
 from xcrack.fatigue.rainflow import closed_cycles
 from xcrack.fatigue.spectrum import Spectrum, distinct
-from xcrack.growth.levels import factors_of, ladders
+from xcrack.growth.levels import ladders
 from xcrack.growth.options import Run
+from xcrack.growth.response import Response
 from xcrack.model.problem import Problem
-from xcrack.sif.sif import SIF
 
 _CHUNK = 20_000  # places times cycles that are rated at once
-
-Answers = tuple[tuple[SIF, ...], ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,20 +43,18 @@ class Rated:
     rate: Floats
 
 
-def pairs_of(
-    run: Run, problem: Problem, solutions: Sequence[Solution], sif: Answers
-) -> list[Pairs]:
+def pairs_of(run: Run, problem: Problem, response: Response) -> list[Pairs]:
     """Kinds of cycles of each crack under the spectrum of a run."""
     spectrum = run.cycle
     if not isinstance(spectrum, Spectrum):
         return []
     if spectrum.states is not None:
-        n = range(len(sif[0]))
-        every = [np.stack([state[c].K for state in sif]) for c in n]
+        n = range(len(response.sif[0]))
+        every = [np.stack([state[c].K for state in response.sif]) for c in n]
         return [pairs_of_states(K, spectrum, problem.material.nu) for K in every]
     values, count, _ = distinct(spectrum.cycles)
     result = []
-    for ladder in ladders(problem, spectrum, factors_of(solutions), sif):
+    for ladder in ladders(problem, spectrum, response):
         K = np.stack([ladder.at(values[:, 0]), ladder.at(values[:, 1])])
         result.append(Pairs(K, np.repeat(count[:, None], K.shape[2], axis=1)))
     return result
@@ -150,9 +144,7 @@ def block_of(every: Rated, count: Floats) -> tuple[Floats, Floats, Floats, Float
     return np.where(mean, np.arctan2(y, x) + 0.0, angle), dK, R, rate
 
 
-def left_out_share(
-    run: Run, problem: Problem, solutions: Sequence[Solution], sif: Answers
-) -> float:
+def left_out_share(run: Run, problem: Problem, response: Response) -> float:
     """Growth of the cycles that a spectrum leaves out, over that of those it has; the worst place.
 
     inf where only they would let a place grow.
@@ -165,8 +157,8 @@ def left_out_share(
         return 0.0
     values, count, _ = distinct(omitted)
     nu, worst = problem.material.nu, 0.0
-    every = pairs_of(run, problem, solutions, sif)
-    for c, ladder in enumerate(ladders(problem, spectrum, factors_of(solutions), sif)):
+    every = pairs_of(run, problem, response)
+    for c, ladder in enumerate(ladders(problem, spectrum, response)):
         K = np.stack([ladder.at(values[:, 0]), ladder.at(values[:, 1])])
         f = K.shape[2]
         if f == 0:
@@ -185,7 +177,6 @@ def left_out_share(
 
 
 __all__ = [
-    "Answers",
     "Pairs",
     "Rated",
     "block_of",

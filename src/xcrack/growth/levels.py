@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
-from xcrack.analysis.solution import Solution
 from xcrack.base.arrays import Bools, Floats, Ints
 from xcrack.fatigue.criteria import clipped
 from xcrack.fatigue.spectrum import Level, Spectrum, distinct, level
+from xcrack.growth.response import Response
 from xcrack.linalg.reuse import Reuse
 from xcrack.model.conditions import InitialStress
 from xcrack.model.problem import Problem
@@ -21,8 +21,7 @@ _EXPONENT = 3.0  # of growth, to tell which ranges matter
 _GROWTH = 0.25  # of the tolerance: what a middle must change of the growth of a block, to matter
 _POINTS = 65  # factors at which ends of cycles are counted for that
 
-Answers = tuple[tuple[SIF, ...], ...]
-Solve = Callable[[Sequence[Any], Reuse], tuple[tuple[Solution, ...], Answers, Reuse]]
+Solve = Callable[[Sequence[Any], Reuse], Response]
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,30 +58,22 @@ class Ladder:
 
 
 @dataclass(frozen=True, eq=False)
-class Solved:
-    """What was solved for one factor: its solution, K, and the closed sets it leaves.
+class LevelResponse:
+    """Response to one factor: a row of that to several, with the closed sets that these leave."""
 
-    Attributes
-    ----------
-    solution : Solution
-    sif : tuple of SIF
-        One a crack.
-    reuse : Reuse
-        Of the solve of several factors that it is one of.
-    row : int
-        Which of them.
-    """
-
-    solution: Solution
-    sif: tuple[SIF, ...]
-    reuse: Reuse
+    whole: Response
     row: int
+
+    @property
+    def sif(self) -> tuple[SIF, ...]:
+        """K of each crack."""
+        return self.whole.sif[self.row]
 
 
 def refined(
     problem: Problem, spectrum: Spectrum, first: Floats, solve: Solve, reuse: Reuse
-) -> tuple[tuple[Solution, ...], Answers, Reuse]:
-    """Solutions and K at levels that are as dense as K and the growth of a block ask for.
+) -> Response:
+    """Response at levels that are as dense as K and the growth of a block ask for.
 
     Parameters
     ----------
@@ -90,7 +81,7 @@ def refined(
     spectrum : Spectrum
     first : (n,) array
         Levels to begin with.
-    solve : callable (states, reuse) -> (solutions, sif, reuse)
+    solve : callable (states, reuse) -> Response
     reuse : Reuse
         Of the step before, with the levels that were wanted there: they are solved at once.
 
@@ -102,7 +93,7 @@ def refined(
     """
     low, high = float(first[0]), float(first[-1])
     earlier = [x for x in reuse.levels if low <= x <= high]
-    solved: dict[float, Solved] = {}
+    solved: dict[float, LevelResponse] = {}
     handed_on = reuse
 
     def solve_at(factors: Sequence[float]) -> Reuse:
@@ -110,15 +101,15 @@ def refined(
         if not new:
             return handed_on
         start = handed_on if not solved else _nearest(handed_on, solved, new)
-        solutions, answers, after = solve(states_of(problem, spectrum, np.array(new)), start)
-        for row, (factor, solution, sif) in enumerate(zip(new, solutions, answers)):
-            solved[factor] = Solved(solution, sif, after, row)
-        return after
+        response = solve(states_of(problem, spectrum, np.array(new)), start)
+        for row, factor in enumerate(new):
+            solved[factor] = LevelResponse(response, row)
+        return response.reuse
 
     handed_on = solve_at([*first.tolist(), *earlier])
     levels = first.tolist()
     active = np.ones(len(levels) - 1, dtype=bool)
-    if all(part is None for each in solved.values() for part in each.solution.contact):
+    if not any(each.whole.may_bend for each in solved.values()):
         active[:] = False  # no crack has contact in any state: its gaps are lines over the factor
     ends = _ends(spectrum, low, high)
     while active.any() and len(levels) < _MOST:
@@ -130,8 +121,12 @@ def refined(
         levels = sorted([*levels, *middle])
         active = np.array([a in bent or b in bent for a, b in zip(levels, levels[1:])])
     every = [solved[factor] for factor in sorted(solved)]
-    handed_on = replace(_nearest(handed_on, solved, levels), levels=tuple(levels))
-    return tuple(each.solution for each in every), tuple(each.sif for each in every), handed_on
+    return Response(
+        tuple(each.whole.states[each.row] for each in every),
+        tuple(each.sif for each in every),
+        tuple(each.whole.solutions[each.row] for each in every if each.whole.solutions),
+        replace(_nearest(handed_on, solved, levels), levels=tuple(levels)),
+    )
 
 
 def states_of(problem: Problem, spectrum: Spectrum, factors: Floats) -> list[float | Level]:
@@ -141,13 +136,13 @@ def states_of(problem: Problem, spectrum: Spectrum, factors: Floats) -> list[flo
     return [level(problem.loads, spectrum.steady, float(factor)) for factor in factors]
 
 
-def _nearest(reuse: Reuse, solved: dict[float, Solved], factors: Sequence[float]) -> Reuse:
+def _nearest(reuse: Reuse, solved: dict[float, LevelResponse], factors: Sequence[float]) -> Reuse:
     """The same with the closed sets of the factors that are nearest to some others."""
     known = np.array(sorted(solved))
     near = [solved[float(known[np.abs(known - factor).argmin()])] for factor in factors]
     active: list[Bools | None] = []
     for c in range(len(reuse.centre)):
-        sets = [each.reuse.active[c] for each in near]
+        sets = [each.whole.reuse.active[c] for each in near]
         rows = [part[each.row] for part, each in zip(sets, near) if part is not None]
         active.append(np.stack(rows) if len(rows) == len(near) else None)
     centre = tuple(x if a is not None else None for x, a in zip(reuse.centre, active))
@@ -165,7 +160,7 @@ def _ends(spectrum: Spectrum, low: float, high: float) -> tuple[Floats, Ints, Fl
 
 def _matters(
     spectrum: Spectrum,
-    solved: dict[float, Solved],
+    solved: dict[float, LevelResponse],
     levels: Sequence[float],
     wanted: Ints,
     middle: Sequence[float],
@@ -205,7 +200,7 @@ def _growths(ladder: Ladder, factors: Floats, pairs: Ints, count: Floats) -> Flo
     return np.asarray(count[:, None] * dK**_EXPONENT)
 
 
-def _cracks(solved: dict[float, Solved]) -> range:
+def _cracks(solved: dict[float, LevelResponse]) -> range:
     return range(len(next(iter(solved.values())).sif))
 
 
@@ -214,17 +209,15 @@ def _cracks(solved: dict[float, Solved]) -> range:
 _FIRST = 5  # levels before the first look at what lies between them
 
 
-def respond_to(
-    problem: Problem, spectrum: Spectrum, solve: Solve, reuse: Reuse
-) -> tuple[tuple[Solution, ...], Answers, Reuse]:
-    """Solutions and K at the levels of a spectrum, in the order of their factors.
+def respond_to_levels(problem: Problem, spectrum: Spectrum, solve: Solve, reuse: Reuse) -> Response:
+    """Response at the levels of a spectrum, in the order of their factors.
 
     Parameters
     ----------
     problem : Problem
     spectrum : Spectrum
         Of factors or rows.
-    solve : callable (states, reuse) -> (solutions, sif, reuse)
+    solve : callable (states, reuse) -> Response
     reuse : Reuse
         Of the step before.
     """
@@ -244,8 +237,9 @@ def respond_to(
     return refined(problem, spectrum, factors, solve, reuse)
 
 
-def ladders(problem: Problem, spectrum: Spectrum, factors: Floats, sif: Answers) -> list[Ladder]:
+def ladders(problem: Problem, spectrum: Spectrum, response: Response) -> list[Ladder]:
     """Ladder of each crack, from K at the levels that were solved."""
+    factors, sif = response.factors, response.sif
     linear = len(factors) == 2
     origin = linear and is_homogeneous(problem, spectrum) and factors[0] < 0 < factors[1]
     result = []
@@ -259,12 +253,6 @@ def ladders(problem: Problem, spectrum: Spectrum, factors: Floats, sif: Answers)
     return result
 
 
-def factors_of(solutions: Sequence[Solution]) -> Floats:
-    """Factor of each solved level."""
-    states = [solution.state for solution in solutions]
-    return np.array([s.factor if isinstance(s, Level) else s for s in states], dtype=float)
-
-
 def is_homogeneous(problem: Problem, spectrum: Spectrum) -> bool:
     """Whether twice the factor gives twice the answer, with contact too."""
     stressed = any(isinstance(load, InitialStress) for load in problem.loads)
@@ -272,13 +260,11 @@ def is_homogeneous(problem: Problem, spectrum: Spectrum) -> bool:
 
 
 __all__ = [
-    "Answers",
     "Ladder",
     "Solve",
-    "factors_of",
     "is_homogeneous",
     "ladders",
     "refined",
-    "respond_to",
+    "respond_to_levels",
     "states_of",
 ]

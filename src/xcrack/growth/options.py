@@ -18,6 +18,7 @@ from xcrack.fatigue.rainflow import turning_points
 from xcrack.fatigue.spectrum import Spectrum
 from xcrack.fatigue.zones import Retardation
 from xcrack.growth.description import DEFAULTS, describe, with_defaults_of
+from xcrack.growth.response import Respond
 from xcrack.growth.step import Cycle
 from xcrack.growth.trail import check_retardation
 from xcrack.model.conditions import Temperature
@@ -43,6 +44,7 @@ class GrowOptions(TypedDict, total=False):
     max_steps: int | None
     max_cycles: float | None
     solver: Any
+    response: Respond | None
     progress: bool | str
 
 
@@ -53,7 +55,7 @@ class Run:
     Parameters
     ----------
     problem, law, criterion, cycle, da, cycles, tolerance, max_unknowns, scaling, integrator, \
-    threshold, retardation, solver, K_c, link_up, max_steps, max_cycles, progress
+    threshold, retardation, solver, response, K_c, link_up, max_steps, max_cycles, progress
         As of `grow`.
     scouts : bool
         It is the scout of a run with a tolerance: nothing is estimated.
@@ -81,6 +83,7 @@ class Run:
     threshold: float = 0.0
     retardation: Retardation | None = None
     solver: Any = None
+    response: Respond | None = None
     K_c: float | None = field(default=None, metadata=_STOPS)
     link_up: Callable[[Floats], ArrayLike] | None = field(default=None, metadata=_STOPS)
     max_steps: int | None = field(default=None, metadata=_STOPS)
@@ -142,6 +145,11 @@ class Run:
         if self.solver is not None and not callable(self.solver):
             raise ProblemError(
                 f"grow: solver = {shown(self.solver)} cannot be called: give a function, or None."
+            )
+        if self.response is not None and not callable(self.response):
+            raise ProblemError(
+                f"grow: response = {shown(self.response)} cannot be called: give a function "
+                "(problem, states, reuse, bars) -> Response, or None."
             )
         self._check_link_up()
         self._check_temperatures()

@@ -181,7 +181,7 @@ def first_trail(run: Run, seen: Evaluation, place: Floats, grown: Bools) -> Trai
     # Of a law with nominal R the rates of a kinked crack are not known, nor a block's direction.
     nominal = getattr(run.law, "ratio", None) == "nominal"
     known = not (nominal and isinstance(run.cycle, Spectrum))
-    asked = asked_of(run, seen.problem, (seen.solutions, seen.sif)) if known else []
+    asked = asked_of(run, seen.problem, seen.response) if known else []
     for c, angle in enumerate(seen.angle):
         rows = slice(row, row + len(angle))
         row += len(angle)

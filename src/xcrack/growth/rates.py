@@ -8,24 +8,24 @@ from typing import Any
 import numpy as np
 
 from xcrack.analysis.solution import Solution
-from xcrack.analysis.solve import solve_states
 from xcrack.base.arrays import Bools, Floats
+from xcrack.base.checks import called
 from xcrack.base.errors import ProblemError, warn
 from xcrack.crack.crack import Crack
 from xcrack.fatigue.checks import evaluate_criterion, evaluate_law
 from xcrack.fatigue.criteria import clipped, equivalent_K, kink_angle, nominal_range
 from xcrack.fatigue.law import Law
 from xcrack.fatigue.spectrum import Spectrum
-from xcrack.growth.block import Answers, Pairs, block_of, left_out_share, pairs_of, rated
+from xcrack.growth.block import Pairs, block_of, left_out_share, pairs_of, rated
 from xcrack.growth.follow import following
-from xcrack.growth.levels import factors_of, respond_to
+from xcrack.growth.levels import respond_to_levels
 from xcrack.growth.options import Run
+from xcrack.growth.response import Answers, Response, checked_response, respond
 from xcrack.growth.step import Cycle, PerCrack, Step, StepError
 from xcrack.growth.trail import FrontTrail, Kinds, Trail
 from xcrack.linalg.reuse import Reuse
 from xcrack.model.problem import Problem
 from xcrack.sif.sif import SIF
-from xcrack.sif.stress_intensity import stress_intensities
 
 # Growth of cracks whose faces rub: ends that friction locks, and histories that it refuses.
 
@@ -98,16 +98,9 @@ _LEFT_OUT = 1e-3  # share of the growth of a block
 
 Rates = tuple[PerCrack, PerCrack, PerCrack, PerCrack]
 PerPlace = tuple[Floats, Floats, Floats, Floats]
-Response = tuple[Sequence[Solution], Answers]
 
 
-def rates_of(
-    run: Run,
-    problem: Problem,
-    sif: Answers,
-    solutions: Sequence[Solution],
-    free: Response | None = None,
-) -> Rates:
+def rates_of(run: Run, problem: Problem, response: Response, free: Response | None = None) -> Rates:
     """Ask criterion and law of a run what K of all load states means.
 
     Parameters
@@ -115,11 +108,9 @@ def rates_of(
     run : Run
     problem : Problem
         With the cracks that K belongs to.
-    sif : sequence of sequence of SIF
-        ``sif[state][crack]``.
-    solutions : sequence of Solution
-        One a state; their factors are the levels of a spectrum.
-    free : solutions and SIF, optional
+    response : Response
+        Of all load states; of a spectrum its factors are the levels.
+    free : Response, optional
         As of `response_without_contact`, where it is known already.
 
     Returns
@@ -128,21 +119,21 @@ def rates_of(
         One array a crack; the rates before a threshold of the run, but for a spectrum, whose cycles
         are held against it one by one.
     """
-    _check_choice(run, sif)
+    _check_choice(run, response.sif)
     if free is None:
-        free = response_without_contact(run, problem, sif, solutions)
-    asked = asked_of(run, problem, (solutions, sif), free)
+        free = response_without_contact(run, problem, response)
+    asked = asked_of(run, problem, response, free)
     angles, ranges, ratios, rates = zip(*(one.answer(one.K) for one in asked), strict=True)
     return angles, ranges, ratios, rates
 
 
-def response_without_contact(
-    run: Run, problem: Problem, sif: Answers, solutions: Sequence[Solution]
-) -> Response | None:
-    """Solutions and K of the scene in which faces may overlap; None where no law asks for them."""
+def response_without_contact(run: Run, problem: Problem, response: Response) -> Response | None:
+    """Response of the scene in which faces may overlap; None where no law asks for it."""
     if getattr(run.law, "ratio", None) != "nominal":
         return None
-    return (solutions, sif) if problem.contact == "off" else _without_contact(run, problem)
+    if problem.contact == "off":
+        return response
+    return respond_to_states(run, replace(problem, contact="off"), Reuse())
 
 
 @dataclass(frozen=True, eq=False)
@@ -173,8 +164,9 @@ def asked_of(
     ----------
     run : Run
     problem : Problem
-    response : solutions and SIF of all states
-    free : the same, optional
+    response : Response
+        Of all states.
+    free : Response, optional
         Without contact, for a law with nominal R.
     """
     asked = _asked_of_blocks if isinstance(run.cycle, Spectrum) else _asked_of_cycle
@@ -187,13 +179,13 @@ def _asked_of_cycle(
     place, nu = following(problem.mesh).PLACE, problem.material.nu
 
     def one(c: int) -> Asked:
-        given = np.stack([state[c].K for state in response[1]])
+        given = np.stack([state[c].K for state in response.sif])
         a = size_at_places(problem, c, given.shape[1])
 
         def answer(K: Floats) -> PerPlace:
             angle, dK, R = evaluate_criterion(run.criterion, K, nu, c, place)
             if free is not None:
-                dK, R = nominal_range(np.stack([state[c].K for state in free[1]]), angle, nu)
+                dK, R = nominal_range(np.stack([state[c].K for state in free.sif]), angle, nu)
             return angle, dK, R, evaluate_law(run.law, dK, R, c, place, a)
 
         def turn(K: Floats) -> Floats:
@@ -208,8 +200,8 @@ def _asked_of_blocks(
     run: Run, problem: Problem, response: Response, free: Response | None
 ) -> list[Asked]:
     place, nu = following(problem.mesh).PLACE, problem.material.nu
-    every = pairs_of(run, problem, *response)
-    nominal = [None] * len(every) if free is None else pairs_of(run, problem, *free)
+    every = pairs_of(run, problem, response)
+    nominal = [None] * len(every) if free is None else pairs_of(run, problem, free)
 
     def one(c: int, pairs: Pairs, other: Pairs | None) -> Asked:
         shape = pairs.K.shape
@@ -240,18 +232,19 @@ def size_at_places(problem: Problem, c: int, n: int) -> Floats:
     return np.full(n, size / tips)
 
 
-def levels_of(cycle: Cycle | Spectrum, solutions: Sequence[Solution]) -> tuple[float, ...]:
+def levels_of(cycle: Cycle | Spectrum, response: Response) -> tuple[float, ...]:
     """Factors of the solved states of a spectrum of factors."""
     if not isinstance(cycle, Spectrum) or cycle.states is not None:
         return ()
-    return tuple(factors_of(solutions).tolist())
+    return tuple(response.factors.tolist())
 
 
 def warn_of_left_out(run: Run, first: Step) -> None:
     """Say how much growth a spectrum leaves out with its small cycles, if it is worth a word."""
     if not isinstance(run.cycle, Spectrum):
         return
-    share = left_out_share(run, first.solutions[0].problem, first.solutions, first.sif)
+    response = Response(first.levels or run.cycle.load_states, first.sif)
+    share = left_out_share(run, run.problem, response)
     if share > _LEFT_OUT:
         warn(
             f"the cycles that the spectrum leaves out are {share:.2%} of the growth of a block at "
@@ -289,37 +282,23 @@ def _choice(reason: str, law: Law) -> str:
     )
 
 
-def _without_contact(run: Run, problem: Problem) -> Response:
-    """Solutions and K of the scene in which crack faces may overlap."""
-    free = replace(problem, contact="off")
-    return respond_to_cycle(free, run.cycle, run.solver, Reuse())[:2]
+def respond_to_states(run: Run, problem: Problem, reuse: Reuse, bars: bool = False) -> Response:
+    """Response of a scene to all load states of a run; to the levels of a spectrum of factors."""
+    spectrum = run.cycle if isinstance(run.cycle, Spectrum) else None
 
+    def solve(states: Sequence[Any], reuse: Reuse) -> Response:
+        if run.response is None:
+            response = respond(problem, states, reuse, bars, solver=run.solver)
+        else:
+            given = called(run.response, "the response of a step", problem, tuple(states), reuse, bars)
+            response = checked_response(given, problem, states)
+        if spectrum is not None and response.solutions:
+            refuse_friction(problem, response.solutions)
+        return response
 
-def respond_to_cycle(
-    problem: Problem, cycle: Cycle | Spectrum, solver: Any, reuse: Reuse, error: bool = False
-) -> tuple[tuple[Solution, ...], Answers, Reuse]:
-    """Solutions of all load states, K of each crack in each of them, and what serves the next.
-
-    The factor is handed on, but not kept with the solutions; with `error` K has its bars.
-    """
-
-    def solve(states: Sequence[Any], reuse: Reuse) -> tuple[tuple[Solution, ...], Answers, Reuse]:
-        flat = problem.mesh.dim < 3  # of fronts, the bars need no factor
-        solutions = solve_states(
-            problem, states, reuse=reuse, solver=solver, repeated=True, error=error and flat
-        )
-        if isinstance(cycle, Spectrum):
-            refuse_friction(problem, solutions)
-        handed_on = solutions[0].reuse
-        light = handed_on.without_factor()
-        solutions = [replace(solution, reuse=light) for solution in solutions]
-        by_crack = [stress_intensities(solutions, c, error) for c in range(len(problem.cracks))]
-        solutions = [replace(solution, factored=None) for solution in solutions]
-        return tuple(solutions), tuple(zip(*by_crack, strict=True)), handed_on
-
-    if isinstance(cycle, Spectrum) and cycle.states is None:
-        return respond_to(problem, cycle, solve, reuse)
-    return solve(cycle.load_states, reuse)
+    if spectrum is not None and spectrum.states is None:
+        return respond_to_levels(problem, spectrum, solve, reuse)
+    return solve(run.cycle.load_states, reuse)
 
 
 # What the load states of one crack state say of its growth, and what an integrator makes of it.
@@ -333,27 +312,29 @@ class Evaluation:
     ----------
     problem : Problem
         With the cracks as they were advanced; `cracks` are what became of them in the body.
-    sif : tuple of tuple of SIF
-        ``sif[state][crack]``.
+    response : Response
+        Of all load states; its K is the best that is known.
     angle, dK_eq, R : tuple of (f,) arrays
         As of `Step`.
     law_rate, rate : tuple of (f,) arrays, length/cycle
         Growth before and after the threshold.
-    solutions : tuple of Solution
-        One for each load state.
-    free : solutions and SIF, optional
-        Without contact, where the law asks for them.
+    free : Response, optional
+        Without contact, where the law asks for it.
     """
 
     problem: Problem
-    sif: tuple[tuple[SIF, ...], ...]
+    response: Response
     angle: PerCrack
     dK_eq: PerCrack
     R: PerCrack
     law_rate: PerCrack
     rate: PerCrack
-    solutions: tuple[Solution, ...] = ()
     free: Response | None = None
+
+    @property
+    def sif(self) -> Answers:
+        """K of each state and crack."""
+        return self.response.sif
 
     @property
     def cracks(self) -> tuple[Crack, ...]:
@@ -395,18 +376,14 @@ class Settled:
     error: StepError | None = None
 
 
-def evaluate(
-    run: Run,
-    problem: Problem,
-    sif: tuple[tuple[SIF, ...], ...],
-    solutions: Sequence[Solution],
-) -> Evaluation:
+def evaluate(run: Run, problem: Problem, response: Response) -> Evaluation:
     """Ask criterion and law of a run what K of all load states means."""
-    free = response_without_contact(run, problem, sif, solutions)
-    angle, dK_eq, R, law_rate = rates_of(run, problem, sif, solutions, free)
-    dK_eq, law_rate = without_locked(problem, solutions, sif, dK_eq, law_rate)
+    free = response_without_contact(run, problem, response)
+    angle, dK_eq, R, law_rate = rates_of(run, problem, response, free)
+    if response.solutions:
+        dK_eq, law_rate = without_locked(problem, response.solutions, response.sif, dK_eq, law_rate)
     rate = tuple(np.where(d < run.threshold, 0.0, r) for d, r in zip(dK_eq, law_rate))
-    return Evaluation(problem, sif, angle, dK_eq, R, law_rate, rate, tuple(solutions), free)
+    return Evaluation(problem, response, angle, dK_eq, R, law_rate, rate, free)
 
 
 # The kinds of cycles of a block at the places of the cracks that were solved.
@@ -417,7 +394,7 @@ def kinds_of(run: Run, seen: Evaluation) -> list[Kinds]:
     problem = seen.problem
     place, nu = following(problem.mesh).PLACE, problem.material.nu
     result = []
-    for c, pairs in enumerate(pairs_of(run, problem, seen.solutions, seen.sif)):
+    for c, pairs in enumerate(pairs_of(run, problem, seen.response)):
         a = size_at_places(problem, c, pairs.K.shape[2])
         every = rated(run, pairs, nu, c, place, a)
         dK, R = (np.ascontiguousarray(each.T)[None] for each in (every.dK, every.R))
@@ -438,7 +415,7 @@ __all__ = [
     "must_choose",
     "rates_of",
     "refuse_friction",
-    "respond_to_cycle",
+    "respond_to_states",
     "size_at_places",
     "warn_of_left_out",
     "without_locked",

@@ -6,7 +6,6 @@ from typing import Unpack
 
 import numpy as np
 
-from xcrack.analysis.solution import Solution
 from xcrack.base.errors import GeometryError, ProblemError, XcrackError, warn
 from xcrack.crack.crack import Crack
 from xcrack.fatigue.checks import depends_on_ratio
@@ -33,7 +32,7 @@ from xcrack.growth.rates import (
     check_choice,
     evaluate,
     levels_of,
-    respond_to_cycle,
+    respond_to_states,
     warn_of_left_out,
 )
 from xcrack.growth.step import LEAST, Advance, Cycle, Joined, Memory, Step, memory_of
@@ -41,7 +40,6 @@ from xcrack.growth.uncertainty import best_known, shortfall, with_K
 from xcrack.linalg.reuse import Reuse
 from xcrack.mesh.mesh import Mesh
 from xcrack.model.problem import Problem
-from xcrack.sif.sif import SIF
 
 
 @lists_options
@@ -115,6 +113,11 @@ def grow(
         Stop at the first step with at least this many cycles.
     solver : optional
         As in `solve`.
+    response : callable (problem, states, reuse, bars) -> Response, optional
+        K from elsewhere than a solution: a handbook, a table, a test. It is asked in each step for
+        K of the cracks of `problem` under some load states, factors of the loads or lists of loads:
+        `Response.of_K` makes the answer from numbers. `reuse` is that of the response before, and
+        `bars` says whether K needs error bars. `respond` is what is asked where it is left out.
     progress : bool or "always"
         One line a step on standard error, if that is a terminal or a notebook (or always); with the
         time that is left, where `max_steps` or `max_cycles` allows an estimate.
@@ -310,13 +313,15 @@ def _next_step(
     met: Joined | None = None,
 ) -> tuple[Step, Reuse]:
     """Solve all load states of a problem and decide where and how fast its cracks grow."""
-    solutions, sif, handed_on = respond(problem, run, reuse)
-    seen = evaluate(run, problem, best_known(sif), solutions)
+    response = respond_to_states(run, problem, reuse, run.estimates)
+    sif, solutions, handed_on = response.sif, response.solutions, response.reuse
+    seen = evaluate(run, problem, replace(response, sif=best_known(sif)))
     integrator = integrator_of(run)
     if last is None:
         index, radius = 0, run.problem.numerics.radius
         settled = integrator.begun(run, seen)
-        if radius is None and run.tolerance is None and len(solutions[0].space.radius):
+        modelled = bool(solutions) and len(solutions[0].space.radius) > 0
+        if radius is None and run.tolerance is None and modelled:
             radius = float(np.min(solutions[0].space.radius))
     else:
         index, radius = last.index + 1, memory_of(last).radius
@@ -349,22 +354,12 @@ def _next_step(
         da=settled.da,
         solutions=solutions,
         memory=memory,
-        levels=levels_of(run.cycle, solutions),
+        levels=levels_of(run.cycle, response),
         corrected=settled.corrected,
         error=settled.error,
         joins=() if met is None else met.joins,
     )
     return step, handed_on
-
-
-def respond(
-    problem: Problem, run: Run, reuse: Reuse
-) -> tuple[tuple[Solution, ...], tuple[tuple[SIF, ...], ...], Reuse]:
-    """Solutions of all load states, K of each crack in each of them, and what serves the next.
-
-    The factor is handed on, but not kept with the solutions.
-    """
-    return respond_to_cycle(problem, run.cycle, run.solver, reuse, run.estimates)
 
 
 def _problem(run: Run, cracks: Sequence[Crack], memory: Memory) -> Problem:
@@ -383,4 +378,4 @@ def _gone(run: Run, cracks: Sequence[Crack], placed: Sequence[Crack]) -> bool:
     return any(twin.gone(*pair) for pair in zip(cracks, placed, strict=True))
 
 
-__all__ = ["grow", "respond", "steps_of"]
+__all__ = ["grow", "steps_of"]

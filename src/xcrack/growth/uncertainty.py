@@ -9,9 +9,9 @@ import numpy as np
 from xcrack.base.arrays import Bools, Floats
 from xcrack.base.errors import collected_warnings
 from xcrack.fatigue.spectrum import Spectrum
-from xcrack.growth.block import Answers
 from xcrack.growth.options import Run
 from xcrack.growth.rates import Evaluation, Settled, asked_of, rates_of
+from xcrack.growth.response import Answers
 from xcrack.growth.step import Step
 from xcrack.sif.sif import SIF
 
@@ -168,7 +168,7 @@ def _answers(
     if isinstance(run.cycle, Spectrum) or seen.free is not None:
         return partial(_moved, run, seen)
     # Of a cycle, K of its states is all that changes.
-    asked = asked_of(run, seen.problem, (seen.solutions, seen.sif))
+    asked = asked_of(run, seen.problem, seen.response)
 
     def answer(bar: Sequence[Floats], mode: int, sign: float) -> tuple[Floats, Floats]:
         with collected_warnings([]):  # they are of cracks that nobody has
@@ -197,9 +197,10 @@ def _moved(
 
     free = None
     if seen.free is not None:
-        free = (seen.free[0], moved(seen.free[1]))
+        free = replace(seen.free, sif=moved(seen.free.sif))
     with collected_warnings([]):  # they are of cracks that nobody has
-        angle, _, _, rate = rates_of(run, seen.problem, moved(seen.sif), seen.solutions, free)
+        response = replace(seen.response, sif=moved(seen.sif))
+        angle, _, _, rate = rates_of(run, seen.problem, response, free)
     return np.concatenate(angle), np.concatenate(rate)
 
 

@@ -16,6 +16,7 @@ from xcrack.base.svg import rim, sketch
 from xcrack.crack.crack import Crack
 from xcrack.crack.junctions import Junction
 from xcrack.crack.placing import check_cracks, junctions, on_others, placed
+from xcrack.crack.stations import Stations, stations_of
 from xcrack.mesh.holes import round_hole
 from xcrack.mesh.mesh import Mesh, facet_set
 from xcrack.model.conditions import (
@@ -121,6 +122,11 @@ class Problem:
         cracks = on_others(self.cracks, cracks, self.mesh)
         check_cracks(cracks, self.mesh)
         return cracks
+
+    @cached_property
+    def stations(self) -> Stations:
+        """Tips, in 3D vertices of the fronts, of the placed cracks inside the body."""
+        return stations_of(self.placed, self.mesh)
 
     @cached_property
     def junctions(self) -> tuple[Junction, ...]:

@@ -112,7 +112,7 @@ def compliance(solution: Solution, force: Any) -> float:
         raise ProblemError(
             "compliance: initial stress has energy without a force: leave it out of the problem."
         )
-    return float(2 * solution.energy / P**2)
+    return float(2 * solution.energy / P / P)
 
 
 __all__ = ["compliance", "crack_opening"]

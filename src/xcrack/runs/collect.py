@@ -121,7 +121,7 @@ def resume(
         are compared by their code and by all that they read.
     until
         As in `collect`.
-    cycles, scaling, integrator, threshold, retardation, solver, progress, keep_solutions
+    cycles, scaling, integrator, threshold, retardation, solver, response, progress, keep_solutions
         As they were given to `grow` and `collect`.
     tolerance, max_unknowns
         As they were given to `grow`. The mesh that a tolerance chose is read from the folder; where

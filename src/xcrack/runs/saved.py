@@ -90,9 +90,7 @@ def save(result: Solution | Sequence[Solution] | History, path: str | PathLike[s
     ProblemError
         Something else than these, or a file that cannot be written.
     """
-    file = path_of(path, "save: path", error=ProblemError)
-    if file.name in ("", ".."):
-        raise ProblemError(f"save: path = {str(file)!r} is a folder: give a file in it.")
+    file = path_of(path, "save: path", error=ProblemError, is_file=True)
     file = file if file.suffix else file.with_name(file.name + _SUFFIX)
     content = {"format": _FORMAT, **_content(result)}
     with system_errors("the result cannot be written to", file, error=ProblemError):

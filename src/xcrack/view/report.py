@@ -73,9 +73,7 @@ def report(
     ProblemError
         Something else than these, no run in the folder, or a file that cannot be written.
     """
-    path = path_of(file, "report: file", error=ProblemError)
-    if path.name in ("", ".."):
-        raise ProblemError(f"report: file = {shown(str(file))} is a folder: give a file in it.")
+    path = path_of(file, "report: file", error=ProblemError, is_file=True)
     path = path if path.suffix else path.with_name(path.name + ".html")
     if not isinstance(title, str):
         raise ProblemError(f"report: title = {shown(title)}: give a text.")

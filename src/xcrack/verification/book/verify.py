@@ -54,7 +54,7 @@ def verify(
         raise ProblemError(f"verify: only = {shown(only)}: give a part of the name of a case.")
     for name, value in (("quick", quick), ("progress", progress)):
         flag(value, f"verify: {name}")
-    path = None if file is None else path_of(file, "verify: file", error=ProblemError)
+    path = None if file is None else path_of(file, "verify: file", error=ProblemError, is_file=True)
 
     def after(result: Result) -> None:
         if progress:

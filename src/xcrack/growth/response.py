@@ -1,0 +1,221 @@
+"""K of the load states of a scene: solved, or from elsewhere.
+
+`grow` asks a function ``response(problem, states, reuse, bars)`` in each step; `respond` is the one
+that solves. Another one takes K from a handbook, a table or a test.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from xcrack.analysis.solution import Solution
+from xcrack.analysis.solve import solve_states
+from xcrack.base.arrays import Floats, lock
+from xcrack.base.checks import entries, flag, numbers, shown
+from xcrack.base.errors import ProblemError
+from xcrack.fatigue.spectrum import Level
+from xcrack.linalg.reuse import Reuse
+from xcrack.model.problem import Problem, check_problem
+from xcrack.sif.sif import SIF
+from xcrack.sif.stress_intensity import stress_intensities
+
+Answers = tuple[tuple[SIF, ...], ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Response:
+    """K of all cracks in some load states.
+
+    Attributes
+    ----------
+    states : tuple of load states
+        Factors of the loads, or lists of loads.
+    sif : tuple of tuple of SIF
+        ``sif[state][crack]``.
+    solutions : tuple of Solution
+        One a state; empty where K is from elsewhere.
+    reuse : Reuse
+        What the next solve starts from.
+
+    Raises
+    ------
+    ProblemError
+        Parts of other types, or other numbers of states than of rows of K.
+    """
+
+    states: tuple[Any, ...]
+    sif: Answers
+    solutions: tuple[Solution, ...] = ()
+    reuse: Reuse = field(default_factory=Reuse)
+
+    def __post_init__(self) -> None:
+        sif = tuple(entries(row, "Response: sif") for row in entries(self.sif, "Response: sif"))
+        object.__setattr__(self, "sif", sif)
+        for name in ("states", "solutions"):
+            object.__setattr__(self, name, entries(getattr(self, name), f"Response: {name}"))
+        if not all(isinstance(each, SIF) for row in sif for each in row):
+            raise ProblemError(f"Response: sif = {shown(self.sif)}: give a row of SIF a state.")
+        if not all(isinstance(each, Solution) for each in self.solutions):
+            raise ProblemError(
+                f"Response: solutions = {shown(self.solutions)}: give those of solve."
+            )
+        if not isinstance(self.reuse, Reuse):
+            raise ProblemError(f"Response: reuse = {shown(self.reuse)}: give that of a Response.")
+        counts = {len(self.states), len(self.sif), len(self.solutions or self.sif)}
+        if len(counts) > 1:
+            raise ProblemError(
+                f"Response: {len(self.states)} states with {len(self.sif)} rows of K and "
+                f"{len(self.solutions)} solutions: give as many of each, or no solutions."
+            )
+
+    @property
+    def factors(self) -> Floats:
+        """Factor of each state of a spectrum."""
+        return np.array([s.factor if isinstance(s, Level) else s for s in self.states], dtype=float)
+
+    @property
+    def may_bend(self) -> bool:
+        """Whether K may be no straight line over the factor: faces press, or nobody knows."""
+        if not self.solutions:
+            return True
+        return any(part is not None for each in self.solutions for part in each.contact)
+
+    @classmethod
+    def of_K(
+        cls, problem: Problem, states: Sequence[Any], K: ArrayLike, T: ArrayLike | None = None
+    ) -> "Response":
+        """K as numbers, at the stations of a problem.
+
+        Parameters
+        ----------
+        problem : Problem
+            As `response` was given it: with the cracks of the step.
+        states : sequence of load states
+            As `response` was given them.
+        K : (s, n, 2 or 3) array, stress √length
+            Of s states at the n stations of `problem.stations`: columns I, II and in 3D III.
+        T : (s, n) array, stress, optional
+            Stress along the faces; 0 where it is left out.
+
+        Raises
+        ------
+        ProblemError
+            Arrays of another shape, or with numbers that are not finite.
+        """
+        check_problem(problem, "Response.of_K")
+        states = entries(states, "Response.of_K: states")
+        stations, d = problem.stations, problem.mesh.dim
+        s, n = len(states), len(stations)
+        try:
+            values = numbers(K, "Response.of_K: K", (s, n, d))
+            stress = np.zeros((s, n)) if T is None else numbers(T, "Response.of_K: T", (s, n))
+        except ProblemError as error:
+            raise ProblemError(
+                f"{error} There are {s} states and {n} stations: see problem.stations."
+            ) from None
+        result = []
+        for k in range(s):
+            row = []
+            for c in range(len(problem.placed)):
+                of_crack = stations.crack == c
+                m = int(of_crack.sum())
+                row.append(
+                    SIF(
+                        x=lock(stations.x[of_crack]),
+                        frame=lock(stations.frame[of_crack]),
+                        K=lock(values[k, of_crack]),
+                        T=lock(stress[k, of_crack]),
+                        spread=lock(np.zeros((m, d))),
+                        s=lock(stations.s[of_crack]),
+                        front=lock(stations.front[of_crack]),
+                        at_surface=lock(np.zeros(m, dtype=bool)),
+                        closed=lock(np.zeros(m, dtype=bool)),
+                        domain_cells=lock(np.full(m, np.inf)),
+                    )
+                )
+            result.append(tuple(row))
+        return cls(tuple(states), tuple(result))
+
+
+Respond = Callable[[Problem, Sequence[Any], Reuse, bool], Response]
+
+
+def respond(
+    problem: Problem,
+    states: Sequence[Any],
+    reuse: Reuse | None = None,
+    bars: bool = False,
+    *,
+    solver: Any = None,
+) -> Response:
+    """Solve a scene in some load states, and take K of all cracks.
+
+    Parameters
+    ----------
+    problem : Problem
+    states : sequence of load states
+        As of `solve`. With friction they are one cycle, repeated until slip returns.
+    reuse : Reuse, optional
+        Of the response before.
+    bars : bool
+        Give K its error bars.
+    solver : optional
+        As of `solve`.
+
+    Returns
+    -------
+    Response
+
+    Raises
+    ------
+    ProblemError
+        As of `solve` and `stress_intensity`.
+    """
+    check_problem(problem, "respond")
+    reuse = Reuse() if reuse is None else reuse
+    if not isinstance(reuse, Reuse):
+        raise ProblemError(f"respond: reuse = {shown(reuse)}: give that of a Response.")
+    states, bars = entries(states, "respond: states"), flag(bars, "respond: bars")
+    if not states:
+        raise ProblemError("respond: states is empty: give one load state, at least.")
+    if solver is not None and not callable(solver):
+        raise ProblemError(f"respond: solver = {shown(solver)} cannot be called: give a function.")
+    plane = problem.mesh.dim < 3  # of fronts, the bars need no factor
+    solved = solve_states(
+        problem, states, reuse=reuse, solver=solver, repeated=True, error=bars and plane
+    )
+    handed_on = solved[0].reuse
+    light = handed_on.without_factor()
+    solutions = [replace(solution, reuse=light) for solution in solved]
+    by_crack = [stress_intensities(solutions, c, bars) for c in range(len(problem.cracks))]
+    solutions = [replace(solution, factored=None) for solution in solutions]
+    sif = tuple(zip(*by_crack, strict=True))
+    return Response(tuple(states), sif, tuple(solutions), handed_on)
+
+
+def checked_response(response: Any, problem: Problem, states: Sequence[Any]) -> Response:
+    """What a function for K returned, if it is a Response for these states and cracks.
+
+    Raises
+    ------
+    ProblemError
+        It is not.
+    """
+    if not isinstance(response, Response):
+        raise ProblemError(
+            f"grow: response returned {shown(response)}: return a Response, such as "
+            "Response.of_K(problem, states, K)."
+        )
+    n = len(problem.placed)
+    if len(response.sif) != len(states) or any(len(row) != n for row in response.sif):
+        raise ProblemError(
+            f"grow: response returned K of {len(response.sif)} states, where {len(states)} were "
+            f"asked for, of {n} cracks each: return a row a state, with a SIF a crack."
+        )
+    return response
+
+
+__all__ = ["Answers", "Respond", "Response", "checked_response", "respond"]
