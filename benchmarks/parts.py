@@ -74,7 +74,8 @@ def run(n: int) -> None:
     with part("enriched cells"):
         K = total_stiffness(plain, enriched_stiffness(V, material, numerics, lips)[0])
     with part("loads"):
-        f = load_vector(V, tuple(problem.loads), lips)[:, None]
+        vectors = [load_vector(V, material, load, lips) for load in problem.loads]
+        f = np.sum(vectors, axis=0)[:, None]
         fixed = known_unknowns(V, ()).fixed.copy()
         fixed[free_motion(V, fixed).pins] = True
     with part("factor"):

@@ -51,6 +51,6 @@ def _path(s: Settings, seed: int, path: Sequence[tuple[float, float]]) -> Outcom
     return Outcome(errors, solutions[-1].n_dof)
 
 
-def _imposed(effective: float, tau: float) -> list[xc.model.conditions.Displacement]:
+def _imposed(effective: float, tau: float) -> list[xc.displacement]:
     u = sliding(effective, tau, PRESSURE, _MIDDLE, _ANGLE)
     return [xc.displacement(side, lambda x: u(x)) for side in _SIDES]

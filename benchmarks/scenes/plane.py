@@ -16,7 +16,7 @@ COARSE = 5  # cells a side from which `adapt` starts
 MODES = (1.0, 0.5)  # K_I and K_II of the open edge crack
 
 
-def _imposed(sides: Sequence[str], u: Field) -> list[xc.model.conditions.Displacement]:
+def _imposed(sides: Sequence[str], u: Field) -> list[xc.displacement]:
     return [xc.displacement(side, lambda x: u(x)) for side in sides]
 
 

@@ -93,7 +93,10 @@ def test_a_broken_multiplier_space_fails(monkeypatch):
     def wrong(right):
         return lambda space, c, lips, kind, fixed=None: right(space, c, lips, "naive", fixed)
 
-    places = ("xcrack.analysis.contact.multipliers", "xcrack.analysis.inf_sup.multipliers")
+    places = (
+        "xcrack.analysis.contact.multipliers",
+        "xcrack.verification.methods.inf_sup.multipliers",
+    )
     failed = broken(monkeypatch, *((place, wrong) for place in places))
     print(sorted(failed))
     kinds = {case.requirement for case in CASES if case.id in failed}

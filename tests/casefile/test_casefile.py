@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import xcrack as xc
-from xcrack.app.case_tables import FORCE, LENGTH, STRESS, TOUGHNESS, Units
+from xcrack.base.units import FORCE, LENGTH, STRESS, TOUGHNESS, Units
 
 pytestmark = pytest.mark.filterwarnings("ignore::xcrack.XcrackWarning")
 

@@ -227,7 +227,7 @@ class ListOf(Kind):
         items = self.read(value)
         if items is None or not self.least <= len(items) <= self.most:
             return NONSENSE
-        verdicts = {self.item.verdict(item) for item in items}
+        verdicts = set() if self.item is None else {self.item.verdict(item) for item in items}
         for verdict in (NONSENSE, SKIP, EDGE):
             if verdict in verdicts:
                 return verdict

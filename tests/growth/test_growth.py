@@ -14,7 +14,7 @@ from xcrack.fatigue.criteria import max_hoop_stress, weighted_angle
 from xcrack.fatigue.power import elber, paris
 from xcrack.growth.run import grow
 from xcrack.growth.step import Cycle
-from xcrack.model.conditions import traction
+from xcrack.model.loads import traction
 
 LAW = paris(C=1e-11, m=3.0)
 CYCLE = Cycle(0.0, 1.0)

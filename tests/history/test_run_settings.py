@@ -23,7 +23,7 @@ from xcrack.growth.description import describe, differences
 from xcrack.growth.options import Run
 from xcrack.growth.run import grow
 from xcrack.growth.step import Cycle
-from xcrack.model import conditions
+from xcrack.model.loads import body_force
 from xcrack.runs import collect as collecting
 from xcrack.runs.collect import collect, resume
 from xcrack.runs.versions import versions
@@ -59,7 +59,7 @@ def test_resume_names_what_is_different_in_the_problem(whole):
         (replace(problem, order=1), r"problem\.order: stored the default, given 1"),
         (replace(problem, contact="off"), r"problem\.contact"),
         (replace(problem, numerics=replace(problem.numerics, points=5)), r"numerics\.points"),
-        (replace(problem, loads=[conditions.body_force((1.0, 0.0))]), r"problem\.loads"),
+        (replace(problem, loads=[body_force((1.0, 0.0))]), r"problem\.loads"),
         (replace(problem, cracks=problem.cracks[:1]), "problem.cracks: stored 2 entries, given 1"),
         (plate(problem.cracks, n=(60, 41)), r"problem\.mesh\.(cells|points)"),
     ):

@@ -14,9 +14,10 @@ from xcrack.fatigue.thresholds import el_haddad, klesnil_lukas, nasgro4_threshol
 from xcrack.growth.run import grow
 from xcrack.growth.step import Cycle
 from xcrack.mesh.box import box
-from xcrack.model.conditions import fix, traction
+from xcrack.model.loads import traction
 from xcrack.model.material import Isotropic
 from xcrack.model.problem import Problem
+from xcrack.model.supports import fix
 from xcrack.testing import check_law
 
 CYCLE = Cycle(0.1, 1.0)

@@ -18,9 +18,10 @@ from xcrack.fatigue.thresholds import klesnil_lukas
 from xcrack.growth.run import grow
 from xcrack.growth.step import Cycle
 from xcrack.mesh.box import box
-from xcrack.model.conditions import fix, traction
+from xcrack.model.loads import traction
 from xcrack.model.material import Isotropic
 from xcrack.model.problem import Problem
+from xcrack.model.supports import fix
 from xcrack.runs.history import History
 from xcrack.runs.life import life
 from xcrack.runs.scatter import Scatter, lognormal, normal

@@ -17,9 +17,10 @@ from xcrack.fatigue.thresholds import klesnil_lukas
 from xcrack.growth.run import grow
 from xcrack.growth.step import Cycle
 from xcrack.mesh.box import box
-from xcrack.model.conditions import fix, traction
+from xcrack.model.loads import traction
 from xcrack.model.material import Isotropic
 from xcrack.model.problem import Problem
+from xcrack.model.supports import fix
 from xcrack.runs.history import History
 from xcrack.runs.inspection import growth_curve, inspection, logistic_pod
 from xcrack.runs.life import life

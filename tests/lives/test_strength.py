@@ -11,15 +11,17 @@ from xcrack.crack.lines import line_crack
 from xcrack.crack.surfaces import elliptic_crack
 from xcrack.fatigue.criteria import max_hoop_stress
 from xcrack.fatigue.power import paris
-from xcrack.fatigue.spectrum import Spectrum, scaled
+from xcrack.fatigue.spectrum import Spectrum
 from xcrack.growth.response import respond
 from xcrack.growth.run import grow
 from xcrack.growth.step import Cycle
 from xcrack.linalg.reuse import Reuse
 from xcrack.mesh.box import box
-from xcrack.model.conditions import fix, traction
+from xcrack.model.loads import traction
 from xcrack.model.material import Isotropic
 from xcrack.model.problem import Problem
+from xcrack.model.states import LoadLevel
+from xcrack.model.supports import fix
 from xcrack.runs.assessment import (
     assessment_line,
     geometry_factors,
@@ -181,7 +183,7 @@ def test_opening_load_is_where_the_tip_opens():
     K = {}
     problem, spectrum = bent()
     for factor in (level - 0.03, level + 0.03):
-        state = [*(scaled(load, factor) for load in problem.loads), *spectrum.steady]
+        state = LoadLevel(factor, spectrum.steady)
         K[factor] = respond(problem, [state], Reuse()).sif[0][0].K[0, 0]
     below, above = K.values()
     assert below < 2e-2 * step[65].sif[-1][0].K[0, 0]

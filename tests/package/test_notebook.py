@@ -33,7 +33,7 @@ def test_cards_are_html_of_the_numbers():
     solution, history = xc.solve(plate()), grown()
     sif = xc.stress_intensity(solution)
     for value, words in (
-        (plate(), "traction on top"),
+        (plate(), "traction(&#x27;top&#x27;)"),
         (solution, f"{solution.n_dof}"),
         (sif, f"{sif.K_I[0]:.6g}"),
         (history, f"{history.life:.6g}"),

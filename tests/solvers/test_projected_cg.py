@@ -191,6 +191,14 @@ CRACKS = {
 }
 
 
+def total(problem, model, loads):
+    """Nodal forces of loads together."""
+    forces = np.zeros(model.space.n_dof)
+    for load in loads:
+        forces += load_vector(model.space, problem.material, load, model.lips)
+    return forces
+
+
 class Scene:
     """A cracked square and all that both engines need."""
 
@@ -207,7 +215,7 @@ class Scene:
         )  # fmt: skip
         self.problem, self.model = problem, build(problem)
         self.space, self.fixed = self.model.space, self.model.known.fixed
-        self.f = load_vector(self.space, tuple(loads), self.model.lips)
+        self.f = total(problem, self.model, loads)
         self.known = self.model.known.value
         self.stiffness = problem.material.E * n / 2
 
@@ -344,7 +352,7 @@ def test_without_supports():
     """Balanced loads on a body that nothing holds, as with pins, up to a rigid motion."""
     scene = Scene("inner", supports=[])
     pull = [xc.traction("top", (0.0, -1.0)), xc.traction("bottom", (0.0, 1.0))]
-    f = load_vector(scene.space, tuple(pull), scene.model.lips)
+    f = total(scene.problem, scene.model, pull)
     motion = free_motion(scene.space, scene.fixed)
     assert motion.modes.shape[1] == 3
     f = balanced(scene.space, motion, f[:, None])[0][:, 0]
@@ -391,7 +399,7 @@ def test_a_tilted_penny_as_with_a_factor(supports, order):
     model = build(problem)
     space, fixed = model.space, model.known.fixed
     motion = free_motion(space, fixed)
-    f = load_vector(space, tuple(loads), model.lips)
+    f = total(problem, model, loads)
     f = balanced(space, motion, f[:, None])[0][:, 0]
     pinned = fixed.copy()
     pinned[motion.pins] = True

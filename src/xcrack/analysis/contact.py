@@ -14,10 +14,8 @@ from xcrack.fem.system import Model
 from xcrack.linalg.direct import System
 from xcrack.linalg.engine import ContactRows, Engine, StateContact
 from xcrack.linalg.reuse import Reuse
-from xcrack.model.conditions import Load
 from xcrack.model.problem import Problem
-
-Acting = Sequence[tuple[tuple[Load, ...], float]]
+from xcrack.model.states import LoadState
 
 _OVERLAP = 1e-9  # share of the largest displacement by which faces must overlap to need contact
 
@@ -29,7 +27,7 @@ def solve_contact(
     f: Floats,
     known: Floats,
     reuse: Reuse,
-    acting: Acting,
+    acting: Sequence[LoadState],
     repeated: bool = False,
 ) -> ContactSolution:
     """Solve, and give multipliers to cracks whose faces overlap, until none does.
@@ -47,9 +45,8 @@ def solve_contact(
         Loads, and displacements that supports impose.
     reuse : Reuse
         Of an earlier step.
-    acting : sequence of (loads, factor)
-        Loads of each state and their scale: some alternatives to multipliers need what acts on
-        the faces besides.
+    acting : sequence of LoadState
+        Loads of each state: some methods need what acts on the faces besides.
     repeated : bool
         With friction: the states are a cycle, repeated until slip returns.
     """
@@ -151,7 +148,7 @@ def _solve_states(
     known: Floats,
     guess: tuple[Floats | None, Floats | None],
     reuse: Reuse,
-    acting: Acting,
+    acting: Sequence[LoadState],
 ) -> list[StateContact]:
     """Contact of all load states; `guess` is the latest u and that of open faces."""
     closed = problem.numerics.initial_set == "closed"

@@ -13,7 +13,7 @@ from xcrack.crack.crack import Crack
 from xcrack.fem.system import Model
 from xcrack.linalg.engine import Engine
 from xcrack.linalg.rigid_motion import Motion
-from xcrack.model.conditions import CrackPressure, Displacement, InitialStress, Load, Support
+from xcrack.model.loads import Load
 from xcrack.model.problem import Problem
 
 
@@ -160,16 +160,13 @@ def resultants(
         Stiffness times displacements less all loads; contact acts on jumps only.
     """
     rows = [
-        _resultant(model, _name(load), vector)
+        _resultant(model, load.name, vector)
         for load, vector in zip(loads, vectors, strict=True)
-        # Displacements act through supports, the others are in equilibrium by themselves.
-        if not isinstance(load, Displacement | InitialStress | CrackPressure)
+        if load.is_listed
     ]
     for number, support in enumerate(problem.supports):
         own = model.known.owner == number
-        rows.append(
-            _resultant(model, f"reaction of {_name(support)}", np.where(own, residual, 0.0))
-        )
+        rows.append(_resultant(model, f"reaction of {support.name}", np.where(own, residual, 0.0)))
     return tuple(rows)
 
 
@@ -185,17 +182,6 @@ def _resultant(model: Model, name: str, f: Floats) -> Resultant:
     return Resultant(
         name, force, (float(turning[1, 2]), float(turning[2, 0]), float(turning[0, 1]))
     )
-
-
-def _name(load: Load | Support) -> str:
-    kind = type(load).__name__
-    words = "".join(f"_{c.lower()}" if c.isupper() else c for c in kind).lstrip("_")
-    where = getattr(load, "where", getattr(load, "x", None))
-    if where is None:
-        return words
-    axis = getattr(load, "axis", None)
-    place = repr(where) if isinstance(where, str) else str(np.round(where, 6).tolist())
-    return f"{words}({place}{'' if axis is None else f', axis={axis}'})"
 
 
 __all__ = []

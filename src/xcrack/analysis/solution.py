@@ -24,8 +24,9 @@ from xcrack.linalg.engine import Engine
 from xcrack.linalg.reuse import Reuse
 from xcrack.linalg.rigid_motion import Motion
 from xcrack.mesh.locate import locate
-from xcrack.model.conditions import InitialStress, Load, evaluate_stress
+from xcrack.model.loads import Load
 from xcrack.model.problem import Problem, crack_number
+from xcrack.model.states import LoadState
 
 # What a solve keeps where errors are asked for: its factor, and the contact of all states.
 
@@ -66,10 +67,8 @@ class Solution:
     problem : Problem
     state : object
         The load state as it was given.
-    loads : tuple of loads
-        Loads of this state, before they were scaled.
-    factor : float
-        Scale of the loads (not of an initial stress).
+    acting : LoadState
+        Loads of this state, and the factor of each.
     space : FunctionSpace
     u : (n_dof,) array, length
         Unknowns: standard, Heaviside, tip functions.
@@ -93,8 +92,7 @@ class Solution:
 
     problem: Problem
     state: object
-    loads: tuple[Load, ...]
-    factor: float
+    acting: LoadState
     space: FunctionSpace
     u: Floats
     lips: tuple[LipPoints, ...]
@@ -105,6 +103,16 @@ class Solution:
     number: int = 0
     factored: Factored | None = None
     dissipated: float = 0.0
+
+    @property
+    def loads(self) -> tuple[Load, ...]:
+        """Loads of this state, before they were scaled."""
+        return self.acting.loads
+
+    @property
+    def factor(self) -> float:
+        """Scale of the loads, but for steady ones, and of the displacements of supports."""
+        return self.acting.factor
 
     def __repr__(self) -> str:
         return f"Solution(state={self.state!r}, n_dof={self.n_dof}, energy={self.energy:.6g})"
@@ -131,8 +139,8 @@ class Solution:
         Faces that rub may hold slip without any load.
         """
         rubs = any(each is not None and each.shear is not None for each in self.contact)
-        stressed = any(isinstance(load, InitialStress) for load in self.loads)
-        return self.factor == 0 and not stressed and not rubs
+        acts = self.factor or any(factor for _, factor in self.acting)
+        return not acts and not rubs
 
     @property
     def n_dof(self) -> int:
@@ -211,9 +219,9 @@ class Solution:
         """Sum of the initial stresses at points `(q, d)`: `(q, d, d)`."""
         x = numbers(x, "initial_stress: x", (None, self.space.dim))
         total = np.zeros((len(x), self.space.dim, self.space.dim))
-        for load in self.loads:
-            if isinstance(load, InitialStress):
-                total = total + evaluate_stress(load.value, x)
+        for load, factor in self.acting:
+            if "initial_stress" in load.acts:
+                total = total + factor * load.initial_stress(x, self.problem.material)
         return total
 
     def opening(self, crack: int = 0) -> Floats:

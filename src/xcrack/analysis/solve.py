@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import scipy.sparse as sp
@@ -33,9 +33,11 @@ from xcrack.linalg.rigid_motion import (
     free_motion,
     without_motion,
 )
-from xcrack.model.conditions import Displacement, InitialStress, Load, Temperature, evaluate_stress
 from xcrack.model.friction import check_order
+from xcrack.model.loads import Load
 from xcrack.model.problem import Problem, check_problem
+from xcrack.model.states import LoadState
+from xcrack.model.supports import Support
 
 # How much of an initial stress the body cannot bear: its part out of balance.
 
@@ -61,23 +63,21 @@ def out_of_balance(problem: Problem, model: Model, loads: Sequence[Load]) -> flo
     float or None
         Between 0 and 1; None where no such stress acts.
     """
-    own = tuple(
-        load
-        for load in loads
-        if isinstance(load, InitialStress) and not isinstance(load, Temperature)
-    )
-    if not own:
+    stresses = tuple(load for load in loads if load.relaxes)
+    if not stresses:
         return None
     space = model.space
     n = space.n_nodes * space.dim
     points = body_points(space)
     x = position(space, points.cell, points.bary)
-    sigma = sum((evaluate_stress(load.value, x) for load in own), np.zeros((1, 1, 1)))
-    stored = np.einsum("q,qij,qij->", points.weight, sigma, problem.material.strain(sigma))
+    material = problem.material
+    sigma = sum((load.initial_stress(x, material) for load in stresses), np.zeros((1, 1, 1)))
+    stored = np.einsum("q,qij,qij->", points.weight, sigma, material.strain(sigma))
     if stored <= 0:
         return None
     free = ~model.known.fixed[:n]
-    f = np.where(free, load_vector(space, own, ())[:n], 0.0)
+    vector = sum(load_vector(space, material, load, ())[:n] for load in stresses)
+    f = np.where(free, vector, 0.0)
     matrix = model.bulk.matrix
     keep = sp.diags(free.astype(float))
     scale = np.where(free, 1 / matrix.diagonal(), 0.0)
@@ -177,15 +177,15 @@ def _solve_states(
     repeated: bool,
 ) -> list[Solution]:
     model = build(problem, None if reuse is None else reuse.bulk)
-    known_loads = mesh_loads(model.space, model.bulk.loads)
-    cases = [_case(problem, model, state, known_loads) for state in states]
+    vectors = mesh_loads(model.space, model.bulk.loads)
+    cases = [_case(problem, model, state, vectors) for state in states]
     fixed = model.known.fixed.copy()
     free = _free(model, fixed)
     motion = free_motion(model.space, fixed, free[1])
     engine = _engine(problem, model, fixed, motion, solver, reuse)
     f, imbalance = balanced(model.space, motion, np.stack([case.f for case in cases], axis=1))
     known = np.stack([case.known for case in cases], axis=1)
-    acting = [(case.loads, case.factor) for case in cases]
+    acting = [case.acting for case in cases]
     start = reuse or Reuse()
     pressed = solve_contact(problem, model, engine, f, known, start, acting, repeated)
     u = pressed.u
@@ -193,28 +193,28 @@ def _solve_states(
         u = without_motion(motion, u)
     loads: tuple[MeshLoad, ...] = ()
     if reuse is not None:  # else there is no next step
-        acted = {id(load): load for case in cases for load in case.loads}.values()
-        vectors = [(load, known_loads[id(load)]) for load in acted]
-        loads = on_mesh(model.space, vectors, model.bulk.loads)
+        acted = {id(load): load for case in cases for load in case.acting.loads}.values()
+        pairs = [(load, vectors[id(load)]) for load in acted]
+        loads = on_mesh(model.space, pairs, model.bulk.loads)
     left = replace(pressed.closed_sets(), bulk=replace(model.bulk, loads=loads, free=free))
     if pressed.rubbing:
         left = replace(left, slip=slip_of(model, pressed.rubbing, u[:, -1]))
     handed_on = engine.handed_on(left)
     factored = Factored(model, engine, motion, pressed) if error else None
     # It depends on the mesh, not on the cracks: steps of a run leave it out.
-    unbalanced = None if reuse is not None else out_of_balance(problem, model, cases[0].loads)
+    first = cases[0].acting.loads
+    unbalanced = None if reuse is not None else out_of_balance(problem, model, first)
     summary = report(problem, model, engine, pressed, motion, imbalance, len(states), unbalanced)
     solutions = []
     inner = times(engine.matrix, u)
     for k, (state, case) in enumerate(zip(states, cases, strict=True)):
         forces = inner[:, k]
-        rows = resultants(problem, model, case.loads, case.parts, forces - case.f)
+        rows = resultants(problem, model, case.acting.loads, case.parts, forces - case.f)
         solutions.append(
             Solution(
                 problem=problem,
                 state=state,
-                loads=case.loads,
-                factor=case.factor,
+                acting=case.acting,
                 space=model.space,
                 u=lock(np.ascontiguousarray(u[:, k])),
                 lips=model.lips,
@@ -278,40 +278,37 @@ def _engine(
 
 
 @dataclass(frozen=True, eq=False)
-class _Case:
+class LoadCase:
     """A load state: its vector, those of each load, and imposed displacements."""
 
-    loads: tuple[Load, ...]
-    factor: float
+    acting: LoadState
     f: Floats
     parts: tuple[Floats, ...]
     known: Floats
 
 
-def _case(problem: Problem, model: Model, state: Any, known_loads: dict[int, Floats]) -> _Case:
+def _case(problem: Problem, model: Model, state: Any, vectors: dict[int, Floats]) -> LoadCase:
     """A load state; states that share loads integrate them once."""
-    loads, factor = problem.state(state)
+    acting = problem.state(state)
     parts = []
-    for load in loads:
-        if id(load) not in known_loads:
-            known_loads[id(load)] = load_vector(model.space, (load,), model.lips)
-        scale = 1.0 if isinstance(load, InitialStress) else factor
-        own = known_loads[id(load)]
-        parts.append(own if scale == 1 else scale * own)
+    for load, factor in acting:
+        if id(load) not in vectors:
+            vectors[id(load)] = load_vector(model.space, problem.material, load, model.lips)
+        vector = vectors[id(load)]
+        parts.append(vector if factor == 1 else factor * vector)
     f = sum(parts, np.zeros(model.space.n_dof))
-    known = model.known.value
-    moved = tuple(load for load in loads if isinstance(load, Displacement))
-    if moved:
-        new = known_unknowns(model.space, moved)
-        known = np.where(new.fixed & model.known.fixed, new.value, known)
-    known = factor * known
+    known = acting.factor * model.known.value
+    moved = [(load, factor) for load, factor in acting if "support" in load.acts]
+    for factor in sorted({factor for _, factor in moved}):
+        new = known_unknowns(model.space, [cast(Support, x) for x, f in moved if f == factor])
+        known = np.where(new.fixed & model.known.fixed, factor * new.value, known)
     largest = max(np.abs(f).max(initial=0.0), np.abs(known).max(initial=0.0))
     if not largest < _LARGEST:
         raise ProblemError(
             f"the loads of state {shown(state)} give forces or displacements of up to "
             f"{largest:.3g}, whose squares are no numbers: take other units."
         )
-    return _Case(loads, factor, f, tuple(parts), known)
+    return LoadCase(acting, f, tuple(parts), known)
 
 
 __all__ = []

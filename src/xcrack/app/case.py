@@ -10,9 +10,10 @@ from typing import Any
 from xcrack.app import case_forms as forms
 from xcrack.app.case_forms import Form
 from xcrack.app.case_histories import loading, retardation_of
-from xcrack.app.case_tables import LENGTH, NUMBER, TOUGHNESS, Table, read_tables
+from xcrack.app.case_tables import Table, read_tables
 from xcrack.base.errors import ProblemError, XcrackError
 from xcrack.base.paths import path_of
+from xcrack.base.units import LENGTH, NUMBER, TOUGHNESS
 from xcrack.fatigue.zones import plastic_zone
 from xcrack.growth.options import GrowOptions
 from xcrack.model.material import Isotropic

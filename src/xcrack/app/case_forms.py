@@ -5,17 +5,10 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from xcrack.app.case_tables import (
-    BODY_FORCE,
-    FORCE,
-    LENGTH,
-    NUMBER,
-    STRESS,
-    TOUGHNESS,
-    Dimension,
-    Table,
-)
+from xcrack.app.case_tables import Table
+from xcrack.base.arguments import arguments_of, kinds_of
 from xcrack.base.errors import ProblemError, XcrackError
+from xcrack.base.units import LENGTH, NUMBER, TOUGHNESS, Dimension
 from xcrack.crack.lines import line_crack
 from xcrack.crack.surfaces import elliptic_crack, penny_crack, plane_crack, read_surface
 from xcrack.fatigue import criteria, fracture, power
@@ -23,7 +16,8 @@ from xcrack.mesh.box import box
 from xcrack.mesh.cylinder import notched_cylinder
 from xcrack.mesh.files import read_mesh
 from xcrack.mesh.plates import plate, plate_with_hole
-from xcrack.model import conditions
+from xcrack.model.loads import Load
+from xcrack.model.supports import Support
 
 _WORD = "kind"
 
@@ -70,19 +64,8 @@ CRACKS = {
     "polygon": Form(plane_crack, _lengths("polygon")),
     "file": Form(read_surface, files=("path",)),
 }
-SUPPORTS = {
-    "fix": Form(conditions.fix),
-    "displacement": Form(conditions.displacement, {"value": LENGTH}),
-}
-LOADS = {
-    "traction": Form(conditions.traction, {"value": STRESS}),
-    "pressure": Form(conditions.pressure, {"p": STRESS}),
-    "point_force": Form(conditions.point_force, {"x": LENGTH, "f": FORCE}),
-    "body_force": Form(conditions.body_force, {"b": BODY_FORCE}),
-    "crack_pressure": Form(conditions.crack_pressure, {"p": STRESS}),
-    "initial_stress": Form(conditions.initial_stress, {"f": STRESS}),
-    "displacement": Form(conditions.displacement, {"value": LENGTH}),
-}
+SUPPORTS = {name: Form(kind) for name, kind in kinds_of(Support).items()}
+LOADS = {name: Form(kind) for name, kind in kinds_of(Load).items()}
 LAWS = {
     "paris": Form(power.paris),
     "elber": Form(power.elber),
@@ -140,7 +123,9 @@ def _argument(table: Table, name: str, form: Form, parameter: inspect.Parameter)
             hint = f"; beside it are {', '.join(near[:5])}" if near else ""
             table.refuse(name, f"there is no file {path}{hint}: paths begin at the case file.")
         return path
-    value = table.value(name, form.units.get(name, _dimension_of(parameter)))
+    rule = arguments_of(form.function)[name].rule
+    declared = None if rule is None or callable(rule.unit) else rule.unit
+    value = table.value(name, form.units.get(name, declared or _dimension_of(parameter)))
     whole = isinstance(value, list) and value and not any(isinstance(v, list) for v in value)
     return tuple(value) if whole else value
 

@@ -6,8 +6,9 @@ from pathlib import Path
 from typing import Any
 
 from xcrack.app.case_forms import LOADS, Form, called_with, made
-from xcrack.app.case_tables import NUMBER, STRESS, TOUGHNESS, Table
+from xcrack.app.case_tables import Table
 from xcrack.base.errors import XcrackError
+from xcrack.base.units import NUMBER, STRESS, TOUGHNESS
 from xcrack.fatigue.files import read_spectrum, twist
 from xcrack.fatigue.spectrum import Spectrum
 from xcrack.fatigue.zones import Retardation, plastic_zone, wheeler, willenborg

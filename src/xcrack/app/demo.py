@@ -11,7 +11,7 @@ from xcrack.base.paths import path_of
 from xcrack.crack.lines import line_crack
 from xcrack.mesh.files import read_mesh
 from xcrack.mesh.mesh import Mesh
-from xcrack.model.conditions import pressure
+from xcrack.model.loads import pressure
 from xcrack.model.material import Isotropic
 from xcrack.model.problem import Problem
 from xcrack.view.report import report

@@ -21,7 +21,7 @@ from xcrack.crack.lines import line_crack
 from xcrack.crack.surfaces import penny_crack
 from xcrack.mesh.box import box
 from xcrack.mesh.mesh import Mesh
-from xcrack.model.conditions import displacement
+from xcrack.model.loads import displacement
 from xcrack.model.material import Isotropic
 from xcrack.model.problem import Problem
 from xcrack.runs.versions import versions

@@ -24,7 +24,6 @@ from xcrack.estimate.surplus import (
     solved,
     surplus,
 )
-from xcrack.model.conditions import CrackPressure, evaluate_scalar
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,7 +117,8 @@ def pressure_on(solution: Solution, c: int) -> Floats:
     lips = solution.lips[c]
     contact: Contact | None = solution.contact[c]
     total = np.zeros(len(lips)) if contact is None else np.array(contact.pressure)
-    for load in solution.loads:
-        if isinstance(load, CrackPressure) and load.crack in (None, c):
-            total += solution.factor * evaluate_scalar(load.value, lips.x, "crack_pressure")
+    for load, factor in solution.acting:
+        given = load.face_pressure(lips.x, c) if "face_pressure" in load.acts else None
+        if given is not None:
+            total += factor * given
     return total

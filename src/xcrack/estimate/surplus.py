@@ -9,6 +9,7 @@ Smith, 1993, SIAM J. Numer. Anal. 30, 921, whose hierarchical bases these are).
 from dataclasses import dataclass
 from functools import lru_cache
 from math import factorial
+from typing import cast
 
 import numpy as np
 
@@ -17,21 +18,12 @@ from xcrack.base.arrays import Bools, Floats, Ints, lock
 from xcrack.estimate.dual import Goal
 from xcrack.fem.facets import LipPoints
 from xcrack.fem.function_space import FunctionSpace
-from xcrack.fem.loads import facet_points, name_of, position, traction_of
+from xcrack.fem.loads import facet_points, position
 from xcrack.fem.quadrature import Points, cell_points, cell_side
 from xcrack.mesh.mesh import facet_set, local_edges
-from xcrack.model.conditions import (
-    BodyForce,
-    Displacement,
-    InitialStress,
-    Load,
-    Pressure,
-    SetLoad,
-    Traction,
-    evaluate,
-    evaluate_stress,
-)
+from xcrack.model.loads import FacetPoints, Load
 from xcrack.model.material import Isotropic
+from xcrack.model.supports import Support
 
 _POINTS, _DEGREE = 3, 4  # where tip functions act; of the products of a cubic and a quadratic
 
@@ -276,39 +268,44 @@ def load_residual(surplus: Surplus, solution: Solution) -> Floats:
     Pressures on crack faces are left out: see `face_residual`.
     """
     result = np.zeros((len(surplus.fixed), 2))
-    for load in solution.loads:
-        if isinstance(load, SetLoad):
-            _add_traction(result, surplus, load, solution.factor)
-        elif isinstance(load, BodyForce | InitialStress):
-            _add_volume(result, surplus, load, solution.factor)
+    for load, factor in solution.acting:
+        if "traction" in load.acts:
+            _add_traction(result, surplus, load, factor)
+        if load.acts & {"volume", "initial_stress"}:
+            _add_volume(result, surplus, load, factor, solution.problem.material)
     return result
 
 
-def _add_traction(result: Floats, surplus: Surplus, load: SetLoad, by: float) -> None:
-    """Constant tractions do no work on the cubic of an edge, which is odd, unless it is cut."""
+def _add_traction(result: Floats, surplus: Surplus, load: Load, factor: float) -> None:
+    """Uniform tractions do no work on the cubic of an edge, which is odd, unless it is cut."""
     space = surplus.space
-    facets = facet_set(space.mesh, load.where, name_of(load))
-    if isinstance(load, Traction | Pressure) and not callable(load.value):
+    facets = facet_set(space.mesh, load.where, load.name)
+    if load.is_uniform:
         owner = space.mesh.facet_to_cell[space.mesh.facet_numbers(facets), 0]
         facets = facets[(surplus.copy[surplus.functions[owner]] >= 0).any(axis=1)]
     if not len(facets):
         return
     points, normal = facet_points(space, facets)
-    _add(result, surplus, points, by * traction_of(load, space, facets, points, normal))
+    x = position(space, points.cell, points.bary)
+    t = load.traction(FacetPoints(space.mesh, facets, x, normal, points.weight))
+    _add(result, surplus, points, factor * t)
 
 
-def _add_volume(result: Floats, surplus: Surplus, load: Load, by: float) -> None:
+def _add_volume(
+    result: Floats, surplus: Surplus, load: Load, factor: float, material: Isotropic
+) -> None:
     from xcrack.estimate.kernels.surplus import add_functional
 
     space = surplus.space
     points = cell_points(space, np.arange(len(space.mesh.cells)), 4, _BODY)
     x = position(space, points.cell, points.bary)
-    if isinstance(load, BodyForce):
-        _add(result, surplus, points, by * evaluate(load.value, x, "body_force"))
-    elif isinstance(load, InitialStress):
-        factor = -points.weight[:, None, None] * evaluate_stress(load.value, x)
+    if "volume" in load.acts:
+        _add(result, surplus, points, factor * load.volume(x))
+    if "initial_stress" in load.acts:
+        sigma = factor * load.initial_stress(x, material)
+        weighted = -points.weight[:, None, None] * sigma
         add_functional(
-            result[:, :, None], points.cell, points.bary, points.side, factor[..., None],
+            result[:, :, None], points.cell, points.bary, points.side, weighted[..., None],
             *surplus.arrays,
         )  # fmt: skip
 
@@ -362,18 +359,19 @@ def imposed(surplus: Surplus, solution: Solution) -> Floats:
     """
     result = np.zeros((len(surplus.fixed), 2))
     taken = np.zeros((len(surplus.fixed), 2), dtype=bool)
-    again = {str(x.where): x for x in solution.loads if isinstance(x, Displacement)}
-    for support in solution.problem.supports:
-        if isinstance(support, Displacement) and isinstance(support.where, str):
-            support = again.get(support.where, support)
-            if callable(support.value):
-                _impose(result, taken, surplus, support)
-    return solution.factor * result
+    moved = {str(load.place): (load, f) for load, f in solution.acting if "support" in load.acts}
+    for given in solution.problem.supports:
+        support, factor = moved.get(str(given.where), (given, solution.factor))
+        if isinstance(given.where, str) and not support.is_uniform:
+            _impose(result, taken, surplus, cast(Support, support), factor)
+    return result
 
 
-def _impose(result: Floats, taken: Bools, surplus: Surplus, support: Displacement) -> None:
+def _impose(
+    result: Floats, taken: Bools, surplus: Surplus, support: Support, factor: float
+) -> None:
     mesh = surplus.space.mesh
-    facets = facet_set(mesh, support.where, "displacement")
+    facets = facet_set(mesh, support.where, support.name)
     owner = mesh.facet_to_cell[mesh.facet_numbers(facets), 0]
     ends = np.sort(facets[surplus.space.signature[owner] == 0], axis=1)
     if not len(ends):
@@ -381,10 +379,7 @@ def _impose(result: Floats, taken: Bools, surplus: Surplus, support: Displacemen
     i, j = mesh.points[ends[:, 0]], mesh.points[ends[:, 1]]
     key = mesh.edges[:, 0] * np.int64(mesh.n_points) + mesh.edges[:, 1]
     edge = np.searchsorted(key, ends[:, 0] * np.int64(mesh.n_points) + ends[:, 1])
-    what = f"displacement({support.where!r})"
-    at = {
-        t: evaluate(support.value, t * i + (1 - t) * j, what) for t in (0.0, 0.25, 0.5, 0.75, 1.0)
-    }
+    at = {t: support.displacement_at(t * i + (1 - t) * j) for t in (0.0, 0.25, 0.5, 0.75, 1.0)}
 
     def rest(t: float) -> Floats:
         quadratic = at[1.0] * t * (2 * t - 1) + at[0.0] * (1 - t) * (1 - 2 * t)
@@ -392,8 +387,8 @@ def _impose(result: Floats, taken: Bools, surplus: Surplus, support: Displacemen
 
     # Li Lj (Li - Lj) is 3/32 at Li = 3/4 and -3/32 at 1/4.
     coefficient = (rest(0.75) - rest(0.25)) / 2 * (32 / 3)
-    new = surplus.fixed[edge] & ~taken[edge]
-    result[edge] = np.where(new, coefficient, result[edge])
+    new = surplus.fixed[edge] & ~taken[edge] & np.isfinite(coefficient)
+    result[edge] = np.where(new, factor * coefficient, result[edge])
     taken[edge] = True
 
 

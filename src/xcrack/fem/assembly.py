@@ -15,7 +15,7 @@ from xcrack.fem.function_space import Batch, FunctionSpace
 from xcrack.fem.quadrature import Points, cell_points
 from xcrack.mesh.mesh import Mesh
 from xcrack.mesh.simplex import cell_nodes, shape_derivatives, simplex_rule
-from xcrack.model.conditions import Load
+from xcrack.model.loads import Load
 from xcrack.model.material import Isotropic
 from xcrack.model.numerics import Numerics
 

@@ -5,156 +5,67 @@ from collections.abc import Iterable
 import numpy as np
 
 from xcrack.base.arrays import Floats, Ints, lock
-from xcrack.base.checks import shown
 from xcrack.base.errors import ProblemError
 from xcrack.fem.assembly import MeshLoad
 from xcrack.fem.facets import LipPoints, jump_values, part_points, split_facets
 from xcrack.fem.function_space import FunctionSpace
 from xcrack.fem.quadrature import Points, at_joints, cell_points, cell_side
-from xcrack.mesh.holes import Hole, round_hole
-from xcrack.mesh.mesh import facet_set, nearest_point, numbers_of
-from xcrack.model.conditions import (
-    Bearing,
-    BodyForce,
-    CrackPressure,
-    InitialStress,
-    Load,
-    PointForce,
-    Pressure,
-    Resultant,
-    SetLoad,
-    evaluate,
-    evaluate_scalar,
-    evaluate_stress,
-)
-
-# Tractions of loads that are given by their resultant.
-
-_AXIAL = 1e-3  # share of a force along the axis that may stem from the fit of the axis
-_COVERED = 0.9  # share of the contact of a pin that must lie on the set
-
-
-def bearing_traction(load: Bearing, hole: Hole, x: Floats, weight: Floats) -> Floats:
-    """Tractions of a pin at integration points, whose sum is the force `(q, d)`.
-
-    Parameters
-    ----------
-    load : Bearing
-    hole : Hole
-    x : (q, d) array, length
-    weight : (q,) array, length or area
-
-    Raises
-    ------
-    ProblemError
-        A force along the axis, or a set that lacks a part of the contact.
-    """
-    what = f"bearing({load.where!r})"
-    force = hole.section @ load.force
-    size = float(np.linalg.norm(load.force))
-    rest = load.force - force @ hole.section
-    along = float(np.linalg.norm(rest))
-    if along > _AXIAL * size:
-        raise ProblemError(
-            f"{what}: {along:.4g} of the force {size:.4g} acts along the axis of the hole, where a "
-            "pin does not press: give that part by traction or resultant."
-        )
-    local = hole.local(x)
-    radial = local / np.linalg.norm(local, axis=1)[:, None]
-    ahead = force / np.linalg.norm(force)
-    across = np.array([-ahead[1], ahead[0]])
-    cosine, sine = radial @ ahead, radial @ across
-    angle = np.arctan2(sine, cosine)
-    half = load.contact_angle / 2
-    p = np.where(np.abs(angle) < half, np.cos(np.pi * angle / load.contact_angle), 0.0)
-    height = np.ptp(_axial(hole, x)) if len(load.force) > 2 else 1.0
-    pressed = float(weight[np.abs(angle) < half].sum())
-    # Points of integration do not reach the ends of the hole: its height is a little larger.
-    whole = load.contact_angle * hole.radius * height
-    if pressed < _COVERED * whole:
-        raise ProblemError(
-            f"{what}: the set covers {100 * pressed / whole:.3g} % of where the pin presses, "
-            f"{np.degrees(load.contact_angle):.4g} degrees around the force: give the whole hole, "
-            "or a smaller contact_angle."
-        )
-    # On a polygon the cosine alone would pull a little to one side.
-    shapes = np.stack([p, p * sine])[:, :, None] * radial
-    sums = np.einsum("q,kqs->sk", weight, shapes)
-    scale = np.linalg.solve(sums, force)
-    across_axis = np.einsum("k,kqs->qs", scale, shapes) @ hole.section
-    # The rest is that of an axis that points know to a few digits only.
-    return np.asarray(across_axis + rest / weight.sum())
-
-
-def _axial(hole: Hole, x: Floats) -> Floats:
-    return np.asarray(x @ np.cross(*hole.section))
-
-
-def resultant_traction(load: Resultant, x: Floats, weight: Floats) -> Floats:
-    """Tractions a + b x (x - centre) with the wanted force and moment `(q, d)`.
-
-    Parameters
-    ----------
-    load : Resultant
-    x : (q, d) array, length
-    weight : (q,) array, length or area
-
-    Raises
-    ------
-    ProblemError
-        A set that is too small for a moment.
-    """
-    d = x.shape[1]
-    force, moment, about = np.zeros(3), np.zeros(3), np.zeros(3)
-    area = weight.sum()
-    centre = weight @ x / area
-    r = np.zeros((len(x), 3))
-    r[:, :d] = x - centre
-    if load.force is not None:
-        force[:d] = load.force
-    if load.moment is not None:
-        moment[3 - len(load.moment) :] = load.moment
-    if load.about is not None:
-        about[:d] = load.about - centre
-    # Moment about the centre of the set: the force acts there otherwise.
-    moment = moment + np.cross(about, force) if load.about is not None else moment
-    inertia = np.einsum("q,q,ij->ij", weight, (r * r).sum(axis=1), np.eye(3))
-    inertia -= np.einsum("q,qi,qj->ij", weight, r, r)
-    turn = np.zeros(3)
-    axes = slice(0 if d > 2 else 2, 3)  # a 2D body turns about the third axis
-    if moment.any():
-        values = np.linalg.eigvalsh(inertia[axes, axes])
-        if values[0] <= 1e-12 * values[-1] or not values[-1]:
-            raise ProblemError(
-                f"resultant({load.where!r}): the set is too small or too slender for a moment."
-            )
-        turn[axes] = np.linalg.solve(inertia[axes, axes], moment[axes])
-    return np.asarray((force / area + np.cross(turn, r))[:, :d])
+from xcrack.mesh.mesh import facet_set, numbers_of
+from xcrack.model.loads import FacetPoints, Load
+from xcrack.model.material import Isotropic
 
 
 def load_vector(
-    space: FunctionSpace, loads: tuple[Load, ...], lips: tuple[LipPoints, ...]
+    space: FunctionSpace, material: Isotropic, load: Load, lips: tuple[LipPoints, ...]
 ) -> Floats:
-    """Sum of the given loads, tested with every function `(n_dof,)`; displacements are skipped."""
+    """A load, tested with every function `(n_dof,)`; displacements give nothing.
+
+    Raises
+    ------
+    ProblemError
+        A set with facets inside the body, or what the load says.
+    """
     f = np.zeros((space.n_functions, space.dim))
-    for load in loads:
-        if isinstance(load, SetLoad):
-            _add_traction(f, space, load)
-        elif isinstance(load, PointForce):
-            point = nearest_point(space.mesh, load.x, "point_force")
-            f[point] += load.force
-        elif isinstance(load, BodyForce):
-            points = body_points(space)
-            b = evaluate(load.value, position(space, points.cell, points.bary), "body_force")
-            _add(f, space, points, b)
-        elif isinstance(load, InitialStress):
-            _add_initial_stress(f, space, load)
-        elif isinstance(load, CrackPressure):
-            for c, points_on_lip in enumerate(lips):
-                if load.crack is None or load.crack == c:
-                    p = evaluate_scalar(load.value, points_on_lip.x, "crack_pressure")
-                    f += lip_force(space, c, points_on_lip, p[:, None] * points_on_lip.normal)
+    acts = load.acts
+    if "traction" in acts:
+        points, on_facets = outer_points(space, load)
+        _add(f, space, points, load.traction(on_facets))
+    if "point_force" in acts:
+        number, force = load.point_forces(space.mesh)
+        np.add.at(f, number, force)
+    if "volume" in acts:
+        points = body_points(space)
+        _add(f, space, points, load.volume(position(space, points.cell, points.bary)))
+    if "initial_stress" in acts:
+        points = body_points(space)
+        x = position(space, points.cell, points.bary)
+        _subtract_stress(f, space, points, load.initial_stress(x, material))
+    if "face_pressure" in acts:
+        for c, on_lip in enumerate(lips):
+            p = load.face_pressure(on_lip.x, c)
+            if p is not None:
+                f += lip_force(space, c, on_lip, p[:, None] * on_lip.normal)
     return f.ravel()
+
+
+def outer_points(space: FunctionSpace, load: Load) -> tuple[Points, FacetPoints]:
+    """Points of integration on the facet set of a load, and what it is asked at them.
+
+    Raises
+    ------
+    ProblemError
+        A set with facets inside the body.
+    """
+    facets = facet_set(space.mesh, load.where, load.name)
+    inner = space.mesh.facet_to_cell[numbers_of(space.mesh, facets), 1] >= 0
+    if inner.any():
+        raise ProblemError(
+            f"{load.name}: {int(inner.sum())} of its facets lie inside the body; loads act on the "
+            "boundary only."
+        )
+    points, normal = facet_points(space, facets)
+    x = position(space, points.cell, points.bary)
+    return points, FacetPoints(space.mesh, facets, x, normal, points.weight)
 
 
 def position(space: FunctionSpace, cell: Ints, bary: Floats) -> Floats:
@@ -212,43 +123,8 @@ def facet_points(space: FunctionSpace, facets: Ints, n: int = 6) -> tuple[Points
     return Points(c[order], bary[order], weight[order], side[order]), normal[order]
 
 
-def _add_traction(f: Floats, space: FunctionSpace, load: SetLoad) -> None:
-    what = name_of(load)
-    facets = facet_set(space.mesh, load.where, what)
-    inner = space.mesh.facet_to_cell[numbers_of(space.mesh, facets), 1] >= 0
-    if inner.any():
-        raise ProblemError(
-            f"{what}: {int(inner.sum())} of its facets lie inside the body; loads act on the "
-            "boundary only."
-        )
-    points, normal = facet_points(space, facets)
-    _add(f, space, points, traction_of(load, space, facets, points, normal))
-
-
-def name_of(load: SetLoad) -> str:
-    """What messages call a load on a facet set."""
-    return f"{type(load).__name__.lower()}({shown(load.where)})"
-
-
-def traction_of(
-    load: SetLoad, space: FunctionSpace, facets: Ints, points: Points, normal: Floats
-) -> Floats:
-    """Tractions `(q, d)` of a load at the integration points of all facets of its set."""
-    what, x = name_of(load), position(space, points.cell, points.bary)
-    if isinstance(load, Pressure):
-        return np.asarray(-evaluate_scalar(load.value, x, what)[:, None] * normal)
-    if isinstance(load, Bearing):
-        hole = round_hole(space.mesh, facets, what)
-        return load.factor * bearing_traction(load, hole, x, points.weight)
-    if isinstance(load, Resultant):
-        return load.factor * resultant_traction(load, x, points.weight)
-    return evaluate(load.value, x, what, normal)
-
-
-def _add_initial_stress(f: Floats, space: FunctionSpace, load: InitialStress) -> None:
+def _subtract_stress(f: Floats, space: FunctionSpace, points: Points, sigma: Floats) -> None:
     """Subtract the integral of sigma0 : grad v."""
-    points = body_points(space)
-    sigma = evaluate_stress(load.value, position(space, points.cell, points.bary))
     for batch, _ in space.batches(np.unique(points.cell)):
         number, row, _ = points.of_cells(batch.cells)
         _, G = space.tabulate(batch, row, points.bary[number], points.side[number])
@@ -294,7 +170,7 @@ def on_mesh(
     known = {id(one.load): one for one in before}
     result = []
     for load, f in loads:
-        if not isinstance(load, SetLoad):
+        if load.acts != {"traction"}:
             continue
         one = known.get(id(load))
         if one is None:

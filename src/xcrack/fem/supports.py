@@ -1,5 +1,6 @@
 """Imposed displacements: which unknowns are known, and their values."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,7 +13,7 @@ from xcrack.fem.loads import facet_points, position
 from xcrack.fem.quadrature import Points
 from xcrack.mesh.mesh import facet_set, nearest_point
 from xcrack.mesh.simplex import facet_nodes
-from xcrack.model.conditions import Displacement, Fix, evaluate
+from xcrack.model.supports import Support
 
 _TRACE = 1e-13  # enriched functions below this value on a facet do not act there (round-off)
 # Share of the largest singular value below which traces of enriched functions do not count. A tube
@@ -39,7 +40,7 @@ class Known:
     owner: Ints
 
 
-def known_unknowns(space: FunctionSpace, supports: tuple[Fix | Displacement, ...]) -> Known:
+def known_unknowns(space: FunctionSpace, supports: Sequence[Support]) -> Known:
     """Unknowns decided by the supports.
 
     Raises
@@ -52,10 +53,9 @@ def known_unknowns(space: FunctionSpace, supports: tuple[Fix | Displacement, ...
     fitted = np.zeros_like(fixed)
     owner = np.full(fixed.shape, -1, dtype=np.int64)
     for number, support in enumerate(supports):
-        if isinstance(support, Fix):
-            functions = _functions_of(space, support.where, "fix")
-            axes = range(space.dim) if support.axis is None else [support.axis]
-            for axis in axes:
+        if support.holds:
+            functions = _functions_of(space, support.where, support.kind)
+            for axis in _axes(support.displacement_at(np.zeros((1, space.dim)))):
                 _impose(space, fixed, value, fitted, functions, axis, np.zeros(len(functions)), 0)
         else:
             for axis, functions, numbers, n_fitted in _imposed(space, support):
@@ -160,30 +160,30 @@ def _traces(space: FunctionSpace, facets: Ints) -> tuple[Points, Ints, Ints, Flo
     return points, np.concatenate(columns), np.concatenate(rows), np.concatenate(values)
 
 
-def _imposed(space: FunctionSpace, support: Displacement) -> list[tuple[int, Ints, Floats, int]]:
+def _imposed(space: FunctionSpace, support: Support) -> list[tuple[int, Ints, Floats, int]]:
     """Axis, functions, values and number of fitted values of an imposed displacement."""
-    nodes = _set_nodes(space, support.where, "displacement")
-    what = f"displacement({shown(support.where)})"
-    value = support.value
-    axes = list(range(space.dim))
-    if isinstance(value, tuple):
-        if len(value) != space.dim:
-            raise ProblemError(f"{what}: {len(value)} entries for {space.dim} directions.")
-        axes = [i for i in axes if value[i] is not None]
-        value = np.array([0.0 if v is None else v for v in value])
-    if not isinstance(support.where, str):
-        u = evaluate(value, space.node_points[nodes], what)
-        return [(axis, nodes, u[:, axis], 0) for axis in axes]
-    _check_ends(space, support.where, facet_set(space.mesh, support.where, what), "displacement")
-    fitted, coefficients = _fit(space, support.where, value, what)
+    where, what = support.where, support.kind
+    nodes = _set_nodes(space, where, what)
+    if not isinstance(where, str):
+        u = support.displacement_at(space.node_points[nodes])
+        return [(axis, nodes, u[:, axis], 0) for axis in _axes(u)]
+    _check_ends(space, where, facet_set(space.mesh, where, support.name), what)
+    fitted, coefficients = _fit(space, support)
     plain = nodes[~np.isin(nodes, fitted[fitted < space.n_nodes])]
-    u = evaluate(value, space.node_points[plain], what) if len(plain) else np.zeros((0, space.dim))
+    parts = [coefficients]
+    if len(plain):
+        parts.insert(0, support.displacement_at(space.node_points[plain]))
+    values = np.concatenate(parts)
     functions = np.concatenate([plain, fitted])
-    values = np.concatenate([u, coefficients])
-    return [(axis, functions, values[:, axis], len(fitted)) for axis in axes]
+    return [(axis, functions, values[:, axis], len(fitted)) for axis in _axes(values)]
 
 
-def _fit(space: FunctionSpace, where: str, value: object, what: str) -> tuple[Ints, Floats]:
+def _axes(values: Floats) -> list[int]:
+    """Directions in which values are imposed, which are the same at all points."""
+    return [int(axis) for axis in np.nonzero(np.isfinite(values).any(axis=0))[0]]
+
+
+def _fit(space: FunctionSpace, support: Support) -> tuple[Ints, Floats]:
     """Least-squares fit on the facets where enriched functions act, and at nodes on a crack.
 
     Shifted functions vanish at nodes, not between them: fixing only the standard unknowns there
@@ -191,7 +191,7 @@ def _fit(space: FunctionSpace, where: str, value: object, what: str) -> tuple[In
     beside it tell which one is meant.
     """
     empty = np.zeros(0, dtype=np.int64), np.zeros((0, space.dim))
-    facets = facet_set(space.mesh, where, what)
+    facets = facet_set(space.mesh, support.where, support.name)
     owner = space.mesh.facet_to_cell[space.mesh.facet_numbers(facets), 0]
     on_lip = np.zeros(space.n_nodes, dtype=bool)
     for cut, number in zip(space.cuts, space.heaviside, strict=True):
@@ -210,7 +210,8 @@ def _fit(space: FunctionSpace, where: str, value: object, what: str) -> tuple[In
     A = np.zeros((len(row_ids), len(unknowns)))
     A[row_place, place] = entry[keep]
     x = position(space, points.cell, points.bary)[row_ids]
-    target = evaluate(value, x, what)
+    given = support.displacement_at(x)
+    target = np.nan_to_num(given)
     # Each point counts alike: weighted by length, the data of a sliver would be cut off as noise.
     # Enriched functions take what standard ones leave, or they would take part in every field
     # where their traces are nearly those of polynomials.
@@ -219,7 +220,8 @@ def _fit(space: FunctionSpace, where: str, value: object, what: str) -> tuple[In
     solution[standard] = np.linalg.lstsq(A[:, standard], target, rcond=1e-11)[0]
     scale = _scales(space)[unknowns]
     rest = np.linalg.lstsq(A / scale, target - A @ solution, rcond=_LEAST[space.dim])[0]
-    return unknowns, solution + rest / scale[:, None]
+    free = np.isnan(given).any(axis=0)
+    return unknowns, np.where(free, np.nan, solution + rest / scale[:, None])
 
 
 def _scales(space: FunctionSpace) -> Floats:

@@ -10,7 +10,6 @@ from xcrack.crack.crack import Crack
 from xcrack.growth.options import Run
 from xcrack.growth.step import Step
 from xcrack.mesh.polygon import closest_on_segment
-from xcrack.model.conditions import CrackPressure
 
 # Where cracks have met between one step and the next: the polylines alone tell.
 
@@ -100,10 +99,10 @@ def named_by_number(run: Run) -> str:
     """Why cracks cannot become one: a load names one by its number; empty where none does."""
     states = [state for state in run.cycle.load_states if isinstance(state, list | tuple)]
     loads = [*run.problem.loads, *(load for state in states for load in state)]
-    if any(isinstance(load, CrackPressure) and load.crack is not None for load in loads):
+    if any(load.is_of_one_crack for load in loads):
         return (
             "a load names a crack by its number, which is another one's after they have joined: "
-            "give crack_pressure without crack."
+            "give it without crack."
         )
     return ""
 

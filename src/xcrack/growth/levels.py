@@ -9,11 +9,11 @@ from scipy.interpolate import PchipInterpolator
 
 from xcrack.base.arrays import Bools, Floats, Ints
 from xcrack.fatigue.criteria import clipped
-from xcrack.fatigue.spectrum import Level, Spectrum, distinct, level
+from xcrack.fatigue.spectrum import Spectrum, distinct
 from xcrack.growth.response import Response
 from xcrack.linalg.reuse import Reuse
-from xcrack.model.conditions import InitialStress
 from xcrack.model.problem import Problem
+from xcrack.model.states import LoadLevel
 from xcrack.sif.sif import SIF
 
 _MOST = 33
@@ -101,7 +101,7 @@ def refined(
         if not new:
             return handed_on
         start = handed_on if not solved else _nearest(handed_on, solved, new)
-        response = solve(states_of(problem, spectrum, np.array(new)), start)
+        response = solve(states_of(spectrum, np.array(new)), start)
         for row, factor in enumerate(new):
             solved[factor] = LevelResponse(response, row)
         return response.reuse
@@ -129,11 +129,11 @@ def refined(
     )
 
 
-def states_of(problem: Problem, spectrum: Spectrum, factors: Floats) -> list[float | Level]:
+def states_of(spectrum: Spectrum, factors: Floats) -> list[float | LoadLevel]:
     """Load states of some factors."""
     if not spectrum.steady:
         return [float(factor) for factor in factors]
-    return [level(problem.loads, spectrum.steady, float(factor)) for factor in factors]
+    return [LoadLevel(float(factor), tuple(spectrum.steady)) for factor in factors]
 
 
 def _nearest(reuse: Reuse, solved: dict[float, LevelResponse], factors: Sequence[float]) -> Reuse:
@@ -233,7 +233,7 @@ def respond_to_levels(problem: Problem, spectrum: Spectrum, solve: Solve, reuse:
     else:
         factors = np.linspace(low, high, _FIRST)
     if exact or spectrum.levels != "auto":
-        return solve(states_of(problem, spectrum, factors), reuse)
+        return solve(states_of(spectrum, factors), reuse)
     return refined(problem, spectrum, factors, solve, reuse)
 
 
@@ -255,8 +255,7 @@ def ladders(problem: Problem, spectrum: Spectrum, response: Response) -> list[La
 
 def is_homogeneous(problem: Problem, spectrum: Spectrum) -> bool:
     """Whether twice the factor gives twice the answer, with contact too."""
-    stressed = any(isinstance(load, InitialStress) for load in problem.loads)
-    return not spectrum.steady and not stressed
+    return not spectrum.steady and not any(load.is_steady for load in problem.loads)
 
 
 __all__ = [

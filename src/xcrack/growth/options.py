@@ -21,7 +21,6 @@ from xcrack.growth.description import DEFAULTS, describe, with_defaults_of
 from xcrack.growth.response import Respond
 from xcrack.growth.step import Cycle
 from xcrack.growth.trail import check_retardation
-from xcrack.model.conditions import Temperature
 from xcrack.model.problem import Problem
 
 _STOPS = {"changes_results": False}  # when a run stops, not how its cracks grow
@@ -174,14 +173,12 @@ class Run:
             )
 
     def _check_temperatures(self) -> None:
-        steady = [load for load in self.problem.loads if isinstance(load, Temperature)]
+        steady = [load for load in self.problem.loads if load.adds_up]
         for k, state in enumerate(self.cycle.load_states):
-            own = (
-                [] if isinstance(state, Real) else [x for x in state if isinstance(x, Temperature)]
-            )
-            if steady and any(load not in steady for load in own):
+            loads = [] if isinstance(state, Real) else [load for load in state if load.adds_up]
+            if steady and any(load not in steady for load in loads):
                 warn(
-                    f"state {k} of the cycle has a temperature of its own, and the problem has "
+                    f"state {k} of the cycle has a {loads[0].kind} of its own, and the problem has "
                     "one that acts in all states: the two add up. If the states are to replace it, "
                     "leave it out of Problem(loads=...)."
                 )

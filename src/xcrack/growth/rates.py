@@ -290,7 +290,9 @@ def respond_to_states(run: Run, problem: Problem, reuse: Reuse, bars: bool = Fal
         if run.response is None:
             response = respond(problem, states, reuse, bars, solver=run.solver)
         else:
-            given = called(run.response, "the response of a step", problem, tuple(states), reuse, bars)
+            given = called(
+                run.response, "the response of a step", problem, tuple(states), reuse, bars
+            )
             response = checked_response(given, problem, states)
         if spectrum is not None and response.solutions:
             refuse_friction(problem, response.solutions)

@@ -16,9 +16,9 @@ from xcrack.analysis.solve import solve_states
 from xcrack.base.arrays import Floats, lock
 from xcrack.base.checks import entries, flag, numbers, shown
 from xcrack.base.errors import ProblemError
-from xcrack.fatigue.spectrum import Level
 from xcrack.linalg.reuse import Reuse
 from xcrack.model.problem import Problem, check_problem
+from xcrack.model.states import LoadLevel
 from xcrack.sif.sif import SIF
 from xcrack.sif.stress_intensity import stress_intensities
 
@@ -74,7 +74,8 @@ class Response:
     @property
     def factors(self) -> Floats:
         """Factor of each state of a spectrum."""
-        return np.array([s.factor if isinstance(s, Level) else s for s in self.states], dtype=float)
+        values = [s.factor if isinstance(s, LoadLevel) else s for s in self.states]
+        return np.array(values, dtype=float)
 
     @property
     def may_bend(self) -> bool:

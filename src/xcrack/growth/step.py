@@ -15,7 +15,7 @@ from xcrack.base.markup import element, joined, table
 from xcrack.crack.crack import Crack
 from xcrack.growth.trail import FrontTrail, Trail
 from xcrack.linalg.reuse import Reuse
-from xcrack.model.conditions import Load
+from xcrack.model.loads import Load
 from xcrack.sif.sif import SIF
 
 # How far each tip of all cracks goes in one step.

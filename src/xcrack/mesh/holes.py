@@ -15,7 +15,7 @@ _ALONG = 0.01  # share of the squared normals along the axis of a cylinder
 
 
 @dataclass(frozen=True, eq=False)
-class Hole:
+class RoundHole:
     """A round hole.
 
     Attributes
@@ -36,7 +36,7 @@ class Hole:
         return np.asarray(x @ self.section.T - self.centre)
 
 
-def round_hole(mesh: Mesh, facets: Ints, what: str) -> Hole:
+def round_hole(mesh: Mesh, facets: Ints, what: str) -> RoundHole:
     """Fit a circle (2D) or a cylinder (3D) to facets of the boundary.
 
     Parameters
@@ -65,7 +65,7 @@ def round_hole(mesh: Mesh, facets: Ints, what: str) -> Hole:
     distance = np.linalg.norm(x - centre, axis=1)
     radius = float(distance.mean())
     off = np.abs(distance - radius).max() / radius
-    hole = Hole(centre, section, radius)
+    hole = RoundHole(centre, section, radius)
     if off > _ROUND:
         raise ProblemError(
             f"{what}: the set is not a round hole: its points lie up to {100 * off:.3g} % of the "

@@ -73,6 +73,11 @@ class Isotropic:
         """E in plane stress, else E / (1 - nu²), stress."""
         return self.E if self.plane == "stress" else self.E / (1 - self.nu**2)
 
+    def thermal_stress(self, change: Floats, alpha: float, dim: int) -> Floats:
+        """Stress `(n, dim, dim)` of a change of temperature `(n,)` that cannot expand."""
+        stiff = -self.E / (1 - self.nu if self.plane == "stress" else 1 - 2 * self.nu)
+        return np.asarray(alpha * stiff * change[:, None, None] * np.eye(dim))
+
     def stress(self, gradient: Floats) -> Floats:
         """Stress `(..., d, d)` of a displacement gradient `(..., d, d)` (row: component)."""
         gradient = _tensors(gradient, "Isotropic.stress: gradient")

@@ -17,24 +17,13 @@ from xcrack.crack.crack import Crack
 from xcrack.crack.junctions import Junction
 from xcrack.crack.placing import check_cracks, junctions, on_others, placed
 from xcrack.crack.stations import Stations, stations_of
-from xcrack.mesh.holes import round_hole
-from xcrack.mesh.mesh import Mesh, facet_set
-from xcrack.model.conditions import (
-    Bearing,
-    CrackPressure,
-    Displacement,
-    Fix,
-    InitialStress,
-    Load,
-    Resultant,
-    Support,
-    check_dimension,
-    check_vectors,
-    with_material,
-)
+from xcrack.mesh.mesh import Mesh
 from xcrack.model.friction import checked_friction
+from xcrack.model.loads import Load
 from xcrack.model.material import Isotropic
 from xcrack.model.numerics import Numerics
+from xcrack.model.states import LoadLevel, LoadState, scaled_state
+from xcrack.model.supports import Support
 
 _ORDER = {2: 2, 3: 1}  # of the standard functions, by dimension (measured)
 _PLANE = {2: True, 3: False}  # whether the material must name a plane state
@@ -140,13 +129,25 @@ class Problem:
             return tuple(self.friction)
         return (float(self.friction),) * len(self.cracks)
 
-    def state(self, state: Any) -> tuple[tuple[Load, ...], float]:
-        """Loads and factor of a load state: a number, or a list of loads."""
+    def state(self, state: Any) -> LoadState:
+        """Loads of a load state: a number, a `LoadLevel`, or a list of loads.
+
+        Raises
+        ------
+        ProblemError
+            Something else than these.
+        """
         if state is None:
-            return self._acting, 1.0
+            return scaled_state(self.loads, 1.0)  # type: ignore[arg-type]
+        if isinstance(state, LoadLevel):
+            for load in state.steady:
+                self._check_load(load)
+            own = scaled_state(self.loads, state.factor)  # type: ignore[arg-type]
+            steady = state.steady
+            return LoadState(own.loads + steady, own.factors + (1.0,) * len(steady), 1.0)
         if isinstance(state, Real | np.ndarray) or np.isscalar(state):
             try:
-                return self._acting, number(state, "load state")
+                return scaled_state(self.loads, number(state, "load state"))  # type: ignore[arg-type]
             except ProblemError as error:
                 raise ProblemError(f"{str(error)[:-1]}, or a list of loads.") from None
         try:
@@ -155,19 +156,12 @@ class Problem:
             raise ProblemError(f"{str(error)[:-1]} of loads, or a number.") from None
         for load in loads:
             self._check_load(load)
-        body = tuple(load for load in self.loads if isinstance(load, InitialStress))
-        loads += tuple(b for b in body if b not in loads)
-        own = dict(zip(map(id, self.loads), self._acting, strict=True))
-        return tuple(own.get(id(x), with_material(x, self.material)) for x in loads), 1.0
-
-    @cached_property
-    def _acting(self) -> tuple[Load, ...]:
-        """The loads with all that depends on the material."""
-        return tuple(with_material(load, self.material) for load in self.loads)
+        body = tuple(load for load in self.loads if load.is_steady)
+        return scaled_state(loads + tuple(b for b in body if b not in loads), 1.0)
 
     def _repr_html_(self) -> str:
-        loads = ", ".join(_named(load) for load in self.loads) or "none"
-        supports = ", ".join(_named(support) for support in self.supports) or "none"
+        loads = ", ".join(load.name for load in self.loads) or "none"
+        supports = ", ".join(support.name for support in self.supports) or "none"
         sizes = f"{self.mesh.n_points} points, {len(self.mesh.cells)} cells"
         rows = [
             ("body", f"{self.mesh.dim}D, {sizes}"),
@@ -194,14 +188,12 @@ class Problem:
                     f"cracks: {shown(crack)} is not a Crack; make one by line_crack(...)."
                 )
         for support in self.supports:
-            if not isinstance(support, Fix | Displacement):
+            if not isinstance(support, Support):
                 raise ProblemError(
-                    f"supports: {type(support).__name__} is not a support; give fix(...) or "
+                    f"supports: {shown(support)} is not a support; give fix(...) or "
                     "displacement(...), and put forces into loads."
                 )
-            check_vectors(support, self.mesh.dim)
-            if isinstance(support.where, str):
-                facet_set(self.mesh, support.where, type(support).__name__.lower())
+            support.check_in(self.mesh)
         for load in self.loads:
             self._check_load(load)
 
@@ -210,36 +202,7 @@ class Problem:
             raise ProblemError(
                 f"loads: {shown(load)} is not a load; see traction(...), pressure(...)."
             )
-        where = getattr(load, "where", None)
-        if isinstance(where, str):
-            facet_set(self.mesh, where, type(load).__name__.lower())
-        if isinstance(load, Bearing | Resultant):
-            check_dimension(load, self.mesh.dim)
-        else:
-            check_vectors(load, self.mesh.dim)
-        if isinstance(load, Bearing):
-            what = f"bearing({load.where!r})"
-            round_hole(self.mesh, facet_set(self.mesh, load.where, what), what)
-        if isinstance(load, Displacement):
-            supported = [s.where for s in self.supports]
-            if not any(_same(where, h) for h in supported):
-                raise ProblemError(
-                    f"displacement({shown(where)}) among the loads gives a new value to a support, "
-                    "but nothing is supported there: put it into supports first."
-                )
-        if isinstance(load, CrackPressure) and load.crack is not None:
-            if not 0 <= load.crack < len(self.cracks):
-                raise ProblemError(
-                    f"crack_pressure(crack={shown(load.crack)}): the problem has "
-                    f"{len(self.cracks)} crack(s), numbered from 0."
-                )
-
-
-def _named(condition: Any) -> str:
-    """A support or load in a few words."""
-    where = getattr(condition, "where", None)
-    name = type(condition).__name__.lower()
-    return f"{name} on {where}" if isinstance(where, str) else name
+        load.check(self)
 
 
 def check_problem(problem: Any, what: str) -> None:
@@ -263,9 +226,3 @@ def crack_number(problem: Problem, crack: Any, what: str) -> int:
             f"{what}: crack {shown(index)}: the problem has {n} crack(s), numbered from 0."
         )
     return index
-
-
-def _same(a: Any, b: Any) -> bool:
-    if isinstance(a, str) or isinstance(b, str):
-        return bool(isinstance(a, str) and isinstance(b, str) and a == b)
-    return bool(len(a) == len(b) and (a == b).all())

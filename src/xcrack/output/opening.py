@@ -11,7 +11,6 @@ from xcrack.base.arrays import Floats
 from xcrack.base.checks import number, numbers, shown
 from xcrack.base.errors import ProblemError
 from xcrack.crack.measures import measures
-from xcrack.model.conditions import InitialStress
 from xcrack.model.problem import crack_number
 
 _NEAR = 1e-6  # of the body: points that lie on a crack
@@ -108,7 +107,7 @@ def compliance(solution: Solution, force: Any) -> float:
     P = number(force, "compliance: force")
     if P == 0:
         raise ProblemError("compliance: force = 0: give the force of this load state.")
-    if any(isinstance(load, InitialStress) for load in solution.loads):
+    if any("initial_stress" in load.acts for load in solution.loads):
         raise ProblemError(
             "compliance: initial stress has energy without a force: leave it out of the problem."
         )

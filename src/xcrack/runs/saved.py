@@ -17,6 +17,7 @@ from xcrack.analysis import plan
 from xcrack.analysis.contact_result import Contact
 from xcrack.analysis.plan import Ingredient, Report
 from xcrack.analysis.solution import Solution
+from xcrack.base.arguments import arguments_of, kinds_of
 from xcrack.base.arrays import Floats, lock
 from xcrack.base.errors import ProblemError
 from xcrack.base.paths import path_of, system_errors
@@ -24,21 +25,16 @@ from xcrack.fem.system import discretised
 from xcrack.linalg.reuse import Reuse
 from xcrack.mesh.mesh import Mesh
 from xcrack.mesh.polygon import Round
-from xcrack.model import conditions
-from xcrack.model.conditions import Bearing, Resultant, Temperature
 from xcrack.model.material import Isotropic
 from xcrack.model.numerics import Numerics
 from xcrack.model.problem import Problem
+from xcrack.model.states import LoadLevel, LoadState
+from xcrack.model.supports import Condition
 from xcrack.runs import run_folder, store
 from xcrack.runs.history import History
 
 _FORMAT = 1
 _SUFFIX = ".npz"
-_CONDITIONS = (
-    conditions.Fix, conditions.Displacement, conditions.Traction, conditions.Pressure,
-    conditions.PointForce, conditions.BodyForce, conditions.CrackPressure,
-    conditions.InitialStress, Bearing, Resultant, Temperature,
-)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -65,10 +61,15 @@ _CLASSES: dict[str, type] = {
     "LoadResultant": plan.Resultant,
     **{
         kind.__name__: kind
-        for kind in (Problem, Mesh, Round, Isotropic, Numerics, Contact, Report,
-                     Ingredient, NotStored, *_CONDITIONS)
+        for kind in (Problem, Mesh, Round, Isotropic, Numerics, Contact, Report, Ingredient,
+                     NotStored, LoadLevel, LoadState)
     },
 }  # fmt: skip
+
+
+def _classes() -> dict[str, type]:
+    """What a file may hold, supports and loads of users among them."""
+    return _CLASSES | kinds_of(Condition)
 
 
 def save(result: Solution | Sequence[Solution] | History, path: str | PathLike[str]) -> Path:
@@ -95,7 +96,7 @@ def save(result: Solution | Sequence[Solution] | History, path: str | PathLike[s
     content = {"format": _FORMAT, **_content(result)}
     with system_errors("the result cannot be written to", file, error=ProblemError):
         file.parent.mkdir(parents=True, exist_ok=True)
-        store.save(file, content, _CLASSES)
+        store.save(file, content, _classes())
     return file
 
 
@@ -107,7 +108,7 @@ def read_saved(path: Path) -> Any:
     ProblemError
         The file is not one of these, or of a newer xcrack.
     """
-    content = store.load(path, _CLASSES)
+    content = store.load(path, _classes())
     if not isinstance(content, dict) or "format" not in content:
         raise ProblemError(f"{path} is not a file that save wrote, or it is damaged.")
     if content["format"] > _FORMAT:
@@ -126,7 +127,7 @@ def write_body(path: Path, problem: Problem) -> None:
     storable = _storable(replace(problem, cracks=(), friction=0.0, numerics=Numerics()))
     content = {"format": _FORMAT, "kind": "body", "problem": storable}
     with contextlib.suppress(OSError, ProblemError):
-        path.write_bytes(store.packed(content, _CLASSES))
+        path.write_bytes(store.packed(content, _classes()))
 
 
 def read_body(path: Path) -> Problem | None:
@@ -134,7 +135,7 @@ def read_body(path: Path) -> Problem | None:
     if not path.is_file():
         return None
     try:
-        content = store.load(path, _CLASSES)
+        content = store.load(path, _classes())
     except ProblemError:
         return None
     problem = content.get("problem") if isinstance(content, dict) else None
@@ -144,11 +145,15 @@ def read_body(path: Path) -> Problem | None:
 def stored_condition(condition: Any) -> Any:
     """A support or load whose functions are replaced by their names."""
     changes = {}
-    for name in ("where", "value", "field"):
-        value = getattr(condition, name, None)
+    for name in arguments_of(type(condition)):
+        value = getattr(condition, name)
         if callable(value) and not isinstance(value, NotStored):
             changes[name] = NotStored(getattr(value, "__name__", type(value).__name__))
     return replace(condition, **changes) if changes else condition
+
+
+def _stored_state(acting: LoadState) -> LoadState:
+    return replace(acting, loads=tuple(map(stored_condition, acting.loads)))
 
 
 def _content(result: Any) -> dict[str, Any]:
@@ -189,10 +194,11 @@ def _state(solution: Solution) -> dict[str, Any]:
     state = solution.state
     if isinstance(state, list | tuple):
         state = [stored_condition(load) for load in state]
+    elif isinstance(state, LoadLevel):
+        state = replace(state, steady=tuple(map(stored_condition, state.steady)))
     return {
         "state": state,
-        "loads": tuple(map(stored_condition, solution.loads)),
-        "factor": solution.factor,
+        "acting": _stored_state(solution.acting),
         "u": solution.u,
         "contact": solution.contact,
         "energy": solution.energy,
@@ -214,9 +220,8 @@ def _solutions(content: dict[str, Any]) -> list[Solution]:
                 f"the file holds {len(u)} unknowns, and its problem has {space.n_dof} in this "
                 "xcrack: read it with the version that wrote it."
             )
-        names = ("state", "loads", "factor", "contact", "energy", "report")
+        names = ("state", "acting", "contact", "energy", "report", "dissipated")
         parts = {name: state[name] for name in names}
-        parts["dissipated"] = state.get("dissipated", 0.0)  # files of before have none
         solutions.append(
             Solution(problem=problem, space=space, u=u, lips=lips, reuse=reuse,
                      **parts)

@@ -8,7 +8,6 @@ from scipy.spatial import cKDTree
 
 from xcrack.analysis.solution import Solution
 from xcrack.base.arrays import Bools, Floats
-from xcrack.model.conditions import CrackPressure, Load, evaluate_scalar
 from xcrack.sif.sif import SIF
 
 
@@ -82,10 +81,10 @@ def lip_pressure(solution: Solution, c: int) -> Floats:
     """
     lips, contact = solution.lips[c], solution.contact[c]
     total = np.zeros(len(lips)) if contact is None else np.array(contact.pressure)
-    for load in solution.loads:
-        if isinstance(load, CrackPressure) and load.crack in (None, c):
-            given = evaluate_scalar(load.value, lips.x, "crack_pressure")
-            total = total + solution.factor * given
+    for load, factor in solution.acting:
+        given = load.face_pressure(lips.x, c) if "face_pressure" in load.acts else None
+        if given is not None:
+            total = total + factor * given
     return total
 
 
@@ -105,9 +104,9 @@ def lip_shear(solution: Solution, c: int) -> Floats | None:
     return np.einsum("qm,qmd->qd", contact.shear, contact.tangent)
 
 
-def acts(solutions: Sequence[Solution], *kinds: type[Load]) -> bool:
-    """Whether loads of one of these kinds act in any of the states."""
-    return any(isinstance(load, kinds) for s in solutions for load in s.loads)
+def acts(solutions: Sequence[Solution], *effects: str) -> bool:
+    """Whether a load of any of the states has one of some effects, as `Load.acts` names them."""
+    return any(load.acts.intersection(effects) for s in solutions for load in s.loads)
 
 
 # Closed tips and fronts: where crack faces (lips) press up to there, K_I is exactly zero.

@@ -11,7 +11,6 @@ from xcrack.fem.assembly import Tabulated, tabulated
 from xcrack.fem.function_space import FunctionSpace
 from xcrack.fem.quadrature import Points, cell_points
 from xcrack.mesh.locate import nearest_boundary
-from xcrack.model.conditions import BodyForce, InitialStress
 from xcrack.sif.accuracy import Domain, check
 from xcrack.sif.common import acts, with_closed
 from xcrack.sif.interaction_2d import (
@@ -172,7 +171,7 @@ def _integrals(solutions: Sequence[Solution], t: int, radii: Floats) -> Floats:
         total += plain_terms(solutions, ring, part.plain, part.degree)
         for values in part.others:
             total += point_terms(solutions, ring, values)
-    if acts(solutions, BodyForce, InitialStress):
+    if acts(solutions, "volume", "initial_stress"):
         for cells, n, degree in ring_classes(space, tip.x, 0.0, outer):
             for points in class_points(space, cells, n, degree):
                 total += volume_terms(solutions, ring, points)

@@ -16,11 +16,6 @@ from xcrack.fem.loads import position
 from xcrack.fem.quadrature import cell_points, cell_side
 from xcrack.mesh.locate import Body, contains
 from xcrack.mesh.simplex import leg_size
-from xcrack.model.conditions import (
-    BodyForce,
-    InitialStress,
-    evaluate,
-)
 from xcrack.sif.accuracy import Domain, check
 from xcrack.sif.common import acts, lip_pressure, lip_shear, mean_rotation, with_closed
 from xcrack.sif.interaction_3d import (
@@ -267,7 +262,7 @@ def _domain_parts(
     mesh, psi = space.mesh, space.cuts[tip.crack].level_set.psi[tip.number]
     outer = float(radii.max())
     coefficients = np.stack([solution.coefficients for solution in solutions], axis=-1)
-    initial = partial(_initial, solutions) if acts(solutions, InitialStress) else None
+    initial = partial(_initial, solutions) if acts(solutions, "initial_stress") else None
     middle = mesh.points[mesh.cells].mean(axis=1)
     reach = 1.05 * outer
     distance = curve.distance(middle, reach + float(mesh.cell_size.max())) - reach
@@ -300,20 +295,20 @@ def _domain_parts(
 
     chunks = range(0, len(cells), _CHUNK)
     # Functions of the user are called by one thread alone.
-    own = acts(solutions, BodyForce, InitialStress)
+    own = acts(solutions, "volume", "initial_stress")
     parts = map(part, chunks) if own else streamed(part, chunks)
     yield from (result for result in parts if result is not None)
 
 
 def _force(solutions: Sequence[Solution], x: Floats) -> Floats | None:
     """Body forces of all states `(q, 3, n)`."""
-    if not acts(solutions, BodyForce):
+    if not acts(solutions, "volume"):
         return None
     total = np.zeros((len(x), 3, len(solutions)))
     for n, solution in enumerate(solutions):
-        for load in solution.loads:
-            if isinstance(load, BodyForce):
-                total[:, :, n] += solution.factor * evaluate(load.value, x, "body_force")
+        for load, factor in solution.acting:
+            if "volume" in load.acts:
+                total[:, :, n] += factor * load.volume(x)
     return total
 
 
@@ -363,7 +358,7 @@ def _lip_part(
         solutions[0].problem.material,
         radii,
         gradient=gradient,
-        initial=partial(_initial, solutions) if acts(solutions, InitialStress) else None,
+        initial=partial(_initial, solutions) if acts(solutions, "initial_stress") else None,
     )
 
 

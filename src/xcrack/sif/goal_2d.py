@@ -17,7 +17,6 @@ from xcrack.fem.assembly import tabulated
 from xcrack.fem.quadrature import Points, lip_side
 from xcrack.fem.williams import continued_polar, mode_matrix, unit_gradients
 from xcrack.mesh.simplex import simplex_rule
-from xcrack.model.conditions import BodyForce, InitialStress
 from xcrack.sif.common import acts, weight
 from xcrack.sif.domain_2d import class_points, domain_of, radii_of, ring_classes, ring_parts
 from xcrack.sif.interaction_2d import ahead_derivative, inner_radii, ring_around, volume_terms
@@ -80,7 +79,7 @@ def constant(solution: Solution, t: int) -> Floats:
     """
     space, scale = solution.space, 0.5 * solution.problem.material.E_prime
     total = np.zeros(2)
-    if not acts([solution], BodyForce, InitialStress):
+    if not acts([solution], "volume", "initial_stress"):
         return total
     outer = domain_of(solution, t).outer
     radii = np.array([outer])

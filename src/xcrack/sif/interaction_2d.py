@@ -25,7 +25,6 @@ from xcrack.fem.quadrature import Points, lip_side
 from xcrack.fem.williams import continued_polar, mode_matrix, unit_gradients
 from xcrack.mesh.mesh import local_edges
 from xcrack.mesh.simplex import simplex_rule
-from xcrack.model.conditions import BodyForce, InitialStress, evaluate, evaluate_stress
 from xcrack.model.material import Isotropic
 from xcrack.sif.common import acts, lip_pressure, lip_shear, mean_rotation, weight
 
@@ -163,7 +162,7 @@ def _auxiliary(solutions: Sequence[Solution], r: Floats, theta: Floats) -> list[
     material = solutions[0].problem.material
     gradients = unit_gradients(r, theta, material.kolosov, material.mu)
     curves = np.zeros((len(gradients), 0, 2, 2))
-    if acts(solutions, InitialStress):
+    if acts(solutions, "initial_stress"):
         curves = ahead_derivative(solutions[0].problem.material, r, theta)
     return [_Field(g, c) for g, c in zip(gradients, curves, strict=True)]
 
@@ -186,15 +185,15 @@ def _load_terms(
 ) -> Floats:
     """Terms of body forces and initial stress, for each domain; dq is weighted."""
     tip = solution.space.tips[t]
-    R = tip.frame
+    R, material = tip.frame, solution.problem.material
     total = np.zeros(len(q))
-    for load in solution.loads:
-        if isinstance(load, BodyForce):
-            b = solution.factor * evaluate(load.value, x, "body_force") @ R.T
+    for load, factor in solution.acting:
+        if "volume" in load.acts:
+            b = factor * load.volume(x) @ R.T
             total -= np.einsum("q,qi,qi,rq->r", points.weight, b, field.gradient[:, :, 0], q)
-        elif isinstance(load, InitialStress):
-            everywhere = evaluate_stress(load.value, x)
-            at_tip = evaluate_stress(load.value, tip.x[None])
+        if "initial_stress" in load.acts:
+            everywhere = factor * load.initial_stress(x, material)
+            at_tip = factor * load.initial_stress(tip.x[None], material)
             full = np.einsum("ai,qij,bj->qab", R, everywhere, R)
             change = np.einsum("ai,qij,bj->qab", R, everywhere - at_tip, R)
             steady = R @ at_tip[0] @ R.T

@@ -17,6 +17,7 @@ from xcrack.base.optional import in_notebook, required
 from xcrack.fem.system import discretised
 from xcrack.linalg.reuse import Reuse
 from xcrack.model.problem import Problem, crack_number
+from xcrack.model.states import scaled_state
 from xcrack.view.figures import checked_title, picture_path
 from xcrack.view.pyvista_2d import RASTER
 from xcrack.view.scene_2d import FIELDS, SPACE_FIELDS, scene
@@ -272,8 +273,7 @@ def _drawable(given: Any, field: Any) -> Solution:
     return Solution(
         problem=given,
         state=None,
-        loads=(),
-        factor=0.0,
+        acting=scaled_state((), 0.0),
         space=space,
         u=lock(np.zeros(space.n_dof)),
         lips=lips,

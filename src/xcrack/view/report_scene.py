@@ -6,9 +6,11 @@ from typing import Any
 import numpy as np
 
 from xcrack.analysis.solution import Solution
+from xcrack.base.arguments import arguments_of
 from xcrack.base.arrays import coordinates
 from xcrack.base.markup import Markup, element, joined, listed, table
 from xcrack.crack.measures import Measures, measures
+from xcrack.model.supports import Condition
 from xcrack.runs.versions import versions
 from xcrack.view.report_source import Section, Source
 
@@ -81,12 +83,15 @@ def _conditions(solution: Solution) -> Markup:
     return joined(*parts)
 
 
-def _condition(role: str, condition: Any) -> tuple[str, str, str, str]:
-    where = getattr(condition, "where", "")
-    names = ("value", "force", "axis", "field")
-    value = next((_value(getattr(condition, n)) for n in names if hasattr(condition, n)), "")
-    place = where if isinstance(where, str) else f"{len(where)} point(s)"
-    return role, type(condition).__name__, place, value
+def _condition(role: str, condition: Condition) -> tuple[str, str, str, str]:
+    where = condition.place
+    place = "" if where is None else where if isinstance(where, str) else _vector(where)
+    values = [
+        f"{name} = {_value(getattr(condition, name))}"
+        for name, argument in arguments_of(type(condition)).items()
+        if name != "where" and getattr(condition, name) is not argument.default
+    ]
+    return role, condition.kind, place, ", ".join(values)
 
 
 def _vector(values: Any) -> str:

@@ -10,15 +10,7 @@ from xcrack.base.arrays import Bools, Floats, Ints
 from xcrack.base.checks import numbers, shown
 from xcrack.base.errors import ProblemError
 from xcrack.mesh.mesh import Mesh
-from xcrack.model.conditions import (
-    Bearing,
-    PointForce,
-    Pressure,
-    Resultant,
-    Traction,
-    evaluate,
-    evaluate_scalar,
-)
+from xcrack.model.loads import FacetPoints
 from xcrack.output.lip_faces_3d import LipFaces, lip_faces
 from xcrack.output.pieces import pieces
 from xcrack.view.scene_2d import SPACE_FIELDS, STRESSES, clipped, field_values, rounded
@@ -380,38 +372,36 @@ def load_arrows(solution: Solution) -> tuple[Floats, Floats]:
     """
     mesh = solution.space.mesh
     forces, tractions = [np.zeros((0, 3, 3))], [np.zeros((0, 3, 3))]
-    for load in solution.loads:
-        if isinstance(load, PointForce):
-            forces.append(np.stack([load.x, load.force, np.zeros(3)])[None])
-        elif isinstance(load, Bearing | Resultant):
-            facets = mesh.facet_sets[load.where]
-            area = np.linalg.norm(_outward(mesh, facets), axis=1)
-            middle = area @ mesh.points[facets].mean(axis=1) / area.sum()
+    for load, factor in solution.acting:
+        sign = np.sign(factor)
+        if "point_force" in load.acts:
+            number, force = load.point_forces(mesh)
+            rows = [mesh.points[number], sign * force, np.zeros_like(force)]
+            forces.append(np.stack(rows, axis=1))
+        if "traction" not in load.acts:
+            continue
+        facets = mesh.facet_sets[load.where]
+        x = mesh.points[facets].mean(axis=1)
+        turned = _outward(mesh, facets)
+        area = np.linalg.norm(turned, axis=1)
+        middle = area @ x / area.sum()
+        if load.has_one_arrow:
             force = np.zeros(3) if load.force is None else load.force
-            forces.append(np.stack([middle, force, np.zeros(3)])[None])
-        elif isinstance(load, Traction | Pressure):
-            facets = mesh.facet_sets[load.where]
-            x = mesh.points[facets].mean(axis=1)
-            turned = _outward(mesh, facets)
-            area = np.linalg.norm(turned, axis=1)
-            out = turned / area[:, None]
-            if isinstance(load, Traction):
-                t = evaluate(load.value, x, "traction", out)
-            else:
-                t = -evaluate_scalar(load.value, x, "pressure")[:, None] * out
-            if np.ptp(x, axis=0).max() < _SMALL * mesh.extent:
-                force = area @ t
-                middle = area @ x / area.sum()
-                forces.append(np.stack([middle, force, area @ out])[None])
-            else:
-                chosen = _spread(x, _MANY)
-                tractions.append(np.stack([x, t, out], axis=1)[chosen])
+            forces.append(np.stack([middle, sign * force, np.zeros(3)])[None])
+            continue
+        out = turned / area[:, None]
+        t = sign * load.traction(FacetPoints(mesh, facets, x, out, area))
+        if np.ptp(x, axis=0).max() < _SMALL * mesh.extent:
+            forces.append(np.stack([middle, area @ t, area @ out])[None])
+        else:
+            chosen = _spread(x, _MANY)
+            tractions.append(np.stack([x, t, out], axis=1)[chosen])
     start, vector = [], []
     for group in (np.concatenate(forces), np.concatenate(tractions)):
         size = np.linalg.norm(group[:, 1], axis=1)
         shown = size > 1e-3 * size.max(initial=0.0)
         x, v, out = np.swapaxes(group[shown], 0, 1)
-        v = np.sign(solution.factor) * v * (_LENGTH * mesh.extent / size.max(initial=1e-300))
+        v = v * (_LENGTH * mesh.extent / size.max(initial=1e-300))
         pressing = np.einsum("kd,kd->k", v, out) < -1e-6 * np.linalg.norm(v, axis=1)
         start.append(np.where(pressing[:, None], x - v, x))
         vector.append(v)

@@ -12,7 +12,7 @@ from xcrack.crack.crack import Crack
 from xcrack.crack.lines import line_crack
 from xcrack.mesh.box import box
 from xcrack.mesh.mesh import Mesh
-from xcrack.model.conditions import Displacement, Traction, displacement, traction
+from xcrack.model.loads import displacement, traction
 from xcrack.model.material import Isotropic
 from xcrack.model.problem import Problem
 
@@ -63,7 +63,7 @@ def turned(function: Plane, origin: ArrayLike, angle: float = 0.0) -> Field:
     return field
 
 
-def tractions(field: Field, names: Sequence[str]) -> list[Traction]:
+def tractions(field: Field, names: Sequence[str]) -> list[traction]:
     """Exact tractions on the given sets."""
     return [
         traction(name, lambda x, normal: np.einsum("qij,qj->qi", field(x)[1], normal))
@@ -71,7 +71,7 @@ def tractions(field: Field, names: Sequence[str]) -> list[Traction]:
     ]
 
 
-def imposed(field: Field, names: Sequence[str]) -> list[Displacement]:
+def imposed(field: Field, names: Sequence[str]) -> list[displacement]:
     """Exact displacements on the given sets."""
     return [displacement(name, lambda x: field(x)[0]) for name in names]
 

@@ -9,7 +9,7 @@ from xcrack.base.arrays import Floats
 from xcrack.crack.surfaces import elliptic_crack, penny_crack
 from xcrack.mesh.box import box
 from xcrack.mesh.mesh import Mesh
-from xcrack.model.conditions import displacement
+from xcrack.model.loads import displacement
 from xcrack.model.material import Isotropic
 from xcrack.model.problem import Problem
 from xcrack.sif.sif import SIF

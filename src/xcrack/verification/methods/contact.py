@@ -27,9 +27,9 @@ from xcrack.fem.facets import LipPoints
 from xcrack.fem.system import Model
 from xcrack.linalg.direct import Solve, System, superlu
 from xcrack.linalg.engine import StateContact
-from xcrack.model.conditions import Load
 from xcrack.model.numerics import ContactMethod
 from xcrack.model.problem import Problem
+from xcrack.model.states import LoadState
 from xcrack.verification.methods.face_stress import (
     averaging,
     steady_stress,
@@ -83,7 +83,7 @@ class Springs(ContactMethod):
         known: Floats,
         start: Sequence[Bools | None],
         closed: bool,
-        acting: Sequence[tuple[tuple[Load, ...], float]],
+        acting: Sequence[LoadState],
     ) -> list[StateContact]:
         """Contact of all load states.
 
@@ -99,9 +99,9 @@ class Springs(ContactMethod):
             First guess of each state's closed set.
         closed : bool
             State of all rows where there is no guess.
-        acting : sequence of (loads, factor)
-            Loads of each state and their scale: Nitsche counts pressures that are given on the
-            faces, and initial stress.
+        acting : sequence of LoadState
+            Loads of each state: Nitsche counts pressures that are given on the faces, and initial
+            stress.
 
         Raises
         ------
@@ -120,7 +120,7 @@ class Springs(ContactMethod):
         for k in range(f.shape[1]):
             first = start[k]
             guess = np.full(len(rows.eps), closed) if first is None else first
-            given = partial(face_tractions, model, chosen, *acting[k])
+            given = partial(face_tractions, problem, model, chosen, acting[k])
             u, pressure, sets = self.solution(system, rows, f[:, k], known[:, k], guess, given)
             states.append(StateContact(pressure, rows.jump @ u, pressure > 0, sets, u))
         return states
@@ -277,13 +277,13 @@ class nitsche(Springs):  # noqa: N801
 
 
 def face_tractions(
-    model: Model, chosen: Sequence[Multipliers], loads: tuple[Load, ...], factor: float
+    problem: Problem, model: Model, chosen: Sequence[Multipliers], acting: LoadState
 ) -> Floats:
     """Normal stress that loads add to that of the strain, at the points of all cracks `(q,)`."""
     parts = []
     for m in chosen:
         lips = model.lips[m.crack]
-        given = steady_stress(lips, m.crack, loads, factor)
+        given = steady_stress(problem.material, lips, m.crack, acting)
         parts.append(averaging(model.space, lips) @ given if given.any() else given)
     return np.concatenate(parts)
 

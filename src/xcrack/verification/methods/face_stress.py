@@ -11,14 +11,8 @@ from xcrack.base.arrays import Floats
 from xcrack.fem.facets import LipPoints
 from xcrack.fem.function_space import FunctionSpace
 from xcrack.fem.quadrature import lip_side
-from xcrack.model.conditions import (
-    CrackPressure,
-    InitialStress,
-    Load,
-    evaluate_scalar,
-    evaluate_stress,
-)
 from xcrack.model.material import Isotropic
+from xcrack.model.states import LoadState
 
 
 def stress_matrix(
@@ -130,23 +124,23 @@ def tip_distance(space: FunctionSpace, c: int, lips: LipPoints) -> Floats:
     return np.asarray((total / np.maximum(size, 1e-300))[lips.segment])
 
 
-def steady_stress(lips: LipPoints, c: int, loads: tuple[Load, ...], factor: float) -> Floats:
+def steady_stress(material: Isotropic, lips: LipPoints, c: int, acting: LoadState) -> Floats:
     """Normal stress that loads add to that of the strain `(q,)`: initial stress, given pressure.
 
     Parameters
     ----------
+    material : Isotropic
     lips : LipPoints
     c : int
         Crack.
-    loads : tuple of loads
-    factor : float
-        Scale of given pressures (not of an initial stress).
+    acting : LoadState
     """
     total = np.zeros(len(lips))
-    for load in loads:
-        if isinstance(load, InitialStress):
-            sigma = evaluate_stress(load.value, lips.x)
+    for load, factor in acting:
+        if "initial_stress" in load.acts:
+            sigma = factor * load.initial_stress(lips.x, material)
             total += np.einsum("qi,qij,qj->q", lips.normal, sigma, lips.normal)
-        elif isinstance(load, CrackPressure) and load.crack in (None, c):
-            total += factor * evaluate_scalar(load.value, lips.x, "crack_pressure")
+        if "face_pressure" in load.acts:
+            p = load.face_pressure(lips.x, c)
+            total += 0.0 if p is None else factor * p
     return total

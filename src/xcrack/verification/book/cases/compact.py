@@ -6,7 +6,7 @@ from xcrack.analysis.solve import solve
 from xcrack.crack.lines import line_crack
 from xcrack.mesh.mesh import Mesh
 from xcrack.mesh.plates import plate
-from xcrack.model.conditions import bearing
+from xcrack.model.loads import bearing
 from xcrack.model.material import Isotropic
 from xcrack.model.problem import Problem
 from xcrack.output.opening import crack_opening

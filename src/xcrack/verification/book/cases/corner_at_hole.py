@@ -6,7 +6,7 @@ from xcrack.analysis.solve import solve
 from xcrack.base.arrays import Floats
 from xcrack.crack.surfaces import elliptic_crack
 from xcrack.mesh.mesh import Mesh
-from xcrack.model.conditions import traction
+from xcrack.model.loads import traction
 from xcrack.model.material import Isotropic
 from xcrack.model.problem import Problem
 from xcrack.sif.stress_intensity import stress_intensity

@@ -6,7 +6,7 @@ import numpy as np
 
 from xcrack.analysis.solve import solve
 from xcrack.base.arrays import Floats
-from xcrack.model.conditions import Displacement
+from xcrack.model.loads import displacement
 from xcrack.sif.stress_intensity import stress_intensities
 from xcrack.verification.book.case import Case, Value
 from xcrack.verification.book.scenes_2d import NU, SIDES, E, centre_crack, imposed, turned
@@ -24,7 +24,7 @@ def _plane(x: Floats, y: Floats, felt: float, shear: float, pressure: float) -> 
     return u + u_body, s + s_body
 
 
-def _state(felt: float, shear: float, pressure: float = 1.0) -> list[Displacement]:
+def _state(felt: float, shear: float, pressure: float = 1.0) -> list[displacement]:
     plane = partial(_plane, felt=felt, shear=shear, pressure=pressure)
     return imposed(turned(plane, _ORIGIN, _ANGLE), SIDES)
 

@@ -13,7 +13,7 @@ from xcrack.fatigue.power import paris
 from xcrack.growth.run import grow
 from xcrack.growth.step import Cycle
 from xcrack.mesh.box import box
-from xcrack.model.conditions import traction
+from xcrack.model.loads import traction
 from xcrack.model.material import Isotropic
 from xcrack.model.problem import Problem
 from xcrack.runs.collect import collect, resume

@@ -12,7 +12,7 @@ from xcrack.growth.ending import amplification
 from xcrack.growth.run import grow
 from xcrack.growth.step import Cycle
 from xcrack.mesh.triangulation import face_areas
-from xcrack.model.conditions import traction
+from xcrack.model.loads import traction
 from xcrack.model.material import Isotropic
 from xcrack.model.problem import Problem
 from xcrack.runs.collect import collect

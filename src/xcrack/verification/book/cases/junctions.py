@@ -7,7 +7,7 @@ import numpy as np
 from xcrack.analysis.solve import solve
 from xcrack.base.arrays import Floats
 from xcrack.crack.lines import line_crack
-from xcrack.model.conditions import traction
+from xcrack.model.loads import traction
 from xcrack.model.material import Isotropic
 from xcrack.model.problem import Problem
 from xcrack.sif.stress_intensity import stress_intensity

@@ -15,9 +15,10 @@ from xcrack.growth.cycles import cycles_between
 from xcrack.growth.run import grow
 from xcrack.growth.step import Cycle, Step
 from xcrack.mesh.box import box
-from xcrack.model.conditions import fix, traction
+from xcrack.model.loads import traction
 from xcrack.model.material import Isotropic
 from xcrack.model.problem import Problem
+from xcrack.model.supports import fix
 from xcrack.runs.collect import collect
 from xcrack.verification.book.case import Case, Value
 from xcrack.verification.exact import lives

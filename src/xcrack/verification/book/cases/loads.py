@@ -10,7 +10,7 @@ import numpy as np
 
 from xcrack.analysis.solve import solve
 from xcrack.crack.lines import line_crack
-from xcrack.model.conditions import Load, crack_pressure, displacement, initial_stress, temperature
+from xcrack.model.loads import Load, crack_pressure, displacement, initial_stress, temperature
 from xcrack.model.material import Isotropic
 from xcrack.model.problem import Problem
 from xcrack.sif.stress_intensity import stress_intensity

@@ -8,7 +8,7 @@ from xcrack.analysis.solve import solve
 from xcrack.crack.lines import line_crack
 from xcrack.crack.surfaces import penny_crack
 from xcrack.mesh.box import box
-from xcrack.model.conditions import displacement
+from xcrack.model.loads import displacement
 from xcrack.model.material import Isotropic
 from xcrack.model.problem import Problem
 from xcrack.verification.book.case import Case, Value

@@ -13,9 +13,10 @@ from xcrack.fatigue.spectrum import Spectrum
 from xcrack.growth.run import grow
 from xcrack.growth.step import Cycle
 from xcrack.mesh.box import box
-from xcrack.model.conditions import fix, traction
+from xcrack.model.loads import traction
 from xcrack.model.material import Isotropic
 from xcrack.model.problem import Problem
+from xcrack.model.supports import fix
 from xcrack.runs.assessment import residual_strength
 from xcrack.runs.collect import collect
 from xcrack.runs.history import History

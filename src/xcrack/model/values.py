@@ -1,0 +1,212 @@
+"""Values over a body: numbers, or functions of the place."""
+
+import inspect
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from xcrack.base.arguments import Error, Rule, Unit
+from xcrack.base.arrays import Floats, frozen
+from xcrack.base.checks import called, number, numbers, shown
+from xcrack.base.errors import ProblemError
+from xcrack.base.units import NUMBER
+
+
+@dataclass(frozen=True)
+class VectorField(Rule):
+    """A vector, or a function f(x) or f(x, normal) of points; with `free` an entry may be None."""
+
+    unit: Unit = NUMBER
+    free: bool = False
+    is_vector = True
+
+    def check(self, value: Any, what: str, error: Error) -> Any:
+        """The function, a read-only vector, or a tuple with None."""
+        if callable(value):
+            return value
+        given = self.free and isinstance(value, list | tuple) and any(v is None for v in value)
+        if given and len(value) in (2, 3):
+            return tuple(
+                None if v is None else number(v, f"{what}[{i}]", error=error)
+                for i, v in enumerate(value)
+            )
+        vector = numbers(value, what, (None,), error=error)
+        if len(vector) not in (2, 3):
+            raise error(f"{what} = {shown(value)}: give a vector of 2 or 3 numbers, or a function.")
+        return frozen(vector)
+
+
+@dataclass(frozen=True)
+class ScalarField(Rule):
+    """A number, or a function f(x) of points."""
+
+    unit: Unit = NUMBER
+
+    def check(self, value: Any, what: str, error: Error) -> Any:
+        """The function, or the number as float."""
+        return value if callable(value) else number(value, what, error=error)
+
+
+@dataclass(frozen=True)
+class StressField(Rule):
+    """A symmetric stress, or a function f(x) of points."""
+
+    unit: Unit = NUMBER
+    is_vector = True
+
+    def check(self, value: Any, what: str, error: Error) -> Any:
+        """The function, or a read-only matrix."""
+        if callable(value):
+            return value
+        sigma = numbers(value, what, (None, None), error=error)
+        if sigma.shape not in ((2, 2), (3, 3)):
+            raise error(f"{what} has the shape {sigma.shape}: give (2, 2) or (3, 3).")
+        if not np.allclose(sigma, sigma.T):
+            raise error(f"{what}: {sigma.tolist()} is not symmetric: give a stress.")
+        return frozen(sigma)
+
+
+@dataclass(frozen=True)
+class Place(Rule):
+    """The name of a facet set, or a point."""
+
+    unit: Unit = NUMBER
+    is_vector = True
+
+    def check(self, value: Any, what: str, error: Error) -> Any:
+        """The name, or a read-only point."""
+        if isinstance(value, str):
+            return value
+        try:
+            return frozen(numbers(value, what, (None,), error=error))
+        except error as cause:
+            raise error(f"{cause} Or give the name of a facet set.") from None
+
+
+@dataclass(frozen=True)
+class SetName(Rule):
+    """The name of a facet set."""
+
+    def check(self, value: Any, what: str, error: Error) -> str:
+        """The name."""
+        if not isinstance(value, str):
+            raise error(f"{what} = {shown(value)}: give the name of a facet set.")
+        return value
+
+
+def vector_at(value: Any, x: Floats, what: str, normal: Floats | None = None) -> Floats:
+    """A vector, f(x) or f(x, normal) at points `(n, d)`, checked.
+
+    Raises
+    ------
+    ProblemError
+        Another shape, or values that are not finite.
+    """
+    n, d = x.shape
+    if callable(value):
+        two = normal is not None and _n_positional(value) >= 2
+        arguments = (x, normal) if two else (x,)
+        result = _real(called(value, f"the value of {what}", *arguments), what)
+    else:
+        result = numbers(value, what)
+    if result.shape == (d,):
+        result = np.broadcast_to(result, (n, d))
+    if result.shape != (n, d):
+        raise ProblemError(
+            f"{what}: the value has shape {result.shape}, wanted {(n, d)} for {n} points in "
+            f"{d} dimensions; give a vector of length {d} or a function that returns (n, {d})."
+        )
+    _check_finite(result, x, what)
+    return result
+
+
+def scalar_at(value: Any, x: Floats, what: str) -> Floats:
+    """A number or f(x) at points `(n, d)`, checked `(n,)`.
+
+    Raises
+    ------
+    ProblemError
+        Another shape, or values that are not finite.
+    """
+    if callable(value):
+        given = _real(called(value, f"the value of {what}", x), what)
+    else:
+        given = numbers(value, what)
+    if given.shape not in ((), (len(x),)):
+        raise ProblemError(
+            f"{what}: the value has shape {given.shape}, wanted {(len(x),)}; give a number or a "
+            "function that returns (n,)."
+        )
+    result = np.broadcast_to(given, (len(x),))
+    _check_finite(result, x, what)
+    return result
+
+
+def stress_at(value: Any, x: Floats, what: str) -> Floats:
+    """A stress or f(x) at points `(n, d)`, checked `(n, d, d)`.
+
+    Raises
+    ------
+    ProblemError
+        Another shape, values that are not finite or not symmetric.
+    """
+    d = x.shape[1]
+    if callable(value):
+        result = _real(called(value, f"the value of {what}", x), what)
+    else:
+        result = numbers(value, what)
+    if result.shape not in ((d, d), (len(x), d, d)):
+        raise ProblemError(
+            f"{what}: the value has shape {result.shape}, wanted {(len(x), d, d)} for {len(x)} "
+            f"points in {d} dimensions."
+        )
+    result = np.broadcast_to(result, (len(x), d, d))
+    _check_finite(result, x, what)
+    skew = np.abs(result - np.swapaxes(result, 1, 2)).max(axis=(1, 2), initial=0)
+    if (skew > 1e-8 * np.abs(result).max(initial=0.0)).any():
+        where = int(np.argmax(skew))
+        raise ProblemError(
+            f"{what}: the value at {np.round(x[where], 9).tolist()} is "
+            f"{result[where].tolist()}: a stress must be symmetric."
+        )
+    return result
+
+
+def _real(result: Any, what: str) -> Floats:
+    """What a function returned: an array of real numbers; others are looked for later."""
+    return numbers(result, f"{what}: the returned value", finite=False)
+
+
+def _check_finite(result: Floats, x: Floats, what: str) -> None:
+    bad = ~np.isfinite(result).reshape(len(x), int(np.prod(result.shape[1:]))).all(axis=1)
+    if bad.any():
+        where = x[np.argmax(bad)]
+        raise ProblemError(
+            f"{what}: the value at {np.round(where, 9).tolist()} is "
+            f"{result[np.argmax(bad)].tolist()}: every value must be finite."
+        )
+
+
+def _n_positional(function: Callable[..., Any]) -> int:
+    try:
+        parameters = inspect.signature(function).parameters.values()
+    except (TypeError, ValueError):
+        return 1
+    kinds = (inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD)
+    if any(p.kind == inspect.Parameter.VAR_POSITIONAL for p in parameters):
+        return 2
+    return sum(p.kind in kinds and p.default is inspect.Parameter.empty for p in parameters)
+
+
+__all__ = [
+    "Place",
+    "ScalarField",
+    "SetName",
+    "StressField",
+    "VectorField",
+    "scalar_at",
+    "stress_at",
+    "vector_at",
+]
