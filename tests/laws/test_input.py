@@ -41,7 +41,7 @@ POINTS = ([10, 20], [1e-8, 1e-7])
             "R_clip = 1",
         ),
         (lambda: paris(1e-11, 3, closure=0.5), "closure = 0.5"),
-        (lambda: paris(1e-11, 3, threshold=V3), "belong to nasgro"),
+        (lambda: paris(1e-11, 3, threshold=V3), "holds Newman's opening function"),
         (lambda: paris(1e-11, 3, approach="difference"), "without a threshold"),
         (
             lambda: paris(1e-11, 3, threshold=klesnil_lukas(6, 0), approach="soft"),

@@ -107,7 +107,7 @@ def test_a_run():
         (lambda: time_rate(1, 1, -1), "K_th"),
         (lambda: time_rate(1, 1, plateau=0), "plateau"),
         (lambda: with_time(3, time_rate(1, 1), 1), "law = 3"),
-        (lambda: with_time(BASE, BASE, 1), "give a time_rate"),
+        (lambda: with_time(BASE, BASE, 1), "give time_rate"),
         (lambda: with_time(BASE, time_rate(1, 1), 0), "period"),
         (lambda: with_time(BASE, time_rate(1, 1), 1, "saw"), "wave"),
         (lambda: with_time(BASE, time_rate(1, 1), 1)(1.0, 1.1), "at most 1"),

@@ -102,13 +102,14 @@ class Choice(Rule):
     """One of some values; 1 is not True."""
 
     values: tuple[Any, ...]
+    needs: str = ""
 
     def check(self, value: Any, what: str, error: Error) -> Any:
         """The value as it is."""
-        if all(isinstance(each, str) for each in self.values):
+        if not self.needs and all(isinstance(each, str) for each in self.values):
             return one_of(value, what, self.values, error=error)
         if not any(type(value) is type(each) and value == each for each in self.values):
-            known = " or ".join(repr(each) for each in self.values)
+            known = self.needs or " or ".join(repr(each) for each in self.values)
             raise error(f"{what} = {shown(value)}: give {known}.")
         return value
 
@@ -260,6 +261,11 @@ class Argument:
     def is_required(self) -> bool:
         """Whether it must be given."""
         return self.default is inspect.Parameter.empty
+
+    def unit_of(self, owner: Any) -> Dimension | None:
+        """Dimension of its numbers in an object; None where it holds none."""
+        unit = None if self.rule is None else self.rule.unit
+        return unit(owner) if callable(unit) else unit
 
     def check(self, value: Any, what: str, error: Error = ProblemError) -> Any:
         """The value as it is kept."""

@@ -5,20 +5,22 @@ already is that of the closed crack, and a closure for R < 0 would count the sam
 """
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from xcrack.base.arguments import Number
 from xcrack.base.arrays import Floats
-from xcrack.base.checks import number, numbers, shown
+from xcrack.base.checks import numbers
 from xcrack.base.errors import ProblemError
-from xcrack.fatigue.law import Bounds, check_bounds, set_floats, stress_ratio
+from xcrack.fatigue.law import Bounds, BoundsRule, Closure, stress_ratio
 
 _LOWEST = -2.0  # f of Newman is constant below
 
 
 @dataclass(frozen=True)
-class linear_closure:  # noqa: N801 - it is used as a function
+class linear_closure(Closure):  # noqa: N801 - it is used as a function
     """U as a straight line over R.
 
     Parameters
@@ -43,14 +45,9 @@ class linear_closure:  # noqa: N801 - it is used as a function
     0.7
     """
 
-    a: float
-    b: float
-    R_range: Bounds
-
-    def __post_init__(self) -> None:
-        set_floats(self, a=number(self.a, "linear_closure: a"))
-        set_floats(self, b=number(self.b, "linear_closure: b"))
-        object.__setattr__(self, "R_range", check_bounds("linear_closure", self.R_range))
+    a: Annotated[float, Number()]
+    b: Annotated[float, Number()]
+    R_range: Annotated[Bounds, BoundsRule()]
 
     def __call__(self, R: ArrayLike) -> Floats:
         """Share of the range that opens the crack, in [0, 1]."""
@@ -59,7 +56,7 @@ class linear_closure:  # noqa: N801 - it is used as a function
 
 
 @dataclass(frozen=True)
-class schijve_closure:  # noqa: N801
+class schijve_closure(Closure):  # noqa: N801
     """U as a parabola over R, from -1 to 1.
 
     Parameters
@@ -84,13 +81,9 @@ class schijve_closure:  # noqa: N801
     0.745
     """
 
-    a: float
-    b: float
-    c: float
-
-    def __post_init__(self) -> None:
-        for name in ("a", "b", "c"):
-            set_floats(self, **{name: number(getattr(self, name), f"schijve_closure: {name}")})
+    a: Annotated[float, Number()]
+    b: Annotated[float, Number()]
+    c: Annotated[float, Number()]
 
     def __call__(self, R: ArrayLike) -> Floats:
         """Share of the range that opens the crack, in [0, 1]."""
@@ -99,7 +92,7 @@ class schijve_closure:  # noqa: N801
 
 
 @dataclass(frozen=True)
-class newman_closure:  # noqa: N801
+class newman_closure(Closure):  # noqa: N801
     """U from Newman's opening function f = K_op / K_max.
 
     Parameters
@@ -129,12 +122,8 @@ class newman_closure:  # noqa: N801
     0.325656 0.903869
     """
 
-    alpha: float
-    S: float
-
-    def __post_init__(self) -> None:
-        set_floats(self, alpha=number(self.alpha, "newman_closure: alpha", least=1, most=6))
-        set_floats(self, S=number(self.S, "newman_closure: S", above=0, most=1))
+    alpha: Annotated[float, Number(least=1, most=6)]
+    S: Annotated[float, Number(above=0, most=1)]
 
     @property
     def A(self) -> tuple[float, float, float, float]:  # noqa: N802 - Newman's own name
@@ -164,18 +153,6 @@ class newman_closure:  # noqa: N801
         )[()]
 
 
-Closure = linear_closure | schijve_closure | newman_closure
-
-
-def check_closure(name: str, closure: object) -> None:
-    """Refuse what is no closure."""
-    if closure is not None and not isinstance(closure, Closure):
-        raise ProblemError(
-            f"{name}: closure = {shown(closure)}: give linear_closure, schijve_closure or "
-            "newman_closure."
-        )
-
-
 def _within(name: str, R: ArrayLike, bounds: Bounds) -> Floats:
     ratio = numbers(R, f"{name}: R")
     outside = (ratio < bounds[0]) | (ratio > bounds[1])
@@ -187,4 +164,4 @@ def _within(name: str, R: ArrayLike, bounds: Bounds) -> Floats:
     return ratio
 
 
-__all__ = ["Closure", "check_closure", "linear_closure", "newman_closure", "schijve_closure"]
+__all__ = ["linear_closure", "newman_closure", "schijve_closure"]

@@ -1,37 +1,46 @@
 """Laws that know the toughness: Forman, Hartman and Schijve, NASGRO."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Annotated
 
 import numpy as np
-from numpy.typing import ArrayLike
 
+from xcrack.base.arguments import Number, Part, checked
 from xcrack.base.arrays import Floats
-from xcrack.base.checks import number, shown
-from xcrack.base.errors import ProblemError
+from xcrack.base.units import LENGTH, STRESS, TOUGHNESS, Dimension
 from xcrack.fatigue.closures import newman_closure
 from xcrack.fatigue.law import (
-    Bounds,
+    Approach,
+    GrowthLaw,
     Ratio,
-    WithUnits,
-    check_bounds,
-    check_ratio,
+    RRange,
+    Threshold,
     largest_K,
     powered,
-    range_and_ratio,
-    set_floats,
-    sizes,
 )
-from xcrack.fatigue.shape import Approach, Shaped, shaped
-from xcrack.fatigue.thresholds import (
-    Powers,
-    Threshold,
-    nasgro3_threshold,
-    nasgro4_threshold,
-)
+from xcrack.fatigue.power import LawThreshold
+from xcrack.fatigue.thresholds import klesnil_lukas, nasgro3_threshold, nasgro4_threshold
+
+_Positive = Annotated[float, Number(above=0)]
+_NotNegative = Annotated[float, Number(least=0)]
+_Toughness = Annotated[float, Number(above=0, unit=TOUGHNESS)]
+
+
+def _per_forman(law: "forman") -> Dimension:
+    return 1.0 - 1.5 * (1 - law.m), 1 - law.m
+
+
+def _per_power(law: "hartman_schijve") -> Dimension:
+    return 1.0 + 1.5 * law.alpha, -law.alpha
+
+
+def _per_nasgro(law: "nasgro") -> Dimension:
+    return 1.0 + 1.5 * law.n, -law.n
 
 
 @dataclass(frozen=True)
-class forman(Shaped):  # noqa: N801 - it is used as a function
+class forman(GrowthLaw):  # noqa: N801 - it is used as a function
     """Growth that rises without bound as K_max comes to the toughness.
 
     Parameters
@@ -60,45 +69,26 @@ class forman(Shaped):  # noqa: N801 - it is used as a function
     1.53846e-06
     """
 
-    C: float
-    m: float
-    K_c: float
-    threshold: Threshold | None = None
+    C: Annotated[float, Number(above=0, unit=_per_forman)]
+    m: _Positive
+    K_c: _Toughness = field()
+    threshold: LawThreshold = None
     approach: Approach = "cut"
-    ratio: Ratio | None = None
-    R_range: Bounds | None = None
+    ratio: Ratio = None
+    R_range: RRange = None
 
-    def __post_init__(self) -> None:
-        for name in ("C", "m", "K_c"):
-            set_floats(self, **{name: number(getattr(self, name), f"forman: {name}", above=0)})
-        self._check_shape()
+    def rate(self, dK: Floats, R: Floats) -> Floats:
+        """C ΔK^m."""
+        return powered("forman", self.C, dK, self.m)
 
-    @property
-    def knows_negative_ratios(self) -> bool:
-        """Its answer for R < 0 depends on how R is meant."""
-        return True
-
-    def _powers(self) -> Powers:
-        return {"C": (1 - self.m, 1), "K_c": (1, 0)}
-
-    def __call__(self, dK_eq: ArrayLike, R: ArrayLike, a: ArrayLike | None = None) -> Floats:
-        """Growth a cycle of each point, length."""
-        dK, ratio = range_and_ratio("forman", dK_eq, R, self.R_range)
-
-        def rate(dK: Floats) -> Floats:
-            left = np.asarray((1 - ratio) * self.K_c - dK)
-            rise = np.broadcast_to(powered("forman", self.C, dK, self.m), left.shape)
-            grows = np.broadcast_to(dK, left.shape) > 0
-            unstable = np.where(grows, np.inf, 0.0)
-            return np.divide(rise, left, out=unstable, where=grows & (left > 0))
-
-        return shaped(
-            rate, dK, ratio, a, threshold=self.threshold, approach=self.approach, K_c=None
-        )[()]
+    def rise(self, dK: Floats, R: Floats) -> Floats:
+        """1 / ((1 - R) K_c - ΔK)."""
+        distance = (1 - R) * self.K_c - dK
+        return np.divide(1.0, distance, out=np.zeros(dK.shape), where=distance > 0)
 
 
 @dataclass(frozen=True)
-class hartman_schijve(WithUnits):  # noqa: N801
+class hartman_schijve(GrowthLaw):  # noqa: N801
     """Growth by the range above a threshold, raised near the toughness.
 
     Parameters
@@ -130,42 +120,39 @@ class hartman_schijve(WithUnits):  # noqa: N801
     8.98476e-08
     """
 
-    D: float
-    alpha: float
-    A: float
-    dK_thr: float
-    ratio: Ratio | None = None
-    R_range: Bounds | None = None
-
-    def __post_init__(self) -> None:
-        name = "hartman_schijve"
-        for constant in ("D", "alpha", "A"):
-            value = number(getattr(self, constant), f"{name}: {constant}", above=0)
-            set_floats(self, **{constant: value})
-        set_floats(self, dK_thr=number(self.dK_thr, f"{name}: dK_thr", least=0))
-        check_ratio(name, self.ratio)
-        object.__setattr__(self, "R_range", check_bounds(name, self.R_range))
+    D: Annotated[float, Number(above=0, unit=_per_power)]
+    alpha: _Positive
+    A: _Toughness
+    dK_thr: Annotated[float, Number(least=0, unit=TOUGHNESS)]
+    ratio: Ratio = None
+    R_range: RRange = None
 
     @property
-    def knows_negative_ratios(self) -> bool:
-        """Its answer for R < 0 depends on how R is meant."""
-        return True
+    def K_c(self) -> float:  # type: ignore[override]
+        """The apparent toughness A."""
+        return self.A
 
-    def _powers(self) -> Powers:
-        return {"D": (-self.alpha, 1), "A": (1, 0), "dK_thr": (1, 0)}
+    @property
+    def approach(self) -> str:  # type: ignore[override]
+        """Growth by the range above the threshold."""
+        return "shift" if self.dK_thr else "cut"
 
-    def __call__(self, dK_eq: ArrayLike, R: ArrayLike) -> Floats:
-        """Growth a cycle of each point, length."""
-        dK, ratio = range_and_ratio("hartman_schijve", dK_eq, R, self.R_range)
-        left = 1 - largest_K(dK, ratio) / self.A
-        with np.errstate(divide="ignore"):
-            over = np.maximum(dK - self.dK_thr, 0.0) / np.sqrt(np.maximum(left, 0.0))
-            rate = self.D * over**self.alpha  # inf at the toughness
-        return np.asarray(np.where(left > 0, rate, np.inf))[()]
+    @cached_property
+    def threshold(self) -> Threshold | None:  # type: ignore[override]
+        """One for all R."""
+        return klesnil_lukas(self.dK_thr, 0.0) if self.dK_thr else None
+
+    def rate(self, dK: Floats, R: Floats) -> Floats:
+        """D ΔK^α."""
+        return powered("hartman_schijve", self.D, dK, self.alpha)
+
+    def rise(self, dK: Floats, R: Floats) -> Floats:
+        """(1 - K_max/A)^(-α/2)."""
+        return np.asarray((1 - largest_K(dK, R) / self.A) ** (-0.5 * self.alpha))
 
 
 @dataclass(frozen=True)
-class nasgro(WithUnits):  # noqa: N801
+class nasgro(GrowthLaw):  # noqa: N801
     """The equation of NASGRO: closure, threshold and toughness in one.
 
     Parameters
@@ -201,59 +188,45 @@ class nasgro(WithUnits):  # noqa: N801
     3.066434e-07
     """
 
-    C: float
-    n: float
-    p: float
-    q: float
-    K_c: float
-    closure: newman_closure
-    threshold: nasgro3_threshold | nasgro4_threshold
-    ratio: Ratio | None = None
-    R_range: Bounds | None = None
-
-    def __post_init__(self) -> None:
-        for name in ("C", "n", "K_c"):
-            set_floats(self, **{name: number(getattr(self, name), f"nasgro: {name}", above=0)})
-        for name in ("p", "q"):
-            set_floats(self, **{name: number(getattr(self, name), f"nasgro: {name}", least=0)})
-        if not isinstance(self.closure, newman_closure):
-            raise ProblemError(f"nasgro: closure = {shown(self.closure)}: give newman_closure.")
-        if not isinstance(self.threshold, nasgro3_threshold | nasgro4_threshold):
-            raise ProblemError(
-                f"nasgro: threshold = {shown(self.threshold)}: give nasgro3_threshold or "
-                "nasgro4_threshold, whichever the constants were published for."
-            )
-        check_ratio("nasgro", self.ratio)
-        object.__setattr__(self, "R_range", check_bounds("nasgro", self.R_range))
+    C: Annotated[float, Number(above=0, unit=_per_nasgro)]
+    n: _Positive
+    p: _NotNegative
+    q: _NotNegative
+    K_c: _Toughness = field()
+    closure: Annotated[newman_closure, Part(newman_closure)] = field()
+    threshold: Annotated[
+        nasgro3_threshold | nasgro4_threshold,
+        Part(
+            (nasgro3_threshold, nasgro4_threshold),
+            needs="nasgro3_threshold or nasgro4_threshold, whichever the constants were published "
+            "for",
+        ),
+    ] = field()
+    ratio: Ratio = None
+    R_range: RRange = None
 
     @property
-    def needs(self) -> tuple[str, ...]:
-        """What it asks for beside the range and R."""
-        return self.threshold.needs
+    def approach(self) -> float:  # type: ignore[override]
+        """The exponent p."""
+        return self.p
 
-    @property
-    def knows_negative_ratios(self) -> bool:
-        """Its answer for R < 0 depends on how R is meant."""
-        return True
+    def rate(self, dK: Floats, R: Floats) -> Floats:
+        """C ΔK^n."""
+        return powered("nasgro", self.C, dK, self.n)
 
-    def _powers(self) -> Powers:
-        return {"C": (-self.n, 1), "K_c": (1, 0)}
-
-    def __call__(self, dK_eq: ArrayLike, R: ArrayLike, a: ArrayLike | None = None) -> Floats:
-        """Growth a cycle of each point, length."""
-        dK, ratio = range_and_ratio("nasgro", dK_eq, R, self.R_range)
-        dK, ratio = np.broadcast_arrays(dK, ratio)
-        a = sizes("nasgro", a, dK.shape)
-        least = np.broadcast_to(self.threshold.of(self.closure, ratio, a), dK.shape)
-        left = 1 - largest_K(dK, ratio) / self.K_c
-        grows = (dK > least) & (left > 0)
-        above = np.where(grows, 1 - least / np.where(grows, dK, 1.0), 0.0)
-        rate = powered("nasgro", self.C, self.closure(ratio) * dK, self.n) * above**self.p
-        rate = np.divide(rate, np.maximum(left, 0.0) ** self.q, out=np.zeros(dK.shape), where=grows)
-        return np.asarray(np.where(left > 0, rate, np.inf))[()]
+    def rise(self, dK: Floats, R: Floats) -> Floats:
+        """(1 - K_max/K_c)^-q."""
+        return np.asarray((1 - largest_K(dK, R) / self.K_c) ** -self.q)
 
 
-def nasgro_K_c(K_Ic: float, sigma_y: float, t: float, A_k: float, B_k: float) -> float:
+@checked()
+def nasgro_K_c(
+    K_Ic: _Toughness,
+    sigma_y: Annotated[float, Number(above=0, unit=STRESS)],
+    t: Annotated[float, Number(above=0, unit=LENGTH)],
+    A_k: _NotNegative,
+    B_k: _NotNegative,
+) -> float:
     """Toughness of a plate of some thickness.
 
     Parameters
@@ -285,13 +258,6 @@ def nasgro_K_c(K_Ic: float, sigma_y: float, t: float, A_k: float, B_k: float) ->
     >>> print(round(nasgro_K_c(30.0, 450.0, 0.005, 1.0, 1.0), 4))
     54.5006
     """
-    name = "nasgro_K_c"
-    K_Ic, sigma_y = (
-        number(K_Ic, f"{name}: K_Ic", above=0),
-        number(sigma_y, f"{name}: sigma_y", above=0),
-    )
-    t, A_k = number(t, f"{name}: t", above=0), number(A_k, f"{name}: A_k", least=0)
-    B_k = number(B_k, f"{name}: B_k", least=0)
     with np.errstate(over="ignore", divide="ignore"):
         t0 = 2.5 * np.square(K_Ic / sigma_y)
         thickness = A_k * t / t0 if A_k else 0.0

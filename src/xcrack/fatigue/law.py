@@ -1,43 +1,38 @@
-"""What all growth laws share: their arguments, the ratio R that they belong to, their units."""
+"""A growth law: rate, closure, threshold and toughness; its arguments, its R, its units."""
 
 from collections.abc import Callable
-from dataclasses import fields, replace
-from typing import Any, Literal, TypeVar
+from dataclasses import replace
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from xcrack.base.arguments import Choice, Declared, Rule, arguments_of
 from xcrack.base.arrays import Floats
 from xcrack.base.checks import number, numbers, shown
-from xcrack.base.errors import ProblemError
+from xcrack.base.errors import ProblemError, XcrackError
+from xcrack.base.units import NUMBER, Dimension
 from xcrack.fatigue.units import factors
 
 ROUND_OFF = 1e-9
 
 Law = Callable[..., Floats]
-Ratio = Literal["contact", "nominal"]
 Bounds = tuple[float, float]
 
 # Of what a law may ask for by name, beside the range and the ratio.
 NEEDS = ("a", "K_max")
 
-Constants = TypeVar("Constants", bound="WithUnits")
 
+class Constants(Declared):
+    """Constants in a dataclass: its fields have the rules that check and the units that convert."""
 
-class WithUnits:
-    """Constants that carry units: each names the powers of K and of length that it has."""
-
-    def _powers(self) -> dict[str, tuple[float, float]]:
-        """Powers of K and of length, by the name of the constant; others have none."""
-        return {}
-
-    def to(self: Constants, units: str, new: str) -> Constants:
-        """The same law in other units.
+    def to(self, units: str, new: str) -> Self:
+        """The same in other units.
 
         Parameters
         ----------
         units, new : str
-            Those of the constants as they are, and the wanted ones: length and K, such as
+            Those of the constants as they are, and of the result: length and K, such as
             ``"m, MPa√m"`` or ``"mm, N/mm^1.5"``. Both lengths of one text may differ, as where
             the literature has mm/cycle over MPa√m.
 
@@ -54,40 +49,210 @@ class WithUnits:
         """
         by_K, by_length = factors(units, new)
         changed: dict[str, Any] = {}
-        for name, (K, length) in self._powers().items():
+        for name, argument in arguments_of(type(self)).items():
             value = getattr(self, name)
-            if value is not None:
-                changed[name] = value * by_K**K * by_length**length
-        for field in fields(self):  # type: ignore[arg-type]
-            part = getattr(self, field.name)
-            if isinstance(part, WithUnits):
-                changed[field.name] = part.to(units, new)
+            if isinstance(value, Constants):
+                changed[name] = value.to(units, new)
+                continue
+            unit = argument.unit_of(self)
+            if value is not None and unit not in (None, NUMBER):
+                changed[name] = _times(value, _factor(unit, by_K, by_length))
         return replace(self, **changed)  # type: ignore[type-var]
 
 
-def set_floats(law: object, **values: float) -> None:
-    """Constants of a law as floats: 3 and 3.0 are the same setting."""
-    for name, value in values.items():
-        object.__setattr__(law, name, value)
+def per_range(law: Any) -> Dimension:
+    """Dimension of C in da/dN = C ΔK^m."""
+    return 1.0 + 1.5 * law.m, -law.m
 
 
-def check_ratio(name: str, ratio: Any) -> None:
-    """Refuse anything but the two kinds of R, and None for a choice that is not made."""
-    if ratio is not None and not (isinstance(ratio, str) and ratio in ("contact", "nominal")):
-        raise ProblemError(
-            f'{name}: ratio = {shown(ratio)}: give "contact" for constants that belong to the '
-            'computed K of a crack with contact, or "nominal" for those fitted with K_min < 0.'
-        )
+def _factor(unit: Dimension, by_K: float, by_length: float) -> float:
+    """What a constant of a dimension is multiplied by: it has powers of K and of length."""
+    length, force = unit  # K is force / length^1.5
+    return float(by_K**force * by_length ** (length + 1.5 * force))
 
 
-def check_bounds(name: str, bounds: Any) -> Bounds | None:
-    """Lowest and highest R of a law, where it has them."""
-    if bounds is None:
-        return None
-    low, high = numbers(bounds, f"{name}: R_range", (2,)).tolist()
-    if not low < high:
-        raise ProblemError(f"{name}: R_range = ({low:g}, {high:g}): give (lowest, highest).")
-    return low, high
+def _times(value: Any, factor: float) -> Any:
+    return tuple(_times(v, factor) for v in value) if isinstance(value, tuple) else value * factor
+
+
+class Closure(Constants):
+    """Share U of a range during which a crack is open. Subclasses are dataclasses."""
+
+    def __call__(self, R: ArrayLike) -> Floats:
+        """U in [0, 1] for R."""
+        raise NotImplementedError
+
+
+class Threshold(Constants):
+    """Range below which a crack does not grow. Subclasses are dataclasses with `value`."""
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """What it asks for beside R: of `NEEDS`."""
+        return ()
+
+    def value(self, R: Floats, a: Floats | None, closure: Closure | None) -> Floats:
+        """Threshold for R of a crack of the size a, in a law with this closure."""
+        raise NotImplementedError
+
+    def check_closure(self, law: str, closure: Closure | None) -> None:
+        """Raise where it does not go with the closure of a law."""
+
+    def __call__(self, R: ArrayLike, a: ArrayLike | None = None) -> Floats:
+        """Threshold for R of a crack of the size a, stress √length."""
+        name = type(self).__name__
+        self.check_closure(name, None)
+        ratio = stress_ratio(name, R)
+        size = sizes(name, a, ratio.shape or None)
+        return np.asarray(self.value(ratio, size, None))[()]
+
+
+class ApproachRule(Rule):
+    """How growth begins above a threshold: in words, or an exponent."""
+
+    def check(self, value: Any, what: str, error: type[XcrackError]) -> str | float:
+        """The word, or the exponent as float."""
+        if not isinstance(value, str):
+            return number(value, what, above=0, error=error)
+        if value not in ("cut", "difference", "shift"):
+            raise error(
+                f'{what} = {shown(value)}: give "cut", "difference", "shift" or an exponent p.'
+            )
+        return value
+
+
+class BoundsRule(Rule):
+    """Lowest and highest R, in order; kept as a tuple."""
+
+    def check(self, value: Any, what: str, error: type[XcrackError]) -> Bounds:
+        """Both as float."""
+        low, high = numbers(value, what, (2,), error=error).tolist()
+        if not low < high:
+            raise error(f"{what} = ({low:g}, {high:g}): give (lowest, highest).")
+        return low, high
+
+
+Approach = Annotated[str | float, ApproachRule()]
+RRange = Annotated[Bounds | None, BoundsRule()]
+Ratio = Annotated[
+    Literal["contact", "nominal"] | None,
+    Choice(
+        ("contact", "nominal"),
+        needs='"contact" for constants that belong to the computed K of a crack with contact, or '
+        '"nominal" for those fitted with K_min < 0',
+    ),
+]
+
+
+class GrowthLaw(Constants):
+    """Growth a cycle, da/dN = rate(U ΔK) near threshold and toughness. Subclasses are dataclasses.
+
+    A law has four parts: `rate` between threshold and toughness, a closure, a threshold with the
+    way to it, and a toughness `K_c` with the `rise` towards it. What a subclass does not have,
+    does nothing.
+
+    Attributes
+    ----------
+    closure : Closure or None
+        U ΔK stands for ΔK in the rate then.
+    threshold : Threshold or None
+        Compared with ΔK itself.
+    approach : {"cut", "difference", "shift"} or float
+        Above the threshold: rate(ΔK), rate(ΔK) - rate(ΔK_th), rate(ΔK - ΔK_th), or rate(ΔK) times
+        (1 - ΔK_th / ΔK)^p.
+    K_c : float or None, stress √length
+        inf where K_max reaches it, which ends a run.
+    ratio : {"contact", "nominal"} or None
+        Which ΔK and R the constants belong to; None: to be given where R < 0 is asked for and
+        `knows_negative_ratios`.
+    R_range : (float, float) or None
+        Others are an error.
+    """
+
+    closure: Closure | None = None
+    threshold: Threshold | None = None
+    approach: str | float = "cut"
+    K_c: float | None = None
+    ratio: str | None = None
+    R_range: Bounds | None = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        name = type(self).__name__
+        if self.threshold is not None:
+            self.threshold.check_closure(name, self.closure)
+        elif self.approach != "cut":
+            raise ProblemError(
+                f"{name}: approach = {shown(self.approach)} without a threshold: give threshold=."
+            )
+
+    def rate(self, dK: Floats, R: Floats) -> Floats:
+        """Growth a cycle between threshold and toughness, of the open part of the range."""
+        raise NotImplementedError
+
+    def rise(self, dK: Floats, R: Floats) -> Floats:
+        """Factor on the rate where K_max is below the toughness."""
+        return np.ones(dK.shape)
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """What it asks for beside the range and R."""
+        return () if self.threshold is None else self.threshold.needs
+
+    @property
+    def knows_negative_ratios(self) -> bool:
+        """Whether its answer for R < 0 depends on how R is meant."""
+        has_rise = type(self).rise is not GrowthLaw.rise
+        return self.closure is not None or self.threshold is not None or has_rise
+
+    def __call__(self, dK_eq: ArrayLike, R: ArrayLike, a: ArrayLike | None = None) -> Floats:
+        """Growth a cycle of each point, length.
+
+        Parameters
+        ----------
+        dK_eq : array, stress √length
+        R : array
+            One for each range, or one for all.
+        a : array, optional, length
+            Crack size, where the threshold asks for it.
+
+        Raises
+        ------
+        ProblemError
+            Arrays that do not fit each other, a negative range, an R above 1 or outside `R_range`.
+        """
+        name = type(self).__name__
+        dK, ratio = np.broadcast_arrays(*range_and_ratio(name, dK_eq, R, self.R_range))
+        U = None if self.closure is None else self.closure(ratio)
+        size = sizes(name, a, dK.shape)
+
+        def rate(dK: Floats) -> Floats:
+            return np.asarray(self.rate(dK if U is None else U * dK, ratio))
+
+        if self.threshold is None:
+            result = rate(dK)
+        else:
+            least = np.broadcast_to(self.threshold.value(ratio, size, self.closure), dK.shape)
+            result = np.where(dK > least, _above(rate, dK, least, self.approach), 0.0)
+        if self.K_c is not None:
+            breaks = largest_K(dK, ratio) >= self.K_c
+            inside = np.where(breaks, 0.0, dK)
+            result = np.where(breaks, np.inf, result * self.rise(inside, ratio))
+        return np.asarray(result)[()]
+
+
+def _above(
+    rate: Callable[[Floats], Floats], dK: Floats, least: Floats, approach: str | float
+) -> Floats:
+    """Growth above a threshold; anything below."""
+    if approach == "cut":
+        return rate(dK)
+    if approach == "difference":
+        return rate(dK) - rate(least)
+    if approach == "shift":
+        return rate(np.maximum(dK - least, 0.0))
+    share = np.divide(least, dK, out=np.ones(dK.shape), where=dK > 0)
+    return np.asarray(rate(dK) * np.maximum(1 - share, 0.0) ** float(approach))
 
 
 def range_and_ratio(
@@ -149,12 +314,12 @@ def stress_ratio(name: str, R: ArrayLike) -> Floats:
     return ratio
 
 
-def sizes(name: str, a: ArrayLike | None, shape: tuple[int, ...]) -> Floats | None:
-    """Crack sizes for ranges of a shape, where they are given."""
+def sizes(name: str, a: ArrayLike | None, shape: tuple[int, ...] | None) -> Floats | None:
+    """Crack sizes for ranges of a shape (None: of any), where they are given."""
     if a is None:
         return None
     given = numbers(a, f"{name}: a")
-    if given.ndim and given.shape != shape:
+    if given.ndim and shape is not None and given.shape != shape:
         raise ProblemError(
             f"{name}: a has the shape {given.shape}: give one crack size for each range, of shape "
             f"{shape}, or one for all."
@@ -187,24 +352,21 @@ def largest_K(dK: Floats, R: Floats) -> Floats:
         return np.asarray(np.where(dK > 0, dK / share, 0.0))
 
 
-def toughness(name: str, value: Any) -> float | None:
-    """A toughness that may be left out."""
-    return None if value is None else number(value, f"{name}: K_c", above=0)
-
-
 __all__ = [
     "NEEDS",
+    "Approach",
     "Bounds",
+    "Closure",
+    "Constants",
+    "GrowthLaw",
     "Law",
+    "RRange",
     "Ratio",
-    "WithUnits",
-    "check_bounds",
-    "check_ratio",
+    "Threshold",
     "largest_K",
+    "per_range",
     "powered",
     "range_and_ratio",
-    "set_floats",
     "sizes",
     "stress_ratio",
-    "toughness",
 ]

@@ -1,29 +1,34 @@
 """Laws that are powers of a range: Paris, Elber, Walker, and Paris in pieces."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Annotated, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from xcrack.base.arguments import Array, Number, Part
 from xcrack.base.arrays import Floats
-from xcrack.base.checks import number, numbers
+from xcrack.base.checks import numbers
 from xcrack.base.errors import ProblemError
-from xcrack.fatigue.closures import Closure, check_closure
+from xcrack.base.units import TOUGHNESS
 from xcrack.fatigue.law import (
-    Bounds,
+    Approach,
+    Closure,
+    GrowthLaw,
     Ratio,
-    WithUnits,
+    RRange,
+    Threshold,
+    per_range,
     powered,
-    range_and_ratio,
-    set_floats,
 )
-from xcrack.fatigue.shape import Approach, Shaped, shaped
-from xcrack.fatigue.thresholds import Powers, Threshold
-from xcrack.fatigue.units import factors
+
+LawClosure = Annotated[Closure | None, Part(Closure)]
+LawThreshold = Annotated[Threshold | None, Part(Threshold)]
+Toughness = Annotated[float | None, Number(above=0, unit=TOUGHNESS)]
 
 
 @dataclass(frozen=True)
-class paris(Shaped):  # noqa: N801 - it is used as a function: paris(C, m)(dK_eq, R)
+class paris(GrowthLaw):  # noqa: N801 - it is used as a function: paris(C, m)(dK_eq, R)
     """Growth as a power of the range.
 
     Parameters
@@ -64,46 +69,22 @@ class paris(Shaped):  # noqa: N801 - it is used as a function: paris(C, m)(dK_eq
     1e-08
     """
 
-    C: float
-    m: float
-    closure: Closure | None = None
-    threshold: Threshold | None = None
+    C: Annotated[float, Number(above=0, unit=per_range)]
+    m: Annotated[float, Number(above=0)]
+    closure: LawClosure = None
+    threshold: LawThreshold = None
     approach: Approach = "cut"
-    K_c: float | None = None
-    ratio: Ratio | None = None
-    R_range: Bounds | None = None
+    K_c: Toughness = None
+    ratio: Ratio = None
+    R_range: RRange = None
 
-    def __post_init__(self) -> None:
-        set_floats(
-            self, C=number(self.C, "paris: C", above=0), m=number(self.m, "paris: m", above=0)
-        )
-        check_closure("paris", self.closure)
-        self._check_shape()
-
-    @property
-    def knows_negative_ratios(self) -> bool:
-        """Whether its answer for R < 0 depends on how R is meant."""
-        return self.closure is not None or self.threshold is not None
-
-    def _powers(self) -> Powers:
-        return {"C": (-self.m, 1), "K_c": (1, 0)}
-
-    def __call__(self, dK_eq: ArrayLike, R: ArrayLike, a: ArrayLike | None = None) -> Floats:
-        """Growth a cycle of each point, length."""
-        dK, ratio = range_and_ratio("paris", dK_eq, R, self.R_range)
-
-        def rate(dK: Floats) -> Floats:
-            if self.closure is not None:
-                dK = self.closure(ratio) * dK
-            return powered("paris", self.C, dK, self.m)
-
-        return shaped(
-            rate, dK, ratio, a, threshold=self.threshold, approach=self.approach, K_c=self.K_c
-        )[()]
+    def rate(self, dK: Floats, R: Floats) -> Floats:
+        """C ΔK^m."""
+        return powered("paris", self.C, dK, self.m)
 
 
 @dataclass(frozen=True)
-class elber(WithUnits):  # noqa: N801 - it is used as a function
+class elber(GrowthLaw):  # noqa: N801 - it is used as a function
     """Growth by the part of the range in which the plastic wake lets the crack open.
 
     Where contact of the lips is computed, the smallest K is that of the closed crack already;
@@ -135,37 +116,48 @@ class elber(WithUnits):  # noqa: N801 - it is used as a function
     1.25e-09
     """
 
-    C: float
-    m: float
-    a: float
-    b: float
+    C: Annotated[float, Number(above=0, unit=per_range)]
+    m: Annotated[float, Number(above=0)]
+    a: Annotated[float, Number()]
+    b: Annotated[float, Number()]
+    knows_negative_ratios = False  # R < 0 is warned of and not refused, as its U is cut to [0, 1]
 
     def __post_init__(self) -> None:
-        set_floats(
-            self, C=number(self.C, "elber: C", above=0), m=number(self.m, "elber: m", above=0)
-        )
-        set_floats(self, a=number(self.a, "elber: a"), b=number(self.b, "elber: b"))
+        super().__post_init__()
         if max(self.a, self.a + self.b) <= 0:
             raise ProblemError(
                 f"elber: U = {self.a} + {self.b} R is not positive for any R in [0, 1], so that "
                 "nothing would ever grow: give a or a + b above 0."
             )
 
-    def _powers(self) -> Powers:
-        return {"C": (-self.m, 1)}
+    @property
+    def closure(self) -> Closure:  # type: ignore[override]
+        """U for any R."""
+        return _OpenShare(self.a, self.b)
 
     def U(self, R: ArrayLike) -> Floats:  # noqa: N802 - Elber's own name
         """Share of the range that opens the crack, in [0, 1]."""
-        return np.asarray(np.clip(self.a + self.b * numbers(R, "elber: R"), 0.0, 1.0))[()]
+        return self.closure(R)
 
-    def __call__(self, dK_eq: ArrayLike, R: ArrayLike) -> Floats:
-        """Growth a cycle of each point, length."""
-        dK, ratio = range_and_ratio("elber", dK_eq, R)
-        return powered("elber", self.C, self.U(ratio) * dK, self.m)[()]
+    def rate(self, dK: Floats, R: Floats) -> Floats:
+        """C (U ΔK)^m."""
+        return powered("elber", self.C, dK, self.m)
 
 
 @dataclass(frozen=True)
-class walker(Shaped):  # noqa: N801 - it is used as a function
+class _OpenShare(Closure):
+    """U = a + b R, cut to [0, 1]."""
+
+    a: float
+    b: float
+
+    def __call__(self, R: ArrayLike) -> Floats:
+        """U in [0, 1] for R."""
+        return np.asarray(np.clip(self.a + self.b * numbers(R, "elber: R"), 0.0, 1.0))[()]
+
+
+@dataclass(frozen=True)
+class walker(GrowthLaw):  # noqa: N801 - it is used as a function
     """Growth by a range that the mean load raises.
 
     Parameters
@@ -197,55 +189,35 @@ class walker(Shaped):  # noqa: N801 - it is used as a function
     4e-09
     """
 
-    C: float
-    m: float
-    gamma: float
-    gamma_minus: float | None = None
-    threshold: Threshold | None = None
+    C: Annotated[float, Number(above=0, unit=per_range)]
+    m: Annotated[float, Number(above=0)]
+    gamma: Annotated[float, Number(least=0, most=1)]
+    gamma_minus: Annotated[float | None, Number(least=0, most=1)] = None
+    threshold: LawThreshold = None
     approach: Approach = "cut"
-    K_c: float | None = None
-    ratio: Ratio | None = None
-    R_range: Bounds | None = None
-
-    def __post_init__(self) -> None:
-        set_floats(
-            self, C=number(self.C, "walker: C", above=0), m=number(self.m, "walker: m", above=0)
-        )
-        set_floats(self, gamma=number(self.gamma, "walker: gamma", least=0, most=1))
-        if self.gamma_minus is not None:
-            minus = number(self.gamma_minus, "walker: gamma_minus", least=0, most=1)
-            set_floats(self, gamma_minus=minus)
-        self._check_shape()
+    K_c: Toughness = None
+    ratio: Ratio = None
+    R_range: RRange = None
 
     @property
     def knows_negative_ratios(self) -> bool:
         """Whether its answer for R < 0 depends on how R is meant."""
-        return self.gamma_minus is not None or self.threshold is not None
+        return self.gamma_minus is not None or super().knows_negative_ratios
 
-    def _powers(self) -> Powers:
-        return {"C": (-self.m, 1), "K_c": (1, 0)}
-
-    def __call__(self, dK_eq: ArrayLike, R: ArrayLike, a: ArrayLike | None = None) -> Floats:
-        """Growth a cycle of each point, length."""
-        dK, ratio = range_and_ratio("walker", dK_eq, R, self.R_range)
+    def rate(self, dK: Floats, R: Floats) -> Floats:
+        """C (ΔK / (1 - R)^(1 - γ))^m."""
         # R = 1 is a load that does not vary: ΔK = 0, and 0/0 must not become nan
-        share = np.maximum(1.0 - ratio, np.finfo(float).tiny)
+        share = np.maximum(1.0 - R, np.finfo(float).tiny)
         gamma: float | Floats = self.gamma
         if self.gamma_minus is not None:
-            gamma = np.where(ratio < 0, self.gamma_minus, self.gamma)
-
-        def rate(dK: Floats) -> Floats:
-            with np.errstate(over="ignore"):
-                effective = np.where(dK > 0, dK / share ** (1.0 - gamma), 0.0)
-            return powered("walker", self.C, effective, self.m)
-
-        return shaped(
-            rate, dK, ratio, a, threshold=self.threshold, approach=self.approach, K_c=self.K_c
-        )[()]
+            gamma = np.where(R < 0, self.gamma_minus, self.gamma)
+        with np.errstate(over="ignore"):
+            effective = np.where(dK > 0, dK / share ** (1.0 - gamma), 0.0)
+        return powered("walker", self.C, effective, self.m)
 
 
 @dataclass(frozen=True)
-class piecewise(Shaped):  # noqa: N801 - it is used as a function
+class piecewise(GrowthLaw):  # noqa: N801 - it is used as a function
     """Paris in pieces: each has its own constants, and they change at knees.
 
     Parameters
@@ -274,16 +246,19 @@ class piecewise(Shaped):  # noqa: N801 - it is used as a function
     363.13 2.36e-05
     """
 
-    pieces: tuple[tuple[float, float], ...]
-    knees: tuple[float, ...] | None = None
-    threshold: Threshold | None = None
+    pieces: Annotated[tuple[tuple[float, float], ...], Array(shape=(None, 2), hashable=True)]
+    knees: Annotated[
+        tuple[float, ...] | None, Array(shape=(None,), unit=TOUGHNESS, hashable=True)
+    ] = None
+    threshold: LawThreshold = None
     approach: Approach = "cut"
-    K_c: float | None = None
-    ratio: Ratio | None = None
-    R_range: Bounds | None = None
+    K_c: Toughness = None
+    ratio: Ratio = None
+    R_range: RRange = None
 
     def __post_init__(self) -> None:
-        constants = numbers(self.pieces, "piecewise: pieces", (None, 2))
+        super().__post_init__()
+        constants = np.array(self.pieces)
         if not len(constants) or (constants <= 0).any():
             raise ProblemError("piecewise: pieces: give positive pairs (C, m).")
         C, m = constants.T
@@ -294,49 +269,24 @@ class piecewise(Shaped):  # noqa: N801 - it is used as a function
                 )
             knees = np.exp(np.diff(np.log(C)) / -np.diff(m))
         else:
-            knees = numbers(self.knees, "piecewise: knees", (len(C) - 1,))
+            knees = np.array(numbers(self.knees, "piecewise: knees", (len(C) - 1,)))
         if (knees <= 0).any() or (np.diff(knees) <= 0).any():
             raise ProblemError(
                 f"piecewise: the knees {knees} do not rise: order the pieces from small ranges to "
                 "large ones."
             )
-        pieces = tuple((float(c), float(e)) for c, e in constants)
-        object.__setattr__(self, "pieces", pieces)
-        object.__setattr__(self, "knees", tuple(float(knee) for knee in knees))
-        self._check_shape()
+        object.__setattr__(self, "knees", tuple(knees.tolist()))
 
-    @property
-    def knows_negative_ratios(self) -> bool:
-        """Whether its answer for R < 0 depends on how R is meant."""
-        return self.threshold is not None
-
-    def _powers(self) -> Powers:
-        return {"K_c": (1, 0)}
-
-    def to(self, units: str, new: str) -> "piecewise":
-        """The same law in other units; see `WithUnits.to`."""
-        rest = super().to(units, new)
+    def to(self, units: str, new: str) -> Self:
+        """The same law in other units; see `paris.to`."""
         pieces = tuple((paris(C, m).to(units, new).C, m) for C, m in self.pieces)
-        by_K, _ = factors(units, new)
-        knees = tuple(knee * by_K for knee in self.knees or ())
-        return piecewise(
-            pieces, knees, rest.threshold, rest.approach, rest.K_c, self.ratio, self.R_range
-        )
+        return replace(super().to(units, new), pieces=pieces)
 
-    def __call__(self, dK_eq: ArrayLike, R: ArrayLike, a: ArrayLike | None = None) -> Floats:
-        """Growth a cycle of each point, length."""
-        dK, ratio = range_and_ratio("piecewise", dK_eq, R, self.R_range)
-        dK, ratio = np.broadcast_arrays(dK, ratio)
+    def rate(self, dK: Floats, R: Floats) -> Floats:
+        """C ΔK^m of the piece."""
         C, m = np.array(self.pieces).T
-        knees = np.array(self.knees)
-
-        def rate(dK: Floats) -> Floats:
-            piece = np.searchsorted(knees, dK, side="right")
-            return powered("piecewise", C[piece], dK, m[piece])
-
-        return shaped(
-            rate, dK, ratio, a, threshold=self.threshold, approach=self.approach, K_c=self.K_c
-        )[()]
+        piece = np.searchsorted(np.array(self.knees), dK, side="right")
+        return powered("piecewise", C[piece], dK, m[piece])
 
 
-__all__ = ["elber", "paris", "piecewise", "walker"]
+__all__ = ["LawClosure", "LawThreshold", "Toughness", "elber", "paris", "piecewise", "walker"]

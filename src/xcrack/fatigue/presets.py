@@ -7,11 +7,12 @@ from functools import cache
 from importlib.resources import files
 from typing import Any
 
+from xcrack.base.arguments import checked
 from xcrack.base.checks import shown
 from xcrack.base.errors import ProblemError
 from xcrack.fatigue.closures import newman_closure
 from xcrack.fatigue.fracture import forman, hartman_schijve, nasgro
-from xcrack.fatigue.law import Bounds, Law, Ratio, check_ratio
+from xcrack.fatigue.law import Bounds, Law, Ratio
 from xcrack.fatigue.power import paris, piecewise, walker
 from xcrack.fatigue.thresholds import nasgro3_threshold, nasgro4_threshold
 from xcrack.fatigue.units import Units
@@ -64,6 +65,7 @@ def presets() -> dict[str, Preset]:
     return dict(_presets())
 
 
+@checked()
 def law(name: str, *, units: str, ratio: Ratio | None = None) -> Any:
     """A growth law with published constants, in the units of your model.
 
@@ -103,7 +105,6 @@ def law(name: str, *, units: str, ratio: Ratio | None = None) -> Any:
             f"law: units = {shown(units)}: K has the root of another length, which no model has: "
             "give one length, such as m, MPa√m."
         )
-    check_ratio("law", ratio)
     preset = known[name]
     return _in_ratio(preset.law, ratio).to(preset.units, units)
 

@@ -2,15 +2,15 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
+from xcrack.base.arguments import Choice
 from xcrack.base.arrays import Floats
-from xcrack.base.checks import number, numbers, one_of
+from xcrack.base.checks import number, numbers
 from xcrack.base.errors import ProblemError
-from xcrack.fatigue.law import Ratio, WithUnits, check_ratio, range_and_ratio
+from xcrack.fatigue.law import Bounds, GrowthLaw, Ratio
 from xcrack.fatigue.units import factors
 
 Curve = tuple[float, tuple[float, ...], tuple[float, ...]]
@@ -18,7 +18,7 @@ _ROUND_OFF = 1e-12
 
 
 @dataclass(frozen=True)
-class rate_table(WithUnits):  # noqa: N801 - it is used as a function
+class rate_table(GrowthLaw):  # noqa: N801 - it is used as a function
     """Measured points, straight lines between them over logarithms.
 
     Below the first point of a curve nothing grows, above the last the answer is inf, which ends a
@@ -54,12 +54,11 @@ class rate_table(WithUnits):  # noqa: N801 - it is used as a function
     """
 
     curves: Any
-    outside: str = "refuse"
-    ratio: Ratio | None = None
+    outside: Annotated[str, Choice(("refuse", "nearest"))] = "refuse"
+    ratio: Ratio = None
 
     def __post_init__(self) -> None:
-        check_ratio("rate_table", self.ratio)
-        one_of(self.outside, "rate_table: outside", ("refuse", "nearest"))
+        super().__post_init__()
         given: list[tuple[Any, Any]] = []
         if isinstance(self.curves, Mapping):
             given = list(self.curves.items())
@@ -78,27 +77,31 @@ class rate_table(WithUnits):  # noqa: N801 - it is used as a function
         return len(self.curves) > 1
 
     def to(self, units: str, new: str) -> "rate_table":
-        """The same law in other units; see `WithUnits.to`."""
+        """The same law in other units; see `paris.to`."""
         by_K, by_length = factors(units, new)
         curves = {
             R: (np.array(dK) * by_K, np.array(rate) * by_length) for R, dK, rate in self.curves
         }
         return rate_table(curves, self.outside, self.ratio)
 
-    def __call__(self, dK_eq: ArrayLike, R: ArrayLike) -> Floats:
-        """Growth a cycle of each point, length."""
+    @property
+    def R_range(self) -> Bounds | None:  # type: ignore[override]  # noqa: N802
+        """Lowest and highest R of its curves, where others are refused."""
+        if self.outside != "refuse" or len(self.curves) < 2:
+            return None
+        return self.curves[0][0], self.curves[-1][0]
+
+    def rate(self, dK: Floats, R: Floats) -> Floats:
+        """Between the points; 0 below them and inf above."""
         lowest, highest = self.curves[0][0], self.curves[-1][0]
-        bounds = (lowest, highest) if self.outside == "refuse" and len(self.curves) > 1 else None
-        dK, ratio = range_and_ratio("rate_table", dK_eq, R, bounds)
-        dK, ratio = np.broadcast_arrays(dK, ratio)
-        ratio = np.clip(ratio, lowest, highest)
+        ratio = np.clip(R, lowest, highest)
         result = np.zeros(dK.shape)
         left = np.ones(dK.shape, dtype=bool)
         for low, high in zip(self.curves, self.curves[1:] or self.curves):
             mine = left & (ratio <= high[0] + (high is low))
             result[mine] = _between(low, high, dK[mine], ratio[mine])
             left &= ~mine
-        return result[()]
+        return result
 
 
 def _curve(R: Any, points: Any) -> Curve:

@@ -1,22 +1,22 @@
 """Thresholds: the range below which a crack does not grow, as a value that is called."""
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from xcrack.base.arguments import Array, Number, Part
 from xcrack.base.arrays import Floats
-from xcrack.base.checks import number, numbers, shown
+from xcrack.base.checks import shown
 from xcrack.base.errors import ProblemError
+from xcrack.base.units import LENGTH, TOUGHNESS
 from xcrack.fatigue.closures import newman_closure
-from xcrack.fatigue.law import WithUnits, set_floats, sizes, stress_ratio
-from xcrack.fatigue.units import factors
-
-Powers = dict[str, tuple[float, float]]
+from xcrack.fatigue.law import Closure, Threshold, sizes, stress_ratio
 
 
 @dataclass(frozen=True)
-class klesnil_lukas(WithUnits):  # noqa: N801 - it is used as a function
+class klesnil_lukas(Threshold):  # noqa: N801 - it is used as a function
     """Threshold as a power of 1 - R.
 
     Parameters
@@ -41,29 +41,16 @@ class klesnil_lukas(WithUnits):  # noqa: N801 - it is used as a function
     3.693433
     """
 
-    dK0: float
-    gamma: float
+    dK0: Annotated[float, Number(above=0, unit=TOUGHNESS)]
+    gamma: Annotated[float, Number(least=0, most=1)]
 
-    def __post_init__(self) -> None:
-        set_floats(self, dK0=number(self.dK0, "klesnil_lukas: dK0", above=0))
-        set_floats(self, gamma=number(self.gamma, "klesnil_lukas: gamma", least=0, most=1))
-
-    @property
-    def needs(self) -> tuple[str, ...]:
-        """What it asks for beside R: nothing."""
-        return ()
-
-    def _powers(self) -> Powers:
-        return {"dK0": (1, 0)}
-
-    def __call__(self, R: ArrayLike, a: ArrayLike | None = None) -> Floats:
+    def value(self, R: Floats, a: Floats | None, closure: Closure | None) -> Floats:
         """Threshold for R, stress √length."""
-        ratio = stress_ratio("klesnil_lukas", R)
-        return np.asarray(self.dK0 * np.maximum(1.0 - ratio, 0.0) ** self.gamma)[()]
+        return np.asarray(self.dK0 * np.maximum(1.0 - R, 0.0) ** self.gamma)
 
 
 @dataclass(frozen=True)
-class stepped_threshold(WithUnits):  # noqa: N801
+class stepped_threshold(Threshold):  # noqa: N801
     """Threshold that falls in a straight line from one R to another, and is constant outside.
 
     Parameters
@@ -92,47 +79,26 @@ class stepped_threshold(WithUnits):  # noqa: N801
     127.2
     """
 
-    R: tuple[float, float]
-    dK: tuple[float, float, float]
-    slope: float
+    R: Annotated[tuple[float, float], Array(shape=(2,), hashable=True)]
+    dK: Annotated[tuple[float, float, float], Array(shape=(3,), unit=TOUGHNESS, hashable=True)]
+    slope: Annotated[float, Number(least=0, unit=TOUGHNESS)]
 
     def __post_init__(self) -> None:
-        name = "stepped_threshold"
-        R = numbers(self.R, f"{name}: R", (2,)).tolist()
-        dK = numbers(self.dK, f"{name}: dK", (3,)).tolist()
-        if not R[0] < R[1] or min(dK) <= 0:
-            raise ProblemError(f"{name}: R = {R} must be in order, and dK = {dK} positive.")
-        object.__setattr__(self, "R", tuple(R))
-        object.__setattr__(self, "dK", tuple(dK))
-        set_floats(self, slope=number(self.slope, f"{name}: slope", least=0))
+        super().__post_init__()
+        if not self.R[0] < self.R[1] or min(self.dK) <= 0:
+            raise ProblemError(
+                f"stepped_threshold: R = {self.R} must be in order, and dK = {self.dK} positive."
+            )
 
-    @property
-    def needs(self) -> tuple[str, ...]:
-        """What it asks for beside R: nothing."""
-        return ()
-
-    def _powers(self) -> Powers:
-        return {"slope": (1, 0)}
-
-    def to(self, units: str, new: str) -> "stepped_threshold":
-        """The same threshold in other units; see `WithUnits.to`."""
-        scaled = super().to(units, new)
-        by_K, _ = factors(units, new)
-        low, falling, high = (dK * by_K for dK in self.dK)
-        return stepped_threshold(self.R, (low, falling, high), scaled.slope)
-
-    def __call__(self, R: ArrayLike, a: ArrayLike | None = None) -> Floats:
+    def value(self, R: Floats, a: Floats | None, closure: Closure | None) -> Floats:
         """Threshold for R, stress √length."""
-        ratio = stress_ratio("stepped_threshold", R)
         low, high = self.R
-        falling = self.dK[1] - self.slope * (ratio - low)
-        return np.asarray(
-            np.where(ratio < low, self.dK[0], np.where(ratio < high, falling, self.dK[2]))
-        )[()]
+        falling = self.dK[1] - self.slope * (R - low)
+        return np.asarray(np.where(R < low, self.dK[0], np.where(R < high, falling, self.dK[2])))
 
 
 @dataclass(frozen=True)
-class el_haddad(WithUnits):  # noqa: N801
+class el_haddad(Threshold):  # noqa: N801
     """Threshold of short cracks: that of long ones times √(a / (a + a0)).
 
     Parameters
@@ -157,33 +123,55 @@ class el_haddad(WithUnits):  # noqa: N801
     4.242641
     """
 
-    long: "klesnil_lukas | stepped_threshold"
-    a0: float
+    long: Annotated[Threshold, Part(Threshold, needs="klesnil_lukas or stepped_threshold")]
+    a0: Annotated[float, Number(above=0, unit=LENGTH)]
 
     def __post_init__(self) -> None:
-        if not isinstance(self.long, klesnil_lukas | stepped_threshold):
+        super().__post_init__()
+        if self.long.needs or isinstance(self.long, _OfNewman):
             raise ProblemError(
                 f"el_haddad: long = {shown(self.long)}: give klesnil_lukas or stepped_threshold."
             )
-        set_floats(self, a0=number(self.a0, "el_haddad: a0", above=0))
 
     @property
     def needs(self) -> tuple[str, ...]:
         """The crack size at the point."""
         return ("a",)
 
-    def _powers(self) -> Powers:
-        return {"a0": (0, 1)}
-
-    def __call__(self, R: ArrayLike, a: ArrayLike | None = None) -> Floats:
+    def value(self, R: Floats, a: Floats | None, closure: Closure | None) -> Floats:
         """Threshold for R of a crack of the size a, stress √length."""
-        ratio = stress_ratio("el_haddad", R)
-        a = sizes("el_haddad", a, ratio.shape) if ratio.ndim else a
-        return np.asarray(self.long(R) * short(a, self.a0, "el_haddad"))[()]
+        return np.asarray(self.long.value(R, None, closure) * short(a, self.a0, "el_haddad"))
+
+
+class _OfNewman(Threshold):
+    """A threshold that Newman's opening function is part of."""
+
+    a0: float
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """The crack size at the point, unless a0 is 0."""
+        return ("a",) if self.a0 else ()
+
+    def check_closure(self, law: str, closure: Closure | None) -> None:
+        """Raise where the closure of the law is another."""
+        if not isinstance(closure, newman_closure):
+            raise ProblemError(
+                f"{law}: {type(self).__name__} holds Newman's opening function: give "
+                f"closure=newman_closure(...), not {shown(closure)}."
+            )
+
+    def of(self, closure: newman_closure, R: ArrayLike, a: ArrayLike | None = None) -> Floats:
+        """Threshold of a law with this closure, for R and a crack of the size a."""
+        name = type(self).__name__
+        self.check_closure(name, closure)
+        ratio = stress_ratio(name, R)
+        size = sizes(name, a, ratio.shape or None)
+        return np.asarray(self.value(ratio, size, closure))[()]
 
 
 @dataclass(frozen=True, kw_only=True)
-class nasgro3_threshold(WithUnits):  # noqa: N801
+class nasgro3_threshold(_OfNewman):  # noqa: N801
     """Threshold of NASGRO up to version 3: its constant is the one for R = 0.
 
     Parameters
@@ -208,38 +196,22 @@ class nasgro3_threshold(WithUnits):  # noqa: N801
     R = 0 here, of 2.8 there.
     """
 
-    dK0: float
-    C_th: float
-    a0: float
+    dK0: Annotated[float, Number(above=0, unit=TOUGHNESS)]
+    C_th: Annotated[float, Number()]
+    a0: Annotated[float, Number(least=0, unit=LENGTH)]
 
-    def __post_init__(self) -> None:
-        set_floats(self, dK0=number(self.dK0, "nasgro3_threshold: dK0", above=0))
-        set_floats(self, C_th=number(self.C_th, "nasgro3_threshold: C_th"))
-        set_floats(self, a0=number(self.a0, "nasgro3_threshold: a0", least=0))
-
-    @property
-    def needs(self) -> tuple[str, ...]:
-        """The crack size at the point, unless a0 is 0."""
-        return ("a",) if self.a0 else ()
-
-    def _powers(self) -> Powers:
-        return {"dK0": (1, 0), "a0": (0, 1)}
-
-    def of(self, closure: newman_closure, R: ArrayLike, a: ArrayLike | None = None) -> Floats:
-        """Threshold of a law with this closure, for R and a crack of the size a."""
-        _check_newman("nasgro3_threshold", closure)
-        ratio = stress_ratio("nasgro3_threshold", R)
-        a = sizes("nasgro3_threshold", a, ratio.shape) if ratio.ndim else a
-        U = closure(ratio)
-        inner = U / (1 - closure.A[0])
+    def value(self, R: Floats, a: Floats | None, closure: Closure | None) -> Floats:
+        """Threshold for R of a crack of the size a, stress √length."""
+        assert isinstance(closure, newman_closure)
+        inner = closure(R) / (1 - closure.A[0])
         size = short(a, self.a0, "nasgro3_threshold")
         with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
-            value = np.asarray(self.dK0 * size / inner ** (1 + self.C_th * ratio))
-        return _finite("nasgro3_threshold", value, ratio)[()]
+            value = np.asarray(self.dK0 * size / inner ** (1 + self.C_th * R))
+        return _finite("nasgro3_threshold", value, R)
 
 
 @dataclass(frozen=True, kw_only=True)
-class nasgro4_threshold(WithUnits):  # noqa: N801
+class nasgro4_threshold(_OfNewman):  # noqa: N801
     """Threshold of NASGRO since version 4: its constant is the one for R towards 1.
 
     Parameters
@@ -269,57 +241,26 @@ class nasgro4_threshold(WithUnits):  # noqa: N801
     them, put them into the form of version 3 or into one of their own.
     """
 
-    dK1: float
-    C_th_plus: float
-    C_th_minus: float
-    a0: float
-    R_clip: float | None = None
+    dK1: Annotated[float, Number(above=0, unit=TOUGHNESS)]
+    C_th_plus: Annotated[float, Number()]
+    C_th_minus: Annotated[float, Number()]
+    a0: Annotated[float, Number(least=0, unit=LENGTH)]
+    R_clip: Annotated[float | None, Number(least=0, below=1)] = None
 
-    def __post_init__(self) -> None:
-        set_floats(self, dK1=number(self.dK1, "nasgro4_threshold: dK1", above=0))
-        set_floats(self, C_th_plus=number(self.C_th_plus, "nasgro4_threshold: C_th_plus"))
-        set_floats(self, C_th_minus=number(self.C_th_minus, "nasgro4_threshold: C_th_minus"))
-        set_floats(self, a0=number(self.a0, "nasgro4_threshold: a0", least=0))
+    def value(self, R: Floats, a: Floats | None, closure: Closure | None) -> Floats:
+        """Threshold for R of a crack of the size a, stress √length."""
+        assert isinstance(closure, newman_closure)
         if self.R_clip is not None:
-            clip = number(self.R_clip, "nasgro4_threshold: R_clip", least=0, below=1)
-            set_floats(self, R_clip=clip)
-
-    @property
-    def needs(self) -> tuple[str, ...]:
-        """The crack size at the point, unless a0 is 0."""
-        return ("a",) if self.a0 else ()
-
-    def _powers(self) -> Powers:
-        return {"dK1": (1, 0), "a0": (0, 1)}
-
-    def of(self, closure: newman_closure, R: ArrayLike, a: ArrayLike | None = None) -> Floats:
-        """Threshold of a law with this closure, for R and a crack of the size a."""
-        _check_newman("nasgro4_threshold", closure)
-        ratio = stress_ratio("nasgro4_threshold", R)
-        a = sizes("nasgro4_threshold", a, ratio.shape) if ratio.ndim else a
-        if self.R_clip is not None:
-            ratio = np.minimum(ratio, self.R_clip)
+            R = np.minimum(R, self.R_clip)
         with np.errstate(over="ignore", divide="ignore"):
-            by_range, open_at_0 = 1 / closure(ratio), 1 - closure.A[0]
+            by_range, open_at_0 = 1 / closure(R), 1 - closure.A[0]
         plus, minus = self.C_th_plus, self.C_th_minus
         size = short(a, self.a0, "nasgro4_threshold")
         with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
-            above = by_range ** (1 + ratio * plus) / open_at_0 ** ((1 - ratio) * plus)
-            below = by_range ** (1 + ratio * minus) / open_at_0 ** (plus - ratio * minus)
-            value = np.asarray(self.dK1 * size * np.where(ratio >= 0, above, below))
-        return _finite("nasgro4_threshold", value, ratio)[()]
-
-
-Threshold = klesnil_lukas | stepped_threshold | el_haddad
-
-
-def check_threshold(name: str, threshold: object) -> None:
-    """Refuse what is no threshold of a law with a free closure."""
-    if threshold is not None and not isinstance(threshold, Threshold):
-        raise ProblemError(
-            f"{name}: threshold = {shown(threshold)}: give klesnil_lukas, stepped_threshold or "
-            "el_haddad; those of NASGRO belong to nasgro."
-        )
+            above = by_range ** (1 + R * plus) / open_at_0 ** ((1 - R) * plus)
+            below = by_range ** (1 + R * minus) / open_at_0 ** (plus - R * minus)
+            value = np.asarray(self.dK1 * size * np.where(R >= 0, above, below))
+        return _finite("nasgro4_threshold", value, R)
 
 
 def _finite(name: str, value: Floats, ratio: Floats) -> Floats:
@@ -331,28 +272,20 @@ def _finite(name: str, value: Floats, ratio: Floats) -> Floats:
     return value
 
 
-def _check_newman(name: str, closure: object) -> None:
-    if not isinstance(closure, newman_closure):
-        raise ProblemError(f"{name}: closure = {shown(closure)}: give newman_closure.")
-
-
-def short(a: ArrayLike | None, a0: float, name: str) -> Floats:
+def short(a: Floats | None, a0: float, name: str) -> Floats:
     """√(a / (a + a0)) of a crack of the size a; 1 where a0 is 0."""
     if not a0:
         return np.asarray(1.0)
     if a is None:
         raise ProblemError(f"{name}: the crack size a is needed: call the law with a=...")
-    size = numbers(a, f"{name}: a")
-    if (size <= 0).any():
+    if (a <= 0).any():
         raise ProblemError(
-            f"{name}: a = {size.min():.6g}: a crack size is positive, give one above 0."
+            f"{name}: a = {a.min():.6g}: a crack size is positive, give one above 0."
         )
-    return np.asarray(np.sqrt(size / (size + a0)))
+    return np.asarray(np.sqrt(a / (a + a0)))
 
 
 __all__ = [
-    "Threshold",
-    "check_threshold",
     "el_haddad",
     "klesnil_lukas",
     "nasgro3_threshold",

@@ -1,25 +1,30 @@
 """Growth in time beside growth by cycles: dwell, creep, corrosion under load."""
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from xcrack.base.arguments import Choice, Function, Number, Part
 from xcrack.base.arrays import Floats
-from xcrack.base.checks import number, numbers, one_of, shown
+from xcrack.base.checks import numbers
 from xcrack.base.errors import ProblemError
-from xcrack.fatigue.law import Law, WithUnits, largest_K, powered, range_and_ratio, set_floats
+from xcrack.base.units import LENGTH, TOUGHNESS, Dimension
+from xcrack.fatigue.law import Constants, Law, largest_K, powered, range_and_ratio
 
-_WAVES = ("hold", "triangle", "sine")
 _X, _W = np.polynomial.legendre.leggauss(8)
 _PANELS = 16  # of half a period: a wave may cross the threshold or the plateau in any of them
 _TAU = np.concatenate([(k + 0.5 * (_X + 1)) / _PANELS for k in range(_PANELS)])
 _WEIGHT = np.tile(0.5 * _W / _PANELS, _PANELS)
 
 
+def _per_time(law: "time_rate") -> Dimension:
+    return 1.0 + 1.5 * law.n, -law.n
+
+
 @dataclass(frozen=True)
-class time_rate(WithUnits):  # noqa: N801 - it is used as a function
+class time_rate(Constants):  # noqa: N801 - it is used as a function
     """Growth in time under a K that acts, da/dt = C K^n.
 
     Parameters
@@ -44,20 +49,10 @@ class time_rate(WithUnits):  # noqa: N801 - it is used as a function
     8e-06
     """
 
-    C: float
-    n: float
-    K_th: float = 0.0
-    plateau: float | None = None
-
-    def __post_init__(self) -> None:
-        set_floats(self, C=number(self.C, "time_rate: C", above=0))
-        set_floats(self, n=number(self.n, "time_rate: n", least=0))
-        set_floats(self, K_th=number(self.K_th, "time_rate: K_th", least=0))
-        if self.plateau is not None:
-            set_floats(self, plateau=number(self.plateau, "time_rate: plateau", above=0))
-
-    def _powers(self) -> dict[str, tuple[float, float]]:
-        return {"C": (-self.n, 1), "K_th": (1, 0), "plateau": (0, 1)}
+    C: Annotated[float, Number(above=0, unit=_per_time)]
+    n: Annotated[float, Number(least=0)]
+    K_th: Annotated[float, Number(least=0, unit=TOUGHNESS)] = 0.0
+    plateau: Annotated[float | None, Number(above=0, unit=LENGTH)] = None
 
     def __call__(self, K: ArrayLike) -> Floats:
         """Growth in a unit of time, length/time; none where K is not positive."""
@@ -70,7 +65,7 @@ class time_rate(WithUnits):  # noqa: N801 - it is used as a function
 
 
 @dataclass(frozen=True)
-class with_time(WithUnits):  # noqa: N801
+class with_time(Constants):  # noqa: N801
     """A law with growth in time added: da/dN + ∫ da/dt over a cycle.
 
     Parameters
@@ -100,20 +95,10 @@ class with_time(WithUnits):  # noqa: N801
     0.00104
     """
 
-    law: Law
-    rate: time_rate
-    period: float
-    wave: str = "hold"
-
-    def __post_init__(self) -> None:
-        if not callable(self.law):
-            raise ProblemError(
-                f"with_time: law = {shown(self.law)} cannot be called: give a growth law."
-            )
-        if not isinstance(self.rate, time_rate):
-            raise ProblemError(f"with_time: rate = {shown(self.rate)}: give a time_rate.")
-        set_floats(self, period=number(self.period, "with_time: period", above=0))
-        one_of(self.wave, "with_time: wave", _WAVES)
+    law: Annotated[Law, Function("a growth law")]
+    rate: Annotated[time_rate, Part(time_rate)]
+    period: Annotated[float, Number(above=0)]
+    wave: Annotated[str, Choice(("hold", "triangle", "sine"))] = "hold"
 
     @property
     def needs(self) -> tuple[str, ...]:
@@ -135,9 +120,9 @@ class with_time(WithUnits):  # noqa: N801
         """Whether the law's answer for R < 0 depends on how R is meant."""
         return bool(getattr(self.law, "knows_negative_ratios", False))
 
-    def to(self, units: str, new: str) -> "with_time":
+    def to(self, units: str, new: str) -> Self:
         """The same in other units, as of `paris`; time stays what it is."""
-        if not isinstance(self.law, WithUnits):
+        if not isinstance(self.law, Constants):
             raise ProblemError("with_time: law has no units that are known: convert it by hand.")
         return super().to(units, new)
 

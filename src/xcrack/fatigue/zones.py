@@ -1,19 +1,23 @@
 """Models of retardation after overloads, as values."""
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from xcrack.base.arguments import Number, Part
 from xcrack.base.arrays import Floats
-from xcrack.base.checks import number, numbers, shown
+from xcrack.base.checks import numbers
 from xcrack.base.errors import ProblemError
+from xcrack.base.units import STRESS, TOUGHNESS
+from xcrack.fatigue.law import Constants
 
 _LARGEST = 1e120  # K whose square is a number
 
 
 @dataclass(frozen=True)
-class plastic_zone:  # noqa: N801 - it is used as a function
+class plastic_zone(Constants):  # noqa: N801 - it is used as a function
     """Size of the plastic zone, (K / sigma_y)² / (beta π).
 
     Parameters
@@ -36,13 +40,8 @@ class plastic_zone:  # noqa: N801 - it is used as a function
     0.895247
     """
 
-    sigma_y: float
-    beta: float
-
-    def __post_init__(self) -> None:
-        for name in ("sigma_y", "beta"):
-            value = number(getattr(self, name), f"plastic_zone: {name}", above=0)
-            object.__setattr__(self, name, value)
+    sigma_y: Annotated[float, Number(above=0, unit=STRESS)]
+    beta: Annotated[float, Number(above=0)]
 
     def __call__(self, K: ArrayLike) -> Floats:
         """Size for K, length."""
@@ -60,7 +59,7 @@ class plastic_zone:  # noqa: N801 - it is used as a function
 
 
 @dataclass(frozen=True)
-class wheeler:  # noqa: N801
+class wheeler(Constants):  # noqa: N801
     """Growth slowed while the plastic zone lies inside that of an overload.
 
     Parameters
@@ -86,12 +85,8 @@ class wheeler:  # noqa: N801
     0.230557
     """
 
-    w: float
-    zone: plastic_zone
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "w", number(self.w, "wheeler: w", above=0))
-        _check_zone("wheeler", self.zone)
+    w: Annotated[float, Number(above=0)]
+    zone: Annotated[plastic_zone, Part(plastic_zone, needs="plastic_zone(sigma_y, beta)")]
 
     def factor(self, K: ArrayLike, K_overload: ArrayLike, da: ArrayLike) -> Floats:
         """Factor on the rate for K, after growth by da since an overload."""
@@ -103,7 +98,7 @@ class wheeler:  # noqa: N801
 
 
 @dataclass(frozen=True)
-class willenborg:  # noqa: N801
+class willenborg(Constants):  # noqa: N801
     """Growth by a K that the residual stress of an overload reduces.
 
     Parameters
@@ -132,14 +127,9 @@ class willenborg:  # noqa: N801
     8.518519
     """
 
-    shutoff: float
-    dK_th: float
-    zone: plastic_zone
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "shutoff", number(self.shutoff, "willenborg: shutoff", above=1))
-        object.__setattr__(self, "dK_th", number(self.dK_th, "willenborg: dK_th", least=0))
-        _check_zone("willenborg", self.zone)
+    shutoff: Annotated[float, Number(above=1)]
+    dK_th: Annotated[float, Number(least=0, unit=TOUGHNESS)]
+    zone: Annotated[plastic_zone, Part(plastic_zone, needs="plastic_zone(sigma_y, beta)")]
 
     def reduction(
         self, K_min: ArrayLike, K_max: ArrayLike, K_overload: ArrayLike, da: ArrayLike
@@ -159,11 +149,6 @@ class willenborg:  # noqa: N801
 
 
 Retardation = wheeler | willenborg
-
-
-def _check_zone(name: str, zone: object) -> None:
-    if not isinstance(zone, plastic_zone):
-        raise ProblemError(f"{name}: zone = {shown(zone)}: give plastic_zone(sigma_y, beta).")
 
 
 __all__ = ["Retardation", "plastic_zone", "wheeler", "willenborg"]
