@@ -13,8 +13,8 @@ from xcrack.crack.surfaces import penny_crack
 from xcrack.fatigue.closures import newman_closure
 from xcrack.fatigue.criteria import max_hoop_stress
 from xcrack.fatigue.power import paris, walker
+from xcrack.fatigue.retardation import plastic_zone, wheeler, willenborg
 from xcrack.fatigue.spectrum import Spectrum
-from xcrack.fatigue.zones import plastic_zone, wheeler, willenborg
 from xcrack.growth.run import grow
 from xcrack.growth.step import Cycle
 from xcrack.mesh.box import box

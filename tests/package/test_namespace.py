@@ -32,6 +32,8 @@ NAMES = [
     "time_rate", "with_time",
     # verification, reports, files of scenes
     "verify", "report", "read_case", "run", "info", "demo", "convert_mesh",
+    # what users derive from
+    "Closure", "GrowthLaw", "Load", "Threshold",
     # campaigns
     "campaign", "grid",
     # lives

@@ -14,7 +14,7 @@ from xcrack.app.case_tables import Table, read_tables
 from xcrack.base.errors import ProblemError, XcrackError
 from xcrack.base.paths import path_of
 from xcrack.base.units import LENGTH, NUMBER, TOUGHNESS
-from xcrack.fatigue.zones import plastic_zone
+from xcrack.fatigue.retardation import plastic_zone
 from xcrack.growth.options import GrowOptions
 from xcrack.model.material import Isotropic
 from xcrack.model.numerics import Numerics

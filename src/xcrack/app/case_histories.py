@@ -10,8 +10,8 @@ from xcrack.app.case_tables import Table
 from xcrack.base.errors import XcrackError
 from xcrack.base.units import NUMBER, STRESS, TOUGHNESS
 from xcrack.fatigue.files import read_spectrum, twist
+from xcrack.fatigue.retardation import Retardation, plastic_zone, wheeler, willenborg
 from xcrack.fatigue.spectrum import Spectrum
-from xcrack.fatigue.zones import Retardation, plastic_zone, wheeler, willenborg
 from xcrack.growth.step import Cycle
 
 _CHOICES = ("unit", "least_range", "levels", "tolerance", "steady")

@@ -15,8 +15,8 @@ from xcrack.base.errors import ProblemError, warn
 from xcrack.fatigue.criteria import Criterion
 from xcrack.fatigue.law import Law
 from xcrack.fatigue.rainflow import turning_points
+from xcrack.fatigue.retardation import Retardation
 from xcrack.fatigue.spectrum import Spectrum
-from xcrack.fatigue.zones import Retardation
 from xcrack.growth.description import DEFAULTS, describe, with_defaults_of
 from xcrack.growth.response import Respond
 from xcrack.growth.step import Cycle

@@ -16,6 +16,7 @@ from xcrack.crack.crack import Crack
 from xcrack.fatigue.checks import law_exponent
 from xcrack.fatigue.criteria import clipped
 from xcrack.fatigue.kink import START, Turn, kinked_K, limit_angles
+from xcrack.fatigue.retardation import OverloadZones
 from xcrack.fatigue.spectrum import Spectrum
 from xcrack.growth.controlled import first, following, share_left
 from xcrack.growth.follow_2d import exit_ahead
@@ -46,7 +47,7 @@ from xcrack.growth.reach import (
     reach_of,
 )
 from xcrack.growth.step import LEAST, Advance, Step, StepError, memory_of
-from xcrack.growth.trail import Control, Trail, Zones, shortest
+from xcrack.growth.trail import Control, Trail, shortest
 from xcrack.mesh.locate import cell_sizes, contains
 from xcrack.mesh.mesh import Mesh
 
@@ -480,11 +481,11 @@ def _better_known(run: Run, trail: Trail, old: Trail, own: float) -> tuple[float
     return change + own, ratio * own
 
 
-def _zones(trail: Trail) -> Zones | None:
+def _zones(trail: Trail) -> OverloadZones | None:
     return None if trail.overloads is None else trail.overloads.zones
 
 
-def _with_zones(trail: Trail, begin: Zones | None, after: Zones | None) -> Trail:
+def _with_zones(trail: Trail, begin: OverloadZones | None, after: OverloadZones | None) -> Trail:
     """The same after a step, with what overloads have left at its begin and at its end."""
     if trail.overloads is None or after is None:
         return trail

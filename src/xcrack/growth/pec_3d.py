@@ -15,6 +15,14 @@ from xcrack.crack.crack import Crack
 from xcrack.crack.fronts_3d import closed_fronts, front_frames
 from xcrack.crack.placing import placed
 from xcrack.fatigue.checks import law_exponent
+from xcrack.fatigue.retardation import (
+    POINTS,
+    BlockCycles,
+    CycleIntegration,
+    OverloadZones,
+    march,
+    no_zones,
+)
 from xcrack.growth import follow_3d
 from xcrack.growth.controlled import first, following, longest, share_left
 from xcrack.growth.cycles import elapsed_3d
@@ -34,11 +42,10 @@ from xcrack.growth.front_places import (
     moved_by,
     values_at,
 )
-from xcrack.growth.marching import POINTS, march
 from xcrack.growth.options import Run
-from xcrack.growth.rates import Evaluation, Settled, kinds_of
+from xcrack.growth.rates import Evaluation, Settled, block_order, kinds_of
 from xcrack.growth.step import Advance, PerCrack, Step, StepError, memory_of, plan_advance
-from xcrack.growth.trail import FrontTrail, Kinds, March, Places, Zones, no_zones
+from xcrack.growth.trail import FrontTrail, Places
 from xcrack.mesh.locate import cell_sizes, contains
 
 # Overloads along fronts: rates as means over a step, and zones carried from front to front.
@@ -82,7 +89,7 @@ def overloads_between(
     seen: Evaluation,
     moved: Sequence[Floats],
     length: float,
-) -> tuple[PerCrack, float, list[Zones]]:
+) -> tuple[PerCrack, float, list[OverloadZones]]:
     """Growth of the places of a step with K between that of its begin and that of its end.
 
     Parameters
@@ -101,7 +108,7 @@ def overloads_between(
     -------
     arc : tuple of (f,) arrays, length
     blocks : float
-    zones : list of Zones
+    zones : list of OverloadZones
         At the places when they have grown by `arc`.
     """
     solved = kinds_of(run, seen)
@@ -126,12 +133,14 @@ def beyond_trapezoid(blocks: float, predicted: float) -> float:
     return abs(0.5 * (predicted + blocks**2 / predicted) - blocks)
 
 
-def zones_onto(zones: Zones, arc: Floats, way: Floats, moved: Floats, x: Floats) -> Zones:
+def zones_onto(
+    zones: OverloadZones, arc: Floats, way: Floats, moved: Floats, x: Floats
+) -> OverloadZones:
     """What overloads have left, at the places of the next front.
 
     Parameters
     ----------
-    zones : Zones
+    zones : OverloadZones
         At the places of the last front, after growth by `arc`.
     arc, way : (f,) arrays, length
         Growth that was marched, and the advance that the whole front made of it.
@@ -146,7 +155,9 @@ def zones_onto(zones: Zones, arc: Floats, way: Floats, moved: Floats, x: Floats)
     share = np.divide(within, arc, out=np.zeros_like(arc), where=arc > 0)
     since = np.maximum(zones.since + share * (way - arc), 0.0)
     nearest = np.linalg.norm(x[:, None] - moved, axis=2).argmin(axis=1)
-    return Zones(since[nearest], zones.size[nearest], zones.K[nearest], zones.position, zones.part)
+    return OverloadZones(
+        since[nearest], zones.size[nearest], zones.K[nearest], zones.position, zones.part
+    )
 
 
 def split(values: Floats, trail: FrontTrail) -> tuple[Floats, ...]:
@@ -155,12 +166,14 @@ def split(values: Floats, trail: FrontTrail) -> tuple[Floats, ...]:
     return tuple(values[a:b] for a, b in zip(ends, ends[1:]))
 
 
-def _kinds(part: Places) -> Kinds:
+def _kinds(part: Places) -> BlockCycles:
     assert part.kinds is not None
     return part.kinds
 
 
-def _near(seen: Evaluation, c: int, kinds: Kinds, x: Floats, lost: Kinds | None = None) -> Kinds:
+def _near(
+    seen: Evaluation, c: int, kinds: BlockCycles, x: Floats, lost: BlockCycles | None = None
+) -> BlockCycles:
     """Cycles of a block at some places, linear between those that were solved."""
     sif, closed = seen.sif[0][c], closed_fronts(seen.cracks[c])
     if not len(sif.x):
@@ -169,20 +182,20 @@ def _near(seen: Evaluation, c: int, kinds: Kinds, x: Floats, lost: Kinds | None 
     values = np.concatenate([kinds.dK[0], kinds.R[0]], axis=1)
     near = carried(sif.x, sif.front, closed, values, x, np.inf)
     a = np.full((1, len(x)), float(kinds.a.flat[0]))
-    return Kinds(near[None, :, :p], near[None, :, p:], a)
+    return BlockCycles(near[None, :, :p], near[None, :, p:], a)
 
 
 def _marched(
     run: Run,
     trail: FrontTrail,
-    solves: Sequence[Sequence[Kinds]],
+    solves: Sequence[Sequence[BlockCycles]],
     length: float,
     ratio: Sequence[float],
     blocks: float,
-) -> March:
+) -> CycleIntegration:
     """All places of all fronts; rates are powers of the sizes of the cracks."""
     names = ("dK", "R", "a")
-    kinds = Kinds(
+    kinds = BlockCycles(
         *(
             np.concatenate(
                 [np.concatenate([getattr(k, name) for k in one], axis=1) for one in solves]
@@ -201,15 +214,18 @@ def _marched(
     since, size, K = (
         np.concatenate([getattr(z, name) for z in every]) for name in ("since", "size", "K")
     )
-    zones = Zones(since, size, K, every[0].position, every[0].part)
+    zones = OverloadZones(since, size, K, every[0].position, every[0].part)
     return march(
-        run,
+        run.law,
+        run.retardation,
+        block_order(run),
         kinds,
         nodes,
         x,
         zones,
         length,
         exponent=trail.exponent,
+        threshold=run.threshold,
         blocks=blocks,
     )
 

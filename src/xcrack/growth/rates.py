@@ -8,21 +8,22 @@ from typing import Any
 import numpy as np
 
 from xcrack.analysis.solution import Solution
-from xcrack.base.arrays import Bools, Floats
+from xcrack.base.arrays import Bools, Floats, Ints
 from xcrack.base.checks import called
 from xcrack.base.errors import ProblemError, warn
 from xcrack.crack.crack import Crack
 from xcrack.fatigue.checks import evaluate_criterion, evaluate_law
 from xcrack.fatigue.criteria import clipped, equivalent_K, kink_angle, nominal_range
 from xcrack.fatigue.law import Law
-from xcrack.fatigue.spectrum import Spectrum
+from xcrack.fatigue.retardation import BlockCycles
+from xcrack.fatigue.spectrum import Spectrum, distinct
 from xcrack.growth.block import Pairs, block_of, left_out_share, pairs_of, rated
 from xcrack.growth.follow import following
 from xcrack.growth.levels import respond_to_levels
 from xcrack.growth.options import Run
 from xcrack.growth.response import Answers, Response, checked_response, respond
 from xcrack.growth.step import Cycle, PerCrack, Step, StepError
-from xcrack.growth.trail import FrontTrail, Kinds, Trail
+from xcrack.growth.trail import FrontTrail, Trail
 from xcrack.linalg.reuse import Reuse
 from xcrack.model.problem import Problem
 from xcrack.sif.sif import SIF
@@ -391,8 +392,14 @@ def evaluate(run: Run, problem: Problem, response: Response) -> Evaluation:
 # The kinds of cycles of a block at the places of the cracks that were solved.
 
 
-def kinds_of(run: Run, seen: Evaluation) -> list[Kinds]:
-    """Range and ratio of each kind of cycle, one `Kinds` of a single solve a crack."""
+def block_order(run: Run) -> Ints:
+    """Kinds of the cycles of a block, in time `(c,)`, of a run with retardation."""
+    assert isinstance(run.cycle, Spectrum)
+    return distinct(run.cycle.cycles)[2]
+
+
+def kinds_of(run: Run, seen: Evaluation) -> list[BlockCycles]:
+    """Range and ratio of each kind of cycle, one `BlockCycles` of a single solve a crack."""
     problem = seen.problem
     place, nu = following(problem.mesh).PLACE, problem.material.nu
     result = []
@@ -400,7 +407,7 @@ def kinds_of(run: Run, seen: Evaluation) -> list[Kinds]:
         a = size_at_places(problem, c, pairs.K.shape[2])
         every = rated(run, pairs, nu, c, place, a)
         dK, R = (np.ascontiguousarray(each.T)[None] for each in (every.dK, every.R))
-        result.append(Kinds(dK, R, a[None]))
+        result.append(BlockCycles(dK, R, a[None]))
     return result
 
 
@@ -409,6 +416,7 @@ __all__ = [
     "Evaluation",
     "Settled",
     "asked_of",
+    "block_order",
     "check_choice",
     "evaluate",
     "kinds_of",

@@ -6,21 +6,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from xcrack.base.arrays import Bools, Floats, Ints
-from xcrack.growth.controlled import longest
-from xcrack.growth.marching import POINTS, march
-from xcrack.growth.options import Run
-from xcrack.growth.rates import Evaluation, kinds_of
-from xcrack.growth.trail import (
-    KEPT,
-    Kinds,
-    March,
-    Overloads,
-    Trail,
-    Zones,
-    directions_at,
+from xcrack.fatigue.retardation import (
+    POINTS,
+    BlockCycles,
+    CycleIntegration,
+    OverloadZones,
+    march,
     no_zones,
-    rates_at,
 )
+from xcrack.growth.controlled import longest
+from xcrack.growth.options import Run
+from xcrack.growth.rates import Evaluation, block_order, kinds_of
+from xcrack.growth.trail import KEPT, Overloads, Trail, directions_at, rates_at
 
 # Where along a way something begins, between two lengths that are halved.
 
@@ -146,12 +143,12 @@ class Piece:
     ----------
     over : callable
         Trail, for its directions -> Growth.
-    after : Zones, optional
+    after : OverloadZones, optional
         What overloads have left then.
     """
 
     over: Callable[[Trail], Growth]
-    after: Zones | None
+    after: OverloadZones | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,7 +169,9 @@ class Reach:
     growth: Growth
 
 
-def piece_of(run: Run, trail: Trail, start: float, length: float, begin: Zones | None) -> Piece:
+def piece_of(
+    run: Run, trail: Trail, start: float, length: float, begin: OverloadZones | None
+) -> Piece:
     """Growth over [start, start + length] of σ, with the overloads left at its begin."""
     if begin is None:
         return Piece(lambda other: growth_over(other, start, length, run.threshold), None)
@@ -212,14 +211,16 @@ def looked_ahead(run: Run, trail: Trail) -> Trail:
     return replace(trail, overloads=replace(own, ahead=ahead))
 
 
-def overloads_begin(run: Run, seen: Evaluation, trail: Trail, before: Zones | None = None) -> Trail:
+def overloads_begin(
+    run: Run, seen: Evaluation, trail: Trail, before: OverloadZones | None = None
+) -> Trail:
     """A first trail with the kinds of cycles of its solve; behind a kink scaled as its range."""
     if run.retardation is None:
         return trail
     kinds = _joined(kinds_of(run, seen))
     was = np.concatenate(seen.dK_eq)
     scale = np.divide(trail.dK_eq[-1], was, out=np.ones_like(was), where=was > 0)
-    kinds = Kinds(kinds.dK * scale[None, :, None], kinds.R, kinds.a)
+    kinds = BlockCycles(kinds.dK * scale[None, :, None], kinds.R, kinds.a)
     zones = no_zones(len(was)) if before is None else before
     return replace(trail, overloads=Overloads(kinds, zones))
 
@@ -233,7 +234,7 @@ def overloads_go_on(run: Run, seen: Evaluation, old: Trail, trail: Trail) -> Tra
     return replace(trail, overloads=Overloads(kinds, own.zones, own.earlier))
 
 
-def overloads_of_rest(before: Trail, stays: Bools | Ints) -> Zones | None:
+def overloads_of_rest(before: Trail, stays: Bools | Ints) -> OverloadZones | None:
     """What overloads have left after a predicted step at the tips that are still there."""
     own = before.overloads
     if own is None:
@@ -250,7 +251,7 @@ def _farthest(run: Run, trail: Trail) -> float:
     return min(length, run.cycles * fastest * (1.0 if trail.n_solves == 1 else _FASTER))
 
 
-def _ahead(run: Run, trail: Trail, length: float) -> March:
+def _ahead(run: Run, trail: Trail, length: float) -> CycleIntegration:
     own = trail.overloads
     assert own is not None
     if own.ahead is not None and length <= own.ahead.sigma[-1]:
@@ -261,24 +262,32 @@ def _ahead(run: Run, trail: Trail, length: float) -> March:
 
 
 def _march(
-    run: Run, trail: Trail, start: float, length: float, begin: Zones, blocks: float = np.inf
-) -> March:
+    run: Run,
+    trail: Trail,
+    start: float,
+    length: float,
+    begin: OverloadZones,
+    blocks: float = np.inf,
+) -> CycleIntegration:
     own = trail.overloads
     assert own is not None
     grid = np.linspace(0.0, length, POINTS)
     return march(
-        run,
+        run.law,
+        run.retardation,
+        block_order(run),
         own.kinds,
         np.log(trail.scale + trail.sigma[:, None]),
         np.log(trail.scale + start + grid[:, None]),
         begin,
         length,
         exponent=trail.exponent,
+        threshold=run.threshold,
         blocks=blocks,
     )
 
 
-def _along(marched: March, trail: Trail, start: float, length: float) -> Growth:
+def _along(marched: CycleIntegration, trail: Trail, start: float, length: float) -> Growth:
     """Growth over the first part of a march, in the directions of a trail."""
     inside = marched.sigma < length
     arc, cycles = marched.until(length)
@@ -290,10 +299,10 @@ def _along(marched: March, trail: Trail, start: float, length: float) -> Growth:
     return Growth(np.stack(move, axis=1), every[-1], cycles)
 
 
-def _joined(parts: list[Kinds]) -> Kinds:
-    """Kinds at all tips, from those of each crack."""
+def _joined(parts: list[BlockCycles]) -> BlockCycles:
+    """BlockCycles at all tips, from those of each crack."""
     columns = zip(*((part.dK, part.R, part.a) for part in parts))
-    return Kinds(*(np.concatenate(column, axis=1) for column in columns))
+    return BlockCycles(*(np.concatenate(column, axis=1) for column in columns))
 
 
 def _can_grow(trail: Trail) -> bool:

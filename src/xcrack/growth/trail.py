@@ -8,112 +8,23 @@ from xcrack.base.arrays import Bools, Floats, Ints
 from xcrack.base.checks import shown
 from xcrack.base.errors import ProblemError
 from xcrack.fatigue.law import Law
+from xcrack.fatigue.retardation import (
+    BlockCycles,
+    CycleIntegration,
+    OverloadZones,
+    Retardation,
+    willenborg,
+)
 from xcrack.fatigue.spectrum import Spectrum
-from xcrack.fatigue.zones import wheeler, willenborg
 
-# What growth cycle by cycle remembers of overloads, and which settings it goes with.
-
-
-@dataclass(frozen=True, eq=False)
-class Zones:
-    """What overloads left at places, and where in a block of cycles the run is.
-
-    Attributes
-    ----------
-    since : (n,) array, length
-        Growth since the overload.
-    size : (n,) array, length
-        Its plastic zone; 0 before the first.
-    K : (n,) array, stress √length
-        K_max of the overload.
-    position : int
-        Number of the next cycle of the block.
-    part : float
-        Of that cycle that is over.
-    """
-
-    since: Floats
-    size: Floats
-    K: Floats
-    position: int = 0
-    part: float = 0.0
-
-    def at(self, places: Bools | Ints) -> "Zones":
-        """The same for some places."""
-        return replace(self, since=self.since[places], size=self.size[places], K=self.K[places])
-
-
-@dataclass(frozen=True, eq=False)
-class Kinds:
-    """The kinds of cycles of a block at places, at the last solves.
-
-    Attributes
-    ----------
-    dK, R : (k, n, p) arrays
-        Equivalent range (stress √length) and ratio.
-    a : (k, n) array, length
-        Crack size that a law is given.
-    """
-
-    dK: Floats
-    R: Floats
-    a: Floats
-
-    def rows(self, which: slice) -> "Kinds":
-        """Some of the solves."""
-        return Kinds(self.dK[which], self.R[which], self.a[which])
-
-    def at(self, places: Bools | Ints) -> "Kinds":
-        """Some of the places."""
-        return Kinds(self.dK[:, places], self.R[:, places], self.a[:, places])
-
-    def followed_by(self, later: "Kinds", most: int) -> "Kinds":
-        """With later solves, of all at most the last few."""
-        parts = zip((self.dK, self.R, self.a), (later.dK, later.R, later.a))
-        return Kinds(*(np.concatenate(pair)[-most:] for pair in parts))
-
-
-@dataclass(frozen=True, eq=False)
-class March:
-    """Growth of places, cycle by cycle.
-
-    Attributes
-    ----------
-    sigma : (g,) array, length
-        Sum of the largest growth of any place in each cycle.
-    arc : (g, n) array, length
-        How far each place has come.
-    cycles : (g,) array
-        Blocks until there.
-    reached : float, length
-        Up to which it came: less than the last of `sigma` where nothing grows, or the blocks are
-        over.
-    zones : Zones
-        Then.
-    """
-
-    sigma: Floats
-    arc: Floats
-    cycles: Floats
-    reached: float
-    zones: Zones
-
-    def until(self, sigma: float) -> tuple[Floats, float]:
-        """How far each place has come `(n,)`, and blocks, at some sigma."""
-        arc = [np.interp(sigma, self.sigma, column) for column in self.arc.T]
-        return np.array(arc), float(np.interp(sigma, self.sigma, self.cycles))
-
-
-def no_zones(n: int) -> Zones:
-    """Places without an overload."""
-    return Zones(np.zeros(n), np.zeros(n), np.zeros(n))
+# Which settings retardation goes with.
 
 
 def check_retardation(model: object, law: Law, cycle: object, integrator: str) -> None:
     """Refuse a model of retardation with what it means nothing with."""
     if model is None:
         return
-    if not isinstance(model, wheeler | willenborg):
+    if not isinstance(model, Retardation):
         raise ProblemError(f"grow: retardation = {shown(model)}: give wheeler or willenborg.")
     if not isinstance(cycle, Spectrum) or cycle.factors is None:
         raise ProblemError(
@@ -253,20 +164,20 @@ class Overloads:
 
     Attributes
     ----------
-    kinds : Kinds
+    kinds : BlockCycles
         At the solves of the trail.
-    zones : Zones
+    zones : OverloadZones
         Where the tips are.
-    earlier : Zones, optional
+    earlier : OverloadZones, optional
         At the begin of the last step, of which a later solve tells more.
-    ahead : March, optional
+    ahead : CycleIntegration, optional
         The next step as the last two solves see it.
     """
 
-    kinds: Kinds
-    zones: Zones
-    earlier: Zones | None = None
-    ahead: March | None = None
+    kinds: BlockCycles
+    zones: OverloadZones
+    earlier: OverloadZones | None = None
+    ahead: CycleIntegration | None = None
 
     def rows(self, which: slice) -> "Overloads":
         """The same with some of the solves."""
@@ -453,9 +364,9 @@ class Places:
         Growth too short to be modelled yet.
     size : float, length
         `surface_size` of the crack.
-    kinds : Kinds, optional
+    kinds : BlockCycles, optional
         Cycles of a block at the places, of one solve; with retardation.
-    zones : Zones, optional
+    zones : OverloadZones, optional
         What overloads have left.
     """
 
@@ -470,8 +381,8 @@ class Places:
     direction: Floats
     pending: Floats
     size: float
-    kinds: Kinds | None = None
-    zones: Zones | None = None
+    kinds: BlockCycles | None = None
+    zones: OverloadZones | None = None
 
     @property
     def angle(self) -> Floats:
@@ -505,18 +416,14 @@ __all__ = [
     "REJECTED",
     "Control",
     "FrontTrail",
-    "Kinds",
-    "March",
     "Overloads",
     "Places",
     "Trail",
-    "Zones",
     "check_retardation",
     "directions_at",
     "first_length",
     "lagrange",
     "next_length",
-    "no_zones",
     "rates_at",
     "shortest",
     "step_error",

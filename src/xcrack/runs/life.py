@@ -12,8 +12,8 @@ from xcrack.base.checks import number, shown, whole
 from xcrack.base.errors import ProblemError
 from xcrack.fatigue.criteria import Criterion
 from xcrack.fatigue.law import Law
+from xcrack.fatigue.retardation import Retardation
 from xcrack.fatigue.spectrum import Spectrum
-from xcrack.fatigue.zones import Retardation
 from xcrack.runs.history import History
 from xcrack.runs.rerating import (
     Block,

@@ -6,14 +6,21 @@ from typing import Any
 
 import numpy as np
 
-from xcrack.base.arrays import Floats, Ints
+from xcrack.base.arrays import Bools, Floats, Ints
 from xcrack.base.checks import number, shown
 from xcrack.base.errors import ProblemError
-from xcrack.fatigue.checks import evaluate_law
+from xcrack.fatigue.checks import law_exponent
 from xcrack.fatigue.criteria import clipped, equivalent_K
 from xcrack.fatigue.law import Law
+from xcrack.fatigue.retardation import (
+    POINTS,
+    BlockCycles,
+    Retardation,
+    cycle_rates,
+    march,
+    no_zones,
+)
 from xcrack.fatigue.spectrum import Spectrum, distinct
-from xcrack.fatigue.zones import Retardation, wheeler, willenborg
 from xcrack.growth.levels import Ladder
 from xcrack.growth.step import Step
 from xcrack.growth.uncertainty import best_known
@@ -22,7 +29,8 @@ from xcrack.runs.rerating import Block, Driving, driving
 from xcrack.runs.scatter import Samples, stretch_of, varied
 
 _BREAKS = "the law returns inf: the toughness is reached"
-_SHIFTS = 257  # values of the reduction of K at which the law is asked
+_STANDS = "a whole block lets nothing grow"
+_ROUND_OFF = 1e-9  # relative
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,23 +115,32 @@ def retarded(
 
 @dataclass(frozen=True, eq=False)
 class CycledPath:
-    """Path of one tip, with K_eq of each kind of cycle at the ends of each step.
+    """Path of one tip, with the kinds of cycles of a block at its solves.
 
     Attributes
     ----------
     rows : Driving
-    K : tuple of (2, p, 2) arrays, stress √length
-        Before and after a step, of each kind of cycle, at its minimum and its maximum.
-    order : (n,) array of int
+    a, size : (n + 1,) arrays, length
+        Length that cycles are counted with, and crack size that a law is given, at the solves.
+    K : (n + 1, p, 2) array, stress √length
+        Of each kind of cycle, at its minimum and its maximum.
+    order : (c,) array of int
         Kinds of the cycles of a block, in time.
+    threshold : float, stress √length
+        Of the run: cycles below it let nothing grow.
     """
 
     rows: Driving
-    K: tuple[Floats, ...]
+    a: Floats
+    size: Floats
+    K: Floats
     order: Ints
+    threshold: float = 0.0
 
     @classmethod
-    def of(cls, history: History, spectrum: Spectrum, nu: float) -> "CycledPath":
+    def of(
+        cls, history: History, spectrum: Spectrum, nu: float, threshold: float = 0.0
+    ) -> "CycledPath":
         """Path of a run.
 
         Raises
@@ -138,36 +155,61 @@ class CycledPath:
                 "for one tip, whose path does not depend on its rate."
             )
         values, _, order = distinct(spectrum.cycles)
-        K = tuple(
+        ends = [
             _ends(rows, row, (history.steps[n], history.steps[n + 1]), values, spectrum, nu)
             for row, n in enumerate(rows.step.tolist())
-        )
-        return cls(rows, K, order)
+        ]
+        a, size = (np.append(each[:, 0], each[-1:, 1]) for each in (rows.a, rows.size))
+        K = np.stack([ends[0][0], *(each[1] for each in ends)])
+        return cls(rows, a, size, K, order, threshold)
 
     def grown(
         self, law: Law, model: Retardation | None, limit: float, factor: float | Floats = 1.0
     ) -> Retarded:
         """Growth cycle by cycle, with K times a factor, of each step where it is an array."""
-        rows, order = self.rows, self.order
-        factors = np.broadcast_to(factor, len(self.K))
-        a, blocks, ended = [float(rows.a[0, 0])], [0.0], ""
-        state = np.array([-np.inf, 0.0, 0.0, 0.0])
-        state[0] = a[0]
-        for row, (ends, times) in enumerate(zip(self.K, factors)):
-            K = ends * times
-            cycles, reached = _piece(rows, row, K, law, model, order, state, limit - blocks[-1])
-            blocks.append(blocks[-1] + cycles / len(order))
-            a.append(reached)
-            if reached < rows.a[row, 1]:
-                ended = (
-                    f"max_blocks = {limit:.6g} reached"
-                    if blocks[-1] >= limit
-                    else _BREAKS
-                    if _breaks(rows, row, K, law)
-                    else "a whole block lets nothing grow"
-                )
-                break
-        return Retarded(np.array(a), np.array(blocks), ended)
+        factors = np.broadcast_to(factor, len(self.a) - 1)
+        a, blocks, zones = [float(self.a[0])], [0.0], no_zones(1)
+        for row, (begin, end) in enumerate(zip(self.a[:-1].tolist(), self.a[1:].tolist())):
+            solves, cycles = self._solves(row, law, float(factors[row]))
+            if not len(solves):
+                return Retarded(np.array([*a, begin]), np.array([*blocks, blocks[-1]]), _BREAKS)
+            grown = march(
+                law,
+                model,
+                self.order,
+                cycles,
+                np.log(self.a[solves])[:, None],
+                np.log(np.linspace(begin, end, POINTS))[:, None],
+                zones,
+                end - begin,
+                exponent=law_exponent(law, cycles.dK[0, 0], cycles.R[0, 0]),
+                threshold=self.threshold,
+                blocks=limit - blocks[-1],
+            )
+            zones = grown.zones
+            a.append(begin + grown.reached)
+            blocks.append(blocks[-1] + float(grown.cycles[-1]))
+            if grown.reached < (end - begin) * (1 - _ROUND_OFF):
+                over = blocks[-1] >= limit * (1 - _ROUND_OFF)
+                ended = f"max_blocks = {limit:.6g} reached" if over else _STANDS
+                return Retarded(np.array(a), np.array(blocks), ended)
+        return Retarded(np.array(a), np.array(blocks))
+
+    def _solves(self, row: int, law: Law, factor: float) -> tuple[Ints, BlockCycles]:
+        """Solves that lead through a step: both ends and the one before; none if the law is inf."""
+        first = max(row - 1, 0)
+        solves = np.arange(first, min(first + 3, len(self.a)))
+        cycles = self._cycles(solves, factor)
+        rates = cycle_rates(law, cycles, np.zeros(1), 0.0)
+        is_finite: Bools = np.array([np.isfinite(rate).all() for rate in rates])
+        if not is_finite[np.isin(solves, (row, row + 1))].all():
+            solves = solves[:0]
+        return solves[is_finite[: len(solves)]], cycles.rows(is_finite)
+
+    def _cycles(self, solves: Ints, factor: float) -> BlockCycles:
+        low, high = np.moveaxis(self.K[solves] * factor, -1, 0)
+        R = np.divide(low, high, out=np.zeros_like(high), where=high > 0)
+        return BlockCycles((high - low)[:, None], R[:, None], self.size[solves][:, None])
 
 
 def check(history: object, law: object, spectrum: object, model: object) -> None:
@@ -226,58 +268,6 @@ def _ends(
     return np.stack(result)
 
 
-def _piece(
-    rows: Driving,
-    row: int,
-    K: Floats,
-    law: Law,
-    model: Retardation | None,
-    order: Ints,
-    state: Floats,
-    left: float,
-) -> tuple[float, float]:
-    """Cycles of one step, and where the crack comes to; the state is changed."""
-    from xcrack.fatigue.kernels.retardation import advanced
-
-    shifts = np.linspace(0, 1, _SHIFTS) if isinstance(model, willenborg) else np.zeros(1)
-    rate = _rates(rows, row, K, law, shifts)
-    dK = K[..., 1] - K[..., 0]
-    threshold = model.dK_th if isinstance(model, willenborg) else 0.0
-    share = np.divide(threshold, dK, out=np.ones_like(dK), where=dK > 0)
-    kind = 1 if isinstance(model, wheeler) else 2 if isinstance(model, willenborg) else 0
-    cycles, a = advanced(
-        float(rows.a[row, 0]),
-        float(rows.a[row, 1]),
-        order,
-        np.ascontiguousarray(K[..., 1]),
-        rate,
-        shifts,
-        0.0 if model is None else model.zone.factor,
-        kind,
-        model.w if isinstance(model, wheeler) else 1.0,
-        model.shutoff if isinstance(model, willenborg) else 2.0,
-        share,
-        state,
-        left,
-    )
-    return float(cycles), float(a)
-
-
-def _rates(rows: Driving, row: int, K: Floats, law: Law, shifts: Floats) -> Floats:
-    """Rates of each kind of cycle at both ends, for each share of K that is taken away."""
-    largest = K[..., 1, None] * (1 - shifts)
-    smallest = np.maximum(K[..., 0, None] - K[..., 1, None] * shifts, 0.0)
-    R = np.divide(smallest, largest, out=np.zeros_like(largest), where=largest > 0)
-    size = np.broadcast_to(rows.size[row][:, None, None], largest.shape)
-    parts = (largest - smallest, R, size)
-    dK, ratio, a = (np.ascontiguousarray(part).ravel() for part in parts)
-    return evaluate_law(law, dK, ratio, 0, "cycle", a).reshape(largest.shape)
-
-
-def _breaks(rows: Driving, row: int, K: Floats, law: Law) -> bool:
-    return bool(np.isinf(_rates(rows, row, K, law, np.zeros(1))).any())
-
-
 # Lives of samples with retardation: each sample cycle by cycle, on K that a run has stored.
 
 
@@ -316,7 +306,7 @@ class RetardedLives:
                 "the run had them."
             )
         check(history, law, block.spectrum, model)
-        self.path = CycledPath.of(history, block.spectrum, block.nu)
+        self.path = CycledPath.of(history, block.spectrum, block.nu, block.threshold)
         self.law, self.model, self.limit = law, model, max_blocks
         self.unit = block.spectrum.unit
 

@@ -14,9 +14,10 @@ from typing import Any
 from xcrack.base.errors import ProblemError
 from xcrack.base.paths import system_errors
 from xcrack.crack.crack import Crack
+from xcrack.fatigue.retardation import BlockCycles, CycleIntegration, OverloadZones
 from xcrack.growth.description import DEFAULTS
 from xcrack.growth.step import Arrival, Join, Memory, Step, StepError
-from xcrack.growth.trail import Control, FrontTrail, Kinds, March, Overloads, Places, Trail, Zones
+from xcrack.growth.trail import Control, FrontTrail, Overloads, Places, Trail
 from xcrack.linalg.reuse import Reuse, Slip
 from xcrack.runs import lock
 from xcrack.runs.store import PART, load, save, write_whole
@@ -30,8 +31,9 @@ _STEP = re.compile(r"step_(\d{5,})\.npz")
 CLASSES: dict[str, type] = {
     "Step": Step, "Memory": Memory, "Reuse": Reuse, "Slip": Slip, "Crack": Crack,
     "SIF": SIF, "StepError": StepError, "Trail": Trail, "FrontTrail": FrontTrail,
-    "Places": Places, "Arrival": Arrival, "Join": Join, "Overloads": Overloads, "Zones": Zones,
-    "Kinds": Kinds, "March": March, "Control": Control, "Bars": Bars,
+    "Places": Places, "Arrival": Arrival, "Join": Join, "Overloads": Overloads,
+    "OverloadZones": OverloadZones, "BlockCycles": BlockCycles,
+    "CycleIntegration": CycleIntegration, "Control": Control, "Bars": Bars,
 }  # fmt: skip
 
 

@@ -5,8 +5,9 @@ from typing import Any
 import numpy as np
 
 from xcrack.base.markup import element, joined, table
+from xcrack.fatigue.retardation import OverloadZones
 from xcrack.growth.step import Memory, Step
-from xcrack.growth.trail import FrontTrail, Trail, Zones
+from xcrack.growth.trail import FrontTrail, Trail
 from xcrack.view.report_source import Section, Source
 
 
@@ -73,7 +74,7 @@ def _left(step: Step, memory: Memory) -> list[tuple[Any, ...]]:
     ]
 
 
-def _ranges(zones: Zones) -> tuple[str, ...]:
+def _ranges(zones: OverloadZones) -> tuple[str, ...]:
     return tuple(_range(x) for x in (zones.K, zones.size, zones.since))
 
 

@@ -9,8 +9,8 @@ import numpy as np
 from xcrack.fatigue.criteria import weighted_angle
 from xcrack.fatigue.law import Law
 from xcrack.fatigue.power import paris
+from xcrack.fatigue.retardation import Retardation, plastic_zone, wheeler, willenborg
 from xcrack.fatigue.spectrum import Spectrum
-from xcrack.fatigue.zones import Retardation, plastic_zone, wheeler, willenborg
 from xcrack.growth.run import grow
 from xcrack.runs.collect import collect
 from xcrack.verification.book.case import Case, Value

@@ -1,0 +1,404 @@
+"""Retardation after overloads: plastic zones, its models, and growth cycle by cycle with them."""
+
+from dataclasses import dataclass, replace
+from typing import Annotated
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from xcrack.base.arguments import Number, Part
+from xcrack.base.arrays import Bools, Floats, Ints
+from xcrack.base.checks import numbers
+from xcrack.base.errors import ProblemError
+from xcrack.base.units import STRESS, TOUGHNESS
+from xcrack.fatigue.checks import evaluate_law
+from xcrack.fatigue.law import Constants, Law, largest_K
+
+_LARGEST = 1e120  # K whose square is a number
+
+# Of growth cycle by cycle.
+POINTS = 65  # of a march, at which growth and cycles are known
+_SHIFTS, _FEWEST = 257, 17  # values of the reduction of K at which the law is asked
+_TABLE = 4_000_000  # rates of a march
+_MOST = 3e8  # cycles of a step, times places
+_LEAST = 1e-9  # of a step: a block that grows less does not grow
+_TINY = 1e-3  # of the largest rate of a cycle: below it a power of the rate is a line
+_SMALLEST = 1e-300
+
+
+@dataclass(frozen=True)
+class plastic_zone(Constants):  # noqa: N801 - it is used as a function
+    """Size of the plastic zone, (K / sigma_y)² / (beta π).
+
+    Parameters
+    ----------
+    sigma_y : float, stress
+        Yield stress, positive.
+    beta : float
+        Positive. 1: width in plane stress (Irwin), 2: radius in plane stress, 3: width and 6:
+        radius in plane strain; 8/π² is the strip of Dugdale. Which one belongs to a model's
+        constants.
+
+    Raises
+    ------
+    ProblemError
+        A value that is not positive.
+
+    Examples
+    --------
+    >>> print((1000 * plastic_zone(400.0, beta=2)(30.0)).round(6))      # MPa √m to mm
+    0.895247
+    """
+
+    sigma_y: Annotated[float, Number(above=0, unit=STRESS)]
+    beta: Annotated[float, Number(above=0)]
+
+    def __call__(self, K: ArrayLike) -> Floats:
+        """Size for K, length."""
+        given = numbers(K, "plastic_zone: K")
+        if np.abs(given).max(initial=0.0) > _LARGEST:
+            raise ProblemError(
+                f"plastic_zone: K = {np.abs(given).max():.3g} has no square: take another unit."
+            )
+        return np.asarray(self.factor * given**2)[()]
+
+    @property
+    def factor(self) -> float:
+        """Size over K²."""
+        return 1.0 / (self.sigma_y**2 * self.beta * np.pi)
+
+
+@dataclass(frozen=True)
+class wheeler(Constants):  # noqa: N801
+    """Growth slowed while the plastic zone lies inside that of an overload.
+
+    Parameters
+    ----------
+    w : float
+        Exponent, positive: fitted to a material and a kind of spectrum.
+    zone : plastic_zone
+
+    Raises
+    ------
+    ProblemError
+        A value that does not fit.
+
+    Notes
+    -----
+    da/dN times [r / (a_OL + r_OL - a)]^w while a + r < a_OL + r_OL (Wheeler 1972, J. Basic Eng. 94,
+    181). A cycle whose zone reaches beyond that of the overload is the new overload.
+
+    Examples
+    --------
+    >>> model = wheeler(1.5, plastic_zone(400.0, beta=2))
+    >>> print(model.factor(15.0, 30.0, 0.3e-3).round(6))
+    0.230557
+    """
+
+    w: Annotated[float, Number(above=0)]
+    zone: Annotated[plastic_zone, Part(plastic_zone, needs="plastic_zone(sigma_y, beta)")]
+
+    def factor(self, K: ArrayLike, K_overload: ArrayLike, da: ArrayLike) -> Floats:
+        """Factor on the rate for K, after growth by da since an overload."""
+        own = self.zone(K)
+        left = self.zone(K_overload) - numbers(da, "wheeler: da")
+        inside = left > own
+        share = np.divide(own, left, out=np.ones_like(left + own), where=inside)
+        return np.asarray(share**self.w)[()]
+
+
+@dataclass(frozen=True)
+class willenborg(Constants):  # noqa: N801
+    """Growth by a K that the residual stress of an overload reduces.
+
+    Parameters
+    ----------
+    shutoff : float
+        Overload over K at which the crack stops, above 1; 2.3 to 3 for aluminium (from memory).
+    dK_th : float, stress √length
+        Threshold, not negative.
+    zone : plastic_zone
+
+    Raises
+    ------
+    ProblemError
+        A value that does not fit.
+
+    Notes
+    -----
+    K_R = φ [K_OL √(1 - da/r_OL) - K_max] >= 0, φ = (1 - ΔK_th/ΔK) / (S - 1) >= 0 (generalised
+    Willenborg model: Gallagher 1974; Gallagher and Hughes, AFFDL-TR-74-27; the same formula is in
+    the program easigrow). Both ends of the cycle are shifted by -K_R and cut at 0: K with contact.
+
+    Examples
+    --------
+    >>> model = willenborg(2.5, 2.0, plastic_zone(400.0, beta=2))
+    >>> print(model.reduction(1.5, 15.0, 30.0, 0.0).round(6))
+    8.518519
+    """
+
+    shutoff: Annotated[float, Number(above=1)]
+    dK_th: Annotated[float, Number(least=0, unit=TOUGHNESS)]
+    zone: Annotated[plastic_zone, Part(plastic_zone, needs="plastic_zone(sigma_y, beta)")]
+
+    def reduction(
+        self, K_min: ArrayLike, K_max: ArrayLike, K_overload: ArrayLike, da: ArrayLike
+    ) -> Floats:
+        """Reduction of K, after growth by da since an overload, stress √length."""
+        low, high, over, grown = (
+            numbers(value, f"willenborg: {name}")
+            for name, value in zip(
+                ("K_min", "K_max", "K_overload", "da"), (K_min, K_max, K_overload, da)
+            )
+        )
+        dK = high - low
+        share = np.divide(self.dK_th, dK, out=np.ones_like(dK), where=dK > 0)
+        phi = np.maximum(1 - share, 0.0) / (self.shutoff - 1)
+        left = np.maximum(1 - grown / self.zone(over), 0.0)
+        return np.asarray(np.maximum(phi * (over * np.sqrt(left) - high), 0.0))[()]
+
+
+Retardation = wheeler | willenborg
+
+
+# What growth cycle by cycle goes from, and what it gives.
+
+
+@dataclass(frozen=True, eq=False)
+class OverloadZones:
+    """What overloads left at places, and where in a block of cycles the run is.
+
+    Attributes
+    ----------
+    since : (n,) array, length
+        Growth since the overload.
+    size : (n,) array, length
+        Its plastic zone; 0 before the first.
+    K : (n,) array, stress √length
+        K_max of the overload.
+    position : int
+        Number of the next cycle of the block.
+    part : float
+        Of that cycle that is over.
+    """
+
+    since: Floats
+    size: Floats
+    K: Floats
+    position: int = 0
+    part: float = 0.0
+
+    def at(self, places: Bools | Ints) -> "OverloadZones":
+        """The same for some places."""
+        return replace(self, since=self.since[places], size=self.size[places], K=self.K[places])
+
+
+@dataclass(frozen=True, eq=False)
+class BlockCycles:
+    """The kinds of cycles of a block at places, at the last solves.
+
+    Attributes
+    ----------
+    dK, R : (k, n, p) arrays
+        Equivalent range (stress √length) and ratio.
+    a : (k, n) array, length
+        Crack size that a law is given.
+    """
+
+    dK: Floats
+    R: Floats
+    a: Floats
+
+    def rows(self, which: slice | Bools) -> "BlockCycles":
+        """Some of the solves."""
+        return BlockCycles(self.dK[which], self.R[which], self.a[which])
+
+    def at(self, places: Bools | Ints) -> "BlockCycles":
+        """Some of the places."""
+        return BlockCycles(self.dK[:, places], self.R[:, places], self.a[:, places])
+
+    def followed_by(self, later: "BlockCycles", most: int) -> "BlockCycles":
+        """With later solves, of all at most the last few."""
+        parts = zip((self.dK, self.R, self.a), (later.dK, later.R, later.a))
+        return BlockCycles(*(np.concatenate(pair)[-most:] for pair in parts))
+
+
+@dataclass(frozen=True, eq=False)
+class CycleIntegration:
+    """Growth of places, cycle by cycle.
+
+    Attributes
+    ----------
+    sigma : (g,) array, length
+        Sum of the largest growth of any place in each cycle.
+    arc : (g, n) array, length
+        How far each place has come.
+    cycles : (g,) array
+        Blocks until there.
+    reached : float, length
+        Up to which it came: less than the last of `sigma` where nothing grows, or the blocks are
+        over.
+    zones : OverloadZones
+        Then.
+    """
+
+    sigma: Floats
+    arc: Floats
+    cycles: Floats
+    reached: float
+    zones: OverloadZones
+
+    def until(self, sigma: float) -> tuple[Floats, float]:
+        """How far each place has come `(n,)`, and blocks, at some sigma."""
+        arc = [np.interp(sigma, self.sigma, column) for column in self.arc.T]
+        return np.array(arc), float(np.interp(sigma, self.sigma, self.cycles))
+
+
+def no_zones(n: int) -> OverloadZones:
+    """Places without an overload."""
+    return OverloadZones(np.zeros(n), np.zeros(n), np.zeros(n))
+
+
+def march(
+    law: Law,
+    model: Retardation | None,
+    order: Ints,
+    cycles: BlockCycles,
+    nodes: Floats,
+    x: Floats,
+    zones: OverloadZones,
+    length: float,
+    *,
+    exponent: float,
+    threshold: float = 0.0,
+    blocks: float = np.inf,
+) -> CycleIntegration:
+    """Let places grow cycle by cycle, until the fastest have come a length.
+
+    Parameters
+    ----------
+    law : callable
+    model : wheeler or willenborg, or None
+    order : (c,) array of int
+        Kinds of the cycles of a block, in time.
+    cycles : BlockCycles
+    nodes : (k, n) array
+        Where these were solved; rates are exponentials of polynomials through them.
+    x : (g, n) array
+        The same coordinate, evenly from the begin to `length`.
+    zones : OverloadZones
+        At the begin.
+    length : float, length
+    exponent : float
+        Of the law, for rates that all but vanish.
+    threshold : float, stress √length
+        Cycles below it let nothing grow.
+    blocks : float
+        To stop after.
+
+    Returns
+    -------
+    CycleIntegration
+    """
+    from xcrack.fatigue.kernels.march import marched
+
+    k, n, p = cycles.dK.shape
+    shifts = np.zeros(1)
+    if isinstance(model, willenborg):
+        fits = _TABLE // max(k * n * p, 1)
+        shifts = np.linspace(0, 1, int(np.clip(fits, _FEWEST, _SHIFTS)))
+    rate = cycle_rates(law, cycles, shifts, threshold)
+    most = rate.max(axis=0)
+    root = np.asarray((rate <= _TINY * most).any(axis=0))
+    with np.errstate(divide="ignore"):
+        values = np.where(root, rate ** (1 / exponent), np.log(np.maximum(rate, _SMALLEST)))
+    least = model.dK_th if isinstance(model, willenborg) else 0.0
+    share = np.divide(least, cycles.dK, out=np.ones_like(cycles.dK), where=cycles.dK > 0)
+    since, size, over = np.array(zones.since), np.array(zones.size), np.array(zones.K)
+    arc, elapsed = np.zeros(x.shape), np.zeros(len(x))
+    reached, position, part, _ = marched(
+        length,
+        min(blocks * len(order), _MOST / max(n, 1)),
+        _LEAST * length,
+        order,
+        _weights(nodes, x),
+        _line_weights(nodes, x),
+        largest_K(cycles.dK, cycles.R),
+        values,
+        root,
+        exponent,
+        share,
+        0.0 if model is None else model.zone.factor,
+        0 if model is None else 1 if isinstance(model, wheeler) else 2,
+        model.w if isinstance(model, wheeler) else 1.0,
+        model.shutoff if isinstance(model, willenborg) else 2.0,
+        since,
+        size,
+        over,
+        zones.position,
+        zones.part,
+        arc,
+        elapsed,
+    )
+    after = OverloadZones(since, size, over, int(position), float(part))
+    sigma = np.linspace(0.0, length, len(x))
+    return CycleIntegration(sigma, arc, elapsed / len(order), float(reached), after)
+
+
+def cycle_rates(law: Law, cycles: BlockCycles, shifts: Floats, threshold: float) -> Floats:
+    """Rates `(k, n, p, s)` with a share of K_max taken from both ends of each cycle."""
+    K_max = largest_K(cycles.dK, cycles.R)[..., None]
+    largest = K_max * (1 - shifts)
+    smallest = np.maximum(K_max - cycles.dK[..., None] - K_max * shifts, 0.0)
+    dK = np.where(shifts == 0, cycles.dK[..., None], largest - smallest)
+    R = np.divide(smallest, largest, out=np.zeros_like(largest), where=largest > 0)
+    R = np.where(shifts == 0, cycles.R[..., None], np.minimum(R, 1.0))
+    a = np.broadcast_to(cycles.a[..., None, None], dK.shape)
+    flat = (np.ascontiguousarray(each).ravel() for each in (dK, R, a))
+    dK_, R_, a_ = flat
+    rate = evaluate_law(law, dK_, R_, 0, "place of a cycle", a_)
+    return np.where(dK_ < threshold, 0.0, rate).reshape(dK.shape)
+
+
+def _weights(nodes: Floats, x: Floats) -> Floats:
+    """Weights of the nodes in the polynomial through them `(g, k, n)`."""
+    k = len(nodes)
+    result = np.ones((len(x), k, x.shape[1]))
+    for j in range(k):
+        for i in range(k):
+            if i != j:
+                result[:, j] *= (x - nodes[i]) / (nodes[j] - nodes[i])
+    return result
+
+
+def _line_weights(nodes: Floats, x: Floats) -> Floats:
+    """The same of straight lines from node to node, the first and the last one prolonged."""
+    k = len(nodes)
+    result = np.zeros((len(x), k, x.shape[1]))
+    if k == 1:
+        return result + 1.0
+    for j in range(k - 1):
+        inside = np.ones(x.shape, dtype=bool)
+        if j > 0:
+            inside &= x >= nodes[j]
+        if j < k - 2:
+            inside &= x < nodes[j + 1]
+        t = (x - nodes[j]) / (nodes[j + 1] - nodes[j])
+        result[:, j] += np.where(inside, 1 - t, 0.0)
+        result[:, j + 1] += np.where(inside, t, 0.0)
+    return result
+
+
+__all__ = [
+    "POINTS",
+    "BlockCycles",
+    "CycleIntegration",
+    "OverloadZones",
+    "Retardation",
+    "cycle_rates",
+    "march",
+    "no_zones",
+    "plastic_zone",
+    "wheeler",
+    "willenborg",
+]
