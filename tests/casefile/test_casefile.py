@@ -153,7 +153,7 @@ def test_run_grows_and_goes_on_to_the_same_result(tmp_path):
         ("nu = 0.3", 'nu = "0.3 mm"', 15, "is a length, but a plain number belongs here"),
         ("nu = 0.3", "nu = 0.7", 15, "nu"),
         ('force = "N"', 'force = "kg"', 5, "known are N, kN"),
-        ('kind = "box"', 'kind = "boxx"', 8, "known are file, box"),
+        ('kind = "box"', 'kind = "boxx"', 8, "known are file, step, box"),
         ('kind = "line"', 'kind = "circle"', 19, "known are line, penny"),
         ('kind = "line"', "kind = 3", 19, "put it into quotes"),
         ('where = "bottom"', 'were = "bottom"', 32, "did you mean 'where'?"),
@@ -179,7 +179,7 @@ def test_what_is_wrong_is_reported_with_its_line(old, new, line, words, tmp_path
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ('"paris"', '"parris"', "known are paris, elber, walker"),
+        ('"paris"', '"parris"', "paris, elber, walker"),
         ("C = 1e-11", "C = -1", "paris: C"),
         ("min = 0.1", "min = 2.0", "min <= max"),
         ("max_steps", "max_step", "did you mean 'max_steps'?"),

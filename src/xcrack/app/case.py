@@ -14,11 +14,14 @@ from xcrack.app.case_tables import Table, read_tables
 from xcrack.base.errors import ProblemError, XcrackError
 from xcrack.base.paths import path_of
 from xcrack.base.units import LENGTH, NUMBER, TOUGHNESS
+from xcrack.fatigue.law import GrowthLaw
 from xcrack.fatigue.retardation import plastic_zone
 from xcrack.growth.options import GrowOptions
+from xcrack.model.loads import Load
 from xcrack.model.material import Isotropic
 from xcrack.model.numerics import Numerics
 from xcrack.model.problem import Problem
+from xcrack.model.supports import Support
 
 _SECTIONS = ("title", "units", "mesh", "material", "cracks", "supports", "loads", "solve",
              "numerics", "growth", "output")  # fmt: skip
@@ -83,13 +86,15 @@ def read_case(path: str | PathLike[str]) -> CaseFile:
         if name not in root:
             root.refuse("", f"the table [{name}] is missing.")
     mesh = forms.made(root.table("mesh"), forms.MESHES)
-    material = forms.called_with(root.table("material"), Form(Isotropic, {"E": (-2.0, 1.0)}))
+    material = forms.called_with(root.table("material"), Form(Isotropic))
     solving = root.table("solve")
     solving.known(("contact", "order", "friction", "states"))
     scene: dict[str, Any] = {
         name: [forms.made(table, known) for table in root.tables(name)]
         for name, known in (
-            ("cracks", forms.CRACKS), ("supports", forms.SUPPORTS), ("loads", forms.LOADS),
+            ("cracks", forms.CRACKS),
+            ("supports", forms.forms_of(Support)),
+            ("loads", forms.forms_of(Load)),
         )
     }  # fmt: skip
     numerics = _numerics(root.table("numerics"))
@@ -117,12 +122,7 @@ def _numerics(table: Table) -> Numerics:
     """Choices of method; those for comparison stay in scripts."""
     names = [f.name for f in fields(Numerics) if f.name not in _METHODS]
     table.known(names)
-    lengths = {"radius": LENGTH, "domain": LENGTH}
-    given = {name: table.value(name, lengths.get(name)) for name in table.content}
-    try:
-        return Numerics(**given)
-    except XcrackError as error:
-        table.wrap(error)
+    return forms.called_with(table, Form(Numerics))  # type: ignore[no-any-return]
 
 
 def _growth(table: Table) -> Mapping[str, Any]:
@@ -141,10 +141,9 @@ def _growth(table: Table) -> Mapping[str, Any]:
     if "retardation" in table:
         given["retardation"] = retardation_of(table.table("retardation"))
     if "link_up" in table:
-        zone = Form(plastic_zone, {"sigma_y": (-2.0, 1.0), "beta": NUMBER})
-        given["link_up"] = forms.called_with(table.table("link_up"), zone)
+        given["link_up"] = forms.called_with(table.table("link_up"), Form(plastic_zone))
     return MappingProxyType({
-        "law": forms.made(table.table("law"), forms.LAWS),
+        "law": forms.made(table.table("law"), forms.forms_of(GrowthLaw)),
         "criterion": forms.CRITERIA[criterion],
         "cycle": loading(table),
         **given,

@@ -3,21 +3,30 @@
 import inspect
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 from xcrack.app.case_tables import Table
-from xcrack.base.arguments import arguments_of, kinds_of
+from xcrack.base.arguments import Argument, Function, Part, arguments_of, classes_of, kinds_of
 from xcrack.base.errors import ProblemError, XcrackError
-from xcrack.base.units import LENGTH, NUMBER, TOUGHNESS, Dimension
+from xcrack.base.units import LENGTH, NUMBER, Dimension
 from xcrack.crack.lines import line_crack
-from xcrack.crack.surfaces import elliptic_crack, penny_crack, plane_crack, read_surface
-from xcrack.fatigue import criteria, fracture, power
+from xcrack.crack.surfaces import (
+    elliptic_crack,
+    penny_crack,
+    plane_crack,
+    read_surface,
+    surface_crack,
+)
+from xcrack.fatigue import criteria, fracture, power  # noqa: F401 - laws are found as classes
+from xcrack.fatigue.law import GrowthLaw
+from xcrack.fatigue.tables import rate_table
+from xcrack.fatigue.time import with_time
 from xcrack.mesh.box import box
 from xcrack.mesh.cylinder import notched_cylinder
 from xcrack.mesh.files import read_mesh
 from xcrack.mesh.plates import plate, plate_with_hole
-from xcrack.model.loads import Load
-from xcrack.model.supports import Support
+from xcrack.mesh.step_file import mesh_step
 
 _WORD = "kind"
 
@@ -48,6 +57,7 @@ _PLATE = _lengths("width", "height", "radius", "size", "size_near", "center", "l
                   "along", "band", "transition")  # fmt: skip
 MESHES = {
     "file": Form(read_mesh, files=("path",)),
+    "step": Form(mesh_step, _lengths("size"), files=("path",)),
     "box": Form(box, _lengths("lower", "upper")),
     "plate": Form(plate, _PLATE),
     "plate_with_hole": Form(plate_with_hole, _PLATE),
@@ -63,16 +73,27 @@ CRACKS = {
     "ellipse": Form(elliptic_crack, _lengths("center", "a", "b")),
     "polygon": Form(plane_crack, _lengths("polygon")),
     "file": Form(read_surface, files=("path",)),
+    "surface": Form(surface_crack, _lengths("points")),
 }
-SUPPORTS = {name: Form(kind) for name, kind in kinds_of(Support).items()}
-LOADS = {name: Form(kind) for name, kind in kinds_of(Load).items()}
-LAWS = {
-    "paris": Form(power.paris),
-    "elber": Form(power.elber),
-    "walker": Form(power.walker),
-    "forman": Form(fracture.forman, {"K_c": TOUGHNESS}),
-    "hartman_schijve": Form(fracture.hartman_schijve, {"A": TOUGHNESS, "dK_thr": TOUGHNESS}),
-}
+
+
+def _rate_table(curves: Any, outside: str = "refuse", ratio: str | None = None) -> rate_table:
+    """A table of rates from a list of curves, each with R, dK and rate."""
+    rows = [curve if isinstance(curve, dict) else {} for curve in curves]
+    if not all(set(row) == {"R", "dK", "rate"} for row in rows):
+        raise ProblemError("rate_table: curves: give a list of { R = .., dK = [..], rate = [..] }.")
+    points = {row["R"]: (row["dK"], row["rate"]) for row in rows}
+    return rate_table(points, outside, ratio)  # type: ignore[arg-type]
+
+
+def forms_of(base: type) -> dict[str, Form]:
+    """Forms of all classes that derive from one: loads, supports, laws and their parts."""
+    forms = {name: Form(kind) for name, kind in kinds_of(base).items()}
+    if base is GrowthLaw:
+        forms |= {"rate_table": Form(_rate_table), "with_time": Form(with_time)}
+    return forms
+
+
 CRITERIA: dict[str, Callable[..., Any]] = {
     "max_hoop_stress": criteria.max_hoop_stress,
     "weighted_angle": criteria.weighted_angle,
@@ -115,35 +136,54 @@ def called_with(table: Table, form: Form, what: str = "", besides: tuple[str, ..
 
 def _argument(table: Table, name: str, form: Form, parameter: inspect.Parameter) -> Any:
     if name in form.files:
-        path = table.source.path.parent / table.text(name)
-        if not path.is_file():
-            near = (
-                sorted(p.name for p in path.parent.glob(f"*{path.suffix}")) if path.suffix else []
-            )
-            hint = f"; beside it are {', '.join(near[:5])}" if near else ""
-            table.refuse(name, f"there is no file {path}{hint}: paths begin at the case file.")
-        return path
-    rule = arguments_of(form.function)[name].rule
-    declared = None if rule is None or callable(rule.unit) else rule.unit
-    value = table.value(name, form.units.get(name, declared or _dimension_of(parameter)))
+        return _file(table, name)
+    declared = arguments_of(form.function).get(name)
+    rule = None if declared is None else declared.rule
+    if isinstance(rule, Part) and isinstance(table.content[name], dict):
+        return _part(table.table(name), rule)
+    if isinstance(rule, Function) and isinstance(table.content[name], dict):
+        return made(table.table(name), forms_of(GrowthLaw))
+    if rule is not None and rule.takes_names and isinstance(table.content[name], str):
+        return table.content[name]
+    unit = form.units.get(name, _dimension_of(declared, parameter))
+    value = table.value(name, unit)
     whole = isinstance(value, list) and value and not any(isinstance(v, list) for v in value)
     return tuple(value) if whole else value
 
 
-def _dimension_of(parameter: inspect.Parameter) -> Dimension | None:
-    """Text is refused for numbers without a unit; names stay what they are."""
-    text = str(parameter.annotation)
-    return NUMBER if text in ("<class 'float'>", "float | None") else None
+def _part(table: Table, rule: Part) -> Any:
+    """A value within another one: a table that names its kind, where there are several."""
+    kinds = classes_of(rule.kind)
+    if len(kinds) == 1 and _WORD not in table:
+        (kind,) = kinds.values()
+        return called_with(table, Form(kind))
+    return made(table, {name: Form(kind) for name, kind in kinds.items()})
+
+
+def _file(table: Table, name: str) -> Path:
+    """A file that a key names, from the folder of the case file."""
+    path = table.source.path.parent / table.text(name)
+    if not path.is_file():
+        near = sorted(p.name for p in path.parent.glob(f"*{path.suffix}")) if path.suffix else []
+        hint = f"; beside it are {', '.join(near[:5])}" if near else ""
+        table.refuse(name, f"there is no file {path}{hint}: paths begin at the case file.")
+    return path
+
+
+def _dimension_of(declared: Argument | None, parameter: inspect.Parameter) -> Dimension | None:
+    """Dimension by the rule of an argument; text is refused for numbers without a unit."""
+    unit = None if declared is None or declared.rule is None else declared.rule.unit
+    if unit is not None:
+        return None if callable(unit) else unit
+    return NUMBER if str(parameter.annotation) in ("<class 'float'>", "float | None") else None
 
 
 __all__ = [
     "CRACKS",
     "CRITERIA",
-    "LAWS",
-    "LOADS",
     "MESHES",
-    "SUPPORTS",
     "Form",
     "called_with",
+    "forms_of",
     "made",
 ]

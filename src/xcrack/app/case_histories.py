@@ -5,17 +5,17 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from xcrack.app.case_forms import LOADS, Form, called_with, made
+from xcrack.app.case_forms import Form, called_with, forms_of, made
 from xcrack.app.case_tables import Table
 from xcrack.base.errors import XcrackError
-from xcrack.base.units import NUMBER, STRESS, TOUGHNESS
+from xcrack.base.units import NUMBER
 from xcrack.fatigue.files import read_spectrum, twist
-from xcrack.fatigue.retardation import Retardation, plastic_zone, wheeler, willenborg
+from xcrack.fatigue.retardation import Retardation, wheeler, willenborg
 from xcrack.fatigue.spectrum import Spectrum
 from xcrack.growth.step import Cycle
+from xcrack.model.loads import Load
 
 _CHOICES = ("unit", "least_range", "levels", "tolerance", "steady")
-_ZONE = {"sigma_y": STRESS, "beta": NUMBER}
 
 
 def _factors(factors: Any) -> Spectrum:
@@ -36,10 +36,7 @@ _HISTORIES = {
     "file": Form(_file, files=("path",)),
     "twist": Form(twist),
 }
-_MODELS = {
-    "wheeler": Form(wheeler),
-    "willenborg": Form(willenborg, {"dK_th": TOUGHNESS}),
-}
+_MODELS = {"wheeler": Form(wheeler), "willenborg": Form(willenborg)}
 
 
 def loading(table: Table) -> Cycle | Spectrum:
@@ -70,7 +67,7 @@ def loading(table: Table) -> Cycle | Spectrum:
     if "unit" in given:
         choices["unit"] = given.text("unit")
     if "steady" in given:
-        choices["steady"] = tuple(made(load, LOADS) for load in given.tables("steady"))
+        choices["steady"] = tuple(made(load, forms_of(Load)) for load in given.tables("steady"))
     try:
         return replace(spectrum, **choices)
     except XcrackError as error:
@@ -81,9 +78,7 @@ def retardation_of(table: Table) -> Retardation:
     """The model of a table, whose zone is a table of its own."""
     if "zone" not in table:
         table.refuse("", "the key 'zone' is missing: zone = { sigma_y = ..., beta = ... }.")
-    zone = called_with(table.table("zone"), Form(plastic_zone, _ZONE))
-    content = {**table.content, "zone": zone}
-    return made(Table(table.source, table.key, content), _MODELS)
+    return made(table, _MODELS)
 
 
 __all__ = ["loading", "retardation_of"]

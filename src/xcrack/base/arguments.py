@@ -44,10 +44,13 @@ class Rule:
         where it holds no numbers.
     is_vector : bool
         Whether its numbers must be as many as the body has dimensions.
+    takes_names : bool
+        Whether a text that is no number may stand for it.
     """
 
     unit: Unit = None
     is_vector: ClassVar[bool] = False
+    takes_names: ClassVar[bool] = False
 
     def check(self, value: Any, what: str, error: Error) -> Any:
         """The value as it is kept; an error where it does not fit."""
@@ -68,11 +71,17 @@ class Number(Rule):
     least: float | None = None
     below: float | None = None
     most: float | None = None
+    hint: str = ""
 
     def check(self, value: Any, what: str, error: Error) -> float:
         """The number as float."""
         bounds = {"above": self.above, "least": self.least, "below": self.below, "most": self.most}
-        return number(value, what, **bounds, error=error)
+        try:
+            return number(value, what, **bounds, error=error)
+        except error as refusal:
+            if not self.hint:
+                raise
+            raise error(f"{str(refusal).rstrip('.')}; {self.hint}.") from None
 
     @property
     def words(self) -> str:
@@ -391,12 +400,18 @@ def _bounds(above: Any, least: Any, below: Any, most: Any) -> str:
     return " and ".join(part for part in (low, high) if part)
 
 
+def classes_of(kind: Any) -> dict[str, type]:
+    """Classes that a value may be of, by name: those derived from a base, or the class itself."""
+    kinds: tuple[Any, ...] = get_args(kind) or (kind if isinstance(kind, tuple) else (kind,))
+    result: dict[str, type] = {}
+    for one in kinds:
+        result |= kinds_of(one) or {one.__name__: one}
+    return result
+
+
 def _named(kind: Any) -> str:
     """Classes in words: those that can be made of them."""
-    kinds: tuple[Any, ...] = get_args(kind) or (kind if isinstance(kind, tuple) else (kind,))
-    names: list[str] = []
-    for one in kinds:
-        names += kinds_of(one) or [one.__name__]
+    names = list(classes_of(kind))
     return " or ".join(filter(None, [", ".join(names[:-1]), names[-1]]))
 
 
@@ -422,5 +437,6 @@ __all__ = [
     "arguments_of",
     "check_fields",
     "checked",
+    "classes_of",
     "kinds_of",
 ]

@@ -1,26 +1,27 @@
 """Isotropic linear elasticity."""
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
+from xcrack.base.arguments import Choice, Declared, Number
 from xcrack.base.arrays import Floats
-from xcrack.base.checks import number, numbers, shown
+from xcrack.base.checks import numbers
 from xcrack.base.errors import ProblemError
-
-_PLANES = ("strain", "stress")
+from xcrack.base.units import STRESS
 
 
 @dataclass(frozen=True)
-class Isotropic:
+class Isotropic(Declared):
     """Isotropic linear elastic material; nothing has a default but the plane of a 3D body.
 
     Parameters
     ----------
     E : float, stress
-        Young's modulus, positive.
+        Young's modulus.
     nu : float
-        Poisson's ratio in (-1, 0.5).
+        Poisson's ratio.
     plane : {"strain", "stress"}, optional
         State of a 2D body; None in 3D.
 
@@ -35,22 +36,14 @@ class Isotropic:
     230769
     """
 
-    E: float
-    nu: float
-    plane: str | None = None
-
-    def __post_init__(self) -> None:
-        number(self.E, "Young's modulus E", above=0)
-        if not -1 < number(self.nu, "Poisson's ratio nu") < 0.5:
-            raise ProblemError(
-                f"Poisson's ratio nu = {self.nu} must lie in (-1, 0.5); for a nearly "
-                "incompressible material take a value such as 0.4999."
-            )
-        if not (self.plane is None or (isinstance(self.plane, str) and self.plane in _PLANES)):
-            raise ProblemError(
-                f'Isotropic(plane={shown(self.plane)}): give "strain" or "stress" in 2D, nothing '
-                "in 3D."
-            )
+    E: Annotated[float, Number(above=0, unit=STRESS)]
+    nu: Annotated[
+        float,
+        Number(above=-1, below=0.5, hint="a nearly incompressible material has such as 0.4999"),
+    ]
+    plane: Annotated[
+        str | None, Choice(("strain", "stress"), needs='"strain" or "stress" in 2D, nothing in 3D')
+    ] = None
 
     @property
     def mu(self) -> float:

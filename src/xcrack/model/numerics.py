@@ -1,20 +1,14 @@
 """Everything that is method, not scene, in one place."""
 
 from dataclasses import dataclass, field
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
+from xcrack.base.arguments import Choice, Declared, Flag, Number, Part, Whole
 from xcrack.base.arrays import Bools, Floats
-from xcrack.base.checks import number, shown, whole
 from xcrack.base.errors import ProblemError
+from xcrack.base.units import LENGTH
 
-
-def _check_choices(given: object, **choices: tuple[object, ...]) -> None:
-    """Raise where a field has none of its values; 1 is not True."""
-    for name, allowed in choices.items():
-        value = getattr(given, name)
-        if not any(type(value) is type(a) and value == a for a in allowed):
-            words = " or ".join(repr(a) for a in allowed)
-            raise ProblemError(f"{type(given).__name__}({name}={shown(value)}): give {words}.")
+_METHODS = "one of xcrack.verification.methods, or leave it out"
 
 
 class ContactMethod:
@@ -80,7 +74,7 @@ class LevelSets:
 
 
 @dataclass(frozen=True)
-class Numerics:
+class Numerics(Declared):
     """Choices of method, with the reason of each default (numbers in docs/measured.md).
 
     Parameters
@@ -147,50 +141,27 @@ class Numerics:
         A word or number that is not one of these.
     """
 
-    enrichment: str = "geometric"
-    radius: float | None = None
-    functions: int = 4
-    multipliers: str = "reduced"
-    consistent: bool = True
-    orthonormal: str = "star"
-    patch: bool = False
-    points: int = 4
-    domain: float | None = None
-    linear: str = "auto"
-    initial_set: str = "closed"
-    substeps: int = 10
-    threads: int | None = field(default=None, metadata={"changes_results": False})
-    contact_method: ContactMethod | None = None
-    tip_basis: TipBasis | None = None
-    level_sets: LevelSets | None = None
+    enrichment: Annotated[str, Choice(("geometric", "topological"))] = "geometric"
+    radius: Annotated[float | None, Number(above=0, unit=LENGTH)] = None
+    functions: Annotated[int, Choice((4, 2))] = 4
+    multipliers: Annotated[str, Choice(("reduced", "sparse", "naive"))] = "reduced"
+    consistent: Annotated[bool, Flag()] = True
+    orthonormal: Annotated[str, Choice(("star", "node", "none"))] = "star"
+    patch: Annotated[bool, Flag()] = False
+    points: Annotated[int, Whole(least=2, most=32)] = 4
+    domain: Annotated[float | None, Number(above=0, unit=LENGTH)] = None
+    linear: Annotated[str, Choice(("auto", "direct", "iterative"))] = "auto"
+    initial_set: Annotated[str, Choice(("closed", "open"))] = "closed"
+    substeps: Annotated[int, Whole(least=1, most=10_000)] = 10
+    threads: Annotated[int | None, Whole(least=1)] = field(
+        default=None, metadata={"changes_results": False}
+    )
+    contact_method: Annotated[ContactMethod | None, Part(ContactMethod, needs=_METHODS)] = None
+    tip_basis: Annotated[TipBasis | None, Part(TipBasis, needs=_METHODS)] = None
+    level_sets: Annotated[LevelSets | None, Part(LevelSets, needs=_METHODS)] = None
 
     def __post_init__(self) -> None:
-        _check_choices(
-            self,
-            enrichment=("geometric", "topological"),
-            functions=(4, 2),
-            multipliers=("reduced", "sparse", "naive"),
-            orthonormal=("star", "node", "none"),
-            linear=("auto", "direct", "iterative"),
-            initial_set=("closed", "open"),
-            consistent=(True, False),
-            patch=(True, False),
-        )
-        for name in ("radius", "domain"):
-            if getattr(self, name) is not None:
-                number(getattr(self, name), f"Numerics: {name}", above=0)
-        whole(self.points, "Numerics: points", least=2, most=32)
-        whole(self.substeps, "Numerics: substeps", least=1, most=10_000)
-        if self.threads is not None:
-            whole(self.threads, "Numerics: threads", least=1)
-        methods = {"contact_method": ContactMethod, "tip_basis": TipBasis, "level_sets": LevelSets}
-        for name, kind in methods.items():
-            method = getattr(self, name)
-            if method is not None and not isinstance(method, kind):
-                raise ProblemError(
-                    f"Numerics: {name} = {shown(method)}: give a {kind.__name__}, such as those of "
-                    "xcrack.verification.methods, or leave it out."
-                )
+        super().__post_init__()
         if self.tip_basis is not None and self.functions != 4:
             raise ProblemError(
                 f"Numerics: a tip_basis combines all four tip functions: leave functions = "

@@ -74,6 +74,7 @@ class Place(Rule):
 
     unit: Unit = NUMBER
     is_vector = True
+    takes_names = True
 
     def check(self, value: Any, what: str, error: Error) -> Any:
         """The name, or a read-only point."""
