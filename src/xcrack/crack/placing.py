@@ -6,7 +6,7 @@ from xcrack.base.errors import GeometryError
 from xcrack.crack import junctions as junctions_2d
 from xcrack.crack.crack import Crack
 from xcrack.crack.junctions import Junction
-from xcrack.crack.placing_2d import check_lines, place_line
+from xcrack.crack.placing_2d import check_lines, place_line, tips_on_mesh
 from xcrack.crack.placing_3d import ShortFront, check_surfaces, place_surface
 from xcrack.crack.placing_3d import short_fronts as surface_short_fronts
 from xcrack.mesh.mesh import Mesh
@@ -21,6 +21,10 @@ _ON_OTHERS: dict[int, Callable[..., tuple[Crack, ...]]] = {
 _JUNCTIONS: dict[int, Callable[..., tuple[Junction, ...]]] = {
     2: junctions_2d.junctions,
     3: lambda cracks, mesh: (),
+}
+_ON_MESH: dict[int, Callable[[Crack, Mesh], Crack]] = {
+    2: tips_on_mesh,
+    3: lambda crack, mesh: crack,
 }
 _SHORT: dict[int, Callable[[Crack, Mesh], list[ShortFront]]] = {
     2: lambda crack, mesh: [],
@@ -89,9 +93,14 @@ def on_others(given: Sequence[Crack], cracks: tuple[Crack, ...], mesh: Mesh) -> 
     return _ON_OTHERS[mesh.dim](given, cracks, mesh)
 
 
+def on_mesh(crack: Crack, mesh: Mesh) -> Crack:
+    """A placed crack as the mesh is cut by it; see `placing_2d.tips_on_mesh`."""
+    return _ON_MESH[mesh.dim](crack, mesh)
+
+
 def junctions(cracks: tuple[Crack, ...], mesh: Mesh) -> tuple[Junction, ...]:
     """Where placed cracks end on others; see `junctions_2d.junctions`."""
     return _JUNCTIONS[mesh.dim](cracks, mesh)
 
 
-__all__ = ["check_cracks", "junctions", "on_others", "placed", "short_fronts"]
+__all__ = ["check_cracks", "junctions", "on_mesh", "on_others", "placed", "short_fronts"]

@@ -1,17 +1,28 @@
 """Cracks in 2D put into a mesh: which ends are tips, and mouths led outside."""
 
+from dataclasses import replace
+
 import numpy as np
 from scipy.spatial import cKDTree
 
-from xcrack.base.arrays import Floats, at, coordinates
+from xcrack.base.arrays import Floats, at, coordinates, lock
 from xcrack.base.errors import CoarseMeshError, GeometryError, warn
 from xcrack.crack.crack import Crack, tip_frames
 from xcrack.crack.junctions import Junction, junctions
 from xcrack.crack.lines import crossing_points, touching_points
-from xcrack.mesh.locate import cell_sizes, cells_at, contains, nearest_boundary, parts_inside
+from xcrack.mesh.locate import (
+    barycentric,
+    cell_sizes,
+    cells_around,
+    cells_at,
+    contains,
+    nearest_boundary,
+    parts_inside,
+)
 from xcrack.mesh.mesh import Mesh
 from xcrack.mesh.polygon import closest_on_segment
 
+ON_MESH = 1e-10  # share of a cell within which a tip lies on a mesh point or on an edge
 _MOUTH = 0.5  # an end within this share of a cell from the boundary is a mouth
 _MEANT = 0.1  # share of a cell inside the boundary up to which nobody means a tip
 _WAY = 3.0  # cells to the boundary, along the crack, from an end that is close to it
@@ -158,6 +169,32 @@ def _prolonged(mesh: Mesh, end: Floats, out: Floats, size: float) -> tuple[float
     gap = float(again[0]) * step if len(again) else np.inf
     way = float(steps[first_out])
     return way, np.asarray(end + out * (way + min(size, gap / 2)))
+
+
+def tips_on_mesh(crack: Crack, mesh: Mesh) -> Crack:
+    """A placed crack whose tips lie on mesh points and edges exactly, or well beside them.
+
+    What is cut between a tip and a mesh point closer than round-off allows has no area, and points
+    of integration on the tip itself.
+    """
+    points = np.array(crack.points)
+    for tip in crack.tips or ():
+        points[tip] = _on_mesh(points[tip], mesh)
+    return replace(crack, points=lock(points))
+
+
+def _on_mesh(x: Floats, mesh: Mesh) -> Floats:
+    """A point, or the mesh point or the point of an edge that it lies on but for round-off."""
+    cells = cells_around(mesh, x, ON_MESH)
+    bary = barycentric(mesh, cells, np.broadcast_to(x, (len(cells), 2)))
+    count = (np.abs(bary) > ON_MESH).sum(axis=1)
+    if count.min(initial=3) == 3:
+        return x
+    row = int(np.argmin(count))
+    share = np.where(np.abs(bary[row]) > ON_MESH, bary[row], 0.0)
+    corners = mesh.points[mesh.cells[cells[row]]]
+    first = corners[np.argmax(share)]  # the mesh point itself where it is alone
+    return np.asarray(first + share / share.sum() @ (corners - first))
 
 
 def check_lines(cracks: tuple[Crack, ...], mesh: Mesh) -> None:

@@ -229,7 +229,9 @@ def _facet_lips(mesh: Mesh, level_set: LevelSet) -> _Lips:
 
 def _lip_normals(mesh: Mesh, phi: Floats, cell: Ints, bary: Floats) -> Floats:
     """Unit normals of lip segments, exactly perpendicular to them, towards growing phi."""
-    corners = np.einsum("lvb,lbd->lvd", bary[:, 1], mesh.points[mesh.cells[cell[:, 1]]])
+    # From a corner of the cell: far from 0 a short segment has lost its direction.
+    nodes = mesh.points[mesh.cells[cell[:, 1]]]
+    corners = np.einsum("lvb,lbd->lvd", bary[:, 1], nodes - nodes[:, :1])
     slope = np.einsum("lb,lbd->ld", phi[mesh.cells[cell[:, 1]]], mesh.gradient[cell[:, 1]])
     normal = _ACROSS[mesh.dim](corners)
     length = np.linalg.norm(normal, axis=1, keepdims=True)

@@ -5,12 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from xcrack.base.arrays import Bools, Floats, Ints
+from xcrack.crack.placing_2d import ON_MESH
 from xcrack.fem.level_set import LevelSet
 from xcrack.mesh.locate import barycentric
 from xcrack.mesh.mesh import Mesh, local_edges
 from xcrack.mesh.split import cut_simplices, interface_simplices
 
-_ON_FACET = 1e-13  # barycentric coordinates of a tip below this are zero
 _ROUND_OFF = 1e-14  # sub-cells below this share of their cell are left out: they are determinants
 
 
@@ -73,7 +73,7 @@ def _tip_cells(
     tip = level_set.tip[k]
     apex = barycentric(mesh, cells, np.broadcast_to(tip, (len(cells), mesh.dim)))
     # Round-off of a tip on a facet would leave a sub-cell without area whose points hit the tip.
-    apex = np.where(apex > _ON_FACET, apex, 0.0)
+    apex = np.where(apex > ON_MESH, apex, 0.0)
     apex /= apex.sum(axis=1, keepdims=True)
     phi = level_set.phi[mesh.cells[cells]]
     crossed = (phi.min(axis=1) < 0) & (phi.max(axis=1) > 0)

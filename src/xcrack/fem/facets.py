@@ -8,7 +8,7 @@ import scipy.sparse as sp
 from xcrack.base.arrays import Bools, Floats, Ints, offsets
 from xcrack.fem.function_space import FunctionSpace
 from xcrack.fem.quadrature import lip_side, radius_at, segment_points, triangle_points
-from xcrack.mesh.mesh import numbers_of
+from xcrack.mesh.mesh import Mesh, numbers_of
 from xcrack.mesh.split import cut_simplices
 
 _AT = 1e-10  # share of a facet's level set below which a value is zero
@@ -183,6 +183,14 @@ class LipPoints:
 
     def __len__(self) -> int:
         return len(self.weight)
+
+    def way_from(self, mesh: Mesh, x: Floats) -> Floats:
+        """Ways to the points from one place `(q, d)`, exact to round-off of the size of a cell.
+
+        Differences of coordinates are exact to that of coordinates only, which may lie far from 0.
+        """
+        corners = mesh.points[mesh.cells[self.cell[:, 1]]] - x
+        return np.asarray(np.einsum("qb,qbd->qd", self.bary[:, 1], corners))
 
 
 def lip_points(space: FunctionSpace, c: int, n: int = 6) -> LipPoints:

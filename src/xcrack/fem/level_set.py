@@ -8,6 +8,7 @@ from scipy.spatial import cKDTree
 from xcrack.base.arrays import Bools, Floats, Ints, lock
 from xcrack.crack.crack import Crack, tip_frames
 from xcrack.crack.fronts_3d import Front, front_frames
+from xcrack.crack.placing_2d import ON_MESH
 from xcrack.mesh.distances import front_distance, surface_distance
 from xcrack.mesh.locate import cells_around
 from xcrack.mesh.mesh import Mesh, local_facets
@@ -132,7 +133,7 @@ def tied_to_tips(
     last kink is less than a cell away.
     """
     x, frame = tip_frames(crack)
-    tip_cells = tuple(cells_around(mesh, point, SNAP) for point in x)
+    tip_cells = tuple(cells_around(mesh, point, ON_MESH) for point in x)
     for k, cells in enumerate(tip_cells):
         nodes = np.unique(mesh.cells[cells])
         local = mesh.points[nodes] - x[k]

@@ -6,6 +6,7 @@ from typing import Any
 
 from xcrack.crack.crack import Crack
 from xcrack.crack.junctions import reaching
+from xcrack.crack.placing import on_mesh
 from xcrack.fem.assembly import Bulk, Enriched, Stiffness, bulk, enriched_stiffness
 from xcrack.fem.cut import cut
 from xcrack.fem.enrichment import front_reach
@@ -84,7 +85,8 @@ def build(problem: Problem, bulk_: Bulk | None = None) -> Model:
 
 def discretised(problem: Problem) -> tuple[FunctionSpace, tuple[LipPoints, ...]]:
     """Function space of a problem, and the points on the faces of its cracks: nothing assembled."""
-    mesh, cracks, numerics = problem.mesh, problem.placed, problem.numerics
+    mesh, numerics = problem.mesh, problem.numerics
+    cracks = tuple(on_mesh(crack, mesh) for crack in problem.placed)
     junctions = problem.junctions
     drawn = reaching(cracks, junctions) if junctions else cracks
     cuts = tuple(cut(mesh, levels(mesh, crack, numerics)) for crack in drawn)

@@ -7,7 +7,7 @@ import numpy as np
 
 from xcrack.analysis.solution import Solution
 from xcrack.base.arrays import Floats
-from xcrack.base.errors import warn
+from xcrack.base.errors import ProblemError, warn
 from xcrack.sif.common import pressure_at, shallow
 from xcrack.sif.sif import SIF
 
@@ -68,7 +68,21 @@ def check(solutions: Sequence[Solution], t: int, domain: Domain, parts: Sequence
     domain : Domain
     parts : sequence of SIF
         One for each state, with at least one row.
+
+    Raises
+    ------
+    ProblemError
+        K that is no number.
     """
+    for part in parts:
+        bad = ~np.isfinite(part.K).all(axis=1)
+        if bad.any():
+            row = int(np.argmax(bad))
+            raise ProblemError(
+                f"{domain.at(part.x[row])}: K = {part.K[row].tolist()} is no number. Move the "
+                f"crack by a thousandth of a cell ({1e-3 * domain.size:.3g}), or refine the mesh "
+                "there."
+            )
     tip = solutions[0].space.tips[t]
     scales = [_scale(s, part, tip.radius) for s, part in zip(solutions, parts, strict=True)]
     difference, place = _difference(domain, parts, scales)

@@ -119,10 +119,11 @@ def _faces(
     tip = space.tips[t]
     lips, R, scale = solution.lips[tip.crack], tip.frame, 0.5 * material.E_prime
     pressure, per_stress = np.zeros((len(lips), 2)), np.zeros((2, 2, 2))
-    near = np.nonzero(np.linalg.norm(lips.x - tip.x, axis=1) < outer)[0]
+    way = lips.way_from(space.mesh, tip.x)
+    near = np.nonzero(np.linalg.norm(way, axis=1) < outer)[0]
     if not len(near):
         return (), pressure, per_stress
-    xi = (lips.x[near] - tip.x) @ R.T
+    xi = way[near] @ R.T
     xi[np.abs(xi[:, 1]) < _STRAIGHT * outer, 1] = 0.0
     bent = bool(xi[:, 1].any())
     parts = []
@@ -172,8 +173,9 @@ def _singular(solution: Solution, t: int) -> tuple[Floats, Floats]:
     radius = domain_of(solution, t).outer
     outer = np.array([radius])
     values, gradients = np.zeros((2, len(lips), 2, 2)), np.zeros((2, len(lips), 2, 2, 2))
-    near = np.nonzero(np.linalg.norm(lips.x - tip.x, axis=1) < radius)[0]
-    xi = (lips.x[near] - tip.x) @ R.T
+    way = lips.way_from(space.mesh, tip.x)
+    near = np.nonzero(np.linalg.norm(way, axis=1) < radius)[0]
+    xi = way[near] @ R.T
     for s, sign in ((0, -1), (1, 1)):
         side = np.full(len(near), sign)
         r, theta = continued_polar(xi, side, np.ones(len(near), dtype=bool))

@@ -208,14 +208,15 @@ def lip_terms(solutions: Sequence[Solution], ring: Ring) -> Floats:
     space, t, radii = solutions[0].space, ring.t, ring.radii
     tip, lips = space.tips[t], solutions[0].lips[space.tips[t].crack]
     result = np.zeros((len(solutions), len(radii), 3))
-    near = np.linalg.norm(lips.x - tip.x, axis=1) < radii.max()
+    way = lips.way_from(space.mesh, tip.x)
+    near = np.linalg.norm(way, axis=1) < radii.max()
     if not near.any():
         return result
     pressure = np.stack([lip_pressure(s, tip.crack)[near] for s in solutions])
     shears = [None if x is None else x[near] for x in (lip_shear(s, tip.crack) for s in solutions)]
     R = tip.frame
     material = solutions[0].problem.material
-    xi = (lips.x[near] - tip.x) @ R.T
+    xi = way[near] @ R.T
     # The last piece is straight: what differs there is round-off, which 1 / r would magnify.
     xi[np.abs(xi[:, 1]) < 1e-9 * radii.max(), 1] = 0.0
     bent = bool(xi[:, 1].any())

@@ -41,7 +41,7 @@ def stress_intensity(solution: Solution, crack: int = 0, error: bool | str | Non
     Raises
     ------
     ProblemError
-        Not a solution, no such crack, or "front" in 2D.
+        Not a solution, no such crack, "front" in 2D, or K that is no number.
 
     Warns
     -----
@@ -83,7 +83,8 @@ def stress_intensities(
     Raises
     ------
     ProblemError
-        Not a list of solutions, solutions of different solves, or no such crack.
+        Not a list of solutions, solutions of different solves, no such crack, or K that is no
+        number.
 
     Warns
     -----

@@ -6,14 +6,16 @@ import numpy as np
 
 from xcrack.base.kernels.jit import kernel
 
-_FOOT = 1e-9  # a foot this close to an end is the end: round-off of coordinates far from 0
+_FOOT = 1e-9  # share of a segment within which a foot at its end is the end
+_ROUND_OFF = 1e-15  # of coordinates, as a share of the largest of them
 
 
 @kernel
 def graded_points(begin, end, tips, u, w):  # type: ignore[no-untyped-def]
     """Gauss points on segments, graded towards a tip that is closer than their length.
 
-    A segment is split at the foot of the nearest tip, with r = u² from there.
+    A segment is split at the foot of the nearest tip, with r = u² from there; also where the foot
+    lies beyond an end.
 
     Parameters
     ----------
@@ -49,21 +51,32 @@ def graded_points(begin, end, tips, u, w):  # type: ignore[no-untyped-def]
             a, b = tips[nearest, 0] - begin[s, 0], tips[nearest, 1] - begin[s, 1]
             square = x * x + y * y
             foot = (a * x + b * y) / square if square > 1e-300 else 0.0
-            if foot < _FOOT:
+            # A part as long as the round-off of coordinates would have points on the tip itself.
+            largest = max(
+                abs(begin[s, 0]), abs(begin[s, 1]), abs(end[s, 0]), abs(end[s, 1]),
+                abs(tips[nearest, 0]), abs(tips[nearest, 1]),
+            )  # fmt: skip
+            close = max(_FOOT, min(0.5, _ROUND_OFF * largest / max(length, 1e-300)))
+            if abs(foot) < close:
                 foot = 0.0
-            elif foot > 1 - _FOOT:
+            elif abs(foot - 1) < close:
                 foot = 1.0
-            a = begin[s, 0] + foot * x - tips[nearest, 0]
-            b = begin[s, 1] + foot * y - tips[nearest, 1]
+            closest = min(max(foot, 0.0), 1.0)
+            a = begin[s, 0] + closest * x - tips[nearest, 0]
+            b = begin[s, 1] + closest * y - tips[nearest, 1]
             near = math.sqrt(a * a + b * b) < length
         for part in range(2):
-            reach = 1 - foot if part == 1 else -foot
-            if (near and reach == 0) or (not near and part == 1):
+            sign = 1.0 if part == 1 else -1.0
+            # From the foot to the near end of this part and to the far one, in this direction.
+            first, last = sign * (1 - part - foot), sign * (part - foot)
+            if (near and last <= 0) or (not near and part == 1):
                 continue
+            low, high = math.sqrt(max(first, 0.0)), math.sqrt(max(last, 0.0))
             for i in range(n):
                 p, share = u[i], w[i]
                 if near:
-                    p, share = foot + reach * (u[i] * u[i]), abs(reach) * (2 * u[i] * w[i])
+                    v = low + (high - low) * u[i]
+                    p, share = foot + sign * (v * v), (high - low) * (2 * v * w[i])
                 number[to], weight[to] = s, length * share
                 place[to, 0], place[to, 1] = 1 - p, p
                 to += 1
