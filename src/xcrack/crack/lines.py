@@ -7,9 +7,10 @@ from xcrack.base.arrays import Bools, Floats, at
 from xcrack.base.errors import GeometryError
 from xcrack.crack.crack import Crack
 from xcrack.mesh.checks import coordinates
-from xcrack.mesh.polygon import closest_on_segment
+from xcrack.mesh.polygon import boxes_meet, closest_on_segment
 
-_SAME = 1e-9  # share of its length within which a line touches itself or is closed
+_SAME = 1e-9  # share of its length within which points of a line are the same, or it touches itself
+_PARALLEL = 1e-10  # sine up to which pieces cross nowhere: they touch along a length, or not at all
 _AT_ONCE = 1_000_000  # pairs of pieces looked at together
 
 
@@ -44,7 +45,7 @@ def line_crack(points: ArrayLike) -> Crack:
     if len(x) < 2:
         raise GeometryError(f"a line crack needs at least two points (p, 2), not {len(x)}.")
     length = np.linalg.norm(np.diff(x, axis=0), axis=1)
-    if (length <= 1e-12 * length.max(initial=0.0)).any() or length.max() == 0:
+    if (length <= _SAME * length.sum()).any():
         i = int(np.argmin(length))
         raise GeometryError(
             f"the crack has a piece of zero length: points {i} and {i + 1} both lie at "
@@ -81,7 +82,10 @@ def polyline_crack(points: Floats, tips: tuple[int, ...] | None = None) -> Crack
 
 
 def crossing_points(a: Floats, b: Floats, same: bool = False) -> Floats:
-    """Points where polylines a and b cross `(k, 2)`; neighbours of one line do not count."""
+    """Points where polylines a and b cross `(k, 2)`; neighbours of one line do not count.
+
+    Pieces that lie on each other cross nowhere; see `touching_points`.
+    """
     parts = [np.zeros((0, 2))]
     s, q = np.diff(b, axis=0)[None], b[None, :-1]
     step = max(_AT_ONCE // max(len(b), 1), 1)
@@ -93,7 +97,11 @@ def crossing_points(a: Floats, b: Floats, same: bool = False) -> Floats:
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             t = (gap[..., 0] * s[..., 1] - gap[..., 1] * s[..., 0]) / cross
             u = (gap[..., 0] * r[..., 1] - gap[..., 1] * r[..., 0]) / cross
-        hit: Bools = (cross != 0) & (t >= 0) & (t <= 1) & (u >= 0) & (u <= 1)
+        hit: Bools = (t >= 0) & (t <= 1) & (u >= 0) & (u <= 1)
+        # Of pieces on one line t and u are quotients of round-off, however far apart they are.
+        length = np.linalg.norm(r, axis=-1) * np.linalg.norm(s, axis=-1)
+        hit &= np.abs(cross) > _PARALLEL * length
+        hit &= boxes_meet(p, start[1:, None], q, b[None, 1:])
         if same:
             i, j = np.indices(hit.shape)
             hit &= np.abs(i + first - j) > 1

@@ -12,6 +12,7 @@ from xcrack.crack.placing_2d import ON_MESH
 from xcrack.mesh.distances import front_distance, surface_distance
 from xcrack.mesh.locate import cells_around
 from xcrack.mesh.mesh import Mesh, local_facets
+from xcrack.mesh.polygon import boxes_meet
 from xcrack.mesh.triangulation import face_normals, rim, ruled, unit
 
 SNAP = 1e-10  # share of an edge below which a cut point is moved onto its end
@@ -170,7 +171,9 @@ def _free_reach(origin: Floats, direction: Floats, polyline: Floats, reach: floa
     with np.errstate(divide="ignore", invalid="ignore"):
         t = (gap[:, 0] * along[:, 1] - gap[:, 1] * along[:, 0]) / cross
         u = (gap[:, 0] * direction[1] - gap[:, 1] * direction[0]) / cross
-    hit = (cross != 0) & (t > 0) & (u >= -1e-9) & (u <= 1 + 1e-9)
+    hit = (t > 0) & (u >= -1e-9) & (u <= 1 + 1e-9)
+    # Of pieces on the line of the ray t and u are quotients of round-off, also of those behind it.
+    hit &= boxes_meet(origin, origin + reach * direction, a, polyline[1:])
     return float(min(reach, np.min(t[hit], initial=np.inf)))
 
 

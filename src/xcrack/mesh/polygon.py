@@ -82,18 +82,22 @@ def _in_circle(p: Floats, q: Floats, a: Floats, b: Floats) -> bool:
 def self_crossing(flat: Floats) -> tuple[int, int] | None:
     """Two sides of a closed 2D polygon that meet other than at their common end."""
     m = len(flat)
-    r = np.roll(flat, -1, axis=0) - flat
+    ends = np.roll(flat, -1, axis=0)
+    r = ends - flat
     cross = r[:, None, 0] * r[None, :, 1] - r[:, None, 1] * r[None, :, 0]
     gap = flat[None] - flat[:, None]
     with np.errstate(divide="ignore", invalid="ignore"):
         t = (gap[..., 0] * r[None, :, 1] - gap[..., 1] * r[None, :, 0]) / cross
         u = (gap[..., 0] * r[:, None, 1] - gap[..., 1] * r[:, None, 0]) / cross
-    hit = (cross != 0) & (t >= -1e-12) & (t <= 1 + 1e-12) & (u >= -1e-12) & (u <= 1 + 1e-12)
+    hit = (t >= -1e-12) & (t <= 1 + 1e-12) & (u >= -1e-12) & (u <= 1 + 1e-12)
+    # Of sides on one line t and u are quotients of round-off, however far apart they are.
+    length = np.linalg.norm(r, axis=1)
+    reach = 1e-12 * float(length.max())
+    hit &= boxes_meet(flat[:, None], ends[:, None], flat[None], ends[None], reach)
     i, j = np.indices(hit.shape)
     apart = (i - j) % m
     hit &= (apart > 1) & (apart < m - 1)
     # Sides on one line: neighbours that turn back, others that overlap.
-    length = np.linalg.norm(r, axis=1)
     off = np.abs(gap[..., 0] * r[:, None, 1] - gap[..., 1] * r[:, None, 0]) / length[:, None]
     along = np.einsum("ijk,ik->ij", gap, r) / length[:, None] ** 2
     on = (off <= 1e-12 * length.max()) & (along >= -1e-12) & (along <= 1 + 1e-12)
@@ -242,6 +246,13 @@ def closest_on_segment(x: Floats, a: Floats, b: Floats) -> Floats:
     square = np.maximum((along * along).sum(axis=-1), 1e-300)
     t = np.clip(((x - a) * along).sum(axis=-1) / square, 0, 1)
     return np.asarray(a + t[..., None] * along)
+
+
+def boxes_meet(a: Floats, b: Floats, c: Floats, d: Floats, reach: float = 0.0) -> Bools:
+    """Whether the boxes along the axes around segments ab and cd `(..., d)` come within a reach."""
+    low = np.maximum(np.minimum(a, b), np.minimum(c, d))
+    high = np.minimum(np.maximum(a, b), np.maximum(c, d))
+    return np.asarray((low <= high + reach).all(axis=-1))
 
 
 __all__ = ["Round", "between", "graded", "with_room"]
