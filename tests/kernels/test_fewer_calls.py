@@ -164,6 +164,23 @@ def test_split():
     np.testing.assert_array_equal(bary[3], [[1, 0], [0.25, 0.75]])
 
 
+def test_split_by_three_cracks():
+    """Parts in their order along the edge; a position that two cracks share counts once."""
+    ends = np.array([[0, 1], [3, 2], [4, 5]])
+    cut = np.array([[0.5, 0.8, np.nan], [0.9, 0.3, 0.5], [0.1, 0.5, 0.5]])
+    level = np.repeat(np.array([[[-1.0, 1.0]]]), 3, axis=0).repeat(3, axis=1)
+    number, bary, side = split(ends, cut, level)
+    np.testing.assert_array_equal(number, [0, 1, 2, 0, 1, 2, 0, 1, 0, 1])
+    first = bary[number == 0, :, 1]
+    np.testing.assert_allclose(first, [[0, 0.1], [0.1, 0.5], [0.5, 0.9], [0.9, 1]])
+    np.testing.assert_array_equal(
+        side[number == 0], [[-1, -1, -1], [-1, -1, 1], [1, -1, 1], [1, 1, 1]]
+    )
+    turned = bary[number == 1, :, 1]
+    np.testing.assert_allclose(turned, [[0, 0.2], [0.2, 0.5], [0.5, 0.7], [0.7, 1]])
+    np.testing.assert_allclose(bary[number == 2, :, 1], [[0, 0.5], [0.5, 1]])
+
+
 @pytest.mark.parametrize("n", [3, 4])
 def test_cut_simplices_fill_their_parents(n):
     """Shares are determinants, sum to one, and phi has one sign on each part."""

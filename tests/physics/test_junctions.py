@@ -72,6 +72,131 @@ def test_pressed_junction(n, within):
     assert np.abs(np.abs(K[:, 1]) / K_PRESSED - 1).max() < within
 
 
+# Straight cracks that cross, drawn -------------------------------------------------------------
+
+# K_I and K_II at the tips, and the energy of the square, by the same conforming elements: 3e-5 and
+# 1e-4 from a coarser mesh, of pressed ones the K_II alone, 2e-4.
+CROSSES = {
+    5100: ([[1.36970, -0.22948], [1.25099, -0.21427], [0.84337, 0.05753], [0.75403, 0.26464]],
+           2.66785),
+    5103: ([[1.58106, -0.30918], [1.52633, -0.21574], [0.73479, 0.19485], [0.52947, 0.15003]],
+           2.87232),
+    5106: ([[1.45801, 0.24065], [1.36618, 0.31283], [0.44859, -0.18415], [0.81070, -0.17134]],
+           2.75610),
+}  # fmt: skip
+CROSSES_PRESSED = {5103: [0.2752, 0.2705, 0.2482, 0.2687], 5104: [0.8490, 0.8519, 0.2228, 0.2150]}
+
+
+def crossing(seed):
+    """Middle and the four tips of two straight cracks that cross at 35 to 90 degrees."""
+    rng = np.random.default_rng(seed)
+    x, angle = rng.uniform(-0.15, 0.15, 2), rng.uniform(-np.pi, np.pi)
+    lean = rng.choice([-1, 1]) * rng.uniform(np.radians(35), np.pi / 2)
+    e, d = (np.array([np.cos(t), np.sin(t)]) for t in (angle, angle + lean))
+    a, b, c, f = rng.uniform(0.35, 0.55, 4)
+    return x, (x - a * e, x + b * e, x - c * d, x + f * d)
+
+
+def both_ways(seed):
+    """Lines of a cross, of which one crack or the other one runs through, and rows by tip."""
+    x, (a, b, c, d) = crossing(seed)
+    return (([(a, b), (c, x), (d, x)], [0, 1, 2, 3]), ([(x, a), (c, d), (b, x)], [0, 2, 3, 1]))
+
+
+def K_by_tip(solution, order) -> Floats:
+    K = [xc.stress_intensity(solution, c).K for c in range(len(solution.problem.cracks))]
+    return np.concatenate(K)[np.argsort(order)]
+
+
+@pytest.mark.parametrize("seed", CROSSES)
+def test_straight_cracks_that_cross(seed):
+    """K and energy, whichever crack runs through: order 2 within 5e-4 at n = 20, 1e-4 at 40."""
+    K, energy = CROSSES[seed]
+    for lines, tips in both_ways(seed):
+        for n, within in ((20, 5e-4), (40, 1e-4)):
+            solution = xc.solve(pulled(perturbed(n, seed), lines, contact="off"))
+            assert error_of(K_by_tip(solution, tips), K) < within
+            assert solution.energy == pytest.approx(energy, rel=1e-4)
+
+
+@pytest.mark.filterwarnings("ignore::xcrack.XcrackWarning")
+@pytest.mark.parametrize("seed", CROSSES)
+def test_straight_cracks_that_cross_at_order_1(seed):
+    K, energy = CROSSES[seed]
+    for lines, tips in both_ways(seed):
+        solution = xc.solve(pulled(perturbed(40, seed), lines, order=1, contact="off"))
+        assert error_of(K_by_tip(solution, tips), K) < 0.02
+        assert solution.energy == pytest.approx(energy, rel=1e-2)
+
+
+@pytest.mark.parametrize("seed", CROSSES_PRESSED)
+def test_straight_cracks_that_cross_and_press(seed):
+    """K_II to 2e-3 of the largest at n = 20, half of which may be the reference's."""
+    wanted = np.array(CROSSES_PRESSED[seed])
+    for lines, tips in both_ways(seed):
+        problem = pulled(perturbed(20, seed), lines, PRESSED, contact="on")
+        K = K_by_tip(xc.solve(problem), tips)
+        assert np.abs(K[:, 0]).max() == 0.0
+        assert np.abs(np.abs(K[:, 1]) - wanted).max() < 2e-3 * wanted.max()
+
+
+def test_straight_crosses_are_accepted():
+    """At drawn angles; with ends on the crack, a 20th of a cell short or beyond, or rounded."""
+    mesh = xc.box((-1, -1), (1, 1), 20)
+    for seed in range(600, 660):
+        x, (a, b, c, d) = crossing(seed)
+        along = 0.005 * (d - c) / np.linalg.norm(d - c)
+        ends = [(x, x), (x - along, x + along), (x + along, x - along), (np.round(x, 3),) * 2]
+        for one, other in ends:
+            lines = [(c, one), (a, b), (other, d)]
+            problem = pulled(mesh, lines)
+            assert [own.on for own in problem.junctions] == [1, 1]
+            assert sorted(own.side for own in problem.junctions) == [-1, 1]
+            assert [crack.tips for crack in problem.placed] == [(0,), (0, 1), (1,)]
+            for own in problem.junctions:
+                np.testing.assert_allclose(own.x, x, atol=2e-3)
+
+
+def test_arms_on_each_other_are_refused():
+    """A cross whose arms overlap along a length, from one side or across the other crack."""
+    mesh = xc.box((-1, -1), (1, 1), 20)
+    for seed in range(600, 610):
+        x, (a, b, c, d) = crossing(seed)
+        for arm in ((x, x + 0.5 * (d - x)), (x - 0.5 * (d - x), x + 0.3 * (d - x))):
+            with pytest.raises(xc.GeometryError, match=r"touch or lie on|from the same side"):
+                _ = pulled(mesh, [(a, b), (x, d), arm]).junctions
+        with pytest.raises(xc.GeometryError, match=r"cross near .* give crack 1 as two cracks"):
+            _ = pulled(mesh, [(a, b), (c, d)]).junctions
+
+
+def test_crosses_on_mesh_lines():
+    """On mesh points, edges and diagonals, and next to them: K is that of 3e-3 of a cell beside."""
+    mesh, beside = xc.box((-1, -1), (1, 1), 20), 0.1 * np.array([0.6, 0.8])
+
+    def K_near(x, angle, distance):
+        x = np.array(x) + distance * beside
+        e, d = (0.4 * np.array([np.cos(t), np.sin(t)]) for t in (angle, angle + 1.2))
+        return K_of(pulled(mesh, [(x - e, x + e), (x, x + d), (x - d, x)], contact="off"))
+
+    for x in ((0.0, 0.0), (0.05, 0.0), (0.05, 0.05)):
+        for angle in (0.0, np.pi / 4, -1.2):
+            wanted = K_near(x, angle, 3e-3)
+            for distance in (0.0, 1e-13, 1e-10, 1e-6):
+                change = np.abs(K_near(x, angle, distance) - wanted).max()
+                assert change < 1e-3 * np.abs(wanted).max()
+
+
+def test_arms_that_one_edge_crosses_with_the_crack_between():
+    """Three cuts of one mesh edge: the body was said to be in two pieces (23 of 300 drawn ones)."""
+    for seed in range(2000, 2030):
+        rng = np.random.default_rng(seed)
+        x, angle = rng.uniform(-0.15, 0.15, 2), rng.uniform(-np.pi, np.pi)
+        leans = angle + np.array([1, -1]) * rng.uniform(0.6, np.pi - 0.6, 2)
+        e, d, f = (0.4 * np.array([np.cos(t), np.sin(t)]) for t in (angle, *leans))
+        problem = pulled(perturbed(20, seed), [(x - e, x + e), (x, x + d), (x, x + f)])
+        assert pieces(build(problem).space)[1] == 1, seed
+
+
 def out_of_the_body(x, direction):
     """Point outside the square, ahead of x."""
     reach = min(

@@ -73,51 +73,57 @@ def on_others(given: Sequence[Crack], cracks: tuple[Crack, ...], mesh: Mesh) -> 
     for c, crack in enumerate(cracks):
         for tip in (crack.tips or ()) if given[c].tips is None else ():
             end, before = crack.points[tip], crack.points[1 if tip == 0 else tip - 1]
-            foot, distance = _nearest_flank(c, end, result)
-            ahead = (end - before) / np.linalg.norm(end - before)
-            if distance > _ON * _size(mesh, end) or _along(ahead, foot, c, result):
+            on = _ends_on(c, before, end, result, _size(mesh, end))
+            if on is None:
                 continue
             points = np.array(result[c].points)
-            points[tip] = _on_line(before, end, foot, result, c)
+            points[tip] = _on_line(before, end, result[on].points)
             tips = tuple(t for t in result[c].tips or () if t != tip)
             result[c] = Crack(points, crack.faces, tips)
     return tuple(result)
 
 
-def _nearest_flank(c: int, x: Floats, cracks: Sequence[Crack]) -> tuple[Floats, float]:
-    """Point of all other cracks that is nearest to x, and its distance."""
-    best, distance = x, np.inf
+def _ends_on(
+    c: int, before: Floats, end: Floats, cracks: Sequence[Crack], size: float
+) -> int | None:
+    """The crack that is meant where crack c ends close to others; None where it has a tip.
+
+    Cracks that it lies along do not count: the arm on the other side of an X is one, and placing
+    refuses those that overlap it. Of others those count first that do not end there too.
+    """
+    ahead = (end - before) / np.linalg.norm(end - before)
+    best, chosen = (True, np.inf), None
     for other, crack in enumerate(cracks):
         if other == c:
             continue
-        foot = closest_on_segment(x, crack.points[:-1], crack.points[1:])
-        away = np.linalg.norm(foot - x, axis=1)
-        k = int(np.argmin(away))
-        if away[k] < distance:
-            best, distance = foot[k], float(away[k])
-    return best, distance
+        foot, distance = _nearest(end, crack.points)
+        if distance > _ON * size or _sine(ahead, _arms(foot, crack.points, size)) < 1e-3:
+            continue
+        to_ends = np.linalg.norm(crack.points[[0, -1]] - foot, axis=1)
+        rank = bool(to_ends.min() < _APART * size), distance
+        if rank < best:
+            best, chosen = rank, other
+    return chosen
 
 
-def _along(ahead: Floats, x: Floats, c: int, cracks: Sequence[Crack]) -> bool:
-    """Whether a crack lies on another one at its end, which placing refuses."""
-    return any(
-        _sine(ahead, arms) < 1e-3
-        for other, crack in enumerate(cracks)
-        if other != c and len(arms := _arms(x, crack.points, float(np.abs(x).max(initial=1.0))))
-    )
+def _nearest(x: Floats, line: Floats) -> tuple[Floats, float]:
+    """Point of a polyline that is nearest to x, and its distance."""
+    foot = closest_on_segment(x, line[:-1], line[1:])
+    away = np.linalg.norm(foot - x, axis=1)
+    k = int(np.argmin(away))
+    return foot[k], float(away[k])
 
 
-def _on_line(before: Floats, end: Floats, foot: Floats, cracks: Sequence[Crack], c: int) -> Floats:
-    """Where the last piece of a crack, prolonged, meets the crack that it ends close to."""
-    if np.array_equal(foot, end):
+def _on_line(before: Floats, end: Floats, line: Floats) -> Floats:
+    """Where the last piece of a crack, prolonged, meets the polyline that it ends close to."""
+    foot, distance = _nearest(end, line)
+    if distance == 0:
         return end
-    ahead = np.stack([before, end + (end - before)])
-    hits = [crossing_points(ahead, crack.points) for k, crack in enumerate(cracks) if k != c]
-    every = np.concatenate(hits)
-    away = np.linalg.norm(every - end, axis=1)
+    hits = crossing_points(np.stack([before, end + (end - before)]), line)
+    away = np.linalg.norm(hits - end, axis=1)
     # A crack that comes in at a small angle meets the other one far from the foot of its end.
-    if len(every) and away.min() <= np.linalg.norm(foot - end) / _SINE:
-        return np.asarray(every[int(np.argmin(away))])
+    if len(hits) and away.min() <= distance / _SINE:
+        return np.asarray(hits[int(np.argmin(away))])
     return foot
 
 
@@ -182,20 +188,19 @@ def _junction(c: int, end: int, cracks: tuple[Crack, ...], mesh: Mesh) -> Juncti
 
 
 def _other(c: int, x: Floats, cracks: tuple[Crack, ...], h: float) -> int:
-    """The crack on which x lies between its ends."""
-    at_end = -1
+    """The crack on which x lies between its ends; of several the one with its ends farthest."""
+    inner, on = -1.0, -1
     for other, crack in enumerate(cracks):
-        if other == c:
+        if other == c or _nearest(x, crack.points)[1] > _SAME * h:
             continue
-        foot = closest_on_segment(x, crack.points[:-1], crack.points[1:])
-        if np.linalg.norm(foot - x, axis=1).min() > _SAME * h:
-            continue
-        if np.linalg.norm(crack.points[[0, -1]] - x, axis=1).min() > _SAME * h:
-            return other
-        at_end = other
-    if at_end >= 0:
+        to_ends = float(np.linalg.norm(crack.points[[0, -1]] - x, axis=1).min())
+        if to_ends > inner:
+            inner, on = to_ends, other
+    if inner > _SAME * h:
+        return on
+    if on >= 0:
         raise GeometryError(
-            f"crack {c} ends at {at(x)} on the end of crack {at_end}: give both as one crack; of "
+            f"crack {c} ends at {at(x)} on the end of crack {on}: give both as one crack; of "
             "three arms give two as one crack, and let the third end between its ends."
         )
     raise GeometryError(

@@ -85,7 +85,7 @@ def graded_points(begin, end, tips, u, w):  # type: ignore[no-untyped-def]
 
 @kernel
 def split(ends, cut, level):  # type: ignore[no-untyped-def]
-    """Parts of edges of a mesh: first parts of all, then second ones, then third ones.
+    """Parts of edges of a mesh: first parts of all, then second ones, and so on.
 
     Parameters
     ----------
@@ -93,7 +93,7 @@ def split(ends, cut, level):  # type: ignore[no-untyped-def]
         Points of the edges.
     cut : (c, k) array
         Where each crack cuts the edge, counted from the smaller point number; nan: nowhere. Next
-        to a junction two cracks may cross one edge.
+        to a junction several cracks may cross one edge, three where two end on either side.
     level : (c, k, 2) array
         Level sets of the cracks at the ends.
 
@@ -106,44 +106,36 @@ def split(ends, cut, level):  # type: ignore[no-untyped-def]
         0 where phi changes its sign though no crack cuts.
     """
     cracks, k = cut.shape
-    first, second = np.empty(k), np.empty(k)
-    once, twice = 0, 0
+    at_cut, cuts = np.empty((k, cracks)), np.zeros(k, np.int64)
+    place = np.zeros(cracks + 2, np.int64)  # of the next part, by its rank on its edge
     for e in range(k):
-        first[e] = second[e] = np.nan
         for c in range(cracks):
             t = cut[c, e]
             if np.isnan(t):
                 continue
             if ends[e, 0] >= ends[e, 1]:
                 t = 1 - t
-            if np.isnan(first[e]):
-                first[e] = t
-            elif t > first[e]:
-                second[e] = t
-            else:
-                second[e] = first[e]
-                first[e] = t
-        once += not np.isnan(first[e])
-        twice += not np.isnan(second[e])
-    number = np.empty(k + once + twice, np.int64)
+            i = cuts[e]
+            while i > 0 and at_cut[e, i - 1] >= t:
+                i -= 1
+            if i < cuts[e] and at_cut[e, i] == t:
+                continue
+            for j in range(cuts[e], i, -1):
+                at_cut[e, j] = at_cut[e, j - 1]
+            at_cut[e, i] = t
+            cuts[e] += 1
+        for part in range(cuts[e] + 1):
+            place[part + 1] += 1
+    for part in range(cracks + 1):
+        place[part + 1] += place[part]
+    number = np.empty(place[cracks + 1], np.int64)
     bary, side = np.empty((len(number), 2, 2)), np.empty((len(number), cracks), np.int64)
-    at_second, at_third = k, k + once
     for e in range(k):
-        for part in range(3):
-            row, begin, end = e, 0.0, 1.0
-            if part == 0:
-                end = 1.0 if np.isnan(first[e]) else first[e]
-            elif part == 1:
-                if np.isnan(first[e]):
-                    break
-                row, begin = at_second, first[e]
-                end = 1.0 if np.isnan(second[e]) else second[e]
-                at_second += 1
-            else:
-                if np.isnan(second[e]):
-                    break
-                row, begin = at_third, second[e]
-                at_third += 1
+        for part in range(cuts[e] + 1):
+            row = place[part]
+            place[part] += 1
+            begin = 0.0 if part == 0 else at_cut[e, part - 1]
+            end = 1.0 if part == cuts[e] else at_cut[e, part]
             number[row] = e
             bary[row, 0, 0], bary[row, 0, 1] = 1 - begin, begin
             bary[row, 1, 0], bary[row, 1, 1] = 1 - end, end
