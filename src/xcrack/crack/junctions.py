@@ -12,7 +12,7 @@ import numpy as np
 
 from xcrack.base.arrays import Floats, at
 from xcrack.base.errors import CoarseMeshError, GeometryError
-from xcrack.crack.crack import Crack
+from xcrack.crack.crack import Crack, tip_frames
 from xcrack.crack.lines import crossing_points, polyline_crack
 from xcrack.mesh.locate import cells_at, contains, nearest_boundary
 from xcrack.mesh.mesh import Mesh
@@ -23,6 +23,7 @@ _ON = 0.1  # share of a cell within which an end is meant to lie on another crac
 _SAME = 1e-6  # share of a cell within which the end of a placed crack lies on another one
 _SINE = np.sin(np.radians(10.0))  # of the smallest angle between two cracks that meet
 _BEYOND = 1.6  # cells by which a crack is prolonged beyond the other one, across it
+_BEFORE_TIP = 1.3  # cells before the next tip of both up to which it is
 _LEAST = 1.0  # cells to a third crack beyond it below which nothing can be resolved
 _APART = 1.0  # cells between a junction and a tip, or another junction on the same side
 REACH = 3.2  # cells around a junction in which sides are those of the junction
@@ -174,8 +175,18 @@ def _junction(c: int, end: int, cracks: tuple[Crack, ...], mesh: Mesh) -> Juncti
             "they are not told apart. Of three arms give the two that are nearly in line as one "
             "crack, and let the third end on it."
         )
-    side = _side(x - min(0.1 * h * sine, 0.5 * length) * ahead, line)
-    way = _BEYOND * h / sine
+    step = min(0.1 * h * sine, 0.5 * length) * ahead
+    side = _side(x - step, line)
+    if _side(x + step, line) == side:
+        raise GeometryError(
+            f"crack {c} ends on a kink of crack {on} at {at(x)}, from outside, and would come out "
+            "on the same side again: of three arms give the two that are most nearly in line as "
+            "one crack, and let the third end on it."
+        )
+    # What lies beyond is taken away again, but only within a reach that ends before the next tip.
+    tips = [p for k in (c, on) for p in tip_frames(cracks[k])[0]]
+    to_tip = min((float(np.linalg.norm(p - x)) for p in tips), default=np.inf)
+    way = min(_BEYOND * h / sine, max(to_tip - _BEFORE_TIP * h, _BEYOND * h))
     again = crossing_points(np.stack([x + 1e-3 * h * ahead, x + 2 * way * ahead]), line)
     free = float(np.linalg.norm(again - x, axis=1).min(initial=np.inf)) / 2
     if free < _LEAST * h:

@@ -328,8 +328,12 @@ def function_space(
     cuts: tuple[Cut, ...],
     numerics: Numerics,
     joints: tuple[Joint, ...] = (),
+    jumps: tuple[Bools, ...] | None = None,
 ) -> FunctionSpace:
-    """Number the functions: standard ones first, then Heaviside by crack, then tips."""
+    """Number the functions: standard ones first, then Heaviside by crack, then tips.
+
+    `jumps` says which nodes carry Heaviside functions, by default those of cells that are cut.
+    """
     for c, (crack, cut) in enumerate(zip(cracks, cuts, strict=True)):
         if not len(cut.lip_cell):
             first, last = np.round(crack.points[[0, -1]], 6).tolist()
@@ -341,8 +345,8 @@ def function_space(
     n_nodes = mesh.n_points + (len(mesh.edges) if order == 2 else 0)
     count = n_nodes
     heaviside = []
-    for cut in cuts:
-        flag = heaviside_nodes(mesh, order, cut)
+    for c, cut in enumerate(cuts):
+        flag = heaviside_nodes(mesh, order, cut) if jumps is None else jumps[c]
         number = np.full(n_nodes, -1, dtype=np.int64)
         number[flag] = count + np.arange(int(flag.sum()))
         heaviside.append(lock(number))

@@ -16,6 +16,7 @@ from xcrack.mesh.locate import cells_around
 from xcrack.mesh.mesh import Mesh
 
 _ROOM, _LEAST = 0.7, 0.1  # cells by which nodes of both cracks are within the reach, or must be
+_HALVES = 50  # of a segment, until the place where it is crossed is exact
 _FROM_TIP = 0.5  # cells between the reach and the next tip
 
 
@@ -113,6 +114,31 @@ def _at(mesh: Mesh, values: Floats, cell: Ints, bary: Floats) -> Floats:
     return np.asarray(np.einsum("kvb,kb->kv", bary, values[mesh.cells[cell]]))
 
 
+def _level(mesh: Mesh, cut: Cut, cell: Ints, bary: Floats) -> Floats:
+    """A function that is zero where a crack is cut, along its kinks too, at points `(k, v)`."""
+    v = bary.shape[1]
+    return cut.level(mesh, cell.repeat(v), bary.reshape(-1, bary.shape[2])).reshape(-1, v)
+
+
+def _crossed(
+    mesh: Mesh, cut: Cut, cell: Ints, bary: Floats, share: Floats, begin: Floats
+) -> Floats:
+    """Shares of segments `(k, 2, 3)` at which a cut crosses them: halved where it has a kink.
+
+    `share` is right elsewhere; of `begin`, the level set at the first ends, the sign counts.
+    """
+    bent = np.nonzero(np.isin(cell, cut.kinks.cells))[0]
+    result = np.array(share)
+    low, high = np.zeros(len(bent)), np.ones(len(bent))
+    for _ in range(_HALVES if len(bent) else 0):
+        middle = (low + high) / 2
+        at = _between(bary[bent][:, None], middle)
+        before = begin[bent] * _level(mesh, cut, cell[bent], at)[:, 0] > 0
+        low, high = np.where(before, middle, low), np.where(before, high, middle)
+    result[bent] = (low + high) / 2
+    return result
+
+
 def _between(bary: Floats, share: Floats) -> Floats:
     """Points on segments `(k, 2, 2, 3)` at a share of their way `(k, 2, 3)`."""
     t = share[:, None, None]
@@ -125,14 +151,15 @@ def _clipped(
     """The cut of the crack that ends, without what lies beyond the other, and the cells of both."""
     phi, side = through.level_set.phi, own.side
     cell = ending.lip_cell[:, 0]
-    value = _at(mesh, phi, cell, ending.lip_bary[:, 0]) * side
+    value = _level(mesh, through, cell, ending.lip_bary[:, 0]) * side
     value[np.abs(value) < 1e-13 * mesh.cell_size[cell, None]] = 0.0
     keep = ~near[cell] | (value > 0).any(axis=1)
     shorten = near[cell] & keep & (value < 0).any(axis=1)
     bary = np.array(ending.lip_bary)
     rows = np.nonzero(shorten)[0]
     a, b = value[rows].T
-    bary[rows, :, (b < 0).astype(np.int64)] = _between(bary[rows], a / (a - b))
+    share = _crossed(mesh, through, cell[rows], bary[rows, 0], a / (a - b), a * side)
+    bary[rows, :, (b < 0).astype(np.int64)] = _between(bary[rows], share)
     gone = np.zeros(len(mesh.cells), dtype=bool)
     gone[cell[~keep & (cell == ending.lip_cell[:, 1])]] = True
     cells = ending.cells[~gone[ending.cells]]
@@ -141,7 +168,11 @@ def _clipped(
     subs = ~(gone | both)[ending.sub_to_cell]
     one, two = mesh.edges.T
     t = ending.cut_edge
-    at_cut = ((1 - t) * phi[one] + t * phi[two]) * side
+    # At a kink the other crack cuts an edge elsewhere than where phi is zero.
+    other = through.cut_edge
+    with np.errstate(invalid="ignore"):
+        at_cut = np.where(t < other, phi[one], phi[two])
+    at_cut = np.where(np.isnan(other), (1 - t) * phi[one] + t * phi[two], at_cut) * side
     close = np.linalg.norm(mesh.points[mesh.edges].mean(axis=1) - own.x, axis=1) < own.reach
     with np.errstate(invalid="ignore"):
         cut_edge = np.where(close & (at_cut < 0), np.nan, t)

@@ -12,6 +12,7 @@ from xcrack.fem.cut import cut
 from xcrack.fem.enrichment import front_reach
 from xcrack.fem.facets import LipPoints, jump_matrix, lip_points
 from xcrack.fem.function_space import FunctionSpace, function_space
+from xcrack.fem.joint_nodes import jump_nodes
 from xcrack.fem.joints_2d import Joint, joined_cuts
 from xcrack.fem.level_set import LevelSet, level_set
 from xcrack.fem.supports import Known, known_unknowns
@@ -94,6 +95,9 @@ def discretised(problem: Problem) -> tuple[FunctionSpace, tuple[LipPoints, ...]]
     if junctions:
         cuts, joints = joined_cuts(mesh, cuts, junctions)
     space = function_space(mesh, problem.order or 1, cracks, cuts, numerics, joints)
+    if joints:
+        jumps = jump_nodes(space)
+        space = function_space(mesh, space.order, cracks, cuts, numerics, joints, jumps)
     return space, tuple(lip_points(space, c) for c in range(len(cracks)))
 
 

@@ -1,0 +1,68 @@
+"""Nodes that carry the jump of a crack which ends on another one, by the parts of their cells.
+
+Cells that the crack cuts do not tell: next to its end a node may have parts of its cells on either
+side of it, though it cuts none of them; and a cell that it does cut may lie on one side of it where
+the other crack is cut along a kink. A jump that is missing binds the faces together, and one that
+is too many makes the stiffness singular.
+"""
+
+import numpy as np
+
+from xcrack.base.arrays import Bools
+from xcrack.fem.function_space import FunctionSpace
+from xcrack.fem.quadrature import SubCells, sub_cells
+from xcrack.mesh.locate import cells_around
+
+_BESIDE = 2.0  # cells to the junction within which nodes are added
+_NOTHING = 1e-13  # share of a cell that is round-off
+
+
+def jump_nodes(space: FunctionSpace) -> tuple[Bools, ...]:
+    """Which nodes carry the Heaviside functions of each crack `(nodes,)`.
+
+    Parameters
+    ----------
+    space : FunctionSpace
+        With the nodes of cells that are cut; only those at junctions change.
+
+    Raises
+    ------
+    GeometryError
+        Two cracks run through one cell.
+    """
+    result = [number >= 0 for number in space.heaviside]
+    for joint in space.joints:
+        own, on = space.cuts[joint.crack], space.cuts[joint.on]
+        inner = _nodes_of(space, joint.near)
+        cells = np.nonzero(inner[space.cell_nodes].any(axis=1))[0]
+        subs = sub_cells(space, cells)
+        # Ahead of a tip the level set changes its sign too, but cuts nothing.
+        crossed = own.is_cut[subs.cell] | on.is_cut[subs.cell]
+        size = space.mesh.cell_size[cells_around(space.mesh, joint.centre, 1e-9)].max()
+        away = np.linalg.norm(space.node_points - joint.centre, axis=1)
+        added = _parted(space, subs, joint.crack, crossed) & (away < _BESIDE * size)
+        added &= inner & ~_nodes_of(space, own.is_tip)
+        parted = _parted(space, subs, joint.crack, np.ones(len(crossed), dtype=bool))
+        result[joint.crack] = added | (result[joint.crack] & (parted | ~inner))
+    return tuple(result)
+
+
+def _nodes_of(space: FunctionSpace, cells: Bools) -> Bools:
+    """Nodes of the flagged cells `(nodes,)`."""
+    flag = np.zeros(space.n_nodes, dtype=bool)
+    flag[space.cell_nodes[cells]] = True
+    return flag
+
+
+def _parted(space: FunctionSpace, subs: SubCells, c: int, chosen: Bools) -> Bools:
+    """Nodes with chosen sub-cells on both sides of crack c `(nodes,)`."""
+    result = np.ones(space.n_nodes, dtype=bool)
+    for side in (1, -1):
+        there = chosen & (subs.side[:, c] == side) & (subs.fraction > _NOTHING)
+        flag = np.zeros(space.n_nodes, dtype=bool)
+        flag[space.cell_nodes[subs.cell[there]]] = True
+        result &= flag
+    return result
+
+
+__all__ = ["jump_nodes"]
