@@ -110,14 +110,16 @@ def test_with_tips_in_the_energy_norm(order, enrichment, meshes):
 
 
 def drawn(seed, kind):
-    """A crack anywhere, of order 2: inner, kinked, from an edge, or in a graded mesh."""
+    """A crack anywhere, of order 2: inner, kinked, from an edge, or in a mesh graded to tips."""
     rng = np.random.default_rng(seed)
     n, angle, x = int(rng.integers(10, 22)), rng.uniform(0, np.pi), rng.uniform(-0.2, 0.2, 2)
     ahead, mesh = scenes.rows(angle)[0], scenes.perturbed(n, seed)
     turned = scenes.rows(angle + np.radians(rng.uniform(30, 90)))[0]
     a, b = rng.uniform(0.25, 0.5, 2)
-    if kind == "graded":
-        size, slope, tips = rng.uniform(0.03, 0.07), rng.uniform(0.2, 0.5), (x - a * ahead, x)
+    if kind.startswith("graded"):
+        tips = (x - a * ahead, x if kind == "graded" else x + b * turned)
+        size, slope = rng.uniform(0.03, 0.07), rng.uniform(0.2, 0.5)
+        size = size if kind == "graded" else size / 2
         mesh = xc.refine(
             scenes.perturbed(n // 2, seed),
             size=lambda y: size + slope * np.min([np.hypot(*(y - t).T) for t in tips], axis=0),
@@ -126,13 +128,14 @@ def drawn(seed, kind):
         "inner": [x - a * ahead, x + b * ahead],
         "graded": [x - a * ahead, x],
         "kinked": [x - a * ahead, x, x + b * turned],
+        "graded, kinked": [x - a * ahead, x, x + b * turned],
     }
     line = scenes.edge_line(x, rng.uniform(-0.5, 0.5), 1.8)
     made = line if kind == "edge" else xc.line_crack(crack[kind])
     return xc.Problem(mesh, STEEL, [made], order=2)
 
 
-@pytest.mark.parametrize("kind", ["inner", "kinked", "edge", "graded"])
+@pytest.mark.parametrize("kind", ["inner", "kinked", "edge", "graded", "graded, kinked"])
 @pytest.mark.parametrize(
     "count", [4, pytest.param(60, marks=[pytest.mark.slow, pytest.mark.mission])]
 )

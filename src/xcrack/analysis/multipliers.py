@@ -18,8 +18,13 @@ from xcrack.base.arrays import Bools, Floats, Ints, offsets, ranges
 from xcrack.fem.facets import LipPoints, arc_position
 from xcrack.fem.function_space import FunctionSpace
 
-_SMALL = 0.5  # share of the median below which a function cut off at a junction is none
-_AT_KINKS = 1.5  # knots besides those by groups: inf-sup .43, .38 with 2 (24 drawn short legs)
+# Share of the median below which a group cut off at a junction joins another, and of groups below
+# which faces between kinks join others. Meshes of squares give halves: round-off must not decide.
+_SMALL, _SHORT = 0.55, 0.45
+_SAME = 1e-6  # relative difference of sizes that differ by round-off
+# Knots of a part besides those by groups. The inf-sup constant of 120 drawn cracks of each kind is
+# .33 or more at a junction, at a kink and with a short leg, .25 with two kinks.
+_BESIDES = 1.5
 _PASSES = 5  # in which knots are moved; each looks one knot to either side
 # At order 2 in 2D: knots over groups, and share of the last piece in the last two. The inf-sup
 # constant of 560 drawn cracks is .29 or more with 1.6; it is .23 at 1.75, .18 at 2, and tends to
@@ -77,7 +82,7 @@ def multipliers(
     elif hats is not None and values.shape[1] > 1:
         mass = _sums(values, lips.weight)
         centre = _sums(values, lips.weight * lips.s) / np.maximum(mass, 1e-300)
-        values = _hats(mass, centre, lips.s, *hats)
+        values = _hats(_knots_by_groups(mass, centre, lips.s, hats), lips.s)
     elif kind != "naive":
         values.sum_duplicates()
     measure = _sums(values, lips.weight)
@@ -113,49 +118,56 @@ def _broken(
     hats: tuple[float, float] | None,
     kinked: bool,
 ) -> sp.csr_matrix:
-    """Functions that end where pressures jump: junctions, kinks; what is small joins another."""
-    typical = float(np.median(np.asarray(values.T @ lips.weight).ravel()))
+    """Functions that end where pressures jump: junctions, kinks."""
+    mass = _sums(values, lips.weight)
+    # Share of groups at each point: their sum over a part grows steadily with the part.
+    groups = lips.weight * (values @ (1 / np.maximum(mass, 1e-14 * mass.max())))
     columns = []
-    for rows in _long_enough(parts, lips.weight, _SMALL * typical) if kinked else parts:
-        weight, s = lips.weight[rows], lips.s[rows]
-        own = values[rows].toarray()
-        mass = own.T @ weight
-        own = own[:, mass > 1e-14 * typical]
-        while True:
-            mass = own.T @ weight
-            centre = (own.T @ (weight * s)) / mass
-            order = np.argsort(centre)
-            own, mass, centre = own[:, order], mass[order], centre[order]
-            k = int(np.argmin(mass))
-            if len(mass) == 1 or mass[k] >= _SMALL * typical:
-                break
-            last = len(mass) - 1
-            to = 1 if k == 0 else k - 1 if k == last or mass[k - 1] < mass[k + 1] else k + 1
-            own[:, to] += own[:, k]
-            own = np.delete(own, k, axis=1)
-        part = sp.csr_matrix(own)
-        if hats is not None and kinked:
-            # Faces between kinks are whole cracks to pressures: so many groups long.
-            wanted = max(int(hats[0] * (mass.sum() / typical - 1) + _AT_KINKS), 2)
-            denser = (wanted - 1) / max(len(mass) - 1, 0.5)
-            part = _hats(mass, centre, s, denser + 1e-9, hats[1])
-        elif hats is not None and len(mass) > 1:
-            part = _hats(mass, centre, s, *hats)
+    for rows in _long_enough(parts, groups) if kinked else parts:
+        if hats is None:
+            part = _without_small(values[rows], lips.weight[rows], lips.s[rows], np.median(mass))
+        else:
+            # Faces between kinks and junctions are whole cracks to pressures.
+            count = max(int(hats[0] * (groups[rows].sum() - 1) + _BESIDES), 2)
+            part = _hats(_even_knots(groups[rows], lips.s[rows], count, hats[1]), lips.s[rows])
         place = (np.ones(len(rows)), (rows, np.arange(len(rows))))
         columns.append(sp.csr_matrix(place, shape=(len(lips), len(rows))) @ part)
     return sp.csr_matrix(sp.hstack(columns))
 
 
-def _long_enough(parts: list[Ints], weight: Floats, least: float) -> list[Ints]:
-    """Parts of the crack faces, those shorter than a length joined to the shorter neighbour."""
+def _without_small(
+    values: sp.csr_matrix, weight: Floats, s: Floats, typical: float
+) -> sp.csr_matrix:
+    """Functions on a part of the crack faces; what is small joins the smaller neighbour."""
+    mass = _sums(values, weight)
+    own = values[:, np.nonzero(mass > 1e-14 * typical)[0]].toarray()
+    while True:
+        mass = own.T @ weight
+        order = np.argsort((own.T @ (weight * s)) / mass)
+        own, mass = own[:, order], mass[order]
+        k = _smallest(mass)
+        if len(mass) == 1 or mass[k] >= _SMALL * typical:
+            return sp.csr_matrix(own)
+        beside = [j for j in (k - 1, k + 1) if 0 <= j < len(mass)]
+        own[:, beside[_smallest(mass[beside])]] += own[:, k]
+        own = np.delete(own, k, axis=1)
+
+
+def _smallest(sizes: Floats) -> int:
+    """Number of the smallest one, of those equal but for round-off the first."""
+    return int(np.argmax(sizes <= (1 + _SAME) * sizes.min()))
+
+
+def _long_enough(parts: list[Ints], groups: Floats) -> list[Ints]:
+    """Parts of the crack faces, joined to the shorter neighbour if they hold no group."""
     parts = list(parts)
     while len(parts) > 1:
-        length = [float(weight[rows].sum()) for rows in parts]
-        k = int(np.argmin(length))
-        if length[k] >= least:
+        length = np.array([groups[rows].sum() for rows in parts])
+        k = _smallest(length)
+        if length[k] >= _SHORT:
             break
         beside = [j for j in (k - 1, k + 1) if 0 <= j < len(parts)]
-        first = min(k, beside[int(np.argmin([length[j] for j in beside]))])
+        first = min(k, beside[_smallest(length[beside])])
         parts[first : first + 2] = [np.concatenate(parts[first : first + 2])]
     return parts
 
@@ -340,16 +352,25 @@ def _knots(centre: Floats, ends: tuple[float, float], last: float) -> Floats:
     return knots
 
 
-def _hats(mass: Floats, centre: Floats, s: Floats, denser: float, last: float) -> sp.csr_matrix:
-    """Piecewise linear hats along the crack, with knots spread like the groups' centres.
-
-    They reach the ends of the crack, so that linear pressures are exact.
-    """
+def _knots_by_groups(mass: Floats, centre: Floats, s: Floats, hats: tuple[float, float]) -> Floats:
+    """Knots spread like the groups' centres, that reach the ends of the crack."""
+    denser, last = hats
     knots = np.unique(centre[mass > 1e-14 * mass.max()])
     if denser > 1:
         place = np.linspace(0, len(knots) - 1, max(int(denser * (len(knots) - 1) + 1e-9), 1) + 1)
         knots = np.interp(place, np.arange(len(knots)), knots)
-    knots = _knots(knots, (float(s.min()), float(s.max())), last)
+    return _knots(knots, (float(s.min()), float(s.max())), last)
+
+
+def _even_knots(groups: Floats, s: Floats, count: int, last: float) -> Floats:
+    """Knots on a part of a crack with the same share of groups between each two."""
+    before = np.cumsum(groups) - groups / 2
+    knots = np.interp(np.linspace(0, groups.sum(), count), before, s)
+    return _knots(knots, (float(s.min()), float(s.max())), last)
+
+
+def _hats(knots: Floats, s: Floats) -> sp.csr_matrix:
+    """Piecewise linear hats along the crack: linear pressures are exact."""
     place = np.clip(np.searchsorted(knots, s, side="right") - 1, 0, len(knots) - 2)
     t = (s - knots[place]) / (knots[place + 1] - knots[place])
     both = np.stack([1 - t, t], axis=1).ravel()
