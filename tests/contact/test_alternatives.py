@@ -370,7 +370,7 @@ def test_what_is_refused():
         numerics_of(contact_method=methods.penalty(), linear="iterative")
     with pytest.raises(xc.ProblemError, match="penalty: factor = -1"):
         methods.penalty(-1.0)
-    with pytest.raises(xc.ProblemError, match="contact_method = 'glue': give a ContactMethod"):
+    with pytest.raises(xc.ProblemError, match="contact_method = 'glue': give one of"):
         xc.Numerics(contact_method="glue")
 
 
