@@ -65,6 +65,11 @@ def missing(marker: str) -> str:
 
 
 @pytest.hookimpl(trylast=True)  # after -m has left out what is not asked for: probe only at need
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """`--ratchet` lowers the limits of tests/package/limits.json to what is measured."""
+    parser.addoption("--ratchet", action="store_true", help="lower limits.json to what it is now")
+
+
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         for marker in PROBES:

@@ -214,6 +214,12 @@ def test_a_front_shorter_than_a_cell_is_reported_here_and_in_plan():
     assert short_fronts(line, xc.box((-1, -1), (2, 2), 9)) == []
 
 
+def test_the_same_crack_twice_is_refused_on_any_mesh():
+    line = xc.line_crack([(-0.2, 0.1), (0.2, -0.1)])
+    with pytest.raises(xc.GeometryError, match=r"cracks 0 and 1 both end at .* no mesh can part"):
+        xc.Problem(BOX, xc.Isotropic(E=1.0, nu=0.3, plane="strain"), [line, line])
+
+
 def test_checks_of_both_dimensions_go_by_one_name():
     cube = xc.box((-1, -1, -1), (1, 1, 1), 8)
     pennies = [xc.penny_crack((0, 0, z), (0, 0, 1), 0.5) for z in (0.03, 0.05)]

@@ -477,6 +477,9 @@ def test_fronts_closer_than_a_cell(cube):
     apart = penny_crack((0.55, 0, 0.03), (0, 0, 1), 0.3)
     with pytest.raises(GeometryError, match="closer than a cell"):
         check_surfaces(placed_pair(cube, one, close), cube)
+    tangent = penny_crack((0.2, 0, 0.03), (0, 0, 1), 0.3)
+    with pytest.raises(GeometryError, match="share the point"):
+        check_surfaces(placed_pair(cube, one, tangent), cube)
     check_surfaces(placed_pair(cube, one, apart), cube)
     check_surfaces(placed_pair(cube, one), cube)
 

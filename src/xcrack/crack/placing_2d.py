@@ -287,6 +287,12 @@ def _check_tips(cracks: tuple[Crack, ...], mesh: Mesh) -> None:
                     f"apart, closer than a cell ({size[i]:.4g}): a crack that closes cuts a piece "
                     "out of the body. Refine the mesh between them, or leave a gap of a few cells."
                 )
+            if apart <= _TOUCH * size[i]:
+                raise GeometryError(
+                    f"cracks {owner[i]} and {owner[j]} both end at {at(x[i])}, where no mesh can "
+                    "part them: give a crack that stands there twice only once, or join the cracks "
+                    "to one that runs through that point."
+                )
             raise CoarseMeshError(
                 f"a tip of crack {owner[i]} at {at(x[i])} and one of crack {owner[j]} at "
                 f"{at(x[j])} are {apart:.4g} apart, closer than a "

@@ -479,6 +479,11 @@ def _check_apart(cracks: tuple[Crack, ...], body: Body) -> None:
     if len(close):
         k = close[np.argmin(apart[close])]
         i, j = pairs[k]
+        if apart[k] <= _TOUCH * size[i]:
+            raise GeometryError(
+                f"the fronts of cracks {owner[i]} and {owner[j]} share the point {at(x[i])}, where "
+                "no mesh can part them: leave a few cells between, or join them to one surface."
+            )
         raise CoarseMeshError(
             f"the front of crack {owner[i]} at {at(x[i])} and that of crack "
             f"{owner[j]} at {at(x[j])} are {apart[k]:.4g} apart, closer than a "

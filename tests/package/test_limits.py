@@ -1,0 +1,207 @@
+"""Sizes of the house as ratchets: `limits.json` has what may not grow; `--ratchet` lowers it.
+
+A limit is raised by hand only, with a reason beside it in the file.
+"""
+
+import ast
+import json
+import os
+import re
+import subprocess
+import sys
+import warnings
+from pathlib import Path
+
+import xcrack as xc
+
+ROOT = Path(__file__).resolve().parents[2]
+SOURCE = ROOT / "src" / "xcrack"
+LIMITS = Path(__file__).with_name("limits.json")
+FILES = sorted(SOURCE.rglob("*.py"))
+PACKAGES = sorted({p.relative_to(SOURCE).parts[0] for p in FILES if p.parent != SOURCE})
+# Classes that answer for themselves: outside their package nobody asks which one it is.
+KINDS = {
+    "model": "displacement traction pressure bearing resultant point_force body_force "
+    "crack_pressure initial_stress temperature fix",
+    "fatigue": "paris elber walker piecewise forman hartman_schijve nasgro rate_table "
+    "linear_closure schijve_closure newman_closure klesnil_lukas stepped_threshold el_haddad "
+    "nasgro3_threshold nasgro4_threshold",
+}
+
+
+def product():
+    """Files without the package of proofs, with their trees."""
+    return {
+        p: ast.parse(p.read_text(encoding="utf-8"))
+        for p in FILES
+        if p.relative_to(SOURCE).parts[0] != "verification"
+    }
+
+
+def stored_names(trees):
+    names = set()
+    for tree in trees.values():
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Name | ast.Attribute) and isinstance(node.ctx, ast.Store):
+                names.add(node.id if isinstance(node, ast.Name) else node.attr)
+            elif isinstance(node, ast.arg):
+                names.add(node.arg)
+            elif isinstance(node, ast.FunctionDef | ast.ClassDef):
+                names.add(node.name)
+    return names
+
+
+def one_word_names(trees):
+    return sum(bool(re.fullmatch(r"_*[a-z]{3,}", name)) for name in stored_names(trees))
+
+
+def questions_for_kinds(trees):
+    """isinstance, match and comparisons of type on loads, laws and their parts."""
+    count = 0
+    for path, tree in trees.items():
+        package = path.relative_to(SOURCE).parts[0]
+        kinds = {k for home, names in KINDS.items() if home != package for k in names.split()}
+        for node in ast.walk(tree):
+            asks = isinstance(node, ast.Call) and getattr(node.func, "id", "") == "isinstance"
+            if asks or isinstance(node, ast.MatchClass):
+                names = {n.id for n in ast.walk(node) if isinstance(n, ast.Name)}
+                count += bool(names & kinds)
+    return count
+
+
+def rules_outside_of_declarations(trees):
+    """Calls that check a number where a field or an argument could declare its rule."""
+    count = 0
+    for path, tree in trees.items():
+        inside = path.relative_to(SOURCE)
+        if inside.parts[0] in ("model", "fatigue") or inside.as_posix() == "growth/options.py":
+            for node in ast.walk(tree):
+                name = getattr(node.func, "id", "") if isinstance(node, ast.Call) else ""
+                count += name in ("number", "whole", "one_of", "flag")
+    return count
+
+
+def tables_of_dimension(trees):
+    return sum(
+        isinstance(node, ast.Dict)
+        and {getattr(key, "value", None) for key in node.keys} == {2, 3}
+        for tree in trees.values() for node in ast.walk(tree)
+    )  # fmt: skip
+
+
+def test_files_with_private_imports():
+    """Test files that import more than public names."""
+    private = re.compile(r"^\s*(from|import) xcrack\.(?!testing\b)", re.MULTILINE)
+    return sum(bool(private.search(p.read_text())) for p in (ROOT / "tests").rglob("test_*.py"))
+
+
+test_files_with_private_imports.__test__ = False
+
+
+def measured():
+    """All static numbers of the limits."""
+    trees = product()
+    lines = {p: p.read_text(encoding="utf-8").count("\n") for p in trees}
+    growth = sum(n for p, n in lines.items() if p.relative_to(SOURCE).parts[0] == "growth")
+    return {
+        "packages": len(PACKAGES),
+        "files": len(FILES),
+        "lines without verification": sum(lines.values()),
+        "lines of growth": growth,
+        "one-word names": one_word_names(trees),
+        "questions for kinds": questions_for_kinds(trees),
+        "rules outside of declarations": rules_outside_of_declarations(trees),
+        "tables of dimension": tables_of_dimension(trees),
+        "test files with private imports": test_files_with_private_imports(),
+    }
+
+
+def test_nothing_has_grown(request):
+    check(measured(), "static", request)
+
+
+def check(numbers, part, request):
+    """Numbers against their limits; with --ratchet the limits come down to them."""
+    content = json.loads(LIMITS.read_text())
+    limits = content[part]
+    assert set(numbers) == set(limits)
+    if request.config.getoption("--ratchet"):
+        content[part] = {name: min(limit, numbers[name]) for name, limit in limits.items()}
+        LIMITS.write_text(json.dumps(content, indent=2) + "\n")
+    above = {name: (n, limits[name]) for name, n in numbers.items() if n > limits[name]}
+    assert not above, f"number and limit: {above}"
+
+
+def test_no_package_hides_a_function():
+    assert not set(PACKAGES) & set(xc.__all__)
+
+
+# --- the way of a reader: files and functions that an operation enters ---------------------------
+
+
+def way(operation):
+    """Files and functions of xcrack that a call enters, compiled ones left out."""
+    root, entered = str(SOURCE) + os.sep, set()
+
+    def note(frame, event, _):
+        if event == "call" and frame.f_code.co_filename.startswith(root):
+            entered.add((frame.f_code.co_filename, frame.f_code.co_qualname))
+
+    before = sys.getprofile()
+    sys.setprofile(note)
+    try:
+        result = operation()
+    finally:
+        sys.setprofile(before)
+    return result, {"files": len({file for file, _ in entered}), "functions": len(entered)}
+
+
+def plate():
+    loads = [xc.traction("top", (0.1, 1.0)), xc.traction("bottom", (-0.1, -1.0))]
+    crack = xc.line_crack([(-0.1, 0.013), (0.3, 0.013)])
+    body = xc.box((0, -1), (1, 1), (10, 20))
+    steel = xc.Isotropic(1.0, 0.3, "strain")
+    return xc.Problem(body, steel, [crack], [xc.fix("bottom")], loads)
+
+
+def block():
+    loads = [xc.traction("top", (0.2, 0, 1.0)), xc.traction("bottom", (-0.2, 0, -1.0))]
+    crack = xc.penny_crack(center=(0, 0, 0.04), normal=(0, 0, 1), radius=0.5)
+    body = xc.box((-1, -1, -1), (1, 1, 1), 6)
+    return xc.Problem(body, xc.Isotropic(1.0, 0.3), [crack], [xc.fix("bottom")], loads)
+
+
+def ways():
+    """Of Problem, solve, K and a growth step in 2D and 3D, when all is imported and compiled."""
+    numbers = {}
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        for dim, scene, da in (("2D", plate, 0.1), ("3D", block, 0.2)):
+
+            def steps(problem, da=da):
+                law, cycle = xc.paris(1e-3, 3.0), xc.Cycle(0.0, 1.0)
+                return xc.grow(problem, law, xc.max_hoop_stress, cycle, da=da, progress=False)
+
+            run = steps(scene())
+            next(run), next(run)
+            problem, numbers[f"{dim} Problem"] = way(scene)
+            solution, numbers[f"{dim} solve"] = way(lambda p=problem: xc.solve(p))
+            _, numbers[f"{dim} K"] = way(lambda s=solution: xc.stress_intensity(s))
+            run = steps(problem)
+            next(run)
+            _, numbers[f"{dim} growth step"] = way(lambda r=run: next(r))
+    return {f"{name}: {what}": n for name, both in numbers.items() for what, n in both.items()}
+
+
+def test_no_way_has_grown(request):
+    """In an interpreter of its own: what other tests have left behind changes the ways."""
+    one_thread = {**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+    run = subprocess.run(
+        [sys.executable, __file__], env=one_thread, capture_output=True, text=True, check=False
+    )
+    assert run.returncode == 0, run.stderr
+    check(json.loads(run.stdout.splitlines()[-1]), "ways", request)
+
+
+if __name__ == "__main__":
+    print(json.dumps(ways()))
