@@ -1,5 +1,7 @@
 """Rules around fronts in 3D: volumes, polynomials, stiffness, and boundaries of pieces."""
 
+from itertools import permutations
+
 import numpy as np
 import pytest
 
@@ -266,3 +268,21 @@ def test_points_away_from_a_front(order, count):
     number, _, weight = front_points(space, cells[far], corner[far], whole, fan, 4)
     np.testing.assert_array_equal(np.bincount(number), count)
     np.testing.assert_allclose(np.bincount(number, weight), 1, rtol=1e-14)  # round-off
+
+
+@pytest.mark.parametrize("graded", [False, True])
+@pytest.mark.parametrize("centre", [(0.03, -0.02, 0.04), (0.03, -1.0, 0.04)])
+def test_points_do_not_depend_on_the_order_of_corners(centre, graded):
+    """Integrals over each cell of what no rule has exactly, on a regular mesh; round-off."""
+    base = xc.box((-1, -1, -1), (1, 1, 1), 6)
+    even = np.array([p for p in permutations(range(4)) if np.linalg.det(np.eye(4)[list(p)]) > 0])
+    drawn = even[np.random.default_rng(3).integers(0, len(even), len(base.cells))]
+    every = []
+    for cells in (base.cells, np.take_along_axis(base.cells, drawn, axis=1)):
+        mesh = xc.Mesh(base.points, cells)
+        crack = xc.penny_crack(centre, (0.3, 0.0, 1.0), 0.5)
+        space = build(xc.Problem(mesh, scenes.STEEL, [crack])).space
+        points = cell_points(space, np.arange(len(cells)), 5, 5, graded)
+        x = np.einsum("qb,qbd->qd", points.bary, mesh.points[cells[points.cell]])
+        every.append(np.bincount(points.cell, points.weight * np.sin(9 * x).sum(axis=1)))
+    np.testing.assert_allclose(every[1], every[0], atol=1e-14)

@@ -11,7 +11,13 @@ from functools import cached_property
 import numpy as np
 
 from xcrack.base.arrays import Bools, Floats, Ints, lock
-from xcrack.fem.cut_ends import front_parts, lips_up_to_fronts, lips_up_to_tips, tip_parts
+from xcrack.fem.cut_ends import (
+    corner_places,
+    front_parts,
+    lips_up_to_fronts,
+    lips_up_to_tips,
+    tip_parts,
+)
 from xcrack.fem.kinks_2d import Kinks, no_kinks, sharpened
 from xcrack.fem.level_set import LevelSet
 from xcrack.mesh.locate import barycentric
@@ -117,7 +123,7 @@ def cut(mesh: Mesh, level_set: LevelSet) -> Cut:
     for cells in level_set.tip_cells:
         is_tip[cells] = True
     candidates = np.nonzero(crossed & ~is_tip)[0]
-    lip, owner = interface_simplices(values[candidates])
+    lip, owner = interface_simplices(values[candidates], corner_places(mesh, level_set, candidates))
     psi = np.einsum("svb,sb->s", lip, level_set.inside[mesh.cells[candidates[owner]]])
     sign_change = exists[mesh.cell_to_edge[candidates]]
     close = (level_set.near[mesh.cell_to_edge[candidates]] | ~sign_change).all(axis=1)
@@ -134,7 +140,8 @@ def cut(mesh: Mesh, level_set: LevelSet) -> Cut:
     if len(kinks.cells):
         subs, lips = _kinked_parts(kinks, values, cells)
     else:
-        bary, fraction, side, parent = cut_simplices(values[cells])
+        corners = corner_places(mesh, level_set, cells)
+        bary, fraction, side, parent = cut_simplices(values[cells], corners)
         subs = [(cells[parent], bary, fraction, side)]
         lips = [_both(candidates[owner[through[owner]]], lip[through[owner]])]
     for end_subs, end_lips, entry in _END_PARTS[mesh.dim](mesh, level_set, positions, exists):

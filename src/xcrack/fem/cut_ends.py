@@ -156,6 +156,16 @@ def front_parts(
     return [_front_subs(mesh, level_set, np.nonzero(is_tip)[0], positions)]
 
 
+def corner_places(mesh: Mesh, level_set: LevelSet, cells: Ints) -> Floats:
+    """Corners of cells, the values of the level sets there as further coordinates `(k, d + 1, c)`.
+
+    Distances between them tell corners apart that cells of regular meshes have alike.
+    """
+    nodes = mesh.cells[cells]
+    values = np.stack([level_set.phi, level_set.inside], axis=1)
+    return np.concatenate([mesh.points[nodes], values[nodes]], axis=2)
+
+
 def _front_subs(
     mesh: Mesh, level_set: LevelSet, cells: Ints, positions: Floats
 ) -> tuple[tuple[Ints, Floats, Floats, Ints], tuple[Ints, Floats], Ints]:
@@ -170,18 +180,20 @@ def _front_subs(
     phi = level_set.phi[mesh.cells[cells]]
     crossed = (phi.min(axis=1) < 0) & (phi.max(axis=1) > 0)
     whole, split = np.nonzero(~crossed)[0], np.nonzero(crossed)[0]
-    bary, share, side, parent = cut_simplices(phi[split])
+    corners = corner_places(mesh, level_set, cells)
+    bary, share, side, parent = cut_simplices(phi[split], corners[split])
     largest = np.take_along_axis(phi, np.abs(phi).argmax(axis=1)[:, None], 1)[:, 0]
     owner = np.concatenate([whole, split[parent]])
     bary = np.concatenate([np.broadcast_to(np.eye(4), (len(whole), 4, 4)), bary])
     share = np.concatenate([np.ones(len(whole)), share])
     side = np.concatenate([np.where(largest[whole] >= 0, 1, -1), side])
     for psi in level_set.psi:
-        owner, bary, share, side = _cut_again(psi[mesh.cells[cells]], owner, bary, share, side)
-    lip, row = interface_simplices(phi[split])
+        values = psi[mesh.cells[cells]]
+        owner, bary, share, side = _cut_again(values, corners, owner, bary, share, side)
+    lip, row = interface_simplices(phi[split], corners[split])
     lip_owner = split[row]
     inside = np.einsum("svb,sb->sv", lip, level_set.inside[mesh.cells[cells[lip_owner]]])
-    part, row = behind(inside)
+    part, row = behind(inside, np.einsum("svb,sbd->svd", lip, corners[lip_owner]))
     lips = np.einsum("svw,swb->svb", part, lip[row])
     edges = np.unique(mesh.cell_to_edge[cells])
     t = positions[edges]
@@ -194,13 +206,14 @@ def _front_subs(
 
 
 def _cut_again(
-    psi: Floats, owner: Ints, bary: Floats, share: Floats, side: Ints
+    psi: Floats, corners: Floats, owner: Ints, bary: Floats, share: Floats, side: Ints
 ) -> tuple[Ints, Floats, Floats, Ints]:
-    """Cut sub-cells along psi, given at the corners of their cells `(k, 4)`."""
+    """Cut sub-cells along psi, given as the places at the corners of their cells `(k, 4)`."""
     values = _snapped(np.einsum("svb,sb->sv", bary, psi[owner]), psi[owner])
     cut = (values.min(axis=1) < 0) & (values.max(axis=1) > 0)
     same, rows = np.nonzero(~cut)[0], np.nonzero(cut)[0]
-    inner, part, _, parent = cut_simplices(values[rows])
+    x = np.einsum("svb,sbd->svd", bary[rows], corners[owner[rows]])
+    inner, part, _, parent = cut_simplices(values[rows], x)
     source = rows[parent]
     finer = np.einsum("svw,swb->svb", inner, bary[source])
     every = np.concatenate([same, source])
@@ -217,17 +230,21 @@ def lips_up_to_fronts(
 
     Those behind fronts.
     """
-    part, row = behind(psi)
-    return np.einsum("svb,sbd->svd", part, mesh.points[mesh.facets[facets[row]]]), row
+    x = mesh.points[mesh.facets[facets]]
+    part, row = behind(psi, x)
+    return np.einsum("svb,sbd->svd", part, x[row]), row
 
 
-def behind(psi: Floats) -> tuple[Floats, Ints]:
-    """Parts of triangles on which psi `(k, 3)` is negative: vertices `(s, 3, 3)`, parent `(s,)`."""
+def behind(psi: Floats, x: Floats | None = None) -> tuple[Floats, Ints]:
+    """Parts of triangles x `(k, 3, 3)` on which psi `(k, 3)` is negative, and their triangles.
+
+    Vertices `(s, 3, 3)` in barycentric coordinates, and numbers `(s,)`.
+    """
     values = _snapped(psi, psi)
     cut = (values.min(axis=1) < 0) & (values.max(axis=1) > 0)
     whole = np.nonzero(~cut & (values.min(axis=1) < 0))[0]
     rows = np.nonzero(cut)[0]
-    inner, _, side, parent = cut_simplices(values[rows])
+    inner, _, side, parent = cut_simplices(values[rows], None if x is None else x[rows])
     mine = side < 0
     corner = np.broadcast_to(np.eye(3), (len(whole), 3, 3))
     return np.concatenate([corner, inner[mine]]), np.concatenate([whole, rows[parent[mine]]])

@@ -113,7 +113,8 @@ def _split_triangles(space: FunctionSpace, ends: Ints) -> FacetParts:
         levels += [(psi, at_front) for psi in cut.level_set.psi]
         for values, where in levels:
             chosen = where[facet[number]]
-            number, bary, side = _split(number, bary, side, values[ends], chosen)
+            x = np.einsum("svb,sbd->svd", bary, space.mesh.points[ends[number]])
+            number, bary, side = _split(number, bary, side, x, values[ends], chosen)
         at = np.einsum("svb,sb->sv", bary, cut.level_set.phi[ends[number]])
         largest = np.take_along_axis(at, np.abs(at).argmax(axis=1)[:, None], 1)[:, 0]
         changes = (at.min(axis=1) < 0) & (at.max(axis=1) > 0) & ~touched[facet[number]]
@@ -137,15 +138,15 @@ _POINTS = {2: _on_segments, 3: _on_triangles}
 
 
 def _split(
-    number: Ints, bary: Floats, side: Ints, values: Floats, chosen: Bools
+    number: Ints, bary: Floats, side: Ints, x: Floats, values: Floats, chosen: Bools
 ) -> tuple[Ints, Floats, Ints]:
-    """Split those of the chosen parts on which a function of the facet changes its sign."""
+    """Split those of the chosen parts x on which a function of the facet changes its sign."""
     at = np.einsum("svb,sb->sv", bary, values[number])
     small = _AT * np.abs(values[number]).max(axis=1, keepdims=True)
     at = np.where(np.abs(at) < small, 0.0, at)
     cut = chosen & (at.min(axis=1) < 0) & (at.max(axis=1) > 0)
     same, rows = np.nonzero(~cut)[0], np.nonzero(cut)[0]
-    inner, _, _, parent = cut_simplices(at[rows])
+    inner, _, _, parent = cut_simplices(at[rows], x[rows])
     source = np.concatenate([same, rows[parent]])
     finer = np.einsum("svw,swb->svb", inner, bary[rows[parent]])
     return number[source], np.concatenate([bary[same], finer]), side[source]

@@ -242,12 +242,13 @@ def extended(crack: Crack, mesh: Mesh, width: float) -> Extended:
         edge = max(float(np.median(side)), 0.25 * float(cell.min()))
         layers = int(np.clip(np.ceil(width / edge), 1, 64))
         origin = crack.points[base]
-        new, faces = ruled(n_points, base, origin, width * direction, layers, front.closed)
+        rays = width * direction
+        new, faces = ruled(n_points, base, origin, rays, layers, front.closed, crossed=True)
         points.append(new)
         everything = np.concatenate(points)
         reference = np.zeros((n_points + len(new), 3))
         reference[base] = n
-        reference[n_points:] = np.repeat(n, layers, axis=0)
+        reference[n_points : n_points + len(n) * layers] = np.repeat(n, layers, axis=0)
         expected = reference[faces].sum(axis=1)
         upright = np.einsum("ij,ij->i", face_normals(everything, faces), unit(expected)) > 0.2
         triangles.append(faces[upright])

@@ -206,7 +206,9 @@ def segment_points(
 _AT = 1e-9  # share of a sub-cell's size below which a vertex lies on the front
 _FAR = 0.7  # distance to the front, in sizes of the sub-cell, beyond which a rule of degree 2 does
 _TINY = 0.01  # sub-cells below this share of their cell get fewer points
-_NEAR = 0.5  # triangles closer to the front, in their sizes, are cut in four
+_NEAR = 0.5  # triangles and sub-cells closer to the front, in their sizes, are cut
+_BISECTIONS = 6  # of a sub-cell towards a front at most
+_SAME = 1e-6  # relative difference below which lengths and volumes are equal
 
 
 def radius_at(space: FunctionSpace, nodes: Ints, bary: Floats) -> Floats:
@@ -256,34 +258,127 @@ def front_points(
     weight : (q,) array
         As a share of the cell's volume.
     """
+    x = np.einsum("svb,sbd->svd", bary, space.mesh.points[space.mesh.cells[cell]])
+    r, size = radius_at(space, space.mesh.cells[cell], bary), _longest(x)
+    touching, far = _on_front(bary, r, size)
+    tiny = share < (1 - _SAME) * _TINY
+    coarse = far & (tiny | (r.min(axis=1) > (1 + _SAME) * _FAR * size)) & (space.order == 1)
+    swept = _swept_points(touching, share, n if space.order == 1 else n + 1)
+    plain = [
+        _rule_points(rows, bary[rows], share[rows], simplex_rule(3, degree))
+        for rows, degree in (
+            (np.nonzero(far & ~coarse)[0], 2 * n - 3),
+            (np.nonzero(coarse)[0], max(n - 2, 1)),
+        )
+    ]
+    return _gathered([*swept, *plain])
+
+
+def graded_points(
+    space: FunctionSpace, cell: Ints, bary: Floats, share: Floats, fan: Bools, n: int, degree: int
+) -> tuple[Ints, Floats, Floats]:
+    """Points in sub-cells on which tip functions act, for K.
+
+    Those that do not touch a front are bisected towards it, until none is nearer to it than half
+    of its size: the noise of a domain integral is that of its quadrature.
+
+    Parameters
+    ----------
+    space, cell, bary, share, fan, n
+        As of `front_points`.
+    degree : int
+        Degree of polynomials integrated exactly away from the front.
+
+    Returns
+    -------
+    number, place, weight
+        As of `front_points`.
+    """
     nodes = space.mesh.cells[cell]
-    r = radius_at(space, nodes, bary)
     x = np.einsum("svb,sbd->svd", bary, space.mesh.points[nodes])
+    r, size = radius_at(space, nodes, bary), _longest(x)
+    touching, far = _on_front(bary, r, size)
+    swept = _swept_points(touching, share, n)
+    number = np.nonzero(far)[0]
+    bary, share, x, r, size = (each[number] for each in (bary, share, x, r, size))
+    parts = []
+    for _ in range(_BISECTIONS):
+        near = (r.min(axis=1) < (1 - _SAME) * _NEAR * size) & (share > (1 + _SAME) * _TINY / 8)
+        parts.append((number[~near], bary[~near], share[~near]))
+        if not near.any():
+            break
+        number = np.concatenate([number[near], number[near]])
+        share = np.concatenate([share[near], share[near]]) / 2
+        bary, x = _halves(space, nodes[number[: len(number) // 2]], bary[near], x[near])
+        r, size = radius_at(space, nodes[number], bary), _longest(x)
+    else:
+        parts.append((number, bary, share))
+    rule = simplex_rule(3, degree)
+    return _gathered([*swept, *(_rule_points(*part, rule) for part in parts)])
+
+
+_Parts = tuple[Ints, Floats, Floats]  # sub-cell, vertices or places, share
+
+
+def _longest(x: Floats) -> Floats:
+    """Longest edge of each tetrahedron `(s,)`."""
     i, j = local_edges(3).T
-    size = np.linalg.norm(x[:, i] - x[:, j], axis=2).max(axis=1)
+    return np.asarray(np.linalg.norm(x[:, i] - x[:, j], axis=2).max(axis=1))
+
+
+def _on_front(bary: Floats, r: Floats, size: Floats) -> tuple[list[tuple[Ints, Floats]], Bools]:
+    """Sub-cells with an edge on the front and with a vertex there, those first; and all others."""
     at = r < _AT * size[:, None]
     corner = np.take_along_axis(bary, np.argsort(~at, axis=1, kind="stable")[:, :, None], axis=1)
     touches = at.sum(axis=1)
-    edge, free = touches == 2, touches == 0
-    vertex = ~edge & ~free
-    tiny = share < _TINY
-    coarse = free & (tiny | (r.min(axis=1) > _FAR * size)) & (space.order == 1)
-    along = n if space.order == 1 else n + 1
-    parts = []
-    for chosen, rule in (
-        (edge & ~tiny, _edge_rule(along)),
-        (edge & tiny, _edge_rule(max(along - 1, 2))),
-        (vertex & ~tiny, _vertex_rule(along)),
-        (vertex & tiny, _vertex_rule(max(along - 1, 2))),
-        (free & ~coarse, simplex_rule(3, 2 * n - 3)),
-        (coarse, simplex_rule(3, max(n - 2, 1))),
-    ):
-        rows = np.nonzero(chosen)[0]
-        place = np.einsum("pv,svb->spb", rule[0], corner[rows])
-        weight = share[rows, None] * rule[1]
-        parts.append((np.repeat(rows, len(rule[1])), place.reshape(-1, 4), weight.ravel()))
+    edge, far = touches == 2, touches == 0
+    rows = (np.nonzero(edge)[0], np.nonzero(~edge & ~far)[0])
+    return [(chosen, corner[chosen]) for chosen in rows], far
+
+
+def _swept_points(touching: list[tuple[Ints, Floats]], share: Floats, n: int) -> list[_Parts]:
+    """Points in sub-cells with an edge and with a vertex on the front."""
+    result = []
+    for (rows, corner), rule in zip(touching, (_edge_rule, _vertex_rule), strict=True):
+        tiny = share[rows] < (1 - _SAME) * _TINY
+        for chosen, k in ((~tiny, n), (tiny, max(n - 1, 2))):
+            result.append(_rule_points(rows[chosen], corner[chosen], share[rows[chosen]], rule(k)))
+    return result
+
+
+def _rule_points(
+    number: Ints, corner: Floats, share: Floats, rule: tuple[Floats, Floats]
+) -> _Parts:
+    """Points of a rule in simplices."""
+    place = np.einsum("pv,svb->spb", rule[0], corner)
+    weight = share[:, None] * rule[1]
+    return np.repeat(number, len(rule[1])), place.reshape(-1, corner.shape[2]), weight.ravel()
+
+
+def _gathered(parts: list[_Parts]) -> _Parts:
     a, b, c = (np.concatenate(p) for p in zip(*parts, strict=True))
     return a, b, c
+
+
+def _halves(space: FunctionSpace, nodes: Ints, bary: Floats, x: Floats) -> tuple[Floats, Floats]:
+    """Both halves of sub-cells across the middle of their longest edge: first all of one kind.
+
+    Of equally long edges that counts whose middle is nearest to the front.
+    """
+    i, j = local_edges(3).T
+    length = np.linalg.norm(x[:, i] - x[:, j], axis=2)
+    most = length.max(axis=1, keepdims=True)
+    middle = radius_at(space, nodes, (bary[:, i] + bary[:, j]) / 2) / most
+    longest = length >= (1 - _SAME) * most
+    edge = np.where(longest, np.round(middle, 7), np.inf).argmin(axis=1)
+    a, b, row = i[edge], j[edge], np.arange(len(x))
+    halves = []
+    for values in (bary, x):
+        pair = [values.copy(), values.copy()]
+        for half, vertex in zip(pair, (a, b), strict=True):
+            half[row, vertex] = (values[row, a] + values[row, b]) / 2
+        halves.append(np.concatenate(pair))
+    return halves[0], halves[1]
 
 
 @lru_cache(maxsize=8)
@@ -566,13 +661,15 @@ def _joined(space: FunctionSpace, subs: SubCells) -> SubCells:
     """Sub-cells with the sides of cracks that end on others, split where both cut a cell."""
     for joint in space.joints:
         phi = space.cuts[joint.crack].level_set.phi
-        value = np.einsum("svb,sb->sv", subs.bary, phi[space.mesh.cells[subs.cell]])
+        nodes = space.mesh.cells[subs.cell]
+        value = np.einsum("svb,sb->sv", subs.bary, phi[nodes])
         small = np.abs(value) < _ROUND_OFF * np.abs(value).max(axis=1, keepdims=True)
         value[small] = 0.0
         split = joint.both[subs.cell] & (subs.side[:, joint.on] == joint.side)
         split &= (value.min(axis=1) < 0) & (value.max(axis=1) > 0)
         whole, rows = np.nonzero(~split)[0], np.nonzero(split)[0]
-        inner, share, _, parent = cut_simplices(value[rows])
+        x = np.einsum("svb,sbd->svd", subs.bary[rows], space.mesh.points[nodes[rows]])
+        inner, share, _, parent = cut_simplices(value[rows], x)
         source = np.concatenate([whole, rows[parent]])
         order = np.argsort(source, kind="stable")
         finer = np.einsum("svw,swb->svb", inner, subs.bary[rows[parent]])
@@ -588,7 +685,9 @@ def _joined(space: FunctionSpace, subs: SubCells) -> SubCells:
     return replace(subs, side=at_joints(space, subs.cell, centre, subs.side))
 
 
-def cell_points(space: FunctionSpace, cells: Ints, n: int, degree: int) -> Points:
+def cell_points(
+    space: FunctionSpace, cells: Ints, n: int, degree: int, graded: bool = False
+) -> Points:
     """Integration points of cells, sorted by cell.
 
     Parameters
@@ -599,6 +698,9 @@ def cell_points(space: FunctionSpace, cells: Ints, n: int, degree: int) -> Point
         Points a direction where tip functions act.
     degree : int
         Degree of polynomials integrated exactly elsewhere.
+    graded : bool
+        In 3D: sub-cells on which tip functions act, and which do not touch a front, are bisected
+        towards it and have a rule of that degree too.
     """
     subs = sub_cells(space, cells)
     with_tip = space.has_tip[subs.cell]
@@ -610,13 +712,15 @@ def cell_points(space: FunctionSpace, cells: Ints, n: int, degree: int) -> Point
     rows = with_tip.nonzero()[0]
     if not len(rows):
         return _sorted(space, subs, number, where, share)
-    near, place, part = _NEAR_TIPS[space.dim](
-        space, subs.cell[rows], subs.bary[rows], subs.fraction[rows], subs.fan[rows], n
-    )
+    near = (subs.cell[rows], subs.bary[rows], subs.fraction[rows], subs.fan[rows], n)
+    if graded:
+        sub, place, part = graded_points(space, *near, degree)
+    else:
+        sub, place, part = _NEAR_TIPS[space.dim](space, *near)
     return _sorted(
         space,
         subs,
-        np.concatenate([number, rows[near]]),
+        np.concatenate([number, rows[sub]]),
         np.concatenate([where, place]),
         np.concatenate([share, part]),
     )

@@ -127,6 +127,13 @@ _TETRAHEDRA: dict[int, list[tuple[float, ...]]] = {
         (0.0734930431163619495, *(0.0927352503108912264,) * 3),
         (0.0425460207770814664, *(0.0455037041256496495,) * 2, 0.4544962958743503505),
     ],
+    7: [  # orbits of Witherden and Vincent, 2015, polished to round-off on the moments
+        (0.09548528946413026, *(0.25,) * 3),
+        (0.04232958120996812, *(0.3157011497782027,) * 3),
+        (0.0318969278328577, *(0.44951017740160354,) * 2, 0.05048982259839646),
+        (0.03720713072833442, *(0.18883383102600002,) * 2, 0.04716070036099767),
+        (0.00811077082990316, *(0.02126547254148261,) * 2, 0.1466388138184847),
+    ],
 }
 _RULES = {2: _TRIANGLES, 3: _TETRAHEDRA}
 
@@ -148,7 +155,7 @@ def simplex_rule(dim: int, degree: int) -> tuple[Floats, Floats]:
     """A rule exact for polynomials of the given degree: points `(q, d + 1)`, weights sum to 1.
 
     In 2D up to degree 10 it is symmetric, so that a mirrored mesh gives a mirrored result;
-    in 3D up to degree 5.
+    in 3D up to degree 7.
     """
     if degree <= 1:
         return np.full((1, dim + 1), 1 / (dim + 1)), np.ones(1)

@@ -72,7 +72,13 @@ def loops(faces: Ints) -> list[Ints]:
 
 
 def ruled(
-    n_points: int, base: Ints, origin: Floats, offset: Floats, layers: int, closed: bool
+    n_points: int,
+    base: Ints,
+    origin: Floats,
+    offset: Floats,
+    layers: int,
+    closed: bool,
+    crossed: bool = False,
 ) -> tuple[Floats, Ints]:
     """Strip of triangles on one side of a polyline, spanned by a ray from each of its points.
 
@@ -88,6 +94,9 @@ def ruled(
         Rows of triangles.
     closed : bool
         Whether the last ray is joined with the first.
+    crossed : bool
+        Whether quadrilaterals are divided by both diagonals: one alone would make a twisted strip
+        depend on its direction.
 
     Returns
     -------
@@ -103,11 +112,25 @@ def ruled(
     points = origin[long, None] + share[:, None] * offset[long, None]
     first = grid if closed else grid[:-1]
     second = np.roll(grid, -1, axis=0) if closed else grid[1:]
-    a, b, c, d = first[:, :-1], second[:, :-1], second[:, 1:], first[:, 1:]
-    faces = np.stack([np.stack([a, b, c], axis=-1), np.stack([a, c, d], axis=-1)], axis=2)
-    faces = faces.reshape(-1, 3)
+    corners = [first[:, :-1], second[:, :-1], second[:, 1:], first[:, 1:]]
+    a, b, c, d = (each.ravel() for each in corners)
+    points, middles = points.reshape(-1, 3), np.zeros((0, 3), dtype=np.int64)
+    if crossed:
+        four = (a != b) & (c != d)
+        quads = np.stack([a, b, c, d], axis=1)[four]
+        a, b, c, d = (each[~four] for each in (a, b, c, d))
+        x = np.zeros((n_points + len(points), 3))
+        x[base], x[n_points:] = origin, points
+        middle = n_points + len(points) + np.arange(len(quads))
+        sides = np.stack([quads, np.roll(quads, -1, axis=1)], axis=2)
+        middles = np.concatenate(
+            [sides, np.broadcast_to(middle[:, None, None], (len(quads), 4, 1))], axis=2
+        ).reshape(-1, 3)
+        points = np.concatenate([points, x[quads].mean(axis=1)])
+    faces = np.stack([np.stack([a, b, c], axis=-1), np.stack([a, c, d], axis=-1)], axis=1)
+    faces = np.concatenate([faces.reshape(-1, 3), middles])
     real = (faces != np.roll(faces, 1, axis=1)).all(axis=1)
-    return points.reshape(-1, 3), faces[real]
+    return points, faces[real]
 
 
 def split_sides(points: Floats, faces: Ints, marked: Bools) -> tuple[Floats, Ints]:

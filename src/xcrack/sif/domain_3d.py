@@ -38,7 +38,7 @@ _BENT = 0.9  # largest outer radius, as a share of the radius of curvature of th
 _SPACING = 2.0  # of the hats, in legs: with less K scatters more
 _SMOOTH = 12  # hats; fewer are so far apart that smoothing would cut off what varies
 _LEAST = 1.2  # legs; the radius of the smallest domain
-_POINTS, _DEGREE = 5, 4  # 6 takes twice the time and is as far from 8, which differs by 0.3 %
+_POINTS, _DEGREE = 5, 5  # of the rules around the front and away from it
 _NARROW = 1.5  # legs; a domain clipped below gives a warning
 _DIFFER = 0.05  # difference of two domains, as a share of the largest K, that gives a warning
 _CHUNK = 1000  # cells integrated at once; bounds the memory
@@ -271,7 +271,7 @@ def _domain_parts(
     cells = cells[distance[cells] <= reach]
 
     def part(first: int) -> tuple[Floats, Floats] | None:
-        points = cell_points(space, cells[first : first + _CHUNK], _POINTS, _DEGREE)
+        points = cell_points(space, cells[first : first + _CHUNK], _POINTS, _DEGREE, True)
         x = position(space, points.cell, points.bary)
         near, feet = curve.near(x, outer)
         if not len(near):

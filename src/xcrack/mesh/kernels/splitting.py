@@ -4,6 +4,8 @@ import numpy as np
 
 from xcrack.base.kernels.jit import kernel
 
+_SAME = 1e-9  # relative difference below which values or lengths are equal
+
 
 @kernel
 def _put(bary, to, point, chosen):  # type: ignore[no-untyped-def]
@@ -55,13 +57,58 @@ def _sides(phi, e, order):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def cut_simplices(phi, least):  # type: ignore[no-untyped-def]
+def _across(x, e, i, order, first, last):  # type: ignore[no-untyped-def]
+    """Sum of the distances of vertex i to some vertices."""
+    total = 0.0
+    for m in range(first, last):
+        square = 0.0
+        for a in range(x.shape[2]):
+            square += (x[e, i, a] - x[e, order[m], a]) ** 2
+        total += np.sqrt(square)
+    return total
+
+
+@kernel
+def _sort(phi, x, e, order, count):  # type: ignore[no-untyped-def]
+    """Sort the vertices of both sides: those nearest to the cut first.
+
+    Of equally near ones that which is nearest to the vertices beyond. Values and lengths decide
+    what is split how, not the numbers of the nodes: turned, mirrored or renumbered simplices are
+    split alike.
+    """
+    n = len(order)
+    for first, last in ((0, count), (count, n)):
+        begin, end = count - first, count + n - last  # of the other side
+        for i in range(first + 1, last):  # stable insertion
+            one, j = order[i], i
+            while j > first:
+                other = order[j - 1]
+                near, far = abs(phi[e, one]), abs(phi[e, other])
+                if abs(near - far) > _SAME * max(near, far):
+                    if near > far:
+                        break
+                elif x.shape[0] == 0:
+                    break
+                else:
+                    short = _across(x, e, one, order, begin, end)
+                    long = _across(x, e, other, order, begin, end)
+                    if short > (1.0 - _SAME) * long:
+                        break
+                order[j] = other
+                j -= 1
+            order[j] = one
+
+
+@kernel
+def cut_simplices(phi, x, least):  # type: ignore[no-untyped-def]
     """Sub-simplices of triangles or tetrahedra with vertex values of both signs.
 
     Parameters
     ----------
     phi : (k, n) array
         n = d + 1.
+    x : (k or 0, n, m) array
+        Vertices, whose distances decide how equal values are split.
     least : float
         Share of a simplex up to which a part is left out.
 
@@ -82,16 +129,10 @@ def cut_simplices(phi, least):  # type: ignore[no-untyped-def]
         count = _sides(phi, e, order)
         if count == 0 or count == n:
             continue
+        _sort(phi, x, e, order, count)
         if count == 1 or count == n - 1:
-            # The values decide which diagonal splits what is left, not the numbers of the nodes.
             own, other = (1, 1) if count == 1 else (-1, 0)
             alone = order[(n - 1) * (1 - other)]
-            for i in range(other + 1, other + n - 1):  # stable insertion
-                one, j = order[i], i
-                while j > other and abs(phi[e, order[j - 1]]) > abs(phi[e, one]):
-                    order[j] = order[j - 1]
-                    j -= 1
-                order[j] = one
             total = 1.0
             chosen[0] = alone
             for m in range(n - 1):
@@ -146,12 +187,14 @@ def _degenerate(bary, to):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def interface_simplices(phi):  # type: ignore[no-untyped-def]
+def interface_simplices(phi, x):  # type: ignore[no-untyped-def]
     """Segments or triangles on which a function of both signs vanishes.
 
     Parameters
     ----------
     phi : (k, n) array
+    x : (k or 0, n, m) array
+        As of `cut_simplices`.
 
     Returns
     -------
@@ -173,6 +216,7 @@ def interface_simplices(phi):  # type: ignore[no-untyped-def]
             parent[to] = e
             to += not _degenerate(bary, to)
         elif 0 < count < n:
+            _sort(phi, x, e, order, count)
             for m in range(4):
                 _mix(point, 4 + m, phi, e, order[m // 2], order[2 + (m == 1 or m == 2)])
             for half in range(2):
