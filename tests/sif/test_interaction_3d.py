@@ -19,15 +19,14 @@ from xcrack.crack.front_curve import FrontCurve, front_curve
 from xcrack.model.material import Isotropic
 from xcrack.sif.domain_3d import front_intensity
 from xcrack.sif.interaction_3d import (
+    domain_integrals,
     front_nodes,
-    full_measure,
     hats,
-    inside_body,
-    integrals,
     lip_integrals,
+    means,
+    reading,
     solve_front,
 )
-from xcrack.sif.smoothing_3d import along, smoothed
 
 STEEL = Isotropic(E=1000.0, nu=0.3)
 STRESS = np.array([[0.3, 0.1, 0.7], [0.1, -0.2, -0.4], [0.7, -0.4, 1.1]])
@@ -58,10 +57,14 @@ def moments(curve, knots, K_of):
     return total / size[:, None]
 
 
-def lumped(curve, knots, I, material):
+def even(distance):
+    """Hats so far apart everywhere."""
+    return lambda s: np.full(len(s), distance)
+
+
+def means_of(curve, knots, I, material):
     """K as means over the hats (p, 3)."""
-    every = np.ones(len(knots), dtype=bool)
-    return solve_front(I, knots, curve, material, every, lumped=1.0)[0, 0]
+    return means(I[:, 0], knots, curve, material)[0]
 
 
 def computed_with(curve, knots, displacement, radius, *, curved=True):
@@ -70,18 +73,18 @@ def computed_with(curve, knots, displacement, radius, *, curved=True):
     gradient = gradient_of(displacement, x, 2e-3 * r)[..., None]
     side, behind = np.where(theta > 0, 1, -1), np.abs(theta) > np.pi / 2
     feet = curve.feet(x)
-    total, measure = integrals(
-        curve, knots, feet, weight, gradient, side, behind, STEEL, np.array([radius]), curved=curved
+    radii = np.full((len(knots), 1), radius)
+    total = domain_integrals(
+        curve, knots, feet, weight, gradient, side, behind, STEEL, radii, curved=curved
     )
-    np.testing.assert_allclose(measure, full_measure(curve, knots, [radius]), rtol=1e-5)
-    return lumped(curve, knots, total, STEEL)
+    return means_of(curve, knots, total, STEEL)
 
 
 @pytest.mark.parametrize("radius", [0.02, 0.05, 0.1, 0.2, 0.5, 0.75])
 def test_penny_at_any_radius(radius):
     # What is left is the spline through 64 uneven vertices; 0.6e-5 to 3e-5 measured.
     curve = ellipse_front(1.0, 1.0, 64, seed=7)
-    knots = front_nodes(curve, 0.5)
+    knots = front_nodes(curve, even(0.5))
     result = computed_with(curve, knots, lambda x: exact.penny(x, 1.0, 1000.0, 0.3, STRESS), radius)
     expected = moments(curve, knots, lambda x: penny_exact(x, 1.0, STRESS))
     assert np.abs(result - expected).max() < 1e-4 * np.abs(expected).max()
@@ -92,7 +95,7 @@ def test_penny_without_the_terms_of_curvature(radius, error):
     # The numbers of the prototype: K_I of the formula of a straight front is that much too large.
     tension = np.diag([0.0, 0.0, 1.0])
     curve = ellipse_front(1.0, 1.0, 64)
-    knots = front_nodes(curve, 0.5)
+    knots = front_nodes(curve, even(0.5))
     args = (curve, knots, lambda x: exact.penny(x, 1.0, 1000.0, 0.3, tension), radius)
     K_I = 2 / np.sqrt(np.pi)
     assert np.abs(computed_with(*args)[:, 0] / K_I - 1).max() < 1e-4
@@ -110,7 +113,7 @@ def test_inclined_penny_in_a_turned_frame():
     flat = ellipse_front(1.0, 1.0, 64, seed=3)
     x, frame, _ = flat.at(flat.breaks)
     curve = front_curve(x @ turn.T, frame @ turn.T, True)
-    knots = front_nodes(curve, 0.5)
+    knots = front_nodes(curve, even(0.5))
     result = computed_with(
         curve, knots, lambda y: exact.penny(y @ turn, 1.0, 1000.0, 0.3, S) @ turn.T, 0.3
     )
@@ -122,7 +125,7 @@ def test_inclined_penny_in_a_turned_frame():
 def test_ellipse(radius):
     # The sharpest radius of curvature is 1/4; 160 vertices.
     curve = ellipse_front(1.0, 0.5, 160)
-    knots = front_nodes(curve, curve.length / 16)
+    knots = front_nodes(curve, even(curve.length / 16))
     result = computed_with(
         curve, knots, lambda x: ellipse(x, 1.0, 0.5, 1000.0, 0.3, STRESS), radius
     )
@@ -184,8 +187,9 @@ def test_a_smooth_field_has_no_K_on_a_twisted_front(prestressed):
     # an
     # initial stress that varies. Round-off and the spline; 1e-7 measured, 0.2 without curvature.
     material = Isotropic(E=3.0, nu=0.28)
-    curve, radii = twisted_helix(), np.array([0.3])
-    knots = front_nodes(curve, 0.5)
+    curve = twisted_helix()
+    knots = front_nodes(curve, even(0.5))
+    radii = np.full((len(knots), 1), 0.3)
     x, weight, _, theta = tube(curve, knots, 0.3, n=8)
     lips, normal, area = ruled_lips(curve, knots, 0.3)
     force, total = smooth_force(x, material), material.stress(smooth_gradient(lips))
@@ -201,7 +205,7 @@ def test_a_smooth_field_has_no_K_on_a_twisted_front(prestressed):
     feet, gradient = curve.feet(x), smooth_gradient(x)[..., None]
     args = (curve, knots, feet, weight, gradient, side, behind, material, radii)
     options = {"force": force[..., None], "initial": initial}
-    body = integrals(*args, **options)[0][0, 0, :, 1:-1]
+    body = domain_integrals(*args, **options)[0, 0, :, 1:-1]
     both = np.stack([smooth_gradient(lips)[..., None]] * 2)
     traction = -np.einsum("qij,qj->qi", total, normal)[..., None]
     lip = lip_integrals(
@@ -210,7 +214,7 @@ def test_a_smooth_field_has_no_K_on_a_twisted_front(prestressed):
     )[0, 0, :, 1:-1]  # fmt: skip
     scale = np.abs(lip).max(axis=1)
     assert (np.abs(body + lip).max(axis=1) < 3e-6 * scale).all()
-    straight = integrals(*args, curved=False, **options)[0][0, 0, :, 1:-1]
+    straight = domain_integrals(*args, curved=False, **options)[0, 0, :, 1:-1]
     assert (np.abs(straight + lip).max(axis=1) > 0.05 * scale).all()
 
 
@@ -219,8 +223,9 @@ def test_pressure_on_the_lips_is_superposed():
     # faces.
     p = 1.7
     S = np.diag([0.0, 0.0, p])
-    curve, radii = ellipse_front(1.0, 1.0, 64), np.array([0.35])
-    knots = front_nodes(curve, 0.7)
+    curve = ellipse_front(1.0, 1.0, 64)
+    knots = front_nodes(curve, even(0.7))
+    radii = np.full((len(knots), 1), 0.35)
 
     def pressed(x):
         return exact.penny(x, 1.0, 1000.0, 0.3, S) - exact.uniform_stress3(x, S, 1000.0, 0.3)[0]
@@ -228,102 +233,66 @@ def test_pressure_on_the_lips_is_superposed():
     x, weight, r, theta = tube(curve, knots, 0.35)
     gradient = gradient_of(pressed, x, 2e-3 * r)[..., None]
     side, behind = np.where(theta > 0, 1, -1), np.abs(theta) > np.pi / 2
-    body, _ = integrals(curve, knots, curve.feet(x), weight, gradient, side, behind, STEEL, radii)
+    body = domain_integrals(
+        curve, knots, curve.feet(x), weight, gradient, side, behind, STEEL, radii
+    )
     lips, normal, area = ruled_lips(curve, knots, 0.35)
     lip = lip_integrals(
         curve, knots, curve.feet(lips), normal, area, p * normal[..., None], STEEL, radii
     )
     expected = penny_exact(x[:1], 1.0, S)[0]
-    result = lumped(curve, knots, body + lip, STEEL)
+    result = means_of(curve, knots, body + lip, STEEL)
     assert np.abs(result - expected).max() < 1e-4 * expected[0]
-    assert np.abs(lumped(curve, knots, body, STEEL)[:, 0] / expected[0] - 1).min() > 0.05
+    assert np.abs(means_of(curve, knots, body, STEEL)[:, 0] / expected[0] - 1).min() > 0.05
 
 
-def test_mean_of_lumped_and_consistent_mass_is_of_order_four():
-    # K(s) = cos(2 pi s / L): its moments are known, the error of the solve is that of the mass.
-    curve = ellipse_front(1.0, 1.0, 200)
-    error = {}
-    for share in (0.0, 0.5, 1.0):
-        for count in (12, 24):
-            knots = front_nodes(curve, curve.length / count)
-            x = curve.at(knots)[0]
-            means = moments(curve, knots, lambda x: x)
-            size = curve.length / count
-            factor = [STEEL.E_prime / 2, STEEL.E_prime / 2, STEEL.mu]
-            I = (means / factor).T[None, None] * size
-            every = np.ones(count, dtype=bool)
-            K = solve_front(I, knots, curve, STEEL, every, lumped=share)[0, 0]
-            error[share, count] = np.abs(K - x).max()
-    assert error[0.5, 12] < 0.1 * min(error[0.0, 12], error[1.0, 12])
-    assert error[0.5, 24] < error[0.5, 12] / 12
-    assert error[0.0, 24] > error[0.0, 12] / 5
+def test_the_spline_of_K_is_of_order_four():
+    # K(s) = cos(2 pi s / L): its means over the hats are known, the error is that of the spline.
+    curve, error = ellipse_front(1.0, 1.0, 200), {}
+    for count in (12, 24):
+        knots = front_nodes(curve, even(curve.length / count))
+        factor = [STEEL.E_prime / 2, STEEL.E_prime / 2, STEEL.mu]
+        I = (moments(curve, knots, lambda x: x) / factor).T[None, None] * curve.length / count
+        K = solve_front(I, knots, curve, STEEL, np.ones(count, dtype=bool))[0, 0]
+        error[count] = np.abs(K - curve.at(knots)[0]).max()
+    assert error[12] < 2e-3
+    assert error[24] < error[12] / 12
 
 
-@pytest.mark.parametrize("closed", [True, False])
-def test_smoothing_keeps_quadratics_and_damps_scatter(closed):
-    s = 0.15 * np.arange(20)
-    K = np.stack([1 + s, s * s - 0.3, 2 - s + 3 * s * s], axis=1)
-    if closed:
-        np.testing.assert_allclose(smoothed(0 * K + 2.5, s, 3.0), 2.5, rtol=1e-12)
-    else:
-        np.testing.assert_allclose(smoothed(K, s, None), K, atol=1e-11)
-        two = np.concatenate([s, s + 10])  # nothing is carried across a gap
-        both = np.concatenate([K, 7 * K])
-        np.testing.assert_allclose(smoothed(both, two, None), both, atol=1e-11)
-    scatter = np.random.default_rng(71).normal(size=(200, 3))
-    period = 3.0 if closed else None
-    assert smoothed(scatter, np.linspace(0, 3, 200), period).std() < 0.8 * scatter.std()
-
-
-def test_smoothing_turns_no_wave_over():
-    """Waves of n places by 1/(1 + 0.05 (2 sin(pi/n))^6): a zigzag falls to a quarter."""
-    n, s = 60, np.arange(60.0)
-    for waves in (1, 6, 10, 20, 30):
-        wave = np.cos(2 * np.pi * waves * s / n)
-        K = np.repeat(wave[:, None], 3, axis=1)
-        share = 1 / (1 + 0.05 * (2 * np.sin(np.pi * waves / n)) ** 6)
-        np.testing.assert_allclose(smoothed(K, s, 60.0)[:, 0], share * wave, atol=1e-12)
-        assert (smoothed(K, s, None)[:, 0] @ wave) > 0
+def test_hats_are_as_close_as_the_spacing_says():
+    curve = flat_front(
+        np.array([[0.0, 2, 0], [0, -2, 0]]), np.array([[1.0, 0, 0], [1, 0, 0]]), False
+    )
+    knots = front_nodes(curve, lambda s: 0.1 + 0.1 * s, (0.5, 3.5))
+    width = np.diff(knots)
+    assert knots[0] == 0.5
+    assert knots[-1] == 3.5
+    np.testing.assert_allclose(width, 0.1 + 0.1 * (knots[1:] + knots[:-1]) / 2, rtol=0.05)
+    hat, share, step = hats(curve, knots, np.linspace(0, 4, 401))
+    assert ((share >= 0) & (share <= 1)).all()
+    assert (np.diff(hat, axis=1) == 1).all()
+    first, last = np.linspace(0, 4, 401) <= 0.5, np.linspace(0, 4, 401) >= 3.5
+    assert not share[first].any()  # beyond the ends the last hat goes on
+    assert (share[last] == 1).all()
+    assert not step[first | last].any()
 
 
 def test_values_along_the_front():
     curve = ellipse_front(1.0, 1.0, 64)
-    knots = front_nodes(curve, curve.length / 24)
+    knots = front_nodes(curve, even(curve.length / 24))
     s = np.linspace(0, curve.length, 57)
-    every = np.ones(24, dtype=bool)
-    np.testing.assert_allclose(
-        along(curve.at(knots)[0], knots, every, curve, s), curve.at(s)[0], atol=3e-5
-    )
-    # A straight line stays one, up to the hats that are left out on either side.
+    matrix = reading(knots, np.ones(24, dtype=bool), curve, s)
+    np.testing.assert_allclose(matrix @ curve.at(knots)[0], curve.at(s)[0], atol=3e-5)
+    # A straight line stays one, up to the hats that are left out on either side; constant beyond.
     straight = flat_front(
         np.array([[0.0, 2, 0], [0, -2, 0]]), np.array([[1.0, 0, 0], [1, 0, 0]]), False
     )
-    knots = front_nodes(straight, 0.25)
+    knots = front_nodes(straight, even(0.25))
     valid = np.ones(len(knots), dtype=bool)
     valid[[0, -1]] = False
-    K = np.stack([knots, 1 + 2 * knots, 0 * knots], axis=1)
     at = np.linspace(0, 4, 31)
-    result = along(K, knots, valid, straight, at)
-    np.testing.assert_allclose(result[:, 1], 1 + 2 * at, atol=1e-12)
-
-
-def test_hats_outside_the_body_are_recognised_by_their_volume():
-    # A straight front that leaves the body at s = 3.
-    curve = flat_front(
-        np.array([[0.0, 2, 0], [0, -2, 0]]), np.array([[1.0, 0, 0], [1, 0, 0]]), False
-    )
-    knots = front_nodes(curve, 0.4)
-    radii = np.array([0.3])
-    x, weight, _, theta = tube(curve, knots, 0.3)
-    retained = curve.feet(x).s < 3.0
-    feet = curve.feet(x[retained])
-    nothing = np.zeros((int(retained.sum()), 3, 3, 1))
-    side, behind = np.where(theta > 0, 1, -1)[retained], (np.abs(theta) > 2)[retained]
-    _, measure = integrals(
-        curve, knots, feet, weight[retained], nothing, side, behind, STEEL, radii
-    )
-    valid = inside_body(measure, full_measure(curve, knots, radii))
-    np.testing.assert_array_equal(valid, knots + 0.4 <= 3.0 + 1e-9)
+    result = reading(knots, valid, straight, at) @ (1 + 2 * knots[valid])
+    np.testing.assert_allclose(result, 1 + 2 * np.clip(at, 0.25, 3.75), atol=1e-12)
 
 
 def test_penny_by_the_finite_element_solution():

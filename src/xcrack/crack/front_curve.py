@@ -6,11 +6,12 @@ from functools import cached_property
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from xcrack.base.arrays import Bools, Floats, Ints, lock
+from xcrack.base.arrays import Floats, Ints, lock
 from xcrack.base.errors import GeometryError
 
 # Points among which the first guess of a foot is looked for: in all, and at least on a piece.
 _SAMPLES, _LEAST = 400, 3
+_STRAIGHT = 1e-9  # turn of a front over its whole length that is round-off
 _GAUSS = np.polynomial.legendre.leggauss(6)
 
 
@@ -28,15 +29,12 @@ class Feet:
         Rows (t, n, b) at the foot.
     turn : (q, 4) array
         Curvatures kt = b'.t and kn = b'.n, twist t'.n, and the speed of the parameter.
-    beyond : (q,) array of bool
-        Past the end of an open front: no foot.
     """
 
     s: Floats
     local: Floats
     frame: Floats
     turn: Floats
-    beyond: Bools
 
     @property
     def r(self) -> Floats:
@@ -54,7 +52,7 @@ class FrontCurve:
     """Cubic splines of the points and normals of a front, periodic where it is closed.
 
     The parameter s is close to the arc length from the first vertex: it is the arc length at the
-    vertices, and the speed in between is known and used.
+    vertices, and the speed in between is known and used. Beyond its ends a front is straight.
 
     Attributes
     ----------
@@ -89,7 +87,7 @@ class FrontCurve:
         Parameters
         ----------
         s : (q,) array, length
-            Parameters; on a closed front any number of turns.
+            Parameters; on a closed front any number of turns, on an open one beyond its ends.
 
         Returns
         -------
@@ -102,7 +100,7 @@ class FrontCurve:
         from xcrack.crack.kernels.front import frames_at
 
         u = np.ascontiguousarray(s, dtype=float)
-        u = np.mod(u, self.length) if self.closed else np.clip(u, 0.0, self.length)
+        u = np.mod(u, self.length) if self.closed else u
         return frames_at(u, self.breaks, self.place, self.normal)
 
     def feet(self, x: Floats) -> Feet:
@@ -155,31 +153,26 @@ class FrontCurve:
         # Read-only as everywhere: a kernel is compiled once more for arrays that are not.
         return np.asarray(nearest_vertices(lock(x.view()), self._guesses[1], bound)[1])
 
-    def sharpest(self, first: float = -np.inf, last: float = np.inf, over: float = 0.0) -> float:
-        """Smallest radius of curvature among the samples; inf for a straight front.
+    def bend(self, s: Floats, over: float) -> Floats:
+        """Radius of curvature, averaged over a length: a much shorter bend counts for little.
 
         Parameters
         ----------
-        first, last : float, length
-            Parameters between which samples count.
+        s : (q,) array, length
         over : float, length
-            Length over which a bend is averaged: a spot that is much shorter counts for little.
+
+        Returns
+        -------
+        (q,) array, length
+            inf where a front is straight.
         """
-        s = self._guesses[0]
-        between = s[(s >= first) & (s <= last)]
-        if not len(between):
-            return np.inf
-        if over > 0:
-            low, high = between - over / 2, between + over / 2
-            if not self.closed:
-                low, high = np.maximum(low, 0.0), np.minimum(high, self.length)
-            ahead, behind = self.at(high)[1][:, 2], self.at(low)[1][:, 2]
-            angle = np.arccos(np.clip(np.einsum("qd,qd->q", ahead, behind), -1, 1))
-            largest = float((angle / (high - low)).max())
-        else:
-            turn = self.at(between)[2]
-            largest = float(np.hypot(turn[:, 0], turn[:, 1]).max())
-        return 1 / largest if largest > 1e-9 / self.length else np.inf
+        low, high = np.asarray(s) - over / 2, np.asarray(s) + over / 2
+        if not self.closed:
+            low, high = np.clip(low, 0.0, self.length), np.clip(high, 0.0, self.length)
+        ahead, behind = self.at(high)[1][:, 2], self.at(low)[1][:, 2]
+        angle = 2 * np.arcsin(np.minimum(np.linalg.norm(ahead - behind, axis=1) / 2, 1.0))
+        straight = angle * self.length <= _STRAIGHT * (high - low)
+        return np.where(straight, np.inf, (high - low) / np.where(straight, 1.0, angle))
 
     def arc(self, s: Floats) -> Floats:
         """Arc length from the first vertex `(q,)` at parameters within the breaks."""

@@ -113,6 +113,9 @@ class Numerics(Declared):
         Outer radius of the first domain of the interaction integral. None: in 2D 2.5 times
         the enriched radius or 4 cells, in 3D 1.05 times it or 2.6 cells, whichever is more, as
         far as body, other tips and the bend of a front allow.
+    depth : float, length, optional
+        In 3D: distance along a front from a free surface at which K is read that has no limit
+        there. None: 2 % of the front's length.
     linear : {"auto", "direct", "iterative"}
         Linear solver. Auto: a factorisation in 2D and below 4 000 unknowns (8 000 at order
         2), above that in 3D conjugate gradients with a multigrid hierarchy: a factor of a 3D body
@@ -150,6 +153,7 @@ class Numerics(Declared):
     patch: Annotated[bool, Flag()] = False
     points: Annotated[int, Whole(least=2, most=32)] = 4
     domain: Annotated[float | None, Number(above=0, unit=LENGTH)] = None
+    depth: Annotated[float | None, Number(above=0, unit=LENGTH)] = None
     linear: Annotated[str, Choice(("auto", "direct", "iterative"))] = "auto"
     initial_set: Annotated[str, Choice(("closed", "open"))] = "closed"
     substeps: Annotated[int, Whole(least=1, most=10_000)] = 10

@@ -1,6 +1,6 @@
 """What K at the tips of 2D and along the fronts of 3D share."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -34,12 +34,6 @@ def weight(r: Floats, xi: Floats, inner: Floats, outer: Floats) -> tuple[Floats,
     q = 1 - z**3 * (10 - 15 * z + 6 * z**2)
     slope = -30 * z**2 * (1 - z) ** 2 / width
     return q, slope[..., None] * (xi / np.maximum(r, 1e-300)[:, None])[None]
-
-
-def weight_integral(inner: Floats, outer: Floats) -> Floats:
-    """Integral of the weight q over a section of the tube around a front `(k,)`, length²."""
-    width = outer - inner
-    return np.asarray(2 * np.pi * (inner**2 / 2 + width * (inner / 2 + width / 7)))
 
 
 def mean_rotation(solution: Solution, distance: Floats, radius: float) -> Floats:
@@ -102,6 +96,13 @@ def lip_shear(solution: Solution, c: int) -> Floats | None:
     if contact.shear.ndim == 1:
         return np.asarray(contact.shear[:, None] * contact.tangent)
     return np.einsum("qm,qmd->qd", contact.shear, contact.tangent)
+
+
+def initial_stresses(solutions: Sequence[Solution]) -> Callable[[Floats], Floats] | None:
+    """Initial stresses of all states, f(x) -> (q, 3, 3, n); None where there are none."""
+    if not acts(solutions, "initial_stress"):
+        return None
+    return lambda x: np.stack([solution.initial_stress(x) for solution in solutions], axis=-1)
 
 
 def acts(solutions: Sequence[Solution], *effects: str) -> bool:

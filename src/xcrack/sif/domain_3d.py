@@ -1,106 +1,223 @@
-"""K along the fronts of a solution in 3D: radii, points, loads, and values at the vertices."""
+"""K along the fronts of a solution in 3D: hats, domains, loads, and values at the vertices."""
 
-from collections.abc import Iterator, Sequence
-from dataclasses import replace
-from functools import partial
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from xcrack.analysis.solution import Solution, gradients_at
-from xcrack.base.arrays import Bools, Floats, Ints
+from xcrack.base.arrays import Bools, Floats, Ints, at, lock
 from xcrack.base.errors import warn
 from xcrack.base.threads import streamed
 from xcrack.crack.front_curve import Feet, FrontCurve, front_curve
 from xcrack.fem.loads import position
 from xcrack.fem.quadrature import cell_points, cell_side
-from xcrack.mesh.locate import Body, contains
+from xcrack.mesh.locate import contains
+from xcrack.mesh.mesh import Mesh
 from xcrack.mesh.simplex import leg_size
 from xcrack.sif.accuracy import Domain, check
-from xcrack.sif.common import acts, lip_pressure, lip_shear, mean_rotation, with_closed
-from xcrack.sif.interaction_3d import (
-    front_nodes,
-    full_measure,
-    inside_body,
-    integrals,
-    lip_integrals,
-    solve_front,
+from xcrack.sif.common import (
+    acts,
+    initial_stresses,
+    lip_pressure,
+    lip_shear,
+    mean_rotation,
+    with_closed,
 )
-from xcrack.sif.sif import SIF
-from xcrack.sif.smoothing_3d import along, smoothed
+from xcrack.sif.interaction_3d import (
+    domain_integrals,
+    front_nodes,
+    lip_integrals,
+    means,
+    reading,
+    solve_front,
+    twice_as_wide,
+)
+from xcrack.sif.sides_3d import (
+    integrals_of_sides,
+    on_smooth_planes,
+    room_beside,
+    sides_around,
+)
+from xcrack.sif.sif import SIF, SurfaceEnd
 
 SECOND = 0.7  # outer radius of the second domain, as a share of the first
-_OUTER = 2.6  # least outer radius, in legs of the cells at the front
+_OUTER = 2.6  # wanted outer radius, in legs of the cells at the front
 # Outer radius in radii of the enriched tube: the error sits in the cells at its rim, and a domain
 # that reaches beyond them makes K of a penny 1 % too low.
 _REACH = 1.05
 _BENT = 0.9  # largest outer radius, as a share of the radius of curvature of the front
-_SPACING = 2.0  # of the hats, in legs: with less K scatters more
-_SMOOTH = 12  # hats; fewer are so far apart that smoothing would cut off what varies
-_LEAST = 1.2  # legs; the radius of the smallest domain
+_LEAST = 0.8  # legs; the radius of the smallest domain
+# Of the tops of the hats, in legs: most, where the front bends, and at its ends, from where it
+# grows by this share of the distance.
+_SPACING, _CLOSEST, _FIRST, _GROWTH = 2.0, 0.7, 1.0, 0.3
 _POINTS, _DEGREE = 5, 5  # of the rules around the front and away from it
 _NARROW = 1.5  # legs; a domain clipped below gives a warning
 _DIFFER = 0.05  # difference of two domains, as a share of the largest K, that gives a warning
+_DEPTH = 0.02  # of a front, where K is read that has no limit at a free surface
 _CHUNK = 1000  # cells integrated at once; bounds the memory
 _SAMPLES = 400  # points of an open front among which its way into the body is looked for
+_ON = 1e-6  # of a side of a front, by which its end may miss the boundary
+_IN_HAT = 9  # points on either side of a hat at which the room for its domain is looked at
 
 
-def tube_of(solution: Solution, t: int, curve: FrontCurve, ends: tuple[float, float]) -> Domain:
-    """Radius of the tube around a front, and the room for it.
+@dataclass(frozen=True, eq=False)
+class FrontValues:
+    """K at the tops of the hats of one front.
+
+    Attributes
+    ----------
+    knots : (p,) array, length
+        Parameters of the tops.
+    K : (n, 2, p, 3) array, stress · √length
+        Of n states and two domains; nan where nothing is known.
+    mean : (n, p, 3) array, stress · √length
+        Means over the hats, of the first domains.
+    valid : (p,) array of bool
+        Hats whose integrals are known.
+    wide : (n, 2, p, 3) array, stress · √length
+        K there, with hats twice as wide.
+    smooth : (p,) array of bool
+        Hats at smooth planes perpendicular to the front.
+    radius : (p,) array, length
+        Outer radius of the domain of each hat.
+    domain : Domain
+        What is expected of the smallest of them.
+    """
+
+    knots: Floats
+    K: Floats
+    mean: Floats
+    valid: Bools
+    wide: Floats
+    smooth: Bools
+    radius: Floats
+    domain: Domain
+
+
+def front_intensity(solutions: Sequence[Solution], t: int) -> list[SIF]:
+    """K at the vertices of one front in the body, for several load states of one solve.
 
     Parameters
     ----------
-    solution : Solution
+    solutions : sequence of Solution
+        States of one problem, which share their space.
     t : int
-        Number of the front in `solution.space.tips`.
-    curve : FrontCurve
-        Of that front.
-    ends : tuple of float, length
-        Where an open front enters and leaves the body.
+        Number of the front in `space.tips`.
+
+    Returns
+    -------
+    list of SIF
+        Zero, with a warning, where K of no part of the front is known.
     """
-    space = solution.space
+    space = solutions[0].space
     tip = space.tips[t]
-    cells = space.cuts[tip.crack].level_set.tip_cells[tip.number]
-    size = leg_size(space.mesh, cells)
-    wanted = solution.problem.numerics.domain
-    if wanted is None:
-        wanted = max(_OUTER * size, _REACH * tip.radius)
-    s = np.linspace(*ends, max(8, round((ends[1] - ends[0]) / (2 * size))) + 1)
-    x = curve.at(s)[0]
-    # Near its exits a front is close to the boundary; that is dealt with by leaving out hats, and
-    # neither that nor a bend there must narrow the whole tube.
-    inner = np.ones(len(s), dtype=bool)
-    ahead = 0.0 if curve.closed else min(wanted, 0.4 * (ends[1] - ends[0]))
-    if not curve.closed:
-        inner = np.minimum(s - ends[0], ends[1] - s) >= ahead
-    room = _BENT * _bends(curve, s, (ends[0] + ahead, ends[1] - ahead), 2 * size)
-    depth = np.abs(Body.of(space.mesh).depth(x[inner])[0])
-    room[inner] = np.minimum(room[inner], 0.95 * depth)
-    for other in space.tips:
-        if other is not tip:
-            room = np.minimum(room, 0.8 * cKDTree(other.x).query(x)[0])
-    for c, lips in enumerate(solution.lips):
-        if c != tip.crack and len(lips):
-            room = np.minimum(room, 0.9 * cKDTree(lips.x).query(x)[0])
-    least = float(room.min())
-    return Domain(
-        outer=min(wanted, max(least, _LEAST * size)),
-        wanted=wanted,
-        room=least,
-        least=_NARROW * size,
-        short=False,
-        size=size,
-        narrowest=x[int(room.argmin())],
-        differ=_DIFFER,
-        label="K along the front, at",
+    number = space.cracks[tip.crack].fronts or ()
+    closed = bool(number[tip.number][0] == number[tip.number][-1])
+    whole = front_curve(tip.x, tip.frame, closed)
+    inside = np.nonzero(contains(space.mesh, np.array(tip.x)))[0]
+    first, last = (0, len(tip.x)) if closed else _part_inside(space.mesh, tip.x, inside)
+    curve = front_curve(tip.x[first:last], tip.frame[first:last], closed)
+    s = curve.breaks[inside - first]
+    x, frame, _ = curve.at(s)
+    ends = way_inside(solutions[0], curve)
+    nothing = np.zeros(len(s))
+    empty = SIF(
+        x=np.array(tip.x)[inside],
+        frame=frame,
+        K=np.zeros((len(s), 3)),
+        T=nothing + np.nan,
+        spread=np.zeros((len(s), 3)),
+        s=whole.arc(whole.breaks[inside]),
+        front=np.zeros(len(s), dtype=np.int64),
+        at_surface=np.ones(len(s), dtype=bool),
+        closed=np.zeros(len(s), dtype=bool),
+        domain_cells=nothing,
+        widened=np.zeros((len(s), 3)),
     )
+    if ends is None or not len(s):
+        return [empty] * len(solutions)
+    values = front_values(solutions, t, curve, ends)
+    if not values.valid.any():
+        _warn_held(x, values)
+        return [empty] * len(solutions)
+    depth = _depth(solutions[0], curve, ends)
+    free = _free_ends(curve, values)
+    read = np.clip(
+        s, ends[0] + depth if free[0] else -np.inf, ends[1] - depth if free[1] else np.inf
+    )
+    everywhere = np.append(read, (ends[0] + depth, ends[1] - depth))
+    matrix = reading(values.knots, values.valid, curve, everywhere)
+    K = np.einsum("sv,nkvm->nksm", matrix, values.K[:, :, values.valid])
+    wide = np.einsum("sv,nvm->nsm", matrix, values.wide[:, 0][:, values.valid])
+    period = curve.length if closed else None
+    cells = np.interp(s, values.knots, values.radius, period=period) / values.domain.size
+    at_surface = (read != s) | ~_covered(curve, values.knots, values.valid, s)
+    result = []
+    for n, solution in enumerate(solutions):
+        rows = K[n, :, : len(s)]
+        sif = replace(
+            empty,
+            K=rows[0],
+            spread=np.abs(rows[0] - rows[1]),
+            widened=np.abs(rows[0] - wide[n, : len(s)]),
+            at_surface=at_surface,
+            domain_cells=cells,
+        )
+        sif = with_closed(sif, solution, tip.crack, values.domain.size)
+        known = tuple(
+            _surface_end(curve, ends[e], K[n, 0, len(s) + e], values, n, -e, depth, sif)
+            for e in (0, 1)
+            if free[e]
+        )
+        result.append(replace(sif, ends=known))
+    check(solutions, t, values.domain, result)
+    return result
 
 
-def _bends(curve: FrontCurve, s: Floats, between: tuple[float, float], over: float) -> Floats:
-    """Smallest radius of curvature around each of evenly spaced parameters `(k,)`, length."""
-    half = 0.51 * (s[1] - s[0])
-    low, high = np.maximum(s - half, between[0]), np.minimum(s + half, between[1])
-    return np.array([curve.sharpest(a, b, over) for a, b in zip(low, high, strict=True)])
+def _part_inside(mesh: Mesh, x: Floats, inside: Ints) -> tuple[int, int]:
+    """First vertex of an open front to count, and the one behind the last.
+
+    One beyond each end of the part in the body, where that does not end at a vertex: from there a
+    front is led out of the body in a direction of its own.
+    """
+    if not len(inside):
+        return 0, len(x)
+    first, last = int(inside[0]), int(inside[-1])
+    ahead = [min(max(k, 0), len(x) - 1) for k in (first - 1, last + 1)]
+    on = x[[first, last]] + _ON * (x[ahead] - x[[first, last]])
+    goes_on = contains(mesh, on)
+    first, last = (k if beyond else own for k, own, beyond in zip(ahead, (first, last), goes_on))
+    return (first, last + 1) if last > first else (0, len(x))
+
+
+def _surface_end(
+    curve: FrontCurve, s: float, K: Floats, values: FrontValues, n: int, e: int, depth: float,
+    sif: SIF,
+) -> SurfaceEnd:  # fmt: skip
+    """What is known where a front comes to a free surface."""
+    x = curve.at(np.array([s]))[0][0]
+    K, mean = np.array(K), np.array(values.mean[n, e])
+    if sif.closed[np.linalg.norm(sif.x - x, axis=1).argmin()]:
+        K[0] = mean[0] = 0.0
+    width = abs(float(values.knots[e] - values.knots[e + 1 if e == 0 else e - 1]))
+    return SurfaceEnd(0, lock(x), depth, lock(K), width, lock(mean))
+
+
+def _depth(solution: Solution, curve: FrontCurve, ends: tuple[float, float]) -> float:
+    """Depth below a free surface at which K is read, length along the front."""
+    length = ends[1] - ends[0]
+    given = solution.problem.numerics.depth
+    return min(_DEPTH * length if given is None else given, length / 2)
+
+
+def _free_ends(curve: FrontCurve, values: FrontValues) -> tuple[bool, bool]:
+    """Whether a front has a first and a last end at a surface whose tractions are known."""
+    if curve.closed:
+        return False, False
+    known = values.valid & ~values.smooth
+    return bool(known[0]), bool(known[-1])
 
 
 def way_inside(solution: Solution, curve: FrontCurve) -> tuple[float, float] | None:
@@ -126,79 +243,26 @@ def way_inside(solution: Solution, curve: FrontCurve) -> tuple[float, float] | N
     return ends[0], ends[1]
 
 
-def front_intensity(solutions: Sequence[Solution], t: int) -> list[SIF]:
-    """K at the vertices of one front in the body, for several load states of one solve.
-
-    Parameters
-    ----------
-    solutions : sequence of Solution
-        States of one problem, which share their space.
-    t : int
-        Number of the front in `space.tips`.
-
-    Returns
-    -------
-    list of SIF
-        Zero, with a warning, where the front is too short for K.
-    """
-    space = solutions[0].space
-    tip = space.tips[t]
-    number = space.cracks[tip.crack].fronts or ()
-    closed = bool(number[tip.number][0] == number[tip.number][-1])
-    curve = front_curve(tip.x, tip.frame, closed)
-    at_vertex = curve.breaks[: len(tip.x)]
-    knots, K, valid, domain = front_values(solutions, t, curve)
-    inside = contains(space.mesh, np.array(tip.x))
-    if not valid.any():
-        K = np.zeros_like(K)
-        _warn_short(np.array(tip.x)[inside] if inside.any() else np.array(tip.x))
-    _, frame, _ = curve.at(at_vertex)
-    shape = (int(inside.sum()),)
-    result = []
-    for solution, values in zip(
-        solutions, along(K, knots, valid, curve, at_vertex)[:, :, inside], strict=True
-    ):
-        sif = SIF(
-            x=np.array(tip.x)[inside],
-            frame=frame[inside],
-            K=values[0],
-            T=np.full(shape, np.nan),
-            spread=np.abs(values[0] - values[1]),
-            s=curve.arc(at_vertex)[inside],
-            front=np.zeros(shape, dtype=np.int64),
-            at_surface=~_covered(curve, knots, valid, at_vertex)[inside],
-            closed=np.zeros(shape, dtype=bool),
-            domain_cells=np.full(shape, 0.0 if domain is None else domain.outer / domain.size),
-        )
-        if domain is not None:
-            sif = with_closed(sif, solution, tip.crack, domain.size)
-        result.append(sif)
-    if domain is not None and valid.any() and inside.any():
-        check(solutions, t, domain, result)
-    return result
-
-
-def _warn_short(x: Floats) -> None:
+def _warn_held(x: Floats, values: FrontValues) -> None:
     warn(
-        f"the front from {np.round(x[0], 6).tolist()} to {np.round(x[-1], 6).tolist()} is too "
-        "short inside the body for K: no domain around it is whole. K counts as 0 there, and it "
-        "does not grow. Refine the mesh around it."
+        f"the front from {at(x[0])} to {at(x[-1])} has no K: everywhere along it a side that is "
+        f"held is nearer than {_LEAST:g} cells, and what that bears is unknown. K counts as 0 "
+        "there, and it does not grow. Refine the mesh around it."
     )
 
 
 def _covered(curve: FrontCurve, knots: Floats, valid: Bools, s: Floats) -> Bools:
-    """Which parameters lie between two valid tops of hats."""
+    """Which parameters lie between two valid tops of hats; ends of open fronts with them."""
     if curve.closed:
         left = np.mod(np.searchsorted(knots, s * (1 + 1e-12), side="right") - 1, len(knots))
         return np.asarray(valid[left] & valid[(left + 1) % len(knots)])
     left = np.clip(np.searchsorted(knots, s, side="right") - 1, 0, len(knots) - 2)
-    within = (s >= knots[0]) & (s <= knots[-1])
-    return np.asarray(within & valid[left] & valid[left + 1])
+    return np.asarray(valid[left] & valid[left + 1])
 
 
 def front_values(
-    solutions: Sequence[Solution], t: int, curve: FrontCurve
-) -> tuple[Floats, Floats, Bools, Domain | None]:
+    solutions: Sequence[Solution], t: int, curve: FrontCurve, ends: tuple[float, float]
+) -> FrontValues:
     """K at the tops of the hats of one front.
 
     Parameters
@@ -206,46 +270,87 @@ def front_values(
     solutions : sequence of Solution
     t : int
     curve : FrontCurve
-
-    Returns
-    -------
-    knots : (p,) array, length
-    K : (n, 2, p, 3) array, stress · √length
-        Of n states and two domains; smoothed where there are hats enough.
-    valid : (p,) array of bool
-        Hats whose domains lie in the body.
-    domain : Domain
-        None where no part of the front lies in the body.
+    ends : tuple of float, length
+        Where the front enters and leaves the body.
     """
-    ends = way_inside(solutions[0], curve)
-    if ends is None:
-        knots = front_nodes(curve, curve.length)
-        return (
-            knots,
-            np.full((len(solutions), 2, len(knots), 3), np.nan),
-            np.zeros(len(knots), bool),
-            None,
-        )
-    domain = tube_of(solutions[0], t, curve, ends)
-    outer, size = domain.outer, domain.size
-    radii = np.array([outer, SECOND * outer])
-    knots = front_nodes(curve, _SPACING * size, None if curve.closed else ends)
-    distance = curve.distance(solutions[0].space.mesh.points, outer)
+    space, material = solutions[0].space, solutions[0].problem.material
+    tip = space.tips[t]
+    size = leg_size(space.mesh, space.cuts[tip.crack].level_set.tip_cells[tip.number])
+    wanted = solutions[0].problem.numerics.domain
+    if wanted is None:
+        wanted = max(_OUTER * size, _REACH * tip.radius)
+    knots = front_nodes(curve, _spacing(curve, ends, size), ends)
+    sides = sides_around(solutions, curve, wanted)
+    room = _room(solutions[0], t, curve, knots, size)
+    held = np.full(len(knots), np.inf) if sides is None else room_beside(sides, curve, knots)
+    smooth = np.zeros(len(knots), dtype=bool)
+    if sides is not None:
+        smooth = on_smooth_planes(sides, curve, knots)
+    valid = held > _LEAST * size
+    room = np.where(valid, np.minimum(room, held), room)
+    radius = np.clip(room, _LEAST * size, wanted)
+    radii = radius[:, None] * np.array([1.0, SECOND])
+    outer = float(radius.max())
+    distance = curve.distance(space.mesh.points, outer)
     turn = np.stack([mean_rotation(s, distance, outer) for s in solutions], axis=-1)
     total = _lip_part(solutions, t, curve, knots, radii, turn)
-    measure = np.zeros((len(radii), len(knots)))
-    for part, volume in _domain_parts(solutions, t, curve, knots, radii, turn):
+    if sides is not None:
+        total += integrals_of_sides(solutions, t, sides, curve, knots, radii, turn)
+    for part in _domain_parts(solutions, t, curve, knots, radii, turn):
         total += part
-        measure += volume
-    valid = inside_body(measure, full_measure(curve, knots, radii))
+    K = solve_front(total, knots, curve, material, valid, smooth)
+    wide = twice_as_wide(total, knots, curve, material, valid, smooth)
+    mean = means(total[:, 0], knots, curve, material)
+    least = int(np.argmin(room))
+    domain = Domain(
+        outer=float(radius.min()),
+        wanted=wanted,
+        room=float(room[least]),
+        least=_NARROW * size,
+        short=False,
+        size=size,
+        narrowest=curve.at(knots[[least]])[0][0],
+        differ=_DIFFER,
+        label="K along the front, at",
+    )
+    return FrontValues(knots, K, mean, valid, wide, smooth, radius, domain)
+
+
+def _spacing(
+    curve: FrontCurve, ends: tuple[float, float], size: float
+) -> Callable[[Floats], Floats]:
+    """Distance between the tops of hats along a front, length."""
+
+    def spacing(s: Floats) -> Floats:
+        width = np.clip(curve.bend(s, size), _CLOSEST * size, _SPACING * size)
+        if curve.closed:
+            return width
+        from_end = np.minimum(s - ends[0], ends[1] - s)
+        return np.minimum(width, _FIRST * size + _GROWTH * from_end)
+
+    return spacing
+
+
+def _room(solution: Solution, t: int, curve: FrontCurve, knots: Floats, size: float) -> Floats:
+    """What bends of the front, other fronts and other cracks leave for each hat `(p,)`, length."""
+    tip = solution.space.tips[t]
+    period = curve.length if curve.closed else 0.0
+    grid = np.concatenate([[knots[-1] - period], knots, [knots[0] + period]])
     if not curve.closed:
-        valid[[0, -1]] = False
-    K = solve_front(total, knots, curve, solutions[0].problem.material, valid)
-    rows = np.nonzero(valid)[0]
-    period = curve.length if curve.closed and valid.all() else None
-    if len(rows) >= _SMOOTH:
-        K[:, :, rows] = smoothed(K[:, :, rows], knots[rows], period)
-    return knots, K, valid, domain
+        grid[[0, -1]] = knots[[0, -1]]
+    share = np.linspace(0.0, 1.0, _IN_HAT)[:, None]
+    s = np.concatenate(
+        [(1 - share) * grid[:-2] + share * knots, (1 - share) * knots + share * grid[2:]]
+    )
+    x = curve.at(s.ravel())[0]
+    room = _BENT * curve.bend(s.ravel(), size)
+    for other in solution.space.tips:
+        if other is not tip:
+            room = np.minimum(room, 0.8 * cKDTree(other.x).query(x)[0])
+    for c, lips in enumerate(solution.lips):
+        if c != tip.crack and len(lips):
+            room = np.minimum(room, 0.9 * cKDTree(lips.x).query(x)[0])
+    return np.asarray(room.reshape(s.shape).min(axis=0))
 
 
 def _domain_parts(
@@ -255,14 +360,14 @@ def _domain_parts(
     knots: Floats,
     radii: Floats,
     turn: Floats,
-) -> Iterator[tuple[Floats, Floats]]:
-    """Domain integrals of the hats and their measures, of the same chunks for any threads."""
+) -> Iterator[Floats]:
+    """Domain integrals of the hats, of the same chunks for any threads."""
     space = solutions[0].space
     tip = space.tips[t]
     mesh, psi = space.mesh, space.cuts[tip.crack].level_set.psi[tip.number]
     outer = float(radii.max())
     coefficients = np.stack([solution.coefficients for solution in solutions], axis=-1)
-    initial = partial(_initial, solutions) if acts(solutions, "initial_stress") else None
+    initial = initial_stresses(solutions)
     middle = mesh.points[mesh.cells].mean(axis=1)
     reach = 1.05 * outer
     distance = curve.distance(middle, reach + float(mesh.cell_size.max())) - reach
@@ -270,7 +375,7 @@ def _domain_parts(
     reach = np.linalg.norm(mesh.points[mesh.cells[cells]] - middle[cells, None], axis=2).max(axis=1)
     cells = cells[distance[cells] <= reach]
 
-    def part(first: int) -> tuple[Floats, Floats] | None:
+    def part(first: int) -> Floats | None:
         points = cell_points(space, cells[first : first + _CHUNK], _POINTS, _DEGREE, True)
         x = position(space, points.cell, points.bary)
         near, feet = curve.near(x, outer)
@@ -279,7 +384,7 @@ def _domain_parts(
         points = points.chosen(near)
         gradient = gradients_at(space, coefficients, points.cell, points.bary, points.side)
         behind = np.einsum("qb,qb->q", psi[mesh.cells[points.cell]], points.bary) < 0
-        return integrals(
+        return domain_integrals(
             curve,
             knots,
             feet,
@@ -312,10 +417,6 @@ def _force(solutions: Sequence[Solution], x: Floats) -> Floats | None:
     return total
 
 
-def _initial(solutions: Sequence[Solution], x: Floats) -> Floats:
-    return np.stack([solution.initial_stress(x) for solution in solutions], axis=-1)
-
-
 def _lip_part(
     solutions: Sequence[Solution],
     t: int,
@@ -339,7 +440,7 @@ def _lip_part(
         if shear is not None:
             traction[:, :, k] += shear[near]
     if not bent and not traction.any():
-        return np.zeros((len(solutions), len(radii), 3, len(knots)))
+        return np.zeros((len(solutions), radii.shape[1], 3, len(knots)))
     gradient = None
     if bent:
         coefficients = np.stack([solution.coefficients for solution in solutions], axis=-1)
@@ -358,7 +459,7 @@ def _lip_part(
         solutions[0].problem.material,
         radii,
         gradient=gradient,
-        initial=partial(_initial, solutions) if acts(solutions, "initial_stress") else None,
+        initial=initial_stresses(solutions),
     )
 
 

@@ -290,11 +290,10 @@ def _polygon(change: Floats, bar: Floats) -> str:
     )
 
 
-# Bars of K along fronts in 3D: order 2 beside order 1, and two domains at order 2.
+# Bars of K along fronts in 3D: order 2 beside order 1, two domains and wider hats at order 2.
 
-_SPREAD_OF_FRONT = (
-    2.0  # half-width over the spread of a place, or its root mean square along the front
-)
+# Half-width over the spread of a place and over its change with hats twice as wide.
+_SPREAD_OF_FRONT, _WIDENED = 4.0, 0.3
 
 
 def front_bars(solutions: Sequence[Solution], sifs: Sequence[SIF], crack: int) -> list[Bars]:
@@ -350,15 +349,16 @@ def bars_beside(sifs: Sequence[SIF], better: Sequence[SIF], reason: str) -> list
 
 
 def _of_spread(sif: SIF) -> Bars:
-    """At order 2: two domains; K is best itself.
+    """At order 2: two domains, and hats twice as wide; K is best itself.
 
-    They may agree by chance in one mode, less likely in all: what they differ by in the root mean
-    square of any of them is the least for each.
+    They may agree by chance at a place: what they differ by in the root mean square along the
+    front is the least for each.
     """
-    spread = np.array(sif.spread)
-    spread[sif.closed, 0] = 0.0
-    least = _mean(sif, spread).max(axis=1)[:, None]
-    return _completed(sif, np.zeros_like(sif.K), _SPREAD_OF_FRONT * np.maximum(spread, least))
+    half = _SPREAD_OF_FRONT * sif.spread
+    if sif.widened is not None:
+        half = np.maximum(half, _WIDENED * sif.widened)
+    half[sif.closed, 0] = 0.0
+    return _completed(sif, np.zeros_like(sif.K), np.maximum(half, _mean(sif, half)))
 
 
 def _of_difference(sif: SIF, finer: SIF) -> Bars:
@@ -404,7 +404,10 @@ def _completed(sif: SIF, eta: Floats, bar: Floats) -> Bars:
     """With K_I of closed places, and without what is beside a free surface."""
     contact = np.zeros_like(bar)
     bar[sif.closed, 0] = contact[sif.closed, 0] = np.abs(sif.K_integral[sif.closed, 0])
-    reason = "K has no meaning so close to a free surface: it is prolonged from inside"
+    reason = (
+        "K has no meaning so close to a free surface, nor is it known beside a side that is held: "
+        "it is that of the nearest place where it is"
+    )
     return bars_of(eta, bar, [reason if at else "" for at in sif.at_surface], contact)
 
 

@@ -1,8 +1,9 @@
 """K along a front in 3D by interaction integrals with hats along the front.
 
 I_j = int P_kj V_k,j + [sigma_ij (u^a_i,jk - eps^a_ij,k) + sigma^a_ij,j u_i,k] V_k dV
-- int_lips P_kj m_j V_k dA, V = hat_j(s) q(r) t(s). The auxiliary fields are those of Williams of
-plane strain and antiplane shear in the planes normal to the front, u^a = U1 t + U2 n + U3 b. With
+- int_S P_kj m_j V_k dA, V = hat_j(s) q(r) t(s), S the crack faces and the sides of the body in the
+domain. The auxiliary fields are those of Williams of plane strain and antiplane shear in the planes
+normal to the front, u^a = U1 t + U2 n + U3 b. With
 t' = -kt b + w n, n' = -kn b - w t, b' = kt t + kn n and hs = 1 - kt x1 - kn x2 the derivative
 along b of what is given in (s, x1, x2) is (d/ds - w (x1 d/dx2 - x2 d/dx1)) / hs: all terms of
 curvature (kt, kn) and of twist w of the frame are counted, none is left out. eps^a and sigma^a
@@ -13,58 +14,65 @@ K_I, K_II = E' / 2 I and K_III = mu I, each divided by the integral of the hat.
 from collections.abc import Callable
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
 from xcrack.base.arrays import Bools, Floats, Ints
 from xcrack.crack.front_curve import Feet, FrontCurve
 from xcrack.fem.williams import continued_polar
 from xcrack.model.material import Isotropic
-from xcrack.sif.common import weight_integral
 
-RING = 0.4  # share of a radius at which the weight starts to fall; 1 inside
-_FEWEST = 6  # hats a front
-_INSIDE = 0.98  # share of the domain of a hat that has to lie in the body
+_FEWEST = {True: 6, False: 3}  # hats of a closed front, steps of an open one
+_STEPS = 64  # samples to a step, by which an uneven spacing is measured out
 _GAUSS = np.polynomial.legendre.leggauss(6)
 _FLAT = 1e-9  # height of a lip point, as a share of the radius, that is round-off
 
 
 def front_nodes(
-    curve: FrontCurve, spacing: float, ends: tuple[float, float] | None = None
+    curve: FrontCurve,
+    spacing: Callable[[Floats], Floats],
+    ends: tuple[float, float] | None = None,
 ) -> Floats:
-    """Parameters s_j of the tops of the hats, evenly spaced.
+    """Parameters s_j of the tops of the hats.
 
     Parameters
     ----------
     curve : FrontCurve
-    spacing : float, length
-        About how far apart; at least six on a front (seven on an open one).
+    spacing : callable
+        Wanted distance of two tops f(s) -> (q,), length. There are at least six hats on a closed
+        front and four on an open one.
     ends : tuple of float, length, optional
         Of an open front: where it enters and where it leaves the body; None: its ends.
 
     Returns
     -------
     (p,) array, length
-        On a closed front the last hat falls to zero at the first.
+        On a closed front the last hat falls to zero at the first, on an open one the first and
+        the last top are its ends.
     """
-    if curve.closed:
-        count = max(_FEWEST, round(curve.length / spacing))
-        return np.asarray(np.arange(count) * (curve.length / count), dtype=float)
     first, last = ends or (0.0, curve.length)
-    return np.linspace(first, last, max(_FEWEST, round((last - first) / spacing)) + 1)
+    width = spacing(np.linspace(first, last, 2))
+    count = int(np.clip(_STEPS * (last - first) / width.min(), _STEPS, 100_000))
+    s = np.linspace(first, last, count + 1)
+    density = 1 / spacing((s[1:] + s[:-1]) / 2)
+    passed = np.concatenate([[0.0], np.cumsum(density * np.diff(s))])
+    steps = max(_FEWEST[curve.closed], round(passed[-1]))
+    knots = np.interp(np.arange(steps + 1) / steps * passed[-1], passed, s)
+    return np.asarray(knots[:-1] if curve.closed else knots)
 
 
 def hats(curve: FrontCurve, knots: Floats, s: Floats) -> tuple[Ints, Floats, Floats]:
-    """The two hats that overlap at parameters s.
+    """The two hats that overlap at parameters s; each goes to the next by t² (3 - 2 t).
 
     Parameters
     ----------
     curve : FrontCurve
     knots : (p,) array, length
     s : (q,) array, length
+        Beyond the ends of an open front the hat of the end is one.
 
     Returns
     -------
     hat : (q, 2) array of int
-        -1 where there is none.
     share : (q,) array
         Value of the second; the first has the rest.
     step : (q,) array, 1/length
@@ -74,18 +82,57 @@ def hats(curve: FrontCurve, knots: Floats, s: Floats) -> tuple[Ints, Floats, Flo
     left = np.searchsorted(knots, s, side="right") - 1
     if curve.closed:
         width = np.diff(np.append(knots, knots[0] + curve.length))
-        away = np.mod(s - knots[left], curve.length)
+        t = np.mod(s - knots[left], curve.length) / width[left]
         hat = np.stack([np.mod(left, count), np.mod(left + 1, count)], axis=1)
-        left = hat[:, 0]
     else:
         left = np.clip(left, 0, count - 2)
-        width, away = np.diff(knots), s - knots[left]
+        width = np.diff(knots)
+        t = np.clip((s - knots[left]) / width[left], 0.0, 1.0)
         hat = np.stack([left, left + 1], axis=1)
-        hat[(s < knots[0]) | (s > knots[-1])] = -1
-    return np.ascontiguousarray(hat), away / width[left], 1 / width[left]
+    return np.ascontiguousarray(hat), t * t * (3 - 2 * t), 6 * t * (1 - t) / width[left]
 
 
-def integrals(
+def reading(knots: Floats, valid: Bools, curve: FrontCurve, s: Floats) -> Floats:
+    """Matrix that makes values at parameters of those at valid tops of hats: cubic splines.
+
+    Parameters
+    ----------
+    knots : (p,) array, length
+    valid : (p,) array of bool
+        v of them.
+    curve : FrontCurve
+    s : (m,) array, length
+
+    Returns
+    -------
+    (m, v) array
+        Beyond the valid tops the value is that of the last of them.
+    """
+    grid, at = knots[valid], np.asarray(s, dtype=float)
+    values = np.eye(len(grid))
+    if len(grid) < 2:
+        return np.ones((len(at), len(grid)))
+    if curve.closed and valid.all():
+        spline = CubicSpline(
+            np.append(grid, grid[0] + curve.length),
+            np.concatenate([values, values[:1]]),
+            bc_type="periodic",
+        )
+        return np.asarray(spline(np.mod(at - grid[0], curve.length) + grid[0]))
+    if curve.closed:
+        # The invalid part is left out: s runs from the first valid top behind the widest gap.
+        gap = np.diff(np.append(grid, grid[0] + curve.length))
+        turn = (int(np.argmax(gap)) + 1) % len(grid)
+        start = grid[turn]
+        grid = np.mod(np.roll(grid, -turn) - start, curve.length)
+        values = np.roll(values, -turn, axis=0)
+        at = np.mod(at - start, curve.length)
+        at = np.where(at > (grid[-1] + curve.length) / 2, at - curve.length, at)
+    spline = CubicSpline(grid, values, bc_type="not-a-knot")
+    return np.asarray(spline(np.clip(at, grid[0], grid[-1])))
+
+
+def domain_integrals(
     curve: FrontCurve,
     knots: Floats,
     feet: Feet,
@@ -99,7 +146,7 @@ def integrals(
     force: Floats | None = None,
     initial: Callable[[Floats], Floats] | None = None,
     curved: bool = True,
-) -> tuple[Floats, Floats]:
+) -> Floats:
     """Domain integrals over points of the body; those of all chunks add up.
 
     Parameters
@@ -116,7 +163,8 @@ def integrals(
     behind : (q,) array of bool
         Behind the front, where the angle of a point follows the crack face of its side.
     material : Isotropic
-    radii : (k,) array, length
+    radii : (p, k) array, length
+        Of the domains of each hat.
     force : (q, 3, n) array, stress/length, optional
         Body forces.
     initial : callable, optional
@@ -127,20 +175,15 @@ def integrals(
 
     Returns
     -------
-    I : (n, k, 3, p) array
+    (n, k, 3, p) array
         Of unit fields of modes I, II, III.
-    measure : (k, p) array, length³
-        Integral of hat q over these points; over the whole domain see `full_measure`.
     """
     from xcrack.crack.kernels.front import front_terms
 
-    radii = np.ascontiguousarray(radii, dtype=float)
     states = gradient.shape[3]
-    total = np.zeros((states, len(radii), 3, len(knots)))
-    measure = np.zeros((len(radii), len(knots)))
+    total = np.zeros((states, radii.shape[1], 3, len(knots)))
     r, theta = continued_polar(feet.local, side, behind)
     hat, share, step = hats(curve, knots, feet.s)
-    hat[feet.beyond] = -1
     steady, change = _initial_stress(curve, feet, initial, states)
     front_terms(
         np.ascontiguousarray(weight),
@@ -154,15 +197,13 @@ def integrals(
         hat,
         share,
         step,
-        radii,
-        RING,
+        np.ascontiguousarray(radii, dtype=float),
         material.lam,
         material.mu,
         curved,
         total,
-        measure,
     )
-    return total, measure
+    return total
 
 
 def _initial_stress(
@@ -207,83 +248,107 @@ def lip_integrals(
     traction : (q, 3, n) array, stress
         On lip +, of n states; on lip - it is the opposite. A pressure p is p times the normal.
     material : Isotropic
-    radii : (k,) array, length
+    radii : (p, k) array, length
     gradient : (2, q, 3, 3, n) array, optional
         Displacement gradients on lip - and lip +: needed where the crack faces are not the
         half-plane of the frame, since the auxiliary field has a traction of its own there.
     initial : callable, optional
-        Initial stress, as in `integrals`; only counts with gradients.
+        Initial stress, as in `domain_integrals`; only counts with gradients.
 
     Returns
     -------
     (n, k, 3, p) array
     """
-    from xcrack.crack.kernels.front import lip_terms
-
-    radii = np.ascontiguousarray(radii, dtype=float)
-    states = traction.shape[2]
-    total = np.zeros((states, len(radii), 3, len(knots)))
-    if not len(weight):
-        return total
-    hat, share, _ = hats(curve, knots, feet.s)
-    hat[feet.beyond] = -1
-    local = np.array(feet.local)
     # What is flat is so but for round-off, which 1 / r would magnify.
+    local = np.array(feet.local)
     local[np.abs(local[:, 1]) < _FLAT * radii.max(), 1] = 0.0
-    steady, _ = _initial_stress(curve, feet, initial, states)
+    feet = Feet(feet.s, local, feet.frame, feet.turn)
     every = np.ones(len(weight), dtype=bool)
-    for s, sign in ((0, -1), (1, 1)):
-        r, theta = continued_polar(local, np.full(len(weight), sign), every)
-        lip_terms(
-            np.ascontiguousarray(weight),
-            np.ascontiguousarray(-sign * normal),
-            np.ascontiguousarray(sign * traction),
-            np.zeros((0, 3, 3, states)) if gradient is None else np.ascontiguousarray(gradient[s]),
-            steady,
-            np.stack([r, theta], axis=1),
-            feet.frame,
-            hat,
-            share,
-            radii,
-            RING,
-            material.lam,
-            material.mu,
-            total,
+    lips = [
+        side_integrals(
+            curve, knots, feet, -sign * normal, weight, sign * traction,
+            np.full(len(weight), sign), every, material, radii,
+            gradient=None if gradient is None else gradient[s], initial=initial,
         )
-    return total
+        for s, sign in ((0, -1), (1, 1))
+    ]  # fmt: skip
+    return np.asarray(lips[0] + lips[1])
 
 
-def full_measure(curve: FrontCurve, knots: Floats, radii: Floats) -> Floats:
-    """Integral of hat q over the whole tube around the front `(k, p)`, length³.
+def side_integrals(
+    curve: FrontCurve,
+    knots: Floats,
+    feet: Feet,
+    outward: Floats,
+    weight: Floats,
+    traction: Floats,
+    side: Ints,
+    behind: Bools,
+    material: Isotropic,
+    radii: Floats,
+    *,
+    gradient: Floats | None = None,
+    initial: Callable[[Floats], Floats] | None = None,
+) -> Floats:
+    """What a side of the body, or one crack face, adds to the integrals.
 
     Parameters
     ----------
-    curve : FrontCurve
-    knots : (p,) array, length
-    radii : (k,) array, length
+    curve, knots, feet, weight, side, behind, material, radii
+        As of `domain_integrals`; weights are areas.
+    outward : (q, 3) array
+        Normals that point out of the body.
+    traction : (q, 3, n) array, stress
+        True tractions of n states.
+    gradient : (q, 3, 3, n) array, optional
+        Displacement gradients; without them only the tractions count.
+    initial : callable, optional
+        Initial stress; only counts with gradients.
+
+    Returns
+    -------
+    (n, k, 3, p) array
     """
-    radii = np.asarray(radii, dtype=float)
-    section = weight_integral(RING * radii, radii)
-    return np.asarray(section[:, None] * _mass(curve, knots).sum(axis=1))
+    from xcrack.crack.kernels.front import surface_terms
+
+    states = traction.shape[2]
+    total = np.zeros((states, radii.shape[1], 3, len(knots)))
+    if not len(weight):
+        return total
+    hat, share, _ = hats(curve, knots, feet.s)
+    r, theta = continued_polar(feet.local, side, behind)
+    steady, _ = _initial_stress(curve, feet, initial, states)
+    surface_terms(
+        np.ascontiguousarray(weight),
+        np.ascontiguousarray(outward),
+        np.ascontiguousarray(traction),
+        np.zeros((0, 3, 3, states)) if gradient is None else np.ascontiguousarray(gradient),
+        steady,
+        np.stack([r, theta], axis=1),
+        feet.frame,
+        hat,
+        share,
+        np.ascontiguousarray(radii, dtype=float),
+        material.lam,
+        material.mu,
+        total,
+    )
+    return total
 
 
-def _mass(curve: FrontCurve, knots: Floats) -> Floats:
-    """Integrals of products of two hats along the front `(p, p)`, length."""
-    count = len(knots)
-    grid = np.append(knots, knots[0] + curve.length) if curve.closed else knots
-    width = np.diff(grid)
-    t = (_GAUSS[0] + 1) / 2
-    speed = curve.at((grid[:-1, None] + width[:, None] * t).ravel())[2][:, 3].reshape(-1, len(t))
-    weight = width[:, None] * _GAUSS[1] / 2 * speed
-    first = np.arange(len(width))
-    second = (first + 1) % count
-    mass = np.zeros((count, count))
-    np.add.at(mass, (first, first), weight @ (1 - t) ** 2)
-    np.add.at(mass, (second, second), weight @ t**2)
-    mixed = weight @ (t * (1 - t))
-    np.add.at(mass, (first, second), mixed)
-    np.add.at(mass, (second, first), mixed)
-    return mass
+def means(I: Floats, knots: Floats, curve: FrontCurve, material: Isotropic) -> Floats:  # noqa: E741
+    """Means of K over the hats `(n, p, 3)`, stress · √length.
+
+    Parameters
+    ----------
+    I : (n, 3, p) array
+        Domain and surface integrals together.
+    knots : (p,) array, length
+    curve : FrontCurve
+    material : Isotropic
+    """
+    size = _moments(curve, knots, lambda s: np.ones((len(s), 1)))[:, 0]
+    return np.asarray(np.moveaxis(I / size, 1, 2) * _factors(material))
 
 
 def solve_front(
@@ -292,59 +357,112 @@ def solve_front(
     curve: FrontCurve,
     material: Isotropic,
     valid: Bools,
-    lumped: float = 0.5,
+    zero: Bools | None = None,
 ) -> Floats:
-    """K at the tops of the hats.
-
-    The mean of the lumped and the consistent mass is used: a moment of a hat is
-    K_j + h² K_j'' / 12, so that (K_j-1 + 10 K_j + K_j+1) / 12 is of order four, where lumped and
-    consistent mass err by h² K'' / 12 to either side; and it magnifies scatter by 1.5 at most,
-    the consistent mass by 3.
+    """K at the tops of the hats: a cubic spline along the front that has the integrals found.
 
     Parameters
     ----------
     I : (n, k, 3, p) array
-        Domain and lip integrals together.
+        Domain and surface integrals together.
     knots : (p,) array, length
     curve : FrontCurve
     material : Isotropic
     valid : (p,) array of bool
-        Hats whose domain lies in the body; K of the others is prolonged.
-    lumped : float
-        Share of the lumped mass.
+        Hats that have an integral.
+    zero : (p,) array of bool, optional
+        Hats at planes of symmetry: K_III is zero there.
 
     Returns
     -------
     (n, k, p, 3) array, stress · √length
-        nan everywhere if no hat is valid.
+        nan at hats that are not valid.
     """
-    count = len(knots)
-    mass = _mass(curve, knots)
-    diagonal = mass.sum(axis=1)
-    mixed = (1 - lumped) * mass + lumped * np.diag(diagonal)
-    whole = valid & np.roll(valid, 1) & np.roll(valid, -1)
-    if not curve.closed:
-        whole[[0, -1]] = False
-    mixed[~whole] = np.diag(diagonal)[~whole]
-    factor = np.array([material.E_prime / 2, material.E_prime / 2, material.mu])
-    K = np.full((*I.shape[:2], count, 3), np.nan)
+    K = np.full((*I.shape[:2], len(knots), 3), np.nan)
     rows = np.nonzero(valid)[0]
     if not len(rows):
         return K
-    right = np.moveaxis(I, 3, 0)[rows].reshape(len(rows), -1)
-    solved = np.linalg.solve(mixed[np.ix_(rows, rows)], right)
-    K[:, :, rows] = np.moveaxis(solved.reshape(len(rows), *I.shape[:3]), 0, 2) * factor
+    moments = _moments(curve, knots, lambda s: reading(knots, valid, curve, s))[rows]
+    K[:, :, rows] = _solved(moments, I[..., rows], material, None if zero is None else zero[rows])
     return K
 
 
-def inside_body(measure: Floats, full: Floats) -> Bools:
-    """Hats whose domains lie wholly in the body `(p,)`, by their volume.
+def twice_as_wide(
+    I: Floats,  # noqa: E741
+    knots: Floats,
+    curve: FrontCurve,
+    material: Isotropic,
+    valid: Bools,
+    zero: Bools | None = None,
+) -> Floats:
+    """K at the tops of the hats from every other hat, each with the halves of those beside it.
 
     Parameters
     ----------
-    measure : (k, p) array, length³
-        Integrals of hat q over the points of the body.
-    full : (k, p) array, length³
-        The same over the whole tubes.
+    I, knots, curve, material, valid, zero
+        As of `solve_front`.
+
+    Returns
+    -------
+    (n, k, p, 3) array, stress · √length
+        nan at hats that are not valid.
     """
-    return np.asarray((measure > _INSIDE * full).all(axis=0))
+    result = np.full((*I.shape[:2], len(knots), 3), np.nan)
+    rows = np.nonzero(valid)[0]
+    if not len(rows):
+        return result
+    whole = bool(valid.all())
+    pick = np.arange(0, len(rows), 2)
+    if not (curve.closed and whole) and pick[-1] != len(rows) - 1:
+        pick = np.append(pick, len(rows) - 1)
+    share = np.zeros((len(pick), len(knots)))
+    share[np.arange(len(pick)), rows[pick]] = 1.0
+    for between in np.setdiff1d(np.arange(len(rows)), pick):
+        after = int(np.searchsorted(pick, between))
+        for wide in (after - 1, after % len(pick)):
+            share[wide, rows[between]] += 0.5
+    tops = rows[pick]
+
+    def spline(s: Floats) -> Floats:
+        if whole:
+            return reading(knots[tops], np.ones(len(tops), dtype=bool), curve, s)
+        return reading(knots, np.isin(np.arange(len(knots)), tops), curve, s)
+
+    own = None if zero is None else zero[tops]
+    K = _solved(share @ _moments(curve, knots, spline), I @ share.T, material, own)
+    result[:, :, rows] = np.einsum("sv,nkvm->nksm", spline(knots[rows]), K)
+    return result
+
+
+def _solved(moments: Floats, I: Floats, material: Isotropic, zero: Bools | None) -> Floats:  # noqa: E741
+    """K `(n, k, v, 3)` of integrals `(n, k, 3, v)`; K_III is zero at some tops."""
+    K = np.empty((*I.shape[:2], len(moments), 3))
+    for mode, factor in enumerate(_factors(material)):
+        matrix, right = moments.copy(), I[:, :, mode]
+        if mode == 2 and zero is not None:
+            matrix[zero] = np.eye(len(matrix))[zero]
+            right = np.where(zero, 0.0, right)
+        K[..., mode] = np.einsum("ij,nkj->nki", np.linalg.inv(matrix), right) * factor
+    return K
+
+
+def _factors(material: Isotropic) -> Floats:
+    """K of each mode over its integral `(3,)`."""
+    return np.array([material.E_prime / 2, material.E_prime / 2, material.mu])
+
+
+def _moments(curve: FrontCurve, knots: Floats, spline: Callable[[Floats], Floats]) -> Floats:
+    """Integrals of the hats over functions of the parameter, f(s) -> (q, v): `(p, v)`, length."""
+    grid = np.append(knots, knots[0] + curve.length) if curve.closed else knots
+    t, weight = (_GAUSS[0] + 1) / 2, _GAUSS[1] / 2
+    s = (grid[:-1, None] + np.diff(grid)[:, None] * t).ravel()
+    hat, share, _ = hats(curve, knots, s)
+    length = curve.at(s)[2][:, 3] * np.outer(np.diff(grid), weight).ravel()
+    values = spline(s) * length[:, None]
+    result = np.zeros((len(knots), values.shape[1]))
+    np.add.at(result, hat[:, 0], (1 - share)[:, None] * values)
+    np.add.at(result, hat[:, 1], share[:, None] * values)
+    return result
+
+
+__all__ = []

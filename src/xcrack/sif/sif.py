@@ -1,14 +1,14 @@
 """Stress intensity factors at the tips or along the fronts of one crack."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from xcrack.base import markup
 from xcrack.base.arrays import Bools, Floats, Ints, lock
-from xcrack.base.checks import numbers, shown, whole_numbers
+from xcrack.base.checks import entries, numbers, shown, whole_numbers
 from xcrack.base.errors import ProblemError
 from xcrack.base.optional import required
 
@@ -58,6 +58,37 @@ def bars_of(
 
 
 @dataclass(frozen=True, eq=False)
+class SurfaceEnd:
+    """Where a front comes to a free surface, at which K has no limit.
+
+    The exponent of the stresses at that corner is not 1/2: K goes to zero or grows without bound,
+    slowly, so that only K at a depth, or over a length, is a number.
+
+    Attributes
+    ----------
+    front : int
+        Which front.
+    x : (3,) array, length
+        The corner.
+    depth : float, length
+        Distance along the front from there to where K is read.
+    K : (3,) array, stress · √length
+        There.
+    width : float, length
+        Of the hat at the end of the front.
+    mean : (3,) array, stress · √length
+        Mean of K over that hat, which falls from the corner to zero over its width.
+    """
+
+    front: int
+    x: Floats
+    depth: float
+    K: Floats
+    width: float
+    mean: Floats
+
+
+@dataclass(frozen=True, eq=False)
 class SIF:
     """Stress intensity factors of one crack.
 
@@ -80,8 +111,9 @@ class SIF:
     front : (f,) array of int
         Which tip or front.
     at_surface : (f,) array of bool
-        Places where a front is so close to a free surface that K, which has no meaning there, is
-        prolonged from inside; never in 2D.
+        Places so close to a side of the body that K there is that of another place: at a free
+        surface that at a depth (`ends`), beside a side that is held the nearest that is known.
+        Never in 2D.
     closed : (f,) array of bool
         Places up to which the crack faces press together: K_I is exactly zero there. Never so on a
         crack without multipliers.
@@ -89,6 +121,10 @@ class SIF:
         Outer radius of the larger domain, in cells; few of them mean a domain that is clipped.
     errors : Bars, optional
         Estimated errors, where they were asked for.
+    ends : tuple of SurfaceEnd
+        Where fronts come to free surfaces; none in 2D.
+    widened : (f, d) array, stress · √length, optional
+        In 3D: difference of K to that of hats along the front which are twice as wide.
 
     Raises
     ------
@@ -107,6 +143,8 @@ class SIF:
     closed: Bools
     domain_cells: Floats
     errors: Bars | None = None
+    ends: tuple[SurfaceEnd, ...] = ()
+    widened: Floats | None = None
 
     def __post_init__(self) -> None:
         x = numbers(self.x, "SIF: x", (None, None))
@@ -125,8 +163,12 @@ class SIF:
                 raise ProblemError(
                     f"SIF: {name} = {shown(flags)}: give an array of bool of shape ({n},)."
                 )
+        if self.widened is not None:
+            numbers(self.widened, "SIF: widened", (n, d), finite=False)
         if self.errors is not None and not isinstance(self.errors, Bars):
             raise ProblemError(f"SIF: errors = {shown(self.errors)}: give Bars or None.")
+        if not all(isinstance(end, SurfaceEnd) for end in entries(self.ends, "SIF: ends")):
+            raise ProblemError(f"SIF: ends = {shown(self.ends)}: give a tuple of SurfaceEnd.")
 
     @property
     def eta(self) -> Floats:
@@ -277,6 +319,8 @@ def joined(parts: Sequence[SIF], dim: int) -> SIF:
         at_surface=lock(rows("at_surface").astype(bool)),
         closed=lock(rows("closed").astype(bool)),
         domain_cells=rows("domain_cells"),
+        ends=tuple(replace(end, front=f) for f, part in enumerate(parts) for end in part.ends),
+        widened=None if any(p.widened is None for p in parts) else rows("widened", dim),
     )
 
 

@@ -9,7 +9,10 @@ from xcrack.base.kernels.jit import kernel
 
 @kernel
 def _curve_at(s, breaks, place, value, slope, bend):  # type: ignore[no-untyped-def]
-    """Value and two derivatives of a cubic spline; coefficients as of scipy, highest first."""
+    """Value and two derivatives of a cubic spline; coefficients as of scipy, highest first.
+
+    Straight beyond its ends.
+    """
     low, high = 0, len(breaks) - 2
     while low < high:
         middle = (low + high + 1) // 2
@@ -17,13 +20,17 @@ def _curve_at(s, breaks, place, value, slope, bend):  # type: ignore[no-untyped-
             low = middle
         else:
             high = middle - 1
-    t = s - breaks[low]
+    inside = min(max(s, breaks[0]), breaks[-1])
+    t, over = inside - breaks[low], s - inside
     for i in range(3):
         c3, c2 = place[0, low, i], place[1, low, i]
         c1, c0 = place[2, low, i], place[3, low, i]
         value[i] = ((c3 * t + c2) * t + c1) * t + c0
         slope[i] = (3 * c3 * t + 2 * c2) * t + c1
         bend[i] = 6 * c3 * t + 2 * c2
+        if over != 0.0:
+            value[i] += over * slope[i]
+            bend[i] = 0.0
 
 
 @kernel
@@ -33,7 +40,7 @@ def frames_at(s, breaks, place, normal):  # type: ignore[no-untyped-def]
     Parameters
     ----------
     s, breaks : (q,) array, (m + 1,) array
-        Parameters within the breaks.
+        Parameters; beyond the breaks the front is straight.
     place, normal : (4, m, 3) arrays
         Spline coefficients of the points and of the normals.
 
@@ -111,13 +118,10 @@ def feet(x, start, reach, breaks, place, normal, closed):  # type: ignore[no-unt
     frame : (q, 3, 3) array
     turn : (q, 4) array
         As of `frames_at`.
-    beyond : (q,) array of bool
-        Past the end of an open front.
     """
     count = len(x)
     s, local = np.empty(count), np.empty((count, 2))
     frame, turn = np.empty((count, 3, 3)), np.empty((count, 4))
-    beyond = np.zeros(count, np.bool_)
     X, dX, ddX = np.empty(3), np.empty(3), np.empty(3)
     N, dN, ddN = np.empty(3), np.empty(3), np.empty(3)
     first, last = breaks[0], breaks[-1]
@@ -142,23 +146,19 @@ def feet(x, start, reach, breaks, place, normal, closed):  # type: ignore[no-unt
                     u += period
                 elif u > last:
                     u -= period
-            else:
-                u = min(max(u, first), last)
             if abs(step) <= 1e-14 * period or u == old:
                 break
         _curve_at(u, breaks, place, X, dX, ddX)
         _curve_at(u, breaks, normal, N, dN, ddN)
         _frame(dX, ddX, N, dN, frame[q], turn[q])
         s[q] = u
-        x1, x2, off = 0.0, 0.0, 0.0
+        x1, x2 = 0.0, 0.0
         for i in range(3):
             gap = x[q, i] - X[i]
             x1 += gap * frame[q, 0, i]
             x2 += gap * frame[q, 1, i]
-            off += gap * frame[q, 2, i]
         local[q, 0], local[q, 1] = x1, x2
-        beyond[q] = not closed and (u == first or u == last) and abs(off) > 1e-9 * period
-    return s, local, frame, turn, beyond
+    return s, local, frame, turn
 
 
 @kernel
@@ -210,11 +210,20 @@ def _unit_stress(G, lam, mu, S):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _weight(r, radius, ring):  # type: ignore[no-untyped-def]
-    """One inside, zero outside, a quintic in the ring between; and its slope."""
-    width = (1.0 - ring) * radius
-    z = min(max((r - ring * radius) / width, 0.0), 1.0)
-    return 1.0 - z**3 * (10.0 - 15.0 * z + 6.0 * z * z), -30.0 * (z * (1.0 - z)) ** 2 / width
+def _weight(r, radius):  # type: ignore[no-untyped-def]
+    """One at the front, zero outside, a quintic between; and its slope."""
+    z = min(r / radius, 1.0)
+    return 1.0 - z**3 * (10.0 - 15.0 * z + 6.0 * z * z), -30.0 * (z * (1.0 - z)) ** 2 / radius
+
+
+@kernel
+def _widest(radii, hat):  # type: ignore[no-untyped-def]
+    """Largest radius of two hats."""
+    largest = 0.0
+    for side in range(2):
+        for k in range(radii.shape[1]):
+            largest = max(largest, radii[hat[side], k])
+    return largest
 
 
 @kernel
@@ -231,8 +240,8 @@ def _into_frame(frame, tensor, result):  # type: ignore[no-untyped-def]
 
 @kernel
 def front_terms(  # type: ignore[no-untyped-def]
-    weight, gradient, force, initial, change, polar, frame, turn, hat, share, step, radii, ring,
-    lam, mu, curved, result, measure,
+    weight, gradient, force, initial, change, polar, frame, turn, hat, share, step, radii,
+    lam, mu, curved, result,
 ):  # fmt: skip
     """Add the domain integrals of points to those of the hats.
 
@@ -249,20 +258,19 @@ def front_terms(  # type: ignore[no-untyped-def]
     polar, frame, turn : (q, 2), (q, 3, 3) and (q, 4) arrays
         Radius and angle; frame and its curvatures at the foot.
     hat : (q, 2) array of int
-        The two hats that overlap there; -1: none.
+        The two hats that overlap there.
     share : (q,) array
         Value of the second hat; the first has the rest.
     step : (q,) array
         Derivative of the second hat by the parameter.
-    radii : (k,) array
-    ring, lam, mu : float
-        Share of a radius at which the weight starts to fall; Lamé constants.
+    radii : (hats, k) array
+        Of the domains of each hat.
+    lam, mu : float
+        Lamé constants.
     curved : bool
         Count the curvatures and the twist; without, for comparison, they are taken as zero.
     result : (n, k, 3, hats) array
         Added to.
-    measure : (k, hats) array
-        Added to: integrals of the weight.
     """
     states = gradient.shape[3]
     kolosov = (lam + 3 * mu) / (lam + mu)
@@ -273,10 +281,15 @@ def front_terms(  # type: ignore[no-untyped-def]
     X, X1, D = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
     g, sigma = np.empty((3, 3)), np.empty((3, 3))
     S0, more = np.zeros((3, 3)), np.zeros((3, 3))
-    Q, dQ = np.empty(len(radii)), np.empty(len(radii))
+    domains = radii.shape[1]
+    value, slope_r, change_s = (
+        np.empty((2, domains)),
+        np.empty((2, domains)),
+        np.empty((2, domains)),
+    )
     for q in range(len(weight)):
         r, theta = polar[q, 0], polar[q, 1]
-        if hat[q, 0] < 0 or r >= radii.max() or r <= 0.0:
+        if r >= _widest(radii, hat[q]) or r <= 0.0:
             continue
         ch, sh = math.cos(0.5 * theta), math.sin(0.5 * theta)
         c, s = ch * ch - sh * sh, 2.0 * sh * ch
@@ -284,10 +297,14 @@ def front_terms(  # type: ignore[no-untyped-def]
         if not curved:
             kt = kn = w = 0.0
         hs = 1.0 - r * (kt * c + kn * s)
-        for k in range(len(radii)):
-            Q[k], dQ[k] = _weight(r, radii[k], ring)
-            measure[k, hat[q, 0]] += weight[q] * Q[k] * (1.0 - share[q])
-            measure[k, hat[q, 1]] += weight[q] * Q[k] * share[q]
+        for side in range(2):
+            part = share[q] if side == 1 else 1.0 - share[q]
+            rise = step[q] if side == 1 else -step[q]
+            for k in range(domains):
+                Q, dQ = _weight(r, radii[hat[q, side], k])
+                value[side, k] = weight[q] * part * Q
+                slope_r[side, k] = weight[q] * part * dQ
+                change_s[side, k] = weight[q] * rise * Q
         for m in range(3):
             _unit_field(
                 m, r, ch, sh, kolosov, scale, U[m], turned[m], G[m], slope[m], spin[m], bend[m]
@@ -341,20 +358,21 @@ def front_terms(  # type: ignore[no-untyped-def]
                             f += frame[q, a, i] * force[q, i, n]
                         volume -= f * G[m, a, 0]
                 radial = p0 * c + p1 * s
-                along = p2 / hs * step[q] / turn[q, 3]
-                for k in range(len(radii)):
-                    every = weight[q] * (Q[k] * volume + dQ[k] * radial)
-                    change_k = weight[q] * Q[k] * along
-                    result[n, k, m, hat[q, 0]] += every * (1.0 - share[q]) - change_k
-                    result[n, k, m, hat[q, 1]] += every * share[q] + change_k
+                along = p2 / hs / turn[q, 3]
+                for side in range(2):
+                    for k in range(domains):
+                        result[n, k, m, hat[q, side]] += (
+                            value[side, k] * volume
+                            + slope_r[side, k] * radial
+                            + change_s[side, k] * along
+                        )
 
 
 @kernel
-def lip_terms(  # type: ignore[no-untyped-def]
-    weight, outward, traction, gradient, initial, polar, frame, hat, share, radii, ring, lam, mu,
-    result,
+def surface_terms(  # type: ignore[no-untyped-def]
+    weight, outward, traction, gradient, initial, polar, frame, hat, share, radii, lam, mu, result,
 ):  # fmt: skip
-    """Subtract the integrals of P_kj m_j V_k over a lip from those of the hats.
+    """Subtract the integrals of P_kj m_j V_k over a lip or a side from those of the hats.
 
     Parameters
     ----------
@@ -363,12 +381,12 @@ def lip_terms(  # type: ignore[no-untyped-def]
     outward : (q, 3) array
         Normal m that points out of the body.
     traction : (q, 3, n) array
-        True traction on this lip, of n states.
+        True traction there, of n states.
     gradient : (q or 0, 3, 3, n) array
-        Displacement gradients; without them the faces count as free of auxiliary traction.
+        Displacement gradients; without them the surface counts as free of auxiliary traction.
     initial : (q or 0, 3, 3, n) array
         Initial stress at the foot, if any.
-    polar, frame, hat, share, radii, ring, lam, mu
+    polar, frame, hat, share, radii, lam, mu
         As of `front_terms`.
     result : (n, k, 3, hats) array
         Added to.
@@ -381,7 +399,7 @@ def lip_terms(  # type: ignore[no-untyped-def]
     g, sigma, m_out, t = np.empty((3, 3)), np.empty((3, 3)), np.empty(3), np.empty(3)
     for q in range(len(weight)):
         r = polar[q, 0]
-        if hat[q, 0] < 0 or r >= radii.max() or r <= 0.0:
+        if r >= _widest(radii, hat[q]) or r <= 0.0:
             continue
         for a in range(3):
             m_out[a] = 0.0
@@ -414,7 +432,8 @@ def lip_terms(  # type: ignore[no-untyped-def]
                         sigma[a, a] += trace
                         W += sigma[a, 0] * G[a, 0] + sigma[a, 1] * G[a, 1]
                     density -= W * m_out[0]
-                for k in range(len(radii)):
-                    Q, _ = _weight(r, radii[k], ring)
-                    result[n, k, mode, hat[q, 0]] -= weight[q] * density * Q * (1.0 - share[q])
-                    result[n, k, mode, hat[q, 1]] -= weight[q] * density * Q * share[q]
+                for side in range(2):
+                    part = share[q] if side == 1 else 1.0 - share[q]
+                    for k in range(radii.shape[1]):
+                        Q, _ = _weight(r, radii[hat[q, side], k])
+                        result[n, k, mode, hat[q, side]] -= weight[q] * part * Q * density

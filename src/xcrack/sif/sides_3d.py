@@ -1,0 +1,205 @@
+"""Sides of the body that cut the domains of K along a front, and what acts on them.
+
+Where a front comes to a side the domain of its last hat ends there. The integral of P_kj m_j V_k
+over that side counts: of the true field the traction alone is needed, and that is known where
+nothing is held. On a smooth plane (a symmetry plane, rollers) perpendicular to the front only the
+pressure of the plane is unknown, which meets a zero displacement in modes I and II.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from xcrack.analysis.solution import Solution, gradients_at
+from xcrack.base.arrays import Bools, Floats, Ints
+from xcrack.crack.front_curve import Feet, FrontCurve
+from xcrack.fem.loads import facet_points, outer_points, position
+from xcrack.fem.quadrature import Points
+from xcrack.mesh.mesh import facet_set, numbers_of
+from xcrack.model.supports import Support
+from xcrack.sif.common import initial_stresses
+from xcrack.sif.interaction_3d import hats, side_integrals
+
+_ALONG = 1e-6  # of a unit normal beside an axis: a plane across that axis
+_ACROSS = 0.999  # least cosine between a front and the normal of a plane perpendicular to it
+
+
+@dataclass(frozen=True, eq=False)
+class Sides:
+    """Points on the boundary of the body near a front.
+
+    Attributes
+    ----------
+    points : Points
+    normal : (q, 3) array
+        Out of the body.
+    feet : Feet
+    held : (q,) array of bool
+        Where the traction is an unknown reaction that counts.
+    smooth : (q,) array of bool
+        On planes perpendicular to the front that hold the body along their normal alone.
+    names : tuple of str
+        Facet sets that hold the body there.
+    """
+
+    points: Points
+    normal: Floats
+    feet: Feet
+    held: Bools
+    smooth: Bools
+    names: tuple[str, ...]
+
+
+def sides_around(solutions: Sequence[Solution], curve: FrontCurve, reach: float) -> Sides | None:
+    """The sides within reach of a front, or None where there are none.
+
+    Parameters
+    ----------
+    solutions : sequence of Solution
+        States of one problem.
+    curve : FrontCurve
+    reach : float, length
+    """
+    space = solutions[0].space
+    mesh = space.mesh
+    facets = mesh.boundary
+    corner = mesh.points[facets]
+    middle = corner.mean(axis=1)
+    size = np.linalg.norm(corner - middle[:, None], axis=2).max(axis=1)
+    facets = facets[curve.distance(middle, reach + 2 * float(size.max())) <= reach + 2 * size]
+    if not len(facets):
+        return None
+    points, normal = facet_points(space, facets)
+    near, feet = curve.near(position(space, points.cell, points.bary), reach)
+    if not len(near):
+        return None
+    points, normal = points.chosen(near), normal[near]
+    facet = mesh.cell_to_facet[points.cell, points.bary.argmin(axis=1)]
+    axes, names = _held_axes(solutions, facet)
+    along = np.abs(np.einsum("qd,qd->q", normal, axes)) > 1 - _ALONG
+    across = np.abs(np.einsum("qd,qd->q", normal, feet.frame[:, 2])) > _ACROSS
+    smooth = (axes.sum(axis=1) == 1) & along & across
+    return Sides(points, normal, feet, axes.any(axis=1) & ~smooth, smooth, names)
+
+
+def _held_axes(solutions: Sequence[Solution], facet: Ints) -> tuple[Floats, tuple[str, ...]]:
+    """One where a direction is held on facets `(q, 3)`, else zero; and the sets that do it."""
+    mesh = solutions[0].space.mesh
+    axes, names = np.zeros((len(facet), 3)), []
+    loads = [load for s in solutions for load in s.loads if isinstance(load, Support)]
+    for support in dict.fromkeys([*solutions[0].problem.supports, *loads]):
+        if not isinstance(support.where, str):
+            continue
+        own = np.isin(facet, numbers_of(mesh, facet_set(mesh, support.where, support.name)))
+        if own.any():
+            middle = mesh.points[mesh.facets[facet[own]]].mean(axis=1)
+            held = ~np.isnan(support.displacement_at(middle))
+            # What is not the same everywhere along a side makes it no plane of symmetry.
+            axes[own] = np.maximum(axes[own], held if support.holds or support.is_uniform else 1.0)
+            names.append(support.where)
+    return axes, tuple(dict.fromkeys(names))
+
+
+def room_beside(sides: Sides, curve: FrontCurve, knots: Floats) -> Floats:
+    """Distance of the hats to what is held, as far as it reaches into their domains `(p,)`."""
+    room = np.full(len(knots), np.inf)
+    hat, share, _ = hats(curve, knots, sides.feet.s)
+    for place, value in ((0, 1 - share), (1, share)):
+        counts = sides.held & (value > 0)
+        np.minimum.at(room, hat[counts, place], sides.feet.r[counts])
+    return room
+
+
+def on_smooth_planes(sides: Sides, curve: FrontCurve, knots: Floats) -> Bools:
+    """Hats that are not zero on a smooth plane perpendicular to the front `(p,)`."""
+    result = np.zeros(len(knots), dtype=bool)
+    hat, share, _ = hats(curve, knots, sides.feet.s)
+    for place, value in ((0, 1 - share), (1, share)):
+        result[hat[sides.smooth & (value > 0.5), place]] = True
+    return result
+
+
+def integrals_of_sides(
+    solutions: Sequence[Solution],
+    t: int,
+    sides: Sides,
+    curve: FrontCurve,
+    knots: Floats,
+    radii: Floats,
+    turn: Floats,
+) -> Floats:
+    """What the sides of the body add to the integrals of the hats `(n, k, 3, p)`.
+
+    Parameters
+    ----------
+    solutions : sequence of Solution
+    t : int
+        Number of the front in `space.tips`.
+    sides : Sides
+    curve : FrontCurve
+    knots : (p,) array, length
+    radii : (p, k) array, length
+    turn : (3, 3, n) array
+        Rotation of each state that is left out.
+    """
+    space, points = solutions[0].space, sides.points
+    coefficients = np.stack([solution.coefficients for solution in solutions], axis=-1)
+    gradient = gradients_at(space, coefficients, points.cell, points.bary, points.side) - turn
+    free = np.zeros((len(points.cell), 3, len(solutions)))
+    total = _integrals(
+        solutions, t, points, sides.normal, sides.feet, free, curve, knots, radii, gradient
+    )
+    for points, normal, feet, traction in _loaded(solutions, curve, float(radii.max())):
+        total += _integrals(solutions, t, points, normal, feet, traction, curve, knots, radii)
+    return total
+
+
+def _integrals(
+    solutions: Sequence[Solution],
+    t: int,
+    points: Points,
+    normal: Floats,
+    feet: Feet,
+    traction: Floats,
+    curve: FrontCurve,
+    knots: Floats,
+    radii: Floats,
+    gradient: Floats | None = None,
+) -> Floats:
+    space = solutions[0].space
+    tip = space.tips[t]
+    psi = space.cuts[tip.crack].level_set.psi[tip.number]
+    behind = np.einsum("qb,qb->q", psi[space.mesh.cells[points.cell]], points.bary) < 0
+    side, initial = points.side[:, tip.crack], initial_stresses(solutions)
+    return side_integrals(
+        curve, knots, feet, normal, points.weight, traction, side, behind,
+        solutions[0].problem.material, radii, gradient=gradient, initial=initial,
+    )  # fmt: skip
+
+
+def _loaded(
+    solutions: Sequence[Solution], curve: FrontCurve, reach: float
+) -> list[tuple[Points, Floats, Feet, Floats]]:
+    """Points on loaded facets within reach, with normals, feet and tractions of all states."""
+    space = solutions[0].space
+    mesh = space.mesh
+    result = []
+    for load in dict.fromkeys(load for s in solutions for load in s.loads):
+        if "traction" not in load.acts:
+            continue
+        facets = facet_set(mesh, load.where, load.name)
+        middle = mesh.points[facets].mean(axis=1)
+        size = np.linalg.norm(mesh.points[facets] - middle[:, None], axis=2).max(axis=1)
+        close = curve.distance(middle, reach + 2 * float(size.max())) <= reach + 2 * size
+        if not close.any():
+            continue
+        points, on_facets = outer_points(space, load)
+        near, feet = curve.near(on_facets.x, reach)
+        factor = np.array([sum(f for one, f in s.acting if one is load) for s in solutions])
+        traction = load.traction(on_facets)[near, :, None] * factor
+        result.append((points.chosen(near), on_facets.normal[near], feet, traction))
+    return result
+
+
+__all__ = []

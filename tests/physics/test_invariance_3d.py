@@ -1,0 +1,89 @@
+"""In 3D K depends neither on the numbers of nodes and cells nor on the order of corners in cells.
+
+On regular meshes, where the values that decide how cells are cut and integrated are often equal.
+All tolerances here are round-off: the same arithmetic on other numbers, with level sets of 1e-9.
+"""
+
+from itertools import permutations
+
+import numpy as np
+import pytest
+from scipy.spatial import cKDTree
+
+import xcrack as xc
+
+ROUND_OFF = 2e-8
+STRESS = np.array([[0.2, 0.1, 0.3], [0.1, -0.1, 0.2], [0.3, 0.2, 1.0]])
+STRAIN = 1.3 * STRESS - 0.3 * np.trace(STRESS) * np.eye(3)
+EVEN = np.array([p for p in permutations(range(4)) if np.linalg.det(np.eye(4)[list(p)]) > 0])
+INNER = xc.penny_crack((0.03, -0.02, 0.04), (0.3, -0.5, 1.0), 0.5)
+SURFACE = xc.penny_crack((0.03, -1.0, 0.04), (0.3, 0.0, 1.0), 0.5)
+
+
+def turn():
+    q = np.linalg.qr(np.random.default_rng(17).normal(size=(3, 3)))[0]
+    return q * np.sign(np.linalg.det(q))
+
+
+def corners_permuted(cells):
+    """The same cells, with another even permutation of the corners of each."""
+    drawn = EVEN[np.random.default_rng(3).integers(0, len(EVEN), len(cells))]
+    return np.take_along_axis(cells, drawn, axis=1)
+
+
+def renumbered(points, cells):
+    rng = np.random.default_rng(5)
+    order = rng.permutation(len(points))
+    return points[order], np.argsort(order)[cells][rng.permutation(len(cells))]
+
+
+def solved(crack, order, points, cells, to=None):
+    """K along the front of a crack in a cube that an even strain pulls, one side left free."""
+    to = np.eye(3) if to is None else to
+    points = points @ to.T
+    if np.linalg.det(to) < 0:
+        cells = cells[:, [1, 0, 2, 3]]
+    boundary = xc.Mesh(points, cells).boundary
+    free = np.abs((points[boundary].mean(axis=1) @ to)[:, 1] + 1) < 1e-9
+    mesh = xc.Mesh(points, cells, {"held": boundary[~free]})
+    support = xc.displacement("held", lambda x: (x @ to) @ STRAIN @ to.T)
+    faces = crack.faces if np.linalg.det(to) > 0 else crack.faces[:, [0, 2, 1]]
+    placed = xc.surface_crack(crack.points @ to.T, faces)
+    problem = xc.Problem(
+        mesh, xc.Isotropic(1.0, 0.3), [placed], supports=[support], order=order, contact="off"
+    )
+    sif = xc.stress_intensity(xc.solve(problem))
+    return sif.x @ to, sif.K
+
+
+@pytest.fixture(scope="module")
+def reference():
+    mesh, results = xc.box((-1, -1, -1), (1, 1, 1), 6), {}
+    for crack in (INNER, SURFACE):
+        for order in (1, 2):
+            results[crack, order] = solved(crack, order, mesh.points, mesh.cells)
+    return results
+
+
+@pytest.mark.parametrize("order", [1, 2])
+@pytest.mark.parametrize("crack", [INNER, SURFACE], ids=["inner", "surface"])
+@pytest.mark.parametrize("change", ["corners", "numbers", "turned", "mirrored"])
+def test_K(reference, crack, order, change):
+    mesh, to = xc.box((-1, -1, -1), (1, 1, 1), 6), None
+    points, cells = mesh.points, mesh.cells
+    if change == "mirrored":
+        to = np.diag([-1.0, 1.0, 1.0])
+    else:
+        cells = corners_permuted(cells)
+    if change in ("numbers", "turned"):
+        points, cells = renumbered(points, cells)
+    if change == "turned":
+        to = turn()
+    x, K = solved(crack, order, points, cells, to)
+    x_wanted, wanted = reference[crack, order]
+    away, at = cKDTree(x).query(x_wanted)
+    K = K[at]
+    if change == "mirrored":  # the sense of shear follows the frame
+        K, wanted = np.abs(K), np.abs(wanted)
+    assert away.max() < 1e-12
+    assert np.abs(K - wanted).max() <= ROUND_OFF * np.abs(wanted).max()
