@@ -218,3 +218,22 @@ def test_drawn_pennies_under_pressure_are_closed_all_along():
         assert sif.closed.all(), seed
         assert (sif.K_I == 0).all()
         assert np.abs(sif.K[:, 1:]).max() > 0.2
+
+
+@quiet
+def test_a_penny_that_sticks_has_no_K():
+    """Its faces never move: K is exactly zero, and what the integral gave is its spread."""
+    a, turn = 0.5, np.array([[0.8, 0, 0.6], [0, 1, 0], [-0.6, 0, 0.8]])
+    pressed = np.array([[0, 0, 0.2], [0, 0, 0], [0.2, 0, -1.0]])  # shear below 0.9 times pressure
+    strain = turn @ (1.3 * pressed - 0.3 * np.trace(pressed) * np.eye(3)) @ turn.T
+    mesh = xc.box((-1, -1, -1), (1, 1, 1), 6)
+    K = {}
+    for friction in (0.0, 0.9):
+        problem = xc.Problem(
+            mesh, xc.Isotropic(1.0, 0.3), [xc.penny_crack((0.03, -0.02, 0.04), turn[:, 2], a)],
+            supports=[xc.displacement("boundary", lambda x: x @ strain)], friction=friction,
+        )  # fmt: skip
+        K[friction] = xc.stress_intensity(xc.solve(problem))
+    assert np.abs(K[0.0].K).max() > 0.1
+    assert not K[0.9].K.any()
+    assert 0 < K[0.9].spread[:, 1:].max() < 0.1 * np.abs(K[0.0].K).max()

@@ -110,7 +110,8 @@ def acts(solutions: Sequence[Solution], *effects: str) -> bool:
     return any(load.acts.intersection(effects) for s in solutions for load in s.loads)
 
 
-# Closed tips and fronts: where crack faces (lips) press up to there, K_I is exactly zero.
+# Closed tips and fronts: where crack faces (lips) press up to there, K_I is exactly zero, and where
+# they have not moved at all, so is K.
 
 _STEEPEST = np.cos(np.pi / 4)  # of a point behind a place on a front: those beside it do not count
 
@@ -121,7 +122,8 @@ def with_closed(sif: SIF, solution: Solution, c: int, size: float) -> SIF:
     A place is closed where the lip point nearest to it, that is the one beside the front at its arc
     position, bears pressure of the multipliers; along a front also between two such places within a
     cell on either side. And it is closed where K_I came out negative, which crack faces that cannot
-    overlap do not have: they press over less than the multipliers resolve.
+    overlap do not have: they press over less than the multipliers resolve. With friction K is zero
+    in all modes where the faces beside a place have stuck from the first.
 
     Parameters
     ----------
@@ -139,7 +141,27 @@ def with_closed(sif: SIF, solution: Solution, c: int, size: float) -> SIF:
     K, spread = np.array(sif.K), np.array(sif.spread)
     spread[closed, 0] = np.abs(K[closed, 0])
     K[closed, 0] = 0.0
+    at_rest = _at_rest(sif, solution, c, size)
+    spread[at_rest] = np.maximum(spread[at_rest], np.abs(K[at_rest]))
+    K[at_rest] = 0.0
     return replace(sif, K=K, spread=spread, closed=closed)
+
+
+_REST = 1e-6  # slip over the largest displacement that is what solvers leave
+
+
+def _at_rest(sif: SIF, solution: Solution, c: int, size: float) -> Bools:
+    """Places beside which the faces of a cell have stuck and never slipped `(f,)`."""
+    contact = solution.contact[c]
+    if contact is None or contact.stuck is None or contact.slip is None or not len(contact.points):
+        return np.zeros(len(sif.x), dtype=bool)
+    slip = np.abs(contact.slip).reshape(len(contact.points), -1).max(axis=1)
+    largest = np.abs(solution.u).max(initial=0.0)
+    rests = np.asarray(contact.stuck) & (slip <= _REST * largest)
+    tree = cKDTree(contact.points)
+    around, nearest = tree.query_ball_point(sif.x, size), tree.query(sif.x)[1]
+    rows = [near or [first] for near, first in zip(around, nearest, strict=True)]
+    return np.array([rests[near].all() for near in rows], dtype=bool)
 
 
 def _without_gaps(closed: Bools, sif: SIF, size: float) -> Bools:
