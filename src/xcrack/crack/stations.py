@@ -12,6 +12,8 @@ from xcrack.crack.fronts_3d import front_frames
 from xcrack.mesh.locate import contains
 from xcrack.mesh.mesh import Mesh
 
+_ON = 1e-6  # of a side of a front, by which its end may miss the boundary
+
 
 @dataclass(frozen=True, eq=False)
 class Stations:
@@ -40,6 +42,22 @@ class Stations:
         return len(self.crack)
 
 
+def part_inside(mesh: Mesh, x: Floats, inside: Ints) -> tuple[int, int]:
+    """First vertex of an open front to count, and the one behind the last.
+
+    One beyond each end of the part in the body, where that does not end at a vertex: from there a
+    front is led out of the body in a direction of its own.
+    """
+    if not len(inside):
+        return 0, len(x)
+    first, last = int(inside[0]), int(inside[-1])
+    ahead = [min(max(k, 0), len(x) - 1) for k in (first - 1, last + 1)]
+    on = x[[first, last]] + _ON * (x[ahead] - x[[first, last]])
+    goes_on = contains(mesh, on)
+    first, last = (k if beyond else own for k, own, beyond in zip(ahead, (first, last), goes_on))
+    return (first, last + 1) if last > first else (0, len(x))
+
+
 def stations_of(cracks: Sequence[Crack], mesh: Mesh) -> Stations:
     """Stations of placed cracks in the body, in the order of `SIF` of each.
 
@@ -57,11 +75,15 @@ def stations_of(cracks: Sequence[Crack], mesh: Mesh) -> Stations:
                 rows.append((c, k, np.zeros(1), x[None], frame[None]))
         else:
             for k, front in enumerate(front_frames(crack)):
-                within = contains(mesh, np.array(front.x))
-                curve = front_curve(front.x, front.frame, front.closed)
-                s = curve.breaks[: len(front.x)]
-                frame = curve.at(s)[1]
-                rows.append((c, k, curve.arc(s)[within], front.x[within], frame[within]))
+                within = np.nonzero(contains(mesh, np.array(front.x)))[0]
+                whole = front_curve(front.x, front.frame, front.closed)
+                first, last = 0, len(front.x)
+                if not front.closed:
+                    first, last = part_inside(mesh, front.x, within)
+                part = front_curve(front.x[first:last], front.frame[first:last], front.closed)
+                frame = part.at(part.breaks[within - first])[1]
+                s = whole.arc(whole.breaks[within])
+                rows.append((c, k, s, front.x[within], frame))
     count = [len(row[2]) for row in rows]
     return Stations(
         lock(np.repeat([row[0] for row in rows], count).astype(np.int64)),

@@ -11,10 +11,10 @@ from xcrack.base.arrays import Bools, Floats, Ints, at, lock
 from xcrack.base.errors import warn
 from xcrack.base.threads import streamed
 from xcrack.crack.front_curve import Feet, FrontCurve, front_curve
+from xcrack.crack.stations import part_inside
 from xcrack.fem.loads import position
 from xcrack.fem.quadrature import cell_points, cell_side
 from xcrack.mesh.locate import contains
-from xcrack.mesh.mesh import Mesh
 from xcrack.mesh.simplex import leg_size
 from xcrack.sif.accuracy import Domain, check
 from xcrack.sif.common import (
@@ -58,7 +58,6 @@ _DIFFER = 0.05  # difference of two domains, as a share of the largest K, that g
 _DEPTH = 0.02  # of a front, where K is read that has no limit at a free surface
 _CHUNK = 1000  # cells integrated at once; bounds the memory
 _SAMPLES = 400  # points of an open front among which its way into the body is looked for
-_ON = 1e-6  # of a side of a front, by which its end may miss the boundary
 _IN_HAT = 9  # points on either side of a hat at which the room for its domain is looked at
 
 
@@ -117,7 +116,7 @@ def front_intensity(solutions: Sequence[Solution], t: int) -> list[SIF]:
     closed = bool(number[tip.number][0] == number[tip.number][-1])
     whole = front_curve(tip.x, tip.frame, closed)
     inside = np.nonzero(contains(space.mesh, np.array(tip.x)))[0]
-    first, last = (0, len(tip.x)) if closed else _part_inside(space.mesh, tip.x, inside)
+    first, last = (0, len(tip.x)) if closed else part_inside(space.mesh, tip.x, inside)
     curve = front_curve(tip.x[first:last], tip.frame[first:last], closed)
     s = curve.breaks[inside - first]
     x, frame, _ = curve.at(s)
@@ -174,22 +173,6 @@ def front_intensity(solutions: Sequence[Solution], t: int) -> list[SIF]:
         result.append(replace(sif, ends=known))
     check(solutions, t, values.domain, result)
     return result
-
-
-def _part_inside(mesh: Mesh, x: Floats, inside: Ints) -> tuple[int, int]:
-    """First vertex of an open front to count, and the one behind the last.
-
-    One beyond each end of the part in the body, where that does not end at a vertex: from there a
-    front is led out of the body in a direction of its own.
-    """
-    if not len(inside):
-        return 0, len(x)
-    first, last = int(inside[0]), int(inside[-1])
-    ahead = [min(max(k, 0), len(x) - 1) for k in (first - 1, last + 1)]
-    on = x[[first, last]] + _ON * (x[ahead] - x[[first, last]])
-    goes_on = contains(mesh, on)
-    first, last = (k if beyond else own for k, own, beyond in zip(ahead, (first, last), goes_on))
-    return (first, last + 1) if last > first else (0, len(x))
 
 
 def _surface_end(

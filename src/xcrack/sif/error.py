@@ -293,7 +293,7 @@ def _polygon(change: Floats, bar: Floats) -> str:
 # Bars of K along fronts in 3D: order 2 beside order 1, two domains and wider hats at order 2.
 
 # Half-width over the spread of a place and over its change with hats twice as wide.
-_SPREAD_OF_FRONT, _WIDENED = 4.0, 0.3
+_SPREAD_OF_FRONT, _WIDENED = 5.0, 0.5
 
 
 def front_bars(solutions: Sequence[Solution], sifs: Sequence[SIF], crack: int) -> list[Bars]:
