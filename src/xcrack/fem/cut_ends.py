@@ -159,8 +159,10 @@ def front_parts(
 def corner_places(mesh: Mesh, level_set: LevelSet, cells: Ints) -> Floats:
     """Corners of cells, the values of the level sets there as further coordinates `(k, d + 1, c)`.
 
-    Distances between them tell corners apart that cells of regular meshes have alike.
+    Distances between them tell corners apart that cells of regular meshes have alike; none in 2D.
     """
+    if mesh.dim == 2:  # rules on triangles are symmetric enough: their order may decide
+        return np.zeros((0, 3, 1))
     nodes = mesh.cells[cells]
     values = np.stack([level_set.phi, level_set.inside], axis=1)
     return np.concatenate([mesh.points[nodes], values[nodes]], axis=2)
