@@ -21,7 +21,7 @@ from xcrack.growth.trail import Control, FrontTrail, Overloads, Places, Trail
 from xcrack.linalg.reuse import Reuse, Slip
 from xcrack.runs import lock
 from xcrack.runs.store import PART, load, save, write_whole
-from xcrack.sif.sif import SIF, Bars
+from xcrack.sif.sif import SIF, Bars, SurfaceEnd
 
 HEADER = "run.json"
 BODY = "body.npz"
@@ -34,6 +34,7 @@ CLASSES: dict[str, type] = {
     "Places": Places, "Arrival": Arrival, "Join": Join, "Overloads": Overloads,
     "OverloadZones": OverloadZones, "BlockCycles": BlockCycles,
     "CycleIntegration": CycleIntegration, "Control": Control, "Bars": Bars,
+    "SurfaceEnd": SurfaceEnd,
 }  # fmt: skip
 
 
