@@ -35,7 +35,7 @@ class Sides:
     normal : (q, 3) array
         Out of the body.
     feet : Feet
-    held : (q,) array of bool
+    reaction : (q,) array of bool
         Where the traction is an unknown reaction that counts.
     smooth : (q,) array of bool
         On planes perpendicular to the front that hold the body along their normal alone.
@@ -46,7 +46,7 @@ class Sides:
     points: Points
     normal: Floats
     feet: Feet
-    held: Bools
+    reaction: Bools
     smooth: Bools
     names: tuple[str, ...]
 
@@ -76,14 +76,14 @@ def sides_around(solutions: Sequence[Solution], curve: FrontCurve, reach: float)
         return None
     points, normal = points.chosen(near), normal[near]
     facet = mesh.cell_to_facet[points.cell, points.bary.argmin(axis=1)]
-    axes, names = _held_axes(solutions, facet)
+    axes, names = _fixed_axes(solutions, facet)
     along = np.abs(np.einsum("qd,qd->q", normal, axes)) > 1 - _ALONG
     across = np.abs(np.einsum("qd,qd->q", normal, feet.frame[:, 2])) > _ACROSS
     smooth = (axes.sum(axis=1) == 1) & along & across
     return Sides(points, normal, feet, axes.any(axis=1) & ~smooth, smooth, names)
 
 
-def _held_axes(solutions: Sequence[Solution], facet: Ints) -> tuple[Floats, tuple[str, ...]]:
+def _fixed_axes(solutions: Sequence[Solution], facet: Ints) -> tuple[Floats, tuple[str, ...]]:
     """One where a direction is held on facets `(q, 3)`, else zero; and the sets that do it."""
     mesh = solutions[0].space.mesh
     axes, names = np.zeros((len(facet), 3)), []
@@ -94,9 +94,9 @@ def _held_axes(solutions: Sequence[Solution], facet: Ints) -> tuple[Floats, tupl
         own = np.isin(facet, numbers_of(mesh, facet_set(mesh, support.where, support.name)))
         if own.any():
             middle = mesh.points[mesh.facets[facet[own]]].mean(axis=1)
-            held = ~np.isnan(support.displacement_at(middle))
+            fixed = ~np.isnan(support.displacement_at(middle))
             # What is not the same everywhere along a side makes it no plane of symmetry.
-            axes[own] = np.maximum(axes[own], held if support.holds or support.is_uniform else 1.0)
+            axes[own] = np.maximum(axes[own], fixed if support.holds or support.is_uniform else 1.0)
             names.append(support.where)
     return axes, tuple(dict.fromkeys(names))
 
@@ -106,7 +106,7 @@ def room_beside(sides: Sides, curve: FrontCurve, knots: Floats) -> Floats:
     room = np.full(len(knots), np.inf)
     hat, share, _ = hats(curve, knots, sides.feet.s)
     for place, value in ((0, 1 - share), (1, share)):
-        counts = sides.held & (value > 0)
+        counts = sides.reaction & (value > 0)
         np.minimum.at(room, hat[counts, place], sides.feet.r[counts])
     return room
 
