@@ -58,6 +58,7 @@ _DIFFER = 0.05  # difference of two domains, as a share of the largest K, that g
 _DEPTH = 0.02  # of a front, where K is read that has no limit at a free surface
 _CHUNK = 1000  # cells integrated at once; bounds the memory
 _SAMPLES = 400  # points of an open front among which its way into the body is looked for
+_ON = 1e-9  # of the length of a front, by which a place at the top of a hat may miss it
 _IN_HAT = 9  # points on either side of a hat at which the room for its domain is looked at
 
 
@@ -139,7 +140,7 @@ def front_intensity(solutions: Sequence[Solution], t: int) -> list[SIF]:
         return [empty] * len(solutions)
     values = front_values(solutions, t, curve, ends)
     if not values.valid.any():
-        _warn_held(x, values)
+        _warn_unknown(x, values)
         return [empty] * len(solutions)
     depth = _depth(solutions[0], curve, ends)
     free = _free_ends(curve, values)
@@ -226,7 +227,7 @@ def way_inside(solution: Solution, curve: FrontCurve) -> tuple[float, float] | N
     return ends[0], ends[1]
 
 
-def _warn_held(x: Floats, values: FrontValues) -> None:
+def _warn_unknown(x: Floats, values: FrontValues) -> None:
     warn(
         f"the front from {at(x[0])} to {at(x[-1])} has no K: everywhere along it a side that is "
         f"held is nearer than {_LEAST:g} cells, and what that bears is unknown. K counts as 0 "
@@ -235,12 +236,13 @@ def _warn_held(x: Floats, values: FrontValues) -> None:
 
 
 def _covered(curve: FrontCurve, knots: Floats, valid: Bools, s: Floats) -> Bools:
-    """Which parameters lie between two valid tops of hats; ends of open fronts with them."""
+    """Which parameters lie at or between valid tops of hats; ends of open fronts with them."""
+    on = (np.abs(s[:, None] - knots[valid]) <= _ON * curve.length).any(axis=1)
     if curve.closed:
         left = np.mod(np.searchsorted(knots, s * (1 + 1e-12), side="right") - 1, len(knots))
-        return np.asarray(valid[left] & valid[(left + 1) % len(knots)])
+        return np.asarray(on | (valid[left] & valid[(left + 1) % len(knots)]))
     left = np.clip(np.searchsorted(knots, s, side="right") - 1, 0, len(knots) - 2)
-    return np.asarray(valid[left] & valid[left + 1])
+    return np.asarray(on | (valid[left] & valid[left + 1]))
 
 
 def front_values(
@@ -265,12 +267,12 @@ def front_values(
     knots = front_nodes(curve, _spacing(curve, ends, size), ends)
     sides = sides_around(solutions, curve, wanted)
     room = _room(solutions[0], t, curve, knots, size)
-    held = np.full(len(knots), np.inf) if sides is None else room_beside(sides, curve, knots)
+    beside = np.full(len(knots), np.inf) if sides is None else room_beside(sides, curve, knots)
     smooth = np.zeros(len(knots), dtype=bool)
     if sides is not None:
         smooth = on_smooth_planes(sides, curve, knots)
-    valid = held > _LEAST * size
-    room = np.where(valid, np.minimum(room, held), room)
+    valid = beside > _LEAST * size
+    room = np.where(valid, np.minimum(room, beside), room)
     radius = np.clip(room, _LEAST * size, wanted)
     radii = radius[:, None] * np.array([1.0, SECOND])
     outer = float(radius.max())
