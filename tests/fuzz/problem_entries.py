@@ -82,6 +82,7 @@ ENTRIES = [
             "patch": arg(Flag(), False),
             "points": arg(Whole(least=2, most=32), 4),
             "domain": arg(Number(optional=True, above=0), None, 0.5),
+            "depth": arg(Number(optional=True, above=0), None, 0.1),
             "linear": arg(Word(words=("auto", "direct", "iterative")), "auto"),
             "initial_set": arg(Word(words=("closed", "open")), "open"),
             "substeps": arg(Whole(least=1, most=10_000), 10, 1),

@@ -110,6 +110,13 @@ for _name in ("at_surface", "closed"):
 for _name in ("T", "domain_cells"):
     SIF[_name] = arg(Seen(rule=lambda v: (x := array(v)) is not None and x.shape == (1,)), [1.0])
 
+_WIDENED = Seen(rule=lambda v: v is None or ((x := array(v)) is not None and x.shape == (1, 2)))
+OF_FRONTS = {
+    "errors": arg(Seen(rule=lambda v: v is None), None),
+    "ends": arg(Seen(rule=lambda v: isinstance(v, tuple) and not v), ()),
+    "widened": arg(_WIDENED, None, [(0.0, 0.0)]),
+}
+
 
 def _solved_by(function):
     return xc.solve(scenes.problem(), solver=function)
@@ -234,7 +241,7 @@ ENTRIES = [
         },
         cost=0.04,
     ),
-    Entry("SIF", xc.SIF, SIF | {"errors": arg(Seen(rule=lambda v: v is None), None)}),
+    Entry("SIF", xc.SIF, SIF | OF_FRONTS),
     Entry(
         "measures",
         xc.measures,

@@ -8,7 +8,7 @@ import numpy as np
 
 from xcrack.base import markup
 from xcrack.base.arrays import Bools, Floats, Ints, lock
-from xcrack.base.checks import entries, numbers, shown, whole_numbers
+from xcrack.base.checks import numbers, shown, whole_numbers
 from xcrack.base.errors import ProblemError
 from xcrack.base.optional import required
 
@@ -167,7 +167,8 @@ class SIF:
             numbers(self.widened, "SIF: widened", (n, d), finite=False)
         if self.errors is not None and not isinstance(self.errors, Bars):
             raise ProblemError(f"SIF: errors = {shown(self.errors)}: give Bars or None.")
-        if not all(isinstance(end, SurfaceEnd) for end in entries(self.ends, "SIF: ends")):
+        known = isinstance(self.ends, tuple)
+        if not known or not all(isinstance(end, SurfaceEnd) for end in self.ends):
             raise ProblemError(f"SIF: ends = {shown(self.ends)}: give a tuple of SurfaceEnd.")
 
     @property
