@@ -153,7 +153,9 @@ _REST = 1e-6  # slip over the largest displacement that is what solvers leave
 def _at_rest(sif: SIF, solution: Solution, c: int, size: float) -> Bools:
     """Places beside which the faces of a cell have stuck and never slipped `(f,)`."""
     contact = solution.contact[c]
-    if contact is None or contact.stuck is None or contact.slip is None or not len(contact.points):
+    if contact is None or not len(contact.points):
+        return np.zeros(len(sif.x), dtype=bool)
+    if contact.shear is None or contact.stuck is None or contact.slip is None:  # no friction
         return np.zeros(len(sif.x), dtype=bool)
     slip = np.abs(contact.slip).reshape(len(contact.points), -1).max(axis=1)
     largest = np.abs(solution.u).max(initial=0.0)
