@@ -181,22 +181,24 @@ def test_split_by_three_cracks():
     np.testing.assert_allclose(bary[number == 2, :, 1], [[0, 0.5], [0.5, 1]])
 
 
+@pytest.mark.parametrize("by_place", [False, True])
 @pytest.mark.parametrize("n", [3, 4])
-def test_cut_simplices_fill_their_parents(n):
+def test_cut_simplices_fill_their_parents(n, by_place):
     """Shares are determinants, sum to one, and phi has one sign on each part."""
     rng = np.random.default_rng(1201)
     phi = rng.normal(size=(500, n))
     phi[rng.random(phi.shape) < 0.1] = 0
     phi = phi[(phi.min(axis=1) < 0) & (phi.max(axis=1) > 0)]
-    bary, fraction, side, parent = cut_simplices(phi, 1e-30)
+    x = rng.normal(size=(len(phi) if by_place else 0, n, n - 1))
+    bary, fraction, side, parent = cut_simplices(phi, x, 1e-30)
     np.testing.assert_allclose(fraction, np.abs(np.linalg.det(bary)), atol=1e-15)
     np.testing.assert_allclose(np.bincount(parent, fraction), 1, rtol=1e-14)
     at = np.einsum("svb,sb->sv", bary, phi[parent]) * side[:, None]
     assert at.min() >= -1e-15
-    lips, of = interface_simplices(phi)
+    lips, of = interface_simplices(phi, x)
     np.testing.assert_allclose(np.einsum("svb,sb->sv", lips, phi[of]), 0, atol=1e-15)
-    assert len(cut_simplices(np.abs(phi), 1e-30)[0]) == 0
-    assert len(interface_simplices(np.abs(phi))[0]) == 0
+    assert len(cut_simplices(np.abs(phi), x, 1e-30)[0]) == 0
+    assert len(interface_simplices(np.abs(phi), x)[0]) == 0
 
 
 @pytest.mark.parametrize("count", [1, 3, 4])
