@@ -8,7 +8,7 @@ import numpy as np
 
 from xcrack.analysis.solution import Solution
 from xcrack.analysis.solve import solve_states
-from xcrack.base.arrays import Bools, Floats, at
+from xcrack.base.arrays import Bools, Floats, Ints, at
 from xcrack.base.errors import ProblemError
 from xcrack.crack.measures import surface_size
 from xcrack.model.problem import Problem
@@ -153,11 +153,16 @@ def values(
 def counted(sif: SIF, beside: float) -> Bools:
     """Places of a crack whose K the tolerance is asked of: those away from free surfaces."""
     result = ~sif.at_surface
-    for front in np.unique(sif.front[sif.at_surface]):
+    for front in ending_fronts(sif):
         own = sif.front == front
         s = sif.s[own]
         result[own] &= np.minimum(s - s.min(), s.max() - s) >= beside
     return np.asarray(result)
+
+
+def ending_fronts(sif: SIF) -> Ints:
+    """Numbers of the fronts of a crack that end at a side of the body."""
+    return np.union1d(sif.front[sif.at_surface], [end.front for end in sif.ends]).astype(np.int64)
 
 
 def _beside_in_3d(problem: Problem) -> tuple[float, ...]:
@@ -176,4 +181,4 @@ def live_states(given: Measured) -> list[int]:
     return [k for k, s in enumerate(given.solutions) if not s.at_rest]
 
 
-__all__ = ["Measured", "counted", "live_states", "measured", "values"]
+__all__ = ["Measured", "counted", "ending_fronts", "live_states", "measured", "values"]

@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial import cKDTree
 
-from xcrack.adaptivity.measured import Measured, counted, live_states, values
+from xcrack.adaptivity.measured import Measured, counted, ending_fronts, live_states, values
 from xcrack.adaptivity.outlines_3d import CELLS
 from xcrack.adaptivity.resolved import resolved
 from xcrack.base.arrays import Floats
@@ -110,7 +110,7 @@ def trusted(new: Measured, old: Measured | None) -> Measured:
 
 def _longer(sif: SIF) -> SIF:
     """Bars as long as corner cracks on coarse cells ask for."""
-    ends = np.isin(sif.front, np.unique(sif.front[sif.at_surface]))
+    ends = np.isin(sif.front, ending_fronts(sif))
     if not ends.any():
         return sif
     bar = np.where(ends[:, None], _OPEN, 1.0) * sif.bar
