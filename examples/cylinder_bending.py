@@ -410,7 +410,7 @@ axes[0].axhspan(low, 0, color="C3", alpha=0.07, lw=0)
 axes[0].set_ylim(low, high)
 axes[0].text(0.45, 0.03, "$K_I$ < 0: the faces overlap", color="C3", transform=axes[0].transAxes)
 axes[0].legend(fontsize="small", frameon=False)
-axes[2].set_xlabel("y along the front, mm (hollow: at the free surface, extrapolated)")
+axes[2].set_xlabel("y along the front, mm (hollow: K of a depth below the free surface)")
 figure.savefig(OUT / "K_at_the_turn.png", dpi=150)
 
 # %% Size of the crack over the cycles

@@ -6,8 +6,8 @@ compared with the equations of Newman and Raju (1981), which they fitted to fini
 so the equations give K of every step, and the life.
 
 Where the front meets the surface, K in the usual sense does not exist: the singularity there is of
-a different order. The library marks these places and extrapolates K to them from inside; they are
-drawn hollow.
+a different order. The library marks these places and gives them K of a depth of 2 % of the front;
+they are drawn hollow.
 
 Units: N, mm, MPa; K in MPa √mm. Pictures, ParaView files and tables go to
 out/semi_elliptic_growth.
