@@ -7,7 +7,7 @@ import scipy.sparse as sp
 
 from xcrack.base.arrays import Bools, Floats, Ints, offsets
 from xcrack.fem.function_space import FunctionSpace
-from xcrack.fem.quadrature import lip_side, radius_at, segment_points, triangle_points
+from xcrack.fem.quadrature import lip_side, quarters, radius_at, segment_points, triangle_points
 from xcrack.mesh.mesh import Mesh, numbers_of
 from xcrack.mesh.split import cut_simplices
 
@@ -42,7 +42,7 @@ def split_facets(space: FunctionSpace, ends: Ints) -> FacetParts:
 
 
 def part_points(
-    space: FunctionSpace, nodes: Ints, bary: Floats, n: int = 6
+    space: FunctionSpace, nodes: Ints, bary: Floats, n: int = 6, halvings: int = 0
 ) -> tuple[Ints, Floats, Floats]:
     """Integration points on segments or triangles inside simplices, graded towards tips.
 
@@ -57,6 +57,9 @@ def part_points(
         Vertices of the parts in them.
     n : int
         Gauss points of a segment.
+    halvings : int
+        How often triangles nearer to a front than they are large are halved: rules suit the inverse
+        root of the distance to it, products of two such fields need more.
 
     Returns
     -------
@@ -68,25 +71,39 @@ def part_points(
         Length or area.
     """
     x = np.einsum("svm,smd->svd", bary, space.mesh.points[nodes])
-    return _POINTS[space.dim](space, x, nodes, bary, n)
+    return _POINTS[space.dim](space, x, nodes, bary, n, halvings)
 
 
 def _on_segments(
-    space: FunctionSpace, x: Floats, nodes: Ints, bary: Floats, n: int
+    space: FunctionSpace, x: Floats, nodes: Ints, bary: Floats, n: int, halvings: int
 ) -> tuple[Ints, Floats, Floats]:
     return segment_points(space, np.ascontiguousarray(x[:, 0]), np.ascontiguousarray(x[:, 1]), n)
 
 
 def _on_triangles(
-    space: FunctionSpace, x: Floats, nodes: Ints, bary: Floats, n: int
+    space: FunctionSpace, x: Floats, nodes: Ints, bary: Floats, n: int, halvings: int
 ) -> tuple[Ints, Floats, Floats]:
-    sides = x[:, [1, 2, 0]] - x
-    size = np.linalg.norm(sides, axis=2).max(axis=1)
-    number, place, share = triangle_points(radius_at(space, nodes, bary), size)
-    area = np.linalg.norm(np.cross(sides[:, 0], sides[:, 2]), axis=1) / 2
-    order = np.argsort(number, kind="stable")
-    number = number[order]
-    return number, place[order], area[number] * share[order]
+    area = np.linalg.norm(np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]), axis=1) / 2
+    of, corner = np.arange(len(x)), np.broadcast_to(np.eye(3), (len(x), 3, 3))
+    r, size = radius_at(space, nodes, bary), _longest_side(x)
+    share = np.ones(len(x))
+    for _ in range(halvings):
+        near = r.min(axis=1) < size
+        parts = np.einsum("cvw,swb->scvb", quarters(), corner[near]).reshape(-1, 3, 3)
+        of = np.concatenate([of[~near], np.repeat(of[near], 4)])
+        corner = np.concatenate([corner[~near], parts])
+        share = np.concatenate([share[~near], np.repeat(share[near] / 4, 4)])
+        size = np.concatenate([size[~near], np.repeat(size[near] / 2, 4)])
+        r = radius_at(space, nodes[of], corner @ bary[of])
+    number, place, rule = triangle_points(r, size)
+    place = np.einsum("qv,qvb->qb", place, corner[number])
+    weight = (area[of] * share)[number] * rule
+    order = np.argsort(of[number], kind="stable")
+    return of[number[order]], place[order], weight[order]
+
+
+def _longest_side(x: Floats) -> Floats:
+    return np.asarray(np.linalg.norm(x[:, [1, 2, 0]] - x, axis=2).max(axis=1))
 
 
 def _split_segments(space: FunctionSpace, ends: Ints) -> FacetParts:

@@ -48,7 +48,7 @@ def load_vector(
     return f.ravel()
 
 
-def outer_points(space: FunctionSpace, load: Load) -> tuple[Points, FacetPoints]:
+def outer_points(space: FunctionSpace, load: Load, halvings: int = 0) -> tuple[Points, FacetPoints]:
     """Points of integration on the facet set of a load, and what it is asked at them.
 
     Raises
@@ -63,7 +63,7 @@ def outer_points(space: FunctionSpace, load: Load) -> tuple[Points, FacetPoints]
             f"{load.name}: {int(inner.sum())} of its facets lie inside the body; loads act on the "
             "boundary only."
         )
-    points, normal = facet_points(space, facets)
+    points, normal = facet_points(space, facets, halvings=halvings)
     x = position(space, points.cell, points.bary)
     return points, FacetPoints(space.mesh, facets, x, normal, points.weight)
 
@@ -98,13 +98,18 @@ def body_points(space: FunctionSpace) -> Points:
     return cell_points(space, cells, 5, space.order + 2)
 
 
-def facet_points(space: FunctionSpace, facets: Ints, n: int = 6) -> tuple[Points, Floats]:
-    """Points on boundary facets with their outward normals; weights are lengths or areas."""
+def facet_points(
+    space: FunctionSpace, facets: Ints, n: int = 6, halvings: int = 0
+) -> tuple[Points, Floats]:
+    """Points on boundary facets with their outward normals; weights are lengths or areas.
+
+    `n` and `halvings` are those of `part_points`.
+    """
     mesh = space.mesh
     number = numbers_of(mesh, facets)
     cell = mesh.facet_to_cell[number, 0]
     parts = split_facets(space, facets)
-    k, place, weight = part_points(space, facets[parts.number], parts.bary, n)
+    k, place, weight = part_points(space, facets[parts.number], parts.bary, n, halvings)
     owner = parts.number[k]
     c = cell[owner]
     # Place of each point of the facet among those of its cell.

@@ -450,8 +450,8 @@ def triangle_points(r: Floats, size: Floats, degree: int = 4) -> tuple[Ints, Flo
         rows = np.nonzero(near)[0]
         number, share = np.repeat(number[rows], 4), np.repeat(share[rows] / 4, 4)
         size = np.repeat(size[rows] / 2, 4)
-        corner = np.einsum("cvw,swb->scvb", _quarters(), corner[rows]).reshape(-1, 3, 3)
-        r = np.einsum("cvw,sw->scv", _quarters(), r[rows]).reshape(-1, 3)
+        corner = np.einsum("cvw,swb->scvb", quarters(), corner[rows]).reshape(-1, 3, 3)
+        r = np.einsum("cvw,sw->scv", quarters(), r[rows]).reshape(-1, 3)
     a, b, c = (np.concatenate(p) for p in zip(*parts, strict=True))
     return a, b, c
 
@@ -477,7 +477,8 @@ def _corner_rule() -> tuple[Floats, Floats]:
 
 
 @lru_cache(maxsize=1)
-def _quarters() -> Floats:
+def quarters() -> Floats:
+    """Barycentric corners of the four equal parts of a triangle `(4, 3, 3)`."""
     a, b, c = np.eye(3)
     ab, bc, ca = (a + b) / 2, (b + c) / 2, (c + a) / 2
     return lock(np.array([[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]))

@@ -22,6 +22,7 @@ from xcrack.sif.common import initial_stresses
 from xcrack.sif.interaction_3d import hats, side_integrals
 
 _ALONG = 1e-6  # of a unit normal beside an axis: a plane across that axis
+_HALVINGS = 4  # of facets beside a front: two fields that go like the inverse root are multiplied
 _ACROSS = 0.999  # least cosine between a front and the normal of a plane perpendicular to it
 
 
@@ -70,7 +71,7 @@ def sides_around(solutions: Sequence[Solution], curve: FrontCurve, reach: float)
     facets = facets[curve.distance(middle, reach + 2 * float(size.max())) <= reach + 2 * size]
     if not len(facets):
         return None
-    points, normal = facet_points(space, facets)
+    points, normal = facet_points(space, facets, halvings=_HALVINGS)
     near, feet = curve.near(position(space, points.cell, points.bary), reach)
     if not len(near):
         return None
@@ -194,7 +195,7 @@ def _loaded(
         close = curve.distance(middle, reach + 2 * float(size.max())) <= reach + 2 * size
         if not close.any():
             continue
-        points, on_facets = outer_points(space, load)
+        points, on_facets = outer_points(space, load, _HALVINGS)
         near, feet = curve.near(on_facets.x, reach)
         factor = np.array([sum(f for one, f in s.acting if one is load) for s in solutions])
         traction = load.traction(on_facets)[near, :, None] * factor
