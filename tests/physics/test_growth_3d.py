@@ -17,6 +17,7 @@ STEEL = xc.Isotropic(E=210e3, nu=0.3)
 LAW = xc.paris(C=1e-11, m=3.0)
 PULL = [xc.traction("top", (0, 0, 100.0)), xc.traction("bottom", (0, 0, -100.0))]
 CENTER = (0.013, -0.021, 0.0317)
+CELLS = 20  # a side, of an inclined penny that turns
 
 
 def in_cube(n, crack, loads=PULL, **options):
@@ -85,7 +86,7 @@ def check_front(step, size, *, closed=True):
 @pytest.fixture(scope="module", params=["pec", "euler"])
 def turned_penny(request):
     run = xc.grow(
-        inclined(14), LAW, xc.max_hoop_stress, xc.Cycle(0.0, 1.0), da=0.06, max_steps=5,
+        inclined(CELLS), LAW, xc.max_hoop_stress, xc.Cycle(0.0, 1.0), da=0.06, max_steps=5,
         progress=False, integrator=request.param,
     )  # fmt: skip
     return list(run)
@@ -97,7 +98,7 @@ def test_inclined_penny_keeps_its_front_and_its_surface(turned_penny):
     assert len(turned_penny) == 5
     check_frozen(turned_penny)
     for step in turned_penny:
-        check_front(step, 2.0 / 14)
+        check_front(step, 2.0 / CELLS)
 
 
 @pytest.mark.slow
@@ -123,7 +124,7 @@ def test_level_sets_are_exact_against_the_faces(turned_penny):
     for step in turned_penny[::2]:
         space = step.solutions[0].space
         crack, level = space.cracks[0], space.cuts[0].level_set
-        size = 2.0 / 14
+        size = 2.0 / CELLS
         x = space.mesh.points
         near = (np.abs(level.phi) < size) & (level.psi[0] < -0.2 * size)
         wanted = distance_to_faces(x[near], crack.points, crack.faces)
