@@ -186,7 +186,7 @@ def test_an_ellipse_becomes_a_circle_in_few_steps():
     for integrator, steps in (("pec", 4), ("euler", 4), ("pec", 8)):
         crack = xc.elliptic_crack(CENTER, (0, 0, 1), (1, 0, 0), 0.42, 0.25, n=64)
         run = xc.grow(
-            in_cube(16, crack, contact="off"), LAW, xc.max_hoop_stress, xc.Cycle(0.0, 1.0),
+            in_cube(22, crack, contact="off"), LAW, xc.max_hoop_stress, xc.Cycle(0.0, 1.0),
             da=0.2 / steps, max_steps=steps + 1, progress=False, integrator=integrator,
         )  # fmt: skip
         history = xc.collect(run, keep_solutions=False)
