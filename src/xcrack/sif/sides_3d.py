@@ -40,8 +40,6 @@ class Sides:
         Where the traction is an unknown reaction that counts.
     smooth : (q,) array of bool
         On planes perpendicular to the front that hold the body along their normal alone.
-    names : tuple of str
-        Facet sets that hold the body there.
     """
 
     points: Points
@@ -49,7 +47,6 @@ class Sides:
     feet: Feet
     reaction: Bools
     smooth: Bools
-    names: tuple[str, ...]
 
 
 def sides_around(solutions: Sequence[Solution], curve: FrontCurve, reach: float) -> Sides | None:
@@ -77,17 +74,17 @@ def sides_around(solutions: Sequence[Solution], curve: FrontCurve, reach: float)
         return None
     points, normal = points.chosen(near), normal[near]
     facet = mesh.cell_to_facet[points.cell, points.bary.argmin(axis=1)]
-    axes, names = _fixed_axes(solutions, facet)
+    axes = _fixed_axes(solutions, facet)
     along = np.abs(np.einsum("qd,qd->q", normal, axes)) > 1 - _ALONG
     across = np.abs(np.einsum("qd,qd->q", normal, feet.frame[:, 2])) > _ACROSS
     smooth = (axes.sum(axis=1) == 1) & along & across
-    return Sides(points, normal, feet, axes.any(axis=1) & ~smooth, smooth, names)
+    return Sides(points, normal, feet, axes.any(axis=1) & ~smooth, smooth)
 
 
-def _fixed_axes(solutions: Sequence[Solution], facet: Ints) -> tuple[Floats, tuple[str, ...]]:
-    """One where a direction is held on facets `(q, 3)`, else zero; and the sets that do it."""
+def _fixed_axes(solutions: Sequence[Solution], facet: Ints) -> Floats:
+    """One where a direction is held on facets `(q, 3)`, else zero."""
     mesh = solutions[0].space.mesh
-    axes, names = np.zeros((len(facet), 3)), []
+    axes = np.zeros((len(facet), 3))
     loads = [load for s in solutions for load in s.loads if isinstance(load, Support)]
     for support in dict.fromkeys([*solutions[0].problem.supports, *loads]):
         if not isinstance(support.where, str):
@@ -98,8 +95,7 @@ def _fixed_axes(solutions: Sequence[Solution], facet: Ints) -> tuple[Floats, tup
             fixed = ~np.isnan(support.displacement_at(middle))
             # What is not the same everywhere along a side makes it no plane of symmetry.
             axes[own] = np.maximum(axes[own], fixed if support.holds or support.is_uniform else 1.0)
-            names.append(support.where)
-    return axes, tuple(dict.fromkeys(names))
+    return axes
 
 
 def room_beside(sides: Sides, curve: FrontCurve, knots: Floats) -> Floats:
