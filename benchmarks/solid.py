@@ -37,10 +37,10 @@ from xcrack.fem.facets import lip_points  # noqa: E402
 from xcrack.fem.function_space import function_space  # noqa: E402
 from xcrack.fem.loads import load_vector  # noqa: E402
 from xcrack.fem.supports import known_unknowns  # noqa: E402
-from xcrack.fem.system import Model, levels  # noqa: E402
+from xcrack.fem.system import System, levels  # noqa: E402
 from xcrack.linalg.engine import ContactRows  # noqa: E402
 from xcrack.linalg.iterative import iterative_system  # noqa: E402
-from xcrack.linalg.rigid_motion import balanced, free_motion  # noqa: E402
+from xcrack.linalg.rigid_motion import balanced_loads, free_motion  # noqa: E402
 
 ROOT = Path(__file__).resolve().parent.parent
 SIZES = (18, 29, 44, 67)
@@ -91,7 +91,7 @@ def measure(n: int) -> dict[str, object]:
     K = Stiffness(plain.matrix, enriched)
     beside = next_to_enriched(where)
     known = known_unknowns(where, ())
-    model = Model(where, lips, plain, enriched, known, n_points)
+    model = System(where, lips, plain, enriched, known, n_points)
     motion = timed("set-up", free_motion, where, known.fixed)
     engine = timed(
         "set-up", iterative_system, where, K, plain, known.fixed, None, motion.modes, None, beside
@@ -100,7 +100,7 @@ def measure(n: int) -> dict[str, object]:
         sum(load_vector(where, problem.material, x, lips) for x in s) for s in STATES.values()
     ]
     loads = np.stack(vectors, axis=1)
-    f = balanced(where, motion, loads)[0]
+    f = balanced_loads(where, motion, loads)[0]
     u = timed("open solves", engine.solve, f)
     open_steps = engine.count.iterations
     chosen = timed("contact", multipliers, where, 0, lips[0], "reduced")

@@ -119,7 +119,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--scenes", nargs="*", default=list(SCENES), choices=list(SCENES))
     parser.add_argument("--size", type=int, default=40, help="cells a side in 3D")
-    parser.add_argument("--most", type=int, default=threads.available())
+    parser.add_argument("--most", type=int, default=threads.available_processors())
     parser.add_argument("--rounds", type=int, default=3)
     parser.add_argument("--json", type=Path)
     parser.add_argument("--figure", type=Path)

@@ -69,7 +69,7 @@ class Scene:
 
 
 @dataclass(frozen=True)
-class Solved:
+class LevelSolution:
     """A solved scene; `alive` has what GetFEM needs but does not keep alive itself."""
 
     scene: Scene
@@ -116,7 +116,7 @@ def answered(request: dict[str, Any]) -> dict[str, Any]:
     return {"errors": errors, "unknowns": solved.unknowns, **took}
 
 
-def run(name: str, n: int, order: int, seed: int | None) -> tuple[Solved, dict[str, float]]:
+def run(name: str, n: int, order: int, seed: int | None) -> tuple[LevelSolution, dict[str, float]]:
     """Solve a scene and compare K and pressures with the exact ones."""
     solved = solution(SCENES[name], n, order, seed)
     K = [intensity(solved, *tip) for tip in solved.scene.tips]
@@ -131,7 +131,7 @@ def run(name: str, n: int, order: int, seed: int | None) -> tuple[Solved, dict[s
     return solved, {name: float(value) for name, value in errors.items()}
 
 
-def solution(scene: Scene, n: int, order: int, seed: int | None) -> Solved:
+def solution(scene: Scene, n: int, order: int, seed: int | None) -> LevelSolution:
     """Displacements, and pressures where there is contact, of a lattice of n x n rectangles."""
     lines = lattice(scene.half, n, seed)
     mesh = gf.Mesh("cartesian", *lines)
@@ -164,7 +164,7 @@ def solution(scene: Scene, n: int, order: int, seed: int | None) -> Solved:
     count, converged = model.solve("max_res", 1e-8, "max_iter", steps, "lsolver", "mumps")
     if not converged:
         raise RuntimeError(f"no solution after {count} steps")
-    return Solved(
+    return LevelSolution(
         scene, lines, mesh, cells, corners, volume, model, int(space.nbdof()), lips,
         (crack, cut, space, *parts),
     )  # fmt: skip
@@ -266,7 +266,7 @@ def sparse(values: Any) -> Any:
     return matrix
 
 
-def points(solved: Solved, rule: Any, cells: Any) -> tuple[Any, Any]:
+def points(solved: LevelSolution, rule: Any, cells: Any) -> tuple[Any, Any]:
     """Places (q, 2) and weights (q,) of the integration points of cells."""
     x, y, weight = rule.im_nodes(np.array([cells], dtype=np.int32))
     for at, lines in zip((x, y), solved.lines):  # weights of GetFEM are those of a unit cell
@@ -274,7 +274,7 @@ def points(solved: Solved, rule: Any, cells: Any) -> tuple[Any, Any]:
     return np.stack([x, y], axis=1), weight
 
 
-def gradients(solved: Solved, rule: Any, cells: Any) -> Any:
+def gradients(solved: LevelSolution, rule: Any, cells: Any) -> Any:
     """Displacement gradients (q, 2, 2) at those points."""
     solved.mesh.set_region(RING_CELLS, np.array([cells]))
     data = gf.MeshImData(rule, RING_CELLS, [2, 2])
@@ -282,7 +282,7 @@ def gradients(solved: Solved, rule: Any, cells: Any) -> Any:
     return np.swapaxes(flat.reshape(-1, 2, 2), 1, 2)  # columns come first
 
 
-def intensity(solved: Solved, tip: float, ahead: float) -> Any:
+def intensity(solved: LevelSolution, tip: float, ahead: float) -> Any:
     """K_I and K_II by the interaction integral over a ring around a tip.
 
     The pressure between the crack faces works on the opening of the auxiliary field of mode I.
@@ -314,13 +314,13 @@ def intensity(solved: Solved, tip: float, ahead: float) -> Any:
     return K
 
 
-def pressures(solved: Solved, x: Any) -> Any:
+def pressures(solved: LevelSolution, x: Any) -> Any:
     """Pressure between the crack faces at places along them."""
     at = np.stack([x, np.zeros_like(x)])
     return solved.model.interpolation("p", at, solved.mesh, LIPS)
 
 
-def pressure_error(solved: Solved) -> float:
+def pressure_error(solved: LevelSolution) -> float:
     """Relative error of the pressure, root of the mean square along the crack."""
     x, weight = points(solved, solved.lips, solved.mesh.region(LIPS)[0])
     assert solved.scene.pressure is not None
@@ -329,7 +329,7 @@ def pressure_error(solved: Solved) -> float:
     return float(np.sqrt(weight @ wrong**2 / (weight @ exact**2)))
 
 
-def energy_error(solved: Solved) -> float:
+def energy_error(solved: LevelSolution) -> float:
     """Relative error in the energy norm, by finer integration than that of the solution."""
     fine = gf.MeshIm("levelset", solved.alive[1], "all", *rules(4, 9, 14))
     x, weight = points(solved, fine, solved.cells)

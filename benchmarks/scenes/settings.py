@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 import xcrack as xc
-from xcrack.adaptivity.adapted import Adapted
+from xcrack.adaptivity.adaptation import Adaptation
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ def mesh_of(s: Settings, half: float, dim: int, seed: int) -> xc.Mesh:
     return xc.Mesh(x, plain.cells, plain.facet_sets)
 
 
-def adapted(problem: xc.Problem, tolerance: float) -> Adapted:
+def adapted(problem: xc.Problem, tolerance: float) -> Adaptation:
     """The scene on the mesh that `adapt` makes, without warnings."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", xc.XcrackWarning)

@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 
 from xcrack.base.arrays import Floats
-from xcrack.base.checks import number, numbers, shown
+from xcrack.base.checks import number, numbers, value_text
 from xcrack.base.errors import ProblemError
-from xcrack.fatigue.checks import wants
+from xcrack.fatigue.checks import law_needs
 from xcrack.fatigue.criteria import Criterion
 from xcrack.fatigue.law import Law
 
@@ -54,9 +54,9 @@ def check_law(law: Law, dK_max: float = 100.0, a: float = 1.0) -> None:
     size = np.full(len(dK), a)
 
     def asked(dK: Floats, R: Floats) -> Floats:
-        return law(dK, R, **wants(law, dK, R, size[: len(dK)]))
+        return law(dK, R, **law_needs(law, dK, R, size[: len(dK)]))
 
-    rate = _called(asked, (dK, R), wrong, "da/dN")
+    rate = _call_law(asked, (dK, R), wrong, "da/dN")
     if rate is not None:
         if rate.shape != dK.shape:
             wrong.append(f"for {len(dK)} points it returns shape {rate.shape}, not {dK.shape}")
@@ -70,9 +70,9 @@ def _is_within(R: float, bounds: tuple[float, float] | None) -> bool:
 
 
 def _check_rates(law: Law, dK: Floats, R: Floats, rate: Floats, wrong: list[str]) -> None:
-    bad = np.isnan(rate)
-    if bad.any():
-        i = int(np.argmax(bad))
+    is_missing = np.isnan(rate)
+    if is_missing.any():
+        i = int(np.argmax(is_missing))
         wrong.append(f"da/dN = {rate[i]} for dK_eq = {dK[i]}, R = {R[i]}: it must be a number")
         return
     if (rate < 0).any():
@@ -93,7 +93,7 @@ def _check_rates(law: Law, dK: Floats, R: Floats, rate: Floats, wrong: list[str]
         wrong.append(
             f"da/dN falls when dK_eq grows from {dK[n * i]} to {dK[n * i + n]} at R = {R[j]}"
         )
-    alone = [_called(law, (dK[i : i + 1], R[i : i + 1]), wrong, "da/dN") for i in range(len(dK))]
+    alone = [_call_law(law, (dK[i : i + 1], R[i : i + 1]), wrong, "da/dN") for i in range(len(dK))]
     if any(one is None or one.size != 1 for one in alone):
         wrong.append("for one point it does not return one rate")
         return
@@ -141,7 +141,7 @@ def _check_modes(criterion: Criterion, nu: float, modes: int, wrong: list[str]) 
     generator = np.random.default_rng(68712)
     K = generator.uniform(-0.4, 0.4, (3, 7, modes))
     K[..., 0] = generator.uniform(0.5, 1.5, (3, 7))
-    first = _answered(criterion, K, nu, wrong)
+    first = _answer_of(criterion, K, nu, wrong)
     if first is None:
         return
     angle, dK, R = first
@@ -155,8 +155,8 @@ def _check_modes(criterion: Criterion, nu: float, modes: int, wrong: list[str]) 
     unloaded = np.zeros_like(K)
     closed, negative = K.copy(), K.copy()
     closed[0, :, 0], negative[0, :, 0] = 0.0, -0.5
-    at_closed = _answered(criterion, closed, nu, wrong)
-    same = {
+    at_closed = _answer_of(criterion, closed, nu, wrong)
+    same_modes = {
         "states in another order": (K[::-1], (angle, dK, R)),
         "four times the load": (4 * K, (angle, 4 * dK, R)),
         "K_II and K_III reversed": (K * mirror, (-angle, dK, R)),
@@ -164,9 +164,9 @@ def _check_modes(criterion: Criterion, nu: float, modes: int, wrong: list[str]) 
         "no load": (unloaded, (0 * angle, 0 * dK, 0 * R)),
     }
     if at_closed is not None:
-        same["a state with K_I < 0 instead of 0"] = (negative, at_closed)
-    for what, (changed, expected) in same.items():
-        answer = _answered(criterion, changed, nu, wrong)
+        same_modes["a state with K_I < 0 instead of 0"] = (negative, at_closed)
+    for what, (changed, expected) in same_modes.items():
+        answer = _answer_of(criterion, changed, nu, wrong)
         if answer is None:
             return
         for name, got, want in zip(("angle", "dK_eq", "R"), answer, expected):
@@ -175,10 +175,10 @@ def _check_modes(criterion: Criterion, nu: float, modes: int, wrong: list[str]) 
                 wrong.append(f"{what}: {name} is {got[i]:.6g}, it should be {want[i]:.6g}")
 
 
-def _answered(
+def _answer_of(
     criterion: Criterion, K: Floats, nu: float, wrong: list[str]
 ) -> tuple[Floats, Floats, Floats] | None:
-    answer: Any = _called(lambda values: criterion(values, nu), (K,), wrong, None)
+    answer: Any = _call_law(lambda values: criterion(values, nu), (K,), wrong, None)
     if answer is None:
         return None
     if not isinstance(answer, tuple) or len(answer) != 3:
@@ -201,7 +201,7 @@ def _answered(
     return parts[0], parts[1], parts[2]
 
 
-def _called(
+def _call_law(
     function: Callable[..., Any], arguments: tuple[Floats, ...], wrong: list[str], name: str | None
 ) -> Any:
     """Answer of a function that must neither fail nor change its arguments."""
@@ -214,7 +214,7 @@ def _called(
             answer = function(*given)
         except Exception as error:
             shapes = ", ".join(str(a.shape) for a in arguments)
-            wrong.append(f"called with arrays of shape {shapes} it raises {shown(error)}")
+            wrong.append(f"called with arrays of shape {shapes} it raises {value_text(error)}")
             return None
     if not all(np.array_equal(a, b) for a, b in zip(given, arguments)):
         wrong.append("it changes the arrays it is given: work on a copy")
@@ -229,12 +229,12 @@ def _called(
 
 def _check_callable(function: object, what: str) -> None:
     if not callable(function):
-        raise ProblemError(f"{what} = {shown(function)} cannot be called: give a function.")
+        raise ProblemError(f"{what} = {value_text(function)} cannot be called: give a function.")
 
 
 def _judge(kind: str, function: object, wrong: list[str]) -> None:
     if wrong:
-        name = getattr(function, "__name__", None) or shown(function)
+        name = getattr(function, "__name__", None) or value_text(function)
         raise ProblemError(
             f"the {kind} {name} cannot be used:\n- " + "\n- ".join(dict.fromkeys(wrong))
         )

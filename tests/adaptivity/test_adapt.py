@@ -11,9 +11,9 @@ import pytest
 import xcrack as xc
 from support import exact
 from support import scenes_2d as scenes
-from xcrack.adaptivity import next_3d
+from xcrack.adaptivity import sizes_3d
 from xcrack.adaptivity.adapt import _MOST_ROUNDS
-from xcrack.adaptivity.wanted import smaller
+from xcrack.adaptivity.target_error import size_ratios
 from xcrack.verification import methods
 
 STEEL = xc.Isotropic(1.0, 0.3, plane="strain")
@@ -172,7 +172,7 @@ def penny(radius=0.15):
 
 def test_the_first_mesh_in_3d_is_fine_along_the_front():
     problem = penny()
-    mesh = next_3d.first_mesh(problem)
+    mesh = sizes_3d.first_mesh(problem)
     angle = np.linspace(0, 2 * np.pi, 50)
     front = np.stack([0.15 * np.cos(angle), 0.15 * np.sin(angle), 0 * angle], 1)
     front += (0.01, 0.02, 0.013)
@@ -268,7 +268,7 @@ def test_wanted_sizes_give_the_wanted_sum(order, dim):
     rng = np.random.default_rng(7103)
     shares = np.exp(rng.normal(size=(1, 400)))
     total = shares.sum()
-    ratio = smaller(shares, np.array([2 * total]), 1.2 * total, order, dim)
+    ratio = size_ratios(shares, np.array([2 * total]), 1.2 * total, order, dim)
     assert 0.25 < ratio.min() < 1
     assert (shares * ratio ** (2 * order)).sum() == pytest.approx(0.6 * total, rel=1e-6)
     # Cells that are refined have equal shares then.
@@ -278,8 +278,8 @@ def test_wanted_sizes_give_the_wanted_sum(order, dim):
 
 def test_errors_that_are_small_enough_ask_for_nothing():
     shares = np.array([[1.0, 2.0], [0.0, 0.0]])
-    assert (smaller(shares, np.array([3.0, np.nan]), 4.0, 2, 2) == 1).all()
-    assert (smaller(shares, np.array([np.nan, np.nan]), 1e-30, 2, 2) == 2.0**-2.5).all()
+    assert (size_ratios(shares, np.array([3.0, np.nan]), 4.0, 2, 2) == 1).all()
+    assert (size_ratios(shares, np.array([np.nan, np.nan]), 1e-30, 2, 2) == 2.0**-2.5).all()
 
 
 def test_a_scene_at_rest_is_not_refined():

@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 import xcrack as xc
-from xcrack.adaptivity import next_3d
-from xcrack.adaptivity.measured import counted, values
-from xcrack.adaptivity.resolved import resolved
-from xcrack.sif.sif import Bars
+from xcrack.adaptivity import sizes_3d
+from xcrack.adaptivity.indicators import counted_places, values
+from xcrack.adaptivity.resolved import resolved_problem
+from xcrack.sif.sif import KErrors
 
 STEEL = xc.Isotropic(1.0, 0.3)
 PULL = [xc.traction("top", (0, 0, 1.0)), xc.traction("bottom", (0, 0, -1.0))]
@@ -167,7 +167,7 @@ def intensity(x, bar, at_surface=None, front=None):
         front=np.zeros(n, dtype=np.int64) if front is None else front,
         at_surface=own if at_surface is None else at_surface, closed=own,
         domain_cells=np.full(n, 3.0),
-        errors=Bars(zero, zero + np.asarray(bar)[:, None], ("",) * n),
+        errors=KErrors(zero, zero + np.asarray(bar)[:, None], ("",) * n),
     )  # fmt: skip
 
 
@@ -183,30 +183,30 @@ def state(*sifs, pressed=(), beside=None):
 def test_cracks_become_finer_by_their_own_need():
     x = np.linspace(0, 1, 5)
     now = state(intensity(x, x * 0 + 0.001), intensity(x, x * 0 + 0.01), intensity(x, x * 0 + 0.2))
-    times = [next_3d._finer(now, c, 0.005, 0.5) for c in range(3)]
+    times = [sizes_3d._refinement_factor(now, c, 0.005, 0.5) for c in range(3)]
     assert times[0] == 1.0
     assert 1.5 <= times[1] < times[2] == 2.0
     pressing = state(intensity(x, x * 0 + 0.001), pressed=(0,))
-    assert next_3d._finer(pressing, 0, 0.005, 0.5) == 1.5
+    assert sizes_3d._refinement_factor(pressing, 0, 0.005, 0.5) == 1.5
     missing = state(intensity(x, x * 0 + np.nan))
-    assert next_3d._finer(missing, 0, 0.005, 0.5) == 1.5
+    assert sizes_3d._refinement_factor(missing, 0, 0.005, 0.5) == 1.5
 
 
 def test_a_front_without_finer_cells_keeps_its_bars():
     """Its K has not changed because its cells have not: that is no small error."""
     x = np.linspace(0, 1, 5)
     before, now = intensity(x, x * 0 + 0.02), intensity(x, x * 0 + 0.03)
-    assert np.allclose(next_3d._shorter(now, before, finer=False).bar, 0.02)
-    assert (next_3d._shorter(now, before, finer=True).bar == 0).all()
+    assert np.allclose(sizes_3d._shorten_errors(now, before, finer=False).bar, 0.02)
+    assert (sizes_3d._shorten_errors(now, before, finer=True).bar == 0).all()
 
 
 def test_places_beside_a_free_surface_do_not_count():
     s = np.linspace(0, 1, 11)
     ends = (s < 0.05) | (s > 0.95)
     open_front = intensity(s, s * 0, at_surface=ends)
-    assert counted(open_front, 0.0).tolist() == (~ends).tolist()
-    assert counted(open_front, 0.25).tolist() == ((s > 0.25) & (s < 0.75)).tolist()
-    assert counted(intensity(s, s * 0), 0.25).all()  # a closed front is nowhere beside one
+    assert counted_places(open_front, 0.0).tolist() == (~ends).tolist()
+    assert counted_places(open_front, 0.25).tolist() == ((s > 0.25) & (s < 0.75)).tolist()
+    assert counted_places(intensity(s, s * 0), 0.25).all()  # a closed front is nowhere beside one
     best, bar = values([[intensity(s, s * 0, at_surface=s >= 0)]], [0], [0.1])
     assert best.tolist() == [[0.0, 0.0, 0.0]]
     assert np.isnan(bar).all()
@@ -217,8 +217,8 @@ def test_each_front_has_cells_of_its_own_size():
         xc.penny_crack((-0.5, 0.0, 0.0), (0, 0, 1), 0.25),
         xc.penny_crack((0.6, 0.0, 0.0), (0, 0, 1), 0.1),
     ]
-    problem = resolved(block(*cracks))
-    mesh = next_3d.first_mesh(problem)
+    problem = resolved_problem(block(*cracks))
+    mesh = sizes_3d.first_mesh(problem)
     at = [mesh.cell_tree.query(c.points[c.fronts[0]])[1] for c in problem.placed]
     large, small = (float(np.median(mesh.cell_size[own])) for own in at)
     assert 1.6 < large / small < 4.0

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import xcrack as xc
-from xcrack.adaptivity import next_3d
-from xcrack.adaptivity.resolved import resolved
+from xcrack.adaptivity import sizes_3d
+from xcrack.adaptivity.resolved import resolved_problem
 from xcrack.base.errors import CoarseMeshError
 
 STEEL = xc.Isotropic(1.0, 0.3, plane="strain")
@@ -80,8 +80,8 @@ def test_an_end_half_a_cell_from_the_boundary_is_a_tip():
 
 def test_a_mesh_that_is_fine_enough_stays():
     problem = plate(INNER, n=6)
-    fine = resolved(problem)
-    assert resolved(fine) is fine
+    fine = resolved_problem(problem)
+    assert resolved_problem(fine) is fine
     assert len(fine.mesh.cells) > len(problem.mesh.cells)
 
 
@@ -136,9 +136,9 @@ def test_a_crack_within_a_cell_in_3d(crack, radius, tips):
     assert problem.mesh.cell_size.min() > 0.8
     with pytest.raises(CoarseMeshError):
         _ = problem.placed
-    placed = resolved(problem)
+    placed = resolved_problem(problem)
     assert placed.placed[0].n_tips == tips
-    mesh = next_3d.first_mesh(problem)
+    mesh = sizes_3d.first_mesh(problem)
     x = placed.placed[0].points[placed.placed[0].fronts[0]]
     x = x[(np.abs(x) < 0.99).all(axis=1)]
     at = mesh.cell_tree.query(x)[1]
@@ -152,7 +152,7 @@ def test_cells_between_two_fronts_are_as_small_as_their_distance():
         xc.penny_crack((-0.25, 0.0, 0.0), (0, 0, 1), 0.2),
         xc.penny_crack((0.25, 0.0, 0.0), (0, 0, 1), 0.2),
     ]
-    mesh = next_3d.first_mesh(block(*cracks))
+    mesh = sizes_3d.first_mesh(block(*cracks))
     between, away = mesh.cell_tree.query([(0.0, 0.0, 0.0), (-0.45, 0.0, 0.0)])[1]
     assert mesh.cell_size[between] <= 0.05 * 1.01
     assert mesh.cell_size[away] > 0.055

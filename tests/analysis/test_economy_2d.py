@@ -11,7 +11,7 @@ import xcrack as xc
 from support import scenes_2d as scenes
 from support.scenes_2d import numerics_of
 from xcrack.analysis.solve import build, solve_states
-from xcrack.linalg.reuse import Reuse
+from xcrack.linalg.reuse import SolverState
 
 STEEL = xc.Isotropic(1.3, 0.27, plane="strain")
 PULL = (xc.traction("top", (0.0, 1.0)), xc.traction("bottom", (0.0, -1.0)))
@@ -119,13 +119,15 @@ def test_the_uncracked_stiffness_is_made_once_a_mesh():
     mesh = scenes.perturbed(14, 5)
     first = xc.solve(problem(EDGE, mesh=mesh))
     longer = [EDGE[0], EDGE[1], (0.3, 0.1)]
-    again = solve_states(problem(longer, mesh=mesh), [None], reuse=Reuse(bulk=first.reuse.bulk))[0]
+    again = solve_states(
+        problem(longer, mesh=mesh), [None], reuse=SolverState(bulk=first.reuse.bulk)
+    )[0]
     assert again.reuse.bulk.matrix is first.reuse.bulk.matrix
     fresh = xc.solve(problem(longer, mesh=mesh))
     assert (again.u == fresh.u).all()
     # Another mesh or order must not take it.
     other = solve_states(
-        problem(EDGE, mesh=mesh, order=1), [None], reuse=Reuse(bulk=first.reuse.bulk)
+        problem(EDGE, mesh=mesh, order=1), [None], reuse=SolverState(bulk=first.reuse.bulk)
     )[0]
     assert other.reuse.bulk is not first.reuse.bulk
 

@@ -8,7 +8,7 @@ import pytest
 import xcrack as xc
 from support import scenes_2d as scenes
 from xcrack.mesh.refinement import refine
-from xcrack.verification.charting.result import Chart, Row
+from xcrack.verification.charting.result import Chart, ChartRow
 from xcrack.verification.charting.values import Sampled, at_places, most_trusted, remaining
 
 PULL = [xc.traction("top", (0.0, 1.0)), xc.traction("bottom", (0.0, -1.0))]
@@ -349,7 +349,7 @@ def test_penny():
 
 
 def row(setting, mesh, seconds, error, **options):
-    return Row(setting, {}, mesh, 1.0 / 2**mesh, 100, seconds, error, np.ones(1), **options)
+    return ChartRow(setting, {}, mesh, 1.0 / 2**mesh, 100, seconds, error, np.ones(1), **options)
 
 
 def test_pareto_and_advice():

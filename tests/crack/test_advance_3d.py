@@ -14,9 +14,9 @@ from xcrack.crack.measures import area_inside, front_length_inside, surface_size
 from xcrack.crack.placing_3d import place_surface
 from xcrack.crack.surfaces import elliptic_crack, penny_crack
 from xcrack.growth.cycles import cycles_between, elapsed_3d
-from xcrack.growth.follow_3d import carried
+from xcrack.growth.follow_3d import interpolate_along_front
 from xcrack.mesh.box import box
-from xcrack.mesh.triangulation import face_areas, face_normals, loops, oriented, side_keys
+from xcrack.mesh.triangulation import face_areas, face_normals, loops, oriented_faces, side_keys
 
 
 def whole(crack):
@@ -59,7 +59,7 @@ def check(new, old):
     assert np.array_equal(new.faces[: len(old.faces)], old.faces)
     _, count = np.unique(side_keys(new.faces), return_counts=True)
     assert count.max() <= 2
-    assert np.array_equal(oriented(new.faces), new.faces)
+    assert np.array_equal(oriented_faces(new.faces), new.faces)
     assert len(np.unique(new.faces)) == len(new.points)
     outline = set()
     for loop in loops(new.faces):
@@ -283,7 +283,7 @@ def test_hollow_front_converges_and_its_loops_vanish():
         check(often, before)
     for crack, tolerance in ((once, 0.03), (often, 0.05)):
         flat = front_points(crack)[:, [0, 2]]
-        assert not len(crossing_points(flat, flat, same=True))
+        assert not len(crossing_points(flat, flat, is_same_line=True))
         inner = (flat[:, 1] > 0.3) & (flat[:, 1] < 5.7)
         assert curve.query(flat[inner])[0] == pytest.approx(1.0, abs=tolerance)
         assert sides(crack)[1:-1].min() >= 0.5 * 0.05
@@ -475,7 +475,9 @@ def test_life_of_a_penny_that_grows():
         sizes.append(surface_size(crack, mesh))
         new = front_points(crack)
         radius = np.linalg.norm(new, axis=1)
-        after = carried(new, np.zeros(len(new), int), [True], radius**1.5, places * 1.2, 0.9)
+        after = interpolate_along_front(
+            new, np.zeros(len(new), int), [True], radius**1.5, places * 1.2, 0.9
+        )
         before = np.full(len(places), (1 + 0.2 * step) ** 1.5)
         cycles += elapsed_3d(sizes[-2:-1], sizes[-1:], [da], [before], [after])
     assert cycles == pytest.approx(2 - 2 / np.sqrt(2), rel=2e-3)
@@ -488,7 +490,7 @@ def test_a_front_that_reaches_its_toughness():
     x = np.array([[0.0, 0, 0], [1, 0, 0], [2, 0, 0]])
     values = np.array([1.0, 2.0, np.inf])
     target = np.array([[0.0, 0, 0], [0.5, 0, 0], [1.0, 0, 0], [1.5, 0, 0], [2.0, 0, 0]])
-    got = carried(x, np.zeros(3, int), [False], values, target, 0.1)
+    got = interpolate_along_front(x, np.zeros(3, int), [False], values, target, 0.1)
     assert got.tolist() == [1.0, 1.5, 2.0, np.inf, np.inf]
 
 
@@ -498,9 +500,9 @@ def test_values_are_carried_to_a_front_that_has_moved():
     value = np.cos(np.arctan2(frames.x[:, 1], frames.x[:, 0]))
     new = front_points(grown(crack, 0.05, 0.05))
     number = np.zeros(64, int)
-    result = carried(frames.x, number, [True], value, new, 0.1)
+    result = interpolate_along_front(frames.x, number, [True], value, new, 0.1)
     assert result == pytest.approx(np.cos(np.arctan2(new[:, 1], new[:, 0])), abs=0.01)
-    assert np.isnan(carried(frames.x, number, [True], value, new * 2, 0.1)).all()
+    assert np.isnan(interpolate_along_front(frames.x, number, [True], value, new * 2, 0.1)).all()
 
 
 def test_normals_agree_with_the_frames():

@@ -67,7 +67,7 @@ def test_drawn_lines_against_exact_arithmetic():
         pieces = list(pairwise(x))
         exact = any(meet(*pieces[i], *pieces[j]) for i in range(5) for j in range(i + 2, 5))
         assert bool(refusal(x)) == exact, seed
-        assert exact == (len(crossing_points(x, x, same=True)) > 0), seed
+        assert exact == (len(crossing_points(x, x, is_same_line=True)) > 0), seed
         count += exact
     assert 100 < count < 250
 

@@ -10,12 +10,12 @@ import pytest
 from xcrack.base.errors import GeometryError
 from xcrack.crack.crack import Crack
 from xcrack.crack.fronts_3d import front_frames
-from xcrack.crack.merging import gap_between, merged, turned
+from xcrack.crack.merging import gap_between, merged_crack, turned_crack
 from xcrack.crack.placing_3d import place_surface
 from xcrack.crack.surfaces import penny_crack, plane_crack, surface_crack
 from xcrack.mesh.box import box
 from xcrack.mesh.locate import Body
-from xcrack.mesh.triangulation import face_areas, face_normals, loops, oriented
+from xcrack.mesh.triangulation import face_areas, face_normals, loops, oriented_faces
 
 A = 1.0
 
@@ -51,7 +51,7 @@ def area(crack):
 def test_the_gap_is_closed_as_by_a_disc(gap, radius):
     """Area of the filled gap against that of circles that touch; 20 %: fillets start at points."""
     one, other = pennies(gap)
-    both = merged(one, other, radius, 0.1)
+    both = merged_crack(one, other, radius, 0.1)
     filled = area(both) - area(one) - area(other)
     assert 1.0 < filled / closed_gap(gap, radius) < 1.2
     (front,) = both.fronts
@@ -60,13 +60,13 @@ def test_the_gap_is_closed_as_by_a_disc(gap, radius):
     (loop,) = loops(both.faces)
     start = int(np.nonzero(front == loop[0])[0][0])
     assert np.array_equal(np.roll(front[:-1], -start), loop)
-    assert np.array_equal(oriented(both.faces), both.faces)
+    assert np.array_equal(oriented_faces(both.faces), both.faces)
     assert face_normals(both.points, both.faces)[:, 2].min() > 1 - 1e-12
 
 
 def test_points_and_faces_of_both_stay_as_they_are():
     one, other = pennies(0.1)
-    both = merged(one, other, 0.3, 0.1)
+    both = merged_crack(one, other, 0.3, 0.1)
     n, m = len(one.points), len(other.points)
     assert both.points[:n].tobytes() == one.points.tobytes()
     assert both.points[n : n + m].tobytes() == other.points.tobytes()
@@ -75,7 +75,7 @@ def test_points_and_faces_of_both_stay_as_they_are():
 
 def test_hollow_corners_are_round():
     """The front turns inwards with about the radius of the disc, and nowhere sharply."""
-    both = merged(*pennies(0.05), 0.4, 0.1)
+    both = merged_crack(*pennies(0.05), 0.4, 0.1)
     (front,) = front_frames(both)
     back = front.x - np.roll(front.x, 1, axis=0)
     ahead = np.roll(front.x, -1, axis=0) - front.x
@@ -90,11 +90,11 @@ def test_hollow_corners_are_round():
 def test_a_crack_that_looks_the_other_way_is_turned():
     one, other = pennies(0.1)
     mesh = box((-3, -2, -1), (3, 2, 1), (6, 4, 2))
-    gap = gap_between(one, turned(other), Body.of(mesh), 1.0)
+    gap = gap_between(one, turned_crack(other), Body.of(mesh), 1.0)
     assert gap.turn == pytest.approx(-1.0)
     assert gap.width == pytest.approx(0.1, abs=1e-12)
     assert gap.x == pytest.approx((0, 0, 0))
-    again = turned(turned(other))
+    again = turned_crack(turned_crack(other))
     assert np.array_equal(again.faces, other.faces)
     assert np.array_equal(again.fronts[0], other.fronts[0])
 
@@ -113,7 +113,7 @@ def test_one_surface_is_a_matter_of_offset_and_angle(height, tilt, good):
 
 def test_cracks_beside_each_other_are_bridged_over_a_small_offset():
     one, other = pennies(0.1, height=0.05)
-    both = merged(one, other, 0.4, 0.1)
+    both = merged_crack(one, other, 0.4, 0.1)
     assert len(both.fronts) == 1
     assert face_normals(both.points, both.faces)[:, 2].min() > 0.7
 
@@ -123,7 +123,7 @@ def test_far_cracks_have_no_gap_to_close():
     mesh = box((-3, -2, -1), (3, 2, 1), (6, 4, 2))
     assert gap_between(one, other, Body.of(mesh), 0.9) is None
     with pytest.raises(GeometryError, match="0 and 0 pieces of the fronts"):
-        merged(one, other, 0.4, 0.1)
+        merged_crack(one, other, 0.4, 0.1)
 
 
 def test_a_crack_within_a_hole_of_another_is_refused():
@@ -136,7 +136,7 @@ def test_a_crack_within_a_hole_of_another_is_refused():
     outer = whole(surface_crack(points, faces))
     inner = whole(penny_crack((0, 0, 0), (0, 0, 1), 0.9, n=64))
     with pytest.raises(GeometryError, match="encloses"):
-        merged(outer, inner, 0.3, 0.1)
+        merged_crack(outer, inner, 0.3, 0.1)
 
 
 def test_two_cracks_from_one_side_meet_at_the_surface():
@@ -145,7 +145,7 @@ def test_two_cracks_from_one_side_meet_at_the_surface():
     half = np.linspace(0, np.pi, 33)
     arc = np.stack([np.cos(half), np.sin(half), 0.013 + 0 * half], axis=1)
     pair = [place_surface(plane_crack(arc + np.array([c, 0, 0])), mesh) for c in (-1.05, 1.05)]
-    both = merged(*pair, 0.3, 0.1)
+    both = merged_crack(*pair, 0.3, 0.1)
     assert len(both.fronts) == 1
     placed = place_surface(both, mesh)
     (front,) = placed.fronts
@@ -167,6 +167,6 @@ def test_two_straight_fronts_of_a_plate_vanish_together():
         for x0, x1 in ((-2.05, -0.05), (0.06, 1.98))
     ]
     assert [len(crack.fronts) for crack in pair] == [2, 2]
-    both = place_surface(merged(*pair, 0.3, 0.1), mesh)
+    both = place_surface(merged_crack(*pair, 0.3, 0.1), mesh)
     x = sorted(both.points[front][:, 0].mean() for front in both.fronts)
     assert x == pytest.approx([-2.05, 1.98], abs=1e-12)

@@ -8,7 +8,7 @@ import pytest
 import xcrack as xc
 from xcrack.crack.advance_2d import advance
 from xcrack.crack.lines import touching_points
-from xcrack.crack.placing import check_cracks, placed, short_fronts
+from xcrack.crack.placing import check_cracks, place_crack, short_fronts
 
 STEEL = xc.Isotropic(E=1.0, nu=0.3, plane="strain")
 BOX = xc.box((-0.5, -0.5), (0.5, 0.5), 16)
@@ -90,12 +90,12 @@ def test_a_tip_beside_its_own_crack():
 
 
 def test_advance_across_itself_names_the_place():
-    crack = placed(xc.line_crack([(-0.6, 0.0), (0.2, 0.0), (0.2, 0.2), (0.0, 0.2)]), BOX)
+    crack = place_crack(xc.line_crack([(-0.6, 0.0), (0.2, 0.0), (0.2, 0.2), (0.0, 0.2)]), BOX)
     on = advance(crack, [np.pi / 2], [0.1])
     np.testing.assert_allclose(on.points[-1], (0.0, 0.1), atol=1e-15)
     with pytest.raises(xc.GeometryError, match=r"across itself near \[0.0, 0.0\]"):
         advance(crack, [np.pi / 2], [0.3])
-    two = placed(xc.line_crack([(-0.2, 0.0), (0.2, 0.0)]), BOX)
+    two = place_crack(xc.line_crack([(-0.2, 0.0), (0.2, 0.0)]), BOX)
     right = np.pi / 2 - 0.1
     one = advance(two, [right, right], [0.15, 0.15])  # both up
     with pytest.raises(xc.GeometryError, match="across itself"):
@@ -113,7 +113,7 @@ def test_advance_across_itself_names_the_place():
     ],
 )
 def test_advances_that_are_none(angle, da, says):
-    crack = placed(xc.line_crack([(-0.6, 0.0), (0.2, 0.0)]), BOX)
+    crack = place_crack(xc.line_crack([(-0.6, 0.0), (0.2, 0.0)]), BOX)
     with pytest.raises(xc.GeometryError, match=says):
         advance(crack, angle, da)
 
@@ -224,7 +224,7 @@ def test_checks_of_both_dimensions_go_by_one_name():
     cube = xc.box((-1, -1, -1), (1, 1, 1), 8)
     pennies = [xc.penny_crack((0, 0, z), (0, 0, 1), 0.5) for z in (0.03, 0.05)]
     with pytest.raises(xc.GeometryError, match="closer than a cell"):
-        check_cracks(tuple(placed(crack, cube) for crack in pennies), cube)
+        check_cracks(tuple(place_crack(crack, cube) for crack in pennies), cube)
     lines = [xc.line_crack([(-0.2, y), (0.2, -y)]) for y in (0.1, -0.1)]
     with pytest.raises(xc.GeometryError, match=r"cracks 0 and 1 cross near \[0.0, 0.0\]"):
-        check_cracks(tuple(placed(crack, BOX) for crack in lines), BOX)
+        check_cracks(tuple(place_crack(crack, BOX) for crack in lines), BOX)

@@ -5,10 +5,10 @@ import pytest
 
 import xcrack as xc
 from xcrack.base.errors import GeometryError, XcrackError
+from xcrack.crack.boundary_trace import Body
 from xcrack.crack.crack import Crack
 from xcrack.crack.fronts_3d import front_frames
-from xcrack.crack.mouths_3d import Body
-from xcrack.crack.placing import placed
+from xcrack.crack.placing import place_crack
 from xcrack.crack.placing_3d import check_surfaces, place_surface
 from xcrack.crack.surfaces import (
     elliptic_crack,
@@ -17,8 +17,8 @@ from xcrack.crack.surfaces import (
     read_surface,
     surface_crack,
 )
-from xcrack.fem.level_set import extended
-from xcrack.mesh.triangulation import face_areas, face_normals, loops, rim, ruled, side_keys
+from xcrack.fem.level_set import extended_surface
+from xcrack.mesh.triangulation import face_areas, face_normals, loops, rim, ruled_strip, side_keys
 
 SQUARE = [(-0.5, -0.5, 0.03), (0.5, -0.5, 0.03), (0.5, 0.5, 0.03), (-0.5, 0.5, 0.03)]
 
@@ -344,7 +344,7 @@ def grown(crack, da):
     points, faces, fronts = crack.points, crack.faces, []
     for front in front_frames(crack):
         number = len(points) + np.arange(len(front.x))
-        new, row = ruled(
+        new, row = ruled_strip(
             len(points), front.number, front.x, da * front.frame[:, 0], 1, front.closed
         )
         points, faces = np.concatenate([points, new]), np.concatenate([faces, row])
@@ -409,7 +409,7 @@ def test_drawn_cracks_have_ends_outside(seed, cube, body):
 
 def test_extension_reaches_ahead_of_every_front(cube):
     placed = place_surface(rectangle(-0.3, 0.3, -1, 1), cube)
-    surface = extended(placed, cube, 0.25)
+    surface = extended_surface(placed, cube, 0.25)
     for k, x in ((1, -0.55), (2, 0.55)):
         strip = surface.points[np.unique(surface.triangles[surface.label == k])]
         ends = {round(float(v), 12) for v in (strip[:, 0].min(), strip[:, 0].max())}
@@ -434,9 +434,9 @@ def test_cracks_that_no_mesh_takes(crack, message, cube):
 
 def test_plane_and_space_do_not_mix(cube):
     with pytest.raises(GeometryError, match="3D crack"):
-        placed(penny_crack((0, 0, 0), (0, 0, 1), 0.5), xc.box((0, 0), (1, 1), 4))
+        place_crack(penny_crack((0, 0, 0), (0, 0, 1), 0.5), xc.box((0, 0), (1, 1), 4))
     with pytest.raises(GeometryError, match="2D crack"):
-        placed(xc.line_crack([(0, 0), (1, 0)]), cube)
+        place_crack(xc.line_crack([(0, 0), (1, 0)]), cube)
 
 
 def test_a_notch_is_narrower_than_a_cell(body):

@@ -9,7 +9,7 @@ import xcrack as xc
 from support import scenes_3d as scenes
 from support.scenes_2d import numerics_of
 from xcrack.analysis.solve import build
-from xcrack.fem.cut_ends import behind
+from xcrack.fem.cut_ends import parts_behind
 from xcrack.mesh.split import cut_simplices, interface_simplices
 
 REGULAR = np.array([[1.0, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]])
@@ -75,7 +75,7 @@ def test_parts_of_triangles_behind_a_front():
     rng = np.random.default_rng(86028)
     psi = rng.uniform(-1, 1, (300, 3))
     psi[::5, 1] = 0.0
-    part, row = behind(psi)
+    part, row = parts_behind(psi)
     share = np.abs(np.linalg.det(part))
     total = np.bincount(row, share, len(psi))
     a, b, c = np.sort(psi, axis=1).T

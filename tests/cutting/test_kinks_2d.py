@@ -8,7 +8,7 @@ from support import scenes_2d as scenes
 from xcrack.analysis.solution import sides_of
 from xcrack.crack.crack import kink_numbers
 from xcrack.fem.consistent import boundary_points
-from xcrack.fem.system import discretised
+from xcrack.fem.system import discretise
 
 STEEL = xc.Isotropic(1.0, 0.3, "strain")
 
@@ -58,7 +58,7 @@ def inside_of_cells(space, line, radius):
 def test_sides_and_lengths_are_those_of_the_polyline(seed):
     """Areas to the error of the reference; lengths of the faces to round-off."""
     problem, line = scene(seed)
-    space, lips = discretised(problem)
+    space, lips = discretise(problem)
     cut, mesh = space.cuts[0], space.mesh
     assert len(cut.kinks.points) == 1
     sticks_out = np.linalg.norm(cut.kinks.points[0] - line[1]) > 1e-9
@@ -80,7 +80,7 @@ def test_sides_and_lengths_are_those_of_the_polyline(seed):
 def test_a_point_is_on_its_side_of_the_kink():
     """`level` is zero on the faces, and its sign is that of the sub-cells."""
     for seed in range(3):
-        space, lips = discretised(scene(seed)[0])
+        space, lips = discretise(scene(seed)[0])
         cut, mesh = space.cuts[0], space.mesh
         phi = cut.level(mesh, lips[0].cell[:, 1], lips[0].bary[:, 1])
         assert np.abs(phi).max() <= 1e-12
@@ -102,7 +102,7 @@ def test_kinks_on_mesh_points_and_edges(where):
 
     for seed in (20, 21):
         problem, _ = scene(seed, kink)
-        space, lips = discretised(problem)
+        space, lips = discretise(problem)
         assert len(space.cuts[0].kinks.points) == 1
         assert lips[0].weight.sum() == pytest.approx(1.1, abs=1e-9)
         assert xc.inf_sup(problem) >= 0.25
@@ -117,7 +117,7 @@ def test_what_is_no_kink_is_cut_as_before():
     sharp = [(-0.5, 0.02), (0.1, 0.03), (-0.1, 0.4)]
     close = [(-0.5, 0.02), (0.1, 0.03), (0.103, 0.04)]
     for line in (arc, sharp, close):
-        space, _ = discretised(xc.Problem(mesh, STEEL, [xc.line_crack(line)], order=2))
+        space, _ = discretise(xc.Problem(mesh, STEEL, [xc.line_crack(line)], order=2))
         assert not len(space.cuts[0].kinks.points)
 
 
@@ -143,7 +143,7 @@ def test_tip_functions_go_on_beyond_pi():
         x, angle = rng.uniform(-0.1, 0.1, 2), rng.uniform(0, 2 * np.pi)
         line = [x - 0.6 * scenes.rows(angle)[0], x, x + 0.3 * scenes.rows(angle + 0.9)[0]]
         problem = xc.Problem(scenes.perturbed(15, seed), STEEL, [xc.line_crack(line)], order=2)
-        space, _ = discretised(problem)
+        space, _ = discretise(problem)
         cut, mesh = space.cuts[0], space.mesh
         centre, cell = cut.sub_bary.mean(axis=1), cut.sub_to_cell
         inner = np.concatenate([(centre + 2 * cut.sub_bary[:, v]) / 3 for v in range(3)])
@@ -193,7 +193,7 @@ def test_boundaries_of_pieces_are_closed(seed):
               1: lambda mesh: mesh.points[mesh.edges[61]].T @ (0.75, 0.25),
               2: lambda mesh: mesh.points[mesh.edges[57]].T @ (0.9, 0.1)}  # fmt: skip
     problem, _ = scene(seed, places.get(seed))
-    space, lips = discretised(problem)
+    space, lips = discretise(problem)
     cells = np.nonzero(space.cuts[0].is_cut)[0]
     points = boundary_points(space, cells, lips)
     for side in (1, -1):

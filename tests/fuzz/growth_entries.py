@@ -27,7 +27,7 @@ from fuzz.result_rules import LOAD, NOTHING, NU, fits
 from fuzz.values import paths
 from xcrack import testing
 from xcrack.growth.step import Arrival
-from xcrack.linalg.reuse import Reuse
+from xcrack.linalg.reuse import SolverState
 
 ANY = Numbers()
 
@@ -274,7 +274,7 @@ ENTRIES = [
                 (),
                 Late(lambda: [scenes.solution()]),
             ),
-            "reuse": arg(Of(type=Reuse), Reuse()),
+            "reuse": arg(Of(type=SolverState), SolverState()),
         },
     ),
     Entry(
@@ -293,7 +293,7 @@ ENTRIES = [
         {
             "problem": arg(Of(type=xc.Problem), Late(scenes.problem)),
             "states": arg(ListOf(item=Number(also=(ListOf(item=LOAD),)), least=1), [1.0]),
-            "reuse": arg(Of(type=Reuse, optional=True), None, Reuse()),
+            "reuse": arg(Of(type=SolverState, optional=True), None, SolverState()),
             "bars": arg(Flag(), False, True),
             "solver": arg(Called(optional=True), None),
         },

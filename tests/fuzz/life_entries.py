@@ -9,7 +9,7 @@ from fuzz.entry import Entry, Hook, arg
 from fuzz.kinds import Called, Filename, Number, Numbers, Of, Seen, Whole, Word, real
 from support.growth_fakes import mode_I, plate
 from xcrack.growth.step import Memory, Step
-from xcrack.linalg.reuse import Reuse
+from xcrack.linalg.reuse import SolverState
 
 LAW = xc.paris(1e-11, 3.0)
 
@@ -22,7 +22,7 @@ def _step(n):
     rate = np.asarray(LAW(dK, 0.0))
     factors = (0.0, 1.0)
     states = xc.Response.of_K(problem, factors, [factor * K for factor in factors]).sif
-    memory = Memory((rate,), (5.0 + 3.0 * n,), (np.zeros(1),), 1.5, Reuse(), {})
+    memory = Memory((rate,), (5.0 + 3.0 * n,), (np.zeros(1),), 1.5, SolverState(), {})
     values = {
         "angle": np.zeros(1),
         "dK_eq": dK,

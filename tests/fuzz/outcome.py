@@ -18,7 +18,7 @@ from fuzz.entry import ARITY, OWN
 from fuzz.kinds import EDGE, NONSENSE, VALID
 from fuzz.values import prepare
 from xcrack.growth.step import StepError
-from xcrack.growth.trail import Control
+from xcrack.growth.trail import StepControl
 
 GOOD = (
     "valid finite",
@@ -155,7 +155,7 @@ def numbers_in(result, depth=0):
         yield from (result.points, result.volume)
     elif isinstance(result, xc.Isotropic):
         yield np.array([result.mu, result.lam, result.kolosov, result.E_prime])
-    elif isinstance(result, StepError | Control):  # nan: not estimated, inf: no length yet
+    elif isinstance(result, StepError | StepControl):  # nan: not estimated, inf: no length yet
         return
     elif is_dataclass(result) and type(result).__module__.startswith("xcrack"):
         for one in fields(result):

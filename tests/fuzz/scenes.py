@@ -86,10 +86,10 @@ def stored():
 
 @cache
 def chart():
-    from xcrack.verification.charting.result import Chart, Row
+    from xcrack.verification.charting.result import Chart, ChartRow
 
     rows = tuple(
-        Row("as given", {}, k, 0.5**k, 100 * 4**k, 0.01 * 4**k, 0.1 * 0.25**k, np.ones(1))
+        ChartRow("as given", {}, k, 0.5**k, 100 * 4**k, 0.01 * 4**k, 0.1 * 0.25**k, np.ones(1))
         for k in range(3)
     )
     return Chart(rows, rows[-1], 1e-3, "K", None, 1)

@@ -8,7 +8,7 @@ from xcrack.crack.crack import Crack
 from xcrack.crack.fronts_3d import front_frames
 from xcrack.crack.placing_3d import place_surface
 from xcrack.crack.surfaces import elliptic_crack, penny_crack, plane_crack, surface_crack
-from xcrack.fem.level_set import extended
+from xcrack.fem.level_set import extended_surface
 from xcrack.mesh.distances import (
     closest_in,
     first_crossing,
@@ -142,7 +142,7 @@ def _outward(mesh, facets):
 )
 def test_flat_crack_has_linear_phi_ahead_of_its_front_as_well(crack):
     placed = place_surface(crack, cube())
-    surface = extended(placed, cube(), 0.4)
+    surface = extended_surface(placed, cube(), 0.4)
     x = np.random.default_rng(97).uniform(-1, 1, (4000, 3)) * [1, 1, 0.3]
     x[::5, 2] = 0.03
     phi, _, beyond = surface_distance(x, surface.points, surface.triangles)
@@ -152,7 +152,7 @@ def test_flat_crack_has_linear_phi_ahead_of_its_front_as_well(crack):
 
 def test_points_in_the_plane_of_a_crack_get_zero():
     placed = place_surface(penny_crack((0, 0, 0), (0, 0, 1), 0.5), cube())
-    surface = extended(placed, cube(), 0.3)
+    surface = extended_surface(placed, cube(), 0.3)
     x = np.random.default_rng(1312).uniform(-0.5, 0.5, (3000, 3)) * [1, 1, 0]
     phi, _, _ = surface_distance(x, surface.points, surface.triangles)
     assert (phi == 0).all()
@@ -164,7 +164,7 @@ def test_surface_comes_before_the_strip_that_lies_on_it():
     outline = [(x, y, 0.0) for x, y in [*u, (-0.15, 0.5), (-0.5, 0.5)]]
     mesh = cube(20)
     placed = place_surface(plane_crack(outline), mesh)
-    surface = extended(placed, mesh, 0.5)
+    surface = extended_surface(placed, mesh, 0.5)
     x = placed.points[placed.faces].mean(axis=1)
     x[:, 2] = 0.01
     _, triangle, _ = surface_distance(x, surface.points, surface.triangles)
@@ -200,7 +200,7 @@ def test_spherical_cap_converges():
     error = []
     for edge in edges:
         placed = place_surface(cap(angle, edge), mesh)
-        surface = extended(placed, mesh, 0.4)
+        surface = extended_surface(placed, mesh, 0.4)
         front = front_frames(placed)[0]
         phi, triangle, _ = surface_distance(x, surface.points, surface.triangles)
         r, _, _ = front_distance(x, front.x, front.closed)

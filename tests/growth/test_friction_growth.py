@@ -15,7 +15,7 @@ from xcrack.analysis.friction import weak_slip
 from xcrack.analysis.solve import solve_states
 from xcrack.fem.facets import arc_position
 from xcrack.fem.system import build
-from xcrack.linalg.reuse import Reuse
+from xcrack.linalg.reuse import SolverState
 
 TURN = 0.31
 
@@ -51,7 +51,7 @@ def test_a_cycle_is_repeated_until_slip_returns():
     assert effective.tolist() == pytest.approx([0.0, tau - mu, mu, tau - mu])
     cycle = states[2:]
     once = xc.solve(problem, cycle)
-    again = solve_states(problem, cycle, reuse=Reuse(), repeated=True)
+    again = solve_states(problem, cycle, reuse=SolverState(), repeated=True)
     K = np.stack([x.K for x in xc.stress_intensities(again)])[:, 1, 1]
     assert K == pytest.approx(effective[2:] * np.sqrt(np.pi), abs=1e-3)
     assert once[0].dissipated == 0
@@ -61,7 +61,7 @@ def test_a_cycle_is_repeated_until_slip_returns():
 def test_a_cycle_that_slips_back_from_its_memory_is_the_same():
     """The same crack again, from what the cycle left behind: nothing changes."""
     problem, cycle = cracked(0.3), xc.Cycle(states=[state(-0.6), state(0.6)])
-    first = xc.respond(problem, cycle.load_states, Reuse())
+    first = xc.respond(problem, cycle.load_states, SolverState())
     second = xc.respond(problem, cycle.load_states, first.reuse)
     largest = max(np.abs(answer[0].K).max() for answer in first.sif)
     for one, two in zip(first.sif, second.sif, strict=True):

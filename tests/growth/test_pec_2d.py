@@ -12,7 +12,7 @@ from xcrack.crack.crack import tip_frames
 from xcrack.crack.lines import line_crack
 from xcrack.fatigue.criteria import max_hoop_stress
 from xcrack.fatigue.power import paris
-from xcrack.growth.options import Run
+from xcrack.growth.options import GrowthRule
 from xcrack.growth.run import grow
 from xcrack.growth.step import Cycle
 from xcrack.growth.trail import first_length, next_length, step_error
@@ -224,12 +224,12 @@ def test_steps_say_how_they_were_solved_and_corrected(whole):
 
 
 def test_a_run_of_the_first_set_of_defaults_goes_on_by_eulers_rule(tmp_path):
-    run = Run(**stored_run())
+    run = GrowthRule(**stored_run())
     assert run.integrator == "pec"
     begun = run.as_begun({"defaults": "1"})
     assert (begun.integrator, begun.defaults) == ("euler", 1)
     assert "integrator" not in begun.settings
-    given = Run(**stored_run(integrator="euler")).as_begun({"defaults": "1"})
+    given = GrowthRule(**stored_run(integrator="euler")).as_begun({"defaults": "1"})
     assert given.settings == begun.settings
 
 

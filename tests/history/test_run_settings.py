@@ -20,7 +20,7 @@ from xcrack.fatigue.power import paris
 from xcrack.growth import description
 from xcrack.growth import description as settings
 from xcrack.growth.description import describe, differences
-from xcrack.growth.options import Run
+from xcrack.growth.options import GrowthRule
 from xcrack.growth.run import grow
 from xcrack.growth.step import Cycle
 from xcrack.model.loads import body_force
@@ -321,7 +321,7 @@ def test_a_run_goes_on_with_its_own_defaults(whole, monkeypatch):
         number,
         {"integrator": "euler", "problem.numerics.points": 6, "scaling": "linear"},
     )
-    run = Run(**run_of())
+    run = GrowthRule(**run_of())
     begun = run.as_begun(whole.steps[0].memory.settings)
     assert begun.problem.numerics.points == 6
     assert begun.scaling == "linear"
@@ -334,11 +334,11 @@ def test_a_choice_that_became_the_default_is_still_a_choice(whole, monkeypatch):
     monkeypatch.setattr(settings, "DEFAULTS", number)
     monkeypatch.setitem(settings.REPLACED, number, {"threshold": 1.0})
     stored = {**whole.steps[0].memory.settings, "threshold": "0.0"}
-    assert Run(**run_of()).as_begun(stored).settings == stored
+    assert GrowthRule(**run_of()).as_begun(stored).settings == stored
 
 
 def test_what_changes_no_result_is_not_in_the_settings():
-    keys = set(Run(**run_of(max_steps=3, K_c=1e9, progress=False)).settings)
+    keys = set(GrowthRule(**run_of(max_steps=3, K_c=1e9, progress=False)).settings)
     assert not keys & {"max_steps", "max_cycles", "K_c", "progress"}
     assert "problem.order" not in keys
-    assert "problem.order" in Run(**run_of(replace(scene(), order=1))).settings
+    assert "problem.order" in GrowthRule(**run_of(replace(scene(), order=1))).settings

@@ -7,12 +7,12 @@ from scipy.spatial import Delaunay
 
 import xcrack as xc
 from tests.support import scenes_2d as scenes
-from xcrack.fem.kernels.bulk import joined
+from xcrack.fem.kernels.bulk import joined_blocks
 from xcrack.fem.kernels.tips import solve_moments
 from xcrack.linalg.kernels.blocks import orthonormal_columns
-from xcrack.linalg.kernels.bordered import bordered
+from xcrack.linalg.kernels.bordered import bordered_matrix
 from xcrack.linalg.kernels.sparse import residual, times, times_transposed
-from xcrack.mesh.kernels.location import cells_within, located, nearest_segment
+from xcrack.mesh.kernels.location import cells_within, locate_points, nearest_segment
 from xcrack.mesh.kernels.segments import graded_points, split
 from xcrack.mesh.kernels.splitting import cut_simplices, interface_simplices
 from xcrack.mesh.locate import cells_around
@@ -39,7 +39,7 @@ def test_bordered():
     fixed[4] = True
     products = (Z, A @ Z, Z.T @ A, Z.T @ A @ Z)
     parts = (arrays(sp.csr_matrix(each)) for each in products)
-    matrix, basis, energy = bordered(*arrays(sp.csr_matrix(A)), *parts, fixed, 6)
+    matrix, basis, energy = bordered_matrix(*arrays(sp.csr_matrix(A)), *parts, fixed, 6)
     columns = np.concatenate([np.eye(9)[:, [0, 1, 3, 5]], Z], axis=1)
     expected = columns / np.sqrt(np.diag(columns.T @ A @ columns))
     result = sp.csr_matrix((basis[2], basis[1], basis[0]), shape=(9, 6)).toarray()
@@ -84,7 +84,7 @@ def test_joined():
     body, over = rng.normal(size=(6, 6)), rng.normal(size=(10, 10))
     body[:2, 2:4], body[4, 5], over[:6, :6], over[2:4, 8:] = 0, 0, 0, 0
     one, other = sp.bsr_matrix(body, blocksize=(2, 2)), sp.bsr_matrix(over, blocksize=(2, 2))
-    result = joined(*arrays(one), *arrays(other), np.ones(5, dtype=bool))
+    result = joined_blocks(*arrays(one), *arrays(other), np.ones(5, dtype=bool))
     matrix = sp.csr_matrix((result[2], result[1], result[0]), shape=(10, 10))
     over[:6, :6] = body
     np.testing.assert_array_equal(matrix.toarray(), over)
@@ -113,7 +113,7 @@ def test_located(dim):
     mesh = xc.Mesh(tree.points, tree.simplices.astype(np.int64))
     of = mesh.points, mesh.cells, mesh.gradient, *mesh.cell_grid
     x = rng.uniform(-0.2, 1.2, (90, dim))
-    cell, bary = located(*of, x, 1e-10)
+    cell, bary = locate_points(*of, x, 1e-10)
     outside = tree.find_simplex(x) < 0
     np.testing.assert_array_equal(cell < 0, outside)
     inside = ~outside
@@ -123,10 +123,10 @@ def test_located(dim):
     at = mesh.points[17]
     around = cells_around(mesh, at, 1e-10)
     np.testing.assert_array_equal(around, np.nonzero((mesh.cells == 17).any(axis=1))[0])
-    where = located(*of, at[None], 1e-10)[0][0]
+    where = locate_points(*of, at[None], 1e-10)[0][0]
     apart = np.linalg.norm(mesh.points[mesh.cells[around]].mean(axis=1) - at, axis=1)
     assert where == around[apart.argmin()]
-    assert located(*of, x[:0], 1e-10)[0].shape == (0,)
+    assert locate_points(*of, x[:0], 1e-10)[0].shape == (0,)
 
 
 def test_cells_and_segments_near_a_point():

@@ -25,7 +25,7 @@ from xcrack.model.supports import fix
 from xcrack.runs.history import History
 from xcrack.runs.life import life
 from xcrack.runs.scatter import Scatter, lognormal, normal
-from xcrack.sif.sif import Bars
+from xcrack.sif.sif import KErrors
 
 LAW = paris(1e-11, 3.0)
 FLIGHT = Spectrum([0.0, 1.0, 0.4, 0.6, 0.1, 0.9, 0.3], unit="flight")
@@ -166,7 +166,10 @@ def test_best_K_of_a_spectrum_is_rated_again():
     def with_bars(*given):
         response = FORMULA(*given)
         bars = [
-            [replace(sif, errors=Bars(0.1 * sif.K, 0.01 * np.abs(sif.K), ("",))) for sif in state]
+            [
+                replace(sif, errors=KErrors(0.1 * sif.K, 0.01 * np.abs(sif.K), ("",)))
+                for sif in state
+            ]
             for state in response.sif
         ]
         return replace(response, sif=bars)

@@ -15,7 +15,7 @@ from xcrack.fatigue.spectrum import Spectrum
 from xcrack.growth.response import respond
 from xcrack.growth.run import grow
 from xcrack.growth.step import Cycle
-from xcrack.linalg.reuse import Reuse
+from xcrack.linalg.reuse import SolverState
 from xcrack.mesh.box import box
 from xcrack.model.loads import traction
 from xcrack.model.material import Isotropic
@@ -184,7 +184,7 @@ def test_opening_load_is_where_the_tip_opens():
     problem, spectrum = bent()
     for factor in (level - 0.03, level + 0.03):
         state = LoadLevel(factor, spectrum.steady)
-        K[factor] = respond(problem, [state], Reuse()).sif[0][0].K[0, 0]
+        K[factor] = respond(problem, [state], SolverState()).sif[0][0].K[0, 0]
     below, above = K.values()
     assert below < 2e-2 * step[65].sif[-1][0].K[0, 0]
     assert above > below

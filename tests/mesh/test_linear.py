@@ -10,7 +10,7 @@ import pytest
 
 import xcrack as xc
 from xcrack.base.errors import MeshError, XcrackError, XcrackWarning
-from xcrack.mesh.linear import SHAPES, linearised
+from xcrack.mesh.linear import SHAPES, linear_mesh
 from xcrack.mesh.raw import RawMesh, mesh_from_raw
 
 DATA = Path(__file__).parents[1] / "data"
@@ -64,7 +64,7 @@ def test_a_cube_of_all_kinds_conforms_whatever_the_numbers() -> None:
     top = np.array([f for _, _, f in sides if (points[f][:, 0] == 0).all()])
     raw = RawMesh(points, blocks, [("quad", "side", top), ("wedge", "prisms", blocks[1][1][:4])])
     with pytest.warns(XcrackWarning, match="9 hexahedra, 18 prisms, 54 pyramids are divided: 216"):
-        mesh = mesh_from_raw(linearised(raw, "cube", strict=False), "cube")
+        mesh = mesh_from_raw(linear_mesh(raw, "cube", strict=False), "cube")
     assert len(mesh.cells) == 9 * 6 + 18 * 3 + 54 * 2
     assert mesh.volume.sum() == pytest.approx(1, rel=ROUND_OFF)
     assert len(mesh.boundary) == 6 * 9 * 2  # no face inside is open
@@ -73,7 +73,7 @@ def test_a_cube_of_all_kinds_conforms_whatever_the_numbers() -> None:
     assert area == pytest.approx(len(top) / 9, rel=ROUND_OFF)
     assert mesh.volume[mesh.cell_sets["prisms"]].sum() == pytest.approx(4 / 54, rel=ROUND_OFF)
     with pytest.raises(MeshError, match=r"9 hexahedron, 18 wedge, 54 pyramid.*strict=True"):
-        linearised(raw, "cube", strict=True)
+        linear_mesh(raw, "cube", strict=True)
 
 
 @pytest.mark.parametrize("kind", ["wedge", "hexahedron", "pyramid"])
@@ -101,7 +101,7 @@ def test_every_numbering_of_a_cell_fills_it(kind: str) -> None:
 
 def linearised_quietly(raw: RawMesh) -> RawMesh:
     with pytest.warns(XcrackWarning, match="divided"):
-        return linearised(raw, "cell", strict=False)
+        return linear_mesh(raw, "cell", strict=False)
 
 
 def test_a_collapsed_hexahedron_is_the_prism_it_looks_like() -> None:
@@ -118,14 +118,14 @@ def test_a_warped_hexahedron_is_divided_from_its_middle() -> None:
     x = np.array([*itertools.product((0, 1), (0, 1), (0, 1))], float)[[0, 4, 6, 2, 1, 5, 7, 3]]
     x[3] = 0.4, 0.6, 0.4
     with pytest.warns(XcrackWarning, match="1 of them from a point in their middle"):
-        split = linearised(
+        split = linear_mesh(
             RawMesh(x, [("hexahedron", cell)], [("hexahedron", "all", cell)]), "warped", False
         )
     mesh = mesh_from_raw(split, "warped")
     assert len(mesh.cells) == len(mesh.cell_sets["all"]) == 12
     x[3] = 1.2, -0.2, 1.2
     with pytest.raises(MeshError, match=r"hexahedron .* at .*turned inside out"):
-        linearised(RawMesh(x, [("hexahedron", cell)]), "bad", strict=False)
+        linear_mesh(RawMesh(x, [("hexahedron", cell)]), "bad", strict=False)
 
 
 def test_prisms_turned_inside_out_are_errors() -> None:
@@ -136,7 +136,7 @@ def test_prisms_turned_inside_out_are_errors() -> None:
     twisted = prisms.copy()
     twisted[1] = twisted[1][[0, 1, 2, 4, 5, 3]]
     with pytest.raises(MeshError, match=r"wedge .*inside out or twisted \(1 such"):
-        linearised(RawMesh(points, [("wedge", twisted)]), "bad", strict=False)
+        linear_mesh(RawMesh(points, [("wedge", twisted)]), "bad", strict=False)
     pushed = points.copy()
     pushed[pushed[:, 2] == 0.5] += (0, 0, 0.8)  # the middle layer beyond the upper end
     split = linearised_quietly(RawMesh(pushed, [("wedge", prisms)]))
@@ -156,7 +156,7 @@ def test_quadrilaterals_take_the_better_diagonal() -> None:
     assert mesh.volume.min() > 0.3
     crossed = RawMesh(points, [("quad", quads[:, [0, 2, 1, 3]])])
     with pytest.raises(MeshError, match="crosses itself"):
-        linearised(crossed, "crossed", strict=False)
+        linear_mesh(crossed, "crossed", strict=False)
 
 
 def test_gmsh_of_order_2_and_of_quadrilaterals() -> None:

@@ -35,7 +35,7 @@ def test_import_loads_nothing_heavy() -> None:
 
 @pytest.mark.parametrize("package", ["gmsh", "meshio"])
 def test_a_package_for_files_has_one_home(package: str) -> None:
-    loads = re.compile(rf"(import {package}\b|required\(\s*[\"']{package}\b)")
+    loads = re.compile(rf"(import {package}\b|require_package\(\s*[\"']{package}\b)")
     homes = {path.relative_to(SOURCE).parts[0] for path in FILES if loads.search(path.read_text())}
     assert homes == {"mesh"}
 
@@ -157,11 +157,11 @@ def test_public_name_is_documented(name: str) -> None:
 
 
 def test_options_of_growth_stand_once() -> None:
-    """Names in `GrowOptions`, defaults on `Run`; signatures of both functions list them."""
-    from xcrack.growth.options import GrowOptions, Run
+    """Names in `GrowthOptions`, defaults on `GrowthRule`; both signatures list them."""
+    from xcrack.growth.options import GrowthOptions, GrowthRule
 
-    options = GrowOptions.__annotations__
-    defaults = {f.name: f.default for f in fields(Run) if f.name in options}
+    options = GrowthOptions.__annotations__
+    defaults = {f.name: f.default for f in fields(GrowthRule) if f.name in options}
     assert set(defaults) == set(options)
     for function in (xcrack.grow, xcrack.resume):
         shown = inspect.signature(function).parameters

@@ -6,7 +6,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from xcrack.base.checks import called, number, numbers, whole, whole_numbers
+from xcrack.base.checks import call_function, number, numbers, whole_number, whole_numbers
 from xcrack.base.errors import MeshError, ProblemError
 
 
@@ -25,7 +25,7 @@ def test_a_number(value):
     result = number(value, "x")
     assert type(result) is float
     assert result == 2.0
-    assert whole(value, "n") == 2
+    assert whole_number(value, "n") == 2
 
 
 @pytest.mark.parametrize(
@@ -36,7 +36,7 @@ def test_a_number(value):
     ],
 )  # fmt: skip
 def test_no_number(value):
-    for check in (number, whole):
+    for check in (number, whole_number):
         with pytest.raises(MeshError, match=r"^box: n = .* is not a number: give a .*number"):
             check(value, "box: n", error=MeshError)
 
@@ -58,12 +58,12 @@ def test_bounds():
         with pytest.raises(ProblemError, match=rf"x = 1 is not possible: give .*number {words}\."):
             number(1, "x", **bounds)
     with pytest.raises(ProblemError, match="whole number of at least 2"):
-        whole(1, "n", least=2)
+        whole_number(1, "n", least=2)
     with pytest.raises(ProblemError, match="whole number of at most 0"):
-        whole(1, "n", most=0)
+        whole_number(1, "n", most=0)
     for odd in (2.5, np.nan, np.inf):
         with pytest.raises(ProblemError, match="give a whole number"):
-            whole(odd, "n")
+            whole_number(odd, "n")
 
 
 def test_an_array():
@@ -113,7 +113,7 @@ def test_an_exception_of_a_users_function_keeps_its_type():
         raise ZeroDivisionError("mine")
 
     with pytest.raises(ZeroDivisionError, match="mine") as caught:
-        called(broken, "the value of traction('top')", 1.0)
+        call_function(broken, "the value of traction('top')", 1.0)
     (note,) = caught.value.__notes__
     assert "broken, which xcrack called for the value of traction('top')" in note
-    assert called(lambda a, b: a + b, "a sum", 1, 2) == 3
+    assert call_function(lambda a, b: a + b, "a sum", 1, 2) == 3

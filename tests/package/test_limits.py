@@ -77,7 +77,7 @@ def rules_outside_of_declarations(trees):
         if inside.parts[0] in ("model", "fatigue") or inside.as_posix() == "growth/options.py":
             for node in ast.walk(tree):
                 name = getattr(node.func, "id", "") if isinstance(node, ast.Call) else ""
-                count += name in ("number", "whole", "one_of", "flag")
+                count += name in ("number", "whole_number", "one_of", "flag")
     return count
 
 

@@ -10,7 +10,7 @@ import xcrack as xc
 from support.growth_fakes import formula, mode_I, plate
 from xcrack.base.arguments import Number, Text
 from xcrack.base.units import LENGTH, NUMBER, STRESS, TOUGHNESS
-from xcrack.fatigue.law import powered
+from xcrack.fatigue.law import power_of
 
 STEEL = xc.Isotropic(210e3, 0.3, plane="strain")
 
@@ -163,4 +163,4 @@ def test_a_law_is_read_from_a_case_file(tmp_path):
 
 def test_a_power_that_overflows_is_refused():
     with pytest.raises(xc.ProblemError, match="too large for a number"):
-        powered("own", 1.0, np.array([1e200]), 2.0)
+        power_of("own", 1.0, np.array([1e200]), 2.0)

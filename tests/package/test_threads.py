@@ -77,18 +77,18 @@ def test_available(monkeypatch, tmp_path):
     monkeypatch.delenv("XCRACK_THREADS", raising=False)
     monkeypatch.setattr(os, "sched_getaffinity", lambda pid: set(range(40)), raising=False)
     monkeypatch.setattr(threads, "_QUOTA", tmp_path / "cpu.max")
-    assert threads.available() == 16
+    assert threads.available_processors() == 16
     for text, count in (("max 100000", 16), ("250000 100000", 3), ("50000 100000", 1), ("x", 16)):
         (tmp_path / "cpu.max").write_text(text + "\n")
-        assert threads.available() == count
+        assert threads.available_processors() == count
     monkeypatch.setattr(os, "sched_getaffinity", lambda pid: {3}, raising=False)
-    assert threads.available() == 1
+    assert threads.available_processors() == 1
     monkeypatch.setenv("XCRACK_THREADS", "24")
-    assert threads.available() == 24
+    assert threads.available_processors() == 24
     for wrong in ("0", "-1", "two", "1.5", ""):
         monkeypatch.setenv("XCRACK_THREADS", wrong)
         with pytest.raises(xc.ProblemError, match=f"XCRACK_THREADS = '{wrong}' in the environment"):
-            threads.available()
+            threads.available_processors()
 
 
 @pytest.mark.parametrize("wrong", [0, -1, 1.5, "two", True])
@@ -104,10 +104,12 @@ def test_each_keeps_the_order_and_its_errors():
 
     with threads.threads(3) as count:
         assert count == threads.number_of_threads() == 3
-        assert threads.each(slow, range(4)) == [0, 1, 2, 3]
-        assert threads.each(lambda _: threads.number_of_threads(), [0]) == [1]  # no pool in a pool
+        assert threads.map_tasks(slow, range(4)) == [0, 1, 2, 3]
+        assert threads.map_tasks(lambda _: threads.number_of_threads(), [0]) == [
+            1
+        ]  # no pool in a pool
         with pytest.raises(ZeroDivisionError):
-            threads.each(lambda k: 1 / k, [1, 0])
+            threads.map_tasks(lambda k: 1 / k, [1, 0])
         with threads.threads(2):  # that of the outer block goes on
             assert threads.number_of_threads() == 3
     assert threads.number_of_threads() == 1
@@ -128,7 +130,7 @@ def test_results_are_taken_while_others_are_made():
             running -= 1
         return k
 
-    assert list(threads.streamed(slow, range(5))) == [0, 1, 2, 3, 4]
+    assert list(threads.stream_tasks(slow, range(5))) == [0, 1, 2, 3, 4]
     assert most == 1
     started = []
 
@@ -138,12 +140,12 @@ def test_results_are_taken_while_others_are_made():
             yield k
 
     with threads.threads(3):
-        results = threads.streamed(slow, tasks())
+        results = threads.stream_tasks(slow, tasks())
         assert next(results) == 0
         assert len(started) <= 5  # memory is bounded
         assert list(results) == list(range(1, 20))
         assert 1 < most <= 3
-        results = threads.streamed(lambda k: 1 / k, [1, 2, 0, 4])
+        results = threads.stream_tasks(lambda k: 1 / k, [1, 2, 0, 4])
         assert [next(results), next(results)] == [1.0, 0.5]
         with pytest.raises(ZeroDivisionError):
             next(results)

@@ -9,7 +9,7 @@ import xcrack as xc
 from support.scenes_2d import perturbed
 from xcrack.base.arrays import Floats
 from xcrack.fem.quadrature import sub_cells
-from xcrack.fem.system import build, discretised
+from xcrack.fem.system import build, discretise
 from xcrack.linalg.rigid_motion import pieces
 from xcrack.output.pieces import pieces as drawn_pieces
 from xcrack.verification.book.cases.junctions import K_PRESSED, LINES, OPEN, PRESSED
@@ -273,7 +273,7 @@ def test_faces_are_as_long_as_their_cracks():
         lines = shallow(seed)
         for number in (2, 3):
             result = outcome(pulled, perturbed(24, seed), lines[:number])
-            result = result if isinstance(result, str) else outcome(discretised, result)
+            result = result if isinstance(result, str) else outcome(discretise, result)
             if isinstance(result, str):
                 assert re.search("two cracks run through the cell|closer than a cell", result)
                 continue

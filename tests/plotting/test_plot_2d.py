@@ -192,7 +192,7 @@ def test_a_path_without_suffix(tmp_path, pulled):
 @pytest.fixture
 def can_render(monkeypatch):
     """The marker has asked already; a second process would take the time of the test."""
-    monkeypatch.setattr(plot_pyvista, "renders", lambda: True)
+    monkeypatch.setattr(plot_pyvista, "can_render", lambda: True)
 
 
 @pytest.mark.plot
@@ -214,7 +214,7 @@ def test_pyvista_returns_its_plotter(pulled):
 
 
 def test_auto_falls_back_to_matplotlib(monkeypatch, pulled):
-    monkeypatch.setattr(plot_pyvista, "renders", lambda: False)
+    monkeypatch.setattr(plot_pyvista, "can_render", lambda: False)
     assert isinstance(xc.plot(pulled, show=False), Figure)
     with pytest.raises(xc.ProblemError, match="libegl1"):
         xc.plot(pulled, renderer="pyvista", show=False)
@@ -222,7 +222,7 @@ def test_auto_falls_back_to_matplotlib(monkeypatch, pulled):
 
 def test_probe_survives_a_process_that_dies(monkeypatch):
     monkeypatch.setattr(plot_pyvista, "_PROBE", "import os; os.abort()")
-    assert not plot_pyvista.renders.__wrapped__()
+    assert not plot_pyvista.can_render.__wrapped__()
 
 
 def test_pressure_along_the_lips(pressed):

@@ -342,7 +342,7 @@ def test_planes():
 @pytest.fixture
 def can_render(monkeypatch):
     """The marker has asked already; a second process would take the time of the test."""
-    monkeypatch.setattr(plot_pyvista, "renders", lambda: True)
+    monkeypatch.setattr(plot_pyvista, "can_render", lambda: True)
 
 
 @pytest.mark.plot
@@ -373,7 +373,7 @@ def test_matplotlib_draws_cracks(tmp_path, solution, field):
 
 
 def test_without_a_renderer(monkeypatch, solution):
-    monkeypatch.setattr(plot_pyvista, "renders", lambda: False)
+    monkeypatch.setattr(plot_pyvista, "can_render", lambda: False)
     assert isinstance(xc.plot(solution, "pressure", show=False), Figure)
     with pytest.raises(xc.ProblemError, match="libegl1"):
         xc.plot(solution, "von_mises", show=False)
@@ -395,7 +395,7 @@ def test_without_a_renderer(monkeypatch, solution):
     ],
 )
 def test_bad_options(monkeypatch, solution, field, options, message):
-    monkeypatch.setattr(plot_pyvista, "renders", lambda: True)
+    monkeypatch.setattr(plot_pyvista, "can_render", lambda: True)
     with pytest.raises(xc.ProblemError, match=message):
         xc.plot(solution, field, show=False, **options)
 

@@ -17,7 +17,7 @@ import pytest
 
 import xcrack as xc
 from xcrack.view import report as reporting
-from xcrack.view.view_3d import packed
+from xcrack.view.view_3d import packed_layers
 
 STEEL = xc.Isotropic(E=210e3, nu=0.3, plane="strain")
 pytestmark = pytest.mark.filterwarnings("ignore::xcrack.XcrackWarning")
@@ -226,7 +226,7 @@ def test_too_much_is_left_out_and_named(monkeypatch, tmp_path):
     text, _, numbers = read(xc.report(penny(), tmp_path / "large.html"))
     assert numbers["view"] == {"layers": 0}
     assert "too much for a page" in text
-    assert packed([]) is None
+    assert packed_layers([]) is None
     # What cannot be drawn without a renderer is named.
     assert any("Mesh" in words for words in numbers["pictures"]["missing"])
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from xcrack.linalg.coulomb import FrictionRows, Status, all_stuck, coulomb
-from xcrack.linalg.coulomb import _swept as swept
+from xcrack.linalg.coulomb import _sweep_functions as swept
 
 
 def drawn(seed, g=12, part=1.0, mu=None):

@@ -11,8 +11,8 @@ import xcrack.linalg.row_blocks as row_blocks_file
 from xcrack.base.errors import ConvergenceError
 from xcrack.base.threads import threads
 from xcrack.linalg import products
-from xcrack.linalg.products import best_guesses, independent
-from xcrack.linalg.projected_cg import Ask, Operator, descending, in_lockstep
+from xcrack.linalg.products import best_guesses, independent_columns
+from xcrack.linalg.projected_cg import Operator, Request, conjugate_gradients_steps, in_lockstep
 from xcrack.linalg.row_blocks import row_blocks
 
 
@@ -87,14 +87,14 @@ def test_iterations_end_on_their_own():
     b = list(np.random.default_rng(72).normal(size=(7, 30)))
     b[3] *= 0
     limits = [1e-3, 1e-12, 1e-6, 1e-9, 1e-1, 1e-9, 1e-12]
-    runs = [descending(operator, own, 0 * own, t) for own, t in zip(b, limits)]
+    runs = [conjugate_gradients_steps(operator, own, 0 * own, t) for own, t in zip(b, limits)]
     results = in_lockstep(operator, runs)
     assert max(asked) == 4
     assert results[3][1] == 0
     assert len({steps for _, steps in results}) > 3
     for own, limit, (y, steps) in zip(b, limits, results):
         assert np.linalg.norm(own - K @ y) <= 1.01 * limit * np.linalg.norm(own)
-        alone = in_lockstep(operator, [descending(operator, own, 0 * own, limit)])[0]
+        alone = in_lockstep(operator, [conjugate_gradients_steps(operator, own, 0 * own, limit)])[0]
         assert alone[1] == steps
         assert alone[0].tobytes() == y.tobytes()
 
@@ -102,7 +102,10 @@ def test_iterations_end_on_their_own():
 def test_the_first_that_fails_ends_all():
     _, operator, _ = dense(73)
     b = list(np.random.default_rng(74).normal(size=(3, 30)))
-    runs = [descending(operator, own, 0 * own, 1e-12, limit) for own, limit in zip(b, (90, 3, 90))]
+    runs = [
+        conjugate_gradients_steps(operator, own, 0 * own, 1e-12, limit)
+        for own, limit in zip(b, (90, 3, 90))
+    ]
     with pytest.raises(ConvergenceError, match="after 3 steps"):
         in_lockstep(operator, runs)
 
@@ -119,7 +122,8 @@ def test_an_answer_for_each_request_in_any_order():
 
     patterns = ["tcc", "cct", "c", "", "ctctct"]
     results = in_lockstep(
-        operator, [asking([Ask.TIMES if k == "t" else Ask.CYCLE for k in p]) for p in patterns]
+        operator,
+        [asking([Request.TIMES if k == "t" else Request.CYCLE for k in p]) for p in patterns],
     )
     assert results == [2, 4, 1, 0, 14]
 
@@ -129,7 +133,7 @@ def test_combinations_of_solved_loads_are_seen():
     K, operator, _ = dense(76)
     a, b, c = rng.normal(size=(3, 30))
     vectors = [a, 0 * a, -3 * a, b, 1e6 * a + 1e-3 * b, a + 2 * b, a + 1e-7 * c, c]
-    assert independent(vectors) == [0, 3, 7]
+    assert independent_columns(vectors) == [0, 3, 7]
     solved = [np.linalg.solve(K, v) for v in (a, b)]
     guess, nothing = best_guesses(operator, solved, [a + 2 * b, 0 * a])
     np.testing.assert_allclose(guess, solved[0] + 2 * solved[1], rtol=1e-9)

@@ -20,8 +20,8 @@ from xcrack.fem.system import build
 from xcrack.linalg import direct, multifrontal
 from xcrack.linalg.basis import function_nodes
 from xcrack.linalg.kernels.tree import postorder
-from xcrack.linalg.multifrontal import factorised, tree
-from xcrack.linalg.reuse import Reuse
+from xcrack.linalg.multifrontal import factorise, tree
+from xcrack.linalg.reuse import SolverState
 from xcrack.linalg.rigid_motion import free_motion
 
 STEEL = xc.Isotropic(1.0, 0.3, "strain")
@@ -74,7 +74,7 @@ def matrix_of(problem):
     model = build(problem)
     fixed = model.known.fixed.copy()
     fixed[free_motion(model.space, fixed).pins] = True
-    basis, reduced = direct._reduced(
+    basis, reduced = direct._reduced_columns(
         model.space, model.stiffness, fixed, problem.numerics, problem.material
     )
     owner = function_nodes(model.space)
@@ -87,7 +87,7 @@ def test_against_a_dense_factorisation(scene, keep):
     """Residual, solution and halves; P K P^T = L L^T says what the forward half is."""
     problem = SCENES[scene]()
     A, columns = matrix_of(problem)
-    factor = factorised(A, columns, tree(problem.mesh, problem.order), keep=keep)
+    factor = factorise(A, columns, tree(problem.mesh, problem.order), keep=keep)
     dense = A.toarray()
     dense = (dense + dense.T) / 2
     exact = scipy.linalg.cholesky(dense[np.ix_(factor.perm, factor.perm)], lower=True)
@@ -111,7 +111,7 @@ def test_forward_half_of_sparse_rows(scene):
     """Only parts that the rows touch are visited; B K^-1 B^T comes from it."""
     problem = SCENES[scene]()
     A, columns = matrix_of(problem)
-    factor = factorised(A, columns, tree(problem.mesh, problem.order))
+    factor = factorise(A, columns, tree(problem.mesh, problem.order))
     rng = np.random.default_rng(734)
     rows = sp.csr_matrix((np.ones(7), (rng.integers(0, 3, 7), rng.choice(A.shape[0], 7))),
                          shape=(3, A.shape[0]))  # fmt: skip
@@ -126,13 +126,13 @@ def test_a_matrix_that_is_not_positive_is_refused():
     problem = plane([EDGE])
     A, columns = matrix_of(problem)
     halves = tree(problem.mesh, 2)
-    assert factorised(A - 0.5 * sp.identity(A.shape[0], format="csc"), columns, halves) is None
+    assert factorise(A - 0.5 * sp.identity(A.shape[0], format="csc"), columns, halves) is None
     holes = sp.diags((np.arange(A.shape[0]) != 11) * 1.0)
-    assert factorised(sp.csc_matrix(holes @ A @ holes), columns, halves) is None
+    assert factorise(sp.csc_matrix(holes @ A @ holes), columns, halves) is None
 
 
 def test_nan_is_not_taken_for_a_solution(monkeypatch):
-    sound = multifrontal.factorised
+    sound = multifrontal.factorise
 
     def spoilt(A, *arguments, **options):
         return sound(sp.csc_matrix(np.nan * A), *arguments, **options)
@@ -208,19 +208,19 @@ def test_only_what_changed_is_factored_and_the_bits_are_the_same(order, monkeypa
     fresh = [p for p in grown(4)]
     halves, before, shares = tree(fresh[0].mesh, order), None, []
     seen = {}
-    sound = multifrontal._wanted
+    sound = multifrontal._parts_to_factor
 
     def watched(*arguments):
         seen["wanted"] = sound(*arguments)
         return seen["wanted"]
 
-    monkeypatch.setattr(multifrontal, "_wanted", watched)
+    monkeypatch.setattr(multifrontal, "_parts_to_factor", watched)
     for problem in fresh:
         problem = replace(problem, order=order)
         A, columns = matrix_of(problem)
-        alone = factorised(A, columns, halves)
+        alone = factorise(A, columns, halves)
         seen.clear()
-        after = factorised(A, columns, halves, before, keep=True)
+        after = factorise(A, columns, halves, before, keep=True)
         b = np.random.default_rng(735).standard_normal((A.shape[0], 2))
         assert after.solve(b).tobytes() == alone.solve(b).tobytes()
         if before is not None:
@@ -228,7 +228,7 @@ def test_only_what_changed_is_factored_and_the_bits_are_the_same(order, monkeypa
         assert sum(map(len, after.memory)) <= multifrontal._SPREAD * after.used
         before = after
     assert max(shares) < 0.7
-    again = factorised(A, columns, halves, before, keep=True)
+    again = factorise(A, columns, halves, before, keep=True)
     assert not seen["wanted"].any()
     assert again.solve(b).tobytes() == before.solve(b).tobytes()
 
@@ -238,14 +238,14 @@ def test_a_change_in_the_last_bit_is_seen():
     problem = plane([EDGE])
     A, columns = matrix_of(problem)
     halves = tree(problem.mesh, 2)
-    before = factorised(A, columns, halves, keep=True)
+    before = factorise(A, columns, halves, keep=True)
     for value in (np.nextafter(A.data[40], 9.0), A.data[40] + 1e-9):
         changed = A.copy()
         i = int(changed.indices[40])
         j = int(np.searchsorted(changed.indptr, 40, side="right") - 1)
         changed[i, j] = changed[j, i] = value
-        after = factorised(sp.csc_matrix(changed), columns, halves, before, keep=True)
-        alone = factorised(sp.csc_matrix(changed), columns, halves)
+        after = factorise(sp.csc_matrix(changed), columns, halves, before, keep=True)
+        alone = factorise(sp.csc_matrix(changed), columns, halves)
         b = np.ones(A.shape[0])
         assert after.solve(b).tobytes() == alone.solve(b).tobytes()
 
@@ -254,19 +254,19 @@ def test_memory_of_update_matrices_is_bounded(monkeypatch):
     problem = grown(1)[0]
     A, columns = matrix_of(problem)
     halves = tree(problem.mesh, 2)
-    free = factorised(A, columns, halves, keep=True)
-    once = factorised(A, columns, halves)
+    free = factorise(A, columns, halves, keep=True)
+    once = factorise(A, columns, halves)
     retained = free.used - once.used
     monkeypatch.setattr(multifrontal, "_MOST", retained // 3)
-    bound = factorised(A, columns, halves, keep=True)
+    bound = factorise(A, columns, halves, keep=True)
     assert bound.lowest > free.lowest
     assert bound.used - once.used <= retained // 3
     b = np.ones(A.shape[0])
     assert bound.solve(b).tobytes() == free.solve(b).tobytes()
     # A factor with other units is not taken over, and one of another tree neither.
-    after = factorised(A, columns, halves, free, keep=True)
+    after = factorise(A, columns, halves, free, keep=True)
     assert after.solve(b).tobytes() == free.solve(b).tobytes()
-    other = factorised(A, columns, tree(problem.mesh, 2), free, keep=True)
+    other = factorise(A, columns, tree(problem.mesh, 2), free, keep=True)
     assert other.solve(b).tobytes() == free.solve(b).tobytes()
 
 
@@ -275,7 +275,7 @@ def test_growth_hands_the_factor_on(contact):
     """The solution of the next crack has the bits of a fresh solve that knows no factor."""
     problems = [replace(p, contact=contact) for p in grown(3)]
     states = [1.0, -0.5]
-    reuse = Reuse()
+    reuse = SolverState()
     for problem in problems:
         light = replace(reuse, factor=None, tree=None, bulk=None)
         alone = solve_states(problem, states, reuse=light)
@@ -319,7 +319,7 @@ def test_blas_has_one_thread_inside_and_as_many_as_before_outside():
     A, columns = matrix_of(problem)
     b = np.ones(A.shape[0])
     with threadpoolctl.threadpool_limits(2, user_api="blas"):
-        two = factorised(A, columns, tree(problem.mesh, 2)).solve(b)
+        two = factorise(A, columns, tree(problem.mesh, 2)).solve(b)
     with threadpoolctl.threadpool_limits(1, user_api="blas"):
-        assert factorised(A, columns, tree(problem.mesh, 2)).solve(b).tobytes() == two.tobytes()
+        assert factorise(A, columns, tree(problem.mesh, 2)).solve(b).tobytes() == two.tobytes()
     np.testing.assert_allclose(many.u, one.u, atol=1e-12 * np.abs(one.u).max())

@@ -10,9 +10,9 @@ import xcrack.linalg.multigrid as multigrid
 from xcrack.fem.assembly import bulk, rigid_modes
 from xcrack.linalg.cycle import largest_eigenvalue
 from xcrack.linalg.kernels.cycle import first_step, next_step
-from xcrack.linalg.multigrid import extended, hierarchy
+from xcrack.linalg.multigrid import extended_cycle, hierarchy
 from xcrack.linalg.projected_cg import Operator, conjugate_gradients
-from xcrack.linalg.row_blocks import Bordered, row_blocks, stored
+from xcrack.linalg.row_blocks import BorderedFactor, row_blocks, stored
 from xcrack.mesh.simplex import node_points
 
 
@@ -43,7 +43,7 @@ def test_a_matrix_in_parts():
     joined = row_blocks([sp.csr_matrix(sp.hstack(below))], np.array([0, 4]))
     for name in ("shape", "first", "start", "offset", "columns", "values"):
         assert np.array_equal(getattr(lower, name), getattr(joined, name)), name
-    A = Bordered(row_blocks([standard], first), row_blocks([across], first), lower)
+    A = BorderedFactor(row_blocks([standard], first), row_blocks([across], first), lower)
     whole = sp.vstack([sp.hstack([standard, across]), sp.hstack(below)])
     x = np.random.default_rng(4481).normal(size=12)
     assert A.shape == (12, 12)
@@ -160,9 +160,9 @@ def operator_of(stiffness, fixed, null=None):
         row_blocks([sp.csr_matrix((n, 0))], levels.matrix.first),
         row_blocks([sp.csr_matrix((0, n)), sp.csr_matrix((0, 0))], nothing),
     ]
-    K = Bordered(levels.matrix, *border)
+    K = BorderedFactor(levels.matrix, *border)
     null = np.zeros((n, 0)) if null is None else null
-    return A, levels, Operator(K.times, extended(levels, K, A.diagonal()), A.diagonal(), null)
+    return A, levels, Operator(K.times, extended_cycle(levels, K, A.diagonal()), A.diagonal(), null)
 
 
 def load(levels, seed=911):

@@ -18,8 +18,8 @@ from xcrack.linalg.active_set import active_set
 from xcrack.linalg.direct import system
 from xcrack.linalg.engine import ContactRows
 from xcrack.linalg.iterative import iterative_system
-from xcrack.linalg.projected_cg import Operator, conjugate_gradients, projected
-from xcrack.linalg.rigid_motion import balanced, free_motion, without_motion
+from xcrack.linalg.projected_cg import Operator, conjugate_gradients, projected_solution
+from xcrack.linalg.rigid_motion import balanced_loads, free_motion, without_motion
 
 
 def dense(K, null=None):
@@ -41,7 +41,7 @@ def pressed(K, b, N, d, start=True, measure=None, **options):
     flags = np.broadcast_to(np.asarray(start, dtype=bool), len(d))
     options = {"tolerance": 1e-12} | options
     y = np.zeros(len(b))
-    return projected(dense(K), b, sp.csr_matrix(N), d, measure, 1.0, flags, y, **options)
+    return projected_solution(dense(K), b, sp.csr_matrix(N), d, measure, 1.0, flags, y, **options)
 
 
 def by_enumeration(K, b, N, d):
@@ -355,7 +355,7 @@ def test_without_supports():
     f = total(scene.problem, scene.model, pull)
     motion = free_motion(scene.space, scene.fixed)
     assert motion.modes.shape[1] == 3
-    f = balanced(scene.space, motion, f[:, None])[0][:, 0]
+    f = balanced_loads(scene.space, motion, f[:, None])[0][:, 0]
     engine = scene.iterative(modes=motion.modes)
     pinned = scene.fixed.copy()
     pinned[motion.pins] = True
@@ -400,7 +400,7 @@ def test_a_tilted_penny_as_with_a_factor(supports, order):
     space, fixed = model.space, model.known.fixed
     motion = free_motion(space, fixed)
     f = total(problem, model, loads)
-    f = balanced(space, motion, f[:, None])[0][:, 0]
+    f = balanced_loads(space, motion, f[:, None])[0][:, 0]
     pinned = fixed.copy()
     pinned[motion.pins] = True
     direct = system(space, model.stiffness, pinned, problem.numerics)

@@ -9,7 +9,7 @@ from xcrack.analysis.solution import Solution
 from xcrack.crack.lines import line_crack
 from xcrack.crack.measures import length_inside
 from xcrack.growth.response import Response
-from xcrack.linalg.reuse import Reuse
+from xcrack.linalg.reuse import SolverState
 from xcrack.mesh.box import box
 from xcrack.model.material import Isotropic
 from xcrack.model.problem import Problem
@@ -37,7 +37,7 @@ def formula(K_of, radius=None):
         full = [np.reshape(K_of(problem, c), (-1, 2)) for c in range(len(problem.placed))]
         K = np.stack([float(state) * np.concatenate(full) for state in states])
         count = 1.0 if not reuse.centre else reuse.centre[0][0, 0] + 1
-        after = Reuse(centre=(np.full((1, 2), count),), active=(None,))
+        after = SolverState(centre=(np.full((1, 2), count),), active=(None,))
         answer = replace(Response.of_K(problem, states, K), reuse=after)
         if radius is None:
             return answer

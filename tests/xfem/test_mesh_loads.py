@@ -5,7 +5,7 @@ import pytest
 
 import xcrack as xc
 from xcrack.analysis.solve import solve_states
-from xcrack.linalg.reuse import Reuse
+from xcrack.linalg.reuse import SolverState
 
 STEEL = xc.Isotropic(210e3, 0.3, "strain")
 
@@ -22,7 +22,7 @@ def test_vectors_of_an_earlier_solve(side, again):
     mesh = xc.box((-1, -1), (1, 1), 8)
     loads = [xc.traction(side, stress), xc.traction("right", (2.0, 0.0))]
     supports = [xc.fix("bottom", 0), xc.fix("bottom", 1)]
-    reuse, made = Reuse(), []
+    reuse, made = SolverState(), []
     for tip in (-0.4, -0.2):
         problem = xc.Problem(
             mesh, STEEL, [xc.line_crack([(-1.2, 0.03), (tip, 0.07)])], loads=loads,
@@ -39,7 +39,7 @@ def test_vectors_of_an_earlier_solve(side, again):
 
 def test_free_motion_of_other_supports():
     """Supports that changed between two solves in a mesh leave other motions free."""
-    mesh, reuse = xc.box((-1, -1), (1, 1), 8), Reuse()
+    mesh, reuse = xc.box((-1, -1), (1, 1), 8), SolverState()
     loads = [xc.traction("top", (0.0, 1.0)), xc.traction("bottom", (0.0, -1.0))]
     for supports in ([], [xc.fix("left", 0)], []):
         problem = xc.Problem(

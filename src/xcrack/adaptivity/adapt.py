@@ -8,21 +8,21 @@ from typing import Any
 
 import numpy as np
 
-from xcrack.adaptivity import next_2d, next_3d
-from xcrack.adaptivity.adapted import Adapted, Round
-from xcrack.adaptivity.measured import Measured, measured
-from xcrack.adaptivity.resolved import resolved
-from xcrack.base.checks import entries, flag, number, whole
+from xcrack.adaptivity import sizes_2d, sizes_3d
+from xcrack.adaptivity.adaptation import Adaptation, AdaptationPass
+from xcrack.adaptivity.indicators import Indicators, indicators_of
+from xcrack.adaptivity.resolved import resolved_problem
+from xcrack.base.checks import entries, flag, number, whole_number
 from xcrack.base.errors import GeometryError, ProblemError, collected_warnings, warn
 from xcrack.mesh.mesh import Mesh
 from xcrack.model.problem import Problem, check_problem
 
-_FIRST: dict[int, Callable[[Problem], Mesh]] = {2: next_2d.first_mesh, 3: next_3d.first_mesh}
-_NEXT: dict[int, Callable[[Measured, float, float, int], Mesh | None]] = {
-    2: next_2d.next_mesh, 3: next_3d.next_mesh,
+_FIRST: dict[int, Callable[[Problem], Mesh]] = {2: sizes_2d.first_mesh, 3: sizes_3d.first_mesh}
+_NEXT: dict[int, Callable[[Indicators, float, float, int], Mesh | None]] = {
+    2: sizes_2d.next_mesh, 3: sizes_3d.next_mesh,
 }  # fmt: skip
-_TRUSTED: dict[int, Callable[[Measured, Measured | None], Measured]] = {
-    2: next_2d.trusted, 3: next_3d.trusted,
+_TRUSTED: dict[int, Callable[[Indicators, Indicators | None], Indicators]] = {
+    2: sizes_2d.trusted_errors, 3: sizes_3d.trusted_errors,
 }  # fmt: skip
 _ORDER = 2
 _MOST_ROUNDS = {2: 14, 3: 6}
@@ -37,7 +37,7 @@ def adapt(
     states: Sequence[Any] | None = None,
     max_unknowns: int | None = None,
     progress: bool | str = True,
-) -> Adapted:
+) -> Adaptation:
     """Refine the mesh of a scene until K is as accurate as wanted.
 
     A first mesh resolves tips, kinks and fronts. Then rounds of: solve at order 2, K with its error
@@ -62,7 +62,7 @@ def adapt(
 
     Returns
     -------
-    Adapted
+    Adaptation
         With `met`, or the reason in words why the tolerance is not met.
 
     Raises
@@ -87,25 +87,25 @@ def adapt(
     tolerance = number(tolerance, "adapt: tolerance", above=0, below=1)
     most = _MOST_UNKNOWNS[problem.mesh.dim]
     if max_unknowns is not None:
-        most = whole(max_unknowns, "adapt: max_unknowns", least=1, most=10**9)
+        most = whole_number(max_unknowns, "adapt: max_unknowns", least=1, most=10**9)
     if not (isinstance(progress, str) and progress == "always"):
         flag(progress, 'adapt: progress, if it is not "always",')
-    problem = resolved(problem)
+    problem = resolved_problem(problem)
     _check_scene(problem)
-    wanted = [None] if states is None else entries(states, "states")
+    load_states = [None] if states is None else entries(states, "states")
     scene = replace(problem, mesh=_FIRST[problem.mesh.dim](problem), order=_ORDER)
-    return _rounds(scene, wanted, tolerance, most, progress)
+    return _adaptation_passes(scene, load_states, tolerance, most, progress)
 
 
-def _rounds(
+def _adaptation_passes(
     scene: Problem,
     states: Sequence[Any],
     tolerance: float,
     most: int,
     progress: bool | str,
-) -> Adapted:
-    rounds: list[Round] = []
-    now, messages = _measured(scene, states, None, rounds)
+) -> Adaptation:
+    rounds: list[AdaptationPass] = []
+    current, messages = _measure_pass(scene, states, None, rounds)
     if rounds[0].unknowns > most:
         raise ProblemError(
             f"adapt: max_unknowns = {most}, and the first mesh, in which every crack is a few "
@@ -113,52 +113,54 @@ def _rounds(
         )
     aim, reason = _AIM, ""
     while True:
-        _tell(progress, len(rounds) - 1, rounds[-1])
+        _tell_progress(progress, len(rounds) - 1, rounds[-1])
         # Estimates are blind to parts of contact: there, two meshes have to agree.
-        met = now.error <= tolerance and (len(rounds) > 1 or not now.pressed)
+        met = current.error <= tolerance and (len(rounds) > 1 or not current.pressed)
         if met:
             break
         if len(rounds) == _MOST_ROUNDS[scene.mesh.dim]:
             reason = f"{len(rounds)} rounds have not been enough"
             break
-        if not now.best.any():
+        if not current.best.any():
             break  # at rest, or shut everywhere: no cell brings K, nor a scale for its error
-        mesh = _NEXT[scene.mesh.dim](now, tolerance, aim, most)
+        mesh = _NEXT[scene.mesh.dim](current, tolerance, aim, most)
         if mesh is None:
             reason = (
                 f"the next mesh would have more than {most} unknowns: allow more with max_unknowns"
             )
             break
         try:
-            new, messages = _measured(replace(scene, mesh=mesh), states, now, rounds)
+            new, messages = _measure_pass(replace(scene, mesh=mesh), states, current, rounds)
         except GeometryError as error:
             reason = f"the crack does not fit into a finer mesh ({error})"
             break
-        if new.error > _STALLED * now.error:
+        if new.error > _STALLED * current.error:
             aim /= 2
-        now = new
+        current = new
     for message in messages:
         warn(message)
-    zero = "" if np.abs(now.best).max(initial=0.0) > 0 else "K is zero at every tip"
-    parts = [part for part in (reason, now.worst, *now.reasons, zero) if part]
+    zero = "" if np.abs(current.best).max(initial=0.0) > 0 else "K is zero at every tip"
+    parts = [part for part in (reason, current.worst, *current.reasons, zero) if part]
     reason = "" if met else "; ".join(parts)
-    return Adapted(now.problem, now.solutions, now.sifs, tolerance, met, reason, tuple(rounds))
+    return Adaptation(
+        current.problem, current.solutions, current.sifs, tolerance, met, reason, tuple(rounds)
+    )
 
 
-def _measured(
-    scene: Problem, states: Sequence[Any], old: Measured | None, rounds: list[Round]
-) -> tuple[Measured, list[str]]:
+def _measure_pass(
+    scene: Problem, states: Sequence[Any], old: Indicators | None, rounds: list[AdaptationPass]
+) -> tuple[Indicators, list[str]]:
     """A round, added to the list of them, and what it warned of."""
     messages: list[str] = []
     start = perf_counter()
     with collected_warnings(messages):
-        new = _TRUSTED[scene.mesh.dim](measured(scene, states), old)
+        new = _TRUSTED[scene.mesh.dim](indicators_of(scene, states), old)
     unknowns, seconds = new.solutions[0].space.n_dof, perf_counter() - start
-    rounds.append(Round(len(scene.mesh.cells), unknowns, new.best, new.bar, seconds))
+    rounds.append(AdaptationPass(len(scene.mesh.cells), unknowns, new.best, new.bar, seconds))
     return new, messages
 
 
-def _tell(progress: bool | str, number: int, row: Round) -> None:
+def _tell_progress(progress: bool | str, number: int, row: AdaptationPass) -> None:
     if progress == "always" or (progress and sys.stderr.isatty()):
         print(
             f"round {number}: {row.unknowns} unknowns, error of K {row.error:.1e}, "

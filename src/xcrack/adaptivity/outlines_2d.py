@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from xcrack.adaptivity.start_2d import growing
+from xcrack.adaptivity.start_2d import growing_sizes
 from xcrack.base.arrays import Floats
 from xcrack.crack.crack import Crack
 from xcrack.crack.measures import length_inside
@@ -19,7 +19,7 @@ _MOUTH, _MEANT = 0.5, 0.1  # as `placing_2d` has them: shares of a cell
 _MOST = 400  # places along a crack
 
 
-def hidden(problem: Problem) -> bool:
+def hidden_ends(problem: Problem) -> bool:
     """Whether an end counts as a mouth because of the cells beside it only."""
     for crack in problem.cracks:
         small = length_inside(crack, problem.mesh) / _CELLS
@@ -30,7 +30,7 @@ def hidden(problem: Problem) -> bool:
     return False
 
 
-def wanted(problem: Problem, trial: int) -> Callable[[Floats], Floats]:
+def edge_lengths(problem: Problem, trial: int) -> Callable[[Floats], Floats]:
     """Longest edges of cells at points: small at the ends, and in later trials all along."""
     mesh = problem.mesh
     place, size = [np.zeros((0, 2))], [np.zeros(0)]
@@ -39,16 +39,16 @@ def wanted(problem: Problem, trial: int) -> Callable[[Floats], Floats]:
         length = length_inside(crack, mesh)
         for k, x in enumerate(every[c]):
             others = np.concatenate([np.delete(every[c], k, 0), *every[:c], *every[c + 1 :]])
-            apart = np.linalg.norm(others - x, axis=1)
-            least = float(apart[apart > 0].min(initial=np.inf))
+            distance = np.linalg.norm(others - x, axis=1)
+            least = float(distance[distance > 0].min(initial=np.inf))
             place.append(x[None])
             size.append(np.array([min(length / _CELLS, least / _ROOM) / 2**trial]))
         if trial:
-            along = _along(crack, length / _CELLS / 2**trial)
+            along = _points_along(crack, length / _CELLS / 2**trial)
             along = along[contains(mesh, along)]
             place.append(along)
             size.append(np.full(len(along), length / _CELLS / 2**trial))
-    return growing(np.concatenate(place), np.concatenate(size), _SLOPE)
+    return growing_sizes(np.concatenate(place), np.concatenate(size), _SLOPE)
 
 
 def _ends(crack: Crack, mesh: Mesh) -> Floats:
@@ -60,15 +60,15 @@ def _ends(crack: Crack, mesh: Mesh) -> Floats:
     return np.asarray(x[np.array(inside, dtype=bool)])
 
 
-def _along(crack: Crack, spacing: float) -> Floats:
+def _points_along(crack: Crack, spacing: float) -> Floats:
     """Points of a crack, no farther apart than a spacing as long as they are not too many."""
     length = np.linalg.norm(np.diff(crack.points, axis=0), axis=1)
     spacing = max(spacing, float(length.sum()) / _MOST)
     parts = [
-        a + np.linspace(0, 1, int(np.ceil(own / spacing)) + 1)[:, None] * (b - a)
-        for a, b, own in zip(crack.points[:-1], crack.points[1:], length, strict=True)
+        a + np.linspace(0, 1, int(np.ceil(piece_length / spacing)) + 1)[:, None] * (b - a)
+        for a, b, piece_length in zip(crack.points[:-1], crack.points[1:], length, strict=True)
     ]
     return np.concatenate(parts)
 
 
-__all__ = ["hidden", "wanted"]
+__all__ = ["edge_lengths", "hidden_ends"]

@@ -8,7 +8,7 @@ from xcrack.base.arrays import Floats, ranges
 from xcrack.crack.crack import Crack
 from xcrack.crack.measures import area_inside
 from xcrack.mesh.locate import Body
-from xcrack.mesh.polygon import graded, with_room
+from xcrack.mesh.polygon import graded_sizes, with_room
 from xcrack.mesh.triangulation import loops
 from xcrack.model.problem import Problem
 
@@ -20,7 +20,7 @@ _FINE = 0.5  # of a cell: spacing of the places
 _MOST = 2000  # places along an outline
 
 
-def hidden(problem: Problem) -> bool:
+def hidden_ends(problem: Problem) -> bool:
     """Whether parts of an outline count as mouths because of the cells beside them only."""
     body = Body.of(problem.mesh)
     for crack in problem.cracks:
@@ -32,7 +32,7 @@ def hidden(problem: Problem) -> bool:
     return False
 
 
-def wanted(problem: Problem, trial: int) -> Callable[[Floats], Floats]:
+def edge_lengths(problem: Problem, trial: int) -> Callable[[Floats], Floats]:
     """Longest edges of cells at points: small along the outlines."""
     body = Body.of(problem.mesh)
     places, sizes = [], []
@@ -40,7 +40,7 @@ def wanted(problem: Problem, trial: int) -> Callable[[Floats], Floats]:
         x, size = _outline(crack, body)
         places.append(x)
         sizes.append(np.full(len(x), _COARSER * size / 2**trial))
-    return graded(places, with_room(places, sizes))
+    return graded_sizes(places, with_room(places, sizes))
 
 
 def _outline(crack: Crack, body: Body) -> tuple[Floats, float]:
@@ -63,4 +63,4 @@ def _outline(crack: Crack, body: Body) -> tuple[Floats, float]:
     return x, area / length / CELLS if length > 0 else np.inf
 
 
-__all__ = ["CELLS", "hidden", "wanted"]
+__all__ = ["CELLS", "edge_lengths", "hidden_ends"]

@@ -12,7 +12,7 @@ _TWINS: dict[int, ModuleType] = {2: outlines_2d, 3: outlines_3d}
 _TRIALS = 5  # each on cells of half the size
 
 
-def resolved(problem: Problem) -> Problem:
+def resolved_problem(problem: Problem) -> Problem:
     """The scene on a mesh that is fine enough to tell tips and fronts of its cracks from mouths.
 
     Cells around the ends of a crack become a quarter of its length, or as small as what lies
@@ -33,10 +33,12 @@ def resolved(problem: Problem) -> Problem:
         No mesh will do: the message of the last one.
     """
     twin = _TWINS[problem.mesh.dim]
-    if _fits(problem) and not twin.hidden(problem):
+    if _fits(problem) and not twin.hidden_ends(problem):
         return problem
     for trial in range(_TRIALS):
-        problem = replace(problem, mesh=refine(problem.mesh, size=twin.wanted(problem, trial)))
+        problem = replace(
+            problem, mesh=refine(problem.mesh, size=twin.edge_lengths(problem, trial))
+        )
         if _fits(problem):
             break
     _ = problem.placed
@@ -51,4 +53,4 @@ def _fits(problem: Problem) -> bool:
     return True
 
 
-__all__ = ["resolved"]
+__all__ = ["resolved_problem"]

@@ -35,10 +35,10 @@ def first_mesh(problem: Problem) -> Mesh:
     # A mesh that is fine enough at its ends stays as it was given.
     if (cell_sizes(problem.mesh, place) <= size).all():
         return problem.mesh
-    return refine(problem.mesh, size=growing(place, size, _SLOPE))
+    return refine(problem.mesh, size=growing_sizes(place, size, _SLOPE))
 
 
-def growing(place: Floats, size: Floats, slope: float) -> Callable[[Floats], Floats]:
+def growing_sizes(place: Floats, size: Floats, slope: float) -> Callable[[Floats], Floats]:
     """Sizes of cells at points that grow with the distance from places `(n, 2)` by a slope."""
 
     def wanted(x: Floats) -> Floats:
@@ -57,22 +57,22 @@ def tip_sizes(problem: Problem) -> tuple[Floats, Floats]:
         for i in crack.tips or ():
             x = crack.points[i]
             spots.append(x[None])
-            sizes.append(min(length / _CELLS, _room(problem, x, tips, crack.points) / _ROOM))
+            sizes.append(min(length / _CELLS, _room_of_tip(problem, x, tips, crack.points) / _ROOM))
     return np.concatenate(spots), np.array(sizes)
 
 
-def _room(problem: Problem, x: Floats, tips: list[Floats], own: Floats) -> float:
+def _room_of_tip(problem: Problem, x: Floats, tips: list[Floats], other_tips: Floats) -> float:
     """Distance of a tip to the boundary, to other cracks and tips."""
     mesh = problem.mesh
     walls = [mesh.points[mesh.boundary]]
     walls += [
         np.stack([crack.points[:-1], crack.points[1:]], axis=1)
         for crack in problem.placed
-        if crack.points is not own
+        if crack.points is not other_tips
     ]
     distance = [float(distance_to_simplices(x, wall).min()) for wall in walls]
     others = [float(np.linalg.norm(x - tip)) for tip in tips if (tip != x).any()]
     return min(distance + others)
 
 
-__all__ = ["first_mesh", "growing", "tip_sizes"]
+__all__ = ["first_mesh", "growing_sizes", "tip_sizes"]

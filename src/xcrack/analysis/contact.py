@@ -6,14 +6,14 @@ from typing import Any, cast
 import numpy as np
 import scipy.sparse as sp
 
-from xcrack.analysis.contact_result import Contact, ContactSolution, Rubbing
-from xcrack.analysis.friction import FrictionSolution, rubs, solve_friction
+from xcrack.analysis.contact_result import Contact, ContactSolution, FrictionWork
+from xcrack.analysis.friction import FrictionSolution, has_friction, solve_friction
 from xcrack.analysis.multipliers import Multipliers, gap_rows, multipliers
 from xcrack.base.arrays import Bools, Floats, lock
-from xcrack.fem.system import Model
-from xcrack.linalg.direct import System
+from xcrack.fem.system import System
+from xcrack.linalg.direct import DirectSystem
 from xcrack.linalg.engine import ContactRows, Engine, StateContact
-from xcrack.linalg.reuse import Reuse
+from xcrack.linalg.reuse import SolverState
 from xcrack.model.problem import Problem
 from xcrack.model.states import LoadState
 
@@ -22,11 +22,11 @@ _OVERLAP = 1e-9  # share of the largest displacement by which faces must overlap
 
 def solve_contact(
     problem: Problem,
-    model: Model,
+    model: System,
     engine: Engine,
     f: Floats,
-    known: Floats,
-    reuse: Reuse,
+    u_imposed: Floats,
+    reuse: SolverState,
     acting: Sequence[LoadState],
     repeated: bool = False,
 ) -> ContactSolution:
@@ -39,11 +39,11 @@ def solve_contact(
     Parameters
     ----------
     problem : Problem
-    model : Model
+    model : System
     engine : Engine
-    f, known : (n_dof, states) arrays
+    f, u_imposed : (n_dof, states) arrays
         Loads, and displacements that supports impose.
-    reuse : Reuse
+    reuse : SolverState
         Of an earlier step.
     acting : sequence of LoadState
         Loads of each state: some methods need what acts on the faces besides.
@@ -59,31 +59,31 @@ def solve_contact(
     rubbed: FrictionSolution | None = None
     chosen: list[Multipliers] = []
     if problem.contact == "off":
-        u: Floats | None = engine.solve(f, known)
+        u: Floats | None = engine.solve(f, u_imposed)
         pending: list[int] = []
     else:
         # A factorisation needs no look at open faces where all cracks get multipliers anyway.
-        sure = problem.contact == "on" and isinstance(engine, System)
+        sure = problem.contact == "on" and isinstance(engine, DirectSystem)
         closed = [c for c in range(n) if len(model.lips[c]) and (sure or reuse.was_closed(c))]
-        u, exact = engine.first_look(f, known, bool(closed))
+        u, exact = engine.first_look(f, u_imposed, bool(closed))
         if u is None:
             pending = expected = closed
         else:
-            pending = _needing(problem, model, u, spaces)
+            pending = _overlapping_cracks(problem, model, u, spaces)
             if not pending and not exact:
-                u = engine.solve(f, known, u)
-                pending = _needing(problem, model, u, spaces)
+                u = engine.solve(f, u_imposed, u)
+                pending = _overlapping_cracks(problem, model, u, spaces)
     opened = u
     while pending:
         for c in pending:
             spaces[c] = _space(problem, model, c)
         chosen = [m for m in spaces if m is not None]
-        if any(rubs(problem, m.crack) for m in chosen):
-            rubbed = _solve_friction(problem, model, engine, chosen, f, known, reuse, repeated)
+        if any(has_friction(problem, m.crack) for m in chosen):
+            rubbed = _solve_friction(problem, model, engine, chosen, f, u_imposed, reuse, repeated)
             states = rubbed.states
         else:
             states = _solve_states(
-                problem, model, engine, chosen, f, known, (u, opened), reuse, acting
+                problem, model, engine, chosen, f, u_imposed, (u, opened), reuse, acting
             )
         u = np.stack([cast(Floats, state.u) for state in states], axis=1)
         sets, dual = max(state.sets for state in states), states[0].dual
@@ -93,8 +93,8 @@ def solve_contact(
             pressure[m.crack] = np.stack([s.pressure[first:last] for s in states], axis=1)
             active[m.crack] = np.stack([s.active[first:last] for s in states])
             first = last
-        seen = u if rubbed is None else np.concatenate([u, rubbed.between], axis=1)
-        pending = _needing(problem, model, seen, spaces)
+        displacements = u if rubbed is None else np.concatenate([u, rubbed.between], axis=1)
+        pending = _overlapping_cracks(problem, model, displacements, spaces)
     assert u is not None  # of the first look, or of the loop that it made begin
     if rubbed is not None:
         parts = tuple(spaces), tuple(pressure), tuple(active)
@@ -115,12 +115,12 @@ def solve_contact(
 
 def _solve_friction(
     problem: Problem,
-    model: Model,
+    model: System,
     engine: Engine,
     chosen: list[Multipliers],
     f: Floats,
-    known: Floats,
-    reuse: Reuse,
+    u_imposed: Floats,
+    reuse: SolverState,
     repeated: bool,
 ) -> FrictionSolution:
     """The load path of all states; substeps count where a crack has no multipliers yet."""
@@ -135,19 +135,19 @@ def _solve_friction(
     if method is not None:
         springs = [method.compliance(problem, model, m) for m in chosen]
     return solve_friction(
-        problem, model, engine, chosen, f, known, start, stiffness, others, before, springs
+        problem, model, engine, chosen, f, u_imposed, start, stiffness, others, before, springs
     )
 
 
 def _solve_states(
     problem: Problem,
-    model: Model,
+    model: System,
     engine: Engine,
     chosen: list[Multipliers],
     f: Floats,
-    known: Floats,
+    u_imposed: Floats,
     guess: tuple[Floats | None, Floats | None],
-    reuse: Reuse,
+    reuse: SolverState,
     acting: Sequence[LoadState],
 ) -> list[StateContact]:
     """Contact of all load states; `guess` is the latest u and that of open faces."""
@@ -157,18 +157,20 @@ def _solve_states(
     if method is not None:
         return cast(
             list[StateContact],
-            method.solve_states(problem, model, engine, chosen, f, known, start, closed, acting),
+            method.solve_states(
+                problem, model, engine, chosen, f, u_imposed, start, closed, acting
+            ),
         )
     rows = [gap_rows(m, model.lips[m.crack], model.jumps[m.crack]) for m in chosen]
     N = rows[0] if len(rows) == 1 else sp.csr_matrix(sp.vstack(rows))
     measure = np.concatenate([m.measure for m in chosen])
     stiffness = problem.material.E / _face_size(model, chosen)
     conditions = ContactRows(N, measure, stiffness, closed)
-    return engine.contact(conditions, f, known, start, *guess)
+    return engine.contact(conditions, f, u_imposed, start, *guess)
 
 
-def _needing(
-    problem: Problem, model: Model, u: Floats, spaces: Sequence[Multipliers | None]
+def _overlapping_cracks(
+    problem: Problem, model: System, u: Floats, spaces: Sequence[Multipliers | None]
 ) -> list[int]:
     """Cracks without multipliers whose faces overlap in some load state."""
     needing = []
@@ -189,17 +191,17 @@ def _needing(
     return needing
 
 
-def _space(problem: Problem, model: Model, c: int) -> Multipliers:
+def _space(problem: Problem, model: System, c: int) -> Multipliers:
     """Where the pressures of a crack live."""
     method = problem.numerics.contact_method
     if method is not None:
         return cast(Multipliers, method.pressure_space(problem, model, c))
     kind = problem.numerics.multipliers
-    fixed, rub = model.known.fixed, rubs(problem, c)
+    fixed, rub = model.known.fixed, has_friction(problem, c)
     return multipliers(model.space, c, model.lips[c], kind, fixed, rub)
 
 
-def _start(chosen: list[Multipliers], reuse: Reuse, k: int, closed: bool) -> Bools | None:
+def _start(chosen: list[Multipliers], reuse: SolverState, k: int, closed: bool) -> Bools | None:
     """Closed set that state k starts from; None where no step came before."""
     if not reuse.centre:
         return None
@@ -210,13 +212,13 @@ def _start(chosen: list[Multipliers], reuse: Reuse, k: int, closed: bool) -> Boo
     return np.concatenate(parts)
 
 
-def _face_size(model: Model, chosen: list[Multipliers]) -> float:
+def _face_size(model: System, chosen: list[Multipliers]) -> float:
     cells = np.unique(np.concatenate([model.lips[m.crack].cell.ravel() for m in chosen]))
     return float(model.space.mesh.cell_size[cells].mean())
 
 
 def contact_of(
-    model: Model, solution: ContactSolution, u: Floats, k: int
+    model: System, solution: ContactSolution, u: Floats, k: int
 ) -> tuple[Contact | None, ...]:
     """Contact of each crack in state k, None where it has no multipliers."""
     result: list[Contact | None] = []
@@ -227,9 +229,9 @@ def contact_of(
             result.append(None)
             continue
         closed = np.asarray(m.values @ active[k].astype(float)) >= 0.5
-        own: dict[str, Any] = {}
+        contact_fields: dict[str, Any] = {}
         if c in rubbing:
-            own = _rubbed(m, rubbing[c], u, k)
+            contact_fields = _friction_fields(m, rubbing[c], u, k)
         result.append(
             Contact(
                 lips.x,
@@ -239,16 +241,16 @@ def contact_of(
                 lock(np.asarray(model.jumps[c] @ u)),
                 lock(closed),
                 lips.s,
-                **own,
+                **contact_fields,
             )
         )
     return tuple(result)
 
 
-def _rubbed(m: Multipliers, rubbing: Rubbing, u: Floats, k: int) -> dict[str, Any]:
+def _friction_fields(m: Multipliers, rubbing: FrictionWork, u: Floats, k: int) -> dict[str, Any]:
     """What friction adds to the contact of one crack in state k."""
     stuck = np.asarray(m.values @ rubbing.stuck[k].astype(float)) >= 0.5
-    shear = np.stack([m.values @ own[:, k] for own in rubbing.shear], axis=1)
+    shear = np.stack([m.values @ tractions[:, k] for tractions in rubbing.shear], axis=1)
     slip = np.stack([jump @ u for jump in rubbing.jumps], axis=1)
     one = (slice(None), 0) if len(rubbing.jumps) == 1 else ()
     return {

@@ -6,7 +6,7 @@ import scipy.sparse as sp
 
 from xcrack.analysis.multipliers import Multipliers
 from xcrack.base.arrays import Bools, Floats
-from xcrack.linalg.reuse import Reuse
+from xcrack.linalg.reuse import SolverState
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +52,7 @@ class Contact:
 
 
 @dataclass(frozen=True, eq=False)
-class Rubbing:
+class FrictionWork:
     """Friction on the faces of one crack in all load states.
 
     Attributes
@@ -90,7 +90,7 @@ class ContactSolution:
     dual : (g, g) array or None
         F = N K^-1 N^T over the multipliers of all cracks in their order; None where no
         factorisation made it.
-    rubbing : tuple of Rubbing
+    rubbing : tuple of FrictionWork
         Of the cracks whose faces rub.
     dissipated : tuple of float
         Energy that friction took in each state since the one before; empty without.
@@ -102,10 +102,10 @@ class ContactSolution:
     active: tuple[Bools | None, ...]
     sets: int
     dual: Floats | None = None
-    rubbing: tuple[Rubbing, ...] = ()
+    rubbing: tuple[FrictionWork, ...] = ()
     dissipated: tuple[float, ...] = ()
 
-    def closed_sets(self) -> Reuse:
+    def closed_sets(self) -> SolverState:
         """Closed sets by place, for the next solve."""
         centre = tuple(None if m is None else m.centre for m in self.spaces)
-        return Reuse(centre, self.active)
+        return SolverState(centre, self.active)

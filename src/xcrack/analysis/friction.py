@@ -12,13 +12,13 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.spatial import cKDTree
 
-from xcrack.analysis.contact_result import Rubbing
+from xcrack.analysis.contact_result import FrictionWork
 from xcrack.analysis.multipliers import Multipliers, gap_rows
 from xcrack.base.arrays import Bools, Floats, lock
 from xcrack.base.errors import ConvergenceError, warn
 from xcrack.fem.facets import LipPoints, arc_position, jump_matrix
 from xcrack.fem.function_space import FunctionSpace
-from xcrack.fem.system import Model
+from xcrack.fem.system import System
 from xcrack.linalg.coulomb import (
     FrictionRows,
     FrictionState,
@@ -28,7 +28,7 @@ from xcrack.linalg.coulomb import (
     coulomb_3d,
 )
 from xcrack.linalg.engine import Engine, StateContact
-from xcrack.linalg.reuse import Slip
+from xcrack.linalg.reuse import SlipField
 from xcrack.model.problem import Problem
 
 # Slip that a crack state leaves to the next one of the grown crack.
@@ -36,31 +36,33 @@ from xcrack.model.problem import Problem
 _OTHER = 0.1  # distance over the length of a crack from which on it is another crack
 
 
-def slip_of(model: Model, rubbing: tuple[Rubbing, ...], u: Floats) -> tuple[Slip | None, ...]:
+def slip_of(
+    model: System, rubbing: tuple[FrictionWork, ...], u: Floats
+) -> tuple[SlipField | None, ...]:
     """Slip of all cracks in one state, None where nothing rubs.
 
     Parameters
     ----------
-    model : Model
-    rubbing : tuple of Rubbing
+    model : System
+    rubbing : tuple of FrictionWork
     u : (n_dof,) array, length
     """
-    result: list[Slip | None] = [None] * len(model.lips)
+    result: list[SlipField | None] = [None] * len(model.lips)
     for each in rubbing:
         along = np.stack([jump @ u for jump in each.jumps], axis=1)
         result[each.crack] = _LEFT[model.space.dim](model, each, along)
     return tuple(result)
 
 
-def weak_slip(model: Model, m: Multipliers, tangents: Floats, before: Slip | None) -> Floats:
+def weak_slip(model: System, m: Multipliers, tangents: Floats, before: SlipField | None) -> Floats:
     """Integrals of each function times the slip that was left `(d - 1, g)`.
 
     Parameters
     ----------
-    model : Model
+    model : System
     m : Multipliers
     tangents : (q, d - 1, d) array
-    before : Slip or None
+    before : SlipField or None
         None where nothing was left.
     """
     lips = model.lips[m.crack]
@@ -70,23 +72,23 @@ def weak_slip(model: Model, m: Multipliers, tangents: Floats, before: Slip | Non
     return np.asarray((m.values.T @ (lips.weight[:, None] * slip)).T)
 
 
-def _left_2d(model: Model, rubbing: Rubbing, along: Floats) -> Slip:
+def _left_2d(model: System, rubbing: FrictionWork, along: Floats) -> SlipField:
     points = model.space.cracks[rubbing.crack].points
     place = _places(points, model.lips[rubbing.crack])
-    return Slip(points, lock(place), lock(along[:, 0]))
+    return SlipField(points, lock(place), lock(along[:, 0]))
 
 
-def _left_3d(model: Model, rubbing: Rubbing, along: Floats) -> Slip:
+def _left_3d(model: System, rubbing: FrictionWork, along: Floats) -> SlipField:
     lips = model.lips[rubbing.crack]
     slip = np.einsum("qm,qmd->qd", along, rubbing.tangents)
-    return Slip(lips.x, lock(np.sqrt(lips.weight)), lock(slip))
+    return SlipField(lips.x, lock(np.sqrt(lips.weight)), lock(slip))
 
 
-def _again_2d(model: Model, c: int, tangents: Floats, before: Slip) -> Floats:
+def _again_2d(model: System, c: int, tangents: Floats, before: SlipField) -> Floats:
     lips, points = model.lips[c], model.space.cracks[c].points
     first = _first(before.points, points)
-    whole = np.linalg.norm(np.diff(before.points, axis=0), axis=1).sum()
-    if _distance(before.points, points, first) > _OTHER * whole:
+    line_length = np.linalg.norm(np.diff(before.points, axis=0), axis=1).sum()
+    if _distance(before.points, points, first) > _OTHER * line_length:
         return np.zeros((len(lips), 1))
     place = _places(points, lips) - first
     inside = (place >= 0) & (place <= len(before.points) - 1)
@@ -94,10 +96,10 @@ def _again_2d(model: Model, c: int, tangents: Floats, before: Slip) -> Floats:
     return np.asarray(slip[:, None])
 
 
-def _again_3d(model: Model, c: int, tangents: Floats, before: Slip) -> Floats:
+def _again_3d(model: System, c: int, tangents: Floats, before: SlipField) -> Floats:
     """Of the nearest point before, none farther than its own piece of face is wide."""
-    far, nearest = cKDTree(before.points).query(model.lips[c].x)
-    slip = np.where((far <= before.place[nearest])[:, None], before.slip[nearest], 0.0)
+    distance, nearest = cKDTree(before.points).query(model.lips[c].x)
+    slip = np.where((distance <= before.place[nearest])[:, None], before.slip[nearest], 0.0)
     return np.einsum("qmd,qd->qm", tangents, slip)
 
 
@@ -140,7 +142,7 @@ _TWIN = {1: coulomb, 2: coulomb_3d}  # by the number of tangents
 
 
 @dataclass(frozen=True, eq=False)
-class Place:
+class SlipPoint:
     """Where a path stands.
 
     Attributes
@@ -172,20 +174,20 @@ class Place:
     at_rest: bool = False
 
 
-def at_rest(rows: FrictionRows, status: Status) -> Place:
+def at_rest(rows: FrictionRows, status: Status) -> SlipPoint:
     """The unloaded body; `status` is where the first guess comes from."""
     nothing = np.zeros(len(rows.F))
-    return Place(nothing, nothing, nothing, status, at_rest=True)
+    return SlipPoint(nothing, nothing, nothing, status, at_rest=True)
 
 
-def with_slip(rows: FrictionRows, d: Floats, slip: Floats, status: Status) -> Place:
+def with_slip(rows: FrictionRows, d: Floats, slip: Floats, status: Status) -> SlipPoint:
     """A state whose weak slips `(r,)` before are given: faces that press stick there, or slide."""
     before = np.concatenate([np.zeros(rows.n), slip])
     state = _tractions(rows, d - before, status)
-    return Place(d, state.lam, state.gap + before, state.status, sets=state.sets)
+    return SlipPoint(d, state.lam, state.gap + before, state.status, sets=state.sets)
 
 
-def march(rows: FrictionRows, d: Floats, begin: Place, substeps: int) -> list[Place]:
+def march(rows: FrictionRows, d: Floats, begin: SlipPoint, substeps: int) -> list[SlipPoint]:
     """All states in their order.
 
     Parameters
@@ -193,7 +195,7 @@ def march(rows: FrictionRows, d: Floats, begin: Place, substeps: int) -> list[Pl
     rows : FrictionRows
     d : (g + r, states) array
         Weak gaps and slips of the states without tractions.
-    begin : Place
+    begin : SlipPoint
     substeps : int
         From one state to the next.
 
@@ -203,13 +205,13 @@ def march(rows: FrictionRows, d: Floats, begin: Place, substeps: int) -> list[Pl
         As of `coulomb`.
     """
     places, place = [], begin
-    for wanted in d.T:
-        place = _reached(rows, wanted, place, substeps)
+    for load in d.T:
+        place = _next_point(rows, load, place, substeps)
         places.append(place)
     return places
 
 
-def shaken_down(rows: FrictionRows, d: Floats, begin: Place, substeps: int) -> list[Place]:
+def shaken_down(rows: FrictionRows, d: Floats, begin: SlipPoint, substeps: int) -> list[SlipPoint]:
     """Cycles through all states until slip returns; the states of the last one.
 
     Parameters
@@ -239,7 +241,7 @@ def shaken_down(rows: FrictionRows, d: Floats, begin: Place, substeps: int) -> l
     return places
 
 
-def _reached(rows: FrictionRows, wanted: Floats, begin: Place, substeps: int) -> Place:
+def _next_point(rows: FrictionRows, load: Floats, begin: SlipPoint, substeps: int) -> SlipPoint:
     """The next state."""
     longest = 1.0 if begin.at_rest else 1.0 / substeps
     shortest = min(longest, _SHORTEST)
@@ -249,23 +251,23 @@ def _reached(rows: FrictionRows, wanted: Floats, begin: Place, substeps: int) ->
     while t < 1.0:
         end = t + step
         end = 1.0 if end > 1.0 - 1e-9 else end
-        d = begin.d + end * (wanted - begin.d)
+        d = begin.d + end * (load - begin.d)
         state = _solved(rows, d, place)
         sets = max(sets, state.sets)
-        closing = state.status.closed & _opened(rows, place)
+        closing = state.status.closed & _open_functions(rows, place)
         if closing.any() and step > shortest:
             step = max(step / 2, shortest)
             continue
-        dissipated += _dissipated(rows, place, state)
+        dissipated += _friction_work(rows, place, state)
         gap = state.gap.copy()
         gap[rows.n :] += place.gap[rows.n :]
-        place = Place(d, state.lam, gap, state.status)
+        place = SlipPoint(d, state.lam, gap, state.status)
         between.append((end, state.lam))
         t, step = end, min(2 * step, longest)
-    return Place(place.d, place.lam, place.gap, place.status, dissipated, sets, tuple(between))
+    return SlipPoint(place.d, place.lam, place.gap, place.status, dissipated, sets, tuple(between))
 
 
-def _solved(rows: FrictionRows, d: Floats, place: Place) -> FrictionState:
+def _solved(rows: FrictionRows, d: Floats, place: SlipPoint) -> FrictionState:
     change = d.copy()
     change[rows.n :] -= place.gap[rows.n :]
     return _tractions(rows, change, place.status)
@@ -298,13 +300,13 @@ def _tractions(rows: FrictionRows, d: Floats, status: Status) -> FrictionState:
     )
 
 
-def _opened(rows: FrictionRows, place: Place) -> Bools:
+def _open_functions(rows: FrictionRows, place: SlipPoint) -> Bools:
     """Functions with a gap that is more than round-off."""
     largest = float(np.abs(place.gap / rows.sizes).max(initial=0.0))
     return np.asarray(place.gap[: rows.n] / rows.measure > _OPEN * largest)
 
 
-def _dissipated(rows: FrictionRows, before: Place, state: FrictionState) -> float:
+def _friction_work(rows: FrictionRows, before: SlipPoint, state: FrictionState) -> float:
     """Work of the tractions of slipping functions: their mean bound over the substep times slip."""
     slips = state.status.slips
     pressure = 0.5 * (np.maximum(before.lam, 0.0) + state.lam)[: rows.n][rows.rubbing]
@@ -319,7 +321,7 @@ class FrictionSolution:
     Attributes
     ----------
     states : list of StateContact
-    rubbing : list of Rubbing
+    rubbing : list of FrictionWork
         One for each crack with friction and multipliers.
     dissipated : tuple of float
         Energy since the state before.
@@ -328,12 +330,12 @@ class FrictionSolution:
     """
 
     states: list[StateContact]
-    rubbing: list[Rubbing]
+    rubbing: list[FrictionWork]
     dissipated: tuple[float, ...]
     between: Floats
 
 
-def rubs(problem: Problem, c: int) -> bool:
+def has_friction(problem: Problem, c: int) -> bool:
     """Whether the faces of crack c rub where they press."""
     return problem.contact != "off" and problem.frictions[c] > 0
 
@@ -383,15 +385,15 @@ def tangential_jumps(
 
 def solve_friction(
     problem: Problem,
-    model: Model,
+    model: System,
     engine: Engine,
     chosen: Sequence[Multipliers],
     f: Floats,
-    known: Floats,
+    u_imposed: Floats,
     start: Bools | None,
     stiffness: float,
     between: bool,
-    before: Sequence[Slip | None] | None,
+    before: Sequence[SlipField | None] | None,
     springs: Sequence[Floats] | None = None,
 ) -> FrictionSolution:
     """Solve all load states in their order, from the unloaded body; or a cycle that is repeated.
@@ -399,18 +401,18 @@ def solve_friction(
     Parameters
     ----------
     problem : Problem
-    model : Model
+    model : System
     engine : Engine
     chosen : sequence of Multipliers
         Of the cracks that need contact.
-    f, known : (n_dof, states) arrays
+    f, u_imposed : (n_dof, states) arrays
     start : (g,) array of bool or None
         First guess of the closed set.
     stiffness : float, stress / length
         As of `ContactRows`.
     between : bool
         Whether displacements of the substeps are asked for.
-    before : sequence of Slip or None
+    before : sequence of SlipField or None
         Of all cracks, for a cycle that is repeated until slip returns: what its last state left
         behind when the crack was shorter; empty where there was none. None: the path alone.
     springs : sequence of (g,) arrays, optional
@@ -425,7 +427,7 @@ def solve_friction(
     rubbing = [face for face in faces if face.mu > 0]
     along = [face.along[k] for k in range(model.space.dim - 1) for face in rubbing]
     N = sp.csr_matrix(sp.vstack([face.normal for face in faces] + along))
-    small = engine.condensed(N, f, known)
+    small = engine.condensed(N, f, u_imposed)
     rows = _rows(faces, small.dual, stiffness)
     if springs is not None:
         every = np.concatenate(springs)
@@ -441,8 +443,8 @@ def solve_friction(
     begin, pass_through = at_rest(rows, status), march
     if before is not None:
         pass_through = shaken_down
-        left = {c: slip for c, slip in enumerate(before)}
-        slips = [left.get(r.space.crack) for r in rubbing]  # cracks may have joined others
+        slip_left = {c: slip for c, slip in enumerate(before)}
+        slips = [slip_left.get(r.space.crack) for r in rubbing]  # cracks may have joined others
         if any(slip is not None for slip in slips):
             weak = [
                 weak_slip(model, r.space, r.tangents, s)
@@ -459,7 +461,9 @@ def solve_friction(
         states,
         _by_crack(rubbing, rows, places),
         tuple(place.dissipated for place in places),
-        _between(engine, N, f, known, places) if between else np.zeros((len(f), 0)),
+        _substep_displacements(engine, N, f, u_imposed, places)
+        if between
+        else np.zeros((len(f), 0)),
     )
 
 
@@ -475,7 +479,7 @@ class _Face:
     along: list[sp.csr_matrix]
 
 
-def _face(problem: Problem, model: Model, m: Multipliers) -> _Face:
+def _face(problem: Problem, model: System, m: Multipliers) -> _Face:
     lips, mu = model.lips[m.crack], problem.frictions[m.crack]
     normal = gap_rows(m, lips, model.jumps[m.crack])
     if not mu:
@@ -493,21 +497,29 @@ def _rows(faces: Sequence[_Face], dual: Floats, stiffness: float) -> FrictionRow
     return FrictionRows(dual, measure, rubbing, mu[rubbing], stiffness)
 
 
-def _by_crack(faces: Sequence[_Face], rows: FrictionRows, places: Sequence[Place]) -> list[Rubbing]:
+def _by_crack(
+    faces: Sequence[_Face], rows: FrictionRows, places: Sequence[SlipPoint]
+) -> list[FrictionWork]:
     shear = np.stack([place.lam[rows.n :].reshape(rows.tangents, -1) for place in places], axis=2)
     stuck = np.stack([p.status.closed[rows.rubbing] & ~p.status.slips for p in places])
     result, first = [], 0
     for face in faces:
-        own = slice(first, first + len(face.space.measure))
+        rows_of_crack = slice(first, first + len(face.space.measure))
         result.append(
-            Rubbing(face.space.crack, lock(face.tangents), face.jumps, shear[:, own], stuck[:, own])
+            FrictionWork(
+                face.space.crack,
+                lock(face.tangents),
+                face.jumps,
+                shear[:, rows_of_crack],
+                stuck[:, rows_of_crack],
+            )
         )
-        first = own.stop
+        first = rows_of_crack.stop
     return result
 
 
-def _between(
-    engine: Engine, N: sp.csr_matrix, f: Floats, known: Floats, places: Sequence[Place]
+def _substep_displacements(
+    engine: Engine, N: sp.csr_matrix, f: Floats, u_imposed: Floats, places: Sequence[SlipPoint]
 ) -> Floats:
     """Displacements of all substeps: other faces may overlap in one of them."""
     loads, given = [], []
@@ -515,8 +527,8 @@ def _between(
     for k, place in enumerate(places):
         for share, lam in place.between[:-1]:
             loads.append(before[0] + share * (f[:, k] - before[0]) + N.T @ lam)
-            given.append(before[1] + share * (known[:, k] - before[1]))
-        before = f[:, k], known[:, k]
+            given.append(before[1] + share * (u_imposed[:, k] - before[1]))
+        before = f[:, k], u_imposed[:, k]
     if not loads:
         return np.zeros((len(f), 0))
     return engine.solve(np.stack(loads, axis=1), np.stack(given, axis=1))
@@ -524,10 +536,10 @@ def _between(
 
 __all__ = [
     "FrictionSolution",
-    "Place",
+    "SlipPoint",
     "at_rest",
+    "has_friction",
     "march",
-    "rubs",
     "shaken_down",
     "slip_of",
     "solve_friction",

@@ -77,18 +77,18 @@ def multipliers(
     parts = _parts(space, c, lips) if kind != "naive" else []
     values = traces
     if kind != "naive":
-        supported = _supported(space, c, nodes, traces, lips, fixed, rubs)
+        supported = _supported_nodes(space, c, nodes, traces, lips, fixed, rubs)
         group = _groups(space, c, nodes, traces, lips.weight, supported)
         shape = (len(lips), int(group.max(initial=-1)) + 1)
         column = group.astype(np.int32)[traces.indices]
         values = sp.csr_matrix((traces.data, column, traces.indptr), shape=shape)
     if len(parts) > 1:
-        values = _broken(values, lips, parts, hats, len(space.cuts[c].kinks.points) > 0)
+        values = _broken_functions(values, lips, parts, hats, len(space.cuts[c].kinks.points) > 0)
     elif hats is not None and values.shape[1] > 1:
         mass = _sums(values, lips.weight)
         centre = _sums(values, lips.weight * lips.s) / np.maximum(mass, 1e-300)
         knots = np.unique(centre[mass > 1e-14 * mass.max()])
-        curved = _curved(
+        curved = _curved_points(
             lips, np.arange(len(lips)), np.interp(lips.s, knots, np.arange(len(knots)))
         )
         values = _hats(_knots_by_groups(knots, lips.s, curved, hats), lips.s)
@@ -120,7 +120,7 @@ def _parts(space: FunctionSpace, c: int, lips: LipPoints) -> list[Ints]:
     return [np.nonzero(part == k)[0] for k in np.unique(part)]
 
 
-def _broken(
+def _broken_functions(
     values: sp.csr_matrix,
     lips: LipPoints,
     parts: list[Ints],
@@ -148,20 +148,20 @@ def _without_small(
 ) -> sp.csr_matrix:
     """Functions on a part of the crack faces; what is small joins the smaller neighbour."""
     mass = _sums(values, weight)
-    own = values[:, np.nonzero(mass > 1e-14 * typical)[0]].toarray()
+    large_values = values[:, np.nonzero(mass > 1e-14 * typical)[0]].toarray()
     while True:
-        mass = own.T @ weight
-        order = np.argsort((own.T @ (weight * s)) / mass)
-        own, mass = own[:, order], mass[order]
-        k = _smallest(mass)
+        mass = large_values.T @ weight
+        order = np.argsort((large_values.T @ (weight * s)) / mass)
+        large_values, mass = large_values[:, order], mass[order]
+        k = _smallest_number(mass)
         if len(mass) == 1 or mass[k] >= _SMALL * typical:
-            return sp.csr_matrix(own)
-        beside = [j for j in (k - 1, k + 1) if 0 <= j < len(mass)]
-        own[:, beside[_smallest(mass[beside])]] += own[:, k]
-        own = np.delete(own, k, axis=1)
+            return sp.csr_matrix(large_values)
+        neighbours = [j for j in (k - 1, k + 1) if 0 <= j < len(mass)]
+        large_values[:, neighbours[_smallest_number(mass[neighbours])]] += large_values[:, k]
+        large_values = np.delete(large_values, k, axis=1)
 
 
-def _smallest(sizes: Floats) -> int:
+def _smallest_number(sizes: Floats) -> int:
     """Number of the smallest one, of those equal but for round-off the first."""
     return int(np.argmax(sizes <= (1 + _SAME) * sizes.min()))
 
@@ -171,11 +171,11 @@ def _long_enough(parts: list[Ints], groups: Floats) -> list[Ints]:
     parts = list(parts)
     while len(parts) > 1:
         length = np.array([groups[rows].sum() for rows in parts])
-        k = _smallest(length)
+        k = _smallest_number(length)
         if length[k] >= _SHORT:
             break
-        beside = [j for j in (k - 1, k + 1) if 0 <= j < len(parts)]
-        first = min(k, beside[_smallest(length[beside])])
+        neighbours = [j for j in (k - 1, k + 1) if 0 <= j < len(parts)]
+        first = min(k, neighbours[_smallest_number(length[neighbours])])
         parts[first : first + 2] = [np.concatenate(parts[first : first + 2])]
     return parts
 
@@ -197,7 +197,7 @@ def _traces(space: FunctionSpace, lips: LipPoints) -> tuple[Ints, sp.csr_matrix]
     return nodes[reached], sp.csr_matrix((entry[acts], column, start), shape=shape)
 
 
-def _supported(
+def _supported_nodes(
     space: FunctionSpace,
     c: int,
     nodes: Ints,
@@ -212,10 +212,10 @@ def _supported(
         return np.zeros(len(nodes), dtype=bool)
     normal = np.stack([_sums(traces, lips.weight * n) for n in lips.normal.T], axis=1)
     given = fixed.reshape(-1, space.dim)[number]
-    whole = (normal**2).sum(axis=1)
-    decided = (normal**2 * given).sum(axis=1) > 0.5 * whole
+    squares = (normal**2).sum(axis=1)
+    decided = (normal**2 * given).sum(axis=1) > 0.5 * squares
     if rubs:
-        decided |= ((whole[:, None] - normal**2) * given).sum(axis=1) > 0.5 * whole
+        decided |= ((squares[:, None] - normal**2) * given).sum(axis=1) > 0.5 * squares
     return np.asarray((number >= 0) & decided)
 
 
@@ -256,8 +256,8 @@ def _groups(
     inside = cut.level_set.inside[nodes] < 0
     # Nodes on the crack carry a group of their own, unless the tip lies on them, or they lie
     # beyond a junction.
-    own = on_crack & inside & ~covered & (space.node_side[c][nodes] != 0)
-    covered |= own
+    is_free_node = on_crack & inside & ~covered & (space.node_side[c][nodes] != 0)
+    covered |= is_free_node
     if supported.any():
         roots = np.array([root(i) for i in range(len(nodes))])
         mass = _sums(traces, weight)
@@ -265,28 +265,29 @@ def _groups(
         covered &= np.bincount(roots, mass * supported, len(nodes))[roots] < 0.5 * total[roots]
         parent[~covered] = np.nonzero(~covered)[0]
     if covered.any() and not covered.all():
-        for k, to in _nearest(traces, weight, covered):
+        for k, to in _nearest_nodes(traces, weight, covered):
             parent[k] = root(to)
     roots = np.array([root(i) for i in range(len(nodes))])
     return np.unique(roots, return_inverse=True)[1]
 
 
-def _nearest(traces: sp.csr_matrix, weight: Floats, covered: Bools) -> list[tuple[int, int]]:
+def _nearest_nodes(traces: sp.csr_matrix, weight: Floats, covered: Bools) -> list[tuple[int, int]]:
     """Nodes that are not covered, each with the covered node of which the trace overlaps most.
 
     The first of equal ones counts; a node that overlaps none is left out.
     """
     counts = np.diff(traces.indptr)
     point = np.arange(len(counts)).repeat(counts)
-    own = np.nonzero(~covered[traces.indices])[0]
-    row, place = ranges(counts[point[own]])
-    own, other = own[row], traces.indptr[point[own]][row] + place
+    uncovered = np.nonzero(~covered[traces.indices])[0]
+    row, place = ranges(counts[point[uncovered]])
+    uncovered, other = uncovered[row], traces.indptr[point[uncovered]][row] + place
     shared = covered[traces.indices[other]]
-    own, other = own[shared], other[shared]
+    uncovered, other = uncovered[shared], other[shared]
     pair, number = np.unique(
-        traces.indices[own] * np.int64(len(covered)) + traces.indices[other], return_inverse=True
+        traces.indices[uncovered] * np.int64(len(covered)) + traces.indices[other],
+        return_inverse=True,
     )
-    products = traces.data[own] * weight[point[own]] * traces.data[other]
+    products = traces.data[uncovered] * weight[point[uncovered]] * traces.data[other]
     overlap = np.bincount(number, products, len(pair))
     node, to = np.divmod(pair, len(covered))
     best = np.lexsort((to, -overlap, node))
@@ -326,11 +327,11 @@ def vital_edges(pairs: Ints, length: Floats) -> Ints:
     while heap:
         top = heapq.heappop(heap)
         e = top[-1]
-        now = entry(e)
-        if now[0] != top[0]:
-            heapq.heappush(heap, now)
+        current = entry(e)
+        if current[0] != top[0]:
+            heapq.heappush(heap, current)
             continue
-        if now[0] >= -1:
+        if current[0] >= -1:
             break
         vital[e] = False
         for end in ends[e]:
@@ -360,7 +361,7 @@ def _knots(centre: Floats, ends: tuple[float, float], last: float) -> Floats:
     return knots
 
 
-def _curved(lips: LipPoints, rows: Ints, place: Floats) -> Bools:
+def _curved_points(lips: LipPoints, rows: Ints, place: Floats) -> Bools:
     """Which of some lip points lie where the faces turn, by their places in numbers of groups."""
     nx, ny = lips.normal[rows].T
     turn = np.unwrap(np.arctan2(ny, nx))
@@ -387,7 +388,7 @@ def _even_knots(lips: LipPoints, rows: Ints, groups: Floats, hats: tuple[float, 
     """Knots on a part of a crack, in proportion to the groups between each two."""
     denser, last = hats
     s, before = lips.s[rows], np.cumsum(groups) - groups / 2
-    density = np.where(_curved(lips, rows, before), 1.0, denser)
+    density = np.where(_curved_points(lips, rows, before), 1.0, denser)
     mean = float(groups @ density / groups.sum())
     count = max(int(mean * (groups.sum() - 1) + _BESIDES), 2)
     weight = groups * density

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from xcrack.base.checks import shown
+from xcrack.base.checks import value_text
 from xcrack.base.errors import ProblemError
 from xcrack.base.markup import element
 from xcrack.crack.placing import short_fronts
@@ -90,8 +90,10 @@ class Report:
         for ingredient in self.ingredients:
             if isinstance(name, str) and ingredient.name == name:
                 return ingredient
-        known = ", ".join(f'"{ingredient.name}"' for ingredient in self.ingredients)
-        raise ProblemError(f"the report has no ingredient {shown(name)}: give one of {known}.")
+        listed_names = ", ".join(f'"{ingredient.name}"' for ingredient in self.ingredients)
+        raise ProblemError(
+            f"the report has no ingredient {value_text(name)}: give one of {listed_names}."
+        )
 
 
 def plan(problem: Problem) -> Report:

@@ -10,7 +10,7 @@ from xcrack.analysis.multipliers import Multipliers
 from xcrack.analysis.plan import Ingredient, Report, Resultant, plan
 from xcrack.base.arrays import Floats, at
 from xcrack.crack.crack import Crack
-from xcrack.fem.system import Model
+from xcrack.fem.system import System
 from xcrack.linalg.engine import Engine
 from xcrack.linalg.rigid_motion import Motion
 from xcrack.model.loads import Load
@@ -19,7 +19,7 @@ from xcrack.model.problem import Problem
 
 def report(
     problem: Problem,
-    model: Model,
+    model: System,
     engine: Engine,
     contact: ContactSolution,
     motion: Motion,
@@ -32,7 +32,7 @@ def report(
     Parameters
     ----------
     problem : Problem
-    model : Model
+    model : System
     engine : Engine
     contact : ContactSolution
     motion : Motion
@@ -74,12 +74,15 @@ def report(
         Ingredient("standard functions", True, f"order {model.space.order}", unknowns=standard)
     )
     for c, (given, placed) in enumerate(zip(problem.cracks, problem.placed, strict=True)):
-        met = sum(own.crack == c for own in problem.junctions)
+        met = sum(junction.crack == c for junction in problem.junctions)
         moved = not given.placed and not np.array_equal(given.points, placed.points)
         if moved and (placed.fronts is not None or 2 - placed.n_tips - met):
             rows.append(Ingredient(f"mouths of crack {c}", True, _mouths(given, placed, met)))
     if problem.junctions:
-        where = [f"{own.crack} on {own.on} at {at(own.x)}" for own in problem.junctions]
+        where = [
+            f"{junction.crack} on {junction.on} at {at(junction.x)}"
+            for junction in problem.junctions
+        ]
         rows.append(Ingredient("ends on other cracks", True, ", ".join(where)))
     if unbalanced is not None:
         why = f"{unbalanced:.2%} of its energy is out of balance: it relaxes without any crack"
@@ -142,7 +145,7 @@ def _n_multipliers(problem: Problem, spaces: Sequence[Multipliers | None]) -> in
 
 def resultants(
     problem: Problem,
-    model: Model,
+    model: System,
     loads: Sequence[Load],
     vectors: Sequence[Floats],
     residual: Floats,
@@ -152,7 +155,7 @@ def resultants(
     Parameters
     ----------
     problem : Problem
-    model : Model
+    model : System
     loads : sequence of loads
     vectors : sequence of (n_dof,) arrays, force
         Of each load, scaled as in the state.
@@ -165,12 +168,16 @@ def resultants(
         if load.is_listed
     ]
     for number, support in enumerate(problem.supports):
-        own = model.known.owner == number
-        rows.append(_resultant(model, f"reaction of {support.name}", np.where(own, residual, 0.0)))
+        rows_of_support = model.known.owner == number
+        rows.append(
+            _resultant(
+                model, f"reaction of {support.name}", np.where(rows_of_support, residual, 0.0)
+            )
+        )
     return tuple(rows)
 
 
-def _resultant(model: Model, name: str, f: Floats) -> Resultant:
+def _resultant(model: System, name: str, f: Floats) -> Resultant:
     """Sums over the standard functions, which together are one everywhere."""
     x = model.space.node_points
     forces = f.reshape(-1, x.shape[1])[: len(x)]

@@ -12,16 +12,16 @@ from numpy.typing import ArrayLike
 from xcrack.analysis.contact_result import Contact, ContactSolution
 from xcrack.analysis.plan import Report
 from xcrack.base.arrays import Bools, Floats, Ints, lock
-from xcrack.base.checks import numbers, shown, whole_numbers
+from xcrack.base.checks import numbers, value_text, whole_numbers
 from xcrack.base.errors import GeometryError, ProblemError
-from xcrack.base.markup import element, joined, table
+from xcrack.base.markup import element, join_parts, table
 from xcrack.fem.facets import LipPoints, jump_values
 from xcrack.fem.function_space import FunctionSpace
 from xcrack.fem.loads import position
 from xcrack.fem.quadrature import at_joints, cell_side
-from xcrack.fem.system import Model
+from xcrack.fem.system import System
 from xcrack.linalg.engine import Engine
-from xcrack.linalg.reuse import Reuse
+from xcrack.linalg.reuse import SolverState
 from xcrack.linalg.rigid_motion import Motion
 from xcrack.mesh.locate import locate
 from xcrack.model.loads import Load
@@ -32,12 +32,12 @@ from xcrack.model.states import LoadState
 
 
 @dataclass(frozen=True, eq=False)
-class Factored:
+class FactoredSolution:
     """A system that is still factored; all states of a solve share one.
 
     Attributes
     ----------
-    model : Model
+    model : System
     engine : Engine
     motion : Motion
         Rigid motions that were removed.
@@ -47,7 +47,7 @@ class Factored:
         Points around tips with the functions there, once K has asked for them.
     """
 
-    model: Model
+    model: System
     engine: Engine
     motion: Motion
     contact: ContactSolution
@@ -80,11 +80,11 @@ class Solution:
         Strain energy, u K u / 2.
     report : Report
         What was modelled, what was left out, and why.
-    reuse : Reuse
+    reuse : SolverState
         What serves the next solve in the same mesh.
     number : int
         Which of the states of its solve.
-    factored : Factored, optional
+    factored : FactoredSolution, optional
         The factor, of a solve with ``error=True``; lost where a solution is pickled.
     dissipated : float, energy (per thickness in 2D)
         What friction took since the state before; 0 without.
@@ -99,9 +99,9 @@ class Solution:
     contact: tuple[Contact | None, ...]
     energy: float
     report: Report
-    reuse: Reuse
+    reuse: SolverState
     number: int = 0
-    factored: Factored | None = None
+    factored: FactoredSolution | None = None
     dissipated: float = 0.0
 
     @property
@@ -119,7 +119,7 @@ class Solution:
 
     def _repr_html_(self) -> str:
         rows: list[tuple[str, Any]] = [
-            ("load state", "as given" if self.state is None else shown(self.state)[:80]),
+            ("load state", "as given" if self.state is None else value_text(self.state)[:80]),
             ("unknowns", self.n_dof),
             ("strain energy", self.energy),
         ]
@@ -130,7 +130,9 @@ class Solution:
             else:
                 rows.append((f"crack {c}", "no multipliers"))
         picture = self.problem.sketch()
-        return joined(element("b", "Solution"), picture, table((), rows), self.report._repr_html_())
+        return join_parts(
+            element("b", "Solution"), picture, table((), rows), self.report._repr_html_()
+        )
 
     @property
     def at_rest(self) -> bool:
@@ -271,7 +273,7 @@ class Solution:
     def _where(self, x: ArrayLike, side: int) -> tuple[Ints, Floats, Ints, bool]:
         points, single = self._points(x)
         if type(side) is bool or not isinstance(side, Real) or side not in (0, 1, -1):
-            raise ProblemError(f"side = {shown(side)}: give 1 (lip +), -1 (lip -) or 0.")
+            raise ProblemError(f"side = {value_text(side)}: give 1 (lip +), -1 (lip -) or 0.")
         cell, bary = locate(self.space.mesh, points)
         if (cell < 0).any():
             outside = points[np.argmax(cell < 0)]
@@ -344,8 +346,8 @@ def sides_of(space: FunctionSpace, cell: Ints, bary: Floats, lip: int) -> Ints:
         phi = cut.level(space.mesh, cell, bary)
         split = (cut.is_cut | cut.is_tip)[cell]
         on_lip = np.abs(phi) <= 1e-9 * space.mesh.cell_size[cell]
-        own = np.where(on_lip & (lip != 0), lip, np.where(phi >= 0, 1, -1))
-        side[:, c] = np.where(split, own, side[:, c])
+        side_of_point = np.where(on_lip & (lip != 0), lip, np.where(phi >= 0, 1, -1))
+        side[:, c] = np.where(split, side_of_point, side[:, c])
     return at_joints(space, cell, bary, side) if space.joints else side
 
 

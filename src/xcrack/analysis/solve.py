@@ -12,23 +12,23 @@ from scipy.sparse.linalg import LinearOperator, cg
 from xcrack.analysis.contact import contact_of, solve_contact
 from xcrack.analysis.friction import slip_of
 from xcrack.analysis.report import report, resultants
-from xcrack.analysis.solution import Factored, Solution
+from xcrack.analysis.solution import FactoredSolution, Solution
 from xcrack.base.arrays import Bools, Floats, lock
-from xcrack.base.checks import entries, flag, shown
+from xcrack.base.checks import entries, flag, value_text
 from xcrack.base.errors import ProblemError
 from xcrack.base.threads import one_blas_thread, threads
 from xcrack.fem.assembly import MeshLoad, body_forces, next_to_enriched
 from xcrack.fem.loads import body_points, load_vector, mesh_loads, on_mesh, position
 from xcrack.fem.supports import known_unknowns
-from xcrack.fem.system import Model, build
+from xcrack.fem.system import System, build
 from xcrack.linalg.direct import Solver, system
 from xcrack.linalg.engine import Engine
 from xcrack.linalg.iterative import iterative_system
 from xcrack.linalg.products import times
-from xcrack.linalg.reuse import Reuse
+from xcrack.linalg.reuse import SolverState
 from xcrack.linalg.rigid_motion import (
     Motion,
-    balanced,
+    balanced_loads,
     free_modes,
     free_motion,
     without_motion,
@@ -45,7 +45,7 @@ _RESIDUAL = 1e-3  # of the conjugate gradients: the energy is then known to far 
 _MOST = 2000
 
 
-def out_of_balance(problem: Problem, model: Model, loads: Sequence[Load]) -> float | None:
+def out_of_balance(problem: Problem, model: System, loads: Sequence[Load]) -> float | None:
     """Share of the energy of the initial stress that relaxes in the body without cracks.
 
     A stress in equilibrium with free sides keeps all of its energy, one that is a strain in
@@ -55,7 +55,7 @@ def out_of_balance(problem: Problem, model: Model, loads: Sequence[Load]) -> flo
     Parameters
     ----------
     problem : Problem
-    model : Model
+    model : System
     loads : sequence of loads
 
     Returns
@@ -132,15 +132,15 @@ def solve(
     check_problem(problem, "solve")
     if solver is not None and not callable(solver):
         raise ProblemError(
-            f"solver = {shown(solver)} cannot be called: give a function of a sparse matrix that "
-            "returns a function of right-hand sides, such as xc.pardiso."
+            f"solver = {value_text(solver)} cannot be called: give a function of a sparse matrix "
+            f"that returns a function of right-hand sides, such as xc.pardiso."
         )
     if states is not None:
         check_order(problem.frictions, states)
         states = entries(states, "states")
     error = flag(error, "solve: error")
-    wanted = [None] if states is None else states
-    solutions = solve_states(problem, wanted, solver=solver, error=error)
+    load_states = [None] if states is None else states
+    solutions = solve_states(problem, load_states, solver=solver, error=error)
     return solutions[0] if states is None else solutions
 
 
@@ -148,16 +148,16 @@ def solve_states(
     problem: Problem,
     states: Sequence[Any],
     *,
-    reuse: Reuse | None = None,
+    reuse: SolverState | None = None,
     solver: Solver | None = None,
     error: bool = False,
     repeated: bool = False,
 ) -> list[Solution]:
     """Solve all load states; `reuse` of an earlier solution in the same mesh saves work.
 
-    Give `Reuse()` at the first of several solves in one mesh: what serves the next is kept then.
-    With `error` the factor stays with the solutions. With `repeated` the states are a cycle: where
-    faces rub it goes on until slip returns, from what `reuse` left behind.
+    Give `SolverState()` at the first of several solves in one mesh: what serves the next is then
+    kept. With `error` the factor stays with the solutions. With `repeated` the states are a cycle:
+    where faces rub it goes on until slip returns, from what `reuse` left behind.
     """
     if not len(states):
         raise ProblemError("states is empty: give at least one load state, or none at all.")
@@ -171,7 +171,7 @@ def solve_states(
 def _solve_states(
     problem: Problem,
     states: Sequence[Any],
-    reuse: Reuse | None,
+    reuse: SolverState | None,
     solver: Solver | None,
     error: bool,
     repeated: bool,
@@ -180,14 +180,14 @@ def _solve_states(
     vectors = mesh_loads(model.space, model.bulk.loads)
     cases = [_case(problem, model, state, vectors) for state in states]
     fixed = model.known.fixed.copy()
-    free = _free(model, fixed)
+    free = _fixed_unknowns(model, fixed)
     motion = free_motion(model.space, fixed, free[1])
     engine = _engine(problem, model, fixed, motion, solver, reuse)
-    f, imbalance = balanced(model.space, motion, np.stack([case.f for case in cases], axis=1))
-    known = np.stack([case.known for case in cases], axis=1)
+    f, imbalance = balanced_loads(model.space, motion, np.stack([case.f for case in cases], axis=1))
+    u_imposed = np.stack([case.known for case in cases], axis=1)
     acting = [case.acting for case in cases]
-    start = reuse or Reuse()
-    pressed = solve_contact(problem, model, engine, f, known, start, acting, repeated)
+    start = reuse or SolverState()
+    pressed = solve_contact(problem, model, engine, f, u_imposed, start, acting, repeated)
     u = pressed.u
     if motion.modes.shape[1]:
         u = without_motion(motion, u)
@@ -200,7 +200,7 @@ def _solve_states(
     if pressed.rubbing:
         left = replace(left, slip=slip_of(model, pressed.rubbing, u[:, -1]))
     handed_on = engine.handed_on(left)
-    factored = Factored(model, engine, motion, pressed) if error else None
+    factored = FactoredSolution(model, engine, motion, pressed) if error else None
     # It depends on the mesh, not on the cracks: steps of a run leave it out.
     first = cases[0].acting.loads
     unbalanced = None if reuse is not None else out_of_balance(problem, model, first)
@@ -230,7 +230,7 @@ def _solve_states(
     return solutions
 
 
-def _free(model: Model, fixed: Bools) -> tuple[Bools, Floats]:
+def _fixed_unknowns(model: System, fixed: Bools) -> tuple[Bools, Floats]:
     """Fixed standard unknowns and the rigid motions left: those of the last solve, or new ones."""
     space, free = model.space, model.bulk.free
     standard = fixed[: space.n_nodes * space.dim]
@@ -241,29 +241,29 @@ def _free(model: Model, fixed: Bools) -> tuple[Bools, Floats]:
 
 def _engine(
     problem: Problem,
-    model: Model,
+    model: System,
     fixed: Bools,
     motion: Motion,
     solver: Solver | None,
-    reuse: Reuse | None,
+    reuse: SolverState | None,
 ) -> Engine:
     """A factorisation, or in 3D above some size conjugate gradients."""
-    space_, wanted = model.space, problem.numerics.linear
+    space_, linear_solver = model.space, problem.numerics.linear
     large = space_.dim == 3 and space_.n_dof > _DIRECT[space_.order]
     basis = problem.numerics.tip_basis
     large = large and problem.numerics.contact_method is None  # others change the matrix
-    if solver is None and (wanted == "iterative" or (wanted == "auto" and large)):
+    if solver is None and (linear_solver == "iterative" or (linear_solver == "auto" and large)):
         # Rows beside the crack are enough where no basis is changed but that of single nodes.
-        apart = space_.order == 1 and basis is None
+        by_parts = space_.order == 1 and basis is None
         return iterative_system(
             space_,
-            model.parts if apart else model.stiffness,
+            model.parts if by_parts else model.stiffness,
             model.bulk,
             fixed,
             None if reuse is None else reuse.hierarchy,
             motion.modes,
             None if basis is None else partial(basis.columns, space_, problem.material),
-            next_to_enriched(space_) if apart else None,
+            next_to_enriched(space_) if by_parts else None,
         )
     fixed[motion.pins] = True
     return system(
@@ -287,7 +287,7 @@ class LoadCase:
     known: Floats
 
 
-def _case(problem: Problem, model: Model, state: Any, vectors: dict[int, Floats]) -> LoadCase:
+def _case(problem: Problem, model: System, state: Any, vectors: dict[int, Floats]) -> LoadCase:
     """A load state; states that share loads integrate them once."""
     acting = problem.state(state)
     parts = []
@@ -297,18 +297,18 @@ def _case(problem: Problem, model: Model, state: Any, vectors: dict[int, Floats]
         vector = vectors[id(load)]
         parts.append(vector if factor == 1 else factor * vector)
     f = sum(parts, np.zeros(model.space.n_dof))
-    known = acting.factor * model.known.value
+    u_imposed = acting.factor * model.known.value
     moved = [(load, factor) for load, factor in acting if "support" in load.acts]
     for factor in sorted({factor for _, factor in moved}):
         new = known_unknowns(model.space, [cast(Support, x) for x, f in moved if f == factor])
-        known = np.where(new.fixed & model.known.fixed, factor * new.value, known)
-    largest = max(np.abs(f).max(initial=0.0), np.abs(known).max(initial=0.0))
+        u_imposed = np.where(new.fixed & model.known.fixed, factor * new.value, u_imposed)
+    largest = max(np.abs(f).max(initial=0.0), np.abs(u_imposed).max(initial=0.0))
     if not largest < _LARGEST:
         raise ProblemError(
-            f"the loads of state {shown(state)} give forces or displacements of up to "
+            f"the loads of state {value_text(state)} give forces or displacements of up to "
             f"{largest:.3g}, whose squares are no numbers: take other units."
         )
-    return LoadCase(acting, f, tuple(parts), known)
+    return LoadCase(acting, f, tuple(parts), u_imposed)
 
 
 __all__ = []

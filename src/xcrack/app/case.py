@@ -16,7 +16,7 @@ from xcrack.base.paths import path_of
 from xcrack.base.units import LENGTH, NUMBER, TOUGHNESS
 from xcrack.fatigue.law import GrowthLaw
 from xcrack.fatigue.retardation import plastic_zone
-from xcrack.growth.options import GrowOptions
+from xcrack.growth.options import GrowthOptions
 from xcrack.model.loads import Load
 from xcrack.model.material import Isotropic
 from xcrack.model.numerics import Numerics
@@ -85,13 +85,13 @@ def read_case(path: str | PathLike[str]) -> CaseFile:
     for name in ("mesh", "material"):
         if name not in root:
             root.refuse("", f"the table [{name}] is missing.")
-    mesh = forms.made(root.table("mesh"), forms.MESHES)
+    mesh = forms.value_of_table(root.table("mesh"), forms.MESHES)
     material = forms.called_with(root.table("material"), Form(Isotropic))
     solving = root.table("solve")
     solving.known(("contact", "order", "friction", "states"))
     scene: dict[str, Any] = {
-        name: [forms.made(table, known) for table in root.tables(name)]
-        for name, known in (
+        name: [forms.value_of_table(table, allowed) for table in root.tables(name)]
+        for name, allowed in (
             ("cracks", forms.CRACKS),
             ("supports", forms.forms_of(Support)),
             ("loads", forms.forms_of(Load)),
@@ -127,7 +127,7 @@ def _numerics(table: Table) -> Numerics:
 
 def _growth(table: Table) -> Mapping[str, Any]:
     """Arguments of `grow`."""
-    options = [name for name in GrowOptions.__annotations__ if name not in ("solver", "response")]
+    options = [name for name in GrowthOptions.__annotations__ if name not in ("solver", "response")]
     table.known(("law", "criterion", "cycle", "spectrum", "da", *options))
     if "law" not in table:
         table.refuse("", "the key 'law' is missing.")
@@ -143,7 +143,7 @@ def _growth(table: Table) -> Mapping[str, Any]:
     if "link_up" in table:
         given["link_up"] = forms.called_with(table.table("link_up"), Form(plastic_zone))
     return MappingProxyType({
-        "law": forms.made(table.table("law"), forms.forms_of(GrowthLaw)),
+        "law": forms.value_of_table(table.table("law"), forms.forms_of(GrowthLaw)),
         "criterion": forms.CRITERIA[criterion],
         "cycle": loading(table),
         **given,

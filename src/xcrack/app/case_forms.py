@@ -101,7 +101,7 @@ CRITERIA: dict[str, Callable[..., Any]] = {
 }
 
 
-def made(table: Table, forms: Mapping[str, Form], default: str = "") -> Any:
+def value_of_table(table: Table, forms: Mapping[str, Form], default: str = "") -> Any:
     """Value of a table: that of the function which its key `kind` names.
 
     Raises
@@ -142,13 +142,13 @@ def _argument(table: Table, name: str, form: Form, parameter: inspect.Parameter)
     if isinstance(rule, Part) and isinstance(table.content[name], dict):
         return _part(table.table(name), rule)
     if isinstance(rule, Function) and isinstance(table.content[name], dict):
-        return made(table.table(name), forms_of(GrowthLaw))
+        return value_of_table(table.table(name), forms_of(GrowthLaw))
     if rule is not None and rule.takes_names and isinstance(table.content[name], str):
         return table.content[name]
     unit = form.units.get(name, _dimension_of(declared, parameter))
     value = table.value(name, unit)
-    whole = isinstance(value, list) and value and not any(isinstance(v, list) for v in value)
-    return tuple(value) if whole else value
+    is_flat_list = isinstance(value, list) and value and not any(isinstance(v, list) for v in value)
+    return tuple(value) if is_flat_list else value
 
 
 def _part(table: Table, rule: Part) -> Any:
@@ -157,15 +157,17 @@ def _part(table: Table, rule: Part) -> Any:
     if len(kinds) == 1 and _WORD not in table:
         (kind,) = kinds.values()
         return called_with(table, Form(kind))
-    return made(table, {name: Form(kind) for name, kind in kinds.items()})
+    return value_of_table(table, {name: Form(kind) for name, kind in kinds.items()})
 
 
 def _file(table: Table, name: str) -> Path:
     """A file that a key names, from the folder of the case file."""
     path = table.source.path.parent / table.text(name)
     if not path.is_file():
-        near = sorted(p.name for p in path.parent.glob(f"*{path.suffix}")) if path.suffix else []
-        hint = f"; beside it are {', '.join(near[:5])}" if near else ""
+        similar_files = (
+            sorted(p.name for p in path.parent.glob(f"*{path.suffix}")) if path.suffix else []
+        )
+        hint = f"; beside it are {', '.join(similar_files[:5])}" if similar_files else ""
         table.refuse(name, f"there is no file {path}{hint}: paths begin at the case file.")
     return path
 
@@ -185,5 +187,5 @@ __all__ = [
     "Form",
     "called_with",
     "forms_of",
-    "made",
+    "value_of_table",
 ]

@@ -5,7 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from xcrack.app.case_forms import Form, called_with, forms_of, made
+from xcrack.app.case_forms import Form, called_with, forms_of, value_of_table
 from xcrack.app.case_tables import Table
 from xcrack.base.errors import XcrackError
 from xcrack.base.units import NUMBER
@@ -56,10 +56,12 @@ def loading(table: Table) -> Cycle | Spectrum:
     given = table.table("spectrum")
     kind = given.text("kind", next((name for name in _HISTORIES if name in given), "factors"))
     if kind in _HISTORIES:
-        own = inspect.signature(_HISTORIES[kind].function).parameters
-        given.known(["kind", *own, *_CHOICES], f" of {kind!r}")
-    rest = {name: value for name, value in given.content.items() if name not in _CHOICES}
-    spectrum = made(Table(given.source, given.key, {"kind": kind, **rest}), _HISTORIES)
+        parameters_of_kind = inspect.signature(_HISTORIES[kind].function).parameters
+        given.known(["kind", *parameters_of_kind, *_CHOICES], f" of {kind!r}")
+    remaining = {name: value for name, value in given.content.items() if name not in _CHOICES}
+    spectrum = value_of_table(
+        Table(given.source, given.key, {"kind": kind, **remaining}), _HISTORIES
+    )
     choices = {name: given.value(name, NUMBER) for name in _CHOICES[1:4] if name in given
                and name != "levels"}  # fmt: skip
     if "levels" in given:
@@ -67,7 +69,9 @@ def loading(table: Table) -> Cycle | Spectrum:
     if "unit" in given:
         choices["unit"] = given.text("unit")
     if "steady" in given:
-        choices["steady"] = tuple(made(load, forms_of(Load)) for load in given.tables("steady"))
+        choices["steady"] = tuple(
+            value_of_table(load, forms_of(Load)) for load in given.tables("steady")
+        )
     try:
         return replace(spectrum, **choices)
     except XcrackError as error:
@@ -78,7 +82,7 @@ def retardation_of(table: Table) -> Retardation:
     """The model of a table, whose zone is a table of its own."""
     if "zone" not in table:
         table.refuse("", "the key 'zone' is missing: zone = { sigma_y = ..., beta = ... }.")
-    return made(table, _MODELS)
+    return value_of_table(table, _MODELS)
 
 
 __all__ = ["loading", "retardation_of"]

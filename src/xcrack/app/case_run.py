@@ -13,7 +13,7 @@ from xcrack.base.paths import path_of, system_errors
 from xcrack.fatigue.criteria import Criterion
 from xcrack.fatigue.law import Law
 from xcrack.fatigue.spectrum import Spectrum
-from xcrack.growth.options import GrowOptions, lists_options
+from xcrack.growth.options import GrowthOptions, lists_options
 from xcrack.growth.run import grow
 from xcrack.growth.step import Cycle
 from xcrack.model.problem import Problem
@@ -39,7 +39,7 @@ def run(
     overwrite: bool = False,
     until: Until | None = None,
     keep_solutions: bool = True,
-    **options: Unpack[GrowOptions],
+    **options: Unpack[GrowthOptions],
 ) -> Any:
     """Run growth in a folder, to its end: begin, or go on with it. Or run a case file.
 
@@ -99,7 +99,7 @@ def _run_in(
     scene: tuple[Any, ...],
     given: dict[str, Any],
     overwrite: bool,
-    options: GrowOptions,
+    options: GrowthOptions,
 ) -> History:
     """History of the run in a folder: begun, gone on with, or read."""
     problem, law, criterion, cycle, da = scene

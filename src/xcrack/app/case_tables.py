@@ -29,7 +29,7 @@ class Source:
 
     def refuse(self, key: Key, words: str) -> NoReturn:
         """Raise an error that names file, line and place."""
-        raise ProblemError(f"{self.path}, line {self.line(key)}, {_shown(key)}: {words}")
+        raise ProblemError(f"{self.path}, line {self.line(key)}, {_key_text(key)}: {words}")
 
     def line(self, key: Key) -> int:
         """Line of a key, or of the table that it is missing from."""
@@ -54,8 +54,8 @@ class Table:
         names = list(names)
         for name in self.content:
             if name not in names:
-                near = difflib.get_close_matches(name, names, 1)
-                hint = f"did you mean {near[0]!r}? " if near else ""
+                similar_keys = difflib.get_close_matches(name, names, 1)
+                hint = f"did you mean {similar_keys[0]!r}? " if similar_keys else ""
                 self.refuse(
                     name, f"there is no such key{what}: {hint}known are {', '.join(names)}."
                 )
@@ -108,7 +108,7 @@ class Table:
         place = (*self.key, key) if key else self.key
         kind = type(error) if isinstance(error, XcrackError) else ProblemError
         line = self.source.line(place)
-        raise kind(f"{self.source.path}, line {line}, {_shown(place)}: {text}") from error
+        raise kind(f"{self.source.path}, line {line}, {_key_text(place)}: {text}") from error
 
 
 def read_tables(path: Path) -> Table:
@@ -138,10 +138,10 @@ def read_tables(path: Path) -> Table:
     units = root.table("units")
     units.known(("length", "force"))
     try:
-        own = Units(**units.content)
+        units_of_file = Units(**units.content)
     except ProblemError as error:
         units.wrap(error)
-    return Table(Source(path, source.lines, own), (), content)
+    return Table(Source(path, source.lines, units_of_file), (), content)
 
 
 def _lines(text: str) -> dict[Key, int]:
@@ -176,7 +176,7 @@ def _parts(name: str) -> Key:
     return tuple(part.strip().strip("\"'") for part in name.split("."))
 
 
-def _shown(key: Key) -> str:
+def _key_text(key: Key) -> str:
     """A key as a reader would look for it."""
     names = [f"{key[k - 1]} {part + 1}" if isinstance(part, int) else part
              for k, part in enumerate(key)

@@ -14,7 +14,7 @@ import xcrack
 from xcrack.analysis.solve import solve
 from xcrack.base.checks import flag
 from xcrack.base.errors import XcrackError, XcrackWarning
-from xcrack.base.optional import required
+from xcrack.base.optional import require_package
 from xcrack.base.threads import number_of_threads
 from xcrack.crack.crack import Crack
 from xcrack.crack.lines import line_crack
@@ -26,7 +26,7 @@ from xcrack.model.material import Isotropic
 from xcrack.model.problem import Problem
 from xcrack.runs.versions import versions
 from xcrack.sif.stress_intensity import stress_intensity
-from xcrack.view.pyvista_2d import renders
+from xcrack.view.pyvista_2d import can_render
 
 _NEEDED = ("numpy", "scipy", "numba", "meshio", "gmsh", "pyvista", "matplotlib", "pyamg",
            "threadpoolctl")  # fmt: skip
@@ -100,17 +100,17 @@ def info(*, warm: bool = False) -> Info:
     missing = []
     for name in _NEEDED:
         try:
-            required(name, "xcrack")
+            require_package(name, "xcrack")
         except XcrackError as error:
             missing.append(str(error))
     drawn = "pyvista in missing"
     if not any("pyvista" in text for text in missing):
-        drawn = "pyvista" if renders() else "matplotlib only: pyvista finds no OpenGL (libegl1)"
+        drawn = "pyvista" if can_render() else "matplotlib only: pyvista finds no OpenGL (libegl1)"
     packages = {"xcrack": xcrack.__version__}
     packages |= {name: _version(name) for name in (*_NEEDED, *_EXTRA)}
     solvers = ["multifrontal", "conjugate gradients with multigrid"]
     solvers += ["pardiso"] if packages["pypardiso"] else []
-    seconds = _warmed() if warm else None
+    seconds = _warm_kernels() if warm else None
     return Info(
         packages, tuple(missing), drawn, tuple(solvers), number_of_threads(), _cache(), seconds
     )
@@ -128,13 +128,13 @@ def _cache() -> str:
     given = os.environ.get("NUMBA_CACHE_DIR")
     if given:
         return given
-    beside = Path(xcrack.__file__).parent / "kernels"
-    if os.access(beside, os.W_OK):
-        return str(beside / "__pycache__")
+    cache_folder = Path(xcrack.__file__).parent / "kernels"
+    if os.access(cache_folder, os.W_OK):
+        return str(cache_folder / "__pycache__")
     return "the user's cache folder of numba"
 
 
-def _warmed() -> float:
+def _warm_kernels() -> float:
     """Solve small scenes that use all kernels."""
     begin = time.perf_counter()
     with warnings.catch_warnings():

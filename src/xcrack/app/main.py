@@ -49,58 +49,76 @@ def _parser() -> argparse.ArgumentParser:
     commands = parser.add_subparsers(required=True, metavar="command")
 
     def add(name: str, function: object, words: str) -> argparse.ArgumentParser:
-        own = commands.add_parser(name, help=words, description=words[0].upper() + words[1:] + ".")
-        own.set_defaults(command=function)
-        return own
+        subparser = commands.add_parser(
+            name, help=words, description=words[0].upper() + words[1:] + "."
+        )
+        subparser.set_defaults(command=function)
+        return subparser
 
-    own = add("info", _info, "versions, solvers, renderers, what is missing")
-    own.add_argument("--warm", action="store_true", help="compile the kernels now")
-    own = add("demo", _demo, "a closed crack at a hole, with a report")
-    own.add_argument("folder", nargs="?", default="xcrack_demo", help="where the report goes")
-    own = add("run", _run, "solve or grow what a case file tells")
-    own.add_argument("case", type=Path, help="a toml file")
-    own.add_argument("--resume", action="store_true", help="go on with the steps that are there")
-    own.add_argument("--overwrite", action="store_true", help="begin anew, move old steps aside")
-    own = add("report", _report, "report of a growth run from its folder")
-    own.add_argument("folder", type=Path, help="the folder of the run")
-    own.add_argument("-o", "--output", type=Path, help="the page; left out: report.html in it")
-    own.add_argument("--yield-stress", type=float, help="to judge plastic zones by")
-    own = add("life", _life, "lives, inspections and strength of a stored growth run")
-    own.add_argument("folder", type=Path, help="the folder of the run")
-    own.add_argument(
+    subparser = add("info", _info, "versions, solvers, renderers, what is missing")
+    subparser.add_argument("--warm", action="store_true", help="compile the kernels now")
+    subparser = add("demo", _demo, "a closed crack at a hole, with a report")
+    subparser.add_argument("folder", nargs="?", default="xcrack_demo", help="where the report goes")
+    subparser = add("run", _run, "solve or grow what a case file tells")
+    subparser.add_argument("case", type=Path, help="a toml file")
+    subparser.add_argument(
+        "--resume", action="store_true", help="go on with the steps that are there"
+    )
+    subparser.add_argument(
+        "--overwrite", action="store_true", help="begin anew, move old steps aside"
+    )
+    subparser = add("report", _report, "report of a growth run from its folder")
+    subparser.add_argument("folder", type=Path, help="the folder of the run")
+    subparser.add_argument(
+        "-o", "--output", type=Path, help="the page; left out: report.html in it"
+    )
+    subparser.add_argument("--yield-stress", type=float, help="to judge plastic zones by")
+    subparser = add("life", _life, "lives, inspections and strength of a stored growth run")
+    subparser.add_argument("folder", type=Path, help="the folder of the run")
+    subparser.add_argument(
         "--scatter",
         type=float,
         metavar="SIGMA",
         required=True,
         help="of ln C: standard deviation of the logarithm of the growth rate",
     )
-    own.add_argument("--samples", type=int, default=100_000)
-    own.add_argument("--seed", type=int, default=1, help="of the draw")
-    own.add_argument("--unit", default="cycle", help="what a cycle is called, such as flight")
-    own.add_argument("--detect", type=float, metavar="A", help="length that a look finds for sure")
-    own.add_argument("--factor", type=float, default=2.0, help="looks from there to the end")
-    own.add_argument("--interval", type=float, metavar="N", help="cycles between looks instead")
-    own.add_argument(
+    subparser.add_argument("--samples", type=int, default=100_000)
+    subparser.add_argument("--seed", type=int, default=1, help="of the draw")
+    subparser.add_argument("--unit", default="cycle", help="what a cycle is called, such as flight")
+    subparser.add_argument(
+        "--detect", type=float, metavar="A", help="length that a look finds for sure"
+    )
+    subparser.add_argument("--factor", type=float, default=2.0, help="looks from there to the end")
+    subparser.add_argument(
+        "--interval", type=float, metavar="N", help="cycles between looks instead"
+    )
+    subparser.add_argument(
         "--pod",
         type=float,
         nargs=2,
         metavar=("A50", "S"),
         help="of a logistic probability of detection: chance that all looks miss",
     )
-    own.add_argument("--toughness", type=float, metavar="K_C", help="for the strength that is left")
-    own.add_argument("--nu", type=float, help="Poisson's ratio, with --toughness")
-    own.add_argument("-o", "--output", type=Path, help="write a report with these sections")
-    own = add("verify", _verify, "compare this installation with what is known")
-    own.add_argument("--quick", action="store_true", help="coarsest meshes of the quick cases")
-    own.add_argument("-k", dest="only", default="", metavar="NAME", help="cases of this name")
-    own.add_argument("-o", "--output", type=Path, help="write the book as a page")
-    own = add("chart", _chart, "error against time of a scene")
-    own.add_argument("scene", type=Path, help="a script that makes `problem`, or a case file")
-    own.add_argument("-o", "--output", type=Path, help="the figure; left out: chart.png beside it")
-    own.add_argument("--seconds", type=float, default=60.0, help="time that it may take")
-    own = add("mesh", _mesh, "convert a mesh from one file to another")
-    own.add_argument("source", type=Path)
-    own.add_argument("target", type=Path)
+    subparser.add_argument(
+        "--toughness", type=float, metavar="K_C", help="for the strength that is left"
+    )
+    subparser.add_argument("--nu", type=float, help="Poisson's ratio, with --toughness")
+    subparser.add_argument("-o", "--output", type=Path, help="write a report with these sections")
+    subparser = add("verify", _verify, "compare this installation with what is known")
+    subparser.add_argument(
+        "--quick", action="store_true", help="coarsest meshes of the quick cases"
+    )
+    subparser.add_argument("-k", dest="only", default="", metavar="NAME", help="cases of this name")
+    subparser.add_argument("-o", "--output", type=Path, help="write the book as a page")
+    subparser = add("chart", _chart, "error against time of a scene")
+    subparser.add_argument("scene", type=Path, help="a script that makes `problem`, or a case file")
+    subparser.add_argument(
+        "-o", "--output", type=Path, help="the figure; left out: chart.png beside it"
+    )
+    subparser.add_argument("--seconds", type=float, default=60.0, help="time that it may take")
+    subparser = add("mesh", _mesh, "convert a mesh from one file to another")
+    subparser.add_argument("source", type=Path)
+    subparser.add_argument("target", type=Path)
     return parser
 
 

@@ -1,8 +1,8 @@
 """Rules of arguments, each written once, where the argument is declared.
 
 A rule is part of the annotation, ``C: Annotated[float, Number(above=0)]``. `Declared` runs those of
-a dataclass, `checked` those of a function; case files, stored values, pages and drawn inputs of
-tests read them by `arguments_of`.
+a dataclass, `check_arguments` those of a function; case files, stored values, pages and drawn
+inputs of tests read them by `arguments_of`.
 """
 
 import inspect
@@ -22,8 +22,17 @@ from typing import (
     get_type_hints,
 )
 
-from xcrack.base.arrays import frozen
-from xcrack.base.checks import entries, flag, number, numbers, one_of, shown, whole, whole_numbers
+from xcrack.base.arrays import frozen_copy
+from xcrack.base.checks import (
+    entries,
+    flag,
+    number,
+    numbers,
+    one_of,
+    value_text,
+    whole_number,
+    whole_numbers,
+)
 from xcrack.base.errors import ProblemError, XcrackError
 from xcrack.base.units import NUMBER, Dimension
 
@@ -98,7 +107,7 @@ class Whole(Rule):
 
     def check(self, value: Any, what: str, error: Error) -> int:
         """The number as int."""
-        return whole(value, what, least=self.least, most=self.most, error=error)
+        return whole_number(value, what, least=self.least, most=self.most, error=error)
 
     @property
     def words(self) -> str:
@@ -118,8 +127,8 @@ class Choice(Rule):
         if not self.needs and all(isinstance(each, str) for each in self.values):
             return one_of(value, what, self.values, error=error)
         if not any(type(value) is type(each) and value == each for each in self.values):
-            known = self.needs or " or ".join(repr(each) for each in self.values)
-            raise error(f"{what} = {shown(value)}: give {known}.")
+            choices = self.needs or " or ".join(repr(each) for each in self.values)
+            raise error(f"{what} = {value_text(value)}: give {choices}.")
         return value
 
     @property
@@ -146,7 +155,7 @@ class Text(Rule):
     def check(self, value: Any, what: str, error: Error) -> str:
         """The text."""
         if not isinstance(value, str) or not value:
-            raise error(f"{what} = {shown(value)}: give {self.needs}.")
+            raise error(f"{what} = {value_text(value)}: give {self.needs}.")
         return value
 
 
@@ -165,7 +174,7 @@ class Array(Rule):
     def check(self, value: Any, what: str, error: Error) -> Any:
         """A read-only copy."""
         made = (whole_numbers if self.is_whole else numbers)(value, what, self.shape, error=error)
-        return _tuples(made.tolist()) if self.hashable else frozen(made)
+        return _tuples(made.tolist()) if self.hashable else frozen_copy(made)
 
 
 @dataclass(frozen=True)
@@ -179,8 +188,8 @@ class Vector(Rule):
         """A read-only copy."""
         vector = numbers(value, what, (None,), error=error)
         if len(vector) not in (2, 3):
-            raise error(f"{what} = {shown(value)}: give 2 or 3 numbers.")
-        return frozen(vector)
+            raise error(f"{what} = {value_text(value)}: give 2 or 3 numbers.")
+        return frozen_copy(vector)
 
 
 @dataclass(frozen=True)
@@ -193,7 +202,9 @@ class Part(Rule):
     def check(self, value: Any, what: str, error: Error) -> Any:
         """The value as it is."""
         if not isinstance(value, self.kind):
-            raise error(f"{what} = {shown(value)}: give {self.needs or _named(self.kind)}.")
+            raise error(
+                f"{what} = {value_text(value)}: give {self.needs or _class_words(self.kind)}."
+            )
         return value
 
 
@@ -210,8 +221,8 @@ class Parts(Rule):
         for item in items:
             if not isinstance(item, self.kind):
                 raise error(
-                    f"{what}: {shown(item)} is not one of them: give "
-                    f"{self.needs or _named(self.kind)}."
+                    f"{what}: {value_text(item)} is not one of them: give "
+                    f"{self.needs or _class_words(self.kind)}."
                 )
         return items
 
@@ -225,7 +236,7 @@ class Function(Rule):
     def check(self, value: Any, what: str, error: Error) -> Any:
         """The function."""
         if not callable(value):
-            raise error(f"{what} = {shown(value)} cannot be called: give {self.needs}.")
+            raise error(f"{what} = {value_text(value)} cannot be called: give {self.needs}.")
         return value
 
 
@@ -355,7 +366,7 @@ class Declared:
         check_fields(self)
 
 
-def checked(error: Error = ProblemError) -> Callable[[Callable[P, T]], Callable[P, T]]:
+def check_arguments(error: Error = ProblemError) -> Callable[[Callable[P, T]], Callable[P, T]]:
     """Let a function run the rules of its parameters before its own code.
 
     Parameters
@@ -409,7 +420,7 @@ def classes_of(kind: Any) -> dict[str, type]:
     return result
 
 
-def _named(kind: Any) -> str:
+def _class_words(kind: Any) -> str:
     """Classes in words: those that can be made of them."""
     names = list(classes_of(kind))
     return " or ".join(filter(None, [", ".join(names[:-1]), names[-1]]))
@@ -435,8 +446,8 @@ __all__ = [
     "Vector",
     "Whole",
     "arguments_of",
+    "check_arguments",
     "check_fields",
-    "checked",
     "classes_of",
     "kinds_of",
 ]

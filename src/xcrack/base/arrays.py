@@ -12,7 +12,7 @@ Bools = NDArray[np.bool_]
 Shape = tuple[int | None, ...]
 
 
-def frozen(values: ArrayLike, dtype: Any = None) -> NDArray[Any]:
+def frozen_copy(values: ArrayLike, dtype: Any = None) -> NDArray[Any]:
     """Return a contiguous read-only copy of `values`."""
     result = np.array(values, dtype=dtype, order="C", copy=True)
     result.flags.writeable = False
@@ -25,13 +25,13 @@ def lock(values: NDArray[Any]) -> NDArray[Any]:
     return values
 
 
-def fits(shape: tuple[int, ...], wanted: Shape | None) -> bool:
+def has_shape(shape: tuple[int, ...], pattern: Shape | None) -> bool:
     """Whether a shape is the wanted one, in which None stands for any length."""
-    if wanted is None:
+    if pattern is None:
         return True
-    if len(shape) != len(wanted):
+    if len(shape) != len(pattern):
         return False
-    for side, other in zip(shape, wanted):
+    for side, other in zip(shape, pattern):
         if other is not None and side != other:
             return False
     return True
@@ -51,7 +51,7 @@ def coordinates(x: Iterable[float]) -> str:
     return "(" + ", ".join(f"{v:.6g}" for v in x) + ")"
 
 
-def stretches(count: int, length: int = 50_000) -> Iterator[slice]:
+def row_stretches(count: int, length: int = 50_000) -> Iterator[slice]:
     """Stretches of so many rows one after the other: what is computed on all at once takes memory.
 
     >>> [(part.start, part.stop) for part in stretches(5, 2)]

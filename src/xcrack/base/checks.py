@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from xcrack.base.arrays import Floats, Ints, Shape, fits
+from xcrack.base.arrays import Floats, Ints, Shape, has_shape
 from xcrack.base.errors import ProblemError, XcrackError
 
 
@@ -48,11 +48,11 @@ def number(
     >>> number(3, "paris: m", above=0)
     3.0
     """
-    wanted = "a finite number" + _bounds(above, least, below, most)
+    expectation = "a finite number" + _bounds(above, least, below, most)
     if isinstance(value, np.ndarray) and value.ndim == 0:
         value = value[()]
     if isinstance(value, bool | np.bool_) or not isinstance(value, Real):
-        raise error(f"{what} = {shown(value)} is not a number: give {wanted}.")
+        raise error(f"{what} = {value_text(value)} is not a number: give {expectation}.")
     try:
         result = float(value)
     except OverflowError:
@@ -64,11 +64,11 @@ def number(
         and (below is None or result < below)
         and (most is None or result <= most)
     ):
-        raise error(f"{what} = {shown(value)} is not possible: give {wanted}.")
+        raise error(f"{what} = {value_text(value)} is not possible: give {expectation}.")
     return result
 
 
-def whole(
+def whole_number(
     value: Any,
     what: str,
     *,
@@ -99,22 +99,24 @@ def whole(
     >>> whole(4, "box: n", least=1)
     4
     """
-    wanted = "a whole number" + _bounds(None, least, None, most)
+    expectation = "a whole number" + _bounds(None, least, None, most)
     if isinstance(value, np.ndarray) and value.ndim == 0:
         value = value[()]
     if isinstance(value, bool | np.bool_) or not isinstance(value, Real):
-        raise error(f"{what} = {shown(value)} is not a number: give {wanted}.")
+        raise error(f"{what} = {value_text(value)} is not a number: give {expectation}.")
     try:
         result = operator.index(value)  # type: ignore[arg-type]
     except TypeError:
         rounded = float(value)
         if not rounded.is_integer():  # nan and inf are not either
-            raise error(f"{what} = {shown(value)} is not possible: give {wanted}.") from None
+            raise error(
+                f"{what} = {value_text(value)} is not possible: give {expectation}."
+            ) from None
         result = int(rounded)
     if (least is not None and result < least) or (most is not None and result > most):
-        raise error(f"{what} = {shown(value)} is not possible: give {wanted}.")
+        raise error(f"{what} = {value_text(value)} is not possible: give {expectation}.")
     if abs(result) >= 2**63:
-        raise error(f"{what} = {shown(value)} is too large to count with: give {wanted}.")
+        raise error(f"{what} = {value_text(value)} is too large to count with: give {expectation}.")
     return result
 
 
@@ -156,10 +158,14 @@ def numbers(
     array([[0., 1.],
            [2., 3.]])
     """
-    if type(value) is not np.ndarray or value.dtype != np.float64 or not fits(value.shape, shape):
-        wanted = "an array of real numbers" + _of_shape(shape)
-        value = _real_array(value, what, wanted, error).astype(np.float64, copy=False)
-        _check_shape(value, what, shape, wanted, error)
+    if (
+        type(value) is not np.ndarray
+        or value.dtype != np.float64
+        or not has_shape(value.shape, shape)
+    ):
+        expectation = "an array of real numbers" + _of_shape(shape)
+        value = _real_array(value, what, expectation, error).astype(np.float64, copy=False)
+        _check_shape(value, what, shape, expectation, error)
     result: Floats = value
     if finite and not np.isfinite(result).all():
         where = np.unravel_index(int(np.argmin(np.isfinite(result))), result.shape)
@@ -196,16 +202,16 @@ def whole_numbers(
     >>> whole_numbers([(0, 1, 2)], "cells", (None, 3))
     array([[0, 1, 2]])
     """
-    if type(value) is np.ndarray and value.dtype == np.int64 and fits(value.shape, shape):
+    if type(value) is np.ndarray and value.dtype == np.int64 and has_shape(value.shape, shape):
         return value
-    wanted = "an array of whole numbers" + _of_shape(shape)
-    result = _real_array(value, what, wanted, error)
-    _check_shape(result, what, shape, wanted, error)
+    expectation = "an array of whole numbers" + _of_shape(shape)
+    result = _real_array(value, what, expectation, error)
+    _check_shape(result, what, shape, expectation, error)
     if result.dtype.kind == "f":
         result = result.astype(np.float64, copy=False)  # a half float ends at 65504
         odd = ~(np.isfinite(result) & (result == np.round(result)) & (np.abs(result) < 2**53))
         if odd.any():
-            raise error(f"{what} holds {result[odd].flat[0]}: give {wanted}.")
+            raise error(f"{what} holds {result[odd].flat[0]}: give {expectation}.")
     return result.astype(np.int64, copy=False)
 
 
@@ -235,8 +241,8 @@ def one_of(
     'on'
     """
     if not isinstance(value, str) or value not in words:
-        known = " or ".join([", ".join(f'"{word}"' for word in words[:-1]), f'"{words[-1]}"'])
-        raise error(f"{what} = {shown(value)} is not known: give {known}.")
+        choices = " or ".join([", ".join(f'"{word}"' for word in words[:-1]), f'"{words[-1]}"'])
+        raise error(f"{what} = {value_text(value)} is not known: give {choices}.")
     return value
 
 
@@ -263,7 +269,7 @@ def flag(value: Any, what: str, *, error: type[XcrackError] = ProblemError) -> b
     False
     """
     if not isinstance(value, bool | np.bool_):
-        raise error(f"{what} = {shown(value)}: give True or False.")
+        raise error(f"{what} = {value_text(value)}: give True or False.")
     return bool(value)
 
 
@@ -289,11 +295,11 @@ def entries(value: Any, what: str, *, error: type[XcrackError] = ProblemError) -
     except Exception:  # whatever an object's own __iter__ raises
         items = None
     if items is None:
-        raise error(f"{what} = {shown(value)}: give a list.")
+        raise error(f"{what} = {value_text(value)}: give a list.")
     return tuple(items)
 
 
-def shown(value: Any) -> str:
+def value_text(value: Any) -> str:
     """A value in a message: one short line, whatever it is.
 
     Parameters
@@ -318,7 +324,7 @@ def shown(value: Any) -> str:
     return text if len(text) <= 80 else f"{text[:60]} … ({type(value).__name__})"
 
 
-def called(function: Callable[..., Any], what: str, *arguments: Any) -> Any:
+def call_function(function: Callable[..., Any], what: str, *arguments: Any) -> Any:
     """Call a user's function; an exception in it keeps its type and says where it was called.
 
     Parameters
@@ -337,32 +343,32 @@ def called(function: Callable[..., Any], what: str, *arguments: Any) -> Any:
         raise
 
 
-def _real_array(value: Any, what: str, wanted: str, error: type[XcrackError]) -> Any:
+def _real_array(value: Any, what: str, expectation: str, error: type[XcrackError]) -> Any:
     if isinstance(value, np.ma.MaskedArray):
         if np.ma.getmaskarray(value).any():
-            raise error(f"{what} has masked entries: give {wanted}, without a mask.")
+            raise error(f"{what} has masked entries: give {expectation}, without a mask.")
         value = value.data
     if isinstance(value, bytes | bytearray):  # numpy takes the second for numbers
-        raise error(f"{what} = {shown(value)} is text: give {wanted}.")
+        raise error(f"{what} = {value_text(value)} is text: give {expectation}.")
     try:
         result = np.asarray(value)
     except Exception as cause:  # ragged rows, or whatever an object's own __array__ raises
-        raise error(f"{what} = {shown(value)}: give {wanted} ({cause}).") from cause
+        raise error(f"{what} = {value_text(value)}: give {expectation} ({cause}).") from cause
     if result.size == 0 and result.dtype.kind in "Of":
         return result.astype(float)
     if result.dtype.kind not in "iuf":
         kind = {"c": "complex", "b": "bool", "U": "str", "S": "bytes"}.get(
             result.dtype.kind, str(result.dtype)
         )
-        raise error(f"{what} = {shown(value)} holds {kind} entries: give {wanted}.")
+        raise error(f"{what} = {value_text(value)} holds {kind} entries: give {expectation}.")
     return result
 
 
 def _check_shape(
-    result: Any, what: str, shape: Shape | None, wanted: str, error: type[XcrackError]
+    result: Any, what: str, shape: Shape | None, expectation: str, error: type[XcrackError]
 ) -> None:
-    if not fits(result.shape, shape):
-        raise error(f"{what} has the shape {result.shape}: give {wanted}.")
+    if not has_shape(result.shape, shape):
+        raise error(f"{what} has the shape {result.shape}: give {expectation}.")
 
 
 @cache
@@ -385,13 +391,13 @@ def _bounds(
 
 
 __all__ = [
-    "called",
+    "call_function",
     "entries",
     "flag",
     "number",
     "numbers",
     "one_of",
-    "shown",
-    "whole",
+    "value_text",
+    "whole_number",
     "whole_numbers",
 ]

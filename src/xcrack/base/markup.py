@@ -26,14 +26,14 @@ class Markup(str):
     """Text that is HTML already."""
 
 
-def escaped(value: Any) -> Markup:
+def escape_html(value: Any) -> Markup:
     """A value as HTML: what is no markup yet is escaped, numbers are shortened."""
     if isinstance(value, Markup):
         return value
-    return Markup(html.escape(shown(value)))
+    return Markup(html.escape(display_text(value)))
 
 
-def shown(value: Any) -> str:
+def display_text(value: Any) -> str:
     """A value as a reader wants to see it."""
     if isinstance(value, bool) or value is None:
         return {True: "yes", False: "no", None: ""}[value]
@@ -54,7 +54,7 @@ def element(name: str, content: Any, **attributes: str) -> Markup:
         f' {"class" if key == "cls" else key}="{html.escape(value)}"'
         for key, value in attributes.items()
     )
-    return Markup(f"<{name}{pairs}>{escaped(content)}</{name}>")
+    return Markup(f"<{name}{pairs}>{escape_html(content)}</{name}>")
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[Any]], *, scroll: bool = False) -> Markup:
@@ -66,14 +66,14 @@ def table(head: Sequence[str], rows: Sequence[Sequence[Any]], *, scroll: bool = 
     return Markup(f'<div class="scroll">{text}</div>') if scroll else text
 
 
-def listed(items: Sequence[Any]) -> Markup:
+def list_markup(items: Sequence[Any]) -> Markup:
     """An unordered list."""
     return Markup("<ul>" + "".join(element("li", item) for item in items) + "</ul>")
 
 
-def joined(*parts: Any) -> Markup:
+def join_parts(*parts: Any) -> Markup:
     """Parts one after the other, escaped where they are not markup."""
-    return Markup("\n".join(escaped(part) for part in parts))
+    return Markup("\n".join(escape_html(part) for part in parts))
 
 
 def page(title: str, *parts: Any) -> str:
@@ -82,7 +82,7 @@ def page(title: str, *parts: Any) -> str:
         '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
         f'<link rel="icon" href="data:,"><title>{html.escape(title)}</title>'
-        f"<style>{_STYLE}</style></head>\n<body>\n{joined(*parts)}\n</body></html>\n"
+        f"<style>{_STYLE}</style></head>\n<body>\n{join_parts(*parts)}\n</body></html>\n"
     )
 
 
@@ -91,4 +91,13 @@ def _cell(value: Any) -> Markup:
     return element("td", value, cls="n") if is_number else element("td", value)
 
 
-__all__ = ["Markup", "element", "escaped", "joined", "listed", "page", "shown", "table"]
+__all__ = [
+    "Markup",
+    "display_text",
+    "element",
+    "escape_html",
+    "join_parts",
+    "list_markup",
+    "page",
+    "table",
+]

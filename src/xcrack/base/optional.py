@@ -9,7 +9,7 @@ from xcrack.base.errors import XcrackError
 _PIP_NAME = {"vtkmodules": "vtk", "PIL": "pillow"}  # where that is not the name of the module
 
 
-def required(name: str, purpose: str, instead: str = "") -> ModuleType:
+def require_package(name: str, purpose: str, instead: str = "") -> ModuleType:
     """Import a package that only some functions need; an error says how to install it.
 
     Parameters
@@ -67,4 +67,4 @@ def in_notebook() -> bool:
     return shell is not None and hasattr(shell, "kernel")
 
 
-__all__ = ["in_notebook", "required"]
+__all__ = ["in_notebook", "require_package"]

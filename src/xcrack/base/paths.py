@@ -7,7 +7,7 @@ from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-from xcrack.base.checks import shown
+from xcrack.base.checks import value_text
 from xcrack.base.errors import XcrackError
 
 _NO_ROOM = "make room, or give a folder on another disk"
@@ -60,13 +60,13 @@ def path_of(
     except Exception:  # whatever an object's own __fspath__ raises
         text = None
     if not isinstance(text, str):
-        raise error(f"{what} = {shown(value)} is not a path: give a string or a pathlib.Path.")
+        raise error(f"{what} = {value_text(value)} is not a path: give a string or a pathlib.Path.")
     if not text or "\0" in text:
         reason = "holds a NUL character" if text else "is empty"
-        raise error(f"{what} = {shown(value)} {reason}: give the path of a file.")
+        raise error(f"{what} = {value_text(value)} {reason}: give the path of a file.")
     path = Path(text)
     if is_file and path.name in ("", ".."):
-        raise error(f"{what} = {shown(str(path))} is a folder: give a file in it.")
+        raise error(f"{what} = {value_text(str(path))} is a folder: give a file in it.")
     return path
 
 

@@ -29,7 +29,7 @@ _QUOTA = Path("/sys/fs/cgroup/cpu.max")
 _pool: ContextVar[ThreadPoolExecutor | None] = ContextVar("xcrack threads", default=None)
 
 
-def available() -> int:
+def available_processors() -> int:
     """Processors that this process may use, by affinity and quota, at most 16.
 
     The environment variable XCRACK_THREADS takes precedence.
@@ -39,13 +39,16 @@ def available() -> int:
     ProblemError
         XCRACK_THREADS is not a whole number above 0.
     """
-    wanted = os.environ.get("XCRACK_THREADS")
-    if wanted is not None:
-        if not (wanted.isascii() and wanted.isdigit() and int(wanted) > 0):
+    requested_number = os.environ.get("XCRACK_THREADS")
+    if requested_number is not None:
+        if not (
+            requested_number.isascii() and requested_number.isdigit() and int(requested_number) > 0
+        ):
             raise ProblemError(
-                f"XCRACK_THREADS = {wanted!r} in the environment: give a whole number above 0."
+                f"XCRACK_THREADS = {requested_number!r} in the environment: give a whole number "
+                f"above 0."
             )
-        return int(wanted)
+        return int(requested_number)
     try:
         count = len(os.sched_getaffinity(0))
     except AttributeError:  # not on this system
@@ -64,13 +67,13 @@ def _quota() -> int:
 
 @contextmanager
 def threads(count: int | None) -> Iterator[int]:
-    """Let `each` use a number of threads within the block; None: as many as are available.
+    """Let `map_tasks` use a number of threads within the block; None: as many as are available.
 
     Parameters
     ----------
     count : int, optional
     """
-    number = available() if count is None else count
+    number = available_processors() if count is None else count
     if number == 1 or _pool.get() is not None:
         yield number
         return
@@ -83,12 +86,12 @@ def threads(count: int | None) -> Iterator[int]:
 
 
 def number_of_threads() -> int:
-    """Threads that `each` would use here."""
+    """Threads that `map_tasks` would use here."""
     pool = _pool.get()
     return 1 if pool is None else int(pool._max_workers)
 
 
-def each(function: Callable[[Task], Result], tasks: Iterable[Task]) -> list[Result]:
+def map_tasks(function: Callable[[Task], Result], tasks: Iterable[Task]) -> list[Result]:
     """Results of a function for tasks, in their order; tasks must not depend on each other.
 
     Parameters
@@ -103,8 +106,8 @@ def each(function: Callable[[Task], Result], tasks: Iterable[Task]) -> list[Resu
     return list(pool.map(function, tasks))
 
 
-def streamed(function: Callable[[Task], Result], tasks: Iterable[Task]) -> Iterator[Result]:
-    """Results of `each` one by one, while later ones are made: at most two a thread wait.
+def stream_tasks(function: Callable[[Task], Result], tasks: Iterable[Task]) -> Iterator[Result]:
+    """Results of `map_tasks` one by one, while later ones are made: at most two a thread wait.
 
     What takes them, say the sum of chunks, runs beside the tasks, and memory is bounded.
     """
@@ -146,15 +149,15 @@ class _Blas:
             if self.users == 0:
                 self._set(None, self.before)
 
-    def _set(self, wanted: int | None, before: Sequence[int | None]) -> None:
+    def _set(self, target_number: int | None, numbers_before: Sequence[int | None]) -> None:
         """Let libraries that had other numbers of threads use a number, or what they had."""
-        for library, number in zip(self.libraries, before):
+        for library, number in zip(self.libraries, numbers_before):
             if number is None or number == 1:
                 continue
             # threadpoolctl lets one thread alone change the number, to settle what is settled
             # here: it is this process' own, and the last to leave may not be the first to enter.
             change = getattr(library, "_real_set_num_threads", library.set_num_threads)
-            change(number if wanted is None else wanted)
+            change(number if target_number is None else target_number)
 
 
 _blas = cache(_Blas)
@@ -175,4 +178,4 @@ def one_blas_thread() -> Iterator[None]:
         blas.leave()
 
 
-__all__ = ["available", "each", "number_of_threads", "one_blas_thread", "threads"]
+__all__ = ["available_processors", "map_tasks", "number_of_threads", "one_blas_thread", "threads"]

@@ -55,10 +55,10 @@ class Units:
     force: str = ""
 
     def __post_init__(self) -> None:
-        for name, known in (("length", _LENGTHS), ("force", _FORCES)):
+        for name, allowed in (("length", _LENGTHS), ("force", _FORCES)):
             given = getattr(self, name)
-            if given and (not isinstance(given, str) or given not in known):
-                raise ProblemError(f"{name} = {given!r:.40}: known are {', '.join(known)}.")
+            if given and (not isinstance(given, str) or given not in allowed):
+                raise ProblemError(f"{name} = {given!r:.40}: known are {', '.join(allowed)}.")
 
     def number(self, text: str, dimension: Dimension) -> float:
         """A quantity as a number in these units.
@@ -74,13 +74,13 @@ class Units:
                 f"{text!r:.60} is no number with a unit, such as {_example(dimension)}."
             )
         value, size, computed = float(match[1]), 1.0, NUMBER
-        rest = match[2]
-        while rest:
-            size, computed, rest = _times(size, computed, rest)
-        wanted = _NAMES.get(dimension, "another quantity")
+        remaining = match[2]
+        while remaining:
+            size, computed, remaining = _times(size, computed, remaining)
+        expectation = _NAMES.get(dimension, "another quantity")
         if computed != dimension:
             have = _NAMES.get(computed, "another quantity")
-            raise ProblemError(f"{text!r:.60} is {have}, but {wanted} belongs here.")
+            raise ProblemError(f"{text!r:.60} is {have}, but {expectation} belongs here.")
         if dimension != NUMBER and not (self.length and self.force):
             raise ProblemError(
                 f"{text!r:.60} has a unit, but the file does not say its own: give [units] with "
@@ -92,17 +92,17 @@ class Units:
         return result if isfinite(result) else inf
 
 
-def _times(size: float, result: Dimension, rest: str) -> tuple[float, Dimension, str]:
+def _times(size: float, result: Dimension, remaining: str) -> tuple[float, Dimension, str]:
     """One more factor of a unit."""
-    match = _FACTOR.match(rest)
+    match = _FACTOR.match(remaining)
     if match is None or match[3] not in _UNITS:
-        name = rest if match is None else match[3]
-        known = ", ".join(_UNITS)
-        raise ProblemError(f"the unit {name!r:.40} is not known: known are {known}.")
+        name = remaining if match is None else match[3]
+        unit_names = ", ".join(_UNITS)
+        raise ProblemError(f"the unit {name!r:.40} is not known: known are {unit_names}.")
     power = float(match[4] or 1) * (0.5 if match[2] else 1.0) * (-1 if match[1] == "/" else 1)
-    factor, own = _UNITS[match[3]]
-    powers = result[0] + power * own[0], result[1] + power * own[1]
-    return size * factor**power, powers, rest[match.end() :]
+    factor, factor_dimension = _UNITS[match[3]]
+    powers = result[0] + power * factor_dimension[0], result[1] + power * factor_dimension[1]
+    return size * factor**power, powers, remaining[match.end() :]
 
 
 def _example(dimension: Dimension) -> str:

@@ -6,17 +6,17 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from xcrack.base.arrays import Bools, Floats, Ints
-from xcrack.base.checks import shown
+from xcrack.base.checks import value_text
 from xcrack.base.errors import GeometryError, warn
 from xcrack.crack.crack import Crack
 from xcrack.crack.front_chain import (
-    Chain,
+    FrontChain,
     along_front,
     chain,
-    divided,
-    faired,
-    spaced,
-    stitched,
+    division_points,
+    faired_front,
+    spaced_front,
+    stitch_side,
     without_loops,
     without_notches,
     without_sides,
@@ -42,8 +42,8 @@ def advance_fronts(
     Each vertex of a front moves by da (cos(angle) t + sin(angle) n) in its frame, and a strip of
     triangles joins the old front with the new one. Angle and advance run between the given
     places as monotone cubics, around closed fronts periodically; beyond the first and last place
-    of an open front they are constant. The new front is faired (see `front_chain.faired`), its
-    points are merged and split so that they lie between 0.5 and 1.5 sizes apart.
+    of an open front they are constant. The new front is faired (see `front_chain.faired_front`),
+    its points are merged and split so that they lie between 0.5 and 1.5 sizes apart.
 
     Parameters
     ----------
@@ -80,8 +80,8 @@ def advance_fronts(
     n_points = len(crack.points)
     points, faces, fronts, strips = [crack.points], [crack.faces], [], []
     for k, old in enumerate(front_frames(crack)):
-        own = number == k
-        new = _strip(old, s[own], angle[own], da[own], size, n_points)
+        is_on_front = number == k
+        new = _strip(old, s[is_on_front], angle[is_on_front], da[is_on_front], size, n_points)
         if new is None:
             fronts.append((crack.fronts or ())[k])
             continue
@@ -97,7 +97,7 @@ def advance_fronts(
 
 
 @dataclass(frozen=True, eq=False)
-class _Strip:
+class AdvanceStrip:
     """What one front adds to its crack."""
 
     points: Floats
@@ -117,15 +117,15 @@ def _check(crack: Crack, s: Floats, front: Ints, angle: Floats, da: Floats, size
         )
     if not (np.isfinite(size) and size > 0):
         raise GeometryError(
-            f"the size {shown(size)} of a front's sides must be positive and finite."
+            f"the size {value_text(size)} of a front's sides must be positive and finite."
         )
     for name, values in (("s", s), ("angle", angle), ("da", da)):
         if not np.isfinite(values).all():
-            bad = int(np.argmin(np.isfinite(values)))
-            raise GeometryError(f"{name} = {values[bad]} at front place {bad} is not finite.")
+            place = int(np.argmin(np.isfinite(values)))
+            raise GeometryError(f"{name} = {values[place]} at front place {place} is not finite.")
     if (da < 0).any():
-        bad = int(np.argmin(da))
-        raise GeometryError(f"da = {da[bad]} at front place {bad}: a crack does not shrink.")
+        place = int(np.argmin(da))
+        raise GeometryError(f"da = {da[place]} at front place {place}: a crack does not shrink.")
     if len(front) and not (front.min() >= 0 and front.max() < len(crack.fronts)):
         raise GeometryError(
             f"places name fronts {front.min()} to {front.max()}; the crack has fronts 0 to "
@@ -135,11 +135,11 @@ def _check(crack: Crack, s: Floats, front: Ints, angle: Floats, da: Floats, size
 
 def _strip(
     old: Front, s: Floats, angle: Floats, da: Floats, size: float, n_points: int
-) -> _Strip | None:
+) -> AdvanceStrip | None:
     """New points and faces ahead of one front; None where it stays."""
     if not len(s) or da.max() == 0:
         return None
-    sent = _sent(old, s, angle, da, size)
+    sent = _advanced_points(old, s, angle, da, size)
     if sent is None:
         return None
     rays, vertex, normal = sent
@@ -148,7 +148,7 @@ def _strip(
         raise _closes(old)
     # A wave along the front is damped, beyond da of a few sides turned over, by the growth itself:
     # K is larger where the front lags behind. What longer steps overshoot more passes take away.
-    smooth = faired(front, int(np.clip(np.ceil(_PASSES * da.max() / size), 1, 8)))
+    smooth = faired_front(front, int(np.clip(np.ceil(_PASSES * da.max() / size), 1, 8)))
     before = np.linalg.norm(front.side, axis=1).sum()
     after = np.linalg.norm(smooth.side, axis=1).sum()
     if abs(after - before) > _LOST * before:
@@ -157,18 +157,18 @@ def _strip(
             f"{after:.4g}: its points zigzag. K along the front, or the advance, jumps from point "
             "to point; smooth it, or take a smaller da."
         )
-    return _joined(old, rays, smooth, vertex, normal, size, n_points)
+    return _joined_strip(old, rays, smooth, vertex, normal, size, n_points)
 
 
-def _joined(
+def _joined_strip(
     old: Front,
-    rays: Chain,
-    front: Chain,
+    rays: FrontChain,
+    front: FrontChain,
     vertex: Ints,
     normal: Floats,
     size: float,
     n_points: int,
-) -> _Strip:
+) -> AdvanceStrip:
     """The strip to a new front whose points are merged and split, no triangle turned over.
 
     Where points that have been left out turn triangles over (a short advance of a curved front)
@@ -176,38 +176,38 @@ def _joined(
     """
     needed = np.zeros(len(rays.x), dtype=bool)
     while True:
-        trial = _cleared(_pinned(front, rays.pinned | needed), size)
-        strip, bad = _stitched(old, trial, vertex, normal, size, n_points)
-        if not len(bad):
+        trial = _cleared_front(_pinned_front(front, rays.pinned | needed), size)
+        strip, turned_sides = _stitched_strip(old, trial, vertex, normal, size, n_points)
+        if not len(turned_sides):
             return strip
-        ends = np.concatenate([bad, (bad + 1) % len(trial.x)])
+        ends = np.concatenate([turned_sides, (turned_sides + 1) % len(trial.x)])
         around = np.isin(trial.owner, ends)
         if (around & ~needed).any():
             needed |= around
             continue
-        front = without_sides(_pinned(trial, rays.pinned), bad)
+        front = without_sides(_pinned_front(trial, rays.pinned), turned_sides)
         if old.closed and len(front.x) < 3:
             raise _closes(old)
         if len(front.x) == len(trial.x):
             raise GeometryError(
-                f"the front that has come to {_at(trial.x[bad[:1]])} folds: neighbours turn in "
-                "opposite directions or run into each other there. Take a smaller da, or smooth "
-                "the angles along the front."
+                f"the front that has come to {_at(trial.x[turned_sides[:1]])} folds: neighbours "
+                f"turn in opposite directions or run into each other there. Take a smaller da, or "
+                f"smooth the angles along the front."
             )
 
 
-def _pinned(front: Chain, rays: Bools) -> Chain:
+def _pinned_front(front: FrontChain, rays: Bools) -> FrontChain:
     """A front of which those points are pinned that one of the given rays has become."""
     pinned = np.zeros(len(front.x), dtype=bool)
     pinned[front.owner[rays]] = True
     return replace(front, pinned=pinned)
 
 
-def _cleared(front: Chain, size: float) -> Chain:
+def _cleared_front(front: FrontChain, size: float) -> FrontChain:
     """A front without short sides and notches."""
     while True:
         count = len(front.x)
-        front = without_notches(spaced(front, LOW * size))
+        front = without_notches(spaced_front(front, LOW * size))
         if len(front.x) == count:
             return front
 
@@ -223,9 +223,9 @@ def _at(x: Floats) -> list[float]:
     return list(np.round(x.mean(axis=0), 6).tolist())
 
 
-def _sent(
+def _advanced_points(
     old: Front, s: Floats, angle: Floats, da: Floats, size: float
-) -> tuple[Chain, Ints, Floats] | None:
+) -> tuple[FrontChain, Ints, Floats] | None:
     """Where the points of a front go, which of them are its vertices, and the new normals.
 
     Sides of the front much longer than `size` send out points from between their ends.
@@ -237,7 +237,7 @@ def _sent(
     breaks = front_curve(old.x, old.frame, closed).breaks
     length = float(breaks[-1])
     pieces = np.where(side > HIGH * size, np.round(side / size), 1).astype(np.int64)
-    inner = divided(old.x, closed, pieces, np.zeros(m, dtype=bool))
+    inner = division_points(old.x, closed, pieces, np.zeros(m, dtype=bool))
     own_frame = _frames(old)
     x: list[Floats] = []
     place: list[float] = []
@@ -293,9 +293,9 @@ def _frames(front: Front) -> Floats:
     return frame
 
 
-def _stitched(
-    old: Front, front: Chain, vertex: Ints, normal: Floats, size: float, n_points: int
-) -> tuple[_Strip, Ints]:
+def _stitched_strip(
+    old: Front, front: FrontChain, vertex: Ints, normal: Floats, size: float, n_points: int
+) -> tuple[AdvanceStrip, Ints]:
     """The strip up to a new front, and the sides of it at which triangles are turned over."""
     fixed = front.fixed()
     length = np.linalg.norm(front.side, axis=1)
@@ -306,7 +306,7 @@ def _stitched(
     ray_to_vertex[vertex] = np.arange(len(vertex))
     still = np.nonzero(front.still)[0]
     own_number[front.owner[still]] = old.number[ray_to_vertex[still]]
-    inner = divided(front.x, front.closed, pieces, own_number >= 0)
+    inner = division_points(front.x, front.closed, pieces, own_number >= 0)
     points: list[Floats] = []
     line: list[int] = []
     begin = np.zeros(n, dtype=np.int64)
@@ -328,7 +328,7 @@ def _stitched(
         line.append(line[0])
     end = np.append(begin[1:], len(line) - 1)
     faces: list[tuple[int, int, int]] = []
-    bad: list[int] = []
+    turned_sides: list[int] = []
     sides = len(vertex) if front.closed else len(vertex) - 1
     for j in range(sides):
         first, last = int(vertex[j]), int(vertex[(j + 1) % len(vertex)])
@@ -343,22 +343,22 @@ def _stitched(
         x = np.array([x_of[p] for p in (*corners, *ahead)])
         expected = normal[first] + normal[last % n_rays]
         expected /= np.linalg.norm(expected)
-        triangles, upright = stitched(corners, ahead, x, expected)
+        triangles, upright = stitch_side(corners, ahead, x, expected)
         faces.extend(triangles)
         if upright < _UPRIGHT:
-            bad.extend(across or [(int(owners[0]) - 1) % n, int(owners[0])])
-    bad = [side for side in bad if side < len(front.side)]
-    strip = _Strip(
+            turned_sides.extend(across or [(int(owners[0]) - 1) % n, int(owners[0])])
+    turned_sides = [side for side in turned_sides if side < len(front.side)]
+    strip = AdvanceStrip(
         np.array(points).reshape(-1, 3),
         np.array(faces, dtype=np.int64).reshape(-1, 3),
         np.array(line),
         front.start[~front.still],
         front.stop[~front.still],
     )
-    return strip, np.array(bad, dtype=np.int64)
+    return strip, np.array(turned_sides, dtype=np.int64)
 
 
-def _check_free(old: Crack, grown: Crack, number: int, strip: _Strip, size: float) -> None:
+def _check_free(old: Crack, grown: Crack, number: int, strip: AdvanceStrip, size: float) -> None:
     """Raise where a front that has advanced meets another part of its crack."""
     new = front_frames(grown)[number]
     moved = new.number >= len(old.points)
@@ -371,9 +371,9 @@ def _check_free(old: Crack, grown: Crack, number: int, strip: _Strip, size: floa
         path = strip.stop - strip.start
         length = np.linalg.norm(path, axis=1)
         # The faces around the start of a path are its own.
-        far = length > 0.5 * size
-        start = strip.start[far] + path[far] * (0.5 * size / length[far])[:, None]
-        stop = strip.stop[far]
+        is_far = length > 0.5 * size
+        start = strip.start[is_far] + path[is_far] * (0.5 * size / length[is_far])[:, None]
+        stop = strip.stop[is_far]
         crossed, place = first_crossing(triangle_tree(old.points, old.faces), start, stop)
         hit = (start + place[:, None] * (stop - start))[crossed >= 0]
     if len(hit):

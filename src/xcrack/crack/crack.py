@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from xcrack.base.arrays import Floats, Ints, Shape, frozen
+from xcrack.base.arrays import Floats, Ints, Shape, frozen_copy
 from xcrack.base.checks import entries, whole_numbers
 from xcrack.base.errors import GeometryError
 from xcrack.mesh.checks import coordinates
@@ -46,11 +46,11 @@ class Crack:
         d = points.shape[1]
         if d not in (2, 3) or not len(points):
             raise GeometryError(f"Crack: points must be (p, 2) or (p, 3), not {points.shape}.")
-        object.__setattr__(self, "points", frozen(points))
+        object.__setattr__(self, "points", frozen_copy(points))
         object.__setattr__(self, "faces", self._numbers("faces", self.faces, (None, d)))
         if self.tips is not None:
-            own = self._numbers("tips", self.tips, (None,))
-            object.__setattr__(self, "tips", tuple(own.tolist()))
+            tip_numbers = self._numbers("tips", self.tips, (None,))
+            object.__setattr__(self, "tips", tuple(tip_numbers.tolist()))
         if self.fronts is not None:
             given = entries(self.fronts, "Crack: fronts", error=GeometryError)
             fronts = [self._numbers(f"fronts[{k}]", f, (None,)) for k, f in enumerate(given)]
@@ -64,7 +64,7 @@ class Crack:
                 f"Crack: {name} name points outside 0 ... {len(self.points) - 1}, such as "
                 f"{array.min() if array.min() < 0 else array.max()}: give numbers of its points."
             )
-        return frozen(array, np.int64)
+        return frozen_copy(array, np.int64)
 
     @property
     def placed(self) -> bool:

@@ -6,23 +6,23 @@ from xcrack.base.arrays import Floats
 from xcrack.crack.crack import Crack, tip_frames
 from xcrack.crack.fronts_3d import front_frames
 
-_Ends = tuple[Sequence[Floats], Sequence[Floats]]
+CutEnds = tuple[Sequence[Floats], Sequence[Floats]]
 
 
-def _tips(crack: Crack) -> _Ends:
+def _tips(crack: Crack) -> CutEnds:
     x, frame = tip_frames(crack)
     return list(x), list(frame)
 
 
-def _fronts(crack: Crack) -> _Ends:
+def _fronts(crack: Crack) -> CutEnds:
     fronts = front_frames(crack)
     return [front.x for front in fronts], [front.frame for front in fronts]
 
 
-_ENDS: dict[int, Callable[[Crack], _Ends]] = {2: _tips, 3: _fronts}
+_ENDS: dict[int, Callable[[Crack], CutEnds]] = {2: _tips, 3: _fronts}
 
 
-def end_frames(crack: Crack) -> _Ends:
+def end_frames(crack: Crack) -> CutEnds:
     """Points and frames of each tip, in 3D of each front, of a placed crack.
 
     Parameters

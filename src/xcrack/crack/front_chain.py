@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from xcrack.base.arrays import Bools, Floats, Ints, frozen
+from xcrack.base.arrays import Bools, Floats, Ints, frozen_copy
 from xcrack.crack.fronts_3d import steps, tangents
 
 _FEWEST = 8  # points of a closed front that are not merged for their spacing
@@ -13,7 +13,7 @@ _NOTCH = np.cos(np.radians(100.0))  # a hollow front that turns by more has a no
 
 
 @dataclass(frozen=True, eq=False)
-class Chain:
+class FrontChain:
     """Points of a new front, and which points of the old one each of them has come from.
 
     Attributes
@@ -43,7 +43,7 @@ class Chain:
 
     def __post_init__(self) -> None:
         for name in ("x", "pinned", "start", "stop", "still", "owner"):
-            object.__setattr__(self, name, frozen(getattr(self, name)))
+            object.__setattr__(self, name, frozen_copy(getattr(self, name)))
 
     @property
     def side(self) -> Floats:
@@ -75,7 +75,7 @@ class Chain:
         return np.asarray((still & following)[: len(self.side)])
 
 
-def chain(start: Floats, stop: Floats, still: Bools, closed: bool) -> Chain:
+def chain(start: Floats, stop: Floats, still: Bools, closed: bool) -> FrontChain:
     """All that was sent out, each a point of its own.
 
     Parameters
@@ -88,20 +88,20 @@ def chain(start: Floats, stop: Floats, still: Bools, closed: bool) -> Chain:
 
     Returns
     -------
-    Chain
+    FrontChain
     """
     pinned = np.array(still)
     if not closed:
         pinned[[0, -1]] = True
-    return Chain(stop, closed, pinned, start, stop, still, np.arange(len(start)))
+    return FrontChain(stop, closed, pinned, start, stop, still, np.arange(len(start)))
 
 
-def merged(front: Chain, side: int, x: Floats) -> Chain:
+def merge_side(front: FrontChain, side: int, x: Floats) -> FrontChain:
     """A front with the ends of one side made one point.
 
     Parameters
     ----------
-    front : Chain
+    front : FrontChain
     side : int
         Leads from the point with this number to the next one.
     x : (3,) array, length
@@ -109,7 +109,7 @@ def merged(front: Chain, side: int, x: Floats) -> Chain:
 
     Returns
     -------
-    Chain
+    FrontChain
     """
     n = len(front.x)
     one, other = side, (side + 1) % n
@@ -124,11 +124,11 @@ def merged(front: Chain, side: int, x: Floats) -> Chain:
     number = np.arange(n)
     number[other] = one
     number[number > other] -= 1
-    rest = np.arange(n) != other
-    return replace(front, x=points[rest], pinned=pinned[rest], owner=number[front.owner])
+    is_other = np.arange(n) != other
+    return replace(front, x=points[is_other], pinned=pinned[is_other], owner=number[front.owner])
 
 
-def without_loops(front: Chain) -> Chain:
+def without_loops(front: FrontChain) -> FrontChain:
     """A front whose sides all run on in their old direction; points of others are merged.
 
     Where a hollow front converges its points overtake each other: the sides between them turn
@@ -142,27 +142,27 @@ def without_loops(front: Chain) -> Chain:
         worst = int(np.argmin(forward))
         if forward[worst] > 0:
             break
-        front = _joined(front, worst)
+        front = _join_side_ends(front, worst)
     return front
 
 
-def _joined(front: Chain, side: int) -> Chain:
+def _join_side_ends(front: FrontChain, side: int) -> FrontChain:
     """Both ends of a side merged half way between the outermost of what they come from."""
     first, last = front.members()
     other = (side + 1) % len(front.x)
-    return merged(front, side, (front.stop[first[side]] + front.stop[last[other]]) / 2)
+    return merge_side(front, side, (front.stop[first[side]] + front.stop[last[other]]) / 2)
 
 
-def without_sides(front: Chain, sides: Ints) -> Chain:
+def without_sides(front: FrontChain, sides: Ints) -> FrontChain:
     """A front in which the ends of the sides with these numbers are merged if one is free."""
     for side in sorted(set(sides.tolist()), reverse=True):
         other = (side + 1) % len(front.x)
         if len(front.x) > 3 and not (front.pinned[side] and front.pinned[other]):
-            front = _joined(front, side)
+            front = _join_side_ends(front, side)
     return front
 
 
-def faired(front: Chain, passes: int) -> Chain:
+def faired_front(front: FrontChain, passes: int) -> FrontChain:
     """A front without zigzag; what is smooth over five of its points hardly moves.
 
     In each pass each free point goes towards the cubic, over the arc length, that fits it and its
@@ -172,12 +172,12 @@ def faired(front: Chain, passes: int) -> Chain:
 
     Parameters
     ----------
-    front : Chain
+    front : FrontChain
     passes : int
 
     Returns
     -------
-    Chain
+    FrontChain
     """
     n = len(front.x)
     length = np.linalg.norm(front.side, axis=1)
@@ -194,11 +194,11 @@ def faired(front: Chain, passes: int) -> Chain:
         place = np.concatenate([[0.0], np.cumsum(length)])[window]
     gap = place[:, :, None] - place[:, None, :] + length.mean() * np.eye(5)
     weight = 1 / (gap / length.mean()).prod(axis=2)
-    own = np.argmax(window == np.arange(n)[:, None], axis=1)
+    own_column = np.argmax(window == np.arange(n)[:, None], axis=1)
     # 3/8 at the middle of five even points, which is 36/70 of the whole way to the cubic.
-    weight *= (0.375 * 70 / 36 * weight[np.arange(n), own] / np.einsum("ij,ij->i", weight, weight))[
-        :, None
-    ]
+    weight *= (
+        0.375 * 70 / 36 * weight[np.arange(n), own_column] / np.einsum("ij,ij->i", weight, weight)
+    )[:, None]
     along = tangents(front.x, front.closed)
     x = np.array(front.x)
     for _ in range(passes):
@@ -213,18 +213,18 @@ def faired(front: Chain, passes: int) -> Chain:
     return replace(front, x=np.where(front.pinned[:, None], front.x, front.x + move))
 
 
-def spaced(front: Chain, least: float) -> Chain:
+def spaced_front(front: FrontChain, least: float) -> FrontChain:
     """A front without short sides: of two points that are too close one is left out.
 
     Parameters
     ----------
-    front : Chain
+    front : FrontChain
     least : float, length
         Sides are at least that long, unless both ends are pinned or a closed front has few points.
 
     Returns
     -------
-    Chain
+    FrontChain
     """
     while True:
         n = len(front.x)
@@ -239,10 +239,10 @@ def spaced(front: Chain, least: float) -> Chain:
         other = (side + 1) % n
         # The point whose neighbour on the far side is nearer can better be spared.
         stays = side if length[side - 1] > length[other % len(length)] else other
-        front = merged(front, side, front.x[stays])
+        front = merge_side(front, side, front.x[stays])
 
 
-def without_notches(front: Chain) -> Chain:
+def without_notches(front: FrontChain) -> FrontChain:
     """A front without hollow corners of less than 80 degrees; what lies in them is passed over."""
     n = len(front.x)
     side = front.side
@@ -258,7 +258,7 @@ def without_notches(front: Chain) -> Chain:
         if len(front.x) > 3:
             into = i if ahead_length[i] < back_length[i] else (i - 1) % n
             goal = (i + 1) % n if into == i else into
-            return merged(front, int(into), front.x[goal])
+            return merge_side(front, int(into), front.x[goal])
     return front
 
 
@@ -273,7 +273,7 @@ _FLAT = 1e-7  # double area over the square of the longest side of a triangle wi
 _LIKE = 0.95  # a diagonal is as good as another if its worst triangle is at most that much worse
 
 
-def divided(x: Floats, closed: bool, pieces: Ints, straight: Bools) -> list[Floats]:
+def division_points(x: Floats, closed: bool, pieces: Ints, straight: Bools) -> list[Floats]:
     """Points inside each side of a polyline, which divide it evenly.
 
     Parameters
@@ -310,7 +310,7 @@ def divided(x: Floats, closed: bool, pieces: Ints, straight: Bools) -> list[Floa
     return result
 
 
-def stitched(
+def stitch_side(
     corners: tuple[int, int], numbers: list[int], x: Floats, normal: Floats
 ) -> tuple[list[tuple[int, int, int]], float]:
     """Triangles between one side of the old front and the new front ahead of it.
@@ -348,7 +348,7 @@ def stitched(
         ]
         if not local:
             return [], 1.0
-        shape, cosine = _worst(x, np.array(local), normal)
+        shape, cosine = _worst_triangle(x, np.array(local), normal)
         # The first way unless another is clearly better: neighbours are cut alike.
         if shape > (quality / _LIKE if quality > 0 else quality):
             best = [(place[a], place[b], place[c]) for a, b, c in local]
@@ -356,7 +356,7 @@ def stitched(
     return best, upright
 
 
-def _worst(x: Floats, triangles: Ints, normal: Floats) -> tuple[float, float]:
+def _worst_triangle(x: Floats, triangles: Ints, normal: Floats) -> tuple[float, float]:
     """Smallest double area along the normal over longest side squared, and cosine to it."""
     a, b, c = (x[triangles[:, i]] for i in range(3))
     area = np.cross(b - a, c - a)

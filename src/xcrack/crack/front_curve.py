@@ -16,7 +16,7 @@ _GAUSS = np.polynomial.legendre.leggauss(6)
 
 
 @dataclass(frozen=True, eq=False)
-class Feet:
+class FootPoints:
     """Points around a front in its local coordinates, x = X(s) + x1 t(s) + x2 n(s).
 
     Attributes
@@ -103,7 +103,7 @@ class FrontCurve:
         u = np.mod(u, self.length) if self.closed else u
         return frames_at(u, self.breaks, self.place, self.normal)
 
-    def feet(self, x: Floats) -> Feet:
+    def feet(self, x: Floats) -> FootPoints:
         """Nearest points of the front.
 
         Parameters
@@ -112,12 +112,12 @@ class FrontCurve:
 
         Returns
         -------
-        Feet
+        FootPoints
             Unique where the metric is positive, that is nearer than the radius of curvature.
         """
         return self.near(x, np.inf)[1]
 
-    def near(self, x: Floats, radius: float) -> tuple[Ints, Feet]:
+    def near(self, x: Floats, radius: float) -> tuple[Ints, FootPoints]:
         """Points within a radius of the front, and a few more, with their feet.
 
         Parameters
@@ -129,7 +129,7 @@ class FrontCurve:
         -------
         rows : (k,) array of int
             Which points.
-        feet : Feet
+        feet : FootPoints
             Theirs.
         """
         from xcrack.crack.kernels.front import feet
@@ -141,7 +141,7 @@ class FrontCurve:
         rows = np.nonzero(sample >= 0)[0]
         picked = np.ascontiguousarray(x[rows], dtype=float)
         curve = (self.breaks, self.place, self.normal, self.closed)
-        return rows, Feet(*feet(picked, s[sample[rows]], 2 * step, *curve))
+        return rows, FootPoints(*feet(picked, s[sample[rows]], 2 * step, *curve))
 
     def distance(self, x: Floats, bound: float = np.inf) -> Floats:
         """Distance of points to the samples of the front `(q,)`; inf beyond a bound, length.

@@ -97,7 +97,7 @@ def _ends_on(
     for other, crack in enumerate(cracks):
         if other == c:
             continue
-        foot, distance = _nearest(end, crack.points)
+        foot, distance = _nearest_point(end, crack.points)
         if distance > _ON * size or _sine(ahead, _arms(foot, crack.points, size)) < 1e-3:
             continue
         to_ends = np.linalg.norm(crack.points[[0, -1]] - foot, axis=1)
@@ -107,24 +107,24 @@ def _ends_on(
     return chosen
 
 
-def _nearest(x: Floats, line: Floats) -> tuple[Floats, float]:
+def _nearest_point(x: Floats, line: Floats) -> tuple[Floats, float]:
     """Point of a polyline that is nearest to x, and its distance."""
     foot = closest_on_segment(x, line[:-1], line[1:])
-    away = np.linalg.norm(foot - x, axis=1)
-    k = int(np.argmin(away))
-    return foot[k], float(away[k])
+    distance = np.linalg.norm(foot - x, axis=1)
+    k = int(np.argmin(distance))
+    return foot[k], float(distance[k])
 
 
 def _on_line(before: Floats, end: Floats, line: Floats) -> Floats:
     """Where the last piece of a crack, prolonged, meets the polyline that it ends close to."""
-    foot, distance = _nearest(end, line)
+    foot, distance = _nearest_point(end, line)
     if distance == 0:
         return end
     hits = crossing_points(np.stack([before, end + (end - before)]), line)
-    away = np.linalg.norm(hits - end, axis=1)
+    from_end = np.linalg.norm(hits - end, axis=1)
     # A crack that comes in at a small angle meets the other one far from the foot of its end.
-    if len(hits) and away.min() <= distance / _SINE:
-        return np.asarray(hits[int(np.argmin(away))])
+    if len(hits) and from_end.min() <= distance / _SINE:
+        return np.asarray(hits[int(np.argmin(from_end))])
     return foot
 
 
@@ -162,7 +162,7 @@ def _on_boundary(x: Floats, mesh: Mesh) -> bool:
 
 def _junction(c: int, end: int, cracks: tuple[Crack, ...], mesh: Mesh) -> Junction:
     x, h = cracks[c].points[end], _size(mesh, cracks[c].points[end])
-    on = _other(c, x, cracks, h)
+    on = _crack_at(c, x, cracks, h)
     before = cracks[c].points[1 if end == 0 else end - 1]
     length = float(np.linalg.norm(x - before))
     ahead = (x - before) / length
@@ -198,11 +198,11 @@ def _junction(c: int, end: int, cracks: tuple[Crack, ...], mesh: Mesh) -> Juncti
     return Junction(c, end, on, x, side, x + min(way, free) * ahead, reach)
 
 
-def _other(c: int, x: Floats, cracks: tuple[Crack, ...], h: float) -> int:
+def _crack_at(c: int, x: Floats, cracks: tuple[Crack, ...], h: float) -> int:
     """The crack on which x lies between its ends; of several the one with its ends farthest."""
     inner, on = -1.0, -1
     for other, crack in enumerate(cracks):
-        if other == c or _nearest(x, crack.points)[1] > _SAME * h:
+        if other == c or _nearest_point(x, crack.points)[1] > _SAME * h:
             continue
         to_ends = float(np.linalg.norm(crack.points[[0, -1]] - x, axis=1).min())
         if to_ends > inner:
@@ -241,39 +241,42 @@ def _side(x: Floats, line: Floats) -> int:
 
 def _check_apart(result: list[Junction], cracks: tuple[Crack, ...], mesh: Mesh) -> None:
     """Raise where a junction is closer than a cell to a tip, an end or a junction beside it."""
-    for i, own in enumerate(result):
-        least = _APART * _size(mesh, own.x)
+    for i, junction in enumerate(result):
+        least = _APART * _size(mesh, junction.x)
         for c, crack in enumerate(cracks):
             for tip in crack.tips or ():
-                apart = float(np.linalg.norm(crack.points[tip] - own.x))
-                if apart < least:
+                distance = float(np.linalg.norm(crack.points[tip] - junction.x))
+                if distance < least:
                     raise CoarseMeshError(
-                        f"crack {own.crack} ends on crack {own.on} at {at(own.x)}, {apart:.4g} "
-                        f"from a tip of crack {c} at {at(crack.points[tip])} and closer than a "
-                        f"cell ({least:.4g}): move it away from the tip, refine the mesh there, "
-                        "or let both cracks be one that runs through."
+                        f"crack {junction.crack} ends on crack {junction.on} at {at(junction.x)}, "
+                        f"{distance:.4g} from a tip of crack {c} at {at(crack.points[tip])} and "
+                        f"closer than a cell ({least:.4g}): move it away from the tip, refine the "
+                        f"mesh there, or let both cracks be one that runs through."
                     )
         for other in result[:i]:
-            apart = float(np.linalg.norm(other.x - own.x))
-            opposite = other.on == own.on and other.side != own.side
-            if apart < least and not opposite:
+            distance = float(np.linalg.norm(other.x - junction.x))
+            opposite = other.on == junction.on and other.side != junction.side
+            if distance < least and not opposite:
                 raise GeometryError(
-                    f"cracks {other.crack} and {own.crack} end {apart:.4g} from each other at "
-                    f"{at(own.x)}, closer than a cell ({least:.4g}) and from the same side: let "
-                    "them end on each other's continuation, a cell or more apart, or on opposite "
-                    "sides of one crack."
+                    f"cracks {other.crack} and {junction.crack} end {distance:.4g} from each other "
+                    f"at {at(junction.x)}, closer than a cell ({least:.4g}) and from the same "
+                    f"side: let them end on each other's continuation, a cell or more apart, or on "
+                    f"opposite sides of one crack."
                 )
 
 
-def reaching(cracks: tuple[Crack, ...], ends: tuple[Junction, ...]) -> tuple[Crack, ...]:
+def prolonged_cracks(cracks: tuple[Crack, ...], ends: tuple[Junction, ...]) -> tuple[Crack, ...]:
     """Cracks prolonged beyond those on which they end: what level sets are made of."""
     result = list(cracks)
-    for own in ends:
-        crack = result[own.crack]
+    for end_of_crack in ends:
+        crack = result[end_of_crack.crack]
         points, tips = crack.points, crack.tips or ()
-        if own.end == 0:
-            points, tips = np.concatenate([own.beyond[None], points]), tuple(t + 1 for t in tips)
+        if end_of_crack.end == 0:
+            points, tips = (
+                np.concatenate([end_of_crack.beyond[None], points]),
+                tuple(t + 1 for t in tips),
+            )
         else:
-            points = np.concatenate([points, own.beyond[None]])
-        result[own.crack] = polyline_crack(points, tips)
+            points = np.concatenate([points, end_of_crack.beyond[None]])
+        result[end_of_crack.crack] = polyline_crack(points, tips)
     return tuple(result)

@@ -64,9 +64,9 @@ def line_crack(points: ArrayLike) -> Crack:
             "cuts a piece out of the body; leave a gap of a few cells between its ends, or give "
             "two arcs as two cracks that do not meet."
         )
-    meeting = crossing_points(x, x, same=True)
+    meeting = crossing_points(x, x, is_same_line=True)
     if not len(meeting):
-        meeting = touching_points(x, x, _SAME * float(length.sum()), same=True)
+        meeting = touching_points(x, x, _SAME * float(length.sum()), is_same_line=True)
     if len(meeting):
         raise GeometryError(
             f"the crack crosses itself near {at(meeting[0])}: end it there, or describe it by two "
@@ -81,7 +81,7 @@ def polyline_crack(points: Floats, tips: tuple[int, ...] | None = None) -> Crack
     return Crack(points, np.stack([number[:-1], number[1:]], axis=1), tips)
 
 
-def crossing_points(a: Floats, b: Floats, same: bool = False) -> Floats:
+def crossing_points(a: Floats, b: Floats, is_same_line: bool = False) -> Floats:
     """Points where polylines a and b cross `(k, 2)`; neighbours of one line do not count.
 
     Pieces that lie on each other cross nowhere; see `touching_points`.
@@ -102,7 +102,7 @@ def crossing_points(a: Floats, b: Floats, same: bool = False) -> Floats:
         length = np.linalg.norm(r, axis=-1) * np.linalg.norm(s, axis=-1)
         hit &= np.abs(cross) > _PARALLEL * length
         hit &= boxes_meet(p, start[1:, None], q, b[None, 1:])
-        if same:
+        if is_same_line:
             i, j = np.indices(hit.shape)
             hit &= np.abs(i + first - j) > 1
         row = np.nonzero(hit)[0]
@@ -110,24 +110,24 @@ def crossing_points(a: Floats, b: Floats, same: bool = False) -> Floats:
     return np.concatenate(parts)
 
 
-def touching_points(a: Floats, b: Floats, reach: float, same: bool = False) -> Floats:
+def touching_points(a: Floats, b: Floats, reach: float, is_same_line: bool = False) -> Floats:
     """Vertices of polylines a and b within a reach of the other line `(k, 2)`.
 
     Lines that lie on each other touch so, though they cross nowhere. Of one line the neighbours
     of a vertex do not count.
     """
     parts = [np.zeros((0, 2))]
-    for x, line in ((a, b),) if same else ((a, b), (b, a)):
+    for x, line in ((a, b),) if is_same_line else ((a, b), (b, a)):
         step = max(_AT_ONCE // max(len(line), 1), 1)
         for first in range(0, len(x), step):
             vertex = x[first : first + step]
             foot = closest_on_segment(vertex[:, None], line[None, :-1], line[None, 1:])
-            close: Bools = np.linalg.norm(foot - vertex[:, None], axis=2) <= reach
-            if same:
-                i, j = np.indices(close.shape)
+            is_close: Bools = np.linalg.norm(foot - vertex[:, None], axis=2) <= reach
+            if is_same_line:
+                i, j = np.indices(is_close.shape)
                 i += first
-                close &= (j < i - 1) | (j > i)
-            parts.append(vertex[close.any(axis=1)])
+                is_close &= (j < i - 1) | (j > i)
+            parts.append(vertex[is_close.any(axis=1)])
     return np.concatenate(parts)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from xcrack.base.arrays import Bools, Floats, Ints, ranges
 from xcrack.base.errors import GeometryError, ProblemError
 from xcrack.crack.crack import Crack, tip_frames
-from xcrack.crack.placing import placed
+from xcrack.crack.placing import place_crack
 from xcrack.mesh.distances import signed_in
 from xcrack.mesh.locate import Body, parts_inside
 from xcrack.mesh.mesh import Mesh
@@ -71,10 +71,10 @@ def measures_of_line(
                     ends.append((x, int(outer[best]), -1))
     traces: dict[int, tuple[float, float]] = {}
     for x, facet, _ in ends:
-        away = np.linalg.norm(tips - x, axis=1).max(initial=0.0)
-        far = max((float(np.linalg.norm(x - y)) for y, _, _ in ends), default=0.0)
+        tip_distance = np.linalg.norm(tips - x, axis=1).max(initial=0.0)
+        span = max((float(np.linalg.norm(x - y)) for y, _, _ in ends), default=0.0)
         k = int(group[facet])
-        depth = float(away) if len(tips) else far
+        depth = float(tip_distance) if len(tips) else span
         traces[k] = (0.0, max(depth, traces.get(k, (0.0, 0.0))[1]))
     return length_inside(crack, mesh), 0.0, traces, ends
 
@@ -125,15 +125,15 @@ def _area_inside(crack: Crack, body: Body) -> float:
         centre = piece.mean(axis=1)
         radius = np.linalg.norm(piece - centre[:, None], axis=2).max(axis=1)
         depth = body.depth(centre)[0]
-        near = np.abs(depth) < radius
-        total += float(area[~near & (depth < 0)].sum())
+        is_near = np.abs(depth) < radius
+        total += float(area[~is_near & (depth < 0)].sum())
         side = np.linalg.norm(np.roll(piece, -1, axis=1) - piece, axis=2)
         cell = body.cell_size(centre)
-        small = near & (side.max(axis=1) <= _FINE * cell)
+        small = is_near & (side.max(axis=1) <= _FINE * cell)
         corners = piece[small].reshape(-1, 3)
         share = _share_below_zero(body.depth(corners)[0].reshape(-1, 3))
         total += float((area[small] * share).sum())
-        piece = halved(piece[near & ~small], side[near & ~small])
+        piece = halved_triangles(piece[is_near & ~small], side[is_near & ~small])
     if total <= 0:
         raise ProblemError(f"no part of the crack at {crack.points[0].tolist()} is in the body.")
     return total
@@ -198,7 +198,7 @@ def surface_size(crack: Crack, mesh: Mesh, body: Body | None = None) -> float:
     return area / length if length > 0 else float(np.sqrt(area))
 
 
-def halved(piece: Floats, side: Floats) -> Floats:
+def halved_triangles(piece: Floats, side: Floats) -> Floats:
     """Triangles `(k, 3, 3)` cut through the middle of their longest sides."""
     turn = (np.argmax(side, axis=1)[:, None] + np.arange(3)) % 3
     a, b, c = np.take_along_axis(piece, turn[..., None], axis=1).transpose(1, 0, 2)
@@ -263,9 +263,11 @@ def measures_of_surface(
     of = group[facet]
     traces = {}
     for k in np.unique(of).tolist():
-        own = segment[of == k]
-        length = float(np.linalg.norm(own[:, 1] - own[:, 0], axis=1).sum())
-        depth = max((float(distance_to_simplices(x, own).min()) for x in deepest), default=0.0)
+        segments_on_set = segment[of == k]
+        length = float(np.linalg.norm(segments_on_set[:, 1] - segments_on_set[:, 0], axis=1).sum())
+        depth = max(
+            (float(distance_to_simplices(x, segments_on_set).min()) for x in deepest), default=0.0
+        )
         traces[k] = (length, depth)
     return area_inside(crack, mesh), front_length_inside(crack, mesh), traces, ends
 
@@ -298,12 +300,12 @@ def _trace(crack: Crack, body: Body) -> Floats:
         centre = piece.mean(axis=1)
         radius = np.linalg.norm(piece - centre[:, None], axis=2).max(axis=1)
         depth, size = body.depth(centre)
-        near = np.abs(depth) < radius
-        piece, size = piece[near], size[near]
+        is_near = np.abs(depth) < radius
+        piece, size = piece[is_near], size[is_near]
         side = np.linalg.norm(np.roll(piece, -1, axis=1) - piece, axis=2)
         small = side.max(axis=1) <= _FINE_SURFACE * size
         parts.append(_zero_lines(piece[small], body))
-        piece = halved(piece[~small], side[~small])
+        piece = halved_triangles(piece[~small], side[~small])
     return np.concatenate(parts)
 
 
@@ -349,20 +351,20 @@ def _ends(x: Floats, body: Body) -> list[Floats]:
     if not inside.any():
         return []
     change = np.nonzero(inside[1:] != inside[:-1])[0]
-    result = [_crossing(points[i], points[i + 1], body) for i in change]
+    result = [_boundary_crossing(points[i], points[i + 1], body) for i in change]
     if closed:
         return result
     for end, before in ((points[0], points[1]), (points[-1], points[-2])):
         if body.depth(end[None])[0][0] >= 0:
             continue
         ahead = (end - before) / max(float(np.linalg.norm(end - before)), 1e-300)
-        far = end + _REACH * body.cell_size(end[None])[0] * ahead
-        if body.depth(far[None])[0][0] >= 0:
-            result.append(_crossing(end, far, body))
+        prolonged_end = end + _REACH * body.cell_size(end[None])[0] * ahead
+        if body.depth(prolonged_end[None])[0][0] >= 0:
+            result.append(_boundary_crossing(end, prolonged_end, body))
     return result
 
 
-def _crossing(one: Floats, other: Floats, body: Body) -> Floats:
+def _boundary_crossing(one: Floats, other: Floats, body: Body) -> Floats:
     """Place on the boundary between a point inside and one outside."""
     inside = body.depth(one[None])[0][0] < 0
     for _ in range(_BISECTIONS):
@@ -375,7 +377,7 @@ def _crossing(one: Floats, other: Floats, body: Body) -> Floats:
 
 
 @dataclass(frozen=True)
-class Trace:
+class SurfaceTrace:
     """A crack on one facet set of the boundary.
 
     Attributes
@@ -394,14 +396,14 @@ class Trace:
 
 
 @dataclass(frozen=True)
-class End:
+class FrontEnd:
     """A place where a front, in 2D the crack, meets the boundary.
 
     Attributes
     ----------
     x : (d,) tuple, length
     name : str
-        Facet set there, as in `Trace`.
+        Facet set there, as in `SurfaceTrace`.
     front : int
         Number of the front; -1 in 2D.
     """
@@ -423,17 +425,17 @@ class Measures:
         Of all fronts inside the body; 0 in 2D.
     depth : float, length
         Largest depth below any of the surfaces that the crack meets; nan where it meets none.
-    traces : tuple of Trace
+    traces : tuple of SurfaceTrace
         One for each facet set that the crack meets, in the order of their names.
-    ends : tuple of End
+    ends : tuple of FrontEnd
         Where its fronts meet the boundary; in 2D its mouths.
     """
 
     area: float
     front_length: float
     depth: float
-    traces: tuple[Trace, ...]
-    ends: tuple[End, ...]
+    traces: tuple[SurfaceTrace, ...]
+    ends: tuple[FrontEnd, ...]
 
     def __str__(self) -> str:
         lines = [f"area {self.area:.6g}, front {self.front_length:.6g}, depth {self.depth:.6g}"]
@@ -495,15 +497,15 @@ def measures(crack: Crack, mesh: Mesh) -> Measures:
         raise GeometryError(
             f"measures: a crack of {crack.dim}D needs a body of {crack.dim}D, not {mesh.dim}D."
         )
-    own = crack if crack.placed else placed(crack, mesh)
+    placed_crack = crack if crack.placed else place_crack(crack, mesh)
     names, group = facet_names(mesh)
-    area, front_length, traces, ends = _BY_DIMENSION[mesh.dim](own, mesh, group)
-    rows = [Trace(names[k], *traces[k]) for k in sorted(traces, key=lambda k: names[k])]
+    area, front_length, traces, ends = _BY_DIMENSION[mesh.dim](placed_crack, mesh, group)
+    rows = [SurfaceTrace(names[k], *traces[k]) for k in sorted(traces, key=lambda k: names[k])]
     depth = max((row.depth for row in rows), default=float("nan"))
     points = []
     for x, facet, front in ends:
         place = np.where(np.abs(x) < _ROUND_OFF * mesh.extent, 0.0, x)
-        points.append(End(tuple(place.tolist()), names[group[facet]], front))
+        points.append(FrontEnd(tuple(place.tolist()), names[group[facet]], front))
     return Measures(area, front_length, depth, tuple(rows), tuple(points))
 
 
@@ -530,4 +532,10 @@ def facet_names(mesh: Mesh) -> tuple[list[str], Ints]:
     return [name for name, _ in sets], group
 
 
-__all__ = ["area_inside", "front_length_inside", "halved", "length_inside", "surface_size"]
+__all__ = [
+    "area_inside",
+    "front_length_inside",
+    "halved_triangles",
+    "length_inside",
+    "surface_size",
+]

@@ -11,9 +11,9 @@ import numpy as np
 
 from xcrack.base.arrays import Bools, Floats, Ints, at
 from xcrack.base.errors import GeometryError
+from xcrack.crack.boundary_trace import runs_of
 from xcrack.crack.crack import Crack
 from xcrack.crack.fronts_3d import Front, front_frames
-from xcrack.crack.mouths_3d import runs_of
 from xcrack.mesh.distances import TriangleTree, closest_in, triangle_tree
 from xcrack.mesh.locate import Body
 from xcrack.mesh.polygon import cross, ear_clipped, self_crossing, without_slivers
@@ -25,7 +25,7 @@ _LOOSE = 3.0  # radii from the end of an open front within which the other one e
 
 
 @dataclass(frozen=True, eq=False)
-class Gap:
+class FrontGap:
     """Where the fronts of two cracks come closest.
 
     Attributes
@@ -50,7 +50,7 @@ class Gap:
         return abs(self.turn) >= _ANGLE and self.offset <= most * size
 
 
-def gap_between(one: Crack, other: Crack, body: Body, reach: float) -> Gap | None:
+def gap_between(one: Crack, other: Crack, body: Body, reach: float) -> FrontGap | None:
     """Where the fronts of two cracks come closest in a body; None where farther than `reach`.
 
     Parameters
@@ -64,7 +64,7 @@ def gap_between(one: Crack, other: Crack, body: Body, reach: float) -> Gap | Non
     -------
     Gap or None
     """
-    best: Gap | None = None
+    best: FrontGap | None = None
     for a, b in ((one, other), (other, one)):
         low, high = b.points.min(axis=0) - reach, b.points.max(axis=0) + reach
         tree: TriangleTree | None = None
@@ -74,28 +74,28 @@ def gap_between(one: Crack, other: Crack, body: Body, reach: float) -> Gap | Non
                 continue
             tree = triangle_tree(b.points, b.faces) if tree is None else tree
             x, normal = front.x[near_box], front.frame[near_box, 1]
-            near = closest_in(tree, x, reach)
-            rows = np.nonzero((near.triangle >= 0) & body.contains(x))[0]
+            closest = closest_in(tree, x, reach)
+            rows = np.nonzero((closest.triangle >= 0) & body.contains(x))[0]
             if not len(rows):
                 continue
-            way = near.foot[rows] - x[rows]
+            way = closest.foot[rows] - x[rows]
             across = np.einsum("ij,ij->i", way, normal[rows])
             along = np.linalg.norm(way - across[:, None] * normal[rows], axis=1)
             k = int(np.argmin(along))
             row = rows[k]
             if best is None or along[k] < best.width:
-                turn = float(tree.normal[near.triangle[row]] @ normal[row])
-                best = Gap(float(along[k]), float(abs(across[k])), turn, x[row] + way[k] / 2)
+                turn = float(tree.normal[closest.triangle[row]] @ normal[row])
+                best = FrontGap(float(along[k]), float(abs(across[k])), turn, x[row] + way[k] / 2)
     return best
 
 
-def turned(crack: Crack) -> Crack:
+def turned_crack(crack: Crack) -> Crack:
     """The same crack with lip + and lip - exchanged; its fronts run the other way."""
     fronts = None if crack.fronts is None else tuple(front[::-1] for front in crack.fronts)
     return Crack(crack.points, crack.faces[:, ::-1], crack.tips, fronts)
 
 
-def merged(one: Crack, other: Crack, radius: float, size: float) -> Crack:
+def merged_crack(one: Crack, other: Crack, radius: float, size: float) -> Crack:
     """Two cracks that lie in one surface, and nearly touch, as one.
 
     Parameters
@@ -129,10 +129,14 @@ def merged(one: Crack, other: Crack, radius: float, size: float) -> Crack:
     pair = (front_frames(one), front_frames(shifted))
     trees = tuple(triangle_tree(c.points, c.faces) for c in (other, one))
     runs = [
-        (front, run) for front in pair[0] for run in _runs(front, _blocked(front, trees[0], radius))
+        (front, run)
+        for front in pair[0]
+        for run in _runs(front, _blocked_points(front, trees[0], radius))
     ]
     others = [
-        (front, run) for front in pair[1] for run in _runs(front, _blocked(front, trees[1], radius))
+        (front, run)
+        for front in pair[1]
+        for run in _runs(front, _blocked_points(front, trees[1], radius))
     ]
     if not runs or len(runs) != len(others):
         raise GeometryError(
@@ -143,7 +147,7 @@ def merged(one: Crack, other: Crack, radius: float, size: float) -> Crack:
     following = dict(side for fronts in pair for front in fronts for side in _sides(front))
     count = len(shifted.points)
     for front, run in runs:
-        mate = others.pop(_mate(front, run, others))
+        mate = others.pop(_facing_number(front, run, others))
         patch = _patch(front, run, *mate, radius, size, count)
         for number in patch.used:
             following.pop(int(number), None)
@@ -155,7 +159,7 @@ def merged(one: Crack, other: Crack, radius: float, size: float) -> Crack:
 
 
 @dataclass(frozen=True)
-class _Run:
+class FacingPart:
     """Piece of a front that faces another crack: places of its points, in the front's direction.
 
     Attributes
@@ -180,14 +184,14 @@ class _Patch:
     used: Ints
 
 
-def _blocked(front: Front, tree: TriangleTree, radius: float) -> Bools:
+def _blocked_points(front: Front, tree: TriangleTree, radius: float) -> Bools:
     """Points of a front ahead of which a disc cannot lie without entering the other crack."""
     centre = front.x + radius * front.frame[:, 0]
-    near = closest_in(tree, centre, radius)
-    return np.asarray((near.triangle >= 0) & (near.distance < radius * (1 - 1e-9)))
+    closest = closest_in(tree, centre, radius)
+    return np.asarray((closest.triangle >= 0) & (closest.distance < radius * (1 - 1e-9)))
 
 
-def _runs(front: Front, blocked: Bools) -> list[_Run]:
+def _runs(front: Front, blocked: Bools) -> list[FacingPart]:
     m = len(blocked)
     if front.closed and blocked.all():
         raise GeometryError(
@@ -200,12 +204,12 @@ def _runs(front: Front, blocked: Bools) -> list[_Run]:
         if front.closed:
             count = len(run) + 2
             result.append(
-                _Run(tuple(int((first - 1 + k) % m) for k in range(count)), (False, False))
+                FacingPart(tuple(int((first - 1 + k) % m) for k in range(count)), (False, False))
             )
             continue
         ends = first == 0, last == m - 1
         place = range(max(first - 1, 0), min(last + 1, m - 1) + 1)
-        result.append(_Run(tuple(place), ends))
+        result.append(FacingPart(tuple(place), ends))
     return result
 
 
@@ -221,7 +225,7 @@ def _sides(front: Front) -> list[tuple[int, int]]:
     return list(zip(number, ahead))
 
 
-def _mate(front: Front, run: _Run, others: list[tuple[Front, _Run]]) -> int:
+def _facing_number(front: Front, run: FacingPart, others: list[tuple[Front, FacingPart]]) -> int:
     """Number of the piece of the other crack's fronts that faces this one."""
     middle = front.x[list(run.place)].mean(axis=0)
     away = [
@@ -232,7 +236,13 @@ def _mate(front: Front, run: _Run, others: list[tuple[Front, _Run]]) -> int:
 
 
 def _patch(
-    front: Front, run: _Run, other: Front, piece: _Run, radius: float, size: float, count: int
+    front: Front,
+    run: FacingPart,
+    other: Front,
+    piece: FacingPart,
+    radius: float,
+    size: float,
+    count: int,
 ) -> _Patch:
     """Faces that close the gap between two pieces of fronts that run against each other."""
     a, b = list(run.place), list(piece.place)
@@ -267,16 +277,16 @@ def _up_to_end(front: Front, place: list[int], end: int, radius: float) -> list[
     There both fronts lie outside the body, where one may be longer than the other.
     """
     m = len(front.x)
-    rest = list(range(place[0])) if end == 0 else list(range(place[-1] + 1, m))
-    if not rest:
+    remaining = list(range(place[0])) if end == 0 else list(range(place[-1] + 1, m))
+    if not remaining:
         return place
-    way = np.linalg.norm(front.x[rest] - front.x[place[end]], axis=1)
+    way = np.linalg.norm(front.x[remaining] - front.x[place[end]], axis=1)
     if front.closed or way.max() > _LOOSE * radius:
         raise GeometryError(
             f"a front ends where it faces another crack at {at(front.x[place[end]])}, whose front "
             "goes on: the gap between them cannot be closed."
         )
-    return rest + place if end == 0 else place + rest
+    return remaining + place if end == 0 else place + remaining
 
 
 def _arc(one: Front, i: int, other: Front, j: int, size: float) -> Floats:
@@ -317,15 +327,15 @@ def _triangles(x: Floats, normal: Floats) -> Ints:
 
 def _chains(following: dict[int, int]) -> list[Ints]:
     """Fronts as point numbers: open ones first from their beginning, closed ones repeat theirs."""
-    rest, result = dict(following), []
+    following_points, result = dict(following), []
     starts = sorted(set(following) - set(following.values()))
-    while rest:
-        begin = starts.pop(0) if starts else min(rest)
+    while following_points:
+        begin = starts.pop(0) if starts else min(following_points)
         line = [begin]
-        while line[-1] in rest:
-            line.append(rest.pop(line[-1]))
+        while line[-1] in following_points:
+            line.append(following_points.pop(line[-1]))
         result.append(np.array(line))
     return sorted(result, key=lambda line: int(line.min()))
 
 
-__all__ = ["OFFSET", "Gap", "gap_between", "merged", "turned"]
+__all__ = ["OFFSET", "FrontGap", "gap_between", "merged_crack", "turned_crack"]

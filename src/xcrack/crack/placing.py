@@ -32,7 +32,7 @@ _SHORT: dict[int, Callable[[Crack, Mesh], list[ShortFront]]] = {
 }
 
 
-def placed(crack: Crack, mesh: Mesh) -> Crack:
+def place_crack(crack: Crack, mesh: Mesh) -> Crack:
     """Decide what of a crack is tip or front in this mesh, and lead its mouths out of the body.
 
     Parameters
@@ -103,4 +103,4 @@ def junctions(cracks: tuple[Crack, ...], mesh: Mesh) -> tuple[Junction, ...]:
     return _JUNCTIONS[mesh.dim](cracks, mesh)
 
 
-__all__ = ["check_cracks", "junctions", "on_mesh", "on_others", "placed", "short_fronts"]
+__all__ = ["check_cracks", "junctions", "on_mesh", "on_others", "place_crack", "short_fronts"]

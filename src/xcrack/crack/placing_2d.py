@@ -75,7 +75,7 @@ def place_line(crack: Crack, mesh: Mesh) -> Crack:
             _check_nick(mesh, points[end], out, gap, size)
         outside = -gap if inside else gap
         if outside < size:
-            way, prolonged = _prolonged(mesh, points[end], out, size)
+            way, prolonged = _prolonged_end(mesh, points[end], out, size)
             if first_time and inside:
                 _check_mouth(points[end], gap, size, way)
             points[end] = prolonged
@@ -156,7 +156,7 @@ def _check_nick(mesh: Mesh, end: Floats, out: Floats, gap: float, size: float) -
         )
 
 
-def _prolonged(mesh: Mesh, end: Floats, out: Floats, size: float) -> tuple[float, Floats]:
+def _prolonged_end(mesh: Mesh, end: Floats, out: Floats, size: float) -> tuple[float, Floats]:
     """How far an end is from leaving the body, and the end moved one cell outside.
 
     Half way across a narrower gap in the body.
@@ -218,7 +218,7 @@ def check_lines(cracks: tuple[Crack, ...], mesh: Mesh) -> None:
     for i, crack in enumerate(cracks):
         for j in range(i):
             crossing = crossing_points(cracks[j].points, crack.points)
-            crossing = _elsewhere(crossing, i, j, meeting, mesh)
+            crossing = _points_off_junctions(crossing, i, j, meeting, mesh)
             if len(crossing):
                 x = coordinates(crossing[0])
                 raise GeometryError(
@@ -235,14 +235,22 @@ def check_lines(cracks: tuple[Crack, ...], mesh: Mesh) -> None:
         _check_flanks(i, cracks, mesh)
 
 
-def _elsewhere(x: Floats, i: int, j: int, meeting: tuple[Junction, ...], mesh: Mesh) -> Floats:
+def _points_off_junctions(
+    x: Floats, i: int, j: int, meeting: tuple[Junction, ...], mesh: Mesh
+) -> Floats:
     """Those of the points in the body at which cracks i and j meet that are no junctions."""
     if not len(x):
         return x
     x = x[contains(mesh, x)]
-    for own in meeting:
-        if i in (own.crack, own.on) or j in (own.crack, own.on):
-            x = x[np.linalg.norm(x - own.x, axis=1) > _MEANT * cell_sizes(mesh, own.x[None])[0]]
+    for meeting_point in meeting:
+        if i in (meeting_point.crack, meeting_point.on) or j in (
+            meeting_point.crack,
+            meeting_point.on,
+        ):
+            x = x[
+                np.linalg.norm(x - meeting_point.x, axis=1)
+                > _MEANT * cell_sizes(mesh, meeting_point.x[None])[0]
+            ]
     return x
 
 
@@ -257,14 +265,14 @@ def _check_flanks(number: int, cracks: tuple[Crack, ...], mesh: Mesh) -> None:
                 continue
             foot = closest_on_segment(end, crack.points[:-1], crack.points[1:])
             distance = np.linalg.norm(foot - end, axis=1)
-            near = int(np.argmin(distance))
-            if (foot[near] - end) @ ahead < _TOWARDS * distance[near]:
+            nearest = int(np.argmin(distance))
+            if (foot[nearest] - end) @ ahead < _TOWARDS * distance[nearest]:
                 continue
-            if distance[near] < _MOUTH * size and contains(mesh, foot[[near]])[0]:
+            if distance[nearest] < _MOUTH * size and contains(mesh, foot[[nearest]])[0]:
                 raise CoarseMeshError(
-                    f"a tip of crack {number} at {at(end)} is {distance[near]:.4g} from crack "
+                    f"a tip of crack {number} at {at(end)} is {distance[nearest]:.4g} from crack "
                     f"{other}, less than half a cell ({size:.4g}), but does not end on it: to let "
-                    f"it end there give a point of crack {other}, such as {at(foot[near])}, as "
+                    f"it end there give a point of crack {other}, such as {at(foot[nearest])}, as "
                     "its end; else leave a few cells between, or refine the mesh there."
                 )
 
@@ -273,21 +281,21 @@ def _check_tips(cracks: tuple[Crack, ...], mesh: Mesh) -> None:
     """Raise where two tips lie in one cell or closer than one."""
     tips = [tip_frames(crack)[0] for crack in cracks]
     x = np.concatenate([np.zeros((0, 2)), *tips])
-    owner = np.repeat(np.arange(len(cracks)), [len(own) for own in tips])
+    owner = np.repeat(np.arange(len(cracks)), [len(tips_of_crack) for tips_of_crack in tips])
     if len(x) < 2:
         return
     cell = cells_at(mesh, x)
     size = mesh.cell_size[cell]
     for i, j in sorted(cKDTree(x).query_pairs(float(size.max()))):
-        apart = float(np.linalg.norm(x[i] - x[j]))
-        if apart < min(size[i], size[j]) or cell[i] == cell[j]:
+        distance = float(np.linalg.norm(x[i] - x[j]))
+        if distance < min(size[i], size[j]) or cell[i] == cell[j]:
             if owner[i] == owner[j]:
                 raise CoarseMeshError(
-                    f"the tips of crack {owner[i]} at {at(x[i])} and {at(x[j])} are {apart:.4g} "
+                    f"the tips of crack {owner[i]} at {at(x[i])} and {at(x[j])} are {distance:.4g} "
                     f"apart, closer than a cell ({size[i]:.4g}): a crack that closes cuts a piece "
                     "out of the body. Refine the mesh between them, or leave a gap of a few cells."
                 )
-            if apart <= _TOUCH * size[i]:
+            if distance <= _TOUCH * size[i]:
                 raise GeometryError(
                     f"cracks {owner[i]} and {owner[j]} both end at {at(x[i])}, where no mesh can "
                     "part them: give a crack that stands there twice only once, or join the cracks "
@@ -295,7 +303,7 @@ def _check_tips(cracks: tuple[Crack, ...], mesh: Mesh) -> None:
                 )
             raise CoarseMeshError(
                 f"a tip of crack {owner[i]} at {at(x[i])} and one of crack {owner[j]} at "
-                f"{at(x[j])} are {apart:.4g} apart, closer than a "
+                f"{at(x[j])} are {distance:.4g} apart, closer than a "
                 f"cell ({size[i]:.4g}): refine the mesh between them, or join the cracks."
             )
 
@@ -314,15 +322,16 @@ def _check_own(number: int, crack: Crack, mesh: Mesh) -> None:
         begin = line[first] + (_OWN * size - away[first]) / length[first] * (
             line[first + 1] - line[first]
         )
-        rest = np.concatenate([begin[None], line[first + 1 :]])
-        foot = closest_on_segment(end, rest[:-1], rest[1:])
+        remaining_line = np.concatenate([begin[None], line[first + 1 :]])
+        foot = closest_on_segment(end, remaining_line[:-1], remaining_line[1:])
         distance = np.linalg.norm(foot - end, axis=1)
-        near = int(np.argmin(distance))
-        if distance[near] < _MOUTH * size:
+        nearest = int(np.argmin(distance))
+        if distance[nearest] < _MOUTH * size:
             raise CoarseMeshError(
-                f"a tip of crack {number} at {at(end)} is {distance[near]:.4g} from another part "
-                f"of the same crack at {at(foot[near])}, less than half a cell ({size:.4g}): what "
-                "lies between is all but cut out. End growth before, or refine the mesh there."
+                f"a tip of crack {number} at {at(end)} is {distance[nearest]:.4g} from another "
+                f"part of the same crack at {at(foot[nearest])}, less than half a cell "
+                f"({size:.4g}): what lies between is all but cut out. End growth before, or refine "
+                f"the mesh there."
             )
 
 
@@ -340,7 +349,7 @@ def _check_touch(
     if (low > high).any():
         return
     touching = touching_points(a.points, b.points, reach)
-    touching = _elsewhere(touching, i, j, meeting, mesh)
+    touching = _points_off_junctions(touching, i, j, meeting, mesh)
     if len(touching):
         raise GeometryError(
             f"cracks {i} and {j} touch or lie on each other near {at(touching[0])}: describe them "

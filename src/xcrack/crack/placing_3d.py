@@ -7,12 +7,12 @@ from scipy.spatial import Delaunay, cKDTree
 
 from xcrack.base.arrays import Bools, Floats, Ints, at
 from xcrack.base.errors import CoarseMeshError, GeometryError, warn
+from xcrack.crack.boundary_trace import OUTSIDE, SIDE, SMOOTH, TraceOutline, open_fronts, runs_of
 from xcrack.crack.crack import Crack
-from xcrack.crack.mouths_3d import OUTSIDE, SIDE, SMOOTH, Outline, open_fronts, runs_of
 from xcrack.mesh.distances import closest_in, first_crossing, triangle_tree
 from xcrack.mesh.locate import Body, locate
 from xcrack.mesh.mesh import Mesh
-from xcrack.mesh.polygon import cross, within
+from xcrack.mesh.polygon import cross, is_within
 from xcrack.mesh.triangulation import (
     components,
     face_areas,
@@ -32,7 +32,9 @@ _PIECE = np.radians(18.0)  # turn between the sides of an arc
 _ROOM = 0.45  # share of the way to the next corner that an arc may take
 
 
-def rounded(points: Floats, faces: Ints, corners: Ints, radius: Floats) -> tuple[Floats, Ints]:
+def rounded_surface(
+    points: Floats, faces: Ints, corners: Ints, radius: Floats
+) -> tuple[Floats, Ints]:
     """Round some corners of a plane surface by arcs, hollow ones as well.
 
     Parameters
@@ -61,18 +63,18 @@ def rounded(points: Floats, faces: Ints, corners: Ints, radius: Floats) -> tuple
     first = points[faces[0, 1]] - points[faces[0, 0]]
     first = first / np.linalg.norm(first)
     plane = np.stack([first, np.cross(normal, first)])
-    wanted = dict(zip(corners.tolist(), radius.tolist(), strict=True))
-    outlines = [_rounded_loop(points[loop], loop, wanted) for loop in loops(faces)]
+    radius_at = dict(zip(corners.tolist(), radius.tolist(), strict=True))
+    outlines = [_rounded_loop(points[loop], loop, radius_at) for loop in loops(faces)]
     rim = np.zeros(len(points), dtype=bool)
     rim[np.stack([faces, np.roll(faces, -1, axis=1)], axis=2)[on_rim(faces)].ravel()] = True
     outline = np.concatenate(outlines)
     inner = points[~rim]
-    inner = inner[_roomy(inner, outline)]
+    inner = inner[_inner_points(inner, outline)]
     origin = points[faces[0, 0]]
-    return _triangulated(outlines, inner, origin, plane)
+    return _triangles_within(outlines, inner, origin, plane)
 
 
-def _rounded_loop(x: Floats, loop: Ints, wanted: dict[int, float]) -> Floats:
+def _rounded_loop(x: Floats, loop: Ints, radius_at: dict[int, float]) -> Floats:
     """Points of one loop with arcs in place of some of its corners."""
     m = len(x)
     along = np.roll(x, -1, axis=0) - x
@@ -86,7 +88,7 @@ def _rounded_loop(x: Floats, loop: Ints, wanted: dict[int, float]) -> Floats:
     keep = np.ones(m, dtype=bool)
     pieces: list[tuple[float, Floats]] = []
     for i in np.nonzero(sharp)[0]:
-        radius = wanted.get(int(loop[i]))
+        radius = radius_at.get(int(loop[i]))
         if radius is None:
             continue
         gap = np.abs(at - s[i])
@@ -130,16 +132,16 @@ def _at(x: Floats, s: Floats, place: float) -> Floats:
     return np.asarray(x[j] + share * (x[(j + 1) % len(x)] - x[j]))
 
 
-def _roomy(inner: Floats, outline: Floats) -> Bools:
+def _inner_points(inner: Floats, outline: Floats) -> Bools:
     """Inner points not too close to the outline for well-shaped triangles."""
     if not len(inner):
         return np.zeros(0, dtype=bool)
-    distance, near = cKDTree(outline).query(inner)
+    distance, nearest = cKDTree(outline).query(inner)
     spacing = np.linalg.norm(outline - np.roll(outline, 1, axis=0), axis=1)
-    return np.asarray(distance > 0.6 * np.maximum(spacing, np.roll(spacing, -1))[near])
+    return np.asarray(distance > 0.6 * np.maximum(spacing, np.roll(spacing, -1))[nearest])
 
 
-def _triangulated(
+def _triangles_within(
     outlines: list[Floats], inner: Floats, origin: Floats, plane: Floats
 ) -> tuple[Floats, Ints]:
     """Triangles between outlines through the given inner points."""
@@ -148,7 +150,7 @@ def _triangulated(
         edges = _edges(outlines)
         flat = (points - origin) @ plane.T
         if len(inner):
-            inside = within(flat, flat[edges])
+            inside = is_within(flat, flat[edges])
             inside[: len(points) - len(inner)] = True
             inner = inner[inside[len(points) - len(inner) :]]
             points, flat = points[inside], flat[inside]
@@ -158,7 +160,7 @@ def _triangulated(
         faces = np.where(area[:, None] < 0, faces[:, ::-1], faces)
         longest = np.max(np.sum((corner - np.roll(corner, 1, axis=1)) ** 2, axis=2), axis=1)
         # Three points of a straight side leave triangles that are round-off.
-        faces = faces[(np.abs(area) > 1e-9 * longest) & within(corner.mean(axis=1), flat[edges])]
+        faces = faces[(np.abs(area) > 1e-9 * longest) & is_within(corner.mean(axis=1), flat[edges])]
         rim = np.stack([faces, np.roll(faces, -1, axis=1)], axis=2)[on_rim(faces)]
         outer = {(int(b), int(a)) for a, b in rim}
         missing = np.array([tuple(edge) not in outer for edge in edges.tolist()])
@@ -169,7 +171,7 @@ def _triangulated(
             np.sort(edges, axis=1) @ np.array([len(points), 1]),
             (np.sort(rim, axis=1) @ np.array([len(points), 1])),
         )
-        outlines = _halved(outlines, ~present)
+        outlines = _halved_sides(outlines, ~present)
     raise CoarseMeshError(
         f"the plane crack at {at(origin)} has an outline too narrow for rounded "
         "corners: refine the mesh there, or simplify the crack."
@@ -186,7 +188,7 @@ def _edges(outlines: list[Floats]) -> Ints:
     return np.concatenate(result)
 
 
-def _halved(outlines: list[Floats], flag: Bools) -> list[Floats]:
+def _halved_sides(outlines: list[Floats], flag: Bools) -> list[Floats]:
     """Outlines with a point in the middle of every flagged side."""
     result, begin = [], 0
     for x in outlines:
@@ -286,7 +288,7 @@ def _placed(crack: Crack, mesh: Mesh) -> tuple[Crack, list[ShortFront]]:
     points, faces = np.array(crack.points), np.array(crack.faces)
     first_time = crack.fronts is None
     if first_time:
-        points, faces = _refined(points, faces, body)
+        points, faces = _refined_faces(points, faces, body)
         points, faces = _with_round_corners(points, faces, body)
         _check_size(points, faces, body)
     owner = {
@@ -306,10 +308,11 @@ def _placed(crack: Crack, mesh: Mesh) -> tuple[Crack, list[ShortFront]]:
         if inside.all():
             fronts.append((int(number[0]), np.append(loop, loop[0])))
             continue
-        outline = Outline(loop, number >= 0, inside, first_time)
-        points, faces, own = open_fronts(points, faces, outline, body)
+        outline = TraceOutline(loop, number >= 0, inside, first_time)
+        points, faces, own_fronts = open_fronts(points, faces, outline, body)
         fronts.extend(
-            (int(number[run[0]]), front) for run, front in zip(runs_of(inside), own, strict=True)
+            (int(number[run[0]]), front)
+            for run, front in zip(runs_of(inside), own_fronts, strict=True)
         )
     fronts.sort(key=lambda pair: pair[0])
     return Crack(points, faces, None, tuple(front for _, front in fronts)), short
@@ -318,10 +321,10 @@ def _placed(crack: Crack, mesh: Mesh) -> tuple[Crack, list[ShortFront]]:
 def _check_inside(crack: Crack, body: Body) -> None:
     """Raise where no part of the crack lies inside the body."""
     mesh = body.mesh
-    near = closest_in(
+    closest = closest_in(
         triangle_tree(crack.points, crack.faces), mesh.points, 1.001 * float(mesh.cell_size.max())
     )
-    foot = near.foot[near.triangle >= 0]
+    foot = closest.foot[closest.triangle >= 0]
     if len(foot):
         depth, size = body.depth(foot)
         # A crack that lies on the boundary does not cut the body.
@@ -363,7 +366,7 @@ def _check_size(points: Floats, faces: Ints, body: Body) -> None:
             )
 
 
-def _refined(points: Floats, faces: Ints, body: Body) -> tuple[Floats, Ints]:
+def _refined_faces(points: Floats, faces: Ints, body: Body) -> tuple[Floats, Ints]:
     """Faces divided until the sides of the outline in and near the body are shorter than a cell."""
     for _ in range(40):
         pairs = sides(faces)
@@ -400,7 +403,7 @@ def _with_round_corners(points: Floats, faces: Ints, body: Body) -> tuple[Floats
     if not corners:
         return points, faces
     number = np.array(corners)
-    return rounded(points, faces, number, 2 * body.cell_size(points[number]))
+    return rounded_surface(points, faces, number, 2 * body.cell_size(points[number]))
 
 
 def _front_sides(x: Floats, candidate: Bools, body: Body) -> tuple[Bools, list[ShortFront]]:
@@ -447,7 +450,7 @@ def check_surfaces(cracks: tuple[Crack, ...], mesh: Mesh) -> None:
     body = Body.of(mesh)
     for j, crack in enumerate(cracks):
         for i in range(j):
-            meeting = _meeting(cracks[i], crack, body)
+            meeting = _meeting_point(cracks[i], crack, body)
             if meeting is not None:
                 raise GeometryError(
                     f"cracks {i} and {j} cross near {at(meeting)}: crossing and "
@@ -472,26 +475,26 @@ def _check_apart(cracks: tuple[Crack, ...], body: Body) -> None:
     size = body.cell_size(x)
     pairs = cKDTree(x).query_pairs(float(size.max()), output_type="ndarray")
     pairs = pairs[owner[pairs[:, 0]] != owner[pairs[:, 1]]]
-    apart = np.linalg.norm(x[pairs[:, 0]] - x[pairs[:, 1]], axis=1)
-    close = np.nonzero(
-        (apart < size[pairs].min(axis=1)) | (cell[pairs[:, 0]] == cell[pairs[:, 1]])
+    distance = np.linalg.norm(x[pairs[:, 0]] - x[pairs[:, 1]], axis=1)
+    close_pairs = np.nonzero(
+        (distance < size[pairs].min(axis=1)) | (cell[pairs[:, 0]] == cell[pairs[:, 1]])
     )[0]
-    if len(close):
-        k = close[np.argmin(apart[close])]
+    if len(close_pairs):
+        k = close_pairs[np.argmin(distance[close_pairs])]
         i, j = pairs[k]
-        if apart[k] <= _TOUCH * size[i]:
+        if distance[k] <= _TOUCH * size[i]:
             raise GeometryError(
                 f"the fronts of cracks {owner[i]} and {owner[j]} share the point {at(x[i])}, where "
                 "no mesh can part them: leave a few cells between, or join them to one surface."
             )
         raise CoarseMeshError(
             f"the front of crack {owner[i]} at {at(x[i])} and that of crack "
-            f"{owner[j]} at {at(x[j])} are {apart[k]:.4g} apart, closer than a "
+            f"{owner[j]} at {at(x[j])} are {distance[k]:.4g} apart, closer than a "
             f"cell ({size[i]:.4g}): refine the mesh between them, or join the cracks."
         )
 
 
-def _meeting(one: Crack, other: Crack, body: Body) -> Floats | None:
+def _meeting_point(one: Crack, other: Crack, body: Body) -> Floats | None:
     """A point inside the body where two surfaces cross or touch, or None."""
     low = np.maximum(one.points.min(axis=0), other.points.min(axis=0))
     high = np.minimum(one.points.max(axis=0), other.points.max(axis=0))
@@ -508,8 +511,8 @@ def _meeting(one: Crack, other: Crack, body: Body) -> Floats | None:
         # Surfaces in one plane cross nothing, but lie on each other.
         x = np.concatenate([a.points, a.points[a.faces].mean(axis=1)])
         size = body.cell_size(x)
-        near = closest_in(tree, x, _TOUCH * float(size.max()))
-        parts.append(x[(near.triangle >= 0) & (near.distance < _TOUCH * size)])
+        closest = closest_in(tree, x, _TOUCH * float(size.max()))
+        parts.append(x[(closest.triangle >= 0) & (closest.distance < _TOUCH * size)])
     points = np.concatenate(parts)
     points = points[body.contains(points)]
     return points[0] if len(points) else None

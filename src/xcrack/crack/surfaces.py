@@ -6,13 +6,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from xcrack.base.arrays import Floats, Ints, at
-from xcrack.base.checks import number, numbers, whole, whole_numbers
+from xcrack.base.checks import number, numbers, whole_number, whole_numbers
 from xcrack.base.errors import GeometryError
 from xcrack.crack.crack import Crack
 from xcrack.mesh.checks import LARGEST, coordinates
 from xcrack.mesh.files import read_triangles
 from xcrack.mesh.polygon import ear_clipped, self_crossing
-from xcrack.mesh.triangulation import face_areas, oriented, rim, side_keys
+from xcrack.mesh.triangulation import face_areas, oriented_faces, rim, side_keys
 
 _FLAT = 1e-9  # share of its size by which a plane polygon may leave its plane
 _FEWEST, _MOST = 8, 100_000  # boundary points of a disc
@@ -109,7 +109,9 @@ def elliptic_crack(
 
 def _disc(center: Floats, first: Floats, second: Floats, n: int) -> Crack:
     """Disc spanned by two conjugate half-axes, in rings whose points become half as many."""
-    count = whole(n, "points of a round crack: n", least=_FEWEST, most=_MOST, error=GeometryError)
+    count = whole_number(
+        n, "points of a round crack: n", least=_FEWEST, most=_MOST, error=GeometryError
+    )
     rings = [(count, 1.0)]
     while rings[-1][0] % 2 == 0 and rings[-1][0] >= 2 * _FEWEST:
         count, radius = rings[-1]
@@ -257,19 +259,19 @@ def surface_crack(points: ArrayLike, triangles: ArrayLike) -> Crack:
         raise GeometryError("a surface crack needs triangles (f, 3), and there are none.")
     faces = whole_numbers(faces, "surface_crack: triangles", (None, 3), error=GeometryError)
     if faces.min() < 0 or faces.max() >= len(x):
-        bad = int(np.argmax(((faces < 0) | (faces >= len(x))).any(axis=1)))
+        face = int(np.argmax(((faces < 0) | (faces >= len(x))).any(axis=1)))
         raise GeometryError(
-            f"triangle {bad} {faces[bad].tolist()} of the surface crack names a point outside "
+            f"triangle {face} {faces[face].tolist()} of the surface crack names a point outside "
             f"0 ... {len(x) - 1}: points are numbered from 0."
         )
     used, inverse = np.unique(faces, return_inverse=True)
     x, faces = x[used], inverse.reshape(-1, 3)
     if not np.isfinite(x).all():
-        bad = int(used[np.argmax(~np.isfinite(x).all(axis=1))])
-        raise GeometryError(f"point {bad} of the surface crack is not finite.")
+        face = int(used[np.argmax(~np.isfinite(x).all(axis=1))])
+        raise GeometryError(f"point {face} of the surface crack is not finite.")
     x = coordinates(x, what, (None, 3), error=GeometryError)
     _check_shape(x, faces)
-    turned = oriented(faces)
+    turned = oriented_faces(faces)
     if turned is None:
         raise GeometryError(
             "the surface crack has only one side (a Möbius strip): cut it open, so that lip + and "
@@ -295,9 +297,9 @@ def _check_shape(x: Floats, faces: Ints) -> None:
     longest = np.linalg.norm(corner - np.roll(corner, 1, axis=1), axis=2).max(axis=1)
     thin = face_areas(x, faces) <= 1e-10 * longest**2
     if thin.any():
-        bad = int(np.argmax(thin))
+        face = int(np.argmax(thin))
         raise GeometryError(
-            f"triangle {bad} of the surface crack at {at(corner[bad][0])} has no "
+            f"triangle {face} of the surface crack at {at(corner[face][0])} has no "
             f"area ({int(thin.sum())} such triangles): remove it or merge its points."
         )
     key, count = np.unique(side_keys(faces), return_counts=True)
@@ -331,10 +333,10 @@ def read_surface(path: str | PathLike[str]) -> Crack:
     GeometryError
         It has no triangles, or not such as `surface_crack` takes.
     """
-    return surface_crack(*_merged(*read_triangles(path)))
+    return surface_crack(*_merged_points(*read_triangles(path)))
 
 
-def _merged(points: Floats, triangles: Ints) -> tuple[Floats, Ints]:
+def _merged_points(points: Floats, triangles: Ints) -> tuple[Floats, Ints]:
     """Points within 1e-7 of the size of the surface made one; triangles that collapse dropped."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
@@ -347,16 +349,20 @@ def _merged(points: Floats, triangles: Ints) -> tuple[Floats, Ints]:
         return points, triangles  # refused by surface_crack
     x = points[used]
     # Single precision is what a binary STL stores.
-    close = cKDTree(x).query_pairs(1e-7 * float(np.ptp(x, axis=0).max()), output_type="ndarray")
+    close_pairs = cKDTree(x).query_pairs(
+        1e-7 * float(np.ptp(x, axis=0).max()), output_type="ndarray"
+    )
     n = len(x)
-    graph = coo_array((np.ones(len(close)), (close[:, 0], close[:, 1])), shape=(n, n))
+    graph = coo_array(
+        (np.ones(len(close_pairs)), (close_pairs[:, 0], close_pairs[:, 1])), shape=(n, n)
+    )
     group = connected_components(graph, directed=False)[1]
     _, first = np.unique(group, return_index=True)
     place = np.zeros(len(points), dtype=np.int64)
     place[used] = group
     faces = place[triangles]
-    whole = (faces != np.roll(faces, 1, axis=1)).all(axis=1)
-    return x[first], faces[whole]
+    is_proper = (faces != np.roll(faces, 1, axis=1)).all(axis=1)
+    return x[first], faces[is_proper]
 
 
 def _vector(value: ArrayLike, what: str) -> Floats:

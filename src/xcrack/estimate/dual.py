@@ -13,7 +13,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from xcrack.analysis.multipliers import gap_rows
-from xcrack.analysis.solution import Factored, Solution
+from xcrack.analysis.solution import FactoredSolution, Solution
 from xcrack.base.arrays import Bools, Floats, Ints
 from xcrack.fem.assembly import Tabulated
 from xcrack.fem.facets import LipPoints, arc_position
@@ -117,7 +117,7 @@ class Goal:
 
 
 @dataclass(frozen=True, eq=False)
-class Groups:
+class GoalGroups:
     """Contact groups of all cracks, one after the other.
 
     Attributes
@@ -145,7 +145,7 @@ class Groups:
     piece: Ints
 
 
-def groups_of(factored: Factored) -> Groups | None:
+def groups_of(factored: FactoredSolution) -> GoalGroups | None:
     """Contact groups of a solve; None where no crack has multipliers."""
     model, contact = factored.model, factored.contact
     parts = []
@@ -160,7 +160,7 @@ def groups_of(factored: Factored) -> Groups | None:
     if not parts or contact.dual is None:
         return None
     every, closed, pressures, crack, position, piece = zip(*parts, strict=True)
-    return Groups(
+    return GoalGroups(
         sp.csr_matrix(sp.vstack(every)),
         contact.dual,
         np.concatenate(closed, axis=1),
@@ -181,7 +181,7 @@ def _kinks(space: FunctionSpace, c: int, lips: LipPoints) -> Floats:
 
 
 @dataclass(frozen=True, eq=False)
-class Duals:
+class DualSolutions:
     """Dual solutions of all functionals in all states.
 
     Attributes
@@ -201,13 +201,15 @@ class Duals:
     per_pressure: Floats
 
 
-def duals(factored: Factored, groups: Groups | None, goals: Sequence[Goal]) -> Duals:
+def duals(
+    factored: FactoredSolution, groups: GoalGroups | None, goals: Sequence[Goal]
+) -> DualSolutions:
     """Dual solutions of the functionals of goals, one after the other in m.
 
     Parameters
     ----------
-    factored : Factored
-    groups : Groups or None
+    factored : FactoredSolution
+    groups : GoalGroups or None
     goals : sequence of Goal
     """
     model, motion = factored.model, factored.motion
@@ -218,7 +220,7 @@ def duals(factored: Factored, groups: Groups | None, goals: Sequence[Goal]) -> D
         z = without_motion(motion, z0)[None]
         states = factored.contact.u.shape[1]
         nothing = np.zeros((0, f.shape[1]))
-        return Duals(z, np.zeros(states, dtype=np.int64), nothing[None], nothing)
+        return DualSolutions(z, np.zeros(states, dtype=np.int64), nothing[None], nothing)
     per_pressure = groups.N @ z0 + _on_groups(factored, groups, goals)
     sets, which = np.unique(groups.active, axis=0, return_inverse=True)
     every, mus = [], []
@@ -230,10 +232,10 @@ def duals(factored: Factored, groups: Groups | None, goals: Sequence[Goal]) -> D
             z = z0 - factored.engine.solve(groups.N.T @ mu)
         every.append(without_motion(motion, z))
         mus.append(mu)
-    return Duals(np.stack(every), which.ravel(), np.stack(mus), per_pressure)
+    return DualSolutions(np.stack(every), which.ravel(), np.stack(mus), per_pressure)
 
 
-def _on_groups(factored: Factored, groups: Groups, goals: Sequence[Goal]) -> Floats:
+def _on_groups(factored: FactoredSolution, groups: GoalGroups, goals: Sequence[Goal]) -> Floats:
     """g_J of the goals `(g, m)`."""
     columns = []
     for goal in goals:
@@ -248,7 +250,7 @@ def _on_groups(factored: Factored, groups: Groups, goals: Sequence[Goal]) -> Flo
 # The end of contact: what functionals would be with the contact a group longer or shorter.
 
 
-def end_changes(groups: Groups, duals: Duals, gap: Floats, k: int) -> Floats:
+def end_changes(groups: GoalGroups, duals: DualSolutions, gap: Floats, k: int) -> Floats:
     """|dJ with a group more closed + dJ with one less|, summed over the ends of contact `(m,)`.
 
     The first-order terms of the two are opposite where the end is right: what is left is of second
@@ -256,8 +258,8 @@ def end_changes(groups: Groups, duals: Duals, gap: Floats, k: int) -> Floats:
 
     Parameters
     ----------
-    groups : Groups
-    duals : Duals
+    groups : GoalGroups
+    duals : DualSolutions
     gap : (g,) array
         Weak gaps of the state.
     k : int
@@ -270,8 +272,8 @@ def end_changes(groups: Groups, duals: Duals, gap: Floats, k: int) -> Floats:
     opened = gap - groups.dual @ pressure
     order = np.lexsort((groups.position, groups.crack))
     along, crack, piece = active[order], groups.crack[order], groups.piece[order]
-    same = (crack[1:] == crack[:-1]) & (piece[1:] == piece[:-1])
-    ends = np.nonzero((along[1:] != along[:-1]) & same)[0]
+    same_piece = (crack[1:] == crack[:-1]) & (piece[1:] == piece[:-1])
+    ends = np.nonzero((along[1:] != along[:-1]) & same_piece)[0]
     for end in ends:
         change = np.zeros(len(total))
         for group in (order[end], order[end + 1]):

@@ -10,11 +10,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from xcrack.analysis.contact_result import Contact
-from xcrack.analysis.solution import Factored, Solution
+from xcrack.analysis.solution import FactoredSolution, Solution
 from xcrack.base.arrays import Floats
 from xcrack.estimate.dual import Goal, duals, end_changes, groups_of
 from xcrack.estimate.surplus import (
-    Surplus,
+    HierarchicalSurplus,
     face_residual,
     goal_residual,
     imposed,
@@ -36,7 +36,7 @@ class Estimate:
         Exact value less computed one.
     shares : (states, m, cells) array
         Absolute contributions of the cells to eta: they add up to more than it.
-    surplus : Surplus
+    surplus : HierarchicalSurplus
     parts : (states, n, m) array
         Contributions of the surplus functions to eta.
     end : (states, m) array
@@ -50,19 +50,21 @@ class Estimate:
 
     eta: Floats
     shares: Floats
-    surplus: Surplus
+    surplus: HierarchicalSurplus
     parts: Floats
     end: Floats
     z: Floats
     mu: tuple[Floats, ...]
 
 
-def estimate(factored: Factored, solutions: Sequence[Solution], goals: Sequence[Goal]) -> Estimate:
+def estimate(
+    factored: FactoredSolution, solutions: Sequence[Solution], goals: Sequence[Goal]
+) -> Estimate:
     """Estimated errors of the functionals of goals, one after the other in m.
 
     Parameters
     ----------
-    factored : Factored
+    factored : FactoredSolution
         Of the solve that gave the solutions.
     solutions : sequence of Solution
         Some of its states; order 2 in 2D.

@@ -64,14 +64,14 @@ def crack_shape(
         side = lip_side(space, c, cell, lips.bary[moved, s], int(sign))
         u, gradient = fields_at(space, _columns(solutions, z), cell, lips.bary[moved, s], side)
         for k, solution in enumerate(solutions):
-            own, first = gradient[..., k], len(solutions) + k * z.shape[2]
+            gradient_of_goal, first = gradient[..., k], len(solutions) + k * z.shape[2]
             dual = gradient[..., first : first + z.shape[2]] - slopes[s]
             weight = u[..., first : first + z.shape[2]] - values[s]
-            sigma = solution.problem.material.stress(own)
+            sigma = solution.problem.material.stress(gradient_of_goal)
             shifted[:, k] += sign * np.einsum("qij,qijm->qm", sigma, dual)
             normals = np.einsum("qi,qijm,qj->qm", n, dual, n)
             shifted[:, k] += sign * pressure[:, k, None] * normals
-            opening = np.einsum("qi,qij,qj->q", n, own, n)
+            opening = np.einsum("qi,qij,qj->q", n, gradient_of_goal, n)
             shifted[:, k] -= sign * mu[k][moved] * opening[:, None]
             slid = np.einsum("qi,qim->qm", turned, weight) * pressure[:, k, None]
             slid -= np.einsum("qi,qi->q", turned, u[..., k])[:, None] * mu[k][moved]
@@ -88,33 +88,35 @@ def rim_shape(solutions: Sequence[Solution], z: Floats) -> tuple[Floats, Floats]
 
     Returns
     -------
-    known : (states, m) array
+    shape_terms : (states, m) array
         Where the mesh knows the curve.
     guessed : (states, m) array
         Where facets look like chords of a curve that it does not know.
     """
     mesh = solutions[0].space.mesh
     sides = [(mesh.facet_sets[name], curve) for name, curve in mesh.curves.items()]
-    known = np.zeros((len(solutions), z.shape[2]))
+    shape_terms = np.zeros((len(solutions), z.shape[2]))
     for facets, curve in sides:
         points, normal = facet_points(solutions[0].space, facets, 3)
         x = position(solutions[0].space, points.cell, points.bary)
         away = np.einsum("qd,qd->q", np.asarray(curve(x)) - x, normal)
-        known -= _moved(solutions, z, points, away)
+        shape_terms -= _boundary_changes(solutions, z, points, away)
     facets, sagitta = _chords(mesh)
     if len(facets) and sides:
         curved = mesh.facet_numbers(np.concatenate([facets for facets, _ in sides]))
         other = ~np.isin(mesh.facet_numbers(facets), curved)
         facets, sagitta = facets[other], sagitta[other]
     if not len(facets):
-        return known, np.zeros_like(known)
+        return shape_terms, np.zeros_like(shape_terms)
     points, _ = facet_points(solutions[0].space, facets, 3)
     of_cell = np.zeros(len(mesh.cells))
     of_cell[mesh.facet_to_cell[mesh.facet_numbers(facets), 0]] = sagitta
-    return known, -_moved(solutions, z, points, of_cell[points.cell])
+    return shape_terms, -_boundary_changes(solutions, z, points, of_cell[points.cell])
 
 
-def _moved(solutions: Sequence[Solution], z: Floats, points: Points, away: Floats) -> Floats:
+def _boundary_changes(
+    solutions: Sequence[Solution], z: Floats, points: Points, away: Floats
+) -> Floats:
     """Integral of away sigma(u) : eps(z) over boundary points `(states, m)`."""
     density = _products(solutions, z, (points.cell, points.bary, points.side))
     return np.asarray(np.einsum("q,qkm->km", points.weight * away, density))
@@ -184,8 +186,8 @@ def _chords(mesh: Mesh) -> tuple[Ints, Floats]:
         difference = heading[second] - heading[first]
         return np.asarray((difference + np.pi) % (2 * np.pi) - np.pi)
 
-    own = np.arange(len(ends))
-    low, high = turn(before, own), turn(own, after)
+    facet_numbers = np.arange(len(ends))
+    low, high = turn(before, facet_numbers), turn(facet_numbers, after)
     small, large = np.minimum(np.abs(low), np.abs(high)), np.maximum(np.abs(low), np.abs(high))
     curved = (before >= 0) & (after >= 0) & (low * high > 0) & (small > 1e-6)
     curved &= (large < _ROUND) & (large < _ALIKE * small)

@@ -29,7 +29,7 @@ _POINTS, _DEGREE = 3, 4  # where tip functions act; of the products of a cubic a
 
 
 @dataclass(frozen=True, eq=False)
-class Surplus:
+class HierarchicalSurplus:
     """Surplus functions on a mesh with cracks, numbered: edges, bubbles, copies.
 
     Attributes
@@ -60,7 +60,7 @@ class Surplus:
         return self.functions, self.sign, self.copy, self.crack, self.space.mesh.gradient
 
 
-def surplus(space: FunctionSpace, fixed: Bools) -> Surplus:
+def surplus(space: FunctionSpace, fixed: Bools) -> HierarchicalSurplus:
     """The surplus space of a function space.
 
     Parameters
@@ -74,15 +74,17 @@ def surplus(space: FunctionSpace, fixed: Bools) -> Surplus:
     cells, edges = len(mesh.cells), len(mesh.edges)
     functions = np.concatenate([mesh.cell_to_edge, edges + np.arange(cells)[:, None]], axis=1)
     n = edges + cells
-    jumps, whole = np.zeros(n, dtype=bool), np.ones(n, dtype=bool)
+    jumps, is_whole = np.zeros(n, dtype=bool), np.ones(n, dtype=bool)
     crack = np.zeros(n, dtype=np.int64)
     for c, cut in enumerate(space.cuts):
-        mine = np.unique(np.concatenate([functions[cut.cells].ravel(), _along(space, c)]))
-        jumps[mine], crack[mine] = True, c
-        whole[functions[cut.is_tip]] = False
+        functions_of_crack = np.unique(
+            np.concatenate([functions[cut.cells].ravel(), _crack_edges(space, c)])
+        )
+        jumps[functions_of_crack], crack[functions_of_crack] = True, c
+        is_whole[functions[cut.is_tip]] = False
     for joint in space.joints:
-        whole[functions[joint.both]] = False
-    jumps &= whole
+        is_whole[functions[joint.both]] = False
+    jumps &= is_whole
     copy = np.full(n, -1, dtype=np.int64)
     copy[jumps] = n + np.arange(int(jumps.sum()))
     components = np.zeros((n + int(jumps.sum()), 2), dtype=bool)
@@ -91,10 +93,12 @@ def surplus(space: FunctionSpace, fixed: Bools) -> Surplus:
     components[copy[jumps]] = components[:n][jumps]
     i, j = local_edges(2).T
     sign = np.where(mesh.cells[:, i] < mesh.cells[:, j], 1.0, -1.0)
-    return Surplus(space, lock(functions), lock(sign), lock(copy), lock(crack), lock(components))
+    return HierarchicalSurplus(
+        space, lock(functions), lock(sign), lock(copy), lock(crack), lock(components)
+    )
 
 
-def _along(space: FunctionSpace, c: int) -> Ints:
+def _crack_edges(space: FunctionSpace, c: int) -> Ints:
     """Edges on which crack c lies."""
     cut, to_edge = space.cuts[c], space.mesh.cell_to_edge
     pairs = cut.lip_cell[cut.lip_cell[:, 0] != cut.lip_cell[:, 1]]
@@ -104,12 +108,14 @@ def _along(space: FunctionSpace, c: int) -> Ints:
     return np.concatenate(shared)
 
 
-def residuals(surplus: Surplus, material: Isotropic, coefficients: Floats) -> tuple[Floats, Floats]:
+def residuals(
+    surplus: HierarchicalSurplus, material: Isotropic, coefficients: Floats
+) -> tuple[Floats, Floats]:
     """-a(u, w) of columns of displacements, and the stiffness of each function with its copy.
 
     Parameters
     ----------
-    surplus : Surplus
+    surplus : HierarchicalSurplus
     material : Isotropic
     coefficients : (functions of the space + 1, 2, m) array, length
         The last row is zero.
@@ -144,7 +150,7 @@ def residuals(surplus: Surplus, material: Isotropic, coefficients: Floats) -> tu
     return residual, blocks
 
 
-def goal_residual(surplus: Surplus, goal: Goal) -> Floats:
+def goal_residual(surplus: HierarchicalSurplus, goal: Goal) -> Floats:
     """The functionals of each surplus function `(n + copies, 2, m)`."""
     from xcrack.estimate.kernels.goal import add_cells
     from xcrack.estimate.kernels.surplus import add_functional
@@ -166,7 +172,7 @@ def goal_residual(surplus: Surplus, goal: Goal) -> Floats:
     return result
 
 
-def solved(surplus: Surplus, blocks: Floats, residual: Floats) -> Floats:
+def solved(surplus: HierarchicalSurplus, blocks: Floats, residual: Floats) -> Floats:
     """Each function with its copy alone: block^-1 residual `(n + copies, 2, m)`, 0 where fixed."""
     copied = np.nonzero(surplus.copy >= 0)[0]
     copies = surplus.copy[copied]
@@ -182,12 +188,12 @@ def solved(surplus: Surplus, blocks: Floats, residual: Floats) -> Floats:
     if len(copied):
         right = np.concatenate([residual[copied], residual[copies]], axis=1)
         fixed = np.concatenate([surplus.fixed[copied], surplus.fixed[copies]], axis=1)
-        four = _regular(blocks[copied], right, fixed)
+        four = _regular_solutions(blocks[copied], right, fixed)
         result[copied], result[copies] = four[:, :2], four[:, 2:]
     return result
 
 
-def _regular(blocks: Floats, right: Floats, fixed: Bools) -> Floats:
+def _regular_solutions(blocks: Floats, right: Floats, fixed: Bools) -> Floats:
     """Solutions of blocks of four; a copy on a sliver hardly differs from its function."""
     k = np.arange(4)
     free: Bools = np.logical_not(fixed)
@@ -200,12 +206,12 @@ def _regular(blocks: Floats, right: Floats, fixed: Bools) -> Floats:
     return np.asarray(x * scale[:, :, None])
 
 
-def shares(surplus: Surplus, parts: Floats, together: bool = False) -> Floats:
+def shares(surplus: HierarchicalSurplus, parts: Floats, together: bool = False) -> Floats:
     """Absolute contributions of functions, by cell: an edge's is halved between its cells.
 
     Parameters
     ----------
-    surplus : Surplus
+    surplus : HierarchicalSurplus
     parts : (n + copies, m) array
     together : bool
         A function and its copy count as one: on a sliver both are large and cancel.
@@ -216,12 +222,12 @@ def shares(surplus: Surplus, parts: Floats, together: bool = False) -> Floats:
     """
     n, mesh = len(surplus.copy), surplus.space.mesh
     size = np.array if together else np.abs
-    own = size(parts[:n])
+    edge_shares = size(parts[:n])
     copied = np.nonzero(surplus.copy >= 0)[0]
-    own[copied] += size(parts[surplus.copy[copied]])
-    own = np.abs(own)
-    own[: len(mesh.edges)][mesh.facet_to_cell[:, 1] >= 0] /= 2
-    return np.asarray(own[surplus.functions].sum(axis=1))
+    edge_shares[copied] += size(parts[surplus.copy[copied]])
+    edge_shares = np.abs(edge_shares)
+    edge_shares[: len(mesh.edges)][mesh.facet_to_cell[:, 1] >= 0] /= 2
+    return np.asarray(edge_shares[surplus.functions].sum(axis=1))
 
 
 @lru_cache(maxsize=1)
@@ -262,7 +268,7 @@ def _mean(power: Ints) -> float:
 _BODY = 5  # degree of the rule for body forces and initial stress
 
 
-def load_residual(surplus: Surplus, solution: Solution) -> Floats:
+def load_residual(surplus: HierarchicalSurplus, solution: Solution) -> Floats:
     """The loads of a state, tested with the surplus functions `(n + copies, 2)`.
 
     Pressures on crack faces are left out: see `face_residual`.
@@ -276,7 +282,7 @@ def load_residual(surplus: Surplus, solution: Solution) -> Floats:
     return result
 
 
-def _add_traction(result: Floats, surplus: Surplus, load: Load, factor: float) -> None:
+def _add_traction(result: Floats, surplus: HierarchicalSurplus, load: Load, factor: float) -> None:
     """Uniform tractions do no work on the cubic of an edge, which is odd, unless it is cut."""
     space = surplus.space
     facets = facet_set(space.mesh, load.where, load.name)
@@ -292,7 +298,7 @@ def _add_traction(result: Floats, surplus: Surplus, load: Load, factor: float) -
 
 
 def _add_volume(
-    result: Floats, surplus: Surplus, load: Load, factor: float, material: Isotropic
+    result: Floats, surplus: HierarchicalSurplus, load: Load, factor: float, material: Isotropic
 ) -> None:
     from xcrack.estimate.kernels.surplus import add_functional
 
@@ -310,7 +316,7 @@ def _add_volume(
         )  # fmt: skip
 
 
-def _add(result: Floats, surplus: Surplus, points: Points, density: Floats) -> None:
+def _add(result: Floats, surplus: HierarchicalSurplus, points: Points, density: Floats) -> None:
     """Add the integral of density . w over points."""
     functions = surplus.functions[points.cell]
     values = _values(surplus, points.cell, points.bary)
@@ -324,19 +330,19 @@ def _add(result: Floats, surplus: Surplus, points: Points, density: Floats) -> N
         np.add.at(result, copy[row, place], side[:, None] * force[row, place])
 
 
-def _values(surplus: Surplus, cell: Ints, bary: Floats) -> Floats:
+def _values(surplus: HierarchicalSurplus, cell: Ints, bary: Floats) -> Floats:
     """The functions of cells at points `(q, 4)`."""
     i, j = local_edges(2).T
     edges = bary[:, i] * bary[:, j] * (bary[:, i] - bary[:, j]) * surplus.sign[cell]
     return np.concatenate([edges, bary.prod(axis=1)[:, None]], axis=1)
 
 
-def face_residual(surplus: Surplus, lips: LipPoints, pressure: Floats) -> Floats:
+def face_residual(surplus: HierarchicalSurplus, lips: LipPoints, pressure: Floats) -> Floats:
     """Pressures on the faces of a crack, tested with the jumps `(n + copies, 2, m)`.
 
     Parameters
     ----------
-    surplus : Surplus
+    surplus : HierarchicalSurplus
     lips : LipPoints
     pressure : (q, m) array, stress
         Positive where it opens the crack.
@@ -352,7 +358,7 @@ def face_residual(surplus: Surplus, lips: LipPoints, pressure: Floats) -> Floats
     return result
 
 
-def imposed(surplus: Surplus, solution: Solution) -> Floats:
+def imposed(surplus: HierarchicalSurplus, solution: Solution) -> Floats:
     """Imposed displacements less their interpolant, as surplus coefficients `(n + copies, 2)`.
 
     Displacements that are fitted beside a crack count as exact.
@@ -368,7 +374,7 @@ def imposed(surplus: Surplus, solution: Solution) -> Floats:
 
 
 def _impose(
-    result: Floats, taken: Bools, surplus: Surplus, support: Support, factor: float
+    result: Floats, taken: Bools, surplus: HierarchicalSurplus, support: Support, factor: float
 ) -> None:
     mesh = surplus.space.mesh
     facets = facet_set(mesh, support.where, support.name)

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from xcrack.base.arrays import Floats
-from xcrack.base.checks import called, numbers, shown
+from xcrack.base.checks import call_function, numbers, value_text
 from xcrack.base.errors import ProblemError
 from xcrack.fatigue.criteria import Criterion
 from xcrack.fatigue.law import NEEDS, Law, largest_K
@@ -44,14 +44,14 @@ def evaluate_criterion(
     n = K.shape[1]
     if n == 0:
         return np.zeros(0), np.zeros(0), np.zeros(0)
-    result = called(criterion, f"the directions of crack {crack}", K.copy(), nu)
+    result = call_function(criterion, f"the directions of crack {crack}", K.copy(), nu)
     try:
         parts = tuple(result)
     except Exception:  # whatever an object's own __iter__ raises
         parts = ()
     if len(parts) != 3 or isinstance(result, str):
         raise ProblemError(
-            f"the criterion must return three arrays (angle, dK_eq, R), not {shown(result)}."
+            f"the criterion must return three arrays (angle, dK_eq, R), not {value_text(result)}."
         )
     angle, dK_eq, R = (
         _one_a_place(part, name, n, f"{place}s of crack {crack}")
@@ -108,9 +108,9 @@ def evaluate_law(
     """
     if len(dK_eq) == 0:
         return np.zeros(0)
-    wanted = wants(law, dK_eq, R, a)
-    result = called(
-        partial(law, **wanted), f"the growth rates of crack {crack}", dK_eq.copy(), R.copy()
+    needs = law_needs(law, dK_eq, R, a)
+    result = call_function(
+        partial(law, **needs), f"the growth rates of crack {crack}", dK_eq.copy(), R.copy()
     )
     rate = np.array(numbers(result, "the growth rate that the law returned", finite=False))
     if rate.shape != dK_eq.shape:
@@ -118,9 +118,9 @@ def evaluate_law(
             f"the law returned shape {rate.shape} for {len(dK_eq)} {place}s; it must return one "
             "rate for each. xcrack.testing.check_law shows what is wrong."
         )
-    bad = ~(rate >= 0)
-    if bad.any():
-        j = int(np.argmax(bad))
+    is_invalid = ~(rate >= 0)
+    if is_invalid.any():
+        j = int(np.argmax(is_invalid))
         raise ProblemError(
             f"the law returned da/dN = {rate[j]} for dK_eq = {dK_eq[j]:.6g}, R = {R[j]:.6g} "
             f"(crack {crack}, {place} {j}); a crack does not shrink: return a number >= 0, and inf "
@@ -129,7 +129,7 @@ def evaluate_law(
     return rate
 
 
-def wants(law: Law, dK_eq: Floats, R: Floats, a: Floats | None) -> dict[str, Floats]:
+def law_needs(law: Law, dK_eq: Floats, R: Floats, a: Floats | None) -> dict[str, Floats]:
     """What a law asks for by name beside the range and R: ``needs`` says it.
 
     Raises
@@ -173,4 +173,4 @@ def law_exponent(law: Law, dK_eq: Floats, R: Floats) -> float:
     return float(np.clip(np.log(rate[1] / rate[0]) / (2 * _NEAR), *_EXPONENTS))
 
 
-__all__ = ["depends_on_ratio", "evaluate_criterion", "evaluate_law", "law_exponent", "wants"]
+__all__ = ["depends_on_ratio", "evaluate_criterion", "evaluate_law", "law_exponent", "law_needs"]

@@ -147,9 +147,14 @@ class newman_closure(Closure):  # noqa: N801
     def __call__(self, R: ArrayLike) -> Floats:
         """Share of the range that opens the crack, in [0, 1]; 1 for R = 1."""
         ratio = stress_ratio("newman_closure", R)
-        rest = 1 - ratio
+        one_less_ratio = 1 - ratio
         return np.asarray(
-            np.divide(1 - self.f(ratio), rest, out=np.ones_like(rest), where=rest > 0)
+            np.divide(
+                1 - self.f(ratio),
+                one_less_ratio,
+                out=np.ones_like(one_less_ratio),
+                where=one_less_ratio > 0,
+            )
         )[()]
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from xcrack.base.arrays import Floats
-from xcrack.base.checks import number, numbers, shown
+from xcrack.base.checks import number, numbers, value_text
 from xcrack.base.errors import ProblemError, warn
 
 Criterion = Callable[[Floats, float], tuple[Floats, Floats, Floats]]
@@ -136,9 +136,9 @@ def max_hoop_stress(
     >>> print(angle, dK_eq, R)
     [0.] [0.8] [0.2]
     """
-    K = _checked(K, nu, range)
-    own = kink_angle(K)
-    return _rated(K, _angle_of_largest(equivalent_K(K, own, nu), own), nu, range)
+    K = _checked_K(K, nu, range)
+    angles = kink_angle(K)
+    return _angle_and_range(K, _angle_of_largest(equivalent_K(K, angles, nu), angles), nu, range)
 
 
 def mean_reference(
@@ -180,15 +180,17 @@ def mean_reference(
     >>> print(angle)
     [0.]
     """
-    K = _checked(K, nu, range)
+    K = _checked_K(K, nu, range)
     if not isinstance(reference, str) or reference not in ("mean", "max", "min"):
-        raise ProblemError(f'reference = {shown(reference)}: give "mean", "max" or "min".')
+        raise ProblemError(f'reference = {value_text(reference)}: give "mean", "max" or "min".')
     if reference == "mean":
         mean = _sum(K) / len(K)
-        return _rated(K, kink_angle(mean), nu, range)
-    own = kink_angle(K)
-    K_eq = equivalent_K(K, own, nu)
-    return _rated(K, _angle_of_largest(K_eq if reference == "max" else -K_eq, own), nu, range)
+        return _angle_and_range(K, kink_angle(mean), nu, range)
+    angles = kink_angle(K)
+    K_eq = equivalent_K(K, angles, nu)
+    return _angle_and_range(
+        K, _angle_of_largest(K_eq if reference == "max" else -K_eq, angles), nu, range
+    )
 
 
 def weighted_angle(
@@ -225,21 +227,21 @@ def weighted_angle(
     >>> print(np.degrees(angle).round(4))
     [-24.6401]
     """
-    K = _checked(K, nu, range)
-    own = kink_angle(K)
-    weight = equivalent_K(K, own, nu)
-    angle = np.arctan2(_sum(weight * np.sin(own)), _sum(weight * np.cos(own))) + 0.0
-    return _rated(K, angle, nu, range)
+    K = _checked_K(K, nu, range)
+    angles = kink_angle(K)
+    weight = equivalent_K(K, angles, nu)
+    angle = np.arctan2(_sum(weight * np.sin(angles)), _sum(weight * np.cos(angles))) + 0.0
+    return _angle_and_range(K, angle, nu, range)
 
 
-def clipped(K: ArrayLike) -> Floats:
+def clipped_K(K: ArrayLike) -> Floats:
     """Copy of K `(..., 2 or 3)` with every negative K_I set to 0: a crack does not open inwards."""
     K = np.array(K, dtype=float)
     K[..., 0] = np.maximum(K[..., 0], 0.0)
     return K
 
 
-def _checked(K: ArrayLike, nu: float, range: str) -> Floats:
+def _checked_K(K: ArrayLike, nu: float, range: str) -> Floats:
     """K as `(s, f, 2 or 3)` with K_I >= 0, after all that a caller can get wrong."""
     K = numbers(K, "K", finite=False)
     if K.ndim != 3 or K.shape[-1] not in (2, 3) or len(K) == 0:
@@ -255,7 +257,7 @@ def _checked(K: ArrayLike, nu: float, range: str) -> Floats:
         )
     number(nu, "Poisson's ratio nu", above=-1, below=0.5)
     if not isinstance(range, str) or range not in ("difference", "component"):
-        raise ProblemError(f'range = {shown(range)}: give "difference" or "component".')
+        raise ProblemError(f'range = {value_text(range)}: give "difference" or "component".')
     # A closed tip has K_I = 0 up to discretisation: only a real overlap triggers a warning.
     negative = K[..., 0] < -_CLOSED * np.abs(K).max(initial=0.0)
     if negative.any():
@@ -265,7 +267,7 @@ def _checked(K: ArrayLike, nu: float, range: str) -> Floats:
             f"smallest is {K[state, point, 0]:.4g} (state {state}, front point {point}). With "
             "contact it is discretisation error; without, the crack faces overlap there."
         )
-    return clipped(K)
+    return clipped_K(K)
 
 
 def _columns(K: ArrayLike) -> Floats:
@@ -288,7 +290,9 @@ def _angle_of_largest(score: Floats, angle: Floats) -> Floats:
     return np.asarray(np.where(tied, angle, np.inf).min(axis=0))
 
 
-def _rated(K: Floats, angle: Floats, nu: float, range: str) -> tuple[Floats, Floats, Floats]:
+def _angle_and_range(
+    K: Floats, angle: Floats, nu: float, range: str
+) -> tuple[Floats, Floats, Floats]:
     """The chosen angle with the range and the ratio R that go with it."""
     K_eq = equivalent_K(K, angle, nu)
     largest, smallest = K_eq.max(axis=0), K_eq.min(axis=0)
@@ -314,7 +318,7 @@ def _component_range(K: Floats, angle: Floats, nu: float) -> Floats:
     """Largest K_eq of the difference of two states, in both orders."""
     largest = np.zeros(K.shape[1])
     for state in K:
-        np.maximum(largest, equivalent_K(clipped(K - state), angle, nu).max(axis=0), out=largest)
+        np.maximum(largest, equivalent_K(clipped_K(K - state), angle, nu).max(axis=0), out=largest)
     return largest
 
 
@@ -355,7 +359,7 @@ def nominal_range(K: Floats, angle: Floats, nu: float) -> tuple[Floats, Floats]:
 
 __all__ = [
     "Criterion",
-    "clipped",
+    "clipped_K",
     "equivalent_K",
     "kink_angle",
     "max_hoop_stress",

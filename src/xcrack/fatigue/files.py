@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from xcrack.base.arrays import Floats, Ints
-from xcrack.base.checks import flag, number, whole
+from xcrack.base.checks import flag, number, whole_number
 from xcrack.base.errors import ProblemError
 from xcrack.base.paths import path_of, system_errors
 from xcrack.fatigue.spectrum import Spectrum
@@ -79,7 +79,7 @@ def read_spectrum(
         return Spectrum(rows=data, unit=unit)
     if column is None and data.shape[1] > 1:
         raise ProblemError(f"{file}: {data.shape[1]} columns: give column= or rows=True.")
-    number = 0 if column is None else whole(column, "read_spectrum: column", least=0)
+    number = 0 if column is None else whole_number(column, "read_spectrum: column", least=0)
     if number >= data.shape[1]:
         raise ProblemError(f"{file}: there is no column {number}: give 0 to {data.shape[1] - 1}.")
     return Spectrum(data[:, number], unit=unit)
@@ -147,8 +147,8 @@ def twist(*, mean: float, seed: int, flights: int = 4000) -> Spectrum:
     -0.5
     """
     mean = number(mean, "twist: mean", above=0)
-    seed = whole(seed, "twist: seed", least=0)
-    flights = whole(flights, "twist: flights", least=1, most=int(_FLIGHTS.sum()))
+    seed = whole_number(seed, "twist: seed", least=0)
+    flights = whole_number(flights, "twist: flights", least=1, most=int(_FLIGHTS.sum()))
     draw = np.random.default_rng(seed)
     kinds = draw.permutation(np.repeat(np.arange(len(_FLIGHTS)), _FLIGHTS))[:flights]
     factors = np.concatenate([_flight(draw, _PER_FLIGHT[kind]) for kind in kinds])

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import numpy as np
 
-from xcrack.base.arguments import Number, Part, checked
+from xcrack.base.arguments import Number, Part, check_arguments
 from xcrack.base.arrays import Floats
 from xcrack.base.units import LENGTH, STRESS, TOUGHNESS, Dimension
 from xcrack.fatigue.closures import newman_closure
@@ -17,7 +17,7 @@ from xcrack.fatigue.law import (
     RRange,
     Threshold,
     largest_K,
-    powered,
+    power_of,
 )
 from xcrack.fatigue.power import LawThreshold
 from xcrack.fatigue.thresholds import klesnil_lukas, nasgro3_threshold, nasgro4_threshold
@@ -79,7 +79,7 @@ class forman(GrowthLaw):  # noqa: N801 - it is used as a function
 
     def rate(self, dK: Floats, R: Floats) -> Floats:
         """C ΔK^m."""
-        return powered("forman", self.C, dK, self.m)
+        return power_of("forman", self.C, dK, self.m)
 
     def rise(self, dK: Floats, R: Floats) -> Floats:
         """1 / ((1 - R) K_c - ΔK)."""
@@ -144,7 +144,7 @@ class hartman_schijve(GrowthLaw):  # noqa: N801
 
     def rate(self, dK: Floats, R: Floats) -> Floats:
         """D ΔK^α."""
-        return powered("hartman_schijve", self.D, dK, self.alpha)
+        return power_of("hartman_schijve", self.D, dK, self.alpha)
 
     def rise(self, dK: Floats, R: Floats) -> Floats:
         """(1 - K_max/A)^(-α/2)."""
@@ -212,14 +212,14 @@ class nasgro(GrowthLaw):  # noqa: N801
 
     def rate(self, dK: Floats, R: Floats) -> Floats:
         """C ΔK^n."""
-        return powered("nasgro", self.C, dK, self.n)
+        return power_of("nasgro", self.C, dK, self.n)
 
     def rise(self, dK: Floats, R: Floats) -> Floats:
         """(1 - K_max/K_c)^-q."""
         return np.asarray((1 - largest_K(dK, R) / self.K_c) ** -self.q)
 
 
-@checked()
+@check_arguments()
 def nasgro_K_c(
     K_Ic: _Toughness,
     sigma_y: Annotated[float, Number(above=0, unit=STRESS)],

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from xcrack.base.arguments import Choice, Declared, Rule, arguments_of
 from xcrack.base.arrays import Floats
-from xcrack.base.checks import number, numbers, shown
+from xcrack.base.checks import number, numbers, value_text
 from xcrack.base.errors import ProblemError, XcrackError
 from xcrack.base.units import NUMBER, Dimension
 from xcrack.fatigue.units import factors
@@ -116,7 +116,7 @@ class ApproachRule(Rule):
             return number(value, what, above=0, error=error)
         if value not in ("cut", "difference", "shift"):
             raise error(
-                f'{what} = {shown(value)}: give "cut", "difference", "shift" or an exponent p.'
+                f'{what} = {value_text(value)}: give "cut", "difference", "shift" or an exponent p.'
             )
         return value
 
@@ -183,7 +183,8 @@ class GrowthLaw(Constants):
             self.threshold.check_closure(name, self.closure)
         elif self.approach != "cut":
             raise ProblemError(
-                f"{name}: approach = {shown(self.approach)} without a threshold: give threshold=."
+                f"{name}: approach = {value_text(self.approach)} without a threshold: give "
+                f"threshold=."
             )
 
     def rate(self, dK: Floats, R: Floats) -> Floats:
@@ -233,7 +234,7 @@ class GrowthLaw(Constants):
             result = rate(dK)
         else:
             least = np.broadcast_to(self.threshold.value(ratio, size, self.closure), dK.shape)
-            result = np.where(dK > least, _above(rate, dK, least, self.approach), 0.0)
+            result = np.where(dK > least, _growth_above(rate, dK, least, self.approach), 0.0)
         if self.K_c is not None:
             breaks = largest_K(dK, ratio) >= self.K_c
             inside = np.where(breaks, 0.0, dK)
@@ -241,7 +242,7 @@ class GrowthLaw(Constants):
         return np.asarray(result)[()]
 
 
-def _above(
+def _growth_above(
     rate: Callable[[Floats], Floats], dK: Floats, least: Floats, approach: str | float
 ) -> Floats:
     """Growth above a threshold; anything below."""
@@ -327,7 +328,7 @@ def sizes(name: str, a: ArrayLike | None, shape: tuple[int, ...] | None) -> Floa
     return given
 
 
-def powered(name: str, C: Floats | float, base: Floats, m: Floats | float) -> Floats:
+def power_of(name: str, C: Floats | float, base: Floats, m: Floats | float) -> Floats:
     """C base^m, which must stay a number where the base is one.
 
     Raises
@@ -365,7 +366,7 @@ __all__ = [
     "Threshold",
     "largest_K",
     "per_range",
-    "powered",
+    "power_of",
     "range_and_ratio",
     "sizes",
     "stress_ratio",

@@ -19,7 +19,7 @@ from xcrack.fatigue.law import (
     RRange,
     Threshold,
     per_range,
-    powered,
+    power_of,
 )
 
 LawClosure = Annotated[Closure | None, Part(Closure)]
@@ -80,7 +80,7 @@ class paris(GrowthLaw):  # noqa: N801 - it is used as a function: paris(C, m)(dK
 
     def rate(self, dK: Floats, R: Floats) -> Floats:
         """C ΔK^m."""
-        return powered("paris", self.C, dK, self.m)
+        return power_of("paris", self.C, dK, self.m)
 
 
 @dataclass(frozen=True)
@@ -141,7 +141,7 @@ class elber(GrowthLaw):  # noqa: N801 - it is used as a function
 
     def rate(self, dK: Floats, R: Floats) -> Floats:
         """C (U ΔK)^m."""
-        return powered("elber", self.C, dK, self.m)
+        return power_of("elber", self.C, dK, self.m)
 
 
 @dataclass(frozen=True)
@@ -213,7 +213,7 @@ class walker(GrowthLaw):  # noqa: N801 - it is used as a function
             gamma = np.where(R < 0, self.gamma_minus, self.gamma)
         with np.errstate(over="ignore"):
             effective = np.where(dK > 0, dK / share ** (1.0 - gamma), 0.0)
-        return powered("walker", self.C, effective, self.m)
+        return power_of("walker", self.C, effective, self.m)
 
 
 @dataclass(frozen=True)
@@ -286,7 +286,7 @@ class piecewise(GrowthLaw):  # noqa: N801 - it is used as a function
         """C ΔK^m of the piece."""
         C, m = np.array(self.pieces).T
         piece = np.searchsorted(np.array(self.knees), dK, side="right")
-        return powered("piecewise", C[piece], dK, m[piece])
+        return power_of("piecewise", C[piece], dK, m[piece])
 
 
 __all__ = ["LawClosure", "LawThreshold", "Toughness", "elber", "paris", "piecewise", "walker"]

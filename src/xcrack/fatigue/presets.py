@@ -7,8 +7,8 @@ from functools import cache
 from importlib.resources import files
 from typing import Any
 
-from xcrack.base.arguments import checked
-from xcrack.base.checks import shown
+from xcrack.base.arguments import check_arguments
+from xcrack.base.checks import value_text
 from xcrack.base.errors import ProblemError
 from xcrack.fatigue.closures import newman_closure
 from xcrack.fatigue.fracture import forman, hartman_schijve, nasgro
@@ -34,7 +34,7 @@ class Preset:
     units : str
         Length and K.
     material, environment, source : str
-    checked : str
+    check_arguments : str
         What the constants were compared with before they were put here.
     R_range : (float, float), optional
         Ratios of the tests; other ratios are an error of the law.
@@ -65,7 +65,7 @@ def presets() -> dict[str, Preset]:
     return dict(_presets())
 
 
-@checked()
+@check_arguments()
 def law(name: str, *, units: str, ratio: Ratio | None = None) -> Any:
     """A growth law with published constants, in the units of your model.
 
@@ -94,18 +94,18 @@ def law(name: str, *, units: str, ratio: Ratio | None = None) -> Any:
     >>> print(f"{rate(500 / 1000**0.5, 0.1) * 1000:.4g} mm")
     2.36e-05 mm
     """
-    known = _presets()
-    if not isinstance(name, str) or name not in known:
+    published = _presets()
+    if not isinstance(name, str) or name not in published:
         raise ProblemError(
-            f"law: no preset {shown(name)}: give one of {', '.join(map(repr, known))}."
+            f"law: no preset {value_text(name)}: give one of {', '.join(map(repr, published))}."
         )
-    wanted = Units.read(units)
-    if not wanted.consistent:
+    units_of_model = Units.read(units)
+    if not units_of_model.consistent:
         raise ProblemError(
-            f"law: units = {shown(units)}: K has the root of another length, which no model has: "
-            "give one length, such as m, MPa√m."
+            f"law: units = {value_text(units)}: K has the root of another length, which no model "
+            f"has: give one length, such as m, MPa√m."
         )
-    preset = known[name]
+    preset = published[name]
     return _in_ratio(preset.law, ratio).to(preset.units, units)
 
 

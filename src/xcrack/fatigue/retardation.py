@@ -100,10 +100,12 @@ class wheeler(Constants):  # noqa: N801
 
     def factor(self, K: ArrayLike, K_overload: ArrayLike, da: ArrayLike) -> Floats:
         """Factor on the rate for K, after growth by da since an overload."""
-        own = self.zone(K)
-        left = self.zone(K_overload) - numbers(da, "wheeler: da")
-        inside = left > own
-        share = np.divide(own, left, out=np.ones_like(left + own), where=inside)
+        zone_size = self.zone(K)
+        remaining = self.zone(K_overload) - numbers(da, "wheeler: da")
+        inside = remaining > zone_size
+        share = np.divide(
+            zone_size, remaining, out=np.ones_like(remaining + zone_size), where=inside
+        )
         return np.asarray(share**self.w)[()]
 
 
@@ -154,8 +156,8 @@ class willenborg(Constants):  # noqa: N801
         dK = high - low
         share = np.divide(self.dK_th, dK, out=np.ones_like(dK), where=dK > 0)
         phi = np.maximum(1 - share, 0.0) / (self.shutoff - 1)
-        left = np.maximum(1 - grown / self.zone(over), 0.0)
-        return np.asarray(np.maximum(phi * (over * np.sqrt(left) - high), 0.0))[()]
+        remaining = np.maximum(1 - grown / self.zone(over), 0.0)
+        return np.asarray(np.maximum(phi * (over * np.sqrt(remaining) - high), 0.0))[()]
 
 
 Retardation = wheeler | willenborg
@@ -300,7 +302,7 @@ def march(
     -------
     CycleIntegration
     """
-    from xcrack.fatigue.kernels.march import marched
+    from xcrack.fatigue.kernels.march import march_places
 
     k, n, p = cycles.dK.shape
     shifts = np.zeros(1)
@@ -316,7 +318,7 @@ def march(
     share = np.divide(least, cycles.dK, out=np.ones_like(cycles.dK), where=cycles.dK > 0)
     since, size, over = np.array(zones.since), np.array(zones.size), np.array(zones.K)
     arc, elapsed = np.zeros(x.shape), np.zeros(len(x))
-    reached, position, part, _ = marched(
+    reached, position, part, _ = march_places(
         length,
         min(blocks * len(order), _MOST / max(n, 1)),
         _LEAST * length,

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from xcrack.base.arrays import Floats, Ints, lock
-from xcrack.base.checks import entries, number, numbers, shown, whole, whole_numbers
+from xcrack.base.checks import entries, number, numbers, value_text, whole_number, whole_numbers
 from xcrack.base.errors import ProblemError
 from xcrack.fatigue.rainflow import CYCLE, rainflow
 from xcrack.model.loads import Load
@@ -81,14 +81,16 @@ class Spectrum:
             )
         if not isinstance(self.unit, str) or not self.unit:
             raise ProblemError(
-                f"Spectrum: unit = {shown(self.unit)}: give a word, such as 'flight'."
+                f"Spectrum: unit = {value_text(self.unit)}: give a word, such as 'flight'."
             )
         least = number(self.least_range, "Spectrum: least_range", least=0)
         object.__setattr__(self, "least_range", least)
         share = number(self.tolerance, "Spectrum: tolerance", above=0, below=1)
         object.__setattr__(self, "tolerance", share)
         if not (isinstance(self.levels, str) and self.levels == "auto"):
-            object.__setattr__(self, "levels", whole(self.levels, "Spectrum: levels", least=2))
+            object.__setattr__(
+                self, "levels", whole_number(self.levels, "Spectrum: levels", least=2)
+            )
         steady = _loads(self.steady, "Spectrum: steady")
         object.__setattr__(self, "steady", steady)
         getattr(self, f"_check_{forms[0]}")()
@@ -101,9 +103,13 @@ class Spectrum:
 
     def _check_rows(self) -> None:
         rows = lock(np.array(numbers(self.rows, "Spectrum: rows", (None, 3))))
-        bad = ~((rows[:, 0] < rows[:, 1]) & (rows[:, 2] > 0))
-        if not len(rows) or bad.any():
-            where = f"rows[{int(np.argmax(bad))}] = {rows[np.argmax(bad)]}" if len(rows) else "rows"
+        is_invalid = ~((rows[:, 0] < rows[:, 1]) & (rows[:, 2] > 0))
+        if not len(rows) or is_invalid.any():
+            where = (
+                f"rows[{int(np.argmax(is_invalid))}] = {rows[np.argmax(is_invalid)]}"
+                if len(rows)
+                else "rows"
+            )
             raise ProblemError(
                 f"Spectrum: {where}: give (min, max, count) with min < max, count > 0."
             )
@@ -133,7 +139,7 @@ class Spectrum:
         object.__setattr__(self, "sequence", sequence)
 
     @cached_property
-    def _counted(self) -> NDArray[Any]:
+    def _all_cycles(self) -> NDArray[Any]:
         """All cycles of a block, those that are left out included."""
         if self.states is not None:
             raise ProblemError(
@@ -156,19 +162,19 @@ class Spectrum:
         (k,) structured array
             Columns min, max, count, and at: which point of the history the maximum is.
         """
-        every = self._counted
+        every = self._all_cycles
         return every[every["max"] - every["min"] >= self.least_range]
 
     @property
     def left_out(self) -> NDArray[Any]:
         """Cycles of a block below `least_range`; columns as of `cycles`."""
-        every = self._counted
+        every = self._all_cycles
         return every[every["max"] - every["min"] < self.least_range]
 
     @property
     def extremes(self) -> tuple[float, float]:
         """Smallest and largest factor."""
-        every = self._counted
+        every = self._all_cycles
         return float(every["min"].min()), float(every["max"].max())
 
     @property
@@ -241,7 +247,7 @@ def _loads(value: Any, what: str) -> tuple[Load, ...]:
     loads = entries(value, what)
     for load in loads:
         if not isinstance(load, Load):
-            raise ProblemError(f"{what} has {shown(load)}, which is not a load: see traction.")
+            raise ProblemError(f"{what} has {value_text(load)}, which is not a load: see traction.")
     return loads
 
 

@@ -96,11 +96,11 @@ class rate_table(GrowthLaw):  # noqa: N801 - it is used as a function
         lowest, highest = self.curves[0][0], self.curves[-1][0]
         ratio = np.clip(R, lowest, highest)
         result = np.zeros(dK.shape)
-        left = np.ones(dK.shape, dtype=bool)
+        is_left = np.ones(dK.shape, dtype=bool)
         for low, high in zip(self.curves, self.curves[1:] or self.curves):
-            mine = left & (ratio <= high[0] + (high is low))
-            result[mine] = _between(low, high, dK[mine], ratio[mine])
-            left &= ~mine
+            is_between = is_left & (ratio <= high[0] + (high is low))
+            result[is_between] = _rates_between(low, high, dK[is_between], ratio[is_between])
+            is_left &= ~is_between
         return result
 
 
@@ -149,7 +149,7 @@ def _check_pair(low: Curve, high: Curve) -> None:
         )
 
 
-def _between(low: Curve, high: Curve, dK: Floats, R: Floats) -> Floats:
+def _rates_between(low: Curve, high: Curve, dK: Floats, R: Floats) -> Floats:
     """Rates of points `(n,)` with R between those of two curves, or on one curve."""
     if high[0] == low[0]:
         rates, one = np.log(low[2]), np.log(low[1])
@@ -161,11 +161,11 @@ def _between(low: Curve, high: Curve, dK: Floats, R: Floats) -> Floats:
         on_low, on_high = R <= low[0], R >= high[0]
         if on_low.any() or on_high.any():
             result = np.zeros(len(R))
-            for curve, mine in ((low, on_low), (high, on_high)):
-                result[mine] = _between(curve, curve, dK[mine], R[mine])
-            rest = ~(on_low | on_high)
-            if rest.any():
-                result[rest] = _between(low, high, dK[rest], R[rest])
+            for curve, is_on_curve in ((low, on_low), (high, on_high)):
+                result[is_on_curve] = _rates_between(curve, curve, dK[is_on_curve], R[is_on_curve])
+            is_between = ~(on_low | on_high)
+            if is_between.any():
+                result[is_between] = _rates_between(low, high, dK[is_between], R[is_between])
             return result
     knots = one + weight[:, None] * (other - one)
     with np.errstate(divide="ignore"):

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 
 from xcrack.base.arguments import Array, Number, Part
 from xcrack.base.arrays import Floats
-from xcrack.base.checks import shown
+from xcrack.base.checks import value_text
 from xcrack.base.errors import ProblemError
 from xcrack.base.units import LENGTH, TOUGHNESS
 from xcrack.fatigue.closures import newman_closure
@@ -130,7 +130,8 @@ class el_haddad(Threshold):  # noqa: N801
         super().__post_init__()
         if self.long.needs or isinstance(self.long, _OfNewman):
             raise ProblemError(
-                f"el_haddad: long = {shown(self.long)}: give klesnil_lukas or stepped_threshold."
+                f"el_haddad: long = {value_text(self.long)}: give klesnil_lukas or "
+                f"stepped_threshold."
             )
 
     @property
@@ -158,7 +159,7 @@ class _OfNewman(Threshold):
         if not isinstance(closure, newman_closure):
             raise ProblemError(
                 f"{law}: {type(self).__name__} holds Newman's opening function: give "
-                f"closure=newman_closure(...), not {shown(closure)}."
+                f"closure=newman_closure(...), not {value_text(closure)}."
             )
 
     def of(self, closure: newman_closure, R: ArrayLike, a: ArrayLike | None = None) -> Floats:

@@ -11,7 +11,7 @@ from xcrack.base.arrays import Floats
 from xcrack.base.checks import numbers
 from xcrack.base.errors import ProblemError
 from xcrack.base.units import LENGTH, TOUGHNESS, Dimension
-from xcrack.fatigue.law import Constants, Law, largest_K, powered, range_and_ratio
+from xcrack.fatigue.law import Constants, Law, largest_K, power_of, range_and_ratio
 
 _X, _W = np.polynomial.legendre.leggauss(8)
 _PANELS = 16  # of half a period: a wave may cross the threshold or the plateau in any of them
@@ -58,7 +58,7 @@ class time_rate(Constants):  # noqa: N801 - it is used as a function
         """Growth in a unit of time, length/time; none where K is not positive."""
         given = np.asarray(numbers(K, "time_rate: K"))
         acts = (given > self.K_th) & (given > 0)
-        rate = powered("time_rate", self.C, np.where(acts, given, 1.0), self.n)
+        rate = power_of("time_rate", self.C, np.where(acts, given, 1.0), self.n)
         if self.plateau is not None:
             rate = np.minimum(rate, self.plateau)
         return np.asarray(np.where(acts, rate, 0.0))[()]

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from xcrack.base.checks import shown
+from xcrack.base.checks import value_text
 from xcrack.base.errors import ProblemError
 
 _LENGTHS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "in": 0.0254, "inch": 0.0254}
@@ -46,11 +46,12 @@ class Units:
             It is no text, or not of this form, or a unit is not known.
         """
         if not isinstance(text, str):
-            raise ProblemError(f'units = {shown(text)}: give a text such as "mm, MPa√mm".')
+            raise ProblemError(f'units = {value_text(text)}: give a text such as "mm, MPa√mm".')
         parts = [part.strip() for part in text.split(",")]
         if len(parts) != 2 or parts[0] not in _LENGTHS:
             raise ProblemError(
-                f'units = {shown(text)}: give length and K, such as "m, MPa√m" or "mm, N/mm^1.5"; '
+                f'units = {value_text(text)}: give length and K, such as "m, MPa√m" or "mm, '
+                f'N/mm^1.5"; '
                 f"lengths are {', '.join(_LENGTHS)}."
             )
         length = _LENGTHS[parts[0]]
@@ -58,7 +59,7 @@ class Units:
         return cls(text, length, K, bool(np.isclose(length, root, rtol=1e-12, atol=0)))
 
 
-def _K_of(text: str, whole: str) -> tuple[float, float]:
+def _K_of(text: str, full_text: str) -> tuple[float, float]:
     """One unit of K in Pa√m, and the length under its root in m."""
     if text in _SQUARE_MM:
         return _SQUARE_MM[text], 1e-3
@@ -67,8 +68,8 @@ def _K_of(text: str, whole: str) -> tuple[float, float]:
     )
     if not root or stress.rstrip("*·") not in _STRESSES or length not in _LENGTHS:
         raise ProblemError(
-            f"units = {shown(whole)}: {shown(text)} is no unit of K that is known: give a stress "
-            f"({', '.join(_STRESSES)}), √ and a length, such as MPa√m, or N/mm^1.5."
+            f"units = {value_text(full_text)}: {value_text(text)} is no unit of K that is known: "
+            f"give a stress ({', '.join(_STRESSES)}), √ and a length, such as MPa√m, or N/mm^1.5."
         )
     return _STRESSES[stress.rstrip("*·")] * np.sqrt(_LENGTHS[length]), _LENGTHS[length]
 

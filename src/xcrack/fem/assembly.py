@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from xcrack.base.arrays import Bools, Floats, Ints, stretches
-from xcrack.base.threads import one_blas_thread, streamed
+from xcrack.base.arrays import Bools, Floats, Ints, row_stretches
+from xcrack.base.threads import one_blas_thread, stream_tasks
 from xcrack.fem.consistent import boundary_points, corrected
 from xcrack.fem.facets import LipPoints
 from xcrack.fem.function_space import Batch, FunctionSpace
@@ -49,7 +49,7 @@ class Tabulated:
         return gradient
 
 
-def tabulated(space: FunctionSpace, points: Points) -> Tabulated:
+def tabulate_functions(space: FunctionSpace, points: Points) -> Tabulated:
     """The functions of a space at points.
 
     Parameters
@@ -110,15 +110,15 @@ class Stiffness:
 
     def joined(self, rows: Bools | None = None) -> sp.csr_matrix:
         """The sum, of all rows or of some functions `(n_functions,)`; others are empty."""
-        from xcrack.fem.kernels.bulk import joined
+        from xcrack.fem.kernels.bulk import joined_blocks
 
         body, over = self.body, self.enriched
-        wanted = np.ones(len(over.indptr) - 1, dtype=bool) if rows is None else rows
+        chosen_rows = np.ones(len(over.indptr) - 1, dtype=bool) if rows is None else rows
         entries = body.data.size + over.data.size
         kind = np.int32 if entries < np.iinfo(np.int32).max else np.int64
-        indptr, indices, data = joined(
+        indptr, indices, data = joined_blocks(
             body.indptr.astype(kind, copy=False), body.indices, body.data, over.indptr,
-            over.indices, over.data, wanted,
+            over.indices, over.data, chosen_rows,
         )  # fmt: skip
         return sp.csr_matrix((data, indices, indptr), shape=self.shape)
 
@@ -148,10 +148,10 @@ def next_to_enriched(space: FunctionSpace) -> Bools:
         carries |= number >= 0
     for tip in space.tips:
         carries[: space.mesh.n_points] |= tip.point_to_function >= 0
-    wanted = np.zeros(space.n_functions, dtype=bool)
-    wanted[space.cell_nodes[carries[space.cell_nodes].any(axis=1)]] = True
-    wanted[space.n_nodes :] = True
-    return wanted
+    is_enriched = np.zeros(space.n_functions, dtype=bool)
+    is_enriched[space.cell_nodes[carries[space.cell_nodes].any(axis=1)]] = True
+    is_enriched[space.n_nodes :] = True
+    return is_enriched
 
 
 # Cells that a crack cuts away from its tips: integrated once, as long as their cut stays.
@@ -189,7 +189,7 @@ def with_one_jump(space: FunctionSpace, cells: Ints) -> Bools:
 
 
 def reused_cells(
-    space: FunctionSpace, cells: Ints, known: ReusedCells | None
+    space: FunctionSpace, cells: Ints, earlier: ReusedCells | None
 ) -> tuple[ReusedCells, int]:
     """Integrate cells with one jump, but those that are known already.
 
@@ -198,7 +198,7 @@ def reused_cells(
     space : FunctionSpace
     cells : (m,) array of int
         Growing.
-    known : ReusedCells, optional
+    earlier : ReusedCells, optional
         Of an earlier crack in the same mesh.
 
     Returns
@@ -212,10 +212,10 @@ def reused_cells(
     n, key = space.cell_nodes.shape[1], _keys(space, cells)
     products = np.empty((len(cells), 2 * n * space.dim, 2 * n * space.dim))
     old = np.zeros(len(cells), dtype=bool)
-    if known is not None and len(known.cells):
-        row = np.minimum(np.searchsorted(known.cells, cells), len(known.cells) - 1)
-        old = (known.cells[row] == cells) & (known.key[row] == key).all(axis=1)
-        products[old] = known.products[row[old]]
+    if earlier is not None and len(earlier.cells):
+        row = np.minimum(np.searchsorted(earlier.cells, cells), len(earlier.cells) - 1)
+        old = (earlier.cells[row] == cells) & (earlier.key[row] == key).all(axis=1)
+        products[old] = earlier.products[row[old]]
     new = np.nonzero(~old)[0]
     points = cell_points(space, cells[new], 0, 2 * (space.order - 1))
     for batch, rows in space.batches(cells[new]):
@@ -238,12 +238,12 @@ def _keys(space: FunctionSpace, cells: Ints) -> Floats:
     key = np.zeros((len(cells), 2 * end + nodes - 1))
     for c in np.unique(crack):
         rows = np.nonzero(crack == c)[0]
-        own = cells[rows]
+        cells_of_rows = cells[rows]
         key[rows, 0] = c
-        key[rows, 1:end] = space.cuts[c].level_set.phi[mesh.cells[own]]
-        key[rows, end : end + nodes] = space.heaviside[c][space.cell_nodes[own]] >= 0
+        key[rows, 1:end] = space.cuts[c].level_set.phi[mesh.cells[cells_of_rows]]
+        key[rows, end : end + nodes] = space.heaviside[c][space.cell_nodes[cells_of_rows]] >= 0
         kinks = space.cuts[c].kinks
-        _, bent, row = np.intersect1d(own, kinks.cells, return_indices=True)
+        _, bent, row = np.intersect1d(cells_of_rows, kinks.cells, return_indices=True)
         if len(bent):
             key[rows[bent], 1:end] = kinks.values[row]
             key[rows[bent], end + nodes :] = np.nan_to_num(kinks.vertex[row])
@@ -318,7 +318,7 @@ def bulk(mesh: Mesh, material: Isotropic, order: int) -> Bulk:
         material.mu,
     )
     if mesh.dim == 3:
-        for part in stretches(len(data)):
+        for part in row_stretches(len(data)):
             data[part] = data[part].transpose(0, 2, 1).copy()
         data = data.transpose(0, 2, 1)
     size = n_nodes * mesh.dim
@@ -330,7 +330,7 @@ def enriched_stiffness(
     material: Isotropic,
     numerics: Numerics,
     lips: tuple[LipPoints, ...],
-    known: ReusedCells | None = None,
+    earlier: ReusedCells | None = None,
 ) -> tuple[Enriched, int, ReusedCells | None]:
     """Entries with an enriched function.
 
@@ -338,7 +338,7 @@ def enriched_stiffness(
 
     Parameters
     ----------
-    known : ReusedCells, optional
+    earlier : ReusedCells, optional
         Of an earlier crack in the same mesh.
 
     Returns
@@ -356,7 +356,7 @@ def enriched_stiffness(
         indptr, indices = np.zeros(space.n_functions + 1, np.int64), np.zeros(0, np.int32)
         return Enriched(indptr, indices, np.zeros((0, d, d))), 0, None
     simple = with_one_jump(space, cells)
-    reusable, n_points = reused_cells(space, cells[simple], known)
+    reusable, n_points = reused_cells(space, cells[simple], earlier)
     others = cells[~simple]
     points = cell_points(space, others, numerics.points, 2 * (space.order - 1))
     with_tip = cells[space.has_tip[cells]]
@@ -379,7 +379,7 @@ def enriched_stiffness(
         return batch.functions, first, weight, G
 
     chunks = _chunks(space, points, others)
-    for part in streamed(tabulated, (b for chunk in chunks for b, _ in space.batches(chunk))):
+    for part in stream_tasks(tabulated, (b for chunk in chunks for b, _ in space.batches(chunk))):
         with one_blas_thread():
             functions, first, weight, G = part
             add_stiffness(

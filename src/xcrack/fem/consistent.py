@@ -45,10 +45,10 @@ def boundary_points(
 ) -> BoundaryPoints:
     """Points on all facets and faces of the pieces of the given cells, sorted by cell."""
     parts = [_facet_points(space, cells)]
-    wanted = np.zeros(len(space.mesh.cells), dtype=bool)
-    wanted[cells] = True
+    chosen_cells = np.zeros(len(space.mesh.cells), dtype=bool)
+    chosen_cells[cells] = True
     for c, points in enumerate(lips):
-        parts.extend(_lip_parts(space, c, points, wanted))
+        parts.extend(_lip_parts(space, c, points, chosen_cells))
     cell, bary, normal, side = (np.concatenate(p) for p in zip(*parts, strict=True))
     order = np.argsort(cell, kind="stable")
     return BoundaryPoints(cell[order], bary[order], normal[order], side[order])
@@ -75,8 +75,8 @@ def _facet_points(space: FunctionSpace, cells: Ints) -> _Part:
     point = first[inverse][owner] + k
     # Of each facet of each cell: its corners among those of the cell, and its outward normal.
     corners = mesh.dim + 1
-    same = np.repeat(mesh.cells[cells], corners, axis=0)[:, :, None] == ends[inverse][:, None, :]
-    local = same.argmax(axis=1)
+    is_end = np.repeat(mesh.cells[cells], corners, axis=0)[:, :, None] == ends[inverse][:, None, :]
+    local = is_end.argmax(axis=1)
     inward = mesh.gradient[cells].reshape(-1, mesh.dim)
     outward = -inward / np.linalg.norm(inward, axis=1, keepdims=True)
     bary = np.zeros((len(owner), corners))
@@ -86,21 +86,23 @@ def _facet_points(space: FunctionSpace, cells: Ints) -> _Part:
     side = cell_side(space, cell)
     for c, cut in enumerate(space.cuts):
         crossed = cut.is_cut[cell] | (cut.is_tip[cell] & (side[:, c] == 0))
-        own = parts.side[piece[point], c]
-        side[crossed, c] = own[crossed]
+        side_of_part = parts.side[piece[point], c]
+        side[crossed, c] = side_of_part[crossed]
     return cell, bary, normal, at_joints(space, cell, bary, side)
 
 
-def _lip_parts(space: FunctionSpace, c: int, lips: LipPoints, wanted: np.ndarray) -> list[_Part]:
+def _lip_parts(
+    space: FunctionSpace, c: int, lips: LipPoints, chosen_cells: np.ndarray
+) -> list[_Part]:
     parts = []
-    same = lips.cell[:, 0] == lips.cell[:, 1]
+    in_one_cell = lips.cell[:, 0] == lips.cell[:, 1]
     for s, sign in ((0, -1), (1, 1)):
         cell = lips.cell[:, s]
-        mine = same & wanted[cell]
-        side = lip_side(space, c, cell[mine], lips.bary[mine, s], sign)
+        is_chosen = in_one_cell & chosen_cells[cell]
+        side = lip_side(space, c, cell[is_chosen], lips.bary[is_chosen, s], sign)
         # The normal points from lip - to lip +: outward for the minus side, inward for the plus.
-        normal = -sign * lips.normal[mine] * lips.weight[mine, None]
-        parts.append((cell[mine], lips.bary[mine, s], normal, side))
+        normal = -sign * lips.normal[is_chosen] * lips.weight[is_chosen, None]
+        parts.append((cell[is_chosen], lips.bary[is_chosen, s], normal, side))
     return parts
 
 

@@ -18,7 +18,7 @@ from xcrack.fem.cut_ends import (
     lips_up_to_tips,
     tip_parts,
 )
-from xcrack.fem.kinks_2d import Kinks, no_kinks, sharpened
+from xcrack.fem.kinks_2d import Kinks, no_kinks, sharpened_cut
 from xcrack.fem.level_set import LevelSet
 from xcrack.mesh.locate import barycentric
 from xcrack.mesh.mesh import Mesh
@@ -126,8 +126,8 @@ def cut(mesh: Mesh, level_set: LevelSet) -> Cut:
     lip, owner = interface_simplices(values[candidates], corner_places(mesh, level_set, candidates))
     psi = np.einsum("svb,sb->s", lip, level_set.inside[mesh.cells[candidates[owner]]])
     sign_change = exists[mesh.cell_to_edge[candidates]]
-    close = (level_set.near[mesh.cell_to_edge[candidates]] | ~sign_change).all(axis=1)
-    through = close & (np.bincount(owner, psi, len(candidates)) < 0)
+    is_close = (level_set.near[mesh.cell_to_edge[candidates]] | ~sign_change).all(axis=1)
+    through = is_close & (np.bincount(owner, psi, len(candidates)) < 0)
     cells = candidates[through]
 
     edge_flag = np.zeros(len(mesh.edges), dtype=bool)
@@ -135,7 +135,7 @@ def cut(mesh: Mesh, level_set: LevelSet) -> Cut:
     kinks = no_kinks()
     if len(level_set.line) > 2:
         at = np.where(edge_flag, positions, np.nan)
-        kinks, at = sharpened(mesh, level_set, cells, at)
+        kinks, at = sharpened_cut(mesh, level_set, cells, at)
         positions = np.where(edge_flag, at, positions)
     if len(kinks.cells):
         subs, lips = _kinked_parts(kinks, values, cells)
@@ -143,10 +143,10 @@ def cut(mesh: Mesh, level_set: LevelSet) -> Cut:
         corners = corner_places(mesh, level_set, cells)
         bary, fraction, side, parent = cut_simplices(values[cells], corners)
         subs = [(cells[parent], bary, fraction, side)]
-        lips = [_both(candidates[owner[through[owner]]], lip[through[owner]])]
+        lips = [_inner_lips(candidates[owner[through[owner]]], lip[through[owner]])]
     for end_subs, end_lips, entry in _END_PARTS[mesh.dim](mesh, level_set, positions, exists):
         subs.append(end_subs)
-        lips.append(_both(*end_lips))
+        lips.append(_inner_lips(*end_lips))
         edge_flag[entry] = True
     lips.append(_facet_lips(mesh, level_set))
     lip_cell = np.concatenate([part.cell for part in lips])
@@ -175,7 +175,7 @@ def _kinked_parts(kinks: Kinks, values: Floats, cells: Ints) -> tuple[list[_Subs
     bent = kinks.cells[rows]
     bary, fraction, side, parent = cut_simplices(values[cells])
     straight = ~np.isin(cells[parent], bent)
-    whole = (cells[parent][straight], bary[straight], fraction[straight], side[straight])
+    straight_parts = (cells[parent][straight], bary[straight], fraction[straight], side[straight])
     lip, owner = interface_simplices(values[cells])
     straight = ~np.isin(cells[owner], bent)
     parts = [(cells[owner][straight], lip[straight])]
@@ -183,10 +183,10 @@ def _kinked_parts(kinks: Kinks, values: Floats, cells: Ints) -> tuple[list[_Subs
     owner, lip = (np.concatenate(part) for part in zip(*parts, strict=True))
     length = np.abs(lip[:, 1] - lip[:, 0]).max(axis=1)
     keep = length > 1e-13
-    return [whole, split], [_both(owner[keep], lip[keep])]
+    return [straight_parts, split], [_inner_lips(owner[keep], lip[keep])]
 
 
-def _both(cell: Ints, bary: Floats) -> _Lips:
+def _inner_lips(cell: Ints, bary: Floats) -> _Lips:
     """Lips inside cells: the same cell on both sides."""
     return _Lips(np.stack([cell, cell], axis=1), np.stack([bary, bary], axis=1))
 

@@ -19,7 +19,7 @@ LipParts = tuple[Ints, Floats]  # cell, barycentric vertices
 
 
 @dataclass(frozen=True, eq=False)
-class _Ends:
+class CutEnds:
     bary: Floats
     psi: Floats
     edge: Ints
@@ -27,7 +27,7 @@ class _Ends:
 
 def _cut_points(
     mesh: Mesh, level_set: LevelSet, cells: Ints, positions: Floats, exists: Bools
-) -> _Ends:
+) -> CutEnds:
     """The two points where phi = 0 meets the boundary of triangles in which it changes sign."""
     pairs = local_edges(mesh.dim)
     edge = mesh.cell_to_edge[cells]
@@ -53,7 +53,7 @@ def _cut_points(
         number[row[~vertex], k] = edge[row[~vertex], e]
     inside = level_set.inside[mesh.cells[cells]]
     psi = np.einsum("cvb,cb->cv", bary, inside)
-    return _Ends(bary, psi, number)
+    return CutEnds(bary, psi, number)
 
 
 def tip_parts(
@@ -125,19 +125,21 @@ def lips_up_to_tips(
     x = mesh.points[mesh.facets[facets]]
     ends_at_tip = np.zeros(len(facets), dtype=bool)
     for k, tip in enumerate(level_set.tip):
-        own = level_set.psi[k][mesh.facets[facets]]
+        psi_of_facets = level_set.psi[k][mesh.facets[facets]]
         length = np.linalg.norm(x[:, 1] - x[:, 0], axis=1)
-        ahead, behind_ = own.argmax(axis=1), own.argmin(axis=1)
+        ahead, behind_ = psi_of_facets.argmax(axis=1), psi_of_facets.argmin(axis=1)
         row = np.arange(len(facets))
-        reaches = (own[row, ahead] > -1e-9 * length) & (own[row, behind_] < -1e-9 * length)
+        reaches = (psi_of_facets[row, ahead] > -1e-9 * length) & (
+            psi_of_facets[row, behind_] < -1e-9 * length
+        )
         reaches &= np.isin(cells, level_set.tip_cells[k]).any(axis=1)
         begin = x[row, behind_]
         x = np.where(
             reaches[:, None, None], np.stack([begin, np.broadcast_to(tip, begin.shape)], 1), x
         )
         ends_at_tip |= reaches
-    near = np.nonzero(ends_at_tip | (psi.mean(axis=1) < 0))[0]
-    return x[near], near
+    candidate_facets = np.nonzero(ends_at_tip | (psi.mean(axis=1) < 0))[0]
+    return x[candidate_facets], candidate_facets
 
 
 # Cells at the fronts of a crack in 3D: cut by phi, then by psi.
@@ -181,21 +183,21 @@ def _front_subs(
     """
     phi = level_set.phi[mesh.cells[cells]]
     crossed = (phi.min(axis=1) < 0) & (phi.max(axis=1) > 0)
-    whole, split = np.nonzero(~crossed)[0], np.nonzero(crossed)[0]
+    uncrossed, split = np.nonzero(~crossed)[0], np.nonzero(crossed)[0]
     corners = corner_places(mesh, level_set, cells)
     bary, share, side, parent = cut_simplices(phi[split], corners[split])
     largest = np.take_along_axis(phi, np.abs(phi).argmax(axis=1)[:, None], 1)[:, 0]
-    owner = np.concatenate([whole, split[parent]])
-    bary = np.concatenate([np.broadcast_to(np.eye(4), (len(whole), 4, 4)), bary])
-    share = np.concatenate([np.ones(len(whole)), share])
-    side = np.concatenate([np.where(largest[whole] >= 0, 1, -1), side])
+    owner = np.concatenate([uncrossed, split[parent]])
+    bary = np.concatenate([np.broadcast_to(np.eye(4), (len(uncrossed), 4, 4)), bary])
+    share = np.concatenate([np.ones(len(uncrossed)), share])
+    side = np.concatenate([np.where(largest[uncrossed] >= 0, 1, -1), side])
     for psi in level_set.psi:
         values = psi[mesh.cells[cells]]
         owner, bary, share, side = _cut_again(values, corners, owner, bary, share, side)
     lip, row = interface_simplices(phi[split], corners[split])
     lip_owner = split[row]
     inside = np.einsum("svb,sb->sv", lip, level_set.inside[mesh.cells[cells[lip_owner]]])
-    part, row = behind(inside, np.einsum("svb,sbd->svd", lip, corners[lip_owner]))
+    part, row = parts_behind(inside, np.einsum("svb,sbd->svd", lip, corners[lip_owner]))
     lips = np.einsum("svw,swb->svb", part, lip[row])
     edges = np.unique(mesh.cell_to_edge[cells])
     t = positions[edges]
@@ -211,17 +213,17 @@ def _cut_again(
     psi: Floats, corners: Floats, owner: Ints, bary: Floats, share: Floats, side: Ints
 ) -> tuple[Ints, Floats, Floats, Ints]:
     """Cut sub-cells along psi, given as the places at the corners of their cells `(k, 4)`."""
-    values = _snapped(np.einsum("svb,sb->sv", bary, psi[owner]), psi[owner])
+    values = _snapped_values(np.einsum("svb,sb->sv", bary, psi[owner]), psi[owner])
     cut = (values.min(axis=1) < 0) & (values.max(axis=1) > 0)
-    same, rows = np.nonzero(~cut)[0], np.nonzero(cut)[0]
+    uncut, rows = np.nonzero(~cut)[0], np.nonzero(cut)[0]
     x = np.einsum("svb,sbd->svd", bary[rows], corners[owner[rows]])
     inner, part, _, parent = cut_simplices(values[rows], x)
     source = rows[parent]
     finer = np.einsum("svw,swb->svb", inner, bary[source])
-    every = np.concatenate([same, source])
-    result = np.concatenate([share[same], share[source] * part])
+    every = np.concatenate([uncut, source])
+    result = np.concatenate([share[uncut], share[source] * part])
     keep = result > _NOTHING
-    vertices = np.concatenate([bary[same], finer])
+    vertices = np.concatenate([bary[uncut], finer])
     return owner[every][keep], vertices[keep], result[keep], side[every][keep]
 
 
@@ -233,26 +235,28 @@ def lips_up_to_fronts(
     Those behind fronts.
     """
     x = mesh.points[mesh.facets[facets]]
-    part, row = behind(psi, x)
+    part, row = parts_behind(psi, x)
     return np.einsum("svb,sbd->svd", part, x[row]), row
 
 
-def behind(psi: Floats, x: Floats | None = None) -> tuple[Floats, Ints]:
+def parts_behind(psi: Floats, x: Floats | None = None) -> tuple[Floats, Ints]:
     """Parts of triangles x `(k, 3, 3)` on which psi `(k, 3)` is negative, and their triangles.
 
     Vertices `(s, 3, 3)` in barycentric coordinates, and numbers `(s,)`.
     """
-    values = _snapped(psi, psi)
+    values = _snapped_values(psi, psi)
     cut = (values.min(axis=1) < 0) & (values.max(axis=1) > 0)
-    whole = np.nonzero(~cut & (values.min(axis=1) < 0))[0]
+    uncut = np.nonzero(~cut & (values.min(axis=1) < 0))[0]
     rows = np.nonzero(cut)[0]
     inner, _, side, parent = cut_simplices(values[rows], None if x is None else x[rows])
-    mine = side < 0
-    corner = np.broadcast_to(np.eye(3), (len(whole), 3, 3))
-    return np.concatenate([corner, inner[mine]]), np.concatenate([whole, rows[parent[mine]]])
+    is_behind = side < 0
+    corner = np.broadcast_to(np.eye(3), (len(uncut), 3, 3))
+    return np.concatenate([corner, inner[is_behind]]), np.concatenate(
+        [uncut, rows[parent[is_behind]]]
+    )
 
 
-def _snapped(values: Floats, scale: Floats) -> Floats:
+def _snapped_values(values: Floats, scale: Floats) -> Floats:
     small = _AT * np.abs(scale).max(axis=1, keepdims=True)
     return np.where(np.abs(values) < small, 0.0, values)
 

@@ -25,7 +25,7 @@ def disc_radii(
     cracks: tuple[Crack, ...],
     cuts: tuple[Cut, ...],
     order: int,
-    wanted: float | None,
+    enriched_radius: float | None,
     meeting: Floats,
 ) -> list[tuple[float, ...]]:
     """Radius of the enriched disc at each tip of each crack, length.
@@ -38,21 +38,21 @@ def disc_radii(
     tips = [tip_frames(crack)[0] for crack in cracks]
     every = np.concatenate(tips) if tips else np.zeros((0, mesh.dim))
     radii = []
-    for crack, cut, own in zip(cracks, cuts, tips, strict=True):
-        length = crack_length(crack) / max(len(own), 1)
+    for crack, cut, tips_of_crack in zip(cracks, cuts, tips, strict=True):
+        length = crack_length(crack) / max(len(tips_of_crack), 1)
         row = []
-        for k, x in enumerate(own):
+        for k, x in enumerate(tips_of_crack):
             to_boundary, _ = nearest_boundary(mesh, x)
-            apart = np.linalg.norm(every - x, axis=1)
-            to_tip = float(np.min(apart[apart > 0], initial=np.inf))
+            distance = np.linalg.norm(every - x, axis=1)
+            to_tip = float(np.min(distance[distance > 0], initial=np.inf))
             to_joint = float(np.linalg.norm(meeting - x, axis=1).min(initial=np.inf))
             size = leg_size(mesh, cut.level_set.tip_cells[k])
-            if wanted is None:
+            if enriched_radius is None:
                 radius = min(
                     _SHARE[order] * min(length, to_boundary, to_tip, to_joint), _MOST[order] * size
                 )
             else:
-                radius = min(wanted, 0.8 * to_boundary, 0.45 * to_tip, 0.8 * to_joint)
+                radius = min(enriched_radius, 0.8 * to_boundary, 0.45 * to_tip, 0.8 * to_joint)
             row.append(max(radius, _LEAST * size))
         radii.append(tuple(row))
     return radii
@@ -71,14 +71,14 @@ _EXIT = 1.5  # a front is near its exit where that is closer than this many dist
 _SAMPLES = 24  # points of an open front at which the distance to the boundary is taken
 
 
-def front_reach(mesh: Mesh, crack: Crack, wanted: float | None) -> float:
+def front_reach(mesh: Mesh, crack: Crack, radius: float | None) -> float:
     """Distance from the fronts of a 3D crack up to which tip functions may act, length."""
     fronts = [crack.points[front] for front in crack.fronts or ()]
     if not fronts:
         return 0.0
-    near = mesh.cell_tree.query(np.concatenate(fronts))[1]
-    size = float(mesh.cell_size[near].max())
-    return max(wanted or 0.0, _RANGE[1][1] * size) + size
+    nearest = mesh.cell_tree.query(np.concatenate(fronts))[1]
+    size = float(mesh.cell_size[nearest].max())
+    return max(radius or 0.0, _RANGE[1][1] * size) + size
 
 
 def front_radii(
@@ -86,7 +86,7 @@ def front_radii(
     cracks: tuple[Crack, ...],
     cuts: tuple[Cut, ...],
     order: int,
-    wanted: float | None,
+    radius: float | None,
     meeting: Floats,
 ) -> list[tuple[float, ...]]:
     """Radius of the enriched tube around each front of each crack, length.
@@ -102,7 +102,7 @@ def front_radii(
     cracks : tuple of Crack
     cuts : tuple of Cut
     order : int
-    wanted : float, length, optional
+    radius : float, length, optional
     meeting : (0, 3) array
         Fronts meet no junctions.
     """
@@ -115,23 +115,26 @@ def front_radii(
     for c, (crack, cut) in enumerate(zip(cracks, cuts, strict=True)):
         row = []
         fronts = crack.fronts or ()
-        if fronts and wanted is None:
+        if fronts and radius is None:
             size = surface_size(crack, mesh, body)
         for k, numbers in enumerate(fronts):
             cell = leg_size(mesh, cut.level_set.tip_cells[k])
             closed = bool(numbers[0] == numbers[-1])
             room = _ASIDE * _to_sides(body, every[c][k], closed)
             others = [
-                x for d, own in enumerate(every) for j, x in enumerate(own) if (d, j) != (c, k)
+                x
+                for d, fronts_of_crack in enumerate(every)
+                for j, x in enumerate(fronts_of_crack)
+                if (d, j) != (c, k)
             ]
             if others:
                 nearest = cKDTree(np.concatenate(others)).query(every[c][k])[0]
                 room = min(room, _APART * float(nearest.min()))
-            if wanted is None:
+            if radius is None:
                 free = min(_SHARE_OF_FRONT * (2 if closed else 1) * size, room)
                 row.append(max(min(free, most * cell), least * cell))
             else:
-                row.append(max(min(wanted, room), _LEAST_OF_FRONT * cell))
+                row.append(max(min(radius, room), _LEAST_OF_FRONT * cell))
         radii.append(tuple(row))
     return radii
 
@@ -164,7 +167,7 @@ def tip_radii(
     cracks: tuple[Crack, ...],
     cuts: tuple[Cut, ...],
     order: int,
-    wanted: float | None,
+    radius: float | None,
     meeting: Floats,
 ) -> list[tuple[float, ...]]:
     """Radius of the enriched disc around each tip, in 3D of the tube around each front, by crack.
@@ -176,13 +179,13 @@ def tip_radii(
     cuts : tuple of Cut
     order : int
         Of the standard functions.
-    wanted : float, length, optional
+    radius : float, length, optional
         Shrunk only where the body or another tip demands; see `disc_radii` and `front_radii` for
         what is taken without it.
     meeting : (k, d) array, length
         Where cracks end on others.
     """
-    return _RADII[mesh.dim](mesh, cracks, cuts, order, wanted, meeting)
+    return _RADII[mesh.dim](mesh, cracks, cuts, order, radius, meeting)
 
 
 def heaviside_nodes(mesh: Mesh, order: int, cut: Cut) -> Bools:
@@ -222,8 +225,10 @@ def tip_points(mesh: Mesh, order: int, cut: Cut, k: int, radius: float, kind: st
         distance = np.hypot(cut.level_set.phi, cut.level_set.psi[k])
         flag |= distance <= radius * (1 + 1e-9)
         if (mesh.dim, order) in _WHOLE:
-            whole = _WHOLE[mesh.dim, order] * leg_size(mesh, tip_cells)
-            flag[mesh.cells[cells_within(mesh, cut.level_set.tip[k], whole * (1 + 1e-9))]] = True
+            whole_size = _WHOLE[mesh.dim, order] * leg_size(mesh, tip_cells)
+            flag[mesh.cells[cells_within(mesh, cut.level_set.tip[k], whole_size * (1 + 1e-9))]] = (
+                True
+            )
     return flag
 
 

@@ -125,13 +125,13 @@ def _split_triangles(space: FunctionSpace, ends: Ints) -> FacetParts:
     side = np.zeros((k, len(space.cuts)), dtype=np.int64)
     facet = space.mesh.facet_numbers(ends)
     for c, cut in enumerate(space.cuts):
-        touched, at_front = _touched(space, c)
+        touched, at_front = _touched_facets(space, c)
         levels = [(cut.level_set.phi, touched)]
         levels += [(psi, at_front) for psi in cut.level_set.psi]
         for values, where in levels:
             chosen = where[facet[number]]
             x = np.einsum("svb,sbd->svd", bary, space.mesh.points[ends[number]])
-            number, bary, side = _split(number, bary, side, x, values[ends], chosen)
+            number, bary, side = _split_parts(number, bary, side, x, values[ends], chosen)
         at = np.einsum("svb,sb->sv", bary, cut.level_set.phi[ends[number]])
         largest = np.take_along_axis(at, np.abs(at).argmax(axis=1)[:, None], 1)[:, 0]
         changes = (at.min(axis=1) < 0) & (at.max(axis=1) > 0) & ~touched[facet[number]]
@@ -139,7 +139,7 @@ def _split_triangles(space: FunctionSpace, ends: Ints) -> FacetParts:
     return FacetParts(number, bary, side)
 
 
-def _touched(space: FunctionSpace, c: int) -> tuple[Bools, Bools]:
+def _touched_facets(space: FunctionSpace, c: int) -> tuple[Bools, Bools]:
     """Facets of the cells that crack c cuts or ends in, and of the latter alone."""
     mesh, cut = space.mesh, space.cuts[c]
     flags = []
@@ -154,7 +154,7 @@ _SPLIT = {2: _split_segments, 3: _split_triangles}
 _POINTS = {2: _on_segments, 3: _on_triangles}
 
 
-def _split(
+def _split_parts(
     number: Ints, bary: Floats, side: Ints, x: Floats, values: Floats, chosen: Bools
 ) -> tuple[Ints, Floats, Ints]:
     """Split those of the chosen parts x on which a function of the facet changes its sign."""
@@ -162,11 +162,11 @@ def _split(
     small = _AT * np.abs(values[number]).max(axis=1, keepdims=True)
     at = np.where(np.abs(at) < small, 0.0, at)
     cut = chosen & (at.min(axis=1) < 0) & (at.max(axis=1) > 0)
-    same, rows = np.nonzero(~cut)[0], np.nonzero(cut)[0]
+    uncut, rows = np.nonzero(~cut)[0], np.nonzero(cut)[0]
     inner, _, _, parent = cut_simplices(at[rows], x[rows])
-    source = np.concatenate([same, rows[parent]])
+    source = np.concatenate([uncut, rows[parent]])
     finer = np.einsum("svw,swb->svb", inner, bary[rows[parent]])
-    return number[source], np.concatenate([bary[same], finer]), side[source]
+    return number[source], np.concatenate([bary[uncut], finer]), side[source]
 
 
 # Integration points on the faces of a crack, shared by contact, loads and K.
@@ -239,12 +239,12 @@ def _along_line(polyline: Floats, x: Floats, corners: Floats) -> Floats:
     return arc_position(polyline, x) - ends.min(initial=np.inf)
 
 
-def _nowhere(points: Floats, x: Floats, corners: Floats) -> Floats:
+def _without_order(points: Floats, x: Floats, corners: Floats) -> Floats:
     """A surface has no order of its points."""
     return np.zeros(len(x))
 
 
-_POSITION = {2: _along_line, 3: _nowhere}
+_POSITION = {2: _along_line, 3: _without_order}
 
 
 def arc_position(polyline: Floats, x: Floats) -> Floats:

@@ -136,8 +136,8 @@ class FunctionSpace:
         levels = [node_level(self.mesh, self.order, cut.level_set.phi) for cut in self.cuts]
         sides = [np.where(phi >= 0, 1, -1).astype(np.int64) for phi in levels]
         for joint in self.joints:
-            away = np.linalg.norm(self.node_points - joint.centre, axis=1)
-            beyond = (away < _BESIDE * joint.reach) & (sides[joint.on] != joint.side)
+            distance = np.linalg.norm(self.node_points - joint.centre, axis=1)
+            beyond = (distance < _BESIDE * joint.reach) & (sides[joint.on] != joint.side)
             sides[joint.crack][beyond] = 0
         return tuple(lock(side) for side in sides)
 
@@ -205,9 +205,9 @@ class FunctionSpace:
         for batch, rows in groups:
             place = np.full(len(cells), -1, dtype=np.int64)
             place[rows] = np.arange(len(rows))
-            own = place[inverse]
-            number = (own >= 0).nonzero()[0]
-            served.append((batch, number, own[number]))
+            positions = place[inverse]
+            number = (positions >= 0).nonzero()[0]
+            served.append((batch, number, positions[number]))
         return served
 
     def _batch(self, cells: Ints, cracks: tuple[int, ...], tips: tuple[int, ...]) -> Batch:
@@ -255,9 +255,9 @@ class FunctionSpace:
         set_standard(N, G, row, bary, gradient, edges[: len(edges) if self.order == 2 else 0])
         first = n
         for c in batch.cracks:
-            own = np.ascontiguousarray(side[:, c])
+            side_of_crack = np.ascontiguousarray(side[:, c])
             nodes = self.cell_nodes[batch.cells]
-            set_jumps(N, G, first, row, own, nodes, self.node_side[c], self.heaviside[c])
+            set_jumps(N, G, first, row, side_of_crack, nodes, self.node_side[c], self.heaviside[c])
             first += n
         for t in batch.tips:
             self._tabulate_tip(t, batch, (N, G), first, row, bary, side)

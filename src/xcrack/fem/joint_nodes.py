@@ -32,17 +32,17 @@ def jump_nodes(space: FunctionSpace) -> tuple[Bools, ...]:
     """
     result = [number >= 0 for number in space.heaviside]
     for joint in space.joints:
-        own, on = space.cuts[joint.crack], space.cuts[joint.on]
+        ending_cut, on = space.cuts[joint.crack], space.cuts[joint.on]
         inner = _nodes_of(space, joint.near)
         cells = np.nonzero(inner[space.cell_nodes].any(axis=1))[0]
         subs = sub_cells(space, cells)
         # Ahead of a tip the level set changes its sign too, but cuts nothing.
-        crossed = own.is_cut[subs.cell] | on.is_cut[subs.cell]
+        crossed = ending_cut.is_cut[subs.cell] | on.is_cut[subs.cell]
         size = space.mesh.cell_size[cells_around(space.mesh, joint.centre, 1e-9)].max()
-        away = np.linalg.norm(space.node_points - joint.centre, axis=1)
-        added = _parted(space, subs, joint.crack, crossed) & (away < _BESIDE * size)
-        added &= inner & ~_nodes_of(space, own.is_tip)
-        parted = _parted(space, subs, joint.crack, np.ones(len(crossed), dtype=bool))
+        distance = np.linalg.norm(space.node_points - joint.centre, axis=1)
+        added = _parted_nodes(space, subs, joint.crack, crossed) & (distance < _BESIDE * size)
+        added &= inner & ~_nodes_of(space, ending_cut.is_tip)
+        parted = _parted_nodes(space, subs, joint.crack, np.ones(len(crossed), dtype=bool))
         result[joint.crack] = added | (result[joint.crack] & (parted | ~inner))
     return tuple(result)
 
@@ -54,13 +54,13 @@ def _nodes_of(space: FunctionSpace, cells: Bools) -> Bools:
     return flag
 
 
-def _parted(space: FunctionSpace, subs: SubCells, c: int, chosen: Bools) -> Bools:
+def _parted_nodes(space: FunctionSpace, subs: SubCells, c: int, chosen: Bools) -> Bools:
     """Nodes with chosen sub-cells on both sides of crack c `(nodes,)`."""
     result = np.ones(space.n_nodes, dtype=bool)
     for side in (1, -1):
-        there = chosen & (subs.side[:, c] == side) & (subs.fraction > _NOTHING)
+        has_part = chosen & (subs.side[:, c] == side) & (subs.fraction > _NOTHING)
         flag = np.zeros(space.n_nodes, dtype=bool)
-        flag[space.cell_nodes[subs.cell[there]]] = True
+        flag[space.cell_nodes[subs.cell[has_part]]] = True
         result &= flag
     return result
 

@@ -70,43 +70,56 @@ def joined_cuts(
     joints : tuple of Joint
     """
     result, joints = list(cuts), []
-    for own in junctions:
-        through, ending, joint = _joined(mesh, result[own.on], result[own.crack], own)
-        result[own.on], result[own.crack] = through, ending
+    for junction in junctions:
+        through, ending, joint = _joined_pair(
+            mesh, result[junction.on], result[junction.crack], junction
+        )
+        result[junction.on], result[junction.crack] = through, ending
         joints.append(joint)
     return tuple(result), tuple(joints)
 
 
-def _joined(mesh: Mesh, through: Cut, ending: Cut, own: Junction) -> tuple[Cut, Cut, Joint]:
+def _joined_pair(
+    mesh: Mesh, through: Cut, ending: Cut, junction: Junction
+) -> tuple[Cut, Cut, Joint]:
     """Cuts of the crack that runs through and of the one that ends on it."""
     centre = mesh.points[mesh.cells].mean(axis=1)
-    own = replace(own, reach=_reach(mesh, through, ending, own))
-    near = np.linalg.norm(centre - own.x, axis=1) < own.reach
-    split = _split(mesh, through, ending, own, near)
+    junction = replace(junction, reach=_joint_radius(mesh, through, ending, junction))
+    is_near = np.linalg.norm(centre - junction.x, axis=1) < junction.reach
+    split = _split_cut(mesh, through, ending, junction, is_near)
     lips = split.lip_points(mesh)
     values = np.abs(_at(mesh, ending.level_set.phi, split.lip_cell[:, 1], split.lip_bary[:, 1]))
-    away = np.linalg.norm(lips - own.x, axis=2) + values
-    x = lips.reshape(-1, 2)[int(np.argmin(away))]
-    clipped, both = _clipped(mesh, through, ending, own, near)
-    joint = Joint(own.crack, own.on, own.side, lock(x), own.x, own.reach, lock(near), lock(both))
+    distance = np.linalg.norm(lips - junction.x, axis=2) + values
+    x = lips.reshape(-1, 2)[int(np.argmin(distance))]
+    clipped, both = _clipped_cut(mesh, through, ending, junction, is_near)
+    joint = Joint(
+        junction.crack,
+        junction.on,
+        junction.side,
+        lock(x),
+        junction.x,
+        junction.reach,
+        lock(is_near),
+        lock(both),
+    )
     return split, clipped, joint
 
 
-def _reach(mesh: Mesh, through: Cut, ending: Cut, own: Junction) -> float:
+def _joint_radius(mesh: Mesh, through: Cut, ending: Cut, junction: Junction) -> float:
     """Radius that holds all points whose cells both cracks cut, and no tip.
 
     Cells that both cracks cut lie farther from a shallow junction than their mean size tells.
     """
-    h = float(mesh.cell_size[cells_around(mesh, own.x, 1e-9)].mean())
+    h = float(mesh.cell_size[cells_around(mesh, junction.x, 1e-9)].mean())
     flags = np.zeros((2, mesh.n_points), dtype=bool)
     for flag, cut in zip(flags, (through, ending), strict=True):
         flag[mesh.cells[cut.cells]] = True
-    away = np.linalg.norm(mesh.points[flags.all(axis=0)] - own.x, axis=1)
-    common = float(away[away < 2 * own.reach].max(initial=0.0))
+    distance = np.linalg.norm(mesh.points[flags.all(axis=0)] - junction.x, axis=1)
+    common = float(distance[distance < 2 * junction.reach].max(initial=0.0))
     tips = [*through.level_set.tip, *ending.level_set.tip]
-    tip = min((float(np.linalg.norm(x - own.x)) for x in tips), default=np.inf)
-    wanted = min(max(own.reach, common + _ROOM * h), tip - _FROM_TIP * h)
-    return max(wanted, min(max(common + _LEAST * h, REACH * h), own.reach))
+    tip = min((float(np.linalg.norm(x - junction.x)) for x in tips), default=np.inf)
+    radius = min(max(junction.reach, common + _ROOM * h), tip - _FROM_TIP * h)
+    return max(radius, min(max(common + _LEAST * h, REACH * h), junction.reach))
 
 
 def _at(mesh: Mesh, values: Floats, cell: Ints, bary: Floats) -> Floats:
@@ -120,7 +133,7 @@ def _level(mesh: Mesh, cut: Cut, cell: Ints, bary: Floats) -> Floats:
     return cut.level(mesh, cell.repeat(v), bary.reshape(-1, bary.shape[2])).reshape(-1, v)
 
 
-def _crossed(
+def _crossing_shares(
     mesh: Mesh, cut: Cut, cell: Ints, bary: Floats, share: Floats, begin: Floats
 ) -> Floats:
     """Shares of segments `(k, 2, 3)` at which a cut crosses them: halved where it has a kink.
@@ -132,40 +145,40 @@ def _crossed(
     low, high = np.zeros(len(bent)), np.ones(len(bent))
     for _ in range(_HALVES if len(bent) else 0):
         middle = (low + high) / 2
-        at = _between(bary[bent][:, None], middle)
+        at = _points_between(bary[bent][:, None], middle)
         before = begin[bent] * _level(mesh, cut, cell[bent], at)[:, 0] > 0
         low, high = np.where(before, middle, low), np.where(before, high, middle)
     result[bent] = (low + high) / 2
     return result
 
 
-def _between(bary: Floats, share: Floats) -> Floats:
+def _points_between(bary: Floats, share: Floats) -> Floats:
     """Points on segments `(k, 2, 2, 3)` at a share of their way `(k, 2, 3)`."""
     t = share[:, None, None]
     return np.asarray((1 - t) * bary[:, :, 0] + t * bary[:, :, 1])
 
 
-def _clipped(
-    mesh: Mesh, through: Cut, ending: Cut, own: Junction, near: Bools
+def _clipped_cut(
+    mesh: Mesh, through: Cut, ending: Cut, junction: Junction, is_near: Bools
 ) -> tuple[Cut, Bools]:
     """The cut of the crack that ends, without what lies beyond the other, and the cells of both."""
-    phi, side = through.level_set.phi, own.side
+    phi, side = through.level_set.phi, junction.side
     cell = ending.lip_cell[:, 0]
     value = _level(mesh, through, cell, ending.lip_bary[:, 0]) * side
     value[np.abs(value) < 1e-13 * mesh.cell_size[cell, None]] = 0.0
-    keep = ~near[cell] | (value > 0).any(axis=1)
-    shorten = near[cell] & keep & (value < 0).any(axis=1)
+    keep = ~is_near[cell] | (value > 0).any(axis=1)
+    shorten = is_near[cell] & keep & (value < 0).any(axis=1)
     bary = np.array(ending.lip_bary)
     rows = np.nonzero(shorten)[0]
     a, b = value[rows].T
-    share = _crossed(mesh, through, cell[rows], bary[rows, 0], a / (a - b), a * side)
-    bary[rows, :, (b < 0).astype(np.int64)] = _between(bary[rows], share)
-    gone = np.zeros(len(mesh.cells), dtype=bool)
-    gone[cell[~keep & (cell == ending.lip_cell[:, 1])]] = True
-    cells = ending.cells[~gone[ending.cells]]
+    share = _crossing_shares(mesh, through, cell[rows], bary[rows, 0], a / (a - b), a * side)
+    bary[rows, :, (b < 0).astype(np.int64)] = _points_between(bary[rows], share)
+    is_discarded = np.zeros(len(mesh.cells), dtype=bool)
+    is_discarded[cell[~keep & (cell == ending.lip_cell[:, 1])]] = True
+    cells = ending.cells[~is_discarded[ending.cells]]
     both = np.zeros(len(mesh.cells), dtype=bool)
-    both[cells] = through.is_cut[cells] & near[cells]
-    subs = ~(gone | both)[ending.sub_to_cell]
+    both[cells] = through.is_cut[cells] & is_near[cells]
+    subs = ~(is_discarded | both)[ending.sub_to_cell]
     one, two = mesh.edges.T
     t = ending.cut_edge
     # At a kink the other crack cuts an edge elsewhere than where phi is zero.
@@ -173,10 +186,12 @@ def _clipped(
     with np.errstate(invalid="ignore"):
         at_cut = np.where(t < other, phi[one], phi[two])
     at_cut = np.where(np.isnan(other), (1 - t) * phi[one] + t * phi[two], at_cut) * side
-    close = np.linalg.norm(mesh.points[mesh.edges].mean(axis=1) - own.x, axis=1) < own.reach
+    is_close = (
+        np.linalg.norm(mesh.points[mesh.edges].mean(axis=1) - junction.x, axis=1) < junction.reach
+    )
     with np.errstate(invalid="ignore"):
-        cut_edge = np.where(close & (at_cut < 0), np.nan, t)
-    sides = np.where(near & (through.side == -side), 0, ending.side)
+        cut_edge = np.where(is_close & (at_cut < 0), np.nan, t)
+    sides = np.where(is_near & (through.side == -side), 0, ending.side)
     return replace(
         ending,
         cells=lock(cells),
@@ -192,17 +207,17 @@ def _clipped(
     ), both
 
 
-def _split(mesh: Mesh, through: Cut, ending: Cut, own: Junction, near: Bools) -> Cut:
+def _split_cut(mesh: Mesh, through: Cut, ending: Cut, junction: Junction, is_near: Bools) -> Cut:
     """The cut of the crack that runs through, its faces split where the other one meets them."""
-    cell = through.lip_cell[:, (own.side + 1) // 2]
-    bary = through.lip_bary[np.arange(len(cell)), (own.side + 1) // 2]
+    cell = through.lip_cell[:, (junction.side + 1) // 2]
+    bary = through.lip_bary[np.arange(len(cell)), (junction.side + 1) // 2]
     value = _at(mesh, ending.level_set.phi, cell, bary)
     value[np.abs(value) < 1e-13 * mesh.cell_size[cell, None]] = 0.0
     rows = np.nonzero(
-        near[cell] & ending.is_cut[cell] & (value.min(axis=1) < 0) & (value.max(axis=1) > 0)
+        is_near[cell] & ending.is_cut[cell] & (value.min(axis=1) < 0) & (value.max(axis=1) > 0)
     )[0]
     a, b = value[rows].T
-    middle = _between(through.lip_bary[rows], a / (a - b))
+    middle = _points_between(through.lip_bary[rows], a / (a - b))
     first, second = np.array(through.lip_bary), np.array(through.lip_bary[rows])
     first[rows, :, 1] = middle
     second[:, :, 0] = middle

@@ -80,7 +80,7 @@ class Kinks:
 
     def faces(self, rows: Ints) -> Floats:
         """Both pieces of the crack in cells with a vertex, by row: their ends `(r, 2, 2, 3)`."""
-        ends = np.array([_crossed(self.values[row]) for row in rows]).reshape(-1, 2, 3)
+        ends = np.array([_crossing_ends(self.values[row]) for row in rows]).reshape(-1, 2, 3)
         vertex = self.vertex[rows]
         return np.stack(
             [np.stack([ends[:, 0], vertex], axis=1), np.stack([vertex, ends[:, 1]], axis=1)], axis=1
@@ -93,7 +93,7 @@ def no_kinks() -> Kinks:
     return Kinks(lock(np.zeros((0, 2))), lock(np.zeros(0, np.int64)), empty, empty)
 
 
-def sharpened(
+def sharpened_cut(
     mesh: Mesh, level_set: LevelSet, cells: Ints, positions: Floats
 ) -> tuple[Kinks, Floats]:
     """Kinks in the cells that a crack cuts, and its positions on the edges `(e,)`.
@@ -110,20 +110,20 @@ def sharpened(
     line = level_set.line
     numbers = kink_numbers(line)
     numbers = numbers[turns(line)[numbers - 1] < _THIN]
-    own = [cells_around(mesh, line[k], 1e-12) for k in numbers]
+    cells_at_kinks = [cells_around(mesh, line[k], 1e-12) for k in numbers]
     reach = [
         cells_within(mesh, line[k], _REACH * mesh.cell_size[c].max())
-        for k, c in zip(numbers, own, strict=True)
+        for k, c in zip(numbers, cells_at_kinks, strict=True)
         if len(c)
     ]
-    near = np.intersect1d(np.concatenate([*reach, np.zeros(0, np.int64)]), cells)
-    if not len(near):
+    cells_near = np.intersect1d(np.concatenate([*reach, np.zeros(0, np.int64)]), cells)
+    if not len(cells_near):
         return no_kinks(), positions
-    edges = np.unique(mesh.cell_to_edge[near])
+    edges = np.unique(mesh.cell_to_edge[cells_near])
     edges = edges[~np.isnan(positions[edges])]
     moved = _crossings(mesh, level_set, edges, positions)
     changed = ~np.isnan(positions) & (moved != positions)
-    where, points = _vertices(mesh, level_set, near, moved, numbers)
+    where, points = _vertices(mesh, level_set, cells_near, moved, numbers)
     redone = changed[mesh.cell_to_edge[cells]].any(axis=1) | np.isin(cells, list(where))
     rows = np.sort(cells[redone])
     values = _values(mesh, level_set.phi, rows, moved)
@@ -148,9 +148,9 @@ def _crossings(mesh: Mesh, level_set: LevelSet, edges: Ints, positions: Floats) 
         s = _cross(a - p, q - p) / _cross(q - p, b - a)
     hit = (s >= -_AT) & (s <= 1 + _AT) & (t >= 0) & (t <= 1)
     at = np.where(hit, t, 0.0).max(axis=1, initial=0.0)
-    same = np.where(hit, np.abs(t - at[:, None]), 0.0).max(axis=1, initial=0.0) <= 1e-8
+    is_single = np.where(hit, np.abs(t - at[:, None]), 0.0).max(axis=1, initial=0.0) <= 1e-8
     at = np.clip(at, SNAP, 1 - SNAP)
-    moves = hit.any(axis=1) & same & (np.abs(at - positions[edges]) > _ROUND_OFF)
+    moves = hit.any(axis=1) & is_single & (np.abs(at - positions[edges]) > _ROUND_OFF)
     result = np.array(positions)
     result[edges[moves]] = at[moves]
     return result
@@ -165,7 +165,7 @@ def _vertices(
     piece behind it. A kink that sticks out of it is moved to its side.
     """
     line = level_set.line
-    ends = np.stack([_crossed(v) for v in _values(mesh, level_set.phi, cells, positions)])
+    ends = np.stack([_crossing_ends(v) for v in _values(mesh, level_set.phi, cells, positions)])
     x = np.einsum("ceb,cbd->ced", ends, mesh.points[mesh.cells[cells]])
     piece = _pieces(line, x.reshape(-1, 2)).reshape(-1, 2)
     first, last = piece.min(axis=1), piece.max(axis=1)
@@ -178,13 +178,16 @@ def _vertices(
             points.append(line[k])
             continue
         inner = (first < numbers[:, None]) & (numbers[:, None] <= last)
-        mine = np.nonzero((first < k) & (k <= last) & (inner.sum(axis=0) == 1))[0]
-        if len(mine) != 1 or is_tip[cells[mine[0]]]:
+        cells_of_kink = np.nonzero((first < k) & (k <= last) & (inner.sum(axis=0) == 1))[0]
+        if len(cells_of_kink) != 1 or is_tip[cells[cells_of_kink[0]]]:
             continue
-        cell = cells[mine[0]]
+        cell = cells[cells_of_kink[0]]
         at = np.maximum(barycentric(mesh, np.array([cell]), line[k][None])[0], 0.0)
         at = np.where(at > _ROUND_OFF, at, 0.0) / at.sum()
-        if abs(np.linalg.det([ends[mine[0], 0], at, ends[mine[0], 1]])) > _ROUND_OFF:
+        if (
+            abs(np.linalg.det([ends[cells_of_kink[0], 0], at, ends[cells_of_kink[0], 1]]))
+            > _ROUND_OFF
+        ):
             where[int(cell)] = at
             points.append(at @ mesh.points[mesh.cells[cell]])
     return where, np.array(points).reshape(-1, 2)
@@ -193,8 +196,8 @@ def _vertices(
 def _pieces(line: Floats, x: Floats) -> Ints:
     """Number of the piece of a polyline that is nearest to each point `(k,)`."""
     pairs = zip(line[:-1], line[1:], strict=True)
-    away = [np.linalg.norm(x - closest_on_segment(x, a, b), axis=1) for a, b in pairs]
-    return np.argmin(away, axis=0)
+    distances = [np.linalg.norm(x - closest_on_segment(x, a, b), axis=1) for a, b in pairs]
+    return np.argmin(distances, axis=0)
 
 
 def _values(mesh: Mesh, phi: Floats, cells: Ints, positions: Floats) -> Floats:
@@ -229,7 +232,7 @@ def _loop(values: Floats) -> list[Floats]:
     return loop
 
 
-def _crossed(values: Floats) -> Floats:
+def _crossing_ends(values: Floats) -> Floats:
     """The two points of the boundary of a triangle where a linear function is zero `(2, 3)`."""
     loop = _loop(values)
     return np.array([p for p in loop if abs(values @ p) <= 1e-12 * np.abs(values).max()])[:2]
@@ -240,7 +243,7 @@ def _two_lines(values: Floats, vertex: Floats) -> tuple[Floats, float]:
 
     With the sign such that the sign times the smaller of both times the sign is like the level set.
     """
-    first, last = _crossed(values)
+    first, last = _crossing_ends(values)
     lines = np.stack([np.cross(first, vertex), np.cross(vertex, last)])
     lines /= np.abs(lines).max(axis=1, keepdims=True)
     left = 1.0 if np.linalg.det([first, vertex, last]) > 0 else -1.0

@@ -13,7 +13,7 @@ from xcrack.mesh.distances import front_distance, surface_distance
 from xcrack.mesh.locate import cells_around
 from xcrack.mesh.mesh import Mesh, local_facets
 from xcrack.mesh.polygon import boxes_meet
-from xcrack.mesh.triangulation import face_normals, rim, ruled, unit
+from xcrack.mesh.triangulation import face_normals, rim, ruled_strip, unit
 
 SNAP = 1e-10  # share of an edge below which a cut point is moved onto its end
 
@@ -75,7 +75,7 @@ def near_edges(mesh: Mesh, phi: Floats) -> Bools:
     return np.asarray(ends[:, 0] + ends[:, 1] <= mesh.edge_length * (1 + 1e-6))
 
 
-def snapped(mesh: Mesh, phi: Floats) -> Floats:
+def snap_to_vertices(mesh: Mesh, phi: Floats) -> Floats:
     """Move cut points within 1e-10 of an edge's end onto that end, until nothing changes."""
     phi = np.array(phi)
     phi[np.abs(phi) < 1e-15 * mesh.longest_edge] = 0.0
@@ -126,7 +126,7 @@ def line_levels(mesh: Mesh, crack: Crack) -> LevelSet:
 
 
 def tied_to_tips(
-    mesh: Mesh, crack: Crack, phi: Floats, psi: Floats, mouth: Floats, near: Bools
+    mesh: Mesh, crack: Crack, phi: Floats, psi: Floats, mouth: Floats, near_edge: Bools
 ) -> LevelSet:
     """Level sets of a placed crack in 2D from values at the points, which are changed.
 
@@ -140,11 +140,11 @@ def tied_to_tips(
         local = mesh.points[nodes] - x[k]
         phi[nodes] = local @ frame[k, 1]
         psi[k, nodes] = local @ frame[k, 0]
-        there = np.zeros(mesh.n_points, dtype=bool)
-        there[nodes] = True
-        near |= there[mesh.edges[:, 0]] | there[mesh.edges[:, 1]]
-    phi = snapped(mesh, phi)
-    return LevelSet(lock(phi), lock(psi), tip_cells, lock(x), lock(mouth), lock(near))
+        at_tip = np.zeros(mesh.n_points, dtype=bool)
+        at_tip[nodes] = True
+        near_edge |= at_tip[mesh.edges[:, 0]] | at_tip[mesh.edges[:, 1]]
+    phi = snap_to_vertices(mesh, phi)
+    return LevelSet(lock(phi), lock(psi), tip_cells, lock(x), lock(mouth), lock(near_edge))
 
 
 def _prolongation(points: Floats, reach: float) -> tuple[Floats, Floats]:
@@ -155,12 +155,12 @@ def _prolongation(points: Floats, reach: float) -> tuple[Floats, Floats]:
     """
     first, last = points[0], points[-1]
     back, on = _unit(first - points[1]), _unit(last - points[-2])
-    near = _free_reach(first, back, points[1:], reach)
-    far = _free_reach(last, on, points[:-1], reach)
-    ahead = np.stack([last, last + far * on])
-    near = _free_reach(first, back, ahead, near)
-    far = _free_reach(last, on, np.stack([first, first + near * back]), far)
-    return first + near * back, last + far * on
+    first_reach = _free_reach(first, back, points[1:], reach)
+    last_reach = _free_reach(last, on, points[:-1], reach)
+    ahead = np.stack([last, last + last_reach * on])
+    first_reach = _free_reach(first, back, ahead, first_reach)
+    last_reach = _free_reach(last, on, np.stack([first, first + first_reach * back]), last_reach)
+    return first + first_reach * back, last + last_reach * on
 
 
 def _free_reach(origin: Floats, direction: Floats, polyline: Floats, reach: float) -> float:
@@ -187,7 +187,7 @@ _FAN = np.radians(30.0)  # a front that turns away by more gets rays between
 
 
 @dataclass(frozen=True, eq=False)
-class Extended:
+class ExtendedSurface:
     """A 3D crack prolonged ahead of its fronts.
 
     Attributes
@@ -205,7 +205,7 @@ class Extended:
     label: Ints
 
 
-def extended(crack: Crack, mesh: Mesh, width: float) -> Extended:
+def extended_surface(crack: Crack, mesh: Mesh, width: float) -> ExtendedSurface:
     """A placed crack with a strip of triangles ahead of each front, tangential to it.
 
     Where a front is hollow the rays of the strip cross; what would be turned over is left out,
@@ -222,7 +222,7 @@ def extended(crack: Crack, mesh: Mesh, width: float) -> Extended:
 
     Returns
     -------
-    Extended
+    ExtendedSurface
     """
     points, triangles = [crack.points], [crack.faces]
     label = [np.zeros(len(crack.faces), dtype=np.int64)]
@@ -243,7 +243,7 @@ def extended(crack: Crack, mesh: Mesh, width: float) -> Extended:
         layers = int(np.clip(np.ceil(width / edge), 1, 64))
         origin = crack.points[base]
         rays = width * direction
-        new, faces = ruled(n_points, base, origin, rays, layers, front.closed, crossed=True)
+        new, faces = ruled_strip(n_points, base, origin, rays, layers, front.closed, crossed=True)
         points.append(new)
         everything = np.concatenate(points)
         reference = np.zeros((n_points + len(new), 3))
@@ -254,7 +254,7 @@ def extended(crack: Crack, mesh: Mesh, width: float) -> Extended:
         triangles.append(faces[upright])
         label.append(np.full(int(upright.sum()), f + 1))
         n_points += len(new)
-    return Extended(
+    return ExtendedSurface(
         lock(np.concatenate(points)), lock(np.concatenate(triangles)), lock(np.concatenate(label))
     )
 
@@ -317,43 +317,43 @@ def surface_levels(mesh: Mesh, crack: Crack, reach: float) -> LevelSet:
     """
     size = _largest_cells(mesh, crack)
     band = reach + 2 * size
-    surface = extended(crack, mesh, band + size)
+    surface = extended_surface(crack, mesh, band + size)
     phi, triangle, at_end = surface_distance(mesh.points, surface.points, surface.triangles, band)
     label = np.where(triangle >= 0, surface.label[triangle], 0)
     fronts = front_frames(crack)
-    far = 10 * mesh.extent
+    far_distance = 10 * mesh.extent
     psi = np.empty((len(fronts), mesh.n_points))
     for k, front in enumerate(fronts):
-        psi[k] = _along(mesh.points, phi, label == k + 1, front, band, far)
-    phi = snapped(mesh, phi)
-    near = near_edges(mesh, phi)
+        psi[k] = _front_distance(mesh.points, phi, label == k + 1, front, band, far_distance)
+    phi = snap_to_vertices(mesh, phi)
+    near_edge = near_edges(mesh, phi)
     for k, front in enumerate(fronts):
-        psi[k] = _unbiased(mesh, phi, psi[k], near, front, band)
-    mouth = np.where(at_end & (label == 0), np.abs(phi), -far)
-    tip_cells = tuple(_front_cells(mesh, phi, p, near) for p in psi)
+        psi[k] = _shifted_psi(mesh, phi, psi[k], near_edge, front, band)
+    mouth = np.where(at_end & (label == 0), np.abs(phi), -far_distance)
+    tip_cells = tuple(_front_cells(mesh, phi, p, near_edge) for p in psi)
     one = np.array([front.x[0] for front in fronts]).reshape(-1, mesh.dim)
-    return LevelSet(lock(phi), lock(psi), tip_cells, lock(one), lock(mouth), lock(near))
+    return LevelSet(lock(phi), lock(psi), tip_cells, lock(one), lock(mouth), lock(near_edge))
 
 
 def _largest_cells(mesh: Mesh, crack: Crack) -> float:
     """Largest cell that the surface runs through, length."""
-    near = mesh.cell_tree.query(crack.points[crack.faces].mean(axis=1))[1]
-    return float(mesh.cell_size[near].max())
+    nearest = mesh.cell_tree.query(crack.points[crack.faces].mean(axis=1))[1]
+    return float(mesh.cell_size[nearest].max())
 
 
-def _along(
+def _front_distance(
     points: Floats,
     phi: Floats,
     ahead: Bools,
     front: Front,
     band: float,
-    far: float,
+    far_distance: float,
 ) -> Floats:
     """Distance to one front along the surface, positive ahead."""
     r, segment, position = front_distance(points, front.x, front.closed, band)
-    near = segment >= 0
-    psi = np.where(ahead, far, -far)
-    rows = np.nonzero(near)[0]
+    has_segment = segment >= 0
+    psi = np.where(ahead, far_distance, -far_distance)
+    rows = np.nonzero(has_segment)[0]
     root = np.sqrt(np.maximum((r[rows] - np.abs(phi[rows])) * (r[rows] + np.abs(phi[rows])), 0.0))
     psi[rows] = np.where(ahead[rows], root, -root)
     flat = rows[root < _FLAT * r[rows]]
@@ -362,15 +362,15 @@ def _along(
     return psi
 
 
-def _unbiased(
-    mesh: Mesh, phi: Floats, psi: Floats, near: Bools, front: Front, band: float
+def _shifted_psi(
+    mesh: Mesh, phi: Floats, psi: Floats, near_edge: Bools, front: Front, band: float
 ) -> Floats:
     """Shift psi so that the front that the cells see is the given one in the mean.
 
     In a cell the front is straight: a curved one would lose the slivers between chords and arc,
     1 % of the radius of a penny of five cells. The loss is measured at the middle of each chord.
     """
-    cells = _front_cells(mesh, phi, psi, near)
+    cells = _front_cells(mesh, phi, psi, near_edge)
     middle, length = _chords(mesh, phi, psi, cells)
     if not len(middle):
         return psi
@@ -423,14 +423,14 @@ def _foot(front: Front, segment: Ints, position: Floats) -> tuple[Floats, Floats
     return foot, ahead / np.linalg.norm(ahead, axis=1, keepdims=True)
 
 
-def _front_cells(mesh: Mesh, phi: Floats, psi: Floats, near: Bools) -> Ints:
+def _front_cells(mesh: Mesh, phi: Floats, psi: Floats, near_edge: Bools) -> Ints:
     """Cells whose closed set meets phi = psi = 0."""
     values = phi[mesh.cells]
     rows = np.nonzero((values.min(axis=1) <= 0) & (values.max(axis=1) >= 0))[0]
     edge = mesh.cell_to_edge[rows]
     a, b = mesh.edges[edge, 0], mesh.edges[edge, 1]
     crossed = phi[a] * phi[b] < 0
-    close = (near[edge] | ~crossed).all(axis=1)
+    is_close = (near_edge[edge] | ~crossed).all(axis=1)
     with np.errstate(divide="ignore", invalid="ignore"):
         t = phi[a] / (phi[a] - phi[b])
         at_edge = np.where(crossed, (1 - t) * psi[a] + t * psi[b], np.nan)
@@ -440,7 +440,7 @@ def _front_cells(mesh: Mesh, phi: Floats, psi: Floats, near: Bools) -> Ints:
     every = np.where(np.abs(every) < _AT * mesh.cell_size[rows][:, None], 0.0, every)
     low = np.where(np.isnan(every), np.inf, every).min(axis=1)
     high = np.where(np.isnan(every), -np.inf, every).max(axis=1)
-    return rows[close & (low <= 0) & (high >= 0)]
+    return rows[is_close & (low <= 0) & (high >= 0)]
 
 
 __all__ = []

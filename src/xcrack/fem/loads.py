@@ -113,10 +113,10 @@ def facet_points(
     owner = parts.number[k]
     c = cell[owner]
     # Place of each point of the facet among those of its cell.
-    same = mesh.cells[c][:, :, None] == facets[owner][:, None, :]
+    is_vertex = mesh.cells[c][:, :, None] == facets[owner][:, None, :]
     on_facet = np.einsum("qv,qvb->qb", place, parts.bary[k])
-    bary = np.einsum("qvf,qf->qv", same.astype(float), on_facet)
-    opposite = (~same.any(axis=2)).argmax(axis=1)
+    bary = np.einsum("qvf,qf->qv", is_vertex.astype(float), on_facet)
+    opposite = (~is_vertex.any(axis=2)).argmax(axis=1)
     inward = mesh.gradient[c, opposite]
     normal = -inward / np.linalg.norm(inward, axis=1, keepdims=True)
     side = cell_side(space, c)
@@ -172,12 +172,12 @@ def on_mesh(
 
     What is known of them from an earlier solve in the mesh serves again.
     """
-    known = {id(one.load): one for one in before}
+    loads_before = {id(one.load): one for one in before}
     result = []
     for load, f in loads:
         if load.acts != {"traction"}:
             continue
-        one = known.get(id(load))
+        one = loads_before.get(id(load))
         if one is None:
             facets = facet_set(space.mesh, load.where, "")
             cells = space.mesh.facet_to_cell[numbers_of(space.mesh, facets), 0]

@@ -100,16 +100,16 @@ def _towards_tips(
 
     pieces = parts(bisect(x, tips, _LEVELS, False, *parts(0)))
     bisect(x, tips, _LEVELS, True, *pieces)
-    owner, local, depth, near = pieces
+    owner, local, depth, is_near = pieces
     number = others[owner]
     bary, share = local @ bary[number], share[number] / 4.0**depth
-    if near.any():
-        x = local[near] @ x[owner[near]]
+    if is_near.any():
+        x = local[is_near] @ x[owner[is_near]]
         middle = x.mean(axis=1)
         nearest = np.argmin(np.linalg.norm(middle[:, None] - tips, axis=2), axis=1)
-        fans.append(_fan_around(number[near], bary[near], share[near], x, tips[nearest]))
+        fans.append(_fan_around(number[is_near], bary[is_near], share[is_near], x, tips[nearest]))
     f = tuple(np.concatenate(p) for p in zip(*fans, strict=True))
-    return number[~near], bary[~near], share[~near], (f[0], f[1], f[2])
+    return number[~is_near], bary[~is_near], share[~is_near], (f[0], f[1], f[2])
 
 
 def _cross(a: Floats, b: Floats) -> Floats:
@@ -168,9 +168,11 @@ def _fan_points(
     s, ws = gauss(n + 1)
     t, wt = gauss(n + 4)
     tau = begin[:, None] + (end - begin)[:, None] * t
-    far = (1 - tau)[..., None] * bary[row, 1][:, None] + tau[..., None] * bary[row, 2][:, None]
+    far_points = (1 - tau)[..., None] * bary[row, 1][:, None] + tau[..., None] * bary[row, 2][
+        :, None
+    ]
     u = (s * s)[None, :, None, None]
-    points = (1 - u) * bary[row, 0][:, None, None] + u * far[:, None]
+    points = (1 - u) * bary[row, 0][:, None, None] + u * far_points[:, None]
     # dV = 2 area u du dtau with u = s².
     radial = 4 * s**3 * ws
     weight = (share[row] * (end - begin))[:, None, None] * radial[None, :, None] * wt
@@ -399,10 +401,12 @@ def _edge_rule(n: int) -> tuple[Floats, Floats]:
 def _vertex_rule(n: int) -> tuple[Floats, Floats]:
     """Rule on a tetrahedron whose first vertex lies on the front, u = s² from there."""
     s, ws = gauss(n - 1)
-    far, share = simplex_rule(2, 4)
+    far_coordinate, share = simplex_rule(2, 4)
     u = np.repeat(s * s, len(share))
     weight = np.outer(ws * s**5, share).ravel()
-    bary = np.concatenate([(1 - u)[:, None], u[:, None] * np.tile(far, (len(s), 1))], axis=1)
+    bary = np.concatenate(
+        [(1 - u)[:, None], u[:, None] * np.tile(far_coordinate, (len(s), 1))], axis=1
+    )
     return lock(bary), lock(weight / weight.sum())
 
 
@@ -435,11 +439,11 @@ def triangle_points(r: Floats, size: Floats, degree: int = 4) -> tuple[Ints, Flo
         first = np.argsort(~at, axis=1, kind="stable")
         corner = np.take_along_axis(corner, first[:, :, None], axis=1)
         r = np.take_along_axis(r, first, axis=1)
-        near = (touches == 0) & (r.min(axis=1) < _NEAR * size) & (level == 0)
+        is_near = (touches == 0) & (r.min(axis=1) < _NEAR * size) & (level == 0)
         for chosen, rule in (
             (touches == 2, _side_rule()),
             ((touches == 1) | (touches == 3), _corner_rule()),
-            ((touches == 0) & ~near, simplex_rule(2, degree)),
+            ((touches == 0) & ~is_near, simplex_rule(2, degree)),
         ):
             rows = np.nonzero(chosen)[0]
             place = np.einsum("pv,svb->spb", rule[0], corner[rows])
@@ -447,7 +451,7 @@ def triangle_points(r: Floats, size: Floats, degree: int = 4) -> tuple[Ints, Flo
             parts.append(
                 (np.repeat(number[rows], len(rule[1])), place.reshape(-1, 3), weight.ravel())
             )
-        rows = np.nonzero(near)[0]
+        rows = np.nonzero(is_near)[0]
         number, share = np.repeat(number[rows], 4), np.repeat(share[rows] / 4, 4)
         size = np.repeat(size[rows] / 2, 4)
         corner = np.einsum("cvw,swb->scvb", quarters(), corner[rows]).reshape(-1, 3, 3)
@@ -535,29 +539,29 @@ def at_joints(
     for joint in space.joints:
         if joint.crack == c:
             continue
-        near = np.nonzero(joint.near[cell])[0]
-        through = sides[near, joint.on]
-        phi = space.cuts[joint.crack].level_set.phi[space.mesh.cells[cell[near]]]
-        own = np.where(np.einsum("kb,kb->k", bary[near], phi) >= 0, 1, -1)
-        whole = ~space.cuts[joint.on].is_cut[cell[near]]
-        changed = np.where(through == -joint.side, 0, own)
-        keep = (through == 0) | ((through == joint.side) & whole & (c != joint.on))
-        sides[near, joint.crack] = np.where(keep, sides[near, joint.crack], changed)
+        near_points = np.nonzero(joint.near[cell])[0]
+        through = sides[near_points, joint.on]
+        phi = space.cuts[joint.crack].level_set.phi[space.mesh.cells[cell[near_points]]]
+        side_of_point = np.where(np.einsum("kb,kb->k", bary[near_points], phi) >= 0, 1, -1)
+        uncut = ~space.cuts[joint.on].is_cut[cell[near_points]]
+        changed = np.where(through == -joint.side, 0, side_of_point)
+        keep = (through == 0) | ((through == joint.side) & uncut & (c != joint.on))
+        sides[near_points, joint.crack] = np.where(keep, sides[near_points, joint.crack], changed)
     return sides
 
 
 def part_numbers(space: FunctionSpace, cell: Ints, sides: Ints) -> Ints:
     """Which part of its cell a point lies in `(k,)`, from 0 to `n_parts` - 1, by its sides."""
     plus = np.zeros(len(cell), dtype=bool)
-    beside = np.zeros(len(cell), dtype=bool)
+    is_beside = np.zeros(len(cell), dtype=bool)
     for c, cut in enumerate(space.cuts):
         above = cut.is_cut[cell] & (sides[:, c] > 0)
         for joint in space.joints:
             if joint.crack == c:
-                beside |= above & joint.both[cell]
+                is_beside |= above & joint.both[cell]
                 above = above & ~joint.both[cell]
         plus |= above
-    return plus + 2 * beside.astype(np.int64)
+    return plus + 2 * is_beside.astype(np.int64)
 
 
 def n_parts(space: FunctionSpace) -> int:
@@ -586,9 +590,11 @@ class Points:
     weight: Floats
     side: Ints
 
-    def chosen(self, wanted: Bools | Ints) -> "Points":
+    def chosen(self, selection: Bools | Ints) -> "Points":
         """Some of the points, by a mask or by their numbers."""
-        return Points(self.cell[wanted], self.bary[wanted], self.weight[wanted], self.side[wanted])
+        return Points(
+            self.cell[selection], self.bary[selection], self.weight[selection], self.side[selection]
+        )
 
     def of_cells(self, cells: Ints) -> tuple[Ints, Ints, Ints]:
         """Points of the given cells: their numbers, row of their cell, offsets by cell."""
@@ -625,40 +631,40 @@ def sub_cells(space: FunctionSpace, cells: Ints) -> SubCells:
     """Sub-cells of the given cells, in their order."""
     mesh = space.mesh
     base = cell_side(space, cells)
-    whole = np.ones(len(cells), dtype=bool)
+    is_whole = np.ones(len(cells), dtype=bool)
     parts = []
     for c, cut in enumerate(space.cuts):
         # Cells split by this crack hand over their sub-cells.
         place = np.full(len(mesh.cells), -1, dtype=np.int64)
         place[cells] = np.arange(len(cells))
         rows = place[cut.sub_to_cell]
-        mine = rows >= 0
-        owner = rows[mine]
-        if not whole[owner].all():
-            bad = cells[owner[~whole[owner]][0]]
+        is_cut_cell = rows >= 0
+        owner = rows[is_cut_cell]
+        if not is_whole[owner].all():
+            failed_cells = cells[owner[~is_whole[owner]][0]]
             raise GeometryError(
                 f"two cracks run through the cell at "
-                f"{np.round(mesh.points[mesh.cells[bad]].mean(axis=0), 6).tolist()}: refine the "
-                "mesh between them until at least one cell lies in between."
+                f"{np.round(mesh.points[mesh.cells[failed_cells]].mean(axis=0), 6).tolist()}: "
+                f"refine the mesh between them until at least one cell lies in between."
             )
         side = base[owner].copy()
-        side[:, c] = cut.sub_side[mine]
-        tip = cut.is_tip[cut.sub_to_cell[mine]]
-        parts.append((owner, cut.sub_bary[mine], cut.sub_fraction[mine], side, tip))
-        whole[owner] = False
-    rest = whole.nonzero()[0]
-    if len(rest) or not parts:
-        corner = np.zeros((len(rest), mesh.dim + 1, mesh.dim + 1))
+        side[:, c] = cut.sub_side[is_cut_cell]
+        tip = cut.is_tip[cut.sub_to_cell[is_cut_cell]]
+        parts.append((owner, cut.sub_bary[is_cut_cell], cut.sub_fraction[is_cut_cell], side, tip))
+        is_whole[owner] = False
+    whole_cells = is_whole.nonzero()[0]
+    if len(whole_cells) or not parts:
+        corner = np.zeros((len(whole_cells), mesh.dim + 1, mesh.dim + 1))
         corner[:, range(mesh.dim + 1), range(mesh.dim + 1)] = 1.0
-        share, fan = np.ones(len(rest)), np.zeros(len(rest), dtype=bool)
-        parts.append((rest, corner, share, base[rest], fan))
+        share, fan = np.ones(len(whole_cells)), np.zeros(len(whole_cells), dtype=bool)
+        parts.append((whole_cells, corner, share, base[whole_cells], fan))
     owner, bary, fraction, side, fan = map(np.concatenate, zip(*parts, strict=True))
     order = owner.argsort(kind="stable")
     subs = SubCells(cells[owner[order]], bary[order], fraction[order], side[order], fan[order])
-    return _joined(space, subs) if space.joints else subs
+    return _sub_cells_at_joints(space, subs) if space.joints else subs
 
 
-def _joined(space: FunctionSpace, subs: SubCells) -> SubCells:
+def _sub_cells_at_joints(space: FunctionSpace, subs: SubCells) -> SubCells:
     """Sub-cells with the sides of cracks that end on others, split where both cut a cell."""
     for joint in space.joints:
         phi = space.cuts[joint.crack].level_set.phi
@@ -668,17 +674,17 @@ def _joined(space: FunctionSpace, subs: SubCells) -> SubCells:
         value[small] = 0.0
         split = joint.both[subs.cell] & (subs.side[:, joint.on] == joint.side)
         split &= (value.min(axis=1) < 0) & (value.max(axis=1) > 0)
-        whole, rows = np.nonzero(~split)[0], np.nonzero(split)[0]
+        unsplit, rows = np.nonzero(~split)[0], np.nonzero(split)[0]
         x = np.einsum("svb,sbd->svd", subs.bary[rows], space.mesh.points[nodes[rows]])
         inner, share, _, parent = cut_simplices(value[rows], x)
-        source = np.concatenate([whole, rows[parent]])
+        source = np.concatenate([unsplit, rows[parent]])
         order = np.argsort(source, kind="stable")
         finer = np.einsum("svw,swb->svb", inner, subs.bary[rows[parent]])
         source = source[order]
         subs = SubCells(
             subs.cell[source],
-            np.concatenate([subs.bary[whole], finer])[order],
-            subs.fraction[source] * np.concatenate([np.ones(len(whole)), share])[order],
+            np.concatenate([subs.bary[unsplit], finer])[order],
+            subs.fraction[source] * np.concatenate([np.ones(len(unsplit)), share])[order],
             subs.side[source],
             subs.fan[source],
         )
@@ -712,13 +718,13 @@ def cell_points(
     share = np.outer(subs.fraction[plain], weight).ravel()
     rows = with_tip.nonzero()[0]
     if not len(rows):
-        return _sorted(space, subs, number, where, share)
-    near = (subs.cell[rows], subs.bary[rows], subs.fraction[rows], subs.fan[rows], n)
+        return _sorted_points(space, subs, number, where, share)
+    is_near = (subs.cell[rows], subs.bary[rows], subs.fraction[rows], subs.fan[rows], n)
     if graded:
-        sub, place, part = graded_points(space, *near, degree)
+        sub, place, part = graded_points(space, *is_near, degree)
     else:
-        sub, place, part = _NEAR_TIPS[space.dim](space, *near)
-    return _sorted(
+        sub, place, part = _NEAR_TIPS[space.dim](space, *is_near)
+    return _sorted_points(
         space,
         subs,
         np.concatenate([number, rows[sub]]),
@@ -731,7 +737,7 @@ def cell_points(
 _NEAR_TIPS = {2: tip_points, 3: front_points}
 
 
-def _sorted(
+def _sorted_points(
     space: FunctionSpace, subs: SubCells, numbers: Ints, every: Floats, part: Floats
 ) -> Points:
     """Points of sub-cells, sorted by cell and sub-cell."""

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from xcrack.base.arrays import Bools, Floats, Ints
-from xcrack.base.checks import shown
+from xcrack.base.checks import value_text
 from xcrack.base.errors import ProblemError
 from xcrack.fem.function_space import FunctionSpace
 from xcrack.fem.loads import facet_points, position
@@ -23,7 +23,7 @@ _LEAST = {2: 1e-11, 3: 1e-3}
 
 
 @dataclass(frozen=True, eq=False)
-class Known:
+class ImposedValues:
     """Unknowns that supports decide, and their values.
 
     Attributes
@@ -40,7 +40,7 @@ class Known:
     owner: Ints
 
 
-def known_unknowns(space: FunctionSpace, supports: Sequence[Support]) -> Known:
+def known_unknowns(space: FunctionSpace, supports: Sequence[Support]) -> ImposedValues:
     """Unknowns decided by the supports.
 
     Raises
@@ -58,10 +58,10 @@ def known_unknowns(space: FunctionSpace, supports: Sequence[Support]) -> Known:
             for axis in _axes(support.displacement_at(np.zeros((1, space.dim)))):
                 _impose(space, fixed, value, fitted, functions, axis, np.zeros(len(functions)), 0)
         else:
-            for axis, functions, numbers, n_fitted in _imposed(space, support):
+            for axis, functions, numbers, n_fitted in _imposed_part(space, support):
                 _impose(space, fixed, value, fitted, functions, axis, numbers, n_fitted)
         owner[fixed & (owner < 0)] = number
-    return Known(fixed.ravel(), value.ravel(), owner.ravel())
+    return ImposedValues(fixed.ravel(), value.ravel(), owner.ravel())
 
 
 def _impose(
@@ -133,11 +133,11 @@ def _check_ends(space: FunctionSpace, where: str, facets: Ints, what: str) -> No
             touches[0, facets[(others < 0).any(axis=1), corner]] = True
             touches[1, facets[(others > 0).any(axis=1), corner]] = True
         ends = (phi == 0) & (space.heaviside[c][: space.mesh.n_points] >= 0)
-        bad = ends & touches[0] & ~touches[1]
-        if bad.any():
-            x = np.round(space.mesh.points[np.argmax(bad)], 6).tolist()
+        is_cut_off = ends & touches[0] & ~touches[1]
+        if is_cut_off.any():
+            x = np.round(space.mesh.points[np.argmax(is_cut_off)], 6).tolist()
             raise ProblemError(
-                f"{what}({shown(where)}) ends at {x}, where crack {c} meets the boundary, and "
+                f"{what}({value_text(where)}) ends at {x}, where crack {c} meets the boundary, and "
                 "supports its lip - only: give the points of the crack in the reverse order (the "
                 "supported lip is then lip +), or move its mouth by a thousandth of a cell."
             )
@@ -160,7 +160,7 @@ def _traces(space: FunctionSpace, facets: Ints) -> tuple[Points, Ints, Ints, Flo
     return points, np.concatenate(columns), np.concatenate(rows), np.concatenate(values)
 
 
-def _imposed(space: FunctionSpace, support: Support) -> list[tuple[int, Ints, Floats, int]]:
+def _imposed_part(space: FunctionSpace, support: Support) -> list[tuple[int, Ints, Floats, int]]:
     """Axis, functions, values and number of fitted values of an imposed displacement."""
     where, what = support.where, support.kind
     nodes = _set_nodes(space, where, what)
@@ -219,9 +219,9 @@ def _fit(space: FunctionSpace, support: Support) -> tuple[Ints, Floats]:
     solution = np.zeros((len(unknowns), space.dim))
     solution[standard] = np.linalg.lstsq(A[:, standard], target, rcond=1e-11)[0]
     scale = _scales(space)[unknowns]
-    rest = np.linalg.lstsq(A / scale, target - A @ solution, rcond=_LEAST[space.dim])[0]
+    correction = np.linalg.lstsq(A / scale, target - A @ solution, rcond=_LEAST[space.dim])[0]
     free = np.isnan(given).any(axis=0)
-    return unknowns, np.where(free, np.nan, solution + rest / scale[:, None])
+    return unknowns, np.where(free, np.nan, solution + correction / scale[:, None])
 
 
 def _scales(space: FunctionSpace) -> Floats:

@@ -5,7 +5,7 @@ from functools import cached_property
 from typing import Any
 
 from xcrack.crack.crack import Crack
-from xcrack.crack.junctions import reaching
+from xcrack.crack.junctions import prolonged_cracks
 from xcrack.crack.placing import on_mesh
 from xcrack.fem.assembly import Bulk, Enriched, Stiffness, bulk, enriched_stiffness
 from xcrack.fem.cut import cut
@@ -15,14 +15,14 @@ from xcrack.fem.function_space import FunctionSpace, function_space
 from xcrack.fem.joint_nodes import jump_nodes
 from xcrack.fem.joints_2d import Joint, joined_cuts
 from xcrack.fem.level_set import LevelSet, level_set
-from xcrack.fem.supports import Known, known_unknowns
+from xcrack.fem.supports import ImposedValues, known_unknowns
 from xcrack.mesh.mesh import Mesh
 from xcrack.model.numerics import Numerics
 from xcrack.model.problem import Problem
 
 
 @dataclass(frozen=True, eq=False)
-class Model:
+class System:
     """Everything that load states share.
 
     Attributes
@@ -32,7 +32,7 @@ class Model:
     bulk : Bulk
     enriched : Enriched
         Entries of enriched functions.
-    known : Known
+    known : ImposedValues
     n_points : int
         Integration points of the enriched cells.
     """
@@ -41,7 +41,7 @@ class Model:
     lips: tuple[LipPoints, ...]
     bulk: Bulk
     enriched: Enriched
-    known: Known
+    known: ImposedValues
     n_points: int
 
     @cached_property
@@ -60,9 +60,9 @@ class Model:
         return tuple(jump_matrix(self.space, c, lips) for c, lips in enumerate(self.lips))
 
 
-def build(problem: Problem, bulk_: Bulk | None = None) -> Model:
+def build(problem: Problem, bulk_: Bulk | None = None) -> System:
     """Cut, number, integrate and assemble a problem, without solving it."""
-    space, lips = discretised(problem)
+    space, lips = discretise(problem)
     mesh, order = space.mesh, space.order
     if (
         bulk_ is None
@@ -74,7 +74,7 @@ def build(problem: Problem, bulk_: Bulk | None = None) -> Model:
     enriched, n_points, reusable = enriched_stiffness(
         space, problem.material, problem.numerics, lips, bulk_.cells
     )
-    return Model(
+    return System(
         space,
         lips,
         replace(bulk_, cells=reusable),
@@ -84,12 +84,12 @@ def build(problem: Problem, bulk_: Bulk | None = None) -> Model:
     )
 
 
-def discretised(problem: Problem) -> tuple[FunctionSpace, tuple[LipPoints, ...]]:
+def discretise(problem: Problem) -> tuple[FunctionSpace, tuple[LipPoints, ...]]:
     """Function space of a problem, and the points on the faces of its cracks: nothing assembled."""
     mesh, numerics = problem.mesh, problem.numerics
     cracks = tuple(on_mesh(crack, mesh) for crack in problem.placed)
     junctions = problem.junctions
-    drawn = reaching(cracks, junctions) if junctions else cracks
+    drawn = prolonged_cracks(cracks, junctions) if junctions else cracks
     cuts = tuple(cut(mesh, levels(mesh, crack, numerics)) for crack in drawn)
     joints: tuple[Joint, ...] = ()
     if junctions:

@@ -25,9 +25,9 @@ def continued_polar(xi: Floats, side: Ints, behind: Bools) -> tuple[Floats, Floa
     """
     r = np.hypot(xi[:, 0], xi[:, 1])
     theta = np.arctan2(xi[:, 1], xi[:, 0])
-    known = behind & (side != 0)
-    theta = np.where(known & (side > 0) & (theta < 0), theta + 2 * np.pi, theta)
-    return r, np.where(known & (side < 0) & (theta > 0), theta - 2 * np.pi, theta)
+    is_behind = behind & (side != 0)
+    theta = np.where(is_behind & (side > 0) & (theta < 0), theta + 2 * np.pi, theta)
+    return r, np.where(is_behind & (side < 0) & (theta > 0), theta - 2 * np.pi, theta)
 
 
 def angular(theta: Floats) -> tuple[Floats, Floats]:

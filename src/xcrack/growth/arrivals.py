@@ -8,7 +8,7 @@ import numpy as np
 from xcrack.crack.crack import Crack
 from xcrack.growth.follow import following
 from xcrack.growth.integrators import integrator_of
-from xcrack.growth.options import Run
+from xcrack.growth.options import GrowthRule
 from xcrack.growth.step import Arrival, Arriving, PerCrack, Step, StepError, memory_of
 from xcrack.sif.sif import SIF
 
@@ -16,13 +16,13 @@ _ROUND_OFF = 1e-12  # of the body: a place as near to zero is zero
 
 
 def arrivals_of(
-    run: Run, last: Step, arriving: Sequence[Arriving], after: float | None
+    run: GrowthRule, last: Step, arriving: Sequence[Arriving], after: float | None
 ) -> tuple[Arrival, ...]:
     """When places come to the boundary.
 
     Parameters
     ----------
-    run : Run
+    run : GrowthRule
     last : Step
         Before the advance.
     arriving : sequence of Arriving
@@ -39,7 +39,7 @@ def arrivals_of(
 
 
 def last_step(
-    run: Run,
+    run: GrowthRule,
     last: Step,
     advanced: Sequence[Crack],
     placed: Sequence[Crack],

@@ -6,11 +6,11 @@ import numpy as np
 
 from xcrack.base.arrays import Floats
 from xcrack.fatigue.checks import evaluate_criterion, evaluate_law
-from xcrack.fatigue.criteria import clipped, equivalent_K, kink_angle, nominal_range
+from xcrack.fatigue.criteria import clipped_K, equivalent_K, kink_angle, nominal_range
 from xcrack.fatigue.rainflow import closed_cycles
 from xcrack.fatigue.spectrum import Spectrum, distinct
 from xcrack.growth.levels import ladders
-from xcrack.growth.options import Run
+from xcrack.growth.options import GrowthRule
 from xcrack.growth.response import Response
 from xcrack.model.problem import Problem
 
@@ -18,7 +18,7 @@ _CHUNK = 20_000  # places times cycles that are rated at once
 
 
 @dataclass(frozen=True, eq=False)
-class Pairs:
+class RangePairs:
     """Kinds of cycles at the places of one crack.
 
     Attributes
@@ -34,7 +34,7 @@ class Pairs:
 
 
 @dataclass(frozen=True, eq=False)
-class Rated:
+class PairRates:
     """Every kind of cycle, rated at each place `(p, f)`: rad, stress √length, length/cycle."""
 
     angle: Floats
@@ -43,7 +43,7 @@ class Rated:
     rate: Floats
 
 
-def pairs_of(run: Run, problem: Problem, response: Response) -> list[Pairs]:
+def pairs_of(run: GrowthRule, problem: Problem, response: Response) -> list[RangePairs]:
     """Kinds of cycles of each crack under the spectrum of a run."""
     spectrum = run.cycle
     if not isinstance(spectrum, Spectrum):
@@ -56,13 +56,13 @@ def pairs_of(run: Run, problem: Problem, response: Response) -> list[Pairs]:
     result = []
     for ladder in ladders(problem, spectrum, response):
         K = np.stack([ladder.at(values[:, 0]), ladder.at(values[:, 1])])
-        result.append(Pairs(K, np.repeat(count[:, None], K.shape[2], axis=1)))
+        result.append(RangePairs(K, np.repeat(count[:, None], K.shape[2], axis=1)))
     return result
 
 
-def pairs_of_states(K: Floats, spectrum: Spectrum, nu: float) -> Pairs:
+def pairs_of_states(K: Floats, spectrum: Spectrum, nu: float) -> RangePairs:
     """Cycles between named states, counted at each place by K_eq of the state's own direction."""
-    opening = clipped(K)
+    opening = clipped_K(K)
     severity = equivalent_K(opening, kink_angle(opening), nu)
     n, f = severity.shape
     count = np.zeros((n, n, f))
@@ -73,24 +73,24 @@ def pairs_of_states(K: Floats, spectrum: Spectrum, nu: float) -> Pairs:
     first, second = np.nonzero(count.any(axis=2))
     if not len(first):  # no place feels a difference
         first, second = np.array([0]), np.array([1])
-    return Pairs(np.stack([K[first], K[second]]), count[first, second])
+    return RangePairs(np.stack([K[first], K[second]]), count[first, second])
 
 
 def rated(
-    run: Run,
-    pairs: Pairs,
+    run: GrowthRule,
+    pairs: RangePairs,
     nu: float,
     c: int,
     place: str,
     a: Floats,
-    nominal: Pairs | None = None,
-) -> Rated:
+    nominal: RangePairs | None = None,
+) -> PairRates:
     """Ask criterion and law about every kind of cycle; they see them as places of one front.
 
     Parameters
     ----------
-    run : Run
-    pairs : Pairs
+    run : GrowthRule
+    pairs : RangePairs
     nu : float
     c : int
         Number of the crack.
@@ -98,7 +98,7 @@ def rated(
         What a place is called in messages.
     a : (f,) array, length
         Crack size at each place.
-    nominal : Pairs, optional
+    nominal : RangePairs, optional
         The same without contact, for a law with nominal R.
     """
     _, p, f, modes = pairs.K.shape
@@ -116,15 +116,15 @@ def rated(
         rate = evaluate_law(run.law, dK, R, c, f"{place} of a cycle", np.tile(a, n))
         rate = np.where(dK < run.threshold, 0.0, rate)
         parts.append(np.stack([angle, dK, R, rate]).reshape(4, n, f))
-    return Rated(*np.concatenate(parts, axis=1)) if parts else Rated(*np.zeros((4, p, f)))
+    return PairRates(*np.concatenate(parts, axis=1)) if parts else PairRates(*np.zeros((4, p, f)))
 
 
-def block_of(every: Rated, count: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+def block_of(every: PairRates, count: Floats) -> tuple[Floats, Floats, Floats, Floats]:
     """Direction, range, ratio and growth of a block at each place.
 
     Parameters
     ----------
-    every : Rated
+    every : PairRates
     count : (p, f) array
 
     Returns
@@ -144,7 +144,7 @@ def block_of(every: Rated, count: Floats) -> tuple[Floats, Floats, Floats, Float
     return np.where(mean, np.arctan2(y, x) + 0.0, angle), dK, R, rate
 
 
-def left_out_share(run: Run, problem: Problem, response: Response) -> float:
+def left_out_share(run: GrowthRule, problem: Problem, response: Response) -> float:
     """Growth of the cycles that a spectrum leaves out, over that of those it has; the worst place.
 
     inf where only they would let a place grow.
@@ -164,7 +164,7 @@ def left_out_share(run: Run, problem: Problem, response: Response) -> float:
         if f == 0:
             continue
         a = np.ones(f)
-        small = Pairs(K, np.repeat(count[:, None], f, axis=1))
+        small = RangePairs(K, np.repeat(count[:, None], f, axis=1))
         growth = [
             block_of(rated(run, pairs, nu, c, "tip", a), pairs.count)[3]
             for pairs in (small, every[c])
@@ -177,8 +177,8 @@ def left_out_share(run: Run, problem: Problem, response: Response) -> float:
 
 
 __all__ = [
-    "Pairs",
-    "Rated",
+    "PairRates",
+    "RangePairs",
     "block_of",
     "left_out_share",
     "pairs_of",

@@ -5,11 +5,11 @@ from typing import Any
 
 import numpy as np
 
-from xcrack.growth.options import Run
+from xcrack.growth.options import GrowthRule
 from xcrack.growth.step import Step, memory_of
 from xcrack.growth.trail import (
     REJECTED,
-    Control,
+    StepControl,
     first_length,
     next_length,
     step_error,
@@ -23,36 +23,36 @@ STEPS = 0.5  # of the tolerance: what the length of the steps may take
 _LEFT, _LEFT_OF_FEW = 0.25, 0.6
 
 
-def longest(run: Run, control: Control) -> float:
+def longest(run: GrowthRule, control: StepControl) -> float:
     """Largest advance of any tip in the next step, length; inf where only cycles limit it."""
     return min(np.inf if run.da is None else run.da, control.length)
 
 
-def share_left(run: Run) -> float:
+def share_left(run: GrowthRule) -> float:
     """Share of a correction that is left as an error."""
     return _LEFT if run.tolerance is None else _LEFT_OF_FEW
 
 
-def first(run: Run, size: float, least: float, room: float) -> Control:
+def first(run: GrowthRule, size: float, least: float, room: float) -> StepControl:
     """Length of the first step, and of the first after K has jumped.
 
     Parameters
     ----------
-    run : Run
+    run : GrowthRule
     size : float, length
         Of the smallest crack.
     least, room : float, length
         Shortest step, and the way to the boundary ahead of the fastest tip.
     """
     if run.tolerance is None:
-        return Control()
+        return StepControl()
     length = first_length(size, STEPS * run.tolerance, least)
-    return Control(within(length, room, least), None, least)
+    return StepControl(within(length, room, least), None, least)
 
 
 def following(
-    run: Run,
-    last: Control,
+    run: GrowthRule,
+    last: StepControl,
     length: float,
     off: float,
     off_cycles: float,
@@ -60,13 +60,13 @@ def following(
     before: float,
     least: float,
     room: float,
-) -> Control:
+) -> StepControl:
     """Length of the step after one whose errors are estimated.
 
     Parameters
     ----------
-    run : Run
-    last : Control
+    run : GrowthRule
+    last : StepControl
         Of the step that is done.
     length, off, off_cycles, cycles, before
         As of `step_error`.
@@ -74,12 +74,12 @@ def following(
         As of `first`.
     """
     if run.tolerance is None:
-        return Control()
+        return StepControl()
     error = step_error(
         off * STEPS / PATH, length, off_cycles, cycles, before, STEPS * run.tolerance
     )
     wanted = next_length(length, error, last.error, least)
-    return Control(within(wanted, room, least), error, least)
+    return StepControl(within(wanted, room, least), error, least)
 
 
 def shortened(last: Step, next_step: Step) -> Step | None:

@@ -7,14 +7,14 @@ from typing import Any
 import numpy as np
 
 from xcrack.base.arrays import Floats, coordinates
-from xcrack.base.checks import called, numbers
+from xcrack.base.checks import call_function, numbers
 from xcrack.crack.lines import crossing_points
-from xcrack.fatigue.criteria import clipped, equivalent_K
-from xcrack.fem.system import discretised
+from xcrack.fatigue.criteria import clipped_K, equivalent_K
+from xcrack.fem.system import discretise
 from xcrack.growth.follow import following, place_name
 from xcrack.growth.follow_2d import exit_ahead
 from xcrack.growth.joins_2d import new_ends, new_unions
-from xcrack.growth.options import Run
+from xcrack.growth.options import GrowthRule
 from xcrack.growth.step import Advance, Arrival, Join, Step, directions, memory_of
 from xcrack.linalg.rigid_motion import pieces
 from xcrack.mesh.locate import cell_extents
@@ -46,7 +46,7 @@ class Ligament:
     name: str
 
 
-def ligaments(run: Run, step: Step) -> list[Ligament]:
+def ligaments(run: GrowthRule, step: Step) -> list[Ligament]:
     """Ligaments of all tips: straight ahead to a crack or the boundary, and between two tips.
 
     Two tips have one between them where each lies ahead of the other.
@@ -72,7 +72,7 @@ def ligaments(run: Run, step: Step) -> list[Ligament]:
     return result
 
 
-def yielded(run: Run, step: Step) -> str:
+def yielded(run: GrowthRule, step: Step) -> str:
     """Which ligament the plastic zones of the most severe state fill; empty where none does.
 
     Zones of two tips add up over the ligament between them (Swift 1994, Int. J. Fatigue 16, 75,
@@ -102,10 +102,10 @@ def yielded(run: Run, step: Step) -> str:
     return f"ligament yield: {what}"
 
 
-def _zones(link_up: Callable[..., Any], run: Run, step: Step, c: int) -> Floats:
-    K = clipped(np.stack([state[c].K for state in step.sif]))
+def _zones(link_up: Callable[..., Any], run: GrowthRule, step: Step, c: int) -> Floats:
+    K = clipped_K(np.stack([state[c].K for state in step.sif]))
     K_eq = equivalent_K(K, step.angle[c], run.problem.material.nu).max(axis=0, initial=0.0)
-    zone = called(link_up, f"link_up at step {step.index}", K_eq)
+    zone = call_function(link_up, f"link_up at step {step.index}", K_eq)
     return numbers(zone, "what link_up returned", K_eq.shape)
 
 
@@ -114,7 +114,7 @@ _SAME = 1e-9  # of the largest K: states that do not differ
 _TURN = np.radians(10.0)
 
 
-def end_at(run: Run, step: Step) -> str:
+def end_at(run: GrowthRule, step: Step) -> str:
     """Why growth ends at this step; empty where it goes on."""
     if step.has_left and step.joins and not step.arrivals:
         return "no tip is left: " + "; ".join(map(str, step.joins))
@@ -128,7 +128,7 @@ def end_at(run: Run, step: Step) -> str:
             )
     if run.K_c is not None:
         for c in range(len(step.cracks)):
-            K = clipped(np.stack([state[c].K for state in step.sif]))
+            K = clipped_K(np.stack([state[c].K for state in step.sif]))
             K_eq = equivalent_K(K, step.angle[c], run.problem.material.nu).max(axis=0)
             for j in np.nonzero(K_eq >= run.K_c)[0].tolist():
                 place = place_name(run.problem.mesh, step, c, j)
@@ -160,7 +160,7 @@ def _same_states(step: Step) -> str:
     )
 
 
-def falls_to_zero(run: Run, step: Step, plan: Advance) -> str:
+def falls_to_zero(run: GrowthRule, step: Step, plan: Advance) -> str:
     """Why a run ends in which all growth is seen to stop within a tenth of a cell."""
     what = (
         f"dK_eq falls below the threshold {run.threshold:.6g}"
@@ -175,7 +175,7 @@ def falls_to_zero(run: Run, step: Step, plan: Advance) -> str:
     )
 
 
-def too_short(run: Run, step: Step, plan: Advance) -> str:
+def too_short(run: GrowthRule, step: Step, plan: Advance) -> str:
     """Why a run ends whose advance is below a tenth of a cell."""
     remedy = "cycles" if run.da is None else "da"
     place = place_name(run.problem.mesh, step, *plan.tip)
@@ -186,7 +186,7 @@ def too_short(run: Run, step: Step, plan: Advance) -> str:
     )
 
 
-def short_kink(run: Run, step: Step, plan: Advance) -> str:
+def short_kink(run: GrowthRule, step: Step, plan: Advance) -> str:
     """What to warn of where the fastest tip turns within one cell; empty where it does not."""
     c, j = plan.tip
     da, angle = step.da[c][j], step.angle[c][j]
@@ -203,7 +203,7 @@ def short_kink(run: Run, step: Step, plan: Advance) -> str:
     )
 
 
-def left_the_body(run: Run, arrivals: Sequence[Arrival]) -> str:
+def left_the_body(run: GrowthRule, arrivals: Sequence[Arrival]) -> str:
     """Why a run ends whose last tips or fronts have left the body."""
     end = following(run.problem.mesh).END
     return ": ".join([f"{end} left the body", "; ".join(map(str, arrivals))]).removesuffix(": ")
@@ -222,7 +222,7 @@ def joins_of(step: Step, problem: Problem, cycles: float) -> tuple[Join, ...]:
 
 def cut_off(step: Step, problem: Problem, joins: Sequence[Join]) -> str:
     """Why a run ends in which cracks that met cut a piece off; empty where they do not."""
-    space, _ = discretised(problem)
+    space, _ = discretise(problem)
     piece, n, share = pieces(space)
     if n < 2 or n <= _pieces_before(step):
         return ""

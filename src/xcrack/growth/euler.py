@@ -4,24 +4,26 @@ import numpy as np
 
 from xcrack.crack.crack import Crack
 from xcrack.growth.follow import following
-from xcrack.growth.options import Run
+from xcrack.growth.options import GrowthRule
 from xcrack.growth.rates import Evaluation, Settled
 from xcrack.growth.step import Advance, PerCrack, Step, StepError, memory_of, plan_advance
 from xcrack.mesh.locate import cell_sizes
 
 
-def begun(run: Run, seen: Evaluation) -> Settled:
+def begun(run: GrowthRule, seen: Evaluation) -> Settled:
     """The first step of a run."""
     return begun_at(run, seen, 0.0)
 
 
-def begun_at(run: Run, seen: Evaluation, cycles: float, error: StepError | None = None) -> Settled:
+def begun_at(
+    run: GrowthRule, seen: Evaluation, cycles: float, error: StepError | None = None
+) -> Settled:
     """A step before which there is nothing to follow."""
     del error
     return _settled(run, seen, cycles, tuple(np.zeros_like(r) for r in seen.rate))
 
 
-def settled(run: Run, last: Step, seen: Evaluation) -> Settled:
+def settled(run: GrowthRule, last: Step, seen: Evaluation) -> Settled:
     """What the cracks after an advance mean for the cycles and for the next advance."""
     mesh = seen.problem.mesh
     since, pending = following(mesh).followed(
@@ -30,13 +32,13 @@ def settled(run: Run, last: Step, seen: Evaluation) -> Settled:
     return _settled(run, seen, last.cycles + since, pending)
 
 
-def planned(run: Run, step: Step) -> Advance:
+def planned(run: GrowthRule, step: Step) -> Advance:
     """The advance after a step."""
     sizes = tuple(cell_sizes(run.problem.mesh, sif.x) for sif in step.sif[0])
     return _plan(run, sizes, step.rate, step.dK_eq, memory_of(step).pending)
 
 
-def advanced(run: Run, step: Step, share: float = 1.0) -> list[Crack]:
+def advanced(run: GrowthRule, step: Step, share: float = 1.0) -> list[Crack]:
     """The cracks after the advance of a step, or after a share of it."""
     mesh = run.problem.mesh
     moved = [
@@ -46,7 +48,7 @@ def advanced(run: Run, step: Step, share: float = 1.0) -> list[Crack]:
     return moved if run.link_up is not None else following(mesh).met(moved, step.da, mesh)
 
 
-def cycles_to(run: Run, step: Step, share: float, after: float | None) -> float:
+def cycles_to(run: GrowthRule, step: Step, share: float, after: float | None) -> float:
     """Cycles of a share of the advance after a step, in proportion to it."""
     if after is not None:
         return share * after
@@ -55,13 +57,15 @@ def cycles_to(run: Run, step: Step, share: float, after: float | None) -> float:
     return share * plan.largest / float(step.rate[c][j])
 
 
-def _settled(run: Run, seen: Evaluation, cycles: float, pending: PerCrack) -> Settled:
+def _settled(run: GrowthRule, seen: Evaluation, cycles: float, pending: PerCrack) -> Settled:
     sizes = tuple(cell_sizes(seen.problem.mesh, sif.x) for sif in seen.sif[0])
     plan = _plan(run, sizes, seen.rate, seen.dK_eq, pending)
     return Settled(cycles, seen.cracks, plan.da, plan.pending)
 
 
-def _plan(run: Run, sizes: PerCrack, rate: PerCrack, dK_eq: PerCrack, pending: PerCrack) -> Advance:
+def _plan(
+    run: GrowthRule, sizes: PerCrack, rate: PerCrack, dK_eq: PerCrack, pending: PerCrack
+) -> Advance:
     return plan_advance(
         rate,
         dK_eq,

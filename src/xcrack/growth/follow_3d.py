@@ -154,14 +154,18 @@ def followed(
         size = cell_sizes(mesh, new.x).mean() if len(new.x) else 0.0
         reach = _REACH * float(size)
         new_closed, old_closed = closed_fronts(cracks[c]), closed_fronts(last.cracks[c])
-        after.append(carried(new.x, new.front, new_closed, law_rate[c], moved, reach))
-        waits = carried(moved, old.front, old_closed, before.pending[c], new.x, reach)
+        after.append(
+            interpolate_along_front(new.x, new.front, new_closed, law_rate[c], moved, reach)
+        )
+        waits = interpolate_along_front(
+            moved, old.front, old_closed, before.pending[c], new.x, reach
+        )
         pending.append(np.nan_to_num(waits))
     cycles = elapsed_3d(before.length, length, last.da, before.law_rate, after)
     return cycles, tuple(pending)
 
 
-def carried(
+def interpolate_along_front(
     x: Floats,
     front: Ints,
     closed: Sequence[bool],
@@ -216,10 +220,10 @@ __all__ = [
     "WAITS_BELOW",
     "advanced",
     "arriving",
-    "carried",
     "crack_size",
     "ended",
     "followed",
     "gone",
+    "interpolate_along_front",
     "met",
 ]

@@ -19,7 +19,7 @@ _FEWEST = 4  # places of a front
 
 
 @dataclass(frozen=True, eq=False)
-class Response:
+class FrontWaves:
     """How the advance of one front answers to its own change of shape.
 
     Attributes
@@ -46,7 +46,7 @@ class Response:
 
 def response(
     s: Floats, advance: Floats, exponent: float, turning: float, closed: bool, length: float
-) -> Response | None:
+) -> FrontWaves | None:
     """Response of one front; None where it is too short to have any.
 
     Parameters
@@ -79,7 +79,7 @@ def response(
     root = np.sqrt(0.5 * exponent * np.where(even > _TINY * even.max(), even, 0.0))
     S = root[:, None] * _wave_operator(n, span, closed, turning / span) * root
     decay, modes = np.linalg.eigh((S + S.T) / 2)
-    return Response(place, root, modes, np.maximum(decay, 0.0), closed, length)
+    return FrontWaves(place, root, modes, np.maximum(decay, 0.0), closed, length)
 
 
 def _wave_operator(n: int, span: float, closed: bool, kappa: float) -> Floats:
@@ -98,7 +98,7 @@ def _wave_operator(n: int, span: float, closed: bool, kappa: float) -> Floats:
     return np.asarray((cosine * factor) @ cosine.T)
 
 
-def predicted(front: Response | None, s: Floats, advance: Floats) -> Floats:
+def predicted(front: FrontWaves | None, s: Floats, advance: Floats) -> Floats:
     """Advance of a step by the rates at its beginning `(f,)`, length."""
     if front is None:
         return advance
@@ -109,7 +109,7 @@ def predicted(front: Response | None, s: Floats, advance: Floats) -> Floats:
     return _changed(front, s, advance, advance, change)
 
 
-def corrected(front: Response | None, s: Floats, advance: Floats, later: Floats) -> Floats:
+def corrected(front: FrontWaves | None, s: Floats, advance: Floats, later: Floats) -> Floats:
     """Advance of a step by the rates at its beginning and those at its predicted end.
 
     Notes
@@ -130,7 +130,7 @@ def corrected(front: Response | None, s: Floats, advance: Floats, later: Floats)
 
 
 def _changed(
-    front: Response,
+    front: FrontWaves,
     s: Floats,
     advance: Floats,
     plain: Floats,
@@ -142,7 +142,7 @@ def _changed(
     return np.asarray(np.maximum(plain + less, 0.0))
 
 
-def _weighted(front: Response, values: Floats, factor: Floats) -> Floats:
+def _weighted(front: FrontWaves, values: Floats, factor: Floats) -> Floats:
     """Value r E f Eᵀ (values/r), zero where nothing grows."""
     grows = front.root > 0
     scaled = np.where(grows, values / np.where(grows, front.root, 1.0), 0.0)
@@ -180,4 +180,4 @@ def turning_of(x: Floats, closed: bool) -> float:
     return float(np.arccos(np.clip(cosine, -1.0, 1.0)))
 
 
-__all__ = ["Response", "corrected", "predicted", "response", "turning_of"]
+__all__ = ["FrontWaves", "corrected", "predicted", "response", "turning_of"]

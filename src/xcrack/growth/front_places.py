@@ -6,7 +6,7 @@ import numpy as np
 
 from xcrack.base.arrays import Bools, Floats
 from xcrack.crack.crack import Crack
-from xcrack.growth.follow_3d import carried
+from xcrack.growth.follow_3d import interpolate_along_front
 from xcrack.growth.trail import Places
 from xcrack.mesh.locate import cell_sizes
 from xcrack.mesh.mesh import Mesh
@@ -33,7 +33,7 @@ class Later:
     way: Floats
 
 
-def moved_by(part: Places, angle: Floats, way: Floats) -> Floats:
+def move_of(part: Places, angle: Floats, way: Floats) -> Floats:
     """Moves `(f, 3)` of places by ways at angles."""
     t, n = part.frame[:, 0], part.frame[:, 1]
     return way[:, None] * (np.cos(angle)[:, None] * t + np.sin(angle)[:, None] * n)
@@ -45,12 +45,14 @@ def front_lengths(crack: Crack) -> Floats:
     return np.array([np.linalg.norm(np.diff(x, axis=0), axis=1).sum() for x in fronts])
 
 
-def values_at(part: Places, closed: Bools, values: Floats, x: Floats, mesh: Mesh) -> Floats:
+def interpolate_within_reach(
+    part: Places, closed: Bools, values: Floats, x: Floats, mesh: Mesh
+) -> Floats:
     """Values of places at points `(f, 3)` beside them; nan where there are none."""
     if not len(part.x):
         return np.full(len(x), np.nan)
     reach = REACH * float(cell_sizes(mesh, part.x).mean())
-    return carried(part.x, part.front, closed.tolist(), values, x, reach)
+    return interpolate_along_front(part.x, part.front, closed.tolist(), values, x, reach)
 
 
-__all__ = ["REACH", "Later", "front_lengths", "moved_by", "values_at"]
+__all__ = ["REACH", "Later", "front_lengths", "interpolate_within_reach", "move_of"]

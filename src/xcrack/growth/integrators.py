@@ -4,7 +4,7 @@ from typing import Protocol
 
 from xcrack.crack.crack import Crack
 from xcrack.growth import euler, pec_2d, pec_3d
-from xcrack.growth.options import Run
+from xcrack.growth.options import GrowthRule
 from xcrack.growth.rates import Evaluation, Settled
 from xcrack.growth.step import Advance, Step
 
@@ -12,26 +12,26 @@ from xcrack.growth.step import Advance, Step
 class Integrator(Protocol):
     """What a run asks of an integrator; `euler`, `pec_2d` and `pec_3d` have it."""
 
-    def begun(self, run: Run, seen: Evaluation) -> Settled:
+    def begun(self, run: GrowthRule, seen: Evaluation) -> Settled:
         """The first step of a run."""
 
-    def settled(self, run: Run, last: Step, seen: Evaluation) -> Settled:
+    def settled(self, run: GrowthRule, last: Step, seen: Evaluation) -> Settled:
         """What the cracks after an advance mean for the cycles and for the next advance."""
 
-    def planned(self, run: Run, step: Step) -> Advance:
+    def planned(self, run: GrowthRule, step: Step) -> Advance:
         """The advance after a step."""
 
-    def advanced(self, run: Run, step: Step) -> list[Crack]:
+    def advanced(self, run: GrowthRule, step: Step) -> list[Crack]:
         """The cracks after the advance of a step."""
 
-    def cycles_to(self, run: Run, step: Step, share: float, after: float | None) -> float:
+    def cycles_to(self, run: GrowthRule, step: Step, share: float, after: float | None) -> float:
         """Cycles of a share of the advance after a step, of which the whole takes `after`.
 
         As the last solves see it, where no solve after it says what the whole takes.
         """
 
 
-def integrator_of(run: Run) -> Integrator:
+def integrator_of(run: GrowthRule) -> Integrator:
     """The integrator of a run."""
     return _INTEGRATORS[run.integrator, run.problem.mesh.dim]
 

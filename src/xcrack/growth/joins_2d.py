@@ -7,7 +7,7 @@ import numpy as np
 from xcrack.base.arrays import Floats, at
 from xcrack.base.errors import GeometryError
 from xcrack.crack.crack import Crack
-from xcrack.growth.options import Run
+from xcrack.growth.options import GrowthRule
 from xcrack.growth.step import Step
 from xcrack.mesh.polygon import closest_on_segment
 
@@ -69,12 +69,12 @@ def new_unions(
     return result
 
 
-def joined(run: Run, last: Step, cracks: Sequence[Crack]) -> None:
+def joined(run: GrowthRule, last: Step, cracks: Sequence[Crack]) -> None:
     """Nothing is left to be joined: the advance has done that, if the scene allows it.
 
     Parameters
     ----------
-    run : Run
+    run : GrowthRule
     last : Step
     cracks : sequence of Crack
         After the advance.
@@ -95,7 +95,7 @@ def joined(run: Run, last: Step, cracks: Sequence[Crack]) -> None:
         raise GeometryError(f"cracks {i} and {k} meet near {at(x)}, and {hindrance}")
 
 
-def named_by_number(run: Run) -> str:
+def named_by_number(run: GrowthRule) -> str:
     """Why cracks cannot become one: a load names one by its number; empty where none does."""
     states = [state for state in run.cycle.load_states if isinstance(state, list | tuple)]
     loads = [*run.problem.loads, *(load for state in states for load in state)]

@@ -11,15 +11,15 @@ from xcrack.base.arrays import Floats, at
 from xcrack.base.errors import GeometryError
 from xcrack.crack.crack import Crack
 from xcrack.crack.fronts_3d import closed_fronts
-from xcrack.crack.merging import OFFSET, Gap, gap_between, merged, turned
-from xcrack.crack.placing import placed
+from xcrack.crack.merging import OFFSET, FrontGap, gap_between, merged_crack, turned_crack
+from xcrack.crack.placing import place_crack
 from xcrack.fatigue.checks import law_exponent
 from xcrack.growth import euler, follow_3d, pec_3d
 from xcrack.growth.ending import part_of_time
-from xcrack.growth.follow_3d import carried, crack_size
+from xcrack.growth.follow_3d import crack_size, interpolate_along_front
 from xcrack.growth.integrators import integrator_of
 from xcrack.growth.joins_2d import named_by_number
-from xcrack.growth.options import Run
+from xcrack.growth.options import GrowthRule
 from xcrack.growth.rates import Evaluation, Settled
 from xcrack.growth.step import Arriving, Join, Joined, Step, StepError, memory_of
 from xcrack.growth.trail import FrontTrail
@@ -37,24 +37,24 @@ _REACH = 4.0  # cells from a place along a front to those of the step before
 _MOST = 0.75  # of a cell: gap that may be left where the fronts speed up towards each other
 _UNKNOWN = 0.25  # of what the cycles differ by from those at the last rate: what is unsure of them
 
-_ADVANCED: dict[str, Callable[[Run, Step, float], list[Crack]]] = {
+_ADVANCED: dict[str, Callable[[GrowthRule, Step, float], list[Crack]]] = {
     "euler": euler.advanced,
     "pec": pec_3d.advanced,
 }
-_BEGUN: dict[str, Callable[[Run, Evaluation, float, StepError], Settled]] = {
+_BEGUN: dict[str, Callable[[GrowthRule, Evaluation, float, StepError], Settled]] = {
     "euler": euler.begun_at,
     "pec": pec_3d.begun_at,
 }
 
 
-def joined(run: Run, last: Step, cracks: Sequence[Crack]) -> Joined | None:
+def joined(run: GrowthRule, last: Step, cracks: Sequence[Crack]) -> Joined | None:
     """Cracks that meet within the advance after a step, joined; None where none do.
 
     The advance ends where the first two fronts are a quarter of a cell apart, which is closed.
 
     Parameters
     ----------
-    run : Run
+    run : GrowthRule
     last : Step
     cracks : sequence of Crack
         After the whole advance.
@@ -89,22 +89,24 @@ def joined(run: Run, last: Step, cracks: Sequence[Crack]) -> Joined | None:
     number = list(range(len(now)))
     while pairs := _close(now, body, OFFSET):
         (i, k), gap, size = pairs[0]
-        other = now[k] if gap.turn > 0 else turned(now[k])
-        now[i] = merged(now[i], other, _RADIUS * size, _SPACING * size)
+        other = now[k] if gap.turn > 0 else turned_crack(now[k])
+        now[i] = merged_crack(now[i], other, _RADIUS * size, _SPACING * size)
         x = tuple(gap.x.tolist())
         joins.append(Join(last.index + 1, last.cycles + cycles, x, (number[i], number[k])))
         del now[k], number[k]
     return Joined(tuple(now), apart, tuple(joins), way, cycles, unsure) if joins else None
 
 
-def arriving(run: Run, last: Step, met: Joined) -> list[Arriving]:
+def arriving(run: GrowthRule, last: Step, met: Joined) -> list[Arriving]:
     """What comes to the boundary in an advance in which cracks join, numbered as before it."""
     mesh = run.problem.mesh
     step = replace(last, da=tuple(met.way * da for da in last.da))
-    return follow_3d.arriving(step, met.apart, [placed(crack, mesh) for crack in met.apart], mesh)
+    return follow_3d.arriving(
+        step, met.apart, [place_crack(crack, mesh) for crack in met.apart], mesh
+    )
 
 
-def settled(run: Run, last: Step, seen: Evaluation, met: Joined) -> Settled:
+def settled(run: GrowthRule, last: Step, seen: Evaluation, met: Joined) -> Settled:
     """A step whose cracks have just joined: growth begins anew, after the cycles so far."""
     mesh, before = seen.problem.mesh, 0.0 if last.error is None else last.error.cycles
     place = tuple(_errors(last, sif.x, mesh) for sif in seen.sif[0])
@@ -114,7 +116,7 @@ def settled(run: Run, last: Step, seen: Evaluation, met: Joined) -> Settled:
 
 def _close(
     cracks: Sequence[Crack], body: Body, beside: float
-) -> list[tuple[tuple[int, int], Gap, float]]:
+) -> list[tuple[tuple[int, int], FrontGap, float]]:
     """Pairs of cracks in one surface whose fronts are too close to be solved, nearest first.
 
     In one surface: within `beside` cells of each other across it.
@@ -136,11 +138,11 @@ def _close(
 
 
 def _met(
-    run: Run,
+    run: GrowthRule,
     last: Step,
     cracks: Sequence[Crack],
     pair: tuple[int, int],
-    near: Gap,
+    near: FrontGap,
     size: float,
     body: Body,
     exponent: float,
@@ -187,7 +189,7 @@ def _gain(last: Step, now: Sequence[Crack], mesh: Mesh, exponent: float) -> floa
 
 
 def _share(
-    run: Run,
+    run: GrowthRule,
     last: Step,
     cracks: Sequence[Crack],
     pair: tuple[int, int],
@@ -247,12 +249,12 @@ def _errors(last: Step, x: Floats, mesh: Mesh) -> Floats:
         if own is None or not len(old.x):
             continue
         reach = _REACH * float(cell_sizes(mesh, old.x).mean())
-        near = carried(old.x, old.front, closed_fronts(crack), own, x, reach)
+        near = interpolate_along_front(old.x, old.front, closed_fronts(crack), own, x, reach)
         result = np.maximum(result, np.nan_to_num(near))
     return result
 
 
-def _hindrance(run: Run) -> str:
+def _hindrance(run: GrowthRule) -> str:
     """Why cracks cannot join in a run; empty where they can."""
     hindrance = named_by_number(run)
     if hindrance:

@@ -8,10 +8,10 @@ import numpy as np
 from scipy.interpolate import PchipInterpolator
 
 from xcrack.base.arrays import Bools, Floats, Ints
-from xcrack.fatigue.criteria import clipped
+from xcrack.fatigue.criteria import clipped_K
 from xcrack.fatigue.spectrum import Spectrum, distinct
 from xcrack.growth.response import Response
-from xcrack.linalg.reuse import Reuse
+from xcrack.linalg.reuse import SolverState
 from xcrack.model.problem import Problem
 from xcrack.model.states import LoadLevel
 from xcrack.sif.sif import SIF
@@ -21,11 +21,11 @@ _EXPONENT = 3.0  # of growth, to tell which ranges matter
 _GROWTH = 0.25  # of the tolerance: what a middle must change of the growth of a block, to matter
 _POINTS = 65  # factors at which ends of cycles are counted for that
 
-Solve = Callable[[Sequence[Any], Reuse], Response]
+Solve = Callable[[Sequence[Any], SolverState], Response]
 
 
 @dataclass(frozen=True, eq=False)
-class Ladder:
+class LevelTable:
     """K of one crack over the factor.
 
     Attributes
@@ -71,7 +71,7 @@ class LevelResponse:
 
 
 def refined(
-    problem: Problem, spectrum: Spectrum, first: Floats, solve: Solve, reuse: Reuse
+    problem: Problem, spectrum: Spectrum, first: Floats, solve: Solve, reuse: SolverState
 ) -> Response:
     """Response at levels that are as dense as K and the growth of a block ask for.
 
@@ -82,7 +82,7 @@ def refined(
     first : (n,) array
         Levels to begin with.
     solve : callable (states, reuse) -> Response
-    reuse : Reuse
+    reuse : SolverState
         Of the step before, with the levels that were wanted there: they are solved at once.
 
     Notes
@@ -96,7 +96,7 @@ def refined(
     solved: dict[float, LevelResponse] = {}
     handed_on = reuse
 
-    def solve_at(factors: Sequence[float]) -> Reuse:
+    def solve_at(factors: Sequence[float]) -> SolverState:
         new = sorted(set(factors) - set(solved))
         if not new:
             return handed_on
@@ -136,7 +136,9 @@ def states_of(spectrum: Spectrum, factors: Floats) -> list[float | LoadLevel]:
     return [LoadLevel(float(factor), tuple(spectrum.steady)) for factor in factors]
 
 
-def _nearest(reuse: Reuse, solved: dict[float, LevelResponse], factors: Sequence[float]) -> Reuse:
+def _nearest(
+    reuse: SolverState, solved: dict[float, LevelResponse], factors: Sequence[float]
+) -> SolverState:
     """The same with the closed sets of the factors that are nearest to some others."""
     known = np.array(sorted(solved))
     near = [solved[float(known[np.abs(known - factor).argmin()])] for factor in factors]
@@ -176,8 +178,8 @@ def _matters(
     for K in solved_K:
         if K.shape[1] == 0:
             continue
-        before = Ladder(np.array(levels), K[old], smooth=True)
-        after = Ladder(np.array(more), K, smooth=True)
+        before = LevelTable(np.array(levels), K[old], smooth=True)
+        after = LevelTable(np.array(more), K, smooth=True)
         largest = max(float(np.abs(K).max()), np.finfo(float).tiny)
         error = np.abs(K[~old] - before.at(np.array(middle))).max(axis=2) / largest
         one, two = (_growths(ladder, factors, pairs, count) for ladder in (before, after))
@@ -193,9 +195,9 @@ def _matters(
     return np.asarray(((off > spectrum.tolerance) & (changed > least)).any(axis=1))
 
 
-def _growths(ladder: Ladder, factors: Floats, pairs: Ints, count: Floats) -> Floats:
+def _growths(ladder: LevelTable, factors: Floats, pairs: Ints, count: Floats) -> Floats:
     """Growth of each kind of cycle at each place `(p, f)`, but for a constant."""
-    K = clipped(ladder.at(factors))
+    K = clipped_K(ladder.at(factors))
     dK = np.linalg.norm(K[pairs[1]] - K[pairs[0]], axis=2)
     return np.asarray(count[:, None] * dK**_EXPONENT)
 
@@ -209,7 +211,9 @@ def _cracks(solved: dict[float, LevelResponse]) -> range:
 _FIRST = 5  # levels before the first look at what lies between them
 
 
-def respond_to_levels(problem: Problem, spectrum: Spectrum, solve: Solve, reuse: Reuse) -> Response:
+def respond_to_levels(
+    problem: Problem, spectrum: Spectrum, solve: Solve, reuse: SolverState
+) -> Response:
     """Response at the levels of a spectrum, in the order of their factors.
 
     Parameters
@@ -218,7 +222,7 @@ def respond_to_levels(problem: Problem, spectrum: Spectrum, solve: Solve, reuse:
     spectrum : Spectrum
         Of factors or rows.
     solve : callable (states, reuse) -> Response
-    reuse : Reuse
+    reuse : SolverState
         Of the step before.
     """
     low, high = spectrum.extremes
@@ -237,7 +241,7 @@ def respond_to_levels(problem: Problem, spectrum: Spectrum, solve: Solve, reuse:
     return refined(problem, spectrum, factors, solve, reuse)
 
 
-def ladders(problem: Problem, spectrum: Spectrum, response: Response) -> list[Ladder]:
+def ladders(problem: Problem, spectrum: Spectrum, response: Response) -> list[LevelTable]:
     """Ladder of each crack, from K at the levels that were solved."""
     factors, sif = response.factors, response.sif
     linear = len(factors) == 2
@@ -247,9 +251,9 @@ def ladders(problem: Problem, spectrum: Spectrum, response: Response) -> list[La
         K = np.stack([state[c].K for state in sif])
         if origin:  # K is in proportion to the factor, on both sides with a slope of its own
             K = np.stack([K[0], np.zeros_like(K[0]), K[1]])
-            result.append(Ladder(np.array([factors[0], 0.0, factors[1]]), K, smooth=False))
+            result.append(LevelTable(np.array([factors[0], 0.0, factors[1]]), K, smooth=False))
         else:
-            result.append(Ladder(factors, K, smooth=not linear))
+            result.append(LevelTable(factors, K, smooth=not linear))
     return result
 
 
@@ -259,7 +263,7 @@ def is_homogeneous(problem: Problem, spectrum: Spectrum) -> bool:
 
 
 __all__ = [
-    "Ladder",
+    "LevelTable",
     "Solve",
     "is_homogeneous",
     "ladders",

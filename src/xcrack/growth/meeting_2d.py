@@ -46,7 +46,7 @@ class Faces:
     side: Floats
 
 
-def faces_of(cracks: Sequence[Crack]) -> Faces:
+def last_faces(cracks: Sequence[Crack]) -> Faces:
     """The last faces of all tips of placed cracks."""
     tip, anchor, side = [np.zeros((0, 2))], [np.zeros((0, 2))], [np.zeros(0)]
     for crack in cracks:
@@ -71,7 +71,7 @@ def moved_on(faces: Faces, grown: Bools, size: Floats) -> Bools:
     return np.asarray(grown & (faces.length < _WHOLE * size))
 
 
-def ending_at(
+def with_tips_at(
     cracks: Sequence[Crack], place: Floats, grown: Bools, size: Floats
 ) -> tuple[list[Crack], Bools]:
     """Cracks that go on to given places.
@@ -95,7 +95,7 @@ def ending_at(
     moves : (n,) array of bool
         Tips that moved; the others wait.
     """
-    faces = faces_of(cracks)
+    faces = last_faces(cracks)
     instead = moved_on(faces, grown, size)
     begin = np.where(instead[:, None], faces.anchor, faces.tip)
     moves = np.linalg.norm(place - begin, axis=1) >= LEAST * size
@@ -171,7 +171,7 @@ def meetings(cracks: Sequence[Crack], mesh: Mesh, ahead: float = AHEAD) -> list[
     """
     if len(cracks) < 2:
         return []
-    faces = faces_of(cracks)
+    faces = last_faces(cracks)
     owner = np.repeat(np.arange(len(cracks)), [crack.n_tips for crack in cracks])
     size = cell_sizes(mesh, faces.tip)
     result = []
@@ -318,11 +318,11 @@ __all__ = [
     "AHEAD",
     "Faces",
     "Meeting",
-    "ending_at",
-    "faces_of",
     "joined",
+    "last_faces",
     "meetings",
     "moved_on",
     "rows_of",
     "split",
+    "with_tips_at",
 ]

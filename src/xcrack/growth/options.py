@@ -1,4 +1,4 @@
-"""All that `grow` can be asked for: its options stand here once, their defaults on `Run` alone."""
+"""Options of `grow`: they stand here once, their defaults on `GrowthRule` alone."""
 
 import inspect
 from collections.abc import Callable, Mapping
@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from xcrack.base.arrays import Floats
-from xcrack.base.checks import number, shown, whole
+from xcrack.base.checks import number, value_text, whole_number
 from xcrack.base.errors import ProblemError, warn
 from xcrack.fatigue.criteria import Criterion
 from xcrack.fatigue.law import Law
@@ -28,7 +28,7 @@ _STOPS = {"changes_results": False}  # when a run stops, not how its cracks grow
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 
-class GrowOptions(TypedDict, total=False):
+class GrowthOptions(TypedDict, total=False):
     """Options of `grow` and `resume` by name; `grow` describes them."""
 
     tolerance: float | None
@@ -48,7 +48,7 @@ class GrowOptions(TypedDict, total=False):
 
 
 @dataclass(frozen=True, eq=False)
-class Run:
+class GrowthRule:
     """All that `grow` was asked for, checked.
 
     Parameters
@@ -94,16 +94,16 @@ class Run:
 
     def __post_init__(self) -> None:
         if not isinstance(self.problem, Problem):
-            raise ProblemError(f"grow: problem = {shown(self.problem)}: give a Problem.")
+            raise ProblemError(f"grow: problem = {value_text(self.problem)}: give a Problem.")
         for name in ("law", "criterion"):
             if not callable(getattr(self, name)):
                 raise ProblemError(
-                    f"grow: {name} = {shown(getattr(self, name))} cannot be called: give a "
+                    f"grow: {name} = {value_text(getattr(self, name))} cannot be called: give a "
                     "function of two arguments."
                 )
         if not isinstance(self.cycle, Cycle | Spectrum):
             raise ProblemError(
-                f"grow: cycle = {shown(self.cycle)}: give Cycle(min, max), or a Spectrum."
+                f"grow: cycle = {value_text(self.cycle)}: give Cycle(min, max), or a Spectrum."
             )
         for state in self.cycle.load_states:
             self.problem.state(state)
@@ -125,14 +125,16 @@ class Run:
             if value is not None:
                 object.__setattr__(self, name, number(value, f"grow: {name}", above=0))
         if self.max_steps is not None:
-            steps = whole(self.max_steps, "grow: max_steps", least=1)
+            steps = whole_number(self.max_steps, "grow: max_steps", least=1)
             object.__setattr__(self, "max_steps", steps)
         object.__setattr__(self, "threshold", number(self.threshold, "grow: threshold", least=0))
         if not isinstance(self.scaling, str) or self.scaling not in ("law", "linear"):
-            raise ProblemError(f'grow: scaling = {shown(self.scaling)}: give "law" or "linear".')
+            raise ProblemError(
+                f'grow: scaling = {value_text(self.scaling)}: give "law" or "linear".'
+            )
         if not isinstance(self.integrator, str) or self.integrator not in ("pec", "euler"):
             raise ProblemError(
-                f'grow: integrator = {shown(self.integrator)}: give "pec" or "euler".'
+                f'grow: integrator = {value_text(self.integrator)}: give "pec" or "euler".'
             )
         if self.scaling == "linear" and self.integrator != "euler":
             raise ProblemError(
@@ -143,11 +145,12 @@ class Run:
         self._check_tolerance()
         if self.solver is not None and not callable(self.solver):
             raise ProblemError(
-                f"grow: solver = {shown(self.solver)} cannot be called: give a function, or None."
+                f"grow: solver = {value_text(self.solver)} cannot be called: give a function, or "
+                f"None."
             )
         if self.response is not None and not callable(self.response):
             raise ProblemError(
-                f"grow: response = {shown(self.response)} cannot be called: give a function "
+                f"grow: response = {value_text(self.response)} cannot be called: give a function "
                 "(problem, states, reuse, bars) -> Response, or None."
             )
         self._check_link_up()
@@ -155,7 +158,7 @@ class Run:
         always = isinstance(self.progress, str) and self.progress == "always"
         if not (isinstance(self.progress, bool) or always):
             raise ProblemError(
-                f'grow: progress = {shown(self.progress)}: give True, False or "always".'
+                f'grow: progress = {value_text(self.progress)}: give True, False or "always".'
             )
 
     def _check_link_up(self) -> None:
@@ -163,8 +166,8 @@ class Run:
             return
         if not callable(self.link_up):
             raise ProblemError(
-                f"grow: link_up = {shown(self.link_up)}: give plastic_zone(sigma_y, beta), or a "
-                "function of K."
+                f"grow: link_up = {value_text(self.link_up)}: give plastic_zone(sigma_y, beta), or "
+                f"a function of K."
             )
         if self.problem.material.plane is None:
             raise ProblemError(
@@ -200,7 +203,7 @@ class Run:
         tolerance = number(self.tolerance, "grow: tolerance", above=0, below=1)
         object.__setattr__(self, "tolerance", tolerance)
         if self.max_unknowns is not None:
-            most = whole(self.max_unknowns, "grow: max_unknowns", least=1, most=10**9)
+            most = whole_number(self.max_unknowns, "grow: max_unknowns", least=1, most=10**9)
             object.__setattr__(self, "max_unknowns", most)
         if self.integrator != "pec":
             raise ProblemError(
@@ -223,7 +226,7 @@ class Run:
             lines |= describe("problem.mesh.curves", curves, self.defaults) if curves else {}
         return lines
 
-    def as_begun(self, stored: Mapping[str, str]) -> "Run":
+    def as_begun(self, stored: Mapping[str, str]) -> "GrowthRule":
         """The run with the defaults of a stored one, where it leaves a choice to them."""
         defaults = int(stored["defaults"])
         return replace(with_defaults_of(self, defaults, stored), defaults=defaults)
@@ -244,8 +247,8 @@ def run_of(
     criterion: Criterion,
     cycle: Cycle | Spectrum,
     da: float | None,
-    options: GrowOptions,
-) -> Run:
+    options: GrowthOptions,
+) -> GrowthRule:
     """The run that a function with the options of `grow` was called for.
 
     Raises
@@ -256,24 +259,24 @@ def run_of(
         One that does not fit.
     """
     for name in options:
-        if name not in GrowOptions.__annotations__:
+        if name not in GrowthOptions.__annotations__:
             raise TypeError(f"{caller}() got an unexpected keyword argument {name!r}")
-    return Run(problem, law, criterion, cycle, da, **options)
+    return GrowthRule(problem, law, criterion, cycle, da, **options)
 
 
 def lists_options(function: Function) -> Function:
-    """Let help and completion list the `GrowOptions` that a function takes by name."""
+    """Let help and completion list the `GrowthOptions` that a function takes by name."""
     signature = inspect.signature(function)
-    default = {each.name: each.default for each in fields(Run)}
+    default = {each.name: each.default for each in fields(GrowthRule)}
     own = [p for p in signature.parameters.values() if p.kind is not p.VAR_KEYWORD]
     options = [
         inspect.Parameter(
             name, inspect.Parameter.KEYWORD_ONLY, default=default[name], annotation=annotation
         )
-        for name, annotation in GrowOptions.__annotations__.items()
+        for name, annotation in GrowthOptions.__annotations__.items()
     ]
     cast(Any, function).__signature__ = signature.replace(parameters=[*own, *options])
     return function
 
 
-__all__ = ["GrowOptions", "Run", "lists_options", "run_of"]
+__all__ = ["GrowthOptions", "GrowthRule", "lists_options", "run_of"]

@@ -14,7 +14,7 @@ from xcrack.base.arrays import Bools, Floats, Ints
 from xcrack.base.errors import GeometryError, XcrackError, collected_warnings
 from xcrack.crack.crack import Crack
 from xcrack.fatigue.checks import law_exponent
-from xcrack.fatigue.criteria import clipped
+from xcrack.fatigue.criteria import clipped_K
 from xcrack.fatigue.kink import START, Turn, kinked_K, limit_angles
 from xcrack.fatigue.retardation import OverloadZones
 from xcrack.fatigue.spectrum import Spectrum
@@ -24,16 +24,16 @@ from xcrack.growth.meeting_2d import (
     AHEAD,
     Faces,
     Meeting,
-    ending_at,
-    faces_of,
     joined,
+    last_faces,
     meetings,
     moved_on,
     rows_of,
     split,
+    with_tips_at,
 )
-from xcrack.growth.options import Run
-from xcrack.growth.rates import Evaluation, Settled, asked_of, size_at_places
+from xcrack.growth.options import GrowthRule
+from xcrack.growth.rates import Evaluation, Settled, asked_of, crack_size
 from xcrack.growth.reach import (
     Growth,
     growth_over,
@@ -47,7 +47,7 @@ from xcrack.growth.reach import (
     reach_of,
 )
 from xcrack.growth.step import LEAST, Advance, Step, StepError, memory_of
-from xcrack.growth.trail import Control, Trail, shortest
+from xcrack.growth.trail import StepControl, Trail, shortest
 from xcrack.mesh.locate import cell_sizes, contains
 from xcrack.mesh.mesh import Mesh
 
@@ -89,12 +89,12 @@ class Prediction:
     apart: list[Crack]
 
 
-def predict(run: Run, cracks: Sequence[Crack], trail: Trail) -> Prediction:
+def predict(run: GrowthRule, cracks: Sequence[Crack], trail: Trail) -> Prediction:
     """Where the last two solves lead; from a first one straight on, at its rates."""
     size = cell_sizes(run.problem.mesh, trail.place)
     reach = reach_of(run, trail)
     place = trail.place + reach.growth.move
-    after, moves = ending_at(cracks, place, trail.grown, size)
+    after, moves = with_tips_at(cracks, place, trail.grown, size)
     ahead = Prediction(
         reach.length, reach.stops, reach.growth, place, after, moves, size, reach.length, after
     )
@@ -104,10 +104,10 @@ def predict(run: Run, cracks: Sequence[Crack], trail: Trail) -> Prediction:
 
 
 def _met(
-    run: Run, cracks: Sequence[Crack], trail: Trail, ahead: Prediction, met: list[Meeting]
+    run: GrowthRule, cracks: Sequence[Crack], trail: Trail, ahead: Prediction, met: list[Meeting]
 ) -> Prediction:
     """A step that ends when the first tip meets another crack, and the cracks joined there."""
-    faces = faces_of(ahead.apart)
+    faces = last_faces(ahead.apart)
     along = np.stack([np.cos(faces.direction), np.sin(faces.direction)], axis=1)
 
     def left(own: Meeting, length: float) -> float:
@@ -123,7 +123,7 @@ def _met(
     length = ahead.length if first == np.inf else first
     growth = growth_until(run, trail, length)
     place = trail.place + growth.move
-    apart, moves = ending_at(cracks, place, trail.grown, ahead.size)
+    apart, moves = with_tips_at(cracks, place, trail.grown, ahead.size)
     arrived = {own.tip for own, when in zip(met, arrival) if when <= length}
     now = [
         own
@@ -152,12 +152,12 @@ _GEOMETRY = 0.65  # times the face's share of the crack: read off four scenes
 _GAMMA = (-2.5, 0.5)
 
 
-def first_trail(run: Run, seen: Evaluation, place: Floats, grown: Bools) -> Trail:
+def first_trail(run: GrowthRule, seen: Evaluation, place: Floats, grown: Bools) -> Trail:
     """What growth begins with, or begins anew with after K has jumped.
 
     Parameters
     ----------
-    run : Run
+    run : GrowthRule
     seen : Evaluation
     place : (n, 2) array, length
         Where the tips are.
@@ -176,7 +176,7 @@ def first_trail(run: Run, seen: Evaluation, place: Floats, grown: Bools) -> Trai
     4 √(2/π) T/K_I* sin θ cos θ √s over the length s (the shear that T adds on the kink, Cotterell
     and Rice 1980).
     """
-    faces = faces_of(seen.cracks)
+    faces = last_faces(seen.cracks)
     direction, rate, dK_eq, exponent = directions_of(run, seen, faces)
     row, bend = 0, np.zeros(len(rate))
     # Of a law with nominal R the rates of a kinked crack are not known, nor a block's direction.
@@ -189,10 +189,10 @@ def first_trail(run: Run, seen: Evaluation, place: Floats, grown: Bools) -> Trai
         turns = (np.abs(angle) > START) & (seen.law_rate[c] > 0)
         if not known or not turns.any():
             continue
-        K = clipped(asked[c].K)
+        K = clipped_K(asked[c].K)
         theta, converged = limit_angles(_quiet(asked[c].turn), K)
         turns &= converged
-        kinked = clipped(kinked_K(K, np.where(turns, theta, 0.0)))
+        kinked = clipped_K(kinked_K(K, np.where(turns, theta, 0.0)))
         dK, behind = seen.dK_eq[c], seen.law_rate[c]
         if not nominal:
             with collected_warnings([]):
@@ -201,7 +201,7 @@ def first_trail(run: Run, seen: Evaluation, place: Floats, grown: Bools) -> Trai
         direction[rows] += np.where(turns, faces.side[rows] * (theta - angle), 0.0)
         rate[rows] = np.where(turns, behind, rate[rows])
         dK_eq[rows] = np.where(turns, dK, dK_eq[rows])
-        opening = clipped(kinked_K(clipped(seen.K(c)), np.where(turns, theta, 0.0)))[..., 0]
+        opening = clipped_K(kinked_K(clipped_K(seen.K(c)), np.where(turns, theta, 0.0)))[..., 0]
         begins = _ratio(opening, _T(seen, c)) * np.sin(theta) * np.cos(theta)
         bend[rows] = np.where(turns, faces.side[rows] * _COTTERELL_RICE * begins, 0.0)
     bend *= np.sqrt(rate / rate.max()) if np.isfinite(rate).all() and rate.any() else 0.0
@@ -218,7 +218,9 @@ def first_trail(run: Run, seen: Evaluation, place: Floats, grown: Bools) -> Trai
     )
 
 
-def directions_of(run: Run, seen: Evaluation, faces: Faces) -> tuple[Floats, Floats, Floats, float]:
+def directions_of(
+    run: GrowthRule, seen: Evaluation, faces: Faces
+) -> tuple[Floats, Floats, Floats, float]:
     """Directions (n,), rates (n,), ranges (n,) at all tips, and the exponent of the law."""
     angle, dK_eq = np.concatenate(seen.angle), np.concatenate(seen.dK_eq)
     exponent = law_exponent(run.law, dK_eq, np.concatenate(seen.R))
@@ -229,7 +231,7 @@ def directions_of(run: Run, seen: Evaluation, faces: Faces) -> tuple[Floats, Flo
 def crack_share(seen: Evaluation) -> Floats:
     """Length of the crack of each tip, half of it where the crack has two `(n,)`."""
     counts = [len(angle) for angle in seen.angle]
-    return np.concatenate([size_at_places(seen.problem, c, n) for c, n in enumerate(counts)])
+    return np.concatenate([crack_size(seen.problem, c, n) for c, n in enumerate(counts)])
 
 
 def turn_of_faces(seen: Evaluation, faces: Faces) -> Floats:
@@ -267,7 +269,7 @@ def _quiet(turn: Turn) -> Turn:
 
     def quiet(K: Floats) -> Floats:
         with collected_warnings([]):
-            return turn(clipped(K))
+            return turn(clipped_K(K))
 
     return quiet
 
@@ -279,9 +281,9 @@ _LEAST_RATIO = 0.2  # of what two parabolas say of a step to what the first of t
 _MENDED = 0.1  # of that squared and relative: what is left once the second step has mended it
 
 
-def begun(run: Run, seen: Evaluation) -> Settled:
+def begun(run: GrowthRule, seen: Evaluation) -> Settled:
     """The first step of a run."""
-    faces = faces_of(seen.cracks)
+    faces = last_faces(seen.cracks)
     trail = first_trail(run, seen, faces.tip, np.zeros(len(faces.tip), dtype=bool))
     trail = replace(trail, control=_first(run, trail, seen))
     trail = looked_ahead(run, overloads_begin(run, seen, trail))
@@ -289,7 +291,7 @@ def begun(run: Run, seen: Evaluation) -> Settled:
     return _settled(run, 0.0, seen.cracks, trail, StepError(none, 0.0))
 
 
-def settled(run: Run, last: Step, seen: Evaluation) -> Settled:
+def settled(run: GrowthRule, last: Step, seen: Evaluation) -> Settled:
     """Correct a predicted step by what was solved there, and predict the next."""
     trail, error = _remembered(last)
     before = predict(run, last.corrected, trail)
@@ -301,7 +303,7 @@ def settled(run: Run, last: Step, seen: Evaluation) -> Settled:
     return _corrected(run, last, seen, before, error)
 
 
-def planned(run: Run, step: Step) -> Advance:
+def planned(run: GrowthRule, step: Step) -> Advance:
     """The advance after a step."""
     trail, _ = _remembered(step)
     still = split(np.zeros(len(trail.place)), step.corrected)
@@ -324,13 +326,13 @@ def planned(run: Run, step: Step) -> Advance:
     )
 
 
-def advanced(run: Run, step: Step) -> list[Crack]:
+def advanced(run: GrowthRule, step: Step) -> list[Crack]:
     """The cracks after the predicted advance of a step."""
     trail, _ = _remembered(step)
     return predict(run, step.corrected, trail).cracks
 
 
-def cycles_to(run: Run, step: Step, share: float, after: float | None) -> float:
+def cycles_to(run: GrowthRule, step: Step, share: float, after: float | None) -> float:
     """Cycles of a share of the advance after a step, by the line through two solves."""
     del after  # behind the first exit other rates count
     trail, _ = _remembered(step)
@@ -347,14 +349,14 @@ def _remembered(step: Step) -> tuple[Trail, StepError]:
 
 
 def _settled(
-    run: Run, cycles: float, corrected: Sequence[Crack], trail: Trail, error: StepError
+    run: GrowthRule, cycles: float, corrected: Sequence[Crack], trail: Trail, error: StepError
 ) -> Settled:
     """A step that is settled, with the advance that follows."""
-    waits = np.linalg.norm(trail.place - faces_of(corrected).tip, axis=1)
+    waits = np.linalg.norm(trail.place - last_faces(corrected).tip, axis=1)
     da = np.zeros(len(waits))
     if np.isfinite(trail.rate[-1]).all() and (trail.rate[-1] > 0).any():
         ahead = predict(run, corrected, trail)
-        way = np.linalg.norm(ahead.place - faces_of(corrected).tip, axis=1)
+        way = np.linalg.norm(ahead.place - last_faces(corrected).tip, axis=1)
         da = np.where(ahead.moves, way, 0.0)
     return Settled(
         cycles, tuple(corrected), split(da, corrected), split(waits, corrected), trail, error
@@ -362,11 +364,11 @@ def _settled(
 
 
 def _corrected(
-    run: Run, last: Step, seen: Evaluation, before: Prediction, error: StepError
+    run: GrowthRule, last: Step, seen: Evaluation, before: Prediction, error: StepError
 ) -> Settled:
     """Correct the last points by the parabola through the last three solves."""
     old, _ = _remembered(last)
-    faces = faces_of(seen.cracks)
+    faces = last_faces(seen.cracks)
     direction, rate, dK_eq, exponent = directions_of(run, seen, faces)
     start = float(old.sigma[-1])
     trail = old.with_solve(start + before.length, direction, rate, dK_eq, exponent)
@@ -384,7 +386,7 @@ def _corrected(
         trail = trail.with_direction(solved + gamma * turn)
     place = old.place + growth.move
     try:
-        corrected, moves = ending_at(last.corrected, place, old.grown, before.size)
+        corrected, moves = with_tips_at(last.corrected, place, old.grown, before.size)
     except GeometryError:  # which the predicted cracks are free of
         place, corrected, moves = before.place, list(seen.cracks), before.moves
     off = share_left(run) * np.linalg.norm(place - before.place, axis=1)
@@ -413,12 +415,12 @@ def _corrected(
     )
 
 
-def _first(run: Run, trail: Trail, seen: Evaluation) -> Control:
+def _first(run: GrowthRule, trail: Trail, seen: Evaluation) -> StepControl:
     """Length of the first step."""
     return first(run, float(trail.scale.min(initial=np.inf)), *_ahead(run, trail, seen))
 
 
-def _ahead(run: Run, trail: Trail, seen: Evaluation) -> tuple[float, float]:
+def _ahead(run: GrowthRule, trail: Trail, seen: Evaluation) -> tuple[float, float]:
     """Shortest step of the fastest tip, and the way to the boundary ahead of it, length."""
     if not len(trail.place):
         return 0.0, np.inf
@@ -431,7 +433,7 @@ def _ahead(run: Run, trail: Trail, seen: Evaluation) -> tuple[float, float]:
 
 
 def _cycles(
-    run: Run, trail: Trail, old: Trail, before: Prediction, growth: Growth
+    run: GrowthRule, trail: Trail, old: Trail, before: Prediction, growth: Growth
 ) -> tuple[float, float, float]:
     """Cycles of a corrected step, what they add to the estimated error, and that of them alone."""
     if old.n_solves == 1:
@@ -457,7 +459,7 @@ def _cycles(
     return growth.cycles + curve - line, own, alone
 
 
-def _better_known(run: Run, trail: Trail, old: Trail, own: float) -> tuple[float, float]:
+def _better_known(run: GrowthRule, trail: Trail, old: Trail, own: float) -> tuple[float, float]:
     """What a step adds to the estimated error of the cycles, and that of the step alone.
 
     Two parabolas span the step before: that of its own, and that of the step behind it. The error
@@ -494,19 +496,19 @@ def _with_zones(trail: Trail, begin: OverloadZones | None, after: OverloadZones 
 
 def _begins(cracks: Sequence[Crack], trail: Trail, before: Prediction) -> Floats:
     """Where the last faces of the predicted cracks begin `(n, 2)`."""
-    faces = faces_of(cracks)
+    faces = last_faces(cracks)
     instead = moved_on(faces, trail.grown, before.size)
     return np.where(instead[:, None], faces.anchor, faces.tip)
 
 
 def _rows_that_stay(advanced: Sequence[Crack], placed: Sequence[Crack]) -> Ints:
     """Rows of the advanced tips that the placed ones are `(n,)`: some have left or joined."""
-    row = {tuple(x): k for k, x in enumerate(faces_of(advanced).tip.tolist())}
-    return np.array([row[tuple(x)] for x in faces_of(placed).tip.tolist()], dtype=np.int64)
+    row = {tuple(x): k for k, x in enumerate(last_faces(advanced).tip.tolist())}
+    return np.array([row[tuple(x)] for x in last_faces(placed).tip.tolist()], dtype=np.int64)
 
 
 def _without_lost_tips(
-    run: Run, last: Step, seen: Evaluation, before: Prediction, stays: Ints
+    run: GrowthRule, last: Step, seen: Evaluation, before: Prediction, stays: Ints
 ) -> Settled:
     """Begin anew after tips have left the body or met: their solves say nothing of the others now.
 
@@ -539,7 +541,7 @@ def _without_lost_tips(
     )
 
 
-def _exit(run: Run, trail: Trail, before: Prediction, lost: Ints) -> float:
+def _exit(run: GrowthRule, trail: Trail, before: Prediction, lost: Ints) -> float:
     """Piece of σ until the first of the lost tips is outside the body; all of it where none is."""
     mesh = run.problem.mesh
     if _inside(mesh, before.place[lost]):
@@ -555,7 +557,7 @@ def _inside(mesh: Mesh, x: Floats) -> bool:
     return bool(contains(mesh, x).all())
 
 
-def _broken(run: Run, last: Step, seen: Evaluation, before: Prediction) -> Settled:
+def _broken(run: GrowthRule, last: Step, seen: Evaluation, before: Prediction) -> Settled:
     """The last step of a run, at whose end a rate is infinite: no polynomial leads there.
 
     The inverse of the largest rate is taken to fall to zero along the step, as `cycles_between`

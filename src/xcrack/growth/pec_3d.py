@@ -13,7 +13,7 @@ from xcrack.base.arrays import Bools, Floats
 from xcrack.base.errors import GeometryError, XcrackError
 from xcrack.crack.crack import Crack
 from xcrack.crack.fronts_3d import closed_fronts, front_frames
-from xcrack.crack.placing import placed
+from xcrack.crack.placing import place_crack
 from xcrack.fatigue.checks import law_exponent
 from xcrack.fatigue.retardation import (
     POINTS,
@@ -26,10 +26,10 @@ from xcrack.fatigue.retardation import (
 from xcrack.growth import follow_3d
 from xcrack.growth.controlled import first, following, longest, share_left
 from xcrack.growth.cycles import elapsed_3d
-from xcrack.growth.follow_3d import carried
+from xcrack.growth.follow_3d import interpolate_along_front
 from xcrack.growth.front_angles import without_noise
 from xcrack.growth.front_filter import (
-    Response,
+    FrontWaves,
     corrected,
     predicted,
     response,
@@ -39,10 +39,10 @@ from xcrack.growth.front_places import (
     REACH,
     Later,
     front_lengths,
-    moved_by,
-    values_at,
+    interpolate_within_reach,
+    move_of,
 )
-from xcrack.growth.options import Run
+from xcrack.growth.options import GrowthRule
 from xcrack.growth.rates import Evaluation, Settled, block_order, kinds_of
 from xcrack.growth.step import Advance, PerCrack, Step, StepError, memory_of, plan_advance
 from xcrack.growth.trail import FrontTrail, Places
@@ -51,7 +51,7 @@ from xcrack.mesh.locate import cell_sizes, contains
 # Overloads along fronts: rates as means over a step, and zones carried from front to front.
 
 
-def with_kinds(run: Run, seen: Evaluation, parts: Sequence[Places]) -> tuple[Places, ...]:
+def with_kinds(run: GrowthRule, seen: Evaluation, parts: Sequence[Places]) -> tuple[Places, ...]:
     """Places with the cycles of a block that were solved close by."""
     if run.retardation is None:
         return tuple(parts)
@@ -63,7 +63,7 @@ def with_kinds(run: Run, seen: Evaluation, parts: Sequence[Places]) -> tuple[Pla
     return tuple(result)
 
 
-def with_mean_rates(run: Run, trail: FrontTrail) -> FrontTrail:
+def with_mean_rates(run: GrowthRule, trail: FrontTrail) -> FrontTrail:
     """The same with rates that are means over the step ahead, as K at its begin leads to.
 
     All are 0 where the growths of a step take more cycles than can be counted.
@@ -84,7 +84,7 @@ def with_mean_rates(run: Run, trail: FrontTrail) -> FrontTrail:
 
 
 def overloads_between(
-    run: Run,
+    run: GrowthRule,
     trail: FrontTrail,
     seen: Evaluation,
     moved: Sequence[Floats],
@@ -94,7 +94,7 @@ def overloads_between(
 
     Parameters
     ----------
-    run : Run
+    run : GrowthRule
     trail : FrontTrail
         Of the begin.
     seen : Evaluation
@@ -180,13 +180,13 @@ def _near(
         return kinds if lost is None else lost
     p = kinds.dK.shape[2]
     values = np.concatenate([kinds.dK[0], kinds.R[0]], axis=1)
-    near = carried(sif.x, sif.front, closed, values, x, np.inf)
+    near = interpolate_along_front(sif.x, sif.front, closed, values, x, np.inf)
     a = np.full((1, len(x)), float(kinds.a.flat[0]))
     return BlockCycles(near[None, :, :p], near[None, :, p:], a)
 
 
 def _marched(
-    run: Run,
+    run: GrowthRule,
     trail: FrontTrail,
     solves: Sequence[Sequence[BlockCycles]],
     length: float,
@@ -233,13 +233,13 @@ def _marched(
 _SHORTEST = 0.6  # cells: a shorter step of a front would end in those in which it began
 
 
-def begun(run: Run, seen: Evaluation) -> Settled:
+def begun(run: GrowthRule, seen: Evaluation) -> Settled:
     """The first step of a run."""
     none = tuple(np.zeros(len(sif.x)) for sif in seen.sif[0])
     return begun_at(run, seen, 0.0, StepError(none, 0.0))
 
 
-def begun_at(run: Run, seen: Evaluation, cycles: float, error: StepError) -> Settled:
+def begun_at(run: GrowthRule, seen: Evaluation, cycles: float, error: StepError) -> Settled:
     """A step before which there is nothing to correct."""
     parts = tuple(_solved_places(seen, c, None) for c in range(len(seen.cracks)))
     parts = with_kinds(run, seen, parts)
@@ -249,7 +249,7 @@ def begun_at(run: Run, seen: Evaluation, cycles: float, error: StepError) -> Set
     return _settled(run, seen, cycles, seen.cracks, trail, error)
 
 
-def settled(run: Run, last: Step, seen: Evaluation) -> Settled:
+def settled(run: GrowthRule, last: Step, seen: Evaluation) -> Settled:
     """Advance the fronts of the last step again, now by the rates at both ends of the step."""
     trail, error = _remembered(last)
     plan = _plan(run, trail)
@@ -260,7 +260,7 @@ def settled(run: Run, last: Step, seen: Evaluation) -> Settled:
     fastest = [max((float(r.max(initial=0.0)) for r in rates), default=0.0) for rates in (
         [part.rate for part in trail.parts], [part.rate for part in after])]  # fmt: skip
     cycles, own = _cycles(run, trail, plan, seen)
-    moved = [part.x + moved_by(part, part.angle, way) for part, way in zip(trail.parts, ahead)]
+    moved = [part.x + move_of(part, part.angle, way) for part, way in zip(trail.parts, ahead)]
     marched = None
     if run.retardation is not None and 0 < fastest[0] < np.inf:
         marched = overloads_between(run, trail, seen, moved, plan.largest)
@@ -307,7 +307,7 @@ def settled(run: Run, last: Step, seen: Evaluation) -> Settled:
     )  # fmt: skip
 
 
-def planned(run: Run, step: Step) -> Advance:
+def planned(run: GrowthRule, step: Step) -> Advance:
     """The advance after a step."""
     trail, _ = _remembered(step)
     plan = _plan(run, trail)
@@ -319,7 +319,7 @@ def planned(run: Run, step: Step) -> Advance:
     return replace(plan, tip=(c, int(np.argmin(away))))
 
 
-def advanced(run: Run, step: Step, share: float = 1.0) -> list[Crack]:
+def advanced(run: GrowthRule, step: Step, share: float = 1.0) -> list[Crack]:
     """The cracks after the predicted advance of a step, or after a share of it."""
     trail, _ = _remembered(step)
     plan = _plan(run, trail)
@@ -330,7 +330,7 @@ def advanced(run: Run, step: Step, share: float = 1.0) -> list[Crack]:
     ]
 
 
-def cycles_to(run: Run, step: Step, share: float, after: float | None) -> float:
+def cycles_to(run: GrowthRule, step: Step, share: float, after: float | None) -> float:
     """Cycles of a share of the advance after a step, in proportion to it."""
     if after is not None:
         return share * after
@@ -347,7 +347,7 @@ def _remembered(step: Step) -> tuple[FrontTrail, StepError]:
 
 
 def _settled(
-    run: Run,
+    run: GrowthRule,
     seen: Evaluation,
     cycles: float,
     cracks: Sequence[Crack],
@@ -363,16 +363,18 @@ def _settled(
     for c, (part, way) in enumerate(zip(trail.parts, ahead)):
         x = seen.sif[0][c].x
         for target, values in ((da, way), (pending, plan.pending[c])):
-            target.append(np.nan_to_num(values_at(part, part.closed, values, x, mesh)))
+            target.append(
+                np.nan_to_num(interpolate_within_reach(part, part.closed, values, x, mesh))
+            )
     return Settled(cycles, tuple(cracks), tuple(da), tuple(pending), trail, error)
 
 
-def _trail(run: Run, seen: Evaluation, parts: tuple[Places, ...]) -> FrontTrail:
+def _trail(run: GrowthRule, seen: Evaluation, parts: tuple[Places, ...]) -> FrontTrail:
     dK_eq, R = np.concatenate(seen.dK_eq), np.concatenate(seen.R)
     return with_mean_rates(run, FrontTrail(parts, law_exponent(run.law, dK_eq, R)))
 
 
-def _shortest(run: Run, trail: FrontTrail) -> float:
+def _shortest(run: GrowthRule, trail: FrontTrail) -> float:
     """Shortest step of the fastest place, length."""
     part = max(trail.parts, key=lambda each: float(each.rate.max(initial=-1.0)))
     if not len(part.s):
@@ -381,7 +383,7 @@ def _shortest(run: Run, trail: FrontTrail) -> float:
     return _SHORTEST * float(cell_sizes(run.problem.mesh, fastest)[0])
 
 
-def _plan(run: Run, trail: FrontTrail) -> Advance:
+def _plan(run: GrowthRule, trail: FrontTrail) -> Advance:
     mesh = run.problem.mesh
     rate = tuple(part.rate for part in trail.parts)
     return plan_advance(
@@ -396,7 +398,7 @@ def _plan(run: Run, trail: FrontTrail) -> Advance:
     )
 
 
-def _responses(trail: FrontTrail, c: int, advance: Floats) -> list[tuple[Bools, Response | None]]:
+def _responses(trail: FrontTrail, c: int, advance: Floats) -> list[tuple[Bools, FrontWaves | None]]:
     """Places of each front of a crack, and its response."""
     part = trail.parts[c]
     result = []
@@ -424,7 +426,7 @@ def _ahead(trail: FrontTrail, plan: Advance) -> PerCrack:
 
 
 def _again(
-    run: Run,
+    run: GrowthRule,
     trail: FrontTrail,
     plan: Advance,
     c: int,
@@ -453,7 +455,7 @@ def _again(
     still = np.hypot(along, across) == 0
     angle = np.where(still, part.angle, np.arctan2(across, along))
     try:
-        again = placed(
+        again = place_crack(
             follow_3d.advanced(crack, part, angle, np.where(goes, wanted, 0.0), mesh), mesh
         )
     except GeometryError:
@@ -461,20 +463,20 @@ def _again(
     if closed_fronts(again) != closed_fronts(solved):
         return None
     gap = np.linalg.norm(
-        moved_by(part, part.angle, later.way) - moved_by(part, angle, wanted), axis=1
+        move_of(part, part.angle, later.way) - move_of(part, angle, wanted), axis=1
     )
     return again, np.where(goes, 0.0, wanted), np.where(goes, gap, 0.0), way
 
 
 def _carried_back(seen: Evaluation, c: int, part: Places, way: Floats) -> Later:
-    target = part.x + moved_by(part, part.angle, way)
+    target = part.x + move_of(part, part.angle, way)
     sif, mesh = seen.sif[0][c], seen.problem.mesh
     here = _solved_places(seen, c, None)
     closed = closed_fronts(seen.cracks[c])
     size = float(cell_sizes(mesh, sif.x).mean()) if len(sif.x) else 0.0
 
     def back(values: Floats) -> Floats:
-        return carried(sif.x, sif.front, closed, values, target, REACH * size)
+        return interpolate_along_front(sif.x, sif.front, closed, values, target, REACH * size)
 
     law_rate = back(seen.law_rate[c])
     lost = np.isnan(law_rate)
@@ -518,12 +520,12 @@ def _corrected_places(
     frame = np.concatenate([front.frame for front in fronts])
 
     def near(values: Floats) -> Floats:
-        return values_at(here, here.closed, values, x, mesh)
+        return interpolate_within_reach(here, here.closed, values, x, mesh)
 
     rate = near(here.rate)
     there = ~np.isnan(rate) & contains(mesh, x)
     direction = np.stack([near(here.direction[:, k]) for k in range(3)], axis=1)
-    waits = np.nan_to_num(values_at(old, old.closed, pending, x, mesh))
+    waits = np.nan_to_num(interpolate_within_reach(old, old.closed, pending, x, mesh))
     return Places(
         s=s[there],
         front=number[there],
@@ -541,23 +543,27 @@ def _corrected_places(
 
 def _waiting(seen: Evaluation, c: int, part: Places, pending: Floats) -> Floats:
     x = seen.sif[0][c].x
-    return np.nan_to_num(values_at(part, part.closed, pending, x, seen.problem.mesh))
+    return np.nan_to_num(interpolate_within_reach(part, part.closed, pending, x, seen.problem.mesh))
 
 
 def _onto(
-    run: Run, seen: Evaluation, c: int, part: Places, last: Step, before: Floats, gap: Floats
+    run: GrowthRule, seen: Evaluation, c: int, part: Places, last: Step, before: Floats, gap: Floats
 ) -> Floats:
     """Estimated error of the places that were solved, with what this step adds."""
     x, mesh, old = seen.sif[0][c].x, seen.problem.mesh, last.sif[0][c]
-    own = np.nan_to_num(values_at(part, part.closed, share_left(run) * gap, x, mesh))
+    own = np.nan_to_num(interpolate_within_reach(part, part.closed, share_left(run) * gap, x, mesh))
     if not len(old.x):
         return own
     reach = 2 * REACH * float(cell_sizes(mesh, old.x).mean()) + float(gap.max(initial=0.0))
-    earlier = carried(old.x, old.front, closed_fronts(last.cracks[c]), before, x, reach)
+    earlier = interpolate_along_front(
+        old.x, old.front, closed_fronts(last.cracks[c]), before, x, reach
+    )
     return np.asarray(own + np.nan_to_num(earlier))
 
 
-def _cycles(run: Run, trail: FrontTrail, plan: Advance, seen: Evaluation) -> tuple[float, float]:
+def _cycles(
+    run: GrowthRule, trail: FrontTrail, plan: Advance, seen: Evaluation
+) -> tuple[float, float]:
     """Cycles of a step by the largest rates at both ends, and what they add to the error.
 
     All places advance in proportion to these, and without the response of the front: so the

@@ -9,13 +9,13 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from xcrack.adaptivity.measured import Measured, measured
+from xcrack.adaptivity.indicators import Indicators, indicators_of
 from xcrack.base.arrays import Floats
 from xcrack.base.errors import ProblemError, XcrackError, collected_warnings, warn
 from xcrack.growth import sizes_2d, sizes_3d
 from xcrack.growth.controlled import PATH, can_be_shortened, shortened
 from xcrack.growth.corridor import corridor, ways_of
-from xcrack.growth.options import Run
+from xcrack.growth.options import GrowthRule
 from xcrack.growth.scout import Stage, samples, scouted
 from xcrack.growth.step import Step, memory_of
 from xcrack.growth.trail import REJECTED, next_length
@@ -29,7 +29,7 @@ SHARE = 0.4  # of the tolerance: what K may take
 _LEAST_EXPONENT = 2.0  # of the law, in the error of life; directions err by twice that of K_II
 _FORETOLD = 4.0  # times the wanted bar: from there the next mesh need not be looked at again
 
-Steps = Callable[[Run], Generator[Step, None, str]]
+Steps = Callable[[GrowthRule], Generator[Step, None, str]]
 
 
 class Sizes(Protocol):
@@ -50,12 +50,12 @@ class Sizes(Protocol):
     def first_sizes(self, problem: Problem, stage: Stage) -> Floats:
         """Sizes of cells at the places of a stage, before any bar is known."""
 
-    def error(self, now: Measured) -> float:
+    def error(self, now: Indicators) -> float:
         """Half-width of K over the largest K."""
 
     def finer(
         self,
-        each: Sequence[Measured],
+        each: Sequence[Indicators],
         wanted: Sequence[float],
         places: Sequence[Floats],
         sizes: list[Floats],
@@ -64,13 +64,13 @@ class Sizes(Protocol):
 
 
 def prepared(
-    run: Run, steps_of: Steps, done: Sequence[Step] = (), stored: Sequence[Mesh] = ()
-) -> Run:
+    run: GrowthRule, steps_of: Steps, done: Sequence[Step] = (), stored: Sequence[Mesh] = ()
+) -> GrowthRule:
     """A run on the mesh that it begins with, or goes on with.
 
     Parameters
     ----------
-    run : Run
+    run : GrowthRule
         On the mesh as it was given.
     steps_of : callable
         What makes the steps of a run.
@@ -81,7 +81,7 @@ def prepared(
 
     Returns
     -------
-    Run
+    GrowthRule
     """
     first = _first_mesh(run)
     if not done:
@@ -102,17 +102,17 @@ def prepared(
     return on(run, mesh)
 
 
-def on(run: Run, mesh: Mesh) -> Run:
+def on(run: GrowthRule, mesh: Mesh) -> GrowthRule:
     """A run on another mesh."""
     return replace(run, problem=replace(run.problem, mesh=mesh, order=2))
 
 
-def _first_mesh(run: Run) -> Mesh:
+def _first_mesh(run: GrowthRule) -> Mesh:
     """The mesh as given, where error bars can be had on it: else finer at the tips, or fronts."""
     return _TWINS[run.problem.mesh.dim].given_mesh(run.problem)
 
 
-def _check_unknowns(run: Run, mesh: Mesh) -> None:
+def _check_unknowns(run: GrowthRule, mesh: Mesh) -> None:
     """Refuse a first mesh that has too many unknowns before anything is solved on it."""
     least = mesh.dim * (mesh.n_points + len(mesh.edges))
     if run.max_unknowns is not None and least > run.max_unknowns:
@@ -129,12 +129,12 @@ def fingerprint(mesh: Mesh) -> str:
     return digest.hexdigest()[:16]
 
 
-def finer(run: Run, steps_of: Steps, last: Step | None) -> tuple[Mesh, bool]:
+def finer(run: GrowthRule, steps_of: Steps, last: Step | None) -> tuple[Mesh, bool]:
     """A mesh on which bars of K are as wanted along all of the way that a scout finds.
 
     Parameters
     ----------
-    run : Run
+    run : GrowthRule
         On the mesh as it was given.
     steps_of : callable
         What makes the steps of a run.
@@ -202,24 +202,24 @@ def finer(run: Run, steps_of: Steps, last: Step | None) -> tuple[Mesh, bool]:
     return mesh, False
 
 
-def _warn_of_most(run: Run, most: int, instead: str) -> None:
+def _warn_of_most(run: GrowthRule, most: int, instead: str) -> None:
     warn(
         f"grow: the mesh that tolerance = {run.tolerance:g} asks for would have more than {most} "
         f"unknowns: {instead}. Allow more with max_unknowns; life_bar says what it costs."
     )
 
 
-def _measured(run: Run, mesh: Mesh, stage: Stage) -> Measured | None:
+def _measured(run: GrowthRule, mesh: Mesh, stage: Stage) -> Indicators | None:
     """K of a stage with its bars; None where that mesh has none."""
     with collected_warnings([]):  # they come again in the run
         try:
             scene = replace(run.problem, mesh=mesh, cracks=stage.cracks, order=2)
-            return measured(scene, run.cycle.load_states)
+            return indicators_of(scene, run.cycle.load_states)
         except XcrackError:
             return None
 
 
-def _tell(run: Run, line: str, start: float) -> None:
+def _tell(run: GrowthRule, line: str, start: float) -> None:
     if run.progress == "always" or (run.progress and sys.stderr.isatty()):
         print(f"{line}, {perf_counter() - start:.2g} s", file=sys.stderr)
 
@@ -239,17 +239,17 @@ _BEGIN = 1.5  # times the share of K at the first step: bars of a crack that gro
 
 
 def again(
-    asked: Run, run: Run, steps_of: Steps, last: Step | None, step: Step
-) -> tuple[Run, Step | None] | None:
+    asked: GrowthRule, run: GrowthRule, steps_of: Steps, last: Step | None, step: Step
+) -> tuple[GrowthRule, Step | None] | None:
     """The run and the step from which one is to be computed again; None where that is good.
 
     It follows from what is stored with the step before: a run that is taken up again does the same.
 
     Parameters
     ----------
-    asked : Run
+    asked : GrowthRule
         On the mesh as it was given.
-    run : Run
+    run : GrowthRule
         On the one of the step.
     steps_of : callable
         What makes the steps of a run.
@@ -267,7 +267,7 @@ def again(
     return None if shorter is None else (run, shorter)
 
 
-def _outgrown(run: Run, last: Step | None, step: Step) -> bool:
+def _outgrown(run: GrowthRule, last: Step | None, step: Step) -> bool:
     """Whether the bars of K are too wide on the mesh of a step, or its cells too long."""
     error = step.error
     if not run.estimates or error is None or not step.n_tips or run.meshes >= _MOST:
@@ -296,7 +296,7 @@ def _outgrown(run: Run, last: Step | None, step: Step) -> bool:
     )
 
 
-def _local(run: Run, step: Step) -> tuple[float, float]:
+def _local(run: GrowthRule, step: Step) -> tuple[float, float]:
     """Errors of rate and direction at a step by K, as they count for life and path."""
     error = step.error
     # No bar: a finer mesh may have one, but once.
@@ -313,7 +313,7 @@ def _has_no_room(last: Step, step: Step) -> bool:
     return error is not None and error > REJECTED and not can_be_shortened(last)
 
 
-def _with_room(run: Run, other: Run, last: Step, step: Step) -> Step:
+def _with_room(run: GrowthRule, other: GrowthRule, last: Step, step: Step) -> Step:
     """The step before, with the way ahead that a finer mesh allows."""
     trail: Any = memory_of(last).trail
     own: Any = memory_of(step).trail

@@ -13,7 +13,7 @@ from typing import Any
 from xcrack.base.errors import XcrackWarning, collected_warnings, warn
 from xcrack.base.optional import in_notebook
 from xcrack.growth.follow import following
-from xcrack.growth.options import Run
+from xcrack.growth.options import GrowthRule
 from xcrack.growth.step import Step
 
 _LOG = logging.getLogger("xcrack")
@@ -27,10 +27,10 @@ class Progress:
 
     Attributes
     ----------
-    run : Run
+    run : GrowthRule
     """
 
-    run: Run
+    run: GrowthRule
     _bar: Any = None
     _cycles: float | None = None
     _begin: float = field(default_factory=lambda: time.perf_counter())
@@ -65,7 +65,7 @@ class Progress:
             self._bar.close()
 
 
-def _line(run: Run, step: Step) -> str:
+def _line(run: GrowthRule, step: Step) -> str:
     places = f"{following(run.problem.mesh).PLACE}s"
     return (
         f"step {step.index:4d}  N {step.cycles:12.6g}  largest dK_eq {_largest(step.dK_eq):10.5g}  "
@@ -77,7 +77,7 @@ def _largest(parts: Any) -> float:
     return max((float(part.max(initial=0.0)) for part in parts), default=0.0)
 
 
-def _new_bar(run: Run, step: Step) -> Any:
+def _new_bar(run: GrowthRule, step: Step) -> Any:
     """A bar for terminal or notebook, with the time that is left; None without tqdm."""
     try:
         from tqdm.auto import tqdm
@@ -86,7 +86,7 @@ def _new_bar(run: Run, step: Step) -> Any:
     return tqdm(total=run.max_steps, initial=step.index, unit="step", file=sys.stderr)
 
 
-def _left(run: Run, step: Step, cycles: float, seconds: float) -> str:
+def _left(run: GrowthRule, step: Step, cycles: float, seconds: float) -> str:
     """Time that is left if all steps take as long as this one; empty where nobody knows."""
     steps = [] if run.max_steps is None else [run.max_steps - 1.0 - step.index]
     if run.max_cycles is not None and cycles > 0:
@@ -100,7 +100,7 @@ def _left(run: Run, step: Step, cycles: float, seconds: float) -> str:
     return f"  about {left / unit:.2g} {name} left"
 
 
-def _is_wanted(run: Run) -> bool:
+def _is_wanted(run: GrowthRule) -> bool:
     """Whether lines are asked for, or standard error is a terminal or a cell of a notebook."""
     notebook = in_notebook() or type(sys.stderr).__module__.startswith("ipykernel")
     return run.progress == "always" or (run.progress is True and (notebook or sys.stderr.isatty()))
@@ -113,7 +113,7 @@ _SEVERAL = re.compile(r"#(,? #)+")
 
 
 @dataclass
-class Kind:
+class WarningGroup:
     """What became of one kind of warning: messages alike but for their numbers."""
 
     first: int
@@ -123,10 +123,10 @@ class Kind:
 
 
 @dataclass
-class Notices:
+class WarningLog:
     """Warnings of a run by their kind; the one value of a run that changes."""
 
-    kinds: dict[str, Kind] = field(default_factory=dict)
+    kinds: dict[str, WarningGroup] = field(default_factory=dict)
     n_steps: int = 0
 
     @contextmanager
@@ -143,9 +143,9 @@ class Notices:
 
     def _add(self, message: str, step: int) -> None:
         key = _SEVERAL.sub("#", _NUMBER.sub("#", message))
-        kind = self.kinds.setdefault(key, Kind(step, 1, step, message))
+        kind = self.kinds.setdefault(key, WarningGroup(step, 1, step, message))
         if kind.last != step:
-            self.kinds[key] = Kind(kind.first, kind.steps + 1, step, message)
+            self.kinds[key] = WarningGroup(kind.first, kind.steps + 1, step, message)
         if kind.first == step:
             warn(message)
 
@@ -176,4 +176,4 @@ def _is_ignored(message: str) -> bool:
     return False
 
 
-__all__ = ["Notices", "Progress"]
+__all__ = ["Progress", "WarningLog"]

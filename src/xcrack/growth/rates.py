@@ -9,22 +9,22 @@ import numpy as np
 
 from xcrack.analysis.solution import Solution
 from xcrack.base.arrays import Bools, Floats, Ints
-from xcrack.base.checks import called
+from xcrack.base.checks import call_function
 from xcrack.base.errors import ProblemError, warn
 from xcrack.crack.crack import Crack
 from xcrack.fatigue.checks import evaluate_criterion, evaluate_law
-from xcrack.fatigue.criteria import clipped, equivalent_K, kink_angle, nominal_range
+from xcrack.fatigue.criteria import clipped_K, equivalent_K, kink_angle, nominal_range
 from xcrack.fatigue.law import Law
 from xcrack.fatigue.retardation import BlockCycles
 from xcrack.fatigue.spectrum import Spectrum, distinct
-from xcrack.growth.block import Pairs, block_of, left_out_share, pairs_of, rated
+from xcrack.growth.block import RangePairs, block_of, left_out_share, pairs_of, rated
 from xcrack.growth.follow import following
 from xcrack.growth.levels import respond_to_levels
-from xcrack.growth.options import Run
+from xcrack.growth.options import GrowthRule
 from xcrack.growth.response import Answers, Response, checked_response, respond
 from xcrack.growth.step import Cycle, PerCrack, Step, StepError
 from xcrack.growth.trail import FrontTrail, Trail
-from xcrack.linalg.reuse import Reuse
+from xcrack.linalg.reuse import SolverState
 from xcrack.model.problem import Problem
 from xcrack.sif.sif import SIF
 
@@ -33,7 +33,7 @@ from xcrack.sif.sif import SIF
 _ROUND_OFF = 1e-5  # range over the largest K_eq below which it is the error of a stuck crack
 
 
-def without_locked(
+def stop_locked_faces(
     problem: Problem,
     solutions: Sequence[Solution],
     sif: Sequence[Sequence[SIF]],
@@ -61,7 +61,7 @@ def without_locked(
         return dK_eq, rate
     nu, largest = problem.material.nu, 0.0
     for c in range(len(dK_eq)):
-        K = clipped(np.stack([state[c].K for state in sif]))
+        K = clipped_K(np.stack([state[c].K for state in sif]))
         largest = max(largest, float(equivalent_K(K, kink_angle(K), nu).max(initial=0.0)))
     ranges, rates = list(dK_eq), list(rate)
     for c in rubs:
@@ -101,12 +101,14 @@ Rates = tuple[PerCrack, PerCrack, PerCrack, PerCrack]
 PerPlace = tuple[Floats, Floats, Floats, Floats]
 
 
-def rates_of(run: Run, problem: Problem, response: Response, free: Response | None = None) -> Rates:
+def rates_of(
+    run: GrowthRule, problem: Problem, response: Response, free: Response | None = None
+) -> Rates:
     """Ask criterion and law of a run what K of all load states means.
 
     Parameters
     ----------
-    run : Run
+    run : GrowthRule
     problem : Problem
         With the cracks that K belongs to.
     response : Response
@@ -128,13 +130,15 @@ def rates_of(run: Run, problem: Problem, response: Response, free: Response | No
     return angles, ranges, ratios, rates
 
 
-def response_without_contact(run: Run, problem: Problem, response: Response) -> Response | None:
+def response_without_contact(
+    run: GrowthRule, problem: Problem, response: Response
+) -> Response | None:
     """Response of the scene in which faces may overlap; None where no law asks for it."""
     if getattr(run.law, "ratio", None) != "nominal":
         return None
     if problem.contact == "off":
         return response
-    return respond_to_states(run, replace(problem, contact="off"), Reuse())
+    return respond_to_states(run, replace(problem, contact="off"), SolverState())
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,13 +161,13 @@ class Asked:
 
 
 def asked_of(
-    run: Run, problem: Problem, response: Response, free: Response | None = None
+    run: GrowthRule, problem: Problem, response: Response, free: Response | None = None
 ) -> list[Asked]:
     """What criterion and law are asked about each crack.
 
     Parameters
     ----------
-    run : Run
+    run : GrowthRule
     problem : Problem
     response : Response
         Of all states.
@@ -175,13 +179,13 @@ def asked_of(
 
 
 def _asked_of_cycle(
-    run: Run, problem: Problem, response: Response, free: Response | None
+    run: GrowthRule, problem: Problem, response: Response, free: Response | None
 ) -> list[Asked]:
     place, nu = following(problem.mesh).PLACE, problem.material.nu
 
     def one(c: int) -> Asked:
         given = np.stack([state[c].K for state in response.sif])
-        a = size_at_places(problem, c, given.shape[1])
+        a = crack_size(problem, c, given.shape[1])
 
         def answer(K: Floats) -> PerPlace:
             angle, dK, R = evaluate_criterion(run.criterion, K, nu, c, place)
@@ -198,15 +202,15 @@ def _asked_of_cycle(
 
 
 def _asked_of_blocks(
-    run: Run, problem: Problem, response: Response, free: Response | None
+    run: GrowthRule, problem: Problem, response: Response, free: Response | None
 ) -> list[Asked]:
     place, nu = following(problem.mesh).PLACE, problem.material.nu
     every = pairs_of(run, problem, response)
     nominal = [None] * len(every) if free is None else pairs_of(run, problem, free)
 
-    def one(c: int, pairs: Pairs, other: Pairs | None) -> Asked:
+    def one(c: int, pairs: RangePairs, other: RangePairs | None) -> Asked:
         shape = pairs.K.shape
-        a = size_at_places(problem, c, shape[2])
+        a = crack_size(problem, c, shape[2])
 
         def answer(K: Floats) -> PerPlace:
             cycles = replace(pairs, K=K.reshape(shape))
@@ -221,7 +225,7 @@ def _asked_of_blocks(
     return [one(c, *each) for c, each in enumerate(zip(every, nominal, strict=True))]
 
 
-def size_at_places(problem: Problem, c: int, n: int) -> Floats:
+def crack_size(problem: Problem, c: int, n: int) -> Floats:
     """Crack size that a law is given at each place `(n,)`, length.
 
     In 2D the length inside the body over the number of tips: half of it for a crack with two. In 3D
@@ -240,7 +244,7 @@ def levels_of(cycle: Cycle | Spectrum, response: Response) -> tuple[float, ...]:
     return tuple(response.factors.tolist())
 
 
-def warn_of_left_out(run: Run, first: Step) -> None:
+def warn_of_left_out(run: GrowthRule, first: Step) -> None:
     """Say how much growth a spectrum leaves out with its small cycles, if it is worth a word."""
     if not isinstance(run.cycle, Spectrum):
         return
@@ -265,7 +269,7 @@ def must_choose(law: Law) -> bool:
     return getattr(law, "ratio", "contact") is None and bool(law.knows_negative_ratios)  # type: ignore[attr-defined]
 
 
-def _check_choice(run: Run, sif: Answers) -> None:
+def _check_choice(run: GrowthRule, sif: Answers) -> None:
     """The same, where no factors say R: a tip that is closed in some state has R < 0."""
     if run.cycle.ratio is None and must_choose(run.law):
         closed = any(crack.closed.any() for state in sif for crack in state)
@@ -283,15 +287,17 @@ def _choice(reason: str, law: Law) -> str:
     )
 
 
-def respond_to_states(run: Run, problem: Problem, reuse: Reuse, bars: bool = False) -> Response:
+def respond_to_states(
+    run: GrowthRule, problem: Problem, reuse: SolverState, bars: bool = False
+) -> Response:
     """Response of a scene to all load states of a run; to the levels of a spectrum of factors."""
     spectrum = run.cycle if isinstance(run.cycle, Spectrum) else None
 
-    def solve(states: Sequence[Any], reuse: Reuse) -> Response:
+    def solve(states: Sequence[Any], reuse: SolverState) -> Response:
         if run.response is None:
             response = respond(problem, states, reuse, bars, solver=run.solver)
         else:
-            given = called(
+            given = call_function(
                 run.response, "the response of a step", problem, tuple(states), reuse, bars
             )
             response = checked_response(given, problem, states)
@@ -379,12 +385,14 @@ class Settled:
     error: StepError | None = None
 
 
-def evaluate(run: Run, problem: Problem, response: Response) -> Evaluation:
+def evaluate(run: GrowthRule, problem: Problem, response: Response) -> Evaluation:
     """Ask criterion and law of a run what K of all load states means."""
     free = response_without_contact(run, problem, response)
     angle, dK_eq, R, law_rate = rates_of(run, problem, response, free)
     if response.solutions:
-        dK_eq, law_rate = without_locked(problem, response.solutions, response.sif, dK_eq, law_rate)
+        dK_eq, law_rate = stop_locked_faces(
+            problem, response.solutions, response.sif, dK_eq, law_rate
+        )
     rate = tuple(np.where(d < run.threshold, 0.0, r) for d, r in zip(dK_eq, law_rate))
     return Evaluation(problem, response, angle, dK_eq, R, law_rate, rate, free)
 
@@ -392,19 +400,19 @@ def evaluate(run: Run, problem: Problem, response: Response) -> Evaluation:
 # The kinds of cycles of a block at the places of the cracks that were solved.
 
 
-def block_order(run: Run) -> Ints:
+def block_order(run: GrowthRule) -> Ints:
     """Kinds of the cycles of a block, in time `(c,)`, of a run with retardation."""
     assert isinstance(run.cycle, Spectrum)
     return distinct(run.cycle.cycles)[2]
 
 
-def kinds_of(run: Run, seen: Evaluation) -> list[BlockCycles]:
+def kinds_of(run: GrowthRule, seen: Evaluation) -> list[BlockCycles]:
     """Range and ratio of each kind of cycle, one `BlockCycles` of a single solve a crack."""
     problem = seen.problem
     place, nu = following(problem.mesh).PLACE, problem.material.nu
     result = []
     for c, pairs in enumerate(pairs_of(run, problem, seen.response)):
-        a = size_at_places(problem, c, pairs.K.shape[2])
+        a = crack_size(problem, c, pairs.K.shape[2])
         every = rated(run, pairs, nu, c, place, a)
         dK, R = (np.ascontiguousarray(each.T)[None] for each in (every.dK, every.R))
         result.append(BlockCycles(dK, R, a[None]))
@@ -418,6 +426,7 @@ __all__ = [
     "asked_of",
     "block_order",
     "check_choice",
+    "crack_size",
     "evaluate",
     "kinds_of",
     "levels_of",
@@ -426,7 +435,6 @@ __all__ = [
     "rates_of",
     "refuse_friction",
     "respond_to_states",
-    "size_at_places",
+    "stop_locked_faces",
     "warn_of_left_out",
-    "without_locked",
 ]

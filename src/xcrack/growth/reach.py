@@ -15,7 +15,7 @@ from xcrack.fatigue.retardation import (
     no_zones,
 )
 from xcrack.growth.controlled import longest
-from xcrack.growth.options import Run
+from xcrack.growth.options import GrowthRule
 from xcrack.growth.rates import Evaluation, block_order, kinds_of
 from xcrack.growth.trail import KEPT, Overloads, Trail, directions_at, rates_at
 
@@ -170,7 +170,7 @@ class Reach:
 
 
 def piece_of(
-    run: Run, trail: Trail, start: float, length: float, begin: OverloadZones | None
+    run: GrowthRule, trail: Trail, start: float, length: float, begin: OverloadZones | None
 ) -> Piece:
     """Growth over [start, start + length] of σ, with the overloads left at its begin."""
     if begin is None:
@@ -179,7 +179,7 @@ def piece_of(
     return Piece(lambda other: _along(marched, other, start, length), marched.zones)
 
 
-def reach_of(run: Run, trail: Trail) -> Reach:
+def reach_of(run: GrowthRule, trail: Trail) -> Reach:
     """The next step as the last two solves see it; from a first one straight on, at its rates."""
     known, start = trail.last(2), float(trail.sigma[-1])
     length = _farthest(run, trail)
@@ -194,7 +194,7 @@ def reach_of(run: Run, trail: Trail) -> Reach:
     return Reach(grows, grows < length, growth_over(known, start, grows, run.threshold))
 
 
-def growth_until(run: Run, trail: Trail, sigma: float) -> Growth:
+def growth_until(run: GrowthRule, trail: Trail, sigma: float) -> Growth:
     """Growth over a first part of the step that is seen ahead."""
     known, start = trail.last(2), float(trail.sigma[-1])
     if trail.overloads is None:
@@ -202,7 +202,7 @@ def growth_until(run: Run, trail: Trail, sigma: float) -> Growth:
     return _along(_ahead(run, trail, sigma), known, start, sigma)
 
 
-def looked_ahead(run: Run, trail: Trail) -> Trail:
+def looked_ahead(run: GrowthRule, trail: Trail) -> Trail:
     """The same with the march of the next step, so that it is made once."""
     own = trail.overloads
     if own is None or not _can_grow(trail):
@@ -212,7 +212,7 @@ def looked_ahead(run: Run, trail: Trail) -> Trail:
 
 
 def overloads_begin(
-    run: Run, seen: Evaluation, trail: Trail, before: OverloadZones | None = None
+    run: GrowthRule, seen: Evaluation, trail: Trail, before: OverloadZones | None = None
 ) -> Trail:
     """A first trail with the kinds of cycles of its solve; behind a kink scaled as its range."""
     if run.retardation is None:
@@ -225,7 +225,7 @@ def overloads_begin(
     return replace(trail, overloads=Overloads(kinds, zones))
 
 
-def overloads_go_on(run: Run, seen: Evaluation, old: Trail, trail: Trail) -> Trail:
+def overloads_go_on(run: GrowthRule, seen: Evaluation, old: Trail, trail: Trail) -> Trail:
     """A trail with one more solve, with the kinds of cycles of that."""
     own = old.overloads
     if own is None:
@@ -242,7 +242,7 @@ def overloads_of_rest(before: Trail, stays: Bools | Ints) -> OverloadZones | Non
     return (own.zones if own.ahead is None else own.ahead.zones).at(stays)
 
 
-def _farthest(run: Run, trail: Trail) -> float:
+def _farthest(run: GrowthRule, trail: Trail) -> float:
     """Piece of σ that the next step does not exceed, length."""
     length = longest(run, trail.control)
     if run.cycles is None:
@@ -251,7 +251,7 @@ def _farthest(run: Run, trail: Trail) -> float:
     return min(length, run.cycles * fastest * (1.0 if trail.n_solves == 1 else _FASTER))
 
 
-def _ahead(run: Run, trail: Trail, length: float) -> CycleIntegration:
+def _ahead(run: GrowthRule, trail: Trail, length: float) -> CycleIntegration:
     own = trail.overloads
     assert own is not None
     if own.ahead is not None and length <= own.ahead.sigma[-1]:
@@ -262,7 +262,7 @@ def _ahead(run: Run, trail: Trail, length: float) -> CycleIntegration:
 
 
 def _march(
-    run: Run,
+    run: GrowthRule,
     trail: Trail,
     start: float,
     length: float,

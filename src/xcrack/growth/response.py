@@ -14,9 +14,9 @@ from numpy.typing import ArrayLike
 from xcrack.analysis.solution import Solution
 from xcrack.analysis.solve import solve_states
 from xcrack.base.arrays import Floats, lock
-from xcrack.base.checks import entries, flag, numbers, shown
+from xcrack.base.checks import entries, flag, numbers, value_text
 from xcrack.base.errors import ProblemError
-from xcrack.linalg.reuse import Reuse
+from xcrack.linalg.reuse import SolverState
 from xcrack.model.problem import Problem, check_problem
 from xcrack.model.states import LoadLevel
 from xcrack.sif.sif import SIF
@@ -37,7 +37,7 @@ class Response:
         ``sif[state][crack]``.
     solutions : tuple of Solution
         One a state; empty where K is from elsewhere.
-    reuse : Reuse
+    reuse : SolverState
         What the next solve starts from.
 
     Raises
@@ -49,7 +49,7 @@ class Response:
     states: tuple[Any, ...]
     sif: Answers
     solutions: tuple[Solution, ...] = ()
-    reuse: Reuse = field(default_factory=Reuse)
+    reuse: SolverState = field(default_factory=SolverState)
 
     def __post_init__(self) -> None:
         sif = tuple(entries(row, "Response: sif") for row in entries(self.sif, "Response: sif"))
@@ -57,13 +57,17 @@ class Response:
         for name in ("states", "solutions"):
             object.__setattr__(self, name, entries(getattr(self, name), f"Response: {name}"))
         if not all(isinstance(each, SIF) for row in sif for each in row):
-            raise ProblemError(f"Response: sif = {shown(self.sif)}: give a row of SIF a state.")
+            raise ProblemError(
+                f"Response: sif = {value_text(self.sif)}: give a row of SIF a state."
+            )
         if not all(isinstance(each, Solution) for each in self.solutions):
             raise ProblemError(
-                f"Response: solutions = {shown(self.solutions)}: give those of solve."
+                f"Response: solutions = {value_text(self.solutions)}: give those of solve."
             )
-        if not isinstance(self.reuse, Reuse):
-            raise ProblemError(f"Response: reuse = {shown(self.reuse)}: give that of a Response.")
+        if not isinstance(self.reuse, SolverState):
+            raise ProblemError(
+                f"Response: reuse = {value_text(self.reuse)}: give that of a Response."
+            )
         counts = {len(self.states), len(self.sif), len(self.solutions or self.sif)}
         if len(counts) > 1:
             raise ProblemError(
@@ -141,13 +145,13 @@ class Response:
         return cls(tuple(states), tuple(result))
 
 
-Respond = Callable[[Problem, Sequence[Any], Reuse, bool], Response]
+Respond = Callable[[Problem, Sequence[Any], SolverState, bool], Response]
 
 
 def respond(
     problem: Problem,
     states: Sequence[Any],
-    reuse: Reuse | None = None,
+    reuse: SolverState | None = None,
     bars: bool = False,
     *,
     solver: Any = None,
@@ -159,7 +163,7 @@ def respond(
     problem : Problem
     states : sequence of load states
         As of `solve`. With friction they are one cycle, repeated until slip returns.
-    reuse : Reuse, optional
+    reuse : SolverState, optional
         Of the response before.
     bars : bool
         Give K its error bars.
@@ -176,14 +180,16 @@ def respond(
         As of `solve` and `stress_intensity`.
     """
     check_problem(problem, "respond")
-    reuse = Reuse() if reuse is None else reuse
-    if not isinstance(reuse, Reuse):
-        raise ProblemError(f"respond: reuse = {shown(reuse)}: give that of a Response.")
+    reuse = SolverState() if reuse is None else reuse
+    if not isinstance(reuse, SolverState):
+        raise ProblemError(f"respond: reuse = {value_text(reuse)}: give that of a Response.")
     states, bars = entries(states, "respond: states"), flag(bars, "respond: bars")
     if not states:
         raise ProblemError("respond: states is empty: give one load state, at least.")
     if solver is not None and not callable(solver):
-        raise ProblemError(f"respond: solver = {shown(solver)} cannot be called: give a function.")
+        raise ProblemError(
+            f"respond: solver = {value_text(solver)} cannot be called: give a function."
+        )
     plane = problem.mesh.dim < 3  # of fronts, the bars need no factor
     solved = solve_states(
         problem, states, reuse=reuse, solver=solver, repeated=True, error=bars and plane
@@ -207,7 +213,7 @@ def checked_response(response: Any, problem: Problem, states: Sequence[Any]) -> 
     """
     if not isinstance(response, Response):
         raise ProblemError(
-            f"grow: response returned {shown(response)}: return a Response, such as "
+            f"grow: response returned {value_text(response)}: return a Response, such as "
             "Response.of_K(problem, states, K)."
         )
     n = len(problem.placed)

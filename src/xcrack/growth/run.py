@@ -25,9 +25,9 @@ from xcrack.growth.ending import (
 )
 from xcrack.growth.follow import following
 from xcrack.growth.integrators import integrator_of
-from xcrack.growth.options import GrowOptions, Run, lists_options, run_of
+from xcrack.growth.options import GrowthOptions, GrowthRule, lists_options, run_of
 from xcrack.growth.prepared import again, fingerprint, prepared
-from xcrack.growth.progress import Notices, Progress
+from xcrack.growth.progress import Progress, WarningLog
 from xcrack.growth.rates import (
     check_choice,
     evaluate,
@@ -36,8 +36,8 @@ from xcrack.growth.rates import (
     warn_of_left_out,
 )
 from xcrack.growth.step import LEAST, Advance, Cycle, Joined, Memory, Step, memory_of
-from xcrack.growth.uncertainty import best_known, shortfall, with_K
-from xcrack.linalg.reuse import Reuse
+from xcrack.growth.uncertainty import add_K_error, best_K, shortfall
+from xcrack.linalg.reuse import SolverState
 from xcrack.mesh.mesh import Mesh
 from xcrack.model.problem import Problem
 
@@ -49,7 +49,7 @@ def grow(
     criterion: Criterion,
     cycle: Cycle | Spectrum,
     da: float | None = None,
-    **options: Unpack[GrowOptions],
+    **options: Unpack[GrowthOptions],
 ) -> Generator[Step, None, str]:
     """Let the cracks of a problem grow under a repeated load cycle.
 
@@ -171,7 +171,7 @@ def grow(
 
 
 def steps_of(
-    run: Run, done: Sequence[Step] = (), meshes: Sequence[Mesh] = ()
+    run: GrowthRule, done: Sequence[Step] = (), meshes: Sequence[Mesh] = ()
 ) -> Generator[Step, None, str]:
     """Steps of a run: from the beginning, or those that follow the steps that are done.
 
@@ -182,18 +182,18 @@ def steps_of(
     asked, last = run, done[-1] if done else None
     if run.estimates:
         run = prepared(run, steps_of, done, meshes)
-    notices, progress = Notices(), Progress(run)
+    notices, progress = WarningLog(), Progress(run)
     kink = ""
     try:
         if last is None:
             with notices.watch(0) as messages:
-                first, reuse = _next_step(run, run.problem, None, Reuse(), settings)
+                first, reuse = _next_step(run, run.problem, None, SolverState(), settings)
                 own = len(messages)
                 other = again(asked, run, steps_of, None, first)
                 if other is not None:
                     run = other[0]
                     del messages[:own]  # of a mesh that nobody has
-                    first, reuse = _next_step(run, run.problem, None, Reuse(), settings)
+                    first, reuse = _next_step(run, run.problem, None, SolverState(), settings)
                 _warn_of_ratio(run, first)
                 warn_of_left_out(run, first)
             last = replace(first, warnings=tuple(messages))
@@ -246,7 +246,9 @@ def steps_of(
     return ended
 
 
-def _after(run: Run, last: Step, plan: Advance, reuse: Reuse) -> tuple[Step | None, Reuse, str]:
+def _after(
+    run: GrowthRule, last: Step, plan: Advance, reuse: SolverState
+) -> tuple[Step | None, SolverState, str]:
     """The step after another one, or why there is none."""
     try:
         cracks = integrator_of(run).advanced(run, last)
@@ -259,7 +261,9 @@ def _after(run: Run, last: Step, plan: Advance, reuse: Reuse) -> tuple[Step | No
     joins = joins_of(last, problem, plan.cycles)
     ended = cut_off(last, problem, joins) if joins else ""
     if joins:
-        reuse = Reuse()  # two cracks have become one: what belongs to numbers of cracks is void
+        reuse = (
+            SolverState()
+        )  # two cracks have become one: what belongs to numbers of cracks is void
     arriving = (
         following(run.problem.mesh).arriving(last, cracks, problem.placed, run.problem.mesh)
         if met is None
@@ -289,7 +293,7 @@ def _stopped(last: Step, error: Exception) -> str:
     return f"the cracks cannot go on after step {last.index}, N = {last.cycles:.6g}: {error}"
 
 
-def _warn_of_ratio(run: Run, first: Step) -> None:
+def _warn_of_ratio(run: GrowthRule, first: Step) -> None:
     """Warn where R < 0 was asked for and a law that depends on R never sees it."""
     if getattr(run.law, "ratio", None) is not None:
         return
@@ -305,17 +309,17 @@ def _warn_of_ratio(run: Run, first: Step) -> None:
 
 
 def _next_step(
-    run: Run,
+    run: GrowthRule,
     problem: Problem,
     last: Step | None,
-    reuse: Reuse,
+    reuse: SolverState,
     settings: Mapping[str, str],
     met: Joined | None = None,
-) -> tuple[Step, Reuse]:
+) -> tuple[Step, SolverState]:
     """Solve all load states of a problem and decide where and how fast its cracks grow."""
     response = respond_to_states(run, problem, reuse, run.estimates)
     sif, solutions, handed_on = response.sif, response.solutions, response.reuse
-    seen = evaluate(run, problem, replace(response, sif=best_known(sif)))
+    seen = evaluate(run, problem, replace(response, sif=best_K(sif)))
     integrator = integrator_of(run)
     if last is None:
         index, radius = 0, run.problem.numerics.radius
@@ -330,7 +334,7 @@ def _next_step(
             if met is None
             else joining.settled(run, last, seen, met)
         )
-    settled = with_K(run, last, settled, seen, sif)
+    settled = add_K_error(run, last, settled, seen, sif)
     memory = Memory(
         seen.law_rate,
         seen.length,
@@ -362,7 +366,7 @@ def _next_step(
     return step, handed_on
 
 
-def _problem(run: Run, cracks: Sequence[Crack], memory: Memory) -> Problem:
+def _problem(run: GrowthRule, cracks: Sequence[Crack], memory: Memory) -> Problem:
     """The scene with the cracks of another step, and the radius of the first."""
     numerics = run.problem.numerics
     if memory.radius is not None:
@@ -372,7 +376,7 @@ def _problem(run: Run, cracks: Sequence[Crack], memory: Memory) -> Problem:
     return problem
 
 
-def _gone(run: Run, cracks: Sequence[Crack], placed: Sequence[Crack]) -> bool:
+def _gone(run: GrowthRule, cracks: Sequence[Crack], placed: Sequence[Crack]) -> bool:
     """Whether tips, or fronts, have left the body."""
     twin = following(run.problem.mesh)
     return any(twin.gone(*pair) for pair in zip(cracks, placed, strict=True))

@@ -11,7 +11,7 @@ from xcrack.crack.crack import Crack
 from xcrack.fatigue.checks import law_exponent
 from xcrack.fatigue.kink import START
 from xcrack.growth.controlled import STEPS
-from xcrack.growth.options import Run
+from xcrack.growth.options import GrowthRule
 from xcrack.growth.step import Step, memory_of
 from xcrack.growth.trail import Trail, first_length
 from xcrack.model.problem import Problem
@@ -61,13 +61,16 @@ class Scouted:
 
 
 def scouted(
-    run: Run, scene: Problem, steps_of: Callable[[Run], Generator[Step, None, str]], begin: int = 0
+    run: GrowthRule,
+    scene: Problem,
+    steps_of: Callable[[GrowthRule], Generator[Step, None, str]],
+    begin: int = 0,
 ) -> Scouted:
     """Grow the cracks of a run in long steps, as far as they go, whatever stops the run itself.
 
     Parameters
     ----------
-    run : Run
+    run : GrowthRule
     scene : Problem
         On a coarse mesh.
     steps_of : callable
@@ -107,7 +110,7 @@ def scouted(
     return Scouted(tuple(stages), exponent, first)
 
 
-def _first_cells(run: Run, step: Step) -> Floats:
+def _first_cells(run: GrowthRule, step: Step) -> Floats:
     """Longest edges of cells at the first tips, for the first step that a tolerance asks for."""
     trail, angle = memory_of(step).trail, np.concatenate(step.angle)
     if not isinstance(trail, Trail):  # fronts begin without kinks of one cell

@@ -5,10 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from xcrack.adaptivity.indicators import Indicators
 from xcrack.adaptivity.joint_2d import joint_mesh
-from xcrack.adaptivity.measured import Measured
-from xcrack.adaptivity.resolved import resolved
-from xcrack.adaptivity.start_2d import growing, tip_sizes
+from xcrack.adaptivity.resolved import resolved_problem
+from xcrack.adaptivity.start_2d import growing_sizes, tip_sizes
 from xcrack.base.arrays import Floats
 from xcrack.growth.scout import Stage
 from xcrack.mesh.locate import cell_sizes
@@ -27,7 +27,7 @@ _AIM = 1.0  # of the wanted half-widths: bars become shorter than foretold
 
 def given_mesh(problem: Problem) -> Mesh:
     """The mesh as it was given, where cracks are long enough in it; else finer at the tips."""
-    problem = resolved(problem)
+    problem = resolved_problem(problem)
     place, size = tip_sizes(problem)
     if (cell_sizes(problem.mesh, place) <= _COARSEST * size).all():
         return problem.mesh
@@ -36,11 +36,11 @@ def given_mesh(problem: Problem) -> Mesh:
 
 def scout_mesh(problem: Problem) -> Mesh:
     """The mesh of a scene, finer around tips where it is coarser than their cracks are short."""
-    problem = resolved(problem)
+    problem = resolved_problem(problem)
     place, size = tip_sizes(problem)
     if not len(place):
         return problem.mesh
-    return refine(problem.mesh, size=growing(place, size, _SLOPE))
+    return refine(problem.mesh, size=growing_sizes(place, size, _SLOPE))
 
 
 def first_sizes(problem: Problem, stage: Stage) -> Floats:
@@ -49,20 +49,23 @@ def first_sizes(problem: Problem, stage: Stage) -> Floats:
     return np.minimum(size, cell_sizes(problem.mesh, place))
 
 
-def error(now: Measured) -> float:
+def error(now: Indicators) -> float:
     """Largest half-width of K over the largest K, of those that are known."""
     scale = float(np.abs(now.best[np.isfinite(now.best)]).max(initial=0.0))
     return float(now.bar[np.isfinite(now.bar)].max(initial=0.0)) / scale if scale > 0 else 0.0
 
 
 def finer(
-    each: Sequence[Measured], wanted: Sequence[float], places: Sequence[Floats], sizes: list[Floats]
+    each: Sequence[Indicators],
+    wanted: Sequence[float],
+    places: Sequence[Floats],
+    sizes: list[Floats],
 ) -> tuple[Mesh, list[Floats]]:
     """The next mesh but for the corridor, and the sizes along that.
 
     Parameters
     ----------
-    each : sequence of Measured
+    each : sequence of Indicators
         Stages on one mesh.
     wanted : sequence of float, stress · √length
         Half-widths of their K.

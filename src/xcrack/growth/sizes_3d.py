@@ -4,8 +4,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from xcrack.adaptivity.measured import Measured
-from xcrack.adaptivity.next_3d import first_mesh, first_size
+from xcrack.adaptivity.indicators import Indicators
+from xcrack.adaptivity.sizes_3d import first_mesh, first_size
 from xcrack.base.arrays import Floats
 from xcrack.growth.scout import Stage
 from xcrack.mesh.mesh import Mesh
@@ -30,7 +30,7 @@ def scout_mesh(problem: Problem) -> Mesh:
     return first_mesh(problem, _COARSER)
 
 
-def error(now: Measured) -> float:
+def error(now: Indicators) -> float:
     """Mean half-width of K along the fronts of all states, over the largest K."""
     good = np.isfinite(now.bar).all(axis=1)
     scale = float(np.abs(now.best[good]).max(initial=0.0))
@@ -46,7 +46,10 @@ def first_sizes(problem: Problem, stage: Stage) -> Floats:
 
 
 def finer(
-    each: Sequence[Measured], wanted: Sequence[float], places: Sequence[Floats], sizes: list[Floats]
+    each: Sequence[Indicators],
+    wanted: Sequence[float],
+    places: Sequence[Floats],
+    sizes: list[Floats],
 ) -> tuple[Mesh, list[Floats]]:
     """The mesh but for the corridor, and the sizes along that: parameters as in 2D."""
     del places

@@ -9,12 +9,12 @@ import numpy as np
 
 from xcrack.analysis.solution import Solution
 from xcrack.base.arrays import Floats, coordinates
-from xcrack.base.checks import entries, number, numbers, shown, whole
+from xcrack.base.checks import entries, number, numbers, value_text, whole_number
 from xcrack.base.errors import ProblemError
-from xcrack.base.markup import element, joined, table
+from xcrack.base.markup import element, join_parts, table
 from xcrack.crack.crack import Crack
 from xcrack.growth.trail import FrontTrail, Trail
-from xcrack.linalg.reuse import Reuse
+from xcrack.linalg.reuse import SolverState
 from xcrack.model.loads import Load
 from xcrack.sif.sif import SIF
 
@@ -199,16 +199,18 @@ class Join:
     cracks: tuple[int, int]
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "step", whole(self.step, "Join: step", least=0))
+        object.__setattr__(self, "step", whole_number(self.step, "Join: step", least=0))
         object.__setattr__(self, "N", number(self.N, "Join: N", least=0))
         point = numbers(self.point, "Join: point", (None,))
         if len(point) not in (2, 3):
-            raise ProblemError(f"Join: point = {shown(self.point)}: give 2 or 3 coordinates.")
+            raise ProblemError(f"Join: point = {value_text(self.point)}: give 2 or 3 coordinates.")
         object.__setattr__(self, "point", tuple(point.tolist()))
         pair = entries(self.cracks, "Join: cracks")
         if len(pair) != 2:
-            raise ProblemError(f"Join: cracks = {shown(self.cracks)}: give the numbers of two.")
-        first, second = (whole(c, "Join: cracks", least=0) for c in pair)
+            raise ProblemError(
+                f"Join: cracks = {value_text(self.cracks)}: give the numbers of two."
+            )
+        first, second = (whole_number(c, "Join: cracks", least=0) for c in pair)
         object.__setattr__(self, "cracks", (first, second))
 
     def __str__(self) -> str:
@@ -228,7 +230,7 @@ def checked_joins(given: Sequence[Join], what: str) -> tuple[Join, ...]:
     joins = entries(given, what)
     for join in joins:
         if not isinstance(join, Join):
-            raise ProblemError(f"{what}: {shown(join)} is none: give a tuple of Join.")
+            raise ProblemError(f"{what}: {value_text(join)} is none: give a tuple of Join.")
     return joins
 
 
@@ -312,7 +314,7 @@ def _load_state(state: Any, what: str) -> Any:
     loads = entries(state, what)
     for load in loads:
         if not isinstance(load, Load):
-            raise ProblemError(f"{what} has {shown(load)}, which is not a load: see traction.")
+            raise ProblemError(f"{what} has {value_text(load)}, which is not a load: see traction.")
     return state if isinstance(state, list | tuple) else loads
 
 
@@ -330,7 +332,7 @@ class Memory:
         Growth too short to be modelled yet.
     radius : float, length, or None
         Enriched radius of the first step.
-    reuse : Reuse
+    reuse : SolverState
         What the next solve starts from, without matrices.
     settings : mapping of str to str
         What the run was asked to do.
@@ -346,7 +348,7 @@ class Memory:
     length: tuple[float, ...]
     pending: PerCrack
     radius: float | None
-    reuse: Reuse
+    reuse: SolverState
     settings: Mapping[str, str]
     trail: Trail | FrontTrail | None = None
     mesh: str = ""
@@ -468,41 +470,44 @@ class Step:
     joins: tuple[Join, ...] = ()
 
     def __post_init__(self) -> None:
-        whole(self.index, "Step: index", least=0)
+        whole_number(self.index, "Step: index", least=0)
         number(self.cycles, "Step: cycles", least=0)
         if not all(isinstance(crack, Crack) for crack in entries(self.cracks, "Step: cracks")):
-            raise ProblemError(f"Step: cracks = {shown(self.cracks)}: give a tuple of Crack.")
+            raise ProblemError(f"Step: cracks = {value_text(self.cracks)}: give a tuple of Crack.")
         moved = entries(self.corrected, "Step: corrected") or entries(self.cracks, "Step: cracks")
         if not all(isinstance(crack, Crack) for crack in moved) or len(moved) != len(self.cracks):
             raise ProblemError(
-                f"Step: corrected = {shown(self.corrected)}: give a Crack for each of `cracks`."
+                f"Step: corrected = {value_text(self.corrected)}: give a Crack for each of "
+                f"`cracks`."
             )
         object.__setattr__(self, "corrected", moved)
         for solution in entries(self.solutions, "Step: solutions"):
             if not isinstance(solution, Solution):
                 raise ProblemError(
-                    f"Step: solutions: {shown(solution)} is none: give what solve returns."
+                    f"Step: solutions: {value_text(solution)} is none: give what solve returns."
                 )
         numbers(self.levels, "Step: levels", (None,))
         for arrival in entries(self.arrivals, "Step: arrivals"):
             if not isinstance(arrival, Arrival):
                 raise ProblemError(
-                    f"Step: arrivals: {shown(arrival)} is no Arrival: leave them out, grow makes "
-                    "them."
+                    f"Step: arrivals: {value_text(arrival)} is no Arrival: leave them out, grow "
+                    f"makes them."
                 )
         object.__setattr__(self, "joins", checked_joins(self.joins, "Step: joins"))
         if not isinstance(self.error, StepError | None):
             raise ProblemError(
-                f"Step: error = {shown(self.error)}: that is made by grow: leave it out."
+                f"Step: error = {value_text(self.error)}: that is made by grow: leave it out."
             )
         if self.warnings is not None:
             messages = entries(self.warnings, "Step: warnings")
             if not all(isinstance(message, str) for message in messages):
-                raise ProblemError(f"Step: warnings = {shown(self.warnings)}: give texts.")
+                raise ProblemError(f"Step: warnings = {value_text(self.warnings)}: give texts.")
             object.__setattr__(self, "warnings", messages)
         states = [entries(state, "Step: sif") for state in entries(self.sif, "Step: sif")]
         if not all(isinstance(sif, SIF) for state in states for sif in state):
-            raise ProblemError(f"Step: sif = {shown(self.sif)}: give SIF of states and cracks.")
+            raise ProblemError(
+                f"Step: sif = {value_text(self.sif)}: give SIF of states and cracks."
+            )
         counts = [[len(sif.x) for sif in state] for state in states]
         for name in ("angle", "dK_eq", "R", "rate", "da"):
             parts = entries(getattr(self, name), f"Step: {name}")
@@ -516,7 +521,7 @@ class Step:
             )
         if not isinstance(self.memory, Memory | None):
             raise ProblemError(
-                f"Step: memory = {shown(self.memory)}: that is made by grow: leave it out."
+                f"Step: memory = {value_text(self.memory)}: that is made by grow: leave it out."
             )
 
     def _repr_html_(self) -> str:
@@ -528,7 +533,7 @@ class Step:
         ]
         head = ("crack", "place", "angle", "ΔK_eq", "R", "da/dN", "da")
         title = element("b", f"Step {self.index}, N = {self.cycles:.6g}")
-        return joined(title, table(head, rows, scroll=len(rows) > 12))
+        return join_parts(title, table(head, rows, scroll=len(rows) > 12))
 
     @property
     def n_tips(self) -> int:

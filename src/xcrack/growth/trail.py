@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from xcrack.base.arrays import Bools, Floats, Ints
-from xcrack.base.checks import shown
+from xcrack.base.checks import value_text
 from xcrack.base.errors import ProblemError
 from xcrack.fatigue.law import Law
 from xcrack.fatigue.retardation import (
@@ -25,7 +25,7 @@ def check_retardation(model: object, law: Law, cycle: object, integrator: str) -
     if model is None:
         return
     if not isinstance(model, Retardation):
-        raise ProblemError(f"grow: retardation = {shown(model)}: give wheeler or willenborg.")
+        raise ProblemError(f"grow: retardation = {value_text(model)}: give wheeler or willenborg.")
     if not isinstance(cycle, Spectrum) or cycle.factors is None:
         raise ProblemError(
             "grow: retardation needs cycles in time: give Spectrum(factors). One Cycle has no "
@@ -62,7 +62,7 @@ REJECTED = 2.0  # errors from which on a step is done again with a shorter one
 
 
 @dataclass(frozen=True, eq=False)
-class Control:
+class StepControl:
     """How long the next step may be.
 
     Attributes
@@ -211,7 +211,7 @@ class Trail:
         Whether the last face of a tip was added by growth, so that it may be moved on.
     overloads : Overloads, optional
         With retardation.
-    control : Control
+    control : StepControl
         How long the next step may be.
     """
 
@@ -225,7 +225,7 @@ class Trail:
     place: Floats
     grown: Bools
     overloads: Overloads | None = None
-    control: Control = field(default_factory=Control)
+    control: StepControl = field(default_factory=StepControl)
 
     @property
     def n_solves(self) -> int:
@@ -402,22 +402,22 @@ class FrontTrail:
         One a crack.
     exponent : float
         Of the growth law.
-    control : Control
+    control : StepControl
         How long the next step may be.
     """
 
     parts: tuple[Places, ...]
     exponent: float
-    control: Control = field(default_factory=Control)
+    control: StepControl = field(default_factory=StepControl)
 
 
 __all__ = [
     "KEPT",
     "REJECTED",
-    "Control",
     "FrontTrail",
     "Overloads",
     "Places",
+    "StepControl",
     "Trail",
     "check_retardation",
     "directions_at",

@@ -9,7 +9,7 @@ import numpy as np
 from xcrack.base.arrays import Bools, Floats
 from xcrack.base.errors import collected_warnings
 from xcrack.fatigue.spectrum import Spectrum
-from xcrack.growth.options import Run
+from xcrack.growth.options import GrowthRule
 from xcrack.growth.rates import Evaluation, Settled, asked_of, rates_of
 from xcrack.growth.response import Answers
 from xcrack.growth.step import Step
@@ -31,7 +31,7 @@ _REMEDY = {
 _WHOLE = 1.0  # relative error of a rate that may as well be zero, or infinite
 
 
-def best_known(sif: Answers) -> Answers:
+def best_K(sif: Answers) -> Answers:
     """K of all states and cracks, replaced by the best one wherever that is known."""
     return tuple(tuple(_best(crack) for crack in state) for state in sif)
 
@@ -65,7 +65,7 @@ class RateError:
     turn: float
 
 
-def rate_error(run: Run, seen: Evaluation, sif: Answers) -> RateError:
+def rate_error(run: GrowthRule, seen: Evaluation, sif: Answers) -> RateError:
     """How much rates and directions change as K moves within its bars.
 
     Each mode in turn is moved by its bar, up and down, in all states at once, and the changes are
@@ -74,7 +74,7 @@ def rate_error(run: Run, seen: Evaluation, sif: Answers) -> RateError:
 
     Parameters
     ----------
-    run : Run
+    run : GrowthRule
     seen : Evaluation
         By the best K.
     sif : sequence of sequence of SIF
@@ -106,8 +106,8 @@ def rate_error(run: Run, seen: Evaluation, sif: Answers) -> RateError:
     return RateError(float(total[worst]), float(contact[worst]), float(turn[counts].max()))
 
 
-def with_K(
-    run: Run, last: Step | None, settled: Settled, seen: Evaluation, sif: Answers
+def add_K_error(
+    run: GrowthRule, last: Step | None, settled: Settled, seen: Evaluation, sif: Answers
 ) -> Settled:
     """A settled step whose error also has what the bars of K have cost so far."""
     if not run.estimates or settled.error is None:
@@ -135,7 +135,7 @@ def with_K(
     )
 
 
-def shortfall(run: Run, last: Step) -> str:
+def shortfall(run: GrowthRule, last: Step) -> str:
     """Why a tolerance is not met at a step, and what to do; empty where it is met."""
     error = last.error
     if error is None or run.tolerance is None or not error.grown > 0:
@@ -162,7 +162,7 @@ def shortfall(run: Run, last: Step) -> str:
 
 
 def _answers(
-    run: Run, seen: Evaluation
+    run: GrowthRule, seen: Evaluation
 ) -> Callable[[Sequence[Floats], int, float], tuple[Floats, Floats]]:
     """Directions and rates with one mode of K moved by its bars."""
     if isinstance(run.cycle, Spectrum) or seen.free is not None:
@@ -182,7 +182,7 @@ def _answers(
 
 
 def _moved(
-    run: Run, seen: Evaluation, bar: Sequence[Floats], mode: int, sign: float
+    run: GrowthRule, seen: Evaluation, bar: Sequence[Floats], mode: int, sign: float
 ) -> tuple[Floats, Floats]:
     """Directions and rates with one mode of K moved by its bars."""
 
@@ -241,4 +241,4 @@ def _share(part: Floats, bar: Floats) -> Floats:
     return np.asarray(np.clip(share.max(axis=0), 0.0, 1.0))
 
 
-__all__ = ["TOGETHER", "RateError", "best_known", "rate_error", "shortfall", "uses_best", "with_K"]
+__all__ = ["TOGETHER", "RateError", "add_K_error", "best_K", "rate_error", "shortfall", "uses_best"]

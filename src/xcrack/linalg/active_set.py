@@ -39,7 +39,7 @@ def active_set(
     ConvergenceError
         The fallback does not satisfy the conditions either.
     """
-    seen: set[bytes] = set()
+    visited: set[bytes] = set()
     active = np.array(start, dtype=bool)
     for iteration in range(1, _MAX_SETS + 1):
         pressure, gap = of_set(F, d, active)
@@ -50,11 +50,11 @@ def active_set(
         if (new == active).all():
             return StateContact(pressure, gap, active, iteration)
         key = new.tobytes()
-        if key in seen:
+        if key in visited:
             break
-        seen.add(key)
+        visited.add(key)
         active = new
-    return _safe(F, d, len(seen))
+    return _least_squares_set(F, d, len(visited))
 
 
 def of_set(F: Floats, d: Floats, active: Bools) -> tuple[Floats, Floats]:
@@ -64,7 +64,7 @@ def of_set(F: Floats, d: Floats, active: Bools) -> tuple[Floats, Floats]:
         # Groups differ in size by many orders of magnitude: scaled, the matrix is well conditioned.
         scale = _scale(F)[active]
         block = F[np.ix_(active, active)] * scale[:, None] * scale
-        pressure[active] = scale * _solved(block, -d[active] * scale)
+        pressure[active] = scale * _smallest_solution(block, -d[active] * scale)
     gap = F @ pressure + d
     gap[active] = 0.0
     return pressure, gap
@@ -77,7 +77,7 @@ def _scale(F: Floats) -> Floats:
     return np.where(moved, 1 / np.sqrt(np.where(moved, diagonal, 1.0)), 0.0)
 
 
-def _solved(A: Floats, b: Floats) -> Floats:
+def _smallest_solution(A: Floats, b: Floats) -> Floats:
     """Solution of a positive system; the smallest one where groups are redundant."""
     try:
         factor = scipy.linalg.cho_factor(A)
@@ -88,7 +88,7 @@ def _solved(A: Floats, b: Floats) -> Floats:
     return np.asarray(scipy.linalg.lstsq(A, b, cond=_REDUNDANT**2)[0])
 
 
-def _safe(F: Floats, d: Floats, tried: int) -> StateContact:
+def _least_squares_set(F: Floats, d: Floats, tried: int) -> StateContact:
     """Non-negative least squares on a root of F (Lawson and Hanson, 1974)."""
     scale = _scale(F)
     w, V = np.linalg.eigh((F + F.T) / 2 * scale[:, None] * scale)

@@ -78,8 +78,8 @@ def _star_home(space: FunctionSpace, c: int, nodes: Ints) -> Ints:
     is_edge = nodes >= n
     edge = nodes[is_edge] - n
     ends = mesh.edges[edge]
-    far = np.argmax(np.abs(cut.level_set.phi[ends]), axis=1)
-    end = ends[np.arange(len(ends)), far]
+    farthest = np.argmax(np.abs(cut.level_set.phi[ends]), axis=1)
+    end = ends[np.arange(len(ends)), farthest]
     move = ~np.isnan(cut.cut_edge[edge]) & (space.heaviside[c][end] >= 0)
     home[is_edge] = np.where(move, end, nodes[is_edge])
     return home
@@ -96,7 +96,7 @@ def restricted(blocks: Blocks, free: Bools) -> Blocks:
     return Blocks(blocks.members[keep], offsets(counts), standard)
 
 
-def orthonormal(K: sp.csr_matrix, blocks: Blocks) -> sp.csr_matrix:
+def orthonormal_functions(K: sp.csr_matrix, blocks: Blocks) -> sp.csr_matrix:
     """The functions that replace the enriched unknowns of blocks, in the old basis `(n, k)`."""
     from xcrack.linalg.kernels.blocks import orthonormal_columns
 
@@ -169,8 +169,8 @@ def patch_orthogonal(
                 nodes = np.unique(space.cell_nodes[cells[start[point] : start[point + 1]]])
             functions = [nodes, *[h[nodes][h[nodes] >= 0] for h in space.heaviside]]
             patch = (np.concatenate(functions)[:, None] * d + np.arange(d)).ravel()
-            own = tip.point_to_function[point] + np.arange(tip.functions)
-            F = (own[:, None] * d + np.arange(d)).ravel()
+            functions_of_tip = tip.point_to_function[point] + np.arange(tip.functions)
+            F = (functions_of_tip[:, None] * d + np.arange(d)).ravel()
             patch, F = patch[free[patch]], F[free[F]]
             members.append(np.concatenate([patch, F]))
             counts.append(len(patch) + len(F))

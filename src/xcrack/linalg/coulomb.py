@@ -143,7 +143,7 @@ def coulomb(rows: FrictionRows, d: Floats, start: Status) -> FrictionState:
     lam, status = np.zeros(len(d)), start
     for sweeps in _SWEEPS:
         if sweeps:
-            lam = _swept(rows, d, lam, sweeps)
+            lam = _sweep_functions(rows, d, lam, sweeps)
             status = _status_of(rows, lam)
         state, sets = _newton(rows, d, status)
         tried += sets
@@ -177,13 +177,13 @@ def of_status(rows: FrictionRows, d: Floats, status: Status) -> tuple[Floats, Fl
         moved = diagonal > 0
         scale = np.where(moved, 1 / np.sqrt(np.where(moved, diagonal, 1.0)), 0.0)
         A = (rows.F[active] @ spread) * scale[:, None] * scale
-        lam = spread @ (scale * solved(A, -d[active] * scale))
+        lam = spread @ (scale * smallest_solution(A, -d[active] * scale))
     gap = rows.F @ lam + d
     gap[active] = 0.0
     return lam, gap
 
 
-def solved(A: Floats, b: Floats) -> Floats:
+def smallest_solution(A: Floats, b: Floats) -> Floats:
     """Solution of a general system; the smallest one where groups are redundant."""
     lu, order, info = scipy.linalg.lapack.dgetrf(A)
     if info == 0 and np.abs(np.diag(lu)).min() > _REDUNDANT:
@@ -194,7 +194,7 @@ def solved(A: Floats, b: Floats) -> Floats:
 
 
 def _newton(rows: FrictionRows, d: Floats, status: Status) -> tuple[FrictionState | None, int]:
-    g, seen = rows.n, set()
+    g, visited = rows.n, set()
     weight = rows.stiffness / rows.measure
     for sets in range(1, _MOST + 1):
         lam, gap = of_status(rows, d, status)
@@ -208,9 +208,9 @@ def _newton(rows: FrictionRows, d: Floats, status: Status) -> tuple[FrictionStat
         new = Status(closed, np.where(slides, np.sign(along), 0.0).astype(np.int64))
         if new.key() == status.key():
             return FrictionState(lam, gap, status, sets), sets
-        if new.key() in seen:
+        if new.key() in visited:
             return None, sets
-        seen.add(new.key())
+        visited.add(new.key())
         status = new
     return None, _MOST
 
@@ -223,7 +223,7 @@ def _status_of(rows: FrictionRows, lam: Floats) -> Status:
     return Status(closed, np.where(slides, np.sign(shear), 0.0).astype(np.int64))
 
 
-def _swept(rows: FrictionRows, d: Floats, lam: Floats, sweeps: int) -> Floats:
+def _sweep_functions(rows: FrictionRows, d: Floats, lam: Floats, sweeps: int) -> Floats:
     """Sweeps of Gauss-Seidel: each function's own problem is solved exactly, one by one."""
     F, g, lam = rows.F, rows.n, np.array(lam)
     partner = np.full(g, -1)
@@ -234,18 +234,18 @@ def _swept(rows: FrictionRows, d: Floats, lam: Floats, sweeps: int) -> Floats:
             if F[i, i] <= 0:
                 continue
             j = int(partner[i])
-            own = [i] if j < 0 else [i, g + j]
-            block = F[np.ix_(own, own)]
-            free = gap[own] - block @ lam[own]
-            new = _alone(block, free, 0.0 if j < 0 else float(rows.mu[j]))
-            change = new - lam[own]
+            rows_of_function = [i] if j < 0 else [i, g + j]
+            block = F[np.ix_(rows_of_function, rows_of_function)]
+            free = gap[rows_of_function] - block @ lam[rows_of_function]
+            new = _tractions_of_one(block, free, 0.0 if j < 0 else float(rows.mu[j]))
+            change = new - lam[rows_of_function]
             if change.any():
-                gap += F[:, own] @ change
-                lam[own] = new
+                gap += F[:, rows_of_function] @ change
+                lam[rows_of_function] = new
     return lam
 
 
-def _alone(block: Floats, free: Floats, mu: float) -> Floats:
+def _tractions_of_one(block: Floats, free: Floats, mu: float) -> Floats:
     """Tractions of one function whose gap and slip without them are given."""
     a, gap = float(block[0, 0]), float(free[0])
     if len(free) == 1:
@@ -273,7 +273,7 @@ _STALL = 1e-8  # one that round-off keeps from falling further
 
 
 @dataclass(frozen=True, eq=False)
-class _Guess:
+class FrictionStart:
     """What a step of Newton is linearised at.
 
     Attributes
@@ -308,12 +308,12 @@ def coulomb_3d(rows: FrictionRows, d: Floats, start: Status) -> FrictionState:
         Neither Newton nor projections settle.
     """
     tried = 0
-    guess = _Guess(start.closed, start.slip.astype(float), np.zeros(len(rows.mu)))
+    guess = FrictionStart(start.closed, start.slip.astype(float), np.zeros(len(rows.mu)))
     lam = np.zeros(len(d))
     for sweeps in _SWEEPS_OVER_CONES:
         if sweeps:
             lam = _swept_cones(rows, d, lam, sweeps)
-            guess = _next(rows, lam, rows.F @ lam + d)
+            guess = _next_status(rows, lam, rows.F @ lam + d)
         state, sets = _newton_on_cones(rows, d, guess)
         tried += sets
         if state is not None:
@@ -326,29 +326,29 @@ def coulomb_3d(rows: FrictionRows, d: Floats, start: Status) -> FrictionState:
 
 
 def _newton_on_cones(
-    rows: FrictionRows, d: Floats, guess: _Guess
+    rows: FrictionRows, d: Floats, guess: FrictionStart
 ) -> tuple[FrictionState | None, int]:
     before, last = np.full(len(d), np.inf), np.inf
     for sets in range(1, _MOST_CONES + 1):
-        lam, gap = _solved(rows, d, guess)
-        new = _next(rows, lam, gap)
+        lam, gap = _linearised_solution(rows, d, guess)
+        new = _next_status(rows, lam, gap)
         largest = float(np.abs(lam).max(initial=0.0))
         change = float(np.abs(lam - before).max(initial=0.0)) if sets > 1 else np.inf
-        same = np.array_equal(new.closed, guess.closed) and np.array_equal(
+        same_status = np.array_equal(new.closed, guess.closed) and np.array_equal(
             new.direction.any(axis=0), guess.direction.any(axis=0)
         )
         turned = new.direction - guess.direction
         bound = rows.mu * np.maximum(lam[: rows.n], 0.0)[rows.rubbing]
         wrong = float(np.abs(bound * turned).max(initial=0.0))
-        settled = wrong <= _CHANGE * largest
+        is_settled = wrong <= _CHANGE * largest
         stalled = wrong <= _STALL * largest and change >= 0.5 * last
-        if same and (settled or stalled):
+        if same_status and (is_settled or stalled):
             return FrictionState(lam, gap, Status(new.closed, new.direction), sets), sets
         before, last, guess = lam, change, new
     return None, _MOST_CONES
 
 
-def _next(rows: FrictionRows, lam: Floats, gap: Floats) -> _Guess:
+def _next_status(rows: FrictionRows, lam: Floats, gap: Floats) -> FrictionStart:
     """Status that tractions and gaps ask for, and how directions follow the slip."""
     g, weight = rows.n, rows.stiffness / rows.measure
     tolerance = 1e-12 * float(np.abs(lam).max(initial=0.0))
@@ -361,10 +361,12 @@ def _next(rows: FrictionRows, lam: Floats, gap: Floats) -> _Guess:
     length = np.where(slides, size, 1.0)
     pressed = rows.mu * np.maximum(lam[:g], 0.0)[rows.rubbing]
     share = np.where(slides, np.minimum(pressed / length, 1.0), 0.0)
-    return _Guess(closed, np.where(slides, trial / length, 0.0), share)
+    return FrictionStart(closed, np.where(slides, trial / length, 0.0), share)
 
 
-def _solved(rows: FrictionRows, d: Floats, guess: _Guess) -> tuple[Floats, Floats]:
+def _linearised_solution(
+    rows: FrictionRows, d: Floats, guess: FrictionStart
+) -> tuple[Floats, Floats]:
     """Tractions of the linearised conditions, and the gaps and slips that they leave."""
     g, r = rows.n, len(rows.mu)
     shut = np.nonzero(guess.closed)[0]
@@ -379,8 +381,8 @@ def _solved(rows: FrictionRows, d: Floats, guess: _Guess) -> tuple[Floats, Float
         scale = np.where(size > 0, 1 / np.sqrt(np.where(size > 0, size, 1.0)), 0.0)
         A = rows.F[np.ix_(active, active)] * scale[:, None] * scale
         b = -d[active] * scale
-        _slide(rows, guess, A, b, shut, touching, slides, scale)
-        lam[active] = scale * solved(A, b)
+        _put_slip_conditions(rows, guess, A, b, shut, touching, slides, scale)
+        lam[active] = scale * smallest_solution(A, b)
     gap = rows.F @ lam + d
     gap[shut] = 0.0
     for part in (g, g + r):
@@ -388,8 +390,8 @@ def _solved(rows: FrictionRows, d: Floats, guess: _Guess) -> tuple[Floats, Float
     return lam, gap
 
 
-def _slide(
-    rows: FrictionRows, guess: _Guess, A: Floats, b: Floats, shut: Ints, touching: Ints,
+def _put_slip_conditions(
+    rows: FrictionRows, guess: FrictionStart, A: Floats, b: Floats, shut: Ints, touching: Ints,
     slides: Bools, scale: Floats,
 ) -> None:  # fmt: skip
     """Put the conditions of slipping functions in the place of those of stuck ones.
@@ -407,23 +409,23 @@ def _slide(
     s, share, mu = guess.direction[:, number], guess.share[number], rows.mu[number]
     t = [m + chosen, m + n + chosen]
     pressed = place[rows.rubbing[number]]
-    own = np.array([scale[t[0]], scale[t[1]]])
+    scale_of_slip = np.array([scale[t[0]], scale[t[1]]])
     weight = (rows.stiffness / rows.measure)[rows.rubbing[number]]
-    slip = np.stack([A[t[0]] / own[0][:, None], A[t[1]] / own[1][:, None]])
-    free = np.stack([b[t[0]] / own[0], b[t[1]] / own[1]])
+    slip = np.stack([A[t[0]] / scale_of_slip[0][:, None], A[t[1]] / scale_of_slip[1][:, None]])
+    free = np.stack([b[t[0]] / scale_of_slip[0], b[t[1]] / scale_of_slip[1]])
     line = np.arange(len(chosen))
     for i in (0, 1):
         row = np.zeros((len(chosen), A.shape[1]))
         right = np.zeros(len(chosen))
-        row[line, t[i]] += own[i]
+        row[line, t[i]] += scale_of_slip[i]
         row[line, pressed] -= mu * s[i] * scale[pressed]
         for j in (0, 1):
             across = share * ((i == j) - s[i] * s[j])
-            row[line, t[j]] -= across * own[j]
+            row[line, t[j]] -= across * scale_of_slip[j]
             row += (across * weight)[:, None] * slip[j]
             right += across * weight * free[j]
-        A[t[i]] = row / own[i][:, None]
-        b[t[i]] = right / own[i]
+        A[t[i]] = row / scale_of_slip[i][:, None]
+        b[t[i]] = right / scale_of_slip[i]
 
 
 def _swept_cones(rows: FrictionRows, d: Floats, lam: Floats, sweeps: int) -> Floats:
@@ -441,15 +443,15 @@ def _swept_cones(rows: FrictionRows, d: Floats, lam: Floats, sweeps: int) -> Flo
             lam[i], j = pressure, int(partner[i])
             if j < 0:
                 continue
-            own = np.array([g + j, g + r + j])
-            stiff = float(np.linalg.eigvalsh(F[np.ix_(own, own)])[-1])
+            rows_of_function = np.array([g + j, g + r + j])
+            stiff = float(np.linalg.eigvalsh(F[np.ix_(rows_of_function, rows_of_function)])[-1])
             if stiff <= 0:
                 continue
-            trial = lam[own] - gap[own] / stiff
+            trial = lam[rows_of_function] - gap[rows_of_function] / stiff
             size, bound = float(np.hypot(*trial)), float(rows.mu[j]) * pressure
             new = trial if size <= bound else trial * (bound / size)
-            gap += F[:, own] @ (new - lam[own])
-            lam[own] = new
+            gap += F[:, rows_of_function] @ (new - lam[rows_of_function])
+            lam[rows_of_function] = new
     return lam
 
 
@@ -461,5 +463,5 @@ __all__ = [
     "coulomb",
     "coulomb_3d",
     "of_status",
-    "solved",
+    "smallest_solution",
 ]

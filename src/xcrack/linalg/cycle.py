@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from xcrack.base.arrays import Floats, lock
-from xcrack.linalg.row_blocks import Bordered, RowBlocks, in_fours
+from xcrack.linalg.row_blocks import BorderedFactor, RowBlocks, in_fours
 from xcrack.linalg.schwarz import Patches
 
 _LANCZOS = 12  # steps for the largest eigenvalue
@@ -18,12 +18,12 @@ _START = 613_077  # seed of the vector that Lanczos starts from
 
 
 @dataclass(frozen=True, eq=False)
-class Level:
+class GridLevel:
     """One level of a cycle, in single precision.
 
     Attributes
     ----------
-    matrix : RowBlocks or Bordered
+    matrix : RowBlocks or BorderedFactor
     inverse : (n,) array
         Inverse diagonal, 0 where the diagonal is.
     largest : float
@@ -34,7 +34,7 @@ class Level:
         Smooth in the place of the inverse diagonal, which is then one.
     """
 
-    matrix: RowBlocks | Bordered
+    matrix: RowBlocks | BorderedFactor
     inverse: Any
     largest: float
     prolong: RowBlocks
@@ -52,18 +52,18 @@ class Level:
 
 
 @dataclass(frozen=True, eq=False)
-class Cycle:
+class VCycle:
     """A V-cycle with Chebyshev smoothing of degree 2: an approximate inverse, symmetric.
 
     Attributes
     ----------
-    levels : tuple of Level
+    levels : tuple of GridLevel
         The finest first.
     coarsest : (c, c) array
         Pseudo-inverse of the last matrix.
     """
 
-    levels: tuple[Level, ...]
+    levels: tuple[GridLevel, ...]
     coarsest: Any
 
     def __call__(self, r: Floats) -> Floats:
@@ -86,7 +86,7 @@ class Cycle:
             return _by_column(self.coarsest.__matmul__, b)
         level = self.levels[number]
         x, r = np.zeros_like(b), b  # nobody needs b any more
-        d = _smoothed(level, r, x)
+        d = _smooth(level, r, x)
         level.matrix.added(r, -1, d)
         n = level.prolong.shape[0]
         coarse = self._down(number + 1, level.restrict.times(r[:n]))
@@ -94,7 +94,7 @@ class Cycle:
         level.prolong.added(correction[:n], 1, coarse)
         x += correction
         level.matrix.added(r, -1, correction)
-        _smoothed(level, r, x)
+        _smooth(level, r, x)
         return x
 
 
@@ -105,7 +105,7 @@ def _by_column(function: Callable[[Any], Any], b: Any) -> Any:
     return np.stack([function(np.ascontiguousarray(column)) for column in b.T], axis=1)
 
 
-def _smoothed(level: Level, r: Any, x: Any) -> Any:
+def _smooth(level: GridLevel, r: Any, x: Any) -> Any:
     """Two Chebyshev steps; r is left one step behind x, by A times the result."""
     from xcrack.linalg.kernels.cycle import first_step, next_step
 
@@ -125,7 +125,7 @@ def _smoothed(level: Level, r: Any, x: Any) -> Any:
 
 
 def largest_eigenvalue(
-    A: RowBlocks | Bordered, diagonal: Floats, solved: Callable[[Any], Any] | None = None
+    A: RowBlocks | BorderedFactor, diagonal: Floats, solved: Callable[[Any], Any] | None = None
 ) -> float:
     """Upper bound of the spectrum of B A, from a few steps of Lanczos.
 
@@ -133,7 +133,7 @@ def largest_eigenvalue(
 
     Parameters
     ----------
-    A : RowBlocks or Bordered
+    A : RowBlocks or BorderedFactor
     diagonal : (n,) array
     solved : callable, optional
         B r of a residual r in single precision; without it B is the inverse diagonal.

@@ -9,7 +9,7 @@ import scipy.sparse as sp
 import scipy.sparse.linalg as sla
 
 from xcrack.base.arrays import Bools, Floats
-from xcrack.base.checks import called, numbers, shown
+from xcrack.base.checks import call_function, numbers, value_text
 from xcrack.base.errors import ConvergenceError, ProblemError, warn
 from xcrack.base.threads import one_blas_thread
 from xcrack.fem.function_space import FunctionSpace
@@ -17,14 +17,14 @@ from xcrack.linalg.active_set import active_set
 from xcrack.linalg.basis import (
     function_nodes,
     node_blocks,
-    orthonormal,
+    orthonormal_functions,
     patch_orthogonal,
     restricted,
 )
-from xcrack.linalg.engine import Condensed, ContactRows, Count, StateContact
-from xcrack.linalg.multifrontal import Factor, Tree, factorised, tree
-from xcrack.linalg.products import proportional, times, times_transposed
-from xcrack.linalg.reuse import Reuse
+from xcrack.linalg.engine import CondensedSystem, ContactRows, SolveCount, StateContact
+from xcrack.linalg.multifrontal import Factor, Tree, factorise, tree
+from xcrack.linalg.products import proportional_columns, times, times_transposed
+from xcrack.linalg.reuse import SolverState
 from xcrack.model.material import Isotropic
 from xcrack.model.numerics import Numerics
 
@@ -77,7 +77,7 @@ def pardiso(A: sp.csc_matrix) -> Solve:
         x86-64.
     """
     if not sp.issparse(A) or A.ndim != 2 or A.shape[0] != A.shape[1]:
-        raise ProblemError(f"pardiso: A = {shown(A)}: give a sparse symmetric matrix (n, n).")
+        raise ProblemError(f"pardiso: A = {value_text(A)}: give a sparse symmetric matrix (n, n).")
     if find_spec("pypardiso") is None:
         raise ProblemError("solver=pardiso needs pypardiso: pip install 'xcrack[pardiso]'.")
     import pypardiso
@@ -89,7 +89,7 @@ def pardiso(A: sp.csc_matrix) -> Solve:
 
 
 @dataclass(frozen=True, eq=False)
-class System:
+class DirectSystem:
     """A factored system.
 
     Attributes
@@ -107,7 +107,7 @@ class System:
     tree : Tree, optional
     hand_on : bool
         Whether the next solve in the same mesh is to use the factor.
-    count : Count
+    count : SolveCount
     """
 
     matrix: sp.csr_matrix
@@ -118,35 +118,37 @@ class System:
     factor: Factor | None = None
     tree: Tree | None = None
     hand_on: bool = False
-    count: Count = field(default_factory=Count)
+    count: SolveCount = field(default_factory=SolveCount)
     shared: str = "factorisation"
     reason: str = ""
 
-    def solve(self, f: Floats, known: Floats | None = None, start: Floats | None = None) -> Floats:
+    def solve(
+        self, f: Floats, u_imposed: Floats | None = None, start: Floats | None = None
+    ) -> Floats:
         """Displacements for loads `(n_dof,)` or `(n_dof, k)` and known values of the same shape."""
         del start
         self.count.solves += 1 if f.ndim == 1 else f.shape[1]
-        b = self._loads(f, known)
+        b = self._loads(f, u_imposed)
         if f.ndim == 1:
-            return self._expanded(self.apply_inverse(b), known)
-        first, scale = proportional(b)
+            return self._expanded(self.apply_inverse(b), u_imposed)
+        first, scale = proportional_columns(b)
         alone = np.unique(first)
         y = self.apply_inverse(b if len(alone) == b.shape[1] else b[:, alone])
-        return self._expanded(y[:, np.searchsorted(alone, first)] * scale, known)
+        return self._expanded(y[:, np.searchsorted(alone, first)] * scale, u_imposed)
 
     def first_look(
-        self, f: Floats, known: Floats, closed_before: bool
+        self, f: Floats, u_imposed: Floats, closed_before: bool
     ) -> tuple[Floats | None, bool]:
         """The solution with open faces; none after closed sets where the factor has halves."""
         if closed_before and self.factor is not None:
             return None, False
-        return self.solve(f, known), True
+        return self.solve(f, u_imposed), True
 
     def contact(
         self,
         rows: ContactRows,
         f: Floats,
-        known: Floats,
+        u_imposed: Floats,
         start: Sequence[Bools | None],
         latest: Floats | None = None,
         opened: Floats | None = None,
@@ -159,33 +161,35 @@ class System:
         """
         del latest
         if self.factor is None:
-            return self._contact_by_solves(rows, f, known, start, opened)
-        small = self.condensed(rows.N, f, known)
+            return self._contact_by_solves(rows, f, u_imposed, start, opened)
+        small = self.condensed(rows.N, f, u_imposed)
         states = self._sets(small.dual, small.gap, rows, start)
         u = small.displacements(np.stack([state.pressure for state in states], axis=1))
         return [replace(state, u=u[:, k], dual=small.dual) for k, state in enumerate(states)]
 
-    def condensed(self, N: sp.csr_matrix, f: Floats, known: Floats) -> Condensed:
+    def condensed(self, N: sp.csr_matrix, f: Floats, u_imposed: Floats) -> CondensedSystem:
         """The system as rows see it; see `Engine`."""
         if self.factor is None:
-            gap = N @ self.solve(f, known)
-            return Condensed(self.dual(N), gap, lambda lam: self.solve(f + N.T @ lam, known))
+            gap = N @ self.solve(f, u_imposed)
+            return CondensedSystem(
+                self.dual(N), gap, lambda lam: self.solve(f + N.T @ lam, u_imposed)
+            )
         factor = self.factor
-        b = self._loads(f, known)
+        b = self._loads(f, u_imposed)
         Y, places = factor.forward_sparse(N @ self.basis)
         y = factor.forward(b)
         with one_blas_thread():
             F = Y.T @ Y
-            d = N @ known + Y.T @ y[places]
+            d = N @ u_imposed + Y.T @ y[places]
 
         def displacements(lam: Floats) -> Floats:
             loaded = y.copy()
             with one_blas_thread():
                 loaded[places] += Y @ lam
             self.count.solves += b.shape[1]
-            return self._expanded(factor.backward(loaded), known)
+            return self._expanded(factor.backward(loaded), u_imposed)
 
-        return Condensed(F, d, displacements)
+        return CondensedSystem(F, d, displacements)
 
     def dual(self, N: sp.csr_matrix) -> Floats:
         """F = N K^-1 N^T `(g, g)`, in blocks of right-hand sides."""
@@ -195,7 +199,7 @@ class System:
             F[:, first : first + _BLOCK] = N @ self.solve(rhs)
         return (F + F.T) / 2
 
-    def handed_on(self, reuse: Reuse) -> Reuse:
+    def handed_on(self, reuse: SolverState) -> SolverState:
         """With the tree of the mesh, and the factor where it may serve again."""
         return replace(reuse, tree=self.tree, factor=self.factor if self.hand_on else None)
 
@@ -203,15 +207,15 @@ class System:
         self,
         rows: ContactRows,
         f: Floats,
-        known: Floats,
+        u_imposed: Floats,
         start: Sequence[Bools | None],
         opened: Floats | None,
     ) -> list[StateContact]:
-        d = rows.N @ (self.solve(f, known) if opened is None else opened)
+        d = rows.N @ (self.solve(f, u_imposed) if opened is None else opened)
         F = self.dual(rows.N)
         states = self._sets(F, d, rows, start)
         pressure = np.stack([state.pressure for state in states], axis=1)
-        u = self.solve(f + rows.N.T @ pressure, known)
+        u = self.solve(f + rows.N.T @ pressure, u_imposed)
         return [replace(state, u=u[:, k], dual=F) for k, state in enumerate(states)]
 
     def _sets(
@@ -225,16 +229,16 @@ class System:
             for k, first in enumerate(start)
         ]
 
-    def _loads(self, f: Floats, known: Floats | None) -> Floats:
+    def _loads(self, f: Floats, u_imposed: Floats | None) -> Floats:
         """Loads and what imposed displacements add to them, in the solver's basis."""
-        if known is not None and known.any():
-            f = f - times(self.matrix, known)
+        if u_imposed is not None and u_imposed.any():
+            f = f - times(self.matrix, u_imposed)
         return times_transposed(self.basis, f)
 
-    def _expanded(self, y: Floats, known: Floats | None) -> Floats:
+    def _expanded(self, y: Floats, u_imposed: Floats | None) -> Floats:
         """Displacements of coefficients in the solver's basis."""
         u = times(self.basis, y)
-        u = u if known is None else known + u
+        u = u if u_imposed is None else u_imposed + u
         if not np.isfinite(u).all():
             raise ConvergenceError(
                 "the linear solve returned nan: the stiffness is singular. Is the body supported, "
@@ -250,8 +254,8 @@ def system(
     numerics: Numerics,
     solver: Solver | None = None,
     material: Isotropic | None = None,
-    reuse: Reuse | None = None,
-) -> System:
+    reuse: SolverState | None = None,
+) -> DirectSystem:
     """Eliminate known unknowns, change the basis, scale by the diagonal and factor.
 
     Parameters
@@ -265,26 +269,30 @@ def system(
         In the place of the factorisation.
     material : Isotropic, optional
         For a tip basis that depends on it.
-    reuse : Reuse, optional
+    reuse : SolverState, optional
         Of an earlier solve. Where it is given, the next one may use this factor.
     """
-    basis, reduced = _reduced(space, K, fixed, numerics, material)
-    count = Count(factorisations=1)
+    basis, reduced = _reduced_columns(space, K, fixed, numerics, material)
+    count = SolveCount(factorisations=1)
     if solver is not None:
-        return System(K, ~fixed, basis, reduced, _verified(solver, reduced), count=count)
+        return DirectSystem(
+            K, ~fixed, basis, reduced, _verified_solver(solver, reduced), count=count
+        )
     halves = None if reuse is None else reuse.tree
     if halves is None or halves.mesh is not space.mesh or halves.order != space.order:
         halves = tree(space.mesh, space.order)
     support = basis.indptr, basis.indices, basis.shape[1], function_nodes(space), space.dim
     before = None if reuse is None else reuse.factor
-    factor = factorised(reduced, support, halves, before, keep=reuse is not None)
+    factor = factorise(reduced, support, halves, before, keep=reuse is not None)
     if factor is None:  # a pivot that is not positive: SuperLU needs none
-        return System(K, ~fixed, basis, reduced, superlu(reduced), tree=halves, count=count)
-    inverse = _checked(factor, reduced, count)
-    return System(K, ~fixed, basis, reduced, inverse, factor, halves, reuse is not None, count)
+        return DirectSystem(K, ~fixed, basis, reduced, superlu(reduced), tree=halves, count=count)
+    inverse = _checked_solution(factor, reduced, count)
+    return DirectSystem(
+        K, ~fixed, basis, reduced, inverse, factor, halves, reuse is not None, count
+    )
 
 
-def _checked(factor: Factor, A: sp.csc_matrix, count: Count) -> Solve:
+def _checked_solution(factor: Factor, A: sp.csc_matrix, count: SolveCount) -> Solve:
     """Solve by a factor; by SuperLU where the residual says that it has lost its digits.
 
     The first right-hand sides are all looked at; of later ones one is enough.
@@ -314,16 +322,18 @@ def _residual(A: sp.csc_matrix, x: Floats, b: Floats) -> float:
     return float(residual(A.indptr, A.indices, A.data, x, b))
 
 
-def _verified(solver: Solver, A: sp.csc_matrix) -> Solve:
+def _verified_solver(solver: Solver, A: sp.csc_matrix) -> Solve:
     """A user's solver, with a look at what it returns: a residual costs one product."""
-    solve = called(solver, "solver=", A)
+    solve = call_function(solver, "solver=", A)
     if not callable(solve):
         raise ProblemError(
-            f"solver returned {shown(solve)}: it must return a function of right-hand sides."
+            f"solver returned {value_text(solve)}: it must return a function of right-hand sides."
         )
 
     def verified(b: Floats) -> Floats:
-        x = numbers(called(solve, "solver=", b), "what the solver returned", b.shape, finite=False)
+        x = numbers(
+            call_function(solve, "solver=", b), "what the solver returned", b.shape, finite=False
+        )
         if not np.isfinite(x).all():
             return x  # a singular stiffness, which has its own error
         share = _residual(A, x, b)
@@ -353,10 +363,10 @@ def scaled_basis(
 
     The material counts for a tip basis that depends on it.
     """
-    return _reduced(space, K, fixed, numerics, material)[0]
+    return _reduced_columns(space, K, fixed, numerics, material)[0]
 
 
-def _reduced(
+def _reduced_columns(
     space: FunctionSpace,
     K: sp.csr_matrix,
     fixed: Bools,
@@ -368,7 +378,7 @@ def _reduced(
     Standard columns are those of the identity: only the border of enriched ones is multiplied
     out. Columns without energy are left out.
     """
-    from xcrack.linalg.kernels.bordered import bordered
+    from xcrack.linalg.kernels.bordered import bordered_matrix
 
     first = space.n_nodes * space.dim
     enriched = _enriched_columns(space, K, ~fixed, numerics, material)
@@ -376,10 +386,13 @@ def _reduced(
         across = K @ enriched
         across.sort_indices()
         down = across.T.tocsr()
-        own = down @ enriched
-        own.sort_indices()
-        parts = ((each.indptr, each.indices, each.data) for each in (enriched, across, down, own))
-        matrix, columns, energy = bordered(K.indptr, K.indices, K.data, *parts, fixed, first)
+        enriched_part = down @ enriched
+        enriched_part.sort_indices()
+        parts = (
+            (each.indptr, each.indices, each.data)
+            for each in (enriched, across, down, enriched_part)
+        )
+        matrix, columns, energy = bordered_matrix(K.indptr, K.indices, K.data, *parts, fixed, first)
         alive = energy > 0
         if alive.all():
             break
@@ -408,7 +421,7 @@ def _enriched_columns(
         changed = sp.csr_matrix(patch if changed is None else changed @ patch)
         K = sp.csr_matrix(patch.T @ K @ patch)
     if numerics.orthonormal != "none" and n > first:
-        Z = orthonormal(K, restricted(node_blocks(space, numerics.orthonormal), free))
+        Z = orthonormal_functions(K, restricted(node_blocks(space, numerics.orthonormal), free))
     else:
         chosen = first + np.nonzero(free[first:])[0]
         ones = (np.ones(len(chosen)), (chosen, np.arange(len(chosen))))

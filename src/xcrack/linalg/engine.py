@@ -8,11 +8,11 @@ import scipy.sparse as sp
 
 from xcrack.base.arrays import Bools, Floats
 from xcrack.fem.assembly import Stiffness
-from xcrack.linalg.reuse import Reuse
+from xcrack.linalg.reuse import SolverState
 
 
 @dataclass
-class Count:
+class SolveCount:
     """Operations of a solve, counted for its report."""
 
     factorisations: int = 0
@@ -75,7 +75,7 @@ class ContactRows:
 
 
 @dataclass(frozen=True, eq=False)
-class Condensed:
+class CondensedSystem:
     """A system as rows of gaps see it.
 
     Attributes
@@ -102,7 +102,7 @@ class Engine(Protocol):
         Stiffness in the basis of the space.
     basis : sparse matrix (n_dof, k)
         Columns of the solver's basis; zero in the rows of known unknowns.
-    count : Count
+    count : SolveCount
     shared : str
         What load states share, in words.
     reason : str
@@ -116,7 +116,7 @@ class Engine(Protocol):
     def basis(self) -> sp.csr_matrix: ...  # noqa: D102
 
     @property
-    def count(self) -> Count: ...  # noqa: D102
+    def count(self) -> SolveCount: ...  # noqa: D102
 
     @property
     def shared(self) -> str: ...  # noqa: D102
@@ -124,7 +124,9 @@ class Engine(Protocol):
     @property
     def reason(self) -> str: ...  # noqa: D102
 
-    def solve(self, f: Floats, known: Floats | None = None, start: Floats | None = None) -> Floats:
+    def solve(
+        self, f: Floats, u_imposed: Floats | None = None, start: Floats | None = None
+    ) -> Floats:
         """Displacements for loads `(n_dof,)` or `(n_dof, k)` and known values of the same shape.
 
         `start` is a first guess of the displacements; a factorisation needs none.
@@ -132,7 +134,7 @@ class Engine(Protocol):
         ...
 
     def first_look(
-        self, f: Floats, known: Floats, closed_before: bool
+        self, f: Floats, u_imposed: Floats, closed_before: bool
     ) -> tuple[Floats | None, bool]:
         """Displacements with open faces that show which faces overlap, and whether they are exact.
 
@@ -144,7 +146,7 @@ class Engine(Protocol):
         self,
         rows: ContactRows,
         f: Floats,
-        known: Floats,
+        u_imposed: Floats,
         start: Sequence[Bools | None],
         latest: Floats | None = None,
         opened: Floats | None = None,
@@ -154,7 +156,7 @@ class Engine(Protocol):
         Parameters
         ----------
         rows : ContactRows
-        f, known : (n_dof, states) arrays
+        f, u_imposed : (n_dof, states) arrays
         start : sequence of (g,) arrays of bool or None
             First guess of each state's closed set.
         latest, opened : (n_dof, states) arrays, optional
@@ -162,13 +164,13 @@ class Engine(Protocol):
         """
         ...
 
-    def condensed(self, N: sp.csr_matrix, f: Floats, known: Floats) -> Condensed:
+    def condensed(self, N: sp.csr_matrix, f: Floats, u_imposed: Floats) -> CondensedSystem:
         """The system as rows `(g, n_dof)` see it, for load states `(n_dof, states)`."""
         ...
 
-    def handed_on(self, reuse: Reuse) -> Reuse:
+    def handed_on(self, reuse: SolverState) -> SolverState:
         """What the next solve may use, with what this system adds to it."""
         ...
 
 
-__all__ = ["Condensed", "ContactRows", "Count", "Engine", "StateContact"]
+__all__ = ["CondensedSystem", "ContactRows", "Engine", "SolveCount", "StateContact"]

@@ -16,20 +16,20 @@ from xcrack.base.arrays import Bools, Floats, Ints, lock
 from xcrack.fem.assembly import Bulk, Stiffness
 from xcrack.fem.function_space import FunctionSpace
 from xcrack.linalg.basis import Blocks, node_blocks, patch_orthogonal, restricted
-from xcrack.linalg.engine import Condensed, ContactRows, Count, StateContact
-from xcrack.linalg.iterative_basis import enriched_basis, nearby, parts_of, within_blocks
-from xcrack.linalg.multigrid import Hierarchy, extended, hierarchy
-from xcrack.linalg.products import best_guesses, independent, proportional
+from xcrack.linalg.engine import CondensedSystem, ContactRows, SolveCount, StateContact
+from xcrack.linalg.iterative_basis import enriched_basis, nearby_unknowns, parts_of, within_blocks
+from xcrack.linalg.multigrid import Hierarchy, extended_cycle, hierarchy
+from xcrack.linalg.products import best_guesses, independent_columns, proportional_columns
 from xcrack.linalg.projected_cg import (
     TOLERANCE,
     Iteration,
     Operator,
     ProjectedState,
-    descending,
+    conjugate_gradients_steps,
     in_lockstep,
-    projecting,
+    projected_steps,
 )
-from xcrack.linalg.reuse import Reuse
+from xcrack.linalg.reuse import SolverState
 from xcrack.linalg.schwarz import star_patches
 
 _ROUGH = 0.02  # residual of a first solution that only shows which faces overlap
@@ -58,7 +58,7 @@ class IterativeSystem:
         Unknowns of each enriched node.
     combined, back : sparse matrices (n_dof, n_dof), optional
         Basis to which the blocks belong where it is not that of the space, and its inverse.
-    count : Count
+    count : SolveCount
     """
 
     matrix: sp.csr_matrix | Stiffness
@@ -70,14 +70,14 @@ class IterativeSystem:
     blocks: Blocks
     combined: sp.csr_matrix | None = None
     back: sp.csr_matrix | None = None
-    count: Count = field(default_factory=Count)
+    count: SolveCount = field(default_factory=SolveCount)
     shared: str = "multigrid hierarchy"
     reason: str = "conjugate gradients: a large body in 3D"
 
     def solve(
         self,
         f: Floats,
-        known: Floats | None = None,
+        u_imposed: Floats | None = None,
         start: Floats | None = None,
         tolerance: float = TOLERANCE,
     ) -> Floats:
@@ -85,40 +85,40 @@ class IterativeSystem:
 
         Parameters
         ----------
-        f, known : arrays
+        f, u_imposed : arrays
         start : array of the same shape, optional
             First guess of the displacements.
         tolerance : float
             Residual relative to the load at which to stop.
         """
         columns = f.reshape(len(f), -1)
-        given = np.zeros_like(columns) if known is None else known.reshape(columns.shape)
+        given = np.zeros_like(columns) if u_imposed is None else u_imposed.reshape(columns.shape)
         b, known_of = _vectors(self._reduced(columns, given)), _vectors(given)
         y: list[Floats] = [np.zeros_like(each) for each in b]
         if start is not None:
             y = _vectors(self.coordinates(start.reshape(columns.shape) - given))
-        first = independent(b)
-        rest = [k for k in range(len(b)) if k not in first]
+        first = independent_columns(b)
+        remaining = [k for k in range(len(b)) if k not in first]
         self._solve_apart(first, b, known_of, y, tolerance)
-        guesses = best_guesses(self.operator, [y[k] for k in first], [b[k] for k in rest])
-        for k, guess in zip(rest, guesses, strict=True):
+        guesses = best_guesses(self.operator, [y[k] for k in first], [b[k] for k in remaining])
+        for k, guess in zip(remaining, guesses, strict=True):
             y[k] = guess
-        self._solve_apart(rest, b, known_of, y, tolerance)
+        self._solve_apart(remaining, b, known_of, y, tolerance)
         return np.asarray(given + self.basis @ np.stack(y, axis=1)).reshape(f.shape)
 
     def first_look(
-        self, f: Floats, known: Floats, closed_before: bool
+        self, f: Floats, u_imposed: Floats, closed_before: bool
     ) -> tuple[Floats | None, bool]:
         """Rough displacements, as few steps as show which faces overlap; none after closed sets."""
         if closed_before:
             return None, False
-        return self.solve(f, known, tolerance=_ROUGH), False
+        return self.solve(f, u_imposed, tolerance=_ROUGH), False
 
     def contact(
         self,
         rows: ContactRows,
         f: Floats,
-        known: Floats,
+        u_imposed: Floats,
         start: Sequence[Bools | None],
         latest: Floats | None = None,
         opened: Floats | None = None,
@@ -129,15 +129,15 @@ class IterativeSystem:
         best guess. Without displacements each state starts from those before it.
         """
         del opened
-        own = sp.csr_matrix(rows.N @ self.basis)
-        b = _vectors(self._reduced(f, known))
-        gaps = _vectors(rows.N @ known)
+        rows_in_basis = sp.csr_matrix(rows.N @ self.basis)
+        b = _vectors(self._reduced(f, u_imposed))
+        gaps = _vectors(rows.N @ u_imposed)
         y = [np.zeros_like(each) for each in b]
         if latest is not None:
-            y = _vectors(self.coordinates(latest - known))
+            y = _vectors(self.coordinates(latest - u_imposed))
         # What a pressure closes, a multiple of the load closes too, and nothing else.
-        whole = np.concatenate([np.stack(b, axis=1), known])
-        like, scale = proportional(whole, _MULTIPLE)
+        right_hand_sides = np.concatenate([np.stack(b, axis=1), u_imposed])
+        like, scale = proportional_columns(right_hand_sides, _MULTIPLE)
         solved: dict[int, ProjectedState] = {}
         for chosen in _in_turn(like, scale):
             runs = []
@@ -146,48 +146,48 @@ class IterativeSystem:
                 first = start[k]
                 if model is not None:
                     y[k], first = scale[k] * model.y, model.active
-                active = own @ y[k] + gaps[k] < 0 if first is None else first
-                conditions = own, gaps[k], rows.measure, rows.stiffness
-                runs.append(self._together(b[k], known[:, k], conditions, active, y[k]))
+                active = rows_in_basis @ y[k] + gaps[k] < 0 if first is None else first
+                conditions = rows_in_basis, gaps[k], rows.measure, rows.stiffness
+                runs.append(self._together(b[k], u_imposed[:, k], conditions, active, y[k]))
             for k, state in zip(chosen, in_lockstep(self.operator, runs), strict=True):
                 solved[k] = state
                 self._counted(state.iterations)
         return [
-            StateContact(s.pressure, s.gap, s.active, s.sets, known[:, k] + self.basis @ s.y)
+            StateContact(s.pressure, s.gap, s.active, s.sets, u_imposed[:, k] + self.basis @ s.y)
             for k, s in sorted(solved.items())
         ]
 
-    def condensed(self, N: sp.csr_matrix, f: Floats, known: Floats) -> Condensed:
+    def condensed(self, N: sp.csr_matrix, f: Floats, u_imposed: Floats) -> CondensedSystem:
         """The system as rows see it; see `Engine`. A solve for each row."""
-        opened = self.solve(f, known)
+        opened = self.solve(f, u_imposed)
         F = np.empty((N.shape[0], N.shape[0]))
         for k in range(0, len(F), _COLUMNS):
             some = N[k : k + _COLUMNS].toarray().T
             F[:, k : k + _COLUMNS] = N @ self.solve(some, start=np.zeros_like(some))
-        return Condensed(
+        return CondensedSystem(
             (F + F.T) / 2,
             N @ opened,
-            lambda lam: self.solve(f + N.T @ lam, known, opened),
+            lambda lam: self.solve(f + N.T @ lam, u_imposed, opened),
         )
 
-    def handed_on(self, reuse: Reuse) -> Reuse:
+    def handed_on(self, reuse: SolverState) -> SolverState:
         """With the levels of the mesh."""
         return replace(reuse, hierarchy=self.hierarchy)
 
-    def _reduced(self, f: Floats, known: Floats) -> Floats:
+    def _reduced(self, f: Floats, u_imposed: Floats) -> Floats:
         """Loads `(n_dof, k)` on the unknowns of the solver."""
-        return np.asarray(self.basis.T @ (f - self.matrix @ known if known.any() else f))
+        return np.asarray(self.basis.T @ (f - self.matrix @ u_imposed if u_imposed.any() else f))
 
     def _solve_apart(
         self,
         chosen: Sequence[int],
         b: Sequence[Floats],
-        known: Sequence[Floats],
+        u_imposed: Sequence[Floats],
         y: list[Floats],
         tolerance: float,
     ) -> None:
         """Put solutions of some states in the place of their guesses."""
-        runs = [self._apart(b[k], known[k], y[k], tolerance) for k in chosen]
+        runs = [self._apart(b[k], u_imposed[k], y[k], tolerance) for k in chosen]
         for k, (solved, steps) in zip(chosen, in_lockstep(self.operator, runs), strict=True):
             y[k] = solved
             self._counted(steps)
@@ -197,42 +197,42 @@ class IterativeSystem:
         self.count.iterations += steps
 
     def _apart(
-        self, b: Floats, known: Floats, start: Floats, tolerance: float
+        self, b: Floats, u_imposed: Floats, start: Floats, tolerance: float
     ) -> Iteration[tuple[Floats, int]]:
-        y, steps = yield from descending(self.operator, b, start, tolerance)
-        share = self._share(y, b, known)
+        y, steps = yield from conjugate_gradients_steps(self.operator, b, start, tolerance)
+        share = self._share(y, b, u_imposed)
         if share < 1:
-            y, more = yield from descending(self.operator, b, y, share * tolerance)
+            y, more = yield from conjugate_gradients_steps(self.operator, b, y, share * tolerance)
             steps += more
         return y, steps
 
     def _together(
         self,
         b: Floats,
-        known: Floats,
+        u_imposed: Floats,
         rows: tuple[sp.csr_matrix, Floats, Floats, float],
         active: Bools,
         y: Floats,
     ) -> Iteration[ProjectedState]:
-        state = yield from projecting(self.operator, b, *rows, active, y, TOLERANCE)
-        share = self._share(state.y, b, known)
+        state = yield from projected_steps(self.operator, b, *rows, active, y, TOLERANCE)
+        share = self._share(state.y, b, u_imposed)
         if share == 1:
             return state
-        more = yield from projecting(
+        more = yield from projected_steps(
             self.operator, b, *rows, state.active, state.y, share * TOLERANCE
         )
         sets, steps = state.sets + more.sets - 1, state.iterations + more.iterations
         return replace(more, sets=sets, iterations=steps)
 
-    def _share(self, y: Floats, b: Floats, known: Floats) -> float:
+    def _share(self, y: Floats, b: Floats, u_imposed: Floats) -> float:
         """Size of the forces in the body relative to b.
 
         Imposed displacements act through b on the cells next to the support alone, as if the rest
         did not give way: b is then far larger than the forces that are looked for.
         """
-        if not known.any():
+        if not u_imposed.any():
             return 1.0
-        forces = (self.matrix @ (known + self.basis @ y))[: len(self.hierarchy.fixed)]
+        forces = (self.matrix @ (u_imposed + self.basis @ y))[: len(self.hierarchy.fixed)]
         size = float(np.sqrt(np.einsum("i,i", b, b)))
         share = float(np.sqrt(np.einsum("i,i", forces, forces))) / size if size > 0 else 1.0
         return min(1.0, max(share, _LEAST_SHARE))
@@ -244,17 +244,17 @@ class IterativeSystem:
         """
         n = len(self.hierarchy.free)
         enriched = self.basis[:, n:]
-        y = ((enriched.T @ (self._within @ u)).T / self.operator.diagonal[n:]).T
+        y = ((enriched.T @ (self._node_entries @ u)).T / self.operator.diagonal[n:]).T
         return np.concatenate([self.basis[:, :n].T @ (u - enriched @ y), y])
 
     @cached_property
-    def _within(self) -> sp.csr_matrix:
+    def _node_entries(self) -> sp.csr_matrix:
         """Entries of the stiffness between unknowns of one node."""
         if self.within is not None:
             return self.within
         assert self.combined is not None
         assert self.back is not None
-        K = nearby(_joined(self.matrix), self.combined, self.blocks)
+        K = nearby_unknowns(_joined(self.matrix), self.combined, self.blocks)
         return sp.csr_matrix(self.back.T @ within_blocks(K, self.blocks) @ self.back)
 
 
@@ -294,7 +294,7 @@ def iterative_system(
     """
     if levels is None or not levels.fits(bulk, fixed):
         levels = hierarchy(bulk, fixed)
-    near = _joined(K, rows)  # after the levels, whose making needs the most memory
+    near_entries = _joined(K, rows)  # after the levels, whose making needs the most memory
     free = ~fixed
     d = space.dim
     plain = np.arange(len(levels.free))
@@ -303,19 +303,19 @@ def iterative_system(
     if tip_columns is not None and space.tips:
         combined, in_use = tip_columns(free)
     if stars and space.tips:
-        combined, back = _apart(space, near, combined, in_use)
-    whole = node_blocks(space, "star" if stars else "node")
-    blocks = restricted(whole, in_use)
-    enriched, starts, block = enriched_basis(space, near, blocks, levels, combined)
-    parts = parts_of(levels, near, plain, enriched)
+        combined, back = _star_orthogonal_basis(space, near_entries, combined, in_use)
+    node_groups = node_blocks(space, "star" if stars else "node")
+    blocks = restricted(node_groups, in_use)
+    enriched, starts, block = enriched_basis(space, near_entries, blocks, levels, combined)
+    parts = parts_of(levels, near_entries, plain, enriched)
     stored, diagonal = parts.stored(starts), parts.diagonal
     patches = None
     if stars and len(block):
         home = np.where(levels.free, plain // d, -1)
-        home = np.concatenate([home, whole.members[whole.offsets[block]] // d])
+        home = np.concatenate([home, node_groups.members[node_groups.offsets[block]] // d])
         patches = star_patches(space, home, len(plain), diagonal, parts.entries)
-    within = within_blocks(near, blocks) if combined is None else None
-    del parts, near  # before the cycle makes copies in single precision
+    within = within_blocks(near_entries, blocks) if combined is None else None
+    del parts, near_entries  # before the cycle makes copies in single precision
     identity = sp.csr_matrix(
         (levels.free.astype(float), (plain, np.arange(len(plain)))),
         shape=(space.n_dof, len(plain)),
@@ -324,7 +324,7 @@ def iterative_system(
     null = np.zeros((0, 0)) if modes is None else modes[: len(plain)]
     if null.shape[1] and not levels.free.all():
         null = np.linalg.qr(null * levels.free[:, None])[0]
-    cycle = extended(levels, stored, diagonal, patches)
+    cycle = extended_cycle(levels, stored, diagonal, patches)
     operator = Operator(stored.times, cycle, diagonal, null, stored.times_all, cycle.of_all)
     return IterativeSystem(K, within, lock(free), basis, levels, operator, blocks, combined, back)
 
@@ -341,7 +341,7 @@ def _in_turn(like: Ints, scale: Floats) -> Iterator[list[int]]:
     yield [int(k) for k in np.nonzero(multiple)[0]]
 
 
-def _apart(
+def _star_orthogonal_basis(
     space: FunctionSpace, K: sp.csr_matrix, modes: sp.csr_matrix | None, free: Bools
 ) -> tuple[sp.csr_matrix, sp.csr_matrix]:
     """Basis in which tip functions are orthogonal to the functions of their star; its inverse."""
@@ -352,6 +352,6 @@ def _apart(
     apart = patch_orthogonal(space, sp.csr_matrix(modes.T @ K @ modes), free, "star")
     # The modes of a point are orthogonal to each other: no two share a function of a component.
     size = np.asarray(modes.multiply(modes).sum(axis=0)).ravel()
-    own = sp.diags(1 / np.where(size > 0, size, 1.0)) @ modes.T
-    back = (2 * sp.identity(space.n_dof) - apart) @ own
+    scaled_modes = sp.diags(1 / np.where(size > 0, size, 1.0)) @ modes.T
+    back = (2 * sp.identity(space.n_dof) - apart) @ scaled_modes
     return sp.csr_matrix(modes @ apart), sp.csr_matrix(back)

@@ -7,10 +7,10 @@ import scipy.sparse as sp
 
 from xcrack.base.arrays import Floats, Ints, ranges
 from xcrack.fem.function_space import FunctionSpace
-from xcrack.linalg.basis import Blocks, orthonormal
+from xcrack.linalg.basis import Blocks, orthonormal_functions
 from xcrack.linalg.multigrid import Hierarchy
 from xcrack.linalg.products import product
-from xcrack.linalg.row_blocks import Bordered, row_blocks
+from xcrack.linalg.row_blocks import BorderedFactor, row_blocks
 
 
 def enriched_basis(
@@ -26,8 +26,8 @@ def enriched_basis(
     then weighs both alike.
     """
     if combined is not None:
-        K = nearby(K, combined, blocks)
-    Z = sp.csc_matrix(orthonormal(K, blocks))
+        K = nearby_unknowns(K, combined, blocks)
+    Z = sp.csc_matrix(orthonormal_functions(K, blocks))
     owner = np.repeat(np.arange(len(blocks.n_standard)), np.diff(blocks.offsets))
     block_of = np.full(space.n_dof, -1, dtype=np.int64)
     block_of[blocks.members] = owner
@@ -67,10 +67,10 @@ class Parts:
         """Of the whole matrix."""
         return np.concatenate([self.levels.diagonal, self.own.diagonal()])
 
-    def stored(self, starts: Ints) -> Bordered:
+    def stored(self, starts: Ints) -> BorderedFactor:
         """The whole matrix; `starts` are the first columns of the enriched nodes."""
         first = np.concatenate([starts, [self.own.shape[0]]])
-        return Bordered(
+        return BorderedFactor(
             self.levels.matrix,
             row_blocks([self.across], self.levels.matrix.first),
             row_blocks([self.across.T.tocsr(), self.own], first),
@@ -79,31 +79,34 @@ class Parts:
     def entries(self, chosen: Ints) -> sp.csr_matrix:
         """Entries between free unknowns, given sorted."""
         n = len(self.plain)
-        standard, rest = chosen[chosen < n], chosen[chosen >= n] - n
-        known = self.plain[standard]
-        across = self.across[standard][:, rest]
-        parts = [[self.K[known][:, known], across], [across.T, self.own[rest][:, rest]]]
+        standard, enriched_numbers = chosen[chosen < n], chosen[chosen >= n] - n
+        standard_entries = self.plain[standard]
+        across = self.across[standard][:, enriched_numbers]
+        parts = [
+            [self.K[standard_entries][:, standard_entries], across],
+            [across.T, self.own[enriched_numbers][:, enriched_numbers]],
+        ]
         return sp.csr_matrix(sp.bmat(parts))
 
 
 def parts_of(levels: Hierarchy, K: sp.csr_matrix, plain: Ints, enriched: sp.csc_matrix) -> Parts:
     """Stiffness between the unknowns of a hierarchy and enriched columns."""
     image = product(K, sp.csr_matrix(enriched))
-    own = product(sp.csr_matrix(enriched.T), image)
+    enriched_block = product(sp.csr_matrix(enriched.T), image)
     across = image[plain]
     if not levels.free.all():
         across = sp.csr_matrix(sp.diags(levels.free.astype(float)) @ across)
-    return Parts(levels, K, plain, across, own)
+    return Parts(levels, K, plain, across, enriched_block)
 
 
-def nearby(K: sp.csr_matrix, changed: sp.csr_matrix, blocks: Blocks) -> sp.csr_matrix:
+def nearby_unknowns(K: sp.csr_matrix, changed: sp.csr_matrix, blocks: Blocks) -> sp.csr_matrix:
     """Stiffness in a changed basis: entries between the unknowns of blocks."""
-    own = np.unique(blocks.members)
-    columns = sp.csc_matrix(changed[:, own])
-    near = np.unique(columns.indices)
-    columns = columns[near]
-    small = sp.coo_matrix(columns.T @ (K[near][:, near] @ columns))
-    return sp.csr_matrix((small.data, (own[small.row], own[small.col])), shape=K.shape)
+    members = np.unique(blocks.members)
+    columns = sp.csc_matrix(changed[:, members])
+    neighbours = np.unique(columns.indices)
+    columns = columns[neighbours]
+    small = sp.coo_matrix(columns.T @ (K[neighbours][:, neighbours] @ columns))
+    return sp.csr_matrix((small.data, (members[small.row], members[small.col])), shape=K.shape)
 
 
 def within_blocks(K: sp.csr_matrix, blocks: Blocks) -> sp.csr_matrix:

@@ -14,7 +14,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from xcrack.base.arrays import Bools, Floats, Ints, lock
-from xcrack.base.threads import each, one_blas_thread
+from xcrack.base.threads import map_tasks, one_blas_thread
 from xcrack.mesh.mesh import Mesh
 from xcrack.mesh.simplex import cell_nodes
 
@@ -57,12 +57,12 @@ def tree(mesh: Mesh, order: int) -> Tree:
     mesh : Mesh
     order : int
     """
-    from xcrack.linalg.kernels.tree import bisected, node_parts, postorder
+    from xcrack.linalg.kernels.tree import bisect_cells, node_parts, postorder
 
     centre = mesh.points[mesh.cells].mean(axis=1)
     depth = max(0, int(np.ceil(np.log2(len(mesh.cells) / _LEAF))))
     ranked = np.stack([np.argsort(x, kind="stable") for x in centre.T])
-    leaf = bisected(ranked, centre, depth)
+    leaf = bisect_cells(ranked, centre, depth)
     nodes = np.ascontiguousarray(cell_nodes(mesh, order))
     part = node_parts(nodes, leaf, depth, int(nodes.max()) + 1)
     parts, rank = postorder(depth)
@@ -121,11 +121,11 @@ class Factor:
 
     def solve(self, b: Floats) -> Floats:
         """Solution for right-hand sides `(n,)` or `(n, r)`."""
-        return self._unpermuted(self._halves(self._permuted(b), True, True), b.shape)
+        return self._unpermute(self._halves(self._permute(b), True, True), b.shape)
 
     def forward(self, b: Floats) -> Floats:
         """L^-1 P b for right-hand sides `(n, r)`, in permuted order."""
-        return self._halves(self._permuted(b), True, False)
+        return self._halves(self._permute(b), True, False)
 
     def forward_sparse(self, B: sp.csr_matrix) -> tuple[Floats, Ints]:
         """L^-1 P B^T for sparse rows B `(r, n)`: the rows that are not zero, and their places."""
@@ -143,12 +143,12 @@ class Factor:
 
     def backward(self, y: Floats) -> Floats:
         """Solution from its forward half `(n, r)`."""
-        return self._unpermuted(self._halves(np.array(y), False, True), y.shape)
+        return self._unpermute(self._halves(np.array(y), False, True), y.shape)
 
-    def _permuted(self, b: Floats) -> Floats:
+    def _permute(self, b: Floats) -> Floats:
         return np.ascontiguousarray(b.reshape(len(b), -1)[self.perm])
 
-    def _unpermuted(self, X: Floats, shape: tuple[int, ...]) -> Floats:
+    def _unpermute(self, X: Floats, shape: tuple[int, ...]) -> Floats:
         x = np.empty_like(X)
         x[self.perm] = X
         return x.reshape(shape)
@@ -156,7 +156,7 @@ class Factor:
     def _halves(
         self, X: Floats, forward: bool, backward: bool, touched: Bools | None = None
     ) -> Floats:
-        from xcrack.linalg.kernels.multifrontal import substituted, substituted_one
+        from xcrack.linalg.kernels.multifrontal import substitute, substituted_one
 
         if X.shape[1] <= _FEW and touched is None:
             columns = np.ascontiguousarray(X.T)
@@ -170,14 +170,14 @@ class Factor:
             touched = np.ones(len(self.first) - 1, dtype=bool)
         tree = self.tree
         with one_blas_thread():
-            substituted(
+            substitute(
                 self.first, self.begin, self.boundary, tree.postorder, tree.rank, self.panel, X,
                 touched, forward, backward,
             )  # fmt: skip
         return X
 
 
-def factorised(
+def factorise(
     A: sp.csc_matrix,
     columns: tuple[Ints, Ints, int, Ints, int],
     tree: Tree,
@@ -199,7 +199,12 @@ def factorised(
     keep : bool
         Keep what the next factorisation may take over.
     """
-    from xcrack.linalg.kernels.fronts import arranged, places_of_updates, sizes, unchanged
+    from xcrack.linalg.kernels.fronts import (
+        arrange_parts,
+        places_of_updates,
+        sizes,
+        unchanged_parts,
+    )
     from xcrack.linalg.kernels.tree import column_parts
 
     order, rank = tree.postorder, tree.rank
@@ -208,7 +213,7 @@ def factorised(
     place = np.empty(len(perm), dtype=np.int32)
     place[perm] = np.arange(len(perm))
     first = np.searchsorted(part[perm], np.arange(len(order) + 1))
-    begin, boundary, in_parent, start, row, value = arranged(
+    begin, boundary, in_parent, start, row, value = arrange_parts(
         A.indptr, A.indices, A.data, first, order, rank, perm, place
     )
     fronts = first, begin, in_parent, start, row, value, order, rank
@@ -222,22 +227,24 @@ def factorised(
         place, height, stack = places_of_updates(order, rank, update_size, lowest)
     own_size = np.where(place < 0, update_size, 0)
     used = int(panel_size.sum() + (own_size.sum() if keep else 0))
-    wanted = np.ones(len(order), dtype=bool)
+    chosen_parts = np.ones(len(order), dtype=bool)
     earlier: tuple[Floats, ...] = ()
     if before is not None and before.tree is tree and before.lowest == lowest <= depth:
-        wanted = _wanted(~unchanged(fronts, before.fronts), order, rank, height, lowest)
+        chosen_parts = _parts_to_factor(
+            ~unchanged_parts(fronts, before.fronts), order, rank, height, lowest
+        )
         earlier = before.memory
-    panels, panel = _room(np.where(wanted, panel_size, 0))
-    updates, update = _room(np.where(wanted, own_size, 0))
+    panels, panel = _room(np.where(chosen_parts, panel_size, 0))
+    updates, update = _room(np.where(chosen_parts, own_size, 0))
     if earlier and before is not None:
-        panel = np.where(wanted, panel, before.panel)
-        update = np.where(wanted, update, before.update)
-    if _factored(fronts, panel, update, (place, height, wanted), stack, lowest):
+        panel = np.where(chosen_parts, panel, before.panel)
+        update = np.where(chosen_parts, update, before.update)
+    if _factor_subtrees(fronts, panel, update, (place, height, chosen_parts), stack, lowest):
         return None
     memory = (*earlier, lock(panels), lock(updates)) if keep else (lock(panels),)
     if sum(len(part) for part in memory) > _SPREAD * used:
-        panels, panel = _gathered(panel, panel_size)
-        updates, update = _gathered(update, own_size)
+        panels, panel = _gather_numbers(panel, panel_size)
+        updates, update = _gather_numbers(update, own_size)
         memory = (lock(panels), lock(updates))
     return Factor(
         tree, lock(perm), lock(first), lock(begin), lock(boundary), lock(in_parent), lock(start),
@@ -245,7 +252,7 @@ def factorised(
     )  # fmt: skip
 
 
-def _factored(
+def _factor_subtrees(
     fronts: tuple[Any, ...],
     panel: Ints,
     update: Ints,
@@ -257,28 +264,28 @@ def _factored(
 
     `parts` are the places of update matrices in a stack, heights, and which parts to factor.
     """
-    from xcrack.linalg.kernels.multifrontal import factored
+    from xcrack.linalg.kernels.multifrontal import factor_parts
 
-    place, height, wanted = parts
+    place, height, chosen_parts = parts
     depth = int(height[-1])
     level = min(max(depth - _SHARED, lowest), depth)
 
     def subtree(root: int) -> int:
         begin, end = root + 2 - (2 << level), root + 1
-        if not wanted[begin:end].any():
+        if not chosen_parts[begin:end].any():
             return 0
         scratch = np.empty(stack)
         at = np.uint64(scratch.ctypes.data) + np.uint64(8) * place[begin:end].astype(np.uint64)
         update[begin:end] = np.where(place[begin:end] >= 0, at, update[begin:end])
-        return int(factored(fronts, panel, update, wanted, begin, end))
+        return int(factor_parts(fronts, panel, update, chosen_parts, begin, end))
 
     with one_blas_thread():
         roots = np.nonzero(height == level)[0].tolist()
         few = len(fronts[5]) < _LEAST
-        if any(map(subtree, roots) if few else each(subtree, roots)):
+        if any(map(subtree, roots) if few else map_tasks(subtree, roots)):
             return True
-        above = wanted & (height > level)
-        return bool(above.any() and factored(fronts, panel, update, above, 0, len(height)))
+        above = chosen_parts & (height > level)
+        return bool(above.any() and factor_parts(fronts, panel, update, above, 0, len(height)))
 
 
 def _room(size: Ints) -> tuple[Floats, Any]:
@@ -288,24 +295,24 @@ def _room(size: Ints) -> tuple[Floats, Any]:
     return numbers, np.uint64(numbers.ctypes.data) + np.uint64(8) * begin
 
 
-def _gathered(old: Ints, size: Ints) -> tuple[Floats, Any]:
+def _gather_numbers(old: Ints, size: Ints) -> tuple[Floats, Any]:
     """The numbers of all parts copied into one array, and their addresses."""
-    from xcrack.linalg.kernels.multifrontal import copied
+    from xcrack.linalg.kernels.multifrontal import copy_stretches
 
     numbers, new = _room(size)
-    copied(old, new, size)
+    copy_stretches(old, new, size)
     return numbers, new
 
 
-def _wanted(changed: Bools, order: Ints, rank: Ints, height: Ints, lowest: int) -> Bools:
+def _parts_to_factor(changed: Bools, order: Ints, rank: Ints, height: Ints, lowest: int) -> Bools:
     """Parts to factor again: those that changed, their ancestors, and whole units of them."""
-    wanted = np.array(changed)
-    p = order[np.nonzero(wanted)[0]]
+    chosen_parts = np.array(changed)
+    p = order[np.nonzero(chosen_parts)[0]]
     while len(p):
-        wanted[rank[p]] = True
+        chosen_parts[rank[p]] = True
         p = np.unique(p[p > 1] >> 1)
     # A unit's root stands for all of it.
     above = order.copy()
     low = height < lowest
     steps = np.where(low, lowest - height, 0)
-    return np.asarray(wanted[rank[above >> steps]])
+    return np.asarray(chosen_parts[rank[above >> steps]])

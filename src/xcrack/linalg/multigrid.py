@@ -15,12 +15,12 @@ import numpy as np
 import scipy.sparse as sp
 
 from xcrack.base.arrays import Bools, Floats, Ints, lock, offsets
-from xcrack.base.optional import required
-from xcrack.base.threads import streamed
+from xcrack.base.optional import require_package
+from xcrack.base.threads import stream_tasks
 from xcrack.fem.assembly import Bulk, bulk, rigid_modes
 from xcrack.linalg.basis import stars
-from xcrack.linalg.cycle import SAFETY, Cycle, Level, largest_eigenvalue, reciprocal
-from xcrack.linalg.row_blocks import Bordered, RowBlocks, stored
+from xcrack.linalg.cycle import SAFETY, GridLevel, VCycle, largest_eigenvalue, reciprocal
+from xcrack.linalg.row_blocks import BorderedFactor, RowBlocks, stored
 from xcrack.linalg.schwarz import Patches
 from xcrack.mesh.simplex import node_points
 
@@ -44,7 +44,7 @@ class Hierarchy:
     matrix : RowBlocks (n, n)
         In double precision; in 3D it shares the memory of the body's stiffness.
     diagonal : (n,) array
-    levels : tuple of Level
+    levels : tuple of GridLevel
         The uncracked body first.
     coarsest : (c, c) array
         Pseudo-inverse of the last matrix.
@@ -55,7 +55,7 @@ class Hierarchy:
     free: Bools
     matrix: RowBlocks
     diagonal: Floats
-    levels: tuple[Level, ...]
+    levels: tuple[GridLevel, ...]
     coarsest: Any
 
     def fits(self, bulk: Bulk, fixed: Bools) -> bool:
@@ -85,7 +85,7 @@ def hierarchy(bulk: Bulk, fixed: Bools) -> Hierarchy:
     else:
         motions = rigid_modes(node_points(bulk.mesh, bulk.order)) * free[:, None]
         alone = np.asarray(fixed.reshape(-1, d).all(axis=1))
-        levels, coarsest = _aggregated(A, finest, motions, alone)
+        levels, coarsest = _aggregation_levels(A, finest, motions, alone)
     return Hierarchy(
         bulk=bulk,
         fixed=lock(fixed),
@@ -97,21 +97,21 @@ def hierarchy(bulk: Bulk, fixed: Bools) -> Hierarchy:
     )
 
 
-def _aggregated(
+def _aggregation_levels(
     A: sp.bsr_matrix, finest: RowBlocks, candidates: Floats, alone: Bools
-) -> tuple[tuple[Level, ...], Floats]:
+) -> tuple[tuple[GridLevel, ...], Floats]:
     """Levels of smoothed aggregation, and the inverse on the coarsest.
 
     Nodes that are alone belong to no aggregate.
     """
-    levels: list[Level] = []
+    levels: list[GridLevel] = []
     while A.shape[0] > _COARSEST or not levels:
         blocks = stored(A) if levels else finest.single()
         diagonal = _diagonal(A)
         largest = largest_eigenvalue(blocks, diagonal)
         P, candidates = _prolongator(A, diagonal, largest, candidates, alone, blocks.idle)
         scale = float(diagonal.max())
-        A, small = _coarse(A, P), sp.bsr_matrix(P, dtype=np.float32)
+        A, small = _coarse_matrix(A, P), sp.bsr_matrix(P, dtype=np.float32)
         alone = np.zeros(len(A.indptr) - 1, dtype=bool)
         del P
         levels.append(_level(blocks, diagonal, largest, small))
@@ -120,17 +120,17 @@ def _aggregated(
     return tuple(levels), _inverse(A.toarray(), scale)
 
 
-def _coarse(A: sp.bsr_matrix, P: sp.bsr_matrix) -> sp.bsr_matrix:
+def _coarse_matrix(A: sp.bsr_matrix, P: sp.bsr_matrix) -> sp.bsr_matrix:
     """P^T A P, summed over stretches of rows: A P takes more memory than A."""
     size = P.blocksize[1]
     total = sp.bsr_matrix((P.shape[1],) * 2, blocksize=(size, size))
 
     def part(first: int) -> sp.bsr_matrix:
-        own = _rows(P, first).T @ (_rows(A, first) @ P)
-        return sp.bsr_matrix(own, blocksize=(size, size))
+        partial_sum = _rows(P, first).T @ (_rows(A, first) @ P)
+        return sp.bsr_matrix(partial_sum, blocksize=(size, size))
 
-    for own in streamed(part, range(0, len(P.indptr) - 1, _ROWS)):
-        total = total + own
+    for partial_sum in stream_tasks(part, range(0, len(P.indptr) - 1, _ROWS)):
+        total = total + partial_sum
     return total
 
 
@@ -144,7 +144,7 @@ def _rows(A: sp.bsr_matrix, first: int) -> sp.bsr_matrix:
 
 def _over_linear(
     bulk_: Bulk, fixed: Bools, finest: RowBlocks, diagonal: Floats
-) -> tuple[tuple[Level, ...], Floats]:
+) -> tuple[tuple[GridLevel, ...], Floats]:
     """Quadratic functions over the levels of the linear ones, which they contain."""
     mesh, d = bulk_.mesh, bulk_.mesh.dim
     lower = hierarchy(bulk(mesh, bulk_.material, 1), fixed)
@@ -157,15 +157,15 @@ def _over_linear(
     return (top, *lower.levels), lower.coarsest
 
 
-def extended(
-    levels: Hierarchy, A: Bordered, diagonal: Floats, patches: Patches | None = None
-) -> Cycle:
+def extended_cycle(
+    levels: Hierarchy, A: BorderedFactor, diagonal: Floats, patches: Patches | None = None
+) -> VCycle:
     """Cycle for an enriched matrix whose standard block is that of a hierarchy.
 
     Parameters
     ----------
     levels : Hierarchy
-    A : Bordered
+    A : BorderedFactor
         In the basis in which the enriched unknowns of a node are orthogonal to its standard ones.
     diagonal : (n,) array
     patches : Patches, optional
@@ -173,30 +173,30 @@ def extended(
     """
     finest = levels.levels[0]
     standard = cast(RowBlocks, finest.matrix)
-    single = Bordered(standard, A.across.single(), A.below.single())
+    single = BorderedFactor(standard, A.across.single(), A.below.single())
     if patches is None:
         inverse = reciprocal(diagonal).astype(np.float32)
         largest = largest_eigenvalue(single, diagonal)
     else:
         inverse = np.ones(len(diagonal), np.float32)
         largest = largest_eigenvalue(single, diagonal, patches.times)
-    top = Level(single, lock(inverse), largest, finest.prolong, finest.restrict, patches)
-    return Cycle((top, *levels.levels[1:]), levels.coarsest)
+    top = GridLevel(single, lock(inverse), largest, finest.prolong, finest.restrict, patches)
+    return VCycle((top, *levels.levels[1:]), levels.coarsest)
 
 
 def _diagonal(A: sp.bsr_matrix) -> Floats:
     """The diagonal; scipy copies blocks that are stored column by column."""
     row = np.repeat(np.arange(len(A.indptr) - 1), np.diff(A.indptr))
-    own = np.nonzero(row == A.indices)[0]
+    diagonal_entries = np.nonzero(row == A.indices)[0]
     result = np.zeros((len(A.indptr) - 1, A.blocksize[0]))
-    result[row[own]] = np.einsum("kii->ki", A.data[own])
+    result[row[diagonal_entries]] = np.einsum("kii->ki", A.data[diagonal_entries])
     return result.ravel()
 
 
-def _level(blocks: RowBlocks, diagonal: Floats, largest: float, P: sp.bsr_matrix) -> Level:
+def _level(blocks: RowBlocks, diagonal: Floats, largest: float, P: sp.bsr_matrix) -> GridLevel:
     R = sp.bsr_matrix(P.T, blocksize=P.blocksize[::-1])
     inverse = lock(reciprocal(diagonal).astype(np.float32))
-    return Level(blocks, inverse, largest, stored(P), stored(R))
+    return GridLevel(blocks, inverse, largest, stored(P), stored(R))
 
 
 def _prolongator(
@@ -209,7 +209,7 @@ def _prolongator(
 ) -> tuple[sp.bsr_matrix, Floats]:
     """Aggregates whose motions are smoothed once, and the motions of the next level."""
     instead = 'Numerics(linear="direct") does without it.'
-    aggregation = required("pyamg.aggregation", "a large 3D body", instead)
+    aggregation = require_package("pyamg.aggregation", "a large 3D body", instead)
     n, size = len(alone), A.blocksize[0]
     ones = np.ones(len(A.indices), np.int8)
     graph = sp.csr_matrix((ones, A.indices, A.indptr), shape=(n, n))
@@ -228,15 +228,15 @@ def _prolongator(
 
     def smoothed(first: int) -> sp.bsr_matrix:
         image = _rows(A, first) @ T
-        own = damped[first : first + _ROWS]
-        image.data *= np.repeat(own, np.diff(image.indptr), axis=0)[:, :, None]
+        damped_rows = damped[first : first + _ROWS]
+        image.data *= np.repeat(damped_rows, np.diff(image.indptr), axis=0)[:, :, None]
         return _rows(T, first) - image
 
     # Of all rows at once the image takes more memory than the result.
-    return _stacked(list(streamed(smoothed, range(0, n, _ROWS)))), coarse
+    return _stacked_rows(list(stream_tasks(smoothed, range(0, n, _ROWS)))), coarse
 
 
-def _stacked(parts: list[sp.bsr_matrix]) -> sp.bsr_matrix:
+def _stacked_rows(parts: list[sp.bsr_matrix]) -> sp.bsr_matrix:
     """Rows of blocks under each other; scipy would take them apart."""
     data = np.concatenate([part.data for part in parts])
     indices = np.concatenate([part.indices for part in parts])

@@ -7,10 +7,10 @@ import numpy as np
 import scipy.sparse as sp
 
 from xcrack.base.arrays import Floats, Ints
-from xcrack.base.threads import each, number_of_threads
+from xcrack.base.threads import map_tasks, number_of_threads
 from xcrack.fem.assembly import Stiffness
 from xcrack.linalg.kernels import sparse
-from xcrack.linalg.projected_cg import Ask, Operator
+from xcrack.linalg.projected_cg import Operator, Request
 
 _LEAST = 100_000  # entries of a factor that a thread is worth
 _SAME = 1e-15  # share of the largest entry up to which vectors are multiples of each other
@@ -43,18 +43,24 @@ def product(A: sp.csr_matrix, B: sp.csr_matrix) -> sp.csr_matrix:
 
     def rows(span: tuple[int, int]) -> sp.csr_matrix:
         indptr = A.indptr[span[0] : span[1] + 1]
-        own = slice(indptr[0], indptr[-1])
+        entries_of_rows = slice(indptr[0], indptr[-1])
         shape = span[1] - span[0], A.shape[1]
-        return sp.csr_matrix((A.data[own], A.indices[own], indptr - indptr[0]), shape=shape) @ B
+        return (
+            sp.csr_matrix(
+                (A.data[entries_of_rows], A.indices[entries_of_rows], indptr - indptr[0]),
+                shape=shape,
+            )
+            @ B
+        )
 
-    return sp.csr_matrix(sp.vstack(each(rows, list(itertools.pairwise(ends))), format="csr"))
+    return sp.csr_matrix(sp.vstack(map_tasks(rows, list(itertools.pairwise(ends))), format="csr"))
 
 
-def proportional(b: Floats, same: float = _SAME) -> tuple[Ints, Floats]:
+def proportional_columns(b: Floats, tolerance: float = _SAME) -> tuple[Ints, Floats]:
     """First column that each of `(n, k)` is a multiple of, to round-off, and the factor `(k,)`.
 
-    Load states are often one load, scaled. `same` is the share of the largest entry by which they
-    may differ.
+    Load states are often one load, scaled. `tolerance` is the share of the largest entry by which
+    they may differ.
     """
     first, scale = np.arange(b.shape[1]), np.ones(b.shape[1])
     for k in range(1, len(first)):
@@ -63,23 +69,23 @@ def proportional(b: Floats, same: float = _SAME) -> tuple[Ints, Floats]:
             if first[i] != i or b[at, i] == 0:
                 continue
             factor = b[at, k] / b[at, i]
-            away = np.abs(b[:, k] - factor * b[:, i]).max()
-            if away <= same * np.abs(b[at, k]):
+            difference = np.abs(b[:, k] - factor * b[:, i]).max()
+            if difference <= tolerance * np.abs(b[at, k]):
                 first[k], scale[k] = i, factor
                 break
     return first, scale
 
 
-def independent(vectors: Sequence[Floats]) -> list[int]:
+def independent_columns(vectors: Sequence[Floats]) -> list[int]:
     """Those that are no combination of others before them, nearly."""
     chosen, directions = [], list[Floats]()
     for k, vector in enumerate(vectors):
-        rest, size = vector.copy(), _norm(vector)
+        residual, size = vector.copy(), _norm(vector)
         for q in directions * 2:  # twice: what is left of nearly parallel vectors is small
-            rest -= np.einsum("i,i", q, rest) * q
-        if not _norm(rest) <= _NEARLY * size:
+            residual -= np.einsum("i,i", q, residual) * q
+        if not _norm(residual) <= _NEARLY * size:
             chosen.append(k)
-            directions.append(rest / _norm(rest))
+            directions.append(residual / _norm(residual))
     return chosen
 
 
@@ -90,8 +96,8 @@ def _norm(vector: Floats) -> float:
 def best_guesses(K: Operator, solved: Sequence[Floats], b: Sequence[Floats]) -> list[Floats]:
     """Combinations of solutions with the least energy: exact for combinations of their loads."""
     if not solved:
-        return [np.zeros_like(own) for own in b]
+        return [np.zeros_like(right_hand_side) for right_hand_side in b]
     y = np.stack(solved, axis=1)
-    image = np.stack(K.answers(Ask.TIMES, solved), axis=1)
+    image = np.stack(K.answers(Request.TIMES, solved), axis=1)
     inverse = np.linalg.pinv(y.T @ image, 1e-12, True)
-    return [y @ (inverse @ (y.T @ own)) for own in b]
+    return [y @ (inverse @ (y.T @ right_hand_side)) for right_hand_side in b]

@@ -20,7 +20,7 @@ import scipy.sparse.linalg as sla
 
 from xcrack.base.arrays import Bools, Floats
 from xcrack.base.errors import ConvergenceError
-from xcrack.base.threads import each
+from xcrack.base.threads import map_tasks
 
 # Iterations that run beside one another, so that one pass over a matrix serves them all.
 
@@ -31,15 +31,15 @@ Apply = Callable[[Floats], Floats]
 ApplyAll = Callable[[Sequence[Floats]], list[Floats]]
 
 
-class Ask(Enum):
+class Request(Enum):
     """What an iteration asks for."""
 
     TIMES = "K v"
     CYCLE = "V r"
 
 
-Request = tuple[Ask, Floats]
-Iteration = Generator[Request, Floats, Result]
+VectorRequest = tuple[Request, Floats]
+Iteration = Generator[VectorRequest, Floats, Result]
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,10 +67,10 @@ class Operator:
     times_all: ApplyAll | None = None
     cycle_all: ApplyAll | None = None
 
-    def answers(self, ask: Ask, vectors: Sequence[Floats]) -> list[Floats]:
+    def answers(self, ask: Request, vectors: Sequence[Floats]) -> list[Floats]:
         """What is asked for of several vectors."""
         one, several = self.times, self.times_all
-        if ask is Ask.CYCLE:
+        if ask is Request.CYCLE:
             one, several = self.cycle, self.cycle_all
         if len(vectors) == 1 or several is None:
             return [one(v) for v in vectors]
@@ -87,7 +87,7 @@ def in_lockstep(K: Operator, iterations: Sequence[Iteration[Result]]) -> list[Re
     """
     results: list[Any] = [None] * len(iterations)
 
-    def advanced(task: tuple[int, Floats | None]) -> Request | None:
+    def advanced(task: tuple[int, Floats | None]) -> VectorRequest | None:
         k, answer = task
         try:
             return iterations[k].send(cast(Floats, answer))
@@ -95,24 +95,24 @@ def in_lockstep(K: Operator, iterations: Sequence[Iteration[Result]]) -> list[Re
             results[k] = end.value
             return None
 
-    waiting: dict[int, Request] = {}
+    waiting: dict[int, VectorRequest] = {}
     tasks: list[tuple[int, Floats | None]] = []
     following = iter(range(len(iterations)))
     while True:
-        beside = _BESIDE - len(waiting) - len(tasks)
-        tasks += [(k, None) for k in itertools.islice(following, beside)]
+        free_places = _BESIDE - len(waiting) - len(tasks)
+        tasks += [(k, None) for k in itertools.islice(following, free_places)]
         if not tasks and not waiting:
             return cast(list[Result], results)
-        for (k, _), request in zip(tasks, each(advanced, tasks), strict=True):
+        for (k, _), request in zip(tasks, map_tasks(advanced, tasks), strict=True):
             if request is not None:
                 waiting[k] = request
         tasks = []
         if not waiting:
             continue
         # Products first: those who looked at their sets meet the others at the next cycle.
-        products = any(ask is Ask.TIMES for ask, _ in waiting.values())
-        ask = Ask.TIMES if products else Ask.CYCLE
-        served = [k for k, (own, _) in waiting.items() if own is ask]
+        products = any(ask is Request.TIMES for ask, _ in waiting.values())
+        ask = Request.TIMES if products else Request.CYCLE
+        served = [k for k, (request_of_one, _) in waiting.items() if request_of_one is ask]
         vectors = [waiting.pop(k)[1] for k in served]
         tasks = list(zip(served, K.answers(ask, vectors), strict=True))
 
@@ -218,11 +218,11 @@ class _Descent:
         return np.zeros(0) if self.plane is None else -self.plane.scale * self.carried
 
     def begin(self) -> Iteration[None]:
-        image = (yield Ask.TIMES, self.y) if self.y.any() else 0.0
+        image = (yield Request.TIMES, self.y) if self.y.any() else 0.0
         self._goes_on(self.b - image)
 
     def step(self) -> Iteration[None]:
-        z = yield Ask.CYCLE, self.r
+        z = yield Request.CYCLE, self.r
         z = z if self.plane is None else self.plane.along(z)
         rz = _dot(self.r, z)
         if self.p is None:
@@ -231,7 +231,7 @@ class _Descent:
             self.p *= rz / self.rz
             self.p += z
         del z  # memory counts while others are answered
-        q = yield Ask.TIMES, self.p
+        q = yield Request.TIMES, self.p
         curvature = _dot(self.p, q)
         if not curvature > 0 or not np.isfinite(rz):
             raise ConvergenceError(
@@ -291,10 +291,10 @@ def conjugate_gradients(
     ConvergenceError
         No solution after so many steps; the message carries the residual.
     """
-    return in_lockstep(K, [descending(K, b, start, tolerance, limit)])[0]
+    return in_lockstep(K, [conjugate_gradients_steps(K, b, start, tolerance, limit)])[0]
 
 
-def descending(
+def conjugate_gradients_steps(
     K: Operator, b: Floats, start: Floats, tolerance: float = TOLERANCE, limit: int = MOST_STEPS
 ) -> Iteration[tuple[Floats, int]]:
     """Run `conjugate_gradients` in lockstep with others."""
@@ -316,7 +316,7 @@ def descending(
     return _without(K.null, descent.y), steps
 
 
-def projected(
+def projected_solution(
     K: Operator,
     b: Floats,
     N: sp.csr_matrix,
@@ -356,11 +356,11 @@ def projected(
     ConvergenceError
         No solution within so many steps or sets; the message carries residual and set.
     """
-    run = projecting(K, b, N, d, measure, stiffness, start, y, tolerance, limit)
+    run = projected_steps(K, b, N, d, measure, stiffness, start, y, tolerance, limit)
     return in_lockstep(K, [run])[0]
 
 
-def projecting(
+def projected_steps(
     K: Operator,
     b: Floats,
     N: sp.csr_matrix,
@@ -372,7 +372,7 @@ def projecting(
     tolerance: float = TOLERANCE,
     limit: int = MOST_STEPS,
 ) -> Iteration[ProjectedState]:
-    """Run `projected` in lockstep with others."""
+    """Run `projected_solution` in lockstep with others."""
     N = sp.csr_matrix(N)
     weight = np.asarray(N.multiply(N) @ (1 / K.diagonal)).ravel()
     movable = weight > 0
@@ -403,7 +403,7 @@ class _Loop:
         if size == 0:
             y = np.zeros_like(y)
         check = _FIRST_CHECK
-        seen: set[bytes] = set()
+        visited: set[bytes] = set()
         singly = False
         while True:
             self.sets += 1
@@ -420,11 +420,11 @@ class _Loop:
                 first = int(np.argmax(new != active))
                 new = active.copy()
                 new[first] = not new[first]
-            elif new.tobytes() in seen:
+            elif new.tobytes() in visited:
                 singly = check <= self.tolerance
                 check = max(self.tolerance, 0.01 * min(check, reached))
-                seen.clear()
-            seen.add(new.tobytes())
+                visited.clear()
+            visited.add(new.tobytes())
             if self.sets >= _MOST_SETS:
                 self._give_up(descent.norm / size, new)
             active = new
@@ -471,7 +471,7 @@ class _Loop:
         plane = self._plane_of(self.movable)
         if size > 0 or plane is None:
             return size
-        return _norm((yield Ask.TIMES, plane.nearest(np.zeros(len(self.b)))))
+        return _norm((yield Request.TIMES, plane.nearest(np.zeros(len(self.b)))))
 
     def _result(self, y: Floats, pressure: Floats, gap: Floats, active: Bools) -> ProjectedState:
         length = np.abs(gap / self.measure).max(initial=0.0)

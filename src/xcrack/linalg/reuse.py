@@ -13,7 +13,7 @@ from xcrack.linalg.multigrid import Hierarchy
 
 
 @dataclass(frozen=True, eq=False)
-class Slip:
+class SlipField:
     """Slip of the faces of one crack, by place along it.
 
     Attributes
@@ -32,8 +32,8 @@ class Slip:
 
 
 @dataclass(frozen=True, eq=False)
-class Reuse:
-    """Work of an earlier solve in the same mesh; an empty one is ``Reuse()``.
+class SolverState:
+    """Work of an earlier solve in the same mesh; an empty one is ``SolverState()``.
 
     Attributes
     ----------
@@ -51,7 +51,7 @@ class Reuse:
         Coarse levels of the iterative solver.
     levels : tuple of float
         Factors of a spectrum that the closed sets belong to, where levels were refined.
-    slip : tuple of Slip or None
+    slip : tuple of SlipField or None
         Of the last load state, with friction: where a repeated cycle of the grown crack begins.
     """
 
@@ -62,19 +62,19 @@ class Reuse:
     bulk: Bulk | None = None
     hierarchy: Hierarchy | None = None
     levels: tuple[float, ...] = ()
-    slip: tuple[Slip | None, ...] = ()
+    slip: tuple[SlipField | None, ...] = ()
 
     def __reduce__(self) -> tuple[Any, ...]:
         # A factor holds addresses: in another process they mean nothing.
-        return Reuse, (
+        return SolverState, (
             self.centre, self.active, None, None, self.bulk, self.hierarchy, self.levels, self.slip,
         )  # fmt: skip
 
-    def without_matrices(self) -> "Reuse":
+    def without_matrices(self) -> "SolverState":
         """The part that fits into a file, and that decides the last bit of the next solve."""
-        return Reuse(self.centre, self.active, levels=self.levels, slip=self.slip)
+        return SolverState(self.centre, self.active, levels=self.levels, slip=self.slip)
 
-    def without_factor(self) -> "Reuse":
+    def without_factor(self) -> "SolverState":
         """The part that is small enough to be kept with each solution."""
         return replace(self, factor=None)
 

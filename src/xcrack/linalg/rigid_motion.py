@@ -86,7 +86,7 @@ def free_motion(space: FunctionSpace, fixed: Bools, free: Floats | None = None) 
     return Motion(modes, candidates[pivots[: free.shape[1]]])
 
 
-def balanced(space: FunctionSpace, motion: Motion, f: Floats) -> tuple[Floats, float]:
+def balanced_loads(space: FunctionSpace, motion: Motion, f: Floats) -> tuple[Floats, float]:
     """Loads `(n_dof, states)` without their small resultants, and the largest share removed.
 
     Raises
@@ -185,20 +185,20 @@ def _neighbours(space: FunctionSpace) -> tuple[Ints, Ints]:
     inner = np.nonzero(mesh.facet_to_cell[:, 1] >= 0)[0]
     parts = split_facets(space, mesh.facets[inner])
     facet = inner[parts.number]
-    apart = np.zeros(len(facet), dtype=bool)
+    is_apart = np.zeros(len(facet), dtype=bool)
     for c, cut in enumerate(space.cuts):
-        own = cut.lip_cell[:, 0] != cut.lip_cell[:, 1]
+        has_two_cells = cut.lip_cell[:, 0] != cut.lip_cell[:, 1]
         on_lip = np.zeros(len(mesh.facets), dtype=bool)
-        for a, b in cut.lip_cell[own]:
+        for a, b in cut.lip_cell[has_two_cells]:
             on_lip[np.intersect1d(mesh.cell_to_facet[a], mesh.cell_to_facet[b])] = True
-        mine = on_lip[facet]
+        lip_facets = on_lip[facet]
         for joint in space.joints:
             if joint.crack == c:
-                mine &= parts.side[:, joint.on] != -joint.side
-        apart |= mine
-    facet, sides = facet[~apart], parts.side[~apart]
+                lip_facets &= parts.side[:, joint.on] != -joint.side
+        is_apart |= lip_facets
+    facet, sides = facet[~is_apart], parts.side[~is_apart]
     corners = mesh.points[mesh.facets[facet]]
-    x = np.einsum("svb,sbd->sd", parts.bary[~apart], corners) / mesh.dim
+    x = np.einsum("svb,sbd->sd", parts.bary[~is_apart], corners) / mesh.dim
     vertex = []
     for cell in mesh.facet_to_cell[facet].T:
         own_sides = sides

@@ -9,7 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from xcrack.base.arrays import Ints, lock, offsets
-from xcrack.base.threads import each, number_of_threads
+from xcrack.base.threads import map_tasks, number_of_threads
 
 _LEAST = 300_000  # values of a part of a product: less takes no longer than to hand it over
 _TOGETHER = 3  # rows that the kernel of products takes at once
@@ -84,7 +84,7 @@ class RowBlocks:
 
         entries = len(self.values) * (1 if x.ndim == 1 else 2)
         count = min(number_of_threads(), entries // _LEAST)
-        each(rows, self._stretches(count))
+        map_tasks(rows, self._stretches(count))
         if unchanged is not None:
             y[self.idle] = unchanged
         return y
@@ -93,8 +93,8 @@ class RowBlocks:
         """Blocks of rows in stretches with about as many values each."""
         if count < 2:
             return [slice(None)]
-        wanted = np.arange(1, count) * (len(self.values) / count)
-        ends = [0, *np.searchsorted(self.offset, wanted), len(self.first) - 1]
+        targets = np.arange(1, count) * (len(self.values) / count)
+        ends = [0, *np.searchsorted(self.offset, targets), len(self.first) - 1]
         return [slice(a, b + 1) for a, b in itertools.pairwise(ends)]
 
     def single(self) -> "RowBlocks":
@@ -122,20 +122,20 @@ def row_blocks(parts: Sequence[sp.csr_matrix], first: Ints, dtype: Any = np.floa
     spans = list(itertools.pairwise(ends))
 
     def sizes_of(A: sp.csr_matrix) -> Ints:
-        def own(span: tuple[int, int]) -> Ints:
+        def sizes_of_part(span: tuple[int, int]) -> Ints:
             return np.asarray(
                 pattern_sizes(A.indptr, A.indices, first[span[0] : span[1] + 1], A.shape[1])
             )
 
-        return np.concatenate(each(own, spans))
+        return np.concatenate(map_tasks(sizes_of_part, spans))
 
     sizes = [sizes_of(A) for A in parts]
-    whole = np.asarray(np.sum(sizes, axis=0, dtype=np.int64))
-    start, offset = offsets(whole), offsets(whole * np.diff(first))
+    total_sizes = np.asarray(np.sum(sizes, axis=0, dtype=np.int64))
+    start, offset = offsets(total_sizes), offsets(total_sizes * np.diff(first))
     columns, values = np.empty(start[-1], np.uint32), np.zeros(offset[-1], dtype)
-    left, shift = np.zeros_like(whole), 0
-    for A, own in zip(parts, sizes):
-        begin, size = start[:-1] + left, np.stack([left, whole], axis=1)
+    filled_sizes, shift = np.zeros_like(total_sizes), 0
+    for A, sizes_of_part in zip(parts, sizes):
+        begin, size = start[:-1] + filled_sizes, np.stack([filled_sizes, total_sizes], axis=1)
 
         def fill(
             span: tuple[int, int],
@@ -150,8 +150,8 @@ def row_blocks(parts: Sequence[sp.csr_matrix], first: Ints, dtype: Any = np.floa
                 size[part], offset[part], A.shape[1], shift, columns, values,
             )  # fmt: skip
 
-        each(fill, spans)
-        left, shift = left + own, shift + A.shape[1]
+        map_tasks(fill, spans)
+        filled_sizes, shift = filled_sizes + sizes_of_part, shift + A.shape[1]
     short = [array.astype(np.uint32) for array in (first, start, offset)]
     return RowBlocks((int(first[-1]), shift), *map(lock, (*short, columns, values)))
 
@@ -195,7 +195,7 @@ def stored(A: sp.bsr_matrix, dtype: Any = np.float32) -> RowBlocks:
 
 
 @dataclass(frozen=True, eq=False)
-class Bordered:
+class BorderedFactor:
     """Matrix of standard and enriched unknowns; the standard block is that of every crack.
 
     Attributes

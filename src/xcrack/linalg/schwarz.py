@@ -90,9 +90,10 @@ def _members(space: FunctionSpace, home: Ints, n_standard: int) -> tuple[Ints, I
     enriched = np.unique(home[n_standard:])
     ends = space.mesh.edges[enriched[enriched >= n] - n].ravel()
     points = np.unique(np.concatenate([enriched[enriched < n], ends]))
-    known = np.nonzero(home >= 0)[0]
+    nodes_with_home = np.nonzero(home >= 0)[0]
     at = sp.csr_matrix(
-        (np.ones(len(known), np.int8), (home[known], known)), shape=(space.n_nodes, len(home))
+        (np.ones(len(nodes_with_home), np.int8), (home[nodes_with_home], nodes_with_home)),
+        shape=(space.n_nodes, len(home)),
     )
     patches = sp.csr_matrix(stars(space.mesh, space.order)[points] @ at)
     patches.sort_indices()

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from xcrack.base.arrays import Floats, Ints
-from xcrack.base.checks import shown
+from xcrack.base.checks import value_text
 from xcrack.base.errors import MeshError
 from xcrack.mesh.linear import base_kind
 from xcrack.mesh.mesh import Mesh
@@ -117,7 +117,9 @@ def abaqus_text(mesh: Mesh) -> str:
     facet_sets, cell_sets = sets_to_write(mesh)
     for name in (*facet_sets, *cell_sets):
         if not name or "," in name or "\n" in name or name != name.strip():
-            raise MeshError(f"set name {shown(name)}: Abaqus files take no commas or line breaks.")
+            raise MeshError(
+                f"set name {value_text(name)}: Abaqus files take no commas or line breaks."
+            )
     numbers = {name: mesh.facet_numbers(facets) for name, facets in facet_sets.items()}
     rows = np.unique(np.concatenate([np.zeros(0, np.int64), *numbers.values()]))
     flat = ", 0." * (3 - mesh.dim)
@@ -148,8 +150,8 @@ def _rows(elements: Ints, first: int) -> Iterable[str]:
 
 def _sections(path: Path, outer: tuple[Path, ...] = ()) -> Iterator[Section]:
     """Keyword, options and data rows of each section, included files in their place."""
-    own = path.resolve()
-    if own in outer:
+    resolved_path = path.resolve()
+    if resolved_path in outer:
         raise MeshError(f"{path.name} includes itself: leave that *INCLUDE out.")
     keyword = ""
     options: dict[str, str] = {}
@@ -171,7 +173,7 @@ def _sections(path: Path, outer: tuple[Path, ...] = ()) -> Iterator[Section]:
             inner = path.parent / options["INPUT"]
             if not inner.is_file():
                 raise MeshError(f"{path.name} includes {str(inner)!r}, which does not exist.")
-            yield from _sections(inner, (*outer, own))
+            yield from _sections(inner, (*outer, resolved_path))
     if keyword:
         yield keyword, options, rows
 
@@ -201,7 +203,7 @@ def _elements(kind: str, rows: list[list[str]]) -> list[list[int]]:
 
 
 def _find(sets: dict[str, list[int]], name: str) -> str:
-    return next((known for known in sets if known.casefold() == name.casefold()), name)
+    return next((set_name for set_name in sets if set_name.casefold() == name.casefold()), name)
 
 
 def _collect(sets: dict[str, list[int]], name: str, members: Iterable[int]) -> None:
@@ -263,8 +265,8 @@ def _raw(
         for where, face in pairs:
             if not re.fullmatch(r"S\d", face):
                 continue  # SPOS, SNEG: sides of a shell
-            known = element_sets.get(_find(element_sets, where), [])
-            for kind, rows in by_kind([int(where)] if where.isdigit() else known):
+            element_rows = element_sets.get(_find(element_sets, where), [])
+            for kind, rows in by_kind([int(where)] if where.isdigit() else element_rows):
                 local = _FACES.get(base_kind(kind) or "", ())
                 if 1 <= int(face[1]) <= len(local):
                     corners = local[int(face[1]) - 1]

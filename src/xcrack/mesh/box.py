@@ -89,6 +89,6 @@ def box(lower: ArrayLike, upper: ArrayLike, n: int | tuple[int, ...]) -> Mesh:
 
 def _facets_on(cells: Ints, on_side: Bools) -> Ints:
     """Facets all of whose points lie on a side, sorted as those of a mesh are."""
-    near = cells[on_side[cells].sum(axis=1) == cells.shape[1] - 1]
-    facets = np.sort(near[on_side[near]].reshape(len(near), -1), axis=1)
+    cells_on_side = cells[on_side[cells].sum(axis=1) == cells.shape[1] - 1]
+    facets = np.sort(cells_on_side[on_side[cells_on_side]].reshape(len(cells_on_side), -1), axis=1)
     return facets[np.lexsort(facets.T[::-1])]

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
-from xcrack.base.arrays import Floats, Ints, Shape, at, ranges, stretches
-from xcrack.base.checks import numbers, shown, whole_numbers
+from xcrack.base.arrays import Floats, Ints, Shape, at, ranges, row_stretches
+from xcrack.base.checks import numbers, value_text, whole_numbers
 from xcrack.base.errors import MeshError, XcrackError
 from xcrack.mesh.polygon import distance_to_simplices
 
@@ -46,7 +46,7 @@ def coordinates(
     return x
 
 
-def checked(points: Any, cells: Any) -> tuple[Floats, Ints]:
+def checked_cells(points: Any, cells: Any) -> tuple[Floats, Ints]:
     """Points and cells of a mesh as arrays, the cells turned to positive orientation.
 
     Parameters
@@ -77,11 +77,12 @@ def checked(points: Any, cells: Any) -> tuple[Floats, Ints]:
             f"cells must be (m, {x.shape[1] + 1}) for points with {x.shape[1]} coordinates, "
             f"not {c.shape}: only triangles in 2D and tetrahedra in 3D are used."
         )
-    bad = ~np.isfinite(x).all(axis=1)
-    if bad.any():
+    is_infinite = ~np.isfinite(x).all(axis=1)
+    if is_infinite.any():
         raise MeshError(
-            f"point {int(np.argmax(bad))} has coordinates {x[np.argmax(bad)].tolist()} "
-            f"({int(bad.sum())} such points): every coordinate must be finite."
+            f"point {int(np.argmax(is_infinite))} has coordinates "
+            f"{x[np.argmax(is_infinite)].tolist()} ({int(is_infinite.sum())} such points): every "
+            f"coordinate must be finite."
         )
     coordinates(x, "points of the mesh", x.shape)
     if c.min() < 0 or c.max() >= len(x):
@@ -97,19 +98,20 @@ def checked(points: Any, cells: Any) -> tuple[Floats, Ints]:
         )
     doubled = np.sort(c, axis=1)
     order = np.lexsort(doubled.T)
-    same = (np.diff(doubled[order], axis=0) == 0).all(axis=1)
-    if same.any():
+    is_repeated = (np.diff(doubled[order], axis=0) == 0).all(axis=1)
+    if is_repeated.any():
         raise MeshError(
-            f"cells {int(order[np.argmax(same)])} and {int(order[np.argmax(same) + 1])} have the "
-            f"same points ({int(same.sum())} such pairs): remove one of each."
+            f"cells {int(order[np.argmax(is_repeated)])} and "
+            f"{int(order[np.argmax(is_repeated) + 1])} have the same points "
+            f"({int(is_repeated.sum())} such pairs): remove one of each."
         )
-    return x, _oriented(x, c)
+    return x, _oriented_cells(x, c)
 
 
-def _oriented(points: Floats, cells: Ints) -> Ints:
+def _oriented_cells(points: Floats, cells: Ints) -> Ints:
     one, other = np.array(list(combinations(range(cells.shape[1]), 2))).T
     volume, longest = np.empty(len(cells)), np.empty(len(cells))
-    for part in stretches(len(cells)):
+    for part in row_stretches(len(cells)):
         x = points[cells[part]]
         with np.errstate(all="ignore"):  # lengths whose products are too small for a number
             volume[part] = np.linalg.det(x[:, 1:] - x[:, :1])
@@ -150,7 +152,7 @@ def checked_sets(
             )
     facets, cells = {}, {}
     for name, members in facet_sets.items():
-        what = f"facet set {shown(name)}"
+        what = f"facet set {value_text(name)}"
         array = whole_numbers(members, what, error=MeshError)
         facets[name] = (
             whole_numbers(array, what, (None, dim), error=MeshError)
@@ -163,7 +165,7 @@ def checked_sets(
                 "from 0."
             )
     for name, members in cell_sets.items():
-        what = f"cell set {shown(name)}"
+        what = f"cell set {value_text(name)}"
         array = whole_numbers(members, what, (None,), error=MeshError)
         if array.size and (array.min() < 0 or array.max() >= n_cells):
             raise MeshError(
@@ -173,7 +175,7 @@ def checked_sets(
     return facets, cells
 
 
-def doubts(points: Floats, cells: Ints, facets: Ints, owner: Ints) -> list[str]:
+def mesh_doubts(points: Floats, cells: Ints, facets: Ints, owner: Ints) -> list[str]:
     """Why a mesh may not be the body it looks like: doubled points, hanging ones, overlaps.
 
     Parameters
@@ -193,13 +195,13 @@ def doubts(points: Floats, cells: Ints, facets: Ints, owner: Ints) -> list[str]:
     number = np.unique(facets)
     corner = points[facets]
     size = np.linalg.norm(corner - np.roll(corner, 1, axis=1), axis=2).max(axis=1)
-    near = np.zeros(len(points))
+    smallest_distance = np.zeros(len(points))
     for column in facets.T:
-        np.maximum.at(near, column, size)
+        np.maximum.at(smallest_distance, column, size)
     messages = []
     tree = cKDTree(points)
     distance, other = tree.query(points[number], k=2)
-    twin = distance[:, 1] <= _SAME * near[number]
+    twin = distance[:, 1] <= _SAME * smallest_distance[number]
     if twin.any():
         i = int(np.argmax(twin))
         pair = sorted(
@@ -211,21 +213,21 @@ def doubts(points: Floats, cells: Ints, facets: Ints, owner: Ints) -> list[str]:
             "as a cut, or bodies lie on top of each other. Merge the points (gmsh: Coherence, or "
             "removeDuplicateNodes), unless the cut is meant."
         )
-    messages += _hanging(points, facets, owner, number[~twin], corner, size)
-    messages += _overlapping(points, cells, owner, corner)
+    messages += _hanging_points(points, facets, owner, number[~twin], corner, size)
+    messages += _overlapping_cells(points, cells, owner, corner)
     return messages
 
 
-def _hanging(
+def _hanging_points(
     points: Floats, facets: Ints, owner: Ints, number: Ints, corner: Floats, size: Floats
 ) -> list[str]:
     """Points that lie on a facet of a cell without being one of its points."""
     middle = corner.mean(axis=1)
     reach = np.linalg.norm(corner - middle[:, None], axis=2).max(axis=1)
-    row, candidate = _within(cKDTree(points[number]), middle, reach + _SAME * size)
+    row, candidate = _pairs_within(cKDTree(points[number]), middle, reach + _SAME * size)
     candidate = number[candidate]
-    own = (facets[row] == candidate[:, None]).any(axis=1)
-    row, candidate = row[~own], candidate[~own]
+    is_own_facet = (facets[row] == candidate[:, None]).any(axis=1)
+    row, candidate = row[~is_own_facet], candidate[~is_own_facet]
     x = points[candidate]
     on = distance_to_simplices(x, corner[row]) <= _SAME * size[row]
     on &= np.linalg.norm(corner[row] - x[:, None], axis=2).min(axis=1) > _SAME * size[row]
@@ -240,44 +242,46 @@ def _hanging(
     ]
 
 
-def _overlapping(points: Floats, cells: Ints, owner: Ints, corner: Floats) -> list[str]:
+def _overlapping_cells(points: Floats, cells: Ints, owner: Ints, corner: Floats) -> list[str]:
     """Cells in which the middle of a boundary facet of another cell lies."""
     x = corner.mean(axis=1)
     shape = points[cells]
     middle = shape.mean(axis=1)
     reach = np.linalg.norm(shape - middle[:, None], axis=2).max(axis=1)
     step = np.floor(np.log2(reach / reach.min())).astype(np.int64)
-    bad = np.zeros(len(x), dtype=np.int64) - 1
+    overlapping = np.zeros(len(x), dtype=np.int64) - 1
     for k in np.unique(step):
         rows = np.nonzero(step == k)[0]
         tree, most = cKDTree(middle[rows]), float(reach[rows].max())
         for begin in range(0, len(x), chunk := max(_AT_ONCE // 100, 1)):
             part = np.arange(begin, min(begin + chunk, len(x)))
-            point, cell = _within(tree, x[part], np.full(len(part), most))
+            point, cell = _pairs_within(tree, x[part], np.full(len(part), most))
             point, cell = part[point], rows[cell]
-            close = np.linalg.norm(middle[cell] - x[point], axis=1) < reach[cell]
-            close &= cell != owner[point]
-            point, cell = point[close], cell[close]
+            is_close = np.linalg.norm(middle[cell] - x[point], axis=1) < reach[cell]
+            is_close &= cell != owner[point]
+            point, cell = point[is_close], cell[is_close]
             edges = shape[cell, 1:] - shape[cell, :1]
-            rest = np.linalg.solve(np.swapaxes(edges, 1, 2), (x[point] - shape[cell, 0])[..., None])
-            bary = np.concatenate([1 - rest.sum(axis=1), rest[..., 0]], axis=1)
+            coordinates = np.linalg.solve(
+                np.swapaxes(edges, 1, 2), (x[point] - shape[cell, 0])[..., None]
+            )
+            bary = np.concatenate([1 - coordinates.sum(axis=1), coordinates[..., 0]], axis=1)
             inside = bary.min(axis=1) > _INSIDE
-            bad[point[inside]] = cell[inside]
-    if (bad < 0).all():
+            overlapping[point[inside]] = cell[inside]
+    if (overlapping < 0).all():
         return []
-    i = int(np.argmax(bad >= 0))
+    i = int(np.argmax(overlapping >= 0))
     return [
-        f"cells {int(owner[i])} and {int(bad[i])} of the mesh overlap at {at(x[i])} "
-        f"({int((bad >= 0).sum())} such places): parts of the body are there twice, and twice as "
-        "stiff. Unite them before meshing (gmsh: BooleanUnion or BooleanFragments)."
+        f"cells {int(owner[i])} and {int(overlapping[i])} of the mesh overlap at {at(x[i])} "
+        f"({int((overlapping >= 0).sum())} such places): parts of the body are there twice, and "
+        f"twice as stiff. Unite them before meshing (gmsh: BooleanUnion or BooleanFragments)."
     ]
 
 
-def _within(tree: cKDTree, x: Floats, reach: Floats) -> tuple[Ints, Ints]:
+def _pairs_within(tree: cKDTree, x: Floats, reach: Floats) -> tuple[Ints, Ints]:
     """Pairs of places and points of a tree no farther from them than a reach."""
-    near = tree.query_ball_point(x, reach)
-    row, _ = ranges(np.array([len(one) for one in near], dtype=np.int64))
-    every = [np.asarray(one, dtype=np.int64) for one in near]
+    neighbours = tree.query_ball_point(x, reach)
+    row, _ = ranges(np.array([len(one) for one in neighbours], dtype=np.int64))
+    every = [np.asarray(one, dtype=np.int64) for one in neighbours]
     return row, np.concatenate([np.zeros(0, dtype=np.int64), *every])
 
 
@@ -298,4 +302,4 @@ def unused_sets(cell_sets: Mapping[str, Ints], n_cells: int) -> list[str]:
     ]
 
 
-__all__ = ["LARGEST", "checked", "checked_sets", "coordinates", "doubts", "unused_sets"]
+__all__ = ["LARGEST", "checked_cells", "checked_sets", "coordinates", "mesh_doubts", "unused_sets"]

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from xcrack.base.arrays import Bools, Floats, Ints, at
-from xcrack.base.checks import called, numbers
+from xcrack.base.checks import call_function, numbers
 from xcrack.base.errors import MeshError, warn
 from xcrack.mesh.checks import LARGEST
 
@@ -69,7 +69,7 @@ def check_on_curves(points: Floats, facet_sets: Mapping[str, Ints], curves: Curv
     for name, curve in curves.items():
         facets = facet_sets[name]
         number = np.unique(facets)
-        _nearest(name, curve, points[number], _reach(points, facets)[number], _FARTHEST)
+        _nearest_points(name, curve, points[number], _reach(points, facets)[number], _FARTHEST)
 
 
 def _reach(points: Floats, facets: Ints) -> Floats:
@@ -82,22 +82,26 @@ def _reach(points: Floats, facets: Ints) -> Floats:
     return reach
 
 
-def _nearest(name: str, curve: Curve, x: Floats, reach: Floats, most: float) -> Floats:
+def _nearest_points(name: str, curve: Curve, x: Floats, reach: Floats, most: float) -> Floats:
     """Nearest points of a curve, no farther than `most` times the size of the facets there."""
     if not len(x):
         return x
     what = f"curves[{name!r}]"
     result = numbers(
-        called(curve, f"the nearest points of {what}", x.copy()), what, x.shape, error=MeshError
+        call_function(curve, f"the nearest points of {what}", x.copy()),
+        what,
+        x.shape,
+        error=MeshError,
     )
     distance = np.linalg.norm(np.clip(result, -LARGEST, LARGEST) - x, axis=1)
-    far = distance > most * reach
-    if far.any():
-        i = int(np.argmax(np.where(far, distance, 0)))
+    is_far = distance > most * reach
+    if is_far.any():
+        i = int(np.argmax(np.where(is_far, distance, 0)))
         raise MeshError(
             f"{what} takes the point {at(x[i])} of the boundary to {at(result[i])}, "
-            f"{distance[i]:.4g} away, where facets are {reach[i]:.4g} long ({int(far.sum())} such "
-            "points): it must return the nearest points of the curve for which the set stands."
+            f"{distance[i]:.4g} away, where facets are {reach[i]:.4g} long ({int(is_far.sum())} "
+            f"such points): it must return the nearest points of the curve for which the set "
+            f"stands."
         )
     return result
 
@@ -143,14 +147,14 @@ def on_curves(
     for _ in range(_PASSES):
         before = x[new]
         for name, number in rows.items():
-            x[number] = _nearest(name, curves[name], x[number], reach[number], _FARTHEST_NEW)
+            x[number] = _nearest_points(name, curves[name], x[number], reach[number], _FARTHEST_NEW)
         off = ((x[plane] - points[plane]) * normal).sum(axis=1)
         x[plane] -= off[:, None] * normal
         if (np.linalg.norm(x[new] - before, axis=1) <= _AT_REST * reach[new]).all():
             break
     changed = np.zeros(len(points), dtype=bool)
     changed[new] = (x[new] != points[new]).any(axis=1)
-    return _unfolded(points, x, cells, changed)
+    return _unfolded_points(points, x, cells, changed)
 
 
 def _other_sides(
@@ -172,8 +176,8 @@ def _other_sides(
             at_new = number[column] >= 0
             mean[number[column[at_new]]] = vector[at_new]
         sides.append(mean)
-    own, other = sides
-    has = (other != 0).any(axis=1) & (np.abs((own * other).sum(axis=1)) < _SHARP)
+    side_here, other = sides
+    has = (other != 0).any(axis=1) & (np.abs((side_here * other).sum(axis=1)) < _SHARP)
     return new[has], other[has]
 
 
@@ -186,13 +190,17 @@ def _normals(corner: Floats) -> Floats:
     return np.asarray(normal / np.linalg.norm(normal, axis=1)[:, None])
 
 
-def _unfolded(points: Floats, x: Floats, cells: Ints, changed: Bools) -> tuple[Floats, Bools]:
+def _unfolded_points(
+    points: Floats, x: Floats, cells: Ints, changed: Bools
+) -> tuple[Floats, Bools]:
     """Moved points, but those that would fold or flatten a cell where they were."""
-    near = cells[changed[cells].any(axis=1)]
-    before, stay, where = _volume(points[near]), 0, points[0]
+    cells_near = cells[changed[cells].any(axis=1)]
+    before, stay, where = _volume(points[cells_near]), 0, points[0]
     while True:
-        bad = _volume(x[near]) / before < _FLATTEST  # cells may still be of either orientation
-        back = np.unique(near[bad])
+        is_folded = (
+            _volume(x[cells_near]) / before < _FLATTEST
+        )  # cells may still be of either orientation
+        back = np.unique(cells_near[is_folded])
         back = back[changed[back]]
         if not len(back):
             break

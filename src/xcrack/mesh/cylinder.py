@@ -10,7 +10,7 @@ from xcrack.base.checks import number
 from xcrack.base.errors import GeometryError, MeshError
 from xcrack.mesh.gmsh_session import FINEST, graded_size, length_of, session
 from xcrack.mesh.mesh import Mesh, sound_mesh
-from xcrack.mesh.polygon import Round
+from xcrack.mesh.polygon import Arc
 
 _FACES = 24
 _TURN = 2 * pi / _FACES  # from one face of an end to the next
@@ -112,18 +112,18 @@ def notched_cylinder(
     outer_span = length_of(outer_span, "outer_span")
     inner_span = length_of(inner_span, "inner_span")
     size, radius = length_of(size, "size"), diameter / 2
-    near = length_of(size if size_near is None else size_near, "size_near")
+    near_size = length_of(size if size_near is None else size_near, "size_near")
     patch = diameter * sin(_TURN / 2) if patch_length is None else patch_length
     patch = length_of(patch, "patch_length")
     depth = length_of(radius if crack_depth is None else crack_depth, "crack_depth")
     if band is None:
         band = _BAND * diameter
     if transition is None:
-        transition = max(_TRANSITION * diameter, (size - near) / _STEEPEST)
+        transition = max(_TRANSITION * diameter, (size - near_size) / _STEEPEST)
     band = number(band, "band", least=0, error=GeometryError)
     transition = number(transition, "transition", least=0, error=GeometryError)
     _check_depths(diameter, notch_depth, notch_angle, depth)
-    _check_sizes(diameter, length, size, near, band, depth)
+    _check_sizes(diameter, length, size, near_size, band, depth)
     slope = tan(notch_angle / 2)
     room = _check_stations(length, outer_span, inner_span, patch, notch_depth * slope)
     limits = [(s + d) / 2 for s in (outer_span, inner_span) for d in (patch, -patch)]
@@ -133,7 +133,7 @@ def notched_cylinder(
     scale = 2.0 ** frexp(length)[1]
     plane = np.array([(0.0, -radius), (0.0, depth - radius)])
     cell_size = graded_size(
-        [], [plane / scale], size / scale, near / scale, band / scale, transition / scale
+        [], [plane / scale], size / scale, near_size / scale, band / scale, transition / scale
     )
     with session(Geometry__OCCUnionUnify=0, Mesh__OptimizeNetgen=1) as gmsh:
         # Without unifying, the fused bar keeps its patches apart.
@@ -222,7 +222,7 @@ def _with_sets(
     facets = sound_mesh(points, cells).boundary
     x, y, z = np.moveaxis(points[facets], -1, 0)
 
-    round_side = Round((0.0, 0.0, 0.0), radius, (1.0, 0.0, 0.0))
+    round_side = Arc((0.0, 0.0, 0.0), radius, (1.0, 0.0, 0.0))
     on_round = (abs(np.hypot(y, z) - radius) < tolerance) & (abs(x) < round_half + tolerance)
     in_notch = (abs(abs(x) - (root - z) * slope) < tolerance).all(axis=1)
     sets = {
@@ -237,9 +237,9 @@ def _with_sets(
     _, *limits = sections
     for station, (high, low) in (("outer", limits[:2]), ("inner", limits[2:])):
         for side, along in (("left", -x), ("right", x)):
-            here = ((along > low - tolerance) & (along < high + tolerance)).all(axis=1)
+            is_in_notch = ((along > low - tolerance) & (along < high + tolerance)).all(axis=1)
             for k in range(_FACES):
-                sets[f"{station}_{side}_{k:02d}"] = facets[here & on_face[k]]
+                sets[f"{station}_{side}_{k:02d}"] = facets[is_in_notch & on_face[k]]
     return sound_mesh(points, cells, sets, curves={"round": round_side})
 
 
@@ -257,26 +257,26 @@ def _check_depths(diameter: float, notch_depth: float, notch_angle: float, depth
 
 
 def _check_sizes(
-    diameter: float, length: float, size: float, near: float, band: float, depth: float
+    diameter: float, length: float, size: float, near_size: float, band: float, depth: float
 ) -> None:
     if size > diameter:
         raise GeometryError(
             f"size = {size:g} is larger than the diameter: give at most {diameter:g}, "
             "better a fifth of it."
         )
-    if near > size:
+    if near_size > size:
         raise GeometryError(
-            f"size_near = {near:g} is larger than size = {size:g}: cells grow away from the notch; "
-            "exchange the two or leave size_near out."
+            f"size_near = {near_size:g} is larger than size = {size:g}: cells grow away from the "
+            f"notch; exchange the two or leave size_near out."
         )
     body = pi / 4 * diameter**2 * length
     points = inf  # also where powers of sizes are too small for a number
-    if near > FINEST * length:
-        points = body / size**3 + min(2 * band * diameter * depth, body) / near**3
+    if near_size > FINEST * length:
+        points = body / size**3 + min(2 * band * diameter * depth, body) / near_size**3
     if points > _MOST_POINTS:
         raise GeometryError(
-            f"size = {size:g} and size_near = {near:g} ask for about {points:.1e} points, more "
-            f"than {_MOST_POINTS:.0e}: enlarge the size, or narrow the band."
+            f"size = {size:g} and size_near = {near_size:g} ask for about {points:.1e} points, "
+            f"more than {_MOST_POINTS:.0e}: enlarge the size, or narrow the band."
         )
 
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from xcrack.base.arrays import Bools, Floats, Ints
-from xcrack.base.threads import each
+from xcrack.base.threads import map_tasks
 from xcrack.mesh.triangulation import face_normals, side_keys
 
 _AT_ONCE = 8192  # points of one task: the same for any number of threads
@@ -15,7 +15,7 @@ _EQUAL = 1e-14  # share of the surface's extent below which two distances are th
 
 
 @dataclass(frozen=True, eq=False)
-class Closest:
+class NearestPoint:
     """Closest points of a triangulated surface.
 
     Attributes
@@ -71,8 +71,8 @@ def triangle_tree(points: Floats, triangles: Ints) -> TriangleTree:
     tiny = _EQUAL * float(np.ptp(corners.reshape(-1, 3), axis=0).max())
     boxes = box_tree(corners.min(axis=1), corners.max(axis=1))
     normal = face_normals(points, triangles)
-    beside, rim = _pseudo_normals(points, triangles, normal)
-    return TriangleTree(corners, normal, beside, rim, boxes, tiny)
+    edge_normals, rim = _pseudo_normals(points, triangles, normal)
+    return TriangleTree(corners, normal, edge_normals, rim, boxes, tiny)
 
 
 def _pseudo_normals(points: Floats, triangles: Ints, normal: Floats) -> tuple[Floats, Bools]:
@@ -88,20 +88,20 @@ def _pseudo_normals(points: Floats, triangles: Ints, normal: Floats) -> tuple[Fl
         for end in (side, (side + 1) % 3):
             rim_point[triangles[rim_side[:, side], end]] = True
     at_corner = corner_normals(points, triangles, normal)[triangles]
-    beside = np.concatenate([at_corner, total[inverse]], axis=1)
-    return beside, np.concatenate([rim_point[triangles], rim_side], axis=1)
+    edge_normals = np.concatenate([at_corner, total[inverse]], axis=1)
+    return edge_normals, np.concatenate([rim_point[triangles], rim_side], axis=1)
 
 
-def closest_in(tree: TriangleTree, x: Floats, band: float = np.inf) -> Closest:
+def closest_in(tree: TriangleTree, x: Floats, band: float = np.inf) -> NearestPoint:
     """Closest point of a surface for each point `(n, 3)`; nothing is sought beyond the band."""
     from xcrack.mesh.kernels.triangles import closest_triangle
 
     # A copy is never read-only, for which the kernel would be compiled once more.
-    own = np.array(x, dtype=float, order="C")
+    points = np.array(x, dtype=float, order="C")
     nearest = _in_parts(
-        closest_triangle, own, tree.corners, tree.normal, *tree.boxes, float(band), tree.tiny
+        closest_triangle, points, tree.corners, tree.normal, *tree.boxes, float(band), tree.tiny
     )
-    return Closest(*nearest)
+    return NearestPoint(*nearest)
 
 
 def _in_parts(kernel: Callable[..., Any], x: Floats, *arguments: Any) -> tuple[Any, ...]:
@@ -110,25 +110,25 @@ def _in_parts(kernel: Callable[..., Any], x: Floats, *arguments: Any) -> tuple[A
     def part(first: int) -> tuple[Any, ...]:
         return tuple(kernel(x[first : first + _AT_ONCE], *arguments))
 
-    parts = each(part, range(0, max(len(x), 1), _AT_ONCE))
+    parts = map_tasks(part, range(0, max(len(x), 1), _AT_ONCE))
     return tuple(np.concatenate(some) for some in zip(*parts, strict=True))
 
 
 def signed_in(tree: TriangleTree, x: Floats, band: float = np.inf) -> tuple[Floats, Ints, Bools]:
     """What `surface_distance` gives, for a surface whose tree is there already."""
     x = np.asarray(x, dtype=float)
-    near = closest_in(tree, x, band)
-    phi = np.array(near.distance)
+    closest = closest_in(tree, x, band)
+    phi = np.array(closest.distance)
     on_boundary = np.zeros(len(phi), dtype=bool)
-    flat = np.nonzero((near.triangle >= 0) & (near.part == 0))[0]
-    t = near.triangle[flat]
+    flat = np.nonzero((closest.triangle >= 0) & (closest.part == 0))[0]
+    t = closest.triangle[flat]
     phi[flat] = np.einsum("ij,ij->i", x[flat] - tree.corners[t, 0], tree.normal[t])
-    edge = np.nonzero(near.part > 0)[0]
-    t, part = near.triangle[edge], near.part[edge] - 1
-    side = np.einsum("ij,ij->i", x[edge] - near.foot[edge], tree.beside[t, part])
+    edge = np.nonzero(closest.part > 0)[0]
+    t, part = closest.triangle[edge], closest.part[edge] - 1
+    side = np.einsum("ij,ij->i", x[edge] - closest.foot[edge], tree.beside[t, part])
     phi[edge] = np.copysign(phi[edge], side)
     on_boundary[edge] = tree.rim[t, part]
-    return phi, near.triangle, on_boundary
+    return phi, closest.triangle, on_boundary
 
 
 def surface_distance(

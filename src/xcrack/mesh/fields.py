@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from xcrack.base.arrays import Floats, Ints, at, frozen
-from xcrack.base.checks import numbers, shown
+from xcrack.base.arrays import Floats, Ints, at, frozen_copy
+from xcrack.base.checks import numbers, value_text
 from xcrack.base.errors import MeshError, ProblemError, warn
 from xcrack.base.paths import system_errors
 from xcrack.mesh.files import existing_file, meshio_read
-from xcrack.mesh.linear import SHAPES, base_kind, linearised
+from xcrack.mesh.linear import SHAPES, base_kind, linear_mesh
 from xcrack.mesh.locate import barycentric, locate
 from xcrack.mesh.mesh import Mesh, sound_mesh
 from xcrack.mesh.raw import RawMesh
@@ -80,26 +80,26 @@ class Field:
     def _beside(self, x: Floats) -> tuple[Ints, Floats]:
         """Nearest cells of points outside, and the places in them: curved sides are polygons."""
         mesh = self.mesh
-        near = np.atleast_2d(mesh.cell_tree.query(x, k=min(_NEAR, len(mesh.cells)))[1])
-        near = near.reshape(len(x), -1)
-        many = near.shape[1]
-        trial = barycentric(mesh, near.ravel(), np.repeat(x, many, axis=0))
+        nearest = np.atleast_2d(mesh.cell_tree.query(x, k=min(_NEAR, len(mesh.cells)))[1])
+        nearest = nearest.reshape(len(x), -1)
+        many = nearest.shape[1]
+        trial = barycentric(mesh, nearest.ravel(), np.repeat(x, many, axis=0))
         trial = np.maximum(trial, 0.0)
         trial /= trial.sum(axis=1, keepdims=True)
-        place = np.einsum("kb,kbd->kd", trial, mesh.points[mesh.cells[near.ravel()]])
+        place = np.einsum("kb,kbd->kd", trial, mesh.points[mesh.cells[nearest.ravel()]])
         distance = np.linalg.norm(place - np.repeat(x, many, axis=0), axis=1).reshape(-1, many)
         best = np.argmin(distance, axis=1)
         row = np.arange(len(x))
-        cell = near[row, best]
-        far = distance[row, best] > _BESIDE * mesh.cell_size[cell]
-        if far.any():
-            i = int(np.argmax(np.where(far, distance[row, best], 0)))
+        cell = nearest[row, best]
+        is_far = distance[row, best] > _BESIDE * mesh.cell_size[cell]
+        if is_far.any():
+            i = int(np.argmax(np.where(is_far, distance[row, best], 0)))
             raise ProblemError(
-                f"field {self.name} does not cover the body: {int(far.sum())} of the points asked "
-                f"for lie beside its mesh, the farthest at {at(x[i])}, {distance[i, best[i]]:.4g} "
-                f"away (its mesh reaches from {at(mesh.points.min(axis=0))} to "
-                f"{at(mesh.points.max(axis=0))}). Check units and position, or give a field of the "
-                "whole body."
+                f"field {self.name} does not cover the body: {int(is_far.sum())} of the points "
+                f"asked for lie beside its mesh, the farthest at {at(x[i])}, "
+                f"{distance[i, best[i]]:.4g} away (its mesh reaches from "
+                f"{at(mesh.points.min(axis=0))} to {at(mesh.points.max(axis=0))}). Check units and "
+                f"position, or give a field of the whole body."
             )
         return cell, trial.reshape(len(x), many, -1)[row, best]
 
@@ -141,7 +141,9 @@ def read_field(path: str | PathLike[str], name: str | None = None) -> Field:
     array([2.5])
     """
     if not isinstance(name, str | None):
-        raise MeshError(f"read_field: name = {shown(name)}: give the name of a field, or None.")
+        raise MeshError(
+            f"read_field: name = {value_text(name)}: give the name of a field, or None."
+        )
     path = existing_file(path, "field")
     with system_errors("cannot read the field file", path):
         content = meshio_read(path, "field")
@@ -158,32 +160,36 @@ def read_field(path: str | PathLike[str], name: str | None = None) -> Field:
     source, values = _data(content, name, path.name)
     if source == "cell":
         values = _at_points(points, content.cells, values, top, path.name)
-    values = _shaped(values, len(points), top, path.name)
+    values = _values_of_shape(values, len(points), top, path.name)
     return _field(points, blocks, values, top, f"{name or 'of'} {path.name}".strip())
 
 
 def _data(content: Any, name: str | None, source: str) -> tuple[str, Any]:
     """The wanted data: where they belong to, and their values."""
-    known = {**{k: "cell" for k in content.cell_data}, **{k: "point" for k in content.point_data}}
+    array_kinds = {
+        **{k: "cell" for k in content.cell_data},
+        **{k: "point" for k in content.point_data},
+    }
     if name is None:
-        if len(known) != 1:
+        if len(array_kinds) != 1:
             raise MeshError(
-                f"{source} has {len(known)} fields ({', '.join(map(repr, sorted(known)))}): give "
-                "read_field(path, name) the one you mean."
+                f"{source} has {len(array_kinds)} fields "
+                f"({', '.join(map(repr, sorted(array_kinds)))}): give read_field(path, name) the "
+                f"one you mean."
             )
-        name = next(iter(known))
-    if name not in known:
-        names = ", ".join(map(repr, sorted(known))) or "none"
-        raise MeshError(f"{source} has no field {shown(name)}: give one of {names}.")
-    data = content.point_data if known[name] == "point" else content.cell_data
-    return known[name], data[name]
+        name = next(iter(array_kinds))
+    if name not in array_kinds:
+        names = ", ".join(map(repr, sorted(array_kinds))) or "none"
+        raise MeshError(f"{source} has no field {value_text(name)}: give one of {names}.")
+    data = content.point_data if array_kinds[name] == "point" else content.cell_data
+    return array_kinds[name], data[name]
 
 
 def _at_points(points: Floats, blocks: Any, values: Any, top: int, source: str) -> Floats:
     """Values of cells averaged at the points, by the sizes of the cells."""
     total: Any = None
     weight = np.zeros(len(points))
-    for block, own in zip(blocks, values, strict=True):
+    for block, values_of_block in zip(blocks, values, strict=True):
         base = base_kind(block.type)
         if base is None or SHAPES[base].dim != top:
             continue
@@ -192,7 +198,7 @@ def _at_points(points: Floats, blocks: Any, values: Any, top: int, source: str) 
         # The spread of the corners stands for the volume: weights need no more.
         size = np.linalg.norm(corner - corner.mean(axis=1, keepdims=True), axis=2).max(axis=1)
         size = size**top
-        data = np.asarray(own, dtype=float)
+        data = np.asarray(values_of_block, dtype=float)
         if total is None:
             total = np.zeros((len(points), *data.shape[1:]))
         for column in rows.T:
@@ -203,7 +209,7 @@ def _at_points(points: Floats, blocks: Any, values: Any, top: int, source: str) 
     return np.asarray(total / np.maximum(weight, 1e-300).reshape(-1, *[1] * (total.ndim - 1)))
 
 
-def _shaped(values: Any, n: int, top: int, source: str) -> Floats:
+def _values_of_shape(values: Any, n: int, top: int, source: str) -> Floats:
     """Values as scalars, vectors or stresses of the dimension of the cells."""
     data = np.asarray(values, dtype=float).reshape(n, -1)
     width = data.shape[1]
@@ -230,7 +236,7 @@ def _field(
     if len(second) == 1 and second <= {"triangle6", "tetra10"}:
         nodes = np.concatenate([data for _, data in blocks])
     else:
-        raw = _split(RawMesh(points, blocks), name)
+        raw = _cells_as_simplices(RawMesh(points, blocks), name)
         points = raw.points
         kind = "tetra" if top > 2 else "triangle"
         nodes = np.concatenate([data for k, data in raw.blocks if k == kind])
@@ -246,24 +252,24 @@ def _field(
     order = _TURNED.get(nodes.shape[1], [1, 0, *range(2, nodes.shape[1])])
     nodes = np.where(turned[:, None], nodes[:, order], nodes)
     used = np.unique(nodes)
-    bad = ~np.isfinite(values[used].reshape(len(used), -1)).all(axis=1)
-    if bad.any():
+    is_infinite = ~np.isfinite(values[used].reshape(len(used), -1)).all(axis=1)
+    if is_infinite.any():
         raise MeshError(
-            f"{name}: the value at {at(points[used[np.argmax(bad)]])} is not finite "
-            f"({int(bad.sum())} such points)."
+            f"{name}: the value at {at(points[used[np.argmax(is_infinite)]])} is not finite "
+            f"({int(is_infinite.sum())} such points)."
         )
     corners, cells = np.unique(nodes[:, : top + 1], return_inverse=True)
     mesh = sound_mesh(points[corners], cells.reshape(-1, top + 1))
-    return Field(mesh, frozen(nodes), frozen(values), name)
+    return Field(mesh, frozen_copy(nodes), frozen_copy(values), name)
 
 
-def _split(raw: RawMesh, name: str) -> RawMesh:
+def _cells_as_simplices(raw: RawMesh, name: str) -> RawMesh:
     """Cells as simplices; how they are divided matters to nobody who interpolates."""
     from xcrack.base.errors import collected_warnings
 
     messages: list[str] = []
     with collected_warnings(messages):
-        result = linearised(raw, name, strict=False)
+        result = linear_mesh(raw, name, strict=False)
     for message in messages:
         if "the sides are straight now" in message:
             warn(message)

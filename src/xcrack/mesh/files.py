@@ -15,10 +15,10 @@ import numpy as np
 from xcrack.base.arrays import Floats, Ints
 from xcrack.base.checks import flag, one_of
 from xcrack.base.errors import GeometryError, MeshError, XcrackError, warn
-from xcrack.base.optional import required
+from xcrack.base.optional import require_package
 from xcrack.base.paths import path_of, system_errors, written_whole
 from xcrack.mesh.abaqus import abaqus_text, read_abaqus
-from xcrack.mesh.linear import SHAPES, base_kind, linearised
+from xcrack.mesh.linear import SHAPES, base_kind, linear_mesh
 from xcrack.mesh.mesh import Mesh
 from xcrack.mesh.msh import REST, msh_text
 from xcrack.mesh.raw import CELL_KIND, FACET_KIND, RawMesh, mesh_from_raw, sets_to_write
@@ -94,7 +94,7 @@ def read_mesh(path: str | PathLike[str], *, strict: bool = False) -> Mesh:
             raw = read_abaqus(path)
         else:
             raw = _raw_from_meshio(meshio_read(path, "mesh"), _gmsh_names(path))
-    return mesh_from_raw(linearised(raw, path.name, strict), path.name)
+    return mesh_from_raw(linear_mesh(raw, path.name, strict), path.name)
 
 
 def read_triangles(path: str | PathLike[str]) -> tuple[Floats, Ints]:
@@ -207,7 +207,7 @@ def existing_file(value: str | PathLike[str], what: str) -> Path:
 
 def meshio_read(path: Path, what: str) -> Any:
     """Content of a file as meshio reads it; errors name the file and what to do."""
-    meshio = required("meshio", f"reading a {path.suffix} file")
+    meshio = require_package("meshio", f"reading a {path.suffix} file")
     _check_extension(path, "read", meshio.extension_to_filetypes)
     output = io.StringIO()
     try:
@@ -223,7 +223,7 @@ def meshio_read(path: Path, what: str) -> Any:
         raise
     except (Exception, SystemExit) as error:
         if isinstance(error, ModuleNotFoundError) and error.name:
-            required(error.name, f"reading a {path.suffix} file")
+            require_package(error.name, f"reading a {path.suffix} file")
         if "gmsh:physical" in str(error):
             reason = (
                 "some of its elements are in physical groups and some are not (gmsh saved all): "
@@ -243,7 +243,7 @@ def _conversion(path: Path) -> str:
 
 
 def _meshio_write(path: Path, mesh: Mesh) -> None:
-    meshio = required("meshio", f"writing a {path.suffix} file")
+    meshio = require_package("meshio", f"writing a {path.suffix} file")
     _check_extension(path, "write", meshio.extension_to_filetypes)
     points = np.zeros((mesh.n_points, 3))
     points[:, : mesh.dim] = mesh.points
@@ -279,12 +279,12 @@ def _meshio_write(path: Path, mesh: Mesh) -> None:
         raise MeshError(f"cannot write {str(path)!r}: {reason}.") from error
 
 
-def _check_extension(path: Path, verb: str, known: dict[str, list[str]]) -> None:
-    if path.suffix.lower() not in known:
+def _check_extension(path: Path, verb: str, formats: dict[str, list[str]]) -> None:
+    if path.suffix.lower() not in formats:
         remedy = _conversion(path) if verb == "read" else ""
         raise XcrackError(
             f"cannot {verb} {path.name!r}: {path.suffix!r} is no extension of a mesh format that "
-            f"is known here. {remedy or 'Known are ' + ', '.join(sorted(known)) + '.'}"
+            f"is known here. {remedy or 'Known are ' + ', '.join(sorted(formats)) + '.'}"
         )
 
 

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from xcrack.base.arrays import Floats
-from xcrack.base.checks import number, shown
+from xcrack.base.checks import number, value_text
 from xcrack.base.errors import GeometryError, XcrackError
-from xcrack.base.optional import required
+from xcrack.base.optional import require_package
 from xcrack.mesh.checks import LARGEST, coordinates
 
 SYSTEM_LIBRARIES = (
@@ -73,7 +73,7 @@ def import_gmsh() -> ModuleType:
         gmsh is not installed, or cannot load a library of the system.
     """
     try:
-        return required("gmsh", "a mesh generator", _WITHOUT)
+        return require_package("gmsh", "a mesh generator", _WITHOUT)
     except XcrackError as error:
         library = re.search(r"[\w+-]+\.so[.\d]*", str(error.__cause__))
         if library is None:
@@ -108,15 +108,15 @@ def session(**options: float) -> Iterator[ModuleType]:
         gmsh cannot be imported.
     """
     gmsh = import_gmsh()
-    asked = {**_OPTIONS, **{name.replace("__", "."): value for name, value in options.items()}}
+    settings = {**_OPTIONS, **{name.replace("__", "."): value for name, value in options.items()}}
     guest = bool(gmsh.isInitialized())
     if not guest:
         # interruptible=True would take over SIGINT for the rest of the process.
         gmsh.initialize([], readConfigFiles=False, run=False, interruptible=False)
-    before = {name: gmsh.option.getNumber(name) for name in asked} if guest else {}
+    before = {name: gmsh.option.getNumber(name) for name in settings} if guest else {}
     host_model = gmsh.model.getCurrent() if guest else ""
     try:
-        for name, value in asked.items():
+        for name, value in settings.items():
             gmsh.option.setNumber(name, value)
         gmsh.model.add("xcrack")
         try:
@@ -141,12 +141,12 @@ FINEST = 1e-6  # share of a body's length below which no cell size is taken
 def graded_size(
     holes: Sequence[tuple[float, float, float]],
     paths: Sequence[Floats],
-    far: float,
-    near: float,
+    far_size: float,
+    near_size: float,
     band: float,
     transition: float,
 ) -> Callable[[float, float], float]:
-    """Cell size as a function of the place: `near` up to `band`, `far` from a transition on.
+    """Cell size by the place: `near_size` up to `band`, `far_size` from a transition on.
 
     Parameters
     ----------
@@ -154,10 +154,10 @@ def graded_size(
         Round holes.
     paths : sequence of (k, 2) arrays, length
         Polylines.
-    far, near : float, length
+    far_size, near_size : float, length
         Sizes far from all holes and paths, and near them.
     band, transition : float, length
-        Where `near` holds, and over what distance the size then grows to `far`.
+        Where `near_size` holds, and over what distance the size then grows to `far_size`.
 
     Returns
     -------
@@ -172,15 +172,15 @@ def graded_size(
             square = (bx - ax) ** 2 + (by - ay) ** 2
             segments.append((ax, ay, bx - ax, by - ay, square or 1.0))
     if not holes and not segments:
-        return lambda x, y: far
-    ramp = max(transition, 1e-9 * far)
+        return lambda x, y: far_size
+    ramp = max(transition, 1e-9 * far_size)
 
     def length(x: float, y: float) -> float:
         distance = min((hypot(x - cx, y - cy) - r for cx, cy, r in holes), default=1e300)
         for ax, ay, tx, ty, square in segments:
             s = min(1.0, max(0.0, ((x - ax) * tx + (y - ay) * ty) / square))
             distance = min(distance, hypot(x - ax - s * tx, y - ay - s * ty))
-        return near + (far - near) * min(1.0, max(0.0, (distance - band) / ramp))
+        return near_size + (far_size - near_size) * min(1.0, max(0.0, (distance - band) / ramp))
 
     return length
 
@@ -218,8 +218,8 @@ def polylines(along: Any) -> list[Floats]:
         ]
     except Exception as error:  # whatever an object's own methods raise
         raise GeometryError(
-            f"along = {shown(along)} must be points of a polyline, [(x0, y0), (x1, y1), ...], or "
-            "a list of such polylines, with finite coordinates."
+            f"along = {value_text(along)} must be points of a polyline, [(x0, y0), (x1, y1), ...], "
+            f"or a list of such polylines, with finite coordinates."
         ) from error
 
 

@@ -55,7 +55,7 @@ def round_hole(mesh: Mesh, facets: Ints, what: str) -> RoundHole:
     if not len(facets):
         raise ProblemError(f"{what}: the set has no facets.")
     area = outward_areas(mesh, facets, what)
-    section = _straightened(mesh.points[np.unique(facets)], _section(area, what))
+    section = _straightened_axes(mesh.points[np.unique(facets)], _section(area, what))
     x = mesh.points[np.unique(facets)] @ section.T
     A = np.column_stack([2 * x, np.ones(len(x))])
     solution, _, rank, _ = np.linalg.lstsq(A, (x**2).sum(axis=1), rcond=1e-10)
@@ -80,7 +80,7 @@ def round_hole(mesh: Mesh, facets: Ints, what: str) -> RoundHole:
     return hole
 
 
-def _straightened(x: Floats, section: Floats) -> Floats:
+def _straightened_axes(x: Floats, section: Floats) -> Floats:
     """Directions across the axis of the cylinder that fits points best (Gauss and Newton)."""
     if x.shape[1] < 3:
         return section

@@ -20,7 +20,7 @@ _Faces = tuple[tuple[int, ...], ...]
 
 
 @dataclass(frozen=True)
-class Shape:
+class CellShape:
     """A kind of element: its dimension, corners and faces (right-handed normals point out)."""
 
     dim: int
@@ -34,24 +34,24 @@ _RING_4 = ((0, 1), (1, 2), (2, 3), (3, 0))
 
 # Corner numbers are those of VTK, which meshio, gmsh and Abaqus share.
 SHAPES = {
-    "vertex": Shape(0, 1),
-    "line": Shape(1, 2, ((0, 1),)),
-    "triangle": Shape(2, 3, _RING_3),
-    "quad": Shape(2, 4, _RING_4),
-    "tetra": Shape(3, 4, (*_RING_3, (0, 3), (1, 3), (2, 3))),
-    "pyramid": Shape(
+    "vertex": CellShape(0, 1),
+    "line": CellShape(1, 2, ((0, 1),)),
+    "triangle": CellShape(2, 3, _RING_3),
+    "quad": CellShape(2, 4, _RING_4),
+    "tetra": CellShape(3, 4, (*_RING_3, (0, 3), (1, 3), (2, 3))),
+    "pyramid": CellShape(
         3,
         5,
         (*_RING_4, (0, 4), (1, 4), (2, 4), (3, 4)),
         ((0, 3, 2, 1), (0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4)),
     ),
-    "wedge": Shape(
+    "wedge": CellShape(
         3,
         6,
         (*_RING_3, (3, 4), (4, 5), (5, 3), (0, 3), (1, 4), (2, 5)),
         ((0, 2, 1), (3, 4, 5), (0, 1, 4, 3), (1, 2, 5, 4), (2, 0, 3, 5)),
     ),
-    "hexahedron": Shape(
+    "hexahedron": CellShape(
         3,
         8,
         (*_RING_4, (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7)),
@@ -80,7 +80,7 @@ def base_kind(kind: str) -> str | None:
     return name.group(1) if name and name.group(1) in SHAPES else None
 
 
-def linearised(raw: RawMesh, source: str, strict: bool) -> RawMesh:
+def linear_mesh(raw: RawMesh, source: str, strict: bool) -> RawMesh:
     """What a file holds with vertices, lines, triangles and tetrahedra only.
 
     Parameters
@@ -240,7 +240,7 @@ def _fans(rows: Ints, faces: _Faces) -> Ints:
     return np.concatenate(parts, axis=1)
 
 
-def _distinct(simplices: Ints) -> Bools:
+def _proper_simplices(simplices: Ints) -> Bools:
     """Which simplices have no point twice: collapsed elements give such pieces."""
     ordered = np.sort(simplices, axis=-1)
     return np.asarray((np.diff(ordered, axis=-1) > 0).all(axis=-1))
@@ -250,9 +250,9 @@ def _tetrahedra(points: Floats, rows: Ints, base: str, source: str) -> tuple[Int
     """Tetrahedra of cells, the cell of each (growing), and the points with those added."""
     triangles = _fans(rows, SHAPES[base].faces)
     pieces, keep = _cones(rows.min(axis=1), triangles)
-    bad = _mixed(points, pieces, keep)
-    if bad.any():
-        number = np.nonzero(bad)[0]
+    folded = _folded_cells(points, pieces, keep)
+    if folded.any():
+        number = np.nonzero(folded)[0]
         # A cell may be there several times, in the body and in sets: one point for all of them.
         _unique, first, inverse = np.unique(
             np.sort(rows[number], axis=1), axis=0, return_index=True, return_inverse=True
@@ -261,7 +261,7 @@ def _tetrahedra(points: Floats, rows: Ints, base: str, source: str) -> tuple[Int
         centre = len(points) + inverse.ravel()
         points = np.concatenate([points, middle])
         again, solid = _cones(centre, triangles[number])
-        wrong = _mixed(points, again, solid)
+        wrong = _folded_cells(points, again, solid)
         if wrong.any():
             cell = rows[number[np.argmax(wrong)]]
             different = len(np.unique(inverse.ravel()[wrong]))
@@ -280,10 +280,10 @@ def _cones(apex: Ints, triangles: Ints) -> tuple[Ints, Bools]:
     """Tetrahedra from a point of each cell to its triangles, and which of them are any."""
     tips = np.broadcast_to(apex[:, None, None], (*triangles.shape[:2], 1))
     pieces = np.concatenate([tips, triangles], axis=2)
-    return pieces, _distinct(pieces)
+    return pieces, _proper_simplices(pieces)
 
 
-def _mixed(points: Floats, pieces: Ints, keep: Bools) -> Bools:
+def _folded_cells(points: Floats, pieces: Ints, keep: Bools) -> Bools:
     """Cells whose pieces do not all have volumes of one sign."""
     x = points[pieces]
     volume = np.where(keep, np.linalg.det(x[:, :, 1:] - x[:, :, :1]), np.nan)
@@ -303,10 +303,10 @@ def _triangles(points: Floats, rows: Ints, plane: bool, source: str) -> tuple[In
     first = np.argmin(rows, axis=1)
     ring = np.take_along_axis(rows, (first[:, None] + np.arange(4)) % 4, axis=1)
     pieces = ring[:, [[0, 1, 2], [0, 2, 3]]]
-    keep = _distinct(pieces)
+    keep = _proper_simplices(pieces)
     if plane:
         turned = ring[:, [[1, 2, 3], [1, 3, 0]]]
-        also = _distinct(turned)
+        also = _proper_simplices(turned)
         quality = [_worst_shape(points, p, k) for p, k in ((pieces, keep), (turned, also))]
         other = quality[1] > quality[0] + 1e-9
         pieces, keep = (

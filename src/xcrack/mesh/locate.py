@@ -16,8 +16,10 @@ _TOLERANCE = 1e-10  # barycentric; a point this close to a cell belongs to it (r
 def barycentric(mesh: Mesh, cell: Ints, x: Floats) -> Floats:
     """Barycentric coordinates `(k, d + 1)` of points `(k, d)` in the given cells `(k,)`."""
     from_first = x - mesh.points[mesh.cells[cell, 0]]
-    rest = np.einsum("kid,kd->ki", mesh.gradient[cell, 1:], from_first)
-    return np.concatenate([1 - rest.sum(axis=1, keepdims=True), rest], axis=1)
+    last_coordinates = np.einsum("kid,kd->ki", mesh.gradient[cell, 1:], from_first)
+    return np.concatenate(
+        [1 - last_coordinates.sum(axis=1, keepdims=True), last_coordinates], axis=1
+    )
 
 
 def locate(mesh: Mesh, x: Floats) -> tuple[Ints, Floats]:
@@ -25,10 +27,12 @@ def locate(mesh: Mesh, x: Floats) -> tuple[Ints, Floats]:
 
     Of several cells that a point belongs to, it is the one with the nearest centroid.
     """
-    from xcrack.mesh.kernels.location import located
+    from xcrack.mesh.kernels.location import locate_points
 
     x = np.ascontiguousarray(np.atleast_2d(np.asarray(x, dtype=float)))
-    cell, bary = located(mesh.points, mesh.cells, mesh.gradient, *mesh.cell_grid, x, _TOLERANCE)
+    cell, bary = locate_points(
+        mesh.points, mesh.cells, mesh.gradient, *mesh.cell_grid, x, _TOLERANCE
+    )
     cell[~((x >= mesh.lower) & (x <= mesh.upper)).all(axis=1)] = -1  # nan too
     return cell, bary
 
@@ -98,9 +102,9 @@ def parts_inside(mesh: Mesh, polyline: Floats) -> list[Floats]:
     pairs, middles = [], []
     chunk = max(_CROSSINGS // max(len(s), 1), 1)
     for first in range(0, len(p), chunk):
-        own = slice(first, first + chunk)
-        x, y = r[own, 0, None], r[own, 1, None]
-        gap_x, gap_y = q[:, 0] - p[own, 0, None], q[:, 1] - p[own, 1, None]
+        chunk_rows = slice(first, first + chunk)
+        x, y = r[chunk_rows, 0, None], r[chunk_rows, 1, None]
+        gap_x, gap_y = q[:, 0] - p[chunk_rows, 0, None], q[:, 1] - p[chunk_rows, 1, None]
         cross = x * s[:, 1] - y * s[:, 0]
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             t = (gap_x * s[:, 1] - gap_y * s[:, 0]) / cross
@@ -113,7 +117,9 @@ def parts_inside(mesh: Mesh, polyline: Floats) -> list[Floats]:
             middles.append(p[first + k] + middle[:, None] * r[first + k])
     inside = contains(mesh, np.concatenate(middles))
     last = np.cumsum([len(each) for each in pairs])[:-1]
-    return [each[own] for each, own in zip(pairs, np.split(inside, last), strict=True)]
+    return [
+        each[chunk_rows] for each, chunk_rows in zip(pairs, np.split(inside, last), strict=True)
+    ]
 
 
 def cells_within(mesh: Mesh, x: Floats, radius: float) -> Ints:

@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
-from xcrack.base.arrays import Floats, Ints, frozen, lock, stretches
-from xcrack.base.checks import shown, whole_numbers
+from xcrack.base.arrays import Floats, Ints, frozen_copy, lock, row_stretches
+from xcrack.base.checks import value_text, whole_numbers
 from xcrack.base.errors import MeshError, ProblemError, warn
-from xcrack.mesh.checks import checked, checked_sets, doubts, unused_sets
+from xcrack.mesh.checks import checked_cells, checked_sets, mesh_doubts, unused_sets
 from xcrack.mesh.curves import Curves, check_on_curves, checked_curves
 
 _CELLS = {2: "triangles", 3: "tetrahedra"}
@@ -69,34 +69,34 @@ class Mesh:
         check_on_curves(self.points, self.facet_sets, self.curves)
         facet = np.nonzero(self.facet_to_cell[:, 1] < 0)[0]
         owner = self.facet_to_cell[facet, 0]
-        for message in doubts(self.points, self.cells, self.facets[facet], owner):
+        for message in mesh_doubts(self.points, self.cells, self.facets[facet], owner):
             warn(message)
         for message in unused_sets(self.cell_sets, len(self.cells)):
             warn(message)
 
     def _complete(self) -> None:
         """Check what was given, and put read-only arrays in its place."""
-        points, cells = checked(self.points, self.cells)
-        object.__setattr__(self, "points", frozen(points))
-        object.__setattr__(self, "cells", frozen(cells))
+        points, cells = checked_cells(self.points, self.cells)
+        object.__setattr__(self, "points", frozen_copy(points))
+        object.__setattr__(self, "cells", frozen_copy(cells))
         self._check_folds()
         facet_sets, cell_sets = checked_sets(
             self.facet_sets, self.cell_sets, self.n_points, len(cells), self.dim
         )
         for name, facets in facet_sets.items():
             self._check_facets(name, facets)
-        named = {name: frozen(facets) for name, facets in facet_sets.items()}
+        named = {name: frozen_copy(facets) for name, facets in facet_sets.items()}
         named.setdefault("boundary", self.boundary)
-        rest = {name: frozen(members) for name, members in cell_sets.items()}
+        sets = {name: frozen_copy(members) for name, members in cell_sets.items()}
         object.__setattr__(self, "facet_sets", MappingProxyType(named))
-        object.__setattr__(self, "cell_sets", MappingProxyType(rest))
+        object.__setattr__(self, "cell_sets", MappingProxyType(sets))
         curves = checked_curves(self.curves, self.facet_sets)
         object.__setattr__(self, "curves", MappingProxyType(curves))
 
     def __reduce__(self) -> tuple[Any, ...]:
         named = {name: facets for name, facets in self.facet_sets.items() if name != "boundary"}
-        rest = (dict(self.cell_sets), dict(self.curves))
-        return sound_mesh, (self.points, self.cells, named, *rest)
+        named_parts = (dict(self.cell_sets), dict(self.curves))
+        return sound_mesh, (self.points, self.cells, named, *named_parts)
 
     def __repr__(self) -> str:
         names = ", ".join(self.facet_sets)
@@ -153,7 +153,7 @@ class Mesh:
         if self.facets.shape[1] == local.shape[1]:  # in 2D each edge is a facet
             return self.facets, lock(np.ascontiguousarray(self.cell_to_facet[:, ::-1]))
         key = np.empty((len(self.cells), len(local)), dtype=np.int64)
-        for part in stretches(len(self.cells)):
+        for part in row_stretches(len(self.cells)):
             pairs = np.sort(self.cells[part][:, local], axis=2)
             key[part] = pairs[:, :, 0] * np.int64(self.n_points) + pairs[:, :, 1]
         unique, inverse = np.unique(key, return_inverse=True)
@@ -166,7 +166,7 @@ class Mesh:
         d = self.dim
         local = local_facets(d)
         key = np.empty((len(self.cells), d + 1), dtype=np.int64)
-        for part in stretches(len(self.cells)):
+        for part in row_stretches(len(self.cells)):
             facets = np.sort(self.cells[part][:, local], axis=2)
             key[part] = _scalar_key(facets.reshape(-1, d), self.n_points).reshape(-1, d + 1)
         flat = key.ravel()
@@ -223,7 +223,7 @@ class Mesh:
     def volume(self) -> Floats:
         """Area or volume of each cell `(m,)`."""
         volume = np.empty(len(self.cells))
-        for part in stretches(len(volume)):
+        for part in row_stretches(len(volume)):
             volume[part] = np.linalg.det(self._edge_matrices(part)) / factorial(self.dim)
         return lock(volume)
 
@@ -231,7 +231,7 @@ class Mesh:
     def gradient(self) -> Floats:
         """Gradients of the barycentric coordinates of each cell `(m, d + 1, d)`, 1/length."""
         gradient = np.empty((*self.cells.shape, self.dim))
-        for part in stretches(len(gradient)):
+        for part in row_stretches(len(gradient)):
             last = np.swapaxes(np.linalg.inv(self._edge_matrices(part)), 1, 2)
             gradient[part, 1:] = last
             gradient[part, 0] = -last.sum(axis=1)
@@ -279,14 +279,14 @@ class Mesh:
         About as many bins as triangles, and a third as many as tetrahedra, whose boxes meet about
         twelve bins each then, and 22 where there are as many.
         """
-        from xcrack.mesh.kernels.location import binned
+        from xcrack.mesh.kernels.location import cells_in_bins
 
         every = np.stack([self.points.min(axis=0), self.points.max(axis=0)])
         side = np.maximum(every[1] - every[0], 1e-300)
         bins = 2 * len(self.cells) / factorial(self.dim)
         edge = (np.prod(side / side.max()) / bins) ** (1 / self.dim) * side.max()
         shape = np.clip(side / edge, 1, len(self.cells)).astype(np.int64)
-        return binned(self.points, self.cells, every, shape), shape
+        return cells_in_bins(self.points, self.cells, every, shape), shape
 
     def facet_numbers(self, facets: Ints) -> Ints:
         """Numbers (rows of `facets`) of the given facets `(k, d)`; -1 where there is none.
@@ -303,7 +303,7 @@ class Mesh:
         """Cells on both sides of a facet must lie on different sides of it."""
         inner = np.nonzero(self.facet_to_cell[:, 1] >= 0)[0]
         folded = np.empty(len(inner), dtype=bool)
-        for part in stretches(len(inner)):
+        for part in row_stretches(len(inner)):
             facet = inner[part]
             one, other = self.facet_to_cell[facet].T
             place = np.argmax(self.cell_to_facet[one] == facet[:, None], axis=1)
@@ -323,8 +323,8 @@ class Mesh:
         number = numbers_of(self, facets)
         if (number < 0).any():
             raise MeshError(
-                f"facet set {shown(name)}: facet {facets[np.argmax(number < 0)].tolist()} is no "
-                f"facet of any cell ({int((number < 0).sum())} in all); mesh body and sets "
+                f"facet set {value_text(name)}: facet {facets[np.argmax(number < 0)].tolist()} is "
+                f"no facet of any cell ({int((number < 0).sum())} in all); mesh body and sets "
                 "together."
             )
         outer = np.nonzero(self.facet_to_cell[:, 1] < 0)[0]
@@ -369,12 +369,12 @@ def sound_mesh(
 
 def numbers_of(mesh: Mesh, facets: Ints) -> Ints:
     """`Mesh.facet_numbers` of facets that need no check."""
-    known = mesh._facet_keys
-    asked = np.array(facets)
-    asked.sort(axis=1)
-    asked = _scalar_key(asked, mesh.n_points)
-    number = np.minimum(known.searchsorted(asked), len(known) - 1)
-    return np.where(known[number] == asked, number, -1)
+    facet_keys = mesh._facet_keys
+    facet_rows = np.array(facets)
+    facet_rows.sort(axis=1)
+    facet_rows = _scalar_key(facet_rows, mesh.n_points)
+    number = np.minimum(facet_keys.searchsorted(facet_rows), len(facet_keys) - 1)
+    return np.where(facet_keys[number] == facet_rows, number, -1)
 
 
 def _scalar_key(facets: Ints, n_points: int) -> Ints:
@@ -403,8 +403,10 @@ def local_facets(dim: int) -> Ints:
 def facet_set(mesh: Mesh, name: str, what: str) -> Ints:
     """Facets of a set by name; an error lists the known names."""
     if name not in mesh.facet_sets:
-        known = ", ".join(repr(n) for n in mesh.facet_sets)
-        raise ProblemError(f"{what}: the mesh has no facet set {shown(name)}; it has {known}.")
+        set_names = ", ".join(repr(n) for n in mesh.facet_sets)
+        raise ProblemError(
+            f"{what}: the mesh has no facet set {value_text(name)}; it has {set_names}."
+        )
     return mesh.facet_sets[name]
 
 

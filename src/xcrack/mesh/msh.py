@@ -5,7 +5,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from xcrack.base.arrays import Ints
-from xcrack.base.checks import shown
+from xcrack.base.checks import value_text
 from xcrack.base.errors import MeshError
 from xcrack.mesh.mesh import Mesh
 from xcrack.mesh.raw import sets_to_write
@@ -40,8 +40,8 @@ def msh_text(mesh: Mesh, version: str = "4.1") -> str:
     facet_sets, cell_sets = sets_to_write(mesh)
     d = mesh.dim
     numbers = {name: mesh.facet_numbers(facets) for name, facets in facet_sets.items()}
-    facet_names, facet_groups = _groups(numbers, len(mesh.facets), rest=False)
-    cell_names, cell_groups = _groups(cell_sets, len(mesh.cells), rest=True)
+    facet_names, facet_groups = _groups(numbers, len(mesh.facets), with_rest=False)
+    cell_names, cell_groups = _groups(cell_sets, len(mesh.cells), with_rest=True)
     entities = [(d - 1, i, t, mesh.facets[rows]) for i, (t, rows) in enumerate(facet_groups, 1)]
     entities += [(d, i, t, mesh.cells[rows]) for i, (t, rows) in enumerate(cell_groups, 1)]
     names = [(d - 1, tag, name) for tag, name in enumerate(facet_names, 1)]
@@ -52,7 +52,7 @@ def msh_text(mesh: Mesh, version: str = "4.1") -> str:
 
 
 def _groups(
-    sets: dict[str, Ints], count: int, rest: bool
+    sets: dict[str, Ints], count: int, with_rest: bool
 ) -> tuple[list[str], list[tuple[Ints, Ints]]]:
     """Names of the groups, and for each combination of groups its tags and its elements."""
     names = list(sets)
@@ -60,7 +60,7 @@ def _groups(
     for column, rows in enumerate(sets.values()):
         member[rows, column] = True
     alone = ~member.any(axis=1)
-    if rest and alone.any():
+    if with_rest and alone.any():
         names.append(REST)
         member = np.column_stack([member, alone])
     rows = np.flatnonzero(member.any(axis=1))
@@ -75,7 +75,7 @@ def _names(names: list[tuple[int, int, str]]) -> Iterable[str]:
     for _, _, name in names:
         if '"' in name or "\n" in name or "\\" in name:
             raise MeshError(
-                f"set name {shown(name)}: msh files take no quotation marks or backslashes."
+                f"set name {value_text(name)}: msh files take no quotation marks or backslashes."
             )
     yield from ["$PhysicalNames", str(len(names))]
     yield from (f'{dim} {tag} "{name}"' for dim, tag, name in names)

@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 
 from xcrack.base.arrays import Floats, Ints
-from xcrack.base.checks import number, shown
+from xcrack.base.checks import number, value_text
 from xcrack.base.errors import GeometryError, MeshError
 from xcrack.mesh.checks import coordinates
 from xcrack.mesh.gmsh_session import FINEST, graded_size, length_of, polylines, session
 from xcrack.mesh.mesh import Mesh, sound_mesh
-from xcrack.mesh.polygon import Round
+from xcrack.mesh.polygon import Arc
 
 Point = tuple[float, float]
 Hole = tuple[Point, float]
@@ -142,7 +142,7 @@ def plate(
             along=[(0.0, 2.85), (12.8, 2.3)],
         )
     """
-    holes = _listed(holes)
+    holes = _list_of_holes(holes)
     names = [f"hole_{i}" for i in range(len(holes))]
     return _plate(width, height, lower, holes, names, size, size_near, along, band, transition)
 
@@ -169,33 +169,35 @@ def _plate(
     _check_holes(width, height, lower, holes)
     smallest_radius = min((radius for _, radius in holes), default=inf)
     hole_size = 2 * pi * smallest_radius / _FEWEST_HOLE_EDGES
-    near = length_of(min(size, hole_size) if size_near is None else size_near, "size_near")
-    _check_sizes(width, height, size, near)
+    near_size = length_of(min(size, hole_size) if size_near is None else size_near, "size_near")
+    _check_sizes(width, height, size, near_size)
     reach = smallest_radius if holes else min(width, height) / 10
     if band is None:
         band = _BAND * reach
     if transition is None:
-        transition = max(_TRANSITION * reach, (size - near) / _STEEPEST)
+        transition = max(_TRANSITION * reach, (size - near_size) / _STEEPEST)
     band = number(band, "band", least=0, error=GeometryError)
     transition = number(transition, "transition", least=0, error=GeometryError)
     paths = polylines(along)
-    _check_cost(width, height, size, near, band, paths)
+    _check_cost(width, height, size, near_size, band, paths)
     # gmsh's tolerances are absolute: mesh a plate of unit size; powers of two lose no digit.
     scale = 2.0 ** frexp(max(width, height))[1]
     length = graded_size(
         [(x / scale, y / scale, r / scale) for (x, y), r in holes],
         [path / scale for path in paths],
         size / scale,
-        near / scale,
+        near_size / scale,
         band / scale,
         transition / scale,
     )
     corner = (lower[0] / scale, lower[1] / scale)
     scaled = [((x / scale, y / scale), r / scale) for (x, y), r in holes]
     with session() as gmsh:
-        curves = _draw(gmsh, width / scale, height / scale, corner, scaled, names, near / scale)
+        curves = _draw(
+            gmsh, width / scale, height / scale, corner, scaled, names, near_size / scale
+        )
         points, cells, facets = mesh_model(gmsh, curves, length)
-    rims = {name: Round(center, radius) for name, (center, radius) in zip(names, holes)}
+    rims = {name: Arc(center, radius) for name, (center, radius) in zip(names, holes)}
     return _finish(points * scale, cells, facets, rims, width, height, lower)
 
 
@@ -206,7 +208,7 @@ def _draw(
     lower: Point,
     holes: Sequence[Hole],
     names: Sequence[str],
-    near: float,
+    near_size: float,
 ) -> dict[str, list[int]]:
     """Draw the plate in the current model; return the curves of each facet set."""
     geo = gmsh.model.geo
@@ -220,7 +222,7 @@ def _draw(
         turn = [(radius, 0.0), (0.0, radius), (-radius, 0.0), (0.0, -radius)]
         rim = [geo.addPoint(x + dx, y + dy, 0.0) for dx, dy in turn]
         curves[name] = [geo.addCircleArc(rim[i], middle, rim[(i + 1) % 4]) for i in range(4)]
-        edges = ceil(max(_FEWEST_HOLE_EDGES / 4, pi / 2 * radius / near - 1e-9))
+        edges = ceil(max(_FEWEST_HOLE_EDGES / 4, pi / 2 * radius / near_size - 1e-9))
         for arc in curves[name]:
             geo.mesh.setTransfiniteCurve(arc, edges + 1)
         loops.append(geo.addCurveLoop(curves[name]))
@@ -283,7 +285,7 @@ def _finish(
     points: Floats,
     cells: Ints,
     facets: dict[str, Ints],
-    rims: dict[str, Round],
+    rims: dict[str, Arc],
     width: float,
     height: float,
     lower: Point,
@@ -306,28 +308,28 @@ def _pair(value: Any, what: str) -> Point:
     return x, y
 
 
-def _listed(holes: Any) -> list[Hole]:
+def _list_of_holes(holes: Any) -> list[Hole]:
     """Holes as a list of pairs."""
     try:
         pairs = [(center, radius) for center, radius in holes]
     except (TypeError, ValueError) as error:
         raise GeometryError(
-            f"holes = {shown(holes)} must be a list of centres and radii, such as "
+            f"holes = {value_text(holes)} must be a list of centres and radii, such as "
             "[((x, y), radius)]."
         ) from error
     return pairs
 
 
-def _check_sizes(width: float, height: float, size: float, near: float) -> None:
+def _check_sizes(width: float, height: float, size: float, near_size: float) -> None:
     if size > min(width, height):
         raise GeometryError(
             f"size = {size:g} is larger than the plate ({width:g} x {height:g}): "
             f"give at most {min(width, height):g}, better a tenth of it."
         )
-    if near > size:
+    if near_size > size:
         raise GeometryError(
-            f"size_near = {near:g} is larger than size = {size:g}: cells grow away from holes and "
-            "paths; exchange the two or leave size_near out."
+            f"size_near = {near_size:g} is larger than size = {size:g}: cells grow away from holes "
+            f"and paths; exchange the two or leave size_near out."
         )
 
 
@@ -355,16 +357,16 @@ def _check_holes(width: float, height: float, lower: Point, holes: Sequence[Hole
 
 
 def _check_cost(
-    width: float, height: float, size: float, near: float, band: float, paths: Sequence[Floats]
+    width: float, height: float, size: float, near_size: float, band: float, paths: Sequence[Floats]
 ) -> None:
     run = sum(float(np.linalg.norm(np.diff(p, axis=0), axis=1).sum()) for p in paths)
     cell = 3**0.5 / 2
     fine = min(2 * band * run, width * height)
     points = inf  # also where squares of sizes are too small for a number
-    if near > FINEST * max(width, height):
-        points = width * height / (cell * size**2) + fine / (cell * near**2)
+    if near_size > FINEST * max(width, height):
+        points = width * height / (cell * size**2) + fine / (cell * near_size**2)
     if points > _MOST_POINTS:
         raise GeometryError(
-            f"size = {size:g} and size_near = {near:g} ask for about {points:.1e} points, more "
-            f"than {_MOST_POINTS:.0e}: enlarge the size, or narrow the band."
+            f"size = {size:g} and size_near = {near_size:g} ask for about {points:.1e} points, "
+            f"more than {_MOST_POINTS:.0e}: enlarge the size, or narrow the band."
         )

@@ -23,17 +23,20 @@ def ear_clipped(polygon: Floats) -> Ints:
     triangles = []
     while len(remaining) > 3:
         best, where = -np.inf, -1
-        rest = polygon[remaining]
-        before, after = np.roll(rest, 1, axis=0), np.roll(rest, -1, axis=0)
-        area = cross(rest - before, after - rest)
+        remaining_polygon = polygon[remaining]
+        before, after = (
+            np.roll(remaining_polygon, 1, axis=0),
+            np.roll(remaining_polygon, -1, axis=0),
+        )
+        area = cross(remaining_polygon - before, after - remaining_polygon)
         for k in np.nonzero(area > 0)[0]:
-            a, b, c = before[k], rest[k], after[k]
+            a, b, c = before[k], remaining_polygon[k], after[k]
             within = (
-                (cross(b - a, rest - a) >= 0)
-                & (cross(c - b, rest - b) >= 0)
-                & (cross(a - c, rest - c) >= 0)
+                (cross(b - a, remaining_polygon - a) >= 0)
+                & (cross(c - b, remaining_polygon - b) >= 0)
+                & (cross(a - c, remaining_polygon - c) >= 0)
             )
-            within &= (np.abs(rest[:, None] - [a, b, c]).max(axis=2) > 0).all(axis=1)
+            within &= (np.abs(remaining_polygon[:, None] - [a, b, c]).max(axis=2) > 0).all(axis=1)
             longest = max(np.sum((b - a) ** 2), np.sum((c - b) ** 2), np.sum((a - c) ** 2))
             if not within.any() and area[k] / longest > best:
                 best, where = float(area[k] / longest), int(k)
@@ -95,20 +98,20 @@ def self_crossing(flat: Floats) -> tuple[int, int] | None:
     reach = 1e-12 * float(length.max())
     hit &= boxes_meet(flat[:, None], ends[:, None], flat[None], ends[None], reach)
     i, j = np.indices(hit.shape)
-    apart = (i - j) % m
-    hit &= (apart > 1) & (apart < m - 1)
+    places_between = (i - j) % m
+    hit &= (places_between > 1) & (places_between < m - 1)
     # Sides on one line: neighbours that turn back, others that overlap.
     off = np.abs(gap[..., 0] * r[:, None, 1] - gap[..., 1] * r[:, None, 0]) / length[:, None]
     along = np.einsum("ijk,ik->ij", gap, r) / length[:, None] ** 2
     on = (off <= 1e-12 * length.max()) & (along >= -1e-12) & (along <= 1 + 1e-12)
-    hit |= on & (apart != 0) & (((j - i) % m) != 1)
+    hit |= on & (places_between != 0) & (((j - i) % m) != 1)
     if not hit.any():
         return None
     first, second = np.argwhere(hit)[0]
     return int(first), int(second)
 
 
-def within(x: Floats, edges: Floats) -> Bools:
+def is_within(x: Floats, edges: Floats) -> Bools:
     """Which points of a plane lie inside outlines given by their sides `(k, 2, 2)`."""
     result = np.zeros(len(x), dtype=bool)
     for a, b in edges:
@@ -128,7 +131,7 @@ _CLOSEST = 1 / 16  # of the size of a crack: less room is none
 _LEVEL = 2.0**0.25  # sizes closer than this are taken for the smaller one
 
 
-def between(lines: Sequence[Floats]) -> Floats:
+def points_between(lines: Sequence[Floats]) -> Floats:
     """Points of polylines `(n, 3)`, closer than their edges."""
     share = np.linspace(0, 1, 4)[:, None, None]
     parts = [(x[:-1] + share * (x[1:] - x[:-1])).reshape(-1, 3) for x in lines]
@@ -136,7 +139,7 @@ def between(lines: Sequence[Floats]) -> Floats:
 
 
 def radii(lines: Sequence[Floats], over: float) -> Floats:
-    """Radius of curvature at the points of `between`, from the turn over a length."""
+    """Radius of curvature at the points of `points_between`, from the turn over a length."""
     result = [np.zeros(0)]
     for x in lines:
         side = np.diff(x, axis=0)
@@ -162,12 +165,14 @@ def with_room(places: Sequence[Floats], sizes: Sequence[Floats]) -> list[Floats]
     result = []
     for c, (x, size) in enumerate(zip(places, sizes, strict=True)):
         others = np.concatenate([np.zeros((0, 3)), *places[:c], *places[c + 1 :]])
-        apart = cKDTree(others).query(x)[0] if len(others) and len(x) else np.full(len(x), np.inf)
-        result.append(np.minimum(size, np.maximum(apart / _ROOM, _CLOSEST * size)))
+        distance = (
+            cKDTree(others).query(x)[0] if len(others) and len(x) else np.full(len(x), np.inf)
+        )
+        result.append(np.minimum(size, np.maximum(distance / _ROOM, _CLOSEST * size)))
     return result
 
 
-def graded(places: Sequence[Floats], sizes: Sequence[Floats]) -> Callable[[Floats], Floats]:
+def graded_sizes(places: Sequence[Floats], sizes: Sequence[Floats]) -> Callable[[Floats], Floats]:
     """Longest edges wanted at points, from those at places `(n, 3)` of each crack."""
     trees = []
     for x, size in zip(places, sizes, strict=True):
@@ -175,8 +180,8 @@ def graded(places: Sequence[Floats], sizes: Sequence[Floats]) -> Callable[[Float
             continue
         level = np.floor(np.log(size.max() / size) / np.log(_LEVEL) + 1e-9)
         for step in np.unique(level):
-            own = level == step
-            trees.append((cKDTree(x[own]), float(size[own].min())))
+            is_of_step = level == step
+            trees.append((cKDTree(x[is_of_step]), float(size[is_of_step].min())))
 
     def wanted(x: Floats) -> Floats:
         each = [h + _SLOPE * np.maximum(tree.query(x)[0] - _PLATEAU * h, 0) for tree, h in trees]
@@ -189,7 +194,7 @@ def graded(places: Sequence[Floats], sizes: Sequence[Floats]) -> Callable[[Float
 
 
 @dataclass(frozen=True)
-class Round:
+class Arc:
     """A circle in 2D, a cylinder around an axis in 3D: a function that projects onto it.
 
     Parameters
@@ -207,12 +212,12 @@ class Round:
 
     def __call__(self, x: Floats) -> Floats:
         """Nearest points on it `(n, d)`; a point of the axis stays where it is."""
-        away = x - np.array(self.center)
+        from_center = x - np.array(self.center)
         if self.axis is not None:
-            away = away - np.outer(away @ np.array(self.axis), self.axis)
-        distance = np.linalg.norm(away, axis=1)
+            from_center = from_center - np.outer(from_center @ np.array(self.axis), self.axis)
+        distance = np.linalg.norm(from_center, axis=1)
         stretch = self.radius / np.where(distance > 0, distance, np.inf) - (distance > 0)
-        return np.asarray(x + stretch[:, None] * away)
+        return np.asarray(x + stretch[:, None] * from_center)
 
 
 # Distances of points to segments and triangles.
@@ -255,4 +260,4 @@ def boxes_meet(a: Floats, b: Floats, c: Floats, d: Floats, reach: float = 0.0) -
     return np.asarray((low <= high + reach).all(axis=-1))
 
 
-__all__ = ["Round", "between", "graded", "with_room"]
+__all__ = ["Arc", "graded_sizes", "points_between", "with_room"]

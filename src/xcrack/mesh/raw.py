@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from xcrack.base.arrays import Floats, Ints
-from xcrack.base.checks import shown
+from xcrack.base.checks import value_text
 from xcrack.base.errors import MeshError, warn
 from xcrack.mesh.mesh import Mesh, sound_mesh
 
@@ -86,7 +86,7 @@ def mesh_from_raw(raw: RawMesh, source: str) -> Mesh:
     facet_sets = _facet_sets(raw, bare, new, source)
     cell_sets = {
         name: np.sort(_row_numbers(cells, new[members]))
-        for name, members in _grouped(raw.sets, CELL_KIND[dim], dim + 1).items()
+        for name, members in _grouped_rows(raw.sets, CELL_KIND[dim], dim + 1).items()
     }
     for name, members in raw.point_sets:
         if name not in facet_sets and name not in cell_sets:
@@ -112,7 +112,8 @@ def _without_own_boundary(facet_sets: dict[str, Ints], bare: Mesh, source: str) 
         facet_sets[name] = facets
         warn(
             f'{source}: the set "boundary" has {len(number)} facets, the boundary of the mesh has '
-            f'{len(outer)}: it is called {shown(name)} here, since "boundary" means all of them.'
+            f'{len(outer)}: it is called {value_text(name)} here, since "boundary" means all of '
+            f"them."
         )
     return facet_sets
 
@@ -125,18 +126,18 @@ def sets_to_write(mesh: Mesh) -> tuple[dict[str, Ints], dict[str, Ints]]:
 
 def _facet_sets(raw: RawMesh, bare: Mesh, new: Ints, source: str) -> dict[str, Ints]:
     facet_sets = {}
-    for name, members in _grouped(raw.sets, FACET_KIND[bare.dim], bare.dim).items():
+    for name, members in _grouped_rows(raw.sets, FACET_KIND[bare.dim], bare.dim).items():
         exists = (members >= 0) & (members < len(new))
         facets = np.where(exists, new[np.where(exists, members, 0)], -1)
-        known = (facets >= 0).all(axis=1) & (bare.facet_numbers(facets) >= 0)
-        if not known.all():
+        is_facet = (facets >= 0).all(axis=1) & (bare.facet_numbers(facets) >= 0)
+        if not is_facet.all():
             warn(
-                f"{source}: {int((~known).sum())} of the {len(facets)} elements in set "
-                f"{shown(name)} are no facets of any cell and are left out; mesh body and sets "
-                "together."
+                f"{source}: {int((~is_facet).sum())} of the {len(facets)} elements in set "
+                f"{value_text(name)} are no facets of any cell and are left out; mesh body and "
+                f"sets together."
             )
-        if known.any():
-            facet_sets[name] = _unique_rows(facets[known])
+        if is_facet.any():
+            facet_sets[name] = _unique_rows(facets[is_facet])
     return facet_sets
 
 
@@ -178,7 +179,7 @@ def _stack(arrays: Iterable[Ints], width: int) -> Ints:
     return np.concatenate(parts) if parts else np.zeros((0, width), dtype=np.int64)
 
 
-def _grouped(sets: list[tuple[str, str, Ints]], kind: str, width: int) -> dict[str, Ints]:
+def _grouped_rows(sets: list[tuple[str, str, Ints]], kind: str, width: int) -> dict[str, Ints]:
     parts: dict[str, list[Ints]] = {}
     for of_kind, name, members in sets:
         if of_kind == kind and len(members):
@@ -192,9 +193,9 @@ def _unique_rows(rows: Ints) -> Ints:
     return rows[np.sort(first)]
 
 
-def _row_numbers(rows: Ints, asked: Ints) -> Ints:
+def _row_numbers(rows: Ints, sought_rows: Ints) -> Ints:
     """Numbers of the rows that have the points asked for, each once."""
-    both = np.sort(np.concatenate([rows, asked]), axis=1)
+    both = np.sort(np.concatenate([rows, sought_rows]), axis=1)
     inverse = np.unique(both, axis=0, return_inverse=True)[1].ravel()
     place = np.full(int(inverse.max()) + 1, -1, dtype=np.int64)
     place[inverse[: len(rows)]] = np.arange(len(rows))

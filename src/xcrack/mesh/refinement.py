@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from xcrack.base.arrays import Bools, Floats, Ints, at, ranges
-from xcrack.base.checks import called, number, numbers, whole_numbers
+from xcrack.base.checks import call_function, number, numbers, whole_numbers
 from xcrack.base.errors import MeshError
 from xcrack.mesh.curves import on_curves
 from xcrack.mesh.gmsh_session import FINEST
@@ -67,72 +67,78 @@ class Simplices:
 
 def simplices(mesh: Mesh) -> Simplices:
     """A mesh as it enters bisection."""
-    middle, rank = _ranked(mesh.points, mesh.edges)
-    own = mesh.facet_to_cell[mesh.cell_to_facet, 0] == np.arange(len(mesh.cells))[:, None]
+    middle, rank = _ranked_edges(mesh.points, mesh.edges)
+    is_first_cell = mesh.facet_to_cell[mesh.cell_to_facet, 0] == np.arange(len(mesh.cells))[:, None]
     return Simplices(
         mesh.points, mesh.cells, mesh.edges, middle, rank, mesh.cell_to_edge,
-        _longest(middle, rank, mesh.cell_to_edge), np.where(own, mesh.cell_to_facet, -1),
-        np.arange(len(mesh.cells)),
+        _longest_edges(middle, rank, mesh.cell_to_edge), np.where(is_first_cell, mesh.cell_to_facet,
+        -1), np.arange(len(mesh.cells)),
     )  # fmt: skip
 
 
-def moved(whole: Simplices, points: Floats) -> Simplices:
+def moved_simplices(simplex_set: Simplices, points: Floats) -> Simplices:
     """The same simplices with their points at other places."""
-    middle, rank = _ranked(points, whole.edges)
-    longest = _longest(middle, rank, whole.cell_to_edge)
-    return replace(whole, points=points, middle=middle, rank=rank, longest=longest)
+    middle, rank = _ranked_edges(points, simplex_set.edges)
+    longest = _longest_edges(middle, rank, simplex_set.cell_to_edge)
+    return replace(simplex_set, points=points, middle=middle, rank=rank, longest=longest)
 
 
-def bisected(whole: Simplices, marked: Bools) -> tuple[Simplices, Bools]:
+def bisect_simplices(simplex_set: Simplices, marked: Bools) -> tuple[Simplices, Bools]:
     """Split the longest edge of each marked cell, and what it takes to conform.
 
     Parameters
     ----------
-    whole : Simplices
+    simplex_set : Simplices
     marked : (m,) array of bool
 
     Returns
     -------
-    whole : Simplices
+    simplex_set : Simplices
         Untouched cells first, in their order; the old points have their numbers.
     untouched : (m,) array of bool
         Which of the cells are still there.
     """
-    untouched = np.ones(len(whole.cells), dtype=bool)
-    split = np.zeros(len(whole.edges), dtype=bool)
-    split[_row(whole.cell_to_edge, whole.longest)[marked]] = True
+    untouched = np.ones(len(simplex_set.cells), dtype=bool)
+    split = np.zeros(len(simplex_set.edges), dtype=bool)
+    split[_row(simplex_set.cell_to_edge, simplex_set.longest)[marked]] = True
     # Of each split edge its middle, and the first of its two halves.
     point, half = np.full((2, len(split)), -1, dtype=np.int64)
-    known, number = np.zeros((2, 0), dtype=np.int64)  # edges between a middle and another point
+    middle_edges, number = np.zeros(
+        (2, 0), dtype=np.int64
+    )  # edges between a middle and another point
     while True:
-        top = _row(whole.cell_to_edge, whole.longest)
-        hanging = np.asarray(split[whole.cell_to_edge].any(axis=1))
+        top = _row(simplex_set.cell_to_edge, simplex_set.longest)
+        hanging = np.asarray(split[simplex_set.cell_to_edge].any(axis=1))
         while (ahead := hanging & ~split[top]).any():
             split[top[ahead]] = True
-            hanging = np.asarray(split[whole.cell_to_edge].any(axis=1))
+            hanging = np.asarray(split[simplex_set.cell_to_edge].any(axis=1))
         if not hanging.any():
-            return whole, untouched
+            return simplex_set, untouched
         still = np.nonzero(untouched)[0]
         untouched[still[hanging[: len(still)]]] = False
         new = np.unique(top[hanging])
         new = new[point[new] < 0]
-        point[new] = len(whole.points) + np.arange(len(new))
-        half[new] = len(whole.edges) + 2 * np.arange(len(new))
-        ends, middle = whole.edges[new], point[new]
+        point[new] = len(simplex_set.points) + np.arange(len(new))
+        half[new] = len(simplex_set.edges) + 2 * np.arange(len(new))
+        ends, middle = simplex_set.edges[new], point[new]
         halves = np.stack([ends[:, 0], middle, ends[:, 1], middle], axis=1).reshape(-1, 2)
-        whole = replace(whole, points=np.concatenate([whole.points, whole.middle[new]]))
-        whole = _with_edges(whole, halves)
-        across = _across(whole, hanging, point)
+        simplex_set = replace(
+            simplex_set, points=np.concatenate([simplex_set.points, simplex_set.middle[new]])
+        )
+        simplex_set = _with_edges(simplex_set, halves)
+        across = _edges_across(simplex_set, hanging, point)
         key = across[..., 0] * _BASE + across[..., 1]
-        fresh = np.setdiff1d(key, known)
-        first = len(whole.edges)
-        whole = _with_edges(whole, np.stack([fresh // _BASE, fresh % _BASE], axis=1))
-        known = np.concatenate([known, fresh])
+        fresh = np.setdiff1d(key, middle_edges)
+        first = len(simplex_set.edges)
+        simplex_set = _with_edges(simplex_set, np.stack([fresh // _BASE, fresh % _BASE], axis=1))
+        middle_edges = np.concatenate([middle_edges, fresh])
         number = np.concatenate([number, first + np.arange(len(fresh))])
-        order = np.argsort(known)
-        known, number = known[order], number[order]
-        whole = _halved(whole, hanging, point, half, number[np.searchsorted(known, key)])
-        more = len(whole.edges) - len(split)
+        order = np.argsort(middle_edges)
+        middle_edges, number = middle_edges[order], number[order]
+        simplex_set = _halved_cells(
+            simplex_set, hanging, point, half, number[np.searchsorted(middle_edges, key)]
+        )
+        more = len(simplex_set.edges) - len(split)
         split = np.concatenate([split, np.zeros(more, dtype=bool)])
         point, half = (np.concatenate([a, np.full(more, -1)]) for a in (point, half))
 
@@ -142,7 +148,7 @@ def _row(table: Ints, column: Ints) -> Ints:
     return np.asarray(table[np.arange(len(table)), column])
 
 
-def _ranked(points: Floats, edges: Ints) -> tuple[Floats, Ints]:
+def _ranked_edges(points: Floats, edges: Ints) -> tuple[Floats, Ints]:
     """Middles of edges, and what orders them: the same bits however points are numbered."""
     one, other = points[edges[:, 0]], points[edges[:, 1]]
     middle = 0.5 * (one + other)
@@ -155,7 +161,7 @@ def _ranked(points: Floats, edges: Ints) -> tuple[Floats, Ints]:
     return middle, np.concatenate([-step[:, None], direction, place], axis=1).astype(np.int64)
 
 
-def _longest(middle: Floats, rank: Ints, cell_to_edge: Ints) -> Ints:
+def _longest_edges(middle: Floats, rank: Ints, cell_to_edge: Ints) -> Ints:
     """Local number of the first edge of each cell in the order of the edges."""
     first = np.ones(cell_to_edge.shape, dtype=bool)
     rows = np.arange(len(first))
@@ -168,35 +174,41 @@ def _longest(middle: Floats, rank: Ints, cell_to_edge: Ints) -> Ints:
     return np.asarray(np.argmax(first, axis=1))
 
 
-def _with_edges(whole: Simplices, edges: Ints) -> Simplices:
-    middle, rank = _ranked(whole.points, edges)
+def _with_edges(simplex_set: Simplices, edges: Ints) -> Simplices:
+    middle, rank = _ranked_edges(simplex_set.points, edges)
     return replace(
-        whole,
-        edges=np.concatenate([whole.edges, edges]),
-        middle=np.concatenate([whole.middle, middle]),
-        rank=np.concatenate([whole.rank, rank]),
+        simplex_set,
+        edges=np.concatenate([simplex_set.edges, edges]),
+        middle=np.concatenate([simplex_set.middle, middle]),
+        rank=np.concatenate([simplex_set.rank, rank]),
     )
 
 
-def _across(whole: Simplices, rows: Bools, point: Ints) -> Ints:
+def _edges_across(simplex_set: Simplices, rows: Bools, point: Ints) -> Ints:
     """Edges from the middle of each cell's longest edge to its other points `(k, d - 1, 2)`."""
-    dim = whole.cells.shape[1] - 1
+    dim = simplex_set.cells.shape[1] - 1
     others = np.array([[k for k in range(dim + 1) if k not in pair] for pair in local_edges(dim)])
-    longest, cells = whole.longest[rows], whole.cells[rows]
-    middle = point[_row(whole.cell_to_edge[rows], longest)]
+    longest, cells = simplex_set.longest[rows], simplex_set.cells[rows]
+    middle = point[_row(simplex_set.cell_to_edge[rows], longest)]
     other = np.take_along_axis(cells, others[longest], axis=1)
     return np.stack([other, np.broadcast_to(middle[:, None], other.shape)], axis=-1)
 
 
-def _halved(whole: Simplices, rows: Bools, point: Ints, half: Ints, across: Ints) -> Simplices:
+def _halved_cells(
+    simplex_set: Simplices, rows: Bools, point: Ints, half: Ints, across: Ints
+) -> Simplices:
     """Cells split at the middle of their longest edge; the other ones come first."""
-    dim = whole.cells.shape[1] - 1
+    dim = simplex_set.cells.shape[1] - 1
     pairs = local_edges(dim)
     pair_of = np.zeros((dim + 1, dim + 1), dtype=np.int64)
     pair_of[pairs[:, 0], pairs[:, 1]] = pair_of[pairs[:, 1], pairs[:, 0]] = np.arange(len(pairs))
     others = np.array([[k for k in range(dim + 1) if k not in pair] for pair in pairs])
-    cells, longest, facet = whole.cells[rows], whole.longest[rows], whole.facet[rows]
-    edges = whole.cell_to_edge[rows]
+    cells, longest, facet = (
+        simplex_set.cells[rows],
+        simplex_set.longest[rows],
+        simplex_set.facet[rows],
+    )
+    edges = simplex_set.cell_to_edge[rows]
     n = np.arange(len(cells))
     top = edges[n, longest]
     children = []
@@ -204,21 +216,23 @@ def _halved(whole: Simplices, rows: Bools, point: Ints, half: Ints, across: Ints
         stays, goes = pairs[longest, side], pairs[longest, 1 - side]
         corners, sides, outside = cells.copy(), edges.copy(), facet.copy()
         corners[n, goes] = point[top]
-        sides[n, longest] = half[top] + (whole.edges[top, 0] != cells[n, stays])
+        sides[n, longest] = half[top] + (simplex_set.edges[top, 0] != cells[n, stays])
         for k, edge in zip(others[longest].T, across.T, strict=True):
             sides[n, pair_of[goes, k]] = edge
         outside[n, stays] = -1
         children.append((corners, sides, outside))
     corners, sides, outside = (np.concatenate(parts) for parts in zip(*children, strict=True))
-    rest = ~rows
-    longest = _longest(whole.middle, whole.rank, sides)
+    is_unsplit = ~rows
+    longest = _longest_edges(simplex_set.middle, simplex_set.rank, sides)
     return replace(
-        whole,
-        cells=np.concatenate([whole.cells[rest], corners]),
-        cell_to_edge=np.concatenate([whole.cell_to_edge[rest], sides]),
-        longest=np.concatenate([whole.longest[rest], longest]),
-        facet=np.concatenate([whole.facet[rest], outside]),
-        parent=np.concatenate([whole.parent[rest], np.tile(whole.parent[rows], 2)]),
+        simplex_set,
+        cells=np.concatenate([simplex_set.cells[is_unsplit], corners]),
+        cell_to_edge=np.concatenate([simplex_set.cell_to_edge[is_unsplit], sides]),
+        longest=np.concatenate([simplex_set.longest[is_unsplit], longest]),
+        facet=np.concatenate([simplex_set.facet[is_unsplit], outside]),
+        parent=np.concatenate(
+            [simplex_set.parent[is_unsplit], np.tile(simplex_set.parent[rows], 2)]
+        ),
     )
 
 
@@ -286,16 +300,16 @@ def refine(mesh: Mesh, cells: ArrayLike | None = None, *, size: Size | None = No
         raise MeshError("refine: give cells or size, not both.")
     if size is not None:
         return _to_size(mesh, _checked_size(mesh, size), None)
-    return _everywhere(mesh) if cells is None else _some(mesh, cells)
+    return _split_all_edges(mesh) if cells is None else _some(mesh, cells)
 
 
-def refine_to(mesh: Mesh, wanted: Floats, sweeps: int) -> Mesh:
+def refine_to(mesh: Mesh, size_at: Floats, sweeps: int) -> Mesh:
     """Bisect cells until their edges are no longer than wanted of the cell in which they lie.
 
     Parameters
     ----------
     mesh : Mesh
-    wanted : (m,) array, length
+    size_at : (m,) array, length
         Longest edge wanted in each cell of the mesh.
     sweeps : int
         Most bisections of a cell, but for those of its neighbours.
@@ -305,7 +319,7 @@ def refine_to(mesh: Mesh, wanted: Floats, sweeps: int) -> Mesh:
     Mesh
         As of `refine`.
     """
-    return _to_size(mesh, lambda centre, parent: wanted[parent], sweeps)
+    return _to_size(mesh, lambda centre, parent: size_at[parent], sweeps)
 
 
 def _some(mesh: Mesh, cells: ArrayLike) -> Mesh:
@@ -319,25 +333,25 @@ def _some(mesh: Mesh, cells: ArrayLike) -> Mesh:
         return mesh
     marked = np.zeros(len(mesh.cells), dtype=bool)
     marked[given] = True
-    return _finished(mesh, _swept(mesh, simplices(mesh), marked)[0])
+    return _finished_mesh(mesh, _sweep(mesh, simplices(mesh), marked)[0])
 
 
-def _to_size(mesh: Mesh, wanted: Callable[[Floats, Ints], Floats], sweeps: int | None) -> Mesh:
+def _to_size(mesh: Mesh, size_at: Callable[[Floats, Ints], Floats], sweeps: int | None) -> Mesh:
     """Bisect until every cell is as small as wanted of its centre and its parent."""
-    whole = simplices(mesh)
-    limit = np.asarray(wanted(whole.centre, whole.parent))
+    simplex_set = simplices(mesh)
+    limit = np.asarray(size_at(simplex_set.centre, simplex_set.parent))
     done = 0
     while sweeps is None or done < sweeps:
-        marked = whole.size > limit
+        marked = simplex_set.size > limit
         if not marked.any():
             break
-        whole, old, same = _swept(mesh, whole, marked)
+        simplex_set, old, is_unsplit_cell = _sweep(mesh, simplex_set, marked)
         # A size is asked for once, of cells that are new or whose points have moved.
-        limit = np.concatenate([limit[old], np.zeros(len(whole.cells) - len(limit[old]))])
-        new = ~same
-        limit[new] = wanted(whole.centre[new], whole.parent[new])
+        limit = np.concatenate([limit[old], np.zeros(len(simplex_set.cells) - len(limit[old]))])
+        new = ~is_unsplit_cell
+        limit[new] = size_at(simplex_set.centre[new], simplex_set.parent[new])
         done += 1
-    return _finished(mesh, whole) if done else mesh
+    return _finished_mesh(mesh, simplex_set) if done else mesh
 
 
 def _checked_size(mesh: Mesh, size: Size) -> Callable[[Floats, Ints], Floats]:
@@ -346,8 +360,8 @@ def _checked_size(mesh: Mesh, size: Size) -> Callable[[Floats, Ints], Floats]:
     function = size if callable(size) else None
     fixed = 0.0 if function else number(size, "refine: size", above=0, error=MeshError)
 
-    def wanted(centre: Floats, parent: Ints) -> Floats:
-        given = fixed if function is None else called(function, what, centre.copy())
+    def size_at(centre: Floats, parent: Ints) -> Floats:
+        given = fixed if function is None else call_function(function, what, centre.copy())
         value = numbers(given, what, finite=False, error=MeshError)
         if value.shape not in ((), (len(centre),)):
             raise MeshError(
@@ -355,37 +369,37 @@ def _checked_size(mesh: Mesh, size: Size) -> Callable[[Floats, Ints], Floats]:
                 "for each."
             )
         value = np.broadcast_to(value, len(centre))
-        bad = ~(value >= least)
-        if bad.any():
-            i = int(np.argmax(bad))
+        is_invalid = ~(value >= least)
+        if is_invalid.any():
+            i = int(np.argmax(is_invalid))
             raise MeshError(
-                f"{what} is {value[i]:g} at {at(centre[i])} ({int(bad.sum())} such cells): it must "
-                f"be a length, no less than a millionth of the body ({least:.3g})."
+                f"{what} is {value[i]:g} at {at(centre[i])} ({int(is_invalid.sum())} such cells): "
+                f"it must be a length, no less than a millionth of the body ({least:.3g})."
             )
         return value
 
-    return wanted
+    return size_at
 
 
-def _swept(mesh: Mesh, whole: Simplices, marked: Bools) -> tuple[Simplices, Bools, Bools]:
+def _sweep(mesh: Mesh, simplex_set: Simplices, marked: Bools) -> tuple[Simplices, Bools, Bools]:
     """One sweep of bisections, its new points on their curves.
 
     Returns
     -------
-    whole : Simplices
+    simplex_set : Simplices
     old : (m,) array of bool
         Which of the cells before are still there; they come first.
-    same : (m',) array of bool
+    is_unsplit_cell : (m',) array of bool
         Which of the cells now are those, with their points where they were.
     """
-    first = len(whole.points)
-    fine, old = bisected(whole, marked)
+    first = len(simplex_set.points)
+    fine, old = bisect_simplices(simplex_set, marked)
     if len(fine.cells) > _MOST_CELLS:
         raise MeshError(
             f"refine: the size asks for more than {_MOST_CELLS:.0e} cells "
             f"({len(fine.cells)} and more to come): enlarge it."
         )
-    same = np.arange(len(fine.cells)) < int(old.sum())
+    is_unsplit_cell = np.arange(len(fine.cells)) < int(old.sum())
     if mesh.curves:
         sets = {
             name: _parts(fine, mesh.facet_numbers(mesh.facet_sets[name])) for name in mesh.curves
@@ -393,44 +407,45 @@ def _swept(mesh: Mesh, whole: Simplices, marked: Bools) -> tuple[Simplices, Bool
         outer = _parts(fine, np.nonzero(mesh.facet_to_cell[:, 1] < 0)[0])
         points, changed = on_curves(fine.points, fine.cells, first, sets, outer, mesh.curves)
         if changed.any():
-            fine = moved(fine, points)
-            same &= ~changed[fine.cells].any(axis=1)
-    return fine, old, same
+            fine = moved_simplices(fine, points)
+            is_unsplit_cell &= ~changed[fine.cells].any(axis=1)
+    return fine, old, is_unsplit_cell
 
 
-def _parts(whole: Simplices, facets: Ints) -> Ints:
+def _parts(simplex_set: Simplices, facets: Ints) -> Ints:
     """Facets of the simplices in which facets of the mesh were split `(k, d)`."""
-    lies = np.zeros(max(int(whole.facet.max()), int(facets.max(initial=0))) + 2, dtype=bool)
+    lies = np.zeros(max(int(simplex_set.facet.max()), int(facets.max(initial=0))) + 2, dtype=bool)
     lies[facets] = True  # the last entry is that of no facet
-    cell, corner = np.nonzero(lies[whole.facet])
+    cell, corner = np.nonzero(lies[simplex_set.facet])
     return np.take_along_axis(
-        whole.cells[cell], local_facets(whole.points.shape[1])[corner], axis=1
+        simplex_set.cells[cell], local_facets(simplex_set.points.shape[1])[corner], axis=1
     )
 
 
-def _finished(mesh: Mesh, whole: Simplices) -> Mesh:
+def _finished_mesh(mesh: Mesh, simplex_set: Simplices) -> Mesh:
     """The simplices as a mesh with the sets and curves of the one they were made from."""
-    order = np.argsort(whole.parent, kind="stable")
-    begin = np.searchsorted(whole.parent[order], np.arange(len(mesh.cells) + 1))
+    order = np.argsort(simplex_set.parent, kind="stable")
+    begin = np.searchsorted(simplex_set.parent[order], np.arange(len(mesh.cells) + 1))
 
     def inside(members: Ints) -> Ints:
         row, place = ranges(begin[members + 1] - begin[members])
         return order[begin[members][row] + place]
 
     facets = {
-        name: _parts(whole, mesh.facet_numbers(facets)) for name, facets in mesh.facet_sets.items()
+        name: _parts(simplex_set, mesh.facet_numbers(facets))
+        for name, facets in mesh.facet_sets.items()
     }
     cells = {name: inside(members) for name, members in mesh.cell_sets.items()}
-    return sound_mesh(whole.points, whole.cells, facets, cells, mesh.curves)
+    return sound_mesh(simplex_set.points, simplex_set.cells, facets, cells, mesh.curves)
 
 
-def _everywhere(mesh: Mesh) -> Mesh:
+def _split_all_edges(mesh: Mesh) -> Mesh:
     """Every edge split in two."""
     points = node_points(mesh, 2)
     nodes = cell_nodes(mesh, 2)
     cells, parent = (_triangles, _tetrahedra)[mesh.dim - 2](points, nodes)
     inverse = np.argsort(parent, kind="stable").reshape(len(mesh.cells), -1)
-    facets = {name: _quartered(mesh, facets) for name, facets in mesh.facet_sets.items()}
+    facets = {name: _facet_parts(mesh, facets) for name, facets in mesh.facet_sets.items()}
     curved = {name: facets[name] for name in mesh.curves}
     if curved:
         outer = facets["boundary"]
@@ -461,7 +476,7 @@ def _tetrahedra(points: Floats, nodes: Ints) -> tuple[Ints, Ints]:
     return children.reshape(-1, 4), np.repeat(np.arange(len(nodes)), 8)
 
 
-def _quartered(mesh: Mesh, facets: Ints) -> Ints:
+def _facet_parts(mesh: Mesh, facets: Ints) -> Ints:
     """Parts of facets: two of an edge, four of a triangle."""
     if not len(facets):
         return facets
@@ -470,4 +485,4 @@ def _quartered(mesh: Mesh, facets: Ints) -> Ints:
     return np.asarray(nodes[:, parts].reshape(-1, mesh.dim))
 
 
-__all__ = ["Simplices", "bisected", "moved", "refine", "refine_to", "simplices"]
+__all__ = ["Simplices", "bisect_simplices", "moved_simplices", "refine", "refine_to", "simplices"]

@@ -139,7 +139,7 @@ _RULES = {2: _TRIANGLES, 3: _TETRAHEDRA}
 
 
 @lru_cache(maxsize=16)
-def _symmetric(dim: int, degree: int) -> tuple[Floats, Floats]:
+def _symmetric_points(dim: int, degree: int) -> tuple[Floats, Floats]:
     bary, weight = [], []
     for w, *first in _RULES[dim][degree]:
         orbit = np.array(list(permutations((*first, 1 - sum(first)))))
@@ -163,9 +163,9 @@ def simplex_rule(dim: int, degree: int) -> tuple[Floats, Floats]:
         a = {1: 0.5 - 0.5 / np.sqrt(3), 2: 1 / 6, 3: (5 - np.sqrt(5)) / 20}[dim]
         bary = np.full((dim + 1, dim + 1), a) + np.eye(dim + 1) * (1 - (dim + 1) * a)
         return bary, np.full(dim + 1, 1 / (dim + 1))
-    for known in _RULES.get(dim, {}):
-        if degree <= known:
-            return _symmetric(dim, known)
+    for degree_of_rule in _RULES.get(dim, {}):
+        if degree <= degree_of_rule:
+            return _symmetric_points(dim, degree_of_rule)
     return conical(dim, degree // 2 + 1)
 
 

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from xcrack.base.arrays import Bools, Floats
-from xcrack.base.checks import called, shown, whole_numbers
+from xcrack.base.checks import call_function, value_text, whole_numbers
 from xcrack.base.errors import GeometryError, MeshError
 from xcrack.base.paths import path_of, system_errors
 from xcrack.mesh.gmsh_session import length_of, session
@@ -132,7 +132,7 @@ def _shape(gmsh: ModuleType, path: Path) -> int:
         box = np.array(gmsh.model.getBoundingBox(-1, -1)) if entities else np.zeros(6)
         extent = box[3:] - box[:3]
         if gmsh.model.getEntities(2) and extent[2] <= _PLANE * extent.max():
-            return _joined(gmsh, 2)
+            return _join_parts(gmsh, 2)
         n_faces = len(gmsh.model.getEntities(2))
         occ.healShapes(sewFaces=True, makeSolids=True)
         occ.synchronize()
@@ -141,7 +141,7 @@ def _shape(gmsh: ModuleType, path: Path) -> int:
                 f"{path.name} has no closed body: its {n_faces} faces do not enclose a volume. "
                 "Close the gaps in the CAD program and export the part as a solid."
             )
-    return _joined(gmsh, 3)
+    return _join_parts(gmsh, 3)
 
 
 def _check_cost(gmsh: ModuleType, dim: int, size: float) -> None:
@@ -154,7 +154,7 @@ def _check_cost(gmsh: ModuleType, dim: int, size: float) -> None:
         )
 
 
-def _joined(gmsh: ModuleType, dim: int) -> int:
+def _join_parts(gmsh: ModuleType, dim: int) -> int:
     """Join touching parts so that their meshes share points."""
     occ = gmsh.model.occ
     occ.synchronize()
@@ -181,7 +181,7 @@ def _set_size(gmsh: ModuleType, size: float | Callable[[Floats], Any]) -> list[B
         # gmsh asks point by point, and an error raised here would be lost in its code.
         if not failures:
             try:
-                value = np.ravel(called(size, "size", np.array([[x, y, z]])))
+                value = np.ravel(call_function(size, "size", np.array([[x, y, z]])))
                 return length_of(
                     value.tolist()[0] if len(value) == 1 else value, f"size at {[x, y, z]}"
                 )
@@ -215,15 +215,17 @@ def _mesh(gmsh: ModuleType, dim: int, source: str, sets: Mapping[str, Selector])
     for name, selector in sets.items():
         members = [tag for tag in faces if len(faces[tag])]
         if callable(selector):
-            members = [tag for tag in members if _selected(selector, points, faces[tag], name)]
+            members = [
+                tag for tag in members if _selected_facets(selector, points, faces[tag], name)
+            ]
         else:
-            asked = whole_numbers(selector, f"sets[{name!r}]", (None,), error=GeometryError)
-            unknown = sorted(set(asked.tolist()) - set(members))
+            facet_numbers = whole_numbers(selector, f"sets[{name!r}]", (None,), error=GeometryError)
+            unknown = sorted(set(facet_numbers.tolist()) - set(members))
             if unknown:
                 raise GeometryError(
                     f"sets[{name!r}]: {source} has no faces {unknown}: give some of {members}."
                 )
-            members = asked.tolist()
+            members = facet_numbers.tolist()
         if not members:
             centres = [np.round(points[f].mean(axis=(0, 1)), 4).tolist() for f in faces.values()]
             raise GeometryError(
@@ -234,14 +236,16 @@ def _mesh(gmsh: ModuleType, dim: int, source: str, sets: Mapping[str, Selector])
     return sound_mesh(points[used][:, :dim], new[cells], facet_sets)
 
 
-def _selected(selector: Callable[[Floats], Any], points: Floats, face: Any, name: str) -> bool:
+def _selected_facets(
+    selector: Callable[[Floats], Any], points: Floats, face: Any, name: str
+) -> bool:
     x = points[np.unique(face)]
-    result = called(selector, f"sets[{name!r}]", x)
+    result = call_function(selector, f"sets[{name!r}]", x)
     try:
         inside = np.asarray(result)
     except Exception as error:  # ragged rows, or what an object's own __array__ raises
         raise GeometryError(
-            f"sets[{name!r}] returned {shown(result)}: return one bool for each point."
+            f"sets[{name!r}] returned {value_text(result)}: return one bool for each point."
         ) from error
     if inside.shape != (len(x),) or inside.dtype != bool:
         raise GeometryError(

@@ -71,7 +71,7 @@ def loops(faces: Ints) -> list[Ints]:
     return result
 
 
-def ruled(
+def ruled_strip(
     n_points: int,
     base: Ints,
     origin: Floats,
@@ -160,15 +160,15 @@ def split_sides(points: Floats, faces: Ints, marked: Bools) -> tuple[Floats, Int
     corner = np.take_along_axis(faces, column, axis=1)
     centre = number[np.take_along_axis(inverse, column, axis=1)]
     (a, b, c), (ab, bc, ca) = corner.T, centre.T
-    whole, two, three = ab < 0, bc >= 0, ca >= 0
+    is_whole, two, three = ab < 0, bc >= 0, ca >= 0
     parts = [
-        faces[whole],
-        np.stack([b, c, ab], axis=1)[~whole & ~two],
-        np.stack([b, bc, ab], axis=1)[~whole & two],
-        np.stack([bc, c, ab], axis=1)[~whole & two],
-        np.stack([c, a, ab], axis=1)[~whole & ~three],
-        np.stack([c, ca, ab], axis=1)[~whole & three],
-        np.stack([ca, a, ab], axis=1)[~whole & three],
+        faces[is_whole],
+        np.stack([b, c, ab], axis=1)[~is_whole & ~two],
+        np.stack([b, bc, ab], axis=1)[~is_whole & two],
+        np.stack([bc, c, ab], axis=1)[~is_whole & two],
+        np.stack([c, a, ab], axis=1)[~is_whole & ~three],
+        np.stack([c, ca, ab], axis=1)[~is_whole & three],
+        np.stack([ca, a, ab], axis=1)[~is_whole & three],
     ]
     return np.concatenate([points, middle]), np.concatenate(parts)
 
@@ -182,21 +182,21 @@ def components(faces: Ints) -> Ints:
     flat = inverse.ravel()
     face = np.repeat(np.arange(len(faces)), 3)
     order = np.argsort(flat, kind="stable")
-    same = flat[order][1:] == flat[order][:-1]
-    one, other = face[order][:-1][same], face[order][1:][same]
+    same_edge = flat[order][1:] == flat[order][:-1]
+    one, other = face[order][:-1][same_edge], face[order][1:][same_edge]
     graph = coo_array((np.ones(len(one)), (one, other)), shape=(len(faces),) * 2)
     return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
 
 
-def oriented(faces: Ints) -> Ints | None:
+def oriented_faces(faces: Ints) -> Ints | None:
     """Faces turned so that neighbours agree, the first of each piece as it is; None: one-sided."""
     _, inverse = np.unique(side_keys(faces), return_inverse=True)
     flat = inverse.ravel()
     pairs = sides(faces).reshape(-1, 2)
     forward = pairs[:, 0] < pairs[:, 1]
     order = np.argsort(flat, kind="stable")
-    same = flat[order][1:] == flat[order][:-1]
-    one, other = order[:-1][same], order[1:][same]
+    same_edge = flat[order][1:] == flat[order][:-1]
+    one, other = order[:-1][same_edge], order[1:][same_edge]
     differ = forward[one] == forward[other]
     neighbours: list[list[tuple[int, bool]]] = [[] for _ in faces]
     for i, j, turn in zip(one // 3, other // 3, differ, strict=True):
@@ -211,10 +211,10 @@ def oriented(faces: Ints) -> Ints | None:
         while queue:
             i = queue.pop()
             for j, turn in neighbours[i]:
-                wanted = int(turned[i]) ^ int(turn)
+                target_turn = int(turned[i]) ^ int(turn)
                 if turned[j] < 0:
-                    turned[j] = wanted
+                    turned[j] = target_turn
                     queue.append(j)
-                elif turned[j] != wanted:
+                elif turned[j] != target_turn:
                     return None
     return np.where(turned[:, None] == 1, faces[:, ::-1], faces)

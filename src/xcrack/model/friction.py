@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from xcrack.base.checks import entries, number, shown
+from xcrack.base.checks import entries, number, value_text
 from xcrack.base.errors import ProblemError
 from xcrack.model.numerics import Numerics
 
@@ -35,7 +35,7 @@ def checked_friction(
         result: float | tuple[float, ...] = number(value, "friction", least=0, most=_MOST)
         acts = bool(result)
     else:
-        wrong = f"friction = {shown(value)}: give a number, or a list of one a crack."
+        wrong = f"friction = {value_text(value)}: give a number, or a list of one a crack."
         if isinstance(value, AnySet):
             raise ProblemError(wrong)
         try:
@@ -44,8 +44,8 @@ def checked_friction(
             raise ProblemError(wrong) from None
         if len(given) != n_cracks:
             raise ProblemError(
-                f"friction = {shown(value)}: the problem has {n_cracks} crack(s); give a number "
-                "for all of them, or a list of one a crack."
+                f"friction = {value_text(value)}: the problem has {n_cracks} crack(s); give a "
+                f"number for all of them, or a list of one a crack."
             )
         result = tuple(
             number(mu, f"friction[{c}]", least=0, most=_MOST) for c, mu in enumerate(given)
@@ -78,8 +78,8 @@ def check_order(frictions: Sequence[float], states: Any) -> None:
     """
     if any(frictions) and isinstance(states, AnySet | Mapping):
         raise ProblemError(
-            f"states = {shown(states)} with friction: each state is reached from the one before "
-            "it, and a set or dict has no order: give a list."
+            f"states = {value_text(states)} with friction: each state is reached from the one "
+            f"before it, and a set or dict has no order: give a list."
         )
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from xcrack.base.arguments import Array, Number, Vector, Whole
-from xcrack.base.arrays import Floats, Ints, frozen
+from xcrack.base.arrays import Floats, Ints, frozen_copy
 from xcrack.base.errors import ProblemError
 from xcrack.base.units import (
     BODY_FORCE,
@@ -296,8 +296,8 @@ class bearing(Load):  # noqa: N801
         given, x, weight = np.asarray(self.force), points.x, points.weight
         force = hole.section @ given
         size = float(np.linalg.norm(given))
-        rest = given - force @ hole.section
-        along = float(np.linalg.norm(rest))
+        remainder = given - force @ hole.section
+        along = float(np.linalg.norm(remainder))
         if along > _AXIAL * size:
             raise ProblemError(
                 f"{self.name}: {along:.4g} of the force {size:.4g} acts along the axis of the "
@@ -314,12 +314,12 @@ class bearing(Load):  # noqa: N801
         height = np.ptp(x @ np.cross(*hole.section)) if len(given) > 2 else 1.0
         pressed = float(weight[np.abs(angle) < half].sum())
         # Points of integration do not reach the ends of the hole: its height is a little larger.
-        whole = self.contact_angle * hole.radius * height
-        if pressed < _COVERED * whole:
+        bearing_area = self.contact_angle * hole.radius * height
+        if pressed < _COVERED * bearing_area:
             raise ProblemError(
-                f"{self.name}: the set covers {100 * pressed / whole:.3g} % of where the pin "
-                f"presses, {np.degrees(self.contact_angle):.4g} degrees around the force: give the "
-                "whole hole, or a smaller contact_angle."
+                f"{self.name}: the set covers {100 * pressed / bearing_area:.3g} % of where the "
+                f"pin presses, {np.degrees(self.contact_angle):.4g} degrees around the force: give "
+                f"the whole hole, or a smaller contact_angle."
             )
         # On a polygon the cosine alone would pull a little to one side.
         shapes = np.stack([p, p * sine])[:, :, None] * radial
@@ -327,7 +327,7 @@ class bearing(Load):  # noqa: N801
         scale = np.linalg.solve(sums, force)
         across_axis = np.einsum("k,kqs->qs", scale, shapes) @ hole.section
         # The rest is that of an axis that points know to a few digits only.
-        return np.asarray(across_axis + rest / weight.sum())
+        return np.asarray(across_axis + remainder / weight.sum())
 
 
 @dataclass(frozen=True, eq=False)
@@ -370,7 +370,7 @@ class resultant(Load):  # noqa: N801
         if self.force is None and self.moment is None:
             raise ProblemError(f"{self.name}: give a force, a moment or both.")
         if self.moment is not None:
-            moment = frozen(np.atleast_1d(self.moment))
+            moment = frozen_copy(np.atleast_1d(self.moment))
             object.__setattr__(self, "moment", moment)
             if moment.shape not in ((1,), (3,)):
                 raise ProblemError(

@@ -40,7 +40,7 @@ class ContactMethod:
         raise NotImplementedError
 
     def solve_states(self, problem: Any, model: Any, engine: Any, chosen: Any, f: Floats,
-                     known: Floats, start: Any, closed: bool, acting: Any) -> Any:  # fmt: skip
+                     u_imposed: Floats, start: Any, closed: bool, acting: Any) -> Any:  # fmt: skip
         """Contact of all load states, a list of `StateContact`."""
         raise NotImplementedError
 

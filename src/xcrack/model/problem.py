@@ -9,13 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from xcrack.base.checks import entries, number, shown, whole
+from xcrack.base.checks import entries, number, value_text, whole_number
 from xcrack.base.errors import CoarseMeshError, ProblemError
-from xcrack.base.markup import Markup, element, joined, table
+from xcrack.base.markup import Markup, element, join_parts, table
 from xcrack.base.svg import rim, sketch
 from xcrack.crack.crack import Crack
 from xcrack.crack.junctions import Junction
-from xcrack.crack.placing import check_cracks, junctions, on_others, placed
+from xcrack.crack.placing import check_cracks, junctions, on_others, place_crack
 from xcrack.crack.stations import Stations, stations_of
 from xcrack.mesh.mesh import Mesh
 from xcrack.model.friction import checked_friction
@@ -89,12 +89,14 @@ class Problem:
         if self.order is None:
             object.__setattr__(self, "order", _ORDER[self.mesh.dim])
         if type(self.order) is bool or not isinstance(self.order, Real) or self.order not in (1, 2):
-            raise ProblemError(f"order = {shown(self.order)}: give 1 or 2.")
+            raise ProblemError(f"order = {value_text(self.order)}: give 1 or 2.")
         if not isinstance(self.contact, str) or self.contact not in ("auto", "on", "off"):
-            raise ProblemError(f'contact = {shown(self.contact)}: give "auto", "on" or "off".')
+            raise ProblemError(f'contact = {value_text(self.contact)}: give "auto", "on" or "off".')
         self._check_members()
-        own = checked_friction(self.friction, len(self.cracks), self.mesh.dim, self.numerics)
-        object.__setattr__(self, "friction", own)
+        friction_values = checked_friction(
+            self.friction, len(self.cracks), self.mesh.dim, self.numerics
+        )
+        object.__setattr__(self, "friction", friction_values)
         with suppress(CoarseMeshError):  # `adapt` refines such a mesh; all else asks for `placed`
             _ = self.placed
 
@@ -107,7 +109,7 @@ class Problem:
         CoarseMeshError
             The mesh is too coarse for them.
         """
-        cracks = tuple(placed(crack, self.mesh) for crack in self.cracks)
+        cracks = tuple(place_crack(crack, self.mesh) for crack in self.cracks)
         cracks = on_others(self.cracks, cracks, self.mesh)
         check_cracks(cracks, self.mesh)
         return cracks
@@ -142,9 +144,11 @@ class Problem:
         if isinstance(state, LoadLevel):
             for load in state.steady:
                 self._check_load(load)
-            own = scaled_state(self.loads, state.factor)  # type: ignore[arg-type]
+            scaled_loads = scaled_state(self.loads, state.factor)  # type: ignore[arg-type]
             steady = state.steady
-            return LoadState(own.loads + steady, own.factors + (1.0,) * len(steady), 1.0)
+            return LoadState(
+                scaled_loads.loads + steady, scaled_loads.factors + (1.0,) * len(steady), 1.0
+            )
         if isinstance(state, Real | np.ndarray) or np.isscalar(state):
             try:
                 return scaled_state(self.loads, number(state, "load state"))  # type: ignore[arg-type]
@@ -171,7 +175,7 @@ class Problem:
             ("loads", loads),
             ("contact, order", f"{self.contact}, {self.order}"),
         ]
-        return joined(element("b", "Problem"), self.sketch(), table((), rows))
+        return join_parts(element("b", "Problem"), self.sketch(), table((), rows))
 
     def sketch(self) -> Markup:
         """Outline of the body and its cracks, as SVG."""
@@ -185,12 +189,12 @@ class Problem:
         for crack in self.cracks:
             if not isinstance(crack, Crack):
                 raise ProblemError(
-                    f"cracks: {shown(crack)} is not a Crack; make one by line_crack(...)."
+                    f"cracks: {value_text(crack)} is not a Crack; make one by line_crack(...)."
                 )
         for support in self.supports:
             if not isinstance(support, Support):
                 raise ProblemError(
-                    f"supports: {shown(support)} is not a support; give fix(...) or "
+                    f"supports: {value_text(support)} is not a support; give fix(...) or "
                     "displacement(...), and put forces into loads."
                 )
             support.check_in(self.mesh)
@@ -200,7 +204,7 @@ class Problem:
     def _check_load(self, load: Any) -> None:
         if not isinstance(load, Load):
             raise ProblemError(
-                f"loads: {shown(load)} is not a load; see traction(...), pressure(...)."
+                f"loads: {value_text(load)} is not a load; see traction(...), pressure(...)."
             )
         load.check(self)
 
@@ -218,11 +222,11 @@ def crack_number(problem: Problem, crack: Any, what: str) -> int:
     n = len(problem.cracks)
     if not n:
         raise ProblemError(
-            f"{what}: crack {shown(crack)}: the problem has no crack: give one with."
+            f"{what}: crack {value_text(crack)}: the problem has no crack: give one with."
         )
-    index = whole(crack, f"{what}: crack", least=0)
+    index = whole_number(crack, f"{what}: crack", least=0)
     if index >= n:
         raise ProblemError(
-            f"{what}: crack {shown(index)}: the problem has {n} crack(s), numbered from 0."
+            f"{what}: crack {value_text(index)}: the problem has {n} crack(s), numbered from 0."
         )
     return index

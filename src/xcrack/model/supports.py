@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 
 from xcrack.base.arguments import Declared, Whole, arguments_of
 from xcrack.base.arrays import Floats
-from xcrack.base.checks import shown
+from xcrack.base.checks import value_text
 from xcrack.base.errors import ProblemError
 from xcrack.base.units import LENGTH
 from xcrack.mesh.mesh import Mesh, facet_set
@@ -37,7 +37,7 @@ class Condition(Declared):
         if where is None:
             return self.kind
         named = isinstance(where, str)
-        return f"{self.kind}({shown(where) if named else np.round(where, 6).tolist()})"
+        return f"{self.kind}({value_text(where) if named else np.round(where, 6).tolist()})"
 
     def check_in(self, mesh: Mesh) -> None:
         """Raise where a vector has another dimension than the body, or a set is not there."""
@@ -47,8 +47,8 @@ class Condition(Declared):
             if vector and isinstance(value, np.ndarray | tuple):
                 if np.shape(value)[-1:] != (mesh.dim,):
                     raise ProblemError(
-                        f"{self.kind}: {name} = {shown(value)} does not suit a body in {mesh.dim} "
-                        f"dimensions: give {mesh.dim} numbers a row."
+                        f"{self.kind}: {name} = {value_text(value)} does not suit a body in "
+                        f"{mesh.dim} dimensions: give {mesh.dim} numbers a row."
                     )
         if isinstance(self.place, str):
             facet_set(mesh, self.place, self.kind)
@@ -100,8 +100,8 @@ class fix(Support):  # noqa: N801 - it is used as a function
     @property
     def name(self) -> str:
         """What messages and reports call it."""
-        whole = super().name
-        return whole if self.axis is None else f"{whole[:-1]}, axis={self.axis})"
+        base_name = super().name
+        return base_name if self.axis is None else f"{base_name[:-1]}, axis={self.axis})"
 
     def check_in(self, mesh: Mesh) -> None:
         """Raise where an axis, a point or a set is not one of the body."""

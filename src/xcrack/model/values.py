@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from xcrack.base.arguments import Error, Rule, Unit
-from xcrack.base.arrays import Floats, frozen
-from xcrack.base.checks import called, number, numbers, shown
+from xcrack.base.arrays import Floats, frozen_copy
+from xcrack.base.checks import call_function, number, numbers, value_text
 from xcrack.base.errors import ProblemError
 from xcrack.base.units import NUMBER
 
@@ -34,8 +34,10 @@ class VectorField(Rule):
             )
         vector = numbers(value, what, (None,), error=error)
         if len(vector) not in (2, 3):
-            raise error(f"{what} = {shown(value)}: give a vector of 2 or 3 numbers, or a function.")
-        return frozen(vector)
+            raise error(
+                f"{what} = {value_text(value)}: give a vector of 2 or 3 numbers, or a function."
+            )
+        return frozen_copy(vector)
 
 
 @dataclass(frozen=True)
@@ -65,7 +67,7 @@ class StressField(Rule):
             raise error(f"{what} has the shape {sigma.shape}: give (2, 2) or (3, 3).")
         if not np.allclose(sigma, sigma.T):
             raise error(f"{what}: {sigma.tolist()} is not symmetric: give a stress.")
-        return frozen(sigma)
+        return frozen_copy(sigma)
 
 
 @dataclass(frozen=True)
@@ -81,7 +83,7 @@ class Place(Rule):
         if isinstance(value, str):
             return value
         try:
-            return frozen(numbers(value, what, (None,), error=error))
+            return frozen_copy(numbers(value, what, (None,), error=error))
         except error as cause:
             raise error(f"{cause} Or give the name of a facet set.") from None
 
@@ -93,7 +95,7 @@ class SetName(Rule):
     def check(self, value: Any, what: str, error: Error) -> str:
         """The name."""
         if not isinstance(value, str):
-            raise error(f"{what} = {shown(value)}: give the name of a facet set.")
+            raise error(f"{what} = {value_text(value)}: give the name of a facet set.")
         return value
 
 
@@ -109,7 +111,7 @@ def vector_at(value: Any, x: Floats, what: str, normal: Floats | None = None) ->
     if callable(value):
         two = normal is not None and _n_positional(value) >= 2
         arguments = (x, normal) if two else (x,)
-        result = _real(called(value, f"the value of {what}", *arguments), what)
+        result = _real(call_function(value, f"the value of {what}", *arguments), what)
     else:
         result = numbers(value, what)
     if result.shape == (d,):
@@ -132,7 +134,7 @@ def scalar_at(value: Any, x: Floats, what: str) -> Floats:
         Another shape, or values that are not finite.
     """
     if callable(value):
-        given = _real(called(value, f"the value of {what}", x), what)
+        given = _real(call_function(value, f"the value of {what}", x), what)
     else:
         given = numbers(value, what)
     if given.shape not in ((), (len(x),)):
@@ -155,7 +157,7 @@ def stress_at(value: Any, x: Floats, what: str) -> Floats:
     """
     d = x.shape[1]
     if callable(value):
-        result = _real(called(value, f"the value of {what}", x), what)
+        result = _real(call_function(value, f"the value of {what}", x), what)
     else:
         result = numbers(value, what)
     if result.shape not in ((d, d), (len(x), d, d)):
@@ -181,12 +183,12 @@ def _real(result: Any, what: str) -> Floats:
 
 
 def _check_finite(result: Floats, x: Floats, what: str) -> None:
-    bad = ~np.isfinite(result).reshape(len(x), int(np.prod(result.shape[1:]))).all(axis=1)
-    if bad.any():
-        where = x[np.argmax(bad)]
+    is_infinite = ~np.isfinite(result).reshape(len(x), int(np.prod(result.shape[1:]))).all(axis=1)
+    if is_infinite.any():
+        where = x[np.argmax(is_infinite)]
         raise ProblemError(
             f"{what}: the value at {np.round(where, 9).tolist()} is "
-            f"{result[np.argmax(bad)].tolist()}: every value must be finite."
+            f"{result[np.argmax(is_infinite)].tolist()}: every value must be finite."
         )
 
 

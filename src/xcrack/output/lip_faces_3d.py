@@ -87,7 +87,7 @@ def lip_faces(solution: Solution, crack: int) -> LipFaces:
     turned = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     area = np.linalg.norm(turned, axis=1) / 2
     over = np.einsum("td,td->t", turned, cut.lip_normal) < 0
-    number = _merged(corners.reshape(-1, 3), _SAME * float(mesh.cell_size.min()))
+    number = _merged_numbers(corners.reshape(-1, 3), _SAME * float(mesh.cell_size.min()))
     n = int(number.max(initial=-1)) + 1
     one = np.zeros(n, dtype=np.int64)
     one[number] = np.arange(len(number))
@@ -134,7 +134,7 @@ def lip_faces(solution: Solution, crack: int) -> LipFaces:
     )
 
 
-def _merged(x: Floats, distance: float) -> Ints:
+def _merged_numbers(x: Floats, distance: float) -> Ints:
     """Number of the place of each point: those closer than a distance share it."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components

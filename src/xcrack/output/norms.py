@@ -6,7 +6,7 @@ import numpy as np
 
 from xcrack.analysis.solution import Solution
 from xcrack.base.arrays import Floats
-from xcrack.base.checks import called, numbers, shown
+from xcrack.base.checks import call_function, numbers, value_text
 from xcrack.base.errors import ProblemError
 from xcrack.fem.loads import position
 from xcrack.fem.quadrature import cell_points
@@ -40,8 +40,8 @@ def energy_error(solution: Solution, stress: Callable[[Floats], Floats]) -> floa
         )
     if not callable(stress):
         raise ProblemError(
-            f"energy_error: stress = {shown(stress)} cannot be called: give a function f(x) of "
-            "points (n, d) that returns (n, d, d)."
+            f"energy_error: stress = {value_text(stress)} cannot be called: give a function f(x) "
+            f"of points (n, d) that returns (n, d, d)."
         )
     space, material = solution.space, solution.problem.material
     error = total = 0.0
@@ -49,7 +49,7 @@ def energy_error(solution: Solution, stress: Callable[[Floats], Floats]) -> floa
         cells = np.arange(first, min(first + _CHUNK, len(space.mesh.cells)))
         points = cell_points(space, cells, 8, 2 * space.order + 2)
         x = position(space, points.cell, points.bary)
-        result = called(stress, "the exact stress of energy_error", x)
+        result = call_function(stress, "the exact stress of energy_error", x)
         exact = numbers(result, "energy_error: the stress at points (n, d)", (*x.shape, x.shape[1]))
         difference = exact - solution.stress_at(points.cell, points.bary, points.side)
         error += _energy(material.strain(difference), difference, points.weight)

@@ -8,7 +8,7 @@ from scipy.spatial import cKDTree
 
 from xcrack.analysis.solution import Solution
 from xcrack.base.arrays import Floats
-from xcrack.base.checks import number, numbers, shown
+from xcrack.base.checks import number, numbers, value_text
 from xcrack.base.errors import ProblemError
 from xcrack.crack.measures import measures
 from xcrack.model.problem import crack_number
@@ -38,7 +38,9 @@ def crack_opening(solution: Solution, x: ArrayLike | None = None, crack: int = 0
         out.
     """
     if not isinstance(solution, Solution):
-        raise ProblemError(f"crack_opening: solution = {shown(solution)}: give what solve returns.")
+        raise ProblemError(
+            f"crack_opening: solution = {value_text(solution)}: give what solve returns."
+        )
     c = crack_number(solution.problem, crack, "crack_opening")
     d = solution.space.dim
     if x is None:
@@ -53,12 +55,12 @@ def crack_opening(solution: Solution, x: ArrayLike | None = None, crack: int = 0
     lips = solution.lips[c]
     distance, nearest = cKDTree(lips.x).query(points)
     normal = lips.normal[nearest]
-    away = np.abs(np.einsum("qd,qd->q", points - lips.x[nearest], normal))
-    if (away > 0.5 * distance + _NEAR * solution.problem.mesh.extent).any():
-        far = points[int(np.argmax(away))]
+    normal_distance = np.abs(np.einsum("qd,qd->q", points - lips.x[nearest], normal))
+    if (normal_distance > 0.5 * distance + _NEAR * solution.problem.mesh.extent).any():
+        farthest = points[int(np.argmax(normal_distance))]
         raise ProblemError(
-            f"crack_opening: {np.round(far, 9).tolist()} does not lie on crack {c}: give points on "
-            "it, or leave x out for its mouths."
+            f"crack_opening: {np.round(farthest, 9).tolist()} does not lie on crack {c}: give "
+            f"points on it, or leave x out for its mouths."
         )
     jump = solution.displacement(points, side=1) - solution.displacement(points, side=-1)
     opening = np.einsum("qd,qd->q", jump, normal)
@@ -103,7 +105,9 @@ def compliance(solution: Solution, force: Any) -> float:
     `energy_release_rate` found another way: from two solutions instead of K.
     """
     if not isinstance(solution, Solution):
-        raise ProblemError(f"compliance: solution = {shown(solution)}: give what solve returns.")
+        raise ProblemError(
+            f"compliance: solution = {value_text(solution)}: give what solve returns."
+        )
     P = number(force, "compliance: force")
     if P == 0:
         raise ProblemError("compliance: force = 0: give the force of this load state.")

@@ -70,8 +70,8 @@ def piece_cells(space: FunctionSpace) -> PieceCells:
         touched = touched | cut.is_cut | cut.is_tip
     mesh, plane = space.mesh, space.dim == 2
     if plane:
-        near = _near_tip(space, mesh.points[mesh.edges])
-        touched = touched | near[mesh.cell_to_edge].any(axis=1)
+        is_near = _near_tip(space, mesh.points[mesh.edges])
+        touched = touched | is_near[mesh.cell_to_edge].any(axis=1)
     plain, others = np.nonzero(~touched)[0], np.nonzero(touched)[0]
     subs = sub_cells(space, others)
     cell, bary, side = (
@@ -80,7 +80,7 @@ def piece_cells(space: FunctionSpace) -> PieceCells:
     wrong = np.linalg.det(bary) < 0
     bary[wrong, -2:] = bary[wrong, -2:][:, ::-1]
     for _ in range(_LEVELS if plane else 0):
-        cell, bary, side = _halved(space, cell, bary, side)
+        cell, bary, side = _halve_edges(space, cell, bary, side)
     return PieceCells(plain, cell, bary, side)
 
 
@@ -93,7 +93,7 @@ def _near_tip(space: FunctionSpace, ends: Floats) -> Bools:
     return np.asarray(tips.query(ends.mean(axis=-2))[0] < _REACH * length)
 
 
-def _halved(
+def _halve_edges(
     space: FunctionSpace, cell: Ints, bary: Floats, side: Ints
 ) -> tuple[Ints, Floats, Ints]:
     """Halve the edges of triangles near a tip."""
@@ -101,13 +101,13 @@ def _halved(
     x = np.einsum("svb,sbd->svd", bary, space.mesh.points[space.mesh.cells[cell]])
     mark = _near_tip(space, x[:, pairs])
     nodes = np.concatenate([bary, bary[:, pairs].mean(axis=2)], axis=1)
-    rest = np.nonzero(~mark.any(axis=1))[0]
-    rows, parts = [rest], [bary[rest]]
+    unmarked = np.nonzero(~mark.any(axis=1))[0]
+    rows, parts = [unmarked], [bary[unmarked]]
     for pattern, triangles in _PARTS.items():
-        mine = np.nonzero((mark == pattern).all(axis=1))[0]
+        rows_of_pattern = np.nonzero((mark == pattern).all(axis=1))[0]
         for triangle in triangles:
-            rows.append(mine)
-            parts.append(nodes[mine][:, triangle])
+            rows.append(rows_of_pattern)
+            parts.append(nodes[rows_of_pattern][:, triangle])
     every = np.concatenate(rows)
     return cell[every], np.concatenate(parts), side[every]
 
@@ -218,9 +218,9 @@ def pieces(solution: Solution) -> Pieces:
     mesh, d = space.mesh, space.dim
     cells = piece_cells(space)
     plain = cells.plain
-    whole = np.broadcast_to(np.eye(d + 1), (len(plain), d + 1, d + 1))
+    whole_pieces = np.broadcast_to(np.eye(d + 1), (len(plain), d + 1, d + 1))
     blocks = [
-        _Block.of(space, plain, whole, space.order),
+        _Block.of(space, plain, whole_pieces, space.order),
         _Block.of(space, cells.cell, cells.bary, 2, cells.side),
     ]
     nodes = space.cell_nodes[plain]
@@ -309,7 +309,7 @@ def _join(
     x = np.concatenate([plain.x[first[old]], split.x])
     size = float(space.mesh.cell_size.min())
     key = np.concatenate([(x - x[:1]) / size, 3.0 * _lip(space, cell, bary, side)], axis=1)
-    group = _same(key)
+    group = _place_numbers(key)
     point = np.full(group.max(initial=-1) + 1, -1, dtype=np.int64)
     point[group[: len(old)]] = old
     new = np.nonzero(point < 0)[0]
@@ -319,7 +319,7 @@ def _join(
     return point[group[len(old) :]], n_plain + len(new), source
 
 
-def _same(key: Floats) -> Ints:
+def _place_numbers(key: Floats) -> Ints:
     """Number of the place of each row: rows closer than `_SAME` share it.
 
     Most rows are equal when rounded; only one of these is compared with others.
@@ -337,13 +337,13 @@ def _same(key: Floats) -> Ints:
 def _lip(space: FunctionSpace, cell: Ints, bary: Floats, side: Ints) -> Ints:
     """Lip of each crack on which points lie `(q, cracks)`: +1, -1, or 0 off the crack."""
     lip = np.zeros(side.shape, dtype=np.int64)
-    near = _SAME * space.mesh.cell_size[cell]
+    tolerance = _SAME * space.mesh.cell_size[cell]
     corner = space.mesh.cells[cell]
     for c, cut in enumerate(space.cuts):
         phi = cut.level(space.mesh, cell, bary)
         # A crack without tips lies behind them everywhere.
         inside = (bary * np.maximum(cut.level_set.inside, -1e300)[corner]).sum(axis=1)
-        lip[:, c] = np.where((np.abs(phi) <= near) & (inside < -near), side[:, c], 0)
+        lip[:, c] = np.where((np.abs(phi) <= tolerance) & (inside < -tolerance), side[:, c], 0)
     return lip
 
 
@@ -361,13 +361,13 @@ def _stresses(solution: Solution, block: _Block) -> tuple[Floats, Floats]:
 def _at_tip(space: FunctionSpace, cell: Ints, bary: Floats) -> Bools:
     """Which points `(q,)` lie at a tip or on a front, as the level sets have it."""
     corner = space.mesh.cells[cell]
-    near = np.full(len(cell), np.inf)
+    nearest_distance = np.full(len(cell), np.inf)
     for cut in space.cuts:
         phi = np.einsum("qb,qb->q", bary, cut.level_set.phi[corner])
         for level in cut.level_set.psi:
             psi = np.einsum("qb,qb->q", bary, level[corner])
-            near = np.minimum(near, np.hypot(phi, psi))
-    return np.asarray(near < _SAME * space.mesh.cell_size[cell])
+            nearest_distance = np.minimum(nearest_distance, np.hypot(phi, psi))
+    return np.asarray(nearest_distance < _SAME * space.mesh.cell_size[cell])
 
 
 def full_stress(solution: Solution, cell: Ints, bary: Floats, side: Ints) -> Floats:

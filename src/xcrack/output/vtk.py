@@ -11,9 +11,9 @@ import numpy as np
 
 from xcrack.analysis.solution import Solution
 from xcrack.base.arrays import Floats, Ints
-from xcrack.base.checks import entries, shown
+from xcrack.base.checks import entries, value_text
 from xcrack.base.errors import ProblemError, XcrackError
-from xcrack.base.optional import required
+from xcrack.base.optional import require_package
 from xcrack.base.paths import path_of, system_errors, written_whole
 from xcrack.crack.measures import measures
 from xcrack.output.lip_faces_3d import lip_faces
@@ -106,10 +106,15 @@ def _checked_sif(solution: Solution, sif: Any) -> tuple[SIF, ...]:
     K = (sif,) if isinstance(sif, SIF) else entries(sif, "write: sif")
     n = len(solution.lips)
     if len(K) != n or not all(isinstance(one, SIF) for one in K):
-        raise ProblemError(f"write: sif = {shown(sif)}: give one SIF for each of the {n} crack(s).")
+        raise ProblemError(
+            f"write: sif = {value_text(sif)}: give one SIF for each of the {n} crack(s)."
+        )
     for tip in solution.space.tips:
-        own = K[tip.crack]
-        if own.x.shape[1:] != (solution.space.dim,) or not (own.front == tip.number).any():
+        K_of_crack = K[tip.crack]
+        if (
+            K_of_crack.x.shape[1:] != (solution.space.dim,)
+            or not (K_of_crack.front == tip.number).any()
+        ):
             raise ProblemError(
                 f"write: sif of crack {tip.crack} has no K for its tip or front {tip.number}: give "
                 "what stress_intensity returns for this solution."
@@ -121,7 +126,7 @@ def _grid_path(path: Any) -> Path:
     target = path_of(path, "write: path", error=ProblemError)
     if target.suffix in (".vtp", ".vtk", ".pvd", ".vtm") or target.name in ("", ".."):
         raise ProblemError(
-            f"write: path = {shown(str(target))}: the grid is a .vtu file; give that ending."
+            f"write: path = {value_text(str(target))}: the grid is a .vtu file; give that ending."
         )
     if target.suffix != ".vtu":
         target = target.with_name(target.name + ".vtu")
@@ -176,8 +181,8 @@ def _write_lips(solution: Solution, path: Path) -> None:
         vectors["shear"] = [np.zeros((n, 2)) if t is None else t for t, n in shears]
         stuck = [None if c is None else c.stuck for c in solution.contact]
         scalars["stuck"] = [
-            np.zeros(len(each.s), np.int8) if own is None else own.astype(np.int8)
-            for own, each in zip(stuck, lips, strict=True)
+            np.zeros(len(each.s), np.int8) if stuck_points is None else stuck_points.astype(np.int8)
+            for stuck_points, each in zip(stuck, lips, strict=True)
         ]
     d = solution.space.dim
     at_points = {name: np.concatenate(values) for name, values in scalars.items()}
@@ -224,14 +229,21 @@ def _write_fronts(solution: Solution, sif: Sequence[SIF], path: Path) -> None:
     lines: list[dict[str, np.ndarray]] = []
     for tip in tips:
         if sif:
-            own = sif[tip.crack]
-            mine = own.front == tip.number
-            line = {"x": own.x[mine], "frame": own.frame[mine], "s": own.s[mine]}
-            line |= {f"K_{name}": getattr(own, f"K_{name}")[mine] for name in ("I", "II", "III")}
+            sif_of_crack = sif[tip.crack]
+            is_on_front = sif_of_crack.front == tip.number
+            line = {
+                "x": sif_of_crack.x[is_on_front],
+                "frame": sif_of_crack.frame[is_on_front],
+                "s": sif_of_crack.s[is_on_front],
+            }
+            line |= {
+                f"K_{name}": getattr(sif_of_crack, f"K_{name}")[is_on_front]
+                for name in ("I", "II", "III")
+            }
             if all(one.errors is not None for one in sif):
                 names = ("I", "II", "III")
-                line |= {f"bar_{m}": own.bar[mine, k] for k, m in enumerate(names)}
-            line["at_surface"] = own.at_surface[mine].astype(np.int8)
+                line |= {f"bar_{m}": sif_of_crack.bar[is_on_front, k] for k, m in enumerate(names)}
+            line["at_surface"] = sif_of_crack.at_surface[is_on_front].astype(np.int8)
         else:
             step = np.linalg.norm(np.diff(tip.x, axis=0), axis=1)
             line = {"x": tip.x, "frame": tip.frame, "s": np.append(0.0, np.cumsum(step))}
@@ -242,8 +254,8 @@ def _write_fronts(solution: Solution, sif: Sequence[SIF], path: Path) -> None:
         run = begin + np.arange(len(line["x"]))
         front = (solution.space.cracks[tip.crack].fronts or ())[tip.number]
         # K is known inside the body: a closed front that leaves it in part is open there.
-        whole = front[0] == front[-1] and len(run) == len(front) - 1
-        runs.append(np.append(run, run[:1]) if whole else run)
+        is_complete = front[0] == front[-1] and len(run) == len(front) - 1
+        runs.append(np.append(run, run[:1]) if is_complete else run)
     every = {name: np.concatenate([line[name] for line in lines]) for name in lines[0]}
     frame = every.pop("frame")
     x = every.pop("x")
@@ -252,9 +264,9 @@ def _write_fronts(solution: Solution, sif: Sequence[SIF], path: Path) -> None:
         "crack": np.array([tip.crack for tip in tips]),
         "front": np.array([tip.number for tip in tips]),
     }
-    known = [measures(crack, solution.space.mesh) for crack in solution.space.cracks]
+    measures_of_cracks = [measures(crack, solution.space.mesh) for crack in solution.space.cracks]
     for name in ("area", "depth"):
-        values = np.array([getattr(known[tip.crack], name) for tip in tips])
+        values = np.array([getattr(measures_of_cracks[tip.crack], name) for tip in tips])
         if np.isfinite(values).all():  # readers of text files stumble over nan
             at_cells[name] = values
     data = _vtk("vtkCommonDataModel").vtkPolyData()
@@ -264,7 +276,7 @@ def _write_fronts(solution: Solution, sif: Sequence[SIF], path: Path) -> None:
 
 
 def _vtk(part: str) -> Any:
-    return required(f"vtkmodules.{part}", "write")
+    return require_package(f"vtkmodules.{part}", "write")
 
 
 def _six(stress: Floats) -> Floats:

@@ -10,10 +10,10 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import brentq
 
 from xcrack.base.arrays import Floats
-from xcrack.base.checks import called, number, numbers, shown, whole
+from xcrack.base.checks import call_function, number, numbers, value_text, whole_number
 from xcrack.base.errors import ProblemError
 from xcrack.base.paths import path_of, system_errors, written_whole
-from xcrack.fatigue.criteria import clipped, equivalent_K
+from xcrack.fatigue.criteria import clipped_K, equivalent_K
 from xcrack.growth.step import Step
 from xcrack.runs.history import History
 
@@ -148,16 +148,17 @@ def residual_strength(
         No history, values out of bounds, a line without collapse, a collapse that is not positive.
     """
     if not isinstance(history, History):
-        raise ProblemError(f"residual_strength: history = {shown(history)}: give a History.")
+        raise ProblemError(f"residual_strength: history = {value_text(history)}: give a History.")
     nu = number(nu, "residual_strength: nu", above=-1, below=0.5)
     tough = number(K_c, "residual_strength: K_c", above=0)
     if collapse is not None and not callable(collapse):
         raise ProblemError(
-            f"residual_strength: collapse = {shown(collapse)}: give a function of a."
+            f"residual_strength: collapse = {value_text(collapse)}: give a function of a."
         )
     if line is not None and (collapse is None or not isinstance(line, assessment_line)):
         raise ProblemError(
-            f"residual_strength: line = {shown(line)}: give assessment_line, and collapse with it."
+            f"residual_strength: line = {value_text(line)}: give assessment_line, and collapse "
+            f"with it."
         )
     names = ("step", "N", "a", "K", "by_toughness", "by_collapse", "by_line")
     result = np.zeros(len(history.solved), dtype=[(name, float) for name in names])
@@ -168,7 +169,7 @@ def residual_strength(
         by_section = by_line = np.nan
         if collapse is not None:
             by_section = number(
-                called(collapse, f"the collapse of step {step.index}", a),
+                call_function(collapse, f"the collapse of step {step.index}", a),
                 "residual_strength: collapse",
                 above=0,
             )
@@ -181,7 +182,9 @@ def residual_strength(
 def _largest_K(step: Step, nu: float) -> tuple[float, int]:
     """Largest K_eq of all load states at all tips of a step, and the crack that has it."""
     largest = [
-        float(equivalent_K(clipped(np.stack([s[c].K for s in step.sif])), angle, nu).max(initial=0))
+        float(
+            equivalent_K(clipped_K(np.stack([s[c].K for s in step.sif])), angle, nu).max(initial=0)
+        )
         for c, angle in enumerate(step.angle)
     ]
     c = int(np.argmax(largest))
@@ -209,7 +212,7 @@ def geometry_factors(history: History, *, stress: float) -> NDArray[Any]:
         No history, or a stress that is not positive.
     """
     if not isinstance(history, History):
-        raise ProblemError(f"geometry_factors: history = {shown(history)}: give a History.")
+        raise ProblemError(f"geometry_factors: history = {value_text(history)}: give a History.")
     stress = number(stress, "geometry_factors: stress", above=0)
     rows = []
     for step in history.steps:
@@ -264,22 +267,22 @@ def write_factors(
     life codes rise strictly. Units are those of the run.
     """
     if not isinstance(history, History):
-        raise ProblemError(f"write_factors: history = {shown(history)}: give a History.")
+        raise ProblemError(f"write_factors: history = {value_text(history)}: give a History.")
     stress = number(stress, "write_factors: stress", above=0)
-    c = whole(crack, "write_factors: crack", least=0)
-    j = whole(tip, "write_factors: tip", least=0)
+    c = whole_number(crack, "write_factors: crack", least=0)
+    j = whole_number(tip, "write_factors: tip", least=0)
     rows = geometry_factors(history, stress=stress)
-    mine = rows[(rows["crack"] == c) & (rows["tip"] == j)]
-    if not len(mine):
+    rows_of_tip = rows[(rows["crack"] == c) & (rows["tip"] == j)]
+    if not len(rows_of_tip):
         raise ProblemError(
             f"write_factors: the history has no crack {c} with a tip {j}: give "
             "those of history.table()."
         )
-    a, half = mine["a"].copy(), np.full(len(mine), np.nan)
+    a, half = rows_of_tip["a"].copy(), np.full(len(rows_of_tip), np.nan)
     if history.steps[0].cracks[0].fronts is not None:
-        a, half = _on_surface(history, mine["step"], c)
-    beta = mine["K_I"] / (stress * np.sqrt(np.pi * a))
-    table = np.stack([a, half, mine["K_I"], beta], axis=1)
+        a, half = _on_surface(history, rows_of_tip["step"], c)
+    beta = rows_of_tip["K_I"] / (stress * np.sqrt(np.pi * a))
+    table = np.stack([a, half, rows_of_tip["K_I"], beta], axis=1)
     rising = np.concatenate([[True], a[1:] > np.maximum.accumulate(a)[:-1]])
     path = path_of(file, "write_factors: file", error=ProblemError)
     head = (
@@ -298,16 +301,24 @@ def write_factors(
 def _on_surface(history: History, steps: np.ndarray, crack: int) -> tuple[np.ndarray, np.ndarray]:
     """Depth, and half of the length on the surface that the crack lies deepest under."""
     measures, _ = history.measures()
-    mine = measures[measures["crack"] == crack]
-    mine = mine[np.isin(mine["step"], steps)]
-    sets = [name.removeprefix("depth_") for name in mine.dtype.names if name.startswith("depth_")]
-    depth = np.array([mine[f"depth_{name}"] for name in sets]).reshape(len(sets), len(mine))
-    length = np.array([mine[f"length_{name}"] for name in sets]).reshape(len(sets), len(mine))
-    half = np.full(len(mine), np.nan)
-    for n in range(len(mine)):
+    rows_of_crack = measures[measures["crack"] == crack]
+    rows_of_crack = rows_of_crack[np.isin(rows_of_crack["step"], steps)]
+    sets = [
+        name.removeprefix("depth_")
+        for name in rows_of_crack.dtype.names
+        if name.startswith("depth_")
+    ]
+    depth = np.array([rows_of_crack[f"depth_{name}"] for name in sets]).reshape(
+        len(sets), len(rows_of_crack)
+    )
+    length = np.array([rows_of_crack[f"length_{name}"] for name in sets]).reshape(
+        len(sets), len(rows_of_crack)
+    )
+    half = np.full(len(rows_of_crack), np.nan)
+    for n in range(len(rows_of_crack)):
         if np.isfinite(depth[:, n]).any():
             half[n] = 0.5 * length[int(np.nanargmax(depth[:, n])), n]
-    return np.asarray(mine["depth"]), half
+    return np.asarray(rows_of_crack["depth"]), half
 
 
 __all__ = ["assessment_line", "geometry_factors", "residual_strength", "write_factors"]

@@ -22,12 +22,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from xcrack.base.checks import flag, shown, whole
+from xcrack.base.checks import flag, value_text, whole_number
 from xcrack.base.errors import ProblemError, XcrackError, warn
 from xcrack.base.paths import path_of, system_errors, written_whole
 from xcrack.growth.description import describe, differences
 from xcrack.runs.history import History
-from xcrack.runs.lock import locked
+from xcrack.runs.lock import lock_folder
 
 # One case of a campaign: run, and what became of it as a row that can be stored.
 
@@ -42,7 +42,7 @@ def key_of(parameters: Parameters) -> str:
     return hashlib.sha256(json.dumps(parameters, sort_keys=True).encode()).hexdigest()[:16]
 
 
-def checked(parameters: Any, number: int) -> dict[str, Any]:
+def checked_case(parameters: Any, number: int) -> dict[str, Any]:
     """Parameters of a case as values that a file can hold.
 
     Raises
@@ -52,7 +52,7 @@ def checked(parameters: Any, number: int) -> dict[str, Any]:
     """
     if not isinstance(parameters, Mapping):
         raise ProblemError(
-            f"campaign: cases[{number}] = {shown(parameters)}: give a dict of the arguments "
+            f"campaign: cases[{number}] = {value_text(parameters)}: give a dict of the arguments "
             "of a case."
         )
     result: dict[str, Any] = {}
@@ -67,8 +67,8 @@ def checked(parameters: Any, number: int) -> dict[str, Any]:
         fits = fits or (isinstance(value, int | float) and bool(np.isfinite(value)))
         if not isinstance(name, str) or not fits:
             raise ProblemError(
-                f"campaign: cases[{number}][{name!r:.40}] = {shown(given)}: give names, and finite "
-                "numbers, texts, True, False or None; make meshes and laws within the case."
+                f"campaign: cases[{number}][{name!r:.40}] = {value_text(given)}: give names, and "
+                f"finite numbers, texts, True, False or None; make meshes and laws within the case."
             )
         result[name] = value
     return result
@@ -86,7 +86,7 @@ def run_case(case: Callable[..., Any], parameters: dict[str, Any]) -> dict[str, 
     begin = time.process_time()
     row: dict[str, Any] = {"parameters": parameters, "result": {}, "error": "", "kind": ""}
     row["trace"] = ""
-    with warnings.catch_warnings(record=True) as seen:
+    with warnings.catch_warnings(record=True) as caught_warnings:
         warnings.simplefilter("always")
         try:
             row["result"] = _numbers(case(**parameters), parameters)
@@ -95,7 +95,7 @@ def run_case(case: Callable[..., Any], parameters: dict[str, Any]) -> dict[str, 
         except Exception as error:
             row["error"], row["kind"] = str(error) or repr(error), type(error).__name__
             row["trace"] = traceback.format_exc()
-    row["warnings"] = sorted({str(warning.message) for warning in seen})
+    row["warnings"] = sorted({str(warning.message) for warning in caught_warnings})
     row["seconds"] = time.process_time() - begin
     return row
 
@@ -111,7 +111,7 @@ def _numbers(value: Any, parameters: Parameters) -> dict[str, Any]:
             number = given.item() if isinstance(given, np.generic) else given
             if not isinstance(number, Real | str) or isinstance(number, complex):
                 raise ProblemError(
-                    f"campaign: a case returned {name!r:.40} = {shown(given)}: give numbers "
+                    f"campaign: a case returned {name!r:.40} = {value_text(given)}: give numbers "
                     "and texts."
                 )
             if name in COLUMNS or (name in parameters and number != parameters[name]):
@@ -122,7 +122,7 @@ def _numbers(value: Any, parameters: Parameters) -> dict[str, Any]:
             result[str(name)] = number
         return result
     raise ProblemError(
-        f"campaign: a case returned {shown(value)}: give a History, or a dict of numbers."
+        f"campaign: a case returned {value_text(value)}: give a History, or a dict of numbers."
     )
 
 
@@ -201,7 +201,7 @@ def _submit_of(client: Any) -> Callable[..., Any]:
     return partial(client.submit, pure=False)
 
 
-def submitted(engine: Engine, parameters: dict[str, Any], case: Callable[..., Any]) -> Any:
+def submit_case(engine: Engine, parameters: dict[str, Any], case: Callable[..., Any]) -> Any:
     """Future of a case.
 
     Raises
@@ -222,7 +222,7 @@ def submitted(engine: Engine, parameters: dict[str, Any], case: Callable[..., An
         ) from error
 
 
-def finished(engine: Engine, futures: Mapping[str, Any]) -> Iterator[str]:
+def finished_names(engine: Engine, futures: Mapping[str, Any]) -> Iterator[str]:
     """Names of futures as they finish, where they can say so, else in their order.
 
     Raises
@@ -237,18 +237,18 @@ def finished(engine: Engine, futures: Mapping[str, Any]) -> Iterator[str]:
         return
     for key, future in futures.items():
         future.add_done_callback(lambda _, key=key: done.put(key))
-    left = set(futures)
-    while left:
+    waiting = set(futures)
+    while waiting:
         try:
             key = done.get(timeout=_LOOK)
         except queue.Empty:
             if engine.is_closed:
                 raise ProblemError(
-                    f"campaign: the client is closed, and {len(left)} cases are not finished. "
+                    f"campaign: the client is closed, and {len(waiting)} cases are not finished. "
                     "Finished cases are stored: call again with another client to go on."
                 ) from None
             continue
-        left.discard(key)
+        waiting.discard(key)
         yield key
 
 
@@ -266,7 +266,7 @@ def answer_of(engine: Engine, future: Any, parameters: dict[str, Any]) -> Any:
             "gone. Finished cases are stored: call again to go on."
         )
     try:
-        return _awaited(engine, future)
+        return _await_answer(engine, future)
     except (KeyboardInterrupt, SystemExit):
         raise
     except BrokenProcessPool as error:
@@ -278,7 +278,7 @@ def answer_of(engine: Engine, future: Any, parameters: dict[str, Any]) -> Any:
         ) from error
 
 
-def _awaited(engine: Engine, future: Any) -> Any:
+def _await_answer(engine: Engine, future: Any) -> Any:
     """Answer of a future; one of dask may say that it has one, whose scheduler then dies."""
     while engine.is_dask:
         try:
@@ -400,26 +400,30 @@ def campaign(
     """
     folder = path_of(path, "campaign: path", error=ProblemError)
     if not callable(case):
-        raise ProblemError(f"campaign: case = {shown(case)} cannot be called: give a function.")
+        raise ProblemError(
+            f"campaign: case = {value_text(case)} cannot be called: give a function."
+        )
     again = flag(retry, "campaign: retry")
-    listed = _listed(cases, "campaign: cases", "a list of dicts")
-    count = whole(workers, "campaign: workers", least=1, most=1024)
+    listed = _list_of(cases, "campaign: cases", "a list of dicts")
+    count = whole_number(workers, "campaign: workers", least=1, most=1024)
     if client is not None and not callable(getattr(client, "submit", None)):
-        raise ProblemError(f"campaign: client = {shown(client)}: give one that has submit(...).")
-    every = {key_of(each): each for each in (checked(c, n) for n, c in enumerate(listed))}
+        raise ProblemError(
+            f"campaign: client = {value_text(client)}: give one that has submit(...)."
+        )
+    every = {key_of(each): each for each in (checked_case(c, n) for n, c in enumerate(listed))}
     if not every:
         raise ProblemError("campaign: cases is empty: give one, at least.")
     with system_errors("the study cannot be written to", folder, error=ProblemError):
         folder.mkdir(parents=True, exist_ok=True)
-    with locked(folder):
+    with lock_folder(folder):
         _check_header(folder, case)
         stored = {key: _read(folder, key) for key in every}
-        wanted = [
+        result_names = [
             key for key, row in stored.items() if row is None or (again and bool(row["kind"]))
         ]
         with engine_of(count, client) as engine:
-            _run(folder, case, every, wanted, engine)
-    return Study(folder, tuple(_stored(folder, key) for key in every))
+            _run(folder, case, every, result_names, engine)
+    return Study(folder, tuple(_stored_case(folder, key) for key in every))
 
 
 def grid(**parameters: Iterable[Any]) -> list[dict[str, Any]]:
@@ -446,44 +450,44 @@ def grid(**parameters: Iterable[Any]) -> list[dict[str, Any]]:
     """
     lists = {}
     for name, values in parameters.items():
-        lists[name] = _listed(values, f"grid: {name}", "a list of values")
+        lists[name] = _list_of(values, f"grid: {name}", "a list of values")
     return [dict(zip(lists, each)) for each in product(*lists.values())]
 
 
-def _listed(values: Any, what: str, wanted: str) -> list[Any]:
+def _list_of(values: Any, what: str, expectation: str) -> list[Any]:
     """Entries of whatever can be gone through, but for text and dicts."""
     if not isinstance(values, str | bytes | Mapping):
         try:
             return list(values)
         except TypeError:
             pass
-    raise ProblemError(f"{what} = {shown(values)}: give {wanted}.")
+    raise ProblemError(f"{what} = {value_text(values)}: give {expectation}.")
 
 
 def _run(
     folder: Path,
     case: Callable[..., Any],
     every: Mapping[str, dict[str, Any]],
-    wanted: list[str],
+    names: list[str],
     engine: Engine,
 ) -> None:
     """Run the cases; each is stored as soon as it is finished, in whatever order."""
-    if not wanted:
+    if not names:
         return
-    first, rest = wanted[0], wanted[1:]
-    _finish(engine, folder, first, every[first], submitted(engine, every[first], case))
+    first, remaining_names = names[0], names[1:]
+    _finish(engine, folder, first, every[first], submit_case(engine, every[first], case))
     futures: dict[str, Any] = {}
     try:
-        for key in rest:
-            futures[key] = submitted(engine, every[key], case)
-        for key in finished(engine, futures):
+        for key in remaining_names:
+            futures[key] = submit_case(engine, every[key], case)
+        for key in finished_names(engine, futures):
             _finish(engine, folder, key, every[key], futures[key])
     except BaseException:
-        _harvest(folder, every, engine, futures)
+        _store_finished(folder, every, engine, futures)
         raise
 
 
-def _harvest(
+def _store_finished(
     folder: Path, every: Mapping[str, dict[str, Any]], engine: Engine, futures: Mapping[str, Any]
 ) -> None:
     """Store what has been finished when a study is broken off, and call off the rest."""
@@ -543,7 +547,7 @@ def _read(folder: Path, key: str) -> dict[str, Any] | None:
     return row if whole_row else None
 
 
-def _stored(folder: Path, key: str) -> dict[str, Any]:
+def _stored_case(folder: Path, key: str) -> dict[str, Any]:
     row = _read(folder, key)
     if row is None:
         raise ProblemError(f"{_file(folder, key)} has gone while the study was running.")
@@ -565,12 +569,12 @@ __all__ = [
     "answer_of",
     "call_off",
     "campaign",
-    "checked",
+    "checked_case",
     "engine_of",
-    "finished",
+    "finished_names",
     "grid",
     "is_good",
     "key_of",
     "run_case",
-    "submitted",
+    "submit_case",
 ]

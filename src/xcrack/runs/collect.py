@@ -6,22 +6,22 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Unpack
 
-from xcrack.base.checks import called, flag, shown
+from xcrack.base.checks import call_function, flag, value_text
 from xcrack.base.errors import ProblemError, warn
 from xcrack.base.paths import path_of, system_errors
 from xcrack.fatigue.criteria import Criterion
 from xcrack.fatigue.law import Law
 from xcrack.fatigue.spectrum import Spectrum
 from xcrack.growth.description import differences, only_compiled_differently
-from xcrack.growth.options import GrowOptions, Run, lists_options, run_of
+from xcrack.growth.options import GrowthOptions, GrowthRule, lists_options, run_of
 from xcrack.growth.run import steps_of
 from xcrack.growth.step import Cycle, Step
 from xcrack.mesh.mesh import Mesh
 from xcrack.model.problem import Problem
 from xcrack.runs import run_folder
 from xcrack.runs.history import History
-from xcrack.runs.lock import locked
-from xcrack.runs.run_folder import Header
+from xcrack.runs.lock import lock_folder
+from xcrack.runs.run_folder import RunHeader
 from xcrack.runs.run_store import RunStore
 from xcrack.runs.saved import read_body, read_saved
 from xcrack.runs.versions import versions
@@ -73,11 +73,15 @@ def collect(
     try:
         iter(steps)
     except Exception as error:  # whatever an object's own __iter__ raises
-        raise ProblemError(f"collect: steps = {shown(steps)}: give what grow returns.") from error
+        raise ProblemError(
+            f"collect: steps = {value_text(steps)}: give what grow returns."
+        ) from error
     if isinstance(steps, str | bytes):
-        raise ProblemError(f"collect: steps = {shown(steps)} is a text: give what grow returns.")
+        raise ProblemError(
+            f"collect: steps = {value_text(steps)} is a text: give what grow returns."
+        )
     _check_options("collect", until, overwrite=overwrite, keep_solutions=keep_solutions)
-    run = _Collection(until, keep_solutions)
+    run = Collector(until, keep_solutions)
     if path is None:
         return run.of(steps)
     folder = path_of(path, "collect: path", error=ProblemError)
@@ -85,7 +89,7 @@ def collect(
         if folder.exists() and not folder.is_dir():
             raise ProblemError(f"{folder} is a file; a run needs a folder of its own.")
         folder.mkdir(parents=True, exist_ok=True)
-    with locked(folder) as check:
+    with lock_folder(folder) as check:
         run_folder.sweep(folder)
         if not overwrite:
             _refuse_stored(folder)
@@ -104,7 +108,7 @@ def resume(
     *,
     until: Until | None = None,
     keep_solutions: bool = True,
-    **options: Unpack[GrowOptions],
+    **options: Unpack[GrowthOptions],
 ) -> History:
     """Go on with a run that is on disk, to the history it would have had, to the last bit.
 
@@ -150,13 +154,13 @@ def resume(
     _check_options("resume", until, keep_solutions=keep_solutions)
     folder = path_of(path, "resume: path", error=ProblemError)
     with system_errors("no run can be read from", folder, error=ProblemError):
-        there = folder.is_dir()
-    if not there:
+        folder_exists = folder.is_dir()
+    if not folder_exists:
         raise ProblemError(
             f"no run to go on with in {folder}: collect(grow(...), path=...) starts one."
         )
-    collection = _Collection(until, keep_solutions, mesh=problem.mesh)
-    with locked(folder) as check:
+    collection = Collector(until, keep_solutions, mesh=problem.mesh)
+    with lock_folder(folder) as check:
         run_folder.sweep(folder)
         header, damaged = run_folder.read_header(folder)
         if header is None:  # killed before its first step
@@ -234,7 +238,7 @@ def _last_mesh(folder: Path, steps: Sequence[Step]) -> Mesh | None:
 
 
 @dataclass
-class _Collection:
+class Collector:
     """Steps that are taken until they end, each on disk before the next is asked for."""
 
     until: Until | None
@@ -246,9 +250,9 @@ class _Collection:
     def of(self, steps: Iterable[Step]) -> History:
         """Take all steps of an iterable; Ctrl-C and errors lose none of those taken."""
         with ExitStack() as stack:
-            close = getattr(steps, "close", None)
-            if close is not None:
-                stack.callback(close)
+            close_steps = getattr(steps, "close", None)
+            if close_steps is not None:
+                stack.callback(close_steps)
             try:
                 ended = self._take(steps)
             except KeyboardInterrupt:
@@ -281,7 +285,9 @@ class _Collection:
             except StopIteration as stop:
                 return str(stop.value or "no more steps")
             if not isinstance(step, Step):
-                raise ProblemError(f"collect: {shown(step)} is not a Step: give what grow returns.")
+                raise ProblemError(
+                    f"collect: {value_text(step)} is not a Step: give what grow returns."
+                )
             has_own = step.memory is not None and bool(step.memory.mesh)
             if step.solutions and (self.mesh is None or has_own):
                 self.mesh = step.solutions[0].problem.mesh
@@ -295,7 +301,7 @@ class _Collection:
         # Where no tip is left the run ends anyway, and functions of users look for K.
         if self.until is None or step.has_left:
             return False
-        enough = called(self.until, f"until, after step {step.index}", step)
+        enough = call_function(self.until, f"until, after step {step.index}", step)
         return flag(enough, "collect: what until returned")
 
     def _interrupted(self) -> str:
@@ -328,26 +334,26 @@ def _is_interrupt(error: BaseException) -> bool:
     return isinstance(error, SystemError) and before is not None and _is_interrupt(before)
 
 
-def _as_begun(run: Run, header: Header, folder: Path) -> Run:
+def _as_begun(run: GrowthRule, header: RunHeader, folder: Path) -> GrowthRule:
     """The run with the defaults of a stored one, whose settings must be the same."""
     run = run.as_begun(header.settings)
-    settings, now = run.settings, versions()
+    settings, current_versions = run.settings, versions()
     compiled: list[str] = []
-    if header.versions.get("python") != now["python"]:
+    if header.versions.get("python") != current_versions["python"]:
         compiled = only_compiled_differently(header.settings, settings)
     given = {**settings, **{key: header.settings[key] for key in compiled}}
     lines = differences(header.settings, given)
     if lines:
         raise ProblemError(
-            f"the run in {folder} was made with other settings: {_few(lines)}. Give those, or "
-            "begin another run in another folder."
+            f"the run in {folder} was made with other settings: {_first_differences(lines)}. Give "
+            f"those, or begin another run in another folder."
         )
-    lines = differences(header.versions, now)
+    lines = differences(header.versions, current_versions)
     lines += [f"{key}: its code cannot be compared between the two" for key in compiled]
     if lines:
         warn(
             f"the run in {folder} was made with other versions, on another processor or with "
-            f"other threads, its last bits may differ: {_few(lines)}."
+            f"other threads, its last bits may differ: {_first_differences(lines)}."
         )
     # What is stored stands for the run, however another python compiles its functions.
     return run
@@ -366,7 +372,7 @@ def _refuse_stored(folder: Path) -> None:
     )
 
 
-def _move_aside(folder: Path, stored: run_folder.Stored, damaged: Path | None) -> None:
+def _move_aside(folder: Path, stored: run_folder.StoredSteps, damaged: Path | None) -> None:
     """Move aside what does not belong to the part of a run that is whole, and warn of it."""
     files = [*stored.rest, *([] if damaged is None else [damaged])]
     aside = run_folder.move_aside(folder, files)
@@ -384,13 +390,13 @@ def _move_aside(folder: Path, stored: run_folder.Stored, damaged: Path | None) -
 def _check_options(caller: str, until: Any, **flags: Any) -> None:
     if until is not None and not callable(until):
         raise ProblemError(
-            f"{caller}: until = {shown(until)} cannot be called: give a function of a Step."
+            f"{caller}: until = {value_text(until)} cannot be called: give a function of a Step."
         )
     for name, value in flags.items():
         flag(value, f"{caller}: {name}")
 
 
-def _few(lines: list[str]) -> str:
+def _first_differences(lines: list[str]) -> str:
     """The first few of many differences, in one line."""
     more = len(lines) - _SHOWN
     return "; ".join(lines[:_SHOWN]) + (f"; and {more} more" if more > 0 else "")

@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xcrack.base import markup
-from xcrack.base.checks import entries, flag, shown
+from xcrack.base.checks import entries, flag, value_text
 from xcrack.base.errors import ProblemError
-from xcrack.base.markup import element, joined
-from xcrack.base.optional import required
+from xcrack.base.markup import element, join_parts
+from xcrack.base.optional import require_package
 from xcrack.base.paths import path_of, system_errors, write_texts
 from xcrack.base.svg import rim, sketch
 from xcrack.crack.crack import Crack
@@ -24,8 +24,8 @@ from xcrack.fatigue.spectrum import Spectrum
 from xcrack.growth.step import Arrival, Join, Step
 from xcrack.mesh.mesh import Mesh
 from xcrack.runs.life_bar import LifeBar, life_bar
-from xcrack.runs.measures import measured, measures_tables, with_measures
-from xcrack.runs.rerating import Rerated, block_of_run, rerated
+from xcrack.runs.measures import measures_of_steps, measures_tables, with_measures
+from xcrack.runs.rerating import RecomputedRates, block_of_run, recompute_rates
 from xcrack.runs.table import table
 
 
@@ -59,16 +59,17 @@ class History:
         for step in steps:
             if not isinstance(step, Step):
                 raise ProblemError(
-                    f"History: {shown(step)} among the steps is not a Step: give those of grow."
+                    f"History: {value_text(step)} among the steps is not a Step: give those of "
+                    f"grow."
                 )
         object.__setattr__(self, "steps", steps)
         if not isinstance(self.ended, str):
-            raise ProblemError(f"History: ended = {shown(self.ended)}: give a text.")
+            raise ProblemError(f"History: ended = {value_text(self.ended)}: give a text.")
         if self.path is not None:
             path = path_of(self.path, "History: path", error=ProblemError)
             object.__setattr__(self, "path", path)
         if not isinstance(self.mesh, Mesh | None):
-            raise ProblemError(f"History: mesh = {shown(self.mesh)}: give a Mesh.")
+            raise ProblemError(f"History: mesh = {value_text(self.mesh)}: give a Mesh.")
 
     @property
     def cracks(self) -> tuple[Crack, ...]:
@@ -123,7 +124,7 @@ class History:
         if self.steps:
             values = self.table()
             parts.append(markup.table(values.dtype.names or (), values.tolist(), scroll=True))
-        return joined(*parts)
+        return join_parts(*parts)
 
     def to_pandas(self) -> Any:
         """The numbers of `table` as a table of pandas.
@@ -137,7 +138,7 @@ class History:
         XcrackError
             pandas is not installed.
         """
-        return required("pandas", "History.to_pandas").DataFrame(self.table())
+        return require_package("pandas", "History.to_pandas").DataFrame(self.table())
 
     def table(self, measures: bool = False) -> NDArray[Any]:
         """All numbers, one row for each tip, in 3D for each front, of each step.
@@ -170,7 +171,7 @@ class History:
         if not flag(measures, "History.table: measures"):
             return rows
         body = self._body(None, "History.table(measures=True)")
-        return with_measures(rows, measured(self.steps, body), body)
+        return with_measures(rows, measures_of_steps(self.steps, body), body)
 
     def rerate(
         self,
@@ -181,7 +182,7 @@ class History:
         criterion: Criterion | None = None,
         nu: float | None = None,
         threshold: float = 0.0,
-    ) -> Rerated:
+    ) -> RecomputedRates:
         """Cycles of the same steps by another growth law.
 
         Parameters
@@ -194,7 +195,7 @@ class History:
 
         Returns
         -------
-        Rerated
+        RecomputedRates
             With `cycles` at each step, `life`, and the `bound` of what other shares of the tips
             would change; 0 for one tip, where the error is that of the steps.
 
@@ -205,7 +206,7 @@ class History:
             spectrum that is not given, or is another one; a law by which the driving tip stops.
         """
         block = block_of_run("rerate", spectrum, criterion, nu, threshold)
-        return rerated(self.steps, law, old, block)
+        return recompute_rates(self.steps, law, old, block)
 
     def measures(self, mesh: Mesh | None = None) -> tuple[NDArray[Any], NDArray[Any]]:
         """What an engineer reads off the cracks: depth, surface lengths, area, ends by set.
@@ -231,7 +232,7 @@ class History:
             No mesh is known.
         """
         body = self._body(mesh, "History.measures")
-        return measures_tables(measured(self.steps, body), body)
+        return measures_tables(measures_of_steps(self.steps, body), body)
 
     def _body(self, mesh: Mesh | None, what: str) -> Mesh:
         body = self.mesh if mesh is None else mesh
@@ -240,7 +241,7 @@ class History:
                 f"{what}: this run was read without its mesh: give measures(mesh=...), or make a "
                 "History with mesh=."
                 if body is None
-                else f"{what}: mesh = {shown(body)}: give a Mesh."
+                else f"{what}: mesh = {value_text(body)}: give a Mesh."
             )
         return body
 
@@ -293,7 +294,7 @@ class History:
         rows, mesh = self.table(), self.mesh
         tables = {"history": rows}
         if mesh is not None:
-            every = measured(self.steps, mesh)
+            every = measures_of_steps(self.steps, mesh)
             tables["history"] = with_measures(rows, every, mesh)
             tables["measures"], tables["ends"] = measures_tables(every, mesh)
         texts = {folder / f"{name}.csv": _csv_text(each) for name, each in tables.items()}

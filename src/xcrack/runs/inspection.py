@@ -7,10 +7,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from xcrack.base.arrays import Floats
-from xcrack.base.checks import called, number, numbers, shown
+from xcrack.base.checks import call_function, number, numbers, value_text
 from xcrack.base.errors import ProblemError
 from xcrack.runs.history import History
-from xcrack.runs.rerating import cycles_of, driving
+from xcrack.runs.rerating import cycles_of, driving_forces
 
 _MOST_LOOKS = 1000
 
@@ -108,8 +108,8 @@ class GrowthCurve:
         step = np.array([self.a[i], self.a[i + 1]])
         begin, end = self.rate[i]
         power = np.log(end / begin) / np.log(step[1] / step[0])
-        there = begin * (a / step[0]) ** power if np.isfinite(power) else begin
-        part = float(cycles_of(np.array([step[0], a]), np.array([begin, there])))
+        cycles_there = begin * (a / step[0]) ** power if np.isfinite(power) else begin
+        part = float(cycles_of(np.array([step[0], a]), np.array([begin, cycles_there])))
         all_of_it = float(cycles_of(step, self.rate[i]))
         return float(self.N[i] + part / all_of_it * (self.N[i + 1] - self.N[i]))
 
@@ -145,8 +145,8 @@ def growth_curve(history: History) -> GrowthCurve:
         Another tip drives from some step on: there is no one curve.
     """
     if not isinstance(history, History):
-        raise ProblemError(f"growth_curve: history = {shown(history)}: give a History.")
-    rows = driving(history.steps)
+        raise ProblemError(f"growth_curve: history = {value_text(history)}: give a History.")
+    rows = driving_forces(history.steps)
     lead = rows.drives
     a, rate, step = rows.a[lead], rows.rate[lead], rows.step[lead]
     if not rows.is_one_tip:
@@ -199,7 +199,7 @@ def inspection(
     if isinstance(curve, History):
         curve = growth_curve(curve)
     if not isinstance(curve, GrowthCurve):
-        raise ProblemError(f"inspection: curve = {shown(curve)}: give a History.")
+        raise ProblemError(f"inspection: curve = {value_text(curve)}: give a History.")
     if (a_detect is None) == (interval is None):
         raise ProblemError("inspection: give a_detect or interval, and not both.")
     low, high = float(curve.a[0]), float(curve.a[-1])
@@ -211,14 +211,14 @@ def inspection(
         )
     begin, last = float(curve.N[0]), curve.cycles_at(end)
     if a_detect is not None:
-        seen = number(a_detect, "inspection: a_detect", above=0)
-        if not low <= seen < end:
+        detected_length = number(a_detect, "inspection: a_detect", above=0)
+        if not low <= detected_length < end:
             raise ProblemError(
-                f"inspection: a_detect = {seen:.6g} is no length of the run: give one from "
-                f"{low:.6g} to {end:.6g}."
+                f"inspection: a_detect = {detected_length:.6g} is no length of the run: give one "
+                f"from {low:.6g} to {end:.6g}."
             )
         share = number(factor, "inspection: factor", least=1)
-        every = (last - curve.cycles_at(seen)) / share
+        every = (last - curve.cycles_at(detected_length)) / share
         first = begin + (last - begin) / 2
     else:
         every = number(interval, "inspection: interval", above=0)
@@ -230,15 +230,19 @@ def inspection(
         )
     at = np.arange(first, last, every)
     if pod is not None and not callable(pod):
-        raise ProblemError(f"inspection: pod = {shown(pod)}: give logistic_pod.")
+        raise ProblemError(f"inspection: pod = {value_text(pod)}: give logistic_pod.")
     a = np.array([curve.length_at(N) for N in at])
-    missed = None if pod is None else float(np.prod([1 - _detected(pod, each) for each in a]))
+    missed = (
+        None
+        if pod is None
+        else float(np.prod([1 - _detection_probability(pod, each) for each in a]))
+    )
     return Inspection(first, every, at, a, missed)
 
 
-def _detected(pod: Any, a: float) -> float:
+def _detection_probability(pod: Any, a: float) -> float:
     """Probability of detection of a length, by a function of the user's."""
-    answer = called(pod, f"the probability of detection at a = {a:.6g}", a)
+    answer = call_function(pod, f"the probability of detection at a = {a:.6g}", a)
     return number(answer, "inspection: what pod returned", least=0, most=1)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xcrack.base.arrays import Floats, lock
-from xcrack.base.checks import number, shown, whole
+from xcrack.base.checks import number, value_text, whole_number
 from xcrack.base.errors import ProblemError
 from xcrack.fatigue.criteria import Criterion
 from xcrack.fatigue.law import Law
@@ -16,16 +16,16 @@ from xcrack.fatigue.retardation import Retardation
 from xcrack.fatigue.spectrum import Spectrum
 from xcrack.runs.history import History
 from xcrack.runs.rerating import (
-    Block,
-    Driving,
+    DrivingForce,
+    SpectrumBlock,
     block_of_run,
     bound_of_shares,
     check_block,
     cycles_of,
-    driving,
+    driving_forces,
 )
 from xcrack.runs.retarded import RetardedLives
-from xcrack.runs.scatter import Scatter, lives, varied
+from xcrack.runs.scatter import Scatter, lives, varied_law
 
 _SAMPLES, _FEW = 100_000, 200
 _ENDS = (0.05, 0.95)
@@ -184,20 +184,20 @@ def life(
     power of the factor between them; for constants of the law it is asked for each sample.
     """
     if not isinstance(history, History):
-        raise ProblemError(f"life: history = {shown(history)}: give a History.")
+        raise ProblemError(f"life: history = {value_text(history)}: give a History.")
     if not isinstance(scatter, Scatter):
-        raise ProblemError(f"life: scatter = {shown(scatter)}: give Scatter(C=...).")
+        raise ProblemError(f"life: scatter = {value_text(scatter)}: give Scatter(C=...).")
     if not (law is None or callable(law)):
-        raise ProblemError(f"life: law = {shown(law)} cannot be called: give a law.")
+        raise ProblemError(f"life: law = {value_text(law)} cannot be called: give a law.")
     if not (unit is None or (isinstance(unit, str) and unit)):
-        raise ProblemError(f"life: unit = {shown(unit)}: give a word, such as 'flight'.")
-    wanted = (_SAMPLES if retardation is None else _FEW) if samples is None else samples
-    n = whole(wanted, "life: samples", least=100, most=10_000_000)
+        raise ProblemError(f"life: unit = {value_text(unit)}: give a word, such as 'flight'.")
+    sample_count = (_SAMPLES if retardation is None else _FEW) if samples is None else samples
+    n = whole_number(sample_count, "life: samples", least=100, most=10_000_000)
     block = block_of_run("life", spectrum, criterion, nu, threshold)
     limit = number(max_blocks, "life: max_blocks", above=0)
     if retardation is not None:
         cycled = RetardedLives(history, law, block, retardation, limit)
-        return _retarded(cycled, history, law, scatter, block, n, seed, unit)
+        return _retarded_lives(cycled, history, law, scatter, block, n, seed, unit)
     rows = _rows(history, law, scatter, block)
     lead = rows.lead
     drawn = scatter.draw(n, seed)
@@ -214,12 +214,16 @@ def life(
 
 
 def _bounds(
-    history: History, rows: Driving, law: Law | None, scatter: Scatter, block: Block | None
+    history: History,
+    rows: DrivingForce,
+    law: Law | None,
+    scatter: Scatter,
+    block: SpectrumBlock | None,
 ) -> dict[str, float]:
     """Numerical errors as shares of the life, by source."""
     lead, bar = rows.lead, history.life_bar
-    known = np.isfinite(bar.steps) and bar.life > 0
-    bounds = {"steps": bar.steps / bar.life if known else _of_steps(lead)}
+    has_bar = np.isfinite(bar.steps) and bar.life > 0
+    bounds = {"steps": bar.steps / bar.life if has_bar else _of_steps(lead)}
     if np.isfinite(bar.K) and bar.life > 0:
         bounds["K"] = (bar.K + bar.contact + bar.unknown) / bar.life
     if law is None or (block is None and history.steps[0].levels):
@@ -232,12 +236,12 @@ def _bounds(
     return bounds
 
 
-def _retarded(
+def _retarded_lives(
     cycled: RetardedLives,
     history: History,
     law: Law | None,
     scatter: Scatter,
-    block: Block | None,
+    block: SpectrumBlock | None,
     n: int,
     seed: int,
     unit: str | None,
@@ -259,16 +263,18 @@ def _retarded(
     return Life(lock(N), cycled.life, alone, bounds, word)
 
 
-def _rows(history: History, law: Law | None, scatter: Scatter, block: Block | None) -> Driving:
+def _rows(
+    history: History, law: Law | None, scatter: Scatter, block: SpectrumBlock | None
+) -> DrivingForce:
     """Places of the run, where the law and the spectrum are those that it had."""
     needs = set(scatter.parts) - {"C", "a0"}
     if law is None:
         if needs:
             raise ProblemError(f"life: {', '.join(sorted(needs))} varies: give the law of the run.")
-        return driving(history.steps)
+        return driving_forces(history.steps)
     if needs or block is not None:
         check_block(history.steps, block, law, "life")
-    rows = driving(history.steps, block)
+    rows = driving_forces(history.steps, block)
     if (block is not None or not history.steps[0].levels) and not np.allclose(
         rows.rates(law), rows.rate, rtol=_SAME, atol=0
     ):
@@ -282,16 +288,16 @@ def _rows(history: History, law: Law | None, scatter: Scatter, block: Block | No
             "or initial stress. Run it with other loads, Spectrum.scaled, to see what they do."
         )
     for name in scatter.constants:
-        varied(law, {name: 1.0})
+        varied_law(law, {name: 1.0})
     return rows
 
 
-def _is_proportional(history: History, block: Block) -> bool:
+def _is_proportional(history: History, block: SpectrumBlock) -> bool:
     chosen = block.spectrum.states is not None or block.spectrum.levels != "auto"
     return not block.spectrum.steady and (chosen or len(history.steps[0].levels) <= 2)
 
 
-def _checked_sizes(lead: Driving, sizes: Floats) -> Floats:
+def _checked_sizes(lead: DrivingForce, sizes: Floats) -> Floats:
     if len(np.unique(lead.place, axis=0)) > 1 or not lead.is_one_tip:
         raise ProblemError(
             "life: a0 varies, but several tips drive the run: its path belongs to the cracks "
@@ -312,7 +318,7 @@ def _ends(N: Floats) -> tuple[float, float]:
     return float(low), float(high)
 
 
-def _of_steps(lead: Driving) -> float:
+def _of_steps(lead: DrivingForce) -> float:
     """A third of what every second step adds, as a share; nan where one place does not last."""
     if len(lead.step) < 4 or not lead.is_one_tip or not np.isfinite(lead.rate).all():
         return float("nan")
@@ -323,35 +329,39 @@ def _of_steps(lead: Driving) -> float:
     return abs(float(cycles_of(a, rate).sum()) - whole_run) / 3 / whole_run
 
 
-def _changed(lead: Driving, rate: Floats) -> float:
+def _change_of_life(lead: DrivingForce, rate: Floats) -> float:
     """Share by which the life is another one with other rates."""
     counted = lead.cycles / cycles_of(lead.a, lead.rate)
     nominal = float(lead.cycles.sum())
     return abs(float((cycles_of(lead.a, rate) * counted).sum()) - nominal) / nominal
 
 
-def _of_K(lead: Driving, law: Law) -> float:
+def _of_K(lead: DrivingForce, law: Law) -> float:
     """Largest change of the life with all K larger or smaller by their spread."""
-    return max(_changed(lead, lead.rates(law, 1.0 + s * lead.spread)) for s in (-1.0, 1.0))
+    return max(_change_of_life(lead, lead.rates(law, 1.0 + s * lead.spread)) for s in (-1.0, 1.0))
 
 
-def _of_levels(history: History, lead: Driving, law: Law, block: Block) -> float:
+def _of_levels(history: History, lead: DrivingForce, law: Law, block: SpectrumBlock) -> float:
     """A third of the change of the life with every second level left out."""
     if all(block.is_solved(step) for step in history.steps):
         return 0.0
-    coarse = driving(history.steps, replace(block, coarse=True)).lead
-    return _changed(lead, coarse.rates(law)) / 3
+    coarse = driving_forces(history.steps, replace(block, coarse=True)).lead
+    return _change_of_life(lead, coarse.rates(law)) / 3
 
 
-def _of_tips(rows: Driving, law: Law, scatter: Scatter) -> float:
+def _of_tips(rows: DrivingForce, law: Law, scatter: Scatter) -> float:
     """Largest change of shares of the advance, of the 5 and 95 % samples of each source alone."""
     counted, worst = rows.cycles[rows.step[rows.drives]], 0.0
     for name, part in scatter.parts.items():
         if name in ("C", "a0"):
             continue
         for value in (float(part.quantile(p)) for p in _ENDS):
-            own = name in scatter.constants
-            rate = rows.rates(varied(law, {name: value})) if own else rows.rates(law, value)
+            is_own_constant = name in scatter.constants
+            rate = (
+                rows.rates(varied_law(law, {name: value}))
+                if is_own_constant
+                else rows.rates(law, value)
+            )
             worst = max(worst, bound_of_shares(rows, rate[:, 0], counted))
     if worst > _MOST:
         raise ProblemError(

@@ -80,8 +80,8 @@ def life_bar(steps: Sequence[Step]) -> LifeBar:
     nan = float("nan")
     every = [sif for step in steps for sif in (step.sif[0] if step.sif else ())]
     states = [state for step in steps for state in zip(*step.sif)]
-    known = [np.all([uses_best(sif) for sif in crack], axis=0) for crack in states]
-    best = sum(int(np.count_nonzero(own)) for own in known)
+    best_flags = [np.all([uses_best(sif) for sif in crack], axis=0) for crack in states]
+    best = sum(int(np.count_nonzero(flags_of_crack)) for flags_of_crack in best_flags)
     places = sum(len(sif.K) for sif in every)
     texts = [
         reason for step in steps for state in step.sif for sif in state

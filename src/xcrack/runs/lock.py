@@ -24,7 +24,7 @@ _TRIES = 20  # others may take or leave the lock meanwhile
 
 
 @contextmanager
-def locked(folder: Path) -> Iterator[Callable[[], None]]:
+def lock_folder(folder: Path) -> Iterator[Callable[[], None]]:
     """Keep other processes from writing to a folder within a block.
 
     The lock is a file that appears with its whole content. It is left behind by a kill; the next
@@ -63,7 +63,7 @@ def locked(folder: Path) -> Iterator[Callable[[], None]]:
 
 def _take(path: Path, owner: dict[str, Any]) -> None:
     for _ in range(_TRIES):
-        if _created(path, owner):
+        if _create_lock(path, owner):
             return
         other = _read(path)
         if other is None and not path.exists():
@@ -79,7 +79,7 @@ def _take(path: Path, owner: dict[str, Any]) -> None:
     raise ProblemError(f"{path}: other processes take and leave the lock all the time; try again.")
 
 
-def _created(path: Path, owner: dict[str, Any]) -> bool:
+def _create_lock(path: Path, owner: dict[str, Any]) -> bool:
     """Create the lock with its content in one go; False where there is one."""
     part = path.with_name(f".{path.name}.{owner['pid']}_{owner['token']}.part")
     with system_errors("the run cannot be locked by", path, error=ProblemError):
@@ -143,7 +143,7 @@ def _may_live(owner: dict[str, Any]) -> bool:
     """Whether the owner of a lock may still write; of another machine it may."""
     this = _this_process()
     if _is_here(owner, this):
-        started = _started(owner["pid"])
+        started = _start_of_process(owner["pid"])
         return started is not None and started == owner.get("started")
     restarted = owner.get("host") == this["host"] and owner.get("boot") != this["boot"]
     return not restarted or this["host"] in _NAMELESS
@@ -151,8 +151,8 @@ def _may_live(owner: dict[str, Any]) -> bool:
 
 def _is_here(owner: dict[str, Any], this: dict[str, Any]) -> bool:
     """Whether process ids mean the same to both."""
-    same = ("host", "boot", "namespace")
-    return all(owner.get(key) == this[key] for key in same)
+    compared_keys = ("host", "boot", "namespace")
+    return all(owner.get(key) == this[key] for key in compared_keys)
 
 
 def _this_process() -> dict[str, Any]:
@@ -164,14 +164,14 @@ def _this_process() -> dict[str, Any]:
         namespace = os.readlink("/proc/self/ns/pid")
     return {
         "pid": os.getpid(),
-        "started": _started(os.getpid()),
+        "started": _start_of_process(os.getpid()),
         "host": platform.node(),
         "boot": boot,
         "namespace": namespace,
     }
 
 
-def _started(pid: Any) -> str | None:
+def _start_of_process(pid: Any) -> str | None:
     """When a process of this machine started, in whatever unit; None where there is none."""
     if not isinstance(pid, int) or pid <= 0:
         return None
@@ -200,4 +200,4 @@ def _now() -> str:
     return time.strftime("%Y-%m-%d %H:%M:%S")
 
 
-__all__ = ["NAME", "locked"]
+__all__ = ["NAME", "lock_folder"]

@@ -10,17 +10,17 @@ from xcrack.crack.measures import Measures, measures
 from xcrack.growth.step import Step
 from xcrack.mesh.mesh import Mesh
 
-Measured = list[tuple[Step, int, Measures]]  # of each crack of each step
+Indicators = list[tuple[Step, int, Measures]]  # of each crack of each step
 
 
-def measured(steps: Sequence[Step], mesh: Mesh) -> Measured:
+def measures_of_steps(steps: Sequence[Step], mesh: Mesh) -> Indicators:
     """Measures of each crack of each step."""
     return [
         (step, c, measures(crack, mesh)) for step in steps for c, crack in enumerate(step.cracks)
     ]
 
 
-def measures_tables(every: Measured, mesh: Mesh) -> tuple[NDArray[Any], NDArray[Any]]:
+def measures_tables(every: Indicators, mesh: Mesh) -> tuple[NDArray[Any], NDArray[Any]]:
     """Measures of each crack of each step, and the ends of their fronts.
 
     Parameters
@@ -56,7 +56,7 @@ def measures_tables(every: Measured, mesh: Mesh) -> tuple[NDArray[Any], NDArray[
     return np.array(rows, dtype=columns), np.array(ends, dtype=kinds)
 
 
-def with_measures(rows: NDArray[Any], every: Measured, mesh: Mesh) -> NDArray[Any]:
+def with_measures(rows: NDArray[Any], every: Indicators, mesh: Mesh) -> NDArray[Any]:
     """The table of steps with the measures of the crack of each row behind its columns.
 
     Parameters
@@ -79,23 +79,27 @@ def with_measures(rows: NDArray[Any], every: Measured, mesh: Mesh) -> NDArray[An
     for k in range(2):
         columns += [(f"end_{k}_{axis}", float) for axis in axes]
         columns.append((f"end_{k}_set", f"U{width}"))
-    known = {(step.index, c): m for step, c, m in every}
+    measures_of_step = {(step.index, c): m for step, c, m in every}
     numbers = rows["front"] if "front" in (rows.dtype.names or ()) else np.full(len(rows), -1)
     result = []
     for row, front in zip(rows, numbers.tolist(), strict=True):
-        m = known[int(row["step"]), int(row["crack"])]
+        m = measures_of_step[int(row["step"]), int(row["crack"])]
         values: list[Any] = [m.area, m.depth, *_by_set(m, names)]
-        own = [end for end in m.ends if end.front == front][:2]
+        ends_of_front = [end for end in m.ends if end.front == front][:2]
         for k in range(2):
-            values += [*own[k].x, own[k].name] if k < len(own) else [*[np.nan] * len(axes), ""]
+            values += (
+                [*ends_of_front[k].x, ends_of_front[k].name]
+                if k < len(ends_of_front)
+                else [*[np.nan] * len(axes), ""]
+            )
         result.append((*row.tolist(), *values))
     return np.array(result, dtype=[*rows.dtype.descr, *columns])
 
 
-def _set_names(every: Measured) -> list[str]:
+def _set_names(every: Indicators) -> list[str]:
     return sorted({trace.name for _, _, m in every for trace in m.traces})
 
 
 def _by_set(m: Measures, names: Sequence[str]) -> list[float]:
-    known = {trace.name: (trace.length, trace.depth) for trace in m.traces}
-    return [value for name in names for value in known.get(name, (np.nan, np.nan))]
+    traces = {trace.name: (trace.length, trace.depth) for trace in m.traces}
+    return [value for name in names for value in traces.get(name, (np.nan, np.nan))]

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from xcrack.base.arrays import Floats
-from xcrack.base.checks import shown
+from xcrack.base.checks import value_text
 from xcrack.base.errors import ProblemError
 from xcrack.growth.step import Step
 
@@ -57,7 +57,7 @@ def opening_load(step: Step) -> OpeningLoad:
     not below the highest closed one. With a factor on all loads, no steady ones, it is 0.
     """
     if not isinstance(step, Step):
-        raise ProblemError(f"opening_load: step = {shown(step)}: give a Step.")
+        raise ProblemError(f"opening_load: step = {value_text(step)}: give a Step.")
     if not step.levels:
         raise ProblemError("opening_load: the step has no levels: run it with Spectrum(factors).")
     levels = np.array(step.levels)

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from xcrack.base.arrays import Floats, Ints
-from xcrack.base.checks import number, shown
+from xcrack.base.checks import number, value_text
 from xcrack.base.errors import ProblemError
 from xcrack.fatigue.checks import evaluate_criterion, evaluate_law
 from xcrack.fatigue.criteria import Criterion
@@ -16,9 +16,9 @@ from xcrack.fatigue.law import Law
 from xcrack.fatigue.spectrum import Spectrum, distinct
 from xcrack.growth.block import pairs_of_states
 from xcrack.growth.cycles import cycles_between
-from xcrack.growth.levels import Ladder
+from xcrack.growth.levels import LevelTable
 from xcrack.growth.step import Step, memory_of, moved_places, numbers_after
-from xcrack.growth.uncertainty import best_known
+from xcrack.growth.uncertainty import best_K
 
 # Ranges and ratios of all cycles of a spectrum, from K at the levels that a step has stored.
 
@@ -26,7 +26,7 @@ _NEAR = 1e-9  # relative: a stored level is the factor that a spectrum has
 
 
 @dataclass(frozen=True, eq=False)
-class Block:
+class SpectrumBlock:
     """What made rates of the K of a run under a spectrum, beside its law.
 
     Attributes
@@ -59,7 +59,7 @@ class Block:
 
     def cycles(self, step: Step, c: int) -> tuple[Floats, Floats, Floats]:
         """Range, ratio and count of each kind of cycle at the places of a crack, each `(p, f)`."""
-        K = np.stack([state[c].K for state in best_known(step.sif)])
+        K = np.stack([state[c].K for state in best_K(step.sif)])
         if self.spectrum.states is not None:
             pairs = pairs_of_states(K, self.spectrum, self.nu)
             ends, count = pairs.K, pairs.count
@@ -73,15 +73,15 @@ class Block:
         _, dK, R = evaluate_criterion(self.criterion, flat, self.nu, c, "place of a cycle")
         return dK.reshape(p, f), R.reshape(p, f), count
 
-    def _ladder(self, step: Step, K: Floats) -> Ladder:
+    def _ladder(self, step: Step, K: Floats) -> LevelTable:
         levels = np.array(step.levels)
         if len(levels) == 2 and levels[0] < 0 < levels[1] and not self.spectrum.steady:
             levels = np.array([levels[0], 0.0, levels[1]])
-            return Ladder(levels, np.stack([K[0], np.zeros_like(K[0]), K[1]]), smooth=False)
+            return LevelTable(levels, np.stack([K[0], np.zeros_like(K[0]), K[1]]), smooth=False)
         if self.coarse and len(levels) > 2:
             chosen = np.unique([*range(0, len(levels), 2), len(levels) - 1])
             levels, K = levels[chosen], K[chosen]
-        return Ladder(levels, K, smooth=len(levels) > 2)
+        return LevelTable(levels, K, smooth=len(levels) > 2)
 
     def check(self, step: Step, what: str) -> None:
         """Refuse a spectrum that is not that of a step.
@@ -113,7 +113,7 @@ def block_of_run(
     criterion: Any,
     nu: Any,
     threshold: Any = 0.0,
-) -> Block | None:
+) -> SpectrumBlock | None:
     """What a caller said of the spectrum of a run, checked; None where there was none.
 
     Parameters
@@ -121,7 +121,7 @@ def block_of_run(
     what : str
         Name of the function, for messages.
     spectrum, criterion, nu, threshold
-        As of `Block`, or None.
+        As of `SpectrumBlock`, or None.
 
     Raises
     ------
@@ -134,13 +134,13 @@ def block_of_run(
             raise ProblemError(f"{what}: threshold belongs to a spectrum: give spectrum=... too.")
         return None
     if not isinstance(spectrum, Spectrum):
-        raise ProblemError(f"{what}: spectrum = {shown(spectrum)}: give that of the run.")
+        raise ProblemError(f"{what}: spectrum = {value_text(spectrum)}: give that of the run.")
     if not callable(criterion):
         raise ProblemError(
-            f"{what}: criterion = {shown(criterion)}: give that of the run; each cycle of the "
+            f"{what}: criterion = {value_text(criterion)}: give that of the run; each cycle of the "
             "spectrum is held against it again."
         )
-    return Block(spectrum, criterion, number(nu, f"{what}: nu", above=-1, below=0.5), least)
+    return SpectrumBlock(spectrum, criterion, number(nu, f"{what}: nu", above=-1, below=0.5), least)
 
 
 # The place that drives each step of a run: its lengths, ranges and rates before and after.
@@ -150,7 +150,7 @@ _NEAR_ADVANCE = 0.5  # of an advance: a place that is taken for the one that it 
 
 
 @dataclass(frozen=True, eq=False)
-class Driving:
+class DrivingForce:
     """Places of all steps that grow, at the begin and at the end of each step.
 
     Attributes
@@ -167,7 +167,7 @@ class Driving:
         run (length/cycle), before and after the step.
     dK, R, count : (k, 2, p) arrays
         Equivalent range (stress √length), ratio and number of each kind of cycle, before and after
-        the step: one kind, but for a spectrum that `driving` is told of.
+        the step: one kind, but for a spectrum that `driving_forces` is told of.
     size : (k, 2) array, length
         Crack size that a law is given.
     spread : (k, 2) array
@@ -200,7 +200,7 @@ class Driving:
         return bool((np.abs(a[1:, 0] - a[:-1, 1]) <= _FOLLOWS * da[1:]).all())
 
     @property
-    def lead(self) -> "Driving":
+    def lead(self) -> "DrivingForce":
         """The driving place of each step only, and the cycles of the steps that have one."""
         names = ("step", "drives", "place", "da", "a", "rate", "size", "spread", "dK", "R", "count")
         parts = {name: getattr(self, name)[self.drives] for name in names}
@@ -212,18 +212,18 @@ class Driving:
         shape = dK.shape
         R, a = (np.broadcast_to(x, shape).ravel() for x in (self.R, self.size[..., None]))
         rate = evaluate_law(law, dK.ravel(), R, 0, "place of a step", a).reshape(shape)
-        there = (self.count > 0) & (dK >= self.threshold)
+        counts_here = (self.count > 0) & (dK >= self.threshold)
         with np.errstate(invalid="ignore"):  # none of a kind that breaks the body
-            return np.asarray(np.where(there, self.count * rate, 0.0).sum(axis=-1))
+            return np.asarray(np.where(counts_here, self.count * rate, 0.0).sum(axis=-1))
 
 
-def driving(steps: Sequence[Step], block: Block | None = None) -> Driving:
+def driving_forces(steps: Sequence[Step], block: SpectrumBlock | None = None) -> DrivingForce:
     """Places that grow, of all steps but the last.
 
     Parameters
     ----------
     steps : sequence of Step
-    block : Block, optional
+    block : SpectrumBlock, optional
         Of a run under a spectrum: all of its cycles then, else the largest alone.
 
     Raises
@@ -244,13 +244,13 @@ def driving(steps: Sequence[Step], block: Block | None = None) -> Driving:
     if not rows:
         raise ProblemError("no place of the history grows: there is no life to look at.")
     table = np.array(rows)
-    index, crack, place, drives, da, there = table[:, :6].T
+    index, crack, place, drives, da, flags = table[:, :6].T
     pairs = table[:, 6:].reshape(len(table), 2, 6)
     a, dK, R, rate, size, spread = np.moveaxis(pairs, 2, 0)
-    step, where = index.astype(np.int64), np.stack([crack, place, there], axis=1).astype(np.int64)
+    step, where = index.astype(np.int64), np.stack([crack, place, flags], axis=1).astype(np.int64)
     one = (dK[..., None], R[..., None], np.ones((*dK.shape, 1)))
     ranges, ratios, count = one if block is None else _of_blocks(steps, block, step, where)
-    return Driving(
+    return DrivingForce(
         step=step,
         drives=drives.astype(bool),
         place=where[:, :2],
@@ -268,7 +268,7 @@ def driving(steps: Sequence[Step], block: Block | None = None) -> Driving:
 
 
 def _of_blocks(
-    steps: Sequence[Step], block: Block, step: Ints, where: Ints
+    steps: Sequence[Step], block: SpectrumBlock, step: Ints, where: Ints
 ) -> tuple[Floats, Floats, Floats]:
     """Range, ratio and count of all cycles of a block at both ends of each row `(k, 2, p)`."""
     answers: dict[tuple[int, int], tuple[Floats, Floats, Floats]] = {}
@@ -346,7 +346,7 @@ _MOST = 0.05
 
 
 @dataclass(frozen=True, eq=False)
-class Rerated:
+class RecomputedRates:
     """Cycles of the steps of a run by another law.
 
     Attributes
@@ -371,9 +371,9 @@ class Rerated:
         return float(self.cycles[-1])
 
 
-def rerated(
-    steps: Sequence[Step], law: Law, old: Law | None = None, block: Block | None = None
-) -> Rerated:
+def recompute_rates(
+    steps: Sequence[Step], law: Law, old: Law | None = None, block: SpectrumBlock | None = None
+) -> RecomputedRates:
     """Cycles of the same steps by another law.
 
     Parameters
@@ -382,7 +382,7 @@ def rerated(
     law : callable
     old : callable, optional
         Law of the run, to be sure that ranges and ratios of the steps are what it was given.
-    block : Block, optional
+    block : SpectrumBlock, optional
         Of a run under a spectrum.
 
     Raises
@@ -393,9 +393,11 @@ def rerated(
     """
     for name, value in (("law", law), ("old", old)):
         if not (callable(value) or (name == "old" and value is None)):
-            raise ProblemError(f"rerate: {name} = {shown(value)} cannot be called: give a law.")
+            raise ProblemError(
+                f"rerate: {name} = {value_text(value)} cannot be called: give a law."
+            )
     check_block(steps, block, law, "rerate")
-    rows = driving(steps, block)
+    rows = driving_forces(steps, block)
     if old is not None and not np.allclose(rows.rates(old), rows.rate, rtol=1e-6, atol=0):
         raise ProblemError("rerate: the steps have other rates than the law they are said to have.")
     rate = rows.rates(law)
@@ -422,10 +424,14 @@ def rerated(
             f"{bound:.1%} in the mean (more than {_MOST:.0%}): the path would differ. Run it with "
             "the law."
         )
-    return Rerated(np.concatenate([[0.0], np.cumsum(since)]) + steps[0].cycles, bound, ended)
+    return RecomputedRates(
+        np.concatenate([[0.0], np.cumsum(since)]) + steps[0].cycles, bound, ended
+    )
 
 
-def check_block(steps: Sequence[Step], block: Block | None, law: Law | None, what: str) -> None:
+def check_block(
+    steps: Sequence[Step], block: SpectrumBlock | None, law: Law | None, what: str
+) -> None:
     """Refuse steps of a spectrum without it, with another one, or with a law that it cannot serve.
 
     Raises
@@ -448,12 +454,12 @@ def check_block(steps: Sequence[Step], block: Block | None, law: Law | None, wha
         )
 
 
-def bound_of_shares(rows: Driving, new: Floats, since: Floats) -> float:
+def bound_of_shares(rows: DrivingForce, new: Floats, since: Floats) -> float:
     """Mean over the cycles of the largest change of an advance over that of the driving place.
 
     Parameters
     ----------
-    rows : Driving
+    rows : DrivingForce
     new : (k,) array
         Other rates before the steps.
     since : (n,) array
@@ -462,23 +468,25 @@ def bound_of_shares(rows: Driving, new: Floats, since: Floats) -> float:
     old, first = rows.rate[:, 0], np.unique(rows.step)
     worst = np.zeros(len(since))
     for n, step in enumerate(first[: len(since)].tolist()):
-        mine = rows.step == step
-        lead = mine & rows.drives
+        is_of_step = rows.step == step
+        lead = is_of_step & rows.drives
         with np.errstate(invalid="ignore"):
-            change = np.abs((new[mine] / old[mine]) / (new[lead] / old[lead]) - 1)
-        worst[n] = np.nan_to_num(change * rows.da[mine] / rows.da[lead], nan=0.0, posinf=1.0).max()
+            change = np.abs((new[is_of_step] / old[is_of_step]) / (new[lead] / old[lead]) - 1)
+        worst[n] = np.nan_to_num(
+            change * rows.da[is_of_step] / rows.da[lead], nan=0.0, posinf=1.0
+        ).max()
     total = since.sum()
     return float(worst @ since / total) if total else 0.0
 
 
 __all__ = [
-    "Block",
-    "Driving",
-    "Rerated",
+    "DrivingForce",
+    "RecomputedRates",
+    "SpectrumBlock",
     "block_of_run",
     "bound_of_shares",
     "check_block",
     "cycles_of",
-    "driving",
-    "rerated",
+    "driving_forces",
+    "recompute_rates",
 ]

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 
 from xcrack.base.arrays import Bools, Floats, Ints
-from xcrack.base.checks import number, shown
+from xcrack.base.checks import number, value_text
 from xcrack.base.errors import ProblemError
 from xcrack.fatigue.checks import law_exponent
-from xcrack.fatigue.criteria import clipped, equivalent_K
+from xcrack.fatigue.criteria import clipped_K, equivalent_K
 from xcrack.fatigue.law import Law
 from xcrack.fatigue.retardation import (
     POINTS,
@@ -21,12 +21,12 @@ from xcrack.fatigue.retardation import (
     no_zones,
 )
 from xcrack.fatigue.spectrum import Spectrum, distinct
-from xcrack.growth.levels import Ladder
+from xcrack.growth.levels import LevelTable
 from xcrack.growth.step import Step
-from xcrack.growth.uncertainty import best_known
+from xcrack.growth.uncertainty import best_K
 from xcrack.runs.history import History
-from xcrack.runs.rerating import Block, Driving, driving
-from xcrack.runs.scatter import Samples, stretch_of, varied
+from xcrack.runs.rerating import DrivingForce, SpectrumBlock, driving_forces
+from xcrack.runs.scatter import Samples, stretch_of, varied_law
 
 _BREAKS = "the law returns inf: the toughness is reached"
 _STANDS = "a whole block lets nothing grow"
@@ -119,7 +119,7 @@ class CycledPath:
 
     Attributes
     ----------
-    rows : Driving
+    rows : DrivingForce
     a, size : (n + 1,) arrays, length
         Length that cycles are counted with, and crack size that a law is given, at the solves.
     K : (n + 1, p, 2) array, stress √length
@@ -130,7 +130,7 @@ class CycledPath:
         Of the run: cycles below it let nothing grow.
     """
 
-    rows: Driving
+    rows: DrivingForce
     a: Floats
     size: Floats
     K: Floats
@@ -148,7 +148,7 @@ class CycledPath:
         ProblemError
             Several tips grow.
         """
-        rows = driving(history.steps)
+        rows = driving_forces(history.steps)
         if len(np.unique(rows.step)) < len(rows.step) or not rows.is_one_tip:
             raise ProblemError(
                 "retarded: several tips grow in this history: retardation along a stored path is "
@@ -220,16 +220,16 @@ def check(history: object, law: object, spectrum: object, model: object) -> None
     ProblemError
     """
     if not isinstance(history, History):
-        raise ProblemError(f"retarded: history = {shown(history)}: give a History.")
+        raise ProblemError(f"retarded: history = {value_text(history)}: give a History.")
     if not callable(law):
-        raise ProblemError(f"retarded: law = {shown(law)} cannot be called: give a law.")
+        raise ProblemError(f"retarded: law = {value_text(law)} cannot be called: give a law.")
     if not isinstance(spectrum, Spectrum) or spectrum.factors is None:
         raise ProblemError(
-            f"retarded: spectrum = {shown(spectrum)}: give Spectrum(factors): rows and states have "
-            "no order in time."
+            f"retarded: spectrum = {value_text(spectrum)}: give Spectrum(factors): rows and states "
+            f"have no order in time."
         )
     if not (model is None or isinstance(model, Retardation)):
-        raise ProblemError(f"retarded: model = {shown(model)}: give wheeler or willenborg.")
+        raise ProblemError(f"retarded: model = {value_text(model)}: give wheeler or willenborg.")
     if getattr(law, "ratio", None) == "nominal":
         raise ProblemError(
             'retarded: the law has ratio="nominal", but zones and reductions belong to K with '
@@ -240,7 +240,7 @@ def check(history: object, law: object, spectrum: object, model: object) -> None
 
 
 def _ends(
-    rows: Driving,
+    rows: DrivingForce,
     row: int,
     ends: tuple[Step, Step],
     values: Floats,
@@ -257,13 +257,13 @@ def _ends(
             result.append(result[-1])
             continue
         levels = np.array(step.levels)
-        K = np.stack([state[crack].K[place] for state in best_known(step.sif)])[:, None]
+        K = np.stack([state[crack].K[place] for state in best_K(step.sif)])[:, None]
         if len(levels) == 2 and levels[0] < 0 < levels[1] and not spectrum.steady:
             levels = np.array([levels[0], 0.0, levels[1]])
             K = np.stack([K[0], np.zeros_like(K[0]), K[1]])
-        ladder = Ladder(levels, K, smooth=len(levels) > 3)
+        ladder = LevelTable(levels, K, smooth=len(levels) > 3)
         angle = step.angle[crack][place]
-        both = [equivalent_K(clipped(ladder.at(values[:, k])), angle, nu)[:, 0] for k in (0, 1)]
+        both = [equivalent_K(clipped_K(ladder.at(values[:, k])), angle, nu)[:, 0] for k in (0, 1)]
         result.append(np.stack([np.minimum(*both), np.maximum(*both)], axis=1))
     return np.stack(result)
 
@@ -278,7 +278,7 @@ class RetardedLives:
     ----------
     history : History
     law : callable or None
-    block : Block or None
+    block : SpectrumBlock or None
         Of the run.
     model : wheeler or willenborg
     max_blocks : float
@@ -294,12 +294,14 @@ class RetardedLives:
         self,
         history: History,
         law: Law | None,
-        block: Block | None,
+        block: SpectrumBlock | None,
         model: Retardation,
         max_blocks: float,
     ) -> None:
         if not isinstance(model, Retardation):
-            raise ProblemError(f"life: retardation = {shown(model)}: give wheeler or willenborg.")
+            raise ProblemError(
+                f"life: retardation = {value_text(model)}: give wheeler or willenborg."
+            )
         if block is None or law is None:
             raise ProblemError(
                 "life: retardation goes cycle by cycle: give law, spectrum, criterion and nu as "
@@ -322,7 +324,7 @@ class RetardedLives:
         C = np.broadcast_to(drawn.get("C", np.ones(1)), n)
         N = np.empty(n)
         for k in range(n):
-            law = varied(self.law, {name: float(drawn[name][k]) for name in names})
+            law = varied_law(self.law, {name: float(drawn[name][k]) for name in names})
             grown = self.path.grown(_times(law, float(C[k])), self.model, self.limit, stretch[k])
             N[k] = self._blocks(grown)
         return N
@@ -344,12 +346,12 @@ def _times(law: Law, factor: float) -> Law:
     """A law times a factor; it asks for what the law asks for."""
     if factor == 1:
         return law
-    result = partial(_scaled, law, factor)
+    result = partial(_scaled_K, law, factor)
     result.needs = getattr(law, "needs", ())  # type: ignore[attr-defined]
     return result
 
 
-def _scaled(law: Law, factor: float, *given: Any, **named: Any) -> Floats:
+def _scaled_K(law: Law, factor: float, *given: Any, **named: Any) -> Floats:
     return np.asarray(factor * law(*given, **named))
 
 

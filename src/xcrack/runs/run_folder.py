@@ -17,11 +17,11 @@ from xcrack.crack.crack import Crack
 from xcrack.fatigue.retardation import BlockCycles, CycleIntegration, OverloadZones
 from xcrack.growth.description import DEFAULTS
 from xcrack.growth.step import Arrival, Join, Memory, Step, StepError
-from xcrack.growth.trail import Control, FrontTrail, Overloads, Places, Trail
-from xcrack.linalg.reuse import Reuse, Slip
+from xcrack.growth.trail import FrontTrail, Overloads, Places, StepControl, Trail
+from xcrack.linalg.reuse import SlipField, SolverState
 from xcrack.runs import lock
 from xcrack.runs.store import PART, load, save, write_whole
-from xcrack.sif.sif import SIF, Bars, SurfaceEnd
+from xcrack.sif.sif import SIF, KErrors, SurfaceEnd
 
 HEADER = "run.json"
 BODY = "body.npz"
@@ -29,17 +29,16 @@ _OTHER_BODY = "body_{}.npz"  # on a mesh that growth has asked for, by its finge
 _FORMAT = 2
 _STEP = re.compile(r"step_(\d{5,})\.npz")
 CLASSES: dict[str, type] = {
-    "Step": Step, "Memory": Memory, "Reuse": Reuse, "Slip": Slip, "Crack": Crack,
-    "SIF": SIF, "StepError": StepError, "Trail": Trail, "FrontTrail": FrontTrail,
-    "Places": Places, "Arrival": Arrival, "Join": Join, "Overloads": Overloads,
-    "OverloadZones": OverloadZones, "BlockCycles": BlockCycles,
-    "CycleIntegration": CycleIntegration, "Control": Control, "Bars": Bars,
-    "SurfaceEnd": SurfaceEnd,
+    kind.__name__: kind for kind in (
+        Step, Memory, SolverState, SlipField, Crack, SIF, StepError, Trail, FrontTrail,
+        Places, Arrival, Join, Overloads, OverloadZones, BlockCycles, CycleIntegration,
+        StepControl, KErrors, SurfaceEnd,
+    )
 }  # fmt: skip
 
 
 @dataclass(frozen=True)
-class Header:
+class RunHeader:
     """What a run is: the same in its first file and in each step.
 
     Attributes
@@ -62,7 +61,7 @@ class Header:
 
 
 @dataclass(frozen=True, eq=False)
-class Stored:
+class StoredSteps:
     """Steps of a folder.
 
     Attributes
@@ -80,14 +79,14 @@ class Stored:
     rest: tuple[Path, ...]
 
 
-def write_header(folder: Path, header: Header) -> None:
+def write_header(folder: Path, header: RunHeader) -> None:
     """Write, or write anew, what the run is."""
     content = {"ended": header.ended, **_content(header)}
     with system_errors("the header of the run cannot be written to", folder, error=ProblemError):
         write_whole(folder / HEADER, (json.dumps(content, indent=1) + "\n").encode())
 
 
-def _content(header: Header) -> dict[str, Any]:
+def _content(header: RunHeader) -> dict[str, Any]:
     """What each file of a run says of it."""
     return {
         "format": _FORMAT,
@@ -96,7 +95,7 @@ def _content(header: Header) -> dict[str, Any]:
     }
 
 
-def _header(content: Any, path: Path) -> Header:
+def _header(content: Any, path: Path) -> RunHeader:
     """What a file says of its run.
 
     Raises
@@ -119,13 +118,13 @@ def _header(content: Any, path: Path) -> Header:
     if written > _FORMAT:
         raise newer
     settings, versions = ({**content[key]} for key in ("settings", "versions"))
-    header = Header(settings, versions, str(content.get("ended", "")))
+    header = RunHeader(settings, versions, str(content.get("ended", "")))
     if header.defaults > DEFAULTS:
         raise newer
     return header
 
 
-def read_header(folder: Path) -> tuple[Header | None, Path | None]:
+def read_header(folder: Path) -> tuple[RunHeader | None, Path | None]:
     """What the run is, and the file of it that is damaged, if one is.
 
     Where the file is lost or damaged, it is taken from the first step that is whole; None where
@@ -153,7 +152,7 @@ def read_header(folder: Path) -> tuple[Header | None, Path | None]:
         return header, path
 
 
-def _header_of_steps(folder: Path) -> Header | None:
+def _header_of_steps(folder: Path) -> RunHeader | None:
     for path in step_files(folder):
         header, step = _read(path)
         if step is not None:
@@ -185,7 +184,7 @@ def step_files(folder: Path) -> list[Path]:
     return [path for path in (step_path(folder, n) for n in numbers) if path.name in names]
 
 
-def write_step(folder: Path, step: Step, header: Header) -> None:
+def write_step(folder: Path, step: Step, header: RunHeader) -> None:
     """Write a step without its solutions; afterwards it is on disk as a whole.
 
     Raises
@@ -206,7 +205,7 @@ def write_step(folder: Path, step: Step, header: Header) -> None:
         ) from error
 
 
-def read_steps(folder: Path, header: Header) -> Stored:
+def read_steps(folder: Path, header: RunHeader) -> StoredSteps:
     """Steps up to the first that is missing, damaged, or of another run."""
     files = step_files(folder)
     steps: list[Step] = []
@@ -216,19 +215,19 @@ def read_steps(folder: Path, header: Header) -> Stored:
         if path != step_path(folder, number):
             fault = f"{step_path(folder, number).name} is missing"
             break
-        own, step = _read(path)
-        if own is None or step is None or step.index != number:
+        own_header, step = _read(path)
+        if own_header is None or step is None or step.index != number:
             fault = f"{path.name} is not whole"
             break
-        if own.settings != header.settings:
+        if own_header.settings != header.settings:
             fault = f"{path.name} belongs to another run"
             break
         memory = None if step.memory is None else replace(step.memory, settings=header.settings)
         steps.append(replace(step, memory=memory))
-    return Stored(tuple(steps), fault, tuple(reversed(files[len(steps) :])))
+    return StoredSteps(tuple(steps), fault, tuple(reversed(files[len(steps) :])))
 
 
-def _read(path: Path) -> tuple[Header | None, Step | None]:
+def _read(path: Path) -> tuple[RunHeader | None, Step | None]:
     """What a file says of its run, and its step; None where it is no step of a run."""
     content = load(path, CLASSES)
     if not isinstance(content, dict):
@@ -274,8 +273,8 @@ __all__ = [
     "BODY",
     "CLASSES",
     "HEADER",
-    "Header",
-    "Stored",
+    "RunHeader",
+    "StoredSteps",
     "body_files",
     "body_path",
     "move_aside",

@@ -8,7 +8,7 @@ from xcrack.base.errors import ProblemError, warn
 from xcrack.growth.step import Step
 from xcrack.model.problem import Problem
 from xcrack.runs import run_folder
-from xcrack.runs.run_folder import Header
+from xcrack.runs.run_folder import RunHeader
 from xcrack.runs.saved import write_body
 from xcrack.runs.versions import versions
 
@@ -19,7 +19,7 @@ class RunStore:
 
     folder: Path
     check: Callable[[], None]  # raises where another process has taken over
-    header: Header | None = None
+    header: RunHeader | None = None
     first: str = ""  # fingerprint of the mesh that a run with a tolerance has begun with
     # Written by this process: a killed one may have left half of them.
     bodies: set[Path] = field(default_factory=set)
@@ -30,7 +30,7 @@ class RunStore:
         if self.header is None:
             settings = {} if step.memory is None else dict(step.memory.settings)
             _make_room(self.folder)
-            self.header = Header(settings, versions())
+            self.header = RunHeader(settings, versions())
             run_folder.write_header(self.folder, self.header)
         problem = step.solutions[0].problem if step.solutions else None
         mesh = "" if step.memory is None else step.memory.mesh

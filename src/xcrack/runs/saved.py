@@ -21,10 +21,10 @@ from xcrack.base.arguments import arguments_of, kinds_of
 from xcrack.base.arrays import Floats, lock
 from xcrack.base.errors import ProblemError
 from xcrack.base.paths import path_of, system_errors
-from xcrack.fem.system import discretised
-from xcrack.linalg.reuse import Reuse
+from xcrack.fem.system import discretise
+from xcrack.linalg.reuse import SolverState
 from xcrack.mesh.mesh import Mesh
-from xcrack.mesh.polygon import Round
+from xcrack.mesh.polygon import Arc
 from xcrack.model.material import Isotropic
 from xcrack.model.numerics import Numerics
 from xcrack.model.problem import Problem
@@ -38,7 +38,7 @@ _SUFFIX = ".npz"
 
 
 @dataclass(frozen=True)
-class NotStored:
+class Unstorable:
     """Stands for a function that a file could not hold.
 
     Attributes
@@ -61,8 +61,8 @@ _CLASSES: dict[str, type] = {
     "LoadResultant": plan.Resultant,
     **{
         kind.__name__: kind
-        for kind in (Problem, Mesh, Round, Isotropic, Numerics, Contact, Report, Ingredient,
-                     NotStored, LoadLevel, LoadState)
+        for kind in (Problem, Mesh, Arc, Isotropic, Numerics, Contact, Report, Ingredient,
+                     Unstorable, LoadLevel, LoadState)
     },
 }  # fmt: skip
 
@@ -127,7 +127,7 @@ def write_body(path: Path, problem: Problem) -> None:
     storable = _storable(replace(problem, cracks=(), friction=0.0, numerics=Numerics()))
     content = {"format": _FORMAT, "kind": "body", "problem": storable}
     with contextlib.suppress(OSError, ProblemError):
-        path.write_bytes(store.packed(content, _classes()))
+        path.write_bytes(store.packed_content(content, _classes()))
 
 
 def read_body(path: Path) -> Problem | None:
@@ -147,8 +147,8 @@ def stored_condition(condition: Any) -> Any:
     changes = {}
     for name in arguments_of(type(condition)):
         value = getattr(condition, name)
-        if callable(value) and not isinstance(value, NotStored):
-            changes[name] = NotStored(getattr(value, "__name__", type(value).__name__))
+        if callable(value) and not isinstance(value, Unstorable):
+            changes[name] = Unstorable(getattr(value, "__name__", type(value).__name__))
     return replace(condition, **changes) if changes else condition
 
 
@@ -180,7 +180,7 @@ def _content(result: Any) -> dict[str, Any]:
 
 def _storable(problem: Problem) -> Problem:
     """A problem whose functions are replaced by their names; curves of the user are left out."""
-    curves = {k: c for k, c in problem.mesh.curves.items() if isinstance(c, Round)}
+    curves = {k: c for k, c in problem.mesh.curves.items() if isinstance(c, Arc)}
     mesh = problem.mesh
     return replace(
         problem,
@@ -210,8 +210,8 @@ def _state(solution: Solution) -> dict[str, Any]:
 def _solutions(content: dict[str, Any]) -> list[Solution]:
     """Solutions on a space that is made anew: the same numbering for the same problem."""
     problem: Problem = content["problem"]
-    space, lips = discretised(problem)
-    reuse: Reuse = content["reuse"]
+    space, lips = discretise(problem)
+    reuse: SolverState = content["reuse"]
     solutions = []
     for state in content["states"]:
         u: Floats = lock(np.asarray(state["u"]))
@@ -229,4 +229,4 @@ def _solutions(content: dict[str, Any]) -> list[Solution]:
     return solutions
 
 
-__all__ = ["NotStored", "read_body", "read_saved", "save", "write_body"]
+__all__ = ["Unstorable", "read_body", "read_saved", "save", "write_body"]

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 
 from xcrack.base.arrays import Floats
-from xcrack.base.checks import number, numbers, shown, whole
+from xcrack.base.checks import number, numbers, value_text, whole_number
 from xcrack.base.errors import ProblemError, XcrackError
 from xcrack.fatigue.law import Law
-from xcrack.runs.rerating import Driving, cycles_of
+from xcrack.runs.rerating import DrivingForce, cycles_of
 
 _ROUND_OFF = 1e-12
 
@@ -157,20 +157,23 @@ class Scatter:
     def __post_init__(self) -> None:
         if not isinstance(self.constants, Mapping):
             raise ProblemError(
-                f'Scatter: constants = {shown(self.constants)}: give a dict, {{"m": normal(0.02)}}.'
+                f"Scatter: constants = {value_text(self.constants)}: give a dict, "
+                f'{{"m": normal(0.02)}}.'
             )
         for name in self.constants:
             if not isinstance(name, str) or name in _OWN:
                 raise ProblemError(
-                    f"Scatter: constants has {shown(name)}: give the name of a constant of the "
-                    "law; C, K, load and a0 are arguments of their own."
+                    f"Scatter: constants has {value_text(name)}: give the name of a constant of "
+                    f"the law; C, K, load and a0 are arguments of their own."
                 )
         object.__setattr__(self, "constants", dict(self.constants))
         every = {name: getattr(self, name) for name in _OWN} | dict(self.constants)
         for name, part in every.items():
-            wanted = name in self.constants or part is not None
-            if wanted and not isinstance(part, Distribution):
-                raise ProblemError(f"Scatter: {name} = {shown(part)}: give lognormal or normal.")
+            is_needed = name in self.constants or part is not None
+            if is_needed and not isinstance(part, Distribution):
+                raise ProblemError(
+                    f"Scatter: {name} = {value_text(part)}: give lognormal or normal."
+                )
         if not self.parts:
             raise ProblemError("Scatter: nothing varies: give C, K, load, a0 or constants.")
         self._check_correlation()
@@ -178,7 +181,7 @@ class Scatter:
     def _check_correlation(self) -> None:
         if not isinstance(self.correlation, Mapping):
             raise ProblemError(
-                f"Scatter: correlation = {shown(self.correlation)}: give a dict, "
+                f"Scatter: correlation = {value_text(self.correlation)}: give a dict, "
                 '{("C", "m"): -0.98}.'
             )
         checked = {}
@@ -186,7 +189,7 @@ class Scatter:
             names = pair if isinstance(pair, tuple) else ()
             if len(names) != 2 or not all(n in self.parts for n in names) or names[0] == names[1]:
                 raise ProblemError(
-                    f"Scatter: correlation has {shown(pair)}: give pairs of what varies, "
+                    f"Scatter: correlation has {value_text(pair)}: give pairs of what varies, "
                     f"{', '.join(self.parts)}."
                 )
             rho = number(value, f"Scatter: correlation of {names[0]} and {names[1]}")
@@ -207,8 +210,8 @@ class Scatter:
     @property
     def parts(self) -> dict[str, Distribution]:
         """What varies, by its name."""
-        own = {name: getattr(self, name) for name in _OWN if getattr(self, name) is not None}
-        return own | dict(self.constants)
+        own_parts = {name: getattr(self, name) for name in _OWN if getattr(self, name) is not None}
+        return own_parts | dict(self.constants)
 
     @property
     def matrix(self) -> Floats:
@@ -239,11 +242,11 @@ class Scatter:
         Conover 1979), and put in the order of correlated scores (Iman and Conover 1982): each
         part alone has the quantiles of its distribution to the number of samples.
         """
-        count = whole(n, "Scatter.draw: n", least=1, most=10_000_000)
-        draw = np.random.default_rng(whole(seed, "Scatter.draw: seed", least=0))
+        count = whole_number(n, "Scatter.draw: n", least=1, most=10_000_000)
+        draw = np.random.default_rng(whole_number(seed, "Scatter.draw: seed", least=0))
         shares = [_ranks(draw, count) for _ in self.parts]
         if self.correlation:
-            shares = _ordered(shares, self.matrix)
+            shares = _ordered_shares(shares, self.matrix)
         return {
             name: np.asarray(part.quantile(share))
             for (name, part), share in zip(self.parts.items(), shares)
@@ -255,7 +258,7 @@ def _ranks(draw: np.random.Generator, n: int) -> Floats:
     return np.asarray((draw.permutation(n) + draw.uniform(1e-9, 1, n)) / n)
 
 
-def _ordered(shares: list[Floats], matrix: Floats) -> list[Floats]:
+def _ordered_shares(shares: list[Floats], matrix: Floats) -> list[Floats]:
     """The same shares in the order of scores that have a correlation."""
     value, vector = np.linalg.eigh(matrix)
     root = vector * np.sqrt(np.maximum(value, 0.0)) @ vector.T
@@ -274,12 +277,12 @@ _NODES = 257  # factors on K at which the rate of a block of many cycles is aske
 Samples = Mapping[str, Floats]
 
 
-def lives(lead: Driving, law: Law | None, drawn: Samples, n: int) -> Floats:
+def lives(lead: DrivingForce, law: Law | None, drawn: Samples, n: int) -> Floats:
     """Cycles of each sample `(n,)`, from the begin of the run.
 
     Parameters
     ----------
-    lead : Driving
+    lead : DrivingForce
         The driving places alone.
     law : callable or None
         Of the run; None where only C and a0 vary.
@@ -304,7 +307,7 @@ def lives(lead: Driving, law: Law | None, drawn: Samples, n: int) -> Floats:
     for begin in range(0, count, rows):
         part = slice(begin, min(begin + rows, count))
         rate = rates.of(part)
-        N[part] = _integrated(lead, rate, None if size is None else size[part])
+        N[part] = _cycles_by_rates(lead, rate, None if size is None else size[part])
     return np.broadcast_to(N / drawn.get("C", np.ones(1)), (n,)).copy()
 
 
@@ -313,7 +316,7 @@ def stretch_of(drawn: Samples) -> Floats:
     return np.asarray(drawn.get("K", np.ones(1)) * drawn.get("load", np.ones(1)))
 
 
-def varied(law: Law, factors: Mapping[str, float]) -> Law:
+def varied_law(law: Law, factors: Mapping[str, float]) -> Law:
     """A law with some of its constants times factors.
 
     Raises
@@ -334,12 +337,12 @@ def _with(part: Any, names: list[str], factor: float, whole_name: str, law: Law)
         inner = _with(value, names[1:], factor, whole_name, law)
         return replace(part, **{names[0]: inner})
     if not has or isinstance(value, bool) or not isinstance(value, int | float):
-        known: list[str] = []
+        allowed: list[str] = []
         if is_dataclass(law):
-            known = [f.name for f in fields(law) if isinstance(getattr(law, f.name), float)]
+            allowed = [f.name for f in fields(law) if isinstance(getattr(law, f.name), float)]
         raise ProblemError(
             f"life: {type(law).__name__} has no constant {whole_name!r} that can vary: give one of "
-            f"{', '.join(known) or 'a law of xcrack'}."
+            f"{', '.join(allowed) or 'a law of xcrack'}."
         )
     try:
         return replace(part, **{names[0]: value * factor})
@@ -353,7 +356,7 @@ def _with(part: Any, names: list[str], factor: float, whole_name: str, law: Law)
 class _Stored:
     """Rates of the run."""
 
-    def __init__(self, lead: Driving) -> None:
+    def __init__(self, lead: DrivingForce) -> None:
         self.lead, self.work = lead, len(lead.step)
 
     def of(self, part: slice) -> Floats:
@@ -363,7 +366,7 @@ class _Stored:
 class _Stretched:
     """Rates of the law with K times a factor."""
 
-    def __init__(self, lead: Driving, law: Law, stretch: Floats) -> None:
+    def __init__(self, lead: DrivingForce, law: Law, stretch: Floats) -> None:
         self.lead, self.law, self.stretch = lead, law, stretch
         self.work = lead.dK.size
 
@@ -375,7 +378,7 @@ class _Stretched:
 class _Varied:
     """Rates of a law of its own for each sample."""
 
-    def __init__(self, lead: Driving, law: Law, constants: Samples, stretch: Floats) -> None:
+    def __init__(self, lead: DrivingForce, law: Law, constants: Samples, stretch: Floats) -> None:
         self.lead, self.law, self.constants, self.stretch = lead, law, constants, stretch
         self.work = lead.dK.size
 
@@ -386,7 +389,7 @@ class _Varied:
         factor = np.broadcast_to(self.stretch[part] if len(self.stretch) > 1 else self.stretch, n)
         return np.stack(
             [
-                self.lead.rates(varied(self.law, dict(zip(names, row))), f)
+                self.lead.rates(varied_law(self.law, dict(zip(names, row))), f)
                 for row, f in zip(rows, factor.tolist())
             ]
         )
@@ -398,7 +401,7 @@ class _Tabulated:
     A straight line in logarithms, so that a power of K is exact.
     """
 
-    def __init__(self, lead: Driving, law: Law, stretch: Floats) -> None:
+    def __init__(self, lead: DrivingForce, law: Law, stretch: Floats) -> None:
         self.log = np.log(stretch)
         self.work = lead.size.size
         low, high = float(self.log.min()), float(self.log.max())
@@ -420,19 +423,19 @@ class _Tabulated:
         return np.asarray(np.where(both, power, line))
 
 
-def _integrated(lead: Driving, rate: Floats, size: Floats | None) -> Floats:
+def _cycles_by_rates(lead: DrivingForce, rate: Floats, size: Floats | None) -> Floats:
     """Cycles over all steps by some rates, in proportion to those that the run counted."""
     a = np.broadcast_to(lead.a, rate.shape)
     counted = lead.cycles / cycles_of(lead.a, lead.rate)
     if size is not None:
-        a, rate = _from(a, rate, size)
+        a, rate = _steps_from_size(a, rate, size)
     since = cycles_of(a, rate) * counted
     broken = np.isinf(rate[..., 0]) | np.isinf(rate[..., 1])
     later = np.cumsum(broken, axis=-1) - broken > 0  # steps after the toughness was reached
     return np.asarray(np.where(later, 0.0, since).sum(axis=-1))
 
 
-def _from(a: Floats, rate: Floats, size: Floats) -> tuple[Floats, Floats]:
+def _steps_from_size(a: Floats, rate: Floats, size: Floats) -> tuple[Floats, Floats]:
     """Steps cut where a crack of some size begins, at the rate that the power law has there."""
     first = np.clip(size[:, None], a[..., 0], a[..., 1])
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -443,4 +446,4 @@ def _from(a: Floats, rate: Floats, size: Floats) -> tuple[Floats, Floats]:
     return np.stack([first, last], axis=-1), np.stack([begin, end], axis=-1)
 
 
-__all__ = ["Distribution", "Scatter", "lives", "lognormal", "normal", "stretch_of", "varied"]
+__all__ = ["Distribution", "Scatter", "lives", "lognormal", "normal", "stretch_of", "varied_law"]

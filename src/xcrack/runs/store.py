@@ -69,14 +69,14 @@ def save(path: Path, value: Any, classes: Classes) -> None:
     ProblemError
         Something in it is none of these.
     """
-    write_whole(path, packed(value, classes))
+    write_whole(path, packed_content(value, classes))
 
 
-def packed(value: Any, classes: Classes) -> bytes:
+def packed_content(value: Any, classes: Classes) -> bytes:
     """Content of the file that `save` writes."""
     arrays: list[NDArray[Any]] = []
     names = {kind: name for name, kind in classes.items()}
-    tree = _encoded(value, arrays, names)
+    tree = _encode(value, arrays, names)
     buffer = io.BytesIO()
     members = {f"array_{i}": array for i, array in enumerate(arrays)}
     np.savez(buffer, allow_pickle=False, tree=np.array(json.dumps(tree)), **members)
@@ -100,14 +100,14 @@ def load(path: Path, classes: Classes) -> Any:
         with np.load(io.BytesIO(data), allow_pickle=False) as members:
             tree = json.loads(str(members["tree"]))
             arrays = {name: members[name] for name in members.files if name != "tree"}
-        return _decoded(tree, arrays, classes, path)
+        return _decode(tree, arrays, classes, path)
     except UnknownValueError:
         raise
     except Exception:  # whatever zipfile, zlib, numpy and json say of bytes that are not theirs
         return None
 
 
-def _encoded(value: Any, arrays: list[NDArray[Any]], names: Mapping[type, str]) -> Any:
+def _encode(value: Any, arrays: list[NDArray[Any]], names: Mapping[type, str]) -> Any:
     if value is None or isinstance(value, bool | int | float | str):
         return value
     if isinstance(value, np.generic | np.ndarray):
@@ -118,7 +118,7 @@ def _encoded(value: Any, arrays: list[NDArray[Any]], names: Mapping[type, str]) 
         return {"array": len(arrays) - 1, "scalar": isinstance(value, np.generic)}
 
     def encoded(item: Any) -> Any:
-        return _encoded(item, arrays, names)
+        return _encode(item, arrays, names)
 
     if isinstance(value, tuple | list):
         name = "tuple" if isinstance(value, tuple) else "list"
@@ -135,12 +135,12 @@ def _encoded(value: Any, arrays: list[NDArray[Any]], names: Mapping[type, str]) 
     )
 
 
-def _decoded(tree: Any, arrays: Mapping[str, NDArray[Any]], classes: Classes, path: Path) -> Any:
+def _decode(tree: Any, arrays: Mapping[str, NDArray[Any]], classes: Classes, path: Path) -> Any:
     if not isinstance(tree, dict):
         return tree
 
     def decoded(item: Any) -> Any:
-        return _decoded(item, arrays, classes, path)
+        return _decode(item, arrays, classes, path)
 
     if "array" in tree:
         array = arrays[f"array_{tree['array']}"]
@@ -162,9 +162,9 @@ def _decoded(tree: Any, arrays: Mapping[str, NDArray[Any]], classes: Classes, pa
         )
     values = {key: decoded(item) for key, item in tree["fields"].items()}
     make: Any = classes[name]
-    known = {f.name: f for f in fields(make) if f.init}
-    needed = {n for n, f in known.items() if f.default is f.default_factory is MISSING}
-    odd = sorted((set(values) - set(known)) | (needed - set(values)))
+    fields_of_class = {f.name: f for f in fields(make) if f.init}
+    needed = {n for n, f in fields_of_class.items() if f.default is f.default_factory is MISSING}
+    odd = sorted((set(values) - set(fields_of_class)) | (needed - set(values)))
     if odd:
         raise UnknownValueError(
             f"{path} holds a {name} that differs in {', '.join(odd)} from the one of this xcrack: "
@@ -173,4 +173,4 @@ def _decoded(tree: Any, arrays: Mapping[str, NDArray[Any]], classes: Classes, pa
     return make(**values)
 
 
-__all__ = ["PART", "Classes", "load", "packed", "save", "write_whole"]
+__all__ = ["PART", "Classes", "load", "packed_content", "save", "write_whole"]

@@ -37,7 +37,7 @@ def _table_2d(steps: Sequence[Step]) -> tuple[list[str], list[tuple[Any, ...]]]:
     states = range(max((len(step.sif) for step in steps), default=0))
     names = ["step", "N", "crack", "tip", "x", "y", "a"]
     names += [f"K_{m}_{s}" for s in states for m in _MODES[:2]]
-    quality = _quality(steps)
+    quality = _quality_columns(steps)
     names += [*quality, *_PARTS]
     rows = []
     for step in steps:
@@ -47,9 +47,11 @@ def _table_2d(steps: Sequence[Step]) -> tuple[list[str], list[tuple[Any, ...]]]:
             for j in range(len(step.angle[c])):
                 K = [value for state in step.sif for value in state[c].K[j]]
                 K += [np.nan] * (2 * (len(states) - len(step.sif)))
-                own = [values[j] for values in parts]
-                rows.append((step.index, step.cycles, c, j, *x[j], _size(step, c), *K, *own))
-        rows += _ended(step, len(names), with_size=True)
+                values_of_tip = [values[j] for values in parts]
+                rows.append(
+                    (step.index, step.cycles, c, j, *x[j], _size(step, c), *K, *values_of_tip)
+                )
+        rows += _rows_at_end(step, len(names), with_size=True)
     return names, rows
 
 
@@ -57,19 +59,22 @@ def _table_3d(steps: Sequence[Step]) -> tuple[list[str], list[tuple[Any, ...]]]:
     """Columns, and a row for each front: smallest value along it, mean over its length, largest."""
     n_states = max((len(step.sif) for step in steps), default=0)
     values = [f"K_{m}_{s}" for s in range(n_states) for m in _MODES]
-    quality = _quality(steps)
+    quality = _quality_columns(steps)
     values += [*quality, *_PARTS]
     names = ["step", "N", "crack", "front", "x", "y", "z", "a"]
     names += [f"{value}_{end}" for value in values for end in _ENDS]
     rows = [
         row
         for step in steps
-        for row in (*_rows_3d(step, n_states, quality), *_ended(step, len(names), with_size=False))
+        for row in (
+            *_rows_3d(step, n_states, quality),
+            *_rows_at_end(step, len(names), with_size=False),
+        )
     ]
     return names, rows
 
 
-def _ended(step: Step, n_columns: int, *, with_size: bool) -> list[tuple[Any, ...]]:
+def _rows_at_end(step: Step, n_columns: int, *, with_size: bool) -> list[tuple[Any, ...]]:
     """Rows of a step at which no tip is left: where they came to the boundary, without K."""
     if not step.has_left:
         return []
@@ -89,34 +94,36 @@ def _rows_3d(step: Step, n_states: int, quality: Measures) -> list[tuple[Any, ..
             continue
         sif = step.sif[0][c]
         for number in np.unique(sif.front):
-            mine = np.nonzero(sif.front == number)[0]
-            weight = front_weights(sif.x[mine])
+            points_of_front = np.nonzero(sif.front == number)[0]
+            weight = front_weights(sif.x[points_of_front])
             columns = [
-                state[c].K[mine, m] if m < state[c].K.shape[1] else np.zeros(len(mine))
+                state[c].K[points_of_front, m]
+                if m < state[c].K.shape[1]
+                else np.zeros(len(points_of_front))
                 for state in step.sif
                 for m in range(3)
             ]
-            columns += [np.full(len(mine), np.nan)] * (3 * n_states - len(columns))
-            columns += [measure(step, c)[mine] for measure in quality.values()]
-            columns += [values[mine] for values in _parts(step, c)]
-            ends = [end for values in columns for end in _ends(values, weight)]
-            middle, size = weight @ sif.x[mine], _size(step, c)
+            columns += [np.full(len(points_of_front), np.nan)] * (3 * n_states - len(columns))
+            columns += [measure(step, c)[points_of_front] for measure in quality.values()]
+            columns += [values[points_of_front] for values in _parts(step, c)]
+            ends = [end for values in columns for end in _extremes_and_mean(values, weight)]
+            middle, size = weight @ sif.x[points_of_front], _size(step, c)
             rows.append((step.index, step.cycles, c, int(number), *middle, size, *ends))
     return rows
 
 
-def _spread(step: Step, c: int) -> Floats:
+def _domain_spread(step: Step, c: int) -> Floats:
     """Largest difference between two domains of all states and modes `(f,)`."""
     every = [state[c].spread.max(axis=1, initial=0.0) for state in step.sif]
     return np.max(every, axis=0) if every else np.full(len(step.angle[c]), np.nan)
 
 
-def _bar(step: Step, c: int) -> Floats:
+def _longest_bar(step: Step, c: int) -> Floats:
     """Longest error bar of all states and modes `(f,)`; nan where one is unknown."""
     return np.max([state[c].bar.max(axis=1, initial=0.0) for state in step.sif], axis=0)
 
 
-def _best(step: Step, c: int) -> Floats:
+def _uses_best_K(step: Step, c: int) -> Floats:
     """1 where growth followed the best K in all states, else 0 `(f,)`."""
     return np.min([uses_best(state[c]) for state in step.sif], axis=0).astype(np.float64)
 
@@ -131,15 +138,15 @@ def _domain_cells(step: Step, c: int) -> Floats:
     return np.min([getattr(state[c], _CELLS) for state in step.sif], axis=0)
 
 
-def _quality(steps: Sequence[Step]) -> Measures:
+def _quality_columns(steps: Sequence[Step]) -> Measures:
     """Columns that say how far K is to be trusted, of what the steps have."""
     every = [sif for step in steps for state in step.sif for sif in state if len(sif.K)]
-    known = bool(every) and all(hasattr(sif, _CELLS) for sif in every)
-    measures: Measures = {"spread": _spread}
-    if known:
+    has_cells = bool(every) and all(hasattr(sif, _CELLS) for sif in every)
+    measures: Measures = {"spread": _domain_spread}
+    if has_cells:
         measures[_CELLS] = _domain_cells
     if every and all(sif.errors is not None for sif in every):
-        measures |= {"bar": _bar, "best": _best, "N_bar": _of_N}
+        measures |= {"bar": _longest_bar, "best": _uses_best_K, "N_bar": _of_N}
     return measures
 
 
@@ -151,15 +158,15 @@ def _size(step: Step, c: int) -> float:
     return np.nan if step.memory is None else step.memory.length[c]
 
 
-def _ends(values: Floats, weight: Floats) -> tuple[float, float, float]:
+def _extremes_and_mean(values: Floats, weight: Floats) -> tuple[float, float, float]:
     """Smallest value, mean and largest; points without a value do not count."""
     good = np.isfinite(values)
     if not good.any():
         return np.nan, np.nan, np.nan
-    there, share = values[good], weight[good]
+    good_values, share = values[good], weight[good]
     total = float(share.sum())
-    mean = float(share @ there) / total if total else float(there.mean())
-    return float(there.min()), mean, float(there.max())
+    mean = float(share @ good_values) / total if total else float(good_values.mean())
+    return float(good_values.min()), mean, float(good_values.max())
 
 
 # A growth run as a series of files for ParaView.

@@ -29,7 +29,7 @@ def versions() -> dict[str, str]:
 
 def _threads() -> str:
     """Number of threads of each BLAS that is loaded; what the environment asks for if none says."""
-    counts = [_asked(module, "get_num_threads", ctypes.c_int) for module in _LINKED]
+    counts = [_ask_library(module, "get_num_threads", ctypes.c_int) for module in _LINKED]
     numbers = dict.fromkeys(str(count) for count in counts if count is not None)
     if numbers:
         return ", ".join(numbers)
@@ -41,12 +41,12 @@ def _threads() -> str:
 
 def _processor() -> str:
     """Kind of processor as the BLAS sees it, else as the system does."""
-    names = (_asked(module, "get_corename", ctypes.c_char_p) for module in _LINKED)
-    known = [name.decode(errors="replace") for name in names if isinstance(name, bytes)]
-    return " ".join([platform.machine(), *dict.fromkeys(known)])
+    names = (_ask_library(module, "get_corename", ctypes.c_char_p) for module in _LINKED)
+    core_names = [name.decode(errors="replace") for name in names if isinstance(name, bytes)]
+    return " ".join([platform.machine(), *dict.fromkeys(core_names)])
 
 
-def _asked(module: str, function: str, kind: type) -> object:
+def _ask_library(module: str, function: str, kind: type) -> object:
     """What a function of OpenBLAS returns; None where the module knows none of that name."""
     try:
         library = ctypes.CDLL(import_module(module).__file__)

@@ -8,7 +8,7 @@ import numpy as np
 from xcrack.analysis.solution import Solution
 from xcrack.base.arrays import Floats
 from xcrack.base.errors import ProblemError, warn
-from xcrack.sif.common import pressure_at, shallow
+from xcrack.sif.common import is_shallow, pressure_at
 from xcrack.sif.sif import SIF
 
 _LOAD = 0.1  # share of K of the mean stress of the body that counts where K is next to nothing
@@ -75,9 +75,9 @@ def check(solutions: Sequence[Solution], t: int, domain: Domain, parts: Sequence
         K that is no number.
     """
     for part in parts:
-        bad = ~np.isfinite(part.K).all(axis=1)
-        if bad.any():
-            row = int(np.argmax(bad))
+        is_missing = ~np.isfinite(part.K).all(axis=1)
+        if is_missing.any():
+            row = int(np.argmax(is_missing))
             raise ProblemError(
                 f"{domain.at(part.x[row])}: K = {part.K[row].tolist()} is no number. Move the "
                 f"crack by a thousandth of a cell ({1e-3 * domain.size:.3g}), or refine the mesh "
@@ -86,11 +86,11 @@ def check(solutions: Sequence[Solution], t: int, domain: Domain, parts: Sequence
     tip = solutions[0].space.tips[t]
     scales = [_scale(s, part, tip.radius) for s, part in zip(solutions, parts, strict=True)]
     difference, place = _difference(domain, parts, scales)
-    doubts = [difference, _overlap(solutions, domain, parts, scales)]
+    doubts = [difference, _overlap_warning(solutions, domain, parts, scales)]
     narrow = domain.room < domain.least or domain.short
     if domain.outer < domain.wanted * (1 - 1e-12) and (narrow or any(doubts)):
         place = domain.narrowest
-        doubts.insert(0, _clipped(domain))
+        doubts.insert(0, _clipped_K(domain))
     else:
         doubts = [difference]
     if any(doubts):
@@ -112,7 +112,7 @@ def _scale(solution: Solution, part: SIF, radius: float) -> float:
     return max(float(np.abs(part.K).max()), _LOAD * float(mean_stress * np.sqrt(np.pi * radius)))
 
 
-def _clipped(domain: Domain) -> str:
+def _clipped_K(domain: Domain) -> str:
     text = (
         f"the domain is clipped to {domain.outer:.4g} ({domain.outer / domain.size:.1f} cells) by "
         "the boundary, another tip or crack, or a bend of the front"
@@ -122,7 +122,7 @@ def _clipped(domain: Domain) -> str:
     return f"{text}, and the crack is only a few cells long" if domain.short else text
 
 
-def _overlap(
+def _overlap_warning(
     solutions: Sequence[Solution], domain: Domain, parts: Sequence[SIF], scales: Sequence[float]
 ) -> str:
     """K_I below zero in a problem with contact: the mesh does not resolve the contact there."""
@@ -144,12 +144,12 @@ def _difference(
         spread = np.array(part.spread)
         spread[part.closed, 0] = 0.0  # K_I is exact there
         inner = ~part.at_surface if not part.at_surface.all() else part.at_surface
-        apart = float(spread[inner].mean(axis=0).max())
-        if scale > 0 and apart / scale > worst:
-            worst = apart / scale
+        difference = float(spread[inner].mean(axis=0).max())
+        if scale > 0 and difference / scale > worst:
+            worst = difference / scale
             place = part.x[inner][np.argmax(spread[inner].max(axis=1))]
             text = (
-                f"domains of radius {domain.outer:.4g} and less differ by {apart:.3g}, "
+                f"domains of radius {domain.outer:.4g} and less differ by {difference:.3g}, "
                 f"{100 * worst:.2g} % of the largest K"
             )
     return text, place
@@ -165,7 +165,7 @@ def _check_zone(solution: Solution, c: int, domain: Domain, part: SIF, scale: fl
     """
     pressure = pressure_at(part, solution, c)
     touching = pressure > 0
-    short = shallow(part, solution, c, _ZONE * domain.size)
+    short = is_shallow(part, solution, c, _ZONE * domain.size)
     if not touching.any() or (touching & ~short).any():
         return False
     K_per_pressure = 2 * np.sqrt(2 * _ZONE * domain.size / np.pi)

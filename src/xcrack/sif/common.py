@@ -51,12 +51,12 @@ def mean_rotation(solution: Solution, distance: Floats, radius: float) -> Floats
     """
     points = solution.space.mesh.points
     d = points.shape[1]
-    near = np.nonzero(distance < radius)[0]
-    if len(near) <= d:
+    near_points = np.nonzero(distance < radius)[0]
+    if len(near_points) <= d:
         return np.zeros((d, d))
-    y, u = np.zeros((2, len(near), 3))  # 2D turns about the third axis
-    x = points[near]
-    y[:, :d], u[:, :d] = x - x.mean(axis=0), solution.coefficients[near]
+    y, u = np.zeros((2, len(near_points), 3))  # 2D turns about the third axis
+    x = points[near_points]
+    y[:, :d], u[:, :d] = x - x.mean(axis=0), solution.coefficients[near_points]
     square, product = y.T @ y, y.T @ u
     inertia = square.trace() * np.eye(3) - square
     turning = product - product.T
@@ -100,12 +100,12 @@ def lip_shear(solution: Solution, c: int) -> Floats | None:
 
 def initial_stresses(solutions: Sequence[Solution]) -> Callable[[Floats], Floats] | None:
     """Initial stresses of all states, f(x) -> (q, 3, 3, n); None where there are none."""
-    if not acts(solutions, "initial_stress"):
+    if not has_effect(solutions, "initial_stress"):
         return None
     return lambda x: np.stack([solution.initial_stress(x) for solution in solutions], axis=-1)
 
 
-def acts(solutions: Sequence[Solution], *effects: str) -> bool:
+def has_effect(solutions: Sequence[Solution], *effects: str) -> bool:
     """Whether a load of any of the states has one of some effects, as `Load.acts` names them."""
     return any(load.acts.intersection(effects) for s in solutions for load in s.loads)
 
@@ -137,7 +137,7 @@ def with_closed(sif: SIF, solution: Solution, c: int, size: float) -> SIF:
     """
     if solution.contact[c] is None:
         return sif
-    closed = _without_gaps(pressed(sif, solution, c), sif, size) | (sif.K_I < 0)
+    closed = _without_gaps(is_pressed(sif, solution, c), sif, size) | (sif.K_I < 0)
     K, spread = np.array(sif.K), np.array(sif.spread)
     spread[closed, 0] = np.abs(K[closed, 0])
     K[closed, 0] = 0.0
@@ -177,8 +177,8 @@ def _without_gaps(closed: Bools, sif: SIF, size: float) -> Bools:
     places = sif.x[closed]
     tree = cKDTree(places)
     for row in np.nonzero(~closed)[0]:
-        near = places[tree.query_ball_point(sif.x[row], size)] - sif.x[row]
-        along = near @ sif.frame[row, -1]
+        offsets = places[tree.query_ball_point(sif.x[row], size)] - sif.x[row]
+        along = offsets @ sif.frame[row, -1]
         result[row] = bool((along > 0).any() and (along < 0).any())
     return result
 
@@ -195,12 +195,12 @@ def pressure_at(sif: SIF, solution: Solution, c: int) -> Floats:
     return np.where(contact.closed[nearest], np.maximum(contact.pressure[nearest], 0.0), 0.0)
 
 
-def pressed(sif: SIF, solution: Solution, c: int) -> Bools:
+def is_pressed(sif: SIF, solution: Solution, c: int) -> Bools:
     """Whether the lip point nearest to each place bears pressure `(f,)`."""
     return np.asarray(pressure_at(sif, solution, c) > 0)
 
 
-def shallow(sif: SIF, solution: Solution, c: int, depth: float) -> Bools:
+def is_shallow(sif: SIF, solution: Solution, c: int, depth: float) -> Bools:
     """Pressed places behind which crack faces are open within a depth `(f,)`.
 
     Parameters
@@ -211,7 +211,7 @@ def shallow(sif: SIF, solution: Solution, c: int, depth: float) -> Bools:
         Crack.
     depth : float, length
     """
-    result = pressed(sif, solution, c)
+    result = is_pressed(sif, solution, c)
     contact = solution.contact[c]
     if contact is None or not result.any():
         return result

@@ -7,12 +7,12 @@ import numpy as np
 
 from xcrack.analysis.solution import Solution
 from xcrack.base.arrays import Floats, Ints
-from xcrack.fem.assembly import Tabulated, tabulated
+from xcrack.fem.assembly import Tabulated, tabulate_functions
 from xcrack.fem.function_space import FunctionSpace
 from xcrack.fem.quadrature import Points, cell_points
 from xcrack.mesh.locate import nearest_boundary
 from xcrack.sif.accuracy import Domain, check
-from xcrack.sif.common import acts, with_closed
+from xcrack.sif.common import has_effect, with_closed
 from xcrack.sif.interaction_2d import (
     constant_part,
     lip_terms,
@@ -80,7 +80,7 @@ def _ring_parts(space: FunctionSpace, t: int, hollow: float, outer: float) -> It
     for cells, n, degree in ring_classes(space, space.tips[t].x, hollow, outer):
         plain = space.signature[cells] == 0
         others = cells[~plain]
-        points = (tabulated(space, p) for p in class_points(space, others, n, degree))
+        points = (tabulate_functions(space, p) for p in class_points(space, others, n, degree))
         few = len(others) <= _CHUNK
         yield RingPart(cells[plain], degree, tuple(points) if few else points)
 
@@ -92,10 +92,10 @@ def ring_classes(
     from xcrack.sif.kernels.ring import cells_between
 
     mesh = space.mesh
-    near = cells_between(mesh.points, mesh.cells, mesh.cell_size, centre, hollow, radius)
-    share = mesh.cell_size[near] / radius
+    near_cells = cells_between(mesh.points, mesh.cells, mesh.cell_size, centre, hollow, radius)
+    share = mesh.cell_size[near_cells] / radius
     for low, high, n, degree in _DEGREES:
-        cells = near[(share > low) & (share <= high)]
+        cells = near_cells[(share > low) & (share <= high)]
         if len(cells):
             yield cells, n, degree
 
@@ -171,7 +171,7 @@ def _integrals(solutions: Sequence[Solution], t: int, radii: Floats) -> Floats:
         total += plain_terms(solutions, ring, part.plain, part.degree)
         for values in part.others:
             total += point_terms(solutions, ring, values)
-    if acts(solutions, "volume", "initial_stress"):
+    if has_effect(solutions, "volume", "initial_stress"):
         for cells, n, degree in ring_classes(space, tip.x, 0.0, outer):
             for points in class_points(space, cells, n, degree):
                 total += volume_terms(solutions, ring, points)
@@ -191,27 +191,27 @@ def domain_of(solution: Solution, t: int) -> Domain:
     tip = space.tips[t]
     cells = space.cuts[tip.crack].level_set.tip_cells[tip.number]
     size = float(space.mesh.cell_size[cells].mean())
-    wanted = solution.problem.numerics.domain or max(_OUTER[space.order] * tip.radius, 4.0 * size)
+    radius = solution.problem.numerics.domain or max(_OUTER[space.order] * tip.radius, 4.0 * size)
     free, _ = nearest_boundary(space.mesh, tip.x)
-    own: list[float] = []
+    radii_of_tip: list[float] = []
     others: list[float] = []
     for other in space.tips:
         if other is not tip:
             distance = float(np.linalg.norm(other.x - tip.x))
-            (own if other.crack == tip.crack else others).append(distance)
+            (radii_of_tip if other.crack == tip.crack else others).append(distance)
     lips = [
         float(np.linalg.norm(points.x - tip.x, axis=1).min())
         for c, points in enumerate(solution.lips)
         if c != tip.crack and len(points)
     ]
     room = min([0.95 * free, *[0.8 * d for d in others], *[0.9 * d for d in lips]])
-    limit = min([room, *[0.8 * d for d in own]])
-    shortest = _SHORT_OPEN if own else 0.0
+    limit = min([room, *[0.8 * d for d in radii_of_tip]])
+    shortest = _SHORT_OPEN if radii_of_tip else 0.0
     if solution.contact[tip.crack] is not None:
         shortest = _SHORT_CONTACT
     return Domain(
-        outer=min(wanted, max(limit, 1.2 * size)),
-        wanted=wanted,
+        outer=min(radius, max(limit, 1.2 * size)),
+        wanted=radius,
         room=room,
         least=_ROOM[space.order] * size,
         short=float(solution.lips[tip.crack].weight.sum()) < shortest * size,

@@ -9,8 +9,8 @@ from scipy.spatial import cKDTree
 from xcrack.analysis.solution import Solution, gradients_at
 from xcrack.base.arrays import Bools, Floats, Ints, at, lock
 from xcrack.base.errors import warn
-from xcrack.base.threads import streamed
-from xcrack.crack.front_curve import Feet, FrontCurve, front_curve
+from xcrack.base.threads import stream_tasks
+from xcrack.crack.front_curve import FootPoints, FrontCurve, front_curve
 from xcrack.crack.stations import part_inside
 from xcrack.fem.loads import position
 from xcrack.fem.quadrature import cell_points, cell_side
@@ -18,7 +18,7 @@ from xcrack.mesh.locate import contains
 from xcrack.mesh.simplex import leg_size
 from xcrack.sif.accuracy import Domain, check
 from xcrack.sif.common import (
-    acts,
+    has_effect,
     initial_stresses,
     lip_pressure,
     lip_shear,
@@ -153,7 +153,7 @@ def front_intensity(solutions: Sequence[Solution], t: int) -> list[SIF]:
     wide = np.einsum("sv,nvm->nsm", matrix, values.wide[:, 0][:, values.valid])
     period = curve.length if closed else None
     cells = np.interp(s, values.knots, values.radius, period=period) / values.domain.size
-    at_surface = (read != s) | ~_covered(curve, values.knots, values.valid, s)
+    at_surface = (read != s) | ~_covered_parameters(curve, values.knots, values.valid, s)
     result = []
     for n, solution in enumerate(solutions):
         rows = K[n, :, : len(s)]
@@ -235,7 +235,7 @@ def _warn_unknown(x: Floats, values: FrontValues) -> None:
     )
 
 
-def _covered(curve: FrontCurve, knots: Floats, valid: Bools, s: Floats) -> Bools:
+def _covered_parameters(curve: FrontCurve, knots: Floats, valid: Bools, s: Floats) -> Bools:
     """Which parameters lie at or between valid tops of hats; ends of open fronts with them."""
     on = (np.abs(s[:, None] - knots[valid]) <= _ON * curve.length).any(axis=1)
     if curve.closed:
@@ -363,10 +363,10 @@ def _domain_parts(
     def part(first: int) -> Floats | None:
         points = cell_points(space, cells[first : first + _CHUNK], _POINTS, _DEGREE, True)
         x = position(space, points.cell, points.bary)
-        near, feet = curve.near(x, outer)
-        if not len(near):
+        near_points, feet = curve.near(x, outer)
+        if not len(near_points):
             return None
-        points = points.chosen(near)
+        points = points.chosen(near_points)
         gradient = gradients_at(space, coefficients, points.cell, points.bary, points.side)
         behind = np.einsum("qb,qb->q", psi[mesh.cells[points.cell]], points.bary) < 0
         return domain_integrals(
@@ -379,20 +379,20 @@ def _domain_parts(
             behind,
             solutions[0].problem.material,
             radii,
-            force=_force(solutions, x[near]),
+            force=_force(solutions, x[near_points]),
             initial=initial,
         )
 
     chunks = range(0, len(cells), _CHUNK)
     # Functions of the user are called by one thread alone.
-    own = acts(solutions, "volume", "initial_stress")
-    parts = map(part, chunks) if own else streamed(part, chunks)
+    has_sources = has_effect(solutions, "volume", "initial_stress")
+    parts = map(part, chunks) if has_sources else stream_tasks(part, chunks)
     yield from (result for result in parts if result is not None)
 
 
 def _force(solutions: Sequence[Solution], x: Floats) -> Floats | None:
     """Body forces of all states `(q, 3, n)`."""
-    if not acts(solutions, "volume"):
+    if not has_effect(solutions, "volume"):
         return None
     total = np.zeros((len(x), 3, len(solutions)))
     for n, solution in enumerate(solutions):
@@ -414,23 +414,24 @@ def _lip_part(
     space = solutions[0].space
     c = space.tips[t].crack
     lips, outer = solutions[0].lips[c], float(radii.max())
-    near, feet = curve.near(lips.x, outer)
-    feet = _as_seen(solutions[0], t, near, feet)
-    pressure = np.stack([lip_pressure(solution, c)[near] for solution in solutions], axis=-1)
+    near_points, feet = curve.near(lips.x, outer)
+    feet = _as_seen(solutions[0], t, near_points, feet)
+    pressure = np.stack([lip_pressure(solution, c)[near_points] for solution in solutions], axis=-1)
     inside = feet.r < outer
     height = np.abs(feet.local[inside, 1]).max(initial=0.0)
     bent = height > 1e-9 * outer
-    traction = lips.normal[near][:, :, None] * pressure[:, None]
+    traction = lips.normal[near_points][:, :, None] * pressure[:, None]
     for k, shear in enumerate(lip_shear(solution, c) for solution in solutions):
         if shear is not None:
-            traction[:, :, k] += shear[near]
+            traction[:, :, k] += shear[near_points]
     if not bent and not traction.any():
         return np.zeros((len(solutions), radii.shape[1], 3, len(knots)))
     gradient = None
     if bent:
         coefficients = np.stack([solution.coefficients for solution in solutions], axis=-1)
         both = [
-            gradients_at(space, coefficients, *_on_lip(solutions[0], c, near, s, sign)) - turn
+            gradients_at(space, coefficients, *_on_lip(solutions[0], c, near_points, s, sign))
+            - turn
             for s, sign in ((0, -1), (1, 1))
         ]
         gradient = np.stack(both)
@@ -438,8 +439,8 @@ def _lip_part(
         curve,
         knots,
         feet,
-        lips.normal[near],
-        lips.weight[near],
+        lips.normal[near_points],
+        lips.weight[near_points],
         traction,
         solutions[0].problem.material,
         radii,
@@ -448,7 +449,7 @@ def _lip_part(
     )
 
 
-def _as_seen(solution: Solution, t: int, rows: Ints, feet: Feet) -> Feet:
+def _as_seen(solution: Solution, t: int, rows: Ints, feet: FootPoints) -> FootPoints:
     """Feet of points on the crack faces, x1 measured from the front that the cells see.
 
     The crack faces end at its chords, and so does the pressure: on a lip the auxiliary field goes
@@ -462,8 +463,8 @@ def _as_seen(solution: Solution, t: int, rows: Ints, feet: Feet) -> Feet:
     ahead = np.einsum("qb,qb->q", lips.bary[rows, 1], psi)
     local = np.array(feet.local)
     # Out of reach of the tube psi has only a sign.
-    known = np.abs(ahead - local[:, 0]) < tip.radius
-    local[known, 0] = ahead[known]
+    is_within = np.abs(ahead - local[:, 0]) < tip.radius
+    local[is_within, 0] = ahead[is_within]
     return replace(feet, local=local)
 
 

@@ -17,13 +17,13 @@ from xcrack.estimate.shape import crack_shape, rim_shape
 from xcrack.estimate.surplus import shares
 from xcrack.mesh.locate import cell_sizes, contains
 from xcrack.mesh.mesh import Mesh
-from xcrack.mesh.polygon import between
+from xcrack.mesh.polygon import points_between
 from xcrack.mesh.refinement import refine
 from xcrack.model.problem import Problem
 from xcrack.sif.domain_2d import domain_of
 from xcrack.sif.domain_3d import front_intensity
 from xcrack.sif.goal_2d import on_faces, tip_goal
-from xcrack.sif.sif import SIF, Bars, bars_of, joined, no_bars
+from xcrack.sif.sif import SIF, KErrors, bars_of, joined, no_bars
 
 # Estimated errors of K at tips of solutions of order 2 in 2D.
 
@@ -113,9 +113,9 @@ def _at_kinks(solution: Solution, result: Estimate, crack: int) -> Floats:
     if not len(kinks):
         return np.zeros_like(result.eta)
     middle = mesh.points[mesh.cells].mean(axis=1)
-    away = np.linalg.norm(middle[:, None] - kinks, axis=2)
-    near = (away < _NEAR * cell_sizes(mesh, kinks)).any(axis=1)
-    every = [shares(result.surplus, parts, together=True)[near] for parts in result.parts]
+    distance = np.linalg.norm(middle[:, None] - kinks, axis=2)
+    is_near = (distance < _NEAR * cell_sizes(mesh, kinks)).any(axis=1)
+    every = [shares(result.surplus, parts, together=True)[is_near] for parts in result.parts]
     return np.asarray(np.sum(every, axis=1))
 
 
@@ -135,7 +135,7 @@ _OVERLAP = 0.02  # share of an overlap at one tip, as its negative K_I, that cou
 _AT_KINKS, _MOVED = 6.0, 2.0
 
 
-def tip_bars(solutions: Sequence[Solution], sifs: Sequence[SIF], crack: int) -> list[Bars]:
+def tip_bars(solutions: Sequence[Solution], sifs: Sequence[SIF], crack: int) -> list[KErrors]:
     """Bars of the tips of one crack in some states of a solve that kept its factor.
 
     Parameters
@@ -146,13 +146,13 @@ def tip_bars(solutions: Sequence[Solution], sifs: Sequence[SIF], crack: int) -> 
     crack : int
     """
     bars = bars_and_shares(solutions, sifs, crack)[0]
-    every = zip(bars, [_rounded(s, crack) for s in solutions], strict=True)
-    return [_without(one, reason) if reason else one for one, reason in every]
+    every = zip(bars, [_refusal_at_kinks(s, crack) for s in solutions], strict=True)
+    return [_without_estimate(one, reason) if reason else one for one, reason in every]
 
 
 def bars_and_shares(
     solutions: Sequence[Solution], sifs: Sequence[SIF], crack: int
-) -> tuple[list[Bars], Floats]:
+) -> tuple[list[KErrors], Floats]:
     """Bars of the tips, and the absolute contributions of the cells to the estimates.
 
     Bars of cracks whose faces press at kinks that the cut rounds off are too short: `tip_bars` has
@@ -165,17 +165,17 @@ def bars_and_shares(
 
     Returns
     -------
-    bars : list of Bars
+    bars : list of KErrors
     shares : (states, tips, 2, cells) array, stress · √length
         Zero where there are no estimates.
     """
     shape = sifs[0].K.shape
-    general = _unsuited(solutions[0], crack)
+    general = _refusal_of_solution(solutions[0], crack)
     if general or not shape[0]:
         cells = len(solutions[0].problem.mesh.cells)
         return [no_bars(shape, general)] * len(sifs), np.zeros((len(sifs), *shape, cells))
     errors = tip_errors(solutions, crack)
-    places = _unresolved(solutions[0], crack)
+    places = _refusals_of_mesh(solutions[0], crack)
     bars = [
         _bars(sif, errors, k, places, s, crack)
         for k, (sif, s) in enumerate(zip(sifs, solutions, strict=True))
@@ -183,7 +183,7 @@ def bars_and_shares(
     return bars, errors.shares
 
 
-def _unsuited(solution: Solution, crack: int) -> str:
+def _refusal_of_solution(solution: Solution, crack: int) -> str:
     """Why a solution has no estimates at all, or nothing."""
     problem = solution.problem
     if solution.space.order == 1:
@@ -196,7 +196,7 @@ def _unsuited(solution: Solution, crack: int) -> str:
     return ""
 
 
-def _unresolved(solution: Solution, crack: int) -> list[str]:
+def _refusals_of_mesh(solution: Solution, crack: int) -> list[str]:
     """Why the mesh at each tip is too coarse for an estimate, or nothing."""
     reasons = []
     tips = [t for t, tip in enumerate(solution.space.tips) if tip.crack == crack]
@@ -221,15 +221,17 @@ def _unresolved(solution: Solution, crack: int) -> list[str]:
 
 def _bars(
     sif: SIF, errors: TipErrors, k: int, places: Sequence[str], solution: Solution, crack: int
-) -> Bars:
+) -> KErrors:
     """Bars of one state."""
-    own = _CAUGHT * errors.eta[k]
+    bar_of_estimate = _CAUGHT * errors.eta[k]
     shape = errors.bend[k] + errors.rim[k]
-    eta = own + shape
+    eta = bar_of_estimate + shape
     shares = errors.shares[k].sum(axis=-1)
-    bar = np.maximum(_ETA * np.abs(own), np.maximum(_SHARES * shares, _SPREAD * sif.spread))
+    bar = np.maximum(
+        _ETA * np.abs(bar_of_estimate), np.maximum(_SHARES * shares, _SPREAD * sif.spread)
+    )
     bar = np.maximum(bar, _AT_KINKS * errors.kinks[k])
-    if any(_presses(solution, crack, x) for x in kinks_inside(solution, crack)):
+    if any(_faces_press(solution, crack, x) for x in kinks_inside(solution, crack)):
         eta = errors.rim[k].copy()
         bar += _MOVED * np.abs(errors.bend[k])
     contact = _END * errors.end[k]
@@ -240,7 +242,9 @@ def _bars(
         contact = contact + _OVERLAP * overlap.max()
         contact[:, 0] += np.maximum(overlap - bar[:, 0], 0.0)
         bar[:, 0] = np.maximum(bar[:, 0], overlap)
-    reasons = [place or _polygon(errors.chords[k][i], bar[i]) for i, place in enumerate(places)]
+    reasons = [
+        place or _refusal_of_polygon(errors.chords[k][i], bar[i]) for i, place in enumerate(places)
+    ]
     bar += _CHORDS * np.abs(errors.chords[k])
     # K_I of closed tips is zero; its bar is what the integral gave.
     eta[sif.closed, 0] = 0.0
@@ -248,21 +252,23 @@ def _bars(
     return bars_of(eta, bar, reasons, contact)
 
 
-def _without(bars: Bars, reason: str) -> Bars:
-    reasons = [own or reason for own in bars.reasons]
+def _without_estimate(bars: KErrors, reason: str) -> KErrors:
+    reasons = [common_reason or reason for common_reason in bars.reasons]
     return bars_of(bars.eta, bars.bar, reasons, bars.contact)
 
 
-def _presses(solution: Solution, crack: int, x: Floats) -> bool:
+def _faces_press(solution: Solution, crack: int, x: Floats) -> bool:
     """Whether the faces press at a point of a crack."""
     contact = solution.contact[crack]
     if contact is None:
         return False
-    near = np.linalg.norm(contact.points - x, axis=1) <= cell_sizes(solution.problem.mesh, x[None])
-    return bool((contact.closed & (contact.pressure > 0))[near].any())
+    is_near = np.linalg.norm(contact.points - x, axis=1) <= cell_sizes(
+        solution.problem.mesh, x[None]
+    )
+    return bool((contact.closed & (contact.pressure > 0))[is_near].any())
 
 
-def _rounded(solution: Solution, crack: int) -> str:
+def _refusal_at_kinks(solution: Solution, crack: int) -> str:
     """Why faces that press at a kink leave no estimate, or nothing.
 
     A sharp kink locks where one that the cut rounds off slides: no first-order estimate sees that.
@@ -270,8 +276,8 @@ def _rounded(solution: Solution, crack: int) -> str:
     cut = solution.space.cuts[crack]
     for x in kinks_inside(solution, crack):
         size = cell_sizes(solution.problem.mesh, x[None])[0]
-        away = np.linalg.norm(cut.kinks.points - x, axis=1).min(initial=np.inf)
-        if away > size and _presses(solution, crack, x):
+        distance = np.linalg.norm(cut.kinks.points - x, axis=1).min(initial=np.inf)
+        if distance > size and _faces_press(solution, crack, x):
             return (
                 f"the faces press at the kink at {at(x)}, which the cut rounds off because it is "
                 "sharper than 100° or less than a cell from a tip or another kink: compare with a "
@@ -280,7 +286,7 @@ def _rounded(solution: Solution, crack: int) -> str:
     return ""
 
 
-def _polygon(change: Floats, bar: Floats) -> str:
+def _refusal_of_polygon(change: Floats, bar: Floats) -> str:
     """Why a polygon instead of a curve leaves no estimate, or nothing."""
     if np.abs(change).max() <= bar.max():
         return ""
@@ -296,7 +302,7 @@ def _polygon(change: Floats, bar: Floats) -> str:
 _SPREAD_OF_FRONT, _WIDENED = 5.0, 0.5
 
 
-def front_bars(solutions: Sequence[Solution], sifs: Sequence[SIF], crack: int) -> list[Bars]:
+def front_bars(solutions: Sequence[Solution], sifs: Sequence[SIF], crack: int) -> list[KErrors]:
     """Bars along the fronts of one crack in some states of a solve.
 
     Parameters
@@ -321,7 +327,7 @@ def front_bars(solutions: Sequence[Solution], sifs: Sequence[SIF], crack: int) -
     return bars_beside(sifs, every, reason)
 
 
-def without_estimate(solutions: Sequence[Solution], sifs: Sequence[SIF]) -> list[Bars] | None:
+def without_estimate(solutions: Sequence[Solution], sifs: Sequence[SIF]) -> list[KErrors] | None:
     """Empty bars where nothing can be estimated, else None."""
     if not len(sifs[0].K):
         return [no_bars(sifs[0].K.shape, "")] * len(sifs)
@@ -330,7 +336,7 @@ def without_estimate(solutions: Sequence[Solution], sifs: Sequence[SIF]) -> list
     return None
 
 
-def bars_beside(sifs: Sequence[SIF], better: Sequence[SIF], reason: str) -> list[Bars]:
+def bars_beside(sifs: Sequence[SIF], better: Sequence[SIF], reason: str) -> list[KErrors]:
     """Bars of K that are the difference to a better one, which is best.
 
     Parameters
@@ -348,7 +354,7 @@ def bars_beside(sifs: Sequence[SIF], better: Sequence[SIF], reason: str) -> list
     return [_of_difference(sif, other) for sif, other in zip(sifs, better, strict=True)]
 
 
-def _of_spread(sif: SIF) -> Bars:
+def _of_spread(sif: SIF) -> KErrors:
     """At order 2: two domains, and hats twice as wide; K is best itself.
 
     They may agree by chance at a place: what they differ by in the root mean square along the
@@ -358,17 +364,19 @@ def _of_spread(sif: SIF) -> Bars:
     if sif.widened is not None:
         half = np.maximum(half, _WIDENED * sif.widened)
     half[sif.closed, 0] = 0.0
-    return _completed(sif, np.zeros_like(sif.K), np.maximum(half, _mean(sif, half)))
+    return _complete_errors(sif, np.zeros_like(sif.K), np.maximum(half, _mean(sif, half)))
 
 
-def _of_difference(sif: SIF, finer: SIF) -> Bars:
+def _of_difference(sif: SIF, finer: SIF) -> KErrors:
     """K of the other solution is best, and the difference its bar."""
     eta = np.empty_like(sif.K)
     for front in np.unique(sif.front):
-        own, other = sif.front == front, finer.front == front
-        eta[own] = _at(sif.x[own], finer.x[other], finer.K[other]) - sif.K[own]
+        is_on_front, other = sif.front == front, finer.front == front
+        eta[is_on_front] = (
+            _at(sif.x[is_on_front], finer.x[other], finer.K[other]) - sif.K[is_on_front]
+        )
     eta[sif.closed, 0] = 0.0
-    return _completed(sif, eta, np.maximum(np.abs(eta), _mean(sif, eta)))
+    return _complete_errors(sif, eta, np.maximum(np.abs(eta), _mean(sif, eta)))
 
 
 def _at(x: Floats, vertices: Floats, values: Floats) -> Floats:
@@ -381,11 +389,11 @@ def _at(x: Floats, vertices: Floats, values: Floats) -> Floats:
         square = np.einsum("ij,ij->i", side, side)
         share = np.einsum("ij,ij->i", x - vertices[nearest], side)
         share = np.clip(share / np.where(square > 0, square, 1.0), 0.0, 1.0)[:, None]
-        apart = np.linalg.norm(x - vertices[nearest] - share * side, axis=1)
-        nearer = apart < distance
+        distance_to_front = np.linalg.norm(x - vertices[nearest] - share * side, axis=1)
+        nearer = distance_to_front < distance
         between = (1 - share) * values[nearest] + share * values[next_to]
         result = np.where(nearer[:, None], between, result)
-        distance = np.minimum(distance, apart)
+        distance = np.minimum(distance, distance_to_front)
     return np.asarray(result)
 
 
@@ -394,13 +402,13 @@ def _mean(sif: SIF, values: Floats) -> Floats:
     result = np.array(values)
     inner = ~sif.at_surface if not sif.at_surface.all() else sif.at_surface
     for front in np.unique(sif.front):
-        own = sif.front == front
-        rows = values[own & inner] if (own & inner).any() else values[own]
-        result[own] = np.sqrt((rows**2).mean(axis=0))
+        is_on_front = sif.front == front
+        rows = values[is_on_front & inner] if (is_on_front & inner).any() else values[is_on_front]
+        result[is_on_front] = np.sqrt((rows**2).mean(axis=0))
     return result
 
 
-def _completed(sif: SIF, eta: Floats, bar: Floats) -> Bars:
+def _complete_errors(sif: SIF, eta: Floats, bar: Floats) -> KErrors:
     """With K_I of closed places, and without what is beside a free surface."""
     contact = np.zeros_like(bar)
     bar[sif.closed, 0] = contact[sif.closed, 0] = np.abs(sif.K_integral[sif.closed, 0])
@@ -417,7 +425,7 @@ FINER = 1.5  # times
 _NEAR_FRONT = 2.0  # cells around the fronts that become smaller
 
 
-def finer_bars(solutions: Sequence[Solution], sifs: Sequence[SIF], crack: int) -> list[Bars]:
+def finer_bars(solutions: Sequence[Solution], sifs: Sequence[SIF], crack: int) -> list[KErrors]:
     """Bars along the fronts of one crack: its states are solved again, with finer cells there.
 
     Parameters
@@ -430,7 +438,7 @@ def finer_bars(solutions: Sequence[Solution], sifs: Sequence[SIF], crack: int) -
 
     Returns
     -------
-    list of Bars
+    list of KErrors
         `best` is K of the finer solution.
     """
     missing = without_estimate(solutions, sifs)
@@ -451,10 +459,10 @@ def finer_bars(solutions: Sequence[Solution], sifs: Sequence[SIF], crack: int) -
 def finer_along(problem: Problem, crack: int) -> Mesh:
     """The mesh with cells along the fronts of one crack that are smaller by 1.5."""
     mesh, placed = problem.mesh, problem.placed[crack]
-    front = cKDTree(between([placed.points[front] for front in placed.fronts or ()]))
+    front = cKDTree(points_between([placed.points[front] for front in placed.fronts or ()]))
     centre = mesh.points[mesh.cells].mean(axis=1)
-    near = front.query(centre)[0] <= _NEAR_FRONT * mesh.cell_size
-    each = np.where(near, mesh.cell_size / FINER, np.inf)
+    is_near = front.query(centre)[0] <= _NEAR_FRONT * mesh.cell_size
+    each = np.where(is_near, mesh.cell_size / FINER, np.inf)
 
     def wanted(x: Floats) -> Floats:
         return np.asarray(each[mesh.cell_tree.query(x)[1]])
@@ -462,7 +470,7 @@ def finer_along(problem: Problem, crack: int) -> Mesh:
     return refine(mesh, size=wanted)
 
 
-_Estimate = Callable[[Sequence[Solution], Sequence[SIF], int], list[Bars]]
+_Estimate = Callable[[Sequence[Solution], Sequence[SIF], int], list[KErrors]]
 
 
 def with_bars(
@@ -487,7 +495,7 @@ def with_bars(
     """
     live = [k for k, s in enumerate(solutions) if not s.at_rest]
     zero = np.zeros_like(sifs[0].K)
-    result = [replace(sif, errors=Bars(zero, zero, ("",) * len(zero))) for sif in sifs]
+    result = [replace(sif, errors=KErrors(zero, zero, ("",) * len(zero))) for sif in sifs]
     if not live:
         return result
     chosen = [solutions[k] for k in live]
@@ -501,7 +509,7 @@ def with_bars(
     return result
 
 
-def _of_tips(solutions: Sequence[Solution], sifs: Sequence[SIF], crack: int) -> list[Bars]:
+def _of_tips(solutions: Sequence[Solution], sifs: Sequence[SIF], crack: int) -> list[KErrors]:
     """In 2D, from the factor."""
     if solutions[0].factored is None:
         problem, states = solutions[0].problem, [s.state for s in solutions]

@@ -13,11 +13,11 @@ import numpy as np
 from xcrack.analysis.solution import Solution
 from xcrack.base.arrays import Floats
 from xcrack.estimate.dual import Goal, GoalCells, GoalPoints
-from xcrack.fem.assembly import tabulated
+from xcrack.fem.assembly import tabulate_functions
 from xcrack.fem.quadrature import Points, lip_side
 from xcrack.fem.williams import continued_polar, mode_matrix, unit_gradients
 from xcrack.mesh.simplex import simplex_rule
-from xcrack.sif.common import acts, weight
+from xcrack.sif.common import has_effect, weight
 from xcrack.sif.domain_2d import class_points, domain_of, radii_of, ring_classes, ring_parts
 from xcrack.sif.interaction_2d import ahead_derivative, inner_radii, ring_around, volume_terms
 
@@ -65,7 +65,7 @@ def tip_goal(solution: Solution, t: int) -> Goal:
             parts.append(GoalPoints(at, factor))
     rotation = _rotation(solution, t, outer)
     faces = partial(_faces, solution, t, outer, inner)
-    if _bent(solution, t, outer):
+    if _has_bent_faces(solution, t, outer):
         on_crack, pressure, _ = faces()
         parts.extend(on_crack)
         return Goal(tuple(parts), tuple(plain_parts), rotation, tip.crack, 2, lambda: pressure)
@@ -79,7 +79,7 @@ def constant(solution: Solution, t: int) -> Floats:
     """
     space, scale = solution.space, 0.5 * solution.problem.material.E_prime
     total = np.zeros(2)
-    if not acts([solution], "volume", "initial_stress"):
+    if not has_effect([solution], "volume", "initial_stress"):
         return total
     outer = domain_of(solution, t).outer
     radii = np.array([outer])
@@ -96,14 +96,14 @@ def _rotation(solution: Solution, t: int, outer: float) -> Floats:
     """Mean rotation of the mesh points around the tip as a functional; see `mean_rotation`."""
     points = solution.space.mesh.points
     result = np.zeros_like(points)
-    near = np.nonzero(np.linalg.norm(points - solution.space.tips[t].x, axis=1) < outer)[0]
-    if len(near) > points.shape[1]:
-        y = points[near] - points[near].mean(axis=0)
-        result[near] = np.stack([-y[:, 1], y[:, 0]], axis=1) / (y * y).sum()
+    near_points = np.nonzero(np.linalg.norm(points - solution.space.tips[t].x, axis=1) < outer)[0]
+    if len(near_points) > points.shape[1]:
+        y = points[near_points] - points[near_points].mean(axis=0)
+        result[near_points] = np.stack([-y[:, 1], y[:, 0]], axis=1) / (y * y).sum()
     return result
 
 
-def _bent(solution: Solution, t: int, outer: float) -> bool:
+def _has_bent_faces(solution: Solution, t: int, outer: float) -> bool:
     """Whether faces in the domain leave the line through the tip."""
     tip = solution.space.tips[t]
     way = solution.lips[tip.crack].x - tip.x
@@ -120,23 +120,23 @@ def _faces(
     lips, R, scale = solution.lips[tip.crack], tip.frame, 0.5 * material.E_prime
     pressure, per_stress = np.zeros((len(lips), 2)), np.zeros((2, 2, 2))
     way = lips.way_from(space.mesh, tip.x)
-    near = np.nonzero(np.linalg.norm(way, axis=1) < outer)[0]
-    if not len(near):
+    near_points = np.nonzero(np.linalg.norm(way, axis=1) < outer)[0]
+    if not len(near_points):
         return (), pressure, per_stress
-    xi = way[near] @ R.T
+    xi = way[near_points] @ R.T
     xi[np.abs(xi[:, 1]) < _STRAIGHT * outer, 1] = 0.0
     bent = bool(xi[:, 1].any())
     parts = []
     for s, sign in ((0, -1), (1, 1)):
-        cell, bary = lips.cell[near, s], lips.bary[near, s]
+        cell, bary = lips.cell[near_points, s], lips.bary[near_points, s]
         side = lip_side(space, tip.crack, cell, bary, sign)
         r, theta = continued_polar(xi, side[:, tip.crack], np.ones(len(xi), dtype=bool))
-        outward = -sign * lips.normal[near] @ R.T
+        outward = -sign * lips.normal[near_points] @ R.T
         q, _ = weight(r, xi, np.array([inner]), np.array([outer]))
-        w = scale * q[0] * lips.weight[near]
-        factor = np.zeros((len(near), 2, 2, 2))
+        w = scale * q[0] * lips.weight[near_points]
+        factor = np.zeros((len(near_points), 2, 2, 2))
         for m, g in enumerate(unit_gradients(r, theta, material.kolosov, material.mu)[:2]):
-            pressure[near, m] += w * np.einsum("qi,qi->q", outward, g[:, :, 0])
+            pressure[near_points, m] += w * np.einsum("qi,qi->q", outward, g[:, :, 0])
             if not bent:
                 continue
             sigma = material.stress(g)
@@ -145,7 +145,7 @@ def _faces(
             local[:, :, 0] -= np.einsum("qij,qj->qi", sigma, outward)
             factor[..., m] = np.einsum("q,ai,qab,bj->qij", w, R, local, R)
         if bent:
-            at = tabulated(space, Points(cell, bary, lips.weight[near], side))
+            at = tabulate_functions(space, Points(cell, bary, lips.weight[near_points], side))
             parts.append(GoalPoints(at, factor))
     return parts, pressure, per_stress
 
@@ -161,12 +161,12 @@ def on_faces(solution: Solution, tips: Sequence[int]) -> tuple[Floats, Floats]:
     values : (2, q, 2, 2 tips) array
     gradients : (2, q, 2, 2, 2 tips) array
     """
-    both = [_singular(solution, t) for t in tips]
+    both = [_singular_part(solution, t) for t in tips]
     values, gradients = zip(*both, strict=True)
     return np.concatenate(values, axis=-1), np.concatenate(gradients, axis=-1)
 
 
-def _singular(solution: Solution, t: int) -> tuple[Floats, Floats]:
+def _singular_part(solution: Solution, t: int) -> tuple[Floats, Floats]:
     space, material = solution.space, solution.problem.material
     tip = space.tips[t]
     lips, R = solution.lips[tip.crack], tip.frame
@@ -174,17 +174,17 @@ def _singular(solution: Solution, t: int) -> tuple[Floats, Floats]:
     outer = np.array([radius])
     values, gradients = np.zeros((2, len(lips), 2, 2)), np.zeros((2, len(lips), 2, 2, 2))
     way = lips.way_from(space.mesh, tip.x)
-    near = np.nonzero(np.linalg.norm(way, axis=1) < radius)[0]
-    xi = way[near] @ R.T
+    near_points = np.nonzero(np.linalg.norm(way, axis=1) < radius)[0]
+    xi = way[near_points] @ R.T
     for s, sign in ((0, -1), (1, 1)):
-        side = np.full(len(near), sign)
-        r, theta = continued_polar(xi, side, np.ones(len(near), dtype=bool))
+        side = np.full(len(near_points), sign)
+        r, theta = continued_polar(xi, side, np.ones(len(near_points), dtype=bool))
         q, dq = weight(r, xi, inner_radii(space.order, outer), outer)
         fields = unit_gradients(r, theta, material.kolosov, material.mu)[:2]
         curves = ahead_derivative(material, r, theta)[:2]
         for m, (g, curve) in enumerate(zip(fields, curves, strict=True)):
             scale = 0.5 * material.E_prime
-            values[s, near, :, m] = scale * q[0][:, None] * (g[:, :, 0] @ R)
+            values[s, near_points, :, m] = scale * q[0][:, None] * (g[:, :, 0] @ R)
             local = q[0][:, None, None] * curve + g[:, :, :1] * dq[0][:, None]
-            gradients[s, near, :, :, m] = scale * (R.T @ local @ R)
+            gradients[s, near_points, :, :, m] = scale * (R.T @ local @ R)
     return values, gradients

@@ -26,7 +26,7 @@ from xcrack.fem.williams import continued_polar, mode_matrix, unit_gradients
 from xcrack.mesh.mesh import local_edges
 from xcrack.mesh.simplex import simplex_rule
 from xcrack.model.material import Isotropic
-from xcrack.sif.common import acts, lip_pressure, lip_shear, mean_rotation, weight
+from xcrack.sif.common import has_effect, lip_pressure, lip_shear, mean_rotation, weight
 
 # Inner radius of the ring in which q falls, as a share of the outer one. At order 1 the ring stays
 # outside the enriched disc; at order 2 a wide ring saves digits on coarse meshes (measured).
@@ -48,19 +48,19 @@ def constant_part(solution: Solution, t: int) -> float:
     lips = solution.lips[tip.crack]
     at_tip = int(np.argmin(np.linalg.norm(lips.x - tip.x, axis=1)))
     pressure = float(lip_pressure(solution, tip.crack)[at_tip])
-    steady = _steady(solution, t)
+    steady = _steady_stress(solution, t)
     contraction = material.lam / (material.lam + 2 * material.mu)
     return float(steady[0, 0] - contraction * steady[1, 1]) - pressure
 
 
-def _steady(solution: Solution, t: int) -> Floats:
+def _steady_stress(solution: Solution, t: int) -> Floats:
     """Initial stress at the tip in its frame `(d, d)`."""
     tip = solution.space.tips[t]
     return np.asarray(tip.frame @ solution.initial_stress(tip.x[None])[0] @ tip.frame.T)
 
 
 @dataclass(frozen=True, eq=False)
-class Ring:
+class IntegrationRing:
     """What the domain integrals around one tip need, for several states.
 
     Attributes
@@ -81,16 +81,18 @@ class Ring:
     coefficients: Floats
 
 
-def ring_around(solutions: Sequence[Solution], t: int, radii: Floats) -> Ring:
+def ring_around(solutions: Sequence[Solution], t: int, radii: Floats) -> IntegrationRing:
     """The domains around tip t with the given outer radii."""
     space = solutions[0].space
     distance = np.linalg.norm(space.mesh.points - space.tips[t].x, axis=1)
     turns = [mean_rotation(s, distance, float(radii.max())) for s in solutions]
     coefficients = np.stack([s.coefficients for s in solutions], axis=-1)
-    return Ring(t, radii, inner_radii(space.order, radii), np.stack(turns, axis=-1), coefficients)
+    return IntegrationRing(
+        t, radii, inner_radii(space.order, radii), np.stack(turns, axis=-1), coefficients
+    )
 
 
-def _constants(solution: Solution, ring: Ring) -> tuple[Any, ...]:
+def _constants(solution: Solution, ring: IntegrationRing) -> tuple[Any, ...]:
     """Last arguments of the kernels of domain integrals."""
     tip, material = solution.space.tips[ring.t], solution.problem.material
     return (
@@ -99,7 +101,9 @@ def _constants(solution: Solution, ring: Ring) -> tuple[Any, ...]:
     )  # fmt: skip
 
 
-def plain_terms(solutions: Sequence[Solution], ring: Ring, cells: Ints, degree: int) -> Floats:
+def plain_terms(
+    solutions: Sequence[Solution], ring: IntegrationRing, cells: Ints, degree: int
+) -> Floats:
     """Domain integrals over plain cells `(s, radii, 3)`, by a rule of the given degree."""
     from xcrack.sif.kernels.ring import add_plain_cells
 
@@ -115,7 +119,9 @@ def plain_terms(solutions: Sequence[Solution], ring: Ring, cells: Ints, degree: 
     return result
 
 
-def point_terms(solutions: Sequence[Solution], ring: Ring, tabulated: Tabulated) -> Floats:
+def point_terms(
+    solutions: Sequence[Solution], ring: IntegrationRing, tabulated: Tabulated
+) -> Floats:
     """Domain integrals over points of any cells `(s, radii, 3)`."""
     from xcrack.sif.kernels.ring import add_points
 
@@ -131,7 +137,7 @@ def point_terms(solutions: Sequence[Solution], ring: Ring, tabulated: Tabulated)
     return result
 
 
-def volume_terms(solutions: Sequence[Solution], ring: Ring, points: Points) -> Floats:
+def volume_terms(solutions: Sequence[Solution], ring: IntegrationRing, points: Points) -> Floats:
     """What body forces and initial stress add at points `(s, radii, 3)`."""
     space = solutions[0].space
     tip = space.tips[ring.t]
@@ -143,28 +149,30 @@ def volume_terms(solutions: Sequence[Solution], ring: Ring, points: Points) -> F
     result = np.zeros((len(solutions), len(ring.radii), 3))
     q, dq = weight(r, xi, ring.inner, ring.radii)
     weighted = points.weight[:, None] * dq  # (radii, q, d)
-    for m, field in enumerate(_auxiliary(solutions, r, theta)):
+    for m, field in enumerate(_auxiliary_fields(solutions, r, theta)):
         for s, solution in enumerate(solutions):
             result[s, :, m] += _load_terms(solution, ring.t, points, x, field, q, weighted)
     return result
 
 
 @dataclass(frozen=True, eq=False)
-class _Field:
+class AuxiliaryField:
     """A unit field: gradient `(q, d, d)`, derivative of the gradient ahead (if needed)."""
 
     gradient: Floats
     curve: Floats
 
 
-def _auxiliary(solutions: Sequence[Solution], r: Floats, theta: Floats) -> list[_Field]:
+def _auxiliary_fields(
+    solutions: Sequence[Solution], r: Floats, theta: Floats
+) -> list[AuxiliaryField]:
     """The unit fields of modes I, II and of the point force."""
     material = solutions[0].problem.material
     gradients = unit_gradients(r, theta, material.kolosov, material.mu)
     curves = np.zeros((len(gradients), 0, 2, 2))
-    if acts(solutions, "initial_stress"):
+    if has_effect(solutions, "initial_stress"):
         curves = ahead_derivative(solutions[0].problem.material, r, theta)
-    return [_Field(g, c) for g, c in zip(gradients, curves, strict=True)]
+    return [AuxiliaryField(g, c) for g, c in zip(gradients, curves, strict=True)]
 
 
 def ahead_derivative(material: Isotropic, r: Floats, theta: Floats) -> Floats:
@@ -181,7 +189,13 @@ def ahead_derivative(material: Isotropic, r: Floats, theta: Floats) -> Floats:
 
 
 def _load_terms(
-    solution: Solution, t: int, points: Points, x: Floats, field: _Field, q: Floats, dq: Floats
+    solution: Solution,
+    t: int,
+    points: Points,
+    x: Floats,
+    field: AuxiliaryField,
+    q: Floats,
+    dq: Floats,
 ) -> Floats:
     """Terms of body forces and initial stress, for each domain; dq is weighted."""
     tip = solution.space.tips[t]
@@ -203,20 +217,22 @@ def _load_terms(
     return total
 
 
-def lip_terms(solutions: Sequence[Solution], ring: Ring) -> Floats:
+def lip_terms(solutions: Sequence[Solution], ring: IntegrationRing) -> Floats:
     """Full lip term of each state, domain and field `(s, radii, 3)`."""
     space, t, radii = solutions[0].space, ring.t, ring.radii
     tip, lips = space.tips[t], solutions[0].lips[space.tips[t].crack]
     result = np.zeros((len(solutions), len(radii), 3))
     way = lips.way_from(space.mesh, tip.x)
-    near = np.linalg.norm(way, axis=1) < radii.max()
-    if not near.any():
+    is_near = np.linalg.norm(way, axis=1) < radii.max()
+    if not is_near.any():
         return result
-    pressure = np.stack([lip_pressure(s, tip.crack)[near] for s in solutions])
-    shears = [None if x is None else x[near] for x in (lip_shear(s, tip.crack) for s in solutions)]
+    pressure = np.stack([lip_pressure(s, tip.crack)[is_near] for s in solutions])
+    shears = [
+        None if x is None else x[is_near] for x in (lip_shear(s, tip.crack) for s in solutions)
+    ]
     R = tip.frame
     material = solutions[0].problem.material
-    xi = way[near] @ R.T
+    xi = way[is_near] @ R.T
     # The last piece is straight: what differs there is round-off, which 1 / r would magnify.
     xi[np.abs(xi[:, 1]) < 1e-9 * radii.max(), 1] = 0.0
     bent = bool(xi[:, 1].any())
@@ -224,16 +240,20 @@ def lip_terms(solutions: Sequence[Solution], ring: Ring) -> Floats:
     if not bent and not pressure.any() and not rubs:
         return result
     # Both faces at once, face - first.
-    n, w, steady = len(xi), lips.weight[near], [_steady(solution, t) for solution in solutions]
-    cell, bary = lips.cell[near], lips.bary[near]
+    n, w, steady = (
+        len(xi),
+        lips.weight[is_near],
+        [_steady_stress(solution, t) for solution in solutions],
+    )
+    cell, bary = lips.cell[is_near], lips.bary[is_near]
     faces = [lip_side(space, tip.crack, cell[:, s], bary[:, s], 2 * s - 1) for s in (0, 1)]
     side = np.concatenate(faces)
     xi = np.concatenate([xi, xi])
     r, theta = continued_polar(xi, side[:, tip.crack], np.ones(2 * n, dtype=bool))
-    outward = lips.normal[near] @ R.T
+    outward = lips.normal[is_near] @ R.T
     outward = np.concatenate([outward, -outward])
     q, _ = weight(r, xi, ring.inner, radii)
-    aux = _auxiliary(solutions, r, theta)
+    aux = _auxiliary_fields(solutions, r, theta)
     local, stresses = None, []
     if bent:
         stresses = [material.stress(field.gradient) for field in aux]

@@ -17,7 +17,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from xcrack.base.arrays import Bools, Floats, Ints
-from xcrack.crack.front_curve import Feet, FrontCurve
+from xcrack.crack.front_curve import FootPoints, FrontCurve
 from xcrack.fem.williams import continued_polar
 from xcrack.model.material import Isotropic
 
@@ -135,7 +135,7 @@ def reading(knots: Floats, valid: Bools, curve: FrontCurve, s: Floats) -> Floats
 def domain_integrals(
     curve: FrontCurve,
     knots: Floats,
-    feet: Feet,
+    feet: FootPoints,
     weight: Floats,
     gradient: Floats,
     side: Ints,
@@ -153,7 +153,7 @@ def domain_integrals(
     ----------
     curve : FrontCurve
     knots : (p,) array, length
-    feet : Feet
+    feet : FootPoints
         `curve.feet(x)` of the points.
     weight : (q,) array, length³
     gradient : (q, 3, 3, n) array
@@ -208,7 +208,7 @@ def domain_integrals(
 
 def _initial_stress(
     curve: FrontCurve,
-    feet: Feet,
+    feet: FootPoints,
     initial: Callable[[Floats], Floats] | None,
     states: int,
 ) -> tuple[Floats, Floats]:
@@ -224,7 +224,7 @@ def _initial_stress(
 def lip_integrals(
     curve: FrontCurve,
     knots: Floats,
-    feet: Feet,
+    feet: FootPoints,
     normal: Floats,
     weight: Floats,
     traction: Floats,
@@ -240,7 +240,7 @@ def lip_integrals(
     ----------
     curve : FrontCurve
     knots : (p,) array, length
-    feet : Feet
+    feet : FootPoints
         `curve.feet(x)` of the points of the crack faces.
     normal : (q, 3) array
         From lip - to lip +.
@@ -262,7 +262,7 @@ def lip_integrals(
     # What is flat is so but for round-off, which 1 / r would magnify.
     local = np.array(feet.local)
     local[np.abs(local[:, 1]) < _FLAT * radii.max(), 1] = 0.0
-    feet = Feet(feet.s, local, feet.frame, feet.turn)
+    feet = FootPoints(feet.s, local, feet.frame, feet.turn)
     every = np.ones(len(weight), dtype=bool)
     lips = [
         side_integrals(
@@ -278,7 +278,7 @@ def lip_integrals(
 def side_integrals(
     curve: FrontCurve,
     knots: Floats,
-    feet: Feet,
+    feet: FootPoints,
     outward: Floats,
     weight: Floats,
     traction: Floats,

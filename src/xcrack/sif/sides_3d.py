@@ -13,7 +13,7 @@ import numpy as np
 
 from xcrack.analysis.solution import Solution, gradients_at
 from xcrack.base.arrays import Bools, Floats, Ints
-from xcrack.crack.front_curve import Feet, FrontCurve
+from xcrack.crack.front_curve import FootPoints, FrontCurve
 from xcrack.fem.loads import facet_points, outer_points, position
 from xcrack.fem.quadrature import Points
 from xcrack.mesh.mesh import facet_set, numbers_of
@@ -35,7 +35,7 @@ class Sides:
     points : Points
     normal : (q, 3) array
         Out of the body.
-    feet : Feet
+    feet : FootPoints
     reaction : (q,) array of bool
         Where the traction is an unknown reaction that counts.
     smooth : (q,) array of bool
@@ -44,7 +44,7 @@ class Sides:
 
     points: Points
     normal: Floats
-    feet: Feet
+    feet: FootPoints
     reaction: Bools
     smooth: Bools
 
@@ -157,7 +157,7 @@ def _integrals(
     t: int,
     points: Points,
     normal: Floats,
-    feet: Feet,
+    feet: FootPoints,
     traction: Floats,
     curve: FrontCurve,
     knots: Floats,
@@ -177,7 +177,7 @@ def _integrals(
 
 def _loaded(
     solutions: Sequence[Solution], curve: FrontCurve, reach: float
-) -> list[tuple[Points, Floats, Feet, Floats]]:
+) -> list[tuple[Points, Floats, FootPoints, Floats]]:
     """Points on loaded facets within reach, with normals, feet and tractions of all states."""
     space = solutions[0].space
     mesh = space.mesh

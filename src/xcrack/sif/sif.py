@@ -8,15 +8,15 @@ import numpy as np
 
 from xcrack.base import markup
 from xcrack.base.arrays import Bools, Floats, Ints, lock
-from xcrack.base.checks import numbers, shown, whole_numbers
+from xcrack.base.checks import numbers, value_text, whole_numbers
 from xcrack.base.errors import ProblemError
-from xcrack.base.optional import required
+from xcrack.base.optional import require_package
 
 # Estimated errors of K, with a reason where there is none.
 
 
 @dataclass(frozen=True, eq=False)
-class Bars:
+class KErrors:
     """Estimated errors of K of one crack in one state.
 
     Attributes
@@ -37,19 +37,19 @@ class Bars:
     contact: Floats | None = None
 
 
-def no_bars(shape: tuple[int, ...], reason: str) -> Bars:
+def no_bars(shape: tuple[int, ...], reason: str) -> KErrors:
     """No estimate at any place, for one reason."""
     nothing = lock(np.full(shape, np.nan))
-    return Bars(nothing, nothing, (reason,) * shape[0])
+    return KErrors(nothing, nothing, (reason,) * shape[0])
 
 
 def bars_of(
     eta: Floats, bar: Floats, reasons: Sequence[str], contact: Floats | None = None
-) -> Bars:
+) -> KErrors:
     """Estimates with nan where there is a reason against them."""
     against = np.array([bool(reason) for reason in reasons], dtype=bool)[:, None]
     part = None if contact is None else lock(np.where(against, np.nan, contact))
-    return Bars(
+    return KErrors(
         lock(np.where(against, np.nan, eta)),
         lock(np.where(against, np.nan, bar)),
         tuple(reasons),
@@ -119,7 +119,7 @@ class SIF:
         crack without multipliers.
     domain_cells : (f,) array
         Outer radius of the larger domain, in cells; few of them mean a domain that is clipped.
-    errors : Bars, optional
+    errors : KErrors, optional
         Estimated errors, where they were asked for.
     ends : tuple of SurfaceEnd
         Where fronts come to free surfaces; none in 2D.
@@ -142,7 +142,7 @@ class SIF:
     at_surface: Bools
     closed: Bools
     domain_cells: Floats
-    errors: Bars | None = None
+    errors: KErrors | None = None
     ends: tuple[SurfaceEnd, ...] = ()
     widened: Floats | None = None
 
@@ -161,15 +161,15 @@ class SIF:
             flags = getattr(self, name)
             if not isinstance(flags, np.ndarray) or flags.dtype != bool or flags.shape != (n,):
                 raise ProblemError(
-                    f"SIF: {name} = {shown(flags)}: give an array of bool of shape ({n},)."
+                    f"SIF: {name} = {value_text(flags)}: give an array of bool of shape ({n},)."
                 )
         if self.widened is not None:
             numbers(self.widened, "SIF: widened", (n, d), finite=False)
-        if self.errors is not None and not isinstance(self.errors, Bars):
-            raise ProblemError(f"SIF: errors = {shown(self.errors)}: give Bars or None.")
+        if self.errors is not None and not isinstance(self.errors, KErrors):
+            raise ProblemError(f"SIF: errors = {value_text(self.errors)}: give KErrors or None.")
         known = isinstance(self.ends, tuple)
         if not known or not all(isinstance(end, SurfaceEnd) for end in self.ends):
-            raise ProblemError(f"SIF: ends = {shown(self.ends)}: give a tuple of SurfaceEnd.")
+            raise ProblemError(f"SIF: ends = {value_text(self.ends)}: give a tuple of SurfaceEnd.")
 
     @property
     def eta(self) -> Floats:
@@ -192,7 +192,7 @@ class SIF:
         return self._errors.reasons
 
     @property
-    def _errors(self) -> Bars:
+    def _errors(self) -> KErrors:
         if self.errors is not None:
             return self.errors
         return no_bars(self.K.shape, "no estimate was asked for: stress_intensity(error=True)")
@@ -233,7 +233,7 @@ class SIF:
         XcrackError
             pandas is not installed.
         """
-        return required("pandas", "SIF.to_pandas").DataFrame(self._columns())
+        return require_package("pandas", "SIF.to_pandas").DataFrame(self._columns())
 
     def _columns(self) -> dict[str, Any]:
         modes = ("I", "II", "III")[: self.K.shape[1]]
@@ -253,7 +253,7 @@ class SIF:
         columns = self._columns()
         rows = list(zip(*(np.asarray(c).tolist() for c in columns.values()), strict=True))
         content = markup.table(tuple(columns), rows, scroll=len(rows) > 12)
-        return markup.joined(markup.element("b", "SIF"), content)
+        return markup.join_parts(markup.element("b", "SIF"), content)
 
     def __repr__(self) -> str:
         if self.K.shape[1] == 3:

@@ -8,7 +8,7 @@ import numpy as np
 
 from xcrack.analysis.solution import Solution
 from xcrack.base.arrays import Floats
-from xcrack.base.checks import flag, shown, whole
+from xcrack.base.checks import flag, value_text, whole_number
 from xcrack.base.errors import ProblemError
 from xcrack.base.threads import threads
 from xcrack.model.material import Isotropic
@@ -91,12 +91,13 @@ def stress_intensities(
     XcrackWarning
         As of `stress_intensity`.
     """
-    solutions = _checked(solutions)
+    solutions = _checked_solutions(solutions)
     space = solutions[0].space
-    crack = whole(crack, "crack")
+    crack = whole_number(crack, "crack")
     if not 0 <= crack < len(space.cuts):
         raise ProblemError(
-            f"crack {shown(crack)}: the problem has {len(space.cuts)} crack(s), numbered from 0."
+            f"crack {value_text(crack)}: the problem has {len(space.cuts)} crack(s), numbered from "
+            f"0."
         )
     # Cycles from nothing are the most common ones: their lower state has no K to look for.
     live = [s for s in solutions if not s.at_rest] or solutions[:1]
@@ -107,8 +108,10 @@ def stress_intensities(
     by_state = [joined([states[k] for states in by_end], space.dim) for k in range(len(live))]
     place = np.cumsum([not s.at_rest for s in solutions]) - 1
     K, T = np.zeros_like(by_state[0].K), np.where(np.isnan(by_state[0].T), np.nan, 0.0)
-    rest = replace(by_state[0], K=K, T=T, spread=K, closed=np.zeros(len(K), dtype=bool))
-    result = [rest if s.at_rest else by_state[k] for s, k in zip(solutions, place, strict=True)]
+    empty_sif = replace(by_state[0], K=K, T=T, spread=K, closed=np.zeros(len(K), dtype=bool))
+    result = [
+        empty_sif if s.at_rest else by_state[k] for s, k in zip(solutions, place, strict=True)
+    ]
     if isinstance(error, str) and error == "front":
         return with_bars(solutions, result, crack, error)
     if error is None:
@@ -118,7 +121,7 @@ def stress_intensities(
     return with_bars(solutions, result, crack) if error else result
 
 
-def _checked(solutions: Any) -> list[Solution]:
+def _checked_solutions(solutions: Any) -> list[Solution]:
     """The solutions as a list, if they are those of one solve."""
     if isinstance(solutions, Solution):
         raise ProblemError(
@@ -174,10 +177,12 @@ def energy_release_rate(sif: SIF, material: Isotropic) -> Floats:
     """
     if not isinstance(sif, SIF):
         raise ProblemError(
-            f"energy_release_rate: sif = {shown(sif)}: give what stress_intensity returns."
+            f"energy_release_rate: sif = {value_text(sif)}: give what stress_intensity returns."
         )
     if not isinstance(material, Isotropic):
-        raise ProblemError(f"energy_release_rate: material = {shown(material)}: give Isotropic.")
+        raise ProblemError(
+            f"energy_release_rate: material = {value_text(material)}: give Isotropic."
+        )
     K = sif.K
     G = (K[:, 0] ** 2 + K[:, 1] ** 2) / material.E_prime
     if K.shape[1] == 3:

@@ -5,9 +5,9 @@ from io import BytesIO
 from pathlib import Path
 from typing import Any
 
-from xcrack.base.checks import flag, shown
+from xcrack.base.checks import flag, value_text
 from xcrack.base.errors import ProblemError
-from xcrack.base.optional import in_notebook, required
+from xcrack.base.optional import in_notebook, require_package
 from xcrack.base.paths import path_of, system_errors, written_whole
 
 _UNSAVED = "the picture cannot be written to"
@@ -21,7 +21,7 @@ def new_figure(size: tuple[float, float], window: bool, caller: str) -> Any:
     size : (float, float)
         Inches.
     window : bool
-        Whether `finished` will show it.
+        Whether `finish_figure` will show it.
     caller : str
         What needs matplotlib, for messages.
 
@@ -35,15 +35,15 @@ def new_figure(size: tuple[float, float], window: bool, caller: str) -> Any:
         Without matplotlib.
     """
     if window and not in_notebook():
-        pyplot = required("matplotlib.pyplot", caller)
+        pyplot = require_package("matplotlib.pyplot", caller)
         return pyplot.figure(figsize=size, layout="constrained")
-    figure = required("matplotlib.figure", caller).Figure(figsize=size, layout="constrained")
+    figure = require_package("matplotlib.figure", caller).Figure(figsize=size, layout="constrained")
     if in_notebook():  # figures of pyplot would be shown at the end of the cell, too
         figure._repr_png_ = lambda: _png(figure)
     return figure
 
 
-def finished(figure: Any, file: Path | None, window: bool, dpi: int = 150) -> Any:
+def finish_figure(figure: Any, file: Path | None, window: bool, dpi: int = 150) -> Any:
     """Save a figure, show it, or both.
 
     Parameters
@@ -65,23 +65,23 @@ def finished(figure: Any, file: Path | None, window: bool, dpi: int = 150) -> An
         written.
     """
     if file is not None:
-        known = sorted(figure.canvas.get_supported_filetypes())
-        if file.suffix[1:].lower() not in known:
+        file_types = sorted(figure.canvas.get_supported_filetypes())
+        if file.suffix[1:].lower() not in file_types:
             raise ProblemError(
-                f"file = {shown(str(file))}: give one that ends in {', '.join(known)}."
+                f"file = {value_text(str(file))}: give one that ends in {', '.join(file_types)}."
             )
         picture = BytesIO()  # writers of pictures may keep to themselves that the disk is full
         try:
             figure.savefig(picture, dpi=dpi, format=file.suffix[1:].lower())
         except Exception as error:  # such as TeX for .pgf, or a font that is missing
             raise ProblemError(
-                f"{_UNSAVED} {shown(str(file))}: matplotlib says {shown(str(error))}; another "
-                "ending, such as .png, may do."
+                f"{_UNSAVED} {value_text(str(file))}: matplotlib says {value_text(str(error))}; "
+                f"another ending, such as .png, may do."
             ) from error
         with written_whole(file, _UNSAVED, error=ProblemError) as part:
             part.write_bytes(picture.getvalue())
     if window and not in_notebook():
-        required("matplotlib.pyplot", "a window").show()
+        require_package("matplotlib.pyplot", "a window").show()
     return figure if file is None else file
 
 
@@ -110,7 +110,7 @@ def picture_path(file: Any, caller: str) -> Path | None:
     if not path.suffix:
         if path.name in ("", ".."):
             raise ProblemError(
-                f"{caller}: file = {shown(str(path))} is a folder: give a file in it."
+                f"{caller}: file = {value_text(str(path))} is a folder: give a file in it."
             )
         path = path.with_name(path.name + ".png")
     with system_errors(_UNSAVED, path, error=ProblemError):
@@ -141,7 +141,7 @@ def checked_title(title: Any, caller: str) -> str | None:
         Name of the function, for messages.
     """
     if not isinstance(title, str | None):
-        raise ProblemError(f"{caller}: title = {shown(title)}: give a text, or leave it out.")
+        raise ProblemError(f"{caller}: title = {value_text(title)}: give a text, or leave it out.")
     return title
 
 
@@ -184,14 +184,14 @@ def picture_of(plotter: Any) -> Picture:
     """What a plotter of pyvista shows."""
     pixels = plotter.screenshot(None, return_img=True)
     content = BytesIO()
-    required("PIL.Image", "plot").fromarray(pixels).save(content, "PNG")
+    require_package("PIL.Image", "plot").fromarray(pixels).save(content, "PNG")
     return Picture(content.getvalue(), plotter)
 
 
 __all__ = [
     "Picture",
     "checked_title",
-    "finished",
+    "finish_figure",
     "new_figure",
     "picture_of",
     "picture_path",

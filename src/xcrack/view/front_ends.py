@@ -20,15 +20,15 @@ def to_the_surface(x: Floats, places: list[Floats]) -> Floats:
     (m, 3) array
     """
     reach = 3 * float(np.linalg.norm(np.diff(x, axis=0), axis=1).max())
-    first, last = (_nearest(places, end, reach) for end in (x[0], x[-1]))
+    first, last = (_nearest_place(places, end, reach) for end in (x[0], x[-1]))
     return np.concatenate([first, x, last])
 
 
-def _nearest(places: list[Floats], x: Floats, reach: float) -> Floats:
+def _nearest_place(places: list[Floats], x: Floats, reach: float) -> Floats:
     """The nearest place within reach `(1, 3)`, or none `(0, 3)`."""
-    near = [place for place in places if np.linalg.norm(place - x) < reach]
-    near.sort(key=lambda place: float(np.linalg.norm(place - x)))
-    return np.reshape(near[:1], (-1, 3))
+    near_places = [place for place in places if np.linalg.norm(place - x) < reach]
+    near_places.sort(key=lambda place: float(np.linalg.norm(place - x)))
+    return np.reshape(near_places[:1], (-1, 3))
 
 
 __all__ = ["to_the_surface"]

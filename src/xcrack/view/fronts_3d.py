@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from xcrack.base.arrays import Bools, Floats
-from xcrack.base.checks import entries, shown, whole
+from xcrack.base.checks import entries, value_text, whole_number
 from xcrack.base.errors import ProblemError
 from xcrack.crack.fronts_3d import closed_fronts, is_closed
 from xcrack.crack.measures import front_ends
@@ -23,13 +23,13 @@ from xcrack.runs.history import History
 from xcrack.sif.sif import SIF
 from xcrack.view.figures import (
     checked_title,
-    finished,
+    finish_figure,
     new_figure,
     picture_path,
     wants_window,
 )
 from xcrack.view.front_ends import to_the_surface
-from xcrack.view.projection import View, best_plane, given_plane, on_plane, section_outline
+from xcrack.view.projection import Projection, best_plane, given_plane, on_plane, section_outline
 
 _MODES = ("I", "II", "III")
 _NOISE = 0.1  # share of the largest K that a panel reaches at least: noise should not fill it
@@ -99,12 +99,12 @@ def draw_fronts(
         Arguments of another type, no steps, no such crack, a 2D crack, labels of another number, a
         file that cannot be written.
     """
-    runs = _several(history, History, "draw_fronts: history")
+    runs = _list_of_values(history, History, "draw_fronts: history")
     names = _names(labels, len(runs), "draw_fronts")
-    crack = whole(crack, "draw_fronts: crack", least=0)
-    every = whole(every, "draw_fronts: every", least=1)
+    crack = whole_number(crack, "draw_fronts: crack", least=0)
+    every = whole_number(every, "draw_fronts: every", least=1)
     if not isinstance(mesh, Mesh | None):
-        raise ProblemError(f"draw_fronts: mesh = {shown(mesh)}: give a Mesh, or leave it out.")
+        raise ProblemError(f"draw_fronts: mesh = {value_text(mesh)}: give a Mesh, or leave it out.")
     for run in runs:
         _check(run.steps, crack)
     view = None if plane is None else given_plane(plane)
@@ -115,7 +115,7 @@ def draw_fronts(
     axes = figure.add_subplot()
     body = mesh if mesh is not None else next((r.mesh for r in runs if r.mesh is not None), None)
     front_axes(axes, [run.steps for run in runs], crack, view, body, names, every)
-    return _done(figure, axes, target, window, heading)
+    return _finish(figure, axes, target, window, heading)
 
 
 def draw_K(
@@ -159,18 +159,19 @@ def draw_K(
         Arguments of another type, no such front or mode, K of a 2D crack, labels of another
         number, a file that cannot be written.
     """
-    every = _several(sif, SIF, "draw_K: sif")
+    every = _list_of_values(sif, SIF, "draw_K: sif")
     names = _names(labels, len(every), "draw_K")
-    front = whole(front, "draw_K: front", least=0)
+    front = whole_number(front, "draw_K: front", least=0)
     modes = (modes,) if isinstance(modes, str) else entries(modes, "draw_K: modes")
     if not modes or not all(isinstance(mode, str) and mode in _MODES for mode in modes):
-        raise ProblemError(f'draw_K: modes = {shown(modes)}: give some of "I", "II", "III".')
+        raise ProblemError(f'draw_K: modes = {value_text(modes)}: give some of "I", "II", "III".')
     heading = checked_title(title, "draw_K")
     for one in every:
         if one.K.shape[1] < 3 or not (one.front == front).any():
-            known = sorted({int(f) for f in one.front}) if one.K.shape[1] > 2 else []
+            front_numbers = sorted({int(f) for f in one.front}) if one.K.shape[1] > 2 else []
             raise ProblemError(
-                f"draw_K(front={front}): there is no such 3D front, only {known}; in 2D read sif.K."
+                f"draw_K(front={front}): there is no such 3D front, only {front_numbers}; in 2D "
+                f"read sif.K."
             )
     target = picture_path(file, "draw_K")
     window = wants_window(show, target, "draw_K")
@@ -180,12 +181,12 @@ def draw_K(
     for axes, mode in zip(panels, modes, strict=True):
         reach = 0.0
         for k, (one, name) in enumerate(zip(every, names, strict=True)):
-            share, K, surface = _along(one, front, _MODES.index(mode))
+            share, K, surface = _K_along(one, front, _MODES.index(mode))
             color, style = f"C{k}", ("-", "--", "-.", ":")[k % 4]
             axes.plot(share, K, style, color=color, lw=1.6, label=name or None)
             axes.plot(share[surface], K[surface], "o", mfc="white", mec=color, ms=5)
             if one.errors is not None:
-                low, high = (_along(one, front, _MODES.index(mode), sign)[1] for sign in (-1, 1))
+                low, high = (_K_along(one, front, _MODES.index(mode), sign)[1] for sign in (-1, 1))
                 axes.fill_between(share, low, high, color=color, alpha=0.2, lw=0)
             reach = max(reach, float(np.abs(K).max()))
         axes.axhline(0, color="0.7", lw=0.8, zorder=0)
@@ -202,14 +203,14 @@ def draw_K(
             fontsize="small",
             frameon=False,
         )
-    return _done(figure, panels[0], target, window, heading)
+    return _finish(figure, panels[0], target, window, heading)
 
 
 def front_axes(
     axes: Any,
     runs: Sequence[Sequence[Step]],
     crack: int,
-    plane: View | None,
+    plane: Projection | None,
     mesh: Mesh | None,
     labels: Sequence[str],
     every: int = 1,
@@ -221,7 +222,7 @@ def front_axes(
     axes : axes of matplotlib
     runs : sequence of sequences of Step
     crack : int
-    plane : View, optional
+    plane : Projection, optional
         Left out: the best one through the first surface.
     mesh : Mesh, optional
     labels : sequence of str
@@ -270,8 +271,8 @@ def front_axes(
     axes.spines[["top", "right"]].set_visible(False)
     if single and len(runs[0]) > 1:
         bar = ScalarMappable(scale, colours)
-        whole = MaxNLocator(integer=True)
-        axes.figure.colorbar(bar, ax=axes, label="step", shrink=0.8, aspect=25, ticks=whole)
+        integer_ticks = MaxNLocator(integer=True)
+        axes.figure.colorbar(bar, ax=axes, label="step", shrink=0.8, aspect=25, ticks=integer_ticks)
     elif any(labels):
         axes.legend(
             fontsize="small",
@@ -302,12 +303,14 @@ def step_fronts(step: Step, crack: int) -> list[FrontLine]:
         for number in np.unique(evaluated.front):
             x = evaluated.x[evaluated.front == number]
             # A closed front that leaves the body in part has K on the rest of it.
-            whole = (number >= len(closed) or closed[number]) and is_closed(x)
-            lines.append(FrontLine(np.concatenate([x, x[:1]]) if whole else x, whole, int(number)))
+            is_loop = (number >= len(closed) or closed[number]) and is_closed(x)
+            lines.append(
+                FrontLine(np.concatenate([x, x[:1]]) if is_loop else x, is_loop, int(number))
+            )
         return lines
     return [
-        FrontLine(body.points[front], whole, k)
-        for k, (front, whole) in enumerate(zip(body.fronts or (), closed, strict=True))
+        FrontLine(body.points[front], is_loop, k)
+        for k, (front, is_loop) in enumerate(zip(body.fronts or (), closed, strict=True))
     ]
 
 
@@ -317,20 +320,26 @@ def _drawn_lines(step: Step, crack: int, body: Body | None) -> list[Floats]:
     if body is None or not step.sif:
         return [line.x for line in lines]
     places = [x for _, x in front_ends(step.cracks[crack], body)]
-    whole = [line.closed or len(line.x) < 2 for line in lines]
-    return [a.x if b else to_the_surface(a.x, places) for a, b in zip(lines, whole, strict=True)]
+    is_whole_line = [line.closed or len(line.x) < 2 for line in lines]
+    return [
+        a.x if b else to_the_surface(a.x, places) for a, b in zip(lines, is_whole_line, strict=True)
+    ]
 
 
-def _along(sif: SIF, front: int, mode: int, edge: int = 0) -> tuple[Floats, Floats, Bools]:
+def _K_along(sif: SIF, front: int, mode: int, edge: int = 0) -> tuple[Floats, Floats, Bools]:
     """Share of the arc length, K of a mode, and which points lie at a free surface.
 
     With an edge of -1 or 1, in the place of K that end of the bar of the best K.
     """
-    mine = np.nonzero(sif.front == front)[0]
-    mine = mine[np.argsort(sif.s[mine], kind="stable")]
-    K = sif.best[mine, mode] + edge * sif.bar[mine, mode] if edge else sif.K[mine, mode]
-    x, surface = sif.x[mine], sif.at_surface[mine]
-    s = sif.s[mine] - sif.s[mine[0]]
+    points_of_front = np.nonzero(sif.front == front)[0]
+    points_of_front = points_of_front[np.argsort(sif.s[points_of_front], kind="stable")]
+    K = (
+        sif.best[points_of_front, mode] + edge * sif.bar[points_of_front, mode]
+        if edge
+        else sif.K[points_of_front, mode]
+    )
+    x, surface = sif.x[points_of_front], sif.at_surface[points_of_front]
+    s = sif.s[points_of_front] - sif.s[points_of_front[0]]
     if is_closed(x) and not surface.any():
         s = np.append(s, s[-1] + np.linalg.norm(x[0] - x[-1]))
         K, surface = np.append(K, K[0]), np.append(surface, surface[0])
@@ -360,12 +369,12 @@ def _check(steps: Sequence[Step], crack: int) -> None:
         raise ProblemError('draw_fronts: only 3D cracks have fronts; in 2D plot "path".')
 
 
-def _several(value: Any, kind: type, what: str) -> list[Any]:
+def _list_of_values(value: Any, kind: type, what: str) -> list[Any]:
     """One value or several, checked."""
     every = [value] if isinstance(value, kind) else list(entries(value, what))
     if not every or not all(isinstance(one, kind) for one in every):
         raise ProblemError(
-            f"{what} = {shown(value)}: give a {kind.__name__}, or a list of at least one."
+            f"{what} = {value_text(value)}: give a {kind.__name__}, or a list of at least one."
         )
     return every
 
@@ -376,15 +385,15 @@ def _names(labels: Any, n: int, caller: str) -> list[str]:
     names = (labels,) if isinstance(labels, str) else entries(labels, f"{caller}: labels")
     if len(names) != n or not all(isinstance(name, str) for name in names):
         raise ProblemError(
-            f"{caller}: labels = {shown(labels)} for {n} curve(s): give a text for each."
+            f"{caller}: labels = {value_text(labels)} for {n} curve(s): give a text for each."
         )
     return list(names)
 
 
-def _done(figure: Any, axes: Any, file: Path | None, window: bool, title: str | None) -> Any:
+def _finish(figure: Any, axes: Any, file: Path | None, window: bool, title: str | None) -> Any:
     if title:
         axes.set_title(title)
-    return finished(figure, file, window)
+    return finish_figure(figure, file, window)
 
 
 __all__ = [

@@ -5,10 +5,10 @@ from typing import Any
 
 import numpy as np
 
-from xcrack.base.checks import shown
+from xcrack.base.checks import value_text
 from xcrack.base.errors import ProblemError
 from xcrack.runs.history import History
-from xcrack.view.figures import finished, new_figure, picture_path
+from xcrack.view.figures import finish_figure, new_figure, picture_path
 
 
 def draw(history: History, kind: str, file: str | Path | None) -> Any:
@@ -22,14 +22,15 @@ def draw(history: History, kind: str, file: str | Path | None) -> Any:
         raise ProblemError('plot kind = "fronts": only 3D cracks have them; give "path".')
     if not isinstance(kind, str) or kind not in (*kinds, "fronts"):
         raise ProblemError(
-            f'plot kind = {shown(kind)}: give "K", "a", "path" or "measures", in 3D also "fronts".'
+            f'plot kind = {value_text(kind)}: give "K", "a", "path" or "measures", in 3D also '
+            f'"fronts".'
         )
     if not history.steps:
         raise ProblemError("there is nothing to draw: the history has no steps.")
     target = picture_path(file, "plot")
     figure = new_figure((6.4, 4.8), target is None, "History.plot")
     kinds[kind](history, figure.add_subplot())
-    finished(figure, target, target is None)
+    finish_figure(figure, target, target is None)
     return figure
 
 
@@ -56,7 +57,7 @@ def _draw_K_of_fronts(history: History, axes: Any) -> None:
         rows = table[(table["crack"] == crack) & (table["front"] == front)]
         label = f"crack {crack}, front {front}"
         for mode, style in (("I", "o-"), ("II", "s--"), ("III", "^:")):
-            low, high = (_extreme(rows, mode, end) for end in ("min", "max"))
+            low, high = (_extreme_K(rows, mode, end) for end in ("min", "max"))
             # The sign of modes II and III goes round with the front.
             largest = high if mode == "I" else np.maximum(np.abs(low), np.abs(high))
             name = f"$K_I$, {label}" if mode == "I" else f"$|K_{{{mode}}}|$, {label}"
@@ -72,7 +73,7 @@ def _draw_K_of_fronts(history: History, axes: Any) -> None:
     axes.legend(fontsize="small")
 
 
-def _extreme(rows: Any, mode: str, end: str) -> Any:
+def _extreme_K(rows: Any, mode: str, end: str) -> Any:
     """Smallest or largest K of a mode in the state whose K is largest in size `(k,)`."""
     n_states = sum(name.startswith("K_I_") and name.endswith("_max") for name in rows.dtype.names)
     ends = [
@@ -106,12 +107,26 @@ def _draw_measures(history: History, axes: Any) -> None:
     rows, _ = history.measures()
     lengths = [name for name in rows.dtype.names or () if name.startswith("length_")]
     for crack in np.unique(rows["crack"]):
-        own, who = rows[rows["crack"] == crack], f"crack {crack}: "
-        axes.plot(own["N"], own["depth"], "o-", ms=3, color=f"C{crack}", label=who + "depth")
+        rows_of_crack, who = rows[rows["crack"] == crack], f"crack {crack}: "
+        axes.plot(
+            rows_of_crack["N"],
+            rows_of_crack["depth"],
+            "o-",
+            ms=3,
+            color=f"C{crack}",
+            label=who + "depth",
+        )
         for name, style in zip(lengths, "sv^Dx<>P*" * len(lengths)):
-            if np.nanmax(np.append(own[name], 0.0)) > 0:
+            if np.nanmax(np.append(rows_of_crack[name], 0.0)) > 0:
                 label = f"{who}length on {name.removeprefix('length_')}"
-                axes.plot(own["N"], own[name], f"{style}--", ms=4, color=f"C{crack}", label=label)
+                axes.plot(
+                    rows_of_crack["N"],
+                    rows_of_crack[name],
+                    f"{style}--",
+                    ms=4,
+                    color=f"C{crack}",
+                    label=label,
+                )
     _mark_joins(history, axes)
     axes.set(xlabel="cycles N", ylabel="length")
     axes.set_ylim(bottom=0.0)
@@ -140,8 +155,8 @@ def _draw_path(history: History, axes: Any) -> None:
         start = history.steps[0].cracks[number].points
         axes.plot(*start[:, :2].T, "-", color=f"C{number}", lw=3.5, solid_capstyle="butt")
         tips = history.table()
-        own = tips[tips["crack"] == number]
-        axes.plot(own["x"], own["y"], ".", ms=4, color=f"C{number}")
+        rows_of_tip = tips[tips["crack"] == number]
+        axes.plot(rows_of_tip["x"], rows_of_tip["y"], ".", ms=4, color=f"C{number}")
     axes.set(xlabel="x", ylabel="y", aspect="equal")
     axes.legend(fontsize="small")
 

@@ -5,16 +5,16 @@ from typing import Any
 
 import numpy as np
 
-from xcrack.base.checks import shown
+from xcrack.base.checks import value_text
 from xcrack.base.errors import ProblemError
 from xcrack.runs.life import Life
-from xcrack.view.figures import finished, new_figure, picture_path
+from xcrack.view.figures import finish_figure, new_figure, picture_path
 
 
 def draw_life(life: Life, kind: str, file: str | Path | None) -> Any:
     """Figure of the share that has ended over cycles, or of how many end where."""
     if not isinstance(kind, str) or kind not in ("cdf", "density"):
-        raise ProblemError(f'plot kind = {shown(kind)}: give "cdf" or "density".')
+        raise ProblemError(f'plot kind = {value_text(kind)}: give "cdf" or "density".')
     N = life.N[np.isfinite(life.N) & (life.N > 0)]
     if not len(N):
         raise ProblemError("there is nothing to draw: no sample ends; give a larger load.")
@@ -35,7 +35,7 @@ def draw_life(life: Life, kind: str, file: str | Path | None) -> Any:
         axes.axvline(life.percentile(p), color="0.6", lw=0.8, ls="--")
     axes.set(xlabel=f"life in {life.unit}s", xscale="log")
     axes.legend(fontsize="small")
-    finished(figure, target, target is None)
+    finish_figure(figure, target, target is None)
     return figure
 
 

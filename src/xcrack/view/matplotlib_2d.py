@@ -10,7 +10,7 @@ from xcrack.analysis.solution import Solution
 from xcrack.base.arrays import Floats
 from xcrack.fem.facets import arc_position
 from xcrack.output.pieces import lips_of
-from xcrack.view.figures import finished, new_figure
+from xcrack.view.figures import finish_figure, new_figure
 from xcrack.view.scene_2d import CLOSED, Scene
 
 _LONGER = 6.4  # inch, longer side of the body
@@ -60,7 +60,7 @@ def draw(
         shrink=0.9,
         aspect=25,
     )
-    return _done(figure, axes, file, show, title)
+    return _finish(figure, axes, file, show, title)
 
 
 def draw_mesh(
@@ -68,12 +68,12 @@ def draw_mesh(
     file: Path | None,
     show: bool,
     title: str | None,
-    near: Floats | None = None,
+    near_box: Floats | None = None,
 ) -> Any:
-    """Mesh, cracks and enriched nodes, of the whole body or in a box `near` (2, 2)."""
+    """Mesh, cracks and enriched nodes, of the whole body or in a box `near_box` (2, 2)."""
     space = solution.space
     mesh = space.mesh
-    box = mesh.points if near is None else near
+    box = mesh.points if near_box is None else near_box
     figure, axes = _body_axes(box, show, bar=0.4)
     from matplotlib.collections import LineCollection
     from matplotlib.patches import Circle
@@ -105,7 +105,7 @@ def draw_mesh(
     _frame(axes, box)
     if space.cuts:
         _legend_below(axes, 3)
-    return _done(figure, axes, file, show, title)
+    return _finish(figure, axes, file, show, title)
 
 
 def draw_along(
@@ -120,13 +120,13 @@ def draw_along(
     figure = new_figure((6.4, 0.6 + 3.0 * len(cracks)), show, "plot")
     every = figure.subplots(len(cracks), 1, squeeze=False)[:, 0]
     for axes, c in zip(every, cracks, strict=True):
-        _along(axes, solution, field, c)
+        _draw_along(axes, solution, field, c)
         name = f"crack {c}: " if len(solution.lips) > 1 else ""
         axes.set_xlabel(f"{name}distance s along the crack")
-    return _done(figure, every[0], file, show, title)
+    return _finish(figure, every[0], file, show, title)
 
 
-def _along(axes: Any, solution: Solution, field: str, c: int) -> None:
+def _draw_along(axes: Any, solution: Solution, field: str, c: int) -> None:
     space, lips = solution.space, lips_of(solution, c)
     cut, crack = space.cuts[c], space.cracks[c]
     ends = arc_position(crack.points, cut.lip_points(space.mesh).reshape(-1, space.dim))
@@ -220,7 +220,7 @@ def _legend_below(axes: Any, columns: int) -> None:
     axes.figure.legend(loc="outside lower center", ncols=columns, fontsize="small", frameon=False)
 
 
-def _done(figure: Any, axes: Any, file: Path | None, show: bool, title: str | None) -> Any:
+def _finish(figure: Any, axes: Any, file: Path | None, show: bool, title: str | None) -> Any:
     if title:
         axes.set_title(title)
-    return finished(figure, file, show, _DPI)
+    return finish_figure(figure, file, show, _DPI)

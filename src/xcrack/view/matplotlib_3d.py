@@ -8,9 +8,9 @@ import numpy as np
 from xcrack.analysis.solution import Solution
 from xcrack.base.arrays import Floats
 from xcrack.output.lip_faces_3d import LipFaces, lip_faces
-from xcrack.view.figures import finished, new_figure
-from xcrack.view.projection import View, best_plane, on_plane
-from xcrack.view.scene_2d import CLOSED, rounded
+from xcrack.view.figures import finish_figure, new_figure
+from xcrack.view.projection import Projection, best_plane, on_plane
+from xcrack.view.scene_2d import CLOSED, rounded_range
 from xcrack.view.scene_3d import LIP_FIELDS, is_coloured, lip_values
 
 _SIZE = 5.0  # inch, longer side of a map
@@ -40,7 +40,7 @@ def draw_cracks(
     figure = new_figure(size, show, "plot")
     every = figure.subplots(len(cracks), 1, squeeze=False)[:, 0]
     values = np.concatenate([lip_values(each, field).ravel() for each in lips])
-    low, high = rounded(float(values.min()), float(values.max()), field)
+    low, high = rounded_range(float(values.min()), float(values.max()), field)
     if limits is not None:
         low, high = limits
     colours = cmap or ("RdBu_r" if low < 0 < high else "viridis")
@@ -50,14 +50,14 @@ def draw_cracks(
             axes.set_title(f"crack {c}", fontsize="medium", loc="left")
     if title:
         figure.suptitle(title)
-    return finished(figure, file, show, _DPI)
+    return finish_figure(figure, file, show, _DPI)
 
 
 def _map(
     figure: Any,
     axes: Any,
     lips: LipFaces,
-    plane: View,
+    plane: Projection,
     field: str,
     limits: tuple[float, float],
     cmap: str,

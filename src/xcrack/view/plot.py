@@ -11,11 +11,11 @@ import numpy as np
 from xcrack.analysis.plan import Report
 from xcrack.analysis.solution import Solution
 from xcrack.base.arrays import Floats, lock
-from xcrack.base.checks import flag, number, numbers, one_of, shown
+from xcrack.base.checks import flag, number, numbers, one_of, value_text
 from xcrack.base.errors import ProblemError, XcrackError
-from xcrack.base.optional import in_notebook, required
-from xcrack.fem.system import discretised
-from xcrack.linalg.reuse import Reuse
+from xcrack.base.optional import in_notebook, require_package
+from xcrack.fem.system import discretise
+from xcrack.linalg.reuse import SolverState
 from xcrack.model.problem import Problem, crack_number
 from xcrack.model.states import scaled_state
 from xcrack.view.figures import checked_title, picture_path
@@ -106,7 +106,7 @@ def plot(
     solution = _drawable(solution, field)
     field = one_of(field, "plot: field", _KNOWN[solution.space.dim])
     one_of(renderer, "plot: renderer", ("auto", "pyvista", "matplotlib"))
-    look = Look(
+    look = PlotStyle(
         warp=number(warp, "plot: warp"),
         title=checked_title(title, "plot"),
         edges=flag(edges, "plot: edges"),
@@ -131,7 +131,7 @@ def plot(
 
 
 @dataclass(frozen=True, eq=False)
-class Look:
+class PlotStyle:
     """How a picture is to look: arguments of `plot`, checked."""
 
     warp: float
@@ -155,7 +155,12 @@ class Look:
 
 
 def _draw_2d(
-    solution: Solution, field: str, target: Path | None, window: bool, renderer: str, look: Look
+    solution: Solution,
+    field: str,
+    target: Path | None,
+    window: bool,
+    renderer: str,
+    look: PlotStyle,
 ) -> Any:
     if look.plane is not None or look.view is not None or look.loads:
         raise ProblemError("plot(clip=, view=, loads=): only 3D bodies know these; leave them out.")
@@ -191,7 +196,12 @@ def _draw_2d(
 
 
 def _draw_3d(
-    solution: Solution, field: str, target: Path | None, window: bool, renderer: str, look: Look
+    solution: Solution,
+    field: str,
+    target: Path | None,
+    window: bool,
+    renderer: str,
+    look: PlotStyle,
 ) -> Any:
     from xcrack.view.scene_3d import crack_scene, mesh_scene, space_scene
 
@@ -266,10 +276,10 @@ def _drawable(given: Any, field: Any) -> Solution:
         )
     if not (isinstance(field, str) and field == "mesh"):
         raise ProblemError(
-            f"plot: a Problem has no field {shown(field)}: give what solve returns, or "
+            f"plot: a Problem has no field {value_text(field)}: give what solve returns, or "
             'field="mesh".'
         )
-    space, lips = discretised(given)
+    space, lips = discretise(given)
     return Solution(
         problem=given,
         state=None,
@@ -280,7 +290,7 @@ def _drawable(given: Any, field: Any) -> Solution:
         contact=(None,) * len(lips),
         energy=0.0,
         report=Report((), {}),
-        reuse=Reuse(),
+        reuse=SolverState(),
     )
 
 
@@ -289,20 +299,21 @@ def _limits(limits: Any) -> tuple[float, float] | None:
         return None
     low, high = numbers(limits, "plot: limits", (2,)).tolist()
     if not low < high:
-        raise ProblemError(f"plot: limits = {shown(limits)}: give the lower one first.")
+        raise ProblemError(f"plot: limits = {value_text(limits)}: give the lower one first.")
     return low, high
 
 
 def _colour_map(cmap: Any) -> Any:
     if cmap is None:
         return None
-    matplotlib = required("matplotlib", "plot: cmap")
+    matplotlib = require_package("matplotlib", "plot: cmap")
     if isinstance(cmap, str) and cmap in matplotlib.colormaps:
         return cmap
-    if isinstance(cmap, required("matplotlib.colors", "plot: cmap").Colormap):
+    if isinstance(cmap, require_package("matplotlib.colors", "plot: cmap").Colormap):
         return cmap
     raise ProblemError(
-        f'plot: cmap = {shown(cmap)}: give the name of a colour map of matplotlib, such as "RdBu".'
+        f"plot: cmap = {value_text(cmap)}: give the name of a colour map of matplotlib, such as "
+        f'"RdBu".'
     )
 
 
@@ -319,18 +330,18 @@ def _has_display() -> bool:
 
 def _fault_of_pyvista(target: Path | None) -> str:
     """Why pyvista cannot draw this file here, and what to do; empty if it can."""
-    from xcrack.view.pyvista_2d import renders
+    from xcrack.view.pyvista_2d import can_render
 
     if target is not None and target.suffix.lower() not in RASTER:
-        return f"it writes {', '.join(RASTER)}, not {shown(target.suffix)}"
-    if renders():
+        return f"it writes {', '.join(RASTER)}, not {value_text(target.suffix)}"
+    if can_render():
         try:
-            required("pyvista", "it")
+            require_package("pyvista", "it")
             return ""
         except XcrackError as error:
             return str(error).rstrip(".")
     try:
-        required("pyvista", "it")
+        require_package("pyvista", "it")
     except XcrackError as error:
         return str(error).rstrip(".")
     return _NO_OPENGL

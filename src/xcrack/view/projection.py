@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from xcrack.base.arrays import Floats, lock
-from xcrack.base.checks import numbers, shown
+from xcrack.base.checks import numbers, value_text
 from xcrack.base.errors import ProblemError
 from xcrack.mesh.mesh import Mesh
 from xcrack.mesh.split import interface_simplices
@@ -16,7 +16,7 @@ _AXIS = 0.999  # cosine from which a direction is called an axis
 
 
 @dataclass(frozen=True, eq=False)
-class View:
+class Projection:
     """A plane to look at.
 
     Attributes
@@ -43,7 +43,7 @@ class View:
         return ("" if value > 0 else "-") + "xyz"[axis]
 
 
-def given_plane(plane: Any) -> View:
+def given_plane(plane: Any) -> Projection:
     """A plane by a point and two directions; the second is made perpendicular to the first.
 
     Parameters
@@ -53,7 +53,7 @@ def given_plane(plane: Any) -> View:
 
     Returns
     -------
-    View
+    Projection
 
     Raises
     ------
@@ -68,19 +68,19 @@ def given_plane(plane: Any) -> View:
         up = second - (second @ right) * right
         length = float(np.linalg.norm(up))
         if length > 1e-6 and right.any():
-            return View(lock(np.array(x)), lock(np.stack([right, up / length])))
+            return Projection(lock(np.array(x)), lock(np.stack([right, up / length])))
         reason = "the two directions are parallel, or one is zero"
     except (TypeError, ValueError):
         reason = "that is no pair"
     except ProblemError as error:
         reason = str(error)[:-1]
     raise ProblemError(
-        f"plane = {shown(plane)}: give a point and two directions, ((x, y, z), (right, up)); "
+        f"plane = {value_text(plane)}: give a point and two directions, ((x, y, z), (right, up)); "
         f"{reason}."
     )
 
 
-def best_plane(x: Floats, normal: ArrayLike | None = None) -> View:
+def best_plane(x: Floats, normal: ArrayLike | None = None) -> Projection:
     """Plane that points `(n, 3)` lie nearest to; a main plane keeps its coordinates.
 
     Parameters
@@ -91,7 +91,7 @@ def best_plane(x: Floats, normal: ArrayLike | None = None) -> View:
 
     Returns
     -------
-    View
+    Projection
     """
     middle = x.mean(axis=0)
     n = np.linalg.svd(x - middle, full_matrices=False)[2][-1]
@@ -103,22 +103,22 @@ def best_plane(x: Floats, normal: ArrayLike | None = None) -> View:
         right, up = np.eye(3)[[(1, 0, 0)[axis], (2, 2, 1)[axis]]]
         right = right if np.cross(right, up) @ n > 0 else -right
         origin = np.where(np.arange(3) == axis, middle, 0.0)
-        return View(lock(origin), lock(np.stack([right, up])))
+        return Projection(lock(origin), lock(np.stack([right, up])))
     upright = np.eye(3)[1 if abs(n[2]) > 0.9 else 2]
     right = np.cross(upright, n)
     right /= np.linalg.norm(right)
     two = np.stack([right, np.cross(n, right)])
     # A direction along an axis shows the coordinate itself.
     along = np.abs(two).max(axis=1) > _AXIS
-    return View(lock(middle - (along * (two @ middle)) @ two), lock(two))
+    return Projection(lock(middle - (along * (two @ middle)) @ two), lock(two))
 
 
-def on_plane(x: Floats, plane: View) -> Floats:
+def on_plane(x: Floats, plane: Projection) -> Floats:
     """Coordinates `(..., 2)` of points `(..., 3)` in a plane."""
     return np.asarray((x - plane.origin) @ plane.axes.T)
 
 
-def section_outline(mesh: Mesh, plane: View) -> Floats:
+def section_outline(mesh: Mesh, plane: Projection) -> Floats:
     """Segments in which a plane meets the boundary of a body, in the plane `(k, 2, 2)`."""
     facets = mesh.boundary
     level = (mesh.points - plane.origin) @ plane.normal
@@ -129,4 +129,4 @@ def section_outline(mesh: Mesh, plane: View) -> Floats:
     return on_plane(np.einsum("kwv,kvd->kwd", bary, corners), plane)
 
 
-__all__ = ["View", "best_plane", "given_plane", "on_plane", "section_outline"]
+__all__ = ["Projection", "best_plane", "given_plane", "on_plane", "section_outline"]

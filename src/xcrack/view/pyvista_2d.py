@@ -13,7 +13,7 @@ import numpy as np
 
 from xcrack.base.arrays import Floats, Ints
 from xcrack.base.errors import ProblemError
-from xcrack.base.optional import in_notebook, required
+from xcrack.base.optional import in_notebook, require_package
 from xcrack.base.paths import written_whole
 from xcrack.view.figures import picture_of
 from xcrack.view.scene_2d import CLOSED, Scene
@@ -31,7 +31,7 @@ MARGIN = 50
 
 
 @functools.cache
-def renders() -> bool:
+def can_render() -> bool:
     """Whether pyvista can draw here; asked once, of another process.
 
     A missing driver may end a process without an exception.
@@ -49,14 +49,14 @@ def draw(
     picture: Scene, file: Path | None, show: bool, title: str | None, edges: bool, cmap: str
 ) -> Any:
     """Draw a scene; returns the plotter where there is no file."""
-    pv = required("pyvista", 'plot(renderer="pyvista")')
+    pv = require_package("pyvista", 'plot(renderer="pyvista")')
     low, high = picture.box
     size = high - low
     scale = LONGER / float(size.max())
     top = 70 if title else 0
     width = int(size[0] * scale) + 2 * MARGIN + BAR
     height = max(int(size[1] * scale) + 2 * MARGIN, SHORTEST) + top
-    with quiet():
+    with quiet_vtk():
         plotter = pv.Plotter(off_screen=not show, window_size=[width, height])
         plotter.set_background("white")
         plotter.enable_anti_aliasing("ssaa")
@@ -76,15 +76,15 @@ def draw(
         # The body fills the window but for the bar on the right and the title above.
         x = low[0] + (width / 2 - MARGIN) / scale
         y = (low[1] + high[1]) / 2 + top / 2 / scale
-        far = float(size.max())
-        camera.focal_point, camera.position = (x, y, 0.0), (x, y, far)
+        far_distance = float(size.max())
+        camera.focal_point, camera.position = (x, y, 0.0), (x, y, far_distance)
         camera.parallel_scale = height / 2 / scale
-        camera.clipping_range = (0.5 * far, 1.5 * far)
-        return shown(plotter, file, show)
+        camera.clipping_range = (0.5 * far_distance, 1.5 * far_distance)
+        return show_or_save(plotter, file, show)
 
 
 def _add_body(pv: Any, plotter: Any, picture: Scene, cmap: str, window: tuple[int, int]) -> None:
-    body = pv.PolyData.from_regular_faces(_raised(picture.points, 0.0), picture.triangles)
+    body = pv.PolyData.from_regular_faces(_raised_lines(picture.points, 0.0), picture.triangles)
     body.point_data["values"] = picture.values
     actor = plotter.add_mesh(
         body,
@@ -107,7 +107,7 @@ def _add_body(pv: Any, plotter: Any, picture: Scene, cmap: str, window: tuple[in
         )
 
 
-def shown(plotter: Any, file: Path | None, show: bool) -> Any:
+def show_or_save(plotter: Any, file: Path | None, show: bool) -> Any:
     """Open the window, save the picture, or both: the file, or the plotter without one."""
     if file is None and in_notebook():
         return picture_of(plotter)
@@ -122,7 +122,7 @@ def shown(plotter: Any, file: Path | None, show: bool) -> Any:
         pixels = plotter.screenshot(None, return_img=True)
     finally:
         plotter.close()
-    image = required("PIL.Image", "plot")
+    image = require_package("PIL.Image", "plot")
     content = BytesIO()  # writers of pictures may keep to themselves that the disk is full
     image.fromarray(pixels).save(content, image.registered_extensions()[file.suffix.lower()])
     with written_whole(file, "the picture cannot be written to", error=ProblemError) as part:
@@ -191,7 +191,7 @@ def _ticks(low: float, high: float) -> Floats:
 
 
 @contextlib.contextmanager
-def quiet() -> Iterator[None]:
+def quiet_vtk() -> Iterator[None]:
     """Without VTK's remark that it found no display and draws without one."""
     from vtkmodules.vtkCommonCore import vtkLogger
 
@@ -208,7 +208,7 @@ def font_size(pixels: int) -> int:
     return max(pixels // 2, 6)
 
 
-def _raised(x: Floats, z: float) -> Floats:
+def _raised_lines(x: Floats, z: float) -> Floats:
     return np.concatenate([x, np.full((len(x), 1), z)], axis=1)
 
 
@@ -216,4 +216,4 @@ def _polylines(pv: Any, curves: Floats, z: float) -> Any:
     k = curves.shape[1]
     number = np.arange(len(curves) * k).reshape(-1, k)
     lines: Ints = np.concatenate([np.full((len(curves), 1), k), number], axis=1)
-    return pv.PolyData(_raised(curves.reshape(-1, 2), z), lines=lines.ravel())
+    return pv.PolyData(_raised_lines(curves.reshape(-1, 2), z), lines=lines.ravel())

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from xcrack.base.arrays import Floats
-from xcrack.base.optional import required
+from xcrack.base.optional import require_package
 from xcrack.view.pyvista_2d import (
     BAR,
     LONGER,
@@ -15,12 +15,12 @@ from xcrack.view.pyvista_2d import (
     SHORTEST,
     add_bar,
     font_size,
-    quiet,
-    shown,
+    quiet_vtk,
+    show_or_save,
 )
 from xcrack.view.scene_2d import CLOSED
 from xcrack.view.scene_3d import SpaceScene
-from xcrack.view.section_3d import Soup, segments_behind
+from xcrack.view.section_3d import TriangleSoup, segments_behind
 
 _APART = "#c9ccd1"  # lips that do not touch, where the pressure is drawn
 _LEGEND = 28  # pixels of a line of the legend
@@ -38,7 +38,7 @@ def draw_space(
     cmap: str,
 ) -> Any:
     """Draw a scene; returns the plotter where there is no file."""
-    pv = required("pyvista", 'plot(renderer="pyvista")')
+    pv = require_package("pyvista", 'plot(renderer="pyvista")')
     right, up, toward = _axes(picture.toward)
     box = picture.box if arrows is None else picture.body
     if arrows is not None:
@@ -55,7 +55,7 @@ def draw_space(
     bar = BAR if picture.label or _legend(picture) else 0
     width = max(int(size[0] * scale) + 2 * MARGIN, SHORTEST) + bar
     height = max(int(size[1] * scale) + 2 * MARGIN, SHORTEST) + top
-    with quiet():
+    with quiet_vtk():
         plotter = pv.Plotter(off_screen=not show, window_size=[width, height])
         plotter.set_background("white")
         plotter.enable_anti_aliasing("ssaa")
@@ -83,14 +83,14 @@ def draw_space(
         y = (low[1] + high[1]) / 2 + top / 2 / scale
         # From close by, too, the whole body lies before the camera.
         depth = picture.body @ toward
-        far = extent + float(depth.max() - depth.min())
+        far_distance = extent + float(depth.max() - depth.min())
         middle = x * right + y * up + (depth.min() + depth.max()) / 2 * toward
-        camera.focal_point, camera.position = tuple(middle), tuple(middle + far * toward)
+        camera.focal_point, camera.position = tuple(middle), tuple(middle + far_distance * toward)
         camera.up = tuple(up)
         camera.parallel_scale = height / 2 / scale
-        camera.clipping_range = (0.01 * far, 2.5 * far)
+        camera.clipping_range = (0.01 * far_distance, 2.5 * far_distance)
         plotter.add_axes(viewport=(0.0, 0.0, 130 / width, 130 / height), line_width=3)
-        return shown(plotter, file, show)
+        return show_or_save(plotter, file, show)
 
 
 def _axes(toward: Floats) -> tuple[Floats, Floats, Floats]:
@@ -109,7 +109,11 @@ def _left_of(picture: SpaceScene, right: Floats, limit: float) -> SpaceScene:
         number = np.arange(k * v).reshape(k, v)
         x = corners.reshape(-1, 3)
         level = x @ right - limit
-        parts = [Soup.of(number, None).behind(level)] if v > 2 else segments_behind(number, level)
+        parts = (
+            [TriangleSoup.of(number, None).behind(level)]
+            if v > 2
+            else segments_behind(number, level)
+        )
         shown = np.zeros(k * v) if values is None else values.ravel()
         return (
             np.concatenate([part.at(x) for part in parts]),
@@ -117,9 +121,9 @@ def _left_of(picture: SpaceScene, right: Floats, limit: float) -> SpaceScene:
         )
 
     names = ("touching", "apart", "skin", "outline", "cell_edges", "faint", "rims", "fronts")
-    rest: dict[str, Any] = {name: cut(getattr(picture, name))[0] for name in names}
+    other_parts: dict[str, Any] = {name: cut(getattr(picture, name))[0] for name in names}
     triangles, values = cut(picture.triangles, picture.values)
-    return replace(picture, triangles=triangles, values=values, **rest)
+    return replace(picture, triangles=triangles, values=values, **other_parts)
 
 
 def _add_faces(

@@ -11,9 +11,9 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from xcrack.base.checks import number, shown
+from xcrack.base.checks import number, value_text
 from xcrack.base.errors import ProblemError, XcrackError, warn
-from xcrack.base.markup import Markup, element, joined, listed, page
+from xcrack.base.markup import Markup, element, join_parts, list_markup, page
 from xcrack.base.paths import path_of, write_texts
 from xcrack.runs.inspection import Inspection
 from xcrack.runs.life import Life
@@ -25,7 +25,7 @@ from xcrack.view import report_scene as scene
 from xcrack.view.report_pictures import Picture, history_pictures, solution_pictures
 from xcrack.view.report_source import Section, Source, source_of
 from xcrack.view.report_viewer import viewer
-from xcrack.view.view_3d import history_layers, packed, solution_layers
+from xcrack.view.view_3d import history_layers, packed_layers, solution_layers
 
 _FORMAT = 1
 
@@ -76,19 +76,19 @@ def report(
     path = path_of(file, "report: file", error=ProblemError, is_file=True)
     path = path if path.suffix else path.with_name(path.name + ".html")
     if not isinstance(title, str):
-        raise ProblemError(f"report: title = {shown(title)}: give a text.")
+        raise ProblemError(f"report: title = {value_text(title)}: give a text.")
     if yield_stress is not None:
         yield_stress = number(yield_stress, "report: yield_stress", above=0)
     if not isinstance(life, Life | None):
-        raise ProblemError(f"report: life = {shown(life)}: give what xc.life returns.")
+        raise ProblemError(f"report: life = {value_text(life)}: give what xc.life returns.")
     if not isinstance(inspection, Inspection | None):
         raise ProblemError(
-            f"report: inspection = {shown(inspection)}: give what xc.inspection returns."
+            f"report: inspection = {value_text(inspection)}: give what xc.inspection returns."
         )
     names = getattr(getattr(strength, "dtype", None), "names", None) or ()
     if strength is not None and not {"step", "by_toughness"} <= set(names):
         raise ProblemError(
-            f"report: strength = {shown(strength)}: give what xc.residual_strength returns."
+            f"report: strength = {value_text(strength)}: give what xc.residual_strength returns."
         )
     source = source_of(result, title, yield_stress, life)
     source = replace(source, inspection=inspection, strength=strength)
@@ -110,10 +110,10 @@ def pictures(source: Source) -> Section:
         drawn, missing = drawn + of_run, missing + lost
     parts: list[Any] = [_figure(picture) for picture in drawn]
     if missing:
-        parts += [element("p", "Not drawn here:", cls="soft"), listed(missing)]
+        parts += [element("p", "Not drawn here:", cls="soft"), list_markup(missing)]
     if not parts:
         parts.append(element("p", "There is nothing to draw yet."))
-    return Section("pictures", "Pictures", joined(*parts),
+    return Section("pictures", "Pictures", join_parts(*parts),
                    {"drawn": [words for words, _ in drawn], "missing": missing})  # fmt: skip
 
 
@@ -130,7 +130,7 @@ def space_view(source: Source) -> Section | None:
             layers = solution_layers(source.solutions[-1])
     except XcrackError:
         layers = []
-    content = packed(layers)
+    content = packed_layers(layers)
     if content is None:
         words = (
             "No view to turn: there is nothing to draw, or too much for a page; see the pictures."
@@ -150,10 +150,10 @@ SECTIONS: Sequence[Callable[[Source], Section | None]] = (
     results.intensity,
     results.contact,
     scene.assumptions,
-    scene.warned,
+    scene.all_warnings,
     pictures,
     results.numbers,
-    scene.again,
+    scene.rerun_section,
 )
 """Parts of a report in their order; a new one is a function of the source, and an entry here."""
 

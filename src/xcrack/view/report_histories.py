@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from xcrack.base.markup import element, joined, table
+from xcrack.base.markup import element, join_parts, table
 from xcrack.fatigue.retardation import OverloadZones
 from xcrack.growth.step import Memory, Step
 from xcrack.growth.trail import FrontTrail, Trail
@@ -37,13 +37,16 @@ def spectrum(source: Source) -> Section | None:
     if model is not None:
         parts += [element("h3", "Retardation"),
                   table((), [("model", model), *_rows(settings, "retardation.")])]  # fmt: skip
-        left = _left(last, memory)
+        zones_left = _zones_of_cracks(last, memory)
         head = ("crack", "places", "K of the overload", "its zone", "growth since")
-        parts += [element("p", "What overloads have left at the last step:"), table(head, left)]
+        parts += [
+            element("p", "What overloads have left at the last step:"),
+            table(head, zones_left),
+        ]
         note = "Cycles are retarded; the rate of a step is that of the law. Ranges: all places."
         parts.append(element("p", note, cls="soft"))
-        values |= {"retardation": model, "zones": [dict(zip(head, row)) for row in left]}
-    return Section("spectrum", "Load history", joined(*parts), values)
+        values |= {"retardation": model, "zones": [dict(zip(head, row)) for row in zones_left]}
+    return Section("spectrum", "Load history", join_parts(*parts), values)
 
 
 def _rows(settings: Any, prefix: str, besides: tuple[str, ...] = ()) -> list[tuple[str, str]]:
@@ -54,7 +57,7 @@ def _rows(settings: Any, prefix: str, besides: tuple[str, ...] = ()) -> list[tup
     ]
 
 
-def _left(step: Step, memory: Memory) -> list[tuple[Any, ...]]:
+def _zones_of_cracks(step: Step, memory: Memory) -> list[tuple[Any, ...]]:
     """Zones of each crack, as ranges over its places."""
     trail = memory.trail
     if isinstance(trail, FrontTrail):

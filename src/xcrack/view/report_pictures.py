@@ -12,7 +12,7 @@ from xcrack.analysis.solution import Solution
 from xcrack.base.errors import XcrackError
 from xcrack.runs.history import History
 from xcrack.sif.sif import SIF
-from xcrack.view.figures import finished
+from xcrack.view.figures import finish_figure
 from xcrack.view.fronts_3d import draw_K
 from xcrack.view.plot import plot
 
@@ -37,7 +37,7 @@ def solution_pictures(
     if severe.lips:
         drawers.append(("Opening of the crack faces", _field(severe, "opening", 0.0)))
     drawers += list(_along_fronts(sif))
-    return _drawn(drawers)
+    return _drawn_picture(drawers)
 
 
 def history_pictures(history: History) -> tuple[list[Picture], list[str]]:
@@ -53,7 +53,7 @@ def history_pictures(history: History) -> tuple[list[Picture], list[str]]:
     if history.mesh is not None:
         measured = "Depth and surface lengths over cycles"
         drawers.insert(3, (measured, lambda f: history.plot("measures", f)))
-    return _drawn(drawers)
+    return _drawn_picture(drawers)
 
 
 def _field(solution: Solution, field: str, warp: float | None = None) -> Draw:
@@ -114,10 +114,10 @@ def _rates(history: History, file: Path) -> None:
     axes.grid(True, which="both", alpha=0.3)
     if axes.get_legend_handles_labels()[0]:
         axes.legend(fontsize="small")
-    finished(figure, Path(file), window=False)
+    finish_figure(figure, Path(file), window=False)
 
 
-def _drawn(drawers: Sequence[tuple[str, Draw]]) -> tuple[list[Picture], list[str]]:
+def _drawn_picture(drawers: Sequence[tuple[str, Draw]]) -> tuple[list[Picture], list[str]]:
     pictures, missing = [], []
     with tempfile.TemporaryDirectory() as folder:
         for k, (words, draw) in enumerate(drawers):

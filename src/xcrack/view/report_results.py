@@ -10,7 +10,7 @@ import numpy as np
 from xcrack.analysis.contact_result import Contact
 from xcrack.analysis.solution import Solution
 from xcrack.base.arrays import coordinates
-from xcrack.base.markup import Markup, element, joined, table
+from xcrack.base.markup import Markup, element, join_parts, table
 from xcrack.sif.sif import SIF
 from xcrack.view.report_source import Section, Source
 
@@ -27,11 +27,11 @@ def intensity(source: Source) -> Section | None:
     for k, state in enumerate(source.sif):
         for c, sif in enumerate(state):
             for tip in np.unique(sif.front):
-                mine = sif.front == tip
-                head, row = _row(sif, mine, source.dim)
+                is_of_tip = sif.front == tip
+                head, row = _row(sif, is_of_tip, source.dim)
                 rows.append((k, c, int(tip), *row))
                 numbers.append({"state": k, "crack": c, "tip": int(tip),
-                                **dict(zip(head, map(_plain, row), strict=True))})  # fmt: skip
+                                **dict(zip(head, map(_json_value, row), strict=True))})  # fmt: skip
     first = ("state", "crack", _END[source.dim])
     note = ("spread: difference between two domains of the integral; domain: radius of the larger "
             "one, in cells. K_I of closed places is exactly zero. best ± bar: estimate of exact K "
@@ -39,36 +39,39 @@ def intensity(source: Source) -> Section | None:
     reasons = {reason for state in source.sif for sif in state for reason in sif.reasons if reason}
     if reasons:
         note += f" No bars: {'; '.join(sorted(reasons))}."
-    content = joined(table((*first, *head), rows, scroll=len(rows) > 12 or source.dim > 2),
+    content = join_parts(table((*first, *head), rows, scroll=len(rows) > 12 or source.dim > 2),
                      element("p", note, cls="soft"))  # fmt: skip
     return Section("K", "Stress intensity factors", content, {"rows": numbers})
 
 
-def _row(sif: SIF, mine: Any, dim: int) -> tuple[tuple[str, ...], tuple[Any, ...]]:
+def _row(sif: SIF, is_of_tip: Any, dim: int) -> tuple[tuple[str, ...], tuple[Any, ...]]:
     """Names and values of one tip or front."""
-    quality = float(sif.spread[mine].max(initial=0.0)), float(sif.domain_cells[mine].min())
-    return _ROW[dim](sif, mine, quality)
+    quality = (
+        float(sif.spread[is_of_tip].max(initial=0.0)),
+        float(sif.domain_cells[is_of_tip].min()),
+    )
+    return _ROW[dim](sif, is_of_tip, quality)
 
 
-def _at_tip(sif: SIF, mine: Any, quality: Any) -> tuple[tuple[str, ...], tuple[Any, ...]]:
-    K, closed = sif.K[mine][0], bool(sif.closed[mine].any())
-    best, bar = sif.best[mine][0], sif.bar[mine][0]
-    place = coordinates(sif.x[mine][0])
+def _at_tip(sif: SIF, is_of_tip: Any, quality: Any) -> tuple[tuple[str, ...], tuple[Any, ...]]:
+    K, closed = sif.K[is_of_tip][0], bool(sif.closed[is_of_tip].any())
+    best, bar = sif.best[is_of_tip][0], sif.bar[is_of_tip][0]
+    place = coordinates(sif.x[is_of_tip][0])
     head = ("place", "K_I", "K_II", "T", "best K_I", "± K_I", "best K_II", "± K_II", "spread",
             "domain", "closed")  # fmt: skip
     bars = (best[0], bar[0], best[1], bar[1])
-    return head, (place, K[0], K[1], sif.T[mine][0], *bars, *quality, closed)
+    return head, (place, K[0], K[1], sif.T[is_of_tip][0], *bars, *quality, closed)
 
 
-def _along_front(sif: SIF, mine: Any, quality: Any) -> tuple[tuple[str, ...], tuple[Any, ...]]:
-    K, closed = sif.K[mine], int(sif.closed[mine].sum())
+def _along_front(sif: SIF, is_of_tip: Any, quality: Any) -> tuple[tuple[str, ...], tuple[Any, ...]]:
+    K, closed = sif.K[is_of_tip], int(sif.closed[is_of_tip].sum())
     head = ("places", *(f"{mode} {end}" for mode in _MODES for end in ("min", "mean", "max")),
             "largest ± K_I", "± K_II", "± K_III", "spread", "domain",
             "closed places")  # fmt: skip
-    bar = sif.bar[mine]
+    bar = sif.bar[is_of_tip]
     bars = [float(np.nanmax(column)) if np.isfinite(column).any() else np.nan for column in bar.T]
     ends = [f(K[:, m]) for m in range(3) for f in (np.min, np.mean, np.max)]
-    return head, (int(mine.sum()), *map(float, ends), *bars, *quality, closed)
+    return head, (int(is_of_tip.sum()), *map(float, ends), *bars, *quality, closed)
 
 
 _ROW = {2: _at_tip, 3: _along_front}
@@ -77,7 +80,7 @@ _ROW = {2: _at_tip, 3: _along_front}
 _RUBBED = ("stuck share", "largest shear", "largest slip", "dissipated since the state before")
 
 
-def _rubbed(solution: Solution, contact: Contact | None) -> tuple[float, ...]:
+def _friction_values(solution: Solution, contact: Contact | None) -> tuple[float, ...]:
     """What friction adds to a row: nothing in a scene without."""
     if not any(solution.problem.frictions):
         return ()
@@ -108,14 +111,14 @@ def contact(source: Source) -> Section | None:
             low = float(gap.min(initial=np.inf)) if len(lips) else 0.0
             rows.append((k, solution.state, c, pressed is not None, share, largest, force,
                          float(gap.max(initial=0.0)), low,
-                         *_rubbed(solution, pressed)))  # fmt: skip
+                         *_friction_values(solution, pressed)))  # fmt: skip
     if not rows:
         return None
     head = ("state", "load", "crack", "multipliers", "closed share", "largest pressure",
             "contact force", "largest opening", "smallest opening",
             *(_RUBBED if rubs else ()))  # fmt: skip
     shown = [(k, _load(state), *rest) for k, state, *rest in rows]
-    numbers = [{name: _plain(v) for name, v in zip(head, row, strict=True)} for row in shown]
+    numbers = [{name: _json_value(v) for name, v in zip(head, row, strict=True)} for row in shown]
     return Section("contact", "Contact of the crack faces", table(head, shown), {"rows": numbers})
 
 
@@ -156,10 +159,12 @@ def growth(source: Source) -> Section | None:
         words = "This run is not finished: the report shows the steps that are there."
         parts.insert(0, element("p", words, cls="bad"))
     bar = history.life_bar
-    sources = {name: _plain(getattr(bar, name)) for name in ("steps", "K", "contact", "unknown")}
+    sources = {
+        name: _json_value(getattr(bar, name)) for name in ("steps", "K", "contact", "unknown")
+    }
     numbers = {"steps": len(history.steps), "cycles": history.life, "ended": history.ended,
                "error of cycles": sources, "whole": source.is_whole}  # fmt: skip
-    return Section("growth", "Growth and life", joined(*parts), numbers)
+    return Section("growth", "Growth and life", join_parts(*parts), numbers)
 
 
 def lives(source: Source) -> Section | None:
@@ -181,10 +186,11 @@ def lives(source: Source) -> Section | None:
             for name, share in life.bounds.items()
         ]
         parts += [element("h3", "Numerical bounds, as shares of the life"), table((), bounds)]
-    values = {"life": life.life, "quantiles": {str(p): _plain(life.percentile(p)) for p in levels},
-              "scatter": {k: list(map(_plain, v)) for k, v in life.scatter.items()},
-              "bounds": {k: _plain(v) for k, v in life.bounds.items()}}  # fmt: skip
-    return Section("life", "Life with its error bar", joined(*parts), values)
+    values = {"life": life.life, "quantiles": {str(p): _json_value(life.percentile(p)) for p in
+    levels},
+              "scatter": {k: list(map(_json_value, v)) for k, v in life.scatter.items()},
+              "bounds": {k: _json_value(v) for k, v in life.bounds.items()}}  # fmt: skip
+    return Section("life", "Life with its error bar", join_parts(*parts), values)
 
 
 def numbers(source: Source) -> Section | None:
@@ -200,17 +206,17 @@ def numbers(source: Source) -> Section | None:
     writer.writerows(rows.tolist())
     coded = base64.b64encode(text.getvalue().encode()).decode()
     link = Markup(f'<a download="history.csv" href="data:text/csv;base64,{coded}">history.csv</a>')
-    content = joined(element("p", joined("Save it as ", link)),
+    content = join_parts(element("p", join_parts("Save it as ", link)),
                      table(names, rows.tolist(), scroll=True))  # fmt: skip
     return Section(
         "table",
         "Table of all steps",
         content,
-        {"columns": names, "rows": [[_plain(v) for v in row] for row in rows.tolist()]},
+        {"columns": names, "rows": [[_json_value(v) for v in row] for row in rows.tolist()]},
     )
 
 
-def _plain(value: Any) -> Any:
+def _json_value(value: Any) -> Any:
     """A value that json has; nan and inf are texts."""
     if isinstance(value, np.generic):
         value = value.item()

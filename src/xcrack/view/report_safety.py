@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from xcrack.base.markup import element, joined, table
+from xcrack.base.markup import element, join_parts, table
 from xcrack.view.report_source import Section, Source
 
 _MOST_LOOKS = 50  # rows of a page
@@ -28,7 +28,7 @@ def inspections(source: Source) -> Section | None:
         parts.append(element("p", f"and {len(looks) - _MOST_LOOKS} looks more", cls="soft"))
     numbers = {"first": plan.first, "interval": plan.interval, "at": plan.at.tolist(),
                "a": plan.a.tolist(), "missed": plan.missed}  # fmt: skip
-    return Section("inspection", "Inspections", joined(*parts), numbers)
+    return Section("inspection", "Inspections", join_parts(*parts), numbers)
 
 
 def strength(source: Source) -> Section | None:
@@ -55,12 +55,12 @@ def strength(source: Source) -> Section | None:
     return Section(
         "strength",
         "Strength that is left",
-        joined(*parts),
-        {name: [_plain(value) for value in rows[name].tolist()] for name in names},
+        join_parts(*parts),
+        {name: [_json_number(value) for value in rows[name].tolist()] for name in names},
     )
 
 
-def _plain(value: float) -> float | None:
+def _json_number(value: float) -> float | None:
     """A number that json has; None where there is none."""
     return value if np.isfinite(value) else None
 

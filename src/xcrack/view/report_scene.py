@@ -8,7 +8,7 @@ import numpy as np
 from xcrack.analysis.solution import Solution
 from xcrack.base.arguments import arguments_of
 from xcrack.base.arrays import coordinates
-from xcrack.base.markup import Markup, element, joined, listed, table
+from xcrack.base.markup import Markup, element, join_parts, list_markup, table
 from xcrack.crack.measures import Measures, measures
 from xcrack.model.supports import Condition
 from xcrack.runs.versions import versions
@@ -32,20 +32,20 @@ def scene(source: Source) -> Section:
     for c, crack in enumerate(source.cracks):
         rows.append((f"crack {c}", _crack(crack)))
     parts: list[Any] = [table((), rows)]
-    known = [] if mesh is None else [measures(crack, mesh) for crack in source.cracks]
-    if known:
+    crack_measures = [] if mesh is None else [measures(crack, mesh) for crack in source.cracks]
+    if crack_measures:
         size = {2: "length", 3: "area"}[source.dim]
         head = ("crack", size, "depth", "on the surfaces", "ends")
-        parts.append(table(head, [_measured(c, m) for c, m in enumerate(known)]))
+        parts.append(table(head, [_measures_of_crack(c, m) for c, m in enumerate(crack_measures)]))
         numbers["measures"] = [
-            asdict(m) | {"depth": None if np.isnan(m.depth) else m.depth} for m in known
+            asdict(m) | {"depth": None if np.isnan(m.depth) else m.depth} for m in crack_measures
         ]
     if problem is not None and source.solutions:
         parts.append(_conditions(source.solutions[-1]))
     else:
         parts.append(element("p", "The stored steps do not hold the loads: they are in the script "
                              "or the case file that made the run.", cls="soft"))  # fmt: skip
-    return Section("scene", "Scene", joined(*parts), numbers)
+    return Section("scene", "Scene", join_parts(*parts), numbers)
 
 
 def _crack(crack: Any) -> str:
@@ -57,7 +57,7 @@ def _crack(crack: Any) -> str:
     return f"{len(crack.points)} points, length {length:.6g}, {tips}"
 
 
-def _measured(c: int, m: Measures) -> tuple[str, ...]:
+def _measures_of_crack(c: int, m: Measures) -> tuple[str, ...]:
     """A crack as it is read off: lengths and depths by facet set, ends by place and set."""
     surfaces = "; ".join(f"{t.name}: length {t.length:.4g}, depth {t.depth:.4g}" for t in m.traces)
     ends = "; ".join(f"{_vector(end.x)} on {end.name}" for end in m.ends)
@@ -80,7 +80,7 @@ def _conditions(solution: Solution) -> Markup:
         head = ("resultants and reactions", "force", "moment about the origin")
         parts += [element("p", f"Scale of the loads in this state: {solution.factor:.6g}."),
                   table(head, sums)]  # fmt: skip
-    return joined(*parts)
+    return join_parts(*parts)
 
 
 def _condition(role: str, condition: Condition) -> tuple[str, str, str, str]:
@@ -119,8 +119,8 @@ def assumptions(source: Source) -> Section:
         parts.append(table(("ingredient", "", "reason", "unknowns"), rows))
     notes = _notes(source)
     parts.append(element("h3", "Validity of linear elastic fracture mechanics"))
-    parts.append(listed(notes))
-    return Section("assumptions", "Assumptions", joined(*parts),
+    parts.append(list_markup(notes))
+    return Section("assumptions", "Assumptions", join_parts(*parts),
                    {"ingredients": numbers, "validity": notes})  # fmt: skip
 
 
@@ -157,7 +157,7 @@ def plastic_zone(source: Source) -> tuple[str, bool]:
     every = [sif.K[:, :2] for state in source.sif for sif in state]
     largest = max((float(np.abs(K).max(initial=0.0)) for K in every), default=0.0)
     radius = (largest / source.yield_stress) ** 2 / (2 * np.pi)
-    lengths = {"shortest crack": _shortest(source), "smallest cell": _cell(source)}
+    lengths = {"shortest crack": _smallest_size(source), "smallest cell": _cell(source)}
     words = ", ".join(f"{100 * radius / v:.3g} % of the {name}" for name, v in lengths.items()
                       if v > 0)  # fmt: skip
     is_small = radius <= _SMALL * lengths["shortest crack"] or not source.cracks
@@ -166,7 +166,7 @@ def plastic_zone(source: Source) -> tuple[str, bool]:
             f"{largest:.6g}: {words}; {verdict}."), is_small  # fmt: skip
 
 
-def _shortest(source: Source) -> float:
+def _smallest_size(source: Source) -> float:
     """Smallest size of a crack: its length inside the body in 2D, its extent in 3D."""
     mesh = source.mesh
     if source.dim == 2 and mesh is not None:
@@ -179,30 +179,30 @@ def _cell(source: Source) -> float:
     return 0.0 if source.mesh is None else float(source.mesh.cell_size.min())
 
 
-def warned(source: Source) -> Section:
+def all_warnings(source: Source) -> Section:
     """All warnings, counted."""
     if source.warnings:
         rows = [(n, text) for text, n in source.warnings.most_common()]
-        content = joined(table(("times", "warning"), rows))
+        content = join_parts(table(("times", "warning"), rows))
     else:
         content = element("p", "There were none.")
     history = source.history
     if history is not None and any(s.warnings is None and not s.solutions for s in history.steps):
         hint = ("Steps of this run, made by an older xcrack, hold no warnings of K: columns spread "
                 "and domain_cells of the table show how far each K is to be trusted.")  # fmt: skip
-        content = joined(content, element("p", hint, cls="soft"))
+        content = join_parts(content, element("p", hint, cls="soft"))
     return Section("warnings", f"Warnings ({source.warnings.total()})", content,
                    {"messages": dict(source.warnings)})  # fmt: skip
 
 
-def again(source: Source) -> Section:
+def rerun_section(source: Source) -> Section:
     """Inputs, versions, and how to run it again."""
-    known, hashes = versions(), source.hashes()
+    software, hashes = versions(), source.hashes()
     settings: dict[str, str] = {}
     history = source.history
     if history is not None and history.steps and history.steps[0].memory is not None:
         settings = dict(history.steps[0].memory.settings)
-    parts: list[Any] = [table((), [*known.items(), *hashes.items()])]
+    parts: list[Any] = [table((), [*software.items(), *hashes.items()])]
     if history is not None and history.path is not None:
         text = f"history = xc.load({str(history.path)!r})\nxc.report(history, 'report.html')"
         if not source.is_whole:
@@ -216,8 +216,8 @@ def again(source: Source) -> Section:
     if settings:
         body = table((), sorted(settings.items()), scroll=True)
         parts.append(Markup(f"<details><summary>settings of the run</summary>{body}</details>"))
-    return Section("again", "Inputs, versions, and how to run it again", joined(*parts),
-                   {"versions": known, "hashes": hashes, "settings": settings})  # fmt: skip
+    return Section("again", "Inputs, versions, and how to run it again", join_parts(*parts),
+                   {"versions": software, "hashes": hashes, "settings": settings})  # fmt: skip
 
 
-__all__ = ["again", "assumptions", "plastic_zone", "scene", "warned"]
+__all__ = ["all_warnings", "assumptions", "plastic_zone", "rerun_section", "scene"]

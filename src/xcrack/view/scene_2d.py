@@ -132,16 +132,18 @@ def _range(
         return float(limits[0]), float(limits[1]), 100.0
     if field in STRESSES and body.solution.space.tips:
         regular = values[body.corners[~body.solution.space.has_tip[body.cell]]]
-        low, high, share = clipped(
+        low, high, share = clipped_range(
             values[body.corners], body.volume, float(np.abs(regular).max(initial=0.0))
         )
         low, high = max(low, float(values.min())), min(high, float(values.max()))
     else:
         low, high, share = float(values.min()), float(values.max()), 100.0
-    return *rounded(low, high, field), share
+    return *rounded_range(low, high, field), share
 
 
-def clipped(values: Floats, measure: Floats, regular: float = 0.0) -> tuple[float, float, float]:
+def clipped_range(
+    values: Floats, measure: Floats, regular: float = 0.0
+) -> tuple[float, float, float]:
     """Lowest and highest value without the few that are very large, and the share kept (%).
 
     Parameters
@@ -167,7 +169,7 @@ def clipped(values: Floats, measure: Floats, regular: float = 0.0) -> tuple[floa
     return max(low, -top), min(high, top), 100 * float(area[within] / area[-1])
 
 
-def rounded(low: float, high: float, field: str) -> tuple[float, float]:
+def rounded_range(low: float, high: float, field: str) -> tuple[float, float]:
     """Ends of the colours for values from low to high."""
     if low < 0 < high and min(-low, high) > 0.05 * max(-low, high):
         high = max(-low, high)
@@ -235,15 +237,15 @@ def _on_lips(body: Pieces, edge: Ints) -> tuple[Ints, Bools]:
     crack = np.full(len(edge), -1, dtype=np.int64)
     closed = np.zeros(len(edge), dtype=bool)
     a, b = body.points[edge[:, 0]], body.points[edge[:, 1]]
-    near = _NEAR * float(body.solution.space.mesh.cell_size.min())
+    tolerance = _NEAR * float(body.solution.space.mesh.cell_size.min())
     for c, phi in enumerate(body.phi):
-        mine = (np.abs(phi[edge[:, :2]]) <= near).all(axis=1)
+        is_on_crack = (np.abs(phi[edge[:, :2]]) <= tolerance).all(axis=1)
         # Ahead of a tip phi is zero as well.
         for psi in body.psi[c]:
-            mine &= (psi[edge[:, :2]] <= near).all(axis=1)
-        crack[mine] = c
+            is_on_crack &= (psi[edge[:, :2]] <= tolerance).all(axis=1)
+        crack[is_on_crack] = c
         contact = body.solution.contact[c]
-        if contact is not None and mine.any():
-            nearest = cKDTree(contact.points).query((a[mine] + b[mine]) / 2)[1]
-            closed[mine] = contact.closed[nearest]
+        if contact is not None and is_on_crack.any():
+            nearest = cKDTree(contact.points).query((a[is_on_crack] + b[is_on_crack]) / 2)[1]
+            closed[is_on_crack] = contact.closed[nearest]
     return crack, closed

@@ -7,16 +7,16 @@ import numpy as np
 
 from xcrack.analysis.solution import Solution
 from xcrack.base.arrays import Bools, Floats, Ints
-from xcrack.base.checks import numbers, shown
+from xcrack.base.checks import numbers, value_text
 from xcrack.base.errors import ProblemError
 from xcrack.mesh.mesh import Mesh
 from xcrack.model.loads import FacetPoints
 from xcrack.output.lip_faces_3d import LipFaces, lip_faces
 from xcrack.output.pieces import pieces
-from xcrack.view.scene_2d import SPACE_FIELDS, STRESSES, clipped, field_values, rounded
+from xcrack.view.scene_2d import SPACE_FIELDS, STRESSES, clipped_range, field_values, rounded_range
 from xcrack.view.section_3d import (
     Plane,
-    Soup,
+    TriangleSoup,
     areas,
     crossing,
     edges_of,
@@ -128,8 +128,8 @@ def clip_plane(clip: Any) -> Plane | None:
     except ProblemError as error:
         reason = str(error)[:-1]
     raise ProblemError(
-        f"plot: clip = {shown(clip)}: give a point and a normal, ((x, y, z), (nx, ny, nz)); what "
-        f"lies on the side of the normal is left out. Here {reason}."
+        f"plot: clip = {value_text(clip)}: give a point and a normal, ((x, y, z), (nx, ny, nz)); "
+        f"what lies on the side of the normal is left out. Here {reason}."
     )
 
 
@@ -141,8 +141,8 @@ def direction(view: Any) -> Floats | None:
     length = float(np.linalg.norm(v))
     if not 0 < length < np.inf:
         raise ProblemError(
-            f"plot: view = {shown(view)} has no direction: give that from the body to the viewer, "
-            "(x, y, z)."
+            f"plot: view = {value_text(view)} has no direction: give that from the body to the "
+            f"viewer, (x, y, z)."
         )
     return np.asarray(v / length)
 
@@ -161,7 +161,7 @@ def space_scene(
     shown = field_values(body, field)
     level = levels(body.points, plane)
     shell, lip, outline, rims, cell_edges = faces(body, level)
-    drawn = [Soup.of(f, None).behind(level) for f in (shell, lip)]
+    drawn = [TriangleSoup.of(f, None).behind(level) for f in (shell, lip)]
     lines = [segments_behind(part, level) for part in (outline, rims, cell_edges)]
     if plane is not None:
         drawn.append(section(body, level))
@@ -175,8 +175,8 @@ def space_scene(
     share = 100.0
     low, high = float(values.min()), float(values.max())
     if field in STRESSES and solution.space.tips:
-        low, high, share = clipped(values, areas(corners))
-    low, high = rounded(low, high, field) if limits is None else limits
+        low, high, share = clipped_range(values, areas(corners))
+    low, high = rounded_range(low, high, field) if limits is None else limits
     clip = limits is None and share < 100
     nothing = np.zeros((0, 3, 3))
     curves = [
@@ -198,7 +198,7 @@ def space_scene(
         faint=outline_rest if warp else np.zeros((0, 2, 3)),
         rims=curves[1],
         fronts=_front_lines(solution, warp, plane)[: None if plane is not None else 0],
-        toward=_toward(plane, view, None),
+        toward=_viewing_direction(plane, view, None),
         heaviside=np.zeros((0, 3)),
         tip=np.zeros((0, 3)),
     )
@@ -227,7 +227,7 @@ def crack_scene(
         low = 0.0
     if field == "pressure":
         low = min(low, 0.0)
-    low, high = rounded(low, high, field) if limits is None else limits
+    low, high = rounded_range(low, high, field) if limits is None else limits
     return replace(
         _seen_through(solution, warp, plane),
         triangles=corners[coloured],
@@ -239,7 +239,7 @@ def crack_scene(
         apart=corners[~coloured] if field == "pressure" else nothing,
         rims=np.concatenate([_middle(each, warp)[each.mouth] for each in lips]),
         cell_edges=edges_of(corners),
-        toward=_toward(plane, view, lips),
+        toward=_viewing_direction(plane, view, lips),
     )
 
 
@@ -261,7 +261,7 @@ def mesh_scene(solution: Solution, plane: Plane | None, view: Floats | None) -> 
         touching=every,
         cell_edges=edges_of(every),
         faint=edges_of(through.skin),
-        toward=_toward(plane, view, lips),
+        toward=_viewing_direction(plane, view, lips),
         heaviside=space.node_points[carries],
         tip=space.mesh.points[around],
     )
@@ -273,7 +273,7 @@ def _seen_through(solution: Solution, warp: float, plane: Plane | None) -> Space
     moved = mesh.points + warp * solution.coefficients[: mesh.n_points]
     level = levels(mesh.points, plane)
     facets = mesh.boundary
-    skin = Soup.of(facets, None).behind(level).at(moved)
+    skin = TriangleSoup.of(facets, None).behind(level).at(moved)
     sharp = segments_behind(mesh.edges[sharp_edges(mesh)], level)
     if plane is not None:
         sharp += crossing(facets, level)
@@ -329,7 +329,9 @@ def _front_lines(solution: Solution, warp: float, plane: Plane | None) -> Floats
     return np.concatenate(parts)
 
 
-def _toward(plane: Plane | None, view: Floats | None, lips: list[LipFaces] | None) -> Floats:
+def _viewing_direction(
+    plane: Plane | None, view: Floats | None, lips: list[LipFaces] | None
+) -> Floats:
     """From the body to the viewer: what was cut open, or the faces of the crack, is seen."""
     if view is not None:
         return view
@@ -382,7 +384,7 @@ def load_arrows(solution: Solution) -> tuple[Floats, Floats]:
             continue
         facets = mesh.facet_sets[load.where]
         x = mesh.points[facets].mean(axis=1)
-        turned = _outward(mesh, facets)
+        turned = _area_vectors(mesh, facets)
         area = np.linalg.norm(turned, axis=1)
         middle = area @ x / area.sum()
         if load.has_one_arrow:
@@ -394,7 +396,7 @@ def load_arrows(solution: Solution) -> tuple[Floats, Floats]:
         if np.ptp(x, axis=0).max() < _SMALL * mesh.extent:
             forces.append(np.stack([middle, area @ t, area @ out])[None])
         else:
-            chosen = _spread(x, _MANY)
+            chosen = _distant_points(x, _MANY)
             tractions.append(np.stack([x, t, out], axis=1)[chosen])
     start, vector = [], []
     for group in (np.concatenate(forces), np.concatenate(tractions)):
@@ -408,7 +410,7 @@ def load_arrows(solution: Solution) -> tuple[Floats, Floats]:
     return np.concatenate(start), np.concatenate(vector)
 
 
-def _outward(mesh: Mesh, facets: Ints) -> Floats:
+def _area_vectors(mesh: Mesh, facets: Ints) -> Floats:
     """Area vectors of boundary facets, out of the body `(k, 3)`."""
     x = mesh.points[facets]
     normal = np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]) / 2
@@ -419,7 +421,7 @@ def _outward(mesh: Mesh, facets: Ints) -> Floats:
     return np.asarray(sign[:, None] * normal)
 
 
-def _spread(x: Floats, n: int) -> Ints:
+def _distant_points(x: Floats, n: int) -> Ints:
     """Up to n points far from each other, by their numbers."""
     chosen = [int(np.argmin(np.linalg.norm(x - x.mean(axis=0), axis=1)))]
     distance = np.linalg.norm(x - x[chosen[0]], axis=1)

@@ -32,37 +32,37 @@ _SMALL = {
 
 
 @dataclass(frozen=True, eq=False)
-class Soup:
+class TriangleSoup:
     """Simplices whose vertices are mixtures of points: numbers `(k, v)`, shares `(k, w, v)`."""
 
     number: Ints
     share: Floats
 
     @classmethod
-    def of(cls, number: Ints, share: Floats | None) -> "Soup":
+    def of(cls, number: Ints, share: Floats | None) -> "TriangleSoup":
         """Simplices of points; without shares their vertices are these."""
         v = number.shape[1]
-        whole = np.broadcast_to(np.eye(v), (len(number), v, v))
-        return cls(number, whole if share is None else share)
+        whole_triangles = np.broadcast_to(np.eye(v), (len(number), v, v))
+        return cls(number, whole_triangles if share is None else share)
 
     def at(self, x: Floats) -> Floats:
         """Values at the vertices `(k, w, m)` of what is given at points `(n, m)`."""
         return np.einsum("kwv,kvm->kwm", self.share, x[self.number])
 
-    def behind(self, level: Floats | None) -> "Soup":
+    def behind(self, level: Floats | None) -> "TriangleSoup":
         """What is left of triangles behind a plane."""
         if level is None:
             return self
         values = level[self.number]
         low, high = values.min(axis=1), values.max(axis=1)
         # The section has what lies in the plane, on the side that is drawn: lips lie there twice.
-        whole, split = np.nonzero((high <= 0) & (low < 0))[0], np.nonzero((low < 0) & (high > 0))[0]
+        uncut, split = np.nonzero((high <= 0) & (low < 0))[0], np.nonzero((low < 0) & (high > 0))[0]
         bary, _, side, parent = cut_simplices(values[split])
-        mine = side < 0
-        rows = np.concatenate([whole, split[parent[mine]]])
+        is_behind = side < 0
+        rows = np.concatenate([uncut, split[parent[is_behind]]])
         v = self.number.shape[1]
-        corner = np.broadcast_to(np.eye(v), (len(whole), v, v))
-        return Soup(self.number[rows], np.concatenate([corner, bary[mine]]))
+        corner = np.broadcast_to(np.eye(v), (len(uncut), v, v))
+        return TriangleSoup(self.number[rows], np.concatenate([corner, bary[is_behind]]))
 
 
 def levels(x: Floats, plane: Plane | None) -> Floats | None:
@@ -75,12 +75,12 @@ def levels(x: Floats, plane: Plane | None) -> Floats | None:
     return np.where(np.abs(level) < 1e-9 * size, 0.0, level)
 
 
-def segments_behind(number: Ints, level: Floats | None) -> list[Soup]:
+def segments_behind(number: Ints, level: Floats | None) -> list[TriangleSoup]:
     """What is left of segments behind a plane."""
     if level is None:
-        return [Soup.of(number, None)]
+        return [TriangleSoup.of(number, None)]
     a, b = level[number].T
-    whole = (a <= 0) & (b <= 0)
+    is_whole = (a <= 0) & (b <= 0)
     crossed = a * b < 0
     t = a[crossed] / (a[crossed] - b[crossed])
     # Both vertices on the side that is kept, one of them the cut point.
@@ -88,20 +88,20 @@ def segments_behind(number: Ints, level: Floats | None) -> list[Soup]:
     share[:, 0] = np.stack([1 - t, t], axis=1)
     retained = np.where(a[crossed] < 0, 0, 1)
     share[np.arange(len(t)), 1, retained] = 1.0
-    return [Soup.of(number[whole], None), Soup(number[crossed], share)]
+    return [TriangleSoup.of(number[is_whole], None), TriangleSoup(number[crossed], share)]
 
 
-def crossing(triangles: Ints, level: Floats | None) -> list[Soup]:
+def crossing(triangles: Ints, level: Floats | None) -> list[TriangleSoup]:
     """Segments in which triangles meet a plane."""
     if level is None:
         return []
     values = level[triangles]
     rows = np.nonzero((values.min(axis=1) < 0) & (values.max(axis=1) >= 0))[0]
     bary, parent = interface_simplices(values[rows])
-    return [Soup(triangles[rows[parent]], bary)]
+    return [TriangleSoup(triangles[rows[parent]], bary)]
 
 
-def section(body: Pieces, level: Floats | None) -> Soup:
+def section(body: Pieces, level: Floats | None) -> TriangleSoup:
     """Triangles in which the pieces meet a plane."""
     assert level is not None
     blocks = [body.plain]
@@ -112,7 +112,7 @@ def section(body: Pieces, level: Floats | None) -> Soup:
     values = level[tetrahedra]
     rows = np.nonzero((values.min(axis=1) < 0) & (values.max(axis=1) >= 0))[0]
     bary, parent = interface_simplices(values[rows])
-    return Soup(tetrahedra[rows[parent]], bary)
+    return TriangleSoup(tetrahedra[rows[parent]], bary)
 
 
 _Faces = tuple[Ints, Ints, Ints, Ints, Ints]
@@ -130,10 +130,10 @@ def faces(body: Pieces, level: Floats | None) -> _Faces:
     for block in (body.plain, body.split):
         cell = body.cell[first : first + len(block)]
         first += len(block)
-        near = rim[cell].any(axis=1) | on_lip[block[:, :4]].sum(axis=1).astype(bool)
-        rows = np.nonzero(near)[0]
+        is_near = rim[cell].any(axis=1) | on_lip[block[:, :4]].sum(axis=1).astype(bool)
+        rows = np.nonzero(is_near)[0]
         block, cell = block[rows], cell[rows]
-        zero = _zero(mesh, body, block, cell)
+        zero = _vanishing_coordinates(mesh, body, block, cell)
         for face in local_facets(3):
             at = zero[:, face].all(axis=1) & rim[cell]
             outside = at.any(axis=1)
@@ -159,7 +159,7 @@ def faces(body: Pieces, level: Floats | None) -> _Faces:
     return shell, lip, outline, rims, cells
 
 
-def _zero(mesh: Mesh, body: Pieces, block: Ints, cell: Ints) -> Bools:
+def _vanishing_coordinates(mesh: Mesh, body: Pieces, block: Ints, cell: Ints) -> Bools:
     """Which barycentric coordinates of the vertices of pieces vanish `(k, 4, 4)`."""
     bary = [barycentric(mesh, cell, body.points[block[:, v]]) for v in range(4)]
     return np.asarray(np.abs(np.stack(bary, axis=1)) < _NEAR)
@@ -167,10 +167,10 @@ def _zero(mesh: Mesh, body: Pieces, block: Ints, cell: Ints) -> Bools:
 
 def _lip_points(body: Pieces) -> Bools:
     """Which points lie on a crack or on its front `(n,)`."""
-    near = _NEAR * float(body.solution.space.mesh.cell_size.min())
+    tolerance = _NEAR * float(body.solution.space.mesh.cell_size.min())
     flag = np.zeros(len(body.points), dtype=bool)
     for phi, psi in zip(body.phi, body.psi, strict=True):
-        flag |= (np.abs(phi) <= near) & (psi <= near).all(axis=0)
+        flag |= (np.abs(phi) <= tolerance) & (psi <= tolerance).all(axis=0)
     return flag
 
 
@@ -184,7 +184,7 @@ def on_facets(body: Pieces, level: Floats | None) -> Ints:
         first += len(block)
         values = level[block[:, :4]]
         rows = np.nonzero((values.min(axis=1) < 0) & (values.max(axis=1) >= 0))[0]
-        zero = _zero(mesh, body, block[rows], cell[rows])
+        zero = _vanishing_coordinates(mesh, body, block[rows], cell[rows])
         for face in local_facets(3):
             on = np.any(zero[:, face].all(axis=1), axis=1)
             parts.append(block[rows[on]][:, face])
@@ -223,10 +223,10 @@ def sharp_edges(mesh: Mesh) -> Bools:
     key = pairs[:, 0] * mesh.n_points + pairs[:, 1]
     order = np.argsort(key, kind="stable")
     owner = np.repeat(np.arange(len(facets)), 3)[order]
-    same = np.nonzero(key[order][1:] == key[order][:-1])[0]
+    same_edge = np.nonzero(key[order][1:] == key[order][:-1])[0]
     # Facets need not turn alike: only the angle between their planes counts.
-    turn = np.abs(np.einsum("kd,kd->k", normal[owner[same]], normal[owner[same + 1]]))
-    sharp = np.unique(key[order][same[turn < _SHARP]])
+    turn = np.abs(np.einsum("kd,kd->k", normal[owner[same_edge]], normal[owner[same_edge + 1]]))
+    sharp = np.unique(key[order][same_edge[turn < _SHARP]])
     edges = np.sort(mesh.edges, axis=1)
     return np.isin(edges[:, 0] * mesh.n_points + edges[:, 1], sharp)
 
@@ -244,7 +244,7 @@ def edges_of(corners: Floats) -> Floats:
 
 __all__ = [
     "Plane",
-    "Soup",
+    "TriangleSoup",
     "areas",
     "crossing",
     "edges_of",

@@ -23,7 +23,7 @@ def solution_layers(solution: Solution) -> list[dict[str, Any]]:
     body = space_scene(solution, "von_mises", 0.0, None, None, None)
     layers = [
         _layer("body: equivalent stress", "triangles", body.triangles,
-               _coloured(body.values, body.limits), 0.35),
+               _coloured_layer(body.values, body.limits), 0.35),
         _layer("edges", "lines", body.outline, _EDGE, 1.0),
     ]  # fmt: skip
     if solution.lips:
@@ -31,7 +31,7 @@ def solution_layers(solution: Solution) -> list[dict[str, Any]]:
         lips = crack_scene(solution, "opening", cracks, 0.0, None, None, None)
         layers += [
             _layer("crack: opening", "triangles", lips.triangles,
-                   _coloured(lips.values, lips.limits), 1.0),
+                   _coloured_layer(lips.values, lips.limits), 1.0),
             _layer("crack: faces that touch", "triangles", lips.touching, (110, 110, 110), 1.0),
             _layer("fronts", "lines", lips.fronts, _FRONT, 1.0),
         ]  # fmt: skip
@@ -58,7 +58,7 @@ def history_layers(history: History) -> list[dict[str, Any]]:
     return [layer for layer in layers if layer["n"]]
 
 
-def packed(layers: Sequence[dict[str, Any]]) -> dict[str, Any] | None:
+def packed_layers(layers: Sequence[dict[str, Any]]) -> dict[str, Any] | None:
     """Layers in one box, as text for a page; None where there is nothing, or too much."""
     triangles = sum(layer["n"] for layer in layers if layer["kind"] == "triangles")
     if not layers or triangles > MOST:
@@ -95,7 +95,7 @@ def _body(mesh: Mesh) -> list[dict[str, Any]]:
     ]
 
 
-def _coloured(values: Floats, limits: tuple[float, float]) -> Any:
+def _coloured_layer(values: Floats, limits: tuple[float, float]) -> Any:
     from matplotlib import colormaps
 
     low, high = limits
@@ -107,4 +107,4 @@ def _text(array: Any) -> str:
     return base64.b64encode(np.ascontiguousarray(array).tobytes()).decode()
 
 
-__all__ = ["MOST", "history_layers", "packed", "solution_layers"]
+__all__ = ["MOST", "history_layers", "packed_layers", "solution_layers"]

@@ -52,8 +52,8 @@ def _rows_of(count: int) -> Any:
                 number = builder.zext(builder.load(builder.gep(column, [k])), _SIZE)
                 xk, p = loaded(x, number), builder.load(at)
                 for i, each in enumerate(sums):
-                    own = builder.load(builder.gep(value, [builder.add(p, _SIZE(i))]))
-                    term = builder.fmul(spread(own), xk)
+                    row_pointer = builder.load(builder.gep(value, [builder.add(p, _SIZE(i))]))
+                    term = builder.fmul(spread(row_pointer), xk)
                     builder.store(builder.fadd(builder.load(each), term), each)
                 builder.store(builder.add(p, _SIZE(count)), at)
             for i, each in enumerate(sums):
@@ -71,9 +71,9 @@ def _rows_of(count: int) -> Any:
 
 def _in_python(count: int) -> Any:
     def rows(columns, values, x, y, scale, out, low, high, place, row):  # type: ignore[no-untyped-def]
-        own = values[place : place + count * (high - low)].reshape(high - low, count)
+        stretch = values[place : place + count * (high - low)].reshape(high - low, count)
         for i in range(count):
-            total = (own[:, i, None] * x[columns[low:high]]).cumsum(axis=0)[-1:].sum(axis=0)
+            total = (stretch[:, i, None] * x[columns[low:high]]).cumsum(axis=0)[-1:].sum(axis=0)
             out[row + i] = y[row + i] + scale * total
 
     return rows

@@ -109,7 +109,7 @@ def take_stress(  # type: ignore[no-untyped-def]
     lam, mu : float
     """
     slope, part = np.empty((4, 2)), np.zeros((2, strain.shape[3], 4))
-    both, own = lam + 2.0 * mu, np.zeros((4, 3))
+    both, direct_part = lam + 2.0 * mu, np.zeros((4, 3))
     for q in range(len(cell)):
         e, w = cell[q], weight[q]
         _slopes(bary[q], gradient[e], sign[e], slope)
@@ -124,15 +124,15 @@ def take_stress(  # type: ignore[no-untyped-def]
                 part[1, m, a] -= s01 * slope[a, 0] + s11 * slope[a, 1]
         for a in range(4):
             x, y = slope[a, 0], slope[a, 1]
-            own[a, 0] += w * (both * x * x + mu * y * y)
-            own[a, 1] += w * (both * y * y + mu * x * x)
-            own[a, 2] += w * (lam + mu) * x * y
+            direct_part[a, 0] += w * (both * x * x + mu * y * y)
+            direct_part[a, 1] += w * (both * y * y + mu * x * x)
+            direct_part[a, 2] += w * (lam + mu) * x * y
         if _same(cell, side, q):
             continue
         _hand_over(part, residual, functions[e], copy, crack, side[q])
         for a in range(4):
             f = functions[e, a]
-            k00, k11, k01 = own[a, 0], own[a, 1], own[a, 2]
+            k00, k11, k01 = direct_part[a, 0], direct_part[a, 1], direct_part[a, 2]
             block = blocks[f]
             block[0, 0] += k00
             block[1, 1] += k11
@@ -152,7 +152,7 @@ def take_stress(  # type: ignore[no-untyped-def]
                 block[3, 0] += jump * k01
                 block[1, 2] += jump * k01
                 block[2, 1] += jump * k01
-        own[:] = 0.0
+        direct_part[:] = 0.0
 
 
 @kernel

@@ -6,7 +6,7 @@ from xcrack.base.kernels.jit import kernel
 
 
 @kernel
-def _interpolated(weight, line, x, row, values, is_root, exponent, place, kind, shift):  # type: ignore[no-untyped-def]
+def _interpolated_rate(weight, line, x, row, values, is_root, exponent, place, kind, shift):  # type: ignore[no-untyped-def]
     """A rate between the solves: its logarithm is smooth, or a power of it is a line."""
     n = values.shape[0]
     result = 0.0
@@ -22,7 +22,7 @@ def _interpolated(weight, line, x, row, values, is_root, exponent, place, kind, 
 
 
 @kernel
-def marched(  # type: ignore[no-untyped-def]
+def march_places(  # type: ignore[no-untyped-def]
     length,
     most,
     least,
@@ -113,9 +113,9 @@ def marched(  # type: ignore[no-untyped-def]
                 at = weight[row, k, i] + x * (weight[row + 1, k, i] - weight[row, k, i])
                 K += at * K_max[k, i, kind]
             K = max(K, 0.0)
-            own = zone * K * K
-            if model > 0 and since[i] + own >= size[i]:
-                since[i], size[i], over[i] = 0.0, own, K
+            zone_size = zone * K * K
+            if model > 0 and since[i] + zone_size >= size[i]:
+                since[i], size[i], over[i] = 0.0, zone_size, K
             low, between = 0, 0.0
             if model == 2 and K > 0 and since[i] < size[i]:
                 threshold = 0.0
@@ -127,23 +127,23 @@ def marched(  # type: ignore[no-untyped-def]
                 place = min(max(reduction / K, 0.0), 1.0) * (n_shifts - 1)
                 low = min(int(place), n_shifts - 2)
                 between = place - low
-            rate = _interpolated(weight, line, x, row, values, is_root, exponent, i, kind, low)
+            rate = _interpolated_rate(weight, line, x, row, values, is_root, exponent, i, kind, low)
             if between > 0:
-                other = _interpolated(
+                other = _interpolated_rate(
                     weight, line, x, row, values, is_root, exponent, i, kind, low + 1
                 )
                 rate += between * (other - rate)
-            if model == 1 and since[i] + own < size[i]:
-                rate *= (own / (size[i] - since[i])) ** w
+            if model == 1 and since[i] + zone_size < size[i]:
+                rate *= (zone_size / (size[i] - since[i])) ** w
             growth[i] = rate
             largest = max(largest, rate)
-        rest = min(1.0 - part, most - elapsed)
-        done = rest
-        if reached + rest * largest >= length:
-            done = min(rest, (length - reached) / largest)
+        remaining = min(1.0 - part, most - elapsed)
+        done = remaining
+        if reached + remaining * largest >= length:
+            done = min(remaining, (length - reached) / largest)
             after = length
         else:
-            after = reached + rest * largest
+            after = reached + remaining * largest
         while filled < n_points and (filled * spacing <= after or after >= length):
             if filled == n_points - 1 and after < length:
                 break
@@ -180,4 +180,4 @@ def marched(  # type: ignore[no-untyped-def]
     return reached, position, part, elapsed
 
 
-__all__ = ["marched"]
+__all__ = ["march_places"]

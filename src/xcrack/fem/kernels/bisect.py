@@ -25,7 +25,7 @@ def _distance(x, y, corner):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def bisect(x, tips, levels, fill, owner, bary, depth, near):  # type: ignore[no-untyped-def]
+def bisect(x, tips, levels, fill, owner, bary, depth, near_tip):  # type: ignore[no-untyped-def]
     """Quarter triangles until they are no larger than their distance to every tip.
 
     Parameters
@@ -40,7 +40,7 @@ def bisect(x, tips, levels, fill, owner, bary, depth, near):  # type: ignore[no-
     bary : (n, 3, 3) array
         Vertices of each part in its triangle.
     depth : (n,) array of int
-    near : (n,) array of bool
+    near_tip : (n,) array of bool
         Still too large after all bisections.
 
     Returns
@@ -49,7 +49,7 @@ def bisect(x, tips, levels, fill, owner, bary, depth, near):  # type: ignore[no-
         Number of parts.
     """
     stack, deep = np.empty((3 * levels + 4, 3, 3)), np.empty(3 * levels + 4, np.int64)
-    own, middle, corner = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 2))
+    triangle, middle, corner = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 2))
     count = 0
     for s in range(len(x)):
         top = 1
@@ -62,38 +62,38 @@ def bisect(x, tips, levels, fill, owner, bary, depth, near):  # type: ignore[no-
             level = deep[top]
             for i in range(3):
                 for b in range(3):
-                    own[i, b] = stack[top, i, b]
+                    triangle[i, b] = stack[top, i, b]
                 for k in range(2):
                     corner[i, k] = 0.0
                     for b in range(3):
-                        corner[i, k] += own[i, b] * x[s, b, k]
+                        corner[i, k] += triangle[i, b] * x[s, b, k]
             size = 0.0
             for i in range(3):
                 j = (i + 1) % 3
                 edge = math.hypot(corner[j, 0] - corner[i, 0], corner[j, 1] - corner[i, 1])
                 size = max(size, edge)
-            close = False
+            is_close = False
             for t in range(len(tips)):
                 if size > _distance(tips[t, 0], tips[t, 1], corner):
-                    close = True
+                    is_close = True
                     break
-            if not close or level == levels:
+            if not is_close or level == levels:
                 if fill:
                     owner[count] = s
                     for i in range(3):
                         for b in range(3):
-                            bary[count, i, b] = own[i, b]
+                            bary[count, i, b] = triangle[i, b]
                     depth[count] = level
-                    near[count] = close
+                    near_tip[count] = is_close
                 count += 1
                 continue
             for i in range(3):
                 for b in range(3):
-                    middle[i, b] = (own[i, b] + own[(i + 1) % 3, b]) / 2
+                    middle[i, b] = (triangle[i, b] + triangle[(i + 1) % 3, b]) / 2
             for i in range(3):
                 for b in range(3):
                     stack[top, i, b] = middle[i, b]
-                    stack[top + 1 + i, 0, b] = own[i, b]
+                    stack[top + 1 + i, 0, b] = triangle[i, b]
                     stack[top + 1 + i, 1, b] = middle[i, b]
                     stack[top + 1 + i, 2, b] = middle[(i + 2) % 3, b]
             for i in range(4):

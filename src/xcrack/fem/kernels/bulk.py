@@ -138,8 +138,8 @@ def block_stiffness(slot, n_blocks, gradient, volume, derivative, weight, lam, m
 
 
 @kernel
-def joined(  # type: ignore[no-untyped-def]
-    indptr, indices, data, over_indptr, over_indices, over_data, wanted
+def joined_blocks(  # type: ignore[no-untyped-def]
+    indptr, indices, data, over_indptr, over_indices, over_data, chosen_rows
 ):
     """Sum of two matrices of blocks of which no block is in both, without its zeros.
 
@@ -149,7 +149,7 @@ def joined(  # type: ignore[no-untyped-def]
         Sorted.
     over_indptr, over_indices, over_data : BSR arrays, (n, n) blocks, n >= m
         Sorted; in the first m rows its columns come after those of the other.
-    wanted : (n,) array of bool
+    chosen_rows : (n,) array of bool
         Rows of blocks to take.
 
     Returns
@@ -162,18 +162,18 @@ def joined(  # type: ignore[no-untyped-def]
     for i in range(n):
         for a in range(d):
             count = 0
-            if i < m and wanted[i]:
+            if i < m and chosen_rows[i]:
                 for k in range(indptr[i], indptr[i + 1]):
                     for b in range(d):
                         count += data[k, a, b] != 0.0
-            if wanted[i]:
+            if chosen_rows[i]:
                 for k in range(over_indptr[i], over_indptr[i + 1]):
                     for b in range(d):
                         count += over_data[k, a, b] != 0.0
             start[i * d + a + 1] = start[i * d + a] + count
     column, value = np.empty(start[n * d], np.int32), np.empty(start[n * d])
     for i in range(n):
-        if not wanted[i]:
+        if not chosen_rows[i]:
             continue
         for a in range(d):
             to = start[i * d + a]

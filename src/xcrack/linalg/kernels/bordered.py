@@ -6,7 +6,7 @@ from xcrack.base.kernels.jit import kernel
 
 
 @kernel
-def bordered(indptr, indices, data, Z, across, down, own, fixed, first):  # type: ignore[no-untyped-def]
+def bordered_matrix(indptr, indices, data, Z, across, down, corner_block, fixed, first):  # type: ignore[no-untyped-def]
     """A symmetric matrix in a basis of its first unknowns and of enriched columns.
 
     Columns are scaled to energy one. Standard unknowns that are fixed or have no energy are left
@@ -16,7 +16,7 @@ def bordered(indptr, indices, data, Z, across, down, own, fixed, first):  # type
     ----------
     indptr, indices, data : CSR arrays of K, (n, n)
     Z : tuple of CSR arrays, (n, m)
-    across, down, own : tuples of CSR arrays, (n, m), (m, n), (m, m)
+    across, down, corner_block : tuples of CSR arrays, (n, m), (m, n), (m, m)
         K Z, its transpose, and Zᵀ K Z; sorted.
     fixed : (n,) array of bool
     first : int
@@ -34,7 +34,7 @@ def bordered(indptr, indices, data, Z, across, down, own, fixed, first):  # type
     Z_start, Z_column, Z_value = Z
     across_start, across_column, across_value = across
     down_start, down_row, down_value = down
-    own_start, own_column, own_value = own
+    own_start, own_column, own_value = corner_block
     n, m = len(indptr) - 1, len(own_start) - 1
     energy = np.zeros(m)
     for c in range(m):

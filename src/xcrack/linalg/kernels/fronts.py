@@ -22,7 +22,7 @@ def _sort(values, low, high):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def arranged(indptr, indices, data, first, order, rank, perm, place):  # type: ignore[no-untyped-def]
+def arrange_parts(indptr, indices, data, first, order, rank, perm, place):  # type: ignore[no-untyped-def]
     """Rows below the pivots of each part, and entries of the matrix by their place in its front.
 
     Parameters
@@ -155,7 +155,7 @@ def places_of_updates(order, rank, update, lowest):  # type: ignore[no-untyped-d
 
 
 @kernel
-def unchanged(fronts, before):  # type: ignore[no-untyped-def]
+def unchanged_parts(fronts, before):  # type: ignore[no-untyped-def]
     """Parts whose entries and whose children's places are the same bits as before `(parts,)`.
 
     Parameters
@@ -166,7 +166,7 @@ def unchanged(fronts, before):  # type: ignore[no-untyped-def]
     first, begin, in_parent, start, row, value, order, rank = fronts
     first0, begin0, in_parent0, start0, row0, value0 = before[:6]
     parts = len(order)
-    same = np.zeros(parts, dtype=np.bool_)
+    is_unchanged = np.zeros(parts, dtype=np.bool_)
     bits, bits0 = value.view(np.uint64), value0.view(np.uint64)
     for t in range(parts):
         k, b = first[t + 1] - first[t], begin[t + 1] - begin[t]
@@ -197,5 +197,5 @@ def unchanged(fronts, before):  # type: ignore[no-untyped-def]
                     if in_parent[begin[child] + i] != in_parent0[begin0[child] + i]:
                         alike = False
                         break
-        same[t] = alike
-    return same
+        is_unchanged[t] = alike
+    return is_unchanged

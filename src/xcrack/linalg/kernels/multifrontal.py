@@ -35,7 +35,7 @@ def _factored_by_loops(F, m, k):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def factored(fronts, panel, update, wanted, low_part, high_part):  # type: ignore[no-untyped-def]
+def factor_parts(fronts, panel, update, chosen_parts, low_part, high_part):  # type: ignore[no-untyped-def]
     """Factor parts of a tree, and hand their updates upwards.
 
     Parameters
@@ -44,7 +44,7 @@ def factored(fronts, panel, update, wanted, low_part, high_part):  # type: ignor
         first, begin, in_parent, start, row, value, order, rank of `fronts.arranged`.
     panel, update : (parts,) arrays of uint64
         Addresses of the panel and of the update matrix of each part; they are written to.
-    wanted : (parts,) array of bool
+    chosen_parts : (parts,) array of bool
         Parts to factor; the panels and update matrices of others are there.
     low_part, high_part : int
         Range of parts in postorder.
@@ -73,7 +73,7 @@ def factored(fronts, panel, update, wanted, low_part, high_part):  # type: ignor
         size.ctypes.data + 12,
     )
     for t in range(low_part, high_part):
-        if not wanted[t]:
+        if not chosen_parts[t]:
             continue
         low = first[t]
         k, b = first[t + 1] - low, begin[t + 1] - begin[t]
@@ -130,7 +130,7 @@ def factored(fronts, panel, update, wanted, low_part, high_part):  # type: ignor
 
 
 @kernel
-def copied(source, target, count):  # type: ignore[no-untyped-def]
+def copy_stretches(source, target, count):  # type: ignore[no-untyped-def]
     """Copy stretches of numbers from address to address."""
     for t in range(len(count)):
         if count[t] > 0:
@@ -142,7 +142,7 @@ def copied(source, target, count):  # type: ignore[no-untyped-def]
 
 @kernel
 def substituted_one(first, begin, boundary, panel, x, forward, backward):  # type: ignore[no-untyped-def]
-    """Solve for one right-hand side `(n,)`, in place; see `substituted`."""
+    """Solve for one right-hand side `(n,)`, in place; see `substitute`."""
     parts, largest = len(first) - 1, 1
     for t in range(parts):
         largest = max(largest, begin[t + 1] - begin[t])
@@ -210,7 +210,7 @@ def substituted_one(first, begin, boundary, panel, x, forward, backward):  # typ
 
 
 @kernel
-def substituted(first, begin, boundary, order, rank, panel, X, touched, forward, backward):  # type: ignore[no-untyped-def]
+def substitute(first, begin, boundary, order, rank, panel, X, touched, forward, backward):  # type: ignore[no-untyped-def]
     """Solve with the factor, in place.
 
     Parameters

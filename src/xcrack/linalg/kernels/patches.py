@@ -19,13 +19,13 @@ def add_solved(members, start, offset, inverse, r, out):  # type: ignore[no-unty
     part = np.empty(len(out), out.dtype)  # no block holds more
     for g in range(len(start) - 1):
         first, size = start[g], start[g + 1] - start[g]
-        own = part[:size]
-        own[:] = 0
+        part_values = part[:size]
+        part_values[:] = 0
         p = offset[g]
         # Column by column: a sum of columns is vectorised, a scalar product is not.
         for j in range(size):
             value = r[members[first + j]]
-            own += value * inverse[p : p + size]
+            part_values += value * inverse[p : p + size]
             p += np.uint64(size)
         for i in range(size):
-            out[members[first + i]] += own[i]
+            out[members[first + i]] += part_values[i]

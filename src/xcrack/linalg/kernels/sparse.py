@@ -59,17 +59,17 @@ def residual(indptr, indices, data, x, b):  # type: ignore[no-untyped-def]
     largest, columns = 0.0, x.shape[1]
     for first in range(0, columns, 2):  # two at once: reading A is what takes the time
         second = min(first + 1, columns - 1)
-        rest, size, other_rest, other_size = 0.0, 0.0, 0.0, 0.0
+        largest_residual, size, other_rest, other_size = 0.0, 0.0, 0.0, 0.0
         for i in range(len(indptr) - 1):
             total, other = 0.0, 0.0
             for k in range(indptr[i], indptr[i + 1]):
                 total += data[k] * x[indices[k], first]
                 other += data[k] * x[indices[k], second]
-            rest += (b[i, first] - total) ** 2
+            largest_residual += (b[i, first] - total) ** 2
             size += b[i, first] ** 2
             other_rest += (b[i, second] - other) ** 2
             other_size += b[i, second] ** 2
-        for r, n in ((rest, size), (other_rest, other_size)):
+        for r, n in ((largest_residual, size), (other_rest, other_size)):
             share = np.sqrt(r / n) if n > 0 else np.sqrt(r)
             if np.isnan(share):
                 return share

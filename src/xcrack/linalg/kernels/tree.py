@@ -9,7 +9,7 @@ from xcrack.base.kernels.jit import kernel
 
 
 @kernel
-def bisected(ranked, centre, depth):  # type: ignore[no-untyped-def]
+def bisect_cells(ranked, centre, depth):  # type: ignore[no-untyped-def]
     """Leaf of each cell after halving at medians along the longer side.
 
     Parameters
@@ -93,10 +93,10 @@ def node_parts(cell_nodes, leaf, depth, n):  # type: ignore[no-untyped-def]
     """Lowest part that holds all cells of each node `(n,)`."""
     part = np.zeros(n, dtype=np.int64)
     for c in range(len(cell_nodes)):
-        own = leaf[c] + (1 << depth)
+        leaf_number = leaf[c] + (1 << depth)
         for j in range(cell_nodes.shape[1]):
             node = cell_nodes[c, j]
-            part[node] = _ancestor(part[node], own)
+            part[node] = _ancestor(part[node], leaf_number)
     return part
 
 

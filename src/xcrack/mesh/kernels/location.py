@@ -10,7 +10,7 @@ _MARGIN = 1e-8  # share of a cell's extent: its box holds what lies in it but fo
 
 
 @kernel
-def _boxed(points, cells, e, x, low, high):  # type: ignore[no-untyped-def]
+def _box_meets_bin(points, cells, e, x, low, high):  # type: ignore[no-untyped-def]
     """Whether the box of a cell, set in `low` and `high`, meets that of points; a margin wider."""
     for j in range(points.shape[1]):
         low[j] = high[j] = points[cells[e, 0], j]
@@ -56,7 +56,7 @@ def _bin(k, begin, end, shape):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def binned(points, cells, every, shape):  # type: ignore[no-untyped-def]
+def cells_in_bins(points, cells, every, shape):  # type: ignore[no-untyped-def]
     """Cells in the bins of a regular grid over the box of a mesh.
 
     Parameters
@@ -98,7 +98,7 @@ def binned(points, cells, every, shape):  # type: ignore[no-untyped-def]
             for k in range(bins, 0, -1):
                 start[k] = start[k - 1]
         for e in range(len(cells)):
-            _boxed(points, cells, e, every, low, high)
+            _box_meets_bin(points, cells, e, every, low, high)
             for k in range(_span(low, high, origin, width, shape, begin, end)):
                 number = _bin(k, begin, end, shape)
                 if filling == 0:
@@ -110,7 +110,7 @@ def binned(points, cells, every, shape):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def located(points, cells, gradient, grid, shape, x, tolerance):  # type: ignore[no-untyped-def]
+def locate_points(points, cells, gradient, grid, shape, x, tolerance):  # type: ignore[no-untyped-def]
     """Cell of each point, the one with the nearest centroid where several have it.
 
     Parameters
@@ -120,7 +120,7 @@ def located(points, cells, gradient, grid, shape, x, tolerance):  # type: ignore
     gradient : (m, d + 1, d) array
         Of the barycentric coordinates of the cells.
     grid, shape
-        Of `binned`.
+        Of `cells_in_bins`.
     x : (k, d) array
     tolerance : float
         Barycentric coordinate below zero up to which a point belongs to a cell.
@@ -133,7 +133,7 @@ def located(points, cells, gradient, grid, shape, x, tolerance):  # type: ignore
     """
     d = points.shape[1]
     cell, bary = np.empty(len(x), np.int64), np.zeros((len(x), d + 1))
-    own = np.empty(d + 1)
+    coordinates = np.empty(d + 1)
     begin, end = np.empty(d, np.int64), np.empty(d, np.int64)
     for q in range(len(x)):
         best, cell[q] = np.inf, -1
@@ -141,34 +141,34 @@ def located(points, cells, gradient, grid, shape, x, tolerance):  # type: ignore
         number = _bin(0, begin, end, shape)
         for k in range(grid[2][number], grid[2][number + 1]):
             e = grid[3][k]
-            if not _inside(points, cells, gradient, e, x[q], tolerance, own):
+            if not _inside(points, cells, gradient, e, x[q], tolerance, coordinates):
                 continue
-            away = 0.0
+            square = 0.0
             for j in range(d):
                 mean = 0.0
                 for b in range(d + 1):
                     mean += points[cells[e, b], j]
-                away += (mean / (d + 1) - x[q, j]) ** 2
-            if away < best:
-                best, cell[q] = away, e
+                square += (mean / (d + 1) - x[q, j]) ** 2
+            if square < best:
+                best, cell[q] = square, e
                 for i in range(d + 1):
-                    bary[q, i] = own[i]
+                    bary[q, i] = coordinates[i]
     return cell, bary
 
 
 @kernel
-def _inside(points, cells, gradient, e, x, tolerance, own):  # type: ignore[no-untyped-def]
+def _inside(points, cells, gradient, e, x, tolerance, coordinates):  # type: ignore[no-untyped-def]
     """Whether a cell has a point, whose barycentric coordinates are set."""
     d, total, least = points.shape[1], 0.0, 1.0
     for i in range(1, d + 1):
-        own[i] = 0.0
+        coordinates[i] = 0.0
         for j in range(d):
-            own[i] += gradient[e, i, j] * (x[j] - points[cells[e, 0], j])
-        total += own[i]
-        if own[i] < least:
-            least = own[i]
-    own[0] = 1 - total
-    return least >= -tolerance and own[0] >= -tolerance
+            coordinates[i] += gradient[e, i, j] * (x[j] - points[cells[e, 0], j])
+        total += coordinates[i]
+        if coordinates[i] < least:
+            least = coordinates[i]
+    coordinates[0] = 1 - total
+    return least >= -tolerance and coordinates[0] >= -tolerance
 
 
 @kernel
@@ -194,7 +194,7 @@ def cells_within(points, cells, x, radius):  # type: ignore[no-untyped-def]
         box[0, j], box[1, j] = x[j] - radius, x[j] + radius
     chosen, count = np.empty(len(cells), np.int64), 0
     for e in range(len(cells)):
-        if _boxed(points, cells, e, box, low, high):
+        if _box_meets_bin(points, cells, e, box, low, high):
             for i in range(3):
                 if _from_segment(points, cells[e, i], cells[e, (i + 1) % 3], x) <= radius:
                     chosen[count] = e
@@ -208,8 +208,8 @@ def nearest_segment(points, segments, x):  # type: ignore[no-untyped-def]
     """Distance of a point in 2D to the nearest of segments `(k, 2)`, and the length of that one."""
     best, nearest = np.inf, 0
     for k in range(len(segments)):
-        away = _from_segment(points, segments[k, 0], segments[k, 1], x)
-        if away < best:
-            best, nearest = away, k
+        distance = _from_segment(points, segments[k, 0], segments[k, 1], x)
+        if distance < best:
+            best, nearest = distance, k
     a, b = segments[nearest, 0], segments[nearest, 1]
     return best, math.hypot(points[b, 0] - points[a, 0], points[b, 1] - points[a, 1])

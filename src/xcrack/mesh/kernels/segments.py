@@ -43,10 +43,10 @@ def graded_points(begin, end, tips, u, w):  # type: ignore[no-untyped-def]
         nearest, least = -1, np.inf
         for t in range(len(tips)):
             a, b = middle0 - tips[t, 0], middle1 - tips[t, 1]
-            away = math.sqrt(a * a + b * b)
-            if away < least:
-                nearest, least = t, away
-        near, foot = False, 0.0
+            distance = math.sqrt(a * a + b * b)
+            if distance < least:
+                nearest, least = t, distance
+        is_near, foot = False, 0.0
         if nearest >= 0:
             a, b = tips[nearest, 0] - begin[s, 0], tips[nearest, 1] - begin[s, 1]
             square = x * x + y * y
@@ -56,25 +56,25 @@ def graded_points(begin, end, tips, u, w):  # type: ignore[no-untyped-def]
                 abs(begin[s, 0]), abs(begin[s, 1]), abs(end[s, 0]), abs(end[s, 1]),
                 abs(tips[nearest, 0]), abs(tips[nearest, 1]),
             )  # fmt: skip
-            close = max(_FOOT, min(0.5, _ROUND_OFF * largest / max(length, 1e-300)))
-            if abs(foot) < close:
+            close_share = max(_FOOT, min(0.5, _ROUND_OFF * largest / max(length, 1e-300)))
+            if abs(foot) < close_share:
                 foot = 0.0
-            elif abs(foot - 1) < close:
+            elif abs(foot - 1) < close_share:
                 foot = 1.0
             closest = min(max(foot, 0.0), 1.0)
             a = begin[s, 0] + closest * x - tips[nearest, 0]
             b = begin[s, 1] + closest * y - tips[nearest, 1]
-            near = math.sqrt(a * a + b * b) < length
+            is_near = math.sqrt(a * a + b * b) < length
         for part in range(2):
             sign = 1.0 if part == 1 else -1.0
             # From the foot to the near end of this part and to the far one, in this direction.
             first, last = sign * (1 - part - foot), sign * (part - foot)
-            if (near and last <= 0) or (not near and part == 1):
+            if (is_near and last <= 0) or (not is_near and part == 1):
                 continue
             low, high = math.sqrt(max(first, 0.0)), math.sqrt(max(last, 0.0))
             for i in range(n):
                 p, share = u[i], w[i]
-                if near:
+                if is_near:
                     v = low + (high - low) * u[i]
                     p, share = foot + sign * (v * v), (high - low) * (2 * v * w[i])
                 number[to], weight[to] = s, length * share

@@ -8,7 +8,7 @@ _SAME = 1e-9  # relative difference below which values or lengths are equal
 
 
 @kernel
-def _put(bary, to, point, chosen):  # type: ignore[no-untyped-def]
+def _set_vertices(bary, to, point, chosen):  # type: ignore[no-untyped-def]
     """Set the vertices of a part to chosen points."""
     for v in range(bary.shape[1]):
         for b in range(bary.shape[2]):
@@ -131,7 +131,7 @@ def cut_simplices(phi, x, least):  # type: ignore[no-untyped-def]
             continue
         _sort(phi, x, e, order, count)
         if count == 1 or count == n - 1:
-            own, other = (1, 1) if count == 1 else (-1, 0)
+            side_sign, other = (1, 1) if count == 1 else (-1, 0)
             alone = order[(n - 1) * (1 - other)]
             total = 1.0
             chosen[0] = alone
@@ -139,21 +139,26 @@ def cut_simplices(phi, x, least):  # type: ignore[no-untyped-def]
                 t[m], u[m] = _mix(point, 4 + m, phi, e, alone, order[other + m])
                 total *= t[m]
                 chosen[1 + m] = 4 + m
-            _put(bary, to, point, chosen)
-            fraction[to], side[to], parent[to] = total, own, e
+            _set_vertices(bary, to, point, chosen)
+            fraction[to], side[to], parent[to] = total, side_sign, e
             to += total > least
             share = 1.0
             for i in range(n - 1):
                 chosen[1 + i] = order[other + i]
             for m in range(n - 1):
                 chosen[m] = 4 + m
-                _put(bary, to, point, chosen)
-                fraction[to], side[to], parent[to] = share * u[m], -own, e
+                _set_vertices(bary, to, point, chosen)
+                fraction[to], side[to], parent[to] = share * u[m], -side_sign, e
                 to += fraction[to] > least
                 share *= t[m]
             continue
-        for own in (1, -1):
-            a, b, c, d = order[1 - own], order[2 - own], order[1 + own], order[2 + own]
+        for side_sign in (1, -1):
+            a, b, c, d = (
+                order[1 - side_sign],
+                order[2 - side_sign],
+                order[1 + side_sign],
+                order[2 + side_sign],
+            )
             t_ac, _ = _mix(point, 4, phi, e, a, c)
             t_ad, _ = _mix(point, 5, phi, e, a, d)
             t_bc, t_cb = _mix(point, 6, phi, e, b, c)
@@ -167,21 +172,21 @@ def cut_simplices(phi, x, least):  # type: ignore[no-untyped-def]
                 elif piece == 2:
                     chosen[1] = b
                     fraction[to] = t_bc * t_bd
-                _put(bary, to, point, chosen)
-                side[to], parent[to] = own, e
+                _set_vertices(bary, to, point, chosen)
+                side[to], parent[to] = side_sign, e
                 to += fraction[to] > least
     return bary[:to], fraction[:to], side[:to], parent[:to]
 
 
 @kernel
-def _degenerate(bary, to):  # type: ignore[no-untyped-def]
+def _is_degenerate(bary, to):  # type: ignore[no-untyped-def]
     """Whether two vertices are the same: phi vanishes at a corner, and nothing lies between."""
     for i in range(bary.shape[1]):
         for j in range(i):
-            same = True
+            is_same = True
             for b in range(bary.shape[2]):
-                same = same and bary[to, i, b] == bary[to, j, b]
-            if same:
+                is_same = is_same and bary[to, i, b] == bary[to, j, b]
+            if is_same:
                 return True
     return False
 
@@ -212,16 +217,16 @@ def interface_simplices(phi, x):  # type: ignore[no-untyped-def]
             for m in range(n - 1):
                 _mix(point, 4 + m, phi, e, alone, order[other + m])
                 chosen[m] = 4 + m
-            _put(bary, to, point, chosen)
+            _set_vertices(bary, to, point, chosen)
             parent[to] = e
-            to += not _degenerate(bary, to)
+            to += not _is_degenerate(bary, to)
         elif 0 < count < n:
             _sort(phi, x, e, order, count)
             for m in range(4):
                 _mix(point, 4 + m, phi, e, order[m // 2], order[2 + (m == 1 or m == 2)])
             for half in range(2):
                 chosen[0], chosen[1], chosen[2] = 4, 5 + half, 6 + half
-                _put(bary, to, point, chosen)
+                _set_vertices(bary, to, point, chosen)
                 parent[to] = e
-                to += not _degenerate(bary, to)
+                to += not _is_degenerate(bary, to)
     return bary[:to], parent[:to]

@@ -165,16 +165,16 @@ def _to_triangle(p, corner, normal, foot, trial):  # type: ignore[no-untyped-def
 
 
 @kernel
-def _descend(p, child, low, high, stack, stack_square, top):  # type: ignore[no-untyped-def]
+def _push_children(p, child, low, high, stack, stack_square, top):  # type: ignore[no-untyped-def]
     """Put two children on the stack, the nearer one on top, and return the new top."""
     one = _to_box(p, low[child], high[child])
     two = _to_box(p, low[child + 1], high[child + 1])
-    near, other = child, child + 1
+    nearer_child, other = child, child + 1
     if two < one:
-        near, other = other, near
+        nearer_child, other = other, nearer_child
         one, two = two, one
     stack[top + 1], stack_square[top + 1] = other, two
-    stack[top + 2], stack_square[top + 2] = near, one
+    stack[top + 2], stack_square[top + 2] = nearer_child, one
     return top + 2
 
 
@@ -216,7 +216,7 @@ def closest_triangle(x, corners, normal, order, node, low, high, band, tiny):  #
     foot = np.empty((n, 3))
     stack = np.empty(128, np.int64)
     stack_square = np.empty(128)
-    here = np.empty(3)
+    foot_point = np.empty(3)
     trial = np.empty(3)
     for i in range(n):
         p = x[i]
@@ -228,17 +228,17 @@ def closest_triangle(x, corners, normal, order, node, low, high, band, tiny):  #
         stack_square[0] = _to_box(p, low[0], high[0])
         while top >= 0:
             at = stack[top]
-            far = stack_square[top]
+            far_square = stack_square[top]
             top -= 1
-            if far > reach:
+            if far_square > reach:
                 continue
             child = node[at, 0]
             if child >= 0:
-                top = _descend(p, child, low, high, stack, stack_square, top)
+                top = _push_children(p, child, low, high, stack, stack_square, top)
                 continue
             for place in range(node[at, 1], node[at, 2]):
                 k = order[place]
-                square, which = _to_triangle(p, corners[k], normal[k], here, trial)
+                square, which = _to_triangle(p, corners[k], normal[k], foot_point, trial)
                 gap = np.sqrt(square)
                 if gap < best - tiny or (gap <= best + tiny and k < nearest):
                     better = True
@@ -251,7 +251,7 @@ def closest_triangle(x, corners, normal, order, node, low, high, band, tiny):  #
                     distance[i] = gap
                     part[i] = which
                     for d in range(3):
-                        foot[i, d] = here[d]
+                        foot[i, d] = foot_point[d]
         triangle[i] = nearest
         if nearest < 0:
             distance[i] = band
@@ -299,13 +299,13 @@ def closest_segment(x, start, stop, order, node, low, high, band):  # type: igno
         stack_square[0] = _to_box(p, low[0], high[0])
         while top >= 0:
             at = stack[top]
-            far = stack_square[top]
+            far_square = stack_square[top]
             top -= 1
-            if far > best:
+            if far_square > best:
                 continue
             child = node[at, 0]
             if child >= 0:
-                top = _descend(p, child, low, high, stack, stack_square, top)
+                top = _push_children(p, child, low, high, stack, stack_square, top)
                 continue
             for place in range(node[at, 1], node[at, 2]):
                 k = order[place]

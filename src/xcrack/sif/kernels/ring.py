@@ -26,20 +26,20 @@ def cells_between(points, cells, size, centre, hollow, radius):  # type: ignore[
     chosen = np.empty(len(cells), np.int64)
     count = 0
     for e in range(len(cells)):
-        far, away = 0.0, 0.0
+        farthest, square_of_point = 0.0, 0.0
         for j in range(d):
             mean = 0.0
             for b in range(corners):
                 mean += points[cells[e, b], j]
-            away += (mean / corners - centre[j]) ** 2
-        if math.sqrt(away) > radius + size[e]:
+            square_of_point += (mean / corners - centre[j]) ** 2
+        if math.sqrt(square_of_point) > radius + size[e]:
             continue
         for b in range(corners):
-            apart = 0.0
+            square = 0.0
             for j in range(d):
-                apart += (points[cells[e, b], j] - centre[j]) ** 2
-            far = max(far, apart)
-        if math.sqrt(far) <= hollow:
+                square += (points[cells[e, b], j] - centre[j]) ** 2
+            farthest = max(farthest, square)
+        if math.sqrt(farthest) <= hollow:
             continue
         chosen[count] = e
         count += 1

@@ -3,7 +3,7 @@
 import math
 from typing import Any
 
-from xcrack.base.markup import Markup, element, escaped, joined, listed, page, table
+from xcrack.base.markup import Markup, element, escape_html, join_parts, list_markup, page, table
 from xcrack.verification.book.requirements import REQUIREMENTS
 from xcrack.verification.book.run import Book, Result, find_cases
 
@@ -37,7 +37,7 @@ def book_page(book: Book, versions: dict[str, str]) -> str:
         element("h2", "Requirements"),
         _matrix(book),
         element("h2", "Requirements without a case"),
-        listed(uncovered) if uncovered else element("p", "There are none."),
+        list_markup(uncovered) if uncovered else element("p", "There are none."),
         element("h2", "Cases"),
         *(_case(result) for result in book.results),
         element("h2", "Versions"),
@@ -54,21 +54,25 @@ def _matrix(book: Book) -> Markup:
         entries.setdefault((case.requirement, case.modelling), []).append(_link(result))
     rows: list[list[Any]] = []
     for key, text in REQUIREMENTS.items():
-        cells = [joined(*entries.get((key, column), [])) for column in columns]
+        cells = [join_parts(*entries.get((key, column), [])) for column in columns]
         rows.append([text, *cells])
     return table(("requirement", *columns), rows)
 
 
 def _link(result: Result) -> Markup:
     kind, mark = _MARK[result.status]
-    link = f'<a href="#{escaped(result.case.id)}" title="{escaped(result.case.id)}">{mark}</a>'
+    link = (
+        f'<a href="#{escape_html(result.case.id)}" title="{escape_html(result.case.id)}">{mark}</a>'
+    )
     return element("span", Markup(link), cls=kind)
 
 
 def _case(result: Result) -> Markup:
     case = result.case
     kind, mark = _MARK[result.status]
-    head = Markup(f'<h3 id="{escaped(case.id)}">{element("span", mark, cls=kind)} {case.id}</h3>')
+    head = Markup(
+        f'<h3 id="{escape_html(case.id)}">{element("span", mark, cls=kind)} {case.id}</h3>'
+    )
     what = (
         f"{REQUIREMENTS[case.requirement]} · {case.modelling} · {case.kind}: {case.reference} · "
         f"{result.seconds:.1f} s"
@@ -91,8 +95,8 @@ def _case(result: Result) -> Markup:
         parts.append(table(head_row, rows))
     if result.warnings:
         parts.append(element("p", f"{len(result.warnings)} warning(s), such as:", cls="soft"))
-        parts.append(listed(result.warnings[:2]))
-    return joined(*parts)
+        parts.append(list_markup(result.warnings[:2]))
+    return join_parts(*parts)
 
 
 def _rate(rate: float) -> str:

@@ -10,14 +10,14 @@ from importlib import import_module
 from types import ModuleType
 
 from xcrack.base.errors import ProblemError, collected_warnings
-from xcrack.base.optional import required
+from xcrack.base.optional import require_package
 from xcrack.verification.book import cases as package
 from xcrack.verification.book.case import Case, Value
 from xcrack.verification.book.requirements import REQUIREMENTS
 
 
 @dataclass(frozen=True)
-class Row:
+class CaseRow:
     """One number of a case over all meshes that were run.
 
     Attributes
@@ -51,7 +51,7 @@ class Result:
     Attributes
     ----------
     case : Case
-    rows : tuple of Row
+    rows : tuple of CaseRow
         One for each of its numbers.
     seconds : float
     error : str
@@ -62,7 +62,7 @@ class Result:
     """
 
     case: Case
-    rows: tuple[Row, ...]
+    rows: tuple[CaseRow, ...]
     seconds: float
     error: str = ""
     skipped: str = ""
@@ -79,7 +79,7 @@ class Result:
         return "skipped" if self.skipped else "passed" if self.passed else "failed"
 
     @property
-    def worst(self) -> Row | None:
+    def worst(self) -> CaseRow | None:
         """The number that uses most of its tolerance."""
         return max(self.rows, key=_use, default=None)
 
@@ -222,16 +222,16 @@ def line_of(result: Result) -> str:
     )
 
 
-def _rows(levels: Sequence[Sequence[Value]]) -> tuple[Row, ...]:
+def _rows(levels: Sequence[Sequence[Value]]) -> tuple[CaseRow, ...]:
     """Values of the same name, mesh by mesh."""
     names = dict.fromkeys(value.name for values in levels for value in values)
     return tuple(
-        Row(tuple(value for values in levels for value in values if value.name == name))
+        CaseRow(tuple(value for values in levels for value in values if value.name == name))
         for name in names
     )
 
 
-def _use(row: Row) -> float:
+def _use(row: CaseRow) -> float:
     """Share of the tolerance that the worst error uses; broken numbers use most."""
     if not row.passed:
         return math.inf
@@ -243,10 +243,10 @@ def _missing(name: str) -> str:
     if not name:
         return ""
     try:
-        required(name, "this case")
+        require_package(name, "this case")
     except Exception as error:
         return str(error).splitlines()[0]
     return ""
 
 
-__all__ = ["Book", "Result", "Row", "chosen", "find_cases", "line_of", "run_case", "run_cases"]
+__all__ = ["Book", "CaseRow", "Result", "chosen", "find_cases", "line_of", "run_case", "run_cases"]

@@ -6,7 +6,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from xcrack.base.checks import flag, shown
+from xcrack.base.checks import flag, value_text
 from xcrack.base.errors import ProblemError
 from xcrack.base.paths import path_of, write_texts
 from xcrack.runs.versions import versions
@@ -51,7 +51,7 @@ def verify(
     True
     """
     if not isinstance(only, str):
-        raise ProblemError(f"verify: only = {shown(only)}: give a part of the name of a case.")
+        raise ProblemError(f"verify: only = {value_text(only)}: give a part of the name of a case.")
     for name, value in (("quick", quick), ("progress", progress)):
         flag(value, f"verify: {name}")
     path = None if file is None else path_of(file, "verify: file", error=ProblemError, is_file=True)

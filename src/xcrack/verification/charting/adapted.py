@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 
 from xcrack.adaptivity.adapt import adapt
-from xcrack.adaptivity.adapted import Adapted
+from xcrack.adaptivity.adaptation import Adaptation
 from xcrack.base.arrays import Floats, lock
 from xcrack.base.checks import entries, number
 from xcrack.base.errors import ProblemError, XcrackError, collected_warnings
 from xcrack.model.problem import Problem
 from xcrack.verification.charting.meshes import smallest
-from xcrack.verification.charting.result import Row
+from xcrack.verification.charting.result import ChartRow
 from xcrack.verification.charting.values import Sampled, at_places, sampled
 
 _NAME = "adapt"
@@ -24,13 +24,13 @@ _STRONGEST = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
-class Run:
+class ToleranceRun:
     """One tolerance: the result and the median time of it, or why there is none."""
 
     tolerance: float
     seconds: float = np.nan
     sample: Sampled | None = None
-    result: Adapted | None = None
+    result: Adaptation | None = None
     warnings: tuple[str, ...] = ()
     failed: str = ""
 
@@ -68,7 +68,7 @@ def adapted_runs(
     quantity: Callable[[Any], Sampled] | None,
     repeat: int,
     say: Callable[[str], None],
-) -> list[Run]:
+) -> list[ToleranceRun]:
     """Each tolerance, so many times, from the mesh of the problem."""
     result = []
     for tolerance in tolerances:
@@ -87,7 +87,7 @@ def _run(
     tolerance: float,
     states: Sequence[Any] | None,
     quantity: Callable[[Any], Sampled] | None,
-) -> Run:
+) -> ToleranceRun:
     messages: list[str] = []
     start = perf_counter()
     try:
@@ -98,16 +98,16 @@ def _run(
             else:
                 sample = quantity(result.solution if states is None else list(result.solutions))
     except (XcrackError, np.linalg.LinAlgError, MemoryError) as error:
-        return Run(tolerance, failed=f"{type(error).__name__}: {error}")
+        return ToleranceRun(tolerance, failed=f"{type(error).__name__}: {error}")
     seconds = perf_counter() - start
     if not np.isfinite(sample.values).all():
-        return Run(tolerance, failed="the quantity is not finite", result=result)
+        return ToleranceRun(tolerance, failed="the quantity is not finite", result=result)
     if not result.met:
         messages.append(f"the tolerance is not met: {result.reason}")
-    return Run(tolerance, seconds, sample, result, tuple(dict.fromkeys(messages)))
+    return ToleranceRun(tolerance, seconds, sample, result, tuple(dict.fromkeys(messages)))
 
 
-def row_of(run: Run, places: Sampled, reference: Floats, scale: float) -> Row:
+def row_of(run: ToleranceRun, places: Sampled, reference: Floats, scale: float) -> ChartRow:
     """A run of `adapt` against the reference."""
     values, failed = np.zeros(0), run.failed
     if run.sample is not None:
@@ -116,7 +116,7 @@ def row_of(run: Run, places: Sampled, reference: Floats, scale: float) -> Row:
         except ProblemError as error:
             failed = str(error)
     last = None if run.result is None else run.result.problem
-    return Row(
+    return ChartRow(
         setting=_NAME,
         fields={"tolerance": run.tolerance},
         mesh=_MESH,
@@ -131,4 +131,4 @@ def row_of(run: Run, places: Sampled, reference: Floats, scale: float) -> Row:
     )
 
 
-__all__ = ["Run", "adapted_runs", "row_of", "wanted_of"]
+__all__ = ["ToleranceRun", "adapted_runs", "row_of", "wanted_of"]

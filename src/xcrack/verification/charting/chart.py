@@ -14,15 +14,15 @@ import numpy as np
 from xcrack.analysis.solution import Solution
 from xcrack.analysis.solve import solve
 from xcrack.base.arrays import Floats, lock
-from xcrack.base.checks import called, entries, flag, number, shown, whole
+from xcrack.base.checks import call_function, entries, flag, number, value_text, whole_number
 from xcrack.base.errors import ProblemError, XcrackError
 from xcrack.base.paths import path_of
 from xcrack.mesh.mesh import Mesh
 from xcrack.mesh.refinement import refine
 from xcrack.model.problem import Problem, check_problem
-from xcrack.verification.charting.adapted import Run, adapted_runs, row_of, wanted_of
+from xcrack.verification.charting.adapted import ToleranceRun, adapted_runs, row_of, wanted_of
 from xcrack.verification.charting.meshes import checked_meshes, made, mean_size, smallest
-from xcrack.verification.charting.result import Chart, Row, checked_error
+from xcrack.verification.charting.result import Chart, ChartRow, checked_error
 from xcrack.verification.charting.settings import (
     IN_PROBLEM,
     default_settings,
@@ -122,10 +122,12 @@ def chart(
     named = default_settings(problem) if settings is None else named_settings(settings)
     if wanted is not None:
         wanted = checked_error(wanted)
-    repeat = whole(repeat, "chart: repeat", least=1, most=1000)
+    repeat = whole_number(repeat, "chart: repeat", least=1, most=1000)
     seconds = number(seconds, "chart: seconds", above=0)
     if quantity is not None and not callable(quantity):
-        raise ProblemError(f"chart: quantity = {shown(quantity)}: give a function of the solution.")
+        raise ProblemError(
+            f"chart: quantity = {value_text(quantity)}: give a function of the solution."
+        )
     if states is not None:
         states = entries(states, "chart: states")
         for state in states:
@@ -220,7 +222,7 @@ def _energies(solutions: Sequence[Solution]) -> Sampled:
 
 
 def _of_user(quantity: Quantity, result: Any) -> Sampled:
-    return plain(called(quantity, "the quantity of chart", result))
+    return plain(call_function(quantity, "the quantity of chart", result))
 
 
 def _varied(problem: Problem, mesh: Mesh, changes: dict[str, Any]) -> Problem:
@@ -289,7 +291,7 @@ def _compared(
     runs: _Runs,
     every: list[Mesh],
     outcomes: dict[tuple[int, int], tuple[_Outcome, float]],
-    others: Sequence[Run],
+    others: Sequence[ToleranceRun],
     wanted: float | None,
     repeat: int,
 ) -> Chart:
@@ -320,7 +322,7 @@ def _compared(
         )
     names = list(runs.named)
     rows = {
-        (k, s): Row(
+        (k, s): ChartRow(
             setting=names[s],
             fields=outcome.fields,
             mesh=k,

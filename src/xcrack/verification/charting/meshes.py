@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable
 from math import factorial
 from typing import Any
 
-from xcrack.base.checks import called
+from xcrack.base.checks import call_function
 from xcrack.base.errors import ProblemError
 from xcrack.mesh.mesh import Mesh
 from xcrack.model.problem import Problem
@@ -12,7 +12,7 @@ from xcrack.model.problem import Problem
 
 def made(maker: Callable[[float], Mesh], size: float) -> Mesh:
     """A mesh of a size from a user's function."""
-    mesh = called(maker, "the meshes of chart", size)
+    mesh = call_function(maker, "the meshes of chart", size)
     if not isinstance(mesh, Mesh):
         raise ProblemError(
             f"meshes({size:.6g}) returned {type(mesh).__name__}: the function must return a Mesh "

@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from xcrack.verification.charting.result import Chart, Row
-from xcrack.view.figures import finished, new_figure, picture_path, wants_window
+from xcrack.verification.charting.result import Chart, ChartRow
+from xcrack.view.figures import finish_figure, new_figure, picture_path, wants_window
 
 _MARKERS = "osD^vP"
 _OWN = "X"  # a mesh that a run has made for itself
@@ -32,7 +32,7 @@ def draw(chart: Chart, file: str | Path | None, show: bool | None) -> Any:
     window = wants_window(show, target, "Chart.plot")
     figure = new_figure((8.2, 4.9), window, "Chart.plot")
     _axes(chart, figure.add_subplot())
-    return finished(figure, target, window, dpi=160)
+    return finish_figure(figure, target, window, dpi=160)
 
 
 def _axes(chart: Chart, axes: Any) -> None:
@@ -83,7 +83,7 @@ def _color(chart: Chart, name: str, number: int) -> str:
     return "black" if own else f"C{number % 10}"
 
 
-def _setting(chart: Chart, axes: Any, rows: list[Row], color: str) -> None:
+def _setting(chart: Chart, axes: Any, rows: list[ChartRow], color: str) -> None:
     """One curve a setting, one marker a mesh; hollow where the reference cannot tell."""
     if not rows:
         return

@@ -7,7 +7,7 @@ from textwrap import shorten
 from typing import Any
 
 from xcrack.base.arrays import Floats
-from xcrack.base.checks import number, shown
+from xcrack.base.checks import number, value_text
 from xcrack.base.errors import ProblemError
 from xcrack.model.problem import Problem
 
@@ -15,7 +15,7 @@ _DECADES = (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
 
 
 @dataclass(frozen=True, eq=False)
-class Row:
+class ChartRow:
     """One setting on one mesh.
 
     Attributes
@@ -70,13 +70,13 @@ class Best:
     Attributes
     ----------
     wanted : float
-    row : Row or None
+    row : ChartRow or None
     words : str
         The same as a sentence.
     """
 
     wanted: float
-    row: Row | None
+    row: ChartRow | None
     words: str
 
     def __bool__(self) -> bool:
@@ -105,9 +105,9 @@ class Chart:
 
     Attributes
     ----------
-    rows : tuple of Row
+    rows : tuple of ChartRow
         From the coarsest mesh to the finest, failed runs included.
-    reference : Row
+    reference : ChartRow
         The run that the others are compared with.
     reference_error : float
         Estimate of its own error, relative as that of the rows. Below it errors mean nothing.
@@ -119,49 +119,51 @@ class Chart:
         Times are medians of so many runs.
     """
 
-    rows: tuple[Row, ...]
-    reference: Row
+    rows: tuple[ChartRow, ...]
+    reference: ChartRow
     reference_error: float
     quantity: str
     wanted: float | None = None
     repeat: int = 1
 
     @property
-    def failed(self) -> tuple[Row, ...]:
+    def failed(self) -> tuple[ChartRow, ...]:
         """Runs without a result."""
         return tuple(row for row in self.rows if row.failed)
 
     @property
-    def good(self) -> tuple[Row, ...]:
+    def good(self) -> tuple[ChartRow, ...]:
         """Runs with a result."""
         return tuple(row for row in self.rows if not row.failed)
 
     @property
-    def pareto(self) -> tuple[Row, ...]:
+    def pareto(self) -> tuple[ChartRow, ...]:
         """Runs that no other run beats in time and error, the fastest first.
 
         Errors below that of the reference count as equal to it.
         """
-        front: list[Row] = []
+        front: list[ChartRow] = []
         for row in sorted(self.good, key=lambda row: (row.seconds, row.error)):
             if not front or self.shown(row) < self.shown(front[-1]):
                 front.append(row)
         return tuple(front)
 
-    def shown(self, row: Row) -> float:
+    def shown(self, row: ChartRow) -> float:
         """Error of a row as far as the reference can tell it.
 
         Parameters
         ----------
-        row : Row
+        row : ChartRow
 
         Raises
         ------
         ProblemError
             Not a row of a chart.
         """
-        if not isinstance(row, Row):
-            raise ProblemError(f"Chart.shown: row = {shown(row)}: give one of the rows of a chart.")
+        if not isinstance(row, ChartRow):
+            raise ProblemError(
+                f"Chart.shown: row = {value_text(row)}: give one of the rows of a chart."
+            )
         return max(row.error, self.reference_error)
 
     def best(self, wanted: float | None = None) -> Best:
@@ -286,17 +288,17 @@ def checked_error(wanted: Any) -> float:
     return number(wanted, "the wanted relative error", above=0)
 
 
-def _place(row: Row) -> tuple[bool, int, bool, float]:
+def _place(row: ChartRow) -> tuple[bool, int, bool, float]:
     """Order in the table: by mesh, those of `adapt` last."""
     return row.mesh < 0, row.mesh, bool(row.failed), row.seconds
 
 
-def _name(row: Row) -> str:
+def _name(row: ChartRow) -> str:
     """Setting, with the tolerance where that is what made the mesh."""
     return f"{row.setting} {row.fields['tolerance']:g}" if row.mesh < 0 else row.setting
 
 
-def _what(row: Row) -> str:
+def _what(row: ChartRow) -> str:
     """Setting and mesh in words."""
     return repr(_name(row)) if row.mesh < 0 else f"{row.setting!r} on mesh {row.mesh}"
 
@@ -305,7 +307,7 @@ def _time(seconds: float) -> str:
     return f"{seconds:.3g} s" if seconds >= 1 else f"{1e3 * seconds:.3g} ms"
 
 
-def _recipe(row: Row) -> str:
+def _recipe(row: ChartRow) -> str:
     if row.mesh < 0:
         return f"Take xc.adapt(problem, tolerance={row.fields['tolerance']:g}), whose best K it is."
     whole = [f"{k}={v!r}" for k, v in row.fields.items() if k in ("order", "contact")]
@@ -319,4 +321,4 @@ def _recipe(row: Row) -> str:
     return f"Change {', '.join(whole)}." if whole else "The settings stay as they are."
 
 
-__all__ = ["Best", "Chart", "Row", "checked_error"]
+__all__ = ["Best", "Chart", "ChartRow", "checked_error"]

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import Any
 
-from xcrack.base.checks import entries, shown
+from xcrack.base.checks import entries, value_text
 from xcrack.base.errors import ProblemError
 from xcrack.model.numerics import Numerics
 from xcrack.model.problem import Problem
@@ -75,11 +75,11 @@ def named_settings(given: Any) -> dict[str, dict[str, Any]]:
             if not isinstance(field, str) or field not in (*IN_PROBLEM, *_METHOD):
                 known = ", ".join((*IN_PROBLEM, *_METHOD))
                 raise ProblemError(
-                    f"settings: {shown(field)} is no choice of method; give one of {known}. "
+                    f"settings: {value_text(field)} is no choice of method; give one of {known}. "
                     "Meshes go into meshes=, loads into states=."
                 )
         if name in named:
-            raise ProblemError(f"settings: {shown(name)} stands there twice; leave one out.")
+            raise ProblemError(f"settings: {value_text(name)} stands there twice; leave one out.")
         named[name] = dict(changes)
     return named
 
@@ -87,7 +87,8 @@ def named_settings(given: Any) -> dict[str, dict[str, Any]]:
 def _name(changes: Any) -> str:
     if not isinstance(changes, Mapping):
         raise ProblemError(
-            f'settings: {shown(changes)} is no dict of fields: give some such as {{"order": 1}}.'
+            f"settings: {value_text(changes)} is no dict of fields: give some such as "
+            f'{{"order": 1}}.'
         )
     return ", ".join(f"{field} {value}" for field, value in changes.items()) or _AS_GIVEN
 

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from xcrack.base.arrays import Floats
-from xcrack.base.checks import shown
+from xcrack.base.checks import value_text
 from xcrack.base.errors import ProblemError
 
 Plane = Literal["strain", "stress"]
@@ -208,5 +208,5 @@ def _packed(w: Complexes, trace: Floats, syy: Floats, sxy: Floats) -> Values:
 
 def _is_strain(plane: str) -> bool:
     if plane not in ("strain", "stress"):
-        raise ProblemError(f'plane is "strain" or "stress", not {shown(plane)}')
+        raise ProblemError(f'plane is "strain" or "stress", not {value_text(plane)}')
     return plane == "strain"

@@ -24,8 +24,8 @@ from xcrack.base.arrays import Bools, Floats
 from xcrack.base.checks import number
 from xcrack.base.errors import ConvergenceError
 from xcrack.fem.facets import LipPoints
-from xcrack.fem.system import Model
-from xcrack.linalg.direct import Solve, System, superlu
+from xcrack.fem.system import System
+from xcrack.linalg.direct import DirectSystem, Solve, superlu
 from xcrack.linalg.engine import StateContact
 from xcrack.model.numerics import ContactMethod
 from xcrack.model.problem import Problem
@@ -52,13 +52,13 @@ class Springs(ContactMethod):
         name = type(self).__name__
         object.__setattr__(self, "factor", number(self.factor, f"{name}: factor", above=0))
 
-    def pressure_space(self, problem: Problem, model: Model, c: int) -> Multipliers:
+    def pressure_space(self, problem: Problem, model: System, c: int) -> Multipliers:
         """The points on the crack faces, one by one."""
         lips = model.lips[c]
         each = sp.csr_matrix(sp.identity(len(lips), format="csr"))
         return Multipliers(c, each, lips.weight, lips.x)
 
-    def compliance(self, problem: Problem, model: Model, chosen: Multipliers) -> Floats:
+    def compliance(self, problem: Problem, model: System, chosen: Multipliers) -> Floats:
         """Weak gap over traction of each spring `(g,)`.
 
         With the rows N of the springs N u + compliance λ = 0 where one presses or sticks: penalties
@@ -66,7 +66,7 @@ class Springs(ContactMethod):
         """
         return chosen.measure / self.rows(problem, model, chosen).eps
 
-    def rows(self, problem: Problem, model: Model, m: Multipliers) -> "Rows":
+    def rows(self, problem: Problem, model: System, m: Multipliers) -> "Rows":
         """Gaps at the points of one crack, and the stiffness there."""
         size = _size(model, model.lips[m.crack])
         stress = sp.csr_matrix((len(m.measure), model.space.n_dof))
@@ -76,8 +76,8 @@ class Springs(ContactMethod):
     def solve_states(
         self,
         problem: Problem,
-        model: Model,
-        engine: System,
+        model: System,
+        engine: DirectSystem,
         chosen: Sequence[Multipliers],
         f: Floats,
         known: Floats,
@@ -90,8 +90,8 @@ class Springs(ContactMethod):
         Parameters
         ----------
         problem : Problem
-        model : Model
-        engine : System
+        model : System
+        engine : DirectSystem
         chosen : sequence of Multipliers
             Of the cracks that need contact, from `pressure_space`.
         f, known : (n_dof, states) arrays
@@ -125,7 +125,7 @@ class Springs(ContactMethod):
             states.append(StateContact(pressure, rows.jump @ u, pressure > 0, sets, u))
         return states
 
-    def system(self, engine: System, rows: "Rows") -> "ClosedSystem":
+    def system(self, engine: DirectSystem, rows: "Rows") -> "ClosedSystem":
         """Stiffness and rows of the iteration."""
         c = rows.eps * rows.measure
         return ClosedSystem(engine, engine.matrix, rows.jump, c, engine.reduced)
@@ -185,12 +185,12 @@ class augmented_lagrangian(Springs):  # noqa: N801
     updates = True
     factor: float = 10.0
 
-    def pressure_space(self, problem: Problem, model: Model, c: int) -> Multipliers:
+    def pressure_space(self, problem: Problem, model: System, c: int) -> Multipliers:
         """Groups of points, as multipliers have them."""
         kind = problem.numerics.multipliers
         return multipliers(model.space, c, model.lips[c], kind, model.known.fixed)
 
-    def rows(self, problem: Problem, model: Model, m: Multipliers) -> "Rows":
+    def rows(self, problem: Problem, model: System, m: Multipliers) -> "Rows":
         """Weak gaps of the groups."""
         lips = model.lips[m.crack]
         size = np.asarray(m.values.T @ (lips.weight * _size(model, lips))) / m.measure
@@ -198,7 +198,7 @@ class augmented_lagrangian(Springs):  # noqa: N801
         eps = self.factor * problem.material.E / size
         return Rows(gap_rows(m, lips, model.jumps[m.crack]), stress, eps, m.measure)
 
-    def system(self, engine: System, rows: "Rows") -> "ClosedSystem":
+    def system(self, engine: DirectSystem, rows: "Rows") -> "ClosedSystem":
         """Springs on weak gaps."""
         c = rows.eps / rows.measure
         return ClosedSystem(engine, engine.matrix, rows.jump, c, engine.reduced)
@@ -247,7 +247,7 @@ class nitsche(Springs):  # noqa: N801
     label = "Nitsche's method"
     factor: float = 40.0
 
-    def rows(self, problem: Problem, model: Model, m: Multipliers) -> "Rows":
+    def rows(self, problem: Problem, model: System, m: Multipliers) -> "Rows":
         """Gaps and mean stresses at the points."""
         lips, c = model.lips[m.crack], m.crack
         mean = averaging(model.space, lips)
@@ -256,7 +256,7 @@ class nitsche(Springs):  # noqa: N801
         eps = self.factor * problem.material.E / size
         return Rows(model.jumps[c], stress, eps, m.measure)
 
-    def system(self, engine: System, rows: "Rows") -> "ClosedSystem":
+    def system(self, engine: DirectSystem, rows: "Rows") -> "ClosedSystem":
         """The stiffness less that of the stresses, on rows of stress and gap."""
         c = rows.measure / rows.eps
         R = sp.csr_matrix(rows.stress + sp.diags(rows.eps) @ rows.jump)
@@ -277,7 +277,7 @@ class nitsche(Springs):  # noqa: N801
 
 
 def face_tractions(
-    problem: Problem, model: Model, chosen: Sequence[Multipliers], acting: LoadState
+    problem: Problem, model: System, chosen: Sequence[Multipliers], acting: LoadState
 ) -> Floats:
     """Normal stress that loads add to that of the strain, at the points of all cracks `(q,)`."""
     parts = []
@@ -308,7 +308,7 @@ class Rows:
     measure: Floats
 
 
-def _size(model: Model, lips: LipPoints) -> Floats:
+def _size(model: System, lips: LipPoints) -> Floats:
     return np.asarray(model.space.mesh.cell_size[lips.cell].mean(axis=1))
 
 
@@ -316,7 +316,7 @@ def _size(model: Model, lips: LipPoints) -> Floats:
 class ClosedSystem:
     """Stiffness, rows and their weights c, with the last factor."""
 
-    engine: System
+    engine: DirectSystem
     stiffness: sp.csr_matrix
     rows: sp.csr_matrix
     c: Floats

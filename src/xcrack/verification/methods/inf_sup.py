@@ -5,14 +5,14 @@ import scipy.linalg
 import scipy.sparse as sp
 import scipy.sparse.linalg as sla
 
-from xcrack.analysis.friction import rubs, tangential_rows
+from xcrack.analysis.friction import has_friction, tangential_rows
 from xcrack.analysis.multipliers import Multipliers, gap_rows, multipliers
 from xcrack.base.arrays import Floats
 from xcrack.base.checks import one_of
 from xcrack.fem.facets import jump_values
 from xcrack.fem.function_space import FunctionSpace
 from xcrack.fem.quadrature import cell_points
-from xcrack.fem.system import Model, build
+from xcrack.fem.system import System, build
 from xcrack.linalg.direct import scaled_basis
 from xcrack.mesh.simplex import leg_sizes
 from xcrack.model.problem import Problem, check_problem, crack_number
@@ -60,7 +60,7 @@ def inf_sup(problem: Problem, crack: int = 0, *, norm: str = "h1") -> float:
         # A small mass makes the rigid motions regular without a support.
         A = A + 1e-8 * sp.diags(A.diagonal())
         B = gap_rows(chosen, lips, model.jumps[crack])
-        if rubs(problem, crack):
+        if has_friction(problem, crack):
             B = sp.csr_matrix(sp.vstack([B, *tangential_rows(space, chosen, lips)]))
         basis = scaled_basis(space, sp.csr_matrix(A), fixed, problem.numerics, problem.material)
     L, d = space.mesh.extent, space.dim
@@ -118,7 +118,7 @@ def _h1(space: FunctionSpace) -> sp.csr_matrix:
     return sp.csr_matrix(triplets, shape=(space.n_functions, space.n_functions))
 
 
-def _scalar_rows(space: FunctionSpace, model: Model, c: int, chosen: Multipliers) -> sp.csr_matrix:
+def _scalar_rows(space: FunctionSpace, model: System, c: int, chosen: Multipliers) -> sp.csr_matrix:
     lips = model.lips[c]
     rows, columns, values = [], [], []
     for functions, number, N in jump_values(space, c, lips):

@@ -8,7 +8,7 @@ _MOST = 5  # bisections of a cell in one round
 _STEPS = 60  # in which a threshold is halved in on
 
 
-def smaller(shares: Floats, bar: Floats, wanted: float, order: int, dim: int) -> Floats:
+def size_ratios(shares: Floats, bar: Floats, target: float, order: int, dim: int) -> Floats:
     """Size of each cell in the next mesh over its size in this one.
 
     A cell's share falls with its size to the power of 2 p + d, while 1 / size^d such cells take its
@@ -21,7 +21,7 @@ def smaller(shares: Floats, bar: Floats, wanted: float, order: int, dim: int) ->
         Contributions of the cells to the errors of k values.
     bar : (k,) array
         Half-widths of these errors; nan where there is none, and the shares alone count.
-    wanted : float
+    target : float
         Half-width that all are to have.
     order, dim : int
 
@@ -35,9 +35,9 @@ def smaller(shares: Floats, bar: Floats, wanted: float, order: int, dim: int) ->
     for each, half in zip(shares, bar, strict=True):
         total = each.sum()
         error = half if np.isfinite(half) else total
-        if not total > 0 or error <= wanted:
+        if not total > 0 or error <= target:
             continue
-        aim = wanted * total / error
+        aim = target * total / error
         low, high = 0.0, float(each.max())
         for _ in range(_STEPS):
             threshold = (low + high) / 2
@@ -49,4 +49,4 @@ def smaller(shares: Floats, bar: Floats, wanted: float, order: int, dim: int) ->
     return np.maximum(ratio, 2.0 ** (-_MOST / dim))
 
 
-__all__ = ["smaller"]
+__all__ = ["size_ratios"]

@@ -10,18 +10,24 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial import cKDTree
 
-from xcrack.adaptivity.measured import Measured, counted, ending_fronts, live_states, values
+from xcrack.adaptivity.indicators import (
+    Indicators,
+    counted_places,
+    ending_fronts,
+    live_states,
+    values,
+)
 from xcrack.adaptivity.outlines_3d import CELLS
-from xcrack.adaptivity.resolved import resolved
+from xcrack.adaptivity.resolved import resolved_problem
 from xcrack.base.arrays import Floats
 from xcrack.crack.crack import Crack
 from xcrack.crack.measures import surface_size
 from xcrack.mesh.locate import cell_sizes
 from xcrack.mesh.mesh import Mesh
-from xcrack.mesh.polygon import between, graded, radii, with_room
+from xcrack.mesh.polygon import graded_sizes, points_between, radii, with_room
 from xcrack.mesh.refinement import refine
 from xcrack.model.problem import Problem
-from xcrack.sif.sif import SIF, Bars
+from xcrack.sif.sif import SIF, KErrors
 
 _LEAST, _MOST = 1.5, 2.0  # times finer in a round: what less changes is no bar
 _POWER = 2.5  # of the cells' size with which bars fall at order 2, on graded meshes (measured)
@@ -33,9 +39,9 @@ _SMALLER = 1.3  # times finer that cells are at least where 1.5 was asked for
 
 def first_mesh(problem: Problem, coarser: float = 1.0) -> Mesh:
     """The mesh of a scene in 3D, finer along fronts where it is coarser than the crack is small."""
-    problem = resolved(problem)
+    problem = resolved_problem(problem)
     places, sizes = _first_sizes(problem)
-    return refine(problem.mesh, size=graded(places, [coarser * size for size in sizes]))
+    return refine(problem.mesh, size=graded_sizes(places, [coarser * size for size in sizes]))
 
 
 def first_size(crack: Crack, mesh: Mesh) -> float:
@@ -43,32 +49,32 @@ def first_size(crack: Crack, mesh: Mesh) -> float:
     return float(surface_size(crack, mesh) / CELLS)
 
 
-def next_mesh(now: Measured, tolerance: float, aim: float, most: int) -> Mesh | None:
+def next_mesh(current: Indicators, tolerance: float, aim: float, most: int) -> Mesh | None:
     """A finer mesh along fronts whose bars are too long, or None where it would be too large."""
-    problem = now.problem
+    problem = current.problem
     places, first = _first_sizes(problem)
     sizes = []
     for c, (x, size) in enumerate(zip(places, first, strict=True)):
         if len(x):
             present = float(np.median(cell_sizes(problem.mesh, x) / size))
-            size = size * min(present, 1.0) / _finer(now, c, tolerance, aim)
+            size = size * min(present, 1.0) / _refinement_factor(current, c, tolerance, aim)
         sizes.append(size)
-    mesh = refine(problem.mesh, size=graded(places, sizes))
-    each = now.solutions[0].space.n_dof / len(problem.mesh.cells)
+    mesh = refine(problem.mesh, size=graded_sizes(places, sizes))
+    each = current.solutions[0].space.n_dof / len(problem.mesh.cells)
     return mesh if each * len(mesh.cells) <= most else None
 
 
-def _finer(now: Measured, c: int, tolerance: float, aim: float) -> float:
+def _refinement_factor(current: Indicators, c: int, tolerance: float, aim: float) -> float:
     """How many times smaller the cells along the fronts of a crack are to be."""
-    error = error_of(now, c)
-    if error <= tolerance and c not in now.pressed:
+    error = error_of(current, c)
+    if error <= tolerance and c not in current.pressed:
         return 1.0
     if error <= tolerance or not np.isfinite(error):
         return _LEAST
     return float(np.clip((error / (aim * tolerance)) ** (1 / _POWER), _LEAST, _MOST))
 
 
-def error_of(given: Measured, c: int) -> float:
+def error_of(given: Indicators, c: int) -> float:
     """Largest half-width of K along the fronts of a crack, over the largest K of all.
 
     Nan where there is none.
@@ -76,13 +82,17 @@ def error_of(given: Measured, c: int) -> float:
     bars = [np.zeros(1)]
     for k in live_states(given):
         sif = given.sifs[k][c]
-        own = sif.bar[counted(sif, given.beside[c])]
-        bars.append(own.max(axis=1) if len(own) or not len(sif.K) else np.full(1, np.nan))
+        bars_of_crack = sif.bar[counted_places(sif, given.beside[c])]
+        bars.append(
+            bars_of_crack.max(axis=1)
+            if len(bars_of_crack) or not len(sif.K)
+            else np.full(1, np.nan)
+        )
     scale = np.abs(given.best).max(initial=0.0)
     return float(np.concatenate(bars).max() / scale) if scale > 0 else float("nan")
 
 
-def trusted(new: Measured, old: Measured | None) -> Measured:
+def trusted_errors(new: Indicators, old: Indicators | None) -> Indicators:
     """Bars that are no longer than what smaller cells at the front have changed.
 
     At order 2 the error falls by more than half where cells become smaller by 1.5, so that the
@@ -93,55 +103,55 @@ def trusted(new: Measured, old: Measured | None) -> Measured:
     """
     live = live_states(new)
     if old is None:
-        sifs = tuple(tuple(map(_longer, state)) for state in new.sifs)
+        sifs = tuple(tuple(map(_lengthen_errors, state)) for state in new.sifs)
         return replace(new, sifs=sifs, bar=values(sifs, live, new.beside)[1])
     finer = [
         _sizes_at(old, c) >= _SMALLER * _sizes_at(new, c) for c in range(len(new.problem.cracks))
     ]
     sifs = tuple(
         tuple(
-            _shorter(_longer(sif), before, finer[c]) if k in live else sif
-            for c, (sif, before) in enumerate(zip(state, states_before, strict=True))
+            _shorten_errors(_lengthen_errors(sif), previous, finer[c]) if k in live else sif
+            for c, (sif, previous) in enumerate(zip(state, states_before, strict=True))
         )
         for k, (state, states_before) in enumerate(zip(new.sifs, old.sifs, strict=True))
     )
     return replace(new, sifs=sifs, bar=values(sifs, live, new.beside)[1])
 
 
-def _longer(sif: SIF) -> SIF:
+def _lengthen_errors(sif: SIF) -> SIF:
     """Bars as long as corner cracks on coarse cells ask for."""
     ends = np.isin(sif.front, ending_fronts(sif))
     if not ends.any():
         return sif
     bar = np.where(ends[:, None], _OPEN, 1.0) * sif.bar
-    return replace(sif, errors=Bars(sif.eta, bar, sif.reasons))
+    return replace(sif, errors=KErrors(sif.eta, bar, sif.reasons))
 
 
-def _sizes_at(given: Measured, c: int) -> float:
+def _sizes_at(given: Indicators, c: int) -> float:
     """Median of the cells along the fronts of a crack, length; 0 where there is none."""
     x = _front(given.problem.placed[c])
     return float(np.median(cell_sizes(given.problem.mesh, x))) if len(x) else 0.0
 
 
-def _shorter(sif: SIF, before: SIF, finer: bool) -> SIF:
+def _shorten_errors(sif: SIF, previous: SIF, finer: bool) -> SIF:
     """Bars by the change, as far as two meshes have K at the same places."""
     bar = np.array(sif.bar)
-    inside, there = ~sif.at_surface, ~before.at_surface
-    if not there.any():
+    inside, is_inside_before = ~sif.at_surface, ~previous.at_surface
+    if not is_inside_before.any():
         return sif
-    nearest = np.nonzero(there)[0][cKDTree(before.x[there]).query(sif.x)[1]]
-    every = np.abs(sif.best - before.best[nearest])
+    nearest = np.nonzero(is_inside_before)[0][cKDTree(previous.x[is_inside_before]).query(sif.x)[1]]
+    every = np.abs(sif.best - previous.best[nearest])
     for front in np.unique(sif.front):
-        own = (sif.front == front) & inside
-        if not own.any():
+        is_on_front = (sif.front == front) & inside
+        if not is_on_front.any():
             continue
-        change = every[own]
+        change = every[is_on_front]
         change = np.maximum(change, np.sqrt((change**2).mean(axis=0)))
         if not finer:
-            change = np.maximum(change, before.bar[nearest][own])
-        bar[own] = np.fmin(bar[own], change)
+            change = np.maximum(change, previous.bar[nearest][is_on_front])
+        bar[is_on_front] = np.fmin(bar[is_on_front], change)
     bar[sif.closed, 0] = sif.bar[sif.closed, 0]
-    return replace(sif, errors=Bars(sif.eta, bar, sif.reasons))
+    return replace(sif, errors=KErrors(sif.eta, bar, sif.reasons))
 
 
 def _first_sizes(problem: Problem) -> tuple[list[Floats], list[Floats]]:
@@ -151,14 +161,14 @@ def _first_sizes(problem: Problem) -> tuple[list[Floats], list[Floats]]:
         size = first_size(crack, problem.mesh)
         lines = [crack.points[front] for front in crack.fronts or ()]
         bend = np.maximum(_BEND * radii(lines, CELLS * size), _SHARPEST * size)
-        places.append(between(lines))
+        places.append(points_between(lines))
         sizes.append(np.minimum(size, bend))
     return places, with_room(places, sizes)
 
 
 def _front(crack: Crack) -> Floats:
     """Points of the fronts of a placed crack, closer than its edges."""
-    return between([crack.points[front] for front in crack.fronts or ()])
+    return points_between([crack.points[front] for front in crack.fronts or ()])
 
 
-__all__ = ["first_mesh", "first_size", "next_mesh", "trusted"]
+__all__ = ["first_mesh", "first_size", "next_mesh", "trusted_errors"]

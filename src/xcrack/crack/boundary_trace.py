@@ -7,7 +7,7 @@ import numpy as np
 from xcrack.base.arrays import Bools, Floats, Ints
 from xcrack.base.errors import CoarseMeshError
 from xcrack.mesh.locate import ON, Body
-from xcrack.mesh.triangulation import face_normals, rim, ruled, unit
+from xcrack.mesh.triangulation import face_normals, rim, ruled_strip, unit
 
 SIDE = 0.75  # sides of a front are at most this share of a cell long
 OUTSIDE = 2.0  # cells by which an open front leaves the body
@@ -20,7 +20,7 @@ _MEET = 0.3  # share of a mouth that its ends may come closer to each other outs
 
 
 @dataclass(frozen=True, eq=False)
-class Outline:
+class TraceOutline:
     """One loop of a surface: its points, and of its sides which may be and which are front."""
 
     loop: Ints
@@ -30,14 +30,14 @@ class Outline:
 
 
 def open_fronts(
-    points: Floats, faces: Ints, outline: Outline, body: Body
+    points: Floats, faces: Ints, outline: TraceOutline, body: Body
 ) -> tuple[Floats, Ints, list[Ints]]:
     """Open fronts of one outline, led out of the body, and its mouths moved outside."""
     loop, m = outline.loop, len(outline.loop)
     x = points[loop]
     depth, _ = body.depth(x)
     size = body.cell_size(x)
-    outward, normal = _outward(points, faces, loop)
+    outward, normal = _outward_directions(points, faces, loop)
     runs = runs_of(outline.inside)
     movable = outline.candidate | np.roll(outline.candidate, 1)
     before: dict[int, Ints] = {}
@@ -62,17 +62,17 @@ def open_fronts(
             offset[[0, -1]] = ends
             inner[[0, -1]] = False
         way = _side_by_side(x[vertex], outward[vertex], offset) if runs else outward[vertex]
-        offset[inner] = _pushed(
+        offset[inner] = _push_vectors(
             x[vertex[inner]], way[inner], depth[vertex[inner]], size[vertex[inner]],
             body, outline.first_time,
         )  # fmt: skip
-        offset = _untangled(x, vertex, offset, normal, not runs)
+        offset = _untangled_rays(x, vertex, offset, normal, not runs)
         long = np.linalg.norm(offset, axis=1)
         if not long.any():
             continue
         layers = int(np.ceil((long / (SIDE * size[vertex])).max()))
         number = len(points) + np.arange(layers)
-        new, strip = ruled(len(points), loop[vertex], x[vertex], offset, layers, not runs)
+        new, strip = ruled_strip(len(points), loop[vertex], x[vertex], offset, layers, not runs)
         if runs and long[0] > 0:
             after[start] = np.append(after[start], number)
         if runs and long[-1] > 0:
@@ -93,7 +93,7 @@ def open_fronts(
     return points, faces, fronts
 
 
-def _outward(points: Floats, faces: Ints, loop: Ints) -> tuple[Floats, Floats]:
+def _outward_directions(points: Floats, faces: Ints, loop: Ints) -> tuple[Floats, Floats]:
     """Directions out of the surface at the points of a loop, and the normals at its sides."""
     edges, owner = rim(faces)
     n = len(points)
@@ -110,29 +110,31 @@ def _side_by_side(x: Floats, outward: Floats, offset: Floats) -> Floats:
     """Ways out along a mouth that turn towards the rays at its ends, so that none are crossed."""
     length = np.linalg.norm(np.diff(x, axis=0), axis=1)
     s = np.concatenate([[0.0], np.cumsum(length)])
-    rest, mixed = np.ones(len(x)), np.zeros_like(x)
+    slack, mixed = np.ones(len(x)), np.zeros_like(x)
     for end, away in ((0, s), (-1, s[-1] - s)):
         long = float(np.linalg.norm(offset[end]))
         if long > 0:
             weight = np.maximum(1 - away / (2 * long), 0)
             mixed += weight[:, None] * offset[end] / long
-            rest -= weight
-    return unit(mixed + np.maximum(rest, 0)[:, None] * outward)
+            slack -= weight
+    return unit(mixed + np.maximum(slack, 0)[:, None] * outward)
 
 
-def _untangled(x: Floats, vertex: Ints, offset: Floats, normal: Floats, closed: bool) -> Floats:
+def _untangled_rays(
+    x: Floats, vertex: Ints, offset: Floats, normal: Floats, closed: bool
+) -> Floats:
     """Rays of a mouth made even where neighbours cross, those at its ends as they are."""
     offset = np.array(offset)
     for _ in range(40):
         a, o = x[vertex], offset
         if closed:
             a, o = np.append(a, a[:1], axis=0), np.append(o, o[:1], axis=0)
-        along, far = np.diff(a, axis=0), np.diff(a + o, axis=0)
+        along, outer_sides = np.diff(a, axis=0), np.diff(a + o, axis=0)
         n = normal[vertex[: len(along)]]
         turned = np.zeros(len(along), dtype=bool)
         for one, other in ((along, along + o[1:]), (along + o[1:], o[:-1])):
             area = np.einsum("ij,ij->i", np.cross(one, other), n)
-            turned |= area < -1e-12 * np.einsum("ij,ij->i", far, far)
+            turned |= area < -1e-12 * np.einsum("ij,ij->i", outer_sides, outer_sides)
         if not turned.any():
             break
         moved = turned | np.roll(turned, 1) if closed else np.zeros(len(vertex), dtype=bool)
@@ -206,7 +208,7 @@ def _straight_out(x: Floats, direction: Floats, size: float, body: Body) -> Floa
     return np.asarray(direction * (max(length, SIDE * size) if length > 0 else 0.0))
 
 
-def _way_out(x: Floats, direction: Floats, size: Floats, wanted: float, body: Body) -> Floats:
+def _way_out(x: Floats, direction: Floats, size: Floats, target_depth: float, body: Body) -> Floats:
     """Lengths by which points move until they are some cells outside; zero: no way out.
 
     Where the body begins again before, this is half way across the gap.
@@ -216,7 +218,7 @@ def _way_out(x: Floats, direction: Floats, size: Floats, wanted: float, body: Bo
     x, direction : (k, 3) arrays
     size : (k,) array, length
         Of the cells.
-    wanted : float
+    target_depth : float
         Cells that the points shall lie outside.
     body : Body
 
@@ -235,28 +237,28 @@ def _way_out(x: Floats, direction: Floats, size: Floats, wanted: float, body: Bo
             continue
         again = np.nonzero(~outside[first:])[0]
         stop = first + int(again[0]) if len(again) else len(steps)
-        far = np.nonzero(row[first:stop] >= wanted)[0]
-        if len(far) and first + far[0] > 0:
-            j = first + int(far[0])
-            result[k] = steps[j] - _STEP * (row[j] - wanted) / (row[j] - row[j - 1])
+        deep_enough = np.nonzero(row[first:stop] >= target_depth)[0]
+        if len(deep_enough) and first + deep_enough[0] > 0:
+            j = first + int(deep_enough[0])
+            result[k] = steps[j] - _STEP * (row[j] - target_depth) / (row[j] - row[j - 1])
         elif len(again):
             result[k] = (steps[first] + steps[stop]) / 2
         else:
-            result[k] = steps[first] + wanted
+            result[k] = steps[first] + target_depth
     return result * size
 
 
-def _pushed(
+def _push_vectors(
     x: Floats, outward: Floats, depth: Floats, size: Floats, body: Body, first_time: bool
 ) -> Floats:
     """Vectors that lead points of a mouth one cell out of the body, zero where they are there."""
     offset = np.zeros_like(x)
-    near = depth < 0.999 * size
-    if near.any():
+    is_inside = depth < 0.999 * size
+    if is_inside.any():
         if first_time:
-            _check_nick(x[near], outward[near], depth[near], size[near], body)
-        length = _way_out(x[near], outward[near], size[near], 1.0, body)
-        offset[near] = length[:, None] * outward[near]
+            _check_nick(x[is_inside], outward[is_inside], depth[is_inside], size[is_inside], body)
+        length = _way_out(x[is_inside], outward[is_inside], size[is_inside], 1.0, body)
+        offset[is_inside] = length[:, None] * outward[is_inside]
     return offset
 
 
@@ -266,12 +268,12 @@ def _check_nick(x: Floats, way: Floats, depth: Floats, size: Floats, body: Body)
     if not len(inside):
         return
     ahead, _ = body.depth(x[inside] + 0.25 * size[inside, None] * way[inside])
-    bad = inside[ahead < depth[inside] - 0.01 * size[inside]]
-    if len(bad):
+    nicks = inside[ahead < depth[inside] - 0.01 * size[inside]]
+    if len(nicks):
         raise CoarseMeshError(
-            f"the crack ends at {np.round(x[bad[0]], 6).tolist()}, {-depth[bad[0]]:.4g} inside the "
-            f"boundary that it comes from, which is less than half a cell ({size[bad[0]]:.4g}): "
-            "refine the mesh there, or leave this part of the crack out."
+            f"the crack ends at {np.round(x[nicks[0]], 6).tolist()}, {-depth[nicks[0]]:.4g} inside "
+            f"the boundary that it comes from, which is less than half a cell "
+            f"({size[nicks[0]]:.4g}): refine the mesh there, or leave this part of the crack out."
         )
 
 

@@ -13,12 +13,12 @@ from xcrack.base.errors import ProblemError
 from xcrack.crack.measures import surface_size
 from xcrack.model.problem import Problem
 from xcrack.sif.error import bars_and_shares
-from xcrack.sif.sif import SIF, Bars
+from xcrack.sif.sif import SIF, KErrors
 from xcrack.sif.stress_intensity import stress_intensities
 
 
 @dataclass(frozen=True, eq=False)
-class Measured:
+class Indicators:
     """A mesh with its solutions and the errors of K.
 
     Attributes
@@ -56,14 +56,18 @@ class Measured:
         """Where bars are longest, in words; empty where there is no bar."""
         for k in live_states(self):
             for c, sif in enumerate(self.sifs[k]):
-                if len(sif.K) and not counted(sif, self.beside[c]).any():
+                if len(sif.K) and not counted_places(sif, self.beside[c]).any():
                     return f"no place of crack {c} is away from free surfaces: its fronts are short"
         ends = [
-            (float(sif.bar[own].max()), c, sif.x[own][int(sif.bar[own].max(axis=1).argmax())])
+            (
+                float(sif.bar[is_counted].max()),
+                c,
+                sif.x[is_counted][int(sif.bar[is_counted].max(axis=1).argmax())],
+            )
             for k in live_states(self)
             for c, sif in enumerate(self.sifs[k])
-            for own in [counted(sif, self.beside[c])]
-            if np.isfinite(sif.bar[own]).all() and own.any()
+            for is_counted in [counted_places(sif, self.beside[c])]
+            if np.isfinite(sif.bar[is_counted]).all() and is_counted.any()
         ]
         if not ends:
             return ""
@@ -93,7 +97,7 @@ class Measured:
         return tuple(dict.fromkeys(every))
 
 
-def measured(problem: Problem, states: Sequence[Any]) -> Measured:
+def indicators_of(problem: Problem, states: Sequence[Any]) -> Indicators:
     """Solutions of a scene at order 2, K and its errors; of fronts no shares."""
     flat = problem.mesh.dim < 3
     solutions = solve_states(problem, states, error=flat)
@@ -108,55 +112,57 @@ def measured(problem: Problem, states: Sequence[Any]) -> Measured:
     for c in range(len(problem.cracks)):
         sifs = stress_intensities(solutions, c, error=not flat)
         zero = np.zeros_like(sifs[0].K)
-        rows = [replace(sif, errors=Bars(zero, zero, ("",) * len(zero))) for sif in sifs]
+        rows = [replace(sif, errors=KErrors(zero, zero, ("",) * len(zero))) for sif in sifs]
         if live and not flat:
             rows = sifs
         if live and flat:
-            bars, own = bars_and_shares([solutions[k] for k in live], [sifs[k] for k in live], c)
+            bars, shares_of_crack = bars_and_shares(
+                [solutions[k] for k in live], [sifs[k] for k in live], c
+            )
             for k, errors in zip(live, bars, strict=True):
                 rows[k] = replace(sifs[k], errors=errors)
-            shares.append(own.reshape(-1, own.shape[-1]))
+            shares.append(shares_of_crack.reshape(-1, shares_of_crack.shape[-1]))
         by_crack.append(rows)
-    beside = _BESIDE[problem.mesh.dim](problem)
+    surface_reach = _BESIDE[problem.mesh.dim](problem)
     sifs_of = tuple(tuple(rows[k] for rows in by_crack) for k in range(len(solutions)))
-    best, bar = values(sifs_of, live, beside)
-    return Measured(
+    best, bar = values(sifs_of, live, surface_reach)
+    return Indicators(
         problem,
         tuple(replace(s, factored=None) for s in solutions),
         sifs_of,
         best,
         bar,
         np.concatenate(shares),
-        beside,
+        surface_reach,
     )
 
 
 def values(
-    sifs: Sequence[Sequence[SIF]], live: Sequence[int], beside: Sequence[float]
+    sifs: Sequence[Sequence[SIF]], live: Sequence[int], surface_reach: Sequence[float]
 ) -> tuple[Floats, Floats]:
     """Best K and its half-widths at all places that count, crack by crack in all live states.
 
     Of a crack none of whose places count, K is one zero and its half-width nan.
     """
     best, bar = [], []
-    for c in range(len(beside)):
+    for c in range(len(surface_reach)):
         for sif in (sifs[k][c] for k in live):
-            own = counted(sif, beside[c])
-            nothing = np.zeros((int(len(sif.K) > 0 and not own.any()), sif.K.shape[1]))
-            best += [sif.best[own], nothing]
-            bar += [sif.bar[own], nothing + np.nan]
+            is_counted = counted_places(sif, surface_reach[c])
+            nothing = np.zeros((int(len(sif.K) > 0 and not is_counted.any()), sif.K.shape[1]))
+            best += [sif.best[is_counted], nothing]
+            bar += [sif.bar[is_counted], nothing + np.nan]
     if not best:
         return np.zeros((0, 2)), np.zeros((0, 2))
     return np.concatenate(best), np.concatenate(bar)
 
 
-def counted(sif: SIF, beside: float) -> Bools:
+def counted_places(sif: SIF, surface_reach: float) -> Bools:
     """Places of a crack whose K the tolerance is asked of: those away from free surfaces."""
     result = ~sif.at_surface
     for front in ending_fronts(sif):
-        own = sif.front == front
-        s = sif.s[own]
-        result[own] &= np.minimum(s - s.min(), s.max() - s) >= beside
+        is_on_front = sif.front == front
+        s = sif.s[is_on_front]
+        result[is_on_front] &= np.minimum(s - s.min(), s.max() - s) >= surface_reach
     return np.asarray(result)
 
 
@@ -176,9 +182,16 @@ _BESIDE: dict[int, Callable[[Problem], tuple[float, ...]]] = {
 }
 
 
-def live_states(given: Measured) -> list[int]:
+def live_states(given: Indicators) -> list[int]:
     """Numbers of the states that are not at rest."""
     return [k for k, s in enumerate(given.solutions) if not s.at_rest]
 
 
-__all__ = ["Measured", "counted", "ending_fronts", "live_states", "measured", "values"]
+__all__ = [
+    "Indicators",
+    "counted_places",
+    "ending_fronts",
+    "indicators_of",
+    "live_states",
+    "values",
+]

@@ -12,7 +12,7 @@ from xcrack.sif.sif import SIF
 
 
 @dataclass(frozen=True, eq=False)
-class Round:
+class AdaptationPass:
     """One mesh of an adaptation.
 
     Attributes
@@ -40,7 +40,7 @@ class Round:
 
 
 @dataclass(frozen=True, eq=False)
-class Adapted:
+class Adaptation:
     """A scene on the mesh that a tolerance asked for; printing it gives the table of its rounds.
 
     Attributes
@@ -57,7 +57,7 @@ class Adapted:
         Whether the bars are within it.
     reason : str
         Why it is not met; empty where it is.
-    rounds : tuple of Round
+    rounds : tuple of AdaptationPass
     """
 
     problem: Problem
@@ -66,7 +66,7 @@ class Adapted:
     tolerance: float
     met: bool
     reason: str
-    rounds: tuple[Round, ...]
+    rounds: tuple[AdaptationPass, ...]
 
     @property
     def solution(self) -> Solution:
@@ -112,4 +112,4 @@ class Adapted:
         return "\n".join([*lines, f"tolerance {self.tolerance:g} of the largest K: {end}"])
 
 
-__all__ = ["Adapted", "Round"]
+__all__ = ["Adaptation", "AdaptationPass"]
