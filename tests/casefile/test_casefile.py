@@ -66,7 +66,7 @@ progress = false
 
 @pytest.fixture(autouse=True)
 def _by_matplotlib(monkeypatch):
-    monkeypatch.setattr("xcrack.view.pyvista_2d.renders", lambda: False)
+    monkeypatch.setattr("xcrack.view.pyvista_2d.can_render", lambda: False)
 
 
 def written(folder, text, name="case.toml"):

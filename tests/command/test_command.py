@@ -14,8 +14,8 @@ pytestmark = pytest.mark.filterwarnings("ignore::xcrack.XcrackWarning")
 
 @pytest.fixture(autouse=True)
 def _by_matplotlib(monkeypatch):
-    monkeypatch.setattr("xcrack.view.pyvista_2d.renders", lambda: False)
-    monkeypatch.setattr("xcrack.app.info.renders", lambda: False)
+    monkeypatch.setattr("xcrack.view.pyvista_2d.can_render", lambda: False)
+    monkeypatch.setattr("xcrack.app.info.can_render", lambda: False)
 
 
 def test_info_lists_what_there_is(capsys):

@@ -10,6 +10,7 @@ from fuzz.kinds import Called, Filename, Number, Numbers, Of, Seen, Whole, Word,
 from support.growth_fakes import mode_I, plate
 from xcrack.growth.step import Memory, Step
 from xcrack.linalg.reuse import SolverState
+from xcrack.runs.rerating import block_of_run, driving_forces
 
 LAW = xc.paris(1e-11, 3.0)
 
@@ -59,6 +60,21 @@ MODEL = xc.wheeler(1.0, ZONE)
 RATED = {"spectrum": SPECTRUM, "criterion": xc.max_hoop_stress, "nu": 0.3}
 
 
+def _flights_of_the_law():
+    """FLIGHTS with the rates that the law gives for its values of K."""
+    block = block_of_run("life", RATED["spectrum"], RATED["criterion"], RATED["nu"], 0.0)
+    ends = driving_forces(FLIGHTS.steps, block).rates(LAW)  # at both ends of each step
+    steps = []
+    for step, value in zip(FLIGHTS.steps, (*ends[:, 0], ends[-1, 1]), strict=True):
+        rate = (np.full(1, value),)
+        memory = dataclasses.replace(step.memory, law_rate=rate)
+        steps.append(dataclasses.replace(step, rate=rate, memory=memory))
+    return xc.History(tuple(steps), "max_steps")
+
+
+LAW_FLIGHTS = _flights_of_the_law()
+
+
 def _empty(value):
     """None for a dict, which may be empty and then says nothing."""
     return None if isinstance(value, dict) else False
@@ -81,7 +97,7 @@ ENTRIES = [
     Entry(
         "assessment_line",
         lambda K_r, L_r: LINE.reserve(K_r, L_r),
-        {"K_r": arg(Number(above=0), 0.5), "L_r": arg(Number(least=0), 0.5)},
+        {"K_r": arg(Number(least=0), 0.5), "L_r": arg(Number(least=0), 0.5)},
     ),
     Entry(
         "residual_strength",
@@ -252,8 +268,9 @@ ENTRIES = [
     Entry(
         "life",
         lambda retardation, max_blocks: (
-            xc.life(
-                FLIGHTS,
+            1
+            / xc.life(
+                LAW_FLIGHTS,
                 LAW,
                 scatter=SCATTER,
                 samples=100,
@@ -261,11 +278,11 @@ ENTRIES = [
                 retardation=retardation,
                 max_blocks=max_blocks,
                 **(RATED if retardation is not None else {}),
-            ).life
+            ).life  # 1/inf: samples longer than max_blocks do not end
         ),
         {
             "retardation": arg(
-                # Rates of FLIGHTS are made up: life may say that they are not those of the law.
+                # Models of other zones may ask for more than is given.
                 Seen(rule=lambda v: v is None or (None if isinstance(v, type(MODEL)) else False)),
                 MODEL,
                 None,

@@ -120,8 +120,10 @@ def test_no_displacement_has_a_negative_energy(problem):
 
 def exactly(monkeypatch):
     """Iterate far below the default tolerance."""
-    plain = iterative.descending
-    monkeypatch.setattr(iterative, "descending", lambda K, b, y, t: plain(K, b, y, 1e-4 * t))
+    plain = iterative.conjugate_gradients_steps
+    monkeypatch.setattr(
+        iterative, "conjugate_gradients_steps", lambda K, b, y, t: plain(K, b, y, 1e-4 * t)
+    )
     monkeypatch.setattr(iterative, "TOLERANCE", 1e-12)
 
 

@@ -27,7 +27,7 @@ pytestmark = pytest.mark.filterwarnings("ignore::xcrack.XcrackWarning")
 def _by_matplotlib(monkeypatch, request):
     """No renderer where a test does not ask for one: quick, and the same everywhere."""
     if not request.node.get_closest_marker("plot"):
-        monkeypatch.setattr("xcrack.view.pyvista_2d.renders", lambda: False)
+        monkeypatch.setattr("xcrack.view.pyvista_2d.can_render", lambda: False)
 
 
 def plate():

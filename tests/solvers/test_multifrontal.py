@@ -137,14 +137,14 @@ def test_nan_is_not_taken_for_a_solution(monkeypatch):
     def spoilt(A, *arguments, **options):
         return sound(sp.csc_matrix(np.nan * A), *arguments, **options)
 
-    monkeypatch.setattr(direct, "factorised", spoilt)
+    monkeypatch.setattr(direct, "factorise", spoilt)
     assert np.isfinite(xc.solve(plane([EDGE])).u).all()
 
 
 def test_superlu_takes_what_is_not_positive(monkeypatch):
     """The body itself is; its factor is refused for a reason of its own."""
     wanted = xc.solve(plane([EDGE]))
-    monkeypatch.setattr(direct, "factorised", lambda *a, **k: None)
+    monkeypatch.setattr(direct, "factorise", lambda *a, **k: None)
     solution = xc.solve(plane([EDGE]))
     np.testing.assert_allclose(solution.u, wanted.u, atol=1e-9 * np.abs(wanted.u).max())
 

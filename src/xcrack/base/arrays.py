@@ -54,7 +54,7 @@ def coordinates(x: Iterable[float]) -> str:
 def row_stretches(count: int, length: int = 50_000) -> Iterator[slice]:
     """Stretches of so many rows one after the other: what is computed on all at once takes memory.
 
-    >>> [(part.start, part.stop) for part in stretches(5, 2)]
+    >>> [(part.start, part.stop) for part in row_stretches(5, 2)]
     [(0, 2), (2, 4), (4, 5)]
     """
     for first in range(0, count, length):

@@ -96,7 +96,7 @@ def whole_number(
 
     Examples
     --------
-    >>> whole(4, "box: n", least=1)
+    >>> whole_number(4, "box: n", least=1)
     4
     """
     expectation = "a whole number" + _bounds(None, least, None, most)
@@ -312,7 +312,7 @@ def value_text(value: Any) -> str:
 
     Examples
     --------
-    >>> shown([1.5, None])
+    >>> value_text([1.5, None])
     '[1.5, None]'
     """
     if type(value) is str and len(value) < 60 and value.isidentifier():

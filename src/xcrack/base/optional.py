@@ -32,7 +32,7 @@ def require_package(name: str, purpose: str, instead: str = "") -> ModuleType:
 
     Examples
     --------
-    >>> required("math", "an example").__name__
+    >>> require_package("math", "an example").__name__
     'math'
     """
     package = _pip_name(name)
