@@ -13,7 +13,7 @@ from support import exact
 from support import scenes_2d as scenes
 from xcrack.adaptivity import sizes_3d
 from xcrack.adaptivity.adapt import _MOST_ROUNDS
-from xcrack.adaptivity.target_error import size_ratios
+from xcrack.adaptivity.sizes_2d import size_ratios
 from xcrack.verification import methods
 
 STEEL = xc.Isotropic(1.0, 0.3, plane="strain")

@@ -9,8 +9,8 @@ import xcrack as xc
 from support import scenes_3d as scenes
 from support.scenes_2d import numerics_of
 from xcrack.analysis.solve import build
-from xcrack.fem.cut_ends import parts_behind
-from xcrack.mesh.split import cut_simplices, interface_simplices
+from xcrack.fem.cut import parts_behind
+from xcrack.mesh.simplex import cut_simplices, interface_simplices
 
 REGULAR = np.array([[1.0, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]])
 

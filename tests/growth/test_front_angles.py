@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from xcrack.growth.front_angles import without_noise
+from xcrack.growth.front_filter import without_noise
 from xcrack.sif.sif import SIF
 
 N, LENGTH = 60, 30.0

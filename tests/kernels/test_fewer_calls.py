@@ -8,10 +8,9 @@ from scipy.spatial import Delaunay
 import xcrack as xc
 from tests.support import scenes_2d as scenes
 from xcrack.fem.kernels.bulk import joined_blocks
-from xcrack.fem.kernels.tips import solve_moments
+from xcrack.fem.kernels.functions import solve_moments
 from xcrack.linalg.kernels.blocks import orthonormal_columns
-from xcrack.linalg.kernels.bordered import bordered_matrix
-from xcrack.linalg.kernels.sparse import residual, times, times_transposed
+from xcrack.linalg.kernels.sparse import bordered_matrix, residual, times, times_transposed
 from xcrack.mesh.kernels.location import cells_within, locate_points, nearest_segment
 from xcrack.mesh.kernels.segments import graded_points, split
 from xcrack.mesh.kernels.splitting import cut_simplices, interface_simplices

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 import xcrack as xc
-from xcrack.fem.kernels.fields import places, set_gradients
-from xcrack.fem.kernels.shapes import set_jumps, set_standard
+from xcrack.fem.kernels.functions import places, set_gradients, set_jumps, set_standard
 from xcrack.fem.williams import continued_polar, mode_matrix, unit_gradients
 from xcrack.mesh.locate import locate
 from xcrack.mesh.mesh import local_edges

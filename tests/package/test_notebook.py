@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import xcrack as xc
-from xcrack.base.svg import sketch
+from xcrack.base.markup import sketch
 from xcrack.view.figures import Picture
 
 pytestmark = pytest.mark.filterwarnings("ignore::xcrack.XcrackWarning")

@@ -19,7 +19,7 @@ from xcrack.base.threads import one_blas_thread
 from xcrack.fem.system import build
 from xcrack.linalg import direct, multifrontal
 from xcrack.linalg.basis import function_nodes
-from xcrack.linalg.kernels.tree import postorder
+from xcrack.linalg.kernels.symbolic import postorder
 from xcrack.linalg.multifrontal import factorise, tree
 from xcrack.linalg.reuse import SolverState
 from xcrack.linalg.rigid_motion import free_motion

@@ -10,7 +10,7 @@ from xcrack.fem.system import build
 from xcrack.linalg.basis import patch_orthogonal, stars
 from xcrack.linalg.cycle import largest_eigenvalue
 from xcrack.linalg.iterative import iterative_system
-from xcrack.linalg.kernels.patches import add_solved
+from xcrack.linalg.kernels.blocks import add_solved
 from xcrack.linalg.schwarz import _inverse
 
 

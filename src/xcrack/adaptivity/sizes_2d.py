@@ -1,17 +1,131 @@
-"""The next mesh in 2D: cells that contribute much to the bars are bisected."""
+"""Meshes in 2D from errors of K.
 
+The first is smaller at tips and kinks; in the next ones cells that contribute much to the bars are
+bisected.
+"""
+
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from xcrack.adaptivity.indicators import Indicators, live_states
-from xcrack.adaptivity.start_2d import first_mesh
-from xcrack.adaptivity.target_error import size_ratios
 from xcrack.base.arrays import Floats
 from xcrack.crack.crack import kink_numbers
+from xcrack.crack.measures import length_inside
+from xcrack.mesh.locate import cell_sizes
 from xcrack.mesh.mesh import Mesh
-from xcrack.mesh.refinement import refine_to
+from xcrack.mesh.polygon import distance_to_simplices
+from xcrack.mesh.refinement import refine, refine_to
+from xcrack.model.problem import Problem
 from xcrack.sif.sif import KErrors
+
+_MOST = 5  # bisections of a cell in one round
+_STEPS = 60  # in which a threshold is halved in on
+
+
+def size_ratios(shares: Floats, bar: Floats, target: float, order: int, dim: int) -> Floats:
+    """Size of each cell in the next mesh over its size in this one.
+
+    A cell's share falls with its size to the power of 2 p + d, while 1 / size^d such cells take its
+    place. With the fewest of them all shares are alike: those above a threshold go down to it, and
+    the threshold is such that bars, which follow the sum of the shares, are as wanted.
+
+    Parameters
+    ----------
+    shares : (k, m) array
+        Contributions of the cells to the errors of k values.
+    bar : (k,) array
+        Half-widths of these errors; nan where there is none, and the shares alone count.
+    target : float
+        Half-width that all are to have.
+    order, dim : int
+
+    Returns
+    -------
+    (m,) array
+        Between `2^(-5 / dim)`, the most that bisection does in a round, and 1.
+    """
+    power = 2 * order + dim
+    ratio = np.ones(shares.shape[1])
+    for each, half in zip(shares, bar, strict=True):
+        total = each.sum()
+        error = half if np.isfinite(half) else total
+        if not total > 0 or error <= target:
+            continue
+        aim = target * total / error
+        low, high = 0.0, float(each.max())
+        for _ in range(_STEPS):
+            threshold = (low + high) / 2
+            left = np.minimum(each, threshold) ** (2 * order / power)
+            left *= each ** (dim / power)
+            low, high = (threshold, high) if left.sum() < aim else (low, threshold)
+        above = each > low
+        ratio[above] = np.minimum(ratio[above], (max(low, 1e-300) / each[above]) ** (1 / power))
+    return np.maximum(ratio, 2.0 ** (-_MOST / dim))
+
+
+_CELLS = 4.0  # of a crack's length: less, and no estimate sees what is left out
+_ROOM = 2.5  # cells between a tip and the next boundary, crack or tip
+_KINK = 20.0  # cells of a crack's length at its kinks: stresses are singular there
+_SLOPE = 0.4  # growth of cells a length
+
+
+def first_mesh(problem: Problem) -> Mesh:
+    """The mesh of a scene in 2D, finer at tips and kinks where it is coarser than they are."""
+    place, size = tip_sizes(problem)
+    bends = [
+        (x, length_inside(crack, problem.mesh) / _KINK)
+        for crack in problem.placed
+        for x in crack.points[kink_numbers(crack.points)]
+    ]
+    if bends:
+        place = np.concatenate([place, [x for x, _ in bends]])
+        size = np.concatenate([size, [h for _, h in bends]])
+    if not len(place):
+        return problem.mesh
+    # A mesh that is fine enough at its ends stays as it was given.
+    if (cell_sizes(problem.mesh, place) <= size).all():
+        return problem.mesh
+    return refine(problem.mesh, size=growing_sizes(place, size, _SLOPE))
+
+
+def growing_sizes(place: Floats, size: Floats, slope: float) -> Callable[[Floats], Floats]:
+    """Sizes of cells at points that grow with the distance from places `(n, 2)` by a slope."""
+
+    def wanted(x: Floats) -> Floats:
+        distance = np.linalg.norm(x[:, None] - place, axis=2)
+        return np.asarray((size + slope * distance).min(axis=1))
+
+    return wanted
+
+
+def tip_sizes(problem: Problem) -> tuple[Floats, Floats]:
+    """All tips `(n, 2)`, and the longest edges of cells there that see crack and room `(n,)`."""
+    spots, sizes = [np.zeros((0, 2))], []
+    tips = [crack.points[i] for crack in problem.placed for i in crack.tips or ()]
+    for crack in problem.placed:
+        length = length_inside(crack, problem.mesh)
+        for i in crack.tips or ():
+            x = crack.points[i]
+            spots.append(x[None])
+            sizes.append(min(length / _CELLS, _room_of_tip(problem, x, tips, crack.points) / _ROOM))
+    return np.concatenate(spots), np.array(sizes)
+
+
+def _room_of_tip(problem: Problem, x: Floats, tips: list[Floats], other_tips: Floats) -> float:
+    """Distance of a tip to the boundary, to other cracks and tips."""
+    mesh = problem.mesh
+    walls = [mesh.points[mesh.boundary]]
+    walls += [
+        np.stack([crack.points[:-1], crack.points[1:]], axis=1)
+        for crack in problem.placed
+        if crack.points is not other_tips
+    ]
+    distance = [float(distance_to_simplices(x, wall).min()) for wall in walls]
+    others = [float(np.linalg.norm(x - tip)) for tip in tips if (tip != x).any()]
+    return min(distance + others)
+
 
 _ORDER = 2
 _SWEEPS = 5
@@ -99,4 +213,38 @@ def _bent_cracks(given: Indicators) -> tuple[int, ...]:
     return tuple(c for c in given.pressed if len(kink_numbers(given.problem.placed[c].points)))
 
 
-__all__ = ["at_coarse_tips", "first_mesh", "next_mesh", "trusted_errors"]
+def joint_mesh(indicators: Sequence[Indicators], target: Sequence[float], aim: float) -> Mesh:
+    """A finer mesh, by the cells' contributions to the bars of all scenes.
+
+    Parameters
+    ----------
+    indicators : sequence of Indicators
+        On the same mesh.
+    target : sequence of float, stress · √length
+        Half-width that K of each is to have.
+    aim : float
+        Share of it that bars of the next mesh are foretold to have.
+    """
+    mesh = indicators[0].problem.mesh
+    shares = np.concatenate(
+        [current.shares / w for current, w in zip(indicators, target, strict=True)]
+    )
+    bar = np.concatenate(
+        [current.bar.ravel() / w for current, w in zip(indicators, target, strict=True)]
+    )
+    ratio = size_ratios(shares, bar, aim, _ORDER, mesh.dim)
+    for current in indicators:
+        ratio = np.minimum(ratio, at_coarse_tips(current))
+    return refine_to(mesh, ratio * mesh.cell_size, _SWEEPS)
+
+
+__all__ = [
+    "at_coarse_tips",
+    "first_mesh",
+    "growing_sizes",
+    "joint_mesh",
+    "next_mesh",
+    "size_ratios",
+    "tip_sizes",
+    "trusted_errors",
+]

@@ -17,8 +17,7 @@ from xcrack.adaptivity.indicators import (
     live_states,
     values,
 )
-from xcrack.adaptivity.outlines_3d import CELLS
-from xcrack.adaptivity.resolved import resolved_problem
+from xcrack.adaptivity.resolved import CELLS, resolved_problem
 from xcrack.base.arrays import Floats
 from xcrack.crack.crack import Crack
 from xcrack.crack.measures import surface_size

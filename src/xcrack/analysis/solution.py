@@ -299,7 +299,7 @@ def fields_at(
     cell, bary, side : arrays
         Points, as in `Solution.at`.
     """
-    from xcrack.fem.kernels.fields import set_gradients
+    from xcrack.fem.kernels.functions import set_gradients
 
     coefficients = np.ascontiguousarray(coefficients)
     d, states = coefficients.shape[1:]
@@ -320,7 +320,7 @@ def gradients_at(
     ----------
     space, coefficients, cell, bary, side : as in `fields_at`
     """
-    from xcrack.fem.kernels.fields import set_gradients
+    from xcrack.fem.kernels.functions import set_gradients
 
     coefficients = np.ascontiguousarray(coefficients)
     d, states = coefficients.shape[1:]

@@ -39,7 +39,7 @@ class Tabulated:
 
     def gradients(self, coefficients: Floats) -> Floats:
         """Gradients of displacements `(q, d, d, s)` from the unknowns by function `(f, d, s)`."""
-        from xcrack.fem.kernels.fields import set_gradients
+        from xcrack.fem.kernels.functions import set_gradients
 
         coefficients = np.ascontiguousarray(coefficients)
         d, states = coefficients.shape[1:]

@@ -122,7 +122,7 @@ def corrected(
     values, gradients : tabulated functions at these points; gradients are changed in place
     boundary : points on the boundary of all pieces
     """
-    from xcrack.fem.kernels.tips import (
+    from xcrack.fem.kernels.functions import (
         add_correction,
         add_flux,
         moments_at,

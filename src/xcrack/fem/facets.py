@@ -9,7 +9,7 @@ from xcrack.base.arrays import Bools, Floats, Ints, offsets
 from xcrack.fem.function_space import FunctionSpace
 from xcrack.fem.quadrature import lip_side, quarters, radius_at, segment_points, triangle_points
 from xcrack.mesh.mesh import Mesh, numbers_of
-from xcrack.mesh.split import cut_simplices
+from xcrack.mesh.simplex import cut_simplices
 
 _AT = 1e-10  # share of a facet's level set below which a value is zero
 

@@ -14,7 +14,7 @@ import numpy as np
 from xcrack.base.arrays import Bools, Floats, Ints, lock
 from xcrack.base.errors import GeometryError
 from xcrack.crack.crack import Crack
-from xcrack.crack.ends import end_frames
+from xcrack.crack.stations import end_frames
 from xcrack.fem.cut import Cut
 from xcrack.fem.enrichment import heaviside_nodes, node_level, tip_points, tip_radii
 from xcrack.fem.joints_2d import Joint
@@ -244,7 +244,7 @@ class FunctionSpace:
         side : (q, cracks) array
             Side of each crack on which the point lies: +1, -1, or 0 where that means nothing.
         """
-        from xcrack.fem.kernels.shapes import set_jumps, set_standard
+        from xcrack.fem.kernels.functions import set_jumps, set_standard
 
         mesh, n = self.mesh, self.cell_nodes.shape[1]
         width = batch.functions.shape[1]
@@ -283,7 +283,7 @@ class FunctionSpace:
         side: Ints,
     ) -> None:
         """Set values and, if there is room for them, gradients of the functions of tip t."""
-        from xcrack.fem.kernels.tips import set_tips
+        from xcrack.fem.kernels.functions import set_tips
 
         tip = self.tips[t]
         levels = self.cuts[tip.crack].level_set

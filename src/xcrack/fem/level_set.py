@@ -96,7 +96,7 @@ def snap_to_vertices(mesh: Mesh, phi: Floats) -> Floats:
 
 def line_levels(mesh: Mesh, crack: Crack) -> LevelSet:
     """Level sets of a placed crack in 2D at the points of a mesh."""
-    from xcrack.mesh.kernels.distance import polyline_distance
+    from xcrack.mesh.kernels.segments import polyline_distance
 
     reach = 10 * mesh.extent + float(np.abs(crack.points - mesh.points[0]).max())
     start, stop = _prolongation(crack.points, reach)

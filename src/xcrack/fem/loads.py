@@ -70,7 +70,7 @@ def outer_points(space: FunctionSpace, load: Load, halvings: int = 0) -> tuple[P
 
 def position(space: FunctionSpace, cell: Ints, bary: Floats) -> Floats:
     """Coordinates of points given by cell and barycentric coordinates."""
-    from xcrack.fem.kernels.fields import places
+    from xcrack.fem.kernels.functions import places
 
     mesh = space.mesh
     return np.asarray(places(cell, np.ascontiguousarray(bary), mesh.points, mesh.cells))

@@ -14,8 +14,7 @@ from xcrack.base.errors import GeometryError
 from xcrack.fem.function_space import FunctionSpace
 from xcrack.mesh.mesh import local_edges
 from xcrack.mesh.polygon import closest_on_segment
-from xcrack.mesh.simplex import SYMMETRIC, gauss, simplex_rule
-from xcrack.mesh.split import cut_simplices
+from xcrack.mesh.simplex import SYMMETRIC, cut_simplices, gauss, simplex_rule
 
 # Integration points around the tips of cracks in 2D.
 

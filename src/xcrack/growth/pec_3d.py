@@ -5,7 +5,7 @@ the same fronts again by the rates at both ends, which are carried along the str
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -27,26 +27,64 @@ from xcrack.growth import follow_3d
 from xcrack.growth.controlled import first, following, longest, share_left
 from xcrack.growth.cycles import elapsed_3d
 from xcrack.growth.follow_3d import interpolate_along_front
-from xcrack.growth.front_angles import without_noise
 from xcrack.growth.front_filter import (
     FrontWaves,
     corrected,
     predicted,
     response,
     turning_of,
-)
-from xcrack.growth.front_places import (
-    REACH,
-    Later,
-    front_lengths,
-    interpolate_within_reach,
-    move_of,
+    without_noise,
 )
 from xcrack.growth.options import GrowthRule
 from xcrack.growth.rates import Evaluation, Settled, block_order, kinds_of
 from xcrack.growth.step import Advance, PerCrack, Step, StepError, memory_of, plan_advance
 from xcrack.growth.trail import FrontTrail, Places
 from xcrack.mesh.locate import cell_sizes, contains
+from xcrack.mesh.mesh import Mesh
+
+REACH = 2.0  # cells from a place along a front to those that values are carried from
+
+
+@dataclass(frozen=True, eq=False)
+class Later:
+    """What was solved at the end of a step, at the places of its beginning.
+
+    Attributes
+    ----------
+    rate, law_rate : (f,) arrays, length/cycle
+        nan in law_rate where a place has left the body.
+    direction : (f, 3) array
+    way : (f,) array, length
+        Predicted advance.
+    """
+
+    rate: Floats
+    law_rate: Floats
+    direction: Floats
+    way: Floats
+
+
+def move_of(part: Places, angle: Floats, way: Floats) -> Floats:
+    """Moves `(f, 3)` of places by ways at angles."""
+    t, n = part.frame[:, 0], part.frame[:, 1]
+    return way[:, None] * (np.cos(angle)[:, None] * t + np.sin(angle)[:, None] * n)
+
+
+def front_lengths(crack: Crack) -> Floats:
+    """Length of each front, length."""
+    fronts = [crack.points[front] for front in crack.fronts or ()]
+    return np.array([np.linalg.norm(np.diff(x, axis=0), axis=1).sum() for x in fronts])
+
+
+def interpolate_within_reach(
+    part: Places, closed: Bools, values: Floats, x: Floats, mesh: Mesh
+) -> Floats:
+    """Values of places at points `(f, 3)` beside them; nan where there are none."""
+    if not len(part.x):
+        return np.full(len(x), np.nan)
+    reach = REACH * float(cell_sizes(mesh, part.x).mean())
+    return interpolate_along_front(part.x, part.front, closed.tolist(), values, x, reach)
+
 
 # Overloads along fronts: rates as means over a step, and zones carried from front to front.
 
@@ -582,10 +620,15 @@ def _cycles(
 
 
 __all__ = [
+    "REACH",
+    "Later",
     "advanced",
     "begun",
     "beyond_trapezoid",
     "cycles_to",
+    "front_lengths",
+    "interpolate_within_reach",
+    "move_of",
     "overloads_between",
     "planned",
     "rate_at_end",

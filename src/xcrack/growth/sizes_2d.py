@@ -6,9 +6,8 @@ from dataclasses import replace
 import numpy as np
 
 from xcrack.adaptivity.indicators import Indicators
-from xcrack.adaptivity.joint_2d import joint_mesh
 from xcrack.adaptivity.resolved import resolved_problem
-from xcrack.adaptivity.start_2d import growing_sizes, tip_sizes
+from xcrack.adaptivity.sizes_2d import growing_sizes, joint_mesh, tip_sizes
 from xcrack.base.arrays import Floats
 from xcrack.growth.scout import Stage
 from xcrack.mesh.locate import cell_sizes

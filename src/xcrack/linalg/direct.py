@@ -378,7 +378,7 @@ def _reduced_columns(
     Standard columns are those of the identity: only the border of enriched ones is multiplied
     out. Columns without energy are left out.
     """
-    from xcrack.linalg.kernels.bordered import bordered_matrix
+    from xcrack.linalg.kernels.sparse import bordered_matrix
 
     first = space.n_nodes * space.dim
     enriched = _enriched_columns(space, K, ~fixed, numerics, material)

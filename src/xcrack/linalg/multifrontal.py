@@ -57,7 +57,7 @@ def tree(mesh: Mesh, order: int) -> Tree:
     mesh : Mesh
     order : int
     """
-    from xcrack.linalg.kernels.tree import bisect_cells, node_parts, postorder
+    from xcrack.linalg.kernels.symbolic import bisect_cells, node_parts, postorder
 
     centre = mesh.points[mesh.cells].mean(axis=1)
     depth = max(0, int(np.ceil(np.log2(len(mesh.cells) / _LEAF))))
@@ -199,13 +199,13 @@ def factorise(
     keep : bool
         Keep what the next factorisation may take over.
     """
-    from xcrack.linalg.kernels.fronts import (
+    from xcrack.linalg.kernels.symbolic import (
         arrange_parts,
+        column_parts,
         places_of_updates,
         sizes,
         unchanged_parts,
     )
-    from xcrack.linalg.kernels.tree import column_parts
 
     order, rank = tree.postorder, tree.rank
     part = rank[column_parts(*columns, tree.node_to_part)]

@@ -47,7 +47,7 @@ class Patches:
 
     def times(self, r: Any) -> Any:
         """Sum of the solutions of all blocks, and of the unknowns outside, in single precision."""
-        from xcrack.linalg.kernels.patches import add_solved
+        from xcrack.linalg.kernels.blocks import add_solved
 
         out = self.alone * r
         add_solved(self.members, self.start, self.offset, self.inverse, r, out)

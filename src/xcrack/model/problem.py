@@ -11,8 +11,7 @@ import numpy as np
 
 from xcrack.base.checks import entries, number, value_text, whole_number
 from xcrack.base.errors import CoarseMeshError, ProblemError
-from xcrack.base.markup import Markup, element, join_parts, table
-from xcrack.base.svg import rim, sketch
+from xcrack.base.markup import Markup, element, join_parts, rim, sketch, table
 from xcrack.crack.crack import Crack
 from xcrack.crack.junctions import Junction
 from xcrack.crack.placing import check_cracks, junctions, on_others, place_crack

@@ -13,10 +13,9 @@ from numpy.typing import NDArray
 from xcrack.base import markup
 from xcrack.base.checks import entries, flag, value_text
 from xcrack.base.errors import ProblemError
-from xcrack.base.markup import element, join_parts
+from xcrack.base.markup import element, join_parts, rim, sketch
 from xcrack.base.optional import require_package
 from xcrack.base.paths import path_of, system_errors, write_texts
-from xcrack.base.svg import rim, sketch
 from xcrack.crack.crack import Crack
 from xcrack.fatigue.criteria import Criterion
 from xcrack.fatigue.law import Law

@@ -10,7 +10,7 @@ from xcrack.base.arrays import Floats, lock
 from xcrack.base.checks import numbers, value_text
 from xcrack.base.errors import ProblemError
 from xcrack.mesh.mesh import Mesh
-from xcrack.mesh.split import interface_simplices
+from xcrack.mesh.simplex import interface_simplices
 
 _AXIS = 0.999  # cosine from which a direction is called an axis
 

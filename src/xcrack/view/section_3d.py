@@ -7,7 +7,7 @@ import numpy as np
 from xcrack.base.arrays import Bools, Floats, Ints
 from xcrack.mesh.locate import barycentric
 from xcrack.mesh.mesh import Mesh, local_edges, local_facets
-from xcrack.mesh.split import cut_simplices, interface_simplices
+from xcrack.mesh.simplex import cut_simplices, interface_simplices
 from xcrack.output.pieces import Pieces
 
 Plane = tuple[Floats, Floats]  # a point and the unit normal; what lies behind it is drawn

@@ -1,4 +1,4 @@
-"""Dense blocks of a sparse matrix, and columns that are orthonormal within them."""
+"""Dense blocks of a sparse matrix: cut out, made orthonormal within, solved and summed."""
 
 import numpy as np
 
@@ -168,3 +168,29 @@ def orthonormal_columns(  # type: ignore[no-untyped-def]
     if failed or letters[0] + len(work) + len(pivots) + len(ss) + len(w) + len(Q) < 1:
         count = -1
     return start, column, value, count
+
+
+@kernel
+def add_solved(members, start, offset, inverse, r, out):  # type: ignore[no-untyped-def]
+    """Add the inverse of each block times its part of r.
+
+    Parameters
+    ----------
+    members, start, offset, inverse : as of `Patches`
+    r : (n,) array
+    out : (n,) array
+        Changed.
+    """
+    part = np.empty(len(out), out.dtype)  # no block holds more
+    for g in range(len(start) - 1):
+        first, size = start[g], start[g + 1] - start[g]
+        part_values = part[:size]
+        part_values[:] = 0
+        p = offset[g]
+        # Column by column: a sum of columns is vectorised, a scalar product is not.
+        for j in range(size):
+            value = r[members[first + j]]
+            part_values += value * inverse[p : p + size]
+            p += np.uint64(size)
+        for i in range(size):
+            out[members[first + i]] += part_values[i]

@@ -1,4 +1,4 @@
-"""Simplices cut by a linear function; see `xcrack.mesh.split`."""
+"""Simplices cut by a linear function; see `xcrack.mesh.simplex`."""
 
 import numpy as np
 

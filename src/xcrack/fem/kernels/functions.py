@@ -1,10 +1,79 @@
-"""Tip functions on hats, tabulated at points, and the correction of their gradients."""
+"""Functions tabulated at points, corrections of their gradients, and the fields that they span."""
 
 import math
 
 import numpy as np
 
 from xcrack.base.kernels.jit import kernel
+
+
+@kernel
+def set_standard(value, slope, row, bary, gradient, edges):  # type: ignore[no-untyped-def]
+    """Set the shape functions of the first columns, and their gradients where these are wanted.
+
+    Parameters
+    ----------
+    value : (q, k) array
+        Changed in place.
+    slope : (q or 0, k, d) array
+        Changed in place; of length 0 where it is not wanted.
+    row : (q,) array of int
+        Cell of each point.
+    bary : (q, d + 1) array
+    gradient : (m, d + 1, d) array
+        Gradients of the barycentric coordinates.
+    edges : (e, 2) array of int
+        Ends of the edges that carry a node; none at order 1.
+    """
+    corners = bary.shape[1]
+    d = corners - 1
+    quadratic = len(edges) > 0
+    for q in range(len(row)):
+        G = gradient[row[q]]
+        for b in range(corners):
+            x = bary[q, b]
+            value[q, b] = x * (2.0 * x - 1.0) if quadratic else x
+            if len(slope):
+                rise = 4.0 * x - 1.0 if quadratic else 1.0
+                for j in range(d):
+                    slope[q, b, j] = rise * G[b, j]
+        for k in range(len(edges)):
+            a, b = edges[k, 0], edges[k, 1]
+            x, y = 4.0 * bary[q, a], 4.0 * bary[q, b]
+            value[q, corners + k] = x * bary[q, b]
+            if len(slope):
+                for j in range(d):
+                    slope[q, corners + k, j] = y * G[a, j] + x * G[b, j]
+
+
+@kernel
+def set_jumps(value, slope, first, row, side, nodes, node_side, number):  # type: ignore[no-untyped-def]
+    """Set shifted Heaviside functions from column `first` on: shape times side less that of node.
+
+    Parameters
+    ----------
+    value : (q, k) array
+        Changed in place; the standard functions are in its first columns.
+    slope : (q or 0, k, d) array
+        Changed in place.
+    first : int
+    row : (q,) array of int
+    side : (q,) array of int
+        Side of the crack.
+    nodes : (m, n) array of int
+    node_side : (nodes,) array of int
+    number : (nodes,) array of int
+        Negative for nodes that carry no Heaviside function.
+    """
+    n = nodes.shape[1]
+    for q in range(len(row)):
+        for a in range(n):
+            node = nodes[row[q], a]
+            jump = float(side[q] - node_side[node]) if number[node] >= 0 else 0.0
+            value[q, first + a] = value[q, a] * jump
+            if len(slope):
+                for j in range(slope.shape[2]):
+                    slope[q, first + a, j] = slope[q, a, j] * jump
 
 
 @kernel
@@ -269,3 +338,58 @@ def add_correction(slope, first, piece, row, coefficient, moment, functions):  #
             for j in range(slope.shape[2]):
                 for a in range(moment.shape[1]):
                     slope[q, first + f, j] += coefficient[k, f, j, a] * moment[q, a]
+
+
+@kernel
+def set_gradients(gradient, number, slope, functions, row, coefficients):  # type: ignore[no-untyped-def]
+    """Set the gradients of displacements at some points.
+
+    Parameters
+    ----------
+    gradient : (q, d, d, s) array
+        Component, derivative, state; changed in place.
+    number : (k,) array of int
+        Points that are set.
+    slope : (k, n, d) array
+        Gradients of the functions there.
+    functions : (m, n) array of int
+        Negative where there is none.
+    row : (k,) array of int
+        Place of each point in `functions`.
+    coefficients : (f, d, s) array
+    """
+    d, states = coefficients.shape[1], coefficients.shape[2]
+    for p in range(len(number)):
+        to = number[p]
+        for i in range(d):
+            for s in range(states):
+                x, y, z = 0.0, 0.0, 0.0  # in 2D y and z are the same
+                for a in range(slope.shape[1]):
+                    f = functions[row[p], a]
+                    if f >= 0:
+                        c = coefficients[f, i, s]
+                        x += slope[p, a, 0] * c
+                        y += slope[p, a, 1] * c
+                        z += slope[p, a, d - 1] * c
+                gradient[to, i, 0, s] = x
+                gradient[to, i, 1, s] = y
+                gradient[to, i, d - 1, s] = z
+
+
+@kernel
+def places(cell, bary, points, cells):  # type: ignore[no-untyped-def]
+    """Coordinates of points in cells `(q, d)`.
+
+    Parameters
+    ----------
+    cell : (q,) array of int
+    bary : (q, d + 1) array
+    points, cells : (n, d) and (m, d + 1) arrays
+    """
+    x = np.zeros((len(cell), points.shape[1]))
+    for q in range(len(cell)):
+        for b in range(bary.shape[1]):
+            node = cells[cell[q], b]
+            for j in range(points.shape[1]):
+                x[q, j] += bary[q, b] * points[node, j]
+    return x
