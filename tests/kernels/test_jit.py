@@ -53,6 +53,8 @@ def run(package, *, home, temporary, user=None, **more):
     return done.stdout.splitlines()
 
 
+@pytest.mark.slow
+@pytest.mark.mission
 def test_a_damaged_cache_is_made_again(package, tmp_path):
     """Index, data, both; cut short or of other bytes: compiled anew, and whole afterwards."""
     where = {"home": tmp_path, "temporary": tmp_path, "NUMBA_CACHE_DIR": str(tmp_path / "cache")}

@@ -156,7 +156,11 @@ PLACES = {
 }
 
 
-@pytest.mark.parametrize("supported", [("right", "bottom", "top"), SIX], ids=["three", "six"])
+@pytest.mark.parametrize(
+    "supported",
+    [("right", "bottom", "top"), pytest.param(SIX, marks=(pytest.mark.slow, pytest.mark.mission))],
+    ids=["three", "six"],
+)
 def test_straight_front_at_any_place(supported):
     """Discretisation: a coarse mesh is half a per cent off, wherever the front lies."""
     result = []

@@ -142,6 +142,8 @@ def test_crack_through_the_whole_body():
             assert patch(mesh, [crack], ("bottom", "top")) <= EXACT, (normal, offset)
 
 
+@pytest.mark.slow
+@pytest.mark.mission
 def test_several_cracks():
     """Two pennies and a sheet with a front; then two parallel pennies in a structured mesh."""
     pennies = [

@@ -108,17 +108,18 @@ def check_drawn(seeds, origin=0.0):
 
 def test_drawn_tips_on_mesh_points_and_edges():
     """Of closed tips 1e-9 of a cell beside a mesh point 10 of 48 had K = nan once."""
-    check_drawn(range(310500, 310650))
+    check_drawn(range(310500, 310560))
 
 
 @pytest.mark.slow
 def test_many_drawn_tips_on_mesh_points_and_edges():
     check_drawn(range(320000, 321000))
+    check_drawn(range(310500, 310650))
 
 
 def test_drawn_tips_far_from_the_origin():
     """Coordinates have a round-off of 1e-12 of a cell there, more than some distances."""
-    check_drawn(range(330000, 330040), origin=1e3)
+    check_drawn(range(330000, 330020), origin=1e3)
 
 
 @pytest.mark.parametrize("distance", [1e-9, 1e-8, 1e-4])

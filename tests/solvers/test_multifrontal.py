@@ -82,7 +82,11 @@ def matrix_of(problem):
 
 
 @pytest.mark.parametrize("scene", SCENES)
-@pytest.mark.parametrize("keep", [False, True], ids=["once", "kept"])
+@pytest.mark.parametrize(
+    "keep",
+    [pytest.param(False, marks=(pytest.mark.slow, pytest.mark.mission)), True],
+    ids=["once", "kept"],
+)
 def test_against_a_dense_factorisation(scene, keep):
     """Residual, solution and halves; P K P^T = L L^T says what the forward half is."""
     problem = SCENES[scene]()

@@ -90,6 +90,8 @@ def test_tip_functions_apart_from_their_star_couple_with_no_more(penny):
     assert after.nnz <= 1.02 * before.nnz
 
 
+@pytest.mark.slow
+@pytest.mark.mission
 def test_the_bound_of_the_spectrum(penny):
     _, engine = penny
     top = engine.operator.cycle.levels[0]

@@ -144,6 +144,8 @@ def gram(space, lips, cell, points, consistent):
     return np.einsum("q,qad,qbd->ab", points.weight, G, G)
 
 
+@pytest.mark.slow
+@pytest.mark.mission
 def test_stiffness_against_brute_force():
     """Cells at the front and around it: the rules in use against thousands of points a cell."""
     built = model(CRACKS["oblique"], seed=23)
