@@ -20,6 +20,7 @@ _HOME = {
     "notched_cylinder": "mesh.cylinder",
     "refine": "mesh.refinement",
     "Isotropic": "model.material",
+    "Material": "model.material",
     "Crack": "crack.crack",
     "line_crack": "crack.lines",
     "penny_crack": "crack.surfaces",

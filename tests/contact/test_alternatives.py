@@ -5,7 +5,7 @@ Exact solutions are imposed on boxes. Bounds are of discretisation unless they s
 tolerance; those that show a failing are lower bounds.
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 
@@ -307,6 +307,33 @@ def test_nitsche_in_space_keeps_uniform_pressure():
         numerics=numerics_of(contact_method=methods.nitsche(), linear="direct"),
     )
     assert deviation(problem, 1.0) <= 1e-8
+
+
+@dataclass(frozen=True)
+class Ply(xc.Material):
+    """Stiff along an axis that is turned by 0.7 in the plane."""
+
+    plane: str | None = None
+
+    def stiffness(self):
+        """A stiff fibre in an isotropic matrix."""
+        C = np.diag([2.0, 2.0, 2.0, 1.0, 1.0, 1.0])
+        C[:3, :3] += 1.0
+        c, s = np.cos(0.7), np.sin(0.7)
+        fibre = np.array([c * c, s * s, 0, 0, 0, c * s])
+        return C + 20 * np.outer(fibre, fibre)
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_nitsche_in_an_anisotropic_plate_keeps_uniform_pressure(order):
+    """Round-off: the stress on the faces is that of the whole stiffness."""
+    sides = [xc.traction(side, lambda x, n: -P0 * n) for side in scenes.SIDES]
+    problem = xc.Problem(
+        scenes.perturbed(10, 5), Ply("strain"), [xc.line_crack([(-0.43, 0.03), (0.37, -0.11)])],
+        loads=sides, order=order, contact="on",
+        numerics=numerics_of(contact_method=methods.nitsche()),
+    )  # fmt: skip
+    assert deviation(problem) <= 1e-8
 
 
 # Scene, states, report ---------------------------------------------------------------------------

@@ -7,10 +7,11 @@ import scipy.sparse as sp
 import xcrack as xc
 from support import scenes_2d as scenes
 from xcrack.fem.assembly import bulk
-from xcrack.fem.kernels.bulk import block_pattern
+from xcrack.fem.kernels.bulk import block_pattern, block_stiffness
 from xcrack.fem.kernels.enriched import add_stiffness, enriched_pattern
 from xcrack.linalg.kernels.blocks import dense_blocks
 from xcrack.mesh.simplex import cell_nodes, shape_derivatives, simplex_rule
+from xcrack.model.material import isotropic_part
 
 
 def elastic_block(G, weight, lam, mu):
@@ -27,6 +28,53 @@ def elastic_block(G, weight, lam, mu):
     return K
 
 
+def general_block(G, weight, C):
+    """Stiffness of tabulated gradients (q, n, d) by the tensor of the material."""
+    return np.einsum("q,ikjl,qak,qbl->aibj", weight, C, G, G)
+
+
+def drawn_tensor(rng, d):
+    """A stiffness with the symmetries of an elastic one, and no other."""
+    C = rng.normal(size=(d,) * 4)
+    C = C + C.transpose(1, 0, 2, 3)
+    C = C + C.transpose(0, 1, 3, 2)
+    return C + C.transpose(2, 3, 0, 1)
+
+
+@pytest.mark.parametrize("d", [2, 3])
+def test_stiffness_of_any_material(d):
+    """Of plain cells, and of cells with enriched functions, against sums over the tensor."""
+    rng = np.random.default_rng(5813)
+    C = drawn_tensor(rng, d)
+    stiffness = isotropic_part(C)
+    corners = rng.uniform(size=(d + 1, d)) + np.eye(d + 1, d)
+    mesh = xc.Mesh(corners, [range(d + 1)], {})
+    nodes = cell_nodes(mesh, 2)
+    indptr, indices, slot = block_pattern(nodes, len(nodes[0]))
+    bary, share = simplex_rule(d, 2)
+    derivative = shape_derivatives(2, bary)
+    data = block_stiffness(
+        slot, len(indices), mesh.gradient, mesh.volume, derivative, share, *stiffness
+    )
+    blocks = data[slot[0]].transpose(0, 2, 1, 3)
+    gradient = np.einsum("qak,ki->qai", derivative, mesh.gradient[0])
+    expected = general_block(gradient, share * mesh.volume[0], C)
+    assert np.allclose(blocks, expected, rtol=0, atol=1e-13 * np.abs(expected).max())
+
+    weight, G = rng.uniform(0.1, 1, 5), rng.normal(size=(5, 3, d))
+    functions, offsets = np.array([[0, 2, 3]]), np.array([0, 5])
+    indptr, indices = enriched_pattern(functions, 4, 2)
+    data = np.zeros((len(indices), d, d))
+    add_stiffness(data, indptr, indices, functions, offsets, weight, G, 2, *stiffness)
+    result = sp.bsr_matrix((data, indices, indptr), shape=(4 * d, 4 * d)).toarray()
+    expected = np.zeros((4, d, 4, d))
+    on = functions[0]
+    expected[np.ix_(on, range(d), on, range(d))] = general_block(G, weight, C)
+    expected[0, :, 0] = 0.0  # of two standard functions: that of the uncracked body
+    expected = expected.reshape(result.shape)
+    assert np.allclose(result, expected, rtol=0, atol=1e-13 * np.abs(expected).max())
+
+
 def test_enriched_stiffness():
     rng = np.random.default_rng(577)
     functions = np.array([[0, 3, 5, 6], [1, 4, -1, 7], [2, 0, 5, -1]])
@@ -34,7 +82,7 @@ def test_enriched_stiffness():
     weight, G = rng.uniform(0.1, 1, 6), rng.normal(size=(6, 4, 2))
     indptr, indices = enriched_pattern(functions, 8, 5)
     data = np.zeros((len(indices), 2, 2))
-    add_stiffness(data, indptr, indices, functions, offsets, weight, G, 5, 1.3, 0.7)
+    add_stiffness(data, indptr, indices, functions, offsets, weight, G, 5, 1.3, 0.7, None)
     result = sp.bsr_matrix((data, indices, indptr), shape=(16, 16)).toarray()
     expected = np.zeros((8, 2, 8, 2))
     for e, numbers in enumerate(functions):

@@ -156,6 +156,53 @@ def test_public_name_is_documented(name: str) -> None:
     assert wanted <= documented(value.__doc__ or ""), f"{name}: parameters without a description"
 
 
+def name_of(node: ast.AST) -> str:
+    """Last word of a name or an attribute."""
+    return str(getattr(node, "attr", getattr(node, "id", "")))
+
+
+def questions_for_material(tree: ast.AST) -> list[str]:
+    """What a file asks of a material that only some kinds know, or of its kind."""
+    constants = {"E", "nu", "mu", "lam", "kolosov", "E_prime", "plane"}
+    forbidden = dict.fromkeys(("isinstance", "issubclass"), "Isotropic")
+    forbidden |= dict.fromkeys(("type", "hasattr", "getattr"), "material")
+    result = []
+    for node in ast.walk(tree):
+        word = "Isotropic" if isinstance(node, ast.MatchClass) else None
+        if isinstance(node, ast.Call):
+            word = forbidden.get(getattr(node.func, "id", ""))
+        if isinstance(node, ast.Attribute) and node.attr in constants:
+            bad = name_of(node.value) == "material"
+        else:
+            bad = word is not None and word in map(name_of, ast.walk(node))
+        if bad:
+            result.append(f"{getattr(node, 'lineno', 0)}: {ast.unparse(node)}")
+    return result
+
+
+def test_questions_for_material_are_recognised() -> None:
+    asked = (
+        "problem.material.nu", "material.plane", "isinstance(m, Isotropic)", "type(material)",
+        "getattr(problem.material, 'E', 1.0)", "isinstance(material, (Isotropic, Other))",
+    )  # fmt: skip
+    for text in asked:
+        assert questions_for_material(ast.parse(text)), text
+    for text in ("problem.material.at_tip().nu", "tip_material.E", "isinstance(material, Material)",
+                 "solution.E", "material.tensor(2)"):  # fmt: skip
+        assert not questions_for_material(ast.parse(text)), text
+
+
+def test_materials_answer_for_themselves() -> None:
+    """Constants are those of the material at a tip; nobody asks for a kind of material."""
+    bad = [
+        f"{label(path)}:{question}"
+        for path in FILES
+        if label(path) != "model/material.py"
+        for question in questions_for_material(ast.parse(path.read_text(encoding="utf-8")))
+    ]
+    assert not bad, "\n".join(bad)
+
+
 def test_options_of_growth_stand_once() -> None:
     """Names in `GrowthOptions`, defaults on `GrowthRule`; both signatures list them."""
     from xcrack.growth.options import GrowthOptions, GrowthRule

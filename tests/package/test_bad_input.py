@@ -274,7 +274,7 @@ PROBLEMS = {
     ),
     "no material": (
         lambda: xc.Problem(box(), 210e3),
-        r"Problem\(material=...\) must be of type Isotropic, not float",
+        r"Problem\(material=...\) must be of type Material such as Isotropic, not float",
     ),
     "contact": (lambda: problem(contact="maybe"), "contact = 'maybe': give \"auto\""),
     "order": (lambda: problem(order=3), "order = 3: give 1 or 2"),

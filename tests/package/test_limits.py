@@ -22,7 +22,7 @@ PACKAGES = sorted({p.relative_to(SOURCE).parts[0] for p in FILES if p.parent != 
 # Classes that answer for themselves: outside their package nobody asks which one it is.
 KINDS = {
     "model": "displacement traction pressure bearing resultant point_force body_force "
-    "crack_pressure initial_stress temperature fix",
+    "crack_pressure initial_stress temperature fix Isotropic",
     "fatigue": "paris elber walker piecewise forman hartman_schijve nasgro rate_table "
     "linear_closure schijve_closure newman_closure klesnil_lukas stepped_threshold el_haddad "
     "nasgro3_threshold nasgro4_threshold",

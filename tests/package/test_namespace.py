@@ -33,7 +33,7 @@ NAMES = [
     # verification, reports, files of scenes
     "verify", "report", "read_case", "run", "info", "demo", "convert_mesh",
     # what users derive from
-    "Closure", "GrowthLaw", "Load", "Threshold",
+    "Closure", "GrowthLaw", "Load", "Material", "Threshold",
     # campaigns
     "campaign", "grid",
     # lives

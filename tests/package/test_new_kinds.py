@@ -1,4 +1,7 @@
-"""A user's own load, growth law, closure and threshold, each one class, in every place."""
+"""A user's own load, growth law, closure and threshold, each one class, in every place.
+
+Materials are in test_new_material; here is their reading with units.
+"""
 
 from dataclasses import dataclass
 from typing import Annotated
@@ -63,6 +66,21 @@ class falling_threshold(xc.Threshold):  # noqa: N801
         return self.dK0 * np.exp(-self.b * R)
 
 
+@dataclass(frozen=True)
+class bonded_rubber(xc.Material):  # noqa: N801
+    """Isotropic, by bulk and shear modulus."""
+
+    bulk: Annotated[float, Number(above=0, unit=STRESS)]
+    shear: Annotated[float, Number(above=0, unit=STRESS)]
+    plane: str | None = None
+
+    def stiffness(self):
+        """Of the body in space."""
+        C = np.diag(np.repeat([2 * self.shear, self.shear], 3))
+        C[:3, :3] += self.bulk - 2 * self.shear / 3
+        return C
+
+
 def scene(load):
     mesh = xc.box((0, -20), (20, 20), (20, 40))
     return xc.Problem(mesh, STEEL, [xc.line_crack([(0, 0.3), (6, 0.3)])], [xc.fix("bottom")],
@@ -110,6 +128,21 @@ def test_a_load_is_read_from_a_case_file_with_units(tmp_path):
     problem = xc.read_case(tmp_path / "case.toml").problem
     assert isinstance(problem.loads[0], ramped_suction)
     assert problem.loads[0].per_length == pytest.approx(4.0)
+
+
+def test_a_material_is_read_from_a_case_file_with_units(tmp_path):
+    case = tmp_path / "case.toml"
+    text = (
+        '[units]\nlength = "mm"\nforce = "N"\n'
+        '[mesh]\nkind = "box"\nlower = [0.0, -20.0]\nupper = [20.0, 20.0]\nn = [20, 40]\n'
+        '[material]\nkind = "bonded_rubber"\nbulk = "2 GPa"\nshear = "{}"\nplane = "strain"\n'
+    )
+    case.write_text(text.format("600 kPa"))
+    material = xc.read_case(case).problem.material
+    assert (material.bulk, material.shear) == pytest.approx((2000.0, 0.6))
+    case.write_text(text.format("-1 MPa"))
+    with pytest.raises(xc.ProblemError, match="bonded_rubber: shear = -1"):
+        xc.read_case(case)
 
 
 def test_bad_arguments_of_a_load_are_refused_by_its_rules():

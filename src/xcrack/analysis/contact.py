@@ -128,7 +128,7 @@ def _solve_friction(
     having = {m.crack for m in chosen}
     others = any(len(lips) and c not in having for c, lips in enumerate(model.lips))
     start, size = _start(chosen, reuse, 0, closed), _face_size(model, chosen)
-    stiffness = problem.material.E / size
+    stiffness = problem.material.largest_modulus / size
     before = reuse.slip if repeated else None
     springs = None
     method = problem.numerics.contact_method
@@ -164,7 +164,7 @@ def _solve_states(
     rows = [gap_rows(m, model.lips[m.crack], model.jumps[m.crack]) for m in chosen]
     N = rows[0] if len(rows) == 1 else sp.csr_matrix(sp.vstack(rows))
     measure = np.concatenate([m.measure for m in chosen])
-    stiffness = problem.material.E / _face_size(model, chosen)
+    stiffness = problem.material.largest_modulus / _face_size(model, chosen)
     conditions = ContactRows(N, measure, stiffness, closed)
     return engine.contact(conditions, f, u_imposed, start, *guess)
 

@@ -18,7 +18,7 @@ from xcrack.fatigue.law import GrowthLaw
 from xcrack.fatigue.retardation import plastic_zone
 from xcrack.growth.options import GrowthOptions
 from xcrack.model.loads import Load
-from xcrack.model.material import Isotropic
+from xcrack.model.material import Isotropic, Material
 from xcrack.model.numerics import Numerics
 from xcrack.model.problem import Problem
 from xcrack.model.supports import Support
@@ -86,7 +86,7 @@ def read_case(path: str | PathLike[str]) -> CaseFile:
         if name not in root:
             root.refuse("", f"the table [{name}] is missing.")
     mesh = forms.value_of_table(root.table("mesh"), forms.MESHES)
-    material = forms.called_with(root.table("material"), Form(Isotropic))
+    material = forms.value_of_kind(root.table("material"), Material, Isotropic)
     solving = root.table("solve")
     solving.known(("contact", "order", "friction", "states"))
     scene: dict[str, Any] = {

@@ -116,6 +116,13 @@ def value_of_table(table: Table, forms: Mapping[str, Form], default: str = "") -
     return called_with(table, forms[kind], f" of {kind!r}", (_WORD,))
 
 
+def value_of_kind(table: Table, base: type, default: type) -> Any:
+    """Value of a table whose `kind` derives from a base; without one it is of the default kind."""
+    if _WORD in table:
+        return value_of_table(table, forms_of(base))
+    return called_with(table, Form(default))
+
+
 def called_with(table: Table, form: Form, what: str = "", besides: tuple[str, ...] = ()) -> Any:
     """Call a function with the keys of a table."""
     parameters = inspect.signature(form.function).parameters
@@ -187,5 +194,6 @@ __all__ = [
     "Form",
     "called_with",
     "forms_of",
+    "value_of_kind",
     "value_of_table",
 ]

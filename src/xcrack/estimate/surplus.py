@@ -22,7 +22,7 @@ from xcrack.fem.loads import facet_points, position
 from xcrack.fem.quadrature import Points, cell_points, cell_side
 from xcrack.mesh.mesh import facet_set, local_edges
 from xcrack.model.loads import FacetPoints, Load
-from xcrack.model.material import Isotropic
+from xcrack.model.material import Isotropic, Material
 from xcrack.model.supports import Support
 
 _POINTS, _DEGREE = 3, 4  # where tip functions act; of the products of a cubic and a quadratic
@@ -109,14 +109,15 @@ def _crack_edges(space: FunctionSpace, c: int) -> Ints:
 
 
 def residuals(
-    surplus: HierarchicalSurplus, material: Isotropic, coefficients: Floats
+    surplus: HierarchicalSurplus, tip_material: Isotropic, coefficients: Floats
 ) -> tuple[Floats, Floats]:
     """-a(u, w) of columns of displacements, and the stiffness of each function with its copy.
 
     Parameters
     ----------
     surplus : HierarchicalSurplus
-    material : Isotropic
+    tip_material : Isotropic
+        Its stiffness is that of the body.
     coefficients : (functions of the space + 1, 2, m) array, length
         The last row is zero.
 
@@ -130,7 +131,7 @@ def residuals(
     from xcrack.estimate.kernels.surplus import take_plain_stress, take_stress
 
     space = surplus.space
-    mesh, lame = space.mesh, (material.lam, material.mu)
+    mesh, lame = space.mesh, (tip_material.lam, tip_material.mu)
     residual = np.zeros((len(surplus.fixed), 2, coefficients.shape[2]))
     blocks = np.zeros((len(surplus.copy), 4, 4))
     special = space.signature != 0
@@ -298,7 +299,7 @@ def _add_traction(result: Floats, surplus: HierarchicalSurplus, load: Load, fact
 
 
 def _add_volume(
-    result: Floats, surplus: HierarchicalSurplus, load: Load, factor: float, material: Isotropic
+    result: Floats, surplus: HierarchicalSurplus, load: Load, factor: float, material: Material
 ) -> None:
     from xcrack.estimate.kernels.surplus import add_functional
 

@@ -16,7 +16,7 @@ from xcrack.fem.quadrature import Points, cell_points
 from xcrack.mesh.mesh import Mesh
 from xcrack.mesh.simplex import cell_nodes, shape_derivatives, simplex_rule
 from xcrack.model.loads import Load
-from xcrack.model.material import Isotropic
+from xcrack.model.material import Material, isotropic_part
 from xcrack.model.numerics import Numerics
 
 # Points in cells together with the functions that act there, for sums over several columns.
@@ -278,7 +278,7 @@ class Bulk:
     Attributes
     ----------
     mesh : Mesh
-    material : Isotropic
+    material : Material
     order : int
     matrix : sparse matrix (n, n), stress · length^(d - 2)
         Node blocks, BSR; in 3D each is stored column by column, as products of the solvers read it.
@@ -291,7 +291,7 @@ class Bulk:
     """
 
     mesh: Mesh
-    material: Isotropic
+    material: Material
     order: int
     matrix: sp.bsr_matrix
     cells: ReusedCells | None = None
@@ -299,7 +299,7 @@ class Bulk:
     free: tuple[Bools, Floats] | None = None
 
 
-def bulk(mesh: Mesh, material: Isotropic, order: int) -> Bulk:
+def bulk(mesh: Mesh, material: Material, order: int) -> Bulk:
     """Stiffness of the uncracked body."""
     from xcrack.fem.kernels.bulk import block_pattern, block_stiffness
 
@@ -314,8 +314,7 @@ def bulk(mesh: Mesh, material: Isotropic, order: int) -> Bulk:
         mesh.volume,
         shape_derivatives(order, bary),
         weight,
-        material.lam,
-        material.mu,
+        *isotropic_part(material.tensor(mesh.dim)),
     )
     if mesh.dim == 3:
         for part in row_stretches(len(data)):
@@ -327,7 +326,7 @@ def bulk(mesh: Mesh, material: Isotropic, order: int) -> Bulk:
 
 def enriched_stiffness(
     space: FunctionSpace,
-    material: Isotropic,
+    material: Material,
     numerics: Numerics,
     lips: tuple[LipPoints, ...],
     earlier: ReusedCells | None = None,
@@ -365,10 +364,10 @@ def enriched_stiffness(
         boundary = boundary_points(space, with_tip, lips)
     indptr, indices = enriched_pattern(_functions(space, cells), space.n_functions, space.n_nodes)
     data = np.zeros((len(indices), d, d))
-    lame = material.lam, material.mu
+    stiffness = isotropic_part(material.tensor(d))
     for batch, rows in space.batches(reusable.cells):
         products = reusable.products[rows]
-        add_products(data, indptr, indices, batch.functions, products, space.n_nodes, *lame)
+        add_products(data, indptr, indices, batch.functions, products, space.n_nodes, *stiffness)
 
     def tabulated(batch: Batch) -> tuple[Ints, Ints, Floats, Floats]:
         number, row, first = points.of_cells(batch.cells)
@@ -383,7 +382,7 @@ def enriched_stiffness(
         with one_blas_thread():
             functions, first, weight, G = part
             add_stiffness(
-                data, indptr, indices, functions, first, weight, G, space.n_nodes, *lame
+                data, indptr, indices, functions, first, weight, G, space.n_nodes, *stiffness
             )  # fmt: skip
     return Enriched(indptr, indices, data), n_points + len(points.weight), reusable
 

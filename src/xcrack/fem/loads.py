@@ -12,11 +12,11 @@ from xcrack.fem.function_space import FunctionSpace
 from xcrack.fem.quadrature import Points, at_joints, cell_points, cell_side
 from xcrack.mesh.mesh import facet_set, numbers_of
 from xcrack.model.loads import FacetPoints, Load
-from xcrack.model.material import Isotropic
+from xcrack.model.material import Material
 
 
 def load_vector(
-    space: FunctionSpace, material: Isotropic, load: Load, lips: tuple[LipPoints, ...]
+    space: FunctionSpace, material: Material, load: Load, lips: tuple[LipPoints, ...]
 ) -> Floats:
     """A load, tested with every function `(n_dof,)`; displacements give nothing.
 

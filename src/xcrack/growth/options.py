@@ -169,7 +169,7 @@ class GrowthRule:
                 f"grow: link_up = {value_text(self.link_up)}: give plastic_zone(sigma_y, beta), or "
                 f"a function of K."
             )
-        if self.problem.material.plane is None:
+        if self.problem.mesh.dim == 3:
             raise ProblemError(
                 "grow: link_up compares plastic zones with the ligaments between tips in a sheet: "
                 "a 3D body has no such ligaments. Leave it out, or model the sheet in 2D."

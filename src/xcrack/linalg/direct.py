@@ -25,7 +25,7 @@ from xcrack.linalg.engine import CondensedSystem, ContactRows, SolveCount, State
 from xcrack.linalg.multifrontal import Factor, Tree, factorise, tree
 from xcrack.linalg.products import proportional_columns, times, times_transposed
 from xcrack.linalg.reuse import SolverState
-from xcrack.model.material import Isotropic
+from xcrack.model.material import Material
 from xcrack.model.numerics import Numerics
 
 # SuperLU, for matrices that are not positive definite and for methods that change the matrix.
@@ -253,7 +253,7 @@ def system(
     fixed: Bools,
     numerics: Numerics,
     solver: Solver | None = None,
-    material: Isotropic | None = None,
+    material: Material | None = None,
     reuse: SolverState | None = None,
 ) -> DirectSystem:
     """Eliminate known unknowns, change the basis, scale by the diagonal and factor.
@@ -267,7 +267,7 @@ def system(
     numerics : Numerics
     solver : callable, optional
         In the place of the factorisation.
-    material : Isotropic, optional
+    material : Material, optional
         For a tip basis that depends on it.
     reuse : SolverState, optional
         Of an earlier solve. Where it is given, the next one may use this factor.
@@ -357,7 +357,7 @@ def scaled_basis(
     K: sp.csr_matrix,
     fixed: Bools,
     numerics: Numerics,
-    material: Isotropic | None = None,
+    material: Material | None = None,
 ) -> sp.csr_matrix:
     """Columns of the solver's basis in the basis of the space `(n_dof, k)`.
 
@@ -371,7 +371,7 @@ def _reduced_columns(
     K: sp.csr_matrix,
     fixed: Bools,
     numerics: Numerics,
-    material: Isotropic | None,
+    material: Material | None,
 ) -> tuple[sp.csr_matrix, sp.csc_matrix]:
     """Columns scaled to energy one, and K in them.
 
@@ -407,7 +407,7 @@ def _enriched_columns(
     K: sp.csr_matrix,
     free: Bools,
     numerics: Numerics,
-    material: Isotropic | None,
+    material: Material | None,
 ) -> sp.csr_matrix:
     """The columns of the solver's basis for enriched unknowns `(n_dof, k)`, not yet scaled."""
     n = space.n_dof

@@ -26,7 +26,7 @@ from xcrack.base.units import (
 )
 from xcrack.mesh.holes import RoundHole, round_hole
 from xcrack.mesh.mesh import Mesh, facet_set, nearest_point
-from xcrack.model.material import Isotropic
+from xcrack.model.material import Material
 from xcrack.model.supports import Condition, Support
 from xcrack.model.values import (
     Place,
@@ -114,7 +114,7 @@ class Load(Condition):
         """Force per volume at points `(q, d)`, stress / length."""
         raise NotImplementedError
 
-    def initial_stress(self, x: Floats, material: Isotropic) -> Floats:
+    def initial_stress(self, x: Floats, material: Material) -> Floats:
         """Stress of the undeformed body at points `(q, d, d)`."""
         raise NotImplementedError
 
@@ -554,7 +554,7 @@ class initial_stress(Load):  # noqa: N801
     relaxes = True
     is_listed = False
 
-    def initial_stress(self, x: Floats, material: Isotropic) -> Floats:
+    def initial_stress(self, x: Floats, material: Material) -> Floats:
         """Its value."""
         return stress_at(self.f, x, self.kind)
 
@@ -593,7 +593,7 @@ class temperature(Load):  # noqa: N801
     adds_up = True
     is_listed = False
 
-    def initial_stress(self, x: Floats, material: Isotropic) -> Floats:
+    def initial_stress(self, x: Floats, material: Material) -> Floats:
         """What the body would bear if it could not expand."""
         return material.thermal_stress(scalar_at(self.field, x, self.kind), self.alpha, x.shape[1])
 

@@ -1,4 +1,4 @@
-"""Isotropic linear elasticity."""
+"""What a body is made of: linear elastic materials."""
 
 from dataclasses import dataclass
 from typing import Annotated
@@ -7,13 +7,185 @@ import numpy as np
 
 from xcrack.base.arguments import Choice, Declared, Number
 from xcrack.base.arrays import Floats
-from xcrack.base.checks import numbers
+from xcrack.base.checks import numbers, value_text
 from xcrack.base.errors import ProblemError
 from xcrack.base.units import STRESS
 
+_VOIGT = np.array([[0, 5, 4], [5, 1, 3], [4, 3, 2]])  # rows of stiffness by component
+_ROUND_OFF = 1e-12  # of the largest entry of a stiffness
+_WRONG_PLANE = {
+    2: 'a 2D body needs {}(..., plane="strain") or plane="stress": the two differ by up to '
+    "1/(1 - nu²) in stiffness, so there is no default.",
+    3: '{}(plane="{}") is for 2D bodies: leave plane out for a mesh of tetrahedra '
+    "(read_mesh drops a constant z).",
+}
+_PLANES = ("strain", "stress")
+
+
+class Material(Declared):
+    """What a body is made of: linear elastic, and the same everywhere.
+
+    One of your own is a frozen dataclass that derives from it, with the method `stiffness` and, for
+    2D bodies, the field `plane`; the rest follows from these two. Where it is isotropic (in 2D: in
+    the plane) K and all that needs K are those of the isotropic material with the same stiffness;
+    else `at_tip` refuses. Two of them are compared by their fields: numbers, words and tuples.
+
+    Attributes
+    ----------
+    plane : {"strain", "stress"} or None
+        State of a 2D body; None in 3D.
+    """
+
+    plane: str | None = None
+
+    @property
+    def kind(self) -> str:
+        """What messages call it."""
+        return type(self).__name__
+
+    def stiffness(self) -> Floats:
+        """Stress xx, yy, zz, yz, xz, xy of strains xx, yy, zz and shear angles yz, xz, xy `(6, 6)`.
+
+        Of the body in space, whatever `plane` says.
+        """
+        raise ProblemError(
+            f"{self.kind} has no stiffness: give it a method stiffness() that returns (6, 6) "
+            "numbers, stress."
+        )
+
+    def check(self, dim: int) -> None:
+        """Raise where it does not suit a body in `dim` dimensions, or its stiffness is none.
+
+        Raises
+        ------
+        ProblemError
+            A plane state that is missing, unknown or too many; fields that cannot be compared; a
+            stiffness of another shape, not symmetric, not positive, or one that shears a plane
+            body out of its plane.
+        """
+        self._check_plane(dim)
+        self._check_fields()
+        C = numbers(self.stiffness(), f"{self.kind}: stiffness()", (6, 6))
+        C_max = np.abs(C).max()
+        if (np.abs(C - C.T) > _ROUND_OFF * C_max).any():
+            raise ProblemError(
+                f"{self.kind}: stiffness() is not symmetric: an elastic material has an energy."
+            )
+        lowest_eigenvalue = float(np.linalg.eigvalsh(C)[0])
+        if not lowest_eigenvalue > 0:
+            raise ProblemError(
+                f"{self.kind}: stiffness() has the eigenvalue {lowest_eigenvalue:.4g}: all must be "
+                "above 0."
+            )
+        if dim == 2 and (np.abs(C[[0, 1, 2, 5]][:, [3, 4]]) > _ROUND_OFF * C_max).any():
+            raise ProblemError(
+                f"{self.kind}: its stiffness shears a plane body out of its plane: turn the axes "
+                "of the material until z is one of symmetry, or model the body in 3D."
+            )
+
+    def _check_plane(self, dim: int) -> None:
+        if (self.plane is None) is (dim == 2):
+            raise ProblemError(_WRONG_PLANE[dim].format(self.kind, self.plane))
+
+    def _check_fields(self) -> None:
+        if self.plane not in (None, *_PLANES):
+            raise ProblemError(
+                f'{self.kind}: plane = {value_text(self.plane)}: give "strain" or "stress".'
+            )
+        try:
+            hash(self)
+        except TypeError:
+            raise ProblemError(
+                f"{self.kind}: its fields cannot be compared, and what was computed for one "
+                "material is used again for an equal one: let it be a frozen dataclass of numbers, "
+                "words and tuples, without arrays or lists."
+            ) from None
+
+    @property
+    def largest_modulus(self) -> float:
+        """Largest Young's modulus along the axes, stress: a scale of the stiffness."""
+        return float(1 / np.diag(np.linalg.inv(self.stiffness()))[:3].min())
+
+    def _plane_stiffness(self) -> Floats:
+        """Stiffness `(6, 6)` where nothing acts across the plane of plane stress."""
+        C = np.asarray(self.stiffness(), dtype=float)
+        return C - np.outer(C[:, 2], C[2]) / C[2, 2] if self.plane == "stress" else C
+
+    def tensor(self, dim: int) -> Floats:
+        """Stiffness in the body `(dim, dim, dim, dim)`, stress; in 2D that of the plane state."""
+        rows = _VOIGT[:dim, :dim]
+        return self._plane_stiffness()[rows[:, :, None, None], rows]
+
+    def stress(self, gradient: Floats) -> Floats:
+        """Stress `(..., d, d)` of a displacement gradient `(..., d, d)` (row: component)."""
+        gradient = _tensors(gradient, f"{self.kind}.stress: gradient")
+        return np.einsum("ijkl,...kl->...ij", self.tensor(gradient.shape[-1]), gradient)
+
+    def strain(self, stress: Floats) -> Floats:
+        """Strain `(..., d, d)` of an in-plane (or 3D) stress `(..., d, d)`."""
+        stress = _tensors(stress, f"{self.kind}.strain: stress")
+        d = stress.shape[-1]
+        compliance_tensor = np.linalg.pinv(self.tensor(d).reshape(d * d, d * d)).reshape((d,) * 4)
+        return np.einsum("ijkl,...kl->...ij", compliance_tensor, stress)
+
+    def stress_across(self, stress: Floats) -> Floats:
+        """Stress across the plane `(...)` of a plane body, from that in it `(..., 2, 2)`."""
+        C_zz_row = self._plane_stiffness()[2, _VOIGT[:2, :2]]
+        return np.asarray(np.einsum("kl,...kl->...", C_zz_row, self.strain(stress)))
+
+    def thermal_stress(self, change: Floats, alpha: float, dim: int) -> Floats:
+        """Stress `(n, dim, dim)` of a change of temperature `(n,)` that cannot expand."""
+        stiff = -self._plane_stiffness()[:, :3].sum(axis=1)[_VOIGT[:dim, :dim]]
+        return np.asarray(alpha * change[:, None, None] * stiff)
+
+    def at_tip(self) -> "Isotropic":
+        """The isotropic material whose fields surround a tip: constants of K, G and criteria.
+
+        Raises
+        ------
+        ProblemError
+            The fields at a tip are others: the stiffness (in 2D that in the plane) depends on the
+            direction.
+        """
+        lam, mu, remainder = isotropic_part(self.tensor(2 if self.plane else 3))
+        if remainder is not None:
+            raise ProblemError(
+                f"{self.kind} is not isotropic: K, its error bars and directions of growth are "
+                "those of isotropic tips. Displacements, stresses, openings and compliance hold; "
+                "for K give an isotropic material."
+            )
+        plane, in_plane = self.plane, lam / (lam + 2 * mu)
+        if plane and abs(in_plane) >= 0.5:  # beyond what isotropy in space allows to this state:
+            plane = "strain" if in_plane > 0 else "stress"  # the other has the same stiffness
+        nu = in_plane if plane == "stress" else lam / (2 * (lam + mu))
+        return Isotropic(2 * mu * (1 + nu), nu, plane)
+
+
+def isotropic_tensor(lam: float, mu: float, dim: int) -> Floats:
+    """Stiffness `(dim, dim, dim, dim)` of Lamé's constants."""
+    C = np.zeros((dim,) * 4)
+    for i in range(dim):
+        for j in range(dim):
+            C[i, i, j, j] += lam
+            C[i, j, i, j] += mu
+            C[i, j, j, i] += mu
+    return C
+
+
+def isotropic_part(tensor: Floats) -> tuple[float, float, Floats | None]:
+    """Lamé's constants of a stiffness `(d, d, d, d)`, and what remains of it beside them.
+
+    None remains where it is round-off.
+    """
+    lam, mu = float(tensor[0, 0, 1, 1]), float(tensor[0, 1, 0, 1])
+    remainder = tensor - isotropic_tensor(lam, mu, len(tensor))
+    if (np.abs(remainder) > _ROUND_OFF * np.abs(tensor).max()).any():
+        return lam, mu, remainder
+    return lam, mu, None
+
 
 @dataclass(frozen=True)
-class Isotropic(Declared):
+class Isotropic(Material):
     """Isotropic linear elastic material; nothing has a default but the plane of a 3D body.
 
     Parameters
@@ -42,8 +214,31 @@ class Isotropic(Declared):
         Number(above=-1, below=0.5, hint="a nearly incompressible material has such as 0.4999"),
     ]
     plane: Annotated[
-        str | None, Choice(("strain", "stress"), needs='"strain" or "stress" in 2D, nothing in 3D')
+        str | None, Choice(_PLANES, needs='"strain" or "stress" in 2D, nothing in 3D')
     ] = None
+
+    def stiffness(self) -> Floats:
+        """Stiffness in space `(6, 6)`, stress."""
+        C = np.diag(np.repeat([2 * self.mu, self.mu], 3))
+        C[:3, :3] += self.E * self.nu / ((1 + self.nu) * (1 - 2 * self.nu))
+        return C
+
+    def check(self, dim: int) -> None:
+        """Raise where the plane state does not suit a body in `dim` dimensions."""
+        self._check_plane(dim)
+
+    @property
+    def largest_modulus(self) -> float:
+        """Young's modulus, stress."""
+        return self.E
+
+    def tensor(self, dim: int) -> Floats:
+        """Stiffness `(dim, dim, dim, dim)` of the constants in use, stress."""
+        return isotropic_tensor(self.lam, self.mu, dim)
+
+    def at_tip(self) -> "Isotropic":
+        """The material itself."""
+        return self
 
     @property
     def mu(self) -> float:
@@ -65,6 +260,11 @@ class Isotropic(Declared):
     def E_prime(self) -> float:
         """E in plane stress, else E / (1 - nu²), stress."""
         return self.E if self.plane == "stress" else self.E / (1 - self.nu**2)
+
+    def stress_across(self, stress: Floats) -> Floats:
+        """Stress across the plane `(...)` of a plane body, from that in it `(..., 2, 2)`."""
+        nu = self.nu if self.plane == "strain" else 0.0
+        return np.asarray(nu * np.trace(stress, axis1=-2, axis2=-1))
 
     def thermal_stress(self, change: Floats, alpha: float, dim: int) -> Floats:
         """Stress `(n, dim, dim)` of a change of temperature `(n,)` that cannot expand."""

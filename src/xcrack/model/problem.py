@@ -19,19 +19,12 @@ from xcrack.crack.stations import Stations, stations_of
 from xcrack.mesh.mesh import Mesh
 from xcrack.model.friction import checked_friction
 from xcrack.model.loads import Load
-from xcrack.model.material import Isotropic
+from xcrack.model.material import Material
 from xcrack.model.numerics import Numerics
 from xcrack.model.states import LoadLevel, LoadState, scaled_state
 from xcrack.model.supports import Support
 
 _ORDER = {2: 2, 3: 1}  # of the standard functions, by dimension (measured)
-_PLANE = {2: True, 3: False}  # whether the material must name a plane state
-_WRONG_PLANE = {
-    2: 'a 2D body needs Isotropic(..., plane="strain") or plane="stress": the two differ by up to '
-    "1/(1 - nu²) in stiffness, so there is no default.",
-    3: 'Isotropic(plane="{}") is for 2D bodies: leave plane out for a mesh of tetrahedra '
-    "(read_mesh drops a constant z).",
-}
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +34,8 @@ class Problem:
     Parameters
     ----------
     mesh : Mesh
-    material : Isotropic
+    material : Material
+        Isotropic, or one of your own.
     cracks : sequence of Crack
     supports : sequence of fix(...) and displacement(...)
         None are needed for loads in equilibrium: rigid motion is removed.
@@ -64,7 +58,7 @@ class Problem:
     """
 
     mesh: Mesh
-    material: Isotropic
+    material: Material
     cracks: Sequence[Crack] = ()
     supports: Sequence[Support] = ()
     loads: Sequence[Load] = ()
@@ -74,17 +68,17 @@ class Problem:
     friction: float | Sequence[float] = 0.0
 
     def __post_init__(self) -> None:
-        for name, kind in (("mesh", Mesh), ("material", Isotropic), ("numerics", Numerics)):
+        for name, kind in (("mesh", Mesh), ("material", Material), ("numerics", Numerics)):
             if not isinstance(getattr(self, name), kind):
+                example_class = " such as Isotropic" if kind is Material else ""
                 raise ProblemError(
-                    f"Problem({name}=...) must be of type {kind.__name__}, "
+                    f"Problem({name}=...) must be of type {kind.__name__}{example_class}, "
                     f"not {type(getattr(self, name)).__name__}."
                 )
         for name in ("cracks", "supports", "loads"):
             given = getattr(self, name)
             object.__setattr__(self, name, entries(given, f"Problem: {name}"))
-        if (self.material.plane is None) is _PLANE[self.mesh.dim]:
-            raise ProblemError(_WRONG_PLANE[self.mesh.dim].format(self.material.plane))
+        self.material.check(self.mesh.dim)
         if self.order is None:
             object.__setattr__(self, "order", _ORDER[self.mesh.dim])
         if type(self.order) is bool or not isinstance(self.order, Real) or self.order not in (1, 2):

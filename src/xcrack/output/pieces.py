@@ -378,9 +378,9 @@ def full_stress(solution: Solution, cell: Ints, bary: Floats, side: Ints) -> Flo
     d = solution.space.dim
     stress = np.zeros((len(cell), 3, 3))
     stress[:, :d, :d] = solution.stress_at(cell, bary, side)
-    if solution.problem.material.plane == "strain":
+    if d == 2:
         elastic = stress[:, :d, :d] - solution.initial_stress(position(solution.space, cell, bary))
-        stress[:, 2, 2] = solution.problem.material.nu * np.trace(elastic, axis1=1, axis2=2)
+        stress[:, 2, 2] = solution.problem.material.stress_across(elastic)
     return stress
 
 

@@ -25,7 +25,7 @@ from xcrack.fem.system import discretise
 from xcrack.linalg.reuse import SolverState
 from xcrack.mesh.mesh import Mesh
 from xcrack.mesh.polygon import Arc
-from xcrack.model.material import Isotropic
+from xcrack.model.material import Material
 from xcrack.model.numerics import Numerics
 from xcrack.model.problem import Problem
 from xcrack.model.states import LoadLevel, LoadState
@@ -61,15 +61,15 @@ _CLASSES: dict[str, type] = {
     "LoadResultant": plan.Resultant,
     **{
         kind.__name__: kind
-        for kind in (Problem, Mesh, Arc, Isotropic, Numerics, Contact, Report, Ingredient,
+        for kind in (Problem, Mesh, Arc, Numerics, Contact, Report, Ingredient,
                      Unstorable, LoadLevel, LoadState)
     },
 }  # fmt: skip
 
 
 def _classes() -> dict[str, type]:
-    """What a file may hold, supports and loads of users among them."""
-    return _CLASSES | kinds_of(Condition)
+    """What a file may hold: materials, supports and loads of users among them."""
+    return _CLASSES | kinds_of(Material) | kinds_of(Condition)
 
 
 def save(result: Solution | Sequence[Solution] | History, path: str | PathLike[str]) -> Path:

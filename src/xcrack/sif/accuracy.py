@@ -107,7 +107,7 @@ def _scale(solution: Solution, part: SIF, radius: float) -> float:
     crack as long as the enriched radius.
     """
     volume = float(solution.space.mesh.volume.sum())
-    E_prime = solution.problem.material.E_prime
+    E_prime = solution.problem.material.at_tip().E_prime
     mean_stress = np.sqrt(2 * max(solution.energy, 0.0) * E_prime / volume)
     return max(float(np.abs(part.K).max()), _LOAD * float(mean_stress * np.sqrt(np.pi * radius)))
 

@@ -131,7 +131,7 @@ def tip_intensity(solutions: Sequence[Solution], t: int) -> list[SIF]:
     domain = domain_of(solutions[0], t)
     outer = domain.outer
     radii = radii_of(domain)
-    E_prime = solutions[0].problem.material.E_prime
+    E_prime = solutions[0].problem.material.at_tip().E_prime
     result = []
     for solution, values in zip(solutions, _integrals(solutions, t, radii), strict=True):
         K = 0.5 * E_prime * values[:, :2]

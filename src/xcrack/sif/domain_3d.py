@@ -258,7 +258,7 @@ def front_values(
     ends : tuple of float, length
         Where the front enters and leaves the body.
     """
-    space, material = solutions[0].space, solutions[0].problem.material
+    space, tip_material = solutions[0].space, solutions[0].problem.material.at_tip()
     tip = space.tips[t]
     size = leg_size(space.mesh, space.cuts[tip.crack].level_set.tip_cells[tip.number])
     wanted = solutions[0].problem.numerics.domain
@@ -283,9 +283,9 @@ def front_values(
         total += integrals_of_sides(solutions, t, sides, curve, knots, radii, turn)
     for part in _domain_parts(solutions, t, curve, knots, radii, turn):
         total += part
-    K = solve_front(total, knots, curve, material, valid, smooth)
-    wide = twice_as_wide(total, knots, curve, material, valid, smooth)
-    mean = means(total[:, 0], knots, curve, material)
+    K = solve_front(total, knots, curve, tip_material, valid, smooth)
+    wide = twice_as_wide(total, knots, curve, tip_material, valid, smooth)
+    mean = means(total[:, 0], knots, curve, tip_material)
     least = int(np.argmin(room))
     domain = Domain(
         outer=float(radius.min()),
@@ -377,7 +377,7 @@ def _domain_parts(
             gradient - turn,
             points.side[:, tip.crack],
             behind,
-            solutions[0].problem.material,
+            solutions[0].problem.material.at_tip(),
             radii,
             force=_force(solutions, x[near_points]),
             initial=initial,
@@ -442,7 +442,7 @@ def _lip_part(
         lips.normal[near_points],
         lips.weight[near_points],
         traction,
-        solutions[0].problem.material,
+        solutions[0].problem.material.at_tip(),
         radii,
         gradient=gradient,
         initial=initial_stresses(solutions),

@@ -36,7 +36,7 @@ def tip_goal(solution: Solution, t: int) -> Goal:
     """
     from xcrack.estimate.kernels.goal import plain_ring, ring_factors
 
-    space, material = solution.space, solution.problem.material
+    space, tip_material = solution.space, solution.problem.material.at_tip()
     mesh, tip = space.mesh, space.tips[t]
     radii = radii_of(domain_of(solution, t))
     outer, hollow = float(radii.max()), float(inner_radii(space.order, radii).min())
@@ -45,8 +45,8 @@ def tip_goal(solution: Solution, t: int) -> Goal:
     psi = cut.level_set.psi[tip.number]
     ring = (
         outer, inner, np.ascontiguousarray(tip.frame),
-        0.5 * material.E_prime * mode_matrix(material.kolosov, material.mu),
-        material.lam, material.mu,
+        0.5 * tip_material.E_prime * mode_matrix(tip_material.kolosov, tip_material.mu),
+        tip_material.lam, tip_material.mu,
     )  # fmt: skip
     parts, plain_parts = [], []
     for part in ring_parts(solution, t, hollow, outer):
@@ -77,7 +77,7 @@ def constant(solution: Solution, t: int) -> Floats:
 
     Given pressures are no part of it: they enter `Goal.pressure` with those of the contact.
     """
-    space, scale = solution.space, 0.5 * solution.problem.material.E_prime
+    space, scale = solution.space, 0.5 * solution.problem.material.at_tip().E_prime
     total = np.zeros(2)
     if not has_effect([solution], "volume", "initial_stress"):
         return total
@@ -115,9 +115,9 @@ def _faces(
     solution: Solution, t: int, outer: float, inner: float
 ) -> tuple[Sequence[GoalPoints], Floats, Floats]:
     """Gradients on bent faces, factors of pressures `(q, 2)` and of the stress at the tip."""
-    space, material = solution.space, solution.problem.material
+    space, tip_material = solution.space, solution.problem.material.at_tip()
     tip = space.tips[t]
-    lips, R, scale = solution.lips[tip.crack], tip.frame, 0.5 * material.E_prime
+    lips, R, scale = solution.lips[tip.crack], tip.frame, 0.5 * tip_material.E_prime
     pressure, per_stress = np.zeros((len(lips), 2)), np.zeros((2, 2, 2))
     way = lips.way_from(space.mesh, tip.x)
     near_points = np.nonzero(np.linalg.norm(way, axis=1) < outer)[0]
@@ -135,11 +135,11 @@ def _faces(
         q, _ = weight(r, xi, np.array([inner]), np.array([outer]))
         w = scale * q[0] * lips.weight[near_points]
         factor = np.zeros((len(near_points), 2, 2, 2))
-        for m, g in enumerate(unit_gradients(r, theta, material.kolosov, material.mu)[:2]):
+        for m, g in enumerate(unit_gradients(r, theta, tip_material.kolosov, tip_material.mu)[:2]):
             pressure[near_points, m] += w * np.einsum("qi,qi->q", outward, g[:, :, 0])
             if not bent:
                 continue
-            sigma = material.stress(g)
+            sigma = tip_material.stress(g)
             local = sigma * outward[:, :1, None]
             per_stress[:, :, m] += R.T @ np.einsum("q,qij->ij", w * outward[:, 0], g) @ R
             local[:, :, 0] -= np.einsum("qij,qj->qi", sigma, outward)
@@ -167,7 +167,7 @@ def on_faces(solution: Solution, tips: Sequence[int]) -> tuple[Floats, Floats]:
 
 
 def _singular_part(solution: Solution, t: int) -> tuple[Floats, Floats]:
-    space, material = solution.space, solution.problem.material
+    space, tip_material = solution.space, solution.problem.material.at_tip()
     tip = space.tips[t]
     lips, R = solution.lips[tip.crack], tip.frame
     radius = domain_of(solution, t).outer
@@ -180,10 +180,10 @@ def _singular_part(solution: Solution, t: int) -> tuple[Floats, Floats]:
         side = np.full(len(near_points), sign)
         r, theta = continued_polar(xi, side, np.ones(len(near_points), dtype=bool))
         q, dq = weight(r, xi, inner_radii(space.order, outer), outer)
-        fields = unit_gradients(r, theta, material.kolosov, material.mu)[:2]
-        curves = ahead_derivative(material, r, theta)[:2]
+        fields = unit_gradients(r, theta, tip_material.kolosov, tip_material.mu)[:2]
+        curves = ahead_derivative(tip_material, r, theta)[:2]
         for m, (g, curve) in enumerate(zip(fields, curves, strict=True)):
-            scale = 0.5 * material.E_prime
+            scale = 0.5 * tip_material.E_prime
             values[s, near_points, :, m] = scale * q[0][:, None] * (g[:, :, 0] @ R)
             local = q[0][:, None, None] * curve + g[:, :, :1] * dq[0][:, None]
             gradients[s, near_points, :, :, m] = scale * (R.T @ local @ R)

@@ -44,12 +44,12 @@ def constant_part(solution: Solution, t: int) -> float:
     A uniform state gives E' I / f = sigma_11 - sigma_22 for its elastic part: the displacement of
     the point force jumps across the crack faces. T is sigma_11 of the whole.
     """
-    tip, material = solution.space.tips[t], solution.problem.material
+    tip, tip_material = solution.space.tips[t], solution.problem.material.at_tip()
     lips = solution.lips[tip.crack]
     at_tip = int(np.argmin(np.linalg.norm(lips.x - tip.x, axis=1)))
     pressure = float(lip_pressure(solution, tip.crack)[at_tip])
     steady = _steady_stress(solution, t)
-    contraction = material.lam / (material.lam + 2 * material.mu)
+    contraction = tip_material.lam / (tip_material.lam + 2 * tip_material.mu)
     return float(steady[0, 0] - contraction * steady[1, 1]) - pressure
 
 
@@ -94,10 +94,11 @@ def ring_around(solutions: Sequence[Solution], t: int, radii: Floats) -> Integra
 
 def _constants(solution: Solution, ring: IntegrationRing) -> tuple[Any, ...]:
     """Last arguments of the kernels of domain integrals."""
-    tip, material = solution.space.tips[ring.t], solution.problem.material
+    tip, tip_material = solution.space.tips[ring.t], solution.problem.material.at_tip()
     return (
         tip.x, ring.turn, ring.radii, ring.inner, np.ascontiguousarray(tip.frame),
-        mode_matrix(material.kolosov, material.mu), material.kolosov, material.lam, material.mu,
+        mode_matrix(tip_material.kolosov, tip_material.mu), tip_material.kolosov,
+        tip_material.lam, tip_material.mu,
     )  # fmt: skip
 
 
@@ -167,15 +168,15 @@ def _auxiliary_fields(
     solutions: Sequence[Solution], r: Floats, theta: Floats
 ) -> list[AuxiliaryField]:
     """The unit fields of modes I, II and of the point force."""
-    material = solutions[0].problem.material
-    gradients = unit_gradients(r, theta, material.kolosov, material.mu)
+    tip_material = solutions[0].problem.material.at_tip()
+    gradients = unit_gradients(r, theta, tip_material.kolosov, tip_material.mu)
     curves = np.zeros((len(gradients), 0, 2, 2))
     if has_effect(solutions, "initial_stress"):
-        curves = ahead_derivative(solutions[0].problem.material, r, theta)
+        curves = ahead_derivative(tip_material, r, theta)
     return [AuxiliaryField(g, c) for g, c in zip(gradients, curves, strict=True)]
 
 
-def ahead_derivative(material: Isotropic, r: Floats, theta: Floats) -> Floats:
+def ahead_derivative(tip_material: Isotropic, r: Floats, theta: Floats) -> Floats:
     """Derivatives along ahead of the unit gradients `(3, q, 2, 2)`, by differences of 1e-5 r."""
     x, y = r * np.cos(theta), r * np.sin(theta)
     step = 1e-5 * r
@@ -184,7 +185,8 @@ def ahead_derivative(material: Isotropic, r: Floats, theta: Floats) -> Floats:
         moved = x + sign * step
         turn = np.arctan2(y, moved)
         continued = turn + 2 * np.pi * np.round((theta - turn) / (2 * np.pi))
-        shifted.append(unit_gradients(np.hypot(moved, y), continued, material.kolosov, material.mu))
+        constants = tip_material.kolosov, tip_material.mu
+        shifted.append(unit_gradients(np.hypot(moved, y), continued, *constants))
     return np.asarray((shifted[0] - shifted[1]) / (2 * step)[:, None, None])
 
 
@@ -256,7 +258,7 @@ def lip_terms(solutions: Sequence[Solution], ring: IntegrationRing) -> Floats:
     aux = _auxiliary_fields(solutions, r, theta)
     local, stresses = None, []
     if bent:
-        stresses = [material.stress(field.gradient) for field in aux]
+        stresses = [material.at_tip().stress(field.gradient) for field in aux]
         places = cell.T.ravel(), np.concatenate([bary[:, 0], bary[:, 1]])
         gradient = gradients_at(space, ring.coefficients, *places, side) - ring.turn
         local = np.einsum("ai,qijs,bj->sqab", R, gradient, R)

@@ -140,7 +140,7 @@ def domain_integrals(
     gradient: Floats,
     side: Ints,
     behind: Bools,
-    material: Isotropic,
+    tip_material: Isotropic,
     radii: Floats,
     *,
     force: Floats | None = None,
@@ -162,7 +162,7 @@ def domain_integrals(
         Side of the crack; 0 where that means nothing.
     behind : (q,) array of bool
         Behind the front, where the angle of a point follows the crack face of its side.
-    material : Isotropic
+    tip_material : Isotropic
     radii : (p, k) array, length
         Of the domains of each hat.
     force : (q, 3, n) array, stress/length, optional
@@ -198,8 +198,8 @@ def domain_integrals(
         share,
         step,
         np.ascontiguousarray(radii, dtype=float),
-        material.lam,
-        material.mu,
+        tip_material.lam,
+        tip_material.mu,
         curved,
         total,
     )
@@ -228,7 +228,7 @@ def lip_integrals(
     normal: Floats,
     weight: Floats,
     traction: Floats,
-    material: Isotropic,
+    tip_material: Isotropic,
     radii: Floats,
     *,
     gradient: Floats | None = None,
@@ -247,7 +247,7 @@ def lip_integrals(
     weight : (q,) array, length²
     traction : (q, 3, n) array, stress
         On lip +, of n states; on lip - it is the opposite. A pressure p is p times the normal.
-    material : Isotropic
+    tip_material : Isotropic
     radii : (p, k) array, length
     gradient : (2, q, 3, 3, n) array, optional
         Displacement gradients on lip - and lip +: needed where the crack faces are not the
@@ -267,7 +267,7 @@ def lip_integrals(
     lips = [
         side_integrals(
             curve, knots, feet, -sign * normal, weight, sign * traction,
-            np.full(len(weight), sign), every, material, radii,
+            np.full(len(weight), sign), every, tip_material, radii,
             gradient=None if gradient is None else gradient[s], initial=initial,
         )
         for s, sign in ((0, -1), (1, 1))
@@ -284,7 +284,7 @@ def side_integrals(
     traction: Floats,
     side: Ints,
     behind: Bools,
-    material: Isotropic,
+    tip_material: Isotropic,
     radii: Floats,
     *,
     gradient: Floats | None = None,
@@ -294,7 +294,7 @@ def side_integrals(
 
     Parameters
     ----------
-    curve, knots, feet, weight, side, behind, material, radii
+    curve, knots, feet, weight, side, behind, tip_material, radii
         As of `domain_integrals`; weights are areas.
     outward : (q, 3) array
         Normals that point out of the body.
@@ -329,14 +329,14 @@ def side_integrals(
         hat,
         share,
         np.ascontiguousarray(radii, dtype=float),
-        material.lam,
-        material.mu,
+        tip_material.lam,
+        tip_material.mu,
         total,
     )
     return total
 
 
-def means(I: Floats, knots: Floats, curve: FrontCurve, material: Isotropic) -> Floats:  # noqa: E741
+def means(I: Floats, knots: Floats, curve: FrontCurve, tip_material: Isotropic) -> Floats:  # noqa: E741
     """Means of K over the hats `(n, p, 3)`, stress · √length.
 
     Parameters
@@ -345,17 +345,17 @@ def means(I: Floats, knots: Floats, curve: FrontCurve, material: Isotropic) -> F
         Domain and surface integrals together.
     knots : (p,) array, length
     curve : FrontCurve
-    material : Isotropic
+    tip_material : Isotropic
     """
     size = _moments(curve, knots, lambda s: np.ones((len(s), 1)))[:, 0]
-    return np.asarray(np.moveaxis(I / size, 1, 2) * _factors(material))
+    return np.asarray(np.moveaxis(I / size, 1, 2) * _factors(tip_material))
 
 
 def solve_front(
     I: Floats,  # noqa: E741
     knots: Floats,
     curve: FrontCurve,
-    material: Isotropic,
+    tip_material: Isotropic,
     valid: Bools,
     zero: Bools | None = None,
 ) -> Floats:
@@ -367,7 +367,7 @@ def solve_front(
         Domain and surface integrals together.
     knots : (p,) array, length
     curve : FrontCurve
-    material : Isotropic
+    tip_material : Isotropic
     valid : (p,) array of bool
         Hats that have an integral.
     zero : (p,) array of bool, optional
@@ -383,7 +383,9 @@ def solve_front(
     if not len(rows):
         return K
     moments = _moments(curve, knots, lambda s: reading(knots, valid, curve, s))[rows]
-    K[:, :, rows] = _solved(moments, I[..., rows], material, None if zero is None else zero[rows])
+    K[:, :, rows] = _solved(
+        moments, I[..., rows], tip_material, None if zero is None else zero[rows]
+    )
     return K
 
 
@@ -391,7 +393,7 @@ def twice_as_wide(
     I: Floats,  # noqa: E741
     knots: Floats,
     curve: FrontCurve,
-    material: Isotropic,
+    tip_material: Isotropic,
     valid: Bools,
     zero: Bools | None = None,
 ) -> Floats:
@@ -399,7 +401,7 @@ def twice_as_wide(
 
     Parameters
     ----------
-    I, knots, curve, material, valid, zero
+    I, knots, curve, tip_material, valid, zero
         As of `solve_front`.
 
     Returns
@@ -429,15 +431,15 @@ def twice_as_wide(
         return reading(knots, np.isin(np.arange(len(knots)), tops), curve, s)
 
     own = None if zero is None else zero[tops]
-    K = _solved(share @ _moments(curve, knots, spline), I @ share.T, material, own)
+    K = _solved(share @ _moments(curve, knots, spline), I @ share.T, tip_material, own)
     result[:, :, rows] = np.einsum("sv,nkvm->nksm", spline(knots[rows]), K)
     return result
 
 
-def _solved(moments: Floats, I: Floats, material: Isotropic, zero: Bools | None) -> Floats:  # noqa: E741
+def _solved(moments: Floats, I: Floats, tip_material: Isotropic, zero: Bools | None) -> Floats:  # noqa: E741
     """K `(n, k, v, 3)` of integrals `(n, k, 3, v)`; K_III is zero at some tops."""
     K = np.empty((*I.shape[:2], len(moments), 3))
-    for mode, factor in enumerate(_factors(material)):
+    for mode, factor in enumerate(_factors(tip_material)):
         matrix, right = moments.copy(), I[:, :, mode]
         if mode == 2 and zero is not None:
             matrix[zero] = np.eye(len(matrix))[zero]
@@ -446,9 +448,9 @@ def _solved(moments: Floats, I: Floats, material: Isotropic, zero: Bools | None)
     return K
 
 
-def _factors(material: Isotropic) -> Floats:
+def _factors(tip_material: Isotropic) -> Floats:
     """K of each mode over its integral `(3,)`."""
-    return np.array([material.E_prime / 2, material.E_prime / 2, material.mu])
+    return np.array([tip_material.E_prime / 2, tip_material.E_prime / 2, tip_material.mu])
 
 
 def _moments(curve: FrontCurve, knots: Floats, spline: Callable[[Floats], Floats]) -> Floats:

@@ -171,7 +171,7 @@ def _integrals(
     side, initial = points.side[:, tip.crack], initial_stresses(solutions)
     return side_integrals(
         curve, knots, feet, normal, points.weight, traction, side, behind,
-        solutions[0].problem.material, radii, gradient=gradient, initial=initial,
+        solutions[0].problem.material.at_tip(), radii, gradient=gradient, initial=initial,
     )  # fmt: skip
 
 

@@ -11,7 +11,7 @@ from xcrack.base.arrays import Floats
 from xcrack.base.checks import flag, value_text, whole_number
 from xcrack.base.errors import ProblemError
 from xcrack.base.threads import threads
-from xcrack.model.material import Isotropic
+from xcrack.model.material import Material
 from xcrack.sif.domain_2d import tip_intensity
 from xcrack.sif.domain_3d import front_intensity
 from xcrack.sif.error import with_bars
@@ -83,8 +83,8 @@ def stress_intensities(
     Raises
     ------
     ProblemError
-        Not a list of solutions, solutions of different solves, no such crack, or K that is no
-        number.
+        Not a list of solutions, solutions of different solves, no such crack, a material that is
+        not isotropic, or K that is no number.
 
     Warns
     -----
@@ -99,6 +99,7 @@ def stress_intensities(
             f"crack {value_text(crack)}: the problem has {len(space.cuts)} crack(s), numbered from "
             f"0."
         )
+    solutions[0].problem.material.at_tip()  # refuses where K is not defined
     # Cycles from nothing are the most common ones: their lower state has no K to look for.
     live = [s for s in solutions if not s.at_rest] or solutions[:1]
     intensity = front_intensity if space.dim == 3 else tip_intensity
@@ -153,13 +154,13 @@ def _checked_solutions(solutions: Any) -> list[Solution]:
 # Energy release rate from K.
 
 
-def energy_release_rate(sif: SIF, material: Isotropic) -> Floats:
+def energy_release_rate(sif: SIF, material: Material) -> Floats:
     """Energy that is released per area of new crack straight ahead; J of an elastic body.
 
     Parameters
     ----------
     sif : SIF
-    material : Isotropic
+    material : Material
 
     Returns
     -------
@@ -168,7 +169,7 @@ def energy_release_rate(sif: SIF, material: Isotropic) -> Floats:
     Raises
     ------
     ProblemError
-        Other kinds of value.
+        Other kinds of value, or a material whose tips are not isotropic.
 
     Notes
     -----
@@ -179,14 +180,14 @@ def energy_release_rate(sif: SIF, material: Isotropic) -> Floats:
         raise ProblemError(
             f"energy_release_rate: sif = {value_text(sif)}: give what stress_intensity returns."
         )
-    if not isinstance(material, Isotropic):
+    if not isinstance(material, Material):
         raise ProblemError(
-            f"energy_release_rate: material = {value_text(material)}: give Isotropic."
+            f"energy_release_rate: material = {value_text(material)}: give Isotropic(...)."
         )
-    K = sif.K
-    G = (K[:, 0] ** 2 + K[:, 1] ** 2) / material.E_prime
+    K, tip_material = sif.K, material.at_tip()
+    G = (K[:, 0] ** 2 + K[:, 1] ** 2) / tip_material.E_prime
     if K.shape[1] == 3:
-        G = G + K[:, 2] ** 2 / (2 * material.mu)
+        G = G + K[:, 2] ** 2 / (2 * tip_material.mu)
     return np.asarray(G)
 
 

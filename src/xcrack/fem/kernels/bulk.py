@@ -78,7 +78,30 @@ def block_pattern(nodes, n_nodes):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def block_stiffness(slot, n_blocks, gradient, volume, derivative, weight, lam, mu):  # type: ignore[no-untyped-def]
+def _add_remainder(data, slot, weight, G, remainder):  # type: ignore[no-untyped-def]
+    """Add what a stiffness that is not isotropic has besides, at one point of a cell."""
+    n, d = G.shape
+    half_product = np.empty((d, d, d))
+    for a in range(n):
+        for i in range(d):
+            for j in range(d):
+                for p in range(d):
+                    total = 0.0
+                    for k in range(d):
+                        total += remainder[i, k, j, p] * G[a, k]
+                    half_product[i, j, p] = weight * total
+        for b in range(n):
+            block = data[slot[a, b]]
+            for i in range(d):
+                for j in range(d):
+                    for p in range(d):
+                        block[i, j] += half_product[i, j, p] * G[b, p]
+
+
+@kernel
+def block_stiffness(  # type: ignore[no-untyped-def]
+    slot, n_blocks, gradient, volume, derivative, weight, lam, mu, remainder
+):
     """Elastic stiffness of plain cells, summed into node blocks.
 
     Parameters
@@ -92,6 +115,8 @@ def block_stiffness(slot, n_blocks, gradient, volume, derivative, weight, lam, m
         Shape derivatives at the integration points.
     weight : (q,) array
     lam, mu : float
+    remainder : (d, d, d, d) array or None
+        Stiffness besides. None is compiled for itself: isotropic bodies pay nothing.
 
     Returns
     -------
@@ -111,6 +136,8 @@ def block_stiffness(slot, n_blocks, gradient, volume, derivative, weight, lam, m
                     for k in range(d + 1):
                         total += derivative[q, a, k] * gradient[e, k, i]
                     G[a, i] = total
+            if remainder is not None:
+                _add_remainder(data, slot[e], w, G, remainder)
             if d == 2:  # written out: two thirds of the time
                 for a in range(n):
                     ax, ay = w * G[a, 0], w * G[a, 1]

@@ -149,7 +149,7 @@ def _products_by_blas(begin, end, weight, gradient, place, active, rows, block):
 
 @kernel
 def _scatter(  # type: ignore[no-untyped-def]
-    data, indptr, indices, functions, place, at, active, plain, block, lam, mu
+    data, indptr, indices, functions, place, at, active, plain, block, lam, mu, remainder
 ):
     """Add the stiffness that follows from the products of a cell, in which functions stand `at`."""
     d = data.shape[1]
@@ -166,6 +166,10 @@ def _scatter(  # type: ignore[no-untyped-def]
                     v = lam * block[k + i, m + j] + mu * block[k + j, m + i]
                     if i == j:
                         v += mu * trace
+                    if remainder is not None:
+                        for p in range(d):
+                            for q in range(d):
+                                v += remainder[i, p, j, q] * block[k + p, m + q]
                     data[one, i, j] += v
                     if a != b:
                         data[other, j, i] += v
@@ -173,12 +177,12 @@ def _scatter(  # type: ignore[no-untyped-def]
 
 @kernel
 def add_stiffness(  # type: ignore[no-untyped-def]
-    data, indptr, indices, functions, offsets, weight, gradient, n_standard, lam, mu
+    data, indptr, indices, functions, offsets, weight, gradient, n_standard, lam, mu, remainder
 ):
     """Add the elastic stiffness of cells with enriched functions.
 
     Entry of functions a, b and components i, j: the integral of
-    lam G_ai G_bj + mu G_aj G_bi + mu delta_ij G_a . G_b.
+    lam G_ai G_bj + mu G_aj G_bi + mu delta_ij G_a . G_b, and remainder_ikjl G_ak G_bl.
 
     Parameters
     ----------
@@ -194,6 +198,8 @@ def add_stiffness(  # type: ignore[no-untyped-def]
     n_standard : int
     lam, mu : float
         Lamé constants.
+    remainder : (d, d, d, d) array or None
+        Stiffness besides. None is compiled for itself: isotropic bodies pay nothing.
     """
     m, n = functions.shape
     d = gradient.shape[2]
@@ -215,7 +221,9 @@ def add_stiffness(  # type: ignore[no-untyped-def]
             _products(begin, end, weight, gradient, place, active, plain, row, block)
         else:
             _products_by_blas(begin, end, weight, gradient, place, active, rows, block)
-        _scatter(data, indptr, indices, functions[e], place, at, active, plain, block, lam, mu)
+        _scatter(
+            data, indptr, indices, functions[e], place, at, active, plain, block, lam, mu, remainder
+        )
 
 
 @kernel
@@ -248,13 +256,13 @@ def gradient_products(offsets, weight, gradient, plain):  # type: ignore[no-unty
 
 @kernel
 def add_products(  # type: ignore[no-untyped-def]
-    data, indptr, indices, functions, products, n_standard, lam, mu
+    data, indptr, indices, functions, products, n_standard, lam, mu, remainder
 ):
     """Add the stiffness of cells whose products are known.
 
     Parameters
     ----------
-    data, indptr, indices, functions, n_standard, lam, mu : as of `add_stiffness`
+    data, indptr, indices, functions, n_standard, lam, mu, remainder : as of `add_stiffness`
     products : (m, n d, n d) array
         As of `gradient_products`.
     """
@@ -263,4 +271,7 @@ def add_products(  # type: ignore[no-untyped-def]
     for e in range(m):
         active, plain = _active(functions[e], n_standard, place)
         block = products[e]
-        _scatter(data, indptr, indices, functions[e], place, place, active, plain, block, lam, mu)
+        _scatter(
+            data, indptr, indices, functions[e], place, place, active, plain, block, lam, mu,
+            remainder,
+        )  # fmt: skip

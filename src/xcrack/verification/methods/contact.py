@@ -70,7 +70,7 @@ class Springs(ContactMethod):
         """Gaps at the points of one crack, and the stiffness there."""
         size = _size(model, model.lips[m.crack])
         stress = sp.csr_matrix((len(m.measure), model.space.n_dof))
-        eps = self.factor * problem.material.E / size
+        eps = self.factor * problem.material.largest_modulus / size
         return Rows(model.jumps[m.crack], stress, eps, m.measure)
 
     def solve_states(
@@ -195,7 +195,7 @@ class augmented_lagrangian(Springs):  # noqa: N801
         lips = model.lips[m.crack]
         size = np.asarray(m.values.T @ (lips.weight * _size(model, lips))) / m.measure
         stress = sp.csr_matrix((len(m.measure), model.space.n_dof))
-        eps = self.factor * problem.material.E / size
+        eps = self.factor * problem.material.largest_modulus / size
         return Rows(gap_rows(m, lips, model.jumps[m.crack]), stress, eps, m.measure)
 
     def system(self, engine: DirectSystem, rows: "Rows") -> "ClosedSystem":
@@ -253,7 +253,7 @@ class nitsche(Springs):  # noqa: N801
         mean = averaging(model.space, lips)
         size = np.minimum(_size(model, lips), tip_distance(model.space, c, lips))
         stress = sp.csr_matrix(mean @ stress_matrix(model.space, problem.material, c, lips))
-        eps = self.factor * problem.material.E / size
+        eps = self.factor * problem.material.largest_modulus / size
         return Rows(model.jumps[c], stress, eps, m.measure)
 
     def system(self, engine: DirectSystem, rows: "Rows") -> "ClosedSystem":

@@ -11,24 +11,25 @@ from xcrack.base.arrays import Floats
 from xcrack.fem.facets import LipPoints
 from xcrack.fem.function_space import FunctionSpace
 from xcrack.fem.quadrature import lip_side
-from xcrack.model.material import Isotropic
+from xcrack.model.material import Material
 from xcrack.model.states import LoadState
 
 
 def stress_matrix(
-    space: FunctionSpace, material: Isotropic, c: int, lips: LipPoints
+    space: FunctionSpace, material: Material, c: int, lips: LipPoints
 ) -> sp.csr_matrix:
     """Mean normal stress n . sigma . n at the lip points, of the strain alone `(q, n_dof)`.
 
     Parameters
     ----------
     space : FunctionSpace
-    material : Isotropic
+    material : Material
     c : int
         Crack.
     lips : LipPoints
     """
     d, share = space.dim, lip_shares(space, c, lips)
+    stiffness = material.tensor(d)
     rows, columns, values = [], [], []
     for s, sign in ((0, -1), (1, 1)):
         cell = lips.cell[:, s]
@@ -37,8 +38,8 @@ def stress_matrix(
             _, G = space.tabulate(batch, row, lips.bary[number, s], side[number])
             functions = batch.functions[row]
             normal = lips.normal[number]
-            along = 2 * material.mu * np.einsum("qnj,qj->qn", G, normal)
-            stress = material.lam * G + along[:, :, None] * normal[:, None]
+            across = np.einsum("ijkl,qi,qj->qkl", stiffness, normal, normal)
+            stress = np.einsum("qkl,qnl->qnk", across, G)
             stress *= share[number, s, None, None]
             acts = functions >= 0
             point = np.broadcast_to(number[:, None], functions.shape)[acts]
@@ -124,12 +125,12 @@ def tip_distance(space: FunctionSpace, c: int, lips: LipPoints) -> Floats:
     return np.asarray((total / np.maximum(size, 1e-300))[lips.segment])
 
 
-def steady_stress(material: Isotropic, lips: LipPoints, c: int, acting: LoadState) -> Floats:
+def steady_stress(material: Material, lips: LipPoints, c: int, acting: LoadState) -> Floats:
     """Normal stress that loads add to that of the strain `(q,)`: initial stress, given pressure.
 
     Parameters
     ----------
-    material : Isotropic
+    material : Material
     lips : LipPoints
     c : int
         Crack.

@@ -16,7 +16,7 @@ from xcrack.base.arrays import Bools, Floats, Ints, lock
 from xcrack.base.errors import ProblemError
 from xcrack.fem.function_space import FunctionSpace, Tip
 from xcrack.fem.williams import mode_matrix
-from xcrack.model.material import Isotropic
+from xcrack.model.material import Material
 from xcrack.model.numerics import TipBasis
 
 
@@ -33,14 +33,14 @@ class modal_basis(TipBasis):  # noqa: N801 - it is used as a function
         return dim
 
     def columns(
-        self, space: FunctionSpace, material: Isotropic | None, free: Bools
+        self, space: FunctionSpace, material: Material | None, free: Bools
     ) -> tuple[sp.csr_matrix, Bools]:
         """See `mode_columns`."""
         return mode_columns(space, material, free)
 
 
 def mode_columns(
-    space: FunctionSpace, material: Isotropic | None, free: Bools
+    space: FunctionSpace, material: Material | None, free: Bools
 ) -> tuple[sp.csr_matrix, Bools]:
     """Basis in which each enriched point has one unknown a mode, and which columns are in use.
 
@@ -53,7 +53,7 @@ def mode_columns(
     ----------
     space : FunctionSpace
         With four functions a tip.
-    material : Isotropic or None
+    material : Material or None
         The angular part of the modes depends on Poisson's ratio.
     free : (n_dof,) array of bool
         Unknowns that supports leave.
@@ -67,7 +67,7 @@ def mode_columns(
     if material is None:
         raise ProblemError("modal_basis needs the material of the body.")
     d = space.dim
-    modes = local_modes(material.kolosov, d)
+    modes = local_modes(material.at_tip().kolosov, d)
     rows, columns, values = [], [], []
     plain = np.ones(space.n_dof, dtype=bool)
     used = np.array(free)
