@@ -34,6 +34,7 @@ _HOME = {
     "traction": "model.loads",
     "pressure": "model.loads",
     "point_force": "model.loads",
+    "line_force": "model.loads",
     "body_force": "model.loads",
     "crack_pressure": "model.loads",
     "initial_stress": "model.loads",

@@ -110,6 +110,15 @@ ENTRIES = [
         xc.point_force,
         {"x": arg(Numbers((2,)), (0, 1)), "f": arg(Numbers((2,)), (1.0, 0.0))},
     ),
+    Entry(
+        "line_force",
+        xc.line_force,
+        {
+            "where": arg(Word(), "left", words=["facet set"]),
+            "beside": arg(Word(), "top", words=["facet set"]),
+            "f": arg(VECTOR, (0, 1), (0, 0, 1)),
+        },
+    ),
     Entry("body_force", xc.body_force, {"b": arg(VECTOR, (0, 1), words=["value"])}),
     Entry(
         "crack_pressure",

@@ -19,9 +19,10 @@ SOURCE = ROOT / "src" / "xcrack"
 LIMITS = Path(__file__).with_name("limits.json")
 FILES = sorted(SOURCE.rglob("*.py"))
 PACKAGES = sorted({p.relative_to(SOURCE).parts[0] for p in FILES if p.parent != SOURCE})
+FILES_OF_LAST_WAY = []  # of the interpreter that follows ways
 # Classes that answer for themselves: outside their package nobody asks which one it is.
 KINDS = {
-    "model": "displacement traction pressure bearing resultant point_force body_force "
+    "model": "displacement traction pressure bearing resultant point_force line_force body_force "
     "crack_pressure initial_stress temperature fix Isotropic",
     "fatigue": "paris elber walker piecewise forman hartman_schijve nasgro rate_table "
     "linear_closure schijve_closure newman_closure klesnil_lukas stepped_threshold el_haddad "
@@ -153,7 +154,9 @@ def way(operation):
         result = operation()
     finally:
         sys.setprofile(before)
-    return result, {"files": len({file for file, _ in entered}), "functions": len(entered)}
+    files = {file for file, _ in entered}
+    FILES_OF_LAST_WAY[:] = sorted(Path(file).relative_to(SOURCE).as_posix() for file in files)
+    return result, {"files": len(files), "functions": len(entered)}
 
 
 def plate():
@@ -203,5 +206,35 @@ def test_no_way_has_grown(request):
     check(json.loads(run.stdout.splitlines()[-1]), "ways", request)
 
 
+def test_files_of_the_walks_are_entered():
+    """Those that docs/developing.md lists; what it has in brackets is of 3D."""
+    page = (ROOT / "docs" / "developing.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| (a solve|K|a growth step) \| ([^|]*) \|$", page, re.MULTILINE)
+    assert [name for name, _ in rows] == ["a solve", "K", "a growth step"]
+    run = subprocess.run(
+        [sys.executable, __file__, "files"], capture_output=True, text=True, check=False
+    )
+    assert run.returncode == 0, run.stderr
+    entered = json.loads(run.stdout.splitlines()[-1])
+    for name, row in rows:
+        files = re.findall(r"`([\w/]+\.py)`", re.sub(r"\([^)]*\)", "", row))
+        assert len(files) >= 5
+        assert set(files) <= set(entered[name]), name
+
+
+def files_in_2d():
+    """Files that a solve, K and the second step of growth enter in the plane."""
+    law, cycle = xc.paris(1e-3, 3.0), xc.Cycle(0.0, 1.0)
+    solution, _ = way(lambda: xc.solve(plate()))
+    files = {"a solve": list(FILES_OF_LAST_WAY)}
+    way(lambda: xc.stress_intensity(solution))
+    files["K"] = list(FILES_OF_LAST_WAY)
+    run = xc.grow(plate(), law, xc.max_hoop_stress, cycle, da=0.1, progress=False)
+    next(run)
+    way(lambda: next(run))
+    files["a growth step"] = list(FILES_OF_LAST_WAY)
+    return files
+
+
 if __name__ == "__main__":
-    print(json.dumps(ways()))
+    print(json.dumps(files_in_2d() if "files" in sys.argv else ways()))

@@ -12,6 +12,7 @@ NAMES = [
     # scene
     "Crack", "Isotropic", "Mesh", "Numerics", "Problem",
     "body_force", "box", "crack_pressure", "displacement", "fix", "initial_stress", "line_crack",
+    "line_force",
     "penny_crack", "elliptic_crack", "plane_crack", "surface_crack", "read_surface",
     "notched_cylinder", "plate", "plate_with_hole", "point_force", "pressure", "read_mesh",
     "mesh_step", "read_field", "bearing", "resultant", "temperature",

@@ -13,6 +13,7 @@ NUMBER: Dimension = (0.0, 0.0)
 LENGTH: Dimension = (1.0, 0.0)
 FORCE: Dimension = (0.0, 1.0)
 STRESS: Dimension = (-2.0, 1.0)
+LINE_FORCE: Dimension = (-1.0, 1.0)
 BODY_FORCE: Dimension = (-3.0, 1.0)
 TOUGHNESS: Dimension = (-1.5, 1.0)
 MOMENT: Dimension = (1.0, 1.0)
@@ -20,6 +21,7 @@ TEMPERATURE = PER_TEMPERATURE = NUMBER  # degrees have no conversions
 
 _NAMES: Mapping[Dimension, str] = {
     NUMBER: "a plain number", LENGTH: "a length", FORCE: "a force", STRESS: "a stress",
+    LINE_FORCE: "a force by length",
     BODY_FORCE: "a force by volume", TOUGHNESS: "a stress times √length",
 }  # fmt: skip
 _LENGTHS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "in": 0.0254}

@@ -1,11 +1,12 @@
 """Loads: what acts on a body. Each says itself what it does; nobody asks which one it is.
 
 A load of your own derives from `Load`, names what it has in `acts`, and answers those questions
-alone (docs/developing.md).
+alone (docs/add_a_load.md).
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from itertools import combinations
 from math import pi
 from typing import Annotated, Any, ClassVar
 
@@ -19,6 +20,7 @@ from xcrack.base.units import (
     BODY_FORCE,
     FORCE,
     LENGTH,
+    LINE_FORCE,
     MOMENT,
     PER_TEMPERATURE,
     STRESS,
@@ -469,6 +471,72 @@ class point_force(Load):  # noqa: N801
         """The nearest mesh point, and the force."""
         x = np.asarray(self.x)
         return np.array([nearest_point(mesh, x, self.kind)]), np.asarray(self.f)[None]
+
+
+@dataclass(frozen=True, eq=False)
+class line_force(Load):  # noqa: N801
+    """Force along the edge in which two facet sets meet; in 2D at the point in which they meet.
+
+    It is spread to the mesh points of the edge, as linear functions along it ask for. Where a crack
+    crosses the edge, half of what acts on the edge of that cell goes to each side.
+
+    Parameters
+    ----------
+    where, beside : str
+        Names of the two facet sets.
+    f : (d,) array or callable, force / length (in 2D force per thickness)
+        Vector, or f(x) -> (n, d).
+
+    Raises
+    ------
+    ProblemError
+        Something else than these, or sets without a common edge.
+    """
+
+    where: Annotated[str, SetName()]
+    beside: Annotated[str, SetName()]
+    f: Annotated[ArrayLike | Callable[..., ArrayLike], VectorField(unit=LINE_FORCE)]
+    acts = frozenset({"point_force"})
+
+    @property
+    def name(self) -> str:
+        """What messages and reports call it."""
+        return f"line_force({self.where!r}, {self.beside!r})"
+
+    def check(self, problem: Any) -> None:
+        """Raise where it has another dimension than the body, or there is no such edge."""
+        super().check(problem)
+        self._edges(problem.mesh)
+
+    def _edges(self, mesh: Mesh) -> Ints:
+        """Segments of the edge `(k, 2)`; points `(k, 1)` in 2D."""
+        sides = []
+        for name in (self.where, self.beside):
+            facets = np.sort(facet_set(mesh, name, self.kind), axis=1)
+            corners = combinations(range(mesh.dim), mesh.dim - 1)
+            sides.append(np.unique(np.concatenate([facets[:, c] for c in corners]), axis=0))
+        both, count = np.unique(np.concatenate(sides), axis=0, return_counts=True)
+        edges = both[count == 2]
+        if not len(edges):
+            raise ProblemError(
+                f"{self.name}: the sets {self.where!r} and {self.beside!r} have no edge in common: "
+                "name two sets of the boundary that meet."
+            )
+        return edges
+
+    def point_forces(self, mesh: Mesh) -> tuple[Ints, Floats]:
+        """Forces at the points of the edge; the rule is exact up to cubic f N."""
+        edges = self._edges(mesh)
+        if mesh.dim == 2:
+            number = edges[:, 0]
+            return number, vector_at(self.f, mesh.points[number], self.kind)
+        number, start, end = edges.ravel(), *mesh.points[edges].transpose(1, 0, 2)
+        half = np.linalg.norm(end - start, axis=1)[:, None] / 2
+        force = np.zeros((*edges.shape, mesh.dim))
+        for s in (0.5 - 12**-0.5, 0.5 + 12**-0.5):  # two points of Gauss
+            value = half * vector_at(self.f, (1 - s) * start + s * end, self.kind)
+            force += np.stack([(1 - s) * value, s * value], axis=1)
+        return number, force.reshape(-1, mesh.dim)
 
 
 @dataclass(frozen=True, eq=False)
