@@ -1,5 +1,6 @@
 """K from elsewhere than a solution: handbooks in plane and space, wrapped answers, refusals."""
 
+import warnings
 from dataclasses import replace
 
 import numpy as np
@@ -166,3 +167,28 @@ def test_stations_of_a_front_are_its_vertices_in_the_body():
     sif = xc.stress_intensity(xc.solve(problem))
     assert np.allclose(problem.stations.x, sif.x, atol=1e-12)
     assert np.allclose(problem.stations.frame, sif.frame, atol=1e-9)
+
+
+def torn(share):
+    """Steps of a penny whose K_III is a share of K_I on one side of it."""
+
+    def response(problem, states, reuse, bars):
+        x = problem.stations.x
+        K = np.stack([np.full(len(x), 100.0), 0 * x[:, 0], share * 100.0 * (x[:, 0] > 0)], axis=1)
+        return xc.Response.of_K(problem, states, [float(s) * K for s in states])
+
+    body = xc.box((-1, -1, -1), (1, 1, 1), 8)
+    crack = xc.penny_crack(center=(0, 0, 0.04), normal=(0, 0, 1), radius=0.5)
+    problem = xc.Problem(body, xc.Isotropic(210e3, 0.3), [crack], [xc.fix("bottom")])
+    return list(xc.grow(problem, xc.paris(1e-9, 3.0), xc.max_hoop_stress, xc.Cycle(0.0, 1.0),
+                        da=0.1, max_steps=2, response=response, progress=False))  # fmt: skip
+
+
+def test_mode_III_beyond_its_threshold_is_named_once():
+    """.521 for nu = .3 (Leblond, Karma and Lazarus, 2011)."""
+    with pytest.warns(xc.XcrackWarning, match=r"crack 0: \|K_III\| is 0.55 K_I at .* Above 0.52"):
+        steps = torn(0.55)
+    assert ["segments" in " ".join(step.warnings) for step in steps] == [True, False]
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        torn(0.5)

@@ -2,6 +2,7 @@
 
 from collections.abc import Generator, Mapping, Sequence
 from dataclasses import replace
+from math import inf, sqrt
 from typing import Unpack
 
 import numpy as np
@@ -183,7 +184,7 @@ def steps_of(
     if run.estimates:
         run = prepared(run, steps_of, done, meshes)
     notices, progress = WarningLog(), Progress(run)
-    kink = ""
+    kink, is_torn = "", False
     try:
         if last is None:
             with notices.watch(0) as messages:
@@ -196,6 +197,7 @@ def steps_of(
                     first, reuse = _next_step(run, run.problem, None, SolverState(), settings)
                 _warn_of_ratio(run, first)
                 warn_of_left_out(run, first)
+                is_torn = _warn_of_mode_III(run, first)
             last = replace(first, warnings=tuple(messages))
             progress.step(last)
             yield last
@@ -223,6 +225,7 @@ def steps_of(
                 next_step, reuse, ended = _after(run, last, plan, reuse)
                 if next_step is None:
                     break
+                is_torn = is_torn or _warn_of_mode_III(run, next_step)
                 own = len(messages)
                 other = again(asked, run, steps_of, last, next_step)
                 if other is not None:
@@ -291,6 +294,37 @@ def _after(
 
 def _stopped(last: Step, error: Exception) -> str:
     return f"the cracks cannot go on after step {last.index}, N = {last.cycles:.6g}: {error}"
+
+
+_OF_LARGEST = 0.1  # K_I below this share of the largest of a front compares with nothing
+
+
+def _warn_of_mode_III(run: GrowthRule, step: Step) -> bool:
+    """Warn where a front is unstable under K_III, and would break into segments.
+
+    Above |K_III| / K_I = √((1 - nu)(2 - 3 nu) / (3 (2 - nu) - 4 √2 (1 - 2 nu))) a straight front is
+    unstable (Leblond, Karma and Lazarus, 2011); below nu of -.04 it never is.
+    """
+    if run.problem.mesh.dim == 2:
+        return False
+    nu = run.problem.material.at_tip().nu
+    growth = 3 * (2 - nu) - 4 * sqrt(2) * (1 - 2 * nu)
+    limit = sqrt((1 - nu) * (2 - 3 * nu) / growth) if growth > 0 else inf
+    for c, states in enumerate(zip(*step.sif, strict=True)):
+        K = np.stack([state.K for state in states])
+        K_I, K_III = K[..., 0], np.abs(K[..., 2])
+        counts = (K_I > _OF_LARGEST * K_I.max(initial=0.0)) & ~states[0].at_surface
+        ratio = np.divide(K_III, K_I, out=np.zeros_like(K_I), where=counts)
+        if ratio.max(initial=0.0) > limit:
+            state, place = np.unravel_index(np.argmax(ratio), ratio.shape)
+            warn(
+                f"crack {c}: |K_III| is {ratio[state, place]:.2g} K_I at "
+                f"{np.round(states[0].x[place], 6).tolist()}. Above {limit:.2g} a front breaks "
+                "into segments that turn out of its surface; xcrack grows it as one, and its rate "
+                "is a guess there."
+            )
+            return True
+    return False
 
 
 def _warn_of_ratio(run: GrowthRule, first: Step) -> None:
