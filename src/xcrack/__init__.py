@@ -89,6 +89,7 @@ _HOME = {
     "Step": "growth.step",
     "Join": "growth.step",
     "grow": "growth.run",
+    "check": "growth.check",
     "Response": "growth.response",
     "respond": "growth.response",
     "life": "runs.life",

@@ -25,7 +25,7 @@ NAMES = [
     # growth
     "Cycle", "History", "Step", "collect", "elber", "equivalent_K", "grow", "max_hoop_stress",
     "mean_reference", "paris", "resume", "walker", "weighted_angle", "cycles_between", "load",
-    "draw_fronts", "Join", "Response", "respond",
+    "draw_fronts", "Join", "Response", "respond", "check",
     # laws
     "el_haddad", "forman", "hartman_schijve", "klesnil_lukas", "law", "linear_closure", "nasgro",
     "nasgro_K_c", "nasgro3_threshold", "nasgro4_threshold", "newman_closure", "piecewise",

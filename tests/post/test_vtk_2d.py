@@ -6,7 +6,8 @@ import pytest
 
 import xcrack as xc
 from xcrack.mesh.mesh import local_edges
-from xcrack.output.pieces import lips_of, pieces, von_mises
+from xcrack.model.material import von_mises
+from xcrack.output.pieces import lips_of, pieces
 
 CRACKS = {
     "edge": [(-1.2, 0.03), (0.083, 0.047)],

@@ -111,8 +111,10 @@ def test_report_of_a_solution(tmp_path):
     assert closed[1] > 0.9
     assert "(0, 160)" in text  # resultant of 80 over the width of 2, in the last state reversed
     zone = next(note for note in numbers["assumptions"]["validity"] if "Plastic zone" in note)
-    largest = np.abs(sif.K).max()
-    assert f"{(largest / 300) ** 2 / (2 * np.pi):.4g}" in zone
+    largest = float(re.search(r"for the largest K ([\d.]+):", zone)[1])
+    K_eq = xc.max_hoop_stress(np.stack([0 * sif.K, sif.K]), 0.3)[1]
+    assert largest == pytest.approx(K_eq.max(), rel=1e-5)  # digits in the text
+    assert f"of {(largest / 300) ** 2 / (6 * np.pi):.3g}" in zone  # plane strain
     ingredients = numbers["assumptions"]["ingredients"]
     assert set(ingredients) == {row.name for row in solutions[0].report.ingredients}
     assert numbers["again"]["hashes"].keys() == {"mesh", "cracks"}
@@ -392,16 +394,18 @@ def test_an_older_page_outlives_a_full_disk(tmp_path):
 
 
 def test_a_plastic_zone_as_large_as_the_crack_is_a_warning(tmp_path):
-    """(K/yield)²/2π of a far stress above yield, against the crack inside the body."""
+    """(K/yield)²/6π of a far stress above yield, against the crack inside the body."""
     loads = [xc.traction("top", (0, 400.0)), xc.traction("bottom", (0, -400.0))]
     crack = xc.line_crack([(-3, 0.3), (4, 0.3)])
     problem = xc.Problem(xc.box((0, -20), (20, 20), (20, 40)), STEEL, [crack], loads=loads)
     solution = xc.solve(problem)
-    with pytest.warns(xc.XcrackWarning, match=r"% of the shortest crack.* does not hold") as record:
+    words = r"over the length of its crack is .* does not hold"
+    with pytest.warns(xc.XcrackWarning, match=words) as record:
         _, _, numbers = read(xc.report(solution, tmp_path / "r.html", yield_stress=345.0))
     K = np.abs(xc.stress_intensity(solution).K[:, :2]).max()
-    share = re.search(r"([\d.]+) % of the shortest crack", str(record[0].message))
-    assert float(share[1]) == pytest.approx(100 * (K / 345) ** 2 / (2 * np.pi) / 4.0, rel=5e-3)
+    share = re.search(r"its crack is ([\d.]+),", " ".join(str(each.message) for each in record))
+    zone = (K / 345) ** 2 / (6 * np.pi)  # plane strain: a third of that of plane stress
+    assert float(share[1]) == pytest.approx(zone / 4.0, rel=5e-3)  # K_II is next to nothing
     assert any("does not hold" in text for text in numbers["warnings"]["messages"])
     with warnings.catch_warnings():
         warnings.simplefilter("error", xc.XcrackWarning)

@@ -9,13 +9,14 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.linalg import LinearOperator, cg
 
+from xcrack.analysis.alarms import alarms_of_solutions
 from xcrack.analysis.contact import contact_of, solve_contact
 from xcrack.analysis.friction import slip_of
 from xcrack.analysis.report import report, resultants
 from xcrack.analysis.solution import FactoredSolution, Solution
 from xcrack.base.arrays import Bools, Floats, lock
 from xcrack.base.checks import entries, flag, value_text
-from xcrack.base.errors import ProblemError
+from xcrack.base.errors import ProblemError, warn
 from xcrack.base.threads import one_blas_thread, threads
 from xcrack.fem.assembly import MeshLoad, body_forces, next_to_enriched
 from xcrack.fem.loads import body_points, load_vector, mesh_loads, on_mesh, position
@@ -128,6 +129,11 @@ def solve(
         without an order where there is friction.
     ConvergenceError
         A singular stiffness, or contact that finds no closed set.
+
+    Warns
+    -----
+    XcrackWarning
+        Nothing acts, or displacements above 2 % of the body that are more likely a slip of units.
     """
     check_problem(problem, "solve")
     if solver is not None and not callable(solver):
@@ -141,6 +147,8 @@ def solve(
     error = flag(error, "solve: error")
     load_states = [None] if states is None else states
     solutions = solve_states(problem, load_states, solver=solver, error=error)
+    for alarm in alarms_of_solutions(solutions, stresses=False):
+        warn(str(alarm))
     return solutions[0] if states is None else solutions
 
 

@@ -8,14 +8,13 @@ import numpy as np
 
 from xcrack.base.arrays import Floats, coordinates
 from xcrack.base.checks import call_function, numbers
-from xcrack.crack.lines import crossing_points
 from xcrack.fatigue.criteria import clipped_K, equivalent_K
 from xcrack.fem.system import discretise
 from xcrack.growth.follow import following, place_name
-from xcrack.growth.follow_2d import exit_ahead
 from xcrack.growth.joins_2d import new_ends, new_unions
 from xcrack.growth.options import GrowthRule
 from xcrack.growth.step import Advance, Arrival, Join, Step, directions, memory_of
+from xcrack.growth.validity import ahead_of
 from xcrack.linalg.rigid_motion import pieces
 from xcrack.mesh.locate import cell_extents
 from xcrack.model.problem import Problem
@@ -56,15 +55,9 @@ def ligaments(run: GrowthRule, step: Step) -> list[Ligament]:
     ahead = np.array([directions(step, c)[j] for c, j in tips]).reshape(-1, 2)
     result = []
     for i, tip in enumerate(tips):
-        hit = exit_ahead(x[i], ahead[i], run.problem.mesh)
-        if hit is not None:
-            way = np.stack([x[i], hit[0]])
-            met = [(float(np.linalg.norm(hit[0] - x[i])), repr(hit[1]))]
-            for c, crack in enumerate(step.cracks):
-                crossed = crossing_points(way, crack.points) if c != tip[0] else way[:0]
-                met += [(float(np.linalg.norm(y - x[i])), f"crack {c}") for y in crossed]
-            length, name = min(met)
-            result.append(Ligament(length, tip, None, name))
+        met = ahead_of(x[i], ahead[i], tip[0], step.cracks, run.problem.mesh)
+        if met is not None:
+            result.append(Ligament(met.length, tip, None, met.label))
         for k in range(i):
             gap = x[k] - x[i]
             if gap @ ahead[i] > 0 > gap @ ahead[k]:
@@ -126,13 +119,14 @@ def end_at(run: GrowthRule, step: Step) -> str:
                 f"K_c reached: the law returned da/dN = inf for dK_eq = {step.dK_eq[c][j]:.6g}, "
                 f"R = {step.R[c][j]:.6g} at {place_name(run.problem.mesh, step, c, j)}"
             )
-    if run.K_c is not None:
+    K_c = run.toughness
+    if K_c is not None:
         for c in range(len(step.cracks)):
             K = clipped_K(np.stack([state[c].K for state in step.sif]))
             K_eq = equivalent_K(K, step.angle[c], run.problem.material.at_tip().nu).max(axis=0)
-            for j in np.nonzero(K_eq >= run.K_c)[0].tolist():
+            for j in np.nonzero(K_eq >= K_c)[0].tolist():
                 place = place_name(run.problem.mesh, step, c, j)
-                return f"K_c reached: K_eq = {K_eq[j]:.6g} >= {run.K_c:.6g} at {place}"
+                return f"K_c reached: K_eq = {K_eq[j]:.6g} >= {K_c:.6g} at {place}"
     full = yielded(run, step)
     if full:
         return full

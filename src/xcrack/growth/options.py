@@ -192,6 +192,13 @@ class GrowthRule:
         """Whether K has error bars, which its growth is held against."""
         return self.tolerance is not None and not self.scouts
 
+    @property
+    def toughness(self) -> float | None:
+        """Toughness at which the run ends: its own, or that of the material; a scout has none."""
+        if self.scouts or self.K_c is not None:
+            return self.K_c
+        return self.problem.material.K_c
+
     def _check_tolerance(self) -> None:
         if self.tolerance is None:
             if self.max_unknowns is not None:

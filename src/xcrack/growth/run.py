@@ -14,6 +14,7 @@ from xcrack.fatigue.criteria import Criterion
 from xcrack.fatigue.law import Law
 from xcrack.fatigue.spectrum import Spectrum
 from xcrack.growth import joining
+from xcrack.growth.alarms import alarm_of_life, alarms_of_step
 from xcrack.growth.arrivals import arrivals_of, last_step
 from xcrack.growth.ending import (
     cut_off,
@@ -103,7 +104,8 @@ def grow(
         factors, with zones kept at each tip, or place along a front. `cycles` of a step are that;
         its `rate` stays that of the law.
     K_c : float, stress √length, optional
-        Stop when the K_eq of any tip in any state reaches it.
+        Stop when the K_eq of any tip in any state reaches it; where it is left out, that of the
+        material.
     link_up : plastic_zone or callable K -> length, optional
         In 2D: stop when plastic zones fill a ligament: those of two tips that head for each other
         add up, that of one tip reaches what lies straight ahead, a hole, a side or another crack.
@@ -139,6 +141,8 @@ def grow(
     Warns
     -----
     XcrackWarning
+        What `check` finds: numbers at the first step that are more likely slips of units, and where
+        linear elasticity does not hold.
         A tolerance that is not met, with the source of the error and what to do; a mesh that would
         have more than `max_unknowns`.
         A turn by more than 10 degrees with an advance below the cell along the path; R < 0 asked
@@ -171,6 +175,11 @@ def grow(
     return steps_of(run_of("grow", problem, law, criterion, cycle, da, options))
 
 
+def first_step(run: GrowthRule) -> Step:
+    """The first step of a run alone, on the mesh as it is."""
+    return _next_step(run, run.problem, None, SolverState(), run.settings)[0]
+
+
 def steps_of(
     run: GrowthRule, done: Sequence[Step] = (), meshes: Sequence[Mesh] = ()
 ) -> Generator[Step, None, str]:
@@ -181,6 +190,7 @@ def steps_of(
     check_choice(run.law, run.cycle.ratio)
     settings = run.settings  # before a law is called that may change what it reads
     asked, last = run, done[-1] if done else None
+    ended = ""
     if run.estimates:
         run = prepared(run, steps_of, done, meshes)
     notices, progress = WarningLog(), Progress(run)
@@ -198,6 +208,7 @@ def steps_of(
                 _warn_of_ratio(run, first)
                 warn_of_left_out(run, first)
                 is_torn = _warn_of_mode_III(run, first)
+                _warn_of_alarms(run, first)
             last = replace(first, warnings=tuple(messages))
             progress.step(last)
             yield last
@@ -230,6 +241,8 @@ def steps_of(
                 other = again(asked, run, steps_of, last, next_step)
                 if other is not None:
                     del messages[:own]  # of a step that nobody has
+                else:
+                    _warn_of_alarms(run, next_step)
             if other is not None:
                 reuse = reuse if other[0] is run else memory_of(last).reuse
                 run, last = other[0], other[1] or last
@@ -241,12 +254,22 @@ def steps_of(
                 break
     finally:
         notices.summarise()
+        if ended and last is not None and not run.scouts:
+            alarm = alarm_of_life(run, last, ended)
+            if alarm is not None:
+                warn(str(alarm))
         short = "" if last is None or not run.estimates else shortfall(run, last)
         if short:
             warn(short)
         progress.close()
     progress.end(ended)
     return ended
+
+
+def _warn_of_alarms(run: GrowthRule, step: Step) -> None:
+    if not run.scouts:
+        for alarm in alarms_of_step(run, step):
+            warn(str(alarm))
 
 
 def _after(

@@ -1,6 +1,6 @@
 """What a body is made of: linear elastic materials."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, fields
 from typing import Annotated
 
 import numpy as np
@@ -9,7 +9,7 @@ from xcrack.base.arguments import Choice, Declared, Number
 from xcrack.base.arrays import Floats
 from xcrack.base.checks import numbers, value_text
 from xcrack.base.errors import ProblemError
-from xcrack.base.units import STRESS
+from xcrack.base.units import STRESS, TOUGHNESS
 
 _VOIGT = np.array([[0, 5, 4], [5, 1, 3], [4, 3, 2]])  # rows of stiffness by component
 _ROUND_OFF = 1e-12  # of the largest entry of a stiffness
@@ -20,6 +20,7 @@ _WRONG_PLANE = {
     "(read_mesh drops a constant z).",
 }
 _PLANES = ("strain", "stress")
+_JUDGES = {"changes_results": False}  # what results are judged by, not what they are
 
 
 class Material(Declared):
@@ -34,9 +35,15 @@ class Material(Declared):
     ----------
     plane : {"strain", "stress"} or None
         State of a 2D body; None in 3D.
+    yield_stress : float, stress, or None
+        What plastic zones and stresses are judged by; where it is None they are not.
+    K_c : float, stress √length, or None
+        Toughness at which growth ends.
     """
 
     plane: str | None = None
+    yield_stress: float | None = None
+    K_c: float | None = None
 
     @property
     def kind(self) -> str:
@@ -161,6 +168,16 @@ class Material(Declared):
         return Isotropic(2 * mu * (1 + nu), nu, plane)
 
 
+def von_mises(stress: Floats) -> Floats:
+    """Von Mises stress `(...)` of full stress tensors `(..., 3, 3)`.
+
+    >>> float(von_mises(np.diag([2.0, 0.0, 0.0])))
+    2.0
+    """
+    deviator = stress - np.trace(stress, axis1=-2, axis2=-1)[..., None, None] / 3 * np.eye(3)
+    return np.asarray(np.sqrt(1.5 * np.einsum("...ij,...ij->...", deviator, deviator)))
+
+
 def isotropic_tensor(lam: float, mu: float, dim: int) -> Floats:
     """Stiffness `(dim, dim, dim, dim)` of Lamé's constants."""
     C = np.zeros((dim,) * 4)
@@ -196,11 +213,16 @@ class Isotropic(Material):
         Poisson's ratio.
     plane : {"strain", "stress"}, optional
         State of a 2D body; None in 3D.
+    yield_stress : float, stress, optional
+        Lets plastic zones be compared with crack and ligament, and stresses with it: see `check`.
+    K_c : float, stress √length, optional
+        Toughness: growth ends where K reaches it, unless `grow` is given another one.
 
     Raises
     ------
     ProblemError
-        E <= 0, nu outside (-1, 0.5), or another word for `plane`.
+        E <= 0, nu outside (-1, 0.5), another word for `plane`, or a yield stress or toughness that
+        is not above 0.
 
     Examples
     --------
@@ -216,6 +238,17 @@ class Isotropic(Material):
     plane: Annotated[
         str | None, Choice(_PLANES, needs='"strain" or "stress" in 2D, nothing in 3D')
     ] = None
+    yield_stress: Annotated[float | None, Number(above=0, unit=STRESS)] = field(
+        default=None, metadata=_JUDGES
+    )
+    K_c: Annotated[float | None, Number(above=0, unit=TOUGHNESS)] = field(
+        default=None, metadata=_JUDGES
+    )
+
+    def __repr__(self) -> str:
+        given = {f.name: getattr(self, f.name) for f in fields(self)}
+        parts = [f"{name}={value!r}" for name, value in given.items() if value is not None]
+        return f"Isotropic({', '.join(parts)})"
 
     def stiffness(self) -> Floats:
         """Stiffness in space `(6, 6)`, stress."""

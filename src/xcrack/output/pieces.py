@@ -202,16 +202,6 @@ class Pieces:
         return lock(((heaviside > 0) + 2 * space.has_tip)[self.cell].astype(np.int64))
 
 
-def von_mises(stress: Floats) -> Floats:
-    """Von Mises stress `(...)` of full stress tensors `(..., 3, 3)`.
-
-    >>> float(von_mises(np.diag([2.0, 0.0, 0.0])))
-    2.0
-    """
-    deviator = stress - np.trace(stress, axis1=-2, axis2=-1)[..., None, None] / 3 * np.eye(3)
-    return np.asarray(np.sqrt(1.5 * np.einsum("...ij,...ij->...", deviator, deviator)))
-
-
 def pieces(solution: Solution) -> Pieces:
     """Cut the body of a solution into pieces and evaluate the solution on them."""
     space = solution.space

@@ -16,8 +16,9 @@ from xcrack.base.errors import ProblemError, XcrackError
 from xcrack.base.optional import require_package
 from xcrack.base.paths import path_of, system_errors, written_whole
 from xcrack.crack.measures import measures
+from xcrack.model.material import von_mises
 from xcrack.output.lip_faces_3d import lip_faces
-from xcrack.output.pieces import Pieces, lips_of, pieces, von_mises
+from xcrack.output.pieces import Pieces, lips_of, pieces
 from xcrack.sif.common import lip_shear
 from xcrack.sif.sif import SIF
 

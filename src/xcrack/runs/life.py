@@ -9,11 +9,12 @@ from numpy.typing import NDArray
 
 from xcrack.base.arrays import Floats, lock
 from xcrack.base.checks import number, value_text, whole_number
-from xcrack.base.errors import ProblemError
+from xcrack.base.errors import ProblemError, warn
 from xcrack.fatigue.criteria import Criterion
 from xcrack.fatigue.law import Law
 from xcrack.fatigue.retardation import Retardation
 from xcrack.fatigue.spectrum import Spectrum
+from xcrack.growth.validity import validity
 from xcrack.runs.history import History
 from xcrack.runs.rerating import (
     DrivingForce,
@@ -171,6 +172,12 @@ def life(
         a0 below the first crack (more than a hundredth of the samples), or with several tips;
         several tips that would have shared the advance another way by more than 5 %.
 
+    Warns
+    -----
+    XcrackWarning
+        Linear elasticity does not hold from some cycle on: a step with its solutions says so, where
+        the material has a yield stress.
+
     Notes
     -----
     Sources "steps" and "K": those of `History.life_bar` where the run estimated them, contact and
@@ -195,6 +202,7 @@ def life(
     n = whole_number(sample_count, "life: samples", least=100, most=10_000_000)
     block = block_of_run("life", spectrum, criterion, nu, threshold)
     limit = number(max_blocks, "life: max_blocks", above=0)
+    _warn_of_validity(history)
     if retardation is not None:
         cycled = RetardedLives(history, law, block, retardation, limit)
         return _retarded_lives(cycled, history, law, scatter, block, n, seed, unit)
@@ -211,6 +219,26 @@ def life(
     }
     word = unit or ("cycle" if block is None else block.spectrum.unit)
     return Life(lock(N + history.steps[0].cycles), history.life, alone, bounds, word)
+
+
+def _warn_of_validity(history: History) -> None:
+    """Say from which cycle on linear elasticity does not hold, where the yield stress is known."""
+    for step in history.solved:
+        if not step.solutions:
+            continue
+        problem = step.solutions[0].problem
+        if problem.material.yield_stress is None:
+            continue
+        mesh = problem.mesh
+        known = validity(problem.material, mesh, step.cracks, step.sif, step.solutions)
+        alarms = [] if known is None else known.alarms()
+        if alarms:
+            share = 1 - step.cycles / history.life if history.life > 0 else 1.0
+            warn(
+                f"life: from N = {step.cycles:.6g} on, {share:.2%} of the life, linear elasticity "
+                f"does not hold: {alarms[0]}"
+            )
+            return
 
 
 def _bounds(

@@ -55,8 +55,8 @@ def report(
         Of the page; ``.html`` is added where it has no suffix.
     title : str
     yield_stress : float, stress, optional
-        Lets the report compare plastic zones with crack and cell; a zone above 15 % of the
-        shortest crack, where K of linear elasticity does not hold, is a warning.
+        In place of that of the material: lets the report compare plastic zones with crack,
+        ligament and cell. What `check` says of them is a warning.
     life : Life, optional
         What `xc.life` made of the run: the report shows it and what drives it.
     inspection : Inspection, optional
@@ -92,8 +92,7 @@ def report(
         )
     source = source_of(result, title, yield_stress, life)
     source = replace(source, inspection=inspection, strength=strength)
-    words, is_small = scene.plastic_zone(source)
-    if not is_small:
+    for words in scene.plastic_zone(source)[1]:
         warn(words)
         source.warnings.update([words])
     sections = [made for make in SECTIONS if (made := make(source)) is not None]

@@ -14,8 +14,6 @@ from xcrack.model.supports import Condition
 from xcrack.runs.versions import versions
 from xcrack.view.report_source import Section, Source
 
-_SMALL = 0.15  # share of the crack up to which a plastic zone counts as small
-
 
 def scene(source: Source) -> Section:
     """Body, material, cracks, supports, and each load with its resultant."""
@@ -148,31 +146,25 @@ def _notes(source: Source) -> list[str]:
     return notes
 
 
-def plastic_zone(source: Source) -> tuple[str, bool]:
-    """Size of the plastic zone against the shortest crack, and whether elastic K holds with it."""
-    if source.yield_stress is None:
-        words = ("Plastic zones were not judged: give report(..., yield_stress=...) to have them "
-                 "compared with crack and cell.")  # fmt: skip
-        return words, True
-    every = [sif.K[:, :2] for state in source.sif for sif in state]
-    largest = max((float(np.abs(K).max(initial=0.0)) for K in every), default=0.0)
-    radius = (largest / source.yield_stress) ** 2 / (2 * np.pi)
-    lengths = {"shortest crack": _smallest_size(source), "smallest cell": _cell(source)}
-    words = ", ".join(f"{100 * radius / v:.3g} % of the {name}" for name, v in lengths.items()
-                      if v > 0)  # fmt: skip
-    is_small = radius <= _SMALL * lengths["shortest crack"] or not source.cracks
-    verdict = "small" if is_small else "NOT small: linear elastic K does not hold"
-    return (f"Plastic zone (Irwin, plane stress) (K/yield)²/2π = {radius:.4g} for the largest K "
-            f"{largest:.6g}: {words}; {verdict}."), is_small  # fmt: skip
-
-
-def _smallest_size(source: Source) -> float:
-    """Smallest size of a crack: its length inside the body in 2D, its extent in 3D."""
-    mesh = source.mesh
-    if source.dim == 2 and mesh is not None:
-        return min((measures(crack, mesh).area for crack in source.cracks), default=0.0)
-    sizes = [float(np.ptp(crack.points, axis=0).max()) for crack in source.cracks]
-    return min(sizes, default=0.0)
+def plastic_zone(source: Source) -> tuple[str, list[str]]:
+    """Plastic zones against crack, ligament and cell in words, and what is beyond its limit."""
+    known = source.validity
+    if known is None or np.isnan(known.zone):
+        words = ("Plastic zones and net sections were not judged: no yield stress is known. Give "
+                 "Isotropic(..., yield_stress=...), or report(..., yield_stress=...).")  # fmt: skip
+        return words, [] if known is None else [str(alarm) for alarm in known.alarms()]
+    shares = {"crack": known.of_crack, "ligament ahead": known.of_ligament}
+    if _cell(source) > 0:
+        shares["smallest cell"] = known.zone / _cell(source)
+    parts = ", ".join(f"{100 * share:.3g} % of the {of}" for of, share in shares.items()
+                      if not np.isnan(share))  # fmt: skip
+    alarms = [str(alarm) for alarm in known.alarms()]
+    verdict = "NOT small: linear elastic K does not hold" if alarms else "small"
+    words = (f"Plastic zone (Irwin, plane {known.state}) of {known.zone:.4g} for the largest K "
+             f"{known.K:.6g}: at most {parts}; {verdict}.")  # fmt: skip
+    if not np.isnan(known.of_section):
+        words += f" Net section: {100 * known.of_section:.3g} % of the load at which it yields."
+    return words, alarms
 
 
 def _cell(source: Source) -> float:

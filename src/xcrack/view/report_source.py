@@ -4,6 +4,7 @@ import hashlib
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -16,7 +17,9 @@ from xcrack.base.errors import ProblemError, XcrackError, collected_warnings
 from xcrack.base.markup import Markup
 from xcrack.base.paths import path_of
 from xcrack.crack.crack import Crack
+from xcrack.growth.validity import Validity, validity
 from xcrack.mesh.mesh import Mesh
+from xcrack.model.material import Isotropic, Material
 from xcrack.model.problem import Problem
 from xcrack.runs.collect import load
 from xcrack.runs.history import History
@@ -25,6 +28,7 @@ from xcrack.runs.life import Life
 from xcrack.sif.sif import SIF
 from xcrack.sif.stress_intensity import stress_intensities
 
+_NU = 0.3  # of a material that is not stored: K_III alone counts by it
 _HALF = "not ended"  # how `load` begins the reason of a run that goes on or was killed
 
 
@@ -63,6 +67,27 @@ class Source:
     def problem(self) -> Problem | None:
         """The scene, where it is known."""
         return self.solutions[0].problem if self.solutions else None
+
+    @cached_property
+    def validity(self) -> Validity | None:
+        """Plastic zones and net sections of the last step; None without a yield stress."""
+        problem, mesh = self.problem, self.mesh
+        material: Material
+        if problem is not None:
+            material, cracks = problem.material, problem.placed
+        elif self.history is not None and self.history.solved:  # the most severe of what it may be
+            plane = "stress" if self.dim == 2 else None
+            material, cracks = Isotropic(1.0, _NU, plane), self.history.solved[-1].cracks
+        else:
+            return None
+        if self.yield_stress is not None:
+            material = Isotropic(
+                1.0, _nu_of(material), material.plane, self.yield_stress, material.K_c
+            )
+        if mesh is None or not self.sif or (material.yield_stress, material.K_c) == (None, None):
+            return None
+        K_c = material.K_c if self.history is None else None  # a run ends there
+        return validity(material, mesh, cracks, self.sif, self.solutions, K_c)
 
     @property
     def mesh(self) -> Mesh | None:
@@ -105,6 +130,11 @@ class Source:
             "mesh": _hash(mesh.points.tobytes() + mesh.cells.tobytes()),
             "cracks": _hash(b"".join(cracks)),
         }
+
+
+def _nu_of(material: Material) -> float:
+    """Poisson's ratio at tips, where K has been had with it."""
+    return material.at_tip().nu
 
 
 def source_of(

@@ -9,7 +9,8 @@ from xcrack.analysis.solution import Solution
 from xcrack.base.arrays import Bools, Floats, Ints
 from xcrack.mesh.locate import barycentric
 from xcrack.mesh.mesh import local_edges
-from xcrack.output.pieces import Pieces, pieces, von_mises
+from xcrack.model.material import von_mises
+from xcrack.output.pieces import Pieces, pieces
 
 FIELDS = {
     "von_mises": "von Mises stress",

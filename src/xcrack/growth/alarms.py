@@ -1,0 +1,165 @@
+"""Magnitudes of a run that are more likely slips of units, and limits of elasticity."""
+
+import numpy as np
+
+from xcrack.analysis.alarms import Alarm, alarms_of_solutions, has_units, millimetre
+from xcrack.base.arguments import arguments_of
+from xcrack.base.errors import XcrackError
+from xcrack.base.units import STRESS
+from xcrack.fatigue.checks import evaluate_law
+from xcrack.fatigue.spectrum import Spectrum
+from xcrack.growth.follow import following, place_name
+from xcrack.growth.options import GrowthRule
+from xcrack.growth.step import Step
+from xcrack.growth.validity import Validity, validity
+from xcrack.model.loads import Load
+
+_FAST = 0.01  # of the crack in a cycle
+_FAR = 0.1  # mm in a cycle
+_ENDLESS = 1e12  # cycles until a crack has grown by its size
+_FEW = 10.0  # cycles of a life
+_SCALED = 20.0  # factor of a spectrum
+_STRESS = 5.0  # load that is a stress already, and not a unit load
+_BELOW = 3.0  # times the range: a law that gives no growth there either
+_REACH = np.logspace(
+    np.log10(_BELOW), 2.0, 32
+)  # times the range, where its threshold is looked for
+
+
+def alarms_of_step(run: GrowthRule, step: Step) -> list[Alarm]:
+    """What is beyond its limit at a step; magnitudes are judged at the first one.
+
+    Parameters
+    ----------
+    run : GrowthRule
+    step : Step
+    """
+    if step.has_left or not step.sif:
+        return []
+    found: list[Alarm] = []
+    if step.index == 0:
+        if step.solutions:
+            found += alarms_of_solutions(step.solutions)
+        if not any("in all load states" in alarm.place for alarm in found):
+            found += _factors(run) + _rate(run, step)
+    known = validity_of(run, step)
+    if known is not None:
+        limits = known.alarms()
+        # Later in a run it is why growth ends.
+        found += [a for a in limits if step.index == 0 or not a.quantity.startswith("K over")]
+    return found
+
+
+def validity_of(run: GrowthRule, step: Step) -> Validity | None:
+    """Plastic zones, toughness and net sections of a step; None where nothing is known of these."""
+    material, K_c = run.problem.material, run.toughness
+    if material.yield_stress is None and K_c is None:
+        return None
+    mesh = step.solutions[0].space.mesh if step.solutions else run.problem.mesh
+    return validity(material, mesh, step.cracks, step.sif, step.solutions, K_c)
+
+
+def alarm_of_life(run: GrowthRule, last: Step, ended: str) -> Alarm | None:
+    """A life that is too short for fatigue, in a scene with units.
+
+    A run that ends at its first step has said why.
+    """
+    cycles, stopped = last.cycles, ended.startswith(("max_", "rate is zero", "the advance"))
+    if stopped or last.index == 0 or not has_units(run.problem) or cycles >= _FEW:
+        return None
+    remedy = "is the law in the units of the model, and are the loads as meant?"
+    return Alarm("the number of cycles until the run ended", cycles, _FEW, "", remedy)
+
+
+def _factors(run: GrowthRule) -> list[Alarm]:
+    """Factors of a spectrum that are stresses, beside loads that are stresses too."""
+    spectrum = run.cycle
+    if not isinstance(spectrum, Spectrum) or spectrum.states is not None:
+        return []
+    largest = max(map(abs, spectrum.extremes))
+    loads = [(_stress_of(load), load) for load in run.problem.loads]
+    stress, load = max(loads, key=lambda pair: pair[0], default=(0.0, None))
+    if largest <= _SCALED or stress < _STRESS or load is None:
+        return []
+    return [
+        Alarm(
+            "the largest factor of the spectrum",
+            largest,
+            _SCALED,
+            f"beside {load.name} of {stress:.4g}",
+            "factors multiply the loads: are they stresses already? Then give unit loads, or "
+            "Spectrum.scaled.",
+        )
+    ]
+
+
+def _stress_of(load: Load) -> float:
+    """Largest number of a load that is a stress; 0 where it has none, or a function."""
+    largest = 0.0
+    for name, argument in arguments_of(type(load)).items():
+        value = getattr(load, name)
+        unit = None if argument.rule is None else argument.rule.unit
+        if (unit(load) if callable(unit) else unit) == STRESS and not callable(value):
+            given = np.asarray(value, dtype=object).ravel()
+            largest = max([largest, *(abs(float(v)) for v in given if v is not None)])
+    return largest
+
+
+def _rate(run: GrowthRule, step: Step) -> list[Alarm]:
+    """Growth a cycle against the crack, a millimetre and a life."""
+    count = float(run.cycle.cycles["count"].sum()) if isinstance(run.cycle, Spectrum) else 1.0
+    mesh, rates = run.problem.mesh, [rate / max(count, 1.0) for rate in step.rate]
+    sizes = [following(mesh).crack_size(crack, mesh) for crack in step.cracks]
+    shares = [rate / size for rate, size in zip(rates, sizes, strict=True)]
+    if not any(len(share) for share in shares):
+        return []
+    c = int(np.argmax([share.max(initial=-1.0) for share in shares]))
+    j = int(np.argmax(shares[c]))
+    place, rate, share = f"at {place_name(mesh, step, c, j)}", rates[c][j], shares[c][j]
+    units = "is the law in the units of the model (`law(..., units=...)`, `law.to`)?"
+    if np.isinf(rate):
+        words = f"the toughness of the law is reached in the first cycle: {units}"
+        K = float(step.dK_eq[c][j])
+        return [Alarm("da/dN of the first step", float(rate), _FAST * sizes[c], place,
+                      f"dK_eq = {K:.4g}: {words}")]  # fmt: skip
+    if share == 0:
+        return _no_growth(run, step, units)
+    found = []
+    unit = millimetre(run.problem)
+    if share > _FAST:
+        found.append(Alarm("da/dN over the size of the crack", float(share), _FAST, place, units))
+    elif unit is not None and rate > _FAR * unit:
+        found.append(Alarm("da/dN", float(rate), _FAR * unit, place, units))
+    elif share * _ENDLESS < 1:
+        words = f"nothing grows in a lifetime: {units}"
+        found.append(Alarm("the size of the crack over da/dN", float(1 / share), _ENDLESS, place,
+                           words))  # fmt: skip
+    return found
+
+
+def _no_growth(run: GrowthRule, step: Step, units: str) -> list[Alarm]:
+    """Ranges that a law gives no growth for, if it does not at some times as much either."""
+    mesh = run.problem.mesh
+    c = int(np.argmax([dK.max(initial=-1.0) for dK in step.dK_eq]))
+    j = int(np.argmax(step.dK_eq[c]))
+    dK, R = float(step.dK_eq[c][j]), step.R[c][[j]]
+    if not dK > 0 or isinstance(run.cycle, Spectrum):
+        return []
+    size = np.array([following(mesh).crack_size(step.cracks[c], mesh)])
+    threshold = np.inf
+    for factor in (1.0, *_REACH):
+        try:
+            rate = evaluate_law(run.law, np.array([factor * dK]), R, c, following(mesh).PLACE, size)
+        except XcrackError:  # beyond what its constants were fitted for
+            return []
+        if rate[0] > 0 and factor * dK >= run.threshold:
+            threshold = factor * dK
+            break
+    if threshold < _BELOW * dK:
+        return []
+    words = f"it is far below the threshold, and nothing grows: {units}"
+    return [Alarm("dK_eq of the first step", dK, threshold, f"at {place_name(mesh, step, c, j)}",
+                  words)]  # fmt: skip
+
+
+__all__ = ["alarm_of_life", "alarms_of_step", "validity_of"]

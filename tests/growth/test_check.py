@@ -1,0 +1,176 @@
+"""Alarms of magnitude and validity: slips of units are told, scenes as they should be are not."""
+
+import warnings
+
+import numpy as np
+import pytest
+
+import xcrack as xc
+from xcrack.growth.validity import validity
+
+BODY = xc.box((0, -20), (20, 20), (20, 40))
+EDGE = xc.line_crack([(0, 0.3), (4, 0.3)])
+LAW, CYCLE = xc.paris(1e-13, 3.0), xc.Cycle(0.1, 1.0)
+
+
+def steel(E=210e3, **options):
+    return xc.Isotropic(E, 0.3, plane="strain", **options)
+
+
+def scene(material=None, stress=80.0, **options):
+    loads = [xc.traction("top", (0, stress)), xc.traction("bottom", (0, -stress))]
+    return xc.Problem(BODY, material or steel(), [EDGE], loads=loads, **options)
+
+
+def warned(call):
+    """Messages of a call."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        call()
+    return [str(each.message) for each in caught]
+
+
+def test_a_scene_as_it_should_be_has_no_alarm():
+    material = steel(yield_stress=900.0, K_c=1500.0)
+    assert xc.check(scene(material), LAW, CYCLE) == ()
+    steps = xc.grow(scene(material), LAW, xc.max_hoop_stress, CYCLE, da=0.5, max_steps=2)
+    assert warned(lambda: list(steps)) == []
+
+
+def unit_loads(factors):
+    return scene(stress=1.0), LAW, xc.Spectrum(factors)
+
+
+SLIPS = {
+    "E in GPa": (lambda: (scene(steel(210.0)), LAW, CYCLE), "displacement over the size"),
+    "C too large": (lambda: (scene(), xc.paris(1e-8, 3.0), CYCLE), "da/dN over the size"),
+    "C too large for a long crack": (lambda: (scene(), xc.paris(3e-9, 3.0), CYCLE), "da/dN"),
+    "C too small": (lambda: (scene(), xc.paris(1e-22, 3.0), CYCLE), "the crack over da/dN"),
+    "spectrum in MPa": (
+        lambda: (scene(), LAW, xc.Spectrum([10, 80, 20, 60.0, 5, 80])),
+        "factor of the spectrum",
+    ),
+    "K_c in MPa√m": (lambda: (scene(steel(K_c=33.0)), LAW, CYCLE), "K over the toughness"),
+    "law in m": (
+        lambda: (scene(), xc.law("AA7050-T7451 NASGRO", units="m, MPa√m"), CYCLE),
+        "da/dN of the first step",
+    ),
+    "threshold in Pa": (
+        lambda: (scene(), xc.paris(1e-13, 3.0, threshold=xc.klesnil_lukas(6.3e6, 0.5)), CYCLE),
+        "dK_eq of the first step",
+    ),
+    "no load": (lambda: (xc.Problem(BODY, steel(), [EDGE]), LAW, CYCLE), "largest displacement"),
+    "beyond yield": (
+        lambda: (scene(steel(yield_stress=60.0), 80.0), LAW, CYCLE),
+        "that 5 % of the body exceeds",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", SLIPS)
+def test_a_slip_is_told_with_number_limit_place_and_remedy(name):
+    make, words = SLIPS[name]
+    alarms = xc.check(*make())
+    (alarm,) = [each for each in alarms if words in each.quantity][:1]
+    assert alarm.value > alarm.limit or name in ("threshold in Pa", "no load")
+    text = str(alarm)
+    assert f"{alarm.value:.4g}" in text
+    assert f"{alarm.limit:.4g}" in text
+    assert alarm.remedy in text
+
+
+def test_unit_loads_beside_a_spectrum_in_MPa_are_as_meant():
+    assert xc.check(*unit_loads([10, 80, 20, 60.0, 5, 80])) == ()
+
+
+def test_a_scene_without_units_is_judged_by_its_rates_alone():
+    """E = 1 and a strain of 80: displacements are what they are."""
+    assert xc.check(scene(steel(1.0)), LAW, CYCLE) == ()
+
+
+def test_growth_warns_of_the_same_once():
+    problem = scene(steel(K_c=3000.0, yield_stress=100.0))
+    alarms = xc.check(problem, LAW, CYCLE, K_c=300.0)
+    assert [a.quantity for a in alarms if "toughness" in a.quantity]
+    history = []
+    options = {"da": 2.0, "max_steps": 4, "progress": False}
+    said = warned(lambda: history.append(
+        xc.collect(xc.grow(problem, LAW, xc.max_hoop_stress, CYCLE, **options))
+    ))  # fmt: skip
+    zones = [text for text in said if "plastic zone" in text and "it came again" not in text]
+    assert len([text for text in said if "ligament ahead" in text]) <= 2  # and its summary
+    assert zones
+    assert any("plastic zone" in text for text in history[0].warnings)
+
+
+def test_growth_ends_at_the_toughness_of_the_material():
+    problem = scene(steel(K_c=500.0))
+    steps = xc.grow(problem, LAW, xc.max_hoop_stress, CYCLE, da=1.0, progress=False)
+    assert xc.collect(steps).ended.startswith("K_c reached: K_eq = ")
+    free = xc.grow(problem, LAW, xc.max_hoop_stress, CYCLE, da=1.0, K_c=1e6, max_steps=3)
+    assert xc.collect(free).ended.startswith("max_steps")
+
+
+@pytest.mark.parametrize("plane", ["strain", "stress"])
+def test_plastic_zones_are_those_of_Irwin(plane):
+    """(K / yield)²/2π, a third of it in plane strain, against crack and ligament."""
+    loads = [xc.traction("top", (0, 80.0)), xc.traction("bottom", (0, -80.0))]
+    material = xc.Isotropic(210e3, 0.3, plane, yield_stress=300.0)
+    solution = xc.solve(xc.Problem(BODY, material, [EDGE], loads=loads))
+    sif = xc.stress_intensity(solution)
+    known = validity(material, BODY, solution.space.cracks, [[sif]], [solution], K_c=400.0)
+    zone = (known.K / 300.0) ** 2 / (2 * np.pi) / (3 if plane == "strain" else 1)
+    assert known.K == pytest.approx(sif.K_I[0], rel=1e-2)  # K_II is next to nothing
+    assert known.zone == pytest.approx(zone, rel=1e-12)
+    assert known.of_crack == pytest.approx(zone / 4, rel=1e-9)
+    assert known.of_ligament == pytest.approx(zone / 16, rel=1e-2)  # it runs almost straight
+    assert known.of_toughness == pytest.approx(known.K / 400, rel=1e-12)
+
+
+def test_the_net_section_yields_where_statics_says():
+    """Force and moment on the ligament of an edge crack follow from the loads alone."""
+    loads = [xc.traction("top", (0, 80.0)), xc.traction("bottom", (0, -80.0))]
+    body = xc.box((0, -20), (20, 20), (40, 80))
+    material = xc.Isotropic(210e3, 0.3, "stress", yield_stress=300.0)
+    solution = xc.solve(xc.Problem(body, material, [EDGE], loads=loads))
+    sif = xc.stress_intensity(solution)
+    known = validity(material, body, solution.space.cracks, [[sif]], [solution])
+    b, force = 16.0, 80.0 * 20
+    moment = force * 2.0  # the load acts in the middle of 20, the ligament's middle is at 12
+    n, m = force / b / 300.0, 4 * moment / b**2 / 300.0
+    load = 0.5 * (m + np.sqrt(m**2 + 4 * n**2))
+    assert known.of_section == pytest.approx(load, rel=0.03)  # discretisation: 0.5 mm cells
+
+
+def test_a_place_of_a_front_has_the_ligament_up_to_the_other_side():
+    """A penny in the middle of a block: 0.5 to its sides; thick enough for plane strain."""
+    body = xc.box((-1, -1, -1), (1, 1, 1), (6, 6, 6))
+    crack = xc.penny_crack((0.01, 0.02, 0.03), (0, 0, 1), 0.5)
+    loads = [xc.traction("top", (0, 0, 100.0)), xc.traction("bottom", (0, 0, -100.0))]
+    material = xc.Isotropic(210e3, 0.3, yield_stress=300.0)
+    solution = xc.solve(xc.Problem(body, material, [crack], loads=loads))
+    sif = xc.stress_intensity(solution)
+    known = validity(material, body, solution.space.cracks, [[sif]])
+    assert known.state == "strain"
+    assert known.zone == pytest.approx((known.K / 300) ** 2 / (6 * np.pi), rel=1e-12)
+    assert 0.45 < known.zone / known.of_ligament < 0.75
+    assert np.isnan(known.of_section)
+
+
+def test_life_says_from_when_elasticity_does_not_hold():
+    problem = scene(steel(yield_stress=300.0))
+    steps = xc.grow(problem, LAW, xc.max_hoop_stress, CYCLE, da=3.0, max_steps=4, progress=False)
+    history = []
+    warned(lambda: history.append(xc.collect(steps)))
+    said = warned(lambda: xc.life(history[0], scatter=xc.Scatter(C=xc.lognormal(0.1)), seed=7))
+    assert any("life: from N = " in text and "does not hold" in text for text in said)
+
+
+def test_nothing_else_than_a_run_is_taken():
+    with pytest.raises(xc.ProblemError, match="cannot be called"):
+        xc.check(scene(), 3.0, CYCLE)
+    with pytest.raises(TypeError, match="unexpected keyword argument"):
+        xc.check(scene(), LAW, CYCLE, foo=1)
+    for name in ("yield_stress", "K_c"):
+        with pytest.raises(xc.ProblemError, match=name):
+            steel(**{name: 0.0})
