@@ -3,6 +3,7 @@
 import numpy as np
 
 from xcrack.analysis.alarms import Alarm, alarms_of_solutions, has_units, millimetre
+from xcrack.analysis.solution import Solution
 from xcrack.base.arguments import arguments_of
 from xcrack.base.errors import XcrackError
 from xcrack.base.units import STRESS
@@ -38,8 +39,8 @@ def alarms_of_step(run: GrowthRule, step: Step) -> list[Alarm]:
         return []
     found: list[Alarm] = []
     if step.index == 0:
-        if step.solutions:
-            found += alarms_of_solutions(step.solutions)
+        if solutions := _solutions(run, step):
+            found += alarms_of_solutions(solutions)
         if not any("in all load states" in alarm.place for alarm in found):
             found += _factors(run) + _rate(run, step)
     known = validity_of(run, step)
@@ -55,8 +56,13 @@ def validity_of(run: GrowthRule, step: Step) -> Validity | None:
     material, K_c = run.problem.material, run.toughness
     if material.yield_stress is None and K_c is None:
         return None
-    mesh = step.solutions[0].space.mesh if step.solutions else run.problem.mesh
-    return validity(material, mesh, step.cracks, step.sif, step.solutions, K_c)
+    mesh, solutions = run.problem.mesh, _solutions(run, step)
+    return validity(material, mesh, step.cracks, step.sif, solutions, K_c)
+
+
+def _solutions(run: GrowthRule, step: Step) -> tuple[Solution, ...]:
+    """Solutions that K of a step comes from: where it comes from elsewhere they may be anything."""
+    return step.solutions if run.response is None else ()
 
 
 def alarm_of_life(run: GrowthRule, last: Step, ended: str) -> Alarm | None:
@@ -93,6 +99,13 @@ def _factors(run: GrowthRule) -> list[Alarm]:
     ]
 
 
+def _cycles_of_block(spectrum: Spectrum) -> float:
+    """Number of cycles of a block; of one of states, which K counts, at most."""
+    if spectrum.states is not None:
+        return max(0.5 * len(spectrum.sequence), 1.0)
+    return max(float(spectrum.cycles["count"].sum()), 1.0)
+
+
 def _stress_of(load: Load) -> float:
     """Largest number of a load that is a stress; 0 where it has none, or a function."""
     largest = 0.0
@@ -107,8 +120,8 @@ def _stress_of(load: Load) -> float:
 
 def _rate(run: GrowthRule, step: Step) -> list[Alarm]:
     """Growth a cycle against the crack, a millimetre and a life."""
-    count = float(run.cycle.cycles["count"].sum()) if isinstance(run.cycle, Spectrum) else 1.0
-    mesh, rates = run.problem.mesh, [rate / max(count, 1.0) for rate in step.rate]
+    count = _cycles_of_block(run.cycle) if isinstance(run.cycle, Spectrum) else 1.0
+    mesh, rates = run.problem.mesh, [rate / count for rate in step.rate]
     sizes = [following(mesh).crack_size(crack, mesh) for crack in step.cracks]
     shares = [rate / size for rate, size in zip(rates, sizes, strict=True)]
     if not any(len(share) for share in shares):
