@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from support import campaign_cases
-from xcrack.base.errors import ProblemError
+from xcrack.base.errors import ProblemError, XcrackWarning
 from xcrack.runs.campaign import campaign, grid, key_of
 
 
@@ -172,3 +172,38 @@ def test_workers_have_the_numbers_of_one_process(tmp_path):
     assert not any(one["error"])
     assert np.array_equal(one["life"], two["life"])
     assert one["ended"].tolist() == two["ended"].tolist()
+
+
+def test_a_study_whose_cases_fail_says_so_and_takes_the_mended_function(tmp_path):
+    """Good rows alone tie a folder to a function."""
+
+    def slip(a):
+        return {"x": a + "1"}
+
+    def mended(a):
+        return {"x": a + 1.0}
+
+    cases = grid(a=[float(k) for k in range(30)])
+    with pytest.warns(
+        XcrackWarning, match=r"30 of 30 cases failed, the first .* TypeError"
+    ) as said:
+        study = campaign(slip, cases, path=tmp_path)
+    assert len(said) == 1
+    assert str(study).splitlines()[0].endswith("0 without error")
+    assert "30 failed with TypeError" in str(study)
+    assert len(str(study)) < 1000
+    study = campaign(mended, cases, path=tmp_path)
+    assert study.failed == ()
+    assert study.table()["x"].tolist() == [k + 1.0 for k in range(30)]
+    with pytest.raises(ProblemError, match="holds a study of another case"):
+        campaign(slip, cases, path=tmp_path, retry=True)
+
+
+def test_a_row_of_other_kinds_of_values_is_damaged(tmp_path):
+    """It is run again, and the table has no errors of Python."""
+    cases = grid(a=[1, 2])
+    campaign(campaign_cases.formula, cases, path=tmp_path)
+    row = {"parameters": 1, "result": 5, "kind": "", "seconds": 0, "error": "", "warnings": []}
+    (tmp_path / f"row_{key_of(cases[0])}.json").write_text(json.dumps(row))
+    study = campaign(campaign_cases.formula, cases, path=tmp_path)
+    assert study.table()["life"].tolist() == [1e6, 5e5]

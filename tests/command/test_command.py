@@ -86,6 +86,12 @@ def test_life_of_a_stored_run(tmp_path, capsys):
     for words in (f"life {history.life:.4g} flights", "chance that all of them miss", "at last"):
         assert words in out
     assert page.is_file()
+    results = tmp_path / "results"  # as a case file leaves them
+    results.mkdir()
+    folder.rename(results / "steps")
+    assert main(["life", str(results), *given[2:]]) == 0
+    given[1] = str(results)
+    capsys.readouterr()
     assert main([*given, "--toughness", "200"]) == 2
     assert "give --nu" in capsys.readouterr().err
     assert main([*given, "--pod", "0.7", "0.3"]) == 2

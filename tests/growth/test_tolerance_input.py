@@ -26,7 +26,7 @@ def steps(problem, **options):
     return xc.grow(problem, LAW, xc.max_hoop_stress, xc.Cycle(0.0, 1.0), progress=False, **options)
 
 
-@pytest.mark.parametrize("tolerance", [0.0, 1.0, -0.1, float("nan"), float("inf"), "1 %"])
+@pytest.mark.parametrize("tolerance", [0.0, 1.0, -0.1, float("nan"), float("inf"), "1 %", 1e-300])
 def test_tolerance_in_3d(tolerance):
     with pytest.raises(xc.ProblemError, match="grow: tolerance"):
         next(steps(penny(), tolerance=tolerance))

@@ -63,6 +63,7 @@ POINTS = ([10, 20], [1e-8, 1e-7])
         (lambda: piecewise([(1e-20, 5), (1e-11, 3)], knees=[1, 2]), "knees has the shape"),
         (lambda: piecewise([(1, 4), (1, 3), (2, 2)], knees=[3, 2]), "do not rise"),
         (lambda: rate_table({}), "give a dict"),
+        (lambda: rate_table(((0.1, (10, 20)),)), "give a dict"),
         (lambda: rate_table({0.1: ([1, 1], [1, 2])}), "positive and rising"),
         (lambda: rate_table({0.1: 3}), r"give \(dK, rate\)"),
         (lambda: rate_table({1.0: POINTS}), "R = 1"),

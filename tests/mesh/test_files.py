@@ -247,6 +247,16 @@ def test_abaqus_includes_and_its_errors(tmp_path):
     (tmp_path / "quad.inp").write_text(CAE.replace("CPE3", "CPE6"))
     with pytest.raises(MeshError, match="ELEMENT"):
         read_mesh(tmp_path / "quad.inp")
+    for k in range(300):
+        (tmp_path / f"i{k}.inp").write_text(f"*INCLUDE, INPUT=i{k + 1}.inp\n")
+    (tmp_path / "i300.inp").write_text(CAE)
+    with pytest.raises(MeshError, match="one in the other"):
+        read_mesh(tmp_path / "i0.inp")
+    assert read_mesh(tmp_path / "i250.inp").n_points == 5
+    many = "*NSET,NSET=a,GENERATE\n1,999999999999,1\n"
+    (tmp_path / "many.inp").write_text(CAE + many)
+    with pytest.raises(MeshError, match="too many members"):
+        read_mesh(tmp_path / "many.inp")
 
 
 def test_sets_off_the_body_are_left_out_with_a_warning(tmp_path):

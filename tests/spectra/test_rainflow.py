@@ -126,7 +126,8 @@ def test_turning_points_of_plateaus():
         (lambda: Spectrum([0, 1], levels=1), "levels = 1"),
         (lambda: Spectrum([0, 1], levels="many"), "levels = 'many'"),
         (lambda: Spectrum([0, 1], tolerance=0), "tolerance"),
-        (lambda: Spectrum([0, 1]).omit(2.0), "no cycle has a range of 2"),
+        (lambda: Spectrum([0, 1]).omit(2.0), "least_range = 2 leaves out all"),
+        (lambda: Spectrum([0, 1], least_range=5.0), "leaves out all cycles.* range is 1"),
         (lambda: Spectrum([0, 1]).scaled(-1), "factor"),
     ],
 )

@@ -20,10 +20,9 @@ from xcrack.model.problem import Problem
 from xcrack.output.vtk import write
 from xcrack.runs.collect import Until, collect, resume
 from xcrack.runs.history import History
+from xcrack.runs.run_folder import STEPS
 from xcrack.view.plot import plot
 from xcrack.view.report import report
-
-_STEPS = "steps"
 
 
 @lists_options
@@ -137,7 +136,7 @@ def _run_case(path: str | PathLike[str], *, resumed: bool, overwrite: bool) -> A
 
 
 def _grown(case: CaseFile, *, resumed: bool, overwrite: bool) -> History:
-    folder = case.folder / _STEPS
+    folder = case.folder / STEPS
     given = dict(case.growth or {})
     if resumed and _begun(folder):
         law, criterion, cycle = (given.pop(name) for name in ("law", "criterion", "cycle"))

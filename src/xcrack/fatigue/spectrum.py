@@ -94,6 +94,12 @@ class Spectrum:
         steady = _loads(self.steady, "Spectrum: steady")
         object.__setattr__(self, "steady", steady)
         getattr(self, f"_check_{forms[0]}")()
+        if least > 0 and not len(self.cycles):
+            every = self._all_cycles
+            raise ProblemError(
+                f"Spectrum: least_range = {least:g} leaves out all cycles: their largest range is "
+                f"{(every['max'] - every['min']).max():g}. Give less."
+            )
 
     def _check_factors(self) -> None:
         factors = lock(np.array(numbers(self.factors, "Spectrum: factors", (None,))))
@@ -212,10 +218,7 @@ class Spectrum:
         >>> len(Spectrum([0.0, 1.0, 0.4, 0.6]).omit(range=0.3).cycles)
         1
         """
-        result = replace(self, least_range=range)
-        if not len(result.cycles):
-            raise ProblemError(f"Spectrum.omit: no cycle has a range of {range:g}: give less.")
-        return result
+        return replace(self, least_range=range)
 
     def scaled(self, factor: float) -> "Spectrum":
         """The spectrum with all factors times another one.

@@ -63,7 +63,9 @@ class rate_table(GrowthLaw):  # noqa: N801 - it is used as a function
         if isinstance(self.curves, Mapping):
             given = list(self.curves.items())
         elif isinstance(self.curves, tuple):  # a law that is made from another one
-            given = [(R, (dK, rate)) for R, dK, rate in self.curves]
+            parts = [curve for curve in self.curves if isinstance(curve, tuple) and len(curve) == 3]
+            if len(parts) == len(self.curves):
+                given = [(R, (dK, rate)) for R, dK, rate in parts]
         if not given:
             raise ProblemError("rate_table: curves: give a dict of R to (dK, rate).")
         curves = tuple(sorted(_curve(R, points) for R, points in given))

@@ -23,6 +23,7 @@ from xcrack.growth.step import Cycle
 from xcrack.growth.trail import check_retardation
 from xcrack.model.problem import Problem
 
+_LEAST = 1e-6  # relative error of a life that cells and steps can be held to
 _STOPS = {"changes_results": False}  # when a run stops, not how its cracks grow
 
 Function = TypeVar("Function", bound=Callable[..., Any])
@@ -208,6 +209,11 @@ class GrowthRule:
                 )
             return
         tolerance = number(self.tolerance, "grow: tolerance", above=0, below=1)
+        if tolerance < _LEAST:
+            raise ProblemError(
+                f"grow: tolerance = {tolerance:g}: no mesh has K to less than {_LEAST:g}: give as "
+                "much, at least."
+            )
         object.__setattr__(self, "tolerance", tolerance)
         if self.max_unknowns is not None:
             most = whole_number(self.max_unknowns, "grow: max_unknowns", least=1, most=10**9)

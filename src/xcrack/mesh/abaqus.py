@@ -40,6 +40,8 @@ _FACES: dict[str, tuple[tuple[int, ...], ...]] = {
 }  # fmt: skip
 _WRITTEN_TYPES = {2: ("T3D2", "CPS3"), 3: ("S3", "C3D4")}  # facets, cells
 _FACE_KIND = {2: "line", 3: "triangle", 4: "quad"}  # by corners
+_MOST_MEMBERS = 10_000_000  # that one line of GENERATE makes
+_DEEPEST = 100  # files that include each other
 
 Section = tuple[str, dict[str, str], list[list[str]]]
 
@@ -150,6 +152,10 @@ def _rows(elements: Ints, first: int) -> Iterable[str]:
 
 def _sections(path: Path, outer: tuple[Path, ...] = ()) -> Iterator[Section]:
     """Keyword, options and data rows of each section, included files in their place."""
+    if len(outer) > _DEEPEST:
+        raise MeshError(
+            f"{path.name} is included by {len(outer)} files, one in the other: join some of them."
+        )
     resolved_path = path.resolve()
     if resolved_path in outer:
         raise MeshError(f"{path.name} includes itself: leave that *INCLUDE out.")
@@ -217,7 +223,10 @@ def _members(
         members: list[int] = []
         for row in rows:
             first, last, step = (*map(int, row), 1)[:3]
-            members += range(first, last + 1, step)
+            numbers = range(first, last + 1, step)
+            if last - first > _MOST_MEMBERS * abs(step):
+                raise ValueError(f"GENERATE from {first} to {last} makes too many members")
+            members += numbers
         return members
     members = []
     for entry in (entry for row in rows for entry in row if entry):

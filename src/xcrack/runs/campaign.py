@@ -8,6 +8,7 @@ import queue
 import time
 import traceback
 import warnings
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
@@ -312,6 +313,8 @@ def call_off(future: Any) -> None:
 
 
 _HEADER = "study.json"
+_ROW = {"parameters": dict, "result": dict, "kind": str, "error": str, "seconds": (int, float)}
+_SHOWN, _LINE = 5, 200  # errors of a summary, and letters of each
 
 
 @dataclass(frozen=True, eq=False)
@@ -333,6 +336,13 @@ class Study:
     def failed(self) -> tuple[dict[str, Any], ...]:
         """Rows of the cases that raised an error."""
         return tuple(row for row in self.rows if row["kind"])
+
+    def __str__(self) -> str:
+        n, words = len(self.rows), _failures(self.failed)
+        head = f"{n} cases in {self.path}, {n - len(self.failed)} without error"
+        return f"{head}\n{words}" if words else head
+
+    __repr__ = __str__
 
     def table(self) -> NDArray[Any]:
         """One row a case: parameters, results, error and seconds; numbers are nan where none is."""
@@ -391,9 +401,16 @@ def campaign(
         case, a folder that another process writes to, or a worker that died: finished cases stay,
         and the same call goes on.
 
+    Warns
+    -----
+    XcrackWarning
+        Cases failed: how many, and the first error.
+
     Notes
     -----
-    Errors in a case are rows, with their text; a run is never stopped by one. The first case is run
+    Errors in a case are rows, with their text; a run is never stopped by one. A folder belongs to
+    the function that its good rows are from: where all have failed, they are run anew with a mended
+    one. The first case is run
     alone, so that kernels are compiled once and not by each worker. A case is known by its
     parameters alone: options of xcrack that are added later change no name. A result with the name
     of a parameter and another value is an error of its case.
@@ -423,7 +440,15 @@ def campaign(
         ]
         with engine_of(count, client) as engine:
             _run(folder, case, every, result_names, engine)
-    return Study(folder, tuple(_stored_case(folder, key) for key in every))
+    study = Study(folder, tuple(_stored_case(folder, key) for key in every))
+    if study.failed:
+        first = study.failed[0]
+        warn(
+            f"campaign: {len(study.failed)} of {len(study.rows)} cases failed, the first of them "
+            f"{value_text(first['parameters'])} with {first['kind']}: {_short(first['error'])} "
+            "`failed` of the study has all; retry=True runs them again."
+        )
+    return study
 
 
 def grid(**parameters: Iterable[Any]) -> list[dict[str, Any]]:
@@ -511,22 +536,32 @@ def _finish(
 
 def _check_header(folder: Path, case: Callable[..., Any]) -> None:
     """Write what the case is, or refuse a folder of another one."""
-    given, file = describe("case", case), folder / _HEADER
-    if file.exists():
-        with system_errors("the study cannot be read from", file, error=ProblemError):
-            text = file.read_text(encoding="utf-8")
+    given, header = describe("case", case), folder / _HEADER
+    if header.exists():
+        with system_errors("the study cannot be read from", header, error=ProblemError):
+            text = header.read_text(encoding="utf-8")
         try:
             stored = json.loads(text)["case"]
         except (ValueError, KeyError, TypeError) as error:
-            raise ProblemError(f"{file} is no header of a study: take another folder.") from error
+            raise ProblemError(f"{header} is no header of a study: take another folder.") from error
         changed = differences(stored, given)
-        if changed:
+        rows = list(folder.glob("row_*.json"))
+        if changed and not any(_is_good_row(file) for file in rows):
+            with system_errors("the study cannot be written to", folder, error=ProblemError):
+                for file in rows:  # failures of another function
+                    file.unlink()
+            _write_header(header, given)
+        elif changed:
             raise ProblemError(
                 f"{folder} holds a study of another case: take another folder.\n- "
                 + "\n- ".join(changed)
             )
         return
-    with written_whole(file, "the study cannot be written to", error=ProblemError) as part:
+    _write_header(header, given)
+
+
+def _write_header(header: Path, given: Mapping[str, str]) -> None:
+    with written_whole(header, "the study cannot be written to", error=ProblemError) as part:
         part.write_text(json.dumps({"case": given}, indent=1), encoding="utf-8")
 
 
@@ -536,15 +571,38 @@ def _file(folder: Path, key: str) -> Path:
 
 def _read(folder: Path, key: str) -> dict[str, Any] | None:
     """A stored row; None where there is none, or it is damaged."""
-    file = _file(folder, key)
+    return _row_of(_file(folder, key))
+
+
+def _row_of(file: Path) -> dict[str, Any] | None:
     if not file.exists():
         return None
     try:
         row = json.loads(file.read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return None
-    whole_row = isinstance(row, dict) and {"parameters", "result", "kind", "seconds"} <= set(row)
+    if not isinstance(row, dict):
+        return None
+    whole_row = all(isinstance(row.get(name), kind) for name, kind in _ROW.items())
     return row if whole_row else None
+
+
+def _is_good_row(file: Path) -> bool:
+    row = _row_of(file)
+    return row is not None and not row["kind"]
+
+
+def _failures(rows: Iterable[Mapping[str, Any]]) -> str:
+    """Errors of cases by their kind, the most frequent ones first; empty where there are none."""
+    count = Counter((row["kind"], _short(row["error"])) for row in rows)
+    lines = [f"{n} failed with {kind}: {text}" for (kind, text), n in count.most_common(_SHOWN)]
+    left = len(count) - len(lines)
+    return "\n".join([*lines, *([f"and {left} other errors"] if left > 0 else [])])
+
+
+def _short(text: str) -> str:
+    line = text.strip().partition("\n")[0]
+    return line if len(line) <= _LINE else f"{line[:_LINE]} ..."
 
 
 def _stored_case(folder: Path, key: str) -> dict[str, Any]:

@@ -191,7 +191,8 @@ def load(path: str | Path) -> Any:
     Parameters
     ----------
     path : path
-        Folder that `collect` wrote to, or file that `save` wrote.
+        Folder that `collect` wrote to, that of the results of a case file, or file that `save`
+        wrote.
 
     Returns
     -------
@@ -211,6 +212,7 @@ def load(path: str | Path) -> Any:
     folder = path_of(path, "load: path", error=ProblemError)
     with system_errors("no run can be read from", folder, error=ProblemError):
         is_file = folder.is_file()
+        folder = folder if is_file else run_folder.folder_of_steps(folder)
     if is_file:
         return read_saved(folder)
     header, _ = run_folder.read_header(folder)

@@ -24,6 +24,7 @@ from xcrack.runs.store import PART, load, save, write_whole
 from xcrack.sif.sif import SIF, KErrors, SurfaceEnd
 
 HEADER = "run.json"
+STEPS = "steps"  # folder of the run in that of the results of a case file
 BODY = "body.npz"
 _OTHER_BODY = "body_{}.npz"  # on a mesh that growth has asked for, by its fingerprint
 _FORMAT = 2
@@ -77,6 +78,12 @@ class StoredSteps:
     steps: tuple[Step, ...]
     fault: str
     rest: tuple[Path, ...]
+
+
+def folder_of_steps(folder: Path) -> Path:
+    """The folder itself, or the one in it where a case file has its steps."""
+    inner = folder / STEPS
+    return inner if inner.is_dir() and not (folder / HEADER).is_file() else folder
 
 
 def write_header(folder: Path, header: RunHeader) -> None:
@@ -277,6 +284,7 @@ __all__ = [
     "StoredSteps",
     "body_files",
     "body_path",
+    "folder_of_steps",
     "move_aside",
     "read_header",
     "read_steps",

@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from os import PathLike
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -151,7 +150,7 @@ def source_of(
     with collected_warnings(messages):
         if isinstance(given, str | PathLike):
             folder = path_of(given, "report: path", error=ProblemError)
-            given = load(_run_folder(folder))
+            given = load(folder)
             title = title or folder.name
         if isinstance(given, History):
             source = _of_history(given, title, yield_stress)
@@ -196,12 +195,6 @@ def _solutions(given: Any) -> tuple[Solution, ...]:
         f"report takes a Solution or a list of them, a History, or the folder of a run, not a "
         f"{type(given).__name__}."
     )
-
-
-def _run_folder(folder: Path) -> Path:
-    """The folder itself, or the one in it where a case file has its steps."""
-    inner = folder / "steps"
-    return inner if inner.is_dir() and not (folder / "run.json").is_file() else folder
 
 
 def _hash(content: bytes) -> str:
