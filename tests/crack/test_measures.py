@@ -174,3 +174,11 @@ def test_a_run_has_tables_of_measures(tmp_path: Path) -> None:
     assert (tmp_path / "out" / "measures.csv").exists()
     with pytest.raises(ProblemError, match="without its mesh"):
         xc.History(history.steps, history.ended).measures()
+
+
+def test_depth_after_a_break_through():
+    """Of a half penny in a wall of 1: its radius, then the thickness, and it never falls."""
+    mesh = xc.box((0, 0, 0), (1, 3, 3), (8, 24, 24))
+    for radius in (0.6, 0.9, 1.05, 1.2, 1.3):
+        m = xc.measures(xc.penny_crack((0, 1.5, 1.513), (0, 0, 1), radius), mesh)
+        assert m.depth == pytest.approx(min(radius, 1.0), rel=5e-3)  # chords of the front

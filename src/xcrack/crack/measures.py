@@ -424,7 +424,8 @@ class Measures:
     front_length : float, length
         Of all fronts inside the body; 0 in 2D.
     depth : float, length
-        Largest depth below any of the surfaces that the crack meets; nan where it meets none.
+        Below the surface on which the crack is longest, in 2D the largest one; nan where it meets
+        none. Another surface that it breaks through to is met by a shorter line at first.
     traces : tuple of SurfaceTrace
         One for each facet set that the crack meets, in the order of their names.
     ends : tuple of FrontEnd
@@ -501,7 +502,7 @@ def measures(crack: Crack, mesh: Mesh) -> Measures:
     names, group = facet_names(mesh)
     area, front_length, traces, ends = _BY_DIMENSION[mesh.dim](placed_crack, mesh, group)
     rows = [SurfaceTrace(names[k], *traces[k]) for k in sorted(traces, key=lambda k: names[k])]
-    depth = max((row.depth for row in rows), default=float("nan"))
+    depth = max(((row.length, row.depth) for row in rows), default=(0.0, float("nan")))[1]
     points = []
     for x, facet, front in ends:
         place = np.where(np.abs(x) < _ROUND_OFF * mesh.extent, 0.0, x)
