@@ -57,7 +57,7 @@ SLIPS = {
     ),
     "threshold in Pa": (
         lambda: (scene(), xc.paris(1e-13, 3.0, threshold=xc.klesnil_lukas(6.3e6, 0.5)), CYCLE),
-        "dK_eq of the first step",
+        "up to which there is no growth",
     ),
     "no load": (lambda: (xc.Problem(BODY, steel(), [EDGE]), LAW, CYCLE), "largest displacement"),
     "beyond yield": (
@@ -72,7 +72,7 @@ def test_a_slip_is_told_with_number_limit_place_and_remedy(name):
     make, words = SLIPS[name]
     alarms = xc.check(*make())
     (alarm,) = [each for each in alarms if words in each.quantity][:1]
-    assert alarm.value > alarm.limit or name in ("threshold in Pa", "no load")
+    assert alarm.value > alarm.limit or name == "no load"
     text = str(alarm)
     assert f"{alarm.value:.4g}" in text
     assert f"{alarm.limit:.4g}" in text
@@ -81,6 +81,12 @@ def test_a_slip_is_told_with_number_limit_place_and_remedy(name):
 
 def test_unit_loads_beside_a_spectrum_in_MPa_are_as_meant():
     assert xc.check(*unit_loads([10, 80, 20, 60.0, 5, 80])) == ()
+
+
+def test_a_flaw_below_the_threshold_is_as_meant():
+    assert (
+        xc.check(scene(), xc.paris(1e-13, 3.0, threshold=xc.klesnil_lukas(700.0, 0.5)), CYCLE) == ()
+    )
 
 
 def test_a_scene_without_units_is_judged_by_its_rates_alone():

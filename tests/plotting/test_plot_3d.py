@@ -11,6 +11,7 @@ from xcrack.growth.step import Step
 from xcrack.runs.history import History
 from xcrack.view import pyvista_2d as plot_pyvista
 from xcrack.view.fronts_3d import draw_fronts, draw_K, step_fronts
+from xcrack.view.plot import crack_box
 from xcrack.view.projection import best_plane, given_plane, on_plane, section_outline
 from xcrack.view.scene_2d import SPACE_FIELDS
 from xcrack.view.scene_3d import (
@@ -435,3 +436,19 @@ def test_plane_bodies_are_not_cut_open():
     )
     with pytest.raises(xc.ProblemError, match="only 3D bodies"):
         xc.plot(xc.solve(flat), clip=((0, 0, 0), (1, 0, 0)))
+
+
+@pytest.mark.plot
+def test_the_window_goes_with_the_crack_that_a_warp_moves():
+    """A column pushed sideways at its head: the box moves as the middle of the crack does."""
+    mesh = xc.box((0, 0, 0), (4, 4, 24), (4, 4, 24))
+    crack = xc.penny_crack((2, 0, 20.03), (0, 0, 1), 1.5)
+    problem = xc.Problem(
+        mesh, xc.Isotropic(70e3, 0.33), [crack], supports=[xc.fix("bottom")],
+        loads=[xc.traction("top", (0, 10.0, 0))],
+    )  # fmt: skip
+    solution = xc.solve(problem)
+    moved = 40 * solution.displacement(np.array([[2.0, 1.0, 20.1]]))[0]
+    still, gone = (crack_box(solution, [0], 1.5, warp).mean(axis=0) for warp in (0.0, 40.0))
+    assert moved[1] > 10
+    assert gone - still == pytest.approx(moved, rel=0.1, abs=0.3)  # it turns, too

@@ -355,6 +355,14 @@ def _all(value, key):
             yield from _all(each, key)
 
 
+def test_the_length_of_a_crack_is_that_in_the_body(tmp_path):
+    crack = xc.line_crack([(-0.3, 0.3), (4, 0.3)])
+    loads = [xc.traction("top", (0, 80.0)), xc.traction("bottom", (0, -80.0))]
+    problem = xc.Problem(xc.box((0, -20), (20, 20), (20, 40)), STEEL, [crack], loads=loads)
+    text, _, _ = read(xc.report(xc.solve(problem), tmp_path / "r.html"))
+    assert re.findall(r"length ([\d.]+)", text)[0] == "4"
+
+
 def test_spectrum_and_retardation_have_a_section(tmp_path):
     """Unit, levels, model and its zones."""
     spectrum = xc.Spectrum([0.0, 1.0, *[0.0, 0.5] * 20], unit="flight")
@@ -366,6 +374,14 @@ def test_spectrum_and_retardation_have_a_section(tmp_path):
     page = xc.report(path, tmp_path / "report.html").read_text(encoding="utf-8")
     section = json.loads((tmp_path / "report.json").read_text())["spectrum"]
     assert section["unit"] == "flight"
+    text = " ".join(re.sub(r"<[^>]+>", " ", (tmp_path / "report.html").read_text()).split())
+    assert "flights N at the last step" in text
+    assert "R of the largest cycle of each flight is 0 to 0" in text
+    assert "factors 42 numbers" in text
+    assert "largest range 1" in text
+    assert xc.load(path).unit == "flight"
+    labels = [axes.get_xlabel() for axes in xc.load(path).plot("a", tmp_path / "a.png").axes]
+    assert labels == ["flights N"]
     assert section["levels"] == [0.0, 1.0]
     assert section["retardation"] == "wheeler"
     (zone,) = section["zones"]

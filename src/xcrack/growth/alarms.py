@@ -151,28 +151,32 @@ def _rate(run: GrowthRule, step: Step) -> list[Alarm]:
 
 
 def _no_growth(run: GrowthRule, step: Step, units: str) -> list[Alarm]:
-    """Ranges that a law gives no growth for, if it does not at some times as much either."""
-    mesh = run.problem.mesh
-    c = int(np.argmax([dK.max(initial=-1.0) for dK in step.dK_eq]))
-    j = int(np.argmax(step.dK_eq[c]))
-    dK, R = float(step.dK_eq[c][j]), step.R[c][[j]]
-    if not dK > 0 or isinstance(run.cycle, Spectrum):
+    """A law that has no growth for a crack as long as the body either, under its mean stress.
+
+    Small flaws below the threshold are as meant.
+    """
+    solutions = _solutions(run, step)
+    if not solutions or isinstance(run.cycle, Spectrum):
         return []
-    size = np.array([following(mesh).crack_size(step.cracks[c], mesh)])
-    threshold = np.inf
-    for factor in (1.0, *_REACH):
+    mesh, material = run.problem.mesh, run.problem.material.at_tip()
+    energy = max(solution.energy for solution in solutions)
+    stress = np.sqrt(2 * max(energy, 0.0) * material.E_prime / mesh.volume.sum())
+    length = float(np.ptp(mesh.points, axis=0).max())
+    largest = float(stress * np.sqrt(np.pi * length))
+    R = next(R[[0]] for R in step.R if len(R))
+    for factor in _REACH:
+        dK = np.array([factor * largest])
         try:
-            rate = evaluate_law(run.law, np.array([factor * dK]), R, c, following(mesh).PLACE, size)
+            rate = evaluate_law(run.law, dK, R, 0, following(mesh).PLACE, np.array([length]))
         except XcrackError:  # beyond what its constants were fitted for
             return []
-        if rate[0] > 0 and factor * dK >= run.threshold:
-            threshold = factor * dK
+        if rate[0] > 0 and dK[0] >= run.threshold:
             break
-    if threshold < _BELOW * dK:
+    if factor == _REACH[0]:
         return []
-    words = f"it is far below the threshold, and nothing grows: {units}"
-    return [Alarm("dK_eq of the first step", dK, threshold, f"at {place_name(mesh, step, c, j)}",
-                  words)]  # fmt: skip
+    words = f"K of a crack as long as the body is no larger, and nothing can grow: {units}"
+    quantity = "dK_eq up to which there is no growth"
+    return [Alarm(quantity, float(factor * largest), largest, "", words)]
 
 
 __all__ = ["alarm_of_life", "alarms_of_step", "validity_of"]

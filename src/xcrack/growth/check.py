@@ -54,11 +54,11 @@ def check(
     -----
     Limits: displacement 2 % of the body; stress in 5 % of the body the yield stress, or without one
     1 % of Young's modulus; growth a cycle 1 % of the crack or 0.1 mm (where Young's modulus is that
-    of a solid in MPa or Pa); 10¹² cycles until the crack has grown by its size; dK_eq a third of
-    the threshold; K_max the toughness; factors of a spectrum 20 beside stresses of 5 (loads);
-    plastic zone 15 % of crack or ligament; the load on a ligament that at which it yields.
-    Displacement and stress are judged where a yield stress is given or Young's modulus is above 10:
-    scenes with numbers near 1 have no units.
+    of a solid in MPa or Pa); 10¹² cycles until the crack has grown by its size; a threshold above K
+    of a crack as long as the body; K_max the toughness; factors of a spectrum 20 beside stresses of
+    5 (loads); plastic zone 15 % of crack or ligament; the load on a ligament that at which it
+    yields. Displacement and stress are judged where a yield stress is given or Young's modulus is
+    above 10: scenes with numbers near 1 have no units.
 
     Examples
     --------

@@ -623,6 +623,47 @@ def lineage(steps: Sequence[Step], crack: int) -> list[list[int]]:
     return rows[::-1]
 
 
+def identities(steps: Sequence[Step]) -> list[list[int]]:
+    """For each crack of each step, its number in the first step: of joined cracks the smallest."""
+    result = [list(range(len(steps[0].cracks)))] if steps else []
+    for one, other in zip(steps, steps[1:]):
+        number = numbers_after(len(one.cracks), other.joins, len(other.cracks))
+        result.append([
+            min(name for name, now in zip(result[-1], number, strict=True) if now == c)
+            for c in range(len(other.cracks))
+        ])  # fmt: skip
+    return result
+
+
+def tip_identities(steps: Sequence[Step]) -> list[list[list[int]]]:
+    """For each tip of each crack of each step in 2D, its number among all tips of the first step.
+
+    A tip is the one that was to advance to where it is: numbers of tips change where cracks join
+    and where a tip leaves the body.
+    """
+    result: list[list[list[int]]] = []
+    known: list[int] = []
+    places = np.zeros((0, 2))
+    for step in steps:
+        x = [tips.x for tips in step.sif[0]] if step.sif else []
+        flat = np.concatenate([np.zeros((0, 2)), *x])
+        if not result:
+            names = list(range(len(flat)))
+        else:
+            names = [-1] * len(flat)
+            distance = np.linalg.norm(flat[:, None] - places, axis=2)
+            for _ in range(min(distance.shape)):
+                i, k = np.unravel_index(np.argmin(distance), distance.shape)
+                names[int(i)] = known[int(k)]
+                distance[i], distance[:, k] = np.inf, np.inf
+        known = names
+        ahead = [moved_places(step, c) for c in range(len(x))]
+        places = np.concatenate([np.zeros((0, 2)), *ahead])
+        ends = np.cumsum([len(each) for each in x]).tolist()
+        result.append([names[end - len(each) : end] for end, each in zip(ends, x, strict=True)])
+    return result
+
+
 __all__ = [
     "LEAST",
     "Advance",
@@ -637,9 +678,11 @@ __all__ = [
     "StepError",
     "checked_joins",
     "directions",
+    "identities",
     "lineage",
     "memory_of",
     "moved_places",
     "numbers_after",
     "plan_advance",
+    "tip_identities",
 ]

@@ -313,7 +313,13 @@ def call_off(future: Any) -> None:
 
 
 _HEADER = "study.json"
-_ROW = {"parameters": dict, "result": dict, "kind": str, "error": str, "seconds": (int, float)}
+_ROW: dict[str, Any] = {
+    "parameters": dict,
+    "result": dict,
+    "kind": str,
+    "error": str,
+    "seconds": (int, float),
+}
 _SHOWN, _LINE = 5, 200  # errors of a summary, and letters of each
 
 

@@ -91,6 +91,15 @@ class History:
         return self.steps[-1].cycles if self.steps else 0.0
 
     @property
+    def unit(self) -> str:
+        """What N counts: cycles, or repetitions of a spectrum by their name."""
+        memory = self.steps[0].memory if self.steps else None
+        settings = {} if memory is None else memory.settings
+        if settings.get("cycle") != "Spectrum":
+            return "cycle"
+        return settings.get("cycle.unit", "'block'").strip("'")
+
+    @property
     def warnings(self) -> dict[str, int]:
         """Warnings that the steps gave, and how often; the most frequent ones first."""
         texts = (text for step in self.steps for text in step.warnings or ())

@@ -1,6 +1,6 @@
 """Warnings about the accuracy of K; their thresholds come from measured errors."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -56,7 +56,13 @@ class Domain:
         return f"{self.label} {np.round(x, 6).tolist()}"
 
 
-def check(solutions: Sequence[Solution], t: int, domain: Domain, parts: Sequence[SIF]) -> None:
+def check(
+    solutions: Sequence[Solution],
+    t: int,
+    domain: Domain,
+    parts: Sequence[SIF],
+    disagree: Callable[[], bool] = lambda: True,
+) -> None:
     """Warn where the domain is clipped too far, two domains differ, or a contact zone is short.
 
     Parameters
@@ -68,6 +74,9 @@ def check(solutions: Sequence[Solution], t: int, domain: Domain, parts: Sequence
     domain : Domain
     parts : sequence of SIF
         One for each state, with at least one row.
+    disagree : callable () -> bool
+        Whether K by other means is another one: a doubt about the domain, or a short contact zone,
+        is no warning where it is not.
 
     Raises
     ------
@@ -84,11 +93,12 @@ def check(solutions: Sequence[Solution], t: int, domain: Domain, parts: Sequence
                 "there."
             )
     tip = solutions[0].space.tips[t]
-    scales = [_scale(s, part, tip.radius) for s, part in zip(solutions, parts, strict=True)]
+    scales = [scale_of(s, part, tip.radius) for s, part in zip(solutions, parts, strict=True)]
     difference, place = _difference(domain, parts, scales)
     doubts = [difference, _overlap_warning(solutions, domain, parts, scales)]
     narrow = domain.room < domain.least or domain.short
-    if domain.outer < domain.wanted * (1 - 1e-12) and (narrow or any(doubts)):
+    is_clipped = domain.outer < domain.wanted * (1 - 1e-12)
+    if is_clipped and (narrow or any(doubts)) and disagree():
         place = domain.narrowest
         doubts.insert(0, _clipped_K(domain))
     else:
@@ -96,11 +106,13 @@ def check(solutions: Sequence[Solution], t: int, domain: Domain, parts: Sequence
     if any(doubts):
         warn(f"{domain.at(place)}: {'; '.join(filter(None, doubts))}. Refine the mesh there.")
     for solution, part, scale in zip(solutions, parts, scales, strict=True):
-        if _check_zone(solution, tip.crack, domain, part, scale):
+        words = _short_zone(solution, tip.crack, domain, part, scale)
+        if words and disagree():
+            warn(words)
             break
 
 
-def _scale(solution: Solution, part: SIF, radius: float) -> float:
+def scale_of(solution: Solution, part: SIF, radius: float) -> float:
     """What differences of K are compared with: the largest K, or what the load would make of it.
 
     K of a closed or shielded tip may be zero: what counts there is K of the body's mean stress at a
@@ -155,8 +167,8 @@ def _difference(
     return text, place
 
 
-def _check_zone(solution: Solution, c: int, domain: Domain, part: SIF, scale: float) -> bool:
-    """Warn of a contact zone that is short wherever it touches a front; whether it is.
+def _short_zone(solution: Solution, c: int, domain: Domain, part: SIF, scale: float) -> str:
+    """What to say of a contact zone that is short wherever it touches a front; empty if it is not.
 
     A zone whose pressures cannot change K by what two domains may differ is left alone: under pure
     shear the errors of a mesh press a few lip points together. An even pressure p within a depth d
@@ -167,13 +179,12 @@ def _check_zone(solution: Solution, c: int, domain: Domain, part: SIF, scale: fl
     touching = pressure > 0
     short = is_shallow(part, solution, c, _ZONE * domain.size)
     if not touching.any() or (touching & ~short).any():
-        return False
+        return ""
     K_per_pressure = 2 * np.sqrt(2 * _ZONE * domain.size / np.pi)
     if K_per_pressure * pressure.max() <= domain.differ * scale:
-        return False
-    warn(
+        return ""
+    return (
         f"{domain.at(part.x[np.argmax(touching)])}: the contact zone there is shorter than two "
         f"cells ({_ZONE * domain.size:.4g}): its pressure and its end are not resolved. Refine the "
         "mesh there."
     )
-    return True

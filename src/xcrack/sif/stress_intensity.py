@@ -12,7 +12,7 @@ from xcrack.base.checks import flag, value_text, whole_number
 from xcrack.base.errors import ProblemError
 from xcrack.base.threads import threads
 from xcrack.model.material import Material
-from xcrack.sif.domain_2d import tip_intensity
+from xcrack.sif.domain_2d import tip_intensities
 from xcrack.sif.domain_3d import front_intensity
 from xcrack.sif.error import with_bars
 from xcrack.sif.sif import SIF, joined
@@ -102,10 +102,13 @@ def stress_intensities(
     solutions[0].problem.material.at_tip()  # refuses where K is not defined
     # Cycles from nothing are the most common ones: their lower state has no K to look for.
     live = [s for s in solutions if not s.at_rest] or solutions[:1]
-    intensity = front_intensity if space.dim == 3 else tip_intensity
     ends = [t for t, tip in enumerate(space.tips) if tip.crack == crack]
     with threads(solutions[0].problem.numerics.threads):
-        by_end = [intensity(live, t) for t in ends]
+        by_end = (
+            tip_intensities(live, ends)
+            if space.dim < 3
+            else [front_intensity(live, t) for t in ends]
+        )
     by_state = [joined([states[k] for states in by_end], space.dim) for k in range(len(live))]
     place = np.cumsum([not s.at_rest for s in solutions]) - 1
     K, T = np.zeros_like(by_state[0].K), np.where(np.isnan(by_state[0].T), np.nan, 0.0)

@@ -7,6 +7,7 @@ import numpy as np
 
 from xcrack.base.checks import value_text
 from xcrack.base.errors import ProblemError
+from xcrack.growth.step import identities, tip_identities
 from xcrack.runs.history import History
 from xcrack.view.figures import finish_figure, new_figure, picture_path
 
@@ -37,12 +38,12 @@ def draw(history: History, kind: str, file: str | Path | None) -> Any:
 def _draw_K(history: History, axes: Any) -> None:
     table = history.table()
     n_states = sum(name.startswith("K_I_") for name in table.dtype.names or ())
-    for number, (crack, tip) in enumerate(_rows_of(table, "tip")):
-        rows = table[(table["crack"] == crack) & (table["tip"] == tip)]
+    labels = _tip_labels(history)
+    for number, (name, label) in enumerate(labels.items()):
+        rows = table[_tip_of_rows(history, table) == name]
         every = np.array([[rows[f"K_{m}_{s}"] for m in ("I", "II")] for s in range(n_states)])
         severe = np.argmax(np.hypot(every[:, 0], every[:, 1]), axis=0)
         K_I, K_II = every[severe, :, np.arange(len(rows))].T
-        label = f"crack {crack}, tip {tip}"
         axes.plot(rows["a"], K_I, "o-", ms=3, color=f"C{number}", label=f"$K_I$, {label}")
         axes.plot(rows["a"], K_II, "s--", ms=3, color=f"C{number}", label=f"$K_{{II}}$, {label}")
     axes.set(xlabel="crack length a", ylabel="K of the most severe state")
@@ -53,6 +54,7 @@ def _draw_K(history: History, axes: Any) -> None:
 def _draw_K_of_fronts(history: History, axes: Any) -> None:
     """Largest and smallest K along each front, of the state that is most severe there."""
     table = history.table()
+    table["crack"] = _crack_of_rows(history, table)
     for number, (crack, front) in enumerate(_rows_of(table, "front")):
         rows = table[(table["crack"] == crack) & (table["front"] == front)]
         label = f"crack {crack}, front {front}"
@@ -68,7 +70,7 @@ def _draw_K_of_fronts(history: History, axes: Any) -> None:
                     rows["N"], low, high, color=f"C{number}", alpha=0.15, lw=0, label=name
                 )
     _mark_joins(history, axes)
-    axes.set(xlabel="cycles N", ylabel="largest K along the front")
+    axes.set(xlabel=f"{history.unit}s N", ylabel="largest K along the front")
     axes.axhline(0, color="0.7", lw=0.8, zorder=0)
     axes.legend(fontsize="small")
 
@@ -93,18 +95,20 @@ def _draw_fronts(history: History, axes: Any) -> None:
 
 def _draw_a(history: History, axes: Any) -> None:
     table = history.table()
+    table["crack"] = _crack_of_rows(history, table)
     for crack in np.unique(table["crack"]):
         rows = table[table["crack"] == crack]
         _, first = np.unique(rows["step"], return_index=True)
         axes.plot(rows["N"][first], rows["a"][first], "o-", ms=3, label=f"crack {crack}")
     _mark_joins(history, axes)
-    axes.set(xlabel="cycles N", ylabel="crack length a")
+    axes.set(xlabel=f"{history.unit}s N", ylabel="crack length a")
     axes.legend(fontsize="small")
 
 
 def _draw_measures(history: History, axes: Any) -> None:
     """Depth, and the length on each facet set, over the cycles."""
     rows, _ = history.measures()
+    rows["crack"] = _crack_of_rows(history, rows)
     lengths = [name for name in rows.dtype.names or () if name.startswith("length_")]
     for crack in np.unique(rows["crack"]):
         rows_of_crack, who = rows[rows["crack"] == crack], f"crack {crack}: "
@@ -128,7 +132,7 @@ def _draw_measures(history: History, axes: Any) -> None:
                     label=label,
                 )
     _mark_joins(history, axes)
-    axes.set(xlabel="cycles N", ylabel="length")
+    axes.set(xlabel=f"{history.unit}s N", ylabel="length")
     axes.set_ylim(bottom=0.0)
     axes.legend(fontsize="small")
 
@@ -150,15 +154,41 @@ def _draw_path(history: History, axes: Any) -> None:
         low, high = history.mesh.points.min(axis=0), history.mesh.points.max(axis=0)
         margin = 0.03 * float((high - low).max())
         axes.set(xlim=(low[0] - margin, high[0] + margin), ylim=(low[1] - margin, high[1] + margin))
-    for number, crack in enumerate(history.cracks):
+    names = identities(history.steps)[-1]
+    table = history.table()
+    crack_of_row = _crack_of_rows(history, table)
+    for number, start in enumerate(history.steps[0].cracks):
+        axes.plot(*start.points[:, :2].T, "-", color=f"C{number}", lw=3.5, solid_capstyle="butt")
+        rows = table[crack_of_row == number]
+        axes.plot(rows["x"], rows["y"], ".", ms=4, color=f"C{number}")
+    for number, crack in zip(names, history.cracks, strict=True):
         axes.plot(*crack.points[:, :2].T, "-", color=f"C{number}", label=f"crack {number}")
-        start = history.steps[0].cracks[number].points
-        axes.plot(*start[:, :2].T, "-", color=f"C{number}", lw=3.5, solid_capstyle="butt")
-        tips = history.table()
-        rows_of_tip = tips[tips["crack"] == number]
-        axes.plot(rows_of_tip["x"], rows_of_tip["y"], ".", ms=4, color=f"C{number}")
     axes.set(xlabel="x", ylabel="y", aspect="equal")
     axes.legend(fontsize="small")
+
+
+def _crack_of_rows(history: History, table: Any) -> Any:
+    """Number that the crack of each row of a table had at first `(k,)`."""
+    names = dict(zip((s.index for s in history.steps), identities(history.steps), strict=True))
+    pairs = zip(table["step"].tolist(), table["crack"].tolist(), strict=True)
+    return np.array([names[step][crack] for step, crack in pairs], dtype=np.int64)
+
+
+def _tip_of_rows(history: History, table: Any) -> Any:
+    """Number that the tip of each row had among all tips of the first step; -1: it has left."""
+    names = dict(zip((s.index for s in history.steps), tip_identities(history.steps), strict=True))
+    rows = zip(*(table[name].tolist() for name in ("step", "crack", "tip")), strict=True)
+    return np.array([
+        names[step][crack][tip] if names[step] else -1 for step, crack, tip in rows
+    ], dtype=np.int64)  # fmt: skip
+
+
+def _tip_labels(history: History) -> dict[int, str]:
+    """Names of tips, by crack and number in the first step."""
+    first = tip_identities(history.steps[:1])[0]
+    return {
+        name: f"crack {c}, tip {j}" for c, tips in enumerate(first) for j, name in enumerate(tips)
+    }
 
 
 def _rows_of(table: Any, what: str) -> list[tuple[int, int]]:

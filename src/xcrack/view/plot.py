@@ -119,7 +119,7 @@ def plot(
         near=None,
     )
     if zoom is not None:
-        look = replace(look, near=crack_box(solution, look.cracks(solution), zoom))
+        look = replace(look, near=crack_box(solution, look.cracks(solution), zoom, look.warp))
     if show is not None:
         show = flag(show, "plot: show")
     if field in _ON_LIPS and not solution.lips:
@@ -242,14 +242,14 @@ def _draw_3d(
     return draw_space(picture, arrows, target, window, look.title, edges, colours)
 
 
-def crack_box(solution: Solution, cracks: list[int], zoom: Any) -> Floats:
-    """Box around cracks, `zoom` times as large as they are `(2, d)`.
+def crack_box(solution: Solution, cracks: list[int], zoom: Any, warp: float = 0.0) -> Floats:
+    """Box around cracks where a warp takes them, `zoom` times as large as they are `(2, d)`.
 
     Parameters
     ----------
     solution : Solution
     cracks : list of int
-    zoom : float
+    zoom, warp : float
 
     Raises
     ------
@@ -260,6 +260,8 @@ def crack_box(solution: Solution, cracks: list[int], zoom: Any) -> Floats:
     if not cracks:
         raise ProblemError("plot(zoom=): the body has no crack to zoom to; leave zoom out.")
     x = np.concatenate([solution.lips[c].x for c in cracks])
+    if warp:
+        x = x + 0.5 * warp * (solution.displacement(x, 1) + solution.displacement(x, -1))
     low, high = x.min(axis=0), x.max(axis=0)
     half = factor * max(float((high - low).max()), 1e-300) / 2
     middle = (low + high) / 2

@@ -8,7 +8,7 @@ from xcrack.base.markup import element, join_parts, table
 from xcrack.fatigue.retardation import OverloadZones
 from xcrack.growth.step import Memory, Step
 from xcrack.growth.trail import FrontTrail, Trail
-from xcrack.view.report_source import Section, Source
+from xcrack.view.report_source import Section, Source, setting_words
 
 
 def spectrum(source: Source) -> Section | None:
@@ -20,7 +20,7 @@ def spectrum(source: Source) -> Section | None:
     settings = memory.settings
     if settings.get("cycle") != "Spectrum":
         return None
-    unit = settings.get("cycle.unit", "'block'").strip("'")
+    unit = source.history.unit if source.history is not None else "block"
     rows: list[tuple[str, Any]] = [
         ("one repetition", unit),
         ("repetitions at the last step", last.cycles),
@@ -30,7 +30,8 @@ def spectrum(source: Source) -> Section | None:
     if counts:
         levels = last.levels
         rows += [("levels of K a step", f"{min(counts)} to {max(counts)}"),
-                 ("their factors", f"{min(levels):.6g} to {max(levels):.6g}")]  # fmt: skip
+                 ("their factors", f"{min(levels):.6g} to {max(levels):.6g}"),
+                 ("largest range", max(levels) - min(levels))]  # fmt: skip
     parts: list[Any] = [table((), rows)]
     values: dict[str, Any] = {"unit": unit, "blocks": last.cycles, "levels": list(last.levels)}
     model = settings.get("retardation")
@@ -51,7 +52,7 @@ def spectrum(source: Source) -> Section | None:
 
 def _rows(settings: Any, prefix: str, besides: tuple[str, ...] = ()) -> list[tuple[str, str]]:
     return [
-        (key.removeprefix(prefix), text)
+        (key.removeprefix(prefix), setting_words(text))
         for key, text in settings.items()
         if key.startswith(prefix) and key not in besides
     ]

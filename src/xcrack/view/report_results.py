@@ -141,7 +141,7 @@ def growth(source: Source) -> Section | None:
     ranges = [r for step in history.steps for part in step.dK_eq for r in part]
     rows: list[tuple[str, Any]] = [
         ("steps", len(history.steps)),
-        ("cycles N at the last step", history.life),
+        (f"{history.unit}s N at the last step", history.life),
         ("its numerical error", str(history.life_bar)),
         *(("join", str(join)) for join in history.joins),
         ("why it ended", history.ended),

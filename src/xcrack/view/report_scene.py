@@ -9,10 +9,12 @@ from xcrack.analysis.solution import Solution
 from xcrack.base.arguments import arguments_of
 from xcrack.base.arrays import coordinates
 from xcrack.base.markup import Markup, element, join_parts, list_markup, table
+from xcrack.crack.crack import Crack
 from xcrack.crack.measures import Measures, measures
+from xcrack.mesh.mesh import Mesh
 from xcrack.model.supports import Condition
 from xcrack.runs.versions import versions
-from xcrack.view.report_source import Section, Source
+from xcrack.view.report_source import Section, Source, setting_words
 
 
 def scene(source: Source) -> Section:
@@ -28,7 +30,7 @@ def scene(source: Source) -> Section:
         rows += [("material", repr(problem.material)), ("order of the elements", problem.order),
                  ("contact", problem.contact)]  # fmt: skip
     for c, crack in enumerate(source.cracks):
-        rows.append((f"crack {c}", _crack(crack)))
+        rows.append((f"crack {c}", _crack(crack, mesh)))
     parts: list[Any] = [table((), rows)]
     crack_measures = [] if mesh is None else [measures(crack, mesh) for crack in source.cracks]
     if crack_measures:
@@ -46,13 +48,13 @@ def scene(source: Source) -> Section:
     return Section("scene", "Scene", join_parts(*parts), numbers)
 
 
-def _crack(crack: Any) -> str:
+def _crack(crack: Crack, mesh: Mesh | None) -> str:
     if crack.fronts is not None:
         n = [len(front) for front in crack.fronts]
         return f"{len(crack.faces)} triangles, {len(n)} front(s) of {', '.join(map(str, n))} points"
-    length = float(np.linalg.norm(np.diff(crack.points, axis=0), axis=1).sum())
     tips = "not placed" if crack.tips is None else f"{len(crack.tips)} tip(s)"
-    return f"{len(crack.points)} points, length {length:.6g}, {tips}"
+    length = "" if mesh is None else f"length {measures(crack, mesh).area:.6g} in the body, "
+    return f"{len(crack.points)} points, {length}{tips}"
 
 
 def _measures_of_crack(c: int, m: Measures) -> tuple[str, ...]:
@@ -136,8 +138,11 @@ def _notes(source: Source) -> list[str]:
             every = np.concatenate(ratios)
             every = every[np.isfinite(every)]
             if len(every):
-                notes.append(f"R of the run is {every.min():.3g} to {every.max():.3g}: compare it "
-                             "with the range that the growth law was fitted for.")  # fmt: skip
+                what = "run" if history.unit == "cycle" else f"largest cycle of each {history.unit}"
+                more = "" if history.unit == "cycle" else ", and those of its other cycles,"
+                notes.append(f"R of the {what} is {every.min():.3g} to {every.max():.3g}: compare "
+                             f"it{more} with the range that the growth law was fitted "
+                             "for.")  # fmt: skip
         touching = any(state[c].closed.any() for step in history.steps for state in step.sif
                        for c in range(len(state)))  # fmt: skip
         if "elber" in law and touching:
@@ -206,7 +211,7 @@ def rerun_section(source: Source) -> Section:
         parts.append(element("p", "Run the script or the case file that made this again; equal "
                              "hashes say that mesh and cracks are the same."))  # fmt: skip
     if settings:
-        body = table((), sorted(settings.items()), scroll=True)
+        body = table((), [(k, setting_words(v)) for k, v in sorted(settings.items())], scroll=True)
         parts.append(Markup(f"<details><summary>settings of the run</summary>{body}</details>"))
     return Section("again", "Inputs, versions, and how to run it again", join_parts(*parts),
                    {"versions": software, "hashes": hashes, "settings": settings})  # fmt: skip

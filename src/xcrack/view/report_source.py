@@ -1,6 +1,7 @@
 """What a report is about, gathered from a solution, a history, or the folder of a run."""
 
 import hashlib
+import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -131,6 +132,14 @@ class Source:
         }
 
 
+_ARRAY = re.compile(r"float64 \((\d+),.*\) (sha256:\w+)")
+
+
+def setting_words(text: str) -> str:
+    """A setting; of an array, which is stored by its hash, how many numbers it has."""
+    return _ARRAY.sub(r"\1 numbers, \2", text)
+
+
 def _nu_of(material: Material) -> float:
     """Poisson's ratio at tips, where K has been had with it."""
     return material.at_tip().nu
@@ -224,4 +233,4 @@ class Section:
     numbers: Mapping[str, Any] = field(default_factory=dict)
 
 
-__all__ = ["Section", "Source", "source_of"]
+__all__ = ["Section", "Source", "setting_words", "source_of"]
