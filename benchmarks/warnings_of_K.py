@@ -90,11 +90,15 @@ def class_of(error: float) -> int:
     return sum(error >= limit for limit in LIMITS)
 
 
-def table(stored: dict, label: str, errors_of: str) -> str:
+def table(stored: dict, label: str, errors_of: str, order: int | None = None) -> str:
     """Scenes in which each warning of one label fires, by the errors of another."""
     rows, judges = stored["labels"][label], stored["labels"][errors_of]
     both = [s for s in rows if "error" in rows[s] and "error" in judges.get(s, {})]
-    lines = [f"warnings of {label}, by the errors of {errors_of} ({len(both)} scenes)"]
+    both = [s for s in both if order in (None, rows[s].get("order"))]
+    lines = [
+        f"warnings of {label}, by the errors of {errors_of} ({len(both)} scenes"
+        + (")" if order is None else f" of order {order})")
+    ]
     lines.append(f"{'':22}" + "".join(f"{name:>20}" for name in CLASSES))
     for word in (*outcomes_of_K.WARNINGS, "any"):
         cells = ""
@@ -122,6 +126,8 @@ def main() -> None:
     stored = read(options.results)
     for label in stored["labels"]:
         print(table(stored, label, label), end="\n\n")
+        for order in (1, 2):
+            print(table(stored, label, label, order), end="\n\n")
         for other in stored["labels"]:
             if other != label:
                 print(table(stored, label, other), end="\n\n")

@@ -40,7 +40,8 @@ def outcome(seed, known=None, kinds=scenes_of_K.KINDS):
     -------
     dict
         ``kind``, and ``refused`` (a word) or ``known`` (tips and K), ``error`` (the largest, as a
-        share of the largest K) and ``warned`` (which of the three warnings).
+        share of the largest K), ``order`` of the functions and ``warned`` (which of the three
+        warnings).
     """
     name = kinds[seed % len(kinds)].__name__
     try:
@@ -60,6 +61,7 @@ def outcome(seed, known=None, kinds=scenes_of_K.KINDS):
     return {
         "kind": name,
         "known": [tips.tolist(), wanted.tolist()],
+        "order": scene.problem.order,
         "error": float(np.abs(K - wanted[row]).max() / np.abs(wanted).max()),
         "warned": [k for k, word in WARNINGS.items() if any(word in text for text in messages)],
     }

@@ -18,9 +18,11 @@ from xcrack.mesh.mesh import Mesh
 
 _ROUND = 0.9  # rad; facets that turn by more meet at a corner
 _ALIKE = 3.0  # ratio of the turns at both ends of a facet of a curve
-# Share of each absolute contribution of a crack's shape that is in doubt: where it is smooth, and
-# besides at kinks, all of it from a turn of so many rad on (measured: half of what a kink of 1 rad
-# changes is of first order).
+# Share of each absolute contribution of a crack's shape that is in doubt: where it is smooth, of
+# what a stretch of some cells contributes, over which the tilt is there and back; and besides at
+# kinks, of each point, all of it from a turn of so many rad on (measured: half of what a kink of
+# 1 rad changes is of first order).
+_STRETCH = 4.0
 _SMOOTH, _KINK, _BLUNT = 0.3, 0.8, 0.5
 
 
@@ -48,7 +50,7 @@ def crack_shape(
     space, lips = solutions[0].space, solutions[0].lips[c]
     z, mu = estimated.z, estimated.mu[c]
     nothing = np.zeros((len(solutions), z.shape[2]))
-    foot, turn, normal = _nearest_on(space.cracks[c].points, lips.x)
+    foot, turn, normal, way = _nearest_on(space.cracks[c].points, lips.x)
     away = _along_normal(foot - lips.x, lips.normal)
     n = lips.normal
     normal = normal * np.sign(np.einsum("qd,qd->q", normal, n))[:, None]
@@ -77,8 +79,16 @@ def crack_shape(
             slid -= np.einsum("qi,qi->q", turned, u[..., k])[:, None] * mu[k][moved]
             tilted[:, k] += sign * slid
     parts = lips.weight[moved][:, None, None] * (away[moved][:, None, None] * shifted + tilted)
-    doubt = _SMOOTH + _KINK * np.minimum(turn[moved] / _BLUNT, 1.0)
-    return parts.sum(axis=0), np.einsum("q,qkm->km", doubt, np.abs(parts))
+    blunt = np.minimum(turn[moved] / _BLUNT, 1.0)
+    cells = lips.weight / space.mesh.cell_size[lips.cell[:, 0]]
+    order = np.argsort(way, kind="stable")
+    stretch = np.empty(len(lips), dtype=np.int64)
+    stretch[order] = np.cumsum(cells[order]) / _STRETCH
+    of_stretch = np.zeros((int(stretch.max()) + 1, *nothing.shape))
+    np.add.at(of_stretch, stretch[moved], (1 - blunt)[:, None, None] * parts)
+    doubt = _SMOOTH * np.abs(of_stretch).sum(axis=0)
+    doubt += (_SMOOTH + _KINK) * np.einsum("q,qkm->km", blunt, np.abs(parts))
+    return parts.sum(axis=0), doubt
 
 
 def rim_shape(solutions: Sequence[Solution], z: Floats) -> tuple[Floats, Floats]:
@@ -122,8 +132,11 @@ def _boundary_changes(
     return np.asarray(np.einsum("q,qkm->km", points.weight * away, density))
 
 
-def _nearest_on(polyline: Floats, x: Floats) -> tuple[Floats, Floats, Floats]:
-    """Nearest points on a polyline, its turn at the next vertex `(q,)`, its normal there."""
+def _nearest_on(polyline: Floats, x: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+    """Nearest points on a polyline, its turn at the next vertex, its normal there, and way there.
+
+    Turns and ways along the line are `(q,)`.
+    """
     a, along = polyline[:-1], np.diff(polyline, axis=0)
     t = np.einsum("qsd,sd->qs", x[:, None] - a, along) / (along * along).sum(axis=1)
     t = np.clip(t, 0.0, 1.0)
@@ -134,7 +147,9 @@ def _nearest_on(polyline: Floats, x: Floats) -> tuple[Floats, Floats, Floats]:
     turn = np.concatenate([[0.0], np.abs(np.diff(heading)), [0.0]])
     normal = np.stack([-along[:, 1], along[:, 0]], axis=1)
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-    return foot[row, best], turn[best + (t[row, best] > 0.5)], normal[best]
+    length = np.linalg.norm(along, axis=1)
+    way = (np.cumsum(length) - length)[best] + t[row, best] * length[best]
+    return foot[row, best], turn[best + (t[row, best] > 0.5)], normal[best], way
 
 
 def _along_normal(way: Floats, normal: Floats) -> Floats:
