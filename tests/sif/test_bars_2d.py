@@ -208,3 +208,31 @@ def test_wrong_choice(wrong):
     if wrong is not None:
         with pytest.raises(xc.ProblemError, match="True or False"):
             xc.stress_intensity(xc.solve(edge(n=4)), error=wrong)
+
+
+def test_bars_on_a_closed_arc():
+    """K_II of an arc that presses and slides: within its bar, which is at most ten times as long.
+
+    Against cells three times smaller; in the median of tips, as one of them may be right by chance.
+    """
+    loads = [
+        xc.traction("right", (-100, 10)), xc.traction("left", (100, -10)),
+        xc.traction("top", (10, -60)), xc.traction("bottom", (-10, 60)),
+    ]  # fmt: skip
+
+    def K_II(half, n):
+        t = np.linspace(-half, half, 641)
+        crack = xc.line_crack(np.c_[np.cos(t) + 0.017, np.sin(t) - 0.011])
+        body, material = xc.box((-2, -2), (2, 2), n), xc.Isotropic(1e5, 0.3, plane="strain")
+        solution = xc.solve(xc.Problem(body, material, [crack], loads=loads), error=True)
+        sif = xc.stress_intensity(solution)
+        row = np.argsort(sif.x[:, 1])
+        return sif.best[row, 1], sif.bar[row, 1]
+
+    ratios = []
+    for half in np.radians([45.0, 70.0, 100.0]):
+        best, bar = K_II(half, 41)
+        error = np.abs(best - K_II(half, 121)[0])
+        assert (error <= bar).all()
+        ratios += (bar / error).tolist()
+    assert np.median(ratios) <= 10

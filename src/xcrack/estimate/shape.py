@@ -19,9 +19,9 @@ from xcrack.mesh.mesh import Mesh
 _ROUND = 0.9  # rad; facets that turn by more meet at a corner
 _ALIKE = 3.0  # ratio of the turns at both ends of a facet of a curve
 # Share of each absolute contribution of a crack's shape that is in doubt: where it is smooth, of
-# what a stretch of some cells contributes, over which the tilt is there and back; and besides at
-# kinks, of each point, all of it from a turn of so many rad on (measured: half of what a kink of
-# 1 rad changes is of first order).
+# each point of open faces, and of what a stretch of some cells contributes where they press, over
+# which the tilt is there and back; and besides at kinks, of each point, all of it from a turn of so
+# many rad on (measured: half of what a kink of 1 rad changes is of first order).
 _STRETCH = 4.0
 _SMOOTH, _KINK, _BLUNT = 0.3, 0.8, 0.5
 
@@ -80,13 +80,15 @@ def crack_shape(
             tilted[:, k] += sign * slid
     parts = lips.weight[moved][:, None, None] * (away[moved][:, None, None] * shifted + tilted)
     blunt = np.minimum(turn[moved] / _BLUNT, 1.0)
+    presses = pressure.any(axis=1) | np.any([each[moved].any(axis=1) for each in mu], axis=0)
+    smooth = (1 - blunt)[:, None, None] * parts
     cells = lips.weight / space.mesh.cell_size[lips.cell[:, 0]]
     order = np.argsort(way, kind="stable")
     stretch = np.empty(len(lips), dtype=np.int64)
     stretch[order] = np.cumsum(cells[order]) / _STRETCH
     of_stretch = np.zeros((int(stretch.max()) + 1, *nothing.shape))
-    np.add.at(of_stretch, stretch[moved], (1 - blunt)[:, None, None] * parts)
-    doubt = _SMOOTH * np.abs(of_stretch).sum(axis=0)
+    np.add.at(of_stretch, stretch[moved][presses], smooth[presses])
+    doubt = _SMOOTH * (np.abs(of_stretch).sum(axis=0) + np.abs(smooth[~presses]).sum(axis=0))
     doubt += (_SMOOTH + _KINK) * np.einsum("q,qkm->km", blunt, np.abs(parts))
     return parts.sum(axis=0), doubt
 
