@@ -186,9 +186,9 @@ def test_a_study_whose_cases_fail_says_so_and_takes_the_mended_function(tmp_path
     cases = grid(a=[float(k) for k in range(30)])
     with pytest.warns(
         XcrackWarning, match=r"30 of 30 cases failed, the first .* TypeError"
-    ) as said:
+    ) as record:
         study = campaign(slip, cases, path=tmp_path)
-    assert len(said) == 1
+    assert len(record) == 1
     assert str(study).splitlines()[0].endswith("0 without error")
     assert "30 failed with TypeError" in str(study)
     assert len(str(study)) < 1000

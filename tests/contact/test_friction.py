@@ -485,3 +485,47 @@ def test_halves_slide_at_the_bound():
 def test_adapt_says_that_friction_has_no_bars():
     with pytest.raises(xc.ProblemError, match="friction"):
         xc.adapt(PLATE, 0.05, states=[100.0], progress=False)
+
+
+def test_dissipation_where_stick_turns_to_slip():
+    """Exact where each state's tractions are those on the way there: its turns are states, too.
+
+    A crack that slips under even pressure has the field of a crack under the rest of the shear.
+    Between two states tractions go in a straight line: without the turns the boundary would move
+    as if the crack slipped before it does, which in this body is 2 % of the work.
+    """
+    young, nu, a, p1, t1, mu = 1e5, 0.3, 0.93, 100.0, 80.0, 0.3
+    Q = np.array([[np.cos(0.21), -np.sin(0.21)], [np.sin(0.21), np.cos(0.21)]])
+    shift = np.array([0.013, -0.017])
+
+    def load(factor, slip):
+        def tractions(x, n):
+            y = (x - shift) @ Q
+            z = y[:, 0] + 1j * y[:, 1]
+            root = np.sqrt(z - a) * np.sqrt(z + a)
+            Z, dZ = slip * z / root, -slip * a * a / root**3
+            s = np.empty((len(x), 2, 2))
+            s[:, 0, 0] = 2 * Z.imag + y[:, 1] * dZ.real
+            s[:, 1, 1] = -y[:, 1] * dZ.real - factor * p1
+            s[:, 0, 1] = s[:, 1, 0] = Z.real - y[:, 1] * dZ.imag + factor * t1 - slip
+            return np.einsum("nij,nj->ni", Q @ s @ Q.T, n)
+
+        return [xc.traction("boundary", tractions)]
+
+    up, down = t1 - mu * p1, t1 + mu * p1
+    turn, back = up / down, 0.05 * down / up
+    path = [
+        (1.0, up), (turn, up), (0.3, 0.3 * down), (0.05, 0.05 * down), (back, 0.05 * down),
+        (0.5, 0.5 * up),
+    ]  # fmt: skip
+    W = np.pi * a**2 * (1 - nu**2) / young * mu * p1
+    exact = W * np.array([
+        up, 0, down * (turn**2 - 0.09), down * (0.09 - 0.0025), 0, up * (0.25 - back**2)
+    ])  # fmt: skip
+    crack = xc.line_crack(np.array([(-a, 0), (a, 0)]) @ Q.T + shift)
+    problem = xc.Problem(
+        xc.box((-2, -2), (2, 2), 31), xc.Isotropic(young, nu, "strain"), [crack], friction=mu
+    )
+    solutions = xc.solve(problem, states=[load(*each) for each in path])
+    dissipated = np.array([s.dissipated for s in solutions])
+    np.testing.assert_allclose(dissipated, exact, rtol=1e-3, atol=3e-5 * W * up)

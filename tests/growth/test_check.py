@@ -68,7 +68,7 @@ SLIPS = {
 
 
 @pytest.mark.parametrize("name", SLIPS)
-def test_a_slip_is_told_with_number_limit_place_and_remedy(name):
+def test_a_slip_has_a_line_with_number_limit_place_and_remedy(name):
     make, words = SLIPS[name]
     alarms = xc.check(*make())
     (alarm,) = [each for each in alarms if words in each.quantity][:1]
@@ -100,11 +100,11 @@ def test_growth_warns_of_the_same_once():
     assert [a.quantity for a in alarms if "toughness" in a.quantity]
     history = []
     options = {"da": 2.0, "max_steps": 4, "progress": False}
-    said = warned(lambda: history.append(
+    messages = warned(lambda: history.append(
         xc.collect(xc.grow(problem, LAW, xc.max_hoop_stress, CYCLE, **options))
     ))  # fmt: skip
-    zones = [text for text in said if "plastic zone" in text and "it came again" not in text]
-    assert len([text for text in said if "ligament ahead" in text]) <= 2  # and its summary
+    zones = [text for text in messages if "plastic zone" in text and "it came again" not in text]
+    assert len([text for text in messages if "ligament ahead" in text]) <= 2  # and its summary
     assert zones
     assert any("plastic zone" in text for text in history[0].warnings)
 
@@ -168,8 +168,8 @@ def test_life_says_from_when_elasticity_does_not_hold():
     steps = xc.grow(problem, LAW, xc.max_hoop_stress, CYCLE, da=3.0, max_steps=4, progress=False)
     history = []
     warned(lambda: history.append(xc.collect(steps)))
-    said = warned(lambda: xc.life(history[0], scatter=xc.Scatter(C=xc.lognormal(0.1)), seed=7))
-    assert any("life: from N = " in text and "does not hold" in text for text in said)
+    messages = warned(lambda: xc.life(history[0], scatter=xc.Scatter(C=xc.lognormal(0.1)), seed=7))
+    assert any("life: from N = " in text and "does not hold" in text for text in messages)
 
 
 def test_nothing_else_than_a_run_is_taken():

@@ -79,11 +79,11 @@ def alarms_of_solutions(solutions: Sequence[Solution], *, stresses: bool = True)
         return [Alarm("the largest displacement", 0.0, 0.0, "in all load states", words)]
     if not has_units(problem):
         return []
-    found = [_displacement(solution) for solution in solutions]
+    alarms = [_displacement(solution) for solution in solutions]
     if stresses:
-        found += [_stress(solution) for solution in solutions]
+        alarms += [_stress(solution) for solution in solutions]
     worst: dict[str, Alarm] = {}
-    for alarm in found:
+    for alarm in alarms:
         before = worst.get(alarm.quantity)
         if alarm.value > alarm.limit and (before is None or alarm.value > before.value):
             worst[alarm.quantity] = alarm

@@ -37,18 +37,18 @@ def alarms_of_step(run: GrowthRule, step: Step) -> list[Alarm]:
     """
     if step.has_left or not step.sif:
         return []
-    found: list[Alarm] = []
+    alarms: list[Alarm] = []
     if step.index == 0:
         if solutions := _solutions(run, step):
-            found += alarms_of_solutions(solutions)
-        if not any("in all load states" in alarm.place for alarm in found):
-            found += _factors(run) + _rate(run, step)
+            alarms += alarms_of_solutions(solutions)
+        if not any("in all load states" in alarm.place for alarm in alarms):
+            alarms += _factors(run) + _rate(run, step)
     known = validity_of(run, step)
     if known is not None:
         limits = known.alarms()
         # Later in a run it is why growth ends.
-        found += [a for a in limits if step.index == 0 or not a.quantity.startswith("K over")]
-    return found
+        alarms += [a for a in limits if step.index == 0 or not a.quantity.startswith("K over")]
+    return alarms
 
 
 def validity_of(run: GrowthRule, step: Step) -> Validity | None:
@@ -137,17 +137,17 @@ def _rate(run: GrowthRule, step: Step) -> list[Alarm]:
                       f"dK_eq = {K:.4g}: {words}")]  # fmt: skip
     if share == 0:
         return _no_growth(run, step, units)
-    found = []
+    alarms = []
     unit = millimetre(run.problem)
     if share > _FAST:
-        found.append(Alarm("da/dN over the size of the crack", float(share), _FAST, place, units))
+        alarms.append(Alarm("da/dN over the size of the crack", float(share), _FAST, place, units))
     elif unit is not None and rate > _FAR * unit:
-        found.append(Alarm("da/dN", float(rate), _FAR * unit, place, units))
+        alarms.append(Alarm("da/dN", float(rate), _FAR * unit, place, units))
     elif share * _ENDLESS < 1:
         words = f"nothing grows in a lifetime: {units}"
-        found.append(Alarm("the size of the crack over da/dN", float(1 / share), _ENDLESS, place,
+        alarms.append(Alarm("the size of the crack over da/dN", float(1 / share), _ENDLESS, place,
                            words))  # fmt: skip
-    return found
+    return alarms
 
 
 def _no_growth(run: GrowthRule, step: Step, units: str) -> list[Alarm]:
@@ -158,9 +158,9 @@ def _no_growth(run: GrowthRule, step: Step, units: str) -> list[Alarm]:
     solutions = _solutions(run, step)
     if not solutions or isinstance(run.cycle, Spectrum):
         return []
-    mesh, material = run.problem.mesh, run.problem.material.at_tip()
+    mesh, E_prime = run.problem.mesh, run.problem.material.at_tip().E_prime
     energy = max(solution.energy for solution in solutions)
-    stress = np.sqrt(2 * max(energy, 0.0) * material.E_prime / mesh.volume.sum())
+    stress = np.sqrt(2 * max(energy, 0.0) * E_prime / mesh.volume.sum())
     length = float(np.ptp(mesh.points, axis=0).max())
     largest = float(stress * np.sqrt(np.pi * length))
     R = next(R[[0]] for R in step.R if len(R))

@@ -36,8 +36,11 @@ def check(
     problem : Problem
         Its material may have a yield stress and a toughness `K_c`: without them plastic zones, net
         sections and K against toughness are not judged.
-    law, cycle, criterion, da, options
+    law, cycle, criterion, da
         As of `grow`; of the steps nothing is needed.
+    tolerance, max_unknowns, cycles, scaling, integrator, threshold, retardation, K_c, link_up, \
+    max_steps, max_cycles, solver, response, progress
+        As of `grow`.
 
     Returns
     -------

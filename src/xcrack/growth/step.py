@@ -420,7 +420,8 @@ class Step:
     cracks : tuple of Crack
         As they were solved: K, angle, rates and the solutions belong to these.
     sif : tuple of tuple of SIF
-        ``sif[state][crack]``.
+        ``sif[state][crack]``; states in the order of `Cycle.load_states`: the minimum of a
+        ``Cycle(min, max)`` first, then its maximum.
     angle, dK_eq, R, rate, da : tuple of (f,) arrays
         One array a crack: kink angle (rad), equivalent range (stress √length), ratio, growth a
         cycle (length/cycle; 0 below the threshold, inf where the law says that the toughness is
@@ -534,6 +535,11 @@ class Step:
         head = ("crack", "place", "angle", "ΔK_eq", "R", "da/dN", "da")
         title = element("b", f"Step {self.index}, N = {self.cycles:.6g}")
         return join_parts(title, table(head, rows, scroll=len(rows) > 12))
+
+    @property
+    def N(self) -> float:  # noqa: N802 - the name of the field
+        """Cycles, as in tables and pictures."""
+        return self.cycles
 
     @property
     def n_tips(self) -> int:

@@ -19,7 +19,6 @@ from xcrack.model.material import Material
 from xcrack.sif.sif import SIF
 
 ZONE = 0.15  # share of crack or ligament up to which a plastic zone counts as small
-_THICK = 2.5  # (K / yield stress)² from which a thickness is plane strain: ASTM E399
 _RADIUS = {"stress": 1 / (2 * np.pi), "strain": 1 / (6 * np.pi)}  # Irwin's, of (K / yield)²
 
 # What lies ahead of tips.
@@ -172,6 +171,7 @@ def validity(
             worst[key], places[key] = value, place
 
     yield_stress, state = material.yield_stress, "stress"
+    thickness = float(np.ptp(mesh.points, axis=0).min())  # of a body in space, at least
     for c, crack in enumerate(cracks):
         K = clipped_K(np.stack([row[c].K for row in sif])) if sif else np.zeros((0, 0, 2))
         if not K.size:
@@ -190,7 +190,7 @@ def validity(
             if yield_stress is None:
                 continue
             square = (float(largest[j]) / yield_stress) ** 2
-            state = _state(material, mesh, square)
+            state = material.constraint(thickness, square)
             zone = _RADIUS[state] * square
             judge("zone", zone, place)
             judge("of_crack", zone / size, place)
@@ -207,7 +207,7 @@ def validity(
     if "K" not in worst:
         return None
     if yield_stress is not None:
-        state = _state(material, mesh, (worst["K"] / yield_stress) ** 2)
+        state = material.constraint(thickness, (worst["K"] / yield_stress) ** 2)
     keys = ("K", "zone", "of_crack", "of_ligament", "of_toughness", "of_section")
     numbers: dict[str, Any] = {key: worst.get(key, np.nan) for key in keys}
     return Validity(**numbers, state=state, places=places)
@@ -232,13 +232,6 @@ def _size(crack: Crack, mesh: Mesh) -> float:
     if mesh.dim == 2:
         return length_inside(crack, mesh)
     return float(np.ptp(crack.points, axis=0).max())
-
-
-def _state(material: Material, mesh: Mesh, square: float) -> str:
-    """Whether a plastic zone is that of plane strain or of plane stress."""
-    if material.plane is not None:
-        return material.plane
-    return "strain" if np.ptp(mesh.points, axis=0).min() >= _THICK * square else "stress"
 
 
 _X, _W = np.polynomial.legendre.leggauss(40)

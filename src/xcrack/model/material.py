@@ -19,6 +19,7 @@ _WRONG_PLANE = {
     3: '{}(plane="{}") is for 2D bodies: leave plane out for a mesh of tetrahedra '
     "(read_mesh drops a constant z).",
 }
+_THICK = 2.5  # (K / yield stress)² from which a thickness is plane strain
 _PLANES = ("strain", "stress")
 _JUDGES = {"changes_results": False}  # what results are judged by, not what they are
 
@@ -144,6 +145,20 @@ class Material(Declared):
         """Stress `(n, dim, dim)` of a change of temperature `(n,)` that cannot expand."""
         stiff = -self._plane_stiffness()[:, :3].sum(axis=1)[_VOIGT[:dim, :dim]]
         return np.asarray(alpha * change[:, None, None] * stiff)
+
+    def constraint(self, thickness: float, square: float) -> str:
+        """Whether a plastic zone is that of plane "strain" or of plane "stress".
+
+        Parameters
+        ----------
+        thickness : float, length
+            Of a body in space.
+        square : float, length
+            (K / yield stress)²: plane strain needs 2.5 times as much thickness (ASTM E399).
+        """
+        if self.plane is not None:
+            return self.plane
+        return "strain" if thickness >= _THICK * square else "stress"
 
     def at_tip(self) -> "Isotropic":
         """The isotropic material whose fields surround a tip: constants of K, G and criteria.

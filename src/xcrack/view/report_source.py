@@ -81,9 +81,8 @@ class Source:
         else:
             return None
         if self.yield_stress is not None:
-            material = Isotropic(
-                1.0, _nu_of(material), material.plane, self.yield_stress, material.K_c
-            )
+            tip_material, K_c = material.at_tip(), material.K_c
+            material = replace(tip_material, yield_stress=self.yield_stress, K_c=K_c)
         if mesh is None or not self.sif or (material.yield_stress, material.K_c) == (None, None):
             return None
         K_c = material.K_c if self.history is None else None  # a run ends there
@@ -138,11 +137,6 @@ _ARRAY = re.compile(r"float64 \((\d+),.*\) (sha256:\w+)")
 def setting_words(text: str) -> str:
     """A setting; of an array, which is stored by its hash, how many numbers it has."""
     return _ARRAY.sub(r"\1 numbers, \2", text)
-
-
-def _nu_of(material: Material) -> float:
-    """Poisson's ratio at tips, where K has been had with it."""
-    return material.at_tip().nu
 
 
 def source_of(
