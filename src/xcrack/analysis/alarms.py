@@ -77,7 +77,9 @@ def alarms_of_solutions(solutions: Sequence[Solution], *, stresses: bool = True)
     if not any(solution.u.any() for solution in solutions):
         words = "give loads=[...], or a displacement that is not zero: K is zero everywhere."
         return [Alarm("the largest displacement", 0.0, 0.0, "in all load states", words)]
-    if not has_units(problem):
+    # What is imposed has no unit of a modulus.
+    forces = any("support" not in load.acts for each in solutions for load in each.loads)
+    if not has_units(problem) or not forces:
         return []
     alarms = [_displacement(solution) for solution in solutions]
     if stresses:

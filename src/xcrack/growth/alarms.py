@@ -139,7 +139,7 @@ def _rate(run: GrowthRule, step: Step) -> list[Alarm]:
         return _no_growth(run, step, units)
     alarms = []
     unit = millimetre(run.problem)
-    if share > _FAST:
+    if share > _FAST and has_units(run.problem):
         alarms.append(Alarm("da/dN over the size of the crack", float(share), _FAST, place, units))
     elif unit is not None and rate > _FAR * unit:
         alarms.append(Alarm("da/dN", float(rate), _FAR * unit, place, units))

@@ -60,8 +60,8 @@ def check(
     of a solid in MPa or Pa); 10¹² cycles until the crack has grown by its size; a threshold above K
     of a crack as long as the body; K_max the toughness; factors of a spectrum 20 beside stresses of
     5 (loads); plastic zone 15 % of crack or ligament; the load on a ligament that at which it
-    yields. Displacement and stress are judged where a yield stress is given or Young's modulus is
-    above 10: scenes with numbers near 1 have no units.
+    yields. Displacement and stress, by loads, and fast growth are judged where a yield stress is
+    given or Young's modulus is above 10: scenes with numbers near 1 have no units.
 
     Examples
     --------
