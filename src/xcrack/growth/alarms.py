@@ -15,7 +15,7 @@ from xcrack.growth.step import Step
 from xcrack.growth.validity import Validity, validity
 from xcrack.model.loads import Load
 
-_FAST = 0.01  # of the crack in a cycle
+_FAST = 0.02  # of the crack in a cycle
 _FAR = 0.1  # mm in a cycle
 _ENDLESS = 1e12  # cycles until a crack has grown by its size
 _FEW = 10.0  # cycles of a life

@@ -56,7 +56,7 @@ def check(
     Notes
     -----
     Limits: displacement 2 % of the body; stress in 5 % of the body the yield stress, or without one
-    1 % of Young's modulus; growth a cycle 1 % of the crack or 0.1 mm (where Young's modulus is that
+    1 % of Young's modulus; growth a cycle 2 % of the crack or 0.1 mm (where Young's modulus is that
     of a solid in MPa or Pa); 10¹² cycles until the crack has grown by its size; a threshold above K
     of a crack as long as the body; K_max the toughness; factors of a spectrum 20 beside stresses of
     5 (loads); plastic zone 15 % of crack or ligament; the load on a ligament that at which it
