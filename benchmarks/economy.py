@@ -152,7 +152,7 @@ def body(n: int = 11) -> Variant:
             xc.displacement(s, lambda x: np.insert(u(x[:, ::2]), 1, 0, axis=1)) for s in sides
         ]
         supports += [xc.fix("front", 1), xc.fix("back", 1)]
-        return xc.Problem(mesh, STEEL[3], [crack], supports=supports, loads=loads)
+        return xc.Problem(mesh, STEEL[3], [crack], supports=supports, loads=loads, order=1)
 
     def judge(solution: xc.Solution, sif: xc.SIF) -> Errors:
         return {"K": np.abs(np.median(np.abs(sif.K[:, :2]), axis=0) / (1.0, 0.5) - 1).max()}
@@ -171,7 +171,7 @@ def disc(
         crack = xc.penny_crack((0, 0, 0), (0, 0, 1), 0.5 - 0.02 * shorter)
         return xc.Problem(
             mesh, STEEL[3], [crack], supports=[xc.displacement("boundary", lambda x: u(x))],
-            contact=contact, numerics=xc.Numerics(**numerics),
+            contact=contact, numerics=xc.Numerics(**numerics), order=1,
         )  # fmt: skip
 
     def judge(solution: xc.Solution, sif: xc.SIF) -> Errors:

@@ -47,7 +47,9 @@ def scene(dim: int, n: int, contact: bool) -> Any:
             [(-1.5, -1.5, 0.03), (-0.1, -1.5, 0.03), (-0.1, 1.5, 0.03), (-1.5, 1.5, 0.03)]
         )
         steel = xc.Isotropic(210e3, 0.3)
-    return xc.Problem(body, steel, [crack], loads=loads, contact="on" if contact else "off")
+    return xc.Problem(
+        body, steel, [crack], loads=loads, contact="on" if contact else "off", order=4 - dim
+    )
 
 
 def one(dim: int, n: int, contact: bool) -> Row:

@@ -37,7 +37,8 @@ def penny(n: int) -> xc.Problem:
     crack = xc.penny_crack((0.01, -0.02, 0.03), (0.3, -0.5, 1.0), 0.5)
     loads = [xc.traction("top", (0, 0, 100.0)), xc.traction("bottom", (0, 0, -100.0))]
     body = xc.box((-1,) * 3, (1,) * 3, n)
-    return xc.Problem(body, xc.Isotropic(210e3, 0.3), [crack], loads=loads, contact="on")
+    steel = xc.Isotropic(210e3, 0.3)
+    return xc.Problem(body, steel, [crack], loads=loads, contact="on", order=1)
 
 
 def edge(n: int) -> xc.Problem:

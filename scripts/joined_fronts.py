@@ -27,6 +27,7 @@ def two_pennies() -> xc.History:
         [xc.penny_crack((x, -0.0315, 0.0175), (0, 0, 1), 1.0, n=64) for x in (-1.48, 1.52)],
         loads=[xc.traction("top", (0, 0, 1.0)), xc.traction("bottom", (0, 0, -1.0))],
         contact="off",
+        order=1,
     )
     return grown(problem, 0.2, 14)
 
@@ -39,6 +40,7 @@ def two_corners() -> xc.History:
         [xc.elliptic_crack((hole._R, 0.0, z), (0, 1, 0), (1, 0, 0), 0.6, 0.6) for z in (2.0, 0.0)],
         loads=[xc.traction("rim", hole._pull)],
         contact="off",
+        order=1,
     )
     return grown(problem, 0.15, 8)
 

@@ -138,7 +138,8 @@ def turning_load_grows_in_contact() -> Results:
 @scene
 def penny_open() -> Results:
     crack = xc.penny_crack((0.01, -0.02, 0.03), (0.3, -0.5, 1.0), 0.5)
-    return of([xc.solve(xc.Problem(perturbed(3, 8, 67), steel(3), [crack], loads=pull(3)))])
+    problem = xc.Problem(perturbed(3, 8, 67), steel(3), [crack], loads=pull(3), order=1)
+    return of([xc.solve(problem)])
 
 
 @scene
@@ -156,7 +157,7 @@ def surface_crack_closed_by_iterations() -> Results:
             [0 * x[:, 0], 0 * x[:, 0], 20 + 100 * x[:, 0]], axis=1))
         for side, s in (("top", 1.0), ("bottom", -1.0))
     ]  # fmt: skip
-    problem = xc.Problem(perturbed(3, 12, 69), steel(3), [crack], loads=bend)
+    problem = xc.Problem(perturbed(3, 12, 69), steel(3), [crack], loads=bend, order=1)
     return of(xc.solve(problem, states=[1.0, -1.0]))
 
 
@@ -164,7 +165,7 @@ def surface_crack_closed_by_iterations() -> Results:
 def edge_front_grows() -> Results:
     crack = xc.plane_crack([(-1.5, -1.5, 0.03), (-0.2, -1.5, 0.03), (-0.2, 1.5, 0.03),
                             (-1.5, 1.5, 0.03)])  # fmt: skip
-    problem = xc.Problem(perturbed(3, 9, 70), steel(3), [crack], loads=pull(3))
+    problem = xc.Problem(perturbed(3, 9, 70), steel(3), [crack], loads=pull(3), order=1)
     steps = xc.grow(problem, LAW, xc.max_hoop_stress, xc.Cycle(0.1, 1.0), 0.25, max_steps=3)
     return of_run(xc.collect(steps))
 

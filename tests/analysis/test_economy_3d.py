@@ -23,7 +23,7 @@ SOLVERS = ["direct", "iterative"]
 
 def problem(*cracks, mesh=None, loads=PULL, **options):
     mesh = scenes_space.perturbed(5, 71) if mesh is None else mesh
-    return xc.Problem(mesh, STEEL, list(cracks), loads=loads, **options)
+    return xc.Problem(mesh, STEEL, list(cracks), loads=loads, **{"order": 1} | options)
 
 
 def split_apart(**options):

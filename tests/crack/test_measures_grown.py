@@ -19,7 +19,9 @@ def straight_on(K, nu):
 def grown(centre):
     crack = xc.elliptic_crack(centre, (0, 1, 0), (1, 0, 0), 3, 3)
     pull = [xc.traction("back", (0, 1, 0)), xc.traction("front", (0, -1, 0))]
-    problem = xc.Problem(BOX, xc.Isotropic(E=1e3, nu=0.3), [crack], loads=pull, contact="off")
+    problem = xc.Problem(
+        BOX, xc.Isotropic(E=1e3, nu=0.3), [crack], loads=pull, contact="off", order=1
+    )
     steps = xc.grow(
         problem, lambda dK, R: RATE + 0.0 * dK, straight_on, xc.Cycle(0, 1), da=0.8, max_steps=6,
         progress=False,

@@ -87,7 +87,9 @@ def test_parts_of_triangles_behind_a_front():
 
 
 def model(mesh, *cracks, **options):
-    return build(xc.Problem(mesh, scenes.STEEL, list(cracks), numerics=numerics_of(**options)))
+    return build(
+        xc.Problem(mesh, scenes.STEEL, list(cracks), numerics=numerics_of(**options), order=1)
+    )
 
 
 def check_cut(built, area=None):

@@ -38,7 +38,7 @@ def pennies(gap=0.75, height=0.0, normals=((0, 0, 1), (0, 0, 1)), loads=PULL, co
         xc.penny_crack((d * (c - (count - 1) / 2), 0.013, 0.0117 + c * height), normal, 1.0, n=48)
         for c, normal in zip(range(count), (*normals, (0, 0, 1)))
     ]
-    return xc.Problem(mesh, xc.Isotropic(1000.0, 0.3), cracks, loads=loads, contact="off")
+    return xc.Problem(mesh, xc.Isotropic(1000.0, 0.3), cracks, loads=loads, contact="off", order=1)
 
 
 def grow(problem, **options):

@@ -328,6 +328,7 @@ def test_a_front_in_3D():
         Isotropic(E=210e3, nu=0.3),
         cracks=[penny_crack((0.1, 0.0, 0.05), (0, 0, 1), 2.0)],
         loads=[traction("top", (0, 0, 100.0)), traction("bottom", (0, 0, -100.0))],
+        order=1,
     )
     law = walker(1e-11, 3, 0.5)
     step = first(Spectrum([0.0, 1.0, 0.4, 0.9]), problem, law=law)

@@ -24,7 +24,7 @@ def strip(d, loads=(), contact="auto"):
     sides = [xc.fix((0.0,) * d, axis=0)] if d == 2 else [xc.fix("front", axis=1)]
     sides += [] if d == 2 else [xc.fix("back", axis=1), xc.fix((0.0,) * d, axis=0)]
     body = xc.Isotropic(E=2e5, nu=0.3, plane=plane)
-    return xc.Problem(mesh, body, [crack], [*ends, *sides], list(loads), contact)
+    return xc.Problem(mesh, body, [crack], [*ends, *sides], list(loads), contact, 4 - d)
 
 
 def rise(x):

@@ -32,7 +32,9 @@ def plane(n=24):
 def solid(n=10):
     crack = xc.penny_crack((0.01, -0.02, 0.03), (0.3, -0.5, 1.0), 0.5)
     loads = [xc.traction("top", (0, 0, -1.0)), xc.traction("bottom", (0, 0, 1.0))]
-    return xc.Problem(xc.box((-1,) * 3, (1,) * 3, n), xc.Isotropic(1.0, 0.3), [crack], loads=loads)
+    return xc.Problem(
+        xc.box((-1,) * 3, (1,) * 3, n), xc.Isotropic(1.0, 0.3), [crack], loads=loads, order=1
+    )
 
 
 def bits(problem, count=None):

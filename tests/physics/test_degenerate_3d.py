@@ -58,6 +58,7 @@ def test_exactly_on_a_layer_a_crack_does_not_vanish():
     whole = xc.Problem(
         xc.box((-1, -1, -1), (1, 1, 1), 6), STEEL, [sheet((0, 0, 1), 0.0)],
         supports=[xc.fix("bottom"), xc.displacement("top", (0, 0, 0.5))], contact="off",
+        order=1,
     )  # fmt: skip
     solution = xc.solve(whole)
     assert (solution.space.heaviside[0] >= 0).sum() == 7**2
@@ -73,7 +74,7 @@ def apart(mesh, crack):
 
     problem = xc.Problem(
         mesh, STEEL, [crack],
-        supports=[xc.fix("bottom"), xc.displacement("top", moved)], contact="off",
+        supports=[xc.fix("bottom"), xc.displacement("top", moved)], contact="off", order=1,
     )  # fmt: skip
     solution = xc.solve(problem)
     from xcrack.fem.facets import jump_matrix
@@ -131,6 +132,7 @@ def through_crack(n, x, z, supported, seed=None, **options):
         ],
         contact="off",
         numerics=numerics_of(**options),
+        order=1,
     )
 
 
@@ -188,14 +190,14 @@ def sheet_problem(eps, **options):
     return xc.Problem(
         xc.box((-1, -1, -1), (1, 1, 1), 6), STEEL, [sheet((0, 0, 1), eps / 3)],
         supports=[xc.fix("bottom"), xc.fix("top")], contact="off",
-        numerics=numerics_of(**options),
+        numerics=numerics_of(**options), order=1,
     )  # fmt: skip
 
 
 def front_problem(eps, **options):
     return xc.Problem(
         xc.box((-1, -1, -1), (1, 1, 1), 6), STEEL, [half_sheet(0.07, eps / 3)],
-        supports=[xc.fix("bottom")], contact="off", numerics=numerics_of(**options),
+        supports=[xc.fix("bottom")], contact="off", numerics=numerics_of(**options), order=1,
     )  # fmt: skip
 
 

@@ -22,7 +22,7 @@ CELLS = 20  # a side, of an inclined penny that turns
 
 def in_cube(n, crack, loads=PULL, **options):
     mesh = xc.box((-1.0, -1.0, -1.0), (1.0, 1.0, 1.0), n)
-    return xc.Problem(mesh, STEEL, [crack], loads=loads, **options)
+    return xc.Problem(mesh, STEEL, [crack], loads=loads, **{"order": 1} | options)
 
 
 def inclined(n, angle=0.6, a=0.35, points=64, **options):

@@ -39,7 +39,7 @@ def patch(mesh, cracks, supported=(), *, E=1.0, nu=0.3, gap=1e-9, **options):
         loads=[xc.pressure(name, P0) for name in SIX if name not in supported],
         contact="on",
         numerics=numerics,
-        **options,
+        **{"order": 1} | options,
     )
     solution = xc.solve(problem)
     assert len(solution.contact) == len(cracks)

@@ -198,7 +198,13 @@ def extruded(n, layers, K, seed=None):
             for side in ("bottom", "top")
         ]
     return xc.Problem(
-        mesh, xc.Isotropic(E=1.0, nu=0.3), [crack], supports=supports, loads=loads, contact="off"
+        mesh,
+        xc.Isotropic(E=1.0, nu=0.3),
+        [crack],
+        supports=supports,
+        loads=loads,
+        contact="off",
+        order=1,
     )
 
 
@@ -285,6 +291,7 @@ def plate_with_part_through_crack(h, *, corner, a=0.4, c=0.5, t=1.0, b=4.0):
         xc.Isotropic(E=1.0, nu=0.3),
         [xc.elliptic_crack((0.0, 0.0071, 0.0), (0, 1, 0), (1, 0, 0), c, a)],
         loads=[xc.traction("back", (0.0, 1.0, 0.0)), xc.traction("front", (0.0, -1.0, 0.0))],
+        order=1,
     )
     sif = xc.stress_intensity(xc.solve(problem))
     phi = np.arctan2(np.maximum(-sif.x[:, 2], 0) / a, sif.x[:, 0] / c)
@@ -361,7 +368,7 @@ def test_renumbered_nodes_and_cells():
     cells = new_of_old[mesh.cells][rng.permutation(len(mesh.cells))]
     other = xc.Problem(
         xc.Mesh(mesh.points[order], cells, sets), problem.material, problem.cracks,
-        supports=problem.supports, contact="off",
+        supports=problem.supports, contact="off", order=1,
     )  # fmt: skip
     assert np.abs(K_of(other) - K_of(problem)).max() <= 1e-6 * K_0
 

@@ -42,6 +42,7 @@ def solution():
         [crack],
         loads=[xc.traction("top", bent), xc.traction("bottom", lambda x: -bent(x))],
         contact="on",
+        order=1,
     )
     return xc.solve(problem)
 

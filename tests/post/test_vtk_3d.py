@@ -20,7 +20,7 @@ def problem(crack, loads, n=N, **options):
         xc.Isotropic(E=1.0, nu=0.3),
         [crack] if crack is not None else [],
         loads=loads,
-        **options,
+        **{"order": 1} | options,
     )
 
 

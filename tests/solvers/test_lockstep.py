@@ -149,7 +149,7 @@ def block(n=6):
     numerics = xc.Numerics(linear="iterative")
     return xc.Problem(
         xc.box((-1,) * 3, (1,) * 3, n), xc.Isotropic(2.0, 0.3), [crack],
-        supports=[xc.fix("bottom")], numerics=numerics,
+        supports=[xc.fix("bottom")], numerics=numerics, order=1,
     )  # fmt: skip
 
 

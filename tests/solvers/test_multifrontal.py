@@ -50,7 +50,7 @@ def penny():
     mesh = xc.box((-1,) * 3, (1,) * 3, 4)
     crack = xc.penny_crack((0.01, -0.02, 0.03), (0.3, -0.5, 1.0), 0.5)
     loads = [xc.traction("top", (0, 0, 1.0)), xc.traction("bottom", (0, 0, -1.0))]
-    return xc.Problem(mesh, xc.Isotropic(1.0, 0.3), [crack], loads=loads)
+    return xc.Problem(mesh, xc.Isotropic(1.0, 0.3), [crack], loads=loads, order=1)
 
 
 SCENES = {

@@ -20,7 +20,7 @@ def scene(radius, **options):
     crack = xc.penny_crack((0.013, -0.021, 0.0317), (0.2, -0.3, 1.0), radius)
     return xc.Problem(
         mesh, scenes_space.STEEL, [crack],
-        numerics=xc.Numerics(linear="iterative"), **options,
+        numerics=xc.Numerics(linear="iterative"), **{"order": 1} | options,
     )  # fmt: skip
 
 

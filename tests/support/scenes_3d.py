@@ -95,6 +95,7 @@ def flat_penny(n, z, a, stress, *, seed=None, contact="off", **options):
         supports=[xc.displacement("boundary", lambda x: exact.penny(x - centre, a, 1.0, 0.3, S))],
         contact=contact,
         numerics=numerics_of(**options),
+        order=1,
     )
 
 

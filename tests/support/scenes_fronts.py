@@ -98,7 +98,7 @@ def flat_scene(
 
     problem = xc.Problem(
         mesh, xc.Isotropic(E=E, nu=nu), [crack], supports=[xc.displacement("boundary", u)],
-        contact=contact, numerics=numerics_of(**options),
+        contact=contact, numerics=numerics_of(**options), order=1,
     )  # fmt: skip
     return problem, (c, Q)
 

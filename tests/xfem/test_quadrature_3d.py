@@ -34,7 +34,7 @@ CRACKS = {
 
 def model(crack, n=6, seed=None, **options):
     mesh = xc.box((-1, -1, -1), (1, 1, 1), n) if seed is None else scenes.perturbed(n, seed)
-    return build(xc.Problem(mesh, scenes.STEEL, [crack], numerics=numerics_of(**options)))
+    return build(xc.Problem(mesh, scenes.STEEL, [crack], numerics=numerics_of(**options), order=1))
 
 
 def with_tip(space):
@@ -283,7 +283,7 @@ def test_points_do_not_depend_on_the_order_of_corners(centre, graded):
     for cells in (base.cells, np.take_along_axis(base.cells, drawn, axis=1)):
         mesh = xc.Mesh(base.points, cells)
         crack = xc.penny_crack(centre, (0.3, 0.0, 1.0), 0.5)
-        space = build(xc.Problem(mesh, scenes.STEEL, [crack])).space
+        space = build(xc.Problem(mesh, scenes.STEEL, [crack], order=1)).space
         points = cell_points(space, np.arange(len(cells)), 5, 5, graded)
         x = np.einsum("qb,qbd->qd", points.bary, mesh.points[cells[points.cell]])
         every.append(np.bincount(points.cell, points.weight * np.sin(9 * x).sum(axis=1)))

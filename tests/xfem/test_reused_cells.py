@@ -22,7 +22,7 @@ def plane(tip, order, more=()):
 
 def space(front, _):
     mesh = scenes_space.perturbed(8, 32)
-    return xc.Problem(mesh, xc.Isotropic(1.0, 0.3), [scenes_space.half_sheet(front, 0.03)])
+    return xc.Problem(mesh, xc.Isotropic(1.0, 0.3), [scenes_space.half_sheet(front, 0.03)], order=1)
 
 
 @pytest.mark.parametrize(

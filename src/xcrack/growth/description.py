@@ -341,11 +341,12 @@ def _hash(data: bytes) -> str:
 _FUNCTION = re.compile(r"([\w.<>]+ )?sha256:[0-9a-f]{16}")
 
 # Number of the set of defaults: raised whenever a changed default changes results.
-DEFAULTS = 3
+DEFAULTS = 4
 # For each set from 2 on, the defaults that it replaced: {2: {"problem.numerics.points": 4}}.
 REPLACED: dict[int, dict[str, Any]] = {
     2: {"integrator": "euler"},
     3: {"problem.numerics.multipliers": "sparse"},
+    4: {"problem.order": lambda problem: 2 if problem.mesh.dim == 2 else 1},
 }
 
 Settings = TypeVar("Settings")

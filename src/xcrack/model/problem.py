@@ -24,7 +24,14 @@ from xcrack.model.numerics import Numerics
 from xcrack.model.states import LoadLevel, LoadState, scaled_state
 from xcrack.model.supports import Support
 
-_ORDER = {2: 2, 3: 1}  # of the standard functions, by dimension (measured)
+_ORDER = 2  # of the standard functions
+_ORDER_OF_RUBBING = 1  # in 3D: order 2 takes 3 to 10 times as long there, K_II is no better
+
+
+def order_left_out(problem: "Problem") -> int:
+    """Order of a problem that does not say one."""
+    rubs = problem.mesh.dim == 3 and problem.contact != "off" and any(problem.frictions)
+    return _ORDER_OF_RUBBING if rubs else _ORDER
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,8 +50,8 @@ class Problem:
     contact : {"auto", "on", "off"}
         auto: a crack whose lips would overlap gets multipliers, others get none.
     order : {1, 2}, optional
-        Degree of the standard and Heaviside functions. Where it is left out: 2 in 2D, 1 in
-        3D.
+        Degree of the standard and Heaviside functions. Where it is left out: 2, but 1 in 3D with
+        friction, where order 2 takes several times as long and K is hardly better.
     numerics : Numerics
     friction : float, or a sequence of one a crack
         Coulomb's coefficient of the crack faces: where they press, they stick until the shear is
@@ -63,7 +70,7 @@ class Problem:
     supports: Sequence[Support] = ()
     loads: Sequence[Load] = ()
     contact: str = "auto"
-    order: int | None = field(default=None, metadata={"resolved": lambda own: _ORDER[own.mesh.dim]})
+    order: int | None = field(default=None, metadata={"resolved": order_left_out})
     numerics: Numerics = field(default_factory=Numerics)
     friction: float | Sequence[float] = 0.0
 
@@ -79,9 +86,8 @@ class Problem:
             given = getattr(self, name)
             object.__setattr__(self, name, entries(given, f"Problem: {name}"))
         self.material.check(self.mesh.dim)
-        if self.order is None:
-            object.__setattr__(self, "order", _ORDER[self.mesh.dim])
-        if type(self.order) is bool or not isinstance(self.order, Real) or self.order not in (1, 2):
+        order = 1 if self.order is None else self.order
+        if type(order) is bool or not isinstance(order, Real) or order not in (1, 2):
             raise ProblemError(f"order = {value_text(self.order)}: give 1 or 2.")
         if not isinstance(self.contact, str) or self.contact not in ("auto", "on", "off"):
             raise ProblemError(f'contact = {value_text(self.contact)}: give "auto", "on" or "off".')
@@ -90,6 +96,8 @@ class Problem:
             self.friction, len(self.cracks), self.mesh.dim, self.numerics
         )
         object.__setattr__(self, "friction", friction_values)
+        if self.order is None:  # it is known now which faces rub
+            object.__setattr__(self, "order", order_left_out(self))
         with suppress(CoarseMeshError):  # `adapt` refines such a mesh; all else asks for `placed`
             _ = self.placed
 

@@ -35,7 +35,7 @@ def _open(level: int, h: float, b: float | None, order: int, **shape: Any) -> li
 
 
 def _closed(level: int) -> list[Value]:
-    problem, Q = flat_crack(0.17 / 2**level, _CLOSED)
+    problem, Q = flat_crack(0.17 / 2**level, _CLOSED, order=1)
     solution = solve(problem)
     sif, contact = stress_intensity(solution), solution.contact[0]
     assert contact is not None

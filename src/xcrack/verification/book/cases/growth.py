@@ -71,6 +71,7 @@ def _round(level: int) -> list[Value]:
         Isotropic(210e3, 0.3),
         [penny_crack(_CENTRE, (0, 0, 1), _RADIUS, n=64)],
         loads=[traction("top", (0, 0, 100.0)), traction("bottom", (0, 0, -100.0))],
+        order=1,
     )
     steps = grow(
         problem, paris(C=1e-11, m=0.5), max_hoop_stress, Cycle(0.0, 1.0), da=0.12, max_steps=2,

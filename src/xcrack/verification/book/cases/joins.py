@@ -39,6 +39,7 @@ def _run(level: int) -> list[Value]:
         [penny_crack((x, -0.0315, 0.0175), (0, 0, 1), 1.0, n=64) for x in (0.02 - d, 0.02 + d)],
         loads=[traction("top", (0, 0, 1.0)), traction("bottom", (0, 0, -1.0))],
         contact="off",
+        order=1,
     )
     history = collect(
         grow(problem, paris(_C, _M), max_hoop_stress, Cycle(0.0, 1.0), da=0.25, max_steps=_STEPS,

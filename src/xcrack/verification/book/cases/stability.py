@@ -55,7 +55,7 @@ def _space(level: int) -> list[Value]:
     for n in (4, 6, 8)[: 2 + level]:
         crack = plane_crack([(-2, -2, 0.1), (2, -2, -0.05), (2, 2, -0.05), (-2, 2, 0.1)])
         mesh = perturbed(n, 23, lower=(-1,) * 3, upper=(1,) * 3)
-        result[f"{n} cells a side"] = inf_sup(Problem(mesh, Isotropic(1.0, 0.3), [crack]))
+        result[f"{n} cells a side"] = inf_sup(Problem(mesh, Isotropic(1.0, 0.3), [crack], order=1))
     return _flat(result)
 
 
