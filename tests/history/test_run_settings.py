@@ -14,7 +14,9 @@ from scipy.interpolate import CubicSpline
 from support.growth_fakes import plate
 from support.growth_runs import *  # noqa: F403 - fixtures come by name
 from support.growth_runs import content, run_of, scene
+from xcrack.analysis.solve import solve
 from xcrack.base.errors import ProblemError, XcrackWarning
+from xcrack.crack.surfaces import penny_crack
 from xcrack.fatigue.criteria import max_hoop_stress
 from xcrack.fatigue.power import paris
 from xcrack.growth import description
@@ -23,9 +25,15 @@ from xcrack.growth.description import describe, differences
 from xcrack.growth.options import GrowthRule
 from xcrack.growth.run import grow
 from xcrack.growth.step import Cycle
+from xcrack.growth.response import Response
+from xcrack.mesh.box import box
 from xcrack.model.loads import body_force
+from xcrack.model.material import Isotropic
+from xcrack.model.problem import Problem
+from xcrack.runs import run_folder
 from xcrack.runs import collect as collecting
-from xcrack.runs.collect import collect, resume
+from xcrack.runs.collect import collect, load, resume
+from xcrack.runs.saved import save
 from xcrack.runs.versions import versions
 
 
@@ -342,3 +350,74 @@ def test_what_changes_no_result_is_not_in_the_settings():
     assert not keys & {"max_steps", "max_cycles", "K_c", "progress"}
     assert "problem.order" not in keys
     assert "problem.order" in GrowthRule(**run_of(replace(scene(), order=1))).settings
+
+
+# Order in space: 1 was the default up to the third set of defaults.
+
+
+def block(**options):
+    crack = penny_crack((0.01, -0.02, 0.03), (0.3, -0.5, 1.0), 0.5, n=32)
+    return Problem(box((-1,) * 3, (1,) * 3, 5), Isotropic(210e3, 0.3), [crack], **options)
+
+
+def sneddon(problem, states, reuse, bars):
+    """K_I = 2 stress √(a / π) along a penny."""
+    a = np.linalg.norm(problem.stations.x, axis=1)
+    K = np.zeros((len(states), len(a), 3))
+    K[:, :, 0] = np.multiply.outer(states, 200 * np.sqrt(a / np.pi))
+    return Response.of_K(problem, states, K)
+
+
+def in_space(problem, **changes):
+    given = {"da": 0.1, "criterion": max_hoop_stress, "response": sneddon, "progress": False}
+    return run_of(problem, **given | {"cycle": Cycle(0.0, 1.0), "max_steps": 2} | changes)
+
+
+def as_of_the_third_set(folder):
+    """The folder as it was written when order 1 was the default in space, and nobody gave one."""
+    header, _ = run_folder.read_header(folder)
+    old = {k: v for k, v in header.settings.items() if k != "problem.order"} | {"defaults": "3"}
+    for step in run_folder.read_steps(folder, header).steps:
+        run_folder.write_step(folder, step, replace(header, settings=old))
+    run_folder.write_header(folder, replace(header, settings=old))
+    return old
+
+
+def test_a_run_in_space_goes_on_with_the_order_it_began_with(tmp_path):
+    assert block().order == 2
+    collect(grow(**in_space(block(order=1))), tmp_path / "run")
+    stored = as_of_the_third_set(tmp_path / "run")
+    for given in (block(), block(order=1)):
+        rule = GrowthRule(**in_space(given)).as_begun(stored)
+        assert rule.problem.order == 1
+        assert rule.settings == stored
+    history = resume(tmp_path / "run", **in_space(block(), max_steps=3))
+    assert len(history.steps) == 3
+    assert history.steps[-1].memory.settings == stored
+    given_then = stored | {"problem.order": "2"}  # a choice that became the default
+    assert GrowthRule(**in_space(block())).as_begun(given_then).problem.order == 2
+
+
+def test_order_1_of_today_is_a_choice(tmp_path):
+    collect(grow(**in_space(block(order=1))), tmp_path / "run")
+    with pytest.raises(ProblemError, match=r"problem\.order: stored 1, given the default"):
+        resume(tmp_path / "run", **in_space(block()))
+
+
+def test_a_plane_run_of_the_third_set_keeps_order_2(whole):
+    stored = whole.steps[0].memory.settings | {"defaults": "3"}
+    assert GrowthRule(**run_of()).as_begun(stored).problem.order == 2
+
+
+def test_faces_that_rub_in_space_have_order_1():
+    """Order 2 takes 3 to 10 times as long there, and K_II is no better (docs/measured.md)."""
+    assert block(friction=0.3).order == 1
+    assert block(friction=[0.3]).order == 1
+    assert block(friction=0.3, order=2).order == 2
+    assert block(friction=0.3, contact="off").order == block(friction=0.0).order == 2
+    assert scene().order == replace(scene(), friction=0.3).order == 2
+
+
+def test_a_stored_solution_keeps_its_order(tmp_path):
+    solution = solve(block(order=1))
+    assert load(save(solution, tmp_path / "one")).problem.order == 1

@@ -13,7 +13,7 @@ from xcrack.adaptivity.adaptation import Adaptation, AdaptationPass
 from xcrack.adaptivity.indicators import Indicators, indicators_of
 from xcrack.adaptivity.resolved import resolved_problem
 from xcrack.base.checks import entries, flag, number, whole_number
-from xcrack.base.errors import GeometryError, ProblemError, collected_warnings, warn
+from xcrack.base.errors import GeometryError, ProblemError, SizeError, collected_warnings, warn
 from xcrack.mesh.mesh import Mesh
 from xcrack.model.problem import Problem, check_problem
 
@@ -133,6 +133,9 @@ def _adaptation_passes(
             new, messages = _measure_pass(replace(scene, mesh=mesh), states, current, rounds)
         except GeometryError as error:
             reason = f"the crack does not fit into a finer mesh ({error})"
+            break
+        except SizeError as error:
+            reason = f"a finer mesh needs more memory than is free ({error})"
             break
         if new.error > _STALLED * current.error:
             aim /= 2

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from xcrack.analysis.forecast import Forecast, forecast
 from xcrack.base.checks import value_text
 from xcrack.base.errors import ProblemError
 from xcrack.base.markup import element
@@ -70,17 +71,22 @@ class Report:
         multipliers.
     resultants : tuple of Resultant
         Of each load of the state, and of the reaction of each support.
+    forecast : Forecast, optional
+        Unknowns and memory, where nothing is solved yet.
     """
 
     ingredients: tuple[Ingredient, ...]
     operations: dict[str, int]
     resultants: tuple[Resultant, ...] = ()
+    forecast: Forecast | None = None
 
     def __str__(self) -> str:
         lines = [str(i) for i in (*self.ingredients, *self.resultants)]
         if self.operations:
             counts = ", ".join(f"{v} {k.replace('_', ' ')}" for k, v in self.operations.items())
             lines.append(f"{'operations':<24}{counts}")
+        if self.forecast is not None:
+            lines.append(f"{'forecast':<24}{self.forecast}")
         return "\n".join(lines)
 
     def _repr_html_(self) -> str:
@@ -106,7 +112,8 @@ def plan(problem: Problem) -> Report:
     Returns
     -------
     Report
-        Printed, it gives one line an ingredient: used or left out, and the reason.
+        Printed, it gives one line an ingredient: used or left out, and the reason; and one of the
+        unknowns and the memory of a solution for one load state, and the memory that is free.
 
     Raises
     ------
@@ -122,6 +129,11 @@ def plan(problem: Problem) -> Report:
     tip functions           left out  no cracks
     """
     check_problem(problem, "plan")
+    return Report(ingredients_of(problem), {}, forecast=forecast(problem))
+
+
+def ingredients_of(problem: Problem) -> tuple[Ingredient, ...]:
+    """What a scene needs, line by line."""
     n_tips = [crack.n_tips for crack in problem.placed]
     rows = [_heaviside(n_tips), _tips(problem, n_tips)]
     rows.extend(_multipliers(problem))
@@ -139,7 +151,7 @@ def plan(problem: Problem) -> Report:
         )
     )
     rows.append(Ingredient("refinement", False, "the mesh is taken as it is"))
-    return Report(tuple(rows), {})
+    return tuple(rows)
 
 
 def _third_mode(problem: Problem, n_tips: list[int]) -> Ingredient:

@@ -7,7 +7,7 @@ import numpy as np
 
 from xcrack.analysis.contact_result import ContactSolution
 from xcrack.analysis.multipliers import Multipliers
-from xcrack.analysis.plan import Ingredient, Report, Resultant, plan
+from xcrack.analysis.plan import Ingredient, Report, Resultant, ingredients_of
 from xcrack.base.arrays import Floats, at
 from xcrack.crack.crack import Crack
 from xcrack.fem.system import System
@@ -50,7 +50,7 @@ def report(
     each = [d * tip.functions if basis is None else basis.unknowns(d) for tip in model.space.tips]
     n_points = [int((tip.point_to_function >= 0).sum()) for tip in model.space.tips]
     n_tip = sum(n * k for n, k in zip(n_points, each, strict=True))
-    for row in plan(problem).ingredients:
+    for row in ingredients_of(problem):
         if row.name == "Heaviside functions":
             row = replace(row, unknowns=n_heaviside)
         elif row.name == "tip functions" and row.used:

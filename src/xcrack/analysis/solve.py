@@ -11,6 +11,7 @@ from scipy.sparse.linalg import LinearOperator, cg
 
 from xcrack.analysis.alarms import alarms_of_solutions
 from xcrack.analysis.contact import contact_of, solve_contact
+from xcrack.analysis.forecast import check_memory, takes_iterations
 from xcrack.analysis.friction import slip_of
 from xcrack.analysis.report import report, resultants
 from xcrack.analysis.solution import FactoredSolution, Solution
@@ -90,8 +91,6 @@ def out_of_balance(problem: Problem, model: System, loads: Sequence[Load]) -> fl
     return float(np.clip(f @ u / stored, 0.0, 1.0))
 
 
-# Unknowns of a 3D body above which a factorisation costs more, by order (measured).
-_DIRECT = {1: 4_000, 2: 8_000}
 _LARGEST = 1e120  # force or displacement whose square, over a small stiffness, is still a number
 
 
@@ -127,6 +126,9 @@ def solve(
     ProblemError
         An unsupported body and loads out of balance, supports that contradict each other; states
         without an order where there is friction.
+    SizeError
+        It would take more memory than is free (a `ProblemError`; `xc.plan` says how much). With a
+        `solver` of one's own nobody knows.
     ConvergenceError
         A singular stiffness, or contact that finds no closed set.
 
@@ -184,7 +186,10 @@ def _solve_states(
     error: bool,
     repeated: bool,
 ) -> list[Solution]:
-    model = build(problem, None if reuse is None else reuse.bulk)
+    old = None if reuse is None else reuse.bulk
+    if solver is None and (old is None or old.mesh is not problem.mesh):
+        check_memory(problem, len(states))
+    model = build(problem, old)
     vectors = mesh_loads(model.space, model.bulk.loads)
     cases = [_case(problem, model, state, vectors) for state in states]
     fixed = model.known.fixed.copy()
@@ -256,11 +261,8 @@ def _engine(
     reuse: SolverState | None,
 ) -> Engine:
     """A factorisation, or in 3D above some size conjugate gradients."""
-    space_, linear_solver = model.space, problem.numerics.linear
-    large = space_.dim == 3 and space_.n_dof > _DIRECT[space_.order]
-    basis = problem.numerics.tip_basis
-    large = large and problem.numerics.contact_method is None  # others change the matrix
-    if solver is None and (linear_solver == "iterative" or (linear_solver == "auto" and large)):
+    space_, basis = model.space, problem.numerics.tip_basis
+    if solver is None and takes_iterations(problem, space_.n_dof):
         # Rows beside the crack are enough where no basis is changed but that of single nodes.
         by_parts = space_.order == 1 and basis is None
         return iterative_system(

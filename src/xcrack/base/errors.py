@@ -33,6 +33,10 @@ class ProblemError(XcrackError):
     """A scene that is not well posed: supports, loads, material or options that do not fit."""
 
 
+class SizeError(ProblemError):
+    """A scene that needs more memory than is free."""
+
+
 class ConvergenceError(XcrackError):
     """An iteration that did not end: the message carries the residual and the state reached."""
 

@@ -12,6 +12,7 @@ from xcrack.sif.common import is_shallow, pressure_at
 from xcrack.sif.sif import SIF
 
 _LOAD = 0.1  # share of K of the mean stress of the body that counts where K is next to nothing
+_SHARP = 1.9  # cells: two, but for the scatter of their sizes along a front
 _ZONE = 2.0  # cells; in shorter contact zones the pressure is hardly more than one number
 
 
@@ -39,6 +40,10 @@ class Domain:
         Share of K by which two domains may differ.
     label : str
         How warnings name the place.
+    bend : float, length
+        Smallest radius of curvature of a front; inf where it is straight, and of a tip.
+    sharpest : (d,) array, length, optional
+        Where that is.
     """
 
     outer: float
@@ -50,6 +55,8 @@ class Domain:
     narrowest: Floats
     differ: float
     label: str
+    bend: float = np.inf
+    sharpest: Floats | None = None
 
     def at(self, x: Floats) -> str:
         """Name of a place in a warning."""
@@ -63,7 +70,7 @@ def check(
     parts: Sequence[SIF],
     disagree: Callable[[], bool] = lambda: True,
 ) -> None:
-    """Warn where the domain is clipped too far, two domains differ, or a contact zone is short.
+    """Warn of clipped domains, bends within two cells, domains that differ, short contact zones.
 
     Parameters
     ----------
@@ -103,6 +110,9 @@ def check(
         doubts.insert(0, _clipped_K(domain))
     else:
         doubts = [difference]
+    sharp = _sharp_bend(domain)
+    if sharp and domain.sharpest is not None:
+        doubts, place = [sharp, *doubts], domain.sharpest
     if any(doubts):
         warn(f"{domain.at(place)}: {'; '.join(filter(None, doubts))}. Refine the mesh there.")
     for solution, part, scale in zip(solutions, parts, scales, strict=True):
@@ -132,6 +142,16 @@ def _clipped_K(domain: Domain) -> str:
     if domain.room < domain.least:
         return f"{text}, and errors are small from {domain.least / domain.size:.3g} cells on"
     return f"{text}, and the crack is only a few cells long" if domain.short else text
+
+
+def _sharp_bend(domain: Domain) -> str:
+    """A front that bends within two cells: chords and linear level sets do not follow it."""
+    if domain.bend >= _SHARP * domain.size:
+        return ""
+    return (
+        f"the front bends with a radius of {domain.bend:.4g} there, {domain.bend / domain.size:.2g} "
+        "cells, and K is good from two cells on (xc.adapt makes them as small)"
+    )
 
 
 def _overlap_warning(

@@ -54,6 +54,7 @@ _LEAST = 0.8  # legs; the radius of the smallest domain
 _SPACING, _CLOSEST, _FIRST, _GROWTH = 2.0, 0.7, 1.0, 0.3
 _POINTS, _DEGREE = 5, 5  # of the rules around the front and away from it
 _NARROW = 1.5  # legs; a domain clipped below gives a warning
+_BEND_OVER = 2.0  # legs over which a bend is averaged that gives a warning: waves are shorter
 _DIFFER = 0.05  # difference of two domains, as a share of the largest K, that gives a warning
 _DEPTH = 0.02  # of a front, where K is read that has no limit at a free surface
 _CHUNK = 1000  # cells integrated at once; bounds the memory
@@ -287,6 +288,8 @@ def front_values(
     wide = twice_as_wide(total, knots, curve, tip_material, valid, smooth)
     mean = means(total[:, 0], knots, curve, tip_material)
     least = int(np.argmin(room))
+    bend = curve.bend(knots, _BEND_OVER * size)
+    sharpest = int(np.argmin(bend))
     domain = Domain(
         outer=float(radius.min()),
         wanted=wanted,
@@ -297,6 +300,8 @@ def front_values(
         narrowest=curve.at(knots[[least]])[0][0],
         differ=_DIFFER,
         label="K along the front, at",
+        bend=float(bend[sharpest]),
+        sharpest=curve.at(knots[[sharpest]])[0][0],
     )
     return FrontValues(knots, K, mean, valid, wide, smooth, radius, domain)
 
