@@ -97,7 +97,7 @@ def turned(k):
 
 def bar(cracks, k, contact="auto"):
     """The bar with its cracks under the four forces, which balance: it needs no supports."""
-    return xc.Problem(BAR, STEEL, cracks=cracks, loads=turned(k), contact=contact)
+    return xc.Problem(BAR, STEEL, cracks=cracks, loads=turned(k), contact=contact, order=1)
 
 
 # %% The crack: straight along y, one millimetre ahead of the root in the full run
@@ -170,7 +170,12 @@ def grown(name, problem, until, max_steps):
     for step in history.steps:
         if not lips_file(name, step.index).exists():  # killed between the two files
             again = xc.Problem(
-                BAR, STEEL, step.cracks, loads=problem.loads, contact=problem.contact
+                BAR,
+                STEEL,
+                step.cracks,
+                loads=problem.loads,
+                contact=problem.contact,
+                order=problem.order,
             )
             np.savez_compressed(lips_file(name, step.index), **lips_of(xc.solve(again)))
     return history, [dict(np.load(lips_file(name, s.index))) for s in history.steps]

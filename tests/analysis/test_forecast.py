@@ -11,7 +11,7 @@ import pytest
 import xcrack as xc
 from support import scenes_3d
 from xcrack.analysis import forecast as forecasts
-from xcrack.analysis.forecast import forecast
+from xcrack.analysis.forecast import forecast_of
 from xcrack.base import memory
 from xcrack.base.errors import SizeError
 from xcrack.fem.system import discretise
@@ -20,7 +20,8 @@ BODY = xc.Isotropic(1.0, 0.3)
 PULL = [xc.traction("top", (0, 0, 1.0)), xc.traction("bottom", (0, 0, -1.0))]
 CRACKS = {
     "penny": xc.penny_crack((0.01, -0.02, 0.03), (0.2, -0.3, 1.0), 0.5),
-    "edge": xc.plane_crack([(-1.5, -1.5, 0.03), (0.1, -1.5, 0.03), (0.1, 1.5, 0.03), (-1.5, 1.5, 0.03)]),
+    "edge": xc.plane_crack([(x, y, 0.03) for x, y in
+                            ((-1.5, -1.5), (0.1, -1.5), (0.1, 1.5), (-1.5, 1.5))]),
     "corner": xc.elliptic_crack((-1, -1, 0.03), (0, 0, 1), (1, 0, 0), 0.8, 0.6),
     "whole section": scenes_3d.sheet((0.1, -0.2, 1.0), 0.07),
 }  # fmt: skip
@@ -35,7 +36,7 @@ def block(n=8, crack="penny", order=2, **options):
 @pytest.mark.parametrize("crack", CRACKS)
 def test_unknowns_in_space(crack, order):
     """Standard ones exactly, enriched ones within 30 %: areas stand for counts."""
-    ahead = forecast(block(10, crack, order))
+    ahead = forecast_of(block(10, crack, order))
     space = discretise(block(10, crack, order))[0]
     assert ahead.standard == 3 * space.n_nodes
     assert ahead.enriched == pytest.approx(space.n_dof - ahead.standard, rel=0.3)
@@ -46,7 +47,7 @@ def test_unknowns_in_the_plane(order):
     mesh = xc.box((-1, -1), (1, 1), 40)
     crack = xc.line_crack([(-0.31, 0.011), (0.27, 0.03)])
     scene = xc.Problem(mesh, xc.Isotropic(1.0, 0.3, "strain"), [crack], order=order)
-    ahead, space = forecast(scene), discretise(scene)[0]
+    ahead, space = forecast_of(scene), discretise(scene)[0]
     assert ahead.standard == 2 * space.n_nodes
     assert ahead.enriched == pytest.approx(space.n_dof - ahead.standard, rel=0.2)
 
@@ -57,13 +58,13 @@ def test_a_hole_changes_next_to_nothing():
     cells = whole.cells[(np.abs(centre[:, :2]) > 1 / 3).any(axis=1)]
     used, cells = np.unique(cells, return_inverse=True)
     scene = xc.Problem(xc.Mesh(whole.points[used], cells.reshape(-1, 4)), BODY)
-    assert forecast(scene).standard == pytest.approx(3 * discretise(scene)[0].n_nodes, abs=3)
+    assert forecast_of(scene).standard == pytest.approx(3 * discretise(scene)[0].n_nodes, abs=3)
 
 
 def test_a_body_without_cracks_has_no_enriched_ones():
     scene = replace(block(), cracks=())
-    assert forecast(scene).enriched == 0
-    assert forecast(scene).iterative
+    assert forecast_of(scene).enriched == 0
+    assert forecast_of(scene).by_iteration
 
 
 def test_plan_tells_unknowns_and_memory(monkeypatch):
@@ -94,7 +95,7 @@ def test_what_does_not_fit_is_refused_before_anything_is_built(monkeypatch):
         xc.solve(block(order=1))
     assert "order=1 (" not in str(refusal.value)
     direct = xc.Numerics(linear="direct")
-    with pytest.raises(SizeError, match='for a factorisation.*linear="iterative"'):
+    with pytest.raises(SizeError, match=r'for a factorisation.*linear="iterative"'):
         xc.solve(block(numerics=direct))
 
 
@@ -143,7 +144,7 @@ xc.solve(block(4, "edge", {order}, numerics=xc.Numerics(linear={linear!r})))  # 
 problem = block({n}, {crack!r}, {order}, numerics=xc.Numerics(linear={linear!r}))
 problem.placed, problem.mesh.edges
 before = int(open("/proc/self/statm").read().split()[1]) * resource.getpagesize()
-foretold = xc.plan(problem).forecast.memory
+foretold = xc.plan(problem).size_forecast.memory
 xc.solve(problem)
 print(1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before, foretold)
 """

@@ -230,6 +230,7 @@ def disc():
         Isotropic(E=210e3, nu=0.3),
         cracks=[penny_crack((0.1, 0.0, 0.05), (0, 0, 1), 2.0)],
         loads=[traction("top", (0, 0, STRESS)), traction("bottom", (0, 0, -STRESS))],
+        order=1,
     )
 
 

@@ -23,15 +23,15 @@ from xcrack.growth import description
 from xcrack.growth import description as settings
 from xcrack.growth.description import describe, differences
 from xcrack.growth.options import GrowthRule
+from xcrack.growth.response import Response
 from xcrack.growth.run import grow
 from xcrack.growth.step import Cycle
-from xcrack.growth.response import Response
 from xcrack.mesh.box import box
 from xcrack.model.loads import body_force
 from xcrack.model.material import Isotropic
 from xcrack.model.problem import Problem
-from xcrack.runs import run_folder
 from xcrack.runs import collect as collecting
+from xcrack.runs import run_folder
 from xcrack.runs.collect import collect, load, resume
 from xcrack.runs.saved import save
 from xcrack.runs.versions import versions

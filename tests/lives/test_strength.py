@@ -231,6 +231,7 @@ def test_table_of_factors_of_a_surface_crack(tmp_path):
         Isotropic(E=2e5, nu=0.3),
         cracks=[crack],
         loads=[traction("back", (0, 100.0, 0)), traction("front", (0, -100.0, 0))],
+        order=1,
     )
     steps = grow(
         problem, LAW, max_hoop_stress, Cycle(0.0, 1.0), da=0.05, max_steps=1, progress=False

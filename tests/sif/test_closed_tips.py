@@ -217,7 +217,7 @@ def test_drawn_pennies_under_pressure_are_closed_all_along():
         ]
         mesh = scenes_space.perturbed(int(rng.integers(6, 10)), seed, rng.uniform(0, 0.15))
         sif = xc.stress_intensity(
-            xc.solve(xc.Problem(mesh, scenes_space.STEEL, [crack], loads=loads))
+            xc.solve(xc.Problem(mesh, scenes_space.STEEL, [crack], loads=loads, order=1))
         )
         assert sif.closed.all(), seed
         assert (sif.K_I == 0).all()

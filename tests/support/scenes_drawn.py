@@ -119,6 +119,7 @@ def _penny_error(rng, n, a, Q, centre, stress):
         supports=[
             xc.displacement("boundary", lambda x: exact.penny((x - centre) @ Q.T, a, 1, 0.3, S) @ Q)
         ],
+        order=1,
     )  # fmt: skip
     sif = scenes_fronts.K_along(problem)
     wanted = scenes_fronts.exact_K(sif.x, (centre, Q), a, None, stress)

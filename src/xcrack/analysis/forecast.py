@@ -18,7 +18,7 @@ _DIRECT = {1: 4_000, 2: 8_000}
 # Nodes that carry a jump lie within so many cells across a crack, by order.
 _LAYER = {1: 2.0, 2: 1.5}
 
-# Peak of a solution in bytes, measured from 5 k to 450 k unknowns (tests/analysis/test_forecast.py).
+# Peak of a solution in bytes, measured from 5 k to 450 k unknowns (docs/measured.md).
 # Conjugate gradients: of a standard unknown, and of an enriched one, whose rows are long; by order.
 _OF_ROWS = {1: (1.4e3, 9.5e3), 2: (2.4e3, 40e3)}
 _OF_STATE = 56.0  # of an unknown in each further load state
@@ -38,7 +38,7 @@ class Forecast:
     enriched : int
         Unknowns of functions that jump or belong to tips, by area and front of the cracks.
     order : int
-    iterative : bool
+    by_iteration : bool
         Whether conjugate gradients solve it, or a factorisation.
     memory : float, bytes
     free : float, bytes, or None
@@ -48,7 +48,7 @@ class Forecast:
     standard: int
     enriched: int
     order: int
-    iterative: bool
+    by_iteration: bool
     memory: float
     free: float | None
 
@@ -66,13 +66,12 @@ class Forecast:
         free = "free memory is not known on this system"
         if self.free is not None:
             free = f"{_size(self.free)} are free" + ("" if self.fits else ": too little")
-        return (
-            f"about {_rounded(self.unknowns)} unknowns at order {self.order}, and {_size(self.memory)} "
-            f"for {'conjugate gradients' if self.iterative else 'a factorisation'}; {free}"
-        )
+        way = "conjugate gradients" if self.by_iteration else "a factorisation"
+        number = f"about {_two_digits(self.unknowns)} unknowns at order {self.order}"
+        return f"{number}, and {_size(self.memory)} for {way}; {free}"
 
 
-def forecast(problem: Problem, n_states: int = 1) -> Forecast:
+def forecast_of(problem: Problem, n_states: int = 1) -> Forecast:
     """Unknowns and memory of a solution, from counts, areas and lengths alone.
 
     Parameters
@@ -81,22 +80,21 @@ def forecast(problem: Problem, n_states: int = 1) -> Forecast:
     n_states : int
         Load states that are solved together.
     """
-    mesh, order = problem.mesh, problem.order or 1
-    dim = mesh.dim
-    nodes = _nodes(mesh, order)
+    mesh, order, dim = problem.mesh, problem.order or 1, problem.mesh.dim
+    nodes = _count_nodes(mesh, order)
     per_point = nodes / mesh.n_points
-    enriched = sum(_enriched_points(problem, crack, per_point) for crack in problem.placed)
-    standard, enriched = dim * nodes, round(dim * enriched)
+    functions = sum(_enriched_functions(problem, crack, per_point) for crack in problem.placed)
+    standard, enriched = dim * nodes, round(dim * functions)
     n = standard + enriched
-    iterative = takes_iterations(problem, n)
-    if iterative:
+    by_iteration = takes_iterations(problem, n)
+    if by_iteration:
         memory = float(np.dot(_OF_ROWS[order], (standard, enriched)))
         memory += _OF_STATE * (n_states - 1) * n
         memory *= _RUBBING if problem.contact != "off" and any(problem.frictions) else 1.0
     else:
         each, power = _OF_FACTOR[dim]
         memory = each * float(n) ** power
-    return Forecast(standard, enriched, order, iterative, memory, free_memory())
+    return Forecast(standard, enriched, order, by_iteration, memory, free_memory())
 
 
 def check_memory(problem: Problem, n_states: int = 1) -> None:
@@ -106,16 +104,16 @@ def check_memory(problem: Problem, n_states: int = 1) -> None:
     ------
     SizeError
     """
-    ahead = forecast(problem, n_states)
+    ahead = forecast_of(problem, n_states)
     if ahead.fits:
         return
-    remedies = ["larger cells away from the cracks", "or let xc.adapt choose the mesh"]
-    if not ahead.iterative and problem.mesh.dim == 3:
-        remedies.insert(0, 'Numerics(linear="iterative")')
+    remedy_list = ["larger cells away from the cracks", "or let xc.adapt choose the mesh"]
+    if not ahead.by_iteration and problem.mesh.dim == 3:
+        remedy_list.insert(0, 'Numerics(linear="iterative")')
     if ahead.order == 2:
-        less = forecast(replace(problem, order=1), n_states)
-        remedies.insert(0, f"order=1 ({_size(less.memory)}, with K less exact)")
-    raise SizeError(f"solve: {ahead}. Give {', '.join(remedies)}.")
+        less = forecast_of(replace(problem, order=1), n_states)
+        remedy_list.insert(0, f"order=1 ({_size(less.memory)}, with K less exact)")
+    raise SizeError(f"solve: {ahead}. Give {', '.join(remedy_list)}.")
 
 
 def takes_iterations(problem: Problem, n: int) -> bool:
@@ -127,7 +125,7 @@ def takes_iterations(problem: Problem, n: int) -> bool:
     return large and problem.numerics.contact_method is None  # others change the matrix
 
 
-def _nodes(mesh: Mesh, order: int) -> int:
+def _count_nodes(mesh: Mesh, order: int) -> int:
     """Points and, at order 2, edges, by Euler's formula for a body without holes."""
     if order == 1:
         return mesh.n_points
@@ -135,12 +133,12 @@ def _nodes(mesh: Mesh, order: int) -> int:
     return 2 * mesh.n_points + len(mesh.cells) + flat - 1
 
 
-def _enriched_points(problem: Problem, crack: Crack, per_point: float) -> float:
-    """Nodes with a jump and four times the points around tips: there is one point a leg^d."""
+def _enriched_functions(problem: Problem, crack: Crack, per_point: float) -> float:
+    """Nodes that carry a jump, and functions of the points at tips: of these one a leg^d."""
     mesh, order, numerics = problem.mesh, problem.order or 1, problem.numerics
     pieces = crack.points[crack.faces]
     cells = mesh.cell_tree.query(pieces.mean(axis=1))[1]
-    leg = float(np.median(leg_sizes(mesh, cells)))
+    leg_length = float(np.median(leg_sizes(mesh, cells)))
     if mesh.dim == 2:
         size, ends = crack_length(crack), float(crack.n_tips)
     else:
@@ -151,19 +149,19 @@ def _enriched_points(problem: Problem, crack: Crack, per_point: float) -> float:
     at_tips = 0.0
     if crack.n_tips:
         a = (1 if mesh.dim == 2 else 2) * size / max(ends, 1e-9)  # of a penny its radius
-        radius = reach_of_tips(mesh.dim, order, a, leg, numerics.radius)
-        at_tips = np.pi * radius**2 * ends / leg**mesh.dim
-    jumping = _LAYER[order] * per_point * size / leg ** (mesh.dim - 1)
-    return jumping + numerics.functions * at_tips
+        radius = reach_of_tips(mesh.dim, order, a, leg_length, numerics.radius)
+        at_tips = np.pi * radius**2 * ends / leg_length**mesh.dim
+    n_jumping = _LAYER[order] * per_point * size / leg_length ** (mesh.dim - 1)
+    return n_jumping + numerics.functions * at_tips
 
 
 def _size(memory: float) -> str:
     return f"{memory / 1e9:.2g} GB" if memory >= 0.95e8 else f"{memory / 1e6:.2g} MB"
 
 
-def _rounded(number: int) -> str:
+def _two_digits(number: int) -> str:
     """Two digits: more are not known."""
     return f"{float(f'{number:.2g}'):,.0f}".replace(",", " ")
 
 
-__all__ = ["Forecast", "check_memory", "forecast", "takes_iterations"]
+__all__ = ["Forecast", "check_memory", "forecast_of", "takes_iterations"]

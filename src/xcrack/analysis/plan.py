@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from xcrack.analysis.forecast import Forecast, forecast
+from xcrack.analysis.forecast import Forecast, forecast_of
 from xcrack.base.checks import value_text
 from xcrack.base.errors import ProblemError
 from xcrack.base.markup import element
@@ -71,22 +71,22 @@ class Report:
         multipliers.
     resultants : tuple of Resultant
         Of each load of the state, and of the reaction of each support.
-    forecast : Forecast, optional
+    size_forecast : Forecast, optional
         Unknowns and memory, where nothing is solved yet.
     """
 
     ingredients: tuple[Ingredient, ...]
     operations: dict[str, int]
     resultants: tuple[Resultant, ...] = ()
-    forecast: Forecast | None = None
+    size_forecast: Forecast | None = None
 
     def __str__(self) -> str:
         lines = [str(i) for i in (*self.ingredients, *self.resultants)]
         if self.operations:
             counts = ", ".join(f"{v} {k.replace('_', ' ')}" for k, v in self.operations.items())
             lines.append(f"{'operations':<24}{counts}")
-        if self.forecast is not None:
-            lines.append(f"{'forecast':<24}{self.forecast}")
+        if self.size_forecast is not None:
+            lines.append(f"{'forecast':<24}{self.size_forecast}")
         return "\n".join(lines)
 
     def _repr_html_(self) -> str:
@@ -129,7 +129,7 @@ def plan(problem: Problem) -> Report:
     tip functions           left out  no cracks
     """
     check_problem(problem, "plan")
-    return Report(ingredients_of(problem), {}, forecast=forecast(problem))
+    return Report(ingredients_of(problem), {}, size_forecast=forecast_of(problem))
 
 
 def ingredients_of(problem: Problem) -> tuple[Ingredient, ...]:

@@ -81,7 +81,7 @@ def front_reach(mesh: Mesh, crack: Crack, radius: float | None) -> float:
     return max(radius or 0.0, _RANGE[1][1] * size) + size
 
 
-def reach_of_tips(dim: int, order: int, size: float, leg: float, radius: float | None) -> float:
+def reach_of_tips(dim: int, order: int, size: float, cell: float, radius: float | None) -> float:
     """Radius around the tips or fronts of a crack of that size, with all the room it wants.
 
     Parameters
@@ -90,8 +90,8 @@ def reach_of_tips(dim: int, order: int, size: float, leg: float, radius: float |
     order : int
     size : float, length
         Length a tip, in 3D area over the length of fronts.
-    leg : float, length
-        Of the cells there.
+    cell : float, length
+        Leg of the cells there.
     radius : float, length, optional
         What is given.
     """
@@ -100,8 +100,8 @@ def reach_of_tips(dim: int, order: int, size: float, leg: float, radius: float |
     else:
         (least, most), free = _RANGE[order], _SHARE_OF_FRONT * size
     if radius is not None:
-        return max(radius, _LEAST * leg)
-    return max(min(free, most * leg), least * leg)
+        return max(radius, _LEAST * cell)
+    return max(min(free, most * cell), least * cell)
 
 
 def front_radii(

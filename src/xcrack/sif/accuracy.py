@@ -42,7 +42,7 @@ class Domain:
         How warnings name the place.
     bend : float, length
         Smallest radius of curvature of a front; inf where it is straight, and of a tip.
-    sharpest : (d,) array, length, optional
+    bend_at : (d,) array, length, optional
         Where that is.
     """
 
@@ -56,7 +56,7 @@ class Domain:
     differ: float
     label: str
     bend: float = np.inf
-    sharpest: Floats | None = None
+    bend_at: Floats | None = None
 
     def at(self, x: Floats) -> str:
         """Name of a place in a warning."""
@@ -111,8 +111,8 @@ def check(
     else:
         doubts = [difference]
     sharp = _sharp_bend(domain)
-    if sharp and domain.sharpest is not None:
-        doubts, place = [sharp, *doubts], domain.sharpest
+    if sharp and domain.bend_at is not None:
+        doubts, place = [sharp, *doubts], domain.bend_at
     if any(doubts):
         warn(f"{domain.at(place)}: {'; '.join(filter(None, doubts))}. Refine the mesh there.")
     for solution, part, scale in zip(solutions, parts, scales, strict=True):
@@ -148,9 +148,10 @@ def _sharp_bend(domain: Domain) -> str:
     """A front that bends within two cells: chords and linear level sets do not follow it."""
     if domain.bend >= _SHARP * domain.size:
         return ""
+    cells = domain.bend / domain.size
     return (
-        f"the front bends with a radius of {domain.bend:.4g} there, {domain.bend / domain.size:.2g} "
-        "cells, and K is good from two cells on (xc.adapt makes them as small)"
+        f"the front bends with a radius of {domain.bend:.4g} there, {cells:.2g} cells, and K is "
+        "good from two cells on (xc.adapt makes them as small)"
     )
 
 

@@ -289,7 +289,7 @@ def front_values(
     mean = means(total[:, 0], knots, curve, tip_material)
     least = int(np.argmin(room))
     bend = curve.bend(knots, _BEND_OVER * size)
-    sharpest = int(np.argmin(bend))
+    bend_at = int(np.argmin(bend))
     domain = Domain(
         outer=float(radius.min()),
         wanted=wanted,
@@ -300,8 +300,8 @@ def front_values(
         narrowest=curve.at(knots[[least]])[0][0],
         differ=_DIFFER,
         label="K along the front, at",
-        bend=float(bend[sharpest]),
-        sharpest=curve.at(knots[[sharpest]])[0][0],
+        bend=float(bend[bend_at]),
+        bend_at=curve.at(knots[[bend_at]])[0][0],
     )
     return FrontValues(knots, K, mean, valid, wide, smooth, radius, domain)
 

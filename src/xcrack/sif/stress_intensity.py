@@ -48,7 +48,8 @@ def stress_intensity(solution: Solution, crack: int = 0, error: bool | str | Non
     XcrackWarning
         A domain with too little room for small errors; two domains that differ by more than 1 % of
         K at a tip, or by 5 % of the largest K in the mean of a front; a contact zone at a tip or
-        front that is shorter than two cells; a front too short for K.
+        front that is shorter than two cells; a front too short for K, or whose radius of curvature
+        is below two cells.
     """
     if not isinstance(solution, Solution):
         hint = ""

@@ -21,8 +21,7 @@ class _Share:
     factor: float
 
 
-# In 3D order 2 pays for a high accuracy alone. The default domain is 2.5 radii in 2D,
-# about one in 3D.
+# The default domain is 2.5 radii in 2D, about one in 3D.
 _DEFAULT: dict[int, dict[str, dict[str, Any]]] = {
     2: {
         "other order": {},
@@ -34,6 +33,7 @@ _DEFAULT: dict[int, dict[str, dict[str, Any]]] = {
         "2 functions": {"functions": 2},
     },
     3: {
+        "other order": {},
         "radius × 0.7": {"radius": _Share(0.7)},
         "radius × 1.4": {"radius": _Share(1.4)},
         "topological": {"enrichment": "topological"},

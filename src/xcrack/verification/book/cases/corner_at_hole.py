@@ -66,7 +66,7 @@ def _pull(x: Floats, normal: Floats) -> Floats:
 
 def _run(level: int) -> list[Value]:
     problem = Problem(
-        _plate(0.2 / 1.6**level),
+        _plate(0.3 / 1.6**level),
         Isotropic(E=1e3, nu=0.3),
         [elliptic_crack((_R, 0.0, _T), (0, 1, 0), (1, 0, 0), _A, _A)],
         loads=[traction("rim", _pull)],
@@ -84,7 +84,7 @@ def _run(level: int) -> list[Value]:
 
 
 CASES = (
-    Case("corner-crack-at-hole", "K_hole", _SOURCE, "published", 3, 1, False, _run, 2, quick=False),
+    Case("corner-crack-at-hole", "K_hole", _SOURCE, "published", 3, 2, False, _run, 2, quick=False),
 )
 
 

@@ -74,6 +74,7 @@ def _space(level: int) -> list[Value]:
                 displacement("boundary", lambda x: fields_3d.uniform_stress_3d(x, S, E, NU)[0])
             ],
             contact="on",
+            order=1,
         )
         values.append(Value(f"deviation, penny {k}", _deviation(problem), 0.0, 1e-5, 1.0))
     return values
