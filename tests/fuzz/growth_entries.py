@@ -78,6 +78,17 @@ def _grow(**changes):
     return list(xc.grow(**given | changes))
 
 
+def _checked(**changes):
+    given = {
+        "problem": scenes.growing(),
+        "law": xc.paris(1e-3, 2.0),
+        "cycle": xc.Cycle(0.0, 1.0),
+        "da": 0.2,
+        "progress": False,
+    }
+    return [str(alarm) for alarm in xc.check(**given | changes)]
+
+
 def _collected(steps=None, **options):
     return xc.collect(iter(scenes.history().steps) if steps is None else steps, **options)
 
@@ -369,6 +380,17 @@ ENTRIES = [
         {"measures": arg(Flag(), False, True)},
     ),
     Entry("grow", _grow, GROW, cost=0.12),
+    Entry("check", _checked, GROW, cost=0.1),
+    Entry(
+        "check",
+        lambda **named: _checked(da=None, **named),
+        {
+            "tolerance": arg(Number(above=0, below=1), 0.2, 0.5),
+            "max_unknowns": arg(Whole(least=1, most=10**9, far=1e9, optional=True), None, 20_000),
+        },
+        cost=0.1,
+        arity=False,
+    ),
     Entry(
         "grow",
         lambda retardation: _grow(

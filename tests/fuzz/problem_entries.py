@@ -45,6 +45,8 @@ ENTRIES = [
             "E": arg(POSITIVE, 1.0, 210e3, words=["Young's modulus"]),
             "nu": arg(Number(above=-1, below=0.5), 0.3, 0, words=["Poisson"]),
             "plane": arg(Word(optional=True, words=("strain", "stress")), None, "strain", "stress"),
+            "yield_stress": arg(Number(optional=True, above=0), None, 350.0),
+            "K_c": arg(Number(optional=True, above=0), None, 3000.0),
         },
     ),
     Entry(

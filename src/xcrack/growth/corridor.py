@@ -11,6 +11,7 @@ from xcrack.growth.scout import Scouted
 _PLATEAU = 1.0  # cells around the path that are as small as those on it
 _SLOPE = 0.4  # growth of cells with the distance
 _CLOSER = 0.5  # of a cell: distance of the points that stand for the path
+_ACROSS = 3.0  # cells across a corridor at least, for the unknowns that it will have
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,8 +90,11 @@ class Corridor:
         return cKDTree(self.x)
 
 
-def corridor(seen: Scouted, ways: Ways, chosen: Ints, sizes: list[Floats]) -> Corridor:
+def corridor(seen: Scouted, ways: Ways, chosen: Ints, sizes: list[Floats], most: int) -> Corridor:
     """Sizes along all paths from those at the tips of some stages.
+
+    Cells are not smaller than those with which the corridor alone has more than all the unknowns:
+    a mesh finer than that is given up anyway, and need not be made to see it.
 
     Parameters
     ----------
@@ -100,7 +104,11 @@ def corridor(seen: Scouted, ways: Ways, chosen: Ints, sizes: list[Floats]) -> Co
         Stages.
     sizes : list of (n,) arrays, length
         At the places of each of these.
+    most : int
+        Unknowns that the mesh may have.
     """
+    way = float(np.linalg.norm(ways.stop - ways.start, axis=1).sum())
+    sizes = [np.maximum(size, _ACROSS * way / most) for size in sizes]
     points, values = [seen.stages[0].places], [sizes[0]]
     by_label: dict[int, list[tuple[int, float]]] = {}
     for stage, own in zip(chosen.tolist(), sizes, strict=True):

@@ -165,7 +165,7 @@ def finer(run: GrowthRule, steps_of: Steps, last: Step | None) -> tuple[Mesh, bo
     stages = [seen.stages[k] for k in chosen]
     sizes = [twin.first_sizes(scene, stage) for stage in stages]
     sizes[0] = np.minimum(sizes[0], seen.step)
-    mesh = refine(mesh, size=corridor(seen, ways, chosen, sizes))
+    mesh = refine(mesh, size=corridor(seen, ways, chosen, sizes, most))
     wanted = SHARE / TOGETHER * float(run.tolerance or 0.0) / max(seen.exponent, _LEAST_EXPONENT)
     for number in range(twin.ROUNDS):
         each = [_measured(run, mesh, stage) for stage in stages]
@@ -188,7 +188,7 @@ def finer(run: GrowthRule, steps_of: Steps, last: Step | None) -> tuple[Mesh, bo
         smaller, own = twin.finer(good, goals, places, [sizes[k] for k in there])
         for k, size in zip(there, own, strict=True):
             sizes[k] = size
-        smaller = refine(smaller, size=corridor(seen, ways, chosen, sizes))
+        smaller = refine(smaller, size=corridor(seen, ways, chosen, sizes, most))
         if unknowns * len(smaller.cells) > most * len(mesh.cells):
             _warn_of_most(
                 run, most, f"growth goes on with {unknowns}, on which K is known to {error:.1e} of "

@@ -175,12 +175,24 @@ def _crack_of_rows(history: History, table: Any) -> Any:
 
 
 def _tip_of_rows(history: History, table: Any) -> Any:
-    """Number that the tip of each row had among all tips of the first step; -1: it has left."""
-    names = dict(zip((s.index for s in history.steps), tip_identities(history.steps), strict=True))
+    """Number that the tip of each row had among all tips of the first step; -1: it has left.
+
+    Rows of a tip that arrives at a side have the K of the step before, and its name there.
+    """
+    every = [*tip_identities(history.steps)]
+    steps = [step.index for step in history.steps]
+    names = {
+        step: (now, before) for step, now, before in zip(steps, every, [every[0], *every[:-1]])
+    }
+
+    def name_of(step: int, crack: int, tip: int) -> int:
+        for tips in names[step]:
+            if crack < len(tips) and tip < len(tips[crack]):
+                return int(tips[crack][tip])
+        return -1
+
     rows = zip(*(table[name].tolist() for name in ("step", "crack", "tip")), strict=True)
-    return np.array([
-        names[step][crack][tip] if names[step] else -1 for step, crack, tip in rows
-    ], dtype=np.int64)  # fmt: skip
+    return np.array([name_of(*row) for row in rows], dtype=np.int64)
 
 
 def _tip_labels(history: History) -> dict[int, str]:
