@@ -23,8 +23,7 @@ from xcrack.fem.cut import cut
 from xcrack.fem.facets import jump_matrix, lip_points
 from xcrack.fem.function_space import function_space
 from xcrack.fem.level_set import line_levels
-from xcrack.fem.loads import load_vector
-from xcrack.fem.supports import known_unknowns
+from xcrack.fem.loads import known_unknowns, load_vector
 from xcrack.linalg import direct as linear
 from xcrack.linalg.engine import ContactRows
 from xcrack.linalg.rigid_motion import free_motion

@@ -35,8 +35,7 @@ from xcrack.fem.assembly import Stiffness, bulk, enriched_stiffness, next_to_enr
 from xcrack.fem.cut import cut  # noqa: E402
 from xcrack.fem.facets import lip_points  # noqa: E402
 from xcrack.fem.function_space import function_space  # noqa: E402
-from xcrack.fem.loads import load_vector  # noqa: E402
-from xcrack.fem.supports import known_unknowns  # noqa: E402
+from xcrack.fem.loads import known_unknowns, load_vector  # noqa: E402
 from xcrack.fem.system import System, levels  # noqa: E402
 from xcrack.linalg.engine import ContactRows  # noqa: E402
 from xcrack.linalg.iterative import iterative_system  # noqa: E402

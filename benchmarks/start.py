@@ -55,7 +55,7 @@ def assembly() -> None:
     import numpy as np
 
     import xcrack as xc
-    from xcrack.fem.kernels.bulk import block_pattern, block_stiffness
+    from xcrack.fem.kernels.stiffness import block_pattern, block_stiffness
     from xcrack.mesh.simplex import cell_nodes, shape_derivatives, simplex_rule
 
     for dim, n in ((2, 400), (3, 36)):

@@ -25,7 +25,7 @@ for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 import numpy as np  # noqa: E402
 
 import xcrack as xc  # noqa: E402
-from xcrack.base import threads  # noqa: E402
+from xcrack.base import machine  # noqa: E402
 from xcrack.fem.system import build  # noqa: E402
 
 Times = dict[str, float]
@@ -56,7 +56,7 @@ def measured(problem: xc.Problem, count: int) -> tuple[Times, bytes]:
     """Wall time and shared part by part with a number of threads, and the results as bytes."""
     problem = replace(problem, numerics=replace(problem.numerics, threads=count))
     clock = [_clocks()]
-    with threads.threads(count):
+    with machine.threads(count):
         build(problem)
     clock.append(_clocks())
     solutions = xc.solve(problem, states=[1.0, -1.0])
@@ -120,7 +120,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--scenes", nargs="*", default=list(SCENES), choices=list(SCENES))
     parser.add_argument("--size", type=int, default=40, help="cells a side in 3D")
-    parser.add_argument("--most", type=int, default=threads.available_processors())
+    parser.add_argument("--most", type=int, default=machine.available_processors())
     parser.add_argument("--rounds", type=int, default=3)
     parser.add_argument("--json", type=Path)
     parser.add_argument("--figure", type=Path)

@@ -11,7 +11,7 @@ import xcrack as xc
 from support import scenes_2d as scenes
 from support.scenes_2d import numerics_of
 from xcrack.analysis.solve import build, solve_states
-from xcrack.linalg.reuse import SolverState
+from xcrack.linalg.engine import SolverState
 
 STEEL = xc.Isotropic(1.3, 0.27, plane="strain")
 PULL = (xc.traction("top", (0.0, 1.0)), xc.traction("bottom", (0.0, -1.0)))

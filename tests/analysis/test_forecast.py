@@ -10,9 +10,9 @@ import pytest
 
 import xcrack as xc
 from support import scenes_3d
-from xcrack.analysis import forecast as forecasts
-from xcrack.analysis.forecast import forecast_of
-from xcrack.base import memory
+from xcrack.analysis import plan as plans
+from xcrack.analysis.plan import forecast_of
+from xcrack.base import machine
 from xcrack.base.errors import SizeError
 from xcrack.fem.system import discretise
 
@@ -68,13 +68,13 @@ def test_a_body_without_cracks_has_no_enriched_ones():
 
 
 def test_plan_tells_unknowns_and_memory(monkeypatch):
-    monkeypatch.setattr(forecasts, "free_memory", lambda: 8e9)
+    monkeypatch.setattr(plans, "free_memory", lambda: 8e9)
     scene = block()
     lines = str(xc.plan(scene)).splitlines()
     assert lines[-1].startswith("forecast")
     assert "17 000 unknowns at order 2" in lines[-1]
     assert "for conjugate gradients; 8 GB are free" in lines[-1]
-    monkeypatch.setattr(forecasts, "free_memory", lambda: None)
+    monkeypatch.setattr(plans, "free_memory", lambda: None)
     assert str(xc.plan(scene)).endswith("free memory is not known on this system")
 
 
@@ -84,13 +84,13 @@ def test_what_does_not_fit_is_refused_before_anything_is_built(monkeypatch):
     def forbidden(*args, **options):
         raise AssertionError("solve built something")
 
-    monkeypatch.setattr(forecasts, "free_memory", lambda: 60e6)
+    monkeypatch.setattr(plans, "free_memory", lambda: 60e6)
     monkeypatch.setattr(xcrack.analysis.solve, "build", forbidden)
     says = r"17 000 unknowns at order 2, and 0.13 GB .* 60 MB are free.*order=1 \(.*xc.adapt"
     with pytest.raises(SizeError, match=says):
         xc.solve(block())
     assert "too little" in str(xc.plan(block()))
-    monkeypatch.setattr(forecasts, "free_memory", lambda: 1e6)
+    monkeypatch.setattr(plans, "free_memory", lambda: 1e6)
     with pytest.raises(xc.ProblemError, match="larger cells") as refusal:
         xc.solve(block(order=1))
     assert "order=1 (" not in str(refusal.value)
@@ -100,21 +100,21 @@ def test_what_does_not_fit_is_refused_before_anything_is_built(monkeypatch):
 
 
 def test_order_1_is_a_remedy_that_works(monkeypatch):
-    monkeypatch.setattr(forecasts, "free_memory", lambda: 60e6)
+    monkeypatch.setattr(plans, "free_memory", lambda: 60e6)
     assert xc.solve(block(order=1)).n_dof > 0
 
 
 def test_nobody_is_refused_where_free_memory_is_not_known(monkeypatch, tmp_path):
-    monkeypatch.setattr(memory, "_STATE", tmp_path / "none")
-    assert memory.free_memory() is None
+    monkeypatch.setattr(machine, "_MEMORY", tmp_path / "none")
+    assert machine.free_memory() is None
     (tmp_path / "other").write_text("MemTotal: 12 kB\n", encoding="ascii")
-    monkeypatch.setattr(memory, "_STATE", tmp_path / "other")
-    assert memory.free_memory() is None
+    monkeypatch.setattr(machine, "_MEMORY", tmp_path / "other")
+    assert machine.free_memory() is None
     assert xc.solve(block(4)).n_dof > 0
 
 
 def test_a_solver_of_the_user_is_not_foretold(monkeypatch):
-    monkeypatch.setattr(forecasts, "free_memory", lambda: 1.0)
+    monkeypatch.setattr(plans, "free_memory", lambda: 1.0)
     from scipy.sparse.linalg import splu
 
     assert xc.solve(block(4, "edge", 1), solver=lambda A: splu(A.tocsc()).solve).n_dof > 0
@@ -125,7 +125,7 @@ def test_adapt_keeps_what_it_has_where_the_next_mesh_does_not_fit(monkeypatch):
     mesh = xc.box((-1,) * 3, (1,) * 3, 4)
     scene = xc.Problem(mesh, BODY, [CRACKS["penny"]], loads=PULL, contact="off")
     given = iter([1e12])
-    monkeypatch.setattr(forecasts, "free_memory", lambda: next(given, 1.0))
+    monkeypatch.setattr(plans, "free_memory", lambda: next(given, 1.0))
     adapted = xc.adapt(scene, 1e-3, progress=False)
     assert not adapted.met
     assert len(adapted.rounds) == 1

@@ -7,7 +7,7 @@ import xcrack as xc
 from support import scenes_2d as scenes
 from xcrack.analysis.solution import sides_of
 from xcrack.crack.crack import kink_numbers
-from xcrack.fem.consistent import boundary_points
+from xcrack.fem.assembly import boundary_points
 from xcrack.fem.system import discretise
 
 STEEL = xc.Isotropic(1.0, 0.3, "strain")

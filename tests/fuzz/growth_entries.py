@@ -27,7 +27,7 @@ from fuzz.result_rules import LOAD, NOTHING, NU, fits
 from fuzz.values import paths
 from xcrack import testing
 from xcrack.growth.step import Arrival
-from xcrack.linalg.reuse import SolverState
+from xcrack.linalg.engine import SolverState
 
 ANY = Numbers()
 

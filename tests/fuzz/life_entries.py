@@ -9,7 +9,7 @@ from fuzz.entry import Entry, Hook, arg
 from fuzz.kinds import Called, Filename, Number, Numbers, Of, Seen, Whole, Word, real
 from support.growth_fakes import mode_I, plate
 from xcrack.growth.step import Memory, Step
-from xcrack.linalg.reuse import SolverState
+from xcrack.linalg.engine import SolverState
 from xcrack.runs.rerating import block_of_run, driving_forces
 
 LAW = xc.paris(1e-11, 3.0)

@@ -15,7 +15,7 @@ from xcrack.analysis.friction import weak_slip
 from xcrack.analysis.solve import solve_states
 from xcrack.fem.facets import arc_position
 from xcrack.fem.system import build
-from xcrack.linalg.reuse import SolverState
+from xcrack.linalg.engine import SolverState
 
 TURN = 0.31
 

@@ -8,7 +8,7 @@ import pytest
 
 import xcrack as xc
 from support import exact
-from xcrack.linalg.reuse import SolverState
+from xcrack.linalg.engine import SolverState
 
 LAW = xc.paris(C=1e-11, m=3.0)
 STEEL = xc.Isotropic(E=210e3, nu=0.3, plane="strain")

@@ -19,7 +19,7 @@ from xcrack.growth.levels import ladders
 from xcrack.growth.response import Response, respond
 from xcrack.growth.run import grow
 from xcrack.growth.step import Cycle
-from xcrack.linalg.reuse import SolverState
+from xcrack.linalg.engine import SolverState
 from xcrack.mesh.box import box
 from xcrack.model.loads import initial_stress, traction
 from xcrack.model.material import Isotropic

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from xcrack.mesh.kernels.segments import nearest_vertices
+from xcrack.mesh.kernels.location import nearest_vertices
 
 
 def _curve(kind, count):

@@ -7,13 +7,22 @@ from scipy.spatial import Delaunay
 
 import xcrack as xc
 from tests.support import scenes_2d as scenes
-from xcrack.fem.kernels.bulk import joined_blocks
 from xcrack.fem.kernels.functions import solve_moments
-from xcrack.linalg.kernels.blocks import orthonormal_columns
-from xcrack.linalg.kernels.sparse import bordered_matrix, residual, times, times_transposed
+from xcrack.fem.kernels.stiffness import joined_blocks
+from xcrack.linalg.kernels.sparse import (
+    bordered_matrix,
+    orthonormal_columns,
+    residual,
+    times,
+    times_transposed,
+)
 from xcrack.mesh.kernels.location import cells_within, locate_points, nearest_segment
-from xcrack.mesh.kernels.segments import graded_points, split
-from xcrack.mesh.kernels.splitting import cut_simplices, interface_simplices
+from xcrack.mesh.kernels.splitting import (
+    cut_simplices,
+    graded_points,
+    interface_simplices,
+    split_segments,
+)
 from xcrack.mesh.locate import cells_around
 from xcrack.mesh.polygon import distance_to_simplices
 
@@ -155,7 +164,7 @@ def test_split():
     ends = np.array([[0, 1], [2, 3], [4, 5], [7, 6]])
     cut = np.array([[0.25, np.nan, np.nan, 0.25]])
     level = np.array([[[-1.0, 3.0], [-1.0, 2.0], [1.0, 2.0], [3.0, -1.0]]])
-    number, bary, side = split(ends, cut, level)
+    number, bary, side = split_segments(ends, cut, level)
     np.testing.assert_array_equal(number, [0, 1, 2, 3, 0, 3])
     np.testing.assert_array_equal(side[:, 0], [-1, 0, 1, 1, 1, -1])
     np.testing.assert_array_equal(bary[0], [[1, 0], [0.75, 0.25]])
@@ -168,7 +177,7 @@ def test_split_by_three_cracks():
     ends = np.array([[0, 1], [3, 2], [4, 5]])
     cut = np.array([[0.5, 0.8, np.nan], [0.9, 0.3, 0.5], [0.1, 0.5, 0.5]])
     level = np.repeat(np.array([[[-1.0, 1.0]]]), 3, axis=0).repeat(3, axis=1)
-    number, bary, side = split(ends, cut, level)
+    number, bary, side = split_segments(ends, cut, level)
     np.testing.assert_array_equal(number, [0, 1, 2, 0, 1, 2, 0, 1, 0, 1])
     first = bary[number == 0, :, 1]
     np.testing.assert_allclose(first, [[0, 0.1], [0.1, 0.5], [0.5, 0.9], [0.9, 1]])

@@ -19,7 +19,7 @@ logging.getLogger("xcrack").addFilter(lambda record: announced.append(record.get
 with warnings.catch_warnings(record=True) as caught:
     warnings.simplefilter("always")
     import numpy as np
-    from xcrack.mesh.kernels.segments import polyline_distance as kernel
+    from xcrack.mesh.kernels.location import polyline_distance as kernel
     line = np.array([[0.0, 0.0], [1.0, 0.0]])
     print(np.asarray(kernel(np.array([[0.5, 2.0]]), line)[0]).ravel()[0])
     from xcrack.fem.kernels.functions import set_gradients

@@ -7,9 +7,13 @@ import scipy.sparse as sp
 import xcrack as xc
 from support import scenes_2d as scenes
 from xcrack.fem.assembly import bulk
-from xcrack.fem.kernels.bulk import block_pattern, block_stiffness
-from xcrack.fem.kernels.enriched import add_stiffness, enriched_pattern
-from xcrack.linalg.kernels.blocks import dense_blocks
+from xcrack.fem.kernels.stiffness import (
+    add_stiffness,
+    block_pattern,
+    block_stiffness,
+    enriched_pattern,
+)
+from xcrack.linalg.kernels.sparse import dense_blocks
 from xcrack.mesh.simplex import cell_nodes, shape_derivatives, simplex_rule
 from xcrack.model.material import isotropic_part
 
@@ -137,7 +141,7 @@ def test_dense_blocks():
 
 def test_bisect_fills_triangles_and_stops_at_tips():
     """Parts add up to their triangle; none is larger than its distance to a tip but the marked."""
-    from xcrack.fem.kernels.bisect import bisect
+    from xcrack.mesh.kernels.splitting import bisect
 
     rng = np.random.default_rng(4410)
     x, tips = rng.uniform(size=(20, 3, 2)), rng.uniform(size=(2, 2))

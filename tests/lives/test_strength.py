@@ -15,12 +15,11 @@ from xcrack.fatigue.spectrum import Spectrum
 from xcrack.growth.response import respond
 from xcrack.growth.run import grow
 from xcrack.growth.step import Cycle
-from xcrack.linalg.reuse import SolverState
+from xcrack.linalg.engine import SolverState
 from xcrack.mesh.box import box
 from xcrack.model.loads import traction
 from xcrack.model.material import Isotropic
-from xcrack.model.problem import Problem
-from xcrack.model.states import LoadLevel
+from xcrack.model.problem import LoadLevel, Problem
 from xcrack.model.supports import fix
 from xcrack.runs.assessment import (
     assessment_line,

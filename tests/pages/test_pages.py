@@ -128,4 +128,4 @@ def test_glossary():
 
 def contact_class(name):
     """Classes of results that users meet but never make."""
-    return getattr(importlib.import_module("xcrack.analysis.contact_result"), name)
+    return getattr(importlib.import_module("xcrack.analysis.contact"), name)

@@ -12,7 +12,7 @@ import pytest
 import xcrack as xc
 from support import scenes_2d as scenes
 from support import scenes_friction
-from xcrack.mesh.kernels.segments import graded_points
+from xcrack.mesh.kernels.splitting import graded_points
 from xcrack.mesh.simplex import gauss
 
 pytestmark = pytest.mark.filterwarnings("ignore::xcrack.XcrackWarning")

@@ -7,13 +7,13 @@ import pytest
 import scipy.sparse as sp
 
 import xcrack as xc
-import xcrack.linalg.row_blocks as row_blocks_file
+import xcrack.linalg.products as row_blocks_file
 from xcrack.base.errors import ConvergenceError
-from xcrack.base.threads import threads
+from xcrack.base.machine import threads
 from xcrack.linalg import products
-from xcrack.linalg.products import best_guesses, independent_columns
+from xcrack.linalg.iterative import best_guesses, independent_columns
+from xcrack.linalg.products import row_blocks
 from xcrack.linalg.projected_cg import Operator, Request, conjugate_gradients_steps, in_lockstep
-from xcrack.linalg.row_blocks import row_blocks
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])

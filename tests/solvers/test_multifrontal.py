@@ -15,13 +15,13 @@ import threadpoolctl
 import xcrack as xc
 from support import scenes_2d as scenes
 from xcrack.analysis.solve import solve_states
-from xcrack.base.threads import one_blas_thread
+from xcrack.base.machine import one_blas_thread
 from xcrack.fem.system import build
 from xcrack.linalg import direct, multifrontal
 from xcrack.linalg.basis import function_nodes
-from xcrack.linalg.kernels.symbolic import postorder
+from xcrack.linalg.engine import SolverState
+from xcrack.linalg.kernels.multifrontal import postorder
 from xcrack.linalg.multifrontal import factorise, tree
-from xcrack.linalg.reuse import SolverState
 from xcrack.linalg.rigid_motion import free_motion
 
 STEEL = xc.Isotropic(1.0, 0.3, "strain")

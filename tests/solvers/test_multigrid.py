@@ -8,11 +8,10 @@ import scipy.sparse.linalg as sla
 import xcrack as xc
 import xcrack.linalg.multigrid as multigrid
 from xcrack.fem.assembly import bulk, rigid_modes
-from xcrack.linalg.cycle import largest_eigenvalue
 from xcrack.linalg.kernels.cycle import first_step, next_step
-from xcrack.linalg.multigrid import extended_cycle, hierarchy
+from xcrack.linalg.multigrid import extended_cycle, hierarchy, largest_eigenvalue
+from xcrack.linalg.products import BorderedFactor, row_blocks, stored
 from xcrack.linalg.projected_cg import Operator, conjugate_gradients
-from xcrack.linalg.row_blocks import BorderedFactor, row_blocks, stored
 from xcrack.mesh.simplex import node_points
 
 

@@ -9,7 +9,7 @@ from xcrack.analysis.solution import Solution
 from xcrack.crack.lines import line_crack
 from xcrack.crack.measures import length_inside
 from xcrack.growth.response import Response
-from xcrack.linalg.reuse import SolverState
+from xcrack.linalg.engine import SolverState
 from xcrack.mesh.box import box
 from xcrack.model.material import Isotropic
 from xcrack.model.problem import Problem

@@ -5,7 +5,7 @@ import pytest
 
 import xcrack as xc
 from xcrack.analysis.solve import solve_states
-from xcrack.linalg.reuse import SolverState
+from xcrack.linalg.engine import SolverState
 
 STEEL = xc.Isotropic(210e3, 0.3, "strain")
 

@@ -8,7 +8,7 @@ import pytest
 import xcrack as xc
 from support import scenes_2d as scenes
 from xcrack.analysis.solve import build
-from xcrack.fem.consistent import boundary_points
+from xcrack.fem.assembly import boundary_points
 from xcrack.fem.loads import position
 from xcrack.fem.quadrature import cell_points, n_parts, part_numbers, segment_points
 from xcrack.mesh.simplex import conical, simplex_rule

@@ -9,7 +9,7 @@ import xcrack as xc
 from support import scenes_3d as scenes
 from support.scenes_2d import numerics_of
 from xcrack.analysis.solve import build
-from xcrack.fem.consistent import boundary_points, corrected
+from xcrack.fem.assembly import boundary_points, corrected
 from xcrack.fem.loads import position
 from xcrack.fem.quadrature import (
     Points,

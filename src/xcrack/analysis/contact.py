@@ -1,21 +1,99 @@
-"""Which cracks need multipliers, and the pressures on their faces in all load states."""
+"""Contact of crack faces (lips): which cracks need multipliers, and the pressures in all states."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any, cast
 
 import numpy as np
 import scipy.sparse as sp
 
-from xcrack.analysis.contact_result import Contact, ContactSolution, FrictionWork
-from xcrack.analysis.friction import FrictionSolution, has_friction, solve_friction
+from xcrack.analysis.friction import FrictionSolution, FrictionWork, has_friction, solve_friction
 from xcrack.analysis.multipliers import Multipliers, gap_rows, multipliers
 from xcrack.base.arrays import Bools, Floats, lock
 from xcrack.fem.system import System
 from xcrack.linalg.direct import DirectSystem
-from xcrack.linalg.engine import ContactRows, Engine, StateContact
-from xcrack.linalg.reuse import SolverState
-from xcrack.model.problem import Problem
-from xcrack.model.states import LoadState
+from xcrack.linalg.engine import ContactRows, Engine, SolverState, StateContact
+from xcrack.model.problem import LoadState, Problem
+
+
+@dataclass(frozen=True, eq=False)
+class Contact:
+    """Contact on all faces of one crack in one load state, at their integration points.
+
+    Attributes
+    ----------
+    points : (q, d) array, length
+    normal : (q, d) array
+        From lip - to lip +.
+    measure : (q,) array, length^(d - 1)
+        Weight of each point: sums are integrals along the crack face.
+    pressure : (q,) array, stress
+        The multiplier field, 0 where open.
+    gap : (q,) array, length
+        Normal opening n . [[u]].
+    closed : (q,) array of bool
+    s : (q,) array, length
+        Position along the crack from where it enters the body.
+    tangent : (q, 2) array, in 3D (q, 2, 3), optional
+        With friction: direction of shear and slip, along the order of the crack's points; in 3D two
+        directions. None without, as the three that follow.
+    shear : (q,) array, in 3D (q, 2), stress, optional
+        Tangential traction on lip + along the tangents; lip - bears the opposite one.
+    slip : (q,) array, in 3D (q, 2), length, optional
+        Tangential jump, that of lip + less that of lip -.
+    stuck : (q,) array of bool, optional
+        Closed, and without slip since the substep before.
+    """
+
+    points: Floats
+    normal: Floats
+    measure: Floats
+    pressure: Floats
+    gap: Floats
+    closed: Bools
+    s: Floats
+    tangent: Floats | None = None
+    shear: Floats | None = None
+    slip: Floats | None = None
+    stuck: Bools | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class ContactSolution:
+    """Displacements and contact pressures of all load states.
+
+    Attributes
+    ----------
+    u : (n_dof, states) array, length
+    spaces : tuple of Multipliers or None
+        One entry a crack; None for a crack without multipliers.
+    pressure : tuple of (g, states) arrays or None
+    active : tuple of (states, g) arrays of bool or None
+    sets : int
+        Closed sets tried in the worst state.
+    dual : (g, g) array or None
+        F = N K^-1 N^T over the multipliers of all cracks in their order; None where no
+        factorisation made it.
+    rubbing : tuple of FrictionWork
+        Of the cracks whose faces rub.
+    dissipated : tuple of float
+        Energy that friction took in each state since the one before; empty without.
+    """
+
+    u: Floats
+    spaces: tuple[Multipliers | None, ...]
+    pressure: tuple[Floats | None, ...]
+    active: tuple[Bools | None, ...]
+    sets: int
+    dual: Floats | None = None
+    rubbing: tuple[FrictionWork, ...] = ()
+    dissipated: tuple[float, ...] = ()
+
+    def closed_sets(self) -> SolverState:
+        """Closed sets by place, for the next solve."""
+        centre = tuple(None if m is None else m.centre for m in self.spaces)
+        return SolverState(centre, self.active)
+
 
 _OVERLAP = 1e-9  # share of the largest displacement by which faces must overlap to need contact
 

@@ -12,7 +12,6 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.spatial import cKDTree
 
-from xcrack.analysis.contact_result import FrictionWork
 from xcrack.analysis.multipliers import Multipliers, gap_rows
 from xcrack.base.arrays import Bools, Floats, lock
 from xcrack.base.errors import ConvergenceError, warn
@@ -27,9 +26,32 @@ from xcrack.linalg.coulomb import (
     coulomb,
     coulomb_3d,
 )
-from xcrack.linalg.engine import Engine, StateContact
-from xcrack.linalg.reuse import SlipField
+from xcrack.linalg.engine import Engine, SlipField, StateContact
 from xcrack.model.problem import Problem
+
+
+@dataclass(frozen=True, eq=False)
+class FrictionWork:
+    """Friction on the faces of one crack in all load states.
+
+    Attributes
+    ----------
+    crack : int
+    tangents : (q, m, d) array
+        One in 2D, two in 3D.
+    jumps : list of m sparse matrices (q, n_dof)
+        Tangential jumps at the lip points.
+    shear : (m, g, states) array, stress
+        Tangential tractions of each multiplier function.
+    stuck : (states, g) array of bool
+    """
+
+    crack: int
+    tangents: Floats
+    jumps: list[sp.csr_matrix]
+    shear: Floats
+    stuck: Bools
+
 
 # Slip that a crack state leaves to the next one of the grown crack.
 

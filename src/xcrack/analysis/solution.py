@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from xcrack.analysis.contact_result import Contact, ContactSolution
+from xcrack.analysis.contact import Contact, ContactSolution
 from xcrack.analysis.plan import Report
 from xcrack.base.arrays import Bools, Floats, Ints, lock
 from xcrack.base.checks import numbers, value_text, whole_numbers
@@ -20,13 +20,11 @@ from xcrack.fem.function_space import FunctionSpace
 from xcrack.fem.loads import position
 from xcrack.fem.quadrature import at_joints, cell_side
 from xcrack.fem.system import System
-from xcrack.linalg.engine import Engine
-from xcrack.linalg.reuse import SolverState
+from xcrack.linalg.engine import Engine, SolverState
 from xcrack.linalg.rigid_motion import Motion
 from xcrack.mesh.locate import locate
 from xcrack.model.loads import Load
-from xcrack.model.problem import Problem, crack_number
-from xcrack.model.states import LoadState
+from xcrack.model.problem import LoadState, Problem, crack_number
 
 # What a solve keeps where errors are asked for: its factor, and the contact of all states.
 

@@ -9,25 +9,22 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.linalg import LinearOperator, cg
 
-from xcrack.analysis.alarms import alarms_of_solutions
 from xcrack.analysis.contact import contact_of, solve_contact
-from xcrack.analysis.forecast import check_memory, takes_iterations
 from xcrack.analysis.friction import slip_of
-from xcrack.analysis.report import report, resultants
+from xcrack.analysis.plan import check_memory, takes_iterations
+from xcrack.analysis.report import alarms_of_solutions, report, resultants
 from xcrack.analysis.solution import FactoredSolution, Solution
 from xcrack.base.arrays import Bools, Floats, lock
 from xcrack.base.checks import entries, flag, value_text
 from xcrack.base.errors import ProblemError, warn
-from xcrack.base.threads import one_blas_thread, threads
+from xcrack.base.machine import one_blas_thread, threads
 from xcrack.fem.assembly import MeshLoad, body_forces, next_to_enriched
-from xcrack.fem.loads import body_points, load_vector, mesh_loads, on_mesh, position
-from xcrack.fem.supports import known_unknowns
+from xcrack.fem.loads import body_points, known_unknowns, load_vector, mesh_loads, on_mesh, position
 from xcrack.fem.system import System, build
 from xcrack.linalg.direct import Solver, system
-from xcrack.linalg.engine import Engine
+from xcrack.linalg.engine import Engine, SolverState
 from xcrack.linalg.iterative import iterative_system
 from xcrack.linalg.products import times
-from xcrack.linalg.reuse import SolverState
 from xcrack.linalg.rigid_motion import (
     Motion,
     balanced_loads,
@@ -37,8 +34,7 @@ from xcrack.linalg.rigid_motion import (
 )
 from xcrack.model.friction import check_order
 from xcrack.model.loads import Load
-from xcrack.model.problem import Problem, check_problem
-from xcrack.model.states import LoadState
+from xcrack.model.problem import LoadState, Problem, check_problem
 from xcrack.model.supports import Support
 
 # How much of an initial stress the body cannot bear: its part out of balance.

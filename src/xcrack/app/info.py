@@ -14,8 +14,8 @@ import xcrack
 from xcrack.analysis.solve import solve
 from xcrack.base.checks import flag
 from xcrack.base.errors import XcrackError, XcrackWarning
+from xcrack.base.machine import number_of_threads
 from xcrack.base.optional import require_package
-from xcrack.base.threads import number_of_threads
 from xcrack.crack.crack import Crack
 from xcrack.crack.lines import line_crack
 from xcrack.crack.surfaces import penny_crack

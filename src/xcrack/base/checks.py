@@ -10,7 +10,9 @@ from typing import Any
 import numpy as np
 
 from xcrack.base.arrays import Floats, Ints, Shape, has_shape
-from xcrack.base.errors import ProblemError, XcrackError
+from xcrack.base.errors import MeshError, ProblemError, XcrackError
+
+LARGEST = 1e90  # coordinate whose third power is still a number
 
 
 def number(
@@ -172,6 +174,29 @@ def numbers(
         place = "" if result.ndim == 0 else f"[{', '.join(str(int(i)) for i in where)}]"
         raise error(f"{what}{place} = {result[where]}: every number must be finite.")
     return result
+
+
+def point_coordinates(
+    value: Any, what: str, shape: Shape, *, error: type[XcrackError] = MeshError
+) -> Floats:
+    """Check that a value is an array of finite coordinates, small enough to compute with.
+
+    Parameters
+    ----------
+    value, what, shape, error
+        As of `numbers`.
+
+    Returns
+    -------
+    array of float
+    """
+    x = numbers(value, what, shape, error=error)
+    if x.size and np.abs(x).max() > LARGEST:
+        raise error(
+            f"{what}: coordinates of up to {np.abs(x).max():.3g} are too large to compute with "
+            "their powers; take another unit of length."
+        )
+    return x
 
 
 def whole_numbers(

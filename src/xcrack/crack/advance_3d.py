@@ -22,7 +22,7 @@ from xcrack.crack.front_chain import (
     without_sides,
 )
 from xcrack.crack.front_curve import front_curve
-from xcrack.crack.fronts_3d import Front, front_frames, steps
+from xcrack.crack.stations import Front, front_frames, steps
 from xcrack.mesh.distances import first_crossing, surface_distance, triangle_tree
 
 LOW, HIGH = 0.5, 1.5  # bounds of the spacing of front points, in sizes

@@ -6,9 +6,8 @@ from typing import Any
 import numpy as np
 
 from xcrack.base.arrays import Floats, Ints, Shape, frozen_copy
-from xcrack.base.checks import entries, whole_numbers
+from xcrack.base.checks import entries, point_coordinates, whole_numbers
 from xcrack.base.errors import GeometryError
-from xcrack.mesh.checks import coordinates
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +41,7 @@ class Crack:
     fronts: tuple[Ints, ...] | None = None
 
     def __post_init__(self) -> None:
-        points = coordinates(self.points, "Crack: points", (None, None), error=GeometryError)
+        points = point_coordinates(self.points, "Crack: points", (None, None), error=GeometryError)
         d = points.shape[1]
         if d not in (2, 3) or not len(points):
             raise GeometryError(f"Crack: points must be (p, 2) or (p, 3), not {points.shape}.")

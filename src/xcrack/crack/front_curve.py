@@ -133,7 +133,7 @@ class FrontCurve:
             Theirs.
         """
         from xcrack.crack.kernels.front import feet
-        from xcrack.mesh.kernels.segments import nearest_vertices
+        from xcrack.mesh.kernels.location import nearest_vertices
 
         s, samples = self._guesses
         step = float(np.diff(s).max())
@@ -148,7 +148,7 @@ class FrontCurve:
 
         It bounds the distance to the front from above.
         """
-        from xcrack.mesh.kernels.segments import nearest_vertices
+        from xcrack.mesh.kernels.location import nearest_vertices
 
         # Read-only as everywhere: a kernel is compiled once more for arrays that are not.
         return np.asarray(nearest_vertices(lock(x.view()), self._guesses[1], bound)[1])

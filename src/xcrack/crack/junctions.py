@@ -234,7 +234,7 @@ def _sine(ahead: Floats, arms: Floats) -> float:
 
 def _side(x: Floats, line: Floats) -> int:
     """Side of a polyline on which a point next to it lies."""
-    from xcrack.mesh.kernels.segments import polyline_distance
+    from xcrack.mesh.kernels.location import polyline_distance
 
     return 1 if polyline_distance(x[None], line)[0][0] > 0 else -1
 

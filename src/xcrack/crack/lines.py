@@ -4,9 +4,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from xcrack.base.arrays import Bools, Floats, at
+from xcrack.base.checks import point_coordinates
 from xcrack.base.errors import GeometryError
 from xcrack.crack.crack import Crack
-from xcrack.mesh.checks import coordinates
 from xcrack.mesh.polygon import boxes_meet, closest_on_segment
 
 _SAME = 1e-9  # share of its length within which points of a line are the same, or it touches itself
@@ -41,7 +41,7 @@ def line_crack(points: ArrayLike) -> Crack:
     >>> line_crack([(0, 0), (1, 0), (2, 1)])
     Crack(3 points, 2 faces, not placed)
     """
-    x = coordinates(points, "line_crack: points", (None, 2), error=GeometryError)
+    x = point_coordinates(points, "line_crack: points", (None, 2), error=GeometryError)
     if len(x) < 2:
         raise GeometryError(f"a line crack needs at least two points (p, 2), not {len(x)}.")
     length = np.linalg.norm(np.diff(x, axis=0), axis=1)

@@ -6,10 +6,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from xcrack.base.arrays import Floats, Ints, at
-from xcrack.base.checks import number, numbers, whole_number, whole_numbers
+from xcrack.base.checks import (
+    LARGEST,
+    number,
+    numbers,
+    point_coordinates,
+    whole_number,
+    whole_numbers,
+)
 from xcrack.base.errors import GeometryError
 from xcrack.crack.crack import Crack
-from xcrack.mesh.checks import LARGEST, coordinates
 from xcrack.mesh.files import read_triangles
 from xcrack.mesh.polygon import ear_clipped, self_crossing
 from xcrack.mesh.triangulation import face_areas, oriented_faces, rim, side_keys
@@ -183,7 +189,7 @@ def plane_crack(polygon: ArrayLike) -> Crack:
     >>> plane_crack([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)])
     Crack(4 points, 2 faces, not placed)
     """
-    x = coordinates(polygon, "plane_crack: polygon", (None, 3), error=GeometryError)
+    x = point_coordinates(polygon, "plane_crack: polygon", (None, 3), error=GeometryError)
     if len(x) < 3:
         raise GeometryError(f"a plane crack needs at least three corners (m, 3), not {len(x)}.")
     size = float(np.linalg.norm(np.ptp(x, axis=0)))
@@ -269,7 +275,7 @@ def surface_crack(points: ArrayLike, triangles: ArrayLike) -> Crack:
     if not np.isfinite(x).all():
         face = int(used[np.argmax(~np.isfinite(x).all(axis=1))])
         raise GeometryError(f"point {face} of the surface crack is not finite.")
-    x = coordinates(x, what, (None, 3), error=GeometryError)
+    x = point_coordinates(x, what, (None, 3), error=GeometryError)
     _check_shape(x, faces)
     turned = oriented_faces(faces)
     if turned is None:
@@ -366,7 +372,7 @@ def _merged_points(points: Floats, triangles: Ints) -> tuple[Floats, Ints]:
 
 
 def _vector(value: ArrayLike, what: str) -> Floats:
-    return coordinates(value, what, (3,), error=GeometryError)
+    return point_coordinates(value, what, (3,), error=GeometryError)
 
 
 def _unit(vector: Floats, what: str) -> Floats:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from xcrack.analysis.contact_result import Contact
+from xcrack.analysis.contact import Contact
 from xcrack.analysis.solution import FactoredSolution, Solution
 from xcrack.base.arrays import Floats
 from xcrack.estimate.dual import Goal, duals, end_changes, groups_of

@@ -5,14 +5,14 @@ from cell to cell. Sub-cell fractions are products of positive cut positions (no
 tiny pieces keep their relative accuracy.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from xcrack.base.arrays import Bools, Floats, Ints, lock
 from xcrack.crack.placing_2d import ON_MESH
-from xcrack.fem.kinks_2d import Kinks, no_kinks, sharpened_cut
+from xcrack.fem.kinks_2d import NO_KINKS, Kinks, sharpened_cut
 from xcrack.fem.level_set import LevelSet
 from xcrack.mesh.locate import barycentric
 from xcrack.mesh.mesh import Mesh, local_edges
@@ -312,7 +312,7 @@ class Cut:
     lip_normal: Floats
     cut_edge: Floats
     side: Ints
-    kinks: Kinks = field(default_factory=no_kinks)
+    kinks: Kinks = NO_KINKS
 
     @cached_property
     def is_cut(self) -> Bools:
@@ -378,7 +378,7 @@ def cut(mesh: Mesh, level_set: LevelSet) -> Cut:
 
     edge_flag = np.zeros(len(mesh.edges), dtype=bool)
     edge_flag[mesh.cell_to_edge[cells]] = True
-    kinks = no_kinks()
+    kinks = NO_KINKS
     if len(level_set.line) > 2:
         at = np.where(edge_flag, positions, np.nan)
         kinks, at = sharpened_cut(mesh, level_set, cells, at)

@@ -107,7 +107,7 @@ def _longest_side(x: Floats) -> Floats:
 
 
 def _split_segments(space: FunctionSpace, ends: Ints) -> FacetParts:
-    from xcrack.mesh.kernels.segments import split
+    from xcrack.mesh.kernels.splitting import split_segments
 
     edge = numbers_of(space.mesh, ends)  # in 2D facets are edges
     position, level = (
@@ -116,7 +116,7 @@ def _split_segments(space: FunctionSpace, ends: Ints) -> FacetParts:
     )
     for c, cut in enumerate(space.cuts):
         position[c], level[c] = cut.cut_edge[edge], cut.level_set.phi[ends]
-    return FacetParts(*split(np.array(ends), position, level))
+    return FacetParts(*split_segments(np.array(ends), position, level))
 
 
 def _split_triangles(space: FunctionSpace, ends: Ints) -> FacetParts:

@@ -87,10 +87,8 @@ class Kinks:
         )
 
 
-def no_kinks() -> Kinks:
-    """Kinks of a cut that has none."""
-    empty = lock(np.zeros((0, 3)))
-    return Kinks(lock(np.zeros((0, 2))), lock(np.zeros(0, np.int64)), empty, empty)
+_NOTHING = lock(np.zeros((0, 3)))
+NO_KINKS = Kinks(lock(np.zeros((0, 2))), lock(np.zeros(0, np.int64)), _NOTHING, _NOTHING)
 
 
 def sharpened_cut(
@@ -118,7 +116,7 @@ def sharpened_cut(
     ]
     cells_near = np.intersect1d(np.concatenate([*reach, np.zeros(0, np.int64)]), cells)
     if not len(cells_near):
-        return no_kinks(), positions
+        return NO_KINKS, positions
     edges = np.unique(mesh.cell_to_edge[cells_near])
     edges = edges[~np.isnan(positions[edges])]
     moved = _crossings(mesh, level_set, edges, positions)

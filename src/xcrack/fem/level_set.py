@@ -7,8 +7,8 @@ from scipy.spatial import cKDTree
 
 from xcrack.base.arrays import Bools, Floats, Ints, lock
 from xcrack.crack.crack import Crack, tip_frames
-from xcrack.crack.fronts_3d import Front, front_frames
 from xcrack.crack.placing_2d import ON_MESH
+from xcrack.crack.stations import Front, front_frames
 from xcrack.mesh.distances import front_distance, surface_distance
 from xcrack.mesh.locate import cells_around
 from xcrack.mesh.mesh import Mesh, local_facets
@@ -96,7 +96,7 @@ def snap_to_vertices(mesh: Mesh, phi: Floats) -> Floats:
 
 def line_levels(mesh: Mesh, crack: Crack) -> LevelSet:
     """Level sets of a placed crack in 2D at the points of a mesh."""
-    from xcrack.mesh.kernels.segments import polyline_distance
+    from xcrack.mesh.kernels.location import polyline_distance
 
     reach = 10 * mesh.extent + float(np.abs(crack.points - mesh.points[0]).max())
     start, stop = _prolongation(crack.points, reach)

@@ -1,18 +1,22 @@
-"""Load vectors: every load is tested with every function, enriched ones included."""
+"""Loads, tested with every function, enriched ones included, and what supports impose."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
-from xcrack.base.arrays import Floats, Ints, lock
+from xcrack.base.arrays import Bools, Floats, Ints, lock
+from xcrack.base.checks import value_text
 from xcrack.base.errors import ProblemError
 from xcrack.fem.assembly import MeshLoad
 from xcrack.fem.facets import LipPoints, jump_values, part_points, split_facets
 from xcrack.fem.function_space import FunctionSpace
 from xcrack.fem.quadrature import Points, at_joints, cell_points, cell_side
-from xcrack.mesh.mesh import facet_set, numbers_of
+from xcrack.mesh.mesh import facet_set, nearest_point, numbers_of
+from xcrack.mesh.simplex import facet_nodes
 from xcrack.model.loads import FacetPoints, Load
 from xcrack.model.material import Material
+from xcrack.model.supports import Support
 
 
 def load_vector(
@@ -188,4 +192,221 @@ def on_mesh(
     return tuple(result)
 
 
-__all__ = []
+# What supports impose: which unknowns are known, and their values.
+
+_TRACE = 1e-13  # enriched functions below this value on a facet do not act there (round-off)
+# Share of the largest singular value below which traces of enriched functions do not count. A tube
+# that just reaches a side of a 3D body has traces there so small that they would buy any value with
+# a coefficient of any size inside the body.
+_LEAST = {2: 1e-11, 3: 1e-3}
+
+
+@dataclass(frozen=True, eq=False)
+class ImposedValues:
+    """Unknowns that supports decide, and their values.
+
+    Attributes
+    ----------
+    fixed : (n_dof,) array of bool
+    value : (n_dof,) array, length
+        Zero where nothing is imposed.
+    owner : (n_dof,) array of int
+        Number of the support that decides, -1 where none does.
+    """
+
+    fixed: Bools
+    value: Floats
+    owner: Ints
+
+
+def known_unknowns(space: FunctionSpace, supports: Sequence[Support]) -> ImposedValues:
+    """Unknowns decided by the supports.
+
+    Raises
+    ------
+    ProblemError
+        Unknown sets, wrong shapes or nan, or two supports that contradict each other at a point.
+    """
+    fixed = np.zeros((space.n_functions, space.dim), dtype=bool)
+    value = np.zeros((space.n_functions, space.dim))
+    fitted = np.zeros_like(fixed)
+    owner = np.full(fixed.shape, -1, dtype=np.int64)
+    for number, support in enumerate(supports):
+        if support.holds:
+            functions = _functions_of(space, support.where, support.kind)
+            for axis in _axes(support.displacement_at(np.zeros((1, space.dim)))):
+                _impose(space, fixed, value, fitted, functions, axis, np.zeros(len(functions)), 0)
+        else:
+            for axis, functions, numbers, n_fitted in _imposed_part(space, support):
+                _impose(space, fixed, value, fitted, functions, axis, numbers, n_fitted)
+        owner[fixed & (owner < 0)] = number
+    return ImposedValues(fixed.ravel(), value.ravel(), owner.ravel())
+
+
+def _impose(
+    space: FunctionSpace,
+    fixed: Bools,
+    value: Floats,
+    fitted: Bools,
+    functions: Ints,
+    axis: int,
+    numbers: Floats,
+    n_fitted: int,
+) -> None:
+    """Write values; the last `n_fitted` come from a fit and may differ from a neighbour's."""
+    again = fixed[functions, axis]
+    from_fit = np.arange(len(functions)) >= len(functions) - n_fitted
+    scale = max(float(np.abs(numbers).max(initial=0)), float(np.abs(value).max(initial=0)))
+    clash = again & (np.abs(value[functions, axis] - numbers) > 1e-6 * scale)
+    clash &= ~from_fit & ~fitted[functions, axis]
+    if clash.any():
+        i = int(np.argmax(clash))
+        x = space.node_points[functions[i]]
+        raise ProblemError(
+            f"two supports contradict each other at {np.round(x, 6).tolist()}, axis {axis}: "
+            f"{value[functions[i], axis]:.6g} and {numbers[i]:.6g}; leave one direction free."
+        )
+    value[functions[~again], axis] = numbers[~again]
+    fixed[functions, axis] = True
+    fitted[functions[~again], axis] = from_fit[~again]
+
+
+def _set_nodes(space: FunctionSpace, where: object, what: str) -> Ints:
+    if isinstance(where, str):
+        facets = facet_set(space.mesh, where, what)
+        return np.unique(facet_nodes(space.mesh, space.order, facets))
+    return np.array([nearest_point(space.mesh, np.asarray(where), what)])
+
+
+def _functions_of(space: FunctionSpace, where: object, what: str) -> Ints:
+    """Functions that act on a set: standard ones, and enriched ones with a trace there.
+
+    At a point only the standard function has a value, and that of a jump on the crack.
+    """
+    nodes = _set_nodes(space, where, what)
+    parts = [nodes]
+    if isinstance(where, str):
+        facets = facet_set(space.mesh, where, what)
+        _check_ends(space, where, facets, what)
+        owner = space.mesh.facet_to_cell[space.mesh.facet_numbers(facets), 0]
+        facets = facets[space.signature[owner] != 0]
+        if len(facets):
+            parts.append(_traces(space, facets)[1])
+    else:
+        for cut, number in zip(space.cuts, space.heaviside, strict=True):
+            on_lip = nodes[cut.level_set.phi[nodes] == 0]
+            parts.append(number[on_lip][number[on_lip] >= 0])
+    return np.unique(np.concatenate(parts))
+
+
+def _check_ends(space: FunctionSpace, where: str, facets: Ints, what: str) -> None:
+    """Raise where a set ends at a point on a crack and holds its lip - there.
+
+    The functions of such a point are those of lip + and of the jump: only their sum is known.
+    """
+    for c, cut in enumerate(space.cuts):
+        phi = cut.level_set.phi
+        touches = np.zeros((2, space.mesh.n_points), dtype=bool)
+        for corner in range(facets.shape[1]):
+            others = np.delete(phi[facets], corner, axis=1)
+            touches[0, facets[(others < 0).any(axis=1), corner]] = True
+            touches[1, facets[(others > 0).any(axis=1), corner]] = True
+        ends = (phi == 0) & (space.heaviside[c][: space.mesh.n_points] >= 0)
+        is_cut_off = ends & touches[0] & ~touches[1]
+        if is_cut_off.any():
+            x = np.round(space.mesh.points[np.argmax(is_cut_off)], 6).tolist()
+            raise ProblemError(
+                f"{what}({value_text(where)}) ends at {x}, where crack {c} meets the boundary, and "
+                "supports its lip - only: give the points of the crack in the reverse order (the "
+                "supported lip is then lip +), or move its mouth by a thousandth of a cell."
+            )
+
+
+def _traces(space: FunctionSpace, facets: Ints) -> tuple[Points, Ints, Ints, Floats]:
+    """Points on facets, and what acts there: function, number of the point, value."""
+    points, _ = facet_points(space, facets)
+    columns: list[Ints] = []
+    rows: list[Ints] = []
+    values: list[Floats] = []
+    for batch, _ in space.batches(np.unique(points.cell)):
+        number, row, _ = points.of_cells(batch.cells)
+        N, _ = space.tabulate(batch, row, points.bary[number], points.side[number], slopes=False)
+        functions = batch.functions[row]
+        acts = (functions >= 0) & (np.abs(N) > _TRACE)
+        columns.append(functions[acts])
+        rows.append(np.broadcast_to(number[:, None], functions.shape)[acts])
+        values.append(N[acts])
+    return points, np.concatenate(columns), np.concatenate(rows), np.concatenate(values)
+
+
+def _imposed_part(space: FunctionSpace, support: Support) -> list[tuple[int, Ints, Floats, int]]:
+    """Axis, functions, values and number of fitted values of an imposed displacement."""
+    where, what = support.where, support.kind
+    nodes = _set_nodes(space, where, what)
+    if not isinstance(where, str):
+        u = support.displacement_at(space.node_points[nodes])
+        return [(axis, nodes, u[:, axis], 0) for axis in _axes(u)]
+    _check_ends(space, where, facet_set(space.mesh, where, support.name), what)
+    fitted, coefficients = _fit(space, support)
+    plain = nodes[~np.isin(nodes, fitted[fitted < space.n_nodes])]
+    parts = [coefficients]
+    if len(plain):
+        parts.insert(0, support.displacement_at(space.node_points[plain]))
+    values = np.concatenate(parts)
+    functions = np.concatenate([plain, fitted])
+    return [(axis, functions, values[:, axis], len(fitted)) for axis in _axes(values)]
+
+
+def _axes(values: Floats) -> list[int]:
+    """Directions in which values are imposed, which are the same at all points."""
+    return [int(axis) for axis in np.nonzero(np.isfinite(values).any(axis=0))[0]]
+
+
+def _fit(space: FunctionSpace, support: Support) -> tuple[Ints, Floats]:
+    """Least-squares fit on the facets where enriched functions act, and at nodes on a crack.
+
+    Shifted functions vanish at nodes, not between them: fixing only the standard unknowns there
+    would leave the facet half free. At a node on a crack the value has two answers: the facets
+    beside it tell which one is meant.
+    """
+    empty = np.zeros(0, dtype=np.int64), np.zeros((0, space.dim))
+    facets = facet_set(space.mesh, support.where, support.name)
+    owner = space.mesh.facet_to_cell[space.mesh.facet_numbers(facets), 0]
+    on_lip = np.zeros(space.n_nodes, dtype=bool)
+    for cut, number in zip(space.cuts, space.heaviside, strict=True):
+        vertices = np.arange(space.mesh.n_points)
+        on_lip[vertices] |= (cut.level_set.phi == 0) & (number[vertices] >= 0)
+    facets = facets[(space.signature[owner] != 0) | on_lip[facets].any(axis=1)]
+    if not len(facets):
+        return empty
+    points, column, row, entry = _traces(space, facets)
+    special = (column >= space.n_nodes) | np.isin(column, np.nonzero(on_lip)[0])
+    if not special.any():
+        return empty
+    keep = np.isin(row, np.unique(row[special]))
+    unknowns, place = np.unique(column[keep], return_inverse=True)
+    row_ids, row_place = np.unique(row[keep], return_inverse=True)
+    A = np.zeros((len(row_ids), len(unknowns)))
+    A[row_place, place] = entry[keep]
+    x = position(space, points.cell, points.bary)[row_ids]
+    given = support.displacement_at(x)
+    target = np.nan_to_num(given)
+    # Each point counts alike: weighted by length, the data of a sliver would be cut off as noise.
+    # Enriched functions take what standard ones leave, or they would take part in every field
+    # where their traces are nearly those of polynomials.
+    standard = unknowns < space.n_nodes
+    solution = np.zeros((len(unknowns), space.dim))
+    solution[standard] = np.linalg.lstsq(A[:, standard], target, rcond=1e-11)[0]
+    scale = _scales(space)[unknowns]
+    correction = np.linalg.lstsq(A / scale, target - A @ solution, rcond=_LEAST[space.dim])[0]
+    free = np.isnan(given).any(axis=0)
+    return unknowns, np.where(free, np.nan, solution + correction / scale[:, None])
+
+
+def _scales(space: FunctionSpace) -> Floats:
+    """Size of each function: 1, but the root of the radius for those of a tip."""
+    scale = np.ones(space.n_functions)
+    for tip in space.tips:
+        first = tip.point_to_function[tip.point_to_function >= 0]
+        scale[first[:, None] + np.arange(tip.functions)] = np.sqrt(tip.radius)
+    return scale

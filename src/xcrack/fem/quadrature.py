@@ -85,7 +85,7 @@ def _towards_tips(
     space: FunctionSpace, cell: Ints, bary: Floats, share: Floats, fan: Bools
 ) -> tuple[Ints, Floats, Floats, _Fans]:
     """Bisect sub-cells until they are no larger than their distance to a tip."""
-    from xcrack.fem.kernels.bisect import bisect
+    from xcrack.mesh.kernels.splitting import bisect
 
     mesh = space.mesh
     tips = np.array([tip.x for tip in space.tips]).reshape(-1, mesh.dim)
@@ -195,7 +195,7 @@ def segment_points(
         Barycentric coordinates in the segment.
     weight : (q,) array, length
     """
-    from xcrack.mesh.kernels.segments import graded_points
+    from xcrack.mesh.kernels.splitting import graded_points
 
     tips = np.array([tip.x for tip in space.tips]).reshape(-1, space.dim)
     number, place, weight = graded_points(begin, end, tips, *gauss(n))

@@ -15,7 +15,7 @@ from xcrack.fem.function_space import FunctionSpace, function_space
 from xcrack.fem.joint_nodes import jump_nodes
 from xcrack.fem.joints_2d import Joint, joined_cuts
 from xcrack.fem.level_set import LevelSet, level_set
-from xcrack.fem.supports import ImposedValues, known_unknowns
+from xcrack.fem.loads import ImposedValues, known_unknowns
 from xcrack.mesh.mesh import Mesh
 from xcrack.model.numerics import Numerics
 from xcrack.model.problem import Problem

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from xcrack.analysis.alarms import Alarm, alarms_of_solutions, has_units, millimetre
+from xcrack.analysis.report import Alarm, alarms_of_solutions, has_units, millimetre
 from xcrack.analysis.solution import Solution
 from xcrack.base.arguments import arguments_of
 from xcrack.base.errors import XcrackError

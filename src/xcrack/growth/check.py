@@ -3,7 +3,7 @@
 from dataclasses import replace
 from typing import Unpack
 
-from xcrack.analysis.alarms import Alarm
+from xcrack.analysis.report import Alarm
 from xcrack.base.errors import collected_warnings
 from xcrack.fatigue.criteria import Criterion, max_hoop_stress
 from xcrack.fatigue.law import Law

@@ -7,8 +7,8 @@ import numpy as np
 from xcrack.base.arrays import Floats, Ints
 from xcrack.crack.advance_3d import advance_fronts
 from xcrack.crack.crack import Crack
-from xcrack.crack.fronts_3d import closed_fronts
 from xcrack.crack.measures import facet_names, front_ends, surface_size
+from xcrack.crack.stations import closed_fronts
 from xcrack.growth.cycles import elapsed_3d
 from xcrack.growth.step import Arriving, PerCrack, Step, memory_of, moved_places
 from xcrack.growth.trail import Places

@@ -10,9 +10,9 @@ from scipy.special import exprel
 from xcrack.base.arrays import Floats, at
 from xcrack.base.errors import GeometryError
 from xcrack.crack.crack import Crack
-from xcrack.crack.fronts_3d import closed_fronts
 from xcrack.crack.merging import OFFSET, FrontGap, gap_between, merged_crack, turned_crack
 from xcrack.crack.placing import place_crack
+from xcrack.crack.stations import closed_fronts
 from xcrack.fatigue.checks import law_exponent
 from xcrack.growth import euler, follow_3d, pec_3d
 from xcrack.growth.ending import part_of_time

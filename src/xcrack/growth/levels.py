@@ -11,9 +11,8 @@ from xcrack.base.arrays import Bools, Floats, Ints
 from xcrack.fatigue.criteria import clipped_K
 from xcrack.fatigue.spectrum import Spectrum, distinct
 from xcrack.growth.response import Response
-from xcrack.linalg.reuse import SolverState
-from xcrack.model.problem import Problem
-from xcrack.model.states import LoadLevel
+from xcrack.linalg.engine import SolverState
+from xcrack.model.problem import LoadLevel, Problem
 from xcrack.sif.sif import SIF
 
 _MOST = 33

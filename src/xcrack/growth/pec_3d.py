@@ -12,8 +12,8 @@ import numpy as np
 from xcrack.base.arrays import Bools, Floats
 from xcrack.base.errors import GeometryError, XcrackError
 from xcrack.crack.crack import Crack
-from xcrack.crack.fronts_3d import closed_fronts, front_frames
 from xcrack.crack.placing import place_crack
+from xcrack.crack.stations import closed_fronts, front_frames
 from xcrack.fatigue.checks import law_exponent
 from xcrack.fatigue.retardation import (
     POINTS,

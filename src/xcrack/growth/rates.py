@@ -24,7 +24,7 @@ from xcrack.growth.options import GrowthRule
 from xcrack.growth.response import Answers, Response, checked_response, respond
 from xcrack.growth.step import Cycle, PerCrack, Step, StepError
 from xcrack.growth.trail import FrontTrail, Trail
-from xcrack.linalg.reuse import SolverState
+from xcrack.linalg.engine import SolverState
 from xcrack.model.problem import Problem
 from xcrack.sif.sif import SIF
 

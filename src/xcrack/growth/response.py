@@ -16,9 +16,8 @@ from xcrack.analysis.solve import solve_states
 from xcrack.base.arrays import Floats, lock
 from xcrack.base.checks import entries, flag, numbers, value_text
 from xcrack.base.errors import ProblemError
-from xcrack.linalg.reuse import SolverState
-from xcrack.model.problem import Problem, check_problem
-from xcrack.model.states import LoadLevel
+from xcrack.linalg.engine import SolverState
+from xcrack.model.problem import LoadLevel, Problem, check_problem
 from xcrack.sif.sif import SIF
 from xcrack.sif.stress_intensity import stress_intensities
 

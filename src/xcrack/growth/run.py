@@ -39,7 +39,7 @@ from xcrack.growth.rates import (
 )
 from xcrack.growth.step import LEAST, Advance, Cycle, Joined, Memory, Step, memory_of
 from xcrack.growth.uncertainty import add_K_error, best_K, shortfall
-from xcrack.linalg.reuse import SolverState
+from xcrack.linalg.engine import SolverState
 from xcrack.mesh.mesh import Mesh
 from xcrack.model.problem import Problem
 

@@ -14,7 +14,7 @@ from xcrack.base.errors import ProblemError
 from xcrack.base.markup import element, join_parts, table
 from xcrack.crack.crack import Crack
 from xcrack.growth.trail import FrontTrail, Trail
-from xcrack.linalg.reuse import SolverState
+from xcrack.linalg.engine import SolverState
 from xcrack.model.loads import Load
 from xcrack.sif.sif import SIF
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from xcrack.analysis.alarms import Alarm
+from xcrack.analysis.report import Alarm
 from xcrack.analysis.solution import Solution
 from xcrack.base.arrays import Floats, coordinates
 from xcrack.crack.crack import Crack

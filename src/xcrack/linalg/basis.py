@@ -13,7 +13,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from xcrack.base.arrays import Bools, Floats, Ints, offsets, ranges
-from xcrack.base.threads import one_blas_thread
+from xcrack.base.machine import one_blas_thread
 from xcrack.fem.function_space import FunctionSpace
 from xcrack.mesh.mesh import Mesh
 
@@ -98,7 +98,7 @@ def restricted(blocks: Blocks, free: Bools) -> Blocks:
 
 def orthonormal_functions(K: sp.csr_matrix, blocks: Blocks) -> sp.csr_matrix:
     """The functions that replace the enriched unknowns of blocks, in the old basis `(n, k)`."""
-    from xcrack.linalg.kernels.blocks import orthonormal_columns
+    from xcrack.linalg.kernels.sparse import orthonormal_columns
 
     with one_blas_thread():
         indptr, indices, data, count = orthonormal_columns(
@@ -112,7 +112,7 @@ def orthonormal_functions(K: sp.csr_matrix, blocks: Blocks) -> sp.csr_matrix:
 
 def _by_shape(K: sp.csr_matrix, blocks: Blocks) -> list[tuple[Ints, Floats, int]]:
     """Dense blocks of K, grouped by size and number of standard unknowns."""
-    from xcrack.linalg.kernels.blocks import dense_blocks
+    from xcrack.linalg.kernels.sparse import dense_blocks
 
     size = np.diff(blocks.offsets)
     flat = dense_blocks(K.indptr, K.indices, K.data, blocks.members, blocks.offsets)

@@ -11,7 +11,7 @@ import scipy.sparse.linalg as sla
 from xcrack.base.arrays import Bools, Floats
 from xcrack.base.checks import call_function, numbers, value_text
 from xcrack.base.errors import ConvergenceError, ProblemError, warn
-from xcrack.base.threads import one_blas_thread
+from xcrack.base.machine import one_blas_thread
 from xcrack.fem.function_space import FunctionSpace
 from xcrack.linalg.active_set import active_set
 from xcrack.linalg.basis import (
@@ -21,10 +21,16 @@ from xcrack.linalg.basis import (
     patch_orthogonal,
     restricted,
 )
-from xcrack.linalg.engine import CondensedSystem, ContactRows, SolveCount, StateContact
+from xcrack.linalg.engine import (
+    CondensedSystem,
+    ContactRows,
+    SolveCount,
+    SolverState,
+    StateContact,
+    proportional_columns,
+)
 from xcrack.linalg.multifrontal import Factor, Tree, factorise, tree
-from xcrack.linalg.products import proportional_columns, times, times_transposed
-from xcrack.linalg.reuse import SolverState
+from xcrack.linalg.products import times, times_transposed
 from xcrack.model.material import Material
 from xcrack.model.numerics import Numerics
 

@@ -14,7 +14,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from xcrack.base.arrays import Bools, Floats, Ints, lock
-from xcrack.base.threads import map_tasks, one_blas_thread
+from xcrack.base.machine import map_tasks, one_blas_thread
 from xcrack.mesh.mesh import Mesh
 from xcrack.mesh.simplex import cell_nodes
 
@@ -57,7 +57,7 @@ def tree(mesh: Mesh, order: int) -> Tree:
     mesh : Mesh
     order : int
     """
-    from xcrack.linalg.kernels.symbolic import bisect_cells, node_parts, postorder
+    from xcrack.linalg.kernels.multifrontal import bisect_cells, node_parts, postorder
 
     centre = mesh.points[mesh.cells].mean(axis=1)
     depth = max(0, int(np.ceil(np.log2(len(mesh.cells) / _LEAF))))
@@ -199,7 +199,7 @@ def factorise(
     keep : bool
         Keep what the next factorisation may take over.
     """
-    from xcrack.linalg.kernels.symbolic import (
+    from xcrack.linalg.kernels.multifrontal import (
         arrange_parts,
         column_parts,
         places_of_updates,

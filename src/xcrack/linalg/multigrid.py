@@ -8,26 +8,318 @@ Quadratic functions are one more level on top: they contain the linear ones (p-m
 and Patera, 1987).
 """
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property, partial
 from typing import Any, cast
 
 import numpy as np
 import scipy.sparse as sp
 
 from xcrack.base.arrays import Bools, Floats, Ints, lock, offsets
+from xcrack.base.machine import stream_tasks
 from xcrack.base.optional import require_package
-from xcrack.base.threads import stream_tasks
 from xcrack.fem.assembly import Bulk, bulk, rigid_modes
+from xcrack.fem.function_space import FunctionSpace
 from xcrack.linalg.basis import stars
-from xcrack.linalg.cycle import SAFETY, GridLevel, VCycle, largest_eigenvalue, reciprocal
-from xcrack.linalg.row_blocks import BorderedFactor, RowBlocks, stored
-from xcrack.linalg.schwarz import Patches
+from xcrack.linalg.products import BorderedFactor, RowBlocks, in_fours, stored
 from xcrack.mesh.simplex import node_points
 
 _COARSEST = 300  # unknowns below which a dense inverse ends the hierarchy
 _OMEGA = 4 / 3  # damping of the step that smooths the prolongator
 _ROWS = 10_000  # of blocks, taken at once where a coarse matrix is made
 _NULL = 1e-11  # eigenvalues of the coarsest matrix below this share are rigid motions
+_LANCZOS = 12  # steps for the largest eigenvalue
+SAFETY = 1.1  # by which it is enlarged: Lanczos gives a lower bound
+_SHARE = 0.1  # of the spectrum's upper end from which Chebyshev smooths
+_START = 613_077  # seed of the vector that Lanczos starts from
+_RESOLVED = 1e-6  # of a block's largest eigenvalue: single precision resolves no more
+
+
+# Smoothing by small overlapping blocks where functions of neighbouring nodes nearly repeat.
+#
+# At order 2 the tip functions on linear hats nearly repeat the quadratic functions of the same
+# star, and Heaviside functions of the midpoints those of the points. A block holds the unknowns of
+# a point and of the midpoints of its edges: their functions all end inside the cells around the
+# point, as its tip functions do. The sum of the solutions of all blocks takes the place of the
+# inverse diagonal (additive Schwarz, on vertex stars after Schoeberl, Melenk, Pechstein and
+# Zaglmayr, 2008).
+
+
+@dataclass(frozen=True, eq=False)
+class Patches:
+    """Overlapping blocks of unknowns with their inverses, in single precision.
+
+    Attributes
+    ----------
+    members : array of uint32
+        Unknowns of the blocks, one block after the other.
+    start : (b + 1,) array of uint32
+        Where each block begins in `members`.
+    offset : (b,) array of uint64
+        Where its inverse begins.
+    inverse : array
+        Symmetric inverses, row by row.
+    alone : (n,) array
+        Inverse diagonal of unknowns outside all blocks, 0 for the others.
+    """
+
+    members: Any
+    start: Any
+    offset: Any
+    inverse: Any
+    alone: Any
+
+    def times(self, r: Any) -> Any:
+        """Sum of the solutions of all blocks, and of the unknowns outside, in single precision."""
+        from xcrack.linalg.kernels.sparse import add_solved
+
+        out = self.alone * r
+        add_solved(self.members, self.start, self.offset, self.inverse, r, out)
+        return out
+
+
+def star_patches(
+    space: FunctionSpace,
+    home: Ints,
+    n_standard: int,
+    diagonal: Floats,
+    entries: Callable[[Ints], sp.csr_matrix],
+) -> Patches:
+    """Blocks of the stars of all points at which an enriched function acts.
+
+    Parameters
+    ----------
+    space : FunctionSpace
+    home : (n,) array of int
+        Node at which each unknown of the matrix is at home, -1 for decoupled ones.
+    n_standard : int
+        Leading unknowns that are not enriched.
+    diagonal : (n,) array
+        Of the matrix.
+    entries : callable
+        Sorted unknowns (m,) -> their entries of the matrix (m, m).
+    """
+    members, start = _members(space, home, n_standard)
+    used, place = np.unique(members, return_inverse=True)
+    inverse, offset = _inverses(entries(used), place, start)
+    alone = (1 / diagonal).astype(np.float32)
+    alone[used] = 0
+    short = [each.astype(np.uint32) for each in (members, start)]
+    return Patches(*map(lock, (*short, offset, inverse, alone)))
+
+
+def _members(space: FunctionSpace, home: Ints, n_standard: int) -> tuple[Ints, Ints]:
+    """Unknowns of each star, one star after the other, and where each begins."""
+    n = space.mesh.n_points
+    enriched = np.unique(home[n_standard:])
+    ends = space.mesh.edges[enriched[enriched >= n] - n].ravel()
+    points = np.unique(np.concatenate([enriched[enriched < n], ends]))
+    nodes_with_home = np.nonzero(home >= 0)[0]
+    at = sp.csr_matrix(
+        (np.ones(len(nodes_with_home), np.int8), (home[nodes_with_home], nodes_with_home)),
+        shape=(space.n_nodes, len(home)),
+    )
+    patches = sp.csr_matrix(stars(space.mesh, space.order)[points] @ at)
+    patches.sort_indices()
+    return patches.indices.astype(np.int64), patches.indptr.astype(np.int64)
+
+
+def _inverses(A: sp.csr_matrix, members: Ints, start: Ints) -> tuple[Any, Any]:
+    """Inverses of diagonal blocks, row by row, and where each begins."""
+    from xcrack.linalg.kernels.sparse import dense_blocks
+
+    size = np.diff(start)
+    offset = offsets(size**2)
+    result = np.empty(offset[-1], np.float32)
+    flat = dense_blocks(A.indptr, A.indices, A.data, members, start)
+    for s in np.unique(size):
+        where = offset[:-1][size == s][:, None] + np.arange(s * s)
+        inverse = _stable_inverses(flat[where].reshape(-1, s, s))
+        result[where] = inverse.reshape(-1, s * s)
+    return result, offset[:-1].astype(np.uint64)
+
+
+def _stable_inverses(A: Floats) -> Floats:
+    """Inverses of positive matrices (b, s, s); eigenvalues that hardly count are lifted."""
+    root = 1 / np.sqrt(np.einsum("bii->bi", A))
+    scaled = root[:, :, None] * A * root[:, None, :]
+    try:
+        L = np.linalg.cholesky(scaled)
+        if np.einsum("bii->bi", L).min() ** 2 > _RESOLVED:
+            inverse = np.linalg.inv(L)
+            return np.asarray(
+                root[:, :, None] * (inverse.transpose(0, 2, 1) @ inverse) * root[:, None, :]
+            )
+    except np.linalg.LinAlgError:
+        pass
+    w, V = np.linalg.eigh(scaled)
+    V = root[:, :, None] * V
+    w = np.maximum(w, _RESOLVED * w[:, -1:])
+    return np.asarray((V / w[:, None, :]) @ V.transpose(0, 2, 1))
+
+
+# A V-cycle on given levels: an approximate inverse in single precision.
+
+
+@dataclass(frozen=True, eq=False)
+class GridLevel:
+    """One level of a cycle, in single precision.
+
+    Attributes
+    ----------
+    matrix : RowBlocks or BorderedFactor
+    inverse : (n,) array
+        Inverse diagonal, 0 where the diagonal is.
+    largest : float
+        Upper bound of the spectrum of D^-1 A.
+    prolong, restrict : RowBlocks
+        From and to the next level; their rows and columns are the leading unknowns of this one.
+    patches : Patches, optional
+        Smooth in the place of the inverse diagonal, which is then one.
+    """
+
+    matrix: RowBlocks | BorderedFactor
+    inverse: Any
+    largest: float
+    prolong: RowBlocks
+    restrict: RowBlocks
+    patches: Patches | None = None
+
+    def solved(self, r: Any) -> Any:
+        """What the smoother multiplies by the inverse diagonal."""
+        return r if self.patches is None else _by_column(self.patches.times, r)
+
+    @cached_property
+    def inverse_of_four(self) -> Any:
+        """The inverse diagonal for four vectors that stand side by side."""
+        return lock(np.repeat(self.inverse, 4))
+
+
+@dataclass(frozen=True, eq=False)
+class VCycle:
+    """A V-cycle with Chebyshev smoothing of degree 2: an approximate inverse, symmetric.
+
+    Attributes
+    ----------
+    levels : tuple of GridLevel
+        The finest first.
+    coarsest : (c, c) array
+        Pseudo-inverse of the last matrix.
+    """
+
+    levels: tuple[GridLevel, ...]
+    coarsest: Any
+
+    def __call__(self, r: Floats) -> Floats:
+        """Approximate A^-1 r."""
+        return self.of_all([r])[0]
+
+    def of_all(self, residuals: Sequence[Floats]) -> list[Floats]:
+        """Approximate A^-1 r of several vectors, four at a time."""
+        sizes = [float(np.abs(r).max(initial=0.0)) for r in residuals]
+        sizes = [size if np.isfinite(size) else 0.0 for size in sizes]
+        scaled = [
+            (r / size if size > 0 else np.zeros_like(r)).astype(np.float32)
+            for r, size in zip(residuals, sizes, strict=True)
+        ]
+        results = in_fours(partial(self._down, 0), scaled)
+        return [z.astype(np.float64) * size for z, size in zip(results, sizes, strict=True)]
+
+    def _down(self, number: int, b: Any) -> Any:
+        if number == len(self.levels):
+            return _by_column(self.coarsest.__matmul__, b)
+        level = self.levels[number]
+        x, r = np.zeros_like(b), b  # nobody needs b any more
+        d = _smooth(level, r, x)
+        level.matrix.added(r, -1, d)
+        n = level.prolong.shape[0]
+        coarse = self._down(number + 1, level.restrict.times(r[:n]))
+        correction = np.zeros_like(x)
+        level.prolong.added(correction[:n], 1, coarse)
+        x += correction
+        level.matrix.added(r, -1, correction)
+        _smooth(level, r, x)
+        return x
+
+
+def _by_column(function: Callable[[Any], Any], b: Any) -> Any:
+    """A function of a vector, or of each column alone: the same bits."""
+    if b.ndim == 1:
+        return function(b)
+    return np.stack([function(np.ascontiguousarray(column)) for column in b.T], axis=1)
+
+
+def _smooth(level: GridLevel, r: Any, x: Any) -> Any:
+    """Two Chebyshev steps; r is left one step behind x, by A times the result."""
+    from xcrack.linalg.kernels.cycle import first_step, next_step
+
+    high, low = level.largest, _SHARE * level.largest
+    middle, half = (high + low) / 2, (high - low) / 2
+    sigma = middle / half
+    rho = 1 / (2 * sigma - 1 / sigma)
+    single = np.float32
+    d = np.empty_like(x)
+    inverse = level.inverse if r.ndim == 1 else level.inverse_of_four
+    first_step(inverse, level.solved(r).ravel(), single(1 / middle), d.ravel(), x.ravel())
+    level.matrix.added(r, -1, d)
+    scale = single(2 * rho / half)
+    after = level.solved(r).ravel()
+    next_step(inverse, after, single(rho / sigma), scale, d.ravel(), x.ravel())
+    return d
+
+
+def largest_eigenvalue(
+    A: RowBlocks | BorderedFactor, diagonal: Floats, solved: Callable[[Any], Any] | None = None
+) -> float:
+    """Upper bound of the spectrum of B A, from a few steps of Lanczos.
+
+    They run in the inner product of the inverse of B, in which B A is symmetric.
+
+    Parameters
+    ----------
+    A : RowBlocks or BorderedFactor
+    diagonal : (n,) array
+    solved : callable, optional
+        B r of a residual r in single precision; without it B is the inverse diagonal.
+    """
+    inverse = reciprocal(diagonal)
+
+    def image(w: Floats) -> Floats:
+        z = inverse * w if solved is None else solved(w.astype(np.float32))
+        return np.asarray(z, dtype=float)
+
+    w = np.sqrt(np.maximum(diagonal, 0.0)) * np.random.default_rng(_START).standard_normal(
+        len(diagonal)
+    )
+    if A.idle is not None:
+        w[A.idle] = 0.0
+    z, before = image(w), np.zeros_like(w)
+    beta = float(np.sqrt(np.einsum("i,i", w, z)))
+    alphas: list[float] = []
+    betas: list[float] = []
+    for _ in range(_LANCZOS):
+        q, p = w / beta, z / beta
+        w = A.times(p.astype(A.dtype)) - beta * before
+        alphas.append(float(np.einsum("i,i", w, p)))
+        w -= alphas[-1] * q
+        z, before = image(w), q
+        beta = float(np.sqrt(max(np.einsum("i,i", w, z), 0.0)))
+        if beta <= 1e-6 * abs(alphas[-1]):
+            break
+        betas.append(beta)
+    n = len(alphas)
+    T = np.diag(alphas) + np.diag(betas[: n - 1], 1) + np.diag(betas[: n - 1], -1)
+    return SAFETY * float(np.linalg.eigvalsh(T)[-1])
+
+
+def reciprocal(diagonal: Floats) -> Floats:
+    """1 / diagonal, 0 where an aggregate was too small for all motions."""
+    alive = diagonal > 1e-12 * diagonal.max(initial=0.0)
+    return np.where(alive, 1 / np.where(alive, diagonal, 1.0), 0.0)
+
+
+# The levels.
 
 
 @dataclass(frozen=True, eq=False)

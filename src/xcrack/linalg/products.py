@@ -1,26 +1,33 @@
-"""Products of sparse matrices with vectors, those of scipy to the bit; proportional vectors."""
+"""Products of sparse matrices with vectors: those of scipy to the bit, and quicker ones.
+
+The multigrid cycle multiplies matrices in blocks of rows that share a pattern, with an enriched
+border.
+"""
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
 
-from xcrack.base.arrays import Floats, Ints
-from xcrack.base.threads import map_tasks, number_of_threads
+from xcrack.base.arrays import Floats, Ints, lock, offsets
+from xcrack.base.machine import map_tasks, number_of_threads
 from xcrack.fem.assembly import Stiffness
-from xcrack.linalg.kernels import sparse
-from xcrack.linalg.projected_cg import Operator, Request
 
-_LEAST = 100_000  # entries of a factor that a thread is worth
-_SAME = 1e-15  # share of the largest entry up to which vectors are multiples of each other
-_NEARLY = 1e-5  # share of a load beside the combinations of others, up to which those come first
+_LEAST_ENTRIES = 100_000  # of a factor that a thread is worth
+_LEAST = 300_000  # values of a part of a product: less takes no longer than to hand it over
+_TOGETHER = 3  # rows that the kernel of products takes at once
+_FOUR = 4  # vectors that the kernel of several takes: what a processor multiplies at once
 
 
 def times(A: sp.csr_matrix | Stiffness, x: Floats) -> Floats:
     """A x for columns `(m,)` or `(m, k)`."""
     if isinstance(A, Stiffness):
         return A @ x
+    from xcrack.linalg.kernels import sparse
+
     x = np.ascontiguousarray(x)
     result = sparse.times(A.indptr, A.indices, A.data, x.reshape(len(x), -1))
     return np.asarray(result.reshape(len(result), *x.shape[1:]))
@@ -28,6 +35,8 @@ def times(A: sp.csr_matrix | Stiffness, x: Floats) -> Floats:
 
 def times_transposed(A: sp.csr_matrix, x: Floats) -> Floats:
     """A^T x for columns `(n,)` or `(n, k)`."""
+    from xcrack.linalg.kernels import sparse
+
     x, n = np.ascontiguousarray(x), A.shape[1]
     result = sparse.times_transposed(A.indptr, A.indices, A.data, n, x.reshape(len(x), -1))
     return np.asarray(result.reshape(n, *x.shape[1:]))
@@ -35,7 +44,7 @@ def times_transposed(A: sp.csr_matrix, x: Floats) -> Floats:
 
 def product(A: sp.csr_matrix, B: sp.csr_matrix) -> sp.csr_matrix:
     """A B of sparse matrices, stretches of rows by threads: the same bits for any number."""
-    count = min(number_of_threads(), A.nnz // _LEAST)
+    count = min(number_of_threads(), A.nnz // _LEAST_ENTRIES)
     if count < 2:
         return sp.csr_matrix(A @ B)
     inner = np.searchsorted(A.indptr, np.linspace(0, A.nnz, count + 1)[1:-1])
@@ -56,48 +65,230 @@ def product(A: sp.csr_matrix, B: sp.csr_matrix) -> sp.csr_matrix:
     return sp.csr_matrix(sp.vstack(map_tasks(rows, list(itertools.pairwise(ends))), format="csr"))
 
 
-def proportional_columns(b: Floats, tolerance: float = _SAME) -> tuple[Ints, Floats]:
-    """First column that each of `(n, k)` is a multiple of, to round-off, and the factor `(k,)`.
+# Matrices in blocks of rows.
 
-    Load states are often one load, scaled. `tolerance` is the share of the largest entry by which
-    they may differ.
+
+def in_fours(function: Callable[[Any], Any], vectors: Sequence[Any]) -> list[Any]:
+    """Results for vectors of a function of a vector, or of four that stand side by side `(n, 4)`.
+
+    One that is left goes alone; where two or three are left the others are zero.
     """
-    first, scale = np.arange(b.shape[1]), np.ones(b.shape[1])
-    for k in range(1, len(first)):
-        for i in range(k):
-            at = int(np.abs(b[:, i]).argmax())
-            if first[i] != i or b[at, i] == 0:
-                continue
-            factor = b[at, k] / b[at, i]
-            difference = np.abs(b[:, k] - factor * b[:, i]).max()
-            if difference <= tolerance * np.abs(b[at, k]):
-                first[k], scale[k] = i, factor
-                break
-    return first, scale
+    results: list[Any] = []
+    for first in range(0, len(vectors), _FOUR):
+        some = vectors[first : first + _FOUR]
+        if len(some) == 1:
+            results.append(function(some[0]))
+            continue
+        columns = np.zeros((len(some[0]), _FOUR), some[0].dtype)
+        for k, vector in enumerate(some):
+            columns[:, k] = vector
+        columns = function(columns)
+        results += [np.ascontiguousarray(columns[:, k]) for k in range(len(some))]
+    return results
 
 
-def independent_columns(vectors: Sequence[Floats]) -> list[int]:
-    """Those that are no combination of others before them, nearly."""
-    chosen, directions = [], list[Floats]()
-    for k, vector in enumerate(vectors):
-        residual, size = vector.copy(), _norm(vector)
-        for q in directions * 2:  # twice: what is left of nearly parallel vectors is small
-            residual -= np.einsum("i,i", q, residual) * q
-        if not _norm(residual) <= _NEARLY * size:
-            chosen.append(k)
-            directions.append(residual / _norm(residual))
-    return chosen
+@dataclass(frozen=True, eq=False)
+class RowBlocks:
+    """Sparse matrix in blocks of rows that share one pattern.
+
+    Attributes
+    ----------
+    shape : (rows, columns)
+    first, start, offset : (b + 1,) arrays of uint32
+        First row, column list and values of each block.
+    columns : array of uint32
+    values : array, float32 or float64
+    idle : (k,) array of int, optional
+        Rows that count as zero whatever the values.
+    """
+
+    shape: tuple[int, int]
+    first: Any
+    start: Any
+    offset: Any
+    columns: Any
+    values: Any
+    idle: Ints | None = None
+
+    @property
+    def dtype(self) -> Any:
+        """Type of the values."""
+        return self.values.dtype
+
+    def times(self, x: Any) -> Any:
+        """A x, in the type of the values; see `added`."""
+        return self.added(np.zeros((self.shape[0], *x.shape[1:]), self.dtype), 1, x)
+
+    def added(self, y: Any, scale: float, x: Any) -> Any:
+        """Write y + scale A x over y, and return it, for a vector or four `(n, 4)`."""
+        if x.ndim == 1:
+            from xcrack.linalg.kernels.cycle import product as multiply
+        else:
+            from xcrack.linalg.kernels.cycle import product_of_four as multiply
+        number = self.dtype.type(scale)
+        unchanged = None if self.idle is None else y[self.idle]
+
+        def rows(stretch: slice) -> None:
+            multiply(
+                self.first[stretch], self.start[stretch], self.offset[stretch], self.columns,
+                self.values, x, y, number, y,
+            )  # fmt: skip
+
+        entries = len(self.values) * (1 if x.ndim == 1 else 2)
+        count = min(number_of_threads(), entries // _LEAST)
+        map_tasks(rows, self._stretches(count))
+        if unchanged is not None:
+            y[self.idle] = unchanged
+        return y
+
+    def _stretches(self, count: int) -> list[slice]:
+        """Blocks of rows in stretches with about as many values each."""
+        if count < 2:
+            return [slice(None)]
+        targets = np.arange(1, count) * (len(self.values) / count)
+        ends = [0, *np.searchsorted(self.offset, targets), len(self.first) - 1]
+        return [slice(a, b + 1) for a, b in itertools.pairwise(ends)]
+
+    def single(self) -> "RowBlocks":
+        """The same matrix in single precision; it shares the pattern."""
+        return replace(self, values=lock(self.values.astype(np.float32)))
 
 
-def _norm(vector: Floats) -> float:
-    return float(np.sqrt(np.einsum("i,i", vector, vector)))
+def row_blocks(parts: Sequence[sp.csr_matrix], first: Ints, dtype: Any = np.float64) -> RowBlocks:
+    """Store CSR matrices side by side in blocks of rows.
+
+    Parameters
+    ----------
+    parts : sequence of sparse matrices (n, m)
+        From the left to the right; they need not be joined before.
+    first : (b + 1,) array of int
+        First row of each block, and n at the end.
+    dtype : numpy type of the values
+    """
+    from xcrack.linalg.kernels.cycle import fill_blocks, pattern_sizes
+
+    first = np.asarray(first, dtype=np.int64)
+    entries = sum(A.nnz for A in parts)
+    count = max(1, min(number_of_threads(), entries // _LEAST))
+    ends = np.linspace(0, len(first) - 1, count + 1).astype(int).tolist()
+    spans = list(itertools.pairwise(ends))
+
+    def sizes_of(A: sp.csr_matrix) -> Ints:
+        def sizes_of_part(span: tuple[int, int]) -> Ints:
+            return np.asarray(
+                pattern_sizes(A.indptr, A.indices, first[span[0] : span[1] + 1], A.shape[1])
+            )
+
+        return np.concatenate(map_tasks(sizes_of_part, spans))
+
+    sizes = [sizes_of(A) for A in parts]
+    total_sizes = np.asarray(np.sum(sizes, axis=0, dtype=np.int64))
+    start, offset = offsets(total_sizes), offsets(total_sizes * np.diff(first))
+    columns, values = np.empty(start[-1], np.uint32), np.zeros(offset[-1], dtype)
+    filled_sizes, shift = np.zeros_like(total_sizes), 0
+    for A, sizes_of_part in zip(parts, sizes):
+        begin, size = start[:-1] + filled_sizes, np.stack([filled_sizes, total_sizes], axis=1)
+
+        def fill(
+            span: tuple[int, int],
+            A: sp.csr_matrix = A,
+            begin: Ints = begin,
+            size: Ints = size,
+            shift: int = shift,
+        ) -> None:
+            part = slice(*span)
+            fill_blocks(
+                A.indptr, A.indices, A.data, first[span[0] : span[1] + 1], begin[part],
+                size[part], offset[part], A.shape[1], shift, columns, values,
+            )  # fmt: skip
+
+        map_tasks(fill, spans)
+        filled_sizes, shift = filled_sizes + sizes_of_part, shift + A.shape[1]
+    short = [array.astype(np.uint32) for array in (first, start, offset)]
+    return RowBlocks((int(first[-1]), shift), *map(lock, (*short, columns, values)))
 
 
-def best_guesses(K: Operator, solved: Sequence[Floats], b: Sequence[Floats]) -> list[Floats]:
-    """Combinations of solutions with the least energy: exact for combinations of their loads."""
-    if not solved:
-        return [np.zeros_like(right_hand_side) for right_hand_side in b]
-    y = np.stack(solved, axis=1)
-    image = np.stack(K.answers(Request.TIMES, solved), axis=1)
-    inverse = np.linalg.pinv(y.T @ image, 1e-12, True)
-    return [y @ (inverse @ (y.T @ right_hand_side)) for right_hand_side in b]
+def stored(A: sp.bsr_matrix, dtype: Any = np.float32) -> RowBlocks:
+    """Store a matrix of blocks: a block of its rows is one of ours.
+
+    Blocks of three rows, or multiples of it, are taken as they are, without a matrix in between;
+    those of three share its memory where they are stored column by column in the type asked for.
+
+    Parameters
+    ----------
+    A : sparse matrix (n, m)
+        BSR.
+    dtype : numpy type of the values
+    """
+    rows, columns = A.blocksize
+    if rows % _TOGETHER:
+        return row_blocks([A.tocsr()], np.arange(0, A.shape[0] + 1, rows), dtype)
+    blocks, indices = A.data.transpose(0, 2, 1), A.indices
+    row = np.repeat(np.arange(len(A.indptr) - 1), np.diff(A.indptr))
+    if not A.has_sorted_indices:  # scipy's own sorting spoils blocks that are a transposed view
+        order = np.lexsort((indices, row))
+        blocks, indices = blocks[order], indices[order]
+    chunks = rows // _TOGETHER
+    if chunks == 1:
+        values = np.ascontiguousarray(blocks, dtype).ravel()
+    else:
+        values = np.empty(blocks.size, dtype)
+        stretch = values.reshape(-1, columns, _TOGETHER)
+        place = np.arange(len(row)) + (chunks - 1) * A.indptr[row].astype(np.int64)
+        for k in range(chunks):  # of a block's rows, which are stored one after the other
+            stretch[place] = blocks[:, :, k * _TOGETHER : (k + 1) * _TOGETHER]
+            place += np.diff(A.indptr)[row]
+    every = np.empty((len(indices), columns), np.uint32)
+    every[:] = indices[:, None] * np.int64(columns) + np.arange(columns)
+    first = np.arange(0, A.shape[0] + 1, rows, dtype=np.uint32)
+    start = (A.indptr * np.int64(columns)).astype(np.uint32)
+    offset = (A.indptr * np.int64(rows * columns)).astype(np.uint32)
+    return RowBlocks(A.shape, *map(lock, (first, start, offset, every.ravel(), values)))
+
+
+@dataclass(frozen=True, eq=False)
+class BorderedFactor:
+    """Matrix of standard and enriched unknowns; the standard block is that of every crack.
+
+    Attributes
+    ----------
+    standard : RowBlocks (n, n)
+    across : RowBlocks (n, e)
+    below : RowBlocks (e, n + e)
+    """
+
+    standard: RowBlocks
+    across: RowBlocks
+    below: RowBlocks
+
+    @property
+    def idle(self) -> Ints | None:
+        """Rows that count as zero."""
+        return self.standard.idle
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Numbers of rows and columns."""
+        n = self.below.shape[1]
+        return n, n
+
+    @property
+    def dtype(self) -> Any:
+        """Type of the values."""
+        return self.standard.dtype
+
+    def times(self, x: Any) -> Any:
+        """A x, in the type of the values; see `RowBlocks.added`."""
+        return self.added(np.zeros_like(x, self.dtype), 1, x)
+
+    def times_all(self, vectors: Sequence[Any]) -> list[Any]:
+        """A x of several vectors, four at a time."""
+        return in_fours(self.times, vectors)
+
+    def added(self, y: Any, scale: float, x: Any) -> Any:
+        """Write y + scale A x over y, and return it; see `RowBlocks.added`."""
+        n = self.standard.shape[0]
+        self.standard.added(y[:n], scale, x[:n])
+        self.across.added(y[:n], scale, x[n:])
+        self.below.added(y[n:], scale, x)
+        return y

@@ -20,7 +20,7 @@ import scipy.sparse.linalg as sla
 
 from xcrack.base.arrays import Bools, Floats
 from xcrack.base.errors import ConvergenceError
-from xcrack.base.threads import map_tasks
+from xcrack.base.machine import map_tasks
 
 # Iterations that run beside one another, so that one pass over a matrix serves them all.
 

@@ -7,9 +7,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from xcrack.base.arrays import Bools, Ints
-from xcrack.base.checks import whole_numbers
+from xcrack.base.checks import point_coordinates, whole_numbers
 from xcrack.base.errors import MeshError
-from xcrack.mesh.checks import coordinates
 from xcrack.mesh.mesh import Mesh, sound_mesh
 
 _MOST_CELLS = 1e8  # more do not fit into the memory of any machine that solves them
@@ -44,11 +43,11 @@ def box(lower: ArrayLike, upper: ArrayLike, n: int | tuple[int, ...]) -> Mesh:
     >>> box((0, 0), (2, 1), (4, 2))
     Mesh(15 points, 16 triangles, facet sets: left, right, bottom, top, boundary)
     """
-    low = coordinates(lower, "box: lower", (None,))
+    low = point_coordinates(lower, "box: lower", (None,))
     d = len(low)
     if d not in (2, 3):
         raise MeshError(f"box: lower {low.tolist()} needs two or three coordinates.")
-    high = coordinates(upper, "box: upper", (d,))
+    high = point_coordinates(upper, "box: upper", (d,))
     if not (high > low).all():
         raise MeshError(f"box: upper {high.tolist()} must exceed lower {low.tolist()}.")
     count = whole_numbers(n, "box: n", error=MeshError)

@@ -8,42 +8,18 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
-from xcrack.base.arrays import Floats, Ints, Shape, at, ranges, row_stretches
-from xcrack.base.checks import numbers, value_text, whole_numbers
-from xcrack.base.errors import MeshError, XcrackError
+from xcrack.base.arrays import Floats, Ints, at, ranges, row_stretches
+from xcrack.base.checks import numbers, point_coordinates, value_text, whole_numbers
+from xcrack.base.errors import MeshError
 from xcrack.mesh.polygon import distance_to_simplices
 
 _FLAT = 1e-12  # a cell whose volume is below this share of (longest edge)^d has no shape
-LARGEST = 1e90  # coordinate whose third power is still a number
 _SAME = 1e-6  # of a facet: points this close to each other, or to a facet, are on each other
 _INSIDE = 1e-3  # barycentric: a point this deep in a cell is in it, whatever the round-off
 # Names that programs make: `read_mesh` for groups without a name, gmsh for surfaces and volumes in
 # Abaqus files, Abaqus for faces and picked elements.
 _UNNAMED = re.compile(r"cells_\d+|(Physical)?(Surface|Volume)\d+|_.*")
 _AT_ONCE = 200_000  # pairs of points and cells looked at together
-
-
-def coordinates(
-    value: Any, what: str, shape: Shape, *, error: type[XcrackError] = MeshError
-) -> Floats:
-    """Check that a value is an array of finite coordinates, small enough to compute with.
-
-    Parameters
-    ----------
-    value, what, shape, error
-        As of `xcrack.base.checks.numbers`.
-
-    Returns
-    -------
-    array of float
-    """
-    x = numbers(value, what, shape, error=error)
-    if x.size and np.abs(x).max() > LARGEST:
-        raise error(
-            f"{what}: coordinates of up to {np.abs(x).max():.3g} are too large to compute with "
-            "their powers; take another unit of length."
-        )
-    return x
 
 
 def checked_cells(points: Any, cells: Any) -> tuple[Floats, Ints]:
@@ -84,7 +60,7 @@ def checked_cells(points: Any, cells: Any) -> tuple[Floats, Ints]:
             f"{x[np.argmax(is_infinite)].tolist()} ({int(is_infinite.sum())} such points): every "
             f"coordinate must be finite."
         )
-    coordinates(x, "points of the mesh", x.shape)
+    point_coordinates(x, "points of the mesh", x.shape)
     if c.min() < 0 or c.max() >= len(x):
         raise MeshError(
             f"cell {int(np.argmax(((c < 0) | (c >= len(x))).any(axis=1)))} names a point outside "
@@ -302,4 +278,4 @@ def unused_sets(cell_sets: Mapping[str, Ints], n_cells: int) -> list[str]:
     ]
 
 
-__all__ = ["LARGEST", "checked_cells", "checked_sets", "coordinates", "mesh_doubts", "unused_sets"]
+__all__ = ["checked_cells", "checked_sets", "mesh_doubts", "unused_sets"]

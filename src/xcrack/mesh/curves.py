@@ -6,9 +6,8 @@ from typing import Any
 import numpy as np
 
 from xcrack.base.arrays import Bools, Floats, Ints, at
-from xcrack.base.checks import call_function, numbers
+from xcrack.base.checks import LARGEST, call_function, numbers
 from xcrack.base.errors import MeshError, warn
-from xcrack.mesh.checks import LARGEST
 
 Curve = Callable[[Floats], Any]
 Curves = Mapping[str, Curve]

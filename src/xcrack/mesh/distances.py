@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from xcrack.base.arrays import Bools, Floats, Ints
-from xcrack.base.threads import map_tasks
+from xcrack.base.machine import map_tasks
 from xcrack.mesh.triangulation import face_normals, side_keys
 
 _AT_ONCE = 8192  # points of one task: the same for any number of threads

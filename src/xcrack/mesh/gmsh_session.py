@@ -10,10 +10,9 @@ from typing import Any
 import numpy as np
 
 from xcrack.base.arrays import Floats
-from xcrack.base.checks import number, value_text
+from xcrack.base.checks import LARGEST, number, point_coordinates, value_text
 from xcrack.base.errors import GeometryError, XcrackError
 from xcrack.base.optional import require_package
-from xcrack.mesh.checks import LARGEST, coordinates
 
 SYSTEM_LIBRARIES = (
     "apt-get install -y --no-install-recommends libglu1-mesa libgl1 libegl1 libgl1-mesa-dri "
@@ -213,7 +212,7 @@ def polylines(along: Any) -> list[Floats]:
     try:
         many = bool(np.ndim(along[0][0]))
         return [
-            coordinates(path, "along", (None, 2), error=GeometryError)
+            point_coordinates(path, "along", (None, 2), error=GeometryError)
             for path in (along if many else [along])
         ]
     except Exception as error:  # whatever an object's own methods raise

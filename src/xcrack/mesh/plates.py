@@ -8,9 +8,8 @@ from typing import Any
 import numpy as np
 
 from xcrack.base.arrays import Floats, Ints
-from xcrack.base.checks import number, value_text
+from xcrack.base.checks import number, point_coordinates, value_text
 from xcrack.base.errors import GeometryError, MeshError
-from xcrack.mesh.checks import coordinates
 from xcrack.mesh.gmsh_session import FINEST, graded_size, length_of, polylines, session
 from xcrack.mesh.mesh import Mesh, sound_mesh
 from xcrack.mesh.polygon import Arc
@@ -304,7 +303,7 @@ def _finish(
 
 
 def _pair(value: Any, what: str) -> Point:
-    x, y = coordinates(value, what, (2,), error=GeometryError).tolist()
+    x, y = point_coordinates(value, what, (2,), error=GeometryError).tolist()
     return x, y
 
 

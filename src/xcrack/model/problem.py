@@ -1,6 +1,6 @@
 """The scene: body, cracks, supports and loads, checked before anything is built."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -21,8 +21,50 @@ from xcrack.model.friction import checked_friction
 from xcrack.model.loads import Load
 from xcrack.model.material import Material
 from xcrack.model.numerics import Numerics
-from xcrack.model.states import LoadLevel, LoadState, scaled_state
 from xcrack.model.supports import Support
+
+
+@dataclass(frozen=True, eq=False)
+class LoadLevel:
+    """A state in which the loads of a problem are scaled, beside steady ones.
+
+    What supports impose is steady too.
+
+    Attributes
+    ----------
+    factor : float
+    steady : tuple of Load
+    """
+
+    factor: float
+    steady: tuple[Load, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class LoadState:
+    """Loads of a state, with the factor of each.
+
+    Attributes
+    ----------
+    loads : tuple of Load
+    factors : tuple of float
+        1 for a steady load.
+    factor : float
+        Of the displacements that supports impose.
+    """
+
+    loads: tuple[Load, ...]
+    factors: tuple[float, ...]
+    factor: float
+
+    def __iter__(self) -> Iterator[tuple[Load, float]]:
+        return zip(self.loads, self.factors, strict=True)
+
+
+def scaled_state(loads: tuple[Load, ...], factor: float) -> LoadState:
+    """The loads times a factor, steady ones as they are."""
+    return LoadState(loads, tuple(1.0 if load.is_steady else factor for load in loads), factor)
+
 
 _ORDER = 2  # of the standard functions
 _ORDER_OF_RUBBING = 1  # in 3D: order 2 takes 3 to 10 times as long there, K_II is no better
@@ -231,3 +273,6 @@ def crack_number(problem: Problem, crack: Any, what: str) -> int:
             f"{what}: crack {value_text(index)}: the problem has {n} crack(s), numbered from 0."
         )
     return index
+
+
+__all__ = ["LoadLevel", "LoadState", "scaled_state"]

@@ -18,7 +18,7 @@ from xcrack.fatigue.retardation import BlockCycles, CycleIntegration, OverloadZo
 from xcrack.growth.description import DEFAULTS
 from xcrack.growth.step import Arrival, Join, Memory, Step, StepError
 from xcrack.growth.trail import FrontTrail, Overloads, Places, StepControl, Trail
-from xcrack.linalg.reuse import SlipField, SolverState
+from xcrack.linalg.engine import SlipField, SolverState
 from xcrack.runs import lock
 from xcrack.runs.store import PART, load, save, write_whole
 from xcrack.sif.sif import SIF, KErrors, SurfaceEnd

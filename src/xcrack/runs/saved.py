@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from xcrack.analysis import plan
-from xcrack.analysis.contact_result import Contact
+from xcrack.analysis.contact import Contact
 from xcrack.analysis.plan import Ingredient, Report
 from xcrack.analysis.solution import Solution
 from xcrack.base.arguments import arguments_of, kinds_of
@@ -22,13 +22,12 @@ from xcrack.base.arrays import Floats, lock
 from xcrack.base.errors import ProblemError
 from xcrack.base.paths import path_of, system_errors
 from xcrack.fem.system import discretise
-from xcrack.linalg.reuse import SolverState
+from xcrack.linalg.engine import SolverState
 from xcrack.mesh.mesh import Mesh
 from xcrack.mesh.polygon import Arc
 from xcrack.model.material import Material
 from xcrack.model.numerics import Numerics
-from xcrack.model.problem import Problem
-from xcrack.model.states import LoadLevel, LoadState
+from xcrack.model.problem import LoadLevel, LoadState, Problem
 from xcrack.model.supports import Condition
 from xcrack.runs import run_folder, store
 from xcrack.runs.history import History

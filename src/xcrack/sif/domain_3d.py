@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 from xcrack.analysis.solution import Solution, gradients_at
 from xcrack.base.arrays import Bools, Floats, Ints, at, lock
 from xcrack.base.errors import warn
-from xcrack.base.threads import stream_tasks
+from xcrack.base.machine import stream_tasks
 from xcrack.crack.front_curve import FootPoints, FrontCurve, front_curve
 from xcrack.crack.stations import part_inside
 from xcrack.fem.loads import position

@@ -10,7 +10,7 @@ from xcrack.analysis.solution import Solution
 from xcrack.analysis.solve import solve_states
 from xcrack.base.arrays import Floats, at
 from xcrack.base.errors import GeometryError, ProblemError
-from xcrack.base.threads import threads
+from xcrack.base.machine import threads
 from xcrack.crack.crack import kink_numbers
 from xcrack.estimate.estimate import Estimate, estimate
 from xcrack.estimate.shape import crack_shape, rim_shape

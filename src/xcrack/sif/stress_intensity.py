@@ -10,7 +10,7 @@ from xcrack.analysis.solution import Solution
 from xcrack.base.arrays import Floats
 from xcrack.base.checks import flag, value_text, whole_number
 from xcrack.base.errors import ProblemError
-from xcrack.base.threads import threads
+from xcrack.base.machine import threads
 from xcrack.model.material import Material
 from xcrack.sif.domain_2d import tip_intensities
 from xcrack.sif.domain_3d import front_intensity

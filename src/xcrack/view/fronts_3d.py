@@ -14,8 +14,8 @@ from numpy.typing import ArrayLike
 from xcrack.base.arrays import Bools, Floats
 from xcrack.base.checks import entries, value_text, whole_number
 from xcrack.base.errors import ProblemError
-from xcrack.crack.fronts_3d import closed_fronts, is_closed
 from xcrack.crack.measures import front_ends
+from xcrack.crack.stations import closed_fronts, is_closed
 from xcrack.growth.step import Step, lineage
 from xcrack.mesh.locate import Body
 from xcrack.mesh.mesh import Mesh

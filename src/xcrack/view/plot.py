@@ -15,9 +15,8 @@ from xcrack.base.checks import flag, number, numbers, one_of, value_text
 from xcrack.base.errors import ProblemError, XcrackError
 from xcrack.base.optional import in_notebook, require_package
 from xcrack.fem.system import discretise
-from xcrack.linalg.reuse import SolverState
-from xcrack.model.problem import Problem, crack_number
-from xcrack.model.states import scaled_state
+from xcrack.linalg.engine import SolverState
+from xcrack.model.problem import Problem, crack_number, scaled_state
 from xcrack.view.figures import checked_title, picture_path
 from xcrack.view.pyvista_2d import RASTER
 from xcrack.view.scene_2d import FIELDS, SPACE_FIELDS, scene

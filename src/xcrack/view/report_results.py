@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from xcrack.analysis.contact_result import Contact
+from xcrack.analysis.contact import Contact
 from xcrack.analysis.solution import Solution
 from xcrack.base.arrays import coordinates
 from xcrack.base.markup import Markup, element, join_parts, table

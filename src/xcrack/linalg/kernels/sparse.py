@@ -1,7 +1,8 @@
-"""Sparse matrices: products in the order of scipy's, and a stiffness in another basis."""
+"""Sparse matrices: their products, and dense blocks cut out, made orthonormal and solved."""
 
 import numpy as np
 
+from xcrack.base.kernels.blas import dgesv, dsyev
 from xcrack.base.kernels.jit import kernel
 
 
@@ -181,3 +182,193 @@ def bordered_matrix(indptr, indices, data, Z, across, down, corner_block, fixed,
             to += 1
         begin[i + 1] = to
     return (start, rows, values), (begin, column, value), energy
+
+
+@kernel
+def dense_blocks(indptr, indices, data, members, offsets):  # type: ignore[no-untyped-def]
+    """Gather K[block, block] for ragged blocks of unknowns.
+
+    Parameters
+    ----------
+    indptr, indices, data : CSR arrays of K
+    members : (k,) array of int
+        Unknowns of the blocks, one block after the other.
+    offsets : (b + 1,) array of int
+
+    Returns
+    -------
+    (sum of squares of the block sizes,) array
+        The blocks, row by row.
+    """
+    n_blocks = len(offsets) - 1
+    total = 0
+    for b in range(n_blocks):
+        total += (offsets[b + 1] - offsets[b]) ** 2
+    result = np.zeros(total)
+    place = np.full(len(indptr) - 1, -1, np.int64)
+    start = 0
+    for b in range(n_blocks):
+        first, last = offsets[b], offsets[b + 1]
+        size = last - first
+        for k in range(first, last):
+            place[members[k]] = k - first
+        for k in range(first, last):
+            row = members[k]
+            for j in range(indptr[row], indptr[row + 1]):
+                column = place[indices[j]]
+                if column >= 0:
+                    result[start + (k - first) * size + column] += data[j]
+        for k in range(first, last):
+            place[members[k]] = -1
+        start += size * size
+    return result
+
+
+@kernel
+def orthonormal_columns(  # type: ignore[no-untyped-def]
+    indptr, indices, data, members, offsets, n_standard, least
+):
+    """Columns that replace the enriched unknowns of blocks, orthonormal in the energy of K.
+
+    Of each block, the enriched unknowns are made orthogonal to its standard ones, scaled by the
+    diagonal, and turned into eigenvectors; those of small eigenvalues are dropped.
+
+    Parameters
+    ----------
+    indptr, indices, data : CSR arrays of K, (n, n)
+    members, offsets : arrays of int
+        As of `dense_blocks`; standard unknowns first.
+    n_standard : (b,) array of int
+    least : float
+        Share of the largest eigenvalue of a block up to which others are dropped.
+
+    Returns
+    -------
+    start, column, value : CSR arrays of the columns, (n, k)
+    count : int
+        k; -1 where a block cannot be factored.
+    """
+    n, blocks = len(indptr) - 1, len(offsets) - 1
+    widest, room = 0, 0
+    for b in range(blocks):
+        size = offsets[b + 1] - offsets[b]
+        if size > widest:
+            widest = size
+        room += size * (size - n_standard[b])
+    place = np.empty(n, np.int64)
+    for i in range(n):
+        place[i] = -1
+    k, Z = np.empty((widest, widest)), np.empty(room)
+    Q, C = np.empty(widest * widest), np.empty(widest * widest)
+    ss, w, D = np.empty(widest * widest), np.empty(widest), np.empty(widest)
+    work, pivots = np.empty(34 * widest + 1), np.empty(widest + 1, np.int32)
+    sizes, letters = np.empty(4, np.int32), np.empty(2, np.uint8)
+    sizes[2] = len(work)
+    letters[0], letters[1] = 86, 76  # V L
+    at = sizes.ctypes.data
+    start = np.zeros(n + 1, np.int32)
+    begin, failed = 0, False
+    for b in range(blocks):
+        first, last = offsets[b], offsets[b + 1]
+        size, s = last - first, n_standard[b]
+        e = size - s
+        if e == 0:
+            continue
+        for i in range(size):
+            place[members[first + i]] = i
+        for i in range(size):
+            row = members[first + i]
+            for j in range(size):
+                k[i, j] = 0.0
+            for j in range(indptr[row], indptr[row + 1]):
+                if place[indices[j]] >= 0:
+                    k[i, place[indices[j]]] += data[j]
+        for i in range(size):
+            place[members[first + i]] = -1
+        for j in range(e):
+            for i in range(s):
+                C[j * s + i] = k[i, s + j]
+        if s > 0:
+            for j in range(s):
+                for i in range(s):
+                    ss[j * s + i] = k[i, j]
+            sizes[0], sizes[1] = s, e
+            dgesv(
+                at, at + 4, ss.ctypes.data, at, pivots.ctypes.data, C.ctypes.data, at, at + 12
+            )  # fmt: skip
+            failed = failed or sizes[3] != 0
+        for j in range(e):
+            D[j] = 1 / np.sqrt(k[s + j, s + j]) if k[s + j, s + j] > 0 else 0.0
+        for j in range(e):
+            for i in range(e):
+                schur = k[s + i, s + j]
+                for m in range(s):
+                    schur -= k[m, s + i] * C[j * s + m]
+                Q[j * e + i] = D[i] * schur * D[j]
+        sizes[0] = e
+        dsyev(
+            letters.ctypes.data, letters.ctypes.data + 1, at, Q.ctypes.data, at, w.ctypes.data,
+            work.ctypes.data, at + 8, at + 12,
+        )  # fmt: skip
+        failed = failed or sizes[3] != 0
+        for j in range(e):
+            scale = 1 / np.sqrt(w[j]) if w[j] > least * w[e - 1] else 0.0
+            for i in range(e):
+                Z[begin + (s + i) * e + j] = D[i] * Q[j * e + i] * scale
+            for i in range(s):
+                total = 0.0
+                for m in range(e):
+                    total += C[m * s + i] * Z[begin + (s + m) * e + j]
+                Z[begin + i * e + j] = -total
+            for i in range(size):
+                start[members[first + i] + 1] += Z[begin + i * e + j] != 0
+        begin += size * e
+    for i in range(n):
+        place[i] = start[i]
+        start[i + 1] += start[i]
+    column, value = np.empty(start[n], np.int32), np.empty(start[n])
+    begin, count = 0, 0
+    for b in range(blocks):
+        first, size = offsets[b], offsets[b + 1] - offsets[b]
+        e = size - n_standard[b]
+        for j in range(e):
+            alive = False
+            for i in range(size):
+                entry = Z[begin + i * e + j]
+                if entry != 0:
+                    to = place[members[first + i]]
+                    column[to], value[to] = count, entry
+                    place[members[first + i]] += 1
+                    alive = True
+            count += alive
+        begin += size * e
+    # Addresses alone keep no array alive: numba frees it after its last use.
+    if failed or letters[0] + len(work) + len(pivots) + len(ss) + len(w) + len(Q) < 1:
+        count = -1
+    return start, column, value, count
+
+
+@kernel
+def add_solved(members, start, offset, inverse, r, out):  # type: ignore[no-untyped-def]
+    """Add the inverse of each block times its part of r.
+
+    Parameters
+    ----------
+    members, start, offset, inverse : as of `Patches`
+    r : (n,) array
+    out : (n,) array
+        Changed.
+    """
+    part = np.empty(len(out), out.dtype)  # no block holds more
+    for g in range(len(start) - 1):
+        first, size = start[g], start[g + 1] - start[g]
+        part_values = part[:size]
+        part_values[:] = 0
+        p = offset[g]
+        # Column by column: a sum of columns is vectorised, a scalar product is not.
+        for j in range(size):
+            value = r[members[first + j]]
+            part_values += value * inverse[p : p + size]
+            p += np.uint64(size)
+        for i in range(size):
+            out[members[first + i]] += part_values[i]

@@ -1,9 +1,13 @@
-"""Simplices cut by a linear function; see `xcrack.mesh.simplex`."""
+"""Simplices split: by a linear function, segments by cracks, and both towards tips."""
+
+import math
 
 import numpy as np
 
 from xcrack.base.kernels.jit import kernel
 
+_FOOT = 1e-9  # share of a segment within which a foot at its end is the end
+_ROUND_OFF = 1e-15  # of coordinates, as a share of the largest of them
 _SAME = 1e-9  # relative difference below which values or lengths are equal
 
 
@@ -230,3 +234,240 @@ def interface_simplices(phi, x):  # type: ignore[no-untyped-def]
                 parent[to] = e
                 to += not _is_degenerate(bary, to)
     return bary[:to], parent[:to]
+
+
+@kernel
+def graded_points(begin, end, tips, u, w):  # type: ignore[no-untyped-def]
+    """Gauss points on segments, graded towards a tip that is closer than their length.
+
+    A segment is split at the foot of the nearest tip, with r = u² from there; also where the foot
+    lies beyond an end.
+
+    Parameters
+    ----------
+    begin, end : (k, 2) arrays
+    tips : (t, 2) array
+    u, w : (n,) arrays
+        Gauss rule on [0, 1].
+
+    Returns
+    -------
+    segment : (q,) array of int
+    place : (q, 2) array
+        Barycentric coordinates in the segment.
+    weight : (q,) array
+        Summing to the length of each segment.
+    """
+    k, n = len(begin), len(u)
+    number = np.empty(2 * n * k, np.int64)
+    place, weight = np.empty((2 * n * k, 2)), np.empty(2 * n * k)
+    to = 0
+    for s in range(k):
+        x, y = end[s, 0] - begin[s, 0], end[s, 1] - begin[s, 1]
+        length = math.sqrt(x * x + y * y)
+        middle0, middle1 = (begin[s, 0] + end[s, 0]) / 2, (begin[s, 1] + end[s, 1]) / 2
+        nearest, least = -1, np.inf
+        for t in range(len(tips)):
+            a, b = middle0 - tips[t, 0], middle1 - tips[t, 1]
+            distance = math.sqrt(a * a + b * b)
+            if distance < least:
+                nearest, least = t, distance
+        is_near, foot = False, 0.0
+        if nearest >= 0:
+            a, b = tips[nearest, 0] - begin[s, 0], tips[nearest, 1] - begin[s, 1]
+            square = x * x + y * y
+            foot = (a * x + b * y) / square if square > 1e-300 else 0.0
+            # A part as long as the round-off of coordinates would have points on the tip itself.
+            largest = max(
+                abs(begin[s, 0]), abs(begin[s, 1]), abs(end[s, 0]), abs(end[s, 1]),
+                abs(tips[nearest, 0]), abs(tips[nearest, 1]),
+            )  # fmt: skip
+            close_share = max(_FOOT, min(0.5, _ROUND_OFF * largest / max(length, 1e-300)))
+            if abs(foot) < close_share:
+                foot = 0.0
+            elif abs(foot - 1) < close_share:
+                foot = 1.0
+            closest = min(max(foot, 0.0), 1.0)
+            a = begin[s, 0] + closest * x - tips[nearest, 0]
+            b = begin[s, 1] + closest * y - tips[nearest, 1]
+            is_near = math.sqrt(a * a + b * b) < length
+        for part in range(2):
+            sign = 1.0 if part == 1 else -1.0
+            # From the foot to the near end of this part and to the far one, in this direction.
+            first, last = sign * (1 - part - foot), sign * (part - foot)
+            if (is_near and last <= 0) or (not is_near and part == 1):
+                continue
+            low, high = math.sqrt(max(first, 0.0)), math.sqrt(max(last, 0.0))
+            for i in range(n):
+                p, share = u[i], w[i]
+                if is_near:
+                    v = low + (high - low) * u[i]
+                    p, share = foot + sign * (v * v), (high - low) * (2 * v * w[i])
+                number[to], weight[to] = s, length * share
+                place[to, 0], place[to, 1] = 1 - p, p
+                to += 1
+    return number[:to], place[:to], weight[:to]
+
+
+@kernel
+def split_segments(ends, cut, level):  # type: ignore[no-untyped-def]
+    """Parts of edges of a mesh: first parts of all, then second ones, and so on.
+
+    Parameters
+    ----------
+    ends : (k, 2) array of int
+        Points of the edges.
+    cut : (c, k) array
+        Where each crack cuts the edge, counted from the smaller point number; nan: nowhere. Next
+        to a junction several cracks may cross one edge, three where two end on either side.
+    level : (c, k, 2) array
+        Level sets of the cracks at the ends.
+
+    Returns
+    -------
+    number : (s,) array of int
+    bary : (s, 2, 2) array
+        Vertices of the part in the edge.
+    side : (s, c) array of int
+        0 where phi changes its sign though no crack cuts.
+    """
+    cracks, k = cut.shape
+    at_cut, cuts = np.empty((k, cracks)), np.zeros(k, np.int64)
+    place = np.zeros(cracks + 2, np.int64)  # of the next part, by its rank on its edge
+    for e in range(k):
+        for c in range(cracks):
+            t = cut[c, e]
+            if np.isnan(t):
+                continue
+            if ends[e, 0] >= ends[e, 1]:
+                t = 1 - t
+            i = cuts[e]
+            while i > 0 and at_cut[e, i - 1] >= t:
+                i -= 1
+            if i < cuts[e] and at_cut[e, i] == t:
+                continue
+            for j in range(cuts[e], i, -1):
+                at_cut[e, j] = at_cut[e, j - 1]
+            at_cut[e, i] = t
+            cuts[e] += 1
+        for part in range(cuts[e] + 1):
+            place[part + 1] += 1
+    for part in range(cracks + 1):
+        place[part + 1] += place[part]
+    number = np.empty(place[cracks + 1], np.int64)
+    bary, side = np.empty((len(number), 2, 2)), np.empty((len(number), cracks), np.int64)
+    for e in range(k):
+        for part in range(cuts[e] + 1):
+            row = place[part]
+            place[part] += 1
+            begin = 0.0 if part == 0 else at_cut[e, part - 1]
+            end = 1.0 if part == cuts[e] else at_cut[e, part]
+            number[row] = e
+            bary[row, 0, 0], bary[row, 0, 1] = 1 - begin, begin
+            bary[row, 1, 0], bary[row, 1, 1] = 1 - end, end
+            middle = (begin + end) / 2
+            for c in range(cracks):
+                a, b = level[c, e, 0], level[c, e, 1]
+                at, t = (1 - middle) * a + middle * b, cut[c, e]
+                if a * b < 0:
+                    # The end on the same side of the cut, which at a kink is not where phi is zero.
+                    # Ahead of a tip phi changes its sign on an edge that no crack splits.
+                    t = 1 - t if ends[e, 0] >= ends[e, 1] else t
+                    at = 0.0 if np.isnan(t) else (a if middle < t else b)
+                side[row, c] = 0 if at == 0 else (1 if at > 0 else -1)
+    return number, bary, side
+
+
+@kernel
+def _distance(x, y, corner):  # type: ignore[no-untyped-def]
+    """Distance of a point to a triangle (3, 2), 0 inside."""
+    best = np.inf
+    low, high = np.inf, -np.inf
+    for i in range(3):
+        j = (i + 1) % 3
+        ax, ay = corner[j, 0] - corner[i, 0], corner[j, 1] - corner[i, 1]
+        bx, by = x - corner[i, 0], y - corner[i, 1]
+        square = max(ax * ax + ay * ay, 1e-300)
+        t = min(max((bx * ax + by * ay) / square, 0.0), 1.0)
+        best = min(best, math.hypot(bx - t * ax, by - t * ay))
+        turn = ax * by - ay * bx
+        low, high = min(low, turn), max(high, turn)
+    return 0.0 if low >= 0.0 or high <= 0.0 else best
+
+
+@kernel
+def bisect(x, tips, levels, fill, owner, bary, depth, near_tip):  # type: ignore[no-untyped-def]
+    """Quarter triangles until they are no larger than their distance to every tip.
+
+    Parameters
+    ----------
+    x : (s, 3, 2) array
+    tips : (t, 2) array
+    levels : int
+        Most bisections.
+    fill : bool
+        Whether the parts are written; else they are counted only.
+    owner : (n,) array of int
+    bary : (n, 3, 3) array
+        Vertices of each part in its triangle.
+    depth : (n,) array of int
+    near_tip : (n,) array of bool
+        Still too large after all bisections.
+
+    Returns
+    -------
+    int
+        Number of parts.
+    """
+    stack, deep = np.empty((3 * levels + 4, 3, 3)), np.empty(3 * levels + 4, np.int64)
+    triangle, middle, corner = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 2))
+    count = 0
+    for s in range(len(x)):
+        top = 1
+        deep[0] = 0
+        for i in range(3):
+            for b in range(3):
+                stack[0, i, b] = 1.0 if i == b else 0.0
+        while top > 0:
+            top -= 1
+            level = deep[top]
+            for i in range(3):
+                for b in range(3):
+                    triangle[i, b] = stack[top, i, b]
+                for k in range(2):
+                    corner[i, k] = 0.0
+                    for b in range(3):
+                        corner[i, k] += triangle[i, b] * x[s, b, k]
+            size = 0.0
+            for i in range(3):
+                j = (i + 1) % 3
+                edge = math.hypot(corner[j, 0] - corner[i, 0], corner[j, 1] - corner[i, 1])
+                size = max(size, edge)
+            is_close = False
+            for t in range(len(tips)):
+                if size > _distance(tips[t, 0], tips[t, 1], corner):
+                    is_close = True
+                    break
+            if not is_close or level == levels:
+                if fill:
+                    owner[count] = s
+                    for i in range(3):
+                        for b in range(3):
+                            bary[count, i, b] = triangle[i, b]
+                    depth[count] = level
+                    near_tip[count] = is_close
+                count += 1
+                continue
+            for i in range(3):
+                for b in range(3):
+                    middle[i, b] = (triangle[i, b] + triangle[(i + 1) % 3, b]) / 2
+            for i in range(3):
+                for b in range(3):
+                    stack[top, i, b] = middle[i, b]
+                    stack[top + 1 + i, 0, b] = triangle[i, b]
+                    stack[top + 1 + i, 1, b] = middle[i, b]
+                    stack[top + 1 + i, 2, b] = middle[(i + 2) % 3, b]
+            for i in range(4):
+                deep[top + i] = level + 1
+            top += 4
+    return count

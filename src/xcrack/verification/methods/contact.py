@@ -28,8 +28,7 @@ from xcrack.fem.system import System
 from xcrack.linalg.direct import DirectSystem, Solve, superlu
 from xcrack.linalg.engine import StateContact
 from xcrack.model.numerics import ContactMethod
-from xcrack.model.problem import Problem
-from xcrack.model.states import LoadState
+from xcrack.model.problem import LoadState, Problem
 from xcrack.verification.methods.face_stress import (
     averaging,
     steady_stress,

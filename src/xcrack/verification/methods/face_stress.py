@@ -12,7 +12,7 @@ from xcrack.fem.facets import LipPoints
 from xcrack.fem.function_space import FunctionSpace
 from xcrack.fem.quadrature import lip_side
 from xcrack.model.material import Material
-from xcrack.model.states import LoadState
+from xcrack.model.problem import LoadState
 
 
 def stress_matrix(

@@ -14,7 +14,7 @@ import pytest
 import threadpoolctl
 
 import xcrack as xc
-from xcrack.base import threads
+from xcrack.base import machine
 from xcrack.fem import assembly
 from xcrack.linalg import multifrontal, row_blocks
 from xcrack.mesh import distances
@@ -78,19 +78,19 @@ def test_threads_are_no_setting_of_a_run():
 def test_available(monkeypatch, tmp_path):
     monkeypatch.delenv("XCRACK_THREADS", raising=False)
     monkeypatch.setattr(os, "sched_getaffinity", lambda pid: set(range(40)), raising=False)
-    monkeypatch.setattr(threads, "_QUOTA", tmp_path / "cpu.max")
-    assert threads.available_processors() == 16
+    monkeypatch.setattr(machine, "_QUOTA", tmp_path / "cpu.max")
+    assert machine.available_processors() == 16
     for text, count in (("max 100000", 16), ("250000 100000", 3), ("50000 100000", 1), ("x", 16)):
         (tmp_path / "cpu.max").write_text(text + "\n")
-        assert threads.available_processors() == count
+        assert machine.available_processors() == count
     monkeypatch.setattr(os, "sched_getaffinity", lambda pid: {3}, raising=False)
-    assert threads.available_processors() == 1
+    assert machine.available_processors() == 1
     monkeypatch.setenv("XCRACK_THREADS", "24")
-    assert threads.available_processors() == 24
+    assert machine.available_processors() == 24
     for wrong in ("0", "-1", "two", "1.5", ""):
         monkeypatch.setenv("XCRACK_THREADS", wrong)
         with pytest.raises(xc.ProblemError, match=f"XCRACK_THREADS = '{wrong}' in the environment"):
-            threads.available_processors()
+            machine.available_processors()
 
 
 @pytest.mark.parametrize("wrong", [0, -1, 1.5, "two", True])
@@ -104,17 +104,17 @@ def test_each_keeps_the_order_and_its_errors():
         time.sleep(0.01 * (3 - k))
         return k
 
-    with threads.threads(3) as count:
-        assert count == threads.number_of_threads() == 3
-        assert threads.map_tasks(slow, range(4)) == [0, 1, 2, 3]
-        assert threads.map_tasks(lambda _: threads.number_of_threads(), [0]) == [
+    with machine.threads(3) as count:
+        assert count == machine.number_of_threads() == 3
+        assert machine.map_tasks(slow, range(4)) == [0, 1, 2, 3]
+        assert machine.map_tasks(lambda _: machine.number_of_threads(), [0]) == [
             1
         ]  # no pool in a pool
         with pytest.raises(ZeroDivisionError):
-            threads.map_tasks(lambda k: 1 / k, [1, 0])
-        with threads.threads(2):  # that of the outer block goes on
-            assert threads.number_of_threads() == 3
-    assert threads.number_of_threads() == 1
+            machine.map_tasks(lambda k: 1 / k, [1, 0])
+        with machine.threads(2):  # that of the outer block goes on
+            assert machine.number_of_threads() == 3
+    assert machine.number_of_threads() == 1
     assert not any(thread.name.startswith("xcrack") for thread in threading.enumerate())
 
 
@@ -132,7 +132,7 @@ def test_results_are_taken_while_others_are_made():
             running -= 1
         return k
 
-    assert list(threads.stream_tasks(slow, range(5))) == [0, 1, 2, 3, 4]
+    assert list(machine.stream_tasks(slow, range(5))) == [0, 1, 2, 3, 4]
     assert most == 1
     started = []
 
@@ -141,13 +141,13 @@ def test_results_are_taken_while_others_are_made():
             started.append(k)
             yield k
 
-    with threads.threads(3):
-        results = threads.stream_tasks(slow, tasks())
+    with machine.threads(3):
+        results = machine.stream_tasks(slow, tasks())
         assert next(results) == 0
         assert len(started) <= 5  # memory is bounded
         assert list(results) == list(range(1, 20))
         assert 1 < most <= 3
-        results = threads.stream_tasks(lambda k: 1 / k, [1, 2, 0, 4])
+        results = machine.stream_tasks(lambda k: 1 / k, [1, 2, 0, 4])
         assert [next(results), next(results)] == [1.0, 0.5]
         with pytest.raises(ZeroDivisionError):
             next(results)
@@ -174,7 +174,7 @@ def test_processes_started_after_a_solve(method):
     if method not in multiprocessing.get_all_start_methods():
         pytest.skip(f"no {method} on this system")
     if method == "spawn":
-        code = "from test_threads import bits, plane; print(hash(bits(plane(12), 2)))"
+        code = "from test_machine import bits, plane; print(hash(bits(plane(12), 2)))"
         folder = os.path.dirname(__file__)
         environment = {**os.environ, "PYTHONHASHSEED": "0", "PYTHONPATH": os.pathsep.join(
             [folder, *sys.path])}  # fmt: skip
@@ -203,7 +203,7 @@ def test_blas_is_restored_when_the_last_has_left():
     inside, leave = threading.Event(), threading.Event()
 
     def other():
-        with threads.one_blas_thread():
+        with machine.one_blas_thread():
             inside.set()
             leave.wait(10)
 
@@ -211,7 +211,7 @@ def test_blas_is_restored_when_the_last_has_left():
         thread = threading.Thread(target=other)
         thread.start()
         inside.wait(10)
-        with threads.one_blas_thread():
+        with machine.one_blas_thread():
             assert blas() == {1}
         assert blas() == {1}  # the other one is still inside
         leave.set()

@@ -1,4 +1,4 @@
-"""Threads: how many a process may use, and loops whose tasks run beside one another.
+"""What the machine gives: threads, loops whose tasks run beside one another, and memory.
 
 Kernels release Python's lock, so plain threads of Python run them side by side. A pool lives only
 as long as one solve: nothing is left that a fork could break, and several threads of the user may
@@ -25,6 +25,8 @@ Result = TypeVar("Result")
 
 _MOST = 16  # threads where nobody asked for more: products are bound by memory before
 _QUOTA = Path("/sys/fs/cgroup/cpu.max")
+_MEMORY = Path("/proc/meminfo")
+_FREE = "MemAvailable:"
 
 _pool: ContextVar[ThreadPoolExecutor | None] = ContextVar("xcrack threads", default=None)
 
@@ -178,4 +180,24 @@ def one_blas_thread() -> Iterator[None]:
         blas.leave()
 
 
-__all__ = ["available_processors", "map_tasks", "number_of_threads", "one_blas_thread", "threads"]
+def free_memory() -> float | None:
+    """Bytes that a process may still take before the system swaps; None where it does not say so.
+
+    Linux says it. Others have no number that counts what caches would give back.
+    """
+    try:
+        lines = _MEMORY.read_text(encoding="ascii", errors="replace").splitlines()
+        row = next(line.split() for line in lines if line.startswith(_FREE))
+        return 1024.0 * int(row[1])
+    except (OSError, StopIteration, ValueError, IndexError):
+        return None
+
+
+__all__ = [
+    "available_processors",
+    "free_memory",
+    "map_tasks",
+    "number_of_threads",
+    "one_blas_thread",
+    "threads",
+]
