@@ -16,7 +16,7 @@ import threadpoolctl
 import xcrack as xc
 from xcrack.base import machine
 from xcrack.fem import assembly
-from xcrack.linalg import multifrontal, row_blocks
+from xcrack.linalg import multifrontal, products
 from xcrack.mesh import distances
 from xcrack.sif import domain_3d
 
@@ -50,7 +50,7 @@ def bits(problem, count=None):
 @pytest.mark.parametrize("scene", [plane, solid])
 def test_the_same_bits_for_any_number(scene, monkeypatch):
     # Small matrices are shared too, and few cells and points make many tasks.
-    monkeypatch.setattr(row_blocks, "_LEAST", 1000)
+    monkeypatch.setattr(products, "_LEAST", 1000)
     monkeypatch.setattr(multifrontal, "_LEAST", 0)
     monkeypatch.setattr(assembly, "_CHUNK", 1500)
     monkeypatch.setattr(domain_3d, "_CHUNK", 150)
