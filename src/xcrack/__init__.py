@@ -13,6 +13,8 @@ _HOME = {
     "Mesh": "mesh.mesh",
     "box": "mesh.box",
     "read_mesh": "mesh.files",
+    "Deck": "model.deck",
+    "read_deck": "model.deck",
     "mesh_step": "mesh.step_file",
     "write_mesh": "mesh.files",
     "plate": "mesh.plates",

@@ -12,6 +12,7 @@ from fuzz.kinds import (
     Called,
     Filename,
     Flag,
+    ListOf,
     Number,
     Numbers,
     Of,
@@ -68,6 +69,57 @@ def _damaged(text):
         "points": text.replace("$Elements", "$Elementary"),
         "number": text.replace(" 3 2 ", " 3 -7 "),
     }
+
+
+DECK = """*NODE
+1, 0., 0.
+2, 1., 0.
+3, 0., 1.
+*ELEMENT, TYPE=CPS3, ELSET=E
+1, 1, 2, 3
+*SOLID SECTION, ELSET=E, MATERIAL=M
+1.
+*MATERIAL, NAME=M
+*ELASTIC
+100., 0.3
+*BOUNDARY
+1, 1, 2
+2, 2
+*STEP
+*STATIC
+*CLOAD
+3, 2, 5.
+*END STEP
+"""
+
+DAMAGED_DECKS = {
+    "no_deck": "no deck at all\n" * 20,
+    "half_deck": DECK[:60],
+    "no_node": DECK.replace("1, 2, 3", "1, 2, 9"),
+    "no_set": DECK.replace("ELSET=E,", "ELSET=F,"),
+    "no_number": DECK.replace("100., 0.3", "a, b"),
+    "no_elastic": DECK.replace("*ELASTIC\n100., 0.3\n", ""),
+    "tied": DECK + "*TIE, NAME=a\nb, c\n",
+    "clash": DECK.replace("2, 2\n", "1, 1, 1, .5\n"),
+    "no_force": DECK.replace("3, 2, 5.", "3, 9, 5."),
+}
+
+
+def _read_deck(path, **named):
+    for name, text in {"there": DECK, **DAMAGED_DECKS}.items():
+        Path(f"{name}.inp").write_text(text)
+    deck = xc.read_deck(path, **named)
+    return deck.problem() if deck.material is not None else deck
+
+
+def step_of_deck(value):
+    """Whether a value is the one step of the deck."""
+    if isinstance(value, str):
+        return value.casefold() == "step-1"
+    number = real(value)
+    if number is not None and not isinstance(value, int):
+        return None if number == 1 else False
+    return value is ... or number == 1
 
 
 DAMAGED = {name: lambda name=name: f"{name}.msh" for name in _damaged("")}
@@ -213,6 +265,23 @@ ENTRIES = [
                 words=["mesh file", "triangles", "cell"],
             ),
             "strict": arg(Flag(), False, True),
+        },
+        in_folder=True,
+    ),
+    Entry(
+        "read_deck",
+        _read_deck,
+        {
+            "path": arg(
+                Filename(known=("there.inp",)),
+                "there.inp",
+                near=paths(".inp", ".inp")
+                | {name: lambda name=name: f"{name}.inp" for name in DAMAGED_DECKS},
+                words=["deck", "line"],
+            ),
+            "step": arg(Seen(rule=step_of_deck), None, 1, "Step-1", words=["step"]),
+            "time": arg(Number(optional=True, least=0), None, 0.5),
+            "ignore": arg(ListOf(item=Word()), (), ["TIE"], words=["ignore"]),
         },
         in_folder=True,
     ),

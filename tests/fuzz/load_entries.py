@@ -29,7 +29,14 @@ def where(value, words=SETS):
     if isinstance(value, str):
         return value in words
     x = array(value)
-    return None if x is not None and x.ndim == 1 and np.isfinite(x).all() else False
+    return None if x is not None and x.ndim in (1, 2) and np.isfinite(x).all() else False
+
+
+def several(value):
+    """Points in rows, which may suit the body and the other arguments or not."""
+    x = array(value)
+    is_row = x is not None and x.ndim == 2 and x.shape[1] in (2, 3) and np.isfinite(x).all()
+    return None if is_row and len(x) else False
 
 
 def any_where(value):
@@ -108,7 +115,10 @@ ENTRIES = [
     Entry(
         "point_force",
         xc.point_force,
-        {"x": arg(Numbers((2,)), (0, 1)), "f": arg(Numbers((2,)), (1.0, 0.0))},
+        {
+            "x": arg(Numbers((2,), also=(Seen(rule=several),)), (0, 1)),
+            "f": arg(Numbers((2,), also=(Seen(rule=several),)), (1.0, 0.0)),
+        },
     ),
     Entry(
         "line_force",
@@ -175,8 +185,16 @@ ENTRIES = [
             (
                 xc.point_force,
                 {
-                    "x": arg(Numbers((2,), least=-1, most=1), (0.0, 1.0), words=["point"]),
-                    "f": arg(Numbers((2,)), (1.0, 0.0), words=["point_force"]),
+                    "x": arg(
+                        Numbers((2,), least=-1, most=1, also=(Seen(rule=several),)),
+                        (0.0, 1.0),
+                        words=["point"],
+                    ),
+                    "f": arg(
+                        Numbers((2,), also=(Seen(rule=several),)),
+                        (1.0, 0.0),
+                        words=["point_force"],
+                    ),
                 },
             ),
             (xc.body_force, {"b": arg(IN_2D, (0, 1), words=["body_force"])}),

@@ -227,7 +227,7 @@ def test_formats_that_need_another_program_name_it(tmp_path: Path) -> None:
     for name, says in [
         ("a.unv", r"gmsh a\.unv -save -o a\.msh"),
         ("a.bdf", r"gmsh a\.bdf -save"),
-        ("a.cdb", "mapdl-archive"),
+        ("a.odb", "the input file"),
         ("a.step", r"mesh_step\(\"a\.step\""),
     ]:
         (tmp_path / name).write_text("nothing")

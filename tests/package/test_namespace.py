@@ -15,7 +15,7 @@ NAMES = [
     "line_force",
     "penny_crack", "elliptic_crack", "plane_crack", "surface_crack", "read_surface",
     "notched_cylinder", "plate", "plate_with_hole", "point_force", "pressure", "read_mesh",
-    "mesh_step", "read_field", "bearing", "resultant", "temperature",
+    "mesh_step", "read_field", "read_deck", "Deck", "bearing", "resultant", "temperature",
     "measures",
     "traction", "write_mesh",
     # solution

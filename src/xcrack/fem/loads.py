@@ -12,7 +12,7 @@ from xcrack.fem.assembly import MeshLoad
 from xcrack.fem.facets import LipPoints, jump_values, part_points, split_facets
 from xcrack.fem.function_space import FunctionSpace
 from xcrack.fem.quadrature import Points, at_joints, cell_points, cell_side
-from xcrack.mesh.mesh import facet_set, nearest_point, numbers_of
+from xcrack.mesh.mesh import facet_set, nearest_nodes, nearest_point, numbers_of
 from xcrack.mesh.simplex import facet_nodes
 from xcrack.model.loads import FacetPoints, Load
 from xcrack.model.material import Material
@@ -35,8 +35,7 @@ def load_vector(
         points, on_facets = outer_points(space, load)
         _add(f, space, points, load.traction(on_facets))
     if "point_force" in acts:
-        number, force = load.point_forces(space.mesh)
-        np.add.at(f, number, force)
+        _add_point_forces(f, space, *load.point_forces(space.mesh))
     if "volume" in acts:
         points = body_points(space)
         _add(f, space, points, load.volume(position(space, points.cell, points.bary)))
@@ -88,6 +87,33 @@ def _add(f: Floats, space: FunctionSpace, points: Points, density: Floats) -> No
         N, _ = space.tabulate(batch, row, points.bary[number], points.side[number], slopes=False)
         force = N[:, :, None] * (points.weight[number, None] * density[number])[:, None]
         _scatter(f, batch.functions[row], force)
+
+
+def _add_point_forces(f: Floats, space: FunctionSpace, number: Ints, force: Floats) -> None:
+    """Add forces at mesh points and in the middles of edges, numbered after all points."""
+    mesh = space.mesh
+    is_middle = number >= mesh.n_points
+    np.add.at(f, number[~is_middle], force[~is_middle])
+    if not is_middle.any():
+        return
+    edge, row = np.unique(number[is_middle] - mesh.n_points, return_inverse=True)
+    total = np.zeros((len(edge), space.dim))
+    np.add.at(total, row, force[is_middle])
+    place = np.full(len(mesh.edges), -1)
+    place[edge] = np.arange(len(edge))
+    owner, _ = np.nonzero(place[mesh.cell_to_edge] >= 0)
+    cell = np.full(len(edge), -1)
+    for column in place[mesh.cell_to_edge[owner]].T:
+        cell[column[column >= 0]] = owner[column >= 0]
+    is_end = (mesh.cells[cell][:, :, None] == mesh.edges[edge][:, None, :]).any(axis=2)
+    side = cell_side(space, cell)
+    for c, cut in enumerate(space.cuts):
+        phi = cut.level_set.phi[mesh.edges[edge]].mean(axis=1)
+        crossed = cut.is_cut[cell] | (cut.is_tip[cell] & (side[:, c] == 0))
+        side[crossed, c] = np.where(phi[crossed] >= 0, 1, -1)
+    order = np.argsort(cell, kind="stable")
+    points = Points(cell[order], 0.5 * is_end[order], np.ones(len(edge)), side[order])
+    _add(f, space, points, total[order])
 
 
 def _scatter(f: Floats, functions: Ints, force: Floats) -> None:
@@ -275,7 +301,15 @@ def _set_nodes(space: FunctionSpace, where: object, what: str) -> Ints:
     if isinstance(where, str):
         facets = facet_set(space.mesh, where, what)
         return np.unique(facet_nodes(space.mesh, space.order, facets))
-    return np.array([nearest_point(space.mesh, np.asarray(where), what)])
+    x = np.asarray(where)
+    if x.ndim == 1:
+        return np.array([nearest_point(space.mesh, x, what)])
+    number = nearest_nodes(space.mesh, x, what)
+    if space.order == 1:  # the ends of an edge hold its middle
+        is_middle = number >= space.mesh.n_points
+        ends = space.mesh.edges[number[is_middle] - space.mesh.n_points]
+        number = np.concatenate([number[~is_middle], ends.ravel()])
+    return np.unique(number)
 
 
 def _functions_of(space: FunctionSpace, where: object, what: str) -> Ints:
@@ -294,7 +328,8 @@ def _functions_of(space: FunctionSpace, where: object, what: str) -> Ints:
             parts.append(_traces(space, facets)[1])
     else:
         for cut, number in zip(space.cuts, space.heaviside, strict=True):
-            on_lip = nodes[cut.level_set.phi[nodes] == 0]
+            vertices = nodes[nodes < space.mesh.n_points]
+            on_lip = vertices[cut.level_set.phi[vertices] == 0]
             parts.append(number[on_lip][number[on_lip] >= 0])
     return np.unique(np.concatenate(parts))
 

@@ -1,7 +1,13 @@
-"""Abaqus input files: meshio's reader has no plane strain elements and no surfaces."""
+"""Abaqus and CalculiX decks: nodes, elements, sets and surfaces of parts and their instances.
+
+meshio's reader has no plane strain elements, no surfaces and one part only.
+"""
 
 import re
-from collections.abc import Iterable, Iterator
+import warnings
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from math import radians
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +15,8 @@ import numpy as np
 from xcrack.base.arrays import Floats, Ints
 from xcrack.base.checks import value_text
 from xcrack.base.errors import MeshError
-from xcrack.mesh.linear import base_kind
+from xcrack.mesh.keywords import Keyword, KeywordUse, entries_of, keywords_of, numbers_of_text
+from xcrack.mesh.linear import SHAPES, base_kind
 from xcrack.mesh.mesh import Mesh
 from xcrack.mesh.raw import RawMesh, sets_to_write
 
@@ -20,12 +27,12 @@ _LINE_3 = r"(?:T2D3|T3D3|B22|B32|SAX2|DC1D3)"
 _PLANE_KIND = {"3": "triangle", "4": "quad", "6": "triangle6", "8": "quad8", "9": "quad9"}
 _SOLID_KIND = {
     "4": "tetra", "5": "pyramid", "6": "wedge", "8": "hexahedron", "10": "tetra10",
-    "15": "wedge15", "20": "hexahedron20",
+    "13": "pyramid13", "15": "wedge15", "20": "hexahedron20", "27": "hexahedron27",
 }  # fmt: skip
 _NODES = {
     "line": 2, "line3": 3, "triangle": 3, "quad": 4, "triangle6": 6, "quad8": 8, "quad9": 9,
-    "tetra": 4, "pyramid": 5, "wedge": 6, "hexahedron": 8, "tetra10": 10, "wedge15": 15,
-    "hexahedron20": 20,
+    "tetra": 4, "pyramid": 5, "wedge": 6, "hexahedron": 8, "tetra10": 10, "pyramid13": 13,
+    "wedge15": 15, "hexahedron20": 20, "hexahedron27": 27,
 }  # fmt: skip
 # Faces S1, S2, ... of an element, as local node numbers (Abaqus manual, element library).
 _FACES: dict[str, tuple[tuple[int, ...], ...]] = {
@@ -41,12 +48,277 @@ _FACES: dict[str, tuple[tuple[int, ...], ...]] = {
 _WRITTEN_TYPES = {2: ("T3D2", "CPS3"), 3: ("S3", "C3D4")}  # facets, cells
 _FACE_KIND = {2: "line", 3: "triangle", 4: "quad"}  # by corners
 _MOST_MEMBERS = 10_000_000  # that one line of GENERATE makes
-_DEEPEST = 100  # files that include each other
 
-Section = tuple[str, dict[str, str], list[list[str]]]
+# What a mesh is made of.
+MESH_KEYWORDS = {
+    "NODE": "nodes", "ELEMENT": "elements", "NSET": "node sets", "ELSET": "element sets",
+    "SURFACE": "surfaces", "PART": "parts", "END PART": "parts", "ASSEMBLY": "the assembly",
+    "END ASSEMBLY": "the assembly", "INSTANCE": "instances of parts", "END INSTANCE": "instances",
+}  # fmt: skip
+# What changes neither the mesh nor a solution in static equilibrium.
+OUTPUT_KEYWORDS = {
+    **dict.fromkeys(
+        ("HEADING", "PREPRINT", "COMMENT"), "words about the deck"
+    ),
+    **dict.fromkeys(
+        ("OUTPUT", "NODE OUTPUT", "ELEMENT OUTPUT", "CONTACT OUTPUT", "ENERGY OUTPUT",
+         "SURFACE OUTPUT", "SECTION PRINT", "MODAL OUTPUT", "INCREMENTATION OUTPUT", "FILE FORMAT",
+         "FILE OUTPUT", "NODE FILE", "NODE PRINT", "EL FILE", "EL PRINT", "ELEMENT FILE",
+         "ENERGY FILE", "ENERGY PRINT", "CONTACT FILE", "CONTACT PRINT", "MONITOR", "PRINT",
+         "RESTART", "SECTION FILE", "INTEGRATED OUTPUT", "INTEGRATED OUTPUT SECTION", "FILTER",
+         "USER OUTPUT VARIABLES"),
+        "what another program writes",
+    ),
+}  # fmt: skip
+# What makes nodes or elements out of others: without it the mesh would be another one.
+_MAKERS = ("NGEN", "NFILL", "NCOPY", "NMAP", "ELGEN", "ELCOPY", "SYSTEM", "SUBSTRUCTURE GENERATE",
+           "SUPER ELEMENT", "IMPORT", "ASSEMBLY COPY")  # fmt: skip
 
 
-def read_abaqus(path: Path) -> RawMesh:
+@dataclass(frozen=True, eq=False)
+class NamedSet:
+    """A set of nodes, elements or faces.
+
+    Attributes
+    ----------
+    name : str
+        As a user calls it.
+    members : (k,) array of int
+        Nodes (rows of the points) or elements; of a surface its elements.
+    faces : (k,) array of int, optional
+        Of a surface: number of the face of each element, from 0.
+    """
+
+    name: str
+    members: Ints
+    faces: Ints | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class ElementGroup:
+    """Elements of one keyword.
+
+    Attributes
+    ----------
+    type : str
+        Such as ``"C3D10"``.
+    kind : str
+        meshio's name; the type again where no body is made of it.
+    first : int
+        Number of its first element in the deck.
+    nodes : (m, k) array of int
+        Rows of the points; (m, 0) where no body is made of it.
+    place : str
+    """
+
+    type: str
+    kind: str
+    first: int
+    nodes: Ints
+    place: str
+
+
+@dataclass(frozen=True, eq=False)
+class DeckLine:
+    """A keyword with where it stands: in which instance ("" is the assembly), in which step."""
+
+    keyword: Keyword
+    instance: str
+    step: int | None
+
+
+@dataclass(frozen=True, eq=False)
+class AbaqusModel:
+    """A deck with its parts put together.
+
+    Attributes
+    ----------
+    path : Path
+    lines : tuple of DeckLine
+        All keywords in their order, those of a part once for each of its instances.
+    points : (n, 3) array, length
+    nodes : dict of (instance, number) to int
+        Row of each node among the points.
+    elements : dict of (instance, number) to int
+        Number of each element in the deck.
+    groups : tuple of ElementGroup
+    node_sets, element_sets, surfaces : dict of (instance, name in lower case) to NamedSet
+    instances : tuple of str
+    unused_parts : tuple of str
+        Parts without an instance.
+    """
+
+    path: Path
+    lines: tuple[DeckLine, ...]
+    points: Floats
+    nodes: dict[tuple[str, int], int]
+    elements: dict[tuple[str, int], int]
+    groups: tuple[ElementGroup, ...]
+    node_sets: dict[tuple[str, str], NamedSet]
+    element_sets: dict[tuple[str, str], NamedSet]
+    surfaces: dict[tuple[str, str], NamedSet]
+    instances: tuple[str, ...]
+    unused_parts: tuple[str, ...]
+
+    def nodes_of(self, entry: str, line: DeckLine, number: int | None = None) -> Ints:
+        """Rows of the nodes that an entry names: a number, a set, or either of an instance."""
+        return _members(entry, line, number, self.nodes, self.node_sets, "node", self.instances)
+
+    def elements_of(self, entry: str, line: DeckLine, number: int | None = None) -> Ints:
+        """Numbers of the elements that an entry names."""
+        return _members(
+            entry, line, number, self.elements, self.element_sets, "element", self.instances
+        )
+
+    def set_of(self, sets: str, name: str, instance: str) -> NamedSet | None:
+        """A set by its name as it is written in an instance; None where there is none."""
+        return _find(getattr(self, sets), name, instance, self.instances)
+
+    def rows_of(self, elements: Ints) -> Iterator[tuple[ElementGroup, Ints]]:
+        """Groups of elements and the rows of these among them."""
+        elements = np.unique(elements)
+        firsts = [group.first for group in self.groups]
+        group_of = np.searchsorted(firsts, elements, side="right") - 1
+        for number in np.unique(group_of):
+            group = self.groups[number]
+            yield group, elements[group_of == number] - group.first
+
+    @property
+    def dim(self) -> int:
+        """Dimension of the body: that of its highest elements."""
+        kinds = [base_kind(group.kind) for group in self.groups if len(group.nodes)]
+        return max((SHAPES[base].dim for base in kinds if base is not None), default=0)
+
+    def is_body(self, group: ElementGroup) -> bool:
+        """Whether elements are part of the body."""
+        base = base_kind(group.kind)
+        return base is not None and SHAPES[base].dim == self.dim and len(group.nodes) > 0
+
+    @property
+    def body_groups(self) -> list[ElementGroup]:
+        """Groups that the body is made of."""
+        return [group for group in self.groups if self.is_body(group)]
+
+    def facets_of(self, elements: Ints, faces: Ints) -> list[tuple[str, Ints]]:
+        """Faces of elements as rows of corners, by kind."""
+        result = []
+        for face in np.unique(faces):
+            for group, rows in self.rows_of(elements[faces == face]):
+                local = _FACES.get(base_kind(group.kind) or "", ())
+                if self.is_body(group) and face < len(local):
+                    corners = local[face]
+                    result.append((_FACE_KIND[len(corners)], group.nodes[rows][:, corners]))
+        return result
+
+    def edge_of_middle_node(self) -> dict[int, tuple[int, int]]:
+        """Corners at the ends of the edge in whose middle a node lies, by node."""
+        edges: dict[int, tuple[int, int]] = {}
+        for group in self.body_groups:
+            shape = SHAPES[base_kind(group.kind) or ""]
+            local = shape.edges
+            middles = group.nodes[:, shape.corners : shape.corners + len(local)]
+            for k in range(middles.shape[1]):
+                i, j = local[k]
+                edges.update(
+                    zip(middles[:, k].tolist(), group.nodes[:, (i, j)].tolist(), strict=True)
+                )
+        return edges
+
+    def raw_mesh(self, sets: Sequence[tuple[str, str, Ints]] = ()) -> RawMesh:
+        """Blocks and sets of a mesh; further sets of facets or elements may be given.
+
+        Parameters
+        ----------
+        sets : sequence of (kind, name, rows)
+            As of `RawMesh`.
+        """
+        has_body = bool(self.body_groups)
+        blocks = [
+            (g.kind, g.nodes if base_kind(g.kind) else np.zeros((len(g.nodes), 1), np.int64))
+            for g in self.groups
+            if base_kind(g.kind) or not has_body
+        ]
+        given: list[tuple[str, str, Ints]] = list(sets)
+        for key, one in self.element_sets.items():
+            name = self.shown_name(key, one)
+            given += [
+                (group.kind, name, group.nodes[rows])
+                for group, rows in self.rows_of(one.members)
+                if base_kind(group.kind)
+            ]
+        for key, one in self.surfaces.items():
+            name = self.shown_name(key, one)
+            faces = np.zeros(0, np.int64) if one.faces is None else one.faces
+            given += [(kind, name, rows) for kind, rows in self.facets_of(one.members, faces)]
+        point_sets = [
+            (self.shown_name(key, one), one.members) for key, one in self.node_sets.items()
+        ]
+        point_sets += [
+            (self.shown_name(key, one), one.members)
+            for key, one in self.surfaces.items()
+            if one.faces is None
+        ]
+        return RawMesh(self.points, blocks, given, point_sets)
+
+    def shown_name(self, key: tuple[str, str], one: NamedSet) -> str:
+        """Name of a set in the mesh: with its instance where there are several."""
+        instance, name = key
+        every = (self.node_sets, self.element_sets, self.surfaces)
+        if instance and (len(self.instances) > 1 or any(("", name) in sets for sets in every)):
+            return f"{instance}.{one.name}"
+        return one.name
+
+    def mesh_uses(self) -> list[KeywordUse]:
+        """What the mesh was made of, keyword by keyword."""
+        uses = []
+        for name, words in MESH_KEYWORDS.items():
+            lines = self.lines_of(name)
+            if name == "ELEMENT":
+                uses += self._element_uses()
+            elif lines:
+                uses.append(use_of(lines, True, words))
+        uses += [
+            KeywordUse("*PART without instance", 1, part, False, "it is no part of the body")
+            for part in self.unused_parts
+        ]
+        return uses
+
+    def lines_of(self, name: str) -> list[DeckLine]:
+        """Where a keyword comes, once for a part with several instances."""
+        first: dict[tuple[Path, int], DeckLine] = {}
+        for line in self.lines:
+            if line.keyword.name == name:
+                first.setdefault((line.keyword.path, line.keyword.line), line)
+        return list(first.values())
+
+    def _element_uses(self) -> list[KeywordUse]:
+        counts: dict[tuple[str, str, bool], tuple[int, str, int]] = {}
+        for group in self.groups:
+            key = (group.type, group.kind, self.is_body(group))
+            n, place, count = counts.get(key, (0, group.place, 0))
+            counts[key] = (n + len(group.nodes), place, count + 1)
+        uses = []
+        for (element, kind, is_body), (n, place, count) in counts.items():
+            base = base_kind(kind)
+            if is_body:
+                words = f"{n} cells of the body"
+            elif base is not None and SHAPES[base].dim == self.dim - 1:
+                words = f"{n} elements on the body: its sets become facet sets"
+            else:
+                words = f"{n} elements that are no part of the body"
+            is_used = is_body or (base is not None and SHAPES[base].dim == self.dim - 1)
+            uses.append(KeywordUse(f"*ELEMENT, TYPE={element}", count, place, is_used, words))
+        return uses
+
+
+def use_of(lines: Sequence[DeckLine], is_used: bool, reason: str) -> KeywordUse:
+    """A row of the table for all comings of a keyword."""
+    keyword = lines[0].keyword
+    is_harmless = not is_used and keyword.name in OUTPUT_KEYWORDS
+    return KeywordUse(f"*{keyword.name}", len(lines), keyword.place, is_used, reason, is_harmless)
+
+
+def read_abaqus(path: Path) -> tuple[RawMesh, list[KeywordUse]]:
     """Read nodes, elements, sets and element surfaces of an Abaqus input file.
 
     Parameters
@@ -58,45 +330,493 @@ def read_abaqus(path: Path) -> RawMesh:
     -------
     RawMesh
         Its contents. Sets keep the case of their first coming.
+    list of KeywordUse
+        What became of each of its keywords.
 
     Raises
     ------
     MeshError
-        Several parts, an element that names an unknown node, a line without numbers, a file that
-        includes itself.
+        An element that names an unknown node, a line without numbers, a file that includes itself,
+        with file and line.
     """
-    nodes: dict[int, list[float]] = {}
-    elements: dict[int, tuple[str, list[int]]] = {}
-    element_sets: dict[str, list[int]] = {}
-    point_sets: dict[str, list[int]] = {}
-    faces: dict[str, list[tuple[str, str]]] = {}
-    parts = 0
-    for keyword, options, rows in _sections(path):
-        try:
-            if keyword == "NODE":
-                nodes.update((int(r[0]), [float(v or 0) for v in r[1:4]]) for r in rows)
-            elif keyword == "ELEMENT":
-                kind = _kind(options.get("TYPE", ""))
-                new = {e[0]: (kind, e[1:]) for e in _elements(kind, rows)}
-                elements.update(new)
-                if "ELSET" in options:
-                    _collect(element_sets, options["ELSET"], new)
-            elif keyword == "ELSET":
-                _collect(element_sets, options["ELSET"], _members(options, rows, element_sets))
-            elif keyword == "NSET":
-                _collect(point_sets, options["NSET"], _members(options, rows, point_sets))
-            elif keyword == "SURFACE" and options.get("TYPE", "ELEMENT").upper() == "ELEMENT":
-                pairs = [(r[0], r[1].upper()) for r in rows if len(r) > 1]
-                faces.setdefault(options["NAME"], []).extend(pairs)
-            parts += keyword == "PART"
-        except (ValueError, KeyError, IndexError) as error:
-            raise MeshError(f"{path.name}: cannot read a *{keyword} section ({error}).") from error
-    if parts > 1:
-        raise MeshError(
-            f"{path.name} has {parts} parts, whose node numbers clash: merge them into one part "
-            "and write the input file anew."
+    model = read_model(path)
+    names = dict.fromkeys(line.keyword.name for line in model.lines)
+    others = [
+        use_of(model.lines_of(name), False, OUTPUT_KEYWORDS.get(name, "it is not of the mesh"))
+        for name in names
+        if name not in MESH_KEYWORDS
+    ]
+    return model.raw_mesh(), [*model.mesh_uses(), *others]
+
+
+def read_model(path: Path) -> AbaqusModel:
+    """Read a deck and put its parts together.
+
+    Raises
+    ------
+    MeshError
+        As of `read_abaqus`.
+    """
+    lines, instances, unused_parts = _assembled(keywords_of(path))
+    builder = _Builder(instances)
+    for line, place in lines:
+        builder.take(line, place)
+    groups = builder.groups()
+    node_sets, element_sets = builder.sets(groups)
+    points = np.array(builder.points, dtype=float).reshape(-1, 3)
+    surfaces = builder.surfaces(element_sets, node_sets, groups)
+    return AbaqusModel(
+        path, tuple(line for line, _ in lines), points, builder.nodes, builder.elements,
+        tuple(groups), node_sets, element_sets, surfaces, instances, unused_parts,
+    )  # fmt: skip
+
+
+Placing = Callable[[Floats], Floats] | None  # of points of an instance
+
+
+def _assembled(
+    keywords: Iterable[Keyword],
+) -> tuple[list[tuple[DeckLine, Placing]], tuple[str, ...], tuple[str, ...]]:
+    """Keywords, those of parts where their instances stand; instances; parts without one."""
+    parts: dict[str, tuple[Keyword, list[Keyword]]] = {}
+    lines: list[tuple[DeckLine, Placing]] = []
+    instances: dict[str, Keyword] = {}
+    part: list[Keyword] | None = None
+    instance, step, n_steps = "", None, 0
+    placed: set[str] = set()
+    for keyword in keywords:
+        name = keyword.name
+        if name == "PART":
+            title = keyword.option("NAME")
+            if title.casefold() in parts:
+                first = parts[title.casefold()][0].place
+                keyword.refuse(
+                    f"there is a part {title!r} already ({first}): give it another name."
+                )
+            part = []
+            parts[title.casefold()] = keyword, part
+        elif name == "END PART":
+            if part is not None:
+                part.append(keyword)
+            part = None
+        elif part is not None:
+            part.append(keyword)
+        elif name == "INSTANCE":
+            instance = keyword.option("NAME")
+            if instance.casefold() in map(str.casefold, instances):
+                keyword.refuse(f"there is an instance {instance!r} already: give it another name.")
+            instances[instance] = keyword
+            lines.append((DeckLine(keyword, "", None), None))
+            title = keyword.options.get("PART", "").casefold()
+            if title and title not in parts:
+                names = ", ".join(k.option("NAME") for k, _ in parts.values()) or "none"
+                keyword.refuse(
+                    f"the deck has no part {keyword.options['PART']!r} before this line; it has "
+                    f"{names}."
+                )
+            placing = _placing(keyword)
+            if title:
+                placed.add(title)
+                begin, content = parts[title]
+                lines.append((DeckLine(begin, instance, None), None))
+                lines += [(DeckLine(inner, instance, None), placing) for inner in content]
+        elif name == "END INSTANCE":
+            lines.append((DeckLine(keyword, "", None), None))
+            instance = ""
+        else:
+            if name == "STEP":
+                n_steps += 1
+                step = n_steps
+            lines.append((DeckLine(keyword, instance, step), None))
+            if name == "END STEP":
+                step = None
+    alone = [title for title in parts if title not in placed]
+    if not instances:  # a deck of parts without an assembly: each stands where it was made
+        within: list[tuple[DeckLine, Placing]] = []
+        for begin, content in parts.values():
+            title = begin.option("NAME") if len(parts) > 1 else ""
+            within += [(DeckLine(inner, title, None), None) for inner in (begin, *content)]
+        titles = [begin.option("NAME") for begin, _ in parts.values()]
+        return within + lines, tuple(titles) if len(parts) > 1 else (), ()
+    unused = tuple(parts[title][0].place for title in alone)
+    return lines, tuple(instances), unused
+
+
+def _placing(keyword: Keyword) -> Placing:
+    """How an instance is moved: a translation, then a turn about an axis."""
+    rows = [
+        [keyword.number(entry, line, "a coordinate", 0.0) for entry in entries]
+        for line, entries in keyword.rows
+    ][:2]
+    if not rows:
+        return None
+    shift = np.array([*rows[0], 0.0, 0.0, 0.0][:3])
+    if len(rows) < 2:
+        return lambda x: x + shift
+    if len(rows[1]) < 7:
+        keyword.refuse("a turn needs two points of its axis and an angle: seven numbers.")
+    begin, end = np.array(rows[1][:3]), np.array(rows[1][3:6])
+    axis = end - begin
+    if not np.any(axis):
+        keyword.refuse("the two points of the axis of its turn are one: give two.")
+    axis = axis / np.linalg.norm(axis)
+    angle = radians(rows[1][6])
+    cross = np.cross(np.eye(3), axis)
+    turn = np.eye(3) + np.sin(angle) * cross.T + (1 - np.cos(angle)) * cross @ cross
+    return lambda x: begin + (x + shift - begin) @ turn.T
+
+
+class _Builder:
+    """What the keywords of a mesh add up to, in their order."""
+
+    def __init__(self, instances: Sequence[str]) -> None:
+        self.instances = tuple(instances)
+        self.points: list[list[float]] = []
+        self.nodes: dict[tuple[str, int], int] = {}
+        self.elements: dict[tuple[str, int], int] = {}
+        self._groups: list[tuple[DeckLine, str, str, int, list[list[int]]]] = []
+        self._n_elements = 0
+        self._node_sets: list[tuple[DeckLine, str, list[int] | None]] = []
+        self._element_sets: list[tuple[DeckLine, str, list[int] | None]] = []
+        self._surfaces: list[DeckLine] = []
+
+    def take(self, line: DeckLine, placing: Placing) -> None:
+        keyword = line.keyword
+        name = keyword.name
+        if name in _MAKERS:
+            keyword.refuse(
+                "it makes nodes or elements out of others, which is not read: let Abaqus or "
+                "CalculiX write the deck with all of them (a flat input file)."
+            )
+        if name == "NODE":
+            self._take_nodes(line, placing)
+        elif name == "ELEMENT":
+            self._take_elements(line)
+        elif name == "NSET":
+            self._node_sets.append((line, keyword.option("NSET"), None))
+        elif name == "ELSET":
+            self._element_sets.append((line, keyword.option("ELSET"), None))
+        elif name == "SURFACE":
+            self._surfaces.append(line)
+
+    def _take_nodes(self, line: DeckLine, placing: Placing) -> None:
+        keyword = line.keyword
+        labels, x = _node_rows(keyword)
+        system = keyword.options.get("SYSTEM", "R").upper()
+        if system == "C":  # cylindrical: radius, angle in degrees, height
+            angle = np.radians(x[:, 1])
+            x = np.stack([x[:, 0] * np.cos(angle), x[:, 0] * np.sin(angle), x[:, 2]], axis=1)
+        elif system == "S":  # spherical: radius, longitude and latitude in degrees
+            along, up = np.radians(x[:, 1]), np.radians(x[:, 2])
+            flat = x[:, 0] * np.cos(up)
+            x = np.stack([flat * np.cos(along), flat * np.sin(along), x[:, 0] * np.sin(up)], axis=1)
+        elif system != "R":
+            keyword.refuse(f"SYSTEM={system}: R, C and S are known.")
+        if placing is not None:
+            x = placing(x)
+        members = []
+        for label, place in zip(labels, x.tolist(), strict=True):
+            row = self.nodes.setdefault((line.instance, label), len(self.points))
+            if row == len(self.points):
+                self.points.append(place)
+            else:
+                self.points[row] = place
+            members.append(row)
+        if "NSET" in keyword.options:
+            self._node_sets.append((line, keyword.option("NSET"), members))
+
+    def _take_elements(self, line: DeckLine) -> None:
+        keyword = line.keyword
+        element_type = keyword.option("TYPE").upper()
+        kind = _kind(element_type)
+        rows = _element_rows(keyword, kind)
+        first = self._n_elements
+        for n, row in enumerate(rows):
+            key = (line.instance, row[0])
+            if key in self.elements:
+                keyword.refuse(f"there is an element {row[0]} already: give each its own number.")
+            self.elements[key] = first + n
+        self._n_elements += len(rows)
+        self._groups.append((line, element_type, kind, first, [row[1:] for row in rows]))
+        if "ELSET" in keyword.options:
+            members = list(range(first, first + len(rows)))
+            self._element_sets.append((line, keyword.option("ELSET"), members))
+
+    def groups(self) -> list[ElementGroup]:
+        """Elements with the rows of their nodes.
+
+        Raises
+        ------
+        MeshError
+            An element that names a node which the deck lacks.
+        """
+        result = []
+        for line, element_type, kind, first, rows in self._groups:
+            nodes = np.zeros((len(rows), 0), dtype=np.int64)
+            if base_kind(kind) is not None:
+                try:
+                    nodes = np.array(
+                        [[self.nodes[line.instance, label] for label in row] for row in rows],
+                        dtype=np.int64,
+                    ).reshape(len(rows), _NODES[kind])
+                except KeyError as error:
+                    label = error.args[0][1]
+                    line.keyword.refuse(
+                        f"element {self._owner_of(label, rows, first)} names node {label}, "
+                        "which the deck lacks: give the whole deck, with the files that it "
+                        "includes."
+                    )
+            result.append(ElementGroup(element_type, kind, first, nodes, line.keyword.place))
+        return result
+
+    def _owner_of(self, label: int, rows: list[list[int]], first: int) -> int:
+        """Number of the first of some elements that names a node."""
+        n = first + next(k for k, row in enumerate(rows) if label in row)
+        return next(key[1] for key, number in self.elements.items() if number == n)
+
+    def sets(
+        self, groups: Sequence[ElementGroup]
+    ) -> tuple[dict[tuple[str, str], NamedSet], dict[tuple[str, str], NamedSet]]:
+        """Node sets and element sets."""
+        elements = _SetTable("element", self.elements, self.instances)
+        for line, name, members in self._element_sets:
+            elements.add(line, name, members)
+        nodes = _SetTable("node", self.nodes, self.instances)
+        for line, name, members in self._node_sets:
+            if members is None and "ELSET" in line.keyword.options:
+                chosen = elements.members(line.keyword.options["ELSET"], line, None)
+                rows = [g.nodes[chosen[(chosen >= g.first) & (chosen < g.first + len(g.nodes))]
+                                - g.first].ravel() for g in groups]  # fmt: skip
+                members = np.unique(np.concatenate([np.zeros(0, np.int64), *rows])).tolist()
+            nodes.add(line, name, members)
+        return nodes.named, elements.named
+
+    def surfaces(
+        self,
+        element_sets: dict[tuple[str, str], NamedSet],
+        node_sets: dict[tuple[str, str], NamedSet],
+        groups: Sequence[ElementGroup],
+    ) -> dict[tuple[str, str], NamedSet]:
+        """Surfaces of element faces, and of nodes."""
+        result: dict[tuple[str, str], NamedSet] = {}
+        free: set[tuple[int, int]] | None = None
+        for line in self._surfaces:
+            keyword = line.keyword
+            name = keyword.option("NAME")
+            scope = line.instance
+            kind = keyword.options.get("TYPE", "ELEMENT").upper()
+            if kind == "NODE":
+                parts = [
+                    _members(
+                        entries[0], line, number, self.nodes, node_sets, "node", self.instances
+                    )
+                    for number, entries in keyword.rows
+                ]
+                members = np.unique(np.concatenate([np.zeros(0, np.int64), *parts]))
+                result[scope, name.casefold()] = NamedSet(name, members)
+                continue
+            if kind != "ELEMENT" or "COMBINE" in keyword.options:
+                continue  # the table names them
+            owners: list[int] = []
+            faces: list[int] = []
+            for number, entries in keyword.rows:
+                members = _members(
+                    entries[0], line, number, self.elements, element_sets, "element", self.instances
+                ).tolist()
+                face = entries[1].upper() if len(entries) > 1 else ""
+                if match := re.fullmatch(r"S([1-6])", face):
+                    owners += members
+                    faces += [int(match[1]) - 1] * len(members)
+                elif not face:
+                    if free is None:
+                        free = _free_faces(groups)
+                    here = set(members)
+                    pairs = sorted(pair for pair in free if pair[0] in here)
+                    owners += [pair[0] for pair in pairs]
+                    faces += [pair[1] for pair in pairs]
+                elif face not in ("SPOS", "SNEG"):  # sides of a shell
+                    keyword.refuse(f"the face {face!r:.20} is not known: S1 to S6 are.", number)
+            key = scope, name.casefold()
+            known = result.get(key)
+            if known is not None and known.faces is not None:
+                owners, faces = [*known.members, *owners], [*known.faces, *faces]
+            result[key] = NamedSet(name, np.array(owners, np.int64), np.array(faces, np.int64))
+        return result
+
+
+class _SetTable:
+    """Sets of nodes or elements by name; a set may name others that come before it."""
+
+    def __init__(
+        self, what: str, numbers: dict[tuple[str, int], int], instances: tuple[str, ...]
+    ) -> None:
+        self.what, self.numbers, self.instances = what, numbers, instances
+        self.named: dict[tuple[str, str], NamedSet] = {}
+
+    def add(self, line: DeckLine, name: str, members: list[int] | None) -> None:
+        keyword = line.keyword
+        if members is None:
+            parts = [np.zeros(0, np.int64)]
+            for number, entries in keyword.rows:
+                if "GENERATE" in keyword.options:
+                    parts.append(self._generated(line, number, entries))
+                else:
+                    parts += [self.members(entry, line, number) for entry in entries if entry]
+            members = np.concatenate(parts).tolist()
+        key = (line.instance, name.casefold())
+        known = self.named.get(key)
+        before = [] if known is None else known.members.tolist()
+        self.named[key] = NamedSet(
+            name if known is None else known.name,
+            np.array(list(dict.fromkeys([*before, *members])), dtype=np.int64),
         )
-    return _raw(path.name, nodes, elements, element_sets, point_sets, faces)
+
+    def members(self, entry: str, line: DeckLine, number: int | None) -> Ints:
+        return _members(entry, line, number, self.numbers, self.named, self.what, self.instances)
+
+    def _generated(self, line: DeckLine, number: int, entries: list[str]) -> Ints:
+        keyword = line.keyword
+        if len(entries) < 2:
+            keyword.refuse("GENERATE needs a first and a last number, and a step if not 1.", number)
+        first, last, *more = (keyword.whole(entry, number, "a number") for entry in entries[:3])
+        step = more[0] if more else 1
+        if not step or last - first > _MOST_MEMBERS * abs(step):
+            keyword.refuse(f"GENERATE from {first} to {last} makes too many members.", number)
+        scope = _instance_of(line, self.instances)
+        labels = range(first, last + 1, step)
+        rows = [self.numbers.get((scope, label), -1) for label in labels]
+        return np.array([row for row in rows if row >= 0], dtype=np.int64)
+
+
+def _instance_of(line: DeckLine, instances: Sequence[str]) -> str:
+    """Instance whose numbers a keyword names."""
+    name = line.keyword.options.get("INSTANCE", line.instance)
+    return next((known for known in instances if known.casefold() == name.casefold()), name)
+
+
+def _find(
+    sets: dict[tuple[str, str], NamedSet], name: str, instance: str, instances: Sequence[str]
+) -> NamedSet | None:
+    """A set by name: that of the instance, of the one named before a dot, or of the only one."""
+    title = name.strip('"').casefold()
+    for scope in dict.fromkeys((instance, "")):
+        if (scope, title) in sets:
+            return sets[scope, title]
+    first, dot, remainder = title.partition(".")
+    if dot:
+        for known in instances:
+            if known.casefold() == first and (known, remainder) in sets:
+                return sets[known, remainder]
+    if len(instances) == 1:
+        return sets.get((instances[0], title))
+    return None
+
+
+def _members(
+    entry: str,
+    line: DeckLine,
+    number: int | None,
+    numbers: dict[tuple[str, int], int],
+    sets: dict[tuple[str, str], NamedSet],
+    what: str,
+    instances: Sequence[str],
+) -> Ints:
+    """Rows that an entry names; an error where the deck has none of that name or number."""
+    keyword = line.keyword
+    scope = _instance_of(line, instances)
+    first, dot, remainder = entry.partition(".")
+    if dot and remainder.isdigit():
+        scope = next((known for known in instances if known.casefold() == first.casefold()), first)
+        entry = remainder
+    if entry.isdigit():
+        label = int(entry)
+        for one in dict.fromkeys((scope, *(instances if len(instances) == 1 else ()))):
+            if (one, label) in numbers:
+                return np.array([numbers[one, label]], dtype=np.int64)
+        where = f" in instance {scope}" if scope else ""
+        keyword.refuse(
+            f"the deck has no {what} {label}{where}: give the number of one that it has.", number
+        )
+    named_set = _find(sets, entry, scope, instances)
+    if named_set is None:
+        names = ", ".join(dict.fromkeys(one.name for one in sets.values()))
+        keyword.refuse(
+            f"the deck has no {what} set {value_text(entry)} before this line; it has "
+            f"{names or 'none'}: give one of them.", number
+        )  # fmt: skip
+    return named_set.members
+
+
+def _free_faces(groups: Sequence[ElementGroup]) -> set[tuple[int, int]]:
+    """Faces of the body that belong to one element only: number of the element, of the face."""
+    rows: dict[tuple[int, ...], list[tuple[int, int]]] = {}
+    dims = [SHAPES[base].dim for g in groups if (base := base_kind(g.kind)) is not None]
+    for group in groups:
+        base = base_kind(group.kind)
+        if base is None or SHAPES[base].dim != max(dims):
+            continue
+        for face, corners in enumerate(_FACES.get(base, ())):
+            for n, key in enumerate(np.sort(group.nodes[:, corners], axis=1).tolist()):
+                rows.setdefault(tuple(key), []).append((group.first + n, face))
+    return {owners[0] for owners in rows.values() if len(owners) == 1}
+
+
+def _node_rows(keyword: Keyword) -> tuple[list[int], Floats]:
+    """Numbers and coordinates `(n, 3)` of nodes."""
+    texts = [text for _, text in keyword.data]
+    width = texts[0].count(",") if texts else 0
+    if width in (2, 3) and all(text.count(",") == width for text in texts):
+        table = _number_table(texts, width + 1)
+        if len(table) and np.isfinite(table).all() and (table[:, 0] % 1 == 0).all():
+            x = np.zeros((len(table), 3))
+            x[:, :width] = table[:, 1:]
+            return table[:, 0].astype(np.int64).tolist(), x
+    labels, places = [], []
+    for line, entries in keyword.rows:
+        labels.append(keyword.whole(entries[0], line, "the number of a node"))
+        given = [keyword.number(entry, line, "a coordinate", 0.0) for entry in entries[1:4]]
+        places.append([*given, 0.0, 0.0, 0.0][:3])
+    return labels, np.array(places, dtype=float).reshape(-1, 3)
+
+
+def _number_table(texts: Sequence[str], width: int) -> Floats:
+    """Rows of numbers that are all alike, taken at once; empty where they are not."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")  # of numpy, about what is no number
+        try:
+            flat = np.fromstring(numbers_of_text(",".join(texts)), sep=",")
+        except (ValueError, DeprecationWarning):
+            flat = np.zeros(0)
+    return flat.reshape(-1, width) if len(flat) == width * len(texts) else np.zeros((0, width))
+
+
+def _element_rows(keyword: Keyword, kind: str) -> list[list[int]]:
+    """Number and nodes of each element; long ones go on in the next line."""
+    if kind not in _NODES:
+        labels = []
+        goes_on = False
+        for line, text in keyword.data:
+            if not goes_on:
+                labels.append(
+                    [keyword.whole(entries_of(text)[0], line, "the number of an element")]
+                )
+            goes_on = text.rstrip().endswith(",")
+        return labels
+    width = _NODES[kind] + 1
+    flat: list[int] = []
+    for line, text in keyword.data:
+        entries = [entry for entry in text.split(",") if entry.strip()]
+        try:
+            flat += map(int, entries)
+        except ValueError:
+            for entry in entries:
+                keyword.whole(entry.strip(), line, "the number of a node")
+    if len(flat) % width:
+        keyword.refuse(
+            f"{len(flat)} numbers for elements of {width} each (a number and {width - 1} nodes): "
+            "give the whole deck, or the type that the elements have."
+        )
+    return [flat[i : i + width] for i in range(0, len(flat), width)]
 
 
 def abaqus_text(mesh: Mesh) -> str:
@@ -150,138 +870,14 @@ def _rows(elements: Ints, first: int) -> Iterable[str]:
         yield f"{i}, {', '.join(map(str, row))}"
 
 
-def _sections(path: Path, outer: tuple[Path, ...] = ()) -> Iterator[Section]:
-    """Keyword, options and data rows of each section, included files in their place."""
-    if len(outer) > _DEEPEST:
-        raise MeshError(
-            f"{path.name} is included by {len(outer)} files, one in the other: join some of them."
-        )
-    resolved_path = path.resolve()
-    if resolved_path in outer:
-        raise MeshError(f"{path.name} includes itself: leave that *INCLUDE out.")
-    keyword = ""
-    options: dict[str, str] = {}
-    rows: list[list[str]] = []
-    for line in path.read_text(encoding="utf-8", errors="replace").splitlines():
-        text = line.strip()
-        if not text or text.startswith("**"):
-            continue
-        if not text.startswith("*"):
-            rows.append([entry.strip() for entry in text.rstrip(",").split(",")])
-            continue
-        if keyword:
-            yield keyword, options, rows
-        head, *entries = text[1:].split(",")
-        keyword, rows = head.strip().upper(), []
-        pairs = (entry.partition("=") for entry in entries)
-        options = {key.strip().upper(): value.strip().strip('"') for key, _, value in pairs}
-        if keyword == "INCLUDE" and "INPUT" in options:
-            inner = path.parent / options["INPUT"]
-            if not inner.is_file():
-                raise MeshError(f"{path.name} includes {str(inner)!r}, which does not exist.")
-            yield from _sections(inner, (*outer, resolved_path))
-    if keyword:
-        yield keyword, options, rows
-
-
 def _kind(element_type: str) -> str:
-    name = element_type.upper()
-    if solid := re.match(_SOLID, name):
+    """Name that meshio has for a type of element; the type itself where no body is made of it."""
+    if solid := re.match(_SOLID, element_type):
         return _SOLID_KIND.get(solid.group(1), element_type)
-    if re.match(_LINE_3, name):
+    if re.match(_LINE_3, element_type):
         return "line3"
-    if re.match(_LINE, name):
+    if re.match(_LINE, element_type):
         return "line"
-    if plane := re.match(_PLANE, name):
+    if plane := re.match(_PLANE, element_type):
         return _PLANE_KIND.get(plane.group(1), element_type)
-    return element_type or "element without TYPE"
-
-
-def _elements(kind: str, rows: list[list[str]]) -> list[list[int]]:
-    if kind not in _NODES:
-        return [[int(v) for v in row if v] for row in rows]
-    # Long elements go on in the next line, so count entries, not lines.
-    flat = [int(v) for row in rows for v in row if v]
-    width = _NODES[kind] + 1
-    if len(flat) % width:
-        raise ValueError(f"{len(flat)} numbers for elements of {width} each")
-    return [flat[i : i + width] for i in range(0, len(flat), width)]
-
-
-def _find(sets: dict[str, list[int]], name: str) -> str:
-    return next((set_name for set_name in sets if set_name.casefold() == name.casefold()), name)
-
-
-def _collect(sets: dict[str, list[int]], name: str, members: Iterable[int]) -> None:
-    sets.setdefault(_find(sets, name), []).extend(members)
-
-
-def _members(
-    options: dict[str, str], rows: list[list[str]], sets: dict[str, list[int]]
-) -> list[int]:
-    if "GENERATE" in options:
-        members: list[int] = []
-        for row in rows:
-            first, last, step = (*map(int, row), 1)[:3]
-            numbers = range(first, last + 1, step)
-            if last - first > _MOST_MEMBERS * abs(step):
-                raise ValueError(f"GENERATE from {first} to {last} makes too many members")
-            members += numbers
-        return members
-    members = []
-    for entry in (entry for row in rows for entry in row if entry):
-        members += [int(entry)] if entry.isdigit() else sets.get(_find(sets, entry), [])
-    return members
-
-
-def _raw(
-    source: str,
-    nodes: dict[int, list[float]],
-    elements: dict[int, tuple[str, list[int]]],
-    element_sets: dict[str, list[int]],
-    point_sets: dict[str, list[int]],
-    faces: dict[str, list[tuple[str, str]]],
-) -> RawMesh:
-    points: Floats = np.zeros((len(nodes), 3))
-    for i, x in enumerate(nodes.values()):
-        points[i, : len(x)] = x
-    number = {node: i for i, node in enumerate(nodes)}
-
-    def by_kind(members: Iterable[int]) -> Iterator[tuple[str, Ints]]:
-        kinds: dict[str, list[list[int]]] = {}
-        for member in dict.fromkeys(members):
-            if member in elements:
-                kind, corners = elements[member]
-                kinds.setdefault(kind, []).append(corners)
-        for kind, rows in kinds.items():
-            if base_kind(kind) is not None:
-                try:
-                    yield kind, np.array([[number[node] for node in row] for row in rows])
-                except KeyError as error:
-                    raise MeshError(
-                        f"{source}: an element names node {error}, which the file lacks."
-                    ) from error
-            else:
-                yield kind, np.zeros((len(rows), 1), dtype=np.int64)
-
-    blocks = list(by_kind(elements))
-    sets = [
-        (kind, name, rows)
-        for name, members in element_sets.items()
-        for kind, rows in by_kind(members)
-    ]
-    for name, pairs in faces.items():
-        for where, face in pairs:
-            if not re.fullmatch(r"S\d", face):
-                continue  # SPOS, SNEG: sides of a shell
-            element_rows = element_sets.get(_find(element_sets, where), [])
-            for kind, rows in by_kind([int(where)] if where.isdigit() else element_rows):
-                local = _FACES.get(base_kind(kind) or "", ())
-                if 1 <= int(face[1]) <= len(local):
-                    corners = local[int(face[1]) - 1]
-                    sets.append((_FACE_KIND[len(corners)], name, rows[:, corners]))
-    rows_of = [
-        (name, np.array([number[n] for n in members if n in number], dtype=np.int64))
-        for name, members in point_sets.items()
-    ]
-    return RawMesh(points, blocks, sets, rows_of)
+    return element_type

@@ -104,6 +104,35 @@ class Field:
         return cell, trial.reshape(len(x), many, -1)[row, best]
 
 
+@dataclass(frozen=True, eq=False)
+class CellField:
+    """Values that are constant in each cell of a mesh; called with points, it finds their cells.
+
+    Attributes
+    ----------
+    mesh : Mesh
+    values : (m, ...) array
+        Scalars, vectors (m, d) or stresses (m, d, d).
+    name : str
+    """
+
+    mesh: Mesh
+    values: Floats
+    name: str
+
+    def __call__(self, x: Floats) -> Floats:
+        """Values at points `(q, ...)`; `x` (q, d), length; beside the mesh those of a near cell."""
+        x = numbers(x, f"{self.name}: x", (None, self.mesh.dim))
+        cell, _ = locate(self.mesh, x)
+        outside = np.nonzero(cell < 0)[0]
+        if len(outside):
+            cell[outside] = self.mesh.cell_tree.query(x[outside])[1]
+        return np.asarray(self.values[cell])
+
+    def __repr__(self) -> str:
+        return f"CellField({self.name}: {len(self.values)} cells)"
+
+
 def read_field(path: str | PathLike[str], name: str | None = None) -> Field:
     """Read a field from a file with a mesh of its own, to use wherever a function f(x) is taken.
 

@@ -18,9 +18,11 @@ from xcrack.base.errors import GeometryError, MeshError, XcrackError, warn
 from xcrack.base.optional import require_package
 from xcrack.base.paths import path_of, system_errors, written_whole
 from xcrack.mesh.abaqus import abaqus_text, read_abaqus
+from xcrack.mesh.keywords import KeywordUse, missed_words
 from xcrack.mesh.linear import SHAPES, base_kind, linear_mesh
 from xcrack.mesh.mesh import Mesh
 from xcrack.mesh.msh import REST, msh_text
+from xcrack.mesh.other_decks import nastran_uses, read_ansys
 from xcrack.mesh.raw import CELL_KIND, FACET_KIND, RawMesh, mesh_from_raw, sets_to_write
 
 _SET = "set:"  # prefix of the 0/1 cell data that carry a set in formats without sets
@@ -28,16 +30,21 @@ _WITH_CELL_DATA = {".vtu", ".vtk", ".xdmf", ".xmf"}
 _TAGS = ("gmsh:physical", "medit:ref", "cell_tags", "nastran:ref", "su2:tag")
 _ENTITY_TAGS = "gmsh:geometrical"
 _WITH_GMSH = "Let gmsh convert it, which keeps its groups: gmsh {0} -save -o {1}.msh."
+_NASTRAN = (".bdf", ".nas", ".fem")
+_SHAPE = 'It is a shape without a mesh: xcrack.mesh_step("{0}", size=...) meshes it.'
 _CONVERT = {  # formats that meshio does not read, or not always
     ".unv": _WITH_GMSH,
-    ".bdf": _WITH_GMSH,
-    ".nas": _WITH_GMSH,
-    ".fem": _WITH_GMSH,
-    ".cdb": "Convert it in Python with the package mapdl-archive (python -m pip install "
-    'mapdl-archive): mapdl_archive.Archive("{0}").grid.save("{1}.vtu").',
-    ".step": 'It is a shape without a mesh: xcrack.mesh_step("{0}", size=...) meshes it.',
-    ".stp": 'It is a shape without a mesh: xcrack.mesh_step("{0}", size=...) meshes it.',
+    **dict.fromkeys(_NASTRAN, _WITH_GMSH),
+    **dict.fromkeys((".step", ".stp"), _SHAPE),
+    ".odb": "It is an output database, which Abaqus alone opens: give the input file (.inp) of the "
+    "same job, which has mesh, sets and loads.",
+    ".rst": "It holds results: give the archive that CDWRITE makes (.cdb) for the mesh; for fields "
+    "convert it in Python with the package ansys-mapdl-reader: "
+    'ansys.mapdl.reader.read_binary("{0}").save_as_vtk("{1}.vtu"), which read_field reads.',
+    ".op2": "It holds results: give the deck (.bdf) for the mesh; for fields convert it in Python "
+    "with the package pyNastran (pyNastran.op2.op2.read_op2) to vtu, which read_field reads.",
 }
+_MISSED_SETS = 12  # that a message names
 
 
 def read_mesh(path: str | PathLike[str], *, strict: bool = False) -> Mesh:
@@ -64,7 +71,12 @@ def read_mesh(path: str | PathLike[str], *, strict: bool = False) -> Mesh:
           Where a file has no groups at all, the numbers of the curves, surfaces and volumes are
           the tags.
         * Abaqus: ``*ELSET`` (of elements one dimension lower: a facet set), ``*SURFACE`` of
-          element faces, and ``*NSET``: the boundary facets that have all their nodes in it.
+          element faces or nodes, and ``*NSET``: the boundary facets that have all their nodes in
+          it. Parts stand where their instances do; sets of one of several instances are called
+          ``instance.set``. A warning names what the deck has beside mesh and sets: `read_deck`
+          reads loads, supports and materials.
+        * Ansys (``.cdb``, written by CDWRITE): components. Nastran (``.bdf``): the property of each
+          element. The warning names their other commands too.
         * vtu, vtk, xdmf: cell data named ``set:<name>``, not zero on members, lower-dimensional
           cells included (so `write_mesh` stores them).
 
@@ -90,11 +102,48 @@ def read_mesh(path: str | PathLike[str], *, strict: bool = False) -> Mesh:
     strict = flag(strict, "read_mesh: strict", error=MeshError)
     path = existing_file(path, "mesh")
     with system_errors("cannot read the mesh file", path):
+        raw, uses = raw_mesh_of(path)
+    mesh = mesh_from_raw(linear_mesh(raw, path.name, strict), path.name)
+    parts = []
+    if ignored := missed_words(uses):
+        parts.append(f"the mesh and its sets are taken, not {', '.join(ignored)}")
         if path.suffix.lower() == ".inp":
-            raw = read_abaqus(path)
-        else:
-            raw = _raw_from_meshio(meshio_read(path, "mesh"), _gmsh_names(path))
-    return mesh_from_raw(linear_mesh(raw, path.name, strict), path.name)
+            parts[-1] += " (read_deck reads loads, supports and materials)"
+    if missed := sets_without_facets(raw, mesh):
+        parts.append(missed)
+    if parts:
+        warn(f"{path.name}: {'; '.join(parts)}.")
+    return mesh
+
+
+def raw_mesh_of(path: Path) -> tuple[RawMesh, list[KeywordUse]]:
+    """Contents of a mesh file, and of a deck what became of its keywords."""
+    suffix = path.suffix.lower()
+    if suffix == ".inp":
+        return read_abaqus(path)
+    if suffix == ".cdb":
+        return read_ansys(path)
+    raw = _raw_from_meshio(meshio_read(path, "mesh"), _gmsh_names(path))
+    if suffix not in _NASTRAN:
+        return raw, []
+    n_cells = sum(len(rows) for kind, rows in raw.blocks if SHAPES[base_kind(kind) or ""].dim > 1)
+    return raw, nastran_uses(path, n_cells)
+
+
+def sets_without_facets(raw: RawMesh, mesh: Mesh) -> str:
+    """Sets of nodes that hold no facet of the mesh, in words; empty where there are none."""
+    names = [
+        f"{name} ({len(members)} node" + ("s)" if len(members) > 1 else ")")
+        for name, members in raw.point_sets
+        if len(members) and name not in mesh.facet_sets and not name.startswith("_")
+    ]
+    if not names:
+        return ""
+    more = f" and {len(names) - _MISSED_SETS} more" if len(names) > _MISSED_SETS else ""
+    return (
+        f"the node sets {', '.join(names[:_MISSED_SETS])}{more} hold no facet of the boundary and "
+        "are left out: fix(...) takes points too"
+    )
 
 
 def read_triangles(path: str | PathLike[str]) -> tuple[Floats, Ints]:

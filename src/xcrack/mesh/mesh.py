@@ -424,4 +424,23 @@ def nearest_point(mesh: Mesh, x: Floats, what: str) -> int:
     return best
 
 
+def nearest_nodes(mesh: Mesh, x: Floats, what: str) -> Ints:
+    """Numbers of the mesh points or middles of edges nearest to points `(k, d)`.
+
+    The middle of edge e has the number ``n_points + e``. An error names the farthest point that is
+    not in or at the body.
+    """
+    if x.shape[1] != mesh.dim:
+        raise ProblemError(f"{what}: the points need {mesh.dim} coordinates, not {x.shape[1]}.")
+    places = np.concatenate([mesh.points, mesh.edge_middles])
+    distance, number = cKDTree(places).query(x)
+    worst = int(np.argmax(distance))
+    if distance[worst] > mesh.cell_size.max():
+        raise ProblemError(
+            f"{what}: {x[worst].tolist()} is {distance[worst]:.4g} away from the nearest mesh "
+            f"point {places[number[worst]].tolist()}: give points of the body."
+        )
+    return np.asarray(number, dtype=np.int64)
+
+
 __all__ = []

@@ -62,6 +62,22 @@ def mesh_from_raw(raw: RawMesh, source: str) -> Mesh:
     MeshError
         No cells, cells that are not linear simplices, a surface in 3D.
     """
+    points, cells, facet_sets, cell_sets, _ = mesh_parts(raw, source)
+    return Mesh(points, cells, facet_sets, cell_sets)
+
+
+def mesh_parts(
+    raw: RawMesh, source: str
+) -> tuple[Floats, Ints, dict[str, Ints], dict[str, Ints], Ints]:
+    """What a mesh is made of, as of `mesh_from_raw`.
+
+    Returns
+    -------
+    points, cells, facet_sets, cell_sets
+        As of `Mesh`.
+    number : (n,) array of int
+        Number of each point of the file among these points; -1 where no cell uses it.
+    """
     _check_kinds(raw.blocks, source)
     dim = 3 if any(kind == "tetra" and len(data) for kind, data in raw.blocks) else 2
     doubled = _stack((data for kind, data in raw.blocks if kind == CELL_KIND[dim]), dim + 1)
@@ -89,14 +105,14 @@ def mesh_from_raw(raw: RawMesh, source: str) -> Mesh:
         for name, members in _grouped_rows(raw.sets, CELL_KIND[dim], dim + 1).items()
     }
     for name, members in raw.point_sets:
-        if name not in facet_sets and name not in cell_sets:
+        if name not in facet_sets:
             inside = np.zeros(len(points), dtype=bool)
             inside[new[members][new[members] >= 0]] = True
             facets = bare.boundary
             facets = facets[inside[facets].all(axis=1)]
             if len(facets):
                 facet_sets[name] = facets
-    return Mesh(points, cells, _without_own_boundary(facet_sets, bare, source), cell_sets)
+    return points, cells, _without_own_boundary(facet_sets, bare, source), cell_sets, new
 
 
 def _without_own_boundary(facet_sets: dict[str, Ints], bare: Mesh, source: str) -> dict[str, Ints]:

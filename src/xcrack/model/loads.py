@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 
 from xcrack.base.arguments import Array, Number, Vector, Whole
 from xcrack.base.arrays import Floats, Ints, frozen_copy
+from xcrack.base.checks import value_text
 from xcrack.base.errors import ProblemError
 from xcrack.base.units import (
     BODY_FORCE,
@@ -27,11 +28,12 @@ from xcrack.base.units import (
     TEMPERATURE,
 )
 from xcrack.mesh.holes import RoundHole, round_hole
-from xcrack.mesh.mesh import Mesh, facet_set, nearest_point
+from xcrack.mesh.mesh import Mesh, facet_set, nearest_nodes, nearest_point
 from xcrack.model.material import Material
 from xcrack.model.supports import Condition, Support
 from xcrack.model.values import (
     Place,
+    PointRows,
     ScalarField,
     SetName,
     StressField,
@@ -125,7 +127,10 @@ class Load(Condition):
         raise NotImplementedError
 
     def point_forces(self, mesh: Mesh) -> tuple[Ints, Floats]:
-        """Mesh points `(m,)`, and the forces at them `(m, d)`."""
+        """Mesh points `(m,)`, and the forces at them `(m, d)`.
+
+        The middle of edge e is point ``n_points + e``.
+        """
         raise NotImplementedError
 
 
@@ -135,11 +140,11 @@ class displacement(Load, Support):  # noqa: N801 - it is used as a function
 
     Parameters
     ----------
-    where : str or (d,) array
-        Name of a facet set, or a point (the nearest mesh point).
+    where : str, (d,) or (k, d) array
+        Name of a facet set, a point (the nearest mesh point), or several points, as of `fix`.
     value : (d,) array or callable, length
-        Vector, whose entries may be None where a direction stays free, or f(x) -> (n, d), called
-        with arrays (n, d). It is never called on a lip.
+        Vector, or f(x) -> (n, d), called with arrays (n, d). An entry of a vector may be None,
+        where a direction stays free, or f(x) -> (n,). It is never called on a lip.
 
     Raises
     ------
@@ -155,7 +160,8 @@ class displacement(Load, Support):  # noqa: N801 - it is used as a function
     @property
     def is_uniform(self) -> bool:
         """Whether it is the same everywhere."""
-        return not callable(self.value)
+        entries = self.value if isinstance(self.value, tuple) else (self.value,)
+        return not any(map(callable, entries))
 
     def check(self, problem: Any) -> None:
         """Raise where it moves nothing that is supported."""
@@ -168,11 +174,7 @@ class displacement(Load, Support):  # noqa: N801 - it is used as a function
 
     def displacement_at(self, x: Floats) -> Floats:
         """Value at points, nan where it leaves a direction free."""
-        value = self.value
-        if isinstance(value, tuple):
-            value = np.array([np.nan if v is None else v for v in value])
-            return np.broadcast_to(value, (len(x), len(value)))
-        return vector_at(value, x, self.name)
+        return vector_at(self.value, x, self.name)
 
 
 @dataclass(frozen=True, eq=False)
@@ -437,12 +439,14 @@ class resultant(Load):  # noqa: N801
 
 @dataclass(frozen=True, eq=False)
 class point_force(Load):  # noqa: N801
-    """Force at a point (the nearest mesh point takes it).
+    """Force at a point (the nearest mesh point takes it), or forces at several.
 
     Parameters
     ----------
-    x : (d,) array, length
-    f : (d,) array, force (per thickness in 2D)
+    x : (d,) or (k, d) array, length
+        A point; or several, each of which may also be the middle of an edge.
+    f : (d,) or (k, d) array, force (per thickness in 2D)
+        One force for all points, or one for each.
 
     Raises
     ------
@@ -450,27 +454,37 @@ class point_force(Load):  # noqa: N801
         Other than 2 or 3 numbers each, or another number in one than in the other.
     """
 
-    x: Annotated[ArrayLike, Vector(unit=LENGTH)]
-    f: Annotated[ArrayLike, Vector(unit=FORCE)]
+    x: Annotated[ArrayLike, PointRows(unit=LENGTH)]
+    f: Annotated[ArrayLike, PointRows(unit=FORCE)]
     acts = frozenset({"point_force"})
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if np.size(self.x) != np.size(self.f):
+        x, f = np.shape(self.x), np.shape(self.f)
+        if x[-1] != f[-1]:
             raise ProblemError(
-                f"point_force: x {np.asarray(self.x).tolist()} and f {np.asarray(self.f).tolist()} "
-                "must both have 2 or both 3 numbers."
+                f"point_force: x {value_text(self.x)} and f {value_text(self.f)} must both have 2 "
+                "or both 3 numbers."
+            )
+        if len(f) == 2 and f != x:
+            raise ProblemError(
+                f"point_force: f has {f[0]} rows, x is {x[0] if len(x) == 2 else 1} point(s): give "
+                "one force for all points, or one for each."
             )
 
     @property
     def name(self) -> str:
         """What messages and reports call it."""
+        if np.ndim(self.x) == 2 and len(self.x) > 1:  # type: ignore[arg-type]
+            return f"point_force({len(self.x)} points)"  # type: ignore[arg-type]
         return f"point_force({np.round(np.asarray(self.x), 6).tolist()})"
 
     def point_forces(self, mesh: Mesh) -> tuple[Ints, Floats]:
-        """The nearest mesh point, and the force."""
+        """The nearest mesh points, and the forces."""
         x = np.asarray(self.x)
-        return np.array([nearest_point(mesh, x, self.kind)]), np.asarray(self.f)[None]
+        if x.ndim == 1:
+            return np.array([nearest_point(mesh, x, self.kind)]), np.asarray(self.f)[None]
+        return nearest_nodes(mesh, x, self.kind), np.broadcast_to(np.asarray(self.f), x.shape)
 
 
 @dataclass(frozen=True, eq=False)

@@ -36,8 +36,11 @@ class Condition(Declared):
         where = self.place
         if where is None:
             return self.kind
-        named = isinstance(where, str)
-        return f"{self.kind}({value_text(where) if named else np.round(where, 6).tolist()})"
+        if isinstance(where, str):
+            return f"{self.kind}({value_text(where)})"
+        if np.ndim(where) == 2 and len(where) > 1:
+            return f"{self.kind}({len(where)} points)"
+        return f"{self.kind}({np.round(where, 6).tolist()})"
 
     def check_in(self, mesh: Mesh) -> None:
         """Raise where a vector has another dimension than the body, or a set is not there."""
@@ -77,12 +80,13 @@ class Support(Condition):
 
 @dataclass(frozen=True, eq=False)
 class fix(Support):  # noqa: N801 - it is used as a function
-    """Hold a facet set or a point, in one direction or in all.
+    """Hold a facet set, a point or several points, in one direction or in all.
 
     Parameters
     ----------
-    where : str or (d,) array
-        Name of a facet set, or a point (the nearest mesh point is supported).
+    where : str, (d,) or (k, d) array
+        Name of a facet set, a point (the nearest mesh point is supported), or several points, each
+        of which may also be the middle of an edge: at order 1 both ends are supported then.
     axis : int, optional
         Direction 0, 1 (, 2); all where it is left out.
 

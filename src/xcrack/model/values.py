@@ -16,7 +16,10 @@ from xcrack.base.units import NUMBER
 
 @dataclass(frozen=True)
 class VectorField(Rule):
-    """A vector, or a function f(x) or f(x, normal) of points; with `free` an entry may be None."""
+    """A vector, or a function f(x) or f(x, normal) of points.
+
+    With `free` an entry may be None, or a function f(x) of its own.
+    """
 
     unit: Unit = NUMBER
     free: bool = False
@@ -26,10 +29,12 @@ class VectorField(Rule):
         """The function, a read-only vector, or a tuple with None."""
         if callable(value):
             return value
-        given = self.free and isinstance(value, list | tuple) and any(v is None for v in value)
-        if given and len(value) in (2, 3):
+        given = self.free and isinstance(value, list | tuple)
+        if given and len(value) in (2, 3) and all(v is None for v in value):
+            raise error(f"{what} = {value_text(value)}: give a number in one direction or more.")
+        if given and any(v is None or callable(v) for v in value) and len(value) in (2, 3):
             return tuple(
-                None if v is None else number(v, f"{what}[{i}]", error=error)
+                v if v is None or callable(v) else number(v, f"{what}[{i}]", error=error)
                 for i, v in enumerate(value)
             )
         vector = numbers(value, what, (None,), error=error)
@@ -72,20 +77,45 @@ class StressField(Rule):
 
 @dataclass(frozen=True)
 class Place(Rule):
-    """The name of a facet set, or a point."""
+    """The name of a facet set, a point, or several points."""
 
     unit: Unit = NUMBER
     is_vector = True
     takes_names = True
 
     def check(self, value: Any, what: str, error: Error) -> Any:
-        """The name, or a read-only point."""
+        """The name, or read-only points."""
         if isinstance(value, str):
             return value
+        shape = (None, None) if np.ndim(_plain(value)) == 2 else (None,)
         try:
-            return frozen_copy(numbers(value, what, (None,), error=error))
+            return frozen_copy(numbers(value, what, shape, error=error))
         except error as cause:
             raise error(f"{cause} Or give the name of a facet set.") from None
+
+
+@dataclass(frozen=True)
+class PointRows(Rule):
+    """A point or vector of two or three numbers, or rows of them; kept read-only."""
+
+    unit: Unit = NUMBER
+    is_vector = True
+
+    def check(self, value: Any, what: str, error: Error) -> Any:
+        """A read-only copy."""
+        shape = (None, None) if np.ndim(_plain(value)) == 2 else (None,)
+        rows = numbers(value, what, shape, error=error)
+        if rows.shape[-1] not in (2, 3) or not len(rows):
+            raise error(f"{what} = {value_text(value)}: give 2 or 3 numbers, or rows of them.")
+        return frozen_copy(rows)
+
+
+def _plain(value: Any) -> Any:
+    """A value as an array, where it is one: ragged lists and the like are looked at later."""
+    try:
+        return np.asarray(value)
+    except Exception:  # whatever an object's own __array__ raises
+        return None
 
 
 @dataclass(frozen=True)
@@ -100,7 +130,7 @@ class SetName(Rule):
 
 
 def vector_at(value: Any, x: Floats, what: str, normal: Floats | None = None) -> Floats:
-    """A vector, f(x) or f(x, normal) at points `(n, d)`, checked.
+    """A vector, f(x) or f(x, normal) at points `(n, d)`, checked; nan where an entry is None.
 
     Raises
     ------
@@ -108,6 +138,11 @@ def vector_at(value: Any, x: Floats, what: str, normal: Floats | None = None) ->
         Another shape, or values that are not finite.
     """
     n, d = x.shape
+    if isinstance(value, tuple):
+        columns = [
+            np.full(n, np.nan) if entry is None else scalar_at(entry, x, what) for entry in value
+        ]
+        return np.stack(columns, axis=1)
     if callable(value):
         two = normal is not None and _n_positional(value) >= 2
         arguments = (x, normal) if two else (x,)
@@ -205,6 +240,7 @@ def _n_positional(function: Callable[..., Any]) -> int:
 
 __all__ = [
     "Place",
+    "PointRows",
     "ScalarField",
     "SetName",
     "StressField",

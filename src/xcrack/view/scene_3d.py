@@ -378,7 +378,8 @@ def load_arrows(solution: Solution) -> tuple[Floats, Floats]:
         sign = np.sign(factor)
         if "point_force" in load.acts:
             number, force = load.point_forces(mesh)
-            rows = [mesh.points[number], sign * force, np.zeros_like(force)]
+            places = np.concatenate([mesh.points, mesh.edge_middles])
+            rows = [places[number], sign * force, np.zeros_like(force)]
             forces.append(np.stack(rows, axis=1))
         if "traction" not in load.acts:
             continue
