@@ -129,6 +129,7 @@ _HOME = {
     "chart": "verification.charting.chart",
     "adapt": "adaptivity.adapt",
     "verify": "verification.book.verify",
+    "validate": "verification.experiments.validate",
     "report": "view.report",
     "read_case": "app.case",
     "run": "app.case_run",

@@ -110,6 +110,15 @@ def _parser() -> argparse.ArgumentParser:
     )
     subparser.add_argument("-k", dest="only", default="", metavar="NAME", help="cases of this name")
     subparser.add_argument("-o", "--output", type=Path, help="write the book as a page")
+    subparser = add("validate", _validate, "predict tests that others made")
+    subparser.add_argument(
+        "--quick", action="store_true", help="coarse cells and long steps, in the plane"
+    )
+    subparser.add_argument("-k", dest="only", default="", metavar="NAME", help="tests of this name")
+    subparser.add_argument("-o", "--output", type=Path, help="write the page, keep each result")
+    subparser.add_argument(
+        "--data", type=Path, metavar="FOLDER", help="with measured numbers that are not free"
+    )
     subparser = add("chart", _chart, "error against time of a scene")
     subparser.add_argument("scene", type=Path, help="a script that makes `problem`, or a case file")
     subparser.add_argument(
@@ -182,6 +191,14 @@ def _verify(options: argparse.Namespace) -> int:
     count = len(book.results)
     print(f"{count} cases in {book.seconds:.0f} s: " + ("all right" if book.passed else "FAILED"))
     return 0 if book.passed else 1
+
+
+def _validate(options: argparse.Namespace) -> int:
+    result = xcrack.validate(
+        options.only, quick=options.quick, file=options.output, data=options.data
+    )
+    print(str(result).rpartition("\n")[2] if result.passed else result)
+    return 0 if result.passed else 1
 
 
 def _chart(options: argparse.Namespace) -> int:

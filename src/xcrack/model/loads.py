@@ -255,7 +255,8 @@ class bearing(Load):  # noqa: N801
     force : (d,) array, force (per thickness in 2D)
         On the body; in 3D perpendicular to the axis of the hole.
     contact_angle : float, rad
-        Angle over which the pin touches; pi is a pin without clearance.
+        Angle over which the pin touches: 60 to 120 degrees for a pin with the clearance of a
+        fixture or a bolt; pi is a pin without clearance. It moves K and the path of a crack.
 
     Raises
     ------
@@ -271,7 +272,7 @@ class bearing(Load):  # noqa: N801
 
     where: Annotated[str, SetName()]
     force: Annotated[ArrayLike, Vector(unit=FORCE)]
-    contact_angle: Annotated[float, Number(above=0, most=pi)] = pi
+    contact_angle: Annotated[float, Number(above=0, most=pi)] = pi / 2
     acts = frozenset({"traction"})
     has_one_arrow = True
 

@@ -1,0 +1,104 @@
+"""A small surface crack that was seen by tomography while it grew (Ferrié 2006)."""
+
+import numpy as np
+
+from xcrack.base.arrays import Floats
+from xcrack.crack.surfaces import elliptic_crack
+from xcrack.fatigue.power import paris
+from xcrack.growth.step import Cycle, Step
+from xcrack.mesh.box import box
+from xcrack.mesh.mesh import Mesh
+from xcrack.model.loads import traction
+from xcrack.model.material import Isotropic
+from xcrack.model.problem import Problem
+from xcrack.verification.experiments.experiment import Experiment
+from xcrack.verification.experiments.outcome import Comparison, Curve, Outcome, Picture
+from xcrack.verification.experiments.trial import Trial, grown
+
+_CELLS, _DA = 5.0, 0.014  # cells over the first depth; length of a step, mm
+_REACH = 0.26  # up to where cells are small, mm
+
+
+def _spread(core: float, length: float, size: float) -> Floats:
+    """Distances beyond a core of small cells, in steps that grow by 1.5."""
+    beyond = size * np.cumsum(1.5 ** np.arange(1, 60))
+    beyond = beyond[: int(np.searchsorted(beyond, length - core)) + 1]
+    return np.asarray(core + beyond * (length - core) / beyond[-1])
+
+
+def _block(experiment: Experiment) -> Mesh:
+    """The block: x along the surface, y into the depth, z along the load."""
+    geometry = experiment.geometry
+    (x0, y0, z0), (x1, y1, z1) = geometry["box"]
+    size = geometry["depth"] / _CELLS
+    across, near = _REACH, 3.5 * size
+    x, z = (np.linspace(-c, c, 2 * int(np.ceil(c / size)) + 1) for c in (across, near))
+    y = np.linspace(y0, _REACH, int(np.ceil(_REACH / size)) + 1)
+    lines = (
+        np.concatenate([-_spread(across, -x0, size)[::-1], x, _spread(across, x1, size)]),
+        np.concatenate([y, _spread(_REACH, y1, size)]),
+        np.concatenate([-_spread(near, -z0, size)[::-1], z, _spread(near, z1, size)]),
+    )
+    count = tuple(len(line) - 1 for line in lines)
+    flat = box((0, 0, 0), count, count)  # integer corners, mapped below
+    number = np.rint(flat.points).astype(int)
+    points = np.stack([line[number[:, k]] for k, line in enumerate(lines)], axis=1)
+    return Mesh(points, flat.cells, flat.facet_sets)
+
+
+def _depth(step: Step) -> float:
+    """Depth of the crack below the surface that it began at."""
+    return float(step.cracks[0].points[:, 1].max())
+
+
+def _run(experiment: Experiment, quick: bool) -> Outcome:
+    geometry, material, load = experiment.geometry, experiment.material, experiment.load
+    stress, measured = load["stress"], experiment.measured
+    a, c = geometry["depth"], geometry["half_width"]
+    pull = [traction("top", (0.0, 0.0, stress)), traction("bottom", (0.0, 0.0, -stress))]
+    crack = elliptic_crack((0.0, 0.0, 0.0), (0, 0, 1), (1, 0, 0), c, a)
+    alloy = Isotropic(material["E"], material["nu"])
+    problem = Problem(_block(experiment), alloy, [crack], loads=pull)
+    # From m and MPa√m to mm and MPa√mm.
+    m = material["paris_m"]
+    law = paris(material["paris_C"] * 1000.0 * 1000.0 ** (-0.5 * m), m)
+    history = grown(
+        problem, law, Cycle(load["R"], 1.0), _DA,
+        until=lambda step: _depth(step) > measured["depth"] + _DA and step.cycles > measured["N"],
+    )  # fmt: skip
+    N = np.array([step.cycles for step in history.steps])
+    depth = np.array([_depth(step) for step in history.steps])
+    predicted = float(np.interp(measured["depth"], depth, N))
+    fronts = []
+    for step in history.steps:
+        points = step.cracks[0].points[np.unique(step.cracks[0].faces)]
+        angle = np.arctan2(points[:, 1], points[:, 0])
+        radius = np.linalg.norm(points[:, :2], axis=1)
+        bins = np.linspace(0.02, np.pi - 0.02, 31)
+        rim = [radius[np.abs(angle - b) < 0.06].max(initial=np.nan) for b in bins]
+        fronts.append(np.stack([rim * np.cos(bins), rim * np.sin(bins)], axis=1))
+    comparisons = (
+        Comparison("cycles to the depth of .1733 mm", predicted, measured["N"], "ratio"),
+        Comparison("depth after 4000 cycles", float(np.interp(measured["N"], N, depth)),
+                   measured["depth"], "ratio", "mm"),
+    )  # fmt: skip
+    pictures = (
+        Picture("Depth over cycles", "N", "depth [mm]", (
+            Curve.of("measured", [(0.0, a), (measured["N"], measured["depth"])], "measured"),
+            Curve.of("predicted", np.stack([N, depth], axis=1), "predicted"))),
+        Picture("Fronts", "x [mm]", "depth [mm]", (
+            *(Curve.of("" if k else "predicted", f, "predicted") for k, f in enumerate(fronts)),
+            Curve.of("measured deepest points", [(0.0, a), (0.0, measured["depth"])], "measured")),
+            is_to_scale=True),
+    )  # fmt: skip
+    return Outcome(experiment.name, (experiment.name,), comparisons, pictures, _WORDS)
+
+
+_WORDS = (
+    "A crack of .1 mm under a ratio R that is recalled: grains, closure of so small a crack, and "
+    "the law of long cracks are worth a factor of 1.5 in its life.",
+)
+TRIALS = (Trial("ferrie_2006", _run, quick=False, needs=""),)
+
+
+__all__ = ["TRIALS"]

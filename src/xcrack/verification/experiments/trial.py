@@ -1,0 +1,87 @@
+"""How a test is predicted: what the trials share."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from xcrack.base.arrays import Floats, Ints
+from xcrack.fatigue.criteria import max_hoop_stress
+from xcrack.fatigue.law import Law
+from xcrack.growth.run import grow
+from xcrack.growth.step import Cycle, Step
+from xcrack.mesh.mesh import Mesh
+from xcrack.model.problem import Problem
+from xcrack.runs.collect import collect
+from xcrack.runs.history import History
+from xcrack.verification.experiments.experiment import Experiment
+from xcrack.verification.experiments.outcome import Curve, Outcome
+
+ROOT_M = np.sqrt(1000.0)  # N/mm^1.5 in a MPa√m
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A test and the function that predicts it.
+
+    Attributes
+    ----------
+    name : str
+        That of its `Experiment`.
+    run : callable (experiment, quick) -> Outcome
+    quick : bool
+        Whether the quick page has it.
+    needs : str
+        What it needs beside xcrack: "gmsh", or nothing.
+    """
+
+    name: str
+    run: Callable[[Experiment, bool], Outcome]
+    quick: bool = True
+    needs: str = "gmsh"
+
+
+def grown(
+    problem: Problem, law: Law, cycle: Cycle, da: float, until: Callable[[Step], bool] | None = None
+) -> History:
+    """A run to its end, or until a step is told to be the last."""
+    steps = grow(problem, law, max_hoop_stress, cycle, da=da, progress=False)
+    return collect(steps, until=until)
+
+
+def outline(mesh: Mesh) -> list[Curve]:
+    """Boundary of a body in the plane, as chains of edges."""
+    edges = mesh.boundary
+    following = {int(a): int(b) for a, b in _oriented(mesh, edges)}
+    curves = []
+    while following:
+        first = next(iter(following))
+        chain = [first]
+        while chain[-1] in following:
+            chain.append(following.pop(chain[-1]))
+        curves.append(Curve.of("", mesh.points[chain], "body"))
+    return curves
+
+
+def _oriented(mesh: Mesh, edges: Ints) -> Ints:
+    """Boundary edges with the body on their left."""
+    cell = mesh.facet_to_cell[mesh.facet_numbers(edges), 0]
+    inside = mesh.points[mesh.cells[cell]].mean(axis=1) - mesh.points[edges[:, 0]]
+    along = mesh.points[edges[:, 1]] - mesh.points[edges[:, 0]]
+    is_left = along[:, 0] * inside[:, 1] - along[:, 1] * inside[:, 0] > 0
+    return np.where(is_left[:, None], edges, edges[:, ::-1])
+
+
+def arc_of(path: Floats) -> Floats:
+    """Length along a polyline (k, 2) at its points (k,)."""
+    return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))])
+
+
+def driving(history: History, crack: int = 0) -> tuple[Floats, Floats]:
+    """Tips (n, 2) of a crack with one tip at the solved steps of a run, and its range of K_eq."""
+    rows = history.table()
+    rows = rows[(rows["crack"] == crack) & np.isfinite(rows["dK_eq"])]
+    return np.stack([rows["x"], rows["y"]], axis=1), np.asarray(rows["dK_eq"])
+
+
+__all__ = ["ROOT_M", "Trial", "arc_of", "driving", "grown", "outline"]

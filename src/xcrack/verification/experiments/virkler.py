@@ -1,0 +1,147 @@
+"""Sixty-eight equal panels: mean a–N and scatter of lives from half of them (Virkler 1979)."""
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from xcrack.base.arrays import Floats
+from xcrack.crack.lines import line_crack
+from xcrack.fatigue.power import paris
+from xcrack.growth.step import Cycle, Step
+from xcrack.mesh.plates import plate
+from xcrack.model.loads import traction
+from xcrack.model.material import Isotropic
+from xcrack.model.problem import Problem
+from xcrack.runs.history import History
+from xcrack.runs.life import life
+from xcrack.runs.scatter import Scatter, lognormal
+from xcrack.verification.experiments.experiment import Experiment
+from xcrack.verification.experiments.outcome import Comparison, Curve, Outcome, Picture
+from xcrack.verification.experiments.trial import Trial, driving, grown
+
+_STEPS, _FEW = 30, 12
+_MEAN = 0.03  # of the mean cycles of the other half, from a = 15 mm on
+_FROM = 15.0
+_HELD, _BAND = 30, (2.5, 97.5)  # of 34 lives in the band of 95 %
+_SAMPLES, _SEED = 20_000, 1979
+
+
+def _panel(experiment: Experiment, half: float) -> Problem:
+    geometry, material, load = experiment.geometry, experiment.material, experiment.load
+    width, length = geometry["width"], geometry["length"]
+    mesh = plate(
+        width, length, lower=(-width / 2, -length / 2), size=12.0, size_near=2.0,
+        along=[(-62.0, 0.0), (62.0, 0.0)], band=3.0, transition=40.0,
+    )  # fmt: skip
+    stress = load["stress_range"] / (1.0 - load["R"])
+    pull = [traction("top", (0.0, stress)), traction("bottom", (0.0, -stress))]
+    alloy = Isotropic(material["E"], material["nu"], "stress")
+    return Problem(mesh, alloy, [line_crack([(-half, 0.0), (half, 0.0)])], loads=pull)
+
+
+def _cycles(a: Floats, dK_at: tuple[Floats, Floats], constants: Floats) -> Floats:
+    """Cycles from a[0] on at half lengths a, for ln C and m of a Paris law."""
+    fine = np.linspace(a[0], a[-1], 2001)
+    dK = np.exp(np.interp(fine, dK_at[0], np.log(dK_at[1])))
+    slowness = np.exp(-constants[0]) * dK ** -constants[1]
+    N = np.concatenate([[0.0], np.cumsum(0.5 * (slowness[1:] + slowness[:-1]) * np.diff(fine))])
+    return np.asarray(np.interp(a, fine, N))
+
+
+def _fitted(a: Floats, mean: Floats, dK_at: tuple[Floats, Floats]) -> Floats:
+    """Ln C and m of the law whose cycles are nearest to a mean curve, as shares of it."""
+
+    def misfit(constants: Floats) -> Floats:
+        return np.asarray((_cycles(a, dK_at, constants) - mean) / mean[-1])
+
+    start = np.log(np.gradient(a, mean).mean()) - 3.0 * np.log(dK_at[1].mean())
+    return np.asarray(least_squares(misfit, [start, 3.0], x_scale=[1.0, 0.1]).x)
+
+
+def _run(experiment: Experiment, quick: bool) -> Outcome:
+    a = np.array(experiment.measured["a"], dtype=float)
+    N = np.array(experiment.measured["N"], dtype=float)  # lengths, tests
+    fitted, others = N[:, 1::2], N[:, 0::2]
+    history, law, dK_at = _history(experiment, a, fitted.mean(axis=1), quick)
+    ratio = _cycles(a, dK_at, np.array([np.log(law.C), law.m])) / np.maximum(
+        others.mean(axis=1), 1.0
+    )
+    end = _half(history.steps[-1])  # the last solve, within half a step of the last length
+    late = (a >= _FROM) & (a <= end)
+    ended, last = (
+        np.array([np.interp(end, a, test) for test in half.T]) for half in (fitted, others)
+    )
+    sigma = float(np.std(np.log(ended), ddof=1))
+    scatter = Scatter(C=lognormal(sigma))
+    lives = life(history, scatter=scatter, samples=_SAMPLES, seed=_SEED)
+    low, high = (lives.percentile(p) for p in _BAND)
+    held = int(np.sum((last >= low) & (last <= high)))
+    worst = float(np.abs(ratio[late] - 1.0).max())
+    comparisons = (
+        Comparison("largest error of the mean cycles of the other half, a ≥ 15 mm", worst,
+                   measure="number", most=_MEAN),
+        Comparison("mean life of the other half", float(lives.life), float(last.mean()),
+                   "ratio", "cycles", 1 - _MEAN, 1 + _MEAN),
+        Comparison("lives of the other half within the band of 95 %, of 34", held,
+                   measure="number", least=_HELD),
+        Comparison("deviation of ln N, fitted half and other half", sigma,
+                   float(np.std(np.log(last), ddof=1)), "ratio"),
+    )  # fmt: skip
+    words = (
+        f"Law fitted to the mean of 34 tests: m = {law.m:.2f}; deviation of ln C {sigma:.4f}: "
+        f"95 % of the lives between {low:.0f} and {high:.0f} cycles.",
+        "What the law fits is its own half: the shape of K over a, and the scatter, are tried.",
+    )
+    return Outcome(
+        experiment.name, (experiment.name,), comparisons,
+        (_of_lengths(a, N, dK_at, law), _of_lives(last, lives.N)), words,
+    )  # fmt: skip
+
+
+def _history(
+    experiment: Experiment, a: Floats, mean: Floats, quick: bool
+) -> tuple[History, paris, tuple[Floats, Floats]]:
+    """A run from the first to the last length under the law fitted to a mean curve, and its K."""
+    da = (a[-1] - a[0]) / (_FEW if quick else _STEPS)
+    cycle = Cycle(experiment.load["R"], 1.0)
+
+    def run(law: paris, end: float) -> History:
+        panel = _panel(experiment, a[0])
+        return grown(panel, law, cycle, da, lambda step: _half(step) >= end)
+
+    trial = run(paris(1e-12, 3.0), a[-1])
+    tips, dK = driving(trial)
+    right = tips[:, 0] > 0
+    dK_at = tips[right, 0], dK[right]
+    constants = _fitted(a, mean, dK_at)
+    law = paris(float(np.exp(constants[0])), float(constants[1]))
+    return run(law, a[-1] - 0.6 * da), law, dK_at
+
+
+def _half(step: Step) -> float:
+    return float(step.cracks[0].points[:, 0].max())
+
+
+def _of_lengths(a: Floats, N: Floats, dK_at: tuple[Floats, Floats], law: paris) -> Picture:
+    predicted = np.stack([_cycles(a, dK_at, np.array([np.log(law.C), law.m])), a], axis=1)
+    tests = [Curve.of("" if k else "34 tests of the other half", np.stack([N[:, j], a], axis=1),
+                      "other") for k, j in enumerate(range(0, N.shape[1], 2))]  # fmt: skip
+    mean = Curve.of("their mean", np.stack([N[:, 0::2].mean(axis=1), a], axis=1), "measured")
+    curves = (*tests, mean, Curve.of("predicted", predicted, "predicted"))
+    return Picture("Half length over cycles", "N", "a [mm]", curves)
+
+
+def _of_lives(measured: Floats, drawn: Floats) -> Picture:
+    share = (np.arange(len(measured)) + 0.5) / len(measured)
+    levels = np.linspace(0.002, 0.998, 250)
+    return Picture(
+        "Share of the tests that have ended", "N", "share",
+        (Curve.of("measured, other half", np.stack([np.sort(measured), share], axis=1), "measured"),
+         Curve.of("predicted", np.stack([np.quantile(drawn, levels), levels], axis=1),
+                  "predicted")),
+    )  # fmt: skip
+
+
+TRIALS = (Trial("virkler_1979", _run),)
+
+
+__all__ = ["TRIALS"]
