@@ -33,6 +33,15 @@ class Only(Word):
         return VALID if isinstance(value, str) and value == "cycle-rule" else NONSENSE
 
 
+class OnlyTest(Word):
+    """Part of the name of a test; others would run for long."""
+
+    def verdict(self, value):
+        if isinstance(value, str) and "no such" not in value and value != "demir":
+            return SKIP
+        return VALID if isinstance(value, str) and value == "demir" else NONSENSE
+
+
 def settings(value):
     """Whether a value is settings of a chart: of none of the general ones."""
     return None if isinstance(value, dict) and not value else value is None or False
@@ -78,6 +87,27 @@ ENTRIES = [
         },
         in_folder=True,
         cost=0.2,
+    ),
+    Entry(
+        "validate",
+        lambda **named: xc.validate(**named).passed,
+        {
+            "only": arg(
+                OnlyTest(), "demir", near={"unknown": lambda: "no such test"}, words=["test"]
+            ),
+            "quick": arg(Flag(), True),
+            "progress": arg(Flag(), False),
+            "data": arg(Filename(optional=True, folder=True, known=(".",)), None, words=["folder"]),
+            "file": arg(
+                Filename(optional=True, endings=(".html", ".md")),
+                None,
+                "good.html",
+                near=paths(".html", ""),
+                words=["page", "results"],
+            ),
+        },
+        in_folder=True,
+        cost=1.0,
     ),
     Entry(
         "chart",

@@ -44,6 +44,7 @@ from xcrack.model.values import (
 )
 
 _AXIAL = 1e-3  # share of a force along the axis that may stem from the fit of the axis
+_PIN_ANGLE = pi / 2  # of a pin with clearance: 60 to 120 degrees
 _COVERED = 0.9  # share of the contact of a pin that must lie on the set
 
 
@@ -272,7 +273,7 @@ class bearing(Load):  # noqa: N801
 
     where: Annotated[str, SetName()]
     force: Annotated[ArrayLike, Vector(unit=FORCE)]
-    contact_angle: Annotated[float, Number(above=0, most=pi)] = pi / 2
+    contact_angle: Annotated[float, Number(above=0, most=pi)] = _PIN_ANGLE
     acts = frozenset({"traction"})
     has_one_arrow = True
 

@@ -8,6 +8,7 @@ from xcrack.fatigue.power import paris
 from xcrack.growth.step import Cycle, Step
 from xcrack.mesh.box import box
 from xcrack.mesh.mesh import Mesh
+from xcrack.mesh.refinement import refine
 from xcrack.model.loads import traction
 from xcrack.model.material import Isotropic
 from xcrack.model.problem import Problem
@@ -15,35 +16,24 @@ from xcrack.verification.experiments.experiment import Experiment
 from xcrack.verification.experiments.outcome import Comparison, Curve, Outcome, Picture
 from xcrack.verification.experiments.trial import Trial, grown
 
-_CELLS, _DA = 5.0, 0.014  # cells over the first depth; length of a step, mm
-_REACH = 0.26  # up to where cells are small, mm
-
-
-def _spread(core: float, length: float, size: float) -> Floats:
-    """Distances beyond a core of small cells, in steps that grow by 1.5."""
-    beyond = size * np.cumsum(1.5 ** np.arange(1, 60))
-    beyond = beyond[: int(np.searchsorted(beyond, length - core)) + 1]
-    return np.asarray(core + beyond * (length - core) / beyond[-1])
+_CELLS, _DA = 4.5, 0.016  # cells over the first depth; length of a step, mm
+_ASIDE = 0.0137  # mm: no plane of mesh points is that of the crack
+_REACH, _COARSE = 0.21, 0.25  # up to where cells are small, and those far away, mm
 
 
 def _block(experiment: Experiment) -> Mesh:
-    """The block: x along the surface, y into the depth, z along the load."""
+    """The block, x along the surface, y into the depth, z along the load: fine at the crack."""
     geometry = experiment.geometry
-    (x0, y0, z0), (x1, y1, z1) = geometry["box"]
-    size = geometry["depth"] / _CELLS
-    across, near = _REACH, 3.5 * size
-    x, z = (np.linspace(-c, c, 2 * int(np.ceil(c / size)) + 1) for c in (across, near))
-    y = np.linspace(y0, _REACH, int(np.ceil(_REACH / size)) + 1)
-    lines = (
-        np.concatenate([-_spread(across, -x0, size)[::-1], x, _spread(across, x1, size)]),
-        np.concatenate([y, _spread(_REACH, y1, size)]),
-        np.concatenate([-_spread(near, -z0, size)[::-1], z, _spread(near, z1, size)]),
-    )
-    count = tuple(len(line) - 1 for line in lines)
-    flat = box((0, 0, 0), count, count)  # integer corners, mapped below
-    number = np.rint(flat.points).astype(int)
-    points = np.stack([line[number[:, k]] for k, line in enumerate(lines)], axis=1)
-    return Mesh(points, flat.cells, flat.facet_sets)
+    lower, upper = np.array(geometry["box"]) + [0.0, 0.0, _ASIDE]
+    near = geometry["depth"] / _CELLS
+
+    def size(x: Floats) -> Floats:
+        away = np.linalg.norm(x, axis=1) - _REACH
+        beyond = np.hypot(np.maximum(away, 0.0), np.maximum(np.abs(x[:, 2]) - 2.5 * near, 0.0))
+        return np.asarray(1.75 * near + 0.8 * beyond)
+
+    count = tuple(int(n) for n in np.rint((upper - lower) / _COARSE))
+    return refine(box(tuple(lower), tuple(upper), count), size=size)
 
 
 def _depth(step: Step) -> float:

@@ -5,6 +5,7 @@ import numpy as np
 from xcrack.analysis.solve import solve
 from xcrack.crack.lines import line_crack
 from xcrack.fatigue.criteria import equivalent_K, max_hoop_stress
+from xcrack.mesh.mesh import Mesh
 from xcrack.mesh.plates import plate
 from xcrack.model.loads import resultant
 from xcrack.model.material import Isotropic
@@ -18,31 +19,39 @@ _FINE, _COARSE = 1.0, 2.0
 _WITHIN = 8.0  # degrees, up to 45 degrees of loading
 
 
-def _specimen(experiment: Experiment, length: float, angle: float, size: float) -> Problem:
-    """Specimen under a unit force per thickness through its middle, at an angle from the normal."""
-    geometry, material = experiment.geometry, experiment.material
+def _mesh(experiment: Experiment, size: float) -> Mesh:
+    """Specimen whose cells are small where all cracks end."""
+    geometry, lengths = experiment.geometry, np.array(experiment.measured["tests"])[:, 2]
     width, height = geometry["width"], geometry["height"]
-    mesh = plate(
-        width, height, lower=(0.0, -height / 2), size=5.0, size_near=size,
-        along=[(length - 6.0, 0.0), (length + 6.0, 0.0)], band=2.0, transition=20.0,
+    ends = [(float(lengths.min()) - 6.0, 0.0), (float(lengths.max()) + 6.0, 0.0)]
+    return plate(
+        width, height, lower=(0.0, -height / 2), size=5.0, size_near=size, along=ends, band=2.0,
+        transition=20.0,
     )  # fmt: skip
+
+
+def _specimen(experiment: Experiment, mesh: Mesh, length: float, angle: float) -> Problem:
+    """Specimen under a unit force per thickness through its middle, at an angle from the normal."""
+    material = experiment.material
     pull = np.array([np.sin(angle), np.cos(angle)])
+    middle = (experiment.geometry["width"] / 2, 0.0)
     loads = [
-        resultant(side, force=sign * pull, moment=0.0, about=(width / 2, 0.0))
+        resultant(side, force=sign * pull, moment=0.0, about=middle)
         for side, sign in (("top", 1.0), ("bottom", -1.0))
     ]
-    steel = Isotropic(material["E"], material["nu"], "strain")
-    return Problem(mesh, steel, [line_crack([(-1.0, 0.0), (length, 0.0)])], loads=loads)
+    alloy = Isotropic(material["E"], material["nu"], "strain")
+    return Problem(mesh, alloy, [line_crack([(-1.0, 0.0), (length, 0.0)])], loads=loads)
 
 
 def _run(experiment: Experiment, quick: bool) -> Outcome:
     tests = np.array(experiment.measured["tests"])
+    mesh = _mesh(experiment, _COARSE if quick else _FINE)
     comparisons, points, loads = [], [], []
     scale, nu = None, experiment.material["nu"]
     for angle in np.unique(tests[:, 0]):
         same = tests[tests[:, 0] == angle]
         length = float(same[:, 2].mean())
-        scene = _specimen(experiment, length, np.radians(angle), _COARSE if quick else _FINE)
+        scene = _specimen(experiment, mesh, length, np.radians(angle))
         K = stress_intensity(solve(scene)).K[0]
         turn = float(abs(max_hoop_stress(np.array([[K], [K]]), nu)[0][0]))
         K_eq = float(equivalent_K(K, -np.sign(K[1]) * turn, nu))

@@ -1,0 +1,113 @@
+"""The page docs/validation.md and its figures, from stored results of `xcrack validate`.
+
+    xcrack validate -o out/validation.html
+    python scripts/validation_page.py out/validation.results
+
+The results are kept in benchmarks/results/validation.json; without a folder the page is made from there.
+"""
+
+import json
+import math
+import sys
+from pathlib import Path
+
+from xcrack.verification.experiments.experiment import read_experiment
+from xcrack.verification.experiments.outcome import Outcome
+from xcrack.verification.experiments.page import MEANING, bound_words, value_words
+from xcrack.verification.experiments.pictures import draw_picture, draw_ratios
+from xcrack.verification.experiments.validate import TRIALS
+
+ROOT = Path(__file__).parents[1]
+STORED = ROOT / "benchmarks" / "results" / "validation.json"
+FIGURES = ROOT / "docs" / "figures"
+PAGE = ROOT / "docs" / "validation.md"
+HEAD = """# Predicted and measured
+
+```sh
+python -m xcrack validate --quick                  # tests in the plane, coarse cells and long steps
+python -m xcrack validate -o validation.html       # all tests, as a page; goes on where it was stopped
+python -m xcrack validate -k wagner                # tests with this in their name
+python -m xcrack validate --data folder -o v.html  # with measured numbers that may not be passed on
+```
+"""
+
+
+def outcomes_of(folder):
+    """Results of a folder, one of each test, in the order of the trials."""
+    found = {}
+    for path in sorted(folder.glob("*.json"), key=lambda path: path.stat().st_mtime):
+        outcome = Outcome.from_json(path.read_text(encoding="utf-8"))
+        found[outcome.name] = outcome
+    return [found[trial.name] for trial in TRIALS if trial.name in found]
+
+
+def stored():
+    """Results that the repository keeps."""
+    content = json.loads(STORED.read_text(encoding="utf-8"))
+    return [Outcome.from_json(json.dumps(each)) for each in content]
+
+
+def row(cells):
+    return "| " + " | ".join(cells) + " |"
+
+
+def rows_of(outcome):
+    """Table of what is asserted, and of the rest where there is little of it."""
+    lines = [row(["number", "predicted", "measured", "value", "asserted"]), "|---|---|---|---|---|"]
+    for each in outcome.comparisons:
+        has_pair = each.measure in ("ratio", "difference")
+        pair = (f"{each.predicted:.4g}", f"{each.measured:.4g}") if has_pair else ("", "")
+        mark = "" if each.passed else " **no**"
+        lines.append(row([each.name, *pair, value_words(each), bound_words(each) + mark]))
+    return lines
+
+
+def section(outcome):
+    """A test: picture, numbers, words, source."""
+    test = read_experiment(outcome.name)
+    lines = [f"## {test.title}", ""]
+    if outcome.pictures:
+        file = FIGURES / f"validation_{outcome.name}.png"
+        draw_picture(outcome.pictures[0], file)
+        lines += [f"![{test.title}: {outcome.pictures[0].words.lower()}](figures/{file.name})", ""]
+    lines += [*rows_of(outcome), ""]
+    lines += [f"* {word}" for word in (*outcome.words, *test.remarks)]
+    source = f"{test.source['work']}; read in {test.source['place']}; licence: {test.license}"
+    recalled = " ".join(test.recalled) or "nothing"
+    return [*lines, "", f"Source: {source}. From memory: {recalled}", ""]
+
+
+def main():
+    if len(sys.argv) > 1:
+        found = outcomes_of(Path(sys.argv[1]))
+        contents = [json.loads(each.to_json()) for each in found]
+        STORED.write_text(json.dumps(contents, ensure_ascii=False) + "\n", encoding="utf-8")
+    outcomes = stored()
+    titles = {each.name: read_experiment(each.name).title for each in outcomes}
+    draw_ratios(outcomes, titles, FIGURES / "validation_ratios.png")
+    seconds = sum(each.seconds for each in outcomes if math.isfinite(each.seconds))
+    lines = [HEAD, *(f"{words}\n" for words in MEANING)]
+    lines += [
+        f"{len(outcomes)} tests took {seconds / 60:.1f} minutes of one core; a result that is stored is not "
+        "computed again. `validation.results` beside the page holds them, and this page is made of "
+        "stored results too.",
+        "",
+        "![Predicted over measured, all tests](figures/validation_ratios.png)",
+        "",
+        row(["test", "", "first number", "value", "asserted", "s"]),
+        "|---|---|---|---|---|---|",
+    ]
+    for outcome in outcomes:
+        first = outcome.comparisons[0]
+        lines.append(
+            row([titles[outcome.name], outcome.status, first.name, value_words(first),
+                 bound_words(first), f"{outcome.seconds:.0f}"])
+        )  # fmt: skip
+    lines.append("")
+    for outcome in outcomes:
+        lines += section(outcome)
+    PAGE.write_text("\n".join(lines), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
