@@ -3,12 +3,14 @@
     xcrack validate -o out/validation.html
     python scripts/validation_page.py out/validation.results
 
-The results are kept in benchmarks/results/validation.json; without a folder the page is made from there.
+The results are kept in benchmarks/results/validation.json; without a folder the page is made
+from there.
 """
 
 import json
 import math
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 from xcrack.verification.experiments.experiment import read_experiment
@@ -24,34 +26,34 @@ PAGE = ROOT / "docs" / "validation.md"
 HEAD = """# Predicted and measured
 
 ```sh
-python -m xcrack validate --quick                  # tests in the plane, coarse cells and long steps
-python -m xcrack validate -o validation.html       # all tests, as a page; goes on where it was stopped
-python -m xcrack validate -k wagner                # tests with this in their name
-python -m xcrack validate --data folder -o v.html  # with measured numbers that may not be passed on
+python -m xcrack validate --quick               # tests in the plane, coarse cells, long steps
+python -m xcrack validate -o validation.html    # all tests, as a page; goes on where it stopped
+python -m xcrack validate -k wagner             # tests with this in their name
+python -m xcrack validate --data folder         # with measured numbers that are not free
 ```
 """
 
 
-def outcomes_of(folder):
+def outcomes_of(folder: Path) -> list[Outcome]:
     """Results of a folder, one of each test, in the order of the trials."""
-    found = {}
+    found: dict[str, Outcome] = {}
     for path in sorted(folder.glob("*.json"), key=lambda path: path.stat().st_mtime):
         outcome = Outcome.from_json(path.read_text(encoding="utf-8"))
         found[outcome.name] = outcome
     return [found[trial.name] for trial in TRIALS if trial.name in found]
 
 
-def stored():
+def stored() -> list[Outcome]:
     """Results that the repository keeps."""
     content = json.loads(STORED.read_text(encoding="utf-8"))
     return [Outcome.from_json(json.dumps(each)) for each in content]
 
 
-def row(cells):
+def row(cells: Sequence[str]) -> str:
     return "| " + " | ".join(cells) + " |"
 
 
-def rows_of(outcome):
+def rows_of(outcome: Outcome) -> list[str]:
     """Table of what is asserted, and of the rest where there is little of it."""
     lines = [row(["number", "predicted", "measured", "value", "asserted"]), "|---|---|---|---|---|"]
     for each in outcome.comparisons:
@@ -62,7 +64,7 @@ def rows_of(outcome):
     return lines
 
 
-def section(outcome):
+def section(outcome: Outcome) -> list[str]:
     """A test: picture, numbers, words, source."""
     test = read_experiment(outcome.name)
     lines = [f"## {test.title}", ""]
@@ -77,7 +79,7 @@ def section(outcome):
     return [*lines, "", f"Source: {source}. From memory: {recalled}", ""]
 
 
-def main():
+def main() -> None:
     if len(sys.argv) > 1:
         found = outcomes_of(Path(sys.argv[1]))
         contents = [json.loads(each.to_json()) for each in found]
@@ -88,9 +90,9 @@ def main():
     seconds = sum(each.seconds for each in outcomes if math.isfinite(each.seconds))
     lines = [HEAD, *(f"{words}\n" for words in MEANING)]
     lines += [
-        f"{len(outcomes)} tests took {seconds / 60:.1f} minutes of one core; a result that is stored is not "
-        "computed again. `validation.results` beside the page holds them, and this page is made of "
-        "stored results too.",
+        f"{len(outcomes)} tests took {seconds / 60:.1f} minutes of one core. The folder beside the "
+        "page keeps the result of each, which is not computed again; this page is made of stored "
+        "results too.",
         "",
         "![Predicted over measured, all tests](figures/validation_ratios.png)",
         "",
