@@ -36,11 +36,11 @@ python -m xcrack validate --data folder         # with measured numbers that are
 
 def outcomes_of(folder: Path) -> list[Outcome]:
     """Results of a folder, one of each test, in the order of the trials."""
-    found: dict[str, Outcome] = {}
+    outcomes: dict[str, Outcome] = {}
     for path in sorted(folder.glob("*.json"), key=lambda path: path.stat().st_mtime):
         outcome = Outcome.from_json(path.read_text(encoding="utf-8"))
-        found[outcome.name] = outcome
-    return [found[trial.name] for trial in TRIALS if trial.name in found]
+        outcomes[outcome.name] = outcome
+    return [outcomes[trial.name] for trial in TRIALS if trial.name in outcomes]
 
 
 def stored() -> list[Outcome]:
@@ -81,8 +81,8 @@ def section(outcome: Outcome) -> list[str]:
 
 def main() -> None:
     if len(sys.argv) > 1:
-        found = outcomes_of(Path(sys.argv[1]))
-        contents = [json.loads(each.to_json()) for each in found]
+        outcomes = outcomes_of(Path(sys.argv[1]))
+        contents = [json.loads(each.to_json()) for each in outcomes]
         STORED.write_text(json.dumps(contents, ensure_ascii=False) + "\n", encoding="utf-8")
     outcomes = stored()
     titles = {each.name: read_experiment(each.name).title for each in outcomes}

@@ -24,7 +24,7 @@ _REACH, _COARSE = 0.21, 0.25  # up to where cells are small, and those far away,
 def _block(experiment: Experiment) -> Mesh:
     """The block, x along the surface, y into the depth, z along the load: fine at the crack."""
     geometry = experiment.geometry
-    lower, upper = np.array(geometry["box"]) + [0.0, 0.0, _ASIDE]
+    lower, upper = np.array(geometry["box"]) + np.array([0.0, 0.0, _ASIDE])
     near = geometry["depth"] / _CELLS
 
     def size(x: Floats) -> Floats:

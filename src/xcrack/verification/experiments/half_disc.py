@@ -65,7 +65,7 @@ def _scene(experiment: Experiment, n: int, slides: bool) -> Problem:
 def _run(experiment: Experiment, quick: bool) -> Outcome:
     n, da = _COARSE if quick else _FINE
     measured, top = experiment.path, experiment.geometry["radius"]
-    known = measured[measured[:, 1] <= 0.9 * top]
+    compared = measured[measured[:, 1] <= 0.9 * top]
 
     def path_of(n: int, da: float, slides: bool = True) -> Floats:
         history = grown(
@@ -75,7 +75,7 @@ def _run(experiment: Experiment, quick: bool) -> Outcome:
         return np.asarray(history.cracks[0].points[1:])
 
     path = path_of(n, da)
-    comparisons = path_comparisons(known, path, within=(_RMS, inf))
+    comparisons = path_comparisons(compared, path, within=(_RMS, inf))
     curves = [
         *outline(_half_disc(experiment, n)),
         Curve.of("measured", measured, "measured"),
@@ -83,7 +83,7 @@ def _run(experiment: Experiment, quick: bool) -> Outcome:
     ]
     words = []
     for other in experiment.others:
-        there = rms(distances(known, np.array(other["path"])))
+        there = rms(distances(compared, np.array(other["path"])))
         words.append(f"{other['program']}: distance of the path, rms {there:.2f} mm")
     if not quick:
         bar = float(distances(path, path_of(*_COARSE)).max())
@@ -91,9 +91,9 @@ def _run(experiment: Experiment, quick: bool) -> Outcome:
             Comparison("bar of the predicted path: coarser cells and longer steps", bar,
                        unit="mm", measure="number")
         )  # fmt: skip
-        held = path_of(*_COARSE, slides=False)
-        comparisons += path_comparisons(known, held, where=", both supports held")
-        curves.append(Curve.of("predicted, both supports held", held, "variant"))
+        clamped = path_of(*_COARSE, slides=False)
+        comparisons += path_comparisons(compared, clamped, where=", both supports held")
+        curves.append(Curve.of("predicted, both supports held", clamped, "variant"))
     curves.append(Curve.of("predicted", path, "predicted"))
     picture = Picture("Path", "x [mm]", "y [mm]", tuple(curves), is_to_scale=True)
     words.append(

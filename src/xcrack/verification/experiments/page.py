@@ -74,9 +74,9 @@ def _summary(outcomes: Sequence[Outcome], titles: Mapping[str, str]) -> Markup:
             f'<a href="#{escape_html(outcome.name)}">{escape_html(titles[outcome.name])}</a>'
         )
         first = next(iter(outcome.comparisons), None)
-        said = "" if first is None else f"{first.name}: {value_words(first)}"
+        number = "" if first is None else f"{first.name}: {value_words(first)}"
         status = element("span", outcome.status, cls=_CLASS[outcome.status])
-        rows.append([link, said, status, f"{outcome.seconds:.0f} s"])
+        rows.append([link, number, status, f"{outcome.seconds:.0f} s"])
     return table(("test", "first number", "", "time"), rows)
 
 

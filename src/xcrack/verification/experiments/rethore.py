@@ -94,7 +94,7 @@ def _run(experiment: Experiment, quick: bool) -> Outcome:
     force: list[Curve] = []
     for kind in ("bands", "sliding") if quick else _SUPPORTS:
         reach = _FADES if kind == "sides" else _END
-        known = measured[measured[:, 0] >= reach]
+        compared = measured[measured[:, 0] >= reach]
         for contact in ("auto", "off"):
             history = grown(
                 plate_of(experiment, mesh, kind, contact), _LAW, Cycle(0.0, 1.0), da,
@@ -103,7 +103,7 @@ def _run(experiment: Experiment, quick: bool) -> Outcome:
             path = history.cracks[0].points[1:]
             words = f"{_SUPPORTS[kind]}, contact {contact.replace('auto', 'on')}"
             within = (_RMS if (kind, contact) == ("bands", "auto") else inf, inf)
-            comparisons += path_comparisons(known, path, within=within, where=f": {words}")
+            comparisons += path_comparisons(compared, path, within=within, where=f": {words}")
             role: Role = "predicted" if (kind, contact) == ("bands", "auto") else "variant"
             curves.append(Curve.of(words, path, role))
             if (kind, contact) == ("bands", "auto"):
@@ -131,9 +131,9 @@ def _gain_by_contact(comparisons: list[Comparison]) -> list[Comparison]:
     gains = []
     for kind, words in _SUPPORTS.items():
         name = f"distance of the path, rms: {words}, contact "
-        found = {c.name.removeprefix(name): c.predicted for c in comparisons if name in c.name}
-        if found and kind != "bands":
-            share = found["on"] / found["off"]
+        rms_of = {c.name.removeprefix(name): c.predicted for c in comparisons if name in c.name}
+        if rms_of and kind != "bands":
+            share = rms_of["on"] / rms_of["off"]
             gains.append(
                 Comparison(f"rms with contact over rms without: {words}", share, measure="number",
                            most=1.0)

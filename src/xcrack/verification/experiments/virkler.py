@@ -60,31 +60,29 @@ def _fitted(a: Floats, mean: Floats, dK_at: tuple[Floats, Floats]) -> Floats:
 def _run(experiment: Experiment, quick: bool) -> Outcome:
     a = np.array(experiment.measured["a"], dtype=float)
     N = np.array(experiment.measured["N"], dtype=float)  # lengths, tests
-    fitted, others = N[:, 1::2], N[:, 0::2]
+    fitted, rest = N[:, 1::2], N[:, 0::2]
     history, law, dK_at = _history(experiment, a, fitted.mean(axis=1), quick)
-    ratio = _cycles(a, dK_at, np.array([np.log(law.C), law.m])) / np.maximum(
-        others.mean(axis=1), 1.0
-    )
+    ratio = _cycles(a, dK_at, np.array([np.log(law.C), law.m])) / np.maximum(rest.mean(axis=1), 1.0)
     end = _half(history.steps[-1])  # the last solve, within half a step of the last length
-    late = (a >= _FROM) & (a <= end)
-    ended, last = (
-        np.array([np.interp(end, a, test) for test in half.T]) for half in (fitted, others)
+    range_of_a = (a >= _FROM) & (a <= end)
+    lives_fitted, lives_other = (
+        np.array([np.interp(end, a, test) for test in half.T]) for half in (fitted, rest)
     )
-    sigma = float(np.std(np.log(ended), ddof=1))
+    sigma = float(np.std(np.log(lives_fitted), ddof=1))
     scatter = Scatter(C=lognormal(sigma))
     lives = life(history, scatter=scatter, samples=_SAMPLES, seed=_SEED)
     low, high = (lives.percentile(p) for p in _BAND)
-    held = int(np.sum((last >= low) & (last <= high)))
-    worst = float(np.abs(ratio[late] - 1.0).max())
+    covered = int(np.sum((lives_other >= low) & (lives_other <= high)))
+    worst = float(np.abs(ratio[range_of_a] - 1.0).max())
     comparisons = (
         Comparison("largest error of the mean cycles of the other half, a ≥ 15 mm", worst,
                    measure="number", most=_MEAN),
-        Comparison("mean life of the other half", float(lives.life), float(last.mean()),
+        Comparison("mean life of the other half", float(lives.life), float(lives_other.mean()),
                    "ratio", "cycles", 1 - _MEAN, 1 + _MEAN),
-        Comparison("lives of the other half within the band of 95 %, of 34", held,
+        Comparison("lives of the other half within the band of 95 %, of 34", covered,
                    measure="number", least=_HELD),
         Comparison("deviation of ln N, fitted half and other half", sigma,
-                   float(np.std(np.log(last), ddof=1)), "ratio"),
+                   float(np.std(np.log(lives_other), ddof=1)), "ratio"),
     )  # fmt: skip
     words = (
         f"Law fitted to the mean of 34 tests: m = {law.m:.2f}; deviation of ln C {sigma:.4f}: "
@@ -93,7 +91,7 @@ def _run(experiment: Experiment, quick: bool) -> Outcome:
     )
     return Outcome(
         experiment.name, (experiment.name,), comparisons,
-        (_of_lengths(a, N, dK_at, law), _of_lives(last, lives.N)), words,
+        (_of_lengths(a, N, dK_at, law), _of_lives(lives_other, lives.N)), words,
     )  # fmt: skip
 
 

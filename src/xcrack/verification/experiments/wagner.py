@@ -154,10 +154,10 @@ def _run(experiment: Experiment, quick: bool) -> Outcome:
     curves += [Curve.of(o["program"], o["path"], "other") for o in experiment.others if "path" in o]
     grid = np.linspace(counts[0, 2], counts[-1, 2], 200)
     along = cycles_at(history, experiment, grid)
-    known = np.isfinite(along)
+    reached = np.isfinite(along)
     life = [
         Curve.of("measured", counts[:, [0, 2]], "measured"),
-        Curve.of("predicted", np.stack([along, grid], axis=1)[known], "predicted"),
+        Curve.of("predicted", np.stack([along, grid], axis=1)[reached], "predicted"),
     ]
     for published in experiment.others:
         program = published["program"]
