@@ -68,10 +68,10 @@ def section(outcome: Outcome) -> list[str]:
     """A test: picture, numbers, words, source."""
     test = read_experiment(outcome.name)
     lines = [f"## {test.title}", ""]
-    if outcome.pictures:
-        file = FIGURES / f"validation_{outcome.name}.png"
-        draw_picture(outcome.pictures[0], file)
-        lines += [f"![{test.title}: {outcome.pictures[0].words.lower()}](figures/{file.name})", ""]
+    for number, picture in enumerate(outcome.pictures):
+        file = FIGURES / f"validation_{outcome.name}{'_2' * number}.png"
+        draw_picture(picture, file)
+        lines += [f"![{test.title}: {picture.words.lower()}](figures/{file.name})", ""]
     lines += [*rows_of(outcome), ""]
     lines += [f"* {word}" for word in (*outcome.words, *test.remarks)]
     source = f"{test.source['work']}; read in {test.source['place']}; licence: {test.license}"

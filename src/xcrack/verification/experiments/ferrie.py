@@ -59,14 +59,7 @@ def _run(experiment: Experiment, quick: bool) -> Outcome:
     N = np.array([step.cycles for step in history.steps])
     depth = np.array([_depth(step) for step in history.steps])
     predicted = float(np.interp(measured["depth"], depth, N))
-    fronts = []
-    for step in history.steps:
-        points = step.cracks[0].points[np.unique(step.cracks[0].faces)]
-        angle = np.arctan2(points[:, 1], points[:, 0])
-        radius = np.linalg.norm(points[:, :2], axis=1)
-        bins = np.linspace(0.02, np.pi - 0.02, 31)
-        rim = [radius[np.abs(angle - b) < 0.06].max(initial=np.nan) for b in bins]
-        fronts.append(np.stack([rim * np.cos(bins), rim * np.sin(bins)], axis=1))
+    fronts = [step.sif[-1][0].x[:, :2] for step in history.solved]
     comparisons = (
         Comparison("cycles to the depth of .1733 mm", predicted, measured["N"], "ratio"),
         Comparison("depth after 4000 cycles", float(np.interp(measured["N"], N, depth)),

@@ -73,14 +73,14 @@ def draw_ratios(outcomes: Sequence[Outcome], titles: Mapping[str, str], file: Pa
         for outcome in outcomes
     ]
     rows = [(outcome, values) for outcome, values in rows if values]
-    figure = new_figure((7.4, 1.2 + 0.42 * max(len(rows), 1)), False, "validate")
+    figure = new_figure((9.6, 1.4 + 0.42 * max(len(rows), 1)), False, "validate")
     axes = figure.add_subplot()
     axes.axvspan(0.5, 2.0, color="#2a7d2a", alpha=0.10, lw=0, label="factor of 2")
     axes.axvline(1.0, color="0.3", lw=1.0)
     for place, (_, values) in enumerate(rows):
         axes.plot(values, np.full(len(values), place), "o", ms=5, mfc="none", color="#c2184b")
     axes.set(
-        xscale="log", xlabel="predicted over measured: cycles, loads, lengths",
+        xscale="log", xlabel="predicted over measured",
         ylim=(len(rows) - 0.5, -0.5),
     )  # fmt: skip
     every = [value for _, values in rows for value in values]
@@ -89,7 +89,7 @@ def draw_ratios(outcomes: Sequence[Outcome], titles: Mapping[str, str], file: Pa
     axes.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
     axes.minorticks_off()
     axes.set_yticks(range(len(rows)), [titles[outcome.name] for outcome, _ in rows], fontsize=8)
-    axes.legend(fontsize=8, frameon=False, loc="lower left")
+    figure.legend(fontsize=8, frameon=False, loc="outside lower left")
     finish_figure(figure, file, False, dpi=110)
 
 

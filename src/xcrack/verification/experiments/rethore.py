@@ -199,6 +199,8 @@ _WORDS = (
     "platens are.",
     "K by image correlation fell to .7 of its first value in the test, as that of a crack that "
     "slows down in PMMA does; one toughness all along asks for a third more force at the end.",
+    "Under sliding platens T along the crack is far below zero near the end, and steps as long as "
+    "these then turn to and fro: the zigzag of that path is numerical.",
     "With whole sides clamped K falls to zero from x = 30 on, which the test did not show: that "
     "pair is compared up to there.",
 )

@@ -33,19 +33,24 @@ _REACH = {"b": 22.0}  # up to where the path is asserted
 _RMS = {"a": 0.7, "b": 0.8, "c": 1.0}
 _LIFE = 1.25
 _EARLY = (
-    "Two other programs and xcrack turn towards the holes earlier than the tests, by far more than "
-    "the bar of the path: in a plane body whose sides are loaded, path and K do not depend on E, "
-    "on plane strain or stress or, at one ratio of loads, on closure, and pins move the path less."
+    "Two other programs and xcrack turn towards the holes earlier than the tests, by several times "
+    "the bar of the path. Neither E nor plane strain or stress moves a path in a body under given "
+    "loads, and closure does not at one ratio of loads; pins move it by a fifth of the distance."
+)
+_SCATTER = (
+    "Lives of a and b come out short at first, those of c long: the law holds between specimens, "
+    "and closure at R = 0.1 is in its constants, which were measured at that ratio."
 )
 _WORDS = {
-    "a": (_EARLY,),
+    "a": (_EARLY, _SCATTER),
     "b": (
         _EARLY,
-        "The test ends in hole b; xcrack, FRANC3D and ZFEM miss it by a millimetre. On which side "
-        "of the hole a path passes hangs on tenths of a millimetre before: it is asserted up to "
-        "x = 22.",
+        _SCATTER,
+        "The test ends in hole b; xcrack, FRANC3D and ZFEM miss it by a millimetre or two. On "
+        "which side of the hole a path passes hangs on tenths of a millimetre before: it is "
+        "asserted up to x = 22.",
     ),
-    "c": (_EARLY,),
+    "c": (_EARLY, _SCATTER),
 }
 
 
