@@ -1,4 +1,9 @@
-"""Compilation of kernels, with a cache on disk that never stands in the way.
+"""Compilation of kernels: what they need and no more, with a cache that never stands in the way.
+
+Much of numba's work on a function is for what kernels do not have: closures, generators, array
+expressions, object mode; and its helpers are optimised and turned into machine code of their own
+before they are made part of their callers. Kernels leave this out, by numba's own means: a list of
+passes, and a library for helpers that stays code to be linked. It halves the time of a first run.
 
 numba keeps compiled code beside the source or in the user's cache folder. It raises where neither
 may be written to (containers, clusters), and at every later run once a cache file is damaged.
@@ -16,10 +21,83 @@ from typing import Any
 
 import numba
 from numba.core import caching
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import CompilerBase, DefaultPassBuilder
+from numba.core.compiler_machinery import PassManager, register_pass
+from numba.core.typed_passes import NativeLowering
 
 from xcrack.base.errors import warn
 
 _DAMAGE = (Exception,)  # what unpickling damaged bytes raises is anybody's guess
+
+
+# Passes for what kernels do not contain, by name: a version of numba without one of them has one
+# less to leave out.
+_NOT_NEEDED = {
+    "AnnotateTypes", "DumpParforDiagnostics", "FindLiterallyCalls", "InlineClosureLikes",
+    "InlineInlinables", "InlineOverloads", "LiteralPropagationSubPipelinePass", "LiteralUnroll",
+    "MakeFunctionToJitFunction", "NoPythonSupportedFeatureValidation", "NopythonRewrites",
+    "RewriteDynamicRaises", "RewriteSemanticConstants", "WithLifting",
+}  # fmt: skip
+
+
+class _Library(JITCodeLibrary):
+    """Machine code of a kernel: optimised once, with its helpers, and not function by function."""
+
+    def _optimize_functions(self, ll_module: Any) -> None:
+        ll_module.data_layout = self._codegen._data_layout
+
+
+class _HelperLibrary(_Library):
+    """Code of a helper, for its callers to link: it never becomes machine code by itself."""
+
+    def finalize(self) -> None:
+        for library in dict.fromkeys(self._linking_libraries):
+            self._reload_init.update(library._reload_init)
+            self._final_module.link_in(library._get_module_for_linking(), preserve=True)
+        self._finalized = True
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class _HelperLowering(NativeLowering):
+    """Lowering that ends before machine code."""
+
+    _name = "xcrack_helper_lowering"
+
+    def run_pass(self, state: Any) -> bool:
+        state.flags.no_compile = True
+        super().run_pass(state)
+        # numba finds a function by its entry point. This one is a callable of its own, as numba
+        # wants it, which refuses all arguments: Python has no business in a helper.
+        lowered, entry_point = state["cr"], f"{state.func_id.unique_name}".upper
+        state.targetctx.insert_user_function(entry_point, lowered.fndesc, [state.library])
+        state["cr"] = lowered._replace(cfunc=entry_point)
+        return True
+
+
+class _Kernel(CompilerBase):
+    """numba's passes without those that kernels do not need."""
+
+    library, lowering = _Library, NativeLowering
+
+    def define_pipelines(self) -> list[Any]:
+        state, passes = self.state, PassManager("kernel")
+        state.library = self.library(state.targetctx.codegen(), state.func_id.func_qualname)
+        state.library.enable_object_caching()
+        left_out = set(_NOT_NEEDED)
+        for each, text in DefaultPassBuilder.define_nopython_pipeline(state).passes:
+            if each.__name__ not in left_out:
+                passes.add_pass(self.lowering if each is NativeLowering else each, text)
+            if each.__name__ == "DeadBranchPrune":  # once: where an argument is None
+                left_out.add(each.__name__)
+        passes.finalize()
+        return [passes]
+
+
+class _Helper(_Kernel):
+    """The same for a function that only kernels call."""
+
+    library, lowering = _HelperLibrary, _HelperLowering
 
 
 class _Cache(caching.FunctionCache):
@@ -59,15 +137,21 @@ def kernel(function: Callable[..., Any]) -> Any:
 
     Division by zero gives inf or nan as in numpy. Python's lock is released, so that threads run
     kernels side by side. The helpers that a kernel calls stand in its own
-    file: numba notices changes of that file alone.
+    file: numba notices changes of that file alone. Their names begin with an underscore, and only
+    kernels call them. Loops are written out: an array expression makes a temporary array of
+    each of its terms.
 
     Parameters
     ----------
     function : callable
     """
-    compiled = numba.njit(error_model="numpy", nogil=True, no_cfunc_wrapper=True)(function)
+    is_helper = function.__name__.startswith("_")
+    compiled = numba.njit(
+        error_model="numpy", nogil=True, no_cfunc_wrapper=True, no_cpython_wrapper=is_helper,
+        pipeline_class=_Helper if is_helper else _Kernel,
+    )(function)  # fmt: skip
     if not numba.config.DISABLE_JIT:
-        compiled._cache = _cache_of(function)
+        compiled._cache = caching.NullCache() if is_helper else _cache_of(function)
         compiled.get_call_template = _of_types(compiled.get_call_template)
     return compiled
 

@@ -362,13 +362,14 @@ def add_solved(members, start, offset, inverse, r, out):  # type: ignore[no-unty
     part = np.empty(len(out), out.dtype)  # no block holds more
     for g in range(len(start) - 1):
         first, size = start[g], start[g + 1] - start[g]
-        part_values = part[:size]
-        part_values[:] = 0
+        for i in range(size):
+            part[i] = 0
         p = offset[g]
         # Column by column: a sum of columns is vectorised, a scalar product is not.
         for j in range(size):
             value = r[members[first + j]]
-            part_values += value * inverse[p : p + size]
-            p += np.uint64(size)
+            for i in range(size):
+                part[i] += value * inverse[p + i]
+            p += size
         for i in range(size):
-            out[members[first + i]] += part_values[i]
+            out[members[first + i]] += part[i]
