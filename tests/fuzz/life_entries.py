@@ -361,6 +361,11 @@ ENTRIES = [
         lambda law: HISTORY.rerate(law).life,
         {"law": arg(Called(), LAW)},
     ),
+    Entry(
+        "History",
+        lambda load: HISTORY.rerate(LAW, load=load).life,
+        {"load": arg(Called(optional=True), None)},
+    ),
 ]
 HOOKS = [
     Hook(

@@ -22,9 +22,16 @@ from xcrack.fatigue.law import Law
 from xcrack.fatigue.spectrum import Spectrum
 from xcrack.growth.step import Arrival, Join, Step
 from xcrack.mesh.mesh import Mesh
+from xcrack.runs.fracture_loads import fracture_loads
 from xcrack.runs.life_bar import LifeBar, life_bar
 from xcrack.runs.measures import measures_of_steps, measures_tables, with_measures
-from xcrack.runs.rerating import RecomputedRates, block_of_run, recompute_rates
+from xcrack.runs.rerating import (
+    LoadProgram,
+    Program,
+    RecomputedRates,
+    block_of_run,
+    recompute_rates,
+)
 from xcrack.runs.table import table
 
 
@@ -190,8 +197,14 @@ class History:
         criterion: Criterion | None = None,
         nu: float | None = None,
         threshold: float = 0.0,
+        load: Program | None = None,
+        K_max: Program | None = None,
     ) -> RecomputedRates:
-        """Cycles of the same steps by another growth law.
+        """Cycles of the same steps by another growth law, or under loads that change on the way.
+
+        The path of a run whose K is in proportion to its loads is that of any factor on them: the
+        loads may follow the crack afterwards, as in tests with a K-gradient, under load shedding
+        or at constant K (ASTM E647).
 
         Parameters
         ----------
@@ -200,21 +213,75 @@ class History:
             Law of the run, to be sure that ranges and ratios of the steps are what it was given.
         spectrum, criterion, nu, threshold : optional
             Of a run under a spectrum, as it had them: each cycle of a block is rated again.
+        load : callable a -> factor, optional
+            On all loads of the run, called with arrays of crack sizes as a law is given them: in 2D
+            the length in the body over the number of tips (length).
+        K_max : callable a -> K, optional
+            Largest equivalent K of a cycle or block (stress √length): the loads are scaled by it
+            over K of the same solve.
 
         Returns
         -------
         RecomputedRates
-            With `cycles` at each step, `life`, and the `bound` of what other shares of the tips
-            would change; 0 for one tip, where the error is that of the steps.
+            With `cycles` at each step, `life`, the `factor` on the loads at each step, and the
+            `bound` of what other shares of the tips would change; 0 for one tip, where the error
+            is that of the steps.
 
         Raises
         ------
         ProblemError
             Several tips would have shared the advance another way, by more than 5 % in the mean; a
-            spectrum that is not given, or is another one; a law by which the driving tip stops.
+            spectrum that is not given, or is another one; a law by which the driving tip stops;
+            loads that are to change where K is not in proportion to them: friction, steady loads,
+            initial stress, contact that begins on the way.
+
+        Examples
+        --------
+        >>> import xcrack as xc
+        >>> strip = xc.box((0, -1), (1, 1), (6, 12))
+        >>> pull = [xc.traction("top", (0, 1)), xc.traction("bottom", (0, -1))]
+        >>> crack = xc.line_crack([(-0.1, 0.02), (0.2, 0.02)])
+        >>> scene = xc.Problem(strip, xc.Isotropic(1.0, 0.3, "strain"), [crack], loads=pull)
+        >>> law, cycle = xc.paris(C=1e-3, m=3.0), xc.Cycle(0.0, 1.0)
+        >>> steps = xc.grow(scene, law, xc.max_hoop_stress, cycle, da=0.1, max_steps=3)
+        >>> shed = xc.collect(steps).rerate(law, K_max=lambda a: 0.0 * a + 1.0)   # constant K
+        >>> print(bool((shed.factor[1:] < shed.factor[:-1]).all()))
+        True
         """
         block = block_of_run("rerate", spectrum, criterion, nu, threshold)
-        return recompute_rates(self.steps, law, old, block)
+        program = None if load is None and K_max is None else LoadProgram(load, K_max)
+        return recompute_rates(self.steps, law, old, block, program)
+
+    def load_at(self, K_c: float) -> NDArray[Any]:
+        """Force and displacement at which the crack goes on at K = K_c, at each step.
+
+        Of a crack that grows without cycles, slowly, as soon as K reaches the toughness: the curve
+        of force over displacement, which may snap back. The path is that of the run, which any law
+        gives with steps of one length `da`.
+
+        Parameters
+        ----------
+        K_c : float, stress √length
+
+        Returns
+        -------
+        structured array
+            Columns step, a (length of all cracks in the body, in 3D their area), factor (on the
+            loads of the largest state), force (largest resultant of a load or of the reaction of a
+            support, per thickness in 2D), displacement (over which that force does all the work).
+
+        Raises
+        ------
+        ProblemError
+            A K_c that is not positive, a run read from its folder, which has no solutions, or K
+            that is not in proportion to the loads.
+
+        Notes
+        -----
+        K_c over the largest K_eq of a cycle scales all: K is in proportion to the loads, and so the
+        displacement is 2 U / force with the strain energy U.
+        """
+        return fracture_loads(self.steps, K_c)
 
     def measures(self, mesh: Mesh | None = None) -> tuple[NDArray[Any], NDArray[Any]]:
         """What an engineer reads off the cracks: depth, surface lengths, area, ends by set.

@@ -1,14 +1,14 @@
 """Cycles of a run by another law, on the path of the first."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import Any
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, cast
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from xcrack.base.arrays import Floats, Ints
-from xcrack.base.checks import number, value_text
+from xcrack.base.checks import call_function, number, numbers, value_text
 from xcrack.base.errors import ProblemError
 from xcrack.fatigue.checks import evaluate_criterion, evaluate_law
 from xcrack.fatigue.criteria import Criterion
@@ -359,11 +359,14 @@ class RecomputedRates:
         depends on the others no more than on itself.
     ended : str
         Empty, or why the new law ends before the last step.
+    factor : (n,) array
+        On the loads of the run, at each step.
     """
 
     cycles: Floats
     bound: float
     ended: str = ""
+    factor: Floats = field(default_factory=lambda: np.ones(0))
 
     @property
     def life(self) -> float:
@@ -371,8 +374,90 @@ class RecomputedRates:
         return float(self.cycles[-1])
 
 
+_SAME_RATIO = 1e-4  # spread of R along a run whose K is in proportion to its loads
+Program = Callable[[Floats], Floats]
+
+
+@dataclass(frozen=True)
+class LoadProgram:
+    """Loads that change as the crack grows: a factor, or the largest K that they are to give.
+
+    Parameters
+    ----------
+    load : callable a -> factor on the loads of the run, optional
+    K_max : callable a -> largest K of a cycle (stress √length), optional
+        One of them, called with arrays of crack sizes as laws are given (length).
+    """
+
+    load: Program | None = None
+    K_max: Program | None = None
+
+    def __post_init__(self) -> None:
+        if (self.load is None) == (self.K_max is None):
+            raise ProblemError("rerate: give load=..., a factor over a, or K_max=..., not both.")
+        for name in ("load", "K_max"):
+            value = getattr(self, name)
+            if not (value is None or callable(value)):
+                raise ProblemError(
+                    f"rerate: {name} = {value_text(value)} cannot be called: give a function of "
+                    f"the crack size, lambda a: ..."
+                )
+
+    def factors(self, rows: DrivingForce) -> Floats:
+        """Factor on the loads before and after each step that grows `(n, 2)`.
+
+        Raises
+        ------
+        ProblemError
+            A function that returns something else than positive numbers.
+        """
+        lead = rows.lead
+        a = lead.size
+        name, function = ("load", self.load) if self.load is not None else ("K_max", self.K_max)
+        answer = call_function(cast(Program, function), f"{name} of rerate", a.ravel())
+        given = numbers(answer, f"rerate: {name}(a)")
+        values = np.broadcast_to(given, a.size).reshape(a.shape)
+        if not (values > 0).all():
+            raise ProblemError(f"rerate: {name}(a) is not positive at a = {a.ravel()[0]:g}.")
+        if self.K_max is None:
+            return np.asarray(values)
+        largest = np.where(lead.count > 0, lead.dK / (1.0 - lead.R), 0.0).max(axis=2)
+        return np.asarray(values / largest)
+
+
+def check_in_proportion(steps: Sequence[Step], rows: DrivingForce, what: str) -> None:
+    """Refuse a run whose K is not in proportion to its loads.
+
+    Raises
+    ------
+    ProblemError
+        Friction, loads that a load state does not scale, or a ratio R that changes on the way.
+    """
+    for solution in steps[0].solutions:
+        problem = solution.problem
+        steady = [load.name for load in problem.loads if load.is_steady]
+        if steady or any(problem.frictions):
+            raise ProblemError(
+                f"{what}: {steady[0] if steady else 'friction'} does not scale with the loads, so "
+                "K is not in proportion to them: grow the cracks under loads of that size."
+            )
+    R = rows.lead.R
+    if np.ptp(R, axis=1).max(initial=0.0) > _SAME_RATIO or (
+        R.shape[2] == 1 and np.ptp(R) > _SAME_RATIO
+    ):
+        raise ProblemError(
+            f"{what}: R goes from {R.min():.4g} to {R.max():.4g} along the run: K is not in "
+            "proportion to the loads. Steady loads, initial stress or contact that begins on the "
+            "way do that: grow the cracks under loads of that size."
+        )
+
+
 def recompute_rates(
-    steps: Sequence[Step], law: Law, old: Law | None = None, block: SpectrumBlock | None = None
+    steps: Sequence[Step],
+    law: Law,
+    old: Law | None = None,
+    block: SpectrumBlock | None = None,
+    program: LoadProgram | None = None,
 ) -> RecomputedRates:
     """Cycles of the same steps by another law.
 
@@ -384,12 +469,15 @@ def recompute_rates(
         Law of the run, to be sure that ranges and ratios of the steps are what it was given.
     block : SpectrumBlock, optional
         Of a run under a spectrum.
+    program : LoadProgram, optional
+        How the loads change as the crack grows.
 
     Raises
     ------
     ProblemError
-        Several tips would have shared the advance another way, by more than 5 %; a spectrum that is
-        not given, or another one; a law with nominal R under it; the new law lets nothing grow.
+        K that is not in proportion to loads that are to change; several tips would have shared the
+        advance another way, by more than 5 %; a spectrum that is not given, or another one; a law
+        with nominal R under it; the new law lets nothing grow.
     """
     for name, value in (("law", law), ("old", old)):
         if not (callable(value) or (name == "old" and value is None)):
@@ -400,8 +488,13 @@ def recompute_rates(
     rows = driving_forces(steps, block)
     if old is not None and not np.allclose(rows.rates(old), rows.rate, rtol=1e-6, atol=0):
         raise ProblemError("rerate: the steps have other rates than the law they are said to have.")
-    rate = rows.rates(law)
-    first = rows.drives
+    first, scale = rows.drives, np.ones((int(rows.drives.sum()), 2))
+    if program is None:
+        rate = rows.rates(law)
+    else:
+        check_in_proportion(steps, rows, "rerate")
+        scale = program.factors(rows)
+        rate = rows.rates(law, scale[np.searchsorted(rows.step[first], rows.step)])
     if not (rate[first][:, 0] > 0).all():
         stopped = int(np.argmin(rate[first][:, 0] > 0))
         raise ProblemError(
@@ -424,8 +517,9 @@ def recompute_rates(
             f"{bound:.1%} in the mean (more than {_MOST:.0%}): the path would differ. Run it with "
             "the law."
         )
+    factor = np.concatenate([scale[:1, 0], scale[: len(since), 1]])
     return RecomputedRates(
-        np.concatenate([[0.0], np.cumsum(since)]) + steps[0].cycles, bound, ended
+        np.concatenate([[0.0], np.cumsum(since)]) + steps[0].cycles, bound, ended, factor
     )
 
 
@@ -481,11 +575,13 @@ def bound_of_shares(rows: DrivingForce, new: Floats, since: Floats) -> float:
 
 __all__ = [
     "DrivingForce",
+    "LoadProgram",
     "RecomputedRates",
     "SpectrumBlock",
     "block_of_run",
     "bound_of_shares",
     "check_block",
+    "check_in_proportion",
     "cycles_of",
     "driving_forces",
     "recompute_rates",

@@ -6,7 +6,6 @@ from typing import Any, cast
 
 import numpy as np
 
-from xcrack.analysis.solution import Solution
 from xcrack.crack.lines import line_crack
 from xcrack.fatigue.power import paris
 from xcrack.growth.step import Cycle, Step
@@ -26,7 +25,7 @@ from xcrack.verification.experiments.outcome import (
     Role,
     path_comparisons,
 )
-from xcrack.verification.experiments.trial import ROOT_M, Trial, arc_of, driving, grown, outline
+from xcrack.verification.experiments.trial import ROOT_M, Trial, arc_of, grown, outline
 
 _FINE, _COARSE = (0.7, 0.8), (1.0, 1.2)  # cell along the path and length of a step, mm
 _SUPPORTS = {
@@ -156,22 +155,21 @@ def _first_angle(experiment: Experiment, history: History) -> Comparison:
 def _forces(experiment: Experiment, history: History) -> tuple[list[Comparison], list[Curve]]:
     """Force and displacement at which the crack goes on at K = K_c, from a scene that is linear."""
     thickness, measured = experiment.geometry["thickness"], experiment.measured
-    shift, force = [], []
-    for step, K in zip(history.solved, driving(history)[1], strict=True):
-        factor = _K_C * ROOT_M / K
-        shift.append(factor)
-        force.append(factor * _reaction(step.solutions[1]) * thickness)
-    stiffness = _reaction(history.solved[0].solutions[1]) * thickness
+    table = history.load_at(_K_C * ROOT_M)
+    shift, force = table["displacement"], thickness * table["force"]
+    stiffness = float(force[0] / shift[0])
     low, high = measured["stiffness"]
     comparisons = [
         Comparison("stiffness with the pre-crack", stiffness, (low + high) / 2, "ratio"),
-        Comparison("force at which the crack begins", force[0], measured["force_at_knee"], "ratio"),
         Comparison(
-            "force at the end, K = 1.28 MPa√m", force[-1], measured["force_at_end"], "ratio"
+            "force at which the crack begins", float(force[0]), measured["force_at_knee"], "ratio"
+        ),
+        Comparison(
+            "force at the end, K = 1.28 MPa√m", float(force[-1]), measured["force_at_end"], "ratio"
         ),
         Comparison(
             "force at the end, K as it fell in the test",
-            force[-1] * measured["K_end_over_first"],
+            float(force[-1]) * measured["K_end_over_first"],
             measured["force_at_end"],
             "ratio",
         ),
@@ -186,12 +184,6 @@ def _forces(experiment: Experiment, history: History) -> tuple[list[Comparison],
         Curve.of("measured", points, "measured"),
         Curve.of(f"K = {_K_C} MPa√m all along", curve, "predicted"),
     ]
-
-
-def _reaction(solution: Solution) -> float:
-    """Force per thickness with which the right platen pushes."""
-    rows = solution.report.resultants
-    return abs(next(float(row.force[0]) for row in rows if "displacement" in row.name))
 
 
 _WORDS = (
