@@ -1,6 +1,7 @@
 """Lives and inspections of a run."""
 
 import dataclasses
+from functools import cache
 
 import numpy as np
 
@@ -36,6 +37,20 @@ def _step(n):
 
 
 HISTORY = xc.History(tuple(_step(n) for n in range(5)), "max_steps")
+
+
+@cache
+def _pulled():
+    """A run with its solutions."""
+    loads = [xc.traction("top", (0.0, 1.0)), xc.traction("bottom", (0.0, -1.0))]
+    strip = xc.box((0.0, -1.0), (1.0, 1.0), (6, 12))
+    crack = xc.line_crack([(-0.1, 0.02), (0.2, 0.02)])
+    scene = xc.Problem(strip, xc.Isotropic(1.0, 0.3, "strain"), [crack], loads=loads)
+    law, cycle = xc.paris(1e-3, 3.0), xc.Cycle(0.0, 1.0)
+    steps = xc.grow(scene, law, xc.max_hoop_stress, cycle, da=0.1, max_steps=2, progress=False)
+    return xc.collect(steps)
+
+
 SCATTER = xc.Scatter(C=xc.lognormal(0.3))
 LIFE = xc.life(HISTORY, scatter=SCATTER, samples=200, seed=1)
 CURVE = xc.growth_curve(HISTORY)
@@ -365,6 +380,11 @@ ENTRIES = [
         "History",
         lambda load: HISTORY.rerate(LAW, load=load).life,
         {"load": arg(Called(optional=True), None)},
+    ),
+    Entry(
+        "History",
+        lambda K_c: _pulled().load_at(K_c)["force"],
+        {"K_c": arg(Number(above=0), 500.0)},
     ),
 ]
 HOOKS = [
