@@ -107,6 +107,7 @@ def test_loads_that_K_does_not_follow_are_refused_in_words():
         ({"load": lambda a: 1.0 + 0 * a, "K_max": lambda a: 1.0 + 0 * a}, "not both"),
         ({"load": 3.0}, "cannot be called"),
         ({"load": lambda a: -a}, "not positive"),
+        ({"load": lambda a: a[:2]}, "one value for each"),
         ({"K_max": lambda a: np.nan * a}, "K_max"),
     ],
 )

@@ -416,6 +416,11 @@ class LoadProgram:
         name, function = ("load", self.load) if self.load is not None else ("K_max", self.K_max)
         answer = call_function(cast(Program, function), f"{name} of rerate", a.ravel())
         given = numbers(answer, f"rerate: {name}(a)")
+        if given.shape not in ((), (a.size,)):
+            raise ProblemError(
+                f"rerate: {name}(a) has the shape {given.shape} for {a.size} sizes: give one value "
+                "for each."
+            )
         values = np.broadcast_to(given, a.size).reshape(a.shape)
         if not (values > 0).all():
             raise ProblemError(f"rerate: {name}(a) is not positive at a = {a.ravel()[0]:g}.")
