@@ -230,6 +230,15 @@ ENTRIES = [
             "n": arg(Whole(least=1, also=(Numbers((2,), whole=True, least=1),)), 3, (2, 3)),
         },
     ),
+    Entry(
+        "part",
+        lambda mesh: (
+            xc.part(mesh, "boundary", ((None,) * mesh.dim,) * 2, "new")
+            if isinstance(mesh, xc.Mesh)
+            else xc.part(mesh, "boundary", ((0, 0), (1, 1)))
+        ),
+        {"mesh": arg(Of(type=xc.Mesh), Late(scenes.mesh), Late(lambda: scenes.mesh(3)))},
+    ),
     Entry("refine", xc.refine, {"mesh": arg(Of(type=xc.Mesh), Late(scenes.mesh))}),
     Entry(
         "refine",

@@ -15,8 +15,11 @@ from fuzz.kinds import (
     Number,
     Numbers,
     Seen,
+    array,
 )
 from fuzz.values import paths
+
+SIDES = ("left", "right", "bottom", "top", "boundary")
 
 
 def holes(value):
@@ -35,6 +38,74 @@ def _mesh_step(**named):
 
 
 LINE = [(0.5, 0.0), (1.0, 0.0)]
+
+PARTS = {
+    "a box elsewhere": lambda: {"a": ((50, 50), (60, 60))},
+    "a box of three": lambda: {"a": ((0, 0, 0), (1, 1, 1))},
+    "a name that is taken": lambda: {"boundary": ((None, None), (None, None))},
+    "text": lambda: {"a": "b"},
+    "a side that is none": lambda: {"a": [99]},
+    "no side": lambda: {"a": []},
+    "list": lambda: [("a", [1])],
+    "numbers": lambda: {"a": lambda x: x[:, 0]},
+}
+SETS = arg(
+    Seen(rule=lambda v: v is None or (v == {} if isinstance(v, dict) else False)),
+    None,
+    near=PARTS,
+    words=["sets", "box"],
+)
+
+
+def outlines(value):
+    """Whether a value is an outline; whether it closes well is no business of this table."""
+    if value is None:  # a plate without width and height
+        return False
+    if isinstance(value, str | dict) or not hasattr(value, "__iter__"):
+        return False
+    if isinstance(value, np.ndarray) and not value.ndim:
+        return False
+    x = array(value)
+    good = x is not None and x.ndim == 2 and x.shape[1] == 2 and len(x) > 2
+    return None if good else False
+
+
+def _outlined(outline, size):
+    return xc.plate(outline=outline, size=size)
+
+
+def _part(of, where, name):
+    return xc.part(scenes.mesh(), of, where, name)
+
+
+def boxes(value):
+    """Whether a value is a box, or None where it depends on the body."""
+    if callable(value):
+        return "skip"
+    if isinstance(value, str | dict | set) or not hasattr(value, "__iter__"):
+        return False
+    x = array(value)
+    return None if x is not None and x.shape == (2, 2) and np.isfinite(x).all() else False
+
+
+def _specimen(make, **named):
+    return make(**named).problem(scenes.STEEL)
+
+
+LENGTHS = {
+    "W": arg(Number(above=0, rule=lambda v: 8 <= v <= 20 or None), 10.0, words=["size", "width"]),
+    "a": arg(Number(above=0, rule=lambda v: 2 <= v <= 3 or None), 2.5, words=["crack", "size"]),
+}
+CELLS = {
+    name: arg(Number(optional=True, rule=lambda v: v > 0 and None), None, words=["size", "plate"])
+    for name in ("size", "size_near")
+}
+FORCED = {"force": arg(Number(rule=lambda v: None), 1.0, words=["force"])}
+ANGLED = {"contact_angle": arg(Number(above=0, most=np.pi, rule=lambda v: v > 0.5 or None), 1.0)}
+STRESSED = {
+    "stress": arg(Number(), 1.0),
+    "height": arg(Number(optional=True, rule=lambda v: v > 0 and None), None, words=["size"]),
+}
 
 PLATE = {
     "size": arg(Number(above=0, rule=lambda v: 0.5 <= v <= 1.0 or None), 1.0, 0.8),
@@ -56,6 +127,7 @@ PLATE = {
     ),
     "band": arg(Number(optional=True, rule=lambda v: v >= 0 and (v < 1 or None)), None, 0.3),
     "transition": arg(Number(optional=True, rule=lambda v: v >= 0 and (v > 0.1 or None)), None, 2),
+    "sets": SETS,
 }
 
 
@@ -131,6 +203,86 @@ ENTRIES = [
             **PLATE,
         },
         cost=0.1,
+    ),
+    Entry(
+        "plate",
+        _outlined,
+        {
+            "outline": arg(
+                Seen(rule=outlines),
+                [(0, 0), (4, 0), ((5, 1), (4, 2)), (0, 2)],
+                [(0, 0), (4, 0), (0, 3)],
+                near={
+                    "crossing": lambda: [(0, 0), (4, 4), (4, 0), (0, 4)],
+                    "two points": lambda: [(0, 0), (4, 4)],
+                    "a point twice": lambda: [(0, 0), (0, 0), (4, 0), (0, 3)],
+                    "an arc on a line": lambda: [(0, 0), ((1, 0), (4, 0)), (0, 3)],
+                    "nan": lambda: [(0, 0), (np.nan, 0), (0, 3)],
+                    "of three": lambda: [(0, 0, 0), (4, 0, 0), (0, 3, 0)],
+                },
+                words=["outline", "plate"],
+            ),
+            "size": PLATE["size"],
+        },
+        cost=0.1,
+        arity=False,
+    ),
+    Entry(
+        "part",
+        _part,
+        {
+            "of": arg(
+                Seen(rule=lambda v: isinstance(v, str) and v in SIDES),
+                "top",
+                "left",
+                words=["part", "set"],
+            ),
+            "where": arg(
+                Seen(rule=boxes),
+                ((None, None), (None, None)),
+                words=["part", "box"],
+                near={"elsewhere": lambda: ((50, 50), (60, 60)), "flags": lambda: lambda x: 1},
+            ),
+            "name": arg(
+                Seen(rule=lambda v: isinstance(v, str) and v not in SIDES),
+                "",
+                "new",
+                words=["part", "name"],
+            ),
+        },
+    ),
+    *(
+        Entry(
+            make.__name__,
+            lambda make=make, **named: _specimen(make, **named),
+            {**LENGTHS, **more, **CELLS},
+            cost=0.4,
+            arity=False,
+        )
+        for make, more in (
+            (xc.compact_tension, FORCED | ANGLED),
+            (xc.disc_compact, FORCED | ANGLED),
+            (xc.middle_tension, STRESSED),
+            (xc.single_edge_tension, STRESSED),
+            (xc.single_edge_bend, FORCED),
+            (
+                xc.lug,
+                {
+                    "D": arg(
+                        Number(above=0, rule=lambda v: 3 <= v <= 4 or None),
+                        3.5,
+                        words=["hole", "size"],
+                    ),
+                    **FORCED,
+                    **ANGLED,
+                    "length": arg(
+                        Number(optional=True, rule=lambda v: v > 0 and None),
+                        None,
+                        words=["size", "hole", "plate"],
+                    ),
+                },
+            ),
+        )
     ),
     Entry(
         "plate_with_hole",

@@ -20,6 +20,8 @@ from fuzz.scene_rules import POSITIVE
 from xcrack.model.numerics import ContactMethod, LevelSets, TipBasis
 from xcrack.verification import methods
 
+HANDBOOK = type(xc.handbook("edge", a=1, W=2)).__bases__
+
 SUPPORTS = type(xc.fix("left")) | type(xc.displacement("left", (0, 0)))
 
 
@@ -114,6 +116,15 @@ ENTRIES = [
                     "outside": Bad(lambda: [xc.line_crack([(5, 5), (6, 6)])]),
                     "3D": lambda: [scenes.crack(3)],
                 },
+            ),
+            "handbook": arg(
+                ListOf(
+                    item=Seen(rule=lambda v: None if isinstance(v, HANDBOOK) else False),
+                    also=(Seen(rule=lambda v: None if isinstance(v, HANDBOOK) else False),),
+                ),
+                (),
+                words=["handbook"],
+                near={"another crack": lambda: xc.handbook("edge", a=1, W=2, S=1, crack=9)},
             ),
             "supports": arg(
                 ListOf(item=Seen(rule=lambda v: isinstance(v, SUPPORTS))),

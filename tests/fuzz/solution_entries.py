@@ -228,6 +228,48 @@ ENTRIES = [
         cost=0.03,
     ),
     Entry(
+        "handbook",
+        lambda kind, values: (
+            xc.handbook(kind, **values)
+            if isinstance(values, dict)
+            else xc.handbook(kind, a=values, W=10.0)
+        ),
+        {
+            "kind": arg(Word(words=("edge",)), "edge", words=["handbook", "kind"]),
+            "values": arg(
+                Number(above=0, rule=lambda v: v < 10 or None),
+                2.0,
+                words=["handbook", "EdgeCrack"],
+                near={
+                    "missing": lambda: {"a": 1.0},
+                    "unknown": lambda: {"a": 1.0, "W": 3.0, "q": 1.0},
+                },
+            ),
+        },
+        arity=False,
+    ),
+    Entry(
+        "handbook",
+        lambda phi: xc.handbook("surface", a=1, c=1, t=3, W=9, S=1).K(phi),
+        {"phi": arg(Numbers(None, least=0, most=np.pi / 2), 0.3, words=["handbook", "phi"])},
+        arity=False,
+    ),
+    *(
+        Entry(
+            "handbook",
+            lambda sif, method=method: getattr(xc.handbook("edge", a=1, W=9, S=1), method)(sif),
+            {
+                "sif": arg(
+                    Of(type=xc.SIF),
+                    Late(lambda: xc.stress_intensity(scenes.solution())),
+                    words=["handbook", "SIF"],
+                )
+            },
+            arity=False,
+        )
+        for method in ("at", "ratio")
+    ),
+    Entry(
         "stress_intensities",
         xc.stress_intensities,
         {

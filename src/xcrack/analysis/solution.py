@@ -1,7 +1,7 @@
 """What a solve returns: displacements, stresses, openings and contact, anywhere in the body."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from numbers import Real
 from typing import Any
@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from xcrack.analysis.contact import Contact, ContactSolution
-from xcrack.analysis.plan import Report
+from xcrack.analysis.plan import Ingredient, Report
 from xcrack.base.arrays import Bools, Floats, Ints, lock
 from xcrack.base.checks import numbers, value_text, whole_numbers
 from xcrack.base.errors import GeometryError, ProblemError
@@ -76,7 +76,7 @@ class Solution:
         One entry a crack: Contact, or None where it has no multipliers.
     energy : float
         Strain energy, u K u / 2.
-    report : Report
+    summary : Report
         What was modelled, what was left out, and why.
     reuse : SolverState
         What serves the next solve in the same mesh.
@@ -96,11 +96,20 @@ class Solution:
     lips: tuple[LipPoints, ...]
     contact: tuple[Contact | None, ...]
     energy: float
-    report: Report
+    summary: Report
     reuse: SolverState
     number: int = 0
     factored: FactoredSolution | None = None
     dissipated: float = 0.0
+
+    @cached_property
+    def report(self) -> Report:
+        """What was modelled, what was left out, and why; K beside that of a handbook, if given."""
+        rows = tuple(
+            Ingredient(f"handbook K of crack {known.crack}", True, known.comparison(self))
+            for known in self.problem.handbook
+        )
+        return replace(self.summary, ingredients=self.summary.ingredients + rows)
 
     @property
     def loads(self) -> tuple[Load, ...]:

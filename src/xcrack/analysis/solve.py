@@ -229,7 +229,7 @@ def _solve_states(
                 lips=model.lips,
                 contact=contact_of(model, pressed, u[:, k], k),
                 energy=0.5 * float(u[:, k] @ forces),
-                report=replace(summary, resultants=rows),
+                summary=replace(summary, resultants=rows),
                 reuse=handed_on,
                 number=k,
                 factored=factored,

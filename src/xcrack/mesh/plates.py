@@ -1,6 +1,6 @@
-"""Plates with round holes, meshed by gmsh and graded towards where cracks will run."""
+"""Plane bodies with round holes, meshed by gmsh and graded towards where cracks will run."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from math import ceil, frexp, hypot, inf, pi
 from types import ModuleType
 from typing import Any
@@ -8,15 +8,27 @@ from typing import Any
 import numpy as np
 
 from xcrack.base.arrays import Floats, Ints
-from xcrack.base.checks import number, point_coordinates, value_text
+from xcrack.base.checks import number, point_coordinates, value_text, whole_numbers
 from xcrack.base.errors import GeometryError, MeshError
 from xcrack.mesh.gmsh_session import FINEST, graded_size, length_of, polylines, session
 from xcrack.mesh.mesh import Mesh, sound_mesh
+from xcrack.mesh.outlines import (
+    Side,
+    distance_to,
+    finer_at_arcs,
+    is_inside,
+    polygon_of,
+    rectangle,
+    sides_of,
+    split_sides,
+)
+from xcrack.mesh.parts import Where, chosen_facets
 from xcrack.mesh.polygon import Arc
 
 Point = tuple[float, float]
 Hole = tuple[Point, float]
 Path = Sequence[Sequence[float]]
+Sets = Mapping[str, Where]
 
 _FEWEST_HOLE_EDGES = 24  # an inscribed polygon of 24 edges has lost 1.1 % of the disc's area
 _BAND = 0.25  # of the smallest radius: lengths of the body, so that halving both sizes halves
@@ -36,6 +48,7 @@ def plate_with_hole(
     along: Path | Sequence[Path] | None = None,
     band: float | None = None,
     transition: float | None = None,
+    sets: Sets | None = None,
 ) -> Mesh:
     """Rectangular plate centred at the origin with one round hole.
 
@@ -59,6 +72,8 @@ def plate_with_hole(
     transition : float, length, optional
         Distance beyond the band over which cells grow linearly to `size`. By default eight
         radii, and never less than twice `size - size_near`.
+    sets : mapping of name to part of the boundary, optional
+        As of `plate`.
 
     Returns
     -------
@@ -71,6 +86,8 @@ def plate_with_hole(
     ------
     GeometryError
         A length that is not positive, a hole that does not fit, sizes larger than the plate.
+    MeshError
+        A set without facets, or with a name that is taken.
     XcrackError
         gmsh cannot be imported; the message says what to install.
 
@@ -85,15 +102,15 @@ def plate_with_hole(
     """
     width, height = length_of(width, "width"), length_of(height, "height")
     radius = length_of(radius, "radius")
+    sides = rectangle((-width / 2, -height / 2), width, height)
     return _plate(
-        width, height, (-width / 2, -height / 2), [(center, radius)], ["hole"], size, size_near,
-        along, band, transition,
-    )  # fmt: skip
+        sides, [(center, radius)], ["hole"], size, size_near, along, band, transition, sets
+    )
 
 
 def plate(
-    width: float,
-    height: float,
+    width: float | None = None,
+    height: float | None = None,
     *,
     size: float,
     size_near: float | None = None,
@@ -102,54 +119,84 @@ def plate(
     along: Path | Sequence[Path] | None = None,
     band: float | None = None,
     transition: float | None = None,
+    outline: Sequence[Any] | None = None,
+    sets: Sets | None = None,
 ) -> Mesh:
-    """Rectangular plate with any number of round holes, none included.
+    """Plate, rectangular or of any outline, with any number of round holes, none included.
 
     Parameters
     ----------
     width, height : float, length
-        Sides of the plate.
+        Sides of a rectangular plate; left out with an `outline`.
     size : float, length
         Cell size far away.
     size_near : float, length, optional
         Cell size at the holes and along `along`. By default `size`, or what a hole needs.
     lower : (2,) floats, length
-        Lower left corner.
+        Lower left corner of a rectangular plate.
     holes : iterable of ((x, y), radius), length
         Centre and radius of each hole. They may not touch the sides or each other.
     along, band, transition
         As in `plate_with_hole`; without holes a tenth of the smaller side stands for the radius.
+    outline : sequence, length, optional
+        Points in the order in which one walks around the body. An entry is a point, to which a
+        straight side leads, or a pair of points, through the first of which an arc leads to the
+        second: ``[(0, 0), (4, 0), ((5, 1), (4, 2)), (0, 2)]`` has one round end. It closes by
+        itself.
+    sets : mapping of name to part of the boundary, optional
+        Further facet sets: a function f(x) -> (n,) bool of points (n, 2), two corners of a box
+        (None where it has no end), or numbers of sides of an outline, from 0. A facet belongs to a
+        set if its middle does; where a box ends on a straight side a point of the mesh is put.
 
     Returns
     -------
     Mesh
-        Facet sets ``left``, ``right``, ``bottom``, ``top``, ``hole_0``, ``hole_1``, ...
+        Facet sets ``left``, ``right``, ``bottom``, ``top`` of a rectangle, ``arc_<number of the
+        side>`` of each arc of an outline; ``hole_0``, ``hole_1``, ... and those of `sets`. `refine`
+        puts new points of arcs and holes onto them.
 
     Raises
     ------
     GeometryError
-        A length that is not positive, a hole that does not fit, sizes larger than the plate.
+        A length that is not positive, an outline that crosses itself, a hole that does not fit,
+        sizes larger than the plate.
+    MeshError
+        A set without facets, or with a name that is taken.
     XcrackError
         gmsh cannot be imported; the message says what to install.
 
     Examples
     --------
-    A plate with two holes and a path for a crack from its left side::
+    A plate with two holes and a path for a crack from its left side, held along 3 of its 20::
 
         mesh = plate(
             20.0, 10.0, holes=[((3.0, 7.0), 2.0), ((17.0, 3.0), 2.0)], size=0.6, size_near=0.25,
-            along=[(0.0, 2.85), (12.8, 2.3)],
+            along=[(0.0, 2.85), (12.8, 2.3)], sets={"seat": ((0, 0), (3, 0))},
+        )
+
+    Half a disc, loaded at its crown::
+
+        mesh = plate(
+            outline=[(-50, 0), (50, 0), ((0, 50), (-50, 0))], size=4.0,
+            sets={"crown": ((-2, None), (2, None)), "base": [0]},
         )
     """
     holes = _list_of_holes(holes)
     names = [f"hole_{i}" for i in range(len(holes))]
-    return _plate(width, height, lower, holes, names, size, size_near, along, band, transition)
+    if (outline is None) == (width is None and height is None):
+        raise GeometryError(
+            "plate: give width and height of a rectangle, or an outline; not both, not neither."
+        )
+    if outline is not None:
+        sides = sides_of(outline)
+    else:
+        width, height = length_of(width, "width"), length_of(height, "height")
+        sides = rectangle(_pair(lower, "lower"), width, height)
+    return _plate(sides, holes, names, size, size_near, along, band, transition, sets)
 
 
 def _plate(
-    width: float,
-    height: float,
-    lower: Point,
+    sides: Sequence[Side],
     holes: Sequence[Hole],
     names: Sequence[str],
     size: float,
@@ -157,15 +204,16 @@ def _plate(
     along: Path | Sequence[Path] | None,
     band: float | None,
     transition: float | None,
+    sets: Sets | None,
 ) -> Mesh:
-    width, height = length_of(width, "width"), length_of(height, "height")
     size = length_of(size, "size")
-    lower = _pair(lower, "lower")
     holes = [
         (_pair(center, f"hole {i}: centre"), length_of(radius, f"radius of hole {i}"))
         for i, (center, radius) in enumerate(holes)
     ]
-    _check_holes(width, height, lower, holes)
+    polygon = polygon_of(sides)
+    width, height = np.ptp(polygon, axis=0).tolist()
+    _check_holes(sides, max(width, height), holes)
     smallest_radius = min((radius for _, radius in holes), default=inf)
     hole_size = 2 * pi * smallest_radius / _FEWEST_HOLE_EDGES
     near_size = length_of(min(size, hole_size) if size_near is None else size_near, "size_near")
@@ -179,6 +227,8 @@ def _plate(
     transition = number(transition, "transition", least=0, error=GeometryError)
     paths = polylines(along)
     _check_cost(width, height, size, near_size, band, paths)
+    named_sets = _checked_sets(sets, [*(side.name for side in sides), *names])
+    parts = split_sides(sides, named_sets)
     # gmsh's tolerances are absolute: mesh a plate of unit size; powers of two lose no digit.
     scale = 2.0 ** frexp(max(width, height))[1]
     length = graded_size(
@@ -189,33 +239,60 @@ def _plate(
         band / scale,
         transition / scale,
     )
-    corner = (lower[0] / scale, lower[1] / scale)
+    scaled_sides = [_scaled(side, scale) for side in parts]
+    length = finer_at_arcs(length, scaled_sides, _FEWEST_HOLE_EDGES, _STEEPEST)
     scaled = [((x / scale, y / scale), r / scale) for (x, y), r in holes]
     with session() as gmsh:
-        curves = _draw(
-            gmsh, width / scale, height / scale, corner, scaled, names, near_size / scale
-        )
+        curves = _draw(gmsh, scaled_sides, scaled, names, near_size / scale)
         points, cells, facets = mesh_model(gmsh, curves, length)
-    rims = {name: Arc(center, radius) for name, (center, radius) in zip(names, holes)}
-    return _finish(points * scale, cells, facets, rims, width, height, lower)
+    rims: dict[str, Arc] = {
+        name: Arc(center, radius) for name, (center, radius) in zip(names, holes)
+    }
+    rims |= {side.name: side.curve for side in sides if side.curve is not None}
+    return _finish(points * scale, cells, facets, rims, parts, named_sets)
+
+
+def _scaled(side: Side, scale: float) -> Side:
+    def less(x: Point) -> Point:
+        return x[0] / scale, x[1] / scale
+
+    center = None if side.center is None else less(side.center)
+    return Side(less(side.start), less(side.end), center, side.turn, side.name, side.number)
 
 
 def _draw(
     gmsh: ModuleType,
-    width: float,
-    height: float,
-    lower: Point,
+    sides: Sequence[Side],
     holes: Sequence[Hole],
     names: Sequence[str],
     near_size: float,
 ) -> dict[str, list[int]]:
-    """Draw the plate in the current model; return the curves of each facet set."""
+    """Draw the plate in the current model; return the curves of each side and hole."""
     geo = gmsh.model.geo
-    (x0, y0), x1, y1 = lower, lower[0] + width, lower[1] + height
-    corner = [geo.addPoint(x, y, 0.0) for x, y in [(x0, y0), (x1, y0), (x1, y1), (x0, y1)]]
-    sides = [geo.addLine(corner[i], corner[(i + 1) % 4]) for i in range(4)]
-    curves = dict(zip(("bottom", "right", "top", "left"), ([side] for side in sides), strict=True))
-    loops = [geo.addCurveLoop(sides)]
+    corners: dict[Point, int] = {}
+
+    def corner(x: Point) -> int:
+        if x not in corners:
+            corners[x] = geo.addPoint(*x, 0.0)
+        return corners[x]
+
+    pieces = [side.parts(pi / 2) for side in sides]  # gmsh draws less than half a turn
+    for parts in pieces:
+        for piece in parts:
+            corner(piece.start)
+    curves: dict[str, list[int]] = {}
+    outer = []
+    for n, parts in enumerate(pieces):
+        tags = []
+        for piece in parts:
+            if piece.center is None:
+                tags.append(geo.addLine(corner(piece.start), corner(piece.end)))
+            else:
+                middle = geo.addPoint(*piece.center, 0.0)
+                tags.append(geo.addCircleArc(corner(piece.start), middle, corner(piece.end)))
+        curves[f"side {n}"] = tags
+        outer += tags
+    loops = [geo.addCurveLoop(outer)]
     for name, ((x, y), radius) in zip(names, holes, strict=True):
         middle = geo.addPoint(x, y, 0.0)
         turn = [(radius, 0.0), (0.0, radius), (-radius, 0.0), (0.0, -radius)]
@@ -285,21 +362,56 @@ def _finish(
     cells: Ints,
     facets: dict[str, Ints],
     rims: dict[str, Arc],
-    width: float,
-    height: float,
-    lower: Point,
+    sides: Sequence[Side],
+    sets: Sets,
 ) -> Mesh:
-    """Put the nodes of the sides exactly onto them and order the sets."""
-    sides = {
-        "left": (0, lower[0]),
-        "right": (0, lower[0] + width),
-        "bottom": (1, lower[1]),
-        "top": (1, lower[1] + height),
-    }
-    for name, (axis, value) in sides.items():
-        points[facets[name].ravel(), axis] = value
-    order = [*sides, *(name for name in facets if name not in sides)]
-    return sound_mesh(points, cells, {name: facets[name] for name in order}, curves=rims)
+    """Put the nodes of the sides exactly onto them, name and order the sets."""
+    of_sides = [facets.pop(f"side {n}") for n in range(len(sides))]
+    named: dict[str, list[Ints]] = {}
+    for side, edges in zip(sides, of_sides, strict=True):
+        for axis in (0, 1) if side.center is None else ():
+            if side.start[axis] == side.end[axis]:
+                points[edges.ravel(), axis] = side.start[axis]
+        if side.name:
+            named.setdefault(side.name, []).append(edges)
+    first = [name for name in ("left", "right", "bottom", "top") if name in named]
+    order = dict.fromkeys([*first, *named])
+    facet_sets = {name: np.concatenate(named[name]) for name in order} | facets
+    outer = np.concatenate([*of_sides, *facets.values()])
+    for name, where in sets.items():
+        if callable(where) or not _are_numbers(where):
+            facet_sets[name] = chosen_facets(points, outer, where, f"sets[{name!r}]")
+            continue
+        numbers = whole_numbers(where, f"sets[{name!r}]", (None,), error=MeshError).tolist()
+        unknown = sorted(set(numbers) - {side.number for side in sides})
+        if unknown or not numbers:
+            last = max(side.number for side in sides)
+            raise MeshError(
+                f"sets[{name!r}] = {value_text(where)}: the sides have the numbers 0 to {last}: "
+                "give some of them."
+            )
+        chosen = [edges for side, edges in zip(sides, of_sides) if side.number in numbers]
+        facet_sets[name] = np.concatenate(chosen)
+    return sound_mesh(points, cells, facet_sets, curves=rims)
+
+
+def _are_numbers(where: Any) -> bool:
+    return isinstance(where, Sequence) and not any(np.ndim(entry) for entry in where)
+
+
+def _checked_sets(sets: Any, names: Sequence[str]) -> Sets:
+    """Parts of the boundary by name."""
+    if sets is None:
+        return {}
+    if not isinstance(sets, Mapping) or not all(isinstance(name, str) and name for name in sets):
+        raise MeshError(
+            "sets must be a dict of names and parts of the boundary, such as sets={'grip': "
+            f"((0, 0), (10, 0))}}, not {value_text(sets)}."
+        )
+    taken = sorted({*sets} & {*names, "boundary"})
+    if taken:
+        raise MeshError(f"sets: the plate has {taken[0]!r} by itself: give another name.")
+    return sets
 
 
 def _pair(value: Any, what: str) -> Point:
@@ -332,20 +444,18 @@ def _check_sizes(width: float, height: float, size: float, near_size: float) -> 
         )
 
 
-def _check_holes(width: float, height: float, lower: Point, holes: Sequence[Hole]) -> None:
+def _check_holes(sides: Sequence[Side], size: float, holes: Sequence[Hole]) -> None:
     for i, (center, radius) in enumerate(holes):
-        if radius < FINEST * max(width, height):
+        if radius < FINEST * size:
             raise GeometryError(
-                f"the radius {radius:g} of hole {i} is too small for a plate of {width:g} x "
-                f"{height:g}: leave the hole out, or make it larger."
+                f"the radius {radius:g} of hole {i} is too small for a plate of {size:g}: leave "
+                "the hole out, or make it larger."
             )
-        x, y = center[0] - lower[0], center[1] - lower[1]
-        gap = min(x, y, width - x, height - y) - radius
+        gap = distance_to(sides, center) * (1 if is_inside(sides, center) else -1) - radius
         if gap <= 0:
             raise GeometryError(
                 f"hole {i} (centre {tuple(center)}, radius {radius:g}) reaches {-gap:g} beyond the "
-                f"plate [{lower[0]:g}, {lower[0] + width:g}] x [{lower[1]:g}, "
-                f"{lower[1] + height:g}]: move it inwards or make it smaller."
+                "plate: move it inwards or make it smaller."
             )
         for j, (other, other_radius) in enumerate(holes[:i]):
             gap = hypot(center[0] - other[0], center[1] - other[1]) - radius - other_radius

@@ -21,6 +21,7 @@ from xcrack.model.friction import checked_friction
 from xcrack.model.loads import Load
 from xcrack.model.material import Material
 from xcrack.model.numerics import Numerics
+from xcrack.model.reference import ReferenceK
 from xcrack.model.supports import Support
 
 
@@ -98,6 +99,8 @@ class Problem:
     friction : float, or a sequence of one a crack
         Coulomb's coefficient of the crack faces: where they press, they stick until the shear is
         that share of the pressure. The order of load states counts then.
+    handbook : HandbookK, or a sequence of them
+        K as of `handbook`, which `solution.report` puts beside the computed one.
 
     Raises
     ------
@@ -115,6 +118,8 @@ class Problem:
     order: int | None = field(default=None, metadata={"resolved": order_left_out})
     numerics: Numerics = field(default_factory=Numerics)
     friction: float | Sequence[float] = 0.0
+    # What K is compared with changes nothing that is computed.
+    handbook: Sequence[ReferenceK] = field(default=(), metadata={"changes_results": False})
 
     def __post_init__(self) -> None:
         for name, kind in (("mesh", Mesh), ("material", Material), ("numerics", Numerics)):
@@ -124,7 +129,9 @@ class Problem:
                     f"Problem({name}=...) must be of type {kind.__name__}{example_class}, "
                     f"not {type(getattr(self, name)).__name__}."
                 )
-        for name in ("cracks", "supports", "loads"):
+        if isinstance(self.handbook, ReferenceK):
+            object.__setattr__(self, "handbook", (self.handbook,))
+        for name in ("cracks", "supports", "loads", "handbook"):
             given = getattr(self, name)
             object.__setattr__(self, name, entries(given, f"Problem: {name}"))
         self.material.check(self.mesh.dim)
@@ -243,6 +250,12 @@ class Problem:
             support.check_in(self.mesh)
         for load in self.loads:
             self._check_load(load)
+        for known in self.handbook:
+            if not isinstance(known, ReferenceK):
+                raise ProblemError(
+                    f'handbook: {value_text(known)} is none: give handbook("edge", a=..., ...).'
+                )
+            known.check(self)
 
     def _check_load(self, load: Any) -> None:
         if not isinstance(load, Load):

@@ -201,7 +201,7 @@ def _state(solution: Solution) -> dict[str, Any]:
         "u": solution.u,
         "contact": solution.contact,
         "energy": solution.energy,
-        "report": solution.report,
+        "summary": solution.summary,
         "dissipated": solution.dissipated,
     }
 
@@ -219,7 +219,7 @@ def _solutions(content: dict[str, Any]) -> list[Solution]:
                 f"the file holds {len(u)} unknowns, and its problem has {space.n_dof} in this "
                 "xcrack: read it with the version that wrote it."
             )
-        names = ("state", "acting", "contact", "energy", "report", "dissipated")
+        names = ("state", "acting", "contact", "energy", "summary", "dissipated")
         parts = {name: state[name] for name in names}
         solutions.append(
             Solution(problem=problem, space=space, u=u, lips=lips, reuse=reuse,

@@ -290,7 +290,7 @@ def _drawable(given: Any, field: Any) -> Solution:
         lips=lips,
         contact=(None,) * len(lips),
         energy=0.0,
-        report=Report((), {}),
+        summary=Report((), {}),
         reuse=SolverState(),
     )
 
