@@ -1,5 +1,7 @@
 """Growth laws and their parts: closures, thresholds, tables, published constants."""
 
+import tempfile
+
 import numpy as np
 
 import xcrack as xc
@@ -43,6 +45,19 @@ def ratios(highest=1.0, lowest=-1e3):
     return Numbers(
         rule=lambda R: bool((R <= highest).all()) and (bool((R >= lowest).all()) or None)
     )
+
+
+def _drawn(**arguments):
+    with tempfile.TemporaryDirectory() as folder:
+        return xc.plot_rates(**arguments, file=f"{folder}/rates.png")
+
+
+def _of_metal(metal, plane, thickness, E, nu):
+    """What the methods of a metal return, and its text."""
+    material = metal.isotropic(plane, thickness=thickness, E=E, nu=nu)
+    law = metal.law(thickness=thickness)
+    needs = {"a": 10.0} if getattr(law, "needs", ()) else {}
+    return [material.E, len(str(metal)), float(law(1.0, 0.1, **needs))]
 
 
 R_RANGE = arg(Seen(rule=bounds), None, (-1.0, 0.8))
@@ -98,6 +113,7 @@ def curves(value):
 
 UNITS = Word(words=("m, MPa√m", "mm, N/mm^1.5", "mm, MPa√mm"))
 KNOWN = tuple(xc.presets())
+METALS = ("2024-T3 sheet, L-T", "7075-T651 plate, L-T")
 
 ENTRIES = [
     Entry(
@@ -395,5 +411,32 @@ ENTRIES = [
         },
     ),
     Entry("presets", lambda: [len(xc.presets())], {}, arity=False),
+    Entry("materials", lambda: [len(xc.materials())], {}, arity=False),
+    Entry(
+        "material",
+        lambda name, units, **use: _of_metal(xc.material(name, units=units), **use),
+        {
+            "name": arg(Word(words=tuple(xc.materials())), *METALS[:2], words=["metal"]),
+            "units": arg(UNITS, "mm, MPa√mm"),
+            "plane": arg(Word(words=("strain", "stress")), "stress"),
+            "thickness": arg(Number(optional=True, above=0), None, 2.0),
+            "E": arg(Number(optional=True, above=0), None, 71e3),
+            "nu": arg(Number(optional=True, above=-1, below=0.5), 0.33),
+        },
+        arity=False,
+    ),
+    Entry(
+        "plot_rates",
+        lambda **k: [len(_drawn(**k).axes)],
+        {
+            "laws": arg(Seen(rule=lambda v: None), {"paris": xc.paris(1e-12, 3.0)}),
+            "units": arg(UNITS, "mm, MPa√mm"),
+            "R": arg(Number(most=1), 0.1),
+            "dK": arg(
+                Seen(rule=lambda v: None if v is None else bounds(v) or None), None, (100.0, 900.0)
+            ),
+        },
+        arity=False,
+    ),
 ]
 HOOKS = []

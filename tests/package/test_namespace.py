@@ -32,7 +32,8 @@ NAMES = [
     # laws
     "el_haddad", "forman", "hartman_schijve", "klesnil_lukas", "law", "linear_closure", "nasgro",
     "nasgro_K_c", "nasgro3_threshold", "nasgro4_threshold", "newman_closure", "piecewise",
-    "presets", "rate_table", "schijve_closure", "stepped_threshold",
+    "Metal", "material", "materials", "plot_rates", "presets", "rate_table",
+    "schijve_closure", "stepped_threshold",
     "time_rate", "with_time",
     # verification, reports, files of scenes
     "verify", "validate", "report", "read_case", "run", "info", "demo", "convert_mesh",

@@ -119,7 +119,8 @@ def _presets() -> Mapping[str, Preset]:
     return {name: _preset(name, entry) for name, entry in tomllib.loads(text).items()}
 
 
-def _preset(name: str, entry: Mapping[str, Any]) -> Preset:
+def law_of_constants(kind: str, entry: Mapping[str, Any], R_range: Bounds | None = None) -> Any:
+    """A law of the constants, closure and threshold of an entry."""
     constants = dict(entry["constants"])
     if "closure" in entry:
         constants["closure"] = newman_closure(**entry["closure"])
@@ -127,10 +128,14 @@ def _preset(name: str, entry: Mapping[str, Any]) -> Preset:
         constants["threshold"] = nasgro3_threshold(**entry["threshold3"])
     if "threshold4" in entry:
         constants["threshold"] = nasgro4_threshold(**entry["threshold4"])
+    return _LAWS[kind](**constants, R_range=R_range)
+
+
+def _preset(name: str, entry: Mapping[str, Any]) -> Preset:
     bounds = tuple(entry["R_range"]) if "R_range" in entry else None
     texts = {key: entry[key] for key in ("units", "material", "environment", "source", "checked")}
-    made = _LAWS[entry["law"]](**constants, R_range=bounds)
+    made = law_of_constants(entry["law"], entry, bounds)
     return Preset(name, made, R_range=bounds, **texts)
 
 
-__all__ = ["Preset", "law", "presets"]
+__all__ = ["Preset", "law", "law_of_constants", "presets"]

@@ -1,0 +1,293 @@
+"""Metals by name: `metals.toml` holds their published values, each with its document."""
+
+import difflib
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, replace
+from functools import cache
+from importlib.resources import files
+from math import sqrt
+from typing import Annotated, Any
+
+from xcrack.base.arguments import Number, check_arguments
+from xcrack.base.checks import value_text
+from xcrack.base.errors import ProblemError
+from xcrack.base.units import LENGTH
+from xcrack.fatigue.presets import law as preset_law
+from xcrack.fatigue.presets import law_of_constants, presets
+from xcrack.fatigue.units import Units, factors
+from xcrack.model.material import Isotropic
+
+_MODEL = "give length and K of the model, such as mm, MPa√mm or in, ksi√in"
+
+
+@dataclass(frozen=True)
+class Metal:
+    """Published values of one metal, in the units of a model.
+
+    Attributes
+    ----------
+    name, units : str
+    E : float, stress, or None
+        Young's modulus; None, as each value, where no source was read.
+    nu : float or None
+    yield_stress, ultimate_stress : float, stress, or None
+    K_Ic : float, stress √length, or None
+        Toughness in plane strain.
+    toughness : tuple of (thickness, K_c)
+        Of tests of plates, thinnest first.
+    laws : mapping of str to growth law
+        By the name of the law, or of a preset.
+    sources : mapping of str to str
+        Document of each value and of each law.
+    """
+
+    name: str
+    units: str
+    E: float | None = None
+    nu: float | None = None
+    yield_stress: float | None = None
+    ultimate_stress: float | None = None
+    K_Ic: float | None = None
+    toughness: tuple[tuple[float, float], ...] = ()
+    laws: Mapping[str, Any] = field(default_factory=dict)
+    sources: Mapping[str, str] = field(default_factory=dict)
+
+    def isotropic(
+        self,
+        plane: str | None = None,
+        *,
+        thickness: float | None = None,
+        E: float | None = None,
+        nu: float | None = None,
+    ) -> Isotropic:
+        """The elastic material of a problem.
+
+        Parameters
+        ----------
+        plane : {"strain", "stress"}, optional
+            State of a 2D body; None in 3D.
+        thickness : float, length, optional
+            Thickness of the plate: the material then has the toughness `K_c` of it.
+        E, nu : float, optional
+            In place of the published value, or of one that is missing.
+
+        Raises
+        ------
+        ProblemError
+            No source has E or nu, and it is not given either; no toughness, as of `K_c`.
+        """
+        elastic = {"E": self.E if E is None else E, "nu": self.nu if nu is None else nu}
+        missing = [name for name, value in elastic.items() if value is None]
+        if missing:
+            raise ProblemError(
+                f"material {self.name!r}: no source with {' and '.join(missing)} was read: "
+                f"give {', '.join(f'isotropic({name}=...)' for name in missing)}."
+            )
+        K_c = None if thickness is None else self.K_c(thickness)
+        return Isotropic(**elastic, plane=plane, yield_stress=self.yield_stress, K_c=K_c)  # type: ignore[arg-type]
+
+    @check_arguments()
+    def K_c(self, thickness: Annotated[float, Number(above=0, unit=LENGTH)]) -> float:
+        """Toughness of a plate, stress √length.
+
+        That of the next thicker plate tested, and K_Ic beyond them all: toughness falls with the
+        thickness, so that this is on the safe side (but for sheet much thinner than any tested).
+
+        Raises
+        ------
+        ProblemError
+            A thickness that is not positive, or no source has such a toughness.
+        """
+        for tested, K_c in self.toughness:
+            if thickness <= tested * (1 + 1e-9):
+                return K_c
+        if self.K_Ic is None:
+            raise ProblemError(
+                f"material {self.name!r}: no source with the toughness of a plate of "
+                f"{thickness:g} was read: leave out the thickness, and give K_c where you need one."
+            )
+        return self.K_Ic
+
+    def law(self, name: str | None = None, *, thickness: float | None = None) -> Any:
+        """A growth law of the metal, by default the first that `laws` has.
+
+        Parameters
+        ----------
+        name : str, optional
+            A name in `laws`.
+        thickness : float, length, optional
+            Growth without bound at `K_c` of this thickness; else at that of the tests that the
+            constants were fitted to. A law of Forman has its own.
+
+        Returns
+        -------
+        callable (dK_eq, R) -> da/dN
+
+        Raises
+        ------
+        ProblemError
+            No such law, or no toughness, as of `K_c`.
+        """
+        if not self.laws:
+            raise ProblemError(
+                f"material {self.name!r}: no source with a growth law was read: give one of your "
+                "own, such as xc.paris(C, m)."
+            )
+        chosen = next(iter(self.laws)) if name is None else name
+        if not isinstance(chosen, str) or chosen not in self.laws:
+            raise ProblemError(
+                f"material {self.name!r}: no law {value_text(chosen)}: give one of "
+                f"{', '.join(map(repr, self.laws))}."
+            )
+        law = self.laws[chosen]
+        if thickness is None or chosen == "forman":
+            return law
+        return replace(law, K_c=self.K_c(thickness))
+
+    def __str__(self) -> str:
+        return "\n".join(self._lines())
+
+    def _lines(self) -> list[str]:
+        length, K = (part.strip() for part in self.units.split(","))
+        stress = K.split("√")[0].rstrip("*· ") if "√" in K else "N/mm²"
+        rows = [
+            (f.name, f"{getattr(self, f.name):.6g} {_unit(f.name, stress, K)}".strip(), f.name)
+            for f in fields(self)
+            if isinstance(getattr(self, f.name), float)
+        ]
+        rows += [
+            (f"K_c of {t:.4g} {length}", f"{K_c:.6g} {K}", "toughness") for t, K_c in self.toughness
+        ]
+        rows += [(f"law {name}", _constants(law), name) for name, law in self.laws.items()]
+        width = max(len(title) for title, _, _ in rows)
+        documents = list(dict.fromkeys(self.sources[source] for _, _, source in rows))
+        lines = [f"{self.name}, in {self.units}"]
+        for title, value, source in rows:
+            n = documents.index(self.sources[source]) + 1
+            lines.append(f"  {title:<{width}}  {value} [{n}]")
+        return lines + [f"  [{n}] {text}" for n, text in enumerate(documents, 1)]
+
+
+def materials() -> list[str]:
+    """Names of the metals that `material` knows.
+
+    Returns
+    -------
+    list of str
+
+    Examples
+    --------
+    >>> "2024-T3 sheet, L-T" in materials()
+    True
+    """
+    return list(_data()["metals"])
+
+
+@check_arguments()
+def material(name: str, *, units: str) -> Metal:
+    """Published values of a metal: stiffness, strength, toughness and growth laws, with sources.
+
+    Parameters
+    ----------
+    name : str
+        One of `materials`.
+    units : str
+        Length and K of the model, such as ``"mm, MPa√mm"``: a problem has no units, so they are
+        never assumed.
+
+    Returns
+    -------
+    Metal
+        ``print`` shows every value with its document. None stands for what was read in no source.
+
+    Raises
+    ------
+    ProblemError
+        No such metal (the message names those most alike), units that are not known, or whose K
+        has the root of another length.
+
+    Notes
+    -----
+    These are values of documents, not of your part: a certified design needs those of its own
+    batch. Growth rates of one alloy differ by a factor of two and more between documents.
+
+    Examples
+    --------
+    >>> metal = material("2024-T3 sheet, L-T", units="mm, MPa√mm")
+    >>> round(metal.E), round(metal.K_c(2.5))
+    (72395, 2582)
+    >>> steel = metal.isotropic(plane="stress", thickness=2.5)
+    >>> law = metal.law("walker")
+    """
+    names = _data()["metals"]
+    if not isinstance(name, str) or name not in names:
+        text = name if isinstance(name, str) else ""
+        alike = difflib.get_close_matches(text, names, n=5, cutoff=0.4) or list(names)
+        raise ProblemError(
+            f"material: name = {value_text(name)} is not among those with sources: give one of "
+            f"{', '.join(map(repr, alike))} (xc.materials() has all), or "
+            f"xc.Isotropic and a law with values of your own."
+        )
+    target = Units.read(units)
+    if not target.consistent:
+        raise ProblemError(
+            f"material: units = {value_text(units)}: K has the root of another length: {_MODEL}."
+        )
+    return _metal(name, names[name], units)
+
+
+def _metal(name: str, entry: Mapping[str, Any], units: str) -> Metal:
+    by_K, by_length = factors(entry["units"], units)
+    scale = {
+        "E": by_K / sqrt(by_length), "nu": 1.0, "yield_stress": by_K / sqrt(by_length),
+        "ultimate_stress": by_K / sqrt(by_length), "K_Ic": by_K,
+    }  # fmt: skip
+    values = {key: entry[key][0] * scale[key] for key in scale if key in entry}
+    sources = {key: _source(entry[key][1]) for key in scale if key in entry}
+    plates = [(t * by_length, K * by_K) for t, K, _ in entry.get("K_c", ())]
+    if plates:
+        sources["toughness"] = _source(entry["K_c"][0][2])
+    laws: dict[str, Any] = {}
+    for kind, part in entry.get("laws", {}).items():
+        laws[kind] = law_of_constants(kind, part).to(part["units"], units)
+        sources[kind] = _source(part["source"])
+    for preset in entry.get("presets", ()):
+        laws[preset] = preset_law(preset, units=units)
+        sources[preset] = presets()[preset].source
+    return Metal(name, units, **values, toughness=tuple(plates), laws=laws, sources=sources)
+
+
+def _source(text: str) -> str:
+    """The document of a short name, with the place that follows it."""
+    key, _, place = text.partition(", ")
+    document = _data()["sources"][key]
+    if not place:
+        return str(document)
+    title, _, quoted = document.partition("; ")
+    return f"{title}, {place}; {quoted}"
+
+
+def _unit(name: str, stress: str, K: str) -> str:
+    return {"nu": "", "K_Ic": K}.get(name, stress)
+
+
+def _constants(law: Any) -> str:
+    """The numbers of a law, in short."""
+    parts = []
+    for f in fields(law):
+        value = getattr(law, f.name)
+        if isinstance(value, float):
+            parts.append(f"{f.name} {value:.4g}")
+        elif f.name == "pieces":
+            parts += [f"C {C:.4g} m {m:.4g}" for C, m in value]
+    return ", ".join(parts)
+
+
+@cache
+def _data() -> Mapping[str, Any]:
+    text = files("xcrack.fatigue").joinpath("metals.toml").read_text(encoding="utf-8")
+    return tomllib.loads(text)
+
+
+__all__ = ["Metal", "material", "materials"]
