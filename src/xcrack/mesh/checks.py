@@ -200,7 +200,7 @@ def _hanging_points(
     """Points that lie on a facet of a cell without being one of its points."""
     middle = corner.mean(axis=1)
     reach = np.linalg.norm(corner - middle[:, None], axis=2).max(axis=1)
-    row, candidate = _pairs_within(cKDTree(points[number]), middle, reach + _SAME * size)
+    row, candidate = pairs_within(cKDTree(points[number]), middle, reach + _SAME * size)
     candidate = number[candidate]
     is_own_facet = (facets[row] == candidate[:, None]).any(axis=1)
     row, candidate = row[~is_own_facet], candidate[~is_own_facet]
@@ -231,7 +231,7 @@ def _overlapping_cells(points: Floats, cells: Ints, owner: Ints, corner: Floats)
         tree, most = cKDTree(middle[rows]), float(reach[rows].max())
         for begin in range(0, len(x), chunk := max(_AT_ONCE // 100, 1)):
             part = np.arange(begin, min(begin + chunk, len(x)))
-            point, cell = _pairs_within(tree, x[part], np.full(len(part), most))
+            point, cell = pairs_within(tree, x[part], np.full(len(part), most))
             point, cell = part[point], rows[cell]
             is_close = np.linalg.norm(middle[cell] - x[point], axis=1) < reach[cell]
             is_close &= cell != owner[point]
@@ -253,7 +253,7 @@ def _overlapping_cells(points: Floats, cells: Ints, owner: Ints, corner: Floats)
     ]
 
 
-def _pairs_within(tree: cKDTree, x: Floats, reach: Floats) -> tuple[Ints, Ints]:
+def pairs_within(tree: cKDTree, x: Floats, reach: Floats) -> tuple[Ints, Ints]:
     """Pairs of places and points of a tree no farther from them than a reach."""
     neighbours = tree.query_ball_point(x, reach)
     row, _ = ranges(np.array([len(one) for one in neighbours], dtype=np.int64))
@@ -278,4 +278,4 @@ def unused_sets(cell_sets: Mapping[str, Ints], n_cells: int) -> list[str]:
     ]
 
 
-__all__ = ["checked_cells", "checked_sets", "mesh_doubts", "unused_sets"]
+__all__ = ["checked_cells", "checked_sets", "mesh_doubts", "pairs_within", "unused_sets"]

@@ -1,9 +1,11 @@
 """Curves and surfaces that a mesh stands for by a polygon: checks, and new points put onto them."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
+from itertools import combinations
 from typing import Any
 
 import numpy as np
+from scipy.sparse import coo_array
 
 from xcrack.base.arrays import Bools, Floats, Ints, at
 from xcrack.base.checks import LARGEST, call_function, numbers
@@ -14,11 +16,14 @@ Curves = Mapping[str, Curve]
 
 # Of a facet's longest edge. The middle of an edge over a quarter turn is .21 away from its arc.
 _FARTHEST = 0.25
-_FARTHEST_NEW = 1.0  # the edge may be the fourth part of the one that the arc was as far from
-_FLATTEST = 0.2  # of a cell's volume that must be left when its points are moved
+_FARTHEST_NEW = 1.0  # of the longest edge that there was
+_FLAT = 0.5  # of a cell's volume: with less left, inner points follow those that are moved
+_FLATTEST = 0.2  # of a cell's volume that must be left when points are moved
 _SHARP = 0.9  # cosine of the angle across which two sides of the body are one smooth surface
+_LAYERS = 2  # of cells around a folded one whose inner points follow
+_SWEEPS = 30
 _PASSES = 60
-_AT_REST = 1e-13  # of a facet's edge: a move that is round-off
+_AT_REST = 1e-13  # of the longest edge: a move that is round-off
 
 
 def checked_curves(given: Any, facet_sets: Mapping[str, Ints]) -> dict[str, Curve]:
@@ -71,6 +76,11 @@ def check_on_curves(points: Floats, facet_sets: Mapping[str, Ints], curves: Curv
         _nearest_points(name, curve, points[number], _reach(points, facets)[number], _FARTHEST)
 
 
+def longest_edge(points: Floats, facets: Iterable[Ints]) -> float:
+    """Longest edge of the facets of some sets, length."""
+    return max((float(_reach(points, f).max(initial=0.0)) for f in facets), default=0.0)
+
+
 def _reach(points: Floats, facets: Ints) -> Floats:
     """Longest edge of the facets around each point `(n,)`; zero where there is none."""
     corner = points[facets]
@@ -106,54 +116,86 @@ def _nearest_points(name: str, curve: Curve, x: Floats, reach: Floats, most: flo
 
 
 def on_curves(
-    points: Floats, cells: Ints, first: int, sets: Mapping[str, Ints], outer: Ints, curves: Curves
-) -> tuple[Floats, Bools]:
+    points: Floats,
+    cells: Ints,
+    new: Bools,
+    sets: Mapping[str, Ints],
+    outer: Ints,
+    curves: Curves,
+    size: float,
+) -> tuple[Floats, Bools, Ints]:
     """Points of refined cells, those of curved sets that are new on their curves.
 
-    Where a curved side meets another one at an edge, the point stays on both: on both curves, or
-    in the plane of the facet on the other side.
+    Where a curved side meets another one at an edge, the point stays on both: on the border of a
+    curve that knows one, else on both curves, or in the plane of the facet on the other side.
 
     Parameters
     ----------
     points : (n, d) array, length
     cells : (m, d + 1) array of int
-    first : int
-        Number of the first new point.
+    new : (n,) array of bool
+        Points that may be moved.
     sets : mapping of str to (k, d) array of int
         Facets of the sets with a curve.
     outer : (k, d) array of int
         All facets of the boundary.
     curves : mapping of str to callable
+    size : float, length
+        Longest edge that the facets had at first: no point is farther from its curve.
 
     Returns
     -------
     points : (n, d) array, length
     changed : (n,) array of bool
         Which points are others now.
+        Where a cell would be folded, inner points move along.
+    kept : (k,) array of int
+        Points that stay where they were all the same.
 
     Raises
     ------
     MeshError
         As `checked_curves`.
     """
-    rows = {name: np.unique(facets[facets >= first]) for name, facets in sets.items()}
-    new = np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *rows.values()]))
-    if not len(new):
-        return points, np.zeros(len(points), dtype=bool)
-    reach = np.max([_reach(points, facets) for facets in sets.values()], axis=0)
-    plane, normal = _other_sides(points, new, sets, outer)
+    rows = [
+        (name, curve, number)
+        for name, facets in sets.items()
+        for curve, number in _curves_of_points(curves[name], facets, new)
+    ]
+    moving = np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *(row[2] for row in rows)]))
+    if not len(moving):
+        return points, np.zeros(len(points), dtype=bool), moving
+    plane, normal = _other_sides(points, moving, sets, outer)
     x = points.copy()
     for _ in range(_PASSES):
-        before = x[new]
-        for name, number in rows.items():
-            x[number] = _nearest_points(name, curves[name], x[number], reach[number], _FARTHEST_NEW)
+        before = x[moving]
+        for name, curve, number in rows:
+            reach = np.full(len(number), size)
+            x[number] = _nearest_points(name, curve, x[number], reach, _FARTHEST_NEW)
         off = ((x[plane] - points[plane]) * normal).sum(axis=1)
         x[plane] -= off[:, None] * normal
-        if (np.linalg.norm(x[new] - before, axis=1) <= _AT_REST * reach[new]).all():
+        if (np.linalg.norm(x[moving] - before, axis=1) <= _AT_REST * size).all():
             break
-    changed = np.zeros(len(points), dtype=bool)
-    changed[new] = (x[new] != points[new]).any(axis=1)
-    return _unfolded_points(points, x, cells, changed)
+    moved = np.zeros(len(points), dtype=bool)
+    moved[moving] = (x[moving] != points[moving]).any(axis=1)
+    x, kept = _unfolded_points(points, x, cells, moved, outer)
+    return x, np.asarray((x != points).any(axis=1)), kept
+
+
+def _curves_of_points(curve: Curve, facets: Ints, new: Bools) -> list[tuple[Curve, Ints]]:
+    """New points of a set with what they are put onto: its curve, or the border of that.
+
+    A curve may have a `border`: that on which the points of edges lie that only one facet of the
+    set has.
+    """
+    number = np.unique(facets[new[facets]])
+    border: Curve | None = getattr(curve, "border", None)
+    if border is None or facets.shape[1] < 3:
+        return [(curve, number)]
+    pairs = np.sort(np.concatenate([facets[:, [i, i - 1]] for i in range(3)]), axis=1)
+    edges, count = np.unique(pairs, axis=0, return_counts=True)
+    at_border = np.isin(number, edges[count == 1])
+    return [(curve, number[~at_border]), (border, number[at_border])]
 
 
 def _other_sides(
@@ -190,32 +232,79 @@ def _normals(corner: Floats) -> Floats:
 
 
 def _unfolded_points(
-    points: Floats, x: Floats, cells: Ints, changed: Bools
-) -> tuple[Floats, Bools]:
-    """Moved points, but those that would fold or flatten a cell where they were."""
-    cells_near = cells[changed[cells].any(axis=1)]
-    before, stay, where = _volume(points[cells_near]), 0, points[0]
+    points: Floats, target: Floats, cells: Ints, moved: Bools, outer: Ints
+) -> tuple[Floats, Ints]:
+    """Points that are moved, and inner ones that follow where a cell would be folded or flattened.
+
+    Points of the boundary stay where they were, and are returned as numbers, where that does not
+    help: walls are thinner than the arc is high, say.
+    """
+    x, moved, kept = target, moved.copy(), [np.zeros(0, dtype=np.int64)]
+    near = np.nonzero(moved[cells].any(axis=1))[0]
+    before, region = _volume(points[cells[near]]), np.zeros(0, dtype=np.int64)
     while True:
-        is_folded = (
-            _volume(x[cells_near]) / before < _FLATTEST
-        )  # cells may still be of either orientation
-        back = np.unique(cells_near[is_folded])
-        back = back[changed[back]]
-        if not len(back):
-            break
-        stay += len(back)
-        where, x[back], changed[back] = points[back[0]], points[back], False
-    if stay:
+        # Cells may still be of either orientation.
+        share = _volume(x[cells[near]]) / before
+        flat, folded = near[share < _FLAT], near[share < _FLATTEST]
+        if not len(folded) and (len(region) or not len(flat)):
+            return x, np.concatenate(kept)
+        if not np.isin(folded, region).all() or not len(region):
+            region = np.union1d(region, flat)
+            for _ in range(_LAYERS):
+                at_region = np.zeros(len(points), dtype=bool)
+                at_region[cells[region]] = True
+                region = np.nonzero(at_region[cells].any(axis=1))[0]
+            near = np.union1d(near, region)
+            before = _volume(points[cells[near]])
+        else:
+            back = np.unique(cells[folded])
+            back = back[moved[back]]
+            if not len(back):  # only inner points fold it: none of them follows
+                back = np.unique(cells[region])
+                back = back[moved[back]]
+            moved[back] = False
+            kept.append(back)
+        x = np.where(moved[:, None], target, points)
+        _let_follow(points, x, cells, region, outer)
+
+
+def _let_follow(points: Floats, x: Floats, cells: Ints, region: Ints, outer: Ints) -> None:
+    """Move the inner points of a region by means of the moves around them (in place)."""
+    beyond = np.ones(len(cells), dtype=bool)
+    beyond[region] = False
+    is_free = np.zeros(len(points), dtype=bool)
+    is_free[cells[region]] = True
+    is_free[cells[beyond]] = False
+    is_free[outer] = False
+    number, corner = np.unique(cells[region], return_inverse=True)
+    corner = corner.reshape(len(region), -1)
+    one, other = np.array(list(combinations(range(cells.shape[1]), 2))).T
+    i, j = corner[:, one].ravel(), corner[:, other].ravel()
+    weight = 1 / ((points[number[i]] - points[number[j]]) ** 2).sum(axis=1)
+    rows, columns = np.concatenate([i, j]), np.concatenate([j, i])
+    links = coo_array((np.tile(weight, 2), (rows, columns)), shape=(len(number),) * 2).tocsr()
+    total = links.sum(axis=1)[:, None]
+    move, free = x[number] - points[number], is_free[number]
+    for _ in range(_SWEEPS):
+        move[free] = (links @ move / total)[free]
+    x[number[free]] = points[number[free]] + move[free]
+
+
+def warn_of_kept(points: Floats, kept: Ints) -> None:
+    """Name the points that have been kept off their curve."""
+    if len(kept):
         warn(
-            f"{stay} new points of the boundary stay off their curve, such as that near "
-            f"{at(where)}: cells there are flatter than the arc is high. Refine the mesh further "
-            "there, or mesh it anew."
+            f"{len(kept)} new points of the boundary stay off their curve, such as that near "
+            f"{at(points[kept[0]])}: cells there are flatter than the arc is high. Refine the mesh "
+            "further there, or mesh it anew."
         )
-    return x, changed
 
 
 def _volume(corner: Floats) -> Floats:
     return np.asarray(np.linalg.det(corner[:, 1:] - corner[:, :1]))
 
 
-__all__ = ["Curve", "Curves", "check_on_curves", "checked_curves", "on_curves"]
+__all__ = [
+    "Curve", "Curves", "check_on_curves", "checked_curves", "longest_edge", "on_curves",
+    "warn_of_kept",
+]  # fmt: skip

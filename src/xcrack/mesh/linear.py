@@ -14,6 +14,7 @@ import numpy as np
 
 from xcrack.base.arrays import Bools, Floats, Ints, at
 from xcrack.base.errors import MeshError, warn
+from xcrack.mesh.polygon import closest_on_segment
 from xcrack.mesh.raw import RawMesh
 
 _Faces = tuple[tuple[int, ...], ...]
@@ -66,6 +67,18 @@ _PLURAL = {
 }  # fmt: skip
 _FLAT = 1e-9  # share of the largest piece of a cell below which a piece of it has no volume
 _STRAIGHT = 1e-6  # of an edge: a midside node this close to the middle is on it
+_HIGHEST = 0.51  # of an edge: an arc of half a turn, and its round-off
+_SAMPLE = 500  # cells from which the order of nodes is taken
+_ORDERS = {
+    (kind, nodes): order
+    for kind, counts in {
+        "line": {3: 2, 4: 3, 5: 4, 6: 5}, "triangle": {6: 2, 7: 2, 10: 3, 15: 4, 21: 5},
+        "quad": {8: 2, 9: 2, 12: 3, 16: 3, 25: 4, 36: 5},
+        "tetra": {10: 2, 11: 2, 20: 3, 35: 4, 56: 5}, "pyramid": {13: 2, 14: 2, 29: 3, 30: 3},
+        "wedge": {15: 2, 18: 2, 40: 3}, "hexahedron": {20: 2, 27: 2, 64: 3, 125: 4},
+    }.items()
+    for nodes, order in counts.items()
+}  # fmt: skip
 
 
 def base_kind(kind: str) -> str | None:
@@ -116,7 +129,13 @@ def linear_mesh(raw: RawMesh, source: str, strict: bool) -> RawMesh:
             "nodes are left out then and cells divided."
         )
     _check_points(raw, source)
-    bulge = max((_bulge(raw.points, k, d) for k, d in raw.blocks if k in other), default=(0.0, 0.0))
+    top = max(SHAPES[base].dim for base in shapes.values())
+    curved = [
+        _curved_edges(raw.points, kind, data, source)
+        for kind, data in raw.blocks
+        if kind in other and SHAPES[other[kind]].dim == top and len(data)
+    ]
+    pairs, middles, bulge = _joined_edges(curved)
     entries = [*raw.blocks, *((kind, data) for kind, _, data in raw.sets)]
     corners = [
         (shapes[kind], data[:, : SHAPES[shapes[kind]].corners]) if kind in other else (kind, data)
@@ -144,7 +163,7 @@ def linear_mesh(raw: RawMesh, source: str, strict: bool) -> RawMesh:
     sets = [(k, n, d) for n, (k, d) in zip(names, done[len(blocks) :], strict=True)]
     # An element may be in the file as part of the body and of sets: what was done is told once.
     _tell(source, counts, shapes, blocks, bulge, len(points) - len(raw.points))
-    return RawMesh(points, blocks, sets, raw.point_sets)
+    return RawMesh(points, blocks, sets, raw.point_sets, pairs, middles)
 
 
 def _is_plane(points: Floats) -> bool:
@@ -203,26 +222,121 @@ def _check_points(raw: RawMesh, source: str) -> None:
             )
 
 
-def _bulge(points: Floats, kind: str, data: Ints) -> tuple[float, float]:
-    """Largest distance of a midside node from the middle of the nearest edge: share, length."""
+_CurvedEdges = tuple[Ints, Floats, tuple[float, float]]
+
+
+def _joined_edges(parts: Sequence[_CurvedEdges]) -> _CurvedEdges:
+    """Curved edges of several blocks as one list, each once, and the largest bulge."""
+    if not parts:
+        return np.zeros((0, 2), np.int64), np.zeros((0, 3)), (0.0, 0.0)
+    pairs, middles, bulges = zip(*parts, strict=True)
+    every, first = np.unique(np.concatenate(pairs), axis=0, return_index=True)
+    return every, np.concatenate(middles)[first], max(bulges)
+
+
+def _curved_edges(points: Floats, kind: str, data: Ints, source: str) -> _CurvedEdges:
+    """Edges of cells of second or higher order that are not straight, smaller end first.
+
+    Also diagonals of their quadrilaterals, whose middle is that of the serendipity element; and
+    the largest distance of a middle from the straight one: share of the edge, length.
+    """
     shape = SHAPES[base_kind(kind) or "vertex"]
-    nodes = data[:, shape.corners : shape.corners + len(shape.edges)]
-    if not nodes.size:
-        return 0.0, 0.0
+    count = len(shape.edges)
+    order = _order_of(kind, data.shape[1])
+    nodes = data[:, shape.corners : shape.corners + count * (order - 1)]
     x = np.asarray(points, dtype=float)
-    ends = x[data[:, np.array(shape.edges)]]
-    middle, length = ends.mean(axis=2), np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=2)
-    # Programs number midside nodes in different orders; the nearest edge is the node's own.
-    best = np.full(nodes.shape, np.inf)
-    share = np.zeros(nodes.shape)
-    for edge in range(len(shape.edges)):
-        distance = np.linalg.norm(x[nodes] - middle[:, edge, None], axis=2)
-        nearer = distance < best
-        best = np.where(nearer, distance, best)
-        relative = distance / np.maximum(length[:, edge, None], np.finfo(float).tiny)
-        share = np.where(nearer, relative, share)
+    ends = x[data[:, np.array(shape.edges).reshape(-1, 2)]]
+    slots = _nodes_of_edges(x[nodes], ends, order) if nodes.size else None
+    if slots is None:
+        return np.zeros((0, 2), np.int64), np.zeros((0, x.shape[1])), (0.0, 0.0)
+    middles = _middles(x[nodes], ends, slots)
+    length = np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=2)
+    _check_middles(middles, ends, length, data, source)
+    away = np.linalg.norm(middles - ends.mean(axis=2), axis=2)
+    share = away / np.maximum(length, np.finfo(float).tiny)
     worst = np.unravel_index(int(np.argmax(share)), share.shape)
-    return float(share[worst]), float(best[worst])
+    pairs = data[:, np.array(shape.edges)]
+    faces = [face for face in shape.faces if len(face) == 4]
+    if faces:
+        corner = data[:, np.array(faces)]
+        number = {frozenset(edge): k for k, edge in enumerate(shape.edges)}
+        around = [[number[frozenset((f[i], f[i - 1]))] for i in range(4)] for f in faces]
+        centre = middles[:, around].sum(axis=2) / 2 - x[corner].sum(axis=2) / 4
+        pairs = np.concatenate([pairs, corner[:, :, [0, 2]], corner[:, :, [1, 3]]], axis=1)
+        middles = np.concatenate([middles, centre, centre], axis=1)
+        both = x[pairs]
+        away = np.linalg.norm(middles - both.mean(axis=2), axis=2)
+        share = away / np.maximum(np.linalg.norm(both[:, :, 1] - both[:, :, 0], axis=2), 1e-300)
+    is_curved = share > _STRAIGHT
+    listed = np.sort(pairs[is_curved], axis=1).astype(np.int64)
+    listed, first = np.unique(listed, axis=0, return_index=True)
+    largest = (float(share[worst]), float(away[worst])) if count else (0.0, 0.0)
+    return listed, middles[is_curved][first], largest
+
+
+def _order_of(kind: str, nodes: int) -> int:
+    """Order of an element by its number of nodes; 1 where it is not known."""
+    return _ORDERS.get((base_kind(kind) or "", nodes), 1)
+
+
+def _nodes_of_edges(x: Floats, ends: Floats, order: int) -> list[list[int]] | None:
+    """Which nodes lie on each edge, and none where that is not clear.
+
+    Programs number them in different orders, the same for all cells of a kind: a node's edge is
+    that to which it is nearest in most cells.
+    """
+    part = slice(None, None, max(1, len(x) // _SAMPLE))
+    a, b = ends[part, None, :, 0], ends[part, None, :, 1]
+    square = np.maximum(((b - a) ** 2).sum(axis=-1), np.finfo(float).tiny)
+    away = np.linalg.norm(x[part, :, None] - closest_on_segment(x[part, :, None], a, b), axis=-1)
+    off = np.median(away / np.sqrt(square), axis=0)
+    if order == 2:  # beside the middle of an edge, not anywhere on it
+        middle = np.linalg.norm(x[part, :, None] - (a + b) / 2, axis=-1)
+        off = np.median(middle / np.sqrt(square), axis=0)
+    edge = np.argmin(off, axis=1)
+    slots = [np.nonzero(edge == k)[0].tolist() for k in range(ends.shape[1])]
+    return slots if all(len(each) == order - 1 for each in slots) else None
+
+
+def _middles(x: Floats, ends: Floats, slots: list[list[int]]) -> Floats:
+    """Middle of each edge: its node there, or what a polynomial through two beside it says."""
+    order = len(slots[0]) + 1
+    result = np.empty((len(x), len(slots), x.shape[2]))
+    for k, each in enumerate(slots):
+        a, b = ends[:, k, 0], ends[:, k, 1]
+        from_middle = np.linalg.norm(x[:, each] - ((a + b) / 2)[:, None], axis=2).mean(axis=0)
+        near = np.array(each)[np.argsort(from_middle, kind="stable")]
+        if order % 2 == 0:
+            result[:, k] = x[:, near[0]]
+            continue
+        t = (order - 1) / (2 * order)  # of the node before the middle, and 1 - t of that behind it
+        outer = (0.5 - t) ** 2 / (2 * t * (1 - t))
+        result[:, k] = (0.5 + outer) * (x[:, near[0]] + x[:, near[1]]) - outer * (a + b)
+    return result
+
+
+def _check_middles(
+    middles: Floats, ends: Floats, length: Floats, data: Ints, source: str
+) -> None:
+    """Refuse midside nodes that lie outside of their edge."""
+    a, b = ends[:, :, 0], ends[:, :, 1]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        along = ((middles - a) * (b - a)).sum(axis=2) / length**2
+        foot = a + along[..., None] * (b - a)
+        height = np.linalg.norm(middles - foot, axis=2) / length
+    is_curved = height > _STRAIGHT
+    inside = np.where(is_curved, (along > 0.25) & (along < 0.75), (along > 0) & (along < 1))
+    is_wrong = ~(inside & (height < _HIGHEST)) & (length > 0)
+    if is_wrong.any():
+        cell, edge = np.argwhere(is_wrong)[0]
+        raise MeshError(
+            f"{source}: a midside node of the cell with the nodes {data[cell].tolist()} (numbers "
+            f"from 0) lies outside of its edge from {at(a[cell, edge])} to {at(b[cell, edge])}, at "
+            f"{at(middles[cell, edge])} ({int(is_wrong.sum())} such nodes): it must lie between "
+            "the quarters of a curved edge, and no farther from it than half of its length. Mend "
+            "the order of the nodes or the mesh, or save it at first order (gmsh: "
+            "Mesh.ElementOrder = 1)."
+        )
 
 
 def _fans(rows: Ints, faces: _Faces) -> Ints:

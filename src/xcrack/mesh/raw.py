@@ -8,6 +8,7 @@ import numpy as np
 from xcrack.base.arrays import Floats, Ints
 from xcrack.base.checks import value_text
 from xcrack.base.errors import MeshError, warn
+from xcrack.mesh.curved_facets import raised_lattice, with_curves
 from xcrack.mesh.mesh import Mesh, sound_mesh
 
 TOPOLOGICAL_DIM = {"vertex": 0, "line": 1, "triangle": 2, "tetra": 3}
@@ -30,12 +31,16 @@ class RawMesh:
         Elements of each set, as point numbers; a name may come several times.
     point_sets : list of (name, (m,) array)
         Sets of points.
+    pairs, middles : (e, 2) array of int, (e, 2) or (e, 3) array, length, optional
+        Ends of curved edges, and the middle of each.
     """
 
     points: Floats
     blocks: list[tuple[str, Ints]]
     sets: list[tuple[str, str, Ints]] = field(default_factory=list)
     point_sets: list[tuple[str, Ints]] = field(default_factory=list)
+    pairs: Ints = field(default_factory=lambda: np.zeros((0, 2), dtype=np.int64))
+    middles: Floats = field(default_factory=lambda: np.zeros((0, 3)))
 
 
 def mesh_from_raw(raw: RawMesh, source: str) -> Mesh:
@@ -62,8 +67,8 @@ def mesh_from_raw(raw: RawMesh, source: str) -> Mesh:
     MeshError
         No cells, cells that are not linear simplices, a surface in 3D.
     """
-    points, cells, facet_sets, cell_sets, _ = mesh_parts(raw, source)
-    return Mesh(points, cells, facet_sets, cell_sets)
+    points, cells, facet_sets, cell_sets, number = mesh_parts(raw, source)
+    return with_curved_edges(Mesh(points, cells, facet_sets, cell_sets), raw, number)
 
 
 def mesh_parts(
@@ -113,6 +118,26 @@ def mesh_parts(
             if len(facets):
                 facet_sets[name] = facets
     return points, cells, _without_own_boundary(facet_sets, bare, source), cell_sets, new
+
+
+def with_curved_edges(mesh: Mesh, raw: RawMesh, number: Ints) -> Mesh:
+    """A mesh of a file with the curves that curved edges in it give.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        Of the parts that `mesh_parts` returns.
+    raw : RawMesh
+    number : (n,) array of int
+        As `mesh_parts` returns it.
+    """
+    pairs = number[raw.pairs]
+    is_used = (pairs >= 0).all(axis=1)
+    if not is_used.any():
+        return mesh
+    middles = np.asarray(raw.middles, dtype=float)[is_used, : mesh.dim]
+    nodes = raised_lattice(mesh, mesh.boundary, pairs[is_used], middles)
+    return with_curves(mesh, mesh.boundary, nodes)
 
 
 def _without_own_boundary(facet_sets: dict[str, Ints], bare: Mesh, source: str) -> dict[str, Ints]:

@@ -4,6 +4,7 @@ import os
 import subprocess
 import sys
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from math import log10
 from os import PathLike
 from pathlib import Path
@@ -12,15 +13,17 @@ from typing import Any
 
 import numpy as np
 
-from xcrack.base.arrays import Bools, Floats
+from xcrack.base.arrays import Bools, Floats, Ints
 from xcrack.base.checks import call_function, value_text, whole_numbers
 from xcrack.base.errors import GeometryError, MeshError
 from xcrack.base.paths import path_of, system_errors
+from xcrack.mesh.curved_facets import lattice, rows_of, with_curves
 from xcrack.mesh.gmsh_session import length_of, session
 from xcrack.mesh.mesh import Mesh, sound_mesh
 
 Selector = Callable[[Floats], Any] | Sequence[int]
 _MOST_POINTS = 5_000_000
+_STRAIGHT = ("Plane", "Line")  # kinds of faces and edges of a shape whose facets are their own
 _PLANE = 1e-7  # share of the size of a shape within which it lies in a plane z = constant
 
 
@@ -233,7 +236,62 @@ def _mesh(gmsh: ModuleType, dim: int, source: str, sets: Mapping[str, Selector])
                 f"have their middles at {centres[:12]}: choose all points of a face."
             )
         facet_sets[name] = new[np.concatenate([faces[tag] for tag in members])]
-    return sound_mesh(points[used][:, :dim], new[cells], facet_sets)
+    mesh = sound_mesh(points[used][:, :dim], new[cells], facet_sets)
+    curved = {
+        tag: new[face]
+        for tag, face in faces.items()
+        if len(face) and gmsh.model.getType(dim - 1, tag) not in _STRAIGHT
+    }
+    lines = {
+        tag: new[elements(1, tag)]
+        for _, tag in gmsh.model.getEntities(1)
+        if dim == 3 and gmsh.model.getType(1, tag) not in _STRAIGHT
+    }
+    return _with_shapes(gmsh, mesh, curved, lines)
+
+
+def _with_shapes(
+    gmsh: ModuleType, mesh: Mesh, faces: dict[int, Ints], lines: dict[int, Ints]
+) -> Mesh:
+    """The mesh with the curves of the shape: nodes of quartic pieces, put onto its faces.
+
+    Parameters
+    ----------
+    gmsh : module
+        With the shape.
+    mesh : Mesh
+    faces : dict of int to (k, d) array of int
+        Facets on each curved face of the shape (in 2D: on each edge).
+    lines : dict of int to (k, 2) array of int
+        In 3D: edges of facets on each curved edge of the shape.
+    """
+    outer = {
+        tag: face[mesh.facet_to_cell[mesh.facet_numbers(face), 1] < 0]
+        for tag, face in faces.items()
+    }
+    outer = {tag: face for tag, face in outer.items() if len(face)}
+    if not outer:
+        return mesh
+    facets = np.concatenate(list(outer.values()))
+    tag = np.repeat(list(outer), [len(face) for face in outer.values()])
+    flat = lattice(mesh.points, facets)
+    # Nodes of edges of the shape belong to these, all others to the face on which they lie.
+    owner, of_line = np.zeros((2, len(flat.points)), dtype=np.int64)
+    for place in flat.facets[:, mesh.dim :].T:
+        owner[place] = tag
+    for number, pairs in lines.items():
+        _, known = rows_of(np.sort(pairs, axis=1), flat.corner[flat.edges], mesh.n_points)
+        nodes = len(flat.corner) + 3 * np.nonzero(known)[0][:, None] + np.arange(3)
+        of_line[nodes.ravel()] = number
+    points = flat.points.copy()
+    for dim, numbers in ((mesh.dim - 1, np.where(of_line > 0, 0, owner)), (1, of_line)):
+        for number in np.unique(numbers[numbers > 0]).tolist():
+            rows = np.nonzero(numbers == number)[0]
+            x = np.zeros((len(rows), 3))
+            x[:, : mesh.dim] = flat.points[rows]
+            nearest = gmsh.model.getClosestPoint(dim, number, x.ravel())[0]
+            points[rows] = np.reshape(nearest, (-1, 3))[:, : mesh.dim]
+    return with_curves(mesh, facets, replace(flat, points=points))
 
 
 def _selected_facets(

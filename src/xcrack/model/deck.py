@@ -25,7 +25,7 @@ from xcrack.mesh.files import existing_file, raw_mesh_of, sets_without_facets
 from xcrack.mesh.keywords import KeywordUse, missed_words, table_of
 from xcrack.mesh.linear import linear_mesh
 from xcrack.mesh.mesh import Mesh
-from xcrack.mesh.raw import mesh_parts
+from xcrack.mesh.raw import mesh_parts, with_curved_edges
 from xcrack.model.deck_body import DeckBody
 from xcrack.model.deck_state import Coupling, DeckState, SpreadLoad, chosen_step, steps_of
 from xcrack.model.loads import (
@@ -311,8 +311,8 @@ def _mesh_deck(path: Path) -> Deck:
     """A deck of which mesh and sets alone are taken."""
     raw, uses = raw_mesh_of(path)
     raw = linear_mesh(raw, path.name, strict=False)
-    points, cells, facet_sets, cell_sets, _ = mesh_parts(raw, path.name)
-    mesh = Mesh(points, cells, facet_sets, cell_sets)
+    points, cells, facet_sets, cell_sets, number = mesh_parts(raw, path.name)
+    mesh = with_curved_edges(Mesh(points, cells, facet_sets, cell_sets), raw, number)
     _tell_missed(path, uses, sets_without_facets(raw, mesh))
     return Deck(path, mesh, keywords=tuple(uses))
 

@@ -14,7 +14,7 @@ from xcrack.mesh.fields import CellField, Field
 from xcrack.mesh.keywords import Keyword
 from xcrack.mesh.linear import linear_mesh
 from xcrack.mesh.mesh import Mesh, nearest_nodes, numbers_of, sound_mesh
-from xcrack.mesh.raw import RawMesh, mesh_parts
+from xcrack.mesh.raw import RawMesh, mesh_parts, with_curved_edges
 from xcrack.model.deck_state import SpreadLoad
 from xcrack.model.material import Isotropic, Material
 
@@ -129,7 +129,8 @@ class DeckBody:
         self.raw: RawMesh = model.raw_mesh([*facets, *cells])
         linear = linear_mesh(self.raw, source, strict=False)
         points, simplices, facet_sets, self._cell_sets, self._number = mesh_parts(linear, source)
-        self.mesh = Mesh(points, simplices, facet_sets)
+        mesh = Mesh(points, simplices, facet_sets)
+        self.mesh = with_curved_edges(mesh, linear, self._number)
         ends = model.edge_of_middle_node()
         self._ends = np.full((len(model.points), 2), -1, dtype=np.int64)
         if ends:

@@ -1,0 +1,402 @@
+"""Curved boundaries from second-order meshes and from CAD, as quartic pieces.
+
+A piece is the polynomial of degree four through its nodes, which is C0 to its neighbours: the nodes
+of an edge depend on that edge alone. Second-order cells give three nodes of an edge; its quartic
+runs along the circle through them, which is exact for what parts are mostly made of, where a
+parabola over 60° is .2 % of the radius off.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+from xcrack.base.arrays import Bools, Floats, Ints, lock, offsets, ranges
+from xcrack.mesh.checks import pairs_within
+from xcrack.mesh.mesh import Mesh, local_edges, numbers_of, sound_mesh
+
+_FLATTEST = 1e-4  # of its longest edge: a facet whose nodes are no farther from its plane is flat
+_SHARP = 0.9  # cosine of the angle across which two pieces are one smooth surface
+_NEIGHBOURS = 4  # nodes from whose pieces a nearest point is looked for
+_ROOMY = 1.1  # times the distance of the farthest node: pieces bulge between their nodes
+_STRAIGHT = 1e-9  # of an edge: middle of an arc this close to its chord
+_NAME = "curved_{}"
+_INNER = np.array([(0, 1, 2), (1, 0, 2), (2, 0, 1)])  # corners by weight of the inner nodes
+_LATTICE = {  # four times the barycentric coordinates of the nodes of a piece, by its corners
+    2: np.array([(4, 0), (0, 4), (3, 1), (2, 2), (1, 3)]),
+    3: np.array([
+        (4, 0, 0), (0, 4, 0), (0, 0, 4), (3, 1, 0), (2, 2, 0), (1, 3, 0), (3, 0, 1), (2, 0, 2),
+        (1, 0, 3), (0, 3, 1), (0, 2, 2), (0, 1, 3), (2, 1, 1), (1, 2, 1), (1, 1, 2),
+    ]),
+}  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class CurvedFacets:
+    """Quartic pieces of a curve or a surface: a function that returns their nearest points.
+
+    Parameters
+    ----------
+    points : (n, d) array, length
+        Nodes.
+    facets : (k, 5) or (k, 15) array of int
+        Nodes of each piece: corners; of each edge, in the order of `local_edges`, three at its
+        quarters from the first corner on; in a triangle the three inside.
+    """
+
+    points: Floats
+    facets: Ints
+
+    def __call__(self, x: Floats) -> Floats:
+        """Nearest points `(n, d)`."""
+        return self.feet(x)[0]
+
+    def feet(self, x: Floats) -> tuple[Floats, Ints]:
+        """Nearest points `(n, d)`, and the piece that each lies on `(n,)`."""
+        from xcrack.mesh.kernels.quartic import nearest_on_pieces
+
+        x = np.ascontiguousarray(x, dtype=float)
+        if not len(x):
+            return x, np.zeros(0, dtype=np.int64)
+        count = min(_NEIGHBOURS, len(self.points))
+        near = self._tree.query(x, k=count)[1].reshape(len(x), count).astype(np.int64)
+        pieces = (*self._owners, self.nodes, *self._balls)
+        foot, owner = nearest_on_pieces(lock(x.view()), lock(near), *pieces)
+        return foot, owner
+
+    @cached_property
+    def nodes(self) -> Floats:
+        """Nodes of each piece `(k, 5 or 15, d)`, length."""
+        return lock(np.ascontiguousarray(self.points[self.facets]))
+
+    @cached_property
+    def _tree(self) -> cKDTree:
+        return cKDTree(self.points)
+
+    @cached_property
+    def _owners(self) -> tuple[Ints, Ints, Ints]:
+        """Pieces that have each node: offsets, pieces, and the number of the node in them."""
+        flat = self.facets.ravel()
+        order = np.argsort(flat, kind="stable")
+        piece, local = np.divmod(order, self.facets.shape[1])
+        begin = offsets(np.bincount(flat, minlength=len(self.points)))
+        return lock(begin), lock(piece), lock(local)
+
+    @cached_property
+    def _balls(self) -> tuple[Floats, Floats]:
+        """Centre and radius of a ball around each piece."""
+        centre = self.nodes.mean(axis=1)
+        radius = np.linalg.norm(self.nodes - centre[:, None], axis=2).max(axis=1)
+        return lock(centre), lock(_ROOMY * radius)
+
+    @cached_property
+    def border(self) -> "CurvedFacets | None":
+        """Curves where a surface ends; None of a curve, and of a closed surface."""
+        if self.facets.shape[1] < 15:
+            return None
+        edges = np.concatenate([self.facets[:, each] for each in _edge_nodes()])
+        ends = np.sort(edges[:, :2], axis=1)
+        _, first, count = np.unique(ends, axis=0, return_index=True, return_counts=True)
+        once = edges[first[count == 1]]
+        if not len(once):
+            return None
+        used, facets = np.unique(once, return_inverse=True)
+        return CurvedFacets(lock(self.points[used]), lock(facets.reshape(-1, 5)))
+
+    def places(self, owner: Ints, bary: Floats) -> tuple[Floats, Floats]:
+        """Points of pieces `(q, d)` at barycentric coordinates, and derivatives along these."""
+        from xcrack.mesh.kernels.quartic import points_of_pieces
+
+        return points_of_pieces(self.nodes, np.ascontiguousarray(owner), lock(np.array(bary)))
+
+
+def _edge_nodes() -> Iterator[list[int]]:
+    """Local numbers of the nodes of each edge of a triangle, its ends first."""
+    for k, (i, j) in enumerate(local_edges(2).tolist()):
+        yield [i, j, 3 + 3 * k, 4 + 3 * k, 5 + 3 * k]
+
+
+@dataclass(frozen=True, eq=False)
+class Lattice:
+    """Nodes of the quartic pieces that stand for facets of a mesh.
+
+    Attributes
+    ----------
+    points : (n, d) array, length
+        On the straight facets: corners, then three of each edge, then three of each triangle.
+    facets : (k, 5) or (k, 15) array of int
+    corner : (c,) array of int
+        Mesh points of the corners.
+    edges : (e, 2) array of int
+        Corners of each edge, smaller first; its nodes are ``c + 3 e ...``.
+    """
+
+    points: Floats
+    facets: Ints
+    corner: Ints
+    edges: Ints
+
+    @property
+    def inner(self) -> int:
+        """Number of the first node inside a triangle."""
+        return len(self.corner) + 3 * len(self.edges)
+
+
+def lattice(points: Floats, facets: Ints) -> Lattice:
+    """Nodes of pieces on straight facets `(k, d)`."""
+    d = facets.shape[1]
+    corner, local = np.unique(facets, return_inverse=True)
+    local = local.reshape(facets.shape)
+    pairs = local_edges(d - 1)
+    ends = local[:, pairs]
+    turned = ends[..., 0] > ends[..., 1]
+    edges, number = np.unique(np.sort(ends.reshape(-1, 2), axis=1), axis=0, return_inverse=True)
+    number = number.reshape(len(facets), len(pairs))
+    three = np.where(turned[..., None], [2, 1, 0], [0, 1, 2])
+    first = len(corner) + 3 * number[..., None] + three
+    nodes = [local, first.reshape(len(facets), -1)]
+    if d == 3:
+        inner = len(corner) + 3 * len(edges) + np.arange(3 * len(facets)).reshape(-1, 3)
+        nodes.append(inner)
+    every = np.concatenate(nodes, axis=1)
+    x = np.empty((int(every.max(initial=-1)) + 1, points.shape[1]))
+    x[every] = np.einsum("ac,kcd->kad", _LATTICE[d] / 4, points[facets])
+    return Lattice(x, every, corner, edges)
+
+
+def arcs(a: Floats, middle: Floats, b: Floats) -> Floats:
+    """Points at the quarters of circular arcs from a to b through a third point `(e, 3, d)`."""
+    chord = b - a
+    half = np.linalg.norm(chord, axis=1) / 2
+    along = chord / (2 * half)[:, None]
+    away = middle - (a + b) / 2
+    share = np.einsum("ed,ed->e", away, along)
+    away -= share[:, None] * along
+    height = np.linalg.norm(away, axis=1)
+    is_straight = height <= _STRAIGHT * half
+    height = np.where(is_straight, half, height)
+    upward = away / height[:, None]
+    centre = (share**2 + height**2 - half**2) / (2 * height)
+    radius, angle = np.hypot(half, centre), np.arctan2(half, -centre)
+    result = np.empty((len(a), 3, a.shape[1]))
+    for k, quarter in enumerate((-0.5, 0.0, 0.5)):
+        x = np.where(is_straight, quarter * half, radius * np.sin(quarter * angle))
+        y = np.where(is_straight, 0.0, centre + radius * np.cos(quarter * angle))
+        result[:, k] = (a + b) / 2 + x[:, None] * along + y[:, None] * upward
+    return result
+
+
+def _with_insides(points: Floats, facets: Ints) -> Floats:
+    """Nodes inside triangles from those of their edges: arcs between the middles of edges.
+
+    An arc from the middle of one edge to that of another has the curvature of the third edge, to
+    which it is parallel, and rises along the normal at its own place.
+    """
+    x = points.copy()
+    middle = {(0, 1): 4, (0, 2): 7, (1, 2): 10}
+    six = points[facets[:, [0, 1, 2, 4, 7, 10]]]
+    for node, (k, i, j) in zip(facets[:, 12:].T, _INNER):
+        bary = np.full(3, 0.25)
+        bary[k] = 0.5
+        one, other = (points[facets[:, middle[min(k, c), max(k, c)]]] for c in (i, j))
+        top = points[facets[:, middle[min(i, j), max(i, j)]]]
+        chord = points[facets[:, j]] - points[facets[:, i]]
+        rise = top - (points[facets[:, i]] + points[facets[:, j]]) / 2
+        edge = np.zeros(3)
+        edge[[i, j]] = 0.5
+        there, here = _parabolic_normals(six, edge), _parabolic_normals(six, bary)
+        height = np.einsum("kd,kd->k", rise, there)
+        half = np.linalg.norm(chord, axis=1) / 2
+        curvature = 2 * height / (half**2 + np.einsum("kd,kd->k", rise, rise))
+        reach = np.linalg.norm(other - one, axis=1) / 2
+        bent = np.minimum(np.abs(curvature * reach), 1.0)
+        lift = curvature * reach**2 / (1 + np.sqrt(1 - bent**2))
+        beside = rise - height[:, None] * there
+        x[node] = (one + other) / 2 + beside / 4 + lift[:, None] * here
+    return x
+
+
+def _parabolic_normals(six: Floats, bary: Floats) -> Floats:
+    """Unit normals of second-order triangles `(k, 6, 3)` at one place."""
+    a, b, c = bary
+    slope = np.array([
+        (1 - 4 * a, 1 - 4 * a), (4 * b - 1, 0), (0, 4 * c - 1), (4 * (a - b), -4 * b),
+        (-4 * c, 4 * (a - c)), (4 * c, 4 * b),
+    ])  # fmt: skip
+    u, v = np.einsum("as,kad->skd", slope, six)
+    normal = np.cross(u, v)
+    return np.asarray(normal / np.maximum(np.linalg.norm(normal, axis=1), 1e-300)[:, None])
+
+
+# Which facets of a mesh are curved, in sets whose pieces do not meet at an edge.
+
+
+def raised_lattice(mesh: Mesh, facets: Ints, pairs: Ints, middles: Floats) -> Lattice:
+    """Lattice on facets of a mesh, from the middles of some of its edges.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    facets : (k, d) array of int
+    pairs : (e, 2) array of int
+        Mesh points at the ends of edges, in any order.
+    middles : (e, d) array, length
+        Their midside nodes.
+    """
+    flat = lattice(mesh.points, facets)
+    ends = flat.corner[flat.edges]
+    place = (mesh.points[ends[:, 0]] + mesh.points[ends[:, 1]]) / 2
+    row, known = rows_of(np.sort(pairs, axis=1), ends, mesh.n_points)
+    place[known] = middles[row[known]]
+    points, count = flat.points.copy(), len(flat.corner)
+    arc = arcs(mesh.points[ends[:, 0]], place, mesh.points[ends[:, 1]])
+    points[count : flat.inner] = arc.reshape(-1, mesh.dim)
+    if mesh.dim == 3:
+        points = _with_insides(points, flat.facets)
+    return replace(flat, points=points)
+
+
+def rows_of(pairs: Ints, sought: Ints, n_points: int) -> tuple[Ints, Bools]:
+    """Rows of pairs of points, smaller first, in a list of such; and which are there."""
+    key, wanted = (p[:, 0] * np.int64(n_points) + p[:, 1] for p in (pairs, sought))
+    order = np.argsort(key, kind="stable")
+    place = np.minimum(np.searchsorted(key[order], wanted), max(len(key) - 1, 0))
+    row = order[place] if len(key) else np.zeros(len(wanted), dtype=np.int64)
+    known = key[row] == wanted if len(key) else np.zeros(len(wanted), dtype=bool)
+    return row, known
+
+
+def with_curves(mesh: Mesh, facets: Ints, nodes: Lattice) -> Mesh:
+    """A mesh with its curved sides as sets, and the curves of these.
+
+    A set of the mesh that consists of whole smooth sides, none of which meets another one at an
+    edge, gets its curve; other sides come into sets ``curved_1``, ``curved_2`` ..., as few as it
+    takes to keep those apart that meet.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    facets : (k, d) array of int
+        Of its boundary.
+    nodes : Lattice
+        Of these facets.
+    """
+    is_curved = _bulge_of(nodes) > _FLATTEST
+    if not is_curved.any():
+        return mesh
+    facets, pieces = facets[is_curved], nodes.facets[is_curved]
+    side = _smooth_sides(mesh, facets, CurvedFacets(nodes.points, pieces))
+    conflicts = _meeting_sides(mesh, facets, side)
+    row_of = np.full(len(mesh.facets), -1)
+    row_of[numbers_of(mesh, facets)] = np.arange(len(facets))
+    groups, free = {}, np.ones(int(side.max()) + 1, dtype=bool)
+    for name, members in mesh.facet_sets.items():
+        row = row_of[numbers_of(mesh, members)]
+        sides = np.unique(side[row]) if len(row) and (row >= 0).all() else np.zeros(0, np.int64)
+        is_whole = len(row) == int(np.isin(side, sides).sum())
+        if name != "boundary" and is_whole and free[sides].all():
+            if not conflicts[np.ix_(sides, sides)].any():
+                groups[name], free[sides] = sides, False
+    facet_sets = {name: f for name, f in mesh.facet_sets.items() if name != "boundary"}
+    for sides in _apart(conflicts, np.nonzero(free)[0], np.bincount(side)):
+        number = 1
+        while (name := _NAME.format(number)) in facet_sets:
+            number += 1
+        groups[name], facet_sets[name] = sides, facets[np.isin(side, sides)]
+    curves = {}
+    for name, sides in groups.items():
+        used, local = np.unique(pieces[np.isin(side, sides)], return_inverse=True)
+        curves[name] = CurvedFacets(
+            lock(nodes.points[used]), lock(local.reshape(-1, pieces.shape[1]))
+        )
+    return sound_mesh(mesh.points, mesh.cells, facet_sets, mesh.cell_sets, curves)
+
+
+def _bulge_of(nodes: Lattice) -> Floats:
+    """Largest distance of the nodes of each piece from its straight facet, over its size."""
+    x = nodes.points[nodes.facets]
+    d = x.shape[2]
+    corner = x[:, :d]
+    size = np.linalg.norm(corner - np.roll(corner, 1, axis=1), axis=2).max(axis=1)
+    along = corner[:, 1:] - corner[:, :1]
+    normal = np.cross(along[:, 0], along[:, 1]) if d == 3 else along[:, 0, ::-1] * (1, -1)
+    normal = normal / np.maximum(np.linalg.norm(normal, axis=1), 1e-300)[:, None]
+    height = np.abs(np.einsum("kad,kd->ka", x - x[:, :1], normal))
+    return np.asarray(height.max(axis=1) / size)
+
+
+def _smooth_sides(mesh: Mesh, facets: Ints, curve: CurvedFacets) -> Ints:
+    """Number of the smooth side that each curved facet belongs to `(k,)`."""
+    d, count = mesh.dim, len(facets)
+    owner = np.tile(np.arange(count), d)
+    # Where facets meet: at points in 2D, at edges in 3D, one row for each.
+    joints = facets[:, [[0], [1]]] if d == 2 else facets[:, local_edges(2)]
+    key = np.sort(np.concatenate(list(joints.transpose(1, 0, 2))), axis=1)
+    bary = np.eye(2) if d == 2 else 0.5 * (1 - np.eye(3))[::-1]
+    normal = _outward_normals(mesh, facets, curve, owner, np.repeat(bary, count, axis=0))
+    _, group, members = np.unique(key, axis=0, return_inverse=True, return_counts=True)
+    order = np.argsort(group.ravel(), kind="stable")
+    begin = np.concatenate([[0], np.cumsum(members)])[:-1][members == 2]
+    one, other = order[begin], order[begin + 1]
+    is_smooth = np.einsum("jd,jd->j", normal[one], normal[other]) > _SHARP
+    links = (np.ones(int(is_smooth.sum())), (owner[one[is_smooth]], owner[other[is_smooth]]))
+    return np.asarray(
+        connected_components(coo_array(links, shape=(count, count)), directed=False)[1],
+        dtype=np.int64,
+    )
+
+
+def _outward_normals(
+    mesh: Mesh, facets: Ints, curve: CurvedFacets, owner: Ints, bary: Floats
+) -> Floats:
+    """Unit normals of pieces out of the body."""
+    along = curve.places(owner, bary)[1]
+    along = along[:, 1:] - along[:, :1]
+    normal = np.cross(along[:, 0], along[:, 1]) if mesh.dim == 3 else along[:, 0, ::-1] * (1, -1)
+    normal = normal / np.maximum(np.linalg.norm(normal, axis=1), 1e-300)[:, None]
+    cell = mesh.facet_to_cell[numbers_of(mesh, facets), 0]
+    inward = mesh.points[mesh.cells[cell]].mean(axis=1) - mesh.points[facets].mean(axis=1)
+    x = mesh.points[facets]
+    edge = x[:, 1:] - x[:, :1]
+    straight = np.cross(edge[:, 0], edge[:, 1]) if mesh.dim == 3 else edge[:, 0, ::-1] * (1, -1)
+    turned = np.einsum("kd,kd->k", straight, inward) > 0
+    return np.asarray(np.where(turned[owner, None], -normal, normal))
+
+
+def _meeting_sides(mesh: Mesh, facets: Ints, side: Ints) -> Bools:
+    """Which sides share a point, or come as close to each other as their facets are long."""
+    count = int(side.max()) + 1
+    pairs = np.unique(np.stack([np.repeat(side, mesh.dim), facets.ravel()], axis=1), axis=0)
+    order = np.argsort(pairs[:, 1], kind="stable")
+    pairs = pairs[order]
+    result = np.zeros((count, count), dtype=bool)
+    for step in range(1, count):  # of the sides at a point, each with the one so many further on
+        same = pairs[step:, 1] == pairs[:-step, 1]
+        if not same.any():
+            break
+        result[pairs[step:, 0][same], pairs[:-step, 0][same]] = True
+    x = mesh.points[facets]
+    size = np.linalg.norm(x - np.roll(x, 1, axis=1), axis=2).max(axis=1)
+    row, near = pairs_within(cKDTree(x.mean(axis=1)), x.mean(axis=1), size)
+    other = side[row] != side[near]
+    result[side[row[other]], side[near[other]]] = True
+    return result | result.T
+
+
+def _apart(conflicts: Bools, sides: Ints, sizes: Ints) -> list[Ints]:
+    """Sides in groups without conflicts, the largest first."""
+    groups: list[list[int]] = []
+    for s in sides[np.argsort(-sizes[sides], kind="stable")].tolist():
+        home = next((g for g in groups if not conflicts[s, g].any()), None)
+        if home is None:
+            groups.append([s])
+        else:
+            home.append(s)
+    return [np.array(g) for g in groups]
+
+
+__all__ = ["CurvedFacets", "Lattice", "lattice", "raised_lattice", "rows_of", "with_curves"]
