@@ -15,7 +15,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from xcrack.base.arrays import Bools, Floats, Ints, lock, offsets, ranges
+from xcrack.base.arrays import Bools, Floats, Ints, lock, offsets
 from xcrack.mesh.checks import pairs_within
 from xcrack.mesh.mesh import Mesh, local_edges, numbers_of, sound_mesh
 

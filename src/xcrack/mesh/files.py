@@ -1,10 +1,13 @@
 """Meshes and surfaces from files, meshes to files, in any format that meshio reads or writes."""
 
+import base64
 import contextlib
 import io
+import json
 import re
 import shlex
 import warnings
+import zlib
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -12,17 +15,20 @@ from urllib.parse import quote, unquote
 
 import numpy as np
 
-from xcrack.base.arrays import Floats, Ints
+from xcrack.base.arrays import Floats, Ints, lock
 from xcrack.base.checks import flag, one_of
 from xcrack.base.errors import GeometryError, MeshError, XcrackError, warn
 from xcrack.base.optional import require_package
 from xcrack.base.paths import path_of, system_errors, written_whole
 from xcrack.mesh.abaqus import abaqus_text, read_abaqus
+from xcrack.mesh.curved_facets import CurvedFacets
+from xcrack.mesh.curves import Curve, check_on_curves
 from xcrack.mesh.keywords import KeywordUse, missed_words
 from xcrack.mesh.linear import SHAPES, base_kind, linear_mesh
-from xcrack.mesh.mesh import Mesh
+from xcrack.mesh.mesh import Mesh, sound_mesh
 from xcrack.mesh.msh import REST, msh_text
 from xcrack.mesh.other_decks import nastran_uses, read_ansys
+from xcrack.mesh.polygon import Arc
 from xcrack.mesh.raw import CELL_KIND, FACET_KIND, RawMesh, mesh_from_raw, sets_to_write
 
 _SET = "set:"  # prefix of the 0/1 cell data that carry a set in formats without sets
@@ -113,7 +119,7 @@ def read_mesh(path: str | PathLike[str], *, strict: bool = False) -> Mesh:
         parts.append(missed)
     if parts:
         warn(f"{path.name}: {'; '.join(parts)}.")
-    return mesh
+    return with_stored_curves(mesh, path)
 
 
 def raw_mesh_of(path: Path) -> tuple[RawMesh, list[KeywordUse]]:
@@ -224,12 +230,17 @@ def write_mesh(path: str | PathLike[str], mesh: Mesh, *, msh_version: str = "4.1
         if path.is_dir():
             raise XcrackError(f"{str(path)!r} is a folder: give the path of a file in it.")
     extension = path.suffix.lower()
+    curves = _text_of_curves(mesh, path)
     if extension == ".msh":
-        _write_text(path, msh_text(mesh, msh_version))
+        _write_text(path, msh_text(mesh, msh_version) + curves)
     elif extension == ".inp":
-        _write_text(path, abaqus_text(mesh))
+        _write_text(path, abaqus_text(mesh) + curves)
     else:
         _meshio_write(path, mesh)
+        if curves:
+            with system_errors("the curves of the mesh are not written to", path):
+                with open(path, "a", encoding="utf-8") as file:
+                    file.write(curves)
 
 
 def _write_text(path: Path, text: str) -> None:
@@ -335,6 +346,91 @@ def _check_extension(path: Path, verb: str, formats: dict[str, list[str]]) -> No
             f"cannot {verb} {path.name!r}: {path.suffix!r} is no extension of a mesh format that "
             f"is known here. {remedy or 'Known are ' + ', '.join(sorted(formats)) + '.'}"
         )
+
+
+# Curves in files that other programs read as before: in a section of its own of msh, in comments.
+
+_FRAMES = {  # before, at each line, and behind
+    ".msh": ("$XcrackCurves", "", "$EndXcrackCurves"), ".inp": ("** xcrack curves", "** ", "** end"),
+    ".vtu": ("<!-- xcrack curves", "", "-->"), ".xdmf": ("<!-- xcrack curves", "", "-->"),
+}  # fmt: skip
+_WIDTH = 76
+
+
+def _text_of_curves(mesh: Mesh, path: Path) -> str:
+    """Curves of a mesh as text at the end of a file; those that it cannot hold are warned of."""
+    frame = _FRAMES.get(path.suffix.lower())
+    content, lost = {}, []
+    for name, curve in mesh.curves.items():
+        if frame is not None and isinstance(curve, Arc):
+            content[name] = {"arc": [list(curve.center), curve.radius, curve.axis]}
+        elif frame is not None and isinstance(curve, CurvedFacets):
+            content[name] = {"facets": [curve.points.tolist(), curve.facets.tolist()]}
+        else:
+            lost.append(name)
+    if lost:
+        reason = (
+            "functions of yours"
+            if frame
+            else f"{path.suffix} files carry none; write .msh, .inp or .vtu to keep them"
+        )
+        warn(f"{path.name}: the curves of the sets {lost} are not stored ({reason}).")
+    if not content or frame is None:
+        return ""
+    packed = zlib.compress(json.dumps(content).encode())
+    text = base64.b64encode(packed).decode()
+    begin, at_line, end = frame
+    lines = [at_line + text[i : i + _WIDTH] for i in range(0, len(text), _WIDTH)]
+    return "\n".join([begin, *lines, end]) + "\n"
+
+
+def _stored_curves(path: Path) -> dict[str, Curve]:
+    """Curves that `write_mesh` put at the end of a file; none where there are none."""
+    frame = _FRAMES.get(path.suffix.lower())
+    if frame is None:
+        return {}
+    begin, at_line, end = frame
+    _, found, rest = path.read_bytes().rpartition(b"\n" + begin.encode() + b"\n")
+    if not found:
+        return {}
+    lines = rest.partition(b"\n" + end.encode())[0].decode("ascii", "replace").splitlines()
+    text = "".join(line.removeprefix(at_line) for line in lines)
+    curves: dict[str, Curve] = {}
+    try:
+        content = json.loads(zlib.decompress(base64.b64decode(text)))
+        for name, entry in content.items():
+            if "arc" in entry:
+                center, radius, axis = entry["arc"]
+                curves[name] = Arc(tuple(center), radius, None if axis is None else tuple(axis))
+            else:
+                points, facets = entry["facets"]
+                curves[name] = CurvedFacets(lock(np.array(points)), lock(np.array(facets)))
+    except Exception:  # whatever base64, zlib and json say of text that is not theirs
+        warn(f"{path.name}: the curves of its boundary cannot be read: the file is damaged.")
+    return curves
+
+
+def with_stored_curves(mesh: Mesh, path: Path) -> Mesh:
+    """A mesh with those of the curves that `write_mesh` put into its file which still fit it."""
+    with system_errors("cannot read the mesh file", path):
+        curves = _stored_curves(path)
+    if not curves:
+        return mesh
+    fitting, lost = {}, []
+    for name, curve in curves.items():
+        try:
+            check_on_curves(mesh.points, mesh.facet_sets, {name: curve})
+            fitting[name] = curve
+        except (KeyError, MeshError):
+            lost.append(name)
+    if lost:
+        warn(
+            f"{path.name}: the curves of the sets {lost} do not fit the points there any more, and "
+            "are left out: the file was changed since it was written."
+        )
+    named = {name: facets for name, facets in mesh.facet_sets.items() if name != "boundary"}
+    every = {**mesh.curves, **fitting}
+    return sound_mesh(mesh.points, mesh.cells, named, mesh.cell_sets, every)
 
 
 def _gmsh_names(path: Path) -> dict[tuple[int, int], str]:

@@ -315,9 +315,7 @@ def _middles(x: Floats, ends: Floats, slots: list[list[int]]) -> Floats:
     return result
 
 
-def _check_middles(
-    middles: Floats, ends: Floats, length: Floats, data: Ints, source: str
-) -> None:
+def _check_middles(middles: Floats, ends: Floats, length: Floats, data: Ints, source: str) -> None:
     """Refuse midside nodes that lie outside of their edge."""
     a, b = ends[:, :, 0], ends[:, :, 1]
     with np.errstate(divide="ignore", invalid="ignore"):

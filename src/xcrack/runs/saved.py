@@ -23,6 +23,7 @@ from xcrack.base.errors import ProblemError
 from xcrack.base.paths import path_of, system_errors
 from xcrack.fem.system import discretise
 from xcrack.linalg.engine import SolverState
+from xcrack.mesh.curved_facets import CurvedFacets
 from xcrack.mesh.mesh import Mesh
 from xcrack.mesh.polygon import Arc
 from xcrack.model.material import Material
@@ -60,7 +61,7 @@ _CLASSES: dict[str, type] = {
     "LoadResultant": plan.Resultant,
     **{
         kind.__name__: kind
-        for kind in (Problem, Mesh, Arc, Numerics, Contact, Report, Ingredient,
+        for kind in (Problem, Mesh, Arc, CurvedFacets, Numerics, Contact, Report, Ingredient,
                      Unstorable, LoadLevel, LoadState)
     },
 }  # fmt: skip
@@ -179,7 +180,7 @@ def _content(result: Any) -> dict[str, Any]:
 
 def _storable(problem: Problem) -> Problem:
     """A problem whose functions are replaced by their names; curves of the user are left out."""
-    curves = {k: c for k, c in problem.mesh.curves.items() if isinstance(c, Arc)}
+    curves = {k: c for k, c in problem.mesh.curves.items() if isinstance(c, Arc | CurvedFacets)}
     mesh = problem.mesh
     return replace(
         problem,

@@ -8,6 +8,7 @@ import numpy as np
 from xcrack.base.checks import value_text
 from xcrack.base.errors import ProblemError
 from xcrack.growth.step import identities, tip_identities
+from xcrack.output.curved_sides import boundary_lines
 from xcrack.runs.history import History
 from xcrack.view.figures import finish_figure, new_figure, picture_path
 
@@ -148,8 +149,8 @@ def _draw_path(history: History, axes: Any) -> None:
     if history.mesh is not None:
         from matplotlib.collections import LineCollection
 
-        facets = history.mesh.points[history.mesh.boundary]
-        axes.add_collection(LineCollection(list(facets[..., :2]), colors="0.6", linewidths=1))
+        lines = boundary_lines(history.mesh)
+        axes.add_collection(LineCollection(list(lines[..., :2]), colors="0.6", linewidths=1))
         axes.autoscale_view()
         low, high = history.mesh.points.min(axis=0), history.mesh.points.max(axis=0)
         margin = 0.03 * float((high - low).max())

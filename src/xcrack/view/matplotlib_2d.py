@@ -9,6 +9,7 @@ import numpy as np
 from xcrack.analysis.solution import Solution
 from xcrack.base.arrays import Floats
 from xcrack.fem.facets import arc_position
+from xcrack.output.curved_sides import boundary_lines
 from xcrack.output.pieces import lips_of
 from xcrack.view.figures import finish_figure, new_figure
 from xcrack.view.scene_2d import CLOSED, Scene
@@ -79,9 +80,13 @@ def draw_mesh(
     from matplotlib.patches import Circle
 
     axes.add_collection(
-        LineCollection(list(mesh.points[mesh.edges]), colors="0.72", linewidths=0.4)
+        LineCollection(
+            list(mesh.points[mesh.facets[mesh.facet_to_cell[:, 1] >= 0]]),
+            colors="0.72",
+            linewidths=0.4,
+        )
     )
-    rim = mesh.points[mesh.boundary]
+    rim = boundary_lines(mesh)
     axes.add_collection(LineCollection(list(rim), colors="black", linewidths=0.9))
     carries = [number >= 0 for number in space.heaviside]
     if carries:

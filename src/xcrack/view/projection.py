@@ -11,6 +11,7 @@ from xcrack.base.checks import numbers, value_text
 from xcrack.base.errors import ProblemError
 from xcrack.mesh.mesh import Mesh
 from xcrack.mesh.simplex import interface_simplices
+from xcrack.output.curved_sides import CurvedSides
 
 _AXIS = 0.999  # cosine from which a direction is called an axis
 
@@ -125,8 +126,11 @@ def section_outline(mesh: Mesh, plane: Projection) -> Floats:
     level = np.where(np.abs(level) < 1e-9 * np.abs(level).max(), 0.0, level)[facets]
     rows = np.nonzero((level.min(axis=1) < 0) & (level.max(axis=1) >= 0))[0]
     bary, parent = interface_simplices(level[rows])
-    corners = mesh.points[facets[rows[parent]]]
-    return on_plane(np.einsum("kwv,kvd->kwd", bary, corners), plane)
+    rows = rows[parent]
+    lines = np.einsum("kwv,kvd->kwd", bary, mesh.points[facets[rows]])
+    if (curved := CurvedSides.of(mesh)) is not None:
+        lines = curved.bent(lines, np.nonzero(mesh.facet_to_cell[:, 1] < 0)[0][rows])
+    return on_plane(lines, plane)
 
 
 __all__ = ["Projection", "best_plane", "given_plane", "on_plane", "section_outline"]

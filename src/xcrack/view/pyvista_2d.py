@@ -137,18 +137,19 @@ def add_bar(
     limits: tuple[float, float],
     window: tuple[int, int],
     bottom: float = 0.1,
+    top: int = 0,
 ) -> None:
-    """Colour bar on the right of the window, from a share of its height on."""
+    """Colour bar on the right of the window, from a share of its height on, less pixels above."""
     from vtkmodules.util.numpy_support import numpy_to_vtk
 
-    width, _ = window
+    width, height = window
     title = label.replace(", ", "\n")
     bar = plotter.add_scalar_bar(
         title=title,
         mapper=actor.mapper,
         vertical=True,
         width=(BAR - 60) / width,
-        height=0.8 - bottom,
+        height=min(0.8, 1 - top / height) - bottom,
         position_x=1 - (BAR - 20) / width,
         position_y=bottom,
         color="black",

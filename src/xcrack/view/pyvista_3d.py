@@ -8,6 +8,7 @@ import numpy as np
 
 from xcrack.base.arrays import Floats
 from xcrack.base.optional import require_package
+from xcrack.output.curved_sides import shading_normals
 from xcrack.view.pyvista_2d import (
     BAR,
     LONGER,
@@ -23,6 +24,7 @@ from xcrack.view.scene_3d import SpaceScene
 from xcrack.view.section_3d import TriangleSoup, segments_behind
 
 _APART = "#c9ccd1"  # lips that do not touch, where the pressure is drawn
+_TRIAD = 130  # pixels of the axes
 _LEGEND = 28  # pixels of a line of the legend
 _LOADS = "#1b4f9c"
 _FRONT = "#d95f02"
@@ -48,11 +50,11 @@ def draw_space(
     size = high - low
     extent = float(size[:2].max())
     scale = LONGER / extent
-    if picture.near is not None:
+    if float((picture.body @ right).max()) > high[0]:
         # What lies beyond the box would be drawn under the bar of the colours.
         picture = _left_of(picture, right, float(high[0]) + MARGIN / scale)
     top = 70 if title else 0
-    bar = BAR if picture.label or _legend(picture) else 0
+    bar = BAR if picture.label or _legend(picture) else _TRIAD
     width = max(int(size[0] * scale) + 2 * MARGIN, SHORTEST) + bar
     height = max(int(size[1] * scale) + 2 * MARGIN, SHORTEST) + top
     with quiet_vtk():
@@ -62,7 +64,7 @@ def draw_space(
         if len(picture.skin):
             # See-through surfaces have to be sorted by depth, or they hide each other.
             plotter.enable_depth_peeling(10)
-        _add_faces(pv, plotter, picture, cmap, (width, height))
+        _add_faces(pv, plotter, picture, cmap, (width, height), top + _TRIAD)
         _add_lines(pv, plotter, picture, edges, toward * 2e-3 * extent)
         _add_points(plotter, picture, toward * 3e-3 * extent)
         if arrows is not None:
@@ -89,7 +91,8 @@ def draw_space(
         camera.up = tuple(up)
         camera.parallel_scale = height / 2 / scale
         camera.clipping_range = (0.01 * far_distance, 2.5 * far_distance)
-        plotter.add_axes(viewport=(0.0, 0.0, 130 / width, 130 / height), line_width=3)
+        corner = (1 - _TRIAD / width, 1 - (top + _TRIAD) / height, 1.0, 1 - top / height)
+        plotter.add_axes(viewport=corner, line_width=3)  # beside the body, above the bar
         return show_or_save(plotter, file, show)
 
 
@@ -127,11 +130,12 @@ def _left_of(picture: SpaceScene, right: Floats, limit: float) -> SpaceScene:
 
 
 def _add_faces(
-    pv: Any, plotter: Any, picture: SpaceScene, cmap: str, window: tuple[int, int]
+    pv: Any, plotter: Any, picture: SpaceScene, cmap: str, window: tuple[int, int], top: int
 ) -> None:
     if picture.label:
         body = _surface(pv, picture.triangles)
         if len(picture.triangles):
+            body.point_data.active_normals = shading_normals(picture.triangles).reshape(-1, 3)
             body.point_data["values"] = picture.values.ravel()
         else:  # all lips are apart, or all touch: the bar still says which field it is
             body = pv.PolyData(np.zeros((1, 3)))
@@ -146,8 +150,9 @@ def _add_faces(
             point_size=0.001,
             **_LIGHT,
         )
+        actor.prop.interpolation = "phong"
         bottom = max(0.1, (_LEGEND * (len(_legend(picture)) + 1.2)) / window[1])
-        add_bar(plotter, actor, picture.label, picture.limits, window, bottom)
+        add_bar(plotter, actor, picture.label, picture.limits, window, bottom, top)
     for corners, color in ((picture.touching, CLOSED), (picture.apart, _APART)):
         if len(corners):
             plotter.add_mesh(_surface(pv, corners), color=color, **_LIGHT)

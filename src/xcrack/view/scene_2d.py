@@ -10,6 +10,7 @@ from xcrack.base.arrays import Bools, Floats, Ints
 from xcrack.mesh.locate import barycentric
 from xcrack.mesh.mesh import local_edges
 from xcrack.model.material import von_mises
+from xcrack.output.curved_sides import CurvedSides
 from xcrack.output.pieces import Pieces, pieces
 
 FIELDS = {
@@ -83,20 +84,32 @@ class Scene:
 def scene(solution: Solution, field: str, warp: float, limits: tuple[float, float] | None) -> Scene:
     """Field on the moved body, each piece with its own side of the crack."""
     body = pieces(solution)
-    moved = body.points + warp * body.displacement
     values = field_values(body, field)
     low, high, share = _range(body, field, values, limits)
     # Rounded down: "100 %" would not be true.
     label = FIELDS[field] + (f", clipped at {int(10 * share) / 10:g} %" if share < 100 else "")
     edge, owner = _edges(body)
-    curve = _curves(body, edge, moved)
     crack, closed = _on_lips(body, edge)
     lip = crack >= 0
-    on_facet, rim = _on_facets(body, edge, owner)
-    rim &= ~lip
+    on_facet, facet = _on_facets(body, edge, owner)
+    rim = (facet >= 0) & ~lip
+    points, triangles = body.points, _triangles(body)
+    given = np.concatenate([body.displacement, values[:, None]], axis=1)
+    curved = CurvedSides.of(solution.space.mesh)
+    rims = None
+    if curved is not None:
+        points, halves, of_half = _onto_curves(curved, points, edge[rim], facet[rim])
+        rims = curved.bend(points[halves], of_half, given[halves])
+        points, given, triangles = _bent(curved, points, given, triangles, halves, of_half)
+    moved, values = points + warp * given[:, :2], given[:, 2]
+    curve, rest = _curves(edge, moved), _curves(edge, points)[rim]
+    outline = curve[rim]
+    if rims is not None:
+        rest = _with_middles(rims[0])
+        outline = _with_middles(rims[0] + warp * rims[1][..., :2])
     return Scene(
         points=moved,
-        triangles=_triangles(body),
+        triangles=triangles,
         values=values,
         label=label,
         limits=(low, high),
@@ -105,12 +118,48 @@ def scene(solution: Solution, field: str, warp: float, limits: tuple[float, floa
             bool(values.max() > high + 1e-9 * (high - low)),
         ),
         signed=low < 0 < high,
-        outline=curve[rim],
+        outline=outline,
         lips=curve[lip & ~closed],
         closed=curve[lip & closed],
         cell_edges=curve[on_facet & ~lip & ~rim],
-        at_rest=_curves(body, edge, body.points)[rim],
+        at_rest=rest,
     )
+
+
+def _onto_curves(
+    curved: CurvedSides, points: Floats, edge: Ints, facet: Ints
+) -> tuple[Floats, Ints, Ints]:
+    """Points with those of curved edges on their curves, and halves of all edges: ends, facet."""
+    x, bends = points.copy(), curved.facet_to_curve[facet] >= 0
+    number, first = np.unique(edge[bends], return_index=True)
+    of_point = np.repeat(facet[bends], 3)[first]
+    x[number[number >= 0]] = curved.nearest(x[number[number >= 0]], of_point[number >= 0])
+    a, b, middle = edge.T
+    has = middle >= 0
+    halves = [np.stack(pair, axis=1) for pair in ((a[~has], b[~has]), (a[has], middle[has]))]
+    halves.append(np.stack([middle[has], b[has]], axis=1))
+    return x, np.concatenate(halves), np.concatenate([facet[~has], facet[has], facet[has]])
+
+
+def _bent(
+    curved: CurvedSides, points: Floats, given: Floats, triangles: Ints, lines: Ints, facet: Ints
+) -> tuple[Floats, Floats, Ints]:
+    """Points, values and triangles, those beside a curved edge in parts that follow it."""
+    edges = curved.facets_of_edges(triangles, lines, facet)
+    beside = (edges >= 0).any(axis=1)
+    chosen = triangles[beside]
+    x, data = curved.bend_edges(points[chosen], edges[beside], given[chosen])
+    number = len(points) + np.arange(3 * len(x)).reshape(-1, 3)
+    return (
+        np.concatenate([points, x.reshape(-1, 2)]),
+        np.concatenate([given, data.reshape(len(number) * 3, -1)]),
+        np.concatenate([triangles[~beside], number]),
+    )
+
+
+def _with_middles(lines: Floats) -> Floats:
+    """Straight lines `(k, 2, 2)` as three points each."""
+    return np.stack([lines[:, 0], lines.mean(axis=1), lines[:, 1]], axis=1)
 
 
 def field_values(body: Pieces, field: str) -> Floats:
@@ -214,8 +263,8 @@ def _edges(body: Pieces) -> tuple[Ints, Ints]:
     return edge[order][last], owner[order][last]
 
 
-def _on_facets(body: Pieces, edge: Ints, owner: Ints) -> tuple[Bools, Bools]:
-    """Which edges lie on facets of the mesh, and which on its boundary.
+def _on_facets(body: Pieces, edge: Ints, owner: Ints) -> tuple[Bools, Ints]:
+    """Which edges lie on facets of the mesh, and on which of its boundary; -1 for none.
 
     Counting the pieces at an edge would not tell: sub-cells of neighbours need not match.
     """
@@ -224,10 +273,12 @@ def _on_facets(body: Pieces, edge: Ints, owner: Ints) -> tuple[Bools, Bools]:
     a, b = (barycentric(mesh, cell, body.points[edge[:, k]]) for k in (0, 1))
     on = (np.abs(a) < _NEAR) & (np.abs(b) < _NEAR)
     rim = mesh.facet_to_cell[mesh.cell_to_facet, 1] < 0  # opposite to each corner of a cell
-    return np.asarray(on.any(axis=1)), np.asarray((on & rim[cell]).any(axis=1))
+    outer = on & rim[cell]
+    facet = mesh.cell_to_facet[cell, np.argmax(outer, axis=1)]
+    return np.asarray(on.any(axis=1)), np.where(outer.any(axis=1), facet, -1)
 
 
-def _curves(body: Pieces, edge: Ints, points: Floats) -> Floats:
+def _curves(edge: Ints, points: Floats) -> Floats:
     a, b = points[edge[:, 0]], points[edge[:, 1]]
     middle = np.where(edge[:, 2:] >= 0, points[edge[:, 2]], (a + b) / 2)
     return np.stack([a, middle, b], axis=1)

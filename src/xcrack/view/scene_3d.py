@@ -11,13 +11,16 @@ from xcrack.base.checks import numbers, value_text
 from xcrack.base.errors import ProblemError
 from xcrack.mesh.mesh import Mesh
 from xcrack.model.loads import FacetPoints
+from xcrack.output.curved_sides import CurvedSides
 from xcrack.output.lip_faces_3d import LipFaces, lip_faces
 from xcrack.output.pieces import pieces
 from xcrack.view.scene_2d import SPACE_FIELDS, STRESSES, clipped_range, field_values, rounded_range
 from xcrack.view.section_3d import (
+    Faces,
     Plane,
     TriangleSoup,
     areas,
+    boundary_edges,
     crossing,
     edges_of,
     faces,
@@ -25,7 +28,6 @@ from xcrack.view.section_3d import (
     on_facets,
     section,
     segments_behind,
-    sharp_edges,
 )
 
 LIP_FIELDS = {
@@ -157,19 +159,38 @@ def space_scene(
 ) -> SpaceScene:
     """Field on the moved body: its surface, and with a plane its section, crack faces behind."""
     body = pieces(solution)
-    moved = body.points + warp * body.displacement
     shown = field_values(body, field)
-    level = levels(body.points, plane)
-    shell, lip, outline, rims, cell_edges = faces(body, level)
-    drawn = [TriangleSoup.of(f, None).behind(level) for f in (shell, lip)]
-    lines = [segments_behind(part, level) for part in (outline, rims, cell_edges)]
+    curved = CurvedSides.of(solution.space.mesh)
+    on = faces(body, curved)
+    at_rest = body.points
+    if curved is not None:  # nodes between corners, so that a section ends where the shell does
+        at_rest = at_rest.copy()
+        number, first = np.unique(on.shell, return_index=True)
+        facet = _on_curve(curved, on)
+        at_rest[number] = curved.nearest(at_rest[number], facet[first])
+    level = levels(at_rest, plane)
+    drawn = [TriangleSoup.of(on.shell, None, on.of_shell).behind(level)]
+    drawn.append(TriangleSoup.of(on.lip).behind(level))
+    lines = [
+        segments_behind(on.outline, level, on.of_outline),
+        segments_behind(on.rims, level),
+        segments_behind(on.cell_edges, level, on.of_cell_edges),
+    ]
     if plane is not None:
         drawn.append(section(body, level))
-        lines[0] += crossing(shell, level)
-        lines[1] += crossing(lip, level)
+        lines[0] += crossing(on.shell, level, on.of_shell)
+        lines[1] += crossing(on.lip, level)
         lines[2] += crossing(on_facets(body, level), level)
-    corners = np.concatenate([part.at(moved) for part in drawn])
-    values = np.concatenate([part.at(shown[:, None])[..., 0] for part in drawn])
+    given = np.concatenate([body.displacement, shown[:, None]], axis=1)
+
+    def placed(part: TriangleSoup) -> tuple[Floats, Floats, Floats]:
+        """Corners at rest, moved ones, and values there."""
+        x, data = part.at(at_rest), part.at(given)
+        if curved is not None:
+            x, data = _bent(curved, on, part, x, data)
+        return x, x + warp * data[..., :3], data[..., 3]
+
+    _, corners, values = (np.concatenate(each) for each in zip(*map(placed, drawn)))
     if not len(corners):
         raise ProblemError("plot(clip=...): the plane leaves nothing of the body; turn its normal.")
     share = 100.0
@@ -180,10 +201,10 @@ def space_scene(
     clip = limits is None and share < 100
     nothing = np.zeros((0, 3, 3))
     curves = [
-        np.concatenate([part.at(moved) for part in group] or [np.zeros((0, 2, 3))])
+        np.concatenate([placed(part)[1] for part in group] or [np.zeros((0, 2, 3))])
         for group in lines
     ]
-    outline_rest = np.concatenate([part.at(body.points) for part in lines[0]])
+    outline_rest = np.concatenate([placed(part)[0] for part in lines[0]])
     return SpaceScene(
         triangles=corners,
         values=values,
@@ -202,6 +223,33 @@ def space_scene(
         heaviside=np.zeros((0, 3)),
         tip=np.zeros((0, 3)),
     )
+
+
+def _bent(
+    curved: CurvedSides, on: Faces, part: TriangleSoup, x: Floats, data: Floats
+) -> tuple[Floats, Floats]:
+    """Segments and triangles of a part that follow the curves on which they lie, or end."""
+    if x.shape[1] == 2 or part.number.shape[1] > 3:
+        return curved.bend(x, part.facet, data)[:2]
+    flat = (part.facet < 0) | (curved.facet_to_curve[part.facet] < 0)
+    whole = flat & (part.share == np.eye(3)).all(axis=(1, 2))  # not cut by the plane
+    edges = curved.facets_of_edges(part.number[whole], on.cell_edges, on.of_cell_edges)
+    beside = curved.bend_edges(x[whole], edges, data[whole])
+    rest = curved.bend(x[~whole], part.facet[~whole], data[~whole])
+    return np.concatenate([beside[0], rest[0]]), np.concatenate([beside[1], rest[1]])
+
+
+def _on_curve(curved: CurvedSides, on: Faces) -> Ints:
+    """For each point of the shell, in the order of its triangles, a facet that has it.
+
+    A curved one where there is one.
+    """
+    facet = np.repeat(on.of_shell, 3)
+    number = on.shell.ravel()
+    order = np.argsort(curved.facet_to_curve[facet] < 0, kind="stable")
+    best = np.full(int(number.max(initial=-1)) + 1, -1)
+    best[number[order[::-1]]] = facet[order[::-1]]
+    return np.asarray(best[number])
 
 
 def crack_scene(
@@ -248,7 +296,7 @@ def mesh_scene(solution: Solution, plane: Plane | None, view: Floats | None) -> 
     space = solution.space
     lips = [lip_faces(solution, c) for c in range(len(space.cuts))]
     corners = [each.points[each.triangles] for each in lips]
-    through = _seen_through(solution, 0.0, plane)
+    through = _seen_through(solution, 0.0, plane, with_cells=True)
     carries = np.zeros(space.n_nodes, dtype=bool)
     for number in space.heaviside:
         carries |= number >= 0
@@ -260,25 +308,36 @@ def mesh_scene(solution: Solution, plane: Plane | None, view: Floats | None) -> 
         through,
         touching=every,
         cell_edges=edges_of(every),
-        faint=edges_of(through.skin),
         toward=_viewing_direction(plane, view, lips),
         heaviside=space.node_points[carries],
         tip=space.mesh.points[around],
     )
 
 
-def _seen_through(solution: Solution, warp: float, plane: Plane | None) -> SpaceScene:
-    """The body and its fronts without colours."""
+def _seen_through(
+    solution: Solution, warp: float, plane: Plane | None, *, with_cells: bool = False
+) -> SpaceScene:
+    """The body and its fronts without colours, and the edges of its cells where asked for."""
     mesh = solution.space.mesh
-    moved = mesh.points + warp * solution.coefficients[: mesh.n_points]
+    displacement = solution.coefficients[: mesh.n_points]
+    curved = CurvedSides.of(mesh)
     level = levels(mesh.points, plane)
-    facets = mesh.boundary
-    skin = TriangleSoup.of(facets, None).behind(level).at(moved)
-    sharp = segments_behind(mesh.edges[sharp_edges(mesh)], level)
+    facets, outer = mesh.boundary, np.nonzero(mesh.facet_to_cell[:, 1] < 0)[0]
+    edges, facet, is_sharp = boundary_edges(mesh, curved)
+    sharp = segments_behind(edges[is_sharp], level, facet[is_sharp])
     if plane is not None:
-        sharp += crossing(facets, level)
+        sharp += crossing(facets, level, outer)
+
+    def placed(part: TriangleSoup) -> Floats:
+        x, data = part.at(mesh.points), part.at(displacement)
+        if curved is not None:
+            x, data, _ = curved.bend(x, part.facet, data)
+        return x + warp * data
+
+    skin = placed(TriangleSoup.of(facets, None, outer).behind(level))
+    faint = [placed(part) for part in segments_behind(edges, level, facet)]
     empty = np.zeros((0, 2, 3))
-    outline = np.concatenate([part.at(moved) for part in sharp] or [empty])
+    outline = np.concatenate([placed(part) for part in sharp] or [empty])
     return SpaceScene(
         triangles=np.zeros((0, 3, 3)),
         values=np.zeros((0, 3)),
@@ -290,7 +349,7 @@ def _seen_through(solution: Solution, warp: float, plane: Plane | None) -> Space
         skin=skin,
         outline=outline,
         cell_edges=empty,
-        faint=empty,
+        faint=np.concatenate(faint) if with_cells else empty,
         rims=empty,
         fronts=_front_lines(solution, warp, None),
         toward=np.array([0.0, -1.0, 0.0]),

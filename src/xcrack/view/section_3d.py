@@ -8,6 +8,7 @@ from xcrack.base.arrays import Bools, Floats, Ints
 from xcrack.mesh.locate import barycentric
 from xcrack.mesh.mesh import Mesh, local_edges, local_facets
 from xcrack.mesh.simplex import cut_simplices, interface_simplices
+from xcrack.output.curved_sides import CurvedSides
 from xcrack.output.pieces import Pieces
 
 Plane = tuple[Floats, Floats]  # a point and the unit normal; what lies behind it is drawn
@@ -33,17 +34,28 @@ _SMALL = {
 
 @dataclass(frozen=True, eq=False)
 class TriangleSoup:
-    """Simplices whose vertices are mixtures of points: numbers `(k, v)`, shares `(k, w, v)`."""
+    """Simplices whose vertices are mixtures of points: numbers `(k, v)`, shares `(k, w, v)`.
+
+    `facet` `(k,)` is the facet of the mesh on which each lies, -1 for none.
+    """
 
     number: Ints
     share: Floats
+    facet: Ints
 
     @classmethod
-    def of(cls, number: Ints, share: Floats | None) -> "TriangleSoup":
+    def of(
+        cls, number: Ints, share: Floats | None = None, facet: Ints | None = None
+    ) -> "TriangleSoup":
         """Simplices of points; without shares their vertices are these."""
         v = number.shape[1]
         whole_triangles = np.broadcast_to(np.eye(v), (len(number), v, v))
-        return cls(number, whole_triangles if share is None else share)
+        on_none = np.full(len(number), -1)
+        return cls(
+            number,
+            whole_triangles if share is None else share,
+            on_none if facet is None else facet,
+        )
 
     def at(self, x: Floats) -> Floats:
         """Values at the vertices `(k, w, m)` of what is given at points `(n, m)`."""
@@ -62,7 +74,8 @@ class TriangleSoup:
         rows = np.concatenate([uncut, split[parent[is_behind]]])
         v = self.number.shape[1]
         corner = np.broadcast_to(np.eye(v), (len(uncut), v, v))
-        return TriangleSoup(self.number[rows], np.concatenate([corner, bary[is_behind]]))
+        share = np.concatenate([corner, bary[is_behind]])
+        return TriangleSoup(self.number[rows], share, self.facet[rows])
 
 
 def levels(x: Floats, plane: Plane | None) -> Floats | None:
@@ -75,10 +88,13 @@ def levels(x: Floats, plane: Plane | None) -> Floats | None:
     return np.where(np.abs(level) < 1e-9 * size, 0.0, level)
 
 
-def segments_behind(number: Ints, level: Floats | None) -> list[TriangleSoup]:
+def segments_behind(
+    number: Ints, level: Floats | None, facet: Ints | None = None
+) -> list[TriangleSoup]:
     """What is left of segments behind a plane."""
+    facet = np.full(len(number), -1) if facet is None else facet
     if level is None:
-        return [TriangleSoup.of(number, None)]
+        return [TriangleSoup.of(number, None, facet)]
     a, b = level[number].T
     is_whole = (a <= 0) & (b <= 0)
     crossed = a * b < 0
@@ -88,17 +104,21 @@ def segments_behind(number: Ints, level: Floats | None) -> list[TriangleSoup]:
     share[:, 0] = np.stack([1 - t, t], axis=1)
     retained = np.where(a[crossed] < 0, 0, 1)
     share[np.arange(len(t)), 1, retained] = 1.0
-    return [TriangleSoup.of(number[is_whole], None), TriangleSoup(number[crossed], share)]
+    whole = TriangleSoup.of(number[is_whole], None, facet[is_whole])
+    return [whole, TriangleSoup(number[crossed], share, facet[crossed])]
 
 
-def crossing(triangles: Ints, level: Floats | None) -> list[TriangleSoup]:
+def crossing(
+    triangles: Ints, level: Floats | None, facet: Ints | None = None
+) -> list[TriangleSoup]:
     """Segments in which triangles meet a plane."""
     if level is None:
         return []
     values = level[triangles]
     rows = np.nonzero((values.min(axis=1) < 0) & (values.max(axis=1) >= 0))[0]
     bary, parent = interface_simplices(values[rows])
-    return [TriangleSoup(triangles[rows[parent]], bary)]
+    rows = rows[parent]
+    return [TriangleSoup.of(triangles[rows], bary, None if facet is None else facet[rows])]
 
 
 def section(body: Pieces, level: Floats | None) -> TriangleSoup:
@@ -112,20 +132,43 @@ def section(body: Pieces, level: Floats | None) -> TriangleSoup:
     values = level[tetrahedra]
     rows = np.nonzero((values.min(axis=1) < 0) & (values.max(axis=1) >= 0))[0]
     bary, parent = interface_simplices(values[rows])
-    return TriangleSoup(tetrahedra[rows[parent]], bary)
+    return TriangleSoup.of(tetrahedra[rows[parent]], bary)
 
 
-_Faces = tuple[Ints, Ints, Ints, Ints, Ints]
+@dataclass(frozen=True, eq=False)
+class Faces:
+    """Boundary and crack faces of a body in pieces, by their points, and edges on them.
+
+    Attributes
+    ----------
+    shell, lip : (k, 3) arrays of int
+        Triangles on the boundary and on crack faces.
+    outline, rims, cell_edges : (k, 2) arrays of int
+        Segments: of sharp edges, of crack faces at the boundary, of cells.
+    of_shell, of_outline, of_cell_edges : (k,) arrays of int
+        Facet of the mesh on which each lies.
+    """
+
+    shell: Ints
+    lip: Ints
+    outline: Ints
+    rims: Ints
+    cell_edges: Ints
+    of_shell: Ints
+    of_outline: Ints
+    of_cell_edges: Ints
 
 
-def faces(body: Pieces, level: Floats | None) -> _Faces:
+def faces(body: Pieces, curved: CurvedSides | None) -> Faces:
     """Triangles on boundary and crack faces, and segments: sharp, of crack faces, of cells."""
     mesh = body.solution.space.mesh
     rim = mesh.facet_to_cell[mesh.cell_to_facet, 1] < 0  # opposite to each corner of a cell
-    sharp = sharp_edges(mesh)
+    sharp = sharp_edges(mesh, curved)
     on_lip = _lip_points(body)
     groups: list[list[Ints]] = [[np.zeros((0, 3), np.int64)], [np.zeros((0, 3), np.int64)]]
     lines: list[list[Ints]] = [[np.zeros((0, 2), np.int64)] for _ in range(3)]
+    of_shell: list[Ints] = [np.zeros(0, np.int64)]
+    of_lines: list[list[Ints]] = [[np.zeros(0, np.int64)] for _ in range(3)]
     first = 0
     for block in (body.plain, body.split):
         cell = body.cell[first : first + len(block)]
@@ -138,7 +181,9 @@ def faces(body: Pieces, level: Floats | None) -> _Faces:
             at = zero[:, face].all(axis=1) & rim[cell]
             outside = at.any(axis=1)
             touches = on_lip[block[:, face]].all(axis=1) & ~outside
+            facet = mesh.cell_to_facet[cell, np.argmax(at, axis=1)]
             groups[0].append(_small_faces(block[outside], face))
+            of_shell.append(np.repeat(facet[outside], len(groups[0][-1]) // max(outside.sum(), 1)))
             groups[1].append(_small_faces(block[touches], face))
             for i, j in ((0, 1), (1, 2), (0, 2)):
                 a, b = face[i], face[j]
@@ -150,13 +195,28 @@ def faces(body: Pieces, level: Floats | None) -> _Faces:
                     on = two[:, r] & two[:, s]
                     edge |= on
                     feature |= on & sharp[mesh.cell_to_edge[cell, e]]
-                lines[0].append(_halves(block[outside & feature], a, b))
-                lines[2].append(_halves(block[outside & edge], a, b))
                 mouth = touches & (two & rim[cell]).any(axis=1)
-                lines[1].append(_halves(block[mouth], a, b))
+                for k, rows in enumerate((outside & feature, mouth, outside & edge)):
+                    lines[k].append(_halves(block[rows], a, b))
+                    each = len(lines[k][-1]) // max(int(rows.sum()), 1)
+                    of_lines[k].append(np.tile(facet[rows], each))
     shell, lip = (np.concatenate(group) for group in groups)
-    outline, rims, cells = (np.unique(np.sort(np.concatenate(p), axis=1), axis=0) for p in lines)
-    return shell, lip, outline, rims, cells
+    outline, rims, cells = (
+        unique_segments(np.concatenate(line), np.concatenate(facet), curved)
+        for line, facet in zip(lines, of_lines, strict=True)
+    )
+    return Faces(
+        shell, lip, outline[0], rims[0], cells[0], np.concatenate(of_shell), outline[1], cells[1]
+    )
+
+
+def unique_segments(line: Ints, facet: Ints, curved: CurvedSides | None) -> tuple[Ints, Ints]:
+    """Segments, each once, and the facet on which each lies: a curved one if there is one."""
+    if curved is not None:
+        order = np.argsort(curved.facet_to_curve[facet] < 0, kind="stable")
+        line, facet = line[order], facet[order]
+    unique, first = np.unique(np.sort(line, axis=1), axis=0, return_index=True)
+    return unique, facet[first]
 
 
 def _vanishing_coordinates(mesh: Mesh, body: Pieces, block: Ints, cell: Ints) -> Bools:
@@ -213,8 +273,8 @@ def _middle_of(a: int, b: int) -> int:
     return 4 + local_edges(3).tolist().index(pair)
 
 
-def sharp_edges(mesh: Mesh) -> Bools:
-    """Edges of the mesh at which its boundary turns `(e,)`."""
+def sharp_edges(mesh: Mesh, curved: CurvedSides | None) -> Bools:
+    """Edges of the mesh at which its boundary turns `(e,)`, other than between its chords."""
     facets = mesh.boundary
     x = mesh.points[facets]
     normal = np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0])
@@ -226,9 +286,24 @@ def sharp_edges(mesh: Mesh) -> Bools:
     same_edge = np.nonzero(key[order][1:] == key[order][:-1])[0]
     # Facets need not turn alike: only the angle between their planes counts.
     turn = np.abs(np.einsum("kd,kd->k", normal[owner[same_edge]], normal[owner[same_edge + 1]]))
-    sharp = np.unique(key[order][same_edge[turn < _SHARP]])
+    is_sharp = turn < _SHARP
+    if curved is not None:
+        side = curved.facet_to_curve[mesh.facet_to_cell[:, 1] < 0]
+        one, other = side[owner[same_edge]], side[owner[same_edge + 1]]
+        is_sharp &= (one != other) | (one < 0)
+    sharp = np.unique(key[order][same_edge[is_sharp]])
     edges = np.sort(mesh.edges, axis=1)
     return np.isin(edges[:, 0] * mesh.n_points + edges[:, 1], sharp)
+
+
+def boundary_edges(mesh: Mesh, curved: CurvedSides | None) -> tuple[Ints, Ints, Bools]:
+    """Edges of the boundary `(e, 2)`, the facet on which each lies, and which are sharp."""
+    outer = np.nonzero(mesh.facet_to_cell[:, 1] < 0)[0]
+    pairs = mesh.facets[outer][:, [[0, 1], [1, 2], [0, 2]]].reshape(-1, 2)
+    edges, facet = unique_segments(pairs, np.repeat(outer, 3), curved)
+    sharp = np.sort(mesh.edges[sharp_edges(mesh, curved)], axis=1)
+    key, of_sharp = (pair[:, 0] * mesh.n_points + pair[:, 1] for pair in (edges, sharp))
+    return edges, facet, np.isin(key, of_sharp)
 
 
 def areas(corners: Floats) -> Floats:
@@ -243,9 +318,11 @@ def edges_of(corners: Floats) -> Floats:
 
 
 __all__ = [
+    "Faces",
     "Plane",
     "TriangleSoup",
     "areas",
+    "boundary_edges",
     "crossing",
     "edges_of",
     "faces",
@@ -254,4 +331,5 @@ __all__ = [
     "section",
     "segments_behind",
     "sharp_edges",
+    "unique_segments",
 ]

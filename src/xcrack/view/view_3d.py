@@ -9,9 +9,10 @@ import numpy as np
 from xcrack.analysis.solution import Solution
 from xcrack.base.arrays import Floats
 from xcrack.mesh.mesh import Mesh
+from xcrack.output.curved_sides import CurvedSides
 from xcrack.runs.history import History
 from xcrack.view.scene_3d import crack_scene, space_scene
-from xcrack.view.section_3d import sharp_edges
+from xcrack.view.section_3d import boundary_edges
 
 MOST = 250_000  # triangles that are packed; seven bytes a corner
 _GREY, _EDGE = (143, 163, 184), (64, 64, 64)
@@ -88,9 +89,14 @@ def _layer(name: str, kind: str, corners: Floats, colours: Any, opacity: float) 
 
 
 def _body(mesh: Mesh) -> list[dict[str, Any]]:
-    edges = mesh.points[mesh.edges[sharp_edges(mesh)]]
+    curved = CurvedSides.of(mesh)
+    pairs, facet, is_sharp = boundary_edges(mesh, curved)
+    skin, edges = mesh.points[mesh.boundary], mesh.points[pairs[is_sharp]]
+    if curved is not None:
+        skin = curved.bent(skin, np.nonzero(mesh.facet_to_cell[:, 1] < 0)[0])
+        edges = curved.bent(edges, facet[is_sharp])
     return [
-        _layer("body", "triangles", mesh.points[mesh.boundary], _GREY, 0.25),
+        _layer("body", "triangles", skin, _GREY, 0.25),
         _layer("edges", "lines", edges, _EDGE, 1.0),
     ]
 
