@@ -335,17 +335,31 @@ def test_a_curve_that_goes_astray_later_is_refused():
         xc.refine(known, size=0.1)
 
 
-def test_points_that_would_fold_cells_stay_and_are_named():
+def under_an_arc(cells):
     """A flat cell under an arc: its third point lies within the arc's height."""
     points = np.array([(-1, 0), (1, 0), (0, -0.05), (-1, -1), (1, -1)], dtype=float)
-    cells = [(0, 2, 1), (0, 3, 2), (2, 4, 1), (3, 4, 2)]
     radius = (1 + 0.3**2) / (2 * 0.3)
 
     def arc(x):
         away = x - (0, radius - 0.3)
         return (0, radius - 0.3) + away / np.linalg.norm(away, axis=1)[:, None] * radius
 
-    mesh = xc.Mesh(points, cells, {"rim": [(0, 1)]}, curves={"rim": arc})
+    used = points[: max(map(max, cells)) + 1]
+    return xc.Mesh(used, cells, {"rim": [(0, 1)]}, curves={"rim": arc})
+
+
+def test_inner_points_follow_where_cells_would_be_folded():
+    mesh = under_an_arc([(0, 2, 1), (0, 3, 2), (2, 4, 1), (3, 4, 2)])
+    fine = xc.refine(mesh, [0])
+    middle = fine.points[np.setdiff1d(fine.facet_sets["rim"], [0, 1])]
+    assert np.allclose(middle, [(0, -0.3)])
+    assert fine.points[2, 1] < -0.3
+    assert fine.volume.min() > 0.02
+
+
+def test_points_that_would_fold_cells_stay_and_are_named():
+    """Where the third point lies on another side, as in a thin wall, it cannot follow."""
+    mesh = under_an_arc([(0, 2, 1)])
     with pytest.warns(xc.XcrackWarning, match="1 new points of the boundary stay off their curve"):
         fine = xc.refine(mesh, [0])
     assert fine.volume.sum() == pytest.approx(mesh.volume.sum(), rel=1e-12)

@@ -56,9 +56,12 @@ _MISSED_SETS = 12  # that a message names
 def read_mesh(path: str | PathLike[str], *, strict: bool = False) -> Mesh:
     """Read a mesh with its sets, and make triangles (2D) or tetrahedra (3D) of its cells.
 
-    Midside nodes of cells of second or higher order are left out. Quadrilaterals, pyramids, prisms
-    and hexahedra are divided so that neighbours agree: a face of four corners from its smallest
-    point number (Dompierre et al. 1999). A warning counts them.
+    Of cells of second or higher order the corners are used, and of their midside nodes the shape
+    of the boundary: arcs through them are the `Mesh.curves` onto which `refine` puts new points. A
+    set that is one smooth curved side gets its curve, other sides come into sets ``curved_1``,
+    ``curved_2`` ..., those that meet at an edge into different ones. Quadrilaterals, pyramids,
+    prisms and hexahedra are divided so that neighbours agree: a face of four corners from its
+    smallest point number (Dompierre et al. 1999). A warning counts them.
 
     Parameters
     ----------
@@ -94,7 +97,8 @@ def read_mesh(path: str | PathLike[str], *, strict: bool = False) -> Mesh:
         The file is missing, may not be read, or has an unknown extension.
     MeshError
         The contents are unreadable, or no mesh that triangles or tetrahedra can be made of;
-        cells that are turned inside out; other cells than linear simplices where `strict`.
+        cells that are turned inside out, midside nodes outside of their edge; other cells than
+        linear simplices where `strict`.
 
     Examples
     --------
@@ -194,7 +198,8 @@ def read_triangles(path: str | PathLike[str]) -> tuple[Floats, Ints]:
 def write_mesh(path: str | PathLike[str], mesh: Mesh, *, msh_version: str = "4.1") -> None:
     """Write a mesh with its sets; `read_mesh` gives the same points, to the last bit, and sets.
 
-    The set ``"boundary"`` is left out where it is the one every mesh has.
+    The set ``"boundary"`` is left out where it is the one every mesh has. Curves go into msh, inp
+    and vtu, in a section or comments that other programs pass over; functions of yours do not.
 
     * ``.msh`` (text, 4.1 or 2.2): all sets as physical groups. In 2.2 a cell of several sets is
       written once for each, as gmsh does.
@@ -351,7 +356,8 @@ def _check_extension(path: Path, verb: str, formats: dict[str, list[str]]) -> No
 # Curves in files that other programs read as before: in a section of its own of msh, in comments.
 
 _FRAMES = {  # before, at each line, and behind
-    ".msh": ("$XcrackCurves", "", "$EndXcrackCurves"), ".inp": ("** xcrack curves", "** ", "** end"),
+    ".msh": ("$XcrackCurves", "", "$EndXcrackCurves"),
+    ".inp": ("** xcrack curves", "** ", "** end"),
     ".vtu": ("<!-- xcrack curves", "", "-->"), ".xdmf": ("<!-- xcrack curves", "", "-->"),
 }  # fmt: skip
 _WIDTH = 76

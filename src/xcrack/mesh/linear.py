@@ -191,7 +191,7 @@ def _tell(
             f"the midside nodes of {curved} cells of second or higher order are left out ("
             + (
                 f"the sides are straight now, which moves them by up to {bulge[1]:.3g}, "
-                f"{bulge[0]:.1%} of an edge"
+                f"{bulge[0]:.1%} of an edge; refine puts new points onto the curves of the boundary"
                 if bulge[0] > _STRAIGHT
                 else "all sides were straight"
             )

@@ -41,7 +41,8 @@ class Mesh:
     curves : mapping of name to callable, optional
         Of facet sets that stand for a curve or a curved surface: ``f(x) -> (n, d)`` returns its
         points nearest to the points x (n, d), which are close to it. `refine` puts new points
-        there. Files do not hold them.
+        there, and pictures show it. Generators, `mesh_step` and second-order meshes bring their
+        own, which files hold; of functions of yours they hold none.
 
     Raises
     ------

@@ -261,7 +261,8 @@ def refine(mesh: Mesh, cells: ArrayLike | None = None, *, size: Size | None = No
     of the smallest one of the mesh. How points are numbered plays no part.
 
     New points of facet sets with a curve (`Mesh.curves`) are put onto it; of other sets they stay
-    on the polygon.
+    on the polygon. Where that would fold or flatten a cell, inner points around it move along; a
+    point for which that does not help stays, and a warning counts them.
 
     Parameters
     ----------

@@ -51,7 +51,9 @@ def mesh_step(
     Returns
     -------
     Mesh
-        In the unit of the file's writer as gmsh takes it, which is mm unless told otherwise.
+        In the unit of the file's writer as gmsh takes it, which is mm unless told otherwise. It
+        knows the curved faces of the shape (`Mesh.curves`), so that `refine` follows them: those
+        of `sets`, and others as sets ``curved_1``, ``curved_2`` ....
 
     Raises
     ------
