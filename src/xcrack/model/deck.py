@@ -21,7 +21,12 @@ from xcrack.base.errors import ProblemError, warn
 from xcrack.base.paths import system_errors
 from xcrack.crack.crack import Crack
 from xcrack.mesh.abaqus import MESH_KEYWORDS, OUTPUT_KEYWORDS, read_model, use_of
-from xcrack.mesh.files import existing_file, raw_mesh_of, sets_without_facets
+from xcrack.mesh.files import (
+    existing_file,
+    raw_mesh_of,
+    sets_without_facets,
+    with_stored_curves,
+)
 from xcrack.mesh.keywords import KeywordUse, missed_words, table_of
 from xcrack.mesh.linear import linear_mesh
 from xcrack.mesh.mesh import Mesh
@@ -313,6 +318,7 @@ def _mesh_deck(path: Path) -> Deck:
     raw = linear_mesh(raw, path.name, strict=False)
     points, cells, facet_sets, cell_sets, number = mesh_parts(raw, path.name)
     mesh = with_curved_edges(Mesh(points, cells, facet_sets, cell_sets), raw, number)
+    mesh = with_stored_curves(mesh, path)
     _tell_missed(path, uses, sets_without_facets(raw, mesh))
     return Deck(path, mesh, keywords=tuple(uses))
 

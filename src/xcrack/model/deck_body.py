@@ -11,6 +11,7 @@ from xcrack.base.arrays import Floats, Ints, lock
 from xcrack.base.errors import MeshError, ProblemError
 from xcrack.mesh.abaqus import MESH_KEYWORDS, AbaqusModel
 from xcrack.mesh.fields import CellField, Field
+from xcrack.mesh.files import with_stored_curves
 from xcrack.mesh.keywords import Keyword
 from xcrack.mesh.linear import linear_mesh
 from xcrack.mesh.mesh import Mesh, nearest_nodes, numbers_of, sound_mesh
@@ -130,7 +131,8 @@ class DeckBody:
         linear = linear_mesh(self.raw, source, strict=False)
         points, simplices, facet_sets, self._cell_sets, self._number = mesh_parts(linear, source)
         mesh = Mesh(points, simplices, facet_sets)
-        self.mesh = with_curved_edges(mesh, linear, self._number)
+        mesh = with_curved_edges(mesh, linear, self._number)
+        self.mesh = with_stored_curves(mesh, model.path)
         ends = model.edge_of_middle_node()
         self._ends = np.full((len(model.points), 2), -1, dtype=np.int64)
         if ends:
