@@ -176,7 +176,7 @@ def test_files_keep_the_curves(tmp_path, suffix):
     meshio.read(tmp_path / f"ring{suffix}")
 
 
-def test_what_files_cannot_keep_is_said(tmp_path):
+def test_files_without_curves_warn(tmp_path):
     mesh = read(*ring(6, "triangle6"), "triangle6")
     with pytest.warns(xc.XcrackWarning, match=r"curves of the sets \['curved_1'\] are not stored"):
         xc.write_mesh(tmp_path / "ring.vtk", mesh)

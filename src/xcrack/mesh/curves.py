@@ -149,7 +149,7 @@ def on_curves(
     changed : (n,) array of bool
         Which points are others now.
         Where a cell would be folded, inner points move along.
-    kept : (k,) array of int
+    flat_points : (k,) array of int
         Points that stay where they were all the same.
 
     Raises
@@ -178,8 +178,8 @@ def on_curves(
             break
     moved = np.zeros(len(points), dtype=bool)
     moved[moving] = (x[moving] != points[moving]).any(axis=1)
-    x, kept = _unfolded_points(points, x, cells, moved, outer)
-    return x, np.asarray((x != points).any(axis=1)), kept
+    x, flat_points = _unfolded_points(points, x, cells, moved, outer)
+    return x, np.asarray((x != points).any(axis=1)), flat_points
 
 
 def _curves_of_points(curve: Curve, facets: Ints, new: Bools) -> list[tuple[Curve, Ints]]:
@@ -239,7 +239,7 @@ def _unfolded_points(
     Points of the boundary stay where they were, and are returned as numbers, where that does not
     help: walls are thinner than the arc is high, say.
     """
-    x, moved, kept = target, moved.copy(), [np.zeros(0, dtype=np.int64)]
+    x, moved, flat_points = target, moved.copy(), [np.zeros(0, dtype=np.int64)]
     near = np.nonzero(moved[cells].any(axis=1))[0]
     before, region = _volume(points[cells[near]]), np.zeros(0, dtype=np.int64)
     while True:
@@ -247,7 +247,7 @@ def _unfolded_points(
         share = _volume(x[cells[near]]) / before
         flat, folded = near[share < _FLAT], near[share < _FLATTEST]
         if not len(folded) and (len(region) or not len(flat)):
-            return x, np.concatenate(kept)
+            return x, np.concatenate(flat_points)
         if not np.isin(folded, region).all() or not len(region):
             region = np.union1d(region, flat)
             for _ in range(_LAYERS):
@@ -263,7 +263,7 @@ def _unfolded_points(
                 back = np.unique(cells[region])
                 back = back[moved[back]]
             moved[back] = False
-            kept.append(back)
+            flat_points.append(back)
         x = np.where(moved[:, None], target, points)
         _let_follow(points, x, cells, region, outer)
 
@@ -290,13 +290,13 @@ def _let_follow(points: Floats, x: Floats, cells: Ints, region: Ints, outer: Int
     x[number[free]] = points[number[free]] + move[free]
 
 
-def warn_of_kept(points: Floats, kept: Ints) -> None:
-    """Name the points that have been kept off their curve."""
-    if len(kept):
+def warn_of_flat_points(points: Floats, flat_points: Ints) -> None:
+    """Name the points that stay off their curve."""
+    if len(flat_points):
         warn(
-            f"{len(kept)} new points of the boundary stay off their curve, such as that near "
-            f"{at(points[kept[0]])}: cells there are flatter than the arc is high. Refine the mesh "
-            "further there, or mesh it anew."
+            f"{len(flat_points)} new points of the boundary stay off their curve, such as that "
+            f"near {at(points[flat_points[0]])}: cells there are flatter than the arc is high. "
+            "Refine the mesh further there, or mesh it anew."
         )
 
 
@@ -306,5 +306,5 @@ def _volume(corner: Floats) -> Floats:
 
 __all__ = [
     "Curve", "Curves", "check_on_curves", "checked_curves", "longest_edge", "on_curves",
-    "warn_of_kept",
+    "warn_of_flat_points",
 ]  # fmt: skip

@@ -396,8 +396,8 @@ def _stored_curves(path: Path) -> dict[str, Curve]:
     if frame is None:
         return {}
     begin, at_line, end = frame
-    _, found, rest = path.read_bytes().rpartition(b"\n" + begin.encode() + b"\n")
-    if not found:
+    _, mark, rest = path.read_bytes().rpartition(b"\n" + begin.encode() + b"\n")
+    if not mark:
         return {}
     lines = rest.partition(b"\n" + end.encode())[0].decode("ascii", "replace").splitlines()
     text = "".join(line.removeprefix(at_line) for line in lines)

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 from xcrack.base.arrays import Bools, Floats, Ints, at, ranges
 from xcrack.base.checks import call_function, number, numbers, whole_numbers
 from xcrack.base.errors import MeshError
-from xcrack.mesh.curves import longest_edge, on_curves, warn_of_kept
+from xcrack.mesh.curves import longest_edge, on_curves, warn_of_flat_points
 from xcrack.mesh.gmsh_session import FINEST
 from xcrack.mesh.mesh import Mesh, local_edges, local_facets, sound_mesh
 from xcrack.mesh.simplex import cell_nodes, facet_nodes, node_points
@@ -334,9 +334,9 @@ def _some(mesh: Mesh, cells: ArrayLike) -> Mesh:
         return mesh
     marked = np.zeros(len(mesh.cells), dtype=bool)
     marked[given] = True
-    kept = np.zeros(0, dtype=np.int64)
-    simplex_set, _, _, kept = _sweep(mesh, simplices(mesh), marked, kept)
-    warn_of_kept(simplex_set.points, kept)
+    flat_points = np.zeros(0, dtype=np.int64)
+    simplex_set, _, _, flat_points = _sweep(mesh, simplices(mesh), marked, flat_points)
+    warn_of_flat_points(simplex_set.points, flat_points)
     return _finished_mesh(mesh, simplex_set)
 
 
@@ -344,18 +344,20 @@ def _to_size(mesh: Mesh, size_at: Callable[[Floats, Ints], Floats], sweeps: int 
     """Bisect until every cell is as small as wanted of its centre and its parent."""
     simplex_set = simplices(mesh)
     limit = np.asarray(size_at(simplex_set.centre, simplex_set.parent))
-    done, kept = 0, np.zeros(0, dtype=np.int64)
+    done, flat_points = 0, np.zeros(0, dtype=np.int64)
     while sweeps is None or done < sweeps:
         marked = simplex_set.size > limit
         if not marked.any():
             break
-        simplex_set, old, is_unsplit_cell, kept = _sweep(mesh, simplex_set, marked, kept)
+        simplex_set, old, is_unsplit_cell, flat_points = _sweep(
+            mesh, simplex_set, marked, flat_points
+        )
         # A size is asked for once, of cells that are new or whose points have moved.
         limit = np.concatenate([limit[old], np.zeros(len(simplex_set.cells) - len(limit[old]))])
         new = ~is_unsplit_cell
         limit[new] = size_at(simplex_set.centre[new], simplex_set.parent[new])
         done += 1
-    warn_of_kept(simplex_set.points, kept)
+    warn_of_flat_points(simplex_set.points, flat_points)
     return _finished_mesh(mesh, simplex_set) if done else mesh
 
 
@@ -387,7 +389,7 @@ def _checked_size(mesh: Mesh, size: Size) -> Callable[[Floats, Ints], Floats]:
 
 
 def _sweep(
-    mesh: Mesh, simplex_set: Simplices, marked: Bools, kept: Ints
+    mesh: Mesh, simplex_set: Simplices, marked: Bools, flat_points: Ints
 ) -> tuple[Simplices, Bools, Bools, Ints]:
     """One sweep of bisections, its new points on their curves.
 
@@ -396,8 +398,8 @@ def _sweep(
     mesh : Mesh
     simplex_set : Simplices
     marked : (m,) array of bool
-    kept : (k,) array of int
-        Points that earlier sweeps have kept off their curves: smaller cells may let them go.
+    flat_points : (k,) array of int
+        Points that earlier sweeps left off their curves: smaller cells may let them go.
 
     Returns
     -------
@@ -406,7 +408,7 @@ def _sweep(
         Which of the cells before are still there; they come first.
     is_unsplit_cell : (m',) array of bool
         Which of the cells now are those, with their points where they were.
-    kept : (k,) array of int
+    flat_points : (k,) array of int
     """
     first = len(simplex_set.points)
     fine, old = bisect_simplices(simplex_set, marked)
@@ -422,15 +424,15 @@ def _sweep(
         }
         outer = _parts(fine, np.nonzero(mesh.facet_to_cell[:, 1] < 0)[0])
         new = np.arange(len(fine.points)) >= first
-        new[kept] = True
+        new[flat_points] = True
         size = longest_edge(mesh.points, (mesh.facet_sets[name] for name in mesh.curves))
-        points, changed, kept = on_curves(
+        points, changed, flat_points = on_curves(
             fine.points, fine.cells, new, sets, outer, mesh.curves, size
         )
         if changed.any():
             fine = moved_simplices(fine, points)
             is_unsplit_cell &= ~changed[fine.cells].any(axis=1)
-    return fine, old, is_unsplit_cell, kept
+    return fine, old, is_unsplit_cell, flat_points
 
 
 def _parts(simplex_set: Simplices, facets: Ints) -> Ints:
@@ -472,8 +474,8 @@ def _split_all_edges(mesh: Mesh) -> Mesh:
         outer = facets["boundary"]
         new = np.arange(len(points)) >= mesh.n_points
         size = longest_edge(mesh.points, (mesh.facet_sets[name] for name in curved))
-        points, _, kept = on_curves(points, cells, new, curved, outer, mesh.curves, size)
-        warn_of_kept(points, kept)
+        points, _, flat_points = on_curves(points, cells, new, curved, outer, mesh.curves, size)
+        warn_of_flat_points(points, flat_points)
     members = {name: inverse[members].ravel() for name, members in mesh.cell_sets.items()}
     return sound_mesh(points, cells, facets, members, mesh.curves)
 

@@ -152,8 +152,8 @@ class CurvedSides:
         for e in range(3):
             low, high = np.sort(triangles[:, [e, (e + 1) % 3]], axis=1).T
             place = np.minimum(np.searchsorted(key, low * count + high), len(key) - 1)
-            found = key[place] == low * count + high
-            result[found, e] = facet[on_curve[order[place[found]]]]
+            on_key = key[place] == low * count + high
+            result[on_key, e] = facet[on_curve[order[place[on_key]]]]
         return result
 
     def _by_parts(self, x: Floats, facet: Ints) -> Iterator[tuple[int, Ints]]:
@@ -165,8 +165,8 @@ class CurvedSides:
                 middle = (x[:, i] + x[:, j]) / 2
                 away = np.linalg.norm(self.nearest(middle, facet) - middle, axis=1)
                 height = np.maximum(height, away)
-        wanted = np.clip(np.ceil(np.log2(np.maximum(height / self.off, 1.0)) / 2), 0, None)
-        parts = np.minimum(2 ** wanted.astype(np.int64), _MOST_PARTS)
+        halvings = np.clip(np.ceil(np.log2(np.maximum(height / self.off, 1.0)) / 2), 0, None)
+        parts = np.minimum(2 ** halvings.astype(np.int64), _MOST_PARTS)
         for n in np.unique(parts):
             yield int(n), np.nonzero(parts == n)[0]
 
