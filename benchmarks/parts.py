@@ -59,7 +59,7 @@ def run(n: int) -> None:
     xc.stress_intensity(xc.solve(scene(16)))
     with part("mesh"):
         problem = scene(n)
-        mesh, material, numerics = problem.mesh, problem.material, problem.numerics
+        mesh, body, numerics = problem.mesh, problem.elasticity, problem.numerics
         _ = mesh.edges, mesh.gradient, mesh.volume, mesh.facets, mesh.cell_tree, problem.placed
     with part("level sets"):
         levels = line_levels(mesh, problem.placed[0])
@@ -69,11 +69,11 @@ def run(n: int) -> None:
         lips = (lip_points(V, 0),)
         _ = V.signature
     with part("bulk"):
-        plain = bulk(mesh, material, 2)
+        plain = bulk(body, 2)
     with part("enriched cells"):
-        K = total_stiffness(plain, enriched_stiffness(V, material, numerics, lips)[0])
+        K = total_stiffness(plain, enriched_stiffness(V, body, numerics, lips)[0])
     with part("loads"):
-        vectors = [load_vector(V, material, load, lips) for load in problem.loads]
+        vectors = [load_vector(V, body, load, lips) for load in problem.loads]
         f = np.sum(vectors, axis=0)[:, None]
         fixed = known_unknowns(V, ()).fixed.copy()
         fixed[free_motion(V, fixed).pins] = True
@@ -84,7 +84,7 @@ def run(n: int) -> None:
     with part("contact"):
         chosen = multipliers(V, 0, lips[0], "reduced")
         N = gap_rows(chosen, lips[0], jump_matrix(V, 0, lips[0]))
-        rows = ContactRows(N, chosen.measure, material.E * n / 2, True)
+        rows = ContactRows(N, chosen.measure, body.largest_modulus * n / 2, True)
         engine.contact(rows, f, np.zeros_like(f), [None], opened=u)
     solution = xc.solve(problem)
     with part("K"):

@@ -83,9 +83,9 @@ def measure(n: int) -> dict[str, object]:
     cuts = (timed("cutting", cut, mesh, phi),)
     where = timed("cutting", function_space, mesh, 1, cracks, cuts, numerics)
     lips = (timed("cutting", lip_points, where, 0),)
-    plain = timed("bulk", bulk, mesh, problem.material, 1)
+    plain = timed("bulk", bulk, problem.elasticity, 1)
     enriched, n_points, _ = timed(
-        "enriched cells", enriched_stiffness, where, problem.material, numerics, lips
+        "enriched cells", enriched_stiffness, where, problem.elasticity, numerics, lips
     )
     K = Stiffness(plain.matrix, enriched)
     beside = next_to_enriched(where)
@@ -96,7 +96,7 @@ def measure(n: int) -> dict[str, object]:
         "set-up", iterative_system, where, K, plain, known.fixed, None, motion.modes, None, beside
     )
     vectors = [
-        sum(load_vector(where, problem.material, x, lips) for x in s) for s in STATES.values()
+        sum(load_vector(where, problem.elasticity, x, lips) for x in s) for s in STATES.values()
     ]
     loads = np.stack(vectors, axis=1)
     f = balanced_loads(where, motion, loads)[0]
@@ -105,7 +105,7 @@ def measure(n: int) -> dict[str, object]:
     chosen = timed("contact", multipliers, where, 0, lips[0], "reduced")
     N = timed("contact", lambda: gap_rows(chosen, lips[0], model.jumps[0]))
     h = mesh.cell_size.mean()
-    rows = ContactRows(N, chosen.measure, problem.material.E / h, True)
+    rows = ContactRows(N, chosen.measure, problem.elasticity.largest_modulus / h, True)
     timed("contact", engine.contact, rows, f, np.zeros_like(f), [None] * 3, u)
     contact_steps = engine.count.iterations - open_steps
     # The same through the front door, for K and for the step after the first.

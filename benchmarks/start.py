@@ -55,20 +55,22 @@ def assembly() -> None:
     import numpy as np
 
     import xcrack as xc
-    from xcrack.fem.kernels.stiffness import block_pattern, block_stiffness
+    from xcrack.fem.kernels.stiffness import add_block_stiffness, block_pattern
     from xcrack.mesh.simplex import cell_nodes, shape_derivatives, simplex_rule
 
     for dim, n in ((2, 400), (3, 36)):
         mesh = xc.box((0,) * dim, (1,) * dim, n)
         nodes = np.ascontiguousarray(cell_nodes(mesh, 1))
         bary, weight = simplex_rule(dim, 0)
-        fixed = (mesh.gradient, mesh.volume, shape_derivatives(1, bary), weight)
+        fixed = (mesh.gradient, mesh.volume, shape_derivatives(1, bary), bary, weight, None)
+        cells = np.arange(len(mesh.cells))
         times: dict[str, list[float]] = {"pattern": [], "values": []}
         for _ in range(6):  # the first compiles
             begin = time.process_time()
             _, indices, slot = block_pattern(nodes, mesh.n_points)
             middle = time.process_time()
-            block_stiffness(slot, len(indices), *fixed, 1.0, 0.7, None)
+            data = np.zeros((len(indices), dim, dim))
+            add_block_stiffness(data, cells, slot, *fixed, 1.0, 0.7, None)
             times["pattern"].append(middle - begin)
             times["values"].append(time.process_time() - middle)
         each = {k: 1e9 * median(v[1:]) / len(mesh.cells) for k, v in times.items()}

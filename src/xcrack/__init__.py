@@ -23,6 +23,8 @@ _HOME = {
     "notched_cylinder": "mesh.cylinder",
     "refine": "mesh.refinement",
     "Isotropic": "model.material",
+    "Graded": "model.material",
+    "MaterialSets": "model.material",
     "Material": "model.material",
     "Crack": "crack.crack",
     "line_crack": "crack.lines",

@@ -92,7 +92,7 @@ def test_a_broken_multiplier_space_fails(monkeypatch):
     """One multiplier a node: the space that oscillates."""
 
     def wrong(right):
-        return lambda space, c, lips, kind, fixed=None: right(space, c, lips, "naive", fixed)
+        return lambda space, c, lips, kind, fixed=None, **_: right(space, c, lips, "naive", fixed)
 
     places = (
         "xcrack.analysis.contact.multipliers",

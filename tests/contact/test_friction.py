@@ -231,7 +231,10 @@ def balance_error(n_states):
     states = [[xc.traction(p.where, _mixed(p, q, s)) for p, q in zip(one, two)] for s in shares]
     solutions = xc.solve(problem, [one, *states])
     model = build(problem)
-    f = [sum(load_vector(model.space, E, load, model.lips) for load in s.loads) for s in solutions]
+    body = problem.elasticity
+    f = [
+        sum(load_vector(model.space, body, load, model.lips) for load in s.loads) for s in solutions
+    ]
     work = sum(
         0.5 * (f[k] + f[k + 1]) @ (solutions[k + 1].u - solutions[k].u) for k in range(n_states)
     )

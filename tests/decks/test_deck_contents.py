@@ -323,3 +323,31 @@ def test_a_crack_in_a_deck_of_second_order(tmp_path):
     crack = xc.line_crack([(0.0, 2.0), (0.8, 2.0)])
     sif = xc.stress_intensity(xc.solve(deck.problem([crack])))
     assert sif.K_I[0] > 0
+
+
+def test_two_materials_that_expand_and_soften(tmp_path):
+    """Each with its own table; E(T) is graded where the temperature is not one."""
+    conditions = (
+        "*INITIAL CONDITIONS, TYPE=TEMPERATURE\nNALL, 20.\n*BOUNDARY\nLEFT, 1, 2\n*STEP\n*STATIC\n"
+        "*TEMPERATURE\nNALL, 120.\nLEFT, 20.\n"
+    )
+    text = plain(tmp_path, conditions).read_text()
+    start = text.index("*SOLID SECTION")
+    two = (
+        "*ELSET, ELSET=HALF\n1,\n*ELSET, ELSET=REST\n2,\n"
+        "*SOLID SECTION, ELSET=HALF, MATERIAL=STEEL\n1.\n"
+        "*SOLID SECTION, ELSET=REST, MATERIAL=BRASS\n1.\n"
+        "*MATERIAL, NAME=BRASS\n*ELASTIC\n1.1E5, 0.34, 20.\n1.0E5, 0.36, 120.\n"
+        "*EXPANSION, ZERO=20.\n1.8E-5, 20.\n2.0E-5, 120.\n"
+    )
+    lines = text[start:].split("\n")
+    with pytest.warns(xc.XcrackWarning, match="Poisson's ratio of .MATERIAL 'BRASS'"):
+        deck = xc.read_deck(written(tmp_path, text[:start] + two + "\n".join(lines[2:])))
+    materials = deck.problem().material
+    assert materials["STEEL"].alpha == pytest.approx(1.2e-5)
+    x = np.array([(1.0, 0.5), (2.0, 0.5)])
+    T = deck.loads[0].field(x) + 20.0
+    assert materials["BRASS"].moduli(x) == pytest.approx(1.1e5 - 100 * (T - 20.0))
+    alpha = materials["BRASS"].expansion(x)
+    assert alpha[T > 21] == pytest.approx(1.8e-5 + 2e-8 * (T[T > 21] - 20.0), rel=1e-6)
+    assert np.isfinite(xc.solve(deck.problem()).energy)

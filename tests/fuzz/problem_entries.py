@@ -4,8 +4,9 @@ import numpy as np
 
 import xcrack as xc
 from fuzz import scenes
-from fuzz.entry import Bad, Entry, Late, arg
+from fuzz.entry import Bad, Entry, Hook, Late, arg
 from fuzz.kinds import (
+    Called,
     Choice,
     Flag,
     ListOf,
@@ -35,6 +36,23 @@ def _of_dim(kind, dim=2):
     return Seen(rule=lambda value: isinstance(value, kind) and value.dim == dim)
 
 
+GLUE = xc.Isotropic(0.1, 0.3, plane="strain")
+HALVES = {
+    "left": lambda x: x[:, 0] < x[:, 0].mean(),
+    "right": lambda x: x[:, 0] >= x[:, 0].mean(),
+    "whole": lambda x: x[:, 0] > -np.inf,
+}
+
+
+def _by_set(value):
+    """Whether a mapping names materials; of pairs that make one nothing is known."""
+    if not isinstance(value, dict | tuple) or not value:
+        return False
+    if isinstance(value, tuple):
+        return None
+    return all(isinstance(k, str) and isinstance(v, xc.Isotropic) for k, v in value.items())
+
+
 _COEFFICIENT = Number(least=0, most=1e3)
 _each_crack = ListOf(item=_COEFFICIENT, rule=lambda values: len(values) == 1)
 
@@ -49,7 +67,51 @@ ENTRIES = [
             "plane": arg(Word(optional=True, words=("strain", "stress")), None, "strain", "stress"),
             "yield_stress": arg(Number(optional=True, above=0), None, 350.0),
             "K_c": arg(Number(optional=True, above=0), None, 3000.0),
+            "alpha": arg(Number(optional=True), None, 1.2e-5),
         },
+    ),
+    Entry(
+        "Graded",
+        xc.Graded,
+        {
+            "E": arg(Called(), Late(lambda: lambda x: 1 + 0 * x[:, 0]), words=["function"]),
+            "nu": arg(Number(above=-1, below=0.5), 0.3, 0, words=["Poisson", "nu"]),
+            "plane": arg(Word(optional=True, words=("strain", "stress")), None, "strain"),
+            "yield_stress": arg(Number(optional=True, above=0), None, 350.0),
+            "K_c": arg(Number(optional=True, above=0), None, 3000.0),
+            "alpha": arg(Number(optional=True, also=(Called(),)), None, 1.2e-5),
+        },
+    ),
+    Entry(
+        "MaterialSets",
+        lambda materials: xc.MaterialSets(materials),
+        {
+            "materials": arg(
+                Seen(rule=_by_set), Late(lambda: {"weld": scenes.STEEL}), words=["material"]
+            )
+        },
+    ),
+    Entry(
+        "MaterialSets",
+        lambda materials: xc.Problem(scenes.mesh().with_cell_sets(HALVES), materials),
+        {
+            "materials": arg(
+                Seen(rule=lambda v: _by_set(v) is True and set(v) == {"left", "right"}),
+                Late(lambda: {"left": scenes.STEEL, "right": GLUE}),
+                words=["material"],
+                near={
+                    "missing": Bad(lambda: {"left": scenes.STEEL}),
+                    "unknown": Bad(lambda: {"left": scenes.STEEL, "rigth": GLUE}),
+                    "plane": Bad(
+                        lambda: {"left": scenes.STEEL, "right": xc.Isotropic(1.0, 0.3, "stress")}
+                    ),
+                    "twice": Bad(
+                        lambda: {"left": scenes.STEEL, "right": GLUE, "whole": scenes.STEEL}
+                    ),
+                },
+            )
+        },
+        cost=0.03,
     ),
     Entry(
         "Isotropic",
@@ -172,4 +234,12 @@ ENTRIES = [
         },
     ),
 ]
-HOOKS = []
+HOOKS = [
+    Hook(
+        "Graded",
+        lambda f: xc.Problem(scenes.mesh(), xc.Graded(f, 0.3, "strain")),
+        lambda x: 1 + x[:, 0] ** 2,
+        Numbers((), rule=lambda s: bool((s > 0).all())),
+        "Graded: E",
+    )
+]

@@ -229,7 +229,7 @@ ENTRIES = [
         xc.temperature,
         {
             "field": arg(Number(also=(Called(),)), 10.0, words=["value"]),
-            "alpha": arg(Number(), 1e-5),
+            "alpha": arg(Number(optional=True), None, 1e-5),
         },
     ),
     Entry(

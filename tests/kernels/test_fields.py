@@ -72,13 +72,14 @@ def test_ring(states, hand, order):
     near_zero = 1e-12 * np.abs(wanted).max()
     of_points, of_cells = np.zeros_like(wanted), np.zeros_like(wanted)
     add_points(
-        of_points, gradient, cell, where, side[cell], area, mesh.points, mesh.cells, psi, *last
-    )
+        of_points, gradient, cell, where, side[cell], area, mesh.points, mesh.cells, psi, *last,
+        None,
+    )  # fmt: skip
     assert of_points == pytest.approx(wanted, rel=1e-11, abs=near_zero)
     edges = local_edges(2)[: None if order == 2 else 0]
     add_plain_cells(
         of_cells, near, mesh.points, mesh.cells, mesh.gradient, mesh.volume, nodes, edges,
-        coefficients, side, psi, bary, share, *last,
+        coefficients, side, psi, bary, share, *last, None,
     )  # fmt: skip
     assert of_cells == pytest.approx(wanted, rel=1e-11, abs=near_zero)
 
@@ -98,7 +99,7 @@ def test_ring_on_axes(theta, side):
     add_points(
         result, gradient, cell, where, np.array([side]), np.ones(1), mesh.points, mesh.cells, psi,
         tip, turn, radii, 0.15 * radii, frame, mode_matrix(STEEL.kolosov, STEEL.mu),
-        STEEL.kolosov, STEEL.lam, STEEL.mu,
+        STEEL.kolosov, STEEL.lam, STEEL.mu, None,
     )  # fmt: skip
     x = np.einsum("qb,qbd->qd", where, mesh.points[mesh.cells[cell]])
     wanted = _twin(

@@ -8,13 +8,14 @@ import xcrack as xc
 from support import scenes_2d as scenes
 from xcrack.fem.assembly import bulk
 from xcrack.fem.kernels.stiffness import (
+    add_block_stiffness,
     add_stiffness,
     block_pattern,
-    block_stiffness,
     enriched_pattern,
 )
 from xcrack.linalg.kernels.sparse import dense_blocks
 from xcrack.mesh.simplex import cell_nodes, shape_derivatives, simplex_rule
+from xcrack.model.elasticity import elasticity
 from xcrack.model.material import isotropic_part
 
 
@@ -45,8 +46,9 @@ def drawn_tensor(rng, d):
     return C + C.transpose(2, 3, 0, 1)
 
 
+@pytest.mark.parametrize("graded", [False, True])
 @pytest.mark.parametrize("d", [2, 3])
-def test_stiffness_of_any_material(d):
+def test_stiffness_of_any_material(d, graded):
     """Of plain cells, and of cells with enriched functions, against sums over the tensor."""
     rng = np.random.default_rng(5813)
     C = drawn_tensor(rng, d)
@@ -57,12 +59,16 @@ def test_stiffness_of_any_material(d):
     indptr, indices, slot = block_pattern(nodes, len(nodes[0]))
     bary, share = simplex_rule(d, 2)
     derivative = shape_derivatives(2, bary)
-    data = block_stiffness(
-        slot, len(indices), mesh.gradient, mesh.volume, derivative, share, *stiffness
-    )
+    data = np.zeros((len(indices), d, d))
+    factor = rng.uniform(0.5, 2, (1, d + 1)) if graded else None
+    add_block_stiffness(
+        data, np.arange(1), slot, mesh.gradient, mesh.volume, derivative, bary, share, factor,
+        *stiffness,
+    )  # fmt: skip
     blocks = data[slot[0]].transpose(0, 2, 1, 3)
     gradient = np.einsum("qak,ki->qai", derivative, mesh.gradient[0])
-    expected = general_block(gradient, share * mesh.volume[0], C)
+    at_points = bary @ factor[0] if graded else 1.0
+    expected = general_block(gradient, share * mesh.volume[0] * at_points, C)
     assert np.allclose(blocks, expected, rtol=0, atol=1e-13 * np.abs(expected).max())
 
     weight, G = rng.uniform(0.1, 1, 5), rng.normal(size=(5, 3, d))
@@ -113,7 +119,7 @@ def test_bulk_stiffness():
             G = np.einsum("qnb,bd->qnd", dN, mesh.gradient[c])
             block = elastic_block(G, rule * mesh.volume[c], material.lam, material.mu)
             expected[np.ix_(numbers, range(2), numbers, range(2))] += block
-        result = bulk(mesh, material, order).matrix.toarray()
+        result = bulk(elasticity(mesh, material), order).matrix.toarray()
         np.testing.assert_allclose(result, expected.reshape(2 * size, -1), atol=1e-13)
 
 

@@ -31,7 +31,7 @@ def test_factors_of_the_ring():
     bary = np.column_stack([1 - local.sum(axis=1), local])
     result = ring_factors(
         np.zeros(40, dtype=int), bary, np.zeros(40, dtype=int), w, corners, cells[None],
-        np.ones(3), np.array(tip), 0.9, 0.2, frame, modes, STEEL.lam, STEEL.mu,
+        np.ones(3), np.array(tip), 0.9, 0.2, frame, modes, STEEL.lam, STEEL.mu, None,
     )  # fmt: skip
     _, dq = weight(r, xi, np.array([0.2]), np.array([0.9]))
     for m, g in enumerate(unit_gradients(r, theta, STEEL.kolosov, STEEL.mu)[:2]):
@@ -86,7 +86,8 @@ def test_residuals_and_blocks_of_a_cracked_body():
     solution = cracked()
     space = solution.space
     w = surplus(space, solution.factored.model.known.fixed)
-    residual, blocks = residuals(w, STEEL, solution.coefficients[..., None])
+    body = solution.problem.elasticity
+    residual, blocks = residuals(w, body, solution.coefficients[..., None])
     points = cell_points(space, np.arange(len(space.mesh.cells)), 3, 4)
     gradient = gradients_at(
         space, solution.coefficients[..., None], points.cell, points.bary, points.side

@@ -105,9 +105,19 @@ def test_cell_sets_that_divide_the_body():
     box = xc.box((0, 0), (2, 1), (4, 2))
     left, right = np.arange(8), np.arange(8, 16)
     every = np.arange(16)
+
+    def messages(points, cells, cell_sets):
+        mesh = xc.Mesh(points, cells, cell_sets=cell_sets)
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            for _ in range(2):  # said once a mesh
+                xc.Problem(mesh, xc.Isotropic(1.0, 0.3, "strain"))
+        return [str(w.message) for w in caught]
+
     (message,) = messages(box.points, box.cells, cell_sets={"steel": left, "glue": right})
     assert "'steel', 'glue'" in message
-    assert "one material" in message
+    assert "given one material" in message
+    assert "Problem(mesh, {'steel': ..., ...})" in message
     for sets in (
         {"body": every},
         {"body": every, "left": left},

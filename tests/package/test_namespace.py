@@ -10,7 +10,7 @@ import xcrack
 
 NAMES = [
     # scene
-    "Crack", "Isotropic", "Mesh", "Numerics", "Problem",
+    "Crack", "Graded", "Isotropic", "MaterialSets", "Mesh", "Numerics", "Problem",
     "body_force", "box", "crack_pressure", "displacement", "fix", "initial_stress", "line_crack",
     "line_force",
     "penny_crack", "elliptic_crack", "plane_crack", "surface_crack", "read_surface",

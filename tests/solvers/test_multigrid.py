@@ -13,6 +13,7 @@ from xcrack.linalg.multigrid import extended_cycle, hierarchy, largest_eigenvalu
 from xcrack.linalg.products import BorderedFactor, row_blocks, stored
 from xcrack.linalg.projected_cg import Operator, conjugate_gradients
 from xcrack.mesh.simplex import node_points
+from xcrack.model.elasticity import elasticity
 
 
 def drawn(shape, share, seed):
@@ -72,7 +73,7 @@ def test_unknowns_that_are_not_free_take_no_part(monkeypatch):
     """The body's matrix serves as it is, with any supports: nothing of it is copied."""
     monkeypatch.setattr(multigrid, "_COARSEST", 6)
     rng = np.random.default_rng(7710)
-    stiffness = bulk(xc.box((-1,) * 3, (1,) * 3, 6), xc.Isotropic(1.0, 0.3), 1)
+    stiffness = bulk(elasticity(xc.box((-1,) * 3, (1,) * 3, 6), xc.Isotropic(1.0, 0.3)), 1)
     A = stiffness.matrix
     fixed = rng.random(A.shape[0]) < 0.3
     fixed[6:60] = True
@@ -144,7 +145,7 @@ def body(n, *, supported="foot", E=1.0, nu=0.3, size=1.0, seed=2203, order=1):
     elif supported == "symmetry":
         for i in range(dim):
             fixed[x[:, i] < 1e-9 * size, i] = True
-    return bulk(mesh, material, order), fixed.ravel()
+    return bulk(elasticity(mesh, material), order), fixed.ravel()
 
 
 def operator_of(stiffness, fixed, null=None):
@@ -217,7 +218,7 @@ def test_quadratic_functions_take_no_more_steps():
         _, levels, K = operator_of(stiffness, fixed)
         b = load(levels)
         steps.append(conjugate_gradients(K, b, np.zeros_like(b))[1])
-        lower = hierarchy(bulk(stiffness.mesh, stiffness.material, 1), fixed)
+        lower = hierarchy(bulk(stiffness.elasticity, 1), fixed)
         assert len(levels.levels) == len(lower.levels) + 1
         # Linear functions have the energy that they have at order 1.
         v = load(lower, 913).astype(np.float32)

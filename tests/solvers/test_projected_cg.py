@@ -195,7 +195,7 @@ def total(problem, model, loads):
     """Nodal forces of loads together."""
     forces = np.zeros(model.space.n_dof)
     for load in loads:
-        forces += load_vector(model.space, problem.material, load, model.lips)
+        forces += load_vector(model.space, problem.elasticity, load, model.lips)
     return forces
 
 

@@ -12,6 +12,7 @@ from xcrack.fem.assembly import reused_cells, with_one_jump
 from xcrack.fem.system import build
 
 STEEL = xc.Isotropic(1.0, 0.3, "strain")
+BODY = xc.Problem(xc.box((0, 0), (1, 1), 1), STEEL).elasticity  # the same everywhere
 ROOT = [(-1.2, 0.013), (-0.5, 0.03)]
 
 
@@ -43,10 +44,10 @@ def test_only_what_changed_is_integrated(scene, first, second, order):
     assert (retained.stiffness != fresh.stiffness).nnz == 0
     assert retained.n_points < fresh.n_points
     simple = fresh.space.enriched[with_one_jump(fresh.space, fresh.space.enriched)]
-    _, again = reused_cells(fresh.space, simple, retained.bulk.cells)
+    _, again = reused_cells(fresh.space, BODY, simple, retained.bulk.cells)
     assert again == 0
-    _, changed = reused_cells(fresh.space, simple, build(before).bulk.cells)
-    _, every = reused_cells(fresh.space, simple, None)
+    _, changed = reused_cells(fresh.space, BODY, simple, build(before).bulk.cells)
+    _, every = reused_cells(fresh.space, BODY, simple, None)
     assert 0 < changed < every
     assert fresh.n_points - retained.n_points == every - changed
 
@@ -56,14 +57,14 @@ def test_a_node_that_lost_its_function(order):
     """Cells around it are integrated anew, all others taken over."""
     space_ = build(plane((0.1, 0.05), order)).space
     cells = space_.enriched[with_one_jump(space_, space_.enriched)]
-    known, _ = reused_cells(space_, cells, None)
+    known, _ = reused_cells(space_, BODY, cells, None)
     nodes = space_.cell_nodes[cells]
     lost = np.array(space_.heaviside[0])
     lost[nodes[lost[nodes] >= 0][0]] = -1
     changed = replace(space_, heaviside=(lost,))
     cells = changed.enriched[with_one_jump(changed, changed.enriched)]
-    result, used = reused_cells(changed, cells, known)
-    fresh, every = reused_cells(changed, cells, None)
+    result, used = reused_cells(changed, BODY, cells, known)
+    fresh, every = reused_cells(changed, BODY, cells, None)
     np.testing.assert_array_equal(result.products, fresh.products)
     assert 0 < used < every
 
@@ -88,8 +89,8 @@ def test_another_crack_in_the_same_cells_is_integrated_anew():
     for cracks in ([shifted], [turned], [other, xc.line_crack([*ROOT, (0.1, 0.05)])]):
         changed = build(replace(scene, cracks=cracks))
         cells = changed.space.enriched[with_one_jump(changed.space, changed.space.enriched)]
-        _, used = reused_cells(changed.space, cells, known)
-        _, every = reused_cells(changed.space, cells, None)
+        _, used = reused_cells(changed.space, BODY, cells, known)
+        _, every = reused_cells(changed.space, BODY, cells, None)
         assert used == every
 
 

@@ -9,7 +9,7 @@ import scipy.sparse as sp
 
 from xcrack.analysis.friction import FrictionSolution, FrictionWork, has_friction, solve_friction
 from xcrack.analysis.multipliers import Multipliers, gap_rows, multipliers
-from xcrack.base.arrays import Bools, Floats, lock
+from xcrack.base.arrays import Bools, Floats, Ints, lock
 from xcrack.fem.system import System
 from xcrack.linalg.direct import DirectSystem
 from xcrack.linalg.engine import ContactRows, Engine, SolverState, StateContact
@@ -206,7 +206,7 @@ def _solve_friction(
     having = {m.crack for m in chosen}
     others = any(len(lips) and c not in having for c, lips in enumerate(model.lips))
     start, size = _start(chosen, reuse, 0, closed), _face_size(model, chosen)
-    stiffness = problem.material.largest_modulus / size
+    stiffness = problem.elasticity.largest_modulus / size
     before = reuse.slip if repeated else None
     springs = None
     method = problem.numerics.contact_method
@@ -242,7 +242,7 @@ def _solve_states(
     rows = [gap_rows(m, model.lips[m.crack], model.jumps[m.crack]) for m in chosen]
     N = rows[0] if len(rows) == 1 else sp.csr_matrix(sp.vstack(rows))
     measure = np.concatenate([m.measure for m in chosen])
-    stiffness = problem.material.largest_modulus / _face_size(model, chosen)
+    stiffness = problem.elasticity.largest_modulus / _face_size(model, chosen)
     conditions = ContactRows(N, measure, stiffness, closed)
     return engine.contact(conditions, f, u_imposed, start, *guess)
 
@@ -262,7 +262,10 @@ def _overlapping_cracks(
         limit = -_OVERLAP * np.abs(u[: model.space.n_nodes * model.space.dim]).max(axis=0)
         if (gap.min(axis=0) >= limit).all():
             continue
-        trial = multipliers(model.space, c, lips, problem.numerics.multipliers, model.known.fixed)
+        trial = multipliers(
+            model.space, c, lips, problem.numerics.multipliers, model.known.fixed,
+            material=material_numbers(problem),
+        )  # fmt: skip
         weak = (trial.values.T @ (lips.weight[:, None] * gap)) / trial.measure[:, None]
         if (weak.min(axis=0) < limit).any():
             needing.append(c)
@@ -276,7 +279,13 @@ def _space(problem: Problem, model: System, c: int) -> Multipliers:
         return cast(Multipliers, method.pressure_space(problem, model, c))
     kind = problem.numerics.multipliers
     fixed, rub = model.known.fixed, has_friction(problem, c)
-    return multipliers(model.space, c, model.lips[c], kind, fixed, rub)
+    return multipliers(model.space, c, model.lips[c], kind, fixed, rub, material_numbers(problem))
+
+
+def material_numbers(problem: Problem) -> Ints | None:
+    """Number of the material of each cell, where there are several."""
+    number = problem.elasticity.number
+    return number if len(number) else None
 
 
 def _start(chosen: list[Multipliers], reuse: SolverState, k: int, closed: bool) -> Bools | None:

@@ -65,16 +65,18 @@ def multipliers(
     kind: str,
     fixed: Bools | None = None,
     rubs: bool = False,
+    material: Ints | None = None,
 ) -> Multipliers:
     """Multiplier space of crack c: "reduced", "sparse" or "naive".
 
     Where supports decide the jump, as at a mouth in a side whose displacement is imposed, a group
     of its own would be redundant: with `fixed` (n_dof,) it joins its neighbour. Where the faces rub
-    the tangential jump counts as the normal one does.
+    the tangential jump counts as the normal one does. Where the crack crosses from one `material`
+    (the number of that of each cell) into another, pressures jump.
     """
     nodes, traces = _traces(space, lips)
     hats = _HATS[kind] if kind != "naive" and space.order == 2 and space.dim == 2 else None
-    parts = _parts(space, c, lips) if kind != "naive" else []
+    parts = _parts(space, c, lips, material) if kind != "naive" else []
     values = traces
     if kind != "naive":
         supported = _supported_nodes(space, c, nodes, traces, lips, fixed, rubs)
@@ -82,8 +84,11 @@ def multipliers(
         shape = (len(lips), int(group.max(initial=-1)) + 1)
         column = group.astype(np.int32)[traces.indices]
         values = sp.csr_matrix((traces.data, column, traces.indptr), shape=shape)
-    if len(parts) > 1:
-        values = _broken_functions(values, lips, parts, hats, len(space.cuts[c].kinks.points) > 0)
+    if space.dim == 3 and material is not None and kind != "naive":
+        values = _split_groups(values, lips.weight, material[lips.cell])
+    elif len(parts) > 1:
+        kinked, crosses = len(space.cuts[c].kinks.points) > 0, material is not None
+        values = _broken_functions(values, lips, parts, hats, kinked, crosses)
     elif hats is not None and values.shape[1] > 1:
         mass = _sums(values, lips.weight)
         centre = _sums(values, lips.weight * lips.s) / np.maximum(mass, 1e-300)
@@ -108,16 +113,22 @@ def _sums(values: sp.csr_matrix, x: Floats) -> Floats:
     return np.asarray(np.bincount(values.indices, at_entries, values.shape[1]), dtype=float)
 
 
-def _parts(space: FunctionSpace, c: int, lips: LipPoints) -> list[Ints]:
-    """Numbers of the lip points between kinks of crack c and ends of other cracks on it."""
+def _parts(space: FunctionSpace, c: int, lips: LipPoints, material: Ints | None) -> list[Ints]:
+    """Lip points between kinks of crack c, ends of other cracks on it, and interfaces."""
     line = space.cracks[c].points
     kinks = space.cuts[c].kinks.points
     ends = np.array([*(joint.x for joint in space.joints if joint.on == c), *kinks])
-    if not len(ends):
-        return []
-    begin = arc_position(line, lips.x[:1])[0] - lips.s[0]
-    part = np.searchsorted(np.sort(arc_position(line, ends)) - begin, lips.s)
-    return [np.nonzero(part == k)[0] for k in np.unique(part)]
+    part = np.zeros(len(lips), dtype=np.int64)
+    if len(ends):
+        begin = arc_position(line, lips.x[:1])[0] - lips.s[0]
+        part = np.searchsorted(np.sort(arc_position(line, ends)) - begin, lips.s)
+    if material is not None and len(lips) and space.dim == 2:
+        order = np.argsort(lips.s, kind="stable")
+        crosses = (np.diff(material[lips.cell[order]], axis=0) != 0).any(axis=1)
+        crosses |= np.diff(part[order]) != 0
+        part[order] = np.concatenate([[0], np.cumsum(crosses)])
+    parts = [np.nonzero(part == k)[0] for k in np.unique(part)]
+    return parts if len(parts) > 1 else []
 
 
 def _broken_functions(
@@ -126,15 +137,24 @@ def _broken_functions(
     parts: list[Ints],
     hats: tuple[float, float] | None,
     kinked: bool,
+    crosses: bool,
 ) -> sp.csr_matrix:
-    """Functions that end where pressures jump: junctions, kinks."""
+    """Functions that end where pressures jump: junctions, kinks, interfaces.
+
+    Short parts are joined to their neighbours, but for those between junctions alone.
+    """
     mass = _sums(values, lips.weight)
     # Share of groups at each point: their sum over a part grows steadily with the part.
     groups = lips.weight * (values @ (1 / np.maximum(mass, 1e-14 * mass.max())))
     columns = []
-    for rows in _long_enough(parts, groups) if kinked else parts:
+    for rows in _long_enough(parts, groups) if kinked or crosses else parts:
         if hats is None:
-            part = _without_small(values[rows], lips.weight[rows], lips.s[rows], np.median(mass))
+            lesser = np.zeros(len(mass), dtype=bool)
+            if crosses:  # of a group that an interface cuts one piece stands: both share its nodes
+                lesser = _sums(values[rows], lips.weight[rows]) <= (0.5 + _SAME) * mass
+            part = _without_small(
+                values[rows], lips.weight[rows], lips.s[rows], np.median(mass), lesser
+            )
         else:
             # Faces between kinks and junctions are whole cracks to pressures.
             part = _hats(_even_knots(lips, rows, groups[rows], hats), lips.s[rows])
@@ -143,22 +163,82 @@ def _broken_functions(
     return sp.csr_matrix(sp.hstack(columns))
 
 
+def _split_groups(values: sp.csr_matrix, weight: Floats, material: Ints) -> sp.csr_matrix:
+    """Groups on a surface that end at interfaces, where pressures jump.
+
+    Of a group that an interface cuts the largest piece stands, since all of them share its nodes;
+    each other piece joins the group on its side of which the function overlaps most. Where there is
+    none, a side of the size of a group gets one of its own, and less than that is not cut off.
+
+    Parameters
+    ----------
+    values : sparse matrix (q, g)
+    weight : (q,) array
+    material : (q, 2) array of int
+        Of the cells on both sides of each point.
+    """
+    pairs, part = np.unique(material, axis=0, return_inverse=True)
+    if len(pairs) == 1:
+        return values
+    part = part.ravel()
+    columns: list[sp.csr_matrix] = []
+    total = _sums(values, weight)
+    typical = float(np.median(total))
+    group_of = np.full((len(pairs), len(total)), -1)  # of pieces that stand
+    pieces = [
+        sp.csr_matrix(sp.diags((part == p).astype(float)) @ values) for p in range(len(pairs))
+    ]
+    mass = np.stack([_sums(piece, weight) for piece in pieces])
+    standing = mass > (0.5 + _SAME) * total
+    count = 0
+    for p, piece in enumerate(pieces):
+        present = mass[p] > 1e-14 * typical
+        if present.any() and not standing[p].any() and mass[p].sum() >= _SHORT * typical:
+            standing[p, int(np.argmax(mass[p]))] = True
+        group_of[p, standing[p]] = count + np.arange(int(standing[p].sum()))
+        count += int(standing[p].sum())
+        overlap = np.abs(piece.T @ sp.diags(weight) @ piece).toarray()
+        waiting = np.nonzero(present & ~standing[p])[0]
+        while len(waiting):
+            known = group_of[p] >= 0
+            shared = overlap[waiting] * known
+            best = shared.argmax(axis=1) if known.any() else np.zeros(len(waiting), dtype=np.int64)
+            joins = shared[np.arange(len(waiting)), best] > 0
+            if not joins.any():
+                break
+            group_of[p, waiting[joins]] = group_of[p, best[joins]]
+            waiting = waiting[~joins]
+    # What found none stays with the piece of its group that stands elsewhere, or with the first.
+    for p, g in zip(*np.nonzero((group_of < 0) & (mass > 1e-14 * typical))):
+        elsewhere = group_of[:, g][group_of[:, g] >= 0]
+        if len(elsewhere):
+            group_of[p, g] = elsewhere[0]
+        else:
+            group_of[p, g], count = count, count + 1
+    for p, piece in enumerate(pieces):
+        rows = np.nonzero(group_of[p] >= 0)[0]
+        place = (np.ones(len(rows)), (rows, group_of[p, rows]))
+        columns.append(piece @ sp.csr_matrix(place, shape=(len(total), count)))
+    return sp.csr_matrix(sum(columns[1:], columns[0]))
+
+
 def _without_small(
-    values: sp.csr_matrix, weight: Floats, s: Floats, typical: float
+    values: sp.csr_matrix, weight: Floats, s: Floats, typical: float, lesser: Bools
 ) -> sp.csr_matrix:
-    """Functions on a part of the crack faces; what is small joins the smaller neighbour."""
+    """Functions on a part of the crack faces; what is small, or lesser, joins a neighbour."""
     mass = _sums(values, weight)
-    large_values = values[:, np.nonzero(mass > 1e-14 * typical)[0]].toarray()
+    present = np.nonzero(mass > 1e-14 * typical)[0]
+    large_values, lesser = values[:, present].toarray(), lesser[present]
     while True:
         mass = large_values.T @ weight
         order = np.argsort((large_values.T @ (weight * s)) / mass)
-        large_values, mass = large_values[:, order], mass[order]
-        k = _smallest_number(mass)
-        if len(mass) == 1 or mass[k] >= _SMALL * typical:
+        large_values, mass, lesser = large_values[:, order], mass[order], lesser[order]
+        k = int(np.argmax(lesser)) if lesser.any() else _smallest_number(mass)
+        if len(mass) == 1 or (mass[k] >= _SMALL * typical and not lesser[k]):
             return sp.csr_matrix(large_values)
         neighbours = [j for j in (k - 1, k + 1) if 0 <= j < len(mass)]
         large_values[:, neighbours[_smallest_number(mass[neighbours])]] += large_values[:, k]
-        large_values = np.delete(large_values, k, axis=1)
+        large_values, lesser = np.delete(large_values, k, axis=1), np.delete(lesser, k)
 
 
 def _smallest_number(sizes: Floats) -> int:

@@ -297,7 +297,7 @@ def plan(problem: Problem) -> Report:
 def ingredients_of(problem: Problem) -> tuple[Ingredient, ...]:
     """What a scene needs, line by line."""
     n_tips = [crack.n_tips for crack in problem.placed]
-    rows = [_heaviside(n_tips), _tips(problem, n_tips)]
+    rows = [*_materials(problem), _heaviside(n_tips), _tips(problem, n_tips)]
     rows.extend(_multipliers(problem))
     rows.extend(_friction(problem))
     rows.append(_third_mode(problem, n_tips))
@@ -314,6 +314,31 @@ def ingredients_of(problem: Problem) -> tuple[Ingredient, ...]:
     )
     rows.append(Ingredient("refinement", False, "the mesh is taken as it is"))
     return tuple(rows)
+
+
+def _materials(problem: Problem) -> list[Ingredient]:
+    """What the body is made of, where it is not one material, and where the tips are."""
+    elasticity = problem.elasticity
+    if elasticity.is_uniform and len(elasticity.named) == 1:
+        return []
+    cells = np.bincount(elasticity.set_number, minlength=len(elasticity.named))
+    if len(elasticity.named) == 1:
+        return [Ingredient("materials", True, f"{elasticity.named[0][1]!r}, linear in each cell")]
+    parts = [
+        f"{name!r} ({count} cells): {material!r}"
+        for (name, material), count in zip(elasticity.named, cells, strict=True)
+    ]
+    bond = f"bonded along {len(elasticity.interfaces)} facets"
+    rows = [Ingredient("materials", True, f"{'; '.join(parts)}; {bond}")]
+    stations = problem.stations
+    sets = elasticity.sets_at(stations.x)
+    ends = "tips" if problem.mesh.dim == 2 else "fronts"
+    for c in np.unique(stations.crack).tolist():
+        names = [elasticity.named[k][0] for k in np.unique(sets[stations.crack == c]).tolist()]
+        if problem.mesh.dim == 2:
+            names = [elasticity.named[k][0] for k in sets[stations.crack == c].tolist()]
+        rows.append(Ingredient(f"{ends} of crack {c}", True, f"in {', '.join(map(repr, names))}"))
+    return rows
 
 
 def _third_mode(problem: Problem, n_tips: list[int]) -> Ingredient:

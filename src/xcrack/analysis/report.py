@@ -9,7 +9,7 @@ from xcrack.analysis.contact import ContactSolution
 from xcrack.analysis.multipliers import Multipliers
 from xcrack.analysis.plan import Ingredient, Report, Resultant, ingredients_of
 from xcrack.analysis.solution import Solution
-from xcrack.base.arrays import Floats, at, coordinates
+from xcrack.base.arrays import Floats, Ints, at, coordinates
 from xcrack.crack.crack import Crack
 from xcrack.fem.system import System
 from xcrack.linalg.engine import Engine
@@ -238,13 +238,13 @@ class Alarm:
 
 def has_units(problem: Problem) -> bool:
     """Whether numbers of the scene have units: a yield stress is given, or a modulus of a solid."""
-    material = problem.material
-    return material.yield_stress is not None or material.largest_modulus > _UNIT
+    elasticity = problem.elasticity
+    return elasticity.knows_yield or elasticity.largest_modulus > _UNIT
 
 
 def millimetre(problem: Problem) -> float | None:
     """Length of a millimetre where Young's modulus is in MPa or Pa; None where it is in neither."""
-    E = problem.material.largest_modulus
+    E = problem.elasticity.largest_modulus
     return 1.0 if _MPA[0] < E < _MPA[1] else 1e-3 if _PA[0] < E < _PA[1] else None
 
 
@@ -285,7 +285,7 @@ def _displacement(solution: Solution) -> Alarm:
     plain[np.unique(space.mesh.cells[space.signature != 0])] = False
     u = np.linalg.norm(solution.coefficients[:n], axis=1) * (plain if plain.any() else 1)
     node = int(np.argmax(u))
-    E = solution.problem.material.largest_modulus
+    E = solution.problem.elasticity.largest_modulus
     remedy = f"is Young's modulus, {E:.4g}, in the unit of the loads, and are these as meant?"
     if E < _MPA[0]:
         remedy += " A modulus in GPa is a thousand times as large in MPa."
@@ -300,42 +300,46 @@ def _displacement(solution: Solution) -> Alarm:
 
 def _stress(solution: Solution) -> Alarm:
     """Stress that a twentieth of the body exceeds, away from cracks."""
-    space, material = solution.space, solution.problem.material
+    space, elasticity = solution.space, solution.problem.elasticity
     cells = np.nonzero(space.signature == 0)[0]
     cells = cells if len(cells) else np.arange(len(space.mesh.cells))
     d = space.dim
     bary = np.full((len(cells), d + 1), 1 / (d + 1))
     sides = np.ones((len(cells), len(space.cuts)), dtype=np.int64)
-    equivalent = von_mises(_in_space(solution, solution.stress_at(cells, bary, sides)))
-    order = np.argsort(equivalent)
+    sigma = solution.stress_at(cells, bary, sides)
+    equivalent = von_mises(_in_space(solution, sigma, cells, bary))
+    limit = elasticity.moduli_of_cells[cells] * _STRAINED
+    if elasticity.knows_yield:
+        limit = elasticity.yield_of_cells(cells)
+    order = np.argsort(equivalent / limit)
     volume = np.cumsum(space.mesh.volume[cells][order])
     k = int(order[np.searchsorted(volume, _SHARE * volume[-1])])
     place = f"at {coordinates(space.mesh.points[space.mesh.cells[cells[k]]].mean(axis=0))}"
-    if material.yield_stress is not None:
+    if elasticity.knows_yield:
         return Alarm(
             "the stress (von Mises) that 5 % of the body exceeds",
             float(equivalent[k]),
-            material.yield_stress,
+            float(limit[k]),
             place,
             "the body yields away from cracks too, so that linear elasticity does not hold: is the "
             "yield stress in the unit of the loads, and are these as meant?",
         )
     return Alarm(
         "the strain (von Mises stress over Young's modulus) that 5 % of the body exceeds",
-        float(equivalent[k] / material.largest_modulus),
+        float(equivalent[k] / limit[k] * _STRAINED),
         _STRAINED,
         place,
         "is Young's modulus in the unit of the loads, and are these as meant?",
     )
 
 
-def _in_space(solution: Solution, sigma: Floats) -> Floats:
+def _in_space(solution: Solution, sigma: Floats, cells: Ints, bary: Floats) -> Floats:
     """Stress in space `(q, 3, 3)` of that in a body `(q, d, d)`."""
     if sigma.shape[-1] == 3:
         return sigma
     full = np.zeros((len(sigma), 3, 3))
     full[:, :2, :2] = sigma
-    full[:, 2, 2] = solution.problem.material.stress_across(sigma)
+    full[:, 2, 2] = solution.problem.elasticity.stress_across(sigma, cells, bary)
     return full
 
 

@@ -221,16 +221,40 @@ class Solution:
     def stress_at(self, cell: Ints, bary: Floats, side: Ints) -> Floats:
         """Stress at points given by cell `(q, d, d)`; arguments as of `at`."""
         cell, bary, side = self._by_cell(cell, bary, side)
-        sigma = self.problem.material.stress(self.at(cell, bary, side)[1])
-        return sigma + self.initial_stress(position(self.space, cell, bary))
+        sigma = self.problem.elasticity.stress(self.at(cell, bary, side)[1], cell, bary)
+        return sigma + self.initial_stress_at(cell, bary)
 
     def initial_stress(self, x: Floats) -> Floats:
         """Sum of the initial stresses at points `(q, d)`: `(q, d, d)`."""
         x = numbers(x, "initial_stress: x", (None, self.space.dim))
-        total = np.zeros((len(x), self.space.dim, self.space.dim))
+        if self.problem.elasticity.is_uniform:
+            nowhere = np.zeros(len(x), dtype=np.int64)  # the stress does not depend on the cell
+            return self.initial_stress_at(nowhere, np.zeros((len(x), 0)), x)
+        return self.initial_stress_at(*self._nearest_cells(x), x)
+
+    def _nearest_cells(self, x: Floats) -> tuple[Ints, Floats]:
+        """Cells `(q,)` and places in them of points in or beside the body."""
+        cell, bary = locate(self.space.mesh, x)
+        # Beside a curved side, which is a polygon to the mesh, the nearest cell counts.
+        outside = np.nonzero(cell < 0)[0]
+        if len(outside):
+            cell[outside] = self.space.mesh.cell_tree.query(x[outside])[1]
+            bary[outside] = 1 / (self.space.dim + 1)
+        return cell, bary
+
+    def initial_stress_at(
+        self, cell: Ints, bary: Floats, x: Floats | None = None, exact: bool = False
+    ) -> Floats:
+        """Sum of the initial stresses at points given by cell, or besides by place: `(q, d, d)`.
+
+        Of a graded modulus it is that of the stiffness, or as K takes it the exact one.
+        """
+        total = np.zeros((len(cell), self.space.dim, self.space.dim))
         for load, factor in self.acting:
             if "initial_stress" in load.acts:
-                total = total + factor * load.initial_stress(x, self.problem.material)
+                x = position(self.space, cell, bary) if x is None else x
+                elasticity = self.problem.elasticity
+                total = total + factor * elasticity.initial_stress(load, x, cell, bary, exact)
         return total
 
     def opening(self, crack: int = 0) -> Floats:

@@ -68,13 +68,15 @@ def out_of_balance(problem: Problem, model: System, loads: Sequence[Load]) -> fl
     n = space.n_nodes * space.dim
     points = body_points(space)
     x = position(space, points.cell, points.bary)
-    material = problem.material
-    sigma = sum((load.initial_stress(x, material) for load in stresses), np.zeros((1, 1, 1)))
-    stored = np.einsum("q,qij,qij->", points.weight, sigma, material.strain(sigma))
+    elasticity, where = problem.elasticity, (points.cell, points.bary)
+    sigma = np.zeros((len(x), space.dim, space.dim))
+    for load in stresses:
+        sigma = sigma + elasticity.initial_stress(load, x, *where)
+    stored = np.einsum("q,qij,qij->", points.weight, sigma, elasticity.strain(sigma, *where))
     if stored <= 0:
         return None
     free = ~model.known.fixed[:n]
-    vector = sum(load_vector(space, material, load, ())[:n] for load in stresses)
+    vector = sum(load_vector(space, elasticity, load, ())[:n] for load in stresses)
     f = np.where(free, vector, 0.0)
     matrix = model.bulk.matrix
     keep = sp.diags(free.astype(float))
@@ -268,7 +270,7 @@ def _engine(
             fixed,
             None if reuse is None else reuse.hierarchy,
             motion.modes,
-            None if basis is None else partial(basis.columns, space_, problem.material),
+            None if basis is None else partial(basis.columns, space_, problem.elasticity.material),
             next_to_enriched(space_) if by_parts else None,
         )
     fixed[motion.pins] = True
@@ -278,7 +280,7 @@ def _engine(
         fixed,
         problem.numerics,
         solver,
-        problem.material,
+        problem.elasticity.material,
         reuse,
     )
 
@@ -299,7 +301,7 @@ def _case(problem: Problem, model: System, state: Any, vectors: dict[int, Floats
     parts = []
     for load, factor in acting:
         if id(load) not in vectors:
-            vectors[id(load)] = load_vector(model.space, problem.material, load, model.lips)
+            vectors[id(load)] = load_vector(model.space, problem.elasticity, load, model.lips)
         vector = vectors[id(load)]
         parts.append(vector if factor == 1 else factor * vector)
     f = sum(parts, np.zeros(model.space.n_dof))

@@ -18,7 +18,7 @@ from xcrack.fatigue.law import GrowthLaw
 from xcrack.fatigue.retardation import plastic_zone
 from xcrack.growth.options import GrowthOptions
 from xcrack.model.loads import Load
-from xcrack.model.material import Isotropic, Material
+from xcrack.model.material import Isotropic, Material, MaterialSets
 from xcrack.model.numerics import Numerics
 from xcrack.model.problem import Problem
 from xcrack.model.supports import Support
@@ -86,7 +86,7 @@ def read_case(path: str | PathLike[str]) -> CaseFile:
         if name not in root:
             root.refuse("", f"the table [{name}] is missing.")
     mesh = forms.value_of_table(root.table("mesh"), forms.MESHES)
-    material = forms.value_of_kind(root.table("material"), Material, Isotropic)
+    material = _material(root.table("material"))
     solving = root.table("solve")
     solving.known(("contact", "order", "friction", "states"))
     scene: dict[str, Any] = {
@@ -116,6 +116,17 @@ def read_case(path: str | PathLike[str]) -> CaseFile:
         pictures=tuple(_texts(output, "pictures")),
         warp=_number(output, "warp", 0.0),
     )
+
+
+def _material(table: Table) -> Material:
+    """One material, or by tables [material.name] one for each cell set."""
+    values = table.content.values()
+    if values and all(isinstance(value, dict) for value in values):
+        return MaterialSets({
+            name: forms.value_of_kind(table.table(name), Material, Isotropic)
+            for name in table.content
+        })  # fmt: skip
+    return forms.value_of_kind(table, Material, Isotropic)  # type: ignore[no-any-return]
 
 
 def _numerics(table: Table) -> Numerics:

@@ -70,7 +70,7 @@ def estimate(
         Some of its states; order 2 in 2D.
     goals : sequence of Goal
     """
-    space, tip_material = factored.model.space, solutions[0].problem.material.at_tip()
+    space = factored.model.space
     groups = groups_of(factored)
     dual = duals(factored, groups, goals)
     w = surplus(space, factored.model.known.fixed)
@@ -79,7 +79,7 @@ def estimate(
     columns = [np.stack([s.u for s in solutions], axis=1), *dual.z[sets]]
     stacked = np.concatenate(columns, axis=1).reshape(space.n_functions, 2, -1)
     stacked = np.concatenate([stacked, np.zeros((1, *stacked.shape[1:]))])
-    residual, blocks = residuals(w, tip_material, stacked)
+    residual, blocks = residuals(w, solutions[0].problem.elasticity, stacked)
     r_u, r_z = residual[:, :, : len(solutions)], residual[:, :, len(solutions) :]
     for k, solution in enumerate(solutions):
         r_u[:, :, k] += load_residual(w, solution)

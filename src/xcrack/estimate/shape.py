@@ -69,7 +69,7 @@ def crack_shape(
             gradient_of_goal, first = gradient[..., k], len(solutions) + k * z.shape[2]
             dual = gradient[..., first : first + z.shape[2]] - slopes[s]
             weight = u[..., first : first + z.shape[2]] - values[s]
-            sigma = solution.problem.material.stress(gradient_of_goal)
+            sigma = solution.problem.elasticity.stress(gradient_of_goal, cell, lips.bary[moved, s])
             shifted[:, k] += sign * np.einsum("qij,qijm->qm", sigma, dual)
             normals = np.einsum("qi,qijm,qj->qm", n, dual, n)
             shifted[:, k] += sign * pressure[:, k, None] * normals
@@ -173,14 +173,15 @@ def _products(
     solutions: Sequence[Solution], z: Floats, points: tuple[Ints, Floats, Ints]
 ) -> Floats:
     """sigma(u) : eps(z) at points given by cell, place and side `(q, states, m)`."""
-    space, material = solutions[0].space, solutions[0].problem.material
+    space, elasticity = solutions[0].space, solutions[0].problem.elasticity
     states, _, m = z.shape
     gradient = gradients_at(space, _columns(solutions, z), *points)
     result = np.empty((len(points[0]), states, m))
     for k in range(states):
         first = states + k * m
         dual = gradient[..., first : first + m]
-        result[:, k] = np.einsum("qij,qijm->qm", material.stress(gradient[..., k]), dual)
+        sigma = elasticity.stress(gradient[..., k], *points[:2])
+        result[:, k] = np.einsum("qij,qijm->qm", sigma, dual)
     return result
 
 

@@ -21,8 +21,9 @@ from xcrack.fem.function_space import FunctionSpace
 from xcrack.fem.loads import facet_points, position
 from xcrack.fem.quadrature import Points, cell_points, cell_side
 from xcrack.mesh.mesh import facet_set, local_edges
+from xcrack.model.elasticity import Elasticity
 from xcrack.model.loads import FacetPoints, Load
-from xcrack.model.material import Isotropic, Material
+from xcrack.model.material import isotropic_part
 from xcrack.model.supports import Support
 
 _POINTS, _DEGREE = 3, 4  # where tip functions act; of the products of a cubic and a quadratic
@@ -109,15 +110,15 @@ def _crack_edges(space: FunctionSpace, c: int) -> Ints:
 
 
 def residuals(
-    surplus: HierarchicalSurplus, tip_material: Isotropic, coefficients: Floats
+    surplus: HierarchicalSurplus, elasticity: Elasticity, coefficients: Floats
 ) -> tuple[Floats, Floats]:
     """-a(u, w) of columns of displacements, and the stiffness of each function with its copy.
 
     Parameters
     ----------
     surplus : HierarchicalSurplus
-    tip_material : Isotropic
-        Its stiffness is that of the body.
+    elasticity : Elasticity
+        Of isotropic materials.
     coefficients : (functions of the space + 1, 2, m) array, length
         The last row is zero.
 
@@ -131,23 +132,27 @@ def residuals(
     from xcrack.estimate.kernels.surplus import take_plain_stress, take_stress
 
     space = surplus.space
-    mesh, lame = space.mesh, (tip_material.lam, tip_material.mu)
+    mesh = space.mesh
     residual = np.zeros((len(surplus.fixed), 2, coefficients.shape[2]))
     blocks = np.zeros((len(surplus.copy), 4, 4))
     special = space.signature != 0
     special |= (surplus.copy[surplus.functions] >= 0).any(axis=1)
     linear, square = _reference()
-    take_plain_stress(
-        residual, blocks, np.nonzero(~special)[0], space.cell_nodes, coefficients,
-        mesh.gradient, mesh.volume, surplus.functions, surplus.sign, linear, square, *lame,
-    )  # fmt: skip
-    points = cell_points(space, np.nonzero(special)[0], _POINTS, _DEGREE)
-    if len(points.cell):
-        strain = gradients_at(space, coefficients, points.cell, points.bary, points.side)
-        take_stress(
-            residual, blocks, points.cell, points.bary, points.weight, points.side, strain,
-            *surplus.arrays, *lame,
+    for material, cells in elasticity.groups(np.arange(len(mesh.cells))):
+        lame = isotropic_part(material.unit.tensor(2))[:2]
+        plain = np.logical_not(special[cells]) & (not material.is_graded)
+        take_plain_stress(
+            residual, blocks, cells[plain], space.cell_nodes, coefficients,
+            mesh.gradient, mesh.volume, surplus.functions, surplus.sign, linear, square, *lame,
         )  # fmt: skip
+        points = cell_points(space, cells[~plain], _POINTS, _DEGREE + material.is_graded)
+        if len(points.cell):
+            strain = gradients_at(space, coefficients, points.cell, points.bary, points.side)
+            weight = elasticity.weights(points.cell, points.bary, points.weight)
+            take_stress(
+                residual, blocks, points.cell, points.bary, weight, points.side, strain,
+                *surplus.arrays, *lame,
+            )  # fmt: skip
     return residual, blocks
 
 
@@ -279,7 +284,7 @@ def load_residual(surplus: HierarchicalSurplus, solution: Solution) -> Floats:
         if "traction" in load.acts:
             _add_traction(result, surplus, load, factor)
         if load.acts & {"volume", "initial_stress"}:
-            _add_volume(result, surplus, load, factor, solution.problem.material)
+            _add_volume(result, surplus, load, factor, solution.problem.elasticity)
     return result
 
 
@@ -299,7 +304,7 @@ def _add_traction(result: Floats, surplus: HierarchicalSurplus, load: Load, fact
 
 
 def _add_volume(
-    result: Floats, surplus: HierarchicalSurplus, load: Load, factor: float, material: Material
+    result: Floats, surplus: HierarchicalSurplus, load: Load, factor: float, elasticity: Elasticity
 ) -> None:
     from xcrack.estimate.kernels.surplus import add_functional
 
@@ -309,7 +314,7 @@ def _add_volume(
     if "volume" in load.acts:
         _add(result, surplus, points, factor * load.volume(x))
     if "initial_stress" in load.acts:
-        sigma = factor * load.initial_stress(x, material)
+        sigma = factor * elasticity.initial_stress(load, x, points.cell, points.bary)
         weighted = -points.weight[:, None, None] * sigma
         add_functional(
             result[:, :, None], points.cell, points.bary, points.side, weighted[..., None],

@@ -22,6 +22,7 @@ from xcrack.fem.quadrature import (
 )
 from xcrack.mesh.mesh import Mesh
 from xcrack.mesh.simplex import cell_nodes, shape_derivatives, simplex_rule
+from xcrack.model.elasticity import Elasticity
 from xcrack.model.loads import Load
 from xcrack.model.material import Material, isotropic_part
 from xcrack.model.numerics import Numerics
@@ -355,13 +356,14 @@ def with_one_jump(space: FunctionSpace, cells: Ints) -> Bools:
 
 
 def reused_cells(
-    space: FunctionSpace, cells: Ints, earlier: ReusedCells | None
+    space: FunctionSpace, elasticity: Elasticity, cells: Ints, earlier: ReusedCells | None
 ) -> tuple[ReusedCells, int]:
     """Integrate cells with one jump, but those that are known already.
 
     Parameters
     ----------
     space : FunctionSpace
+    elasticity : Elasticity
     cells : (m,) array of int
         Growing.
     earlier : ReusedCells, optional
@@ -383,11 +385,12 @@ def reused_cells(
         old = (earlier.cells[row] == cells) & (earlier.key[row] == key).all(axis=1)
         products[old] = earlier.products[row[old]]
     new = np.nonzero(~old)[0]
-    points = cell_points(space, cells[new], 0, 2 * (space.order - 1))
+    points = cell_points(space, cells[new], 0, _degree(space.order, elasticity))
+    weight = elasticity.weights(points.cell, points.bary, points.weight)
     for batch, rows in space.batches(cells[new]):
         number, place, first = points.of_cells(batch.cells)
         _, G = space.tabulate(batch, place, points.bary[number], points.side[number])
-        products[new[rows]] = gradient_products(first, points.weight[number], G, n)
+        products[new[rows]] = gradient_products(first, weight[number], G, n)
     return ReusedCells(cells, key, products), len(points.weight)
 
 
@@ -444,7 +447,7 @@ class Bulk:
     Attributes
     ----------
     mesh : Mesh
-    material : Material
+    elasticity : Elasticity
     order : int
     matrix : sparse matrix (n, n), stress · length^(d - 2)
         Node blocks, BSR; in 3D each is stored column by column, as products of the solvers read it.
@@ -457,7 +460,7 @@ class Bulk:
     """
 
     mesh: Mesh
-    material: Material
+    elasticity: Elasticity
     order: int
     matrix: sp.bsr_matrix
     cells: ReusedCells | None = None
@@ -465,34 +468,38 @@ class Bulk:
     free: tuple[Bools, Floats] | None = None
 
 
-def bulk(mesh: Mesh, material: Material, order: int) -> Bulk:
+def bulk(elasticity: Elasticity, order: int) -> Bulk:
     """Stiffness of the uncracked body."""
-    from xcrack.fem.kernels.stiffness import block_pattern, block_stiffness
+    from xcrack.fem.kernels.stiffness import add_block_stiffness, block_pattern
 
+    mesh = elasticity.mesh
     nodes = np.ascontiguousarray(cell_nodes(mesh, order))
     n_nodes = mesh.n_points + (len(mesh.edges) if order == 2 else 0)
     indptr, indices, slot = block_pattern(nodes, n_nodes)
-    bary, weight = simplex_rule(mesh.dim, 2 * (order - 1))
-    data = block_stiffness(
-        slot,
-        len(indices),
-        mesh.gradient,
-        mesh.volume,
-        shape_derivatives(order, bary),
-        weight,
-        *isotropic_part(material.tensor(mesh.dim)),
-    )
+    data = np.zeros((len(indices), mesh.dim, mesh.dim))
+    for material, cells in elasticity.groups(np.arange(len(mesh.cells))):
+        factor = elasticity.factor if material.is_graded else None
+        bary, weight = simplex_rule(mesh.dim, 2 * (order - 1) + material.is_graded)
+        add_block_stiffness(
+            data, cells, slot, mesh.gradient, mesh.volume, shape_derivatives(order, bary), bary,
+            weight, factor, *isotropic_part(material.unit.tensor(mesh.dim)),
+        )  # fmt: skip
     if mesh.dim == 3:
         for part in row_stretches(len(data)):
             data[part] = data[part].transpose(0, 2, 1).copy()
         data = data.transpose(0, 2, 1)
     size = n_nodes * mesh.dim
-    return Bulk(mesh, material, order, sp.bsr_matrix((data, indices, indptr), shape=(size, size)))
+    return Bulk(mesh, elasticity, order, sp.bsr_matrix((data, indices, indptr), shape=(size, size)))
+
+
+def _degree(order: int, elasticity: Elasticity) -> int:
+    """Degree of the stiffness of standard functions: one more where the modulus is linear."""
+    return 2 * (order - 1) + elasticity.is_graded
 
 
 def enriched_stiffness(
     space: FunctionSpace,
-    material: Material,
+    elasticity: Elasticity,
     numerics: Numerics,
     lips: tuple[LipPoints, ...],
     earlier: ReusedCells | None = None,
@@ -521,32 +528,47 @@ def enriched_stiffness(
         indptr, indices = np.zeros(space.n_functions + 1, np.int64), np.zeros(0, np.int32)
         return Enriched(indptr, indices, np.zeros((0, d, d))), 0, None
     simple = with_one_jump(space, cells)
-    reusable, n_points = reused_cells(space, cells[simple], earlier)
+    reusable, n_points = reused_cells(space, elasticity, cells[simple], earlier)
     others = cells[~simple]
-    points = cell_points(space, others, numerics.points, 2 * (space.order - 1))
+    points = cell_points(space, others, numerics.points, _degree(space.order, elasticity))
     with_tip = cells[space.has_tip[cells]]
     boundary = None
     if numerics.consistent and len(with_tip):
         boundary = boundary_points(space, with_tip, lips)
     indptr, indices = enriched_pattern(_functions(space, cells), space.n_functions, space.n_nodes)
     data = np.zeros((len(indices), d, d))
-    stiffness = isotropic_part(material.tensor(d))
-    for batch, rows in space.batches(reusable.cells):
-        products = reusable.products[rows]
-        add_products(data, indptr, indices, batch.functions, products, space.n_nodes, *stiffness)
+    for material, own in elasticity.groups(reusable.cells):
+        stiffness = isotropic_part(material.unit.tensor(d))
+        for batch, _ in space.batches(own):
+            products = reusable.products[np.searchsorted(reusable.cells, batch.cells)]
+            add_products(
+                data, indptr, indices, batch.functions, products, space.n_nodes, *stiffness
+            )  # fmt: skip
 
-    def tabulated(batch: Batch) -> tuple[Ints, Ints, Floats, Floats]:
+    def tabulated(task: tuple[Material, Batch]) -> tuple[Material, Ints, Ints, Floats, Floats]:
+        material, batch = task
         number, row, first = points.of_cells(batch.cells)
         bary, weight, side = points.bary[number], points.weight[number], points.side[number]
         N, G = space.tabulate(batch, row, bary, side)
         if batch.tips and boundary is not None:
             G = corrected(space, batch, (row, bary, weight, side), N, G, boundary)
-        return batch.functions, first, weight, G
+        return (
+            material,
+            batch.functions,
+            first,
+            elasticity.weights(batch.cells[row], bary, weight),
+            G,
+        )
 
-    chunks = _chunks(space, points, others)
-    for part in stream_tasks(tabulated, (b for chunk in chunks for b, _ in space.batches(chunk))):
+    tasks = (
+        (material, batch)
+        for chunk in _chunks(space, points, others)
+        for material, own in elasticity.groups(chunk)
+        for batch, _ in space.batches(own)
+    )
+    for material, functions, first, weight, G in stream_tasks(tabulated, tasks):
         with one_blas_thread():
-            functions, first, weight, G = part
+            stiffness = isotropic_part(material.unit.tensor(d))
             add_stiffness(
                 data, indptr, indices, functions, first, weight, G, space.n_nodes, *stiffness
             )  # fmt: skip

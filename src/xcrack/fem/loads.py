@@ -14,13 +14,13 @@ from xcrack.fem.function_space import FunctionSpace
 from xcrack.fem.quadrature import Points, at_joints, cell_points, cell_side
 from xcrack.mesh.mesh import facet_set, nearest_nodes, nearest_point, numbers_of
 from xcrack.mesh.simplex import facet_nodes
+from xcrack.model.elasticity import Elasticity
 from xcrack.model.loads import FacetPoints, Load
-from xcrack.model.material import Material
 from xcrack.model.supports import Support
 
 
 def load_vector(
-    space: FunctionSpace, material: Material, load: Load, lips: tuple[LipPoints, ...]
+    space: FunctionSpace, elasticity: Elasticity, load: Load, lips: tuple[LipPoints, ...]
 ) -> Floats:
     """A load, tested with every function `(n_dof,)`; displacements give nothing.
 
@@ -42,7 +42,8 @@ def load_vector(
     if "initial_stress" in acts:
         points = body_points(space)
         x = position(space, points.cell, points.bary)
-        _subtract_stress(f, space, points, load.initial_stress(x, material))
+        sigma = elasticity.initial_stress(load, x, points.cell, points.bary)
+        _subtract_stress(f, space, points, sigma)
     if "face_pressure" in acts:
         for c, on_lip in enumerate(lips):
             p = load.face_pressure(on_lip.x, c)

@@ -68,11 +68,11 @@ def build(problem: Problem, bulk_: Bulk | None = None) -> System:
         bulk_ is None
         or bulk_.mesh is not mesh
         or bulk_.order != order
-        or bulk_.material != problem.material
+        or bulk_.elasticity.material != problem.material
     ):
-        bulk_ = bulk(mesh, problem.material, order)
+        bulk_ = bulk(problem.elasticity, order)
     enriched, n_points, reusable = enriched_stiffness(
-        space, problem.material, problem.numerics, lips, bulk_.cells
+        space, problem.elasticity, problem.numerics, lips, bulk_.cells
     )
     return System(
         space,

@@ -53,7 +53,7 @@ def alarms_of_step(run: GrowthRule, step: Step) -> list[Alarm]:
 
 def validity_of(run: GrowthRule, step: Step) -> Validity | None:
     """Plastic zones, toughness and net sections of a step; None where nothing is known of these."""
-    material, K_c = run.problem.material, run.toughness
+    material, K_c = run.problem.elasticity.material, run.toughness
     if material.yield_stress is None and K_c is None:
         return None
     mesh, solutions = run.problem.mesh, _solutions(run, step)
@@ -158,7 +158,7 @@ def _no_growth(run: GrowthRule, step: Step, units: str) -> list[Alarm]:
     solutions = _solutions(run, step)
     if not solutions or isinstance(run.cycle, Spectrum):
         return []
-    mesh, E_prime = run.problem.mesh, run.problem.material.at_tip().E_prime
+    mesh, E_prime = run.problem.mesh, run.problem.elasticity.largest_modulus
     energy = max(solution.energy for solution in solutions)
     stress = np.sqrt(2 * max(energy, 0.0) * E_prime / mesh.volume.sum())
     length = float(np.ptp(mesh.points, axis=0).max())

@@ -93,7 +93,7 @@ def _without_places(sif: SIF) -> SIF:
             "x", "frame", "K", "T", "spread", "s", "front", "at_surface", "closed", "domain_cells"
         )
     }  # fmt: skip
-    return replace(sif, **rows, errors=None, ends=(), widened=None)
+    return replace(sif, **rows, errors=None, ends=(), widened=None, E_prime=None, nu=None)
 
 
 __all__ = ["arrivals_of", "last_step"]

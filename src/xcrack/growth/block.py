@@ -51,7 +51,7 @@ def pairs_of(run: GrowthRule, problem: Problem, response: Response) -> list[Rang
     if spectrum.states is not None:
         n = range(len(response.sif[0]))
         every = [np.stack([state[c].K for state in response.sif]) for c in n]
-        return [pairs_of_states(K, spectrum, problem.material.at_tip().nu) for K in every]
+        return [pairs_of_states(K, spectrum, problem.elasticity.poisson) for K in every]
     values, count, _ = distinct(spectrum.cycles)
     result = []
     for ladder in ladders(problem, spectrum, response):
@@ -156,7 +156,7 @@ def left_out_share(run: GrowthRule, problem: Problem, response: Response) -> flo
     if not len(omitted) or spectrum.least_range == 0:
         return 0.0
     values, count, _ = distinct(omitted)
-    nu, worst = problem.material.at_tip().nu, 0.0
+    nu, worst = problem.elasticity.poisson, 0.0
     every = pairs_of(run, problem, response)
     for c, ladder in enumerate(ladders(problem, spectrum, response)):
         K = np.stack([ladder.at(values[:, 0]), ladder.at(values[:, 1])])

@@ -97,7 +97,7 @@ def yielded(run: GrowthRule, step: Step) -> str:
 
 def _zones(link_up: Callable[..., Any], run: GrowthRule, step: Step, c: int) -> Floats:
     K = clipped_K(np.stack([state[c].K for state in step.sif]))
-    K_eq = equivalent_K(K, step.angle[c], run.problem.material.at_tip().nu).max(axis=0, initial=0.0)
+    K_eq = equivalent_K(K, step.angle[c], run.problem.elasticity.poisson).max(axis=0, initial=0.0)
     zone = call_function(link_up, f"link_up at step {step.index}", K_eq)
     return numbers(zone, "what link_up returned", K_eq.shape)
 
@@ -123,7 +123,7 @@ def end_at(run: GrowthRule, step: Step) -> str:
     if K_c is not None:
         for c in range(len(step.cracks)):
             K = clipped_K(np.stack([state[c].K for state in step.sif]))
-            K_eq = equivalent_K(K, step.angle[c], run.problem.material.at_tip().nu).max(axis=0)
+            K_eq = equivalent_K(K, step.angle[c], run.problem.elasticity.poisson).max(axis=0)
             for j in np.nonzero(K_eq >= K_c)[0].tolist():
                 place = place_name(run.problem.mesh, step, c, j)
                 return f"K_c reached: K_eq = {K_eq[j]:.6g} >= {K_c:.6g} at {place}"

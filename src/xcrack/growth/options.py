@@ -198,7 +198,7 @@ class GrowthRule:
         """Toughness at which the run ends: its own, or that of the material; a scout has none."""
         if self.scouts or self.K_c is not None:
             return self.K_c
-        return self.problem.material.K_c
+        return self.problem.elasticity.material.K_c
 
     def _check_tolerance(self) -> None:
         if self.tolerance is None:

@@ -59,7 +59,7 @@ def stop_locked_faces(
     rubs = [c for c in range(len(dK_eq)) if _rubs(solutions[0], c)]
     if not rubs:
         return dK_eq, rate
-    nu, largest = problem.material.at_tip().nu, 0.0
+    nu, largest = problem.elasticity.poisson, 0.0
     for c in range(len(dK_eq)):
         K = clipped_K(np.stack([state[c].K for state in sif]))
         largest = max(largest, float(equivalent_K(K, kink_angle(K), nu).max(initial=0.0)))
@@ -181,7 +181,7 @@ def asked_of(
 def _asked_of_cycle(
     run: GrowthRule, problem: Problem, response: Response, free: Response | None
 ) -> list[Asked]:
-    place, nu = following(problem.mesh).PLACE, problem.material.at_tip().nu
+    place, nu = following(problem.mesh).PLACE, problem.elasticity.poisson
 
     def one(c: int) -> Asked:
         given = np.stack([state[c].K for state in response.sif])
@@ -204,7 +204,7 @@ def _asked_of_cycle(
 def _asked_of_blocks(
     run: GrowthRule, problem: Problem, response: Response, free: Response | None
 ) -> list[Asked]:
-    place, nu = following(problem.mesh).PLACE, problem.material.at_tip().nu
+    place, nu = following(problem.mesh).PLACE, problem.elasticity.poisson
     every = pairs_of(run, problem, response)
     nominal = [None] * len(every) if free is None else pairs_of(run, problem, free)
 
@@ -409,7 +409,7 @@ def block_order(run: GrowthRule) -> Ints:
 def kinds_of(run: GrowthRule, seen: Evaluation) -> list[BlockCycles]:
     """Range and ratio of each kind of cycle, one `BlockCycles` of a single solve a crack."""
     problem = seen.problem
-    place, nu = following(problem.mesh).PLACE, problem.material.at_tip().nu
+    place, nu = following(problem.mesh).PLACE, problem.elasticity.poisson
     result = []
     for c, pairs in enumerate(pairs_of(run, problem, seen.response)):
         a = crack_size(problem, c, pairs.K.shape[2])

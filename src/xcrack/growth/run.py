@@ -330,7 +330,7 @@ def _warn_of_mode_III(run: GrowthRule, step: Step) -> bool:
     """
     if run.problem.mesh.dim == 2:
         return False
-    nu = run.problem.material.at_tip().nu
+    nu = run.problem.elasticity.poisson
     growth = 3 * (2 - nu) - 4 * sqrt(2) * (1 - 2 * nu)
     limit = sqrt((1 - nu) * (2 - 3 * nu) / growth) if growth > 0 else inf
     for c, states in enumerate(zip(*step.sif, strict=True)):

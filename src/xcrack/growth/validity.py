@@ -15,6 +15,7 @@ from xcrack.crack.measures import length_inside
 from xcrack.fatigue.criteria import clipped_K, equivalent_K, kink_angle
 from xcrack.growth.follow_2d import exit_ahead
 from xcrack.mesh.mesh import Mesh
+from xcrack.model.elasticity import elasticity
 from xcrack.model.material import Material
 from xcrack.sif.sif import SIF
 
@@ -171,12 +172,13 @@ def validity(
             worst[key], places[key] = value, place
 
     yield_stress, state = material.yield_stress, "stress"
+    nu = elasticity(mesh, material).poisson
     thickness = float(np.ptp(mesh.points, axis=0).min())  # of a body in space, at least
     for c, crack in enumerate(cracks):
         K = clipped_K(np.stack([row[c].K for row in sif])) if sif else np.zeros((0, 0, 2))
         if not K.size:
             continue
-        largest, angle = _largest(K, material)
+        largest, angle = _largest(K, nu)
         places_of_crack = sif[0][c]
         ahead = _directions(places_of_crack, angle)
         size = _size(crack, mesh)
@@ -213,10 +215,10 @@ def validity(
     return Validity(**numbers, state=state, places=places)
 
 
-def _largest(K: Floats, material: Material) -> tuple[Floats, Floats]:
+def _largest(K: Floats, nu: float) -> tuple[Floats, Floats]:
     """Largest equivalent factor of the states `(f,)`, and the direction in that state."""
     angle = kink_angle(K)
-    equivalent = equivalent_K(K, angle, material.at_tip().nu)
+    equivalent = equivalent_K(K, angle, nu)
     row = equivalent.argmax(axis=0)
     column = np.arange(K.shape[1])
     return equivalent[row, column], angle[row, column]

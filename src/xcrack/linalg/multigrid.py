@@ -439,7 +439,7 @@ def _over_linear(
 ) -> tuple[tuple[GridLevel, ...], Floats]:
     """Quadratic functions over the levels of the linear ones, which they contain."""
     mesh, d = bulk_.mesh, bulk_.mesh.dim
-    lower = hierarchy(bulk(mesh, bulk_.material, 1), fixed)
+    lower = hierarchy(bulk(bulk_.elasticity, 1), fixed)
     half = 0.5 * stars(mesh, 2)
     half.setdiag(1.0)
     P = sp.kron(half.T.tocsr(), sp.identity(d))

@@ -272,9 +272,9 @@ def unused_sets(cell_sets: Mapping[str, Ints], n_cells: int) -> list[str]:
         return []
     names = ", ".join(repr(name) for name in parts[:5]) + (" ..." if len(parts) > 5 else "")
     return [
-        f"the mesh has {len(parts)} cell sets that each cover a part of the body ({names}): "
-        "xcrack takes the whole body to be of one material and uses no cell sets. If they stand "
-        "for different materials, the result is not that of your part."
+        f"the mesh has {len(parts)} cell sets that each cover a part of the body ({names}), and "
+        "the whole body is given one material. If they stand for different ones, give them by "
+        f"name: Problem(mesh, {{{parts[0]!r}: ..., ...}})."
     ]
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from xcrack.base.arrays import Floats, Ints, frozen_copy, lock, row_stretches
-from xcrack.base.checks import value_text, whole_numbers
+from xcrack.base.checks import call_function, value_text, whole_numbers
 from xcrack.base.errors import MeshError, ProblemError, warn
 from xcrack.mesh.checks import checked_cells, checked_sets, mesh_doubts, unused_sets
 from xcrack.mesh.curves import Curves, check_on_curves, checked_curves
@@ -25,8 +25,8 @@ class Mesh:
     """Simplices with sets by name; it never changes, whatever the crack does.
 
     Cells of negative orientation are turned. The facet set ``"boundary"`` always exists: all
-    facets that belong to one cell only. A warning names doubled and hanging points, cells that
-    overlap, and cell sets that divide the body, since nothing uses them.
+    facets that belong to one cell only. A warning names doubled and hanging points, and cells that
+    overlap.
 
     Parameters
     ----------
@@ -72,8 +72,7 @@ class Mesh:
         owner = self.facet_to_cell[facet, 0]
         for message in mesh_doubts(self.points, self.cells, self.facets[facet], owner):
             warn(message)
-        for message in unused_sets(self.cell_sets, len(self.cells)):
-            warn(message)
+        object.__setattr__(self, "_is_new", True)
 
     def _complete(self) -> None:
         """Check what was given, and put read-only arrays in its place."""
@@ -101,6 +100,8 @@ class Mesh:
 
     def __repr__(self) -> str:
         names = ", ".join(self.facet_sets)
+        if self.cell_sets:
+            names += f", cell sets: {', '.join(self.cell_sets)}"
         cells = f"{len(self.cells)} {_CELLS[self.dim]}"
         return f"Mesh({self.n_points} points, {cells}, facet sets: {names})"
 
@@ -300,6 +301,51 @@ class Mesh:
         facets = whole_numbers(facets, "facet_numbers: facets", (None, self.dim), error=MeshError)
         return numbers_of(self, facets)
 
+    def with_cell_sets(self, cell_sets: Mapping[str, Any]) -> "Mesh":
+        """The mesh with other cell sets, in place of those that it has.
+
+        Parameters
+        ----------
+        cell_sets : mapping of str to (k,) array of int, or callable
+            Cell numbers of each set, or f(x) -> (m,) bool of the centroids of all cells (m, d).
+
+        Returns
+        -------
+        Mesh
+
+        Raises
+        ------
+        MeshError
+            No mapping of names, cells that there are not, or a function that returns something
+            else than a flag for each cell.
+
+        Examples
+        --------
+        >>> mesh = Mesh([(0, 0), (1, 0), (0, 1), (1, 1)], [(0, 1, 2), (1, 3, 2)])
+        >>> mesh.with_cell_sets({"low": lambda x: x[:, 1] < 0.5}).cell_sets["low"].tolist()
+        [0]
+        """
+        if not isinstance(cell_sets, Mapping):
+            raise MeshError(
+                f"with_cell_sets: {value_text(cell_sets)}: give a mapping of names to cell numbers."
+            )
+        middle = self.points[self.cells].mean(axis=1)
+        sets = {}
+        for name, members in cell_sets.items():
+            if callable(members):
+                what = f"with_cell_sets: the function of {value_text(name)}"
+                flags = np.asarray(call_function(members, what, middle))
+                if flags.shape != (len(middle),) or flags.dtype != bool:
+                    raise MeshError(
+                        f"{what} returned {flags.dtype} of shape {flags.shape}: return True or "
+                        f"False for each of the {len(middle)} cells, as x[:, 0] < 1.0 does."
+                    )
+                members = np.nonzero(flags)[0]
+            sets[name] = members
+        named = {name: f for name, f in self.facet_sets.items() if name != "boundary"}
+        sets = checked_sets({}, sets, self.n_points, len(self.cells), self.dim)[1]
+        return sound_mesh(self.points, self.cells, named, sets, self.curves)
+
     def _check_folds(self) -> None:
         """Cells on both sides of a facet must lie on different sides of it."""
         inner = np.nonzero(self.facet_to_cell[:, 1] >= 0)[0]
@@ -366,6 +412,14 @@ def sound_mesh(
         object.__setattr__(mesh, name, value)
     mesh._complete()
     return mesh
+
+
+def warn_of_sets(mesh: Mesh) -> None:
+    """Say once that cell sets of a user's mesh divide a body that is given one material."""
+    if vars(mesh).get("_is_new"):  # a mesh of a generator, or one that was refined, has no new sets
+        object.__setattr__(mesh, "_is_new", False)
+        for message in unused_sets(mesh.cell_sets, len(mesh.cells)):
+            warn(message)
 
 
 def numbers_of(mesh: Mesh, facets: Ints) -> Ints:

@@ -285,7 +285,7 @@ def read_deck(
             parts[f"load {n}"] = np.concatenate(one.elements)
     body = DeckBody(model, [one for n, one in enumerate(loads) if f"load {n}" not in parts], parts)
     scene = _Scene(body, state)
-    material = body.material(state.temperature)
+    material = body.material(state.temperature, state.initial_temperature)
     supports, given = scene.supports(), scene.loads()
     uses = _uses(state, left_out)
     _tell_missed(path, uses)
@@ -581,13 +581,11 @@ class _Scene:
         strain = np.full(len(body.model.points), np.nan)
         alpha = 0.0
         expanding = [key for key in body.sections if len(body.materials[key].expansion)]
+        if expanding and len(body.sections) > 1:  # each material has its own
+            change = state.temperature - state.initial_temperature
+            return temperature(body.point_field(change, "temperature"))
         for key in expanding:
             one = body.materials[key]
-            if len(body.sections) > 1:
-                raise ProblemError(
-                    f"{one.place}: *MATERIAL {one.name!r}: expansion of several materials is not "
-                    "read: give problem(loads=[temperature(...)])."
-                )
             alpha = float(one.expansion[0, 0])
             rows = body.nodes_of_material(key)
             strain[rows] = one.strain(state.temperature[rows], state.initial_temperature[rows])

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from xcrack.base.arrays import Floats, Ints, lock
-from xcrack.base.errors import MeshError, ProblemError
+from xcrack.base.errors import MeshError, ProblemError, warn
 from xcrack.mesh.abaqus import MESH_KEYWORDS, AbaqusModel
 from xcrack.mesh.fields import CellField, Field
 from xcrack.mesh.files import with_stored_curves
@@ -17,12 +17,16 @@ from xcrack.mesh.linear import linear_mesh
 from xcrack.mesh.mesh import Mesh, nearest_nodes, numbers_of, sound_mesh
 from xcrack.mesh.raw import RawMesh, mesh_parts, with_curved_edges
 from xcrack.model.deck_state import SpreadLoad
-from xcrack.model.material import Isotropic, Material
+from xcrack.model.material import Graded, Isotropic, Material
 
 _PROPERTIES = ("ELASTIC", "EXPANSION", "DENSITY", "PLASTIC")
 _EQUAL = 1e-9  # relative: values this close are one
 # Edges of a cell in the order of Field, by the ends.
 _EDGES = {2: ((0, 1), (1, 2), (2, 0)), 3: ((0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3))}
+
+
+def _zero(x: Floats) -> Floats:
+    return np.zeros(len(x))
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,26 +58,71 @@ class DeckMaterial:
         parts = [np.interp(t, at, alpha) * (t - self.zero) for t in (T, T_0)]
         return np.asarray(parts[0] - parts[1])
 
-    def isotropic(self, plane: str | None, T: Floats) -> Material:
-        """Elastic constants at the temperature of its elements.
+    def elastic_at(self, plane: str | None, T: Floats, field: Any, alpha: Any) -> Material:
+        """Elastic constants at the temperatures of its elements.
+
+        Parameters
+        ----------
+        plane : str or None
+        T : (k,) array
+            Temperatures of its nodes.
+        field : callable
+            Temperature at points.
+        alpha : float, callable or None
+            Coefficient of expansion.
 
         Raises
         ------
         ProblemError
-            It has none, or they depend on a temperature that is not one.
+            It has none.
         """
         if not len(self.elastic):
             raise ProblemError(
                 f"{self.place}: *MATERIAL {self.name!r} has no *ELASTIC: give E and nu."
             )
-        if len(self.elastic) > 1 and np.ptp(T) > _EQUAL * max(float(np.abs(T).max()), 1.0):
-            raise ProblemError(
-                f"{self.place}: *MATERIAL {self.name!r} depends on the temperature, which goes "
-                f"from {T.min():g} to {T.max():g} over the body: give problem(material=...)."
+        E, nu, at = self.elastic[np.argsort(self.elastic[:, 2])].T
+        varies = np.ptp(T) > _EQUAL * max(float(np.abs(T).max()), 1.0)
+        if not callable(alpha) and not (len(self.elastic) > 1 and varies):
+            E_of_body, nu_of_body = (float(np.interp(T[0], at, v)) for v in (E, nu))
+            return Isotropic(E_of_body, nu_of_body, plane, self.yield_stress, alpha=alpha)
+        low, high = np.interp([T.min(), T.max()], at, nu)
+        if abs(high - low) > _EQUAL:
+            warn(
+                f"{self.place}: Poisson's ratio of *MATERIAL {self.name!r} goes from {low:g} to "
+                f"{high:g} with the temperature of the body: it is taken as {(low + high) / 2:g}."
             )
-        table = self.elastic[np.argsort(self.elastic[:, 2])]
-        E, nu = (float(np.interp(T[0], table[:, 2], table[:, k])) for k in (0, 1))
-        return Isotropic(E, nu, plane, self.yield_stress)
+        modulus = OfTemperature(field, tuple(at.tolist()), tuple(E.tolist()))
+        return Graded(modulus, float((low + high) / 2), plane, self.yield_stress, alpha=alpha)
+
+
+@dataclass(frozen=True)
+class OfTemperature:
+    """A table over the temperature, with the temperature of the place."""
+
+    field: Any
+    temperatures: tuple[float, ...]
+    values: tuple[float, ...]
+
+    def __call__(self, x: Floats) -> Floats:
+        """Values at points `(q,)`; beyond its ends that of the end."""
+        return np.asarray(np.interp(self.field(x), self.temperatures, self.values))
+
+
+@dataclass(frozen=True)
+class MeanExpansion:
+    """Mean coefficient of expansion between two temperatures of the place, from a secant table."""
+
+    field: Any
+    initial_field: Any
+    material: DeckMaterial
+
+    def __call__(self, x: Floats) -> Floats:
+        """At points `(q,)`."""
+        T, T_0 = self.field(x), self.initial_field(x)
+        change = T - T_0
+        small = np.abs(change) <= _EQUAL * np.maximum(np.abs(T), 1.0)
+        T = np.where(small, T_0 + 1e-3, T)
+        return np.asarray(self.material.strain(T, T_0) / np.where(small, 1e-3, change))
 
 
 class DeckBody:
@@ -181,15 +230,27 @@ class DeckBody:
             return {name: every for name in self.materials}
         return sections
 
-    def material(self, T: Floats) -> Material | dict[str, Material] | None:
-        """The material at temperatures of the nodes, or several by name."""
-        by_name = {
-            self.materials[key].name: self.materials[key].isotropic(
-                self.plane, T[self.nodes_of_material(key)]
-            )
-            for key in self.sections
-        }
+    def material(self, T: Floats, T_0: Floats) -> Material | dict[str, Material] | None:
+        """The material at temperatures of the nodes, or several by name.
+
+        Those of a body of several have an expansion, of the temperatures T_0 to T.
+        """
+        field = self.function_of(T, "temperature")
+        by_name: dict[str, Material] = {}
+        for key in self.sections:
+            one, rows = self.materials[key], self.nodes_of_material(key)
+            alpha: Any = None
+            if len(self.sections) > 1 and not np.array_equal(T, T_0):
+                alpha = one.expansion[0, 0] if len(one.expansion) else 0.0
+                if len(one.expansion) > 1:
+                    alpha = MeanExpansion(field, self.function_of(T_0, "temperature"), one)
+            by_name[one.name] = one.elastic_at(self.plane, T[rows], field, alpha)
         return by_name if len(set(by_name.values())) > 1 else next(iter(by_name.values()), None)
+
+    def function_of(self, values: Floats, name: str) -> Any:
+        """`point_field`, a function also where the value is one."""
+        made = self.point_field(values, name)
+        return made if callable(made) else OfTemperature(_zero, (0.0,), (made,))
 
     def nodes_of_material(self, key: str) -> Ints:
         """Nodes of the elements of a material."""

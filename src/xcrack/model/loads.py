@@ -656,13 +656,14 @@ class temperature(Load):  # noqa: N801
     ----------
     field : float or callable, temperature
         Change dT as a number or f(x) -> (n,), such as `read_field` returns.
-    alpha : float, 1 / temperature
-        Coefficient of thermal expansion.
+    alpha : float, 1 / temperature, optional
+        Coefficient of thermal expansion; that of the material where it is left out.
 
     Raises
     ------
     ProblemError
-        Numbers that are not finite.
+        Numbers that are not finite; a material without alpha; an alpha beside materials by set,
+        which have one each.
 
     Examples
     --------
@@ -671,15 +672,29 @@ class temperature(Load):  # noqa: N801
     """
 
     field: Annotated[float | Callable[..., ArrayLike], ScalarField(unit=TEMPERATURE)]
-    alpha: Annotated[float, Number(unit=PER_TEMPERATURE)]
+    alpha: Annotated[float | None, Number(unit=PER_TEMPERATURE)] = None
     acts = frozenset({"initial_stress"})
     is_steady = True
     adds_up = True
     is_listed = False
 
+    def check(self, problem: Any) -> None:
+        """Raise where a material has no alpha, or where there are several beside one alpha."""
+        super().check(problem)
+        named = problem.elasticity.named
+        if self.alpha is None:
+            for _, material in named:
+                material.expansion(problem.mesh.points[:1])
+        elif len(named) > 1:
+            raise ProblemError(
+                f"temperature(alpha={self.alpha:g}): the body has several materials: leave alpha "
+                "out, and give each its own, Isotropic(..., alpha=...)."
+            )
+
     def initial_stress(self, x: Floats, material: Material) -> Floats:
         """What the body would bear if it could not expand."""
-        return material.thermal_stress(scalar_at(self.field, x, self.kind), self.alpha, x.shape[1])
+        alpha = material.expansion(x) if self.alpha is None else self.alpha
+        return material.thermal_stress(scalar_at(self.field, x, self.kind), alpha, x.shape[1])
 
 
 def _is_same_place(a: Any, b: Any) -> bool:

@@ -1,15 +1,18 @@
 """What a body is made of: linear elastic materials."""
 
-from dataclasses import dataclass, field, fields
-from typing import Annotated
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field, fields, replace
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from xcrack.base.arguments import Choice, Declared, Number
-from xcrack.base.arrays import Floats
+from xcrack.base.arguments import Choice, Declared, Function, Number
+from xcrack.base.arrays import Floats, Ints, at
 from xcrack.base.checks import numbers, value_text
 from xcrack.base.errors import ProblemError
-from xcrack.base.units import STRESS, TOUGHNESS
+from xcrack.base.units import PER_TEMPERATURE, STRESS, TOUGHNESS
+from xcrack.model.values import ScalarField, scalar_at
 
 _VOIGT = np.array([[0, 5, 4], [5, 1, 3], [4, 3, 2]])  # rows of stiffness by component
 _ROUND_OFF = 1e-12  # of the largest entry of a stiffness
@@ -25,7 +28,7 @@ _JUDGES = {"changes_results": False}  # what results are judged by, not what the
 
 
 class Material(Declared):
-    """What a body is made of: linear elastic, and the same everywhere.
+    """What a body, or a part of it, is made of: linear elastic, and the same everywhere.
 
     One of your own is a frozen dataclass that derives from it, with the method `stiffness` and, for
     2D bodies, the field `plane`; the rest follows from these two. Where it is isotropic (in 2D: in
@@ -40,16 +43,60 @@ class Material(Declared):
         What plastic zones and stresses are judged by; where it is None they are not.
     K_c : float, stress √length, or None
         Toughness at which growth ends.
+    alpha : float, 1 / temperature, or None
+        Coefficient of thermal expansion, alike in all directions.
+    is_graded : bool
+        Whether its stiffness changes from point to point: that of `unit` times `moduli`.
     """
 
     plane: str | None = None
     yield_stress: float | None = None
     K_c: float | None = None
+    alpha: Any = None
+    is_graded: ClassVar[bool] = False
 
     @property
     def kind(self) -> str:
         """What messages call it."""
         return type(self).__name__
+
+    @property
+    def unit(self) -> "Material":
+        """The material itself; of a graded one that with the modulus one."""
+        return self
+
+    @property
+    def modulus_field(self) -> Any:
+        """Of a graded one the function that its modulus is; else None."""
+        return None
+
+    @property
+    def named(self) -> "tuple[tuple[str, Material], ...]":
+        """Materials by the names of their cell sets; one for the whole body has no name."""
+        return (("", self),)
+
+    def stored(self, moduli: Floats) -> "Material":
+        """The material for a file: of a graded one its moduli at the nodes of the mesh `(n,)`."""
+        return self
+
+    def with_yield_stress(self, yield_stress: float) -> "Material":
+        """The material, judged by another yield stress."""
+        return replace(self.at_tip(), yield_stress=yield_stress, K_c=self.K_c)
+
+    def expansion(self, x: Floats) -> Any:
+        """Coefficient of thermal expansion at points `(q, d)`: a number, or `(q,)`.
+
+        Raises
+        ------
+        ProblemError
+            It has none.
+        """
+        if self.alpha is None:
+            raise ProblemError(
+                f"temperature: {self!r} has no alpha: give {self.kind}(..., alpha=...), the "
+                "coefficient of thermal expansion."
+            )
+        return self.alpha
 
     def stiffness(self) -> Floats:
         """Stress xx, yy, zz, yz, xz, xy of strains xx, yy, zz and shear angles yz, xz, xy `(6, 6)`.
@@ -141,10 +188,13 @@ class Material(Declared):
         C_zz_row = self._plane_stiffness()[2, _VOIGT[:2, :2]]
         return np.asarray(np.einsum("kl,...kl->...", C_zz_row, self.strain(stress)))
 
-    def thermal_stress(self, change: Floats, alpha: float, dim: int) -> Floats:
-        """Stress `(n, dim, dim)` of a change of temperature `(n,)` that cannot expand."""
+    def thermal_stress(self, change: Floats, alpha: Any, dim: int) -> Floats:
+        """Stress `(n, dim, dim)` of a change of temperature `(n,)` that cannot expand.
+
+        Alpha is a number, or one at each point `(n,)`.
+        """
         stiff = -self._plane_stiffness()[:, :3].sum(axis=1)[_VOIGT[:dim, :dim]]
-        return np.asarray(alpha * change[:, None, None] * stiff)
+        return np.asarray(_by_point(alpha) * change[:, None, None] * stiff)
 
     def constraint(self, thickness: float, square: float) -> str:
         """Whether a plastic zone is that of plane "strain" or of plane "stress".
@@ -216,6 +266,10 @@ def isotropic_part(tensor: Floats) -> tuple[float, float, Floats | None]:
     return lam, mu, None
 
 
+_NU = Number(above=-1, below=0.5, hint="a nearly incompressible material has such as 0.4999")
+_PLANE = Choice(_PLANES, needs='"strain" or "stress" in 2D, nothing in 3D')
+
+
 @dataclass(frozen=True)
 class Isotropic(Material):
     """Isotropic linear elastic material; nothing has a default but the plane of a 3D body.
@@ -232,12 +286,14 @@ class Isotropic(Material):
         Lets plastic zones be compared with crack and ligament, and stresses with it: see `check`.
     K_c : float, stress √length, optional
         Toughness: growth ends where K reaches it, unless `grow` is given another one.
+    alpha : float, 1 / temperature, optional
+        Coefficient of thermal expansion, for loads such as `temperature(dT)`.
 
     Raises
     ------
     ProblemError
-        E <= 0, nu outside (-1, 0.5), another word for `plane`, or a yield stress or toughness that
-        is not above 0.
+        E <= 0, nu outside (-1, 0.5), another word for `plane`, a yield stress or toughness that
+        is not above 0, or an alpha that is no number.
 
     Examples
     --------
@@ -246,24 +302,18 @@ class Isotropic(Material):
     """
 
     E: Annotated[float, Number(above=0, unit=STRESS)]
-    nu: Annotated[
-        float,
-        Number(above=-1, below=0.5, hint="a nearly incompressible material has such as 0.4999"),
-    ]
-    plane: Annotated[
-        str | None, Choice(_PLANES, needs='"strain" or "stress" in 2D, nothing in 3D')
-    ] = None
+    nu: Annotated[float, _NU]
+    plane: Annotated[str | None, _PLANE] = None
     yield_stress: Annotated[float | None, Number(above=0, unit=STRESS)] = field(
         default=None, metadata=_JUDGES
     )
     K_c: Annotated[float | None, Number(above=0, unit=TOUGHNESS)] = field(
         default=None, metadata=_JUDGES
     )
+    alpha: Annotated[float | None, Number(unit=PER_TEMPERATURE)] = None
 
     def __repr__(self) -> str:
-        given = {f.name: getattr(self, f.name) for f in fields(self)}
-        parts = [f"{name}={value!r}" for name, value in given.items() if value is not None]
-        return f"Isotropic({', '.join(parts)})"
+        return _text(self)
 
     def stiffness(self) -> Floats:
         """Stiffness in space `(6, 6)`, stress."""
@@ -314,10 +364,10 @@ class Isotropic(Material):
         nu = self.nu if self.plane == "strain" else 0.0
         return np.asarray(nu * np.trace(stress, axis1=-2, axis2=-1))
 
-    def thermal_stress(self, change: Floats, alpha: float, dim: int) -> Floats:
+    def thermal_stress(self, change: Floats, alpha: Any, dim: int) -> Floats:
         """Stress `(n, dim, dim)` of a change of temperature `(n,)` that cannot expand."""
         stiff = -self.E / (1 - self.nu if self.plane == "stress" else 1 - 2 * self.nu)
-        return np.asarray(alpha * stiff * change[:, None, None] * np.eye(dim))
+        return np.asarray(_by_point(alpha) * stiff * change[:, None, None] * np.eye(dim))
 
     def stress(self, gradient: Floats) -> Floats:
         """Stress `(..., d, d)` of a displacement gradient `(..., d, d)` (row: component)."""
@@ -343,3 +393,318 @@ def _tensors(value: object, what: str) -> Floats:
             f"{what} has the shape {tensors.shape}: give (..., 2, 2) or (..., 3, 3)."
         )
     return tensors
+
+
+def _by_point(value: Any) -> Any:
+    """A number, or one at each point as it multiplies tensors `(q, 1, 1)`."""
+    return value if np.ndim(value) == 0 else np.asarray(value)[:, None, None]
+
+
+def _words(value: Any) -> str:
+    """A value, or the name of a function."""
+    if not callable(value):
+        return repr(value)
+    return str(getattr(value, "__name__", getattr(value, "name", type(value).__name__)))
+
+
+def _text(material: Any) -> str:
+    """What was given to make it."""
+    given = {f.name: getattr(material, f.name) for f in fields(material)}
+    parts = [f"{name}={_words(value)}" for name, value in given.items() if value is not None]
+    return f"{material.kind}({', '.join(parts)})"
+
+
+@dataclass(frozen=True, eq=False)
+class StoredFunction:
+    """A function of a graded material in a file: its values at the nodes of the mesh.
+
+    Attributes
+    ----------
+    name : str
+        Of the function that it was.
+    values : (n,) array
+        At the points of the mesh, then at the middles of its edges; nan where they are not known.
+    """
+
+    name: str
+    values: Floats
+
+    def __call__(self, x: Floats) -> Floats:
+        """Refuse points that are no nodes."""
+        raise ProblemError(
+            f"the function {self.name} of a graded material was stored with its solution for the "
+            "mesh of that alone: make the problem again by the script that made it."
+        )
+
+
+def at_nodes(modulus: Any, nodes: Ints) -> Any:
+    """A modulus as a function of nodes, in their order: a stored one knows no other points."""
+    stored = isinstance(modulus, StoredFunction) and nodes.max(initial=0) < len(modulus.values)
+    values = modulus.values[nodes] if stored else None
+    if values is None or not np.isfinite(values).all():
+        return modulus
+    return lambda x: values
+
+
+@dataclass(frozen=True)
+class Graded(Material):
+    """Isotropic material whose Young's modulus changes from point to point.
+
+    As in a graded coating, or in a hot part with E(T(x)). E is taken as linear in each cell
+    between its values at the corners.
+
+    Parameters
+    ----------
+    E : callable, stress
+        Young's modulus f(x) -> (n,) at points (n, d), above 0.
+    nu : float
+        Poisson's ratio.
+    plane : {"strain", "stress"}, optional
+        State of a 2D body; None in 3D.
+    yield_stress, K_c
+        As of `Isotropic`.
+    alpha : float or callable, 1 / temperature, optional
+        Coefficient of thermal expansion, a number or f(x) -> (n,).
+
+    Raises
+    ------
+    ProblemError
+        E is not a function; else as of `Isotropic`. A problem refuses values of E that are not
+        above 0, not finite, or of another shape.
+
+    Examples
+    --------
+    >>> coated = Graded(E=lambda x: 210e3 - 1e3 * x[:, 1], nu=0.3, plane="strain")
+    >>> coated.moduli(np.array([(0.0, 10.0)]))
+    array([200000.])
+    """
+
+    E: Annotated[
+        Callable[[Floats], ArrayLike],
+        Function("a function f(x) of points; one number is that of Isotropic"),
+    ]
+    nu: Annotated[float, _NU]
+    plane: Annotated[str | None, _PLANE] = None
+    yield_stress: Annotated[float | None, Number(above=0, unit=STRESS)] = field(
+        default=None, metadata=_JUDGES
+    )
+    K_c: Annotated[float | None, Number(above=0, unit=TOUGHNESS)] = field(
+        default=None, metadata=_JUDGES
+    )
+    alpha: Annotated[
+        float | Callable[[Floats], ArrayLike] | None, ScalarField(unit=PER_TEMPERATURE)
+    ] = None
+    is_graded = True
+
+    def __repr__(self) -> str:
+        return _text(self)
+
+    @property
+    def unit(self) -> Isotropic:
+        """The material whose Young's modulus is one."""
+        return Isotropic(1.0, self.nu, self.plane)
+
+    @property
+    def modulus_field(self) -> Any:
+        """The function that Young's modulus is."""
+        return self.E
+
+    def stored(self, moduli: Floats) -> "Graded":
+        """The material for a file, with its moduli at the nodes of the mesh `(n,)`."""
+        alpha: Any = self.alpha
+        if callable(alpha):
+            alpha = StoredFunction(_words(alpha), np.zeros(0))
+        return replace(self, E=StoredFunction(_words(self.E), moduli), alpha=alpha)
+
+    def check(self, dim: int) -> None:
+        """Raise where the plane state does not suit a body in `dim` dimensions."""
+        self._check_plane(dim)
+        self._check_fields()
+
+    def with_yield_stress(self, yield_stress: float) -> "Graded":
+        """The material, judged by another yield stress."""
+        return replace(self, yield_stress=yield_stress)
+
+    def stiffness(self) -> Floats:
+        """Refused: it has one at each place."""
+        raise ProblemError(
+            f"{self!r} has another stiffness at each place: ask problem.elasticity at points."
+        )
+
+    def at_tip(self) -> Isotropic:
+        """Refused: it is another one at each tip."""
+        raise ProblemError(
+            f"{self!r} is another material at each tip: a SIF has the constants at its own."
+        )
+
+    def moduli(self, x: Floats, nodes: Ints | None = None) -> Floats:
+        """Young's modulus at points `(n, d)`, checked `(n,)`.
+
+        Parameters
+        ----------
+        x : (n, d) array, length
+        nodes : (n,) array of int, optional
+            Their numbers among the nodes of order 2 of the mesh: of a stored material, no function
+            but its values there are left.
+
+        Raises
+        ------
+        ProblemError
+            Another shape, values that are not finite or not above 0.
+        """
+        E = scalar_at(self.E if nodes is None else at_nodes(self.E, nodes), x, "Graded: E")
+        if len(E) and not E.min() > 0:
+            raise ProblemError(
+                f"Graded: E = {E.min():.6g} at {at(x[np.argmin(E)])} ({int((E <= 0).sum())} such "
+                "points): give values above 0 in all of the body."
+            )
+        return E
+
+    def expansion(self, x: Floats) -> Any:
+        """Coefficient of thermal expansion at points `(q, d)`."""
+        alpha = super().expansion(x)
+        return scalar_at(alpha, x, "Graded: alpha") if callable(alpha) else alpha
+
+
+class ScaledMaterial(Material):
+    """A graded material at some points: the stiffness of its unit times a factor at each.
+
+    Parameters
+    ----------
+    graded : Material
+    factor : (q,) array
+    """
+
+    def __init__(self, graded: Material, factor: Floats) -> None:
+        self.graded, self.unit_material, self.factor = graded, graded.unit, factor
+        self.plane = graded.plane
+
+    def expansion(self, x: Floats) -> Any:
+        """Coefficient of thermal expansion at the points."""
+        return self.graded.expansion(x)
+
+    def tensor(self, dim: int) -> Floats:
+        """Stiffness at the points `(q, dim, dim, dim, dim)`, stress."""
+        return np.multiply.outer(self.factor, self.unit_material.tensor(dim))
+
+    def stress(self, gradient: Floats) -> Floats:
+        """Stress `(q, d, d)` of displacement gradients at the points."""
+        return self.factor[:, None, None] * self.unit_material.stress(gradient)
+
+    def strain(self, stress: Floats) -> Floats:
+        """Strain `(q, d, d)` of stresses at the points."""
+        return self.unit_material.strain(stress) / self.factor[:, None, None]
+
+    def stress_across(self, stress: Floats) -> Floats:
+        """Stress across the plane `(q,)` of a plane body."""
+        return self.unit_material.stress_across(stress)
+
+    def thermal_stress(self, change: Floats, alpha: Any, dim: int) -> Floats:
+        """Stress `(q, dim, dim)` of a change of temperature that cannot expand."""
+        unit_stress = self.unit_material.thermal_stress(change, alpha, dim)
+        return self.factor[:, None, None] * unit_stress
+
+
+@dataclass(frozen=True)
+class MaterialSets(Material):
+    """Materials by the names of cell sets of the mesh; bonded where they meet.
+
+    ``Problem(mesh, {"plate": ..., "weld": ...})`` is short for it. Each cell of the mesh must be in
+    just one of the sets.
+
+    Parameters
+    ----------
+    materials : mapping of str to Material
+
+    Raises
+    ------
+    ProblemError
+        No mapping of names to materials. A problem refuses sets that the mesh does not have, that
+        are empty, that overlap or leave cells out, and materials of different `plane`.
+
+    Examples
+    --------
+    >>> steel, weld = Isotropic(210e3, 0.3, "strain"), Isotropic(190e3, 0.3, "strain")
+    >>> MaterialSets({"plate": steel, "weld": weld})["weld"].E
+    190000.0
+    """
+
+    materials: Any
+
+    def __post_init__(self) -> None:
+        given = self.materials
+        pairs = given.items() if isinstance(given, Mapping) else given
+        if not isinstance(given, Mapping | tuple) or not pairs:
+            raise ProblemError(
+                f"material: {value_text(given)}: give a mapping of cell sets to materials, such as "
+                '{"plate": Isotropic(...), "weld": Isotropic(...)}.'
+            )
+        for name, material in pairs:
+            if not isinstance(name, str) or not isinstance(material, Material):
+                raise ProblemError(
+                    f"material: {value_text(name)}: {value_text(material)}: give the name of a "
+                    "cell set, and a material such as Isotropic(...)."
+                )
+            if isinstance(material, MaterialSets):
+                raise ProblemError(
+                    f"material: {value_text(name)} holds materials by set itself: give one mapping."
+                )
+        object.__setattr__(self, "materials", tuple((str(n), m) for n, m in pairs))
+
+    def __getitem__(self, name: str) -> Material:
+        return dict(self.materials)[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return (name for name, _ in self.materials)
+
+    def __repr__(self) -> str:
+        return "{" + ", ".join(f"{name!r}: {material!r}" for name, material in self.materials) + "}"
+
+    @property
+    def plane(self) -> str | None:  # type: ignore[override]
+        """State of a 2D body, of all its materials."""
+        return self.materials[0][1].plane
+
+    @property
+    def named(self) -> tuple[tuple[str, Material], ...]:
+        """Materials by the names of their cell sets."""
+        return tuple(self.materials)
+
+    def with_yield_stress(self, yield_stress: float) -> "MaterialSets":
+        """All of them, judged by one yield stress."""
+        return MaterialSets({
+            name: one.with_yield_stress(yield_stress) for name, one in self.materials
+        })  # fmt: skip
+
+    def check(self, dim: int) -> None:
+        """Raise where one of them does not suit a body in `dim` dimensions.
+
+        Raises
+        ------
+        ProblemError
+            What its material says, with its name; different plane states.
+        """
+        for name, material in self.materials:
+            try:
+                material.check(dim)
+            except ProblemError as error:
+                raise ProblemError(f"material of {name!r}: {error}") from None
+        other = next((n for n, m in self.materials if m.plane != self.plane), None)
+        if other is not None:
+            raise ProblemError(
+                f'material: {self.materials[0][0]!r} is of plane "{self.plane}", and {other!r} of '
+                f'plane "{self[other].plane}": a body is in one state.'
+            )
+
+    def stiffness(self) -> Floats:
+        """Refused: each set has its own."""
+        raise ProblemError(
+            "materials by set have a stiffness each: ask problem.material[name], or "
+            "problem.elasticity at points."
+        )
+
+    def at_tip(self) -> Isotropic:
+        """Refused: each tip has its own."""
+        raise ProblemError(
+            "materials by set: a tip has that of its own set, and a SIF its constants."
+        )

@@ -1,6 +1,6 @@
 """The scene: body, cracks, supports and loads, checked before anything is built."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -16,10 +16,11 @@ from xcrack.crack.crack import Crack
 from xcrack.crack.junctions import Junction
 from xcrack.crack.placing import check_cracks, junctions, on_others, place_crack
 from xcrack.crack.stations import Stations, stations_of
-from xcrack.mesh.mesh import Mesh
+from xcrack.mesh.mesh import Mesh, warn_of_sets
+from xcrack.model.elasticity import Elasticity, elasticity
 from xcrack.model.friction import checked_friction
 from xcrack.model.loads import Load
-from xcrack.model.material import Material
+from xcrack.model.material import Material, MaterialSets
 from xcrack.model.numerics import Numerics
 from xcrack.model.reference import ReferenceK
 from xcrack.model.supports import Support
@@ -84,8 +85,8 @@ class Problem:
     Parameters
     ----------
     mesh : Mesh
-    material : Material
-        Isotropic, or one of your own.
+    material : Material, or mapping of str to Material
+        Isotropic, Graded, or one of your own; a mapping gives each cell set its own.
     cracks : sequence of Crack
     supports : sequence of fix(...) and displacement(...)
         None are needed for loads in equilibrium: rigid motion is removed.
@@ -110,7 +111,7 @@ class Problem:
     """
 
     mesh: Mesh
-    material: Material
+    material: Material | Mapping[str, Material]
     cracks: Sequence[Crack] = ()
     supports: Sequence[Support] = ()
     loads: Sequence[Load] = ()
@@ -122,19 +123,27 @@ class Problem:
     handbook: Sequence[ReferenceK] = field(default=(), metadata={"changes_results": False})
 
     def __post_init__(self) -> None:
+        if isinstance(self.material, Mapping):
+            object.__setattr__(self, "material", MaterialSets(self.material))
         for name, kind in (("mesh", Mesh), ("material", Material), ("numerics", Numerics)):
             if not isinstance(getattr(self, name), kind):
-                example_class = " such as Isotropic" if kind is Material else ""
+                example_class, remedy = "", ""
+                if kind is Material:
+                    example_class = " such as Isotropic"
+                    remedy = ": give one, or a mapping of cell sets to materials"
                 raise ProblemError(
                     f"Problem({name}=...) must be of type {kind.__name__}{example_class}, "
-                    f"not {type(getattr(self, name)).__name__}."
+                    f"not {type(getattr(self, name)).__name__}{remedy}."
                 )
         if isinstance(self.handbook, ReferenceK):
             object.__setattr__(self, "handbook", (self.handbook,))
         for name in ("cracks", "supports", "loads", "handbook"):
             given = getattr(self, name)
             object.__setattr__(self, name, entries(given, f"Problem: {name}"))
-        self.material.check(self.mesh.dim)
+        material: Any = self.material
+        material.check(self.mesh.dim)
+        if not len(self.elasticity.set_number):
+            warn_of_sets(self.mesh)
         order = 1 if self.order is None else self.order
         if type(order) is bool or not isinstance(order, Real) or order not in (1, 2):
             raise ProblemError(f"order = {value_text(self.order)}: give 1 or 2.")
@@ -149,6 +158,12 @@ class Problem:
             object.__setattr__(self, "order", order_left_out(self))
         with suppress(CoarseMeshError):  # `adapt` refines such a mesh; all else asks for `placed`
             _ = self.placed
+
+    @cached_property
+    def elasticity(self) -> Elasticity:
+        """What each cell is made of."""
+        given: Any = self.material  # a mapping has become MaterialSets
+        return elasticity(self.mesh, given)
 
     @cached_property
     def placed(self) -> tuple[Crack, ...]:

@@ -43,7 +43,7 @@ def energy_error(solution: Solution, stress: Callable[[Floats], Floats]) -> floa
             f"energy_error: stress = {value_text(stress)} cannot be called: give a function f(x) "
             f"of points (n, d) that returns (n, d, d)."
         )
-    space, material = solution.space, solution.problem.material
+    space, elasticity = solution.space, solution.problem.elasticity
     error = total = 0.0
     for first in range(0, len(space.mesh.cells), _CHUNK):
         cells = np.arange(first, min(first + _CHUNK, len(space.mesh.cells)))
@@ -52,8 +52,9 @@ def energy_error(solution: Solution, stress: Callable[[Floats], Floats]) -> floa
         result = call_function(stress, "the exact stress of energy_error", x)
         exact = numbers(result, "energy_error: the stress at points (n, d)", (*x.shape, x.shape[1]))
         difference = exact - solution.stress_at(points.cell, points.bary, points.side)
-        error += _energy(material.strain(difference), difference, points.weight)
-        total += _energy(material.strain(exact), exact, points.weight)
+        where = points.cell, points.bary
+        error += _energy(elasticity.strain(difference, *where), difference, points.weight)
+        total += _energy(elasticity.strain(exact, *where), exact, points.weight)
     if not total > 0:
         raise ProblemError(
             "energy_error: the exact stress is zero everywhere, so there is no relative error."

@@ -1,7 +1,8 @@
 """A solution as it is seen: pieces of the body that show every jump, and the faces of its cracks.
 
 Plain cells share their points, cells with enriched functions are replaced by their sub-cells, and
-points on a crack exist twice, once for each lip. Files and pictures are made of these.
+points on a crack exist twice, once for each lip, as do points on interfaces, once for each
+material. Files and pictures are made of these.
 """
 
 from dataclasses import dataclass
@@ -150,7 +151,7 @@ class Pieces:
     ----------
     solution : Solution
     points : (n, d) array, length
-        Twice where a crack is: once for each lip.
+        Twice where a crack is, once for each lip, and once for each material at interfaces.
     displacement : (n, d) array, length
     stress : (n, 3, 3) array, stress
         Mean of the pieces that meet at the point on the same lip, weighted by their size. At a
@@ -190,6 +191,18 @@ class Pieces:
         return lock(np.concatenate([self.plain[:, : d + 1], self.split[:, : d + 1]]))
 
     @cached_property
+    def material(self) -> Ints:
+        """Which of the named materials of the body each point has `(n,)`."""
+        set_number = self.solution.problem.elasticity.set_number
+        result = np.zeros(len(self.points), dtype=np.int64)
+        if len(set_number):
+            for block, cells in zip(
+                (self.plain, self.split), np.split(self.cell, [len(self.plain)]), strict=True
+            ):
+                result[block] = set_number[cells][:, None]
+        return lock(result)
+
+    @cached_property
     def volume(self) -> Floats:
         """Volume of all pieces `(m + s,)`, length^d."""
         return lock(_volume(self.points[self.corners]))
@@ -227,7 +240,13 @@ def pieces(solution: Solution) -> Pieces:
     x[: len(used)], u[: len(used)] = space.node_points[used], solution.coefficients[used]
     stress, center = zip(*[_stresses(solution, block) for block in blocks], strict=True)
     weight = np.concatenate([block.weight for block in blocks])
-    every = np.concatenate(point)
+    every, origin = np.concatenate(point), np.arange(n)
+    set_number = solution.problem.elasticity.set_number
+    if len(set_number):
+        owner = np.concatenate([block.where[0] for block in blocks])
+        every, origin = _apart_by_material(every, set_number[owner], n)
+        n, x, u, source = len(origin), x[origin], u[origin], source[origin]
+        number, joined = every[: number.size].reshape(number.shape), every[number.size :]
     total = np.bincount(every, weight, n)
     values = np.concatenate(stress).reshape(-1, 9)
     mean = np.stack([np.bincount(every, weight * v, n) / total for v in values.T], axis=1)
@@ -250,6 +269,17 @@ def pieces(solution: Solution) -> Pieces:
         ),
         psi=tuple(np.einsum("nb,fnb->fn", bary[source], s.psi[:, corner]) for s in levels),
     )
+
+
+def _apart_by_material(point: Ints, material: Ints, n: int) -> tuple[Ints, Ints]:
+    """Points of nodes `(q,)` of which each has one material, and the point each was `(m,)`."""
+    key, number = np.unique(point * (material.max() + 1) + material, return_inverse=True)
+    old = key // (material.max() + 1)
+    first = np.append(True, old[1:] != old[:-1])  # it keeps its number
+    new = np.where(first, old, n - 1 + np.cumsum(~first))
+    origin = np.empty(n + int((~first).sum()), dtype=np.int64)
+    origin[new] = old
+    return new[number], origin
 
 
 @dataclass(frozen=True, eq=False)
@@ -369,8 +399,8 @@ def full_stress(solution: Solution, cell: Ints, bary: Floats, side: Ints) -> Flo
     stress = np.zeros((len(cell), 3, 3))
     stress[:, :d, :d] = solution.stress_at(cell, bary, side)
     if d == 2:
-        elastic = stress[:, :d, :d] - solution.initial_stress(position(solution.space, cell, bary))
-        stress[:, 2, 2] = solution.problem.material.stress_across(elastic)
+        elastic = stress[:, :d, :d] - solution.initial_stress_at(cell, bary)
+        stress[:, 2, 2] = solution.problem.elasticity.stress_across(elastic, cell, bary)
     return stress
 
 

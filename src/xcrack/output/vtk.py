@@ -42,7 +42,9 @@ def write(
     a crack is: warp by ``displacement`` and the crack opens. Point data: ``displacement``,
     ``stress`` (mean of the cells at the point, on its own lip; xx yy zz xy yz xz), ``von_mises``,
     ``phi_<crack>`` and ``psi_<crack>_<tip>``. Cell data: ``stress_center``, ``von_mises_center``
-    (no mean), ``enriched`` (1 Heaviside, 2 tip functions, 3 both) and ``cell`` of the mesh.
+    (no mean), ``enriched`` (1 Heaviside, 2 tip functions, 3 both), ``cell`` of the mesh, and where
+    there are several ``material``, by its place among those of the problem. Points are there twice
+    where materials meet, since stresses jump.
 
     The lips of all cracks share one file, a line each with cell data ``crack``. Its point data
     are those of ``solution.contact``: ``pressure``, ``gap``, ``closed`` (0 or 1; pressure 0 and
@@ -157,6 +159,9 @@ def _write_grid(body: Pieces, path: Path) -> None:
         "enriched": body.enriched,
         "cell": body.cell,
     }
+    set_number = body.solution.problem.elasticity.set_number
+    if len(set_number):
+        at_cells["material"] = set_number[body.cell]
     _save(writer, grid, at_points, at_cells, path)
 
 

@@ -227,10 +227,10 @@ def _warn_of_validity(history: History) -> None:
         if not step.solutions:
             continue
         problem = step.solutions[0].problem
-        if problem.material.yield_stress is None:
+        if problem.elasticity.material.yield_stress is None:
             continue
         mesh = problem.mesh
-        known = validity(problem.material, mesh, step.cracks, step.sif, step.solutions)
+        known = validity(problem.elasticity.material, mesh, step.cracks, step.sif, step.solutions)
         alarms = [] if known is None else known.alarms()
         if alarms:
             share = 1 - step.cycles / history.life if history.life > 0 else 1.0

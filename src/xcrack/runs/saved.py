@@ -26,7 +26,7 @@ from xcrack.linalg.engine import SolverState
 from xcrack.mesh.curved_facets import CurvedFacets
 from xcrack.mesh.mesh import Mesh
 from xcrack.mesh.polygon import Arc
-from xcrack.model.material import Material
+from xcrack.model.material import Material, MaterialSets, StoredFunction
 from xcrack.model.numerics import Numerics
 from xcrack.model.problem import LoadLevel, LoadState, Problem
 from xcrack.model.supports import Condition
@@ -62,7 +62,7 @@ _CLASSES: dict[str, type] = {
     **{
         kind.__name__: kind
         for kind in (Problem, Mesh, Arc, CurvedFacets, Numerics, Contact, Report, Ingredient,
-                     Unstorable, LoadLevel, LoadState)
+                     Unstorable, LoadLevel, LoadState, StoredFunction)
     },
 }  # fmt: skip
 
@@ -184,10 +184,26 @@ def _storable(problem: Problem) -> Problem:
     mesh = problem.mesh
     return replace(
         problem,
+        material=_stored_material(problem),
         mesh=mesh if len(curves) == len(mesh.curves) else replace(mesh, curves=curves),
         supports=tuple(map(stored_condition, problem.supports)),
         loads=tuple(map(stored_condition, problem.loads)),
     )
+
+
+def _stored_material(problem: Problem) -> Material:
+    """The material, whose graded moduli are replaced by their values at the nodes of the mesh."""
+    elasticity, mesh = problem.elasticity, problem.mesh
+    if elasticity.node_moduli is None:
+        return elasticity.material
+    stored = {}
+    for k, (name, one) in enumerate(elasticity.named):
+        cells = np.arange(len(mesh.cells))
+        cells = cells[elasticity.set_number == k] if len(elasticity.set_number) else cells
+        values = np.full(mesh.n_points + len(mesh.edges), np.nan)
+        values[mesh.corners_and_edges[cells]] = elasticity.node_moduli[cells]
+        stored[name] = one.stored(lock(values))
+    return stored[""] if "" in stored else MaterialSets(stored)
 
 
 def _state(solution: Solution) -> dict[str, Any]:

@@ -7,7 +7,9 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from xcrack.analysis.solution import Solution
-from xcrack.base.arrays import Bools, Floats
+from xcrack.base.arrays import Bools, Floats, Ints
+from xcrack.mesh.locate import barycentric
+from xcrack.model.material import Isotropic
 from xcrack.sif.sif import SIF
 
 
@@ -63,6 +65,40 @@ def mean_rotation(solution: Solution, distance: Floats, radius: float) -> Floats
     moment = np.array([turning[1, 2], turning[2, 0], turning[0, 1]])
     w = np.linalg.solve(inertia, moment)
     return np.array([[0.0, -w[2], w[1]], [w[2], 0.0, -w[0]], [-w[1], w[0], 0.0]])[:d, :d]
+
+
+def material_at_tip(solution: Solution, t: int) -> Isotropic:
+    """The isotropic material at a tip.
+
+    Parameters
+    ----------
+    solution : Solution
+    t : int
+        Number of the tip in `space.tips`.
+
+    Raises
+    ------
+    GeometryError
+        The tip lies on an interface.
+    ProblemError
+        The material there is not isotropic.
+    """
+    elasticity = solution.problem.elasticity
+    if elasticity.is_uniform:
+        return elasticity.materials[0].at_tip()
+    return elasticity.at_tip(tip_cells(solution, t), solution.space.tips[t].x)
+
+
+def tip_cells(solution: Solution, t: int) -> Ints:
+    """Cells that hold a tip, or along a front."""
+    tip = solution.space.tips[t]
+    return solution.space.cuts[tip.crack].level_set.tip_cells[tip.number]
+
+
+def tip_place(solution: Solution, t: int) -> tuple[Floats, Ints, Floats]:
+    """Place of a tip in 2D `(1, 2)`, a cell that holds it `(1,)`, and where in it `(1, 3)`."""
+    x, cell = solution.space.tips[t].x[None], tip_cells(solution, t)[:1]
+    return x, cell, barycentric(solution.space.mesh, cell, x)
 
 
 def lip_pressure(solution: Solution, c: int) -> Floats:

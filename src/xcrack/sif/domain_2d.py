@@ -13,7 +13,7 @@ from xcrack.fem.function_space import FunctionSpace
 from xcrack.fem.quadrature import Points, cell_points
 from xcrack.mesh.locate import nearest_boundary
 from xcrack.sif.accuracy import Domain, check, scale_of
-from xcrack.sif.common import has_effect, with_closed
+from xcrack.sif.common import has_effect, material_at_tip, with_closed
 from xcrack.sif.interaction_2d import (
     constant_part,
     lip_terms,
@@ -43,11 +43,15 @@ class RingPart:
         Of the rule for them.
     others : iterable of Tabulated
         Points of the other cells.
+    differs : bool
+        Whether their stiffness may be another one than that at the tip: they count wherever the
+        weight q is not zero, others only where its gradient is not.
     """
 
     plain: Ints
     degree: int
     others: Iterable[Tabulated]
+    differs: bool
 
 
 def ring_parts(solution: Solution, t: int, hollow: float, outer: float) -> Iterable[RingPart]:
@@ -64,7 +68,7 @@ def ring_parts(solution: Solution, t: int, hollow: float, outer: float) -> Itera
     hollow, outer : float, length
         Radii between which the cells lie.
     """
-    parts, factored = _ring_parts(solution.space, t, hollow, outer), solution.factored
+    parts, factored = _ring_parts(solution, t, hollow, outer), solution.factored
     if factored is None:
         return parts
     key = t, hollow, outer
@@ -77,13 +81,26 @@ def ring_parts(solution: Solution, t: int, hollow: float, outer: float) -> Itera
     return stored
 
 
-def _ring_parts(space: FunctionSpace, t: int, hollow: float, outer: float) -> Iterator[RingPart]:
-    for cells, n, degree in ring_classes(space, space.tips[t].x, hollow, outer):
-        plain = space.signature[cells] == 0
-        others = cells[~plain]
-        points = (tabulate_functions(space, p) for p in class_points(space, others, n, degree))
-        few = len(others) <= _CHUNK
-        yield RingPart(cells[plain], degree, tuple(points) if few else points)
+def _ring_parts(solution: Solution, t: int, hollow: float, outer: float) -> Iterator[RingPart]:
+    space, elasticity = solution.space, solution.problem.elasticity
+    x = space.tips[t].x
+    for cells, n, degree in ring_classes(space, x, hollow, outer):
+        if not elasticity.is_uniform:
+            cells = np.setdiff1d(cells, elasticity.differing(material_at_tip(solution, t), cells))
+        yield _ring_part(space, cells, n, degree, False)
+    if elasticity.is_uniform:
+        return
+    for cells, n, degree in ring_classes(space, x, 0.0, outer):
+        cells = elasticity.differing(material_at_tip(solution, t), cells)
+        yield _ring_part(space, cells, n, degree, True)
+
+
+def _ring_part(space: FunctionSpace, cells: Ints, n: int, degree: int, differs: bool) -> RingPart:
+    plain = space.signature[cells] == 0
+    others = cells[~plain]
+    points = (tabulate_functions(space, p) for p in class_points(space, others, n, degree))
+    few = len(others) <= _CHUNK
+    return RingPart(cells[plain], degree, tuple(points) if few else points, differs)
 
 
 def ring_classes(
@@ -178,7 +195,7 @@ def _K_of_lips(solution: Solution, t: int, jump: Floats, size: float) -> Floats:
     if near.sum() < 3:
         return np.full(2, np.inf)
     r, weight = r[near], np.sqrt(lips.weight[near])[:, None]
-    E_prime = solution.problem.material.at_tip().E_prime
+    E_prime = material_at_tip(solution, t).E_prime
     values = 0.125 * E_prime * np.sqrt(2 * np.pi) * jump[near] @ tip.frame[[1, 0]].T
     columns = np.stack([np.sqrt(r), r**1.5 / size], axis=1)
     return np.asarray(np.linalg.lstsq(columns * weight, values * weight, rcond=None)[0][0])
@@ -190,7 +207,8 @@ def _tip_intensity(solutions: Sequence[Solution], t: int) -> tuple[list[SIF], Do
     domain = domain_of(solutions[0], t)
     outer = domain.outer
     radii = radii_of(domain)
-    E_prime = solutions[0].problem.material.at_tip().E_prime
+    tip_material = material_at_tip(solutions[0], t)
+    E_prime = tip_material.E_prime
     result = []
     for solution, values in zip(solutions, _integrals(solutions, t, radii), strict=True):
         K = 0.5 * E_prime * values[:, :2]
@@ -206,6 +224,8 @@ def _tip_intensity(solutions: Sequence[Solution], t: int) -> tuple[list[SIF], Do
             at_surface=np.zeros(1, dtype=bool),
             closed=np.zeros(1, dtype=bool),
             domain_cells=np.array([outer / domain.size]),
+            E_prime=np.array([E_prime]),
+            nu=np.array([tip_material.nu]),
         )
         result.append(with_closed(sif, solution, tip.crack, domain.size))
     return result, domain
@@ -226,9 +246,9 @@ def _integrals(solutions: Sequence[Solution], t: int, radii: Floats) -> Floats:
     # Within the inner radius grad q vanishes.
     hollow = float(ring.inner.min())
     for part in ring_parts(solutions[0], t, hollow, outer):
-        total += plain_terms(solutions, ring, part.plain, part.degree)
+        total += plain_terms(solutions, ring, part)
         for values in part.others:
-            total += point_terms(solutions, ring, values)
+            total += point_terms(solutions, ring, values, part.differs)
     if has_effect(solutions, "volume", "initial_stress"):
         for cells, n, degree in ring_classes(space, tip.x, 0.0, outer):
             for points in class_points(space, cells, n, degree):
@@ -277,7 +297,18 @@ def domain_of(solution: Solution, t: int) -> Domain:
         narrowest=tip.x,
         differ=_DIFFER[space.order],
         label="K at",
+        interface=_distance_to_interface(solution, tip.x),
     )
+
+
+def _distance_to_interface(solution: Solution, x: Floats) -> float:
+    """Distance of a tip to another material, length; inf where there is none."""
+    from xcrack.mesh.kernels.location import nearest_segment
+
+    mesh, interfaces = solution.space.mesh, solution.problem.elasticity.interfaces
+    if not len(interfaces):
+        return np.inf
+    return float(nearest_segment(mesh.points, mesh.facets[interfaces], np.ascontiguousarray(x))[0])
 
 
 __all__ = []

@@ -22,6 +22,7 @@ from xcrack.sif.common import (
     initial_stresses,
     lip_pressure,
     lip_shear,
+    material_at_tip,
     mean_rotation,
     with_closed,
 )
@@ -259,7 +260,7 @@ def front_values(
     ends : tuple of float, length
         Where the front enters and leaves the body.
     """
-    space, tip_material = solutions[0].space, solutions[0].problem.material.at_tip()
+    space, material = solutions[0].space, material_at_tip(solutions[0], t)
     tip = space.tips[t]
     size = leg_size(space.mesh, space.cuts[tip.crack].level_set.tip_cells[tip.number])
     wanted = solutions[0].problem.numerics.domain
@@ -284,9 +285,9 @@ def front_values(
         total += integrals_of_sides(solutions, t, sides, curve, knots, radii, turn)
     for part in _domain_parts(solutions, t, curve, knots, radii, turn):
         total += part
-    K = solve_front(total, knots, curve, tip_material, valid, smooth)
-    wide = twice_as_wide(total, knots, curve, tip_material, valid, smooth)
-    mean = means(total[:, 0], knots, curve, tip_material)
+    K = solve_front(total, knots, curve, material, valid, smooth)
+    wide = twice_as_wide(total, knots, curve, material, valid, smooth)
+    mean = means(total[:, 0], knots, curve, material)
     least = int(np.argmin(room))
     bend = curve.bend(knots, _BEND_OVER * size)
     bend_at = int(np.argmin(bend))
@@ -382,7 +383,7 @@ def _domain_parts(
             gradient - turn,
             points.side[:, tip.crack],
             behind,
-            solutions[0].problem.material.at_tip(),
+            material_at_tip(solutions[0], t),
             radii,
             force=_force(solutions, x[near_points]),
             initial=initial,
@@ -447,7 +448,7 @@ def _lip_part(
         lips.normal[near_points],
         lips.weight[near_points],
         traction,
-        solutions[0].problem.material.at_tip(),
+        material_at_tip(solutions[0], t),
         radii,
         gradient=gradient,
         initial=initial_stresses(solutions),

@@ -19,7 +19,9 @@ from xcrack.mesh.locate import cell_sizes, contains
 from xcrack.mesh.mesh import Mesh
 from xcrack.mesh.polygon import points_between
 from xcrack.mesh.refinement import refine
+from xcrack.model.material import isotropic_part
 from xcrack.model.problem import Problem
+from xcrack.sif.accuracy import BESIDE
 from xcrack.sif.domain_2d import domain_of
 from xcrack.sif.domain_3d import front_intensity
 from xcrack.sif.goal_2d import on_faces, tip_goal
@@ -40,8 +42,9 @@ class TipErrors:
         Signed estimate of exact K less K as the integrals gave it.
     shares : (states, tips, 2, cells) array, stress · √length
         Absolute contributions of the cells to it.
-    kinks : (states, tips, 2) array, stress · √length
-        Those of the cells at kinks, with functions and their copies taken together.
+    kinks, interfaces : (states, tips, 2) arrays, stress · √length
+        Those of the cells at kinks, and where interfaces meet sides and the crack, with functions
+        and their copies taken together.
     end : (states, tips, 2) array, stress · √length
         What moving the ends of contact by a group does; see `contact_end.end_changes`.
     bend, rim : (states, tips, 2) arrays, stress · √length
@@ -56,6 +59,7 @@ class TipErrors:
     eta: Floats
     shares: Floats
     kinks: Floats
+    interfaces: Floats
     end: Floats
     bend: Floats
     bend_bar: Floats
@@ -91,7 +95,8 @@ def tip_errors(solutions: Sequence[Solution], crack: int) -> TipErrors:
     return TipErrors(
         result.eta.reshape(shape),
         result.shares.reshape(*shape, -1),
-        _at_kinks(solutions[0], result, crack).reshape(shape),
+        _near(solutions[0], result, kinks_inside(solutions[0], crack)).reshape(shape),
+        _near(solutions[0], result, _interface_ends(solutions[0], crack)).reshape(shape),
         result.end.reshape(shape),
         bend.reshape(shape),
         bend_bar.reshape(shape),
@@ -107,14 +112,26 @@ def kinks_inside(solution: Solution, crack: int) -> Floats:
     return np.asarray(kinks[contains(solution.problem.mesh, kinks)] if len(kinks) else kinks)
 
 
-def _at_kinks(solution: Solution, result: Estimate, crack: int) -> Floats:
-    """Absolute contributions of the cells at the kinks of a crack `(states, m)`."""
-    mesh, kinks = solution.problem.mesh, kinks_inside(solution, crack)
-    if not len(kinks):
+def _interface_ends(solution: Solution, crack: int) -> Floats:
+    """Where interfaces meet the boundary and the crack `(k, 2)`."""
+    elasticity = solution.problem.elasticity
+    if not len(elasticity.interfaces):
+        return np.zeros((0, 2))
+    mesh, lips = solution.problem.mesh, solution.lips[crack]
+    nodes = np.intersect1d(mesh.facets[elasticity.interfaces], mesh.boundary)
+    order = np.argsort(lips.s, kind="stable")
+    crosses = (np.diff(elasticity.number[lips.cell[order]], axis=0) != 0).any(axis=1)
+    return np.concatenate([mesh.points[nodes], lips.x[order[1:][crosses]]])
+
+
+def _near(solution: Solution, result: Estimate, x: Floats) -> Floats:
+    """Absolute contributions of the cells at some points `(states, m)`."""
+    mesh = solution.problem.mesh
+    if not len(x):
         return np.zeros_like(result.eta)
     middle = mesh.points[mesh.cells].mean(axis=1)
-    distance = np.linalg.norm(middle[:, None] - kinks, axis=2)
-    is_near = (distance < _NEAR * cell_sizes(mesh, kinks)).any(axis=1)
+    distance = np.linalg.norm(middle[:, None] - x, axis=2)
+    is_near = (distance < _NEAR * cell_sizes(mesh, x)).any(axis=1)
     every = [shares(result.surplus, parts, together=True)[is_near] for parts in result.parts]
     return np.asarray(np.sum(every, axis=1))
 
@@ -133,6 +150,8 @@ _OVERLAP = 0.02  # share of an overlap at one tip, as its negative K_I, that cou
 # Of the shares of cells at kinks, whose functions catch a part only of what is singular, and of
 # what moving the crack onto its kinks changes where faces press: no estimate has a sign there.
 _AT_KINKS, _MOVED = 6.0, 2.0
+# Of the shares of cells where an interface meets a side or the crack, which are singular too.
+_AT_INTERFACES = 2.0
 
 
 def tip_bars(solutions: Sequence[Solution], sifs: Sequence[SIF], crack: int) -> list[KErrors]:
@@ -193,6 +212,11 @@ def _refusal_of_solution(solution: Solution, crack: int) -> str:
         return f"contact by {method.label} has no estimate"
     if any(contact is not None and contact.shear is not None for contact in solution.contact):
         return "friction has no estimate"
+    materials = problem.elasticity.materials
+    if len(materials) > 1:
+        for material in materials:
+            if isotropic_part(material.unit.tensor(2))[2] is not None:
+                return f"{material.kind} is not isotropic, and has no estimate"
     return ""
 
 
@@ -209,6 +233,11 @@ def _refusals_of_mesh(solution: Solution, crack: int) -> list[str]:
             reason = (
                 f"the crack is {length / domain.size:.1f} cells long, and bars hold from {least:g} "
                 "on: refine the mesh there"
+            )
+        elif domain.interface < BESIDE * domain.size:
+            reason = (
+                f"another material begins {domain.interface / domain.size:.2g} cells away, and "
+                f"bars hold from {BESIDE:g} on: refine the mesh there"
             )
         elif domain.room < _ROOM * domain.size:
             reason = (
@@ -231,6 +260,7 @@ def _bars(
         _ETA * np.abs(bar_of_estimate), np.maximum(_SHARES * shares, _SPREAD * sif.spread)
     )
     bar = np.maximum(bar, _AT_KINKS * errors.kinks[k])
+    bar = np.maximum(bar, _AT_INTERFACES * errors.interfaces[k])
     if any(_faces_press(solution, crack, x) for x in kinks_inside(solution, crack)):
         eta = errors.rim[k].copy()
         bar += _MOVED * np.abs(errors.bend[k])

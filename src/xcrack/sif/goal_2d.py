@@ -17,9 +17,16 @@ from xcrack.fem.assembly import tabulate_functions
 from xcrack.fem.quadrature import Points, lip_side
 from xcrack.fem.williams import continued_polar, mode_matrix, unit_gradients
 from xcrack.mesh.simplex import simplex_rule
-from xcrack.sif.common import has_effect, weight
+from xcrack.sif.common import has_effect, material_at_tip, tip_place, weight
 from xcrack.sif.domain_2d import class_points, domain_of, radii_of, ring_classes, ring_parts
-from xcrack.sif.interaction_2d import ahead_derivative, inner_radii, ring_around, volume_terms
+from xcrack.sif.interaction_2d import (
+    ahead_derivative,
+    change_in_cells,
+    inner_radii,
+    ring_around,
+    stiffness_change,
+    volume_terms,
+)
 
 _STRAIGHT = 1e-9  # share of the radius below which a face is on the line through the tip
 
@@ -36,7 +43,7 @@ def tip_goal(solution: Solution, t: int) -> Goal:
     """
     from xcrack.estimate.kernels.goal import plain_ring, ring_factors
 
-    space, tip_material = solution.space, solution.problem.material.at_tip()
+    space, tip_material = solution.space, material_at_tip(solution, t)
     mesh, tip = space.mesh, space.tips[t]
     radii = radii_of(domain_of(solution, t))
     outer, hollow = float(radii.max()), float(inner_radii(space.order, radii).min())
@@ -54,13 +61,17 @@ def tip_goal(solution: Solution, t: int) -> Goal:
             integrals = plain_ring(
                 part.plain, mesh.points, mesh.cells, mesh.gradient, mesh.volume, cut.side, psi,
                 *simplex_rule(2, part.degree), tip.x, *ring,
+                change_in_cells(solution, t, part),
             )  # fmt: skip
             plain_parts.append(GoalCells(part.plain, *integrals))
         for at in part.others:
             points = at.points
+            change = None
+            if part.differs:
+                change = stiffness_change(solution, t, points.cell, points.bary)
             factor = ring_factors(
                 points.cell, points.bary, points.side[:, tip.crack], points.weight,
-                mesh.points, mesh.cells, psi, tip.x, *ring,
+                mesh.points, mesh.cells, psi, tip.x, *ring, change,
             )  # fmt: skip
             parts.append(GoalPoints(at, factor))
     rotation = _rotation(solution, t, outer)
@@ -77,7 +88,7 @@ def constant(solution: Solution, t: int) -> Floats:
 
     Given pressures are no part of it: they enter `Goal.pressure` with those of the contact.
     """
-    space, scale = solution.space, 0.5 * solution.problem.material.at_tip().E_prime
+    space, scale = solution.space, 0.5 * material_at_tip(solution, t).E_prime
     total = np.zeros(2)
     if not has_effect([solution], "volume", "initial_stress"):
         return total
@@ -87,7 +98,8 @@ def constant(solution: Solution, t: int) -> Floats:
     for cells, n, degree in ring_classes(space, space.tips[t].x, 0.0, outer):
         for points in class_points(space, cells, n, degree):
             total += scale * volume_terms([solution], ring, points)[0, 0, :2]
-    steady = solution.initial_stress(space.tips[t].x[None])[0]
+    x, cell, bary = tip_place(solution, t)
+    steady = solution.initial_stress_at(cell, bary, x, True)[0]
     _, _, per_stress = _faces(solution, t, outer, float(inner_radii(space.order, radii)[0]))
     return np.asarray(total + np.einsum("ijm,ij->m", per_stress, steady))
 
@@ -115,7 +127,7 @@ def _faces(
     solution: Solution, t: int, outer: float, inner: float
 ) -> tuple[Sequence[GoalPoints], Floats, Floats]:
     """Gradients on bent faces, factors of pressures `(q, 2)` and of the stress at the tip."""
-    space, tip_material = solution.space, solution.problem.material.at_tip()
+    space, tip_material = solution.space, material_at_tip(solution, t)
     tip = space.tips[t]
     lips, R, scale = solution.lips[tip.crack], tip.frame, 0.5 * tip_material.E_prime
     pressure, per_stress = np.zeros((len(lips), 2)), np.zeros((2, 2, 2))
@@ -167,7 +179,7 @@ def on_faces(solution: Solution, tips: Sequence[int]) -> tuple[Floats, Floats]:
 
 
 def _singular_part(solution: Solution, t: int) -> tuple[Floats, Floats]:
-    space, tip_material = solution.space, solution.problem.material.at_tip()
+    space, tip_material = solution.space, material_at_tip(solution, t)
     tip = space.tips[t]
     lips, R = solution.lips[tip.crack], tip.frame
     radius = domain_of(solution, t).outer

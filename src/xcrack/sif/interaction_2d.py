@@ -9,6 +9,15 @@ traction counts (full lip term). K = E'/2 I with the unit fields; T = E' I / f w
 force f along the crack faces, less the pressure on the crack faces at the tip. An initial stress
 enters by its value at the tip, which is counted in sigma : eps^a, and by its change from there,
 times the derivative of eps^a.
+
+The auxiliary fields are those of the material at the tip, C_t. A body of C(x) is one of C_t with
+the initial stress (C - C_t) eps(u), which is zero at the tip; it adds
+
+    int (C - C_t) eps(u) : (u^a_,1 (x) grad q + q grad u^a_,1) dA
+
+and nothing where two materials are bonded: there sigma m is continuous, and the jump of grad u is
+a (x) m, so that sigma^a m . u_,1 and (sigma^a : eps) m_1 jump by the same (after Yu, Wu, Guo, Du
+and He, 2009, Int. J. Solids Struct. 46, 3710). Derivatives of C do not enter.
 """
 
 from collections.abc import Sequence
@@ -26,7 +35,15 @@ from xcrack.fem.williams import continued_polar, mode_matrix, unit_gradients
 from xcrack.mesh.mesh import local_edges
 from xcrack.mesh.simplex import simplex_rule
 from xcrack.model.material import Isotropic
-from xcrack.sif.common import has_effect, lip_pressure, lip_shear, mean_rotation, weight
+from xcrack.sif.common import (
+    has_effect,
+    lip_pressure,
+    lip_shear,
+    material_at_tip,
+    mean_rotation,
+    tip_place,
+    weight,
+)
 
 # Inner radius of the ring in which q falls, as a share of the outer one. At order 1 the ring stays
 # outside the enriched disc; at order 2 a wide ring saves digits on coarse meshes (measured).
@@ -44,7 +61,7 @@ def constant_part(solution: Solution, t: int) -> float:
     A uniform state gives E' I / f = sigma_11 - sigma_22 for its elastic part: the displacement of
     the point force jumps across the crack faces. T is sigma_11 of the whole.
     """
-    tip, tip_material = solution.space.tips[t], solution.problem.material.at_tip()
+    tip, tip_material = solution.space.tips[t], material_at_tip(solution, t)
     lips = solution.lips[tip.crack]
     at_tip = int(np.argmin(np.linalg.norm(lips.x - tip.x, axis=1)))
     pressure = float(lip_pressure(solution, tip.crack)[at_tip])
@@ -55,8 +72,8 @@ def constant_part(solution: Solution, t: int) -> float:
 
 def _steady_stress(solution: Solution, t: int) -> Floats:
     """Initial stress at the tip in its frame `(d, d)`."""
-    tip = solution.space.tips[t]
-    return np.asarray(tip.frame @ solution.initial_stress(tip.x[None])[0] @ tip.frame.T)
+    tip, (x, cell, bary) = solution.space.tips[t], tip_place(solution, t)
+    return np.asarray(tip.frame @ solution.initial_stress_at(cell, bary, x, True)[0] @ tip.frame.T)
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,7 +111,7 @@ def ring_around(solutions: Sequence[Solution], t: int, radii: Floats) -> Integra
 
 def _constants(solution: Solution, ring: IntegrationRing) -> tuple[Any, ...]:
     """Last arguments of the kernels of domain integrals."""
-    tip, tip_material = solution.space.tips[ring.t], solution.problem.material.at_tip()
+    tip, tip_material = solution.space.tips[ring.t], material_at_tip(solution, ring.t)
     return (
         tip.x, ring.turn, ring.radii, ring.inner, np.ascontiguousarray(tip.frame),
         mode_matrix(tip_material.kolosov, tip_material.mu), tip_material.kolosov,
@@ -102,10 +119,32 @@ def _constants(solution: Solution, ring: IntegrationRing) -> tuple[Any, ...]:
     )  # fmt: skip
 
 
-def plain_terms(
-    solutions: Sequence[Solution], ring: IntegrationRing, cells: Ints, degree: int
-) -> Floats:
-    """Domain integrals over plain cells `(s, radii, 3)`, by a rule of the given degree."""
+def stiffness_change(solution: Solution, t: int, cell: Ints, bary: Floats) -> Floats:
+    """Stiffness at points less that of a tip, in its frame `(q, 3, 3)`."""
+    frame, tip_material = solution.space.tips[t].frame, material_at_tip(solution, t)
+    return solution.problem.elasticity.change(tip_material, cell, bary, frame)
+
+
+def change_in_cells(solution: Solution, t: int, part: Any) -> Floats | None:
+    """The same at the points of a rule in plain cells `(k, q or 1, 3, 3)`; None where it is zero.
+
+    Parameters
+    ----------
+    solution : Solution
+    t : int
+    part : RingPart
+    """
+    if not part.differs:
+        return None
+    bary, cells = simplex_rule(2, part.degree)[0], part.plain
+    if not solution.problem.elasticity.is_graded:
+        bary = bary[:1]
+    points = np.repeat(cells, len(bary)), np.tile(bary, (len(cells), 1))
+    return stiffness_change(solution, t, *points).reshape(len(cells), len(bary), 3, 3)
+
+
+def plain_terms(solutions: Sequence[Solution], ring: IntegrationRing, part: Any) -> Floats:
+    """Domain integrals over the plain cells of a `RingPart` `(s, radii, 3)`."""
     from xcrack.sif.kernels.ring import add_plain_cells
 
     space = solutions[0].space
@@ -113,27 +152,34 @@ def plain_terms(
     cut, edges = space.cuts[tip.crack], local_edges(2)
     result = np.zeros((len(solutions), len(ring.radii), 3))
     add_plain_cells(
-        result, cells, mesh.points, mesh.cells, mesh.gradient, mesh.volume, space.cell_nodes,
+        result, part.plain, mesh.points, mesh.cells, mesh.gradient, mesh.volume, space.cell_nodes,
         edges if space.order == 2 else edges[:0], ring.coefficients, cut.side,
-        cut.level_set.psi[tip.number], *simplex_rule(2, degree), *_constants(solutions[0], ring),
+        cut.level_set.psi[tip.number], *simplex_rule(2, part.degree),
+        *_constants(solutions[0], ring), change_in_cells(solutions[0], ring.t, part),
     )  # fmt: skip
     return result
 
 
 def point_terms(
-    solutions: Sequence[Solution], ring: IntegrationRing, tabulated: Tabulated
+    solutions: Sequence[Solution], ring: IntegrationRing, tabulated: Tabulated, differs: bool
 ) -> Floats:
-    """Domain integrals over points of any cells `(s, radii, 3)`."""
+    """Domain integrals over points of any cells `(s, radii, 3)`.
+
+    Their stiffness may differ from that of the tip.
+    """
     from xcrack.sif.kernels.ring import add_points
 
     space = solutions[0].space
     mesh, tip = space.mesh, space.tips[ring.t]
     points, gradient = tabulated.points, tabulated.gradients(ring.coefficients)
     result = np.zeros((len(solutions), len(ring.radii), 3))
+    change = None
+    if differs:
+        change = stiffness_change(solutions[0], ring.t, points.cell, points.bary)
     add_points(
         result, gradient, points.cell, points.bary, points.side[:, tip.crack], points.weight,
         mesh.points, mesh.cells, space.cuts[tip.crack].level_set.psi[tip.number],
-        *_constants(solutions[0], ring),
+        *_constants(solutions[0], ring), change,
     )  # fmt: skip
     return result
 
@@ -150,7 +196,7 @@ def volume_terms(solutions: Sequence[Solution], ring: IntegrationRing, points: P
     result = np.zeros((len(solutions), len(ring.radii), 3))
     q, dq = weight(r, xi, ring.inner, ring.radii)
     weighted = points.weight[:, None] * dq  # (radii, q, d)
-    for m, field in enumerate(_auxiliary_fields(solutions, r, theta)):
+    for m, field in enumerate(_auxiliary_fields(solutions, ring.t, r, theta)):
         for s, solution in enumerate(solutions):
             result[s, :, m] += _load_terms(solution, ring.t, points, x, field, q, weighted)
     return result
@@ -165,10 +211,10 @@ class AuxiliaryField:
 
 
 def _auxiliary_fields(
-    solutions: Sequence[Solution], r: Floats, theta: Floats
+    solutions: Sequence[Solution], t: int, r: Floats, theta: Floats
 ) -> list[AuxiliaryField]:
     """The unit fields of modes I, II and of the point force."""
-    tip_material = solutions[0].problem.material.at_tip()
+    tip_material = material_at_tip(solutions[0], t)
     gradients = unit_gradients(r, theta, tip_material.kolosov, tip_material.mu)
     curves = np.zeros((len(gradients), 0, 2, 2))
     if has_effect(solutions, "initial_stress"):
@@ -201,15 +247,16 @@ def _load_terms(
 ) -> Floats:
     """Terms of body forces and initial stress, for each domain; dq is weighted."""
     tip = solution.space.tips[t]
-    R, material = tip.frame, solution.problem.material
+    R, elasticity = tip.frame, solution.problem.elasticity
     total = np.zeros(len(q))
     for load, factor in solution.acting:
         if "volume" in load.acts:
             b = factor * load.volume(x) @ R.T
             total -= np.einsum("q,qi,qi,rq->r", points.weight, b, field.gradient[:, :, 0], q)
         if "initial_stress" in load.acts:
-            everywhere = factor * load.initial_stress(x, material)
-            at_tip = factor * load.initial_stress(tip.x[None], material)
+            where = x, points.cell, points.bary
+            everywhere = factor * elasticity.initial_stress(load, *where, exact=True)
+            at_tip = factor * elasticity.initial_stress(load, *tip_place(solution, t), exact=True)
             full = np.einsum("ai,qij,bj->qab", R, everywhere, R)
             change = np.einsum("ai,qij,bj->qab", R, everywhere - at_tip, R)
             steady = R @ at_tip[0] @ R.T
@@ -233,7 +280,7 @@ def lip_terms(solutions: Sequence[Solution], ring: IntegrationRing) -> Floats:
         None if x is None else x[is_near] for x in (lip_shear(s, tip.crack) for s in solutions)
     ]
     R = tip.frame
-    material = solutions[0].problem.material
+    tip_material = material_at_tip(solutions[0], t)
     xi = way[is_near] @ R.T
     # The last piece is straight: what differs there is round-off, which 1 / r would magnify.
     xi[np.abs(xi[:, 1]) < 1e-9 * radii.max(), 1] = 0.0
@@ -255,10 +302,10 @@ def lip_terms(solutions: Sequence[Solution], ring: IntegrationRing) -> Floats:
     outward = lips.normal[is_near] @ R.T
     outward = np.concatenate([outward, -outward])
     q, _ = weight(r, xi, ring.inner, radii)
-    aux = _auxiliary_fields(solutions, r, theta)
+    aux = _auxiliary_fields(solutions, t, r, theta)
     local, stresses = None, []
     if bent:
-        stresses = [material.at_tip().stress(field.gradient) for field in aux]
+        stresses = [tip_material.stress(field.gradient) for field in aux]
         places = cell.T.ravel(), np.concatenate([bary[:, 0], bary[:, 1]])
         gradient = gradients_at(space, ring.coefficients, *places, side) - ring.turn
         local = np.einsum("ai,qijs,bj->sqab", R, gradient, R)
@@ -267,7 +314,7 @@ def lip_terms(solutions: Sequence[Solution], ring: IntegrationRing) -> Floats:
         if shear is not None:
             shear = shear @ R.T
             traction += np.concatenate([-shear, shear])
-        sigma = None if local is None else material.stress(local[k]) + steady[k]
+        sigma = None if local is None else tip_material.stress(local[k]) + steady[k]
         for m, field in enumerate(aux):
             density = np.einsum("qi,qi->q", traction, field.gradient[:, :, 0])
             if local is not None and sigma is not None:

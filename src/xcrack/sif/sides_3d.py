@@ -18,7 +18,7 @@ from xcrack.fem.loads import facet_points, outer_points, position
 from xcrack.fem.quadrature import Points
 from xcrack.mesh.mesh import facet_set, numbers_of
 from xcrack.model.supports import Support
-from xcrack.sif.common import initial_stresses
+from xcrack.sif.common import initial_stresses, material_at_tip
 from xcrack.sif.interaction_3d import hats, side_integrals
 
 _ALONG = 1e-6  # of a unit normal beside an axis: a plane across that axis
@@ -171,7 +171,7 @@ def _integrals(
     side, initial = points.side[:, tip.crack], initial_stresses(solutions)
     return side_integrals(
         curve, knots, feet, normal, points.weight, traction, side, behind,
-        solutions[0].problem.material.at_tip(), radii, gradient=gradient, initial=initial,
+        material_at_tip(solutions[0], t), radii, gradient=gradient, initial=initial,
     )  # fmt: skip
 
 

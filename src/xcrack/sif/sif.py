@@ -125,6 +125,8 @@ class SIF:
         Where fronts come to free surfaces; none in 2D.
     widened : (f, d) array, stress · √length, optional
         In 3D: difference of K to that of hats along the front which are twice as wide.
+    E_prime, nu : (f,) arrays, optional
+        Of the material there: E / (1 - nu²), in plane stress E (stress), and Poisson's ratio.
 
     Raises
     ------
@@ -145,6 +147,8 @@ class SIF:
     errors: KErrors | None = None
     ends: tuple[SurfaceEnd, ...] = ()
     widened: Floats | None = None
+    E_prime: Floats | None = None
+    nu: Floats | None = None
 
     def __post_init__(self) -> None:
         x = numbers(self.x, "SIF: x", (None, None))
@@ -163,8 +167,9 @@ class SIF:
                 raise ProblemError(
                     f"SIF: {name} = {value_text(flags)}: give an array of bool of shape ({n},)."
                 )
-        if self.widened is not None:
-            numbers(self.widened, "SIF: widened", (n, d), finite=False)
+        for name, shape in (("widened", (n, d)), ("E_prime", (n,)), ("nu", (n,))):
+            if getattr(self, name) is not None:
+                numbers(getattr(self, name), f"SIF: {name}", shape, finite=False)
         if self.errors is not None and not isinstance(self.errors, KErrors):
             raise ProblemError(f"SIF: errors = {value_text(self.errors)}: give KErrors or None.")
         known = isinstance(self.ends, tuple)
@@ -309,6 +314,9 @@ def joined(parts: Sequence[SIF], dim: int) -> SIF:
         values = [getattr(part, name) for part in parts]
         return lock(np.concatenate([np.zeros((0, *shape)), *values]))
 
+    def rows_if_known(name: str, *shape: int) -> Floats | None:
+        return None if any(getattr(p, name) is None for p in parts) else rows(name, *shape)
+
     return SIF(
         x=rows("x", dim),
         frame=rows("frame", dim, dim),
@@ -321,7 +329,9 @@ def joined(parts: Sequence[SIF], dim: int) -> SIF:
         closed=lock(rows("closed").astype(bool)),
         domain_cells=rows("domain_cells"),
         ends=tuple(replace(end, front=f) for f, part in enumerate(parts) for end in part.ends),
-        widened=None if any(p.widened is None for p in parts) else rows("widened", dim),
+        widened=rows_if_known("widened", dim),
+        E_prime=rows_if_known("E_prime"),
+        nu=rows_if_known("nu"),
     )
 
 

@@ -100,7 +100,9 @@ def stress_intensities(
             f"crack {value_text(crack)}: the problem has {len(space.cuts)} crack(s), numbered from "
             f"0."
         )
-    solutions[0].problem.material.at_tip()  # refuses where K is not defined
+    elasticity = solutions[0].problem.elasticity
+    if elasticity.is_uniform:
+        elasticity.materials[0].at_tip()  # refuses where K is not defined
     # Cycles from nothing are the most common ones: their lower state has no K to look for.
     live = [s for s in solutions if not s.at_rest] or solutions[:1]
     ends = [t for t, tip in enumerate(space.tips) if tip.crack == crack]
@@ -158,13 +160,14 @@ def _checked_solutions(solutions: Any) -> list[Solution]:
 # Energy release rate from K.
 
 
-def energy_release_rate(sif: SIF, material: Material) -> Floats:
+def energy_release_rate(sif: SIF, material: Material | None = None) -> Floats:
     """Energy that is released per area of new crack straight ahead; J of an elastic body.
 
     Parameters
     ----------
     sif : SIF
-    material : Material
+    material : Material, optional
+        That of all tips; where it is left out, that which each tip was in.
 
     Returns
     -------
@@ -173,7 +176,8 @@ def energy_release_rate(sif: SIF, material: Material) -> Floats:
     Raises
     ------
     ProblemError
-        Other kinds of value, or a material whose tips are not isotropic.
+        Other kinds of value, a material whose tips are not isotropic, or none where the SIF does
+        not say it, as K from elsewhere.
 
     Notes
     -----
@@ -184,14 +188,21 @@ def energy_release_rate(sif: SIF, material: Material) -> Floats:
         raise ProblemError(
             f"energy_release_rate: sif = {value_text(sif)}: give what stress_intensity returns."
         )
-    if not isinstance(material, Material):
+    K, E_prime, nu = sif.K, sif.E_prime, sif.nu
+    if material is not None:
+        if not isinstance(material, Material):
+            raise ProblemError(
+                f"energy_release_rate: material = {value_text(material)}: give Isotropic(...)."
+            )
+        tip_material = material.at_tip()
+        E_prime, nu = (np.full(len(K), v) for v in (tip_material.E_prime, tip_material.nu))
+    if E_prime is None or nu is None:
         raise ProblemError(
-            f"energy_release_rate: material = {value_text(material)}: give Isotropic(...)."
+            "energy_release_rate: the SIF does not say its material: give material=Isotropic(...)."
         )
-    K, tip_material = sif.K, material.at_tip()
-    G = (K[:, 0] ** 2 + K[:, 1] ** 2) / tip_material.E_prime
-    if K.shape[1] == 3:
-        G = G + K[:, 2] ** 2 / (2 * tip_material.mu)
+    G = (K[:, 0] ** 2 + K[:, 1] ** 2) / E_prime
+    if K.shape[1] == 3:  # 2 mu = E' (1 - nu)
+        G = G + K[:, 2] ** 2 / (E_prime * (1 - nu))
     return np.asarray(G)
 
 

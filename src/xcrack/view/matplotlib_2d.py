@@ -38,6 +38,7 @@ def draw(
     lines = [
         (picture.at_rest, "0.6", 0.6, 0.5),
         (picture.cell_edges if edges else picture.cell_edges[:0], "0.2", 0.25, 2),
+        (picture.interfaces, "0.25", 0.7, 2.5),
         (picture.outline, "black", 0.9, 3),
         (picture.lips, "black", 0.9, 3),
         (picture.closed, CLOSED, 2.2, 4),
@@ -79,6 +80,7 @@ def draw_mesh(
     from matplotlib.collections import LineCollection
     from matplotlib.patches import Circle
 
+    _fill_by_material(axes, solution)
     axes.add_collection(
         LineCollection(
             list(mesh.points[mesh.facets[mesh.facet_to_cell[:, 1] >= 0]]),
@@ -108,9 +110,22 @@ def draw_mesh(
             circle = Circle(tuple(tip.x), tip.radius, fill=False, ls="--", lw=0.8, ec="C1")
             axes.add_patch(circle)
     _frame(axes, box)
-    if space.cuts:
+    if space.cuts or solution.problem.elasticity.named[0][0]:
         _legend_below(axes, 3)
     return _finish(figure, axes, file, show, title)
+
+
+def _fill_by_material(axes: Any, solution: Solution) -> None:
+    """Cells in a light colour by material, where there are several."""
+    from matplotlib import colormaps
+    from matplotlib.collections import PolyCollection
+
+    elasticity, mesh = solution.problem.elasticity, solution.space.mesh
+    for k, (name, _) in enumerate(elasticity.named if len(elasticity.set_number) else ()):
+        color = (*colormaps["Pastel1"](k % 9)[:3], 1.0)
+        shapes = mesh.points[mesh.cells[elasticity.set_number == k]]
+        axes.add_collection(PolyCollection(list(shapes), facecolors=[color], zorder=0.5))
+        axes.plot([], [], "s", color=color, label=name)
 
 
 def draw_along(

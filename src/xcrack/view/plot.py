@@ -54,7 +54,8 @@ def plot(
     solution : Solution, or Problem
         A problem has one picture only: the field "mesh".
     field : str
-        On the body: "von_mises", "sxx", "syy", "sxy", "displacement" (its norm), "ux", "uy".
+        On the body: "von_mises", "sxx", "syy", "sxy", "displacement" (its norm), "ux", "uy", and
+        "material" (which of several). Stresses jump where materials meet.
         Along the crack faces: "pressure" (of contact), "opening" (with the sliding); where the
         crack faces touch the graph is shaded. "mesh": the mesh with its cracks and enriched nodes.
         In 3D also "szz", "syz", "sxz" and "uz"; "pressure", "opening" (or "gap") and "sliding"

@@ -168,6 +168,7 @@ def _add_lines(pv: Any, plotter: Any, picture: Scene, edges: bool, step: float) 
     lines = [
         (picture.at_rest, "#9a9a9a", 1.5, -1),
         (picture.cell_edges if edges else picture.cell_edges[:0], "#303030", 1.0, 1),
+        (picture.interfaces, "#404040", 1.8, 1.5),
         (picture.outline, "black", 2.5, 2),
         (picture.lips, "black", 2.5, 2),
         (picture.closed, CLOSED, 5.0, 3),

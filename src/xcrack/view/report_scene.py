@@ -1,5 +1,6 @@
 """Sections on what was asked: scene, assumptions, validity, inputs and how to run it again."""
 
+from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
@@ -12,8 +13,10 @@ from xcrack.base.markup import Markup, element, join_parts, list_markup, table
 from xcrack.crack.crack import Crack
 from xcrack.crack.measures import Measures, measures
 from xcrack.mesh.mesh import Mesh
+from xcrack.model.problem import Problem
 from xcrack.model.supports import Condition
 from xcrack.runs.versions import versions
+from xcrack.sif.sif import SIF
 from xcrack.view.report_source import Section, Source, setting_words
 
 
@@ -27,10 +30,14 @@ def scene(source: Source) -> Section:
         rows += [("body", size), ("mesh", f"{mesh.n_points} points, {len(mesh.cells)} cells")]
         numbers |= {"points": mesh.n_points, "cells": len(mesh.cells)}
     if problem is not None:
-        rows += [("material", repr(problem.material)), ("order of the elements", problem.order),
-                 ("contact", problem.contact)]  # fmt: skip
+        rows += [
+            (f"material {name!r}" if name else "material", repr(material))
+            for name, material in problem.elasticity.named
+        ]
+        rows += [("order of the elements", problem.order), ("contact", problem.contact)]
     for c, crack in enumerate(source.cracks):
-        rows.append((f"crack {c}", _crack(crack, mesh)))
+        where = "" if problem is None else _materials_of_tips(problem, source.sif, c)
+        rows.append((f"crack {c}", _crack(crack, mesh) + where))
     parts: list[Any] = [table((), rows)]
     crack_measures = [] if mesh is None else [measures(crack, mesh) for crack in source.cracks]
     if crack_measures:
@@ -46,6 +53,17 @@ def scene(source: Source) -> Section:
         parts.append(element("p", "The stored steps do not hold the loads: they are in the script "
                              "or the case file that made the run.", cls="soft"))  # fmt: skip
     return Section("scene", "Scene", join_parts(*parts), numbers)
+
+
+def _materials_of_tips(problem: Problem, sif: Sequence[Sequence[SIF]], c: int) -> str:
+    """In which materials the tips of a crack are, where there are several."""
+    elasticity = problem.elasticity
+    if not len(elasticity.set_number) or not sif or not len(sif[0][c].x):
+        return ""
+    sets = elasticity.sets_at(sif[0][c].x)
+    if problem.mesh.dim == 3:
+        sets = np.unique(sets)
+    return f", in {', '.join(repr(elasticity.named[k][0]) for k in sets.tolist())}"
 
 
 def _crack(crack: Crack, mesh: Mesh | None) -> str:

@@ -74,15 +74,14 @@ class Source:
         problem, mesh = self.problem, self.mesh
         material: Material
         if problem is not None:
-            material, cracks = problem.material, problem.placed
+            material, cracks = problem.elasticity.material, problem.placed
         elif self.history is not None and self.history.solved:  # the most severe of what it may be
             plane = "stress" if self.dim == 2 else None
             material, cracks = Isotropic(1.0, _NU, plane), self.history.solved[-1].cracks
         else:
             return None
         if self.yield_stress is not None:
-            tip_material, K_c = material.at_tip(), material.K_c
-            material = replace(tip_material, yield_stress=self.yield_stress, K_c=K_c)
+            material = material.with_yield_stress(self.yield_stress)
         if mesh is None or not self.sif or (material.yield_stress, material.K_c) == (None, None):
             return None
         K_c = material.K_c if self.history is None else None  # a run ends there

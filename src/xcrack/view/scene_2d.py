@@ -21,6 +21,7 @@ FIELDS = {
     "displacement": "displacement",
     "ux": "displacement x",
     "uy": "displacement y",
+    "material": "material",
 }
 SPACE_FIELDS = FIELDS | {
     "szz": "stress zz",
@@ -51,9 +52,9 @@ class Scene:
         Whether values lie below or above the colours.
     signed : bool
         The field has a sign: its colours part at zero.
-    outline, lips, closed, cell_edges, at_rest : (k, 3, 2) arrays, length
+    outline, lips, closed, cell_edges, at_rest, interfaces : (k, 3, 2) arrays, length
         Edges as three points: of the body, of open crack faces, of closed crack faces, between
-        cells of the mesh, and of the body that has not moved.
+        cells of the mesh, of the body that has not moved, and between materials.
     near : (2, 2) array, length, optional
         Box to show instead of the whole body.
     """
@@ -70,6 +71,7 @@ class Scene:
     closed: Floats
     cell_edges: Floats
     at_rest: Floats
+    interfaces: Floats
     near: Floats | None = None
 
     @property
@@ -87,11 +89,12 @@ def scene(solution: Solution, field: str, warp: float, limits: tuple[float, floa
     values = field_values(body, field)
     low, high, share = _range(body, field, values, limits)
     # Rounded down: "100 %" would not be true.
-    label = FIELDS[field] + (f", clipped at {int(10 * share) / 10:g} %" if share < 100 else "")
+    label = label_of(body, field)
+    label += f", clipped at {int(10 * share) / 10:g} %" if share < 100 else ""
     edge, owner = _edges(body)
     crack, closed = _on_lips(body, edge)
     lip = crack >= 0
-    on_facet, facet = _on_facets(body, edge, owner)
+    on_facet, facet, between = _on_facets(body, edge, owner)
     rim = (facet >= 0) & ~lip
     points, triangles = body.points, _triangles(body)
     given = np.concatenate([body.displacement, values[:, None]], axis=1)
@@ -123,6 +126,7 @@ def scene(solution: Solution, field: str, warp: float, limits: tuple[float, floa
         closed=curve[lip & closed],
         cell_edges=curve[on_facet & ~lip & ~rim],
         at_rest=rest,
+        interfaces=curve[between & ~lip],
     )
 
 
@@ -162,6 +166,15 @@ def _with_middles(lines: Floats) -> Floats:
     return np.stack([lines[:, 0], lines.mean(axis=1), lines[:, 1]], axis=1)
 
 
+def label_of(body: Pieces, field: str) -> str:
+    """What the colour bar says."""
+    if field != "material":
+        return SPACE_FIELDS[field]
+    named = body.solution.problem.elasticity.named
+    names = [f"{k} {name or material.kind}" for k, (name, material) in enumerate(named)]
+    return f"material: {', '.join(names)}"
+
+
 def field_values(body: Pieces, field: str) -> Floats:
     """Values of a field at the points of the pieces `(n,)`."""
     if field == "von_mises":
@@ -169,6 +182,8 @@ def field_values(body: Pieces, field: str) -> Floats:
     if field in STRESSES:
         i, j = ("xyz".index(letter) for letter in field[1:])
         return np.array(body.stress[:, i, j])
+    if field == "material":
+        return body.material.astype(float)
     if field == "displacement":
         return np.asarray(np.linalg.norm(body.displacement, axis=1))
     return np.array(body.displacement[:, "xyz".index(field[1])])
@@ -263,8 +278,8 @@ def _edges(body: Pieces) -> tuple[Ints, Ints]:
     return edge[order][last], owner[order][last]
 
 
-def _on_facets(body: Pieces, edge: Ints, owner: Ints) -> tuple[Bools, Ints]:
-    """Which edges lie on facets of the mesh, and on which of its boundary; -1 for none.
+def _on_facets(body: Pieces, edge: Ints, owner: Ints) -> tuple[Bools, Ints, Bools]:
+    """Which edges lie on facets, on which of the boundary (-1: none), which between materials.
 
     Counting the pieces at an edge would not tell: sub-cells of neighbours need not match.
     """
@@ -275,7 +290,10 @@ def _on_facets(body: Pieces, edge: Ints, owner: Ints) -> tuple[Bools, Ints]:
     rim = mesh.facet_to_cell[mesh.cell_to_facet, 1] < 0  # opposite to each corner of a cell
     outer = on & rim[cell]
     facet = mesh.cell_to_facet[cell, np.argmax(outer, axis=1)]
-    return np.asarray(on.any(axis=1)), np.where(outer.any(axis=1), facet, -1)
+    between = np.zeros(len(mesh.facets), dtype=bool)
+    between[body.solution.problem.elasticity.interfaces] = True
+    bonded = (on & between[mesh.cell_to_facet[cell]]).any(axis=1)
+    return np.asarray(on.any(axis=1)), np.where(outer.any(axis=1), facet, -1), np.asarray(bonded)
 
 
 def _curves(edge: Ints, points: Floats) -> Floats:

@@ -14,7 +14,13 @@ from xcrack.model.loads import FacetPoints
 from xcrack.output.curved_sides import CurvedSides
 from xcrack.output.lip_faces_3d import LipFaces, lip_faces
 from xcrack.output.pieces import pieces
-from xcrack.view.scene_2d import SPACE_FIELDS, STRESSES, clipped_range, field_values, rounded_range
+from xcrack.view.scene_2d import (
+    STRESSES,
+    clipped_range,
+    field_values,
+    label_of,
+    rounded_range,
+)
 from xcrack.view.section_3d import (
     Faces,
     Plane,
@@ -208,7 +214,7 @@ def space_scene(
     return SpaceScene(
         triangles=corners,
         values=values,
-        label=SPACE_FIELDS[field] + (f", clipped at {int(10 * share) / 10:g} %" if clip else ""),
+        label=label_of(body, field) + (f", clipped at {int(10 * share) / 10:g} %" if clip else ""),
         limits=(low, high),
         signed=low < 0 < high,
         touching=nothing,

@@ -25,16 +25,39 @@ def _half_angle(x, y, r, behind, side):  # type: ignore[no-untyped-def]
 
 
 @kernel
+def _bend(M, r, c, s):  # type: ignore[no-untyped-def]
+    """Derivatives ahead of the gradient of a component, given by tip functions (4,)."""
+    C, S, size = c * c - s * s, 2.0 * s * c, r * math.sqrt(r)
+    c3, s3 = c * C - s * S, s * C + c * S
+    # The tip functions by cosine and sine of half the angle, and of three times that.
+    a, b, e, d = M[0] + 0.5 * M[2], M[1] + 0.5 * M[3], -0.5 * M[2], 0.5 * M[3]
+    v = a * c + b * s + e * c3 + d * s3
+    v1 = 0.5 * (b * c - a * s) + 1.5 * (d * c3 - e * s3)
+    v2 = -0.25 * (a * c + b * s) - 2.25 * (e * c3 + d * s3)
+    along, across = 0.5 * v * C - v1 * S, 0.5 * v * S + v1 * C
+    slope_along = -0.5 * (v1 * C + v * S) - v2 * S
+    slope_across = 0.5 * (v * C - v1 * S) + v2 * C
+    return -(0.5 * along * C + slope_along * S) / size, -(
+        0.5 * across * C + slope_across * S
+    ) / size
+
+
+@kernel
 def _factor(  # type: ignore[no-untyped-def]
-    x, y, behind, side, weight, outer, inner, frame, modes, lam, mu, result
+    x, y, behind, side, weight, outer, inner, frame, modes, lam, mu, change, result
 ):  # fmt: skip
-    """Set the factors (2, 2, 2) of one point; False where grad q is 0."""
+    """Set the factors (2, 2, 2) of one point; False where there are none.
+
+    The change of the stiffness from that of the tip (3, 3) counts unless it is None.
+    """
     r = math.sqrt(x * x + y * y)
-    if r >= outer or r <= inner:
+    if r >= outer or (r <= inner and change is None) or r == 0.0:
         return False
     c, s = _half_angle(x, y, r, behind, side)
     width = outer - inner
     z = (r - inner) / width
+    if change is not None:
+        z = max(z, 0.0)
     fall = -30.0 * z * z * (1.0 - z) * (1.0 - z) / (width * r) * weight
     dx, dy = fall * x, fall * y
     C, S = c * c - s * s, 2.0 * s * c
@@ -60,6 +83,18 @@ def _factor(  # type: ignore[no-untyped-def]
         f11 = trace + 2.0 * mu * b * dy - dx * s22
         f01 = mu * (a * dy + b * dx) - dx * s12
         f10 = mu * (a * dy + b * dx) + s22 * dy
+        if change is not None:
+            q = weight * (1.0 - z * z * z * (10.0 - 15.0 * z + 6.0 * z * z))
+            h00, h01 = _bend(M[0], r, c, s)
+            h10, h11 = _bend(M[1], r, c, s)
+            t0 = a * dx + q * h00
+            t1 = b * dy + q * h11
+            t2 = a * dy + b * dx + q * (h01 + h10)
+            shear = change[2, 0] * t0 + change[2, 1] * t1 + change[2, 2] * t2
+            f00 += change[0, 0] * t0 + change[0, 1] * t1 + change[0, 2] * t2
+            f11 += change[1, 0] * t0 + change[1, 1] * t1 + change[1, 2] * t2
+            f01 += shear
+            f10 += shear
         for i in range(2):
             first = frame[0, i] * f00 + frame[1, i] * f10
             second = frame[0, i] * f01 + frame[1, i] * f11
@@ -70,7 +105,7 @@ def _factor(  # type: ignore[no-untyped-def]
 
 @kernel
 def ring_factors(  # type: ignore[no-untyped-def]
-    cell, bary, side, weight, points, cells, psi, tip, outer, inner, frame, modes, lam, mu
+    cell, bary, side, weight, points, cells, psi, tip, outer, inner, frame, modes, lam, mu, change
 ):  # fmt: skip
     """Factors B of the displacement gradient in the domain integrals of modes I and II.
 
@@ -92,11 +127,14 @@ def ring_factors(  # type: ignore[no-untyped-def]
     modes : (2, 2, 4) array
         Displacements of modes I and II by tip function.
     lam, mu : float
+    change : (q, 3, 3) array or None
+        Stiffness less that of the tip, in the frame, by strains and shear angle. None is compiled
+        for itself.
 
     Returns
     -------
     (q, 2, 2, 2) array
-        Component, derivative, mode; zero where grad q is.
+        Component, derivative, mode; zero where grad q is and nothing changes.
     """
     result = np.zeros((len(weight), 2, 2, 2))
     for p in range(len(weight)):
@@ -108,7 +146,8 @@ def ring_factors(  # type: ignore[no-untyped-def]
             psi_sum += psi[node]
         x, y = frame[0, 0] * dx + frame[0, 1] * dy, frame[1, 0] * dx + frame[1, 1] * dy
         _factor(
-            x, y, psi_sum < 0.0, side[p], weight[p], outer, inner, frame, modes, lam, mu, result[p]
+            x, y, psi_sum < 0.0, side[p], weight[p], outer, inner, frame, modes, lam, mu,
+            None if change is None else change[p], result[p],
         )  # fmt: skip
     return result
 
@@ -116,7 +155,7 @@ def ring_factors(  # type: ignore[no-untyped-def]
 @kernel
 def plain_ring(  # type: ignore[no-untyped-def]
     chosen, points, cells, slopes, volume, side, psi, bary, share, tip, outer, inner, frame, modes,
-    lam, mu,
+    lam, mu, change,
 ):  # fmt: skip
     """The same integrals over plain cells, with each shape and surplus function of order 2.
 
@@ -132,6 +171,8 @@ def plain_ring(  # type: ignore[no-untyped-def]
         Points of a cell and their share of its volume.
     tip : (2,) array, length
     outer, inner, frame, modes, lam, mu : as in `ring_factors`
+    change : (k, q or 1, 3, 3) array or None
+        As in `ring_factors`, of the chosen cells: at their points, or the same at all of them.
 
     Returns
     -------
@@ -153,11 +194,24 @@ def plain_ring(  # type: ignore[no-untyped-def]
             for b in range(3):
                 dx += bary[p, b] * points[cells[e, b], 0]
                 dy += bary[p, b] * points[cells[e, b], 1]
-            if not inner * inner < dx * dx + dy * dy < outer * outer:
+            square = dx * dx + dy * dy
+            if square >= outer * outer or (change is None and square <= inner * inner):
                 continue
             x, y = frame[0, 0] * dx + frame[0, 1] * dy, frame[1, 0] * dx + frame[1, 1] * dy
             if not _factor(
-                x, y, behind, side[e], share[p] * volume[e], outer, inner, frame, modes, lam, mu, B
+                x,
+                y,
+                behind,
+                side[e],
+                share[p] * volume[e],
+                outer,
+                inner,
+                frame,
+                modes,
+                lam,
+                mu,
+                None if change is None else change[k, min(p, change.shape[1] - 1)],
+                B,
             ):
                 continue
             u, v, w = bary[p, 0], bary[p, 1], bary[p, 2]

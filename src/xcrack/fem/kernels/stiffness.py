@@ -102,37 +102,40 @@ def _add_remainder(data, slot, weight, G, remainder):  # type: ignore[no-untyped
 
 
 @kernel
-def block_stiffness(  # type: ignore[no-untyped-def]
-    slot, n_blocks, gradient, volume, derivative, weight, lam, mu, remainder
+def add_block_stiffness(  # type: ignore[no-untyped-def]
+    data, cells, slot, gradient, volume, derivative, bary, weight, factor, lam, mu, remainder
 ):
-    """Elastic stiffness of plain cells, summed into node blocks.
+    """Add the elastic stiffness of plain cells of one material to node blocks.
 
     Parameters
     ----------
+    data : (n_blocks, d, d) array
+        Changed in place.
+    cells : (k,) array of int
     slot : (m, n, n) array of int
-    n_blocks : int
     gradient : (m, d + 1, d) array
         Gradients of the barycentric coordinates.
     volume : (m,) array
     derivative : (q, n, d + 1) array
         Shape derivatives at the integration points.
-    weight : (q,) array
+    bary, weight : (q, d + 1) array and (q,) array
+    factor : (m, d + 1) array or None
+        By which the stiffness counts at the corners, linear between. None is compiled for itself.
     lam, mu : float
     remainder : (d, d, d, d) array or None
         Stiffness besides. None is compiled for itself: isotropic bodies pay nothing.
-
-    Returns
-    -------
-    (n_blocks, d, d) array
     """
-    m, n, _ = slot.shape
-    d = gradient.shape[2]
-    data = np.zeros((n_blocks, d, d))
+    n, d = slot.shape[1], gradient.shape[2]
     G = np.empty((n, d))
     both = lam + 2.0 * mu
-    for e in range(m):
+    for e in cells:
         for q in range(len(weight)):
             w = weight[q] * volume[e]
+            if factor is not None:
+                at_point = 0.0
+                for k in range(d + 1):
+                    at_point += bary[q, k] * factor[e, k]
+                w *= at_point
             for a in range(n):
                 for i in range(d):
                     total = 0.0
@@ -164,7 +167,6 @@ def block_stiffness(  # type: ignore[no-untyped-def]
                         for j in range(d):
                             block[i, j] += w * (lam * G[a, i] * G[b, j] + mu * G[a, j] * G[b, i])
                         block[i, i] += dot
-    return data
 
 
 @kernel

@@ -75,6 +75,38 @@ def _unit_fields(r, c, s, modes, kolosov, lam, mu, g, sigma):  # type: ignore[no
 
 
 @kernel
+def _unit_bends(r, x, y, c, s, modes, kolosov, mu, bend):  # type: ignore[no-untyped-def]
+    """Derivatives ahead of the gradients of the unit fields, at half the angle (c, s)."""
+    root, C, S = math.sqrt(r), c * c - s * s, 2.0 * s * c
+    c3, s3 = c * C - s * S, s * C + c * S
+    for m in range(2):
+        for i in range(2):
+            # The tip functions by cosine and sine of half the angle, and of three times that.
+            a, e = modes[m, i, 0] + 0.5 * modes[m, i, 2], -0.5 * modes[m, i, 2]
+            b, d = modes[m, i, 1] + 0.5 * modes[m, i, 3], 0.5 * modes[m, i, 3]
+            v = a * c + b * s + e * c3 + d * s3
+            v1 = 0.5 * (b * c - a * s) + 1.5 * (d * c3 - e * s3)
+            v2 = -0.25 * (a * c + b * s) - 2.25 * (e * c3 + d * s3)
+            along = 0.5 * v * C - v1 * S
+            across = 0.5 * v * S + v1 * C
+            slope_along = -0.5 * (v1 * C + v * S) - v2 * S
+            slope_across = 0.5 * (v * C - v1 * S) + v2 * C
+            bend[m, i, 0] = -(0.5 * along * C + slope_along * S) / (root * r)
+            bend[m, i, 1] = -(0.5 * across * C + slope_across * S) / (root * r)
+    square = r * r
+    scale = 1.0 / (math.pi * square)
+    stress_00 = scale * (-3.0 * x * x + 4.0 * x**4 / square) / square
+    stress_01 = scale * (-2.0 * x * y + 4.0 * x**3 * y / square) / square
+    stress_11 = scale * (-y * y + 4.0 * x * x * y * y / square) / square
+    mean = (3.0 - kolosov) / 4.0 * scale * (2.0 * x * x / square - 1.0)
+    turn = -(kolosov + 1.0) / (8.0 * mu * math.pi) * 2.0 * x * y / (square * square)
+    bend[2, 0, 0] = (stress_00 - mean) / (2.0 * mu)
+    bend[2, 0, 1] = stress_01 / (2.0 * mu) - turn
+    bend[2, 1, 0] = stress_01 / (2.0 * mu) + turn
+    bend[2, 1, 1] = (stress_11 - mean) / (2.0 * mu)
+
+
+@kernel
 def _into_frame(frame, tensor, turn, local):  # type: ignore[no-untyped-def]
     """Components along the rows of a frame of a tensor less another one; (2, 2, s)."""
     for state in range(tensor.shape[2]):
@@ -90,9 +122,12 @@ def _into_frame(frame, tensor, turn, local):  # type: ignore[no-untyped-def]
 @kernel
 def _add_point(  # type: ignore[no-untyped-def]
     total, local, dx, dy, side, behind, weight, radii, inner, frame, modes, kolosov, lam, mu, g,
-    sigma, fall,
+    sigma, fall, change, bend,
 ):  # fmt: skip
-    """Add what one point contributes; local: gradients in the frame, dx and dy from the tip."""
+    """Add what one point contributes; local: gradients in the frame, dx and dy from the tip.
+
+    The change of the stiffness from that of the tip (3, 3) counts unless it is None.
+    """
     r = math.sqrt(dx * dx + dy * dy)
     x = frame[0, 0] * dx + frame[0, 1] * dy
     y = frame[1, 0] * dx + frame[1, 1] * dy
@@ -124,12 +159,29 @@ def _add_point(  # type: ignore[no-untyped-def]
             )
             for k in range(len(radii)):
                 total[state, k, m] += fall[k] * flux
+    if change is not None:
+        _unit_bends(r, x, y, c, s, modes, kolosov, mu, bend)
+        for state in range(local.shape[2]):
+            e0, e1 = local[0, 0, state], local[1, 1, state]
+            e2 = local[0, 1, state] + local[1, 0, state]
+            s00 = change[0, 0] * e0 + change[0, 1] * e1 + change[0, 2] * e2
+            s11 = change[1, 0] * e0 + change[1, 1] * e1 + change[1, 2] * e2
+            s01 = change[2, 0] * e0 + change[2, 1] * e1 + change[2, 2] * e2
+            for m in range(3):
+                flux = x * (s00 * g[m, 0, 0] + s01 * g[m, 1, 0])
+                flux += y * (s01 * g[m, 0, 0] + s11 * g[m, 1, 0])
+                steady = s00 * bend[m, 0, 0] + s11 * bend[m, 1, 1]
+                steady += s01 * (bend[m, 0, 1] + bend[m, 1, 0])
+                for k in range(len(radii)):
+                    z = min(max((r - inner[k]) / (radii[k] - inner[k]), 0.0), 1.0)
+                    q = 1.0 - z * z * z * (10.0 - 15.0 * z + 6.0 * z * z)
+                    total[state, k, m] += fall[k] * flux + weight * q * steady
 
 
 @kernel
 def add_points(  # type: ignore[no-untyped-def]
     total, gradient, cell, bary, side, weight, points, cells, psi, tip, turn, radii, inner, frame,
-    modes, kolosov, lam, mu,
+    modes, kolosov, lam, mu, change,
 ):  # fmt: skip
     """Add the domain integrals of modes I, II and of the point force over points.
 
@@ -157,12 +209,17 @@ def add_points(  # type: ignore[no-untyped-def]
     modes : (2, 2, 4) array
         Displacements of modes I and II by tip function.
     kolosov, lam, mu : float
+    change : (q, 3, 3) array or None
+        Stiffness less that of the tip, in the frame, by strains and shear angle. With it points
+        within the inner radius count too. None is compiled for itself.
     """
     g, sigma, fall = np.empty((3, 2, 2)), np.empty((3, 2, 2)), np.empty(len(radii))
-    local = np.empty((2, 2, total.shape[0]))
+    local, bend = np.empty((2, 2, total.shape[0])), np.empty((3, 2, 2))
     largest, smallest = radii[0], inner[0]
     for k in range(1, len(radii)):
         largest, smallest = max(largest, radii[k]), min(smallest, inner[k])
+    if change is not None:
+        smallest = 0.0
     for p in range(len(weight)):
         dx, dy, psi_sum = -tip[0], -tip[1], 0.0
         for b in range(3):
@@ -174,14 +231,14 @@ def add_points(  # type: ignore[no-untyped-def]
             _into_frame(frame, gradient[p], turn, local)
             _add_point(
                 total, local, dx, dy, side[p], psi_sum < 0.0, weight[p], radii, inner, frame, modes,
-                kolosov, lam, mu, g, sigma, fall,
+                kolosov, lam, mu, g, sigma, fall, None if change is None else change[p], bend,
             )  # fmt: skip
 
 
 @kernel
 def add_plain_cells(  # type: ignore[no-untyped-def]
     total, chosen, points, cells, slopes, volume, nodes, edges, coefficients, side, psi, bary,
-    share, tip, turn, radii, inner, frame, modes, kolosov, lam, mu,
+    share, tip, turn, radii, inner, frame, modes, kolosov, lam, mu, change,
 ):  # fmt: skip
     """Add the domain integrals over plain cells: places, gradients and terms in one pass.
 
@@ -191,6 +248,8 @@ def add_plain_cells(  # type: ignore[no-untyped-def]
     ----------
     total, tip, turn, radii, inner, frame, modes, kolosov, lam, mu
         As of `add_points`.
+    change : (k, q or 1, 3, 3) array or None
+        As of `add_points`, of the chosen cells: at their points, or the same at all of them.
     chosen : (k,) array of int
         Cells on which no enriched function acts.
     points, cells : (n, 2) and (m, 3) arrays
@@ -210,11 +269,14 @@ def add_plain_cells(  # type: ignore[no-untyped-def]
     states = total.shape[0]
     g, sigma, fall = np.empty((3, 2, 2)), np.empty((3, 2, 2)), np.empty(len(radii))
     gradient, corner = np.empty((2, 2, states)), np.empty((3, 2, 2, states))
-    local = np.empty((2, 2, states))
+    local, bend = np.empty((2, 2, states)), np.empty((3, 2, 2))
     largest, smallest = radii[0], inner[0]
     for k in range(1, len(radii)):
         largest, smallest = max(largest, radii[k]), min(smallest, inner[k])
-    for e in chosen:
+    if change is not None:
+        smallest = 0.0
+    for place in range(len(chosen)):
+        e = chosen[place]
         behind = psi[cells[e, 0]] + psi[cells[e, 1]] + psi[cells[e, 2]] < 0.0
         for b in range(3):
             for i in range(2):
@@ -250,4 +312,5 @@ def add_plain_cells(  # type: ignore[no-untyped-def]
             _add_point(
                 total, local, dx, dy, side[e], behind, share[p] * volume[e], radii, inner, frame,
                 modes, kolosov, lam, mu, g, sigma, fall,
+                None if change is None else change[place, min(p, change.shape[1] - 1)], bend,
             )  # fmt: skip

@@ -69,7 +69,7 @@ class Springs(ContactMethod):
         """Gaps at the points of one crack, and the stiffness there."""
         size = _size(model, model.lips[m.crack])
         stress = sp.csr_matrix((len(m.measure), model.space.n_dof))
-        eps = self.factor * problem.material.largest_modulus / size
+        eps = self.factor * problem.elasticity.largest_modulus / size
         return Rows(model.jumps[m.crack], stress, eps, m.measure)
 
     def solve_states(
@@ -194,7 +194,7 @@ class augmented_lagrangian(Springs):  # noqa: N801
         lips = model.lips[m.crack]
         size = np.asarray(m.values.T @ (lips.weight * _size(model, lips))) / m.measure
         stress = sp.csr_matrix((len(m.measure), model.space.n_dof))
-        eps = self.factor * problem.material.largest_modulus / size
+        eps = self.factor * problem.elasticity.largest_modulus / size
         return Rows(gap_rows(m, lips, model.jumps[m.crack]), stress, eps, m.measure)
 
     def system(self, engine: DirectSystem, rows: "Rows") -> "ClosedSystem":
@@ -251,8 +251,10 @@ class nitsche(Springs):  # noqa: N801
         lips, c = model.lips[m.crack], m.crack
         mean = averaging(model.space, lips)
         size = np.minimum(_size(model, lips), tip_distance(model.space, c, lips))
-        stress = sp.csr_matrix(mean @ stress_matrix(model.space, problem.material, c, lips))
-        eps = self.factor * problem.material.largest_modulus / size
+        stress = sp.csr_matrix(
+            mean @ stress_matrix(model.space, problem.elasticity.material, c, lips)
+        )
+        eps = self.factor * problem.elasticity.largest_modulus / size
         return Rows(model.jumps[c], stress, eps, m.measure)
 
     def system(self, engine: DirectSystem, rows: "Rows") -> "ClosedSystem":
@@ -282,7 +284,7 @@ def face_tractions(
     parts = []
     for m in chosen:
         lips = model.lips[m.crack]
-        given = steady_stress(problem.material, lips, m.crack, acting)
+        given = steady_stress(problem.elasticity.material, lips, m.crack, acting)
         parts.append(averaging(model.space, lips) @ given if given.any() else given)
     return np.concatenate(parts)
 

@@ -5,6 +5,7 @@ import scipy.linalg
 import scipy.sparse as sp
 import scipy.sparse.linalg as sla
 
+from xcrack.analysis.contact import material_numbers
 from xcrack.analysis.friction import has_friction, tangential_rows
 from xcrack.analysis.multipliers import Multipliers, gap_rows, multipliers
 from xcrack.base.arrays import Floats
@@ -50,19 +51,23 @@ def inf_sup(problem: Problem, crack: int = 0, *, norm: str = "h1") -> float:
     model = build(problem)
     space = model.space
     lips = model.lips[crack]
-    chosen = multipliers(space, crack, lips, problem.numerics.multipliers)
+    chosen = multipliers(
+        space, crack, lips, problem.numerics.multipliers, material=material_numbers(problem)
+    )
     if norm == "h1":
         A, B = _h1(space), _scalar_rows(space, model, crack, chosen)
         basis = sp.identity(space.n_functions, format="csr")
     else:
         fixed = np.zeros(space.n_dof, dtype=bool)
-        A = model.stiffness / problem.material.largest_modulus
+        A = model.stiffness / problem.elasticity.largest_modulus
         # A small mass makes the rigid motions regular without a support.
         A = A + 1e-8 * sp.diags(A.diagonal())
         B = gap_rows(chosen, lips, model.jumps[crack])
         if has_friction(problem, crack):
             B = sp.csr_matrix(sp.vstack([B, *tangential_rows(space, chosen, lips)]))
-        basis = scaled_basis(space, sp.csr_matrix(A), fixed, problem.numerics, problem.material)
+        basis = scaled_basis(
+            space, sp.csr_matrix(A), fixed, problem.numerics, problem.elasticity.material
+        )
     L, d = space.mesh.extent, space.dim
     h = leg_sizes(space.mesh, lips.cell).mean(axis=1) / L
     gram = (chosen.values.T @ sp.diags(h * lips.weight) @ chosen.values).toarray() / L ** (d - 1)

@@ -41,7 +41,7 @@ def _run(level: int, factor: float) -> list[Value]:
     problem = Problem(mesh, Isotropic(E, nu, "strain"), [line_crack([mouth - along, tip])],
                       loads=ends)  # fmt: skip
     solution = solve(problem, [factor])[0]
-    G = energy_release_rate(stress_intensity(solution), problem.material)
+    G = energy_release_rate(stress_intensity(solution), problem.elasticity.material)
     at = mouth[None] + 1e-6 * along
     jump = solution.displacement(at, 1) - solution.displacement(at, -1)
     name = "opening at the mouth" if factor > 0 else "slip at the mouth"
