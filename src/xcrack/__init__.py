@@ -26,6 +26,7 @@ _HOME = {
     "Graded": "model.material",
     "MaterialSets": "model.material",
     "Material": "model.material",
+    "interface_intensity": "sif.interface_crack",
     "Crack": "crack.crack",
     "line_crack": "crack.lines",
     "penny_crack": "crack.surfaces",

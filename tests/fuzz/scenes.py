@@ -46,6 +46,16 @@ def solution(dim=2, cracked=True):
 
 
 @cache
+def split():
+    """A crack along the interface of two materials."""
+    mesh = xc.box((-1, -1), (1, 1), 6)
+    mesh = mesh.with_cell_sets({"one": lambda x: x[:, 1] < 0, "two": lambda x: x[:, 1] > 0})
+    materials = {"one": xc.Isotropic(1.0, 0.3, "strain"), "two": xc.Isotropic(2.0, 0.3, "strain")}
+    pull = [xc.traction("top", (0.0, 1.0)), xc.traction("bottom", (0.0, -1.0))]
+    return xc.solve(xc.Problem(mesh, materials, [xc.line_crack([(-1, 0), (0.1, 0)])], loads=pull))
+
+
+@cache
 def states():
     return xc.solve(problem(), [0.0, 1.0])
 

@@ -231,6 +231,16 @@ ENTRIES = [
         cost=0.03,
     ),
     Entry(
+        "interface_intensity",
+        xc.interface_intensity,
+        {
+            "solution": arg(Of(type=xc.Solution), Late(scenes.split), words=["Solution"]),
+            "length": arg(Number(above=0), 2.0),
+            "crack": CRACK,
+        },
+        cost=0.03,
+    ),
+    Entry(
         "handbook",
         lambda kind, values: (
             xc.handbook(kind, **values)

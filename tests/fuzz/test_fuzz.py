@@ -29,6 +29,10 @@ _EXEMPT = {
 # By xcrack itself, with arrays of quadrature points.
 _CALLED_BY_XCRACK = {
     "check",  # of materials, with the dimension of the mesh
+    "with_yield_stress",  # as the options of a report, drawn there
+    "stored",  # for a file
+    "moduli",  # at nodes of the mesh: drawn as E of a problem
+    "expansion",
     "tensor",
     "stress_across",
     "thermal_stress",

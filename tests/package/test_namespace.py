@@ -24,7 +24,7 @@ NAMES = [
     "write", "SIF", "handbook", "Specimen",
     "compact_tension", "disc_compact", "lug", "middle_tension", "single_edge_bend",
     "single_edge_tension",
-    "stress_intensities", "refine", "pardiso", "draw_K",
+    "stress_intensities", "interface_intensity", "refine", "pardiso", "draw_K",
     # growth
     "Cycle", "History", "Step", "collect", "elber", "equivalent_K", "grow", "max_hoop_stress",
     "mean_reference", "paris", "resume", "walker", "weighted_angle", "cycles_between", "load",

@@ -22,7 +22,7 @@ from xcrack.fem.quadrature import at_joints, cell_side
 from xcrack.fem.system import System
 from xcrack.linalg.engine import Engine, SolverState
 from xcrack.linalg.rigid_motion import Motion
-from xcrack.mesh.locate import locate
+from xcrack.mesh.locate import barycentric, cells_at, locate
 from xcrack.model.loads import Load
 from xcrack.model.problem import LoadState, Problem, crack_number
 
@@ -222,40 +222,16 @@ class Solution:
         """Stress at points given by cell `(q, d, d)`; arguments as of `at`."""
         cell, bary, side = self._by_cell(cell, bary, side)
         sigma = self.problem.elasticity.stress(self.at(cell, bary, side)[1], cell, bary)
-        return sigma + self.initial_stress_at(cell, bary)
+        return sigma + initial_stress_at(self, cell, bary)
 
     def initial_stress(self, x: Floats) -> Floats:
         """Sum of the initial stresses at points `(q, d)`: `(q, d, d)`."""
         x = numbers(x, "initial_stress: x", (None, self.space.dim))
         if self.problem.elasticity.is_uniform:
             nowhere = np.zeros(len(x), dtype=np.int64)  # the stress does not depend on the cell
-            return self.initial_stress_at(nowhere, np.zeros((len(x), 0)), x)
-        return self.initial_stress_at(*self._nearest_cells(x), x)
-
-    def _nearest_cells(self, x: Floats) -> tuple[Ints, Floats]:
-        """Cells `(q,)` and places in them of points in or beside the body."""
-        cell, bary = locate(self.space.mesh, x)
-        # Beside a curved side, which is a polygon to the mesh, the nearest cell counts.
-        outside = np.nonzero(cell < 0)[0]
-        if len(outside):
-            cell[outside] = self.space.mesh.cell_tree.query(x[outside])[1]
-            bary[outside] = 1 / (self.space.dim + 1)
-        return cell, bary
-
-    def initial_stress_at(
-        self, cell: Ints, bary: Floats, x: Floats | None = None, exact: bool = False
-    ) -> Floats:
-        """Sum of the initial stresses at points given by cell, or besides by place: `(q, d, d)`.
-
-        Of a graded modulus it is that of the stiffness, or as K takes it the exact one.
-        """
-        total = np.zeros((len(cell), self.space.dim, self.space.dim))
-        for load, factor in self.acting:
-            if "initial_stress" in load.acts:
-                x = position(self.space, cell, bary) if x is None else x
-                elasticity = self.problem.elasticity
-                total = total + factor * elasticity.initial_stress(load, x, cell, bary, exact)
-        return total
+            return initial_stress_at(self, nowhere, np.zeros((len(x), 0)), x)
+        cell = cells_at(self.space.mesh, x)
+        return initial_stress_at(self, cell, barycentric(self.space.mesh, cell, x), x)
 
     def opening(self, crack: int = 0) -> Floats:
         """Normal opening n . [[u]] `(q,)` at the points `lips[crack].x`, length."""
@@ -380,6 +356,22 @@ def sides_of(space: FunctionSpace, cell: Ints, bary: Floats, lip: int) -> Ints:
         side_of_point = np.where(on_lip & (lip != 0), lip, np.where(phi >= 0, 1, -1))
         side[:, c] = np.where(split, side_of_point, side[:, c])
     return at_joints(space, cell, bary, side) if space.joints else side
+
+
+def initial_stress_at(
+    solution: Solution, cell: Ints, bary: Floats, x: Floats | None = None, exact: bool = False
+) -> Floats:
+    """Sum of the initial stresses at points given by cell, or besides by place `(q, d, d)`.
+
+    Of a graded modulus it is that of the stiffness, or as K takes it the exact one.
+    """
+    total = np.zeros((len(cell), solution.space.dim, solution.space.dim))
+    for load, factor in solution.acting:
+        if "initial_stress" in load.acts:
+            x = position(solution.space, cell, bary) if x is None else x
+            elasticity = solution.problem.elasticity
+            total = total + factor * elasticity.initial_stress(load, x, cell, bary, exact)
+    return total
 
 
 __all__ = []

@@ -16,7 +16,7 @@ import numpy as np
 from xcrack.base.arrays import Bools, Floats, Ints, at, lock
 from xcrack.base.checks import value_text
 from xcrack.base.errors import GeometryError, ProblemError
-from xcrack.mesh.locate import barycentric, locate
+from xcrack.mesh.locate import barycentric, cells_at
 from xcrack.mesh.mesh import Mesh, local_edges
 from xcrack.mesh.simplex import node_points, simplex_rule
 from xcrack.model.material import Isotropic, Material, ScaledMaterial, isotropic_part
@@ -233,22 +233,37 @@ class Elasticity:
         Parameters
         ----------
         cells : (k,) array of int
-            Around the tip.
-        x : (d,) array, length
+            Around the tip, or along the front.
+        x : (d,) array, or (m, d) array of a front, length
 
         Raises
         ------
         GeometryError
-            The tip lies on an interface.
+            The tip lies on an interface, or the front in several materials.
         ProblemError
-            The material there is not isotropic.
+            The material there is not isotropic, or along a front graded.
         """
         if len(self.number) and len(np.unique(self.number[cells])) > 1:
             names = " and ".join(map(repr, self.names_of(cells)))
+            if x.ndim == 2:
+                raise GeometryError(
+                    f"the front from {at(x[0])} to {at(x[-1])} passes through {names}: K along a "
+                    "front is known in one material. Let it end at the interface, or give both "
+                    "sets the same elastic constants."
+                )
             raise GeometryError(
                 f"the crack ends at {at(x)} on the interface of {names}: the stress there does not "
-                "go like 1/√r, so there is no K. Let it end a cell before or behind."
+                "go like 1/√r, so there is no K. Let it end a cell before or behind; a crack along "
+                "the interface has a complex K, see interface_intensity."
             )
+        if x.ndim == 2:
+            material = self.groups(cells)[0][0]
+            if material.is_graded:
+                raise ProblemError(
+                    f"{material!r}: K along a front is known in a material with one stiffness: "
+                    "give the set around the front an Isotropic."
+                )
+            return material.at_tip()
         return self._isotropic(int(cells[0]), x)
 
     def _isotropic(self, cell: int, x: Floats) -> Isotropic:
@@ -270,11 +285,7 @@ class Elasticity:
         """
         if not len(self.set_number):
             return np.zeros(len(x), dtype=np.int64)
-        cell, _ = locate(self.mesh, x)
-        outside = np.nonzero(cell < 0)[0]
-        if len(outside):
-            cell[outside] = self.mesh.cell_tree.query(x[outside])[1]
-        return self.set_number[cell]
+        return self.set_number[cells_at(self.mesh, x)]
 
     def names_of(self, cells: Ints) -> list[str]:
         """Names of the cell sets that hold the materials of some cells."""
@@ -311,6 +322,33 @@ class Elasticity:
         if moduli is not None:
             result = result * moduli[:, None, None]
         return np.asarray(result - _voigt(material.tensor(d), frame))
+
+    def stress_change(
+        self, material: Isotropic, gradient: Floats, cell: Ints, bary: Floats
+    ) -> Floats:
+        """Stress of displacement gradients less that which another material would bear.
+
+        Parameters
+        ----------
+        material : Isotropic
+        gradient : (q, d, d, n) array
+            Of n states.
+        cell, bary : (q,) array of int and (q, d + 1) array
+
+        Returns
+        -------
+        (q, d, d, n) array, stress
+        """
+        result = np.zeros_like(gradient)
+        differs = np.zeros(len(self.mesh.cells), dtype=bool)
+        differs[self.differing(material, np.arange(len(differs)))] = True
+        rows = np.nonzero(differs[cell])[0]
+        for n in range(gradient.shape[3] if len(rows) else 0):
+            local = np.ascontiguousarray(gradient[rows, :, :, n])
+            for part, one in self.at_points(cell[rows], bary[rows], exact=True):
+                change = one.stress(local[part]) - material.stress(local[part])
+                result[rows[part], :, :, n] = change
+        return result
 
     def _by_material(self, law: str, tensor: Floats, cell: Ints, bary: Floats) -> Floats:
         if self.is_uniform:

@@ -13,7 +13,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from xcrack.analysis.solution import Solution
+from xcrack.analysis.solution import Solution, initial_stress_at
 from xcrack.base.arrays import Bools, Floats, Ints, lock
 from xcrack.fem.function_space import FunctionSpace
 from xcrack.fem.loads import position
@@ -399,7 +399,7 @@ def full_stress(solution: Solution, cell: Ints, bary: Floats, side: Ints) -> Flo
     stress = np.zeros((len(cell), 3, 3))
     stress[:, :d, :d] = solution.stress_at(cell, bary, side)
     if d == 2:
-        elastic = stress[:, :d, :d] - solution.initial_stress_at(cell, bary)
+        elastic = stress[:, :d, :d] - initial_stress_at(solution, cell, bary)
         stress[:, 2, 2] = solution.problem.elasticity.stress_across(elastic, cell, bary)
     return stress
 

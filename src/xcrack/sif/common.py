@@ -6,9 +6,9 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial import cKDTree
 
-from xcrack.analysis.solution import Solution
+from xcrack.analysis.solution import Solution, initial_stress_at
 from xcrack.base.arrays import Bools, Floats, Ints
-from xcrack.mesh.locate import barycentric
+from xcrack.mesh.locate import barycentric, cells_at
 from xcrack.model.material import Isotropic
 from xcrack.sif.sif import SIF
 
@@ -138,7 +138,16 @@ def initial_stresses(solutions: Sequence[Solution]) -> Callable[[Floats], Floats
     """Initial stresses of all states, f(x) -> (q, 3, 3, n); None where there are none."""
     if not has_effect(solutions, "initial_stress"):
         return None
-    return lambda x: np.stack([solution.initial_stress(x) for solution in solutions], axis=-1)
+
+    def initial(x: Floats) -> Floats:
+        if solutions[0].problem.elasticity.is_uniform:
+            return np.stack([s.initial_stress(x) for s in solutions], axis=-1)
+        mesh = solutions[0].space.mesh
+        cell = cells_at(mesh, x)
+        place = cell, barycentric(mesh, cell, x), x
+        return np.stack([initial_stress_at(s, *place, True) for s in solutions], axis=-1)
+
+    return initial
 
 
 def has_effect(solutions: Sequence[Solution], *effects: str) -> bool:

@@ -14,6 +14,7 @@ from xcrack.crack.front_curve import FootPoints, FrontCurve, front_curve
 from xcrack.crack.stations import part_inside
 from xcrack.fem.loads import position
 from xcrack.fem.quadrature import cell_points, cell_side
+from xcrack.mesh.distances import closest_in, triangle_tree
 from xcrack.mesh.locate import contains
 from xcrack.mesh.simplex import leg_size
 from xcrack.sif.accuracy import Domain, check
@@ -124,7 +125,7 @@ def front_intensity(solutions: Sequence[Solution], t: int) -> list[SIF]:
     s = curve.breaks[inside - first]
     x, frame, _ = curve.at(s)
     ends = way_inside(solutions[0], curve)
-    nothing = np.zeros(len(s))
+    nothing, tip_material = np.zeros(len(s)), material_at_tip(solutions[0], t)
     empty = SIF(
         x=np.array(tip.x)[inside],
         frame=frame,
@@ -137,6 +138,8 @@ def front_intensity(solutions: Sequence[Solution], t: int) -> list[SIF]:
         closed=np.zeros(len(s), dtype=bool),
         domain_cells=nothing,
         widened=np.zeros((len(s), 3)),
+        E_prime=np.full(len(s), tip_material.E_prime),
+        nu=np.full(len(s), tip_material.nu),
     )
     if ends is None or not len(s):
         return [empty] * len(solutions)
@@ -260,7 +263,7 @@ def front_values(
     ends : tuple of float, length
         Where the front enters and leaves the body.
     """
-    space, material = solutions[0].space, material_at_tip(solutions[0], t)
+    space, tip_material = solutions[0].space, material_at_tip(solutions[0], t)
     tip = space.tips[t]
     size = leg_size(space.mesh, space.cuts[tip.crack].level_set.tip_cells[tip.number])
     wanted = solutions[0].problem.numerics.domain
@@ -285,9 +288,9 @@ def front_values(
         total += integrals_of_sides(solutions, t, sides, curve, knots, radii, turn)
     for part in _domain_parts(solutions, t, curve, knots, radii, turn):
         total += part
-    K = solve_front(total, knots, curve, material, valid, smooth)
-    wide = twice_as_wide(total, knots, curve, material, valid, smooth)
-    mean = means(total[:, 0], knots, curve, material)
+    K = solve_front(total, knots, curve, tip_material, valid, smooth)
+    wide = twice_as_wide(total, knots, curve, tip_material, valid, smooth)
+    mean = means(total[:, 0], knots, curve, tip_material)
     least = int(np.argmin(room))
     bend = curve.bend(knots, _BEND_OVER * size)
     bend_at = int(np.argmin(bend))
@@ -303,8 +306,18 @@ def front_values(
         label="K along the front, at",
         bend=float(bend[bend_at]),
         bend_at=curve.at(knots[[bend_at]])[0][0],
+        interface=_distance_to_interface(solutions[0], curve.at(knots)[0]),
     )
     return FrontValues(knots, K, mean, valid, wide, smooth, radius, domain)
+
+
+def _distance_to_interface(solution: Solution, x: Floats) -> float:
+    """Least distance of points of a front to another material, length; inf without."""
+    mesh, interfaces = solution.space.mesh, solution.problem.elasticity.interfaces
+    if not len(interfaces):
+        return np.inf
+    tree = triangle_tree(mesh.points, mesh.facets[interfaces])
+    return float(np.abs(closest_in(tree, x).distance).min())
 
 
 def _spacing(
@@ -358,7 +371,8 @@ def _domain_parts(
     mesh, psi = space.mesh, space.cuts[tip.crack].level_set.psi[tip.number]
     outer = float(radii.max())
     coefficients = np.stack([solution.coefficients for solution in solutions], axis=-1)
-    initial = initial_stresses(solutions)
+    initial, elasticity = initial_stresses(solutions), solutions[0].problem.elasticity
+    tip_material = material_at_tip(solutions[0], t)
     middle = mesh.points[mesh.cells].mean(axis=1)
     reach = 1.05 * outer
     distance = curve.distance(middle, reach + float(mesh.cell_size.max())) - reach
@@ -375,6 +389,9 @@ def _domain_parts(
         points = points.chosen(near_points)
         gradient = gradients_at(space, coefficients, points.cell, points.bary, points.side)
         behind = np.einsum("qb,qb->q", psi[mesh.cells[points.cell]], points.bary) < 0
+        change = None
+        if not elasticity.is_uniform:
+            change = elasticity.stress_change(tip_material, gradient, points.cell, points.bary)
         return domain_integrals(
             curve,
             knots,
@@ -383,10 +400,11 @@ def _domain_parts(
             gradient - turn,
             points.side[:, tip.crack],
             behind,
-            material_at_tip(solutions[0], t),
+            tip_material,
             radii,
             force=_force(solutions, x[near_points]),
             initial=initial,
+            stress_change=change,
         )
 
     chunks = range(0, len(cells), _CHUNK)

@@ -10,7 +10,7 @@ from functools import partial
 
 import numpy as np
 
-from xcrack.analysis.solution import Solution
+from xcrack.analysis.solution import Solution, initial_stress_at
 from xcrack.base.arrays import Floats
 from xcrack.estimate.dual import Goal, GoalCells, GoalPoints
 from xcrack.fem.assembly import tabulate_functions
@@ -99,7 +99,7 @@ def constant(solution: Solution, t: int) -> Floats:
         for points in class_points(space, cells, n, degree):
             total += scale * volume_terms([solution], ring, points)[0, 0, :2]
     x, cell, bary = tip_place(solution, t)
-    steady = solution.initial_stress_at(cell, bary, x, True)[0]
+    steady = initial_stress_at(solution, cell, bary, x, True)[0]
     _, _, per_stress = _faces(solution, t, outer, float(inner_radii(space.order, radii)[0]))
     return np.asarray(total + np.einsum("ijm,ij->m", per_stress, steady))
 

@@ -26,7 +26,7 @@ from typing import Any
 
 import numpy as np
 
-from xcrack.analysis.solution import Solution, gradients_at
+from xcrack.analysis.solution import Solution, gradients_at, initial_stress_at
 from xcrack.base.arrays import Floats, Ints
 from xcrack.fem.assembly import Tabulated
 from xcrack.fem.loads import position
@@ -73,7 +73,8 @@ def constant_part(solution: Solution, t: int) -> float:
 def _steady_stress(solution: Solution, t: int) -> Floats:
     """Initial stress at the tip in its frame `(d, d)`."""
     tip, (x, cell, bary) = solution.space.tips[t], tip_place(solution, t)
-    return np.asarray(tip.frame @ solution.initial_stress_at(cell, bary, x, True)[0] @ tip.frame.T)
+    steady = initial_stress_at(solution, cell, bary, x, True)[0]
+    return np.asarray(tip.frame @ steady @ tip.frame.T)
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,7 +8,9 @@ t' = -kt b + w n, n' = -kn b - w t, b' = kt t + kn n and hs = 1 - kt x1 - kn x2 
 along b of what is given in (s, x1, x2) is (d/ds - w (x1 d/dx2 - x2 d/dx1)) / hs: all terms of
 curvature (kt, kn) and of twist w of the frame are counted, none is left out. eps^a and sigma^a
 are made of the derivatives along t and n alone, hence the second and the third term.
-K_I, K_II = E' / 2 I and K_III = mu I, each divided by the integral of the hat.
+K_I, K_II = E' / 2 I and K_III = mu I, each divided by the integral of the hat. Where the stiffness
+is another one than C_t at the front, (C - C_t) eps(u) is an initial stress to a body of C_t, as in
+2D.
 """
 
 from collections.abc import Callable
@@ -145,6 +147,7 @@ def domain_integrals(
     *,
     force: Floats | None = None,
     initial: Callable[[Floats], Floats] | None = None,
+    stress_change: Floats | None = None,
     curved: bool = True,
 ) -> Floats:
     """Domain integrals over points of the body; those of all chunks add up.
@@ -170,6 +173,9 @@ def domain_integrals(
     initial : callable, optional
         f(x) -> (q, 3, 3, n), initial stress at points: its value at the foot of a point counts
         in sigma : eps^a, its change from there by the derivative of eps^a.
+    stress_change : (q, 3, 3, n) array, stress, optional
+        Where the stiffness is another one than that of the tip: (C - C_t) eps(u), which is an
+        initial stress to a body of C_t.
     curved : bool
         Without, curvature and twist are left out for comparison.
 
@@ -185,6 +191,9 @@ def domain_integrals(
     r, theta = continued_polar(feet.local, side, behind)
     hat, share, step = hats(curve, knots, feet.s)
     steady, change = _initial_stress(curve, feet, initial, states)
+    if stress_change is not None:
+        change = change + stress_change if len(change) else np.ascontiguousarray(stress_change)
+        steady = steady if len(steady) else np.zeros_like(change)
     front_terms(
         np.ascontiguousarray(weight),
         np.ascontiguousarray(gradient),

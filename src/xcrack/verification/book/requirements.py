@@ -37,6 +37,7 @@ REQUIREMENTS: Mapping[str, str] = MappingProxyType({
     "temperature": "Thermal stress",
     "resultants": "Resultants of bearing loads, forces and moments, and reactions",
     "measures": "Depth, lengths on surfaces and area of a crack in a body",
+    "materials": "Several materials, graded ones, and cracks beside and on interfaces",
     "submodel": "K of a part whose cut sides move as the whole does",
 })  # fmt: skip
 
