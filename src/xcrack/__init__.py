@@ -89,6 +89,8 @@ _HOME = {
     "material": "fatigue.metals",
     "materials": "fatigue.metals",
     "plot_rates": "view.rates",
+    "plot_spectrum": "view.lives",
+    "plot_strength": "view.lives",
     "presets": "fatigue.presets",
     "linear_closure": "fatigue.closures",
     "schijve_closure": "fatigue.closures",

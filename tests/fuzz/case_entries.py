@@ -188,6 +188,14 @@ ENTRIES = [
             "yield_stress": arg(Number(optional=True, above=0), None, 1.0),
             "inspection": arg(Seen(rule=lambda v: v is None), None),
             "strength": arg(Seen(rule=lambda v: v is None), None),
+            "spectrum": arg(Seen(rule=lambda v: v is None), None),
+            "units": arg(
+                Seen(
+                    rule=lambda v: v is None or (v == "N, mm, MPa" if isinstance(v, str) else False)
+                ),
+                None,
+                "N, mm, MPa",
+            ),
         },
         in_folder=True,
         cost=3.0,

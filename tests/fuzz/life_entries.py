@@ -95,6 +95,7 @@ def _empty(value):
     return None if isinstance(value, dict) else False
 
 
+STRENGTH = xc.residual_strength(HISTORY, nu=0.3, K_c=2000.0)
 LINE = xc.assessment_line(210e3, 355.0, 510.0)
 FLAT = HISTORY.steps[0].sif[1][0]
 
@@ -130,6 +131,38 @@ ENTRIES = [
             "collapse": arg(Called(optional=True), None),
         },
         arity=False,
+    ),
+    Entry(
+        "residual_strength",
+        lambda yield_stress, resistance: xc.residual_strength(
+            HISTORY, nu=0.3, K_c=2000.0, yield_stress=yield_stress, resistance=resistance
+        )["factor"],
+        {
+            "yield_stress": arg(Number(optional=True, above=0), None, 300.0),
+            "resistance": arg(Called(optional=True), None),
+        },
+        arity=False,
+    ),
+    Entry(
+        "plot_strength",
+        lambda strength, unit, file: xc.plot_strength(strength, unit=unit, file=file),
+        {
+            "strength": arg(Seen(rule=lambda v: v is STRENGTH), STRENGTH),
+            "unit": arg(Word(rule=bool), "cycle"),
+            "file": arg(Filename(rule=lambda v: None), "strength.png"),
+        },
+        in_folder=True,
+        cost=0.5,
+    ),
+    Entry(
+        "plot_spectrum",
+        lambda spectrum, file: xc.plot_spectrum(spectrum, file=file),
+        {
+            "spectrum": arg(Of(type=xc.Spectrum), SPECTRUM),
+            "file": arg(Filename(rule=lambda v: None), "spectrum.png"),
+        },
+        in_folder=True,
+        cost=0.5,
     ),
     Entry(
         "geometry_factors",

@@ -8,6 +8,7 @@ from fuzz.entry import Bad, Entry, Hook, Late, arg
 from fuzz.kinds import (
     Called,
     Choice,
+    Filename,
     Flag,
     ListOf,
     Number,
@@ -219,6 +220,16 @@ ENTRIES = [
             "friction": arg(Number(least=0, most=1e3, also=(_each_crack,)), 0.0, 0.3),
         },
         cost=0.03,
+    ),
+    Entry(
+        "Problem",
+        lambda file, title: scenes.problem().plot(file, title=title),
+        {
+            "file": arg(Filename(rule=lambda v: None), "setup.png"),
+            "title": arg(Word(optional=True), None, "a plate"),
+        },
+        in_folder=True,
+        cost=0.5,
     ),
     Entry(
         "Problem",

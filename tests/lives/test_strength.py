@@ -30,6 +30,7 @@ from xcrack.runs.assessment import (
 from xcrack.runs.history import History
 from xcrack.runs.opening import opening_load
 from xcrack.sif.stress_intensity import energy_release_rate
+from xcrack.view.lives import plot_strength
 
 LAW = paris(1e-11, 3.0)
 STEEL = assessment_line(E=210e3, sigma_y=355.0, sigma_u=510.0)
@@ -240,3 +241,71 @@ def test_table_of_factors_of_a_surface_crack(tmp_path):
     assert a == pytest.approx(0.4, rel=0.02)
     assert c == pytest.approx(0.4, rel=0.02)
     assert beta == pytest.approx(K / (100 * np.sqrt(np.pi * a)), rel=1e-6)
+
+
+def test_an_r_curve_is_touched_by_K_of_the_extending_crack():
+    """K = S √(π a), K_R = C √da: the largest K_R/K is at the largest extension that the run has;
+    a curve that saturates has its tangent inside, found by hand on a fine grid."""
+    response = formula(mode_I())
+    given = {"da": 0.5, "max_steps": 30, "progress": False, "response": response}
+    run = History(tuple(grow(plate(), LAW, max_hoop_stress, Cycle(0.0, 1.0), **given)), "")
+
+    def resistance(da):
+        return 2500.0 * (1 - 0.6 * np.exp(-da / 1.5))
+
+    rows = residual_strength(run, nu=0.3, K_c=1000.0, resistance=resistance)
+    a = 5.0 + np.linspace(0, 14, 200_001)
+    by_hand = (resistance(a - 5.0) / (STRESS * np.sqrt(np.pi * a))).max()
+    assert rows["by_resistance"][0] == pytest.approx(by_hand, rel=1e-3)
+    assert by_hand > 1000.0 / (STRESS * np.sqrt(5 * np.pi))  # beyond the onset
+    assert np.array_equal(rows["factor"], rows["by_resistance"])  # K_c is the onset only
+    assert rows["by_resistance"][-1] == pytest.approx(
+        resistance(0.0) / rows["K"][-1]
+    )  # a run that ends there
+
+
+def test_link_up_is_that_of_two_zones_in_the_ligament():
+    """Swift: K²/(2π σ²) of both tips fill the ligament; tips that do not face each other do not."""
+    pair = [line_crack([(10.0, 0.37), (20.0, 0.37)]), line_crack([(26.0, 0.37), (34.0, 0.37)])]
+    options = {"da": 0.5, "max_steps": 1, "progress": False, "response": formula(mode_I())}
+    (step,) = grow(plate(pair), LAW, max_hoop_stress, Cycle(0.0, 1.0), **options)
+    rows = residual_strength(History((step,), ""), nu=0.3, K_c=1e5, yield_stress=300.0)
+    zones = [(STRESS / 300.0) ** 2 * a / 2 for a in (5.0, 4.0)]  # of K = S √(π a)
+    assert rows["by_link_up"][0] == pytest.approx(np.sqrt(6.0 / sum(zones)))
+    assert rows["crack"][0] == 0
+    assert np.isnan(rows["by_section"][0])  # no solutions
+    alone = [line_crack([(10.0, 0.37), (20.0, 0.37)])]
+    (step,) = grow(plate(alone), LAW, max_hoop_stress, Cycle(0.0, 1.0), **options)
+    assert residual_strength(History((step,), ""), nu=0.3, K_c=1.0, yield_stress=1.0)[
+        "by_link_up"
+    ] == [np.inf]
+
+
+def test_net_section_and_one_curve_through_a_join(tmp_path):
+    """Two collinear cracks: the lead crack goes on through the join, strength falls with it, and
+    the net section carries the load of the ligaments (exact: a strip under tension alone)."""
+    pull = [traction("top", (0.0, 100.0)), traction("bottom", (0.0, -100.0))]
+    cracks = [line_crack([(12.0, 0.3), (20.0, 0.3)]), line_crack([(23.0, 0.3), (28.0, 0.3)])]
+    mesh = box((0.0, -20.0), (40.0, 20.0), (40, 40))
+    scene = Problem(mesh, Isotropic(73e3, 0.33, "stress"), cracks, loads=pull)
+    steps = grow(scene, LAW, max_hoop_stress, Cycle(0.0, 1.0), da=0.8, max_steps=5, progress=False)
+    run = History(tuple(steps), "")
+    assert run.joins
+    rows = residual_strength(run, nu=0.33, K_c=4000.0, yield_stress=350.0)
+    assert np.isinf(rows["by_link_up"][-1])
+    assert np.isfinite(rows["by_link_up"][0])
+    assert (np.diff(rows["factor"]) < 0).all()
+    assert set(rows["crack"]) == {0}
+    assert rows["by_section"][0] < 350 / 100 * (40 - 13) / 40 * 1.02
+    figure = plot_strength(rows, unit="flight", file=tmp_path / "strength.png")
+    assert figure.axes[0].get_xlabel() == "flights N"
+    assert (tmp_path / "strength.png").stat().st_size > 1e4
+
+
+def test_bad_input_of_strength(history):
+    with pytest.raises(ProblemError, match="give a function of da"):
+        residual_strength(history, nu=0.3, K_c=1.0, resistance=3.0)
+    with pytest.raises(ProblemError, match="0 over the whole run"):
+        residual_strength(history, nu=0.3, K_c=1.0, resistance=lambda da: 0.0)
+    with pytest.raises(ProblemError, match="residual_strength returns"):
+        plot_strength(np.zeros(3))

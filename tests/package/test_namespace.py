@@ -45,9 +45,9 @@ NAMES = [
     "Scatter", "growth_curve", "inspection", "life", "logistic_pod", "lognormal", "normal",
     "assessment_line", "compliance", "crack_opening", "energy_release_rate", "geometry_factors",
     "opening_load", "write_factors",
-    "residual_strength", "plastic_zone", "retarded", "wheeler", "willenborg",
+    "residual_strength", "plot_strength", "plastic_zone", "retarded", "wheeler", "willenborg",
     # spectra
-    "Spectrum", "rainflow", "read_spectrum", "twist",
+    "Spectrum", "rainflow", "read_spectrum", "twist", "plot_spectrum",
     "save",
     # errors
     "ConvergenceError", "GeometryError", "MeshError", "ProblemError", "XcrackError",

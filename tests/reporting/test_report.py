@@ -101,7 +101,7 @@ def test_report_of_a_solution(tmp_path):
     assert path == tmp_path / "new" / "plate.html"
     text, reader, numbers = read(path)
     assert "A &lt;plate&gt;" in text
-    assert len(reader.pictures) == len(numbers["pictures"]["drawn"]) >= 4
+    assert len(reader.pictures) - 1 == len(numbers["pictures"]["drawn"]) >= 4  # one stands first
     sif = xc.stress_intensity(solutions[0])
     rows = numbers["K"]["rows"]
     assert [row["K_I"] for row in rows[:2]] == sif.K_I.tolist()
@@ -426,3 +426,74 @@ def test_a_plastic_zone_as_large_as_the_crack_is_a_warning(tmp_path):
     with warnings.catch_warnings():
         warnings.simplefilter("error", xc.XcrackWarning)
         xc.report(solution, tmp_path / "r.html", yield_stress=3450.0)
+
+
+def test_first_page(tmp_path):
+    """What is to be signed stands first, with units; margins that are lost and warnings are red."""
+    problem = replace(plate(), material=replace(STEEL, yield_stress=90.0, K_c=150.0))
+    history = growth(problem)
+    strength = xc.residual_strength(history, nu=0.3, K_c=150.0, yield_stress=90.0)
+    path = xc.report(history, tmp_path / "a.html", units="N, mm, MPa", strength=strength)
+    text, reader, numbers = read(path)
+    assert reader.ids[0] == "summary"
+    page = numbers["summary"]
+    assert page["life"].startswith(f"{history.life:.6g} cycles")
+    assert page["material"] == (
+        "E = 210000.0 MPa, nu = 0.3, plane = strain, yield_stress = 90.0 MPa, K_c = 150.0 MPa√mm"
+    )
+    assert page["growth law"] == "elber(C = 1e-11, m = 3, a = 0.5, b = 0.4)"
+    assert page["crack 0 at first"] == "length 0.64257 mm"
+    largest = max(abs(row["K_I"]) for row in numbers["K"]["rows"])
+    assert float(page["largest K at the end"].split()[0]) == pytest.approx(largest, rel=0.05)
+    summary = text[text.index('id="summary"') : text.index('id="scene"')]
+    assert 'class="bad">plastic zone' in summary or "plastic zone" not in summary
+    assert f'class="bad"><a href="#warnings">{numbers["summary"]["warnings"]} warning' in summary
+    assert "K_I [MPa√mm]" in text
+    assert "value = [0.0, 80.0] MPa" in text
+    assert "None" not in summary
+    assert not re.search(r"\d\.\d{10}", summary)
+    assert "sha256" not in summary
+
+
+def test_units_of_a_report(tmp_path):
+    for units, words in (
+        ("mm", "give force, length and stress"),
+        ("N, mm, psi", "consistent"),
+        ("N, ell, MPa", "known are"),
+        (3, "give force, length and stress"),
+    ):
+        with pytest.raises(xc.ProblemError, match=words):
+            xc.report(xc.solve(plate()), tmp_path / "a.html", units=units)
+
+
+def test_load_history_is_drawn(tmp_path):
+    """Factors and counts of a spectrum as a picture, its name on the axes, no hash in the table."""
+    spectrum = xc.Spectrum([0.0, 1.0, 0.4, 0.6], unit="flight")
+    law = xc.paris(1e-11, 3)
+    run = xc.collect(xc.grow(plate(), law, xc.max_hoop_stress, spectrum, da=0.1, max_steps=2,
+                             progress=False))  # fmt: skip
+    text, reader, numbers = read(xc.report(run, tmp_path / "a.html", spectrum=spectrum))
+    assert len(reader.pictures) == len(numbers["pictures"]["drawn"]) + 2
+    part = text[text.index('id="spectrum"') : text.index('id="K"')]
+    assert "4 numbers" in part
+    assert "sha256" not in part
+    assert "flights" in numbers["summary"]["life"]
+    figure = xc.plot_spectrum(spectrum, file=tmp_path / "spectrum.png")
+    assert "flight" in figure.axes[0].get_xlabel()
+    with pytest.raises(xc.ProblemError, match="depend on K"):
+        xc.plot_spectrum(xc.Spectrum(states=[0.0, 1.0], sequence=[0, 1]), file=tmp_path / "b.png")
+
+
+@pytest.mark.parametrize("make", [plate, block])
+def test_set_up_before_a_solve(make, tmp_path):
+    """Loads, supports, cracks and their normals by name; nothing is solved."""
+    problem = replace(make(), supports=[xc.fix("left", axis=0)])
+    figure = problem.plot(tmp_path / "setup.png", title="before")
+    words = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert words[:2] == ["traction('top')", "traction('bottom')"]
+    assert "fix('left', axis=0)" in words
+    assert any("normal" in word for word in words)
+    names = {text.get_text() for text in figure.axes[0].texts}
+    assert {"top", "bottom", "left", "right", "0"} <= names
+    assert "boundary" not in names
+    assert matplotlib.image.imread(tmp_path / "setup.png").std() > 0.01

@@ -5,6 +5,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
 from numbers import Real
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -241,6 +242,28 @@ class Problem:
             ("contact, order", f"{self.contact}, {self.order}"),
         ]
         return join_parts(element("b", "Problem"), self.sketch(), table((), rows))
+
+    def plot(self, file: str | Path | None = None, *, title: str | None = None) -> Any:
+        """Draw the set-up before a solve: body, sets, loads, supports, cracks and their normals.
+
+        Parameters
+        ----------
+        file : path, optional
+            Picture to write; without it a window opens, or the notebook shows it.
+        title : str, optional
+
+        Returns
+        -------
+        matplotlib figure
+
+        Raises
+        ------
+        ProblemError
+            No text as title, or a file that cannot be written.
+        """
+        from xcrack.view.setup import draw_setup
+
+        return draw_setup(self, file, title)
 
     def sketch(self) -> Markup:
         """Outline of the body and its cracks, as SVG."""

@@ -1,7 +1,8 @@
 """Residual strength: by toughness, by collapse of the section, and by both together."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import combinations
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,8 @@ from xcrack.base.checks import call_function, number, numbers, value_text, whole
 from xcrack.base.errors import ProblemError
 from xcrack.base.paths import path_of, system_errors, written_whole
 from xcrack.fatigue.criteria import clipped_K, equivalent_K
-from xcrack.growth.step import Step
+from xcrack.growth.step import Step, identities
+from xcrack.growth.validity import validity
 from xcrack.runs.history import History
 
 
@@ -116,10 +118,15 @@ def residual_strength(
     *,
     nu: float,
     K_c: float,
+    resistance: Callable[[float], float] | None = None,
+    yield_stress: float | None = None,
     collapse: Callable[[float], float] | None = None,
     line: assessment_line | None = None,
 ) -> NDArray[Any]:
     """Factors on the largest load of a run at which its cracks break the body, step by step.
+
+    Each row is of the lead crack: the one with the largest K. With several cracks the rows are one
+    curve through all joins, as multiple-site damage is judged.
 
     Parameters
     ----------
@@ -128,7 +135,12 @@ def residual_strength(
     nu : float
         Poisson's ratio, for K_eq.
     K_c : float, stress √length
-        Toughness.
+        Toughness; of plates that of their thickness.
+    resistance : callable da -> K_R, optional
+        R-curve: resistance over the stable extension of a tip. The lead crack then extends stably
+        along the path of the run.
+    yield_stress : float, stress, optional
+        Or a flow stress: for the net section and the link-up of two cracks, in 2D.
     collapse : callable a -> factor, optional
         Factor on the largest load at which the net section yields throughout, for the length that
         `table` calls a.
@@ -138,57 +150,183 @@ def residual_strength(
     Returns
     -------
     (n,) structured array
-        A row for each step with K, the last one included: step, N, K (largest K_eq of all load
-        states and tips), a of the crack that has it, by_toughness (K_c/K; inf where K is
-        0), by_collapse and by_line, nan where nothing was given for them.
+        A row for each step with K, the last one included: step, N, crack (the lead crack, by its
+        number in the first step), a (its length), K (largest K_eq of all load states and tips);
+        by_toughness (K_c/K; inf where K is 0), by_resistance, by_section (the weakest ligament
+        yields; of steps that have their solutions), by_link_up (plastic zones of two tips that face
+        each other touch; inf where none do), by_collapse and by_line, nan where nothing was given
+        for them; and factor, the smallest of them. Where there is an R-curve, by_toughness does
+        not count in it: stable extension may begin there.
 
     Raises
     ------
     ProblemError
-        No history, values out of bounds, a line without collapse, a collapse that is not positive.
+        No history, values out of bounds, a line without collapse, a collapse or a resistance that
+        is not positive.
+
+    Notes
+    -----
+    R-curve: the load at which K of the extending crack touches the curve, that is the largest
+    K_R(da)/K(a + da) over the extensions which the run went through up to its end or the next join
+    (ASTM E561); where it is there the true factor is at least that. Link-up: Swift's criterion,
+    Irwin's zones (K/yield)²/2π of plane stress fill the ligament between two tips (T. Swift, on
+    damage tolerance of riveted panels, 1993 on; from memory). Net section: force and moment on the
+    ligament ahead of each tip, as of `check`.
+
+    Examples
+    --------
+    ::
+
+        rows = xc.residual_strength(history, nu=0.33, K_c=3000.0, yield_stress=350.0)
+        xc.plot_strength(rows, unit="flight", file="strength.png")
     """
     if not isinstance(history, History):
         raise ProblemError(f"residual_strength: history = {value_text(history)}: give a History.")
     nu = number(nu, "residual_strength: nu", above=-1, below=0.5)
     tough = number(K_c, "residual_strength: K_c", above=0)
-    if collapse is not None and not callable(collapse):
-        raise ProblemError(
-            f"residual_strength: collapse = {value_text(collapse)}: give a function of a."
-        )
+    if yield_stress is not None:
+        yield_stress = number(yield_stress, "residual_strength: yield_stress", above=0)
+    for name, given, of in (("collapse", collapse, "a"), ("resistance", resistance, "da")):
+        if given is not None and not callable(given):
+            raise ProblemError(
+                f"residual_strength: {name} = {value_text(given)}: give a function of {of}."
+            )
     if line is not None and (collapse is None or not isinstance(line, assessment_line)):
         raise ProblemError(
             f"residual_strength: line = {value_text(line)}: give assessment_line, and collapse "
             f"with it."
         )
-    names = ("step", "N", "a", "K", "by_toughness", "by_collapse", "by_line")
-    result = np.zeros(len(history.solved), dtype=[(name, float) for name in names])
-    for n, step in enumerate(history.solved):
-        K, c = _largest_K(step, nu)
+    steps = history.solved
+    result = np.zeros(len(steps), dtype=_STRENGTH)
+    for name in CRITERIA:
+        result[name] = np.nan
+    names = identities(steps)
+    for n, step in enumerate(steps):
+        K = K_of_cracks(step, nu)
+        c = int(np.argmax(K))
         a = step.memory.length[c] if step.memory is not None else np.nan
-        by_K = tough / K if K > 0 else np.inf
-        by_section = by_line = np.nan
+        row = result[n]
+        row["step"], row["N"], row["crack"], row["a"], row["K"] = (
+            step.index, step.cycles, names[n][c], a, K[c]
+        )  # fmt: skip
+        by_K = tough / K[c] if K[c] > 0 else np.inf
+        row["by_toughness"] = by_K
+        if resistance is not None:
+            row["by_resistance"] = _by_resistance(steps[n:], names[n:], c, nu, resistance)
+        if yield_stress is not None:
+            row["by_section"] = _by_section(step, yield_stress)
+            row["by_link_up"] = _by_link_up(step, nu, yield_stress)
         if collapse is not None:
-            by_section = number(
+            row["by_collapse"] = number(
                 call_function(collapse, f"the collapse of step {step.index}", a),
                 "residual_strength: collapse",
                 above=0,
             )
         if line is not None:
-            by_line = line.reserve(1 / by_K, 1 / by_section)
-        result[n] = (step.index, step.cycles, a, K, by_K, by_section, by_line)
+            row["by_line"] = line.reserve(1 / by_K, 1 / row["by_collapse"])
+        counted = [name for name in CRITERIA if resistance is None or name != "by_toughness"]
+        row["factor"] = np.nanmin([row[name] for name in counted])
     return result
 
 
-def _largest_K(step: Step, nu: float) -> tuple[float, int]:
-    """Largest K_eq of all load states at all tips of a step, and the crack that has it."""
-    largest = [
-        float(
-            equivalent_K(clipped_K(np.stack([s[c].K for s in step.sif])), angle, nu).max(initial=0)
+CRITERIA = (
+    "by_toughness", "by_resistance", "by_section", "by_link_up", "by_collapse", "by_line",
+)  # fmt: skip
+"""Columns of `residual_strength` that are factors by one criterion each."""
+
+_STRENGTH = [
+    (name, int if name == "crack" else float)
+    for name in ("step", "N", "crack", "a", "K", *CRITERIA, "factor")
+]
+
+
+def K_of_cracks(step: Step, nu: float) -> list[float]:
+    """Largest K_eq of all load states at all tips of each crack of a step."""
+    return [float(_equivalent(step, c, nu).max(initial=0)) for c in range(len(step.angle))]
+
+
+def _equivalent(step: Step, c: int, nu: float) -> Floats:
+    """Largest K_eq of all load states at each tip of a crack `(f,)`."""
+    K = clipped_K(np.stack([state[c].K for state in step.sif]))
+    every: Floats = equivalent_K(K, step.angle[c], nu)
+    return every.max(axis=0)
+
+
+def _by_resistance(
+    steps: Sequence[Step],
+    names: Sequence[Sequence[int]],
+    crack: int,
+    nu: float,
+    resistance: Callable[[float], float],
+) -> float:
+    """Factor at which a crack becomes unstable, along the steps that are left of the run."""
+    a: list[float] = []
+    K: list[float] = []
+    c = crack
+    for step, own in zip(steps, names, strict=True):
+        met = a and any(c in join.cracks for join in step.joins)
+        if met or names[0][crack] not in own or step.memory is None:
+            break
+        c = own.index(names[0][crack])
+        a.append(step.memory.length[c] / max(len(step.angle[c]), 1) if step.cracks[c].dim == 2
+                 else step.memory.length[c])  # fmt: skip
+        K.append(K_of_cracks(step, nu)[c])
+    if not a or not all(np.isfinite(a)):
+        return np.nan
+    rising = np.concatenate([[True], a[1:] > np.maximum.accumulate(a)[:-1]])
+    length, size = np.array(a)[rising], np.array(K)[rising]
+    # Between two steps K is straight in a; the curve has its own shape.
+    places = np.unique(
+        np.concatenate(
+            [np.linspace(*pair, _PLACES) for pair in zip(length, length[1:])] or [length]
         )
-        for c, angle in enumerate(step.angle)
+    )
+    what = f"the resistance of step {steps[0].index}"
+    best = 0.0
+    for x in places:
+        K_R = call_function(resistance, what, float(x - length[0]))
+        K_R = number(K_R, "residual_strength: resistance", least=0)
+        K_x = float(np.interp(x, length, size))
+        best = max(best, K_R / K_x if K_x > 0 else np.inf)
+    if best == 0:
+        raise ProblemError(
+            "residual_strength: resistance is 0 over the whole run: give K_R over the extension."
+        )
+    return best
+
+
+_PLACES = 20  # between two steps at which an R-curve is looked at
+_FACING = 0.5  # cosine of the angle up to which two tips face each other: 60 degrees
+
+
+def _by_section(step: Step, yield_stress: float) -> float:
+    """Factor at which the weakest ligament of a plane body yields; nan without solutions."""
+    if not step.solutions or step.solutions[0].space.dim != 2:
+        return np.nan
+    problem = step.solutions[0].problem
+    material = problem.elasticity.material.with_yield_stress(yield_stress)
+    known = validity(material, problem.mesh, step.cracks, step.sif, step.solutions)
+    return np.nan if known is None or not known.of_section > 0 else 1 / known.of_section
+
+
+def _by_link_up(step: Step, nu: float, yield_stress: float) -> float:
+    """Factor at which plastic zones of two tips that face each other touch in 2D."""
+    tips = [
+        (c, sif.x[j], sif.frame[j, 0], K)
+        for c, sif in enumerate(step.sif[0])
+        for j, K in enumerate(_equivalent(step, c, nu).tolist())
     ]
-    c = int(np.argmax(largest))
-    return largest[c], c
+    if not tips or len(tips[0][1]) != 2:
+        return np.nan
+    least = np.inf
+    for (c, x, ahead, K), (d, y, other, L) in combinations(tips, 2):
+        way = y - x
+        ligament = float(np.linalg.norm(way))
+        faces = min(way @ ahead, -(way @ other)) > _FACING * ligament
+        if c != d and faces and K**2 + L**2 > 0:
+            zones = (K**2 + L**2) / (2 * np.pi * yield_stress**2)
+            least = min(least, float(np.sqrt(ligament / zones)))
+    return least
 
 
 def geometry_factors(history: History, *, stress: float) -> NDArray[Any]:
@@ -321,4 +459,11 @@ def _on_surface(history: History, steps: np.ndarray, crack: int) -> tuple[np.nda
     return np.asarray(rows_of_crack["depth"]), half
 
 
-__all__ = ["assessment_line", "geometry_factors", "residual_strength", "write_factors"]
+__all__ = [
+    "CRITERIA",
+    "K_of_cracks",
+    "assessment_line",
+    "geometry_factors",
+    "residual_strength",
+    "write_factors",
+]

@@ -1,6 +1,5 @@
 """Write a report: sections, pictures and the interactive view in one file."""
 
-import base64
 import datetime
 import json
 from collections.abc import Callable, Sequence
@@ -15,6 +14,7 @@ from xcrack.base.checks import number, value_text
 from xcrack.base.errors import ProblemError, XcrackError, warn
 from xcrack.base.markup import Markup, element, join_parts, list_markup, page
 from xcrack.base.paths import path_of, write_texts
+from xcrack.fatigue.spectrum import Spectrum
 from xcrack.runs.inspection import Inspection
 from xcrack.runs.life import Life
 from xcrack.runs.versions import versions
@@ -22,8 +22,9 @@ from xcrack.view import report_histories as histories
 from xcrack.view import report_results as results
 from xcrack.view import report_safety as safety
 from xcrack.view import report_scene as scene
-from xcrack.view.report_pictures import Picture, history_pictures, solution_pictures
-from xcrack.view.report_source import Section, Source, source_of
+from xcrack.view.report_pictures import figure_markup, history_pictures, solution_pictures
+from xcrack.view.report_source import Section, Source, UnitNames, source_of
+from xcrack.view.report_summary import summary
 from xcrack.view.report_viewer import viewer
 from xcrack.view.view_3d import history_layers, packed_layers, solution_layers
 
@@ -39,10 +40,14 @@ def report(
     life: Life | None = None,
     inspection: Inspection | None = None,
     strength: NDArray[Any] | None = None,
+    spectrum: Spectrum | None = None,
+    units: str | None = None,
 ) -> Path:
     """Write what was modelled and what came out, as one page that needs no network.
 
-    The page has the scene, assumptions and their validity, K, contact, growth, all warnings, the
+    The page begins with a summary to sign: part, material, load, law, cracks at first and at the
+    end, life with its bar, margins, inspections, the number of warnings, one picture. Behind it
+    are the scene, assumptions and their validity, K, contact, growth, all warnings, the
     table of a run as CSV, pictures, for bodies in space a view to turn, and how to run it again.
     A ``.json`` file beside it has the numbers.
 
@@ -63,6 +68,10 @@ def report(
         What `xc.inspection` made of the run: when to look.
     strength : structured array, optional
         What `xc.residual_strength` made of the run.
+    spectrum : Spectrum, optional
+        Load history of the run, for its picture: runs store its hash alone.
+    units : str, optional
+        Names of force, length and stress, such as ``"N, mm, MPa"``: they stand in all tables.
 
     Returns
     -------
@@ -90,8 +99,12 @@ def report(
         raise ProblemError(
             f"report: strength = {value_text(strength)}: give what xc.residual_strength returns."
         )
+    names_of_units = UnitNames.read(units)
     source = source_of(result, title, yield_stress, life)
-    source = replace(source, inspection=inspection, strength=strength)
+    if not isinstance(spectrum, Spectrum | None):
+        raise ProblemError(f"report: spectrum = {value_text(spectrum)}: give xc.Spectrum(...).")
+    source = replace(source, inspection=inspection, strength=strength, spectrum=spectrum,
+                     units=names_of_units)  # fmt: skip
     for words in scene.plastic_zone(source)[1]:
         warn(words)
         source.warnings.update([words])
@@ -107,7 +120,7 @@ def pictures(source: Source) -> Section:
     if source.history is not None:
         of_run, lost = history_pictures(source.history)
         drawn, missing = drawn + of_run, missing + lost
-    parts: list[Any] = [_figure(picture) for picture in drawn]
+    parts: list[Any] = [figure_markup(picture) for picture in drawn]
     if missing:
         parts += [element("p", "Not drawn here:", cls="soft"), list_markup(missing)]
     if not parts:
@@ -139,6 +152,7 @@ def space_view(source: Source) -> Section | None:
 
 
 SECTIONS: Sequence[Callable[[Source], Section | None]] = (
+    summary,
     scene.scene,
     space_view,
     results.growth,
@@ -171,13 +185,6 @@ def _page(source: Source, sections: Sequence[Section]) -> str:
     for section in sections:
         parts += [Markup(f'<h2 id="{section.key}">{section.title}</h2>'), section.content]
     return page(source.title, *parts)
-
-
-def _figure(picture: Picture) -> Markup:
-    words, data = picture
-    coded = base64.b64encode(data).decode()
-    text = element("figcaption", words)
-    return Markup(f'<figure><img alt="{words}" src="data:image/png;base64,{coded}">{text}</figure>')
 
 
 def _json(source: Source, sections: Sequence[Section]) -> str:

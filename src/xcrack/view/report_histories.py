@@ -8,6 +8,8 @@ from xcrack.base.markup import element, join_parts, table
 from xcrack.fatigue.retardation import OverloadZones
 from xcrack.growth.step import Memory, Step
 from xcrack.growth.trail import FrontTrail, Trail
+from xcrack.view.lives import plot_spectrum
+from xcrack.view.report_pictures import drawn_figure
 from xcrack.view.report_source import Section, Source, setting_words
 
 
@@ -33,6 +35,10 @@ def spectrum(source: Source) -> Section | None:
                  ("their factors", f"{min(levels):.6g} to {max(levels):.6g}"),
                  ("largest range", max(levels) - min(levels))]  # fmt: skip
     parts: list[Any] = [table((), rows)]
+    shown = source.spectrum
+    if shown is not None and shown.states is None:
+        words = f"Load history: a {shown.unit} in time, and how often a range is exceeded"
+        parts.append(drawn_figure(words, lambda file: plot_spectrum(shown, file=file)))
     values: dict[str, Any] = {"unit": unit, "blocks": last.cycles, "levels": list(last.levels)}
     model = settings.get("retardation")
     if model is not None:
@@ -52,7 +58,7 @@ def spectrum(source: Source) -> Section | None:
 
 def _rows(settings: Any, prefix: str, besides: tuple[str, ...] = ()) -> list[tuple[str, str]]:
     return [
-        (key.removeprefix(prefix), setting_words(text))
+        (key.removeprefix(prefix), setting_words(text).partition(", sha256")[0])
         for key, text in settings.items()
         if key.startswith(prefix) and key not in besides
     ]

@@ -1,5 +1,6 @@
 """Pictures of a report: as PNG bytes, each with the words under it."""
 
+import base64
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
@@ -10,6 +11,7 @@ import numpy as np
 
 from xcrack.analysis.solution import Solution
 from xcrack.base.errors import XcrackError
+from xcrack.base.markup import Markup, element
 from xcrack.runs.history import History
 from xcrack.sif.sif import SIF
 from xcrack.view.figures import finish_figure
@@ -38,6 +40,32 @@ def solution_pictures(
         drawers.append(("Opening of the crack faces", _field(severe, "opening", 0.0)))
     drawers += list(_along_fronts(sif))
     return _drawn_picture(drawers)
+
+
+def figure_markup(picture: Picture) -> Markup:
+    """A picture with the words under it, as part of a page."""
+    words, data = picture
+    coded = base64.b64encode(data).decode()
+    text = element("figcaption", words)
+    return Markup(f'<figure><img alt="{words}" src="data:image/png;base64,{coded}">{text}</figure>')
+
+
+def drawn_figure(words: str, draw: Draw) -> Markup:
+    """A picture as part of a page; words where it cannot be drawn here."""
+    drawn, missing = _drawn_picture([(words, draw)])
+    return figure_markup(drawn[0]) if drawn else element("p", missing[0], cls="soft")
+
+
+def first_picture(
+    history: History | None, solutions: Sequence[Solution], sif: Sequence[Sequence[SIF]]
+) -> Markup | None:
+    """The picture of a first page: length over life of a run, stress of a solution."""
+    if history is not None and history.steps:
+        return drawn_figure("Length of the cracks over the life", lambda f: history.plot("a", f))
+    if not solutions:
+        return None
+    severe = solutions[_most_severe(solutions, sif)]
+    return drawn_figure("Equivalent stress, displacements enlarged", _field(severe, "von_mises"))
 
 
 def history_pictures(history: History) -> tuple[list[Picture], list[str]]:
@@ -130,4 +158,11 @@ def _drawn_picture(drawers: Sequence[tuple[str, Draw]]) -> tuple[list[Picture], 
     return pictures, missing
 
 
-__all__ = ["Picture", "history_pictures", "solution_pictures"]
+__all__ = [
+    "Picture",
+    "drawn_figure",
+    "figure_markup",
+    "first_picture",
+    "history_pictures",
+    "solution_pictures",
+]

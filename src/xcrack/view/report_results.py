@@ -11,8 +11,9 @@ from xcrack.analysis.contact import Contact
 from xcrack.analysis.solution import Solution
 from xcrack.base.arrays import coordinates
 from xcrack.base.markup import Markup, element, join_parts, table
+from xcrack.base.units import FORCE, LENGTH, LINE_FORCE, NUMBER, STRESS, TOUGHNESS
 from xcrack.sif.sif import SIF
-from xcrack.view.report_source import Section, Source
+from xcrack.view.report_source import Section, Source, UnitNames
 
 _MODES = ("K_I", "K_II", "K_III")
 _END = {2: "tip", 3: "front"}
@@ -39,9 +40,16 @@ def intensity(source: Source) -> Section | None:
     reasons = {reason for state in source.sif for sif in state for reason in sif.reasons if reason}
     if reasons:
         note += f" No bars: {'; '.join(sorted(reasons))}."
-    content = join_parts(table((*first, *head), rows, scroll=len(rows) > 12 or source.dim > 2),
+    shown = [_K_head(name, source.units) for name in head]
+    content = join_parts(table((*first, *shown), rows, scroll=len(rows) > 12 or source.dim > 2),
                      element("p", note, cls="soft"))  # fmt: skip
     return Section("K", "Stress intensity factors", content, {"rows": numbers})
+
+
+def _K_head(name: str, units: UnitNames) -> str:
+    if "K_" in name or name == "spread":
+        return units.head(name, TOUGHNESS)
+    return units.head(name, {"T": STRESS, "place": LENGTH}.get(name, NUMBER))
 
 
 def _row(sif: SIF, is_of_tip: Any, dim: int) -> tuple[tuple[str, ...], tuple[Any, ...]]:
@@ -119,7 +127,17 @@ def contact(source: Source) -> Section | None:
             *(_RUBBED if rubs else ()))  # fmt: skip
     shown = [(k, _load(state), *rest) for k, state, *rest in rows]
     numbers = [{name: _json_value(v) for name, v in zip(head, row, strict=True)} for row in shown]
-    return Section("contact", "Contact of the crack faces", table(head, shown), {"rows": numbers})
+    stresses, lengths = {"largest pressure", "largest shear"}, {"largest slip"}
+    units = source.units
+    printed = [
+        units.head(name, STRESS if name in stresses
+                   else LENGTH if "opening" in name or name in lengths
+                   else LINE_FORCE if name == "contact force" and source.dim == 2
+                   else FORCE if name == "contact force" else NUMBER)
+        for name in head
+    ]  # fmt: skip
+    content = table(printed, shown)
+    return Section("contact", "Contact of the crack faces", content, {"rows": numbers})
 
 
 def _load(state: Any) -> str:
@@ -142,18 +160,23 @@ def growth(source: Source) -> Section | None:
     rows: list[tuple[str, Any]] = [
         ("steps", len(history.steps)),
         (f"{history.unit}s N at the last step", history.life),
-        ("its numerical error", str(history.life_bar)),
+        ("its numerical error", str(history.life_bar).replace("cycles", f"{history.unit}s")),
         *(("join", str(join)) for join in history.joins),
         ("why it ended", history.ended),
     ]
     rows += [("break-through", str(each)) for each in history.arrivals]
     if rates and ranges:
-        rows += [("ΔK_eq of the run", f"{min(ranges):.6g} to {max(ranges):.6g}"),
-                 ("da/dN of the run", f"{min(rates):.4g} to {max(rates):.4g}")]  # fmt: skip
+        units = source.units
+        rate = f"{min(rates):.4g} to {max(rates):.4g}"
+        rows += [("ΔK_eq of the run",
+                  units.value(f"{min(ranges):.6g} to {max(ranges):.6g}", TOUGHNESS)),
+                 ("da/dN of the run", f"{units.value(rate, LENGTH)} a {history.unit}")
+                 ]  # fmt: skip
     if last.memory is not None:
         law = {k: v for k, v in last.memory.settings.items() if k == "law" or k.startswith("law.")}
         rows += [(name, text) for name, text in law.items()]
-        rows += [(f"size of crack {c} at the end", v) for c, v in enumerate(last.memory.length)]
+        rows += [(f"size of crack {c} at the end", source.units.value(v, LENGTH))
+                 for c, v in enumerate(last.memory.length)]  # fmt: skip
     parts: list[Any] = [table((), rows)]
     if not source.is_whole:
         words = "This run is not finished: the report shows the steps that are there."
@@ -207,13 +230,25 @@ def numbers(source: Source) -> Section | None:
     coded = base64.b64encode(text.getvalue().encode()).decode()
     link = Markup(f'<a download="history.csv" href="data:text/csv;base64,{coded}">history.csv</a>')
     content = join_parts(element("p", join_parts("Save it as ", link)),
-                     table(names, rows.tolist(), scroll=True))  # fmt: skip
+                     table([_column_head(name, source.units) for name in names], rows.tolist(),
+                           scroll=True))  # fmt: skip
     return Section(
         "table",
         "Table of all steps",
         content,
         {"columns": names, "rows": [[_json_value(v) for v in row] for row in rows.tolist()]},
     )
+
+
+_LENGTHS = ("x", "y", "z", "a", "da")
+
+
+def _column_head(name: str, units: UnitNames) -> str:
+    """A column of the table of a run, with its unit."""
+    if name.startswith(("K_", "dK_eq", "spread", "bar")):
+        return units.head(name, TOUGHNESS)
+    first = name.partition("_")[0]
+    return units.head(name, LENGTH if first in _LENGTHS or first == "rate" else NUMBER)
 
 
 def _json_value(value: Any) -> Any:

@@ -7,9 +7,10 @@ from typing import Any
 import numpy as np
 
 from xcrack.analysis.solution import Solution
-from xcrack.base.arguments import arguments_of
+from xcrack.base.arguments import Argument, Declared, arguments_of
 from xcrack.base.arrays import coordinates
 from xcrack.base.markup import Markup, element, join_parts, list_markup, table
+from xcrack.base.units import FORCE, LENGTH, LINE_FORCE, MOMENT, NUMBER, Dimension
 from xcrack.crack.crack import Crack
 from xcrack.crack.measures import Measures, measures
 from xcrack.mesh.mesh import Mesh
@@ -17,7 +18,7 @@ from xcrack.model.problem import Problem
 from xcrack.model.supports import Condition
 from xcrack.runs.versions import versions
 from xcrack.sif.sif import SIF
-from xcrack.view.report_source import Section, Source, setting_words
+from xcrack.view.report_source import Section, Source, UnitNames, setting_words
 
 
 def scene(source: Source) -> Section:
@@ -27,7 +28,10 @@ def scene(source: Source) -> Section:
     mesh, problem = source.mesh, source.problem
     if mesh is not None:
         size = " × ".join(f"{v:.6g}" for v in np.ptp(mesh.points, axis=0))
-        rows += [("body", size), ("mesh", f"{mesh.n_points} points, {len(mesh.cells)} cells")]
+        rows += [
+            ("body", source.units.value(size, LENGTH)),
+            ("mesh", f"{mesh.n_points} points, {len(mesh.cells)} cells"),
+        ]
         numbers |= {"points": mesh.n_points, "cells": len(mesh.cells)}
     if problem is not None:
         rows += [
@@ -42,13 +46,15 @@ def scene(source: Source) -> Section:
     crack_measures = [] if mesh is None else [measures(crack, mesh) for crack in source.cracks]
     if crack_measures:
         size = {2: "length", 3: "area"}[source.dim]
-        head = ("crack", size, "depth", "on the surfaces", "ends")
+        area = LENGTH if source.dim == 2 else (2.0, 0.0)
+        head = ("crack", source.units.head(size, area), source.units.head("depth", LENGTH),
+                "on the surfaces", "ends")  # fmt: skip
         parts.append(table(head, [_measures_of_crack(c, m) for c, m in enumerate(crack_measures)]))
         numbers["measures"] = [
             asdict(m) | {"depth": None if np.isnan(m.depth) else m.depth} for m in crack_measures
         ]
     if problem is not None and source.solutions:
-        parts.append(_conditions(source.solutions[-1]))
+        parts.append(_conditions(source.solutions[-1], source.units))
     else:
         parts.append(element("p", "The stored steps do not hold the loads: they are in the script "
                              "or the case file that made the run.", cls="soft"))  # fmt: skip
@@ -83,10 +89,10 @@ def _measures_of_crack(c: int, m: Measures) -> tuple[str, ...]:
     return str(c), f"{m.area:.6g}", depth, surfaces or "none", ends or "none"
 
 
-def _conditions(solution: Solution) -> Markup:
+def _conditions(solution: Solution, units: UnitNames) -> Markup:
     """Supports and loads, and what they add up to in this state."""
-    rows = [_condition("support", each) for each in solution.problem.supports]
-    rows += [_condition("load", each) for each in solution.loads]
+    rows = [condition_row("support", each, units) for each in solution.problem.supports]
+    rows += [condition_row("load", each, units) for each in solution.loads]
     if not rows:
         return element("p", "No supports and no loads.")
     parts = [table(("", "kind", "where", "value"), rows)]
@@ -95,21 +101,34 @@ def _conditions(solution: Solution) -> Markup:
         for each in solution.report.resultants
     ]
     if sums:
-        head = ("resultants and reactions", "force", "moment about the origin")
+        force, moment = (LINE_FORCE, FORCE) if solution.space.dim == 2 else (FORCE, MOMENT)
+        head = ("resultants and reactions", units.head("force", force),
+                units.head("moment about the origin", moment))  # fmt: skip
         parts += [element("p", f"Scale of the loads in this state: {solution.factor:.6g}."),
                   table(head, sums)]  # fmt: skip
     return join_parts(*parts)
 
 
-def _condition(role: str, condition: Condition) -> tuple[str, str, str, str]:
+def condition_row(role: str, condition: Condition, units: UnitNames) -> tuple[str, str, str, str]:
+    """Role, kind, place and values of a support or a load."""
     where = condition.place
     place = "" if where is None else where if isinstance(where, str) else _vector(where)
-    values = [
-        f"{name} = {_value(getattr(condition, name))}"
-        for name, argument in arguments_of(type(condition)).items()
-        if name != "where" and getattr(condition, name) is not argument.default
+    return role, condition.kind, place, values_in_words(condition, units)
+
+
+def values_in_words(given: Declared, units: UnitNames) -> str:
+    """Arguments of a value that are not left out, but for its place, with their units."""
+    words = [
+        f"{name} = {_value(getattr(given, name))} {units.label(_unit(argument))}".rstrip()
+        for name, argument in arguments_of(type(given)).items()
+        if name != "where" and getattr(given, name) is not argument.default
     ]
-    return role, condition.kind, place, ", ".join(values)
+    return ", ".join(words)
+
+
+def _unit(argument: Argument) -> Dimension:
+    unit = None if argument.rule is None else argument.rule.unit
+    return NUMBER if unit is None or callable(unit) else unit
 
 
 def _vector(values: Any) -> str:
@@ -121,7 +140,14 @@ def _value(value: Any) -> str:
         name = getattr(value, "__name__", getattr(value, "name", type(value).__name__))
         return f"function {name}"
     array = np.asarray(value, dtype=object)
-    return str(array.tolist() if array.ndim else value)
+    return str(_short(array.tolist()) if array.ndim else _short(value))
+
+
+def _short(value: Any) -> Any:
+    """Numbers without the digits that nobody reads."""
+    if isinstance(value, list):
+        return [_short(each) for each in value]
+    return float(f"{value:.6g}") if isinstance(value, float) else value
 
 
 def assumptions(source: Source) -> Section:
@@ -235,4 +261,12 @@ def rerun_section(source: Source) -> Section:
                    {"versions": software, "hashes": hashes, "settings": settings})  # fmt: skip
 
 
-__all__ = ["all_warnings", "assumptions", "plastic_zone", "rerun_section", "scene"]
+__all__ = [
+    "all_warnings",
+    "assumptions",
+    "condition_row",
+    "plastic_zone",
+    "rerun_section",
+    "scene",
+    "values_in_words",
+]

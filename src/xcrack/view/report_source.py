@@ -13,10 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xcrack.analysis.solution import Solution
+from xcrack.base.checks import value_text
 from xcrack.base.errors import ProblemError, XcrackError, collected_warnings
-from xcrack.base.markup import Markup
+from xcrack.base.markup import Markup, display_text
 from xcrack.base.paths import path_of
+from xcrack.base.units import BODY_FORCE, STRESS, Dimension, Units
 from xcrack.crack.crack import Crack
+from xcrack.fatigue.spectrum import Spectrum
 from xcrack.growth.validity import Validity, validity
 from xcrack.mesh.mesh import Mesh
 from xcrack.model.material import Isotropic, Material
@@ -30,6 +33,77 @@ from xcrack.sif.stress_intensity import stress_intensities
 
 _NU = 0.3  # of a material that is not stored: K_III alone counts by it
 _HALF = "not ended"  # how `load` begins the reason of a run that goes on or was killed
+
+
+@dataclass(frozen=True)
+class UnitNames:
+    """Names of the units of a report; of nothing where none were given.
+
+    Attributes
+    ----------
+    length, force, stress : str
+    """
+
+    length: str = ""
+    force: str = ""
+    stress: str = ""
+
+    @classmethod
+    def read(cls, text: Any) -> "UnitNames":
+        """Names from a text such as ``"N, mm, MPa"``.
+
+        Raises
+        ------
+        ProblemError
+            No force, length and stress, unknown ones, or a stress that is not the force over the
+            square of the length.
+        """
+        if text is None:
+            return cls()
+        parts = [part.strip() for part in text.split(",")] if isinstance(text, str) else []
+        if len(parts) != 3:
+            raise ProblemError(
+                f"report: units = {value_text(text)}: give force, length and stress, such as "
+                '"N, mm, MPa".'
+            )
+        force, length, stress = parts
+        try:
+            size = Units(length, force).number(f"1 {stress}", STRESS)
+        except ProblemError as error:
+            raise ProblemError(f"report: units = {value_text(text)}: {error}") from None
+        if abs(size - 1) > 1e-6:
+            raise ProblemError(
+                f"report: units = {value_text(text)}: 1 {stress} is {size:.6g} {force}/{length}²: "
+                "give a consistent set."
+            )
+        return cls(length, force, stress)
+
+    def label(self, dimension: Dimension) -> str:
+        """Name of the unit of a dimension, such as MPa√mm; empty where none is known."""
+        powers, force = dimension
+        if not self.length or (powers, force) == (0.0, 0.0):
+            return ""
+        first = {0.0: "", 1.0: self.force}.get(force, f"{self.force}^{force:g}")
+        if force == 1 and powers <= -1.5 and (powers, force) != BODY_FORCE:
+            first, powers = self.stress, powers + 2
+        if powers == 0:
+            return first
+        size = {1.0: "", 2.0: "²", 3.0: "³", 0.5: ""}.get(abs(powers), f"^{abs(powers):g}")
+        root = "√" if abs(powers) == 0.5 else ""
+        last = f"{root}{self.length}{size}"
+        if powers < 0:
+            return f"{first or '1'}/{last}"
+        return f"{first}·{last}" if first and not root else f"{first}{last}"
+
+    def value(self, value: Any, dimension: Dimension) -> str:
+        """A value with its unit."""
+        text = value if isinstance(value, str) else display_text(value)
+        return f"{text} {self.label(dimension)}".rstrip()
+
+    def head(self, name: str, dimension: Dimension) -> str:
+        """The head of a column with its unit."""
+        label = self.label(dimension)
+        return f"{name} [{label}]" if label else name
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,6 +123,9 @@ class Source:
     inspection : Inspection, optional
     strength : structured array, optional
         What `residual_strength` returned.
+    units : UnitNames
+    spectrum : Spectrum, optional
+        Load history of the run, for its picture.
     warnings : mapping of str to int
         What was warned of, and how often.
     """
@@ -62,6 +139,25 @@ class Source:
     life: Life | None = None
     inspection: Inspection | None = None
     strength: NDArray[Any] | None = None
+    units: "UnitNames" = field(default_factory=lambda: UnitNames())
+    spectrum: Spectrum | None = None
+
+    @property
+    def nu(self) -> float:
+        """Poisson's ratio, for equivalent K."""
+        return _NU if self.problem is None else float(self.problem.elasticity.poisson)
+
+    @property
+    def toughness(self) -> float | None:
+        """K_c of the material, or the one at which the run was to end."""
+        if self.problem is not None and self.problem.elasticity.material.K_c is not None:
+            return float(self.problem.elasticity.material.K_c)
+        memory = self.history.steps[0].memory if self.history and self.history.steps else None
+        text = "" if memory is None else memory.settings.get("K_c", "")
+        try:
+            return float(text)
+        except ValueError:
+            return None
 
     @property
     def problem(self) -> Problem | None:
@@ -226,4 +322,4 @@ class Section:
     numbers: Mapping[str, Any] = field(default_factory=dict)
 
 
-__all__ = ["Section", "Source", "setting_words", "source_of"]
+__all__ = ["Section", "Source", "UnitNames", "setting_words", "source_of"]

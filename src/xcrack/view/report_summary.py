@@ -1,0 +1,189 @@
+"""The first page of a report: what a chief engineer signs."""
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from xcrack.base.markup import Markup, element, join_parts, table
+from xcrack.base.units import LENGTH, STRESS, TOUGHNESS
+from xcrack.crack.crack import Crack
+from xcrack.crack.measures import measures
+from xcrack.growth.step import Memory
+from xcrack.growth.validity import ZONE
+from xcrack.runs.assessment import CRITERIA, K_of_cracks
+from xcrack.sif.sif import SIF
+from xcrack.view.report_pictures import first_picture
+from xcrack.view.report_scene import condition_row, values_in_words
+from xcrack.view.report_source import Section, Source, setting_words
+
+_MOST_LOADS = 8  # rows of a first page
+_FEW = 0.05  # share of the samples that end before the life that is named
+
+
+def summary(source: Source) -> Section:
+    """Part, load, cracks, life, margins, inspections and warnings, with one picture."""
+    rows = [*_part(source), *_cracks(source), *_growth(source), *_margins(source),
+            *_decisions(source)]  # fmt: skip
+    count = source.warnings.total()
+    words = Markup(f'<a href="#warnings">{_counted(count, "warning")}</a>')
+    rows.append(("warnings", element("span", words, cls="bad" if count else "good")))
+    parts: list[Any] = [table((), rows)]
+    drawn = first_picture(source.history, source.solutions, source.sif)
+    if drawn is not None:
+        parts.append(drawn)
+    shown = {name: str(value) for name, value in rows if not isinstance(value, Markup)}
+    return Section("summary", "Summary", join_parts(*parts), {**shown, "warnings": count})
+
+
+Rows = Iterator[tuple[str, Any]]
+
+
+def _counted(n: int, word: str) -> str:
+    return f"{n} {word}" if n == 1 else f"{n} {word}s"
+
+
+def _part(source: Source) -> Rows:
+    units, mesh, problem = source.units, source.mesh, source.problem
+    if mesh is not None:
+        size = " × ".join(f"{v:.6g}" for v in np.ptp(mesh.points, axis=0))
+        yield "part", units.value(size, LENGTH)
+    if problem is None:
+        return
+    for name, material in problem.elasticity.named:
+        words = values_in_words(material, units)
+        if source.yield_stress is not None:
+            words += f", judged by a yield stress of {units.value(source.yield_stress, STRESS)}"
+        yield (f"material {name!r}" if name else "material"), words
+    given = [condition_row("load", load, units) for load in problem.loads]
+    for _, kind, place, value in given[:_MOST_LOADS]:
+        yield "load", ", ".join(part for part in (kind, place and f"at {place}", value) if part)
+    if len(given) > _MOST_LOADS:
+        yield "load", f"and {len(given) - _MOST_LOADS} more: see Scene"
+
+
+def _cracks(source: Source) -> Rows:
+    mesh, history = source.mesh, source.history
+    if history is not None and history.steps:
+        yield from ((f"crack {c} at first", _size(crack, source))
+                    for c, crack in enumerate(history.steps[0].cracks))  # fmt: skip
+    when = "" if history is None else " at the end"
+    if mesh is not None or source.dim == 3:
+        for c, crack in enumerate(source.cracks):
+            yield f"crack {c}{when}", _size(crack, source)
+
+
+def _size(crack: Crack, source: Source) -> str:
+    """Length, or depth and length on the surface that it is deepest under."""
+    mesh, units = source.mesh, source.units
+    if mesh is None:
+        extent = float(np.ptp(crack.points, axis=0).max())
+        return f"extent {units.value(f'{extent:.5g}', LENGTH)}"
+    of_crack = measures(crack, mesh)
+    if source.dim == 2:
+        return f"length {units.value(f'{of_crack.area:.5g}', LENGTH)}"
+    if np.isnan(of_crack.depth) or not of_crack.traces:
+        return f"area {units.value(f'{of_crack.area:.5g}', (2.0, 0.0))}"
+    deepest = max(of_crack.traces, key=lambda trace: trace.depth)
+    return (f"depth {units.value(f'{of_crack.depth:.5g}', LENGTH)}, length "
+            f"{units.value(f'{deepest.length:.5g}', LENGTH)} on {deepest.name}")  # fmt: skip
+
+
+def _growth(source: Source) -> Rows:
+    history = source.history
+    if history is None or not history.steps:
+        return
+    memory = history.steps[0].memory
+    if memory is not None:
+        yield "growth law", _settings(memory, "law")
+        yield "load history", _settings(memory, "cycle")
+    bar = history.life_bar.total
+    bars = "" if np.isnan(bar) else f" ± {bar:.2g} (numerical error)"
+    yield "life", f"{history.life:.6g} {history.unit}s{bars}"
+    yield "why it ended", history.ended or "not known"
+    for join in history.joins:
+        yield "join", str(join)
+
+
+def _settings(memory: Memory, name: str) -> str:
+    """A law or a load history in a line."""
+    settings = memory.settings
+    parts = [
+        f"{key.removeprefix(name + '.')} = {_short(setting_words(text).partition(', sha256')[0])}"
+        for key, text in settings.items()
+        if key.startswith(f"{name}.") and text not in ("None", "()")
+    ]
+    return f"{settings.get(name, '')}({', '.join(parts)})"
+
+
+def _short(text: str) -> str:
+    """A number without the digits that nobody reads."""
+    try:
+        return f"{float(text):.6g}"
+    except ValueError:
+        return text
+
+
+def _margins(source: Source) -> Rows:
+    units, history = source.units, source.history
+    nu = source.nu
+    if history is not None and history.solved:
+        first, last = (max(K_of_cracks(history.solved[k], nu), default=0.0) for k in (0, -1))
+        yield "largest K at first", units.value(f"{first:.5g}", TOUGHNESS)
+        yield "largest K at the end", units.value(f"{last:.5g}", TOUGHNESS)
+    else:
+        for k, state in enumerate(source.sif):
+            for c, sif in enumerate(state):
+                if len(sif.K):
+                    where = f", state {k}" if len(source.sif) > 1 else ""
+                    yield f"K of crack {c}{where}", _largest(sif, source)
+        last = np.nan if source.validity is None else source.validity.K
+    for known in () if source.problem is None or history is not None else source.problem.handbook:
+        yield "beside a handbook", known.comparison(source.solutions[-1])
+    K_c = source.toughness
+    if K_c is not None and last > 0:
+        yield "margin of toughness", _judged(f"K_c / K = {K_c / last:.4g}", K_c > last)
+    known_validity = source.validity
+    if known_validity is None or np.isnan(known_validity.zone):
+        yield "plastic zone, net section", "not judged: no yield stress is known"
+        return
+    worst = np.nanmax([known_validity.of_crack, known_validity.of_ligament])
+    words = f"plastic zone {100 * worst:.3g} % of the crack or ligament"
+    yield "linear elasticity", _judged(words, worst <= ZONE)
+    if not np.isnan(known_validity.of_section):
+        share = known_validity.of_section
+        yield "net section", _judged(f"{100 * share:.3g} % of the load that yields it", share < 1)
+
+
+def _largest(sif: SIF, source: Source) -> str:
+    """K of a tip or the largest of a front, with its bar."""
+    names = ("K_I", "K_II", "K_III")
+    j = int(np.argmax(np.linalg.norm(sif.K, axis=1)))
+    values = ", ".join(f"{name} = {value:.5g}" for name, value in zip(names, sif.K[j]))
+    bar = "" if np.isnan(sif.bar[j, 0]) else f" (K_I ± {sif.bar[j, 0]:.2g})"
+    return source.units.value(values, TOUGHNESS) + bar
+
+
+def _judged(words: str, is_good: bool) -> Markup:
+    return element("span", words, cls="good" if is_good else "bad")
+
+
+def _decisions(source: Source) -> Rows:
+    strength, plan, life = source.strength, source.inspection, source.life
+    if strength is not None and len(strength):
+        names = [name for name in CRITERIA if name in (strength.dtype.names or ())]
+        least = np.nanmin([strength[name] for name in names], axis=0)
+        if "factor" in (strength.dtype.names or ()):
+            least = strength["factor"]
+        words = f"bears {least[-1]:.4g} times the largest load at the end"
+        yield "residual strength", _judged(words, least.min() >= 1)
+    if life is not None:
+        early = life.percentile(100 * _FEW)
+        yield "life with scatter", f"{100 * _FEW:g} % end before {early:.5g} {life.unit}s"
+    if plan is not None:
+        missed = "" if plan.missed is None else f"; all miss with chance {plan.missed:.3g}"
+        yield "inspection", (f"first after {plan.first:.6g}, then every {plan.interval:.6g}: "
+                             f"{_counted(len(plan.at), 'look')}{missed}")  # fmt: skip
+
+
+__all__ = ["summary"]
