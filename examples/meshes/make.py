@@ -188,7 +188,36 @@ def small_crack(path: Path) -> None:
         gmsh.write(str(path))
 
 
+def inclusion(path: Path) -> None:
+    """Plate of inclusion.py, with a disc of another material as a cell set."""
+    with session() as gmsh:
+        occ = gmsh.model.occ
+        plate, disc = occ.addRectangle(0, -30, 0, 60, 60), occ.addDisk(30, 9, 0, 7, 7)
+        _, parts = occ.fragment([(2, plate)], [(2, disc)])
+        occ.synchronize()
+        inside = [tag for _, tag in parts[1]]
+        outside = [tag for _, tag in parts[0] if tag not in inside]
+        gmsh.model.addPhysicalGroup(2, inside, 1, "inclusion")
+        gmsh.model.addPhysicalGroup(2, outside, 2, "plate")
+        sides = {"left": (0, 0), "right": (0, 60), "bottom": (1, -30), "top": (1, 30)}
+        for k, (name, (axis, value)) in enumerate(sides.items()):
+            centres = [(occ.getCenterOfMass(1, t)[axis], t) for _, t in gmsh.model.getEntities(1)]
+            on_side = [tag for centre, tag in centres if abs(centre - value) < 1e-6]
+            gmsh.model.addPhysicalGroup(1, on_side, 10 + k, name)
+        size = gmsh.model.mesh.field.add("Box")
+        box = {"VIn": 0.9, "VOut": 4, "XMin": 8, "XMax": 48, "YMin": -6, "YMax": 18,
+               "Thickness": 14}  # fmt: skip
+        for key, value in box.items():
+            gmsh.model.mesh.field.setNumber(size, key, value)
+        gmsh.model.mesh.field.setAsBackgroundMesh(size)
+        for option in ("ExtendFromBoundary", "FromPoints", "FromCurvature"):
+            gmsh.option.setNumber(f"Mesh.MeshSize{option}", 0)
+        gmsh.model.mesh.generate(2)
+        gmsh.write(str(path))
+
+
 if __name__ == "__main__":
+    inclusion(HERE / "inclusion.msh")
     lug(HERE / "lug.inp")
     small_crack(HERE / "small_crack.msh")
     for name, mesh in meshes().items():
