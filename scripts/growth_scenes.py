@@ -233,6 +233,79 @@ def tolerance_2d() -> Run:
 
 
 @scene
+def slow_tip_waits() -> Run:
+    lines = [[(-1.2, 0.33), (-0.32, 0.29)], [(1.2, -0.29), (0.78, -0.31)]]
+    return body(square(23, 84), lines, pull(2)), xc.Cycle(0.0, 1.0), {"da": 0.08, "max_steps": 6}
+
+
+@scene
+def spectrum_of_states() -> Run:
+    turned = pull(2, size=40.0, shear=30.0)
+    spectrum = xc.Spectrum(states=[0.0, pull(2, size=90.0), turned], sequence=[0, 1, 2, 1, 0])
+    problem = body(square(21, 85), [[(-1.2, 0.013), (-0.3, 0.041)]], pull(2))
+    return problem, spectrum, {"da": 0.12, "max_steps": 3, "law": PARIS}
+
+
+@scene
+def overloads_one_tip_leaves() -> Run:
+    problem = body(square(25, 86), [[(0.31, 0.02), (0.71, 0.03)]], pull(2))
+    spectrum = xc.Spectrum([*[0.1, 0.7] * 30, 0.0, 1.0], unit="block")
+    model = xc.wheeler(1.4, xc.plastic_zone(600.0, beta=2))
+    return problem, spectrum, {"da": 0.14, "max_steps": 6, "law": PARIS, "retardation": model}
+
+
+@scene
+def toughness_of_the_law() -> Run:
+    problem = body(square(21, 87), [[(-1.2, 0.013), (-0.3, 0.041)]], pull(2))
+    return problem, xc.Cycle(0.1, 1.0), {"da": 0.1, "law": xc.forman(C=1e-9, m=2.5, K_c=420.0)}
+
+
+@scene
+def toughness_of_the_material() -> Run:
+    problem = body(square(21, 88), [[(-1.2, 0.013), (-0.3, 0.041)]], pull(2))
+    return problem, xc.Cycle(0.1, 1.0), {"da": 0.1, "K_c": 430.0}
+
+
+@scene
+def falls_below_the_threshold() -> Run:
+    supports = [xc.fix("bottom"), xc.displacement("top", (0.0, 0.0))]
+    states = [[xc.displacement("top", (0.0, 0.0))], [xc.displacement("top", (0.0, 1e-3))]]
+    problem = body(square(21, 89), [[(-1.2, 0.013), (-0.3, 0.041)]], [], supports=supports)
+    options = {"da": 0.25, "max_steps": 9, "threshold": 108.0}
+    return problem, xc.Cycle(states=states), options
+
+
+@scene
+def plastic_zones_meet() -> Run:
+    problem, cycle, options = link_up()
+    return problem, cycle, options | {"link_up": xc.plastic_zone(190.0, beta=2)}
+
+
+@scene
+def given_cycles() -> Run:
+    problem = body(square(21, 90), [[(-1.2, 0.013), (-0.4, 0.041)]], pull(2, shear=20.0))
+    return problem, xc.Cycle(0.0, 1.0), {"da": 0.2, "cycles": 900.0, "max_cycles": 3100.0}
+
+
+@scene
+def tolerance_as_a_tip_leaves() -> Run:
+    problem = body(square(14, 91), [[(0.15, 0.02), (0.72, 0.03)]], pull(2))
+    return problem, xc.Cycle(0.0, 1.0), {"tolerance": 0.1, "max_steps": 7}
+
+
+@scene
+def K_from_a_formula() -> Run:
+    def response(problem: xc.Problem, states: Any, reuse: Any, bars: bool) -> xc.Response:
+        del reuse, bars
+        x = problem.stations.x
+        K = np.stack([300.0 + 60.0 * x[:, 0], 20.0 - 70.0 * x[:, 1]], axis=1)
+        return xc.Response.of_K(problem, states, np.stack([float(f) * K for f in states]))
+
+    problem = body(square(21, 92), [[(-0.4, 0.02), (0.41, 0.03)]], [])
+    return problem, xc.Cycle(0.1, 1.0), {"da": 0.14, "max_steps": 5, "response": response}
+
+
+@scene
 def penny() -> Run:
     crack = xc.penny_crack((0.01, -0.02, 0.03), (0.3, -0.5, 1.0), 0.5)
     problem = xc.Problem(cube(9, 67), SOLID, [crack], loads=pull(3), order=1)
@@ -288,6 +361,18 @@ def surface_crack_in_contact() -> Run:
     ]  # fmt: skip
     problem = xc.Problem(cube(9, 70), SOLID, [crack], loads=bend, order=1)
     return problem, xc.Cycle(-1.0, 1.0), {"da": 0.25, "max_steps": 3}
+
+
+@scene
+def penny_euler() -> Run:
+    problem, cycle, options = penny()
+    return problem, cycle, options | {"integrator": "euler"}
+
+
+@scene
+def penny_by_cycles() -> Run:
+    problem, cycle, _ = penny()
+    return problem, cycle, {"da": 0.3, "cycles": 1.1e5, "max_steps": 3}
 
 
 def results_of(steps: Any) -> Results:
