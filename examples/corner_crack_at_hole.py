@@ -106,7 +106,7 @@ print(" ".join(f"{name:>20}" for name in HEAD))
 lines = []
 for row in rows:
     own = table[table["step"] == row["step"]]
-    K = (own["K_I_1_min"].min(), own["K_I_1_max"].max()) if len(own) else (np.nan, np.nan)
+    K = (own["K_I_max_min"].min(), own["K_I_max_max"].max()) if len(own) else (np.nan, np.nan)
     lines.append((row["step"], row["N"], row["length_front"], row["length_hole"], row["area"], *K))
     print(" ".join(f"{value:20.6g}" for value in lines[-1]))
 with open(OUT / "table.csv", "w", newline="") as file:

@@ -424,7 +424,7 @@ for name, (history, _) in runs.items():
     color, style = LOOK[name]
     n0 = 0.0 if name == "before" else N_TURN
     N = np.array([s.cycles for s in history.steps]) + n0
-    a = np.array([s.memory.length[0] for s in history.steps])
+    a = np.array([s.sizes[0] for s in history.steps])
     furthest = np.array([s.sif[-1][0].x[:, 2].max() for s in history.steps])
     axes[0].plot(N / 1e3, a, style, color=color, marker="o", ms=3, label=LABEL[name])
     if name != "before":

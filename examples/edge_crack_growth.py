@@ -96,7 +96,7 @@ options = {
 }
 history = xc.collect(xc.grow(plate, **options))
 table = history.table()
-K, a, y = table["K_I_1"], table["a"], table["y"]
+K, a, y = table["K_I_max"], table["a"], table["y"]
 print(history.solved[-1].solutions[-1].report)
 
 # %% The same run, stopped and resumed from disk

@@ -10,7 +10,7 @@ from benchmarks.runs import Outcome
 from benchmarks.scenes.growth import A0, A1, GROWN, LAW, N_STEPS, TURNING, exact_life, tip_errors
 from benchmarks.scenes.material import NU
 from xcrack.fatigue.criteria import kink_angle
-from xcrack.growth.cycles import cycles_between
+from xcrack.fatigue.cycle import cycles_between
 
 
 def grown(grading: Grading, steps: int = N_STEPS) -> Outcome:

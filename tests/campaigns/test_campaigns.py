@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from support import campaign_cases
-from xcrack.base.errors import ProblemError, XcrackWarning
-from xcrack.runs.campaign import campaign, grid, key_of
+from xcrack import ProblemError, XcrackWarning, campaign, grid
+from xcrack.runs.campaign import key_of
 
 
 def test_rows_and_failures(tmp_path):

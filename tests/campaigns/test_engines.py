@@ -15,8 +15,7 @@ import numpy as np
 import pytest
 
 from support import campaign_cases
-from xcrack.base.errors import ProblemError, XcrackWarning
-from xcrack.runs.campaign import campaign, grid
+from xcrack import ProblemError, XcrackWarning, campaign, grid
 
 TESTS = Path(__file__).parents[1]
 

@@ -13,8 +13,9 @@ from xcrack.crack.measures import area_inside, front_length_inside, surface_size
 from xcrack.crack.placing_3d import place_surface
 from xcrack.crack.stations import front_frames
 from xcrack.crack.surfaces import elliptic_crack, penny_crack
-from xcrack.growth.cycles import cycles_between, elapsed_3d
-from xcrack.growth.follow_3d import interpolate_along_front
+from xcrack.fatigue.cycle import cycles_between
+from xcrack.growth.euler import elapsed_3d
+from xcrack.growth.fronts import interpolate_along_front
 from xcrack.mesh.box import box
 from xcrack.mesh.triangulation import face_areas, face_normals, loops, oriented_faces, side_keys
 

@@ -26,7 +26,7 @@ from fuzz.kinds import (
 from fuzz.result_rules import LOAD, NOTHING, NU, fits
 from fuzz.values import paths
 from xcrack import testing
-from xcrack.growth.step import Arrival
+from xcrack.growth.step import Arrival, StepControl
 from xcrack.linalg.engine import SolverState
 
 ANY = Numbers()
@@ -63,6 +63,12 @@ def _per_crack(value):
         return False
     one = array(items[0])
     return one is not None and one.shape == (1,)
+
+
+def _no_rows_or_one(value):
+    """Whether there is nothing, which is filled in; of other values their shapes decide."""
+    items = items_of(value)
+    return True if items is not None and not len(items) else None
 
 
 def _grow(**changes):
@@ -337,8 +343,18 @@ ENTRIES = [
                 Late(lambda: [scenes.crack()]),
             ),
             "levels": arg(Numbers((None,)), (), [0.0, 1.0]),
-            "memory": arg(Seen(rule=lambda v: v is None), None),
-            "error": arg(Seen(rule=lambda v: v is None), None),
+            "states": arg(ListOf(item=Word(), rule=lambda v: len(v) in (0, 1)), (), ["max"]),
+            "law_rate": arg(Seen(rule=_no_rows_or_one), (), [[0.1]]),
+            "R_range": arg(Seen(rule=_no_rows_or_one), (), [[[0.0, 0.5]]]),
+            "sizes": arg(Numbers((None,)), (), [1.0]),
+            "control": arg(Of(type=StepControl), StepControl()),
+            **{
+                name: arg(Seen(rule=lambda v: v is None), None)
+                for name in (
+                    *("error", "identities", "stations", "solves", "zones", "earlier_zones"),
+                    *("plan", "run"),
+                )
+            },
             "warnings": arg(ListOf(item=Word(), optional=True), None, ["a domain is clipped"]),
             "arrivals": arg(
                 ListOf(item=Of(type=Arrival)), (), (Arrival(0, 0, (1.0, 0.5), "right", 0.1, 9.0),)

@@ -9,8 +9,6 @@ import xcrack as xc
 from fuzz.entry import Entry, Hook, arg
 from fuzz.kinds import Called, Filename, Number, Numbers, Of, Seen, Whole, Word, real
 from support.growth_fakes import mode_I, plate
-from xcrack.growth.step import Memory, Step
-from xcrack.linalg.engine import SolverState
 from xcrack.runs.rerating import block_of_run, driving_forces
 
 LAW = xc.paris(1e-11, 3.0)
@@ -24,7 +22,6 @@ def _step(n):
     rate = np.asarray(LAW(dK, 0.0))
     factors = (0.0, 1.0)
     states = xc.Response.of_K(problem, factors, [factor * K for factor in factors]).sif
-    memory = Memory((rate,), (5.0 + 3.0 * n,), (np.zeros(1),), 1.5, SolverState(), {})
     values = {
         "angle": np.zeros(1),
         "dK_eq": dK,
@@ -33,7 +30,7 @@ def _step(n):
         "da": np.full(1, 3.0),
     }
     parts = {name: (value,) for name, value in values.items()}
-    return Step(n, 1e4 * n, problem.placed, states, **parts, memory=memory)
+    return xc.Step(n, 1e4 * n, problem.placed, states, **parts, sizes=(5.0 + 3.0 * n,))
 
 
 HISTORY = xc.History(tuple(_step(n) for n in range(5)), "max_steps")
@@ -82,8 +79,7 @@ def _flights_of_the_law():
     steps = []
     for step, value in zip(FLIGHTS.steps, (*ends[:, 0], ends[-1, 1]), strict=True):
         rate = (np.full(1, value),)
-        memory = dataclasses.replace(step.memory, law_rate=rate)
-        steps.append(dataclasses.replace(step, rate=rate, memory=memory))
+        steps.append(dataclasses.replace(step, rate=rate, law_rate=rate))
     return xc.History(tuple(steps), "max_steps")
 
 

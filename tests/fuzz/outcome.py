@@ -17,8 +17,7 @@ import xcrack as xc
 from fuzz.entry import ARITY, OWN
 from fuzz.kinds import EDGE, NONSENSE, VALID
 from fuzz.values import prepare
-from xcrack.growth.step import StepError
-from xcrack.growth.trail import StepControl
+from xcrack.growth.step import StepControl, StepError
 
 GOOD = (
     "valid finite",

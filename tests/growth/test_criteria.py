@@ -8,14 +8,15 @@ from hypothesis.extra.numpy import arrays
 from scipy.optimize import minimize_scalar
 
 from support import exact
-from xcrack.base.errors import ProblemError, XcrackWarning
-from xcrack.fatigue.criteria import (
+from xcrack import (
+    ProblemError,
+    XcrackWarning,
     equivalent_K,
-    kink_angle,
     max_hoop_stress,
     mean_reference,
     weighted_angle,
 )
+from xcrack.fatigue.criteria import kink_angle
 
 SEED = 90317
 CRITERIA = [

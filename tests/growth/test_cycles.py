@@ -5,8 +5,7 @@ import pytest
 from scipy.integrate import quad
 
 from support import exact
-from xcrack.base.errors import ProblemError
-from xcrack.growth.cycles import cycles_between
+from xcrack import ProblemError, cycles_between
 
 
 @pytest.mark.parametrize("g", [-1.5, 0.0, 0.5, 1.0, 1 + 1e-13, 1 - 1e-9, 1.5, 2.0, 4.0])

@@ -197,4 +197,4 @@ def test_the_body_of_a_run_is_stored_with_one_coefficient_a_crack(tmp_path):
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", xc.XcrackWarning)
         xc.collect(run, path=tmp_path / "run")
-    assert (tmp_path / "run" / "body.npz").exists()
+    assert (tmp_path / "run" / "mesh.npz").exists()

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from xcrack import SIF
 from xcrack.growth.front_filter import without_noise
-from xcrack.sif.sif import SIF
 
 N, LENGTH = 60, 30.0
 

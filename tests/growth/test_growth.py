@@ -6,15 +6,19 @@ from scipy.integrate import quad
 
 from support import exact
 from support.growth_fakes import STRESS, formula, mode_I, plate
-from xcrack.base.errors import ProblemError
+from xcrack import (
+    Cycle,
+    ProblemError,
+    elber,
+    grow,
+    line_crack,
+    max_hoop_stress,
+    paris,
+    traction,
+    weighted_angle,
+)
 from xcrack.crack.crack import tip_frames
-from xcrack.crack.lines import line_crack
 from xcrack.crack.measures import length_inside
-from xcrack.fatigue.criteria import max_hoop_stress, weighted_angle
-from xcrack.fatigue.power import elber, paris
-from xcrack.growth.run import grow
-from xcrack.growth.step import Cycle
-from xcrack.model.loads import traction
 
 LAW = paris(C=1e-11, m=3.0)
 CYCLE = Cycle(0.0, 1.0)
@@ -350,8 +354,8 @@ def test_ends_where_the_tip_leaves_the_body():
     response = formula(mode_I())
     steps, ended = run(grow(plate(), LAW, max_hoop_stress, CYCLE, da=20.0, response=response))
     assert ended == (
-        f"tip left the body: crack 0 reached 'right' at (60, 0.37), N = {steps[-1].cycles:.6g} "
-        "(the last 15 at predicted rates)"
+        "tip left the body: tip of crack 0 reached 'right' at (60, 0.37), "
+        f"N = {steps[-1].cycles:.6g} (the last 15 at predicted rates)"
     )
     assert [step.n_tips for step in steps] == [1, 1, 1, 0]
 
@@ -379,7 +383,9 @@ def test_a_body_that_falls_apart_ends_the_run():
 
     steps, ended = run(grow(problem, LAW, max_hoop_stress, CYCLE, da=6.0, response=response))
     assert len(steps) == 2
-    assert ended.startswith("tip left the body: crack 0 reached 'left' at (0, 0.37), N = ")
+    assert ended.startswith(
+        "tip left the body: left tip of crack 0 reached 'left' at (0, 0.37), N = "
+    )
     assert "a piece is held by nothing" in ended
 
 

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 import xcrack as xc
-from xcrack.growth.step import identities, tip_identities
 
 LAW, CYCLE = xc.paris(1e-11, 3.0), xc.Cycle(0.0, 1.0)
 pytestmark = pytest.mark.filterwarnings("ignore::xcrack.XcrackWarning")
@@ -26,12 +25,17 @@ def history():
 def test_names_go_through_a_join(history):
     assert len(history.joins) == 1
     counts = [len(step.cracks) for step in history.steps]
-    names = identities(history.steps)
-    tips = tip_identities(history.steps)
     assert {3, 2} == set(counts)
-    for count, of_cracks, of_tips in zip(counts, names, tips):
-        assert of_cracks == ([0, 1, 2] if count == 3 else [0, 2])
-        assert of_tips == ([[0, 1], [2, 3], [4, 5]] if count == 3 else [[0, 3], [4, 5]])
+    for count, step in zip(counts, history.steps):
+        known = step.identities
+        assert known.cracks == ((0, 1, 2) if count == 3 else (0, 2))
+        assert known.ends == (((0, 1), (2, 3), (4, 5)) if count == 3 else ((0, 3), (4, 5)))
+    assert history.names[3] == step.end_name(0, 1) == "right tip of crack 1"
+    table = history.table()
+    rows = table[table["id"] == 3]
+    assert (np.diff(rows["x"]) > 0).all()
+    assert rows["tip"].tolist() == [1] * len(history.steps)
+    assert set(rows["crack"].tolist()) == {1, 0}
 
 
 def test_a_curve_is_one_crack(history, tmp_path):
@@ -55,4 +59,7 @@ def test_names_go_through_an_arrival():
     steps = xc.grow(problem, LAW, xc.max_hoop_stress, CYCLE, da=1.0, max_steps=4, progress=False)
     history = xc.collect(steps)
     assert history.arrivals
-    assert [tips[0] for tips in tip_identities(history.steps)][-1] == [1]
+    assert history.steps[-1].identities.ends == ((1,),)
+    (arrival,) = history.arrivals
+    assert (arrival.end, arrival.label) == (0, "left tip of crack 0")
+    assert str(arrival).startswith("left tip of crack 0 reached 'left' at (0, ")

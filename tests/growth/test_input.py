@@ -6,12 +6,9 @@ import numpy as np
 import pytest
 
 from support.growth_fakes import STRESS, formula, mode_I, plate
-from xcrack.base.errors import ProblemError, XcrackWarning, warn
+from xcrack import Cycle, ProblemError, XcrackWarning, elber, grow, max_hoop_stress, paris, walker
+from xcrack.base.errors import warn
 from xcrack.crack.measures import length_inside
-from xcrack.fatigue.criteria import max_hoop_stress
-from xcrack.fatigue.power import elber, paris, walker
-from xcrack.growth.run import grow
-from xcrack.growth.step import Cycle
 
 LAW = paris(C=1e-11, m=3.0)
 CYCLE = Cycle(0.0, 1.0)

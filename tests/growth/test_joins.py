@@ -3,7 +3,7 @@
 import pytest
 
 import xcrack as xc
-from xcrack.base.errors import ProblemError
+from xcrack import ProblemError
 from xcrack.growth.step import numbers_after
 
 

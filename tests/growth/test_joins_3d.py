@@ -13,8 +13,7 @@ import pytest
 import xcrack as xc
 from support.scenes_fronts import graded, lines
 from xcrack.growth import joins_3d
-from xcrack.growth.ending import amplification, part_of_time
-from xcrack.growth.step import lineage
+from xcrack.growth.joins_3d import amplification, part_of_time
 from xcrack.mesh.triangulation import face_areas
 from xcrack.view.report_results import growth
 from xcrack.view.report_source import Source
@@ -115,7 +114,8 @@ def check(history):
     assert table["crack"].tolist() == [0, 1, 0, 0]
     assert len(history.measures()[0]) == 4
     assert "join" in history._repr_html_()
-    assert lineage(history.steps, 0) == lineage(history.steps, 1) == [[0, 1], [0], [0]]
+    assert [step.identities.cracks for step in history.steps] == [(0, 1), (0,), (0,)]
+    assert [step.identities.ends for step in history.steps] == [((0,), (1,)), ((0,),), ((0,),)]
     same = history.rerate(xc.paris(C=2e-3, m=3.0))
     assert same.cycles == pytest.approx([step.cycles / 2 for step in history.steps])
 

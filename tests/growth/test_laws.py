@@ -5,8 +5,7 @@ import pytest
 from scipy.integrate import quad
 
 from support import exact
-from xcrack.base.errors import ProblemError
-from xcrack.fatigue.power import elber, paris, walker
+from xcrack import ProblemError, elber, paris, walker
 from xcrack.testing import check_criterion, check_law
 
 A0, A1, STRESS, C = 1e-3, 1e-2, 100.0, 1e-11

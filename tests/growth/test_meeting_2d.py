@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import xcrack as xc
-from xcrack.growth.meeting_2d import joined, meetings
+from xcrack.crack.meetings import joined, meetings
 
 STEEL = xc.Isotropic(210e3, 0.3, "strain")
 PULL = [xc.traction("top", (0, 100.0)), xc.traction("bottom", (0, -100.0))]

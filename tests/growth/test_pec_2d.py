@@ -6,17 +6,9 @@ from scipy.integrate import quad, solve_ivp
 
 from support.growth_fakes import STRESS, formula, plate
 from support.growth_runs import *  # noqa: F403 - fixtures come by name
-from support.growth_runs import run_of as stored_run
-from xcrack.base.errors import ProblemError
+from xcrack import Cycle, ProblemError, collect, grow, line_crack, load, max_hoop_stress, paris
 from xcrack.crack.crack import tip_frames
-from xcrack.crack.lines import line_crack
-from xcrack.fatigue.criteria import max_hoop_stress
-from xcrack.fatigue.power import paris
-from xcrack.growth.options import GrowthRule
-from xcrack.growth.run import grow
-from xcrack.growth.step import Cycle
-from xcrack.growth.trail import first_length, next_length, step_error
-from xcrack.runs.collect import collect, load
+from xcrack.growth.step_length import first_length, next_length, step_error
 
 LAW = paris(C=1e-11, m=3.0)
 CYCLE = Cycle(0.0, 1.0)
@@ -164,7 +156,7 @@ def test_a_tip_that_leaves_ends_what_its_solves_can_say():
         low, high = (middle, high) if cycles(5.0, middle, 1.0) < exit_ else (low, middle)
     N = exit_ + cycles(low, x, 1.3)
     assert step.cycles == pytest.approx(N, rel=0.02)
-    assert step.memory.trail.n_solves == 3
+    assert step.solves.n_solves == 3
 
 
 def test_an_infinite_rate_at_the_end_of_a_step():
@@ -199,7 +191,7 @@ def test_a_first_kink_begins_in_its_limit():
 
     response = formula(K_of)
     step = end_of(plate(), da=2.0, max_steps=1, response=response)
-    direction = step.memory.trail.direction[0, 0]
+    direction = np.arctan2(*step.solves.direction[0, 0, ::-1])
     assert np.degrees(direction) == pytest.approx(-77.33, abs=5e-3)
     assert np.degrees(step.angle[0][0]) == pytest.approx(-70.53, abs=5e-3)  # what K says
 
@@ -215,22 +207,12 @@ def test_steps_say_how_they_were_solved_and_corrected(whole):
             assert one.corrected[c].points.tobytes() == two.corrected[c].points.tobytes()
             assert one.error.place[c].tobytes() == two.error.place[c].tobytes()
         assert one.error.cycles == two.error.cycles
-        assert one.memory.trail.direction.tobytes() == two.memory.trail.direction.tobytes()
-        assert one.memory.trail.n_solves == min(one.index + 1, 3)
+        assert one.solves.direction.tobytes() == two.solves.direction.tobytes()
+        assert one.solves.n_solves == min(one.index + 1, 3)
     moved = [
         np.linalg.norm(s.corrected[0].points[-1] - s.cracks[0].points[-1]) for s in whole.steps
     ]
     assert moved[0] == 0 < min(moved[1:])
-
-
-def test_a_run_of_the_first_set_of_defaults_goes_on_by_eulers_rule(tmp_path):
-    run = GrowthRule(**stored_run())
-    assert run.integrator == "pec"
-    begun = run.as_begun({"defaults": "1"})
-    assert (begun.integrator, begun.defaults) == ("euler", 1)
-    assert "integrator" not in begun.settings
-    given = GrowthRule(**stored_run(integrator="euler")).as_begun({"defaults": "1"})
-    assert given.settings == begun.settings
 
 
 def test_the_linear_ratio_is_of_first_order_only():

@@ -7,25 +7,32 @@ import pytest
 from scipy.interpolate import PchipInterpolator
 
 from support.growth_fakes import STRESS, formula, mode_I, plate
-from xcrack.base.errors import ProblemError
-from xcrack.crack.lines import line_crack
-from xcrack.crack.surfaces import penny_crack
-from xcrack.fatigue.closures import newman_closure
-from xcrack.fatigue.criteria import max_hoop_stress
-from xcrack.fatigue.power import paris, walker
-from xcrack.fatigue.retardation import plastic_zone, wheeler, willenborg
-from xcrack.fatigue.spectrum import Spectrum
-from xcrack.growth.run import grow
-from xcrack.growth.step import Cycle
-from xcrack.mesh.box import box
-from xcrack.model.loads import traction
-from xcrack.model.material import Isotropic
-from xcrack.model.problem import Problem
-from xcrack.runs.collect import collect, resume
-from xcrack.runs.history import History
-from xcrack.runs.life import life
-from xcrack.runs.retarded import retarded
-from xcrack.runs.scatter import Scatter, lognormal
+from xcrack import (
+    Cycle,
+    History,
+    Isotropic,
+    Problem,
+    ProblemError,
+    Scatter,
+    Spectrum,
+    box,
+    collect,
+    grow,
+    life,
+    line_crack,
+    lognormal,
+    max_hoop_stress,
+    newman_closure,
+    paris,
+    penny_crack,
+    plastic_zone,
+    resume,
+    retarded,
+    traction,
+    walker,
+    wheeler,
+    willenborg,
+)
 
 LAW = paris(5e-12, 3.0)
 ZONES = plastic_zone(300.0, beta=2)  # MPa, mm
@@ -271,14 +278,14 @@ def test_a_front(tmp_path):
 
 
 def test_what_a_step_carries():
-    """Its rate is that of the law; what overloads left is in its memory."""
+    """Its rate is that of the law; what overloads left goes with it."""
     response = formula(mode_I())
     plain, slow = (
         steps_of(None, response=response)[2],
         steps_of(wheeler(1.0, ZONES), response=response)[2],
     )
     assert slow.rate[0] == pytest.approx(plain.rate[0], rel=1e-9)
-    zones = slow.memory.trail.overloads.zones
+    zones = slow.zones
     assert [f.name for f in fields(zones)] == ["since", "size", "K", "position", "part"]
     K = STRESS * np.sqrt(np.pi * 7.0)
     assert zones.K[0] == pytest.approx(K, rel=2e-3)

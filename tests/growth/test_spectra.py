@@ -7,25 +7,33 @@ import pytest
 
 from support import exact
 from support.growth_fakes import formula, mode_I, plate
-from xcrack.base.errors import ProblemError, XcrackWarning
-from xcrack.crack.lines import line_crack
-from xcrack.crack.surfaces import penny_crack
-from xcrack.fatigue.closures import newman_closure
-from xcrack.fatigue.criteria import max_hoop_stress, weighted_angle
-from xcrack.fatigue.power import paris, walker
-from xcrack.fatigue.spectrum import Spectrum
-from xcrack.fatigue.thresholds import klesnil_lukas
+from xcrack import (
+    Cycle,
+    Isotropic,
+    Problem,
+    ProblemError,
+    Response,
+    Spectrum,
+    XcrackWarning,
+    box,
+    collect,
+    fix,
+    grow,
+    initial_stress,
+    klesnil_lukas,
+    line_crack,
+    max_hoop_stress,
+    newman_closure,
+    paris,
+    penny_crack,
+    respond,
+    resume,
+    traction,
+    walker,
+    weighted_angle,
+)
 from xcrack.growth.levels import ladders
-from xcrack.growth.response import Response, respond
-from xcrack.growth.run import grow
-from xcrack.growth.step import Cycle
 from xcrack.linalg.engine import SolverState
-from xcrack.mesh.box import box
-from xcrack.model.loads import initial_stress, traction
-from xcrack.model.material import Isotropic
-from xcrack.model.problem import Problem
-from xcrack.model.supports import fix
-from xcrack.runs.collect import collect, resume
 
 LAW = paris(1e-11, 3.0)
 COARSE = pytest.mark.filterwarnings("ignore::xcrack.XcrackWarning")

@@ -141,7 +141,7 @@ def test_life_of_a_penny():
 
 def meshes_of(history):
     """Fingerprints of the meshes of a run, each once."""
-    return list(dict.fromkeys(step.memory.mesh for step in history.steps))
+    return list(dict.fromkeys(step.run.mesh for step in history.steps))
 
 
 def resumed(folder, given, whole, stops):
@@ -158,7 +158,7 @@ def test_mesh_is_refined_at_the_first_step_that_needs_it(tmp_path):
     """The first step is good enough on the mesh as given, the second is not; resumed on each."""
     given = run_of(strip(5), tolerance=1e-3)
     whole = xc.collect(xc.grow(**given, max_steps=3), tmp_path / "whole")
-    assert [step.memory.meshes for step in whole.steps] == [0, 1, 1]
+    assert [step.run.meshes for step in whole.steps] == [0, 1, 1]
     cells = [len(step.solutions[0].problem.mesh.cells) for step in whole.steps]
     assert cells[0] < cells[1] == cells[2]
     assert whole.steps[1].error.rate < 0.5 * whole.steps[0].error.rate
@@ -187,7 +187,7 @@ def test_mesh_is_refined_again_where_the_scout_was_misled(tmp_path, monkeypatch)
     monkeypatch.setattr(prepared, "scouted", blind)
     given = run_of(tolerance=1e-3)
     whole = xc.collect(xc.grow(**given, max_steps=17), tmp_path / "whole")
-    made = [step.memory.meshes for step in whole.steps]
+    made = [step.run.meshes for step in whole.steps]
     assert len(begins) == 2
     assert begins[0] == 0 < begins[1]
     assert len(meshes_of(whole)) == 2
@@ -197,8 +197,8 @@ def test_mesh_is_refined_again_where_the_scout_was_misled(tmp_path, monkeypatch)
     resumed(tmp_path / "part", given, whole, (begins[1], begins[1] + 1, begins[1] + 2))
     assert content(tmp_path / "part") == content(tmp_path / "whole")
     # Without its second mesh it is made again, from the step before.
-    for body in run_folder.body_files(tmp_path / "part")[1:]:
-        body.unlink()
+    for mesh in run_folder.mesh_files(tmp_path / "part")[1:]:
+        mesh.unlink()
     again = xc.resume(tmp_path / "part", **given, max_steps=len(whole.steps) + 1)
     longer = xc.resume(tmp_path / "whole", **given, max_steps=len(whole.steps) + 1)
     assert again.table().tobytes() == longer.table().tobytes()
@@ -208,11 +208,11 @@ def test_mesh_is_refined_again_where_the_scout_was_misled(tmp_path, monkeypatch)
 
 
 def content(folder):
-    files = sorted(p for p in folder.iterdir() if p.is_file() and p.name != run_folder.BODY)
+    files = sorted(p for p in folder.iterdir() if p.is_file() and p.name != run_folder.MESH)
     return {path.name: path.read_bytes() for path in files}
 
 
-@pytest.mark.parametrize("lost", ["", pytest.param(run_folder.BODY, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("lost", ["", pytest.param(run_folder.MESH, marks=pytest.mark.slow)])
 def test_resumed_to_the_last_bit(tmp_path, lost):
     """A run that is killed, also one that has lost its mesh: that is scouted and made again."""
     given = run_of(tolerance=0.05 if not lost else 1e-3)

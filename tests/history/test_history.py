@@ -12,17 +12,14 @@ import pytest
 from support.growth_fakes import fake_solution
 from support.growth_runs import *  # noqa: F403 - fixtures come by name
 from support.growth_runs import N_STEPS, run_of
-from xcrack.base.errors import ProblemError
-from xcrack.growth.run import grow
-from xcrack.runs.collect import collect, load
-from xcrack.runs.history import History
+from xcrack import History, ProblemError, collect, grow, load
 
 
 def test_table(whole, tmp_path):
     table = whole.table()
     assert table.dtype.names == (
-        *("step", "N", "crack", "tip", "x", "y", "a"),
-        *("K_I_0", "K_II_0", "K_I_1", "K_II_1", "spread"),
+        *("step", "N", "crack", "tip", "id", "x", "y", "a"),
+        *("K_I_min", "K_II_min", "K_I_max", "K_II_max", "spread"),
         *(name for name in ("domain_cells",) if hasattr(whole.steps[0].sif[0][0], name)),
         *("angle", "dK_eq", "R", "rate", "da"),
     )
@@ -31,7 +28,14 @@ def test_table(whole, tmp_path):
     row = table[-1]
     assert (row["step"], row["crack"], row["tip"]) == (N_STEPS - 1, 1, 0)
     assert row["N"] == last.cycles == whole.life
-    assert row["K_II_1"] == last.sif[1][1].K[0, 1]
+    assert (
+        row["K_II_max"] == last.sif[1][1].K[0, 1] == last.sif[last.states.index("max")][1].K_II[0]
+    )
+    assert table["K_II_1"].tolist() == table["K_II_max"].tolist()  # by number, as in older scripts
+    with pytest.raises(ProblemError, match=r"no column 'K_II': it has step, N, .*K_II_max"):
+        table["K_II"]
+    assert whole.names == ("tip of crack 0", "tip of crack 1")
+    assert row["id"] == 1
     assert (row["x"], row["y"]) == tuple(last.cracks[1].points[-1])
     assert row["da"] == last.da[1][0]
     first = table[table["step"] == 0]
@@ -102,7 +106,7 @@ def test_write_with_solutions_and_without(whole, tmp_path, monkeypatch):
     with open(tmp_path / "out" / "history.csv", newline="") as file:
         rows = list(csv.DictReader(file))
     assert len(rows) == 4
-    assert float(rows[3]["K_II_1"]) == mixed.table()["K_II_1"][3]  # all digits
+    assert float(rows[3]["K_II_max"]) == mixed.table()["K_II_1"][3]  # all digits
     sets = list(ElementTree.parse(tmp_path / "out" / "history.pvd").getroot().iter("DataSet"))
     assert [s.get("file") for s in sets] == [
         "steps/step_00000_cracks.vtp",
@@ -144,7 +148,7 @@ def test_histories_that_cannot_be(changes, words):
         ({"sif": ((1, 2),)}, "give SIF"),
         ({"angle": (np.zeros(2), np.zeros(1))}, r"\[2, 1\].* one for each tip"),
         ({"rate": 3.0}, "Step: rate = 3.0: give a list"),
-        ({"memory": {}}, "that is made by grow"),
+        ({"plan": {}}, "that is made by grow"),
     ],
 )
 def test_steps_that_cannot_be(whole, changes, words):

@@ -3,19 +3,21 @@
 import io
 import json
 import pickle
+import re
 import warnings
 import zipfile
+from dataclasses import fields, is_dataclass, replace
 
 import numpy as np
 import pytest
 
+import xcrack as xc
+from scripts.run_folder_page import PAGE, page_with_tables, patterns
 from support.growth_runs import *  # noqa: F403 - fixtures come by name
 from support.growth_runs import N_STEPS, Killed, Saboteur, assert_same, content, run_of
-from xcrack.base.errors import ProblemError, XcrackWarning
-from xcrack.growth.run import grow
+from xcrack import ProblemError, XcrackWarning, collect, grow, load, resume
 from xcrack.runs import run_folder as run_files
 from xcrack.runs import store
-from xcrack.runs.collect import collect, load, resume
 
 # --- to disk and on ----------------------------------------------------------------------------
 
@@ -91,14 +93,14 @@ def test_no_step_is_computed_after_until_was_true():
 
 
 @pytest.mark.parametrize(
-    ("written", "words"), [(1, "before the first release"), (3, "newer xcrack")]
+    ("written", "words"), [(2, "before the first release"), (4, "newer xcrack")]
 )
 @pytest.mark.parametrize("lost", [False, True], ids=["header", "steps"])
 def test_a_run_of_another_format(whole, monkeypatch, written, words, lost):
     """Whether the header says so, or the steps where it is lost."""
     folder = whole.path.parent / "other"
     with monkeypatch.context() as patch:
-        patch.setattr(run_files, "_FORMAT", written)
+        patch.setattr(run_files, "FORMAT", written)
         collect(grow(**run_of()), folder)
     if lost:
         (folder / "run.json").unlink()
@@ -109,28 +111,88 @@ def test_a_run_of_another_format(whole, monkeypatch, written, words, lost):
     assert content(folder) == before
 
 
-def test_a_class_of_another_version(whole):
-    """A name that is not known, a field that is not, a field that is missing."""
+def test_a_folder_of_an_older_format_is_refused_in_words(tmp_path):
+    """Its steps are private classes by name, in a text called tree."""
+    tree = {"dict": [["run", {"dict": [["format", 2]]}], ["step", {"class": "Step"}]]}
+    np.savez(tmp_path / "step_00000.npz", tree=np.array(json.dumps(tree)))
+    for header in (None, {"format": 2, "settings": {}, "versions": {}}):
+        if header:
+            (tmp_path / "run.json").write_text(json.dumps(header))
+        with pytest.raises(ProblemError, match="has format 2, from before the first release"):
+            load(tmp_path)
+
+
+def test_a_step_that_knows_more_or_less_is_read(whole):
+    """Arrays of a later version are not looked at; values with a default may be missing."""
     path = run_files.step_path(whole.path, 1)
-    with np.load(path) as members:
+    with np.load(path, allow_pickle=False) as members:
         arrays = dict(members)
-    tree = str(arrays.pop("tree"))
-    for old, new, words in (
-        ('"class": "SIF"', '"class": "Jump"', "holds a 'Jump'"),
-        ('"spread":', '"scatter":', "holds a SIF that differs in scatter, spread"),
-    ):
-        np.savez(path, tree=np.array(tree.replace(old, new)), **arrays)
-        with pytest.raises(ProblemError, match=words):
-            load(whole.path)
+    less = {k: v for k, v in arrays.items() if not k.startswith(("arrival_", "identity_"))}
+    np.savez(path, **less, later_array=np.arange(3))
+    read = load(whole.path)
+    assert len(read.steps) == len(whole.steps)
+    assert read.steps[1].identities is None
+    assert read.steps[1].sif[1][0].K.tobytes() == whole.steps[1].sif[1][0].K.tobytes()
 
 
-def test_a_stored_file_chooses_no_code(tmp_path):
+def test_what_cannot_be_stored_is_named(tmp_path):
+    with pytest.raises(ProblemError, match=r"(Posix|Windows)Path cannot be stored"):
+        store.packed_content({"path": tmp_path}, {})
     tree = {"class": "subprocess:Popen", "fields": {"args": "true"}}
     np.savez(tmp_path / "x.npz", tree=np.array(json.dumps(tree)))
     with pytest.raises(ProblemError, match=r"x\.npz holds a 'subprocess:Popen'"):
-        store.load(tmp_path / "x.npz", run_files.CLASSES)
-    with pytest.raises(ProblemError, match=r"(Posix|Windows)Path cannot be stored"):
-        store.save(tmp_path / "y.npz", {"path": tmp_path}, run_files.CLASSES)
+        store.load(tmp_path / "x.npz", {})
+
+
+# --- what files hold -----------------------------------------------------------------------------
+
+
+def test_the_page_lists_the_arrays():
+    text = PAGE.read_text(encoding="utf-8")
+    assert page_with_tables(text) == text, "python scripts/run_folder_page.py writes them anew"
+
+
+def check_files(folder):
+    """Plain arrays, for numpy alone, whose names the page has."""
+    known = re.compile("|".join(patterns()))
+    for path in [*folder.glob("step_*.npz"), *folder.glob("mesh*.npz")]:
+        with np.load(path, allow_pickle=False) as arrays:
+            for name in arrays.files:
+                assert arrays[name].dtype.kind in "fibU", (path.name, name)
+                assert known.fullmatch(name), (path.name, name)
+
+
+def test_files_are_plain_arrays(whole, tmp_path):
+    check_files(whole.path)
+    plate, crack = xc.box((0, -2), (4, 2), (8, 8)), xc.line_crack([(0, 0.1), (1, 0.1)])
+    loads = [xc.traction("top", (0.0, -80.0)), xc.traction("bottom", (0.0, 80.0))]
+    steel = xc.Isotropic(210e3, 0.3, "strain")
+    problem = xc.Problem(plate, steel, [crack], loads=loads, contact="on")
+    collect(grow(**run_of(problem, response=None, max_steps=1)), tmp_path / "closed")
+    check_files(tmp_path / "closed")
+    assert (tmp_path / "closed" / "mesh.npz").exists()
+
+
+def same_value(one, other, where):
+    """Whether two values are the same to the last bit, part by part."""
+    if is_dataclass(one):
+        for each in fields(one):
+            place = f"{where}.{each.name}"
+            same_value(getattr(one, each.name), getattr(other, each.name), place)
+    elif isinstance(one, np.ndarray):
+        assert one.dtype == other.dtype, where
+        assert one.tobytes() == other.tobytes(), where
+    elif isinstance(one, tuple | list):
+        assert len(one) == len(other), where
+        for k, pair in enumerate(zip(one, other)):
+            same_value(*pair, f"{where}[{k}]")
+    else:
+        assert one == other or (one != one and other != other), where
+
+
+def test_every_field_of_a_step_survives(whole):
+    for one, other in zip(whole.steps, load(whole.path).steps, strict=True):
+        same_value(replace(one, solutions=()), other, f"step {one.index}")
 
 
 # --- damage and strangers ------------------------------------------------------------------------
@@ -167,7 +229,7 @@ def test_a_lost_middle_step_is_computed_again_to_the_same_bytes(whole, index):
     assert aside == {name: before[name] for name in before if name > path.name}
 
 
-@pytest.mark.parametrize("text", [None, "", "{", '{"format": 2}', "[]"])
+@pytest.mark.parametrize("text", [None, "", "{", '{"format": 3}', "[]"])
 def test_a_lost_or_damaged_header_is_made_again_from_the_steps(whole, text):
     before = content(whole.path)
     path = whole.path / "run.json"
@@ -199,17 +261,9 @@ def junk(folder):
     deep = io.BytesIO()
     np.savez(deep, tree=np.array("[" * 10_000 + "]" * 10_000))
     odd = io.BytesIO()
-    fields = {"index": 2, "cycles": "many", "cracks": 1, "sif": 2, "angle": None, "dK_eq": 1}
-    fields |= {"R": 1, "rate": 1, "da": 1, "solutions": {"tuple": []}, "memory": None}
     run = json.loads((folder / "run.json").read_text())
     del run["ended"]
-    pairs = {
-        "dict": [
-            ["run", {"dict": [[k, as_dict(v)] for k, v in run.items()]}],
-            ["step", {"class": "Step", "fields": fields}],
-        ]
-    }
-    np.savez(odd, tree=np.array(json.dumps(pairs)))
+    np.savez(odd, run=np.array(json.dumps(run)), index=np.array(2), cycles=np.array("many"))
     return {
         "empty": b"",
         "text": b"my own notes",
@@ -220,10 +274,6 @@ def junk(folder):
         "deep nesting": deep.getvalue(),
         "step of odd parts": odd.getvalue(),
     }
-
-
-def as_dict(value):
-    return {"dict": list(value.items())} if isinstance(value, dict) else value
 
 
 def zipped(files):

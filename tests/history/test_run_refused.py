@@ -8,9 +8,7 @@ import pytest
 
 from support.growth_runs import *  # noqa: F403 - fixtures come by name
 from support.growth_runs import N_STEPS, Saboteur, assert_same, run_of
-from xcrack.base.errors import ProblemError, XcrackWarning
-from xcrack.growth.run import grow
-from xcrack.runs.collect import collect, load, resume
+from xcrack import ProblemError, XcrackWarning, collect, grow, load, resume
 
 # --- the system refuses --------------------------------------------------------------------------
 

@@ -1,6 +1,7 @@
 """Settings of a run as text, and runs that are taken up again with others."""
 
 import functools
+import json
 import math
 import os
 import subprocess
@@ -14,26 +15,29 @@ from scipy.interpolate import CubicSpline
 from support.growth_fakes import plate
 from support.growth_runs import *  # noqa: F403 - fixtures come by name
 from support.growth_runs import content, run_of, scene
-from xcrack.analysis.solve import solve
-from xcrack.base.errors import ProblemError, XcrackWarning
-from xcrack.crack.surfaces import penny_crack
-from xcrack.fatigue.criteria import max_hoop_stress
-from xcrack.fatigue.power import paris
-from xcrack.growth import description
-from xcrack.growth import description as settings
-from xcrack.growth.description import describe, differences
+from xcrack import (
+    Cycle,
+    Isotropic,
+    Problem,
+    ProblemError,
+    Response,
+    XcrackWarning,
+    body_force,
+    box,
+    collect,
+    grow,
+    load,
+    max_hoop_stress,
+    paris,
+    penny_crack,
+    resume,
+    save,
+    solve,
+)
+from xcrack.base import description
+from xcrack.base.description import describe, differences
 from xcrack.growth.options import GrowthRule
-from xcrack.growth.response import Response
-from xcrack.growth.run import grow
-from xcrack.growth.step import Cycle
-from xcrack.mesh.box import box
-from xcrack.model.loads import body_force
-from xcrack.model.material import Isotropic
-from xcrack.model.problem import Problem
 from xcrack.runs import collect as collecting
-from xcrack.runs import run_folder
-from xcrack.runs.collect import collect, load, resume
-from xcrack.runs.saved import save
 from xcrack.runs.versions import versions
 
 
@@ -48,9 +52,9 @@ def push(size):
         ({"criterion": max_hoop_stress}, r"criterion: stored xcrack\.weighted_angle, given .*hoop"),
         ({"cycle": Cycle(0.1, 1.0)}, r"cycle\.min: stored 0\.0, given 0\.1"),
         ({"da": 1.8}, r"da: stored 1\.7, given 1\.8"),
-        ({"threshold": 1.0}, "threshold: stored the default, given 1.0"),
+        ({"threshold": 1.0}, r"threshold: stored 0\.0, given 1\.0"),
         ({"scaling": "linear"}, "scaling"),
-        ({"cycles": 1e5}, "cycles: stored the default, given 100000"),
+        ({"cycles": 1e5}, "cycles: stored None, given 100000"),
     ],
 )
 def test_resume_names_what_is_different(whole, changes, words):
@@ -64,7 +68,7 @@ def test_resume_names_what_is_different_in_the_problem(whole):
     problem = scene()
     for changed, words in (
         (replace(problem, material=replace(problem.material, nu=0.2)), r"problem\.material\.nu"),
-        (replace(problem, order=1), r"problem\.order: stored the default, given 1"),
+        (replace(problem, order=1), r"problem\.order: stored 2, given 1"),
         (replace(problem, contact="off"), r"problem\.contact"),
         (replace(problem, numerics=replace(problem.numerics, points=5)), r"numerics\.points"),
         (replace(problem, loads=[body_force((1.0, 0.0))]), r"problem\.loads"),
@@ -198,7 +202,7 @@ def test_what_is_the_same_has_the_same_text():
     assert described(("def law(dK, R):", documented)) == described(
         ("def law(dK, R):", documented.replace("A law.", "Another text."))
     )
-    imported = "from xcrack.growth.description import describe"
+    imported = "from xcrack.base.description import describe"
     code = f"{SCRIPT}\n{imported}\nprint(describe('law', law))"
     for seed in ("1", "2"):
         child = subprocess.run(
@@ -320,39 +324,30 @@ def test_another_python_compiles_other_code(tmp_path, monkeypatch):
     assert content(whole.path) == before
 
 
-def test_a_run_goes_on_with_its_own_defaults(whole, monkeypatch):
-    """Of the set it began with, where the user left the choice to them."""
-    number = settings.DEFAULTS + 1
-    monkeypatch.setattr(settings, "DEFAULTS", number)
-    monkeypatch.setitem(
-        settings.REPLACED,
-        number,
-        {"integrator": "euler", "problem.numerics.points": 6, "scaling": "linear"},
-    )
-    run = GrowthRule(**run_of())
-    begun = run.as_begun(whole.steps[0].memory.settings)
-    assert begun.problem.numerics.points == 6
-    assert begun.scaling == "linear"
-    assert begun.settings == whole.steps[0].memory.settings
-    assert begun.as_begun(begun.settings).settings == begun.settings
-
-
-def test_a_choice_that_became_the_default_is_still_a_choice(whole, monkeypatch):
-    number = settings.DEFAULTS + 1
-    monkeypatch.setattr(settings, "DEFAULTS", number)
-    monkeypatch.setitem(settings.REPLACED, number, {"threshold": 1.0})
-    stored = {**whole.steps[0].memory.settings, "threshold": "0.0"}
-    assert GrowthRule(**run_of()).as_begun(stored).settings == stored
+def test_a_later_option_is_no_difference_at_its_default(whole):
+    """A run from before there was an option goes on where that is left out, and says so else."""
+    path = whole.path / "run.json"
+    stored = json.loads(path.read_text())
+    del stored["settings"]["threshold"]
+    for file in whole.path.glob("step_*.npz"):
+        with np.load(file, allow_pickle=False) as members:
+            arrays = dict(members)
+        header = json.loads(str(arrays["run"]))
+        del header["settings"]["threshold"]
+        np.savez(file, **{**arrays, "run": np.array(json.dumps(header))})
+    path.write_text(json.dumps(stored))
+    assert len(resume(whole.path, **run_of(max_steps=6)).steps) == 6
+    with pytest.raises(ProblemError, match=r"threshold: stored nothing, given 1\.0"):
+        resume(whole.path, **run_of(threshold=1.0))
 
 
 def test_what_changes_no_result_is_not_in_the_settings():
     keys = set(GrowthRule(**run_of(max_steps=3, K_c=1e9, progress=False)).settings)
     assert not keys & {"max_steps", "max_cycles", "K_c", "progress"}
-    assert "problem.order" not in keys
-    assert "problem.order" in GrowthRule(**run_of(replace(scene(), order=1))).settings
+    assert {"problem.order", "threshold", "integrator"} <= keys  # defaults too
 
 
-# Order in space: 1 was the default up to the third set of defaults.
+# Order in space.
 
 
 def block(**options):
@@ -373,40 +368,10 @@ def in_space(problem, **changes):
     return run_of(problem, **given | {"cycle": Cycle(0.0, 1.0), "max_steps": 2} | changes)
 
 
-def as_of_the_third_set(folder):
-    """The folder as it was written when order 1 was the default in space, and nobody gave one."""
-    header, _ = run_folder.read_header(folder)
-    old = {k: v for k, v in header.settings.items() if k != "problem.order"} | {"defaults": "3"}
-    for step in run_folder.read_steps(folder, header).steps:
-        run_folder.write_step(folder, step, replace(header, settings=old))
-    run_folder.write_header(folder, replace(header, settings=old))
-    return old
-
-
-def test_a_run_in_space_goes_on_with_the_order_it_began_with(tmp_path):
-    assert block().order == 2
+def test_a_run_goes_on_with_the_order_it_began_with(tmp_path):
     collect(grow(**in_space(block(order=1))), tmp_path / "run")
-    stored = as_of_the_third_set(tmp_path / "run")
-    for given in (block(), block(order=1)):
-        rule = GrowthRule(**in_space(given)).as_begun(stored)
-        assert rule.problem.order == 1
-        assert rule.settings == stored
-    history = resume(tmp_path / "run", **in_space(block(), max_steps=3))
-    assert len(history.steps) == 3
-    assert history.steps[-1].memory.settings == stored
-    given_then = stored | {"problem.order": "2"}  # a choice that became the default
-    assert GrowthRule(**in_space(block())).as_begun(given_then).problem.order == 2
-
-
-def test_order_1_of_today_is_a_choice(tmp_path):
-    collect(grow(**in_space(block(order=1))), tmp_path / "run")
-    with pytest.raises(ProblemError, match=r"problem\.order: stored 1, given the default"):
+    with pytest.raises(ProblemError, match=r"problem\.order: stored 1, given 2"):
         resume(tmp_path / "run", **in_space(block()))
-
-
-def test_a_plane_run_of_the_third_set_keeps_order_2(whole):
-    stored = whole.steps[0].memory.settings | {"defaults": "3"}
-    assert GrowthRule(**run_of()).as_begun(stored).problem.order == 2
 
 
 def test_faces_that_rub_in_space_have_order_1():

@@ -67,7 +67,7 @@ def test_history_in_one_file(tmp_path):
         assert again.table().tobytes() == history.table().tobytes()
         assert again.ended == history.ended
         assert again.mesh.points.tobytes() == history.mesh.points.tobytes()
-    (tmp_path / "run" / "body.npz").write_bytes(b"half")
+    (tmp_path / "run" / "mesh.npz").write_bytes(b"half")
     assert xc.load(tmp_path / "run").mesh is None  # the steps are what counts
 
 

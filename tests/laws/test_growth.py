@@ -4,20 +4,28 @@ import numpy as np
 import pytest
 
 from support.growth_fakes import formula, mode_I, plate
-from xcrack.base.errors import ProblemError
-from xcrack.crack.lines import line_crack
-from xcrack.fatigue.closures import newman_closure
-from xcrack.fatigue.criteria import max_hoop_stress, nominal_range
-from xcrack.fatigue.fracture import forman, nasgro
-from xcrack.fatigue.power import elber, paris, walker
-from xcrack.fatigue.thresholds import el_haddad, klesnil_lukas, nasgro4_threshold
-from xcrack.growth.run import grow
-from xcrack.growth.step import Cycle
-from xcrack.mesh.box import box
-from xcrack.model.loads import traction
-from xcrack.model.material import Isotropic
-from xcrack.model.problem import Problem
-from xcrack.model.supports import fix
+from xcrack import (
+    Cycle,
+    Isotropic,
+    Problem,
+    ProblemError,
+    box,
+    el_haddad,
+    elber,
+    fix,
+    forman,
+    grow,
+    klesnil_lukas,
+    line_crack,
+    max_hoop_stress,
+    nasgro,
+    nasgro4_threshold,
+    newman_closure,
+    paris,
+    traction,
+    walker,
+)
+from xcrack.fatigue.criteria import nominal_range
 from xcrack.testing import check_law
 
 CYCLE = Cycle(0.1, 1.0)

@@ -3,18 +3,25 @@
 import numpy as np
 import pytest
 
-from xcrack.base.errors import ProblemError
-from xcrack.fatigue.closures import linear_closure, newman_closure, schijve_closure
-from xcrack.fatigue.fracture import forman, hartman_schijve, nasgro, nasgro_K_c
-from xcrack.fatigue.power import paris, piecewise, walker
-from xcrack.fatigue.presets import law
-from xcrack.fatigue.tables import rate_table
-from xcrack.fatigue.thresholds import (
+from xcrack import (
+    ProblemError,
     el_haddad,
+    forman,
+    hartman_schijve,
     klesnil_lukas,
+    law,
+    linear_closure,
+    nasgro,
     nasgro3_threshold,
     nasgro4_threshold,
+    nasgro_K_c,
+    newman_closure,
+    paris,
+    piecewise,
+    rate_table,
+    schijve_closure,
     stepped_threshold,
+    walker,
 )
 
 NEWMAN = newman_closure(2.0, 0.3)

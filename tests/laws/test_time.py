@@ -5,14 +5,19 @@ import pytest
 from scipy.integrate import quad
 
 from support.growth_fakes import STRESS, formula, mode_I, plate
-from xcrack.base.errors import ProblemError
-from xcrack.fatigue.closures import newman_closure
-from xcrack.fatigue.criteria import max_hoop_stress
-from xcrack.fatigue.power import paris, walker
-from xcrack.fatigue.thresholds import el_haddad, klesnil_lukas
-from xcrack.fatigue.time import time_rate, with_time
-from xcrack.growth.run import grow
-from xcrack.growth.step import Cycle
+from xcrack import (
+    Cycle,
+    ProblemError,
+    el_haddad,
+    grow,
+    klesnil_lukas,
+    max_hoop_stress,
+    newman_closure,
+    paris,
+    time_rate,
+    walker,
+    with_time,
+)
 from xcrack.testing import check_law
 
 BASE = paris(1e-8, 3.0)

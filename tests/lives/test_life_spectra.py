@@ -9,22 +9,27 @@ import pytest
 
 from support import exact
 from support.growth_fakes import STRESS, formula, mode_I, plate
-from xcrack.base.errors import ProblemError
-from xcrack.crack.lines import line_crack
-from xcrack.fatigue.criteria import max_hoop_stress
-from xcrack.fatigue.power import paris, walker
-from xcrack.fatigue.spectrum import Spectrum
-from xcrack.fatigue.thresholds import klesnil_lukas
-from xcrack.growth.run import grow
-from xcrack.growth.step import Cycle
-from xcrack.mesh.box import box
-from xcrack.model.loads import traction
-from xcrack.model.material import Isotropic
-from xcrack.model.problem import Problem
-from xcrack.model.supports import fix
-from xcrack.runs.history import History
-from xcrack.runs.life import life
-from xcrack.runs.scatter import Scatter, lognormal, normal
+from xcrack import (
+    Cycle,
+    History,
+    Isotropic,
+    Problem,
+    ProblemError,
+    Scatter,
+    Spectrum,
+    box,
+    fix,
+    grow,
+    klesnil_lukas,
+    life,
+    line_crack,
+    lognormal,
+    max_hoop_stress,
+    normal,
+    paris,
+    traction,
+    walker,
+)
 from xcrack.sif.sif import KErrors
 
 LAW = paris(1e-11, 3.0)

@@ -8,23 +8,31 @@ import pytest
 
 from support import exact
 from support.growth_fakes import STRESS, formula, mode_I, plate
-from xcrack.base.errors import ProblemError
-from xcrack.crack.lines import line_crack
-from xcrack.fatigue.criteria import max_hoop_stress, weighted_angle
-from xcrack.fatigue.power import paris, walker
-from xcrack.fatigue.spectrum import Spectrum
-from xcrack.fatigue.thresholds import klesnil_lukas
-from xcrack.growth.run import grow
-from xcrack.growth.step import Cycle
-from xcrack.mesh.box import box
-from xcrack.model.loads import traction
-from xcrack.model.material import Isotropic
-from xcrack.model.problem import Problem
-from xcrack.model.supports import fix
-from xcrack.runs.history import History
-from xcrack.runs.inspection import growth_curve, inspection, logistic_pod
-from xcrack.runs.life import life
-from xcrack.runs.scatter import Scatter, lognormal, normal
+from xcrack import (
+    Cycle,
+    History,
+    Isotropic,
+    Problem,
+    ProblemError,
+    Scatter,
+    Spectrum,
+    box,
+    fix,
+    grow,
+    growth_curve,
+    inspection,
+    klesnil_lukas,
+    life,
+    line_crack,
+    logistic_pod,
+    lognormal,
+    max_hoop_stress,
+    normal,
+    paris,
+    traction,
+    walker,
+    weighted_angle,
+)
 
 LAW = paris(1e-11, 3.0)
 CYCLE = Cycle(0.0, 1.0)

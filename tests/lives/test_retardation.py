@@ -6,26 +6,26 @@ from scipy.integrate import quad
 
 from support import exact
 from support.growth_fakes import STRESS, formula, mode_I, plate
-from xcrack.base.errors import ProblemError
-from xcrack.fatigue.criteria import max_hoop_stress
-from xcrack.fatigue.power import paris, walker
-from xcrack.fatigue.retardation import (
-    POINTS,
-    BlockCycles,
-    OverloadZones,
-    march,
+from xcrack import (
+    Cycle,
+    History,
+    ProblemError,
+    Scatter,
+    Spectrum,
+    grow,
+    klesnil_lukas,
+    life,
+    lognormal,
+    max_hoop_stress,
+    normal,
+    paris,
     plastic_zone,
+    retarded,
+    walker,
     wheeler,
     willenborg,
 )
-from xcrack.fatigue.spectrum import Spectrum
-from xcrack.fatigue.thresholds import klesnil_lukas
-from xcrack.growth.run import grow
-from xcrack.growth.step import Cycle
-from xcrack.runs.history import History
-from xcrack.runs.life import life
-from xcrack.runs.retarded import retarded
-from xcrack.runs.scatter import Scatter, lognormal, normal
+from xcrack.fatigue.retardation import POINTS, BlockCycles, OverloadZones, march
 
 ZONE = plastic_zone(400.0, beta=2)  # MPa, MPa √m, m
 RATE = 1e-11 * 15.0**3

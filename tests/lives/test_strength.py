@@ -6,31 +6,32 @@ import numpy as np
 import pytest
 
 from support.growth_fakes import STRESS, formula, mode_I, plate
-from xcrack.base.errors import ProblemError
-from xcrack.crack.lines import line_crack
-from xcrack.crack.surfaces import elliptic_crack
-from xcrack.fatigue.criteria import max_hoop_stress
-from xcrack.fatigue.power import paris
-from xcrack.fatigue.spectrum import Spectrum
-from xcrack.growth.response import respond
-from xcrack.growth.run import grow
-from xcrack.growth.step import Cycle
-from xcrack.linalg.engine import SolverState
-from xcrack.mesh.box import box
-from xcrack.model.loads import traction
-from xcrack.model.material import Isotropic
-from xcrack.model.problem import LoadLevel, Problem
-from xcrack.model.supports import fix
-from xcrack.runs.assessment import (
+from xcrack import (
+    Cycle,
+    History,
+    Isotropic,
+    Problem,
+    ProblemError,
+    Spectrum,
     assessment_line,
+    box,
+    elliptic_crack,
+    energy_release_rate,
+    fix,
     geometry_factors,
+    grow,
+    line_crack,
+    max_hoop_stress,
+    opening_load,
+    paris,
+    plot_strength,
     residual_strength,
+    respond,
+    traction,
     write_factors,
 )
-from xcrack.runs.history import History
-from xcrack.runs.opening import opening_load
-from xcrack.sif.stress_intensity import energy_release_rate
-from xcrack.view.lives import plot_strength
+from xcrack.linalg.engine import SolverState
+from xcrack.model.problem import LoadLevel
 
 LAW = paris(1e-11, 3.0)
 STEEL = assessment_line(E=210e3, sigma_y=355.0, sigma_u=510.0)

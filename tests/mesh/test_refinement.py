@@ -10,7 +10,7 @@ import pytest
 
 import xcrack as xc
 from support import scenes_2d as scenes
-from xcrack.growth.description import describe
+from xcrack.base.description import describe
 from xcrack.mesh.mesh import local_edges
 from xcrack.mesh.refinement import refine_to
 

@@ -67,7 +67,7 @@ def test_the_same_bits_for_any_number(scene, monkeypatch):
 def test_threads_are_no_setting_of_a_run():
     problem = plane()
     other = replace(problem, numerics=xc.Numerics(threads=3))
-    from xcrack.growth.description import describe
+    from xcrack.base.description import describe
 
     assert describe("problem", problem) == describe("problem", other)
 

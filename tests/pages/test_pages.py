@@ -82,7 +82,7 @@ def test_the_constants_that_matter_are_tied():
         "_SHARE[1]", "_SHARE[2]", "_MOST[1]", "_MOST[2]", "_RANGE[1]", "_RANGE[2]",  # enrichment
         "_OUTER", "_OUTER[1]", "_OUTER[2]", "_REACH", "_BENT",  # domains of K
         "_DIRECT[1]", "_DIRECT[2]", "TOLERANCE",  # solvers
-        "_ORDER", "points", "_OVERLAP", "LEAST", "_FORMAT",
+        "_ORDER", "points", "_OVERLAP", "LEAST", "FORMAT",
     }  # fmt: skip
 
 

@@ -3,9 +3,7 @@
 import numpy as np
 import pytest
 
-from xcrack.base.errors import ProblemError
-from xcrack.fatigue.files import read_spectrum, twist
-from xcrack.fatigue.spectrum import Spectrum
+from xcrack import ProblemError, Spectrum, read_spectrum, twist
 
 
 def test_one_column(tmp_path):

@@ -7,9 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from xcrack.base.errors import ProblemError
-from xcrack.fatigue.rainflow import rainflow, turning_points
-from xcrack.fatigue.spectrum import Spectrum
+from xcrack import ProblemError, Spectrum, rainflow
+from xcrack.fatigue.rainflow import turning_points
 
 ASTM = [-2, 1, -3, 5, -1, 3, -4, 4, -2]  # figure 6 of ASTM E1049-85
 

@@ -5,14 +5,9 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from xcrack.analysis.solution import Solution
-from xcrack.crack.lines import line_crack
+from xcrack import Isotropic, Problem, Response, Solution, box, line_crack
 from xcrack.crack.measures import length_inside
-from xcrack.growth.response import Response
 from xcrack.linalg.engine import SolverState
-from xcrack.mesh.box import box
-from xcrack.model.material import Isotropic
-from xcrack.model.problem import Problem
 
 STRESS = 100.0
 

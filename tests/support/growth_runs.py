@@ -6,14 +6,9 @@ from functools import cache
 import pytest
 
 from support.growth_fakes import formula, mode_I, plate
-from xcrack.crack.lines import line_crack
-from xcrack.fatigue.criteria import weighted_angle
-from xcrack.fatigue.power import paris
-from xcrack.growth.run import grow
-from xcrack.growth.step import Cycle
+from xcrack import Cycle, collect, grow, line_crack, paris, weighted_angle
 from xcrack.runs import store
-from xcrack.runs.collect import collect
-from xcrack.runs.run_folder import BODY
+from xcrack.runs.run_folder import MESH
 
 LAW = paris(C=1e-11, m=3.0)
 CYCLE = Cycle(0.0, 1.0)
@@ -49,7 +44,7 @@ def whole(tmp_path):
 
 def content(folder):
     """Files of a run, but for what was moved aside, and the body that pictures are made with."""
-    files = sorted(path for path in folder.iterdir() if path.is_file() and path.name != BODY)
+    files = sorted(path for path in folder.iterdir() if path.is_file() and path.name != MESH)
     return {path.name: path.read_bytes() for path in files}
 
 

@@ -9,10 +9,10 @@ from xcrack.app.case_forms import Form, called_with, forms_of, value_of_table
 from xcrack.app.case_tables import Table
 from xcrack.base.errors import XcrackError
 from xcrack.base.units import NUMBER
+from xcrack.fatigue.cycle import Cycle
 from xcrack.fatigue.files import read_spectrum, twist
 from xcrack.fatigue.retardation import Retardation, wheeler, willenborg
 from xcrack.fatigue.spectrum import Spectrum
-from xcrack.growth.step import Cycle
 from xcrack.model.loads import Load
 
 _CHOICES = ("unit", "least_range", "levels", "tolerance", "steady")

@@ -11,11 +11,11 @@ from xcrack.base.checks import flag
 from xcrack.base.errors import ProblemError
 from xcrack.base.paths import path_of, system_errors
 from xcrack.fatigue.criteria import Criterion
+from xcrack.fatigue.cycle import Cycle
 from xcrack.fatigue.law import Law
 from xcrack.fatigue.spectrum import Spectrum
 from xcrack.growth.options import GrowthOptions, lists_options
 from xcrack.growth.run import grow
-from xcrack.growth.step import Cycle
 from xcrack.model.problem import Problem
 from xcrack.output.vtk import write
 from xcrack.runs.collect import Until, collect, resume

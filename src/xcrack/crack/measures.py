@@ -198,6 +198,11 @@ def surface_size(crack: Crack, mesh: Mesh, body: Body | None = None) -> float:
     return area / length if length > 0 else float(np.sqrt(area))
 
 
+def crack_size(crack: Crack, mesh: Mesh) -> float:
+    """Length of a placed crack in the body, in 3D its area over the length of its fronts."""
+    return length_inside(crack, mesh) if crack.fronts is None else surface_size(crack, mesh)
+
+
 def halved_triangles(piece: Floats, side: Floats) -> Floats:
     """Triangles `(k, 3, 3)` cut through the middle of their longest sides."""
     turn = (np.argmax(side, axis=1)[:, None] + np.arange(3)) % 3
@@ -533,8 +538,27 @@ def facet_names(mesh: Mesh) -> tuple[list[str], Ints]:
     return [name for name, _ in sets], group
 
 
+def exit_ahead(x: Floats, ahead: Floats, mesh: Mesh) -> tuple[Floats, str] | None:
+    """Where a tip that runs straight meets the boundary, and the facet set there."""
+    facet = np.nonzero(mesh.facet_to_cell[:, 1] < 0)[0]
+    start, stop = mesh.points[mesh.facets[facet]].transpose(1, 0, 2)
+    side, gap = stop - start, start - x
+    cross = ahead[0] * side[:, 1] - ahead[1] * side[:, 0]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        far = (gap[:, 0] * side[:, 1] - gap[:, 1] * side[:, 0]) / cross
+        share = (gap[:, 0] * ahead[1] - gap[:, 1] * ahead[0]) / cross
+    hit = (cross != 0) & (share >= 0) & (share <= 1) & (far > 0)
+    if not hit.any():
+        return None
+    first = int(np.argmin(np.where(hit, far, np.inf)))
+    names, group = facet_names(mesh)
+    return x + far[first] * ahead, names[group[facet[first]]]
+
+
 __all__ = [
     "area_inside",
+    "crack_size",
+    "exit_ahead",
     "front_length_inside",
     "halved_triangles",
     "length_inside",

@@ -9,9 +9,9 @@ from xcrack.base.errors import XcrackError
 from xcrack.base.units import STRESS
 from xcrack.fatigue.checks import evaluate_law
 from xcrack.fatigue.spectrum import Spectrum
-from xcrack.growth.follow import following, place_name
 from xcrack.growth.options import GrowthRule
-from xcrack.growth.step import Step
+from xcrack.growth.rates import PLACE
+from xcrack.growth.step import Step, place_name
 from xcrack.growth.validity import Validity, validity
 from xcrack.model.loads import Load
 
@@ -27,23 +27,23 @@ _REACH = np.logspace(
 )  # times the range, where its threshold is looked for
 
 
-def alarms_of_step(run: GrowthRule, step: Step) -> list[Alarm]:
+def alarms_of_step(rule: GrowthRule, step: Step) -> list[Alarm]:
     """What is beyond its limit at a step; magnitudes are judged at the first one.
 
     Parameters
     ----------
-    run : GrowthRule
+    rule : GrowthRule
     step : Step
     """
     if step.has_left or not step.sif:
         return []
     alarms: list[Alarm] = []
     if step.index == 0:
-        if solutions := _solutions(run, step):
+        if solutions := _solutions(rule, step):
             alarms += alarms_of_solutions(solutions)
         if not any("in all load states" in alarm.place for alarm in alarms):
-            alarms += _factors(run) + _rate(run, step)
-    known = validity_of(run, step)
+            alarms += _factors(rule) + _rate(rule, step)
+    known = validity_of(rule, step)
     if known is not None:
         limits = known.alarms()
         # Later in a run it is why growth ends.
@@ -51,39 +51,39 @@ def alarms_of_step(run: GrowthRule, step: Step) -> list[Alarm]:
     return alarms
 
 
-def validity_of(run: GrowthRule, step: Step) -> Validity | None:
+def validity_of(rule: GrowthRule, step: Step) -> Validity | None:
     """Plastic zones, toughness and net sections of a step; None where nothing is known of these."""
-    material, K_c = run.problem.elasticity.material, run.toughness
+    material, K_c = rule.problem.elasticity.material, rule.toughness
     if material.yield_stress is None and K_c is None:
         return None
-    mesh, solutions = run.problem.mesh, _solutions(run, step)
+    mesh, solutions = rule.problem.mesh, _solutions(rule, step)
     return validity(material, mesh, step.cracks, step.sif, solutions, K_c)
 
 
-def _solutions(run: GrowthRule, step: Step) -> tuple[Solution, ...]:
+def _solutions(rule: GrowthRule, step: Step) -> tuple[Solution, ...]:
     """Solutions that K of a step comes from: where it comes from elsewhere they may be anything."""
-    return step.solutions if run.response is None else ()
+    return step.solutions if rule.response is None else ()
 
 
-def alarm_of_life(run: GrowthRule, last: Step, ended: str) -> Alarm | None:
+def alarm_of_life(rule: GrowthRule, last: Step, ended: str) -> Alarm | None:
     """A life that is too short for fatigue, in a scene with units.
 
     A run that ends at its first step has said why.
     """
     cycles, stopped = last.cycles, ended.startswith(("max_", "rate is zero", "the advance"))
-    if stopped or last.index == 0 or not has_units(run.problem) or cycles >= _FEW:
+    if stopped or last.index == 0 or not has_units(rule.problem) or cycles >= _FEW:
         return None
     remedy = "is the law in the units of the model, and are the loads as meant?"
     return Alarm("the number of cycles until the run ended", cycles, _FEW, "", remedy)
 
 
-def _factors(run: GrowthRule) -> list[Alarm]:
+def _factors(rule: GrowthRule) -> list[Alarm]:
     """Factors of a spectrum that are stresses, beside loads that are stresses too."""
-    spectrum = run.cycle
+    spectrum = rule.cycle
     if not isinstance(spectrum, Spectrum) or spectrum.states is not None:
         return []
     largest = max(map(abs, spectrum.extremes))
-    loads = [(_stress_of(load), load) for load in run.problem.loads]
+    loads = [(_stress_of(load), load) for load in rule.problem.loads]
     stress, load = max(loads, key=lambda pair: pair[0], default=(0.0, None))
     if largest <= _SCALED or stress < _STRESS or load is None:
         return []
@@ -118,17 +118,17 @@ def _stress_of(load: Load) -> float:
     return largest
 
 
-def _rate(run: GrowthRule, step: Step) -> list[Alarm]:
+def _rate(rule: GrowthRule, step: Step) -> list[Alarm]:
     """Growth a cycle against the crack, a millimetre and a life."""
-    count = _cycles_of_block(run.cycle) if isinstance(run.cycle, Spectrum) else 1.0
-    mesh, rates = run.problem.mesh, [rate / count for rate in step.rate]
-    sizes = [following(mesh).crack_size(crack, mesh) for crack in step.cracks]
+    count = _cycles_of_block(rule.cycle) if isinstance(rule.cycle, Spectrum) else 1.0
+    rates = [rate / count for rate in step.rate]
+    sizes = step.sizes
     shares = [rate / size for rate, size in zip(rates, sizes, strict=True)]
     if not any(len(share) for share in shares):
         return []
     c = int(np.argmax([share.max(initial=-1.0) for share in shares]))
     j = int(np.argmax(shares[c]))
-    place, rate, share = f"at {place_name(mesh, step, c, j)}", rates[c][j], shares[c][j]
+    place, rate, share = f"at {place_name(step, c, j)}", rates[c][j], shares[c][j]
     units = "is the law in the units of the model (`law(..., units=...)`, `law.to`)?"
     if np.isinf(rate):
         words = f"the toughness of the law is reached in the first cycle: {units}"
@@ -136,10 +136,10 @@ def _rate(run: GrowthRule, step: Step) -> list[Alarm]:
         return [Alarm("da/dN of the first step", float(rate), _FAST * sizes[c], place,
                       f"dK_eq = {K:.4g}: {words}")]  # fmt: skip
     if share == 0:
-        return _no_growth(run, step, units)
+        return _no_growth(rule, step, units)
     alarms = []
-    unit = millimetre(run.problem)
-    if share > _FAST and has_units(run.problem):
+    unit = millimetre(rule.problem)
+    if share > _FAST and has_units(rule.problem):
         alarms.append(Alarm("da/dN over the size of the crack", float(share), _FAST, place, units))
     elif unit is not None and rate > _FAR * unit:
         alarms.append(Alarm("da/dN", float(rate), _FAR * unit, place, units))
@@ -150,15 +150,15 @@ def _rate(run: GrowthRule, step: Step) -> list[Alarm]:
     return alarms
 
 
-def _no_growth(run: GrowthRule, step: Step, units: str) -> list[Alarm]:
+def _no_growth(rule: GrowthRule, step: Step, units: str) -> list[Alarm]:
     """A law that has no growth for a crack as long as the body either, under its mean stress.
 
     Small flaws below the threshold are as meant.
     """
-    solutions = _solutions(run, step)
-    if not solutions or isinstance(run.cycle, Spectrum):
+    solutions = _solutions(rule, step)
+    if not solutions or isinstance(rule.cycle, Spectrum):
         return []
-    mesh, E_prime = run.problem.mesh, run.problem.elasticity.largest_modulus
+    mesh, E_prime = rule.problem.mesh, rule.problem.elasticity.largest_modulus
     energy = max(solution.energy for solution in solutions)
     stress = np.sqrt(2 * max(energy, 0.0) * E_prime / mesh.volume.sum())
     length = float(np.ptp(mesh.points, axis=0).max())
@@ -167,10 +167,10 @@ def _no_growth(run: GrowthRule, step: Step, units: str) -> list[Alarm]:
     for factor in _REACH:
         dK = np.array([factor * largest])
         try:
-            rate = evaluate_law(run.law, dK, R, 0, following(mesh).PLACE, np.array([length]))
+            rate = evaluate_law(rule.law, dK, R, 0, PLACE[mesh.dim], np.array([length]))
         except XcrackError:  # beyond what its constants were fitted for
             return []
-        if rate[0] > 0 and dK[0] >= run.threshold:
+        if rate[0] > 0 and dK[0] >= rule.threshold:
             break
     if factor == _REACH[0]:
         return []

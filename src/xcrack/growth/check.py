@@ -6,12 +6,12 @@ from typing import Unpack
 from xcrack.analysis.report import Alarm
 from xcrack.base.errors import collected_warnings
 from xcrack.fatigue.criteria import Criterion, max_hoop_stress
+from xcrack.fatigue.cycle import Cycle
 from xcrack.fatigue.law import Law
 from xcrack.fatigue.spectrum import Spectrum
 from xcrack.growth.alarms import alarms_of_step
 from xcrack.growth.options import GrowthOptions, lists_options, run_of
 from xcrack.growth.run import first_step
-from xcrack.growth.step import Cycle
 from xcrack.model.problem import Problem
 
 _ANY = 1.0  # length of a step that is not taken

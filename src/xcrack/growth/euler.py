@@ -1,81 +1,281 @@
 """Growth of first order: each step goes on with the directions and rates at its beginning."""
 
-import numpy as np
+from dataclasses import replace
 
+import numpy as np
+from scipy.spatial import cKDTree
+from scipy.special import exprel
+
+from xcrack.base.arrays import Floats, Ints
+from xcrack.base.errors import GeometryError
+from xcrack.crack.advance_2d import advance
 from xcrack.crack.crack import Crack
-from xcrack.growth.follow import following
+from xcrack.crack.meetings import LEAST, joined, meetings
+from xcrack.crack.stations import closed_fronts
+from xcrack.fatigue.cycle import cycles_between
+from xcrack.growth import fronts
+from xcrack.growth.corrected import Corrected
+from xcrack.growth.fronts import advanced_crack, front_lengths, interpolate_along_front
 from xcrack.growth.options import GrowthRule
-from xcrack.growth.rates import Evaluation, Settled
-from xcrack.growth.step import Advance, PerCrack, Step, StepError, memory_of, plan_advance
+from xcrack.growth.rates import Rates
+from xcrack.growth.solves import SolveHistory
+from xcrack.growth.stations import GrowthStations, Identities, PerCrack, directions
+from xcrack.growth.step import Plan, Step, StepError, moved_places, plan_of, solves_of
 from xcrack.mesh.locate import cell_sizes
 
+_SAME = 1e-6  # of the coordinates: a tip recognised after its advance
+_DRIVING = 0.5  # share of the largest rate from which on a point counts as driving
+_WAITS_BELOW = {2: LEAST, 3: fronts.WAITS_BELOW}
 
-def begun(run: GrowthRule, seen: Evaluation) -> Settled:
+
+def predict(rule: GrowthRule, step: Step) -> Plan:
+    """The advance after a step."""
+    stations, solves = solves_of(step)
+    mesh, n = rule.problem.mesh, len(stations)
+    cell = cell_sizes(mesh, stations.x)
+    rate = np.concatenate([np.zeros(0), *step.rate])
+    fastest, still = float(rate.max(initial=0.0)), np.zeros(n)
+    plan = Plan(
+        solves.start, 0.0, 0.0, still, 0 * stations.x, still > 0, cell, 0, 0.0, step.corrected
+    )
+    if fastest == 0 or np.isinf(fastest):
+        return plan
+    by_cycles = np.inf if rule.cycles is None else rule.cycles * fastest
+    largest = float(min(np.inf if rule.da is None else rule.da, by_cycles))
+    score = _score(rule, step)
+    wanted = stations.waits + largest * (score / score.max())
+    goes = wanted >= _WAITS_BELOW[mesh.dim] * cell
+    way = np.where(goes, wanted, 0.0)
+    row = int(np.argmax(score))
+    plan = replace(
+        plan,
+        length=largest,
+        cycles=largest / float(rate[row]),
+        arc=way,
+        move=way[:, None] * solves.direction[-1],
+        moves=goes,
+        tip=row,
+        largest=largest,
+    )
+    if largest < LEAST * cell[row]:
+        return replace(plan, limit="short")
+    try:
+        return replace(plan, cracks=tuple(advanced(rule, step, way)))
+    except GeometryError as error:
+        return replace(plan, limit="geometry", refusal=str(error))
+
+
+def advanced(rule: GrowthRule, step: Step, way: Floats) -> list[Crack]:
+    """The cracks after the advance of their stations."""
+    mesh = rule.problem.mesh
+    stations = solves_of(step)[0]
+    angle = np.concatenate([np.zeros(0), *step.angle])
+    if mesh.dim == 3:
+        return [
+            advanced_crack(crack, stations, c, angle, way, mesh)
+            for c, crack in enumerate(step.cracks)
+        ]
+    rows = [stations.crack == c for c in range(len(step.cracks))]
+    cracks = [advance(crack, angle[r], way[r]) for crack, r in zip(step.cracks, rows, strict=True)]
+    if rule.link_up is not None:
+        return cracks
+    now = [own for own in meetings(cracks, mesh) if own.soon]
+    return joined(cracks, (way > 0).tolist(), now) if now else cracks
+
+
+def partly_advanced(rule: GrowthRule, step: Step, plan: Plan, part: float) -> list[Crack]:
+    """The cracks after a part of a planned advance."""
+    return advanced(rule, step, part * plan.arc)
+
+
+def ends_of(step: Step, plan: Plan) -> Floats:
+    """Where the ends of the cracks come to `(n, d)`."""
+    return solves_of(step)[0].x + plan.move
+
+
+def advance_of(step: Step, plan: Plan, rates: Rates) -> Floats:
+    """Advance to the next step at the stations that were solved `(n,)`, length."""
+    del step, rates
+    return plan.arc
+
+
+def begin(rule: GrowthRule, rates: Rates, identities: Identities) -> Corrected:
     """The first step of a run."""
-    return begun_at(run, seen, 0.0)
+    return _settled(rule, rates, identities, 0.0, np.zeros(len(rates.stations)))
 
 
-def begun_at(
-    run: GrowthRule, seen: Evaluation, cycles: float, error: StepError | None = None
-) -> Settled:
+def begin_at(
+    rule: GrowthRule, rates: Rates, identities: Identities, cycles: float, error: StepError
+) -> Corrected:
     """A step before which there is nothing to follow."""
     del error
-    return _settled(run, seen, cycles, tuple(np.zeros_like(r) for r in seen.rate))
+    return _settled(rule, rates, identities, cycles, np.zeros(len(rates.stations)))
 
 
-def settled(run: GrowthRule, last: Step, seen: Evaluation) -> Settled:
+def correct(rule: GrowthRule, last: Step, rates: Rates, identities: Identities) -> Corrected:
     """What the cracks after an advance mean for the cycles and for the next advance."""
-    mesh = seen.problem.mesh
-    since, pending = following(mesh).followed(
-        last, seen.cracks, seen.sif[0], seen.law_rate, seen.length, mesh
-    )
-    return _settled(run, seen, last.cycles + since, pending)
+    follow = _followed_2d if rates.problem.mesh.dim == 2 else _followed_3d
+    since, waits = follow(rule, last, rates)
+    return _settled(rule, rates, identities, last.cycles + since, waits)
 
 
-def planned(run: GrowthRule, step: Step) -> Advance:
-    """The advance after a step."""
-    sizes = tuple(cell_sizes(run.problem.mesh, sif.x) for sif in step.sif[0])
-    return _plan(run, sizes, step.rate, step.dK_eq, memory_of(step).pending)
+def _settled(
+    rule: GrowthRule, rates: Rates, identities: Identities, cycles: float, waits: Floats
+) -> Corrected:
+    at, n = rates.stations, len(rates.stations)
+    closed, length = np.zeros(n, dtype=bool), np.zeros(n)
+    if rates.problem.mesh.dim == 3:
+        for c, crack in enumerate(rates.cracks):
+            rows = at.crack == c
+            closed[rows] = np.array(closed_fronts(crack), dtype=bool)[at.front[rows]]
+            length[rows] = front_lengths(crack)[at.front[rows]]
+    direction = directions(at.frame, rates.angle)
+    stations = GrowthStations(
+        at.crack, at.front, at.s, at.x, at.frame, identities.of(at), closed, length,
+        waits[:, None] * direction, np.zeros(n, dtype=bool),
+    )  # fmt: skip
+    solves = SolveHistory(
+        np.zeros(1), rates.law_rate[None], rates.dK_eq[None], direction[None],
+        rates.size_of_law, np.zeros(n), rates.exponent(rule.law),
+    )  # fmt: skip
+    return Corrected(cycles, rates.cracks, stations, solves)
 
 
-def advanced(run: GrowthRule, step: Step, share: float = 1.0) -> list[Crack]:
-    """The cracks after the advance of a step, or after a share of it."""
-    mesh = run.problem.mesh
-    moved = [
-        following(mesh).advanced(crack, step.sif[0][c], step.angle[c], share * step.da[c], mesh)
-        for c, crack in enumerate(step.cracks)
-    ]
-    return moved if run.link_up is not None else following(mesh).met(moved, step.da, mesh)
+def cycles_until(rule: GrowthRule, step: Step, part: float, after: float | None) -> float:
+    """Cycles of a part of the advance after a step, in proportion to it."""
+    del rule
+    return part * (plan_of(step).cycles if after is None else after)
 
 
-def cycles_to(run: GrowthRule, step: Step, share: float, after: float | None) -> float:
-    """Cycles of a share of the advance after a step, in proportion to it."""
-    if after is not None:
-        return share * after
-    plan = planned(run, step)
-    c, j = plan.tip
-    return share * plan.largest / float(step.rate[c][j])
+# Cycles of a step, by the local power law of what drives it, and growth that goes on waiting.
 
 
-def _settled(run: GrowthRule, seen: Evaluation, cycles: float, pending: PerCrack) -> Settled:
-    sizes = tuple(cell_sizes(seen.problem.mesh, sif.x) for sif in seen.sif[0])
-    plan = _plan(run, sizes, seen.rate, seen.dK_eq, pending)
-    return Settled(cycles, seen.cracks, plan.da, plan.pending)
+def _followed_2d(rule: GrowthRule, last: Step, rates: Rates) -> tuple[float, Floats]:
+    """Cycles since the last step, and the growth that waits at the tips of this one.
+
+    All tips together: where two cracks have become one, their numbers have changed. Their moved
+    places are recognised; one that has left the body has no rate.
+    """
+    stations, solves = solves_of(last)
+    moved = np.concatenate([moved_places(last, c) for c in range(len(last.cracks))])
+    row = _matched(moved, rates.stations.x)
+    there = row >= 0
+    waits = np.zeros(len(rates.stations))
+    waits[row[there]] = _rest(rule, last)[there]
+    rate0, da = solves.rate[-1], np.concatenate(last.da)
+    goes = (da > 0) & (rate0 > 0)
+    stay = goes & there
+    choice = stay if stay.any() else goes
+    j = int(np.argmax(np.where(choice, rate0, -1.0)))
+    if not there[j]:
+        return float(da[j] / rate0[j]), waits
+    c = int(stations.crack[j])
+    a = last.sizes[c] * float(da[j] / da[stations.crack == c].sum())
+    return float(cycles_between(a, a + da[j], rate0[j], rates.law_rate[row[j]])), waits
 
 
-def _plan(
-    run: GrowthRule, sizes: PerCrack, rate: PerCrack, dK_eq: PerCrack, pending: PerCrack
-) -> Advance:
-    return plan_advance(
-        rate,
-        dK_eq,
-        pending,
-        sizes,
-        da=run.da,
-        cycles=run.cycles,
-        scaling=run.scaling,
-        least=following(run.problem.mesh).WAITS_BELOW,
-    )
+def _score(rule: GrowthRule, step: Step) -> Floats:
+    """What the advances of the stations are in proportion to `(n,)`."""
+    rate = np.concatenate([np.zeros(0), *step.rate])
+    return rate if rule.scaling == "law" else np.where(rate > 0, solves_of(step)[1].dK_eq[-1], 0.0)
 
 
-__all__ = ["advanced", "begun", "cycles_to", "planned", "settled"]
+def _rest(rule: GrowthRule, last: Step) -> Floats:
+    """Growth that goes on waiting at the stations of a step `(n,)`."""
+    plan, score = plan_of(last), _score(rule, last)
+    wanted = solves_of(last)[0].waits + plan.length * (score / score.max())
+    return np.where(plan.moves, 0.0, wanted)
+
+
+def _matched(moved: Floats, tips: Floats) -> Ints:
+    """Row of each tip after the step, -1 where it has left the body."""
+    if not len(tips) or not len(moved):
+        return np.full(len(moved), -1)
+    distance, row = cKDTree(tips).query(moved)
+    return np.where(distance <= _SAME * np.abs(tips).max(), row, -1)
+
+
+def _followed_3d(rule: GrowthRule, last: Step, rates: Rates) -> tuple[float, Floats]:
+    """Cycles since the last step, and the growth that waits at the places of this one."""
+    stations, mesh = solves_of(last)[0], rates.problem.mesh
+    rest = _rest(rule, last)
+    after: list[Floats] = []
+    waits: list[Floats] = []
+    for c, crack in enumerate(rates.cracks):
+        new, moved = rates.sif[0][c], moved_places(last, c)
+        reach = fronts.REACH * float(cell_sizes(mesh, new.x).mean() if len(new.x) else 0.0)
+        own, closed = rates.stations.crack == c, closed_fronts(crack)
+        after.append(
+            interpolate_along_front(new.x, new.front, closed, rates.law_rate[own], moved, reach)
+        )
+        old, shut = last.sif[0][c], closed_fronts(last.cracks[c])
+        near = interpolate_along_front(
+            moved, old.front, shut, rest[stations.crack == c], new.x, reach
+        )
+        waits.append(np.nan_to_num(near))
+    sizes = (last.sizes, rates.problem.sizes)
+    cycles = elapsed_3d(*sizes, last.da, last.law_rate, after)
+    return cycles, np.concatenate(waits)
+
+
+def elapsed_3d(
+    size0: tuple[float, ...],
+    size1: tuple[float, ...],
+    da: PerCrack,
+    rate0: PerCrack,
+    rate1: list[Floats],
+) -> float:
+    """Cycles of one step of 3D cracks, by the power law of the point that drives it.
+
+    Parameters
+    ----------
+    size0, size1 : tuple of float, length
+        Size of each crack before and after the step.
+    da, rate0 : tuple of (f,) arrays
+        Advance of the places along the fronts of each crack, and growth a cycle before the step.
+    rate1 : list of (f,) arrays, length/cycle
+        Growth a cycle after the step where these places have come to, nan where they have left the
+        body, inf where the toughness is reached.
+
+    Notes
+    -----
+    The driving point is the one with the largest rate of those that moved and are still there;
+    if none is, the rate before the step stands for the whole of it. Its rate is taken as a power
+    of the size, which is proportional to the advance within the step: with x = ln(size1/size0),
+    y = ln(rate1/rate0) and E(q) = (e^q - 1)/q the step takes da/rate0 E(x - y)/E(x) cycles. For
+    a straight front, and for any front that keeps its shape, this is `cycles_between`. y is that
+    of all points of the crack which grow at least half as fast, so that the scatter of K from
+    point to point averages out.
+    """
+    moved = [(d > 0) & (r > 0) for d, r in zip(da, rate0)]
+    stay = [m & ~np.isnan(r) for m, r in zip(moved, rate1)]
+    there = any(m.any() for m in stay)
+    largest = [float(r[m].max(initial=-1.0)) for r, m in zip(rate0, stay if there else moved)]
+    c = int(np.argmax(largest))
+    driving = (stay if there else moved)[c] & (rate0[c] >= largest[c])
+    j = int(np.argmax(driving))
+    by_first_rate = float(da[c][j] / rate0[c][j])
+    if not there:
+        return by_first_rate
+    fast = stay[c] & (rate0[c] >= _DRIVING * largest[c])
+    if np.isinf(rate1[c][fast]).any():
+        return 0.5 * by_first_rate  # as in `cycles_between`
+    ratio = float(rate1[c][fast].sum() / rate0[c][fast].sum())
+    if ratio == 0:
+        return 2 * by_first_rate
+    x, y = np.log(size1[c] / size0[c]), np.log(ratio)
+    return by_first_rate * float(exprel(x - y) / exprel(x))
+
+
+__all__ = [
+    "advance_of",
+    "advanced",
+    "begin",
+    "begin_at",
+    "correct",
+    "cycles_until",
+    "elapsed_3d",
+    "ends_of",
+    "partly_advanced",
+    "predict",
+]

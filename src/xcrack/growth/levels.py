@@ -1,4 +1,4 @@
-"""Levels of a factor at which K is solved, refined where contact bends K between them."""
+"""Load states of a run: those of a cycle, or levels of a factor, refined where contact bends K."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -7,10 +7,15 @@ from typing import Any
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
+from xcrack.analysis.solution import Solution
 from xcrack.base.arrays import Bools, Floats, Ints
+from xcrack.base.checks import call_function
+from xcrack.base.errors import ProblemError
 from xcrack.fatigue.criteria import clipped_K
+from xcrack.fatigue.cycle import Cycle
 from xcrack.fatigue.spectrum import Spectrum, distinct
-from xcrack.growth.response import Response
+from xcrack.growth.options import GrowthRule
+from xcrack.growth.response import Response, checked_response, respond
 from xcrack.linalg.engine import SolverState
 from xcrack.model.problem import LoadLevel, Problem
 from xcrack.sif.sif import SIF
@@ -261,12 +266,73 @@ def is_homogeneous(problem: Problem, spectrum: Spectrum) -> bool:
     return not spectrum.steady and not any(load.is_steady for load in problem.loads)
 
 
+# Response of a scene to all load states of a run.
+
+
+def respond_to_states(
+    rule: GrowthRule, problem: Problem, reuse: SolverState, bars: bool = False
+) -> Response:
+    """Response of a scene to all load states of a run; to the levels of a spectrum of factors."""
+    spectrum = rule.cycle if isinstance(rule.cycle, Spectrum) else None
+
+    def solve(states: Sequence[Any], reuse: SolverState) -> Response:
+        if rule.response is None:
+            response = respond(problem, states, reuse, bars, solver=rule.solver)
+        else:
+            given = call_function(
+                rule.response, "the response of a step", problem, tuple(states), reuse, bars
+            )
+            response = checked_response(given, problem, states)
+        if spectrum is not None and response.solutions:
+            refuse_friction(problem, response.solutions)
+        return response
+
+    if spectrum is not None and spectrum.states is None:
+        return respond_to_levels(problem, spectrum, solve, reuse)
+    return solve(rule.cycle.load_states, reuse)
+
+
+def refuse_friction(problem: Problem, solutions: Sequence[Solution]) -> None:
+    """Raise where faces rub under a spectrum: K depends on the path, not on the factor alone."""
+    for c, mu in enumerate(problem.frictions):
+        if mu and has_slip(solutions[0], c):
+            raise ProblemError(
+                f"grow: a Spectrum with friction on crack {c}, whose faces press: K then depends "
+                "on the loads before, and a spectrum takes its cycles one by one. Give "
+                "Cycle(states=[...]), or friction=0."
+            )
+
+
+def has_slip(solution: Solution, c: int) -> bool:
+    """Whether the faces of a crack rub."""
+    contact = solution.contact[c]
+    return contact is not None and contact.shear is not None
+
+
+def states_and_levels(
+    cycle: Cycle | Spectrum, response: Response
+) -> tuple[tuple[str, ...], tuple[float, ...]]:
+    """Names of the load states that were solved, and their factors under a spectrum of factors.
+
+    The states of a ``Cycle(min, max)`` are called so, and so are the lowest and the highest level
+    of a spectrum, with the others numbered between them; states in a list have their number.
+    """
+    n = len(response.sif)
+    if cycle.states is not None:
+        return tuple(map(str, range(n))), ()
+    levels = tuple(response.factors.tolist()) if isinstance(cycle, Spectrum) else ()
+    return (("min", *map(str, range(1, n - 1)), "max") if n > 1 else ("max",)), levels
+
+
 __all__ = [
     "LevelTable",
     "Solve",
+    "has_slip",
     "is_homogeneous",
     "ladders",
     "refined",
     "respond_to_levels",
+    "respond_to_states",
+    "states_and_levels",
     "states_of",
 ]

@@ -1,32 +1,35 @@
 """Options of `grow`: they stand here once, their defaults on `GrowthRule` alone."""
 
 import inspect
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, fields, replace
+from collections.abc import Callable
+from dataclasses import dataclass, field, fields
 from numbers import Real
-from typing import Any, TypedDict, TypeVar, cast
+from typing import Annotated, Any, TypedDict, TypeVar, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from xcrack.base.arguments import Choice, Function, Number, Part, Whole, arguments_of
 from xcrack.base.arrays import Floats
-from xcrack.base.checks import number, value_text, whole_number
+from xcrack.base.description import default_keys, describe
 from xcrack.base.errors import ProblemError, warn
 from xcrack.fatigue.criteria import Criterion
+from xcrack.fatigue.cycle import Cycle
 from xcrack.fatigue.law import Law
 from xcrack.fatigue.rainflow import turning_points
-from xcrack.fatigue.retardation import Retardation
+from xcrack.fatigue.retardation import Retardation, willenborg
 from xcrack.fatigue.spectrum import Spectrum
-from xcrack.growth.description import DEFAULTS, describe, with_defaults_of
 from xcrack.growth.response import Respond
-from xcrack.growth.step import Cycle
-from xcrack.growth.trail import check_retardation
 from xcrack.model.problem import Problem
 
 _LEAST = 1e-6  # relative error of a life that cells and steps can be held to
 _STOPS = {"changes_results": False}  # when a run stops, not how its cracks grow
+_POSITIVE = Number(above=0)
+_PROGRESS = 'True, False or "always"'
+_LINK_UP = "plastic_zone(sigma_y, beta), or a function of K"
+_RESPONSE = "a function (problem, states, reuse, bars) -> Response, or None"
 
-Function = TypeVar("Function", bound=Callable[..., Any])
+AnyFunction = TypeVar("AnyFunction", bound=Callable[..., Any])
 
 
 class GrowthOptions(TypedDict, total=False):
@@ -61,8 +64,6 @@ class GrowthRule:
         It is the scout of a run with a tolerance: nothing is estimated.
     meshes : int
         Number of meshes that a tolerance has made so far.
-    defaults : int
-        Number of the set of defaults.
 
     Raises
     ------
@@ -70,42 +71,36 @@ class GrowthRule:
         One of them does not fit.
     """
 
-    problem: Problem
-    law: Law
-    criterion: Criterion
-    cycle: Cycle | Spectrum
-    da: float | None = None
-    cycles: float | None = None
-    tolerance: float | None = None
-    max_unknowns: int | None = None
-    scaling: str = "law"
-    integrator: str = "pec"
-    threshold: float = 0.0
-    retardation: Retardation | None = None
-    solver: Any = None
-    response: Respond | None = None
-    K_c: float | None = field(default=None, metadata=_STOPS)
-    link_up: Callable[[Floats], ArrayLike] | None = field(default=None, metadata=_STOPS)
-    max_steps: int | None = field(default=None, metadata=_STOPS)
-    max_cycles: float | None = field(default=None, metadata=_STOPS)
-    progress: bool | str = field(default=True, metadata=_STOPS)
-    defaults: int = field(default=DEFAULTS, metadata=_STOPS)
+    problem: Annotated[Problem, Part(Problem, needs="a Problem")]
+    law: Annotated[Law, Function("a function of two arguments")]
+    criterion: Annotated[Criterion, Function("a function of two arguments")]
+    cycle: Annotated[Cycle | Spectrum, Part((Cycle, Spectrum), "Cycle(min, max), or a Spectrum")]
+    da: Annotated[float | None, _POSITIVE] = None
+    cycles: Annotated[float | None, _POSITIVE] = None
+    tolerance: Annotated[float | None, Number(above=0, below=1)] = None
+    max_unknowns: Annotated[int | None, Whole(least=1, most=10**9)] = None
+    scaling: Annotated[str, Choice(("law", "linear"))] = "law"
+    integrator: Annotated[str, Choice(("pec", "euler"))] = "pec"
+    threshold: Annotated[float, Number(least=0)] = 0.0
+    retardation: Annotated[Retardation | None, Part(Retardation, "wheeler or willenborg")] = None
+    solver: Annotated[Any, Function("a function, or None")] = None
+    response: Annotated[Respond | None, Function(_RESPONSE)] = None
+    K_c: Annotated[float | None, _POSITIVE] = field(default=None, metadata=_STOPS)
+    link_up: Annotated[Callable[[Floats], ArrayLike] | None, Function(_LINK_UP)] = field(
+        default=None, metadata=_STOPS
+    )
+    max_steps: Annotated[int | None, Whole(least=1)] = field(default=None, metadata=_STOPS)
+    max_cycles: Annotated[float | None, _POSITIVE] = field(default=None, metadata=_STOPS)
+    progress: Annotated[bool | str, Choice((True, False, "always"), _PROGRESS)] = field(
+        default=True, metadata=_STOPS
+    )
     scouts: bool = field(default=False, metadata=_STOPS)
     meshes: int = field(default=0, metadata=_STOPS)
 
     def __post_init__(self) -> None:
-        if not isinstance(self.problem, Problem):
-            raise ProblemError(f"grow: problem = {value_text(self.problem)}: give a Problem.")
-        for name in ("law", "criterion"):
-            if not callable(getattr(self, name)):
-                raise ProblemError(
-                    f"grow: {name} = {value_text(getattr(self, name))} cannot be called: give a "
-                    "function of two arguments."
-                )
-        if not isinstance(self.cycle, Cycle | Spectrum):
-            raise ProblemError(
-                f"grow: cycle = {value_text(self.cycle)}: give Cycle(min, max), or a Spectrum."
-            )
+        for name, argument in arguments_of(GrowthRule).items():
+            checked = argument.check(getattr(self, name), f"grow: {name}")
+            object.__setattr__(self, name, checked)
         for state in self.cycle.load_states:
             self.problem.state(state)
         if isinstance(self.cycle, Cycle) and looks_like_history(self.cycle):
@@ -121,59 +116,43 @@ class GrowthRule:
                 "grow needs da (largest advance a step) or cycles (cycles a step), or a tolerance, "
                 "which chooses the steps and the mesh."
             )
-        for name in ("da", "cycles", "K_c", "max_cycles"):
-            value = getattr(self, name)
-            if value is not None:
-                object.__setattr__(self, name, number(value, f"grow: {name}", above=0))
-        if self.max_steps is not None:
-            steps = whole_number(self.max_steps, "grow: max_steps", least=1)
-            object.__setattr__(self, "max_steps", steps)
-        object.__setattr__(self, "threshold", number(self.threshold, "grow: threshold", least=0))
-        if not isinstance(self.scaling, str) or self.scaling not in ("law", "linear"):
-            raise ProblemError(
-                f'grow: scaling = {value_text(self.scaling)}: give "law" or "linear".'
-            )
-        if not isinstance(self.integrator, str) or self.integrator not in ("pec", "euler"):
-            raise ProblemError(
-                f'grow: integrator = {value_text(self.integrator)}: give "pec" or "euler".'
-            )
         if self.scaling == "linear" and self.integrator != "euler":
             raise ProblemError(
                 'grow: scaling = "linear" contradicts the law, and leads to no path as steps get '
                 'shorter: only integrator="euler" has it, for comparison.'
             )
-        check_retardation(self.retardation, self.law, self.cycle, self.integrator)
-        self._check_tolerance()
-        if self.solver is not None and not callable(self.solver):
-            raise ProblemError(
-                f"grow: solver = {value_text(self.solver)} cannot be called: give a function, or "
-                f"None."
-            )
-        if self.response is not None and not callable(self.response):
-            raise ProblemError(
-                f"grow: response = {value_text(self.response)} cannot be called: give a function "
-                "(problem, states, reuse, bars) -> Response, or None."
-            )
-        self._check_link_up()
-        self._check_temperatures()
-        always = isinstance(self.progress, str) and self.progress == "always"
-        if not (isinstance(self.progress, bool) or always):
-            raise ProblemError(
-                f'grow: progress = {value_text(self.progress)}: give True, False or "always".'
-            )
-
-    def _check_link_up(self) -> None:
-        if self.link_up is None:
-            return
-        if not callable(self.link_up):
-            raise ProblemError(
-                f"grow: link_up = {value_text(self.link_up)}: give plastic_zone(sigma_y, beta), or "
-                f"a function of K."
-            )
-        if self.problem.mesh.dim == 3:
+        if self.link_up is not None and self.problem.mesh.dim == 3:
             raise ProblemError(
                 "grow: link_up compares plastic zones with the ligaments between tips in a sheet: "
                 "a 3D body has no such ligaments. Leave it out, or model the sheet in 2D."
+            )
+        self._check_retardation()
+        self._check_tolerance()
+        self._check_temperatures()
+
+    def _check_retardation(self) -> None:
+        """Refuse a model of retardation with what it means nothing with."""
+        if self.retardation is None:
+            return
+        if not isinstance(self.cycle, Spectrum) or self.cycle.factors is None:
+            raise ProblemError(
+                "grow: retardation needs cycles in time: give Spectrum(factors). One Cycle has no "
+                "overload, counted rows no order, and states are counted at each tip on its own."
+            )
+        if self.integrator != "pec":
+            raise ProblemError('grow: retardation goes with integrator="pec" only.')
+        if getattr(self.law, "ratio", None) == "nominal":
+            raise ProblemError(
+                'grow: the law has ratio="nominal", but plastic zones belong to K with contact: '
+                'with retardation give a law with ratio="contact".'
+            )
+        if isinstance(self.retardation, willenborg) and (
+            getattr(self.law, "closure", None) is not None
+        ):
+            raise ProblemError(
+                "grow: the law has a closure, and willenborg lowers K as well: both stand for the "
+                "same plastic wake, which would count twice. Give a law without closure, or "
+                "wheeler."
             )
 
     def _check_temperatures(self) -> None:
@@ -208,16 +187,11 @@ class GrowthRule:
                     "too, or leave it out."
                 )
             return
-        tolerance = number(self.tolerance, "grow: tolerance", above=0, below=1)
-        if tolerance < _LEAST:
+        if self.tolerance < _LEAST:
             raise ProblemError(
-                f"grow: tolerance = {tolerance:g}: no mesh has K to less than {_LEAST:g}: give as "
-                "much, at least."
+                f"grow: tolerance = {self.tolerance:g}: no mesh has K to less than {_LEAST:g}: "
+                "give as much, at least."
             )
-        object.__setattr__(self, "tolerance", tolerance)
-        if self.max_unknowns is not None:
-            most = whole_number(self.max_unknowns, "grow: max_unknowns", least=1, most=10**9)
-            object.__setattr__(self, "max_unknowns", most)
         if self.integrator != "pec":
             raise ProblemError(
                 f'grow: tolerance needs the errors that integrator="pec" estimates, and '
@@ -233,16 +207,16 @@ class GrowthRule:
     @property
     def settings(self) -> dict[str, str]:
         """Text of all that decides how the cracks grow; rules that stop a run are not in it."""
-        lines = {"defaults": str(self.defaults), **describe("", self, self.defaults)}
+        lines = describe("", self)
         if self.tolerance is not None:  # curves shape the mesh that is refined
             curves = self.problem.mesh.curves
-            lines |= describe("problem.mesh.curves", curves, self.defaults) if curves else {}
+            lines |= describe("problem.mesh.curves", curves) if curves else {}
         return lines
 
-    def as_begun(self, stored: Mapping[str, str]) -> "GrowthRule":
-        """The run with the defaults of a stored one, where it leaves a choice to them."""
-        defaults = int(stored["defaults"])
-        return replace(with_defaults_of(self, defaults, stored), defaults=defaults)
+    @property
+    def default_settings(self) -> set[str]:
+        """Keys of the settings that a run from before they were options may lack."""
+        return default_keys("", self)
 
 
 def looks_like_history(cycle: Cycle) -> bool:
@@ -277,7 +251,7 @@ def run_of(
     return GrowthRule(problem, law, criterion, cycle, da, **options)
 
 
-def lists_options(function: Function) -> Function:
+def lists_options(function: AnyFunction) -> AnyFunction:
     """Let help and completion list the `GrowthOptions` that a function takes by name."""
     signature = inspect.signature(function)
     default = {each.name: each.default for each in fields(GrowthRule)}

@@ -5,7 +5,7 @@ import sys
 from collections.abc import Callable, Generator, Sequence
 from dataclasses import replace
 from time import perf_counter
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 
@@ -13,12 +13,11 @@ from xcrack.adaptivity.indicators import Indicators, indicators_of
 from xcrack.base.arrays import Floats
 from xcrack.base.errors import ProblemError, XcrackError, collected_warnings, warn
 from xcrack.growth import sizes_2d, sizes_3d
-from xcrack.growth.controlled import PATH, can_be_shortened, shortened
 from xcrack.growth.corridor import corridor, ways_of
 from xcrack.growth.options import GrowthRule
 from xcrack.growth.scout import Stage, samples, scouted
-from xcrack.growth.step import Step, memory_of
-from xcrack.growth.trail import REJECTED, next_length
+from xcrack.growth.step import Step, run_state
+from xcrack.growth.step_length import PATH, REJECTED, next_length
 from xcrack.growth.uncertainty import TOGETHER
 from xcrack.mesh.locate import cell_sizes
 from xcrack.mesh.mesh import Mesh
@@ -64,13 +63,13 @@ class Sizes(Protocol):
 
 
 def prepared(
-    run: GrowthRule, steps_of: Steps, done: Sequence[Step] = (), stored: Sequence[Mesh] = ()
+    rule: GrowthRule, steps_of: Steps, done: Sequence[Step] = (), stored: Sequence[Mesh] = ()
 ) -> GrowthRule:
     """A run on the mesh that it begins with, or goes on with.
 
     Parameters
     ----------
-    run : GrowthRule
+    rule : GrowthRule
         On the mesh as it was given.
     steps_of : callable
         What makes the steps of a run.
@@ -83,41 +82,41 @@ def prepared(
     -------
     GrowthRule
     """
-    first = _first_mesh(run)
+    first = _first_mesh(rule)
     if not done:
-        _check_unknowns(run, first)
-        return on(run, first)
-    known = memory_of(done[-1]).mesh
-    run = replace(run, meshes=memory_of(done[-1]).meshes)
+        _check_unknowns(rule, first)
+        return on(rule, first)
+    known = run_state(done[-1]).mesh
+    rule = replace(rule, meshes=run_state(done[-1]).meshes)
     for mesh in (first, *stored):
         if fingerprint(mesh) == known:
-            return on(run, replace(mesh, curves=run.problem.mesh.curves))
-    earlier = [step for step in done if memory_of(step).mesh != known]
-    mesh, _ = finer(run, steps_of, earlier[-1] if earlier else None)
+            return on(rule, replace(mesh, curves=rule.problem.mesh.curves))
+    earlier = [step for step in done if run_state(step).mesh != known]
+    mesh, _ = finer(rule, steps_of, earlier[-1] if earlier else None)
     if fingerprint(mesh) != known:
         warn(
             "the mesh that the run had is not stored, and the one that was made again differs "
             "from it in the last bits: so may the steps that follow."
         )
-    return on(run, mesh)
+    return on(rule, mesh)
 
 
-def on(run: GrowthRule, mesh: Mesh) -> GrowthRule:
+def on(rule: GrowthRule, mesh: Mesh) -> GrowthRule:
     """A run on another mesh."""
-    return replace(run, problem=replace(run.problem, mesh=mesh, order=2))
+    return replace(rule, problem=replace(rule.problem, mesh=mesh, order=2))
 
 
-def _first_mesh(run: GrowthRule) -> Mesh:
+def _first_mesh(rule: GrowthRule) -> Mesh:
     """The mesh as given, where error bars can be had on it: else finer at the tips, or fronts."""
-    return _TWINS[run.problem.mesh.dim].given_mesh(run.problem)
+    return _TWINS[rule.problem.mesh.dim].given_mesh(rule.problem)
 
 
-def _check_unknowns(run: GrowthRule, mesh: Mesh) -> None:
+def _check_unknowns(rule: GrowthRule, mesh: Mesh) -> None:
     """Refuse a first mesh that has too many unknowns before anything is solved on it."""
     least = mesh.dim * (mesh.n_points + len(mesh.edges))
-    if run.max_unknowns is not None and least > run.max_unknowns:
+    if rule.max_unknowns is not None and least > rule.max_unknowns:
         raise ProblemError(
-            f"grow: max_unknowns = {run.max_unknowns}, and the first mesh, on which cracks are a "
+            f"grow: max_unknowns = {rule.max_unknowns}, and the first mesh, on which cracks are a "
             f"few cells long, has {least} at least: allow more, or give a coarser mesh."
         )
 
@@ -129,12 +128,12 @@ def fingerprint(mesh: Mesh) -> str:
     return digest.hexdigest()[:16]
 
 
-def finer(run: GrowthRule, steps_of: Steps, last: Step | None) -> tuple[Mesh, bool]:
+def finer(rule: GrowthRule, steps_of: Steps, last: Step | None) -> tuple[Mesh, bool]:
     """A mesh on which bars of K are as wanted along all of the way that a scout finds.
 
     Parameters
     ----------
-    run : GrowthRule
+    rule : GrowthRule
         On the mesh as it was given.
     steps_of : callable
         What makes the steps of a run.
@@ -147,18 +146,18 @@ def finer(run: GrowthRule, steps_of: Steps, last: Step | None) -> tuple[Mesh, bo
     bool
         Whether it would have more unknowns than it may.
     """
-    twin, start = _TWINS[run.problem.mesh.dim], perf_counter()
-    before = _first_mesh(run)
+    twin, start = _TWINS[rule.problem.mesh.dim], perf_counter()
+    before = _first_mesh(rule)
     if last is not None:
-        run = replace(run, problem=replace(run.problem, cracks=last.corrected))
-    most = run.max_unknowns or twin.MOST_UNKNOWNS
-    mesh = twin.scout_mesh(run.problem)
-    _tell(run, f"scout: on {len(mesh.cells)} cells", start)
-    scene = replace(run.problem, mesh=mesh, order=twin.SCOUT_ORDER)
-    seen = scouted(run, scene, steps_of, 0 if last is None else last.index)
+        rule = replace(rule, problem=replace(rule.problem, cracks=last.corrected))
+    most = rule.max_unknowns or twin.MOST_UNKNOWNS
+    mesh = twin.scout_mesh(rule.problem)
+    _tell(rule, f"scout: on {len(mesh.cells)} cells", start)
+    scene = replace(rule.problem, mesh=mesh, order=twin.SCOUT_ORDER)
+    seen = scouted(rule, scene, steps_of, 0 if last is None else last.index)
     if not seen.stages:
         return mesh, False
-    _tell(run, f"scout: {len(seen.stages)} steps, N = {seen.stages[-1].cycles:.4g}", start)
+    _tell(rule, f"scout: {len(seen.stages)} steps, N = {seen.stages[-1].cycles:.4g}", start)
     ways = ways_of(seen)
     # Of one that has begun long ago, most of the life is over.
     chosen = samples(seen, twin.STAGES, 1.0 if last is not None and last.index else twin.LIFE)
@@ -166,9 +165,9 @@ def finer(run: GrowthRule, steps_of: Steps, last: Step | None) -> tuple[Mesh, bo
     sizes = [twin.first_sizes(scene, stage) for stage in stages]
     sizes[0] = np.minimum(sizes[0], seen.step)
     mesh = refine(mesh, size=corridor(seen, ways, chosen, sizes, most))
-    wanted = SHARE / TOGETHER * float(run.tolerance or 0.0) / max(seen.exponent, _LEAST_EXPONENT)
+    wanted = SHARE / TOGETHER * float(rule.tolerance or 0.0) / max(seen.exponent, _LEAST_EXPONENT)
     for number in range(twin.ROUNDS):
-        each = [_measured(run, mesh, stage) for stage in stages]
+        each = [_measured(rule, mesh, stage) for stage in stages]
         there = [k for k, now in enumerate(each) if now is not None]
         good = [now for now in each if now is not None]
         if not good:
@@ -176,10 +175,10 @@ def finer(run: GrowthRule, steps_of: Steps, last: Step | None) -> tuple[Mesh, bo
         error = max(map(twin.error, good))
         unknowns = max(now.solutions[0].space.n_dof for now in good)
         text = f"{unknowns} unknowns, K within {error:.1e}, wanted {wanted:.1e}"
-        _tell(run, f"mesh {number}: {text}", start)
+        _tell(rule, f"mesh {number}: {text}", start)
         if number == 0 and unknowns > most:
             instead = f"{unknowns} are the fewest for the way ahead; growth keeps the mesh it has"
-            _warn_of_most(run, most, instead)
+            _warn_of_most(rule, most, instead)
             return before, True
         if error <= wanted:
             break
@@ -191,36 +190,36 @@ def finer(run: GrowthRule, steps_of: Steps, last: Step | None) -> tuple[Mesh, bo
         smaller = refine(smaller, size=corridor(seen, ways, chosen, sizes, most))
         if unknowns * len(smaller.cells) > most * len(mesh.cells):
             _warn_of_most(
-                run, most, f"growth goes on with {unknowns}, on which K is known to {error:.1e} of "
-                f"its largest value, where {wanted:.1e} was wanted",
+                rule, most, f"growth goes on with {unknowns}, on which K is known to {error:.1e} "
+                f"of its largest value, where {wanted:.1e} was wanted",
             )  # fmt: skip
             return mesh, True
         same, mesh = len(smaller.cells) == len(mesh.cells), smaller
         if error <= _FORETOLD * wanted or same:
             break
-    _tell(run, f"mesh: {len(mesh.cells)} cells", start)
+    _tell(rule, f"mesh: {len(mesh.cells)} cells", start)
     return mesh, False
 
 
-def _warn_of_most(run: GrowthRule, most: int, instead: str) -> None:
+def _warn_of_most(rule: GrowthRule, most: int, instead: str) -> None:
     warn(
-        f"grow: the mesh that tolerance = {run.tolerance:g} asks for would have more than {most} "
+        f"grow: the mesh that tolerance = {rule.tolerance:g} asks for would have more than {most} "
         f"unknowns: {instead}. Allow more with max_unknowns; life_bar says what it costs."
     )
 
 
-def _measured(run: GrowthRule, mesh: Mesh, stage: Stage) -> Indicators | None:
+def _measured(rule: GrowthRule, mesh: Mesh, stage: Stage) -> Indicators | None:
     """K of a stage with its bars; None where that mesh has none."""
     with collected_warnings([]):  # they come again in the run
         try:
-            scene = replace(run.problem, mesh=mesh, cracks=stage.cracks, order=2)
-            return indicators_of(scene, run.cycle.load_states)
+            scene = replace(rule.problem, mesh=mesh, cracks=stage.cracks, order=2)
+            return indicators_of(scene, rule.cycle.load_states)
         except XcrackError:
             return None
 
 
-def _tell(run: GrowthRule, line: str, start: float) -> None:
-    if run.progress == "always" or (run.progress and sys.stderr.isatty()):
+def _tell(rule: GrowthRule, line: str, start: float) -> None:
+    if rule.progress == "always" or (rule.progress and sys.stderr.isatty()):
         print(f"{line}, {perf_counter() - start:.2g} s", file=sys.stderr)
 
 
@@ -238,18 +237,18 @@ _HALF, _WHOLE = 0.5, 0.8  # of the tolerance, by all sources: below that no fine
 _BEGIN = 1.5  # times the share of K at the first step: bars of a crack that grows become shorter
 
 
-def again(
-    asked: GrowthRule, run: GrowthRule, steps_of: Steps, last: Step | None, step: Step
+def replanned(
+    asked: GrowthRule, rule: GrowthRule, steps_of: Steps, last: Step | None, step: Step
 ) -> tuple[GrowthRule, Step | None] | None:
     """The run and the step from which one is to be computed again; None where that is good.
 
-    It follows from what is stored with the step before: a run that is taken up again does the same.
+    It follows from what is stored with the step before: a run that is resumed does the same.
 
     Parameters
     ----------
     asked : GrowthRule
         On the mesh as it was given.
-    run : GrowthRule
+    rule : GrowthRule
         On the one of the step.
     steps_of : callable
         What makes the steps of a run.
@@ -257,50 +256,62 @@ def again(
         The one before, which is handed over.
     step : Step
     """
-    if _outgrown(run, last, step):
+    if _outgrown(rule, last, step):
         mesh, is_largest = finer(asked, steps_of, last)
-        other = replace(on(run, mesh), meshes=_MOST if is_largest else run.meshes + 1)
-        return other, last if last is None else _with_room(run, other, last, step)
+        other = replace(on(rule, mesh), meshes=_MOST if is_largest else rule.meshes + 1)
+        return other, last if last is None else _with_room(rule, other, last, step)
     if last is None:
         return None
-    shorter = shortened(last, step)
-    return None if shorter is None else (run, shorter)
+    shorter = _shortened(last, step)
+    return None if shorter is None else (rule, shorter)
 
 
-def _outgrown(run: GrowthRule, last: Step | None, step: Step) -> bool:
+def _shortened(last: Step, step: Step) -> Step | None:
+    """The step before one whose error is too large, with a shorter way ahead; None if that is not.
+
+    It follows from what is stored with both: a run that is taken up again does the same.
+    """
+    error, control = step.control.error, last.control
+    if error is None or error <= REJECTED or not control.can_shorten:
+        return None
+    length = next_length(control.length, error, None, control.least)
+    return replace(last, control=replace(control, length=length))
+
+
+def _outgrown(rule: GrowthRule, last: Step | None, step: Step) -> bool:
     """Whether the bars of K are too wide on the mesh of a step, or its cells too long."""
     error = step.error
-    if not run.estimates or error is None or not step.n_tips or run.meshes >= _MOST:
+    if not rule.estimates or error is None or not step.n_tips or rule.meshes >= _MOST:
         return False
-    before = 0 if last is None else memory_of(last).meshes
-    if run.meshes > before or (run.meshes and step.index < _SETTLED):
+    before = 0 if last is None else run_state(last).meshes
+    if rule.meshes > before or (rule.meshes and step.index < _SETTLED):
         return False  # it was made for this step, or for a kink just behind it
-    tolerance = float(run.tolerance or 0.0)
-    forgiven = 1.0 if run.meshes == 0 else _FORGIVEN
-    rate, turn = _local(run, step)
-    before_it = (np.inf, np.inf) if run.meshes == 0 or last is None else _local(run, last)
+    tolerance = float(rule.tolerance or 0.0)
+    forgiven = 1.0 if rule.meshes == 0 else _FORGIVEN
+    rate, turn = _local(rule, step)
+    before_it = (np.inf, np.inf) if rule.meshes == 0 or last is None else _local(rule, last)
     rate, turn = min(rate, before_it[0]), min(turn, before_it[1])
     of_life, of_path = SHARE * tolerance, (1 - PATH) * tolerance
     if last is None:
         return rate > _BEGIN * of_life or turn > _BEGIN * of_path
-    cycles, way = step.cycles, max(error.grown, _SIZE * min(memory_of(step).length, default=0.0))
+    cycles, way = step.cycles, max(error.grown, _SIZE * min(step.sizes, default=0.0))
     if not (cycles > 0 and way > 0):
         return False
-    whole = (_WHOLE if run.meshes else _HALF) * tolerance
+    whole = (_WHOLE if rule.meshes else _HALF) * tolerance
     short_of_life = (error.K + error.contact + error.unknown) / cycles > of_life
     short_of_path = error.K_place / way > of_path
     return bool(
         (rate > forgiven * of_life and short_of_life and error.life / cycles > whole)
         or (turn > forgiven * of_path and short_of_path and error.path / way > whole)
-        or (run.meshes == 0 and _has_no_room(last, step))
+        or (rule.meshes == 0 and _has_no_room(last, step))
     )
 
 
-def _local(run: GrowthRule, step: Step) -> tuple[float, float]:
+def _local(rule: GrowthRule, step: Step) -> tuple[float, float]:
     """Errors of rate and direction at a step by K, as they count for life and path."""
     error = step.error
     # No bar: a finer mesh may have one, but once.
-    unknown = 1.0 if run.meshes == 0 else 0.0
+    unknown = 1.0 if rule.meshes == 0 else 0.0
     if error is None or np.isnan(error.rate):
         return unknown, unknown
     return TOGETHER * error.rate, error.turn
@@ -308,24 +319,20 @@ def _local(run: GrowthRule, step: Step) -> tuple[float, float]:
 
 def _has_no_room(last: Step, step: Step) -> bool:
     """Whether a step is too long, and the cells leave no room for a shorter one."""
-    control = memory_of(step).trail
-    error = None if control is None else control.control.error
-    return error is not None and error > REJECTED and not can_be_shortened(last)
+    error = step.control.error
+    return error is not None and error > REJECTED and not last.control.can_shorten
 
 
-def _with_room(run: GrowthRule, other: GrowthRule, last: Step, step: Step) -> Step:
+def _with_room(rule: GrowthRule, other: GrowthRule, last: Step, step: Step) -> Step:
     """The step before, with the way ahead that a finer mesh allows."""
-    trail: Any = memory_of(last).trail
-    own: Any = memory_of(step).trail
     places = np.concatenate([sif.x for sif in step.sif[0]])
-    sizes = [cell_sizes(each.problem.mesh, places) for each in (run, other)]
-    control = trail.control
+    sizes = [cell_sizes(each.problem.mesh, places) for each in (rule, other)]
+    control, error = last.control, step.control.error
     least = control.least * min(float(np.median(sizes[1] / sizes[0])), 1.0)
     length = control.length
-    if own.control.error is not None and own.control.error > REJECTED:
-        length = next_length(length, own.control.error, None, least)
-    control = replace(control, length=length, least=least)
-    return replace(last, memory=replace(memory_of(last), trail=replace(trail, control=control)))
+    if error is not None and error > REJECTED:
+        length = next_length(length, error, None, least)
+    return replace(last, control=replace(control, length=length, least=least))
 
 
-__all__ = ["SHARE", "again", "finer", "fingerprint", "on", "prepared"]
+__all__ = ["SHARE", "finer", "fingerprint", "on", "prepared", "replanned"]

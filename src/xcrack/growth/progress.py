@@ -12,8 +12,8 @@ from typing import Any
 
 from xcrack.base.errors import XcrackWarning, collected_warnings, warn
 from xcrack.base.optional import in_notebook
-from xcrack.growth.follow import following
 from xcrack.growth.options import GrowthRule
+from xcrack.growth.rates import PLACE
 from xcrack.growth.step import Step
 
 _LOG = logging.getLogger("xcrack")
@@ -66,7 +66,7 @@ class Progress:
 
 
 def _line(run: GrowthRule, step: Step) -> str:
-    places = f"{following(run.problem.mesh).PLACE}s"
+    places = f"{PLACE[run.problem.mesh.dim]}s"
     return (
         f"step {step.index:4d}  N {step.cycles:12.6g}  largest dK_eq {_largest(step.dK_eq):10.5g}  "
         f"da {_largest(step.da):9.4g}  {places} {step.n_tips}"

@@ -1,321 +1,82 @@
-"""From K of the load states to direction, range, ratio and rate at each place of the cracks."""
+"""From K of the load states to direction, range, ratio and rate at each station of the cracks."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
-from xcrack.analysis.solution import Solution
 from xcrack.base.arrays import Bools, Floats, Ints
-from xcrack.base.checks import call_function
 from xcrack.base.errors import ProblemError, warn
 from xcrack.crack.crack import Crack
-from xcrack.fatigue.checks import evaluate_criterion, evaluate_law
+from xcrack.crack.stations import Stations
+from xcrack.fatigue.checks import evaluate_criterion, evaluate_law, law_exponent
 from xcrack.fatigue.criteria import clipped_K, equivalent_K, kink_angle, nominal_range
 from xcrack.fatigue.law import Law
+from xcrack.fatigue.rainflow import closed_cycles
 from xcrack.fatigue.retardation import BlockCycles
 from xcrack.fatigue.spectrum import Spectrum, distinct
-from xcrack.growth.block import RangePairs, block_of, left_out_share, pairs_of, rated
-from xcrack.growth.follow import following
-from xcrack.growth.levels import respond_to_levels
+from xcrack.growth.levels import has_slip, ladders, respond_to_states
 from xcrack.growth.options import GrowthRule
-from xcrack.growth.response import Answers, Response, checked_response, respond
-from xcrack.growth.step import Cycle, PerCrack, Step, StepError
-from xcrack.growth.trail import FrontTrail, Trail
+from xcrack.growth.response import Answers, Response
+from xcrack.growth.stations import PerCrack, directions, solved_stations, split
 from xcrack.linalg.engine import SolverState
 from xcrack.model.problem import Problem
-from xcrack.sif.sif import SIF
 
-# Growth of cracks whose faces rub: ends that friction locks, and histories that it refuses.
+PLACE = {2: "tip", 3: "front place"}  # what a station is called in messages
 
 _ROUND_OFF = 1e-5  # range over the largest K_eq below which it is the error of a stuck crack
-
-
-def stop_locked_faces(
-    problem: Problem,
-    solutions: Sequence[Solution],
-    sif: Sequence[Sequence[SIF]],
-    dK_eq: PerCrack,
-    rate: PerCrack,
-) -> tuple[PerCrack, PerCrack]:
-    """Ranges and rates, zero where the faces beside a tip stick in every state.
-
-    K does not change there: what is left of its range is the error of quadrature, which a crack
-    must not grow on. Without friction they stay as they are.
-
-    Parameters
-    ----------
-    problem : Problem
-    solutions : sequence of Solution
-        One a state.
-    sif : sequence of sequence of SIF
-        ``sif[state][crack]``.
-    dK_eq, rate : tuple of (f,) arrays
-    """
-    if not any(problem.frictions):
-        return dK_eq, rate
-    rubs = [c for c in range(len(dK_eq)) if _rubs(solutions[0], c)]
-    if not rubs:
-        return dK_eq, rate
-    nu, largest = problem.elasticity.poisson, 0.0
-    for c in range(len(dK_eq)):
-        K = clipped_K(np.stack([state[c].K for state in sif]))
-        largest = max(largest, float(equivalent_K(K, kink_angle(K), nu).max(initial=0.0)))
-    ranges, rates = list(dK_eq), list(rate)
-    for c in rubs:
-        still = locked(solutions, c, sif[0][c]) | (dK_eq[c] <= _ROUND_OFF * largest)
-        ranges[c] = np.where(still, 0.0, dK_eq[c])
-        rates[c] = np.where(still, 0.0, rate[c])
-    return tuple(ranges), tuple(rates)
-
-
-def locked(solutions: Sequence[Solution], c: int, sif: SIF) -> Bools:
-    """Ends of crack c beside which the faces stick in every state `(f,)`."""
-    lips = solutions[0].lips[c]
-    nearest = [int(np.argmin(np.linalg.norm(lips.x - x, axis=1))) for x in sif.x]
-    stuck = [s.contact[c].stuck[nearest] for s in solutions]  # type: ignore[union-attr,index]
-    return np.asarray(np.all(stuck, axis=0))
-
-
-def refuse_friction(problem: Problem, solutions: Sequence[Solution]) -> None:
-    """Raise where faces rub under a spectrum: K depends on the path, not on the factor alone."""
-    for c, mu in enumerate(problem.frictions):
-        if mu and _rubs(solutions[0], c):
-            raise ProblemError(
-                f"grow: a Spectrum with friction on crack {c}, whose faces press: K then depends "
-                "on the loads before, and a spectrum takes its cycles one by one. Give "
-                "Cycle(states=[...]), or friction=0."
-            )
-
-
-def _rubs(solution: Solution, c: int) -> bool:
-    contact = solution.contact[c]
-    return contact is not None and contact.shear is not None
-
-
 _LEFT_OUT = 1e-3  # share of the growth of a block
-
-Rates = tuple[PerCrack, PerCrack, PerCrack, PerCrack]
-PerPlace = tuple[Floats, Floats, Floats, Floats]
-
-
-def rates_of(
-    run: GrowthRule, problem: Problem, response: Response, free: Response | None = None
-) -> Rates:
-    """Ask criterion and law of a run what K of all load states means.
-
-    Parameters
-    ----------
-    run : GrowthRule
-    problem : Problem
-        With the cracks that K belongs to.
-    response : Response
-        Of all load states; of a spectrum its factors are the levels.
-    free : Response, optional
-        As of `response_without_contact`, where it is known already.
-
-    Returns
-    -------
-    angle, dK_eq, R, law_rate : tuple of (f,) arrays
-        One array a crack; the rates before a threshold of the run, but for a spectrum, whose cycles
-        are held against it one by one.
-    """
-    _check_choice(run, response.sif)
-    if free is None:
-        free = response_without_contact(run, problem, response)
-    asked = asked_of(run, problem, response, free)
-    angles, ranges, ratios, rates = zip(*(one.answer(one.K) for one in asked), strict=True)
-    return angles, ranges, ratios, rates
-
-
-def response_without_contact(
-    run: GrowthRule, problem: Problem, response: Response
-) -> Response | None:
-    """Response of the scene in which faces may overlap; None where no law asks for it."""
-    if getattr(run.law, "ratio", None) != "nominal":
-        return None
-    if problem.contact == "off":
-        return response
-    return respond_to_states(run, replace(problem, contact="off"), SolverState())
+_CHUNK = 20_000  # stations times cycles that are rated at once
 
 
 @dataclass(frozen=True, eq=False)
-class Asked:
+class CycleRates:
+    """What criterion and law say of K at the f stations of a crack.
+
+    Attributes
+    ----------
+    angle : (f,) array, rad
+        Of the direction of growth in the frames.
+    dK_eq : (f,) array, stress √length
+        Of a block that of its largest cycle.
+    R : (f,) array
+        Ratio of that cycle.
+    rate : (f,) array, length/cycle
+        Before a threshold of the run; that of a block is the sum of its cycles, those above it.
+    R_range : (f, 2) array
+        Smallest and largest ratio of all cycles.
+    """
+
+    angle: Floats
+    dK_eq: Floats
+    R: Floats
+    rate: Floats
+    R_range: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class CriterionInput:
     """K of one crack as criterion and law see it, and what they say of K of this shape.
 
     Attributes
     ----------
     K : (s, f, 2 or 3) array, stress √length
         Of the load states, or of both ends of each kind of cycle of a spectrum.
-    answer : callable
-        K -> direction, range, ratio, rate at the places, of the cycle or of the block.
-    turn : callable
+    rates_of_K : callable
+        K -> CycleRates.
+    angle_of_K : callable
         K -> direction alone.
     """
 
     K: Floats
-    answer: Callable[[Floats], PerPlace]
-    turn: Callable[[Floats], Floats]
-
-
-def asked_of(
-    run: GrowthRule, problem: Problem, response: Response, free: Response | None = None
-) -> list[Asked]:
-    """What criterion and law are asked about each crack.
-
-    Parameters
-    ----------
-    run : GrowthRule
-    problem : Problem
-    response : Response
-        Of all states.
-    free : Response, optional
-        Without contact, for a law with nominal R.
-    """
-    asked = _asked_of_blocks if isinstance(run.cycle, Spectrum) else _asked_of_cycle
-    return asked(run, problem, response, free)
-
-
-def _asked_of_cycle(
-    run: GrowthRule, problem: Problem, response: Response, free: Response | None
-) -> list[Asked]:
-    place, nu = following(problem.mesh).PLACE, problem.elasticity.poisson
-
-    def one(c: int) -> Asked:
-        given = np.stack([state[c].K for state in response.sif])
-        a = crack_size(problem, c, given.shape[1])
-
-        def answer(K: Floats) -> PerPlace:
-            angle, dK, R = evaluate_criterion(run.criterion, K, nu, c, place)
-            if free is not None:
-                dK, R = nominal_range(np.stack([state[c].K for state in free.sif]), angle, nu)
-            return angle, dK, R, evaluate_law(run.law, dK, R, c, place, a)
-
-        def turn(K: Floats) -> Floats:
-            return evaluate_criterion(run.criterion, K, nu, c, place)[0]
-
-        return Asked(given, answer, turn)
-
-    return [one(c) for c in range(len(problem.placed))]
-
-
-def _asked_of_blocks(
-    run: GrowthRule, problem: Problem, response: Response, free: Response | None
-) -> list[Asked]:
-    place, nu = following(problem.mesh).PLACE, problem.elasticity.poisson
-    every = pairs_of(run, problem, response)
-    nominal = [None] * len(every) if free is None else pairs_of(run, problem, free)
-
-    def one(c: int, pairs: RangePairs, other: RangePairs | None) -> Asked:
-        shape = pairs.K.shape
-        a = crack_size(problem, c, shape[2])
-
-        def answer(K: Floats) -> PerPlace:
-            cycles = replace(pairs, K=K.reshape(shape))
-            return block_of(rated(run, cycles, nu, c, place, a, other), pairs.count)
-
-        def turn(K: Floats) -> Floats:  # the mean of the cycles' directions needs their rates
-            return answer(K)[0]
-
-        flat = (shape[0] * shape[1], *shape[2:])  # -1 means nothing where no tip is left
-        return Asked(pairs.K.reshape(flat), answer, turn)
-
-    return [one(c, *each) for c, each in enumerate(zip(every, nominal, strict=True))]
-
-
-def crack_size(problem: Problem, c: int, n: int) -> Floats:
-    """Crack size that a law is given at each place `(n,)`, length.
-
-    In 2D the length inside the body over the number of tips: half of it for a crack with two. In 3D
-    the area over the length of the fronts, which for a disc is half of its radius.
-    """
-    crack = problem.placed[c]
-    size = following(problem.mesh).crack_size(crack, problem.mesh)
-    tips = max(n, 1) if crack.fronts is None else 1
-    return np.full(n, size / tips)
-
-
-def levels_of(cycle: Cycle | Spectrum, response: Response) -> tuple[float, ...]:
-    """Factors of the solved states of a spectrum of factors."""
-    if not isinstance(cycle, Spectrum) or cycle.states is not None:
-        return ()
-    return tuple(response.factors.tolist())
-
-
-def warn_of_left_out(run: GrowthRule, first: Step) -> None:
-    """Say how much growth a spectrum leaves out with its small cycles, if it is worth a word."""
-    if not isinstance(run.cycle, Spectrum):
-        return
-    response = Response(first.levels or run.cycle.load_states, first.sif)
-    share = left_out_share(run, run.problem, response)
-    if share > _LEFT_OUT:
-        warn(
-            f"the cycles that the spectrum leaves out are {share:.2%} of the growth of a block at "
-            "the place where they matter most, before the first step: lives are too long by as "
-            "much. Omit less to keep them."
-        )
-
-
-def check_choice(law: Law, ratio: float | None) -> None:
-    """Refuse a cycle with R < 0 under a law that must know how R is meant, and was not told."""
-    if ratio is not None and ratio < 0 and must_choose(law):
-        raise ProblemError(_choice(f"the cycle has R = {ratio:.4g}", law))
-
-
-def must_choose(law: Law) -> bool:
-    """Whether R < 0 may mean two things to a law, and it does not say which."""
-    return getattr(law, "ratio", "contact") is None and bool(law.knows_negative_ratios)  # type: ignore[attr-defined]
-
-
-def _check_choice(run: GrowthRule, sif: Answers) -> None:
-    """The same, where no factors say R: a tip that is closed in some state has R < 0."""
-    if run.cycle.ratio is None and must_choose(run.law):
-        closed = any(crack.closed.any() for state in sif for crack in state)
-        if closed:
-            raise ProblemError(_choice("a load state closes a tip, so that R < 0", run.law))
-
-
-def _choice(reason: str, law: Law) -> str:
-    name = type(law).__name__
-    return (
-        f"{reason}, and {name} does not say which K its constants belong to: give {name}(..., "
-        'ratio="contact") for K as computed with contact, where a closed tip has K = 0, or '
-        'ratio="nominal" for constants that were fitted with K_min < 0. The rates differ by up to '
-        "a factor of 3."
-    )
-
-
-def respond_to_states(
-    run: GrowthRule, problem: Problem, reuse: SolverState, bars: bool = False
-) -> Response:
-    """Response of a scene to all load states of a run; to the levels of a spectrum of factors."""
-    spectrum = run.cycle if isinstance(run.cycle, Spectrum) else None
-
-    def solve(states: Sequence[Any], reuse: SolverState) -> Response:
-        if run.response is None:
-            response = respond(problem, states, reuse, bars, solver=run.solver)
-        else:
-            given = call_function(
-                run.response, "the response of a step", problem, tuple(states), reuse, bars
-            )
-            response = checked_response(given, problem, states)
-        if spectrum is not None and response.solutions:
-            refuse_friction(problem, response.solutions)
-        return response
-
-    if spectrum is not None and spectrum.states is None:
-        return respond_to_levels(problem, spectrum, solve, reuse)
-    return solve(run.cycle.load_states, reuse)
-
-
-# What the load states of one crack state say of its growth, and what an integrator makes of it.
+    rates_of_K: Callable[[Floats], CycleRates]
+    angle_of_K: Callable[[Floats], Floats]
 
 
 @dataclass(frozen=True, eq=False)
-class Evaluation:
-    """Directions and rates of all places of the cracks of a problem.
+class Rates:
+    """Directions and rates at all n stations at which K of a problem was solved.
 
     Attributes
     ----------
@@ -323,21 +84,27 @@ class Evaluation:
         With the cracks as they were advanced; `cracks` are what became of them in the body.
     response : Response
         Of all load states; its K is the best that is known.
-    angle, dK_eq, R : tuple of (f,) arrays
-        As of `Step`.
-    law_rate, rate : tuple of (f,) arrays, length/cycle
-        Growth before and after the threshold.
+    stations : Stations
+        Of the response.
+    angle, dK_eq, R : (n,) arrays
+        As of `CycleRates`.
+    law_rate, rate : (n,) arrays, length/cycle
+        Growth before and after the threshold of the run.
+    R_range : (n, 2) array
+        Smallest and largest ratio of the cycles of a block.
     free : Response, optional
         Without contact, where the law asks for it.
     """
 
     problem: Problem
     response: Response
-    angle: PerCrack
-    dK_eq: PerCrack
-    R: PerCrack
-    law_rate: PerCrack
-    rate: PerCrack
+    stations: Stations
+    angle: Floats
+    dK_eq: Floats
+    R: Floats
+    law_rate: Floats
+    rate: Floats
+    R_range: Floats
     free: Response | None = None
 
     @property
@@ -351,90 +118,446 @@ class Evaluation:
         return self.problem.placed
 
     @cached_property
-    def length(self) -> tuple[float, ...]:
-        """Size of each crack in the body, length."""
-        mesh = self.problem.mesh
-        return tuple(following(mesh).crack_size(crack, mesh) for crack in self.cracks)
+    def counts(self) -> list[int]:
+        """Number of stations of each crack."""
+        return [len(sif.x) for sif in self.sif[0]]
 
-    def K(self, c: int) -> Floats:
-        """Factors at the places of crack c in all states `(s, f, 2 or 3)`."""
-        return np.stack([state[c].K for state in self.sif])
+    def split(self, values: Floats) -> PerCrack:
+        """Values at the stations as one array a crack."""
+        return split(values, self.counts)
+
+    @cached_property
+    def K(self) -> Floats:
+        """Factors in all states `(s, n, 2 or 3)`, stress √length."""
+        return np.stack([np.concatenate([sif.K for sif in state]) for state in self.sif])
+
+    @cached_property
+    def T(self) -> Floats:
+        """Stress along the faces in all states `(s, n)`."""
+        return np.stack([np.concatenate([sif.T for sif in state]) for state in self.sif])
+
+    @property
+    def size_of_law(self) -> Floats:
+        """Crack size that a law is given at each station `(n,)`, length."""
+        parts = [law_size(self.problem, c, n) for c, n in enumerate(self.counts)]
+        return np.concatenate([np.zeros(0), *parts])
+
+    @property
+    def direction(self) -> Floats:
+        """Unit vectors of growth `(n, d)`."""
+        return directions(self.stations.frame, self.angle)
+
+    def exponent(self, law: Law) -> float:
+        """Slope of a law at the largest range."""
+        return law_exponent(law, self.dK_eq, self.R)
+
+    @property
+    def largest(self) -> float:
+        """Largest rate, length/cycle."""
+        return float(self.rate.max(initial=0.0))
+
+
+def rates_of(
+    rule: GrowthRule, problem: Problem, response: Response, free: Response | None = None
+) -> Rates:
+    """Ask criterion and law of a run what K of all load states means.
+
+    Parameters
+    ----------
+    rule : GrowthRule
+    problem : Problem
+        With the cracks that K belongs to.
+    response : Response
+        Of all load states; of a spectrum its factors are the levels.
+    free : Response, optional
+        As of `response_without_contact`, where it is known already.
+    """
+    _check_choice(rule, response.sif)
+    if free is None:
+        free = response_without_contact(rule, problem, response)
+    inputs = criterion_inputs(rule, problem, response, free)
+    parts = [each.rates_of_K(each.K) for each in inputs]
+    angle, dK_eq, R, law_rate, R_range = (
+        np.concatenate([getattr(part, name) for part in parts])
+        for name in ("angle", "dK_eq", "R", "rate", "R_range")
+    )
+    stations = solved_stations(response.sif[0])
+    if response.solutions and any(problem.frictions):
+        still = _locked(problem, response, dK_eq)
+        dK_eq, law_rate = np.where(still, 0.0, dK_eq), np.where(still, 0.0, law_rate)
+    rate = np.where(dK_eq < rule.threshold, 0.0, law_rate)
+    return Rates(problem, response, stations, angle, dK_eq, R, law_rate, rate, R_range, free)
+
+
+def response_without_contact(
+    rule: GrowthRule, problem: Problem, response: Response
+) -> Response | None:
+    """Response of the scene in which faces may overlap; None where no law asks for it."""
+    if getattr(rule.law, "ratio", None) != "nominal":
+        return None
+    if problem.contact == "off":
+        return response
+    return respond_to_states(rule, replace(problem, contact="off"), SolverState())
+
+
+def criterion_inputs(
+    rule: GrowthRule, problem: Problem, response: Response, free: Response | None = None
+) -> list[CriterionInput]:
+    """What criterion and law are asked about each crack.
+
+    Parameters
+    ----------
+    rule : GrowthRule
+    problem : Problem
+    response : Response
+        Of all states.
+    free : Response, optional
+        Without contact, for a law with nominal R.
+    """
+    of_rule = _inputs_of_blocks if isinstance(rule.cycle, Spectrum) else _inputs_of_cycle
+    return of_rule(rule, problem, response, free)
+
+
+def _inputs_of_cycle(
+    rule: GrowthRule, problem: Problem, response: Response, free: Response | None
+) -> list[CriterionInput]:
+    place, nu = PLACE[problem.mesh.dim], problem.elasticity.poisson
+
+    def of_crack(c: int) -> CriterionInput:
+        given = np.stack([state[c].K for state in response.sif])
+        a = law_size(problem, c, given.shape[1])
+
+        def rates_of_K(K: Floats) -> CycleRates:
+            angle, dK, R = evaluate_criterion(rule.criterion, K, nu, c, place)
+            if free is not None:
+                dK, R = nominal_range(np.stack([state[c].K for state in free.sif]), angle, nu)
+            rate = evaluate_law(rule.law, dK, R, c, place, a)
+            return CycleRates(angle, dK, R, rate, np.stack([R, R], axis=1))
+
+        def angle_of_K(K: Floats) -> Floats:
+            return evaluate_criterion(rule.criterion, K, nu, c, place)[0]
+
+        return CriterionInput(given, rates_of_K, angle_of_K)
+
+    return [of_crack(c) for c in range(len(problem.placed))]
+
+
+def _inputs_of_blocks(
+    rule: GrowthRule, problem: Problem, response: Response, free: Response | None
+) -> list[CriterionInput]:
+    place, nu = PLACE[problem.mesh.dim], problem.elasticity.poisson
+    every = pairs_of(rule, problem, response)
+    nominal = [None] * len(every) if free is None else pairs_of(rule, problem, free)
+
+    def of_crack(c: int, pairs: RangePairs, free_pairs: RangePairs | None) -> CriterionInput:
+        shape = pairs.K.shape
+        a = law_size(problem, c, shape[2])
+
+        def rates_of_K(K: Floats) -> CycleRates:
+            cycles = replace(pairs, K=K.reshape(shape))
+            return block_of(rated(rule, cycles, nu, c, place, a, free_pairs), pairs.count)
+
+        def angle_of_K(K: Floats) -> Floats:  # the mean of the cycles' directions needs their rates
+            return rates_of_K(K).angle
+
+        flat = (shape[0] * shape[1], *shape[2:])  # -1 means nothing where no tip is left
+        return CriterionInput(pairs.K.reshape(flat), rates_of_K, angle_of_K)
+
+    return [of_crack(c, *each) for c, each in enumerate(zip(every, nominal, strict=True))]
+
+
+def law_size(problem: Problem, c: int, n: int) -> Floats:
+    """Crack size that a law is given at each of n stations `(n,)`, length.
+
+    In 2D the length inside the body over the number of tips: half of it for a crack with two. In 3D
+    the area over the length of the fronts, which for a disc is half of its radius.
+    """
+    tips = max(n, 1) if problem.mesh.dim < 3 else 1
+    return np.full(n, problem.sizes[c] / tips)
+
+
+# Ends that friction locks.
+
+
+def _locked(problem: Problem, response: Response, dK_eq: Floats) -> Bools:
+    """Stations beside which the faces stick in every state `(n,)`.
+
+    K does not change there: what is left of its range is the error of quadrature, which a crack
+    must not grow on.
+    """
+    solutions, sif = response.solutions, response.sif
+    parts = [np.zeros(len(each.x), dtype=bool) for each in sif[0]]
+    rubs = [c for c in range(len(parts)) if has_slip(solutions[0], c)]
+    if rubs:
+        nu = problem.elasticity.poisson
+        K = clipped_K(np.stack([np.concatenate([each.K for each in state]) for state in sif]))
+        largest = float(equivalent_K(K, kink_angle(K), nu).max(initial=0.0))
+        split_ranges = split(dK_eq, [len(part) for part in parts])
+    for c in rubs:
+        lips = solutions[0].lips[c]
+        nearest = [int(np.argmin(np.linalg.norm(lips.x - x, axis=1))) for x in sif[0][c].x]
+        stuck = [s.contact[c].stuck[nearest] for s in solutions]  # type: ignore[union-attr,index]
+        parts[c] = np.all(stuck, axis=0) | (split_ranges[c] <= _ROUND_OFF * largest)
+    return np.concatenate(parts)
+
+
+# The ratio R < 0, which may mean two things.
+
+
+def check_choice(law: Law, ratio: float | None) -> None:
+    """Refuse a cycle with R < 0 under a law that must know how R is meant, and was not told."""
+    if ratio is not None and ratio < 0 and _must_choose(law):
+        raise ProblemError(_choice(f"the cycle has R = {ratio:.4g}", law))
+
+
+def _must_choose(law: Law) -> bool:
+    """Whether R < 0 may mean two things to a law, and it does not say which."""
+    return getattr(law, "ratio", "contact") is None and bool(law.knows_negative_ratios)  # type: ignore[attr-defined]
+
+
+def _check_choice(rule: GrowthRule, sif: Answers) -> None:
+    """The same, where no factors say R: a tip that is closed in some state has R < 0."""
+    if rule.cycle.ratio is None and _must_choose(rule.law):
+        closed = any(crack.closed.any() for state in sif for crack in state)
+        if closed:
+            raise ProblemError(_choice("a load state closes a tip, so that R < 0", rule.law))
+
+
+def _choice(reason: str, law: Law) -> str:
+    name = type(law).__name__
+    return (
+        f"{reason}, and {name} does not say which K its constants belong to: give {name}(..., "
+        'ratio="contact") for K as computed with contact, where a closed tip has K = 0, or '
+        'ratio="nominal" for constants that were fitted with K_min < 0. The rates differ by up to '
+        "a factor of 3."
+    )
+
+
+# A block of cycles: each cycle is rated, and their growth added.
 
 
 @dataclass(frozen=True, eq=False)
-class Settled:
-    """What an integrator makes of an evaluation.
+class RangePairs:
+    """Kinds of cycles at the stations of one crack.
 
     Attributes
     ----------
-    cycles : float
-        Cycles until the corrected cracks are reached.
-    corrected : tuple of Crack
-        Where growth goes on.
-    da, pending : tuple of (f,) arrays, length
-        As of `Step` and `Memory`.
-    trail : Trail or FrontTrail, optional
-    error : StepError, optional
+    K : (2, p, f, 2 or 3) array, stress √length
+        At both ends of each kind of cycle.
+    count : (p, f) array
+        How often a block has it.
     """
 
-    cycles: float
-    corrected: tuple[Crack, ...]
-    da: PerCrack
-    pending: PerCrack
-    trail: Trail | FrontTrail | None = None
-    error: StepError | None = None
+    K: Floats
+    count: Floats
 
 
-def evaluate(run: GrowthRule, problem: Problem, response: Response) -> Evaluation:
-    """Ask criterion and law of a run what K of all load states means."""
-    free = response_without_contact(run, problem, response)
-    angle, dK_eq, R, law_rate = rates_of(run, problem, response, free)
-    if response.solutions:
-        dK_eq, law_rate = stop_locked_faces(
-            problem, response.solutions, response.sif, dK_eq, law_rate
-        )
-    rate = tuple(np.where(d < run.threshold, 0.0, r) for d, r in zip(dK_eq, law_rate))
-    return Evaluation(problem, response, angle, dK_eq, R, law_rate, rate, free)
+@dataclass(frozen=True, eq=False)
+class PairRates:
+    """Every kind of cycle, rated at each station `(p, f)`: rad, stress √length, length/cycle."""
+
+    angle: Floats
+    dK: Floats
+    R: Floats
+    rate: Floats
 
 
-# The kinds of cycles of a block at the places of the cracks that were solved.
-
-
-def block_order(run: GrowthRule) -> Ints:
-    """Kinds of the cycles of a block, in time `(c,)`, of a run with retardation."""
-    assert isinstance(run.cycle, Spectrum)
-    return distinct(run.cycle.cycles)[2]
-
-
-def kinds_of(run: GrowthRule, seen: Evaluation) -> list[BlockCycles]:
-    """Range and ratio of each kind of cycle, one `BlockCycles` of a single solve a crack."""
-    problem = seen.problem
-    place, nu = following(problem.mesh).PLACE, problem.elasticity.poisson
+def pairs_of(rule: GrowthRule, problem: Problem, response: Response) -> list[RangePairs]:
+    """Kinds of cycles of each crack under the spectrum of a run."""
+    spectrum = rule.cycle
+    if not isinstance(spectrum, Spectrum):
+        return []
+    if spectrum.states is not None:
+        nu = problem.elasticity.poisson
+        every = [np.stack([sif.K for sif in crack]) for crack in zip(*response.sif)]
+        return [pairs_of_states(K, spectrum, nu) for K in every]
+    values, count, _ = distinct(spectrum.cycles)
     result = []
-    for c, pairs in enumerate(pairs_of(run, problem, seen.response)):
-        a = crack_size(problem, c, pairs.K.shape[2])
-        every = rated(run, pairs, nu, c, place, a)
-        dK, R = (np.ascontiguousarray(each.T)[None] for each in (every.dK, every.R))
-        result.append(BlockCycles(dK, R, a[None]))
+    for ladder in ladders(problem, spectrum, response):
+        K = np.stack([ladder.at(values[:, 0]), ladder.at(values[:, 1])])
+        result.append(RangePairs(K, np.repeat(count[:, None], K.shape[2], axis=1)))
     return result
 
 
+def pairs_of_states(K: Floats, spectrum: Spectrum, nu: float) -> RangePairs:
+    """Cycles between named states, counted at each station by K_eq of the state's own direction."""
+    opening = clipped_K(K)
+    severity = equivalent_K(opening, kink_angle(opening), nu)
+    n, f = severity.shape
+    count = np.zeros((n, n, f))
+    for place in range(f):
+        for one, other in closed_cycles(severity[spectrum.sequence, place]):
+            i, j = sorted((int(spectrum.sequence[one]), int(spectrum.sequence[other])))
+            count[i, j, place] += 1
+    first, second = np.nonzero(count.any(axis=2))
+    if not len(first):  # no station feels a difference
+        first, second = np.array([0]), np.array([1])
+    return RangePairs(np.stack([K[first], K[second]]), count[first, second])
+
+
+def rated(
+    rule: GrowthRule,
+    pairs: RangePairs,
+    nu: float,
+    c: int,
+    place: str,
+    a: Floats,
+    nominal: RangePairs | None = None,
+) -> PairRates:
+    """Ask criterion and law about every kind of cycle; they see them as stations of one front.
+
+    Parameters
+    ----------
+    rule : GrowthRule
+    pairs : RangePairs
+    nu : float
+    c : int
+        Number of the crack.
+    place : str
+        What a station is called in messages.
+    a : (f,) array, length
+        Crack size at each station.
+    nominal : RangePairs, optional
+        The same without contact, for a law with nominal R.
+    """
+    _, p, f, modes = pairs.K.shape
+    parts = []
+    rows = max(1, _CHUNK // max(f, 1))
+    for begin in range(0, p, rows):
+        K = pairs.K[:, begin : begin + rows]
+        n = K.shape[1]
+        angle, dK, R = evaluate_criterion(
+            rule.criterion, K.reshape(2, n * f, modes), nu, c, f"{place} of a cycle"
+        )
+        if nominal is not None:
+            free = nominal.K[:, begin : begin + rows].reshape(2, n * f, modes)
+            dK, R = nominal_range(free, angle, nu)
+        rate = evaluate_law(rule.law, dK, R, c, f"{place} of a cycle", np.tile(a, n))
+        rate = np.where(dK < rule.threshold, 0.0, rate)
+        parts.append(np.stack([angle, dK, R, rate]).reshape(4, n, f))
+    return PairRates(*np.concatenate(parts, axis=1)) if parts else PairRates(*np.zeros((4, p, f)))
+
+
+def block_of(every: PairRates, count: Floats) -> CycleRates:
+    """Direction, range, ratio and growth of a block at each station.
+
+    Parameters
+    ----------
+    every : PairRates
+    count : (p, f) array
+
+    Returns
+    -------
+    CycleRates
+        Range and ratio are those of the cycle with the largest range; the direction is the mean of
+        the cycles' directions, each weighted with its growth. One cycle stays as it is.
+    """
+    counts = count > 0
+    growth = np.where(counts, count * every.rate, 0.0)
+    there = np.where(counts, every.dK, -1.0)
+    largest, place = there.argmax(axis=0), np.arange(count.shape[1])
+    dK, R, angle = (x[largest, place] for x in (every.dK, every.R, every.angle))
+    counted = np.where(counts, every.R, R)
+    R_range = np.stack([counted.min(axis=0), counted.max(axis=0)], axis=1)
+    rate = growth.sum(axis=0)
+    mean = np.isfinite(rate) & (rate > 0) & ((growth > 0).sum(axis=0) > 1)
+    with np.errstate(invalid="ignore"):
+        x, y = (
+            np.where(mean, (growth * f(every.angle)).sum(axis=0), 1.0) for f in (np.cos, np.sin)
+        )
+    angle = np.where(mean, np.arctan2(y, x) + 0.0, angle)
+    return CycleRates(angle, dK, R, rate, R_range)
+
+
+def warn_of_left_out(rule: GrowthRule, response: Response) -> None:
+    """Say how much growth a spectrum leaves out with its small cycles, if it is worth a word."""
+    omitted = left_out_share(rule, rule.problem, response)
+    if omitted > _LEFT_OUT:
+        warn(
+            f"the cycles that the spectrum leaves out are {omitted:.2%} of the growth of a block "
+            "at the place where they matter most, before the first step: lives are too long by as "
+            "much. Omit less to keep them."
+        )
+
+
+def left_out_share(rule: GrowthRule, problem: Problem, response: Response) -> float:
+    """Growth of the cycles that a spectrum leaves out, over that of those it has; the worst place.
+
+    inf where only they would let a place grow.
+    """
+    spectrum = rule.cycle
+    if not isinstance(spectrum, Spectrum) or spectrum.states is not None:
+        return 0.0
+    omitted = spectrum.left_out
+    if not len(omitted) or spectrum.least_range == 0:
+        return 0.0
+    values, count, _ = distinct(omitted)
+    nu, worst = problem.elasticity.poisson, 0.0
+    every = pairs_of(rule, problem, response)
+    for c, ladder in enumerate(ladders(problem, spectrum, response)):
+        K = np.stack([ladder.at(values[:, 0]), ladder.at(values[:, 1])])
+        f = K.shape[2]
+        if f == 0:
+            continue
+        a = np.ones(f)
+        small = RangePairs(K, np.repeat(count[:, None], f, axis=1))
+        growth = [
+            block_of(rated(rule, pairs, nu, c, "tip", a), pairs.count).rate
+            for pairs in (small, every[c])
+        ]
+        grows = np.nonzero(growth[0])[0]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            ratio = growth[0][grows] / growth[1][grows]
+        worst = max(worst, float(ratio.max(initial=0.0)))
+    return worst
+
+
+# The kinds of cycles of a block, for growth cycle by cycle.
+
+
+def block_order(rule: GrowthRule) -> Ints:
+    """Kinds of the cycles of a block, in time `(c,)`, of a run with retardation."""
+    assert isinstance(rule.cycle, Spectrum)
+    return distinct(rule.cycle.cycles)[2]
+
+
+def kinds_of(rule: GrowthRule, rates: Rates) -> BlockCycles | None:
+    """Range and ratio of each kind of cycle at all stations, of a single solve.
+
+    None without retardation.
+    """
+    if rule.retardation is None:
+        return None
+    problem = rates.problem
+    place, nu = PLACE[problem.mesh.dim], problem.elasticity.poisson
+    parts = []
+    for c, pairs in enumerate(pairs_of(rule, problem, rates.response)):
+        a = law_size(problem, c, pairs.K.shape[2])
+        every = rated(rule, pairs, nu, c, place, a)
+        parts.append((every.dK.T[None], every.R.T[None], a[None]))
+    return BlockCycles(
+        *(np.ascontiguousarray(np.concatenate(x, axis=1)) for x in zip(*parts, strict=True))
+    )
+
+
 __all__ = [
-    "Asked",
-    "Evaluation",
-    "Settled",
-    "asked_of",
+    "PLACE",
+    "CriterionInput",
+    "CycleRates",
+    "PairRates",
+    "RangePairs",
+    "Rates",
+    "block_of",
     "block_order",
     "check_choice",
-    "crack_size",
-    "evaluate",
+    "criterion_inputs",
     "kinds_of",
-    "levels_of",
-    "locked",
-    "must_choose",
+    "law_size",
+    "left_out_share",
+    "pairs_of",
+    "pairs_of_states",
+    "rated",
     "rates_of",
-    "refuse_friction",
-    "respond_to_states",
-    "stop_locked_faces",
+    "response_without_contact",
     "warn_of_left_out",
 ]

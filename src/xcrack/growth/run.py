@@ -8,40 +8,47 @@ from typing import Unpack
 import numpy as np
 
 from xcrack.base.errors import GeometryError, ProblemError, XcrackError, warn
-from xcrack.crack.crack import Crack
+from xcrack.crack.measures import crack_size
 from xcrack.fatigue.checks import depends_on_ratio
 from xcrack.fatigue.criteria import Criterion
+from xcrack.fatigue.cycle import Cycle
 from xcrack.fatigue.law import Law
 from xcrack.fatigue.spectrum import Spectrum
-from xcrack.growth import joining
+from xcrack.growth import joins_3d
 from xcrack.growth.alarms import alarm_of_life, alarms_of_step
-from xcrack.growth.arrivals import arrivals_of, last_step
-from xcrack.growth.ending import (
+from xcrack.growth.ends import cannot_go_on, end_of_run, left_the_body, refusal_of, short_kink
+from xcrack.growth.events import (
+    Arriving,
+    arrivals_of,
+    arriving,
     cut_off,
-    end_at,
-    falls_to_zero,
+    ended_crack,
+    have_left,
     joins_of,
-    left_the_body,
-    short_kink,
-    too_short,
+    with_joins,
 )
-from xcrack.growth.follow import following
-from xcrack.growth.integrators import integrator_of
+from xcrack.growth.integrator import integrator_of
+from xcrack.growth.levels import respond_to_states, states_and_levels
 from xcrack.growth.options import GrowthOptions, GrowthRule, lists_options, run_of
-from xcrack.growth.prepared import again, fingerprint, prepared
+from xcrack.growth.prepared import fingerprint, prepared, replanned
 from xcrack.growth.progress import Progress, WarningLog
-from xcrack.growth.rates import (
-    check_choice,
-    evaluate,
-    levels_of,
-    respond_to_states,
-    warn_of_left_out,
+from xcrack.growth.rates import check_choice, rates_of, warn_of_left_out
+from xcrack.growth.response import Response
+from xcrack.growth.stations import Identities, first_identities, identities_after
+from xcrack.growth.step import (
+    Join,
+    RunState,
+    Step,
+    numbers_after,
+    plan_of,
+    run_state,
+    solves_of,
 )
-from xcrack.growth.step import LEAST, Advance, Cycle, Joined, Memory, Step, memory_of
 from xcrack.growth.uncertainty import add_K_error, best_K, shortfall
 from xcrack.linalg.engine import SolverState
 from xcrack.mesh.mesh import Mesh
 from xcrack.model.problem import Problem
+from xcrack.sif.sif import SIF
 
 
 @lists_options
@@ -172,80 +179,68 @@ def grow(
     >>> bool(history.life_bar.relative < 0.05)
     True
     """
-    return steps_of(run_of("grow", problem, law, criterion, cycle, da, options))
+    return growth_steps(run_of("grow", problem, law, criterion, cycle, da, options))
 
 
-def first_step(run: GrowthRule) -> Step:
+def first_step(rule: GrowthRule) -> Step:
     """The first step of a run alone, on the mesh as it is."""
-    return _next_step(run, run.problem, None, SolverState(), run.settings)[0]
+    return _solved_step(rule, rule.problem, None, SolverState(), {})[0]
 
 
-def steps_of(
-    run: GrowthRule, done: Sequence[Step] = (), meshes: Sequence[Mesh] = ()
+def growth_steps(
+    rule: GrowthRule, done: Sequence[Step] = (), meshes: Sequence[Mesh] = ()
 ) -> Generator[Step, None, str]:
     """Steps of a run: from the beginning, or those that follow the steps that are done.
 
-    Of one with a tolerance, `meshes` are those that it has had.
+    Of one with a tolerance, `meshes` are those that it has had. Returns why the run ended.
     """
-    check_choice(run.law, run.cycle.ratio)
-    settings = run.settings  # before a law is called that may change what it reads
-    asked, last = run, done[-1] if done else None
+    check_choice(rule.law, rule.cycle.ratio)
+    settings = rule.settings  # before a law is called that may change what it reads
+    asked, last = rule, done[-1] if done else None
     ended = ""
-    if run.estimates:
-        run = prepared(run, steps_of, done, meshes)
-    notices, progress = WarningLog(), Progress(run)
+    if rule.estimates:
+        rule = prepared(rule, growth_steps, done, meshes)
+    notices, progress = WarningLog(), Progress(rule)
     kink, is_torn = "", False
     try:
         if last is None:
             with notices.watch(0) as messages:
-                first, reuse = _next_step(run, run.problem, None, SolverState(), settings)
+                first, reuse = _solved_step(rule, rule.problem, None, SolverState(), settings)
                 own = len(messages)
-                other = again(asked, run, steps_of, None, first)
+                other = replanned(asked, rule, growth_steps, None, first)
                 if other is not None:
-                    run = other[0]
+                    rule = other[0]
                     del messages[:own]  # of a mesh that nobody has
-                    first, reuse = _next_step(run, run.problem, None, SolverState(), settings)
-                _warn_of_ratio(run, first)
-                warn_of_left_out(run, first)
-                is_torn = _warn_of_mode_III(run, first)
-                _warn_of_alarms(run, first)
+                    first, reuse = _solved_step(rule, rule.problem, None, SolverState(), settings)
+                _warn_of_ratio(rule, first)
+                _warn_of_left_out(rule, first)
+                is_torn = _warn_of_mode_III(rule, first)
+                _warn_of_alarms(rule, first)
             last = replace(first, warnings=tuple(messages))
             progress.step(last)
             yield last
         else:
-            reuse = memory_of(last).reuse
+            reuse = run_state(last).reuse
         while True:
-            ended = end_at(run, last)
+            ended = end_of_run(rule, last) or refusal_of(rule, last)
             if ended:
+                _refuse(last, ended)
                 break
-            plan = integrator_of(run).planned(run, last)
-            if plan.falls_to_zero:
-                ended = falls_to_zero(run, last, plan)
-            if not ended and plan.largest < LEAST * plan.size:
-                ended = too_short(run, last, plan)
-                if last.index == 0:
-                    raise ProblemError(ended)
-                warn(ended)
-            if ended:
-                break
-            if not kink:
-                kink = short_kink(run, last, plan)
-                if kink:
-                    warn(kink)
+            kink = kink or _warned_of_kink(rule, last)
             with notices.watch(last.index + 1) as messages:
-                next_step, reuse, ended = _after(run, last, plan, reuse)
+                next_step, reuse, ended = _step_after(rule, last, reuse)
                 if next_step is None:
                     break
-                is_torn = is_torn or _warn_of_mode_III(run, next_step)
+                is_torn = is_torn or _warn_of_mode_III(rule, next_step)
                 own = len(messages)
-                other = again(asked, run, steps_of, last, next_step)
+                other = replanned(asked, rule, growth_steps, last, next_step)
                 if other is not None:
                     del messages[:own]  # of a step that nobody has
                 else:
-                    _warn_of_alarms(run, next_step)
+                    _warn_of_alarms(rule, next_step)
             if other is not None:
-                reuse = reuse if other[0] is run else memory_of(last).reuse
-                run, last = other[0], other[1] or last
+                reuse = reuse if other[0] is rule else run_state(last).reuse
+                rule, last = other[0], _planned(other[0], other[1] or last)
                 continue
             last = replace(next_step, warnings=tuple(messages))
             progress.step(last)
@@ -254,11 +249,11 @@ def steps_of(
                 break
     finally:
         notices.summarise()
-        if ended and last is not None and not run.scouts:
-            alarm = alarm_of_life(run, last, ended)
+        if ended and last is not None and not rule.scouts:
+            alarm = alarm_of_life(rule, last, ended)
             if alarm is not None:
                 warn(str(alarm))
-        short = "" if last is None or not run.estimates else shortfall(run, last)
+        short = "" if last is None or not rule.estimates else shortfall(rule, last)
         if short:
             warn(short)
         progress.close()
@@ -266,71 +261,231 @@ def steps_of(
     return ended
 
 
-def _warn_of_alarms(run: GrowthRule, step: Step) -> None:
-    if not run.scouts:
-        for alarm in alarms_of_step(run, step):
+def _refuse(step: Step, ended: str) -> None:
+    """Raise where the first step of a run is too short for the mesh; later that ends it."""
+    if step.plan is not None and step.plan.limit == "short" and ended.startswith("the advance"):
+        if step.index == 0:
+            raise ProblemError(ended)
+        warn(ended)
+
+
+def _warned_of_kink(rule: GrowthRule, step: Step) -> str:
+    kink = short_kink(rule, step)
+    if kink:
+        warn(kink)
+    return kink
+
+
+def _warn_of_alarms(rule: GrowthRule, step: Step) -> None:
+    if not rule.scouts:
+        for alarm in alarms_of_step(rule, step):
             warn(str(alarm))
 
 
-def _after(
-    run: GrowthRule, last: Step, plan: Advance, reuse: SolverState
+def _warn_of_left_out(rule: GrowthRule, first: Step) -> None:
+    if isinstance(rule.cycle, Spectrum):
+        warn_of_left_out(rule, Response(first.levels or rule.cycle.load_states, first.sif))
+
+
+def _step_after(
+    rule: GrowthRule, last: Step, reuse: SolverState
 ) -> tuple[Step | None, SolverState, str]:
     """The step after another one, or why there is none."""
+    plan = plan_of(last)
     try:
-        cracks = integrator_of(run).advanced(run, last)
-        met = joining.joined(run, last, cracks)
-        if met is not None:
-            cracks, reuse = list(met.cracks), replace(reuse, centre=(), active=())
-        problem = _problem(run, cracks, memory_of(last))
+        problem = _scene(rule, last)
     except GeometryError as error:
-        return None, reuse, _stopped(last, error)
-    joins = joins_of(last, problem, plan.cycles)
-    ended = cut_off(last, problem, joins) if joins else ""
-    if joins:
-        reuse = (
-            SolverState()
-        )  # two cracks have become one: what belongs to numbers of cracks is void
-    arriving = (
-        following(run.problem.mesh).arriving(last, cracks, problem.placed, run.problem.mesh)
-        if met is None
-        else joining.arriving(run, last, met)
-    )
+        return None, reuse, cannot_go_on(last, error)
+    if plan.joins:
+        reuse = replace(reuse, centre=(), active=())
+    joins = joins_of(last, problem)
+    ended = cut_off(last, problem, joins)
+    if joins and problem.mesh.dim == 2:
+        reuse = SolverState()  # what belongs to numbers of cracks is void
+    near = arriving(last, problem)
     if not any(placed.n_tips for placed in problem.placed):
-        step = last_step(run, last, cracks, problem.placed, arriving)
-        when = max([step.cycles, *(join.N for join in joins)])
-        return replace(step, cycles=when, joins=joins), reuse, ended
+        step = _last_step(rule, last, problem, near, joins)
+        return step, reuse, ended
     if ended:
         return None, reuse, ended
     try:
-        step, reuse = _next_step(run, problem, last, reuse, memory_of(last).settings, met)
-        arrivals = arrivals_of(run, last, arriving, step.cycles - last.cycles)
-        own = tuple(replace(join, N=step.cycles) for join in joins)
-        return replace(step, arrivals=arrivals, joins=own or step.joins), reuse, ""
+        step, reuse = _solved_step(rule, problem, last, reuse, run_state(last).settings, joins)
+        arrivals = arrivals_of(rule, last, near, step.cycles - last.cycles)
+        return replace(step, arrivals=arrivals), reuse, ""
     except GeometryError as error:
-        return None, reuse, _stopped(last, error)
+        return None, reuse, cannot_go_on(last, error)
     except XcrackError as error:
-        if not _gone(run, cracks, problem.placed):
+        if not have_left(plan.cracks, problem.placed):
             raise
-        left = left_the_body(run, arrivals_of(run, last, arriving, None))
+        left = left_the_body(rule, arrivals_of(rule, last, near, None))
         return None, reuse, f"{left}, and the body cannot be solved without it: {error}"
 
 
-def _stopped(last: Step, error: Exception) -> str:
-    return f"the cracks cannot go on after step {last.index}, N = {last.cycles:.6g}: {error}"
+def _scene(rule: GrowthRule, last: Step) -> Problem:
+    """The scene after the plan of a step, with the radius of the first."""
+    numerics, radius = rule.problem.numerics, run_state(last).radius
+    if radius is not None:
+        numerics = replace(numerics, radius=radius)
+    problem = replace(rule.problem, cracks=plan_of(last).cracks, numerics=numerics)
+    _ = problem.placed  # an error here ends a run
+    return problem
+
+
+def _solved_step(
+    rule: GrowthRule,
+    problem: Problem,
+    last: Step | None,
+    reuse: SolverState,
+    settings: Mapping[str, str],
+    joins: Sequence[Join] = (),
+) -> tuple[Step, SolverState]:
+    """Solve all load states of a problem and decide where and how fast its cracks grow."""
+    response = respond_to_states(rule, problem, reuse, rule.estimates)
+    sif, solutions, handed_on = response.sif, response.solutions, response.reuse
+    rates = rates_of(rule, problem, replace(response, sif=best_K(sif)))
+    integrator = integrator_of(rule)
+    if last is None:
+        index, radius = 0, rule.problem.numerics.radius
+        identities = first_identities(problem.placed)
+        corrected = integrator.begin(rule, rates, identities)
+        modelled = bool(solutions) and len(solutions[0].space.radius) > 0
+        if radius is None and rule.tolerance is None and modelled:
+            radius = float(np.min(solutions[0].space.radius))
+    else:
+        index, radius = last.index + 1, run_state(last).radius
+        identities = _identities(rule, last, problem, joins)
+        correct = joins_3d.joined if plan_of(last).joins else integrator.correct
+        corrected = correct(rule, last, rates, identities)
+    corrected = add_K_error(rule, last, corrected, rates, sif)
+    states, levels = states_and_levels(rule.cycle, response)
+    step = Step(
+        index=index,
+        cycles=corrected.cycles,
+        cracks=rates.cracks,
+        sif=sif,
+        angle=rates.split(rates.angle),
+        dK_eq=rates.split(rates.dK_eq),
+        R=rates.split(rates.R),
+        rate=rates.split(rates.rate),
+        da=rates.split(np.zeros(len(rates.rate))),
+        solutions=solutions,
+        levels=levels,
+        corrected=corrected.cracks,
+        error=corrected.error,
+        joins=tuple(replace(join, N=corrected.cycles) for join in joins),
+        states=states,
+        law_rate=rates.split(rates.law_rate),
+        R_range=rates.split(rates.R_range),
+        sizes=problem.sizes,
+        identities=identities,
+        stations=corrected.stations,
+        solves=corrected.solves,
+        zones=corrected.zones,
+        earlier_zones=corrected.earlier_zones,
+        control=corrected.control,
+        run=RunState(
+            settings,
+            handed_on.without_matrices(),
+            radius,
+            fingerprint(problem.mesh) if rule.estimates else "",
+            rule.meshes,
+        ),
+    )
+    step = _planned(rule, step)
+    da = integrator.advance_of(step, plan_of(step), rates)
+    return replace(step, da=rates.split(da)), handed_on
+
+
+def _planned(rule: GrowthRule, step: Step) -> Step:
+    """A step with the plan of what comes after it."""
+    plan = integrator_of(rule).predict(rule, step)
+    step = replace(step, plan=plan)
+    if plan.limit:
+        return step
+    try:
+        return replace(step, plan=with_joins(rule, step, plan))
+    except GeometryError as error:
+        return replace(step, plan=replace(plan, limit="geometry", refusal=str(error)))
+
+
+def _identities(
+    rule: GrowthRule, last: Step, problem: Problem, joins: Sequence[Join]
+) -> Identities:
+    """Which tips, fronts and cracks those of the next scene are."""
+    before = last.identities or first_identities(last.cracks)
+    numbers = numbers_after(len(last.cracks), joins, len(problem.placed))
+    place = integrator_of(rule).ends_of(last, plan_of(last))
+    return identities_after(before, numbers, solves_of(last)[0], place, problem.placed)
+
+
+def _last_step(
+    rule: GrowthRule,
+    last: Step,
+    problem: Problem,
+    near: Sequence[Arriving],
+    joins: Sequence[Join],
+) -> Step:
+    """The step at which no tip is left: cracks that end on the boundary, without K.
+
+    Its cycles are those of the last tip.
+    """
+    plan = plan_of(last)
+    arrivals = arrivals_of(rule, last, near, None)
+    cracks = tuple(
+        ended_crack(before, after, [one for one in near if one.crack == c])
+        for c, (before, after) in enumerate(zip(plan.cracks, problem.placed, strict=True))
+    )
+    none = tuple(np.zeros(0) for _ in cracks)
+    cycles = max((arrival.cycles for arrival in arrivals), default=last.cycles)
+    error = last.error
+    if error is not None:  # no K has been solved for the last ligament: its cycles count in full
+        error = replace(error, place=none, unknown=error.unknown + cycles - last.cycles)
+    return Step(
+        index=last.index + 1,
+        cycles=max([cycles, *(join.N for join in joins)]),
+        cracks=cracks,
+        # Two cracks may have become one.
+        sif=tuple(tuple(map(_without_stations, state[: len(cracks)])) for state in last.sif),
+        angle=none,
+        dK_eq=none,
+        R=none,
+        rate=none,
+        da=none,
+        levels=last.levels,
+        error=error,
+        arrivals=arrivals,
+        joins=tuple(joins),
+        states=last.states,
+        law_rate=none,
+        R_range=tuple(np.zeros((0, 2)) for _ in cracks),
+        sizes=tuple(crack_size(crack, problem.mesh) for crack in cracks),
+        identities=_identities(rule, last, problem, joins),
+        run=last.run,
+    )
+
+
+def _without_stations(sif: SIF) -> SIF:
+    rows = {
+        name: getattr(sif, name)[:0]
+        for name in (
+            "x", "frame", "K", "T", "spread", "s", "front", "at_surface", "closed", "domain_cells"
+        )
+    }  # fmt: skip
+    return replace(sif, **rows, errors=None, ends=(), widened=None, E_prime=None, nu=None)
 
 
 _OF_LARGEST = 0.1  # K_I below this share of the largest of a front compares with nothing
 
 
-def _warn_of_mode_III(run: GrowthRule, step: Step) -> bool:
+def _warn_of_mode_III(rule: GrowthRule, step: Step) -> bool:
     """Warn where a front is unstable under K_III, and would break into segments.
 
     Above |K_III| / K_I = √((1 - nu)(2 - 3 nu) / (3 (2 - nu) - 4 √2 (1 - 2 nu))) a straight front is
     unstable (Leblond, Karma and Lazarus, 2011); below nu of -.04 it never is.
     """
-    if run.problem.mesh.dim == 2:
+    if rule.problem.mesh.dim == 2:
         return False
-    nu = run.problem.elasticity.poisson
+    nu = rule.problem.elasticity.poisson
     growth = 3 * (2 - nu) - 4 * sqrt(2) * (1 - 2 * nu)
     limit = sqrt((1 - nu) * (2 - 3 * nu) / growth) if growth > 0 else inf
     for c, states in enumerate(zip(*step.sif, strict=True)):
@@ -350,12 +505,12 @@ def _warn_of_mode_III(run: GrowthRule, step: Step) -> bool:
     return False
 
 
-def _warn_of_ratio(run: GrowthRule, first: Step) -> None:
+def _warn_of_ratio(rule: GrowthRule, first: Step) -> None:
     """Warn where R < 0 was asked for and a law that depends on R never sees it."""
-    if getattr(run.law, "ratio", None) is not None:
+    if getattr(rule.law, "ratio", None) is not None:
         return
-    ratio, dK_eq = run.cycle.ratio, np.concatenate([d[d > 0] for d in first.dK_eq])
-    if ratio is None or ratio >= 0 or not len(dK_eq) or not depends_on_ratio(run.law, dK_eq):
+    ratio, dK_eq = rule.cycle.ratio, np.concatenate([d[d > 0] for d in first.dK_eq])
+    if ratio is None or ratio >= 0 or not len(dK_eq) or not depends_on_ratio(rule.law, dK_eq):
         return
     warn(
         f"the cycle has R = {ratio:.4g}, but a closed crack has K_I = 0: the law sees K_max as "
@@ -365,78 +520,4 @@ def _warn_of_ratio(run: GrowthRule, first: Step) -> None:
     )
 
 
-def _next_step(
-    run: GrowthRule,
-    problem: Problem,
-    last: Step | None,
-    reuse: SolverState,
-    settings: Mapping[str, str],
-    met: Joined | None = None,
-) -> tuple[Step, SolverState]:
-    """Solve all load states of a problem and decide where and how fast its cracks grow."""
-    response = respond_to_states(run, problem, reuse, run.estimates)
-    sif, solutions, handed_on = response.sif, response.solutions, response.reuse
-    seen = evaluate(run, problem, replace(response, sif=best_K(sif)))
-    integrator = integrator_of(run)
-    if last is None:
-        index, radius = 0, run.problem.numerics.radius
-        settled = integrator.begun(run, seen)
-        modelled = bool(solutions) and len(solutions[0].space.radius) > 0
-        if radius is None and run.tolerance is None and modelled:
-            radius = float(np.min(solutions[0].space.radius))
-    else:
-        index, radius = last.index + 1, memory_of(last).radius
-        settled = (
-            integrator.settled(run, last, seen)
-            if met is None
-            else joining.settled(run, last, seen, met)
-        )
-    settled = add_K_error(run, last, settled, seen, sif)
-    memory = Memory(
-        seen.law_rate,
-        seen.length,
-        settled.pending,
-        radius,
-        handed_on.without_matrices(),
-        settings,
-        settled.trail,
-        fingerprint(problem.mesh) if run.estimates else "",
-        run.meshes,
-    )
-    step = Step(
-        index=index,
-        cycles=settled.cycles,
-        cracks=seen.cracks,
-        sif=sif,
-        angle=seen.angle,
-        dK_eq=seen.dK_eq,
-        R=seen.R,
-        rate=seen.rate,
-        da=settled.da,
-        solutions=solutions,
-        memory=memory,
-        levels=levels_of(run.cycle, response),
-        corrected=settled.corrected,
-        error=settled.error,
-        joins=() if met is None else met.joins,
-    )
-    return step, handed_on
-
-
-def _problem(run: GrowthRule, cracks: Sequence[Crack], memory: Memory) -> Problem:
-    """The scene with the cracks of another step, and the radius of the first."""
-    numerics = run.problem.numerics
-    if memory.radius is not None:
-        numerics = replace(numerics, radius=memory.radius)
-    problem = replace(run.problem, cracks=tuple(cracks), numerics=numerics)
-    _ = problem.placed  # an error here ends a run
-    return problem
-
-
-def _gone(run: GrowthRule, cracks: Sequence[Crack], placed: Sequence[Crack]) -> bool:
-    """Whether tips, or fronts, have left the body."""
-    twin = following(run.problem.mesh)
-    return any(twin.gone(*pair) for pair in zip(cracks, placed, strict=True))
-
-
-__all__ = ["grow", "steps_of"]
+__all__ = ["first_step", "grow", "growth_steps"]

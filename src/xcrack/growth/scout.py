@@ -10,10 +10,9 @@ from xcrack.base.errors import collected_warnings
 from xcrack.crack.crack import Crack
 from xcrack.fatigue.checks import law_exponent
 from xcrack.fatigue.kink import START
-from xcrack.growth.controlled import STEPS
 from xcrack.growth.options import GrowthRule
-from xcrack.growth.step import Step, memory_of
-from xcrack.growth.trail import Trail, first_length
+from xcrack.growth.step import Step, solves_of
+from xcrack.growth.step_length import STEPS, first_length
 from xcrack.model.problem import Problem
 
 TOLERANCE = 0.1  # of the scout: its path only says where cells are to be small
@@ -61,7 +60,7 @@ class Scouted:
 
 
 def scouted(
-    run: GrowthRule,
+    rule: GrowthRule,
     scene: Problem,
     steps_of: Callable[[GrowthRule], Generator[Step, None, str]],
     begin: int = 0,
@@ -70,7 +69,7 @@ def scouted(
 
     Parameters
     ----------
-    run : GrowthRule
+    rule : GrowthRule
     scene : Problem
         On a coarse mesh.
     steps_of : callable
@@ -82,7 +81,7 @@ def scouted(
     exponent, first = 1.0, np.zeros(0)
     with collected_warnings([]):  # they are of a mesh that nobody has
         scout = replace(
-            run,
+            rule,
             problem=scene,
             da=None,
             cycles=None,
@@ -98,8 +97,8 @@ def scouted(
         for step in steps_of(scout):
             if not stages:
                 dK_eq, R = np.concatenate(step.dK_eq), np.concatenate(step.R)
-                exponent = law_exponent(run.law, dK_eq, R)
-                first = _first_cells(run, step)
+                exponent = law_exponent(rule.law, dK_eq, R)
+                first = _first_cells(rule, step)
                 if begin:  # the run goes on in steps of its own length
                     first = np.full(len(first), np.inf)
             places = np.concatenate([sif.x for sif in step.sif[0]])
@@ -110,12 +109,13 @@ def scouted(
     return Scouted(tuple(stages), exponent, first)
 
 
-def _first_cells(run: GrowthRule, step: Step) -> Floats:
+def _first_cells(rule: GrowthRule, step: Step) -> Floats:
     """Longest edges of cells at the first tips, for the first step that a tolerance asks for."""
-    trail, angle = memory_of(step).trail, np.concatenate(step.angle)
-    if not isinstance(trail, Trail):  # fronts begin without kinks of one cell
+    angle = np.concatenate(step.angle)
+    if rule.problem.mesh.dim == 3:  # fronts begin without kinks of one cell
         return np.full(len(angle), np.inf)
-    length = first_length(1.0, STEPS * float(run.tolerance or 0.0), 0.0) * trail.scale
+    scale = solves_of(step)[1].scale
+    length = first_length(1.0, STEPS * float(rule.tolerance or 0.0), 0.0) * scale
     return np.where(np.abs(angle) > START, _KINKED, _STRAIGHT) * length
 
 

@@ -1,121 +1,31 @@
-"""The values of a growth run: the load cycle, and one state of the cracks after the other."""
+"""The values of a growth run: cracks after cracks, and the plan between them."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from numbers import Real
-from typing import Any
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from xcrack.analysis.solution import Solution
-from xcrack.base.arrays import Floats, coordinates
+from xcrack.base.arrays import Bools, Floats, coordinates
 from xcrack.base.checks import entries, number, numbers, value_text, whole_number
 from xcrack.base.errors import ProblemError
 from xcrack.base.markup import element, join_parts, table
 from xcrack.crack.crack import Crack
-from xcrack.growth.trail import FrontTrail, Trail
+from xcrack.fatigue.retardation import OverloadZones
+from xcrack.growth.solves import SolveHistory
+from xcrack.growth.stations import GrowthStations, Identities, PerCrack, directions
 from xcrack.linalg.engine import SolverState
-from xcrack.model.loads import Load
 from xcrack.sif.sif import SIF
 
-# How far each tip of all cracks goes in one step.
-
-LEAST = 0.1  # of a cell: a shorter new face turns the tip's frame, but not the crack the mesh sees
-
-PerCrack = tuple[Floats, ...]  # one array (f,) a crack
+# What happens between two steps.
 
 
-@dataclass(frozen=True, eq=False)
-class Advance:
-    """What one step is to do.
-
-    Attributes
-    ----------
-    da : tuple of (f,) arrays, length
-        Advance of each tip, one array a crack.
-    pending : tuple of (f,) arrays, length
-        Growth that is too short to be modelled yet and waits for the next steps.
-    largest : float, length
-        Advance asked for at the fastest tip; 0 where nothing grows, or a rate is infinite.
-    size : float, length
-        Cell size at that tip.
-    tip : (int, int)
-        That tip: crack and number.
-    falls_to_zero : bool
-        Whether all growth is seen to stop within a tenth of that cell.
-    cycles : float
-        That it is seen to take; 0 where the integrator cannot tell.
-    """
-
-    da: PerCrack
-    pending: PerCrack
-    largest: float
-    size: float
-    tip: tuple[int, int]
-    falls_to_zero: bool = False
-    cycles: float = 0.0
-
-
-def plan_advance(
-    rate: PerCrack,
-    dK_eq: PerCrack,
-    pending: PerCrack,
-    size: PerCrack,
-    *,
-    da: float | None,
-    cycles: float | None,
-    scaling: str,
-    least: float = LEAST,
-) -> Advance:
-    """Share one step out over the tips.
-
-    Parameters
-    ----------
-    rate, dK_eq, pending, size : tuple of (f,) arrays
-        Growth a cycle, equivalent range, growth left over from earlier steps, cell size.
-    da : float, length, or None
-        Largest advance of any tip.
-    cycles : float or None
-        Cycles of the step; with `da` too, the smaller advance holds.
-    scaling : {"law", "linear"}
-        Advance of the other tips in proportion to the rate, or to dK_eq as in the source paper
-        (which contradicts its own law, and does not converge to the right path).
-    least : float
-        Share of a cell below which an advance waits.
-
-    Returns
-    -------
-    Advance
-    """
-    every_rate = np.concatenate(rate)
-    fastest = float(every_rate.max(initial=0.0))
-    if fastest == 0 or np.isinf(fastest):
-        still = tuple(np.zeros_like(r) for r in rate)
-        return Advance(still, pending, 0.0, np.inf, (0, 0))
-    score = (
-        rate if scaling == "law" else tuple(np.where(r > 0, k, 0.0) for r, k in zip(rate, dK_eq))
-    )
-    best = max(float(s.max(initial=0.0)) for s in score)
-    crack = next(c for c, s in enumerate(score) if s.max(initial=0.0) == best)
-    number = int(np.argmax(score[crack]))
-    by_cycles = np.inf if cycles is None else cycles * fastest
-    largest = float(min(np.inf if da is None else da, by_cycles))
-    wanted = [p + largest * (s / best) for p, s in zip(pending, score)]
-    go = [w >= least * h for w, h in zip(wanted, size)]
-    return Advance(
-        da=tuple(np.where(g, w, 0.0) for g, w in zip(go, wanted)),
-        pending=tuple(np.where(g, 0.0, w) for g, w in zip(go, wanted)),
-        largest=largest,
-        size=float(size[crack][number]),
-        tip=(crack, number),
-    )
-
-
-# A tip or a front that reaches the boundary of the body.
+class Event:
+    """Something that happened between two steps: it has a place, cycles N, and a text."""
 
 
 @dataclass(frozen=True)
-class Arrival:
+class Arrival(Event):
     """Where and when a tip, or a front, came to the boundary.
 
     Attributes
@@ -132,6 +42,10 @@ class Arrival:
         From the last solved step to there, along a straight line.
     cycles : float
         Cycles until then: the ligament at rates that the last solves predict.
+    end : int
+        Identity of the tip or front; -1 where it is not known.
+    label : str
+        What that is called.
     """
 
     crack: int
@@ -140,39 +54,24 @@ class Arrival:
     name: str
     ligament: float
     cycles: float
+    end: int = -1
+    label: str = ""
+
+    @property
+    def N(self) -> float:  # noqa: N802 - the name of the field
+        """Cycles, as of other events."""
+        return self.cycles
 
     def __str__(self) -> str:
         return (
-            f"crack {self.crack} reached {self.name!r} at {coordinates(self.x)}, "
+            f"{self.label or f'crack {self.crack}'} reached {self.name!r} at "
+            f"{coordinates(self.x)}, "
             f"N = {self.cycles:.6g} (the last {self.ligament:.4g} at predicted rates)"
         )
 
 
 @dataclass(frozen=True)
-class Arriving:
-    """An arrival during an advance that is not solved yet.
-
-    Attributes
-    ----------
-    crack, tip, x, name, ligament
-        As of `Arrival`.
-    share : float
-        Part of the advance until then; above 1 where the boundary is a little farther.
-    """
-
-    crack: int
-    tip: int
-    x: tuple[float, ...]
-    name: str
-    ligament: float
-    share: float
-
-
-# Where and when cracks join during growth.
-
-
-@dataclass(frozen=True)
-class Join:
+class Join(Event):
     """Two cracks that became one, or a crack that runs into another one and ends there.
 
     Attributes
@@ -246,111 +145,116 @@ def numbers_after(n: int, joins: Sequence[Join], left: int) -> list[int]:
     return number
 
 
-@dataclass(frozen=True, eq=False)
-class Cycle:
-    """The load states of one cycle.
-
-    Parameters
-    ----------
-    min, max : float, optional
-        Two factors on all loads of the problem.
-    states : sequence of load states, optional
-        Any number of states instead: each a factor, or a list of loads.
-
-    Raises
-    ------
-    ProblemError
-        Neither or both are given, a factor is no finite number, or min > max.
-
-    Examples
-    --------
-    >>> Cycle(0.1, 1.0).load_states
-    (0.1, 1.0)
-    """
-
-    min: float | None = None
-    max: float | None = None
-    states: Sequence[Any] | None = None
-
-    def __post_init__(self) -> None:
-        if self.states is None:
-            if self.min is None or self.max is None:
-                raise ProblemError("Cycle: give min and max, or states=[...].")
-            for name in ("min", "max"):
-                factor = number(getattr(self, name), f"Cycle({name}=...)")
-                object.__setattr__(self, name, factor)
-            if not self.min <= self.max:
-                raise ProblemError(f"Cycle({self.min}, {self.max}): give finite min <= max.")
-            return
-        if self.min is not None or self.max is not None:
-            raise ProblemError("Cycle: give min and max, or states=[...], not both.")
-        states = entries(self.states, "Cycle: states")
-        if not states:
-            raise ProblemError("Cycle(states=...) takes a list of at least one load state.")
-        checked = (_load_state(state, f"Cycle: states[{k}]") for k, state in enumerate(states))
-        object.__setattr__(self, "states", tuple(checked))
-
-    @property
-    def ratio(self) -> float | None:
-        """Smallest over largest factor of the cycle, as it was asked for.
-
-        None where that is no ratio of forces: a state that is a list of loads, or no factor > 0.
-        """
-        factors = [float(state) for state in self.load_states if isinstance(state, Real)]
-        if len(factors) < len(self.load_states) or max(factors) <= 0:
-            return None
-        return min(factors) / max(factors)
-
-    @property
-    def load_states(self) -> tuple[Any, ...]:
-        """The states as `solve` takes them."""
-        return (self.min, self.max) if self.states is None else tuple(self.states)
-
-
-def _load_state(state: Any, what: str) -> Any:
-    """A load state, checked: a number, or a tuple of loads."""
-    if isinstance(state, Real):
-        return number(state, what)
-    loads = entries(state, what)
-    for load in loads:
-        if not isinstance(load, Load):
-            raise ProblemError(f"{what} has {value_text(load)}, which is not a load: see traction.")
-    return state if isinstance(state, list | tuple) else loads
+# The next step, and what a run carries along.
 
 
 @dataclass(frozen=True, eq=False)
-class Memory:
-    """What a step leaves to the next one, beside what it reports.
+class Plan:
+    """What comes after a step, as its last solves see it; n stations as of the step.
 
     Attributes
     ----------
-    law_rate : tuple of (f,) arrays, length/cycle
-        Rates before the threshold is applied: the cycles of a step that ends below it are finite.
-    length : tuple of float, length
-        Length of each crack inside the body; in 3D its area over the length of its fronts.
-    pending : tuple of (f,) arrays, length
-        Growth too short to be modelled yet.
-    radius : float, length, or None
-        Enriched radius of the first step.
-    reuse : SolverState
-        What the next solve starts from, without matrices.
+    sigma : float, length
+        Where it begins, from where the history of the solves does.
+    length : float, length
+        Of σ: largest advance of any end.
+    cycles : float
+        That it takes.
+    arc : (n,) array, length
+        How far each station comes.
+    move : (n, d) array, length
+        From where to where each comes.
+    moves : (n,) array of bool
+        Stations that move in the mesh; the others wait.
+    cell : (n,) array, length
+        Size of the cells at the stations.
+    tip : int
+        Row of the station that drives.
+    largest : float, length
+        Advance asked for there; 0 where nothing can grow.
+    cracks : tuple of Crack
+        As they will be: those that meet are joined.
+    apart : tuple of Crack
+        The same before they join; none where none do.
+    part : float
+        Of the advance that is made: fronts that meet end it.
+    error : float
+        Estimated error of the cycles, where they follow from a gap that closes.
+    joins : tuple of Join
+    limit : str
+        Why it cannot be taken: "arrest", "short" or "geometry"; empty where it can.
+    refusal : str
+        The same in words.
+    """
+
+    sigma: float
+    length: float
+    cycles: float
+    arc: Floats
+    move: Floats
+    moves: Bools
+    cell: Floats
+    tip: int
+    largest: float
+    cracks: tuple[Crack, ...]
+    apart: tuple[Crack, ...] = ()
+    part: float = 1.0
+    error: float = 0.0
+    joins: tuple[Join, ...] = ()
+    limit: str = ""
+    refusal: str = ""
+
+    @property
+    def end(self) -> float:
+        """σ at its end, length."""
+        return self.sigma + self.length
+
+
+@dataclass(frozen=True, eq=False)
+class StepControl:
+    """How long the next step may be.
+
+    Attributes
+    ----------
+    length : float, length
+        Largest advance of any tip; inf where no tolerance was asked for.
+    error : float or None
+        `step_error` of the last step; None where there is none, as before the first.
+    least : float, length
+        Shortest step that the cells at the fastest tip allow.
+    """
+
+    length: float = np.inf
+    error: float | None = None
+    least: float = 0.0
+
+    @property
+    def can_shorten(self) -> bool:
+        """Whether the cells leave room for a shorter step."""
+        return self.length > 1.001 * self.least
+
+
+@dataclass(frozen=True, eq=False)
+class RunState:
+    """What a run carries along from step to step, beside its cracks and rates.
+
+    Attributes
+    ----------
     settings : mapping of str to str
         What the run was asked to do.
+    reuse : SolverState
+        What the next solve starts from, without matrices.
+    radius : float, length, or None
+        Enriched radius of the first step.
     mesh : str
         Fingerprint of the mesh of a run with a tolerance; empty where none was asked for.
     meshes : int
         Number of meshes that the tolerance has made; 0 on the one as given.
-    trail : Trail or FrontTrail, optional
-        What an integrator of second order remembers of the last solves.
     """
 
-    law_rate: PerCrack
-    length: tuple[float, ...]
-    pending: PerCrack
-    radius: float | None
-    reuse: SolverState
     settings: Mapping[str, str]
-    trail: Trail | FrontTrail | None = None
+    reuse: SolverState
+    radius: float | None = None
     mesh: str = ""
     meshes: int = 0
 
@@ -407,6 +311,19 @@ class StepError:
         return steps + self.K_place
 
 
+_MADE_BY_GROW = {
+    "error": StepError,
+    "identities": Identities,
+    "stations": GrowthStations,
+    "solves": SolveHistory,
+    "zones": OverloadZones,
+    "earlier_zones": OverloadZones,
+    "control": StepControl,
+    "plan": Plan,
+    "run": RunState,
+}
+
+
 @dataclass(frozen=True, eq=False)
 class Step:
     """One state of the cracks during growth.
@@ -420,7 +337,7 @@ class Step:
     cracks : tuple of Crack
         As they were solved: K, angle, rates and the solutions belong to these.
     sif : tuple of tuple of SIF
-        ``sif[state][crack]``; states in the order of `Cycle.load_states`: the minimum of a
+        ``sif[state][crack]``; states in the order of `states`: the minimum of a
         ``Cycle(min, max)`` first, then its maximum.
     angle, dK_eq, R, rate, da : tuple of (f,) arrays
         One array a crack: kink angle (rad), equivalent range (stress √length), ratio, growth a
@@ -429,8 +346,6 @@ class Step:
         still shorter than a tenth of a cell: it waits).
     solutions : tuple of Solution
         One for each load state; empty in a step that was read from disk.
-    memory : Memory, optional
-        What the next step needs.
     levels : tuple of float
         Factors of the load states of a spectrum of factors, in the order of `sif`.
     corrected : tuple of Crack
@@ -445,6 +360,30 @@ class Step:
         step is the last one: it ends there, and has no K.
     joins : tuple of Join
         Cracks that became one since the step before.
+    states : tuple of str
+        Names of the load states, in the order of `sif`: those of a ``Cycle(min, max)``, and the
+        lowest and highest level of a spectrum, are "min" and "max".
+    law_rate : tuple of (f,) arrays, length/cycle
+        Rates before the threshold is applied: the cycles of a step that ends below it are finite.
+        `rate`, where it is left out.
+    R_range : tuple of (f, 2) arrays
+        Smallest and largest ratio of all cycles of a block; of one cycle both are R.
+    sizes : tuple of float, length
+        Length of each crack inside the body; in 3D its area over the length of its fronts.
+    identities : Identities, optional
+        Which tips, fronts and cracks of other steps these are.
+    stations : GrowthStations, optional
+        The ends of `corrected`, from which growth goes on.
+    solves : SolveHistory, optional
+        What the last solves say at these.
+    zones, earlier_zones : OverloadZones, optional
+        What overloads have left there, and where the last step began.
+    control : StepControl
+        How long the next step may be.
+    plan : Plan, optional
+        The next step; none where the run ends.
+    run : RunState, optional
+        What the run carries along.
 
     Raises
     ------
@@ -462,13 +401,24 @@ class Step:
     rate: PerCrack
     da: PerCrack
     solutions: tuple[Solution, ...] = ()
-    memory: Memory | None = None
     levels: tuple[float, ...] = ()
     corrected: tuple[Crack, ...] = ()
     error: StepError | None = None
     warnings: tuple[str, ...] | None = None
     arrivals: tuple[Arrival, ...] = ()
     joins: tuple[Join, ...] = ()
+    states: tuple[str, ...] = ()
+    law_rate: PerCrack = ()
+    R_range: PerCrack = ()
+    sizes: tuple[float, ...] = ()
+    identities: Identities | None = None
+    stations: GrowthStations | None = None
+    solves: SolveHistory | None = None
+    zones: OverloadZones | None = None
+    earlier_zones: OverloadZones | None = None
+    control: StepControl = field(default_factory=StepControl)
+    plan: Plan | None = None
+    run: RunState | None = None
 
     def __post_init__(self) -> None:
         whole_number(self.index, "Step: index", least=0)
@@ -495,10 +445,6 @@ class Step:
                     f"makes them."
                 )
         object.__setattr__(self, "joins", checked_joins(self.joins, "Step: joins"))
-        if not isinstance(self.error, StepError | None):
-            raise ProblemError(
-                f"Step: error = {value_text(self.error)}: that is made by grow: leave it out."
-            )
         if self.warnings is not None:
             messages = entries(self.warnings, "Step: warnings")
             if not all(isinstance(message, str) for message in messages):
@@ -520,10 +466,30 @@ class Step:
                 f"Step: K, angle, dK_eq, R, rate and da have {counts} values for {n} cracks: give "
                 "one for each tip, or place along a front, of each crack."
             )
-        if not isinstance(self.memory, Memory | None):
+        self._check_parts_of_grow(counts[0])
+
+    def _check_parts_of_grow(self, counts: Sequence[int | None]) -> None:
+        """What `grow` adds to a step, and nobody else has to give."""
+        names = entries(self.states, "Step: states") or tuple(map(str, range(len(self.sif))))
+        if len(names) != len(self.sif) or not all(isinstance(name, str) for name in names):
             raise ProblemError(
-                f"Step: memory = {value_text(self.memory)}: that is made by grow: leave it out."
+                f"Step: states = {value_text(self.states)}: give a name for each row of sif."
             )
+        object.__setattr__(self, "states", names)
+        numbers(self.sizes, "Step: sizes", (None,))
+        left_out = {"law_rate": self.rate, "R_range": [np.stack([R, R], axis=-1) for R in self.R]}
+        for name, columns in (("law_rate", ()), ("R_range", (2,))):
+            parts = entries(getattr(self, name), f"Step: {name}") or tuple(left_out[name])
+            object.__setattr__(self, name, parts)
+            rows = counts if len(parts) == len(counts) else [None] * len(parts)
+            for part, n in zip(parts, rows, strict=True):
+                numbers(part, f"Step: {name}", (n, *columns), finite=False)
+        for name, kind in _MADE_BY_GROW.items():
+            value = getattr(self, name)
+            if not (isinstance(value, kind) or (value is None and name != "control")):
+                raise ProblemError(
+                    f"Step: {name} = {value_text(value)}: that is made by grow: leave it out."
+                )
 
     def _repr_html_(self) -> str:
         parts = zip(self.angle, self.dK_eq, self.R, self.rate, self.da, strict=True)
@@ -551,144 +517,75 @@ class Step:
         """Whether all tips have left the body: the last step of a run, which has no K."""
         return self.index > 0 and not self.n_tips
 
+    @property
+    def counts(self) -> list[int]:
+        """Number of stations of each crack at which K was solved."""
+        return [len(a) for a in self.angle]
 
-def memory_of(step: Step) -> Memory:
-    """What a step left to the next one."""
-    if step.memory is None:
-        raise ProblemError(f"step {step.index} carries no memory: it was not made by grow.")
-    return step.memory
+    def end_name(self, crack: int, number: int) -> str:
+        """Name of a tip, in 3D of a front, by its numbers in this step: "left tip of crack 2"."""
+        if self.identities is None:
+            word = "tip" if self.cracks[crack].fronts is None else "front"
+            return f"{word} {number} of crack {crack}"
+        return self.identities.name_of(crack, number)
 
 
-def directions(step: Step, c: int) -> Floats:
-    """Unit vectors `(f, d)` along which the places of crack c advance."""
-    frame, beta = step.sif[0][c].frame, step.angle[c][:, None]
-    return np.asarray(np.cos(beta) * frame[:, 0] + np.sin(beta) * frame[:, 1])
+def run_state(step: Step) -> RunState:
+    """What a run has carried along to a step."""
+    if step.run is None:
+        raise _not_made_by_grow(step)
+    return step.run
+
+
+def solves_of(step: Step) -> tuple[GrowthStations, SolveHistory]:
+    """The stations from which growth goes on, and what the last solves say there."""
+    if step.stations is None or step.solves is None:
+        raise _not_made_by_grow(step)
+    return step.stations, step.solves
+
+
+def plan_of(step: Step) -> Plan:
+    """The plan of what comes after a step."""
+    if step.plan is None:
+        raise _not_made_by_grow(step)
+    return step.plan
+
+
+def _not_made_by_grow(step: Step) -> ProblemError:
+    return ProblemError(f"step {step.index} was not made by grow: nothing goes on from it.")
+
+
+def growth_directions(step: Step, c: int) -> Floats:
+    """Unit vectors `(f, d)` along which the stations of crack c advance."""
+    return directions(step.sif[0][c].frame, step.angle[c])
 
 
 def moved_places(step: Step, c: int) -> Floats:
-    """Where the tips, or the places along fronts, of crack c have come to `(f, d)`."""
-    return np.asarray(step.sif[0][c].x + step.da[c][:, None] * directions(step, c))
+    """Where the tips, or the stations along fronts, of crack c have come to `(f, d)`."""
+    return np.asarray(step.sif[0][c].x + step.da[c][:, None] * growth_directions(step, c))
 
 
-# What cracks have become that met during an advance.
-
-
-@dataclass(frozen=True, eq=False)
-class Joined:
-    """Cracks after an advance in which some of them have joined.
-
-    Attributes
-    ----------
-    cracks : tuple of Crack
-        Those that are left, not placed again.
-    apart : tuple of Crack
-        The same before they joined.
-    joins : tuple of Join
-    way : float
-        Share of the whole advance that they have come.
-    cycles : float
-        Of the advance.
-    error : float
-        Estimated error of these.
-    """
-
-    cracks: tuple[Crack, ...]
-    apart: tuple[Crack, ...]
-    joins: tuple[Join, ...]
-    way: float
-    cycles: float
-    error: float
-
-
-# Which cracks of the steps of a run are one crack, over the joins between them.
-
-
-def lineage(steps: Sequence[Step], crack: int) -> list[list[int]]:
-    """Numbers in each step of a crack, and of all cracks that it joins in the end.
-
-    Parameters
-    ----------
-    steps : sequence of Step
-    crack : int
-        Number in the first step.
-
-    Returns
-    -------
-    list of list of int
-    """
-    number = [
-        numbers_after(len(one.cracks), other.joins, len(other.cracks))
-        for one, other in zip(steps, steps[1:])
-    ]
-    last = crack
-    for after in number:
-        last = after[last]
-    rows = [[last]]
-    for after in reversed(number):
-        rows.append([c for c, now in enumerate(after) if now in rows[-1]])
-    return rows[::-1]
-
-
-def identities(steps: Sequence[Step]) -> list[list[int]]:
-    """For each crack of each step, its number in the first step: of joined cracks the smallest."""
-    result = [list(range(len(steps[0].cracks)))] if steps else []
-    for one, other in zip(steps, steps[1:]):
-        number = numbers_after(len(one.cracks), other.joins, len(other.cracks))
-        result.append([
-            min(name for name, now in zip(result[-1], number, strict=True) if now == c)
-            for c in range(len(other.cracks))
-        ])  # fmt: skip
-    return result
-
-
-def tip_identities(steps: Sequence[Step]) -> list[list[list[int]]]:
-    """For each tip of each crack of each step in 2D, its number among all tips of the first step.
-
-    A tip is the one that was to advance to where it is: numbers of tips change where cracks join
-    and where a tip leaves the body.
-    """
-    result: list[list[list[int]]] = []
-    known: list[int] = []
-    places = np.zeros((0, 2))
-    for step in steps:
-        x = [tips.x for tips in step.sif[0]] if step.sif else []
-        flat = np.concatenate([np.zeros((0, 2)), *x])
-        if not result:
-            names = list(range(len(flat)))
-        else:
-            names = [-1] * len(flat)
-            distance = np.linalg.norm(flat[:, None] - places, axis=2)
-            for _ in range(min(distance.shape)):
-                i, k = np.unravel_index(np.argmin(distance), distance.shape)
-                names[int(i)] = known[int(k)]
-                distance[i], distance[:, k] = np.inf, np.inf
-        known = names
-        ahead = [moved_places(step, c) for c in range(len(x))]
-        places = np.concatenate([np.zeros((0, 2)), *ahead])
-        ends = np.cumsum([len(each) for each in x]).tolist()
-        result.append([names[end - len(each) : end] for end, each in zip(ends, x, strict=True)])
-    return result
+def place_name(step: Step, c: int, j: int) -> str:
+    """Name of a tip, or of a place along a front, of crack c in a message."""
+    words = "tip" if step.cracks[c].fronts is None else "front place"
+    return f"crack {c}, {words} {j} at {coordinates(step.sif[0][c].x[j])}"
 
 
 __all__ = [
-    "LEAST",
-    "Advance",
     "Arrival",
-    "Arriving",
-    "Cycle",
+    "Event",
     "Join",
-    "Joined",
-    "Memory",
-    "PerCrack",
+    "Plan",
+    "RunState",
     "Step",
+    "StepControl",
     "StepError",
     "checked_joins",
-    "directions",
-    "identities",
-    "lineage",
-    "memory_of",
+    "growth_directions",
     "moved_places",
     "numbers_after",
-    "plan_advance",
-    "tip_identities",
+    "place_name",
+    "plan_of",
+    "run_state",
+    "solves_of",
 ]

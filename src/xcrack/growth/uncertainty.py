@@ -9,8 +9,9 @@ import numpy as np
 from xcrack.base.arrays import Bools, Floats
 from xcrack.base.errors import collected_warnings
 from xcrack.fatigue.spectrum import Spectrum
+from xcrack.growth.corrected import Corrected
 from xcrack.growth.options import GrowthRule
-from xcrack.growth.rates import Evaluation, Settled, asked_of, rates_of
+from xcrack.growth.rates import Rates, criterion_inputs, rates_of
 from xcrack.growth.response import Answers
 from xcrack.growth.step import Step
 from xcrack.sif.sif import SIF
@@ -65,7 +66,7 @@ class RateError:
     turn: float
 
 
-def rate_error(run: GrowthRule, seen: Evaluation, sif: Answers) -> RateError:
+def rate_error(rule: GrowthRule, rates: Rates, sif: Answers) -> RateError:
     """How much rates and directions change as K moves within its bars.
 
     Each mode in turn is moved by its bar, up and down, in all states at once, and the changes are
@@ -74,20 +75,20 @@ def rate_error(run: GrowthRule, seen: Evaluation, sif: Answers) -> RateError:
 
     Parameters
     ----------
-    run : GrowthRule
-    seen : Evaluation
+    rule : GrowthRule
+    rates : Rates
         By the best K.
     sif : sequence of sequence of SIF
         With bars.
     """
-    bar = [_stacked(sif, c, lambda s: s.bar) for c in range(len(seen.cracks))]
-    own = [_stacked(sif, c, _contact_part) for c in range(len(seen.cracks))]
+    bar = [_stacked(sif, c, lambda s: s.bar) for c in range(len(rates.cracks))]
+    own = [_stacked(sif, c, _contact_part) for c in range(len(rates.cracks))]
     known = np.concatenate([np.isfinite(b).all(axis=(0, 2)) for b in bar])
     surface = np.concatenate([crack.at_surface for crack in sif[0]])
-    rate, angle = np.concatenate(seen.law_rate), np.concatenate(seen.angle)
+    rate, angle = rates.law_rate, rates.angle
     n = len(rate)
     total, contact, turn = np.zeros(n), np.zeros(n), np.zeros(n)
-    answer = _answers(run, seen)
+    answer = _answers(rule, rates)
     for mode in range(sif[0][0].K.shape[1] if sif and sif[0] else 0):
         change, turned = np.zeros(n), np.zeros(n)
         for sign in (1.0, -1.0):
@@ -107,23 +108,23 @@ def rate_error(run: GrowthRule, seen: Evaluation, sif: Answers) -> RateError:
 
 
 def add_K_error(
-    run: GrowthRule, last: Step | None, settled: Settled, seen: Evaluation, sif: Answers
-) -> Settled:
+    rule: GrowthRule, last: Step | None, corrected: Corrected, rates: Rates, sif: Answers
+) -> Corrected:
     """A settled step whose error also has what the bars of K have cost so far."""
-    if not run.estimates or settled.error is None:
-        return settled
-    now = rate_error(run, seen, sif)
+    if not rule.estimates or corrected.error is None:
+        return corrected
+    now = rate_error(rule, rates, sif)
     if last is None or last.error is None:
-        error = replace(settled.error, K=0.0, contact=0.0, unknown=0.0, K_place=0.0, grown=0.0)
+        error = replace(corrected.error, K=0.0, contact=0.0, unknown=0.0, K_place=0.0, grown=0.0)
     else:
-        before, cycles = last.error, settled.cycles - last.cycles
-        rates, parts = [before.rate, now.rate], [before.rate_contact, now.contact]
+        before, cycles = last.error, corrected.cycles - last.cycles
+        both, parts = [before.rate, now.rate], [before.rate_contact, now.contact]
         turns = [turn for turn in (before.turn, now.turn) if np.isfinite(turn)]
         way = max((float(da.max(initial=0.0)) for da in last.da), default=0.0)
-        of_K = [rate - part for rate, part in zip(rates, parts) if np.isfinite(rate)]
-        of_contact = [part for rate, part in zip(rates, parts) if np.isfinite(rate)]
+        of_K = [rate - part for rate, part in zip(both, parts) if np.isfinite(rate)]
+        of_contact = [part for rate, part in zip(both, parts) if np.isfinite(rate)]
         error = replace(
-            settled.error,
+            corrected.error,
             K=before.K + TOGETHER * 0.5 * cycles * sum(of_K),
             contact=before.contact + 0.5 * cycles * sum(of_contact),
             unknown=before.unknown + 0.5 * cycles * (2 - len(of_K)),
@@ -131,18 +132,18 @@ def add_K_error(
             grown=before.grown + way,
         )
     return replace(
-        settled, error=replace(error, rate=now.rate, rate_contact=now.contact, turn=now.turn)
+        corrected, error=replace(error, rate=now.rate, rate_contact=now.contact, turn=now.turn)
     )
 
 
-def shortfall(run: GrowthRule, last: Step) -> str:
+def shortfall(rule: GrowthRule, last: Step) -> str:
     """Why a tolerance is not met at a step, and what to do; empty where it is met."""
     error = last.error
-    if error is None or run.tolerance is None or not error.grown > 0:
+    if error is None or rule.tolerance is None or not error.grown > 0:
         return ""
     life = error.life / last.cycles if last.cycles > 0 else 0.0
     path = error.path / error.grown
-    if max(life, path) <= run.tolerance:
+    if max(life, path) <= rule.tolerance:
         return ""
     steps = error.path - error.K_place
     shares = {
@@ -156,33 +157,35 @@ def shortfall(run: GrowthRule, last: Step) -> str:
     reasons = dict.fromkeys(r for state in last.sif for sif in state for r in sif.reasons if r)
     why = f" ({'; '.join(reasons)})" if reasons and worst == "no bar" else ""
     return (
-        f"tolerance = {run.tolerance:g} is not met at step {last.index}: the life is known to "
+        f"tolerance = {rule.tolerance:g} is not met at step {last.index}: the life is known to "
         f"{life:.1e}, the path to {path:.1e} of the length grown, by {parts}. {_REMEDY[worst]}{why}"
     )
 
 
 def _answers(
-    run: GrowthRule, seen: Evaluation
+    rule: GrowthRule, rates: Rates
 ) -> Callable[[Sequence[Floats], int, float], tuple[Floats, Floats]]:
     """Directions and rates with one mode of K moved by its bars."""
-    if isinstance(run.cycle, Spectrum) or seen.free is not None:
-        return partial(_moved, run, seen)
+    if isinstance(rule.cycle, Spectrum) or rates.free is not None:
+        return partial(_moved, rule, rates)
     # Of a cycle, K of its states is all that changes.
-    asked = asked_of(run, seen.problem, seen.response)
+    inputs = criterion_inputs(rule, rates.problem, rates.response)
 
     def answer(bar: Sequence[Floats], mode: int, sign: float) -> tuple[Floats, Floats]:
         with collected_warnings([]):  # they are of cracks that nobody has
-            every = [one.answer(_moved_K(one.K, bar[c], mode, sign)) for c, one in enumerate(asked)]
+            every = [
+                own.rates_of_K(_moved_K(own.K, bar[c], mode, sign)) for c, own in enumerate(inputs)
+            ]
         return (
-            np.concatenate([angle for angle, _, _, _ in every]),
-            np.concatenate([rate for _, _, _, rate in every]),
+            np.concatenate([each.angle for each in every]),
+            np.concatenate([each.rate for each in every]),
         )
 
     return answer
 
 
 def _moved(
-    run: GrowthRule, seen: Evaluation, bar: Sequence[Floats], mode: int, sign: float
+    rule: GrowthRule, rates: Rates, bar: Sequence[Floats], mode: int, sign: float
 ) -> tuple[Floats, Floats]:
     """Directions and rates with one mode of K moved by its bars."""
 
@@ -196,12 +199,12 @@ def _moved(
         )
 
     free = None
-    if seen.free is not None:
-        free = replace(seen.free, sif=moved(seen.free.sif))
+    if rates.free is not None:
+        free = replace(rates.free, sif=moved(rates.free.sif))
     with collected_warnings([]):  # they are of cracks that nobody has
-        response = replace(seen.response, sif=moved(seen.sif))
-        angle, _, _, rate = rates_of(run, seen.problem, response, free)
-    return np.concatenate(angle), np.concatenate(rate)
+        response = replace(rates.response, sif=moved(rates.sif))
+        other = rates_of(rule, rates.problem, response, free)
+    return other.angle, other.law_rate
 
 
 def _with_K(sif: SIF, bar: Floats, mode: int, sign: float) -> SIF:

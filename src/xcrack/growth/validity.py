@@ -11,9 +11,8 @@ from xcrack.analysis.solution import Solution
 from xcrack.base.arrays import Floats, coordinates
 from xcrack.crack.crack import Crack
 from xcrack.crack.lines import crossing_points
-from xcrack.crack.measures import length_inside
+from xcrack.crack.measures import exit_ahead, length_inside
 from xcrack.fatigue.criteria import clipped_K, equivalent_K, kink_angle
-from xcrack.growth.follow_2d import exit_ahead
 from xcrack.mesh.mesh import Mesh
 from xcrack.model.elasticity import elasticity
 from xcrack.model.material import Material

@@ -15,6 +15,7 @@ from xcrack.base.errors import CoarseMeshError, ProblemError
 from xcrack.base.markup import Markup, element, join_parts, rim, sketch, table
 from xcrack.crack.crack import Crack
 from xcrack.crack.junctions import Junction
+from xcrack.crack.measures import crack_size
 from xcrack.crack.placing import check_cracks, junctions, on_others, place_crack
 from xcrack.crack.stations import Stations, stations_of
 from xcrack.mesh.mesh import Mesh, warn_of_sets
@@ -184,6 +185,11 @@ class Problem:
     def stations(self) -> Stations:
         """Tips, in 3D vertices of the fronts, of the placed cracks inside the body."""
         return stations_of(self.placed, self.mesh)
+
+    @cached_property
+    def sizes(self) -> tuple[float, ...]:
+        """Size of each crack: its length in the body, in 3D its area over that of its fronts."""
+        return tuple(crack_size(crack, self.mesh) for crack in self.placed)
 
     @cached_property
     def junctions(self) -> tuple[Junction, ...]:

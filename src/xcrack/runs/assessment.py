@@ -15,7 +15,7 @@ from xcrack.base.checks import call_function, number, numbers, value_text, whole
 from xcrack.base.errors import ProblemError
 from xcrack.base.paths import path_of, system_errors, written_whole
 from xcrack.fatigue.criteria import clipped_K, equivalent_K
-from xcrack.growth.step import Step, identities
+from xcrack.growth.step import Step
 from xcrack.growth.validity import validity
 from xcrack.runs.history import History
 
@@ -156,7 +156,8 @@ def residual_strength(
         yields; of steps that have their solutions), by_link_up (plastic zones of two tips that face
         each other touch; inf where none do), by_collapse and by_line, nan where nothing was given
         for them; and factor, the smallest of them. Where there is an R-curve, by_toughness does
-        not count in it: stable extension may begin there.
+        not count in it: stable extension may begin there. Last, id: of the tip, in 3D the front,
+        with that K (`History.names`).
 
     Raises
     ------
@@ -200,15 +201,16 @@ def residual_strength(
     result = np.zeros(len(steps), dtype=_STRENGTH)
     for name in CRITERIA:
         result[name] = np.nan
-    names = identities(steps)
+    names = [_crack_numbers(step) for step in steps]
     for n, step in enumerate(steps):
         K = K_of_cracks(step, nu)
         c = int(np.argmax(K))
-        a = step.memory.length[c] if step.memory is not None else np.nan
+        a = step.sizes[c] if step.sizes else np.nan
         row = result[n]
         row["step"], row["N"], row["crack"], row["a"], row["K"] = (
             step.index, step.cycles, names[n][c], a, K[c]
         )  # fmt: skip
+        row["id"] = _end_with_largest_K(step, c, nu)
         by_K = tough / K[c] if K[c] > 0 else np.inf
         row["by_toughness"] = by_K
         if resistance is not None:
@@ -235,9 +237,24 @@ CRITERIA = (
 """Columns of `residual_strength` that are factors by one criterion each."""
 
 _STRENGTH = [
-    (name, int if name == "crack" else float)
-    for name in ("step", "N", "crack", "a", "K", *CRITERIA, "factor")
+    (name, int if name in ("crack", "id") else float)
+    for name in ("step", "N", "crack", "a", "K", *CRITERIA, "factor", "id")
 ]
+
+
+def _crack_numbers(step: Step) -> list[int]:
+    """Number that each crack of a step had at first."""
+    known = step.identities
+    return list(range(len(step.cracks))) if known is None else list(known.cracks)
+
+
+def _end_with_largest_K(step: Step, c: int, nu: float) -> int:
+    """Identity of the tip or front of a crack that has its largest K_eq; -1 without any."""
+    K = _equivalent(step, c, nu)
+    if not len(K):
+        return -1
+    number = int(step.sif[0][c].front[int(np.argmax(K))])
+    return number if step.identities is None else step.identities.ends[c][number]
 
 
 def K_of_cracks(step: Step, nu: float) -> list[float]:
@@ -265,11 +282,11 @@ def _by_resistance(
     c = crack
     for step, own in zip(steps, names, strict=True):
         met = a and any(c in join.cracks for join in step.joins)
-        if met or names[0][crack] not in own or step.memory is None:
+        if met or names[0][crack] not in own or not step.sizes:
             break
         c = own.index(names[0][crack])
-        a.append(step.memory.length[c] / max(len(step.angle[c]), 1) if step.cracks[c].dim == 2
-                 else step.memory.length[c])  # fmt: skip
+        tips = max(len(step.angle[c]), 1) if step.cracks[c].dim == 2 else 1
+        a.append(step.sizes[c] / tips)
         K.append(K_of_cracks(step, nu)[c])
     if not a or not all(np.isfinite(a)):
         return np.nan
@@ -356,7 +373,7 @@ def geometry_factors(history: History, *, stress: float) -> NDArray[Any]:
     for step in history.steps:
         for c, crack in enumerate(step.cracks):
             sif, tips = step.sif[-1][c], 1 if crack.fronts is not None else len(step.angle[c])
-            length = np.nan if step.memory is None else step.memory.length[c]
+            length = step.sizes[c] if step.sizes else np.nan
             for place in np.unique(sif.front):
                 K = float(sif.K[sif.front == place, 0].max())
                 a = length / max(tips, 1)

@@ -24,9 +24,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xcrack.base.checks import flag, value_text, whole_number
+from xcrack.base.description import describe, differences
 from xcrack.base.errors import ProblemError, XcrackError, warn
 from xcrack.base.paths import path_of, system_errors, written_whole
-from xcrack.growth.description import describe, differences
 from xcrack.runs.history import History
 from xcrack.runs.lock import lock_folder
 

@@ -7,23 +7,23 @@ from pathlib import Path
 from typing import Any, Unpack
 
 from xcrack.base.checks import call_function, flag, value_text
+from xcrack.base.description import differences, only_compiled_differently
 from xcrack.base.errors import ProblemError, warn
 from xcrack.base.paths import path_of, system_errors
 from xcrack.fatigue.criteria import Criterion
+from xcrack.fatigue.cycle import Cycle
 from xcrack.fatigue.law import Law
 from xcrack.fatigue.spectrum import Spectrum
-from xcrack.growth.description import differences, only_compiled_differently
 from xcrack.growth.options import GrowthOptions, GrowthRule, lists_options, run_of
-from xcrack.growth.run import steps_of
-from xcrack.growth.step import Cycle, Step
+from xcrack.growth.run import growth_steps
+from xcrack.growth.step import Step
 from xcrack.mesh.mesh import Mesh
 from xcrack.model.problem import Problem
 from xcrack.runs import run_folder
 from xcrack.runs.history import History
 from xcrack.runs.lock import lock_folder
-from xcrack.runs.run_folder import RunHeader
-from xcrack.runs.run_store import RunStore
-from xcrack.runs.saved import read_body, read_saved
+from xcrack.runs.run_folder import RunHeader, RunStore
+from xcrack.runs.saved import read_saved
 from xcrack.runs.versions import versions
 
 Until = Callable[[Step], bool]
@@ -165,22 +165,22 @@ def resume(
         header, damaged = run_folder.read_header(folder)
         if header is None:  # killed before its first step
             collection.store = RunStore(folder, check)
-            return collection.of(steps_of(run))
-        run = _as_begun(run, header, folder)
+            return collection.of(growth_steps(run))
+        _check_settings(run, header, folder)
         stored = run_folder.read_steps(folder, header)
         if stored.rest or damaged is not None:
             _move_aside(folder, stored, damaged)
         header = replace(header, ended="")
         run_folder.write_header(folder, header)
         collection.taken.extend(stored.steps)
-        memory = stored.steps[0].memory if stored.steps else None
-        collection.store = RunStore(folder, check, header, "" if memory is None else memory.mesh)
+        first = stored.steps[0].run if stored.steps else None
+        collection.store = RunStore(folder, check, header, "" if first is None else first.mesh)
         meshes: list[Mesh] = []
         if run.tolerance is not None and stored.steps:
-            bodies = (read_body(path) for path in run_folder.body_files(folder))
-            meshes = [body.mesh for body in bodies if body is not None]
+            every = map(run_folder.read_mesh_file, run_folder.mesh_files(folder))
+            meshes = [mesh for mesh in every if mesh is not None]
             collection.mesh = _last_mesh(folder, stored.steps) or problem.mesh
-        return collection.of(steps_of(run, stored.steps, meshes))
+        return collection.of(growth_steps(run, stored.steps, meshes))
 
 
 def load(path: str | Path) -> Any:
@@ -233,10 +233,9 @@ def load(path: str | Path) -> Any:
 
 def _last_mesh(folder: Path, steps: Sequence[Step]) -> Mesh | None:
     """The mesh of the last step of a run, where it is stored."""
-    memories = [step.memory for step in steps if step.memory is not None]
-    other = bool(memories) and memories[-1].mesh != memories[0].mesh
-    body = read_body(run_folder.body_path(folder, memories[-1].mesh if other else ""))
-    return None if body is None else body.mesh
+    names = [step.run.mesh for step in steps if step.run is not None]
+    other = bool(names) and names[-1] != names[0]
+    return run_folder.read_mesh_file(run_folder.mesh_path(folder, names[-1] if other else ""))
 
 
 @dataclass
@@ -290,7 +289,7 @@ class Collector:
                 raise ProblemError(
                     f"collect: {value_text(step)} is not a Step: give what grow returns."
                 )
-            has_own = step.memory is not None and bool(step.memory.mesh)
+            has_own = step.run is not None and bool(step.run.mesh)
             if step.solutions and (self.mesh is None or has_own):
                 self.mesh = step.solutions[0].problem.mesh
             self.taken.append(step if self.keep_solutions else replace(step, solutions=()))
@@ -336,15 +335,14 @@ def _is_interrupt(error: BaseException) -> bool:
     return isinstance(error, SystemError) and before is not None and _is_interrupt(before)
 
 
-def _as_begun(run: GrowthRule, header: RunHeader, folder: Path) -> GrowthRule:
-    """The run with the defaults of a stored one, whose settings must be the same."""
-    run = run.as_begun(header.settings)
+def _check_settings(run: GrowthRule, header: RunHeader, folder: Path) -> None:
+    """Refuse to go on with a run of other settings; warn of other versions."""
     settings, current_versions = run.settings, versions()
     compiled: list[str] = []
     if header.versions.get("python") != current_versions["python"]:
         compiled = only_compiled_differently(header.settings, settings)
     given = {**settings, **{key: header.settings[key] for key in compiled}}
-    lines = differences(header.settings, given)
+    lines = differences(header.settings, given, run.default_settings)
     if lines:
         raise ProblemError(
             f"the run in {folder} was made with other settings: {_first_differences(lines)}. Give "
@@ -357,8 +355,6 @@ def _as_begun(run: GrowthRule, header: RunHeader, folder: Path) -> GrowthRule:
             f"the run in {folder} was made with other versions, on another processor or with "
             f"other threads, its last bits may differ: {_first_differences(lines)}."
         )
-    # What is stored stands for the run, however another python compiles its functions.
-    return run
 
 
 def _refuse_stored(folder: Path) -> None:

@@ -3,6 +3,7 @@
 import csv
 import io
 from collections import Counter
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -100,11 +101,22 @@ class History:
     @property
     def unit(self) -> str:
         """What N counts: cycles, or repetitions of a spectrum by their name."""
-        memory = self.steps[0].memory if self.steps else None
-        settings = {} if memory is None else memory.settings
+        settings = self.settings
         if settings.get("cycle") != "Spectrum":
             return "cycle"
         return settings.get("cycle.unit", "'block'").strip("'")
+
+    @property
+    def settings(self) -> Mapping[str, str]:
+        """What the run was asked to do, as text by name; empty where it is not known."""
+        run = self.steps[0].run if self.steps else None
+        return {} if run is None else run.settings
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of all tips, in 3D fronts, by their identity: the column ``id`` of `table`."""
+        known = [step.identities for step in self.steps if step.identities is not None]
+        return known[-1].names if known else ()
 
     @property
     def warnings(self) -> dict[str, int]:
@@ -169,18 +181,22 @@ class History:
         Returns
         -------
         structured array
-            Columns step, N, crack, tip; x, y of the tip; a (length of its crack inside the body);
-            K_I, K_II of load state 0 as ``K_I_0`` and so on, then of state 1, ...; spread (largest
-            difference of K between two domains, of all states and modes); domain_cells (smallest
-            radius of these domains, in cells, where K has it); bar (longest error bar of K), best
-            (1 where growth followed the best K of all states, 0 where it followed K) and N_bar
-            (error bar of N), where K has bars; angle, dK_eq, R, rate, da
-            as in `Step`. A step at which no tip is left has a row for each `Arrival`, x and y where
-            it is, and nan for K and what follows from it. In 3D ``front`` stands for ``tip``, x, y,
-            z is the middle of the front and a the area of the crack over the length of its fronts;
-            each K, K_III among them, and each of the others has three columns, its smallest value
-            along the front, its mean over the length and its largest: ``K_I_0_min``,
-            ``K_I_0_mean``, ``K_I_0_max``.
+            Columns step, N, crack, tip (numbers in the step); id (the same tip through the run,
+            called ``names[id]``); x, y of the tip; a (length of its crack inside the body); K_I,
+            K_II of each load state by its name in `Step.states`: ``K_I_min``, ``K_II_min``,
+            ``K_I_max``, ``K_II_max`` of a ``Cycle(min, max)``, ``K_I_0`` and so on of states in a
+            list, and under a spectrum the levels between the lowest and the highest by number;
+            spread (largest difference of K between two domains, of all states and modes);
+            domain_cells (smallest radius of these domains, in cells, where K has it); bar (longest
+            error bar of K), best (1 where growth followed the best K of all states, 0 where it
+            followed K) and N_bar (error bar of N), where K has bars; angle, dK_eq, R as in `Step`,
+            R_low and R_high (smallest and largest ratio of all cycles, under a spectrum), rate, da.
+            A step at which no tip is left has a row for each `Arrival`, x and y where it is, and
+            nan for K and what follows from it. In 3D ``front`` stands for ``tip``, x, y, z is the
+            middle of the front and a the area of the crack over the length of its fronts; each K,
+            K_III among them, and each of the others has three columns, its smallest value along the
+            front, its mean over the length and its largest: ``K_I_max_min``, ``K_I_max_mean``,
+            ``K_I_max_max``. Another column than these is a `ProblemError` that lists them.
         """
         rows = table(self.steps)
         if not flag(measures, "History.table: measures"):

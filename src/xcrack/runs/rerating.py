@@ -12,12 +12,12 @@ from xcrack.base.checks import call_function, number, numbers, value_text
 from xcrack.base.errors import ProblemError
 from xcrack.fatigue.checks import evaluate_criterion, evaluate_law
 from xcrack.fatigue.criteria import Criterion
+from xcrack.fatigue.cycle import cycles_between
 from xcrack.fatigue.law import Law
 from xcrack.fatigue.spectrum import Spectrum, distinct
-from xcrack.growth.block import pairs_of_states
-from xcrack.growth.cycles import cycles_between
 from xcrack.growth.levels import LevelTable
-from xcrack.growth.step import Step, memory_of, moved_places, numbers_after
+from xcrack.growth.rates import pairs_of_states
+from xcrack.growth.step import Step, moved_places, numbers_after
 from xcrack.growth.uncertainty import best_K
 
 # Ranges and ratios of all cycles of a spectrum, from K at the levels that a step has stored.
@@ -233,7 +233,12 @@ def driving_forces(steps: Sequence[Step], block: SpectrumBlock | None = None) ->
     """
     if len(steps) < 2:
         raise ProblemError(f"the history has {len(steps)} steps: a life needs two, at least.")
-    if any(key.startswith("retardation") for key in memory_of(steps[0]).settings):
+    if not all(step.sizes for step in steps):
+        raise ProblemError(
+            "the history has steps without sizes of their cracks: give Step(..., sizes=...)."
+        )
+    first = steps[0].run
+    if first is not None and first.settings.get("retardation", "None") != "None":
         raise ProblemError(
             "the history was grown with retardation: its cycles do not follow from its rates. Grow "
             "without it, and take the model along that path by retarded, or life(retardation=...)."
@@ -297,22 +302,21 @@ def _numbers(step: Step, after: Step) -> list[int]:
 
 
 def _of_step(number: int, step: Step, after: Step) -> list[tuple[float, ...]]:
-    before, later = memory_of(step), memory_of(after)
     ligament = {(arrival.crack, arrival.tip): arrival.ligament for arrival in after.arrivals}
     rows = []
     joined = {c for join in after.joins for c in join.cracks}
     for c, now in enumerate(_numbers(step, after)):
-        da, rate = step.da[c], before.law_rate[c]
+        da, rate = step.da[c], step.law_rate[c]
         grows = np.nonzero((da > 0) & (rate > 0))[0]
         if not len(grows):
             continue
         moved, there = moved_places(step, c), after.sif[0][now].x
         for j in grows.tolist():
-            a, way = before.length[c] * float(da[j] / da.sum()), float(da[j])
-            first = _values(step, c, j, a, before.length[c])
+            a, way = step.sizes[c] * float(da[j] / da.sum()), float(da[j])
+            first = _values(step, c, j, a, step.sizes[c])
             distance, k = cKDTree(there).query(moved[j]) if len(there) else (np.inf, 0)
             if distance <= _NEAR_ADVANCE * da[j] and c not in joined:
-                last = _values(after, now, int(k), a + da[j], later.length[now])
+                last = _values(after, now, int(k), a + da[j], after.sizes[now])
             else:  # it has left the body, or joined another crack: its rate stays what it was
                 way = ligament.get((c, j), way)
                 k, last = -1, (a + way, *first[1:])
@@ -329,7 +333,7 @@ def _values(step: Step, c: int, j: int, a: float, length: float) -> tuple[float,
     spread = np.stack([state[c].spread[j] for state in step.sif])
     largest = int(np.argmax(np.abs(K).max(axis=1)))
     share = spread[largest].max() / max(np.abs(K[largest]).max(), np.finfo(float).tiny)
-    dK, R, rate = (x[c][j] for x in (step.dK_eq, step.R, memory_of(step).law_rate))
+    dK, R, rate = (x[c][j] for x in (step.dK_eq, step.R, step.law_rate))
     return float(a), float(dK), float(R), float(rate), length / tips, float(share)
 
 

@@ -1,41 +1,42 @@
 """The folder of a growth run: one file a step, and one that says what the run is.
 
-Each step also carries what the run is, so that a lost header is made again from the steps. What was
-finished is never deleted: files that do not belong to the run are moved into a folder beside them.
+Files hold plain arrays by name (`step_arrays`), and text: numpy alone reads them. Each step also
+carries what the run is, so that a lost header is made again from the steps. What was finished is
+never deleted: files that do not belong to the run are moved into a folder beside them.
 """
 
+import contextlib
 import json
 import re
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from xcrack.base.errors import ProblemError
+import numpy as np
+
+from xcrack.base.errors import ProblemError, XcrackError, warn
 from xcrack.base.paths import system_errors
-from xcrack.crack.crack import Crack
-from xcrack.fatigue.retardation import BlockCycles, CycleIntegration, OverloadZones
-from xcrack.growth.description import DEFAULTS
-from xcrack.growth.step import Arrival, Join, Memory, Step, StepError
-from xcrack.growth.trail import FrontTrail, Overloads, Places, StepControl, Trail
-from xcrack.linalg.engine import SlipField, SolverState
+from xcrack.growth.step import Step
+from xcrack.mesh.mesh import Mesh
 from xcrack.runs import lock
-from xcrack.runs.store import PART, load, save, write_whole
-from xcrack.sif.sif import SIF, KErrors, SurfaceEnd
+from xcrack.runs.step_arrays import (
+    arrays_of,
+    arrays_of_mesh,
+    mesh_of,
+    packed_arrays,
+    read_arrays,
+    step_of,
+)
+from xcrack.runs.store import PART, write_whole
+from xcrack.runs.versions import versions
 
 HEADER = "run.json"
 STEPS = "steps"  # folder of the run in that of the results of a case file
-BODY = "body.npz"
-_OTHER_BODY = "body_{}.npz"  # on a mesh that growth has asked for, by its fingerprint
-_FORMAT = 2
+MESH = "mesh.npz"
+FORMAT = 3
+_OTHER_MESH = "mesh_{}.npz"  # one that growth has asked for, by its fingerprint
 _STEP = re.compile(r"step_(\d{5,})\.npz")
-CLASSES: dict[str, type] = {
-    kind.__name__: kind for kind in (
-        Step, Memory, SolverState, SlipField, Crack, SIF, StepError, Trail, FrontTrail,
-        Places, Arrival, Join, Overloads, OverloadZones, BlockCycles, CycleIntegration,
-        StepControl, KErrors, SurfaceEnd,
-    )
-}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -45,7 +46,7 @@ class RunHeader:
     Attributes
     ----------
     settings : mapping of str to str
-        What the run was asked to do, and the number of its set of defaults.
+        What the run was asked to do.
     versions : mapping of str to str
     ended : str
         Why the run ended; empty while it goes on.
@@ -54,11 +55,6 @@ class RunHeader:
     settings: Mapping[str, str]
     versions: Mapping[str, str]
     ended: str = ""
-
-    @property
-    def defaults(self) -> int:
-        """Number of the set of defaults that the run began with."""
-        return int(self.settings["defaults"])
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,7 +92,7 @@ def write_header(folder: Path, header: RunHeader) -> None:
 def _content(header: RunHeader) -> dict[str, Any]:
     """What each file of a run says of it."""
     return {
-        "format": _FORMAT,
+        "format": FORMAT,
         "versions": dict(header.versions),
         "settings": dict(header.settings),
     }
@@ -113,22 +109,18 @@ def _header(content: Any, path: Path) -> RunHeader:
         It is not a file of a run.
     """
     written = content["format"]
-    if written < _FORMAT:
+    if written < FORMAT:
         raise ProblemError(
             f"{path} has format {written}, from before the first release, and this xcrack reads "
-            f"{_FORMAT}: start the run again in another folder."
+            f"{FORMAT}: start the run again in another folder."
         )
-    newer = ProblemError(
-        f"{path} was written by a newer xcrack (format {written}, this one reads {_FORMAT}): "
-        "update xcrack, or read the run with the version that wrote it."
-    )
-    if written > _FORMAT:
-        raise newer
+    if written > FORMAT:
+        raise ProblemError(
+            f"{path} was written by a newer xcrack (format {written}, this one reads {FORMAT}): "
+            "update xcrack, or read the run with the version that wrote it."
+        )
     settings, versions = ({**content[key]} for key in ("settings", "versions"))
-    header = RunHeader(settings, versions, str(content.get("ended", "")))
-    if header.defaults > DEFAULTS:
-        raise newer
-    return header
+    return RunHeader(settings, versions, str(content.get("ended", "")))
 
 
 def read_header(folder: Path) -> tuple[RunHeader | None, Path | None]:
@@ -172,15 +164,24 @@ def step_path(folder: Path, index: int) -> Path:
     return folder / f"step_{index:05d}.npz"
 
 
-def body_path(folder: Path, mesh: str) -> Path:
-    """File of the body on its first mesh, or on the one with a fingerprint."""
-    return folder / (_OTHER_BODY.format(mesh) if mesh else BODY)
+def mesh_path(folder: Path, name: str) -> Path:
+    """File of the first mesh, or of the one with a fingerprint."""
+    return folder / (_OTHER_MESH.format(name) if name else MESH)
 
 
-def body_files(folder: Path) -> list[Path]:
-    """All files of bodies: on the first mesh, and on others."""
+def mesh_files(folder: Path) -> list[Path]:
+    """All files of meshes: the first one, and others."""
     with system_errors("the run cannot be read from", folder, error=ProblemError):
-        return [folder / BODY, *sorted(folder.glob(_OTHER_BODY.format("*")))]
+        return [folder / MESH, *sorted(folder.glob(_OTHER_MESH.format("*")))]
+
+
+def read_mesh_file(path: Path) -> Mesh | None:
+    """A mesh of a run; None where it is not there, or not whole."""
+    arrays = read_arrays(path.read_bytes()) if path.is_file() else None
+    try:
+        return None if arrays is None else mesh_of(arrays)
+    except (KeyError, ProblemError):
+        return None
 
 
 def step_files(folder: Path) -> list[Path]:
@@ -199,11 +200,10 @@ def write_step(folder: Path, step: Step, header: RunHeader) -> None:
     ProblemError
         The system refuses: no space, no permission. The steps before are whole.
     """
-    memory = None if step.memory is None else replace(step.memory, settings={})
-    stored = {"run": _content(header), "step": replace(step, solutions=(), memory=memory)}
     path = step_path(folder, step.index)
+    content = {"run": np.array(json.dumps(_content(header))), **arrays_of(step)}
     try:
-        save(path, stored, CLASSES)
+        write_whole(path, packed_arrays(content))
     except OSError as error:
         before = f"The {step.index} steps before it are whole" if step.index else "No step is there"
         raise ProblemError(
@@ -229,22 +229,27 @@ def read_steps(folder: Path, header: RunHeader) -> StoredSteps:
         if own_header.settings != header.settings:
             fault = f"{path.name} belongs to another run"
             break
-        memory = None if step.memory is None else replace(step.memory, settings=header.settings)
-        steps.append(replace(step, memory=memory))
+        steps.append(step)
     return StoredSteps(tuple(steps), fault, tuple(reversed(files[len(steps) :])))
 
 
 def _read(path: Path) -> tuple[RunHeader | None, Step | None]:
     """What a file says of its run, and its step; None where it is no step of a run."""
-    content = load(path, CLASSES)
-    if not isinstance(content, dict):
+    if path.is_dir():
         return None, None
+    with system_errors("a step cannot be read from", path, error=ProblemError):
+        arrays = read_arrays(path.read_bytes())
+    if arrays is None:
+        return None, None
+    old = "Step" in str(arrays.get("tree", ""))  # the text of all older formats
     try:
-        header = _header(content["run"], path)
+        header = _header({"format": 2} if old else json.loads(str(arrays.pop("run"))), path)
     except (ValueError, KeyError, TypeError):
         return None, None
-    step = content.get("step")
-    return header, step if isinstance(step, Step) else None
+    try:
+        return header, step_of(arrays, dict(header.settings))
+    except (ValueError, KeyError, TypeError, IndexError, XcrackError):
+        return header, None
 
 
 def move_aside(folder: Path, files: Sequence[Path]) -> Path:
@@ -276,17 +281,78 @@ def sweep(folder: Path) -> None:
                 path.unlink(missing_ok=True)
 
 
+@dataclass
+class RunStore:
+    """Where the steps of a run go; the header is written with the first of them."""
+
+    folder: Path
+    check: Callable[[], None]  # raises where another process has taken over
+    header: RunHeader | None = None
+    first: str = ""  # fingerprint of the mesh that a run with a tolerance has begun with
+    # Written by this process: a killed one may have left half of them.
+    meshes: set[Path] = field(default_factory=set)
+
+    def write(self, step: Step) -> None:
+        """Write a step; afterwards it is on disk as a whole."""
+        self.check()
+        if self.header is None:
+            settings = {} if step.run is None else dict(step.run.settings)
+            _make_room(self.folder)
+            self.header = RunHeader(settings, versions())
+            write_header(self.folder, self.header)
+        name = "" if step.run is None else step.run.mesh
+        if step.index == 0:
+            self.first = name
+        path = mesh_path(self.folder, "" if name == self.first else name)
+        mesh = getattr(step.solutions[0].problem, "mesh", None) if step.solutions else None
+        if path not in self.meshes and isinstance(mesh, Mesh):
+            # A run does without it: where the system refuses, it is left out.
+            with contextlib.suppress(OSError):
+                path.write_bytes(packed_arrays(arrays_of_mesh(mesh)))
+            self.meshes.add(path)
+        write_step(self.folder, step, self.header)
+
+    def end(self, ended: str) -> None:
+        """Write why the run ended."""
+        if self.header is not None:
+            self.check()
+            write_header(self.folder, replace(self.header, ended=ended))
+
+
+def _make_room(folder: Path) -> None:
+    """Move aside what stands in the place of the files of a new run."""
+    files = step_files(folder)[::-1]
+    if files:
+        files += mesh_files(folder)[1:]
+    header = folder / HEADER
+    if header.exists() and (files or not _is_header(folder)):
+        files.append(header)
+    if files:
+        aside = move_aside(folder, files)
+        warn(f"{len(files)} files that stood in {folder} were moved to {aside}.")
+
+
+def _is_header(folder: Path) -> bool:
+    """Whether the header of a folder can be read; one without steps may be written anew."""
+    try:
+        return read_header(folder)[1] is None
+    except ProblemError:
+        return False
+
+
 __all__ = [
-    "BODY",
-    "CLASSES",
+    "FORMAT",
     "HEADER",
+    "MESH",
     "RunHeader",
+    "RunStore",
     "StoredSteps",
-    "body_files",
-    "body_path",
     "folder_of_steps",
+    "mesh_files",
+    "mesh_path",
     "move_aside",
     "read_header",
+    "read_mesh_file",
     "read_steps",
     "step_files",
     "step_path",

@@ -4,7 +4,7 @@ Functions among loads and supports cannot be stored. A solution that comes back 
 place: pictures, K and reports work; solving again asks for the script.
 """
 
-import contextlib
+import json
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from os import PathLike
@@ -21,8 +21,9 @@ from xcrack.base.arguments import arguments_of, kinds_of
 from xcrack.base.arrays import Floats, lock
 from xcrack.base.errors import ProblemError
 from xcrack.base.paths import path_of, system_errors
+from xcrack.crack.crack import Crack
 from xcrack.fem.system import discretise
-from xcrack.linalg.engine import SolverState
+from xcrack.linalg.engine import SlipField, SolverState
 from xcrack.mesh.curved_facets import CurvedFacets
 from xcrack.mesh.mesh import Mesh
 from xcrack.mesh.polygon import Arc
@@ -32,6 +33,15 @@ from xcrack.model.problem import LoadLevel, LoadState, Problem
 from xcrack.model.supports import Condition
 from xcrack.runs import run_folder, store
 from xcrack.runs.history import History
+from xcrack.runs.step_arrays import (
+    Arrays,
+    arrays_of,
+    arrays_of_mesh,
+    mesh_of,
+    packed_arrays,
+    read_arrays,
+    step_of,
+)
 
 _FORMAT = 1
 _SUFFIX = ".npz"
@@ -57,12 +67,12 @@ class Unstorable:
 
 
 _CLASSES: dict[str, type] = {
-    **run_folder.CLASSES,
     "LoadResultant": plan.Resultant,
     **{
         kind.__name__: kind
-        for kind in (Problem, Mesh, Arc, CurvedFacets, Numerics, Contact, Report, Ingredient,
-                     Unstorable, LoadLevel, LoadState, StoredFunction)
+        for kind in (Problem, Mesh, Arc, CurvedFacets, Crack, Numerics, Contact, Report,
+                     Ingredient, SolverState, SlipField, Unstorable, LoadLevel, LoadState,
+                     StoredFunction)
     },
 }  # fmt: skip
 
@@ -93,10 +103,13 @@ def save(result: Solution | Sequence[Solution] | History, path: str | PathLike[s
     """
     file = path_of(path, "save: path", error=ProblemError, is_file=True)
     file = file if file.suffix else file.with_name(file.name + _SUFFIX)
-    content = {"format": _FORMAT, **_content(result)}
+    if isinstance(result, History):
+        data = packed_arrays(_arrays_of_history(result))
+    else:
+        data = store.packed_content({"format": _FORMAT, **_content(result)}, _classes())
     with system_errors("the result cannot be written to", file, error=ProblemError):
         file.parent.mkdir(parents=True, exist_ok=True)
-        store.save(file, content, _classes())
+        store.write_whole(file, data)
     return file
 
 
@@ -108,38 +121,58 @@ def read_saved(path: Path) -> Any:
     ProblemError
         The file is not one of these, or of a newer xcrack.
     """
+    with system_errors("a stored value cannot be read from", path, error=ProblemError):
+        arrays = read_arrays(path.read_bytes())
+    if arrays is not None and "history" in arrays:
+        return _history_of(arrays, path)
     content = store.load(path, _classes())
     if not isinstance(content, dict) or "format" not in content:
         raise ProblemError(f"{path} is not a file that save wrote, or it is damaged.")
     if content["format"] > _FORMAT:
         raise ProblemError(f"{path} was written by a newer xcrack: update xcrack.")
-    if content["kind"] == "history":
-        return History(content["steps"], content["ended"], None, content["mesh"])
     solutions = _solutions(content)
     return solutions if content["several"] else solutions[0]
 
 
-def write_body(path: Path, problem: Problem) -> None:
-    """Write body, supports and loads of a run beside its steps, for pictures and reports.
+def _arrays_of_history(history: History) -> Arrays:
+    """Arrays of all steps, as in the folder of a run, each behind the number of its step."""
+    result: Arrays = {
+        "history": np.array(run_folder.FORMAT),
+        "n_steps": np.array(len(history.steps)),
+        "ended": np.array(history.ended),
+        "settings": np.array(json.dumps(dict(history.settings))),
+    }
+    for k, step in enumerate(history.steps):
+        result |= {f"{k:05d}_{name}": values for name, values in arrays_of(step).items()}
+    if history.mesh is not None:
+        mesh = arrays_of_mesh(history.mesh)
+        result |= {f"mesh_{name}": values for name, values in mesh.items()}
+    return result
 
-    A run does without it: where it cannot be stored, or the system refuses, it is left out.
+
+def _history_of(arrays: Arrays, path: Path) -> History:
+    """The history of a file.
+
+    Raises
+    ------
+    ProblemError
+        It is damaged, or of a newer xcrack.
     """
-    storable = _storable(replace(problem, cracks=(), friction=0.0, numerics=Numerics()))
-    content = {"format": _FORMAT, "kind": "body", "problem": storable}
-    with contextlib.suppress(OSError, ProblemError):
-        path.write_bytes(store.packed_content(content, _classes()))
+    if int(arrays["history"]) > run_folder.FORMAT:
+        raise ProblemError(f"{path} was written by a newer xcrack: update xcrack.")
 
+    def part(prefix: str) -> Arrays:
+        own = (name for name in arrays if name.startswith(prefix))
+        return {name.removeprefix(prefix): arrays[name] for name in own}
 
-def read_body(path: Path) -> Problem | None:
-    """The body of a run without its cracks; None where it is not there, or not whole."""
-    if not path.is_file():
-        return None
     try:
-        content = store.load(path, _classes())
-    except ProblemError:
-        return None
-    problem = content.get("problem") if isinstance(content, dict) else None
-    return problem if isinstance(problem, Problem) else None
+        settings = json.loads(str(arrays["settings"]))
+        every = [part(f"{k:05d}_") for k in range(int(arrays["n_steps"]))]
+        steps = tuple(step_of(each, settings) for each in every)
+        mesh = mesh_of(part("mesh_")) if "mesh_points" in arrays else None
+        return History(steps, str(arrays["ended"]), None, mesh)
+    except (KeyError, ValueError, IndexError) as error:
+        raise ProblemError(f"{path} is not a file that save wrote, or it is damaged.") from error
 
 
 def stored_condition(condition: Any) -> Any:
@@ -157,9 +190,6 @@ def _stored_state(acting: LoadState) -> LoadState:
 
 
 def _content(result: Any) -> dict[str, Any]:
-    if isinstance(result, History):
-        steps = tuple(replace(step, solutions=()) for step in result.steps)
-        return {"kind": "history", "steps": steps, "ended": result.ended, "mesh": result.mesh}
     several = not isinstance(result, Solution)
     solutions = list(result) if isinstance(result, list | tuple) else [result]
     if not solutions or not all(isinstance(solution, Solution) for solution in solutions):
@@ -170,7 +200,6 @@ def _content(result: Any) -> dict[str, Any]:
         raise ProblemError("save: the solutions are of different solves: save each on its own.")
     first = solutions[0]
     return {
-        "kind": "solution",
         "several": several,
         "problem": _storable(first.problem),
         "reuse": first.reuse.without_matrices(),
@@ -245,4 +274,4 @@ def _solutions(content: dict[str, Any]) -> list[Solution]:
     return solutions
 
 
-__all__ = ["Unstorable", "read_body", "read_saved", "save", "write_body"]
+__all__ = ["Unstorable", "read_saved", "save"]

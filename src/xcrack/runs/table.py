@@ -1,11 +1,11 @@
 """Numbers of a growth run as a table: a row for each tip, in 3D for each front, of each step."""
 
+import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from xcrack.base.arrays import Floats, Ints
 from xcrack.base.errors import ProblemError
@@ -16,58 +16,116 @@ from xcrack.growth.step import Step
 from xcrack.growth.uncertainty import uses_best
 from xcrack.runs.life_bar import life_bar
 
-Measures = dict[str, Callable[[Step, int], Floats]]
+Columns = dict[str, Callable[[Step, int], Floats]]  # of a step and a crack, at its stations
 
 _MODES = ("I", "II", "III")
 _ENDS = ("min", "mean", "max")
+_NUMBERED = re.compile(r"(K_I{1,3})_(\d+)(_min|_mean|_max|)")
 _CELLS = "domain_cells"
-_PARTS = ("angle", "dK_eq", "R", "rate", "da")
-_WHOLE = ("step", "crack", "tip", "front")
+_WHOLE = ("step", "crack", "tip", "front", "id")
 
 
-def table(steps: Sequence[Step]) -> NDArray[Any]:
+class Table(np.ndarray[Any, Any]):
+    """A structured array that names its columns where another one is asked for."""
+
+    def __getitem__(self, key: Any) -> Any:
+        names = self.dtype.names
+        asked = [key] if isinstance(key, str) else key if isinstance(key, list) else []
+        if names is None or not all(isinstance(name, str) for name in asked):
+            asked = []
+        columns = [self._by_number(name) for name in asked]
+        for name in columns:
+            if name not in (names or ()):
+                listed = ", ".join(names or ())
+                raise ProblemError(f"the table has no column {name!r}: it has {listed}.")
+        if columns:
+            key = columns[0] if isinstance(key, str) else columns
+        result = super().__getitem__(key)
+        return np.asarray(result) if isinstance(key, str) else result
+
+    def _by_number(self, name: str) -> str:
+        """Column of K of a load state by its number, as "K_I_1"; the name where it is none."""
+        match = _NUMBERED.fullmatch(name)
+        if match is None or self.dtype.names is None or name in self.dtype.names:
+            return name
+        stem, number, end = match.groups()
+        first = f"{stem}_"
+        columns = [n for n in self.dtype.names if n.startswith(first) and n.endswith(end)]
+        return columns[int(number)] if int(number) < len(columns) else name
+
+
+def table(steps: Sequence[Step]) -> Table:
     """Table of steps; its columns are those that `History.table` names."""
     fronts = bool(steps and steps[-1].cracks and steps[-1].cracks[0].fronts is not None)
     names, rows = (_table_3d if fronts else _table_2d)(steps)
-    return np.array(rows, dtype=[(n, np.int64 if n in _WHOLE else np.float64) for n in names])
+    kinds = [(n, np.int64 if n in _WHOLE else np.float64) for n in names]
+    return np.array(rows, dtype=kinds).view(Table)
+
+
+def state_names(steps: Sequence[Step]) -> list[str]:
+    """Names of all load states of some steps, in the order of their loads."""
+    every = {name for step in steps for name in step.states}
+    numbers = sorted((name for name in every if name.isdigit()), key=int)
+    words = [name for step in steps for name in step.states if not name.isdigit()]
+    others = [name for name in dict.fromkeys(words) if name not in ("min", "max")]
+    ends = [[name] if name in every else [] for name in ("min", "max")]
+    return [*ends[0], *numbers, *others, *ends[1]]
+
+
+def _K_of_states(step: Step, states: Sequence[str], c: int, modes: int) -> list[Floats]:
+    """K of the modes of each state at the stations of a crack; nan where a step has no such one."""
+    n = len(step.angle[c])
+    result = []
+    for name in states:
+        row = step.states.index(name) if name in step.states else -1
+        for m in range(modes):
+            K = step.sif[row][c].K if row >= 0 else np.full((n, modes), np.nan)
+            result.append(K[:, m] if m < K.shape[1] else np.zeros(n))
+    return result
+
+
+def _end_of(step: Step, c: int, number: int) -> int:
+    """Identity of a tip or front; its number where nothing is known."""
+    return number if step.identities is None else step.identities.ends[c][number]
 
 
 def _table_2d(steps: Sequence[Step]) -> tuple[list[str], list[tuple[Any, ...]]]:
     """Columns, and a row for each tip."""
-    states = range(max((len(step.sif) for step in steps), default=0))
-    names = ["step", "N", "crack", "tip", "x", "y", "a"]
+    states, parts = state_names(steps), _parts(steps)
+    names = ["step", "N", "crack", "tip", "id", "x", "y", "a"]
     names += [f"K_{m}_{s}" for s in states for m in _MODES[:2]]
     quality = _quality_columns(steps)
-    names += [*quality, *_PARTS]
+    names += [*quality, *parts]
     rows = []
     for step in steps:
         for c, crack in enumerate(step.cracks):
             x, _ = tip_frames(crack)
-            parts = [*(measure(step, c) for measure in quality.values()), *_parts(step, c)]
+            values = [
+                *(of(step, c) for of in quality.values()),
+                *(of(step, c) for of in parts.values()),
+            ]
+            K = _K_of_states(step, states, c, 2)
             for j in range(len(step.angle[c])):
-                K = [value for state in step.sif for value in state[c].K[j]]
-                K += [np.nan] * (2 * (len(states) - len(step.sif)))
-                values_of_tip = [values[j] for values in parts]
-                rows.append(
-                    (step.index, step.cycles, c, j, *x[j], _size(step, c), *K, *values_of_tip)
-                )
+                numbers = [column[j] for column in (*K, *values)]
+                end = _end_of(step, c, j)
+                rows.append((step.index, step.cycles, c, j, end, *x[j], _size(step, c), *numbers))
         rows += _rows_at_end(step, len(names), with_size=True)
     return names, rows
 
 
 def _table_3d(steps: Sequence[Step]) -> tuple[list[str], list[tuple[Any, ...]]]:
     """Columns, and a row for each front: smallest value along it, mean over its length, largest."""
-    n_states = max((len(step.sif) for step in steps), default=0)
-    values = [f"K_{m}_{s}" for s in range(n_states) for m in _MODES]
+    states, parts = state_names(steps), _parts(steps)
+    values = [f"K_{m}_{s}" for s in states for m in _MODES]
     quality = _quality_columns(steps)
-    values += [*quality, *_PARTS]
-    names = ["step", "N", "crack", "front", "x", "y", "z", "a"]
+    values += [*quality, *parts]
+    names = ["step", "N", "crack", "front", "id", "x", "y", "z", "a"]
     names += [f"{value}_{end}" for value in values for end in _ENDS]
     rows = [
         row
         for step in steps
         for row in (
-            *_rows_3d(step, n_states, quality),
+            *_rows_3d(step, states, {**quality, **parts}),
             *_rows_at_end(step, len(names), with_size=False),
         )
     ]
@@ -82,33 +140,24 @@ def _rows_at_end(step: Step, n_columns: int, *, with_size: bool) -> list[tuple[A
     for each in step.arrivals:
         size = _size(step, each.crack) if with_size else np.nan
         number = each.tip if with_size else 0
-        row = (step.index, step.cycles, each.crack, number, *each.x, size)
+        row = (step.index, step.cycles, each.crack, number, each.end, *each.x, size)
         rows.append((*row, *[np.nan] * (n_columns - len(row))))
     return rows
 
 
-def _rows_3d(step: Step, n_states: int, quality: Measures) -> list[tuple[Any, ...]]:
+def _rows_3d(step: Step, states: Sequence[str], columns: Columns) -> list[tuple[Any, ...]]:
     rows: list[tuple[Any, ...]] = []
     for c in range(len(step.cracks)):
         if not step.sif:
             continue
         sif = step.sif[0][c]
-        for number in np.unique(sif.front):
-            points_of_front = np.nonzero(sif.front == number)[0]
-            weight = front_weights(sif.x[points_of_front])
-            columns = [
-                state[c].K[points_of_front, m]
-                if m < state[c].K.shape[1]
-                else np.zeros(len(points_of_front))
-                for state in step.sif
-                for m in range(3)
-            ]
-            columns += [np.full(len(points_of_front), np.nan)] * (3 * n_states - len(columns))
-            columns += [measure(step, c)[points_of_front] for measure in quality.values()]
-            columns += [values[points_of_front] for values in _parts(step, c)]
-            ends = [end for values in columns for end in _extremes_and_mean(values, weight)]
-            middle, size = weight @ sif.x[points_of_front], _size(step, c)
-            rows.append((step.index, step.cycles, c, int(number), *middle, size, *ends))
+        every = [*_K_of_states(step, states, c, 3), *(of(step, c) for of in columns.values())]
+        for number in np.unique(sif.front).tolist():
+            along = np.nonzero(sif.front == number)[0]
+            weight = front_weights(sif.x[along])
+            ends = [end for values in every for end in _extremes_and_mean(values[along], weight)]
+            middle, size, end = weight @ sif.x[along], _size(step, c), _end_of(step, c, number)
+            rows.append((step.index, step.cycles, c, number, end, *middle, size, *ends))
     return rows
 
 
@@ -138,11 +187,11 @@ def _domain_cells(step: Step, c: int) -> Floats:
     return np.min([getattr(state[c], _CELLS) for state in step.sif], axis=0)
 
 
-def _quality_columns(steps: Sequence[Step]) -> Measures:
+def _quality_columns(steps: Sequence[Step]) -> Columns:
     """Columns that say how far K is to be trusted, of what the steps have."""
     every = [sif for step in steps for state in step.sif for sif in state if len(sif.K)]
     has_cells = bool(every) and all(hasattr(sif, _CELLS) for sif in every)
-    measures: Measures = {"spread": _domain_spread}
+    measures: Columns = {"spread": _domain_spread}
     if has_cells:
         measures[_CELLS] = _domain_cells
     if every and all(sif.errors is not None for sif in every):
@@ -150,12 +199,24 @@ def _quality_columns(steps: Sequence[Step]) -> Measures:
     return measures
 
 
-def _parts(step: Step, c: int) -> list[Floats]:
-    return [getattr(step, part)[c] for part in _PARTS]
+def _parts(steps: Sequence[Step]) -> Columns:
+    """Columns of what growth has at a station; the ratios of all cycles where there are several."""
+
+    def column(
+        name: str, of: Callable[[Any], Floats] = np.asarray
+    ) -> Callable[[Step, int], Floats]:
+        return lambda step, c: of(getattr(step, name)[c])
+
+    result: Columns = {name: column(name) for name in ("angle", "dK_eq", "R")}
+    pairs = [(r, R) for step in steps for r, R in zip(step.R_range, step.R)]
+    if any(not np.array_equal(r, np.stack([R, R], axis=1)) for r, R in pairs):
+        result["R_low"] = lambda step, c: step.R_range[c][:, 0]
+        result["R_high"] = lambda step, c: step.R_range[c][:, 1]
+    return result | {name: column(name) for name in ("rate", "da")}
 
 
 def _size(step: Step, c: int) -> float:
-    return np.nan if step.memory is None else step.memory.length[c]
+    return step.sizes[c] if step.sizes else np.nan
 
 
 def _extremes_and_mean(values: Floats, weight: Floats) -> tuple[float, float, float]:
@@ -258,4 +319,4 @@ def _cells(name: str, cells: Sequence[tuple[int, Ints]]) -> str:
 """
 
 
-__all__ = ["polylines", "table", "write_series"]
+__all__ = ["Table", "polylines", "state_names", "table", "write_series"]

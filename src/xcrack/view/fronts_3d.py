@@ -16,7 +16,7 @@ from xcrack.base.checks import entries, value_text, whole_number
 from xcrack.base.errors import ProblemError
 from xcrack.crack.measures import front_ends
 from xcrack.crack.stations import closed_fronts, is_closed
-from xcrack.growth.step import Step, lineage
+from xcrack.growth.step import Step, numbers_after
 from xcrack.mesh.locate import Body
 from xcrack.mesh.mesh import Mesh
 from xcrack.runs.history import History
@@ -249,7 +249,7 @@ def front_axes(
     last = max(steps[-1].index for steps in runs)
     colours, scale = colormaps["viridis"], Normalize(runs[0][0].index, max(last, 1))
     for k, (steps, name) in enumerate(zip(runs, labels, strict=True)):
-        every_step = list(zip(steps, lineage(steps, crack)))
+        every_step = list(zip(steps, _numbers_of(steps, crack)))
         for step, numbers in [*every_step[:-1:every], every_step[-1]]:
             newest = step is steps[-1]
             age = (last - step.index) / max(last, 1)
@@ -280,6 +280,21 @@ def front_axes(
             bbox_to_anchor=(0.5, -0.13),
             ncols=min(len(runs), 3),
         )
+
+
+def _numbers_of(steps: Sequence[Step], crack: int) -> list[list[int]]:
+    """Numbers in each step of a crack of the first, and of all cracks that it joins in the end."""
+    number = [
+        numbers_after(len(one.cracks), other.joins, len(other.cracks))
+        for one, other in zip(steps, steps[1:])
+    ]
+    last = crack
+    for after in number:
+        last = after[last]
+    rows = [[last]]
+    for after in reversed(number):
+        rows.append([c for c, now in enumerate(after) if now in rows[-1]])
+    return rows[::-1]
 
 
 def step_fronts(step: Step, crack: int) -> list[FrontLine]:

@@ -7,9 +7,10 @@ import numpy as np
 
 from xcrack.base.checks import value_text
 from xcrack.base.errors import ProblemError
-from xcrack.growth.step import identities, tip_identities
+from xcrack.growth.step import Step
 from xcrack.output.curved_sides import boundary_lines
 from xcrack.runs.history import History
+from xcrack.runs.table import state_names
 from xcrack.view.figures import finish_figure, new_figure, picture_path
 
 
@@ -38,11 +39,10 @@ def draw(history: History, kind: str, file: str | Path | None) -> Any:
 
 def _draw_K(history: History, axes: Any) -> None:
     table = history.table()
-    n_states = sum(name.startswith("K_I_") for name in table.dtype.names or ())
-    labels = _tip_labels(history)
-    for number, (name, label) in enumerate(labels.items()):
-        rows = table[_tip_of_rows(history, table) == name]
-        every = np.array([[rows[f"K_{m}_{s}"] for m in ("I", "II")] for s in range(n_states)])
+    states = state_names(history.steps)
+    for number, end in enumerate(np.unique(table["id"][table["step"] == table["step"][0]])):
+        rows, label = table[table["id"] == end], _end_name(history, int(end))
+        every = np.array([[rows[f"K_{m}_{s}"] for m in ("I", "II")] for s in states])
         severe = np.argmax(np.hypot(every[:, 0], every[:, 1]), axis=0)
         K_I, K_II = every[severe, :, np.arange(len(rows))].T
         axes.plot(rows["a"], K_I, "o-", ms=3, color=f"C{number}", label=f"$K_I$, {label}")
@@ -55,12 +55,11 @@ def _draw_K(history: History, axes: Any) -> None:
 def _draw_K_of_fronts(history: History, axes: Any) -> None:
     """Largest and smallest K along each front, of the state that is most severe there."""
     table = history.table()
-    table["crack"] = _crack_of_rows(history, table)
-    for number, (crack, front) in enumerate(_rows_of(table, "front")):
-        rows = table[(table["crack"] == crack) & (table["front"] == front)]
-        label = f"crack {crack}, front {front}"
+    for number, end in enumerate(np.unique(table["id"])):
+        rows, label = table[table["id"] == end], _end_name(history, int(end))
         for mode, style in (("I", "o-"), ("II", "s--"), ("III", "^:")):
-            low, high = (_extreme_K(rows, mode, end) for end in ("min", "max"))
+            states = state_names(history.steps)
+            low, high = (_extreme_K(rows, states, mode, most) for most in ("min", "max"))
             # The sign of modes II and III goes round with the front.
             largest = high if mode == "I" else np.maximum(np.abs(low), np.abs(high))
             name = f"$K_I$, {label}" if mode == "I" else f"$|K_{{{mode}}}|$, {label}"
@@ -76,15 +75,14 @@ def _draw_K_of_fronts(history: History, axes: Any) -> None:
     axes.legend(fontsize="small")
 
 
-def _extreme_K(rows: Any, mode: str, end: str) -> Any:
+def _extreme_K(rows: Any, states: list[str], mode: str, most: str) -> Any:
     """Smallest or largest K of a mode in the state whose K is largest in size `(k,)`."""
-    n_states = sum(name.startswith("K_I_") and name.endswith("_max") for name in rows.dtype.names)
     ends = [
         np.array([[rows[f"K_{m}_{s}_{e}"] for e in ("min", "max")] for m in ("I", "II", "III")])
-        for s in range(n_states)
+        for s in states
     ]
-    severe = np.argmax([np.abs(each).max(axis=(0, 1)) for each in ends], axis=0)
-    return np.array([rows[f"K_{mode}_{s}_{end}"][k] for k, s in enumerate(severe)])
+    severe = np.argmax([np.nan_to_num(np.abs(each)).max(axis=(0, 1)) for each in ends], axis=0)
+    return np.array([rows[f"K_{mode}_{states[s]}_{most}"][k] for k, s in enumerate(severe)])
 
 
 def _draw_fronts(history: History, axes: Any) -> None:
@@ -155,7 +153,7 @@ def _draw_path(history: History, axes: Any) -> None:
         low, high = history.mesh.points.min(axis=0), history.mesh.points.max(axis=0)
         margin = 0.03 * float((high - low).max())
         axes.set(xlim=(low[0] - margin, high[0] + margin), ylim=(low[1] - margin, high[1] + margin))
-    names = identities(history.steps)[-1]
+    names = _first_numbers(history.steps[-1])
     table = history.table()
     crack_of_row = _crack_of_rows(history, table)
     for number, start in enumerate(history.steps[0].cracks):
@@ -168,44 +166,22 @@ def _draw_path(history: History, axes: Any) -> None:
     axes.legend(fontsize="small")
 
 
+def _first_numbers(step: Step) -> tuple[int, ...]:
+    """Number that each crack of a step had at first."""
+    known = step.identities
+    return tuple(range(len(step.cracks))) if known is None else known.cracks
+
+
 def _crack_of_rows(history: History, table: Any) -> Any:
     """Number that the crack of each row of a table had at first `(k,)`."""
-    names = dict(zip((s.index for s in history.steps), identities(history.steps), strict=True))
+    names = {step.index: _first_numbers(step) for step in history.steps}
     pairs = zip(table["step"].tolist(), table["crack"].tolist(), strict=True)
     return np.array([names[step][crack] for step, crack in pairs], dtype=np.int64)
 
 
-def _tip_of_rows(history: History, table: Any) -> Any:
-    """Number that the tip of each row had among all tips of the first step; -1: it has left.
-
-    Rows of a tip that arrives at a side have the K of the step before, and its name there.
-    """
-    every = [*tip_identities(history.steps)]
-    steps = [step.index for step in history.steps]
-    names = {
-        step: (now, before) for step, now, before in zip(steps, every, [every[0], *every[:-1]])
-    }
-
-    def name_of(step: int, crack: int, tip: int) -> int:
-        for tips in names[step]:
-            if crack < len(tips) and tip < len(tips[crack]):
-                return int(tips[crack][tip])
-        return -1
-
-    rows = zip(*(table[name].tolist() for name in ("step", "crack", "tip")), strict=True)
-    return np.array([name_of(*row) for row in rows], dtype=np.int64)
-
-
-def _tip_labels(history: History) -> dict[int, str]:
-    """Names of tips, by crack and number in the first step."""
-    first = tip_identities(history.steps[:1])[0]
-    return {
-        name: f"crack {c}, tip {j}" for c, tips in enumerate(first) for j, name in enumerate(tips)
-    }
-
-
-def _rows_of(table: Any, what: str) -> list[tuple[int, int]]:
-    return sorted({(int(row["crack"]), int(row[what])) for row in table})
+def _end_name(history: History, end: int) -> str:
+    """What a tip, or front, is called."""
+    return history.names[end] if 0 <= end < len(history.names) else f"tip {end}"
 
 
 __all__ = ["draw"]

@@ -6,8 +6,7 @@ import numpy as np
 
 from xcrack.base.markup import element, join_parts, table
 from xcrack.fatigue.retardation import OverloadZones
-from xcrack.growth.step import Memory, Step
-from xcrack.growth.trail import FrontTrail, Trail
+from xcrack.growth.step import Step
 from xcrack.view.lives import plot_spectrum
 from xcrack.view.report_pictures import drawn_figure
 from xcrack.view.report_source import Section, Source, setting_words
@@ -15,14 +14,11 @@ from xcrack.view.report_source import Section, Source, setting_words
 
 def spectrum(source: Source) -> Section | None:
     """Spectrum, levels of K, model of retardation and its zones; nothing for a plain cycle."""
-    steps = () if source.history is None else source.history.steps
-    if not steps or steps[-1].memory is None:
+    history = source.history
+    if history is None or history.settings.get("cycle") != "Spectrum":
         return None
-    last, memory = steps[-1], steps[-1].memory
-    settings = memory.settings
-    if settings.get("cycle") != "Spectrum":
-        return None
-    unit = source.history.unit if source.history is not None else "block"
+    steps, settings, unit = history.steps, history.settings, history.unit
+    last = steps[-1]
     rows: list[tuple[str, Any]] = [
         ("one repetition", unit),
         ("repetitions at the last step", last.cycles),
@@ -40,11 +36,11 @@ def spectrum(source: Source) -> Section | None:
         words = f"Load history: a {shown.unit} in time, and how often a range is exceeded"
         parts.append(drawn_figure(words, lambda file: plot_spectrum(shown, file=file)))
     values: dict[str, Any] = {"unit": unit, "blocks": last.cycles, "levels": list(last.levels)}
-    model = settings.get("retardation")
-    if model is not None:
+    model = settings.get("retardation", "None")
+    if model != "None":
         parts += [element("h3", "Retardation"),
                   table((), [("model", model), *_rows(settings, "retardation.")])]  # fmt: skip
-        zones_left = _zones_of_cracks(last, memory)
+        zones_left = _zones_of_cracks(last)
         head = ("crack", "places", "K of the overload", "its zone", "growth since")
         parts += [
             element("p", "What overloads have left at the last step:"),
@@ -60,27 +56,18 @@ def _rows(settings: Any, prefix: str, besides: tuple[str, ...] = ()) -> list[tup
     return [
         (key.removeprefix(prefix), setting_words(text).partition(", sha256")[0])
         for key, text in settings.items()
-        if key.startswith(prefix) and key not in besides
+        if key.startswith(prefix) and key not in besides and text != "None"
     ]
 
 
-def _zones_of_cracks(step: Step, memory: Memory) -> list[tuple[Any, ...]]:
+def _zones_of_cracks(step: Step) -> list[tuple[Any, ...]]:
     """Zones of each crack, as ranges over its places."""
-    trail = memory.trail
-    if isinstance(trail, FrontTrail):
-        return [
-            (c, len(part.s), *_ranges(part.zones))
-            for c, part in enumerate(trail.parts)
-            if part.zones is not None and len(part.s)
-        ]
-    if not isinstance(trail, Trail) or trail.overloads is None:
+    if step.stations is None or step.zones is None:
         return []
-    crack = np.repeat(np.arange(len(step.corrected)), [each.n_tips for each in step.corrected])
-    zones = trail.overloads.zones
-    if len(crack) != len(zones.K):
-        return []
+    crack = step.stations.crack
     return [
-        (int(c), int((crack == c).sum()), *_ranges(zones.at(crack == c))) for c in np.unique(crack)
+        (int(c), int((crack == c).sum()), *_ranges(step.zones.at(crack == c)))
+        for c in np.unique(crack)
     ]
 
 

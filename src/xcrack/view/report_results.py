@@ -172,11 +172,10 @@ def growth(source: Source) -> Section | None:
                   units.value(f"{min(ranges):.6g} to {max(ranges):.6g}", TOUGHNESS)),
                  ("da/dN of the run", f"{units.value(rate, LENGTH)} a {history.unit}")
                  ]  # fmt: skip
-    if last.memory is not None:
-        law = {k: v for k, v in last.memory.settings.items() if k == "law" or k.startswith("law.")}
-        rows += [(name, text) for name, text in law.items()]
-        rows += [(f"size of crack {c} at the end", source.units.value(v, LENGTH))
-                 for c, v in enumerate(last.memory.length)]  # fmt: skip
+    law = {k: v for k, v in history.settings.items() if k == "law" or k.startswith("law.")}
+    rows += [(name, text) for name, text in law.items() if text != "None"]
+    rows += [(f"size of crack {c} at the end", source.units.value(v, LENGTH))
+             for c, v in enumerate(last.sizes)]  # fmt: skip
     parts: list[Any] = [table((), rows)]
     if not source.is_whole:
         words = "This run is not finished: the report shows the steps that are there."

@@ -174,19 +174,16 @@ def _notes(source: Source) -> list[str]:
     notes = [f"Small strains, a linear elastic isotropic body, crack faces {faces}."]
     notes.append(plastic_zone(source)[0])
     history = source.history
-    memory = history.steps[0].memory if history is not None and history.steps else None
-    if history is not None and memory is not None:
-        law = memory.settings.get("law", "")
-        ratios = [R for step in history.steps for R in step.R if len(R)]
+    if history is not None and history.settings:
+        law = history.settings.get("law", "")
+        ratios = [R for step in history.steps for R in step.R_range or step.R if len(R)]
         if ratios:
-            every = np.concatenate(ratios)
+            every = np.concatenate([R.ravel() for R in ratios])
             every = every[np.isfinite(every)]
             if len(every):
-                what = "run" if history.unit == "cycle" else f"largest cycle of each {history.unit}"
-                more = "" if history.unit == "cycle" else ", and those of its other cycles,"
+                what = "run" if history.unit == "cycle" else f"cycles of each {history.unit}"
                 notes.append(f"R of the {what} is {every.min():.3g} to {every.max():.3g}: compare "
-                             f"it{more} with the range that the growth law was fitted "
-                             "for.")  # fmt: skip
+                             "it with the range that the growth law was fitted for.")  # fmt: skip
         touching = any(state[c].closed.any() for step in history.steps for state in step.sif
                        for c in range(len(state)))  # fmt: skip
         if "elber" in law and touching:
@@ -239,10 +236,8 @@ def all_warnings(source: Source) -> Section:
 def rerun_section(source: Source) -> Section:
     """Inputs, versions, and how to run it again."""
     software, hashes = versions(), source.hashes()
-    settings: dict[str, str] = {}
     history = source.history
-    if history is not None and history.steps and history.steps[0].memory is not None:
-        settings = dict(history.steps[0].memory.settings)
+    settings = {} if history is None else dict(history.settings)
     parts: list[Any] = [table((), [*software.items(), *hashes.items()])]
     if history is not None and history.path is not None:
         text = f"history = xc.load({str(history.path)!r})\nxc.report(history, 'report.html')"

@@ -152,8 +152,7 @@ class Source:
         """K_c of the material, or the one at which the run was to end."""
         if self.problem is not None and self.problem.elasticity.material.K_c is not None:
             return float(self.problem.elasticity.material.K_c)
-        memory = self.history.steps[0].memory if self.history and self.history.steps else None
-        text = "" if memory is None else memory.settings.get("K_c", "")
+        text = self.history.settings.get("K_c", "") if self.history and self.history.steps else ""
         try:
             return float(text)
         except ValueError:
@@ -212,9 +211,9 @@ class Source:
     def hashes(self) -> dict[str, str]:
         """Hashes of the inputs."""
         if self.history is not None and self.history.steps:
-            memory = self.history.steps[0].memory
-            if memory is not None:
-                text = "\n".join(f"{k}={v}" for k, v in sorted(memory.settings.items()))
+            settings = self.history.settings
+            if settings:
+                text = "\n".join(f"{k}={v}" for k, v in sorted(settings.items()))
                 return {"settings of the run": _hash(text.encode())}
         if self.problem is None:
             return {}

@@ -1,6 +1,6 @@
 """The first page of a report: what a chief engineer signs."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -9,7 +9,6 @@ from xcrack.base.markup import Markup, element, join_parts, table
 from xcrack.base.units import LENGTH, STRESS, TOUGHNESS
 from xcrack.crack.crack import Crack
 from xcrack.crack.measures import measures
-from xcrack.growth.step import Memory
 from xcrack.growth.validity import ZONE
 from xcrack.runs.assessment import CRITERIA, K_of_cracks
 from xcrack.sif.sif import SIF
@@ -93,10 +92,9 @@ def _growth(source: Source) -> Rows:
     history = source.history
     if history is None or not history.steps:
         return
-    memory = history.steps[0].memory
-    if memory is not None:
-        yield "growth law", _settings(memory, "law")
-        yield "load history", _settings(memory, "cycle")
+    if history.settings:
+        yield "growth law", _settings(history.settings, "law")
+        yield "load history", _settings(history.settings, "cycle")
     bar = history.life_bar.total
     bars = "" if np.isnan(bar) else f" ± {bar:.2g} (numerical error)"
     yield "life", f"{history.life:.6g} {history.unit}s{bars}"
@@ -105,9 +103,8 @@ def _growth(source: Source) -> Rows:
         yield "join", str(join)
 
 
-def _settings(memory: Memory, name: str) -> str:
+def _settings(settings: Mapping[str, str], name: str) -> str:
     """A law or a load history in a line."""
-    settings = memory.settings
     parts = [
         f"{key.removeprefix(name + '.')} = {_short(setting_words(text).partition(', sha256')[0])}"
         for key, text in settings.items()

@@ -4,8 +4,9 @@ import numpy as np
 
 from xcrack.base.arrays import Floats
 from xcrack.crack.surfaces import elliptic_crack
+from xcrack.fatigue.cycle import Cycle
 from xcrack.fatigue.power import paris
-from xcrack.growth.step import Cycle, Step
+from xcrack.growth.step import Step
 from xcrack.mesh.box import box
 from xcrack.mesh.mesh import Mesh
 from xcrack.mesh.refinement import refine

@@ -7,8 +7,8 @@ import numpy as np
 
 from xcrack.base.arrays import Floats
 from xcrack.crack.lines import line_crack
+from xcrack.fatigue.cycle import Cycle
 from xcrack.fatigue.power import paris
-from xcrack.growth.step import Cycle
 from xcrack.mesh.box import box
 from xcrack.mesh.mesh import Mesh
 from xcrack.model.loads import displacement

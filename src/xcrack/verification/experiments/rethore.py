@@ -7,8 +7,9 @@ from typing import Any, cast
 import numpy as np
 
 from xcrack.crack.lines import line_crack
+from xcrack.fatigue.cycle import Cycle
 from xcrack.fatigue.power import paris
-from xcrack.growth.step import Cycle, Step
+from xcrack.growth.step import Step
 from xcrack.mesh.mesh import Mesh
 from xcrack.mesh.plates import plate
 from xcrack.model.loads import displacement

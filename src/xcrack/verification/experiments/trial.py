@@ -7,9 +7,10 @@ import numpy as np
 
 from xcrack.base.arrays import Floats, Ints
 from xcrack.fatigue.criteria import max_hoop_stress
+from xcrack.fatigue.cycle import Cycle
 from xcrack.fatigue.law import Law
 from xcrack.growth.run import grow
-from xcrack.growth.step import Cycle, Step
+from xcrack.growth.step import Step
 from xcrack.mesh.mesh import Mesh
 from xcrack.model.problem import Problem
 from xcrack.runs.collect import collect

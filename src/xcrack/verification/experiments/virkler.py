@@ -5,8 +5,9 @@ from scipy.optimize import least_squares
 
 from xcrack.base.arrays import Floats
 from xcrack.crack.lines import line_crack
+from xcrack.fatigue.cycle import Cycle
 from xcrack.fatigue.power import paris
-from xcrack.growth.step import Cycle, Step
+from xcrack.growth.step import Step
 from xcrack.mesh.plates import plate
 from xcrack.model.loads import traction
 from xcrack.model.material import Isotropic

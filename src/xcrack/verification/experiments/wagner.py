@@ -7,8 +7,8 @@ import numpy as np
 
 from xcrack.base.arrays import Floats
 from xcrack.crack.lines import line_crack
+from xcrack.fatigue.cycle import Cycle
 from xcrack.fatigue.power import paris
-from xcrack.growth.step import Cycle
 from xcrack.mesh.plates import plate
 from xcrack.model.loads import bearing
 from xcrack.model.material import Isotropic

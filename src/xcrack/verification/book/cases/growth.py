@@ -9,9 +9,9 @@ import numpy as np
 from xcrack.crack.lines import line_crack
 from xcrack.crack.surfaces import penny_crack
 from xcrack.fatigue.criteria import max_hoop_stress, weighted_angle
+from xcrack.fatigue.cycle import Cycle
 from xcrack.fatigue.power import paris
 from xcrack.growth.run import grow
-from xcrack.growth.step import Cycle
 from xcrack.mesh.box import box
 from xcrack.model.loads import traction
 from xcrack.model.material import Isotropic

@@ -7,10 +7,10 @@ from xcrack.base.arrays import Floats
 from xcrack.crack.crack import Crack
 from xcrack.crack.surfaces import penny_crack
 from xcrack.fatigue.criteria import max_hoop_stress
+from xcrack.fatigue.cycle import Cycle
 from xcrack.fatigue.power import paris
-from xcrack.growth.ending import amplification
+from xcrack.growth.joins_3d import amplification
 from xcrack.growth.run import grow
-from xcrack.growth.step import Cycle
 from xcrack.mesh.triangulation import face_areas
 from xcrack.model.loads import traction
 from xcrack.model.material import Isotropic

@@ -9,11 +9,11 @@ from scipy.integrate import quad
 
 from xcrack.crack.lines import line_crack
 from xcrack.fatigue.criteria import weighted_angle
+from xcrack.fatigue.cycle import Cycle, cycles_between
 from xcrack.fatigue.law import Law
 from xcrack.fatigue.power import elber, paris, walker
-from xcrack.growth.cycles import cycles_between
 from xcrack.growth.run import grow
-from xcrack.growth.step import Cycle, Step
+from xcrack.growth.step import Step
 from xcrack.mesh.box import box
 from xcrack.model.loads import traction
 from xcrack.model.material import Isotropic

@@ -8,10 +8,10 @@ from scipy.special import ndtri
 from xcrack.base.arrays import Floats
 from xcrack.crack.lines import line_crack
 from xcrack.fatigue.criteria import weighted_angle
+from xcrack.fatigue.cycle import Cycle
 from xcrack.fatigue.power import paris
 from xcrack.fatigue.spectrum import Spectrum
 from xcrack.growth.run import grow
-from xcrack.growth.step import Cycle
 from xcrack.mesh.box import box
 from xcrack.model.loads import traction
 from xcrack.model.material import Isotropic

@@ -14,7 +14,6 @@ from xcrack.base.arrays import Bools, Floats, Ints
 from xcrack.crack.advance_2d import with_tips
 from xcrack.crack.crack import Crack, tip_frames
 from xcrack.crack.lines import crossing_points, polyline_crack
-from xcrack.growth.step import LEAST, PerCrack
 from xcrack.mesh.locate import cell_sizes, contains
 from xcrack.mesh.mesh import Mesh
 from xcrack.mesh.polygon import closest_on_segment
@@ -22,6 +21,7 @@ from xcrack.mesh.polygon import closest_on_segment
 # Tips of all 2D cracks as rows of one array, and cracks that end at given places.
 
 _WHOLE = 0.5  # cells: a shorter face is not left behind, its end moves on with the tip
+LEAST = 0.1  # cells: a shorter new face turns the tip's frame, but not the crack the mesh sees
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,11 +111,6 @@ def rows_of(cracks: Sequence[Crack]) -> list[slice]:
     """Rows of the tips of each crack."""
     end = np.cumsum([0, *(crack.n_tips for crack in cracks)])
     return [slice(int(a), int(b)) for a, b in zip(end, end[1:])]
-
-
-def split(values: Floats, cracks: Sequence[Crack]) -> PerCrack:
-    """Rows of all tips as one array a crack."""
-    return tuple(np.array(values[rows]) for rows in rows_of(cracks))
 
 
 AHEAD = 1.25  # cells beyond the advance within which a tip is taken to meet what lies ahead
@@ -314,15 +309,76 @@ def _one(one: Crack, two: Crack, x: Floats) -> Crack:
     return polyline_crack(points, tuple(tips))
 
 
+# Where cracks have met between one step and the next: the polylines alone tell.
+
+_SAME = 1e-9  # of the extent of the cracks: an end lies on another crack
+
+
+def ends_on_others(cracks: Sequence[Crack]) -> list[tuple[int, int, Floats]]:
+    """Ends of placed cracks on others in 2D: crack, the other one, place `(2,)`."""
+    if len(cracks) < 2 or any(crack.tips is None for crack in cracks):
+        return []
+    reach = _SAME * float(np.ptp(np.concatenate([crack.points for crack in cracks]), axis=0).max())
+    result = []
+    for c, crack in enumerate(cracks):
+        for end in (0, len(crack.points) - 1):
+            if end in (crack.tips or ()):
+                continue
+            x = crack.points[end]
+            for on, other in enumerate(cracks):
+                line = other.points
+                if on == c or np.linalg.norm(line[[0, -1]] - x, axis=1).min() <= reach:
+                    continue
+                foot = closest_on_segment(x, line[:-1], line[1:])
+                if np.linalg.norm(foot - x, axis=1).min() <= reach:
+                    result.append((c, on, x))
+                    break
+    return result
+
+
+def new_ends(before: Sequence[Crack], after: Sequence[Crack]) -> list[tuple[int, int, Floats]]:
+    """Ends on others that were not there before."""
+    known = {tuple(x.tolist()) for _, _, x in ends_on_others(before)}
+    return [own for own in ends_on_others(after) if tuple(own[2].tolist()) not in known]
+
+
+def new_unions(
+    before: Sequence[Crack], after: Sequence[Crack]
+) -> list[tuple[tuple[int, int], Floats]]:
+    """Points at which two tips have become one crack; none in 3D.
+
+    Returns
+    -------
+    list of (numbers of the cracks before, the smaller one first, place (2,))
+    """
+    if len(after) >= len(before) or any(crack.tips is None for crack in after):
+        return []
+    owner = {tuple(x): c for c, crack in enumerate(before) for x in crack.points.tolist()}
+    result = []
+    for crack in after:
+        of_point = [owner.get(tuple(x), -1) for x in crack.points.tolist()]
+        for k in range(1, len(of_point) - 1):
+            if of_point[k] >= 0:
+                continue
+            left = next((c for c in of_point[k::-1] if c >= 0), -1)
+            right = next((c for c in of_point[k:] if c >= 0), -1)
+            if left != right and min(left, right) >= 0:
+                result.append(((min(left, right), max(left, right)), crack.points[k]))
+    return result
+
+
 __all__ = [
     "AHEAD",
+    "LEAST",
     "Faces",
     "Meeting",
+    "ends_on_others",
     "joined",
     "last_faces",
     "meetings",
     "moved_on",
+    "new_ends",
+    "new_unions",
     "rows_of",
-    "split",
     "with_tips_at",
 ]

@@ -6,13 +6,13 @@ import re
 import sys
 import sysconfig
 import types
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import MISSING, Field, fields, is_dataclass, replace
+from collections.abc import Callable, Iterator, Mapping, Set
+from dataclasses import MISSING, Field, fields, is_dataclass
 from enum import Enum
 from functools import partial
 from numbers import Number
 from pathlib import Path, PurePath
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
@@ -143,6 +143,7 @@ def wrapped_by(value: Any) -> Callable[..., Any] | None:
 
 _LONG = 200  # a text longer than this is stored by its hash
 _MANY = 50  # and a container of more entries
+_FEW = 16  # numbers of an array that are shown
 _OWN = "xcrack."
 _NAMED = type | types.BuiltinFunctionType | types.ModuleType | np.ufunc
 
@@ -150,15 +151,16 @@ _NAMED = type | types.BuiltinFunctionType | types.ModuleType | np.ufunc
 class Description:
     """Lines of a description, filled value by value.
 
-    Parameters
+    Attributes
     ----------
-    defaults : mapping of str to anything
-        Defaults that are others than those of the classes, by the key of their field.
+    lines : dict of str to str
+    at_default : set of str
+        Keys of fields of xcrack's own classes that have their default, and of what is in them.
     """
 
-    def __init__(self, defaults: Mapping[str, Any]) -> None:
+    def __init__(self) -> None:
         self.lines: dict[str, str] = {}
-        self._defaults = defaults
+        self.at_default: set[str] = set()
         self._described: dict[int, Any] = {}  # functions and objects; alive, so that ids are theirs
         self._packages: set[str] = set()  # installed ones whose functions were given by the user
 
@@ -187,8 +189,10 @@ class Description:
         if value is None or isinstance(value, Number | str | bytes | PurePath | Enum):
             self.lines[name] = _shortened(repr(value))
         elif isinstance(value, np.ndarray) and not value.dtype.hasobject:
+            text = repr(value.tolist()) if value.size <= _FEW else ""
             content = np.ascontiguousarray(value)
-            self.lines[name] = f"{value.dtype} {value.shape} {_hash(content.tobytes())}"
+            hashed = f"{value.dtype} {value.shape} {_hash(content.tobytes())}"
+            self.lines[name] = text if text and len(text) <= _LONG else hashed
         elif isinstance(value, types.FunctionType):
             self._add_function(name, value, inner, used)
         elif isinstance(value, types.MethodType):
@@ -217,7 +221,7 @@ class Description:
             entries = [(f"[{i}]", item) for i, item in enumerate(value)]
         target = self
         if len(entries) > _MANY:
-            target = Description(self._defaults)
+            target = Description()
             target._described, target._packages = self._described, self._packages
         for key, item in entries:
             target.add(name + key, item, owners, used)
@@ -263,22 +267,15 @@ class Description:
         if name:
             self.lines[name] = type(value).__qualname__
         for field in fields(value):
-            key, item = f"{name}.{field.name}".lstrip("."), getattr(value, field.name)
-            if own and self._is_left_out(key, value, field, item):
+            if own and not field.metadata.get("changes_results", True):
                 continue
+            key, item = f"{name}.{field.name}".lstrip("."), getattr(value, field.name)
+            before = set(self.lines)
             self.add(key, item, owners, used)
-            if own and is_dataclass(item) and type(default_of(value, field)) is type(item):
-                del self.lines[key]  # it is the kind that a reader expects; its fields say the rest
+            if own and is_equal(item, default_of(value, field)):
+                self.at_default |= set(self.lines) - before
         if not own:
             self._add_methods(name, type(value), owners)
-
-    def _is_left_out(self, key: str, owner: Any, field: Field[Any], value: Any) -> bool:
-        if not field.metadata.get("changes_results", True):
-            return True
-        if key in self._defaults:
-            earlier = self._defaults[key]
-            return is_equal(value, earlier(owner) if callable(earlier) else earlier)
-        return is_equal(value, default_of(owner, field))
 
     def _add_object(self, name: str, value: Any, owners: tuple[int, ...], used: bool) -> None:
         """Any other object, by what a copy of it would be made from."""
@@ -340,35 +337,21 @@ def _hash(data: bytes) -> str:
 
 _FUNCTION = re.compile(r"([\w.<>]+ )?sha256:[0-9a-f]{16}")
 
-# Number of the set of defaults: raised whenever a changed default changes results.
-DEFAULTS = 4
-# For each set from 2 on, the defaults that it replaced: {2: {"problem.numerics.points": 4}}.
-REPLACED: dict[int, dict[str, Any]] = {
-    2: {"integrator": "euler"},
-    3: {"problem.numerics.multipliers": "sparse"},
-    4: {"problem.order": lambda problem: 2 if problem.mesh.dim == 2 else 1},
-}
 
-Settings = TypeVar("Settings")
-
-
-def describe(name: str, value: Any, number: int | None = None) -> dict[str, str]:
+def describe(name: str, value: Any) -> dict[str, str]:
     """Flat description of a value: the same text for the same settings, in any process.
 
-    Arrays and long containers are described by a hash; functions of xcrack and of other packages
-    by their name; functions of the user by their code and by all that they read: helpers,
-    constants, lists, dicts and objects of the script, what they close over. Dataclasses are
-    described field by field, other objects by what a copy would be made from, and by the code of
-    their class if it is the user's. Fields whose metadata say ``changes_results=False`` are never
-    described.
+    Long arrays and containers are described by a hash; functions of xcrack and of other packages by
+    their name; functions of the user by their code and by all that they read: helpers, constants,
+    lists, dicts and objects of the script, what they close over. Dataclasses are described field by
+    field, other objects by what a copy would be made from, and by the code of their class if it is
+    the user's. Fields whose metadata say ``changes_results=False`` are never described.
 
     Parameters
     ----------
     name : str
         Prefix of the keys; empty for a dataclass whose fields need none.
     value : anything
-    number : int, optional
-        Set of defaults whose values are left out; today's if omitted.
 
     Returns
     -------
@@ -379,54 +362,33 @@ def describe(name: str, value: Any, number: int | None = None) -> dict[str, str]
     >>> describe("da", 0.5)
     {'da': '0.5'}
     """
-    description = Description(defaults_of(DEFAULTS if number is None else number))
+    description = Description()
     description.add(name, value)
     return description.lines
 
 
-def defaults_of(number: int) -> dict[str, Any]:
-    """Defaults of a set that are others today, by the key of their field."""
-    values: dict[str, Any] = {}
-    for later in range(DEFAULTS, number, -1):
-        values |= REPLACED.get(later, {})
-    return values
+def default_keys(name: str, value: Any) -> set[str]:
+    """Keys of a description that say no more than a default: an older one may lack them."""
+    description = Description()
+    description.add(name, value)
+    return description.at_default
 
 
-def with_defaults_of(settings: Settings, number: int, stored: Mapping[str, str]) -> Settings:
-    """Settings in which fields left at today's default have that of an earlier set.
+def differences(
+    stored: Mapping[str, str], given: Mapping[str, str], new_defaults: Set[str] = frozenset()
+) -> list[str]:
+    """One line for each key in which two descriptions differ.
 
     Parameters
     ----------
-    settings : dataclass
-    number : int
-        The earlier set.
-    stored : mapping of str to str
-        Description of the run that was begun with that set: a field it names was not left out.
+    stored, given : mapping of str to str
+    new_defaults : set of str
+        Keys that the stored one may lack: fields that it did not know, at their default.
     """
-    for key, value in defaults_of(number).items():
-        if key not in stored:
-            path = key.split(".")
-            settings = _with_field(settings, path, value)
-    return settings
-
-
-def _with_field(owner: Any, path: list[str], value: Any) -> Any:
-    name, inner = path[0], path[1:]
-    old = getattr(owner, name)
-    if inner:
-        return replace(owner, **{name: _with_field(old, inner, value)})
-    field = next(f for f in fields(owner) if f.name == name)
-    if not is_equal(old, default_of(owner, field)):
-        return owner  # given, not left out
-    return replace(owner, **{name: value(owner) if callable(value) else value})
-
-
-def differences(stored: Mapping[str, str], given: Mapping[str, str]) -> list[str]:
-    """One line for each key in which two descriptions differ."""
     return [
-        f"{key}: stored {_text(stored, key)}, given {_text(given, key)}"
+        f"{key}: stored {stored.get(key, 'nothing')}, given {given.get(key, 'nothing')}"
         for key in sorted({*stored, *given})
-        if stored.get(key) != given.get(key)
+        if stored.get(key) != given.get(key) and not (key not in stored and key in new_defaults)
     ]
 
 
@@ -440,21 +402,12 @@ def only_compiled_differently(stored: Mapping[str, str], given: Mapping[str, str
     return [key for key, (one, other) in names.items() if one and other and one[1] == other[1]]
 
 
-def _text(settings: Mapping[str, str], key: str) -> str:
-    owner = key.rpartition(".")[0]
-    return settings.get(key, "the default" if not owner or owner in settings else "nothing")
-
-
 __all__ = [
-    "DEFAULTS",
-    "REPLACED",
     "Description",
     "code_of",
-    "default_of",
-    "defaults_of",
+    "default_keys",
     "describe",
     "differences",
-    "is_equal",
     "is_installed",
     "is_public_library",
     "methods",
@@ -462,6 +415,5 @@ __all__ = [
     "only_compiled_differently",
     "package_of",
     "reads",
-    "with_defaults_of",
     "wrapped_by",
 ]

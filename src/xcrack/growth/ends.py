@@ -1,0 +1,279 @@
+"""Why growth ends."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from xcrack.base.arrays import Floats
+from xcrack.base.checks import call_function, numbers
+from xcrack.fatigue.criteria import clipped_K, equivalent_K
+from xcrack.growth.options import GrowthRule
+from xcrack.growth.step import (
+    Arrival,
+    Step,
+    growth_directions,
+    place_name,
+    plan_of,
+    solves_of,
+)
+from xcrack.growth.validity import ahead_of
+from xcrack.mesh.locate import cell_extents
+
+# Ligaments in front of the tips of 2D cracks, and whether plastic zones fill them.
+
+_Place = tuple[int, int]
+
+
+@dataclass(frozen=True)
+class Ligament:
+    """What lies between a tip and what it heads for.
+
+    Attributes
+    ----------
+    length : float
+    tip : (int, int)
+        Crack and number.
+    other : (int, int), optional
+        The other tip, where both head for each other.
+    name : str
+        Facet set or crack that the tip heads for; empty between two tips.
+    """
+
+    length: float
+    tip: _Place
+    other: _Place | None
+    name: str
+
+
+def ligaments(rule: GrowthRule, step: Step) -> list[Ligament]:
+    """Ligaments of all tips: straight ahead to a crack or the boundary, and between two tips.
+
+    Two tips have one between them where each lies ahead of the other.
+    """
+    tips = [(c, j) for c in range(len(step.cracks)) for j in range(len(step.sif[0][c].x))]
+    x = np.array([step.sif[0][c].x[j] for c, j in tips]).reshape(-1, 2)
+    ahead = np.array([growth_directions(step, c)[j] for c, j in tips]).reshape(-1, 2)
+    result = []
+    for i, tip in enumerate(tips):
+        met = ahead_of(x[i], ahead[i], tip[0], step.cracks, rule.problem.mesh)
+        if met is not None:
+            result.append(Ligament(met.length, tip, None, met.label))
+        for k in range(i):
+            gap = x[k] - x[i]
+            if gap @ ahead[i] > 0 > gap @ ahead[k]:
+                result.append(Ligament(float(np.linalg.norm(gap)), tip, tips[k], ""))
+    return result
+
+
+def ligament_yields(rule: GrowthRule, step: Step) -> str:
+    """Which ligament the plastic zones of the most severe state fill; empty where none does.
+
+    Zones of two tips add up over the ligament between them (Swift 1994, Int. J. Fatigue 16, 75,
+    from memory);
+    the zone of one tip fills what lies ahead of it.
+    """
+    if rule.link_up is None:
+        return ""
+    zone = [_zones(rule.link_up, rule, step, c) for c in range(len(step.cracks))]
+
+    def size(place: _Place | None) -> float:
+        return 0.0 if place is None else float(zone[place[0]][place[1]])
+
+    known = ligaments(rule, step)
+    full = [(size(one.tip) + size(one.other)) / one.length for one in known]
+    if not full or max(full) < 1:
+        return ""
+    one = known[int(np.argmax(full))]
+    first = f"of {place_name(step, *one.tip)}, {size(one.tip):.4g}"
+    if one.other is None:
+        what = f"the plastic zone {first}, fills the {one.length:.4g} to {one.name}"
+    else:
+        what = (
+            f"the plastic zones {first}, and of {place_name(step, *one.other)}, "
+            f"{size(one.other):.4g}, fill the {one.length:.4g} between them"
+        )
+    return f"ligament yield: {what}"
+
+
+def _zones(link_up: Callable[..., Any], rule: GrowthRule, step: Step, c: int) -> Floats:
+    K_eq = _largest_K(rule, step, c)
+    zone = call_function(link_up, f"link_up at step {step.index}", K_eq)
+    return numbers(zone, "what link_up returned", K_eq.shape)
+
+
+_SAME = 1e-9  # of the largest K: states that do not differ
+# A turn by more puts K 0.1 % off where the advance is 0.3 cells, 0.3 % at 20 degrees (measured).
+_TURN = np.radians(10.0)
+
+
+# Reasons for which a run ends at a step: each is asked in turn, and is empty where it goes on.
+
+
+def no_end_is_left(rule: GrowthRule, step: Step) -> str:
+    """All tips or fronts have left the body, or joined."""
+    if not step.has_left:
+        return ""
+    if step.joins and not step.arrivals:
+        return "no tip is left: " + "; ".join(map(str, step.joins))
+    return left_the_body(rule, step.arrivals)
+
+
+def law_reaches_toughness(rule: GrowthRule, step: Step) -> str:
+    """The law returns an infinite rate."""
+    del rule
+    for c, rate in enumerate(step.rate):
+        for j in np.nonzero(np.isinf(rate))[0].tolist():
+            return (
+                f"K_c reached: the law returned da/dN = inf for dK_eq = {step.dK_eq[c][j]:.6g}, "
+                f"R = {step.R[c][j]:.6g} at {place_name(step, c, j)}"
+            )
+    return ""
+
+
+def toughness_is_reached(rule: GrowthRule, step: Step) -> str:
+    """K_eq of some state reaches K_c."""
+    K_c = rule.toughness
+    if K_c is None:
+        return ""
+    for c in range(len(step.cracks)):
+        K_eq = _largest_K(rule, step, c)
+        for j in np.nonzero(K_eq >= K_c)[0].tolist():
+            place = place_name(step, c, j)
+            return f"K_c reached: K_eq = {K_eq[j]:.6g} >= {K_c:.6g} at {place}"
+    return ""
+
+
+def cycles_are_over(rule: GrowthRule, step: Step) -> str:
+    """As many cycles as asked for."""
+    if rule.max_cycles is None or step.cycles < rule.max_cycles:
+        return ""
+    return f"max_cycles = {rule.max_cycles:.6g} reached: {step.cycles:.6g} cycles"
+
+
+def steps_are_over(rule: GrowthRule, step: Step) -> str:
+    """As many steps as asked for."""
+    if rule.max_steps is None or step.index + 1 < rule.max_steps:
+        return ""
+    return f"max_steps = {rule.max_steps} reached"
+
+
+def nothing_grows(rule: GrowthRule, step: Step) -> str:
+    """No rate is positive."""
+    if any((r > 0).any() for r in step.rate):
+        return ""
+    if any((r > 0).any() for r in step.law_rate):
+        return f"rate is zero: dK_eq is below the threshold {rule.threshold:.6g} at every tip"
+    return "rate is zero at every tip" + _same_states(step)
+
+
+ENDS: tuple[Callable[[GrowthRule, Step], str], ...] = (
+    no_end_is_left,
+    law_reaches_toughness,
+    toughness_is_reached,
+    ligament_yields,
+    cycles_are_over,
+    steps_are_over,
+    nothing_grows,
+)
+
+
+def end_of_run(rule: GrowthRule, step: Step) -> str:
+    """Why a run ends at a step; empty where it goes on."""
+    return next(filter(None, (end(rule, step) for end in ENDS)), "")
+
+
+def _largest_K(rule: GrowthRule, step: Step, c: int) -> Floats:
+    """Largest K_eq of all states at the stations of a crack `(f,)`."""
+    K = clipped_K(np.stack([state[c].K for state in step.sif]))
+    nu = rule.problem.elasticity.poisson
+    return equivalent_K(K, step.angle[c], nu).max(axis=0, initial=0.0)
+
+
+def _same_states(step: Step) -> str:
+    """What to say where K is the same in all load states; empty where it is not, or is zero."""
+    K = np.stack([np.concatenate([sif.K for sif in state]) for state in step.sif])
+    size = float(np.abs(K).max(initial=0.0))
+    if len(K) < 2 or size == 0 or float(np.ptp(K, axis=0).max(initial=0.0)) > _SAME * size:
+        return ""
+    return (
+        f": K is the same in all {len(K)} load states of the cycle. An initial stress or a "
+        "temperature among the loads of the problem acts in each of them: leave it out there if "
+        "the states give others."
+    )
+
+
+def left_the_body(rule: GrowthRule, arrivals: Sequence[Arrival]) -> str:
+    """Why a run ends whose last tips or fronts have left the body."""
+    end = "tip" if rule.problem.mesh.dim == 2 else "front"
+    return ": ".join([f"{end} left the body", "; ".join(map(str, arrivals))]).removesuffix(": ")
+
+
+# Plans that cannot be taken.
+
+
+def refusal_of(rule: GrowthRule, step: Step) -> str:
+    """Why the plan of a step cannot be taken; empty where it can."""
+    plan = plan_of(step)
+    if not plan.limit:
+        return ""
+    if plan.limit == "geometry":
+        return cannot_go_on(step, plan.refusal)
+    place = place_name(step, *driving_place(step))
+    if plan.limit == "short":
+        remedy = "cycles" if rule.da is None else "da"
+        return (
+            f"the advance {plan.largest:.4g} at {place} is below a tenth of the cell there (cell "
+            f"size {plan.cell[plan.tip]:.4g}): the mesh cannot see it. Take a larger {remedy} or a "
+            "finer mesh around the tip."
+        )
+    what = "it falls to zero"
+    if rule.threshold > 0:
+        what = f"dK_eq falls below the threshold {rule.threshold:.6g}"
+    if rule.retardation is not None:
+        what += ", or retardation all but stops it,"
+    return f"rate is zero: {what} within a tenth of a cell at every tip, as of {place}"
+
+
+def cannot_go_on(step: Step, reason: object) -> str:
+    """Why a run ends whose cracks cannot be advanced, or solved."""
+    return f"the cracks cannot go on after step {step.index}, N = {step.cycles:.6g}: {reason}"
+
+
+def driving_place(step: Step) -> tuple[int, int]:
+    """Crack and number of the solved station that is nearest to the one that drives the plan."""
+    stations, row = solves_of(step)[0], plan_of(step).tip
+    c = int(stations.crack[row])
+    away = np.linalg.norm(step.sif[0][c].x - stations.x[row], axis=1)
+    return c, int(np.argmin(away))
+
+
+def short_kink(rule: GrowthRule, step: Step) -> str:
+    """What to warn of where the fastest tip turns within one cell; empty where it does not."""
+    c, j = driving_place(step)
+    da, angle = step.da[c][j], step.angle[c][j]
+    ahead = growth_directions(step, c)[[j]]
+    middle = step.sif[0][c].x[[j]] + 0.5 * da * ahead
+    extent = float(cell_extents(rule.problem.mesh, middle, ahead)[0])
+    if da >= extent or abs(angle) <= _TURN:
+        return ""
+    place = place_name(step, c, j)
+    return (
+        f"the advance {da:.4g} at {place} is below one cell along the path ({extent:.4g}) and "
+        f"turns by {np.degrees(angle):.3g} degrees: K of the next step feels "
+        "the kink through one cell only. Take a larger da or a finer mesh around the tip."
+    )
+
+
+__all__ = [
+    "ENDS",
+    "Ligament",
+    "cannot_go_on",
+    "driving_place",
+    "end_of_run",
+    "left_the_body",
+    "ligaments",
+    "refusal_of",
+    "short_kink",
+]

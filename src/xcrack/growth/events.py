@@ -1,0 +1,299 @@
+"""What happens between two steps: ends that come to the boundary, and cracks that meet."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from xcrack.base.arrays import Floats, at, coordinates
+from xcrack.base.errors import GeometryError
+from xcrack.crack.crack import Crack, tip_frames
+from xcrack.crack.measures import exit_ahead, facet_names, front_ends
+from xcrack.crack.meetings import new_ends, new_unions
+from xcrack.crack.placing import place_crack
+from xcrack.fem.system import discretise
+from xcrack.growth import joins_3d
+from xcrack.growth.integrator import integrator_of
+from xcrack.growth.options import GrowthRule
+from xcrack.growth.step import Arrival, Join, Plan, Step, moved_places, plan_of
+from xcrack.linalg.rigid_motion import pieces
+from xcrack.mesh.distances import signed_in
+from xcrack.mesh.locate import Body
+from xcrack.mesh.mesh import Mesh
+from xcrack.model.problem import Problem
+
+_ROUND_OFF = 1e-12  # of the body: a place as near to zero is zero
+
+# Cracks that meet.
+
+
+def with_joins(rule: GrowthRule, step: Step, plan: Plan) -> Plan:
+    """A plan in which cracks that meet within it are joined.
+
+    Raises
+    ------
+    GeometryError
+        They meet, and what they would become cannot be made, or a load belongs to one of them.
+    """
+    if rule.problem.mesh.dim == 3:
+        return joins_3d.with_joins(rule, step, plan)
+    # In 2D tips have met in the advance itself, if the scene allows it.
+    unions = new_unions(step.corrected, plan.cracks)
+    if not unions:
+        return plan
+    hindrance = joins_3d.named_by_number(rule)
+    if not hindrance and isinstance(rule.problem.friction, Sequence):
+        hindrance = "friction differs between them: give one number for all cracks."
+    if hindrance:
+        (i, k), x = unions[0]
+        raise GeometryError(f"cracks {i} and {k} meet near {at(x)}, and {hindrance}")
+    return plan
+
+
+def joins_of(step: Step, problem: Problem) -> tuple[Join, ...]:
+    """Cracks that meet in the advance after a step: those of its plan, in 2D as they are placed."""
+    plan = plan_of(step)
+    if problem.mesh.dim == 3:
+        return plan.joins
+    N, index = step.cycles + plan.cycles, step.index + 1
+    ends = new_ends(step.corrected, problem.placed)
+    unions = new_unions(step.corrected, problem.placed)
+    return tuple(
+        [Join(index, N, tuple(x.tolist()), (min(c, on), max(c, on))) for c, on, x in ends]
+        + [Join(index, N, tuple(x.tolist()), pair) for pair, x in unions]
+    )
+
+
+def cut_off(step: Step, problem: Problem, joins: Sequence[Join]) -> str:
+    """Why a run ends in which cracks that met cut a piece off in 2D; empty where they do not."""
+    if not joins or problem.mesh.dim == 3:
+        return ""
+    space, _ = discretise(problem)
+    piece, n, part = pieces(space)
+    if n < 2 or n <= (pieces(step.solutions[0].space)[1] if step.solutions else 1):
+        return ""
+    k = int(np.argmin(part))
+    x = coordinates(space.node_points[piece == k].mean(axis=0))
+    words = "; ".join(map(str, joins))
+    return f"{words}: the piece around {x}, {100 * part[k]:.3g} % of the body, is cut off"
+
+
+# Ends that come to the boundary.
+
+_REACH = 2.0  # cells from a place along a front to those of the step before
+_BISECTIONS = 40
+_LONGER = (2.0, 4.0, 8.0)  # times an advance: ways on which the last pieces of a front leave
+
+
+@dataclass(frozen=True)
+class Arriving:
+    """An arrival during an advance that is not solved yet.
+
+    Attributes
+    ----------
+    crack, tip, x, name, ligament, end, label
+        As of `Arrival`.
+    part : float
+        Of the advance until then; above 1 where the boundary is a little farther.
+    """
+
+    crack: int
+    tip: int
+    x: tuple[float, ...]
+    name: str
+    ligament: float
+    part: float
+    end: int = -1
+    label: str = ""
+
+
+def arriving(step: Step, problem: Problem) -> list[Arriving]:
+    """Ends that come to the boundary in the advance after a step, with the facet sets there."""
+    plan, mesh = plan_of(step), problem.mesh
+    if mesh.dim == 2:
+        result = _arriving_tips(step, plan.cracks, problem.placed, mesh)
+    elif plan.apart:
+        scaled = replace(step, da=tuple(plan.part * da for da in step.da))
+        placed = [place_crack(crack, mesh) for crack in plan.apart]
+        result = _arriving_fronts(scaled, plan.apart, placed, mesh)
+    else:
+        result = _arriving_fronts(step, plan.cracks, problem.placed, mesh)
+    return [_named(step, each) for each in result]
+
+
+def _named(step: Step, one: Arriving) -> Arriving:
+    """The same with the identity of the end."""
+    if step.identities is None:
+        return one
+    number = one.tip
+    if step.cracks[one.crack].fronts is not None:
+        number = int(step.sif[0][one.crack].front[one.tip])
+    ends = step.identities.ends
+    if one.crack >= len(ends) or number >= len(ends[one.crack]):
+        return one
+    end = ends[one.crack][number]
+    return replace(one, end=end, label=step.identities.names[end])
+
+
+def arrivals_of(
+    rule: GrowthRule, last: Step, arriving: Sequence[Arriving], after: float | None
+) -> tuple[Arrival, ...]:
+    """When places come to the boundary.
+
+    Parameters
+    ----------
+    rule : GrowthRule
+    last : Step
+        Before the advance.
+    arriving : sequence of Arriving
+    after : float, optional
+        Cycles of the whole advance, where it was solved.
+    """
+    integrator, mesh = integrator_of(rule), rule.problem.mesh
+    result = []
+    for one in arriving:
+        N = last.cycles + integrator.cycles_until(rule, last, one.part, after)
+        x = tuple(0.0 if abs(v) < _ROUND_OFF * mesh.extent else v for v in one.x)
+        result.append(Arrival(one.crack, one.tip, x, one.name, one.ligament, N, one.end, one.label))
+    return tuple(result)
+
+
+def have_left(cracks: Sequence[Crack], placed: Sequence[Crack]) -> bool:
+    """Whether tips, or whole fronts, have left the body."""
+    return any(_gone(*pair) for pair in zip(cracks, placed, strict=True))
+
+
+def _gone(advanced: Crack, placed: Crack) -> list[int]:
+    """Numbers of the tips that have left the body; [0] where all fronts have."""
+    if advanced.fronts is not None:
+        return [0] if advanced.n_tips and not placed.n_tips else []
+    return [j for j, tip in enumerate(advanced.tips or ()) if tip not in (placed.tips or ())]
+
+
+def _arriving_tips(
+    last: Step, advanced: Sequence[Crack], placed: Sequence[Crack], mesh: Mesh
+) -> list[Arriving]:
+    """Tips that have left the body, and the part of their straight way that lies inside."""
+    result = []
+    for c, pair in enumerate(zip(advanced, placed, strict=True)):
+        start = _starts(last, advanced, c)
+        for j in _gone(*pair):
+            move = pair[0].points[(pair[0].tips or ())[j]] - start[j]
+            way = float(np.linalg.norm(move))
+            hit = exit_ahead(start[j], move / way, mesh) if way > 0 else None
+            if hit is not None:
+                x, name = hit
+                ligament = float(np.linalg.norm(x - start[j]))
+                result.append(Arriving(c, j, tuple(x.tolist()), name, ligament, ligament / way))
+    return result
+
+
+def _starts(last: Step, advanced: Sequence[Crack], c: int) -> Floats:
+    """Where the tips of an advanced crack were before `(f, 2)`."""
+    before = last.corrected
+    if [crack.n_tips for crack in before] == [crack.n_tips for crack in advanced]:
+        return tip_frames(before[c])[0]
+    # Tips have met and are gone: the nearest that was is the same one.
+    every = np.concatenate([tip_frames(crack)[0] for crack in before])
+    now = tip_frames(advanced[c])[0]
+    return every[[int(np.argmin(np.linalg.norm(every - x, axis=1))) for x in now]]
+
+
+def ended_crack(advanced: Crack, placed: Crack, arriving: Sequence[Arriving]) -> Crack:
+    """A crack that has left the body, as it ends there: in 2D where it meets the boundary."""
+    if placed.fronts is not None:
+        return placed
+    points = np.array(placed.points)
+    for each in arriving:
+        points[(advanced.tips or ())[each.tip]] = each.x
+    return Crack(points, placed.faces, ())
+
+
+def _arriving_fronts(
+    last: Step, advanced: Sequence[Crack], placed: Sequence[Crack], mesh: Mesh
+) -> list[Arriving]:
+    """Facet sets that a front has come to, each with the place along it that was first.
+
+    A front that has left the body as a whole comes with its last place.
+    """
+    body, (names, group) = Body.of(mesh), facet_names(mesh)
+    outer = np.nonzero(mesh.facet_to_cell[:, 1] < 0)[0]
+
+    def name_at(x: Floats) -> str:
+        return names[group[outer[signed_in(body.boundary, x[None])[1][0]]]]
+
+    result = []
+    for c, pair in enumerate(zip(advanced, placed, strict=True)):
+        start, move = last.sif[0][c].x, moved_places(last, c) - last.sif[0][c].x
+        part_inside = _parts(start, move, body)
+        x = start + np.minimum(part_inside, 1.0)[:, None] * move
+        if _gone(*pair):
+            result += [
+                Arriving(c, place, tuple(y.tolist()), name_at(y), way, part)
+                for place, y, way, part in _last_out(start, move, part_inside, body)
+            ]
+            continue
+        before = [x for _, x in front_ends(last.corrected[c], body)]
+        known = {name_at(each) for each in before}
+        reach = 2.0 * float(np.linalg.norm(move, axis=1).max(initial=0.0))
+        for _, end in front_ends(pair[1], body):
+            name, near = name_at(end), reach + _REACH * float(body.cell_size(end[None])[0])
+            away = min((float(np.linalg.norm(end - each)) for each in before), default=np.inf)
+            if name in known and away <= near:
+                continue
+            known.add(name)
+            before.append(end)
+            gap = np.linalg.norm(x - end, axis=1)
+            out = np.isfinite(part_inside) & (gap <= near + reach)
+            out &= np.array([bool(o) and name_at(each) == name for o, each in zip(out, x)], bool)
+            place = int(np.argmin(np.where(out, part_inside, np.inf) if out.any() else gap))
+            there, part = (x[place], float(part_inside[place])) if out.any() else (end, 1.0)
+            way = float(np.linalg.norm(there - start[place]))
+            result.append(Arriving(c, place, tuple(there.tolist()), name, way, part))
+    return result
+
+
+def _last_out(
+    start: Floats, move: Floats, part: Floats, body: Body
+) -> list[tuple[int, Floats, float, float]]:
+    """The place of a front that leaves the body last: number, where, its way, part of the move.
+
+    The last pieces of a front are too short for the mesh: they go on straight.
+    """
+    part = np.array(part)
+    for longer in _LONGER:
+        inside = np.isinf(part)
+        part[inside] = longer * _parts(start[inside], longer * move[inside], body)
+    part[np.isinf(part)] = -1.0  # it waits, or runs along a side
+    if not len(part) or part.max() < 0:
+        return []
+    place = int(np.argmax(part))
+    y = start[place] + part[place] * move[place]
+    return [(place, y, float(np.linalg.norm(y - start[place])), float(part[place]))]
+
+
+def _parts(start: Floats, move: Floats, body: Body) -> Floats:
+    """Part of a move after which each place is outside the body; inf where it stays inside."""
+    part = np.full(len(start), np.inf)
+    if not len(start):
+        return part
+    out = np.nonzero((body.depth(start)[0] < 0) & (body.depth(start + move)[0] >= 0))[0]
+    low, high = np.zeros(len(out)), np.ones(len(out))
+    for _ in range(_BISECTIONS):
+        middle = 0.5 * (low + high)
+        outside = body.depth(start[out] + middle[:, None] * move[out])[0] >= 0
+        low, high = np.where(outside, low, middle), np.where(outside, middle, high)
+    part[out] = high
+    return part
+
+
+__all__ = [
+    "Arriving",
+    "arrivals_of",
+    "arriving",
+    "cut_off",
+    "ended_crack",
+    "have_left",
+    "joins_of",
+    "with_joins",
+]

@@ -1,0 +1,763 @@
+"""Growth of second order at one solve a step, of fronts of 3D cracks.
+
+A step advances the corrected fronts of the last one by the rates known there, solves, and advances
+the same fronts again by the rates at both ends, which are carried along the strip between the two.
+"""
+
+from collections.abc import Sequence
+from dataclasses import fields, replace
+
+import numpy as np
+from scipy.special import exprel
+
+from xcrack.base.arrays import Bools, Floats, Ints
+from xcrack.base.errors import GeometryError
+from xcrack.crack.advance_3d import advance_fronts
+from xcrack.crack.crack import Crack
+from xcrack.crack.measures import crack_size
+from xcrack.crack.meetings import LEAST
+from xcrack.crack.placing import place_crack
+from xcrack.crack.stations import closed_fronts, front_frames
+from xcrack.fatigue.retardation import (
+    POINTS,
+    BlockCycles,
+    CycleIntegration,
+    OverloadZones,
+    march,
+    no_zones,
+)
+from xcrack.growth.corrected import Corrected
+from xcrack.growth.front_filter import (
+    FrontWaves,
+    corrected,
+    predicted,
+    response,
+    turning_of,
+    without_noise,
+)
+from xcrack.growth.options import GrowthRule
+from xcrack.growth.rates import Rates, block_order, kinds_of
+from xcrack.growth.solves import SolveHistory
+from xcrack.growth.stations import GrowthStations, Identities, directions
+from xcrack.growth.step import Plan, Step, StepError, plan_of, solves_of
+from xcrack.growth.step_length import first_control, longest, next_control, share_left
+from xcrack.mesh.distances import front_distance
+from xcrack.mesh.locate import cell_sizes, contains
+from xcrack.mesh.mesh import Mesh
+
+WAITS_BELOW = 0.02  # of a cell: neighbours along a front move on, so a slow part has to follow
+REACH = 2.0  # cells from a place along a front to those that values are carried from
+
+_SPACING = 0.5  # of a cell, between the points of a new front
+_SHORTEST = 0.6  # cells: a shorter step of a front would end in those in which it began
+
+# Values along fronts, from one to the next.
+
+
+def interpolate_along_front(
+    x: Floats,
+    front: Ints,
+    closed: Sequence[bool],
+    values: Floats,
+    target: Floats,
+    reach: float,
+) -> Floats:
+    """Values along fronts, taken over to points nearby, as those of the fronts after a step.
+
+    Parameters
+    ----------
+    x : (f, 3) array, length
+        Places with values, in order along each front.
+    front : (f,) array of int
+        Which front.
+    closed : sequence of bool
+        Whether each front is closed.
+    values : (f,) or (f, m) array
+    target : (g, 3) array, length
+        Where values are sought.
+    reach : float, length
+        A point farther from all places than this gets none.
+
+    Returns
+    -------
+    (g,) or (g, m) array
+        Linear between the places, nan beyond reach.
+    """
+    result = np.full((len(target), *values.shape[1:]), np.nan)
+    best = np.full(len(target), float(reach))
+    for number in np.unique(front):
+        own = front == number
+        line, along = x[own], values[own]
+        if len(line) == 1:
+            line, along = np.concatenate([line, line]), np.concatenate([along, along])
+        shut = bool(closed[number]) and len(line) > 2
+        r, segment, place = front_distance(target, line, shut)
+        following = (segment + 1) % len(line)
+        place = np.nan_to_num(place).reshape(-1, *[1] * (values.ndim - 1))
+        first, second = along[segment], along[following]
+        with np.errstate(invalid="ignore"):  # inf where the toughness is reached
+            between = (1 - place) * first + place * second
+        value = np.where(place == 0, first, np.where(place == 1, second, between))
+        nearer = r <= best
+        result[nearer], best[nearer] = value[nearer], r[nearer]
+    return result
+
+
+def _near(part: GrowthStations, values: Floats, x: Floats, mesh: Mesh) -> Floats:
+    """Values at the stations of a crack at points beside them; nan where there are none."""
+    if not len(part.x):
+        return np.full((len(x), *values.shape[1:]), np.nan)
+    reach = REACH * float(cell_sizes(mesh, part.x).mean())
+    return interpolate_along_front(part.x, part.front, _closed(part), values, x, reach)
+
+
+def _closed(part: GrowthStations) -> list[bool]:
+    """Of each front of a crack whether it is closed."""
+    result = [False] * (int(part.front.max(initial=-1)) + 1)
+    for number, closed in zip(part.front.tolist(), part.closed.tolist(), strict=True):
+        result[number] = closed
+    return result
+
+
+def front_lengths(crack: Crack) -> Floats:
+    """Length of each front, length."""
+    fronts = [crack.points[front] for front in crack.fronts or ()]
+    return np.array([np.linalg.norm(np.diff(x, axis=0), axis=1).sum() for x in fronts])
+
+
+# Stations and solves of the cracks as they were solved, and as they are corrected.
+
+
+def _solved(
+    rule: GrowthRule, rates: Rates, identities: Identities, sigma: float
+) -> tuple[GrowthStations, SolveHistory]:
+    """All fronts as they were solved."""
+    at = rates.stations
+    n = len(at)
+    angle, closed, length = np.zeros(n), np.zeros(n, dtype=bool), np.zeros(n)
+    for c, crack in enumerate(rates.cracks):
+        rows = at.crack == c
+        shut, whole = np.array(closed_fronts(crack), dtype=bool), front_lengths(crack)
+        states = [state[c] for state in rates.sif]
+        most = max(states, key=lambda each: each.K_I.max(initial=-np.inf))
+        angle[rows] = without_noise(most, rates.angle[rows], shut, whole)
+        closed[rows], length[rows] = shut[at.front[rows]], whole[at.front[rows]]
+    stations = GrowthStations(
+        crack=at.crack,
+        front=at.front,
+        s=at.s,
+        x=at.x,
+        frame=at.frame,
+        end=identities.of(at),
+        closed=closed,
+        length=length,
+        offset=np.zeros_like(at.x),
+        fresh=np.zeros(n, dtype=bool),
+    )
+    solves = SolveHistory(
+        sigma=np.array([sigma]),
+        rate=rates.law_rate[None],
+        dK_eq=rates.dK_eq[None],
+        direction=directions(at.frame, angle)[None],
+        scale=np.array(rates.problem.sizes)[at.crack],
+        bend=np.zeros(n),
+        exponent=rates.exponent(rule.law),
+        kinds=kinds_of(rule, rates),
+    )
+    return stations, solves
+
+
+def _corrected_part(
+    rule: GrowthRule,
+    c: int,
+    crack: Crack,
+    identities: Identities,
+    solved: tuple[GrowthStations, SolveHistory],
+    before: GrowthStations,
+    waits: Floats,
+) -> tuple[GrowthStations, SolveHistory]:
+    """Stations of a corrected crack, with what was solved close by."""
+    here, solves = solved
+    mesh, fronts = rule.problem.mesh, front_frames(crack)
+    x = np.concatenate([front.x for front in fronts])
+    count = [len(front.x) for front in fronts]
+    number = np.repeat(np.arange(len(fronts)), count)
+    rate = _near(here, solves.rate[0], x, mesh)
+    there = ~np.isnan(rate) & contains(mesh, x)
+    x, number = x[there], number[there]
+    lengths = front_lengths(crack)
+    part = GrowthStations(
+        crack=np.full(len(x), c),
+        front=number,
+        s=np.concatenate([front.s[: len(front.x)] for front in fronts])[there],
+        x=x,
+        frame=np.concatenate([front.frame for front in fronts])[there],
+        end=np.array(identities.ends[c], dtype=np.int64)[number],
+        closed=np.array(closed_fronts(crack), dtype=bool)[number],
+        length=lengths[number],
+        offset=np.zeros_like(x),
+        fresh=np.zeros(len(x), dtype=bool),
+    )
+    direction = np.stack(
+        [_near(here, solves.direction[0][:, k], x, mesh) for k in range(3)], axis=1
+    )
+    rest = np.nan_to_num(_near(before, waits, x, mesh))
+    unit = direction / np.linalg.norm(direction, axis=1)[:, None]
+    part = replace(part, offset=rest[:, None] * unit)
+    return part, replace(
+        solves,
+        rate=rate[there][None],
+        dK_eq=_near(here, solves.dK_eq[0], x, mesh)[None],
+        direction=direction[None],
+        scale=np.full(len(x), crack_size(crack, mesh)),
+        bend=np.zeros(len(x)),
+        kinds=None,
+    )
+
+
+def _kinds_near(
+    solved: GrowthStations, kinds: BlockCycles, x: Floats, lost: BlockCycles | None = None
+) -> BlockCycles:
+    """Cycles of a block of a crack at some places, linear between those that were solved."""
+    if not len(solved.x):
+        return kinds if lost is None else lost
+    p = kinds.dK.shape[2]
+    values = np.concatenate([kinds.dK[0], kinds.R[0]], axis=1)
+    near = interpolate_along_front(solved.x, solved.front, _closed(solved), values, x, np.inf)
+    a = np.full((1, len(x)), float(kinds.a.flat[0]))
+    return BlockCycles(near[None, :, :p], near[None, :, p:], a)
+
+
+def _all_kinds(parts: Sequence[BlockCycles]) -> BlockCycles:
+    names = ("dK", "R", "a")
+    return BlockCycles(*(np.concatenate([getattr(k, n) for k in parts], axis=1) for n in names))
+
+
+def _whole(
+    parts: Sequence[tuple[GrowthStations, SolveHistory]],
+) -> tuple[GrowthStations, SolveHistory]:
+    """Stations and solves of all cracks."""
+    stations = GrowthStations(
+        *(
+            np.concatenate([getattr(part[0], f.name) for part in parts])
+            for f in fields(GrowthStations)
+        )
+    )
+    solves = [part[1] for part in parts]
+
+    def rows(name: str, axis: int) -> Floats:
+        return np.concatenate([getattr(each, name) for each in solves], axis=axis)
+
+    return stations, replace(
+        solves[0],
+        rate=rows("rate", 1),
+        dK_eq=rows("dK_eq", 1),
+        direction=rows("direction", 1),
+        scale=rows("scale", 0),
+        bend=rows("bend", 0),
+        kinds=None,
+    )
+
+
+def _part(of: tuple[GrowthStations, SolveHistory], c: int) -> tuple[GrowthStations, SolveHistory]:
+    """Stations and solves of one crack."""
+    stations, solves = of
+    rows = stations.crack == c
+    return stations.at(rows), replace(
+        solves,
+        rate=solves.rate[:, rows],
+        dK_eq=solves.dK_eq[:, rows],
+        direction=solves.direction[:, rows],
+        scale=solves.scale[rows],
+        bend=solves.bend[rows],
+        kinds=None if solves.kinds is None else solves.kinds.at(rows),
+    )
+
+
+def _rate(rule: GrowthRule, solves: SolveHistory) -> Floats:
+    """Rates after the threshold `(n,)`."""
+    return np.where(solves.dK_eq[-1] < rule.threshold, 0.0, solves.rate[-1])
+
+
+def _angle(stations: GrowthStations, solves: SolveHistory) -> Floats:
+    return solves.angles(stations.frame)[-1]
+
+
+def _move(stations: GrowthStations, angle: Floats, way: Floats) -> Floats:
+    """Moves `(n, 3)` by ways at angles."""
+    t, n = stations.frame[:, 0], stations.frame[:, 1]
+    return np.asarray(way[:, None] * (np.cos(angle)[:, None] * t + np.sin(angle)[:, None] * n))
+
+
+# The next step.
+
+
+def predict(rule: GrowthRule, step: Step) -> Plan:
+    """The next step by the rates at its beginning."""
+    stations, solves = solves_of(step)
+    rate, cell = _rate(rule, solves), cell_sizes(rule.problem.mesh, stations.x)
+    fastest = float(rate.max(initial=0.0))
+    n = len(stations)
+    still = np.zeros(n)
+    plan = Plan(
+        solves.start, 0.0, 0.0, still, 0 * stations.x, still > 0, cell, 0, 0.0, step.corrected
+    )
+    if fastest == 0 or np.isinf(fastest):
+        stopped = rule.retardation is not None and fastest == 0
+        return replace(plan, limit="arrest" if stopped else "")
+    by_cycles = np.inf if rule.cycles is None else rule.cycles * fastest
+    largest = float(min(longest(rule, step.control), by_cycles))
+    row = int(np.argmax(rate))
+    way = part_of_advance(rule, step, largest)
+    plan = replace(
+        plan,
+        length=largest,
+        cycles=largest / fastest,
+        arc=way,
+        move=_move(stations, _angle(stations, solves), way),
+        moves=_wanted(rule, step, largest)[1],
+        tip=row,
+        largest=largest,
+    )
+    if largest < LEAST * cell[row]:
+        return replace(plan, limit="short")
+    try:
+        return replace(plan, cracks=tuple(advanced(rule, step, way)))
+    except GeometryError as error:
+        return replace(plan, limit="geometry", refusal=str(error))
+
+
+def _wanted(rule: GrowthRule, step: Step, largest: float) -> tuple[Floats, Bools]:
+    """Advance with the growth that has waited `(n,)`, and which stations move."""
+    stations, solves = solves_of(step)
+    rate = _rate(rule, solves)
+    wanted = stations.waits + largest * (rate / rate.max())
+    return wanted, wanted >= WAITS_BELOW * cell_sizes(rule.problem.mesh, stations.x)
+
+
+def part_of_advance(rule: GrowthRule, step: Step, largest: float, part: float = 1.0) -> Floats:
+    """Advance at the stations `(n,)` over a step, or over a part of it, length."""
+    stations, solves = solves_of(step)
+    wanted, goes = _wanted(rule, step, largest)
+    da = part * np.where(goes, wanted, 0.0)
+    way = np.array(da)
+    for rows, front in _waves(stations, solves, da):
+        way[rows] = np.where(da[rows] > 0, predicted(front, stations.s[rows], da[rows]), 0.0)
+    return way
+
+
+def advanced(rule: GrowthRule, step: Step, way: Floats) -> list[Crack]:
+    """The cracks of a step after its stations have advanced."""
+    stations, solves = solves_of(step)
+    angle = _angle(stations, solves)
+    return [
+        advanced_crack(crack, stations, c, angle, way, rule.problem.mesh)
+        for c, crack in enumerate(step.corrected)
+    ]
+
+
+def partly_advanced(rule: GrowthRule, step: Step, plan: Plan, part: float) -> list[Crack]:
+    """The cracks after a part of a planned advance."""
+    return advanced(rule, step, part_of_advance(rule, step, plan.largest, part))
+
+
+def advanced_crack(
+    crack: Crack, stations: GrowthStations, c: int, angle: Floats, way: Floats, mesh: Mesh
+) -> Crack:
+    """A crack after the advance of its fronts at stations along them."""
+    rows = stations.crack == c
+    if not rows.any():
+        return crack
+    size = _SPACING * float(cell_sizes(mesh, stations.x[rows]).mean())
+    s, front = stations.s[rows], stations.front[rows]
+    return advance_fronts(crack, s, front, angle[rows], way[rows], size)
+
+
+def _waves(
+    stations: GrowthStations, solves: SolveHistory, advance: Floats
+) -> list[tuple[Ints, FrontWaves | None]]:
+    """Rows of each front, and how its advance answers to its own change of shape."""
+    result = []
+    for end in np.unique(stations.crack * 10**6 + stations.front):
+        rows = np.nonzero(stations.crack * 10**6 + stations.front == end)[0]
+        closed, s = bool(stations.closed[rows[0]]), stations.s[rows]
+        order = np.argsort(s)
+        turning = turning_of(stations.x[rows][order], closed) if len(rows) > 2 else 0.0
+        length = float(stations.length[rows[0]])
+        waves = response(s, advance[rows], solves.exponent, turning, closed, length)
+        result.append((rows, waves))
+    return result
+
+
+def ends_of(step: Step, plan: Plan) -> Floats:
+    """Where the fronts at the stations come to `(n, 3)`."""
+    stations = solves_of(step)[0]
+    return stations.x + plan.move
+
+
+def advance_of(step: Step, plan: Plan, rates: Rates) -> Floats:
+    """Advance to the next step at the stations that were solved `(n,)`, length."""
+    stations = solves_of(step)[0]
+    mesh, at = rates.problem.mesh, rates.stations
+    parts = [np.zeros(0)]
+    for c in range(len(rates.cracks)):
+        rows = stations.crack == c
+        near = _near(stations.at(rows), plan.arc[rows], at.x[at.crack == c], mesh)
+        parts.append(np.nan_to_num(near))
+    return np.concatenate(parts)
+
+
+# A solve: correct the step that led there.
+
+
+def begin(rule: GrowthRule, rates: Rates, identities: Identities) -> Corrected:
+    """The first step of a run."""
+    none = rates.split(np.zeros(len(rates.stations)))
+    return begin_at(rule, rates, identities, 0.0, StepError(none, 0.0))
+
+
+def begin_at(
+    rule: GrowthRule, rates: Rates, identities: Identities, cycles: float, error: StepError
+) -> Corrected:
+    """A step before which there is nothing to correct."""
+    stations, solves = _solved(rule, rates, identities, 0.0)
+    zones = None if rule.retardation is None else no_zones(len(stations))
+    size = min((rates.problem.sizes[c] for c in set(stations.crack.tolist())), default=np.inf)
+    solves = _with_mean_rates(rule, stations, solves, zones)
+    control = first_control(rule, size, _shortest(rule, stations, solves), np.inf)
+    return Corrected(cycles, rates.cracks, stations, solves, error, control, zones)
+
+
+def _shortest(rule: GrowthRule, stations: GrowthStations, solves: SolveHistory) -> float:
+    """Shortest step of the fastest station, length."""
+    if not len(stations):
+        return 0.0
+    fastest = stations.x[[int(np.argmax(_rate(rule, solves)))]]
+    return _SHORTEST * float(cell_sizes(rule.problem.mesh, fastest)[0])
+
+
+def correct(rule: GrowthRule, last: Step, rates: Rates, identities: Identities) -> Corrected:
+    """Advance the fronts of the last step again, now by the rates at both ends of the step."""
+    plan, (stations, solves) = plan_of(last), solves_of(last)
+    error = StepError((), 0.0) if last.error is None else last.error
+    solved = _solved(rule, rates, identities, plan.end)
+    here = [_part(solved, c) for c in range(len(rates.cracks))]
+    first_rate = _rate(rule, solves)
+    fastest = float(first_rate.max(initial=0.0))
+    rate, direction = _carried_back(rule, last, rates, here)
+    cycles, own = _cycles(rule, last, rates)
+    share = plan.length / rate.max(initial=0.0) * rate if rate.max(initial=0.0) > 0 else None
+    marched = None
+    if rule.retardation is not None and 0 < fastest < np.inf:
+        marched = _overloads_between(rule, last, rates, here)
+        rate = rate_at_end(first_rate, marched[0], plan.cycles)
+        share = plan.length / fastest * rate
+        cycles, own = marched[1], share_left(rule) * beyond_trapezoid(marched[1], plan.cycles)
+    if np.isinf(rates.rate).any() or fastest == 0:
+        share = None
+    parts, cracks, zones = [], [], []
+    gap, way = np.zeros(len(stations)), np.array(plan.arc)
+    for c in range(len(rates.cracks)):
+        rows = stations.crack == c
+        again = None
+        if share is not None and rows.any():
+            again = _again(rule, last, c, rates.cracks[c], share, direction)
+        part = here[c]
+        if again is None:
+            crack = rates.cracks[c]
+            waits = np.where(plan.moves[rows], 0.0, _wanted(rule, last, plan.length)[0][rows])
+            near = _near(stations.at(rows), waits, part[0].x, rule.problem.mesh)
+            part = (
+                replace(part[0], offset=np.nan_to_num(near)[:, None] * part[1].direction[0]),
+                part[1],
+            )
+        else:
+            crack, waits, gap[rows], way[rows] = again
+            before = stations.at(rows)
+            part = _corrected_part(rule, c, crack, identities, part, before, waits)
+        if marched is not None:
+            moved = (stations.x + plan.move)[rows]
+            arc, left = marched[0][rows], marched[2].at(rows)
+            zones.append(zones_onto(left, arc, way[rows], moved, part[0].x))
+        cracks.append(crack)
+        parts.append(part)
+    after, later = _whole(parts)
+    if rule.retardation is not None:
+        kinds = [
+            _kinds_near(each[0], _kinds(each[1]), part[0].x)
+            for each, part in zip(here, parts, strict=True)
+        ]
+        later = replace(later, kinds=_all_kinds(kinds))
+    remaining = _all_zones(zones) if zones else None
+    if rule.retardation is not None and remaining is None:
+        remaining = no_zones(len(after))
+    later = _with_mean_rates(rule, after, later, remaining)
+    off = share_left(rule) * float(gap.max(initial=0.0))
+    control = next_control(
+        rule, last.control, plan.length, off, own, cycles, last.cycles,
+        _shortest(rule, after, later), np.inf,
+    )  # fmt: skip
+    place = _errors_at(rule, last, rates, gap)
+    return Corrected(
+        last.cycles + cycles, tuple(cracks), after, later,
+        StepError(place, error.cycles + own), control, remaining,
+    )  # fmt: skip
+
+
+def _carried_back(
+    rule: GrowthRule,
+    last: Step,
+    rates: Rates,
+    here: Sequence[tuple[GrowthStations, SolveHistory]],
+) -> tuple[Floats, Floats]:
+    """Rates (n,) and directions (n, 3) at the end of a step, at the stations of its beginning."""
+    plan, (stations, solves) = plan_of(last), solves_of(last)
+    mesh, first = rates.problem.mesh, _rate(rule, solves)
+    rate, direction = np.array(first), np.array(solves.direction[-1])
+    for c, (part, values) in enumerate(here):
+        rows = np.nonzero(stations.crack == c)[0]
+        target = (stations.x + plan.move)[rows]
+        law_rate = _near(part, values.rate[0], target, mesh)
+        lost = np.isnan(law_rate)
+        near = np.nan_to_num(_near(part, _rate(rule, values), target, mesh))
+        rate[rows] = np.where(lost, first[rows], near)
+        heading = np.stack(
+            [_near(part, values.direction[0][:, k], target, mesh) for k in range(3)], axis=1
+        )
+        direction[rows] = np.where(lost[:, None], solves.direction[-1][rows], heading)
+    return rate, direction
+
+
+def _again(
+    rule: GrowthRule, last: Step, c: int, solved: Crack, share: Floats, later: Floats
+) -> tuple[Crack, Floats, Floats, Floats] | None:
+    """The corrected crack, growth that waits at the old places, how far these are moved, and grow.
+
+    None where the crack that was solved has other fronts: there is nothing to correct.
+    """
+    plan, (stations, solves) = plan_of(last), solves_of(last)
+    mesh, rows = rule.problem.mesh, stations.crack == c
+    rate = _rate(rule, solves)
+    first = plan.length / rate.max() * rate
+    way = 0.5 * (first + share)
+    for own, front in _waves(stations, solves, first):
+        way[own] = corrected(front, stations.s[own], first[own], share[own])
+    wanted = stations.waits + way
+    goes = wanted >= WAITS_BELOW * plan.cell
+    heading = first[:, None] * solves.direction[-1] + share[:, None] * later
+    along = np.einsum("ij,ij->i", heading, stations.frame[:, 0])
+    across = np.einsum("ij,ij->i", heading, stations.frame[:, 1])
+    ahead = _angle(stations, solves)
+    angle = np.where(np.hypot(along, across) == 0, ahead, np.arctan2(across, along))
+    try:
+        moved = np.where(goes, wanted, 0.0)
+        crack = advanced_crack(last.corrected[c], stations, c, angle, moved, mesh)
+        again = place_crack(crack, mesh)
+    except GeometryError:
+        return None
+    if closed_fronts(again) != closed_fronts(solved):
+        return None
+    gap = np.linalg.norm(plan.move - _move(stations, angle, wanted), axis=1)
+    waits, gap = np.where(goes, 0.0, wanted), np.where(goes, gap, 0.0)
+    return again, waits[rows], gap[rows], way[rows]
+
+
+def _errors_at(rule: GrowthRule, last: Step, rates: Rates, gap: Floats) -> tuple[Floats, ...]:
+    """Estimated error of the places that were solved, with what this step adds."""
+    stations, mesh = solves_of(last)[0], rates.problem.mesh
+    result = []
+    for c in range(len(rates.cracks)):
+        rows = stations.crack == c
+        x, old = rates.sif[0][c].x, last.sif[0][c]
+        adds = _near(stations.at(rows), share_left(rule) * gap[rows], x, mesh)
+        adds = np.nan_to_num(adds)
+        if len(old.x) and last.error is not None:
+            reach = 2 * REACH * float(cell_sizes(mesh, old.x).mean())
+            reach += float(gap[rows].max(initial=0.0))
+            before, closed = last.error.place[c], closed_fronts(last.cracks[c])
+            near = interpolate_along_front(old.x, old.front, closed, before, x, reach)
+            adds = adds + np.nan_to_num(near)
+        result.append(np.asarray(adds))
+    return tuple(result)
+
+
+def _cycles(rule: GrowthRule, last: Step, rates: Rates) -> tuple[float, float]:
+    """Cycles of a step by the largest rates at both ends, and what they add to the error.
+
+    All places advance in proportion to these, and without the response of the front: so the
+    scatter of the largest of many rates costs nothing. The rate is taken as a power of the size of
+    the crack, which is proportional to the advance within the step.
+    """
+    plan, (stations, solves) = plan_of(last), solves_of(last)
+    c = int(stations.crack[plan.tip])
+    before, later = float(solves.rate[-1].max()), float(rates.law_rate.max(initial=0.0))
+    by_first_rate = plan.length / before
+    if later == 0:
+        return 2 * by_first_rate, 0.0
+    if np.isinf(later):
+        return 0.5 * by_first_rate, 0.0
+    x = np.log(rates.problem.sizes[c] / float(solves.scale[plan.tip]))
+    y = np.log(later / before)
+    cycles = by_first_rate * float(exprel(x - y) / exprel(x))
+    trapezoid = 0.5 * plan.length * (1 / before + 1 / later)
+    return cycles, share_left(rule) * abs(cycles - trapezoid)
+
+
+def cycles_until(rule: GrowthRule, step: Step, part: float, after: float | None) -> float:
+    """Cycles of a part of the advance after a step, in proportion to it."""
+    del rule
+    return part * (plan_of(step).cycles if after is None else after)
+
+
+# Overloads along fronts: rates as means over a step, and zones carried from front to front.
+
+
+def _kinds(solves: SolveHistory) -> BlockCycles:
+    assert solves.kinds is not None
+    return solves.kinds
+
+
+def _all_zones(parts: Sequence[OverloadZones]) -> OverloadZones:
+    since, size, K = (
+        np.concatenate([getattr(z, name) for z in parts]) for name in ("since", "size", "K")
+    )
+    return OverloadZones(since, size, K, parts[0].position, parts[0].part)
+
+
+def _with_mean_rates(
+    rule: GrowthRule, stations: GrowthStations, solves: SolveHistory, zones: OverloadZones | None
+) -> SolveHistory:
+    """The same with rates that are means over the step ahead, as K at its begin leads to.
+
+    All are 0 where the growths of a step take more cycles than can be counted.
+    """
+    fastest = float(_rate(rule, solves).max(initial=0.0))
+    if rule.retardation is None or zones is None or not 0 < fastest < np.inf:
+        return solves
+    length = np.inf if rule.da is None else rule.da
+    blocks = np.inf if rule.cycles is None else rule.cycles
+    length = min(length, blocks * fastest)
+    ratio = np.ones(len(stations))
+    ahead = _marched(rule, solves, [_kinds(solves)], zones, length, ratio, blocks)
+    cycles = float(ahead.cycles[-1])
+    grows = cycles > 0 and (ahead.reached >= length or cycles >= blocks * (1 - 1e-9))
+    rate = ahead.arc[-1] / cycles if grows else 0.0 * ahead.arc[-1]
+    return replace(solves, rate=rate[None])
+
+
+def _overloads_between(
+    rule: GrowthRule,
+    last: Step,
+    rates: Rates,
+    here: Sequence[tuple[GrowthStations, SolveHistory]],
+) -> tuple[Floats, float, OverloadZones]:
+    """Growth of the stations of a step with K between that of its begin and that of its end.
+
+    Returns
+    -------
+    arc : (n,) array, length
+    blocks : float
+    zones : OverloadZones
+        At the stations when they have grown by `arc`.
+    """
+    plan, (stations, solves) = plan_of(last), solves_of(last)
+    first = _kinds(solves)
+    later, ratio = [], np.ones(len(stations))
+    for c, (part, values) in enumerate(here):
+        rows = np.nonzero(stations.crack == c)[0]
+        moved = (stations.x + plan.move)[rows]
+        later.append(_kinds_near(part, _kinds(values), moved, first.at(rows)))
+        ratio[rows] = rates.problem.sizes[c] / solves.scale[rows]
+    assert last.zones is not None
+    done = _marched(
+        rule, solves, [first, _all_kinds(later)], last.zones, plan.length, ratio, np.inf
+    )
+    rest = plan.length / done.reached if 0 < done.reached < plan.length else 1.0
+    return rest * done.arc[-1], rest * float(done.cycles[-1]), done.zones
+
+
+def rate_at_end(rate: Floats, arc: Floats, blocks: float) -> Floats:
+    """Rates that, as a mean with those of the begin, let stations grow by an arc in some blocks."""
+    return np.maximum(2 * arc / blocks - rate, 0.0)
+
+
+def beyond_trapezoid(blocks: float, expected: float) -> float:
+    """Blocks of a step by a power of the rates at both ends, against the mean of their inverses."""
+    return abs(0.5 * (expected + blocks**2 / expected) - blocks)
+
+
+def zones_onto(
+    zones: OverloadZones, arc: Floats, way: Floats, moved: Floats, x: Floats
+) -> OverloadZones:
+    """What overloads have left, at the places of the next front.
+
+    Parameters
+    ----------
+    zones : OverloadZones
+        At the places of the last front, after growth by `arc`.
+    arc, way : (f,) arrays, length
+        Growth that was marched, and the advance that the whole front made of it.
+    moved : (f, 3) array, length
+        Where these places have come to.
+    x : (g, 3) array, length
+        Places of the next front: each takes over from the nearest.
+    """
+    if not len(moved):
+        return replace(no_zones(len(x)), position=zones.position, part=zones.part)
+    within = np.minimum(zones.since, arc)
+    share = np.divide(within, arc, out=np.zeros_like(arc), where=arc > 0)
+    since = np.maximum(zones.since + share * (way - arc), 0.0)
+    nearest = np.linalg.norm(x[:, None] - moved, axis=2).argmin(axis=1)
+    return replace(zones.at(nearest), since=since[nearest])
+
+
+def _marched(
+    rule: GrowthRule,
+    solves: SolveHistory,
+    kinds: Sequence[BlockCycles],
+    zones: OverloadZones,
+    length: float,
+    ratio: Floats,
+    blocks: float,
+) -> CycleIntegration:
+    """All stations of all fronts; rates are powers of the sizes of the cracks."""
+    every = BlockCycles(
+        *(np.concatenate([getattr(each, name) for each in kinds]) for name in ("dK", "R", "a"))
+    )
+    t = np.linspace(0.0, 1.0, POINTS)[:, None]
+    even = np.abs(ratio - 1) < 1e-6
+    safe = np.where(even, 2.0, ratio)
+    x = np.where(even, t, np.log1p(t * (safe - 1)) / np.log(safe))
+    nodes = np.repeat(np.arange(float(len(kinds)))[:, None], len(ratio), axis=1)
+    return march(
+        rule.law,
+        rule.retardation,
+        block_order(rule),
+        every,
+        nodes,
+        x,
+        zones,
+        length,
+        exponent=solves.exponent,
+        threshold=rule.threshold,
+        blocks=blocks,
+    )
+
+
+__all__ = [
+    "advance_of",
+    "advanced",
+    "begin",
+    "begin_at",
+    "beyond_trapezoid",
+    "correct",
+    "cycles_until",
+    "ends_of",
+    "front_lengths",
+    "interpolate_along_front",
+    "part_of_advance",
+    "partly_advanced",
+    "predict",
+    "rate_at_end",
+    "zones_onto",
+]

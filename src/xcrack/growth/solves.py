@@ -1,0 +1,372 @@
+"""What the last solves say of growth over a piece of σ: by rates, or cycle by cycle with overloads.
+
+σ is the integral of the largest rate over the cycles: the arc of the ends that drive, one after the
+other, so that a change of the one that drives is no event.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from xcrack.base.arrays import Floats
+from xcrack.fatigue.retardation import POINTS, BlockCycles, CycleIntegration, OverloadZones, march
+from xcrack.growth.options import GrowthRule
+from xcrack.growth.rates import block_order
+
+KEPT = 3  # solves: a parabola passes through three points
+
+_TINY = 1e-3  # of the largest rate: the logarithm of a smaller one says nothing between two solves
+_LEAST_SCALE = 1e-300  # below every rate: keeps logarithms finite
+
+_PIECES = 4  # a step's: rates may start, stop or overtake each other inside it
+_X, _W = np.polynomial.legendre.leggauss(8)
+_POINTS = np.concatenate([(k + 0.5 * (_X + 1)) / _PIECES for k in range(_PIECES)])
+_WEIGHTS = np.tile(0.5 * _W / _PIECES, _PIECES)
+_PASSES = 60  # of a bisection: to the last bit
+
+
+@dataclass(frozen=True, eq=False)
+class SolveHistory:
+    """Directions and rates at the n stations of now in the last k solves, the newest last.
+
+    Attributes
+    ----------
+    sigma : (k,) array, length
+        Where they were solved, from where the history begins.
+    rate : (k, n) array, length/cycle
+        By the law, before any threshold.
+    dK_eq : (k, n) array, stress √length
+        Equivalent range.
+    direction : (k, n, d) array
+        Unit vectors of growth.
+    scale : (n,) array, length
+        Size of the crack where the history begins: rates are taken as functions of
+        ln(scale + sigma).
+    bend : (n,) array, rad/√length
+        Of the paths where the history begins: behind a kink a direction changes by bend √σ, which
+        no polynomial follows.
+    exponent : float
+        Of the law: a rate close to zero is interpolated as its power 1/exponent.
+    kinds : BlockCycles, optional
+        Cycles of a block, with retardation.
+    """
+
+    sigma: Floats
+    rate: Floats
+    dK_eq: Floats
+    direction: Floats
+    scale: Floats
+    bend: Floats
+    exponent: float
+    kinds: BlockCycles | None = None
+
+    @property
+    def n_solves(self) -> int:
+        """Number of solves since the history begins that are known still."""
+        return len(self.sigma)
+
+    @property
+    def start(self) -> float:
+        """σ of the newest solve, length."""
+        return float(self.sigma[-1])
+
+    def last(self, count: int) -> "SolveHistory":
+        """The same with the last few solves only."""
+        return self._of_solves(slice(max(self.n_solves - count, 0), None))
+
+    def first(self, count: int) -> "SolveHistory":
+        """The same without the newest solves."""
+        return self._of_solves(slice(0, count))
+
+    def _of_solves(self, which: slice) -> "SolveHistory":
+        names = ("sigma", "rate", "dK_eq", "direction")
+        kinds = None if self.kinds is None else self.kinds.rows(which)
+        return replace(self, **{name: getattr(self, name)[which] for name in names}, kinds=kinds)
+
+    def with_solve(
+        self,
+        sigma: float,
+        rate: Floats,
+        dK_eq: Floats,
+        direction: Floats,
+        exponent: float,
+        kinds: BlockCycles | None = None,
+    ) -> "SolveHistory":
+        """The same with one more solve at the stations."""
+        if self.kinds is not None and kinds is not None:
+            kinds = self.kinds.followed_by(kinds, KEPT)
+        more = replace(
+            self,
+            sigma=np.append(self.sigma, sigma),
+            rate=np.vstack([self.rate, rate]),
+            dK_eq=np.vstack([self.dK_eq, dK_eq]),
+            direction=np.concatenate([self.direction, direction[None]]),
+            exponent=exponent,
+            kinds=None,
+        )
+        return replace(more.last(KEPT), kinds=kinds)
+
+    def with_direction(self, direction: Floats) -> "SolveHistory":
+        """The same with other directions `(n, d)` at the newest solve."""
+        return replace(self, direction=np.concatenate([self.direction[:-1], direction[None]]))
+
+    def angles(self, frame: Floats) -> Floats:
+        """Angles of the directions in frames `(k, n)`, without jumps by a full turn, rad."""
+        along = np.einsum("knj,nj->kn", self.direction, frame[:, 0])
+        across = np.einsum("knj,nj->kn", self.direction, frame[:, 1])
+        angle = np.arctan2(across, along)
+        for k in range(len(angle) - 2, -1, -1):
+            angle[k] += 2 * np.pi * np.round((angle[k + 1] - angle[k]) / (2 * np.pi))
+        return np.asarray(angle)
+
+    @property
+    def can_grow(self) -> bool:
+        """Whether any rate of the newest solve is positive, and all are finite."""
+        rate = self.rate[-1]
+        return bool((rate > 0).any() and np.isfinite(rate).all())
+
+
+def angles_at(solves: SolveHistory, angle: Floats, s: Floats) -> Floats:
+    """Angles at `s` (q,), by bend √s and a polynomial through those of all solves: `(q, n)`."""
+    nodes = np.repeat(solves.sigma[:, None], angle.shape[1], axis=1)
+    x = np.repeat(s[:, None], angle.shape[1], axis=1)
+    smooth = lagrange(nodes, angle - solves.bend * np.sqrt(nodes), x)
+    return np.asarray(smooth + solves.bend * np.sqrt(x))
+
+
+def rates_at(solves: SolveHistory, s: Floats, threshold: float = 0.0) -> Floats:
+    """Rates at `s` (q,) by all solves: `(q, n)`, length/cycle.
+
+    Parameters
+    ----------
+    solves : SolveHistory
+    s : (q,) array, length
+    threshold : float, stress √length
+        Where the range falls below it the rate is zero.
+
+    Returns
+    -------
+    (q, n) array, length/cycle
+        The logarithm of a rate is the polynomial through all solves in ln(scale + s); the power
+        1/exponent of one that is all but zero in any of them a line from solve to solve.
+    """
+    rate = _positive(solves, solves.rate, s, solves.exponent)
+    if threshold > 0:
+        rate = np.where(_positive(solves, solves.dK_eq, s, 1.0) < threshold, 0.0, rate)
+    return rate
+
+
+def _positive(solves: SolveHistory, values: Floats, s: Floats, exponent: float) -> Floats:
+    nodes = np.log(solves.scale + solves.sigma[:, None])
+    x = np.log(solves.scale + s[:, None])
+    with np.errstate(over="ignore", under="ignore"):
+        power = np.exp(
+            np.clip(lagrange(nodes, np.log(np.maximum(values, _LEAST_SCALE)), x), -690, 690)
+        )
+    tiny = (values <= _TINY * values.max(axis=1, keepdims=True)).any(axis=0)
+    if tiny.any():
+        root = _lines(nodes[:, tiny], values[:, tiny] ** (1 / exponent), x[:, tiny])
+        power[:, tiny] = np.maximum(root, 0.0) ** exponent
+    return power
+
+
+def _lines(nodes: Floats, values: Floats, x: Floats) -> Floats:
+    """Lines from node to node, the last one prolonged: `(q, n)`."""
+    result = lagrange(nodes[-2:], values[-2:], x)
+    for k in range(len(nodes) - 2, 0, -1):
+        before = lagrange(nodes[k - 1 : k + 1], values[k - 1 : k + 1], x)
+        result = np.where(x < nodes[k], before, result)
+    return result
+
+
+def lagrange(nodes: Floats, values: Floats, x: Floats) -> Floats:
+    """Polynomials through values `(k, n)` at nodes `(k, n)`, at `x` (q, n): `(q, n)`."""
+    result = np.zeros(x.shape)
+    for j in range(len(nodes)):
+        weight = np.ones(x.shape)
+        for i in range(len(nodes)):
+            if i != j:
+                weight *= (x - nodes[i]) / (nodes[j] - nodes[i])
+        result += weight * values[j]
+    return result
+
+
+def halved(holds: Callable[[float], bool], most: float, times: int = 40) -> tuple[float, float]:
+    """Lengths between which a condition ceases to hold, in [0, most].
+
+    Parameters
+    ----------
+    holds : callable length -> bool
+        True at 0, false at `most`.
+    most : float
+    times : int
+        The two lengths are most / 2^times apart.
+
+    Returns
+    -------
+    low, high : float
+        It holds at `low`, or low is 0; not at `high`, or high is `most`.
+    """
+    low, high = 0.0, most
+    for _ in range(times):
+        middle = 0.5 * (low + high)
+        if holds(middle):
+            low = middle
+        else:
+            high = middle
+    return low, high
+
+
+@dataclass(frozen=True, eq=False)
+class Growth:
+    """What happens over a piece of σ.
+
+    Attributes
+    ----------
+    move : (n, d) array, length
+        How far each end comes.
+    arc : (n,) array, length
+        Length of its path.
+    cycles : float
+    """
+
+    move: Floats
+    arc: Floats
+    cycles: float
+
+
+@dataclass(frozen=True, eq=False)
+class Stretch:
+    """A piece of σ over which ends grow as some solves have it.
+
+    Attributes
+    ----------
+    solves : SolveHistory
+    start, length : float, length
+        Of σ.
+    threshold : float, stress √length
+        As of `rates_at`.
+    marched : CycleIntegration, optional
+        Growth cycle by cycle, with retardation; it may go farther than `length`.
+    """
+
+    solves: SolveHistory
+    start: float
+    length: float
+    threshold: float = 0.0
+    marched: CycleIntegration | None = None
+
+    @property
+    def zones(self) -> OverloadZones | None:
+        """What overloads have left at its end."""
+        return None if self.marched is None else self.marched.zones
+
+    def arcs(self, length: float | None = None) -> tuple[Floats, float]:
+        """Lengths of the paths `(n,)`, and cycles, over all of it or a first part."""
+        length = self.length if length is None else length
+        if self.marched is not None:
+            return self.marched.until(length)
+        share, per_cycle = self._shares(self.start + length * _POINTS)
+        return length * _WEIGHTS @ share, float(length * _WEIGHTS @ per_cycle)
+
+    def _shares(self, s: Floats) -> tuple[Floats, Floats]:
+        """dx/dσ of each path `(q, n)`, and dN/dσ `(q,)`, where anything grows."""
+        rate = rates_at(self.solves, s, self.threshold)
+        largest = rate.max(axis=1, initial=0.0)
+        grows = largest > 0
+        safe = np.where(grows, largest, 1.0)
+        return np.where(grows[:, None], rate / safe[:, None], 0.0), np.where(grows, 1 / safe, 0.0)
+
+    def growth(self, frame: Floats, angle: Floats, length: float | None = None) -> Growth:
+        """Growth in the directions of the solves, over all of it or a first part.
+
+        Parameters
+        ----------
+        frame : (n, d, d) array
+        angle : (k, n) array, rad
+            Of the directions of the solves in these frames.
+        length : float, optional
+
+        Notes
+        -----
+        dx_i/dσ = r_i / max_j r_j (cos θ_i t + sin θ_i n), dN/dσ = 1 / max_j r_j.
+        """
+        length = self.length if length is None else length
+        if self.marched is None:
+            s, weight = self.start + length * _POINTS, length * _WEIGHTS
+            share, per_cycle = self._shares(s)
+            arc, cycles = weight @ share, float(weight @ per_cycle)
+        else:
+            inside = self.marched.sigma < length
+            arc, cycles = self.marched.until(length)
+            sigma = np.append(self.marched.sigma[inside], length)
+            share = np.diff(np.vstack([self.marched.arc[inside], arc]), axis=0)
+            weight = np.ones(len(share))
+            s = self.start + 0.5 * (sigma[1:] + sigma[:-1])
+        theta = angles_at(self.solves, angle, s)
+        along, across = (weight @ (share * f(theta)) for f in (np.cos, np.sin))
+        move = along[:, None] * frame[:, 0] + across[:, None] * frame[:, 1]
+        return Growth(move, arc, cycles)
+
+    def length_of_cycles(self, cycles: float) -> float:
+        """First part that takes a number of cycles, at most all of it, length."""
+        if self.arcs()[1] <= cycles:
+            return self.length
+        return halved(lambda part: self.arcs(part)[1] < cycles, self.length, _PASSES)[1]
+
+    def growing_length(self) -> float:
+        """Part up to which anything grows, length."""
+
+        def grows(part: float) -> bool:
+            rate = rates_at(self.solves, np.array([self.start + part]), self.threshold)
+            return bool((rate > 0).any())
+
+        if grows(self.length):
+            return self.length
+        return halved(grows, self.length, _PASSES)[0]
+
+
+def stretch_of(
+    rule: GrowthRule,
+    solves: SolveHistory,
+    start: float,
+    length: float,
+    zones: OverloadZones | None,
+    blocks: float = np.inf,
+) -> Stretch:
+    """A piece of σ from some start, with the overloads left there.
+
+    With retardation it ends after some blocks of cycles, if it does not sooner.
+    """
+    marched = None
+    if zones is not None:
+        grid = np.linspace(0.0, length, POINTS)
+        assert solves.kinds is not None
+        marched = march(
+            rule.law,
+            rule.retardation,
+            block_order(rule),
+            solves.kinds,
+            np.log(solves.scale + solves.sigma[:, None]),
+            np.log(solves.scale + start + grid[:, None]),
+            zones,
+            length,
+            exponent=solves.exponent,
+            threshold=rule.threshold,
+            blocks=blocks,
+        )
+    return Stretch(solves, start, length, rule.threshold, marched)
+
+
+__all__ = [
+    "KEPT",
+    "Growth",
+    "SolveHistory",
+    "Stretch",
+    "angles_at",
+    "halved",
+    "lagrange",
+    "rates_at",
+    "stretch_of",
+]

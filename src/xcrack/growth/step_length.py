@@ -1,0 +1,166 @@
+"""How long the next step may be: as it was asked for, and for a wanted error of path and life."""
+
+import numpy as np
+
+from xcrack.growth.options import GrowthRule
+from xcrack.growth.step import StepControl
+
+PATH = 0.75  # of it in the path, which K has less in
+STEPS = 0.5  # of the tolerance: what the length of the steps may take
+REJECTED = 2.0  # errors from which on a step is done again with a shorter one
+# Of a correction: more than the error that is left, on nearly all scenes, in equal steps and in
+# those of a tolerance, which are fewer and change their length.
+_LEFT, _LEFT_OF_FEW = 0.25, 0.6
+
+_LEAST = 1e-3  # a step without any correction does not ask for an endless next one
+_SAFE = 0.95
+_NOW, _BEFORE = 0.35, 0.15  # exponents of the last error and of the one before
+_BEGIN = 2.0  # of the crack, times the root of the tolerance: the first step
+_FIRST = 0.5  # exponent after the first step, whose predictor is of first order
+_CHANGE, _FIRST_CHANGE = (0.4, 1.6), (0.5, 1.6)
+# Cells of the shortest step: straight on, and more behind a right-angled kink, where K on a shorter
+# face is that of a kink between two cells.
+_STRAIGHT, _KINKED = 0.12, 1.6
+_PAST = 0.05  # of the cycles so far: a step of fewer cycles may err by a share of this many
+_AHEAD = 0.5  # of the way to the boundary ahead: the longest step
+
+
+def shortest(cell: float, turn: float) -> float:
+    """Shortest step in cells of some size, behind a kink of some angle (rad)."""
+    return (_STRAIGHT + _KINKED * float(np.sin(min(abs(turn), np.pi / 2))) ** 2) * cell
+
+
+def step_error(
+    off: float, length: float, off_cycles: float, cycles: float, before: float, tolerance: float
+) -> float:
+    """Error of a step in units of the tolerance, at least a thousandth.
+
+    Parameters
+    ----------
+    off : float, length
+        Largest estimated error of a tip.
+    length : float, length
+        Of the step.
+    off_cycles, cycles : float
+        Estimated error of the cycles of the step, and these.
+    before : float
+        Cycles before the step.
+    tolerance : float
+        Of the path, relative to the length grown, and of the life.
+    """
+    path = off / (length * tolerance)
+    whole = max(cycles, _PAST * before)
+    life = off_cycles / (whole * tolerance) if whole > 0 else 0.0
+    return float(max(path, life, _LEAST))
+
+
+def first_length(size: float, tolerance: float, least: float) -> float:
+    """Length of the first step for a crack of some size, and no less than the least."""
+    return float(max(_BEGIN * size * np.sqrt(tolerance), least))
+
+
+def next_length(length: float, error: float, before: float | None, least: float) -> float:
+    """Length of the next step.
+
+    Parameters
+    ----------
+    length : float, length
+        Of the last step.
+    error : float
+        `step_error` of it.
+    before : float or None
+        That of the step before; None after the first step, and to do a step again.
+    least : float, length
+
+    Returns
+    -------
+    float, length
+
+    Notes
+    -----
+    Proportional and integral control (Gustafsson 1991) for a rule of second order.
+    """
+    if before is None:
+        factor = np.clip(_SAFE * error**-_FIRST, *_FIRST_CHANGE)
+    else:
+        factor = np.clip(_SAFE * error**-_NOW * before**_BEFORE, *_CHANGE)
+    return float(max(length * factor, least))
+
+
+def longest(rule: GrowthRule, control: StepControl) -> float:
+    """Largest advance of any end in the next step, length; inf where only cycles limit it."""
+    return min(np.inf if rule.da is None else rule.da, control.length)
+
+
+def share_left(rule: GrowthRule) -> float:
+    """Share of a correction that is left as an error."""
+    return _LEFT if rule.tolerance is None else _LEFT_OF_FEW
+
+
+def first_control(rule: GrowthRule, size: float, least: float, room: float) -> StepControl:
+    """Length of the first step, and of the first after K has jumped.
+
+    Parameters
+    ----------
+    rule : GrowthRule
+    size : float, length
+        Of the smallest crack.
+    least, room : float, length
+        Shortest step, and the way to the boundary ahead of the fastest tip.
+    """
+    if rule.tolerance is None:
+        return StepControl()
+    length = first_length(size, STEPS * rule.tolerance, least)
+    return StepControl(_within(length, room, least), None, least)
+
+
+def next_control(
+    rule: GrowthRule,
+    last: StepControl,
+    length: float,
+    off: float,
+    off_cycles: float,
+    cycles: float,
+    before: float,
+    least: float,
+    room: float,
+) -> StepControl:
+    """Length of the step after one whose errors are estimated.
+
+    Parameters
+    ----------
+    rule : GrowthRule
+    last : StepControl
+        Of the step that is done.
+    length, off, off_cycles, cycles, before
+        As of `step_error`.
+    least, room
+        As of `first_control`.
+    """
+    if rule.tolerance is None:
+        return StepControl()
+    error = step_error(
+        off * STEPS / PATH, length, off_cycles, cycles, before, STEPS * rule.tolerance
+    )
+    wanted = next_length(length, error, last.error, least)
+    return StepControl(_within(wanted, room, least), error, least)
+
+
+def _within(length: float, room: float, least: float) -> float:
+    """A length that leaves half of the way to the boundary ahead, but the least at least."""
+    return float(max(min(length, _AHEAD * room), least))
+
+
+__all__ = [
+    "PATH",
+    "REJECTED",
+    "STEPS",
+    "first_control",
+    "first_length",
+    "longest",
+    "next_control",
+    "next_length",
+    "share_left",
+    "shortest",
+    "step_error",
+]

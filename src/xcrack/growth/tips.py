@@ -1,0 +1,568 @@
+"""Growth of second order at one solve a step: predict, evaluate, correct; tips of 2D cracks.
+
+From the corrected tips of a step the last two solves predict the next tips; there all states are
+solved; the parabola through the last three solves then moves the tips once more, without a solve.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from xcrack.base.arrays import Bools, Floats, Ints
+from xcrack.base.errors import GeometryError, XcrackError, collected_warnings
+from xcrack.crack.crack import Crack, tip_frames
+from xcrack.crack.measures import exit_ahead
+from xcrack.crack.meetings import (
+    AHEAD,
+    LEAST,
+    Faces,
+    Meeting,
+    joined,
+    last_faces,
+    meetings,
+    moved_on,
+    with_tips_at,
+)
+from xcrack.fatigue.criteria import clipped_K
+from xcrack.fatigue.kink import START, kinked_K, limit_angles
+from xcrack.fatigue.retardation import BlockCycles, no_zones
+from xcrack.fatigue.spectrum import Spectrum
+from xcrack.growth.corrected import Corrected
+from xcrack.growth.options import GrowthRule
+from xcrack.growth.rates import CriterionInput, Rates, criterion_inputs, kinds_of
+from xcrack.growth.solves import Growth, SolveHistory, Stretch, halved, stretch_of
+from xcrack.growth.stations import GrowthStations, Identities
+from xcrack.growth.step import Plan, Step, StepControl, StepError, plan_of, solves_of
+from xcrack.growth.step_length import first_control, longest, next_control, share_left, shortest
+from xcrack.mesh.locate import cell_sizes, contains
+from xcrack.mesh.mesh import Mesh
+
+_FASTER = 2.0  # times the last rate: what a step of prescribed cycles may reckon with
+
+# The next step of 2D cracks as the last two solves see it, up to where tips meet other cracks.
+
+
+def predict(rule: GrowthRule, step: Step) -> Plan:
+    """Where the last two solves lead; from a first one straight on, at its rates."""
+    stations, solves = solves_of(step)
+    cell = cell_sizes(rule.problem.mesh, stations.x)
+    n = len(stations)
+    rate = np.concatenate([np.zeros(0), *step.rate])
+    if not (rate > 0).any() or np.isinf(rate).any():
+        still = np.zeros(n)
+        return Plan(
+            solves.start, 0.0, 0.0, still, 0 * stations.x, still > 0, cell, 0, 0.0, step.corrected
+        )
+    stretch, stops = _ahead(rule, step)
+    growth = _growth(stations, stretch)
+    row = int(np.argmax(growth.arc))
+    plan = Plan(
+        sigma=solves.start,
+        length=stretch.length,
+        cycles=growth.cycles,
+        arc=growth.arc,
+        move=growth.move,
+        moves=np.zeros(n, dtype=bool),
+        cell=cell,
+        tip=row,
+        largest=stretch.length,
+        cracks=step.corrected,
+    )
+    if stops and growth.arc[row] < LEAST * cell[row]:
+        return replace(plan, limit="arrest")
+    if plan.largest < LEAST * cell[row]:
+        return replace(plan, limit="short")
+    try:
+        after, moves = with_tips_at(step.corrected, stations.x + growth.move, stations.fresh, cell)
+        plan = replace(plan, cracks=tuple(after), moves=moves)
+        # Where plastic zones end the run, they do so before the tips meet.
+        met = meetings(after, rule.problem.mesh) if rule.link_up is None else []
+        return _met(rule, step, plan, stretch, met) if met else plan
+    except GeometryError as error:
+        return replace(plan, limit="geometry", refusal=str(error))
+
+
+def _ahead(rule: GrowthRule, step: Step) -> tuple[Stretch, bool]:
+    """The next piece of σ, and whether all growth is seen to stop at its end."""
+    solves = solves_of(step)[1]
+    known = solves.last(2)
+    length = longest(rule, step.control)
+    if rule.cycles is not None:
+        fastest = float(solves.rate[-1].max(initial=0.0))
+        factor = 1.0 if solves.n_solves == 1 else _FASTER
+        length = min(length, rule.cycles * fastest * factor)
+    blocks = np.inf if rule.cycles is None else rule.cycles
+    stretch = stretch_of(rule, known, solves.start, length, step.zones, blocks)
+    if stretch.marched is not None:
+        came = min(length, stretch.marched.reached)
+        over = rule.cycles is not None and stretch.arcs(came)[1] >= rule.cycles * (1 - 1e-9)
+        return replace(stretch, length=came), came < length and not over
+    if rule.cycles is not None:
+        stretch = replace(stretch, length=stretch.length_of_cycles(rule.cycles))
+    grows = stretch.growing_length()
+    return replace(stretch, length=grows), grows < stretch.length
+
+
+def _growth(stations: GrowthStations, stretch: Stretch, length: float | None = None) -> Growth:
+    frame = stations.frame
+    return stretch.growth(frame, stretch.solves.angles(frame), length)
+
+
+def _met(rule: GrowthRule, step: Step, plan: Plan, stretch: Stretch, met: list[Meeting]) -> Plan:
+    """A step that ends when the first tip meets another crack, and the cracks joined there."""
+    stations = solves_of(step)[0]
+    faces = last_faces(plan.cracks)
+    along = np.stack([np.cos(faces.direction), np.sin(faces.direction)], axis=1)
+
+    def left(own: Meeting, length: float) -> float:
+        place = stations.x + _growth(stations, stretch, length).move
+        to = own.x if own.other < 0 else place[own.other]
+        return float((to - place[own.tip]) @ along[own.tip])
+
+    most = plan.length + max(AHEAD * own.size for own in met)
+    if stretch.marched is not None and most > stretch.marched.sigma[-1]:
+        zones, known = step.zones, stretch.solves
+        stretch = stretch_of(rule, known, plan.sigma, most, zones)
+    arrival = [_arrival(partial(left, own), most) for own in met]
+    first = min(arrival)
+    if first == np.inf and not any(own.soon for own in met):
+        return plan
+    length = plan.length if first == np.inf else first
+    growth = _growth(stations, stretch, length)
+    place = stations.x + growth.move
+    apart, moves = with_tips_at(step.corrected, place, stations.fresh, plan.cell)
+    arrived = {own.tip for own, when in zip(met, arrival) if when <= length}
+    now = [
+        own
+        for own in meetings(apart, rule.problem.mesh, 2 * AHEAD)
+        if own.soon or own.tip in arrived
+    ]
+    if not now:
+        return plan
+    whole = joined(apart, moves.tolist(), now)
+    return replace(
+        plan,
+        length=length,
+        cycles=growth.cycles,
+        arc=growth.arc,
+        move=growth.move,
+        moves=moves,
+        cracks=tuple(whole),
+        apart=tuple(apart),
+    )
+
+
+def _arrival(left: Callable[[float], float], most: float) -> float:
+    """Length of σ after which nothing is left of a way; inf where that takes too long."""
+    if left(most) > 0:
+        return np.inf
+    return halved(lambda length: left(length) > 0, most)[1]
+
+
+def ends_of(step: Step, plan: Plan) -> Floats:
+    """Where the ends of the cracks at the stations come to `(n, 2)`, to the last bit."""
+    stations = solves_of(step)[0]
+    tip = last_faces(step.corrected).tip
+    return np.where(plan.moves[:, None], stations.x + plan.move, tip)
+
+
+def advance_of(step: Step, plan: Plan, rates: Rates) -> Floats:
+    """Advance to the next step at the stations that were solved `(n,)`, length."""
+    del rates
+    stations = solves_of(step)[0]
+    way = np.linalg.norm(stations.x + plan.move - last_faces(step.corrected).tip, axis=1)
+    return np.where(plan.moves, way, 0.0)
+
+
+# Directions and rates of tips in 2D: at the beginning, behind a kink, and as a face turns.
+
+_COTTERELL_RICE = 4 * np.sqrt(2 / np.pi)
+_GEOMETRY = 0.65  # times the face's share of the crack: read off four scenes
+_GAMMA = (-2.5, 0.5)
+
+
+def first_solves(rule: GrowthRule, rates: Rates) -> SolveHistory:
+    """What growth begins with, or begins anew with after K has jumped.
+
+    Notes
+    -----
+    Where a criterion turns a crack by more than three degrees, the kinked crack begins in the
+    direction in which the criterion, asked again at the kink, turns no further (`limit_angles`),
+    with the rate of the kinked crack. From there its direction changes by
+    4 √(2/π) T/K_I* sin θ cos θ √s over the length s (the shear that T adds on the kink, Cotterell
+    and Rice 1980).
+    """
+    angle, rate, dK_eq = np.array(rates.angle), np.array(rates.law_rate), np.array(rates.dK_eq)
+    bend = np.zeros(len(rate))
+    # Of a law with nominal R the rates of a kinked crack are not known, nor a block's direction.
+    nominal = getattr(rule.law, "ratio", None) == "nominal"
+    known = not (nominal and isinstance(rule.cycle, Spectrum))
+    turns = (np.abs(angle) > START) & (rate > 0)
+    if known and turns.any():
+        inputs = criterion_inputs(rule, rates.problem, rates.response)
+        for c, own in enumerate(inputs):
+            rows = np.nonzero(rates.stations.crack == c)[0]
+            if not turns[rows].any():
+                continue
+            begins, ratio, kinked = _kink(own, turns[rows], rates, rows)
+            behind, dK = rate[rows], dK_eq[rows]
+            if not nominal:
+                with collected_warnings([]):  # they are of cracks that nobody has
+                    answer = own.rates_of_K(clipped_K(kinked_K(clipped_K(own.K), begins)))
+                behind, dK = answer.rate, answer.dK_eq
+            kinks = kinked & (behind > 0) & np.isfinite(behind)
+            angle[rows] = np.where(kinks, begins, angle[rows])
+            rate[rows] = np.where(kinks, behind, rate[rows])
+            dK_eq[rows] = np.where(kinks, dK, dK_eq[rows])
+            shear = ratio * np.sin(begins) * np.cos(begins)
+            bend[rows] = np.where(kinks, _COTTERELL_RICE * shear, 0.0)
+    bend *= np.sqrt(rate / rate.max()) if np.isfinite(rate).all() and rate.any() else 0.0
+    direction = replace(rates, angle=angle).direction
+    kinds = kinds_of(rule, rates)
+    if kinds is not None:  # behind a kink scaled as the range
+        grown = np.divide(dK_eq, rates.dK_eq, out=np.ones_like(dK_eq), where=rates.dK_eq > 0)
+        kinds = BlockCycles(kinds.dK * grown[None, :, None], kinds.R, kinds.a)
+    return SolveHistory(
+        sigma=np.zeros(1),
+        rate=rate[None],
+        dK_eq=dK_eq[None],
+        direction=direction[None],
+        scale=rates.size_of_law,
+        bend=bend,
+        exponent=rates.exponent(rule.law),
+        kinds=kinds,
+    )
+
+
+def _kink(
+    own: CriterionInput, turns: Bools, rates: Rates, rows: Ints
+) -> tuple[Floats, Floats, Bools]:
+    """Limit angle of the kinks of a crack, T/K_I behind them, and where they are known."""
+
+    def quiet(K: Floats) -> Floats:
+        with collected_warnings([]):
+            return own.angle_of_K(clipped_K(K))
+
+    theta, converged = limit_angles(quiet, clipped_K(own.K))
+    kinked = turns & converged
+    theta = np.where(kinked, theta, 0.0)
+    opening = clipped_K(kinked_K(clipped_K(rates.K[:, rows]), theta))[..., 0]
+    return theta, _T_over_K(opening, rates.T[:, rows]), kinked
+
+
+def turn_of_faces(rates: Rates, length: Floats) -> Floats:
+    """How much the direction of growth at a tip turns as its last face is turned `(n,)`.
+
+    Notes
+    -----
+    γ = 4 √(2/π) T √ℓ / K_I + 0.65 ℓ/a, ℓ the last face and a the crack, after Cotterell and Rice
+    (1980) for a short kink; of the state with the largest K_I.
+    """
+    K_I = rates.K[..., 0]
+    gamma = _COTTERELL_RICE * _T_over_K(K_I, rates.T) * np.sqrt(length)
+    gamma += _GEOMETRY * length / rates.size_of_law
+    return np.where(K_I.max(axis=0) > 0, np.clip(gamma, *_GAMMA), 0.0)
+
+
+def _T_over_K(K_I: Floats, T: Floats) -> Floats:
+    """T over K_I of the state with the largest K_I of each tip `(f,)`; 0 where none opens it."""
+    tip = np.arange(K_I.shape[1])
+    state = np.argmax(K_I, axis=0)
+    opening, along = K_I[state, tip], T[state, tip]
+    opens = (opening > 0) & np.isfinite(along)
+    return np.asarray(np.where(opens, along, 0.0) / np.where(opens, opening, 1.0))
+
+
+# A solve: correct the step that led there.
+
+_PASSES = 6  # of the correction, which turns the last face, which turns the direction
+_OF_LENGTH = 0.5  # relative change of K with that of the length of a crack, also of another one
+_FIRST = 0.5  # of that for the first step's cycles, of which no parabola is known yet
+_LEAST_RATIO = 0.2  # of what two parabolas say of a step to what the first of them did
+_MENDED = 0.1  # of that squared and relative: what is left once the second step has mended it
+
+
+def begin(rule: GrowthRule, rates: Rates, identities: Identities) -> Corrected:
+    """The first step of a run."""
+    n = len(rates.stations)
+    stations = _stations(rates.cracks, identities, rates.stations.x, np.zeros(n, dtype=bool))
+    solves = first_solves(rule, rates)
+    zones = None if rule.retardation is None else no_zones(n)
+    control = _first(rule, stations, solves, rates)
+    error = StepError(rates.split(np.zeros(n)), 0.0)
+    return Corrected(0.0, rates.cracks, stations, solves, error, control, zones)
+
+
+def _stations(
+    cracks: Sequence[Crack], identities: Identities, x: Floats, fresh: Bools
+) -> GrowthStations:
+    """Tips of cracks whose growth has come to some places."""
+    count = [crack.n_tips for crack in cracks]
+    frame = [tip_frames(crack)[1] for crack in cracks]
+    n = len(x)
+    ends = [end for own in identities.ends for end in own]
+    return GrowthStations(
+        crack=np.repeat(np.arange(len(cracks)), count),
+        front=np.concatenate([np.zeros(0, dtype=np.int64), *map(np.arange, count)]),
+        s=np.zeros(n),
+        x=x,
+        frame=np.concatenate([np.zeros((0, 2, 2)), *frame]),
+        end=np.array(ends, dtype=np.int64),
+        closed=np.zeros(n, dtype=bool),
+        length=np.zeros(n),
+        offset=x - last_faces(cracks).tip,
+        fresh=fresh,
+    )
+
+
+def correct(rule: GrowthRule, last: Step, rates: Rates, identities: Identities) -> Corrected:
+    """Correct a predicted step by what was solved there."""
+    plan = plan_of(last)
+    rows = _rows_that_stay(ends_of(last, plan), rates.cracks)
+    if len(rows) < len(plan.arc):
+        return _without_lost_tips(rule, last, rates, identities, rows)
+    if np.isinf(rates.rate).any():
+        return _broken(last, rates, identities)
+    return _corrected(rule, last, rates, identities)
+
+
+def _corrected(rule: GrowthRule, last: Step, rates: Rates, identities: Identities) -> Corrected:
+    """Correct the last points by the parabola through the last three solves."""
+    plan, error = plan_of(last), _error(last)
+    stations, old = solves_of(last)
+    faces = last_faces(rates.cracks)
+    solves = old.with_solve(
+        plan.end, rates.law_rate, rates.dK_eq, rates.direction, rates.exponent(rule.law),
+        kinds_of(rule, rates),
+    )  # fmt: skip
+    stretch = stretch_of(rule, solves, plan.sigma, plan.length, last.zones)
+    frame = rates.stations.frame
+    angle = solves.angles(frame)
+    solved = np.array(angle[-1])
+    gamma = np.where(plan.moves, turn_of_faces(rates, faces.length), 0.0)
+    begin_of_face = _begins(last, plan)
+    growth = Growth(plan.move, plan.arc, plan.cycles)
+    for _ in range(_PASSES):
+        growth = stretch.growth(frame, angle)
+        face = stations.x + growth.move - begin_of_face
+        turn = np.arctan2(
+            np.einsum("nj,nj->n", face, frame[:, 1]), np.einsum("nj,nj->n", face, frame[:, 0])
+        )
+        angle[-1] = solved + gamma * turn
+    solves = solves.with_direction(replace(rates, angle=angle[-1]).direction)
+    x = stations.x + growth.move
+    try:
+        cracks, moves = with_tips_at(last.corrected, x, stations.fresh, plan.cell)
+    except GeometryError:  # which the predicted cracks are free of
+        x, cracks, moves = stations.x + plan.move, list(rates.cracks), plan.moves
+    gap = x - (stations.x + plan.move)
+    off = share_left(rule) * np.linalg.norm(gap, axis=1)
+    if old.n_solves == 1:
+        off *= _FIRST
+    cycles, own, alone = _cycles(rule, last, solves, growth)
+    ahead = share_left(rule) * np.abs((gap * solves.direction[-1]).sum(axis=1))
+    behind = error.behind + float((_OF_LENGTH * ahead / solves.scale).max(initial=0.0))
+    own += solves.exponent * behind * cycles
+    after = _stations(cracks, identities, x, stations.fresh | moves)
+    control = next_control(
+        rule, last.control, plan.length, float(off.max(initial=0.0)), alone, growth.cycles,
+        last.cycles, *_room(rule, after, solves, rates),
+    )  # fmt: skip
+    place = tuple(a + b for a, b in zip(error.place, rates.split(off), strict=True))
+    return Corrected(
+        last.cycles + cycles,
+        tuple(cracks),
+        after,
+        solves,
+        StepError(place, error.cycles + own, behind=behind),
+        control,
+        stretch.zones,
+        last.zones,
+    )
+
+
+def _error(step: Step) -> StepError:
+    if step.error is None:
+        raise XcrackError(f"step {step.index} was not made by integrator='pec'.")
+    return step.error
+
+
+def _first(
+    rule: GrowthRule, stations: GrowthStations, solves: SolveHistory, rates: Rates
+) -> StepControl:
+    """Length of the first step."""
+    size = float(solves.scale.min(initial=np.inf))
+    return first_control(rule, size, *_room(rule, stations, solves, rates))
+
+
+def _room(
+    rule: GrowthRule, stations: GrowthStations, solves: SolveHistory, rates: Rates
+) -> tuple[float, float]:
+    """Shortest step of the fastest tip, and the way to the boundary ahead of it, length."""
+    if not len(stations):
+        return 0.0, np.inf
+    tip = int(np.argmax(solves.rate[-1]))
+    x, mesh = stations.x[tip], rule.problem.mesh
+    hit = exit_ahead(x, solves.direction[-1, tip], mesh)
+    room = np.inf if hit is None else float(np.linalg.norm(hit[0] - x))
+    return shortest(float(cell_sizes(mesh, x[None])[0]), float(rates.angle[tip])), room
+
+
+def _cycles(
+    rule: GrowthRule, last: Step, solves: SolveHistory, growth: Growth
+) -> tuple[float, float, float]:
+    """Cycles of a corrected step, what they add to the estimated error, and that of them alone."""
+    plan, old = plan_of(last), solves_of(last)[1]
+    if old.n_solves == 1:
+        off = abs(growth.cycles - plan.cycles)
+        # The parabola of the next step mends it: of that, a square is left.
+        rest = _MENDED * share_left(rule) * off**2 / growth.cycles if growth.cycles > 0 else 0.0
+        return growth.cycles, _FIRST * share_left(rule) * off, rest
+    line = stretch_of(rule, solves.last(2), plan.sigma, plan.length, last.zones).arcs()[1]
+    alone = own = share_left(rule) * abs(growth.cycles - line)
+    if old.n_solves > 2:
+        return growth.cycles, *_better_known(rule, last, solves, own)
+    # The second step: the parabola tells what the first one, along a line, was off.
+    span, first = float(old.sigma[1] - old.sigma[0]), float(old.sigma[0])
+    line, curve, constant = (
+        stretch_of(rule, each, first, span, last.earlier_zones).arcs()[1]
+        for each in (old, solves, old.first(1))
+    )
+    own += share_left(rule) * (abs(curve - line) - _FIRST * abs(line - constant))
+    return growth.cycles + curve - line, own, alone
+
+
+def _better_known(
+    rule: GrowthRule, last: Step, solves: SolveHistory, own: float
+) -> tuple[float, float]:
+    """What a step adds to the estimated error of the cycles, and that of the step alone.
+
+    Two parabolas span the step before: that of its own, and that of the step behind it. The error
+    is between them, so that their difference takes the place of what was reckoned with then; the
+    error of this step, of which no second parabola is known yet, is taken to be smaller likewise.
+    """
+    old = solves_of(last)[1]
+    if last.zones is not None:
+        return own, own
+
+    def cycles(each: SolveHistory, k: int) -> float:
+        begins, ends = float(old.sigma[k]), float(old.sigma[k + 1])
+        return Stretch(each, begins, ends - begins, rule.threshold).arcs()[1]
+
+    was = share_left(rule) * abs(cycles(old, 1) - cycles(old.last(2), 1))
+    now = abs(cycles(old, 1) - cycles(solves, 1))
+    ratio = float(np.clip(now / was, _LEAST_RATIO, 1.0)) if was > 0 else 1.0
+    change = now - was
+    if old.sigma[0] == 0:  # the first step of all is spanned by one parabola: the next is prolonged
+        was = share_left(rule) * abs(cycles(old, 0) - cycles(old.first(2), 0))
+        change += min(abs(cycles(old, 0) - cycles(solves, 0)), was) - was
+    return change + own, ratio * own
+
+
+def _begins(last: Step, plan: Plan) -> Floats:
+    """Where the last faces of the predicted cracks begin `(n, 2)`."""
+    faces: Faces = last_faces(last.corrected)
+    instead = moved_on(faces, solves_of(last)[0].fresh, plan.cell)
+    return np.where(instead[:, None], faces.anchor, faces.tip)
+
+
+def _rows_that_stay(ends: Floats, placed: Sequence[Crack]) -> Ints:
+    """Rows of the advanced tips that the placed ones are `(n,)`: some have left or joined."""
+    row = {tuple(x): k for k, x in enumerate(ends.tolist())}
+    return np.array([row[tuple(x)] for x in last_faces(placed).tip.tolist()], dtype=np.int64)
+
+
+def _without_lost_tips(
+    rule: GrowthRule, last: Step, rates: Rates, identities: Identities, stays: Ints
+) -> Corrected:
+    """Begin anew after tips have left the body or met: their solves say nothing of the others now.
+
+    Up to the first exit the cycles are those that the solves before it predicted, behind it the
+    new rates count.
+    """
+    plan, error = plan_of(last), _error(last)
+    before = solves_of(last)[0]
+    x = (before.x + plan.move)[stays]
+    stations = _stations(rates.cracks, identities, x, (before.fresh | plan.moves)[stays])
+    solves = first_solves(rule, rates)
+    ahead = _ahead(rule, last)[0]
+    zones = ahead.zones if ahead.marched is not None else None
+    zones = None if zones is None else zones.at(stays)
+    lost_rows = np.setdiff1d(np.arange(len(plan.arc)), stays)
+    exit_ = _exit(rule, last, ahead, lost_rows)
+    cycles = ahead.arcs(exit_)[1]
+    rest = plan.length - exit_
+    if 0 < rates.largest < np.inf and last.zones is None:
+        cycles += rest / rates.largest
+    elif rest > 0:
+        cycles = plan.cycles
+    lost = np.concatenate(error.place)[stays]
+    own = share_left(rule) * abs(cycles - plan.cycles)
+    own += solves.exponent * error.behind * cycles
+    return Corrected(
+        last.cycles + cycles,
+        rates.cracks,
+        stations,
+        solves,
+        StepError(rates.split(lost), error.cycles + own, behind=error.behind),
+        _first(rule, stations, solves, rates),
+        zones,
+    )
+
+
+def _exit(rule: GrowthRule, last: Step, ahead: Stretch, lost: Ints) -> float:
+    """Piece of σ until the first of the lost tips is outside the body; all of it where none is."""
+    plan, mesh = plan_of(last), rule.problem.mesh
+    stations = solves_of(last)[0]
+    if _inside(mesh, (stations.x + plan.move)[lost]):
+        return plan.length
+
+    def holds(length: float) -> bool:
+        return _inside(mesh, (stations.x + _growth(stations, ahead, length).move)[lost])
+
+    return halved(holds, plan.length)[1]
+
+
+def _inside(mesh: Mesh, x: Floats) -> bool:
+    return bool(contains(mesh, x).all())
+
+
+def _broken(last: Step, rates: Rates, identities: Identities) -> Corrected:
+    """The last step of a run, at whose end a rate is infinite: no polynomial leads there.
+
+    The inverse of the largest rate is taken to fall to zero along the step, as `cycles_between`
+    does it.
+    """
+    plan, error = plan_of(last), _error(last)
+    stations, old = solves_of(last)
+    cycles = 0.5 * plan.length / float(old.rate[-1].max())
+    if last.zones is not None:
+        cycles = 0.5 * plan.cycles
+    after = _stations(rates.cracks, identities, stations.x + plan.move, stations.fresh | plan.moves)
+    solves = replace(old, rate=np.vstack([old.rate[:-1], rates.law_rate]))
+    return Corrected(
+        last.cycles + cycles, rates.cracks, after, solves,
+        StepError(error.place, error.cycles + cycles), StepControl(), last.zones,
+    )  # fmt: skip
+
+
+def cycles_until(rule: GrowthRule, step: Step, part: float, after: float | None) -> float:
+    """Cycles of a part of the advance after a step, by the line through two solves."""
+    del after  # behind the first exit other rates count
+    plan, solves = plan_of(step), solves_of(step)[1]
+    length = part * plan.length
+    return stretch_of(rule, solves.last(2), plan.sigma, length, step.zones).arcs()[1]
+
+
+__all__ = [
+    "advance_of",
+    "begin",
+    "correct",
+    "cycles_until",
+    "ends_of",
+    "first_solves",
+    "predict",
+    "turn_of_faces",
+]
