@@ -428,17 +428,20 @@ def step_of(arrays: Arrays, settings: dict[str, str] | None = None) -> Step:
 # A mesh.
 
 
-_CURVES: dict[str, type] = {"arc": Arc, "pieces": CurvedFacets}
+_CURVES: dict[str, tuple[type, str]] = {  # by prefix, with a field that each has
+    "arc": (Arc, "center"),
+    "pieces": (CurvedFacets, "points"),
+}
 
 
 def arrays_of_mesh(mesh: Mesh) -> Arrays:
-    """Points, cells, sets and curves of a mesh; functions of the user among the curves are left out."""
+    """Points, cells, sets and curves of a mesh, but for curves that are functions of the user."""
     result: Arrays = {"points": mesh.points, "cells": mesh.cells}
     for kind, sets in (("facet_set", mesh.facet_sets), ("cell_set", mesh.cell_sets)):
         result |= {f"{kind}_{name}": sets[name] for name in sorted(sets)}
     for name, curve in sorted(mesh.curves.items()):
-        for prefix, kind in _CURVES.items():
-            if isinstance(curve, kind):
+        for prefix, (curve_kind, _) in _CURVES.items():
+            if isinstance(curve, curve_kind):
                 result |= pack(f"{prefix}_{name}", curve)
     return result
 
@@ -453,11 +456,11 @@ def mesh_of(arrays: Arrays) -> Mesh:
         }
         for kind in ("facet_set_", "cell_set_")
     }
-    curves = {
-        name: unpack(kind, f"{prefix}_{name}", arrays)
+    curves: dict[str, Any] = {
+        name: unpack(curve_kind, f"{prefix}_{name}", arrays)
         for name in sets["facet_set_"]
-        for prefix, kind in _CURVES.items()
-        if f"{prefix}_{name}_{fields(kind)[0].name}" in arrays
+        for prefix, (curve_kind, field) in _CURVES.items()
+        if f"{prefix}_{name}_{field}" in arrays
     }
     return sound_mesh(
         arrays["points"], arrays["cells"], sets["facet_set_"], sets["cell_set_"], curves
