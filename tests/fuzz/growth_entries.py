@@ -363,6 +363,14 @@ ENTRIES = [
         },
     ),
     Entry(
+        "Step.end_name",
+        lambda crack, number: scenes.history().steps[0].end_name(crack, number),
+        {
+            "crack": arg(Whole(least=0, most=0), 0),
+            "number": arg(Whole(least=0, most=1, rule=lambda v: v == 0 or None), 0),
+        },
+    ),
+    Entry(
         "Join",
         xc.Join,
         {

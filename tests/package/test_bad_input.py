@@ -351,7 +351,10 @@ PROBLEMS = {
         lambda: grow(criterion=lambda K, nu: 1.0),
         r"must return three arrays \(angle, dK_eq, R\)",
     ),
-    "scaling": (lambda: grow(scaling="log"), 'scaling = \'log\': give "law" or "linear"'),
+    "scaling": (
+        lambda: grow(scaling="log"),
+        'scaling = \'log\' is not known: give "law" or "linear"',
+    ),
     "cycle order": (lambda: xc.Cycle(1.0, 0.0), r"Cycle\(1.0, 0.0\): give finite min <= max"),
     "cycle twice": (lambda: xc.Cycle(0.0, 1.0, states=[1.0]), "not both"),
     "cycle of nothing": (lambda: xc.Cycle(states=[]), "at least one load state"),

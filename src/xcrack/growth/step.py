@@ -523,7 +523,18 @@ class Step:
         return [len(a) for a in self.angle]
 
     def end_name(self, crack: int, number: int) -> str:
-        """Name of a tip, in 3D of a front, by its numbers in this step: "left tip of crack 2"."""
+        """Name of a tip, in 3D of a front, by its numbers in this step: "left tip of crack 2".
+
+        Raises
+        ------
+        ProblemError
+            There is none of these numbers.
+        """
+        crack = whole_number(crack, "end_name: crack", least=0, most=len(self.cracks) - 1)
+        last = self.cracks[crack].n_tips - 1
+        if last < 0:
+            raise ProblemError(f"end_name: crack {crack} has no end left in step {self.index}.")
+        number = whole_number(number, "end_name: number", least=0, most=last)
         if self.identities is None:
             word = "tip" if self.cracks[crack].fronts is None else "front"
             return f"{word} {number} of crack {crack}"
