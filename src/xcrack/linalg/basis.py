@@ -4,7 +4,8 @@ For each node, its enriched unknowns are made orthogonal in energy to its standa
 orthonormal among themselves; dependent combinations are dropped. At order 2 a thin sliver makes
 4 N_c plus the Heaviside functions of the midpoints of its cut edges nearly vanish, though they
 sit on different nodes: the unknowns of each cut edge therefore join the block of the edge's end
-that is farther from the crack (star).
+that is farther from the crack (star). Those of an edge whose other end lies on the crack, or next
+to it, do so too: in 3D a sliver may be a wedge along an edge of the mesh, with an uncut edge.
 """
 
 from dataclasses import dataclass
@@ -17,6 +18,7 @@ from xcrack.base.machine import one_blas_thread
 from xcrack.fem.function_space import FunctionSpace
 from xcrack.mesh.mesh import Mesh
 
+_BESIDE = 0.05  # of the level set at one end of an edge: nearer to the crack is the other one
 _DEPENDENT = 1e-10  # eigenvalues below this share of a block's largest are dropped
 
 
@@ -80,7 +82,9 @@ def _star_home(space: FunctionSpace, c: int, nodes: Ints) -> Ints:
     ends = mesh.edges[edge]
     farthest = np.argmax(np.abs(cut.level_set.phi[ends]), axis=1)
     end = ends[np.arange(len(ends)), farthest]
-    move = ~np.isnan(cut.cut_edge[edge]) & (space.heaviside[c][end] >= 0)
+    distance = np.abs(cut.level_set.phi[ends])
+    on_crack = distance.min(axis=1) < _BESIDE * distance.max(axis=1)
+    move = (~np.isnan(cut.cut_edge[edge]) | on_crack) & (space.heaviside[c][end] >= 0)
     home[is_edge] = np.where(move, end, nodes[is_edge])
     return home
 
