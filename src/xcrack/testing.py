@@ -1,13 +1,15 @@
 """Checks for functions that users write: what is wrong with a law or a criterion, in words."""
 
 from collections.abc import Callable
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
+from xcrack.base.arguments import Function, Length, Number, Poisson, check_arguments
 from xcrack.base.arrays import Floats
-from xcrack.base.checks import number, numbers, value_text
+from xcrack.base.checks import numbers, value_text
 from xcrack.base.errors import ProblemError
+from xcrack.base.units import TOUGHNESS
 from xcrack.fatigue.checks import law_needs
 from xcrack.fatigue.criteria import Criterion
 from xcrack.fatigue.law import Law
@@ -16,7 +18,12 @@ _ROUND_OFF = 1e-9  # relative; a few operations on numbers of order one
 _RATIOS = [0.0, 0.1, 0.5, 0.8, 0.95]
 
 
-def check_law(law: Law, dK_max: float = 100.0, a: float = 1.0) -> None:
+@check_arguments()
+def check_law(
+    law: Annotated[Law, Function("a function (dK_eq, R) -> da/dN")],
+    dK_max: Annotated[float, Number(above=0, unit=TOUGHNESS)] = 100.0,
+    a: Length = 1.0,
+) -> None:
     """Try a growth law and say all that is wrong with it.
 
     Parameters
@@ -41,9 +48,6 @@ def check_law(law: Law, dK_max: float = 100.0, a: float = 1.0) -> None:
     >>> from xcrack.fatigue.power import paris
     >>> check_law(paris(C=1e-11, m=3))
     """
-    _check_callable(law, "check_law: law")
-    dK_max = number(dK_max, "check_law: dK_max", above=0)
-    a = number(a, "check_law: a", above=0)
     wrong: list[str] = []
     ratios = [-2.0, -1.0, -0.3, -1e-9] if getattr(law, "ratio", None) == "nominal" else []
     ratios = [R for R in [*ratios, *_RATIOS] if _is_within(R, getattr(law, "R_range", None))]
@@ -104,7 +108,11 @@ def _check_rates(law: Law, dK: Floats, R: Floats, rate: Floats, wrong: list[str]
         )
 
 
-def check_criterion(criterion: Criterion, nu: float = 0.3) -> None:
+@check_arguments()
+def check_criterion(
+    criterion: Annotated[Criterion, Function("a function (K, nu) -> (angle, dK_eq, R)")],
+    nu: Poisson = 0.3,
+) -> None:
     """Try a direction criterion and say all that is wrong with it.
 
     Parameters
@@ -127,8 +135,6 @@ def check_criterion(criterion: Criterion, nu: float = 0.3) -> None:
     >>> from xcrack.fatigue.criteria import weighted_angle
     >>> check_criterion(weighted_angle)
     """
-    _check_callable(criterion, "check_criterion: criterion")
-    nu = number(nu, "check_criterion: nu", above=-1, below=0.5)
     wrong: list[str] = []
     for modes in (2, 3):
         _check_modes(criterion, nu, modes, wrong)
@@ -225,11 +231,6 @@ def _call_law(
     except ProblemError as error:
         wrong.append(str(error))
         return None
-
-
-def _check_callable(function: object, what: str) -> None:
-    if not callable(function):
-        raise ProblemError(f"{what} = {value_text(function)} cannot be called: give a function.")
 
 
 def _judge(kind: str, function: object, wrong: list[str]) -> None:

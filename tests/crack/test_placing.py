@@ -8,7 +8,7 @@ import pytest
 import xcrack as xc
 from xcrack.crack.advance_2d import advance
 from xcrack.crack.lines import touching_points
-from xcrack.crack.placing import check_cracks, place_crack, short_fronts
+from xcrack.crack.stations import check_cracks, place_crack, short_fronts
 
 STEEL = xc.Isotropic(E=1.0, nu=0.3, plane="strain")
 BOX = xc.box((-0.5, -0.5), (0.5, 0.5), 16)

@@ -143,7 +143,7 @@ ENTRIES = [
             "enrichment": arg(Word(words=("geometric", "topological")), "geometric"),
             "radius": arg(Number(optional=True, above=0), None, 0.3),
             "functions": arg(Choice(values=(4, 2)), 4, 2),
-            "multipliers": arg(Word(words=("reduced", "naive")), "naive"),
+            "multipliers": arg(Word(words=("reduced", "sparse", "naive")), "naive"),
             "consistent": arg(Flag(), True, False),
             "orthonormal": arg(Word(words=("star", "node", "none")), "star"),
             "patch": arg(Flag(), False),

@@ -219,7 +219,7 @@ REFUSED = {
     "size_near = inf": {"size_near": np.inf},
     "band = -1": {"band": -1.0},
     "transition = nan": {"transition": np.nan},
-    r"notch_angle = 60 .*np\.radians": {"notch_angle": 60.0},
+    r"notch_angle = 60.0 .*np\.radians": {"notch_angle": 60.0},
     "notch_angle = nan": {"notch_angle": np.nan},
     "crack_depth = 1.5 must exceed notch_depth = 2": {"crack_depth": 1.5},
     "crack_depth = 21 .* not diameter = 20": {"crack_depth": 21.0},

@@ -255,14 +255,17 @@ PROBLEMS = {
         lambda: problem(loads=[xc.crack_pressure(1.0, crack=1)]),
         r"crack_pressure\(crack=1\): the problem has 0 crack",
     ),
-    "no load": (lambda: problem(loads=["top"]), "loads: 'top' is not a load"),
+    "no load": (
+        lambda: problem(loads=["top"]),
+        "loads: 'top' is not one of them: give loads, such",
+    ),
     "no support": (
         lambda: problem(supports=PULL),
-        r"supports: traction\(.*is not a support; give fix",
+        r"supports: traction\(.*is not one of them: give fix.*put forces into loads",
     ),
     "no crack": (
         lambda: xc.Problem(box(), STEEL, [[(0, 0), (1, 1)]]),
-        "is not a Crack; make one by",
+        "is not one of them: give cracks, such as line_crack",
     ),
     "a load for loads": (
         lambda: xc.Problem(box(), STEEL, loads=PULL[0]),
@@ -270,13 +273,13 @@ PROBLEMS = {
     ),
     "no mesh": (
         lambda: xc.Problem("plate.msh", STEEL),
-        r"Problem\(mesh=...\) must be of type Mesh, not str",
+        "Problem: mesh = 'plate.msh': give a mesh, such as box",
     ),
     "no material": (
         lambda: xc.Problem(box(), 210e3),
-        r"Problem\(material=...\) must be of type Material such as Isotropic, not float",
+        r"Problem: material = 210000.0: give a material, such as Isotropic",
     ),
-    "contact": (lambda: problem(contact="maybe"), "contact = 'maybe': give \"auto\""),
+    "contact": (lambda: problem(contact="maybe"), "contact = 'maybe' .*give \"auto\""),
     "order": (lambda: problem(order=3), "order = 3: give 1 or 2"),
     "load state": (
         lambda: xc.solve(problem(), states=[NAN]),
@@ -299,7 +302,7 @@ PROBLEMS = {
     ),
     "a problem": (
         lambda: xc.solve("scene"),
-        r"solve: give a Problem\(.*, not str",
+        r"solve: problem = 'scene': give a Problem\(mesh",
     ),
     "a solver": (lambda: xc.solve(problem(), solver="mumps"), "solver = 'mumps' cannot be called"),
     "a solver of nothing": (

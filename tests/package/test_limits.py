@@ -71,15 +71,25 @@ def questions_for_kinds(trees):
 
 
 def rules_outside_of_declarations(trees):
-    """Calls that check a number where a field or an argument could declare its rule."""
-    count = 0
-    for path, tree in trees.items():
-        inside = path.relative_to(SOURCE)
-        if inside.parts[0] in ("model", "fatigue") or inside.as_posix() == "growth/options.py":
-            for node in ast.walk(tree):
-                name = getattr(node.func, "id", "") if isinstance(node, ast.Call) else ""
-                count += name in ("number", "whole_number", "one_of", "flag")
-    return count
+    """Calls that check a value where a field or an argument could declare its rule.
+
+    A function of a value, `what` to call it and the `error` to raise belongs to a rule itself.
+    """
+    checks = {"number", "whole_number", "one_of", "flag", "entries", "path_of"}
+
+    def calls(node, is_rule):
+        if isinstance(node, ast.FunctionDef):
+            arguments = [*node.args.args, *node.args.kwonlyargs]
+            is_rule = {"what", "error"} <= {argument.arg for argument in arguments}
+        name = getattr(node.func, "id", "") if isinstance(node, ast.Call) else ""
+        own = int(name in checks and not is_rule)
+        return own + sum(calls(child, is_rule) for child in ast.iter_child_nodes(node))
+
+    return sum(
+        calls(tree, False)
+        for path, tree in trees.items()
+        if path.relative_to(SOURCE).parts[0] not in ("base", "growth", "runs")
+    )
 
 
 def tables_of_dimension(trees):

@@ -4,7 +4,7 @@ import sys
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from time import perf_counter
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -12,10 +12,10 @@ from xcrack.adaptivity import sizes_2d, sizes_3d
 from xcrack.adaptivity.adaptation import Adaptation, AdaptationPass
 from xcrack.adaptivity.indicators import Indicators, indicators_of
 from xcrack.adaptivity.resolved import resolved_problem
-from xcrack.base.checks import entries, flag, number, whole_number
+from xcrack.base.arguments import Items, Number, Progress, Whole, check_arguments
 from xcrack.base.errors import GeometryError, ProblemError, SizeError, collected_warnings, warn
 from xcrack.mesh.mesh import Mesh
-from xcrack.model.problem import Problem, check_problem
+from xcrack.model.problem import Problem, ProblemArgument
 
 _FIRST: dict[int, Callable[[Problem], Mesh]] = {2: sizes_2d.first_mesh, 3: sizes_3d.first_mesh}
 _NEXT: dict[int, Callable[[Indicators, float, float, int], Mesh | None]] = {
@@ -31,12 +31,13 @@ _AIM = 0.5  # of the tolerance: bars of the next mesh are foretold to a factor o
 _STALLED = 0.9  # a bar that falls to no less than this share has another cause than the cells
 
 
+@check_arguments()
 def adapt(
-    problem: Problem,
-    tolerance: float,
-    states: Sequence[Any] | None = None,
-    max_unknowns: int | None = None,
-    progress: bool | str = True,
+    problem: ProblemArgument,
+    tolerance: Annotated[float, Number(above=0, below=1)],
+    states: Annotated[Sequence[Any] | None, Items()] = None,
+    max_unknowns: Annotated[int | None, Whole(least=1, most=10**9)] = None,
+    progress: Annotated[bool | str, Progress()] = True,
 ) -> Adaptation:
     """Refine the mesh of a scene until K is as accurate as wanted.
 
@@ -68,8 +69,8 @@ def adapt(
     Raises
     ------
     ProblemError
-        A scene without tips or fronts, a tolerance that is not between 0 and 1, fewer unknowns than
-        the first mesh has, contact by a method that has no estimate, faces that press and rub.
+        A scene without tips or fronts, fewer unknowns than the first mesh has, contact by a method
+        that has no estimate, faces that press and rub.
     ConvergenceError, GeometryError
         The first mesh cannot be solved.
 
@@ -83,16 +84,10 @@ def adapt(
     A bar knows nothing of a wrong load, and of a body that is not linear elastic. The rule by which
     cells are refined is that of equal shares (Becker and Rannacher, 2001, Acta Numerica 10, 1).
     """
-    check_problem(problem, "adapt")
-    tolerance = number(tolerance, "adapt: tolerance", above=0, below=1)
-    most = _MOST_UNKNOWNS[problem.mesh.dim]
-    if max_unknowns is not None:
-        most = whole_number(max_unknowns, "adapt: max_unknowns", least=1, most=10**9)
-    if not (isinstance(progress, str) and progress == "always"):
-        flag(progress, 'adapt: progress, if it is not "always",')
+    most = _MOST_UNKNOWNS[problem.mesh.dim] if max_unknowns is None else max_unknowns
     problem = resolved_problem(problem)
     _check_scene(problem)
-    load_states = [None] if states is None else entries(states, "states")
+    load_states = [None] if states is None else states
     scene = replace(problem, mesh=_FIRST[problem.mesh.dim](problem), order=_ORDER)
     return _adaptation_passes(scene, load_states, tolerance, most, progress)
 

@@ -4,17 +4,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from xcrack.base.arguments import check_arguments
 from xcrack.base.checks import value_text
 from xcrack.base.errors import ProblemError, SizeError
 from xcrack.base.machine import free_memory
 from xcrack.base.markup import element
 from xcrack.crack.crack import Crack, crack_length
 from xcrack.crack.measures import area_inside, front_length_inside
-from xcrack.crack.placing import short_fronts
+from xcrack.crack.stations import short_fronts
 from xcrack.fem.enrichment import reach_of_tips
 from xcrack.mesh.mesh import Mesh
 from xcrack.mesh.simplex import leg_sizes
-from xcrack.model.problem import Problem, check_problem
+from xcrack.model.problem import Problem, ProblemArgument
 
 # Unknowns and memory, foretold from mesh and cracks.
 
@@ -264,7 +265,8 @@ class Report:
         )
 
 
-def plan(problem: Problem) -> Report:
+@check_arguments()
+def plan(problem: ProblemArgument) -> Report:
     """What a scene needs, decided before anything is built.
 
     Parameters
@@ -290,7 +292,6 @@ def plan(problem: Problem) -> Report:
     >>> print(xc.plan(xc.Problem(mesh, steel))["tip functions"])
     tip functions           left out  no cracks
     """
-    check_problem(problem, "plan")
     return Report(ingredients_of(problem), {}, size_forecast=forecast_of(problem))
 
 

@@ -4,13 +4,14 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from numbers import Real
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from xcrack.analysis.contact import Contact, ContactSolution
 from xcrack.analysis.plan import Ingredient, Report
+from xcrack.base.arguments import Part
 from xcrack.base.arrays import Bools, Floats, Ints, lock
 from xcrack.base.checks import numbers, value_text, whole_numbers
 from xcrack.base.errors import GeometryError, ProblemError
@@ -373,5 +374,7 @@ def initial_stress_at(
             total = total + factor * elasticity.initial_stress(load, x, cell, bary, exact)
     return total
 
+
+SolutionArgument = Annotated[Solution, Part(Solution, "a Solution, as solve returns it")]
 
 __all__ = []

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any, cast
+from typing import Annotated, Any, cast
 
 import numpy as np
 import scipy.sparse as sp
@@ -14,8 +14,9 @@ from xcrack.analysis.friction import slip_of
 from xcrack.analysis.plan import check_memory, takes_iterations
 from xcrack.analysis.report import alarms_of_solutions, report, resultants
 from xcrack.analysis.solution import FactoredSolution, Solution
+from xcrack.base.arguments import Function, Items, Switch, check_arguments
 from xcrack.base.arrays import Bools, Floats, lock
-from xcrack.base.checks import entries, flag, value_text
+from xcrack.base.checks import value_text
 from xcrack.base.errors import ProblemError, warn
 from xcrack.base.machine import one_blas_thread, threads
 from xcrack.fem.assembly import MeshLoad, body_forces, next_to_enriched
@@ -34,7 +35,7 @@ from xcrack.linalg.rigid_motion import (
 )
 from xcrack.model.friction import check_order
 from xcrack.model.loads import Load
-from xcrack.model.problem import LoadState, Problem, check_problem
+from xcrack.model.problem import LoadState, Problem, ProblemArgument
 from xcrack.model.supports import Support
 
 # How much of an initial stress the body cannot bear: its part out of balance.
@@ -89,14 +90,18 @@ def out_of_balance(problem: Problem, model: System, loads: Sequence[Load]) -> fl
     return float(np.clip(f @ u / stored, 0.0, 1.0))
 
 
+_SOLVER = (
+    "a function of a sparse matrix that returns a function of right-hand sides, such as xc.pardiso"
+)
 _LARGEST = 1e120  # force or displacement whose square, over a small stiffness, is still a number
 
 
+@check_arguments()
 def solve(
-    problem: Problem,
-    states: Sequence[Any] | None = None,
-    solver: Solver | None = None,
-    error: bool = False,
+    problem: ProblemArgument,
+    states: Annotated[Sequence[Any] | None, Items(keeps_sets=True)] = None,
+    solver: Annotated[Solver | None, Function(_SOLVER)] = None,
+    error: Switch = False,
 ) -> Any:
     """Solve a problem for one load state or several, with one factorisation.
 
@@ -135,17 +140,9 @@ def solve(
     XcrackWarning
         Nothing acts, or displacements above 2 % of the body that are more likely a slip of units.
     """
-    check_problem(problem, "solve")
-    if solver is not None and not callable(solver):
-        raise ProblemError(
-            f"solver = {value_text(solver)} cannot be called: give a function of a sparse matrix "
-            f"that returns a function of right-hand sides, such as xc.pardiso."
-        )
     if states is not None:
         check_order(problem.frictions, states)
-        states = entries(states, "states")
-    error = flag(error, "solve: error")
-    load_states = [None] if states is None else states
+    load_states = [None] if states is None else tuple(states)
     solutions = solve_states(problem, load_states, solver=solver, error=error)
     for alarm in alarms_of_solutions(solutions, stresses=False):
         warn(str(alarm))

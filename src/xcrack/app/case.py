@@ -2,17 +2,15 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
-from os import PathLike
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from xcrack.app import case_forms as forms
-from xcrack.app.case_forms import Form
+from xcrack.app import case_values as values
 from xcrack.app.case_histories import loading, retardation_of
 from xcrack.app.case_tables import Table, read_tables
-from xcrack.base.errors import ProblemError, XcrackError
-from xcrack.base.paths import path_of
+from xcrack.base.arguments import FileName, check_arguments
+from xcrack.base.errors import XcrackError
 from xcrack.base.units import LENGTH, NUMBER, TOUGHNESS
 from xcrack.fatigue.law import GrowthLaw
 from xcrack.fatigue.retardation import plastic_zone
@@ -62,7 +60,8 @@ class CaseFile:
     warp: float
 
 
-def read_case(path: str | PathLike[str]) -> CaseFile:
+@check_arguments()
+def read_case(path: FileName) -> CaseFile:
     """Read a scene from a toml file.
 
     Parameters
@@ -79,22 +78,22 @@ def read_case(path: str | PathLike[str]) -> CaseFile:
         No such file, no toml, a wrong key, unit or file, or a scene that is not well posed: the
         message has file, line, and how to mend it.
     """
-    file = path_of(path, "read_case: path", error=ProblemError)
+    file = Path(path)
     root = read_tables(file)
     root.known(_SECTIONS)
     for name in ("mesh", "material"):
         if name not in root:
             root.refuse("", f"the table [{name}] is missing.")
-    mesh = forms.value_of_table(root.table("mesh"), forms.MESHES)
+    mesh = values.value_of_table(root.table("mesh"), values.MESHES)
     material = _material(root.table("material"))
     solving = root.table("solve")
     solving.known(("contact", "order", "friction", "states"))
     scene: dict[str, Any] = {
-        name: [forms.value_of_table(table, allowed) for table in root.tables(name)]
+        name: [values.value_of_table(table, allowed) for table in root.tables(name)]
         for name, allowed in (
-            ("cracks", forms.CRACKS),
-            ("supports", forms.forms_of(Support)),
-            ("loads", forms.forms_of(Load)),
+            ("cracks", values.CRACKS),
+            ("supports", values.makers_of(Support)),
+            ("loads", values.makers_of(Load)),
         )
     }  # fmt: skip
     numerics = _numerics(root.table("numerics"))
@@ -120,20 +119,20 @@ def read_case(path: str | PathLike[str]) -> CaseFile:
 
 def _material(table: Table) -> Material:
     """One material, or by tables [material.name] one for each cell set."""
-    values = table.content.values()
-    if values and all(isinstance(value, dict) for value in values):
+    parts = table.content.values()
+    if parts and all(isinstance(part, dict) for part in parts):
         return MaterialSets({
-            name: forms.value_of_kind(table.table(name), Material, Isotropic)
+            name: values.value_of_kind(table.table(name), Material, Isotropic)
             for name in table.content
         })  # fmt: skip
-    return forms.value_of_kind(table, Material, Isotropic)  # type: ignore[no-any-return]
+    return values.value_of_kind(table, Material, Isotropic)  # type: ignore[no-any-return]
 
 
 def _numerics(table: Table) -> Numerics:
     """Choices of method; those for comparison stay in scripts."""
     names = [f.name for f in fields(Numerics) if f.name not in _METHODS]
     table.known(names)
-    return forms.called_with(table, Form(Numerics))  # type: ignore[no-any-return]
+    return values.called_with(table, Numerics)  # type: ignore[no-any-return]
 
 
 def _growth(table: Table) -> Mapping[str, Any]:
@@ -143,8 +142,8 @@ def _growth(table: Table) -> Mapping[str, Any]:
     if "law" not in table:
         table.refuse("", "the key 'law' is missing.")
     criterion = table.text("criterion", "max_hoop_stress")
-    if criterion not in forms.CRITERIA:
-        table.refuse("criterion", f"known are {', '.join(forms.CRITERIA)}.")
+    if criterion not in values.CRITERIA:
+        table.refuse("criterion", f"known are {', '.join(values.CRITERIA)}.")
     units = {"da": LENGTH, **_OPTIONS}
     given = {
         name: table.value(name, units.get(name)) for name in table.content if name not in _TABLES
@@ -152,10 +151,10 @@ def _growth(table: Table) -> Mapping[str, Any]:
     if "retardation" in table:
         given["retardation"] = retardation_of(table.table("retardation"))
     if "link_up" in table:
-        given["link_up"] = forms.called_with(table.table("link_up"), Form(plastic_zone))
+        given["link_up"] = values.called_with(table.table("link_up"), plastic_zone)
     return MappingProxyType({
-        "law": forms.value_of_table(table.table("law"), forms.forms_of(GrowthLaw)),
-        "criterion": forms.CRITERIA[criterion],
+        "law": values.value_of_table(table.table("law"), values.makers_of(GrowthLaw)),
+        "criterion": values.CRITERIA[criterion],
         "cycle": loading(table),
         **given,
     })  # fmt: skip

@@ -1,12 +1,13 @@
 """Load histories, and retardation after overloads, as tables of a case file give them."""
 
 import inspect
+from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
-from xcrack.app.case_forms import Form, called_with, forms_of, value_of_table
 from xcrack.app.case_tables import Table
+from xcrack.app.case_values import called_with, makers_of, value_of_table
+from xcrack.base.arguments import FileName
 from xcrack.base.errors import XcrackError
 from xcrack.base.units import NUMBER
 from xcrack.fatigue.cycle import Cycle
@@ -26,17 +27,17 @@ def _rows(rows: Any) -> Spectrum:
     return Spectrum(rows=rows)
 
 
-def _file(path: Path, column: int | None = None, rows: bool = False) -> Spectrum:
+def _file(path: FileName, column: int | None = None, rows: bool = False) -> Spectrum:
     return read_spectrum(path, column=column, rows=rows)
 
 
-_HISTORIES = {
-    "factors": Form(_factors),
-    "rows": Form(_rows),
-    "file": Form(_file, files=("path",)),
-    "twist": Form(twist),
+_HISTORIES: dict[str, Callable[..., Any]] = {
+    "factors": _factors,
+    "rows": _rows,
+    "file": _file,
+    "twist": twist,
 }
-_MODELS = {"wheeler": Form(wheeler), "willenborg": Form(willenborg)}
+_MODELS = {"wheeler": wheeler, "willenborg": willenborg}
 
 
 def loading(table: Table) -> Cycle | Spectrum:
@@ -50,13 +51,13 @@ def loading(table: Table) -> Cycle | Spectrum:
     if "spectrum" not in table:
         if "cycle" not in table:
             table.refuse("", "the key 'cycle' is missing; or give 'spectrum'.")
-        return called_with(table.table("cycle"), Form(Cycle, {"min": NUMBER, "max": NUMBER}))
+        return called_with(table.table("cycle"), Cycle)
     if "cycle" in table:
         table.refuse("spectrum", "give cycle or spectrum, not both.")
     given = table.table("spectrum")
     kind = given.text("kind", next((name for name in _HISTORIES if name in given), "factors"))
     if kind in _HISTORIES:
-        parameters_of_kind = inspect.signature(_HISTORIES[kind].function).parameters
+        parameters_of_kind = inspect.signature(_HISTORIES[kind]).parameters
         given.known(["kind", *parameters_of_kind, *_CHOICES], f" of {kind!r}")
     remaining = {name: value for name, value in given.content.items() if name not in _CHOICES}
     spectrum = value_of_table(
@@ -70,7 +71,7 @@ def loading(table: Table) -> Cycle | Spectrum:
         choices["unit"] = given.text("unit")
     if "steady" in given:
         choices["steady"] = tuple(
-            value_of_table(load, forms_of(Load)) for load in given.tables("steady")
+            value_of_table(load, makers_of(Load)) for load in given.tables("steady")
         )
     try:
         return replace(spectrum, **choices)

@@ -7,9 +7,9 @@ from typing import Any, Unpack
 from xcrack.analysis.solution import Solution
 from xcrack.analysis.solve import solve
 from xcrack.app.case import CaseFile, read_case
-from xcrack.base.checks import flag
+from xcrack.base.arguments import FileName, Switch, check_arguments
 from xcrack.base.errors import ProblemError
-from xcrack.base.paths import path_of, system_errors
+from xcrack.base.paths import system_errors
 from xcrack.fatigue.criteria import Criterion
 from xcrack.fatigue.cycle import Cycle
 from xcrack.fatigue.law import Law
@@ -26,18 +26,19 @@ from xcrack.view.report import report
 
 
 @lists_options
+@check_arguments()
 def run(
-    path: str | PathLike[str],
+    path: FileName,
     problem: Problem | None = None,
     law: Law | None = None,
     criterion: Criterion | None = None,
     cycle: Cycle | Spectrum | None = None,
     da: float | None = None,
     *,
-    resumed: bool = False,
-    overwrite: bool = False,
+    resumed: Switch = False,
+    overwrite: Switch = False,
     until: Until | None = None,
-    keep_solutions: bool = True,
+    keep_solutions: Switch = True,
     **options: Unpack[GrowthOptions],
 ) -> Any:
     """Run growth in a folder, to its end: begin, or go on with it. Or run a case file.
@@ -76,8 +77,6 @@ def run(
         As of `grow`, `collect` and `resume`: the folder holds a run with other settings. Of a case
         file as of `read_case`, `solve`, `grow` and `resume`.
     """
-    for name, value in (("resumed", resumed), ("overwrite", overwrite)):
-        flag(value, f"run: {name}")
     if problem is not None:
         if resumed:
             raise ProblemError("run: resumed belongs to a case file: a run in a folder goes on.")
@@ -102,7 +101,7 @@ def _run_in(
 ) -> History:
     """History of the run in a folder: begun, gone on with, or read."""
     problem, law, criterion, cycle, da = scene
-    folder = path_of(path, "run: path", error=ProblemError)
+    folder = Path(path)
     with system_errors("a folder for the run cannot be made at", folder, error=ProblemError):
         if folder.is_file():
             raise ProblemError(

@@ -1,12 +1,13 @@
 """Meshes from one file to another."""
 
-from os import PathLike
-
+from xcrack.base.arguments import FileName, check_arguments
+from xcrack.base.errors import MeshError
 from xcrack.mesh.files import read_mesh, write_mesh
 from xcrack.mesh.mesh import Mesh
 
 
-def convert_mesh(source: str | PathLike[str], target: str | PathLike[str]) -> Mesh:
+@check_arguments(MeshError)
+def convert_mesh(source: FileName, target: FileName) -> Mesh:
     """Read a mesh from a file and write it to another one, of another kind if need be.
 
     Parameters

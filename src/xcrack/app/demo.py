@@ -2,12 +2,11 @@
 
 import warnings
 from importlib.resources import as_file, files
-from os import PathLike
 from pathlib import Path
 
 from xcrack.analysis.solve import solve
-from xcrack.base.errors import ProblemError, XcrackWarning
-from xcrack.base.paths import path_of
+from xcrack.base.arguments import FileName, check_arguments
+from xcrack.base.errors import XcrackWarning
 from xcrack.crack.lines import line_crack
 from xcrack.mesh.files import read_mesh
 from xcrack.mesh.mesh import Mesh
@@ -19,7 +18,8 @@ from xcrack.view.report import report
 _RADIUS, _TIP, _PRESSURE = 5.0, 12.0, 80.0  # mm, mm, MPa
 
 
-def demo(folder: str | PathLike[str] = "xcrack_demo") -> Path:
+@check_arguments()
+def demo(folder: FileName = "xcrack_demo") -> Path:
     """Solve a plate with a hole whose crack is pressed together, and report on it.
 
     Parameters
@@ -37,7 +37,7 @@ def demo(folder: str | PathLike[str] = "xcrack_demo") -> Path:
     ProblemError
         The folder cannot be written.
     """
-    path = path_of(folder, "demo: folder", error=ProblemError)
+    path = Path(folder)
     problem = Problem(
         demo_mesh(),
         Isotropic(E=210e3, nu=0.3, plane="strain"),

@@ -12,7 +12,7 @@ import numpy as np
 
 import xcrack
 from xcrack.analysis.solve import solve
-from xcrack.base.checks import flag
+from xcrack.base.arguments import Switch, check_arguments
 from xcrack.base.errors import XcrackError, XcrackWarning
 from xcrack.base.machine import number_of_threads
 from xcrack.base.optional import require_package
@@ -78,7 +78,8 @@ class Info:
         return "\n".join(f"{name:<18}{text}" for name, text in rows)
 
 
-def info(*, warm: bool = False) -> Info:
+@check_arguments()
+def info(*, warm: Switch = False) -> Info:
     """Versions, solvers, renderers, missing libraries, and the folder of the compiled kernels.
 
     Parameters
@@ -90,13 +91,7 @@ def info(*, warm: bool = False) -> Info:
     -------
     Info
         Printed, it is a list.
-
-    Raises
-    ------
-    ProblemError
-        `warm` is neither True nor False.
     """
-    warm = flag(warm, "info: warm")
     missing = []
     for name in _NEEDED:
         try:

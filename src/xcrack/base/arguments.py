@@ -1,14 +1,19 @@
 """Rules of arguments, each written once, where the argument is declared.
 
 A rule is part of the annotation, ``C: Annotated[float, Number(above=0)]``. `Declared` runs those of
-a dataclass, `check_arguments` those of a function; case files, stored values, pages and drawn
-inputs of tests read them by `arguments_of`.
+a dataclass, `check_arguments` those of a function or method; case files, stored values, pages and
+the tests of wrong input read them by `arguments_of`. Rules look at one value: what two arguments
+must be to each other stands in the code that they are given to.
 """
 
 import inspect
-from collections.abc import Callable
-from dataclasses import MISSING, dataclass, fields, is_dataclass
+import re
+from collections.abc import Callable, Mapping
+from collections.abc import Set as AbstractSet
+from dataclasses import MISSING, dataclass, field, fields, is_dataclass
 from functools import cache, wraps
+from os import PathLike
+from pathlib import Path
 from types import NoneType, UnionType
 from typing import (
     Annotated,
@@ -22,27 +27,33 @@ from typing import (
     get_type_hints,
 )
 
-from xcrack.base.arrays import frozen_copy
+import numpy as np
+
+from xcrack.base.arrays import Floats, frozen_copy
 from xcrack.base.checks import (
+    LARGEST,
     entries,
     flag,
     number,
     numbers,
     one_of,
+    point_coordinates,
     value_text,
     whole_number,
     whole_numbers,
 )
 from xcrack.base.errors import ProblemError, XcrackError
-from xcrack.base.units import NUMBER, Dimension
+from xcrack.base.paths import path_of
+from xcrack.base.units import LENGTH, NUMBER, Dimension
 
 P = ParamSpec("P")
 T = TypeVar("T")
 Error = type[XcrackError]
+_FEW = 2  # whole numbers between bounds, beyond the first, that a refusal lists
 Unit = Dimension | Callable[[Any], Dimension] | None
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class Rule:
     """What an argument may be.
 
@@ -67,11 +78,14 @@ class Rule:
 
     @property
     def words(self) -> str:
-        """What fits, for pages."""
+        """What fits, for pages and signatures."""
         return ""
 
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({self.words})"
 
-@dataclass(frozen=True, kw_only=True)
+
+@dataclass(frozen=True, kw_only=True, repr=False)
 class Number(Rule):
     """A finite real number within bounds, kept as float."""
 
@@ -98,7 +112,7 @@ class Number(Rule):
         return _bounds(self.above, self.least, self.below, self.most)
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class Whole(Rule):
     """A whole number within bounds, kept as int."""
 
@@ -107,7 +121,14 @@ class Whole(Rule):
 
     def check(self, value: Any, what: str, error: Error) -> int:
         """The number as int."""
-        return whole_number(value, what, least=self.least, most=self.most, error=error)
+        low, high = self.least, self.most
+        try:
+            return whole_number(value, what, least=low, most=high, error=error)
+        except error:
+            if low is None or high is None or high - low > _FEW:
+                raise
+            choices = " or ".join(map(str, range(low, high + 1)))
+            raise error(f"{what} = {value_text(value)}: give {choices}.") from None
 
     @property
     def words(self) -> str:
@@ -115,7 +136,7 @@ class Whole(Rule):
         return _bounds(None, self.least, None, self.most)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Choice(Rule):
     """One of some values; 1 is not True."""
 
@@ -137,7 +158,27 @@ class Choice(Rule):
         return "{" + ", ".join(repr(each) for each in self.values) + "}"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
+class SomeOf(Rule):
+    """One of some words, or a list of at least one; kept as tuple."""
+
+    values: tuple[str, ...]
+
+    def check(self, value: Any, what: str, error: Error) -> tuple[str, ...]:
+        """The words as a tuple."""
+        words = (value,) if isinstance(value, str) else entries(value, what, error=error)
+        if not words or not all(isinstance(word, str) and word in self.values for word in words):
+            choices = ", ".join(f'"{word}"' for word in self.values)
+            raise error(f"{what} = {value_text(value)}: give some of {choices}.")
+        return words
+
+    @property
+    def words(self) -> str:
+        """The values."""
+        return "some of " + ", ".join(map(repr, self.values))
+
+
+@dataclass(frozen=True, repr=False)
 class Flag(Rule):
     """True or False."""
 
@@ -146,20 +187,45 @@ class Flag(Rule):
         return flag(value, what, error=error)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
+class Progress(Rule):
+    """Whether progress is shown: True or False, "always" where nobody watches too."""
+
+    def check(self, value: Any, what: str, error: Error) -> bool | str:
+        """The word, or a bool."""
+        if isinstance(value, str) and value == "always":
+            return value
+        if not isinstance(value, bool | np.bool_):
+            raise error(f'{what} = {value_text(value)}: give True, False or "always".')
+        return bool(value)
+
+
+@dataclass(frozen=True, repr=False)
 class Text(Rule):
-    """A text that is not empty; the name of a facet set is one."""
+    """A text that is not empty, but where it may be; the name of a facet set is one."""
 
     needs: str = "a text"
+    may_be_empty: bool = False
 
     def check(self, value: Any, what: str, error: Error) -> str:
         """The text."""
-        if not isinstance(value, str) or not value:
+        if not isinstance(value, str) or not (value or self.may_be_empty):
             raise error(f"{what} = {value_text(value)}: give {self.needs}.")
         return value
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
+class FilePath(Rule):
+    """The path of a file or folder; relative paths of a case file begin beside it."""
+
+    is_file: bool = False
+
+    def check(self, value: Any, what: str, error: Error) -> Path:
+        """The path."""
+        return path_of(value, what, error=error, is_file=self.is_file)
+
+
+@dataclass(frozen=True, repr=False)
 class Array(Rule):
     """An array of finite numbers of a shape, None where any length will do; kept read-only.
 
@@ -167,7 +233,7 @@ class Array(Rule):
     """
 
     shape: tuple[int | None, ...] | None = None
-    unit: Unit = NUMBER
+    unit: Unit = field(default=NUMBER, kw_only=True)
     is_whole: bool = False
     hashable: bool = False
 
@@ -177,7 +243,56 @@ class Array(Rule):
         return _tuples(made.tolist()) if self.hashable else frozen_copy(made)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
+class Points(Rule):
+    """Coordinates of a shape, None where any length will do, small enough to compute with."""
+
+    shape: tuple[int | None, ...] | None = None
+    unit: Unit = field(default=LENGTH, kw_only=True)
+
+    def check(self, value: Any, what: str, error: Error) -> Floats:
+        """A read-only copy."""
+        return frozen_copy(point_coordinates(value, what, self.shape, error=error))
+
+    @property
+    def words(self) -> str:
+        """The shape."""
+        return _shape_words(self.shape)
+
+
+@dataclass(frozen=True, repr=False)
+class Direction(Rule):
+    """A vector of three numbers that has a direction."""
+
+    needs: str = "a direction (x, y, z)"
+
+    def check(self, value: Any, what: str, error: Error) -> Floats:
+        """The unit vector."""
+        try:
+            vector = numbers(value, what, (3,), error=error)
+        except error:
+            raise error(f"{what} = {value_text(value)}: give {self.needs}.") from None
+        length = float(np.linalg.norm(vector))
+        if not 0 < length < np.inf:
+            raise error(f"{what} = {value_text(value)} has no direction: give {self.needs}.")
+        return np.asarray(vector / length)
+
+
+@dataclass(frozen=True, repr=False)
+class Interval(Rule):
+    """Two numbers, the lower one first."""
+
+    unit: Unit = field(default=NUMBER, kw_only=True)
+
+    def check(self, value: Any, what: str, error: Error) -> tuple[float, float]:
+        """Both as float."""
+        low, high = numbers(value, what, (2,), error=error).tolist()
+        if not low < high:
+            raise error(f"{what} = ({low:g}, {high:g}): give (lowest, highest).")
+        return low, high
+
+
+@dataclass(frozen=True, repr=False)
 class Vector(Rule):
     """Two or three finite numbers, by the dimension of the body; kept read-only."""
 
@@ -192,7 +307,7 @@ class Vector(Rule):
         return frozen_copy(vector)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Part(Rule):
     """A value of a class."""
 
@@ -208,7 +323,7 @@ class Part(Rule):
         return value
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Parts(Rule):
     """A list of values of a class, kept as tuple."""
 
@@ -227,7 +342,54 @@ class Parts(Rule):
         return items
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
+class OneOrMore(Rule):
+    """A value of a class, or a list of them, of at least one but where it may be empty; a tuple."""
+
+    kind: type
+    needs: str = ""
+    may_be_empty: bool = False
+
+    def check(self, value: Any, what: str, error: Error) -> tuple[Any, ...]:
+        """The values as a tuple."""
+        items = (value,) if isinstance(value, self.kind) else entries(value, what, error=error)
+        fits = all(isinstance(item, self.kind) for item in items)
+        if not fits or not (items or self.may_be_empty):
+            needs = self.needs or f"a {self.kind.__name__}"
+            raise error(f"{what} = {value_text(value)}: give {needs}, or a list of them.")
+        return items
+
+
+@dataclass(frozen=True, repr=False)
+class Items(Rule):
+    """A list of whatever is looked at where it is used; sets, without an order, may be kept."""
+
+    keeps_sets: bool = False
+
+    def check(self, value: Any, what: str, error: Error) -> Any:
+        """The entries as a tuple."""
+        items = entries(value, what, error=error)
+        return value if self.keeps_sets and isinstance(value, AbstractSet) else items
+
+
+@dataclass(frozen=True, repr=False)
+class CheckedBy(Rule):
+    """What a function (value, what, error) takes; kept as that returns it."""
+
+    function: Callable[[Any, str, Error], Any]
+    unit: Unit = field(default=None, kw_only=True)
+
+    def check(self, value: Any, what: str, error: Error) -> Any:
+        """What the function makes of the value."""
+        return self.function(value, what, error)
+
+    @property
+    def words(self) -> str:
+        """The name of the function."""
+        return self.function.__name__
+
+
+@dataclass(frozen=True, repr=False)
 class Function(Rule):
     """Something that can be called."""
 
@@ -240,12 +402,15 @@ class Function(Rule):
         return value
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Either(Rule):
     """What fits one of two rules; the message is that of the second."""
 
     first: Rule
     second: Rule
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "unit", self.second.unit)
 
     def check(self, value: Any, what: str, error: Error) -> Any:
         """The value as the rule that it fits keeps it."""
@@ -253,6 +418,11 @@ class Either(Rule):
             return self.first.check(value, what, error)
         except error:
             return self.second.check(value, what, error)
+
+    @property
+    def words(self) -> str:
+        """Both rules."""
+        return f"{self.first}, or {self.second}"
 
 
 @dataclass(frozen=True)
@@ -328,17 +498,22 @@ def _arguments_of(owner: Any) -> dict[str, Argument]:
 
 def _argument(name: str, hint: Any, default: Any) -> Argument:
     rule: Rule | None = None
+    is_optional = default is None
+    if get_origin(hint) in (Union, UnionType):  # such as Length | None
+        declared = [one for one in get_args(hint) if get_origin(one) is Annotated]
+        if len(declared) == 1:
+            is_optional = is_optional or NoneType in get_args(hint)
+            (hint,) = declared
     if get_origin(hint) is Annotated:
         hint, *notes = get_args(hint)
         rule = next((note for note in notes if isinstance(note, Rule)), None)
-    is_optional = default is None
     if get_origin(hint) in (Union, UnionType):
         is_optional = is_optional or NoneType in get_args(hint)
     return Argument(name, rule, default, is_optional, hint)
 
 
 def check_fields(value: Any, error: Error = ProblemError) -> None:
-    """Run the rules of all fields of a dataclass, at the end of its making.
+    """Run the rules of all fields of a dataclass, when it is made.
 
     Parameters
     ----------
@@ -362,12 +537,23 @@ def check_fields(value: Any, error: Error = ProblemError) -> None:
 class Declared:
     """A dataclass whose fields are checked by their rules when it is made."""
 
+    def __init_subclass__(cls) -> None:
+        super().__init_subclass__()
+        annotations = {
+            name: hint
+            for base in reversed(cls.__mro__)
+            for name, hint in inspect.get_annotations(base).items()
+        }
+        cls.__doc__ = _with_bounds(cls.__doc__, annotations)
+
     def __post_init__(self) -> None:
         check_fields(self)
 
 
 def check_arguments(error: Error = ProblemError) -> Callable[[Callable[P, T]], Callable[P, T]]:
-    """Let a function run the rules of its parameters before its own code.
+    """Let a function or method run the rules of its parameters before its own code.
+
+    Its docstring gets their bounds.
 
     Parameters
     ----------
@@ -380,16 +566,43 @@ def check_arguments(error: Error = ProblemError) -> Callable[[Callable[P, T]], C
 
         @wraps(function)
         def run(*values: P.args, **named: P.kwargs) -> T:
-            given = signature.bind(*values, **named)
+            try:
+                given = signature.bind(*values, **named)
+            except TypeError:
+                return function(*values, **named)  # raises in Python's own words
             for name, argument in arguments_of(function).items():
-                if name in given.arguments:
-                    what = f"{function.__name__}: {name}"
+                if name in given.arguments and argument.rule is not None:
+                    what = f"{function.__qualname__}: {name}"
                     given.arguments[name] = argument.check(given.arguments[name], what, error)
             return function(*given.args, **given.kwargs)
 
+        run.__doc__ = _with_bounds(function.__doc__, function.__annotations__)
         return run
 
     return decorate
+
+
+_PARAMETERS = re.compile(r"^( *)(\w+(?:, \w+)*) : (.+)$", re.MULTILINE)
+
+
+def _with_bounds(text: str | None, annotations: Mapping[str, Any]) -> str | None:
+    """A docstring whose lines "name : type" say the bounds that the annotations declare."""
+    if not text:
+        return text
+
+    def line(match: re.Match[str]) -> str:
+        names = match[2].split(", ")
+        bounds = {_bounds_of(annotations.get(name)) for name in names}
+        words = bounds.pop() if len(bounds) == 1 else ""
+        return f"{match[0]}, {words}" if words else match[0]
+
+    return _PARAMETERS.sub(line, text)
+
+
+def _bounds_of(hint: Any) -> str:
+    """Bounds of a number in words; empty where an annotation has none."""
+    rule = _argument("", hint, inspect.Parameter.empty).rule
+    return rule.words if isinstance(rule, Number | Whole) else ""
 
 
 def kinds_of(base: type) -> dict[str, type]:
@@ -407,7 +620,7 @@ def _bounds(above: Any, least: Any, below: Any, most: Any) -> str:
     low = f"above {above:g}" if above is not None else ""
     low = f"at least {least:g}" if least is not None else low
     high = f"below {below:g}" if below is not None else ""
-    high = f"at most {most:g}" if most is not None else high
+    high = f"at most {most:g}" if most is not None and most < LARGEST else high
     return " and ".join(part for part in (low, high) if part)
 
 
@@ -426,22 +639,50 @@ def _class_words(kind: Any) -> str:
     return " or ".join(filter(None, [", ".join(names[:-1]), names[-1]]))
 
 
+def _shape_words(shape: tuple[int | None, ...] | None) -> str:
+    if shape is None:
+        return "any shape"
+    return ", ".join("n" if side is None else str(side) for side in shape)
+
+
 def _tuples(value: Any) -> Any:
     return tuple(_tuples(each) for each in value) if isinstance(value, list) else value
 
 
+# Arguments that many functions have.
+
+Length = Annotated[float, Number(above=0, most=LARGEST, unit=LENGTH)]
+Distance = Annotated[float, Number(least=0, most=LARGEST, unit=LENGTH)]
+FileName = Annotated[str | PathLike[str], FilePath()]
+Switch = Annotated[bool, Flag()]
+Poisson = Annotated[float, Number(above=-1, below=0.5)]
+
 __all__ = [
     "Argument",
     "Array",
+    "CheckedBy",
     "Choice",
     "Declared",
+    "Direction",
+    "Distance",
     "Either",
+    "FileName",
+    "FilePath",
     "Flag",
     "Function",
+    "Interval",
+    "Items",
+    "Length",
     "Number",
+    "OneOrMore",
     "Part",
     "Parts",
+    "Points",
+    "Poisson",
+    "Progress",
     "Rule",
+    "SomeOf",
+    "Switch",
     "Text",
     "Vector",
     "Whole",

@@ -177,7 +177,7 @@ def numbers(
 
 
 def point_coordinates(
-    value: Any, what: str, shape: Shape, *, error: type[XcrackError] = MeshError
+    value: Any, what: str, shape: Shape | None = None, *, error: type[XcrackError] = MeshError
 ) -> Floats:
     """Check that a value is an array of finite coordinates, small enough to compute with.
 

@@ -1,10 +1,12 @@
 """Cracks in 2D: polylines."""
 
+from typing import Annotated
+
 import numpy as np
 from numpy.typing import ArrayLike
 
+from xcrack.base.arguments import Points, check_arguments
 from xcrack.base.arrays import Bools, Floats, at
-from xcrack.base.checks import point_coordinates
 from xcrack.base.errors import GeometryError
 from xcrack.crack.crack import Crack
 from xcrack.mesh.polygon import boxes_meet, closest_on_segment
@@ -14,7 +16,8 @@ _PARALLEL = 1e-10  # sine up to which pieces cross nowhere: they touch along a l
 _AT_ONCE = 1_000_000  # pairs of pieces looked at together
 
 
-def line_crack(points: ArrayLike) -> Crack:
+@check_arguments(GeometryError)
+def line_crack(points: Annotated[ArrayLike, Points((None, 2))]) -> Crack:
     """2D crack along a polyline.
 
     An end outside the body, or within half a cell of its boundary, becomes a mouth as soon as
@@ -33,7 +36,7 @@ def line_crack(points: ArrayLike) -> Crack:
     Raises
     ------
     GeometryError
-        Fewer than two points, nan, points that coincide, a line that is closed, crosses or
+        Fewer than two points, points that coincide, a line that is closed, crosses or
         touches itself, or turns back.
 
     Examples
@@ -41,7 +44,7 @@ def line_crack(points: ArrayLike) -> Crack:
     >>> line_crack([(0, 0), (1, 0), (2, 1)])
     Crack(3 points, 2 faces, not placed)
     """
-    x = point_coordinates(points, "line_crack: points", (None, 2), error=GeometryError)
+    x = np.asarray(points)
     if len(x) < 2:
         raise GeometryError(f"a line crack needs at least two points (p, 2), not {len(x)}.")
     length = np.linalg.norm(np.diff(x, axis=0), axis=1)

@@ -2,13 +2,15 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
+from xcrack.base.arguments import Part, check_arguments
 from xcrack.base.arrays import Bools, Floats, Ints, ranges
 from xcrack.base.errors import GeometryError, ProblemError
 from xcrack.crack.crack import Crack, tip_frames
-from xcrack.crack.placing import place_crack
+from xcrack.crack.stations import place_crack
 from xcrack.mesh.distances import signed_in
 from xcrack.mesh.locate import Body, parts_inside
 from xcrack.mesh.mesh import Mesh
@@ -463,7 +465,8 @@ _BY_DIMENSION: dict[int, Callable[[Crack, Mesh, Ints], _Raw]] = {
 }
 
 
-def measures(crack: Crack, mesh: Mesh) -> Measures:
+@check_arguments(GeometryError)
+def measures(crack: Annotated[Crack, Part(Crack)], mesh: Annotated[Mesh, Part(Mesh)]) -> Measures:
     """Area, depth, surface lengths of a crack, and where its fronts meet which facet sets.
 
     Traces and ends are intersections of the crack with the facets of the boundary: a semi-ellipse
@@ -494,11 +497,6 @@ def measures(crack: Crack, mesh: Mesh) -> Measures:
     on 'left': length 0, depth below it 0.3
     end at (0, 0.5) on 'left'
     """
-    if not isinstance(crack, Crack) or not isinstance(mesh, Mesh):
-        raise GeometryError(
-            f"measures: give a Crack and a Mesh, not {type(crack).__name__} and "
-            f"{type(mesh).__name__}."
-        )
     if crack.dim != mesh.dim:
         raise GeometryError(
             f"measures: a crack of {crack.dim}D needs a body of {crack.dim}D, not {mesh.dim}D."

@@ -1,20 +1,21 @@
 """Cracks in 3D: flat ones by their outline, others by their triangles."""
 
-from os import PathLike
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from xcrack.base.arrays import Floats, Ints, at
-from xcrack.base.checks import (
-    LARGEST,
-    number,
-    numbers,
-    point_coordinates,
-    whole_number,
-    whole_numbers,
+from xcrack.base.arguments import (
+    FileName,
+    Length,
+    Points,
+    Whole,
+    check_arguments,
 )
+from xcrack.base.arrays import Floats, Ints, at
+from xcrack.base.checks import LARGEST, numbers, point_coordinates, whole_numbers
 from xcrack.base.errors import GeometryError
+from xcrack.base.units import NUMBER
 from xcrack.crack.crack import Crack
 from xcrack.mesh.files import read_triangles
 from xcrack.mesh.polygon import ear_clipped, self_crossing
@@ -23,8 +24,13 @@ from xcrack.mesh.triangulation import face_areas, oriented_faces, rim, side_keys
 _FLAT = 1e-9  # share of its size by which a plane polygon may leave its plane
 _FEWEST, _MOST = 8, 100_000  # boundary points of a disc
 
+Place = Annotated[ArrayLike, Points((3,))]
+_Vector = Annotated[ArrayLike, Points((3,), unit=NUMBER)]
+_Count = Annotated[int, Whole(least=_FEWEST, most=_MOST)]
 
-def penny_crack(center: ArrayLike, normal: ArrayLike, radius: float, *, n: int = 128) -> Crack:
+
+@check_arguments(GeometryError)
+def penny_crack(center: Place, normal: _Vector, radius: Length, *, n: _Count = 128) -> Crack:
     """Circular 3D crack.
 
     Parameters
@@ -43,30 +49,23 @@ def penny_crack(center: ArrayLike, normal: ArrayLike, radius: float, *, n: int =
     Raises
     ------
     GeometryError
-        Values that are not finite, no normal, a radius that is not positive, n below 8.
+        A normal without direction.
 
     Examples
     --------
     >>> penny_crack((0, 0, 0), (0, 0, 1), 2.0, n=32).dim
     3
     """
-    middle = _vector(center, "penny_crack: center")
-    z = _unit(_vector(normal, "penny_crack: normal"), "the normal of the penny crack")
-    radius = number(radius, "penny_crack: radius", above=0, most=LARGEST, error=GeometryError)
+    middle, z = np.asarray(center), _unit(np.asarray(normal), "the normal of the penny crack")
     x = np.eye(3)[int(np.argmin(np.abs(z)))]
     x = np.cross(np.cross(z, x), z)
     x /= np.linalg.norm(x)
     return _disc(middle, x * radius, np.cross(z, x) * radius, n)
 
 
+@check_arguments(GeometryError)
 def elliptic_crack(
-    center: ArrayLike,
-    normal: ArrayLike,
-    axis: ArrayLike,
-    a: float,
-    b: float,
-    *,
-    n: int = 128,
+    center: Place, normal: _Vector, axis: _Vector, a: Length, b: Length, *, n: _Count = 128
 ) -> Crack:
     """Elliptic 3D crack.
 
@@ -89,19 +88,15 @@ def elliptic_crack(
     Raises
     ------
     GeometryError
-        Values that are not finite, no normal, an axis along the normal, half-axes that are not
-        positive, n below 8.
+        A normal without direction, an axis along the normal.
 
     Examples
     --------
     >>> elliptic_crack((0, 0, 0), (0, 0, 1), (1, 0, 0), 2.0, 1.0).dim
     3
     """
-    middle = _vector(center, "elliptic_crack: center")
-    z = _unit(_vector(normal, "elliptic_crack: normal"), "the normal of the elliptic crack")
-    given = _vector(axis, "elliptic_crack: axis")
-    a = number(a, "elliptic_crack: half-axis a", above=0, most=LARGEST, error=GeometryError)
-    b = number(b, "elliptic_crack: half-axis b", above=0, most=LARGEST, error=GeometryError)
+    middle, given = np.asarray(center), np.asarray(axis)
+    z = _unit(np.asarray(normal), "the normal of the elliptic crack")
     flat = given - (given @ z) * z
     if not np.linalg.norm(flat) > 1e-9 * np.linalg.norm(given):
         raise GeometryError(
@@ -115,10 +110,7 @@ def elliptic_crack(
 
 def _disc(center: Floats, first: Floats, second: Floats, n: int) -> Crack:
     """Disc spanned by two conjugate half-axes, in rings whose points become half as many."""
-    count = whole_number(
-        n, "points of a round crack: n", least=_FEWEST, most=_MOST, error=GeometryError
-    )
-    rings = [(count, 1.0)]
+    rings = [(n, 1.0)]
     while rings[-1][0] % 2 == 0 and rings[-1][0] >= 2 * _FEWEST:
         count, radius = rings[-1]
         side = 2 * np.pi * radius / count
@@ -162,7 +154,8 @@ def _cosine(turns: Floats) -> Floats:
     return np.where(part == 0.25, 0.0, np.where(back, -value, value))
 
 
-def plane_crack(polygon: ArrayLike) -> Crack:
+@check_arguments(GeometryError)
+def plane_crack(polygon: Annotated[ArrayLike, Points((None, 3))]) -> Crack:
     """Flat 3D crack bounded by a polygon.
 
     Edges inside the body become its front as soon as it is put into a mesh, edges outside or
@@ -181,7 +174,7 @@ def plane_crack(polygon: ArrayLike) -> Crack:
     Raises
     ------
     GeometryError
-        Fewer than three corners, nan, corners that coincide, a polygon that is not plane (to
+        Fewer than three corners, corners that coincide, a polygon that is not plane (to
         1e-9 of its size), has no area or crosses itself.
 
     Examples
@@ -189,7 +182,7 @@ def plane_crack(polygon: ArrayLike) -> Crack:
     >>> plane_crack([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)])
     Crack(4 points, 2 faces, not placed)
     """
-    x = point_coordinates(polygon, "plane_crack: polygon", (None, 3), error=GeometryError)
+    x = np.asarray(polygon)
     if len(x) < 3:
         raise GeometryError(f"a plane crack needs at least three corners (m, 3), not {len(x)}.")
     size = float(np.linalg.norm(np.ptp(x, axis=0)))
@@ -318,7 +311,8 @@ def _check_shape(x: Floats, faces: Ints) -> None:
         )
 
 
-def read_surface(path: str | PathLike[str]) -> Crack:
+@check_arguments()
+def read_surface(path: FileName) -> Crack:
     """Read a 3D crack from a file with triangles.
 
     Parameters
@@ -369,10 +363,6 @@ def _merged_points(points: Floats, triangles: Ints) -> tuple[Floats, Ints]:
     faces = place[triangles]
     is_proper = (faces != np.roll(faces, 1, axis=1)).all(axis=1)
     return x[first], faces[is_proper]
-
-
-def _vector(value: ArrayLike, what: str) -> Floats:
-    return point_coordinates(value, what, (3,), error=GeometryError)
 
 
 def _unit(vector: Floats, what: str) -> Floats:

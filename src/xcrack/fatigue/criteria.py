@@ -6,19 +6,51 @@ A criterion of your own is any function of that form; `xcrack.testing.check_crit
 """
 
 from collections.abc import Callable
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from xcrack.base.arguments import Array, CheckedBy, Choice, Poisson, check_arguments
 from xcrack.base.arrays import Floats
-from xcrack.base.checks import number, numbers, value_text
-from xcrack.base.errors import ProblemError, warn
+from xcrack.base.checks import numbers
+from xcrack.base.errors import ProblemError, XcrackError, warn
+from xcrack.base.units import TOUGHNESS
 
 Criterion = Callable[[Floats, float], tuple[Floats, Floats, Floats]]
 
 _TIE = 1e-12  # relative: two states whose K_eq differ by round-off only are a tie
 _CLOSED = 1e-3  # share of the largest K below which a negative K_I is that of a closed tip
 _DIFFER = 0.2  # share by which the two kinds of range may differ before a warning
+
+
+def columns_of_K(value: Any, what: str = "K", error: type[XcrackError] = ProblemError) -> Floats:
+    """K as `(..., 2 or 3)` array of finite numbers."""
+    K = numbers(value, what, error=error)
+    if K.ndim < 1 or K.shape[-1] not in (2, 3):
+        raise error(f"{what} must have 2 or 3 columns (I, II[, III]), not shape {K.shape}.")
+    return K
+
+
+def states_of_K(value: Any, what: str, error: type[XcrackError]) -> Floats:
+    """K of load states as `(s, f, 2 or 3)` array of finite numbers."""
+    K = numbers(value, what, finite=False, error=error)
+    if K.ndim != 3 or K.shape[-1] not in (2, 3) or len(K) == 0:
+        raise error(
+            f"{what}: a criterion takes K of shape (states, front points, 2 or 3), not {K.shape}; "
+            "a single state is K[None]."
+        )
+    if not np.isfinite(K).all():
+        state, point, mode = np.argwhere(~np.isfinite(K))[0]
+        raise error(
+            f"{what} of state {state}, front point {point}, mode {mode + 1} is "
+            f"{K[state, point, mode]}: no direction can be chosen."
+        )
+    return K
+
+
+_States = Annotated[ArrayLike, CheckedBy(states_of_K, unit=TOUGHNESS)]
+_Range = Annotated[str, Choice(("difference", "component"))]
 
 
 def kink_angle(K: ArrayLike) -> Floats:
@@ -45,13 +77,18 @@ def kink_angle(K: ArrayLike) -> Floats:
     >>> np.degrees(kink_angle([0.0, 1.0])).round(4)       # pure mode II
     np.float64(-70.5288)
     """
-    K = _columns(K)
+    K = columns_of_K(K)
     K_I, K_II = np.maximum(K[..., 0], 0.0), K[..., 1]
     angle = -2 * np.arctan2(2 * K_II, K_I + np.hypot(K_I, np.sqrt(8.0) * K_II))
     return angle + 0.0  # no -0.0: straight ahead is one number
 
 
-def equivalent_K(K: ArrayLike, angle: ArrayLike, nu: float) -> Floats:
+@check_arguments()
+def equivalent_K(
+    K: Annotated[ArrayLike, CheckedBy(columns_of_K, unit=TOUGHNESS)],
+    angle: Annotated[ArrayLike, Array()],
+    nu: Poisson,
+) -> Floats:
     """Equivalent stress intensity factor in a direction.
 
     Parameters
@@ -71,8 +108,7 @@ def equivalent_K(K: ArrayLike, angle: ArrayLike, nu: float) -> Floats:
     Raises
     ------
     ProblemError
-        Factors or angles that are not finite or do not fit each other, an angle beyond pi, nu
-        outside (-1, 0.5).
+        Factors and angles that do not fit each other, an angle beyond pi.
 
     Notes
     -----
@@ -85,13 +121,12 @@ def equivalent_K(K: ArrayLike, angle: ArrayLike, nu: float) -> Floats:
     >>> equivalent_K(K, kink_angle(K), nu=0.3).round(6)
     np.float64(1.36899)
     """
-    K, angle = _columns(K), numbers(angle, "angle")
+    K, angle = np.asarray(K), np.asarray(angle)
     if (np.abs(angle) > np.pi).any():
         raise ProblemError(
-            f"angle = {angle.flat[np.argmax(np.abs(angle))]:.6g}: angles are in rad, from -pi to "
-            "pi; for degrees use numpy.radians."
+            f"equivalent_K: angle = {angle.flat[np.argmax(np.abs(angle))]:.6g}: angles are in rad, "
+            "from -pi to pi; for degrees use numpy.radians."
         )
-    nu = number(nu, "Poisson's ratio nu", above=-1, below=0.5)
     try:
         np.broadcast_shapes(K.shape[:-1], angle.shape)
     except ValueError as error:
@@ -99,6 +134,11 @@ def equivalent_K(K: ArrayLike, angle: ArrayLike, nu: float) -> Floats:
             f"K of shape {K.shape} and angles of shape {angle.shape} do not fit: give one angle "
             "for each row of K, or one for all."
         ) from error
+    return _equivalent_K(K, angle, nu)
+
+
+def _equivalent_K(K: Floats, angle: Floats, nu: float) -> Floats:
+    """Equivalent factor of arrays that fit."""
     half = angle / 2
     cos, sin = np.cos(half), np.sin(half)
     bracket = np.maximum(cos**2 * (K[..., 0] * cos - 3 * K[..., 1] * sin), 0.0)
@@ -107,8 +147,9 @@ def equivalent_K(K: ArrayLike, angle: ArrayLike, nu: float) -> Floats:
     return np.hypot(bracket, K[..., 2] / np.sqrt(1 - nu))
 
 
+@check_arguments()
 def max_hoop_stress(
-    K: ArrayLike, nu: float, *, range: str = "difference"
+    K: _States, nu: Poisson, *, range: _Range = "difference"
 ) -> tuple[Floats, Floats, Floats]:
     """Kink in the direction that the most severe load state asks for.
 
@@ -136,13 +177,18 @@ def max_hoop_stress(
     >>> print(angle, dK_eq, R)
     [0.] [0.8] [0.2]
     """
-    K = _checked_K(K, nu, range)
+    K = _flagged_K(np.asarray(K))
     angles = kink_angle(K)
-    return _angle_and_range(K, _angle_of_largest(equivalent_K(K, angles, nu), angles), nu, range)
+    return _angle_and_range(K, _angle_of_largest(_equivalent_K(K, angles, nu), angles), nu, range)
 
 
+@check_arguments()
 def mean_reference(
-    K: ArrayLike, nu: float, *, reference: str = "mean", range: str = "difference"
+    K: _States,
+    nu: Poisson,
+    *,
+    reference: Annotated[str, Choice(("mean", "max", "min"))] = "mean",
+    range: _Range = "difference",
 ) -> tuple[Floats, Floats, Floats]:
     """Kink in the direction of one reference state of the cycle.
 
@@ -180,21 +226,20 @@ def mean_reference(
     >>> print(angle)
     [0.]
     """
-    K = _checked_K(K, nu, range)
-    if not isinstance(reference, str) or reference not in ("mean", "max", "min"):
-        raise ProblemError(f'reference = {value_text(reference)}: give "mean", "max" or "min".')
+    K = _flagged_K(np.asarray(K))
     if reference == "mean":
         mean = _sum(K) / len(K)
         return _angle_and_range(K, kink_angle(mean), nu, range)
     angles = kink_angle(K)
-    K_eq = equivalent_K(K, angles, nu)
+    K_eq = _equivalent_K(K, angles, nu)
     return _angle_and_range(
         K, _angle_of_largest(K_eq if reference == "max" else -K_eq, angles), nu, range
     )
 
 
+@check_arguments()
 def weighted_angle(
-    K: ArrayLike, nu: float, *, range: str = "difference"
+    K: _States, nu: Poisson, *, range: _Range = "difference"
 ) -> tuple[Floats, Floats, Floats]:
     """Kink in the mean direction of all load states, each weighted with its K_eq.
 
@@ -227,9 +272,9 @@ def weighted_angle(
     >>> print(np.degrees(angle).round(4))
     [-24.6401]
     """
-    K = _checked_K(K, nu, range)
+    K = _flagged_K(np.asarray(K))
     angles = kink_angle(K)
-    weight = equivalent_K(K, angles, nu)
+    weight = _equivalent_K(K, angles, nu)
     angle = np.arctan2(_sum(weight * np.sin(angles)), _sum(weight * np.cos(angles))) + 0.0
     return _angle_and_range(K, angle, nu, range)
 
@@ -241,23 +286,8 @@ def clipped_K(K: ArrayLike) -> Floats:
     return K
 
 
-def _checked_K(K: ArrayLike, nu: float, range: str) -> Floats:
-    """K as `(s, f, 2 or 3)` with K_I >= 0, after all that a caller can get wrong."""
-    K = numbers(K, "K", finite=False)
-    if K.ndim != 3 or K.shape[-1] not in (2, 3) or len(K) == 0:
-        raise ProblemError(
-            f"a criterion takes K of shape (states, front points, 2 or 3), not {K.shape}; "
-            "a single state is K[None]."
-        )
-    if not np.isfinite(K).all():
-        state, point, mode = np.argwhere(~np.isfinite(K))[0]
-        raise ProblemError(
-            f"K of state {state}, front point {point}, mode {mode + 1} is "
-            f"{K[state, point, mode]}: no direction can be chosen."
-        )
-    number(nu, "Poisson's ratio nu", above=-1, below=0.5)
-    if not isinstance(range, str) or range not in ("difference", "component"):
-        raise ProblemError(f'range = {value_text(range)}: give "difference" or "component".')
+def _flagged_K(K: Floats) -> Floats:
+    """K with K_I >= 0; a warning where faces overlap."""
     # A closed tip has K_I = 0 up to discretisation: only a real overlap triggers a warning.
     negative = K[..., 0] < -_CLOSED * np.abs(K).max(initial=0.0)
     if negative.any():
@@ -268,14 +298,6 @@ def _checked_K(K: ArrayLike, nu: float, range: str) -> Floats:
             "contact it is discretisation error; without, the crack faces overlap there."
         )
     return clipped_K(K)
-
-
-def _columns(K: ArrayLike) -> Floats:
-    """K as `(..., 2 or 3)` array of finite numbers."""
-    K = numbers(K, "K")
-    if K.ndim < 1 or K.shape[-1] not in (2, 3):
-        raise ProblemError(f"K must have 2 or 3 columns (I, II[, III]), not shape {K.shape}.")
-    return K
 
 
 def _sum(values: Floats) -> Floats:
@@ -294,7 +316,7 @@ def _angle_and_range(
     K: Floats, angle: Floats, nu: float, range: str
 ) -> tuple[Floats, Floats, Floats]:
     """The chosen angle with the range and the ratio R that go with it."""
-    K_eq = equivalent_K(K, angle, nu)
+    K_eq = _equivalent_K(K, angle, nu)
     largest, smallest = K_eq.max(axis=0), K_eq.min(axis=0)
     R = np.divide(smallest, largest, out=np.zeros_like(largest), where=largest > 0)
     difference = largest - smallest

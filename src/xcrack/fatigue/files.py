@@ -1,20 +1,26 @@
 """Load histories from text files."""
 
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 
+from xcrack.base.arguments import FileName, Number, Switch, Whole, check_arguments
 from xcrack.base.arrays import Floats, Ints
-from xcrack.base.checks import flag, number, whole_number
 from xcrack.base.errors import ProblemError
-from xcrack.base.paths import path_of, system_errors
-from xcrack.fatigue.spectrum import Spectrum
+from xcrack.base.paths import system_errors
+from xcrack.fatigue.spectrum import BlockName, Spectrum
 
 _COMMENTS = ("#", "%", "!", "//")
 
 
+@check_arguments()
 def read_spectrum(
-    path: str | Path, *, column: int | None = None, rows: bool = False, unit: str = "block"
+    path: FileName,
+    *,
+    column: Annotated[int | None, Whole(least=0)] = None,
+    rows: Switch = False,
+    unit: BlockName = "block",
 ) -> Spectrum:
     """Read a load history: turning points, or counted cycles.
 
@@ -39,8 +45,7 @@ def read_spectrum(
     ProblemError
         A file that cannot be read, a line that does not fit (with its number), no such column.
     """
-    file = path_of(path, "read_spectrum: path", error=ProblemError)
-    rows = flag(rows, "read_spectrum: rows")
+    file = Path(path)
     with system_errors(
         "read_spectrum: path: the spectrum cannot be read from", file, error=ProblemError
     ):
@@ -79,10 +84,10 @@ def read_spectrum(
         return Spectrum(rows=data, unit=unit)
     if column is None and data.shape[1] > 1:
         raise ProblemError(f"{file}: {data.shape[1]} columns: give column= or rows=True.")
-    number = 0 if column is None else whole_number(column, "read_spectrum: column", least=0)
-    if number >= data.shape[1]:
-        raise ProblemError(f"{file}: there is no column {number}: give 0 to {data.shape[1] - 1}.")
-    return Spectrum(data[:, number], unit=unit)
+    k = column or 0
+    if k >= data.shape[1]:
+        raise ProblemError(f"{file}: there is no column {k}: give 0 to {data.shape[1] - 1}.")
+    return Spectrum(data[:, k], unit=unit)
 
 
 # TWIST, the flight-by-flight spectrum of the lower wing skin of a transport aircraft.
@@ -108,7 +113,13 @@ _PER_FLIGHT = np.array(
 )
 
 
-def twist(*, mean: float, seed: int, flights: int = 4000) -> Spectrum:
+@check_arguments()
+def twist(
+    *,
+    mean: Annotated[float, Number(above=0)],
+    seed: Annotated[int, Whole(least=0)],
+    flights: Annotated[int, Whole(least=1, most=int(_FLIGHTS.sum()))] = 4000,
+) -> Spectrum:
     """TWIST by its definition: 4000 flights of ten types, drawn anew.
 
     The order of the flights, and of the gusts within each, is random by definition. This is a draw
@@ -121,18 +132,13 @@ def twist(*, mean: float, seed: int, flights: int = 4000) -> Spectrum:
     seed : int
         Of the draw.
     flights : int
-        The first ones of a block only, at most 4000.
+        The first ones of a block only.
 
     Returns
     -------
     Spectrum
         Each flight begins with the load on the ground, -0.5 times the mean; then each gust up is
         followed by one down, of a size drawn from those of the flight. `unit` is "4000 flights".
-
-    Raises
-    ------
-    ProblemError
-        A mean that is not positive, more than 4000 flights, a seed that is no whole number.
 
     Notes
     -----
@@ -146,9 +152,6 @@ def twist(*, mean: float, seed: int, flights: int = 4000) -> Spectrum:
     >>> print(spectrum.extremes[0])
     -0.5
     """
-    mean = number(mean, "twist: mean", above=0)
-    seed = whole_number(seed, "twist: seed", least=0)
-    flights = whole_number(flights, "twist: flights", least=1, most=int(_FLIGHTS.sum()))
     draw = np.random.default_rng(seed)
     kinds = draw.permutation(np.repeat(np.arange(len(_FLIGHTS)), _FLIGHTS))[:flights]
     factors = np.concatenate([_flight(draw, _PER_FLIGHT[kind]) for kind in kinds])

@@ -46,18 +46,18 @@ class forman(GrowthLaw):  # noqa: N801 - it is used as a function
     Parameters
     ----------
     C : float, length/cycle (stress √length)^(1 - m)
-        Positive; one power of K more than that of `paris`.
+        One power of K more than that of `paris`.
     m : float
-        Exponent, positive.
+        Exponent.
     K_c : float, stress √length
-        Toughness, positive: inf where ΔK >= (1 - R) K_c.
+        Toughness: inf where ΔK >= (1 - R) K_c.
     threshold, approach, ratio, R_range
         As of `paris`.
 
     Raises
     ------
     ProblemError
-        A constant that is not positive, or a part that does not fit.
+        A part that does not fit.
 
     Notes
     -----
@@ -94,13 +94,12 @@ class hartman_schijve(GrowthLaw):  # noqa: N801
     Parameters
     ----------
     D : float, length/cycle / (stress √length)^alpha
-        Positive.
     alpha : float
-        Exponent, positive.
+        Exponent.
     A : float, stress √length
-        Apparent toughness, positive: inf where K_max reaches it.
+        Apparent toughness: inf where K_max reaches it.
     dK_thr : float, stress √length
-        Threshold, not negative; what varies from crack to crack in this method.
+        Threshold; what varies from crack to crack in this method.
     ratio, R_range
         As of `paris`.
 
@@ -158,11 +157,11 @@ class nasgro(GrowthLaw):  # noqa: N801
     Parameters
     ----------
     C : float, length/cycle / (stress √length)^n
-        Positive.
-    n, p, q : float
-        Exponents: n positive, p and q not negative.
+    n : float
+    p, q : float
+        Exponents.
     K_c : float, stress √length
-        Toughness, positive: inf where K_max reaches it. `nasgro_K_c` gives it for a thickness.
+        Toughness: inf where K_max reaches it. `nasgro_K_c` gives it for a thickness.
     closure : newman_closure
     threshold : nasgro3_threshold or nasgro4_threshold
         Of the generation that the constants were published for.
@@ -243,11 +242,6 @@ def nasgro_K_c(
     Returns
     -------
     float, stress √length
-
-    Raises
-    ------
-    ProblemError
-        A value that is not positive; A_k and B_k may be 0.
 
     Notes
     -----

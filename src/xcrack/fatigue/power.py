@@ -34,9 +34,8 @@ class paris(GrowthLaw):  # noqa: N801 - it is used as a function: paris(C, m)(dK
     Parameters
     ----------
     C : float, length/cycle / (stress √length)^m
-        Positive.
     m : float
-        Exponent, positive.
+        Exponent.
     closure : linear_closure, schijve_closure or newman_closure, optional
         U ΔK stands for ΔK then.
     threshold : klesnil_lukas, stepped_threshold or el_haddad, optional
@@ -55,7 +54,7 @@ class paris(GrowthLaw):  # noqa: N801 - it is used as a function: paris(C, m)(dK
     Raises
     ------
     ProblemError
-        C, m or K_c not positive and finite, or a part that does not fit.
+        A part that does not fit.
 
     Notes
     -----
@@ -93,16 +92,15 @@ class elber(GrowthLaw):  # noqa: N801 - it is used as a function
     Parameters
     ----------
     C : float, length/cycle / (stress √length)^m
-        Positive.
     m : float
-        Exponent, positive.
+        Exponent.
     a, b : float
         U = a + b R, cut to [0, 1].
 
     Raises
     ------
     ProblemError
-        C or m not positive, a or b not finite, or U = 0 for all R in [0, 1].
+        U = 0 for all R in [0, 1].
 
     Notes
     -----
@@ -163,20 +161,20 @@ class walker(GrowthLaw):  # noqa: N801 - it is used as a function
     Parameters
     ----------
     C : float, length/cycle / (stress √length)^m
-        Positive; valid for R = 0.
+        Valid for R = 0.
     m : float
-        Exponent, positive.
+        Exponent.
     gamma : float
-        In [0, 1]; 1 makes it the law of Paris.
+        1 makes it the law of Paris.
     gamma_minus : float, optional
-        Exponent for R < 0, in [0, 1]: 0 is growth by K_max alone. `gamma`, where it is left out.
+        Exponent for R < 0: 0 is growth by K_max alone. `gamma`, where it is left out.
     threshold, approach, K_c, ratio, R_range
         As of `paris`.
 
     Raises
     ------
     ProblemError
-        C or m not positive, an exponent outside [0, 1], or a part that does not fit.
+        A part that does not fit.
 
     Notes
     -----
@@ -233,7 +231,7 @@ class piecewise(GrowthLaw):  # noqa: N801 - it is used as a function
     Raises
     ------
     ProblemError
-        Constants that are not positive, lines that do not cross in this order.
+        Lines that do not cross in this order.
 
     Notes
     -----

@@ -5,9 +5,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cache
 from importlib.resources import files
-from typing import Any
+from typing import Annotated, Any
 
-from xcrack.base.arguments import check_arguments
+from xcrack.base.arguments import Text, check_arguments
 from xcrack.base.checks import value_text
 from xcrack.base.errors import ProblemError
 from xcrack.fatigue.closures import newman_closure
@@ -17,6 +17,7 @@ from xcrack.fatigue.power import paris, piecewise, walker
 from xcrack.fatigue.thresholds import nasgro3_threshold, nasgro4_threshold
 from xcrack.fatigue.units import Units
 
+_UNITS = 'those of length and K, such as "mm, MPa√mm"'
 _LAWS: dict[str, Any] = {
     kind.__name__: kind for kind in (paris, piecewise, walker, forman, hartman_schijve, nasgro)
 }
@@ -34,7 +35,7 @@ class Preset:
     units : str
         Length and K.
     material, environment, source : str
-    check_arguments : str
+    checked : str
         What the constants were compared with before they were put here.
     R_range : (float, float), optional
         Ratios of the tests; other ratios are an error of the law.
@@ -66,7 +67,12 @@ def presets() -> dict[str, Preset]:
 
 
 @check_arguments()
-def law(name: str, *, units: str, ratio: Ratio | None = None) -> Any:
+def law(
+    name: Annotated[str, Text("the name of a preset")],
+    *,
+    units: Annotated[str, Text(_UNITS)],
+    ratio: Ratio | None = None,
+) -> Any:
     """A growth law with published constants, in the units of your model.
 
     Parameters
@@ -95,7 +101,7 @@ def law(name: str, *, units: str, ratio: Ratio | None = None) -> Any:
     2.36e-05 mm
     """
     published = _presets()
-    if not isinstance(name, str) or name not in published:
+    if name not in published:
         raise ProblemError(
             f"law: no preset {value_text(name)}: give one of {', '.join(map(repr, published))}."
         )

@@ -1,12 +1,12 @@
 """Rainflow counting of a history that is repeated."""
 
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from xcrack.base.arguments import Array, check_arguments
 from xcrack.base.arrays import Floats, Ints
-from xcrack.base.checks import numbers
 from xcrack.base.errors import ProblemError
 
 CYCLE = np.dtype([("min", float), ("max", float), ("count", float), ("at", np.int64)])
@@ -66,7 +66,8 @@ def closed_cycles(values: Floats) -> list[tuple[int, int]]:
     return pairs
 
 
-def rainflow(values: ArrayLike) -> NDArray[Any]:
+@check_arguments()
+def rainflow(values: Annotated[ArrayLike, Array((None,))]) -> NDArray[Any]:
     """Cycles of a history that is repeated, with exact ranges.
 
     Parameters
@@ -83,7 +84,7 @@ def rainflow(values: ArrayLike) -> NDArray[Any]:
     Raises
     ------
     ProblemError
-        Not a list of finite numbers, or one in which nothing varies.
+        Nothing varies.
 
     Notes
     -----
@@ -95,7 +96,7 @@ def rainflow(values: ArrayLike) -> NDArray[Any]:
     >>> print(rainflow([-2, 1, -3, 5, -1, 3, -4, 4, -2])[["min", "max"]].tolist())
     [(-2.0, 1.0), (-4.0, 5.0), (-1.0, 3.0), (-3.0, 4.0)]
     """
-    history = numbers(values, "rainflow: values", (None,))
+    history = np.asarray(values)
     pairs = closed_cycles(history)
     if not pairs:
         raise ProblemError("rainflow: the values do not vary: give two that differ, at least.")

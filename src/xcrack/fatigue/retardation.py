@@ -33,16 +33,11 @@ class plastic_zone(Constants):  # noqa: N801 - it is used as a function
     Parameters
     ----------
     sigma_y : float, stress
-        Yield stress, positive.
+        Yield stress.
     beta : float
-        Positive. 1: width in plane stress (Irwin), 2: radius in plane stress, 3: width and 6:
+        1: width in plane stress (Irwin), 2: radius in plane stress, 3: width and 6:
         radius in plane strain; 8/π² is the strip of Dugdale. Which one belongs to a model's
         constants.
-
-    Raises
-    ------
-    ProblemError
-        A value that is not positive.
 
     Examples
     --------
@@ -75,13 +70,8 @@ class wheeler(Constants):  # noqa: N801
     Parameters
     ----------
     w : float
-        Exponent, positive: fitted to a material and a kind of spectrum.
+        Exponent: fitted to a material and a kind of spectrum.
     zone : plastic_zone
-
-    Raises
-    ------
-    ProblemError
-        A value that does not fit.
 
     Notes
     -----
@@ -116,15 +106,10 @@ class willenborg(Constants):  # noqa: N801
     Parameters
     ----------
     shutoff : float
-        Overload over K at which the crack stops, above 1; 2.3 to 3 for aluminium (from memory).
+        Overload over K at which the crack stops; 2.3 to 3 for aluminium (from memory).
     dK_th : float, stress √length
-        Threshold, not negative.
+        Threshold.
     zone : plastic_zone
-
-    Raises
-    ------
-    ProblemError
-        A value that does not fit.
 
     Notes
     -----

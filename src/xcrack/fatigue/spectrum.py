@@ -4,20 +4,52 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from numbers import Real
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from xcrack.base.arrays import Floats, Ints, lock
-from xcrack.base.checks import entries, number, numbers, value_text, whole_number, whole_numbers
-from xcrack.base.errors import ProblemError
+from xcrack.base.arguments import (
+    Array,
+    CheckedBy,
+    Choice,
+    Declared,
+    Either,
+    Number,
+    Text,
+    Whole,
+    check_arguments,
+)
+from xcrack.base.arrays import Floats, Ints
+from xcrack.base.checks import entries, number, value_text
+from xcrack.base.errors import ProblemError, XcrackError
 from xcrack.fatigue.rainflow import CYCLE, rainflow
 from xcrack.model.loads import Load
 
+BlockName = Annotated[str, Text("a word, such as 'flight'")]
+
+
+def checked_loads(value: Any, what: str, error: type[XcrackError]) -> tuple[Load, ...]:
+    """Loads as a tuple, checked."""
+    loads = entries(value, what, error=error)
+    for load in loads:
+        if not isinstance(load, Load):
+            raise error(f"{what} has {value_text(load)}, which is not a load: see traction.")
+    return loads
+
+
+def named_states(value: Any, what: str, error: type[XcrackError]) -> tuple[Any, ...]:
+    """Load states, checked: a factor or loads each."""
+    return tuple(
+        number(state, f"{what}[{k}]", error=error)
+        if isinstance(state, Real)
+        else checked_loads(state, f"{what}[{k}]", error)
+        for k, state in enumerate(entries(value, what, error=error))
+    )
+
 
 @dataclass(frozen=True, eq=False)
-class Spectrum:
+class Spectrum(Declared):
     """A load history that is repeated until a run ends.
 
     Give `factors` for one factor on the loads of the problem, `rows` for cycles that were counted
@@ -51,9 +83,8 @@ class Spectrum:
     Raises
     ------
     ProblemError
-        None or several of the three forms, numbers that are not finite, a history that does not
-        vary, rows whose minimum is not below their maximum, states that the sequence does not
-        have.
+        None or several of the three forms, a history that does not vary, rows whose minimum is not
+        below their maximum, states that the sequence does not have.
 
     Examples
     --------
@@ -62,53 +93,38 @@ class Spectrum:
     [(-0.2, 1.0), (0.4, 0.6)]
     """
 
-    factors: Any = None
-    rows: Any = None
-    states: Any = None
-    sequence: Any = None
-    unit: str = "block"
-    steady: Sequence[Load] = ()
-    least_range: float = 0.0
-    levels: str | int = "auto"
-    tolerance: float = 0.01
+    factors: Annotated[Any, Array((None,))] = None
+    rows: Annotated[Any, Array((None, 3))] = None
+    states: Annotated[Any, CheckedBy(named_states)] = None
+    sequence: Annotated[Any, Array((None,), is_whole=True)] = None
+    unit: BlockName = "block"
+    steady: Annotated[Sequence[Load], CheckedBy(checked_loads)] = ()
+    least_range: Annotated[float, Number(least=0)] = 0.0
+    levels: Annotated[str | int, Either(Choice(("auto",)), Whole(least=2))] = "auto"
+    tolerance: Annotated[float, Number(above=0, below=1)] = 0.01
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         forms = [name for name in ("factors", "rows", "states") if getattr(self, name) is not None]
         if len(forms) != 1 or (self.sequence is not None) != (self.states is not None):
             raise ProblemError(
                 "Spectrum: give factors, or rows=..., or states=[...] with sequence=[...], not "
                 f"{' and '.join(forms) or 'nothing'}."
             )
-        if not isinstance(self.unit, str) or not self.unit:
-            raise ProblemError(
-                f"Spectrum: unit = {value_text(self.unit)}: give a word, such as 'flight'."
-            )
-        least = number(self.least_range, "Spectrum: least_range", least=0)
-        object.__setattr__(self, "least_range", least)
-        share = number(self.tolerance, "Spectrum: tolerance", above=0, below=1)
-        object.__setattr__(self, "tolerance", share)
-        if not (isinstance(self.levels, str) and self.levels == "auto"):
-            object.__setattr__(
-                self, "levels", whole_number(self.levels, "Spectrum: levels", least=2)
-            )
-        steady = _loads(self.steady, "Spectrum: steady")
-        object.__setattr__(self, "steady", steady)
         getattr(self, f"_check_{forms[0]}")()
-        if least > 0 and not len(self.cycles):
+        if self.least_range > 0 and not len(self.cycles):
             every = self._all_cycles
             raise ProblemError(
-                f"Spectrum: least_range = {least:g} leaves out all cycles: their largest range is "
-                f"{(every['max'] - every['min']).max():g}. Give less."
+                f"Spectrum: least_range = {self.least_range:g} leaves out all cycles: their "
+                f"largest range is {(every['max'] - every['min']).max():g}. Give less."
             )
 
     def _check_factors(self) -> None:
-        factors = lock(np.array(numbers(self.factors, "Spectrum: factors", (None,))))
-        if not len(factors) or factors.min() == factors.max():
+        if not len(self.factors) or self.factors.min() == self.factors.max():
             raise ProblemError("Spectrum: the factors do not vary: give two that differ, at least.")
-        object.__setattr__(self, "factors", factors)
 
     def _check_rows(self) -> None:
-        rows = lock(np.array(numbers(self.rows, "Spectrum: rows", (None, 3))))
+        rows = self.rows
         is_invalid = ~((rows[:, 0] < rows[:, 1]) & (rows[:, 2] > 0))
         if not len(rows) or is_invalid.any():
             where = (
@@ -119,17 +135,9 @@ class Spectrum:
             raise ProblemError(
                 f"Spectrum: {where}: give (min, max, count) with min < max, count > 0."
             )
-        object.__setattr__(self, "rows", rows)
 
     def _check_states(self) -> None:
-        given = entries(self.states, "Spectrum: states")
-        states = tuple(
-            number(state, f"Spectrum: states[{k}]")
-            if isinstance(state, Real)
-            else _loads(state, f"Spectrum: states[{k}]")
-            for k, state in enumerate(given)
-        )
-        sequence = lock(np.array(whole_numbers(self.sequence, "Spectrum: sequence", (None,))))
+        states, sequence = self.states, self.sequence
         if not len(states) or not len(sequence) or len(np.unique(sequence)) < 2:
             raise ProblemError(
                 "Spectrum: the sequence does not vary: it needs two states, at least."
@@ -141,8 +149,6 @@ class Spectrum:
             )
         if self.least_range or self.steady:
             raise ProblemError("Spectrum: least_range and steady belong to factors, not to states.")
-        object.__setattr__(self, "states", states)
-        object.__setattr__(self, "sequence", sequence)
 
     @cached_property
     def _all_cycles(self) -> NDArray[Any]:
@@ -220,15 +226,14 @@ class Spectrum:
         """
         return replace(self, least_range=range)
 
-    def scaled(self, factor: float) -> "Spectrum":
+    @check_arguments()
+    def scaled(self, factor: Annotated[float, Number(above=0)]) -> "Spectrum":
         """The spectrum with all factors times another one.
 
         Parameters
         ----------
         factor : float
-            Positive.
         """
-        factor = number(factor, "Spectrum.scaled: factor", above=0)
         if self.states is not None:
             raise ProblemError("Spectrum.scaled: states are loads: scale them where they are made.")
         if self.rows is not None:
@@ -246,12 +251,4 @@ def distinct(cycles: NDArray[Any]) -> tuple[Floats, Floats, Ints]:
     return values, count, which.astype(np.int64)
 
 
-def _loads(value: Any, what: str) -> tuple[Load, ...]:
-    loads = entries(value, what)
-    for load in loads:
-        if not isinstance(load, Load):
-            raise ProblemError(f"{what} has {value_text(load)}, which is not a load: see traction.")
-    return loads
-
-
-__all__ = ["Spectrum", "distinct"]
+__all__ = ["BlockName", "Spectrum", "distinct"]

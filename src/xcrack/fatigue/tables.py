@@ -6,15 +6,47 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from xcrack.base.arguments import Choice
+from xcrack.base.arguments import CheckedBy, Choice
 from xcrack.base.arrays import Floats
 from xcrack.base.checks import number, numbers
-from xcrack.base.errors import ProblemError
+from xcrack.base.errors import ProblemError, XcrackError
 from xcrack.fatigue.law import Bounds, GrowthLaw, Ratio
 from xcrack.fatigue.units import factors
 
 Curve = tuple[float, tuple[float, ...], tuple[float, ...]]
 _ROUND_OFF = 1e-12
+
+
+def checked_curves(value: Any, what: str, error: type[XcrackError]) -> tuple[Curve, ...]:
+    """Curves by rising R, checked: a mapping, or those of another table."""
+    given: list[tuple[Any, Any]] = []
+    if isinstance(value, Mapping):
+        given = list(value.items())
+    elif isinstance(value, tuple):  # a law that is made from another one
+        parts = [curve for curve in value if isinstance(curve, tuple) and len(curve) == 3]
+        if len(parts) == len(value):
+            given = [(R, (dK, rate)) for R, dK, rate in parts]
+    if not given:
+        raise error(f"{what}: give a dict of R to (dK, rate).")
+    return tuple(sorted(_curve(R, points, what, error) for R, points in given))
+
+
+def _curve(R: Any, points: Any, what: str, error: type[XcrackError]) -> Curve:
+    """One curve, checked."""
+    ratio = number(R, f"{what}: R", below=1, error=error)
+    try:
+        dK, rate = points
+    except (TypeError, ValueError):
+        raise error(f"{what}: curve of R = {ratio:g}: give (dK, rate).") from None
+    dK = numbers(dK, f"{what}: dK of R = {ratio:g}", (None,), error=error)
+    rate = numbers(rate, f"{what}: rate of R = {ratio:g}", (len(dK),), error=error)
+    rises = all(len(x) > 1 and x[0] > 0 and (np.diff(x) > 0).all() for x in (dK, rate))
+    if not rises:
+        raise error(
+            f"{what}: curve of R = {ratio:g}: give two or more points, ranges and rates "
+            "positive and rising."
+        )
+    return ratio, tuple(dK.tolist()), tuple(rate.tolist())
 
 
 @dataclass(frozen=True)
@@ -53,25 +85,14 @@ class rate_table(GrowthLaw):  # noqa: N801 - it is used as a function
     1e-07
     """
 
-    curves: Any
+    curves: Annotated[Any, CheckedBy(checked_curves)]
     outside: Annotated[str, Choice(("refuse", "nearest"))] = "refuse"
     ratio: Ratio = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        given: list[tuple[Any, Any]] = []
-        if isinstance(self.curves, Mapping):
-            given = list(self.curves.items())
-        elif isinstance(self.curves, tuple):  # a law that is made from another one
-            parts = [curve for curve in self.curves if isinstance(curve, tuple) and len(curve) == 3]
-            if len(parts) == len(self.curves):
-                given = [(R, (dK, rate)) for R, dK, rate in parts]
-        if not given:
-            raise ProblemError("rate_table: curves: give a dict of R to (dK, rate).")
-        curves = tuple(sorted(_curve(R, points) for R, points in given))
-        for low, high in zip(curves, curves[1:]):
+        for low, high in zip(self.curves, self.curves[1:]):
             _check_pair(low, high)
-        object.__setattr__(self, "curves", curves)
 
     @property
     def knows_negative_ratios(self) -> bool:
@@ -104,24 +125,6 @@ class rate_table(GrowthLaw):  # noqa: N801 - it is used as a function
             result[is_between] = _rates_between(low, high, dK[is_between], ratio[is_between])
             is_left &= ~is_between
         return result
-
-
-def _curve(R: Any, points: Any) -> Curve:
-    """One curve, checked."""
-    ratio = number(R, "rate_table: R", below=1)
-    try:
-        dK, rate = points
-    except (TypeError, ValueError):
-        raise ProblemError(f"rate_table: curve of R = {ratio:g}: give (dK, rate).") from None
-    dK = numbers(dK, f"rate_table: dK of R = {ratio:g}", (None,))
-    rate = numbers(rate, f"rate_table: rate of R = {ratio:g}", (len(dK),))
-    rises = all(len(x) > 1 and x[0] > 0 and (np.diff(x) > 0).all() for x in (dK, rate))
-    if not rises:
-        raise ProblemError(
-            f"rate_table: curve of R = {ratio:g}: give two or more points, ranges and rates "
-            "positive and rising."
-        )
-    return ratio, tuple(dK.tolist()), tuple(rate.tolist())
 
 
 def _knots(low: Curve, high: Curve) -> tuple[Floats, Floats, Floats]:

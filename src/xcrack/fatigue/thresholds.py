@@ -22,9 +22,9 @@ class klesnil_lukas(Threshold):  # noqa: N801 - it is used as a function
     Parameters
     ----------
     dK0 : float, stress √length
-        Threshold for R = 0, positive.
+        Threshold for R = 0.
     gamma : float
-        Exponent, in [0, 1]; 0 is a threshold that does not depend on R.
+        Exponent; 0 is a threshold that does not depend on R.
 
     Raises
     ------
@@ -106,12 +106,12 @@ class el_haddad(Threshold):  # noqa: N801
     long : klesnil_lukas or stepped_threshold
         Threshold of long cracks.
     a0 : float, length
-        Positive; (dK / (Y Δσ))² / π with the range Δσ at the endurance limit.
+        (dK / (Y Δσ))² / π with the range Δσ at the endurance limit.
 
     Raises
     ------
     ProblemError
-        Another kind of threshold, or a0 that is not positive.
+        Another kind of threshold.
 
     Notes
     -----
@@ -178,7 +178,7 @@ class nasgro3_threshold(_OfNewman):  # noqa: N801
     Parameters
     ----------
     dK0 : float, stress √length
-        Threshold of long cracks for R = 0, positive.
+        Threshold of long cracks for R = 0.
     C_th : float
         Its dependence on R.
     a0 : float, length
@@ -218,7 +218,7 @@ class nasgro4_threshold(_OfNewman):  # noqa: N801
     Parameters
     ----------
     dK1 : float, stress √length
-        Threshold of long cracks for R towards 1, positive.
+        Threshold of long cracks for R towards 1.
     C_th_plus, C_th_minus : float
         Dependence on R >= 0 and on R < 0.
     a0 : float, length

@@ -30,18 +30,12 @@ class time_rate(Constants):  # noqa: N801 - it is used as a function
     Parameters
     ----------
     C : float, length/time/(stress √length)^n
-        Positive.
     n : float
-        Exponent, not negative.
+        Exponent.
     K_th : float, stress √length
         Nothing grows at or below it, K_Iscc of corrosion under load.
     plateau : float, length/time, optional
         Largest rate, where a reaction or transport limits it.
-
-    Raises
-    ------
-    ProblemError
-        A constant that does not fit.
 
     Examples
     --------
@@ -73,7 +67,7 @@ class with_time(Constants):  # noqa: N801
     law : callable (dK_eq, R) -> da/dN
     rate : time_rate
     period : float, time
-        What a cycle lasts, or what is held of it; positive.
+        What a cycle lasts, or what is held of it.
     wave : {"hold", "triangle", "sine"}
         How K runs over the period: held at K_max, or between K_min and K_max.
 

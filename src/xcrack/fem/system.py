@@ -6,7 +6,7 @@ from typing import Any
 
 from xcrack.crack.crack import Crack
 from xcrack.crack.junctions import prolonged_cracks
-from xcrack.crack.placing import on_mesh
+from xcrack.crack.stations import on_mesh
 from xcrack.fem.assembly import Bulk, Enriched, Stiffness, bulk, enriched_stiffness
 from xcrack.fem.cut import cut
 from xcrack.fem.enrichment import front_reach

@@ -10,7 +10,7 @@ from xcrack.base.errors import GeometryError
 from xcrack.crack.crack import Crack, tip_frames
 from xcrack.crack.measures import exit_ahead, facet_names, front_ends
 from xcrack.crack.meetings import new_ends, new_unions
-from xcrack.crack.placing import place_crack
+from xcrack.crack.stations import place_crack
 from xcrack.fem.system import discretise
 from xcrack.growth import joins_3d
 from xcrack.growth.integrator import integrator_of

@@ -16,8 +16,7 @@ from xcrack.crack.advance_3d import advance_fronts
 from xcrack.crack.crack import Crack
 from xcrack.crack.measures import crack_size
 from xcrack.crack.meetings import LEAST
-from xcrack.crack.placing import place_crack
-from xcrack.crack.stations import closed_fronts, front_frames
+from xcrack.crack.stations import closed_fronts, front_frames, place_crack
 from xcrack.fatigue.retardation import (
     POINTS,
     BlockCycles,

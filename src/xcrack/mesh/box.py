@@ -2,12 +2,13 @@
 
 from itertools import permutations
 from math import factorial
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from xcrack.base.arguments import Array, Points, check_arguments
 from xcrack.base.arrays import Bools, Ints
-from xcrack.base.checks import point_coordinates, whole_numbers
 from xcrack.base.errors import MeshError
 from xcrack.mesh.mesh import Mesh, sound_mesh
 
@@ -18,7 +19,12 @@ _SIDES = {
 }
 
 
-def box(lower: ArrayLike, upper: ArrayLike, n: int | tuple[int, ...]) -> Mesh:
+@check_arguments(MeshError)
+def box(
+    lower: Annotated[ArrayLike, Points((None,))],
+    upper: Annotated[ArrayLike, Points((None,))],
+    n: Annotated[int | tuple[int, ...], Array(is_whole=True)],
+) -> Mesh:
     """Structured simplices in a box, diagonals alternating from cell to cell.
 
     Parameters
@@ -36,23 +42,24 @@ def box(lower: ArrayLike, upper: ArrayLike, n: int | tuple[int, ...]) -> Mesh:
     Raises
     ------
     MeshError
-        Corners that do not span a box, n that is not a whole number or below 1.
+        Corners that do not span a box, or no cells, or too many.
 
     Examples
     --------
     >>> box((0, 0), (2, 1), (4, 2))
     Mesh(15 points, 16 triangles, facet sets: left, right, bottom, top, boundary)
     """
-    low = point_coordinates(lower, "box: lower", (None,))
+    low, high, count = np.asarray(lower), np.asarray(upper), np.asarray(n)
     d = len(low)
     if d not in (2, 3):
         raise MeshError(f"box: lower {low.tolist()} needs two or three coordinates.")
-    high = point_coordinates(upper, "box: upper", (d,))
-    if not (high > low).all():
+    if len(high) != d or not (high > low).all():
         raise MeshError(f"box: upper {high.tolist()} must exceed lower {low.tolist()}.")
-    count = whole_numbers(n, "box: n", error=MeshError)
-    if count.ndim:
-        count = whole_numbers(count, "box: n", (d,), error=MeshError)
+    if count.shape not in ((), (d,)):
+        raise MeshError(
+            f"box: n has the shape {count.shape}: give a whole number, or one for each of the "
+            f"{d} directions."
+        )
     count = np.broadcast_to(count, (d,))
     if (count < 1).any():
         raise MeshError(f"box: n must be at least 1 in every direction, not {count.tolist()}.")

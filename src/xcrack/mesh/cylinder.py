@@ -2,13 +2,14 @@
 
 from math import frexp, inf, pi, sin, tan
 from types import ModuleType
+from typing import Annotated
 
 import numpy as np
 
+from xcrack.base.arguments import Distance, Length, Number, check_arguments
 from xcrack.base.arrays import Floats, Ints
-from xcrack.base.checks import number
 from xcrack.base.errors import GeometryError, MeshError
-from xcrack.mesh.gmsh_session import FINEST, graded_size, length_of, session
+from xcrack.mesh.gmsh_session import FINEST, graded_size, session
 from xcrack.mesh.mesh import Mesh, sound_mesh
 from xcrack.mesh.polygon import Arc
 
@@ -19,22 +20,24 @@ _TRANSITION = 1.0  # size everywhere, as convergence studies need
 _STEEPEST = 0.5  # growth of the cell size a unit of distance that still gives good cells
 _TOLERANCE = 1e-6  # of the diameter: far above round-off, far below every cell
 _MOST_POINTS = 5_000_000
+_RADIANS = "it is in rad, and np.radians turns degrees into it"
 
 
+@check_arguments(GeometryError)
 def notched_cylinder(
     *,
-    diameter: float,
-    length: float,
-    notch_depth: float,
-    notch_angle: float,
-    outer_span: float,
-    inner_span: float,
-    size: float,
-    size_near: float | None = None,
-    patch_length: float | None = None,
-    crack_depth: float | None = None,
-    band: float | None = None,
-    transition: float | None = None,
+    diameter: Length,
+    length: Length,
+    notch_depth: Length,
+    notch_angle: Annotated[float, Number(above=0, below=pi, hint=_RADIANS)],
+    outer_span: Length,
+    inner_span: Length,
+    size: Length,
+    size_near: Length | None = None,
+    patch_length: Length | None = None,
+    crack_depth: Length | None = None,
+    band: Distance | None = None,
+    transition: Distance | None = None,
 ) -> Mesh:
     """Round bar with a straight V-notch at mid-length and ends of 24 plane faces.
 
@@ -86,8 +89,8 @@ def notched_cylinder(
     Raises
     ------
     GeometryError
-        A length that is not positive, stations that overlap or do not fit between the ends and
-        the notch, an angle outside 0 ... pi, sizes that do not fit.
+        Stations that overlap or do not fit between the ends and the notch, sizes that do not
+        fit, or too many points.
     MeshError
         gmsh made no mesh.
     XcrackError
@@ -106,23 +109,15 @@ def notched_cylinder(
             traction("inner_right_12", (0.0, 0.0, -p)), traction("outer_right_00", (0.0, 0.0, p)),
         ]
     """
-    diameter, length = length_of(diameter, "diameter"), length_of(length, "length")
-    notch_depth = length_of(notch_depth, "notch_depth")
-    notch_angle = number(notch_angle, "notch_angle", error=GeometryError)
-    outer_span = length_of(outer_span, "outer_span")
-    inner_span = length_of(inner_span, "inner_span")
-    size, radius = length_of(size, "size"), diameter / 2
-    near_size = length_of(size if size_near is None else size_near, "size_near")
+    radius = diameter / 2
+    near_size = size if size_near is None else size_near
     patch = diameter * sin(_TURN / 2) if patch_length is None else patch_length
-    patch = length_of(patch, "patch_length")
-    depth = length_of(radius if crack_depth is None else crack_depth, "crack_depth")
+    depth = radius if crack_depth is None else crack_depth
     if band is None:
         band = _BAND * diameter
     if transition is None:
         transition = max(_TRANSITION * diameter, (size - near_size) / _STEEPEST)
-    band = number(band, "band", least=0, error=GeometryError)
-    transition = number(transition, "transition", least=0, error=GeometryError)
-    _check_depths(diameter, notch_depth, notch_angle, depth)
+    _check_depths(diameter, notch_depth, depth)
     _check_sizes(diameter, length, size, near_size, band, depth)
     slope = tan(notch_angle / 2)
     room = _check_stations(length, outer_span, inner_span, patch, notch_depth * slope)
@@ -243,12 +238,7 @@ def _with_sets(
     return sound_mesh(points, cells, sets, curves={"round": round_side})
 
 
-def _check_depths(diameter: float, notch_depth: float, notch_angle: float, depth: float) -> None:
-    if not 0 < notch_angle < pi:
-        raise GeometryError(
-            f"notch_angle = {notch_angle:g} must lie between 0 and pi: it is in rad, "
-            "np.radians turns degrees into it."
-        )
+def _check_depths(diameter: float, notch_depth: float, depth: float) -> None:
     if not notch_depth < depth <= diameter:
         raise GeometryError(
             f"crack_depth = {depth:g} must exceed notch_depth = {notch_depth:g} and not "

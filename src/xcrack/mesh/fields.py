@@ -1,11 +1,11 @@
 """Fields from files: values on another mesh, interpolated wherever they are asked for."""
 
 from dataclasses import dataclass
-from os import PathLike
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
+from xcrack.base.arguments import FileName, Text, check_arguments
 from xcrack.base.arrays import Floats, Ints, at, frozen_copy
 from xcrack.base.checks import numbers, value_text
 from xcrack.base.errors import MeshError, ProblemError, warn
@@ -133,7 +133,10 @@ class CellField:
         return f"CellField({self.name}: {len(self.values)} cells)"
 
 
-def read_field(path: str | PathLike[str], name: str | None = None) -> Field:
+@check_arguments(MeshError)
+def read_field(
+    path: FileName, name: Annotated[str | None, Text("the name of a field")] = None
+) -> Field:
     """Read a field from a file with a mesh of its own, to use wherever a function f(x) is taken.
 
     Parameters
@@ -169,10 +172,6 @@ def read_field(path: str | PathLike[str], name: str | None = None) -> Field:
     >>> read_field(path)(np.array([(0.5, 0.5)]))
     array([2.5])
     """
-    if not isinstance(name, str | None):
-        raise MeshError(
-            f"read_field: name = {value_text(name)}: give the name of a field, or None."
-        )
     path = existing_file(path, "field")
     with system_errors("cannot read the field file", path):
         content = meshio_read(path, "field")

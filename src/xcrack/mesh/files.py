@@ -10,16 +10,16 @@ import warnings
 import zlib
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 from urllib.parse import quote, unquote
 
 import numpy as np
 
+from xcrack.base.arguments import Choice, FileName, Part, Switch, check_arguments
 from xcrack.base.arrays import Floats, Ints, lock
-from xcrack.base.checks import flag, one_of
 from xcrack.base.errors import GeometryError, MeshError, XcrackError, warn
 from xcrack.base.optional import require_package
-from xcrack.base.paths import path_of, system_errors, written_whole
+from xcrack.base.paths import system_errors, written_whole
 from xcrack.mesh.abaqus import abaqus_text, read_abaqus
 from xcrack.mesh.curved_facets import CurvedFacets
 from xcrack.mesh.curves import Curve, check_on_curves
@@ -53,7 +53,8 @@ _CONVERT = {  # formats that meshio does not read, or not always
 _MISSED_SETS = 12  # that a message names
 
 
-def read_mesh(path: str | PathLike[str], *, strict: bool = False) -> Mesh:
+@check_arguments(MeshError)
+def read_mesh(path: FileName, *, strict: Switch = False) -> Mesh:
     """Read a mesh with its sets, and make triangles (2D) or tetrahedra (3D) of its cells.
 
     Of cells of second or higher order the corners are used, and of their midside nodes the shape
@@ -109,7 +110,6 @@ def read_mesh(path: str | PathLike[str], *, strict: bool = False) -> Mesh:
     >>> read_mesh(path)
     Mesh(9 points, 8 triangles, facet sets: left, right, bottom, top, boundary)
     """
-    strict = flag(strict, "read_mesh: strict", error=MeshError)
     path = existing_file(path, "mesh")
     with system_errors("cannot read the mesh file", path):
         raw, uses = raw_mesh_of(path)
@@ -195,7 +195,13 @@ def read_triangles(path: str | PathLike[str]) -> tuple[Floats, Ints]:
     return points, triangles.astype(np.int64)
 
 
-def write_mesh(path: str | PathLike[str], mesh: Mesh, *, msh_version: str = "4.1") -> None:
+@check_arguments(XcrackError)
+def write_mesh(
+    path: FileName,
+    mesh: Annotated[Mesh, Part(Mesh)],
+    *,
+    msh_version: Annotated[str, Choice(("4.1", "2.2"))] = "4.1",
+) -> None:
     """Write a mesh with its sets; `read_mesh` gives the same points, to the last bit, and sets.
 
     The set ``"boundary"`` is left out where it is the one every mesh has. Curves go into msh, inp
@@ -225,10 +231,7 @@ def write_mesh(path: str | PathLike[str], mesh: Mesh, *, msh_version: str = "4.1
     MeshError
         A name of a set that the format cannot hold.
     """
-    path = path_of(path, "write_mesh: path")
-    if not isinstance(mesh, Mesh):
-        raise MeshError(f"write_mesh: give a Mesh, not {type(mesh).__name__}.")
-    one_of(msh_version, "write_mesh: msh_version", ("4.1", "2.2"), error=XcrackError)
+    path = Path(path)
     with system_errors("cannot write", path):
         if not path.parent.is_dir():
             raise XcrackError(f"folder {str(path.parent)!r} does not exist: make it first.")
@@ -256,7 +259,7 @@ def _write_text(path: Path, text: str) -> None:
 
 def existing_file(value: str | PathLike[str], what: str) -> Path:
     """Path of a file that is there."""
-    path = path_of(value, f"path of the {what} file")
+    path = Path(value)
     with system_errors(f"cannot read the {what} file", path):
         if path.is_dir():
             raise XcrackError(

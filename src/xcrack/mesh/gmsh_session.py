@@ -5,14 +5,16 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from math import hypot
 from types import ModuleType
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
+from xcrack.base.arguments import CheckedBy
 from xcrack.base.arrays import Floats
 from xcrack.base.checks import LARGEST, number, point_coordinates, value_text
 from xcrack.base.errors import GeometryError, XcrackError
 from xcrack.base.optional import require_package
+from xcrack.base.units import LENGTH
 
 SYSTEM_LIBRARIES = (
     "apt-get install -y --no-install-recommends libglu1-mesa libgl1 libegl1 libgl1-mesa-dri "
@@ -184,47 +186,34 @@ def graded_size(
     return length
 
 
-def polylines(along: Any) -> list[Floats]:
-    """Bring one polyline, several or none into one form.
-
-    Parameters
-    ----------
-    along : (k, 2) points, a sequence of such, or None, length
-        What the user gave.
-
-    Returns
-    -------
-    list of (k, 2) array, length
-        The polylines.
-
-    Raises
-    ------
-    GeometryError
-        Anything else, or coordinates that are not finite.
-
-    Examples
-    --------
-    >>> [path.tolist() for path in polylines([(0, 0), (1, 0)])]
-    [[[0.0, 0.0], [1.0, 0.0]]]
-    """
-    if along is None:
-        return []
-    try:
-        many = bool(np.ndim(along[0][0]))
-        return [
-            point_coordinates(path, "along", (None, 2), error=GeometryError)
-            for path in (along if many else [along])
-        ]
-    except Exception as error:  # whatever an object's own methods raise
-        raise GeometryError(
-            f"along = {value_text(along)} must be points of a polyline, [(x0, y0), (x1, y1), ...], "
-            f"or a list of such polylines, with finite coordinates."
-        ) from error
-
-
 def length_of(value: Any, what: str) -> float:
     """Check that a value is a positive length that gmsh can compute with, and return it."""
     return number(value, what, above=0, most=LARGEST, error=GeometryError)
+
+
+def polylines(value: Any, what: str, error: type[XcrackError]) -> list[Floats]:
+    """One polyline or several in one form, checked.
+
+    Examples
+    --------
+    >>> [path.tolist() for path in polylines([(0, 0), (1, 0)], "plate: along", XcrackError)]
+    [[[0.0, 0.0], [1.0, 0.0]]]
+    """
+    try:
+        many = bool(np.ndim(value[0][0]))
+        return [
+            point_coordinates(path, what, (None, 2), error=error)
+            for path in (value if many else [value])
+        ]
+    except Exception as cause:  # whatever an object's own methods raise
+        raise error(
+            f"{what} = {value_text(value)} must be points of a polyline, [(x0, y0), (x1, y1), "
+            "...], or a list of such polylines, with finite coordinates."
+        ) from cause
+
+
+Path = Sequence[Sequence[float]]
+Along = Annotated[Path | Sequence[Path] | None, CheckedBy(polylines, unit=LENGTH)]
 
 
 __all__ = []

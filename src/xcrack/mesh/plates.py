@@ -3,14 +3,30 @@
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from math import ceil, frexp, hypot, inf, pi
 from types import ModuleType
-from typing import Any
+from typing import Annotated, Any, cast
 
 import numpy as np
 
+from xcrack.base.arguments import (
+    CheckedBy,
+    Distance,
+    Error,
+    Length,
+    Points,
+    check_arguments,
+)
 from xcrack.base.arrays import Floats, Ints
-from xcrack.base.checks import number, point_coordinates, value_text, whole_numbers
+from xcrack.base.checks import (
+    LARGEST,
+    entries,
+    number,
+    point_coordinates,
+    value_text,
+    whole_numbers,
+)
 from xcrack.base.errors import GeometryError, MeshError
-from xcrack.mesh.gmsh_session import FINEST, graded_size, length_of, polylines, session
+from xcrack.base.units import LENGTH
+from xcrack.mesh.gmsh_session import FINEST, Along, graded_size, session
 from xcrack.mesh.mesh import Mesh, sound_mesh
 from xcrack.mesh.outlines import (
     Side,
@@ -27,7 +43,6 @@ from xcrack.mesh.polygon import Arc
 
 Point = tuple[float, float]
 Hole = tuple[Point, float]
-Path = Sequence[Sequence[float]]
 Sets = Mapping[str, Where]
 
 _FEWEST_HOLE_EDGES = 24  # an inscribed polygon of 24 edges has lost 1.1 % of the disc's area
@@ -37,17 +52,36 @@ _STEEPEST = 0.5  # growth of the cell size a unit of distance that still gives g
 _MOST_POINTS = 5_000_000
 
 
+def checked_holes(value: Any, what: str, error: Error) -> list[Hole]:
+    """Centres and radii of holes, checked."""
+    try:
+        pairs = [(center, radius) for center, radius in entries(value, what, error=error)]
+    except (error, TypeError, ValueError):
+        raise error(
+            f"{what} = {value_text(value)} must be a list of centres and radii, such as "
+            "[((x, y), radius)]."
+        ) from None
+    return [
+        (
+            _pair(point_coordinates(center, f"{what}[{i}]: centre", (2,), error=error)),
+            number(radius, f"{what}[{i}]: radius", above=0, most=LARGEST, error=error),
+        )
+        for i, (center, radius) in enumerate(pairs)
+    ]
+
+
+@check_arguments(GeometryError)
 def plate_with_hole(
     *,
-    width: float,
-    height: float,
-    radius: float,
-    size: float,
-    size_near: float | None = None,
-    center: Point = (0.0, 0.0),
-    along: Path | Sequence[Path] | None = None,
-    band: float | None = None,
-    transition: float | None = None,
+    width: Length,
+    height: Length,
+    radius: Length,
+    size: Length,
+    size_near: Length | None = None,
+    center: Annotated[Point, Points((2,))] = (0.0, 0.0),
+    along: Along = None,
+    band: Distance | None = None,
+    transition: Distance | None = None,
     sets: Sets | None = None,
 ) -> Mesh:
     """Rectangular plate centred at the origin with one round hole.
@@ -85,7 +119,7 @@ def plate_with_hole(
     Raises
     ------
     GeometryError
-        A length that is not positive, a hole that does not fit, sizes larger than the plate.
+        A hole that does not fit, sizes larger than the plate, or too many points.
     MeshError
         A set without facets, or with a name that is taken.
     XcrackError
@@ -100,25 +134,23 @@ def plate_with_hole(
             along=[(5.0, 0.0), (12.0, 0.0)], transition=15.0,
         )
     """
-    width, height = length_of(width, "width"), length_of(height, "height")
-    radius = length_of(radius, "radius")
     sides = rectangle((-width / 2, -height / 2), width, height)
-    return _plate(
-        sides, [(center, radius)], ["hole"], size, size_near, along, band, transition, sets
-    )
+    holes = [(_pair(center), radius)]
+    return _plate(sides, holes, ["hole"], size, size_near, along, band, transition, sets)
 
 
+@check_arguments(GeometryError)
 def plate(
-    width: float | None = None,
-    height: float | None = None,
+    width: Length | None = None,
+    height: Length | None = None,
     *,
-    size: float,
-    size_near: float | None = None,
-    lower: Point = (0.0, 0.0),
-    holes: Iterable[Hole] = (),
-    along: Path | Sequence[Path] | None = None,
-    band: float | None = None,
-    transition: float | None = None,
+    size: Length,
+    size_near: Length | None = None,
+    lower: Annotated[Point, Points((2,))] = (0.0, 0.0),
+    holes: Annotated[Iterable[Hole], CheckedBy(checked_holes, unit=LENGTH)] = (),
+    along: Along = None,
+    band: Distance | None = None,
+    transition: Distance | None = None,
     outline: Sequence[Any] | None = None,
     sets: Sets | None = None,
 ) -> Mesh:
@@ -158,8 +190,8 @@ def plate(
     Raises
     ------
     GeometryError
-        A length that is not positive, an outline that crosses itself, a hole that does not fit,
-        sizes larger than the plate.
+        An outline that crosses itself, a hole that does not fit, sizes larger than the plate, or
+        too many points.
     MeshError
         A set without facets, or with a name that is taken.
     XcrackError
@@ -181,18 +213,17 @@ def plate(
             sets={"crown": ((-2, None), (2, None)), "base": [0]},
         )
     """
-    holes = _list_of_holes(holes)
-    names = [f"hole_{i}" for i in range(len(holes))]
-    if (outline is None) == (width is None and height is None):
+    given = cast(list[Hole], holes)
+    names = [f"hole_{i}" for i in range(len(given))]
+    if outline is not None and width is None and height is None:
+        sides = sides_of(outline)
+    elif outline is None and width is not None and height is not None:
+        sides = rectangle(_pair(lower), width, height)
+    else:
         raise GeometryError(
             "plate: give width and height of a rectangle, or an outline; not both, not neither."
         )
-    if outline is not None:
-        sides = sides_of(outline)
-    else:
-        width, height = length_of(width, "width"), length_of(height, "height")
-        sides = rectangle(_pair(lower, "lower"), width, height)
-    return _plate(sides, holes, names, size, size_near, along, band, transition, sets)
+    return _plate(sides, given, names, size, size_near, along, band, transition, sets)
 
 
 def _plate(
@@ -201,31 +232,24 @@ def _plate(
     names: Sequence[str],
     size: float,
     size_near: float | None,
-    along: Path | Sequence[Path] | None,
+    along: Any,
     band: float | None,
     transition: float | None,
     sets: Sets | None,
 ) -> Mesh:
-    size = length_of(size, "size")
-    holes = [
-        (_pair(center, f"hole {i}: centre"), length_of(radius, f"radius of hole {i}"))
-        for i, (center, radius) in enumerate(holes)
-    ]
     polygon = polygon_of(sides)
     width, height = np.ptp(polygon, axis=0).tolist()
     _check_holes(sides, max(width, height), holes)
     smallest_radius = min((radius for _, radius in holes), default=inf)
     hole_size = 2 * pi * smallest_radius / _FEWEST_HOLE_EDGES
-    near_size = length_of(min(size, hole_size) if size_near is None else size_near, "size_near")
+    near_size = min(size, hole_size) if size_near is None else size_near
     _check_sizes(width, height, size, near_size)
     reach = smallest_radius if holes else min(width, height) / 10
     if band is None:
         band = _BAND * reach
     if transition is None:
         transition = max(_TRANSITION * reach, (size - near_size) / _STEEPEST)
-    band = number(band, "band", least=0, error=GeometryError)
-    transition = number(transition, "transition", least=0, error=GeometryError)
-    paths = polylines(along)
+    paths = along or []
     _check_cost(width, height, size, near_size, band, paths)
     named_sets = _checked_sets(sets, [*(side.name for side in sides), *names])
     parts = split_sides(sides, named_sets)
@@ -414,21 +438,8 @@ def _checked_sets(sets: Any, names: Sequence[str]) -> Sets:
     return sets
 
 
-def _pair(value: Any, what: str) -> Point:
-    x, y = point_coordinates(value, what, (2,), error=GeometryError).tolist()
-    return x, y
-
-
-def _list_of_holes(holes: Any) -> list[Hole]:
-    """Holes as a list of pairs."""
-    try:
-        pairs = [(center, radius) for center, radius in holes]
-    except (TypeError, ValueError) as error:
-        raise GeometryError(
-            f"holes = {value_text(holes)} must be a list of centres and radii, such as "
-            "[((x, y), radius)]."
-        ) from error
-    return pairs
+def _pair(point: Any) -> Point:
+    return float(point[0]), float(point[1])
 
 
 def _check_sizes(width: float, height: float, size: float, near_size: float) -> None:

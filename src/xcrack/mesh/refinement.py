@@ -2,13 +2,16 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from xcrack.base.arguments import Array, Either, Function, Number, Part, check_arguments
 from xcrack.base.arrays import Bools, Floats, Ints, at, ranges
-from xcrack.base.checks import call_function, number, numbers, whole_numbers
+from xcrack.base.checks import call_function, numbers
 from xcrack.base.errors import MeshError
+from xcrack.base.units import LENGTH
 from xcrack.mesh.curves import longest_edge, on_curves, warn_of_flat_points
 from xcrack.mesh.gmsh_session import FINEST
 from xcrack.mesh.mesh import Mesh, local_edges, local_facets, sound_mesh
@@ -248,9 +251,16 @@ _TIE = 1e-6  # share by which a diagonal must be shorter to be taken instead of 
 _MOST_CELLS = 10_000_000  # more do not fit into the memory of machines that solve them
 
 Size = float | Callable[[Floats], ArrayLike]
+_SizeRule = Either(Function(), Number(above=0, unit=LENGTH, hint="or a function f(x) of centres"))
 
 
-def refine(mesh: Mesh, cells: ArrayLike | None = None, *, size: Size | None = None) -> Mesh:
+@check_arguments(MeshError)
+def refine(
+    mesh: Annotated[Mesh, Part(Mesh)],
+    cells: Annotated[ArrayLike | None, Array((None,), is_whole=True, unit=None)] = None,
+    *,
+    size: Annotated[Size | None, _SizeRule] = None,
+) -> Mesh:
     """Make a mesh finer: everywhere, at some cells, or to a wanted size.
 
     Given neither `cells` nor `size`, every edge is split in two: triangles into four, tetrahedra
@@ -282,9 +292,8 @@ def refine(mesh: Mesh, cells: ArrayLike | None = None, *, size: Size | None = No
     Raises
     ------
     MeshError
-        Not a mesh, both `cells` and `size`, numbers of no cell, a size that is nan, not positive,
-        or so small that there would be more than ten million cells, a curve that returns points
-        elsewhere.
+        Both `cells` and `size`, numbers of no cell, a size that is nan, not positive, or so small
+        that there would be more than ten million cells, a curve that returns points elsewhere.
 
     Examples
     --------
@@ -295,13 +304,11 @@ def refine(mesh: Mesh, cells: ArrayLike | None = None, *, size: Size | None = No
     >>> refine(coarse, size=lambda x: 0.1 + np.linalg.norm(x, axis=1))
     Mesh(13 points, 14 triangles, facet sets: left, right, bottom, top, boundary)
     """
-    if not isinstance(mesh, Mesh):
-        raise MeshError(f"refine: give a Mesh, not {type(mesh).__name__}.")
     if cells is not None and size is not None:
         raise MeshError("refine: give cells or size, not both.")
     if size is not None:
         return _to_size(mesh, _checked_size(mesh, size), None)
-    return _split_all_edges(mesh) if cells is None else _some(mesh, cells)
+    return _split_all_edges(mesh) if cells is None else _some(mesh, np.asarray(cells))
 
 
 def refine_to(mesh: Mesh, size_at: Floats, sweeps: int) -> Mesh:
@@ -323,8 +330,7 @@ def refine_to(mesh: Mesh, size_at: Floats, sweeps: int) -> Mesh:
     return _to_size(mesh, lambda centre, parent: size_at[parent], sweeps)
 
 
-def _some(mesh: Mesh, cells: ArrayLike) -> Mesh:
-    given = whole_numbers(cells, "refine: cells", (None,), error=MeshError)
+def _some(mesh: Mesh, given: Ints) -> Mesh:
     if given.size and (given.min() < 0 or given.max() >= len(mesh.cells)):
         raise MeshError(
             f"refine: cells names {int(given.min() if given.min() < 0 else given.max())}; the mesh "
@@ -365,10 +371,9 @@ def _checked_size(mesh: Mesh, size: Size) -> Callable[[Floats, Ints], Floats]:
     """Wanted size of cells, checked as it is asked for."""
     what, least = "the size of refine", FINEST * mesh.extent
     function = size if callable(size) else None
-    fixed = 0.0 if function else number(size, "refine: size", above=0, error=MeshError)
 
     def size_at(centre: Floats, parent: Ints) -> Floats:
-        given = fixed if function is None else call_function(function, what, centre.copy())
+        given = size if function is None else call_function(function, what, centre.copy())
         value = numbers(given, what, finite=False, error=MeshError)
         if value.shape not in ((), (len(centre),)):
             raise MeshError(

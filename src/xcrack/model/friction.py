@@ -8,20 +8,38 @@ from typing import Any
 import numpy as np
 
 from xcrack.base.checks import entries, number, value_text
-from xcrack.base.errors import ProblemError
+from xcrack.base.errors import ProblemError, XcrackError
 from xcrack.model.numerics import Numerics
 
 _MOST = 1e3  # beyond, faces that press never slip
 
 
-def checked_friction(
-    value: Any, n_cracks: int, dim: int, numerics: Numerics
+def friction_coefficients(
+    value: Any, what: str, error: type[XcrackError]
 ) -> float | tuple[float, ...]:
-    """Coefficients of friction: one for all cracks, or one for each.
+    """Coefficients of friction, checked: one for all cracks, or one for each."""
+    if isinstance(value, Real) or (isinstance(value, np.ndarray) and value.ndim == 0):
+        return number(value, what, least=0, most=_MOST, error=error)
+    wrong = f"{what} = {value_text(value)}: give a number, or a list of one a crack."
+    if isinstance(value, AnySet):
+        raise error(wrong)
+    try:
+        given = entries(value, what, error=error)
+    except error:
+        raise error(wrong) from None
+    return tuple(
+        number(mu, f"{what}[{c}]", least=0, most=_MOST, error=error) for c, mu in enumerate(given)
+    )
+
+
+def fitted_friction(
+    friction: float | Sequence[float], n_cracks: int, dim: int, numerics: Numerics
+) -> float | tuple[float, ...]:
+    """Coefficients of the cracks of a problem.
 
     Parameters
     ----------
-    value : anything
+    friction : float, or sequence of one a crack
     n_cracks : int
     dim : int
     numerics : Numerics
@@ -29,33 +47,19 @@ def checked_friction(
     Raises
     ------
     ProblemError
-        Not numbers from 0 to 1000, another count than cracks, or a method without friction.
+        Another count than cracks, or a method without friction.
     """
-    if isinstance(value, Real) or (isinstance(value, np.ndarray) and value.ndim == 0):
-        result: float | tuple[float, ...] = number(value, "friction", least=0, most=_MOST)
-        acts = bool(result)
-    else:
-        wrong = f"friction = {value_text(value)}: give a number, or a list of one a crack."
-        if isinstance(value, AnySet):
-            raise ProblemError(wrong)
-        try:
-            given = entries(value, "friction")
-        except ProblemError:
-            raise ProblemError(wrong) from None
-        if len(given) != n_cracks:
+    if isinstance(friction, Sequence):
+        if len(friction) != n_cracks:
             raise ProblemError(
-                f"friction = {value_text(value)}: the problem has {n_cracks} crack(s); give a "
-                f"number for all of them, or a list of one a crack."
+                f"Problem: friction = {value_text(list(friction))}: the problem has {n_cracks} "
+                f"crack(s); give a number for all of them, or a list of one a crack."
             )
-        result = tuple(
-            number(mu, f"friction[{c}]", least=0, most=_MOST) for c, mu in enumerate(given)
-        )
-        acts = any(mu > 0 for mu in result)
-        if len(set(result)) == 1:  # cracks that join in growth then need no numbers of their own
-            result = result[0]
-    if acts:
+        if len(set(friction)) == 1:  # cracks that join in growth then need no numbers of their own
+            friction = friction[0]
+    if friction if isinstance(friction, float) else any(friction):
         _check_method(dim, numerics)
-    return result
+    return friction if isinstance(friction, float) else tuple(friction)
 
 
 def _check_method(dim: int, numerics: Numerics) -> None:
@@ -83,4 +87,4 @@ def check_order(frictions: Sequence[float], states: Any) -> None:
         )
 
 
-__all__ = ["check_order", "checked_friction"]
+__all__ = ["check_order", "fitted_friction", "friction_coefficients"]

@@ -6,21 +6,28 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from numbers import Real
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
+from xcrack.base.arguments import CheckedBy, Choice, Declared, OneOrMore, Part, Parts, Whole
 from xcrack.base.checks import entries, number, value_text, whole_number
 from xcrack.base.errors import CoarseMeshError, ProblemError
 from xcrack.base.markup import Markup, element, join_parts, rim, sketch, table
 from xcrack.crack.crack import Crack
 from xcrack.crack.junctions import Junction
 from xcrack.crack.measures import crack_size
-from xcrack.crack.placing import check_cracks, junctions, on_others, place_crack
-from xcrack.crack.stations import Stations, stations_of
+from xcrack.crack.stations import (
+    Stations,
+    check_cracks,
+    junctions,
+    on_others,
+    place_crack,
+    stations_of,
+)
 from xcrack.mesh.mesh import Mesh, warn_of_sets
 from xcrack.model.elasticity import Elasticity, elasticity
-from xcrack.model.friction import checked_friction
+from xcrack.model.friction import fitted_friction, friction_coefficients
 from xcrack.model.loads import Load
 from xcrack.model.material import Material, MaterialSets
 from xcrack.model.numerics import Numerics
@@ -70,6 +77,9 @@ def scaled_state(loads: tuple[Load, ...], factor: float) -> LoadState:
     return LoadState(loads, tuple(1.0 if load.is_steady else factor for load in loads), factor)
 
 
+_MATERIAL = "a material, such as Isotropic(...), or a mapping of cell sets to materials"
+_HANDBOOK = 'handbook("edge", a=..., ...)'
+_SUPPORTS = "fix(...) or displacement(...), and put forces into loads"
 _ORDER = 2  # of the standard functions
 _ORDER_OF_RUBBING = 1  # in 3D: order 2 takes 3 to 10 times as long there, K_II is no better
 
@@ -81,7 +91,7 @@ def order_left_out(problem: "Problem") -> int:
 
 
 @dataclass(frozen=True, eq=False)
-class Problem:
+class Problem(Declared):
     """A body with cracks, supports and loads.
 
     Parameters
@@ -112,47 +122,32 @@ class Problem:
         too coarse for a crack is refused by what solves on it: `adapt` makes it finer first.
     """
 
-    mesh: Mesh
-    material: Material | Mapping[str, Material]
-    cracks: Sequence[Crack] = ()
-    supports: Sequence[Support] = ()
-    loads: Sequence[Load] = ()
-    contact: str = "auto"
-    order: int | None = field(default=None, metadata={"resolved": order_left_out})
-    numerics: Numerics = field(default_factory=Numerics)
-    friction: float | Sequence[float] = 0.0
+    mesh: Annotated[Mesh, Part(Mesh, "a mesh, such as box(...) or read_mesh(...)")]
+    material: Annotated[Material | Mapping[str, Material], Part(Material, _MATERIAL)]
+    cracks: Annotated[Sequence[Crack], Parts(Crack, "cracks, such as line_crack(...)")] = ()
+    supports: Annotated[Sequence[Support], Parts(Support, _SUPPORTS)] = ()
+    loads: Annotated[Sequence[Load], Parts(Load, "loads, such as traction(...)")] = ()
+    contact: Annotated[str, Choice(("auto", "on", "off"))] = "auto"
+    order: Annotated[int | None, Whole(least=1, most=2)] = field(
+        default=None, metadata={"resolved": order_left_out}
+    )
+    numerics: Annotated[Numerics, Part(Numerics)] = field(default_factory=Numerics)
+    friction: Annotated[float | Sequence[float], CheckedBy(friction_coefficients)] = 0.0
     # What K is compared with changes nothing that is computed.
-    handbook: Sequence[ReferenceK] = field(default=(), metadata={"changes_results": False})
+    handbook: Annotated[Sequence[ReferenceK], OneOrMore(ReferenceK, _HANDBOOK, True)] = field(
+        default=(), metadata={"changes_results": False}
+    )
 
     def __post_init__(self) -> None:
         if isinstance(self.material, Mapping):
             object.__setattr__(self, "material", MaterialSets(self.material))
-        for name, kind in (("mesh", Mesh), ("material", Material), ("numerics", Numerics)):
-            if not isinstance(getattr(self, name), kind):
-                example_class, remedy = "", ""
-                if kind is Material:
-                    example_class = " such as Isotropic"
-                    remedy = ": give one, or a mapping of cell sets to materials"
-                raise ProblemError(
-                    f"Problem({name}=...) must be of type {kind.__name__}{example_class}, "
-                    f"not {type(getattr(self, name)).__name__}{remedy}."
-                )
-        if isinstance(self.handbook, ReferenceK):
-            object.__setattr__(self, "handbook", (self.handbook,))
-        for name in ("cracks", "supports", "loads", "handbook"):
-            given = getattr(self, name)
-            object.__setattr__(self, name, entries(given, f"Problem: {name}"))
+        super().__post_init__()
         material: Any = self.material
         material.check(self.mesh.dim)
         if not len(self.elasticity.set_number):
             warn_of_sets(self.mesh)
-        order = 1 if self.order is None else self.order
-        if type(order) is bool or not isinstance(order, Real) or order not in (1, 2):
-            raise ProblemError(f"order = {value_text(self.order)}: give 1 or 2.")
-        if not isinstance(self.contact, str) or self.contact not in ("auto", "on", "off"):
-            raise ProblemError(f'contact = {value_text(self.contact)}: give "auto", "on" or "off".')
         self._check_members()
-        friction_values = checked_friction(
+        friction_values = fitted_friction(
             self.friction, len(self.cracks), self.mesh.dim, self.numerics
         )
         object.__setattr__(self, "friction", friction_values)
@@ -280,26 +275,12 @@ class Problem:
         return sketch(self.mesh.points, self.mesh.boundary, cracks)
 
     def _check_members(self) -> None:
-        for crack in self.cracks:
-            if not isinstance(crack, Crack):
-                raise ProblemError(
-                    f"cracks: {value_text(crack)} is not a Crack; make one by line_crack(...)."
-                )
         for support in self.supports:
-            if not isinstance(support, Support):
-                raise ProblemError(
-                    f"supports: {value_text(support)} is not a support; give fix(...) or "
-                    "displacement(...), and put forces into loads."
-                )
             support.check_in(self.mesh)
         for load in self.loads:
-            self._check_load(load)
-        for known in self.handbook:
-            if not isinstance(known, ReferenceK):
-                raise ProblemError(
-                    f'handbook: {value_text(known)} is none: give handbook("edge", a=..., ...).'
-                )
-            known.check(self)
+            load.check(self)
+        for reference in self.handbook:
+            reference.check(self)
 
     def _check_load(self, load: Any) -> None:
         if not isinstance(load, Load):
@@ -307,6 +288,9 @@ class Problem:
                 f"loads: {value_text(load)} is not a load; see traction(...), pressure(...)."
             )
         load.check(self)
+
+
+ProblemArgument = Annotated[Problem, Part(Problem, "a Problem(mesh, material, ...)")]
 
 
 def check_problem(problem: Any, what: str) -> None:

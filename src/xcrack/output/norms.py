@@ -1,20 +1,27 @@
 """Errors of a solution against a known field."""
 
 from collections.abc import Callable
+from typing import Annotated
 
 import numpy as np
 
-from xcrack.analysis.solution import Solution
+from xcrack.analysis.solution import SolutionArgument
+from xcrack.base.arguments import Function, check_arguments
 from xcrack.base.arrays import Floats
-from xcrack.base.checks import call_function, numbers, value_text
+from xcrack.base.checks import call_function, numbers
 from xcrack.base.errors import ProblemError
 from xcrack.fem.loads import position
 from xcrack.fem.quadrature import cell_points
 
 _CHUNK = 20_000  # cells integrated at once; bounds the memory
+_STRESS = "a function f(x) of points (n, d) that returns (n, d, d)"
 
 
-def energy_error(solution: Solution, stress: Callable[[Floats], Floats]) -> float:
+@check_arguments()
+def energy_error(
+    solution: SolutionArgument,
+    stress: Annotated[Callable[[Floats], Floats], Function(_STRESS)],
+) -> float:
     """Relative error in the energy norm, integrated on the cut sub-cells.
 
     Parameters
@@ -31,18 +38,8 @@ def energy_error(solution: Solution, stress: Callable[[Floats], Floats]) -> floa
     Raises
     ------
     ProblemError
-        Not a solution, not a function, values of another shape or not finite, or an exact stress
-        that is zero everywhere.
+        Values of another shape or not finite, or an exact stress that is zero everywhere.
     """
-    if not isinstance(solution, Solution):
-        raise ProblemError(
-            f"energy_error: give a Solution as solve returns it, not {type(solution).__name__}."
-        )
-    if not callable(stress):
-        raise ProblemError(
-            f"energy_error: stress = {value_text(stress)} cannot be called: give a function f(x) "
-            f"of points (n, d) that returns (n, d, d)."
-        )
     space, elasticity = solution.space, solution.problem.elasticity
     error = total = 0.0
     for first in range(0, len(space.mesh.cells), _CHUNK):

@@ -1,22 +1,28 @@
 """How far a crack gapes, and how compliant it makes the body: what clip gauges measure."""
 
-from typing import Any
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
-from xcrack.analysis.solution import Solution
+from xcrack.analysis.solution import Solution, SolutionArgument
+from xcrack.base.arguments import Number, Points, check_arguments
 from xcrack.base.arrays import Floats
-from xcrack.base.checks import number, numbers, value_text
 from xcrack.base.errors import ProblemError
+from xcrack.base.units import FORCE
 from xcrack.crack.measures import measures
 from xcrack.model.problem import crack_number
 
 _NEAR = 1e-6  # of the body: points that lie on a crack
 
 
-def crack_opening(solution: Solution, x: ArrayLike | None = None, crack: int = 0) -> Floats:
+@check_arguments()
+def crack_opening(
+    solution: SolutionArgument,
+    x: Annotated[ArrayLike | None, Points()] = None,
+    crack: int = 0,
+) -> Floats:
     """Distance of the crack faces at points of a crack: CMOD at its mouth, COD elsewhere.
 
     Parameters
@@ -37,16 +43,12 @@ def crack_opening(solution: Solution, x: ArrayLike | None = None, crack: int = 0
         Points that do not lie on the crack; a crack without mouths, or one in 3D, where x is left
         out.
     """
-    if not isinstance(solution, Solution):
-        raise ProblemError(
-            f"crack_opening: solution = {value_text(solution)}: give what solve returns."
-        )
     c = crack_number(solution.problem, crack, "crack_opening")
     d = solution.space.dim
     if x is None:
         points, single = _mouths(solution, c), False
     else:
-        given = numbers(x, "crack_opening: x")
+        given = np.asarray(x)
         single, points = given.ndim == 1, np.atleast_2d(given)
         if points.ndim != 2 or points.shape[1] != d:
             raise ProblemError(
@@ -79,7 +81,11 @@ def _mouths(solution: Solution, c: int) -> Floats:
     return np.array([end.x for end in ends])
 
 
-def compliance(solution: Solution, force: Any) -> float:
+@check_arguments()
+def compliance(
+    solution: SolutionArgument,
+    force: Annotated[float, Number(unit=FORCE)],
+) -> float:
     """Displacement of the loads over their force, from the strain energy: 2 U / P².
 
     Parameters
@@ -96,7 +102,7 @@ def compliance(solution: Solution, force: Any) -> float:
     Raises
     ------
     ProblemError
-        No solution, a force that is 0, initial stress.
+        A force that is 0, initial stress.
 
     Notes
     -----
@@ -104,18 +110,13 @@ def compliance(solution: Solution, force: Any) -> float:
     forces act where the gap is zero). G = P²/2 dC/da (Irwin and Kies 1954) is G of
     `energy_release_rate` found another way: from two solutions instead of K.
     """
-    if not isinstance(solution, Solution):
-        raise ProblemError(
-            f"compliance: solution = {value_text(solution)}: give what solve returns."
-        )
-    P = number(force, "compliance: force")
-    if P == 0:
+    if force == 0:
         raise ProblemError("compliance: force = 0: give the force of this load state.")
     if any("initial_stress" in load.acts for load in solution.loads):
         raise ProblemError(
             "compliance: initial stress has energy without a force: leave it out of the problem."
         )
-    return float(2 * solution.energy / P / P)
+    return float(2 * solution.energy / force / force)
 
 
 __all__ = ["compliance", "crack_opening"]

@@ -5,16 +5,17 @@ VTK's own writers are used without pyvista: they need no renderer and no libGL.
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
-from xcrack.analysis.solution import Solution
+from xcrack.analysis.solution import Solution, SolutionArgument
+from xcrack.base.arguments import FileName, OneOrMore, check_arguments
 from xcrack.base.arrays import Floats, Ints
-from xcrack.base.checks import entries, value_text
+from xcrack.base.checks import value_text
 from xcrack.base.errors import ProblemError, XcrackError
 from xcrack.base.optional import require_package
-from xcrack.base.paths import path_of, system_errors, written_whole
+from xcrack.base.paths import system_errors, written_whole
 from xcrack.crack.measures import measures
 from xcrack.model.material import von_mises
 from xcrack.output.lip_faces_3d import lip_faces
@@ -33,8 +34,12 @@ _ORDER = {
 }
 
 
+@check_arguments()
 def write(
-    solution: Solution, path: str | Path, *, sif: SIF | Sequence[SIF] | None = None
+    solution: SolutionArgument,
+    path: FileName,
+    *,
+    sif: Annotated[SIF | Sequence[SIF] | None, OneOrMore(SIF)] = None,
 ) -> list[Path]:
     """Write a solution for ParaView: ``<path>.vtu`` and, for its cracks, ``<path>_lips.vtp``.
 
@@ -77,17 +82,13 @@ def write(
     Raises
     ------
     ProblemError
-        Arguments of another type, a path that ends on the suffix of another kind of VTK file, not
+        A path that ends on the suffix of another kind of VTK file, not
         one SIF for each crack, or a file that cannot be written.
     XcrackError
         VTK is not installed.
     """
-    if not isinstance(solution, Solution):
-        raise ProblemError(
-            f"write: give a Solution as solve returns it, not {type(solution).__name__}."
-        )
     K = _checked_sif(solution, sif)
-    target = _grid_path(path)
+    target = _grid_path(Path(path))
     _write_grid(pieces(solution), target)
     if not any(len(lips) for lips in solution.lips):
         return [target]
@@ -106,9 +107,9 @@ def write(
 def _checked_sif(solution: Solution, sif: Any) -> tuple[SIF, ...]:
     if sif is None:
         return ()
-    K = (sif,) if isinstance(sif, SIF) else entries(sif, "write: sif")
+    K: tuple[SIF, ...] = sif
     n = len(solution.lips)
-    if len(K) != n or not all(isinstance(one, SIF) for one in K):
+    if len(K) != n:
         raise ProblemError(
             f"write: sif = {value_text(sif)}: give one SIF for each of the {n} crack(s)."
         )
@@ -125,8 +126,7 @@ def _checked_sif(solution: Solution, sif: Any) -> tuple[SIF, ...]:
     return K
 
 
-def _grid_path(path: Any) -> Path:
-    target = path_of(path, "write: path", error=ProblemError)
+def _grid_path(target: Path) -> Path:
     if target.suffix in (".vtp", ".vtk", ".pvd", ".vtm") or target.name in ("", ".."):
         raise ProblemError(
             f"write: path = {value_text(str(target))}: the grid is a .vtu file; give that ending."

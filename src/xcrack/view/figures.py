@@ -3,14 +3,17 @@
 from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
-from xcrack.base.checks import flag, value_text
+from xcrack.base.arguments import FileName, Text, check_arguments
+from xcrack.base.checks import value_text
 from xcrack.base.errors import ProblemError
 from xcrack.base.optional import in_notebook, require_package
 from xcrack.base.paths import path_of, system_errors, written_whole
 
 _UNSAVED = "the picture cannot be written to"
+
+Title = Annotated[str | None, Text("a text, or leave it out", may_be_empty=True)]
 
 
 def new_figure(size: tuple[float, float], window: bool, caller: str) -> Any:
@@ -118,33 +121,6 @@ def picture_path(file: Any, caller: str) -> Path | None:
     return path
 
 
-def wants_window(show: Any, file: Path | None, caller: str) -> bool:
-    """Whether to open a window: as asked for, or where there is no file.
-
-    Parameters
-    ----------
-    show : bool or None
-    file : Path or None
-    caller : str
-        Name of the function, for messages.
-    """
-    return file is None if show is None else flag(show, f"{caller}: show")
-
-
-def checked_title(title: Any, caller: str) -> str | None:
-    """A title, or None.
-
-    Parameters
-    ----------
-    title : str or None
-    caller : str
-        Name of the function, for messages.
-    """
-    if not isinstance(title, str | None):
-        raise ProblemError(f"{caller}: title = {value_text(title)}: give a text, or leave it out.")
-    return title
-
-
 def _png(figure: Any) -> bytes:
     buffer = BytesIO()
     figure.savefig(buffer, format="png", dpi=100)
@@ -172,9 +148,10 @@ class Picture:
     def _repr_png_(self) -> bytes:
         return self.data
 
-    def save(self, file: str | Path) -> Path:
+    @check_arguments()
+    def save(self, file: FileName) -> Path:
         """Write the picture to a PNG file."""
-        path = path_of(file, "save: file", error=ProblemError)
+        path = Path(file)
         with written_whole(path, "the picture cannot be written to", error=ProblemError) as part:
             part.write_bytes(self.data)
         return path
@@ -190,10 +167,9 @@ def picture_of(plotter: Any) -> Picture:
 
 __all__ = [
     "Picture",
-    "checked_title",
+    "Title",
     "finish_figure",
     "new_figure",
     "picture_of",
     "picture_path",
-    "wants_window",
 ]

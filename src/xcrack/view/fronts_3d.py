@@ -6,14 +6,25 @@ By matplotlib, without a renderer; for one run or one state, or for several side
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from xcrack.base.arguments import (
+    CheckedBy,
+    FileName,
+    OneOrMore,
+    Part,
+    SomeOf,
+    Switch,
+    Whole,
+    check_arguments,
+)
 from xcrack.base.arrays import Bools, Floats
-from xcrack.base.checks import entries, value_text, whole_number
+from xcrack.base.checks import value_text
 from xcrack.base.errors import ProblemError
+from xcrack.base.units import LENGTH
 from xcrack.crack.measures import front_ends
 from xcrack.crack.stations import closed_fronts, is_closed
 from xcrack.growth.step import Step, numbers_after
@@ -22,15 +33,15 @@ from xcrack.mesh.mesh import Mesh
 from xcrack.runs.history import History
 from xcrack.sif.sif import SIF
 from xcrack.view.figures import (
-    checked_title,
+    Title,
     finish_figure,
     new_figure,
     picture_path,
-    wants_window,
 )
 from xcrack.view.projection import Projection, best_plane, given_plane, on_plane, section_outline
 
 _MODES = ("I", "II", "III")
+_Labels = Annotated[Sequence[str] | None, OneOrMore(str, "a text")]
 _NOISE = 0.1  # share of the largest K that a panel reaches at least: noise should not fill it
 
 
@@ -52,17 +63,20 @@ class FrontLine:
     number: int
 
 
+@check_arguments()
 def draw_fronts(
-    history: History | Sequence[History],
+    history: Annotated[History | Sequence[History], OneOrMore(History)],
     *,
-    crack: int = 0,
-    plane: tuple[ArrayLike, Sequence[ArrayLike]] | None = None,
-    labels: Sequence[str] | None = None,
-    every: int = 1,
-    mesh: Mesh | None = None,
-    file: str | Path | None = None,
-    show: bool | None = None,
-    title: str | None = None,
+    crack: Annotated[int, Whole(least=0)] = 0,
+    plane: Annotated[
+        tuple[ArrayLike, Sequence[ArrayLike]] | None, CheckedBy(given_plane, unit=LENGTH)
+    ] = None,
+    labels: _Labels = None,
+    every: Annotated[int, Whole(least=1)] = 1,
+    mesh: Annotated[Mesh | None, Part(Mesh)] = None,
+    file: FileName | None = None,
+    show: Switch | None = None,
+    title: Title = None,
 ) -> Any:
     """Draw the fronts of growth runs over the section of the body.
 
@@ -95,37 +109,34 @@ def draw_fronts(
     Raises
     ------
     ProblemError
-        Arguments of another type, no steps, no such crack, a 2D crack, labels of another number, a
+        No steps, no such crack, a 2D crack, labels of another number, a
         file that cannot be written.
     """
-    runs = _list_of_values(history, History, "draw_fronts: history")
+    runs = cast(tuple[History, ...], history)
     names = _names(labels, len(runs), "draw_fronts")
-    crack = whole_number(crack, "draw_fronts: crack", least=0)
-    every = whole_number(every, "draw_fronts: every", least=1)
-    if not isinstance(mesh, Mesh | None):
-        raise ProblemError(f"draw_fronts: mesh = {value_text(mesh)}: give a Mesh, or leave it out.")
     for run in runs:
         _check(run.steps, crack)
-    view = None if plane is None else given_plane(plane)
-    heading = checked_title(title, "draw_fronts")
     target = picture_path(file, "draw_fronts")
-    window = wants_window(show, target, "draw_fronts")
+    window = target is None if show is None else show
     figure = new_figure((6.4, 5.6), window, "draw_fronts")
     axes = figure.add_subplot()
     body = mesh if mesh is not None else next((r.mesh for r in runs if r.mesh is not None), None)
-    front_axes(axes, [run.steps for run in runs], crack, view, body, names, every)
-    return _finish(figure, axes, target, window, heading)
+    front_axes(
+        axes, [run.steps for run in runs], crack, cast(Projection | None, plane), body, names, every
+    )
+    return _finish(figure, axes, target, window, title)
 
 
+@check_arguments()
 def draw_K(
-    sif: SIF | Sequence[SIF],
+    sif: Annotated[SIF | Sequence[SIF], OneOrMore(SIF)],
     *,
-    front: int = 0,
-    labels: Sequence[str] | None = None,
-    modes: Sequence[str] = _MODES,
-    file: str | Path | None = None,
-    show: bool | None = None,
-    title: str | None = None,
+    front: Annotated[int, Whole(least=0)] = 0,
+    labels: _Labels = None,
+    modes: Annotated[Sequence[str], SomeOf(_MODES)] = _MODES,
+    file: FileName | None = None,
+    show: Switch | None = None,
+    title: Title = None,
 ) -> Any:
     """Draw K_I, K_II and K_III along a front over its arc length, from 0 to 1.
 
@@ -155,16 +166,10 @@ def draw_K(
     Raises
     ------
     ProblemError
-        Arguments of another type, no such front or mode, K of a 2D crack, labels of another
-        number, a file that cannot be written.
+        No such front, K of a 2D crack, labels of another number, a file that cannot be written.
     """
-    every = _list_of_values(sif, SIF, "draw_K: sif")
+    every = cast(tuple[SIF, ...], sif)
     names = _names(labels, len(every), "draw_K")
-    front = whole_number(front, "draw_K: front", least=0)
-    modes = (modes,) if isinstance(modes, str) else entries(modes, "draw_K: modes")
-    if not modes or not all(isinstance(mode, str) and mode in _MODES for mode in modes):
-        raise ProblemError(f'draw_K: modes = {value_text(modes)}: give some of "I", "II", "III".')
-    heading = checked_title(title, "draw_K")
     for one in every:
         if one.K.shape[1] < 3 or not (one.front == front).any():
             front_numbers = sorted({int(f) for f in one.front}) if one.K.shape[1] > 2 else []
@@ -173,7 +178,7 @@ def draw_K(
                 f"read sif.K."
             )
     target = picture_path(file, "draw_K")
-    window = wants_window(show, target, "draw_K")
+    window = target is None if show is None else show
     figure = new_figure((6.4, 0.8 + 2.0 * len(modes)), window, "draw_K")
     panels = figure.subplots(len(modes), 1, squeeze=False, sharex=True)[:, 0]
     largest = max(float(np.abs(one.K[one.front == front]).max()) for one in every)
@@ -202,7 +207,7 @@ def draw_K(
             fontsize="small",
             frameon=False,
         )
-    return _finish(figure, panels[0], target, window, heading)
+    return _finish(figure, panels[0], target, window, title)
 
 
 def front_axes(
@@ -383,21 +388,11 @@ def _check(steps: Sequence[Step], crack: int) -> None:
         raise ProblemError('draw_fronts: only 3D cracks have fronts; in 2D plot "path".')
 
 
-def _list_of_values(value: Any, kind: type, what: str) -> list[Any]:
-    """One value or several, checked."""
-    every = [value] if isinstance(value, kind) else list(entries(value, what))
-    if not every or not all(isinstance(one, kind) for one in every):
-        raise ProblemError(
-            f"{what} = {value_text(value)}: give a {kind.__name__}, or a list of at least one."
-        )
-    return every
-
-
 def _names(labels: Any, n: int, caller: str) -> list[str]:
     if labels is None:
         return [""] * n if n == 1 else [str(k) for k in range(n)]
-    names = (labels,) if isinstance(labels, str) else entries(labels, f"{caller}: labels")
-    if len(names) != n or not all(isinstance(name, str) for name in names):
+    names: tuple[str, ...] = labels
+    if len(names) != n:
         raise ProblemError(
             f"{caller}: labels = {value_text(labels)} for {n} curve(s): give a text for each."
         )

@@ -4,48 +4,76 @@ import os
 import sys
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, cast
 
 import numpy as np
 
 from xcrack.analysis.plan import Report
 from xcrack.analysis.solution import Solution
+from xcrack.base.arguments import (
+    CheckedBy,
+    Choice,
+    Direction,
+    FileName,
+    Interval,
+    Number,
+    Part,
+    Switch,
+    Text,
+    check_arguments,
+)
 from xcrack.base.arrays import Floats, lock
-from xcrack.base.checks import flag, number, numbers, one_of, value_text
+from xcrack.base.checks import one_of, value_text
 from xcrack.base.errors import ProblemError, XcrackError
 from xcrack.base.optional import in_notebook, require_package
+from xcrack.base.units import LENGTH
 from xcrack.fem.system import discretise
 from xcrack.linalg.engine import SolverState
 from xcrack.model.problem import Problem, crack_number, scaled_state
-from xcrack.view.figures import checked_title, picture_path
+from xcrack.view.figures import Title, picture_path
 from xcrack.view.pyvista_2d import RASTER
 from xcrack.view.scene_2d import FIELDS, SPACE_FIELDS, scene
-from xcrack.view.scene_3d import LIP_FIELDS, clip_plane, direction
+from xcrack.view.scene_3d import LIP_FIELDS, clip_plane
 from xcrack.view.section_3d import Plane
 
 _GRAPHS = ("pressure", "opening")
 _KNOWN = {2: (*FIELDS, "mesh", *_GRAPHS), 3: (*SPACE_FIELDS, "mesh", *LIP_FIELDS)}
 _ON_LIPS = {*_GRAPHS, *LIP_FIELDS}
+_DRAWABLE = 'a Solution, or a Problem with field="mesh"'
 _NO_OPENGL = "it cannot draw here (no OpenGL): apt-get install libegl1 libgl1-mesa-dri"
 
 
+def colour_map(value: Any, what: str, error: type[XcrackError]) -> Any:
+    """A colour map of matplotlib, or its name, checked."""
+    matplotlib = require_package("matplotlib", "plot: cmap")
+    if isinstance(value, str) and value in matplotlib.colormaps:
+        return value
+    if isinstance(value, require_package("matplotlib.colors", "plot: cmap").Colormap):
+        return value
+    raise error(
+        f"{what} = {value_text(value)}: give the name of a colour map of matplotlib, such as "
+        '"RdBu".'
+    )
+
+
+@check_arguments()
 def plot(
-    solution: Solution | Problem,
-    field: str = "von_mises",
+    solution: Annotated[Solution | Problem, Part((Solution, Problem), _DRAWABLE)],
+    field: Annotated[str, Text("the name of a field")] = "von_mises",
     *,
-    file: str | Path | None = None,
-    warp: float = 0.0,
-    show: bool | None = None,
-    renderer: str = "auto",
-    title: str | None = None,
-    edges: bool = False,
-    limits: tuple[float, float] | None = None,
-    cmap: str | None = None,
+    file: FileName | None = None,
+    warp: Annotated[float, Number()] = 0.0,
+    show: Switch | None = None,
+    renderer: Annotated[str, Choice(("auto", "pyvista", "matplotlib"))] = "auto",
+    title: Title = None,
+    edges: Switch = False,
+    limits: Annotated[tuple[float, float] | None, Interval()] = None,
+    cmap: Annotated[Any, CheckedBy(colour_map)] = None,
     crack: int | None = None,
-    clip: tuple[Any, Any] | None = None,
-    view: Any = None,
-    loads: bool = False,
-    zoom: float | None = None,
+    clip: Annotated[tuple[Any, Any] | None, CheckedBy(clip_plane, unit=LENGTH)] = None,
+    view: Annotated[Any, Direction("the direction from the body to the viewer, (x, y, z)")] = None,
+    loads: Switch = False,
+    zoom: Annotated[float | None, Number(above=0)] = None,
 ) -> Any:
     """Draw a solution, or the mesh and the cracks of a problem.
 
@@ -98,30 +126,27 @@ def plot(
     Raises
     ------
     ProblemError
-        Arguments of another type, an unknown field or renderer, a crack that does not exist, a
-        renderer that cannot draw, a plane that leaves nothing, a file that cannot be written.
+        A field of another dimension, a crack that does not exist, a renderer that cannot draw, a
+        plane that leaves nothing, a file that cannot be written.
     XcrackError
         The renderer that was asked for is not installed.
     """
     solution = _drawable(solution, field)
     field = one_of(field, "plot: field", _KNOWN[solution.space.dim])
-    one_of(renderer, "plot: renderer", ("auto", "pyvista", "matplotlib"))
     look = PlotStyle(
-        warp=number(warp, "plot: warp"),
-        title=checked_title(title, "plot"),
-        edges=flag(edges, "plot: edges"),
-        limits=_limits(limits),
-        cmap=_colour_map(cmap),
+        warp=warp,
+        title=title,
+        edges=edges,
+        limits=limits,
+        cmap=cmap,
         crack=None if crack is None else crack_number(solution.problem, crack, "plot"),
-        plane=clip_plane(clip),
-        view=direction(view),
-        loads=flag(loads, "plot: loads"),
+        plane=cast(Plane | None, clip),
+        view=view,
+        loads=loads,
         near=None,
     )
     if zoom is not None:
         look = replace(look, near=crack_box(solution, look.cracks(solution), zoom, look.warp))
-    if show is not None:
-        show = flag(show, "plot: show")
     if field in _ON_LIPS and not solution.lips:
         raise ProblemError(f'plot(field="{field}"): the body has no crack; draw another field.')
     target = picture_path(file, "plot")
@@ -242,7 +267,7 @@ def _draw_3d(
     return draw_space(picture, arrows, target, window, look.title, edges, colours)
 
 
-def crack_box(solution: Solution, cracks: list[int], zoom: Any, warp: float = 0.0) -> Floats:
+def crack_box(solution: Solution, cracks: list[int], zoom: float, warp: float = 0.0) -> Floats:
     """Box around cracks where a warp takes them, `zoom` times as large as they are `(2, d)`.
 
     Parameters
@@ -254,29 +279,24 @@ def crack_box(solution: Solution, cracks: list[int], zoom: Any, warp: float = 0.
     Raises
     ------
     ProblemError
-        No crack, or a zoom that is not positive.
+        No crack.
     """
-    factor = number(zoom, "plot: zoom", above=0)
     if not cracks:
         raise ProblemError("plot(zoom=): the body has no crack to zoom to; leave zoom out.")
     x = np.concatenate([solution.lips[c].x for c in cracks])
     if warp:
         x = x + 0.5 * warp * (solution.displacement(x, 1) + solution.displacement(x, -1))
     low, high = x.min(axis=0), x.max(axis=0)
-    half = factor * max(float((high - low).max()), 1e-300) / 2
+    half = zoom * max(float((high - low).max()), 1e-300) / 2
     middle = (low + high) / 2
     return np.stack([middle - half, middle + half])
 
 
-def _drawable(given: Any, field: Any) -> Solution:
+def _drawable(given: Solution | Problem, field: str) -> Solution:
     """The solution, or that of a problem in which nothing acts, to draw its mesh and cracks."""
     if isinstance(given, Solution):
         return given
-    if not isinstance(given, Problem):
-        raise ProblemError(
-            f'plot: give a Solution, or a Problem with field="mesh", not {type(given).__name__}.'
-        )
-    if not (isinstance(field, str) and field == "mesh"):
+    if field != "mesh":
         raise ProblemError(
             f"plot: a Problem has no field {value_text(field)}: give what solve returns, or "
             'field="mesh".'
@@ -293,29 +313,6 @@ def _drawable(given: Any, field: Any) -> Solution:
         energy=0.0,
         summary=Report((), {}),
         reuse=SolverState(),
-    )
-
-
-def _limits(limits: Any) -> tuple[float, float] | None:
-    if limits is None:
-        return None
-    low, high = numbers(limits, "plot: limits", (2,)).tolist()
-    if not low < high:
-        raise ProblemError(f"plot: limits = {value_text(limits)}: give the lower one first.")
-    return low, high
-
-
-def _colour_map(cmap: Any) -> Any:
-    if cmap is None:
-        return None
-    matplotlib = require_package("matplotlib", "plot: cmap")
-    if isinstance(cmap, str) and cmap in matplotlib.colormaps:
-        return cmap
-    if isinstance(cmap, require_package("matplotlib.colors", "plot: cmap").Colormap):
-        return cmap
-    raise ProblemError(
-        f"plot: cmap = {value_text(cmap)}: give the name of a colour map of matplotlib, such as "
-        f'"RdBu".'
     )
 
 

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 
 from xcrack.base.arrays import Floats, lock
 from xcrack.base.checks import numbers, value_text
-from xcrack.base.errors import ProblemError
+from xcrack.base.errors import ProblemError, XcrackError
 from xcrack.mesh.mesh import Mesh
 from xcrack.mesh.simplex import interface_simplices
 from xcrack.output.curved_sides import CurvedSides
@@ -44,25 +44,15 @@ class Projection:
         return ("" if value > 0 else "-") + "xyz"[axis]
 
 
-def given_plane(plane: Any) -> Projection:
-    """A plane by a point and two directions; the second is made perpendicular to the first.
+def given_plane(
+    value: Any, what: str = "plane", error: type[XcrackError] = ProblemError
+) -> Projection:
+    """A plane by a point and two directions, checked.
 
-    Parameters
-    ----------
-    plane : (origin, (right, up))
-        The point, which is drawn at (0, 0), and the directions to the right and up.
-
-    Returns
-    -------
-    Projection
-
-    Raises
-    ------
-    ProblemError
-        Not a point and two directions that span a plane.
+    The point is drawn at (0, 0); the second direction is made perpendicular to the first.
     """
     try:
-        origin, axes = plane
+        origin, axes = value
         x, two = numbers(origin, "origin", (3,)), numbers(axes, "directions", (2, 3))
         lengths = np.linalg.norm(two, axis=1, keepdims=True)
         right, second = two / np.where((lengths > 0) & np.isfinite(lengths), lengths, np.inf)
@@ -73,10 +63,10 @@ def given_plane(plane: Any) -> Projection:
         reason = "the two directions are parallel, or one is zero"
     except (TypeError, ValueError):
         reason = "that is no pair"
-    except ProblemError as error:
-        reason = str(error)[:-1]
-    raise ProblemError(
-        f"plane = {value_text(plane)}: give a point and two directions, ((x, y, z), (right, up)); "
+    except ProblemError as cause:
+        reason = str(cause)[:-1]
+    raise error(
+        f"{what} = {value_text(value)}: give a point and two directions, ((x, y, z), (right, up)); "
         f"{reason}."
     )
 

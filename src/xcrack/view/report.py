@@ -6,14 +6,16 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 from numpy.typing import NDArray
 
-from xcrack.base.checks import number, value_text
+from xcrack.base.arguments import FilePath, Number, Part, Text, check_arguments
+from xcrack.base.checks import value_text
 from xcrack.base.errors import ProblemError, XcrackError, warn
 from xcrack.base.markup import Markup, element, join_parts, list_markup, page
-from xcrack.base.paths import path_of, write_texts
+from xcrack.base.paths import write_texts
+from xcrack.base.units import STRESS
 from xcrack.fatigue.spectrum import Spectrum
 from xcrack.runs.inspection import Inspection
 from xcrack.runs.life import Life
@@ -31,17 +33,18 @@ from xcrack.view.view_3d import history_layers, packed_layers, solution_layers
 _FORMAT = 1
 
 
+@check_arguments()
 def report(
     result: Any,
-    file: str | PathLike[str],
+    file: Annotated[str | PathLike[str], FilePath(is_file=True)],
     *,
-    title: str = "",
-    yield_stress: float | None = None,
-    life: Life | None = None,
-    inspection: Inspection | None = None,
+    title: Annotated[str, Text(may_be_empty=True)] = "",
+    yield_stress: Annotated[float | None, Number(above=0, unit=STRESS)] = None,
+    life: Annotated[Life | None, Part(Life, "what xc.life returns")] = None,
+    inspection: Annotated[Inspection | None, Part(Inspection, "what xc.inspection returns")] = None,
     strength: NDArray[Any] | None = None,
-    spectrum: Spectrum | None = None,
-    units: str | None = None,
+    spectrum: Annotated[Spectrum | None, Part(Spectrum, "a Spectrum")] = None,
+    units: Annotated[str | None, Text('the units of length and K, such as "mm, MPa√mm"')] = None,
 ) -> Path:
     """Write what was modelled and what came out, as one page that needs no network.
 
@@ -80,20 +83,10 @@ def report(
     Raises
     ------
     ProblemError
-        Something else than these, no run in the folder, or a file that cannot be written.
+        No run in the folder, or a file that cannot be written.
     """
-    path = path_of(file, "report: file", error=ProblemError, is_file=True)
+    path = Path(file)
     path = path if path.suffix else path.with_name(path.name + ".html")
-    if not isinstance(title, str):
-        raise ProblemError(f"report: title = {value_text(title)}: give a text.")
-    if yield_stress is not None:
-        yield_stress = number(yield_stress, "report: yield_stress", above=0)
-    if not isinstance(life, Life | None):
-        raise ProblemError(f"report: life = {value_text(life)}: give what xc.life returns.")
-    if not isinstance(inspection, Inspection | None):
-        raise ProblemError(
-            f"report: inspection = {value_text(inspection)}: give what xc.inspection returns."
-        )
     names = getattr(getattr(strength, "dtype", None), "names", None) or ()
     if strength is not None and not {"step", "by_toughness"} <= set(names):
         raise ProblemError(

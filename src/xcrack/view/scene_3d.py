@@ -8,7 +8,7 @@ import numpy as np
 from xcrack.analysis.solution import Solution
 from xcrack.base.arrays import Bools, Floats, Ints
 from xcrack.base.checks import numbers, value_text
-from xcrack.base.errors import ProblemError
+from xcrack.base.errors import ProblemError, XcrackError
 from xcrack.mesh.mesh import Mesh
 from xcrack.model.loads import FacetPoints
 from xcrack.output.curved_sides import CurvedSides
@@ -120,12 +120,10 @@ class SpaceScene:
         return np.concatenate([part.reshape(-1, 3) for part in parts])
 
 
-def clip_plane(clip: Any) -> Plane | None:
-    """Point and unit normal of a plane, as the user gave them."""
-    if clip is None:
-        return None
+def clip_plane(value: Any, what: str = "clip", error: type[XcrackError] = ProblemError) -> Plane:
+    """Point and unit normal of a plane, checked."""
     try:
-        point, normal = clip
+        point, normal = value
         x, n = numbers(point, "point", (3,)), numbers(normal, "normal", (3,))
         length = float(np.linalg.norm(n))
         if 0 < length < np.inf:
@@ -133,26 +131,12 @@ def clip_plane(clip: Any) -> Plane | None:
         reason = "the normal has no direction"
     except (TypeError, ValueError):
         reason = "that is no pair"
-    except ProblemError as error:
-        reason = str(error)[:-1]
-    raise ProblemError(
-        f"plot: clip = {value_text(clip)}: give a point and a normal, ((x, y, z), (nx, ny, nz)); "
+    except ProblemError as cause:
+        reason = str(cause)[:-1]
+    raise error(
+        f"{what} = {value_text(value)}: give a point and a normal, ((x, y, z), (nx, ny, nz)); "
         f"what lies on the side of the normal is left out. Here {reason}."
     )
-
-
-def direction(view: Any) -> Floats | None:
-    """Unit vector from the body to the viewer, as the user gave it."""
-    if view is None:
-        return None
-    v = numbers(view, "plot: view, the direction to the viewer", (3,))
-    length = float(np.linalg.norm(v))
-    if not 0 < length < np.inf:
-        raise ProblemError(
-            f"plot: view = {value_text(view)} has no direction: give that from the body to the "
-            f"viewer, (x, y, z)."
-        )
-    return np.asarray(v / length)
 
 
 def space_scene(
@@ -503,7 +487,6 @@ __all__ = [
     "SpaceScene",
     "clip_plane",
     "crack_scene",
-    "direction",
     "is_coloured",
     "lip_values",
     "load_arrows",

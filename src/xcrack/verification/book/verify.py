@@ -4,22 +4,23 @@ import json
 import sys
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
-from xcrack.base.checks import flag, value_text
+from xcrack.base.arguments import FilePath, Switch, Text, check_arguments
 from xcrack.base.errors import ProblemError
-from xcrack.base.paths import path_of, write_texts
+from xcrack.base.paths import write_texts
 from xcrack.runs.versions import versions
 from xcrack.verification.book.page import book_page
 from xcrack.verification.book.run import Book, Result, chosen, line_of, run_cases
 
 
+@check_arguments()
 def verify(
-    only: str = "",
+    only: Annotated[str, Text("a part of the name of a case", may_be_empty=True)] = "",
     *,
-    quick: bool = False,
-    file: str | PathLike[str] | None = None,
-    progress: bool = True,
+    quick: Switch = False,
+    file: Annotated[str | PathLike[str] | None, FilePath(is_file=True)] = None,
+    progress: Switch = True,
 ) -> Book:
     """Compare this installation with exact solutions, published tables and other programs.
 
@@ -50,19 +51,14 @@ def verify(
     >>> xc.verify("cycle-rule", quick=True, progress=False).passed
     True
     """
-    if not isinstance(only, str):
-        raise ProblemError(f"verify: only = {value_text(only)}: give a part of the name of a case.")
-    for name, value in (("quick", quick), ("progress", progress)):
-        flag(value, f"verify: {name}")
-    path = None if file is None else path_of(file, "verify: file", error=ProblemError, is_file=True)
 
     def after(result: Result) -> None:
         if progress:
             print(line_of(result), file=sys.stderr, flush=True)
 
     book = run_cases(chosen(only, quick=quick), quick=quick, after=after)
-    if path is not None:
-        write_book(book, path)
+    if file is not None:
+        write_book(book, Path(file))
     return book
 
 

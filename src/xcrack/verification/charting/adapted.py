@@ -35,12 +35,27 @@ class ToleranceRun:
     failed: str = ""
 
 
-def wanted_of(given: Sequence[float] | None, problem: Problem, varied: bool) -> tuple[float, ...]:
-    """Tolerances to run, from large to small.
+def chart_tolerances(value: Any, what: str, error: type[XcrackError]) -> tuple[float, ...]:
+    """Tolerances of `adapt`, checked, from large to small."""
+    given = {
+        number(one, f"{what}[{k}]", above=0, below=1, error=error)
+        for k, one in enumerate(entries(value, what, error=error))
+    }
+    if not given:
+        raise error(f"{what} is empty: give numbers between 0 and 1, or leave it out.")
+    if min(given) < _STRONGEST:
+        raise error(f"{what}: {min(given):g} is too small: give {_STRONGEST:g} or more.")
+    return tuple(sorted(given, reverse=True))
+
+
+def tolerances_to_run(
+    tolerances: Sequence[float] | None, problem: Problem, varied: bool
+) -> tuple[float, ...]:
+    """Tolerances of a chart, from large to small.
 
     Parameters
     ----------
-    given : sequence of float, or None
+    tolerances : sequence of float, or None
     problem : Problem
     varied : bool
         Whether settings are those that a chart takes by itself.
@@ -48,17 +63,14 @@ def wanted_of(given: Sequence[float] | None, problem: Problem, varied: bool) -> 
     Raises
     ------
     ProblemError
-        No numbers between 0 and 1, or no K to adapt to.
+        There is no K to adapt to.
     """
     tips = any(crack.n_tips for crack in problem.placed)
-    if given is None:
+    if tolerances is None:
         return _TOLERANCES[problem.mesh.dim] if varied and tips else ()
-    values = {number(t, "chart: tolerance", above=0, below=1) for t in entries(given, "tolerances")}
-    if min(values) < _STRONGEST:
-        raise ProblemError(f"chart: tolerance = {min(values):g}: give {_STRONGEST:g} or more.")
     if not tips:
         raise ProblemError("chart: tolerances are those of K, and no crack has a tip in the body.")
-    return tuple(sorted(values, reverse=True))
+    return tuple(tolerances)
 
 
 def adapted_runs(
@@ -131,4 +143,4 @@ def row_of(run: ToleranceRun, places: Sampled, reference: Floats, scale: float) 
     )
 
 
-__all__ = ["ToleranceRun", "adapted_runs", "row_of", "wanted_of"]
+__all__ = ["ToleranceRun", "adapted_runs", "chart_tolerances", "row_of", "tolerances_to_run"]

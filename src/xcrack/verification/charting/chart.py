@@ -5,26 +5,41 @@ import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from pathlib import Path
 from time import perf_counter
-from typing import Any
+from typing import Annotated, Any, cast
 
 import numpy as np
 
 from xcrack.analysis.solution import Solution
 from xcrack.analysis.solve import solve
+from xcrack.base.arguments import (
+    CheckedBy,
+    FileName,
+    Function,
+    Items,
+    Number,
+    Progress,
+    Whole,
+    check_arguments,
+)
 from xcrack.base.arrays import Floats, lock
-from xcrack.base.checks import call_function, entries, flag, number, value_text, whole_number
+from xcrack.base.checks import call_function
 from xcrack.base.errors import ProblemError, XcrackError
-from xcrack.base.paths import path_of
 from xcrack.mesh.mesh import Mesh
 from xcrack.mesh.refinement import refine
-from xcrack.model.problem import Problem, check_problem
-from xcrack.verification.charting.adapted import ToleranceRun, adapted_runs, row_of, wanted_of
+from xcrack.model.problem import Problem, ProblemArgument
+from xcrack.verification.charting.adapted import (
+    ToleranceRun,
+    adapted_runs,
+    chart_tolerances,
+    row_of,
+    tolerances_to_run,
+)
 from xcrack.verification.charting.meshes import checked_meshes, made, mean_size, smallest
-from xcrack.verification.charting.result import Chart, ChartRow, checked_error
+from xcrack.verification.charting.result import Chart, ChartRow, WantedError
 from xcrack.verification.charting.settings import (
     IN_PROBLEM,
+    Named,
     default_settings,
     named_settings,
     with_lengths,
@@ -42,19 +57,20 @@ _MOST_UNKNOWNS = {2: 200_000, 3: 300_000}
 _DEARER = {2: 5.0, 3: 10.0}
 
 
+@check_arguments()
 def chart(
-    problem: Problem,
-    settings: Settings | None = None,
+    problem: ProblemArgument,
+    settings: Annotated[Settings | None, CheckedBy(named_settings)] = None,
     *,
     meshes: Meshes | None = None,
-    states: Sequence[Any] | None = None,
-    quantity: Quantity | None = None,
-    tolerances: Sequence[float] | None = None,
-    wanted: float | None = None,
-    repeat: int = 3,
-    seconds: float = 60.0,
-    file: str | Path | None = None,
-    progress: bool | str = True,
+    states: Annotated[Sequence[Any] | None, Items()] = None,
+    quantity: Annotated[Quantity | None, Function("a function of the solution")] = None,
+    tolerances: Annotated[Sequence[float] | None, CheckedBy(chart_tolerances)] = None,
+    wanted: WantedError = None,
+    repeat: Annotated[int, Whole(least=1, most=1000)] = 3,
+    seconds: Annotated[float, Number(above=0)] = 60.0,
+    file: FileName | None = None,
+    progress: Annotated[bool | str, Progress()] = True,
 ) -> Chart:
     """Run a scene over some settings and meshes, and chart its error against its time.
 
@@ -118,25 +134,10 @@ def chart(
     >>> sorted({row.setting for row in chart.rows})
     ['as given', 'order 1']
     """
-    check_problem(problem, "chart")
-    named = default_settings(problem) if settings is None else named_settings(settings)
-    if wanted is not None:
-        wanted = checked_error(wanted)
-    repeat = whole_number(repeat, "chart: repeat", least=1, most=1000)
-    seconds = number(seconds, "chart: seconds", above=0)
-    if quantity is not None and not callable(quantity):
-        raise ProblemError(
-            f"chart: quantity = {value_text(quantity)}: give a function of the solution."
-        )
-    if states is not None:
-        states = entries(states, "chart: states")
-        for state in states:
-            problem.state(state)
-    if not (isinstance(progress, str) and progress == "always"):
-        flag(progress, 'chart: progress, if it is not "always",')
-    if file is not None:
-        path_of(file, "chart: file", error=ProblemError)
-    aims = wanted_of(tolerances, problem, settings is None)
+    named = cast(Named, settings) if settings is not None else default_settings(problem)
+    for state in states or ():
+        problem.state(state)
+    aims = tolerances_to_run(tolerances, problem, settings is None)
     runs = _Runs(problem, named, states, quantity, progress)
     every = _meshes(runs, meshes, repeat, seconds)
     outcomes = _timed(runs, every, repeat)

@@ -1,19 +1,19 @@
 """The picture of a chart: error against time."""
 
-from pathlib import Path
+from os import PathLike
 from typing import Any
 
 import numpy as np
 
 from xcrack.verification.charting.result import Chart, ChartRow
-from xcrack.view.figures import finish_figure, new_figure, picture_path, wants_window
+from xcrack.view.figures import finish_figure, new_figure, picture_path
 
 _MARKERS = "osD^vP"
 _OWN = "X"  # a mesh that a run has made for itself
 _BELOW = 0.5  # the picture ends at this share of the error of the reference
 
 
-def draw(chart: Chart, file: str | Path | None, show: bool | None) -> Any:
+def draw(chart: Chart, file: str | PathLike[str] | None, show: bool | None) -> Any:
     """Draw a chart; returns the figure, or the path of the file where there is one.
 
     Parameters
@@ -29,7 +29,7 @@ def draw(chart: Chart, file: str | Path | None, show: bool | None) -> Any:
         No path, a format that matplotlib does not know, or a file that cannot be written.
     """
     target = picture_path(file, "Chart.plot")
-    window = wants_window(show, target, "Chart.plot")
+    window = target is None if show is None else show
     figure = new_figure((8.2, 4.9), window, "Chart.plot")
     _axes(chart, figure.add_subplot())
     return finish_figure(figure, target, window, dpi=160)

@@ -2,14 +2,16 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
 from textwrap import shorten
-from typing import Any
+from typing import Annotated, Any
 
+from xcrack.base.arguments import FileName, Number, Switch, check_arguments
 from xcrack.base.arrays import Floats
-from xcrack.base.checks import number, value_text
+from xcrack.base.checks import value_text
 from xcrack.base.errors import ProblemError
 from xcrack.model.problem import Problem
+
+WantedError = Annotated[float | None, Number(above=0)]
 
 _DECADES = (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
 
@@ -166,7 +168,8 @@ class Chart:
             )
         return max(row.error, self.reference_error)
 
-    def best(self, wanted: float | None = None) -> Best:
+    @check_arguments()
+    def best(self, wanted: WantedError = None) -> Best:
         """The cheapest run whose error, plus that of the reference, is at most the wanted one.
 
         Parameters
@@ -182,9 +185,11 @@ class Chart:
         Raises
         ------
         ProblemError
-            No positive number.
+            No number, here nor for the chart.
         """
-        wanted = checked_error(self.wanted if wanted is None else wanted)
+        wanted = self.wanted if wanted is None else wanted
+        if wanted is None:
+            raise ProblemError("Chart.best: wanted = None: give a relative error, such as 1e-3.")
         able = [row for row in self.good if row.error + self.reference_error <= wanted]
         if not able:
             closest = min(self.good, key=lambda row: row.error + self.reference_error)
@@ -237,7 +242,8 @@ class Chart:
             lines.append(line.rstrip())
         return "\n".join(lines)
 
-    def plot(self, file: str | Path | None = None, *, show: bool | None = None) -> Any:
+    @check_arguments()
+    def plot(self, file: FileName | None = None, *, show: Switch | None = None) -> Any:
         """Draw error against time.
 
         Parameters
@@ -275,19 +281,6 @@ class Chart:
         return "\n".join([head, "", self.table(), "", *words])
 
 
-def checked_error(wanted: Any) -> float:
-    """A wanted error, after a look at it.
-
-    Raises
-    ------
-    ProblemError
-        No positive number.
-    """
-    if wanted is None:
-        raise ProblemError("wanted = None: give a relative error, such as 1e-3.")
-    return number(wanted, "the wanted relative error", above=0)
-
-
 def _place(row: ChartRow) -> tuple[bool, int, bool, float]:
     """Order in the table: by mesh, those of `adapt` last."""
     return row.mesh < 0, row.mesh, bool(row.failed), row.seconds
@@ -321,4 +314,4 @@ def _recipe(row: ChartRow) -> str:
     return f"Change {', '.join(whole)}." if whole else "The settings stay as they are."
 
 
-__all__ = ["Best", "Chart", "ChartRow", "checked_error"]
+__all__ = ["Best", "Chart", "ChartRow"]

@@ -5,7 +5,7 @@ from dataclasses import dataclass, fields
 from typing import Any
 
 from xcrack.base.checks import entries, value_text
-from xcrack.base.errors import ProblemError
+from xcrack.base.errors import ProblemError, XcrackError
 from xcrack.model.numerics import Numerics
 from xcrack.model.problem import Problem
 
@@ -44,56 +44,63 @@ _DEFAULT: dict[int, dict[str, dict[str, Any]]] = {
 }
 
 
-def named_settings(given: Any) -> dict[str, dict[str, Any]]:
-    """Settings by name, after a look at them; those of the problem are always among them.
+Named = dict[str, dict[str, Any]]
+
+
+def named_settings(
+    given: Any, what: str = "settings", error: type[XcrackError] = ProblemError
+) -> Named:
+    """Settings by name, checked; those of the problem are always among them.
 
     Parameters
     ----------
     given : sequence of mappings, or mapping of name to mapping
+    what : str
+        Its name in a message.
+    error : type of XcrackError
 
     Raises
     ------
-    ProblemError
+    error
         Fields that are no choice of method, names that stand there twice.
     """
     if isinstance(given, Mapping) and all(isinstance(v, Mapping) for v in given.values()):
         pairs = [(str(name), changes) for name, changes in given.items()]
     else:
         try:
-            several = entries(given, "settings")
-        except ProblemError as error:
+            several = entries(given, what, error=error)
+        except error as cause:
             example = '[{"order": 1}, {"radius": 0.2}]'
-            raise ProblemError(f"{str(error)[:-1]} of dicts, such as {example}.") from None
-        pairs = [(_name(changes), changes) for changes in several]
+            raise error(f"{str(cause)[:-1]} of dicts, such as {example}.") from None
+        pairs = [(_name(changes, what, error), changes) for changes in several]
     if not pairs:
-        raise ProblemError("settings is empty: give at least one dict of fields, or leave it out.")
-    named: dict[str, dict[str, Any]] = {}
+        raise error(f"{what} is empty: give at least one dict of fields, or leave it out.")
+    named: Named = {}
     if not any(not changes for _, changes in pairs):
         named[_AS_GIVEN] = {}
     for name, changes in pairs:
         for field in changes:
             if not isinstance(field, str) or field not in (*IN_PROBLEM, *_METHOD):
                 known = ", ".join((*IN_PROBLEM, *_METHOD))
-                raise ProblemError(
-                    f"settings: {value_text(field)} is no choice of method; give one of {known}. "
+                raise error(
+                    f"{what}: {value_text(field)} is no choice of method; give one of {known}. "
                     "Meshes go into meshes=, loads into states=."
                 )
         if name in named:
-            raise ProblemError(f"settings: {value_text(name)} stands there twice; leave one out.")
+            raise error(f"{what}: {value_text(name)} stands there twice; leave one out.")
         named[name] = dict(changes)
     return named
 
 
-def _name(changes: Any) -> str:
+def _name(changes: Any, what: str, error: type[XcrackError]) -> str:
     if not isinstance(changes, Mapping):
-        raise ProblemError(
-            f"settings: {value_text(changes)} is no dict of fields: give some such as "
-            f'{{"order": 1}}.'
+        raise error(
+            f'{what}: {value_text(changes)} is no dict of fields: give some such as {{"order": 1}}.'
         )
     return ", ".join(f"{field} {value}" for field, value in changes.items()) or _AS_GIVEN
 
 
-def default_settings(problem: Problem) -> dict[str, dict[str, Any]]:
+def default_settings(problem: Problem) -> Named:
     """Variations that may matter for a scene; without tips only the order does.
 
     Parameters
@@ -135,4 +142,4 @@ def with_lengths(changes: dict[str, Any], radius: float | None) -> tuple[dict[st
     }, ""
 
 
-__all__ = ["IN_PROBLEM", "default_settings", "named_settings", "with_lengths"]
+__all__ = ["IN_PROBLEM", "Named", "default_settings", "named_settings", "with_lengths"]

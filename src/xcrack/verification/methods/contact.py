@@ -14,14 +14,15 @@ the set where R u + r < 0 (Alart and Curnier, 1991); they differ in K, f, R, r a
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
+from typing import Annotated
 
 import numpy as np
 import scipy.optimize
 import scipy.sparse as sp
 
 from xcrack.analysis.multipliers import Multipliers, gap_rows, multipliers
+from xcrack.base.arguments import Declared, Number
 from xcrack.base.arrays import Bools, Floats
-from xcrack.base.checks import number
 from xcrack.base.errors import ConvergenceError
 from xcrack.fem.facets import LipPoints
 from xcrack.fem.system import System
@@ -42,14 +43,10 @@ _TOLERANCE = 1e-8  # change of the multipliers, as a share of the largest, that 
 
 
 @dataclass(frozen=True)
-class Springs(ContactMethod):
+class Springs(Declared, ContactMethod):
     """What the methods share: springs or stresses on rows of gaps, and Newton's iteration."""
 
-    factor: float
-
-    def __post_init__(self) -> None:
-        name = type(self).__name__
-        object.__setattr__(self, "factor", number(self.factor, f"{name}: factor", above=0))
+    factor: Annotated[float, Number(above=0)]
 
     def pressure_space(self, problem: Problem, model: System, c: int) -> Multipliers:
         """The points on the crack faces, one by one."""
@@ -147,11 +144,6 @@ class penalty(Springs):  # noqa: N801 - it is used as a function
     factor : float
         Stiffness per area of crack face over E / size of a cell. The overlap falls with it, and
         the pressure starts to oscillate.
-
-    Raises
-    ------
-    ProblemError
-        A factor that is not positive.
     """
 
     label = "a penalty"
@@ -167,11 +159,6 @@ class augmented_lagrangian(Springs):  # noqa: N801
     ----------
     factor : float
         As of `penalty`: stiffer springs take fewer updates.
-
-    Raises
-    ------
-    ProblemError
-        A factor that is not positive.
 
     Notes
     -----
@@ -231,11 +218,6 @@ class nitsche(Springs):  # noqa: N801
     ----------
     factor : float
         As of `penalty`: the method is unstable below a bound that depends on order and cells.
-
-    Raises
-    ------
-    ProblemError
-        A factor that is not positive.
 
     Notes
     -----

@@ -1,5 +1,7 @@
 """The discrete inf-sup constant of the multiplier space: a number for its stability."""
 
+from typing import Annotated
+
 import numpy as np
 import scipy.linalg
 import scipy.sparse as sp
@@ -8,18 +10,24 @@ import scipy.sparse.linalg as sla
 from xcrack.analysis.contact import material_numbers
 from xcrack.analysis.friction import has_friction, tangential_rows
 from xcrack.analysis.multipliers import Multipliers, gap_rows, multipliers
+from xcrack.base.arguments import Choice, check_arguments
 from xcrack.base.arrays import Floats
-from xcrack.base.checks import one_of
 from xcrack.fem.facets import jump_values
 from xcrack.fem.function_space import FunctionSpace
 from xcrack.fem.quadrature import cell_points
 from xcrack.fem.system import System, build
 from xcrack.linalg.direct import scaled_basis
 from xcrack.mesh.simplex import leg_sizes
-from xcrack.model.problem import Problem, check_problem, crack_number
+from xcrack.model.problem import ProblemArgument, crack_number
 
 
-def inf_sup(problem: Problem, crack: int = 0, *, norm: str = "h1") -> float:
+@check_arguments()
+def inf_sup(
+    problem: ProblemArgument,
+    crack: int = 0,
+    *,
+    norm: Annotated[str, Choice(("h1", "energy"))] = "h1",
+) -> float:
     """Discrete inf-sup constant of the multipliers in use.
 
     The square root of the smallest eigenvalue of B A^-1 B^T against the weighted mass int h mu²,
@@ -43,11 +51,9 @@ def inf_sup(problem: Problem, crack: int = 0, *, norm: str = "h1") -> float:
     Raises
     ------
     ProblemError
-        Not a problem, no such crack, or another word for `norm`.
+        No such crack.
     """
-    check_problem(problem, "inf_sup")
     crack = crack_number(problem, crack, "inf_sup")
-    one_of(norm, "inf_sup: norm", ("h1", "energy"))
     model = build(problem)
     space = model.space
     lips = model.lips[crack]

@@ -2,14 +2,21 @@
 
 import inspect
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from xcrack.app.case_tables import Table
-from xcrack.base.arguments import Argument, Function, Part, arguments_of, classes_of, kinds_of
+from xcrack.base.arguments import (
+    Argument,
+    FilePath,
+    Function,
+    Part,
+    arguments_of,
+    classes_of,
+    kinds_of,
+)
 from xcrack.base.errors import ProblemError, XcrackError
-from xcrack.base.units import LENGTH, NUMBER, Dimension
+from xcrack.base.units import NUMBER, Dimension
 from xcrack.crack.lines import line_crack
 from xcrack.crack.surfaces import (
     elliptic_crack,
@@ -31,49 +38,21 @@ from xcrack.mesh.step_file import mesh_step
 _WORD = "kind"
 
 
-@dataclass(frozen=True)
-class Form:
-    """A function that a table may name, and what its arguments are.
-
-    Attributes
-    ----------
-    function : callable
-    units : mapping of name to dimension
-        Of arguments that may have a unit.
-    files : tuple of str
-        Arguments that are paths, from the folder of the file.
-    """
-
-    function: Callable[..., Any]
-    units: Mapping[str, Dimension] = field(default_factory=dict)
-    files: tuple[str, ...] = ()
-
-
-def _lengths(*names: str) -> dict[str, Dimension]:
-    return dict.fromkeys(names, LENGTH)
-
-
-_PLATE = _lengths("width", "height", "radius", "size", "size_near", "center", "lower", "holes",
-                  "along", "band", "transition")  # fmt: skip
-MESHES = {
-    "file": Form(read_mesh, files=("path",)),
-    "step": Form(mesh_step, _lengths("size"), files=("path",)),
-    "box": Form(box, _lengths("lower", "upper")),
-    "plate": Form(plate, _PLATE),
-    "plate_with_hole": Form(plate_with_hole, _PLATE),
-    "notched_cylinder": Form(
-        notched_cylinder,
-        _lengths("diameter", "length", "notch_depth", "outer_span", "inner_span", "size",
-                 "size_near", "patch_length", "crack_depth", "band", "transition"),
-    ),
-}  # fmt: skip
-CRACKS = {
-    "line": Form(line_crack, _lengths("points")),
-    "penny": Form(penny_crack, _lengths("center", "radius")),
-    "ellipse": Form(elliptic_crack, _lengths("center", "a", "b")),
-    "polygon": Form(plane_crack, _lengths("polygon")),
-    "file": Form(read_surface, files=("path",)),
-    "surface": Form(surface_crack, _lengths("points")),
+MESHES: dict[str, Callable[..., Any]] = {
+    "file": read_mesh,
+    "step": mesh_step,
+    "box": box,
+    "plate": plate,
+    "plate_with_hole": plate_with_hole,
+    "notched_cylinder": notched_cylinder,
+}
+CRACKS: dict[str, Callable[..., Any]] = {
+    "line": line_crack,
+    "penny": penny_crack,
+    "ellipse": elliptic_crack,
+    "polygon": plane_crack,
+    "file": read_surface,
+    "surface": surface_crack,
 }
 
 
@@ -86,12 +65,12 @@ def _rate_table(curves: Any, outside: str = "refuse", ratio: str | None = None) 
     return rate_table(points, outside, ratio)  # type: ignore[arg-type]
 
 
-def forms_of(base: type) -> dict[str, Form]:
-    """Forms of all classes that derive from one: loads, supports, laws and their parts."""
-    forms = {name: Form(kind) for name, kind in kinds_of(base).items()}
+def makers_of(base: type) -> dict[str, Callable[..., Any]]:
+    """What makes values of a base, by name: loads, supports, laws and their parts."""
+    makers: dict[str, Callable[..., Any]] = dict(kinds_of(base))
     if base is GrowthLaw:
-        forms |= {"rate_table": Form(_rate_table), "with_time": Form(with_time)}
-    return forms
+        makers |= {"rate_table": _rate_table, "with_time": with_time}
+    return makers
 
 
 CRITERIA: dict[str, Callable[..., Any]] = {
@@ -101,7 +80,9 @@ CRITERIA: dict[str, Callable[..., Any]] = {
 }
 
 
-def value_of_table(table: Table, forms: Mapping[str, Form], default: str = "") -> Any:
+def value_of_table(
+    table: Table, makers: Mapping[str, Callable[..., Any]], default: str = ""
+) -> Any:
     """Value of a table: that of the function which its key `kind` names.
 
     Raises
@@ -111,21 +92,23 @@ def value_of_table(table: Table, forms: Mapping[str, Form], default: str = "") -
         with file and line.
     """
     kind = table.text(_WORD, default or None)
-    if kind not in forms:
-        table.refuse(_WORD, f"{kind!r:.40} is not known: known are {', '.join(forms)}.")
-    return called_with(table, forms[kind], f" of {kind!r}", (_WORD,))
+    if kind not in makers:
+        table.refuse(_WORD, f"{kind!r:.40} is not known: known are {', '.join(makers)}.")
+    return called_with(table, makers[kind], f" of {kind!r}", (_WORD,))
 
 
 def value_of_kind(table: Table, base: type, default: type) -> Any:
     """Value of a table whose `kind` derives from a base; without one it is of the default kind."""
     if _WORD in table:
-        return value_of_table(table, forms_of(base))
-    return called_with(table, Form(default))
+        return value_of_table(table, makers_of(base))
+    return called_with(table, default)
 
 
-def called_with(table: Table, form: Form, what: str = "", besides: tuple[str, ...] = ()) -> Any:
-    """Call a function with the keys of a table."""
-    parameters = inspect.signature(form.function).parameters
+def called_with(
+    table: Table, maker: Callable[..., Any], what: str = "", besides: tuple[str, ...] = ()
+) -> Any:
+    """Call a function or class with the keys of a table."""
+    parameters = inspect.signature(maker).parameters
     table.known([*besides, *parameters], what)
     for name, parameter in parameters.items():
         if parameter.default is parameter.empty and name not in table:
@@ -134,26 +117,27 @@ def called_with(table: Table, form: Form, what: str = "", besides: tuple[str, ..
     for name in table.content:
         if name in besides:
             continue
-        given[name] = _argument(table, name, form, parameters[name])
+        given[name] = _argument(table, name, maker, parameters[name])
     try:
-        return form.function(**given)
+        return maker(**given)
     except (XcrackError, TypeError, ValueError) as error:
         table.wrap(error if isinstance(error, XcrackError) else ProblemError(str(error)))
 
 
-def _argument(table: Table, name: str, form: Form, parameter: inspect.Parameter) -> Any:
-    if name in form.files:
-        return _file(table, name)
-    declared = arguments_of(form.function).get(name)
+def _argument(
+    table: Table, name: str, maker: Callable[..., Any], parameter: inspect.Parameter
+) -> Any:
+    declared = arguments_of(maker).get(name)
     rule = None if declared is None else declared.rule
+    if isinstance(rule, FilePath):
+        return _file(table, name)
     if isinstance(rule, Part) and isinstance(table.content[name], dict):
         return _part(table.table(name), rule)
     if isinstance(rule, Function) and isinstance(table.content[name], dict):
-        return value_of_table(table.table(name), forms_of(GrowthLaw))
+        return value_of_table(table.table(name), makers_of(GrowthLaw))
     if rule is not None and rule.takes_names and isinstance(table.content[name], str):
         return table.content[name]
-    unit = form.units.get(name, _dimension_of(declared, parameter))
-    value = table.value(name, unit)
+    value = table.value(name, _dimension_of(declared, parameter))
     is_flat_list = isinstance(value, list) and value and not any(isinstance(v, list) for v in value)
     return tuple(value) if is_flat_list else value
 
@@ -163,8 +147,8 @@ def _part(table: Table, rule: Part) -> Any:
     kinds = classes_of(rule.kind)
     if len(kinds) == 1 and _WORD not in table:
         (kind,) = kinds.values()
-        return called_with(table, Form(kind))
-    return value_of_table(table, {name: Form(kind) for name, kind in kinds.items()})
+        return called_with(table, kind)
+    return value_of_table(table, kinds)
 
 
 def _file(table: Table, name: str) -> Path:
@@ -191,9 +175,8 @@ __all__ = [
     "CRACKS",
     "CRITERIA",
     "MESHES",
-    "Form",
     "called_with",
-    "forms_of",
+    "makers_of",
     "value_of_kind",
     "value_of_table",
 ]
