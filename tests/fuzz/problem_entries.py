@@ -60,6 +60,11 @@ _each_crack = ListOf(item=_COEFFICIENT, rule=lambda values: len(values) == 1)
 
 ENTRIES = [
     Entry(
+        "Isotropic.with_yield_stress",
+        lambda yield_stress: scenes.STEEL.with_yield_stress(yield_stress).yield_stress,
+        {"yield_stress": arg(Number(above=0, optional=True), 350.0)},
+    ),
+    Entry(
         "Isotropic",
         xc.Isotropic,
         {

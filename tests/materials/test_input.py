@@ -34,7 +34,7 @@ def box(**sets):
          "holds materials by set itself"),
         (box(), {}, "give a mapping of cell sets to materials"),
         (box(), [STEEL, GLUE],
-         "such as Isotropic, not list: give one, or a mapping of cell sets to materials"),
+         r"\(list\): give a material, such as Isotropic\(.*\), or a mapping of cell sets"),
     ],
 )  # fmt: skip
 def test_sets_that_are_no_body_are_refused(mesh, materials, text):

@@ -233,7 +233,7 @@ PROBLEMS = {
     ),
     "axis": (
         lambda: xc.fix("top", axis=3),
-        r"fix: axis = 3 is not possible: give .* at least 0 and of at most 2",
+        "fix: axis = 3: give 0 or 1 or 2",
     ),
     "axis of space": (
         lambda: solve(supports=[xc.fix("top", axis=2)]),

@@ -247,7 +247,7 @@ def test_the_table_of_drawn_inputs_has_the_same_bounds():
 
 def test_docstrings_read_the_bounds_and_do_not_repeat_them():
     """Help and the site say what the rule says; words beside it would be a second rule."""
-    said, faults = 0, []
+    quoted, faults = 0, []
     for owner, value, arguments in declared():
         text = inspect.cleandoc(value.__doc__ or "").partition("\nReturns\n")[0]
         for name, argument in arguments.items():
@@ -259,7 +259,7 @@ def test_docstrings_read_the_bounds_and_do_not_repeat_them():
             if line is None:
                 continue
             head, *rest = line[0].splitlines()
-            said += argument.rule.words in head
+            quoted += argument.rule.words in head
             if argument.rule.words not in head:
                 faults.append(f"{owner}: {head}: {argument.rule.words}")
             if re.search(
@@ -267,4 +267,4 @@ def test_docstrings_read_the_bounds_and_do_not_repeat_them():
             ):
                 faults.append(f"{owner}: {name}: {rest}")
     assert not faults, "\n".join(faults)
-    assert said > 80
+    assert quoted > 80

@@ -9,7 +9,7 @@ from importlib.resources import files
 from math import sqrt
 from typing import Annotated, Any
 
-from xcrack.base.arguments import Number, check_arguments
+from xcrack.base.arguments import Number, Text, check_arguments
 from xcrack.base.checks import value_text
 from xcrack.base.errors import ProblemError
 from xcrack.base.units import LENGTH
@@ -185,7 +185,11 @@ def materials() -> list[str]:
 
 
 @check_arguments()
-def material(name: str, *, units: str) -> Metal:
+def material(
+    name: Annotated[str, Text("the name of a metal, see xc.materials()")],
+    *,
+    units: Annotated[str, Text('the units of length and K, such as "mm, MPa√mm"')],
+) -> Metal:
     """Published values of a metal: stiffness, strength, toughness and growth laws, with sources.
 
     Parameters
@@ -221,9 +225,8 @@ def material(name: str, *, units: str) -> Metal:
     >>> law = metal.law("walker")
     """
     names = _data()["metals"]
-    if not isinstance(name, str) or name not in names:
-        text = name if isinstance(name, str) else ""
-        alike = difflib.get_close_matches(text, names, n=5, cutoff=0.4) or list(names)
+    if name not in names:
+        alike = difflib.get_close_matches(name, names, n=5, cutoff=0.4) or list(names)
         raise ProblemError(
             f"material: name = {value_text(name)} is not among those with sources: give one of "
             f"{', '.join(map(repr, alike))} (xc.materials() has all), or "

@@ -1,10 +1,11 @@
 """Parts of facet sets: those in a box, or where a function says so."""
 
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
+from xcrack.base.arguments import Part, Text, check_arguments
 from xcrack.base.arrays import Bools, Floats, Ints, at
 from xcrack.base.checks import call_function, number, value_text
 from xcrack.base.errors import MeshError, ProblemError, warn
@@ -15,7 +16,13 @@ _ENDS = 0.02  # share of a set by which its ends may be off without a word
 _SAMPLES = 12  # points along an edge that tell how much of a facet is meant
 
 
-def part(mesh: Mesh, of: str, where: Where, name: str = "") -> Mesh:
+@check_arguments(MeshError)
+def part(
+    mesh: Annotated[Mesh, Part(Mesh)],
+    of: Annotated[str, Text("the name of a facet set")],
+    where: Where,
+    name: Annotated[str, Text("a name", may_be_empty=True)] = "",
+) -> Mesh:
     """The mesh with one more facet set: a part of one that it has.
 
     Parameters
@@ -49,10 +56,6 @@ def part(mesh: Mesh, of: str, where: Where, name: str = "") -> Mesh:
     >>> len(mesh.facet_sets["seat"])
     2
     """
-    if not isinstance(mesh, Mesh):
-        raise MeshError(f"part: give a Mesh, not {type(mesh).__name__}.")
-    if not isinstance(of, str) or not isinstance(name, str):
-        raise MeshError(f"part: of = {value_text(of)}, name = {value_text(name)}: give texts.")
     name = name or f"part of {of}"
     if name in mesh.facet_sets:
         raise MeshError(f"part: the mesh has a facet set {name!r} already: give another name.")

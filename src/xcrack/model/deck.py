@@ -7,16 +7,14 @@ a user leaves it out knowingly.
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from os import PathLike
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
-from xcrack.base.arguments import Parts
+from xcrack.base.arguments import FileName, Number, Parts, check_arguments
 from xcrack.base.arrays import Floats, Ints, frozen_copy, lock
-from xcrack.base.checks import number
 from xcrack.base.errors import ProblemError, warn
 from xcrack.base.paths import system_errors
 from xcrack.crack.crack import Crack
@@ -215,12 +213,13 @@ class Deck:
         )
 
 
+@check_arguments()
 def read_deck(
-    path: str | PathLike[str],
+    path: FileName,
     step: int | str | None = None,
     *,
-    time: float | None = None,
-    ignore: Sequence[str] = (),
+    time: Annotated[float, Number(least=0)] | None = None,
+    ignore: Annotated[Sequence[str], Parts(str, 'keywords such as "TIE"')] = (),
 ) -> Deck:
     """Read a deck of another program: body, materials, supports and the loads of a step.
 
@@ -262,14 +261,7 @@ def read_deck(
         print(xc.stress_intensity(xc.solve(problem)))
     """
     path = existing_file(path, "deck")
-    if time is not None:
-        time = number(time, "read_deck: time", least=0)
-    left_out = {
-        " ".join(name.upper().lstrip("*").split())
-        for name in Parts(str, 'keywords such as "TIE"').check(
-            ignore, "read_deck: ignore", ProblemError
-        )
-    }
+    left_out = {" ".join(name.upper().lstrip("*").split()) for name in ignore}
     with system_errors("cannot read the deck", path):
         if path.suffix.lower() != ".inp":
             return _mesh_deck(path)

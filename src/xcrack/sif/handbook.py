@@ -12,7 +12,7 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from xcrack.base.arguments import Number, Whole
+from xcrack.base.arguments import Number, Text, Whole, check_arguments
 from xcrack.base.arrays import Floats
 from xcrack.base.checks import numbers, value_text
 from xcrack.base.errors import ProblemError, XcrackError
@@ -634,7 +634,8 @@ KINDS: Mapping[str, type[HandbookK]] = {
 }  # fmt: skip
 
 
-def handbook(kind: str, **values: Any) -> HandbookK:
+@check_arguments()
+def handbook(kind: Annotated[str, Text("one of " + ", ".join(KINDS))], **values: Any) -> HandbookK:
     """K of a crack as a handbook has it, with its source and where it holds.
 
     Parameters
@@ -663,7 +664,7 @@ def handbook(kind: str, **values: Any) -> HandbookK:
     >>> print(handbook("compact", a=20.0, W=50.0, force=100.0).K().__round__(3))
     102.937
     """
-    if not isinstance(kind, str) or kind not in KINDS:
+    if kind not in KINDS:
         raise ProblemError(f"handbook: kind = {value_text(kind)}: give {', '.join(KINDS)}.")
     try:
         return KINDS[kind](**values)

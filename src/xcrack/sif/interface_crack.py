@@ -14,12 +14,13 @@ a_1 = kappa_1/mu_1 + 1/mu_2 and a_2 = kappa_2/mu_2 + 1/mu_1.
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
-from xcrack.analysis.solution import Solution, gradients_at, initial_stress_at
+from xcrack.analysis.solution import Solution, SolutionArgument, gradients_at, initial_stress_at
+from xcrack.base.arguments import Length, Whole, check_arguments
 from xcrack.base.arrays import Bools, Floats, at, lock
-from xcrack.base.checks import number, value_text, whole_number
 from xcrack.base.errors import GeometryError, ProblemError
 from xcrack.fem.loads import position
 from xcrack.fem.quadrature import Points, lip_side
@@ -75,7 +76,10 @@ class InterfaceSIF:
         return np.asarray(np.degrees(np.arctan2(self.K_2, self.K_1)))
 
 
-def interface_intensity(solution: Solution, length: float, crack: int = 0) -> InterfaceSIF:
+@check_arguments()
+def interface_intensity(
+    solution: SolutionArgument, length: Length, crack: Annotated[int, Whole(least=0)] = 0
+) -> InterfaceSIF:
     """K_1, K_2 and G at the tips of a crack that runs along a bonded interface, in 2D.
 
     Parameters
@@ -103,19 +107,12 @@ def interface_intensity(solution: Solution, length: float, crack: int = 0) -> In
     Ahead σ₂₂ + iσ₁₂ = (K₁ + iK₂)(r/length)^{iε}/√(2πr), with the second axis normal to the crack
     (Rice, 1988).
     """
-    if not isinstance(solution, Solution):
-        raise ProblemError(
-            f"interface_intensity takes a Solution as solve returns it, not a "
-            f"{type(solution).__name__}."
-        )
     if solution.space.dim != 2:
         raise ProblemError("interface_intensity: K on interfaces is known in 2D alone.")
-    length = number(length, "interface_intensity: length", above=0.0)
-    crack = whole_number(crack, "crack")
-    if not 0 <= crack < len(solution.space.cuts):
+    if crack >= len(solution.space.cuts):
         raise ProblemError(
-            f"crack {value_text(crack)}: the problem has {len(solution.space.cuts)} crack(s), "
-            "numbered from 0."
+            f"interface_intensity: crack = {crack}: the problem has "
+            f"{len(solution.space.cuts)} crack(s), numbered from 0."
         )
     tips = [t for t, tip in enumerate(solution.space.tips) if tip.crack == crack]
     if not tips:

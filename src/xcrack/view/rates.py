@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from xcrack.base.arguments import Number, check_arguments
+from xcrack.base.arguments import Number, Text, check_arguments
 from xcrack.base.checks import numbers
 from xcrack.base.errors import ProblemError
 from xcrack.fatigue.checks import evaluate_law
@@ -23,7 +23,7 @@ _STYLES = ("-", "--", "-.", ":")
 def plot_rates(
     laws: Mapping[str, Any] | Sequence[Metal],
     *,
-    units: str,
+    units: Annotated[str, Text('the units of length and K, such as "mm, MPa√mm"')],
     R: Annotated[float, Number(most=1)] = 0.1,
     dK: tuple[float, float] | None = None,
     file: str | Path | None = None,

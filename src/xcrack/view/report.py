@@ -94,8 +94,6 @@ def report(
         )
     names_of_units = UnitNames.read(units)
     source = source_of(result, title, yield_stress, life)
-    if not isinstance(spectrum, Spectrum | None):
-        raise ProblemError(f"report: spectrum = {value_text(spectrum)}: give xc.Spectrum(...).")
     source = replace(source, inspection=inspection, strength=strength, spectrum=spectrum,
                      units=names_of_units)  # fmt: skip
     for words in scene.plastic_zone(source)[1]:

@@ -7,11 +7,13 @@ from dataclasses import dataclass, replace
 from hashlib import sha256
 from os import PathLike
 from pathlib import Path
+from typing import Annotated
 
-from xcrack.base.checks import flag, value_text
+from xcrack.base.arguments import FilePath, Switch, Text, check_arguments
+from xcrack.base.checks import value_text
 from xcrack.base.errors import ProblemError, collected_warnings
 from xcrack.base.optional import require_package
-from xcrack.base.paths import path_of, system_errors, write_texts
+from xcrack.base.paths import system_errors, write_texts
 from xcrack.runs.versions import versions
 from xcrack.verification.experiments import (
     ferrie,
@@ -72,13 +74,14 @@ class Validation:
         return "\n".join([*map(line_of, self.outcomes), f"{total}; {self.seconds:.0f} s"])
 
 
+@check_arguments()
 def validate(
-    only: str = "",
+    only: Annotated[str, Text("a part of a test's name", may_be_empty=True)] = "",
     *,
-    quick: bool = False,
-    file: str | PathLike[str] | None = None,
-    data: str | PathLike[str] | None = None,
-    progress: bool = True,
+    quick: Switch = False,
+    file: Annotated[str | PathLike[str], FilePath(is_file=True)] | None = None,
+    data: Annotated[str | PathLike[str], FilePath()] | None = None,
+    progress: Switch = True,
 ) -> Validation:
     """Predict tests that others made, and put what they measured beside it.
 
@@ -120,21 +123,15 @@ def validate(
     >>> print(xc.validate("demir", quick=True, progress=False).outcomes[0].status)
     agrees
     """
-    if not isinstance(only, str):
-        raise ProblemError(f"validate: only = {value_text(only)}: give a part of a test's name.")
-    for name, value in (("quick", quick), ("progress", progress)):
-        flag(value, f"validate: {name}")
-    page = None
-    if file is not None:
-        page = path_of(file, "validate: file", error=ProblemError, is_file=True)
-    folder = None if data is None else path_of(data, "validate: data", error=ProblemError)
+    page = None if file is None else Path(file)
+    folder = None if data is None else Path(data)
     if folder is not None and not folder.is_dir():
         raise ProblemError(f"validate: data = {value_text(str(folder))} is no folder.")
     trials = [t for t in TRIALS if only in t.name and (t.quick or not quick)]
     if not trials:
         names = ", ".join(t.name for t in TRIALS)
         raise ProblemError(
-            f"validate: no {'quick ' * quick}test has {only!r} in its name: they are {names}."
+            f"validate: no {'quick ' * quick}test has {only!r} in its name: give a part of {names}."
         )
     outcomes = []
     for trial in trials:
