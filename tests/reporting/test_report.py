@@ -468,14 +468,14 @@ def test_units_of_a_report(tmp_path):
 
 def test_load_history_is_drawn(tmp_path):
     """Factors and counts of a spectrum as a picture, its name on the axes, no hash in the table."""
-    spectrum = xc.Spectrum([0.0, 1.0, 0.4, 0.6], unit="flight")
+    spectrum = xc.Spectrum([0.0, 1.0, 0.4, 0.6] * 5, unit="flight")
     law = xc.paris(1e-11, 3)
     run = xc.collect(xc.grow(plate(), law, xc.max_hoop_stress, spectrum, da=0.1, max_steps=2,
                              progress=False))  # fmt: skip
     text, reader, numbers = read(xc.report(run, tmp_path / "a.html", spectrum=spectrum))
     assert len(reader.pictures) == len(numbers["pictures"]["drawn"]) + 2
     part = text[text.index('id="spectrum"') : text.index('id="K"')]
-    assert "4 numbers" in part
+    assert "20 numbers" in part
     assert "sha256" not in part
     assert "flights" in numbers["summary"]["life"]
     figure = xc.plot_spectrum(spectrum, file=tmp_path / "spectrum.png")

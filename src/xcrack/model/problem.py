@@ -10,7 +10,17 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from xcrack.base.arguments import CheckedBy, Choice, Declared, OneOrMore, Part, Parts, Whole
+from xcrack.base.arguments import (
+    CheckedBy,
+    Choice,
+    Declared,
+    OneOrMore,
+    Part,
+    Parts,
+    Text,
+    Whole,
+    check_arguments,
+)
 from xcrack.base.checks import entries, number, value_text, whole_number
 from xcrack.base.errors import CoarseMeshError, ProblemError
 from xcrack.base.markup import Markup, element, join_parts, rim, sketch, table
@@ -244,7 +254,13 @@ class Problem(Declared):
         ]
         return join_parts(element("b", "Problem"), self.sketch(), table((), rows))
 
-    def plot(self, file: str | Path | None = None, *, title: str | None = None) -> Any:
+    @check_arguments()
+    def plot(
+        self,
+        file: str | Path | None = None,
+        *,
+        title: Annotated[str | None, Text("a text, or leave it out", may_be_empty=True)] = None,
+    ) -> Any:
         """Draw the set-up before a solve: body, sets, loads, supports, cracks and their normals.
 
         Parameters

@@ -1,11 +1,12 @@
 """Pictures of lives, load histories and residual strength."""
 
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from xcrack.base.arguments import Text, check_arguments
 from xcrack.base.checks import value_text
 from xcrack.base.errors import ProblemError
 from xcrack.fatigue.spectrum import Spectrum
@@ -52,10 +53,11 @@ _LABELS = {
 }
 
 
+@check_arguments()
 def plot_strength(
     strength: NDArray[Any],
     *,
-    unit: str = "cycle",
+    unit: Annotated[str, Text('what N counts, such as "cycle"')] = "cycle",
     file: str | Path | None = None,
 ) -> Any:
     """Draw what `residual_strength` returned: factors on the load over the life, as one curve.
@@ -86,8 +88,6 @@ def plot_strength(
         )
     if not np.isfinite(strength["factor"]).any():
         raise ProblemError("plot_strength: there is nothing to draw: no factor is finite.")
-    if not isinstance(unit, str) or not unit:
-        raise ProblemError(f"plot_strength: unit = {value_text(unit)}: give a word, as 'flight'.")
     target = picture_path(file, "plot_strength")
     figure = new_figure((6.4, 4.8), target is None, "plot_strength")
     axes = figure.add_subplot()

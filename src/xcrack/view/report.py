@@ -44,7 +44,7 @@ def report(
     inspection: Annotated[Inspection | None, Part(Inspection, "what xc.inspection returns")] = None,
     strength: NDArray[Any] | None = None,
     spectrum: Annotated[Spectrum | None, Part(Spectrum, "a Spectrum")] = None,
-    units: Annotated[str | None, Text('the units of length and K, such as "mm, MPa√mm"')] = None,
+    units: Annotated[str | None, Text('force, length and stress, such as "N, mm, MPa"')] = None,
 ) -> Path:
     """Write what was modelled and what came out, as one page that needs no network.
 

@@ -12,7 +12,7 @@ from xcrack.mesh.mesh import Mesh
 from xcrack.model.loads import FacetPoints, Load
 from xcrack.model.problem import Problem
 from xcrack.output.curved_sides import boundary_lines
-from xcrack.view.figures import checked_title, finish_figure, new_figure, picture_path
+from xcrack.view.figures import finish_figure, new_figure, picture_path
 
 _ARROW = 0.12  # share of the body of the longest arrow
 _MANY = 9  # arrows, and marks of a support, on a set
@@ -27,7 +27,6 @@ def draw_setup(problem: Problem, file: str | Path | None, title: str | None) -> 
 
     Nothing is solved. Loads that act everywhere are named in the legend.
     """
-    title = checked_title(title, "Problem.plot")
     target = picture_path(file, "Problem.plot")
     mesh = problem.mesh
     figure = new_figure(_size(mesh), target is None, "Problem.plot")
