@@ -151,7 +151,7 @@ BAD = {
     "axis along normal": (lambda: elliptic_crack((0, 0, 0), (0, 0, 1), (0, 0, 2), 2, 1), "axis"),
     "half-axis": (
         lambda: elliptic_crack((0, 0, 0), (0, 0, 1), (1, 0, 0), 2, np.inf),
-        "half-axis b",
+        "b = inf is not possible",
     ),
     "two corners": (lambda: plane_crack(SQUARE[:2]), "three corners"),
     "doubled corner": (lambda: plane_crack([*SQUARE, SQUARE[0]]), "leave one out"),

@@ -150,7 +150,7 @@ def test_a_run_goes_on_with_what_is_stored(tmp_path):
 
 
 def test_wrong_input_is_refused_in_words(tmp_path):
-    with pytest.raises(xc.ProblemError, match="they are wagner_2018_a"):
+    with pytest.raises(xc.ProblemError, match="give a part of wagner_2018_a"):
         xc.validate("no such test")
     with pytest.raises(xc.ProblemError, match="is no folder"):
         xc.validate("demir", data=tmp_path / "none")

@@ -20,7 +20,7 @@ def oscillation(upper: Constants, lower: Constants, plane: Plane = "strain") -> 
     """Index epsilon of the stress at a tip of a crack between two half-planes.
 
     >>> round(oscillation((3.0, 0.3), (1.0, 0.3)), 5)
-    -0.04582
+    -0.04579
     """
     a_1, a_2 = _slopes(upper, lower, plane)
     return float(np.log(a_1 / a_2) / (2 * np.pi))

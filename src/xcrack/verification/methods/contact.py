@@ -42,11 +42,14 @@ _MAX_UPDATES = 500
 _TOLERANCE = 1e-8  # change of the multipliers, as a share of the largest, that ends their updates
 
 
+_Factor = Annotated[float, Number(above=0)]
+
+
 @dataclass(frozen=True)
 class Springs(Declared, ContactMethod):
     """What the methods share: springs or stresses on rows of gaps, and Newton's iteration."""
 
-    factor: Annotated[float, Number(above=0)]
+    factor: _Factor
 
     def pressure_space(self, problem: Problem, model: System, c: int) -> Multipliers:
         """The points on the crack faces, one by one."""
@@ -148,7 +151,7 @@ class penalty(Springs):  # noqa: N801 - it is used as a function
 
     label = "a penalty"
     friction_dims = (2,)
-    factor: float = 100.0
+    factor: _Factor = 100.0
 
 
 @dataclass(frozen=True)
@@ -169,7 +172,7 @@ class augmented_lagrangian(Springs):  # noqa: N801
     has_unknowns = True
     friction_dims = (2,)
     updates = True
-    factor: float = 10.0
+    factor: _Factor = 10.0
 
     def pressure_space(self, problem: Problem, model: System, c: int) -> Multipliers:
         """Groups of points, as multipliers have them."""
@@ -226,7 +229,7 @@ class nitsche(Springs):  # noqa: N801
     """
 
     label = "Nitsche's method"
-    factor: float = 40.0
+    factor: _Factor = 40.0
 
     def rows(self, problem: Problem, model: System, m: Multipliers) -> "Rows":
         """Gaps and mean stresses at the points."""
