@@ -13,7 +13,7 @@ import pytest
 import xcrack as xc
 from support.scenes_fronts import graded, lines
 from xcrack.growth import joins_3d
-from xcrack.growth.joins_3d import amplification, part_of_time
+from xcrack.growth.gaps import amplification, part_of_time
 from xcrack.mesh.triangulation import face_areas
 from xcrack.view.report_results import growth
 from xcrack.view.report_source import Source

@@ -93,9 +93,10 @@ def test_on_real_K_two_collinear_cracks_end_before_they_meet():
     )
     history = run(problem, da=0.8, link_up=xc.plastic_zone(345.0, beta=2))
     last = history.steps[-1].sif[-1]
-    zones = sum((sif.K_I[0] / 345.0) ** 2 / (2 * np.pi) for sif in last)
-    # K_eq and K_I differ by the little K_II that the mesh makes.
-    assert zones >= 0.999 * (last[1].x[0, 0] - last[0].x[0, 0])
+    # By K_eq, which differs from K_I by the little K_II that the mesh makes.
+    zones = sum((K_eq[0] / 345.0) ** 2 / (2 * np.pi) for K_eq in history.steps[-1].dK_eq)
+    left = float(np.linalg.norm(last[1].x[0] - last[0].x[0]))
+    assert left <= zones <= left * (1 + 3e-4)
     assert history.ended.startswith("ligament yield")
 
 

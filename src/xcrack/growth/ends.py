@@ -2,13 +2,15 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from math import inf, log
 
 import numpy as np
 
 from xcrack.base.arrays import Floats
 from xcrack.base.checks import call_function, numbers
+from xcrack.base.errors import XcrackError, collected_warnings
 from xcrack.fatigue.criteria import clipped_K, equivalent_K
+from xcrack.fatigue.cycle import Cycle
 from xcrack.growth.options import GrowthRule
 from xcrack.growth.step import (
     Arrival,
@@ -74,18 +76,17 @@ def ligament_yields(rule: GrowthRule, step: Step) -> str:
     from memory);
     the zone of one tip fills what lies ahead of it.
     """
-    if rule.link_up is None:
+    filled = _filled(rule, step)
+    if not filled:
         return ""
-    zone = [_zones(rule.link_up, rule, step, c) for c in range(len(step.cracks))]
-
-    def size(place: _Place | None) -> float:
-        return 0.0 if place is None else float(zone[place[0]][place[1]])
-
-    known = ligaments(rule, step)
-    full = [(size(one.tip) + size(one.other)) / one.length for one in known]
-    if not full or max(full) < 1:
+    share, one = max(filled, key=lambda each: each[0])
+    if share < 1:
         return ""
-    one = known[int(np.argmax(full))]
+    zone = [_zones(rule, step, c) for c in range(len(step.cracks))]
+
+    def size(place: _Place) -> float:
+        return float(zone[place[0]][place[1]])
+
     first = f"of {place_name(step, *one.tip)}, {size(one.tip):.4g}"
     if one.other is None:
         what = f"the plastic zone {first}, fills the {one.length:.4g} to {one.name}"
@@ -97,9 +98,25 @@ def ligament_yields(rule: GrowthRule, step: Step) -> str:
     return f"ligament yield: {what}"
 
 
-def _zones(link_up: Callable[..., Any], rule: GrowthRule, step: Step, c: int) -> Floats:
+def _filled(rule: GrowthRule, step: Step) -> list[tuple[float, Ligament]]:
+    """Ligaments, and the share of each that plastic zones fill; none without a rule for them."""
+    if rule.link_up is None or step.has_left:
+        return []
+    zone = [_zones(rule, step, c) for c in range(len(step.cracks))]
+    result = []
+    for one in ligaments(rule, step):
+        c, j = one.tip
+        size = float(zone[c][j])
+        if one.other is not None:
+            size += float(zone[one.other[0]][one.other[1]])
+        result.append((size / one.length, one))
+    return result
+
+
+def _zones(rule: GrowthRule, step: Step, c: int) -> Floats:
+    assert rule.link_up is not None
     K_eq = _largest_K(rule, step, c)
-    zone = call_function(link_up, f"link_up at step {step.index}", K_eq)
+    zone = call_function(rule.link_up, f"link_up at step {step.index}", K_eq)
     return numbers(zone, "what link_up returned", K_eq.shape)
 
 
@@ -182,6 +199,68 @@ ENDS: tuple[Callable[[GrowthRule, Step], str], ...] = (
 def end_of_run(rule: GrowthRule, step: Step) -> str:
     """Why a run ends at a step; empty where it goes on."""
     return next(filter(None, (end(rule, step) for end in ENDS)), "")
+
+
+# How far a step is beyond ends that come within one: the last step is made as long as that.
+
+
+def cycles_beyond(rule: GrowthRule, step: Step) -> float:
+    """Cycles over those asked for."""
+    return -inf if rule.max_cycles is None else step.cycles / rule.max_cycles - 1
+
+
+def K_beyond(rule: GrowthRule, step: Step) -> float:
+    """Logarithm of the largest K_eq over K_c."""
+    if rule.toughness is None or step.has_left:
+        return -inf
+    largest = max(
+        float(_largest_K(rule, step, c).max(initial=0.0)) for c in range(len(step.cracks))
+    )
+    return log(largest / rule.toughness) if largest > 0 else -inf
+
+
+def law_beyond(rule: GrowthRule, step: Step) -> float:
+    """Logarithm of the largest range over the one from which on the law returns inf.
+
+    Where cycles of several ranges count, only its sign is known.
+    """
+    if step.has_left or not isinstance(rule.cycle, Cycle):
+        return 1.0 if law_reaches_toughness(rule, step) else -1.0
+    dK_eq, R = np.concatenate(step.dK_eq), np.concatenate(step.R)
+    low, high = -_FAR, _FAR
+
+    def breaks(factor: float) -> bool:
+        with collected_warnings([]):
+            return bool(np.isinf(rule.law(np.exp(factor) * dK_eq, R)).any())
+
+    try:
+        if not breaks(high):
+            return -_FAR
+        for _ in range(_HALVINGS):
+            middle = 0.5 * (low + high)
+            low, high = (low, middle) if breaks(middle) else (middle, high)
+    except XcrackError:  # a table ends there
+        return 1.0 if law_reaches_toughness(rule, step) else -1.0
+    return -high
+
+
+def zones_beyond(rule: GrowthRule, step: Step) -> float:
+    """Logarithm of the share of a ligament that plastic zones fill."""
+    share = max((share for share, _ in _filled(rule, step)), default=0.0)
+    return log(share) if share > 0 else -inf
+
+
+_FAR, _HALVINGS = 1.0, 40  # of the logarithm of a range
+WITHIN: tuple[Callable[[GrowthRule, Step], float], ...] = (cycles_beyond, K_beyond, zones_beyond)
+
+
+def beyond_end(rule: GrowthRule, step: Step, breaks: bool) -> float:
+    """How far a step is beyond the first of these ends: 0 is there, negative before.
+
+    `breaks` says that the law returns inf within the step: elsewhere it is not asked.
+    """
+    ends = (*WITHIN, law_beyond) if breaks else WITHIN
+    return max(beyond(rule, step) for beyond in ends)
 
 
 def _largest_K(rule: GrowthRule, step: Step, c: int) -> Floats:
@@ -268,12 +347,16 @@ def short_kink(rule: GrowthRule, step: Step) -> str:
 
 __all__ = [
     "ENDS",
+    "WITHIN",
     "Ligament",
+    "beyond_end",
     "cannot_go_on",
     "driving_place",
     "end_of_run",
+    "law_reaches_toughness",
     "left_the_body",
     "ligaments",
+    "nothing_grows",
     "refusal_of",
     "short_kink",
 ]

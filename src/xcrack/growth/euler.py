@@ -21,6 +21,7 @@ from xcrack.growth.rates import Rates
 from xcrack.growth.solves import SolveHistory
 from xcrack.growth.stations import GrowthStations, Identities, PerCrack, directions
 from xcrack.growth.step import Plan, Step, StepError, moved_places, plan_of, solves_of
+from xcrack.growth.step_length import longest
 from xcrack.mesh.locate import cell_sizes
 
 _SAME = 1e-6  # of the coordinates: a tip recognised after its advance
@@ -41,7 +42,7 @@ def predict(rule: GrowthRule, step: Step) -> Plan:
     if fastest == 0 or np.isinf(fastest):
         return plan
     by_cycles = np.inf if rule.cycles is None else rule.cycles * fastest
-    largest = float(min(np.inf if rule.da is None else rule.da, by_cycles))
+    largest = float(min(longest(rule, step.control), by_cycles))
     score = _score(rule, step)
     wanted = stations.waits + largest * (score / score.max())
     goes = wanted >= _WAITS_BELOW[mesh.dim] * cell

@@ -16,6 +16,7 @@ from xcrack.crack.stations import closed_fronts
 from xcrack.growth import euler, fronts
 from xcrack.growth.corrected import Corrected
 from xcrack.growth.fronts import interpolate_along_front
+from xcrack.growth.gaps import UNKNOWN, part_of_time
 from xcrack.growth.options import GrowthRule
 from xcrack.growth.rates import Rates
 from xcrack.growth.stations import Identities
@@ -32,7 +33,6 @@ _WITHIN = 1e-3  # of a cell: to which the gap is closed
 _TRIES = 12  # advances until it is
 _REACH = 4.0  # cells from a place along a front to those of the step before
 _MOST = 0.75  # of a cell: gap that may be left where the fronts speed up towards each other
-_UNKNOWN = 0.25  # of what the cycles differ by from those at the last rate: what is unsure of them
 
 _INTEGRATORS = {"euler": euler, "pec": fronts}
 
@@ -68,7 +68,7 @@ def with_joins(rule: GrowthRule, step: Step, plan: Plan) -> Plan:
     time, way, plain = min(_met(rule, step, plan, *each, body, m) for each in close)
     now = _advanced(rule, step, plan, way)
     cycles = time * plan.cycles / _gain(step, now, rule.problem.mesh, m)
-    unsure = _UNKNOWN * abs(plain * plan.cycles - cycles)
+    unsure = UNKNOWN[3] * abs(plain * plan.cycles - cycles)
     apart, joins = tuple(now), []
     number = list(range(len(now)))
     while pairs := _close(now, body, OFFSET):
@@ -158,7 +158,7 @@ def _met(
         return way, way, way
     a = 2 * float(np.mean([step.sizes[c] for c in pair]))  # of a penny: its radius
     plain = way * gap / (gap - left)
-    time = plain * part_of_time(gap / a, exponent)
+    time = plain * part_of_time(gap / a, exponent, 3)
     most = way * (gap - _MOST * size) / (gap - left)
     return time, min(way, max(time, most)), plain
 
@@ -263,42 +263,4 @@ def named_by_number(rule: GrowthRule) -> str:
     return ""
 
 
-# How fast the last ligament between two coplanar fronts breaks.
-
-_A, _P, _B, _Q = 0.0977222, 0.575392, 3.22635, 1.32721  # fitted to 0.2 % from x = 0.03 to 4
-_POINTS = 48
-
-
-def amplification(x: Floats) -> Floats:
-    """K of a penny that faces an equal one at a gap of x radii, over K of one alone."""
-    return np.asarray(1 + _A * x**-_P / (1 + _B * x**_Q))
-
-
-def part_of_time(x: float, exponent: float) -> float:
-    """Time in which a gap of x radii closes, over the time at the rate of its beginning.
-
-    Parameters
-    ----------
-    x : float
-        Gap over radius.
-    exponent : float
-        Of the growth law.
-
-    Returns
-    -------
-    float
-        Below 1: the mean of (f(x)/f)^m over the gap, f the amplification.
-
-    Examples
-    --------
-    >>> print(round(part_of_time(0.5, 3.0), 2), round(part_of_time(4.0, 3.0), 2))
-    0.73 0.93
-    """
-    u, weight = np.polynomial.legendre.leggauss(_POINTS)
-    u = (u + 1) / 2
-    # Points crowd towards the end of the gap, where K is singular.
-    ratio = (amplification(np.array([x])) / amplification(x * u**2)) ** exponent
-    return float((weight / 2 * 2 * u * ratio).sum())
-
-
-__all__ = ["amplification", "joined", "named_by_number", "part_of_time", "with_joins"]
+__all__ = ["joined", "named_by_number", "with_joins"]

@@ -26,6 +26,7 @@ from xcrack.model.problem import Problem
 
 SHARE = 0.4  # of the tolerance: what K may take
 _LEAST_EXPONENT = 2.0  # of the law, in the error of life; directions err by twice that of K_II
+_FAINT = 1e-3  # of the largest K of all stages: a smaller one need not be known to its own size
 _FORETOLD = 4.0  # times the wanted bar: from there the next mesh need not be looked at again
 
 Steps = Callable[[GrowthRule], Generator[Step, None, str]]
@@ -182,7 +183,8 @@ def finer(rule: GrowthRule, steps_of: Steps, last: Step | None) -> tuple[Mesh, b
             return before, True
         if error <= wanted:
             break
-        goals = [wanted * float(np.abs(now.best).max(initial=0.0)) for now in good]
+        largest = [float(np.abs(now.best).max(initial=0.0)) for now in good]
+        goals = [wanted * max(K, _FAINT * max(largest)) for K in largest]
         places = [stages[k].places for k in there]
         smaller, own = twin.finer(good, goals, places, [sizes[k] for k in there])
         for k, size in zip(there, own, strict=True):

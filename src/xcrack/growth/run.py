@@ -9,6 +9,7 @@ import numpy as np
 
 from xcrack.base.errors import GeometryError, ProblemError, XcrackError, warn
 from xcrack.crack.measures import crack_size
+from xcrack.crack.meetings import LEAST
 from xcrack.fatigue.checks import depends_on_ratio
 from xcrack.fatigue.criteria import Criterion
 from xcrack.fatigue.cycle import Cycle
@@ -16,7 +17,16 @@ from xcrack.fatigue.law import Law
 from xcrack.fatigue.spectrum import Spectrum
 from xcrack.growth import joins_3d
 from xcrack.growth.alarms import alarm_of_life, alarms_of_step
-from xcrack.growth.ends import cannot_go_on, end_of_run, left_the_body, refusal_of, short_kink
+from xcrack.growth.ends import (
+    beyond_end,
+    cannot_go_on,
+    end_of_run,
+    law_reaches_toughness,
+    left_the_body,
+    nothing_grows,
+    refusal_of,
+    short_kink,
+)
 from xcrack.growth.events import (
     Arriving,
     arrivals_of,
@@ -34,7 +44,7 @@ from xcrack.growth.prepared import fingerprint, prepared, replanned
 from xcrack.growth.progress import Progress, WarningLog
 from xcrack.growth.rates import check_choice, rates_of, warn_of_left_out
 from xcrack.growth.response import Response
-from xcrack.growth.stations import Identities, first_identities, identities_after
+from xcrack.growth.stations import Identities, first_identities, identities_after, split
 from xcrack.growth.step import (
     Join,
     RunState,
@@ -112,7 +122,8 @@ def grow(
         its `rate` stays that of the law.
     K_c : float, stress √length, optional
         Stop when the K_eq of any tip in any state reaches it; where it is left out, that of the
-        material.
+        material. The last step is made as long as that takes, to 2e-4 of K_c, with a solve at its
+        end; so it is where a law returns inf, a ligament yields, or `max_cycles` are over.
     link_up : plastic_zone or callable K -> length, optional
         In 2D: stop when plastic zones fill a ligament: those of two tips that head for each other
         add up, that of one tip reaches what lies straight ahead, a hole, a side or another crack.
@@ -120,7 +131,8 @@ def grow(
     max_steps : int, optional
         Stop after this many steps, the first included.
     max_cycles : float, optional
-        Stop at the first step with at least this many cycles.
+        Stop after this many cycles, to 2e-4 of them, or at the first step beyond where that is less
+        than a tenth of a cell away.
     solver : optional
         As in `solve`.
     response : callable (problem, states, reuse, bars) -> Response, optional
@@ -196,6 +208,7 @@ def growth_steps(
     """
     check_choice(rule.law, rule.cycle.ratio)
     settings = rule.settings  # before a law is called that may change what it reads
+    done = steps_to_go_on_from(rule, done)
     asked, last = rule, done[-1] if done else None
     ended = ""
     if rule.estimates:
@@ -207,7 +220,9 @@ def growth_steps(
             with notices.watch(0) as messages:
                 first, reuse = _solved_step(rule, rule.problem, None, SolverState(), settings)
                 own = len(messages)
-                other = replanned(asked, rule, growth_steps, None, first)
+                other = None
+                if not nothing_grows(rule, first):  # where nothing does, no mesh is fine enough
+                    other = replanned(asked, rule, growth_steps, None, first)
                 if other is not None:
                     rule = other[0]
                     del messages[:own]  # of a mesh that nobody has
@@ -237,6 +252,9 @@ def growth_steps(
                 if other is not None:
                     del messages[:own]  # of a step that nobody has
                 else:
+                    next_step, reuse, ended = _cut_at_end(
+                        rule, last, (next_step, reuse, ended), messages
+                    )
                     _warn_of_alarms(rule, next_step)
             if other is not None:
                 reuse = reuse if other[0] is rule else run_state(last).reuse
@@ -259,6 +277,86 @@ def growth_steps(
         progress.close()
     progress.end(ended)
     return ended
+
+
+def steps_to_go_on_from(rule: GrowthRule, done: Sequence[Step]) -> Sequence[Step]:
+    """Steps of a run without a last one that was cut short for an end that is none now."""
+    if len(done) > 1 and done[-1].run is not None and done[-1].run.cut:
+        return done if end_of_run(rule, done[-1]) else done[:-1]
+    return done
+
+
+_AIM = 1e-4  # of K, or of the cycles: a run ends as far beyond its end, and at most twice
+_TRIES = 6  # solves for that
+
+
+def _cut_at_end(
+    rule: GrowthRule,
+    last: Step,
+    ending: tuple[Step, SolverState, str],
+    messages: list[str],
+) -> tuple[Step, SolverState, str]:
+    """A step that ends where the run does, in place of one that goes beyond.
+
+    Parameters
+    ----------
+    rule : GrowthRule
+    last : Step
+        The one before.
+    ending : (Step, SolverState, str)
+        The whole step, what the next solve starts from, and why the run ends there, if it does.
+    messages : list of str
+        Warnings of the step, in place of which those of the shorter one come.
+
+    Notes
+    -----
+    The false position by Dowell and Jarratt (1971, BIT 11, 168, "Illinois"), between the ends of
+    the step, each time with a solve. No advance is below a tenth of a cell, which no mesh sees.
+    """
+    plan, breaks = plan_of(last), bool(law_reaches_toughness(rule, ending[0]))
+    low, high = 0.0, plan.length * plan.part
+    at_high = beyond_end(rule, ending[0], breaks) - _AIM
+    if at_high <= _AIM:
+        return ending
+    at_low = max(beyond_end(rule, last, breaks), -1.0) - _AIM
+    least, reuse, bound = (1 + 1e-6) * LEAST * float(plan.cell[plan.tip]), ending[1], ""
+    for _ in range(_TRIES):
+        length = low + (high - low) * at_low / (at_low - at_high)
+        length = max(length, least)
+        if length >= high - 1e-3 * least:
+            break
+        shorter = _with_length(rule, last, length)
+        if plan_of(shorter).limit:
+            break
+        before = messages[:]
+        messages.clear()
+        step, reuse, ended = _step_after(rule, shorter, reuse)
+        beyond = -np.inf if step is None else beyond_end(rule, step, breaks) - _AIM
+        if step is None or beyond < -_AIM:
+            messages[:] = before
+            if step is None:
+                break
+            low, at_low = length, beyond
+            at_high *= 0.5 if bound == "high" else 1.0
+            bound = "high"
+            continue
+        ending = replace(step, run=replace(run_state(step), cut=True)), reuse, ended
+        high, at_high = length, beyond
+        if beyond <= _AIM:
+            break
+        at_low *= 0.5 if bound == "low" else 1.0
+        bound = "low"
+    return ending
+
+
+def _with_length(rule: GrowthRule, step: Step, length: float) -> Step:
+    """A step with a shorter way ahead, of which the advance of its stations is a share."""
+    shorter = _planned(rule, replace(step, control=replace(step.control, length=length)))
+    plan, before = plan_of(shorter), plan_of(step)
+    share = plan.largest / before.largest if before.largest > 0 else 1.0
+    if rule.integrator == "euler":  # it recognises its stations by that, to round-off
+        return replace(shorter, da=split(plan.arc, [len(da) for da in step.da]))
+    return replace(shorter, da=tuple(share * da for da in step.da))
 
 
 def _refuse(step: Step, ended: str) -> None:
@@ -520,4 +618,4 @@ def _warn_of_ratio(rule: GrowthRule, first: Step) -> None:
     )
 
 
-__all__ = ["first_step", "grow", "growth_steps"]
+__all__ = ["first_step", "grow", "growth_steps", "steps_to_go_on_from"]

@@ -250,6 +250,9 @@ class RunState:
         Fingerprint of the mesh of a run with a tolerance; empty where none was asked for.
     meshes : int
         Number of meshes that the tolerance has made; 0 on the one as given.
+    cut : bool
+        The step is shorter than planned, as the run ends at it: where it goes on after all, with
+        other limits, the step is computed again.
     """
 
     settings: Mapping[str, str]
@@ -257,6 +260,7 @@ class RunState:
     radius: float | None = None
     mesh: str = ""
     meshes: int = 0
+    cut: bool = False
 
 
 @dataclass(frozen=True, eq=False)

@@ -30,6 +30,7 @@ from xcrack.fatigue.kink import START, kinked_K, limit_angles
 from xcrack.fatigue.retardation import BlockCycles, no_zones
 from xcrack.fatigue.spectrum import Spectrum
 from xcrack.growth.corrected import Corrected
+from xcrack.growth.gaps import UNKNOWN, part_of_time
 from xcrack.growth.options import GrowthRule
 from xcrack.growth.rates import CriterionInput, Rates, criterion_inputs, kinds_of
 from xcrack.growth.solves import Growth, SolveHistory, Stretch, halved, stretch_of
@@ -141,6 +142,9 @@ def _met(rule: GrowthRule, step: Step, plan: Plan, stretch: Stretch, met: list[M
     ]
     if not now:
         return plan
+    growth, unsure = _as_gap_closes(step, growth, now)
+    place = stations.x + growth.move
+    apart, moves = with_tips_at(step.corrected, place, stations.fresh, plan.cell)
     whole = joined(apart, moves.tolist(), now)
     return replace(
         plan,
@@ -151,7 +155,42 @@ def _met(rule: GrowthRule, step: Step, plan: Plan, stretch: Stretch, met: list[M
         moves=moves,
         cracks=tuple(whole),
         apart=tuple(apart),
+        error=unsure,
     )
+
+
+def _as_gap_closes(step: Step, growth: Growth, met: list[Meeting]) -> tuple[Growth, float]:
+    """Growth until two facing tips have met, and what is unsure of its cycles.
+
+    No polynomial through solves before follows K in the last of a gap: its time is that of two
+    equal cracks that face each other. The other tips come as far as they can in that.
+    """
+    facing = [own for own in met if own.other >= 0]
+    if not facing or step.zones is not None:
+        return growth, 0.0
+    stations, solves = solves_of(step)
+    rate, m, radius = solves.rate[-1], solves.exponent, _radii(step)
+    best = growth.cycles, 0.0
+    for own in facing:
+        i, k = own.tip, own.other
+        gap, speed = float(np.linalg.norm(stations.x[k] - stations.x[i])), float(rate[i] + rate[k])
+        if speed <= 0:
+            continue
+        plain = gap / speed
+        cycles = plain * part_of_time(2 * gap / float(radius[i] + radius[k]), m, 2)
+        if cycles < best[0]:
+            best = cycles, UNKNOWN[2] * (plain - cycles)
+    cycles, unsure = best
+    share = cycles / growth.cycles if growth.cycles > 0 else 1.0
+    meets = np.isin(np.arange(len(rate)), [row for own in facing for row in (own.tip, own.other)])
+    part = np.where(meets, 1.0, share)
+    return Growth(part[:, None] * growth.move, part * growth.arc, cycles), unsure
+
+
+def _radii(step: Step) -> Floats:
+    """Half the length of the crack of each tip, or all of it where it has but one tip `(n,)`."""
+    half = [size / max(crack.n_tips, 1) for size, crack in zip(step.sizes, step.cracks)]
+    return np.repeat(half, [crack.n_tips for crack in step.cracks])
 
 
 def _arrival(left: Callable[[float], float], most: float) -> float:
@@ -492,14 +531,14 @@ def _without_lost_tips(
     zones = None if zones is None else zones.at(stays)
     lost_rows = np.setdiff1d(np.arange(len(plan.arc)), stays)
     exit_ = _exit(rule, last, ahead, lost_rows)
-    cycles = ahead.arcs(exit_)[1]
     rest = plan.length - exit_
+    cycles = ahead.arcs(exit_)[1] if rest > 0 else plan.cycles
     if 0 < rates.largest < np.inf and last.zones is None:
         cycles += rest / rates.largest
     elif rest > 0:
         cycles = plan.cycles
     lost = np.concatenate(error.place)[stays]
-    own = share_left(rule) * abs(cycles - plan.cycles)
+    own = share_left(rule) * abs(cycles - plan.cycles) + plan.error
     own += solves.exponent * error.behind * cycles
     return Corrected(
         last.cycles + cycles,

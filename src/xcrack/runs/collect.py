@@ -15,7 +15,7 @@ from xcrack.fatigue.cycle import Cycle
 from xcrack.fatigue.law import Law
 from xcrack.fatigue.spectrum import Spectrum
 from xcrack.growth.options import GrowthOptions, GrowthRule, lists_options, run_of
-from xcrack.growth.run import growth_steps
+from xcrack.growth.run import growth_steps, steps_to_go_on_from
 from xcrack.growth.step import Step
 from xcrack.mesh.mesh import Mesh
 from xcrack.model.problem import Problem
@@ -172,7 +172,8 @@ def resume(
             _move_aside(folder, stored, damaged)
         header = replace(header, ended="")
         run_folder.write_header(folder, header)
-        collection.taken.extend(stored.steps)
+        steps = steps_to_go_on_from(run, stored.steps)
+        collection.taken.extend(steps)
         first = stored.steps[0].run if stored.steps else None
         collection.store = RunStore(folder, check, header, "" if first is None else first.mesh)
         meshes: list[Mesh] = []
@@ -180,7 +181,7 @@ def resume(
             every = map(run_folder.read_mesh_file, run_folder.mesh_files(folder))
             meshes = [mesh for mesh in every if mesh is not None]
             collection.mesh = _last_mesh(folder, stored.steps) or problem.mesh
-        return collection.of(growth_steps(run, stored.steps, meshes))
+        return collection.of(growth_steps(run, steps, meshes))
 
 
 def load(path: str | Path) -> Any:

@@ -9,7 +9,7 @@ from xcrack.crack.surfaces import penny_crack
 from xcrack.fatigue.criteria import max_hoop_stress
 from xcrack.fatigue.cycle import Cycle
 from xcrack.fatigue.power import paris
-from xcrack.growth.joins_3d import amplification
+from xcrack.growth.gaps import amplification
 from xcrack.growth.run import grow
 from xcrack.mesh.triangulation import face_areas
 from xcrack.model.loads import traction
