@@ -45,5 +45,7 @@ html_theme_options = (
 )
 html_show_sourcelink = False
 templates_path: list[str] = []
+html_static_path = ["static"]
+html_css_files = ["site.css"]
 
 site_pages.write(DOCS)

@@ -18,13 +18,16 @@ from pathlib import Path
 QUICK = ("edge_crack_growth",)
 GROUPS = {
     "Bodies and meshes": ("mesh.",),
+    "Decks of other programs": ("model.deck",),
     "Cracks": ("crack.",),
-    "Scene": ("scene.",),
-    "Solutions": ("analysis.", "solvers.", "post.", "contact."),
+    "Materials, loads, supports": ("model.",),
+    "Solve, adapt, save": ("analysis.", "linalg.", "adaptivity.", "estimate.", "fem.", "output."),
     "Stress intensity factors": ("sif.",),
-    "Laws, load histories and growth": ("laws.", "spectra.", "growth.", "history.", "life."),
-    "Pictures, charts and reports": ("plotting.", "charting.", "reporting.", "post."),
-    "Command, case files, verification": ("command.", "casefile.", "book."),
+    "Laws, metals and load histories": ("fatigue.",),
+    "Growth": ("growth.",),
+    "Lives, inspections, residual strength, campaigns": ("runs.",),
+    "Pictures and reports": ("view.",),
+    "Case files, command line, evidence": ("app.", "verification."),
     "Others": ("",),
 }
 
@@ -51,26 +54,29 @@ def put(path: Path, text: str) -> None:
 
 
 def write_gallery(root: Path, folder: Path) -> None:
-    """A page for each example, and one that shows them all."""
+    """A page for each example with what it prints, and a grid of thumbnails."""
     cards, names = [], []
     for script in sorted((root / "examples").glob("*.py")):
         title, words, blocks = parts_of(script)
-        pictures = pictures_of(script, root, folder)
+        pictures, printed = results_of(script, root, folder)
         lines = [f"# {title}", "", words, ""]
         for picture in pictures:
             lines += [f"![{picture.stem.replace('_', ' ')}]({picture.name})", ""]
+        if printed:
+            lines += ["## What it prints", "", "```text", printed, "```", ""]
         for heading, code in blocks:
             lines += [f"## {heading}", ""] if heading else []
             lines += ["```python", code.strip("\n"), "```", ""]
         put(folder / f"{script.stem}.md", "\n".join(lines))
         names.append(script.stem)
-        image = f"[![{title}]({pictures[0].name})]({script.stem}.md)\n\n" if pictures else ""
-        cards.append(
-            f"## [{title}]({script.stem}.md)\n\n{image}{words.partition(chr(10) * 2)[0]}\n"
-        )
+        image = [f"[![]({pictures[0].name})]({script.stem}.md)", ""] if pictures else []
+        first = words.partition("\n\n")[0].replace("\n", " ")
+        cards += ["::::{container} card", *image, f"**[{title}]({script.stem}.md)**", "",
+                  first, "::::", ""]  # fmt: skip
     toc = "\n".join(["```{toctree}", ":hidden:", "", *names, "```"])
     intro = "Narrated scripts of the folder `examples`; each checks its own numbers."
-    put(folder / "index.md", f"# Gallery\n\n{intro}\n\n{toc}\n\n" + "\n".join(cards))
+    grid = "\n".join([":::::{container} cards", "", *cards, ":::::"])
+    put(folder / "index.md", f"# Gallery\n\n{intro}\n\n{toc}\n\n{grid}\n")
 
 
 def parts_of(script: Path) -> tuple[str, str, list[tuple[str, str]]]:
@@ -90,9 +96,11 @@ def parts_of(script: Path) -> tuple[str, str, list[tuple[str, str]]]:
     return title, rest.replace("<", "&lt;").replace("*", "\\*"), blocks
 
 
-def pictures_of(script: Path, root: Path, folder: Path) -> list[Path]:
-    """Pictures of an example beside its page: of a run now, or of a stored one."""
+def results_of(script: Path, root: Path, folder: Path) -> tuple[list[Path], str]:
+    """Pictures of an example beside its page, and what it prints: of a run now, or a stored one."""
     stored = sorted((root / "docs" / "figures" / "gallery").glob(f"{script.stem}*.png"))
+    printed = root / "docs" / "figures" / "gallery" / f"{script.stem}.txt"
+    text = printed.read_text(encoding="utf-8").rstrip() if printed.is_file() else ""
     taken = []
     if script.stem in QUICK and os.environ.get("XCRACK_DOCS_RUN", "1") != "0":
         with tempfile.TemporaryDirectory() as name:
@@ -104,39 +112,51 @@ def pictures_of(script: Path, root: Path, folder: Path) -> list[Path]:
                 target = folder / f"{script.stem}_{picture.stem}.png"
                 shutil.copy(picture, target)
                 taken.append(target)
-        return taken
+        return taken, run.stdout.rstrip()
     for picture in stored:
         shutil.copy(picture, folder / picture.name)
         taken.append(folder / picture.name)
-    return taken
+    return taken, text
 
 
 def write_reference(folder: Path) -> None:
-    """A page for each group of public names, from their docstrings."""
+    """A page for each public name, named as users write it, and lists with a line for each."""
     import xcrack
 
-    left = {name: home for name, home in xcrack._HOME.items()}
-    pages = []
+    left = dict(xcrack._HOME)
+    parts, pages = [], []
     for title, homes in GROUPS.items():
-        mine = [name for name, home in left.items() if home.startswith(homes)]
-        if not mine:
+        names = sorted(
+            (name for name, home in left.items() if f"{home}.".startswith(homes)), key=str.lower
+        )
+        if not names:
             continue
-        for name in mine:
-            del left[name]
-        slug = re.sub(r"\W+", "_", title.lower()).strip("_")
-        lines = [f"# {title}", ""]
-        for name in sorted(mine, key=str.lower):
-            kind = "autoclass" if isinstance(getattr(xcrack, name), type) else "autofunction"
-            full = f"xcrack.{xcrack._HOME[name]}.{name}"
-            own = xcrack._HOME[name]
-            options = [":members:", ":no-inherited-members:"] if kind == "autoclass" else []
-            lines += [f"## {name}", "", f"`xcrack.{name}`, in `{own.replace('.', '/')}.py`", "",
-                      "```{eval-rst}", f".. {kind}:: {full}",
-                      *(f"   {option}" for option in options), "```", ""]  # fmt: skip
-        put(folder / f"{slug}.md", "\n".join(lines))
-        pages.append(slug)
-    toc = "\n".join(["```{toctree}", ":maxdepth: 2", "", *pages, "```"])
+        rows = []
+        for name in names:
+            home = left.pop(name)
+            value = getattr(xcrack, name)
+            kind = "autoclass" if isinstance(value, type) else "autofunction"
+            options = ["   :members:", "   :no-inherited-members:"] if kind == "autoclass" else []
+            first = (getattr(value, "__doc__", None) or "").strip().partition("\n")[0]
+            place = f"`xcrack.{name}`, in `{home.replace('.', '/')}.py`"
+            lines = [f"# {name}", "", place, "", "```{eval-rst}", f".. {kind}:: xcrack.{name}",
+                     *options, "```", ""]  # fmt: skip
+            put(folder / f"{slug(name)}.md", "\n".join(lines))
+            rows.append(f"| [`{name}`]({slug(name)}.md) | {cell_text(first)} |")
+            pages.append(slug(name))
+        parts += [f"## {title}", "", "| name | |", "|---|---|", *rows, ""]
+    toc = "\n".join(["```{toctree}", ":hidden:", "", *pages, "```"])
     intro = (
         "What `import xcrack as xc` offers, from the docstrings: `help(xc.solve)` says the same."
     )
-    put(folder / "index.md", f"# Reference\n\n{intro}\n\n{toc}\n")
+    put(folder / "index.md", "\n".join([f"# Reference\n\n{intro}\n\n{toc}\n", *parts]))
+
+
+def slug(name: str) -> str:
+    """Name of a page; capitals are told apart on disks that do not."""
+    return f"{name}_class" if name[:1].isupper() else name
+
+
+def cell_text(words: str) -> str:
+    """A line as a cell of a table."""
+    return words.replace("|", "\\|").replace("*", "\\*").replace("<", "&lt;")

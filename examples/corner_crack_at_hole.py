@@ -138,5 +138,5 @@ assert {end.name for end in first.ends} == {"front", "hole"}
 assert (np.diff(rows["area"]) > 0).all()
 if not QUICK:
     assert through(history.steps[-1])
-    assert rows["depth"][-1] > 0.9 * THICKNESS
+    assert rows["length_hole"][-1] > 0.9 * THICKNESS
 print(f"pictures, ParaView files and tables are in {OUT.resolve()}")

@@ -150,6 +150,7 @@ _HOME = {
     "validate": "verification.experiments.validate",
     "report": "view.report",
     "read_case": "app.case",
+    "sweep": "app.sweep",
     "run": "app.case_run",
     "info": "app.info",
     "demo": "app.demo",

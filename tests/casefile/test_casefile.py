@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 import xcrack as xc
+from xcrack.app.main import main
+from xcrack.app.sweep import values_of
 from xcrack.base.units import FORCE, LENGTH, STRESS, TOUGHNESS, Units
 
 pytestmark = pytest.mark.filterwarnings("ignore::xcrack.XcrackWarning")
@@ -328,3 +330,97 @@ def test_what_run_refuses(tmp_path):
         xc.run(tmp_path / "run", script(), resumed=True)
     with pytest.raises(xc.ProblemError, match="law = None"):
         xc.run(tmp_path / "run", script(), progress=False)
+
+
+def test_keys_can_be_changed(tmp_path):
+    """By their place: tables of a list and entries of an array are counted from 0."""
+    file = tmp_path / "case.toml"
+    file.write_text(SWEPT, encoding="utf-8")
+    changes = {"cracks.0.points.1.0": 8.0, "loads.0.value.1": "100 MPa", "title": "Other"}
+    case = xc.read_case(file, changes)
+    assert case.problem.cracks[0].points[1].tolist() == [8.0, 1.0]
+    assert np.asarray(case.problem.loads[0].value).tolist() == [0.0, 100.0]
+    assert case.title == "Other"
+    for changes, words in (
+        ({"crack.0.points": 3}, "the file has no 'crack'; it has title"),
+        ({"cracks.1.points": 3}, "a list of 1, counted from 0"),
+        ({"title.x": 3}, "'Strip', which has no parts"),
+        ({"material.bulk": 3}, "there is no such key"),
+    ):
+        with pytest.raises(xc.ProblemError, match=words):
+            xc.read_case(file, changes)
+
+
+def test_sweep_is_one_table_and_one_picture(tmp_path, capsys):
+    """Lives of a sweep are those of runs one by one; failures are rows; it goes on where it was."""
+    file = tmp_path / "case.toml"
+    file.write_text(SWEPT, encoding="utf-8")
+    words = ["sweep", str(file), "--set", "cracks.0.points.1.0=4,30", "--set", "growth.law.m=2.9"]
+    with pytest.warns(xc.XcrackWarning, match="1 of 2 cases failed"):
+        assert main(words) == 1
+    out = capsys.readouterr().out
+    assert "2 cases in" in out
+    assert "1 failed with ProblemError: the cracks cut the body" in out
+    folder = tmp_path / "case_sweep"
+    rows = (folder / "sweep.csv").read_text().splitlines()
+    assert rows[0].startswith("cracks.0.points.1.0,growth.law.m,life,steps,ended,folder")
+    assert (folder / "sweep.png").stat().st_size > 5e3
+    changes = {"cracks.0.points.1.0": 4, "growth.law.m": 2.9}
+    case = xc.read_case(file, changes)
+    life = xc.collect(xc.grow(case.problem, **{**case.growth, "progress": False})).life
+    assert float(rows[1].split(",")[2]) == life
+    assert xc.load(folder / rows[1].split(",")[5]).life == life  # as report and life take it
+    stamp = {path: path.stat().st_mtime_ns for path in folder.glob("row_*")}
+    with pytest.warns(xc.XcrackWarning, match="1 of 2"):
+        xc.sweep(file, {key: [v] if key != "cracks.0.points.1.0" else [4, 30]
+                        for key, v in changes.items()})  # fmt: skip
+    assert stamp == {path: path.stat().st_mtime_ns for path in folder.glob("row_*")}
+    with pytest.raises(xc.ProblemError, match="give a key of the file and its values"):
+        values_of("radius")
+    with pytest.raises(xc.ProblemError, match="a list is empty"):
+        xc.sweep(file, {"title": []})
+
+
+def test_sweep_of_solutions(tmp_path):
+    """K of each state, with units in the values."""
+    file = tmp_path / "case.toml"
+    text = SWEPT.partition("[growth]")[0] + "[solve]\nstates = [0.5, 1.0]\n"
+    file.write_text(text, encoding="utf-8")
+    rows = xc.sweep(
+        file, {"loads.0.value.1": ["80 MPa", "80000 kPa"]}, folder=tmp_path / "s"
+    ).table()
+    assert rows["K_I in state 1"][0] == pytest.approx(2 * rows["K_I in state 0"][0])
+    assert rows["K_I in state 1"][1] == pytest.approx(rows["K_I in state 1"][0], rel=1e-12)
+
+
+SWEPT = """
+title = "Strip"
+[units]
+length = "mm"
+force = "N"
+[mesh]
+kind = "box"
+lower = [0.0, -10.0]
+upper = [20.0, 10.0]
+n = [20, 20]
+[material]
+E = "210 GPa"
+nu = 0.3
+plane = "strain"
+[[cracks]]
+kind = "line"
+points = [[0.0, 1.0], [6.0, 1.0]]
+[[loads]]
+kind = "traction"
+where = "top"
+value = [0.0, "80 MPa"]
+[[loads]]
+kind = "traction"
+where = "bottom"
+value = [0.0, "-80 MPa"]
+[growth]
+law = { kind = "paris", C = 1e-11, m = 3 }
+cycle = { min = 0.1, max = 1.0 }
+da = 1.0
+max_steps = 2
+"""

@@ -116,6 +116,16 @@ def _run(path, **named):
     return xc.run(path, **named)
 
 
+def _changed(changes):
+    _case()
+    return xc.read_case("case.toml", changes)
+
+
+def _swept(path, values, **named):
+    _case()
+    return xc.sweep(path, values, **named).table()["seconds"]
+
+
 def _reported(**named):
     given = {"result": scenes.solution(), "file": "good.html"}
     return xc.report(**given | named)
@@ -150,6 +160,44 @@ ENTRIES = [
         in_folder=True,
         arity=False,
         cost=0.05,
+    ),
+    Entry(
+        "read_case",
+        lambda changes: _changed(changes).problem.mesh,
+        {
+            "changes": arg(
+                Seen(rule=lambda v: v is None or (None if isinstance(v, dict) else False)),
+                None,
+                {"material.nu": 0.2},
+                words=["changes", "key"],
+            )
+        },
+        in_folder=True,
+        arity=False,
+        cost=0.05,
+    ),
+    Entry(
+        "sweep",
+        _swept,
+        {
+            "path": arg(
+                Filename(known=("case.toml",)),
+                "case.toml",
+                near=paths(".toml", ""),
+                words=["toml", "file", "scene"],
+            ),
+            "values": arg(
+                Seen(rule=lambda v: None if isinstance(v, dict) else False),
+                {"material.nu": [0.2, 0.3]},
+                words=["values", "key", "list"],
+            ),
+            "folder": arg(Filename(rule=lambda v: None), "swept"),
+            "workers": arg(Seen(rule=lambda v: "skip" if v != 1 else True), 1),
+            "retry": arg(Flag(), False),
+        },
+        in_folder=True,
+        cost=3.0,
+        share=0.02,
     ),
     Entry(
         "run",

@@ -36,7 +36,7 @@ NAMES = [
     "schijve_closure", "stepped_threshold",
     "time_rate", "with_time",
     # verification, reports, files of scenes
-    "verify", "validate", "report", "read_case", "run", "info", "demo", "convert_mesh",
+    "verify", "validate", "report", "read_case", "run", "sweep", "info", "demo", "convert_mesh",
     # what users derive from
     "Closure", "GrowthLaw", "Load", "Material", "Threshold",
     # campaigns

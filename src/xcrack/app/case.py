@@ -10,7 +10,8 @@ from xcrack.app import case_values as values
 from xcrack.app.case_histories import loading, retardation_of
 from xcrack.app.case_tables import Table, read_tables
 from xcrack.base.arguments import FileName, check_arguments
-from xcrack.base.errors import XcrackError
+from xcrack.base.checks import value_text
+from xcrack.base.errors import ProblemError, XcrackError
 from xcrack.base.units import LENGTH, NUMBER, TOUGHNESS
 from xcrack.fatigue.law import GrowthLaw
 from xcrack.fatigue.retardation import plastic_zone
@@ -61,12 +62,15 @@ class CaseFile:
 
 
 @check_arguments()
-def read_case(path: FileName) -> CaseFile:
+def read_case(path: FileName, changes: Mapping[str, Any] | None = None) -> CaseFile:
     """Read a scene from a toml file.
 
     Parameters
     ----------
     path : path
+    changes : mapping of key to value, optional
+        Other values than the file has, such as ``{"cracks.0.radius": 2.0}``; tables of a list and
+        entries of an array are counted from 0.
 
     Returns
     -------
@@ -79,7 +83,11 @@ def read_case(path: FileName) -> CaseFile:
         message has file, line, and how to mend it.
     """
     file = Path(path)
-    root = read_tables(file)
+    if not isinstance(changes, Mapping | None):
+        raise ProblemError(
+            f"read_case: changes = {value_text(changes)}: give a dict of keys and values."
+        )
+    root = read_tables(file, {str(key): value for key, value in (changes or {}).items()})
     root.known(_SECTIONS)
     for name in ("mesh", "material"):
         if name not in root:

@@ -3,7 +3,7 @@
 import difflib
 import re
 import tomllib
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NoReturn
@@ -111,13 +111,13 @@ class Table:
         raise kind(f"{self.source.path}, line {line}, {_key_text(place)}: {text}") from error
 
 
-def read_tables(path: Path) -> Table:
-    """The root table of a file.
+def read_tables(path: Path, changes: Mapping[str, Any] | None = None) -> Table:
+    """The root table of a file, with other values of some keys.
 
     Raises
     ------
     ProblemError
-        No such file, or one that is no toml.
+        No such file, one that is no toml, or a key to be changed that it does not have.
     """
     with system_errors("the scene cannot be read from", path, error=ProblemError):
         data = path.read_bytes()
@@ -133,6 +133,8 @@ def read_tables(path: Path) -> Table:
         raise ProblemError(
             f"{path}, line {line}: this is no toml ({error}); texts stand in quotes, lists in [ ]."
         ) from error
+    for key, value in (changes or {}).items():
+        _change(content, key, value, path)
     source = Source(path, _lines(text))
     root = Table(source, (), content)
     units = root.table("units")
@@ -142,6 +144,32 @@ def read_tables(path: Path) -> Table:
     except ProblemError as error:
         units.wrap(error)
     return Table(Source(path, source.lines, units_of_file), (), content)
+
+
+def _change(content: dict[str, Any], key: str, value: Any, path: Path) -> None:
+    """Set a key such as ``cracks.0.radius``: tables of a list and entries are counted from 0."""
+    place: Any = content
+    parts = key.split(".")
+    for n, part in enumerate(parts):
+        where = ".".join(parts[:n]) or "the file"
+        if isinstance(place, list):
+            if not part.isdecimal() or int(part) >= len(place):
+                raise ProblemError(
+                    f"{path}: {key}: {where} is a list of {len(place)}, counted from 0: give one "
+                    f"of its numbers in place of {part!r:.40}."
+                )
+            index: Any = int(part)
+        elif isinstance(place, dict):
+            index = part
+            if part not in place and n < len(parts) - 1:
+                known = ", ".join(place) or "nothing"
+                raise ProblemError(f"{path}: {key}: {where} has no {part!r:.40}; it has {known}.")
+        else:
+            raise ProblemError(f"{path}: {key}: {where} is {place!r:.40}, which has no parts.")
+        if n == len(parts) - 1:
+            place[index] = value
+        else:
+            place = place[index]
 
 
 def _lines(text: str) -> dict[Key, int]:

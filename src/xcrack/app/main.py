@@ -67,6 +67,19 @@ def _parser() -> argparse.ArgumentParser:
     subparser.add_argument(
         "--overwrite", action="store_true", help="begin anew, move old steps aside"
     )
+    subparser = add("sweep", _sweep, "run a case file for many values of some keys")
+    subparser.add_argument("case", type=Path, help="a toml file")
+    subparser.add_argument(
+        "--set",
+        dest="values",
+        action="append",
+        required=True,
+        metavar="KEY=A,B,...",
+        help="such as cracks.0.radius=1,2,3; several: all combinations",
+    )
+    subparser.add_argument("--workers", type=int, default=1, help="processes")
+    subparser.add_argument("--retry", action="store_true", help="run those again that failed")
+    subparser.add_argument("-o", "--output", type=Path, help="folder; left out: beside the file")
     subparser = add("report", _report, "report of a growth run from its folder")
     subparser.add_argument("folder", type=Path, help="the folder of the run")
     subparser.add_argument(
@@ -146,6 +159,23 @@ def _run(options: argparse.Namespace) -> int:
     print(result if not isinstance(result, list) else "\n".join(map(str, result)))
     print(f"results are in {xcrack.read_case(options.case).folder.resolve()}")
     return 0
+
+
+def _sweep(options: argparse.Namespace) -> int:
+    from xcrack.app.sweep import values_of
+
+    values = dict(values_of(text) for text in options.values)
+    study = xcrack.sweep(
+        options.case, values, folder=options.output, workers=options.workers, retry=options.retry
+    )
+    rows = study.table()
+    shown = [name for name in rows.dtype.names or () if name not in ("seconds", "folder")]
+    print("  ".join(shown))
+    for row in rows:
+        print("  ".join(f"{v:.6g}" if isinstance(v, float) else str(v)
+                        for v in (row[name] for name in shown)))  # fmt: skip
+    print(study)
+    return 1 if study.failed else 0
 
 
 def _report(options: argparse.Namespace) -> int:

@@ -9,7 +9,7 @@ import numpy as np
 from xcrack.analysis.solution import Solution
 from xcrack.base.arguments import Argument, Declared, arguments_of
 from xcrack.base.arrays import coordinates
-from xcrack.base.markup import Markup, element, join_parts, list_markup, table
+from xcrack.base.markup import Markup, display_text, element, join_parts, list_markup, table
 from xcrack.base.units import FORCE, LENGTH, LINE_FORCE, MOMENT, NUMBER, Dimension
 from xcrack.crack.crack import Crack
 from xcrack.crack.measures import Measures, measures
@@ -140,7 +140,7 @@ def _value(value: Any) -> str:
         name = getattr(value, "__name__", getattr(value, "name", type(value).__name__))
         return f"function {name}"
     array = np.asarray(value, dtype=object)
-    return str(_short(array.tolist()) if array.ndim else _short(value))
+    return str(_short(array.tolist())) if array.ndim else display_text(value)
 
 
 def _short(value: Any) -> Any:

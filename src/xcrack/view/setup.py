@@ -52,14 +52,14 @@ def _size(mesh: Mesh) -> tuple[float, float]:
         return 7.5, 6.2
     extent = np.ptp(mesh.points, axis=0)
     width, height = 6.0 * extent / extent.max()
-    return max(float(width), 3.0) + 1.4, max(float(height), 2.4) + 1.6
+    return max(float(width), 5.6) + 1.4, max(float(height), 2.4) + 1.6
 
 
 def _draw_body(axes: Any, mesh: Mesh) -> None:
     lines = boundary_lines(mesh) if mesh.dim == 2 else _edges(mesh)
     axes.add_collection(_lines(lines, "black", 1.0, mesh.dim))
     low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
-    margin = (1.3 * _ARROW if mesh.dim == 2 else 0.5 * _ARROW) * mesh.extent
+    margin = (1.5 * _ARROW if mesh.dim == 2 else 0.5 * _ARROW) * mesh.extent
     names = "xyz"[: mesh.dim]
     axes.set(**{f"{name}lim": (a - margin, b + margin) for name, a, b in zip(names, low, high)},
              **{f"{name}label": name for name in names})  # fmt: skip
@@ -215,7 +215,7 @@ def _draw_cracks(axes: Any, problem: Problem) -> None:
         if len(ends):
             axes.plot(*np.transpose(ends), "x", color=_CRACK, ms=7, mew=1.8, zorder=6)
     if len(shown):
-        words = "cracks, by number, with their normal (from the - to the + face)"
+        words = "cracks with their normal (- to + face)"
         words += "; x: tips" if dim == 2 else ""
         _entry(axes, dim, words, _CRACK, "_")
 
