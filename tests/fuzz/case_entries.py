@@ -229,7 +229,7 @@ ENTRIES = [
             "file": arg(
                 Filename(endings=(".html",)),
                 "good.html",
-                near={k: v for k, v in paths(".html", "").items() if "other" not in k},
+                near=paths(".html", ""),
                 words=["report"],
             ),
             "title": arg(Word(), "a"),

@@ -102,7 +102,12 @@ ENTRIES = [
         lambda materials: xc.Problem(scenes.mesh().with_cell_sets(HALVES), materials),
         {
             "materials": arg(
-                Seen(rule=lambda v: _by_set(v) is True and set(v) == {"left", "right"}),
+                Seen(
+                    rule=lambda v: (
+                        isinstance(v, xc.Isotropic)  # of the whole body
+                        or (_by_set(v) is True and set(v) == {"left", "right"})
+                    )
+                ),
                 Late(lambda: {"left": scenes.STEEL, "right": GLUE}),
                 words=["material"],
                 near={

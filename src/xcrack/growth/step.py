@@ -455,7 +455,7 @@ class Step:
                 raise ProblemError(f"Step: warnings = {value_text(self.warnings)}: give texts.")
             object.__setattr__(self, "warnings", messages)
         states = [entries(state, "Step: sif") for state in entries(self.sif, "Step: sif")]
-        if not all(isinstance(sif, SIF) for state in states for sif in state):
+        if not states or not all(isinstance(sif, SIF) for state in states for sif in state):
             raise ProblemError(
                 f"Step: sif = {value_text(self.sif)}: give SIF of states and cracks."
             )

@@ -693,7 +693,7 @@ class MaterialSets(Material):
         if other is not None:
             raise ProblemError(
                 f'material: {self.materials[0][0]!r} is of plane "{self.plane}", and {other!r} of '
-                f'plane "{self[other].plane}": a body is in one state.'
+                f'plane "{self[other].plane}": give all the same.'
             )
 
     def stiffness(self) -> Floats:

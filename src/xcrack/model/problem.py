@@ -301,7 +301,8 @@ class Problem(Declared):
     def _check_load(self, load: Any) -> None:
         if not isinstance(load, Load):
             raise ProblemError(
-                f"loads: {value_text(load)} is not a load; see traction(...), pressure(...)."
+                f"load state: {value_text(load)} is not a load: give loads such as traction(...), "
+                "or a number that scales those of the problem."
             )
         load.check(self)
 

@@ -59,7 +59,9 @@ def opening_load(step: Step) -> OpeningLoad:
     if not isinstance(step, Step):
         raise ProblemError(f"opening_load: step = {value_text(step)}: give a Step.")
     if not step.levels:
-        raise ProblemError("opening_load: the step has no levels: run it with Spectrum(factors).")
+        raise ProblemError(
+            "opening_load: the step has no levels: give one of a run under Spectrum(factors)."
+        )
     levels = np.array(step.levels)
     parts = [
         _of_crack(levels, np.stack([s[c].K[:, 0] for s in step.sif]))

@@ -83,10 +83,15 @@ def report(
     Raises
     ------
     ProblemError
-        No run in the folder, or a file that cannot be written.
+        No run in the folder, a file with another suffix, or one that cannot be written.
     """
     path = Path(file)
     path = path if path.suffix else path.with_name(path.name + ".html")
+    if path.suffix.lower() != ".html":
+        raise ProblemError(
+            f"report: file = {value_text(str(file))}: a report is a page: give a file that ends "
+            "in .html."
+        )
     names = getattr(getattr(strength, "dtype", None), "names", None) or ()
     if strength is not None and not {"step", "by_toughness"} <= set(names):
         raise ProblemError(
