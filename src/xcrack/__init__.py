@@ -30,6 +30,7 @@ _HOME = {
     "Crack": "crack.crack",
     "line_crack": "crack.lines",
     "penny_crack": "crack.surfaces",
+    "arm": "crack.junctions_3d",
     "elliptic_crack": "crack.surfaces",
     "plane_crack": "crack.surfaces",
     "surface_crack": "crack.surfaces",

@@ -7,6 +7,7 @@ from fuzz.entry import Entry, arg
 from fuzz.kinds import (
     ListOf,
     Numbers,
+    Of,
     Whole,
 )
 from fuzz.scene_rules import POSITIVE, SQUARE
@@ -51,6 +52,7 @@ ENTRIES = [
                 ),
                 None,
             ),
+            "ends_on": arg(ListOf(item=Numbers((2,)), rule=lambda v: not v), ()),
         },
     ),
     Entry(
@@ -78,6 +80,19 @@ ENTRIES = [
             "normal": arg(Numbers((3,), rule=lambda v: bool(v.any())), (0, 0, 1), [1, 1, 1]),
             "radius": arg(POSITIVE, 1.0, 2),
             "n": arg(Whole(least=8, most=100_000), 16, 33),
+        },
+    ),
+    Entry(
+        "arm",
+        xc.arm,
+        {
+            "crack": arg(
+                Of(type=xc.Crack, rule=lambda crack: crack.dim == 3),
+                xc.penny_crack((0, 0, 0), (0, 0, 1), 1.0, n=16),
+                near={"in 2D": lambda: xc.line_crack([(0, 0), (1, 0)])},
+            ),
+            "on": arg(Whole(least=0), 0, 3),
+            "side": arg(Whole(least=-1, most=1, rule=bool), 1, -1),
         },
     ),
     Entry(

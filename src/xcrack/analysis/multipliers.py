@@ -17,6 +17,7 @@ import scipy.sparse as sp
 from xcrack.base.arrays import Bools, Floats, Ints, offsets, ranges
 from xcrack.fem.facets import LipPoints, arc_position
 from xcrack.fem.function_space import FunctionSpace
+from xcrack.fem.joints_2d import Joint
 
 # Share of the median below which a group cut off at a junction joins another, and of groups below
 # which faces between kinks join others. Meshes of squares give halves: round-off must not decide.
@@ -86,6 +87,12 @@ def multipliers(
         values = sp.csr_matrix((traces.data, column, traces.indptr), shape=shape)
     if space.dim == 3 and material is not None and kind != "naive":
         values = _split_groups(values, lips.weight, material[lips.cell])
+    if space.dim == 3 and kind != "naive":
+        for joint in space.joints:
+            if joint.on == c:
+                values = _split_groups(values, lips.weight, *_sides_of_arm(space, joint, lips))
+    if space.dim == 3:
+        values.sum_duplicates()
     elif len(parts) > 1:
         kinked, crosses = len(space.cuts[c].kinks.points) > 0, material is not None
         values = _broken_functions(values, lips, parts, hats, kinked, crosses)
@@ -114,7 +121,9 @@ def _sums(values: sp.csr_matrix, x: Floats) -> Floats:
 
 
 def _parts(space: FunctionSpace, c: int, lips: LipPoints, material: Ints | None) -> list[Ints]:
-    """Lip points between kinks of crack c, ends of other cracks on it, and interfaces."""
+    """Lip points in 2D between kinks of crack c, ends of other cracks on it, and interfaces."""
+    if space.dim == 3:
+        return []
     line = space.cracks[c].points
     kinks = space.cuts[c].kinks.points
     ends = np.array([*(joint.x for joint in space.joints if joint.on == c), *kinks])
@@ -122,7 +131,7 @@ def _parts(space: FunctionSpace, c: int, lips: LipPoints, material: Ints | None)
     if len(ends):
         begin = arc_position(line, lips.x[:1])[0] - lips.s[0]
         part = np.searchsorted(np.sort(arc_position(line, ends)) - begin, lips.s)
-    if material is not None and len(lips) and space.dim == 2:
+    if material is not None and len(lips):
         order = np.argsort(lips.s, kind="stable")
         crosses = (np.diff(material[lips.cell[order]], axis=0) != 0).any(axis=1)
         crosses |= np.diff(part[order]) != 0
@@ -163,8 +172,19 @@ def _broken_functions(
     return sp.csr_matrix(sp.hstack(columns))
 
 
-def _split_groups(values: sp.csr_matrix, weight: Floats, material: Ints) -> sp.csr_matrix:
-    """Groups on a surface that end at interfaces, where pressures jump.
+def _sides_of_arm(space: FunctionSpace, joint: Joint, lips: LipPoints) -> tuple[Ints, Bools]:
+    """Side of a crack that ends there on which lip points lie `(q, 1)`, and those beside it."""
+    k = (1 + joint.side) // 2
+    cell, bary = lips.cell[:, k], lips.bary[:, k]
+    corner = space.mesh.cells[cell]
+    level = np.einsum("qb,qb->q", bary, space.cuts[joint.crack].level_set.phi[corner])
+    return np.where(level >= 0, 1, -1)[:, None], joint.both[cell]
+
+
+def _split_groups(
+    values: sp.csr_matrix, weight: Floats, material: Ints, beside: Bools | None = None
+) -> sp.csr_matrix:
+    """Groups on a surface that end at interfaces or junctions, where pressures jump.
 
     Of a group that an interface cuts the largest piece stands, since all of them share its nodes;
     each other piece joins the group on its side of which the function overlaps most. Where there is
@@ -174,8 +194,10 @@ def _split_groups(values: sp.csr_matrix, weight: Floats, material: Ints) -> sp.c
     ----------
     values : sparse matrix (q, g)
     weight : (q,) array
-    material : (q, 2) array of int
-        Of the cells on both sides of each point.
+    material : (q, k) array of int
+        Of the cells on both sides of each point, or the side of a crack that ends there.
+    beside : (q,) array of bool, optional
+        Points in cells with an interface: only groups that reach these end there.
     """
     pairs, part = np.unique(material, axis=0, return_inverse=True)
     if len(pairs) == 1:
@@ -189,6 +211,19 @@ def _split_groups(values: sp.csr_matrix, weight: Floats, material: Ints) -> sp.c
         sp.csr_matrix(sp.diags((part == p).astype(float)) @ values) for p in range(len(pairs))
     ]
     mass = np.stack([_sums(piece, weight) for piece in pieces])
+    if beside is not None:  # the others stay whole, with the part in which they have most
+        whole = np.nonzero(_sums(values, weight * beside) <= 1e-14 * typical)[0]
+        most = mass.argmax(axis=0)
+        stays = np.zeros(len(total), dtype=bool)
+        stays[whole] = True
+        pieces = [
+            sp.csr_matrix(
+                piece @ sp.diags((~stays).astype(float))
+                + values @ sp.diags((stays & (most == p)).astype(float))
+            )
+            for p, piece in enumerate(pieces)
+        ]
+        mass = np.stack([_sums(piece, weight) for piece in pieces])
     standing = mass > (0.5 + _SAME) * total
     count = 0
     for p, piece in enumerate(pieces):

@@ -28,6 +28,10 @@ class Crack:
         In 3D: point numbers along each front, in the direction of the third row of its frames
         (ahead, normal, ahead x normal); a closed front repeats its first point at the end. None
         where no mesh has decided yet.
+    ends_on : tuple of (int, {1, -1}), optional
+        In 3D: cracks of the same problem on which this one ends, by their numbers, and the side of
+        each from which it comes: +1 is that to which the normal points. What lies beyond does not
+        count; see `arm`.
 
     Raises
     ------
@@ -39,6 +43,7 @@ class Crack:
     faces: Ints
     tips: tuple[int, ...] | None = None
     fronts: tuple[Ints, ...] | None = None
+    ends_on: tuple[tuple[int, int], ...] = ()
 
     def __post_init__(self) -> None:
         points = point_coordinates(self.points, "Crack: points", (None, None), error=GeometryError)
@@ -54,6 +59,8 @@ class Crack:
             given = entries(self.fronts, "Crack: fronts", error=GeometryError)
             fronts = [self._numbers(f"fronts[{k}]", f, (None,)) for k, f in enumerate(given)]
             object.__setattr__(self, "fronts", tuple(fronts))
+        if self.ends_on:
+            object.__setattr__(self, "ends_on", _checked_ends(self.ends_on, d))
 
     def _numbers(self, name: str, given: Any, shape: Shape) -> Ints:
         """Point numbers as a read-only array."""
@@ -87,6 +94,19 @@ class Crack:
         elif self.tips is not None:
             ends = f"tips {list(self.tips)}"
         return f"Crack({len(self.points)} points, {len(self.faces)} faces, {ends})"
+
+
+def _checked_ends(given: Any, d: int) -> tuple[tuple[int, int], ...]:
+    """Numbers of other cracks and the sides from which one ends on them."""
+    if d == 2:
+        raise GeometryError("Crack: ends_on is of 3D: in 2D a crack ends on another with its end.")
+    pairs = whole_numbers(given, "Crack: ends_on", (None, 2), error=GeometryError)
+    if (pairs[:, 0] < 0).any() or (np.abs(pairs[:, 1]) != 1).any():
+        raise GeometryError(
+            f"Crack: ends_on = {pairs.tolist()}: give pairs of the number of a crack, from 0 on, "
+            "and of the side 1 or -1 of it."
+        )
+    return tuple((int(on), int(side)) for on, side in pairs.tolist())
 
 
 def crack_length(crack: Crack) -> float:

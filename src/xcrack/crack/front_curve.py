@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from xcrack.base.arrays import Floats, Ints, lock
+from xcrack.base.arrays import Bools, Floats, Ints, lock
 from xcrack.base.errors import GeometryError
 
 # Points among which the first guess of a foot is looked for: in all, and at least on a piece.
@@ -35,6 +35,12 @@ class FootPoints:
     local: Floats
     frame: Floats
     turn: Floats
+
+    def chosen(self, selection: Bools | Ints) -> "FootPoints":
+        """Some of the points, by a mask or by their numbers."""
+        return FootPoints(
+            self.s[selection], self.local[selection], self.frame[selection], self.turn[selection]
+        )
 
     @property
     def r(self) -> Floats:

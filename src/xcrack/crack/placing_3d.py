@@ -9,7 +9,8 @@ from xcrack.base.arrays import Bools, Floats, Ints, at
 from xcrack.base.errors import CoarseMeshError, GeometryError, warn
 from xcrack.crack.boundary_trace import OUTSIDE, SIDE, SMOOTH, TraceOutline, open_fronts, runs_of
 from xcrack.crack.crack import Crack
-from xcrack.mesh.distances import closest_in, first_crossing, triangle_tree
+from xcrack.crack.junctions_3d import are_opposite, crossings, is_before, may_touch
+from xcrack.mesh.distances import closest_in, triangle_tree
 from xcrack.mesh.locate import Body, locate
 from xcrack.mesh.mesh import Mesh
 from xcrack.mesh.polygon import cross, is_within
@@ -256,6 +257,8 @@ def place_surface(crack: Crack, mesh: Mesh) -> Crack:
         No part of the crack lies inside the body; or the crack is smaller than a cell, or ends
         less than half a cell inside the boundary that it comes from.
     """
+    if crack.ends_on and crack.fronts is not None:
+        return crack
     placed, short = _placed(crack, mesh)
     if crack.fronts is None:
         for front in short:
@@ -450,11 +453,15 @@ def check_surfaces(cracks: tuple[Crack, ...], mesh: Mesh) -> None:
     body = Body.of(mesh)
     for j, crack in enumerate(cracks):
         for i in range(j):
-            meeting = _meeting_point(cracks[i], crack, body)
-            if meeting is not None:
+            if may_touch(cracks, i, j):
+                continue
+            meeting = _meeting_points(cracks[i], crack, body)
+            meeting = meeting[is_before(cracks, i, meeting) & is_before(cracks, j, meeting)]
+            if len(meeting):
                 raise GeometryError(
-                    f"cracks {i} and {j} cross near {at(meeting)}: crossing and "
-                    "branching cracks are not supported; end one of them a few cells before."
+                    f"cracks {i} and {j} cross near {at(meeting[0])}: let one of them end on the "
+                    f"other, arm(crack, on={i}, side=1), and where it goes on beyond give a second "
+                    "arm with side=-1; or end it a few cells before."
                 )
     _check_apart(cracks, body)
 
@@ -464,8 +471,10 @@ def _check_apart(cracks: tuple[Crack, ...], body: Body) -> None:
     parts, owners = [np.zeros((0, 3))], [np.zeros(0, dtype=np.int64)]
     for i, crack in enumerate(cracks):
         for front in crack.fronts or ():
-            parts.append(crack.points[front])
-            owners.append(np.full(len(front), i))
+            part = crack.points[front]
+            part = part[is_before(cracks, i, part)]
+            parts.append(part)
+            owners.append(np.full(len(part), i))
     x, owner = np.concatenate(parts), np.concatenate(owners)
     inside = body.contains(x)
     x, owner = x[inside], owner[inside]
@@ -475,6 +484,9 @@ def _check_apart(cracks: tuple[Crack, ...], body: Body) -> None:
     size = body.cell_size(x)
     pairs = cKDTree(x).query_pairs(float(size.max()), output_type="ndarray")
     pairs = pairs[owner[pairs[:, 0]] != owner[pairs[:, 1]]]
+    if any(crack.ends_on for crack in cracks):
+        apart = [not are_opposite(cracks[a], cracks[b]) for a, b in owner[pairs].tolist()]
+        pairs = pairs[np.array(apart, dtype=bool)]
     distance = np.linalg.norm(x[pairs[:, 0]] - x[pairs[:, 1]], axis=1)
     close_pairs = np.nonzero(
         (distance < size[pairs].min(axis=1)) | (cell[pairs[:, 0]] == cell[pairs[:, 1]])
@@ -494,28 +506,21 @@ def _check_apart(cracks: tuple[Crack, ...], body: Body) -> None:
         )
 
 
-def _meeting_point(one: Crack, other: Crack, body: Body) -> Floats | None:
-    """A point inside the body where two surfaces cross or touch, or None."""
+def _meeting_points(one: Crack, other: Crack, body: Body) -> Floats:
+    """Points inside the body where two surfaces cross or touch `(n, 3)`."""
     low = np.maximum(one.points.min(axis=0), other.points.min(axis=0))
     high = np.minimum(one.points.max(axis=0), other.points.max(axis=0))
     if (low > high).any():
-        return None
-    parts = [np.zeros((0, 3))]
+        return np.zeros((0, 3))
+    parts = [crossings(one, other)]
+    # Surfaces in one plane cross nothing, but lie on each other.
     for a, b in ((one, other), (other, one)):
-        tree = triangle_tree(b.points, b.faces)
-        pairs = np.unique(np.sort(sides(a.faces).reshape(-1, 2), axis=1), axis=0)
-        start, stop = a.points[pairs[:, 0]], a.points[pairs[:, 1]]
-        triangle, position = first_crossing(tree, start, stop)
-        hit = triangle >= 0
-        parts.append(start[hit] + position[hit, None] * (stop - start)[hit])
-        # Surfaces in one plane cross nothing, but lie on each other.
         x = np.concatenate([a.points, a.points[a.faces].mean(axis=1)])
         size = body.cell_size(x)
-        closest = closest_in(tree, x, _TOUCH * float(size.max()))
+        closest = closest_in(triangle_tree(b.points, b.faces), x, _TOUCH * float(size.max()))
         parts.append(x[(closest.triangle >= 0) & (closest.distance < _TOUCH * size)])
     points = np.concatenate(parts)
-    points = points[body.contains(points)]
-    return points[0] if len(points) else None
+    return points[body.contains(points)]
 
 
 __all__ = []

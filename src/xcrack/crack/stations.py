@@ -2,15 +2,17 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
-from xcrack.base.arrays import Floats, Ints, lock
+from xcrack.base.arrays import Bools, Floats, Ints, lock
 from xcrack.base.errors import GeometryError
 from xcrack.crack import junctions as junctions_2d
 from xcrack.crack.crack import Crack, tip_frames
 from xcrack.crack.front_curve import front_curve
 from xcrack.crack.junctions import Junction
+from xcrack.crack.junctions_3d import arms_placed, is_before, surface_junctions
 from xcrack.crack.placing_2d import check_lines, place_line, tips_on_mesh
 from xcrack.crack.placing_3d import ShortFront, check_surfaces, place_surface
 from xcrack.crack.placing_3d import short_fronts as surface_short_fronts
@@ -27,11 +29,11 @@ _CHECK: dict[int, Callable[[tuple[Crack, ...], Mesh], None]] = {2: check_lines, 
 
 _ON_OTHERS: dict[int, Callable[..., tuple[Crack, ...]]] = {
     2: junctions_2d.on_others,
-    3: lambda given, cracks, mesh: cracks,
+    3: arms_placed,
 }
 _JUNCTIONS: dict[int, Callable[..., tuple[Junction, ...]]] = {
     2: junctions_2d.junctions,
-    3: lambda cracks, mesh: (),
+    3: surface_junctions,
 }
 _ON_MESH: dict[int, Callable[[Crack, Mesh], Crack]] = {
     2: tips_on_mesh,
@@ -100,7 +102,7 @@ def check_cracks(cracks: tuple[Crack, ...], mesh: Mesh) -> None:
 
 
 def on_others(given: Sequence[Crack], cracks: tuple[Crack, ...], mesh: Mesh) -> tuple[Crack, ...]:
-    """Placed cracks whose ends on other cracks are no tips; see `junctions_2d.on_others`."""
+    """Placed cracks that end on others; see `on_others` in 2D and `arms_placed` in 3D."""
     return _ON_OTHERS[mesh.dim](given, cracks, mesh)
 
 
@@ -249,7 +251,15 @@ class Stations:
         return len(self.crack)
 
 
-def part_inside(mesh: Mesh, x: Floats, inside: Ints) -> tuple[int, int]:
+def inside_body(cracks: Sequence[Crack], c: int, mesh: Mesh, x: Floats) -> Bools:
+    """Which points of crack c count: in the body, and not beyond a crack on which it ends."""
+    inside = contains(mesh, x)
+    if cracks[c].ends_on:
+        inside = inside & is_before(cracks, c, x)
+    return np.asarray(inside)
+
+
+def part_inside(x: Floats, inside: Ints, is_inside: Callable[[Floats], Bools]) -> tuple[int, int]:
     """First vertex of an open front to count, and the one behind the last.
 
     One beyond each end of the part in the body, where that does not end at a vertex: from there a
@@ -260,7 +270,7 @@ def part_inside(mesh: Mesh, x: Floats, inside: Ints) -> tuple[int, int]:
     first, last = int(inside[0]), int(inside[-1])
     ahead = [min(max(k, 0), len(x) - 1) for k in (first - 1, last + 1)]
     on = x[[first, last]] + _ON * (x[ahead] - x[[first, last]])
-    goes_on = contains(mesh, on)
+    goes_on = is_inside(on)
     first, last = (k if beyond else own for k, own, beyond in zip(ahead, (first, last), goes_on))
     return (first, last + 1) if last > first else (0, len(x))
 
@@ -282,11 +292,12 @@ def stations_of(cracks: Sequence[Crack], mesh: Mesh) -> Stations:
                 rows.append((c, k, np.zeros(1), x[None], frame[None]))
         else:
             for k, front in enumerate(front_frames(crack)):
-                within = np.nonzero(contains(mesh, np.array(front.x)))[0]
+                is_inside = partial(inside_body, cracks, c, mesh)
+                within = np.nonzero(is_inside(np.array(front.x)))[0]
                 whole = front_curve(front.x, front.frame, front.closed)
                 first, last = 0, len(front.x)
                 if not front.closed:
-                    first, last = part_inside(mesh, front.x, within)
+                    first, last = part_inside(front.x, within, is_inside)
                 part = front_curve(front.x[first:last], front.frame[first:last], front.closed)
                 frame = part.at(part.breaks[within - first])[1]
                 s = whole.arc(whole.breaks[within])

@@ -5,6 +5,7 @@ from scipy.spatial import cKDTree
 
 from xcrack.base.arrays import Bools, Floats, Ints
 from xcrack.crack.crack import Crack, crack_length, tip_frames
+from xcrack.crack.junctions_3d import are_opposite
 from xcrack.crack.measures import surface_size
 from xcrack.fem.cut import Cut
 from xcrack.mesh.locate import Body, cells_within, nearest_boundary
@@ -148,7 +149,7 @@ def front_radii(
                 x
                 for d, fronts_of_crack in enumerate(every)
                 for j, x in enumerate(fronts_of_crack)
-                if (d, j) != (c, k)
+                if (d, j) != (c, k) and not are_opposite(cracks[d], crack)
             ]
             if others:
                 nearest = cKDTree(np.concatenate(others)).query(every[c][k])[0]

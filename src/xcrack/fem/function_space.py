@@ -89,7 +89,7 @@ class FunctionSpace:
     tips : tuple of Tip
     n_nodes, n_functions : int
     joints : tuple of Joint
-        In 2D: where cracks end on others.
+        Where cracks end on others.
     """
 
     mesh: Mesh
@@ -300,6 +300,13 @@ class FunctionSpace:
             tip.point_to_function >= 0,
             self.tip_shift[t],
         )
+        for joint in self.joints:
+            if joint.crack == tip.crack and self.dim == 3:
+                beyond = side[:, joint.on] == -joint.side
+                last = first + (self.dim + 1) * tip.functions
+                for table in tables:
+                    if len(table):
+                        table[beyond, first:last] = 0.0
 
     @cached_property
     def tip_shift(self) -> tuple[Floats, ...]:
@@ -319,6 +326,18 @@ def _with_any(flag: Bools, nodes: Ints) -> Ints:
     for column in nodes.T[1:]:
         result |= flag[column]
     return np.asarray(result.nonzero()[0])
+
+
+def _bears_tip(mesh: Mesh, other: Cut, side: int) -> Bools:
+    """Points that may carry tip functions of a crack that ends on another one in 3D `(n,)`.
+
+    Those of cells with parts on its side; but where the other crack has ended nothing may jump
+    across its level set.
+    """
+    flag = np.zeros(mesh.n_points, dtype=bool)
+    flag[mesh.cells[(other.side == side) | other.is_cut]] = True
+    flag[mesh.cells[(other.side == 0) & ~other.is_cut]] = False
+    return flag
 
 
 def function_space(
@@ -358,6 +377,9 @@ def function_space(
         x, frame = end_frames(cracks[c])
         for k in range(cut.n_tips):
             flag = tip_points(mesh, order, cut, k, radii[c][k], numerics.enrichment)
+            for joint in joints:
+                if joint.crack == c and mesh.dim == 3:
+                    flag &= _bears_tip(mesh, cuts[joint.on], joint.side)
             number = np.full(mesh.n_points, -1, dtype=np.int64)
             number[flag] = count + numerics.functions * np.arange(int(flag.sum()))
             count += numerics.functions * int(flag.sum())

@@ -10,6 +10,7 @@ import numpy as np
 
 from xcrack.base.arrays import Bools
 from xcrack.fem.function_space import FunctionSpace
+from xcrack.fem.joints_2d import Joint
 from xcrack.fem.quadrature import SubCells, sub_cells
 from xcrack.mesh.locate import cells_around
 
@@ -33,18 +34,37 @@ def jump_nodes(space: FunctionSpace) -> tuple[Bools, ...]:
     result = [number >= 0 for number in space.heaviside]
     for joint in space.joints:
         ending_cut, on = space.cuts[joint.crack], space.cuts[joint.on]
-        inner = _nodes_of(space, joint.near)
+        inner, is_beside = _NEIGHBOURHOOD[space.dim](space, joint)
         cells = np.nonzero(inner[space.cell_nodes].any(axis=1))[0]
         subs = sub_cells(space, cells)
         # Ahead of a tip the level set changes its sign too, but cuts nothing.
         crossed = ending_cut.is_cut[subs.cell] | on.is_cut[subs.cell]
-        size = space.mesh.cell_size[cells_around(space.mesh, joint.centre, 1e-9)].max()
-        distance = np.linalg.norm(space.node_points - joint.centre, axis=1)
-        added = _parted_nodes(space, subs, joint.crack, crossed) & (distance < _BESIDE * size)
+        if space.dim == 3:  # along the junction its own front may be near
+            inside = ending_cut.level_set.inside[space.mesh.cells]
+            ahead = np.asarray((inside >= 0).any(axis=1))
+            crossed &= ending_cut.is_cut[subs.cell] | ~ahead[subs.cell]
+        added = _parted_nodes(space, subs, joint.crack, crossed) & is_beside
         added &= inner & ~_nodes_of(space, ending_cut.is_tip)
         parted = _parted_nodes(space, subs, joint.crack, np.ones(len(crossed), dtype=bool))
         result[joint.crack] = added | (result[joint.crack] & (parted | ~inner))
     return tuple(result)
+
+
+def _around_point(space: FunctionSpace, joint: Joint) -> tuple[Bools, Bools]:
+    """Nodes in 2D that a junction may change, and those close to it `(nodes,)`."""
+    size = space.mesh.cell_size[cells_around(space.mesh, joint.centre, 1e-9)].max()
+    distance = np.linalg.norm(space.node_points - joint.centre, axis=1)
+    return _nodes_of(space, joint.near), distance < _BESIDE * size
+
+
+def _along_line(space: FunctionSpace, joint: Joint) -> tuple[Bools, Bools]:
+    """Nodes in 3D next to cells that both cracks cut `(nodes,)`, twice."""
+    both = _nodes_of(space, joint.both)
+    inner = _nodes_of(space, np.asarray(both[space.cell_nodes].any(axis=1)))
+    return inner, inner
+
+
+_NEIGHBOURHOOD = {2: _around_point, 3: _along_line}
 
 
 def _nodes_of(space: FunctionSpace, cells: Bools) -> Bools:

@@ -35,7 +35,7 @@ class Joint:
     centre : (2,) array, length
         Where the cracks meet.
     reach : float, length
-        Around the centre.
+        Around the centre; infinite in 3D.
     near : (m,) array of bool
         Cells in which sides are those of the junction.
     both : (m,) array of bool

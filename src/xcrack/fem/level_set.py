@@ -335,6 +335,29 @@ def surface_levels(mesh: Mesh, crack: Crack, reach: float) -> LevelSet:
     return LevelSet(lock(phi), lock(psi), tip_cells, lock(one), lock(mouth), lock(near_edge))
 
 
+def with_far_sides(mesh: Mesh, crack: Crack, levels: "LevelSet", reach: float) -> "LevelSet":
+    """Level sets of a placed 3D crack on which others end: phi has its sign everywhere.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    crack : Crack
+    levels : LevelSet
+        As of `surface_levels`, where phi has a sign only up to some cells beyond the reach.
+    reach : float, length
+    """
+    size = _largest_cells(mesh, crack)
+    band = reach + 2 * size
+    far = np.nonzero(np.abs(levels.phi) >= band * (1 - 1e-9))[0]
+    if not len(far):
+        return levels
+    surface = extended_surface(crack, mesh, band + size)
+    distance = surface_distance(mesh.points[far], surface.points, surface.triangles)[0]
+    phi = np.array(levels.phi)
+    phi[far] = np.copysign(phi[far], distance)
+    return replace(levels, phi=lock(phi))
+
+
 def _largest_cells(mesh: Mesh, crack: Crack) -> float:
     """Largest cell that the surface runs through, length."""
     nearest = mesh.cell_tree.query(crack.points[crack.faces].mean(axis=1))[1]

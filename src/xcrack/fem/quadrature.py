@@ -667,28 +667,47 @@ def _sub_cells_at_joints(space: FunctionSpace, subs: SubCells) -> SubCells:
     """Sub-cells with the sides of cracks that end on others, split where both cut a cell."""
     for joint in space.joints:
         phi = space.cuts[joint.crack].level_set.phi
-        nodes = space.mesh.cells[subs.cell]
-        value = np.einsum("svb,sb->sv", subs.bary, phi[nodes])
-        small = np.abs(value) < _ROUND_OFF * np.abs(value).max(axis=1, keepdims=True)
-        value[small] = 0.0
-        split = joint.both[subs.cell] & (subs.side[:, joint.on] == joint.side)
-        split &= (value.min(axis=1) < 0) & (value.max(axis=1) > 0)
-        unsplit, rows = np.nonzero(~split)[0], np.nonzero(split)[0]
-        x = np.einsum("svb,sbd->svd", subs.bary[rows], space.mesh.points[nodes[rows]])
-        inner, share, _, parent = cut_simplices(value[rows], x)
-        source = np.concatenate([unsplit, rows[parent]])
-        order = np.argsort(source, kind="stable")
-        finer = np.einsum("svw,swb->svb", inner, subs.bary[rows[parent]])
-        source = source[order]
-        subs = SubCells(
-            subs.cell[source],
-            np.concatenate([subs.bary[unsplit], finer])[order],
-            subs.fraction[source] * np.concatenate([np.ones(len(unsplit)), share])[order],
-            subs.side[source],
-            subs.fan[source],
-        )
+        chosen = joint.both[subs.cell] & (subs.side[:, joint.on] == joint.side)
+        subs = _split_along(space, subs, phi, chosen, _ROUND_OFF)
+    if space.dim == 3:
+        subs = _sub_cells_at_ends_of_fronts(space, subs)
     centre = subs.bary.mean(axis=1)
     return replace(subs, side=at_joints(space, subs.cell, centre, subs.side))
+
+
+def _sub_cells_at_ends_of_fronts(space: FunctionSpace, subs: SubCells) -> SubCells:
+    """Sub-cells split along the fronts of arms, in the cells that the other crack cuts too."""
+    for joint in space.joints:
+        cut = space.cuts[joint.crack]
+        for psi in cut.level_set.psi:
+            chosen = (joint.both & cut.is_tip)[subs.cell] & (subs.side[:, joint.on] == joint.side)
+            subs = _split_along(space, subs, psi, chosen, _AT)
+    return subs
+
+
+def _split_along(
+    space: FunctionSpace, subs: SubCells, values: Floats, chosen: Bools, tiny: float
+) -> SubCells:
+    """Chosen sub-cells split along the zero of a linear function, in their order."""
+    nodes = space.mesh.cells[subs.cell]
+    value = np.einsum("svb,sb->sv", subs.bary, values[nodes])
+    small = np.abs(value) < tiny * np.abs(value).max(axis=1, keepdims=True)
+    value[small] = 0.0
+    split = chosen & (value.min(axis=1) < 0) & (value.max(axis=1) > 0)
+    unsplit, rows = np.nonzero(~split)[0], np.nonzero(split)[0]
+    x = np.einsum("svb,sbd->svd", subs.bary[rows], space.mesh.points[nodes[rows]])
+    inner, share, _, parent = cut_simplices(value[rows], x)
+    source = np.concatenate([unsplit, rows[parent]])
+    order = np.argsort(source, kind="stable")
+    finer = np.einsum("svw,swb->svb", inner, subs.bary[rows[parent]])
+    source = source[order]
+    return SubCells(
+        subs.cell[source],
+        np.concatenate([subs.bary[unsplit], finer])[order],
+        subs.fraction[source] * np.concatenate([np.ones(len(unsplit)), share])[order],
+        subs.side[source],
+        subs.fan[source],
+    )
 
 
 def cell_points(

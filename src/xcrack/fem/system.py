@@ -7,14 +7,15 @@ from typing import Any
 from xcrack.crack.crack import Crack
 from xcrack.crack.junctions import prolonged_cracks
 from xcrack.crack.stations import on_mesh
+from xcrack.fem import joints_2d, joints_3d
 from xcrack.fem.assembly import Bulk, Enriched, Stiffness, bulk, enriched_stiffness
 from xcrack.fem.cut import cut
 from xcrack.fem.enrichment import front_reach
 from xcrack.fem.facets import LipPoints, jump_matrix, lip_points
 from xcrack.fem.function_space import FunctionSpace, function_space
 from xcrack.fem.joint_nodes import jump_nodes
-from xcrack.fem.joints_2d import Joint, joined_cuts
-from xcrack.fem.level_set import LevelSet, level_set
+from xcrack.fem.joints_2d import Joint
+from xcrack.fem.level_set import LevelSet, level_set, with_far_sides
 from xcrack.fem.loads import ImposedValues, known_unknowns
 from xcrack.mesh.mesh import Mesh
 from xcrack.model.numerics import Numerics
@@ -89,16 +90,24 @@ def discretise(problem: Problem) -> tuple[FunctionSpace, tuple[LipPoints, ...]]:
     mesh, numerics = problem.mesh, problem.numerics
     cracks = tuple(on_mesh(crack, mesh) for crack in problem.placed)
     junctions = problem.junctions
-    drawn = prolonged_cracks(cracks, junctions) if junctions else cracks
-    cuts = tuple(cut(mesh, levels(mesh, crack, numerics)) for crack in drawn)
+    drawn = prolonged_cracks(cracks, junctions) if junctions and mesh.dim == 2 else cracks
+    level_sets = [levels(mesh, crack, numerics) for crack in drawn]
+    if junctions and mesh.dim == 3:
+        for on in {junction.on for junction in junctions}:
+            reach = front_reach(mesh, drawn[on], numerics.radius)
+            level_sets[on] = with_far_sides(mesh, drawn[on], level_sets[on], reach)
+    cuts = tuple(cut(mesh, each) for each in level_sets)
     joints: tuple[Joint, ...] = ()
     if junctions:
-        cuts, joints = joined_cuts(mesh, cuts, junctions)
+        cuts, joints = _JOINED[mesh.dim](mesh, cuts, junctions)
     space = function_space(mesh, problem.order or 1, cracks, cuts, numerics, joints)
     if joints:
         jumps = jump_nodes(space)
         space = function_space(mesh, space.order, cracks, cuts, numerics, joints, jumps)
     return space, tuple(lip_points(space, c) for c in range(len(cracks)))
+
+
+_JOINED = {2: joints_2d.joined_cuts, 3: joints_3d.joined_cuts}
 
 
 def levels(mesh: Mesh, crack: Crack, numerics: Numerics) -> LevelSet:

@@ -127,7 +127,9 @@ def pack_cracks(prefix: str, cracks: Sequence[Crack]) -> Arrays:
     ends = [[np.array([tip]) for tip in crack.tips or ()] if crack.fronts is None
             else list(crack.fronts) for crack in cracks]  # fmt: skip
     d = cracks[0].dim if cracks else 2
+    arms = [(c, on, side) for c, crack in enumerate(cracks) for on, side in crack.ends_on]
     return {
+        **({f"{prefix}_arms": np.array(arms, dtype=np.int64)} if arms else {}),
         f"{prefix}_points": np.concatenate([np.zeros((0, d)), *(c.points for c in cracks)]),
         f"{prefix}_point_count": _counts([c.points for c in cracks]),
         f"{prefix}_faces": _whole(np.zeros((0, d)), *(c.faces for c in cracks)),
@@ -147,6 +149,7 @@ def unpack_cracks(prefix: str, arrays: Arrays) -> tuple[Crack, ...]:
     counts = [arrays[f"{prefix}_{name}"].tolist() for name in ("point_count", "face_count")]
     cut_points, cut_faces = (np.cumsum([0, *count]) for count in counts)
     every = np.split(ends, np.cumsum(arrays[f"{prefix}_end_length"])[:-1]) if len(ends) else []
+    arms = arrays.get(f"{prefix}_arms", np.zeros((0, 3), dtype=np.int64))
     result, first = [], 0
     for c, count in enumerate(arrays[f"{prefix}_end_count"].tolist()):
         own = every[first : first + max(count, 0)]
@@ -158,7 +161,8 @@ def unpack_cracks(prefix: str, arrays: Arrays) -> tuple[Crack, ...]:
             tips = tuple(int(end[0]) for end in own)
         elif count >= 0:
             fronts = tuple(own)
-        result.append(Crack(points[part], sides, tips, fronts))
+        ends_on = tuple((on, side) for crack, on, side in arms.tolist() if crack == c)
+        result.append(Crack(points[part], sides, tips, fronts, ends_on))
     return tuple(result)
 
 

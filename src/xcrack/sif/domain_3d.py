@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -11,11 +12,11 @@ from xcrack.base.arrays import Bools, Floats, Ints, at, lock
 from xcrack.base.errors import warn
 from xcrack.base.machine import stream_tasks
 from xcrack.crack.front_curve import FootPoints, FrontCurve, front_curve
-from xcrack.crack.stations import part_inside
+from xcrack.crack.junctions_3d import are_opposite
+from xcrack.crack.stations import inside_body, part_inside
 from xcrack.fem.loads import position
-from xcrack.fem.quadrature import cell_points, cell_side
+from xcrack.fem.quadrature import cell_points, cell_side, lip_side
 from xcrack.mesh.distances import closest_in, triangle_tree
-from xcrack.mesh.locate import contains
 from xcrack.mesh.simplex import leg_size
 from xcrack.sif.accuracy import Domain, check
 from xcrack.sif.common import (
@@ -37,6 +38,7 @@ from xcrack.sif.interaction_3d import (
     twice_as_wide,
 )
 from xcrack.sif.sides_3d import (
+    before_junctions,
     integrals_of_sides,
     on_smooth_planes,
     room_beside,
@@ -119,12 +121,13 @@ def front_intensity(solutions: Sequence[Solution], t: int) -> list[SIF]:
     number = space.cracks[tip.crack].fronts or ()
     closed = bool(number[tip.number][0] == number[tip.number][-1])
     whole = front_curve(tip.x, tip.frame, closed)
-    inside = np.nonzero(contains(space.mesh, np.array(tip.x)))[0]
-    first, last = (0, len(tip.x)) if closed else part_inside(space.mesh, tip.x, inside)
+    is_inside = partial(inside_body, space.cracks, tip.crack, space.mesh)
+    inside = np.nonzero(is_inside(np.array(tip.x)))[0]
+    first, last = (0, len(tip.x)) if closed else part_inside(tip.x, inside, is_inside)
     curve = front_curve(tip.x[first:last], tip.frame[first:last], closed)
     s = curve.breaks[inside - first]
     x, frame, _ = curve.at(s)
-    ends = way_inside(solutions[0], curve)
+    ends = way_inside(curve, is_inside)
     nothing, tip_material = np.zeros(len(s)), material_at_tip(solutions[0], t)
     empty = SIF(
         x=np.array(tip.x)[inside],
@@ -209,13 +212,14 @@ def _free_ends(curve: FrontCurve, values: FrontValues) -> tuple[bool, bool]:
     return bool(known[0]), bool(known[-1])
 
 
-def way_inside(solution: Solution, curve: FrontCurve) -> tuple[float, float] | None:
+def way_inside(
+    curve: FrontCurve, is_inside: Callable[[Floats], Bools]
+) -> tuple[float, float] | None:
     """Parameters at which an open front enters and leaves the body; None if it never does."""
     if curve.closed:
         return 0.0, curve.length
-    mesh = solution.space.mesh
     s = np.linspace(0.0, curve.length, _SAMPLES + 1)
-    inside = np.nonzero(contains(mesh, curve.at(s)[0]))[0]
+    inside = np.nonzero(is_inside(curve.at(s)[0]))[0]
     if not len(inside):
         return None
     ends = []
@@ -224,7 +228,7 @@ def way_inside(solution: Solution, curve: FrontCurve) -> tuple[float, float] | N
         outside = s[min(max(last + step, 0), _SAMPLES)]
         for _ in range(30 if outside != within else 0):
             middle = (within + outside) / 2
-            if contains(mesh, curve.at(np.array([middle]))[0])[0]:
+            if is_inside(curve.at(np.array([middle]))[0])[0]:
                 within = middle
             else:
                 outside = middle
@@ -270,7 +274,7 @@ def front_values(
     if wanted is None:
         wanted = max(_OUTER * size, _REACH * tip.radius)
     knots = front_nodes(curve, _spacing(curve, ends, size), ends)
-    sides = sides_around(solutions, curve, wanted)
+    sides = sides_around(solutions, tip.crack, curve, wanted)
     room = _room(solutions[0], t, curve, knots, size)
     beside = np.full(len(knots), np.inf) if sides is None else room_beside(sides, curve, knots)
     smooth = np.zeros(len(knots), dtype=bool)
@@ -348,11 +352,15 @@ def _room(solution: Solution, t: int, curve: FrontCurve, knots: Floats, size: fl
     )
     x = curve.at(s.ravel())[0]
     room = _BENT * curve.bend(s.ravel(), size)
+    cracks = solution.space.cracks
+    under = [on for on, _ in cracks[tip.crack].ends_on]  # their faces bound the domains
     for other in solution.space.tips:
-        if other is not tip:
+        if other is not tip and not are_opposite(cracks[other.crack], cracks[tip.crack]):
             room = np.minimum(room, 0.8 * cKDTree(other.x).query(x)[0])
     for c, lips in enumerate(solution.lips):
-        if c != tip.crack and len(lips):
+        if c == tip.crack or c in under or are_opposite(cracks[c], cracks[tip.crack]):
+            continue
+        if len(lips):
             room = np.minimum(room, 0.9 * cKDTree(lips.x).query(x)[0])
     return np.asarray(room.reshape(s.shape).min(axis=0))
 
@@ -386,6 +394,9 @@ def _domain_parts(
         near_points, feet = curve.near(x, outer)
         if not len(near_points):
             return None
+        counts = before_junctions(space, tip.crack, points.side[near_points])
+        if not counts.all():
+            near_points, feet = near_points[counts], feet.chosen(counts)
         points = points.chosen(near_points)
         gradient = gradients_at(space, coefficients, points.cell, points.bary, points.side)
         behind = np.einsum("qb,qb->q", psi[mesh.cells[points.cell]], points.bary) < 0
@@ -496,6 +507,8 @@ def _on_lip(solution: Solution, c: int, rows: Ints, s: int, sign: int) -> tuple[
     """Cells, places and sides of points on one lip."""
     lips = solution.lips[c]
     cell = lips.cell[rows, s]
+    if solution.space.joints:
+        return cell, lips.bary[rows, s], lip_side(solution.space, c, cell, lips.bary[rows, s], sign)
     side = cell_side(solution.space, cell)
     side[:, c] = sign
     return cell, lips.bary[rows, s], side

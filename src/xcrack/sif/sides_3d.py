@@ -14,11 +14,13 @@ import numpy as np
 from xcrack.analysis.solution import Solution, gradients_at
 from xcrack.base.arrays import Bools, Floats, Ints
 from xcrack.crack.front_curve import FootPoints, FrontCurve
+from xcrack.fem.facets import part_points
+from xcrack.fem.function_space import FunctionSpace
 from xcrack.fem.loads import facet_points, outer_points, position
-from xcrack.fem.quadrature import Points
+from xcrack.fem.quadrature import Points, lip_side
 from xcrack.mesh.mesh import facet_set, numbers_of
 from xcrack.model.supports import Support
-from xcrack.sif.common import initial_stresses, material_at_tip
+from xcrack.sif.common import initial_stresses, lip_pressure, lip_shear, material_at_tip
 from xcrack.sif.interaction_3d import hats, side_integrals
 
 _ALONG = 1e-6  # of a unit normal beside an axis: a plane across that axis
@@ -49,16 +51,52 @@ class Sides:
     smooth: Bools
 
 
-def sides_around(solutions: Sequence[Solution], curve: FrontCurve, reach: float) -> Sides | None:
+def before_junctions(space: FunctionSpace, crack: int, side: Ints) -> Bools:
+    """Which points do not lie beyond a crack on which this one ends, by their sides `(q,)`."""
+    result = np.ones(len(side), dtype=bool)
+    for joint in space.joints:
+        if joint.crack == crack:
+            result &= side[:, joint.on] == joint.side
+    return result
+
+
+def sides_around(
+    solutions: Sequence[Solution], crack: int, curve: FrontCurve, reach: float
+) -> Sides | None:
     """The sides within reach of a front, or None where there are none.
+
+    Where the crack ends on another one that is a side of what it lies in, too.
 
     Parameters
     ----------
     solutions : sequence of Solution
         States of one problem.
+    crack : int
+        Whose front it is.
     curve : FrontCurve
     reach : float, length
     """
+    outer = _boundary_around(solutions, crack, curve, reach)
+    faces = _faces_around(solutions[0].space, crack, curve, reach)
+    parts = [part for part in (outer, *faces) if part is not None]
+    if len(parts) < 2:
+        return parts[0] if parts else None
+    points, feet = [part.points for part in parts], [part.feet for part in parts]
+    return Sides(
+        Points(*(np.concatenate([getattr(one, n) for one in points])
+                 for n in ("cell", "bary", "weight", "side"))),
+        np.concatenate([part.normal for part in parts]),
+        FootPoints(*(np.concatenate([getattr(one, n) for one in feet])
+                     for n in ("s", "local", "frame", "turn"))),
+        np.concatenate([part.reaction for part in parts]),
+        np.concatenate([part.smooth for part in parts]),
+    )  # fmt: skip
+
+
+def _boundary_around(
+    solutions: Sequence[Solution], crack: int, curve: FrontCurve, reach: float
+) -> Sides | None:
+    """The boundary of the body within reach of a front."""
     space = solutions[0].space
     mesh = space.mesh
     facets = mesh.boundary
@@ -72,6 +110,10 @@ def sides_around(solutions: Sequence[Solution], curve: FrontCurve, reach: float)
     near, feet = curve.near(position(space, points.cell, points.bary), reach)
     if not len(near):
         return None
+    counts = before_junctions(space, crack, points.side[near])
+    near, feet = near[counts], feet.chosen(counts)
+    if not len(near):
+        return None
     points, normal = points.chosen(near), normal[near]
     facet = mesh.cell_to_facet[points.cell, points.bary.argmin(axis=1)]
     axes = _fixed_axes(solutions, facet)
@@ -79,6 +121,33 @@ def sides_around(solutions: Sequence[Solution], curve: FrontCurve, reach: float)
     across = np.abs(np.einsum("qd,qd->q", normal, feet.frame[:, 2])) > _ACROSS
     smooth = (axes.sum(axis=1) == 1) & along & across
     return Sides(points, normal, feet, axes.any(axis=1) & ~smooth, smooth)
+
+
+def _faces_around(space: FunctionSpace, crack: int, curve: FrontCurve, reach: float) -> list[Sides]:
+    """Faces of the cracks on which this one ends, from its side, within reach of a front."""
+    mesh, result = space.mesh, []
+    for joint in space.joints:
+        if joint.crack != crack:
+            continue
+        cut, k = space.cuts[joint.on], (1 + joint.side) // 2
+        corner = cut.lip_points(mesh)
+        middle = corner.mean(axis=1)
+        size = np.linalg.norm(corner - middle[:, None], axis=2).max(axis=1, initial=0.0)
+        most = float(size.max(initial=0.0))
+        rows = np.nonzero(curve.distance(middle, reach + 2 * most) <= reach + 2 * size)[0]
+        owner, local = cut.lip_cell[rows, k], cut.lip_bary[rows, k]
+        number, place, weight = part_points(space, mesh.cells[owner], local, halvings=_HALVINGS)
+        cell = owner[number]
+        bary = np.einsum("qv,qvb->qb", place, local[number])
+        near, feet = curve.near(position(space, cell, bary), reach)
+        cell, bary, weight = cell[near], bary[near], weight[near]
+        sides = lip_side(space, joint.on, cell, bary, joint.side)
+        counts = before_junctions(space, crack, sides)
+        points = Points(cell, bary, weight, sides).chosen(counts)
+        normal = -joint.side * cut.lip_normal[rows][number[near]][counts]
+        never = np.zeros(len(points.cell), dtype=bool)
+        result.append(Sides(points, normal, feet.chosen(counts), never, never))
+    return result
 
 
 def _fixed_axes(solutions: Sequence[Solution], facet: Ints) -> Floats:
@@ -147,7 +216,14 @@ def integrals_of_sides(
     total = _integrals(
         solutions, t, points, sides.normal, sides.feet, free, curve, knots, radii, gradient
     )
-    for points, normal, feet, traction in _loaded(solutions, curve, float(radii.max())):
+    reach, crack = float(radii.max()), space.tips[t].crack
+    loaded = _loaded(solutions, curve, reach) + _pressed(solutions, crack, curve, reach)
+    for points, normal, feet, traction in loaded:
+        counts = before_junctions(space, crack, points.side)
+        if not counts.all():
+            points, normal, feet, traction = (
+                points.chosen(counts), normal[counts], feet.chosen(counts), traction[counts]
+            )  # fmt: skip
         total += _integrals(solutions, t, points, normal, feet, traction, curve, knots, radii)
     return total
 
@@ -196,6 +272,37 @@ def _loaded(
         factor = np.array([sum(f for one, f in s.acting if one is load) for s in solutions])
         traction = load.traction(on_facets)[near, :, None] * factor
         result.append((points.chosen(near), on_facets.normal[near], feet, traction))
+    return result
+
+
+def _pressed(
+    solutions: Sequence[Solution], crack: int, curve: FrontCurve, reach: float
+) -> list[tuple[Points, Floats, FootPoints, Floats]]:
+    """Points on the faces of the cracks on which this one ends, with what acts there."""
+    space = solutions[0].space
+    result = []
+    for joint in space.joints:
+        if joint.crack != crack:
+            continue
+        lips, k = solutions[0].lips[joint.on], (1 + joint.side) // 2
+        traction = (
+            lips.normal[:, :, None]
+            * np.stack([lip_pressure(solution, joint.on) for solution in solutions], axis=-1)[
+                :, None
+            ]
+        )
+        for n, solution in enumerate(solutions):
+            shear = lip_shear(solution, joint.on)
+            if shear is not None:
+                traction[:, :, n] += shear
+        if not traction.any():
+            continue
+        near, feet = curve.near(lips.x, reach)
+        cell, bary = lips.cell[near, k], lips.bary[near, k]
+        sides = lip_side(space, joint.on, cell, bary, joint.side)
+        points = Points(cell, bary, lips.weight[near], sides)
+        normal = -joint.side * lips.normal[near]
+        result.append((points, normal, feet, joint.side * traction[near]))
     return result
 
 

@@ -1,0 +1,255 @@
+"""Cracks in 3D that end on the face of others: arms, where they meet, and what is too close.
+
+An arm is a surface drawn through the crack on which it ends; only what lies on one side of that one
+counts. Of two surfaces that cross one runs through, and the other is two arms.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Annotated
+
+import numpy as np
+
+from xcrack.base.arguments import Part, Whole, check_arguments
+from xcrack.base.arrays import Bools, Floats, Ints, at
+from xcrack.base.errors import CoarseMeshError, GeometryError
+from xcrack.crack.crack import Crack
+from xcrack.crack.junctions import Junction
+from xcrack.mesh.distances import first_crossing, signed_in, triangle_tree
+from xcrack.mesh.locate import Body
+from xcrack.mesh.mesh import Mesh
+from xcrack.mesh.triangulation import sides
+
+_BEYOND = 2.0  # legs of cells by which fronts are kept beyond the crack on which an arm ends
+_DRAWN = 1.2  # legs of cells by which an arm must be drawn on beyond it at least
+_LEG = 3**-0.5  # leg of a cell over its longest edge
+
+
+@check_arguments(GeometryError)
+def arm(
+    crack: Annotated[Crack, Part(Crack)],
+    on: Annotated[int, Whole(least=0)],
+    side: Annotated[int, Whole(least=-1, most=1)],
+) -> Crack:
+    """What of a 3D crack lies on one side of another one, on which it ends.
+
+    Parameters
+    ----------
+    crack : Crack
+        Drawn on beyond the other crack, by two cells or more.
+    on : int
+        Number of the other one in `Problem.cracks`. It runs through: where they meet it must reach
+        at least a cell beyond the arm.
+    side : {1, -1}
+        Side of the other one that counts: 1 is that to which its normal points, its lip +.
+
+    Returns
+    -------
+    Crack
+
+    Raises
+    ------
+    GeometryError
+        A crack in 2D, where ends that lie on others say the same.
+
+    Notes
+    -----
+    An arm may end on several others. Two cracks that cross are one and two arms.
+
+    Examples
+    --------
+    >>> one = penny_crack((0, 0, 0), (0, 0, 1), 0.6)
+    >>> other = penny_crack((0, 0, 0), (1, 0, 0), 0.3)
+    >>> crossing = [one, arm(other, 0, 1), arm(other, 0, -1)]
+    """
+    if side == 0:
+        raise GeometryError("arm: side = 0: give 1 or -1, the side of the other crack that counts.")
+    return replace(crack, ends_on=(*crack.ends_on, (int(on), int(side))))
+
+
+def distance_to_side(cracks: Sequence[Crack], c: int, x: Floats) -> Floats:
+    """Distance of points to the nearest crack on which crack c ends, negative beyond it `(n,)`."""
+    result = np.full(len(x), np.inf)
+    for on, side in cracks[c].ends_on:
+        result = np.minimum(result, side * _signed(cracks[on], x))
+    return result
+
+
+def is_before(cracks: Sequence[Crack], c: int, x: Floats) -> Bools:
+    """Which points do not lie beyond a crack on which crack c ends `(n,)`."""
+    if not cracks[c].ends_on:
+        return np.ones(len(x), dtype=bool)
+    return np.asarray(distance_to_side(cracks, c, x) > 0)
+
+
+def _signed(crack: Crack, x: Floats) -> Floats:
+    return signed_in(triangle_tree(crack.points, crack.faces), x)[0]
+
+
+def may_touch(cracks: Sequence[Crack], i: int, j: int) -> bool:
+    """Whether two cracks meet on purpose: one ends on the other, or both on opposite sides."""
+    return _ends_on(cracks[i], j) or _ends_on(cracks[j], i) or are_opposite(cracks[i], cracks[j])
+
+
+def _ends_on(crack: Crack, on: int) -> bool:
+    return any(number == on for number, _ in crack.ends_on)
+
+
+def are_opposite(one: Crack, other: Crack) -> bool:
+    """Whether two cracks end on opposite sides of the same one."""
+    return any((on, -side) in other.ends_on for on, side in one.ends_on)
+
+
+def arms_placed(given: Sequence[Crack], cracks: tuple[Crack, ...], mesh: Mesh) -> tuple[Crack, ...]:
+    """Placed cracks, the fronts of arms cut down to the side on which they lie.
+
+    Raises
+    ------
+    GeometryError
+        An arm on a crack that is not there, in a circle, or that lies on one side of it.
+    CoarseMeshError
+        An arm that is not drawn on far enough.
+    """
+    if not any(crack.ends_on for crack in given):
+        return cracks
+    _check_numbers(given)
+    result = [replace(own, ends_on=one.ends_on) for one, own in zip(given, cracks, strict=True)]
+    for c, crack in enumerate(given):
+        if crack.ends_on and crack.fronts is None:
+            result[c] = _cut_down(result, c, Body.of(mesh))
+    return tuple(result)
+
+
+def _check_numbers(given: Sequence[Crack]) -> None:
+    """Raise where arms end on what is not there, on themselves, or in a circle."""
+    for c, crack in enumerate(given):
+        beneath, number = [c], c
+        reached = {c}
+        while beneath:
+            number = beneath.pop()
+            for on, _ in given[number].ends_on:
+                if on >= len(given):
+                    raise GeometryError(
+                        f"crack {number} ends on crack {on}, but there are {len(given)}, numbered "
+                        "from 0 on: give the number of one of them."
+                    )
+                if on == c:
+                    raise GeometryError(
+                        f"crack {c} ends on itself, or on one that ends on it: of cracks that meet "
+                        "let one run through."
+                    )
+                if on not in reached:
+                    reached.add(on)
+                    beneath.append(on)
+        if len({on for on, _ in crack.ends_on}) < len(crack.ends_on):
+            raise GeometryError(
+                f"crack {c} ends on one crack twice: give an arm for each side of it."
+            )
+
+
+def _cut_down(cracks: Sequence[Crack], c: int, body: Body) -> Crack:
+    crack = cracks[c]
+    for on, side in crack.ends_on:
+        depth = side * _signed(cracks[on], crack.points)
+        inside = body.contains(crack.points)
+        if not (depth < 0).any():
+            x = crack.points[int(np.argmin(np.where(inside, depth, depth.max())))]
+            raise GeometryError(
+                f"crack {c} does not reach crack {on}, on which it is to end: it stops "
+                f"{depth.min():.4g} before it, as at {at(x)}. Draw it on through that crack by two "
+                f"cells or more (what lies beyond does not count), or take the other side of it."
+            )
+        if not (depth > 0).any():
+            raise GeometryError(
+                f"crack {c} lies wholly beyond crack {on}, on which it is to end from side "
+                f"{side:+d}: take side {-side}."
+            )
+    fronts: list[Ints] = []
+    for front in crack.fronts or ():
+        fronts.extend(_parts_before(cracks, c, front, body))
+    return replace(crack, fronts=tuple(fronts))
+
+
+def _parts_before(cracks: Sequence[Crack], c: int, front: Ints, body: Body) -> list[Ints]:
+    """Parts of a front on the side that counts, each with two cells beyond."""
+    closed = bool(front[0] == front[-1])
+    loop = np.array(front[:-1] if closed else front)
+    x = cracks[c].points[loop]
+    depth = distance_to_side(cracks, c, x)
+    if (depth > 0).all():
+        return [front]
+    leg = _LEG * body.cell_size(x)
+    keep = depth > 0
+    if closed:  # begin at the place farthest beyond
+        k = int(np.argmin(depth))
+        loop, x = np.roll(loop, -k), np.roll(x, -k, axis=0)
+        depth, leg, keep = np.roll(depth, -k), np.roll(leg, -k), np.roll(keep, -k)
+    s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(x, axis=0), axis=1))])
+    ends = np.flatnonzero(np.diff(np.r_[0, keep.astype(int), 0]))
+    parts: list[Ints] = []
+    counted = np.zeros(len(loop), dtype=bool)
+    last_stop = -1
+    for first, stop in zip(ends[::2], ends[1::2], strict=True):
+        reach = _BEYOND * float(leg[first:stop].mean())
+        low = max(int(np.searchsorted(s, s[first] - reach)), last_stop)
+        high = int(np.searchsorted(s, s[stop - 1] + reach, side="right"))
+        low, high = max(min(low, first - 1), 0), min(max(high, stop + 1), len(loop))
+        counted[low:high] = True
+        if parts and low <= last_stop:
+            parts[-1] = np.concatenate([parts[-1], loop[last_stop:high]])
+        else:
+            parts.append(np.array(loop[low:high]))
+        last_stop = high
+    if closed:
+        counted[0] = False
+    rest = ~counted & body.contains(x) & (depth > -_DRAWN * leg)
+    if rest.any():
+        k = int(np.argmax(np.where(rest, depth, -np.inf)))
+        others = " and ".join(str(on) for on, _ in cracks[c].ends_on)
+        raise CoarseMeshError(
+            f"crack {c} runs only {-depth[k]:.4g} beyond crack {others}, on which it ends, at "
+            f"{at(x[k])}: draw it on by two cells ({2 * leg[k]:.4g}) or more (what lies beyond "
+            "does not count), or refine the mesh there."
+        )
+    return parts
+
+
+def surface_junctions(cracks: tuple[Crack, ...], mesh: Mesh) -> tuple[Junction, ...]:
+    """Which placed cracks in 3D end on others, and a point where they meet."""
+    result = []
+    for c, crack in enumerate(cracks):
+        for on, side in crack.ends_on:
+            line = crossings(crack, cracks[on])
+            if not len(line):
+                d = np.abs(_signed(cracks[on], crack.points))
+                line = crack.points[[int(np.argmin(d))]]
+            inside = Body.of(mesh).contains(line)
+            line = line[inside] if inside.any() else line
+            middle = line[int(np.argmin(np.linalg.norm(line - line.mean(axis=0), axis=1)))]
+            result.append(Junction(c, -1, on, middle, side, middle, np.inf))
+    return tuple(result)
+
+
+def crossings(one: Crack, other: Crack) -> Floats:
+    """Points at which edges of either surface cross the other one `(n, 3)`."""
+    parts = [np.zeros((0, 3))]
+    for a, b in ((one, other), (other, one)):
+        tree = triangle_tree(b.points, b.faces)
+        pairs = np.unique(np.sort(sides(a.faces).reshape(-1, 2), axis=1), axis=0)
+        start, stop = a.points[pairs[:, 0]], a.points[pairs[:, 1]]
+        triangle, position = first_crossing(tree, start, stop)
+        hit = triangle >= 0
+        parts.append(start[hit] + position[hit, None] * (stop - start)[hit])
+    return np.concatenate(parts)
+
+
+__all__ = [
+    "are_opposite",
+    "arm",
+    "arms_placed",
+    "crossings",
+    "distance_to_side",
+    "is_before",
+    "may_touch",
+    "surface_junctions",
+]

@@ -1,0 +1,178 @@
+"""Cuts of cracks that end on the face of others in 3D.
+
+The arm is cut as if it ran on, and what lies beyond the other crack is taken away again: its faces
+are clipped by the level set of the other one, whose faces are split by that of the arm.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from xcrack.base.arrays import Bools, Floats, Ints, at, lock
+from xcrack.base.errors import CoarseMeshError, GeometryError
+from xcrack.crack.junctions import Junction
+from xcrack.fem.cut import Cut
+from xcrack.fem.joints_2d import Joint
+from xcrack.mesh.mesh import Mesh
+from xcrack.mesh.simplex import cut_simplices
+
+_ROUND_OFF = 1e-13  # share of a cell below which a distance is zero
+_SINE = np.sin(np.radians(15.0))  # of the smallest angle between two cracks that meet
+
+
+def joined_cuts(
+    mesh: Mesh, cuts: tuple[Cut, ...], junctions: tuple[Junction, ...]
+) -> tuple[tuple[Cut, ...], tuple[Joint, ...]]:
+    """Cuts without what lies beyond junctions, and the junctions in the mesh.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    cuts : tuple of Cut
+        Of arms drawn through the cracks on which they end.
+    junctions : tuple of Junction
+
+    Returns
+    -------
+    cuts : tuple of Cut
+    joints : tuple of Joint
+
+    Raises
+    ------
+    GeometryError
+        An arm that does not reach the other crack, or lies along it.
+    CoarseMeshError
+        An arm that meets the other crack where that has its front, or runs past it.
+    """
+    result, joints = list(cuts), []
+    for junction in junctions:
+        through, ending = result[junction.on], result[junction.crack]
+        gone = cuts[junction.on].side == -junction.side
+        gone |= _all_beyond(mesh, through, ending, junction.side)
+        acts = (ending.is_cut | ending.is_tip) & ~gone
+        both = acts & through.is_cut
+        _check(mesh, through, ending, junction, acts, both)
+        result[junction.on] = _split_cut(mesh, through, ending, both)
+        result[junction.crack] = _clipped_cut(mesh, through, ending, junction.side, gone, both)
+        every = np.ones(len(mesh.cells), dtype=bool)
+        joints.append(
+            Joint(
+                junction.crack, junction.on, junction.side, lock(np.array(junction.x)),
+                lock(np.array(junction.x)), np.inf, lock(every), lock(both),
+            )
+        )  # fmt: skip
+    return tuple(result), tuple(joints)
+
+
+def _check(
+    mesh: Mesh, through: Cut, ending: Cut, junction: Junction, acts: Bools, both: Bools
+) -> None:
+    """Raise where two cracks do not meet on a line between the fronts of the other one."""
+    c, on = junction.crack, junction.on
+    if not both.any():
+        raise GeometryError(
+            f"crack {c} does not reach crack {on}, on which it is to end: draw it on through that "
+            "crack by two cells or more, or take the other side of it."
+        )
+    past = acts & (through.side == 0) & ~through.is_cut
+    if past.any():
+        cell = int(np.nonzero(past)[0][0])
+        raise CoarseMeshError(
+            f"crack {c} ends on crack {on}, but runs past its front, or to within a cell of it, at "
+            f"{at(mesh.points[mesh.cells[cell]].mean(axis=0))}: let crack {on} reach two cells or "
+            f"more beyond crack {c}, refine the mesh there, or let crack {c} run through and crack "
+            f"{on} end on it, an arm for each side on which it lies."
+        )
+    cells = np.nonzero(both)[0]
+    one, other = (_slopes(mesh, cut, cells) for cut in (through, ending))
+    sine = np.linalg.norm(np.cross(one, other), axis=1)
+    if sine.min() < _SINE:
+        cell = int(cells[int(np.argmin(sine))])
+        raise GeometryError(
+            f"crack {c} meets crack {on} at {np.degrees(np.arcsin(sine.min())):.2g} degrees at "
+            f"{at(mesh.points[mesh.cells[cell]].mean(axis=0))}, or lies along it: below 15 degrees "
+            "they are not told apart. Leave out what lies along the other crack, or give both as "
+            "one surface."
+        )
+
+
+def _slopes(mesh: Mesh, cut: Cut, cells: Ints) -> Floats:
+    """Unit normals of a crack in cells `(k, 3)`."""
+    slope = np.einsum("kb,kbd->kd", cut.level_set.phi[mesh.cells[cells]], mesh.gradient[cells])
+    length = np.linalg.norm(slope, axis=1, keepdims=True)
+    return np.asarray(slope / np.maximum(length, 1e-300))
+
+
+def _all_beyond(mesh: Mesh, through: Cut, ending: Cut, side: int) -> Bools:
+    """Cells of both cracks in which all faces of the arm lie beyond the other one `(m,)`."""
+    cell = ending.lip_cell[:, 0]
+    value = _at(mesh, through.level_set.phi, cell, ending.lip_bary[:, 0]) * side
+    has_faces = np.zeros(len(mesh.cells), dtype=bool)
+    has_faces[cell[(value > 0).any(axis=1)]] = True
+    return through.is_cut & (ending.is_cut | ending.is_tip) & ~has_faces
+
+
+def _at(mesh: Mesh, values: Floats, cell: Ints, bary: Floats) -> Floats:
+    """A linear function at points of cells `(k, v)`, round-off as zero."""
+    result = np.einsum("kvb,kb->kv", bary, values[mesh.cells[cell]])
+    result[np.abs(result) < _ROUND_OFF * mesh.cell_size[cell, None]] = 0.0
+    return np.asarray(result)
+
+
+def _parts(value: Floats, bary: Floats, x: Floats) -> tuple[Floats, Ints, Ints]:
+    """Triangles with values of both signs split: corners `(s, 2, 3, 4)`, sides and parents."""
+    inner, _, side, parent = cut_simplices(value, x)
+    return np.einsum("svw,stwb->stvb", inner, bary[parent]), side, parent
+
+
+def _clipped_cut(mesh: Mesh, through: Cut, ending: Cut, side: int, gone: Bools, both: Bools) -> Cut:
+    """The cut of the arm, without what lies beyond the other crack."""
+    phi = through.level_set.phi
+    cell = ending.lip_cell[:, 0]
+    value = _at(mesh, phi, cell, ending.lip_bary[:, 0]) * side
+    low, high = value.min(axis=1), value.max(axis=1)
+    clips = both[cell]
+    keep = ~gone[cell] & (~clips | ((low >= 0) & (high > 0)))
+    rows = np.nonzero(clips & (low < 0) & (high > 0))[0]
+    x = ending.lip_points(mesh)[rows]
+    bary, part_side, parent = _parts(value[rows], ending.lip_bary[rows], x)
+    before = part_side > 0
+    source = np.concatenate([np.nonzero(keep)[0], rows[parent[before]]])
+    subs = ~(gone | both)[ending.sub_to_cell]
+    one, two = mesh.edges.T
+    t = ending.cut_edge
+    at_cut = ((1 - t) * phi[one] + t * phi[two]) * side
+    with np.errstate(invalid="ignore"):
+        cut_edge = np.where(at_cut < 0, np.nan, t)
+    return replace(
+        ending,
+        cells=lock(ending.cells[~gone[ending.cells]]),
+        sub_to_cell=lock(ending.sub_to_cell[subs]),
+        sub_bary=lock(ending.sub_bary[subs]),
+        sub_fraction=lock(ending.sub_fraction[subs]),
+        sub_side=lock(ending.sub_side[subs]),
+        lip_cell=lock(ending.lip_cell[source]),
+        lip_bary=lock(np.concatenate([ending.lip_bary[keep], bary[before]])),
+        lip_normal=lock(ending.lip_normal[source]),
+        cut_edge=lock(cut_edge),
+        side=lock(np.where(through.side == -side, 0, ending.side)),
+    )
+
+
+def _split_cut(mesh: Mesh, through: Cut, ending: Cut, both: Bools) -> Cut:
+    """The cut of the crack that runs through, its faces split where the arm meets them."""
+    cell = through.lip_cell[:, 0]
+    value = _at(mesh, ending.level_set.phi, cell, through.lip_bary[:, 0])
+    split = both[cell] & (value.min(axis=1) < 0) & (value.max(axis=1) > 0)
+    rows = np.nonzero(split)[0]
+    bary, _, parent = _parts(value[rows], through.lip_bary[rows], through.lip_points(mesh)[rows])
+    source = np.concatenate([np.nonzero(~split)[0], rows[parent]])
+    return replace(
+        through,
+        lip_cell=lock(through.lip_cell[source]),
+        lip_bary=lock(np.concatenate([through.lip_bary[~split], bary])),
+        lip_normal=lock(through.lip_normal[source]),
+    )
+
+
+__all__ = ["joined_cuts"]

@@ -1,0 +1,267 @@
+"""Cracks in 3D that end on the face of others: slices against the plane, and what is refused."""
+
+import numpy as np
+import pytest
+
+import xcrack as xc
+from xcrack.fem.system import discretise
+
+STEEL = xc.Isotropic(1e5, 0.3)
+Z, X, LENGTH, THICK = 0.013, 0.07, 0.4, 0.4
+THROUGH = [(-0.51, Z), (0.52, Z)]
+
+
+def pulled(scale, sideways):
+    """Tractions in x and z that balance, by the set on which they act."""
+    pairs = {"top": (30.0, 100.0), "right": (sideways, 30.0)}
+    pairs |= {"bottom": (-30.0, -100.0), "left": (-sideways, -30.0)}
+    return {name: scale * np.array(t) for name, t in pairs.items()}
+
+
+def strip(line):
+    """A plane crack through the thickness over a line in x and z."""
+    (xa, za), (xb, zb) = line
+    return xc.plane_crack([(xa, -0.6, za), (xb, -0.6, zb), (xb, 0.6, zb), (xa, 0.6, za)])
+
+
+def side_above(crack):
+    """Side of a crack that looks up."""
+    a, b, c = crack.points[crack.faces[0]]
+    return 1 if np.cross(b - a, c - a)[2] > 0 else -1
+
+
+def slice_of_T(n, angle, order, scale=1.0, sideways=60.0, **options):
+    """A T in plane strain: a slice in space, and the same in the plane."""
+    turned = np.array([np.cos(np.radians(angle)), np.sin(np.radians(angle))])
+    ends = [np.array([X, Z]) + t * turned for t in (-0.35, 0.0, LENGTH)]
+    t = pulled(scale, sideways)
+    through = strip(THROUGH)
+    space = xc.Problem(
+        xc.box((-1, -THICK / 2, -1), (1, THICK / 2, 1), (n, 3, n)),
+        STEEL,
+        [through, xc.arm(strip((ends[0], ends[2])), 0, side_above(through))],
+        supports=[xc.fix("front", axis=1), xc.fix("back", axis=1)],
+        loads=[xc.traction(name, (v[0], 0.0, v[1])) for name, v in t.items()],
+        order=order,
+        **options,
+    )
+    plane = xc.Problem(
+        xc.box((-1, -1), (1, 1), 81),
+        xc.Isotropic(1e5, 0.3, plane="strain"),
+        [xc.line_crack(THROUGH), xc.line_crack([ends[1], ends[2]])],
+        loads=[xc.traction(name, tuple(v)) for name, v in t.items()],
+        **options,
+    )
+    return xc.solve(space), xc.solve(plane)
+
+
+def K_of(solution):
+    """Means over each front in space, K of each tip in the plane; K_I and K_II."""
+    rows = []
+    for c in range(len(solution.problem.cracks)):
+        sif = xc.stress_intensity(solution, c)
+        rows += [sif.K[sif.front == f, :2].mean(axis=0) for f in np.unique(sif.front)]
+    return np.array(rows)
+
+
+def plane_K(solution):
+    return np.concatenate([xc.stress_intensity(solution, c).K for c in (0, 1)])
+
+
+@pytest.mark.slow
+def test_slice_of_a_T_on_a_coarse_mesh():
+    """Order 1: discretisation."""
+    space, plane = slice_of_T(21, 90.0, 1, contact="off")
+    assert space.energy / THICK == pytest.approx(plane.energy, rel=0.01)
+    K, wanted = K_of(space), plane_K(plane)
+    assert np.abs(K - wanted).max() < 0.06 * np.abs(wanted).max()
+    assert len(space.problem.junctions) == 1
+
+
+@pytest.mark.slow
+@pytest.mark.mission
+@pytest.mark.parametrize("angle", [90.0, 50.0])
+def test_slice_of_a_T(angle):
+    """Energy to 5e-4 and K to half a percent of that in the plane, at 43 k unknowns."""
+    space, plane = slice_of_T(21, angle, 2, contact="off")
+    energy = space.energy / THICK / plane.energy - 1
+    error = np.abs(K_of(space) - plane_K(plane)).max() / np.abs(plane_K(plane)).max()
+    print(f"\n{angle:.0f} degrees: energy {energy:.1e}, K {error:.1e}")
+    assert abs(energy) < 5e-4
+    assert error < 5e-3
+
+
+@pytest.mark.slow
+def test_closed_slice_of_a_T():
+    """Forces to .3 %, K_II to 2 % and pressures away from the ends to 15 %."""
+    space, plane = slice_of_T(31, 90.0, 1, -1.0, 80.0, contact="on")
+    K, wanted = K_of(space), plane_K(plane)
+    force = [
+        [float((c.measure * c.pressure).sum()) / thick for c in s.contact]
+        for s, thick in ((space, THICK), (plane, 1.0))
+    ]
+    print(f"\nforces {force}, K_II {K[:, 1]} for {wanted[:, 1]}")
+    assert np.allclose(force[0], force[1], rtol=3e-3)
+    assert np.abs(K[:, 1] - wanted[:, 1]).max() < 0.02 * np.abs(wanted[:, 1]).max()
+
+
+@pytest.mark.slow
+def test_pressures_end_at_the_junction():
+    """No group of the crack that runs through reaches to both sides of the arm."""
+    from xcrack.analysis.multipliers import multipliers
+
+    space, _ = slice_of_T(21, 90.0, 1, contact="off")
+    lips = space.lips[0]
+    values = multipliers(space.space, 0, lips, "reduced").values
+    above = lips.x[:, 0] > X
+    near = np.abs(lips.x[:, 0] - X) < 0.3
+    mass = np.stack(
+        [np.asarray(values.T @ (lips.weight * near * part)).ravel() for part in (above, ~above)]
+    )
+    shared = mass.min(axis=0) / mass.sum(axis=0).clip(1e-300)
+    assert (shared < 0.02).all()
+    assert values.sum(axis=1) == pytest.approx(1.0)
+
+
+PULL = [
+    xc.traction("top", (0, 0, 100.0)), xc.traction("bottom", (0, 0, -100.0)),
+    xc.traction("right", (100.0, 0, 0)), xc.traction("left", (-100.0, 0, 0)),
+]  # fmt: skip
+ONE = xc.penny_crack((0.013, 0.0, 0.017), (0, 0, 1), 0.65)
+OTHER = xc.penny_crack((0.013, 0.0, 0.017), (1, 0, 0), 0.35)
+
+
+def scene(cracks, n=13, **options):
+    mesh = xc.box((-1,) * 3, (1,) * 3, n)
+    options = {"order": 1, "loads": PULL, **options}
+    return xc.Problem(mesh, STEEL, cracks, **options)
+
+
+def crossing():
+    return [ONE, xc.arm(OTHER, 0, 1), xc.arm(OTHER, 0, -1)]
+
+
+@pytest.mark.slow
+def test_crossing_pennies_are_symmetric():
+    """Both arms bear the same but for the mesh, and less than the penny alone near the other."""
+    solution = xc.solve(scene(crossing()))
+    alone = xc.stress_intensity(xc.solve(scene([OTHER])), 0).K[:, 0].mean()
+    K = [xc.stress_intensity(solution, c).K[:, 0] for c in (1, 2)]
+    assert K[0].mean() == pytest.approx(K[1].mean(), rel=0.05)
+    for arm in K:
+        assert 0 < arm[[0, -1]].max() < 0.5 * arm.max() < arm.max() < alone
+    opened = xc.solve(scene([ONE])).energy
+    assert solution.energy > opened
+
+
+@pytest.mark.slow
+def test_crossing_pennies():
+    """A conforming quadratic mesh has 1.10e-3 for the energy that the second penny adds."""
+    solution, one = (
+        xc.solve(scene(cracks, 21, order=2, contact="off")) for cracks in (crossing(), [ONE])
+    )
+    K = [xc.stress_intensity(solution, c).K[:, 0] for c in (1, 2)]
+    print(f"\nadded {solution.energy - one.energy:.3e}, arms {K[0].mean():.2f}, {K[1].mean():.2f}")
+    assert K[0].mean() == pytest.approx(K[1].mean(), rel=0.01)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("friction", [0.0, 0.3])
+def test_closed_crossing(friction):
+    """Pressed from all sides the faces bear the pressure of the whole body: nothing slips."""
+    loads = [xc.pressure("boundary", 100.0)]
+    solution = xc.solve(scene(crossing(), contact="on", friction=friction, loads=loads))
+    for contact in solution.contact:
+        mean = (contact.measure * contact.pressure).sum() / contact.measure.sum()
+        assert mean == pytest.approx(100.0, rel=1e-6)
+    plain = xc.solve(scene([], loads=loads)).energy
+    assert solution.energy == pytest.approx(plain, rel=1e-8)
+
+
+@pytest.mark.slow
+def test_arm_leaves_the_body():
+    """An arm on a crack that leaves the body with it has a front with two ends."""
+    through = xc.plane_crack(
+        [(-1.5, -0.7, 0.017), (1.5, -0.7, 0.017), (1.5, 1.5, 0.017), (-1.5, 1.5, 0.017)]
+    )
+    edge = xc.plane_crack(
+        [(0.013, -0.2, -0.5), (0.013, 1.5, -0.5), (0.013, 1.5, 0.6), (0.013, -0.2, 0.6)]
+    )
+    problem = scene([through, xc.arm(edge, 0, side_above(through))], 9, contact="off",
+                    supports=[xc.fix("bottom")], loads=PULL[:1])  # fmt: skip
+    sif = xc.stress_intensity(xc.solve(problem), 1)
+    assert np.isfinite(sif.K).all()
+    assert (sif.x[:, 2] > 0.017).all()
+
+
+@pytest.mark.slow
+def test_arm_on_an_arm():
+    """Three surfaces: the second ends on the first, the third on the second."""
+    plates = [
+        strip(THROUGH),
+        xc.arm(strip([(X, -0.4), (X, 0.6)]), 0, side_above(strip(THROUGH))),
+    ]
+    normal = np.cross(*(np.diff(plates[1].points[plates[1].faces[0]], axis=0)))
+    third = xc.arm(strip([(-0.4, 0.33), (0.5, 0.33)]), 1, 1 if normal[0] > 0 else -1)
+    mesh = xc.box((-1, -0.2, -1), (1, 0.2, 1), (21, 3, 21))
+    problem = xc.Problem(mesh, STEEL, [*plates, third], order=1, contact="off",
+        supports=[xc.fix("front", axis=1), xc.fix("back", axis=1)], loads=PULL)  # fmt: skip
+    solution = xc.solve(problem)
+    sif = xc.stress_intensity(solution, 2)
+    assert np.isfinite(sif.K).all()
+    assert (sif.x[:, 0] > X).all()
+
+
+@pytest.mark.slow
+def test_saved_solution_knows_its_arms(tmp_path):
+    solution = xc.solve(scene(crossing()))
+    xc.save(solution, tmp_path / "crossing.npz")
+    again = xc.load(tmp_path / "crossing.npz")
+    assert [crack.ends_on for crack in again.problem.cracks] == [(), ((0, 1),), ((0, -1),)]
+    assert np.array_equal(xc.stress_intensity(again, 1).K, xc.stress_intensity(solution, 1).K)
+
+
+BAD = {
+    "crosses": ([ONE, OTHER], "let one of them end on the other"),
+    "no such crack": ([ONE, xc.arm(OTHER, 2, 1)], "there are 2"),
+    "on itself": ([ONE, xc.arm(OTHER, 1, 1)], "ends on itself"),
+    "in a circle": ([xc.arm(ONE, 1, 1), xc.arm(OTHER, 0, 1)], "let one run through"),
+    "twice": ([ONE, xc.arm(xc.arm(OTHER, 0, 1), 0, -1)], "an arm for each side"),
+    "third of a cell before": (
+        [ONE, xc.arm(xc.penny_crack((0.013, 0.0, 0.43), (1, 0, 0), 0.35), 0, 1)],
+        "does not reach crack 0",
+    ),
+    "ends on it": (
+        [ONE, xc.arm(xc.penny_crack((0.013, 0.0, 0.33), (1, 0, 0), 0.35), 0, 1)],
+        "draw it on by two cells",
+    ),
+    "wrong side": (
+        [ONE, xc.arm(xc.penny_crack((0.013, 0.0, 0.5), (1, 0, 0), 0.35), 0, -1)],
+        "does not reach|wholly beyond",
+    ),
+    "along it": ([ONE, xc.arm(xc.penny_crack((0, 0, 0.03), (0.05, 0, 1), 0.4), 0, 1)],
+        "15 degrees|draw it on"),
+    "past its front": (
+        [ONE, xc.arm(xc.penny_crack((0.5, 0.0, 0.017), (0, 1, 0), 0.35), 0, 1)],
+        "front|closer than a cell",
+    ),
+    "interlocked": (
+        [ONE, xc.arm(xc.penny_crack((0.013, 0.45, 0.017), (1, 0, 0), 0.4), 0, 1)],
+        "front|closer than a cell",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_bad_arms_are_refused_with_the_remedy(name):
+    cracks, words = BAD[name]
+    with pytest.raises(xc.XcrackError, match=words):
+        discretise(scene(cracks))
+
+
+@pytest.mark.slow
+def test_arms_do_not_grow_yet():
+    law, cycle = xc.paris(1e-12, 3.0), xc.Cycle(0.0, 1.0)
+    history = xc.collect(xc.grow(scene(crossing()), law, xc.max_hoop_stress, cycle, da=0.05))
+    assert len(history.steps) == 1
+    assert "does not grow yet" in history.ended
