@@ -241,7 +241,7 @@ def place_surface(crack: Crack, mesh: Mesh) -> Crack:
     ----------
     crack : Crack
         In 3D. If its fronts are known already, only these are looked at again, and its points
-        stay as they are.
+        stay as they are; two of them that have met become one.
     mesh : Mesh
 
     Returns
@@ -318,7 +318,14 @@ def _placed(crack: Crack, mesh: Mesh) -> tuple[Crack, list[ShortFront]]:
             for run, front in zip(runs_of(inside), own_fronts, strict=True)
         )
     fronts.sort(key=lambda pair: pair[0])
-    return Crack(points, faces, None, tuple(front for _, front in fronts)), short
+    placed = Crack(points, faces, None, tuple(front for _, front in fronts))
+    if first_time:
+        return placed, short
+    # Frames at fronts are those of placed cracks: they are imported after this file.
+    from xcrack.crack.merging import joined_fronts
+
+    joined = joined_fronts(placed, body)
+    return _placed(joined, mesh) if joined is not None else (placed, short)
 
 
 def _check_inside(crack: Crack, body: Body) -> None:
