@@ -120,18 +120,12 @@ def _into_frame(frame, tensor, turn, local):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _add_point(  # type: ignore[no-untyped-def]
-    total, local, dx, dy, side, behind, weight, radii, inner, frame, modes, kolosov, lam, mu, g,
-    sigma, fall, change, bend,
-):  # fmt: skip
-    """Add what one point contributes; local: gradients in the frame, dx and dy from the tip.
-
-    The change of the stiffness from that of the tip (3, 3) counts unless it is None.
-    """
+def _place(frame, dx, dy, side, behind):  # type: ignore[no-untyped-def]
+    """Distance, coordinates, and cosine and sine of half the angle, without trigonometry."""
     r = math.sqrt(dx * dx + dy * dy)
     x = frame[0, 0] * dx + frame[0, 1] * dy
     y = frame[1, 0] * dx + frame[1, 1] * dy
-    # Half the angle without trigonometry; the larger of its sine and cosine by the root.
+    # The larger of both by the root.
     if x >= 0.0:
         c = math.sqrt(0.5 * (1.0 + x / r))
         s = 0.5 * y / (r * c)
@@ -140,6 +134,16 @@ def _add_point(  # type: ignore[no-untyped-def]
         c = 0.5 * y / (r * s)
     if behind and side * s < 0.0:  # a lip that bends: the angle is continued by a turn
         c, s = -c, -s
+    return r, x, y, c, s
+
+
+@kernel
+def _add_point(  # type: ignore[no-untyped-def]
+    total, local, dx, dy, side, behind, weight, radii, inner, frame, modes, kolosov, lam, mu, g,
+    sigma, fall,
+):  # fmt: skip
+    """Add what one point contributes; local: gradients in the frame, dx and dy from the tip."""
+    r, x, y, c, s = _place(frame, dx, dy, side, behind)
     _unit_fields(r, c, s, modes, kolosov, lam, mu, g, sigma)
     for k in range(len(radii)):
         width = radii[k] - inner[k]
@@ -159,23 +163,34 @@ def _add_point(  # type: ignore[no-untyped-def]
             )
             for k in range(len(radii)):
                 total[state, k, m] += fall[k] * flux
-    if change is not None:
-        _unit_bends(r, x, y, c, s, modes, kolosov, mu, bend)
-        for state in range(local.shape[2]):
-            e0, e1 = local[0, 0, state], local[1, 1, state]
-            e2 = local[0, 1, state] + local[1, 0, state]
-            s00 = change[0, 0] * e0 + change[0, 1] * e1 + change[0, 2] * e2
-            s11 = change[1, 0] * e0 + change[1, 1] * e1 + change[1, 2] * e2
-            s01 = change[2, 0] * e0 + change[2, 1] * e1 + change[2, 2] * e2
-            for m in range(3):
-                flux = x * (s00 * g[m, 0, 0] + s01 * g[m, 1, 0])
-                flux += y * (s01 * g[m, 0, 0] + s11 * g[m, 1, 0])
-                steady = s00 * bend[m, 0, 0] + s11 * bend[m, 1, 1]
-                steady += s01 * (bend[m, 0, 1] + bend[m, 1, 0])
-                for k in range(len(radii)):
-                    z = min(max((r - inner[k]) / (radii[k] - inner[k]), 0.0), 1.0)
-                    q = 1.0 - z * z * z * (10.0 - 15.0 * z + 6.0 * z * z)
-                    total[state, k, m] += fall[k] * flux + weight * q * steady
+
+
+@kernel
+def _add_change(  # type: ignore[no-untyped-def]
+    total, local, dx, dy, side, behind, weight, radii, inner, frame, modes, kolosov, mu, g, fall,
+    change, bend,
+):  # fmt: skip
+    """Add what the change of the stiffness from that of the tip (3, 3) contributes at a point.
+
+    After `_add_point`, whose unit gradients and slopes of the weight count.
+    """
+    r, x, y, c, s = _place(frame, dx, dy, side, behind)
+    _unit_bends(r, x, y, c, s, modes, kolosov, mu, bend)
+    for state in range(local.shape[2]):
+        e0, e1 = local[0, 0, state], local[1, 1, state]
+        e2 = local[0, 1, state] + local[1, 0, state]
+        s00 = change[0, 0] * e0 + change[0, 1] * e1 + change[0, 2] * e2
+        s11 = change[1, 0] * e0 + change[1, 1] * e1 + change[1, 2] * e2
+        s01 = change[2, 0] * e0 + change[2, 1] * e1 + change[2, 2] * e2
+        for m in range(3):
+            flux = x * (s00 * g[m, 0, 0] + s01 * g[m, 1, 0])
+            flux += y * (s01 * g[m, 0, 0] + s11 * g[m, 1, 0])
+            steady = s00 * bend[m, 0, 0] + s11 * bend[m, 1, 1]
+            steady += s01 * (bend[m, 0, 1] + bend[m, 1, 0])
+            for k in range(len(radii)):
+                z = min(max((r - inner[k]) / (radii[k] - inner[k]), 0.0), 1.0)
+                q = 1.0 - z * z * z * (10.0 - 15.0 * z + 6.0 * z * z)
+                total[state, k, m] += fall[k] * flux + weight * q * steady
 
 
 @kernel
@@ -231,8 +246,13 @@ def add_points(  # type: ignore[no-untyped-def]
             _into_frame(frame, gradient[p], turn, local)
             _add_point(
                 total, local, dx, dy, side[p], psi_sum < 0.0, weight[p], radii, inner, frame, modes,
-                kolosov, lam, mu, g, sigma, fall, None if change is None else change[p], bend,
+                kolosov, lam, mu, g, sigma, fall,
             )  # fmt: skip
+            if change is not None:
+                _add_change(
+                    total, local, dx, dy, side[p], psi_sum < 0.0, weight[p], radii, inner, frame,
+                    modes, kolosov, mu, g, fall, change[p], bend,
+                )  # fmt: skip
 
 
 @kernel
@@ -312,5 +332,10 @@ def add_plain_cells(  # type: ignore[no-untyped-def]
             _add_point(
                 total, local, dx, dy, side[e], behind, share[p] * volume[e], radii, inner, frame,
                 modes, kolosov, lam, mu, g, sigma, fall,
-                None if change is None else change[place, min(p, change.shape[1] - 1)], bend,
             )  # fmt: skip
+            if change is not None:
+                _add_change(
+                    total, local, dx, dy, side[e], behind, share[p] * volume[e], radii, inner,
+                    frame, modes, kolosov, mu, g, fall,
+                    change[place, min(p, change.shape[1] - 1)], bend,
+                )  # fmt: skip
