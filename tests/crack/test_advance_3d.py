@@ -8,10 +8,10 @@ from xcrack.base.errors import GeometryError, XcrackWarning
 from xcrack.crack.advance_3d import advance_fronts
 from xcrack.crack.crack import Crack
 from xcrack.crack.front_chain import along_front
+from xcrack.crack.fronts import front_frames
 from xcrack.crack.lines import crossing_points
 from xcrack.crack.measures import area_inside, front_length_inside, surface_size
 from xcrack.crack.placing_3d import place_surface
-from xcrack.crack.stations import front_frames
 from xcrack.crack.surfaces import elliptic_crack, penny_crack
 from xcrack.fatigue.cycle import cycles_between
 from xcrack.growth.euler import elapsed_3d

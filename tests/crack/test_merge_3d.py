@@ -9,9 +9,9 @@ import pytest
 
 from xcrack.base.errors import GeometryError
 from xcrack.crack.crack import Crack
+from xcrack.crack.fronts import front_frames
 from xcrack.crack.merging import gap_between, merged_crack, turned_crack
 from xcrack.crack.placing_3d import place_surface
-from xcrack.crack.stations import front_frames
 from xcrack.crack.surfaces import penny_crack, plane_crack, surface_crack
 from xcrack.mesh.box import box
 from xcrack.mesh.locate import Body

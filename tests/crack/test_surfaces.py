@@ -7,8 +7,9 @@ import xcrack as xc
 from xcrack.base.errors import GeometryError, XcrackError
 from xcrack.crack.boundary_trace import Body
 from xcrack.crack.crack import Crack
+from xcrack.crack.fronts import front_frames
 from xcrack.crack.placing_3d import check_surfaces, place_surface
-from xcrack.crack.stations import front_frames, place_crack
+from xcrack.crack.stations import place_crack
 from xcrack.crack.surfaces import (
     elliptic_crack,
     penny_crack,

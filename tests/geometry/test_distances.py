@@ -5,8 +5,8 @@ import pytest
 
 import xcrack as xc
 from xcrack.crack.crack import Crack
+from xcrack.crack.fronts import front_frames
 from xcrack.crack.placing_3d import place_surface
-from xcrack.crack.stations import front_frames
 from xcrack.crack.surfaces import elliptic_crack, penny_crack, plane_crack, surface_crack
 from xcrack.fem.level_set import extended_surface
 from xcrack.mesh.distances import (

@@ -6,7 +6,7 @@ from matplotlib.figure import Figure
 from scipy.spatial import cKDTree
 
 import xcrack as xc
-from xcrack.crack.stations import front_weights, is_closed
+from xcrack.crack.fronts import front_weights, is_closed
 from xcrack.growth.step import Step
 from xcrack.runs.history import History
 from xcrack.view import pyvista_2d as plot_pyvista

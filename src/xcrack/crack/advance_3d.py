@@ -28,8 +28,8 @@ from xcrack.crack.front_chain import (
     without_sides,
 )
 from xcrack.crack.front_curve import front_curve
+from xcrack.crack.fronts import Front, front_frames, steps
 from xcrack.crack.merging import through_holes
-from xcrack.crack.stations import Front, front_frames, steps
 from xcrack.mesh.distances import first_crossing, surface_distance, triangle_tree
 from xcrack.mesh.locate import Body
 from xcrack.mesh.triangulation import rim, sides

@@ -14,7 +14,7 @@ from xcrack.base.arrays import Bools, Floats, Ints
 from xcrack.crack.boundary_trace import OUTSIDE, open_runs, runs_of, way_out
 from xcrack.crack.front_chain import FrontChain, chain
 from xcrack.crack.front_curve import front_curve
-from xcrack.crack.stations import Front
+from xcrack.crack.fronts import Front
 from xcrack.mesh.locate import Body
 
 Rays = tuple[FrontChain, Ints, Floats]  # what is sent out, which are vertices, normals there

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from xcrack.base.arrays import Bools, Floats, Ints, frozen_copy
-from xcrack.crack.stations import steps, tangents
+from xcrack.crack.fronts import steps, tangents
 
 _FEWEST = 8  # points of a closed front that are not merged for their spacing
 _PART = 0.1  # of its advance by which fairing may move a point

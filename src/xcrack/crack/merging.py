@@ -14,7 +14,7 @@ from xcrack.base.arrays import Bools, Floats, Ints, at
 from xcrack.base.errors import GeometryError
 from xcrack.crack.boundary_trace import open_runs, runs_of
 from xcrack.crack.crack import Crack
-from xcrack.crack.stations import Front, front_frames
+from xcrack.crack.fronts import Front, front_frames
 from xcrack.mesh.distances import TriangleTree, closest_in, front_distance, triangle_tree
 from xcrack.mesh.locate import Body
 from xcrack.mesh.polygon import cross, ear_clipped, self_crossing, without_slivers

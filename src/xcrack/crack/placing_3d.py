@@ -10,6 +10,7 @@ from xcrack.base.errors import CoarseMeshError, GeometryError, warn
 from xcrack.crack.boundary_trace import OUTSIDE, SIDE, SMOOTH, TraceOutline, open_fronts, runs_of
 from xcrack.crack.crack import Crack
 from xcrack.crack.junctions_3d import are_opposite, crossings, is_before, may_touch
+from xcrack.crack.merging import joined_fronts
 from xcrack.mesh.distances import closest_in, triangle_tree
 from xcrack.mesh.locate import Body, locate
 from xcrack.mesh.mesh import Mesh
@@ -321,9 +322,6 @@ def _placed(crack: Crack, mesh: Mesh) -> tuple[Crack, list[ShortFront]]:
     placed = Crack(points, faces, None, tuple(front for _, front in fronts))
     if first_time:
         return placed, short
-    # Frames at fronts are those of placed cracks: they are imported after this file.
-    from xcrack.crack.merging import joined_fronts
-
     joined = joined_fronts(placed, body)
     return _placed(joined, mesh) if joined is not None else (placed, short)
 

@@ -7,8 +7,8 @@ from scipy.spatial import cKDTree
 
 from xcrack.base.arrays import Bools, Floats, Ints, lock
 from xcrack.crack.crack import Crack, tip_frames
+from xcrack.crack.fronts import Front, front_frames
 from xcrack.crack.placing_2d import ON_MESH
-from xcrack.crack.stations import Front, front_frames
 from xcrack.mesh.distances import front_distance, surface_distance
 from xcrack.mesh.locate import cells_around
 from xcrack.mesh.mesh import Mesh, local_facets

@@ -10,8 +10,8 @@ from xcrack.base.arrays import Floats, Ints
 from xcrack.base.errors import GeometryError
 from xcrack.crack.advance_2d import advance
 from xcrack.crack.crack import Crack
+from xcrack.crack.fronts import closed_fronts
 from xcrack.crack.meetings import LEAST, joined, meetings
-from xcrack.crack.stations import closed_fronts
 from xcrack.fatigue.cycle import cycles_between
 from xcrack.growth import fronts
 from xcrack.growth.corrected import Corrected

@@ -14,9 +14,10 @@ from xcrack.base.arrays import Bools, Floats, Ints
 from xcrack.base.errors import GeometryError
 from xcrack.crack.advance_3d import advance_fronts
 from xcrack.crack.crack import Crack
+from xcrack.crack.fronts import closed_fronts, front_frames
 from xcrack.crack.measures import crack_size
 from xcrack.crack.meetings import LEAST
-from xcrack.crack.stations import closed_fronts, front_frames, place_crack
+from xcrack.crack.stations import place_crack
 from xcrack.fatigue.retardation import (
     POINTS,
     BlockCycles,

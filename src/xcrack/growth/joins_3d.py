@@ -10,9 +10,9 @@ from scipy.special import exprel
 from xcrack.base.arrays import Floats, at
 from xcrack.base.errors import GeometryError
 from xcrack.crack.crack import Crack
+from xcrack.crack.fronts import closed_fronts
 from xcrack.crack.measures import crack_size
 from xcrack.crack.merging import OFFSET, FrontGap, gap_between, merged_crack, turned_crack
-from xcrack.crack.stations import closed_fronts
 from xcrack.growth import euler, fronts
 from xcrack.growth.corrected import Corrected
 from xcrack.growth.fronts import interpolate_along_front

@@ -11,7 +11,7 @@ from xcrack.base.arrays import Floats, Ints
 from xcrack.base.errors import ProblemError
 from xcrack.base.paths import write_texts
 from xcrack.crack.crack import Crack, tip_frames
-from xcrack.crack.stations import front_weights
+from xcrack.crack.fronts import front_weights
 from xcrack.growth.step import Step
 from xcrack.growth.uncertainty import uses_best
 from xcrack.runs.life_bar import life_bar

@@ -25,8 +25,8 @@ from xcrack.base.arrays import Bools, Floats
 from xcrack.base.checks import value_text
 from xcrack.base.errors import ProblemError
 from xcrack.base.units import LENGTH
+from xcrack.crack.fronts import closed_fronts, is_closed
 from xcrack.crack.measures import front_ends
-from xcrack.crack.stations import closed_fronts, is_closed
 from xcrack.growth.step import Step, numbers_after
 from xcrack.mesh.locate import Body
 from xcrack.mesh.mesh import Mesh
