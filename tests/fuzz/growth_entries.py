@@ -155,6 +155,7 @@ GROW = {
     "retardation": arg(Seen(rule=lambda v: v is None), None),
     "K_c": arg(Number(optional=True, above=0), None, 1e3),
     "link_up": arg(Called(optional=True), None, xc.plastic_zone(400.0, 2)),
+    "stop_at_interface": arg(Flag(), False, True),
     "max_steps": arg(
         Whole(
             least=1,
@@ -198,6 +199,7 @@ RESUME = {
     "K_c": arg(Number(optional=True, above=0), None, 1e3),
     "retardation": arg(Seen(rule=lambda v: v is None), None),
     "link_up": arg(Called(optional=True), None, xc.plastic_zone(400.0, 2)),
+    "stop_at_interface": arg(Flag(), False, True),
     "max_steps": arg(Whole(least=1, rule=lambda v: v < 3 or None, far=2), 2),
     "max_cycles": arg(Number(optional=True, above=0), None, 1e6),
     "until": arg(Called(optional=True), None),

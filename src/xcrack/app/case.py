@@ -143,6 +143,14 @@ def _numerics(table: Table) -> Numerics:
     return values.called_with(table, Numerics)  # type: ignore[no-any-return]
 
 
+def _law(table: Table) -> Any:
+    """One law, or by tables [growth.law.name] one for each material."""
+    makers = values.makers_of(GrowthLaw)
+    if table.content and all(isinstance(value, dict) for value in table.content.values()):
+        return {name: values.value_of_table(table.table(name), makers) for name in table.content}
+    return values.value_of_table(table, makers)
+
+
 def _growth(table: Table) -> Mapping[str, Any]:
     """Arguments of `grow`."""
     options = [name for name in GrowthOptions.__annotations__ if name not in ("solver", "response")]
@@ -161,7 +169,7 @@ def _growth(table: Table) -> Mapping[str, Any]:
     if "link_up" in table:
         given["link_up"] = values.called_with(table.table("link_up"), plastic_zone)
     return MappingProxyType({
-        "law": values.value_of_table(table.table("law"), values.makers_of(GrowthLaw)),
+        "law": _law(table.table("law")),
         "criterion": values.CRITERIA[criterion],
         "cycle": loading(table),
         **given,

@@ -10,6 +10,7 @@ from xcrack.base.checks import call_function, numbers, value_text
 from xcrack.base.errors import ProblemError
 from xcrack.fatigue.criteria import Criterion
 from xcrack.fatigue.law import NEEDS, Law, largest_K
+from xcrack.fatigue.law_sets import LawSets, Names
 
 _NEAR = 1e-3  # change of ln(range) over which the slope of a law is taken
 _USUAL, _EXPONENTS = 3.0, (1.0, 20.0)
@@ -81,13 +82,19 @@ def _one_a_place(part: Any, name: str, n: int, places: str) -> Floats:
 
 
 def evaluate_law(
-    law: Law, dK_eq: Floats, R: Floats, crack: int, place: str = "tip", a: Floats | None = None
+    law: Law | LawSets,
+    dK_eq: Floats,
+    R: Floats,
+    crack: int,
+    place: str = "tip",
+    a: Floats | None = None,
+    material: Names | None = None,
 ) -> Floats:
     """Growth a cycle at each place of one crack.
 
     Parameters
     ----------
-    law : callable
+    law : callable, or LawSets
     dK_eq, R : (f,) arrays
     crack : int
         Its number, for messages.
@@ -95,6 +102,8 @@ def evaluate_law(
         What a point of a front is called in messages.
     a : (f,) array, optional, length
         Crack size at each place, for a law that asks for it.
+    material : (f,) array of str, optional
+        Names of the materials there, for laws by material; without it the fastest counts.
 
     Returns
     -------
@@ -108,6 +117,14 @@ def evaluate_law(
     """
     if len(dK_eq) == 0:
         return np.zeros(0)
+    if isinstance(law, LawSets):
+        rate = np.zeros(len(dK_eq))
+        for name, part in law.laws:
+            rows = np.arange(len(dK_eq)) if material is None else np.nonzero(material == name)[0]
+            size = None if a is None else a[rows]
+            of_part = evaluate_law(part, dK_eq[rows], R[rows], crack, place, size)
+            rate[rows] = np.maximum(rate[rows], of_part)
+        return rate
     needs = law_needs(law, dK_eq, R, a)
     result = call_function(
         partial(law, **needs), f"the growth rates of crack {crack}", dK_eq.copy(), R.copy()
@@ -149,25 +166,30 @@ def law_needs(law: Law, dK_eq: Floats, R: Floats, a: Floats | None) -> dict[str,
     return values
 
 
-def depends_on_ratio(law: Law, dK_eq: Floats) -> bool:
+def depends_on_ratio(law: Law | LawSets, dK_eq: Floats) -> bool:
     """Whether a law gives other rates for other ratios R at these ranges `(f,)`."""
     low, high = (evaluate_law(law, dK_eq, np.full(len(dK_eq), ratio), 0) for ratio in _RATIOS)
     return not np.array_equal(low, high)
 
 
-def law_exponent(law: Law, dK_eq: Floats, R: Floats) -> float:
+def law_exponent(
+    law: Law | LawSets, dK_eq: Floats, R: Floats, material: Names | None = None
+) -> float:
     """Slope of ln(rate) over ln(range) of a law at its largest range, in [1, 20]; 3 if unknown.
 
     Parameters
     ----------
-    law : callable
+    law : callable, or LawSets
     dK_eq, R : (f,) arrays
+    material : (f,) array of str, optional
+        As of `evaluate_law`.
     """
     if not len(dK_eq) or dK_eq.max() <= 0:
         return _USUAL
     j = int(np.argmax(dK_eq))
     ranges = dK_eq[j] * np.exp(np.array([-_NEAR, _NEAR]))
-    rate = evaluate_law(law, ranges, np.full(2, R[j]), 0)
+    names = None if material is None else material[[j, j]]
+    rate = evaluate_law(law, ranges, np.full(2, R[j]), 0, material=names)
     if not (np.isfinite(rate).all() and (rate > 0).all()):
         return _USUAL
     return float(np.clip(np.log(rate[1] / rate[0]) / (2 * _NEAR), *_EXPONENTS))

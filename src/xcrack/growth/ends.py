@@ -9,6 +9,7 @@ import numpy as np
 from xcrack.base.arrays import Floats
 from xcrack.base.checks import call_function, numbers
 from xcrack.base.errors import XcrackError, collected_warnings
+from xcrack.crack.stations import stations_of
 from xcrack.fatigue.criteria import clipped_K, equivalent_K
 from xcrack.fatigue.cycle import Cycle
 from xcrack.growth.options import GrowthRule
@@ -150,15 +151,31 @@ def law_reaches_toughness(rule: GrowthRule, step: Step) -> str:
 
 
 def toughness_is_reached(rule: GrowthRule, step: Step) -> str:
-    """K_eq of some state reaches K_c."""
-    K_c = rule.toughness
-    if K_c is None:
+    """K_eq of some state reaches K_c of the material there."""
+    if rule.toughness is None:
         return ""
     for c in range(len(step.cracks)):
-        K_eq = _largest_K(rule, step, c)
+        K_eq, K_c = _largest_K(rule, step, c), rule.toughness_at(step.sif[0][c].x)
         for j in np.nonzero(K_eq >= K_c)[0].tolist():
             place = place_name(step, c, j)
-            return f"K_c reached: K_eq = {K_eq[j]:.6g} >= {K_c:.6g} at {place}"
+            return f"K_c reached: K_eq = {K_eq[j]:.6g} >= {K_c[j]:.6g} at {place}"
+    return ""
+
+
+def interface_is_passed(rule: GrowthRule, step: Step) -> str:
+    """A tip is in a material in which none was at the start, and the run stops there."""
+    elasticity = rule.problem.elasticity
+    if not rule.stop_at_interface or len(elasticity.named) < 2:
+        return ""
+    start = stations_of(rule.problem.placed, rule.problem.mesh).x
+    known = set(elasticity.names_at(start).tolist())
+    for c in range(len(step.cracks)):
+        names = elasticity.names_at(step.sif[0][c].x)
+        for j, name in enumerate(names.tolist()):
+            if name not in known:
+                words = " and ".join(map(repr, sorted(known)))
+                place = place_name(step, c, j)
+                return f"interface passed: {place} has come from {words} into {name!r}"
     return ""
 
 
@@ -190,6 +207,7 @@ ENDS: tuple[Callable[[GrowthRule, Step], str], ...] = (
     law_reaches_toughness,
     toughness_is_reached,
     ligament_yields,
+    interface_is_passed,
     cycles_are_over,
     steps_are_over,
     nothing_grows,

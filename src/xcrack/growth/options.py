@@ -1,7 +1,7 @@
 """Options of `grow`: they stand here once, their defaults on `GrowthRule` alone."""
 
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields
 from numbers import Real
 from typing import Annotated, Any, TypedDict, TypeVar, cast
@@ -9,13 +9,13 @@ from typing import Annotated, Any, TypedDict, TypeVar, cast
 import numpy as np
 from numpy.typing import ArrayLike
 
-from xcrack.base.arguments import Choice, Function, Number, Part, Whole, arguments_of
+from xcrack.base.arguments import Choice, Either, Function, Number, Part, Whole, arguments_of
 from xcrack.base.arrays import Floats
 from xcrack.base.description import default_keys, describe
 from xcrack.base.errors import ProblemError, warn
 from xcrack.fatigue.criteria import Criterion
 from xcrack.fatigue.cycle import Cycle
-from xcrack.fatigue.law import Law
+from xcrack.fatigue.law_sets import LawSets
 from xcrack.fatigue.rainflow import turning_points
 from xcrack.fatigue.retardation import Retardation, willenborg
 from xcrack.fatigue.spectrum import Spectrum
@@ -44,6 +44,7 @@ class GrowthOptions(TypedDict, total=False):
     retardation: Retardation | None
     K_c: float | None
     link_up: Callable[[Floats], ArrayLike] | None
+    stop_at_interface: bool
     max_steps: int | None
     max_cycles: float | None
     solver: Any
@@ -58,7 +59,8 @@ class GrowthRule:
     Parameters
     ----------
     problem, law, criterion, cycle, da, cycles, tolerance, max_unknowns, scaling, integrator, \
-    threshold, retardation, solver, response, K_c, link_up, max_steps, max_cycles, progress
+    threshold, retardation, solver, response, K_c, link_up, stop_at_interface, max_steps, \
+    max_cycles, progress
         As of `grow`.
     scouts : bool
         It is the scout of a run with a tolerance: nothing is estimated.
@@ -72,7 +74,10 @@ class GrowthRule:
     """
 
     problem: Annotated[Problem, Part(Problem, needs="a Problem")]
-    law: Annotated[Law, Function("a function of two arguments")]
+    law: Annotated[
+        Any,
+        Either(Part(LawSets, "laws by material"), Function("a function of two arguments")),
+    ]
     criterion: Annotated[Criterion, Function("a function of two arguments")]
     cycle: Annotated[Cycle | Spectrum, Part((Cycle, Spectrum), "Cycle(min, max), or a Spectrum")]
     da: Annotated[float | None, _POSITIVE] = None
@@ -89,6 +94,9 @@ class GrowthRule:
     link_up: Annotated[Callable[[Floats], ArrayLike] | None, Function(_LINK_UP)] = field(
         default=None, metadata=_STOPS
     )
+    stop_at_interface: Annotated[bool, Choice((True, False))] = field(
+        default=False, metadata=_STOPS
+    )
     max_steps: Annotated[int | None, Whole(least=1)] = field(default=None, metadata=_STOPS)
     max_cycles: Annotated[float | None, _POSITIVE] = field(default=None, metadata=_STOPS)
     progress: Annotated[bool | str, Choice((True, False, "always"), _PROGRESS)] = field(
@@ -98,9 +106,13 @@ class GrowthRule:
     meshes: int = field(default=0, metadata=_STOPS)
 
     def __post_init__(self) -> None:
+        if isinstance(self.law, Mapping):
+            object.__setattr__(self, "law", LawSets(self.law))
         for name, argument in arguments_of(GrowthRule).items():
             checked = argument.check(getattr(self, name), f"grow: {name}")
             object.__setattr__(self, name, checked)
+        if isinstance(self.law, LawSets):
+            self.law.check([name for name, _ in self.problem.elasticity.named])
         for state in self.cycle.load_states:
             self.problem.state(state)
         if isinstance(self.cycle, Cycle) and looks_like_history(self.cycle):
@@ -138,6 +150,11 @@ class GrowthRule:
             raise ProblemError(
                 "grow: retardation needs cycles in time: give Spectrum(factors). One Cycle has no "
                 "overload, counted rows no order, and states are counted at each tip on its own."
+            )
+        if isinstance(self.law, LawSets):
+            raise ProblemError(
+                "grow: retardation follows one law through all of a crack: leave it out, or give "
+                "one law for all materials."
             )
         if self.integrator != "pec":
             raise ProblemError('grow: retardation goes with integrator="pec" only.')
@@ -178,6 +195,12 @@ class GrowthRule:
         if self.scouts or self.K_c is not None:
             return self.K_c
         return self.problem.elasticity.material.K_c
+
+    def toughness_at(self, x: Floats) -> Floats:
+        """Toughness at which the run ends, of the material at each point `(n,)`; inf without."""
+        if self.scouts or self.K_c is not None:
+            return np.full(len(x), np.inf if self.K_c is None else self.K_c)
+        return self.problem.elasticity.toughness_at(x)
 
     def _check_tolerance(self) -> None:
         if self.tolerance is None:
@@ -230,7 +253,7 @@ def looks_like_history(cycle: Cycle) -> bool:
 def run_of(
     caller: str,
     problem: Problem,
-    law: Law,
+    law: Any,
     criterion: Criterion,
     cycle: Cycle | Spectrum,
     da: float | None,

@@ -13,6 +13,7 @@ from xcrack.crack.stations import Stations
 from xcrack.fatigue.checks import evaluate_criterion, evaluate_law, law_exponent
 from xcrack.fatigue.criteria import clipped_K, equivalent_K, kink_angle, nominal_range
 from xcrack.fatigue.law import Law
+from xcrack.fatigue.law_sets import LawSets, Names
 from xcrack.fatigue.rainflow import closed_cycles
 from xcrack.fatigue.retardation import BlockCycles
 from xcrack.fatigue.spectrum import Spectrum, distinct
@@ -147,9 +148,10 @@ class Rates:
         """Unit vectors of growth `(n, d)`."""
         return directions(self.stations.frame, self.angle)
 
-    def exponent(self, law: Law) -> float:
+    def exponent(self, law: Law | LawSets) -> float:
         """Slope of a law at the largest range."""
-        return law_exponent(law, self.dK_eq, self.R)
+        names = self.problem.elasticity.names_at(self.stations.x)
+        return law_exponent(law, self.dK_eq, self.R, names)
 
     @property
     def largest(self) -> float:
@@ -228,12 +230,13 @@ def _inputs_of_cycle(
     def of_crack(c: int) -> CriterionInput:
         given = np.stack([state[c].K for state in response.sif])
         a = law_size(problem, c, given.shape[1])
+        names = problem.elasticity.names_at(response.sif[0][c].x)
 
         def rates_of_K(K: Floats) -> CycleRates:
             angle, dK, R = evaluate_criterion(rule.criterion, K, nu, c, place)
             if free is not None:
                 dK, R = nominal_range(np.stack([state[c].K for state in free.sif]), angle, nu)
-            rate = evaluate_law(rule.law, dK, R, c, place, a)
+            rate = evaluate_law(rule.law, dK, R, c, place, a, names)
             return CycleRates(angle, dK, R, rate, np.stack([R, R], axis=1))
 
         def angle_of_K(K: Floats) -> Floats:
@@ -254,10 +257,11 @@ def _inputs_of_blocks(
     def of_crack(c: int, pairs: RangePairs, free_pairs: RangePairs | None) -> CriterionInput:
         shape = pairs.K.shape
         a = law_size(problem, c, shape[2])
+        names = problem.elasticity.names_at(response.sif[0][c].x)
 
         def rates_of_K(K: Floats) -> CycleRates:
             cycles = replace(pairs, K=K.reshape(shape))
-            return block_of(rated(rule, cycles, nu, c, place, a, free_pairs), pairs.count)
+            return block_of(rated(rule, cycles, nu, c, place, a, free_pairs, names), pairs.count)
 
         def angle_of_K(K: Floats) -> Floats:  # the mean of the cycles' directions needs their rates
             return rates_of_K(K).angle
@@ -328,15 +332,15 @@ def _locked(problem: Problem, response: Response, dK_eq: Floats) -> Bools:
 # The ratio R < 0, which may mean two things.
 
 
-def check_choice(law: Law, ratio: float | None) -> None:
+def check_choice(law: Law | LawSets, ratio: float | None) -> None:
     """Refuse a cycle with R < 0 under a law that must know how R is meant, and was not told."""
     if ratio is not None and ratio < 0 and _must_choose(law):
         raise ProblemError(_choice(f"the cycle has R = {ratio:.4g}", law))
 
 
-def _must_choose(law: Law) -> bool:
+def _must_choose(law: Law | LawSets) -> bool:
     """Whether R < 0 may mean two things to a law, and it does not say which."""
-    return getattr(law, "ratio", "contact") is None and bool(law.knows_negative_ratios)  # type: ignore[attr-defined]
+    return getattr(law, "ratio", "contact") is None and bool(law.knows_negative_ratios)  # type: ignore[union-attr]
 
 
 def _check_choice(rule: GrowthRule, sif: Answers) -> None:
@@ -347,7 +351,7 @@ def _check_choice(rule: GrowthRule, sif: Answers) -> None:
             raise ProblemError(_choice("a load state closes a tip, so that R < 0", rule.law))
 
 
-def _choice(reason: str, law: Law) -> str:
+def _choice(reason: str, law: Law | LawSets) -> str:
     name = type(law).__name__
     return (
         f"{reason}, and {name} does not say which K its constants belong to: give {name}(..., "
@@ -427,6 +431,7 @@ def rated(
     place: str,
     a: Floats,
     nominal: RangePairs | None = None,
+    names: Names | None = None,
 ) -> PairRates:
     """Ask criterion and law about every kind of cycle; they see them as stations of one front.
 
@@ -443,6 +448,8 @@ def rated(
         Crack size at each station.
     nominal : RangePairs, optional
         The same without contact, for a law with nominal R.
+    names : (f,) array of str, optional
+        Of the materials at the stations.
     """
     _, p, f, modes = pairs.K.shape
     parts = []
@@ -456,7 +463,8 @@ def rated(
         if nominal is not None:
             free = nominal.K[:, begin : begin + rows].reshape(2, n * f, modes)
             dK, R = nominal_range(free, angle, nu)
-        rate = evaluate_law(rule.law, dK, R, c, f"{place} of a cycle", np.tile(a, n))
+        of_rows = None if names is None else np.tile(names, n)
+        rate = evaluate_law(rule.law, dK, R, c, f"{place} of a cycle", np.tile(a, n), of_rows)
         rate = np.where(dK < rule.threshold, 0.0, rate)
         parts.append(np.stack([angle, dK, R, rate]).reshape(4, n, f))
     return PairRates(*np.concatenate(parts, axis=1)) if parts else PairRates(*np.zeros((4, p, f)))

@@ -14,6 +14,7 @@ from xcrack.fatigue.checks import depends_on_ratio
 from xcrack.fatigue.criteria import Criterion
 from xcrack.fatigue.cycle import Cycle
 from xcrack.fatigue.law import Law
+from xcrack.fatigue.law_sets import LawSets
 from xcrack.fatigue.spectrum import Spectrum
 from xcrack.growth import joins_3d
 from xcrack.growth.alarms import alarm_of_life, alarms_of_step
@@ -64,7 +65,7 @@ from xcrack.sif.sif import SIF
 @lists_options
 def grow(
     problem: Problem,
-    law: Law,
+    law: Law | Mapping[str, Law] | LawSets,
     criterion: Criterion,
     cycle: Cycle | Spectrum,
     da: float | None = None,
@@ -82,7 +83,9 @@ def grow(
     problem : Problem
         With the cracks as they are at first. The radius of the tip functions is taken at the
         first step and used in all.
-    law : callable (dK_eq, R) -> da/dN
+    law : callable (dK_eq, R) -> da/dN, or mapping of str to such
+        A mapping gives each material of the problem, by the name of its cell set, a law of its own,
+        and a tip grows by that of the material that it is in, with its threshold and toughness.
         `paris`, `walker`, `forman`, `nasgro` ... or your own. Where it returns inf, the toughness
         is reached and growth ends. One with ``ratio="nominal"`` gets range and R < 0 of the scene
         without contact, in the direction that K with contact asks for: one more solve a step.
@@ -128,6 +131,8 @@ def grow(
         In 2D: stop when plastic zones fill a ligament: those of two tips that head for each other
         add up, that of one tip reaches what lies straight ahead, a hole, a side or another crack.
         Swift's criterion has ``plastic_zone(sigma_y, beta=2)``.
+    stop_at_interface : bool
+        End the run where a tip has come into a material in which none was at the start.
     max_steps : int, optional
         Stop after this many steps, the first included.
     max_cycles : float, optional

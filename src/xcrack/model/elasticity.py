@@ -287,6 +287,15 @@ class Elasticity:
             return np.zeros(len(x), dtype=np.int64)
         return self.set_number[cells_at(self.mesh, x)]
 
+    def names_at(self, x: Floats) -> Any:
+        """Names of the materials at points `(n,)`: of their cell sets."""
+        return np.array([name for name, _ in self.named])[self.sets_at(x)]
+
+    def toughness_at(self, x: Floats) -> Floats:
+        """Toughness of the material at points `(n,)`, inf where it is not known."""
+        every = [np.inf if one.K_c is None else one.K_c for _, one in self.named]
+        return np.asarray(np.array(every)[self.sets_at(x)])
+
     def names_of(self, cells: Ints) -> list[str]:
         """Names of the cell sets that hold the materials of some cells."""
         if not len(self.set_number):

@@ -670,6 +670,17 @@ class MaterialSets(Material):
         """Materials by the names of their cell sets."""
         return tuple(self.materials)
 
+    @property
+    def K_c(self) -> float | None:  # type: ignore[override]
+        """Toughness of the least tough of those whose toughness is known."""
+        return min((m.K_c for _, m in self.materials if m.K_c is not None), default=None)
+
+    @property
+    def yield_stress(self) -> float | None:  # type: ignore[override]
+        """Yield stress of the weakest of those whose yield stress is known."""
+        given = (m.yield_stress for _, m in self.materials if m.yield_stress is not None)
+        return min(given, default=None)
+
     def with_yield_stress(self, yield_stress: float) -> "MaterialSets":
         """All of them, judged by one yield stress."""
         return MaterialSets({
