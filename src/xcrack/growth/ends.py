@@ -10,8 +10,10 @@ from xcrack.base.arrays import Floats
 from xcrack.base.checks import call_function, numbers
 from xcrack.base.errors import XcrackError, collected_warnings
 from xcrack.crack.stations import stations_of
+from xcrack.fatigue.checks import evaluate_law
 from xcrack.fatigue.criteria import clipped_K, equivalent_K
 from xcrack.fatigue.cycle import Cycle
+from xcrack.fatigue.law_sets import LawSets
 from xcrack.growth.options import GrowthRule
 from xcrack.growth.step import (
     Arrival,
@@ -228,13 +230,14 @@ def cycles_beyond(rule: GrowthRule, step: Step) -> float:
 
 
 def K_beyond(rule: GrowthRule, step: Step) -> float:
-    """Logarithm of the largest K_eq over K_c."""
+    """Logarithm of the largest K_eq over K_c of the material there."""
     if rule.toughness is None or step.has_left:
         return -inf
     largest = max(
-        float(_largest_K(rule, step, c).max(initial=0.0)) for c in range(len(step.cracks))
+        float((_largest_K(rule, step, c) / rule.toughness_at(step.sif[0][c].x)).max(initial=0.0))
+        for c in range(len(step.cracks))
     )
-    return log(largest / rule.toughness) if largest > 0 else -inf
+    return log(largest) if largest > 0 else -inf
 
 
 def law_beyond(rule: GrowthRule, step: Step) -> float:
@@ -246,10 +249,16 @@ def law_beyond(rule: GrowthRule, step: Step) -> float:
         return 1.0 if law_reaches_toughness(rule, step) else -1.0
     dK_eq, R = np.concatenate(step.dK_eq), np.concatenate(step.R)
     low, high = -_FAR, _FAR
+    names = rule.problem.elasticity.names_at(np.concatenate([sif.x for sif in step.sif[0]]))
 
     def breaks(factor: float) -> bool:
+        ranges = np.exp(factor) * dK_eq
         with collected_warnings([]):
-            return bool(np.isinf(rule.law(np.exp(factor) * dK_eq, R)).any())
+            if isinstance(rule.law, LawSets):
+                rate = evaluate_law(rule.law, ranges, R, 0, material=names)
+            else:
+                rate = rule.law(ranges, R)
+            return bool(np.isinf(rate).any())
 
     try:
         if not breaks(high):
