@@ -59,7 +59,7 @@ class Crack:
             given = entries(self.fronts, "Crack: fronts", error=GeometryError)
             fronts = [self._numbers(f"fronts[{k}]", f, (None,)) for k, f in enumerate(given)]
             object.__setattr__(self, "fronts", tuple(fronts))
-        if self.ends_on:
+        if not isinstance(self.ends_on, tuple) or len(self.ends_on):
             object.__setattr__(self, "ends_on", _checked_ends(self.ends_on, d))
 
     def _numbers(self, name: str, given: Any, shape: Shape) -> Ints:
@@ -98,13 +98,16 @@ class Crack:
 
 def _checked_ends(given: Any, d: int) -> tuple[tuple[int, int], ...]:
     """Numbers of other cracks and the sides from which one ends on them."""
-    if d == 2:
-        raise GeometryError("Crack: ends_on is of 3D: in 2D a crack ends on another with its end.")
     pairs = whole_numbers(given, "Crack: ends_on", (None, 2), error=GeometryError)
     if (pairs[:, 0] < 0).any() or (np.abs(pairs[:, 1]) != 1).any():
         raise GeometryError(
             f"Crack: ends_on = {pairs.tolist()}: give pairs of the number of a crack, from 0 on, "
             "and of the side 1 or -1 of it."
+        )
+    if d == 2 and len(pairs):
+        raise GeometryError(
+            "Crack: ends_on is of 3D: leave it out, and let a crack in 2D end on the other with "
+            "its own end."
         )
     return tuple((int(on), int(side)) for on, side in pairs.tolist())
 
