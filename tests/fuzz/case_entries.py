@@ -192,7 +192,9 @@ ENTRIES = [
                 words=["values", "key", "list"],
             ),
             "folder": arg(Filename(rule=lambda v: None), "swept"),
-            "workers": arg(Seen(rule=lambda v: "skip" if v != 1 else True), 1),
+            "workers": arg(
+                Seen(rule=lambda v: True if isinstance(v, int) and v == 1 else "skip"), 1
+            ),
             "retry": arg(Flag(), False),
         },
         in_folder=True,
