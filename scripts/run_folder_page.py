@@ -33,6 +33,7 @@ _CRACKS: tuple[Row, ...] = (
     ("end_count", "(cracks,), int", "How many tips or fronts each crack has; -1: not placed yet."),
 )
 _STEP: tuple[Row, ...] = (
+    ("array_count", "int", "How many other arrays the file has: one that has fewer is damaged."),
     ("run", "text", "What the run is: format, versions and settings, in JSON."),
     ("index", "int", "Number of the step."),
     ("cycles", "float", "Cycles until the cracks look like `corrected`."),

@@ -187,7 +187,7 @@ def _grown(law=None, cycle=None, **options):
 
 
 @pytest.mark.parametrize("name", SLIPS)
-def test_slips_of_units_are_said(name):
+def test_slips_of_units_warn(name):
     """A warning each, with the number."""
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
@@ -209,13 +209,13 @@ def test_a_case_goes_on_after_a_kill(tmp_path):
     whole = xc.run(file)
     steps = file.parent / "case_results" / "steps"
     stored = sorted(steps.glob("step_*.npz"))
-    kept = tmp_path / "kept"
-    shutil.copytree(steps, kept)
+    copy = tmp_path / "copy"
+    shutil.copytree(steps, copy)
     stored[-1].unlink()  # as a kill leaves it
     assert main(["run", str(file), "--resume"]) == 0
     again = xc.load(steps)
     assert again.life == whole.life
-    assert again.table().tobytes() == xc.load(kept).table().tobytes()
+    assert again.table().tobytes() == xc.load(copy).table().tobytes()
 
 
 CASE = """

@@ -70,11 +70,10 @@ def test_growth_takes_no_K_I_from_a_closed_tip():
     K = np.array(state.K)
     K[:, 0] = 0.0
     nothing = np.zeros_like(K)
-    angle, dK, _ = xc.max_hoop_stress(np.stack([nothing, K]), 0.3)
-    np.testing.assert_array_equal(step.dK_eq[0], dK)
-    np.testing.assert_array_equal(step.angle[0], angle)
-    # K_II is zero but for discretisation.
-    assert step.dK_eq[0].max() <= 0.02 * 0.5 * np.sqrt(np.pi * 0.5)
+    _, dK, _ = xc.max_hoop_stress(np.stack([nothing, K]), 0.3)
+    # K_II is zero but for discretisation; a range of round-off is none.
+    assert dK.max() <= 0.02 * 0.5 * np.sqrt(np.pi * 0.5)
+    np.testing.assert_array_equal(step.dK_eq[0], 0.0)
 
 
 def test_closed_up_to_one_tip():

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from functools import partial
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from xcrack.analysis.solution import Solution
 from xcrack.analysis.solve import solve
 from xcrack.app.case import read_case
 from xcrack.app.case_tables import read_tables
+from xcrack.base.arguments import Switch, Whole, check_arguments
 from xcrack.base.checks import value_text
 from xcrack.base.errors import ProblemError
 from xcrack.base.paths import path_of, system_errors, written_whole
@@ -27,13 +28,14 @@ TABLE, PICTURE = "sweep.csv", "sweep.png"
 _MODES = ("K_I", "K_II", "K_III")
 
 
+@check_arguments()
 def sweep(
     path: str | PathLike[str],
     values: Mapping[str, Sequence[Any]],
     *,
     folder: str | PathLike[str] | None = None,
-    workers: int = 1,
-    retry: bool = False,
+    workers: Annotated[int, Whole(least=1, most=1024)] = 1,
+    retry: Switch = False,
 ) -> Study:
     """Run a case file for all combinations of values of some keys.
 

@@ -58,6 +58,7 @@ def arm(
 
     Examples
     --------
+    >>> from xcrack.crack.surfaces import penny_crack
     >>> one = penny_crack((0, 0, 0), (0, 0, 1), 0.6)
     >>> other = penny_crack((0, 0, 0), (1, 0, 0), 0.3)
     >>> crossing = [one, arm(other, 0, 1), arm(other, 0, -1)]

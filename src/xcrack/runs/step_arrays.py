@@ -474,10 +474,13 @@ def mesh_of(arrays: Arrays) -> Mesh:
 # Files.
 
 
+_COUNT = "array_count"
+
+
 def packed_arrays(arrays: Arrays) -> bytes:
-    """Content of a file of numpy with some arrays."""
-    buffer = io.BytesIO()
-    np.savez(buffer, allow_pickle=False, **arrays)  # type: ignore[arg-type]
+    """Content of a file of numpy with some arrays, and how many they are."""
+    buffer, count = io.BytesIO(), np.array(len(arrays))
+    np.savez(buffer, allow_pickle=False, **arrays, **{_COUNT: count})  # type: ignore[arg-type]
     return buffer.getvalue()
 
 
@@ -485,7 +488,9 @@ def read_arrays(data: bytes) -> Arrays | None:
     """Arrays of a file of numpy; None where it is damaged, or none of these."""
     try:
         with np.load(io.BytesIO(data), allow_pickle=False) as members:
-            return {name: members[name] for name in members.files}
+            arrays = {name: members[name] for name in members.files}
+        # Members have checksums, the directory of the file has none: a bit of it may hide some.
+        return arrays if int(arrays.pop(_COUNT)) == len(arrays) else None
     except Exception:  # whatever zipfile, zlib and numpy say of bytes that are not theirs
         return None
 
