@@ -192,9 +192,7 @@ ENTRIES = [
                 words=["values", "key", "list"],
             ),
             "folder": arg(Filename(rule=lambda v: None), "swept"),
-            "workers": arg(
-                Seen(rule=lambda v: True if isinstance(v, int) and v == 1 else "skip"), 1
-            ),
+            "workers": arg(Seen(rule=lambda v: True if type(v) is int and v == 1 else "skip"), 1),
             "retry": arg(Flag(), False),
         },
         in_folder=True,

@@ -480,7 +480,7 @@ _COUNT = "array_count"
 def packed_arrays(arrays: Arrays) -> bytes:
     """Content of a file of numpy with some arrays, and how many they are."""
     buffer, count = io.BytesIO(), np.array(len(arrays))
-    np.savez(buffer, allow_pickle=False, **arrays, **{_COUNT: count})  # type: ignore[arg-type]
+    np.savez(buffer, allow_pickle=False, **{_COUNT: count}, **arrays)  # type: ignore[arg-type]
     return buffer.getvalue()
 
 
@@ -490,7 +490,8 @@ def read_arrays(data: bytes) -> Arrays | None:
         with np.load(io.BytesIO(data), allow_pickle=False) as members:
             arrays = {name: members[name] for name in members.files}
         # Members have checksums, the directory of the file has none: a bit of it may hide some.
-        return arrays if int(arrays.pop(_COUNT)) == len(arrays) else None
+        count = arrays.pop(_COUNT, None)
+        return arrays if count is None or int(count) == len(arrays) else None
     except Exception:  # whatever zipfile, zlib and numpy say of bytes that are not theirs
         return None
 
