@@ -81,7 +81,7 @@ def shortest_way(x, start: float, centre: float, radius: float):
 def test_an_even_front_passes_a_hole(tmp_path, ratio, counts):
     """Two arms beside a hole wider than two cells, one front behind; the area is Huygens'.
 
-    Tolerances are discretisation: a cell's area before the arms meet; the gap that closes
+    Tolerances are discretisation: half a cell's area before the arms meet; the gap that closes
     then is a cell wide.
     """
     radius, centre, start, da = ratio * H, -0.4, -0.4 - ratio * H - 0.12, 0.1
