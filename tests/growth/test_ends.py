@@ -86,6 +86,8 @@ def test_fronts_end_as_tips_do(integrator):
     assert middle <= float(last.dK_eq[0].max()) / 0.9 <= middle * (1 + WITHIN)
 
 
+@pytest.mark.slow
+@pytest.mark.mission
 def test_beyond_its_end_a_run_goes_on_as_if_there_had_been_none(tmp_path):
     """To the last bit: the short last step is computed again."""
     whole = run(strip(), da=1.5, max_steps=5)

@@ -95,6 +95,8 @@ def test_the_report_names_materials_and_where_tips_are():
     assert "materials" in str(xc.plan(problem))
 
 
+@pytest.mark.slow
+@pytest.mark.mission
 def test_pictures_files_and_reports_show_materials(tmp_path):
     solution = xc.solve(scenes.edge_crack(12, 0.6, 8.0))
     for field in ("material", "syy", "mesh"):

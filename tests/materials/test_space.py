@@ -35,6 +35,8 @@ def pair(ratio, alphas=(None, None)):
             "two": xc.Isotropic(ratio, 0.3, alpha=alphas[1])}  # fmt: skip
 
 
+@pytest.mark.slow
+@pytest.mark.mission
 @pytest.mark.parametrize("case", [0, 1])
 def test_a_front_before_an_interface(case):
     """Without the term of the other stiffness K is 3 % off the one way and 6 % the other."""
@@ -55,6 +57,8 @@ def test_a_front_behind_an_interface(case):
     assert sif.E_prime == pytest.approx(ratio / (1 - 0.3**2))
 
 
+@pytest.mark.slow
+@pytest.mark.mission
 @pytest.mark.parametrize(("ratio", "K"), scenes.THERMAL)
 def test_thermal_mismatch_along_a_front(ratio, K):
     problem = slab(14, pair(ratio, (0.0, 1e-2)), [xc.temperature(1.0)])

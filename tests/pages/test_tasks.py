@@ -75,6 +75,8 @@ def test_a_part_from_step_with_a_pin_and_a_life_by_nasgro_under_a_spectrum(tmp_p
     assert run.life > 0
 
 
+@pytest.mark.slow
+@pytest.mark.mission
 def test_multiple_site_damage_with_link_up_and_residual_strength(tmp_path):
     """Two cracks of a row grow together; strength is one curve through the link-up."""
     problem = xc.Problem(
@@ -202,6 +204,8 @@ def test_wrong_places_are_refused(words):
         REFUSED[words]()
 
 
+@pytest.mark.slow
+@pytest.mark.mission
 def test_a_case_goes_on_after_a_kill(tmp_path):
     """Half of the steps are there: the same command ends with the same numbers."""
     file = tmp_path / "case.toml"

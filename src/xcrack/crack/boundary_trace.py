@@ -14,8 +14,7 @@ OUTSIDE = 2.0  # cells by which an open front leaves the body
 SMOOTH = np.cos(np.radians(30.0))  # an outline that turns by more has a corner
 _LEAST = 1.25  # cells by which an old front may still be outside
 _REACH = 12.0  # cells within which a way out of the body is sought
-_SLOPE = 0.35  # by which depth falls at least on a way inside the body: else it leads along it
-_SLACK = 0.1  # of a cell, in this
+_INSIDE = 4.0  # cells of the body that lie at most on this way
 _STEP = 0.125  # of a cell, in this search
 _MEET = 0.3  # share of a mouth that its ends may come closer to each other outside
 
@@ -48,19 +47,9 @@ def open_fronts(
         offset = np.zeros((len(vertex), 3))
         inner = np.array(movable[vertex])
         if runs:
+            room = (len(mouth) - 1) // 2
             old = outline.candidate[mouth] & (not outline.first_time)
-            if old.all():
-                # A front that has come to a hole goes on across it: to one side in its middle, or
-                # until it is far enough outside.
-                first = int(np.argmax(depth[mouth] + np.roll(depth, -1)[mouth]))
-                last = first + 1
-                far = np.nonzero(depth[vertex] >= 0.999 * OUTSIDE * size[vertex])[0]
-                if len(far) > 1:
-                    first, last = int(far[0]), int(far[-1])
-                after[int(vertex[0])] = loop[vertex[1 : first + 1]]
-                before[int(vertex[-1])] = loop[vertex[last:-1]]
-                continue
-            ways, room = (x, depth, size, outward), (len(mouth) - 1) // 2
+            ways = (x, depth, size, outward)
             first, offset[0] = _led_out(*ways, vertex, old, room, body)
             stop, offset[-1] = _led_out(*ways, vertex[::-1], old[::-1], room, body)
             last = len(vertex) - 1 - stop
@@ -180,18 +169,13 @@ def _led_out(
         at = vertex[k]
         if leaves < 0 and depth[at] >= -ON * size[at]:
             leaves, tangent = k, along
-        was_front = k > 0 and bool(old[k - 1])
-        goes_on = k < len(old) and bool(old[k])
-        if depth[at] >= (_LEAST if was_front and not goes_on else 0.999 * OUTSIDE) * size[at]:
+        enough = _LEAST if k > 0 and old[k - 1] and not old[k] else 0.999 * OUTSIDE
+        if depth[at] >= enough * size[at]:
             return k, np.zeros(3)
-        if was_front and leaves >= 0 and not goes_on:
-            return k, _straight_out(x[at], along, float(size[at]), body)
-        if was_front and leaves >= 0 and depth[vertex[k + 1]] < depth[at]:
-            return k, np.zeros(3)  # in a hole, as far from this wall as from others
         following = unit(x[vertex[k + 1]] - x[at])
         # Round a hollow corner the outline leads on; straight on lies the surface itself.
-        corner = bool(following @ along < SMOOTH and following @ outward[at] < 0) and not goes_on
-        turns_round = depth[at] > 0 and depth[vertex[k + 1]] < depth[at] and not goes_on
+        corner = bool(following @ along < SMOOTH and following @ outward[at] < 0) and not old[k]
+        turns_round = depth[at] > 0 and depth[vertex[k + 1]] < depth[at] and not old[k]
         if corner or turns_round or k == room:
             # From a corner the front goes on straight; an outline that turns round is left
             # where it comes out of the body.
@@ -219,17 +203,15 @@ def _led_out(
 
 
 def _straight_out(x: Floats, direction: Floats, size: float, body: Body) -> Floats:
-    """Vector by which the end of a front goes on; zero: no way out."""
-    length = way_out(x[None], direction[None], np.array([size]), OUTSIDE, body)[0]
-    return np.asarray(direction * (length if length > _STEP * size else 0.0))
+    """Vector by which the end of a front goes on, no shorter than a side; zero: no way out."""
+    length = _way_out(x[None], direction[None], np.array([size]), OUTSIDE, body)[0]
+    return np.asarray(direction * (max(length, SIDE * size) if length > 0 else 0.0))
 
 
-def way_out(x: Floats, direction: Floats, size: Floats, target_depth: float, body: Body) -> Floats:
+def _way_out(x: Floats, direction: Floats, size: Floats, target_depth: float, body: Body) -> Floats:
     """Lengths by which points move until they are some cells outside; zero: no way out.
 
-    A way goes straight to the boundary, never along it through the body, and outside no farther
-    than to where another wall is as near: a hole is divided among what comes from its walls, and
-    ways that start across them do not meet (they end at the medial axis; Blum, 1967).
+    Where the body begins again before, this is half way across the gap.
 
     Parameters
     ----------
@@ -251,16 +233,18 @@ def way_out(x: Floats, direction: Floats, size: Floats, target_depth: float, bod
     for k, row in enumerate(every.reshape(len(x), -1) / size[:, None]):
         outside = row > ON
         first = int(np.argmax(outside))
-        if not outside[first] or (row[:first] < row[0] + _SLOPE * steps[:first] - _SLACK).any():
+        if not outside[first] or steps[first] > _INSIDE or (first == 0 and row[1] < row[0]):
             continue
-        falls = np.nonzero(row[first + 1 :] < row[first:-1] - 1e-9)[0]
-        last = first + int(falls[0]) if len(falls) else len(steps) - 1
-        deep_enough = np.nonzero(row[first : last + 1] >= target_depth)[0]
-        if not len(deep_enough):
-            result[k] = steps[first + int(np.argmax(row[first : last + 1]))]
-        elif first + deep_enough[0] > 0:
+        again = np.nonzero(~outside[first:])[0]
+        stop = first + int(again[0]) if len(again) else len(steps)
+        deep_enough = np.nonzero(row[first:stop] >= target_depth)[0]
+        if len(deep_enough) and first + deep_enough[0] > 0:
             j = first + int(deep_enough[0])
             result[k] = steps[j] - _STEP * (row[j] - target_depth) / (row[j] - row[j - 1])
+        elif len(again):
+            result[k] = (steps[first] + steps[stop]) / 2
+        else:
+            result[k] = steps[first] + target_depth
     return result * size
 
 
@@ -273,7 +257,7 @@ def _push_vectors(
     if is_inside.any():
         if first_time:
             _check_nick(x[is_inside], outward[is_inside], depth[is_inside], size[is_inside], body)
-        length = way_out(x[is_inside], outward[is_inside], size[is_inside], 1.0, body)
+        length = _way_out(x[is_inside], outward[is_inside], size[is_inside], 1.0, body)
         offset[is_inside] = length[:, None] * outward[is_inside]
     return offset
 
@@ -303,9 +287,3 @@ def runs_of(flag: Bools) -> list[Ints]:
         place = (first + np.arange(len(flag))) % len(flag)
         result.append(place[: int(np.argmin(flag[place]))])
     return result
-
-
-def open_runs(flag: Bools) -> list[Ints]:
-    """Runs of true values that do not go round, each as its places in order."""
-    places = np.nonzero(flag)[0]
-    return [run for run in np.split(places, np.nonzero(np.diff(places) > 1)[0] + 1) if len(run)]

@@ -10,7 +10,6 @@ from xcrack.base.errors import CoarseMeshError, GeometryError, warn
 from xcrack.crack.boundary_trace import OUTSIDE, SIDE, SMOOTH, TraceOutline, open_fronts, runs_of
 from xcrack.crack.crack import Crack
 from xcrack.crack.junctions_3d import are_opposite, crossings, is_before, may_touch
-from xcrack.crack.merging import joined_fronts
 from xcrack.mesh.distances import closest_in, triangle_tree
 from xcrack.mesh.locate import Body, locate
 from xcrack.mesh.mesh import Mesh
@@ -242,7 +241,7 @@ def place_surface(crack: Crack, mesh: Mesh) -> Crack:
     ----------
     crack : Crack
         In 3D. If its fronts are known already, only these are looked at again, and its points
-        stay as they are; two of them that have met become one.
+        stay as they are.
     mesh : Mesh
 
     Returns
@@ -319,11 +318,7 @@ def _placed(crack: Crack, mesh: Mesh) -> tuple[Crack, list[ShortFront]]:
             for run, front in zip(runs_of(inside), own_fronts, strict=True)
         )
     fronts.sort(key=lambda pair: pair[0])
-    placed = Crack(points, faces, None, tuple(front for _, front in fronts))
-    if first_time:
-        return placed, short
-    joined = joined_fronts(placed, body)
-    return _placed(joined, mesh) if joined is not None else (placed, short)
+    return Crack(points, faces, None, tuple(front for _, front in fronts)), short
 
 
 def _check_inside(crack: Crack, body: Body) -> None:
