@@ -126,7 +126,8 @@ def _run_case(path: str | PathLike[str], *, resumed: bool, overwrite: bool) -> A
         for k, solution in enumerate(solutions):
             write(solution, case.folder / ("solution" if len(solutions) == 1 else f"state_{k}"))
     else:
-        result = _grown(case, resumed=resumed, overwrite=overwrite)
+        steps = case.folder / STEPS
+        result = growth_of_case(case, steps, resumed=resumed, overwrite=overwrite)
         result.write(case.folder)
         solutions = list(result.solved[-1].solutions) if result.solved else []
     _draw(case, solutions)
@@ -134,13 +135,23 @@ def _run_case(path: str | PathLike[str], *, resumed: bool, overwrite: bool) -> A
     return result
 
 
-def _grown(case: CaseFile, *, resumed: bool, overwrite: bool) -> History:
-    folder = case.folder / STEPS
-    given = dict(case.growth or {})
+def growth_of_case(
+    case: CaseFile,
+    folder: Path,
+    *,
+    resumed: bool,
+    overwrite: bool = False,
+    keep_solutions: bool = True,
+    **options: Any,
+) -> History:
+    """The growth of a case, stored in a folder; gone on with where it has begun there."""
+    given = {**(case.growth or {}), **options}
     if resumed and _begun(folder):
         law, criterion, cycle = (given.pop(name) for name in ("law", "criterion", "cycle"))
-        return resume(folder, case.problem, law, criterion, cycle, given.pop("da", None), **given)
-    return collect(grow(case.problem, **given), folder, overwrite=overwrite)
+        return resume(folder, case.problem, law, criterion, cycle, given.pop("da", None),
+                      keep_solutions=keep_solutions, **given)  # fmt: skip
+    steps = grow(case.problem, **given)
+    return collect(steps, folder, overwrite=overwrite, keep_solutions=keep_solutions)
 
 
 def _begun(folder: Path) -> bool:
@@ -155,4 +166,4 @@ def _draw(case: CaseFile, solutions: list[Solution]) -> None:
             plot(solution, field, file=case.folder / f"{name}.png", warp=case.warp)
 
 
-__all__ = ["run"]
+__all__ = ["growth_of_case", "run"]

@@ -13,14 +13,14 @@ import numpy as np
 from xcrack.analysis.solution import Solution
 from xcrack.analysis.solve import solve
 from xcrack.app.case import read_case
+from xcrack.app.case_run import growth_of_case
 from xcrack.app.case_tables import read_tables
 from xcrack.base.arguments import Switch, Whole, check_arguments
 from xcrack.base.checks import value_text
 from xcrack.base.errors import ProblemError
 from xcrack.base.paths import path_of, system_errors, written_whole
-from xcrack.growth.run import grow
 from xcrack.runs.campaign import Study, campaign, grid, key_of
-from xcrack.runs.collect import collect, resume
+from xcrack.runs.run_folder import STEPS
 from xcrack.sif.stress_intensity import stress_intensities
 from xcrack.view.sweeps import draw_sweep
 
@@ -119,16 +119,8 @@ def run_changed(file: str, text: str, folder: str, /, **changes: Any) -> dict[st
     if case.growth is None:
         solved = solve(case.problem, case.states)
         return _largest([solved] if isinstance(solved, Solution) else list(solved))
-    steps = Path(folder) / f"run_{key_of(changes)}" / "steps"
-    given = dict(case.growth)
-    if steps.is_dir() and any(steps.glob("step_*.npz")):
-        law, criterion, cycle = (given.pop(name) for name in ("law", "criterion", "cycle"))
-        da = given.pop("da", None)
-        history = resume(steps, case.problem, law, criterion, cycle, da,
-                         **{**given, "progress": False})  # fmt: skip
-    else:
-        history = collect(grow(case.problem, **{**given, "progress": False}), steps,
-                          keep_solutions=False)  # fmt: skip
+    steps = Path(folder) / f"run_{key_of(changes)}" / STEPS
+    history = growth_of_case(case, steps, resumed=True, keep_solutions=False, progress=False)
     return {
         "life": history.life,
         "steps": len(history.steps),
