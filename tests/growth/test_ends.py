@@ -59,6 +59,20 @@ def test_a_run_ends_where_its_law_breaks():
     assert step.dK_eq[0][0] == pytest.approx(0.9 * 3000.0, rel=WITHIN)
 
 
+def test_a_run_ends_where_a_law_that_needs_more_breaks():
+    """Size for its threshold, or K_max: the end is found as it is for other laws."""
+
+    def by_largest_K(dK, R, K_max):
+        return np.where(K_max >= 3000.0, np.inf, 1e-10 * dK**3)
+
+    by_largest_K.needs = ("K_max",)
+    short = xc.el_haddad(xc.klesnil_lukas(100.0, 0.0), a0=0.1)
+    for law in (xc.forman(1e-10, 3.0, K_c=3000.0, threshold=short), by_largest_K):
+        step = run(strip(), law, da=3.0).solved[-1]
+        assert np.isinf(step.rate[0][0])
+        assert step.dK_eq[0][0] == pytest.approx(0.9 * 3000.0, rel=WITHIN)
+
+
 def test_a_run_ends_where_a_ligament_yields():
     history = run(strip(), da=3.0, link_up=xc.plastic_zone(400.0, 2))
     assert history.ended.startswith("ligament yield")

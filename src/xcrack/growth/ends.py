@@ -11,14 +11,14 @@ from xcrack.base.checks import call_function, numbers
 from xcrack.base.errors import XcrackError, collected_warnings
 from xcrack.crack.stations import stations_of
 from xcrack.fatigue.checks import evaluate_law
-from xcrack.fatigue.criteria import clipped_K, equivalent_K
 from xcrack.fatigue.cycle import Cycle
-from xcrack.fatigue.law_sets import LawSets
 from xcrack.growth.options import GrowthRule
+from xcrack.growth.rates import law_size
 from xcrack.growth.step import (
     Arrival,
     Step,
     growth_directions,
+    largest_K_eq,
     place_name,
     plan_of,
     solves_of,
@@ -118,7 +118,7 @@ def _filled(rule: GrowthRule, step: Step) -> list[tuple[float, Ligament]]:
 
 def _zones(rule: GrowthRule, step: Step, c: int) -> Floats:
     assert rule.link_up is not None
-    K_eq = _largest_K(rule, step, c)
+    K_eq = largest_K_eq(step, c, rule.problem.elasticity.poisson)
     zone = call_function(rule.link_up, f"link_up at step {step.index}", K_eq)
     return numbers(zone, "what link_up returned", K_eq.shape)
 
@@ -157,7 +157,8 @@ def toughness_is_reached(rule: GrowthRule, step: Step) -> str:
     if rule.toughness is None:
         return ""
     for c in range(len(step.cracks)):
-        K_eq, K_c = _largest_K(rule, step, c), rule.toughness_at(step.sif[0][c].x)
+        K_eq = largest_K_eq(step, c, rule.problem.elasticity.poisson)
+        K_c = rule.toughness_at(step.sif[0][c].x)
         for j in np.nonzero(K_eq >= K_c)[0].tolist():
             place = place_name(step, c, j)
             return f"K_c reached: K_eq = {K_eq[j]:.6g} >= {K_c[j]:.6g} at {place}"
@@ -233,10 +234,10 @@ def K_beyond(rule: GrowthRule, step: Step) -> float:
     """Logarithm of the largest K_eq over K_c of the material there."""
     if rule.toughness is None or step.has_left:
         return -inf
-    largest = max(
-        float((_largest_K(rule, step, c) / rule.toughness_at(step.sif[0][c].x)).max(initial=0.0))
-        for c in range(len(step.cracks))
-    )
+    nu, largest = rule.problem.elasticity.poisson, 0.0
+    for c, sif in enumerate(step.sif[0]):
+        share = largest_K_eq(step, c, nu) / rule.toughness_at(sif.x)
+        largest = max(largest, float(share.max(initial=0.0)))
     return log(largest) if largest > 0 else -inf
 
 
@@ -249,15 +250,15 @@ def law_beyond(rule: GrowthRule, step: Step) -> float:
         return 1.0 if law_reaches_toughness(rule, step) else -1.0
     dK_eq, R = np.concatenate(step.dK_eq), np.concatenate(step.R)
     low, high = -_FAR, _FAR
-    names = rule.problem.elasticity.names_at(np.concatenate([sif.x for sif in step.sif[0]]))
+    x = [sif.x for sif in step.sif[0]]
+    names = rule.problem.elasticity.names_at(np.concatenate(x))
+    dim = rule.problem.mesh.dim
+    sizes = [law_size(dim, a, len(of_crack)) for a, of_crack in zip(step.sizes, x, strict=True)]
+    a = np.concatenate(sizes)
 
     def breaks(factor: float) -> bool:
-        ranges = np.exp(factor) * dK_eq
         with collected_warnings([]):
-            if isinstance(rule.law, LawSets):
-                rate = evaluate_law(rule.law, ranges, R, 0, material=names)
-            else:
-                rate = rule.law(ranges, R)
+            rate = evaluate_law(rule.law, np.exp(factor) * dK_eq, R, 0, a=a, material=names)
             return bool(np.isinf(rate).any())
 
     try:
@@ -288,13 +289,6 @@ def beyond_end(rule: GrowthRule, step: Step, breaks: bool) -> float:
     """
     ends = (*WITHIN, law_beyond) if breaks else WITHIN
     return max(beyond(rule, step) for beyond in ends)
-
-
-def _largest_K(rule: GrowthRule, step: Step, c: int) -> Floats:
-    """Largest K_eq of all states at the stations of a crack `(f,)`."""
-    K = clipped_K(np.stack([state[c].K for state in step.sif]))
-    nu = rule.problem.elasticity.poisson
-    return equivalent_K(K, step.angle[c], nu).max(axis=0, initial=0.0)
 
 
 def _same_states(step: Step) -> str:

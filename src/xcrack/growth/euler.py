@@ -7,7 +7,6 @@ from scipy.spatial import cKDTree
 from scipy.special import exprel
 
 from xcrack.base.arrays import Floats, Ints
-from xcrack.base.errors import GeometryError
 from xcrack.crack.advance_2d import advance
 from xcrack.crack.crack import Crack
 from xcrack.crack.fronts import closed_fronts
@@ -32,21 +31,19 @@ _WAITS_BELOW = {2: LEAST, 3: fronts.WAITS_BELOW}
 def predict(rule: GrowthRule, step: Step) -> Plan:
     """The advance after a step."""
     stations, solves = solves_of(step)
-    mesh, n = rule.problem.mesh, len(stations)
+    mesh = rule.problem.mesh
     cell = cell_sizes(mesh, stations.x)
     rate = np.concatenate([np.zeros(0), *step.rate])
-    fastest, still = float(rate.max(initial=0.0)), np.zeros(n)
-    plan = Plan(
-        solves.start, 0.0, 0.0, still, 0 * stations.x, still > 0, cell, 0, 0.0, step.corrected
-    )
+    fastest = float(rate.max(initial=0.0))
+    plan = Plan.at_rest(step, cell)
     if fastest == 0 or np.isinf(fastest):
         return plan
     by_cycles = np.inf if rule.cycles is None else rule.cycles * fastest
     largest = float(min(longest(rule, step.control), by_cycles))
     score = _score(rule, step)
-    wanted = stations.waits + largest * (score / score.max())
-    goes = wanted >= _WAITS_BELOW[mesh.dim] * cell
-    way = np.where(goes, wanted, 0.0)
+    growth = stations.growth(score, largest)
+    goes = growth >= _WAITS_BELOW[mesh.dim] * cell
+    way = np.where(goes, growth, 0.0)
     row = int(np.argmax(score))
     plan = replace(
         plan,
@@ -58,12 +55,7 @@ def predict(rule: GrowthRule, step: Step) -> Plan:
         tip=row,
         largest=largest,
     )
-    if largest < LEAST * cell[row]:
-        return replace(plan, limit="short")
-    try:
-        return replace(plan, cracks=tuple(advanced(rule, step, way)))
-    except GeometryError as error:
-        return replace(plan, limit="geometry", refusal=str(error))
+    return plan.with_cracks(lambda: advanced(rule, step, way))
 
 
 def advanced(rule: GrowthRule, step: Step, way: Floats) -> list[Crack]:
@@ -183,9 +175,8 @@ def _score(rule: GrowthRule, step: Step) -> Floats:
 
 def _rest(rule: GrowthRule, last: Step) -> Floats:
     """Growth that goes on waiting at the stations of a step `(n,)`."""
-    plan, score = plan_of(last), _score(rule, last)
-    wanted = solves_of(last)[0].waits + plan.length * (score / score.max())
-    return np.where(plan.moves, 0.0, wanted)
+    plan = plan_of(last)
+    return np.where(plan.moves, 0.0, solves_of(last)[0].growth(_score(rule, last), plan.length))
 
 
 def _matched(moved: Floats, tips: Floats) -> Ints:

@@ -10,13 +10,12 @@ from dataclasses import fields, replace
 import numpy as np
 from scipy.special import exprel
 
-from xcrack.base.arrays import Bools, Floats, Ints
+from xcrack.base.arrays import Floats, Ints
 from xcrack.base.errors import GeometryError
 from xcrack.crack.advance_3d import advance_fronts
 from xcrack.crack.crack import Crack
 from xcrack.crack.fronts import closed_fronts, front_frames
 from xcrack.crack.measures import crack_size
-from xcrack.crack.meetings import LEAST
 from xcrack.crack.stations import place_crack
 from xcrack.fatigue.retardation import (
     POINTS,
@@ -297,49 +296,32 @@ def predict(rule: GrowthRule, step: Step) -> Plan:
     stations, solves = solves_of(step)
     rate, cell = _rate(rule, solves), cell_sizes(rule.problem.mesh, stations.x)
     fastest = float(rate.max(initial=0.0))
-    n = len(stations)
-    still = np.zeros(n)
-    plan = Plan(
-        solves.start, 0.0, 0.0, still, 0 * stations.x, still > 0, cell, 0, 0.0, step.corrected
-    )
+    plan = Plan.at_rest(step, cell)
     if fastest == 0 or np.isinf(fastest):
         stopped = rule.retardation is not None and fastest == 0
         return replace(plan, limit="arrest" if stopped else "")
     by_cycles = np.inf if rule.cycles is None else rule.cycles * fastest
     largest = float(min(longest(rule, step.control), by_cycles))
     row = int(np.argmax(rate))
-    way = part_of_advance(rule, step, largest)
+    growth = stations.growth(rate, largest)
+    goes = growth >= WAITS_BELOW * cell
+    way = _arcs(step, np.where(goes, growth, 0.0))
     plan = replace(
         plan,
         length=largest,
         cycles=largest / fastest,
         arc=way,
         move=_move(stations, _angle(stations, solves), way),
-        moves=_wanted(rule, step, largest)[1],
+        moves=goes,
         tip=row,
         largest=largest,
     )
-    if largest < LEAST * cell[row]:
-        return replace(plan, limit="short")
-    try:
-        return replace(plan, cracks=tuple(advanced(rule, step, way)))
-    except GeometryError as error:
-        return replace(plan, limit="geometry", refusal=str(error))
+    return plan.with_cracks(lambda: advanced(rule, step, way))
 
 
-def _wanted(rule: GrowthRule, step: Step, largest: float) -> tuple[Floats, Bools]:
-    """Advance with the growth that has waited `(n,)`, and which stations move."""
+def _arcs(step: Step, da: Floats) -> Floats:
+    """Advance of the stations by rates `(n,)` with what the shape of their fronts makes of it."""
     stations, solves = solves_of(step)
-    rate = _rate(rule, solves)
-    wanted = stations.waits + largest * (rate / rate.max())
-    return wanted, wanted >= WAITS_BELOW * cell_sizes(rule.problem.mesh, stations.x)
-
-
-def part_of_advance(rule: GrowthRule, step: Step, largest: float, part: float = 1.0) -> Floats:
-    """Advance at the stations `(n,)` over a step, or over a part of it, length."""
-    stations, solves = solves_of(step)
-    wanted, goes = _wanted(rule, step, largest)
-    da = part * np.where(goes, wanted, 0.0)
     way = np.array(da)
     for rows, front in _waves(stations, solves, da):
         way[rows] = np.where(da[rows] > 0, predicted(front, stations.s[rows], da[rows]), 0.0)
@@ -358,7 +340,10 @@ def advanced(rule: GrowthRule, step: Step, way: Floats) -> list[Crack]:
 
 def partly_advanced(rule: GrowthRule, step: Step, plan: Plan, part: float) -> list[Crack]:
     """The cracks after a part of a planned advance."""
-    return advanced(rule, step, part_of_advance(rule, step, plan.largest, part))
+    stations, solves = solves_of(step)
+    growth = stations.growth(_rate(rule, solves), plan.largest)
+    goes = growth >= WAITS_BELOW * plan.cell
+    return advanced(rule, step, _arcs(step, part * np.where(goes, growth, 0.0)))
 
 
 def advanced_crack(
@@ -465,7 +450,8 @@ def correct(rule: GrowthRule, last: Step, rates: Rates, identities: Identities) 
         part = here[c]
         if again is None:
             crack = rates.cracks[c]
-            waits = np.where(plan.moves[rows], 0.0, _wanted(rule, last, plan.length)[0][rows])
+            growth = stations.growth(first_rate, plan.length)
+            waits = np.where(plan.moves[rows], 0.0, growth[rows])
             near = _near(stations.at(rows), waits, part[0].x, rule.problem.mesh)
             part = (
                 replace(part[0], offset=np.nan_to_num(near)[:, None] * part[1].direction[0]),
@@ -755,7 +741,6 @@ __all__ = [
     "ends_of",
     "front_lengths",
     "interpolate_along_front",
-    "part_of_advance",
     "partly_advanced",
     "predict",
     "rate_at_end",

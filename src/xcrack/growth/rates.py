@@ -140,7 +140,8 @@ class Rates:
     @property
     def size_of_law(self) -> Floats:
         """Crack size that a law is given at each station `(n,)`, length."""
-        parts = [law_size(self.problem, c, n) for c, n in enumerate(self.counts)]
+        sizes, dim = self.problem.sizes, self.problem.mesh.dim
+        parts = [law_size(dim, a, n) for a, n in zip(sizes, self.counts, strict=True)]
         return np.concatenate([np.zeros(0), *parts])
 
     @property
@@ -229,7 +230,7 @@ def _inputs_of_cycle(
 
     def of_crack(c: int) -> CriterionInput:
         given = np.stack([state[c].K for state in response.sif])
-        a = law_size(problem, c, given.shape[1])
+        a = law_size(problem.mesh.dim, problem.sizes[c], given.shape[1])
         names = problem.elasticity.names_at(response.sif[0][c].x)
 
         def rates_of_K(K: Floats) -> CycleRates:
@@ -256,7 +257,7 @@ def _inputs_of_blocks(
 
     def of_crack(c: int, pairs: RangePairs, free_pairs: RangePairs | None) -> CriterionInput:
         shape = pairs.K.shape
-        a = law_size(problem, c, shape[2])
+        a = law_size(problem.mesh.dim, problem.sizes[c], shape[2])
         names = problem.elasticity.names_at(response.sif[0][c].x)
 
         def rates_of_K(K: Floats) -> CycleRates:
@@ -272,14 +273,14 @@ def _inputs_of_blocks(
     return [of_crack(c, *each) for c, each in enumerate(zip(every, nominal, strict=True))]
 
 
-def law_size(problem: Problem, c: int, n: int) -> Floats:
-    """Crack size that a law is given at each of n stations `(n,)`, length.
+def law_size(dim: int, size: float, n: int) -> Floats:
+    """Crack size that a law is given at each of n stations of a crack `(n,)`, length.
 
     In 2D the length inside the body over the number of tips: half of it for a crack with two. In 3D
     the area over the length of the fronts, which for a disc is half of its radius.
     """
-    tips = max(n, 1) if problem.mesh.dim < 3 else 1
-    return np.full(n, problem.sizes[c] / tips)
+    tips = max(n, 1) if dim < 3 else 1
+    return np.full(n, size / tips)
 
 
 # Ends that have no range but that of round-off.
@@ -300,7 +301,8 @@ def _at_rest(problem: Problem, response: Response, dK_eq: Floats) -> Bools:
     energy = max(solution.energy for solution in response.solutions)
     modulus = problem.elasticity.largest_modulus
     stress = np.sqrt(2 * max(energy, 0.0) * modulus / float(problem.mesh.volume.sum()))
-    size = np.concatenate([law_size(problem, c, len(e.x)) for c, e in enumerate(response.sif[0])])
+    dim, sizes = problem.mesh.dim, zip(problem.sizes, response.sif[0], strict=True)
+    size = np.concatenate([law_size(dim, a, len(sif.x)) for a, sif in sizes])
     return np.asarray(closed & (dK_eq <= _FAINT * stress * np.sqrt(np.pi * size)))
 
 
@@ -564,7 +566,7 @@ def kinds_of(rule: GrowthRule, rates: Rates) -> BlockCycles | None:
     place, nu = PLACE[problem.mesh.dim], problem.elasticity.poisson
     parts = []
     for c, pairs in enumerate(pairs_of(rule, problem, rates.response)):
-        a = law_size(problem, c, pairs.K.shape[2])
+        a = law_size(problem.mesh.dim, problem.sizes[c], pairs.K.shape[2])
         every = rated(rule, pairs, nu, c, place, a)
         parts.append((every.dK.T[None], every.R.T[None], a[None]))
     return BlockCycles(

@@ -120,12 +120,6 @@ class SolveHistory:
             angle[k] += 2 * np.pi * np.round((angle[k + 1] - angle[k]) / (2 * np.pi))
         return np.asarray(angle)
 
-    @property
-    def can_grow(self) -> bool:
-        """Whether any rate of the newest solve is positive, and all are finite."""
-        rate = self.rate[-1]
-        return bool((rate > 0).any() and np.isfinite(rate).all())
-
 
 def angles_at(solves: SolveHistory, angle: Floats, s: Floats) -> Floats:
     """Angles at `s` (q,), by bend √s and a polynomial through those of all solves: `(q, n)`."""

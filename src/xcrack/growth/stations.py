@@ -61,6 +61,10 @@ class GrowthStations(Stations):
         """Length of the growth that waits `(n,)`."""
         return np.linalg.norm(self.offset, axis=1)
 
+    def growth(self, rate: Floats, largest: float) -> Floats:
+        """Growth in proportion to rates, the largest as given, on top of what waits `(n,)`."""
+        return np.asarray(self.waits + largest * (rate / rate.max()))
+
 
 def solved_stations(sif: Sequence[SIF]) -> Stations:
     """Stations at which K of all cracks was solved, from K of one load state."""

@@ -1,16 +1,18 @@
 """The values of a growth run: cracks after cracks, and the plan between them."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from xcrack.analysis.solution import Solution
 from xcrack.base.arrays import Bools, Floats, coordinates
 from xcrack.base.checks import entries, number, numbers, value_text, whole_number
-from xcrack.base.errors import ProblemError
+from xcrack.base.errors import GeometryError, ProblemError
 from xcrack.base.markup import element, join_parts, table
 from xcrack.crack.crack import Crack
+from xcrack.crack.meetings import LEAST
+from xcrack.fatigue.criteria import clipped_K, equivalent_K
 from xcrack.fatigue.retardation import OverloadZones
 from xcrack.growth.solves import SolveHistory
 from xcrack.growth.stations import GrowthStations, Identities, PerCrack, directions
@@ -208,6 +210,22 @@ class Plan:
     def end(self) -> float:
         """σ at its end, length."""
         return self.sigma + self.length
+
+    @classmethod
+    def at_rest(cls, step: "Step", cell: Floats) -> "Plan":
+        """Nothing advances; its stations are in cells of such sizes `(n,)`."""
+        (stations, solves), still = solves_of(step), np.zeros(len(cell))
+        move = 0 * stations.x
+        return cls(solves.start, 0.0, 0.0, still, move, still > 0, cell, 0, 0.0, step.corrected)
+
+    def with_cracks(self, advance: Callable[[], Sequence[Crack]]) -> "Plan":
+        """With the cracks that it leads to, or with its limit where it cannot be taken."""
+        if self.largest < LEAST * self.cell[self.tip]:
+            return replace(self, limit="short")
+        try:
+            return replace(self, cracks=tuple(advance()))
+        except GeometryError as error:
+            return replace(self, limit="geometry", refusal=str(error))
 
 
 @dataclass(frozen=True, eq=False)
@@ -545,6 +563,12 @@ class Step:
         return self.identities.name_of(crack, number)
 
 
+def largest_K_eq(step: Step, crack: int, nu: float) -> Floats:
+    """Largest K_eq of all states at the stations of a crack `(f,)`."""
+    K = clipped_K(np.stack([state[crack].K for state in step.sif]))
+    return equivalent_K(K, step.angle[crack], nu).max(axis=0, initial=0.0)
+
+
 def run_state(step: Step) -> RunState:
     """What a run has carried along to a step."""
     if step.run is None:
@@ -597,6 +621,7 @@ __all__ = [
     "StepError",
     "checked_joins",
     "growth_directions",
+    "largest_K_eq",
     "moved_places",
     "numbers_after",
     "place_name",

@@ -49,13 +49,9 @@ def predict(rule: GrowthRule, step: Step) -> Plan:
     """Where the last two solves lead; from a first one straight on, at its rates."""
     stations, solves = solves_of(step)
     cell = cell_sizes(rule.problem.mesh, stations.x)
-    n = len(stations)
     rate = np.concatenate([np.zeros(0), *step.rate])
     if not (rate > 0).any() or np.isinf(rate).any():
-        still = np.zeros(n)
-        return Plan(
-            solves.start, 0.0, 0.0, still, 0 * stations.x, still > 0, cell, 0, 0.0, step.corrected
-        )
+        return Plan.at_rest(step, cell)
     stretch, stops = _ahead(rule, step)
     growth = _growth(stations, stretch)
     row = int(np.argmax(growth.arc))
@@ -65,7 +61,7 @@ def predict(rule: GrowthRule, step: Step) -> Plan:
         cycles=growth.cycles,
         arc=growth.arc,
         move=growth.move,
-        moves=np.zeros(n, dtype=bool),
+        moves=np.zeros(len(stations), dtype=bool),
         cell=cell,
         tip=row,
         largest=stretch.length,

@@ -302,10 +302,6 @@ class Elasticity:
             return [self.named[0][0]]
         return [self.named[k][0] for k in np.unique(self.set_number[cells]).tolist()]
 
-    def material_of(self, cell: int) -> tuple[str, Material]:
-        """Name and material of a cell, as they were given."""
-        return self.named[int(self.set_number[cell]) if len(self.set_number) else 0]
-
     def differing(self, material: Isotropic, cells: Ints) -> Ints:
         """Those of the cells whose stiffness is not everywhere that of a material."""
         tensor = material.tensor(self.mesh.dim)

@@ -14,10 +14,13 @@ from xcrack.base.arrays import Floats
 from xcrack.base.checks import call_function, number, numbers, value_text, whole_number
 from xcrack.base.errors import ProblemError
 from xcrack.base.paths import path_of, system_errors, written_whole
-from xcrack.fatigue.criteria import clipped_K, equivalent_K
-from xcrack.growth.step import Step
+from xcrack.growth.step import (
+    Step,
+    largest_K_eq,
+)
 from xcrack.growth.validity import validity
 from xcrack.runs.history import History
+from xcrack.runs.table import crack_numbers, end_id
 
 
 @dataclass(frozen=True)
@@ -201,7 +204,7 @@ def residual_strength(
     result = np.zeros(len(steps), dtype=_STRENGTH)
     for name in CRITERIA:
         result[name] = np.nan
-    names = [_crack_numbers(step) for step in steps]
+    names = [crack_numbers(step) for step in steps]
     for n, step in enumerate(steps):
         K = K_of_cracks(step, nu)
         c = int(np.argmax(K))
@@ -210,7 +213,8 @@ def residual_strength(
         row["step"], row["N"], row["crack"], row["a"], row["K"] = (
             step.index, step.cycles, names[n][c], a, K[c]
         )  # fmt: skip
-        row["id"] = _end_with_largest_K(step, c, nu)
+        K_eq = largest_K_eq(step, c, nu)
+        row["id"] = end_id(step, c, step.sif[0][c].front[np.argmax(K_eq)]) if len(K_eq) else -1
         by_K = tough / K[c] if K[c] > 0 else np.inf
         row["by_toughness"] = by_K
         if resistance is not None:
@@ -242,31 +246,9 @@ _STRENGTH = [
 ]
 
 
-def _crack_numbers(step: Step) -> list[int]:
-    """Number that each crack of a step had at first."""
-    known = step.identities
-    return list(range(len(step.cracks))) if known is None else list(known.cracks)
-
-
-def _end_with_largest_K(step: Step, c: int, nu: float) -> int:
-    """Identity of the tip or front of a crack that has its largest K_eq; -1 without any."""
-    K = _equivalent(step, c, nu)
-    if not len(K):
-        return -1
-    number = int(step.sif[0][c].front[int(np.argmax(K))])
-    return number if step.identities is None else step.identities.ends[c][number]
-
-
 def K_of_cracks(step: Step, nu: float) -> list[float]:
     """Largest K_eq of all load states at all tips of each crack of a step."""
-    return [float(_equivalent(step, c, nu).max(initial=0)) for c in range(len(step.angle))]
-
-
-def _equivalent(step: Step, c: int, nu: float) -> Floats:
-    """Largest K_eq of all load states at each tip of a crack `(f,)`."""
-    K = clipped_K(np.stack([state[c].K for state in step.sif]))
-    every: Floats = equivalent_K(K, step.angle[c], nu)
-    return every.max(axis=0)
+    return [float(largest_K_eq(step, c, nu).max(initial=0)) for c in range(len(step.angle))]
 
 
 def _by_resistance(
@@ -331,7 +313,7 @@ def _by_link_up(step: Step, nu: float, yield_stress: float) -> float:
     tips = [
         (c, sif.x[j], sif.frame[j, 0], K)
         for c, sif in enumerate(step.sif[0])
-        for j, K in enumerate(_equivalent(step, c, nu).tolist())
+        for j, K in enumerate(largest_K_eq(step, c, nu).tolist())
     ]
     if not tips or len(tips[0][1]) != 2:
         return np.nan

@@ -12,7 +12,9 @@ from xcrack.base.errors import ProblemError
 from xcrack.base.paths import write_texts
 from xcrack.crack.crack import Crack, tip_frames
 from xcrack.crack.fronts import front_weights
-from xcrack.growth.step import Step
+from xcrack.growth.step import (
+    Step,
+)
 from xcrack.growth.uncertainty import uses_best
 from xcrack.runs.life_bar import life_bar
 
@@ -84,9 +86,15 @@ def _K_of_states(step: Step, states: Sequence[str], c: int, modes: int) -> list[
     return result
 
 
-def _end_of(step: Step, c: int, number: int) -> int:
+def crack_numbers(step: Step) -> tuple[int, ...]:
+    """Number that each crack of a step had at first."""
+    known = step.identities
+    return tuple(range(len(step.cracks))) if known is None else known.cracks
+
+
+def end_id(step: Step, crack: int, number: int) -> int:
     """Identity of a tip or front; its number where nothing is known."""
-    return number if step.identities is None else step.identities.ends[c][number]
+    return number if step.identities is None else step.identities.ends[crack][number]
 
 
 def _table_2d(steps: Sequence[Step]) -> tuple[list[str], list[tuple[Any, ...]]]:
@@ -107,7 +115,7 @@ def _table_2d(steps: Sequence[Step]) -> tuple[list[str], list[tuple[Any, ...]]]:
             K = _K_of_states(step, states, c, 2)
             for j in range(len(step.angle[c])):
                 numbers = [column[j] for column in (*K, *values)]
-                end = _end_of(step, c, j)
+                end = end_id(step, c, j)
                 rows.append((step.index, step.cycles, c, j, end, *x[j], _size(step, c), *numbers))
         rows += _rows_at_end(step, len(names), with_size=True)
     return names, rows
@@ -156,7 +164,7 @@ def _rows_3d(step: Step, states: Sequence[str], columns: Columns) -> list[tuple[
             along = np.nonzero(sif.front == number)[0]
             weight = front_weights(sif.x[along])
             ends = [end for values in every for end in _extremes_and_mean(values[along], weight)]
-            middle, size, end = weight @ sif.x[along], _size(step, c), _end_of(step, c, number)
+            middle, size, end = weight @ sif.x[along], _size(step, c), end_id(step, c, number)
             rows.append((step.index, step.cycles, c, number, end, *middle, size, *ends))
     return rows
 
@@ -319,4 +327,4 @@ def _cells(name: str, cells: Sequence[tuple[int, Ints]]) -> str:
 """
 
 
-__all__ = ["Table", "polylines", "state_names", "table", "write_series"]
+__all__ = ["Table", "crack_numbers", "end_id", "polylines", "state_names", "table", "write_series"]

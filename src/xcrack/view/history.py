@@ -7,10 +7,9 @@ import numpy as np
 
 from xcrack.base.checks import value_text
 from xcrack.base.errors import ProblemError
-from xcrack.growth.step import Step
 from xcrack.output.curved_sides import boundary_lines
 from xcrack.runs.history import History
-from xcrack.runs.table import state_names
+from xcrack.runs.table import crack_numbers, state_names
 from xcrack.view.figures import finish_figure, new_figure, picture_path
 
 
@@ -153,7 +152,7 @@ def _draw_path(history: History, axes: Any) -> None:
         low, high = history.mesh.points.min(axis=0), history.mesh.points.max(axis=0)
         margin = 0.03 * float((high - low).max())
         axes.set(xlim=(low[0] - margin, high[0] + margin), ylim=(low[1] - margin, high[1] + margin))
-    names = _first_numbers(history.steps[-1])
+    names = crack_numbers(history.steps[-1])
     table = history.table()
     crack_of_row = _crack_of_rows(history, table)
     for number, start in enumerate(history.steps[0].cracks):
@@ -166,15 +165,9 @@ def _draw_path(history: History, axes: Any) -> None:
     axes.legend(fontsize="small")
 
 
-def _first_numbers(step: Step) -> tuple[int, ...]:
-    """Number that each crack of a step had at first."""
-    known = step.identities
-    return tuple(range(len(step.cracks))) if known is None else known.cracks
-
-
 def _crack_of_rows(history: History, table: Any) -> Any:
     """Number that the crack of each row of a table had at first `(k,)`."""
-    names = {step.index: _first_numbers(step) for step in history.steps}
+    names = {step.index: crack_numbers(step) for step in history.steps}
     pairs = zip(table["step"].tolist(), table["crack"].tolist(), strict=True)
     return np.array([names[step][crack] for step, crack in pairs], dtype=np.int64)
 
