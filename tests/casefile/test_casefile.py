@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import xcrack as xc
+from support.case_texts import STRIP, STRIP_GROWTH
 from xcrack.app.main import main
 from xcrack.app.sweep import values_of
 from xcrack.base.units import FORCE, LENGTH, STRESS, TOUGHNESS, Units
@@ -393,24 +394,7 @@ def test_sweep_of_solutions(tmp_path):
     assert rows["K_I in state 1"][1] == pytest.approx(rows["K_I in state 1"][0], rel=1e-12)
 
 
-SWEPT = """
-title = "Strip"
-[units]
-length = "mm"
-force = "N"
-[mesh]
-kind = "box"
-lower = [0.0, -10.0]
-upper = [20.0, 10.0]
-n = [20, 20]
-[material]
-E = "210 GPa"
-nu = 0.3
-plane = "strain"
-[[cracks]]
-kind = "line"
-points = [[0.0, 1.0], [6.0, 1.0]]
-[[loads]]
+SWEPT = f"""{STRIP}[[loads]]
 kind = "traction"
 where = "top"
 value = [0.0, "80 MPa"]
@@ -418,9 +402,4 @@ value = [0.0, "80 MPa"]
 kind = "traction"
 where = "bottom"
 value = [0.0, "-80 MPa"]
-[growth]
-law = { kind = "paris", C = 1e-11, m = 3 }
-cycle = { min = 0.1, max = 1.0 }
-da = 1.0
-max_steps = 2
-"""
+{STRIP_GROWTH}"""

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import xcrack as xc
+from support.case_texts import STRIP, STRIP_GROWTH
 from support.decks import box_cases
 from xcrack.app.main import main
 
@@ -33,6 +34,11 @@ def strip(**changes):
 
 @pytest.mark.slow
 @pytest.mark.gmsh
+@pytest.mark.xfail(
+    strict=True,
+    raises=xc.ProblemError,
+    reason="an inspection plan asks for one place that drives, and it moves along this front",
+)
 def test_a_part_from_step_with_a_pin_and_a_life_by_nasgro_under_a_spectrum(tmp_path):
     """STEP to inspection interval: every number of the first page is there."""
     import gmsh
@@ -50,7 +56,7 @@ def test_a_part_from_step_with_a_pin_and_a_life_by_nasgro_under_a_spectrum(tmp_p
     # what the engineer writes
     mesh = xc.mesh_step(
         tmp_path / "bracket.step",
-        size=lambda x: np.minimum(0.9 + 0.3 * np.hypot(x[:, 0], x[:, 1] - 8.0), 2.5),
+        size=lambda x: np.minimum(0.35 + 0.3 * np.linalg.norm(x - (0.0, 8.0, 6.0), axis=1), 2.5),
         sets={"hole": lambda x: np.hypot(x[:, 0], x[:, 1]) < 8.1, "end": lambda x: x[:, 0] < -29.9},
     )
     metal = xc.material("7075-T651 plate, L-T", units="mm, MPa√mm")
@@ -222,33 +228,11 @@ def test_a_case_goes_on_after_a_kill(tmp_path):
     assert again.table().tobytes() == xc.load(copy).table().tobytes()
 
 
-CASE = """
-title = "Strip"
-[units]
-length = "mm"
-force = "N"
-[mesh]
-kind = "box"
-lower = [0.0, -10.0]
-upper = [20.0, 10.0]
-n = [20, 20]
-[material]
-E = "210 GPa"
-nu = 0.3
-plane = "strain"
-[[cracks]]
-kind = "line"
-points = [[0.0, 1.0], [6.0, 1.0]]
-[[supports]]
+CASE = f"""{STRIP}[[supports]]
 kind = "fix"
 where = "bottom"
 [[loads]]
 kind = "traction"
 where = "top"
 value = [0.0, "80 MPa"]
-[growth]
-law = { kind = "paris", C = 1e-11, m = 3 }
-cycle = { min = 0.1, max = 1.0 }
-da = 1.0
-max_steps = 3
-"""
+{STRIP_GROWTH.replace("max_steps = 2", "max_steps = 3")}"""
