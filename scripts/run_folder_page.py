@@ -160,7 +160,7 @@ def table_of_names() -> str:
     """The same as tables of markdown."""
     lines = []
     for title, rows in array_names().items():
-        lines += [f"### {title}", "", "| array | shape, unit | what it is |", "|---|---|---|"]
+        lines += [f"## {title}", "", "| array | shape, unit | what it is |", "|---|---|---|"]
         for name, shape, words in rows:
             names = ", ".join(f"`{each}`" for each in name.split(", "))
             lines.append(f"| {names} | {shape.replace('|', 'or')} | {words.replace('|', 'or')} |")
