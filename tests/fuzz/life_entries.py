@@ -359,7 +359,19 @@ ENTRIES = [
         cost=0.5,
         in_folder=True,
     ),
-    Entry("growth_curve", xc.growth_curve, {"history": RUN}),
+    Entry(
+        "growth_curve",
+        xc.growth_curve,
+        {
+            "history": RUN,
+            "measure": arg(Word(optional=True, words=("advance", "length")), None, "length"),
+        },
+    ),
+    Entry(
+        "growth_curve",
+        lambda crack: xc.growth_curve(HISTORY, measure="length", crack=crack),
+        {"crack": arg(Whole(optional=True, least=0, most=0), None, 0)},
+    ),
     Entry(
         "growth_curve",
         lambda a, N: CURVE.cycles_at(a) + CURVE.length_at(N),
@@ -392,6 +404,7 @@ ENTRIES = [
             "pod": arg(Called(optional=True), None),
             "a_detect": arg(Number(least=5, below=17), 8.0),
             "factor": arg(Number(least=1), 3),
+            "measure": arg(Word(optional=True, words=("advance", "length")), None, "length"),
         },
     ),
     Entry(

@@ -14,6 +14,7 @@ from xcrack import (
     Isotropic,
     Problem,
     ProblemError,
+    Response,
     Scatter,
     Spectrum,
     box,
@@ -29,6 +30,7 @@ from xcrack import (
     max_hoop_stress,
     normal,
     paris,
+    penny_crack,
     traction,
     walker,
     weighted_angle,
@@ -256,9 +258,70 @@ def test_curve_there_and_back(curve):
         assert curve.length_at(N) == pytest.approx(a, rel=1e-8)
 
 
+def test_a_curve_by_a_measure_of_the_crack(history):
+    """An edge crack in mode I: its length and its depth are what cycles are counted with."""
+    history = History(history.steps, "", mesh=plate().mesh)
+    lead = growth_curve(history)
+    for measure in ("length", "depth"):
+        curve = growth_curve(history, measure=measure)
+        for N in np.linspace(0.0, history.life, 7):
+            assert curve.length_at(N) == pytest.approx(lead.length_at(N), rel=1e-9)
+    plan = inspection(history, a_detect=10.0, measure="depth")
+    assert plan.measure == "depth"
+    assert plan.interval == pytest.approx(inspection(lead, a_detect=10.0).interval, rel=1e-9)
+
+
+def test_a_curve_of_a_penny():
+    """K = 2 S √(r/π) all around: the driving place moves; by its area it grows as in closed form.
+
+    Discretisation: chords of the advanced front, as long as a cell of 0.35, take 0.9 % of the root.
+    """
+
+    def respond(problem, states, reuse, bars):
+        r = np.linalg.norm(problem.stations.x[:, :2], axis=1)
+        K = 2 * STRESS * np.sqrt(r / np.pi)[:, None] * np.eye(3)[0]
+        return Response.of_K(problem, states, np.stack([float(s) * K for s in states]))
+
+    mesh = box((-1, -1, -1), (1, 1, 1), (10, 10, 10))
+    pull = [traction("top", (0, 0, 1.0)), traction("bottom", (0, 0, -1.0))]
+    crack = penny_crack((0, 0, 0.013), (0, 0, 1), 0.5)
+    problem = Problem(mesh, Isotropic(1e3, 0.3), [crack], loads=pull, order=1)
+    grown = run(problem, response=respond, da=0.05, n=2)
+    curve = growth_curve(History(grown.steps, "", mesh=mesh))
+    assert curve.measure == "root_area"
+    part = 1e-11 * (2 * STRESS / np.sqrt(np.pi)) ** 3 / 2
+    for N in np.linspace(0.0, grown.life, 5):
+        radius = (0.5**-0.5 - part * N) ** -2
+        assert curve.length_at(N) / np.sqrt(np.pi) == pytest.approx(radius, rel=0.015)
+
+
+def test_multiple_sites_are_one_curve():
+    """Before the join that of the longer crack, then of both; it jumps where they meet."""
+    cracks = [line_crack([(10, 0.3), (18, 0.3)]), line_crack([(21, 0.3), (27, 0.3)])]
+    response = formula(mode_I())
+    grown = run(plate(cracks), response=response, da=0.8, n=4)
+    assert len(grown.joins) == 1
+    curve, other = growth_curve(grown), growth_curve(grown, crack=1)
+    assert curve.measure == other.measure == "length"
+    n = int(np.argmin(np.diff(curve.N)))
+    assert curve.N[n + 1] == curve.N[n]
+    own, whole = curve.a[[n, n + 1]]
+    assert (curve.a[0], other.a[0]) == (8.0, 6.0)
+    assert whole == pytest.approx(own + other.a[n])
+    assert curve.length_at(0.999 * curve.N[n]) < own
+    assert curve.cycles_at((own + whole) / 2) == curve.N[n]
+    assert inspection(grown, interval=0.4 * grown.life).measure == "length"
+
+
 @pytest.mark.parametrize(
     ("make", "words"),
     [
+        (lambda h: growth_curve(h, crack=7), "the run begins with 0"),
+        (lambda h: growth_curve(h, measure="length", crack=True), "crack = True"),
+        (lambda h: growth_curve(h, measure="advance", crack=0), "a crack is named"),
+        (lambda h: growth_curve(h, measure=3), "measure = 3: give measure="),
+        (lambda h: growth_curve(h, measure="depth"), "without its mesh"),
+        (lambda h: inspection(growth_curve(h), interval=1e4, measure="depth"), "has its own"),
         (lambda h: lognormal(-0.1), "sigma"),
         (lambda h: normal(0.3), "sigma = 0.3"),
         (lambda h: Scatter(), "nothing varies"),

@@ -34,11 +34,6 @@ def strip(**changes):
 
 @pytest.mark.slow
 @pytest.mark.gmsh
-@pytest.mark.xfail(
-    strict=True,
-    raises=xc.ProblemError,
-    reason="an inspection plan asks for one place that drives, and it moves along this front",
-)
 def test_a_part_from_step_with_a_pin_and_a_life_by_nasgro_under_a_spectrum(tmp_path):
     """STEP to inspection interval: every number of the first page is there."""
     import gmsh

@@ -1,5 +1,6 @@
 """When to look, and what the chance is that all looks miss."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -9,10 +10,14 @@ from numpy.typing import ArrayLike
 from xcrack.base.arrays import Floats
 from xcrack.base.checks import call_function, number, numbers, value_text
 from xcrack.base.errors import ProblemError
+from xcrack.growth.step import Step, numbers_after
 from xcrack.runs.history import History
-from xcrack.runs.rerating import cycles_of, driving_forces
+from xcrack.runs.rerating import DrivingForce, cycles_of, driving_forces
+from xcrack.runs.table import crack_numbers
 
 _MOST_LOOKS = 1000
+_ADVANCE = "advance"  # the length that cycles are counted with
+_FALLS = 1e-6  # share by which a measure may fall in a step: round-off of clipped faces
 
 
 @dataclass(frozen=True)
@@ -75,6 +80,8 @@ class Inspection:
         Length of the crack at each.
     missed : float, optional
         Chance that all of them miss the crack, where a probability of detection was given.
+    measure : str
+        What its length is, as of `growth_curve`.
     """
 
     first: float
@@ -82,30 +89,36 @@ class Inspection:
     at: Floats
     a: Floats
     missed: float | None
+    measure: str = _ADVANCE
 
 
 @dataclass(frozen=True, eq=False)
 class GrowthCurve:
-    """Length of the crack that drives a run over cycles, by the power law of each step.
+    """Length of a crack over cycles, by the power law of each step.
 
     Attributes
     ----------
     N, a : (n,) arrays
-        Cycles and length (length) at the steps.
+        Cycles and length (length) at the steps; where it does not grow it stays what it is.
     rate : (n - 1, 2) array, length/cycle
         At both ends of each step.
+    measure : str
+        What the length is, as of `growth_curve`.
     """
 
     N: Floats
     a: Floats
     rate: Floats
+    measure: str = _ADVANCE
 
     def cycles_at(self, a: float) -> float:
-        """Cycles at which the crack has a length; those of the nearer end outside."""
+        """Cycles up to which the crack has a length; those of the nearer end outside."""
         a = number(a, "GrowthCurve.cycles_at: a", least=0)
         i = int(np.clip(np.searchsorted(self.a, a, side="right") - 1, 0, len(self.a) - 2))
         a = float(np.clip(a, self.a[i], self.a[i + 1]))
         step = np.array([self.a[i], self.a[i + 1]])
+        if step[0] == step[1]:
+            return float(self.N[i + 1])
         begin, end = self.rate[i]
         power = np.log(end / begin) / np.log(step[1] / step[0])
         cycles_there = begin * (a / step[0]) ** power if np.isfinite(power) else begin
@@ -124,41 +137,195 @@ class GrowthCurve:
             return float(self.a[-1])
         i = int(np.searchsorted(self.N, N, side="right") - 1)
         low, high = self.a[i], self.a[i + 1]
+        if low == high:
+            return float(low)
         return float(brentq(lambda a: self.cycles_at(a) - N, low, high, xtol=1e-13 * high))
 
 
-def growth_curve(history: History) -> GrowthCurve:
-    """Length over cycles of the one tip that drives a run.
+def growth_curve(
+    history: History, *, measure: str | None = None, crack: int | None = None
+) -> GrowthCurve:
+    """Length of a crack over cycles, of one tip or as an engineer measures it.
 
     Parameters
     ----------
     history : History
+        With its mesh where the measure is another one than the length of a 2D crack.
+    measure : str, optional
+        "advance": the length that cycles are counted with, of the one tip that drives a 2D run; of
+        a crack that grows evenly at two tips, half. "length" of a 2D crack within the body;
+        "root_area" of a 3D one, the root of its area; or a column of `History.measures`: "depth",
+        "length_<set>" and "depth_<set>" of a facet set, "front_length". If omitted, "root_area" in
+        3D; in 2D "advance" where one tip drives, else "length".
+    crack : int, optional
+        Number in the first step; it is followed through joins. If omitted, the crack that leads at
+        the end, and before each join the longer one of those that joined: of several cracks
+        (multiple-site damage) that is one curve. In 2D it jumps where they join, at the end of the
+        step; in 3D the join rises over its step.
 
     Returns
     -------
     GrowthCurve
-        Of lengths as cycles are counted with: of a crack that grows evenly at two tips, half.
 
     Raises
     ------
     ProblemError
-        Another tip drives from some step on: there is no one curve.
+        "advance" of a run in which another tip drives from some step on; no such measure or crack;
+        a measure that falls, or that the crack does not have at some step; no mesh.
+
+    Notes
+    -----
+    Within a step a measure grows in proportion to the advance of the place that drives, with its
+    rates at both ends; of a run with retardation, evenly in cycles.
     """
     if not isinstance(history, History):
         raise ProblemError(f"growth_curve: history = {value_text(history)}: give a History.")
+    if measure is not None and not isinstance(measure, str):
+        raise ProblemError(f"growth_curve: measure = {value_text(measure)}: give {_MEASURES}.")
+    flat = history.steps[0].cracks[0].dim == 2
+    if measure is None and not flat:
+        measure = "root_area"
+    if measure not in (None, _ADVANCE):
+        return _measured_curve(history, measure, crack)
     rows = driving_forces(history.steps)
-    lead = rows.drives
-    a, rate, step = rows.a[lead], rows.rate[lead], rows.step[lead]
-    if not rows.is_one_tip:
+    if crack is not None or not rows.is_one_tip:
+        if measure is None:
+            return _measured_curve(history, "length", crack)
         raise ProblemError(
-            "growth_curve: more than one tip drives the run: give the part of the history in which "
-            "one does, History(history.steps[:n], ended='')."
+            'growth_curve: measure = "advance" is of the one tip that drives a run, and '
+            f"{'more than one does' if crack is None else 'a crack is named'}: give {_MEASURES}."
         )
-    if np.isinf(rate[-1, 1]):  # no power law ends there: one that is steep, over the same cycles
+    lead = rows.drives
+    a, step = rows.a[lead], rows.step[lead]
+    N = np.concatenate([[0.0], np.cumsum(rows.cycles[step])]) + history.steps[0].cycles
+    return GrowthCurve(N, np.concatenate([a[:, 0], a[-1:, 1]]), _bounded(rows.rate[lead]))
+
+
+_MEASURES = (
+    'measure="length" in 2D, "root_area" in 3D, or a column of History.measures, such as "depth"'
+)
+
+
+def _bounded(rate: Floats) -> Floats:
+    """Rates of steps; where the last one has no power law: a steep one, over the same cycles."""
+    if np.isinf(rate[-1, 1]):
         rate = rate.copy()
         rate[-1, 1] = 3 * rate[-1, 0]
-    N = np.concatenate([[0.0], np.cumsum(rows.cycles[step])]) + history.steps[0].cycles
-    return GrowthCurve(N, np.concatenate([a[:, 0], a[-1:, 1]]), rate)
+    return rate
+
+
+def _measured_curve(history: History, measure: str, crack: int | None) -> GrowthCurve:
+    """The curve of one crack by a measure of it."""
+    steps = history.steps
+    if len(steps) < 2:
+        raise ProblemError("growth_curve: the history has one step: a curve needs two.")
+    values = _measures_of(history, steps, measure)
+    line = _line_of(steps, values, crack)
+    a = np.array([of[c] for of, c in zip(values, line, strict=True)])
+    N = np.array([step.cycles for step in steps])
+    unknown = ~(np.isfinite(a) & (a > 0))
+    if unknown.any():
+        index = steps[int(np.argmax(unknown))].index
+        raise ProblemError(
+            f"growth_curve: the crack has no {measure!r} at step {index}: give {_MEASURES}."
+        )
+    falls = a[1:] < a[:-1] * (1 - _FALLS)
+    if falls.any():
+        n = int(np.argmax(falls))
+        raise ProblemError(
+            f"growth_curve: {measure!r} falls from {a[n]:.6g} to {a[n + 1]:.6g} after step "
+            f"{steps[n].index}: a curve rises. Give another measure, or the part of the history in "
+            "which it rises, History(history.steps[:n], ended='', mesh=history.mesh)."
+        )
+    a = np.maximum.accumulate(a)
+    grows, cycles = np.diff(a), np.diff(N)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        rate = np.repeat((grows / cycles)[:, None], 2, axis=1)
+    if _settings(steps).get("retardation", "None") == "None":
+        lead: DrivingForce = driving_forces(history.steps).lead
+        for n, ends, advance in zip(lead.step, _bounded(lead.rate), np.diff(lead.a).ravel()):
+            if n < len(rate) and advance > 0:
+                rate[n] = ends * grows[n] / advance
+    if measure == "length":
+        N, a, rate = _with_jumps(steps, line, N, a, rate)
+    return GrowthCurve(N, a, rate, measure)
+
+
+def _with_jumps(
+    steps: Sequence[Step], line: Sequence[int], N: Floats, a: Floats, rate: Floats
+) -> tuple[Floats, Floats, Floats]:
+    """A 2D curve that goes on by its own advance up to a join, and rises there at once."""
+    for n in range(len(steps) - 2, -1, -1):
+        c = line[n]
+        if not any(c in join.cracks for join in steps[n + 1].joins):
+            continue
+        alone = min(float(a[n] + steps[n].da[c].sum()), float(a[n + 1]))
+        share = (alone - a[n]) / (a[n + 1] - a[n]) if a[n + 1] > a[n] else 1.0
+        N, a = np.insert(N, n + 1, N[n + 1]), np.insert(a, n + 1, alone)
+        rate = np.insert(rate, n + 1, 1.0, axis=0)
+        rate[n] *= share
+    return N, a, rate
+
+
+def _settings(steps: Sequence[Step]) -> Any:
+    return {} if steps[0].run is None else steps[0].run.settings
+
+
+def _measures_of(history: History, steps: Sequence[Step], measure: str) -> list[list[float]]:
+    """The measure of each crack of each step."""
+    flat = steps[0].cracks[0].dim == 2
+    if flat and measure == "length":
+        if not all(step.sizes for step in steps):
+            raise ProblemError(
+                "growth_curve: the history has steps without sizes of their cracks: give "
+                "Step(..., sizes=...)."
+            )
+        return [list(step.sizes) for step in steps]
+    table, _ = history.measures()
+    names = [n for n in table.dtype.names or () if n.startswith(("depth", "length_"))]
+    if flat:
+        known = ["length", *(n for n in names if n.startswith("depth"))]
+    else:
+        known = ["root_area", "front_length", *names]
+    if measure not in known:
+        raise ProblemError(
+            f"growth_curve: measure = {value_text(measure)}: the run has {', '.join(known)}."
+        )
+    column = np.sqrt(table["area"]) if measure == "root_area" else table[measure]
+    return [column[table["step"] == step.index].tolist() for step in steps]
+
+
+def _line_of(
+    steps: Sequence[Step], values: Sequence[Sequence[float]], crack: int | None
+) -> list[int]:
+    """Number of a crack at each step: the one that is named, or back from the one that leads."""
+    pairs = list(zip(steps, steps[1:], strict=False))
+    after = [numbers_after(len(a.cracks), b.joins, len(b.cracks)) for a, b in pairs]
+    if crack is not None:
+        first = crack_numbers(steps[0])
+        if isinstance(crack, bool) or crack not in first:
+            raise ProblemError(
+                f"growth_curve: crack = {value_text(crack)}: the run begins with "
+                f"{', '.join(map(str, first))}."
+            )
+        line = [first.index(crack)]
+        for numbers_there in after:
+            line.append(numbers_there[line[-1]])
+        return line
+    last = max(n for n, step in enumerate(steps) if n == 0 or not step.has_left)
+    rate = [float(of_crack.max(initial=0)) for of_crack in steps[last].law_rate]
+    line = [max(range(len(rate)), key=lambda c: (rate[c], _known(values[last][c])))]
+    for numbers_there, before in zip(after[:last][::-1], values[:last][::-1], strict=True):
+        joined = [c for c, now in enumerate(numbers_there) if now == line[0]]
+        line.insert(0, max(joined, key=lambda c: _known(before[c])))
+    for numbers_there in after[last:]:
+        line.append(numbers_there[line[-1]])
+    return line
+
+
+def _known(value: float) -> float:
+    """A length to compare with; none is the least of all."""
+    return value if np.isfinite(value) else -np.inf
 
 
 def inspection(
@@ -169,6 +336,7 @@ def inspection(
     a_critical: float | None = None,
     interval: float | None = None,
     pod: logistic_pod | None = None,
+    measure: str | None = None,
 ) -> Inspection:
     """Thresholds and intervals of inspection from a growth curve.
 
@@ -186,6 +354,8 @@ def inspection(
         Cycles between looks instead; the first is after one interval.
     pod : callable a -> probability, optional
         Gives the chance that all looks miss.
+    measure : str, optional
+        Of a history: what all these lengths are, as of `growth_curve`.
 
     Returns
     -------
@@ -194,10 +364,13 @@ def inspection(
     Raises
     ------
     ProblemError
-        Neither or both of a_detect and interval, lengths outside of the curve.
+        Neither or both of a_detect and interval, lengths outside of the curve, a measure of what
+        is a curve already; as of `growth_curve`.
     """
     if isinstance(curve, History):
-        curve = growth_curve(curve)
+        curve = growth_curve(curve, measure=measure)
+    elif measure is not None:
+        raise ProblemError("inspection: measure belongs to a history: a curve has its own.")
     if not isinstance(curve, GrowthCurve):
         raise ProblemError(f"inspection: curve = {value_text(curve)}: give a History.")
     if (a_detect is None) == (interval is None):
@@ -237,7 +410,7 @@ def inspection(
         if pod is None
         else float(np.prod([1 - _detection_probability(pod, each) for each in a]))
     )
-    return Inspection(first, every, at, a, missed)
+    return Inspection(first, every, at, a, missed, curve.measure)
 
 
 def _detection_probability(pod: Any, a: float) -> float:

@@ -13,6 +13,7 @@ from xcrack.view.report_pictures import drawn_figure
 from xcrack.view.report_source import Section, Source
 
 _MOST_LOOKS = 50  # rows of a page
+_MEASURES = {"advance": "its advance at the driving tip", "root_area": "the root of its area"}
 
 
 def inspections(source: Source) -> Section | None:
@@ -24,6 +25,7 @@ def inspections(source: Source) -> Section | None:
         ("first look after", plan.first),
         ("cycles between looks", plan.interval),
         ("looks before the end", len(plan.at)),
+        ("length of the crack is", _MEASURES.get(plan.measure, plan.measure.replace("_", " of "))),
     ]
     if plan.missed is not None:
         rows.append(("chance that all of them miss", f"{plan.missed:.3g}"))
@@ -33,7 +35,7 @@ def inspections(source: Source) -> Section | None:
     if len(looks) > _MOST_LOOKS:
         parts.append(element("p", f"and {len(looks) - _MOST_LOOKS} looks more", cls="soft"))
     numbers = {"first": plan.first, "interval": plan.interval, "at": plan.at.tolist(),
-               "a": plan.a.tolist(), "missed": plan.missed}  # fmt: skip
+               "a": plan.a.tolist(), "missed": plan.missed, "measure": plan.measure}  # fmt: skip
     return Section("inspection", "Inspections", join_parts(*parts), numbers)
 
 
