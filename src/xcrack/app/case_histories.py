@@ -79,8 +79,15 @@ def loading(table: Table) -> Cycle | Spectrum:
         given.wrap(error)
 
 
-def retardation_of(table: Table) -> Retardation:
-    """The model of a table, whose zone is a table of its own."""
+def retardation_of(table: Table) -> Retardation | dict[str, Retardation]:
+    """The model of a table, whose zone is a table too; or by tables one for each material."""
+    several = table.content and all(isinstance(each, dict) for each in table.content.values())
+    if several and "zone" not in table:
+        return {name: _model(table.table(name)) for name in table.content}
+    return _model(table)
+
+
+def _model(table: Table) -> Retardation:
     if "zone" not in table:
         table.refuse("", "the key 'zone' is missing: zone = { sigma_y = ..., beta = ... }.")
     return value_of_table(table, _MODELS)

@@ -1,18 +1,20 @@
 """Retardation after overloads: plastic zones, its models, and growth cycle by cycle with them."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from xcrack.base.arguments import Number, Part
 from xcrack.base.arrays import Bools, Floats, Ints
-from xcrack.base.checks import numbers
+from xcrack.base.checks import numbers, value_text
 from xcrack.base.errors import ProblemError
 from xcrack.base.units import STRESS, TOUGHNESS
 from xcrack.fatigue.checks import evaluate_law
 from xcrack.fatigue.law import Constants, Law, largest_K
+from xcrack.fatigue.law_sets import LawSets, Names
 
 _LARGEST = 1e120  # K whose square is a number
 
@@ -148,6 +150,68 @@ class willenborg(Constants):  # noqa: N801
 Retardation = wheeler | willenborg
 
 
+@dataclass(frozen=True)
+class RetardationSets:
+    """Models of retardation by the names of the cell sets that materials have.
+
+    ``grow(..., retardation={"plate": wheeler(...), "weld": wheeler(...)})`` is short for it: a tip
+    has the zones of the material that it is in.
+
+    Parameters
+    ----------
+    models : mapping of str to wheeler, or of str to willenborg
+
+    Raises
+    ------
+    ProblemError
+        No mapping of names to models of one kind.
+    """
+
+    models: Any
+
+    def __post_init__(self) -> None:
+        given = self.models
+        pairs = given.items() if isinstance(given, Mapping) else given
+        if not isinstance(given, Mapping | tuple) or not pairs:
+            raise ProblemError(
+                f"retardation: {value_text(given)}: give a mapping of cell sets to models, such as "
+                '{"plate": wheeler(...), "weld": wheeler(...)}.'
+            )
+        for name, model in pairs:
+            if not isinstance(name, str) or not isinstance(model, Retardation):
+                raise ProblemError(
+                    f"retardation: {value_text(name)}: {value_text(model)}: give the name of a "
+                    "cell set, and wheeler or willenborg."
+                )
+        object.__setattr__(self, "models", tuple(pairs))
+        if len({type(model) for _, model in self.models}) > 1:
+            raise ProblemError(
+                "retardation: one material has wheeler, and one willenborg: an overload in front "
+                "of an interface would be forgotten behind it. Give all the same kind."
+            )
+
+    def at(self, names: Sequence[str]) -> list[Retardation]:
+        """The model of each of some materials."""
+        models = dict(self.models)
+        return [models[name] for name in names]
+
+    def check(self, names: Sequence[str]) -> None:
+        """Raise where the materials of a problem are others.
+
+        Raises
+        ------
+        ProblemError
+            A material without a model, or a model without a material.
+        """
+        given = [name for name, _ in self.models]
+        if sorted(given) != sorted(names):
+            known = ", ".join(map(repr, names)) if names[0] else "one, without a name"
+            raise ProblemError(
+                f"retardation: there are models for {', '.join(map(repr, given))}, and the "
+                f"materials of the problem are {known}: give each of them one."
+            )
+
+
 # What growth cycle by cycle goes from, and what it gives.
 
 
@@ -190,24 +254,34 @@ class BlockCycles:
         Equivalent range (stress √length) and ratio.
     a : (k, n) array, length
         Crack size that a law is given.
+    sets : (n,) array of int, optional
+        Number of the material that each place goes on in; one material, where it is left out.
     """
 
     dK: Floats
     R: Floats
     a: Floats
+    sets: Ints | None = None
+
+    @property
+    def arrays(self) -> tuple[Floats, Floats, Floats]:
+        """Range, ratio and size."""
+        return self.dK, self.R, self.a
 
     def rows(self, which: slice | Bools) -> "BlockCycles":
         """Some of the solves."""
-        return BlockCycles(self.dK[which], self.R[which], self.a[which])
+        return BlockCycles(self.dK[which], self.R[which], self.a[which], self.sets)
 
     def at(self, places: Bools | Ints) -> "BlockCycles":
         """Some of the places."""
-        return BlockCycles(self.dK[:, places], self.R[:, places], self.a[:, places])
+        sets = None if self.sets is None else self.sets[places]
+        return BlockCycles(self.dK[:, places], self.R[:, places], self.a[:, places], sets)
 
     def followed_by(self, later: "BlockCycles", most: int) -> "BlockCycles":
-        """With later solves, of all at most the last few."""
-        parts = zip((self.dK, self.R, self.a), (later.dK, later.R, later.a))
-        return BlockCycles(*(np.concatenate(pair)[-most:] for pair in parts))
+        """With later solves, of all at most the last few, in the materials of the later ones."""
+        parts = zip(self.arrays, later.arrays)
+        dK, R, a = (np.concatenate(pair)[-most:] for pair in parts)
+        return BlockCycles(dK, R, a, later.sets)
 
 
 @dataclass(frozen=True, eq=False)
@@ -247,8 +321,8 @@ def no_zones(n: int) -> OverloadZones:
 
 
 def march(
-    law: Law,
-    model: Retardation | None,
+    law: Law | LawSets,
+    model: Retardation | RetardationSets | None,
     order: Ints,
     cycles: BlockCycles,
     nodes: Floats,
@@ -259,13 +333,14 @@ def march(
     exponent: float,
     threshold: float = 0.0,
     blocks: float = np.inf,
+    names: Sequence[str] = ("",),
 ) -> CycleIntegration:
     """Let places grow cycle by cycle, until the fastest have come a length.
 
     Parameters
     ----------
-    law : callable
-    model : wheeler or willenborg, or None
+    law : callable, or LawSets
+    model : wheeler or willenborg, or RetardationSets, or None
     order : (c,) array of int
         Kinds of the cycles of a block, in time.
     cycles : BlockCycles
@@ -282,6 +357,8 @@ def march(
         Cycles below it let nothing grow.
     blocks : float
         To stop after.
+    names : sequence of str
+        Of the materials that `cycles.sets` counts.
 
     Returns
     -------
@@ -291,15 +368,20 @@ def march(
 
     k, n, p = cycles.dK.shape
     shifts = np.zeros(1)
-    if isinstance(model, willenborg):
+    material = None if cycles.sets is None else np.array(names)[cycles.sets]
+    models: list[Any] = [model] * n
+    if isinstance(model, RetardationSets):
+        models = model.at([names[0]] * n if material is None else material.tolist())
+    first = models[0] if models else None
+    if isinstance(first, willenborg):
         fits = _TABLE // max(k * n * p, 1)
         shifts = np.linspace(0, 1, int(np.clip(fits, _FEWEST, _SHIFTS)))
-    rate = cycle_rates(law, cycles, shifts, threshold)
+    rate = cycle_rates(law, cycles, shifts, threshold, material)
     most = rate.max(axis=0)
     root = np.asarray((rate <= _TINY * most).any(axis=0))
     with np.errstate(divide="ignore"):
         values = np.where(root, rate ** (1 / exponent), np.log(np.maximum(rate, _SMALLEST)))
-    least = model.dK_th if isinstance(model, willenborg) else 0.0
+    least = np.array([getattr(one, "dK_th", 0.0) for one in models])[None, :, None]
     share = np.divide(least, cycles.dK, out=np.ones_like(cycles.dK), where=cycles.dK > 0)
     since, size, over = np.array(zones.since), np.array(zones.size), np.array(zones.K)
     arc, elapsed = np.zeros(x.shape), np.zeros(len(x))
@@ -315,10 +397,10 @@ def march(
         root,
         exponent,
         share,
-        0.0 if model is None else model.zone.factor,
-        0 if model is None else 1 if isinstance(model, wheeler) else 2,
-        model.w if isinstance(model, wheeler) else 1.0,
-        model.shutoff if isinstance(model, willenborg) else 2.0,
+        np.array([0.0 if one is None else one.zone.factor for one in models]),
+        0 if first is None else 1 if isinstance(first, wheeler) else 2,
+        np.array([getattr(one, "w", 1.0) for one in models]),
+        np.array([getattr(one, "shutoff", 2.0) for one in models]),
         since,
         size,
         over,
@@ -332,7 +414,13 @@ def march(
     return CycleIntegration(sigma, arc, elapsed / len(order), float(reached), after)
 
 
-def cycle_rates(law: Law, cycles: BlockCycles, shifts: Floats, threshold: float) -> Floats:
+def cycle_rates(
+    law: Law | LawSets,
+    cycles: BlockCycles,
+    shifts: Floats,
+    threshold: float,
+    material: Names | None = None,
+) -> Floats:
     """Rates `(k, n, p, s)` with a share of K_max taken from both ends of each cycle."""
     K_max = largest_K(cycles.dK, cycles.R)[..., None]
     largest = K_max * (1 - shifts)
@@ -343,7 +431,10 @@ def cycle_rates(law: Law, cycles: BlockCycles, shifts: Floats, threshold: float)
     a = np.broadcast_to(cycles.a[..., None, None], dK.shape)
     flat = (np.ascontiguousarray(each).ravel() for each in (dK, R, a))
     dK_, R_, a_ = flat
-    rate = evaluate_law(law, dK_, R_, 0, "place of a cycle", a_)
+    names = None
+    if material is not None and isinstance(law, LawSets):
+        names = np.broadcast_to(material[None, :, None, None], dK.shape).ravel()
+    rate = evaluate_law(law, dK_, R_, 0, "place of a cycle", a_, names)
     return np.where(dK_ < threshold, 0.0, rate).reshape(dK.shape)
 
 
@@ -382,6 +473,7 @@ __all__ = [
     "CycleIntegration",
     "OverloadZones",
     "Retardation",
+    "RetardationSets",
     "cycle_rates",
     "march",
     "no_zones",

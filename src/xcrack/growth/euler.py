@@ -15,8 +15,16 @@ from xcrack.fatigue.cycle import cycles_between
 from xcrack.growth import fronts
 from xcrack.growth.corrected import Corrected
 from xcrack.growth.fronts import advanced_crack, front_lengths, interpolate_along_front
+from xcrack.growth.interfaces import (
+    InterfacesAhead,
+    cycles_across,
+    cycles_of_jump,
+    interfaces_ahead,
+    rates_behind,
+    warn_of_passages,
+)
 from xcrack.growth.options import GrowthRule
-from xcrack.growth.rates import Rates
+from xcrack.growth.rates import Rates, rates_by_law_of
 from xcrack.growth.solves import SolveHistory
 from xcrack.growth.stations import GrowthStations, Identities, PerCrack, directions
 from xcrack.growth.step import Plan, Step, StepError, moved_places, plan_of, solves_of
@@ -44,6 +52,13 @@ def predict(rule: GrowthRule, step: Step) -> Plan:
     growth = stations.growth(score, largest)
     goes = growth >= _WAITS_BELOW[mesh.dim] * cell
     way = np.where(goes, growth, 0.0)
+    near = interfaces_ahead(rule, stations.x, way[:, None] * solves.direction[-1])
+    if near is not None and (way > near.stop).any():  # a step ends before it, or behind
+        reaches = way > near.stop
+        largest *= float((near.goal[reaches] / way[reaches]).min())
+        growth = stations.growth(score, largest)
+        goes = growth >= _WAITS_BELOW[mesh.dim] * cell
+        way = np.where(goes, growth, 0.0)
     row = int(np.argmax(score))
     plan = replace(
         plan,
@@ -162,9 +177,37 @@ def _followed_2d(rule: GrowthRule, last: Step, rates: Rates) -> tuple[float, Flo
     j = int(np.argmax(np.where(choice, rate0, -1.0)))
     if not there[j]:
         return float(da[j] / rate0[j]), waits
+    near = interfaces_ahead(rule, stations.x, plan_of(last).move)
+    if near is not None and da[j] > near.way[j]:
+        return _across(rule, last, rates, near, j, int(row[j])), waits
     c = int(stations.crack[j])
     a = last.sizes[c] * float(da[j] / da[stations.crack == c].sum())
     return float(cycles_between(a, a + da[j], rate0[j], rates.law_rate[row[j]])), waits
+
+
+def _across(
+    rule: GrowthRule, last: Step, rates: Rates, near: InterfacesAhead, j: int, row: int
+) -> float:
+    """Cycles of a step in which the driving tip j has passed an interface; `row` is it behind."""
+    solves, way = solves_of(last)[1], float(near.way[j])
+    behind = float(plan_of(last).arc[j]) - way
+    begin, end = float(solves.rate[-1, j]), float(rates.law_rate[row])
+    if not 0 < end < np.inf:  # the run ends there
+        cycles = np.array([way, behind]) / begin
+    elif near.is_smooth[j]:
+        sets = np.array(rule.problem.elasticity.sets_at(rates.stations.x))
+        sets[row] = near.before[j]
+        here = rates_by_law_of(rule, rates.problem, rates.response, sets)[row]
+        there = rates_behind(rule, last, near)[j]
+        rate = np.array([[begin, here], [there, end]])
+        cycles = cycles_across(float(solves.scale[j]), way, behind, *rate)
+    else:
+        exponent, power = rates.exponent(rule.law), float(near.power[j])
+        cycles = np.array(cycles_of_jump(solves, exponent, end, j, way, behind, power))
+    at = np.full(len(near.way), np.nan)
+    at[j] = cycles[0]
+    warn_of_passages(rule, last, near, at)
+    return float(cycles.sum())
 
 
 def _score(rule: GrowthRule, step: Step) -> Floats:

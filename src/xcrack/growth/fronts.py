@@ -224,12 +224,17 @@ def _kinds_near(
     values = np.concatenate([kinds.dK[0], kinds.R[0]], axis=1)
     near = interpolate_along_front(solved.x, solved.front, _closed(solved), values, x, np.inf)
     a = np.full((1, len(x)), float(kinds.a.flat[0]))
-    return BlockCycles(near[None, :, :p], near[None, :, p:], a)
+    sets = kinds.sets
+    if sets is not None:
+        sets = sets[np.linalg.norm(x[:, None] - solved.x, axis=2).argmin(axis=1)]
+    return BlockCycles(near[None, :, :p], near[None, :, p:], a, sets)
 
 
 def _all_kinds(parts: Sequence[BlockCycles]) -> BlockCycles:
-    names = ("dK", "R", "a")
-    return BlockCycles(*(np.concatenate([getattr(k, n) for k in parts], axis=1) for n in names))
+    arrays = zip(*(kinds.arrays for kinds in parts), strict=True)
+    sets = [kinds.sets for kinds in parts if kinds.sets is not None]
+    dK, R, a = (np.concatenate(part, axis=1) for part in arrays)
+    return BlockCycles(dK, R, a, np.concatenate(sets) if sets else None)
 
 
 def _whole(
@@ -707,9 +712,9 @@ def _marched(
     blocks: float,
 ) -> CycleIntegration:
     """All stations of all fronts; rates are powers of the sizes of the cracks."""
-    every = BlockCycles(
-        *(np.concatenate([getattr(each, name) for each in kinds]) for name in ("dK", "R", "a"))
-    )
+    arrays = zip(*(each.arrays for each in kinds), strict=True)
+    dK, R, a = (np.concatenate(part) for part in arrays)
+    every = BlockCycles(dK, R, a, kinds[0].sets)
     t = np.linspace(0.0, 1.0, POINTS)[:, None]
     even = np.abs(ratio - 1) < 1e-6
     safe = np.where(even, 2.0, ratio)
@@ -727,6 +732,7 @@ def _marched(
         exponent=solves.exponent,
         threshold=rule.threshold,
         blocks=blocks,
+        names=[name for name, _ in rule.problem.elasticity.named],
     )
 
 

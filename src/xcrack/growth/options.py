@@ -17,7 +17,7 @@ from xcrack.fatigue.criteria import Criterion
 from xcrack.fatigue.cycle import Cycle
 from xcrack.fatigue.law_sets import LawSets
 from xcrack.fatigue.rainflow import turning_points
-from xcrack.fatigue.retardation import Retardation, willenborg
+from xcrack.fatigue.retardation import Retardation, RetardationSets, willenborg
 from xcrack.fatigue.spectrum import Spectrum
 from xcrack.growth.response import Respond
 from xcrack.model.problem import Problem
@@ -41,7 +41,7 @@ class GrowthOptions(TypedDict, total=False):
     scaling: str
     integrator: str
     threshold: float
-    retardation: Retardation | None
+    retardation: Retardation | Mapping[str, Retardation] | None
     K_c: float | None
     link_up: Callable[[Floats], ArrayLike] | None
     stop_at_interface: bool
@@ -87,7 +87,10 @@ class GrowthRule:
     scaling: Annotated[str, Choice(("law", "linear"))] = "law"
     integrator: Annotated[str, Choice(("pec", "euler"))] = "pec"
     threshold: Annotated[float, Number(least=0)] = 0.0
-    retardation: Annotated[Retardation | None, Part(Retardation, "wheeler or willenborg")] = None
+    retardation: Annotated[
+        Any,
+        Part(Retardation | RetardationSets, "wheeler or willenborg, or a mapping to one of them"),
+    ] = None
     solver: Annotated[Any, Function("a function, or None")] = None
     response: Annotated[Respond | None, Function(_RESPONSE)] = None
     K_c: Annotated[float | None, _POSITIVE] = field(default=None, metadata=_STOPS)
@@ -108,11 +111,15 @@ class GrowthRule:
     def __post_init__(self) -> None:
         if isinstance(self.law, Mapping):
             object.__setattr__(self, "law", LawSets(self.law))
+        if isinstance(self.retardation, Mapping):
+            object.__setattr__(self, "retardation", RetardationSets(self.retardation))
         for name, argument in arguments_of(GrowthRule).items():
             checked = argument.check(getattr(self, name), f"grow: {name}")
             object.__setattr__(self, name, checked)
         if isinstance(self.law, LawSets):
             self.law.check([name for name, _ in self.problem.elasticity.named])
+        if isinstance(self.retardation, RetardationSets):
+            self.retardation.check([name for name, _ in self.problem.elasticity.named])
         for state in self.cycle.load_states:
             self.problem.state(state)
         if isinstance(self.cycle, Cycle) and looks_like_history(self.cycle):
@@ -151,11 +158,6 @@ class GrowthRule:
                 "grow: retardation needs cycles in time: give Spectrum(factors). One Cycle has no "
                 "overload, counted rows no order, and states are counted at each tip on its own."
             )
-        if isinstance(self.law, LawSets):
-            raise ProblemError(
-                "grow: retardation follows one law through all of a crack: leave it out, or give "
-                "one law for all materials."
-            )
         if self.integrator != "pec":
             raise ProblemError('grow: retardation goes with integrator="pec" only.')
         if getattr(self.law, "ratio", None) == "nominal":
@@ -163,8 +165,12 @@ class GrowthRule:
                 'grow: the law has ratio="nominal", but plastic zones belong to K with contact: '
                 'with retardation give a law with ratio="contact".'
             )
-        if isinstance(self.retardation, willenborg) and (
-            getattr(self.law, "closure", None) is not None
+        laws = [law for _, law in self.law.laws] if isinstance(self.law, LawSets) else [self.law]
+        model: Any = self.retardation
+        if isinstance(model, RetardationSets):
+            model = model.models[0][1]  # they are of one kind
+        if isinstance(model, willenborg) and any(
+            getattr(law, "closure", None) is not None for law in laws
         ):
             raise ProblemError(
                 "grow: the law has a closure, and willenborg lowers K as well: both stand for the "

@@ -1,6 +1,6 @@
 """From K of the load states to direction, range, ratio and rate at each station of the cracks."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -15,7 +15,7 @@ from xcrack.fatigue.criteria import clipped_K, equivalent_K, kink_angle, nominal
 from xcrack.fatigue.law import Law
 from xcrack.fatigue.law_sets import LawSets, Names
 from xcrack.fatigue.rainflow import closed_cycles
-from xcrack.fatigue.retardation import BlockCycles
+from xcrack.fatigue.retardation import BlockCycles, RetardationSets
 from xcrack.fatigue.spectrum import Spectrum, distinct
 from xcrack.growth.levels import has_slip, ladders, respond_to_states
 from xcrack.growth.options import GrowthRule
@@ -194,6 +194,25 @@ def rates_of(
     return Rates(problem, response, stations, angle, dK_eq, R, law_rate, rate, R_range, free)
 
 
+def rates_by_law_of(rule: GrowthRule, problem: Problem, response: Response, sets: Ints) -> Floats:
+    """Rates before the threshold at stations `(n,)` by the laws of given materials.
+
+    Parameters
+    ----------
+    rule : GrowthRule
+        Without a law that asks for K without contact.
+    problem : Problem
+    response : Response
+        Of all states.
+    sets : (n,) array of int
+        Numbers of the materials.
+    """
+    named = np.array([name for name, _ in problem.elasticity.named])[sets]
+    names = np.split(named, np.cumsum([len(sif.x) for sif in response.sif[0]])[:-1])
+    inputs = criterion_inputs(rule, problem, response, names=names)
+    return np.concatenate([own.rates_of_K(own.K).rate for own in inputs])
+
+
 def response_without_contact(
     rule: GrowthRule, problem: Problem, response: Response
 ) -> Response | None:
@@ -206,7 +225,11 @@ def response_without_contact(
 
 
 def criterion_inputs(
-    rule: GrowthRule, problem: Problem, response: Response, free: Response | None = None
+    rule: GrowthRule,
+    problem: Problem,
+    response: Response,
+    free: Response | None = None,
+    names: Sequence[Names] | None = None,
 ) -> list[CriterionInput]:
     """What criterion and law are asked about each crack.
 
@@ -218,20 +241,28 @@ def criterion_inputs(
         Of all states.
     free : Response, optional
         Without contact, for a law with nominal R.
+    names : sequence of (f,) arrays of str, optional
+        Materials whose laws count, one array a crack: those that the stations are in.
     """
+    if names is None:
+        names = [problem.elasticity.names_at(sif.x) for sif in response.sif[0]]
     of_rule = _inputs_of_blocks if isinstance(rule.cycle, Spectrum) else _inputs_of_cycle
-    return of_rule(rule, problem, response, free)
+    return of_rule(rule, problem, response, free, names)
 
 
 def _inputs_of_cycle(
-    rule: GrowthRule, problem: Problem, response: Response, free: Response | None
+    rule: GrowthRule,
+    problem: Problem,
+    response: Response,
+    free: Response | None,
+    materials: Sequence[Names],
 ) -> list[CriterionInput]:
     place, nu = PLACE[problem.mesh.dim], problem.elasticity.poisson
 
     def of_crack(c: int) -> CriterionInput:
         given = np.stack([state[c].K for state in response.sif])
         a = law_size(problem.mesh.dim, problem.sizes[c], given.shape[1])
-        names = problem.elasticity.names_at(response.sif[0][c].x)
+        names = materials[c]
 
         def rates_of_K(K: Floats) -> CycleRates:
             angle, dK, R = evaluate_criterion(rule.criterion, K, nu, c, place)
@@ -249,7 +280,11 @@ def _inputs_of_cycle(
 
 
 def _inputs_of_blocks(
-    rule: GrowthRule, problem: Problem, response: Response, free: Response | None
+    rule: GrowthRule,
+    problem: Problem,
+    response: Response,
+    free: Response | None,
+    materials: Sequence[Names],
 ) -> list[CriterionInput]:
     place, nu = PLACE[problem.mesh.dim], problem.elasticity.poisson
     every = pairs_of(rule, problem, response)
@@ -258,7 +293,7 @@ def _inputs_of_blocks(
     def of_crack(c: int, pairs: RangePairs, free_pairs: RangePairs | None) -> CriterionInput:
         shape = pairs.K.shape
         a = law_size(problem.mesh.dim, problem.sizes[c], shape[2])
-        names = problem.elasticity.names_at(response.sif[0][c].x)
+        names = materials[c]
 
         def rates_of_K(K: Floats) -> CycleRates:
             cycles = replace(pairs, K=K.reshape(shape))
@@ -567,11 +602,15 @@ def kinds_of(rule: GrowthRule, rates: Rates) -> BlockCycles | None:
     parts = []
     for c, pairs in enumerate(pairs_of(rule, problem, rates.response)):
         a = law_size(problem.mesh.dim, problem.sizes[c], pairs.K.shape[2])
-        every = rated(rule, pairs, nu, c, place, a)
+        names = problem.elasticity.names_at(rates.response.sif[0][c].x)
+        every = rated(rule, pairs, nu, c, place, a, names=names)
         parts.append((every.dK.T[None], every.R.T[None], a[None]))
-    return BlockCycles(
-        *(np.ascontiguousarray(np.concatenate(x, axis=1)) for x in zip(*parts, strict=True))
+    several = isinstance(rule.law, LawSets) or isinstance(rule.retardation, RetardationSets)
+    sets = problem.elasticity.sets_at(rates.stations.x) if several else None
+    dK, R, size = (
+        np.ascontiguousarray(np.concatenate(x, axis=1)) for x in zip(*parts, strict=True)
     )
+    return BlockCycles(dK, R, size, sets)
 
 
 __all__ = [
@@ -591,6 +630,7 @@ __all__ = [
     "pairs_of",
     "pairs_of_states",
     "rated",
+    "rates_by_law_of",
     "rates_of",
     "response_without_contact",
     "warn_of_left_out",

@@ -119,10 +119,11 @@ def grow(
         beginning, so that the path is of first order.
     threshold : float, stress √length
         Below this dK_eq a tip does not grow.
-    retardation : wheeler or willenborg, optional
+    retardation : wheeler or willenborg, or mapping of str to such, optional
         Of cycles after an overload: growth is then followed cycle by cycle under a `Spectrum` of
         factors, with zones kept at each tip, or place along a front. `cycles` of a step are that;
-        its `rate` stays that of the law.
+        its `rate` stays that of the law. A mapping gives each material, by the name of its cell
+        set, a model of its own.
     K_c : float, stress √length, optional
         Stop when the K_eq of any tip in any state reaches it; where it is left out, that of the
         material. The last step is made as long as that takes, to 2e-4 of K_c, with a solve at its
@@ -169,12 +170,19 @@ def grow(
         linear elasticity does not hold.
         A tolerance that is not met, with the source of the error and what to do; a mesh that would
         have more than `max_unknowns`.
+        Where a tip passes from one material into another, with the cycles.
         A turn by more than 10 degrees with an advance below the cell along the path; R < 0 asked
         of a law that depends on R. Warnings that come again in later steps are counted, and
         summarised in one when the run ends.
 
     Notes
     -----
+    Where the materials ahead of a tip differ, in stiffness or in law, a step ends before their
+    interface and the next one behind it, whatever `da`: 1.1 cells beside one at which the stiffness
+    changes, as K is off closer to it, and .3 cells where only laws do. The cycles of that step are
+    those of its two parts, each by the law of its own material. Close to another stiffness K goes
+    like a power of the distance (Zak and Williams 1963, for a crack that meets it at right angles).
+
     Cycles between two steps: `cycles_between`, with the rates at both, so a step costs one
     analysis of all load states and the life of ten steps is good to a few tenths of a per cent.
 

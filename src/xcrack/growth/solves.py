@@ -349,6 +349,7 @@ def stretch_of(
             exponent=solves.exponent,
             threshold=rule.threshold,
             blocks=blocks,
+            names=[name for name, _ in rule.problem.elasticity.named],
         )
     return Stretch(solves, start, length, rule.threshold, marched)
 

@@ -31,15 +31,40 @@ from xcrack.fatigue.retardation import BlockCycles, no_zones
 from xcrack.fatigue.spectrum import Spectrum
 from xcrack.growth.corrected import Corrected
 from xcrack.growth.gaps import UNKNOWN, part_of_time
+from xcrack.growth.interfaces import (
+    InterfacesAhead,
+    cycles_of_jump,
+    interfaces_ahead,
+    mixed,
+    passage,
+    rates_behind,
+    warn_of_passages,
+)
 from xcrack.growth.options import GrowthRule
-from xcrack.growth.rates import CriterionInput, Rates, criterion_inputs, kinds_of
-from xcrack.growth.solves import Growth, SolveHistory, Stretch, halved, stretch_of
+from xcrack.growth.rates import (
+    CriterionInput,
+    Rates,
+    criterion_inputs,
+    kinds_of,
+    rates_by_law_of,
+)
+from xcrack.growth.solves import Growth, SolveHistory, Stretch, halved, rates_at, stretch_of
 from xcrack.growth.stations import GrowthStations, Identities
-from xcrack.growth.step import Plan, Step, StepControl, StepError, plan_of, solves_of
+from xcrack.growth.step import (
+    Plan,
+    Step,
+    StepControl,
+    StepError,
+    plan_of,
+    solves_of,
+)
 from xcrack.growth.step_length import first_control, longest, next_control, share_left, shortest
 from xcrack.mesh.locate import cell_sizes, contains
 from xcrack.mesh.mesh import Mesh
 
+_LONGER = np.array(
+    [1.5, 12.0, 96.0]
+)  # times a step: until ends behind interfaces are where they were
 _FASTER = 2.0  # times the last rate: what a step of prescribed cycles may reckon with
 
 # The next step of 2D cracks as the last two solves see it, up to where tips meet other cracks.
@@ -54,6 +79,9 @@ def predict(rule: GrowthRule, step: Step) -> Plan:
         return Plan.at_rest(step, cell)
     stretch, stops = _ahead(rule, step)
     growth = _growth(stations, stretch)
+    near = interfaces_ahead(rule, stations.x, growth.move)
+    if near is not None and (growth.arc > near.stop).any():
+        stretch, growth = _up_to_interfaces(rule, step, near, stretch, growth)
     row = int(np.argmax(growth.arc))
     plan = Plan(
         sigma=solves.start,
@@ -100,6 +128,38 @@ def _ahead(rule: GrowthRule, step: Step) -> tuple[Stretch, bool]:
         stretch = replace(stretch, length=stretch.length_of_cycles(rule.cycles))
     grows = stretch.growing_length()
     return replace(stretch, length=grows), grows < stretch.length
+
+
+def _up_to_interfaces(
+    rule: GrowthRule, step: Step, near: InterfacesAhead, stretch: Stretch, growth: Growth
+) -> tuple[Stretch, Growth]:
+    """A step that ends before an interface of materials, or behind it: its piece of σ, and growth.
+
+    Behind it the rates are those of the law there, at the K that is known before it.
+    """
+    stations, solves = solves_of(step)
+    own = solves.last(2)
+    goal = np.where(growth.arc > near.stop, near.goal, np.inf)
+    most, row = stretch.length, int(np.argmax(growth.arc))
+    crosses = np.isfinite(goal) & (goal > near.way)
+    after = own
+    if crosses.any():
+        rate = rates_behind(rule, step, near)
+        rate = np.where(crosses & (rate > 0), rate, own.rate[-1])
+        after = replace(own, rate=np.broadcast_to(rate, own.rate.shape))
+        if crosses[row]:  # da and cycles are shorter than the cells there
+            most = max(most, min(float(goal[row]), step.control.length))
+    done = passage(
+        rule,
+        stations.frame,
+        lambda passed: mixed(own, after, near.after, passed),
+        near,
+        goal,
+        solves.start,
+        most,
+        step.zones,
+    )
+    return replace(stretch, length=done.length), done.growth
 
 
 def _growth(stations: GrowthStations, stretch: Stretch, length: float | None = None) -> Growth:
@@ -258,7 +318,7 @@ def first_solves(rule: GrowthRule, rates: Rates) -> SolveHistory:
     kinds = kinds_of(rule, rates)
     if kinds is not None:  # behind a kink scaled as the range
         grown = np.divide(dK_eq, rates.dK_eq, out=np.ones_like(dK_eq), where=rates.dK_eq > 0)
-        kinds = BlockCycles(kinds.dK * grown[None, :, None], kinds.R, kinds.a)
+        kinds = replace(kinds, dK=kinds.dK * grown[None, :, None])
     return SolveHistory(
         sigma=np.zeros(1),
         rate=rate[None],
@@ -360,7 +420,105 @@ def correct(rule: GrowthRule, last: Step, rates: Rates, identities: Identities) 
         return _without_lost_tips(rule, last, rates, identities, rows)
     if np.isinf(rates.rate).any():
         return _broken(last, rates, identities)
+    near = interfaces_ahead(rule, solves_of(last)[0].x, plan.move)
+    if near is not None and (plan.arc > near.way).any():
+        return _passed(rule, last, rates, identities, near)
     return _corrected(rule, last, rates, identities)
+
+
+def _passed(
+    rule: GrowthRule, last: Step, rates: Rates, identities: Identities, near: InterfacesAhead
+) -> Corrected:
+    """A step in which tips have passed into other materials: each part counts by its own law.
+
+    Where only the laws differ, K is known on both sides, and is a power of the length between.
+    Where K jumps, it is prolonged up to the interface, and is that of its end behind.
+    """
+    plan, error = plan_of(last), _error(last)
+    stations, old = solves_of(last)
+    crosses = plan.arc > near.way
+    kinds = kinds_of(rule, rates)
+    begin = old.last(1)
+    now = begin.with_solve(
+        plan.end, rates.law_rate, rates.dK_eq, rates.direction, rates.exponent(rule.law), kinds
+    )
+    jumps = crosses & ~near.is_smooth
+    here = np.where(jumps, rates_at(old.last(2), np.array([plan.end]))[0], rates.law_rate)
+    there = np.where(jumps, rates.law_rate, begin.rate[0])
+    smooth = crosses & near.is_smooth
+    if smooth.any():
+        sets = np.where(smooth, near.before, near.after)
+        before = rates_by_law_of(rule, rates.problem, rates.response, sets)
+        here = np.where(smooth, before, here)
+        there = np.where(smooth, rates_behind(rule, last, near), there)
+    own = old.with_solve(
+        plan.end, here, rates.dK_eq, rates.direction, rates.exponent(rule.law), kinds
+    )
+    after = replace(now, rate=np.stack([there, rates.law_rate]))
+    if jumps.any():
+        own = replace(own, dK_eq=np.where(jumps, begin.dK_eq[0], own.dK_eq))
+        after = replace(after, dK_eq=np.where(jumps, rates.dK_eq, after.dK_eq))
+        own, after = _with_jumps(own, jumps, -2), _with_jumps(after, jumps, -1)
+    if own.kinds is not None and begin.kinds is not None:
+        own = replace(own, kinds=replace(own.kinds, sets=begin.kinds.sets))
+    stands = crosses & ~(rates.rate > 0)  # nothing grows behind: the run ends there
+    after = replace(after, rate=np.where(stands, own.rate[-2:], after.rate))
+    goal = np.where(crosses, plan.arc, np.inf)
+
+    def solves_in(passed: Bools) -> SolveHistory:
+        return mixed(own.last(2), after, near.after, passed) if passed.any() else own
+
+    for most in _LONGER * plan.length:
+        done = passage(
+            rule,
+            rates.stations.frame,
+            solves_in,
+            near,
+            goal,
+            plan.sigma,
+            most,
+            last.zones,
+        )
+        if (done.growth.arc >= goal * (1 - 1e-9)).any():
+            break
+    cycles, cycles_at = done.growth.cycles, np.array(done.cycles_at)
+    row = int(np.argmax(np.where(jumps, plan.arc, -1.0)))
+    if jumps[row] and last.zones is None and rates.rate[row] > 0:
+        behind = float(plan.arc[row] - near.way[row])
+        first, second = cycles_of_jump(
+            old, own.exponent, float(rates.law_rate[row]), row, float(near.way[row]), behind,
+            float(near.power[row]),
+        )  # fmt: skip
+        cycles, cycles_at[row] = first + second, first
+    warn_of_passages(rule, last, near, cycles_at)
+    after_it = _stations(
+        rates.cracks, identities, stations.x + plan.move, stations.fresh | plan.moves
+    )
+    goes_on = not jumps.any() and plan.sigma > 0 and bool((crosses | (rates.rate == 0)).all())
+    solves = replace(after, kinds=now.kinds) if goes_on else first_solves(rule, rates)
+    own_error = share_left(rule) * abs(cycles - plan.cycles) + plan.error
+    own_error += solves.exponent * error.behind * cycles
+    return Corrected(
+        last.cycles + cycles,
+        rates.cracks,
+        after_it,
+        solves,
+        StepError(error.place, error.cycles + own_error, behind=error.behind),
+        last.control if goes_on else _first(rule, after_it, solves, rates),
+        done.zones,
+    )
+
+
+def _with_jumps(solves: SolveHistory, jumps: Bools, k: int) -> SolveHistory:
+    """The same where the cycles of a block at some tips are those of one of its solves."""
+    kinds = solves.kinds
+    if kinds is None:
+        return solves
+    dK, R, a = (
+        np.where(jumps.reshape(1, -1, *[1] * (part.ndim - 2)), part[[k]], part)
+        for part in kinds.arrays
+    )
+    return replace(solves, kinds=BlockCycles(dK, R, a, kinds.sets))
 
 
 def _corrected(rule: GrowthRule, last: Step, rates: Rates, identities: Identities) -> Corrected:
@@ -459,6 +617,8 @@ def _cycles(
     alone = own = share_left(rule) * abs(growth.cycles - line)
     if old.n_solves > 2:
         return growth.cycles, *_better_known(rule, last, solves, own)
+    if old.sigma[0] > 0:  # the step before has passed an interface
+        return growth.cycles, own, alone
     # The second step: the parabola tells what the first one, along a line, was off.
     span, first = float(old.sigma[1] - old.sigma[0]), float(old.sigma[0])
     line, curve, constant = (

@@ -266,6 +266,16 @@ class Elasticity:
             return material.at_tip()
         return self._isotropic(int(cells[0]), x)
 
+    def isotropic_at(self, x: Floats) -> Isotropic:
+        """The isotropic material at a point `(d,)`.
+
+        Raises
+        ------
+        ProblemError
+            It is not isotropic.
+        """
+        return self._isotropic(int(cells_at(self.mesh, x[None])[0]), x)
+
     def _isotropic(self, cell: int, x: Floats) -> Isotropic:
         """The isotropic material at a point in a cell."""
         material = self.materials[int(self.number[cell]) if len(self.number) else 0]

@@ -70,10 +70,10 @@ def march_places(  # type: ignore[no-untyped-def]
         Of that root.
     share : (k, n, p) array
         ΔK_th / ΔK.
-    zone : float, length / K²
+    zone : (n,) array, length / K²
     model : int
         0: none, 1: Wheeler, 2: Willenborg.
-    w, shutoff : float
+    w, shutoff : (n,) arrays
     since, size, over : (n,) arrays
         Growth since the overload, its zone and K; changed.
     position : int
@@ -113,7 +113,7 @@ def march_places(  # type: ignore[no-untyped-def]
                 at = weight[row, k, i] + x * (weight[row + 1, k, i] - weight[row, k, i])
                 K += at * K_max[k, i, kind]
             K = max(K, 0.0)
-            zone_size = zone * K * K
+            zone_size = zone[i] * K * K
             if model > 0 and since[i] + zone_size >= size[i]:
                 since[i], size[i], over[i] = 0.0, zone_size, K
             low, between = 0, 0.0
@@ -122,7 +122,7 @@ def march_places(  # type: ignore[no-untyped-def]
                 for k in range(K_max.shape[0]):
                     at = weight[row, k, i] + x * (weight[row + 1, k, i] - weight[row, k, i])
                     threshold += at * share[k, i, kind]
-                phi = max(0.0, 1.0 - threshold) / (shutoff - 1.0)
+                phi = max(0.0, 1.0 - threshold) / (shutoff[i] - 1.0)
                 reduction = phi * (over[i] * np.sqrt(1.0 - since[i] / size[i]) - K)
                 place = min(max(reduction / K, 0.0), 1.0) * (n_shifts - 1)
                 low = min(int(place), n_shifts - 2)
@@ -134,7 +134,7 @@ def march_places(  # type: ignore[no-untyped-def]
                 )
                 rate += between * (other - rate)
             if model == 1 and since[i] + zone_size < size[i]:
-                rate *= (zone_size / (size[i] - since[i])) ** w
+                rate *= (zone_size / (size[i] - since[i])) ** w[i]
             growth[i] = rate
             largest = max(largest, rate)
         remaining = min(1.0 - part, most - elapsed)

@@ -1,0 +1,433 @@
+"""Ends that come to an interface of materials: steps end before it, and go on behind it.
+
+K of a tip that is nearer to another material than a cell is off by more than a per cent, and there
+is none on the interface. The last step before it ends a cell away; the next one passes, and ends
+a cell behind. Its cycles are those of both parts, each by the law of the material it runs in.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from xcrack.base.arrays import Bools, Floats, Ints, coordinates
+from xcrack.base.description import describe
+from xcrack.base.errors import ProblemError, collected_warnings, warn
+from xcrack.fatigue.cycle import cycles_between
+from xcrack.fatigue.law_sets import LawSets
+from xcrack.fatigue.retardation import BlockCycles, OverloadZones, RetardationSets
+from xcrack.growth.options import GrowthRule
+from xcrack.growth.rates import rates_by_law_of
+from xcrack.growth.response import Response
+from xcrack.growth.solves import Growth, SolveHistory, Stretch, halved, stretch_of
+from xcrack.growth.step import Step, plan_of, solves_of
+from xcrack.growth.uncertainty import best_K
+from xcrack.mesh.locate import cell_sizes
+from xcrack.model.elasticity import Elasticity
+from xcrack.model.material import Isotropic
+
+# Cells between an interface and the end of a step before or behind it: where K jumps, and where the
+# laws differ alone.
+_GAPS = (1.1, 0.3)
+_SOON = 0.25  # cells: a step that would be shorter passes at once
+_LEAST = 0.05  # cells: a shorter piece of a way is the corner of a set, not a layer
+_SPLITS = 60  # of a bisection: to the last bit
+
+
+@dataclass(frozen=True, eq=False)
+class InterfacesAhead:
+    """Interfaces on the ways of n ends.
+
+    Attributes
+    ----------
+    way : (n,) array, length
+        To the first one; inf where there is none.
+    behind : (n,) array, length
+        From there to where a step behind it ends.
+    before, after : (n,) array of int
+        Numbers of the sets on both sides.
+    is_smooth : (n,) array of bool
+        The materials differ in their laws alone: K does not feel the interface.
+    cell, gap : (n,) arrays, length
+        Size of the cells there, and from the interface to the ends of steps beside it.
+    power : (n,) array
+        K close to the interface goes like this power of the distance to it, on both sides.
+    """
+
+    way: Floats
+    behind: Floats
+    before: Ints
+    after: Ints
+    is_smooth: Bools
+    cell: Floats
+    gap: Floats
+    power: Floats
+
+    @property
+    def stop(self) -> Floats:
+        """Way to where the last step before the interface ends `(n,)`, length; inf without one."""
+        return np.where(np.isfinite(self.way), self.way - self.gap, np.inf)
+
+    @property
+    def goal(self) -> Floats:
+        """Way to where the next step ends at the latest `(n,)`, length; inf without an interface.
+
+        Before it, and behind where that is too short a step.
+        """
+        return np.where(self.stop < _SOON * self.cell, self.way + self.behind, self.stop)
+
+
+def interfaces_ahead(rule: GrowthRule, x: Floats, move: Floats) -> InterfacesAhead | None:
+    """Interfaces on the ways of ends, and a little beyond; None where there are none.
+
+    Parameters
+    ----------
+    rule : GrowthRule
+    x : (n, 2) array, length
+        Where the ends are.
+    move : (n, 2) array, length
+        How far they would come.
+    """
+    elasticity = rule.problem.elasticity
+    if len(elasticity.named) < 2 or x.shape[1] != 2:
+        return None
+    mesh, kinds = rule.problem.mesh, _kinds(rule)
+    one, other = mesh.facet_to_cell.T
+    of_cell = kinds[elasticity.set_number]
+    facets = mesh.facets[(other >= 0) & (of_cell[one] != of_cell[other])]
+    length = np.linalg.norm(move, axis=1)
+    if not len(facets) or not length.any():
+        return None
+    n, number = len(x), _numbers_of_sets(rule)
+    way, behind, gap, power = np.full(n, np.inf), np.full(n, np.inf), np.zeros(n), np.zeros(n)
+    before = np.array(elasticity.sets_at(x))
+    after, cell, is_smooth = np.array(before), cell_sizes(mesh, x), np.zeros(n, dtype=bool)
+    by_K = getattr(rule.law, "ratio", None) != "nominal"
+    for i in np.nonzero(length > 0)[0].tolist():
+        ahead = move[i] / length[i]
+        most = length[i] + 3 * _GAPS[0] * cell[i]
+        hits = _hits(mesh.points[facets], x[i], ahead, most)
+        ends = np.concatenate([[0.0], hits, [most]])
+        middle = x[i] + 0.5 * (ends[1:] + ends[:-1])[:, None] * ahead
+        sets = elasticity.sets_at(middle)
+        is_long = np.diff(ends) > _LEAST * cell[i]
+        begins, sets = ends[:-1][is_long], sets[is_long]
+        changes = np.nonzero(kinds[sets[1:]] != kinds[sets[:-1]])[0] + 1
+        if not len(changes):
+            continue
+        first = int(changes[0])
+        way[i], before[i], after[i] = begins[first], sets[first - 1], sets[first]
+        is_smooth[i] = by_K and number[before[i]] == number[after[i]]
+        place = x[i] + (way[i] + _LEAST * cell[i]) * ahead
+        cell[i] = float(cell_sizes(mesh, place[None])[0])
+        gap[i] = _GAPS[int(is_smooth[i])] * cell[i]
+        room = begins[int(changes[1])] - way[i] if len(changes) > 1 else np.inf
+        behind[i] = min(gap[i], 0.5 * room)
+        if number[before[i]] != number[after[i]]:
+            beside = [x[i] + (way[i] + k * _LEAST * cell[i]) * ahead for k in (-1, 1)]
+            power[i] = _power_of_K(elasticity, *beside)
+    if np.isinf(way).all():
+        return None
+    return InterfacesAhead(way, behind, before, after, is_smooth, cell, gap, power)
+
+
+def _numbers_of_sets(rule: GrowthRule) -> Ints:
+    """Number of the stiffness of each named set `(m,)`."""
+    elasticity = rule.problem.elasticity
+    if not len(elasticity.number):
+        return np.zeros(len(elasticity.named), dtype=np.int64)
+    first = [int(np.argmax(elasticity.set_number == k)) for k in range(len(elasticity.named))]
+    return elasticity.number[first]
+
+
+def _kinds(rule: GrowthRule) -> Ints:
+    """Which of the named sets are alike in stiffness and law `(m,)`: equal numbers."""
+    number, names = _numbers_of_sets(rule), [name for name, _ in rule.problem.elasticity.named]
+    own = [""] * len(names)
+    if isinstance(rule.law, LawSets):
+        laws = dict(rule.law.laws)
+        own = [str(describe("law", laws[name])) for name in names]
+    if isinstance(rule.retardation, RetardationSets):
+        models = dict(rule.retardation.models)
+        own = [words + str(models[name]) for words, name in zip(own, names, strict=True)]
+    every = list(zip(number.tolist(), own, strict=True))
+    return np.array([every.index(each) for each in every], dtype=np.int64)
+
+
+def _hits(facets: Floats, x: Floats, ahead: Floats, most: float) -> Floats:
+    """Lengths at which a straight way passes facets `(k, 2, 2)`, rising."""
+    start, side = facets[:, 0], facets[:, 1] - facets[:, 0]
+    gap, cross = start - x, ahead[0] * side[:, 1] - ahead[1] * side[:, 0]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        far = (gap[:, 0] * side[:, 1] - gap[:, 1] * side[:, 0]) / cross
+        share = (gap[:, 0] * ahead[1] - gap[:, 1] * ahead[0]) / cross
+    hit = (cross != 0) & (share >= -1e-9) & (share <= 1 + 1e-9) & (far > 0) & (far < most)
+    return np.unique(far[hit])
+
+
+def _power_of_K(elasticity: Elasticity, before: Floats, behind: Floats) -> float:
+    """Power of the distance to an interface that K goes like: above 0 before a stiffer material."""
+    try:
+        own, other = elasticity.isotropic_at(before), elasticity.isotropic_at(behind)
+    except ProblemError:  # not isotropic
+        return 0.0
+    return 0.5 - singularity_at_interface(own, other)
+
+
+def singularity_at_interface(own: Isotropic, other: Isotropic) -> float:
+    """Order λ of the stresses r^-λ at a tip on an interface, which its crack meets at right angles.
+
+    Parameters
+    ----------
+    own, other : Isotropic
+        Materials of the crack, and ahead of it.
+
+    Notes
+    -----
+    cos λπ = 2 (β - α) / (1 + β) (1 - λ)² + (α + β²) / (1 - β²) with the parameters of Dundurs,
+    α > 0 where the material ahead is stiffer (Zak and Williams 1963, J. Appl. Mech. 30, 142; as in
+    He and Hutchinson 1989, Int. J. Solids Struct. 25, 1053).
+
+    Examples
+    --------
+    >>> from xcrack.model.material import Isotropic
+    >>> steel = Isotropic(210e3, 0.3, "strain")
+    >>> round(singularity_at_interface(steel, steel), 6)
+    0.5
+    """
+    alpha = (other.E_prime - own.E_prime) / (other.E_prime + own.E_prime)
+    beta = (other.mu * (own.kolosov - 1) - own.mu * (other.kolosov - 1)) / (
+        other.mu * (own.kolosov + 1) + own.mu * (other.kolosov + 1)
+    )
+
+    def above(order: float) -> bool:
+        right = 2 * (beta - alpha) / (1 + beta) * (1 - order) ** 2
+        right += (alpha + beta**2) / (1 - beta**2)
+        return bool(np.cos(np.pi * order) > right)
+
+    return sum(halved(above, 1.0)) / 2
+
+
+# A step that ends before an interface, or passes.
+
+
+@dataclass(frozen=True, eq=False)
+class Passage:
+    """What happens until the first of some ends is where its step ends.
+
+    Attributes
+    ----------
+    length : float, length
+        Of σ.
+    growth : Growth
+    cycles_at : (n,) array
+        Cycles at which ends were on their interface; nan where they were not.
+    zones : OverloadZones, optional
+        What overloads have left then.
+    """
+
+    length: float
+    growth: Growth
+    cycles_at: Floats
+    zones: OverloadZones | None
+
+
+def passage(
+    rule: GrowthRule,
+    frame: Floats,
+    solves_in: Callable[[Bools], SolveHistory],
+    near: InterfacesAhead,
+    goal: Floats,
+    start: float,
+    most: float,
+    zones: OverloadZones | None,
+) -> Passage:
+    """Let ends grow, through their interfaces, until the first of them has come as far as wanted.
+
+    Parameters
+    ----------
+    rule : GrowthRule
+    frame : (n, 2, 2) array
+        Of the ends.
+    solves_in : callable (n,) array of bool -> SolveHistory
+        What solves say when some ends have passed.
+    near : InterfacesAhead
+    goal : (n,) array, length
+        Way of each at which the passage ends; inf for those that do not end it.
+    start, most : float, length
+        Of σ: where it begins, and its longest piece.
+    zones : OverloadZones, optional
+        Left at the begin.
+    """
+    n = len(goal)
+    passed, done = np.zeros(n, dtype=bool), np.zeros(n)
+    cycles_at, move, total, cycles = np.full(n, np.nan), np.zeros((n, 2)), 0.0, 0.0
+    while total < most * (1 - 1e-12):
+        solves = solves_in(passed)
+        piece = stretch_of(rule, solves, start + total, most - total, zones)
+        crosses = (goal > near.way) & ~passed
+        length, row = _first(piece, np.where(crosses, near.way, goal) - done)
+        if length < most - total:
+            piece = stretch_of(rule, solves, start + total, length, zones)
+        growth = piece.growth(frame, solves.angles(frame))
+        move, done = move + growth.move, done + growth.arc
+        cycles, total = cycles + growth.cycles, total + length
+        zones = piece.zones
+        if row < 0 or not crosses[row]:
+            break
+        passed[row], done[row], cycles_at[row] = True, near.way[row], cycles
+    return Passage(total, Growth(move, done, cycles), cycles_at, zones)
+
+
+def _first(piece: Stretch, target: Floats) -> tuple[float, int]:
+    """Part of a piece of σ until the first end is where it should be, and which; -1 where none."""
+    length, first = piece.length, -1
+    for row in np.nonzero(piece.arcs()[0] >= target)[0].tolist():
+
+        def before(part: float, row: int = row) -> bool:
+            return bool(piece.arcs(part)[0][row] < target[row])
+
+        part = halved(before, length, _SPLITS)[1]
+        if part < length or first < 0:
+            length, first = part, row
+    return length, first
+
+
+def mixed(own: SolveHistory, after: SolveHistory, sets: Ints, passed: Bools) -> SolveHistory:
+    """What solves say of ends of which some have passed into another set.
+
+    Parameters
+    ----------
+    own, after : SolveHistory
+        Before and behind the interfaces.
+    sets : (n,) array of int
+        Behind.
+    passed : (n,) array of bool
+    """
+    kinds = own.kinds
+    if kinds is not None and after.kinds is not None:
+        dK, R, a = (
+            np.where(passed.reshape(1, -1, *[1] * (two.ndim - 2)), two, one)
+            for one, two in zip(kinds.arrays, after.kinds.arrays, strict=True)
+        )
+        if kinds.sets is not None:
+            sets = np.where(passed, sets, kinds.sets)
+        kinds = BlockCycles(dK, R, a, sets)
+    return replace(
+        own,
+        rate=np.where(passed, after.rate, own.rate),
+        dK_eq=np.where(passed, after.dK_eq, own.dK_eq),
+        kinds=kinds,
+    )
+
+
+_MOST_POWER = 0.9  # of the distance, in a rate: from 1 on a crack would take for ever to pass
+_X, _W = np.polynomial.legendre.leggauss(24)
+
+
+def cycles_of_jump(
+    old: SolveHistory,
+    exponent: float,
+    rate: float,
+    row: int,
+    way: float,
+    behind: float,
+    power: float,
+) -> tuple[float, float]:
+    """Cycles of an end up to an interface at which K jumps, and from there to its place behind.
+
+    Parameters
+    ----------
+    old : SolveHistory
+        Before it.
+    exponent : float
+        Of the law behind.
+    rate : float, length/cycle
+        At the place behind.
+    row : int
+        Of the end.
+    way, behind : float, length
+        From the last solve to the interface, and from there.
+    power : float
+        As of `InterfacesAhead`.
+
+    Notes
+    -----
+    The rate is a power of the distance to the interface times one of the size of the crack. That
+    of the size follows from the last two solves before it, on both sides.
+    """
+    known, scale = old.last(2), float(old.scale[row])
+    size = scale + known.sigma
+    before, after = (
+        float(np.clip(power * m, -_MOST_POWER, _MOST_POWER)) for m in (old.exponent, exponent)
+    )
+    distance = way + known.sigma[-1] - known.sigma
+    regular = known.rate[:, row] / distance**before
+    growth = 0.0
+    if len(size) > 1 and regular.min() > 0:
+        growth = float(np.log(regular[-1] / regular[0]) / np.log(size[-1] / size[0]))
+    there = size[-1] + way
+
+    def time(length: float, at_end: float, power: float, side: float) -> float:
+        # With u = (distance / length)^(1 - power) the power of the distance is gone.
+        distance = length * (0.5 * (_X + 1)) ** (1 / (1 - power))
+        factor = ((there + side * length) / (there + side * distance)) ** growth
+        return float(length / (at_end * (1 - power)) * (0.5 * _W @ factor))
+
+    first = time(way, float(known.rate[-1, row]), before, -1.0)
+    return first, time(behind, rate, after, 1.0)
+
+
+def rates_behind(rule: GrowthRule, step: Step, near: InterfacesAhead) -> Floats:
+    """Rates `(n,)` of the last solve by the laws of the materials behind interfaces."""
+    if getattr(rule.law, "ratio", None) == "nominal":  # K without contact is not known any more
+        return solves_of(step)[1].rate[-1]
+    response = Response(step.levels or rule.cycle.load_states, best_K(step.sif))
+    problem = replace(rule.problem, cracks=step.cracks)
+    with collected_warnings([]):  # they were given at the solve
+        return rates_by_law_of(rule, problem, response, near.after)
+
+
+def cycles_across(size: float, way: float, behind: float, own: Floats, after: Floats) -> Floats:
+    """Cycles of an end before an interface at which only laws differ, and behind it `(2,)`.
+
+    Parameters
+    ----------
+    size : float, length
+        Of the crack at first.
+    way, behind : float, length
+        To the interface, and from there.
+    own, after : (2,) arrays, length/cycle
+        Rates at both ends of the step by the law before, and by that behind.
+    """
+    ends = size + np.array([0.0, way, way + behind])
+    share = np.log(ends[1] / size) / np.log(ends[2] / size)
+    there = [rate[0] * (rate[1] / rate[0]) ** share for rate in (own, after)]
+    return cycles_between(ends[:2], ends[1:], [own[0], there[1]], [there[0], after[1]])
+
+
+def warn_of_passages(rule: GrowthRule, last: Step, near: InterfacesAhead, cycles: Floats) -> None:
+    """Say where ends pass interfaces, `cycles` `(n,)` after a step; nan where they do not."""
+    stations, move = solves_of(last)[0], plan_of(last).move
+    names = [name for name, _ in rule.problem.elasticity.named]
+    for row in np.nonzero(np.isfinite(cycles))[0].tolist():
+        name = last.end_name(int(stations.crack[row]), int(stations.front[row]))
+        x = stations.x[row] + near.way[row] * move[row] / np.linalg.norm(move[row])
+        warn(
+            f"{name} passes from {names[near.before[row]]!r} into {names[near.after[row]]!r} at "
+            f"{coordinates(x.tolist())}, N = {last.cycles + float(cycles[row]):.6g}"
+        )
+
+
+__all__ = [
+    "InterfacesAhead",
+    "Passage",
+    "cycles_across",
+    "cycles_of_jump",
+    "interfaces_ahead",
+    "mixed",
+    "passage",
+    "rates_behind",
+    "singularity_at_interface",
+    "warn_of_passages",
+]
