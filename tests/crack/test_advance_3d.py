@@ -17,6 +17,7 @@ from xcrack.fatigue.cycle import cycles_between
 from xcrack.growth.euler import elapsed_3d
 from xcrack.growth.fronts import interpolate_along_front
 from xcrack.mesh.box import box
+from xcrack.mesh.locate import Body
 from xcrack.mesh.triangulation import face_areas, face_normals, loops, oriented_faces, side_keys
 
 
@@ -515,14 +516,14 @@ def test_normals_agree_with_the_frames():
 def test_growth_in_a_body_until_the_front_has_left_it():
     """Placed again after each step: a closed front opens, splits at the faces, and is gone."""
     mesh = box((-1, -1, -1), (1, 1, 1), 12)
-    size = 0.6 * float(mesh.cell_size.min())
+    body, size = Body.of(mesh), 0.6 * float(mesh.cell_size.min())
     crack = place_surface(penny_crack((0.1, 0.2, 0.03), (0, 0, 1), 0.5), mesh)
     kinds, area = [], []
     while crack.fronts and len(kinds) < 12:
         frames = front_frames(crack)
         s = np.concatenate([f.s for f in frames])
         number = np.repeat(np.arange(len(frames)), [len(f.s) for f in frames])
-        moved = advance_fronts(crack, s, number, 0 * s, np.full(len(s), 0.1), size)
+        moved = advance_fronts(crack, s, number, 0 * s, np.full(len(s), 0.1), size, body)
         check(moved, crack)
         crack = place_surface(moved, mesh)
         assert np.array_equal(crack.points[: len(moved.points)], moved.points)

@@ -8,6 +8,13 @@ from numpy.typing import ArrayLike
 from xcrack.base.arrays import Bools, Floats, Ints
 from xcrack.base.checks import value_text
 from xcrack.base.errors import GeometryError, warn
+from xcrack.crack.advance_in_body import (
+    Rays,
+    has_way_to_hole,
+    joined_front,
+    must_be_free,
+    rays_in_body,
+)
 from xcrack.crack.crack import Crack
 from xcrack.crack.front_chain import (
     FrontChain,
@@ -23,7 +30,10 @@ from xcrack.crack.front_chain import (
 )
 from xcrack.crack.front_curve import front_curve
 from xcrack.crack.fronts import Front, front_frames, steps
+from xcrack.crack.merging import through_holes
 from xcrack.mesh.distances import first_crossing, surface_distance, triangle_tree
+from xcrack.mesh.locate import Body
+from xcrack.mesh.triangulation import rim, sides
 
 LOW, HIGH = 0.5, 1.5  # bounds of the spacing of front points, in sizes
 _LEAST = 0.02  # of the size, and at most a tenth of the largest: a smaller advance is ignored
@@ -35,7 +45,13 @@ _AHEAD = 0.6  # of the size: half as far from this place ahead of a front no cra
 
 
 def advance_fronts(
-    crack: Crack, s: ArrayLike, front: ArrayLike, angle: ArrayLike, da: ArrayLike, size: float
+    crack: Crack,
+    s: ArrayLike,
+    front: ArrayLike,
+    angle: ArrayLike,
+    da: ArrayLike,
+    size: float,
+    body: Body | None = None,
 ) -> Crack:
     """Let the fronts of a placed 3D crack advance.
 
@@ -44,6 +60,11 @@ def advance_fronts(
     places as monotone cubics, around closed fronts periodically; beyond the first and last place
     of an open front they are constant. The new front is faired (see `front_chain.faired_front`),
     its points are merged and split so that they lie between 0.5 and 1.5 sizes apart.
+
+    In a body, what comes to a hole goes into it and no farther, and from then on ends of open
+    fronts are led out of the body anew, fronts on both sides of a hole advance as one that runs on
+    across it, and two fronts of one crack that meet stop a short way before (`placing_3d` joins
+    them).
 
     Parameters
     ----------
@@ -60,13 +81,15 @@ def advance_fronts(
         below a fiftieth of `size` (or a tenth of the largest one, if that is less) are none.
     size : float, length
         Spacing of the points of the new front, about half a cell to a cell.
+    body : Body, optional
+        That the crack lies in; without it the crack grows as in an unbounded one.
 
     Returns
     -------
     Crack
         The old points and faces come first and are unchanged to the last bit; `fronts` hold the
-        new ones, in the same order and direction. Not yet placed again: parts of the fronts may
-        lie outside the body.
+        new ones, in the same order and direction, one for those on both sides of a hole. Not yet
+        placed again: parts of the fronts may lie outside the body.
 
     Raises
     ------
@@ -82,23 +105,71 @@ def advance_fronts(
     s, angle, da = (np.asarray(v, dtype=float) for v in (s, angle, da))
     number = np.asarray(front, dtype=np.int64)
     _check(crack, s, number, angle, da, size)
+    fronts = front_frames(crack)
+    alone = [((k,), front.closed) for k, front in enumerate(fronts)]
+    chains = through_holes(crack, fronts, body) if body is not None else alone
+    sent, wholes = [], []
+    for members, goes_round in chains:
+        old, begins = joined_front([fronts[k] for k in members], goes_round)
+        own = np.isin(number, members)
+        shift = np.zeros(len(fronts))
+        shift[list(members)] = begins
+        wholes.append(old)
+        place = s[own] + shift[number[own]]
+        sent.append(_advanced_points(old, place, angle[own], da[own], size))
+    meets = np.zeros((0, 3))
+    if body is not None and chains == alone and not has_way_to_hole(sent, body):
+        body = None  # no hole is near: the way of any front
+    if body is not None:
+        sent, meets = rays_in_body(sent, size, body)
     n_points = len(crack.points)
-    points, faces, fronts, strips = [crack.points], [crack.faces], [], []
-    for k, old in enumerate(front_frames(crack)):
-        is_on_front = number == k
-        new = _strip(old, s[is_on_front], angle[is_on_front], da[is_on_front], size, n_points)
-        if new is None:
-            fronts.append((crack.fronts or ())[k])
+    points, faces = [crack.points], [crack.faces]
+    lines: list[Ints] = []
+    strips: list[tuple[int, AdvanceStrip]] = []
+    for (members, _), old, rays in zip(chains, wholes, sent):
+        if rays is None or rays[0].still.all():
+            lines.extend((crack.fronts or ())[k] for k in members)
             continue
+        path = float(np.linalg.norm(rays[0].stop - rays[0].start, axis=1).max())
+        longest = float(da[number == members[0]].max()) if body is None else path
+        new = _strip(old, rays, longest, size, n_points, body)
         points.append(new.points)
         faces.append(new.faces)
-        fronts.append(new.front)
-        strips.append((k, new))
+        parts = [new.front] if len(members) == 1 else _parts(new.front, crack)
+        strips.extend((len(lines) + k, new) for k in range(len(parts)))
+        lines.extend(parts)
         n_points += len(new.points)
-    grown = Crack(np.concatenate(points), np.concatenate(faces), None, tuple(fronts))
+    grown = Crack(np.concatenate(points), np.concatenate(faces), None, tuple(lines))
+    if body is not None:
+        _check_folds(grown)
     for k, new in strips:
-        _check_free(crack, grown, k, new, size)
+        _check_free(crack, grown, k, new, size, body, meets)
     return grown
+
+
+def _check_folds(crack: Crack) -> None:
+    """Raise where faces lie on each other, so that they share a side in one direction."""
+    pairs, count = np.unique(sides(crack.faces).reshape(-1, 2), axis=0, return_counts=True)
+    if (count > 1).any():
+        raise GeometryError(
+            f"the front that has come to {_at(crack.points[pairs[count > 1][0]])} folds: its ends "
+            "outside the body run into faces that lie there. Take a smaller da."
+        )
+
+
+def _parts(line: Ints, crack: Crack) -> list[Ints]:
+    """A new front cut where it would run on from one old front to another that both stay."""
+    outline = {(int(b), int(a)) for a, b in rim(crack.faces)[0]}
+    old, n = line < len(crack.points), len(line) - 1
+    cuts = [
+        k for k in range(n)
+        if old[k] and old[k + 1] and (int(line[k]), int(line[k + 1])) not in outline
+    ]  # fmt: skip
+    if cuts and line[0] == line[-1]:
+        line = np.append(np.roll(line[:-1], -1 - cuts[0]), line[cuts[0] + 1])[:-1]
+        cuts = [k - cuts[0] - 1 for k in cuts[1:]]
+    ends = [0, *(k + 1 for k in cuts), len(line)]
+    return [line[a:b] for a, b in zip(ends, ends[1:]) if b - a > 1]
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,21 +210,16 @@ def _check(crack: Crack, s: Floats, front: Ints, angle: Floats, da: Floats, size
 
 
 def _strip(
-    old: Front, s: Floats, angle: Floats, da: Floats, size: float, n_points: int
-) -> AdvanceStrip | None:
-    """New points and faces ahead of one front; None where it stays."""
-    if not len(s) or da.max() == 0:
-        return None
-    sent = _advanced_points(old, s, angle, da, size)
-    if sent is None:
-        return None
+    old: Front, sent: Rays, longest: float, size: float, n_points: int, body: Body | None
+) -> AdvanceStrip:
+    """New points and faces ahead of one front."""
     rays, vertex, normal = sent
     front = without_loops(rays)
     if len(front.x) < 3 and old.closed:
         raise _closes(old)
     # A wave along the front is damped, beyond da of a few sides turned over, by the growth itself:
     # K is larger where the front lags behind. What longer steps overshoot more passes take away.
-    smooth = faired_front(front, int(np.clip(np.ceil(_PASSES * da.max() / size), 1, 8)))
+    smooth = faired_front(front, int(np.clip(np.ceil(_PASSES * longest / size), 1, 8)))
     before = np.linalg.norm(front.side, axis=1).sum()
     after = np.linalg.norm(smooth.side, axis=1).sum()
     if abs(after - before) > _LOST * before:
@@ -162,7 +228,7 @@ def _strip(
             f"{after:.4g}: its points zigzag. K along the front, or the advance, jumps from point "
             "to point; smooth it, or take a smaller da."
         )
-    return _joined_strip(old, rays, smooth, vertex, normal, size, n_points)
+    return _joined_strip(old, rays, smooth, vertex, normal, size, n_points, body)
 
 
 def _joined_strip(
@@ -173,15 +239,18 @@ def _joined_strip(
     normal: Floats,
     size: float,
     n_points: int,
+    body: Body | None,
 ) -> AdvanceStrip:
     """The strip to a new front whose points are merged and split, no triangle turned over.
 
     Where points that have been left out turn triangles over (a short advance of a curved front)
     they are taken back; where points that have run into each other do so, these are merged.
+    Outside the body nothing depends on it.
     """
-    needed = np.zeros(len(rays.x), dtype=bool)
+    pinned = rays.pinned[rays.owner]
+    needed = np.zeros(len(rays.owner), dtype=bool)
     while True:
-        trial = _cleared_front(_pinned_front(front, rays.pinned | needed), size)
+        trial = _cleared_front(_pinned_front(front, pinned | needed), size)
         strip, turned_sides = _stitched_strip(old, trial, vertex, normal, size, n_points)
         if not len(turned_sides):
             return strip
@@ -190,7 +259,14 @@ def _joined_strip(
         if (around & ~needed).any():
             needed |= around
             continue
-        front = without_sides(_pinned_front(trial, rays.pinned), turned_sides)
+        if body is not None:
+            inside = body.contains(trial.x)
+            turned_sides = turned_sides[
+                inside[turned_sides] | inside[(turned_sides + 1) % len(inside)]
+            ]
+            if not len(turned_sides):
+                return strip
+        front = without_sides(_pinned_front(trial, pinned), turned_sides)
         if old.closed and len(front.x) < 3:
             raise _closes(old)
         if len(front.x) == len(trial.x):
@@ -228,13 +304,14 @@ def _at(x: Floats) -> list[float]:
     return list(np.round(x.mean(axis=0), 6).tolist())
 
 
-def _advanced_points(
-    old: Front, s: Floats, angle: Floats, da: Floats, size: float
-) -> tuple[FrontChain, Ints, Floats] | None:
+def _advanced_points(old: Front, s: Floats, angle: Floats, da: Floats, size: float) -> Rays | None:
     """Where the points of a front go, which of them are its vertices, and the new normals.
 
-    Sides of the front much longer than `size` send out points from between their ends.
+    Sides of the front much longer than `size` send out points from between their ends. None where
+    the front stays.
     """
+    if not len(s) or da.max() == 0:
+        return None
     m, closed = len(old.x), old.closed
     following = np.roll(np.arange(m), -1) if closed else np.arange(1, m)
     leading = np.arange(len(following))
@@ -334,8 +411,8 @@ def _stitched_strip(
     end = np.append(begin[1:], len(line) - 1)
     faces: list[tuple[int, int, int]] = []
     turned_sides: list[int] = []
-    sides = len(vertex) if front.closed else len(vertex) - 1
-    for j in range(sides):
+    n_sides = len(vertex) if front.closed else len(vertex) - 1
+    for j in range(n_sides):
         first, last = int(vertex[j]), int(vertex[(j + 1) % len(vertex)])
         last += n_rays if last <= first else 0
         owners = front.owner[np.arange(first, last + 1) % n_rays]
@@ -363,20 +440,27 @@ def _stitched_strip(
     return strip, np.array(turned_sides, dtype=np.int64)
 
 
-def _check_free(old: Crack, grown: Crack, number: int, strip: AdvanceStrip, size: float) -> None:
-    """Raise where a front that has advanced meets another part of its crack."""
+def _check_free(
+    old: Crack, grown: Crack, number: int, strip: AdvanceStrip, size: float,
+    body: Body | None, meets: Floats,
+) -> None:  # fmt: skip
+    """Raise where a front that has advanced meets another part of its crack.
+
+    Outside the body it may, and beside the places where two fronts meet.
+    """
     new = front_frames(grown)[number]
     moved = new.number >= len(old.points)
     if not new.closed:
         moved[[0, -1]] = False  # outside the body, beside the outline of the mouth
     probe = new.x[moved] + _AHEAD * size * _frames(new)[moved, 0]
+    probe = probe[must_be_free(new.x[moved], size, body, meets)]
     phi, _, _ = surface_distance(probe, grown.points, grown.faces, _AHEAD * size)
     hit = probe[np.abs(phi) < 0.5 * _AHEAD * size]
     if not len(hit):
         path = strip.stop - strip.start
         length = np.linalg.norm(path, axis=1)
         # The faces around the start of a path are its own.
-        is_far = length > 0.5 * size
+        is_far = (length > 0.5 * size) & must_be_free(strip.stop, size, body, meets)
         start = strip.start[is_far] + path[is_far] * (0.5 * size / length[is_far])[:, None]
         stop = strip.stop[is_far]
         crossed, place = first_crossing(triangle_tree(old.points, old.faces), start, stop)

@@ -6,6 +6,7 @@ import numpy as np
 
 from xcrack.base.arrays import Bools, Floats, Ints
 from xcrack.base.errors import CoarseMeshError
+from xcrack.mesh.distances import first_crossing
 from xcrack.mesh.locate import ON, Body
 from xcrack.mesh.triangulation import face_normals, rim, ruled_strip, unit
 
@@ -16,6 +17,13 @@ _LEAST = 1.25  # cells by which an old front may still be outside
 _REACH = 12.0  # cells within which a way out of the body is sought
 _INSIDE = 4.0  # cells of the body that lie at most on this way
 _STEP = 0.125  # of a cell, in this search
+_SLOPE = (
+    0.35  # by which depth falls at least on a way to the wall of a hole: else it leads along it
+)
+_SLACK = 0.1  # of a cell, in this
+_BEFORE = 0.25  # of a facet: a wall is as far ahead of what comes to it
+_STRAIGHT = 0.8  # cosine between both parts of a front, drawn across a hole, and the way across
+_AROUND = 32  # directions in which a hole has a wall
 _MEET = 0.3  # share of a mouth that its ends may come closer to each other outside
 
 
@@ -49,6 +57,12 @@ def open_fronts(
         if runs:
             room = (len(mouth) - 1) // 2
             old = outline.candidate[mouth] & (not outline.first_time)
+            deepest = int(vertex[np.argmax(depth[vertex])])
+            if _passes_hole(x, mouth, deepest, outward, normal, old, body):
+                first, last = _across_hole(depth[vertex], size[vertex])
+                after[int(vertex[0])] = loop[vertex[1 : first + 1]]
+                before[int(vertex[-1])] = loop[vertex[last:-1]]
+                continue
             ways = (x, depth, size, outward)
             first, offset[0] = _led_out(*ways, vertex, old, room, body)
             stop, offset[-1] = _led_out(*ways, vertex[::-1], old[::-1], room, body)
@@ -91,6 +105,82 @@ def open_fronts(
         for run in runs
     ]
     return points, faces, fronts
+
+
+def is_enclosed(x: Floats, normal: Floats, body: Body) -> Bools:
+    """Which points outside a body it has all around, in planes: those in holes and cavities.
+
+    Parameters
+    ----------
+    x : (n, 3) array, length
+    normal : (n, 3) array
+        Of the plane through each.
+    body : Body
+
+    Returns
+    -------
+    (n,) array of bool
+        False for points in the body, and before walls that leave a way out, such as notches.
+    """
+    result = ~body.contains(x)
+    if result.any():
+        corner, angle = body.mesh.points, 2 * np.pi * (np.arange(_AROUND) + 0.3) / _AROUND
+        reach = float(np.linalg.norm(corner.max(axis=0) - corner.min(axis=0)))
+        least = np.eye(3)[np.argmin(np.abs(normal[result]), axis=1)]
+        one = unit(np.cross(normal[result], least))
+        other = np.cross(normal[result], one)
+        way = np.cos(angle)[:, None] * one[:, None] + np.sin(angle)[:, None] * other[:, None]
+        start = np.repeat(x[result], _AROUND, axis=0)
+        crossed, _ = first_crossing(body.boundary, start, start + reach * way.reshape(-1, 3))
+        result[result] = (crossed.reshape(-1, _AROUND) >= 0).all(axis=1)
+    return result
+
+
+def is_at_hole(x: Floats, ahead: Floats, normal: Floats, body: Body) -> bool:
+    """Whether a point of an outline lies in a hole, or comes to one on its way straight ahead."""
+    depth, size = (float(value[0]) for value in body.depth(x[None]))
+    if depth <= ON * size:
+        x = x + (_BEFORE * size - depth) * ahead
+    return bool(is_enclosed(x[None], normal[None], body)[0])
+
+
+def _passes_hole(
+    x: Floats, mouth: Ints, deepest: int, outward: Floats, normal: Floats, old: Bools, body: Body
+) -> bool:
+    """Whether a front goes on across a mouth: it did before, or is drawn straight across a hole."""
+    m = len(x)
+    if (~old).sum() > 1:
+        first, last = int(mouth[0]), int(mouth[-1] + 1) % m
+        way = unit(x[last] - x[first])
+        back, along = unit(x[first] - x[first - 1]), unit(x[(last + 1) % m] - x[last])
+        if old.any() or min(back @ way, along @ way) < _STRAIGHT:
+            return False
+    return is_at_hole(x[deepest], outward[deepest], normal[deepest], body)
+
+
+def behind_holes(points: Floats, faces: Ints, outline: TraceOutline, body: Body) -> Bools:
+    """Sides in the body, of what was front before, that have just come out of a hole `(m,)`."""
+    result = np.zeros(len(outline.loop), dtype=bool)
+    x = points[outline.loop]
+    outward, normal = _outward_directions(points, faces, outline.loop)
+    depth, size = body.depth((x + np.roll(x, -1, axis=0)) / 2)
+    for run in runs_of(~outline.inside):
+        if outline.candidate[run].all() and (depth[run] <= ON * size[run]).all():
+            k = run[np.argmax(depth[run])]
+            result[run] = is_at_hole(x[k], -outward[k], normal[k], body)
+    return result
+
+
+def _across_hole(depth: Floats, size: Floats) -> tuple[int, int]:
+    """How far the fronts on both sides of a hole go on into it along their outline.
+
+    To one side in its middle, or until they are far enough outside.
+    """
+    far = np.nonzero(depth >= 0.999 * OUTSIDE * size)[0]
+    if len(far) > 1:
+        return int(far[0]), int(far[-1])
+    first = int(np.argmax(depth[:-1] + depth[1:]))
+    return first, first + 1
 
 
 def _outward_directions(points: Floats, faces: Ints, loop: Ints) -> tuple[Floats, Floats]:
@@ -248,6 +338,41 @@ def _way_out(x: Floats, direction: Floats, size: Floats, target_depth: float, bo
     return result * size
 
 
+def way_to_middle(x: Floats, direction: Floats, size: float, body: Body) -> float:
+    """Length by which a point moves into a hole until it is two cells outside; zero: no way out.
+
+    A way goes straight to the boundary, never along it through the body, and outside no farther
+    than to where another wall is as near: a hole is divided among what comes from its walls, and
+    ways that start across them do not meet (they end at the medial axis; Blum, 1967).
+
+    Parameters
+    ----------
+    x, direction : (3,) arrays
+    size : float, length
+        Of the cells.
+    body : Body
+
+    Returns
+    -------
+    float, length
+    """
+    steps = _STEP * np.arange(int(_REACH / _STEP) + 1)
+    row = body.depth(x + (steps * size)[:, None] * direction)[0] / size
+    outside = row > ON
+    first = int(np.argmax(outside))
+    if not outside[first] or (row[:first] < row[0] + _SLOPE * steps[:first] - _SLACK).any():
+        return 0.0
+    falls = np.nonzero(row[first + 1 :] < row[first:-1] - 1e-9)[0]
+    last = first + int(falls[0]) if len(falls) else len(steps) - 1
+    deep_enough = np.nonzero(row[first : last + 1] >= OUTSIDE)[0]
+    if not len(deep_enough):
+        return float(steps[first + int(np.argmax(row[first : last + 1]))] * size)
+    j = first + int(deep_enough[0])
+    if j == 0:
+        return 0.0
+    return float((steps[j] - _STEP * (row[j] - OUTSIDE) / (row[j] - row[j - 1])) * size)
+
+
 def _push_vectors(
     x: Floats, outward: Floats, depth: Floats, size: Floats, body: Body, first_time: bool
 ) -> Floats:
@@ -287,3 +412,9 @@ def runs_of(flag: Bools) -> list[Ints]:
         place = (first + np.arange(len(flag))) % len(flag)
         result.append(place[: int(np.argmin(flag[place]))])
     return result
+
+
+def open_runs(flag: Bools) -> list[Ints]:
+    """Runs of true values that do not go round, each as its places in order."""
+    places = np.nonzero(flag)[0]
+    return [run for run in np.split(places, np.nonzero(np.diff(places) > 1)[0] + 1) if len(run)]

@@ -1,26 +1,30 @@
-"""Two cracks in 3D that lie in one surface made one: their fronts meet, and one front goes on.
+"""Fronts in 3D that meet in one surface, of two cracks or of one: one front goes on.
 
 The merged surface is the closing of both by a disc (Serra, 1982, sec. II.C): what a disc in the
-surface ahead of the fronts cannot reach without entering one of the cracks is filled. Hollow
-corners where the fronts meet are thus rounded with its radius.
+surface ahead of the fronts cannot reach without entering the crack behind one of them is filled.
+Hollow corners where the fronts meet are thus rounded with its radius.
 """
 
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from xcrack.base.arrays import Bools, Floats, Ints, at
 from xcrack.base.errors import GeometryError
-from xcrack.crack.boundary_trace import runs_of
+from xcrack.crack.boundary_trace import is_at_hole, is_enclosed, open_runs, runs_of
 from xcrack.crack.crack import Crack
 from xcrack.crack.fronts import Front, front_frames
-from xcrack.mesh.distances import TriangleTree, closest_in, triangle_tree
+from xcrack.mesh.distances import TriangleTree, closest_in, front_distance, triangle_tree
 from xcrack.mesh.locate import Body
 from xcrack.mesh.polygon import cross, ear_clipped, self_crossing, without_slivers
-from xcrack.mesh.triangulation import unit
+from xcrack.mesh.triangulation import rim, unit
 
 _ANGLE = np.cos(np.radians(20.0))  # normals of both cracks may differ by as much
 OFFSET = 0.5  # of a cell: one crack may lie as far beside the surface of the other
+_NEAR = 1.1  # cells between two fronts of a crack below which they join
+_WIDE = 2.0  # cells between two ends of fronts behind a hole below which they join
+_FACES = 0.3  # cosine between the direction ahead of a front and another one that it meets
 _LOOSE = 3.0  # radii from the end of an open front within which the other one ends too
 
 
@@ -126,26 +130,282 @@ def merged_crack(one: Crack, other: Crack, radius: float, size: float) -> Crack:
         None,
         tuple(front + n for front in other.fronts or ()),
     )
-    pair = (front_frames(one), front_frames(shifted))
+    both = Crack(shifted.points, np.concatenate([one.faces, shifted.faces]))
     trees = tuple(triangle_tree(c.points, c.faces) for c in (other, one))
-    runs = [
-        (front, run)
-        for front in pair[0]
-        for run in _runs(front, _blocked_points(front, trees[0], radius))
+
+    def blocked(tree: TriangleTree) -> Callable[[Front], Bools]:
+        return lambda front: _blocked_points(front, tree, radius)
+
+    facing = (front_frames(one), front_frames(shifted))
+    return _with_gap_closed(both, facing, (), tuple(map(blocked, trees)), radius, size)
+
+
+def through_holes(
+    crack: Crack, fronts: Sequence[Front], body: Body
+) -> list[tuple[tuple[int, ...], bool]]:
+    """Fronts that run on in each other across holes, as numbers of fronts in a row.
+
+    Parameters
+    ----------
+    crack : Crack
+        Placed. Fronts belong to each other where one ends a side of the outline before the other
+        begins, or both do outside the body, close to each other in one hole.
+    fronts : sequence of Front
+    body : Body
+
+    Returns
+    -------
+    list of (tuple of int, bool)
+        Fronts in a row, and whether the last one runs on in the first.
+    """
+    follower = {int(b): int(a) for a, b in rim(crack.faces)[0]}
+    pairs = []
+    for i, one in enumerate(fronts):
+        for j, other in enumerate(fronts):
+            if one.closed or other.closed:
+                continue
+            way = other.x[0] - one.x[-1]
+            gap = float(np.linalg.norm(way))
+            beside = follower.get(int(one.number[-1])) == int(other.number[0])
+            ahead = min(one.frame[-1, 2] @ way, other.frame[0, 2] @ way)
+            if not beside and ahead > _FACES * gap:
+                near = gap < _WIDE * float(body.cell_size(one.x[-1:])[0])
+                between = one.x[-1] + np.linspace(0.0, 1.0, 9)[:, None] * way
+                beside = near and not body.contains(between).any()
+            frame = one.frame[-1]
+            if beside and is_at_hole(one.x[-1] + way / 2, frame[0], frame[1], body):
+                pairs.append((gap, i, j))
+    following: dict[int, int] = {}
+    for _, i, j in sorted(pairs):
+        if i not in following and j not in following.values():
+            following[i] = j
+    chains, starts = [], sorted(set(range(len(fronts))) - set(following.values()))
+    remaining = set(range(len(fronts)))
+    while remaining:
+        k = starts.pop(0) if starts else min(remaining)
+        row: list[int] = []
+        while k in remaining:
+            row.append(k)
+            remaining.discard(k)
+            k = following.get(k, -1)
+        chains.append((tuple(row), fronts[row[0]].closed or k == row[0]))
+    return chains
+
+
+def joined_fronts(crack: Crack, body: Body) -> Crack | None:
+    """A crack two of whose fronts have met, with one front in their place; None where none have.
+
+    Parameters
+    ----------
+    crack : Crack
+        With fronts, such as the two on both sides of a hole that it has grown past.
+    body : Body
+
+    Returns
+    -------
+    Crack or None
+        With all points and faces as they were, and those of the gap; not yet placed again.
+
+    Raises
+    ------
+    GeometryError
+        The gap has a shape that cannot be closed.
+    """
+    fronts = front_frames(crack)
+    if not _meets_in_hole(fronts, body):
+        return None
+    rows = through_holes(crack, fronts, body)
+    follows = {pair for row, _ in rows for pair in zip(row, row[1:])}
+    follows |= {(row[-1], row[0]) for row, goes_round in rows if goes_round}
+    for i, one in enumerate(fronts):
+        for j, other in enumerate(fronts[: i + 1]):
+            pair = (one, other) if i != j else _thirds(one)
+            if pair is None or (i, j) in follows or (j, i) in follows:
+                continue
+            ends = _meeting_ends(*pair, body)
+            met = _meeting_place(*pair, body) if ends is None else ends[2]
+            if met is None:
+                continue
+            rest = [front for k, front in enumerate(fronts) if k not in (i, j)]
+            rest += [] if i != j else [_middle(one, *pair)]
+            return _join(crack, pair, rest, float(body.cell_size(met[None])[0]), body)
+    return None
+
+
+def _meets_in_hole(fronts: Sequence[Front], body: Body) -> bool:
+    """Whether one front ends in a hole near where another one, or itself, begins in it."""
+    open_ones = [front for front in fronts if not front.closed]
+    if not open_ones:
+        return False
+    first, last = (np.array([front.x[end] for front in open_ones]) for end in (0, -1))
+    gap = np.linalg.norm(last[:, None] - first[None], axis=2)
+    i, j = np.nonzero(gap < _LOOSE * body.cell_size(last)[:, None])
+    normal = np.array([front.frame[-1, 1] for front in open_ones])
+    both = is_enclosed(last[i], normal[i], body) & is_enclosed(first[j], normal[i], body)
+    return bool(both.any())
+
+
+def _thirds(front: Front) -> tuple[Front, Front] | None:
+    """What lies at both ends of an open front."""
+    first, last = (int(np.searchsorted(front.s, part * front.s[-1] / 3)) for part in (1, 2))
+    if front.closed or first < 1 or last > len(front.x) - 2:
+        return None
+    return _piece(front, slice(0, first + 1)), _piece(front, slice(last, None))
+
+
+def _middle(front: Front, first: Front, last: Front) -> Front:
+    """An open front between the pieces at its ends."""
+    return _piece(front, slice(len(first.x) - 1, len(front.x) - len(last.x) + 1))
+
+
+def _piece(front: Front, part: slice) -> Front:
+    return replace(
+        front, x=front.x[part], frame=front.frame[part], s=front.s[part], number=front.number[part]
+    )
+
+
+def _ends_outside(front: Front, body: Body) -> list[tuple[int, int]]:
+    """Last point in the body at each end of an open front that leaves it, and which end that is."""
+    inside = body.contains(front.x)
+    if front.closed or not inside.any():
+        return []
+    places = np.nonzero(inside)[0]
+    both = ((int(places[0]), 0), (int(places[-1]), -1))
+    return [(place, end) for place, end in both if not inside[end]]
+
+
+def _meeting_ends(one: Front, other: Front, body: Body) -> tuple[int, int, Floats] | None:
+    """Which ends at a hole have met behind it, so that no hole lies between them, and where."""
+    for p, first in _ends_outside(one, body):
+        for q, second in _ends_outside(other, body):
+            x, y = one.x[p], other.x[q]
+            size = float(body.cell_size(((x + y) / 2)[None])[0])
+            way = (y - x) if second == 0 else (x - y)  # as a front runs that goes on from one
+            gap = float(np.linalg.norm(way))
+            aligned = first != second and bool(one.frame[p, 1] @ other.frame[q, 1] > _ANGLE)
+            aligned &= min(one.frame[p, 2] @ way, other.frame[q, 2] @ way) > _FACES * gap
+            if not aligned or gap > _WIDE * size:
+                continue
+            between = x + np.linspace(0.0, 1.0, 9)[:, None] * (y - x)
+            if body.contains(between).all():
+                return first, second, np.asarray((x + y) / 2)
+    return None
+
+
+def _meeting_place(one: Front, other: Front, body: Body) -> Floats | None:
+    """Where two fronts in one surface are closer than about a cell, and lead to each other."""
+    rows = np.nonzero(body.contains(one.x))[0]
+    size = body.cell_size(one.x[rows])
+    if not len(rows) or not body.contains(other.x).any():
+        return None
+    r, segment, position = front_distance(
+        one.x[rows], other.x, other.closed, _NEAR * float(size.max())
+    )
+    near = (segment >= 0) & (r < _NEAR * size) & (r > 0)
+    rows, r, size = rows[near], r[near], size[near]
+    segment, position = segment[near], position[near]
+    if not len(rows):
+        return None
+    t, after = position[:, None], (segment + 1) % len(other.x)
+    foot = (1 - t) * other.x[segment] + t * other.x[after]
+    frame = (1 - t[..., None]) * other.frame[segment] + t[..., None] * other.frame[after]
+    way = foot - one.x[rows]
+    ahead, normal = one.frame[rows, 0], one.frame[rows, 1]
+    across = np.abs(np.einsum("ij,ij->i", way, normal))
+    faces = np.einsum("ij,ij->i", way, ahead) > _FACES * r
+    faces &= np.einsum("ij,ij->i", way, frame[:, 0]) < -_FACES * r
+    faces &= (np.einsum("ij,ij->i", normal, frame[:, 1]) > _ANGLE) & (across < OFFSET * size)
+    if not faces.any():
+        return None
+    k = int(np.argmin(np.where(faces, r / size, np.inf)))
+    return np.asarray(one.x[rows[k]] + way[k] / 2)
+
+
+def _join(
+    crack: Crack, pair: tuple[Front, Front], rest: Sequence[Front], radius: float, body: Body
+) -> Crack:
+    """The gap between two fronts of a crack closed.
+
+    Their ends outside the body may lie across each other: as much of them is left out.
+    """
+    ends = _nearest_ends(*pair, body)
+
+    def blocked(k: int, fronts: tuple[Front, Front]) -> Callable[[Front], Bools]:
+        other = fronts[1 - k]
+
+        def ahead(front: Front) -> Bools:
+            centre = front.x + radius * front.frame[:, 0]
+            r, segment, _ = front_distance(centre, other.x, other.closed, radius)
+            flag = (segment >= 0) & (r < radius * (1 - 1e-9))
+            inside = np.nonzero(body.contains(front.x))[0]
+            if not front.closed:
+                flag[: inside[0]] = ends is not None and ends[k] == 0
+                flag[inside[-1] + 1 :] = ends is not None and ends[k] == -1
+            return np.asarray(flag)
+
+        return ahead
+
+    whole = max(len(front.x) for front in pair)
+    for count in (whole, *range(8, 0, -1)):
+        short = (
+            _with_short_ends(pair[0], count, body),
+            _with_short_ends(pair[1], count, body),
+        )
+        try:
+            return _with_gap_closed(
+                Crack(crack.points, crack.faces), ([short[0]], [short[1]]), rest,
+                (blocked(0, short), blocked(1, short)), radius, radius / 2,
+            )  # fmt: skip
+        except GeometryError as error:
+            failure = error
+    raise failure
+
+
+def _nearest_ends(one: Front, other: Front, body: Body) -> tuple[int, int] | None:
+    """Those ends of two fronts outside the body that lie in one hole, if any do."""
+    pairs = [
+        (float(np.linalg.norm(one.x[p] - other.x[q])), first, second)
+        for p, first in _ends_outside(one, body)
+        for q, second in _ends_outside(other, body)
+        if first != second
     ]
-    others = [
-        (front, run)
-        for front in pair[1]
-        for run in _runs(front, _blocked_points(front, trees[1], radius))
-    ]
+    if not pairs:
+        return None
+    gap, first, second = min(pairs)
+    size = float(body.cell_size(one.x[[first]])[0])
+    return (first, second) if gap < _LOOSE * size else None
+
+
+def _with_short_ends(front: Front, count: int, body: Body) -> Front:
+    """An open front with at most some points outside the body at each end."""
+    inside = np.nonzero(body.contains(front.x))[0]
+    if front.closed or not len(inside):
+        return front
+    return _piece(front, slice(max(int(inside[0]) - count, 0), int(inside[-1]) + 1 + count))
+
+
+def _with_gap_closed(
+    crack: Crack,
+    pair: tuple[Sequence[Front], Sequence[Front]],
+    rest: Sequence[Front],
+    blocked: tuple[Callable[[Front], Bools], ...],
+    radius: float,
+    size: float,
+) -> Crack:
+    """A crack with faces between those pieces of two groups of fronts that face each other."""
+    runs, others = (
+        [(front, run) for front in group for run in _runs(front, flag(front))]
+        for group, flag in zip(pair, blocked)
+    )
     if not runs or len(runs) != len(others):
         raise GeometryError(
             f"{len(runs)} and {len(others)} pieces of the fronts of two cracks face each other: "
             "the gap between them cannot be closed."
         )
-    points, faces = [shifted.points], [one.faces, shifted.faces]
-    following = dict(side for fronts in pair for front in fronts for side in _sides(front))
-    count = len(shifted.points)
+    points, faces = [crack.points], [crack.faces]
+    every = (*pair[0], *pair[1], *rest)
+    following = dict(side for front in every for side in _sides(front))
+    count = len(crack.points)
     for front, run in runs:
         mate = others.pop(_facing_number(front, run, others))
         patch = _patch(front, run, *mate, radius, size, count)
@@ -199,7 +459,7 @@ def _runs(front: Front, blocked: Bools) -> list[FacingPart]:
             "one of them encloses the other."
         )
     result = []
-    for run in runs_of(blocked) if front.closed else _open_runs(blocked):
+    for run in runs_of(blocked) if front.closed else open_runs(blocked):
         first, last = int(run[0]), int(run[-1])
         if front.closed:
             count = len(run) + 2
@@ -211,12 +471,6 @@ def _runs(front: Front, blocked: Bools) -> list[FacingPart]:
         place = range(max(first - 1, 0), min(last + 1, m - 1) + 1)
         result.append(FacingPart(tuple(place), ends))
     return result
-
-
-def _open_runs(flag: Bools) -> list[Ints]:
-    """Runs of true values that do not go round."""
-    places = np.nonzero(flag)[0]
-    return [run for run in np.split(places, np.nonzero(np.diff(places) > 1)[0] + 1) if len(run)]
 
 
 def _sides(front: Front) -> list[tuple[int, int]]:
@@ -338,4 +592,4 @@ def _chains(following: dict[int, int]) -> list[Ints]:
     return sorted(result, key=lambda line: int(line.min()))
 
 
-__all__ = ["OFFSET", "FrontGap", "gap_between", "merged_crack", "turned_crack"]
+__all__ = ["OFFSET", "FrontGap", "gap_between", "joined_fronts", "merged_crack", "turned_crack"]

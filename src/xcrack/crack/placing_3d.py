@@ -7,9 +7,18 @@ from scipy.spatial import Delaunay, cKDTree
 
 from xcrack.base.arrays import Bools, Floats, Ints, at
 from xcrack.base.errors import CoarseMeshError, GeometryError, warn
-from xcrack.crack.boundary_trace import OUTSIDE, SIDE, SMOOTH, TraceOutline, open_fronts, runs_of
+from xcrack.crack.boundary_trace import (
+    OUTSIDE,
+    SIDE,
+    SMOOTH,
+    TraceOutline,
+    behind_holes,
+    open_fronts,
+    runs_of,
+)
 from xcrack.crack.crack import Crack
 from xcrack.crack.junctions_3d import are_opposite, crossings, is_before, may_touch
+from xcrack.crack.merging import joined_fronts
 from xcrack.mesh.distances import closest_in, triangle_tree
 from xcrack.mesh.locate import Body, locate
 from xcrack.mesh.mesh import Mesh
@@ -241,7 +250,7 @@ def place_surface(crack: Crack, mesh: Mesh) -> Crack:
     ----------
     crack : Crack
         In 3D. If its fronts are known already, only these are looked at again, and its points
-        stay as they are.
+        stay as they are; two of them that have met become one.
     mesh : Mesh
 
     Returns
@@ -308,6 +317,9 @@ def _placed(crack: Crack, mesh: Mesh) -> tuple[Crack, list[ShortFront]]:
             continue
         inside, too_short = _front_sides(points[loop], number >= 0, body)
         short.extend(too_short)
+        if not first_time and not inside.all():
+            outline = TraceOutline(loop, number >= 0, inside, first_time)
+            inside = inside | behind_holes(points, faces, outline, body)
         if inside.all():
             fronts.append((int(number[0]), np.append(loop, loop[0])))
             continue
@@ -318,7 +330,11 @@ def _placed(crack: Crack, mesh: Mesh) -> tuple[Crack, list[ShortFront]]:
             for run, front in zip(runs_of(inside), own_fronts, strict=True)
         )
     fronts.sort(key=lambda pair: pair[0])
-    return Crack(points, faces, None, tuple(front for _, front in fronts)), short
+    placed = Crack(points, faces, None, tuple(front for _, front in fronts))
+    if first_time:
+        return placed, short
+    joined = joined_fronts(placed, body)
+    return _placed(joined, mesh) if joined is not None else (placed, short)
 
 
 def _check_inside(crack: Crack, body: Body) -> None:

@@ -68,6 +68,7 @@ _SHARE_OF_FRONT, _ASIDE, _APART = 0.65, 0.7, 0.45
 # change nothing, and take a third more time.
 _LEAST_OF_FRONT = 2.0
 _RANGE = {1: (2.6, 3.6), 2: (2.0, 2.0)}
+_RUNS_ON = 1.0  # cells between the end of a front and another front that goes on from there
 _EXIT = 1.5  # a front is near its exit where that is closer than this many distances to the side
 _SAMPLES = 24  # points of an open front at which the distance to the boundary is taken
 
@@ -254,6 +255,38 @@ def tip_points(mesh: Mesh, order: int, cut: Cut, k: int, radius: float, kind: st
                 True
             )
     return flag
+
+
+def divided_points(mesh: Mesh, crack: Crack, cut: Cut, flags: list[Bools]) -> list[Bools]:
+    """Points of the fronts of a 3D crack, each of one front around ends that are beside each other.
+
+    On both sides of a hole fronts end beside each other in it: around these ends the functions of
+    both are the same, and a point carries those of the nearer front.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    crack : Crack
+    cut : Cut
+    flags : list of (n,) array of bool
+        Points that may carry the functions of each front.
+
+    Returns
+    -------
+    list of (n,) array of bool
+    """
+    result = list(flags)
+    phi, psi = cut.level_set.phi, cut.level_set.psi
+    ends = [crack.points[front[[0, -1]]] for front in crack.fronts or ()]
+    for j, one in enumerate(ends):
+        for i, other in enumerate(ends[:j]):
+            gap = float(np.linalg.norm(one - other[::-1], axis=1).min())
+            if gap < _RUNS_ON * leg_size(mesh, cut.level_set.tip_cells[j]):
+                both = result[i] & result[j]
+                nearer = np.hypot(phi, psi[i]) <= np.hypot(phi, psi[j])
+                result[i] = result[i] & ~(both & ~nearer)
+                result[j] = result[j] & ~(both & nearer)
+    return result
 
 
 def node_level(mesh: Mesh, order: int, phi: Floats) -> Floats:

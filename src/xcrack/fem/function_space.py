@@ -16,7 +16,13 @@ from xcrack.base.errors import GeometryError
 from xcrack.crack.crack import Crack
 from xcrack.crack.stations import end_frames
 from xcrack.fem.cut import Cut
-from xcrack.fem.enrichment import heaviside_nodes, node_level, tip_points, tip_radii
+from xcrack.fem.enrichment import (
+    divided_points,
+    heaviside_nodes,
+    node_level,
+    tip_points,
+    tip_radii,
+)
 from xcrack.fem.joints_2d import Joint
 from xcrack.fem.williams import polar, tip_values
 from xcrack.mesh.mesh import Mesh, local_edges
@@ -375,8 +381,13 @@ def function_space(
     tips = []
     for c, cut in enumerate(cuts):
         x, frame = end_frames(cracks[c])
-        for k in range(cut.n_tips):
-            flag = tip_points(mesh, order, cut, k, radii[c][k], numerics.enrichment)
+        flags = [
+            tip_points(mesh, order, cut, k, radii[c][k], numerics.enrichment)
+            for k in range(cut.n_tips)
+        ]
+        if mesh.dim == 3 and len(flags) > 1:
+            flags = divided_points(mesh, cracks[c], cut, flags)
+        for k, flag in enumerate(flags):
             for joint in joints:
                 if joint.crack == c and mesh.dim == 3:
                     flag &= _bears_tip(mesh, cuts[joint.on], joint.side)

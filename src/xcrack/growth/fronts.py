@@ -41,7 +41,7 @@ from xcrack.growth.stations import GrowthStations, Identities, directions
 from xcrack.growth.step import Plan, Step, StepError, plan_of, solves_of
 from xcrack.growth.step_length import first_control, longest, next_control, share_left
 from xcrack.mesh.distances import front_distance
-from xcrack.mesh.locate import cell_sizes, contains
+from xcrack.mesh.locate import Body, cell_sizes, contains
 from xcrack.mesh.mesh import Mesh
 
 WAITS_BELOW = 0.02  # of a cell: neighbours along a front move on, so a slow part has to follow
@@ -360,7 +360,7 @@ def advanced_crack(
         return crack
     size = _SPACING * float(cell_sizes(mesh, stations.x[rows]).mean())
     s, front = stations.s[rows], stations.front[rows]
-    return advance_fronts(crack, s, front, angle[rows], way[rows], size)
+    return advance_fronts(crack, s, front, angle[rows], way[rows], size, Body.of(mesh))
 
 
 def _waves(

@@ -55,8 +55,9 @@ def loops(faces: Ints) -> list[Ints]:
     """Boundary loops against the direction of the faces, the first point not repeated.
 
     This is the direction of b = t x n where t points out of the surface. A loop starts at its
-    lowest point number.
+    lowest point number. Loops that touch in a point are loops of their own.
     """
+    faces, original = _parted_at_points(faces)
     edges, _ = rim(faces)
     follower = {int(b): int(a) for a, b in edges}
     result = []
@@ -67,8 +68,32 @@ def loops(faces: Ints) -> list[Ints]:
         while current != start:
             loop.append(current)
             current = follower.pop(current)
-        result.append(np.array(loop, dtype=np.int64))
+        number = original[np.array(loop, dtype=np.int64)]
+        result.append(np.roll(number, -int(np.argmin(number))))
     return result
+
+
+def _parted_at_points(faces: Ints) -> tuple[Ints, Ints]:
+    """Faces that share no more than a point parted there, and the numbers of points before."""
+    edges, _ = rim(faces)
+    count = int(faces.max()) + 1 if len(faces) else 0
+    original = list(range(count))
+    pinched = np.nonzero(np.bincount(edges[:, 0], minlength=count) > 1)[0]
+    if not len(pinched):
+        return faces, np.arange(count)
+    parted = np.array(faces)
+    for point in pinched.tolist():
+        around, corner = np.nonzero(faces == point)
+        neighbours = np.stack([faces[around, (corner + k) % 3] for k in (1, 2)], axis=1)
+        part = np.unique(neighbours, return_inverse=True)[1].reshape(-1, 2)
+        for _ in range(len(around)):
+            np.minimum.at(lowest := np.arange(part.max() + 1), part, part.min(axis=1)[:, None])
+            part = lowest[part]
+        for other in np.unique(part[:, 0])[1:]:
+            own = part[:, 0] == other
+            parted[around[own], corner[own]] = len(original)
+            original.append(point)
+    return parted, np.array(original, dtype=np.int64)
 
 
 def ruled_strip(

@@ -1,0 +1,445 @@
+"""What a body does to an advance in 3D: holes stop it, other fronts too, and ends lie outside.
+
+A crack that comes to a hole goes into it: faces outside the body span what lies between its parts
+on both sides, as far as these have come, and no face lies in the body that growth did not make.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from xcrack.base.arrays import Bools, Floats, Ints
+from xcrack.crack.boundary_trace import is_enclosed, open_runs, runs_of, way_to_middle
+from xcrack.crack.front_chain import FrontChain, chain
+from xcrack.crack.front_curve import front_curve
+from xcrack.crack.fronts import Front
+from xcrack.mesh.locate import Body
+
+Rays = tuple[FrontChain, Ints, Floats]  # what is sent out, which are vertices, normals there
+
+_LEAST = 0.02  # of the size: a shorter advance is none
+_SAMPLES = 16  # of a way, to find holes on it
+_HOLE = 1.0  # sizes: a shorter way through a hole is passed over
+_ROOM = 0.5  # sizes that two fronts which meet leave between them
+_FACES = 0.5  # cosine between a way and another front that it leads to
+_TANGENT = 1.5  # sizes over which the direction of a front at its end is taken
+_SHORT = 0.5  # sizes: an end outside the body that is shorter is none
+_CROSS = 0.5  # sizes by which two ends outside the body come closer only where they cross
+_THROUGH = 4.0  # sizes of the body that a way from end to end of a front may lead through
+_BESIDE = 4.0  # sizes from where fronts meet, and between their ends, where they may come close
+
+
+def joined_front(fronts: Sequence[Front], goes_round: bool) -> tuple[Front, list[float]]:
+    """Fronts in a row as one, and where on it each of them begins."""
+    if len(fronts) == 1 and fronts[0].closed == goes_round:
+        return fronts[0], [0.0]
+    x = np.concatenate([front.x for front in fronts])
+    frame = np.concatenate([front.frame for front in fronts])
+    s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(x, axis=0), axis=1))])
+    number = np.concatenate([front.number for front in fronts])
+    first = np.cumsum([0, *(len(front.x) for front in fronts[:-1])])
+    whole = Front(x, frame, goes_round, s, number)
+    return whole, front_curve(x, frame, goes_round).breaks[first].tolist()
+
+
+def has_way_to_hole(sent: Sequence[Rays | None], body: Body) -> bool:
+    """Whether something that fronts send out comes from the body into a hole of it."""
+    share = np.linspace(0.0, 1.0, _SAMPLES + 1)[1:]
+    for rays in sent:
+        if rays is None:
+            continue
+        front, normal = rays[0], rays[2]
+        move = front.stop - front.start
+        x = front.start[:, None] + share[:, None] * move[:, None]
+        outside = ~body.contains(x.reshape(-1, 3)).reshape(len(move), -1)
+        rows = np.nonzero(outside.any(axis=1) & body.contains(front.start))[0]
+        if is_enclosed(x[rows, np.argmax(outside[rows], axis=1)], normal[rows], body).any():
+            return True
+    return False
+
+
+def rays_in_body(
+    sent: Sequence[Rays | None], size: float, body: Body
+) -> tuple[list[Rays | None], Floats]:
+    """What the fronts of a crack send out, as far as it goes in a body.
+
+    Parameters
+    ----------
+    sent : sequence of Rays or None
+        One a front.
+    size : float, length
+        Of the sides of fronts.
+    body : Body
+
+    Returns
+    -------
+    sent : list of Rays or None
+    meets : (k, 3) array, length
+        Where two fronts of the crack, or its ends at a hole, are about to meet.
+    """
+    fronts = [None if rays is None else _stopped_in_holes(rays[0], size, body) for rays in sent]
+    fronts, meets = _stopped_at_fronts(fronts, size, body)
+    fronts, beside = _with_ends_outside(fronts, size, body)
+    result = [
+        None if rays is None or front is None else (_still_at_vertices(front, rays[1]), *rays[1:])
+        for rays, front in zip(sent, fronts)
+    ]
+    return result, np.concatenate([meets, beside])
+
+
+def _still_at_vertices(front: FrontChain, vertex: Ints) -> FrontChain:
+    """A front on which points within its old sides that do not move fall on vertices beside."""
+    between = front.still & ~np.isin(np.arange(len(front.still)), vertex)
+    if not between.any():
+        return front
+    rows = np.nonzero(between)[0]
+    beside = vertex[np.searchsorted(vertex, rows) - 1]
+    owner, still, stop = np.array(front.owner), np.array(front.still), np.array(front.stop)
+    remains = np.ones(len(front.x), dtype=bool)
+    remains[owner[rows]] = False
+    owner[rows] = owner[beside]
+    still[rows], stop[rows] = False, front.x[owner[beside]]
+    number = np.cumsum(remains) - 1
+    return replace(
+        front,
+        x=front.x[remains],
+        pinned=front.pinned[remains],
+        owner=number[owner],
+        still=still,
+        stop=stop,
+    )
+
+
+def must_be_free(x: Floats, size: float, body: Body | None, meets: Floats) -> Bools:
+    """Which points of a front lie in the body, and not beside others that it meets `(n,)`."""
+    if body is None:
+        return np.ones(len(x), dtype=bool)
+    free = body.contains(x)
+    if len(meets):
+        free &= cKDTree(meets).query(x)[0] > _BESIDE * size
+    return np.asarray(free)
+
+
+def _stopped_in_holes(front: FrontChain, size: float, body: Body) -> FrontChain:
+    """Ways that lead out of the body and in again end half way across what lies between."""
+    share = np.linspace(0.0, 1.0, _SAMPLES + 1)
+    move = front.stop - front.start
+    depth, _ = body.depth((front.start[:, None] + share[:, None] * move[:, None]).reshape(-1, 3))
+    outside = depth.reshape(len(move), -1) > 0
+    first = np.argmax(outside, axis=1)
+    again = ~outside & (np.arange(_SAMPLES + 1) > first[:, None])
+    last = np.argmax(again, axis=1)
+    comes_back = ~outside[:, 0] & outside.any(axis=1) & again.any(axis=1)
+    width = (share[last] - share[first]) * np.linalg.norm(move, axis=1)
+    comes_back &= width > _HOLE * size
+    most = np.where(comes_back, (share[first] + share[last]) / 2, 1.0)
+    return _shortened(front, most, size)
+
+
+def _shortened(front: FrontChain, share: Floats, size: float) -> FrontChain:
+    """Ways cut to a share of their length; below a fiftieth of a size nothing is left of them."""
+    if not (share < 1).any():
+        return front
+    move = share[:, None] * (front.stop - front.start)
+    stays = front.still | ((share < 1) & (np.linalg.norm(move, axis=1) < _LEAST * size))
+    return chain(
+        front.start, np.where(stays[:, None], front.start, front.start + move), stays, front.closed
+    )
+
+
+def _facing_parts(fronts: Sequence[FrontChain | None]) -> Iterator[tuple[int, Ints, int, Ints]]:
+    """Pairs of parts of fronts that may meet: two fronts, a third of an open one at each end."""
+    for i, one in enumerate(fronts):
+        for j, other in enumerate(fronts[: i + 1]):
+            if one is None or other is None:
+                continue
+            if i != j:
+                yield i, np.arange(len(one.x)), j, np.arange(len(other.x))
+            elif not one.closed and len(one.x) > 3:
+                s = np.cumsum(np.linalg.norm(one.start[1:] - one.start[:-1], axis=1))
+                first, last = (int(np.searchsorted(s, part * s[-1] / 3)) + 1 for part in (1, 2))
+                yield i, np.arange(first), i, np.arange(last, len(one.x))
+
+
+def _stopped_at_fronts(
+    fronts: Sequence[FrontChain | None], size: float, body: Body
+) -> tuple[list[FrontChain | None], Floats]:
+    """Ways of two fronts that lead to each other end before they meet; where they would have."""
+    share = [np.ones(0) if front is None else np.ones(len(front.x)) for front in fronts]
+    meets = [np.zeros((0, 3))]
+    for i, mine, j, others in _facing_parts(fronts):
+        for a, p, b, q in ((i, mine, j, others), (j, others, i, mine)):
+            one, other = fronts[a], fronts[b]
+            assert one is not None
+            assert other is not None
+            way, back = one.stop[p] - one.start[p], other.stop[q] - other.start[q]
+            reach = float(np.linalg.norm(way, axis=1).max() + np.linalg.norm(back, axis=1).max())
+            distance, nearest = cKDTree(other.start[q]).query(
+                one.start[p], distance_upper_bound=reach + _ROOM * size
+            )
+            rows = np.nonzero(np.isfinite(distance) & (distance > 0))[0]
+            rows = rows[body.contains(one.start[p[rows]])]
+            gap, k = distance[rows], nearest[rows]
+            across = (other.start[q[k]] - one.start[p[rows]]) / gap[:, None]
+            ahead = np.einsum("ij,ij->i", way[rows], across)
+            towards = -np.einsum("ij,ij->i", back[k], across)
+            long, wide = np.linalg.norm(way[rows], axis=1), np.linalg.norm(back[k], axis=1)
+            hit = (ahead >= _FACES * long) & (towards >= _FACES * wide)
+            hit &= ahead + towards > gap - _ROOM * size
+            part = np.maximum(gap - _ROOM * size, 0.0)[hit] / (ahead + towards)[hit]
+            np.minimum.at(share[a], p[rows[hit]], part)
+            meets.append((one.start[p[rows]] + other.start[q[k]])[hit] / 2)
+    result = [
+        None if front is None else _shortened(front, part, size)
+        for front, part in zip(fronts, share)
+    ]
+    return result, np.concatenate(meets)
+
+
+@dataclass(frozen=True, eq=False)
+class _FrontEnd:
+    """How a front goes on outside of the body after an advance.
+
+    Attributes
+    ----------
+    front : int
+    base : int
+        Its ray from which it goes on, the first outside or the last in the body.
+    inside : bool
+        Whether the base lies in the body.
+    path : (k, 3) array, length
+        Where it goes on, from the base; without room one point.
+    """
+
+    front: int
+    base: int
+    inside: bool
+    path: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class _Gap:
+    """Rays of a front outside the body: beyond its end, or between two parts of it.
+
+    Attributes
+    ----------
+    rays : (k,) array of int
+        In their order along the front.
+    ends : (int, int)
+        Numbers of the ends on both sides; -1 where the front ends outside.
+    """
+
+    rays: Ints
+    ends: tuple[int, int]
+
+
+def _with_ends_outside(
+    fronts: Sequence[FrontChain | None], size: float, body: Body
+) -> tuple[list[FrontChain | None], Floats]:
+    """Fronts that go on straight from where they leave the body, and where two ends meet.
+
+    What lay outside before the advance does not advance with a front: behind a curved wall it
+    would come into the body elsewhere. Across a hole a front goes on from end to end.
+    """
+    ends: list[_FrontEnd] = []
+    gaps: list[list[_Gap]] = []
+    for k, front in enumerate(fronts):
+        gaps.append([] if front is None else _gaps(k, front, ends, size, body))
+    meets = [np.zeros((0, 3))]
+    for i in range(len(ends)):
+        for j in range(i):
+            if np.linalg.norm(ends[i].path[0] - ends[j].path[0]) < _BESIDE * size:
+                meets.append((ends[i].path[:1] + ends[j].path[:1]) / 2)
+            ends[i], ends[j] = _cut_where_crossing(ends[i], ends[j], size)
+    result = [
+        None if front is None else _led_on(front, gap, ends, size, body)
+        for front, gap in zip(fronts, gaps)
+    ]
+    return result, np.concatenate(meets)
+
+
+def _gaps(
+    number: int, front: FrontChain, ends: list[_FrontEnd], size: float, body: Body
+) -> list[_Gap]:
+    """Where a front lies outside the body; its ends there are added to a list."""
+    n = len(front.x)
+    before, after = body.contains(front.start), body.contains(front.stop)
+    if before.all() or not (before & after).any():
+        return []
+    result = []
+    for run in runs_of(~before) if front.closed else open_runs(~before):
+        sides = []
+        for reverse in (False, True):
+            row = run[::-1] if reverse else run
+            step = -1 if reverse else 1
+            back = row[0] - step * np.arange(1, n)
+            back = back % n if front.closed else back[(back >= 0) & (back < n)]
+            # As far back as the front lay in the body before.
+            back = back[: int(np.argmin(before[back]))] if not before[back].all() else back
+            order = np.concatenate([back[::-1], row])
+            first = len(back)  # the first ray that started outside
+            inside = np.nonzero(after[order[: first + 1]])[0]
+            if not len(back) or not len(inside):
+                sides.append(-1)  # it ends here, or what lay in the body has left it
+                continue
+            leaves = min(int(inside[-1]) + 1, first)
+            base = int(order[leaves])
+            way = _lead_out(front.stop[order[: leaves + 1]], size, body)
+            path = front.stop[base][None]
+            if way is not None:
+                path = np.stack([path[0], path[0] + way])
+            sides.append(len(ends))
+            ends.append(_FrontEnd(number, base, bool(after[base]), path))
+        if max(sides) >= 0:
+            result.append(_Gap(run, (sides[0], sides[1])))
+    return result
+
+
+def _lead_out(x: Floats, size: float, body: Body) -> Floats | None:
+    """Vector by which a front goes straight on from its last point; None where none leads out."""
+    away = np.linalg.norm(x - x[-1], axis=1)
+    behind = np.nonzero(away > _TANGENT * size)[0]
+    begin = int(behind[-1]) if len(behind) else 0
+    if away[begin] == 0:
+        return None
+    ahead = (x[-1] - x[begin]) / away[begin]
+    length = way_to_middle(x[-1], ahead, float(body.cell_size(x[-1:])[0]), body)
+    return np.asarray(length * ahead) if length > _SHORT * size else None
+
+
+def _up_to_other_walls(start: Floats, stop: Floats, body: Body) -> Floats:
+    """Points outside the body after a move, or the part of it over which no wall comes nearer."""
+    share = np.linspace(0.0, 1.0, _SAMPLES + 1)
+    move = stop - start
+    depth, size = body.depth((start[:, None] + share[:, None] * move[:, None]).reshape(-1, 3))
+    depth, size = depth.reshape(len(move), -1), size.reshape(len(move), -1)
+    nearer = depth < depth[:, :1] - 1e-9 * size
+    last = np.where(nearer.any(axis=1), np.argmax(nearer, axis=1) - 1, _SAMPLES)
+    return np.asarray(start + share[last][:, None] * move)
+
+
+def _cut_where_crossing(
+    one: _FrontEnd, other: _FrontEnd, size: float
+) -> tuple[_FrontEnd, _FrontEnd]:
+    """Two ends, as far as they do not cross each other."""
+    if len(one.path) < 2 or len(other.path) < 2:
+        return one, other
+    (x, s), (y, t) = _samples(one.path), _samples(other.path)
+    gap = np.linalg.norm(x[:, None] - y[None], axis=2)
+    longer = np.maximum(s[:, None], t[None])
+    near = gap < _CROSS * size
+    if not near.any():
+        return one, other
+    i, j = np.unravel_index(np.argmin(np.where(near, longer, np.inf)), near.shape)
+    return _cut(one, float(s[i]), size), _cut(other, float(t[j]), size)
+
+
+def _samples(path: Floats) -> tuple[Floats, Floats]:
+    """Points along a path, and their arc lengths."""
+    s = _arc(path)
+    at = np.linspace(0.0, s[-1], 4 * _SAMPLES + 1)
+    return _along(path, at), at
+
+
+def _arc(path: Floats) -> Floats:
+    return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))])
+
+
+def _along(path: Floats, at: Floats) -> Floats:
+    s = _arc(path)
+    return np.stack([np.interp(at, s, path[:, k]) for k in range(3)], axis=1)
+
+
+def _cut(end: _FrontEnd, length: float, size: float) -> _FrontEnd:
+    """An end up to an arc length."""
+    whole = float(_arc(end.path)[-1])
+    if length >= whole:
+        return end
+    if length < _SHORT * size:
+        return replace(end, path=end.path[:1])
+    return replace(end, path=_along(end.path, np.array([0.0, length])))
+
+
+def _led_on(
+    front: FrontChain, gaps: Sequence[_Gap], ends: Sequence[_FrontEnd], size: float, body: Body
+) -> FrontChain:
+    """A front whose rays outside the body come to the ways that its ends take there."""
+    if not gaps:
+        return front
+    n = len(front.x)
+    stop, still, owner = np.array(front.stop), np.array(front.still), np.arange(n)
+    outside = np.zeros(n, dtype=bool)
+    for gap in gaps:
+        first, last = (ends[k] if k >= 0 else None for k in gap.ends)
+        begin = int(gap.rays[0]) - 1 if first is None else first.base
+        end = int(gap.rays[-1]) + 1 if last is None else last.base
+        if begin == end:
+            continue  # a single point, which goes on from both sides
+        rays = (begin + 1 + np.arange((end - begin - 1) % n)) % n
+        if not len(rays):
+            continue
+        target, bends = _way_across(front, rays, first, last, size, body)
+        if not len(target):
+            base = first if first is not None else last
+            assert base is not None
+            owner[rays], stop[rays], still[rays] = base.base, base.path[0], False
+            continue
+        # What would turn behind the old end stays there: outside, faces need not follow it.
+        way = front.stop[rays] - front.start[rays]
+        ahead = np.einsum("ij,ij->i", target - front.start[rays], way)
+        stays = ahead < _LEAST * size * np.linalg.norm(way, axis=1)
+        stop[rays] = np.where(stays[:, None], front.start[rays], target)
+        still[rays], outside[rays[bends]] = stays, True
+    remains = owner == np.arange(n)
+    pinned = (still | outside)[remains]
+    if not front.closed:
+        pinned[[0, -1]] = True
+    number = np.cumsum(remains) - 1
+    return FrontChain(stop[remains], front.closed, pinned, front.start, stop, still, number[owner])
+
+
+def _way_across(
+    front: FrontChain,
+    rays: Ints,
+    first: _FrontEnd | None,
+    last: _FrontEnd | None,
+    size: float,
+    body: Body,
+) -> tuple[Floats, Ints]:
+    """Where the rays of a gap go, none where the front ends before, and at which it bends."""
+    start, none = front.start[rays], np.zeros(0, dtype=np.int64)
+    if first is None or last is None:
+        end = first if first is not None else last
+        assert end is not None
+        outwards = start if first is not None else start[::-1]
+        if len(end.path) > 1:
+            s = _arc(np.concatenate([front.start[[end.base]], outwards]))
+            way = _along(end.path, s[1:] / s[-1] * _arc(end.path)[-1])
+            return (way if first is not None else way[::-1]), none
+        if end.inside:
+            return _up_to_other_walls(start, front.stop[rays], body), none
+        return np.zeros((0, 3)), none
+    link = np.linspace(0.0, 1.0, 4 * _SAMPLES + 1)[:, None] * (last.path[-1] - first.path[-1])
+    width = float(np.linalg.norm(link[-1]))
+    if float(body.contains(first.path[-1] + link).mean()) * width > _THROUGH * size:
+        # Other walls lie between: faces go on up to them.
+        return _up_to_other_walls(start, front.stop[rays], body), none
+    path = np.concatenate([first.path, last.path[::-1]])
+    inner = path[1:-1]
+    if len(inner) == 2 and width < size:
+        inner = inner.mean(axis=0, keepdims=True)
+    path = np.concatenate([path[:1], inner, path[-1:]])
+    s = _arc(np.concatenate([front.start[[first.base]], start, front.start[[last.base]]]))
+    share = _arc(path)[1:-1] / _arc(path)[-1]
+    bends = np.unique(np.abs(s[1:-1, None] / s[-1] - share).argmin(axis=0))
+    if len(bends) < len(inner):
+        inner, bends = inner[:0], none
+    # A bend falls on a ray, and the others lie evenly between.
+    known = np.concatenate([[0], bends + 1, [len(s) - 1]])
+    whole = np.concatenate([path[:1], inner, path[-1:]])
+    at = np.interp(s[1:-1], s[known], np.arange(len(known)))
+    return np.stack(
+        [np.interp(at, np.arange(len(known)), whole[:, k]) for k in range(3)], axis=1
+    ), bends
