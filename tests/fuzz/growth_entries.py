@@ -167,6 +167,7 @@ GROW = {
         2,
     ),
     "max_cycles": arg(Number(optional=True, above=0), None, 1e6, 10.0),
+    "max_size": arg(Number(optional=True, above=0), None, 1e6),
     "solver": arg(Called(optional=True), None),
     "response": arg(Called(optional=True), None, xc.respond),
     "progress": arg(Flag(also=(Word(words=("always",)),)), False),
@@ -202,6 +203,7 @@ RESUME = {
     "stop_at_interface": arg(Flag(), False, True),
     "max_steps": arg(Whole(least=1, rule=lambda v: v < 3 or None, far=2), 2),
     "max_cycles": arg(Number(optional=True, above=0), None, 1e6),
+    "max_size": arg(Number(optional=True, above=0), None, 1e6),
     "until": arg(Called(optional=True), None),
     "cycle": arg(
         Seen(rule=lambda v: isinstance(v, xc.Cycle) and v.load_states == (0.0, 1.0)),

@@ -4,6 +4,7 @@ import warnings
 
 import numpy as np
 import pytest
+from scipy.integrate import quad
 
 import xcrack as xc
 
@@ -21,7 +22,7 @@ def strip(n=20, stress=140.0):
 
 def block():
     """A thick strip with a straight front."""
-    mesh = xc.box((0, -4, 0), (4, 4, 1), (9, 18, 2))
+    mesh = xc.box((0, -4, 0), (4, 4, 1), (13, 26, 4))
     loads = [xc.traction("back", (0, 140.0, 0)), xc.traction("front", (0, -140.0, 0))]
     crack = xc.plane_crack([(-0.1, 0.11, -0.1), (1, 0.11, -0.1), (1, 0.11, 1.1), (-0.1, 0.11, 1.1)])
     return xc.Problem(mesh, xc.Isotropic(210e3, 0.3), [crack], loads=loads)
@@ -112,6 +113,114 @@ def test_beyond_its_end_a_run_goes_on_as_if_there_had_been_none(tmp_path):
         short = xc.collect(xc.grow(*args, **options, **limit), folder)
         assert len(short.steps) < 5
         assert xc.resume(folder, *args, **options, **limit).life == short.life
+        longer = xc.resume(folder, *args, **options, max_steps=5)
+        assert [step.cycles for step in longer.steps] == [step.cycles for step in whole.steps]
+
+
+# --- a length that is asked for, and K by formulas, whose integrals are exact --------------------
+
+WIDTH, HALF = 20.0, 20.0
+
+
+def single_edge(a):
+    """K of an edge crack in a strip, for a stress of 140 (Tada, Paris, Irwin 1973: within .5 %)."""
+    t = np.pi * a / (2 * WIDTH)
+    shape = (0.752 + 2.02 * a / WIDTH + 0.37 * (1 - np.sin(t)) ** 3) / np.cos(t)
+    return 140.0 * np.sqrt(np.pi * a) * np.sqrt(np.tan(t) / t) * shape
+
+
+def centre(a):
+    """K of a centre crack of length 2 a in a strip, for a stress of 140 (Feddersen 1966)."""
+    return 140.0 * np.sqrt(np.pi * a / np.cos(np.pi * a / (2 * HALF)))
+
+
+def known(K_of):
+    """Response with K as a function of the length in the body over the number of tips."""
+
+    def response(problem, states, reuse, bars):
+        count = [crack.n_tips for crack in problem.placed]
+        a = np.repeat([size / max(n, 1) for size, n in zip(problem.sizes, count)], count)
+        K = np.where(a < 0.999 * WIDTH, K_of(np.minimum(a, 0.999 * WIDTH)), 0.0)
+        return xc.Response.of_K(
+            problem, states, [float(s) * np.stack([K, 0 * K], 1) for s in states]
+        )
+
+    return response
+
+
+def exact(K_of, a0, a1):
+    return quad(lambda a: 1 / (1e-13 * (0.9 * K_of(a)) ** 3), a0, a1, epsrel=1e-12)[0]
+
+
+def centre_crack():
+    loads = [xc.traction("top", (0, 140.0)), xc.traction("bottom", (0, -140.0))]
+    mesh = xc.box((-HALF, -HALF), (HALF, HALF), (20, 20))
+    crack = xc.line_crack([(-3, 0.3), (3, 0.3)])
+    return xc.Problem(mesh, xc.Isotropic(210e3, 0.3, plane="strain"), [crack], loads=loads)
+
+
+@pytest.mark.parametrize("integrator", ["pec", "euler"])
+@pytest.mark.parametrize(
+    ("scene", "K_of", "begin", "size"),
+    [(strip, single_edge, 4.0, 9.37), (centre_crack, centre, 3.0, 2 * 8.11)],
+)
+def test_a_run_ends_at_a_length(scene, K_of, begin, size, integrator):
+    """To round-off; its cycles are those of the integral, but for discretisation: steps of .4."""
+    options = {"da": 0.4, "response": known(K_of), "integrator": integrator}
+    history = run(scene(), max_size=size, **options)
+    (crack,) = history.solved[-1].cracks
+    n = crack.n_tips
+    assert history.solved[-1].sizes[0] == pytest.approx(size, rel=1e-9)
+    assert history.ended.startswith(f"max_size = {size:g} reached: crack 0")
+    rel = 2e-4 if integrator == "pec" else 2e-3
+    assert history.life == pytest.approx(exact(K_of, begin, size / n), rel=rel)
+
+
+def test_no_length_is_left_that_is_too_short_for_the_mesh():
+    """The end is .02 beyond a step, a fiftieth of a cell: the one before leaves a tenth, .14."""
+    history = run(strip(), da=1.5, max_size=7.02, response=known(single_edge))
+    assert history.solved[-1].sizes[0] == pytest.approx(7.02, rel=1e-9)
+    assert [round(step.sizes[0], 3) for step in history.solved] == [4.0, 5.5, 6.879, 7.02]
+
+
+@pytest.mark.parametrize("da", [3.0, 1.5, 0.75])
+def test_life_of_a_strip_by_long_steps(da):
+    """Discretisation: steps as long as the crack err by .3 %, and by the third power of that."""
+    history = run(strip(), da=da, max_size=11.37, response=known(single_edge))
+    off = 3e-3 * (da / 3.0) ** 3 + 3e-5
+    assert history.life == pytest.approx(exact(single_edge, 4.0, 11.37), rel=off)
+
+
+@pytest.mark.parametrize("da", [2.0, 0.5])
+def test_cycles_until_a_side_converge(da):
+    """Discretisation: K has no bound there, and the last step costs nothing."""
+    history = run(strip(), da=da, response=known(single_edge))
+    (arrival,) = history.arrivals
+    assert arrival.x == pytest.approx((20.0, 0.3), rel=1e-9)
+    off = 2e-4 if da == 0.5 else 5e-3
+    assert history.life == pytest.approx(exact(single_edge, 4.0, 0.999 * WIDTH), rel=off)
+
+
+@pytest.mark.slow
+def test_fronts_end_at_a_size():
+    for integrator in ("pec", "euler"):
+        history = run(block(), da=0.6, max_size=2.0, integrator=integrator)
+        assert history.solved[-1].sizes[0] == pytest.approx(2.0, rel=1e-9)
+        assert history.ended.startswith("max_size = 2 reached")
+
+
+@pytest.mark.slow
+def test_beyond_its_size_a_run_goes_on_as_if_there_had_been_none(tmp_path):
+    """To the last bit, also behind a step that was shorter for the one after it."""
+    options = {"da": 1.5, "response": known(single_edge), "progress": False}
+    args = (strip(), LAW, xc.max_hoop_stress, CYCLE)
+    whole = xc.collect(xc.grow(*args, **options, max_steps=5))
+    for size in (6.3, 7.02):
+        folder = tmp_path / str(size)
+        short = xc.collect(xc.grow(*args, **options, max_size=size), folder)
+        assert xc.resume(folder, *args, **options, max_size=size).life == short.life
+        (folder / f"step_{len(short.steps) - 1:05d}.npz").unlink()
+        assert xc.resume(folder, *args, **options, max_size=size).life == short.life
         longer = xc.resume(folder, *args, **options, max_steps=5)
         assert [step.cycles for step in longer.steps] == [step.cycles for step in whole.steps]
 

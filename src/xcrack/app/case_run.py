@@ -63,7 +63,7 @@ def run(
     tolerance, max_unknowns : optional
         As of `grow`.
     cycles, scaling, integrator, threshold, retardation, solver, response, K_c, link_up, \
-    stop_at_interface, max_steps, max_cycles, tolerance, max_unknowns, progress
+    stop_at_interface, max_steps, max_cycles, max_size, tolerance, max_unknowns, progress
         As of `grow`.
 
     Returns

@@ -123,7 +123,7 @@ def _zones(rule: GrowthRule, step: Step, c: int) -> Floats:
     return numbers(zone, "what link_up returned", K_eq.shape)
 
 
-_SAME = 1e-9  # of the largest K: states that do not differ
+_SAME = 1e-9  # of the largest K, or of a length: what does not differ
 # A turn by more puts K 0.1 % off where the advance is 0.3 cells, 0.3 % at 20 degrees (measured).
 _TURN = np.radians(10.0)
 
@@ -182,18 +182,21 @@ def interface_is_passed(rule: GrowthRule, step: Step) -> str:
     return ""
 
 
-def cycles_are_over(rule: GrowthRule, step: Step) -> str:
-    """As many cycles as asked for."""
-    if rule.max_cycles is None or step.cycles < rule.max_cycles:
-        return ""
-    return f"max_cycles = {rule.max_cycles:.6g} reached: {step.cycles:.6g} cycles"
+def limit_is_reached(rule: GrowthRule, step: Step) -> str:
+    """As many cycles or steps as asked for, or a crack as long."""
+    if rule.max_cycles is not None and step.cycles >= rule.max_cycles:
+        return f"max_cycles = {rule.max_cycles:.6g} reached: {step.cycles:.6g} cycles"
+    if rule.max_size is not None and size_beyond(rule, step.sizes) >= -_SAME:
+        c = int(np.argmax(step.sizes))
+        return f"max_size = {rule.max_size:.6g} reached: crack {c} is {step.sizes[c]:.6g} long"
+    if rule.max_steps is not None and step.index + 1 >= rule.max_steps:
+        return f"max_steps = {rule.max_steps} reached"
+    return ""
 
 
-def steps_are_over(rule: GrowthRule, step: Step) -> str:
-    """As many steps as asked for."""
-    if rule.max_steps is None or step.index + 1 < rule.max_steps:
-        return ""
-    return f"max_steps = {rule.max_steps} reached"
+def size_beyond(rule: GrowthRule, sizes: Sequence[float]) -> float:
+    """Share by which the largest of some cracks is longer than asked for."""
+    return -inf if rule.max_size is None else max(sizes, default=0.0) / rule.max_size - 1
 
 
 def nothing_grows(rule: GrowthRule, step: Step) -> str:
@@ -211,8 +214,7 @@ ENDS: tuple[Callable[[GrowthRule, Step], str], ...] = (
     toughness_is_reached,
     ligament_yields,
     interface_is_passed,
-    cycles_are_over,
-    steps_are_over,
+    limit_is_reached,
     nothing_grows,
 )
 
@@ -380,4 +382,5 @@ __all__ = [
     "nothing_grows",
     "refusal_of",
     "short_kink",
+    "size_beyond",
 ]

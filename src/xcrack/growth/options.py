@@ -47,6 +47,7 @@ class GrowthOptions(TypedDict, total=False):
     stop_at_interface: bool
     max_steps: int | None
     max_cycles: float | None
+    max_size: float | None
     solver: Any
     response: Respond | None
     progress: bool | str
@@ -60,7 +61,7 @@ class GrowthRule:
     ----------
     problem, law, criterion, cycle, da, cycles, tolerance, max_unknowns, scaling, integrator, \
     threshold, retardation, solver, response, K_c, link_up, stop_at_interface, max_steps, \
-    max_cycles, progress
+    max_cycles, max_size, progress
         As of `grow`.
     scouts : bool
         It is the scout of a run with a tolerance: nothing is estimated.
@@ -102,6 +103,7 @@ class GrowthRule:
     )
     max_steps: Annotated[int | None, Whole(least=1)] = field(default=None, metadata=_STOPS)
     max_cycles: Annotated[float | None, _POSITIVE] = field(default=None, metadata=_STOPS)
+    max_size: Annotated[float | None, _POSITIVE] = field(default=None, metadata=_STOPS)
     progress: Annotated[bool | str, Choice((True, False, "always"), _PROGRESS)] = field(
         default=True, metadata=_STOPS
     )

@@ -27,6 +27,7 @@ from xcrack.growth.ends import (
     nothing_grows,
     refusal_of,
     short_kink,
+    size_beyond,
 )
 from xcrack.growth.events import (
     Arriving,
@@ -139,6 +140,9 @@ def grow(
     max_cycles : float, optional
         Stop after this many cycles, to 2e-4 of them, or at the first step beyond where that is less
         than a tenth of a cell away.
+    max_size : float, length, optional
+        Stop when a crack is as long, by `Step.sizes`: in 2D its length in the body, in 3D its area
+        over the length of its fronts. The last step ends there.
     solver : optional
         As in `solve`.
     response : callable (problem, states, reuse, bars) -> Response, optional
@@ -256,17 +260,20 @@ def growth_steps(
                 break
             kink = kink or _warned_of_kink(rule, last)
             with notices.watch(last.index + 1) as messages:
-                next_step, reuse, ended = _step_after(rule, last, reuse)
+                cut = last if rule.max_size is None else _cut_at_size(rule, last)
+                next_step, reuse, ended = _step_after(rule, cut, reuse)
                 if next_step is None:
                     break
                 is_torn = is_torn or _warn_of_mode_III(rule, next_step)
                 own = len(messages)
-                other = replanned(asked, rule, growth_steps, last, next_step)
+                other = replanned(asked, rule, growth_steps, cut, next_step)
                 if other is not None:
                     del messages[:own]  # of a step that nobody has
                 else:
+                    if cut is not last:
+                        next_step = _marked(next_step)
                     next_step, reuse, ended = _cut_at_end(
-                        rule, last, (next_step, reuse, ended), messages
+                        rule, cut, (next_step, reuse, ended), messages
                     )
                     _warn_of_alarms(rule, next_step)
             if other is not None:
@@ -293,10 +300,17 @@ def growth_steps(
 
 
 def steps_to_go_on_from(rule: GrowthRule, done: Sequence[Step]) -> Sequence[Step]:
-    """Steps of a run without a last one that was cut short for an end that is none now."""
-    if len(done) > 1 and done[-1].run is not None and done[-1].run.cut:
-        return done if end_of_run(rule, done[-1]) else done[:-1]
+    """Steps of a run without the last ones, if these were cut short for an end that is none now."""
+    if done and end_of_run(rule, done[-1]):
+        return done
+    while len(done) > 1 and done[-1].run is not None and done[-1].run.cut:
+        done = done[:-1]
     return done
+
+
+def _marked(step: Step) -> Step:
+    """A step that is shorter than planned, for an end that comes."""
+    return step if step.run is None else replace(step, run=replace(step.run, cut=True))
 
 
 _AIM = 1e-4  # of K, or of the cycles: a run ends as far beyond its end, and at most twice
@@ -353,13 +367,48 @@ def _cut_at_end(
             at_high *= 0.5 if bound == "high" else 1.0
             bound = "high"
             continue
-        ending = replace(step, run=replace(run_state(step), cut=True)), reuse, ended
+        ending = _marked(step), reuse, ended
         high, at_high = length, beyond
         if beyond <= _AIM:
             break
         at_low *= 0.5 if bound == "low" else 1.0
         bound = "low"
     return ending
+
+
+_SAME = 1e-10  # of a length that was asked for
+
+
+def _cut_at_size(rule: GrowthRule, last: Step) -> Step:
+    """A step whose way ahead ends where a crack is as long as asked for; the same where none is.
+
+    The cracks alone say that: nothing is solved. Where less than a tenth of a cell would be left
+    behind it, this step leaves that much.
+    """
+    from scipy.optimize import brentq
+
+    plan = plan_of(last)
+    least = (1 + 1e-6) * LEAST * float(plan.cell[plan.tip])
+    longest = plan.length * plan.part
+
+    def beyond(length: float) -> float:
+        return size_beyond(rule, _scene(rule, _with_length(rule, last, length)).sizes)
+
+    try:
+        at_end, at_begin = (
+            size_beyond(rule, _scene(rule, last).sizes),
+            size_beyond(rule, last.sizes),
+        )
+        if at_end <= _SAME:
+            slope = (at_end - at_begin) / longest
+            is_there = at_end >= -_SAME or longest < 2 * least or -at_end >= slope * least
+            return last if is_there else _with_length(rule, last, longest - least - at_end / slope)
+        if beyond(least) >= 0:
+            return _with_length(rule, last, least)
+        length = brentq(beyond, least, longest, xtol=_SAME * least, rtol=1e-15)
+        return _with_length(rule, last, length)
+    except (GeometryError, ProblemError):  # the step itself says why it cannot be taken
+        return last
 
 
 def _with_length(rule: GrowthRule, step: Step, length: float) -> Step:

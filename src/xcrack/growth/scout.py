@@ -90,6 +90,7 @@ def scouted(
             K_c=None,
             link_up=None,
             max_cycles=None,
+            max_size=None,
             max_steps=_MOST_STEPS,
             progress=False,
             scouts=True,

@@ -142,8 +142,14 @@ def rates_at(solves: SolveHistory, s: Floats, threshold: float = 0.0) -> Floats:
     Returns
     -------
     (q, n) array, length/cycle
-        The logarithm of a rate is the polynomial through all solves in ln(scale + s); the power
-        1/exponent of one that is all but zero in any of them a line from solve to solve.
+        The logarithm of a rate is a line in ln(scale + s) through two solves, and through three one
+        with (scale + s)² beside it; the power 1/exponent of one that is all but zero in any of them
+        a line from solve to solve.
+
+    Notes
+    -----
+    So powers of the length are exact, and the width of a body enters as it does first in K of
+    cracks of length a: as a power series in a² (Isida 1973, in Sih, Mechanics of Fracture 1).
     """
     rate = _positive(solves, solves.rate, s, solves.exponent)
     if threshold > 0:
@@ -155,14 +161,25 @@ def _positive(solves: SolveHistory, values: Floats, s: Floats, exponent: float) 
     nodes = np.log(solves.scale + solves.sigma[:, None])
     x = np.log(solves.scale + s[:, None])
     with np.errstate(over="ignore", under="ignore"):
-        power = np.exp(
-            np.clip(lagrange(nodes, np.log(np.maximum(values, _LEAST_SCALE)), x), -690, 690)
-        )
+        logarithm = _curve(nodes, np.log(np.maximum(values, _LEAST_SCALE)), x)
+        power = np.exp(np.clip(logarithm, -690, 690))
     tiny = (values <= _TINY * values.max(axis=1, keepdims=True)).any(axis=0)
     if tiny.any():
         root = _lines(nodes[:, tiny], values[:, tiny] ** (1 / exponent), x[:, tiny])
         power[:, tiny] = np.maximum(root, 0.0) ** exponent
     return power
+
+
+def _curve(nodes: Floats, values: Floats, x: Floats) -> Floats:
+    """Through values `(k, n)` at logarithms of lengths, at those of others (q, n): `(q, n)`."""
+    line = lagrange(nodes[:2], values[:2], x)
+    if len(nodes) < 3:
+        return line
+    newest = nodes[2:]
+    square = [np.exp(2 * (where - newest)) for where in (nodes[:2], newest, x)]
+    bends = square[2] - lagrange(nodes[:2], square[0], x)
+    whole = square[1] - lagrange(nodes[:2], square[0], newest)
+    return line + (values[2:] - lagrange(nodes[:2], values[:2], newest)) * bends / whole
 
 
 def _lines(nodes: Floats, values: Floats, x: Floats) -> Floats:

@@ -130,7 +130,7 @@ def resume(
     tolerance, max_unknowns
         As they were given to `grow`. The mesh that a tolerance chose is read from the folder; where
         it is lost it is made again.
-    K_c, link_up, stop_at_interface, max_steps, max_cycles
+    K_c, link_up, stop_at_interface, max_steps, max_cycles, max_size
         Rules that stop a run may be other ones than before.
 
     Returns
