@@ -80,6 +80,8 @@ def test_surface_crack(tolerance):
     assert adapted.rounds[-1].unknowns < 100_000
 
 
+@pytest.mark.slow
+@pytest.mark.mission
 @pytest.mark.mission
 def test_corner_crack():
     """The short one of the default run: 5 % from cells of .87, five times the crack."""

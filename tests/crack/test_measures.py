@@ -138,6 +138,8 @@ def test_what_cannot_be_measured_says_so() -> None:
         xc.measures(xc.elliptic_crack((50, 5, 6), (0, 1, 0), (1, 0, 0), 1, 1), BOX)
 
 
+@pytest.mark.slow
+@pytest.mark.mission
 def test_a_run_has_tables_of_measures(tmp_path: Path) -> None:
     mesh = xc.box((0, 0), (1, 2), (10, 20))
     problem = xc.Problem(

@@ -67,6 +67,8 @@ def run(tmp_path_factory):
     return folder, problem, xc.collect(grow(problem), folder)
 
 
+@pytest.mark.slow
+@pytest.mark.mission
 def test_two_pennies_become_one(run):
     check(run[2])
 
@@ -76,6 +78,7 @@ def test_two_pennies_become_one_by_euler():
     check(xc.collect(grow(pennies(), integrator="euler")))
 
 
+@pytest.mark.slow
 def test_pictures_and_tables_of_a_join(run, tmp_path):
     history = run[2]
     figure = history.plot("fronts", file=tmp_path / "fronts.png")

@@ -39,6 +39,8 @@ def test_each_step_is_on_disk_before_the_next_begins(tmp_path):
     assert json.loads((tmp_path / "run.json").read_text())["versions"]["numpy"] == np.__version__
 
 
+@pytest.mark.slow
+@pytest.mark.mission
 def test_killed_between_any_two_writes(whole, tmp_path):
     """Every place where the disk is touched, from the first to the last."""
     with pytest.MonkeyPatch.context() as patch:

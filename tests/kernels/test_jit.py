@@ -69,6 +69,7 @@ def test_a_damaged_cache_is_made_again(package, tmp_path):
         assert run(package, **where)[:2] == ["2.0", "0 1"]
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(
     not hasattr(os, "getuid") or os.getuid() != 0 or shutil.which("setpriv") is None,
     reason="needs root and setpriv to become a user who may write nothing",

@@ -47,7 +47,7 @@ def bits(problem, count=None):
     return b"".join(np.ascontiguousarray(part).tobytes() for part in parts)
 
 
-@pytest.mark.parametrize("scene", [plane, solid])
+@pytest.mark.parametrize("scene", [plane, pytest.param(solid, marks=pytest.mark.slow)])
 def test_the_same_bits_for_any_number(scene, monkeypatch):
     # Small matrices are shared too, and few cells and points make many tasks.
     monkeypatch.setattr(products, "_LEAST", 1000)
@@ -169,7 +169,7 @@ def _child(queue):
 
 
 @pytest.mark.filterwarnings("ignore:This process:DeprecationWarning")
-@pytest.mark.parametrize("method", ["fork", "spawn"])
+@pytest.mark.parametrize("method", ["fork", pytest.param("spawn", marks=pytest.mark.slow)])
 def test_processes_started_after_a_solve(method):
     if method not in multiprocessing.get_all_start_methods():
         pytest.skip(f"no {method} on this system")

@@ -32,6 +32,8 @@ def opened(eps):
     return np.array([solution.energy, *scenes_space.opening(solution)])
 
 
+@pytest.mark.slow
+@pytest.mark.mission
 def test_results_are_continuous_in_the_cut_position():
     """A crack that moves by a tenth of a cell, down to a layer of nodes, onto it and below.
 
@@ -160,7 +162,10 @@ PLACES = {
 
 @pytest.mark.parametrize(
     "supported",
-    [("right", "bottom", "top"), pytest.param(SIX, marks=(pytest.mark.slow, pytest.mark.mission))],
+    [
+        pytest.param(("right", "bottom", "top"), marks=pytest.mark.slow),
+        pytest.param(SIX, marks=(pytest.mark.slow, pytest.mark.mission)),
+    ],
     ids=["three", "six"],
 )
 def test_straight_front_at_any_place(supported):
@@ -174,6 +179,7 @@ def test_straight_front_at_any_place(supported):
     assert np.ptp(result) <= 1e-2
 
 
+@pytest.mark.slow
 def test_energy_of_a_straight_front_is_that_of_its_neighbours():
     """The energy is smooth in the place of the front, whatever the mesh: discretisation."""
     places = (0.0, 1e-9, 0.07, 0.14, 0.2, CELL - 1e-9, CELL, 0.3)

@@ -171,6 +171,8 @@ def test_arms_on_each_other_are_refused():
             _ = pulled(mesh, [(a, b), (c, d)]).junctions
 
 
+@pytest.mark.slow
+@pytest.mark.mission
 def test_crosses_on_mesh_lines():
     """On mesh points, edges and diagonals, and next to them: K is that of 3e-3 of a cell beside."""
     mesh, beside = xc.box((-1, -1), (1, 1), 20), 0.1 * np.array([0.6, 0.8])
@@ -243,6 +245,7 @@ def check_forks(seeds):
     print(f"\nforks: K differs by {worst:.1e} at most, {refusals} refused")
 
 
+@pytest.mark.slow
 def test_forks_in_any_order():
     """Of these nine drawn ones five were 6 to 100 % off in one order, without a word."""
     check_forks([1, 7, 12, 59, 79, 91, 104, 128, 138])

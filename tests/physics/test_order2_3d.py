@@ -166,6 +166,7 @@ def test_steps_do_not_grow_with_the_mesh():
     assert counts[-1] <= counts[0] + 5
 
 
+@pytest.mark.slow
 def test_steps_do_not_depend_on_the_cut():
     """Down to 1e-12 of a cell beside a layer of nodes, and on it."""
     cell = 2 / 6

@@ -80,6 +80,8 @@ def test_many_pennies_anywhere():
     print(f"\n60 pennies anywhere: pressure to {worst:.1e}")
 
 
+@pytest.mark.slow
+@pytest.mark.mission
 def test_any_cut_position():
     """From half a cell above the layer of nodes down to 1e-14, on it, and below."""
     for k, eps in enumerate(CUTS[::2] + CUTS[-1:] + CUTS_BELOW[::2]):

@@ -210,6 +210,7 @@ def test_wrong_choice(wrong):
             xc.stress_intensity(xc.solve(edge(n=4)), error=wrong)
 
 
+@pytest.mark.slow
 def test_bars_on_a_closed_arc():
     """K_II of an arc that presses and slides: within its bar, which is at most ten times as long.
 

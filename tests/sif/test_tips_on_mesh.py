@@ -106,6 +106,8 @@ def check_drawn(seeds, origin=0.0):
     print(f"\nlargest changes of K to a tip 1e-4 of a cell away: {worst}")
 
 
+@pytest.mark.slow
+@pytest.mark.mission
 def test_drawn_tips_on_mesh_points_and_edges():
     """Of closed tips 1e-9 of a cell beside a mesh point 10 of 48 had K = nan once."""
     check_drawn(range(310500, 310560))

@@ -78,6 +78,7 @@ def pressed_junction(seed, n, shift, order):
     )  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("order", [1, 2])
 def test_junctions_moved_by_next_to_nothing(order):
     """In meshes of squares groups of pressures are halves of others: round-off decides nothing.
