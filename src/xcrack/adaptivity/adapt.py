@@ -17,7 +17,9 @@ from xcrack.base.errors import GeometryError, ProblemError, SizeError, collected
 from xcrack.mesh.mesh import Mesh
 from xcrack.model.problem import Problem, ProblemArgument
 
-_FIRST: dict[int, Callable[[Problem], Mesh]] = {2: sizes_2d.first_mesh, 3: sizes_3d.first_mesh}
+_FIRST: dict[int, Callable[[Problem, float], Mesh]] = {
+    2: lambda problem, _: sizes_2d.first_mesh(problem), 3: sizes_3d.coarse_mesh,
+}  # fmt: skip
 _NEXT: dict[int, Callable[[Indicators, float, float, int], Mesh | None]] = {
     2: sizes_2d.next_mesh, 3: sizes_3d.next_mesh,
 }  # fmt: skip
@@ -41,7 +43,8 @@ def adapt(
 ) -> Adaptation:
     """Refine the mesh of a scene until K is as accurate as wanted.
 
-    A first mesh resolves tips, kinks and fronts. Then rounds of: solve at order 2, K with its error
+    A first mesh resolves tips, kinks and fronts, these with cells as large as the tolerance lets
+    them be. Then rounds of: solve at order 2, K with its error
     bars, a finer mesh, until every bar is within the tolerance. In 2D cells are bisected that
     contribute much to the bars. In 3D there is no such share of a cell: those along the fronts
     become smaller by 1.5 each round, larger ones with the distance.
@@ -88,7 +91,7 @@ def adapt(
     problem = resolved_problem(problem)
     _check_scene(problem)
     load_states = [None] if states is None else states
-    scene = replace(problem, mesh=_FIRST[problem.mesh.dim](problem), order=_ORDER)
+    scene = replace(problem, mesh=_FIRST[problem.mesh.dim](problem, tolerance), order=_ORDER)
     return _adaptation_passes(scene, load_states, tolerance, most, progress)
 
 

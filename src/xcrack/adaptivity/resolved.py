@@ -78,7 +78,7 @@ def _points_along(crack: Crack, spacing: float) -> Floats:
 
 # Cells of a crack's size (half the radius of a penny) along its outline, by their longest edges.
 CELLS = 1.25
-_COARSER = 2.0  # than that, to see where the fronts are
+_COARSER = 4.0  # than that, to see where the fronts are
 _MOUTH = 0.5  # as `placing_3d` has it: share of a cell
 _FINE = 0.5  # of a cell: spacing of the places
 _MOST_ON_OUTLINES = 2000  # places along an outline

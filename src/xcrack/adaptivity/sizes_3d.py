@@ -28,6 +28,7 @@ from xcrack.mesh.refinement import refine
 from xcrack.model.problem import Problem
 from xcrack.sif.sif import SIF, KErrors
 
+_BAR, _RISE, _COARSEST = 0.0125, 2.0, 3.0  # bars over K on the first mesh, in pennies, and coarser
 _LEAST, _MOST = 1.5, 2.0  # times finer in a round: what less changes is no bar
 _POWER = 2.5  # of the cells' size with which bars fall at order 2, on graded meshes (measured)
 _BEND = 0.6  # of the radius of curvature of a front: the domains of K have to fit into it
@@ -36,11 +37,18 @@ _OPEN = 1.5  # error of K beside a free surface over the bar of two domains (mea
 _SMALLER = 1.3  # times finer that cells are at least where 1.5 was asked for
 
 
+def coarse_mesh(problem: Problem, tolerance: float) -> Mesh:
+    """The first mesh of a scene in 3D: cells along its fronts as large as the tolerance lets them.
+
+    Their bars are within it in about half of the scenes, else one more round is.
+    """
+    return first_mesh(problem, float(np.clip((tolerance / _BAR) ** (1 / _RISE), 1.0, _COARSEST)))
+
+
 def first_mesh(problem: Problem, coarser: float = 1.0) -> Mesh:
     """The mesh of a scene in 3D, finer along fronts where it is coarser than the crack is small."""
     problem = resolved_problem(problem)
-    places, sizes = _first_sizes(problem)
-    return refine(problem.mesh, size=graded_sizes(places, [coarser * size for size in sizes]))
+    return refine(problem.mesh, size=graded_sizes(*_first_sizes(problem, coarser)))
 
 
 def first_size(crack: Crack, mesh: Mesh) -> float:
@@ -56,7 +64,7 @@ def next_mesh(current: Indicators, tolerance: float, aim: float, most: int) -> M
     for c, (x, size) in enumerate(zip(places, first, strict=True)):
         if len(x):
             present = float(np.median(cell_sizes(problem.mesh, x) / size))
-            size = size * min(present, 1.0) / _refinement_factor(current, c, tolerance, aim)
+            size = size * present / _refinement_factor(current, c, tolerance, aim)
         sizes.append(size)
     mesh = refine(problem.mesh, size=graded_sizes(places, sizes))
     each = current.solutions[0].space.n_dof / len(problem.mesh.cells)
@@ -153,7 +161,7 @@ def _shorten_errors(sif: SIF, previous: SIF, finer: bool) -> SIF:
     return replace(sif, errors=KErrors(sif.eta, bar, sif.reasons))
 
 
-def _first_sizes(problem: Problem) -> tuple[list[Floats], list[Floats]]:
+def _first_sizes(problem: Problem, coarser: float = 1.0) -> tuple[list[Floats], list[Floats]]:
     """Places along the fronts of each crack, and the longest edges of the first mesh there."""
     places, sizes = [], []
     for crack in problem.placed:
@@ -162,7 +170,14 @@ def _first_sizes(problem: Problem) -> tuple[list[Floats], list[Floats]]:
         bend = np.maximum(_BEND * radii(lines, CELLS * size), _SHARPEST * size)
         places.append(points_between(lines))
         sizes.append(np.minimum(size, bend))
-    return places, with_room(places, sizes)
+    # Where cracks are near each other cells stay small all along: sizes that differ much within
+    # the reach of the tip functions leave a matrix that is not positive.
+    near = with_room(places, [coarser * size for size in sizes])
+    is_alone = [np.array_equal(a, coarser * b) for a, b in zip(near, sizes, strict=True)]
+    return places, [
+        a if alone else b
+        for a, b, alone in zip(near, with_room(places, sizes), is_alone, strict=True)
+    ]
 
 
 def _front(crack: Crack) -> Floats:
@@ -170,4 +185,4 @@ def _front(crack: Crack) -> Floats:
     return points_between([crack.points[front] for front in crack.fronts or ()])
 
 
-__all__ = ["first_mesh", "first_size", "next_mesh", "trusted_errors"]
+__all__ = ["coarse_mesh", "first_mesh", "first_size", "next_mesh", "trusted_errors"]

@@ -124,8 +124,8 @@ def is_within(x: Floats, edges: Floats) -> Bools:
 
 # Sizes of cells around lines: room between lines, and sizes that grow with the distance.
 
-_PLATEAU = 2.0  # cells around a front that are as small as those at it
-_SLOPE = 0.5
+_PLATEAU = 1.0  # cells around a front that are as small as those at it
+_SLOPE = 0.7
 _ROOM = 2.0  # cells between two fronts
 _CLOSEST = 1 / 16  # of the size of a crack: less room is none
 _LEVEL = 2.0**0.25  # sizes closer than this are taken for the smaller one
