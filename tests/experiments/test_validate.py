@@ -19,7 +19,7 @@ from xcrack.verification.experiments.outcome import (
     path_comparisons,
 )
 from xcrack.verification.experiments.page import bound_words, validation_page
-from xcrack.verification.experiments.trial import Trial
+from xcrack.verification.experiments.trial import Trial, by_others
 
 TRIALS = {trial.name: trial for trial in runner.TRIALS}
 
@@ -64,7 +64,7 @@ def test_every_test_names_what_is_read_and_what_is_recalled():
         assert test.license
         assert all(isinstance(word, str) and word for word in (*test.recalled, *test.remarks))
         assert test.measured
-    assert sum(read_experiment(name).dim == 3 for name in experiment_names()) == 1
+    assert sum(read_experiment(name).dim == 3 for name in experiment_names()) == 3
 
 
 def test_measured_numbers_of_a_folder_take_the_place_of_those_quoted(tmp_path):
@@ -202,6 +202,27 @@ def test_lives_of_half_of_the_panels_foretell_those_of_the_other_half():
     assert mean.value <= 0.03
     assert abs(life.value - 1) <= 0.03
     assert covered.value >= 30
+
+
+@pytest.mark.slow
+@pytest.mark.mission
+def test_branches_of_surface_cracks_under_shear_have_the_angles_that_were_measured():
+    outcome = outcome_of("factory_roof_2009", quick=False)
+    assert 65 <= outcome.find("angle of branches at the surface, mode II").predicted <= 77
+    assert 30 <= outcome.find("angle of branches at the deepest point, mode III").predicted <= 50
+    assert outcome.find("K_II over K_III at the deepest point").predicted < 1e-6
+
+
+def test_numbers_of_other_programs_stand_beside():
+    test = read_experiment("wagner_2018_b")
+    rows = {row.name: row.value for row in by_others(test, test.path)}
+    assert rows["by FRANC3D: distance of the path, rms"] == pytest.approx(0.67, abs=0.005)
+    assert rows["by phase field (Castillón): life over that of the test"] == 0.81
+    near = by_others(test, test.path[test.path[:, 0] <= 22], " up to x = 22")
+    assert [row.name.partition(": ")[2] for row in near] == [
+        "distance of the path, rms up to x = 22" for _ in range(2)
+    ]
+    assert all(row.value < 0.8 for row in near)
 
 
 @pytest.mark.slow

@@ -68,6 +68,20 @@ def test_parts_of_sides_end_where_they_were_asked_to():
     assert sum(row.force[1] for row in pushed) == pytest.approx(0.0, abs=1e-9)
 
 
+@pytest.mark.gmsh
+def test_a_flat_box_on_a_side_holds_all_of_its_points():
+    """Corners of a side that are no binary fractions are off the box by round-off."""
+    x, y = 0.1 + 0.2, 0.7 * 3
+    ends = [(-x, 0.0), (x, 0.0), (x, y), (-x, y)]
+    sets = {"upper": ((x, y / 3), (x, y)), "part": ((-x, y), (x / 3, y))}
+    mesh = xc.plate(outline=ends, size=0.17, sets=sets)
+    assert length(mesh, "upper") == pytest.approx(2 * y / 3, rel=ROUND_OFF)
+    assert length(mesh, "part") == pytest.approx(4 * x / 3, rel=ROUND_OFF)
+    slanted = xc.plate(outline=[(0, 0), (1, 0.1), (0.9, 1.1), (-0.1, 1)], size=0.1)
+    named = xc.part(slanted, "boundary", ((0.9, 0.1), (1.0, 1.1)), "flank")
+    assert length(named, "flank") == pytest.approx(np.hypot(0.1, 1), rel=ROUND_OFF)
+
+
 def test_a_part_of_a_set_of_any_mesh():
     """By a box and by a function, in 2D and 3D; refinement keeps it."""
     mesh = xc.box((0, 0, 0), (2, 1, 1), (8, 4, 4))

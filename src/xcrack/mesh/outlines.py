@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from xcrack.base.arrays import Floats, at
+from xcrack.base.arrays import Bools, Floats, at
 from xcrack.base.checks import point_coordinates, value_text
 from xcrack.base.errors import GeometryError
-from xcrack.mesh.parts import box_of
+from xcrack.mesh.parts import box_of, selector
 from xcrack.mesh.polygon import Arc, is_within, self_crossing
 
 Point = tuple[float, float]
@@ -204,13 +204,13 @@ def polygon_of(sides: Sequence[Side]) -> Floats:
 
 def split_sides(sides: Sequence[Side], sets: Mapping[str, Any]) -> list[Side]:
     """Sides with corners where boxes of sets end."""
-    limits: list[tuple[int, float, Floats, Floats]] = []
+    limits: list[tuple[int, float, Callable[[Floats], Bools]]] = []
     for name, where in sets.items():
         if not callable(where) and not _are_numbers(where):
-            box = box_of(where, 2, f"sets[{name!r}]")
+            what = f"sets[{name!r}]"
             limits += [
-                (axis, value, *box)
-                for corner in box
+                (axis, value, selector(where, 2, what))
+                for corner in box_of(where, 2, what)
                 for axis, value in enumerate(corner.tolist())
                 if np.isfinite(value)
             ]
@@ -218,10 +218,9 @@ def split_sides(sides: Sequence[Side], sets: Mapping[str, Any]) -> list[Side]:
     for side in sides:
         shares = {
             round(share, 12)
-            for axis, value, lower, upper in limits
+            for axis, value, is_inside in limits
             for share in side.crossings(axis, value)
-            if lower[1 - axis] <= side.at(np.array([share]))[0, 1 - axis] <= upper[1 - axis]
-            and _ROUND < share < 1 - _ROUND
+            if _ROUND < share < 1 - _ROUND and is_inside(side.at(np.array([share])))[0]
         }
         result += side.cut_at(sorted(shares))
     return result

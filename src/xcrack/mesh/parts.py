@@ -103,7 +103,8 @@ def selector(where: Where, dim: int, what: str) -> Callable[[Floats], Bools]:
     if callable(where):
         return lambda x: _asked(where, x, what)
     lower, upper = box_of(where, dim, what)
-    reach = 1e-9 * np.where(np.isfinite(upper - lower), upper - lower, 0.0)
+    ends = np.concatenate([lower, upper])
+    reach = 1e-9 * np.abs(ends[np.isfinite(ends)]).max(initial=0.0)  # a box may be flat
     lower, upper = lower - reach, upper + reach
     return lambda x: np.asarray(((x >= lower) & (x <= upper)).all(axis=1))
 

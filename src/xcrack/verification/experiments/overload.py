@@ -6,33 +6,22 @@ import numpy as np
 
 from xcrack.analysis.solve import solve
 from xcrack.base.arrays import Floats
-from xcrack.crack.lines import line_crack
 from xcrack.fatigue.retardation import plastic_zone
-from xcrack.mesh.plates import plate
-from xcrack.model.loads import bearing
 from xcrack.model.material import Isotropic
-from xcrack.model.problem import Problem
+from xcrack.sif.specimens import compact_tension
 from xcrack.sif.stress_intensity import stress_intensity
 from xcrack.verification.experiments.experiment import Experiment
 from xcrack.verification.experiments.outcome import Comparison, Curve, Outcome, Picture
 from xcrack.verification.experiments.trial import Trial
 
 _ZONES = {1.0: "width in plane stress", 2.0: "radius in plane stress", 3.0: "width in plane strain"}
-_CELLS = 25  # along the ligament
 
 
 def _K_over_length(test: dict[str, Any], a: Floats) -> Floats:
     """K per unit force of a compact specimen at lengths a from the load line."""
-    W, B = test["W"], test["B"]
-    mesh = plate(
-        1.25 * W, 1.2 * W, lower=(-0.25 * W, -0.6 * W), size=0.1 * W, size_near=W / _CELLS / 2,
-        holes=[((0.0, side * 0.275 * W), 0.125 * W) for side in (1, -1)],
-        along=[(float(a[0]), 0.0), (float(a[-1]), 0.0)], band=0.05 * W, transition=0.5 * W,
-    )  # fmt: skip
     steel = Isotropic(1e3 * test["E"], 0.3, "stress")
-    loads = [bearing(f"hole_{k}", (0.0, side / B)) for k, side in ((0, 1.0), (1, -1.0))]
-    cracks = [line_crack([(-0.26 * W, 0.0), (float(x), 0.0)]) for x in a]
-    problems = [Problem(mesh, steel, [crack], loads=loads) for crack in cracks]
+    tests = [compact_tension(test["W"], float(x), force=1.0 / test["B"]) for x in a]
+    problems = [each.problem(steel) for each in tests]
     return np.array([stress_intensity(solve(problem)).K_I[0] for problem in problems])
 
 

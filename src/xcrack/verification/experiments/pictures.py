@@ -22,7 +22,7 @@ _STYLES: Mapping[str, dict[str, Any]] = {
     },
     "predicted": {"color": "#c2184b", "lw": 1.8, "zorder": 5},
     "variant": {"lw": 1.1, "ls": "--", "zorder": 3},
-    "other": {"lw": 1.0, "ls": ":", "zorder": 2},
+    "other": {"lw": 1.5, "ls": ":", "zorder": 2},
 }
 _VARIANTS = ("#1f6fb4", "#2a8a5a", "#d08a1d", "#7a5aa6", "#5a7f8f")
 _MANY = 8  # curves of one role: drawn thin and grey

@@ -45,16 +45,14 @@ def _mesh(experiment: Experiment, size: float) -> Mesh:
     geometry = experiment.geometry
     (x0, y0), (x1, y1) = geometry["outline"]
     hole, tip = geometry["hole"], np.array(geometry["tip"])
-    mesh = plate(
-        x1 - x0, y1 - y0, lower=(x0, y0), holes=[(tuple(hole["center"]), hole["radius"])],
-        size=4.0, size_near=size, along=[(82.0, 27.5), tip.tolist(), *experiment.path.tolist()],
-        band=3.0, transition=15.0,
+    low, high = (y0 + y1) / 2 - geometry["band"], (y0 + y1) / 2 + geometry["band"]
+    bands = {"left_band": ((x0, low), (x0, high)), "right_band": ((x1, low), (x1, high))}
+    return plate(
+        outline=[(x0, y0), (x1, y0), (x1, y1), (x0, y1)],
+        holes=[(tuple(hole["center"]), hole["radius"])], size=4.0, size_near=size,
+        along=[(82.0, 27.5), tip.tolist(), *experiment.path.tolist()], band=3.0, transition=15.0,
+        sets={"left": [3], "right": [1], **bands},
     )  # fmt: skip
-    sets = {name: facets for name, facets in mesh.facet_sets.items() if name != "boundary"}
-    for side in ("left", "right"):
-        middle = mesh.points[sets[side], 1].mean(axis=1)
-        sets[f"{side}_band"] = sets[side][np.abs(middle - (y0 + y1) / 2) <= geometry["band"]]
-    return Mesh(mesh.points, mesh.cells, sets, curves=mesh.curves)
 
 
 def _supports(kind: str) -> list[Support]:
@@ -194,6 +192,9 @@ _WORDS = (
     "slows down in PMMA does; one toughness all along asks for a third more force at the end.",
     "Under sliding platens T along the crack is far below zero near the end, and steps as long as "
     "these then turn to and fro: the zigzag of that path is numerical.",
+    "The plate, 10 mm thick and 70 high, is taken in plane stress. Plane strain makes it "
+    "stiffer by 16 per cent, 11.9 kN/mm beside 10.5 to 10.9 measured, and moves the path by "
+    ".07 mm.",
     "With whole sides clamped K falls to zero from x = 30 on, which the test did not show: that "
     "pair is compared up to there.",
 )

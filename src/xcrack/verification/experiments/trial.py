@@ -16,7 +16,7 @@ from xcrack.model.problem import Problem
 from xcrack.runs.collect import collect
 from xcrack.runs.history import History
 from xcrack.verification.experiments.experiment import Experiment
-from xcrack.verification.experiments.outcome import Curve, Outcome
+from xcrack.verification.experiments.outcome import Comparison, Curve, Outcome, distances, rms
 
 ROOT_M = np.sqrt(1000.0)  # N/mm^1.5 in a MPa√m
 
@@ -85,4 +85,38 @@ def driving(history: History, crack: int = 0) -> tuple[Floats, Floats]:
     return np.stack([rows["x"], rows["y"]], axis=1), np.asarray(rows["dK_eq"])
 
 
-__all__ = ["ROOT_M", "Trial", "arc_of", "driving", "grown", "outline"]
+_OF_OTHERS = (
+    ("life_ratio", "life over that of the test", ""),
+    ("depth", "depth at the cycles of the test", "mm"),
+    ("angle", "angle at the surface", "degrees"),
+)
+
+
+def by_others(
+    experiment: Experiment, points: Floats | None = None, where: str = ""
+) -> list[Comparison]:
+    """What other programs, or their authors, published of the same test.
+
+    Parameters
+    ----------
+    experiment : Experiment
+    points : (n, 2) array, optional
+        Measured ones, from which the distance of their paths is taken here.
+    where : str
+        Said behind the name of that distance.
+    """
+    rows = []
+    for other in experiment.others:
+        start = f"by {other['program']}: "
+        if points is not None and "path" in other:
+            away = distances(points, np.array(other["path"]))
+            name = f"{start}distance of the path, rms{where}"
+            rows.append(Comparison(name, rms(away), unit="mm"))
+        for key, words, unit in _OF_OTHERS if not where else ():
+            values = np.atleast_1d(other.get(key, []))
+            rows += [Comparison(start + words, float(v), measure="number", unit=unit)
+                     for v in values]  # fmt: skip
+    return rows
+
+
+__all__ = ["ROOT_M", "Trial", "arc_of", "by_others", "driving", "grown", "outline"]

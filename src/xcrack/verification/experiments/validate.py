@@ -16,7 +16,7 @@ from xcrack.base.optional import require_package
 from xcrack.base.paths import system_errors, write_texts
 from xcrack.runs.versions import versions
 from xcrack.verification.experiments import (
-    ferrie,
+    fronts,
     half_disc,
     overload,
     rethore,
@@ -36,7 +36,7 @@ TRIALS: tuple[Trial, ...] = (
     *shear.TRIALS,
     *virkler.TRIALS,
     *overload.TRIALS,
-    *ferrie.TRIALS,
+    *fronts.TRIALS,
 )
 _UNWRITTEN = "the results cannot be written to"
 
