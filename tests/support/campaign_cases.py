@@ -22,12 +22,16 @@ def formula(a, load=1.0):
 
 
 def counted(a, folder):
-    """A case that leaves a mark each time it is run, and kills its process where asked to."""
+    """A case that leaves a mark each time it is run, and kills its process where asked to.
+
+    Once where a file asks for it, each time where that is a folder.
+    """
     marks = Path(folder)
     with open(marks / f"ran_{a}", "a") as file:
         file.write("x")
     if (marks / f"kill_{a}").exists():
-        (marks / f"kill_{a}").unlink()
+        if (marks / f"kill_{a}").is_file():
+            (marks / f"kill_{a}").unlink()
         time.sleep(0.2)
         os._exit(9)
     return {"twice": 2.0 * a}

@@ -184,9 +184,20 @@ def engine_of(workers: int, client: Any) -> Iterator[Engine]:
     elif workers == 1:
         yield Engine(lambda function, *arguments: _Done(partial(function, *arguments)))
     else:
-        context = multiprocessing.get_context("spawn")
-        with ProcessPoolExecutor(workers, mp_context=context) as pool:
-            yield Engine(pool.submit)
+        with _pool(workers) as engine:
+            yield engine
+
+
+@contextmanager
+def _pool(workers: int) -> Iterator[Engine]:
+    """Engine of other processes of this machine."""
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(workers, mp_context=context) as pool:
+        yield Engine(pool.submit)
+
+
+class WorkerDeathError(ProblemError):
+    """A process that ran cases died."""
 
 
 def _submit_of(client: Any) -> Callable[..., Any]:
@@ -215,7 +226,7 @@ def submit_case(engine: Engine, parameters: dict[str, Any], case: Callable[..., 
     except (KeyboardInterrupt, SystemExit):
         raise
     except BrokenProcessPool as error:
-        raise ProblemError(_died(parameters)) from error
+        raise WorkerDeathError(_died(parameters)) from error
     except Exception as error:
         raise ProblemError(
             f"campaign: the client did not take the case {parameters} "
@@ -271,7 +282,7 @@ def answer_of(engine: Engine, future: Any, parameters: dict[str, Any]) -> Any:
     except (KeyboardInterrupt, SystemExit):
         raise
     except BrokenProcessPool as error:
-        raise ProblemError(_died(parameters)) from error
+        raise WorkerDeathError(_died(parameters)) from error
     except BaseException as error:  # futures of a client that is cancelled raise no Exception
         raise ProblemError(
             f"campaign: the client gave no answer for the case {parameters} "
@@ -404,8 +415,8 @@ def campaign(
     ------
     ProblemError
         Cases that a file cannot hold, a parameter called error or seconds, a folder of another
-        case, a folder that another process writes to, or a worker that died: finished cases stay,
-        and the same call goes on.
+        case, a folder that another process writes to, or a worker of a client that died: finished
+        cases stay, and the same call goes on.
 
     Warns
     -----
@@ -414,12 +425,12 @@ def campaign(
 
     Notes
     -----
-    Errors in a case are rows, with their text; a run is never stopped by one. A folder belongs to
-    the function that its good rows are from: where all have failed, they are run anew with a mended
-    one. The first case is run
-    alone, so that kernels are compiled once and not by each worker. A case is known by its
-    parameters alone: options of xcrack that are added later change no name. A result with the name
-    of a parameter and another value is an error of its case.
+    Errors in a case are rows, with their text; a run is never stopped by one. With several workers
+    a case that kills its process is a row too, once it has done so alone. A folder belongs to the
+    function that its good rows are from: where all have failed, they are run anew with a mended
+    one. The first case is run alone, so that kernels are compiled once and not by each worker. A
+    case is known by its parameters alone: options of xcrack that are added later change no name. A
+    result with the name of a parameter and another value is an error of its case.
     """
     folder = path_of(path, "campaign: path", error=ProblemError)
     if not callable(case):
@@ -444,8 +455,7 @@ def campaign(
         result_names = [
             key for key, row in stored.items() if row is None or (again and bool(row["kind"]))
         ]
-        with engine_of(count, client) as engine:
-            _run(folder, case, every, result_names, engine)
+        _run_through_deaths(folder, case, every, result_names, count, client)
     study = Study(folder, tuple(_stored_case(folder, key) for key in every))
     if study.failed:
         first = study.failed[0]
@@ -495,45 +505,104 @@ def _list_of(values: Any, what: str, expectation: str) -> list[Any]:
     raise ProblemError(f"{what} = {value_text(values)}: give {expectation}.")
 
 
+def _run_through_deaths(
+    folder: Path,
+    case: Callable[..., Any],
+    every: Mapping[str, dict[str, Any]],
+    names: list[str],
+    workers: int,
+    client: Any,
+) -> None:
+    """Run the cases; one that kills its worker is a row, and the others go on in new workers.
+
+    A pool does not say which case its process died of. It takes them in order, so that it is one of
+    the first that have no answer: each of those is run in a process of its own.
+    """
+    remaining_names = list(names)
+    while remaining_names:
+        finished: set[str] = set()
+        try:
+            with engine_of(workers, client) as engine:
+                _run(folder, case, every, remaining_names, engine, finished)
+            return
+        except WorkerDeathError:
+            if client is not None:
+                raise
+        remaining_names = [key for key in remaining_names if key not in finished]
+        suspects = remaining_names[: 2 * workers + 1]  # under way, and handed out
+        for key in suspects:
+            _run_alone(folder, case, key, every[key])
+        remaining_names = remaining_names[len(suspects) :]
+
+
+def _run_alone(
+    folder: Path, case: Callable[..., Any], key: str, parameters: dict[str, Any]
+) -> None:
+    """Run a case in a process of its own; that it dies is a row."""
+    row: dict[str, Any] = {"parameters": parameters, "result": {}, "trace": "", "warnings": []}
+    try:
+        with _pool(1) as engine:
+            row = answer_of(engine, submit_case(engine, parameters, case), parameters)
+    except WorkerDeathError as error:
+        row |= {"error": _DEATH, "kind": type(error).__name__, "seconds": 0.0}
+    _store(folder, key, row)
+
+
+_DEATH = (
+    "the process that ran this case died twice, the second time with this case alone: it was "
+    "killed, out of memory, or ended by a fault in compiled code. Run it by itself to see, or "
+    "again with retry=True."
+)
+
+
 def _run(
     folder: Path,
     case: Callable[..., Any],
     every: Mapping[str, dict[str, Any]],
     names: list[str],
     engine: Engine,
+    finished: set[str],
 ) -> None:
     """Run the cases; each is stored as soon as it is finished, in whatever order."""
-    if not names:
-        return
     first, remaining_names = names[0], names[1:]
     _finish(engine, folder, first, every[first], submit_case(engine, every[first], case))
+    finished.add(first)
     futures: dict[str, Any] = {}
     try:
         for key in remaining_names:
             futures[key] = submit_case(engine, every[key], case)
         for key in finished_names(engine, futures):
             _finish(engine, folder, key, every[key], futures[key])
+            finished.add(key)
     except BaseException:
-        _store_finished(folder, every, engine, futures)
+        _store_finished(folder, every, engine, futures, finished)
         raise
 
 
 def _store_finished(
-    folder: Path, every: Mapping[str, dict[str, Any]], engine: Engine, futures: Mapping[str, Any]
+    folder: Path,
+    every: Mapping[str, dict[str, Any]],
+    engine: Engine,
+    futures: Mapping[str, Any],
+    finished: set[str],
 ) -> None:
     """Store what has been finished when a study is broken off, and call off the rest."""
     if engine.is_closed:  # it would wait for an answer that never comes
         return
     for key, future in futures.items():
-        if is_good(future) and _read(folder, key) is None:
+        if is_good(future) and key not in finished:
             _finish(engine, folder, key, every[key], future)
+            finished.add(key)
         call_off(future)
 
 
 def _finish(
     engine: Engine, folder: Path, key: str, parameters: dict[str, Any], future: Any
 ) -> None:
-    row = answer_of(engine, future, parameters)
+    _store(folder, key, answer_of(engine, future, parameters))
+
+
+def _store(folder: Path, key: str, row: Mapping[str, Any]) -> None:
     with written_whole(
         _file(folder, key), "a row cannot be written to", error=ProblemError
     ) as part:
@@ -545,10 +614,10 @@ def _check_header(folder: Path, case: Callable[..., Any]) -> None:
     given, header = describe("case", case), folder / _HEADER
     if header.exists():
         with system_errors("the study cannot be read from", header, error=ProblemError):
-            text = header.read_text(encoding="utf-8")
+            data = header.read_bytes()
         try:
-            stored = json.loads(text)["case"]
-        except (ValueError, KeyError, TypeError) as error:
+            stored = json.loads(data)["case"]
+        except (ValueError, KeyError, TypeError, RecursionError) as error:
             raise ProblemError(f"{header} is no header of a study: take another folder.") from error
         changed = differences(stored, given)
         rows = list(folder.glob("row_*.json"))
@@ -585,7 +654,7 @@ def _row_of(file: Path) -> dict[str, Any] | None:
         return None
     try:
         row = json.loads(file.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+    except (OSError, ValueError, RecursionError):
         return None
     if not isinstance(row, dict):
         return None
