@@ -177,7 +177,7 @@ def state(*sifs, pressed=(), beside=None):
     best, bar = values([sifs], [0], beside or (0.0,) * len(sifs))
     return SimpleNamespace(
         sifs=[sifs], solutions=[SimpleNamespace(at_rest=False)], best=best, bar=bar,
-        pressed=pressed, beside=beside or (0.0,) * len(sifs),
+        pressed=pressed, beside=beside or (0.0,) * len(sifs), scale=np.abs(best).max(),
     )  # fmt: skip
 
 

@@ -56,7 +56,8 @@ def adapt(
         (`Mesh.curves`) become smooth.
     tolerance : float
         Wanted error of K at every tip, or along all fronts away from free surfaces, in every state,
-        over the largest K of all.
+        over the largest K of all, but for cracks that symmetry keeps shut: K = 0 need not be known
+        better than to this share of a ten-thousandth of K by the mean energy of the body.
     states : sequence, optional
         Load states, as for `solve`.
     max_unknowns : int, optional
@@ -157,7 +158,9 @@ def _measure_pass(
     with collected_warnings(messages):
         new = _TRUSTED[scene.mesh.dim](indicators_of(scene, states), old)
     unknowns, seconds = new.solutions[0].space.n_dof, perf_counter() - start
-    rounds.append(AdaptationPass(len(scene.mesh.cells), unknowns, new.best, new.bar, seconds))
+    rounds.append(
+        AdaptationPass(len(scene.mesh.cells), unknowns, new.best, new.bar, new.scale, seconds)
+    )
     return new, messages
 
 

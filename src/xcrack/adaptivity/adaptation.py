@@ -22,6 +22,9 @@ class AdaptationPass:
         Best K of all states, cracks and tips, one after the other; states at rest are left out.
     bar : (k, 2) array, stress · √length
         Half-widths of their errors; nan where there is no estimate.
+    scale : float, stress · √length
+        What they are compared with: the largest best K, or where that is next to nothing a
+        ten-thousandth of K by the mean energy of the body.
     seconds : float
         Time of the round, its refinement included.
     """
@@ -30,13 +33,13 @@ class AdaptationPass:
     unknowns: int
     best: Floats
     bar: Floats
+    scale: float
     seconds: float
 
     @property
     def error(self) -> float:
-        """Largest half-width over the largest best K; nan where one of them is missing."""
-        scale = np.abs(self.best).max(initial=0.0)
-        return float(self.bar.max(initial=0.0) / scale) if scale > 0 else float("nan")
+        """Largest half-width over `scale`; nan where one of them is missing."""
+        return float(self.bar.max(initial=0.0) / self.scale) if self.scale > 0 else float("nan")
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from xcrack.analysis.solution import Solution
+from xcrack.analysis.solution import Solution, mean_stress
 from xcrack.analysis.solve import solve_states
 from xcrack.base.arrays import Bools, Floats, Ints, at
 from xcrack.base.errors import ProblemError
@@ -47,9 +47,27 @@ class Indicators:
 
     @property
     def error(self) -> float:
-        """Largest half-width over the largest best K; nan where one of them is missing."""
-        scale = np.abs(self.best).max(initial=0.0)
+        """Largest half-width over `scale`; nan where one of them is missing."""
+        scale = self.scale
         return float(self.bar.max(initial=0.0) / scale) if scale > 0 else float("nan")
+
+    @property
+    def scale(self) -> float:
+        """What errors of all K are compared with, stress · √length."""
+        return self.scale_of(self.best)
+
+    def scale_of(self, best: Floats) -> float:
+        """The largest of some best K, or where that is next to nothing a share of K by the energy.
+
+        A crack that is closed by symmetry has K = 0: what a mesh gives is its error, and no cell
+        is small enough for a share of that.
+        """
+        largest = float(np.abs(best).max(initial=0.0))
+        if not largest > 0:
+            return largest
+        size = max(self.problem.sizes, default=0.0)
+        K_of_energy = mean_stress(self.solutions) * np.sqrt(np.pi * size)
+        return max(largest, float(_FAINT * K_of_energy))
 
     @property
     def worst(self) -> str:
@@ -175,6 +193,7 @@ def _beside_in_3d(problem: Problem) -> tuple[float, ...]:
     return tuple(_SHARE * surface_size(crack, problem.mesh) for crack in problem.placed)
 
 
+_FAINT = 1e-4  # of K by the mean energy of the body: a smaller one counts as this
 _SHARE = 0.5  # of a crack's size, half the radius of a penny
 _BESIDE: dict[int, Callable[[Problem], tuple[float, ...]]] = {
     2: lambda problem: (0.0,) * len(problem.cracks),

@@ -177,7 +177,7 @@ def _ends(given: Indicators) -> list[int]:
 
 def next_mesh(current: Indicators, tolerance: float, aim: float, most: int) -> Mesh | None:
     """A finer mesh, or None where it would have too many unknowns."""
-    mesh, scale = current.problem.mesh, float(np.abs(current.best).max(initial=0.0))
+    mesh, scale = current.problem.mesh, current.scale
     each = current.solutions[0].space.n_dof / len(mesh.cells)
     for share in aim * 2.0 ** np.arange(1 + _GENTLER):
         target = tolerance * scale * share

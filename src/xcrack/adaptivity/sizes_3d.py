@@ -95,7 +95,7 @@ def error_of(given: Indicators, c: int) -> float:
             if len(bars_of_crack) or not len(sif.K)
             else np.full(1, np.nan)
         )
-    scale = np.abs(given.best).max(initial=0.0)
+    scale = given.scale
     return float(np.concatenate(bars).max() / scale) if scale > 0 else float("nan")
 
 

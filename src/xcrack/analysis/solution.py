@@ -1,6 +1,6 @@
 """What a solve returns: displacements, stresses, openings and contact, anywhere in the body."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from numbers import Real
@@ -291,6 +291,16 @@ class Solution:
                 "solution.inside(x)."
             )
         return cell, bary, sides_of(self.space, cell, bary, side), single
+
+
+def mean_stress(solutions: Sequence[Solution]) -> float:
+    """Stress of the mean energy of a body, in the state in which that is largest."""
+    if not solutions:
+        return 0.0
+    energy = max(0.0, *(solution.energy for solution in solutions))
+    body = solutions[0].problem
+    modulus = body.elasticity.largest_modulus
+    return float(np.sqrt(2 * energy * modulus / float(body.mesh.volume.sum())))
 
 
 def fields_at(

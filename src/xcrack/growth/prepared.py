@@ -183,7 +183,7 @@ def finer(rule: GrowthRule, steps_of: Steps, last: Step | None) -> tuple[Mesh, b
             return before, True
         if error <= wanted:
             break
-        largest = [float(np.abs(now.best).max(initial=0.0)) for now in good]
+        largest = [now.scale for now in good]
         goals = [wanted * max(K, _FAINT * max(largest)) for K in largest]
         places = [stages[k].places for k in there]
         smaller, own = twin.finer(good, goals, places, [sizes[k] for k in there])

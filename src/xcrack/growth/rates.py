@@ -6,6 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
+from xcrack.analysis.solution import mean_stress
 from xcrack.base.arrays import Bools, Floats, Ints
 from xcrack.base.errors import ProblemError, warn
 from xcrack.crack.crack import Crack
@@ -333,9 +334,7 @@ def _at_rest(problem: Problem, response: Response, dK_eq: Floats) -> Bools:
     closed = ~np.any(opening, axis=0)
     if not response.solutions or not closed.any():
         return np.zeros(len(dK_eq), dtype=bool)
-    energy = max(solution.energy for solution in response.solutions)
-    modulus = problem.elasticity.largest_modulus
-    stress = np.sqrt(2 * max(energy, 0.0) * modulus / float(problem.mesh.volume.sum()))
+    stress = mean_stress(response.solutions)
     dim, sizes = problem.mesh.dim, zip(problem.sizes, response.sif[0], strict=True)
     size = np.concatenate([law_size(dim, a, len(sif.x)) for a, sif in sizes])
     return np.asarray(closed & (dK_eq <= _FAINT * stress * np.sqrt(np.pi * size)))

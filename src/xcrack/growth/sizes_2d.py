@@ -50,7 +50,7 @@ def first_sizes(problem: Problem, stage: Stage) -> Floats:
 
 def error(now: Indicators) -> float:
     """Largest half-width of K over the largest K, of those that are known."""
-    scale = float(np.abs(now.best[np.isfinite(now.best)]).max(initial=0.0))
+    scale = now.scale_of(now.best[np.isfinite(now.best)])
     return float(now.bar[np.isfinite(now.bar)].max(initial=0.0)) / scale if scale > 0 else 0.0
 
 

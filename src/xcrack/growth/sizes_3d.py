@@ -33,7 +33,7 @@ def scout_mesh(problem: Problem) -> Mesh:
 def error(now: Indicators) -> float:
     """Mean half-width of K along the fronts of all states, over the largest K."""
     good = np.isfinite(now.bar).all(axis=1)
-    scale = float(np.abs(now.best[good]).max(initial=0.0))
+    scale = now.scale_of(now.best[good])
     return float(now.bar[good].max(axis=1).mean()) / scale if scale > 0 else 0.0
 
 
@@ -55,7 +55,7 @@ def finer(
     del places
     result = []
     for now, aim, size in zip(each, wanted, sizes, strict=True):
-        scale = float(np.abs(now.best[np.isfinite(now.best)]).max(initial=0.0))
+        scale = now.scale_of(now.best[np.isfinite(now.best)])
         over = error(now) * scale / aim if aim > 0 else 1.0
         result.append(size / np.clip(over, 1.0, _MOST**_POWER) ** (1 / _POWER))
     return each[0].problem.mesh, result
