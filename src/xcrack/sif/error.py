@@ -8,7 +8,7 @@ from scipy.spatial import cKDTree
 
 from xcrack.analysis.solution import Solution
 from xcrack.analysis.solve import solve_states
-from xcrack.base.arrays import Floats, at
+from xcrack.base.arrays import Bools, Floats, at
 from xcrack.base.errors import GeometryError, ProblemError
 from xcrack.base.machine import threads
 from xcrack.crack.crack import kink_numbers
@@ -17,7 +17,7 @@ from xcrack.estimate.shape import crack_shape, rim_shape
 from xcrack.estimate.surplus import shares
 from xcrack.mesh.locate import cell_sizes, contains
 from xcrack.mesh.mesh import Mesh
-from xcrack.mesh.polygon import points_between
+from xcrack.mesh.polygon import distance_to_simplices, points_between
 from xcrack.mesh.refinement import refine
 from xcrack.model.material import isotropic_part
 from xcrack.model.problem import Problem
@@ -45,6 +45,8 @@ class TipErrors:
     kinks, interfaces : (states, tips, 2) arrays, stress · √length
         Those of the cells at kinks, and where interfaces meet sides and the crack, with functions
         and their copies taken together.
+    junctions : (states, tips, 2) array, stress · √length
+        Those of the cells at the junctions of the crack.
     end : (states, tips, 2) array, stress · √length
         What moving the ends of contact by a group does; see `contact_end.end_changes`.
     bend, rim : (states, tips, 2) arrays, stress · √length
@@ -60,6 +62,7 @@ class TipErrors:
     shares: Floats
     kinks: Floats
     interfaces: Floats
+    junctions: Floats
     end: Floats
     bend: Floats
     bend_bar: Floats
@@ -92,11 +95,13 @@ def tip_errors(solutions: Sequence[Solution], crack: int) -> TipErrors:
         bend, bend_bar = crack_shape(solutions, result, crack, lambda: on_faces(solutions[0], tips))
         rim, chords = rim_shape(solutions, result.z)
     shape = (len(solutions), len(tips), 2)
+    at_junctions = _cells_near(solutions[0], _junction_places(solutions[0], crack))
     return TipErrors(
         result.eta.reshape(shape),
         result.shares.reshape(*shape, -1),
         _near(solutions[0], result, kinks_inside(solutions[0], crack)).reshape(shape),
         _near(solutions[0], result, _interface_ends(solutions[0], crack)).reshape(shape),
+        result.shares[..., at_junctions].sum(axis=-1).reshape(shape),
         result.end.reshape(shape),
         bend.reshape(shape),
         bend_bar.reshape(shape),
@@ -126,14 +131,27 @@ def _interface_ends(solution: Solution, crack: int) -> Floats:
 
 def _near(solution: Solution, result: Estimate, x: Floats) -> Floats:
     """Absolute contributions of the cells at some points `(states, m)`."""
-    mesh = solution.problem.mesh
     if not len(x):
         return np.zeros_like(result.eta)
-    middle = mesh.points[mesh.cells].mean(axis=1)
-    distance = np.linalg.norm(middle[:, None] - x, axis=2)
-    is_near = (distance < _NEAR * cell_sizes(mesh, x)).any(axis=1)
+    is_near = _cells_near(solution, x)
     every = [shares(result.surplus, parts, together=True)[is_near] for parts in result.parts]
     return np.asarray(np.sum(every, axis=1))
+
+
+def _cells_near(solution: Solution, x: Floats) -> Bools:
+    """Whether cells are at some points `(cells,)`."""
+    mesh = solution.problem.mesh
+    if not len(x):
+        return np.zeros(len(mesh.cells), dtype=bool)
+    middle = mesh.points[mesh.cells].mean(axis=1)
+    distance = np.linalg.norm(middle[:, None] - x, axis=2)
+    return np.asarray((distance < _NEAR * cell_sizes(mesh, x)).any(axis=1))
+
+
+def _junction_places(solution: Solution, crack: int) -> Floats:
+    """Where a crack ends on others, and others on it `(k, 2)`."""
+    junctions = solution.problem.junctions
+    return np.array([j.x for j in junctions if crack in (j.crack, j.on)]).reshape(-1, 2)
 
 
 # Bars of K at tips in 2D: how estimates become half-widths, and where there are none.
@@ -149,7 +167,10 @@ _ROOM = 1.5
 _OVERLAP = 0.02  # share of an overlap at one tip, as its negative K_I, that counts at all tips
 # Of the shares of cells at kinks, whose functions catch a part only of what is singular, and of
 # what moving the crack onto its kinks changes where faces press: no estimate has a sign there.
-_AT_KINKS, _MOVED = 6.0, 2.0
+_AT_KINKS, _MOVED = 8.0, 2.0
+# Of the shares of cells at junctions, where few functions tell the sides apart; in cells, the least
+# distance from a junction to the next tip, boundary or junction, and from a kink to the boundary.
+_AT_JUNCTIONS, _BRANCH, _KINK_ROOM = 4.0, 1.5, 1.0
 # Of the shares of cells where an interface meets a side or the crack, which are singular too.
 _AT_INTERFACES = 2.0
 
@@ -165,7 +186,9 @@ def tip_bars(solutions: Sequence[Solution], sifs: Sequence[SIF], crack: int) -> 
     crack : int
     """
     bars = bars_and_shares(solutions, sifs, crack)[0]
-    every = zip(bars, [_refusal_at_kinks(s, crack) for s in solutions], strict=True)
+    common = _refusal_of_short_parts(solutions[0], crack)
+    reasons = [common or _refusal_at_kinks(s, crack) for s in solutions]
+    every = zip(bars, reasons, strict=True)
     return [_without_estimate(one, reason) if reason else one for one, reason in every]
 
 
@@ -174,8 +197,8 @@ def bars_and_shares(
 ) -> tuple[list[KErrors], Floats]:
     """Bars of the tips, and the absolute contributions of the cells to the estimates.
 
-    Bars of cracks whose faces press at kinks that the cut rounds off are too short: `tip_bars` has
-    none there.
+    Bars of cracks whose faces press at kinks that the cut rounds off, or with parts shorter than a
+    cell at junctions and kinks, are too short: `tip_bars` has none there.
 
     Parameters
     ----------
@@ -261,6 +284,7 @@ def _bars(
     )
     bar = np.maximum(bar, _AT_KINKS * errors.kinks[k])
     bar = np.maximum(bar, _AT_INTERFACES * errors.interfaces[k])
+    bar = np.maximum(bar, _AT_JUNCTIONS * errors.junctions[k])
     if any(_faces_press(solution, crack, x) for x in kinks_inside(solution, crack)):
         eta = errors.rim[k].copy()
         bar += _MOVED * np.abs(errors.bend[k])
@@ -314,6 +338,45 @@ def _refusal_at_kinks(solution: Solution, crack: int) -> str:
                 "mesh that is finer there"
             )
     return ""
+
+
+def _refusal_of_short_parts(solution: Solution, crack: int) -> str:
+    """Why a part of a crack at a junction or a kink is too short for an estimate, or nothing.
+
+    What the functions of its few cells cannot show, those of the surplus space cannot either.
+    """
+    problem = solution.problem
+    mesh, junctions = problem.mesh, problem.junctions
+    for j in junctions:
+        if crack not in (j.crack, j.on):
+            continue
+        lines = [problem.placed[c] for c in (j.crack, j.on)]
+        ends = [line.points[i] for line in lines for i in line.tips or ()]
+        others = [k.x for k in junctions if {k.crack, k.on} & {j.crack, j.on}]
+        away = np.linalg.norm(np.array([*ends, *others]) - j.x, axis=1)
+        room, size = _room(mesh, j.x), cell_sizes(mesh, j.x[None])[0]
+        room = min([room, *away[away > _SAME * size]])
+        if room < _BRANCH * size:
+            return (
+                f"the next tip, junction or boundary is {room / size:.1f} cells from the junction "
+                f"at {at(j.x)}, and bars hold from {_BRANCH:g} on: refine the mesh there"
+            )
+    for x in kinks_inside(solution, crack):
+        room, size = _room(mesh, x), cell_sizes(mesh, x[None])[0]
+        if room < _KINK_ROOM * size:
+            return (
+                f"the boundary is {room / size:.1f} cells from the kink at {at(x)}, and bars hold "
+                f"from {_KINK_ROOM:g} on: refine the mesh there"
+            )
+    return ""
+
+
+_SAME = 1e-6  # cells: nearer points are one
+
+
+def _room(mesh: Mesh, x: Floats) -> float:
+    """Distance of a point to the boundary."""
+    return float(distance_to_simplices(x, mesh.points[mesh.boundary]).min())
 
 
 def _refusal_of_polygon(change: Floats, bar: Floats) -> str:
