@@ -5,6 +5,7 @@ import inspect
 import pytest
 
 import xcrack as xc
+from fuzz import damage
 from fuzz.kinds import NONSENSE, VALID
 from fuzz.run import PARTS, TABLE, drawn, run, table
 from xcrack.fatigue.law import GrowthLaw, Threshold
@@ -125,3 +126,24 @@ def test_verdicts_know_what_they_judge():
         for kind, values in cases:
             for value in values:
                 assert kind.verdict(value) == verdict, (kind, value)
+
+
+def test_some_damaged_files(capsys):
+    """A file in a hundred of each class; gmsh of a process of its own is left to the long one."""
+    names = [draw.__name__ for draw in damage.CLASSES if draw is not damage.step_files]
+    table, faults = damage.run(40213, 0.01, names)
+    with capsys.disabled():
+        print(f"\n{damage.report(table)}")
+    assert not faults, "\n" + "\n".join(faults)
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(3000)
+@pytest.mark.parametrize("seed", [51307])
+def test_damaged_files(seed, capsys):
+    """Case files, rows, saved files, decks, pipes, sizes, depth, names that lead out, threads."""
+    table, faults = damage.run(seed)
+    with capsys.disabled():
+        print(f"\ndamaged files, seed {seed}\n{damage.report(table)}")
+    assert sum(sum(counts.values()) for counts in table.values()) >= 1500
+    assert not faults, "\n" + "\n".join(faults)

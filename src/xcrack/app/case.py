@@ -91,7 +91,7 @@ def read_case(path: FileName, changes: Mapping[str, Any] | None = None) -> CaseF
     root.known(_SECTIONS)
     for name in ("mesh", "material"):
         if name not in root:
-            root.refuse("", f"the table [{name}] is missing.")
+            root.refuse("", f"the table [{name}] is missing: give it.")
     mesh = values.value_of_table(root.table("mesh"), values.MESHES)
     material = _material(root.table("material"))
     solving = root.table("solve")
@@ -156,7 +156,7 @@ def _growth(table: Table) -> Mapping[str, Any]:
     options = [name for name in GrowthOptions.__annotations__ if name not in ("solver", "response")]
     table.known(("law", "criterion", "cycle", "spectrum", "da", *options))
     if "law" not in table:
-        table.refuse("", "the key 'law' is missing.")
+        table.refuse("", "the key 'law' is missing: give it.")
     criterion = table.text("criterion", "max_hoop_stress")
     if criterion not in values.CRITERIA:
         table.refuse("criterion", f"known are {', '.join(values.CRITERIA)}.")

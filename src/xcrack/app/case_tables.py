@@ -82,7 +82,7 @@ class Table:
         """A key that is text."""
         value = self.content.get(name, default)
         if value is None:
-            self.refuse("", f"the key {name!r} is missing.")
+            self.refuse("", f"the key {name!r} is missing: give it.")
         if not isinstance(value, str):
             self.refuse(name, f"{value!r:.60} is no text: put it into quotes.")
         return value
@@ -132,6 +132,10 @@ def read_tables(path: Path, changes: Mapping[str, Any] | None = None) -> Table:
         line = int(place[1]) if place else text.count("\n") + 1
         raise ProblemError(
             f"{path}, line {line}: this is no toml ({error}); texts stand in quotes, lists in [ ]."
+        ) from error
+    except RecursionError as error:
+        raise ProblemError(
+            f"{path}: lists or tables are nested too deeply: give those that the keys need."
         ) from error
     for key, value in (changes or {}).items():
         _change(content, key, value, path)

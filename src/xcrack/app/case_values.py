@@ -112,7 +112,7 @@ def called_with(
     table.known([*besides, *parameters], what)
     for name, parameter in parameters.items():
         if parameter.default is parameter.empty and name not in table:
-            table.refuse("", f"the key {name!r}{what} is missing.")
+            table.refuse("", f"the key {name!r}{what} is missing: give it.")
     given: dict[str, Any] = {}
     for name in table.content:
         if name in besides:

@@ -182,7 +182,7 @@ def _value(text: str) -> Any:
     """A number, a flag or a text without its quotes."""
     try:
         value = tomllib.loads(f"v = {text}")["v"]
-    except tomllib.TOMLDecodeError:
+    except (tomllib.TOMLDecodeError, RecursionError):
         return text
     return value if isinstance(value, bool | int | float | str) else text
 

@@ -89,13 +89,23 @@ def system_errors(
         For an OSError; it names the path, what the system said, and what to do.
     """
     try:
-        if "read" in what and path.is_char_device():  # some give bytes without end
-            raise error(f"{what} {_shown_path(path)}: it is a device: give the path of a file.")
+        kind = _endless_kind(path) if "read" in what else ""
+        if kind:
+            raise error(f"{what} {_shown_path(path)}: it is a {kind}: give the path of a file.")
         yield
     except OSError as cause:
         reason = cause.strerror or str(cause) or type(cause).__name__
         mend = _MEND.get(cause.errno or 0, "check the path")
         raise error(f"{what} {_shown_path(path)}: {reason}: {mend}.") from cause
+
+
+def _endless_kind(path: Path) -> str:
+    """What a path is that may give bytes without end, or none for ever; empty for others."""
+    if path.is_char_device():
+        return "device"
+    if path.is_fifo():
+        return "pipe"
+    return "socket" if path.is_socket() else ""
 
 
 def _shown_path(path: Path) -> str:

@@ -60,7 +60,8 @@ def read_spectrum(
         except ValueError:
             if table:
                 raise ProblemError(
-                    f"{file}, line {n}: {line.strip()!r:.60} is no number."
+                    f"{file}, line {n}: {line.strip()!r:.60} is no number: give "
+                    "numbers, one line for each of them."
                 ) from None
             continue
         if not np.isfinite(values).all():

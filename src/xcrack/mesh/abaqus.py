@@ -681,7 +681,8 @@ class _SetTable:
         first, last, *more = (keyword.whole(entry, number, "a number") for entry in entries[:3])
         step = more[0] if more else 1
         if not step or last - first > _MOST_MEMBERS * abs(step):
-            keyword.refuse(f"GENERATE from {first} to {last} makes too many members.", number)
+            words = f"GENERATE from {first} to {last} makes too many members: give those there are."
+            keyword.refuse(words, number)
         scope = _instance_of(line, self.instances)
         labels = range(first, last + 1, step)
         rows = [self.numbers.get((scope, label), -1) for label in labels]

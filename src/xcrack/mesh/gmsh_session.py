@@ -1,6 +1,7 @@
 """One gmsh session with every option set, that leaves nothing behind."""
 
 import re
+import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from math import hypot
@@ -85,12 +86,15 @@ def import_gmsh() -> ModuleType:
         ) from error.__cause__
 
 
+_ONE_AT_A_TIME = threading.RLock()  # two threads in gmsh end the process
+
+
 @contextmanager
 def session(**options: float) -> Iterator[ModuleType]:
     """Open a gmsh model of its own, with known options, and remove it at the end.
 
     A session that the caller has open is used as it is: its models stay, its options come back.
-    gmsh holds one state a process, so sessions must not run in two threads at once.
+    gmsh holds one state a process: sessions of several threads run one after the other.
 
     Parameters
     ----------
@@ -110,6 +114,11 @@ def session(**options: float) -> Iterator[ModuleType]:
     """
     gmsh = import_gmsh()
     settings = {**_OPTIONS, **{name.replace("__", "."): value for name, value in options.items()}}
+    with _ONE_AT_A_TIME:
+        yield from _open_session(gmsh, settings)
+
+
+def _open_session(gmsh: ModuleType, settings: Mapping[str, float]) -> Iterator[ModuleType]:
     guest = bool(gmsh.isInitialized())
     if not guest:
         # interruptible=True would take over SIGINT for the rest of the process.

@@ -157,7 +157,7 @@ class DeckBody:
         if not model.body_groups:
             raise MeshError(
                 f"{model.path.name} has no triangles, quadrilaterals, tetrahedra, pyramids, prisms "
-                "or hexahedra of which a body could be made."
+                "or hexahedra of which a body could be made: export the elements too."
             )
         self.dim, self.plane, self.thickness = model.dim, _plane(model), 1.0
         self.materials = _materials(model)
