@@ -460,7 +460,7 @@ def _columns(keyword: Keyword, width: int) -> Floats:
         for line, row in keyword.rows
     ]
     if not rows:
-        keyword.refuse("its data line is missing.", error=ProblemError)
+        keyword.refuse("its data line is missing: give it.", error=ProblemError)
     return np.array(rows)
 
 
