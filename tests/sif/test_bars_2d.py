@@ -277,7 +277,7 @@ def K_and_bars(name, levels):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", OFF_BY_BARS)
 def test_no_bar_that_does_not_hold_at_junctions_and_kinks(name):
-    """Against cells four times smaller: within 1.5 bars, or nan with a reason; once 3 to 39 bars."""
+    """Cells four times smaller: within 1.5 bars, or nan with a reason; it was 3 to 39 bars."""
     for sif, fine in zip(K_and_bars(name, 0), K_and_bars(name, 2), strict=True):
         has_bar = np.isfinite(sif.bar)
         off = np.abs(sif.best - fine.best)
