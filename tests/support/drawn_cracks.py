@@ -22,7 +22,7 @@ AGREE = 0.2  # largest difference of the two references, as a share of the bar
 AGREE_K = 5e-3  # and of the largest K, where there is no bar
 TRUTH_EVERY = 5
 # Finest cells of the references, over the size of the body, and the share by which cells grow away.
-FINE = {2: (1 / 60, 1 / 160), 3: (0.5, 0.35)}  # in 3D over the cell size
+FINE = {2: (1 / 60, 1 / 160), 3: (0.4, 0.27)}  # in 3D over the cell size
 _GROWS = 0.2
 _WIDEST = {2: (0.14, 0.09)}
 _LEAST = 1e-6  # of the largest K: what nobody can tell apart
@@ -296,7 +296,7 @@ def tee_of_sheets(rng, n):
     main = scenes_space.half_sheet(rng.uniform(0.3, 0.6), rng.uniform(-0.3, 0.1), 0.0)
     z, x = main.points[0, 2], rng.uniform(-0.5, 0.0)
     above = z + rng.uniform(0.35, 0.55)
-    other = xc.plane_crack([(x, -2, z - 0.2), (x, 2, z - 0.2), (x, 2, above), (x, -2, above)])
+    other = xc.plane_crack([(x, -2, z - 1.2), (x, 2, z - 1.2), (x, 2, above), (x, -2, above)])
     a, b, c = main.points[main.faces[0]]
     return [main, xc.arm(other, 0, 1 if np.cross(b - a, c - a)[2] > 0 else -1)]
 
