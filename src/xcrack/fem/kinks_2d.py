@@ -6,7 +6,8 @@ slide around what is round, however small. Therefore mesh edges near kinks are c
 polyline crosses them, and the cell of a kink is split along both pieces of the crack.
 """
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -115,13 +116,16 @@ def sharpened_cut(
         if len(c)
     ]
     cells_near = np.intersect1d(np.concatenate([*reach, np.zeros(0, np.int64)]), cells)
+    on_points = [
+        k for k, c in zip(numbers, cells_at_kinks, strict=True) if _is_point(mesh, c, line[k])
+    ]
     if not len(cells_near):
-        return NO_KINKS, positions
+        return replace(NO_KINKS, points=lock(line[on_points].reshape(-1, 2))), positions
     edges = np.unique(mesh.cell_to_edge[cells_near])
     edges = edges[~np.isnan(positions[edges])]
     moved = _crossings(mesh, level_set, edges, positions)
     changed = ~np.isnan(positions) & (moved != positions)
-    where, points = _vertices(mesh, level_set, cells_near, moved, numbers)
+    where, points = _vertices(mesh, level_set, cells_near, moved, numbers, on_points)
     redone = changed[mesh.cell_to_edge[cells]].any(axis=1) | np.isin(cells, list(where))
     rows = np.sort(cells[redone])
     values = _values(mesh, level_set.phi, rows, moved)
@@ -129,6 +133,12 @@ def sharpened_cut(
     for cell, at in where.items():
         vertex[np.searchsorted(rows, cell)] = at
     return Kinks(lock(points), lock(rows), lock(values), lock(vertex)), moved
+
+
+def _is_point(mesh: Mesh, cells: Ints, x: Floats) -> bool:
+    """Whether a kink in some cells is a point of the mesh: pieces along edges cut no cell there."""
+    away = np.linalg.norm(mesh.points[mesh.cells[cells]] - x, axis=2)
+    return bool((away <= _AT * mesh.cell_size[cells, None]).any())
 
 
 def _crossings(mesh: Mesh, level_set: LevelSet, edges: Ints, positions: Floats) -> Floats:
@@ -155,12 +165,18 @@ def _crossings(mesh: Mesh, level_set: LevelSet, edges: Ints, positions: Floats) 
 
 
 def _vertices(
-    mesh: Mesh, level_set: LevelSet, cells: Ints, positions: Floats, numbers: Ints
+    mesh: Mesh,
+    level_set: LevelSet,
+    cells: Ints,
+    positions: Floats,
+    numbers: Ints,
+    on_points: Sequence[int],
 ) -> tuple[dict[int, Floats], Floats]:
     """Cells that have a kink inside, with its place, and all kinks of the cut `(k, 2)`.
 
     The cell of a kink is the one that the crack enters by the piece before it and leaves by the
-    piece behind it. A kink that sticks out of it is moved to its side.
+    piece behind it. A kink that sticks out of it is moved to its side. One on a point of the mesh
+    is in no cell.
     """
     line = level_set.line
     ends = np.stack([_crossing_ends(v) for v in _values(mesh, level_set.phi, cells, positions)])
@@ -172,7 +188,7 @@ def _vertices(
     where, points = {}, []
     for k in numbers:
         touch = np.linalg.norm(x - line[k], axis=2).min(axis=1) <= _AT * mesh.cell_size[cells]
-        if touch.any():
+        if touch.any() or k in on_points:
             points.append(line[k])
             continue
         inner = (first < numbers[:, None]) & (numbers[:, None] <= last)
