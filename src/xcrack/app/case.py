@@ -1,33 +1,47 @@
-"""A case file read: problem, load states, growth, and where the results go."""
+"""A case file read: problem, load states, growth, what is made of it, where the results go."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields, replace
+from functools import partial
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
+from xcrack.adaptivity.adapt import adapt
+from xcrack.analysis.solve import solve
 from xcrack.app import case_values as values
-from xcrack.app.case_histories import loading, retardation_of
+from xcrack.app.case_assessment import inspection_of, life_of, strength_of
+from xcrack.app.case_histories import load_states, loading, retardation_of
 from xcrack.app.case_tables import Table, read_tables
-from xcrack.base.arguments import FileName, check_arguments
+from xcrack.base.arguments import FileName, arguments_of, check_arguments
 from xcrack.base.checks import value_text
 from xcrack.base.errors import ProblemError, XcrackError
-from xcrack.base.units import LENGTH, NUMBER, TOUGHNESS
+from xcrack.base.units import LENGTH
 from xcrack.fatigue.law import GrowthLaw
 from xcrack.fatigue.retardation import plastic_zone
-from xcrack.growth.options import GrowthOptions
+from xcrack.growth.options import GrowthOptions, GrowthRule
+from xcrack.linalg.direct import pardiso
+from xcrack.mesh.mesh import Mesh
+from xcrack.mesh.parts import part, selector
+from xcrack.mesh.refinement import refine
+from xcrack.model.deck import read_deck
 from xcrack.model.loads import Load
 from xcrack.model.material import Isotropic, Material, MaterialSets
 from xcrack.model.numerics import Numerics
 from xcrack.model.problem import Problem
 from xcrack.model.supports import Support
 
-_SECTIONS = ("title", "units", "mesh", "material", "cracks", "supports", "loads", "solve",
-             "numerics", "growth", "output")  # fmt: skip
-_OPTIONS = {"K_c": TOUGHNESS}  # of grow, that have a unit
+_BODIES = ("mesh", "deck", "specimen")  # of which a file has one
+_SECTIONS = ("title", "units", *_BODIES, "material", "cracks", "supports", "loads", "handbook",
+             "solve", "numerics", "growth", "life", "inspection", "strength", "output")  # fmt: skip
+_MORE_OF_MESH = ("refine", "parts", "cell_sets")  # beside the arguments of what makes it
+_CHOICES = ("contact", "order", "friction")  # of the problem
+_SOLVING = ("error", "solver", "tolerance", "max_unknowns")  # of solve and adapt
 _TABLES = ("law", "criterion", "cycle", "spectrum", "retardation", "link_up")  # of growth
-_OUTPUT = ("folder", "pictures", "warp")
+_OUTPUT = ("folder", "pictures", "warp", "keep_solutions")
 _METHODS = ("contact_method", "tip_basis", "level_sets")  # of numerics, to compare with
+_FUNCTIONS = ("response",)  # options of growth that a script alone can give
+_SOLVERS = {"pardiso": pardiso}
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,8 +53,8 @@ class CaseFile:
     path : Path
     title : str
     problem : Problem
-    states : tuple of float, optional
-        Factors of the loads to solve for; None: the loads as they are.
+    states : tuple of load states, optional
+        Factors, or lists of loads, to solve for; None: the loads as they are.
     growth : mapping, optional
         Arguments of `grow` beside the problem; None where nothing grows.
     folder : Path
@@ -49,16 +63,31 @@ class CaseFile:
         Fields to draw.
     warp : float
         Displacements are drawn this many times as large.
+    solving : mapping
+        Arguments of `solve`, or with a tolerance of `adapt`, beside problem and states.
+    life, inspection, strength : mapping, optional
+        Arguments of `life`, `inspection` and `residual_strength` beside the history; None where
+        they are not asked for.
+    keep_solutions : bool
+        As of `collect`.
+    units : str, optional
+        Force, length and stress of the file, as `report` takes them.
     """
 
     path: Path
     title: str
     problem: Problem
-    states: tuple[float, ...] | None
+    states: tuple[Any, ...] | None
     growth: Mapping[str, Any] | None
     folder: Path
     pictures: tuple[str, ...]
     warp: float
+    solving: Mapping[str, Any] = field(default_factory=dict)
+    life: Mapping[str, Any] | None = None
+    inspection: Mapping[str, Any] | None = None
+    strength: Mapping[str, Any] | None = None
+    keep_solutions: bool = True
+    units: str | None = None
 
 
 @check_arguments()
@@ -89,51 +118,128 @@ def read_case(path: FileName, changes: Mapping[str, Any] | None = None) -> CaseF
         )
     root = read_tables(file, {str(key): value for key, value in (changes or {}).items()})
     root.known(_SECTIONS)
-    for name in ("mesh", "material"):
-        if name not in root:
-            root.refuse("", f"the table [{name}] is missing: give it.")
-    mesh = values.value_of_table(root.table("mesh"), values.MESHES)
-    material = _material(root.table("material"))
-    solving = root.table("solve")
-    solving.known(("contact", "order", "friction", "states"))
-    scene: dict[str, Any] = {
+    problem = _problem(root)
+    solving, output = root.table("solve"), root.table("output")
+    output.known(_OUTPUT)
+    growth = _growth(root.table("growth")) if "growth" in root else None
+    for name in ("life", "inspection", "strength"):
+        if name in root and growth is None:
+            root.refuse(name, "it is of a growth run: give the table [growth] too.")
+    units = root.source.units
+    return CaseFile(
+        path=file,
+        title=root.text("title", file.stem),
+        problem=problem,
+        states=load_states(solving, "states") if "states" in solving else None,
+        growth=growth,
+        folder=file.parent / output.text("folder", f"{file.stem}_results"),
+        pictures=tuple(_texts(output, "pictures")),
+        warp=_number(output, "warp", 0.0),
+        solving=_solving(solving),
+        life=life_of(root.table("life"), problem, growth) if growth and "life" in root else None,
+        inspection=inspection_of(root.table("inspection")) if "inspection" in root else None,
+        strength=strength_of(root.table("strength"), problem, growth)
+        if growth and "strength" in root
+        else None,
+        keep_solutions=_flag(output, "keep_solutions", True),
+        units=f"{units.force}, {units.length}, {units.stress}" if units.stress else None,
+    )
+
+
+def _problem(root: Table) -> Problem:
+    """Body, material, cracks, supports, loads and choices; of a deck or specimen what it has."""
+    given_bodies = [name for name in _BODIES if name in root]
+    if len(given_bodies) != 1:
+        root.refuse(
+            given_bodies[-1] if given_bodies else "",
+            "give one of [mesh], [deck] and [specimen]."
+            if given_bodies
+            else "the table [mesh] is missing.",
+        )
+    scene: dict[str, Any] = {}
+    if "material" in root:
+        scene["material"] = _material(root.table("material"))
+    scene |= {
         name: [values.value_of_table(table, allowed) for table in root.tables(name)]
         for name, allowed in (
             ("cracks", values.CRACKS),
             ("supports", values.makers_of(Support)),
             ("loads", values.makers_of(Load)),
+            ("handbook", values.HANDBOOK),
         )
+        if name in root
     }  # fmt: skip
-    numerics = _numerics(root.table("numerics"))
-    named = [name for name in ("contact", "order", "friction") if name in solving]
-    chosen = {name: solving.value(name, None) for name in named}
+    scene["numerics"] = _numerics(root.table("numerics"))
+    solving = root.table("solve")
+    solving.known((*_CHOICES, "states", *_SOLVING))
+    chosen = {name: values.argument_of(solving, name, Problem) for name in _CHOICES
+              if name in solving}  # fmt: skip
+    (body,) = given_bodies
+    table = root.table(body)
+    if body == "mesh":
+        mesh = _mesh(table)
+    elif body == "deck":
+        deck = values.called_with(_without(table, _MORE_OF_MESH), read_deck)
+        deck = replace(deck, mesh=_changed_mesh(table, deck.mesh))
+    else:
+        specimen = values.value_of_table(table, values.SPECIMENS)
+    if "material" not in scene and (body != "deck" or deck.material is None):
+        root.refuse("", "the table [material] is missing: give it.")
     try:
-        problem = Problem(mesh, material, **scene, **chosen, numerics=numerics)
+        if body == "mesh":
+            return Problem(mesh, **scene, **chosen)
+        if body == "deck":
+            return deck.problem(**scene, **chosen)  # type: ignore[no-any-return]
+        return specimen.problem(**scene, **chosen)  # type: ignore[no-any-return]
     except XcrackError as error:
         (solving if chosen else root).wrap(error)
-    output = root.table("output")
-    output.known(_OUTPUT)
-    return CaseFile(
-        path=file,
-        title=root.text("title", file.stem),
-        problem=problem,
-        states=_states(solving),
-        growth=_growth(root.table("growth")) if "growth" in root else None,
-        folder=file.parent / output.text("folder", f"{file.stem}_results"),
-        pictures=tuple(_texts(output, "pictures")),
-        warp=_number(output, "warp", 0.0),
-    )
+
+
+def _without(table: Table, names: tuple[str, ...]) -> Table:
+    content = {name: value for name, value in table.content.items() if name not in names}
+    return Table(table.source, table.key, content)
+
+
+def _mesh(table: Table) -> Mesh:
+    """A mesh by the function that its kind names, and what is made of it."""
+    mesh = values.value_of_table(_without(table, _MORE_OF_MESH), values.MESHES)
+    return _changed_mesh(table, mesh)
+
+
+def _changed_mesh(table: Table, mesh: Mesh) -> Mesh:
+    """The mesh refined, with parts of its facet sets, and cell sets by boxes."""
+    if "refine" in table:
+        listed = isinstance(table.content["refine"], list)
+        for each in table.tables("refine") if listed else [table.table("refine")]:
+            mesh = values.called_with(each, refine, given={"mesh": mesh})
+    for each in table.tables("parts"):
+        mesh = values.called_with(each, part, given={"mesh": mesh})
+    if "cell_sets" in table:
+        boxes = table.table("cell_sets")
+        try:
+            mesh = mesh.with_cell_sets({
+                name: selector(boxes.value(name, LENGTH), mesh.dim, f"cell set {name!r}")
+                for name in boxes.content
+            })  # fmt: skip
+        except XcrackError as error:
+            boxes.wrap(error)
+    return mesh
 
 
 def _material(table: Table) -> Material:
     """One material, or by tables [material.name] one for each cell set."""
     parts = table.content.values()
-    if parts and all(isinstance(part, dict) for part in parts):
+    if parts and all(isinstance(part, dict) for part in parts) and not _is_one(table, Isotropic):
         return MaterialSets({
             name: values.value_of_kind(table.table(name), Material, Isotropic)
             for name in table.content
         })  # fmt: skip
     return values.value_of_kind(table, Material, Isotropic)  # type: ignore[no-any-return]
+
+
+def _is_one(table: Table, kind: type) -> bool:
+    """Whether the tables are arguments of one value, rather than values by name."""
+    return all(name in kind.__annotations__ for name in table.content)
 
 
 def _numerics(table: Table) -> Numerics:
@@ -151,38 +257,80 @@ def _law(table: Table) -> Any:
     return values.value_of_table(table, makers)
 
 
+def _criterion(table: Table) -> Any:
+    """A criterion by its name, or a table of its kind with its choices."""
+    if not isinstance(table.content.get("criterion"), dict):
+        criterion = table.text("criterion", "max_hoop_stress")
+        if criterion not in values.CRITERIA:
+            table.refuse("criterion", f"known are {', '.join(values.CRITERIA)}.")
+        return values.CRITERIA[criterion]
+    chosen = table.table("criterion")
+    kind = chosen.text("kind")
+    if kind not in values.CRITERIA:
+        chosen.refuse("kind", f"known are {', '.join(values.CRITERIA)}.")
+    criterion_of_kind = values.CRITERIA[kind]
+    named = [name for name in arguments_of(criterion_of_kind) if name not in ("K", "nu")]
+    chosen.known(["kind", *named], f" of {kind!r}")
+    choices = {}
+    for name in chosen.content:
+        if name != "kind":
+            value = values.argument_of(chosen, name, criterion_of_kind)
+            try:
+                choices[name] = arguments_of(criterion_of_kind)[name].check(value, name)
+            except XcrackError as error:
+                chosen.wrap(error)
+    return partial(criterion_of_kind, **choices)
+
+
 def _growth(table: Table) -> Mapping[str, Any]:
     """Arguments of `grow`."""
-    options = [name for name in GrowthOptions.__annotations__ if name not in ("solver", "response")]
+    options = [name for name in GrowthOptions.__annotations__ if name not in _FUNCTIONS]
+    for name in _FUNCTIONS:
+        if name in table:
+            table.refuse(
+                name, f"it is a function: a script gives it, grow(case.problem, {name}=...)."
+            )
     table.known(("law", "criterion", "cycle", "spectrum", "da", *options))
     if "law" not in table:
         table.refuse("", "the key 'law' is missing: give it.")
-    criterion = table.text("criterion", "max_hoop_stress")
-    if criterion not in values.CRITERIA:
-        table.refuse("criterion", f"known are {', '.join(values.CRITERIA)}.")
-    units = {"da": LENGTH, **_OPTIONS}
     given = {
-        name: table.value(name, units.get(name)) for name in table.content if name not in _TABLES
+        name: values.argument_of(table, name, GrowthRule)
+        for name in table.content
+        if name not in _TABLES and name != "solver"
     }
+    if "solver" in table:
+        given["solver"] = _solver(table)
     if "retardation" in table:
         given["retardation"] = retardation_of(table.table("retardation"))
     if "link_up" in table:
         given["link_up"] = values.called_with(table.table("link_up"), plastic_zone)
     return MappingProxyType({
         "law": _law(table.table("law")),
-        "criterion": values.CRITERIA[criterion],
+        "criterion": _criterion(table),
         "cycle": loading(table),
         **given,
     })  # fmt: skip
 
 
-def _states(table: Table) -> tuple[float, ...] | None:
-    if "states" not in table:
-        return None
-    value = table.value("states", NUMBER)
-    if not isinstance(value, list) or not value:
-        table.refuse("states", f"{value!r:.60}: give a list of factors, such as [0.1, 1.0].")
-    return tuple(value)
+def _solver(table: Table) -> Any:
+    name = table.text("solver")
+    if name not in _SOLVERS:
+        table.refuse("solver", f"{name!r:.40}: known is {', '.join(_SOLVERS)}; else a script.")
+    return _SOLVERS[name]
+
+
+def _solving(table: Table) -> Mapping[str, Any]:
+    """Arguments of `solve`, or with a tolerance of `adapt`, beside problem and states."""
+    maker = adapt if "tolerance" in table else solve
+    given = {}
+    for name in _SOLVING:
+        if name not in table:
+            continue
+        if name not in arguments_of(maker):
+            other = "with a tolerance" if maker is adapt else "without a tolerance"
+            table.refuse(name, f"it has no meaning {other}: leave one of them out.")
+        given[name] = _solver(table) if name == "solver" else values.argument_of(table, name, maker)
+    return MappingProxyType(given)
 
 
 def _texts(table: Table, name: str) -> list[str]:
@@ -197,6 +345,13 @@ def _number(table: Table, name: str, default: float) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float):
         table.refuse(name, f"{value!r:.60}: give a number.")
     return float(value)
+
+
+def _flag(table: Table, name: str, default: bool) -> bool:
+    value = table.content.get(name, default)
+    if not isinstance(value, bool):
+        table.refuse(name, f"{value!r:.60}: give true or false.")
+    return value
 
 
 __all__ = ["CaseFile", "read_case"]

@@ -4,11 +4,12 @@ from os import PathLike
 from pathlib import Path
 from typing import Any, Unpack
 
+from xcrack.adaptivity.adapt import adapt
 from xcrack.analysis.solution import Solution
 from xcrack.analysis.solve import solve
 from xcrack.app.case import CaseFile, read_case
 from xcrack.base.arguments import FileName, Switch, check_arguments
-from xcrack.base.errors import ProblemError
+from xcrack.base.errors import ProblemError, warn
 from xcrack.base.paths import system_errors
 from xcrack.fatigue.criteria import Criterion
 from xcrack.fatigue.cycle import Cycle
@@ -18,8 +19,11 @@ from xcrack.growth.options import GrowthOptions, lists_options
 from xcrack.growth.run import grow
 from xcrack.model.problem import Problem
 from xcrack.output.vtk import write
+from xcrack.runs.assessment import residual_strength
 from xcrack.runs.collect import Until, collect, resume
 from xcrack.runs.history import History
+from xcrack.runs.inspection import inspection
+from xcrack.runs.life import life
 from xcrack.runs.run_folder import STEPS
 from xcrack.view.plot import plot
 from xcrack.view.report import report
@@ -121,18 +125,45 @@ def _run_case(path: str | PathLike[str], *, resumed: bool, overwrite: bool) -> A
         case.folder.mkdir(parents=True, exist_ok=True)
     result: Any
     if case.growth is None:
-        result = solve(case.problem, case.states)
+        result = solved_case(case)
         solutions = [result] if isinstance(result, Solution) else list(result)
         for k, solution in enumerate(solutions):
             write(solution, case.folder / ("solution" if len(solutions) == 1 else f"state_{k}"))
     else:
         steps = case.folder / STEPS
-        result = growth_of_case(case, steps, resumed=resumed, overwrite=overwrite)
+        result = growth_of_case(case, steps, resumed=resumed, overwrite=overwrite,
+                                keep_solutions=case.keep_solutions)  # fmt: skip
         result.write(case.folder)
         solutions = list(result.solved[-1].solutions) if result.solved else []
     _draw(case, solutions)
-    report(result, case.folder / "report.html", title=case.title)
+    report(result, case.folder / "report.html", title=case.title, units=case.units,
+           **_assessed(case, result))  # fmt: skip
     return result
+
+
+def solved_case(case: CaseFile) -> Solution | list[Solution]:
+    """The solution of a case that does not grow, or those of its states."""
+    if "tolerance" not in case.solving:
+        return solve(case.problem, case.states, **case.solving)
+    found = adapt(case.problem, states=case.states, **case.solving)
+    if not found.met:
+        warn(f"{case.path}: tolerance = {found.tolerance:g} is not met: {found.reason}")
+    return list(found.solutions) if case.states is not None else found.solution
+
+
+def _assessed(case: CaseFile, result: Any) -> dict[str, Any]:
+    """What the file asks for beside a run: its spectrum, life, inspections and strength."""
+    if case.growth is None:
+        return {}
+    cycle = case.growth["cycle"]
+    made: dict[str, Any] = {"spectrum": cycle if isinstance(cycle, Spectrum) else None}
+    if case.life is not None:
+        made["life"] = life(result, **case.life)
+    if case.inspection is not None:
+        made["inspection"] = inspection(result, **case.inspection)
+    if case.strength is not None:
+        made["strength"] = residual_strength(result, **case.strength)
+    return made
 
 
 def growth_of_case(
@@ -166,4 +197,4 @@ def _draw(case: CaseFile, solutions: list[Solution]) -> None:
             plot(solution, field, file=case.folder / f"{name}.png", warp=case.warp)
 
 
-__all__ = ["growth_of_case", "run"]
+__all__ = ["growth_of_case", "run", "solved_case"]

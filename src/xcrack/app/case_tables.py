@@ -14,6 +14,7 @@ from xcrack.base.units import Dimension, Units
 
 Key = tuple[str | int, ...]
 
+FREE = "free"  # a direction that nothing holds, a side of a box without an end
 _HEADER = re.compile(r"\s*(\[\[?)\s*([^\[\]]+?)\s*\]\]?\s*(?:#.*)?")
 _ENTRY = re.compile(r"\s*([\w.\"'-]+(?:\s*\.\s*[\w\"'-]+)*)\s*=(.*)", re.DOTALL)
 _QUOTED = re.compile(r"\"(?:\\.|[^\"\\])*\"|'[^']*'")
@@ -87,16 +88,23 @@ class Table:
             self.refuse(name, f"{value!r:.60} is no text: put it into quotes.")
         return value
 
-    def value(self, name: str, dimension: Dimension | None) -> Any:
-        """A key in the units of the file, lists entry by entry; text stays text without one."""
+    def value(self, name: str, dimension: Dimension | None, hint: str = "") -> Any:
+        """A key in the units of the file, lists and tables entry by entry.
+
+        Text stays text without a dimension; "free" in a list is None.
+        """
         try:
             return self._converted(self.content[name], dimension)
         except ProblemError as error:
-            self.refuse(name, str(error))
+            self.refuse(name, f"{error}{hint}")
 
-    def _converted(self, value: Any, dimension: Dimension | None) -> Any:
+    def _converted(self, value: Any, dimension: Dimension | None, within: bool = False) -> Any:
         if isinstance(value, list):
-            return [self._converted(item, dimension) for item in value]
+            return [self._converted(item, dimension, True) for item in value]
+        if isinstance(value, dict):
+            return {key: self._converted(item, dimension) for key, item in value.items()}
+        if value == FREE and within:
+            return None
         if isinstance(value, str) and dimension is not None:
             return self.source.units.number(value, dimension)
         return value
@@ -104,7 +112,9 @@ class Table:
     def wrap(self, error: XcrackError | TypeError) -> NoReturn:
         """Raise an error of a function that this table was given to, with file and line."""
         text = str(error)
-        key = next((name for name in self.content if re.search(rf"\b{name}\b", text)), "")
+        found = {name: re.search(rf"\b{re.escape(name)}\b", text) for name in self.content}
+        places = {name: match.start() for name, match in found.items() if match}
+        key = min(places, key=places.__getitem__, default="")  # what it speaks of first
         place = (*self.key, key) if key else self.key
         kind = type(error) if isinstance(error, XcrackError) else ProblemError
         line = self.source.line(place)
@@ -216,4 +226,4 @@ def _key_text(key: Key) -> str:
     return ".".join(names) if names else "the file"
 
 
-__all__ = ["Key", "Source", "Table", "read_tables"]
+__all__ = ["FREE", "Key", "Source", "Table", "read_tables"]

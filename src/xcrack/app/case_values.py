@@ -1,22 +1,36 @@
-"""What tables of a case file may hold: the functions that they call, units of their arguments."""
+"""What tables of a case file may hold: the functions that they call, units of their arguments.
+
+Units and kinds of arguments are those that the functions and classes declare (`base/arguments.py`):
+a new load, law or support is known here as soon as it is there.
+"""
 
 import inspect
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 from xcrack.app.case_tables import Table
 from xcrack.base.arguments import (
     Argument,
+    Array,
+    Declared,
+    Either,
     FilePath,
     Function,
+    Number,
+    OneOrMore,
     Part,
+    Parts,
+    Text,
     arguments_of,
     classes_of,
     kinds_of,
 )
 from xcrack.base.errors import ProblemError, XcrackError
-from xcrack.base.units import NUMBER, Dimension
+from xcrack.base.units import LENGTH, NUMBER, TOUGHNESS, Dimension
+from xcrack.crack.crack import Crack
+from xcrack.crack.junctions_3d import arm
 from xcrack.crack.lines import line_crack
 from xcrack.crack.surfaces import (
     elliptic_crack,
@@ -26,17 +40,37 @@ from xcrack.crack.surfaces import (
     surface_crack,
 )
 from xcrack.fatigue import criteria, fracture, power  # noqa: F401 - laws are found as classes
+from xcrack.fatigue.fracture import nasgro_K_c
 from xcrack.fatigue.law import GrowthLaw
+from xcrack.fatigue.metals import material as metal
+from xcrack.fatigue.presets import law as preset
 from xcrack.fatigue.tables import rate_table
 from xcrack.fatigue.time import with_time
 from xcrack.mesh.box import box
 from xcrack.mesh.cylinder import notched_cylinder
+from xcrack.mesh.fields import read_field
 from xcrack.mesh.files import read_mesh
 from xcrack.mesh.plates import plate, plate_with_hole
 from xcrack.mesh.step_file import mesh_step
+from xcrack.model.material import Isotropic, Material
+from xcrack.model.values import ScalarField, StressField, VectorField
+from xcrack.sif.handbook import KINDS as HANDBOOK
+from xcrack.sif.specimens import (
+    compact_tension,
+    disc_compact,
+    lug,
+    middle_tension,
+    single_edge_bend,
+    single_edge_tension,
+)
 
 _WORD = "kind"
-
+_BOXES = ("sets", "where")  # parts of a boundary, as boxes
+_FIELDS = (VectorField, ScalarField, StressField, Function, Either)
+_WAY = (
+    " A function of the place has no words in a case file: sample it, write it to a file with its "
+    'mesh, and give { path = "field.vtu" }, with name = "..." of several data, as of read_field.'
+)
 
 MESHES: dict[str, Callable[..., Any]] = {
     "file": read_mesh,
@@ -46,6 +80,11 @@ MESHES: dict[str, Callable[..., Any]] = {
     "plate_with_hole": plate_with_hole,
     "notched_cylinder": notched_cylinder,
 }
+SPECIMENS: dict[str, Callable[..., Any]] = {
+    each.__name__: each
+    for each in (compact_tension, disc_compact, lug, middle_tension, single_edge_bend,
+                 single_edge_tension)
+}  # fmt: skip
 CRACKS: dict[str, Callable[..., Any]] = {
     "line": line_crack,
     "penny": penny_crack,
@@ -53,31 +92,74 @@ CRACKS: dict[str, Callable[..., Any]] = {
     "polygon": plane_crack,
     "file": read_surface,
     "surface": surface_crack,
+    "arm": arm,
 }
+CRITERIA: dict[str, Callable[..., Any]] = {
+    "max_hoop_stress": criteria.max_hoop_stress,
+    "weighted_angle": criteria.weighted_angle,
+    "mean_reference": criteria.mean_reference,
+}
+_NUMBERS: dict[str, Callable[..., Any]] = {"nasgro_K_c": nasgro_K_c}  # that a function computes
+
+_Name = Annotated[str, Text("the name of a metal, see xc.materials()")]
+_Thickness = Annotated[float | None, Number(above=0, unit=LENGTH)]
 
 
-def _rate_table(curves: Any, outside: str = "refuse", ratio: str | None = None) -> rate_table:
+@dataclass(frozen=True, eq=False)
+class RateCurve(Declared):
+    """Points of a rate table at one R, as a file gives them.
+
+    Attributes
+    ----------
+    R : float
+    dK : (n,) array, stress √length
+    rate : (n,) array, length/cycle
+    """
+
+    R: Annotated[float, Number()]
+    dK: Annotated[Any, Array((None,), unit=TOUGHNESS)]
+    rate: Annotated[Any, Array((None,), unit=LENGTH)]
+
+
+def _rate_table(
+    curves: Annotated[Any, Parts(RateCurve)], outside: str = "refuse", ratio: str | None = None
+) -> rate_table:
     """A table of rates from a list of curves, each with R, dK and rate."""
-    rows = [curve if isinstance(curve, dict) else {} for curve in curves]
-    if not all(set(row) == {"R", "dK", "rate"} for row in rows):
-        raise ProblemError("rate_table: curves: give a list of { R = .., dK = [..], rate = [..] }.")
-    points = {row["R"]: (row["dK"], row["rate"]) for row in rows}
+    points = {each.R: (each.dK, each.rate) for each in curves}
     return rate_table(points, outside, ratio)  # type: ignore[arg-type]
+
+
+def _metal_law(
+    name: _Name, units: str, law: str | None = None, thickness: _Thickness = None
+) -> Any:
+    """A growth law of a metal by its name."""
+    return metal(name, units=units).law(law, thickness=thickness)
+
+
+def _metal_material(
+    name: _Name,
+    units: str,
+    plane: str | None = None,
+    thickness: _Thickness = None,
+    E: Annotated[float | None, arguments_of(Isotropic)["E"].rule] = None,
+    nu: Annotated[float | None, arguments_of(Isotropic)["nu"].rule] = None,
+) -> Isotropic:
+    """The elastic material of a metal by its name."""
+    return metal(name, units=units).isotropic(plane, thickness=thickness, E=E, nu=nu)
 
 
 def makers_of(base: type) -> dict[str, Callable[..., Any]]:
     """What makes values of a base, by name: loads, supports, laws and their parts."""
     makers: dict[str, Callable[..., Any]] = dict(kinds_of(base))
     if base is GrowthLaw:
-        makers |= {"rate_table": _rate_table, "with_time": with_time}
+        makers |= {
+            "rate_table": _rate_table, "with_time": with_time, "preset": preset,
+            "metal": _metal_law,
+        }  # fmt: skip
+    if base is Material:
+        makers = {name: maker for name, maker in makers.items() if name != "MaterialSets"}
+        makers["metal"] = _metal_material
     return makers
-
-
-CRITERIA: dict[str, Callable[..., Any]] = {
-    "max_hoop_stress": criteria.max_hoop_stress,
-    "weighted_angle": criteria.weighted_angle,
-    "mean_reference": criteria.mean_reference,
-}
 
 
 def value_of_table(
@@ -105,50 +187,83 @@ def value_of_kind(table: Table, base: type, default: type) -> Any:
 
 
 def called_with(
-    table: Table, maker: Callable[..., Any], what: str = "", besides: tuple[str, ...] = ()
+    table: Table,
+    maker: Callable[..., Any],
+    what: str = "",
+    besides: Sequence[str] = (),
+    given: Mapping[str, Any] | None = None,
 ) -> Any:
-    """Call a function or class with the keys of a table."""
+    """Call a function or class with the keys of a table, and values that are known already."""
     parameters = inspect.signature(maker).parameters
-    table.known([*besides, *parameters], what)
+    known = dict(given or {})
+    if "units" in parameters and "units" not in table:  # those of the model
+        known["units"] = _units_of_laws(table)
+    table.known([*besides, *(name for name in parameters if name not in (given or {}))], what)
     for name, parameter in parameters.items():
-        if parameter.default is parameter.empty and name not in table:
+        if parameter.default is parameter.empty and name not in table and name not in known:
             table.refuse("", f"the key {name!r}{what} is missing: give it.")
-    given: dict[str, Any] = {}
     for name in table.content:
-        if name in besides:
-            continue
-        given[name] = _argument(table, name, maker, parameters[name])
+        if name not in besides:
+            known[name] = argument_of(table, name, maker)
     try:
-        return maker(**given)
+        return maker(**known)
     except (XcrackError, TypeError, ValueError) as error:
         table.wrap(error if isinstance(error, XcrackError) else ProblemError(str(error)))
 
 
-def _argument(
-    table: Table, name: str, maker: Callable[..., Any], parameter: inspect.Parameter
-) -> Any:
+def _units_of_laws(table: Table) -> str:
+    """Length and K of the file, as laws by name take them."""
+    units = table.source.units
+    if not units.stress:
+        table.refuse(
+            "",
+            "published values have units, and those of the file are not known, or their stress has "
+            'no name: give [units] with length and force, such as "mm" and "N".',
+        )
+    return f"{units.length}, {units.stress}√{units.length}"
+
+
+def argument_of(table: Table, name: str, maker: Callable[..., Any]) -> Any:
+    """A key of a table as the argument of a function, by the rule that it declares."""
     declared = arguments_of(maker).get(name)
     rule = None if declared is None else declared.rule
+    value = table.content[name]
     if isinstance(rule, FilePath):
         return _file(table, name)
-    if isinstance(rule, Part) and isinstance(table.content[name], dict):
-        return _part(table.table(name), rule)
-    if isinstance(rule, Function) and isinstance(table.content[name], dict):
-        return value_of_table(table.table(name), makers_of(GrowthLaw))
-    if rule is not None and rule.takes_names and isinstance(table.content[name], str):
-        return table.content[name]
-    value = table.value(name, _dimension_of(declared, parameter))
-    is_flat_list = isinstance(value, list) and value and not any(isinstance(v, list) for v in value)
-    return tuple(value) if is_flat_list else value
+    if isinstance(rule, Part) and isinstance(value, dict):
+        return _part(table.table(name), rule.kind)
+    if isinstance(rule, Parts | OneOrMore) and _are_tables(value):
+        return [_part(each, rule.kind) for each in table.tables(name)]
+    if isinstance(rule, _FIELDS) and isinstance(value, dict):
+        inner = table.table(name)
+        if _WORD in inner:
+            return value_of_table(inner, makers_of(GrowthLaw))
+        return called_with(inner, read_field)
+    if isinstance(rule, Function):
+        table.refuse(name, f"{value!r:.60} is no function.{_WAY}")
+    if isinstance(rule, Number) and isinstance(value, dict):
+        return value_of_table(table.table(name), _NUMBERS)
+    if rule is not None and rule.takes_names and isinstance(value, str):
+        return value
+    is_field = isinstance(rule, _FIELDS)
+    parameter = inspect.signature(maker).parameters[name]
+    dimension = LENGTH if name in _BOXES and rule is None else _dimension_of(declared, parameter)
+    given = table.value(name, dimension, _WAY if is_field else "")
+    is_flat_list = isinstance(given, list) and given and not any(isinstance(v, list) for v in given)
+    return tuple(given) if is_flat_list else given
 
 
-def _part(table: Table, rule: Part) -> Any:
+def _are_tables(value: Any) -> bool:
+    return isinstance(value, list) and bool(value) and all(isinstance(v, dict) for v in value)
+
+
+def _part(table: Table, kind: Any) -> Any:
     """A value within another one: a table that names its kind, where there are several."""
-    kinds = classes_of(rule.kind)
-    if len(kinds) == 1 and _WORD not in table:
-        (kind,) = kinds.values()
-        return called_with(table, kind)
-    return value_of_table(table, kinds)
+    makers = CRACKS if kind is Crack else classes_of(kind)
+    if len(makers) == 1 and _WORD not in table:
+        (maker,) = makers.values()
+        return called_with(table, maker)
+    return value_of_table(table, makers)
 
 
 def _file(table: Table, name: str) -> Path:
@@ -174,7 +289,10 @@ def _dimension_of(declared: Argument | None, parameter: inspect.Parameter) -> Di
 __all__ = [
     "CRACKS",
     "CRITERIA",
+    "HANDBOOK",
     "MESHES",
+    "SPECIMENS",
+    "argument_of",
     "called_with",
     "makers_of",
     "value_of_kind",

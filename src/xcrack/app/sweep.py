@@ -11,9 +11,8 @@ from typing import Annotated, Any
 import numpy as np
 
 from xcrack.analysis.solution import Solution
-from xcrack.analysis.solve import solve
 from xcrack.app.case import read_case
-from xcrack.app.case_run import growth_of_case
+from xcrack.app.case_run import growth_of_case, solved_case
 from xcrack.app.case_tables import read_tables
 from xcrack.base.arguments import Switch, Whole, check_arguments
 from xcrack.base.checks import value_text
@@ -117,7 +116,7 @@ def run_changed(file: str, text: str, folder: str, /, **changes: Any) -> dict[st
     """
     case = read_case(file, changes)
     if case.growth is None:
-        solved = solve(case.problem, case.states)
+        solved = solved_case(case)
         return _largest([solved] if isinstance(solved, Solution) else list(solved))
     steps = Path(folder) / f"run_{key_of(changes)}" / STEPS
     history = growth_of_case(case, steps, resumed=True, keep_solutions=False, progress=False)

@@ -39,6 +39,7 @@ _UNITS: dict[str, tuple[float, Dimension]] = {
     **{name: (size, FORCE) for name, size in _FORCES.items()},
     **{name: (size, STRESS) for name, size in _STRESSES.items()},
 }
+_SAME = 1e-9  # relative: round-off of a unit of stress
 _QUANTITY = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*?)\s*")
 _FACTOR = re.compile(r"\s*([*·/]?)\s*(?:(sqrt\(|√)?\s*([A-Za-zµ]+)\s*\)?)(?:\^(-?\d+(?:\.\d+)?))?")
 
@@ -61,6 +62,14 @@ class Units:
             given = getattr(self, name)
             if given and (not isinstance(given, str) or given not in allowed):
                 raise ProblemError(f"{name} = {given!r:.40}: known are {', '.join(allowed)}.")
+
+    @property
+    def stress(self) -> str:
+        """Name of the force over the square of the length; empty where it has none."""
+        if not (self.length and self.force):
+            return ""
+        size = _FORCES[self.force] / _LENGTHS[self.length] ** 2
+        return next((n for n, one in _STRESSES.items() if abs(one / size - 1) < _SAME), "")
 
     def number(self, text: str, dimension: Dimension) -> float:
         """A quantity as a number in these units.

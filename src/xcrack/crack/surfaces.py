@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from xcrack.base.arguments import (
+    Array,
     FileName,
     Length,
     Points,
@@ -222,7 +223,10 @@ def plane_crack(polygon: Annotated[ArrayLike, Points((None, 3))]) -> Crack:
     return Crack(x, ear_clipped(flat))
 
 
-def surface_crack(points: ArrayLike, triangles: ArrayLike) -> Crack:
+def surface_crack(
+    points: Annotated[ArrayLike, Points((None, 3))],
+    triangles: Annotated[ArrayLike, Array((None, 3), is_whole=True)],
+) -> Crack:
     """3D crack along a triangulated surface, in one or several pieces.
 
     Faces are turned so that neighbours agree; the first face of each piece decides where lip + is

@@ -13,6 +13,7 @@ from xcrack.base.arguments import Choice, Either, Function, Number, Part, Whole,
 from xcrack.base.arrays import Floats
 from xcrack.base.description import default_keys, describe
 from xcrack.base.errors import ProblemError, warn
+from xcrack.base.units import LENGTH, TOUGHNESS
 from xcrack.fatigue.criteria import Criterion
 from xcrack.fatigue.cycle import Cycle
 from xcrack.fatigue.law_sets import LawSets
@@ -81,20 +82,22 @@ class GrowthRule:
     ]
     criterion: Annotated[Criterion, Function("a function of two arguments")]
     cycle: Annotated[Cycle | Spectrum, Part((Cycle, Spectrum), "Cycle(min, max), or a Spectrum")]
-    da: Annotated[float | None, _POSITIVE] = None
+    da: Annotated[float | None, Number(above=0, unit=LENGTH)] = None
     cycles: Annotated[float | None, _POSITIVE] = None
     tolerance: Annotated[float | None, Number(above=0, below=1)] = None
     max_unknowns: Annotated[int | None, Whole(least=1, most=10**9)] = None
     scaling: Annotated[str, Choice(("law", "linear"))] = "law"
     integrator: Annotated[str, Choice(("pec", "euler"))] = "pec"
-    threshold: Annotated[float, Number(least=0)] = 0.0
+    threshold: Annotated[float, Number(least=0, unit=TOUGHNESS)] = 0.0
     retardation: Annotated[
         Any,
         Part(Retardation | RetardationSets, "wheeler or willenborg, or a mapping to one of them"),
     ] = None
     solver: Annotated[Any, Function("a function, or None")] = None
     response: Annotated[Respond | None, Function(_RESPONSE)] = None
-    K_c: Annotated[float | None, _POSITIVE] = field(default=None, metadata=_STOPS)
+    K_c: Annotated[float | None, Number(above=0, unit=TOUGHNESS)] = field(
+        default=None, metadata=_STOPS
+    )
     link_up: Annotated[Callable[[Floats], ArrayLike] | None, Function(_LINK_UP)] = field(
         default=None, metadata=_STOPS
     )

@@ -70,6 +70,11 @@ def checked_holes(value: Any, what: str, error: Error) -> list[Hole]:
     ]
 
 
+def checked_outline(value: Any, what: str, error: Error) -> list[Side]:
+    """Sides of an outline, checked."""
+    return sides_of(value)
+
+
 @check_arguments(GeometryError)
 def plate_with_hole(
     *,
@@ -151,7 +156,7 @@ def plate(
     along: Along = None,
     band: Distance | None = None,
     transition: Distance | None = None,
-    outline: Sequence[Any] | None = None,
+    outline: Annotated[Sequence[Any] | None, CheckedBy(checked_outline, unit=LENGTH)] = None,
     sets: Sets | None = None,
 ) -> Mesh:
     """Plate, rectangular or of any outline, with any number of round holes, none included.
@@ -216,7 +221,7 @@ def plate(
     given = cast(list[Hole], holes)
     names = [f"hole_{i}" for i in range(len(given))]
     if outline is not None and width is None and height is None:
-        sides = sides_of(outline)
+        sides = cast(list[Side], outline)
     elif outline is None and width is not None and height is not None:
         sides = rectangle(_pair(lower), width, height)
     else:

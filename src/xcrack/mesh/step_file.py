@@ -9,28 +9,34 @@ from math import log10
 from os import PathLike
 from pathlib import Path
 from types import ModuleType
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
+from xcrack.base.arguments import Either, FilePath, Function, Number
 from xcrack.base.arrays import Bools, Floats, Ints
 from xcrack.base.checks import call_function, value_text, whole_numbers
 from xcrack.base.errors import GeometryError, MeshError
 from xcrack.base.paths import path_of, system_errors
+from xcrack.base.units import LENGTH
 from xcrack.mesh.curved_facets import lattice, rows_of, with_curves
 from xcrack.mesh.gmsh_session import length_of, session
 from xcrack.mesh.mesh import Mesh, sound_mesh
+from xcrack.mesh.parts import box_of
 
-Selector = Callable[[Floats], Any] | Sequence[int]
+Selector = Callable[[Floats], Any] | Sequence[Any]
 _MOST_POINTS = 5_000_000
 _STRAIGHT = ("Plane", "Line")  # kinds of faces and edges of a shape whose facets are their own
+_ON_BOX = 1e-6  # share of the sides of a box by which a point may lie beside it
 _PLANE = 1e-7  # share of the size of a shape within which it lies in a plane z = constant
 
 
 def mesh_step(
-    path: str | PathLike[str],
+    path: Annotated[str | PathLike[str], FilePath()],
     *,
-    size: float | Callable[[Floats], Any],
+    size: Annotated[
+        float | Callable[[Floats], Any], Either(Function(), Number(above=0, unit=LENGTH))
+    ],
     sets: Mapping[str, Selector] | None = None,
 ) -> Mesh:
     """Mesh the body in a STEP file with gmsh: tetrahedra, or triangles for a plane sheet.
@@ -46,7 +52,8 @@ def mesh_step(
         Cell size, or f(x) -> (n,) for points x (n, 3).
     sets : mapping of name to selector, optional
         A selector is f(x) -> (n,) bool for points x (n, 3): a face of the shape (in 2D: an edge)
-        belongs to the set if all mesh points on it do. Or the numbers that gmsh gives to the faces.
+        belongs to the set if all mesh points on it do. Or two corners of a box that holds them,
+        None where it has no end; or the numbers that gmsh gives to the faces.
 
     Returns
     -------
@@ -219,6 +226,8 @@ def _mesh(gmsh: ModuleType, dim: int, source: str, sets: Mapping[str, Selector])
     facet_sets = {}
     for name, selector in sets.items():
         members = [tag for tag in faces if len(faces[tag])]
+        if _is_box(selector):
+            selector = _within_box(selector, f"sets[{name!r}]")
         if callable(selector):
             members = [
                 tag for tag in members if _selected_facets(selector, points, faces[tag], name)
@@ -294,6 +303,21 @@ def _with_shapes(
             nearest = gmsh.model.getClosestPoint(dim, number, x.ravel())[0]
             points[rows] = np.reshape(nearest, (-1, 3))[:, : mesh.dim]
     return with_curves(mesh, facets, replace(flat, points=points))
+
+
+def _is_box(selector: Any) -> bool:
+    """Whether it is two corners, rather than numbers of faces."""
+    return isinstance(selector, Sequence) and [np.ndim(corner) for corner in selector] == [1, 1]
+
+
+def _within_box(corners: Any, what: str) -> Callable[[Floats], Bools]:
+    """A selector by two corners, in the plane of a sheet also of two numbers each."""
+    n = 2 if len(corners[0]) == 2 else 3
+    lower, upper = box_of(corners, n, what)
+    reach = _ON_BOX * np.where(np.isfinite(upper - lower), upper - lower, 0.0).max()
+    return lambda x: np.asarray(
+        ((x[:, :n] >= lower - reach) & (x[:, :n] <= upper + reach)).all(axis=1)
+    )
 
 
 def _selected_facets(

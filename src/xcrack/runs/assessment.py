@@ -4,16 +4,18 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import brentq
 
+from xcrack.base.arguments import Declared, Function, Number, Part, Poisson, check_arguments
 from xcrack.base.arrays import Floats
 from xcrack.base.checks import call_function, number, numbers, value_text, whole_number
 from xcrack.base.errors import ProblemError
 from xcrack.base.paths import path_of, system_errors, written_whole
+from xcrack.base.units import STRESS, TOUGHNESS
 from xcrack.growth.step import (
     Step,
     largest_K_eq,
@@ -24,7 +26,7 @@ from xcrack.runs.table import crack_numbers, end_id
 
 
 @dataclass(frozen=True)
-class assessment_line:  # noqa: N801 - it is used as a function
+class assessment_line(Declared):  # noqa: N801 - it is used as a function
     """Failure assessment line of option 1: the largest K_r for L_r.
 
     Parameters
@@ -52,14 +54,12 @@ class assessment_line:  # noqa: N801 - it is used as a function
     [1.     0.9367 0.5613] 1.2183
     """
 
-    E: float
-    sigma_y: float
-    sigma_u: float
+    E: Annotated[float, Number(above=0, unit=STRESS)]
+    sigma_y: Annotated[float, Number(above=0, unit=STRESS)]
+    sigma_u: Annotated[float, Number(above=0, unit=STRESS)]
 
     def __post_init__(self) -> None:
-        for name in ("E", "sigma_y", "sigma_u"):
-            value = number(getattr(self, name), f"assessment_line: {name}", above=0)
-            object.__setattr__(self, name, value)
+        super().__post_init__()
         if self.sigma_u < self.sigma_y:
             raise ProblemError(
                 f"assessment_line: sigma_u = {self.sigma_u:g} is below sigma_y = {self.sigma_y:g}: "
@@ -116,15 +116,16 @@ class assessment_line:  # noqa: N801 - it is used as a function
         return float(brentq(left, 0.0, most, xtol=1e-14 * most, rtol=1e-14))
 
 
+@check_arguments()
 def residual_strength(
     history: History,
     *,
-    nu: float,
-    K_c: float,
-    resistance: Callable[[float], float] | None = None,
-    yield_stress: float | None = None,
-    collapse: Callable[[float], float] | None = None,
-    line: assessment_line | None = None,
+    nu: Poisson,
+    K_c: Annotated[float, Number(above=0, unit=TOUGHNESS)],
+    resistance: Annotated[Callable[[float], float] | None, Function("a function of da")] = None,
+    yield_stress: Annotated[float | None, Number(above=0, unit=STRESS)] = None,
+    collapse: Annotated[Callable[[float], float] | None, Function("a function of a")] = None,
+    line: Annotated[assessment_line | None, Part(assessment_line)] = None,
 ) -> NDArray[Any]:
     """Factors on the largest load of a run at which its cracks break the body, step by step.
 
@@ -186,16 +187,7 @@ def residual_strength(
     """
     if not isinstance(history, History):
         raise ProblemError(f"residual_strength: history = {value_text(history)}: give a History.")
-    nu = number(nu, "residual_strength: nu", above=-1, below=0.5)
-    tough = number(K_c, "residual_strength: K_c", above=0)
-    if yield_stress is not None:
-        yield_stress = number(yield_stress, "residual_strength: yield_stress", above=0)
-    for name, given, of in (("collapse", collapse, "a"), ("resistance", resistance, "da")):
-        if given is not None and not callable(given):
-            raise ProblemError(
-                f"residual_strength: {name} = {value_text(given)}: give a function of {of}."
-            )
-    if line is not None and (collapse is None or not isinstance(line, assessment_line)):
+    if line is not None and collapse is None:
         raise ProblemError(
             f"residual_strength: line = {value_text(line)}: give assessment_line, and collapse "
             f"with it."
@@ -215,7 +207,7 @@ def residual_strength(
         )  # fmt: skip
         K_eq = largest_K_eq(step, c, nu)
         row["id"] = end_id(step, c, step.sif[0][c].front[np.argmax(K_eq)]) if len(K_eq) else -1
-        by_K = tough / K[c] if K[c] > 0 else np.inf
+        by_K = K_c / K[c] if K[c] > 0 else np.inf
         row["by_toughness"] = by_K
         if resistance is not None:
             row["by_resistance"] = _by_resistance(steps[n:], names[n:], c, nu, resistance)

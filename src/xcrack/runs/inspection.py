@@ -1,15 +1,17 @@
 """When to look, and what the chance is that all looks miss."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from xcrack.base.arguments import Declared, Function, Number, Text, check_arguments
 from xcrack.base.arrays import Floats
 from xcrack.base.checks import call_function, number, numbers, value_text
 from xcrack.base.errors import ProblemError
+from xcrack.base.units import LENGTH
 from xcrack.growth.step import Step, numbers_after
 from xcrack.runs.history import History
 from xcrack.runs.rerating import DrivingForce, cycles_of, driving_forces
@@ -21,15 +23,15 @@ _FALLS = 1e-6  # share by which a measure may fall in a step: round-off of clipp
 
 
 @dataclass(frozen=True)
-class logistic_pod:  # noqa: N801 - it is used as a function
+class logistic_pod(Declared):  # noqa: N801 - it is used as a function
     """Probability of detection as a logistic function of the logarithm of the length.
 
     Parameters
     ----------
     a50 : float, length
-        Found in half of all looks; positive.
+        Found in half of all looks.
     s : float
-        Width, positive: a90 = a50 exp(s ln 9).
+        Width: a90 = a50 exp(s ln 9).
 
     Raises
     ------
@@ -46,12 +48,8 @@ class logistic_pod:  # noqa: N801 - it is used as a function
     0.9
     """
 
-    a50: float
-    s: float
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "a50", number(self.a50, "logistic_pod: a50", above=0))
-        object.__setattr__(self, "s", number(self.s, "logistic_pod: s", above=0))
+    a50: Annotated[float, Number(above=0, unit=LENGTH)]
+    s: Annotated[float, Number(above=0)]
 
     def __call__(self, a: ArrayLike) -> Floats:
         """Share of the looks that find a crack of the length a."""
@@ -328,15 +326,16 @@ def _known(value: float) -> float:
     return value if np.isfinite(value) else -np.inf
 
 
+@check_arguments()
 def inspection(
     curve: GrowthCurve | History,
     *,
-    a_detect: float | None = None,
-    factor: float = 2.0,
-    a_critical: float | None = None,
-    interval: float | None = None,
-    pod: logistic_pod | None = None,
-    measure: str | None = None,
+    a_detect: Annotated[float | None, Number(above=0, unit=LENGTH)] = None,
+    factor: Annotated[float, Number(least=1)] = 2.0,
+    a_critical: Annotated[float | None, Number(above=0, unit=LENGTH)] = None,
+    interval: Annotated[float | None, Number(above=0)] = None,
+    pod: Annotated[Callable[[float], Any] | None, Function("logistic_pod")] = None,
+    measure: Annotated[str | None, Text("a measure, as of growth_curve")] = None,
 ) -> Inspection:
     """Thresholds and intervals of inspection from a growth curve.
 
@@ -384,17 +383,16 @@ def inspection(
         )
     begin, last = float(curve.N[0]), curve.cycles_at(end)
     if a_detect is not None:
-        detected_length = number(a_detect, "inspection: a_detect", above=0)
-        if not low <= detected_length < end:
+        if not low <= a_detect < end:
             raise ProblemError(
-                f"inspection: a_detect = {detected_length:.6g} is no length of the run: give one "
+                f"inspection: a_detect = {a_detect:.6g} is no length of the run: give one "
                 f"from {low:.6g} to {end:.6g}."
             )
-        share = number(factor, "inspection: factor", least=1)
-        every = (last - curve.cycles_at(detected_length)) / share
+        every = (last - curve.cycles_at(a_detect)) / factor
         first = begin + (last - begin) / 2
     else:
-        every = number(interval, "inspection: interval", above=0)
+        assert interval is not None  # one of the two
+        every = interval
         first = begin + every
     if (last - first) / every > _MOST_LOOKS:
         raise ProblemError(
@@ -402,8 +400,6 @@ def inspection(
             "give a longer interval."
         )
     at = np.arange(first, last, every)
-    if pod is not None and not callable(pod):
-        raise ProblemError(f"inspection: pod = {value_text(pod)}: give logistic_pod.")
     a = np.array([curve.length_at(N) for N in at])
     missed = (
         None

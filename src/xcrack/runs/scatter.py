@@ -2,10 +2,11 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, is_dataclass, replace
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
+from xcrack.base.arguments import Declared, Number
 from xcrack.base.arrays import Floats
 from xcrack.base.checks import number, numbers, value_text, whole_number
 from xcrack.base.errors import ProblemError, XcrackError
@@ -16,15 +17,14 @@ _ROUND_OFF = 1e-12
 
 
 @dataclass(frozen=True)
-class lognormal:  # noqa: N801 - it is used as a function
+class lognormal(Declared):  # noqa: N801 - it is used as a function
     """A factor whose logarithm is normal with the median 1, or a length with another median.
 
     Parameters
     ----------
     sigma : float
-        Standard deviation of the natural logarithm, not negative.
+        Standard deviation of the natural logarithm.
     median : float
-        Positive.
 
     Raises
     ------
@@ -37,14 +37,8 @@ class lognormal:  # noqa: N801 - it is used as a function
     1.638
     """
 
-    sigma: float
-    median: float = 1.0
-
-    def __post_init__(self) -> None:
-        sigma = number(self.sigma, "lognormal: sigma", least=0, most=100)
-        object.__setattr__(self, "sigma", sigma)
-        median = number(self.median, "lognormal: median", above=0)
-        object.__setattr__(self, "median", median)
+    sigma: Annotated[float, Number(least=0, most=100)]
+    median: Annotated[float, Number(above=0)] = 1.0
 
     def quantile(self, p: float | Floats) -> Floats:
         """Value that a share p of all does not exceed."""
@@ -52,15 +46,14 @@ class lognormal:  # noqa: N801 - it is used as a function
 
 
 @dataclass(frozen=True)
-class normal:  # noqa: N801
+class normal(Declared):  # noqa: N801
     """A factor that is normal with the mean 1, or a length with another mean.
 
     Parameters
     ----------
     sigma : float
-        Standard deviation, not negative, at most a fifth of the mean: no factor is negative.
+        Standard deviation, at most a fifth of the mean: no factor is negative.
     mean : float
-        Positive.
 
     Raises
     ------
@@ -73,14 +66,12 @@ class normal:  # noqa: N801
     1.0
     """
 
-    sigma: float
-    mean: float = 1.0
+    sigma: Annotated[float, Number(least=0)]
+    mean: Annotated[float, Number(above=0)] = 1.0
 
     def __post_init__(self) -> None:
-        mean = number(self.mean, "normal: mean", above=0)
-        object.__setattr__(self, "mean", mean)
-        sigma = number(self.sigma, "normal: sigma", least=0, most=0.2 * mean)
-        object.__setattr__(self, "sigma", sigma)
+        super().__post_init__()
+        number(self.sigma, "normal: sigma", most=0.2 * self.mean)
 
     def quantile(self, p: float | Floats) -> Floats:
         """Value that a share p of all does not exceed; nothing below a thousandth of the mean."""
