@@ -369,6 +369,7 @@ plane = "strain"
     assert problem.handbook == wanted.handbook
 
 
+@pytest.mark.filterwarnings("ignore::xcrack.XcrackWarning")
 def test_a_deck_with_a_crack(tmp_path):
     from support.decks import box_cases
 
