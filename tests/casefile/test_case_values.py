@@ -221,9 +221,9 @@ MAKERS = {"line_crack", "penny_crack", "elliptic_crack", "plane_crack", "surface
 
 def test_no_public_name_is_forgotten():
     """A new public function is a key of case files, or stands in a list with the reason."""
-    said = {name for samples, _ in GROUPS.values() for name in samples} | MAKERS | set(KEYS)
-    assert set(xc.__all__) - said == set(RESULTS + QUESTIONS) & set(xc.__all__)
-    assert not said & set(RESULTS + QUESTIONS)
+    words = {name for samples, _ in GROUPS.values() for name in samples} | MAKERS | set(KEYS)
+    assert set(xc.__all__) - words == set(RESULTS + QUESTIONS) & set(xc.__all__)
+    assert not words & set(RESULTS + QUESTIONS)
 
 
 def test_no_option_is_forgotten():

@@ -168,8 +168,8 @@ def strength_of(table: Table, problem: Problem, growth: Mapping[str, Any]) -> Ma
     table.known([name for name in arguments_of(residual_strength) if name not in _OF_RUN])
     material = problem.elasticity.material
     given: dict[str, Any] = {"nu": _poisson(table, problem)}
-    for name in ("K_c", "yield_stress"):
-        known = growth.get(name, getattr(material, name))
+    of_body = {"K_c": growth.get("K_c", material.K_c), "yield_stress": material.yield_stress}
+    for name, known in of_body.items():
         if name in table:
             given[name] = argument_of(table, name, residual_strength)
         elif known is not None:

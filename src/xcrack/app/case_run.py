@@ -145,10 +145,10 @@ def solved_case(case: CaseFile) -> Solution | list[Solution]:
     """The solution of a case that does not grow, or those of its states."""
     if "tolerance" not in case.solving:
         return solve(case.problem, case.states, **case.solving)
-    found = adapt(case.problem, states=case.states, **case.solving)
-    if not found.met:
-        warn(f"{case.path}: tolerance = {found.tolerance:g} is not met: {found.reason}")
-    return list(found.solutions) if case.states is not None else found.solution
+    adapted = adapt(case.problem, states=case.states, **case.solving)
+    if not adapted.met:
+        warn(f"{case.path}: tolerance = {adapted.tolerance:g} is not met: {adapted.reason}")
+    return list(adapted.solutions) if case.states is not None else adapted.solution
 
 
 def _assessed(case: CaseFile, result: Any) -> dict[str, Any]:
