@@ -145,10 +145,10 @@ def solved_case(case: CaseFile) -> Solution | list[Solution]:
     """The solution of a case that does not grow, or those of its states."""
     if "tolerance" not in case.solving:
         return solve(case.problem, case.states, **case.solving)
-    adapted = adapt(case.problem, states=case.states, **case.solving)
-    if not adapted.met:
-        warn(f"{case.path}: tolerance = {adapted.tolerance:g} is not met: {adapted.reason}")
-    return list(adapted.solutions) if case.states is not None else adapted.solution
+    adaptation = adapt(case.problem, states=case.states, **case.solving)
+    if not adaptation.met:
+        warn(f"{case.path}: tolerance = {adaptation.tolerance:g} is not met: {adaptation.reason}")
+    return list(adaptation.solutions) if case.states is not None else adaptation.solution
 
 
 def _assessed(case: CaseFile, result: Any) -> dict[str, Any]:

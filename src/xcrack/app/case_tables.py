@@ -112,8 +112,11 @@ class Table:
     def wrap(self, error: XcrackError | TypeError) -> NoReturn:
         """Raise an error of a function that this table was given to, with file and line."""
         text = str(error)
-        matches = {name: re.search(rf"\b{re.escape(name)}\b", text) for name in self.content}
-        places = {name: match.start() for name, match in matches.items() if match}
+        places = {
+            name: match.start()
+            for name in self.content
+            if (match := re.search(rf"\b{re.escape(name)}\b", text))
+        }
         key = min(places, key=places.__getitem__, default="")  # what it speaks of first
         place = (*self.key, key) if key else self.key
         kind = type(error) if isinstance(error, XcrackError) else ProblemError
