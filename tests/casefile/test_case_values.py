@@ -303,11 +303,12 @@ def test_options_of_growth_have_the_units_that_they_declare(tmp_path):
 da = "0.1 cm"
 threshold = "2 MPa*sqrt(m)"
 K_c = "50 MPa*sqrt(m)"
+max_size = "1 cm"
 solver = "pardiso"
 criterion = {{ kind = "mean_reference", reference = "max" }}
 """
     growth = read(tmp_path, text).growth
-    assert growth["da"] == 1.0
+    assert (growth["da"], growth["max_size"]) == (1.0, 10.0)
     assert growth["threshold"] == pytest.approx(2 * K)
     assert growth["K_c"] == pytest.approx(50 * K)
     assert growth["solver"] is xc.pardiso

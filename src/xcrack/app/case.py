@@ -154,7 +154,7 @@ def _problem(root: Table) -> Problem:
             given_bodies[-1] if given_bodies else "",
             "give one of [mesh], [deck] and [specimen]."
             if given_bodies
-            else "the table [mesh] is missing.",
+            else "the table [mesh] is missing: give it.",
         )
     scene: dict[str, Any] = {}
     if "material" in root:

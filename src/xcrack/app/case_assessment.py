@@ -113,7 +113,7 @@ def _poisson(table: Table, problem: Problem) -> float:
     try:
         return problem.elasticity.material.at_tip().nu
     except XcrackError:
-        table.refuse("", "the key 'nu' is missing: the body has no one Poisson's ratio.")
+        table.refuse("", "the key 'nu' is missing: give it, the body has no one Poisson's ratio.")
 
 
 def life_of(table: Table, problem: Problem, growth: Mapping[str, Any]) -> Mapping[str, Any]:
@@ -175,7 +175,9 @@ def strength_of(table: Table, problem: Problem, growth: Mapping[str, Any]) -> Ma
         elif known is not None:
             given[name] = known
     if "K_c" not in given:
-        table.refuse("", "the key 'K_c' is missing, and neither growth nor material have it.")
+        table.refuse(
+            "", "the key 'K_c' is missing, and neither growth nor material have it: give it."
+        )
     makers = {"resistance": ResistanceCurve, "collapse": CollapseFactor, "line": assessment_line}
     for name, maker in makers.items():
         if name in table:

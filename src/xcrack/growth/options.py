@@ -106,7 +106,9 @@ class GrowthRule:
     )
     max_steps: Annotated[int | None, Whole(least=1)] = field(default=None, metadata=_STOPS)
     max_cycles: Annotated[float | None, _POSITIVE] = field(default=None, metadata=_STOPS)
-    max_size: Annotated[float | None, _POSITIVE] = field(default=None, metadata=_STOPS)
+    max_size: Annotated[float | None, Number(above=0, unit=LENGTH)] = field(
+        default=None, metadata=_STOPS
+    )
     progress: Annotated[bool | str, Choice((True, False, "always"), _PROGRESS)] = field(
         default=True, metadata=_STOPS
     )
