@@ -214,6 +214,19 @@ def test_a_front_shorter_than_a_cell_is_reported_here_and_in_plan():
     assert short_fronts(line, xc.box((-1, -1), (2, 2), 9)) == []
 
 
+@pytest.mark.parametrize(("depth", "cells"), [(0.05, (10, 1, 10)), (0.15, (10, 2, 10))])
+def test_a_front_in_a_slab_of_a_cell_is_reported(depth, cells):
+    """It would be cut in two without a word; a crack that is drawn through is."""
+    mesh = xc.box((-1, 0, -1), (1, 0.1 * cells[1], 1), cells)
+    crack = xc.plane_crack([(-2, -1, 0.02), (2, -1, 0.02), (2, depth, 0.02), (-2, depth, 0.02)])
+    with pytest.warns(xc.XcrackWarning, match=r"within half a cell .* Take at least three cells"):
+        assert place_crack(crack, mesh).fronts == ()
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", xc.XcrackWarning)
+        through = xc.plane_crack([(-2, -1, 0.02), (2, -1, 0.02), (2, 1, 0.02), (-2, 1, 0.02)])
+        assert place_crack(through, mesh).fronts == ()
+
+
 def test_the_same_crack_twice_is_refused_on_any_mesh():
     line = xc.line_crack([(-0.2, 0.1), (0.2, -0.1)])
     with pytest.raises(xc.GeometryError, match=r"cracks 0 and 1 both end at .* no mesh can part"):

@@ -396,3 +396,46 @@ def test_turned_scaled_and_in_other_units(scale, options):
     """
     other = K_of(small(b=A, seed=811, scale=scale, **options)[0])
     assert np.abs(other / np.sqrt(scale) - reference_K()).max() <= 1e-6 * K_0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("bent", "inner", "ends"), [(0.0, 1e-3, 2e-3), (1.0, 2e-3, 5e-3)])
+def test_initially_stressed_sides(bent, inner, ends):
+    """An initial stress −C ε(v) is a change of the displacement by v, at free sides as well.
+
+    So K is that of the body without it whose ends move by v less. v is a polynomial that the
+    functions contain, so all that is left is quadrature, of terms that are larger than K.
+    """
+    E, nu = 1.0, 0.3
+    lame, mu = E * nu / (1 + nu) / (1 - 2 * nu), E / 2 / (1 + nu)
+    straight = np.array([[0.3, 0.2, -0.1], [0.15, -0.2, 0.25], [0.1, -0.3, 0.4]])
+    second = bent * np.random.default_rng(5).uniform(-0.5, 0.5, (3, 3, 3))
+    second = second + second.transpose(0, 2, 1)
+
+    def v(x):
+        return x @ straight.T + 0.5 * np.einsum("ijk,nj,nk->ni", second, x, x)
+
+    def stress(x):
+        gradient = straight + np.einsum("ijk,nk->nij", second, x)
+        strain = (gradient + gradient.transpose(0, 2, 1)) / 2
+        trace = np.trace(strain, axis1=1, axis2=2)[:, None, None]
+        return -2 * mu * strain - lame * trace * np.eye(3)
+
+    def pull(x):
+        return np.stack([0.1 * x[:, 2], 0 * x[:, 0], 0.5 * x[:, 2]], axis=1)
+
+    mesh = xc.box((0, 0, -1), (1, 1, 1), (8, 6, 12))
+    corners = [(-0.5, -0.5, 0.011), (0.45, -0.5, 0.011), (0.45, 1.5, 0.03), (-0.5, 1.5, 0.03)]
+    both = []
+    for loads, move in (([xc.initial_stress(stress)], lambda x: pull(x) + v(x)), ([], pull)):
+        held = [xc.displacement(side, move) for side in ("top", "bottom")]
+        problem = xc.Problem(
+            mesh, xc.Isotropic(E=E, nu=nu), [xc.plane_crack(corners)], loads=loads, supports=held,
+            contact="off",
+        )  # fmt: skip
+        both.append(xc.stress_intensity(xc.solve(problem)))
+    stressed, free = both
+    apart = np.abs(stressed.K - free.K).max(axis=1) / np.abs(free.K).max()
+    assert free.at_surface.sum() >= 2
+    assert apart[~free.at_surface].max() < inner
+    assert apart[free.at_surface].max() < ends

@@ -210,6 +210,7 @@ def _halved_sides(outlines: list[Floats], flag: Bools) -> list[Floats]:
 
 
 _MOUTH = 0.5  # an edge within this share of a cell from the boundary is a mouth
+_SEEN = 0.05  # share of a cell inside the boundary from which on an outline ends in the body
 _NEAR = 3.0  # cells around the body in which the outline is refined
 _TOUCH = 1e-6  # share of a cell within which cracks touch
 
@@ -223,7 +224,7 @@ class ShortFront:
     x : tuple of float, length
         Its middle.
     length : float, length
-        Of the part that lies more than half a cell inside.
+        Of the part that lies more than half a cell inside; 0 where none of it does.
     cell : float, length
         Size of the largest cell there.
     """
@@ -233,6 +234,11 @@ class ShortFront:
     cell: float
 
     def __str__(self) -> str:
+        if self.length == 0:
+            return (
+                f"the front at {at(self.x)} lies everywhere within half a cell "
+                f"({self.cell / 2:.4g}) of the boundary"
+            )
         return (
             f"the front at {at(self.x)}, {self.length:.4g} long without what lies within half a "
             f"cell of the boundary, is shorter than a cell ({self.cell:.4g})"
@@ -273,7 +279,7 @@ def place_surface(crack: Crack, mesh: Mesh) -> Crack:
         for front in short:
             warn(
                 f"{front}: it becomes part of the mouth, the crack cuts through there and has no "
-                "K. Take at least three cells along it."
+                "K. Take at least three cells along it, and across the body around it."
             )
     return placed
 
@@ -317,6 +323,8 @@ def _placed(crack: Crack, mesh: Mesh) -> tuple[Crack, list[ShortFront]]:
             continue
         inside, too_short = _front_sides(points[loop], number >= 0, body)
         short.extend(too_short)
+        if first_time and not inside.any() and not too_short:
+            short.extend(_front_along_boundary(points[loop], body))
         if not first_time and not inside.all():
             outline = TraceOutline(loop, number >= 0, inside, first_time)
             inside = inside | behind_holes(points, faces, outline, body)
@@ -340,21 +348,24 @@ def _placed(crack: Crack, mesh: Mesh) -> tuple[Crack, list[ShortFront]]:
 def _check_inside(crack: Crack, body: Body) -> None:
     """Raise where no part of the crack lies inside the body."""
     mesh = body.mesh
-    closest = closest_in(
-        triangle_tree(crack.points, crack.faces), mesh.points, 1.001 * float(mesh.cell_size.max())
-    )
-    foot = closest.foot[closest.triangle >= 0]
-    if len(foot):
-        depth, size = body.depth(foot)
-        # A crack that lies on the boundary does not cut the body.
-        if (depth < -_TOUCH * size).any():
-            return
-        if (depth < _TOUCH * size).any():
-            where = foot[int(np.argmin(depth))]
-            raise GeometryError(
-                f"the crack near {at(where)} lies on the boundary and cuts nothing: move it "
-                "inside. If that is the symmetry plane of a half model, model both halves."
-            )
+    tree, reach = triangle_tree(crack.points, crack.faces), 1.001 * float(mesh.cell_size.max())
+    on_boundary = np.zeros((0, 3))
+    # A body of one cell across has points on its boundary only.
+    for x in (mesh.points, mesh.points[mesh.cells].mean(axis=1)):
+        closest = closest_in(tree, x, reach)
+        foot = closest.foot[closest.triangle >= 0]
+        if len(foot):
+            depth, size = body.depth(foot)
+            if (depth < -_TOUCH * size).any():
+                return
+            if (depth < _TOUCH * size).any():
+                on_boundary = foot[[int(np.argmin(depth))]]
+    # A crack that lies on the boundary does not cut the body.
+    if len(on_boundary):
+        raise GeometryError(
+            f"the crack near {at(on_boundary[0])} lies on the boundary and cuts nothing: move it "
+            "inside. If that is the symmetry plane of a half model, model both halves."
+        )
     low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
     at_low, at_high = crack.points.min(axis=0), crack.points.max(axis=0)
     raise GeometryError(
@@ -448,6 +459,17 @@ def _front_sides(x: Floats, candidate: Bools, body: Body) -> tuple[Bools, list[S
             elif (candidate[run] & (depth[run] < 0)).all():
                 inside[run] = True
     return inside, short
+
+
+def _front_along_boundary(x: Floats, body: Body) -> list[ShortFront]:
+    """What of an outline ends in the body, but nowhere half a cell from its boundary."""
+    middle = (x + np.roll(x, -1, axis=0)) / 2
+    depth, facet = body.depth(middle)
+    deepest = int(np.argmin(depth / facet))
+    if depth[deepest] > -_SEEN * facet[deepest]:
+        return []
+    size = float(body.cell_size(middle[[deepest]])[0])
+    return [ShortFront(tuple(middle[deepest].tolist()), 0.0, size)]
 
 
 def check_surfaces(cracks: tuple[Crack, ...], mesh: Mesh) -> None:
