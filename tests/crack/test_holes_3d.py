@@ -6,6 +6,7 @@ that are exact.
 """
 
 import shutil
+import warnings
 
 import numpy as np
 import pytest
@@ -166,6 +167,17 @@ def test_a_front_that_touches_a_hole_from_both_sides(tmp_path):
     assert len(crack.fronts) == 1
     exact = 2 * HALF * 0.9 - np.pi * 0.2**2
     assert area_inside(crack, mesh) == pytest.approx(exact, rel=0.01)
+
+
+def test_ligaments_that_cells_do_not_resolve_are_named(tmp_path):
+    """What is left beside the hole is two cells wide; half a one at each side does not count."""
+    mesh = block(tmp_path / "hole.msh", (-0.4, 0, -0.5, 1.0, 0.25), h=0.2)
+    crack = place_surface(through_crack(-0.75), mesh)
+    with warnings.catch_warnings(record=True) as issued:
+        warnings.simplefilter("always", xc.XcrackWarning)
+        while crack.fronts:
+            crack = grown(crack, mesh, 0.15)
+    assert any("as if it had left the body. Take at" in str(each.message) for each in issued)
 
 
 @pytest.mark.slow

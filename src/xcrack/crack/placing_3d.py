@@ -210,6 +210,7 @@ def _halved_sides(outlines: list[Floats], flag: Bools) -> list[Floats]:
 
 
 _MOUTH = 0.5  # an edge within this share of a cell from the boundary is a mouth
+_LOST = 0.4  # of a cell: a shorter rest of a front has left the body
 _SEEN = 0.05  # share of a cell inside the boundary from which on an outline ends in the body
 _NEAR = 3.0  # cells around the body in which the outline is refined
 _TOUCH = 1e-6  # share of a cell within which cracks touch
@@ -264,7 +265,7 @@ def place_surface(crack: Crack, mesh: Mesh) -> Crack:
     Crack
         With `fronts` set. Ends of open fronts lie two cells outside the body, mouths at least
         one cell (less in a gap that is narrower). A warning names a front that is shorter than a
-        cell and becomes part of the mouth.
+        cell and becomes part of the mouth; of a crack that has grown, where none is left.
 
     Raises
     ------
@@ -281,6 +282,13 @@ def place_surface(crack: Crack, mesh: Mesh) -> Crack:
                 f"{front}: it becomes part of the mouth, the crack cuts through there and has no "
                 "K. Take at least three cells along it, and across the body around it."
             )
+    elif crack.fronts and not placed.fronts:
+        for front in short:
+            if front.length > _LOST * front.cell:
+                warn(
+                    f"{front}: the crack cuts through there, as if it had left the body. Take at "
+                    "least three cells across what is left of the body there."
+                )
     return placed
 
 
