@@ -100,6 +100,72 @@ def test_shear_closes_a_tip(sign):
         assert "the faces press over" in sif.reasons[0]
 
 
+def sheared_crack(beta, n):
+    """An interface crack of half length 1 in a shear field 1, whose faces press without friction.
+
+    The singular integral equations of Comninou (1978, J. Appl. Mech. 45, 287) for densities B of
+    dislocations, of unit compliance: σ₁₂ = ∫B₁/(x - ξ)/π + β B₂ = -1 on the crack, and where it is
+    open σ₂₂ = ∫B₂/(x - ξ)/π - β B₁ = 0, by pieces of constant jumps. Where it opens by less than
+    nothing it is closed, where it is pulled it is not. Returns where it begins to press, and G of
+    either tip: both are the same, since no place along the interface is special.
+    """
+    ends = -np.cos(np.pi * np.arange(n + 1) / n)
+    x = 0.5 * (ends[1:] + ends[:-1])
+    pole = (1 / (x[:, None] - ends[1:]) - 1 / (x[:, None] - ends[:-1])) / np.pi
+    grid, density = np.r_[-1.0, x, 1.0], np.zeros((n, n + 2))
+    for i in range(n):  # by the parabola through three jumps, which are zero at the tips
+        a, b, c = grid[i : i + 3]
+        density[i, i : i + 3] = -np.array(
+            [(b - c) / ((a - b) * (a - c)), (2 * b - a - c) / ((b - a) * (b - c)),
+             (b - a) / ((c - a) * (c - b))]
+        )  # fmt: skip
+    density = density[:, 1:-1]
+    closed = np.zeros(n, dtype=bool)
+    for _ in range(50):
+        free = ~closed
+        matrix = np.block([[pole, beta * density[:, free]],
+                           [-beta * density[free], pole[np.ix_(free, free)]]])  # fmt: skip
+        jumps = np.linalg.solve(matrix, np.r_[-np.ones(n), np.zeros(free.sum())])
+        slip, opening = jumps[:n], np.zeros(n)
+        opening[free] = jumps[n:]
+        stress = pole @ opening - beta * density @ slip
+        now = (closed & (stress < 0)) | (free & (opening < 0))
+        if (now == closed).all():
+            break
+        closed = now
+    return ends[int(np.argmax(closed))], 0.5 * float(np.diff(ends) @ slip)
+
+
+@pytest.mark.slow
+def test_contact_in_shear_against_the_equations_of_comninou():
+    """A third of the crack presses; there G holds, and K is nan with its reason."""
+    mesh = xc.box((-20.0, -20.0), (20.0, 20.0), (40, 40))
+    mesh = xc.refine(mesh, size=lambda x: np.maximum(0.05, 0.35 * (
+        np.hypot(np.maximum(np.abs(x[:, 0]) - 1.1, 0), x[:, 1]) - 0.25)))  # fmt: skip
+    mesh = mesh.with_cell_sets({"one": lambda x: x[:, 1] > 0, "two": lambda x: x[:, 1] < 0})
+    one, two = xc.Isotropic(2e4, 0.0, "strain"), xc.Isotropic(1e3, 0.0, "strain")
+    pairs = {"top": (1, 0), "bottom": (-1, 0), "right": (0, 1), "left": (0, -1)}
+    load = [xc.traction(side, np.array(t, dtype=float)) for side, t in pairs.items()]
+    problem = xc.Problem(mesh, {"one": one, "two": two}, [xc.line_crack([(-1, 0), (1, 0)])],
+                         loads=load)  # fmt: skip
+    solution = xc.solve(problem)
+    sif = xc.interface_intensity(solution, 2.0)
+    beta = (one.mu * (two.kolosov - 1) - two.mu * (one.kolosov - 1)) / (
+        one.mu * (two.kolosov + 1) + two.mu * (one.kolosov + 1)
+    )
+    alpha = (one.E_prime - two.E_prime) / (one.E_prime + two.E_prime)
+    unit = 2 * one.mu * (1 - alpha) / ((one.kolosov + 1) * (1 - beta**2))
+    (begin, coarse), (fine_begin, fine) = (sheared_crack(beta, n) for n in (200, 400))
+    assert begin == pytest.approx(fine_begin, abs=0.02)
+    G = (2 * fine - coarse) / unit  # the pieces are of first order
+    print(sif.G / G, fine_begin, sif.contact_zone)
+    assert sif.G == pytest.approx(G, rel=5e-3)  # of it 2e-3 of the width of the plate
+    assert sif.contact_zone[1] == pytest.approx(1 - fine_begin, abs=0.05)  # a cell
+    assert sif.contact_zone[0] < 0.05  # Comninou: of 1e-7 of the crack
+    assert np.isnan([sif.K_1[1], sif.K_2[1]]).all()
+    assert "the faces press over" in sif.reasons[1]
+
+
 def test_tips_that_are_not_on_an_interface_are_refused():
     solution = xc.solve(scenes.edge_crack(10, 0.37, 3.0))
     with pytest.raises(xc.GeometryError, match="does not run along an interface there"):

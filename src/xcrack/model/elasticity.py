@@ -233,37 +233,23 @@ class Elasticity:
         Parameters
         ----------
         cells : (k,) array of int
-            Around the tip, or along the front.
-        x : (d,) array, or (m, d) array of a front, length
+            Around the tip.
+        x : (d,) array, length
 
         Raises
         ------
         GeometryError
-            The tip lies on an interface, or the front in several materials.
+            The tip lies on an interface.
         ProblemError
-            The material there is not isotropic, or along a front graded.
+            The material there is not isotropic.
         """
         if len(self.number) and len(np.unique(self.number[cells])) > 1:
             names = " and ".join(map(repr, self.names_of(cells)))
-            if x.ndim == 2:
-                raise GeometryError(
-                    f"the front from {at(x[0])} to {at(x[-1])} passes through {names}: K along a "
-                    "front is known in one material. Let it end at the interface, or give both "
-                    "sets the same elastic constants."
-                )
             raise GeometryError(
                 f"the crack ends at {at(x)} on the interface of {names}: the stress there does not "
                 "go like 1/√r, so there is no K. Let it end a cell before or behind; a crack along "
                 "the interface has a complex K, see interface_intensity."
             )
-        if x.ndim == 2:
-            material = self.groups(cells)[0][0]
-            if material.is_graded:
-                raise ProblemError(
-                    f"{material!r}: K along a front is known in a material with one stiffness: "
-                    "give the set around the front an Isotropic."
-                )
-            return material.at_tip()
         return self._isotropic(int(cells[0]), x)
 
     def isotropic_at(self, x: Floats) -> Isotropic:

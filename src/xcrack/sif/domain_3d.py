@@ -18,16 +18,17 @@ from xcrack.fem.loads import position
 from xcrack.fem.quadrature import cell_points, cell_side, lip_side
 from xcrack.mesh.distances import closest_in, triangle_tree
 from xcrack.mesh.simplex import leg_size
+from xcrack.model.material import Isotropic
 from xcrack.sif.accuracy import Domain, check
 from xcrack.sif.common import (
     has_effect,
     initial_stresses,
     lip_pressure,
     lip_shear,
-    material_at_tip,
     mean_rotation,
     with_closed,
 )
+from xcrack.sif.front_materials import FrontMaterials, front_materials, warn_of_changes
 from xcrack.sif.interaction_3d import (
     domain_integrals,
     front_nodes,
@@ -128,7 +129,10 @@ def front_intensity(solutions: Sequence[Solution], t: int) -> list[SIF]:
     s = curve.breaks[inside - first]
     x, frame, _ = curve.at(s)
     ends = way_inside(curve, is_inside)
-    nothing, tip_material = np.zeros(len(s)), material_at_tip(solutions[0], t)
+    nothing = np.zeros(len(s))
+    size = leg_size(space.mesh, space.cuts[tip.crack].level_set.tip_cells[tip.number])
+    materials = front_materials(solutions[0], t, curve, size)
+    E_prime, nu = materials.moduli(s)
     empty = SIF(
         x=np.array(tip.x)[inside],
         frame=frame,
@@ -141,12 +145,12 @@ def front_intensity(solutions: Sequence[Solution], t: int) -> list[SIF]:
         closed=np.zeros(len(s), dtype=bool),
         domain_cells=nothing,
         widened=np.zeros((len(s), 3)),
-        E_prime=np.full(len(s), tip_material.E_prime),
-        nu=np.full(len(s), tip_material.nu),
+        E_prime=E_prime,
+        nu=nu,
     )
     if ends is None or not len(s):
         return [empty] * len(solutions)
-    values = front_values(solutions, t, curve, ends)
+    values = front_values(solutions, t, curve, ends, materials)
     if not values.valid.any():
         _warn_unknown(x, values)
         return [empty] * len(solutions)
@@ -155,10 +159,15 @@ def front_intensity(solutions: Sequence[Solution], t: int) -> list[SIF]:
     read = np.clip(
         s, ends[0] + depth if free[0] else -np.inf, ends[1] - depth if free[1] else np.inf
     )
+    read, passes = materials.beside_changes(read, values.domain.size)
     everywhere = np.append(read, (ends[0] + depth, ends[1] - depth))
     matrix = reading(values.knots, values.valid, curve, everywhere)
     K = np.einsum("sv,nkvm->nksm", matrix, values.K[:, :, values.valid])
     wide = np.einsum("sv,nvm->nsm", matrix, values.wide[:, 0][:, values.valid])
+    if not materials.is_one:
+        of_material = materials.factors(everywhere)
+        K, wide = K * of_material, wide * of_material
+        values = replace(values, mean=values.mean * materials.factors(values.knots))
     period = curve.length if closed else None
     cells = np.interp(s, values.knots, values.radius, period=period) / values.domain.size
     at_surface = (read != s) | ~_covered_parameters(curve, values.knots, values.valid, s)
@@ -181,6 +190,7 @@ def front_intensity(solutions: Sequence[Solution], t: int) -> list[SIF]:
         )
         result.append(replace(sif, ends=known))
     check(solutions, t, values.domain, result)
+    warn_of_changes(materials, curve, passes)
     return result
 
 
@@ -255,7 +265,11 @@ def _covered_parameters(curve: FrontCurve, knots: Floats, valid: Bools, s: Float
 
 
 def front_values(
-    solutions: Sequence[Solution], t: int, curve: FrontCurve, ends: tuple[float, float]
+    solutions: Sequence[Solution],
+    t: int,
+    curve: FrontCurve,
+    ends: tuple[float, float],
+    materials: FrontMaterials,
 ) -> FrontValues:
     """K at the tops of the hats of one front.
 
@@ -266,8 +280,10 @@ def front_values(
     curve : FrontCurve
     ends : tuple of float, length
         Where the front enters and leaves the body.
+    materials : FrontMaterials
+        K of its places is given as if all of the front were of the first reference.
     """
-    space, tip_material = solutions[0].space, material_at_tip(solutions[0], t)
+    space, tip_material = solutions[0].space, materials.references[0]
     tip = space.tips[t]
     size = leg_size(space.mesh, space.cuts[tip.crack].level_set.tip_cells[tip.number])
     wanted = solutions[0].problem.numerics.domain
@@ -287,10 +303,10 @@ def front_values(
     outer = float(radius.max())
     distance = curve.distance(space.mesh.points, outer)
     turn = np.stack([mean_rotation(s, distance, outer) for s in solutions], axis=-1)
-    total = _lip_part(solutions, t, curve, knots, radii, turn)
+    total = _lip_part(solutions, t, curve, knots, radii, turn, materials)
     if sides is not None:
-        total += integrals_of_sides(solutions, t, sides, curve, knots, radii, turn)
-    for part in _domain_parts(solutions, t, curve, knots, radii, turn):
+        total += integrals_of_sides(solutions, t, sides, curve, knots, radii, turn, materials)
+    for part in _domain_parts(solutions, t, curve, knots, radii, turn, materials):
         total += part
     K = solve_front(total, knots, curve, tip_material, valid, smooth)
     wide = twice_as_wide(total, knots, curve, tip_material, valid, smooth)
@@ -310,7 +326,9 @@ def front_values(
         label="K along the front, at",
         bend=float(bend[bend_at]),
         bend_at=curve.at(knots[[bend_at]])[0][0],
-        interface=_distance_to_interface(solutions[0], curve.at(knots)[0]),
+        interface=_distance_to_interface(
+            solutions[0], curve.at(knots[~materials.beside_changes(knots, 1.5 * size)[1]])[0]
+        ),
     )
     return FrontValues(knots, K, mean, valid, wide, smooth, radius, domain)
 
@@ -318,7 +336,7 @@ def front_values(
 def _distance_to_interface(solution: Solution, x: Floats) -> float:
     """Least distance of points of a front to another material, length; inf without."""
     mesh, interfaces = solution.space.mesh, solution.problem.elasticity.interfaces
-    if not len(interfaces):
+    if not len(interfaces) or not len(x):
         return np.inf
     tree = triangle_tree(mesh.points, mesh.facets[interfaces])
     return float(np.abs(closest_in(tree, x).distance).min())
@@ -372,6 +390,7 @@ def _domain_parts(
     knots: Floats,
     radii: Floats,
     turn: Floats,
+    materials: FrontMaterials,
 ) -> Iterator[Floats]:
     """Domain integrals of the hats, of the same chunks for any threads."""
     space = solutions[0].space
@@ -380,7 +399,6 @@ def _domain_parts(
     outer = float(radii.max())
     coefficients = np.stack([solution.coefficients for solution in solutions], axis=-1)
     initial, elasticity = initial_stresses(solutions), solutions[0].problem.elasticity
-    tip_material = material_at_tip(solutions[0], t)
     middle = mesh.points[mesh.cells].mean(axis=1)
     reach = 1.05 * outer
     distance = curve.distance(middle, reach + float(mesh.cell_size.max())) - reach
@@ -400,29 +418,42 @@ def _domain_parts(
         points = points.chosen(near_points)
         gradient = gradients_at(space, coefficients, points.cell, points.bary, points.side)
         behind = np.einsum("qb,qb->q", psi[mesh.cells[points.cell]], points.bary) < 0
-        change = None
-        if not elasticity.is_uniform:
-            change = elasticity.stress_change(tip_material, gradient, points.cell, points.bary)
-        return domain_integrals(
-            curve,
-            knots,
-            feet,
-            points.weight,
-            gradient - turn,
-            points.side[:, tip.crack],
-            behind,
-            tip_material,
-            radii,
-            force=_force(solutions, x[near_points]),
-            initial=initial,
-            stress_change=change,
-        )
+        force, side = _force(solutions, x[near_points]), points.side[:, tip.crack]
+        if materials.is_one:
+            material, change = materials.references[0], None
+            if not elasticity.is_uniform:
+                change = elasticity.stress_change(material, gradient, points.cell, points.bary)
+            return domain_integrals(
+                curve, knots, feet, points.weight, gradient - turn, side, behind, material, radii,
+                force=force, initial=initial, stress_change=change,
+            )  # fmt: skip
+        total = np.zeros((len(solutions), radii.shape[1], 3, len(knots)))
+        for material, rows, ratio in materials.parts(feet.s):
+            own, of_feet = gradient[rows], feet.chosen(rows)
+            cell, bary = points.cell[rows], points.bary[rows]
+            change, rise, turned = elasticity.stress_change(material, own, cell, bary), None, turn
+            if ratio is not None:
+                change -= (ratio[0] - 1)[:, None, None, None] * _stresses(material, own)
+                own = ratio[0][:, None, None, None] * (own - turn)
+                rise, turned = ratio[1] / of_feet.turn[:, 3], np.zeros_like(turn)
+            total += domain_integrals(
+                curve, knots, of_feet, points.weight[rows], own - turned, side[rows], behind[rows],
+                material, radii, force=None if force is None else force[rows], initial=initial,
+                stress_change=change, rise=rise,
+            )  # fmt: skip
+        return total
 
     chunks = range(0, len(cells), _CHUNK)
     # Functions of the user are called by one thread alone.
     has_sources = has_effect(solutions, "volume", "initial_stress")
     parts = map(part, chunks) if has_sources else stream_tasks(part, chunks)
     yield from (result for result in parts if result is not None)
+
+
+def _stresses(material: Isotropic, gradient: Floats) -> Floats:
+    """Stress `(q, 3, 3, n)` of displacement gradients of n states."""
+    states = [np.ascontiguousarray(gradient[..., n]) for n in range(gradient.shape[3])]
+    return np.stack([material.stress(state) for state in states], axis=-1)
 
 
 def _force(solutions: Sequence[Solution], x: Floats) -> Floats | None:
@@ -444,6 +475,7 @@ def _lip_part(
     knots: Floats,
     radii: Floats,
     turn: Floats,
+    materials: FrontMaterials,
 ) -> Floats:
     """Lip integrals of the hats `(n, k, 3, p)`."""
     space = solutions[0].space
@@ -470,18 +502,18 @@ def _lip_part(
             for s, sign in ((0, -1), (1, 1))
         ]
         gradient = np.stack(both)
-    return lip_integrals(
-        curve,
-        knots,
-        feet,
-        lips.normal[near_points],
-        lips.weight[near_points],
-        traction,
-        material_at_tip(solutions[0], t),
-        radii,
-        gradient=gradient,
-        initial=initial_stresses(solutions),
-    )
+    normal, weight = lips.normal[near_points], lips.weight[near_points]
+    total = np.zeros((len(solutions), radii.shape[1], 3, len(knots)))
+    initial = initial_stresses(solutions)
+    for material, rows, ratio in materials.parts(feet.s):
+        own = None if gradient is None else gradient[:, rows]
+        if own is not None and ratio is not None:
+            own = own * ratio[0][None, :, None, None, None]
+        total += lip_integrals(
+            curve, knots, feet.chosen(rows), normal[rows], weight[rows], traction[rows], material,
+            radii, gradient=own, initial=initial,
+        )  # fmt: skip
+    return total
 
 
 def _as_seen(solution: Solution, t: int, rows: Ints, feet: FootPoints) -> FootPoints:

@@ -7,7 +7,9 @@ normal to the front, u^a = U1 t + U2 n + U3 b. With
 t' = -kt b + w n, n' = -kn b - w t, b' = kt t + kn n and hs = 1 - kt x1 - kn x2 the derivative
 along b of what is given in (s, x1, x2) is (d/ds - w (x1 d/dx2 - x2 d/dx1)) / hs: all terms of
 curvature (kt, kn) and of twist w of the frame are counted, none is left out. eps^a and sigma^a
-are made of the derivatives along t and n alone, hence the second and the third term.
+are made of the derivatives along t and n alone, hence the second and the third term. Where the
+modulus changes along the front, sigma^a goes like E(s), and sigma^a_ib dlnE/ds / hs is part of
+sigma^a_ij,j: the same sums, of E(s) / E u.
 K_I, K_II = E' / 2 I and K_III = mu I, each divided by the integral of the hat. Where the stiffness
 is another one than C_t at the front, (C - C_t) eps(u) is an initial stress to a body of C_t, as in
 2D.
@@ -148,6 +150,7 @@ def domain_integrals(
     force: Floats | None = None,
     initial: Callable[[Floats], Floats] | None = None,
     stress_change: Floats | None = None,
+    rise: Floats | None = None,
     curved: bool = True,
 ) -> Floats:
     """Domain integrals over points of the body; those of all chunks add up.
@@ -176,6 +179,9 @@ def domain_integrals(
     stress_change : (q, 3, 3, n) array, stress, optional
         Where the stiffness is another one than that of the tip: (C - C_t) eps(u), which is an
         initial stress to a body of C_t.
+    rise : (q,) array, 1/length, optional
+        Derivative of ln E along the front, where `gradient` is that of u times E over that of
+        `tip_material`.
     curved : bool
         Without, curvature and twist are left out for comparison.
 
@@ -210,6 +216,7 @@ def domain_integrals(
         tip_material.lam,
         tip_material.mu,
         curved,
+        np.zeros(0) if rise is None else np.ascontiguousarray(rise),
         total,
     )
     return total

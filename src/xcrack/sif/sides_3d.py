@@ -20,7 +20,8 @@ from xcrack.fem.loads import facet_points, outer_points, position
 from xcrack.fem.quadrature import Points, lip_side
 from xcrack.mesh.mesh import facet_set, numbers_of
 from xcrack.model.supports import Support
-from xcrack.sif.common import initial_stresses, lip_pressure, lip_shear, material_at_tip
+from xcrack.sif.common import initial_stresses, lip_pressure, lip_shear
+from xcrack.sif.front_materials import FrontMaterials
 from xcrack.sif.interaction_3d import hats, side_integrals
 
 _ALONG = 1e-6  # of a unit normal beside an axis: a plane across that axis
@@ -194,6 +195,7 @@ def integrals_of_sides(
     knots: Floats,
     radii: Floats,
     turn: Floats,
+    materials: FrontMaterials,
 ) -> Floats:
     """What the sides of the body add to the integrals of the hats `(n, k, 3, p)`.
 
@@ -208,13 +210,24 @@ def integrals_of_sides(
     radii : (p, k) array, length
     turn : (3, 3, n) array
         Rotation of each state that is left out.
+    materials : FrontMaterials
     """
     space, points = solutions[0].space, sides.points
     coefficients = np.stack([solution.coefficients for solution in solutions], axis=-1)
     gradient = gradients_at(space, coefficients, points.cell, points.bary, points.side) - turn
     free = np.zeros((len(points.cell), 3, len(solutions)))
     total = _integrals(
-        solutions, t, points, sides.normal, sides.feet, free, curve, knots, radii, gradient
+        solutions,
+        t,
+        points,
+        sides.normal,
+        sides.feet,
+        free,
+        curve,
+        knots,
+        radii,
+        materials,
+        gradient,
     )
     reach, crack = float(radii.max()), space.tips[t].crack
     loaded = _loaded(solutions, curve, reach) + _pressed(solutions, crack, curve, reach)
@@ -224,7 +237,9 @@ def integrals_of_sides(
             points, normal, feet, traction = (
                 points.chosen(counts), normal[counts], feet.chosen(counts), traction[counts]
             )  # fmt: skip
-        total += _integrals(solutions, t, points, normal, feet, traction, curve, knots, radii)
+        total += _integrals(
+            solutions, t, points, normal, feet, traction, curve, knots, radii, materials
+        )
     return total
 
 
@@ -238,6 +253,7 @@ def _integrals(
     curve: FrontCurve,
     knots: Floats,
     radii: Floats,
+    materials: FrontMaterials,
     gradient: Floats | None = None,
 ) -> Floats:
     space = solutions[0].space
@@ -245,10 +261,21 @@ def _integrals(
     psi = space.cuts[tip.crack].level_set.psi[tip.number]
     behind = np.einsum("qb,qb->q", psi[space.mesh.cells[points.cell]], points.bary) < 0
     side, initial = points.side[:, tip.crack], initial_stresses(solutions)
-    return side_integrals(
-        curve, knots, feet, normal, points.weight, traction, side, behind,
-        material_at_tip(solutions[0], t), radii, gradient=gradient, initial=initial,
-    )  # fmt: skip
+    if materials.is_one:
+        return side_integrals(
+            curve, knots, feet, normal, points.weight, traction, side, behind,
+            materials.references[0], radii, gradient=gradient, initial=initial,
+        )  # fmt: skip
+    total = np.zeros((len(solutions), radii.shape[1], 3, len(knots)))
+    for material, rows, ratio in materials.parts(feet.s):
+        own = None if gradient is None else gradient[rows]
+        if own is not None and ratio is not None:
+            own = own * ratio[0][:, None, None, None]
+        total += side_integrals(
+            curve, knots, feet.chosen(rows), normal[rows], points.weight[rows], traction[rows],
+            side[rows], behind[rows], material, radii, gradient=own, initial=initial,
+        )  # fmt: skip
+    return total
 
 
 def _loaded(

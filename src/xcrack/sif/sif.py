@@ -112,8 +112,8 @@ class SIF:
         Which tip or front.
     at_surface : (f,) array of bool
         Places so close to a side of the body that K there is that of another place: at a free
-        surface that at a depth (`ends`), beside a side that is held the nearest that is known.
-        Never in 2D.
+        surface that at a depth (`ends`), beside a side that is held the nearest that is known, and
+        where the front passes into another material that of a cell away. Never in 2D.
     closed : (f,) array of bool
         Places up to which the crack faces press together: K_I is exactly zero there. Never so on a
         crack without multipliers.

@@ -241,7 +241,7 @@ def _into_frame(frame, tensor, result):  # type: ignore[no-untyped-def]
 @kernel
 def front_terms(  # type: ignore[no-untyped-def]
     weight, gradient, force, initial, change, polar, frame, turn, hat, share, step, radii,
-    lam, mu, curved, result,
+    lam, mu, curved, slopes, result,
 ):  # fmt: skip
     """Add the domain integrals of points to those of the hats.
 
@@ -269,6 +269,8 @@ def front_terms(  # type: ignore[no-untyped-def]
         Lamé constants.
     curved : bool
         Count the curvatures and the twist; without, for comparison, they are taken as zero.
+    slopes : (q or 0,) array, 1/length
+        Derivative of the logarithm of the modulus along the front, if it changes.
     result : (n, k, 3, hats) array
         Added to.
     """
@@ -323,6 +325,9 @@ def front_terms(  # type: ignore[no-untyped-def]
             D[m, 0] += kt * S[m, 2, 2] - w * S[m, 1, 2]
             D[m, 1] += kn * S[m, 2, 2] + w * S[m, 0, 2]
             D[m, 2] -= kt * S[m, 0, 2] + kn * S[m, 1, 2]
+            if len(slopes) > 0:
+                for i in range(3):
+                    D[m, i] += slopes[q] * S[m, i, 2]
             for i in range(3):
                 D[m, i] /= hs
         for n in range(states):
