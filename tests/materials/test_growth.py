@@ -129,6 +129,24 @@ def test_the_order_of_stresses_at_an_interface(ratio, plane):
     assert values[1][-1] >= 1e-5 * values[1][0]
 
 
+def test_the_criterion_has_the_ratio_of_Poisson_where_the_tip_is():
+    asked = []
+
+    def criterion(K, nu):
+        asked.append((K.shape[1], nu))
+        return xc.max_hoop_stress(K, nu)
+
+    materials = {"one": xc.Isotropic(1.0, 0.2, "strain"), "two": xc.Isotropic(1.0, 0.4, "strain")}
+    problem = xc.Problem(scenes.square(12), materials, [xc.line_crack([(0.3, 0.02), (0.7, 0.02)])],
+                         loads=scenes.PULL)  # fmt: skip
+
+    def response(problem, states, reuse, bars):
+        return xc.Response.of_K(problem, states, [[[k, 0.0], [k, 0.0]] for k in states])
+
+    next(xc.grow(problem, FAST, criterion, CYCLE, da=0.05, response=response, progress=False))
+    assert set(asked) == {(1, 0.2), (1, 0.4)}
+
+
 def test_each_material_has_its_toughness():
     def materials(K_c):
         return {"one": xc.Isotropic(1.0, 0.3, "strain", K_c=1e3),

@@ -18,7 +18,7 @@ _RATIOS = (0.0, 0.5)  # a law that gives the same rate for both does not depend 
 
 
 def evaluate_criterion(
-    criterion: Criterion, K: Floats, nu: float, crack: int, place: str = "tip"
+    criterion: Criterion, K: Floats, nu: float | Floats, crack: int, place: str = "tip"
 ) -> tuple[Floats, Floats, Floats]:
     """Angle, range and ratio at each place of one crack.
 
@@ -26,7 +26,8 @@ def evaluate_criterion(
     ----------
     criterion : callable
     K : (s, f, 2 or 3) array, stress √length
-    nu : float
+    nu : float or (f,) array
+        An array asks the criterion once for each of its values.
     crack : int
         Its number, for messages.
     place : str
@@ -45,6 +46,12 @@ def evaluate_criterion(
     n = K.shape[1]
     if n == 0:
         return np.zeros(0), np.zeros(0), np.zeros(0)
+    if isinstance(nu, np.ndarray):
+        every = np.empty((3, n))
+        for value in np.unique(nu).tolist():
+            rows = nu == value
+            every[:, rows] = evaluate_criterion(criterion, K[:, rows], value, crack, place)
+        return every[0], every[1], every[2]
     result = call_function(criterion, f"the directions of crack {crack}", K.copy(), nu)
     try:
         parts = tuple(result)

@@ -137,7 +137,7 @@ def equivalent_K(
     return _equivalent_K(K, angle, nu)
 
 
-def _equivalent_K(K: Floats, angle: Floats, nu: float) -> Floats:
+def _equivalent_K(K: Floats, angle: Floats, nu: float | Floats) -> Floats:
     """Equivalent factor of arrays that fit."""
     half = angle / 2
     cos, sin = np.cos(half), np.sin(half)
@@ -344,10 +344,17 @@ def _component_range(K: Floats, angle: Floats, nu: float) -> Floats:
     return largest
 
 
+def local_equivalent_K(K: Floats, angle: Floats, nu: float | Floats) -> Floats:
+    """`equivalent_K` at places `(s, f)`, of which each may have a Poisson's ratio of its own."""
+    if isinstance(nu, np.ndarray):
+        return np.asarray(_equivalent_K(K, angle, nu))
+    return equivalent_K(K, angle, nu)
+
+
 # Range and ratio of a crack whose faces may overlap.
 
 
-def nominal_range(K: Floats, angle: Floats, nu: float) -> tuple[Floats, Floats]:
+def nominal_range(K: Floats, angle: Floats, nu: float | Floats) -> tuple[Floats, Floats]:
     """Range and ratio of a crack whose faces may overlap, R < 0 included.
 
     Parameters
@@ -356,7 +363,7 @@ def nominal_range(K: Floats, angle: Floats, nu: float) -> tuple[Floats, Floats]:
         Of the scene without contact.
     angle : (f,) array, rad
         Direction at each place.
-    nu : float
+    nu : float or (f,) array
 
     Returns
     -------
@@ -384,6 +391,7 @@ __all__ = [
     "clipped_K",
     "equivalent_K",
     "kink_angle",
+    "local_equivalent_K",
     "max_hoop_stress",
     "mean_reference",
     "nominal_range",

@@ -118,7 +118,7 @@ def _filled(rule: GrowthRule, step: Step) -> list[tuple[float, Ligament]]:
 
 def _zones(rule: GrowthRule, step: Step, c: int) -> Floats:
     assert rule.link_up is not None
-    K_eq = largest_K_eq(step, c, rule.problem.elasticity.poisson)
+    K_eq = largest_K_eq(step, c, rule.problem.elasticity.poisson_at(step.sif[0][c].x))
     zone = call_function(rule.link_up, f"link_up at step {step.index}", K_eq)
     return numbers(zone, "what link_up returned", K_eq.shape)
 
@@ -157,7 +157,7 @@ def toughness_is_reached(rule: GrowthRule, step: Step) -> str:
     if rule.toughness is None:
         return ""
     for c in range(len(step.cracks)):
-        K_eq = largest_K_eq(step, c, rule.problem.elasticity.poisson)
+        K_eq = largest_K_eq(step, c, rule.problem.elasticity.poisson_at(step.sif[0][c].x))
         K_c = rule.toughness_at(step.sif[0][c].x)
         for j in np.nonzero(K_eq >= K_c)[0].tolist():
             place = place_name(step, c, j)
@@ -236,8 +236,9 @@ def K_beyond(rule: GrowthRule, step: Step) -> float:
     """Logarithm of the largest K_eq over K_c of the material there."""
     if rule.toughness is None or step.has_left:
         return -inf
-    nu, largest = rule.problem.elasticity.poisson, 0.0
+    largest = 0.0
     for c, sif in enumerate(step.sif[0]):
+        nu = rule.problem.elasticity.poisson_at(sif.x)
         share = largest_K_eq(step, c, nu) / rule.toughness_at(sif.x)
         largest = max(largest, float(share.max(initial=0.0)))
     return log(largest) if largest > 0 else -inf

@@ -12,7 +12,7 @@ from xcrack.base.errors import ProblemError, warn
 from xcrack.crack.crack import Crack
 from xcrack.crack.stations import Stations
 from xcrack.fatigue.checks import evaluate_criterion, evaluate_law, law_exponent
-from xcrack.fatigue.criteria import clipped_K, equivalent_K, kink_angle, nominal_range
+from xcrack.fatigue.criteria import clipped_K, kink_angle, local_equivalent_K, nominal_range
 from xcrack.fatigue.law import Law
 from xcrack.fatigue.law_sets import LawSets, Names
 from xcrack.fatigue.rainflow import closed_cycles
@@ -258,9 +258,10 @@ def _inputs_of_cycle(
     free: Response | None,
     materials: Sequence[Names],
 ) -> list[CriterionInput]:
-    place, nu = PLACE[problem.mesh.dim], problem.elasticity.poisson
+    place = PLACE[problem.mesh.dim]
 
     def of_crack(c: int) -> CriterionInput:
+        nu = problem.elasticity.poisson_at(response.sif[0][c].x)
         given = np.stack([state[c].K for state in response.sif])
         a = law_size(problem.mesh.dim, problem.sizes[c], given.shape[1])
         names = materials[c]
@@ -287,12 +288,12 @@ def _inputs_of_blocks(
     free: Response | None,
     materials: Sequence[Names],
 ) -> list[CriterionInput]:
-    place, nu = PLACE[problem.mesh.dim], problem.elasticity.poisson
+    place = PLACE[problem.mesh.dim]
     every = pairs_of(rule, problem, response)
     nominal = [None] * len(every) if free is None else pairs_of(rule, problem, free)
 
     def of_crack(c: int, pairs: RangePairs, free_pairs: RangePairs | None) -> CriterionInput:
-        shape = pairs.K.shape
+        shape, nu = pairs.K.shape, problem.elasticity.poisson_at(response.sif[0][c].x)
         a = law_size(problem.mesh.dim, problem.sizes[c], shape[2])
         names = materials[c]
 
@@ -353,9 +354,9 @@ def _locked(problem: Problem, response: Response, dK_eq: Floats) -> Bools:
     parts = [np.zeros(len(each.x), dtype=bool) for each in sif[0]]
     rubs = [c for c in range(len(parts)) if has_slip(solutions[0], c)]
     if rubs:
-        nu = problem.elasticity.poisson
+        nu = problem.elasticity.poisson_at(np.concatenate([each.x for each in sif[0]]))
         K = clipped_K(np.stack([np.concatenate([each.K for each in state]) for state in sif]))
-        largest = float(equivalent_K(K, kink_angle(K), nu).max(initial=0.0))
+        largest = float(local_equivalent_K(K, kink_angle(K), nu).max(initial=0.0))
         split_ranges = split(dK_eq, [len(part) for part in parts])
     for c in rubs:
         lips = solutions[0].lips[c]
@@ -432,9 +433,9 @@ def pairs_of(rule: GrowthRule, problem: Problem, response: Response) -> list[Ran
     if not isinstance(spectrum, Spectrum):
         return []
     if spectrum.states is not None:
-        nu = problem.elasticity.poisson
+        nu = [problem.elasticity.poisson_at(sif.x) for sif in response.sif[0]]
         every = [np.stack([sif.K for sif in crack]) for crack in zip(*response.sif)]
-        return [pairs_of_states(K, spectrum, nu) for K in every]
+        return [pairs_of_states(K, spectrum, own) for K, own in zip(every, nu, strict=True)]
     values, count, _ = distinct(spectrum.cycles)
     result = []
     for ladder in ladders(problem, spectrum, response):
@@ -443,10 +444,10 @@ def pairs_of(rule: GrowthRule, problem: Problem, response: Response) -> list[Ran
     return result
 
 
-def pairs_of_states(K: Floats, spectrum: Spectrum, nu: float) -> RangePairs:
+def pairs_of_states(K: Floats, spectrum: Spectrum, nu: float | Floats) -> RangePairs:
     """Cycles between named states, counted at each station by K_eq of the state's own direction."""
     opening = clipped_K(K)
-    severity = equivalent_K(opening, kink_angle(opening), nu)
+    severity = local_equivalent_K(opening, kink_angle(opening), nu)
     n, f = severity.shape
     count = np.zeros((n, n, f))
     for place in range(f):
@@ -462,7 +463,7 @@ def pairs_of_states(K: Floats, spectrum: Spectrum, nu: float) -> RangePairs:
 def rated(
     rule: GrowthRule,
     pairs: RangePairs,
-    nu: float,
+    nu: float | Floats,
     c: int,
     place: str,
     a: Floats,
@@ -475,7 +476,7 @@ def rated(
     ----------
     rule : GrowthRule
     pairs : RangePairs
-    nu : float
+    nu : float or (f,) array
     c : int
         Number of the crack.
     place : str
@@ -493,12 +494,13 @@ def rated(
     for begin in range(0, p, rows):
         K = pairs.K[:, begin : begin + rows]
         n = K.shape[1]
+        of_row = np.tile(nu, n) if isinstance(nu, np.ndarray) else nu
         angle, dK, R = evaluate_criterion(
-            rule.criterion, K.reshape(2, n * f, modes), nu, c, f"{place} of a cycle"
+            rule.criterion, K.reshape(2, n * f, modes), of_row, c, f"{place} of a cycle"
         )
         if nominal is not None:
             free = nominal.K[:, begin : begin + rows].reshape(2, n * f, modes)
-            dK, R = nominal_range(free, angle, nu)
+            dK, R = nominal_range(free, angle, of_row)
         of_rows = None if names is None else np.tile(names, n)
         rate = evaluate_law(rule.law, dK, R, c, f"{place} of a cycle", np.tile(a, n), of_rows)
         rate = np.where(dK < rule.threshold, 0.0, rate)
@@ -560,17 +562,19 @@ def left_out_share(rule: GrowthRule, problem: Problem, response: Response) -> fl
     if not len(omitted) or spectrum.least_range == 0:
         return 0.0
     values, count, _ = distinct(omitted)
-    nu, worst = problem.elasticity.poisson, 0.0
+    worst = 0.0
     every = pairs_of(rule, problem, response)
     for c, ladder in enumerate(ladders(problem, spectrum, response)):
         K = np.stack([ladder.at(values[:, 0]), ladder.at(values[:, 1])])
         f = K.shape[2]
         if f == 0:
             continue
+        nu = problem.elasticity.poisson_at(response.sif[0][c].x)
+        names = problem.elasticity.names_at(response.sif[0][c].x)
         a = np.ones(f)
         small = RangePairs(K, np.repeat(count[:, None], f, axis=1))
         growth = [
-            block_of(rated(rule, pairs, nu, c, "tip", a), pairs.count).rate
+            block_of(rated(rule, pairs, nu, c, "tip", a, names=names), pairs.count).rate
             for pairs in (small, every[c])
         ]
         grows = np.nonzero(growth[0])[0]
@@ -597,11 +601,11 @@ def kinds_of(rule: GrowthRule, rates: Rates) -> BlockCycles | None:
     if rule.retardation is None:
         return None
     problem = rates.problem
-    place, nu = PLACE[problem.mesh.dim], problem.elasticity.poisson
-    parts = []
+    place, parts = PLACE[problem.mesh.dim], []
     for c, pairs in enumerate(pairs_of(rule, problem, rates.response)):
         a = law_size(problem.mesh.dim, problem.sizes[c], pairs.K.shape[2])
-        names = problem.elasticity.names_at(rates.response.sif[0][c].x)
+        x = rates.response.sif[0][c].x
+        nu, names = problem.elasticity.poisson_at(x), problem.elasticity.names_at(x)
         every = rated(rule, pairs, nu, c, place, a, names=names)
         parts.append((every.dK.T[None], every.R.T[None], a[None]))
     several = isinstance(rule.law, LawSets) or isinstance(rule.retardation, RetardationSets)

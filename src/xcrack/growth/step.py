@@ -12,7 +12,7 @@ from xcrack.base.errors import GeometryError, ProblemError
 from xcrack.base.markup import element, join_parts, table
 from xcrack.crack.crack import Crack
 from xcrack.crack.meetings import LEAST
-from xcrack.fatigue.criteria import clipped_K, equivalent_K
+from xcrack.fatigue.criteria import clipped_K, local_equivalent_K
 from xcrack.fatigue.retardation import OverloadZones
 from xcrack.growth.solves import SolveHistory
 from xcrack.growth.stations import GrowthStations, Identities, PerCrack, directions
@@ -563,10 +563,10 @@ class Step:
         return self.identities.name_of(crack, number)
 
 
-def largest_K_eq(step: Step, crack: int, nu: float) -> Floats:
+def largest_K_eq(step: Step, crack: int, nu: float | Floats) -> Floats:
     """Largest K_eq of all states at the stations of a crack `(f,)`."""
     K = clipped_K(np.stack([state[crack].K for state in step.sif]))
-    return equivalent_K(K, step.angle[crack], nu).max(axis=0, initial=0.0)
+    return local_equivalent_K(K, step.angle[crack], nu).max(axis=0, initial=0.0)
 
 
 def run_state(step: Step) -> RunState:

@@ -95,6 +95,19 @@ class Elasticity:
             total += nu * float(self.mesh.volume[cells].sum())
         return total / float(self.mesh.volume.sum())
 
+    def poisson_at(self, x: Floats) -> float | Floats:
+        """Poisson's ratio at points `(n, d)`: one number where all materials have it, else `(n,)`.
+
+        Raises
+        ------
+        ProblemError
+            A material that is not isotropic.
+        """
+        if len(self.named) == 1:
+            return self.poisson
+        values = np.array([material.unit.at_tip().nu for _, material in self.named])
+        return float(values[0]) if np.ptp(values) == 0 else np.asarray(values[self.sets_at(x)])
+
     @property
     def knows_yield(self) -> bool:
         """Whether one of its materials has a yield stress."""
