@@ -1,5 +1,8 @@
 """Bodies of several materials: patches to round-off, K against exact values and another program."""
 
+import warnings
+from functools import partial
+
 import numpy as np
 import pytest
 
@@ -186,6 +189,38 @@ def test_a_tip_nearer_to_an_interface_than_a_cell_is_named():
         sif = xc.stress_intensity(xc.solve(scenes.edge_crack(20, 0.48, 10.0), error=True))
     assert np.isnan(sif.bar).all()
     assert "another material begins" in sif.reasons[0]
+
+
+@pytest.mark.slow
+def test_bars_hold_beside_interfaces():
+    """Of tips in two materials, against meshes of a bar of 2e-5."""
+    shares = []
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        for scene in [partial(scenes.edge_crack, a=a, ratio=r)
+                      for r in (0.1, 0.3, 3.0, 10.0) for a in (0.3, 0.43, 0.57, 0.7)] + [
+                      partial(scenes.slanted_crack, ratio=r, nu=nu) for r, nu in ((0.1, 0.3),
+                      (10.0, 0.3), (3.0, 0.45))]:  # fmt: skip
+            best = xc.adapt(scene(10), 2e-5, progress=False).sif.best
+            for n in (10, 14, 20, 28):
+                sif = xc.stress_intensity(xc.solve(scene(n)), error=True)
+                off = np.abs(sif.best - best) / sif.bar
+                shares += off[:, 0].tolist() + (off[:, 1].tolist() if len(off) > 1 else [])
+    shares = np.array(shares)[np.isfinite(shares)]
+    print(f"{len(shares)} bars: {np.mean(shares <= 1):.3f} hold")
+    assert len(shares) > 70
+    assert np.mean(shares <= 1) >= 0.93
+
+
+@pytest.mark.slow
+@pytest.mark.mission
+def test_adaptation_does_not_say_that_a_tolerance_is_met_where_it_is_not():
+    for a, ratio in ((0.53, 0.1), (0.53, 10.0), (0.4, 10.0), (0.47, 0.1)):
+        best = xc.adapt(scenes.edge_crack(10, a, ratio), 1e-5, progress=False).sif.best
+        for tolerance in (1e-3, 3e-4, 1e-4, 7e-5):
+            result = xc.adapt(scenes.edge_crack(10, a, ratio), tolerance, progress=False)
+            off = np.abs(result.sif.best - best).max() / np.abs(best).max()
+            assert not result.met or off <= tolerance
 
 
 @pytest.mark.slow

@@ -94,6 +94,26 @@ def layers(n, materials, across=4, a=0.4, thickness=0.6):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(("order", "count", "least"), [(1, 12, 0.2), (2, 4, 0.3)])
+def test_pressures_that_end_at_interfaces_are_stable_in_space(order, count, least):
+    """The inf-sup constant over drawn cuts, beside that of the same cuts in one material."""
+    rng, values = np.random.default_rng(1208), []
+    for _ in range(count):
+        n = 2 * int(rng.integers(2, 4)), int(rng.integers(4, 6)), int(rng.integers(4, 6))
+        mesh = scenes.perturbed(n, 0, int(rng.integers(1 << 30)))
+        normal = rng.normal(size=3) + np.array([0.0, 0.0, 2.5])
+        centre = 0.5 + rng.uniform(-0.1, 0.1, 3) * np.array([1.0, 0.5, 1.0])
+        crack = xc.penny_crack(centre, normal / np.linalg.norm(normal), rng.uniform(0.25, 0.35))
+        pairs = [
+            {"one": xc.Isotropic(1.0, 0.3), "two": xc.Isotropic(E, 0.3)} for E in (1 + 1e-6, 1)
+        ]
+        values.append([xc.inf_sup(xc.Problem(mesh, pair, [crack], order=order)) for pair in pairs])
+    split, whole = np.array(values).min(axis=0)
+    print(f"order {order}: {split:.3f}, without an interface {whole:.3f}")
+    assert split >= max(least, 0.65 * whole)
+
+
+@pytest.mark.slow
 @pytest.mark.mission
 def test_a_front_through_two_materials():
     """Layers side by side: K of each is that of one material in proportion to its E."""

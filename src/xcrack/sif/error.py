@@ -173,6 +173,7 @@ _AT_KINKS, _MOVED = 8.0, 2.0
 _AT_JUNCTIONS, _BRANCH, _KINK_ROOM = 4.0, 1.5, 1.0
 # Of the shares of cells where an interface meets a side or the crack, which are singular too.
 _AT_INTERFACES = 2.0
+_BESIDE = 1.0  # by how much bars grow a cell away from another material, less farther away
 
 
 def tip_bars(solutions: Sequence[Solution], sifs: Sequence[SIF], crack: int) -> list[KErrors]:
@@ -285,6 +286,7 @@ def _bars(
     bar = np.maximum(bar, _AT_KINKS * errors.kinks[k])
     bar = np.maximum(bar, _AT_INTERFACES * errors.interfaces[k])
     bar = np.maximum(bar, _AT_JUNCTIONS * errors.junctions[k])
+    bar *= _beside_interfaces(solution, crack)[:, None]
     if any(_faces_press(solution, crack, x) for x in kinks_inside(solution, crack)):
         eta = errors.rim[k].copy()
         bar += _MOVED * np.abs(errors.bend[k])
@@ -304,6 +306,15 @@ def _bars(
     eta[sif.closed, 0] = 0.0
     bar[sif.closed, 0] = contact[sif.closed, 0] = np.abs(sif.K_integral[sif.closed, 0])
     return bars_of(eta, bar, reasons, contact)
+
+
+def _beside_interfaces(solution: Solution, crack: int) -> Floats:
+    """How much wider bars are at tips with another material beside them `(f,)`."""
+    tips = [t for t, tip in enumerate(solution.space.tips) if tip.crack == crack]
+    if not len(solution.problem.elasticity.interfaces):
+        return np.ones(len(tips))
+    domains = [domain_of(solution, t) for t in tips]
+    return np.array([1 + _BESIDE * domain.size / domain.interface for domain in domains])
 
 
 def _without_estimate(bars: KErrors, reason: str) -> KErrors:
