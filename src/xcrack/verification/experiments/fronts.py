@@ -75,9 +75,9 @@ def _run_bar(experiment: Experiment, quick: bool) -> Outcome:
         spread = float(np.ptp(answer.K_I) / answer.K_I.max())
     angles = [_angle_at_ends(front, _NEAR * thickness) for front in fronts]
     measured = experiment.measured["angle"]
-    end, reach = fronts[-1][0], 0.2 * thickness
-    rise = reach * np.tan(np.radians(measured))
-    tangent = end[::-1] + np.array([(0.0, 0.0), (reach, rise)])
+    end, reach = fronts[-1][0], 0.1 * thickness
+    slope = np.tan(np.radians(measured))
+    tangent = end[::-1] + np.linspace(0.0, reach, 6)[:, None] * np.array([1.0, slope])
     comparisons = (
         Comparison("angle of the steady front at the surface", float(np.mean(angles[-3:])),
                    measured, "difference", "degrees", -_BEND, _BEND),
@@ -101,7 +101,7 @@ def _run_bar(experiment: Experiment, quick: bool) -> Outcome:
             Curve.of(f"{measured:g} degrees, measured", tangent, "measured"))),
         Picture("Angle at the surface", "growth [mm]", "angle [degrees]", (
             Curve.of("predicted", growth, "predicted"),
-            Curve.of("measured", np.add(ends, (0.0, measured)), "measured"), *others)),
+            Curve.of("measured", [(x, measured) for x in advance], "measured"), *others)),
     )  # fmt: skip
     return Outcome(experiment.name, (experiment.name,), comparisons, pictures, _BOWED)
 
