@@ -171,8 +171,7 @@ def _run_block(experiment: Experiment, quick: bool) -> Outcome:
     pictures = (
         Picture("Angles of branches", "place along the front [degrees]", "angle [degrees]", (
             Curve.of("measured, least and largest", bands, "measured"),
-            Curve.of("tilt by K_II, where it leads", np.stack([place, tilt], 1)[is_tilting],
-                     "variant"),
+            Curve.of("tilt by K_II", np.stack([place, tilt], 1), "predicted"),
             Curve.of("twist by K_III, where it leads", np.stack([place, twist], 1)[~is_tilting],
                      "variant"))),
         Picture("K along the front", "place along the front [degrees]", "K over the largest", (
