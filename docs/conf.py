@@ -39,7 +39,14 @@ html_theme = (
 )
 html_title = f"xcrack {version}"
 html_theme_options = (
-    {"show_toc_level": 2, "navigation_with_keys": False, "show_nav_level": 1}
+    {
+        "show_toc_level": 2,
+        "navigation_with_keys": False,
+        "show_nav_level": 1,
+        "header_links_before_dropdown": 6,
+        "pygments_light_style": "default",
+        "pygments_dark_style": "github-dark",
+    }
     if html_theme != "alabaster"
     else {}
 )
@@ -47,5 +54,7 @@ html_show_sourcelink = False
 templates_path: list[str] = []
 html_static_path = ["static"]
 html_css_files = ["site.css"]
+html_favicon = "static/icon.svg"
+html_context = {"default_mode": "auto"}
 
 site_pages.write(DOCS)

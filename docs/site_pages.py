@@ -16,6 +16,9 @@ import tempfile
 from pathlib import Path
 
 QUICK = ("edge_crack_growth",)
+# Pictures that say at a glance what a scene is come first: the thumbnail of a card is one of them.
+FIRST = ("von_mises", "stress", "opening", "after", "stiff", "uncracked", "split", "flaws", "faces",
+         "displacement", "bar_after_the_turn")  # fmt: skip
 GROUPS = {
     "Bodies and meshes": ("mesh.",),
     "Decks of other programs": ("model.deck",),
@@ -68,9 +71,10 @@ def write_gallery(root: Path, folder: Path) -> None:
             lines += [f"## {heading}", ""] if heading else []
             lines += ["```python", code.strip("\n"), "```", ""]
         put(folder / f"{script.stem}.md", "\n".join(lines))
-        names.append(script.stem)
+        names.append(f"{re.split('[:,]', title)[0]} <{script.stem}>")
         image = [f"[![]({pictures[0].name})]({script.stem}.md)", ""] if pictures else []
-        first = words.partition("\n\n")[0].replace("\n", " ")
+        first = re.split(r"(?<=[a-z)])\. ", words.partition("\n\n")[0].replace("\n", " "))[0]
+        first = f"{first.rstrip('.:')}."
         cards += ["::::{container} card", *image, f"**[{title}]({script.stem}.md)**", "",
                   first, "::::", ""]  # fmt: skip
     toc = "\n".join(["```{toctree}", ":hidden:", "", *names, "```"])
@@ -101,6 +105,7 @@ def results_of(script: Path, root: Path, folder: Path) -> tuple[list[Path], str]
     stored = sorted((root / "docs" / "figures" / "gallery").glob(f"{script.stem}*.png"))
     printed = root / "docs" / "figures" / "gallery" / f"{script.stem}.txt"
     text = printed.read_text(encoding="utf-8").rstrip() if printed.is_file() else ""
+    stored.sort(key=lambda path: not path.stem.endswith(FIRST))
     taken = []
     if script.stem in QUICK and os.environ.get("XCRACK_DOCS_RUN", "1") != "0":
         with tempfile.TemporaryDirectory() as name:
@@ -144,10 +149,20 @@ def write_reference(folder: Path) -> None:
             put(folder / f"{slug(name)}.md", "\n".join(lines))
             rows.append(f"| [`{name}`]({slug(name)}.md) | {cell_text(first)} |")
             pages.append(slug(name))
-        parts += [f"## {title}", "", "| name | |", "|---|---|", *rows, ""]
-    toc = "\n".join(["```{toctree}", ":hidden:", "", *pages, "```"])
+        parts += [f"## {title}", "", "| name | what it is |", "|---|---|", *rows, ""]
+    about = [
+        "../glossary",
+        "../theory",
+        "../developing",
+        "../about/changelog",
+        "../about/contributing",
+    ]
+    toc = "\n".join(["```{toctree}", ":hidden:", ":caption: About", "", *about, "```", "",
+                     "```{toctree}", ":hidden:", ":caption: Names", "", *pages, "```"])  # fmt: skip
     intro = (
-        "What `import xcrack as xc` offers, from the docstrings: `help(xc.solve)` says the same."
+        "[Glossary](../glossary.md), [theory](../theory.md), [developing](../developing.md), "
+        "[changelog](../about/changelog.md).\n\nWhat `import xcrack as xc` offers, from the "
+        "docstrings: `help(xc.solve)` says the same."
     )
     put(folder / "index.md", "\n".join([f"# Reference\n\n{intro}\n\n{toc}\n", *parts]))
 

@@ -15,6 +15,15 @@ NEEDS = ("sphinx", "myst_parser", "numpydoc")
 MISSING = [name for name in NEEDS if find_spec(name) is None]
 
 
+def test_the_gallery_has_a_picture_and_the_words_of_each_example():
+    """The one that is run as the site is built has none stored."""
+    gallery = ROOT / "docs" / "figures" / "gallery"
+    for script in (ROOT / "examples").glob("*.py"):
+        if script.stem != "edge_crack_growth":
+            assert list(gallery.glob(f"{script.stem}_*.png")), script.name
+            assert (gallery / f"{script.stem}.txt").read_text(encoding="utf-8").strip()
+
+
 @pytest.mark.slow
 @pytest.mark.skipif(bool(MISSING), reason=f"site not available: no {', '.join(MISSING)}")
 def test_the_site_has_no_warning(tmp_path):

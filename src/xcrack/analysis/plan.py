@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from xcrack.base.arguments import check_arguments
+from xcrack.base.arrays import coordinates
 from xcrack.base.checks import value_text
 from xcrack.base.errors import ProblemError, SizeError
 from xcrack.base.machine import free_memory
@@ -217,11 +218,20 @@ class Resultant:
     force: tuple[float, ...]
     moment: float | tuple[float, ...]
 
+    @property
+    def sums_as_text(self) -> tuple[str, str]:
+        """Force and moment as text; what is zero to round-off reads 0."""
+        moment = (self.moment,) if isinstance(self.moment, float) else self.moment
+        least = 1e-12 * max(map(abs, (*self.force, *moment)))
+        return coordinates(_cut(self.force, least)), coordinates(_cut(moment, least))
+
     def __str__(self) -> str:
-        force = ", ".join(f"{f:.6g}" for f in self.force)
-        parts = (self.moment,) if isinstance(self.moment, float) else self.moment
-        moment = ", ".join(f"{m:.6g}" for m in parts)
-        return f"{self.name:<33} force ({force}), moment about the origin ({moment})"
+        force, moment = self.sums_as_text
+        return f"{self.name:<33} force {force}, moment about the origin {moment}"
+
+
+def _cut(values: tuple[float, ...], least: float) -> list[float]:
+    return [v if abs(v) > least else 0.0 for v in values]
 
 
 @dataclass(frozen=True)

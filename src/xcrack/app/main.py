@@ -113,7 +113,7 @@ def _parser() -> argparse.ArgumentParser:
         help="of a logistic probability of detection: chance that all looks miss",
     )
     subparser.add_argument(
-        "--toughness", type=float, metavar="K_C", help="for the strength that is left"
+        "--toughness", type=float, metavar="K_C", help="for the residual strength"
     )
     subparser.add_argument("--nu", type=float, help="Poisson's ratio, with --toughness")
     subparser.add_argument("-o", "--output", type=Path, help="write a report with these sections")

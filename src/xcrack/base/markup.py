@@ -13,16 +13,19 @@ _STYLE = """
 :root { color-scheme: light dark; --line: #8884; --soft: #8881; --good: #2a7d2a; --bad: #c22; }
 body { font: 15px/1.5 system-ui, sans-serif; max-width: 70rem; margin: 2rem auto; padding: 0 1rem; }
 h1 { font-size: 1.7rem; margin-bottom: .2rem } h2 { margin-top: 2.2rem; font-size: 1.25rem;
-border-bottom: 1px solid var(--line) } table { border-collapse: collapse; margin: .6rem 0 }
+border-bottom: 1px solid var(--line) } table { border-collapse: collapse; margin: .6rem 0;
+display: block; max-width: 100%; overflow-x: auto }
 th, td { padding: .2rem .6rem; border-bottom: 1px solid var(--line); text-align: left;
 vertical-align: top; font-variant-numeric: tabular-nums }
 th { background: var(--soft) }
-td.n { text-align: right } .scroll { overflow: auto; max-height: 28rem }
+td.n { text-align: right } td.n:nth-child(2):last-child { text-align: left }
+.scroll { overflow: auto; max-height: 28rem }
 img { max-width: min(100%, 46rem);
 height: auto; background: #fff } .good { color: var(--good) } .bad { color: var(--bad);
 font-weight: 600 } .soft { opacity: .7 } pre { background: var(--soft); padding: .6rem;
 overflow: auto } figure { margin: .8rem 0 } nav a { margin-right: 1rem }
 canvas { width: 100%; height: 32rem; touch-action: none; background: #fff }
+@media (max-width: 40rem) { canvas { height: 20rem } td { min-width: 4rem } }
 """
 
 

@@ -92,7 +92,7 @@ def plot_strength(
     figure = new_figure((6.4, 4.8), target is None, "plot_strength")
     axes = figure.add_subplot()
     N = strength["N"]
-    axes.plot(N, strength["factor"], color="0.75", lw=6, zorder=1, label="strength that is left")
+    axes.plot(N, strength["factor"], color="0.75", lw=6, zorder=1, label="residual strength")
     for number, name in enumerate(CRITERIA):
         shown = np.where(np.isfinite(strength[name]), strength[name], np.nan)
         if np.isfinite(shown).any():

@@ -13,7 +13,7 @@ from xcrack.base.arrays import coordinates
 from xcrack.base.markup import Markup, element, join_parts, table
 from xcrack.base.units import FORCE, LENGTH, LINE_FORCE, NUMBER, STRESS, TOUGHNESS
 from xcrack.sif.sif import SIF
-from xcrack.view.report_source import Section, Source, UnitNames
+from xcrack.view.report_source import Section, Source, UnitNames, setting_words
 
 _MODES = ("K_I", "K_II", "K_III")
 _END = {2: "tip", 3: "front"}
@@ -36,14 +36,22 @@ def intensity(source: Source) -> Section | None:
     first = ("state", "crack", _END[source.dim])
     note = ("spread: difference between two domains of the integral; domain: radius of the larger "
             "one, in cells. K_I of closed places is exactly zero. best ± bar: estimate of exact K "
-            "and half-width of its error, nan where there is none.")  # fmt: skip
+            "and half-width of its error, left out where there is none.")  # fmt: skip
     reasons = {reason for state in source.sif for sif in state for reason in sif.reasons if reason}
     if reasons:
         note += f" No bars: {'; '.join(sorted(reasons))}."
-    shown = [_K_head(name, source.units) for name in head]
-    content = join_parts(table((*first, *shown), rows, scroll=len(rows) > 12 or source.dim > 2),
+    names = (*first, *(_K_head(name, source.units) for name in head))
+    known_columns = [k for k in range(len(names)) if any(not _is_nan(row[k]) for row in rows)]
+    shown = [[row[k] for k in known_columns] for row in rows]
+    is_long = len(rows) > 12 or source.dim > 2
+    content = join_parts(table([names[k] for k in known_columns], shown, scroll=is_long),
                      element("p", note, cls="soft"))  # fmt: skip
     return Section("K", "Stress intensity factors", content, {"rows": numbers})
+
+
+def _is_nan(value: Any) -> bool:
+    """Whether it is a number that is not known."""
+    return isinstance(value, float) and bool(np.isnan(value))
 
 
 def _K_head(name: str, units: UnitNames) -> str:
@@ -173,7 +181,7 @@ def growth(source: Source) -> Section | None:
                  ("da/dN of the run", f"{units.value(rate, LENGTH)} a {history.unit}")
                  ]  # fmt: skip
     law = {k: v for k, v in history.settings.items() if k == "law" or k.startswith("law.")}
-    rows += [(name, text) for name, text in law.items() if text != "None"]
+    rows += [(name, setting_words(text)) for name, text in law.items() if text != "None"]
     rows += [(f"size of crack {c} at the end", source.units.value(v, LENGTH))
              for c, v in enumerate(last.sizes)]  # fmt: skip
     parts: list[Any] = [table((), rows)]

@@ -70,7 +70,7 @@ def strength(source: Source) -> Section | None:
     parts.append(table(heads, values, scroll=len(values) > 12))
     return Section(
         "strength",
-        "Strength that is left",
+        "Residual strength",
         join_parts(*parts),
         {name: [_json_number(value) for value in rows[name].tolist()] for name in names},
     )

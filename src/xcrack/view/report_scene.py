@@ -35,7 +35,10 @@ def scene(source: Source) -> Section:
         numbers |= {"points": mesh.n_points, "cells": len(mesh.cells)}
     if problem is not None:
         rows += [
-            (f"material {name!r}" if name else "material", repr(material))
+            (
+                f"material {name!r}" if name else "material",
+                values_in_words(material, source.units) or repr(material),
+            )
             for name, material in problem.elasticity.named
         ]
         rows += [("order of the elements", problem.order), ("contact", problem.contact)]
@@ -96,10 +99,7 @@ def _conditions(solution: Solution, units: UnitNames) -> Markup:
     if not rows:
         return element("p", "No supports and no loads.")
     parts = [table(("", "kind", "where", "value"), rows)]
-    sums = [
-        (each.name, _vector(each.force), _vector(each.moment))
-        for each in solution.report.resultants
-    ]
+    sums = [(each.name, *each.sums_as_text) for each in solution.report.resultants]
     if sums:
         force, moment = (LINE_FORCE, FORCE) if solution.space.dim == 2 else (FORCE, MOMENT)
         head = ("resultants and reactions", units.head("force", force),

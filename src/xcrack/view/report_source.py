@@ -225,12 +225,13 @@ class Source:
         }
 
 
+_DIGITS = re.compile(r"(?<![\w.])\d+\.\d{6,}(?:e[+-]?\d+)?(?![\w.])")
 _ARRAY = re.compile(r"float64 \((\d+),.*\) (sha256:\w+)")
 
 
 def setting_words(text: str) -> str:
-    """A setting; of an array, which is stored by its hash, how many numbers it has."""
-    return _ARRAY.sub(r"\1 numbers, \2", text)
+    """A setting as it is read: six digits; of an array, stored by its hash, its numbers' count."""
+    return _DIGITS.sub(lambda m: f"{float(m[0]):.6g}", _ARRAY.sub(r"\1 numbers, \2", text))
 
 
 def source_of(
