@@ -153,6 +153,7 @@ def write_reference(folder: Path) -> None:
     about = [
         "../glossary",
         "../theory",
+        "../factorisation",
         "../developing",
         "../about/changelog",
         "../about/contributing",
