@@ -24,6 +24,7 @@ img { max-width: min(100%, 46rem);
 height: auto; background: #fff } .good { color: var(--good) } .bad { color: var(--bad);
 font-weight: 600 } .soft { opacity: .7 } pre { background: var(--soft); padding: .6rem;
 overflow: auto } figure { margin: .8rem 0 } nav a { margin-right: 1rem }
+p, li, figcaption { overflow-wrap: anywhere }
 canvas { width: 100%; height: 32rem; touch-action: none; background: #fff }
 @media (max-width: 40rem) { canvas { height: 20rem } td { min-width: 4rem } }
 """

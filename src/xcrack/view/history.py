@@ -5,8 +5,10 @@ from typing import Any
 
 import numpy as np
 
+from xcrack.base.arrays import Floats
 from xcrack.base.checks import value_text
 from xcrack.base.errors import ProblemError
+from xcrack.mesh.locate import parts_inside
 from xcrack.output.curved_sides import boundary_lines
 from xcrack.runs.history import History
 from xcrack.runs.table import crack_numbers, state_names
@@ -156,13 +158,26 @@ def _draw_path(history: History, axes: Any) -> None:
     table = history.table()
     crack_of_row = _crack_of_rows(history, table)
     for number, start in enumerate(history.steps[0].cracks):
-        axes.plot(*start.points[:, :2].T, "-", color=f"C{number}", lw=3.5, solid_capstyle="butt")
+        for part in _shown_parts(history, start.points):
+            axes.plot(*part[:, :2].T, "-", color=f"C{number}", lw=3.5, solid_capstyle="butt")
         rows = table[crack_of_row == number]
         axes.plot(rows["x"], rows["y"], ".", ms=4, color=f"C{number}")
     for number, crack in zip(names, history.cracks, strict=True):
-        axes.plot(*crack.points[:, :2].T, "-", color=f"C{number}", label=f"crack {number}")
+        label = f"crack {number}"
+        for part in _shown_parts(history, crack.points):
+            axes.plot(*part[:, :2].T, "-", color=f"C{number}", label=label)
+            label = ""  # once in the legend
     axes.set(xlabel="x", ylabel="y", aspect="equal")
     axes.legend(fontsize="small")
+
+
+def _shown_parts(history: History, line: Floats) -> list[Floats]:
+    """Parts of a line inside the body: a crack begins at its side, not where it was given."""
+    mesh = history.mesh
+    if mesh is None or mesh.dim == 3:
+        return [line]
+    pieces = zip(line[:-1], line[1:], parts_inside(mesh, line), strict=True)
+    return [a + np.outer(part, b - a) for a, b, parts in pieces for part in parts]
 
 
 def _crack_of_rows(history: History, table: Any) -> Any:
