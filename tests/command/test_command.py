@@ -40,8 +40,9 @@ def test_warm_compiles_the_kernels(capsys):
 @pytest.mark.mission
 def test_demo_leaves_a_report(tmp_path, capsys):
     assert main(["demo", str(tmp_path / "demo")]) == 0
-    page = tmp_path / "demo" / "report.html"
-    assert str(page.resolve()) in capsys.readouterr().out
+    page, printed = tmp_path / "demo" / "report.html", capsys.readouterr()
+    assert "solving" in printed.err
+    assert str(page.resolve()) in printed.out
     assert "closed crack at a hole" in page.read_text(encoding="utf-8")
 
 
@@ -114,6 +115,10 @@ def test_run_report_and_chart(tmp_path, capsys):
     assert main(["run", str(case), "--resume"]) == 0
     folder = tmp_path / "case_results"
     (folder / "report.html").unlink()
+    assert main(["plot", str(folder), "a"]) == 0
+    assert (folder / "a.png").stat().st_size > 5e3
+    assert main(["life", str(folder), "--scatter", "0.2", "--samples", "200"]) == 0
+    assert "90 %" in capsys.readouterr().out
     assert main(["report", str(folder)]) == 0
     assert (folder / "report.html").is_file()
     case.write_text(GROWTH.replace("nu = 0.3", "nuu = 0.3"), encoding="utf-8")

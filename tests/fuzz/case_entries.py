@@ -258,7 +258,8 @@ ENTRIES = [
                 "good",
                 near={k: v for k, v in paths("", "").items() if "other" not in k},
                 words=["report"],
-            )
+            ),
+            "progress": arg(Flag(), False),
         },
         in_folder=True,
         cost=60.0,

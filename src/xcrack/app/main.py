@@ -86,6 +86,10 @@ def _parser() -> argparse.ArgumentParser:
         "-o", "--output", type=Path, help="the page; left out: report.html in it"
     )
     subparser.add_argument("--yield-stress", type=float, help="to judge plastic zones by")
+    subparser = add("plot", _plot, "picture of a growth run from its folder")
+    subparser.add_argument("folder", type=Path, help="the folder of the run")
+    subparser.add_argument("kind", nargs="?", default="a", help="K, a, path, fronts or measures")
+    subparser.add_argument("-o", "--output", type=Path, help="the figure; left out: kind.png in it")
     subparser = add("life", _life, "lives, inspections and strength of a stored growth run")
     subparser.add_argument("folder", type=Path, help="the folder of the run")
     subparser.add_argument(
@@ -150,7 +154,8 @@ def _info(options: argparse.Namespace) -> int:
 
 
 def _demo(options: argparse.Namespace) -> int:
-    print(f"the report is {xcrack.demo(options.folder).resolve()}")
+    path = xcrack.demo(options.folder, progress="always")
+    print(f"the report is {path.resolve()}")
     return 0
 
 
@@ -182,6 +187,13 @@ def _report(options: argparse.Namespace) -> int:
     target = options.output or options.folder / "report.html"
     path = xcrack.report(options.folder, target, yield_stress=options.yield_stress)
     print(f"the report is {path.resolve()}")
+    return 0
+
+
+def _plot(options: argparse.Namespace) -> int:
+    target = options.output or options.folder / f"{options.kind}.png"
+    xcrack.load(options.folder).plot(options.kind, target)
+    print(f"the figure is {target.resolve()}")
     return 0
 
 

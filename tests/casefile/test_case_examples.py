@@ -1,0 +1,70 @@
+"""Examples whose scene is data, as case files: the same problem to the last bit, the same run."""
+
+import ast
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import xcrack as xc
+from xcrack.base.description import describe
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+SCENES = {  # what makes the problem of an example, from its names
+    "compact_tension": lambda given: given["specimen"](15.0, np.pi / 3),
+    "edge_crack_growth": lambda given: given["plate"],
+    "two_holes": lambda given: given["stretched"](xc.read_mesh(given["MESHES"] / "two_holes.msh")),
+    "link_up": lambda given: given["sheet"](1.0),
+    "compressed_crack": lambda given: given["plate"](0.3),
+    "inclusion": lambda given: given["scene"](1 / 8),
+    "bimetal": lambda given: given["strip"](6),
+}
+LAST = {"compact_tension": "specimen", "edge_crack_growth": "plate", "two_holes": "stretched",
+        "link_up": "problem", "compressed_crack": "plate", "inclusion": "scene",
+        "bimetal": "strip"}  # fmt: skip
+
+
+def names_of(example: str) -> dict:
+    """Constants and functions of an example up to what makes its problem: nothing is computed."""
+    file = EXAMPLES / f"{example}.py"
+    given = {"__file__": str(file), "__name__": example}
+    for node in ast.parse(file.read_text(encoding="utf-8")).body:
+        if isinstance(node, ast.Import | ast.ImportFrom | ast.Assign | ast.FunctionDef):
+            exec(compile(ast.Module([node], []), str(file), "exec"), given)
+        if LAST[example] in given:
+            return given
+    raise AssertionError(example)
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(n, marks=[pytest.mark.gmsh] * (n == "link_up")) for n in SCENES]
+)
+def test_a_case_file_is_the_problem_of_the_example(name):
+    if name == "link_up":
+        pytest.importorskip("gmsh")
+    wanted = SCENES[name](names_of(name))
+    case = xc.read_case(EXAMPLES / "cases" / f"{name}.toml")
+    assert describe("problem", case.problem) == describe("problem", wanted)
+    assert case.problem.mesh.points.tobytes() == wanted.mesh.points.tobytes()
+
+
+def test_each_case_has_its_example():
+    assert {path.stem for path in (EXAMPLES / "cases").glob("*.toml")} == set(SCENES)
+
+
+@pytest.mark.slow
+@pytest.mark.mission
+def test_growth_of_an_example_from_its_case_file(tmp_path):
+    """Two steps of the edge crack, by Python and by the file: every number of the table."""
+    given = names_of("edge_crack_growth")
+    case = xc.read_case(EXAMPLES / "cases" / "edge_crack_growth.toml", {"growth.max_steps": 2})
+    runs = [
+        xc.collect(xc.grow(problem, **growth, progress=False))
+        for problem, growth in (
+            (case.problem, dict(case.growth)),
+            (given["plate"], {"law": given["LAW"], "criterion": xc.max_hoop_stress,
+                              "cycle": xc.Cycle(0.1, 1.0), "da": 1.5, "max_steps": 2}),
+        )
+    ]  # fmt: skip
+    assert runs[0].table().tobytes() == runs[1].table().tobytes()
+    assert runs[0].settings == runs[1].settings
