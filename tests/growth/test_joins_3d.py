@@ -167,8 +167,7 @@ def test_cracks_beside_one_surface_end_the_run_with_the_place():
     [
         ({"loads": [xc.crack_pressure(1.0, crack=0), xc.crack_pressure(1.0, crack=1)]}, {},
          "a load names a crack by its number"),
-        ({"friction": 0.3}, {}, "what slip has left"),
-        ({}, {"retardation": object()}, "what overloads have left"),
+        ({"friction": [0.3, 0.2]}, {}, "friction differs between them"),
     ],
 )  # fmt: skip
 def test_what_belongs_to_one_of_two_cracks_ends_the_run(changes, options, words):

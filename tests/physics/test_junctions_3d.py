@@ -1,5 +1,7 @@
 """Cracks in 3D that end on the face of others: slices against the plane, and what is refused."""
 
+import sys
+
 import numpy as np
 import pytest
 
@@ -89,6 +91,20 @@ def test_slice_of_a_T(angle):
     print(f"\n{angle:.0f} degrees: energy {energy:.1e}, K {error:.1e}")
     assert abs(energy) < 5e-4
     assert error < 5e-3
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("height", "place"), [(0.0, 0.07), (0.013, 0.0), (0.0, 0.0)])
+def test_slice_of_a_T_on_planes_of_the_mesh(monkeypatch, height, place):
+    """Either crack, or both, on facets of the mesh: as between them (discretisation)."""
+    here = sys.modules[__name__]
+    monkeypatch.setattr(here, "Z", height)
+    monkeypatch.setattr(here, "X", place)
+    monkeypatch.setattr(here, "THROUGH", [(-0.51, height), (0.52, height)])
+    space, plane = slice_of_T(20, 90.0, 1, contact="off")
+    assert space.energy / THICK == pytest.approx(plane.energy, rel=0.01)
+    K, wanted = K_of(space), plane_K(plane)
+    assert np.abs(K - wanted).max() < 0.02 * np.abs(wanted).max()
 
 
 @pytest.mark.slow
@@ -257,11 +273,3 @@ def test_bad_arms_are_refused_with_the_remedy(name):
     cracks, words = BAD[name]
     with pytest.raises(xc.XcrackError, match=words):
         discretise(scene(cracks))
-
-
-@pytest.mark.slow
-def test_arms_do_not_grow_yet():
-    law, cycle = xc.paris(1e-12, 3.0), xc.Cycle(0.0, 1.0)
-    history = xc.collect(xc.grow(scene(crossing()), law, xc.max_hoop_stress, cycle, da=0.05))
-    assert len(history.steps) == 1
-    assert "does not grow yet" in history.ended

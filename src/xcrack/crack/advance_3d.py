@@ -97,11 +97,6 @@ def advance_fronts(
         Numbers that do not fit or are not finite, a front that closes upon itself, meets another
         part of the crack, or folds because its neighbours turn in opposite directions.
     """
-    if crack.ends_on:
-        raise GeometryError(
-            "a crack that ends on another one in space does not grow yet: K, contact and friction "
-            "of it are known, but a run cannot lead its front on."
-        )
     s, angle, da = (np.asarray(v, dtype=float) for v in (s, angle, da))
     number = np.asarray(front, dtype=np.int64)
     _check(crack, s, number, angle, da, size)
@@ -139,7 +134,7 @@ def advance_fronts(
         strips.extend((len(lines) + k, new) for k in range(len(parts)))
         lines.extend(parts)
         n_points += len(new.points)
-    grown = Crack(np.concatenate(points), np.concatenate(faces), None, tuple(lines))
+    grown = Crack(np.concatenate(points), np.concatenate(faces), None, tuple(lines), crack.ends_on)
     if body is not None:
         _check_folds(grown)
     for k, new in strips:

@@ -5,7 +5,7 @@ counts. Of two surfaces that cross one runs through, and the other is two arms.
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Annotated
 
 import numpy as np
@@ -13,15 +13,18 @@ import numpy as np
 from xcrack.base.arguments import Part, Whole, check_arguments
 from xcrack.base.arrays import Bools, Floats, Ints, at
 from xcrack.base.errors import CoarseMeshError, GeometryError
+from xcrack.crack.advance_3d import advance_fronts
 from xcrack.crack.crack import Crack
+from xcrack.crack.fronts import Front, front_frames
 from xcrack.crack.junctions import Junction
-from xcrack.mesh.distances import first_crossing, signed_in, triangle_tree
+from xcrack.mesh.distances import TriangleTree, first_crossing, signed_in, triangle_tree
 from xcrack.mesh.locate import Body
 from xcrack.mesh.mesh import Mesh
 from xcrack.mesh.triangulation import sides
 
 _BEYOND = 2.0  # legs of cells by which fronts are kept beyond the crack on which an arm ends
 _DRAWN = 1.2  # legs of cells by which an arm must be drawn on beyond it at least
+_LED = 2.2  # cells beyond it, to which a front that comes to its face is led
 _LEG = 3**-0.5  # leg of a cell over its longest edge
 
 
@@ -83,6 +86,39 @@ def is_before(cracks: Sequence[Crack], c: int, x: Floats) -> Bools:
     return np.asarray(distance_to_side(cracks, c, x) > 0)
 
 
+@dataclass(frozen=True, eq=False)
+class BodyBefore(Body):
+    """What of a body lies before the cracks on which one ends: their faces are sides of it.
+
+    Attributes
+    ----------
+    under : tuple of (TriangleTree, int)
+        Those cracks, and the side of each that counts.
+    """
+
+    under: tuple[tuple[TriangleTree, int], ...] = ()
+
+    def depth(self, x: Floats) -> tuple[Floats, Floats]:
+        """Distance to the boundary or to such a crack, negative inside, and the size there."""
+        depth, size = super().depth(x)
+        for tree, side in self.under:
+            beyond = -side * signed_in(tree, x)[0]
+            first = beyond > depth
+            depth = np.where(first, beyond, depth)
+            size = np.where(first, self.cell_size(x), size)
+        return depth, size
+
+
+def body_of(cracks: Sequence[Crack], c: int, body: Body) -> Body:
+    """The body for one of some cracks: without what lies beyond others on which it ends."""
+    if not cracks[c].ends_on:
+        return body
+    under = tuple(
+        (triangle_tree(cracks[on].points, cracks[on].faces), side) for on, side in cracks[c].ends_on
+    )
+    return BodyBefore(body.mesh, body.boundary, body.facet_size, under)
+
+
 def _signed(crack: Crack, x: Floats) -> Floats:
     return signed_in(triangle_tree(crack.points, crack.faces), x)[0]
 
@@ -99,6 +135,34 @@ def _ends_on(crack: Crack, on: int) -> bool:
 def are_opposite(one: Crack, other: Crack) -> bool:
     """Whether two cracks end on opposite sides of the same one."""
     return any((on, -side) in other.ends_on for on, side in one.ends_on)
+
+
+def renumbered_arms(cracks: Sequence[Crack], i: int, k: int, agrees: bool) -> list[Crack]:
+    """Cracks without number k, which has become part of i; `agrees` where both look one way.
+
+    Raises
+    ------
+    GeometryError
+        The two ended on each other, or on both sides of a third one.
+    """
+    result = [replace(crack, ends_on=()) for c, crack in enumerate(cracks) if c != k]
+    for c, crack in enumerate(cracks):
+        if not crack.ends_on:
+            continue
+        own = i if c == k else c
+        own -= own > k
+        ends = list(result[own].ends_on)
+        for on, side in crack.ends_on:
+            turned = -side if on == k and not agrees else side
+            end = ((i if on == k else on) - ((i if on == k else on) > k), turned)
+            if end[0] == own or (end[0], -turned) in ends:
+                raise GeometryError(
+                    f"cracks {i} and {k} become one, which would end on itself or on both sides of "
+                    "another one: end growth before, and give what has become of them."
+                )
+            ends += [end] if end not in ends else []
+        result[own] = replace(result[own], ends_on=tuple(ends))
+    return result
 
 
 def arms_placed(given: Sequence[Crack], cracks: tuple[Crack, ...], mesh: Mesh) -> tuple[Crack, ...]:
@@ -231,6 +295,129 @@ def surface_junctions(cracks: tuple[Crack, ...], mesh: Mesh) -> tuple[Junction, 
     return tuple(result)
 
 
+# Fronts that come to the face of another crack: straight ahead through it, and arms from there.
+
+
+@dataclass(frozen=True, eq=False)
+class FaceAhead:
+    """The face of a crack ahead of the front of another one.
+
+    Attributes
+    ----------
+    crack, on : int
+        Whose front it is, and whose face.
+    width : float, length
+        From the nearest place of the front straight ahead to the face.
+    leg : float, length
+        Of the cell there.
+    x : (3,) array, length
+        Where the face is met.
+    """
+
+    crack: int
+    on: int
+    width: float
+    leg: float
+    x: Floats
+
+
+def face_ahead(
+    cracks: Sequence[Crack], c: int, on: int, body: Body, reach: float
+) -> FaceAhead | None:
+    """Where the face of another crack is nearest straight ahead of the fronts of crack c.
+
+    Parameters
+    ----------
+    cracks : sequence of Crack
+        With fronts.
+    c, on : int
+    body : Body
+    reach : float
+        Legs of cells; farther away nothing is sought.
+    """
+    best = None
+    for front, way, leg in _ways_to_face(cracks, c, on, body, reach):
+        k = int(np.argmin(way))
+        if np.isfinite(way[k]) and (best is None or way[k] < best.width):
+            x = front.x[k] + way[k] * front.frame[k, 0]
+            best = FaceAhead(c, on, float(way[k]), float(leg[k]), x)
+    return best
+
+
+def _ways_to_face(
+    cracks: Sequence[Crack], c: int, on: int, body: Body, reach: float
+) -> list[tuple[Front, Floats, Floats]]:
+    """Fronts of crack c near another one: ways `(m,)` straight ahead to its face, legs of cells."""
+    farthest = reach * _LEG * float(body.mesh.cell_size.max())
+    low = cracks[on].points.min(axis=0) - farthest
+    high = cracks[on].points.max(axis=0) + farthest
+    result = []
+    tree: TriangleTree | None = None
+    before = body
+    for front in front_frames(cracks[c]):
+        rows = np.nonzero(((front.x >= low) & (front.x <= high)).all(axis=1))[0]
+        if not len(rows):
+            continue
+        if tree is None:
+            tree = triangle_tree(cracks[on].points, cracks[on].faces)
+            before = body_of(cracks, c, body)
+        leg = _LEG * body.cell_size(front.x)
+        start, ahead = front.x[rows], (reach * leg[:, None] * front.frame[:, 0])[rows]
+        triangle, share = first_crossing(tree, start, start + ahead)
+        is_met = (triangle >= 0) & before.contains(start)
+        is_met &= before.contains(start + np.where(is_met, share, 0.0)[:, None] * ahead)
+        way = np.full(len(front.x), np.inf)
+        way[rows[is_met]] = (share * reach * leg[rows])[is_met]
+        result.append((front, way, leg))
+    return result
+
+
+def led_through(
+    cracks: Sequence[Crack], c: int, on: int, body: Body, reach: float, size: float
+) -> Crack:
+    """Crack c, its fronts led straight on through the face of another one, on which it then ends.
+
+    Parameters
+    ----------
+    cracks : sequence of Crack
+        With fronts.
+    c, on : int
+    body : Body
+    reach : float
+        Legs of cells: places of a front whose way to the face is no longer are led on.
+    size : float
+        Of the sides of the new front, in cells.
+
+    Returns
+    -------
+    Crack
+        Not placed again.
+    """
+    tree = triangle_tree(cracks[on].points, cracks[on].faces)
+    near = {
+        int(front.number[0]): (way, leg)
+        for front, way, leg in _ways_to_face(cracks, c, on, body, reach)
+    }
+    s, number, da, cell, depth = [], [], [], [], []
+    for f, front in enumerate(front_frames(cracks[c])):
+        s.append(front.s)
+        number.append(np.full(len(front.x), f))
+        da.append(np.zeros(len(front.x)))
+        if int(front.number[0]) in near:
+            way, leg = near[int(front.number[0])]
+            is_led = np.isfinite(way)
+            da[-1][is_led] = (way + _LED / _LEG * leg)[is_led]
+            depth.append(signed_in(tree, front.x[is_led])[0])
+            cell.append(leg[is_led] / _LEG)
+    side = 1 if np.concatenate(depth).mean() > 0 else -1
+    ways = np.concatenate(da)
+    grown = advance_fronts(
+        cracks[c], np.concatenate(s), np.concatenate(number), 0 * ways, ways,
+        size * float(np.concatenate(cell).mean()),
+    )  # fmt: skip
+    return replace(grown, ends_on=(*cracks[c].ends_on, (on, side)))
+
+
 def crossings(one: Crack, other: Crack) -> Floats:
     """Points at which edges of either surface cross the other one `(n, 3)`."""
     parts = [np.zeros((0, 3))]
@@ -245,12 +432,18 @@ def crossings(one: Crack, other: Crack) -> Floats:
 
 
 __all__ = [
+    "BodyBefore",
+    "FaceAhead",
     "are_opposite",
     "arm",
     "arms_placed",
+    "body_of",
     "crossings",
     "distance_to_side",
+    "face_ahead",
     "is_before",
+    "led_through",
     "may_touch",
+    "renumbered_arms",
     "surface_junctions",
 ]

@@ -1,6 +1,6 @@
 """A crack as an engineer measures it: area, depth, lengths on surfaces, and where its ends lie."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Annotated
 
@@ -10,6 +10,7 @@ from xcrack.base.arguments import Part, check_arguments
 from xcrack.base.arrays import Bools, Floats, Ints, ranges
 from xcrack.base.errors import GeometryError, ProblemError
 from xcrack.crack.crack import Crack, tip_frames
+from xcrack.crack.junctions_3d import body_of
 from xcrack.crack.stations import place_crack
 from xcrack.mesh.distances import signed_in
 from xcrack.mesh.locate import Body, parts_inside
@@ -200,9 +201,15 @@ def surface_size(crack: Crack, mesh: Mesh, body: Body | None = None) -> float:
     return area / length if length > 0 else float(np.sqrt(area))
 
 
-def crack_size(crack: Crack, mesh: Mesh) -> float:
-    """Length of a placed crack in the body, in 3D its area over the length of its fronts."""
-    return length_inside(crack, mesh) if crack.fronts is None else surface_size(crack, mesh)
+def crack_size(cracks: Sequence[Crack], c: int, mesh: Mesh) -> float:
+    """Length of one of some placed cracks in the body, in 3D its area over that of its fronts.
+
+    What lies beyond a crack on which it ends does not count.
+    """
+    crack = cracks[c]
+    if crack.fronts is None:
+        return length_inside(crack, mesh)
+    return surface_size(crack, mesh, body_of(cracks, c, Body.of(mesh)))
 
 
 def halved_triangles(piece: Floats, side: Floats) -> Floats:

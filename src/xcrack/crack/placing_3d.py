@@ -1,6 +1,7 @@
 """Cracks in 3D put into a mesh: what of their outline is front, and mouths led outside."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial import Delaunay, cKDTree
@@ -17,7 +18,7 @@ from xcrack.crack.boundary_trace import (
     runs_of,
 )
 from xcrack.crack.crack import Crack
-from xcrack.crack.junctions_3d import are_opposite, crossings, is_before, may_touch
+from xcrack.crack.junctions_3d import are_opposite, body_of, crossings, is_before, may_touch
 from xcrack.crack.merging import joined_fronts
 from xcrack.mesh.distances import closest_in, triangle_tree
 from xcrack.mesh.locate import Body, locate
@@ -275,7 +276,7 @@ def place_surface(crack: Crack, mesh: Mesh) -> Crack:
     """
     if crack.ends_on and crack.fronts is not None:
         return crack
-    placed, short = _placed(crack, mesh)
+    placed, short = _placed(crack, Body.of(mesh))
     if crack.fronts is None:
         for front in short:
             warn(
@@ -305,11 +306,36 @@ def short_fronts(crack: Crack, mesh: Mesh) -> list[ShortFront]:
     -------
     list of ShortFront
     """
-    return _placed(crack, mesh)[1] if crack.fronts is None else []
+    return _placed(crack, Body.of(mesh))[1] if crack.fronts is None else []
 
 
-def _placed(crack: Crack, mesh: Mesh) -> tuple[Crack, list[ShortFront]]:
-    body = Body.of(mesh)
+def place_arm(cracks: Sequence[Crack], c: int, mesh: Mesh) -> Crack:
+    """Place one of some cracks whose fronts are known, and that may end on others of them.
+
+    The faces of those are to its fronts what the boundary of the body is: fronts go on beyond by
+    two cells, and no farther.
+
+    Parameters
+    ----------
+    cracks : sequence of Crack
+    c : int
+    mesh : Mesh
+    """
+    crack = cracks[c]
+    placed = _placed(crack, body_of(cracks, c, Body.of(mesh)))[0]
+    return replace(placed, ends_on=crack.ends_on)
+
+
+def place_arms(cracks: Sequence[Crack], mesh: Mesh) -> list[Crack]:
+    """Cracks after an advance, those that end on others placed again; see `place_arm`."""
+    result = list(cracks)
+    for c, crack in enumerate(cracks):
+        if crack.ends_on:
+            result[c] = place_arm(result, c, mesh)
+    return result
+
+
+def _placed(crack: Crack, body: Body) -> tuple[Crack, list[ShortFront]]:
     _check_inside(crack, body)
     points, faces = np.array(crack.points), np.array(crack.faces)
     first_time = crack.fronts is None
@@ -333,7 +359,7 @@ def _placed(crack: Crack, mesh: Mesh) -> tuple[Crack, list[ShortFront]]:
         short.extend(too_short)
         if first_time and not inside.any() and not too_short:
             short.extend(_front_along_boundary(points[loop], body))
-        if not first_time and not inside.all():
+        if not first_time and not crack.ends_on and not inside.all():
             outline = TraceOutline(loop, number >= 0, inside, first_time)
             inside = inside | behind_holes(points, faces, outline, body)
         if inside.all():
@@ -347,10 +373,10 @@ def _placed(crack: Crack, mesh: Mesh) -> tuple[Crack, list[ShortFront]]:
         )
     fronts.sort(key=lambda pair: pair[0])
     placed = Crack(points, faces, None, tuple(front for _, front in fronts))
-    if first_time:
+    if first_time or crack.ends_on:
         return placed, short
     joined = joined_fronts(placed, body)
-    return _placed(joined, mesh) if joined is not None else (placed, short)
+    return _placed(joined, body) if joined is not None else (placed, short)
 
 
 def _check_inside(crack: Crack, body: Body) -> None:
@@ -501,7 +527,7 @@ def check_surfaces(cracks: tuple[Crack, ...], mesh: Mesh) -> None:
         for i in range(j):
             if may_touch(cracks, i, j):
                 continue
-            meeting = _meeting_points(cracks[i], crack, body)
+            meeting = meeting_points(cracks[i], crack, body)
             meeting = meeting[is_before(cracks, i, meeting) & is_before(cracks, j, meeting)]
             if len(meeting):
                 raise GeometryError(
@@ -552,7 +578,7 @@ def _check_apart(cracks: tuple[Crack, ...], body: Body) -> None:
         )
 
 
-def _meeting_points(one: Crack, other: Crack, body: Body) -> Floats:
+def meeting_points(one: Crack, other: Crack, body: Body) -> Floats:
     """Points inside the body where two surfaces cross or touch `(n, 3)`."""
     low = np.maximum(one.points.min(axis=0), other.points.min(axis=0))
     high = np.minimum(one.points.max(axis=0), other.points.max(axis=0))

@@ -49,10 +49,11 @@ def joined_cuts(
         through, ending = result[junction.on], result[junction.crack]
         gone = cuts[junction.on].side == -junction.side
         gone |= _all_beyond(mesh, through, ending, junction.side)
-        acts = (ending.is_cut | ending.is_tip) & ~gone
+        acts = (ending.is_cut | ending.is_tip | _beside_faces(mesh, ending)) & ~gone
         both = acts & through.is_cut
-        _check(mesh, through, ending, junction, acts, both)
-        result[junction.on] = _split_cut(mesh, through, ending, both)
+        met = both | (acts & _beside_faces(mesh, through))
+        _check(mesh, through, ending, junction, acts, met)
+        result[junction.on] = _split_cut(mesh, through, ending, met)
         result[junction.crack] = _clipped_cut(mesh, through, ending, junction.side, gone, both)
         every = np.ones(len(mesh.cells), dtype=bool)
         joints.append(
@@ -65,11 +66,13 @@ def joined_cuts(
 
 
 def _check(
-    mesh: Mesh, through: Cut, ending: Cut, junction: Junction, acts: Bools, both: Bools
+    mesh: Mesh, through: Cut, ending: Cut, junction: Junction, acts: Bools, met: Bools
 ) -> None:
     """Raise where two cracks do not meet on a line between the fronts of the other one."""
     c, on = junction.crack, junction.on
-    if not both.any():
+    if not met.any():
+        if (_on_faces(mesh, ending) & _on_faces(mesh, through)).any():
+            return  # both lie on facets of the mesh, and meet on edges of it
         raise GeometryError(
             f"crack {c} does not reach crack {on}, on which it is to end: draw it on through that "
             "crack by two cells or more, or take the other side of it."
@@ -83,7 +86,7 @@ def _check(
             f"more beyond crack {c}, refine the mesh there, or let crack {c} run through and crack "
             f"{on} end on it, an arm for each side on which it lies."
         )
-    cells = np.nonzero(both)[0]
+    cells = np.nonzero(met)[0]
     one, other = (_slopes(mesh, cut, cells) for cut in (through, ending))
     sine = np.linalg.norm(np.cross(one, other), axis=1)
     if sine.min() < _SINE:
@@ -94,6 +97,23 @@ def _check(
             "they are not told apart. Leave out what lies along the other crack, or give both as "
             "one surface."
         )
+
+
+def _beside_faces(mesh: Mesh, cut: Cut) -> Bools:
+    """Cells beside facets of the mesh on which a crack lies `(m,)`."""
+    beside = np.zeros(len(mesh.cells), dtype=bool)
+    beside[cut.lip_cell[cut.lip_cell[:, 0] != cut.lip_cell[:, 1]]] = True
+    return beside
+
+
+def _on_faces(mesh: Mesh, cut: Cut) -> Bools:
+    """Points of facets of the mesh on which a crack lies `(n,)`."""
+    pairs = cut.lip_cell[cut.lip_cell[:, 0] != cut.lip_cell[:, 1]]
+    corner, other = mesh.cells[pairs].transpose(1, 0, 2)
+    shared = (corner[:, :, None] == other[:, None]).any(axis=2)
+    on_faces = np.zeros(mesh.n_points, dtype=bool)
+    on_faces[corner[shared]] = True
+    return on_faces
 
 
 def _slopes(mesh: Mesh, cut: Cut, cells: Ints) -> Floats:
@@ -159,11 +179,11 @@ def _clipped_cut(mesh: Mesh, through: Cut, ending: Cut, side: int, gone: Bools, 
     )
 
 
-def _split_cut(mesh: Mesh, through: Cut, ending: Cut, both: Bools) -> Cut:
+def _split_cut(mesh: Mesh, through: Cut, ending: Cut, met: Bools) -> Cut:
     """The cut of the crack that runs through, its faces split where the arm meets them."""
     cell = through.lip_cell[:, 0]
     value = _at(mesh, ending.level_set.phi, cell, through.lip_bary[:, 0])
-    split = both[cell] & (value.min(axis=1) < 0) & (value.max(axis=1) > 0)
+    split = met[through.lip_cell].any(axis=1) & (value.min(axis=1) < 0) & (value.max(axis=1) > 0)
     rows = np.nonzero(split)[0]
     bary, _, parent = _parts(value[rows], through.lip_bary[rows], through.lip_points(mesh)[rows])
     source = np.concatenate([np.nonzero(~split)[0], rows[parent]])

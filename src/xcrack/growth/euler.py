@@ -11,6 +11,7 @@ from xcrack.crack.advance_2d import advance
 from xcrack.crack.crack import Crack
 from xcrack.crack.fronts import closed_fronts
 from xcrack.crack.meetings import LEAST, joined, meetings
+from xcrack.crack.placing_3d import place_arms
 from xcrack.fatigue.cycle import cycles_between
 from xcrack.growth import fronts
 from xcrack.growth.corrected import Corrected
@@ -79,10 +80,13 @@ def advanced(rule: GrowthRule, step: Step, way: Floats) -> list[Crack]:
     stations = solves_of(step)[0]
     angle = np.concatenate([np.zeros(0), *step.angle])
     if mesh.dim == 3:
-        return [
-            advanced_crack(crack, stations, c, angle, way, mesh)
-            for c, crack in enumerate(step.cracks)
-        ]
+        return place_arms(
+            [
+                advanced_crack(crack, stations, c, angle, way, mesh)
+                for c, crack in enumerate(step.cracks)
+            ],
+            mesh,
+        )
     rows = [stations.crack == c for c in range(len(step.cracks))]
     cracks = [advance(crack, angle[r], way[r]) for crack, r in zip(step.cracks, rows, strict=True)]
     if rule.link_up is not None:
@@ -113,10 +117,15 @@ def begin(rule: GrowthRule, rates: Rates, identities: Identities) -> Corrected:
 
 
 def begin_at(
-    rule: GrowthRule, rates: Rates, identities: Identities, cycles: float, error: StepError
+    rule: GrowthRule,
+    rates: Rates,
+    identities: Identities,
+    cycles: float,
+    error: StepError,
+    last: Step | None = None,
 ) -> Corrected:
     """A step before which there is nothing to follow."""
-    del error
+    del error, last
     return _settled(rule, rates, identities, cycles, np.zeros(len(rates.stations)))
 
 

@@ -65,17 +65,22 @@ def joins_of(step: Step, problem: Problem) -> tuple[Join, ...]:
 
 
 def cut_off(step: Step, problem: Problem, joins: Sequence[Join]) -> str:
-    """Why a run ends in which cracks that met cut a piece off in 2D; empty where they do not."""
-    if not joins or problem.mesh.dim == 3:
+    """Why a run ends in which cracks that met cut a piece off; empty where they do not."""
+    if not joins or (problem.mesh.dim == 3 and not problem.junctions):
         return ""
+    piece = piece_cut_off(step, problem)
+    return "; ".join(map(str, joins)) + f": {piece}" if piece else ""
+
+
+def piece_cut_off(step: Step, problem: Problem) -> str:
+    """Which piece of the body is cut off that was not in the step before; empty where none is."""
     space, _ = discretise(problem)
     piece, n, part = pieces(space)
     if n < 2 or n <= (pieces(step.solutions[0].space)[1] if step.solutions else 1):
         return ""
     k = int(np.argmin(part))
     x = coordinates(space.node_points[piece == k].mean(axis=0))
-    words = "; ".join(map(str, joins))
-    return f"{words}: the piece around {x}, {100 * part[k]:.3g} % of the body, is cut off"
+    return f"the piece around {x}, {100 * part[k]:.3g} % of the body, is cut off"
 
 
 # Ends that come to the boundary.
@@ -295,5 +300,6 @@ __all__ = [
     "ended_crack",
     "have_left",
     "joins_of",
+    "piece_cut_off",
     "with_joins",
 ]

@@ -16,7 +16,8 @@ from xcrack.crack.advance_3d import advance_fronts
 from xcrack.crack.crack import Crack
 from xcrack.crack.fronts import closed_fronts, front_frames
 from xcrack.crack.measures import crack_size
-from xcrack.crack.stations import place_crack
+from xcrack.crack.placing_3d import place_arm, place_arms
+from xcrack.crack.stations import inside_body, place_crack
 from xcrack.fatigue.retardation import (
     POINTS,
     BlockCycles,
@@ -41,7 +42,7 @@ from xcrack.growth.stations import GrowthStations, Identities, directions
 from xcrack.growth.step import Plan, Step, StepError, plan_of, solves_of
 from xcrack.growth.step_length import first_control, longest, next_control, share_left
 from xcrack.mesh.distances import front_distance
-from xcrack.mesh.locate import Body, cell_sizes, contains
+from xcrack.mesh.locate import Body, cell_sizes
 from xcrack.mesh.mesh import Mesh
 
 WAITS_BELOW = 0.02  # of a cell: neighbours along a front move on, so a slow part has to follow
@@ -169,7 +170,7 @@ def _solved(
 def _corrected_part(
     rule: GrowthRule,
     c: int,
-    crack: Crack,
+    cracks: Sequence[Crack],
     identities: Identities,
     solved: tuple[GrowthStations, SolveHistory],
     before: GrowthStations,
@@ -177,12 +178,13 @@ def _corrected_part(
 ) -> tuple[GrowthStations, SolveHistory]:
     """Stations of a corrected crack, with what was solved close by."""
     here, solves = solved
+    crack = cracks[c]
     mesh, fronts = rule.problem.mesh, front_frames(crack)
     x = np.concatenate([front.x for front in fronts])
     count = [len(front.x) for front in fronts]
     number = np.repeat(np.arange(len(fronts)), count)
     rate = _near(here, solves.rate[0], x, mesh)
-    there = ~np.isnan(rate) & contains(mesh, x)
+    there = ~np.isnan(rate) & inside_body(cracks, c, mesh, x)
     x, number = x[there], number[there]
     lengths = front_lengths(crack)
     part = GrowthStations(
@@ -208,7 +210,7 @@ def _corrected_part(
         rate=rate[there][None],
         dK_eq=_near(here, solves.dK_eq[0], x, mesh)[None],
         direction=direction[None],
-        scale=np.full(len(x), crack_size(crack, mesh)),
+        scale=np.full(len(x), crack_size(cracks, c, mesh)),
         bend=np.zeros(len(x)),
         kinds=None,
     )
@@ -337,10 +339,14 @@ def advanced(rule: GrowthRule, step: Step, way: Floats) -> list[Crack]:
     """The cracks of a step after its stations have advanced."""
     stations, solves = solves_of(step)
     angle = _angle(stations, solves)
-    return [
-        advanced_crack(crack, stations, c, angle, way, rule.problem.mesh)
-        for c, crack in enumerate(step.corrected)
-    ]
+    mesh = rule.problem.mesh
+    return place_arms(
+        [
+            advanced_crack(crack, stations, c, angle, way, mesh)
+            for c, crack in enumerate(step.corrected)
+        ],
+        mesh,
+    )
 
 
 def partly_advanced(rule: GrowthRule, step: Step, plan: Plan, part: float) -> list[Crack]:
@@ -407,11 +413,21 @@ def begin(rule: GrowthRule, rates: Rates, identities: Identities) -> Corrected:
 
 
 def begin_at(
-    rule: GrowthRule, rates: Rates, identities: Identities, cycles: float, error: StepError
+    rule: GrowthRule,
+    rates: Rates,
+    identities: Identities,
+    cycles: float,
+    error: StepError,
+    last: Step | None = None,
 ) -> Corrected:
-    """A step before which there is nothing to correct."""
+    """A step before which there is nothing to correct.
+
+    What overloads have left since the step before, `last`, is that of the nearest place.
+    """
     stations, solves = _solved(rule, rates, identities, 0.0)
     zones = None if rule.retardation is None else no_zones(len(stations))
+    if zones is not None and last is not None:
+        zones = _zones_after(rule, last, stations.x)
     size = min((rates.problem.sizes[c] for c in set(stations.crack.tolist())), default=np.inf)
     solves = _with_mean_rates(rule, stations, solves, zones)
     control = first_control(rule, size, _shortest(rule, stations, solves), np.inf)
@@ -445,13 +461,14 @@ def correct(rule: GrowthRule, last: Step, rates: Rates, identities: Identities) 
         cycles, own = marched[1], share_left(rule) * beyond_trapezoid(marched[1], plan.cycles)
     if np.isinf(rates.rate).any() or fastest == 0:
         share = None
-    parts, cracks, zones = [], [], []
+    parts, zones = [], []
+    cracks: list[Crack] = []
     gap, way = np.zeros(len(stations)), np.array(plan.arc)
     for c in range(len(rates.cracks)):
         rows = stations.crack == c
         again = None
         if share is not None and rows.any():
-            again = _again(rule, last, c, rates.cracks[c], share, direction)
+            again = _again(rule, last, c, rates.cracks, share, direction)
         part = here[c]
         if again is None:
             crack = rates.cracks[c]
@@ -465,7 +482,8 @@ def correct(rule: GrowthRule, last: Step, rates: Rates, identities: Identities) 
         else:
             crack, waits, gap[rows], way[rows] = again
             before = stations.at(rows)
-            part = _corrected_part(rule, c, crack, identities, part, before, waits)
+            every = [*cracks, crack, *rates.cracks[c + 1 :]]
+            part = _corrected_part(rule, c, every, identities, part, before, waits)
         if marched is not None:
             moved = (stations.x + plan.move)[rows]
             arc, left = marched[0][rows], marched[2].at(rows)
@@ -520,7 +538,12 @@ def _carried_back(
 
 
 def _again(
-    rule: GrowthRule, last: Step, c: int, solved: Crack, share: Floats, later: Floats
+    rule: GrowthRule,
+    last: Step,
+    c: int,
+    cracks: Sequence[Crack],
+    share: Floats,
+    later: Floats,
 ) -> tuple[Crack, Floats, Floats, Floats] | None:
     """The corrected crack, growth that waits at the old places, how far these are moved, and grow.
 
@@ -543,10 +566,14 @@ def _again(
     try:
         moved = np.where(goes, wanted, 0.0)
         crack = advanced_crack(last.corrected[c], stations, c, angle, moved, mesh)
-        again = place_crack(crack, mesh)
+        if crack.ends_on:
+            every = [crack if k == c else other for k, other in enumerate(cracks)]
+            again = place_arm(every, c, mesh)
+        else:
+            again = place_crack(crack, mesh)
     except GeometryError:
         return None
-    if closed_fronts(again) != closed_fronts(solved):
+    if closed_fronts(again) != closed_fronts(cracks[c]):
         return None
     gap = np.linalg.norm(plan.move - _move(stations, angle, wanted), axis=1)
     waits, gap = np.where(goes, 0.0, wanted), np.where(goes, gap, 0.0)
@@ -665,6 +692,16 @@ def _overloads_between(
     )
     rest = plan.length / done.reached if 0 < done.reached < plan.length else 1.0
     return rest * done.arc[-1], rest * float(done.cycles[-1]), done.zones
+
+
+def _zones_after(rule: GrowthRule, last: Step, x: Floats) -> OverloadZones:
+    """What overloads have left at places that some of the stations of a step have come to."""
+    plan, (stations, solves) = plan_of(last), solves_of(last)
+    assert last.zones is not None
+    ones, length = np.ones(len(stations)), plan.part * plan.length
+    done = _marched(rule, solves, [_kinds(solves)], last.zones, length, ones, np.inf)
+    arc, moved = done.arc[-1], stations.x + plan.part * plan.move
+    return zones_onto(done.zones, arc, arc, moved, x)
 
 
 def rate_at_end(rate: Floats, arc: Floats, blocks: float) -> Floats:

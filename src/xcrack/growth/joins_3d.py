@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from itertools import combinations
+from itertools import combinations, permutations
 
 import numpy as np
 from scipy.special import exprel
@@ -11,8 +11,17 @@ from xcrack.base.arrays import Floats, at
 from xcrack.base.errors import GeometryError
 from xcrack.crack.crack import Crack
 from xcrack.crack.fronts import closed_fronts
+from xcrack.crack.junctions_3d import (
+    FaceAhead,
+    face_ahead,
+    is_before,
+    led_through,
+    may_touch,
+    renumbered_arms,
+)
 from xcrack.crack.measures import crack_size
 from xcrack.crack.merging import OFFSET, FrontGap, gap_between, merged_crack, turned_crack
+from xcrack.crack.placing_3d import meeting_points, place_arm
 from xcrack.growth import euler, fronts
 from xcrack.growth.corrected import Corrected
 from xcrack.growth.fronts import interpolate_along_front
@@ -26,6 +35,7 @@ from xcrack.mesh.mesh import Mesh
 
 _NEAR = 1.1  # cells between fronts below which they join: closer ones cannot be solved
 _BESIDE = 1.0  # cells that fronts may pass beside each other at the end of the whole advance
+_AHEAD = 1.8  # legs of cells before a face in which no front can be solved: it is led through
 _LEFT = 0.25  # of a cell: the gap that is closed at once
 _RADIUS = 1.0  # cells: of the disc that rounds hollow corners of the joined front
 _SPACING = 0.5  # of a cell, between the points of a new front
@@ -58,18 +68,29 @@ def with_joins(rule: GrowthRule, step: Step, plan: Plan) -> Plan:
         return plan
     body = Body.of(rule.problem.mesh)
     close = _close(plan.cracks, body, _BESIDE)
-    if not close:
+    faces = _faces_met(plan.cracks, body)
+    if not close and not faces:
         return plan
-    hindrance = _hindrance(rule)
+    hindrance = _hindrance(rule) if close else ""
     if hindrance:
         i, k = close[0][0]
         raise GeometryError(f"cracks {i} and {k} meet near {at(close[0][1].x)}, and {hindrance}")
     m = solves_of(step)[1].exponent
-    time, way, plain = min(_met(rule, step, plan, *each, body, m) for each in close)
+    time, way, plain = min(
+        [_met(rule, step, plan, *each, body, m) for each in close]
+        + [_met_face(rule, step, plan, *pair, body, m) for pair in faces]
+    )
     now = _advanced(rule, step, plan, way)
     cycles = time * plan.cycles / _gain(step, now, rule.problem.mesh, m)
     unsure = UNKNOWN[3] * abs(plain * plan.cycles - cycles)
     apart, joins = tuple(now), []
+    for met in _faces_near(now, body, _AHEAD):
+        if may_touch(now, met.crack, met.on):
+            continue
+        now[met.crack] = led_through(now, met.crack, met.on, body, _AHEAD, _SPACING)
+        now[met.crack] = place_arm(now, met.crack, rule.problem.mesh)
+        pair = (min(met.crack, met.on), max(met.crack, met.on))
+        joins.append(Join(step.index + 1, step.cycles + cycles, tuple(met.x.tolist()), pair))
     number = list(range(len(now)))
     while pairs := _close(now, body, OFFSET):
         (i, k), gap, size = pairs[0]
@@ -77,7 +98,8 @@ def with_joins(rule: GrowthRule, step: Step, plan: Plan) -> Plan:
         now[i] = merged_crack(now[i], other, _RADIUS * size, _SPACING * size)
         x = tuple(gap.x.tolist())
         joins.append(Join(step.index + 1, step.cycles + cycles, x, (number[i], number[k])))
-        del now[k], number[k]
+        now = renumbered_arms(now, i, k, gap.turn > 0)
+        del number[k]
     if not joins:
         return plan
     return replace(
@@ -97,8 +119,74 @@ def joined(rule: GrowthRule, last: Step, rates: Rates, identities: Identities) -
     place = tuple(_errors(last, sif.x, mesh) for sif in rates.sif[0])
     error = StepError(place, before + plan.error)
     return _INTEGRATORS[rule.integrator].begin_at(
-        rule, rates, identities, last.cycles + plan.cycles, error
+        rule, rates, identities, last.cycles + plan.cycles, error, last
     )
+
+
+def _faces_near(cracks: Sequence[Crack], body: Body, reach: float) -> list[FaceAhead]:
+    """Faces of others within some legs of cells straight ahead of fronts, nearest first."""
+    near = [
+        face_ahead(cracks, c, on, body, reach)
+        for c, on in permutations(range(len(cracks)), 2)
+        if not may_touch(cracks, c, on)
+    ]
+    return sorted([each for each in near if each is not None], key=lambda each: each.width)
+
+
+def _faces_met(cracks: Sequence[Crack], body: Body) -> list[tuple[int, int]]:
+    """Pairs of cracks of which one has come to the face of the other, or through it."""
+    pairs = {(min(m.crack, m.on), max(m.crack, m.on)) for m in _faces_near(cracks, body, _AHEAD)}
+    for i, k in combinations(range(len(cracks)), 2):
+        if (i, k) not in pairs and not may_touch(cracks, i, k) and _cross(cracks, i, k, body):
+            pairs.add((i, k))
+    return sorted(pairs)
+
+
+def _cross(cracks: Sequence[Crack], i: int, k: int, body: Body) -> bool:
+    x = meeting_points(cracks[i], cracks[k], body)
+    return bool((is_before(cracks, i, x) & is_before(cracks, k, x)).any()) if len(x) else False
+
+
+def _met_face(
+    rule: GrowthRule, step: Step, plan: Plan, i: int, k: int, body: Body, exponent: float
+) -> tuple[float, float, float]:
+    """When a front has met the face of another crack, in shares of an advance; as of `_met`.
+
+    Before a free face K grows as between two cracks that face each other at twice the distance.
+    """
+
+    def face_after(share: float, reach: float) -> FaceAhead | None:
+        now = plan.cracks if share == 1.0 else _advanced(rule, step, plan, share)
+        if _cross(now, i, k, body):
+            return FaceAhead(i, k, 0.0, 1.0, np.zeros(3))
+        both = [face_ahead(now, *pair, body, reach) for pair in ((i, k), (k, i))]
+        return min(
+            (one for one in both if one is not None), key=lambda one: one.width, default=None
+        )
+
+    low, high, met = 0.0, 1.0, face_after(1.0, _AHEAD)
+    while met is not None and met.width > _LEFT * met.leg and high * plan.largest < met.leg:
+        low, high = high, high + met.leg / plan.largest
+        met = face_after(high, _AHEAD)
+    way = high
+    if met is not None and met.width <= _LEFT * met.leg:
+        for _ in range(_TRIES):
+            way = 0.5 * (low + high)
+            near = face_after(way, _AHEAD)
+            if near is not None and near.width <= 0.5 * _LEFT * near.leg:
+                high = way
+            elif near is None or near.width > _LEFT * near.leg:
+                low = way
+            else:
+                break
+        else:
+            way = low
+    last = face_after(way, _AHEAD)
+    rest = 0.0 if last is None else last.width / plan.largest
+    plain = way + rest
+    c = i if last is None else last.crack
+    gap = plain * plan.largest
+    return plain * part_of_time(gap / step.sizes[c], exponent, 3), way, plain
 
 
 def _close(
@@ -113,7 +201,7 @@ def _close(
     result = []
     for i, k in combinations(range(len(cracks)), 2):
         x = np.concatenate([cracks[i].points[front] for front in cracks[i].fronts or ()])
-        if not len(x):
+        if not len(x) or may_touch(cracks, i, k):
             continue
         gap = gap_between(cracks[i], cracks[k], body, 2 * float(body.cell_size(x).max()))
         if gap is None:
@@ -169,8 +257,8 @@ def _gain(step: Step, now: Sequence[Crack], mesh: Mesh, exponent: float) -> floa
     As in `elapsed_3d`: K goes with the root of the size.
     """
     gains = []
-    for old, crack in zip(step.sizes, now):
-        x = np.log(crack_size(crack, mesh) / old)
+    for c, old in enumerate(step.sizes):
+        x = np.log(crack_size(now, c, mesh) / old)
         gains.append(float(exprel(x) / exprel(x - exponent / 2 * x)))
     return max(gains)
 
@@ -238,16 +326,8 @@ def _hindrance(rule: GrowthRule) -> str:
     hindrance = named_by_number(rule)
     if hindrance:
         return hindrance
-    if isinstance(rule.problem.friction, Sequence) or any(rule.problem.frictions):
-        return (
-            "what slip has left on the faces of two cracks is not carried on to one: go on with "
-            "friction=0, or with a new run from there."
-        )
-    if rule.retardation is not None:
-        return (
-            "what overloads have left at two fronts is not carried on to one: go on without "
-            "retardation from there."
-        )
+    if isinstance(rule.problem.friction, Sequence):
+        return "friction differs between them: give one number for all cracks."
     return ""
 
 

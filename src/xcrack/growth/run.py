@@ -37,6 +37,7 @@ from xcrack.growth.events import (
     ended_crack,
     have_left,
     joins_of,
+    piece_cut_off,
     with_joins,
 )
 from xcrack.growth.integrator import integrator_of
@@ -457,9 +458,13 @@ def _step_after(
     except GeometryError as error:
         return None, reuse, cannot_go_on(last, error)
     if plan.joins:
-        reuse = replace(reuse, centre=(), active=())
+        slip = reuse.slip if len(plan.cracks) == len(last.cracks) else ()
+        reuse = replace(reuse, centre=(), active=(), slip=slip)
     joins = joins_of(last, problem)
-    ended = cut_off(last, problem, joins)
+    try:
+        ended = cut_off(last, problem, joins)
+    except GeometryError as error:
+        return None, reuse, cannot_go_on(last, error)
     if joins and problem.mesh.dim == 2:
         reuse = SolverState()  # what belongs to numbers of cracks is void
     near = arriving(last, problem)
@@ -476,7 +481,10 @@ def _step_after(
         return None, reuse, cannot_go_on(last, error)
     except XcrackError as error:
         if not have_left(plan.cracks, problem.placed):
-            raise
+            piece = piece_cut_off(last, problem) if problem.junctions else ""
+            if not piece:
+                raise
+            return None, reuse, f"{piece}, after step {last.index}, N = {last.cycles:.6g}"
         left = left_the_body(rule, arrivals_of(rule, last, near, None))
         return None, reuse, f"{left}, and the body cannot be solved without it: {error}"
 
@@ -618,7 +626,7 @@ def _last_step(
         states=last.states,
         law_rate=none,
         R_range=tuple(np.zeros((0, 2)) for _ in cracks),
-        sizes=tuple(crack_size(crack, problem.mesh) for crack in cracks),
+        sizes=tuple(crack_size(cracks, c, problem.mesh) for c in range(len(cracks))),
         identities=_identities(rule, last, problem, joins),
         run=last.run,
     )

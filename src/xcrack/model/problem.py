@@ -194,7 +194,7 @@ class Problem(Declared):
     @cached_property
     def sizes(self) -> tuple[float, ...]:
         """Size of each crack: its length in the body, in 3D its area over that of its fronts."""
-        return tuple(crack_size(crack, self.mesh) for crack in self.placed)
+        return tuple(crack_size(self.placed, c, self.mesh) for c in range(len(self.placed)))
 
     @cached_property
     def junctions(self) -> tuple[Junction, ...]:

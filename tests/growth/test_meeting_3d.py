@@ -1,0 +1,210 @@
+"""Growth in 3D onto the face of another crack: the front goes through it, and an arm goes on.
+
+Coarse meshes of order 1: K is good to a few per cent, and so is what follows from it.
+"""
+
+import shutil
+
+import numpy as np
+import pytest
+
+import xcrack as xc
+from xcrack.crack.junctions_3d import body_of
+from xcrack.crack.measures import front_length_inside
+from xcrack.mesh.locate import Body
+
+pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("ignore::xcrack.XcrackWarning")]
+
+E, NU = 1e5, 0.3
+LAW, CYCLE = xc.paris(C=1e-12, m=3.0), xc.Cycle(0.0, 1.0)
+FACE = 0.52
+
+
+def loads(pull):
+    pairs = {"top": (0, 0, 100.0), "bottom": (0, 0, -100.0)}
+    pairs |= {"right": (pull, 0, 0), "left": (-pull, 0, 0)}
+    return [xc.traction(name, t) for name, t in pairs.items()]
+
+
+def penny_before_a_face(n=8, pull=20.0, face=FACE, **options):
+    """A penny whose front heads for the face of a crack through the body."""
+    outline = [(face, y, z) for y, z in ((-1.5, -0.5), (1.5, -0.5), (1.5, 0.5), (-1.5, 0.5))]
+    cracks = [xc.penny_crack((-0.1, 0.02, 0.03), (0, 0, 1), 0.4), xc.plane_crack(outline)]
+    mesh = xc.box((-1.2, -1, -1), (1.2, 1, 1), (6 * n // 5, n, n))
+    given = {"loads": loads(pull), "order": 1, "contact": "off"}
+    return xc.Problem(mesh, xc.Isotropic(E, NU), cracks, **given | options)
+
+
+def grow(problem, law=LAW, cycle=CYCLE, **options):
+    given = {"da": 0.12, "max_steps": 3, "progress": False}
+    return xc.grow(problem, law, xc.max_hoop_stress, cycle, **given | options)
+
+
+def areas(step):
+    """Of the faces of each crack that count."""
+    result = []
+    body = Body.of(step.solutions[-1].problem.mesh)
+    for c in range(len(step.cracks)):
+        side, total = body_of(step.cracks, c, body), 0.0
+        for corner in step.cracks[c].points[step.cracks[c].faces]:
+            t = (np.arange(12) + 0.5) / 12
+            u, v = (a.ravel() for a in np.meshgrid(t, t))
+            u, v = np.where(u + v > 1, 1 - u, u), np.where(u + v > 1, 1 - v, v)
+            x = (
+                corner[0]
+                + u[:, None] * (corner[1] - corner[0])
+                + v[:, None] * (corner[2] - corner[0])
+            )
+            area = np.linalg.norm(np.cross(corner[1] - corner[0], corner[2] - corner[0])) / 2
+            total += area * float(side.contains(x).mean())
+        result.append(total)
+    return np.array(result)
+
+
+def release(step):
+    """Mean energy release rate of each crack."""
+    K = [sif.K for sif in step.sif[-1]]
+    return np.array(
+        [
+            ((k[:, :2] ** 2).sum(axis=1) * (1 - NU**2) + k[:, 2] ** 2 * (1 + NU)).mean() / E
+            for k in K
+        ]
+    )
+
+
+def unbalanced(history):
+    """What of the energy of each step after the first no release over the new area explains."""
+    result = []
+    for one, other in zip(history.steps, history.steps[1:]):
+        released = 0.5 * (release(one) + release(other)) @ (areas(other) - areas(one))
+        energy = other.solutions[-1].energy
+        result.append((energy - one.solutions[-1].energy - released) / energy)
+    return np.array(result)
+
+
+@pytest.mark.mission
+def test_a_penny_grows_through_a_face_and_goes_on():
+    """Six steps; the energy through the meeting to 2 % (discretisation, and steps)."""
+    history = xc.collect(grow(penny_before_a_face(10), da=0.1, max_steps=6))
+    assert len(history.steps) == 6, history.ended
+    (join,) = history.joins
+    assert join.step == 1
+    assert join.cracks == (0, 1)
+    assert join.point == pytest.approx((FACE, 0.02, 0.03), abs=0.1)
+    assert history.steps[1].cycles == join.N
+    assert [step.cracks[0].ends_on != () for step in history.steps] == [False] + [True] * 5
+    off = unbalanced(history)
+    print(f"\nunbalanced {np.round(off, 4)}")
+    assert np.abs(off).max() < 0.02
+    K = np.concatenate([sif.K for step in history.steps for sif in step.sif[-1]])
+    assert np.isfinite(K).all()
+    cycles = np.diff([step.cycles for step in history.steps])
+    assert (cycles > 0).all()
+
+
+def test_two_meshes_agree():
+    """Energy to 2 %, cycles of the meeting to 3 %."""
+    runs = [xc.collect(grow(penny_before_a_face(n), da=0.1, max_steps=2)) for n in (10, 15)]
+    energy, cycles = (
+        np.array([f(run.steps[1]) for run in runs])
+        for f in (lambda step: step.solutions[-1].energy, lambda step: step.cycles)
+    )
+    print(f"\nenergy {energy}, cycles {cycles}")
+    assert energy[0] == pytest.approx(energy[1], rel=0.02)
+    assert cycles[0] == pytest.approx(cycles[1], rel=0.03)
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    """Folder of a run through a meeting, with its problem."""
+    folder = tmp_path_factory.mktemp("meeting") / "run"
+    problem = penny_before_a_face()
+    return folder, problem, xc.collect(grow(problem, max_steps=4), folder)
+
+
+@pytest.mark.parametrize("steps", [1, 2, 3])
+def test_a_run_goes_on_over_a_meeting_to_the_last_bit(run, tmp_path, steps):
+    """From before the meeting, at it and after."""
+    folder, problem, straight = run
+    assert [len(step.joins) for step in straight.steps] == [0, 1, 0, 0]
+    own = tmp_path / "run"
+    shutil.copytree(folder, own)
+    for path in sorted(own.glob("step_*.npz"))[steps:]:
+        path.unlink()
+    history = xc.resume(
+        own, problem, LAW, xc.max_hoop_stress, CYCLE, da=0.12, max_steps=steps + 1, progress=False
+    )
+    assert len(history.steps) == steps + 1
+    for one, other in zip(straight.steps, history.steps, strict=False):
+        assert one.cycles == other.cycles
+        assert one.joins == other.joins
+        for a, b in zip(one.cracks, other.cracks, strict=True):
+            assert a.points.tobytes() == b.points.tobytes()
+            assert a.faces.tobytes() == b.faces.tobytes()
+            assert a.ends_on == b.ends_on
+        for a, b in zip(one.sif[-1], other.sif[-1], strict=True):
+            assert a.K.tobytes() == b.K.tobytes()
+
+
+def test_euler_goes_through_a_face_as_well():
+    history = xc.collect(grow(penny_before_a_face(), integrator="euler"))
+    assert len(history.steps) == 3
+    assert len(history.joins) == 1
+
+
+def test_a_meeting_under_friction():
+    """The face is pressed and rubs, the penny is open."""
+    problem = penny_before_a_face(pull=-30.0, contact="on", friction=0.3)
+    history = xc.collect(grow(problem))
+    assert len(history.steps) == 3, history.ended
+    assert len(history.joins) == 1
+    contact = history.steps[-1].solutions[-1].contact[1]
+    assert contact is not None
+    assert contact.closed.any()
+
+
+def test_a_meeting_with_retardation():
+    """Overloads before the meeting are felt after it: the run is slower than without."""
+    spectrum = xc.Spectrum([*([0.05, 0.5] * 200), 0.05, 1.0])
+    law, cycles = xc.paris(C=3e-11, m=3.0), []
+    for retardation in (None, xc.wheeler(0.5, xc.plastic_zone(1000.0, beta=6))):
+        given = {"retardation": retardation} if retardation else {}
+        history = xc.collect(grow(penny_before_a_face(), law, spectrum, **given))
+        assert len(history.steps) == 3, history.ended
+        assert len(history.joins) == 1
+        cycles.append([step.cycles for step in history.steps])
+    plain, slowed = np.array(cycles)
+    assert (np.diff(slowed) > np.diff(plain)).all()
+
+
+def test_arms_as_given_grow():
+    """Two pennies that cross, of which the larger one opens: its front and those of both arms."""
+    one = xc.penny_crack((0.013, 0.0, 0.017), (0, 0, 1), 0.65)
+    other = xc.penny_crack((0.013, 0.0, 0.017), (1, 0, 0), 0.35)
+    cracks = [one, xc.arm(other, 0, 1), xc.arm(other, 0, -1)]
+    problem = xc.Problem(
+        xc.box((-1,) * 3, (1,) * 3, 13), xc.Isotropic(E, NU), cracks, loads=loads(100.0), order=1,
+        contact="off",
+    )  # fmt: skip
+    history = xc.collect(grow(problem, da=0.08))
+    assert len(history.steps) == 3, history.ended
+    assert not history.joins
+    first, last = history.steps[0].cracks, history.steps[-1].cracks
+    for old, new in zip(first, last, strict=True):
+        assert new.ends_on == old.ends_on
+        assert len(new.points) > len(old.points)
+    assert np.abs(unbalanced(history)).max() < 0.02
+    mesh = problem.mesh
+    assert front_length_inside(last[0], mesh) > front_length_inside(first[0], mesh)
+
+
+def test_no_face_ahead_is_not_looked_at(monkeypatch):
+    """Where nothing comes close nothing is advanced a second time."""
+    from xcrack.growth import joins_3d
+
+    def never(*arguments):
+        raise AssertionError(f"asked with {len(arguments)} arguments")
+
+    monkeypatch.setattr(joins_3d, "_advanced", never)
+    problem = penny_before_a_face(10, face=0.85)
+    assert len(list(grow(problem, da=0.05, max_steps=2))) == 2
