@@ -562,3 +562,29 @@ def test_a_crack_that_ends_on_nothing():
     """Only a crack with tips given can: line_crack makes a tip of such an end."""
     with pytest.raises(xc.GeometryError, match="neither a tip nor on another crack"):
         xc.Problem(xc.box((-1, -1), (1, 1), 20), STEEL, [xc.Crack([A, B], [(0, 1)], tips=(1,))])
+
+
+def test_a_pressed_junction_that_is_moved_by_round_off():
+    """K_II of the branch was .0284 as given, and .0170 moved by 1e-10; a fine mesh has .0154."""
+    stress = np.array([[-0.9585380911737438, -0.1425], [-0.1425, -0.5100829309811238]])
+    cracks = [
+        np.array([(-0.2909604623969714, -1.001), (-0.2600695669746747, -0.16433349455816926)]),
+        np.array([(-0.28180532179043694, -0.7530369871618295), (0.1703621209, -0.630342411366)]),
+    ]
+    loads = [
+        xc.traction(side, lambda x, normal: normal @ stress)
+        for side in ("left", "right", "bottom", "top")
+    ]
+
+    def K_II(shift):
+        problem = xc.Problem(
+            xc.box((-1, -1), (1, 1), 16), xc.Isotropic(1.0, 0.45, plane="strain"),
+            [xc.line_crack(c + shift) for c in cracks], loads=loads,
+        )  # fmt: skip
+        return float(xc.stress_intensity(xc.solve(problem), 1).K[0, 1])
+
+    given = K_II(np.zeros(2))
+    assert given == pytest.approx(0.0154, rel=0.06)
+    for angle in (0.8, 2.4, 4.0):
+        moved = K_II(1.25e-10 * np.array([np.cos(angle), np.sin(angle)]))
+        assert moved == pytest.approx(given, rel=1e-7)
