@@ -141,6 +141,38 @@ def test_a_front_along_which_the_modulus_changes():
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("integrator", ["pec", "euler"])
+def test_a_front_passes_an_interface_with_the_law_of_each_side(integrator):
+    """A straight front through materials whose laws differ by ten, against the integral of both."""
+    steel = xc.Isotropic(1.0, 0.3)
+    laws = {"one": xc.paris(1e-3, 3.0), "two": xc.paris(1e-4, 3.0)}
+    K_of = np.polynomial.Polynomial([1.0, 2.0])
+
+    def response(problem, states, reuse, bars):
+        a = problem.stations.x[:, 0]
+        K = [np.stack([k * K_of(a), 0 * a, 0 * a], axis=1) for k in states]
+        return xc.Response.of_K(problem, states, K)
+
+    def cycles(begin, end, C):
+        return (K_of(begin) ** -2 - K_of(end) ** -2) / (4 * C)  # ∫ da / (C (1 + 2 a)³)
+
+    error = []
+    for n in (8, 16):
+        problem = slab(n, {"one": steel, "two": steel}, PULL, 0.33, 0.3)
+        with pytest.warns(xc.XcrackWarning, match="front of crack 0 passes from 'one' into 'two'"):
+            steps = list(xc.grow(problem, laws, xc.max_hoop_stress, xc.Cycle(0.0, 1.0), da=0.05,
+                                 max_steps=6, response=response, integrator=integrator,
+                                 progress=False))  # fmt: skip
+        x = [float(step.corrected[0].points[:, 0].max()) for step in steps]
+        assert any(0.5 < each < 0.6 for each in x)
+        assert not any(abs(each - 0.5) < 0.2 / n for each in x)
+        exact = cycles(0.33, 0.5, 1e-3) + cycles(0.5, x[-1], 1e-4)
+        error.append(abs(steps[-1].cycles / exact - 1))
+    print(integrator, error)
+    assert error[-1] <= 5e-3
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["two", "graded"])
 def test_two_meshes_agree_along_a_front_in_materials_that_contract(kind):
     """With Poisson's ratio there is no exact value: K a cell and more from the corner."""

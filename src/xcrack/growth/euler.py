@@ -23,6 +23,7 @@ from xcrack.growth.interfaces import (
     interfaces_ahead,
     rates_behind,
     warn_of_passages,
+    whole_front_ahead,
 )
 from xcrack.growth.options import GrowthRule
 from xcrack.growth.rates import Rates, rates_by_law_of
@@ -53,7 +54,8 @@ def predict(rule: GrowthRule, step: Step) -> Plan:
     growth = stations.growth(score, largest)
     goes = growth >= _WAITS_BELOW[mesh.dim] * cell
     way = np.where(goes, growth, 0.0)
-    near = interfaces_ahead(rule, stations.x, way[:, None] * solves.direction[-1])
+    ahead = interfaces_ahead if mesh.dim == 2 else whole_front_ahead
+    near = ahead(rule, stations.x, way[:, None] * solves.direction[-1])
     if near is not None and (way > near.stop).any():  # a step ends before it, or behind
         reaches = way > near.stop
         largest *= float((near.goal[reaches] / way[reaches]).min())
@@ -257,6 +259,9 @@ def _followed_3d(rule: GrowthRule, last: Step, rates: Rates) -> tuple[float, Flo
             moved, old.front, shut, rest[stations.crack == c], new.x, reach
         )
         waits.append(np.nan_to_num(near))
+    across = fronts.cycles_of_passage(rule, last, rates)
+    if across is not None:
+        return across, np.concatenate(waits)
     sizes = (last.sizes, rates.problem.sizes)
     cycles = elapsed_3d(*sizes, last.da, last.law_rate, after)
     return cycles, np.concatenate(waits)

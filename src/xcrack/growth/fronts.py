@@ -35,6 +35,14 @@ from xcrack.growth.front_filter import (
     turning_of,
     without_noise,
 )
+from xcrack.growth.interfaces import (
+    cycles_across,
+    cycles_of_jump,
+    rates_in_set,
+    scene_of,
+    warn_of_passages,
+    whole_front_ahead,
+)
 from xcrack.growth.options import GrowthRule
 from xcrack.growth.rates import Rates, block_order, kinds_of
 from xcrack.growth.solves import SolveHistory
@@ -313,6 +321,14 @@ def predict(rule: GrowthRule, step: Step) -> Plan:
     growth = stations.growth(rate, largest)
     goes = growth >= WAITS_BELOW * cell
     way = _arcs(step, np.where(goes, growth, 0.0))
+    near = whole_front_ahead(rule, stations.x, _move(stations, _angle(stations, solves), way))
+    if near is not None and (way > near.stop).any():  # it ends before an interface, or behind
+        reaches = way > near.stop
+        share, passes = near.goal[reaches] / way[reaches], (near.goal > near.way)[reaches]
+        largest *= float(share[passes].max() if passes.any() else share.min())
+        growth = stations.growth(rate, largest)
+        goes = growth >= WAITS_BELOW * cell
+        way = _arcs(step, np.where(goes, growth, 0.0))
     plan = replace(
         plan,
         length=largest,
@@ -459,6 +475,9 @@ def correct(rule: GrowthRule, last: Step, rates: Rates, identities: Identities) 
         rate = rate_at_end(first_rate, marched[0], plan.cycles)
         share = plan.length / fastest * rate
         cycles, own = marched[1], share_left(rule) * beyond_trapezoid(marched[1], plan.cycles)
+    across = cycles_of_passage(rule, last, rates)
+    if across is not None:  # places stay where they are, a cell behind
+        cycles, share = across, None
     if np.isinf(rates.rate).any() or fastest == 0:
         share = None
     parts, zones = [], []
@@ -621,6 +640,44 @@ def _cycles(rule: GrowthRule, last: Step, rates: Rates) -> tuple[float, float]:
     return cycles, share_left(rule) * abs(cycles - trapezoid)
 
 
+def cycles_of_passage(rule: GrowthRule, last: Step, rates: Rates) -> float | None:
+    """Cycles of a step in which a front has passed an interface of materials; None elsewhere.
+
+    Of the place that drives: the others pass with it.
+    """
+    plan, (stations, solves) = plan_of(last), solves_of(last)
+    near, row = whole_front_ahead(rule, stations.x, plan.move), plan.tip
+    if near is None or not plan.arc[row] > near.way[row]:
+        return None
+    way, length = float(near.way[row]), float(plan.arc[row])
+    begin, end = float(solves.rate[-1].max()), float(rates.law_rate.max(initial=0.0))
+    if not 0 < end < np.inf:  # the run ends there
+        cycles = np.array([way, length - way]) / begin
+    elif near.is_smooth[row]:
+        here, there = (
+            float(rates_in_set(rule, problem, response, int(k)).max())
+            for problem, response, k in (
+                (rates.problem, rates.response, near.before[row]),
+                (*scene_of(rule, last), near.after[row]),
+            )
+        )
+        size = float(solves.scale[row])
+        after = rates.problem.sizes[int(stations.crack[row])]
+        unit = (after - size) / length  # of size, which the rates are powers of, over the advance
+        parts = cycles_across(
+            size, unit * way, unit * (length - way),
+            unit * np.array([begin, here]), unit * np.array([there, end]),
+        )  # fmt: skip
+        cycles = np.asarray(parts)
+    else:
+        exponent, power = rates.exponent(rule.law), float(near.power[row])
+        cycles = np.array(cycles_of_jump(solves, exponent, end, row, way, length - way, power))
+    at = np.full(len(near.way), np.nan)
+    at[row] = cycles[0]
+    warn_of_passages(rule, last, near, at)
+    return float(cycles.sum())
+
+
 def cycles_until(rule: GrowthRule, step: Step, part: float, after: float | None) -> float:
     """Cycles of a part of the advance after a step, in proportion to it."""
     del rule
@@ -780,6 +837,7 @@ __all__ = [
     "begin_at",
     "beyond_trapezoid",
     "correct",
+    "cycles_of_passage",
     "cycles_until",
     "ends_of",
     "front_lengths",

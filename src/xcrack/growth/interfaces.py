@@ -25,6 +25,7 @@ from xcrack.growth.uncertainty import best_K
 from xcrack.mesh.locate import cell_sizes
 from xcrack.model.elasticity import Elasticity
 from xcrack.model.material import Isotropic
+from xcrack.model.problem import Problem
 
 # Cells between an interface and the end of a step before or behind it: where K jumps, and where the
 # laws differ alone.
@@ -83,13 +84,13 @@ def interfaces_ahead(rule: GrowthRule, x: Floats, move: Floats) -> InterfacesAhe
     Parameters
     ----------
     rule : GrowthRule
-    x : (n, 2) array, length
+    x : (n, d) array, length
         Where the ends are.
-    move : (n, 2) array, length
+    move : (n, d) array, length
         How far they would come.
     """
     elasticity = rule.problem.elasticity
-    if len(elasticity.named) < 2 or x.shape[1] != 2:
+    if len(elasticity.named) < 2:
         return None
     mesh, kinds = rule.problem.mesh, _kinds(rule)
     one, other = mesh.facet_to_cell.T
@@ -131,6 +132,17 @@ def interfaces_ahead(rule: GrowthRule, x: Floats, move: Floats) -> InterfacesAhe
     return InterfacesAhead(way, behind, before, after, is_smooth, cell, gap, power)
 
 
+def whole_front_ahead(rule: GrowthRule, x: Floats, move: Floats) -> InterfacesAhead | None:
+    """The same of places along fronts that are all in one material, which they leave together.
+
+    A front that is in several already goes on with the law of each place.
+    """
+    near = interfaces_ahead(rule, x, move)
+    if near is None or len(np.unique(_kinds(rule)[near.before])) > 1:
+        return None
+    return near
+
+
 def _numbers_of_sets(rule: GrowthRule) -> Ints:
     """Number of the stiffness of each named set `(m,)`."""
     elasticity = rule.problem.elasticity
@@ -155,7 +167,18 @@ def _kinds(rule: GrowthRule) -> Ints:
 
 
 def _hits(facets: Floats, x: Floats, ahead: Floats, most: float) -> Floats:
-    """Lengths at which a straight way passes facets `(k, 2, 2)`, rising."""
+    """Lengths at which a straight way passes facets `(k, d, d)`, rising."""
+    if len(x) == 3:
+        one, two = facets[:, 1] - facets[:, 0], facets[:, 2] - facets[:, 0]
+        normal, gap = np.cross(one, two), facets[:, 0] - x
+        with np.errstate(divide="ignore", invalid="ignore"):
+            far = np.einsum("ki,ki->k", gap, normal) / (normal @ ahead)
+            place = far[:, None] * ahead - gap
+            size = np.einsum("ki,ki->k", normal, normal)
+            u = np.einsum("ki,ki->k", np.cross(place, two), normal) / size
+            v = np.einsum("ki,ki->k", np.cross(one, place), normal) / size
+        inside = (u >= -1e-9) & (v >= -1e-9) & (u + v <= 1 + 1e-9)
+        return np.unique(far[inside & (far > 0) & (far < most)])
     start, side = facets[:, 0], facets[:, 1] - facets[:, 0]
     gap, cross = start - x, ahead[0] * side[:, 1] - ahead[1] * side[:, 0]
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -382,10 +405,22 @@ def rates_behind(rule: GrowthRule, step: Step, near: InterfacesAhead) -> Floats:
     """Rates `(n,)` of the last solve by the laws of the materials behind interfaces."""
     if getattr(rule.law, "ratio", None) == "nominal":  # K without contact is not known any more
         return solves_of(step)[1].rate[-1]
-    response = Response(step.levels or rule.cycle.load_states, best_K(step.sif))
-    problem = replace(rule.problem, cracks=step.cracks)
+    problem, response = scene_of(rule, step)
     with collected_warnings([]):  # they were given at the solve
         return rates_by_law_of(rule, problem, response, near.after)
+
+
+def scene_of(rule: GrowthRule, step: Step) -> tuple[Problem, Response]:
+    """The scene of a step, and K of its load states."""
+    response = Response(step.levels or rule.cycle.load_states, best_K(step.sif))
+    return replace(rule.problem, cracks=step.cracks), response
+
+
+def rates_in_set(rule: GrowthRule, problem: Problem, response: Response, number: int) -> Floats:
+    """Rates at the stations of a solve `(n,)` by the law of one material."""
+    n = sum(len(sif.x) for sif in response.sif[0])
+    with collected_warnings([]):
+        return rates_by_law_of(rule, problem, response, np.full(n, number))
 
 
 def cycles_across(size: float, way: float, behind: float, own: Floats, after: Floats) -> Floats:
@@ -428,6 +463,9 @@ __all__ = [
     "mixed",
     "passage",
     "rates_behind",
+    "rates_in_set",
+    "scene_of",
     "singularity_at_interface",
     "warn_of_passages",
+    "whole_front_ahead",
 ]
