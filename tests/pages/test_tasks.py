@@ -91,8 +91,11 @@ def test_multiple_site_damage_with_link_up_and_residual_strength(tmp_path):
     rows = xc.residual_strength(run, nu=0.33, K_c=3000.0, yield_stress=350.0)
     xc.plot_strength(rows, file=tmp_path / "strength.png")
     xc.report(run, tmp_path / "msd.html", units=UNITS, strength=rows)
+    looks = xc.inspection(run, a_detect=9.0, factor=3)
     assert len(run.joins) == 1
     assert (np.diff(rows["factor"]) < 0).all()
+    assert looks.measure == "length"
+    assert 0 < 3 * looks.interval < run.life
 
 
 def test_weld_toe_with_residual_stress_under_full_reversal():
@@ -112,6 +115,57 @@ def test_weld_toe_with_residual_stress_under_full_reversal():
                       progress=False)  # fmt: skip
         lives[name] = xc.collect(run).life
     assert lives["weld"] < lives["none"]
+
+
+@pytest.mark.slow
+@pytest.mark.gmsh
+def test_a_lug_with_a_field_of_residual_stress(tmp_path):
+    """A field of another program, in a script and in a case file: the same K, below that without.
+
+    The field is that of a hole which was expanded: compression at its edge, in balance over the
+    width but for what the solution spreads.
+    """
+    pytest.importorskip("gmsh")
+    meshio = pytest.importorskip("meshio")
+    grid = xc.box((-40.0, -100.0), (40.0, 40.0), (60, 105))
+    r = np.maximum(np.linalg.norm(grid.points, axis=1), 8.0)
+    stress = np.zeros((grid.n_points, 9))
+    stress[:, 4] = -90.0 * np.exp(-(r - 8.0) / 3.0) + 20.0 * np.exp(-(((r - 15.0) / 3.0) ** 2))
+    points = np.column_stack([grid.points, np.zeros(len(r))])
+    meshio.Mesh(points, [("triangle", grid.cells)], {"S": stress}).write(tmp_path / "S.vtu")
+    # what the engineer writes
+    lug = xc.lug(W=40.0, D=16.0, a=3.0, force=800.0, size=4.0, size_near=0.8)
+    left = xc.initial_stress(xc.read_field(tmp_path / "S.vtu"))
+    metal = xc.material("7075-T651 plate, L-T", units="mm, MPa√mm").isotropic("stress")
+    K = [xc.stress_intensity(xc.solve(lug.problem(metal, loads=loads))).K_I[0]
+         for loads in (lug.loads, [*lug.loads, left])]  # fmt: skip
+    assert K[1] < 0.9 * K[0]
+    # or without Python
+    (tmp_path / "lug.toml").write_text(LUG, encoding="utf-8")
+    again = xc.solve(xc.read_case(tmp_path / "lug.toml").problem)
+    assert xc.stress_intensity(again).K_I[0] == K[1]
+
+
+LUG = """
+[units]
+length = "mm"
+force = "N"
+[specimen]
+kind = "lug"
+W = 40.0
+D = 16.0
+a = 3.0
+force = 800.0
+size = 4.0
+size_near = 0.8
+[material]
+kind = "metal"
+name = "7075-T651 plate, L-T"
+plane = "stress"
+[[loads]]
+kind = "initial_stress"
+f = { path = "S.vtu" }
+"""
 
 
 def test_a_deck_of_another_program_to_K(tmp_path):

@@ -181,8 +181,10 @@ def _problem(root: Table) -> Problem:
     elif body == "deck":
         deck = values.called_with(_without(table, _MORE_OF_MESH), read_deck)
         deck = replace(deck, mesh=_changed_mesh(table, deck.mesh))
+        scene |= _beside(deck, scene)
     else:
         specimen = values.value_of_table(table, values.SPECIMENS)
+        scene |= _beside(specimen, scene)
     if "material" not in scene and (body != "deck" or deck.material is None):
         root.refuse("", "the table [material] is missing: give it.")
     try:
@@ -193,6 +195,12 @@ def _problem(root: Table) -> Problem:
         return specimen.problem(**scene, **chosen)  # type: ignore[no-any-return]
     except XcrackError as error:
         (solving if chosen else root).wrap(error)
+
+
+def _beside(body: Any, scene: Mapping[str, Any]) -> dict[str, Any]:
+    """Supports and loads of a deck or specimen, and behind them those of the file."""
+    names = ("supports", "loads")
+    return {name: [*getattr(body, name), *scene[name]] for name in names if name in scene}
 
 
 def _without(table: Table, names: tuple[str, ...]) -> Table:
