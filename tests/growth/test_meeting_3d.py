@@ -208,3 +208,61 @@ def test_no_face_ahead_is_not_looked_at(monkeypatch):
     monkeypatch.setattr(joins_3d, "_advanced", never)
     problem = penny_before_a_face(10, face=0.85)
     assert len(list(grow(problem, da=0.05, max_steps=2))) == 2
+
+
+def arc_crack(inner, outer, gap, n=60):
+    """An annulus about the z-axis, open over an angle of twice `gap` (0: closed)."""
+    angle = np.linspace(gap, 2 * np.pi - gap, n + (gap > 0))[: n + (gap > 0)]
+    if gap == 0:
+        angle = np.linspace(0, 2 * np.pi, n + 1)[:-1]
+    radii = np.linspace(inner, outer, 5)
+    points = [(r * np.cos(a), r * np.sin(a), 0.03) for a in angle for r in radii]
+    rows = [(5 * i + j, 5 * i + j + 1, 5 * ((i + 1) % len(angle)) + j)
+            for i in range(n) for j in range(4)]  # fmt: skip
+    faces = [f for a, b, c in rows for f in ((a, b, c + 1), (a, c + 1, c))]
+    return xc.surface_crack(np.array(points), np.array(faces))
+
+
+def scene_of(crack, n):
+    mesh = xc.box((-1.2, -1.2, -0.7), (1.2, 1.2, 0.7), (n, n, 7 * n // 12))
+    return xc.Problem(
+        mesh, xc.Isotropic(E, NU), [crack], loads=loads(0.0)[:2], order=1, contact="off"
+    )
+
+
+def rising(history):
+    energy = np.array([step.solutions[-1].energy for step in history.steps])
+    assert (np.diff(energy) > 0).all(), energy
+    for step in history.steps:
+        for sif in step.sif[-1]:
+            assert np.isfinite(sif.K).all()
+
+
+def test_the_inner_front_of_an_annulus_closes():
+    """The ligament breaks, is an event, and a disc goes on."""
+    history = xc.collect(grow(scene_of(arc_crack(0.35, 0.6, 0.0), 14), da=0.1, max_steps=5))
+    assert len(history.steps) == 5, history.ended
+    (join,) = history.joins
+    assert join.cracks == (0, 0)
+    assert np.abs(join.point).max() < 0.1
+    assert "the ligament inside crack 0 breaks" in str(join)
+    fronts = [len(step.cracks[0].fronts) for step in history.steps]
+    assert fronts == sorted(fronts, reverse=True)
+    assert (fronts[0], fronts[-1]) == (2, 1)
+    rising(history)
+    # A disc of the same radius has the same K, to what its shape and the mesh leave.
+    last = history.steps[-1].sif[-1][0]
+    radius = np.linalg.norm(last.x[:, :2], axis=1).mean()
+    disc = xc.penny_crack((0, 0, 0.03), (0, 0, 1), radius)
+    K = xc.stress_intensity(xc.solve(scene_of(disc, 14)), 0).K_I.mean()
+    assert last.K_I.mean() == pytest.approx(K, rel=0.05)
+
+
+def test_the_ends_of_an_arc_meet():
+    """A C becomes an annulus, and that a disc."""
+    history = xc.collect(grow(scene_of(arc_crack(0.33, 0.57, 0.35), 18), da=0.08, max_steps=5))
+    assert len(history.steps) == 5, history.ended
+    assert [join.cracks for join in history.joins] == [(0, 0)] * 2
+    fronts = [len(step.cracks[0].fronts) for step in history.steps]
+    assert (fronts[0], max(fronts), fronts[-1]) == (1, 2, 1)
+    rising(history)

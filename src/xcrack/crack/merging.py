@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from xcrack.base.arrays import Bools, Floats, Ints, at
 from xcrack.base.errors import GeometryError
@@ -25,6 +26,7 @@ OFFSET = 0.5  # of a cell: one crack may lie as far beside the surface of the ot
 _NEAR = 1.1  # cells between two fronts of a crack below which they join
 _WIDE = 2.0  # cells between two ends of fronts behind a hole below which they join
 _FACES = 0.3  # cosine between the direction ahead of a front and another one that it meets
+_STRAIGHT = 0.8  # cosine, or share of a radius, from which on fronts face each other
 _LOOSE = 3.0  # radii from the end of an open front within which the other one ends too
 
 
@@ -138,6 +140,119 @@ def merged_crack(one: Crack, other: Crack, radius: float, size: float) -> Crack:
 
     facing = (front_frames(one), front_frames(shifted))
     return _with_gap_closed(both, facing, (), tuple(map(blocked, trees)), radius, size)
+
+
+@dataclass(frozen=True, eq=False)
+class OwnGap:
+    """Where fronts of one crack come to face each other: width, size of the cell, place."""
+
+    width: float
+    size: float
+    x: Floats
+
+
+def own_gap(crack: Crack, body: Body, reach: float) -> OwnGap | None:
+    """Where closed fronts of one crack that face each other are nearest; None if nowhere.
+
+    Parameters
+    ----------
+    crack : Crack
+        With fronts.
+    body : Body
+    reach : float
+        In cells; farther apart they do not count.
+    """
+    fronts = [front for front in front_frames(crack) if front.closed]  # open ones: `joined_fronts`
+    if not fronts:
+        return None
+    x = np.concatenate([front.x for front in fronts])
+    t, n = np.concatenate([front.frame[:, :2] for front in fronts]).transpose(1, 0, 2)
+    size = body.cell_size(x)
+    pairs = cKDTree(x).query_pairs(reach * float(size.max()), output_type="ndarray")
+    way = x[pairs[:, 1]] - x[pairs[:, 0]]
+    width = np.linalg.norm(way, axis=1)
+    faces = np.einsum("ij,ij->i", way, t[pairs[:, 0]]) > _STRAIGHT * width
+    faces &= np.einsum("ij,ij->i", way, t[pairs[:, 1]]) < -_STRAIGHT * width
+    faces &= np.einsum("ij,ij->i", n[pairs[:, 0]], n[pairs[:, 1]]) > _ANGLE
+    faces &= width < reach * size[pairs[:, 0]]
+    pairs, width = pairs[faces], width[faces]
+    inside = body.contains(x[pairs].mean(axis=1)) if len(pairs) else np.zeros(0, dtype=bool)
+    if not inside.any():
+        return None
+    k = int(np.argmin(np.where(inside, width, np.inf)))
+    return OwnGap(float(width[k]), float(size[pairs[k, 0]]), x[pairs[k]].mean(axis=0))
+
+
+def with_own_gap_closed(crack: Crack, x: Floats, radius: float, size: float) -> Crack:
+    """A crack whose fronts face each other near a place, with faces in the gap between.
+
+    Parameters
+    ----------
+    crack : Crack
+        With fronts.
+    x : (3,) array, length
+    radius : float, length
+        Of the disc that closes the gap.
+    size : float, length
+        Spacing of new front points.
+
+    Raises
+    ------
+    GeometryError
+        Not two pieces of fronts face each other there, or the gap cannot be closed.
+    """
+    tree, parts = triangle_tree(crack.points, crack.faces), []
+    fronts = front_frames(crack)
+    for f, front in enumerate(fronts):
+        centre = front.x + radius * front.frame[:, 0]
+        flag = closest_in(tree, centre, radius).distance < _STRAIGHT * radius
+        flag |= np.roll(flag, 1) & np.roll(flag, -1)  # one that its neighbours enclose
+        flag &= np.linalg.norm(front.x - x, axis=1) < _LOOSE * radius
+        runs = runs_of(flag) if front.closed else open_runs(flag)
+        parts += [(f, run) for run in runs if len(run)]
+    parts.sort(key=lambda part: float(np.linalg.norm(fronts[part[0]].x[part[1]] - x, axis=1).min()))
+    if len(parts) > 2 and _faces(fronts, *parts[:2]):
+        parts = parts[:2]
+    if len(parts) != 2:
+        raise GeometryError(
+            f"{len(parts)} pieces of the fronts of one crack face each other near {at(x)}: the "
+            "ligament between them cannot be closed. End growth before, or give what has joined."
+        )
+
+    def blocked(k: int) -> Callable[[Front], Bools]:
+        f, run = parts[k]
+
+        def flags(front: Front) -> Bools:
+            flag = np.zeros(len(front.x), dtype=bool)
+            flag[run] = front is fronts[f]
+            return flag
+
+        return flags
+
+    pair = ([fronts[parts[0][0]]], [fronts[parts[1][0]]])
+    rest = [front for f, front in enumerate(fronts) if f not in (parts[0][0], parts[1][0])]
+    bare = Crack(crack.points, crack.faces)
+    closed = _with_gap_closed(bare, pair, rest, (blocked(0), blocked(1)), radius, size)
+    return replace(closed, ends_on=crack.ends_on)
+
+
+def _faces(fronts: Sequence[Front], one: tuple[int, Ints], other: tuple[int, Ints]) -> bool:
+    """Whether two pieces of fronts look towards each other."""
+    (f, run), (g, also) = one, other
+    ahead, back = fronts[f].frame[run, 0].mean(axis=0), fronts[g].frame[also, 0].mean(axis=0)
+    return bool(ahead @ back < 0)
+
+
+def without_inner_front(crack: Crack, number: int) -> tuple[Crack, Floats]:
+    """A crack whose closed front around a ligament is gone, filled up to its middle, and that."""
+    front = (crack.fronts or ())[number]
+    centre = crack.points[front[:-1]].mean(axis=0)
+    middle = np.full(len(front) - 1, len(crack.points))
+    fan = np.stack([front[:-1], front[1:], middle], axis=1)
+    fronts = tuple(own for f, own in enumerate(crack.fronts or ()) if f != number)
+    points = np.concatenate([crack.points, centre[None]])
+    faces = np.concatenate([crack.faces, fan])
+    return Crack(points, faces, None, fronts, crack.ends_on), centre
 
 
 def through_holes(
@@ -592,4 +707,15 @@ def _chains(following: dict[int, int]) -> list[Ints]:
     return sorted(result, key=lambda line: int(line.min()))
 
 
-__all__ = ["OFFSET", "FrontGap", "gap_between", "joined_fronts", "merged_crack", "turned_crack"]
+__all__ = [
+    "OFFSET",
+    "FrontGap",
+    "OwnGap",
+    "gap_between",
+    "joined_fronts",
+    "merged_crack",
+    "own_gap",
+    "turned_crack",
+    "with_own_gap_closed",
+    "without_inner_front",
+]

@@ -10,7 +10,7 @@ from scipy.special import exprel
 from xcrack.base.arrays import Floats, at
 from xcrack.base.errors import GeometryError
 from xcrack.crack.crack import Crack
-from xcrack.crack.fronts import closed_fronts
+from xcrack.crack.fronts import closed_fronts, front_frames
 from xcrack.crack.junctions_3d import (
     FaceAhead,
     face_ahead,
@@ -20,7 +20,17 @@ from xcrack.crack.junctions_3d import (
     renumbered_arms,
 )
 from xcrack.crack.measures import crack_size
-from xcrack.crack.merging import OFFSET, FrontGap, gap_between, merged_crack, turned_crack
+from xcrack.crack.merging import (
+    OFFSET,
+    FrontGap,
+    OwnGap,
+    gap_between,
+    merged_crack,
+    own_gap,
+    turned_crack,
+    with_own_gap_closed,
+    without_inner_front,
+)
 from xcrack.crack.placing_3d import meeting_points, place_arm
 from xcrack.growth import euler, fronts
 from xcrack.growth.corrected import Corrected
@@ -33,6 +43,8 @@ from xcrack.growth.step import Join, Plan, Step, StepError, plan_of, solves_of
 from xcrack.mesh.locate import Body, cell_sizes
 from xcrack.mesh.mesh import Mesh
 
+_LIGAMENT = 0.9  # cells: radius of a ligament inside a front below which it breaks
+_OWN = "of the same crack"  # what advancing says of a front that meets its own crack
 _NEAR = 1.1  # cells between fronts below which they join: closer ones cannot be solved
 _BESIDE = 1.0  # cells that fronts may pass beside each other at the end of the whole advance
 _AHEAD = 1.8  # legs of cells before a face in which no front can be solved: it is led through
@@ -64,9 +76,12 @@ def with_joins(rule: GrowthRule, step: Step, plan: Plan) -> Plan:
     GeometryError
         The gap between two fronts has a shape that cannot be closed.
     """
+    body = Body.of(rule.problem.mesh)
+    own = _with_ligament_broken(rule, step, plan, body)
+    if own is not None or plan.limit:
+        return own or plan
     if len(plan.cracks) < 2:
         return plan
-    body = Body.of(rule.problem.mesh)
     close = _close(plan.cracks, body, _BESIDE)
     faces = _faces_met(plan.cracks, body)
     if not close and not faces:
@@ -106,6 +121,91 @@ def with_joins(rule: GrowthRule, step: Step, plan: Plan) -> Plan:
         plan, part=way, cycles=cycles, error=unsure, cracks=tuple(now), apart=apart,
         joins=tuple(joins),
     )  # fmt: skip
+
+
+# Fronts of one crack: those that close around a ligament, and those that come to face each other.
+
+
+def _with_ligament_broken(rule: GrowthRule, step: Step, plan: Plan, body: Body) -> Plan | None:
+    """A plan in which a ligament inside one crack breaks within its advance; None without one."""
+    inner = _inner_front(step, plan, body)
+    if inner is None:
+        facing = _facing_share(rule, step, plan, body)
+        if facing is None:
+            return None
+        c, way, gap = facing
+        apart = _advanced(rule, step, plan, way)
+        crack = with_own_gap_closed(apart[c], gap.x, _RADIUS * gap.size, _SPACING * gap.size)
+        x, time = gap.x, way
+    else:
+        c, f, time = inner
+        stations = solves_of(step)[0]
+        moves = (stations.crack != c) | (stations.front != f)
+        arc = np.where(moves, time * plan.arc, 0.0)
+        apart = _INTEGRATORS[rule.integrator].advanced(rule, step, arc)
+        crack, x = without_inner_front(apart[c], f)
+    now = [crack if k == c else other for k, other in enumerate(apart)]
+    cycles = time * plan.cycles
+    join = Join(step.index + 1, step.cycles + cycles, tuple(x.tolist()), (c, c))
+    return replace(
+        plan, part=min(time, 1.0), cycles=cycles, error=UNKNOWN[3] * cycles, cracks=tuple(now),
+        apart=tuple(apart), joins=(join,), limit="", refusal="",
+    )  # fmt: skip
+
+
+def _inner_front(step: Step, plan: Plan, body: Body) -> tuple[int, int, float] | None:
+    """A closed front that will have closed around a ligament: crack, front, share of the advance.
+
+    Where less than a cell and a half would be left of its radius the ligament breaks.
+    """
+    stations = solves_of(step)[0]
+    for c, crack in enumerate(step.corrected):
+        for f, front in enumerate(front_frames(crack)):
+            if not front.closed or len(crack.fronts or ()) < 2:
+                continue
+            away = front.x.mean(axis=0) - front.x
+            if np.einsum("ij,ij->i", away, front.frame[:, 0]).mean() <= 0:
+                continue
+            rows = (stations.crack == c) & (stations.front == f)
+            radius = float(np.linalg.norm(away, axis=1).max())
+            way = float(plan.arc[rows].mean()) if rows.any() else 0.0
+            cell = float(body.cell_size(front.x).mean())
+            if radius - way < _LIGAMENT * cell and way > 0:
+                return c, f, min(radius / way, max(1.0, cell / plan.largest))
+    return None
+
+
+def _facing_share(
+    rule: GrowthRule, step: Step, plan: Plan, body: Body
+) -> tuple[int, float, OwnGap] | None:
+    """Crack whose fronts come to face each other, the share of the advance, and the gap then."""
+
+    def nearest_gap(share: float) -> tuple[int, OwnGap] | None:
+        now = plan.cracks if share == 1.0 else _advanced(rule, step, plan, share)
+        gaps = [(c, own_gap(crack, body, _NEAR)) for c, crack in enumerate(now)]
+        found = [(c, gap) for c, gap in gaps if gap is not None]
+        return min(found, key=lambda each: each[1].width, default=None)
+
+    if not plan.limit:
+        met = nearest_gap(1.0)
+        if met is None:
+            return None
+        if met[1].width > _LEFT * met[1].size:
+            return met[0], 1.0, met[1]
+    elif _OWN not in plan.refusal:
+        return None
+    low, high = 0.0, 1.0
+    for _ in range(_TRIES):
+        share = 0.5 * (low + high)
+        try:
+            met = nearest_gap(share)
+        except GeometryError:
+            high = share
+            continue
+        if met is not None and met[1].width > _LEFT * met[1].size:
+            return met[0], share, met[1]
+        low, high = (low, share) if met is not None else (share, high)
+    return None
 
 
 def _advanced(rule: GrowthRule, step: Step, plan: Plan, part: float) -> list[Crack]:

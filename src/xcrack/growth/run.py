@@ -568,7 +568,7 @@ def _planned(rule: GrowthRule, step: Step) -> Step:
     """A step with the plan of what comes after it."""
     plan = integrator_of(rule).predict(rule, step)
     step = replace(step, plan=plan)
-    if plan.limit:
+    if plan.limit and (plan.limit != "geometry" or rule.problem.mesh.dim == 2):
         return step
     try:
         return replace(step, plan=with_joins(rule, step, plan))

@@ -76,6 +76,8 @@ class Arrival(Event):
 class Join(Event):
     """Two cracks that became one, or a crack that runs into another one and ends there.
 
+    Or a ligament inside one crack that breaks: both numbers are that of the crack.
+
     Attributes
     ----------
     step : int
@@ -117,6 +119,8 @@ class Join(Event):
     def __str__(self) -> str:
         first, second = self.cracks
         place = coordinates(self.point)
+        if first == second:
+            return f"the ligament inside crack {first} breaks at {place}, N = {self.N:.6g}"
         return f"cracks {first} and {second} join at {place}, N = {self.N:.6g}"
 
 
