@@ -84,17 +84,17 @@ class FrontMaterials:
     def moduli(self, s: Floats) -> tuple[Floats, Floats]:
         """E' and Poisson's ratio at parameters `(q,)`."""
         E_prime, nu = np.empty(len(s)), np.empty(len(s))
-        for material, rows, ratio in self.parts(s):
-            E_prime[rows] = material.E_prime * (1.0 if ratio is None else ratio[0])
-            nu[rows] = material.nu
+        for reference, rows, ratio in self.parts(s):
+            E_prime[rows] = reference.E_prime * (1.0 if ratio is None else ratio[0])
+            nu[rows] = reference.nu
         return E_prime, nu
 
     def factors(self, s: Floats) -> Floats:
         """K over that of the first reference for the same displacements `(q, 3)`."""
         first, result = self.references[0], np.ones((len(s), 3))
-        for material, rows, _ in self.parts(s):
-            result[rows, :2] = material.E_prime / first.E_prime
-            result[rows, 2] = material.mu / first.mu
+        for reference, rows, _ in self.parts(s):
+            result[rows, :2] = reference.E_prime / first.E_prime
+            result[rows, 2] = reference.mu / first.mu
         return result
 
     def beside_changes(self, s: Floats, size: float) -> tuple[Floats, Bools]:
