@@ -18,10 +18,12 @@ SCENES = {  # what makes the problem of an example, from its names
     "compressed_crack": lambda given: given["plate"](0.3),
     "inclusion": lambda given: given["scene"](1 / 8),
     "bimetal": lambda given: given["strip"](6),
+    "bonded_patch": lambda given: given["scene"]([xc.line_crack([(-10.0, 0.0), (10.0, 0.0)])]),
+    "flaw_campaign": lambda given: given["flawed"](0, 0.0, 1.0),
 }
 LAST = {"compact_tension": "specimen", "edge_crack_growth": "plate", "two_holes": "stretched",
         "link_up": "problem", "compressed_crack": "plate", "inclusion": "scene",
-        "bimetal": "strip"}  # fmt: skip
+        "bimetal": "strip", "bonded_patch": "scene", "flaw_campaign": "flawed"}  # fmt: skip
 
 
 def names_of(example: str) -> dict:

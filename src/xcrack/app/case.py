@@ -1,11 +1,13 @@
 """A case file read: problem, load states, growth, what is made of it, where the results go."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import partial
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
+
+import numpy as np
 
 from xcrack.adaptivity.adapt import adapt
 from xcrack.analysis.solve import solve
@@ -14,6 +16,7 @@ from xcrack.app.case_assessment import inspection_of, life_of, strength_of
 from xcrack.app.case_histories import load_states, loading, retardation_of
 from xcrack.app.case_tables import Table, read_tables
 from xcrack.base.arguments import FileName, arguments_of, check_arguments
+from xcrack.base.arrays import Bools, Floats
 from xcrack.base.checks import value_text
 from xcrack.base.errors import ProblemError, XcrackError
 from xcrack.base.units import LENGTH
@@ -40,6 +43,7 @@ _SOLVING = ("error", "solver", "tolerance", "max_unknowns")  # of solve and adap
 _TABLES = ("law", "criterion", "cycle", "spectrum", "retardation", "link_up")  # of growth
 _OUTPUT = ("folder", "pictures", "warp", "keep_solutions")
 _METHODS = ("contact_method", "tip_basis", "level_sets")  # of numerics, to compare with
+_REST = "rest"  # of the cells: those in no box
 _FUNCTIONS = ("response",)  # options of growth that a script alone can give
 _SOLVERS = {"pardiso": pardiso}
 
@@ -225,13 +229,24 @@ def _changed_mesh(table: Table, mesh: Mesh) -> Mesh:
     if "cell_sets" in table:
         boxes = table.table("cell_sets")
         try:
-            mesh = mesh.with_cell_sets({
+            inside = {
                 name: selector(boxes.value(name, LENGTH), mesh.dim, f"cell set {name!r}")
-                for name in boxes.content
-            })  # fmt: skip
+                for name, box in boxes.content.items()
+                if box != _REST
+            }
+            others = list(inside.values())
+            for name in boxes.content:
+                if name not in inside:
+                    inside[name] = partial(_beside_all, others)
+            mesh = mesh.with_cell_sets(inside)
         except XcrackError as error:
             boxes.wrap(error)
     return mesh
+
+
+def _beside_all(others: Sequence[Callable[[Floats], Bools]], x: Floats) -> Bools:
+    """Points that are in none of other parts."""
+    return ~np.any([is_inside(x) for is_inside in others], axis=0)
 
 
 def _material(table: Table) -> Material:
