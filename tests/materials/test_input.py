@@ -178,6 +178,42 @@ def test_materials_by_set_in_a_case_file(tmp_path):
         xc.read_case(path)
 
 
+GROWTH = """
+[growth]
+da = 0.05
+[growth.law.one]
+kind = "paris"
+C = 1e-3
+m = 3.0
+[growth.law.two]
+kind = "paris"
+C = 1e-4
+m = 3.0
+[growth.spectrum]
+factors = [0.0, 1.0, 0.0, 1.5]
+[growth.retardation.one]
+kind = "wheeler"
+w = 1.5
+zone = { sigma_y = 40.0, beta = 2 }
+[growth.retardation.two]
+kind = "wheeler"
+w = 1.2
+zone = { sigma_y = 25.0, beta = 2 }
+"""
+
+
+def test_laws_and_retardation_by_set_in_a_case_file(tmp_path):
+    xc.write_mesh(tmp_path / "mesh.msh", scenes.square(6))
+    path = tmp_path / "case.toml"
+    path.write_text(CASE + GROWTH)
+    growth = xc.read_case(path).growth
+    assert dict(growth["law"]) == {"one": xc.paris(1e-3, 3.0), "two": xc.paris(1e-4, 3.0)}
+    assert dict(growth["retardation"]) == {
+        "one": xc.wheeler(1.5, xc.plastic_zone(40.0, beta=2)),
+        "two": xc.wheeler(1.2, xc.plastic_zone(25.0, beta=2)),
+    }
+
+
 def test_growth_runs_are_resumed(tmp_path):
     problem = scenes.edge_crack(14, 0.3, 4.0)
     law, cycle = xc.paris(1e-3, 3.0), xc.Cycle(0.0, 1.0)
