@@ -15,6 +15,7 @@ from xcrack.fatigue.retardation import BlockCycles, OverloadZones
 from xcrack.growth.solves import SolveHistory
 from xcrack.growth.stations import GrowthStations
 from xcrack.growth.step import Arrival, Join, Plan, RunState, StepControl, StepError
+from xcrack.growth.validity import Validity
 from xcrack.linalg.engine import SlipField
 from xcrack.sif.sif import SIF, KErrors, SurfaceEnd
 
@@ -41,6 +42,8 @@ _STEP: tuple[Row, ...] = (
     ("levels", "(s,)", "Factors of the load states of a spectrum of factors."),
     ("sizes", "(cracks,), length", "Length of each crack inside the body; in 3D its area over the "
      "length of its fronts."),
+    ("load_factor", "float, optional", "On all loads beside the `states`, where they change as the "
+     "crack grows; K has it. Missing: 1."),
     ("warnings", "(w,), text", "Messages of the warnings; missing: not known."),
     ("identity_crack", "(cracks,), int", "Number that each crack had at first."),
     ("identity_end", "(ends,), int", "Identity of each tip or front."),
@@ -142,6 +145,11 @@ def array_names() -> dict[str, list[Row]]:
                 "How far each station may be from where steps of no length lead.",
             ),
             *_rows(StepError, "error_", ("place",)),
+        ],
+        "How far linear elasticity holds, with a yield stress or a toughness": [
+            *_rows(Validity, "validity_", ("places",)),
+            ("validity_number", "(k,), text", "Which of these numbers have a place."),
+            ("validity_place", "(k,), text", "Where each of them is largest."),
         ],
         "What happened since the step before": [
             *_rows(Arrival, "arrival_", (), "each "),

@@ -231,6 +231,20 @@ def test_units_are_those_of_the_tables():
     assert Units("m", "MN").number("1 MPa", STRESS) == pytest.approx(1.0, rel=1e-12)
 
 
+def test_loads_that_follow_the_crack_are_a_table_with_units(tmp_path):
+    """In the unit of the model: a K in MPa√m is 31.6 times as large in MPa√mm."""
+    numbers = 'K = "20 MPa*sqrt(m)", gradient = -0.08, a0 = "5 mm"'
+    falling = f'load_program = {{ kind = "K_gradient", {numbers} }}\n'
+    program = xc.read_case(written(tmp_path, GROWTH + falling)).growth["load_program"]
+    assert program.K == pytest.approx(20.0 * np.sqrt(1000.0))
+    assert (program.gradient, program.a0) == (-0.08, 5.0)
+    shed = 'load_program = { kind = "load_over_size", function = [[5.0, 1.0], [20.0, 0.5]] }\n'
+    program = xc.read_case(written(tmp_path, GROWTH + shed)).growth["load_program"]
+    assert program.factors(np.array([12.5]), None, None) == pytest.approx([0.75])
+    with pytest.raises(xc.ProblemError, match="load_over_size"):
+        xc.read_case(written(tmp_path, GROWTH + 'load_program = { kind = "shed" }\n'))
+
+
 def test_zones_of_link_up_are_a_table_with_units(tmp_path):
     zone = 'link_up = { sigma_y = "0.345 GPa", beta = 2 }\n'
     case = xc.read_case(written(tmp_path, GROWTH + zone))

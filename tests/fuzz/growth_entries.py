@@ -153,6 +153,9 @@ GROW = {
     "integrator": arg(Word(words=("pec", "euler")), "pec", "euler"),
     "threshold": arg(Number(least=0), 0.0, 0.1),
     "retardation": arg(Seen(rule=lambda v: v is None), None),
+    "load_program": arg(
+        Of(optional=True, type=xc.LoadProgram), None, xc.load_over_size([(0.0, 1.0), (9.0, 0.9)])
+    ),
     "K_c": arg(Number(optional=True, above=0), None, 1e3),
     "link_up": arg(Called(optional=True), None, xc.plastic_zone(400.0, 2)),
     "stop_at_interface": arg(Flag(), False, True),
@@ -199,6 +202,9 @@ RESUME = {
     "progress": arg(Flag(also=(Word(words=("always",)),)), False),
     "K_c": arg(Number(optional=True, above=0), None, 1e3),
     "retardation": arg(Seen(rule=lambda v: v is None), None),
+    "load_program": arg(
+        Of(optional=True, type=xc.LoadProgram), None, xc.load_over_size([(0.0, 1.0), (9.0, 0.9)])
+    ),
     "link_up": arg(Called(optional=True), None, xc.plastic_zone(400.0, 2)),
     "stop_at_interface": arg(Flag(), False, True),
     "max_steps": arg(Whole(least=1, rule=lambda v: v < 3 or None, far=2), 2),
@@ -296,6 +302,7 @@ ENTRIES = [
                 Late(lambda: [scenes.solution()]),
             ),
             "reuse": arg(Of(type=SolverState), SolverState()),
+            "load_factor": arg(Number(above=0), 1.0, 2.0),
         },
     ),
     Entry(
@@ -351,12 +358,13 @@ ENTRIES = [
             "law_rate": arg(Seen(rule=_no_rows_or_one), (), [[0.1]]),
             "R_range": arg(Seen(rule=_no_rows_or_one), (), [[[0.0, 0.5]]]),
             "sizes": arg(Numbers((None,)), (), [1.0]),
+            "load_factor": arg(Number(above=0), 1.0, 0.5),
             "control": arg(Of(type=StepControl), StepControl()),
             **{
                 name: arg(Seen(rule=lambda v: v is None), None)
                 for name in (
                     *("error", "identities", "stations", "solves", "zones", "earlier_zones"),
-                    *("plan", "run"),
+                    *("plan", "run", "validity"),
                 )
             },
             "warnings": arg(ListOf(item=Word(), optional=True), None, ["a domain is clipped"]),

@@ -62,6 +62,7 @@ RUN = arg(
 ANY = Numbers(rule=lambda x: True if x.ndim == 0 and abs(x) < 15 else None)
 ZONE = xc.plastic_zone(400.0, 2)
 POSITIVE = arg(Number(above=0, far=1e4), 1.0, 2)
+FOLLOWS = arg(Seen(rule=lambda v: True if callable(v) else None), lambda a: 1.0 + 0.0 * a)
 SPECTRUM = xc.Spectrum([0.0, 1.0, 0.4, 0.6])
 FLIGHTS = xc.History(
     tuple(dataclasses.replace(step, levels=(0.0, 1.0)) for step in HISTORY.steps), "max_steps"
@@ -193,6 +194,15 @@ ENTRIES = [
         },
     ),
     Entry("plastic_zone", xc.plastic_zone, {"sigma_y": POSITIVE, "beta": POSITIVE}),
+    *(
+        Entry(name, getattr(xc, name), {"function": FOLLOWS})
+        for name in ("load_over_size", "load_over_cycles", "K_over_size")
+    ),
+    Entry(
+        "K_gradient",
+        xc.K_gradient,
+        {"K": POSITIVE, "gradient": arg(Number(), -0.08, 0.0), "a0": arg(Number(), 0.0, 5.0)},
+    ),
     Entry("plastic_zone", lambda K: ZONE(K), {"K": arg(Numbers(), 30.0)}),
     Entry("wheeler", xc.wheeler, {"w": POSITIVE, "zone": arg(Of(type=xc.plastic_zone), ZONE)}),
     Entry(

@@ -19,7 +19,7 @@ _EXEMPT = {
         "raised by xcrack; its arguments are those of every exception",
     ),
     **dict.fromkeys(
-        ("GrowthLaw", "Closure", "Threshold", "Load", "Material"),
+        ("GrowthLaw", "Closure", "Threshold", "Load", "LoadProgram", "Material"),
         "base classes of what users define: test_new_kinds, test_new_material",
     ),
     "Deck": "made by read_deck; its problem(...) is called in that entry",
@@ -38,6 +38,8 @@ _CALLED_BY_XCRACK = {
     "stress_across",
     "thermal_stress",
     "displacement_at",
+    "factors",  # of loads that follow the crack
+    "scaled",  # K and solutions, by these
     *(name for kind in (Load, Condition, GrowthLaw, Threshold) for name in vars(kind)),
 }
 _MADE_BY_XCRACK = ("Solution",)  # by solve, from parts that users do not have

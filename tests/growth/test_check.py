@@ -163,6 +163,26 @@ def test_a_place_of_a_front_has_the_ligament_up_to_the_other_side():
     assert np.isnan(known.of_section)
 
 
+def test_a_table_says_how_far_elasticity_holds(tmp_path):
+    """Irwin's zone (K / yield)² / 6π over the crack; a run that is read from disk knows it."""
+    material = steel(yield_stress=400.0, K_c=1500.0)
+    steps = xc.grow(scene(material), LAW, xc.max_hoop_stress, CYCLE, da=1.5, max_steps=3)
+    history = xc.collect(steps, tmp_path / "run")
+    table = history.table()
+    K = np.hypot(table["K_I_max"], table["K_II_max"])
+    zone = (K / 400.0) ** 2 / (6 * np.pi)
+    assert table["zone_of_crack"] == pytest.approx(zone / table["a"], rel=1e-3)  # of K_eq
+    assert table["zone_of_ligament"] == pytest.approx(zone / (20 - table["x"]), rel=2e-3)
+    assert table["K_of_K_c"] == pytest.approx(K / 1500.0, rel=1e-3)
+    assert (np.diff(table["section"]) > 0).all()
+    stored = xc.load(tmp_path / "run")
+    for name in ("zone_of_crack", "zone_of_ligament", "section", "K_of_K_c"):
+        np.testing.assert_array_equal(stored.table()[name], table[name])
+    assert stored.steps[1].validity.places == history.steps[1].validity.places
+    plain = xc.grow(scene(), LAW, xc.max_hoop_stress, CYCLE, da=1.5, max_steps=1)
+    assert "K_of_K_c" not in xc.collect(plain).table().dtype.names
+
+
 def test_life_says_from_when_elasticity_does_not_hold():
     problem = scene(steel(yield_stress=300.0))
     steps = xc.grow(problem, LAW, xc.max_hoop_stress, CYCLE, da=3.0, max_steps=4, progress=False)

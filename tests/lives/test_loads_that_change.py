@@ -108,7 +108,7 @@ def test_loads_that_K_does_not_follow_are_refused_in_words():
         ({"load": 3.0}, "cannot be called"),
         ({"load": lambda a: -a}, "not positive"),
         ({"load": lambda a: a[:2]}, "one value for each"),
-        ({"K_max": lambda a: np.nan * a}, "K_max"),
+        ({"K_max": lambda a: np.nan * a}, "must be finite"),
     ],
 )
 def test_programs_that_do_not_fit_are_refused_in_words(formula, given, says):

@@ -29,6 +29,7 @@ NAMES = [
     "Cycle", "History", "Step", "collect", "elber", "equivalent_K", "grow", "max_hoop_stress",
     "mean_reference", "paris", "resume", "walker", "weighted_angle", "cycles_between", "load",
     "draw_fronts", "Join", "Response", "respond", "check",
+    "K_gradient", "K_over_size", "load_over_cycles", "load_over_size",
     # laws
     "el_haddad", "forman", "hartman_schijve", "klesnil_lukas", "law", "linear_closure", "nasgro",
     "nasgro_K_c", "nasgro3_threshold", "nasgro4_threshold", "newman_closure", "piecewise",
@@ -38,7 +39,7 @@ NAMES = [
     # verification, reports, files of scenes
     "verify", "validate", "report", "read_case", "run", "sweep", "info", "demo", "convert_mesh",
     # what users derive from
-    "Closure", "GrowthLaw", "Load", "Material", "Threshold",
+    "Closure", "GrowthLaw", "Load", "LoadProgram", "Material", "Threshold",
     # campaigns
     "campaign", "grid",
     # lives

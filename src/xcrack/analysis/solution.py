@@ -122,6 +122,33 @@ class Solution:
         """Scale of the loads, but for steady ones, and of the displacements of supports."""
         return self.acting.factor
 
+    def scaled(self, factor: float) -> "Solution":
+        """The solution under loads times a factor, where all is in proportion to them."""
+        factor = float(numbers(factor, "scaled: factor", ()))
+        acting, level = self.acting, 1.0 if self.state is None else self.state
+        if not isinstance(level, Real) or any(load.is_steady for load in self.loads):
+            raise ProblemError("only a solution of a factor on loads that are not steady scales.")
+        contact = []
+        for each in self.contact:
+            values = {} if each is None else {
+                name: lock(factor * getattr(each, name))
+                for name in ("pressure", "gap", "shear", "slip")
+                if getattr(each, name) is not None
+            }  # fmt: skip
+            contact.append(None if each is None else replace(each, **values))
+        return replace(
+            self,
+            state=factor * float(level),
+            acting=LoadState(
+                acting.loads, tuple(factor * f for f in acting.factors), factor * acting.factor
+            ),
+            u=lock(factor * self.u),
+            contact=tuple(contact),
+            energy=factor**2 * self.energy,
+            dissipated=factor**2 * self.dissipated,
+            factored=None,
+        )
+
     def __repr__(self) -> str:
         return f"Solution(state={self.state!r}, n_dof={self.n_dof}, energy={self.energy:.6g})"
 

@@ -21,6 +21,7 @@ from xcrack.base.checks import value_text
 from xcrack.base.errors import ProblemError, XcrackError
 from xcrack.base.units import LENGTH
 from xcrack.fatigue.law import GrowthLaw
+from xcrack.fatigue.load_program import LoadProgram
 from xcrack.fatigue.retardation import plastic_zone
 from xcrack.growth.options import GrowthOptions, GrowthRule
 from xcrack.linalg.direct import pardiso
@@ -40,7 +41,15 @@ _SECTIONS = ("title", "units", *_BODIES, "material", "cracks", "supports", "load
 _MORE_OF_MESH = ("refine", "parts", "cell_sets")  # beside the arguments of what makes it
 _CHOICES = ("contact", "order", "friction")  # of the problem
 _SOLVING = ("error", "solver", "tolerance", "max_unknowns")  # of solve and adapt
-_TABLES = ("law", "criterion", "cycle", "spectrum", "retardation", "link_up")  # of growth
+_TABLES = (
+    "law",
+    "criterion",
+    "cycle",
+    "spectrum",
+    "retardation",
+    "link_up",
+    "load_program",
+)  # of growth
 _OUTPUT = ("folder", "pictures", "warp", "keep_solutions")
 _METHODS = ("contact_method", "tip_basis", "level_sets")  # of numerics, to compare with
 _REST = "rest"  # of the cells: those in no box
@@ -325,6 +334,10 @@ def _growth(table: Table) -> Mapping[str, Any]:
         given["solver"] = _solver(table)
     if "retardation" in table:
         given["retardation"] = retardation_of(table.table("retardation"))
+    if "load_program" in table:
+        given["load_program"] = values.value_of_table(
+            table.table("load_program"), values.makers_of(LoadProgram)
+        )
     if "link_up" in table:
         given["link_up"] = values.called_with(table.table("link_up"), plastic_zone)
     return MappingProxyType({

@@ -66,8 +66,8 @@ def run(
         As of `collect`.
     tolerance, max_unknowns : optional
         As of `grow`.
-    cycles, scaling, integrator, threshold, retardation, solver, response, K_c, link_up, \
-    stop_at_interface, max_steps, max_cycles, max_size, tolerance, max_unknowns, progress
+    cycles, scaling, integrator, threshold, retardation, solver, response, load_program, K_c, \
+    link_up, stop_at_interface, max_steps, max_cycles, max_size, tolerance, max_unknowns, progress
         As of `grow`.
 
     Returns

@@ -43,7 +43,8 @@ def alarms_of_step(rule: GrowthRule, step: Step) -> list[Alarm]:
             alarms += alarms_of_solutions(solutions)
         if not any("in all load states" in alarm.place for alarm in alarms):
             alarms += _factors(rule) + _rate(rule, step)
-    known = validity_of(rule, step)
+    known = step.validity if rule.K_c is None else None
+    known = known or validity_of(rule, step, rule.toughness)
     if known is not None:
         limits = known.alarms()
         # Later in a run it is why growth ends.
@@ -51,9 +52,9 @@ def alarms_of_step(rule: GrowthRule, step: Step) -> list[Alarm]:
     return alarms
 
 
-def validity_of(rule: GrowthRule, step: Step) -> Validity | None:
+def validity_of(rule: GrowthRule, step: Step, K_c: float | None) -> Validity | None:
     """Plastic zones, toughness and net sections of a step; None where nothing is known of these."""
-    material, K_c = rule.problem.elasticity.material, rule.toughness
+    material = rule.problem.elasticity.material
     if material.yield_stress is None and K_c is None:
         return None
     mesh, solutions = rule.problem.mesh, _solutions(rule, step)

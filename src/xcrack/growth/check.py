@@ -40,7 +40,7 @@ def check(
         As of `grow`; of the steps nothing is needed.
     tolerance, max_unknowns, cycles, scaling, integrator, threshold, retardation, K_c, link_up, \
     stop_at_interface, \
-    max_steps, max_cycles, max_size, solver, response, progress
+    max_steps, max_cycles, max_size, load_program, solver, response, progress
         As of `grow`.
 
     Returns

@@ -9,9 +9,9 @@ from scipy.interpolate import PchipInterpolator
 
 from xcrack.analysis.solution import Solution
 from xcrack.base.arrays import Bools, Floats, Ints
-from xcrack.base.checks import call_function
+from xcrack.base.checks import call_function, numbers
 from xcrack.base.errors import ProblemError
-from xcrack.fatigue.criteria import clipped_K
+from xcrack.fatigue.criteria import clipped_K, equivalent_K, kink_angle
 from xcrack.fatigue.cycle import Cycle
 from xcrack.fatigue.spectrum import Spectrum, distinct
 from xcrack.growth.options import GrowthRule
@@ -270,12 +270,27 @@ def is_homogeneous(problem: Problem, spectrum: Spectrum) -> bool:
 
 
 def respond_to_states(
-    rule: GrowthRule, problem: Problem, reuse: SolverState, bars: bool = False
+    rule: GrowthRule,
+    problem: Problem,
+    reuse: SolverState,
+    bars: bool = False,
+    load_factor: float = 1.0,
 ) -> Response:
-    """Response of a scene to all load states of a run; to the levels of a spectrum of factors."""
+    """Response of a scene to all load states of a run; to the levels of a spectrum of factors.
+
+    With a factor on its loads its states are named as without.
+    """
     spectrum = rule.cycle if isinstance(rule.cycle, Spectrum) else None
 
-    def solve(states: Sequence[Any], reuse: SolverState) -> Response:
+    def solve(names: Sequence[Any], reuse: SolverState) -> Response:
+        states = names
+        if load_factor != 1:
+            states = [
+                replace(state, factor=load_factor * state.factor)
+                if isinstance(state, LoadLevel)
+                else load_factor * state
+                for state in names
+            ]
         if rule.response is None:
             response = respond(problem, states, reuse, bars, solver=rule.solver)
         else:
@@ -283,6 +298,8 @@ def respond_to_states(
                 rule.response, "the response of a step", problem, tuple(states), reuse, bars
             )
             response = checked_response(given, problem, states)
+        if load_factor != 1:
+            response = replace(response, states=tuple(names), load_factor=load_factor)
         if spectrum is not None and response.solutions:
             refuse_friction(problem, response.solutions)
         return response
@@ -290,6 +307,33 @@ def respond_to_states(
     if spectrum is not None and spectrum.states is None:
         return respond_to_levels(problem, spectrum, solve, reuse)
     return solve(rule.cycle.load_states, reuse)
+
+
+def respond_under_program(
+    rule: GrowthRule, problem: Problem, reuse: SolverState, bars: bool, N: float
+) -> Response:
+    """Response of a scene under loads that change as the crack grows, after some cycles.
+
+    Where they are to give some K, those of the scene are solved, and all that follows is scaled.
+    """
+    if rule.load_program is None or not rule.load_program.needs_K:
+        factor = load_factor_at(rule, problem, N)
+        return respond_to_states(rule, problem, reuse, bars, factor)
+    response = respond_to_states(rule, problem, reuse, bars)
+    nu, largest = problem.elasticity.poisson, 0.0
+    for of_crack in zip(*response.sif, strict=True):
+        K = clipped_K(np.stack([sif.K for sif in of_crack]))
+        largest = max(largest, float(equivalent_K(K, kink_angle(K), nu).max(initial=0.0)))
+    return response.scaled(load_factor_at(rule, problem, N, largest))
+
+
+def load_factor_at(rule: GrowthRule, problem: Problem, N: float, K_max: float = np.nan) -> float:
+    """Factor on the loads of a scene after some cycles; of one that gives K, with K under them."""
+    assert rule.load_program is not None
+    tips = [max(crack.n_tips, 1) if problem.mesh.dim < 3 else 1 for crack in problem.placed]
+    a = max(size / n for size, n in zip(problem.sizes, tips, strict=True))
+    values = rule.load_program.factors(np.array([a]), np.array([N]), np.array([K_max]))
+    return float(numbers(values, "the factor of load_program", (1,))[0])
 
 
 def refuse_friction(problem: Problem, solutions: Sequence[Solution]) -> None:
@@ -330,9 +374,11 @@ __all__ = [
     "has_slip",
     "is_homogeneous",
     "ladders",
+    "load_factor_at",
     "refined",
     "respond_to_levels",
     "respond_to_states",
+    "respond_under_program",
     "states_and_levels",
     "states_of",
 ]

@@ -17,17 +17,19 @@ from xcrack.base.units import LENGTH, TOUGHNESS
 from xcrack.fatigue.criteria import Criterion
 from xcrack.fatigue.cycle import Cycle
 from xcrack.fatigue.law_sets import LawSets
+from xcrack.fatigue.load_program import LoadProgram
 from xcrack.fatigue.rainflow import turning_points
 from xcrack.fatigue.retardation import Retardation, RetardationSets, willenborg
 from xcrack.fatigue.spectrum import Spectrum
 from xcrack.growth.response import Respond
-from xcrack.model.problem import Problem
+from xcrack.model.problem import LoadLevel, Problem
 
 _LEAST = 1e-6  # relative error of a life that cells and steps can be held to
 _STOPS = {"changes_results": False}  # when a run stops, not how its cracks grow
 _POSITIVE = Number(above=0)
 _PROGRESS = 'True, False or "always"'
 _LINK_UP = "plastic_zone(sigma_y, beta), or a function of K"
+_LOAD_PROGRAM = "K_gradient(K), load_over_size(lambda a: ...) or another LoadProgram"
 _RESPONSE = "a function (problem, states, reuse, bars) -> Response, or None"
 
 AnyFunction = TypeVar("AnyFunction", bound=Callable[..., Any])
@@ -45,6 +47,7 @@ class GrowthOptions(TypedDict, total=False):
     retardation: Retardation | Mapping[str, Retardation] | None
     K_c: float | None
     link_up: Callable[[Floats], ArrayLike] | None
+    load_program: LoadProgram | None
     stop_at_interface: bool
     max_steps: int | None
     max_cycles: float | None
@@ -61,8 +64,8 @@ class GrowthRule:
     Parameters
     ----------
     problem, law, criterion, cycle, da, cycles, tolerance, max_unknowns, scaling, integrator, \
-    threshold, retardation, solver, response, K_c, link_up, stop_at_interface, max_steps, \
-    max_cycles, max_size, progress
+    threshold, retardation, solver, response, load_program, K_c, link_up, stop_at_interface, \
+    max_steps, max_cycles, max_size, progress
         As of `grow`.
     scouts : bool
         It is the scout of a run with a tolerance: nothing is estimated.
@@ -95,6 +98,7 @@ class GrowthRule:
     ] = None
     solver: Annotated[Any, Function("a function, or None")] = None
     response: Annotated[Respond | None, Function(_RESPONSE)] = None
+    load_program: Annotated[LoadProgram | None, Part(LoadProgram, needs=_LOAD_PROGRAM)] = None
     K_c: Annotated[float | None, Number(above=0, unit=TOUGHNESS)] = field(
         default=None, metadata=_STOPS
     )
@@ -155,6 +159,7 @@ class GrowthRule:
         self._check_retardation()
         self._check_tolerance()
         self._check_temperatures()
+        self._check_load_program()
 
     def _check_retardation(self) -> None:
         """Refuse a model of retardation with what it means nothing with."""
@@ -184,6 +189,35 @@ class GrowthRule:
                 "same plastic wake, which would count twice. Give a law without closure, or "
                 "wheeler."
             )
+
+    def _check_load_program(self) -> None:
+        """Refuse loads that follow the crack where a factor on all of them says nothing."""
+        if self.load_program is None:
+            return
+        if not all(isinstance(state, Real | LoadLevel) for state in self.cycle.load_states):
+            raise ProblemError(
+                "grow: load_program is a factor on the loads: give Cycle(min, max) or a Spectrum "
+                "of factors, no lists of loads."
+            )
+        names = self._loads_out_of_proportion()
+        if names and self.load_program.needs_K:
+            raise ProblemError(
+                f"grow: {names[0]} does not scale with the loads, so K is not in proportion to "
+                "them, and load_program cannot tell which loads give it: give their factor, by "
+                "load_over_size or load_over_cycles."
+            )
+
+    def _loads_out_of_proportion(self) -> list[str]:
+        """Names of what acts and is not multiplied by a factor on the loads."""
+        names = [load.name for load in self.problem.loads if load.is_steady]
+        names += [load.name for load in getattr(self.cycle, "steady", ())]
+        return [*names, "friction"] if any(self.problem.frictions) else names
+
+    @property
+    def follows_cycles(self) -> bool:
+        """Whether loads change with the cycles, and K in proportion to them."""
+        program = self.load_program
+        return program is not None and program.needs_N and not self._loads_out_of_proportion()
 
     def _check_temperatures(self) -> None:
         steady = [load for load in self.problem.loads if load.adds_up]

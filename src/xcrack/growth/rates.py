@@ -222,7 +222,9 @@ def response_without_contact(
         return None
     if problem.contact == "off":
         return response
-    return respond_to_states(rule, replace(problem, contact="off"), SolverState())
+    factor = response.load_factor
+    scene = replace(problem, contact="off")
+    return respond_to_states(rule, scene, SolverState(), load_factor=factor)
 
 
 def criterion_inputs(

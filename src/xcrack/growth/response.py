@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from xcrack.analysis.solution import Solution
 from xcrack.analysis.solve import solve_states
 from xcrack.base.arrays import Floats, lock
-from xcrack.base.checks import entries, flag, numbers, value_text
+from xcrack.base.checks import entries, flag, number, numbers, value_text
 from xcrack.base.errors import ProblemError
 from xcrack.linalg.engine import SolverState
 from xcrack.model.problem import LoadLevel, Problem, check_problem
@@ -38,6 +38,8 @@ class Response:
         One a state; empty where K is from elsewhere.
     reuse : SolverState
         What the next solve starts from.
+    load_factor : float
+        On the loads beside that of a state, where they change as the crack grows.
 
     Raises
     ------
@@ -49,6 +51,7 @@ class Response:
     sif: Answers
     solutions: tuple[Solution, ...] = ()
     reuse: SolverState = field(default_factory=SolverState)
+    load_factor: float = 1.0
 
     def __post_init__(self) -> None:
         sif = tuple(entries(row, "Response: sif") for row in entries(self.sif, "Response: sif"))
@@ -67,6 +70,7 @@ class Response:
             raise ProblemError(
                 f"Response: reuse = {value_text(self.reuse)}: give that of a Response."
             )
+        number(self.load_factor, "Response: load_factor", above=0)
         counts = {len(self.states), len(self.sif), len(self.solutions or self.sif)}
         if len(counts) > 1:
             raise ProblemError(
@@ -86,6 +90,15 @@ class Response:
         if not self.solutions:
             return True
         return any(part is not None for each in self.solutions for part in each.contact)
+
+    def scaled(self, factor: float) -> "Response":
+        """The response to loads times a factor, of a scene in which all is in proportion."""
+        return replace(
+            self,
+            sif=tuple(tuple(each.scaled(factor) for each in state) for state in self.sif),
+            solutions=tuple(solution.scaled(factor) for solution in self.solutions),
+            load_factor=factor * self.load_factor,
+        )
 
     @classmethod
     def of_K(

@@ -17,7 +17,7 @@ from xcrack.fatigue.law import Law
 from xcrack.fatigue.law_sets import LawSets
 from xcrack.fatigue.spectrum import Spectrum
 from xcrack.growth import joins_3d
-from xcrack.growth.alarms import alarm_of_life, alarms_of_step
+from xcrack.growth.alarms import alarm_of_life, alarms_of_step, validity_of
 from xcrack.growth.ends import (
     beyond_end,
     cannot_go_on,
@@ -41,7 +41,12 @@ from xcrack.growth.events import (
     with_joins,
 )
 from xcrack.growth.integrator import integrator_of
-from xcrack.growth.levels import respond_to_states, states_and_levels
+from xcrack.growth.levels import (
+    load_factor_at,
+    respond_to_states,
+    respond_under_program,
+    states_and_levels,
+)
 from xcrack.growth.options import GrowthOptions, GrowthRule, lists_options, run_of
 from xcrack.growth.prepared import fingerprint, prepared, replanned
 from xcrack.growth.progress import Progress, WarningLog
@@ -143,7 +148,8 @@ def grow(
         than a tenth of a cell away.
     max_size : float, length, optional
         Stop when a crack is as long, by `Step.sizes`: in 2D its length in the body, in 3D its area
-        over the length of its fronts. The last step ends there.
+        over the length of its fronts. The last step ends there, unless one is shorter than two
+        tenths of a cell.
     solver : optional
         As in `solve`.
     response : callable (problem, states, reuse, bars) -> Response, optional
@@ -151,6 +157,9 @@ def grow(
         K of the cracks of `problem` under some load states, factors of the loads or lists of loads:
         `Response.of_K` makes the answer from numbers. `reuse` is that of the response before, and
         `bars` says whether K needs error bars. `respond` is what is asked where it is left out.
+    load_program : K_gradient, K_over_size, load_over_size or load_over_cycles, optional
+        Loads that change as the crack grows: what all of them are multiplied by beside the cycle or
+        spectrum, or the K that they are to give. `Step.load_factor` has it.
     progress : bool or "always"
         One line a step on standard error, if that is a terminal or a notebook (or always); with the
         time that is left, where `max_steps` or `max_cycles` allows an estimate.
@@ -248,7 +257,7 @@ def growth_steps(
                 _warn_of_ratio(rule, first)
                 _warn_of_left_out(rule, first)
                 is_torn = _warn_of_mode_III(rule, first)
-                _warn_of_alarms(rule, first)
+                first = _judged(rule, first)
             last = replace(first, warnings=tuple(messages))
             progress.step(last)
             yield last
@@ -276,7 +285,7 @@ def growth_steps(
                     next_step, reuse, ended = _cut_at_end(
                         rule, cut, (next_step, reuse, ended), messages
                     )
-                    _warn_of_alarms(rule, next_step)
+                    next_step = _judged(rule, next_step)
             if other is not None:
                 reuse = reuse if other[0] is rule else run_state(last).reuse
                 rule, last = other[0], _planned(other[0], other[1] or last)
@@ -437,10 +446,16 @@ def _warned_of_kink(rule: GrowthRule, step: Step) -> str:
     return kink
 
 
-def _warn_of_alarms(rule: GrowthRule, step: Step) -> None:
-    if not rule.scouts:
-        for alarm in alarms_of_step(rule, step):
-            warn(str(alarm))
+def _judged(rule: GrowthRule, step: Step) -> Step:
+    """A step with how far elasticity holds at it; warns of what is beyond its limit."""
+    if rule.scouts:
+        return step
+    if not step.has_left:  # by the material alone: a K_c of the run only says where it ends
+        K_c = rule.problem.elasticity.material.K_c
+        step = replace(step, validity=validity_of(rule, step, K_c))
+    for alarm in alarms_of_step(rule, step):
+        warn(str(alarm))
+    return step
 
 
 def _warn_of_left_out(rule: GrowthRule, first: Step) -> None:
@@ -499,6 +514,9 @@ def _scene(rule: GrowthRule, last: Step) -> Problem:
     return problem
 
 
+_AGREES = 40  # times, until loads and cycles of a solve agree
+
+
 def _solved_step(
     rule: GrowthRule,
     problem: Problem,
@@ -508,7 +526,11 @@ def _solved_step(
     joins: Sequence[Join] = (),
 ) -> tuple[Step, SolverState]:
     """Solve all load states of a problem and decide where and how fast its cracks grow."""
-    response = respond_to_states(rule, problem, reuse, rule.estimates)
+    if rule.load_program is None:
+        response = respond_to_states(rule, problem, reuse, rule.estimates)
+    else:
+        N = 0.0 if last is None else last.cycles + plan_of(last).cycles
+        response = respond_under_program(rule, problem, reuse, rule.estimates, N)
     sif, solutions, handed_on = response.sif, response.solutions, response.reuse
     rates = rates_of(rule, problem, replace(response, sif=best_K(sif)))
     integrator = integrator_of(rule)
@@ -524,6 +546,14 @@ def _solved_step(
         identities = _identities(rule, last, problem, joins)
         correct = joins_3d.joined if plan_of(last).joins else integrator.correct
         corrected = correct(rule, last, rates, identities)
+        for _ in range(_AGREES if rule.follows_cycles else 0):  # the cycles were foretold
+            change = load_factor_at(rule, problem, corrected.cycles) / response.load_factor
+            if abs(change - 1) < _SAME:
+                break
+            response = response.scaled(sqrt(change))  # half of it: fewer cycles, smaller loads
+            sif, solutions = response.sif, response.solutions
+            rates = rates_of(rule, problem, replace(response, sif=best_K(sif)))
+            corrected = correct(rule, last, rates, identities)
     corrected = add_K_error(rule, last, corrected, rates, sif)
     states, levels = states_and_levels(rule.cycle, response)
     step = Step(
@@ -545,6 +575,7 @@ def _solved_step(
         law_rate=rates.split(rates.law_rate),
         R_range=rates.split(rates.R_range),
         sizes=problem.sizes,
+        load_factor=response.load_factor,
         identities=identities,
         stations=corrected.stations,
         solves=corrected.solves,

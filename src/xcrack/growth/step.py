@@ -16,6 +16,7 @@ from xcrack.fatigue.criteria import clipped_K, local_equivalent_K
 from xcrack.fatigue.retardation import OverloadZones
 from xcrack.growth.solves import SolveHistory
 from xcrack.growth.stations import GrowthStations, Identities, PerCrack, directions
+from xcrack.growth.validity import Validity
 from xcrack.linalg.engine import SolverState
 from xcrack.sif.sif import SIF
 
@@ -347,6 +348,7 @@ _MADE_BY_GROW = {
     "control": StepControl,
     "plan": Plan,
     "run": RunState,
+    "validity": Validity,
 }
 
 
@@ -396,6 +398,8 @@ class Step:
         Smallest and largest ratio of all cycles of a block; of one cycle both are R.
     sizes : tuple of float, length
         Length of each crack inside the body; in 3D its area over the length of its fronts.
+    load_factor : float
+        On all loads beside those of `states`, where they change as the crack grows; K has it.
     identities : Identities, optional
         Which tips, fronts and cracks of other steps these are.
     stations : GrowthStations, optional
@@ -410,6 +414,8 @@ class Step:
         The next step; none where the run ends.
     run : RunState, optional
         What the run carries along.
+    validity : Validity, optional
+        How far linear elasticity holds, where the material has a yield stress or a toughness.
 
     Raises
     ------
@@ -437,6 +443,7 @@ class Step:
     law_rate: PerCrack = ()
     R_range: PerCrack = ()
     sizes: tuple[float, ...] = ()
+    load_factor: float = 1.0
     identities: Identities | None = None
     stations: GrowthStations | None = None
     solves: SolveHistory | None = None
@@ -445,6 +452,7 @@ class Step:
     control: StepControl = field(default_factory=StepControl)
     plan: Plan | None = None
     run: RunState | None = None
+    validity: Validity | None = None
 
     def __post_init__(self) -> None:
         whole_number(self.index, "Step: index", least=0)
@@ -503,6 +511,7 @@ class Step:
             )
         object.__setattr__(self, "states", names)
         numbers(self.sizes, "Step: sizes", (None,))
+        number(self.load_factor, "Step: load_factor", above=0)
         left_out = {"law_rate": self.rate, "R_range": [np.stack([R, R], axis=-1) for R in self.R]}
         for name, columns in (("law_rate", ()), ("R_range", (2,))):
             parts = entries(getattr(self, name), f"Step: {name}") or tuple(left_out[name])

@@ -125,7 +125,8 @@ def resume(
         are compared by their code and by all that they read.
     until
         As in `collect`.
-    cycles, scaling, integrator, threshold, retardation, solver, response, progress, keep_solutions
+    cycles, scaling, integrator, threshold, retardation, solver, response, load_program, progress, \
+    keep_solutions
         As they were given to `grow` and `collect`.
     tolerance, max_unknowns
         As they were given to `grow`. The mesh that a tolerance chose is read from the folder; where

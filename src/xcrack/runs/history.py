@@ -20,6 +20,7 @@ from xcrack.base.paths import path_of, system_errors, write_texts
 from xcrack.crack.crack import Crack
 from xcrack.fatigue.criteria import Criterion
 from xcrack.fatigue.law import Law
+from xcrack.fatigue.load_program import Curve, LoadProgram
 from xcrack.fatigue.spectrum import Spectrum
 from xcrack.growth.step import Arrival, Join, Step
 from xcrack.mesh.mesh import Mesh
@@ -27,10 +28,9 @@ from xcrack.runs.fracture_loads import fracture_loads
 from xcrack.runs.life_bar import LifeBar, life_bar
 from xcrack.runs.measures import measures_of_steps, measures_tables, with_measures
 from xcrack.runs.rerating import (
-    LoadProgram,
-    Program,
     RecomputedRates,
     block_of_run,
+    load_program_of,
     recompute_rates,
 )
 from xcrack.runs.table import table
@@ -190,7 +190,11 @@ class History:
             domain_cells (smallest radius of these domains, in cells, where K has it); bar (longest
             error bar of K), best (1 where growth followed the best K of all states, 0 where it
             followed K) and N_bar (error bar of N), where K has bars; angle, dK_eq, R as in `Step`,
-            R_low and R_high (smallest and largest ratio of all cycles, under a spectrum), rate, da.
+            R_low and R_high (smallest and largest ratio of all cycles, under a spectrum);
+            zone_of_crack, zone_of_ligament, section, K_of_K_c (plastic zone over crack and
+            ligament, load on the ligament over that at which it yields, K over the toughness, each
+            at its worst place: the material has a yield stress, or K_c), load_factor (where loads
+            change as the crack grows), rate, da.
             A step at which no tip is left has a row for each `Arrival`, x and y where it is, and
             nan for K and what follows from it. In 3D ``front`` stands for ``tip``, x, y, z is the
             middle of the front and a the area of the crack over the length of its fronts; each K,
@@ -213,8 +217,8 @@ class History:
         criterion: Criterion | None = None,
         nu: float | None = None,
         threshold: float = 0.0,
-        load: Program | None = None,
-        K_max: Program | None = None,
+        load: Curve | None = None,
+        K_max: Curve | LoadProgram | None = None,
     ) -> RecomputedRates:
         """Cycles of the same steps by another growth law, or under loads that change on the way.
 
@@ -265,7 +269,7 @@ class History:
         True
         """
         block = block_of_run("rerate", spectrum, criterion, nu, threshold)
-        program = None if load is None and K_max is None else LoadProgram(load, K_max)
+        program = load_program_of(load, K_max)
         return recompute_rates(self.steps, law, old, block, program)
 
     def load_at(self, K_c: float) -> NDArray[Any]:

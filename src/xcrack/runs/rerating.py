@@ -1,19 +1,20 @@
 """Cycles of a run by another law, on the path of the first."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from xcrack.base.arrays import Floats, Ints
-from xcrack.base.checks import call_function, number, numbers, value_text
+from xcrack.base.checks import number, value_text
 from xcrack.base.errors import ProblemError
 from xcrack.fatigue.checks import evaluate_criterion, evaluate_law
 from xcrack.fatigue.criteria import Criterion
 from xcrack.fatigue.cycle import cycles_between
 from xcrack.fatigue.law import Law
+from xcrack.fatigue.load_program import Curve, K_over_size, LoadProgram, load_over_size
 from xcrack.fatigue.spectrum import Spectrum, distinct
 from xcrack.growth.levels import LevelTable
 from xcrack.growth.rates import pairs_of_states
@@ -243,6 +244,11 @@ def driving_forces(steps: Sequence[Step], block: SpectrumBlock | None = None) ->
             "the history was grown with retardation: its cycles do not follow from its rates. Grow "
             "without it, and take the model along that path by retarded, or life(retardation=...)."
         )
+    if first is not None and first.settings.get("load_program") == "load_over_cycles":
+        raise ProblemError(
+            "the history was grown under loads that change with the cycles: by other rates they "
+            "come at other lengths. Grow with the other law, or give load_over_size."
+        )
     rows: list[tuple[float, ...]] = []
     for n, (step, after) in enumerate(zip(steps, steps[1:])):
         rows += _of_step(n, step, after)
@@ -379,59 +385,30 @@ class RecomputedRates:
 
 
 _SAME_RATIO = 1e-4  # spread of R along a run whose K is in proportion to its loads
-Program = Callable[[Floats], Floats]
 
 
-@dataclass(frozen=True)
-class LoadProgram:
-    """Loads that change as the crack grows: a factor, or the largest K that they are to give.
+def load_program_of(load: Curve | None, K_max: Curve | LoadProgram | None) -> LoadProgram | None:
+    """How loads change along a path that is known: by a factor or a K over the size.
 
-    Parameters
-    ----------
-    load : callable a -> factor on the loads of the run, optional
-    K_max : callable a -> largest K of a cycle (stress √length), optional
-        One of them, called with arrays of crack sizes as laws are given (length).
+    Raises
+    ------
+    ProblemError
+        Both are given, or what is no function.
     """
+    if load is not None and K_max is not None:
+        raise ProblemError("rerate: give load=..., a factor over a, or K_max=..., not both.")
+    if K_max is not None:
+        return K_max if isinstance(K_max, LoadProgram) else K_over_size(K_max)
+    return None if load is None else load_over_size(load)
 
-    load: Program | None = None
-    K_max: Program | None = None
 
-    def __post_init__(self) -> None:
-        if (self.load is None) == (self.K_max is None):
-            raise ProblemError("rerate: give load=..., a factor over a, or K_max=..., not both.")
-        for name in ("load", "K_max"):
-            value = getattr(self, name)
-            if not (value is None or callable(value)):
-                raise ProblemError(
-                    f"rerate: {name} = {value_text(value)} cannot be called: give a function of "
-                    f"the crack size, lambda a: ..."
-                )
-
-    def factors(self, rows: DrivingForce) -> Floats:
-        """Factor on the loads before and after each step that grows `(n, 2)`.
-
-        Raises
-        ------
-        ProblemError
-            A function that returns something else than positive numbers.
-        """
-        lead = rows.lead
-        a = lead.size
-        name, function = ("load", self.load) if self.load is not None else ("K_max", self.K_max)
-        answer = call_function(cast(Program, function), f"{name} of rerate", a.ravel())
-        given = numbers(answer, f"rerate: {name}(a)")
-        if given.shape not in ((), (a.size,)):
-            raise ProblemError(
-                f"rerate: {name}(a) has the shape {given.shape} for {a.size} sizes: give one value "
-                "for each."
-            )
-        values = np.broadcast_to(given, a.size).reshape(a.shape)
-        if not (values > 0).all():
-            raise ProblemError(f"rerate: {name}(a) is not positive at a = {a.ravel()[0]:g}.")
-        if self.K_max is None:
-            return np.asarray(values)
-        largest = np.where(lead.count > 0, lead.dK / (1.0 - lead.R), 0.0).max(axis=2)
-        return np.asarray(values / largest)
+def _factors(program: LoadProgram, rows: DrivingForce) -> Floats:
+    """Factor on the loads before and after each step that grows `(n, 2)`."""
+    lead = rows.lead
+    largest = np.where(lead.count > 0, lead.dK / (1.0 - lead.R), 0.0).max(axis=2)
+    a = lead.size
+    values = program.factors(a.ravel(), np.full(a.size, np.nan), largest.ravel())
+    return np.broadcast_to(values, a.size).reshape(a.shape)
 
 
 def check_in_proportion(steps: Sequence[Step], rows: DrivingForce, what: str) -> None:
@@ -502,7 +479,7 @@ def recompute_rates(
         rate = rows.rates(law)
     else:
         check_in_proportion(steps, rows, "rerate")
-        scale = program.factors(rows)
+        scale = _factors(program, rows)
         rate = rows.rates(law, scale[np.searchsorted(rows.step[first], rows.step)])
     if not (rate[first][:, 0] > 0).all():
         stopped = int(np.argmin(rate[first][:, 0] > 0))
@@ -584,7 +561,6 @@ def bound_of_shares(rows: DrivingForce, new: Floats, since: Floats) -> float:
 
 __all__ = [
     "DrivingForce",
-    "LoadProgram",
     "RecomputedRates",
     "SpectrumBlock",
     "block_of_run",
@@ -593,5 +569,6 @@ __all__ = [
     "check_in_proportion",
     "cycles_of",
     "driving_forces",
+    "load_program_of",
     "recompute_rates",
 ]

@@ -20,6 +20,7 @@ from xcrack.fatigue.retardation import OverloadZones
 from xcrack.growth.solves import SolveHistory
 from xcrack.growth.stations import GrowthStations, Identities, PerCrack, split
 from xcrack.growth.step import Arrival, Join, Plan, RunState, Step, StepControl, StepError
+from xcrack.growth.validity import Validity
 from xcrack.linalg.engine import SlipField, SolverState
 from xcrack.mesh.curved_facets import CurvedFacets
 from xcrack.mesh.mesh import Mesh, sound_mesh
@@ -319,6 +320,8 @@ def arrays_of(step: Step) -> Arrays:
         "sizes": np.array(step.sizes, dtype=np.float64),
         **pack_cracks("crack", step.cracks),
     }
+    if step.load_factor != 1:
+        result["load_factor"] = np.array(float(step.load_factor))
     if step.corrected is not step.cracks:
         result |= pack_cracks("corrected", step.corrected)
     if step.sif:
@@ -350,6 +353,10 @@ def arrays_of(step: Step) -> Arrays:
         result["identity_end"] = _whole(np.zeros(0), *map(np.array, step.identities.ends))
         result["identity_end_count"] = _counts(step.identities.ends)
         result["identity_name"] = np.array(step.identities.names, dtype=str)
+    if step.validity is not None:
+        result |= pack("validity", step.validity, ("places",))
+        result["validity_number"] = np.array(list(step.validity.places), dtype=str)
+        result["validity_place"] = np.array(list(step.validity.places.values()), dtype=str)
     if step.run is not None:
         result |= pack("run", step.run, ("settings", "reuse")) | _pack_reuse(step.run.reuse)
     return result
@@ -404,6 +411,10 @@ def step_of(arrays: Arrays, settings: dict[str, str] | None = None) -> Step:
     run = None
     if "run_mesh" in arrays:
         run = unpack(RunState, "run", arrays, settings=settings or {}, reuse=_unpack_reuse(arrays))
+    validity = None
+    if "validity_number" in arrays:
+        names, words = (arrays[f"validity_{name}"].tolist() for name in ("number", "place"))
+        validity = unpack(Validity, "validity", arrays, places=dict(zip(names, words, strict=True)))
     return Step(
         index=int(arrays["index"]),
         cycles=float(arrays["cycles"]),
@@ -418,6 +429,7 @@ def step_of(arrays: Arrays, settings: dict[str, str] | None = None) -> Step:
         joins=tuple(unpack_rows(Join, "join", arrays)),
         states=tuple(arrays["states"].tolist()),
         sizes=tuple(arrays["sizes"].tolist()),
+        load_factor=float(arrays.get("load_factor", 1.0)),
         identities=identities,
         stations=unpack(GrowthStations, "station", arrays),
         solves=unpack(SolveHistory, "solves", arrays),
@@ -426,6 +438,7 @@ def step_of(arrays: Arrays, settings: dict[str, str] | None = None) -> Step:
         control=unpack(StepControl, "control", arrays) or StepControl(),
         plan=plan,
         run=run,
+        validity=validity,
     )
 
 

@@ -220,7 +220,26 @@ def _parts(steps: Sequence[Step]) -> Columns:
     if any(not np.array_equal(r, np.stack([R, R], axis=1)) for r, R in pairs):
         result["R_low"] = lambda step, c: step.R_range[c][:, 0]
         result["R_high"] = lambda step, c: step.R_range[c][:, 1]
+    for name in _VALIDITY:
+        known = [getattr(step.validity, name, np.nan) for step in steps]
+        if np.isfinite(known).any():
+            result[_VALIDITY[name]] = _of_validity(name)
+    if any(step.load_factor != 1 for step in steps):
+        result["load_factor"] = lambda step, c: np.full(len(step.R[c]), step.load_factor)
     return result | {name: column(name) for name in ("rate", "da")}
+
+
+_VALIDITY = {
+    "of_crack": "zone_of_crack",
+    "of_ligament": "zone_of_ligament",
+    "of_section": "section",
+    "of_toughness": "K_of_K_c",
+}
+
+
+def _of_validity(name: str) -> Callable[[Step, int], Floats]:
+    """A column of what elasticity is judged by: the same at all stations of a step."""
+    return lambda step, c: np.full(len(step.R[c]), getattr(step.validity, name, np.nan))
 
 
 def _size(step: Step, c: int) -> float:

@@ -8,7 +8,7 @@ import numpy as np
 
 from xcrack.base import markup
 from xcrack.base.arrays import Bools, Floats, Ints, lock
-from xcrack.base.checks import numbers, value_text, whole_numbers
+from xcrack.base.checks import number, numbers, value_text, whole_numbers
 from xcrack.base.errors import ProblemError
 from xcrack.base.optional import require_package
 
@@ -223,6 +223,27 @@ class SIF:
         K = np.array(self.K)
         K[self.closed, 0] = self.spread[self.closed, 0]
         return K
+
+    def scaled(self, factor: float) -> "SIF":
+        """K under loads times a factor, where all is in proportion to them."""
+        factor = number(factor, "scaled: factor")
+
+        def times(values: Floats | None) -> Any:
+            return None if values is None else lock(factor * values)
+
+        errors = self.errors
+        if errors is not None:
+            eta, bar, contact = (times(x) for x in (errors.eta, errors.bar, errors.contact))
+            errors = KErrors(eta, bar, errors.reasons, contact)
+        return replace(
+            self,
+            K=times(self.K),
+            T=times(self.T),
+            spread=times(self.spread),
+            errors=errors,
+            ends=tuple(replace(e, K=times(e.K), mean=times(e.mean)) for e in self.ends),
+            widened=times(self.widened),
+        )
 
     def to_pandas(self) -> Any:
         """All values as a table of pandas: a row for each tip or place.

@@ -184,6 +184,12 @@ def _notes(source: Source) -> list[str]:
                 what = "run" if history.unit == "cycle" else f"cycles of each {history.unit}"
                 notes.append(f"R of the {what} is {every.min():.3g} to {every.max():.3g}: compare "
                              "it with the range that the growth law was fitted for.")  # fmt: skip
+        program = history.settings.get("load_program", "None")
+        if program != "None":
+            factors = [step.load_factor for step in history.steps]
+            notes.append(f"The loads change as the crack grows ({program}): their factor goes "
+                         f"from {factors[0]:.4g} to {factors[-1]:.4g}, see load_factor in the "
+                         "table of the run.")  # fmt: skip
         touching = any(state[c].closed.any() for step in history.steps for state in step.sif
                        for c in range(len(state)))  # fmt: skip
         if "elber" in law and touching:

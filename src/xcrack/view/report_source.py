@@ -168,6 +168,10 @@ class Source:
         """Plastic zones and net sections of the last step; None without a yield stress."""
         problem, mesh = self.problem, self.mesh
         material: Material
+        if problem is None and self.yield_stress is None and self.history is not None:
+            stored = self.history.solved[-1].validity if self.history.solved else None
+            if stored is not None:
+                return stored
         if problem is not None:
             material, cracks = problem.elasticity.material, problem.placed
         elif self.history is not None and self.history.solved:  # the most severe of what it may be
