@@ -69,6 +69,28 @@ def test_one_tip_arrives_and_the_other_goes_on():
     assert arrival.cycles == pytest.approx(8.0 / (1e-12 * STRESS**3), rel=1e-9)
 
 
+@pytest.mark.parametrize("da", [5.3, 1.4, 0.7])
+def test_the_other_tip_goes_on_from_where_it_is_as_one_arrives(da):
+    """K jumps there, from √(π a) of two tips to 1.12 √(π a) of one: both integrals are exact.
+
+    Steps of any length end there; one of .7 would end .3 before the side, which is no tip.
+    """
+
+    def K_of(problem, c):
+        n, size = problem.placed[c].n_tips, problem.sizes[c]
+        K = STRESS * np.sqrt(np.pi * size / 2) if n == 2 else 1.12 * STRESS * np.sqrt(np.pi * size)
+        return [[K, 0.0]] * n
+
+    problem = plate([xc.line_crack([(8.0, 0.37), (20.0, 0.37)])])
+    history = grown(problem, da=da, max_size=40.0, response=formula(K_of))
+    (step,) = [step for step in history.steps if step.arrivals]
+    assert step.sizes[0] == pytest.approx(28.0, rel=1e-9)
+    assert step.cycles == pytest.approx(exact(6.0, 14.0), rel=1e-9)
+    assert step.arrivals[0].cycles == pytest.approx(step.cycles, rel=1e-9)
+    whole = exact(6.0, 14.0) + exact(28.0, 40.0) / 1.12**3
+    assert history.life == pytest.approx(whole, rel=1e-9)
+
+
 def test_the_last_step_is_stored_and_nothing_follows_it(tmp_path):
     response = formula(mode_I())
     options = {"da": 20.0, "progress": False}

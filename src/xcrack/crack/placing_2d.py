@@ -23,7 +23,7 @@ from xcrack.mesh.mesh import Mesh
 from xcrack.mesh.polygon import closest_on_segment
 
 ON_MESH = 1e-10  # share of a cell within which a tip lies on a mesh point or on an edge
-_MOUTH = 0.5  # an end within this share of a cell from the boundary is a mouth
+MOUTH = 0.5  # an end within this share of a cell from the boundary is a mouth
 _MEANT = 0.1  # share of a cell inside the boundary up to which nobody means a tip
 _WAY = 3.0  # cells to the boundary, along the crack, from an end that is close to it
 _ROUND = 1.1  # a way outside the body that is this much longer than its chord goes out and back
@@ -66,7 +66,7 @@ def place_line(crack: Crack, mesh: Mesh) -> Crack:
         inward = 1 if end == 0 else last - 1
         out = (points[end] - points[inward]) / np.linalg.norm(points[end] - points[inward])
         gap, size = nearest_boundary(mesh, points[end])
-        if end in candidates and inside and gap > _MOUTH * size:
+        if end in candidates and inside and gap > MOUTH * size:
             tips.append(end)
             continue
         if end not in candidates:
@@ -268,7 +268,7 @@ def _check_flanks(number: int, cracks: tuple[Crack, ...], mesh: Mesh) -> None:
             nearest = int(np.argmin(distance))
             if (foot[nearest] - end) @ ahead < _TOWARDS * distance[nearest]:
                 continue
-            if distance[nearest] < _MOUTH * size and contains(mesh, foot[[nearest]])[0]:
+            if distance[nearest] < MOUTH * size and contains(mesh, foot[[nearest]])[0]:
                 raise CoarseMeshError(
                     f"a tip of crack {number} at {at(end)} is {distance[nearest]:.4g} from crack "
                     f"{other}, less than half a cell ({size:.4g}), but does not end on it: to let "
@@ -326,7 +326,7 @@ def _check_own(number: int, crack: Crack, mesh: Mesh) -> None:
         foot = closest_on_segment(end, remaining_line[:-1], remaining_line[1:])
         distance = np.linalg.norm(foot - end, axis=1)
         nearest = int(np.argmin(distance))
-        if distance[nearest] < _MOUTH * size:
+        if distance[nearest] < MOUTH * size:
             raise CoarseMeshError(
                 f"a tip of crack {number} at {at(end)} is {distance[nearest]:.4g} from another "
                 f"part of the same crack at {at(foot[nearest])}, less than half a cell "

@@ -25,6 +25,7 @@ from xcrack.crack.meetings import (
     moved_on,
     with_tips_at,
 )
+from xcrack.crack.placing_2d import MOUTH
 from xcrack.fatigue.criteria import clipped_K
 from xcrack.fatigue.kink import START, kinked_K, limit_angles
 from xcrack.fatigue.retardation import BlockCycles, no_zones
@@ -59,7 +60,7 @@ from xcrack.growth.step import (
     solves_of,
 )
 from xcrack.growth.step_length import first_control, longest, next_control, share_left, shortest
-from xcrack.mesh.locate import cell_sizes, contains
+from xcrack.mesh.locate import cell_sizes, contains, nearest_boundary
 from xcrack.mesh.mesh import Mesh
 
 _LONGER = np.array(
@@ -82,6 +83,8 @@ def predict(rule: GrowthRule, step: Step) -> Plan:
     near = interfaces_ahead(rule, stations.x, growth.move)
     if near is not None and (growth.arc > near.stop).any():
         stretch, growth = _up_to_interfaces(rule, step, near, stretch, growth)
+    else:
+        stretch, growth = _up_to_boundary(rule, step, stretch, growth)
     row = int(np.argmax(growth.arc))
     plan = Plan(
         sigma=solves.start,
@@ -160,6 +163,38 @@ def _up_to_interfaces(
         step.zones,
     )
     return replace(stretch, length=done.length), done.growth
+
+
+def _up_to_boundary(
+    rule: GrowthRule, step: Step, stretch: Stretch, growth: Growth
+) -> tuple[Stretch, Growth]:
+    """A step that ends when the first tip arrives at the boundary, where others go on.
+
+    Also where it would end so close before it that the mesh takes it for a mouth: K of the others
+    jumps as it leaves, so that no step spans that. The last tips are as far as their ligament says.
+    """
+    stations, mesh = solves_of(step)[0], rule.problem.mesh
+    if len(stations) < 2:
+        return stretch, growth
+    place, leaves = stations.x + growth.move, np.zeros(len(stations), dtype=bool)
+    for row, within in enumerate(contains(mesh, place).tolist()):
+        gap, size = nearest_boundary(mesh, place[row])
+        leaves[row] = growth.arc[row] > 0 and not (within and gap > MOUTH * size)
+    if not leaves.any() or leaves.all():
+        return stretch, growth
+    longer = stretch.length + float(cell_sizes(mesh, stations.x).max())
+    if stretch.marched is not None and longer > stretch.marched.sigma[-1]:
+        zones = step.zones
+        longest_stretch = stretch_of(rule, stretch.solves, stretch.start, longer, zones)
+        stretch = replace(longest_stretch, length=stretch.length)
+
+    def holds(length: float) -> bool:
+        return _inside(mesh, (stations.x + _growth(stations, stretch, length).move)[leaves])
+
+    if holds(longer):  # it runs along a side
+        return stretch, growth
+    length = halved(holds, longer)[1]
+    return replace(stretch, length=length), _growth(stations, stretch, length)
 
 
 def _growth(stations: GrowthStations, stretch: Stretch, length: float | None = None) -> Growth:
@@ -682,7 +717,8 @@ def _without_lost_tips(
     x = (before.x + plan.move)[stays]
     stations = _stations(rates.cracks, identities, x, (before.fresh | plan.moves)[stays])
     solves = first_solves(rule, rates)
-    ahead = _ahead(rule, last)[0]
+    known = solves_of(last)[1].last(2)
+    ahead = stretch_of(rule, known, plan.sigma, plan.length, last.zones)
     zones = ahead.zones if ahead.marched is not None else None
     zones = None if zones is None else zones.at(stays)
     lost_rows = np.setdiff1d(np.arange(len(plan.arc)), stays)
