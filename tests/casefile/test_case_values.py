@@ -199,7 +199,7 @@ def test_a_file_makes_what_python_makes(group, name):
 # Public names that a case file has no words for, and why. All others are said by some key.
 RESULTS = """
 Crack Deck History Inspection Join Mesh Metal Problem Response SIF Scatter Solution Specimen Step
-Closure GrowthLaw Load Material MaterialSets Threshold
+Closure GrowthLaw Load LoadProgram Material MaterialSets Threshold
 ConvergenceError GeometryError MeshError ProblemError XcrackError XcrackWarning
 """.split()
 QUESTIONS = """
@@ -215,6 +215,7 @@ grow Cycle Spectrum read_spectrum twist wheeler willenborg plastic_zone pardiso 
 mean_reference weighted_angle life lognormal normal inspection logistic_pod residual_strength
 assessment_line handbook Numerics adapt read_deck refine part read_field law material time_rate
 nasgro_K_c mesh_step read_mesh read_surface
+K_gradient K_over_size load_over_cycles load_over_size
 """.split()  # functions that a section or key stands for
 MAKERS = {"line_crack", "penny_crack", "elliptic_crack", "plane_crack", "surface_crack"}
 
