@@ -119,8 +119,8 @@ def test_run_report_and_chart(tmp_path, capsys):
     assert (folder / "a.png").stat().st_size > 5e3
     assert main(["life", str(folder), "--scatter", "0.2", "--samples", "200"]) == 0
     assert "90 %" in capsys.readouterr().out
-    assert main(["report", str(folder)]) == 0
-    assert (folder / "report.html").is_file()
+    assert main(["report", str(folder), "--units", "N, mm, MPa"]) == 0
+    assert "MPa√mm" in (folder / "report.html").read_text(encoding="utf-8")
     case.write_text(GROWTH.replace("nu = 0.3", "nuu = 0.3"), encoding="utf-8")
     assert main(["run", str(case)]) == 2
     assert "line 15" in capsys.readouterr().err

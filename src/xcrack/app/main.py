@@ -86,6 +86,7 @@ def _parser() -> argparse.ArgumentParser:
         "-o", "--output", type=Path, help="the page; left out: report.html in it"
     )
     subparser.add_argument("--yield-stress", type=float, help="to judge plastic zones by")
+    subparser.add_argument("--units", help='of all tables, such as "N, mm, MPa"')
     subparser = add("plot", _plot, "picture of a growth run from its folder")
     subparser.add_argument("folder", type=Path, help="the folder of the run")
     subparser.add_argument("kind", nargs="?", default="a", help="K, a, path, fronts or measures")
@@ -185,7 +186,8 @@ def _sweep(options: argparse.Namespace) -> int:
 
 def _report(options: argparse.Namespace) -> int:
     target = options.output or options.folder / "report.html"
-    path = xcrack.report(options.folder, target, yield_stress=options.yield_stress)
+    path = xcrack.report(options.folder, target, yield_stress=options.yield_stress,
+                         units=options.units)  # fmt: skip
     print(f"the report is {path.resolve()}")
     return 0
 
