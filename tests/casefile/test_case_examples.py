@@ -8,6 +8,7 @@ import pytest
 
 import xcrack as xc
 from xcrack.base.description import describe
+from xcrack.verification.book.cases.plates import plate
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 SCENES = {  # what makes the problem of an example, from its names
@@ -48,6 +49,45 @@ def test_a_case_file_is_the_problem_of_the_example(name):
     case = xc.read_case(EXAMPLES / "cases" / f"{name}.toml")
     assert describe("problem", case.problem) == describe("problem", wanted)
     assert case.problem.mesh.points.tobytes() == wanted.mesh.points.tobytes()
+
+
+PLATE = """
+[mesh]
+kind = "box"
+lower = [{low}, -{height}]
+upper = [1.0, {height}]
+n = [{columns}, {rows}]
+[material]
+E = 1.0
+nu = 0.3
+plane = "strain"
+[[cracks]]
+kind = "line"
+points = [[{left}, 0], [{a}, 0]]
+[[loads]]
+kind = "traction"
+where = "top"
+value = [0.0, 1.0]
+[[loads]]
+kind = "traction"
+where = "bottom"
+value = [0.0, -1.0]
+[solve]
+order = {order}
+"""
+
+
+@pytest.mark.parametrize("order", [1, 2])
+@pytest.mark.parametrize(("a", "centre"), [(0.3, False), (0.5, False), (0.5, True)])
+def test_the_plates_of_the_book(a, centre, order, tmp_path):
+    """The tables of K of the verification book, as case files."""
+    height, low = (1.0, -1.0) if centre else (1.5, 0.0)
+    rows = round(2 * height / (a / 10))
+    text = PLATE.format(low=low, height=height, columns=round((1 - low) / (a / 10)), order=order,
+                        rows=rows + 1 - rows % 2, left=-a if centre else -0.1, a=a)  # fmt: skip
+    (tmp_path / "case.toml").write_text(text, encoding="utf-8")
+    wanted = plate(a, order, 10, centre=centre, height=height)
+    assert describe("", xc.read_case(tmp_path / "case.toml").problem) == describe("", wanted)
 
 
 def test_each_case_has_its_example():
