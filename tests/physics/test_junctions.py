@@ -588,3 +588,36 @@ def test_a_pressed_junction_that_is_moved_by_round_off():
     for angle in (0.8, 2.4, 4.0):
         moved = K_II(1.25e-10 * np.array([np.cos(angle), np.sin(angle)]))
         assert moved == pytest.approx(given, rel=1e-7)
+
+
+def test_a_short_cross_that_is_turned():
+    """Each arm lies on the prolongation of the other: round-off chose sides, K was .5 % off."""
+    stress = np.array([[1.539, -0.6469], [-0.6469, 1.407]])
+    x = np.array([-0.0273, 0.3555])
+    lines = [
+        np.array([[0.1192, 0.5474], [-0.1914, 0.1406]]),
+        np.array([x, [0.2573, 0.3323]]),
+        np.array([x, [-0.3013, 0.3778]]),
+    ]
+    a, b = lines[0]
+    t = (x - a) @ (b - a) / ((b - a) @ (b - a))
+    lines[1][0] = lines[2][0] = x = a + t * (b - a)
+    lines[2][1] = x - 0.963 * (lines[1][1] - x)
+    mesh = xc.box((-1, -1), (1, 1), 14)
+
+    def K(angle):
+        c, s = np.cos(angle), np.sin(angle)
+        R = np.array([[c, -s], [s, c]])
+        turned = R @ stress @ R.T
+        loads = [
+            xc.traction(side, lambda x, normal: normal @ turned)
+            for side in ("left", "right", "bottom", "top")
+        ]
+        body = xc.Mesh(mesh.points @ R.T, mesh.cells, mesh.facet_sets)
+        cracks = [xc.line_crack(line @ R.T) for line in lines]
+        problem = xc.Problem(body, xc.Isotropic(1.0, 0.3, "strain"), cracks, loads=loads)
+        return K_by_tip(xc.solve(problem), np.arange(4))
+
+    given = K(0.0)
+    for angle in (0.7, 2.1):
+        assert np.abs(K(angle) - given).max() < 1e-7 * np.abs(given).max()
