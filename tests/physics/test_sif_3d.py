@@ -428,9 +428,9 @@ def test_initially_stressed_sides(bent, inner, ends):
     corners = [(-0.5, -0.5, 0.011), (0.45, -0.5, 0.011), (0.45, 1.5, 0.03), (-0.5, 1.5, 0.03)]
     both = []
     for loads, move in (([xc.initial_stress(stress)], lambda x: pull(x) + v(x)), ([], pull)):
-        held = [xc.displacement(side, move) for side in ("top", "bottom")]
+        grips = [xc.displacement(side, move) for side in ("top", "bottom")]
         problem = xc.Problem(
-            mesh, xc.Isotropic(E=E, nu=nu), [xc.plane_crack(corners)], loads=loads, supports=held,
+            mesh, xc.Isotropic(E=E, nu=nu), [xc.plane_crack(corners)], loads=loads, supports=grips,
             contact="off",
         )  # fmt: skip
         both.append(xc.stress_intensity(xc.solve(problem)))

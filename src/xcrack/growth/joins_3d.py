@@ -183,8 +183,8 @@ def _facing_share(
     def nearest_gap(share: float) -> tuple[int, OwnGap] | None:
         now = plan.cracks if share == 1.0 else _advanced(rule, step, plan, share)
         gaps = [(c, own_gap(crack, body, _NEAR)) for c, crack in enumerate(now)]
-        found = [(c, gap) for c, gap in gaps if gap is not None]
-        return min(found, key=lambda each: each[1].width, default=None)
+        open_gaps = [(c, gap) for c, gap in gaps if gap is not None]
+        return min(open_gaps, key=lambda each: each[1].width, default=None)
 
     if not plan.limit:
         met = nearest_gap(1.0)
