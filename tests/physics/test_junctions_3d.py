@@ -237,6 +237,13 @@ def test_saved_solution_knows_its_arms(tmp_path):
     assert np.array_equal(xc.stress_intensity(again, 1).K, xc.stress_intensity(solution, 1).K)
 
 
+def upright(low):
+    """A plane crack that stands on a height."""
+    return xc.plane_crack(
+        [(0.013, y, z) for y, z in ((-0.3, low), (0.3, low), (0.3, 0.5), (-0.3, 0.5))]
+    )
+
+
 BAD = {
     "crosses": ([ONE, OTHER], "let one of them end on the other"),
     "no such crack": ([ONE, xc.arm(OTHER, 2, 1)], "there are 2"),
@@ -257,6 +264,11 @@ BAD = {
     ),
     "along it": ([ONE, xc.arm(xc.penny_crack((0, 0, 0.03), (0.05, 0, 1), 0.4), 0, 1)],
         "15 degrees|draw it on"),
+    "touches along an edge": ([ONE, upright(0.017)], "let one of them end on the other"),
+    "lies in it over an area": (
+        [ONE, xc.penny_crack((0.013, 0.0, 0.017), (0, 0, 1), 0.35)],
+        "cross near|let one of them end",
+    ),
     "past its front": (
         [ONE, xc.arm(xc.penny_crack((0.5, 0.0, 0.017), (0, 1, 0), 0.35), 0, 1)],
         "front|closer than a cell",
@@ -273,3 +285,14 @@ def test_bad_arms_are_refused_with_the_remedy(name):
     cracks, words = BAD[name]
     with pytest.raises(xc.XcrackError, match=words):
         discretise(scene(cracks))
+
+
+@pytest.mark.slow
+def test_an_edge_a_third_of_a_cell_from_a_face_is_refused():
+    """Two cracks would run through one cell; half a cell farther they are solved."""
+    with pytest.raises(xc.GeometryError, match="refine the mesh between them"):
+        xc.solve(scene([ONE, upright(0.067)], contact="off"))
+    energy, one = (
+        xc.solve(scene(cracks, contact="off")).energy for cracks in ([ONE, upright(0.12)], [ONE])
+    )
+    assert energy > one
