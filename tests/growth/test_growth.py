@@ -369,7 +369,8 @@ def test_one_tip_leaves_and_the_other_goes_on():
     assert [step.n_tips for step in steps] == [2, 2, 1, 1]
     assert ended.startswith("max_steps")
     assert np.isfinite(steps[-1].cycles)
-    assert length_inside(steps[2].cracks[0], problem.mesh) == pytest.approx(32.0, rel=1e-12)
+    # The step ends as the left tip arrives, 2 ahead: the right one is at 28 then. To round-off.
+    assert length_inside(steps[2].cracks[0], problem.mesh) == pytest.approx(28.0, rel=1e-10)
 
 
 def test_a_body_that_falls_apart_ends_the_run():
