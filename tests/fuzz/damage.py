@@ -161,7 +161,7 @@ def campaign_rows(rng):
         else:
             path.write_bytes(mutated_bytes(rng, path.read_bytes()))
         study = xc.campaign(half, cases, path="study")
-        return study.table()["half"]
+        return len(study.table())  # a name that is damaged leaves nan in its column
 
     return f"a study whose {target} is damaged", call
 

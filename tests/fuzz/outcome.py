@@ -35,7 +35,7 @@ _FEWEST_WORDS = 5
 _MEND = re.compile(  # an order, or what would be right
     r"\b(ask|begin|call|check|choose|couple|cut|describe|draw|enlarge|export|gives?|install|join|"
     r"known are|leave|make|merge|mesh|move|must|needs?|numbered|put|remesh|remove|resume|return|"
-    r"rows are|save|see|starts|such as|takes?|try|use|wanted|write|is no toml|is no text)\b",
+    r"rows are|save|it has|see|starts|such as|takes?|try|use|wanted|write|is no toml|is no text)\b",
     re.I,
 )
 # What numpy and others warn of by themselves is theirs, but a nan on its way must not pass.

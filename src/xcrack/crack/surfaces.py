@@ -271,7 +271,7 @@ def surface_crack(
     x, faces = x[used], inverse.reshape(-1, 3)
     if not np.isfinite(x).all():
         face = int(used[np.argmax(~np.isfinite(x).all(axis=1))])
-        raise GeometryError(f"point {face} of the surface crack is not finite.")
+        raise GeometryError(f"point {face} of the surface crack is not finite: give it.")
     x = point_coordinates(x, what, (None, 3), error=GeometryError)
     _check_shape(x, faces)
     turned = oriented_faces(faces)
