@@ -302,5 +302,5 @@ def test_a_crack_that_symmetry_keeps_shut_is_not_refined_without_end():
     scene = xc.Problem(body, xc.Isotropic(1.0, 0.3, "strain"), [crack], loads=loads)
     adapted = xc.adapt(scene, 0.03, max_unknowns=20_000, progress=False)
     assert adapted.met
-    assert adapted.rounds[-1].unknowns < 10_000
+    assert adapted.rounds[-1].unknowns < 12_000
     assert np.abs(adapted.sif.K).max() < 1e-4  # of 1, what the load would give a crack across it

@@ -83,7 +83,8 @@ def with_joins(rule: GrowthRule, step: Step, plan: Plan) -> Plan:
     if len(plan.cracks) < 2:
         return plan
     close = _close(plan.cracks, body, _BESIDE)
-    faces = _faces_met(plan.cracks, body)
+    facing = {pair for pair, _, _ in close}  # their fronts join; faces are those of other pairs
+    faces = [pair for pair in _faces_met(plan.cracks, body) if pair not in facing]
     if not close and not faces:
         return plan
     hindrance = _hindrance(rule) if close else ""
@@ -100,11 +101,11 @@ def with_joins(rule: GrowthRule, step: Step, plan: Plan) -> Plan:
     unsure = UNKNOWN[3] * abs(plain * plan.cycles - cycles)
     apart, joins = tuple(now), []
     for met in _faces_near(now, body, _AHEAD):
-        if may_touch(now, met.crack, met.on):
+        pair = (min(met.crack, met.on), max(met.crack, met.on))
+        if pair in facing or may_touch(now, met.crack, met.on):
             continue
         now[met.crack] = led_through(now, met.crack, met.on, body, _AHEAD, _SPACING)
         now[met.crack] = place_arm(now, met.crack, rule.problem.mesh)
-        pair = (min(met.crack, met.on), max(met.crack, met.on))
         joins.append(Join(step.index + 1, step.cycles + cycles, tuple(met.x.tolist()), pair))
     number = list(range(len(now)))
     while pairs := _close(now, body, OFFSET):
