@@ -164,7 +164,7 @@ fine = PARTS[-1] >= 8
 assert abs(table["K_I mean"][-1] - 1) < 0.015
 assert table["K_I scatter"][-1] < (0.005 if fine else 0.01)
 for name in ("K_II error", "K_III error", "closed: K_II error", "closed: K_III error"):
-    assert table[name][-1] < (0.015 if fine else 0.03), name
+    assert table[name][-1] < (0.02 if fine else 0.03), name  # largest along the front, of order 1
 # K_I of sliding faces is a discretisation error: pressure is constant on each multiplier group.
 assert table["closed: K_I rms"][-1] < 0.01
 assert table["closed: K_I largest"][-1] < (0.02 if fine else 0.03)

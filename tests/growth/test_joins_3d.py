@@ -123,7 +123,8 @@ def check(history):
     assert same.cycles == pytest.approx([step.cycles / 2 for step in history.steps])
 
 
-@pytest.mark.parametrize("steps", [1, pytest.param(2, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("steps", [pytest.param(1, marks=pytest.mark.mission), 2])
 def test_a_run_goes_on_over_a_join_to_the_last_bit(run, tmp_path, steps):
     """From the step before it, and from the joined one."""
     folder, problem, straight = run

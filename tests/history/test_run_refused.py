@@ -16,7 +16,11 @@ from xcrack import ProblemError, XcrackWarning, collect, grow, load, resume
 @pytest.mark.parametrize(
     ("number", "at"),
     [
-        (errno.ENOSPC, range(1, 5 * (N_STEPS + 2) + 1)),
+        pytest.param(
+            errno.ENOSPC,
+            range(1, 5 * (N_STEPS + 2) + 1),
+            marks=(pytest.mark.slow, pytest.mark.mission),
+        ),
         (errno.EROFS, (1, 6, 16)),
         (errno.EACCES, (1, 6, 16)),
     ],

@@ -148,6 +148,7 @@ def test_cells_are_fine_where_the_crack_runs_and_well_shaped(bar):
     assert smallest_angle(bar)[fine].min() > 18
 
 
+@pytest.mark.slow
 @pytest.mark.gmsh
 def test_depth_and_band_say_where_cells_are_fine(bar):
     deep = example_bar(crack_depth=14.0, band=1.6)

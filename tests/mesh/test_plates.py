@@ -298,6 +298,7 @@ def test_two_holes_turned_by_half_a_turn_is_the_same_mesh_to_the_last_bit():
     np.testing.assert_allclose(np.hypot(*(rim(mesh, "hole_0") - (3, 7)).T), 2.0, atol=2.0**-13)
 
 
+@pytest.mark.slow
 @pytest.mark.gmsh
 def test_script_makes_the_meshes_of_the_examples():
     spec = importlib.util.spec_from_file_location("make_meshes", EXAMPLES / "make.py")

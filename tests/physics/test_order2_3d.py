@@ -127,6 +127,7 @@ def exactly(monkeypatch):
     monkeypatch.setattr(iterative, "TOLERANCE", 1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("supported", [True, False], ids=["held", "not held"])
 def test_states_as_with_a_factor(monkeypatch, supported):
     """Open, closed and bent, so that a part is closed: all to 1e-8."""
@@ -159,6 +160,8 @@ def test_states_as_with_a_factor(monkeypatch, supported):
     assert 0 < closed[2] < 1
 
 
+@pytest.mark.slow
+@pytest.mark.mission
 def test_steps_do_not_grow_with_the_mesh():
     counts = [steps(tilted(n)) for n in (5, 7, 10)]
     print(f"steps {counts}")

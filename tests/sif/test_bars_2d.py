@@ -128,6 +128,8 @@ def test_no_bar_where_faces_press_at_a_kink_that_is_rounded():
     assert np.isfinite(sif.bar).all()
 
 
+@pytest.mark.slow
+@pytest.mark.mission
 def test_hole_whose_curve_is_known():
     """A polygon of few sides: most of what it changes is in eta."""
     K = {}
