@@ -190,7 +190,12 @@ RESUME = {
         near=paths("", ""),
         words=["run"],
     ),
-    "problem": arg(Seen(rule=lambda v: v is scenes.growing()), Late(scenes.growing)),
+    "problem": arg(
+        Seen(
+            rule=lambda v: v is scenes.growing() or (None if isinstance(v, xc.Problem) else False)
+        ),
+        Late(scenes.growing),
+    ),
     "law": arg(Called(), xc.paris(1e-3, 2.0), near={"other": Bad(lambda: xc.paris(2e-3, 2.0))}),
     "criterion": arg(Called(), xc.max_hoop_stress, near={"other": Bad(lambda: xc.weighted_angle)}),
     "cycles": arg(Seen(rule=lambda v: v is None), None),
@@ -202,9 +207,7 @@ RESUME = {
     "progress": arg(Flag(also=(Word(words=("always",)),)), False),
     "K_c": arg(Number(optional=True, above=0), None, 1e3),
     "retardation": arg(Seen(rule=lambda v: v is None), None),
-    "load_program": arg(
-        Of(optional=True, type=xc.LoadProgram), None, xc.load_over_size([(0.0, 1.0), (9.0, 0.9)])
-    ),
+    "load_program": arg(Seen(rule=lambda v: v is None), None),
     "link_up": arg(Called(optional=True), None, xc.plastic_zone(400.0, 2)),
     "stop_at_interface": arg(Flag(), False, True),
     "max_steps": arg(Whole(least=1, rule=lambda v: v < 3 or None, far=2), 2),

@@ -103,7 +103,7 @@ def approach(value):
     if isinstance(value, str):
         return value in ("cut", "difference")
     x = real(value)
-    return x is not None and 0 < x < 1e300
+    return x is not None and 0 < x <= 1e300
 
 
 def curves(value):

@@ -316,7 +316,7 @@ def test_multiple_sites_are_one_curve():
 @pytest.mark.parametrize(
     ("make", "words"),
     [
-        (lambda h: growth_curve(h, crack=7), "the run begins with 0"),
+        (lambda h: growth_curve(h, crack=7), "the run begins with: 0"),
         (lambda h: growth_curve(h, measure="length", crack=True), "crack = True"),
         (lambda h: growth_curve(h, measure="advance", crack=0), "a crack is named"),
         (lambda h: growth_curve(h, measure=3), "measure = 3: give measure="),

@@ -140,7 +140,9 @@ class GrowthRule:
                 "is a Spectrum(factors)."
             )
         if not self.problem.cracks:
-            raise ProblemError("grow: the problem has no crack; growth does not start one.")
+            raise ProblemError(
+                "grow: the problem has no crack, and growth does not start one: give one."
+            )
         if self.da is None and self.cycles is None and self.tolerance is None:
             raise ProblemError(
                 "grow needs da (largest advance a step) or cycles (cycles a step), or a tolerance, "

@@ -303,8 +303,8 @@ def _line_of(
         first = crack_numbers(steps[0])
         if isinstance(crack, bool) or crack not in first:
             raise ProblemError(
-                f"growth_curve: crack = {value_text(crack)}: the run begins with "
-                f"{', '.join(map(str, first))}."
+                f"growth_curve: crack = {value_text(crack)}: give the number of one that the run "
+                f"begins with: {', '.join(map(str, first))}."
             )
         line = [first.index(crack)]
         for numbers_there in after:
