@@ -415,14 +415,77 @@ def _bounds(
     return f" {text}" if text else ""
 
 
+def values_by_set(
+    given: Any, what: str, values: str, maker: str, value: str, is_value: Callable[[Any], bool]
+) -> tuple[tuple[str, Any], ...]:
+    """Check a mapping from names of cell sets to values, and return its pairs.
+
+    Parameters
+    ----------
+    given : mapping, or tuple of pairs
+    what : str
+        What the values are of, in messages.
+    values, value : str
+        What they are, and how one is given.
+    maker : str
+        A function that makes one.
+    is_value : callable
+
+    Raises
+    ------
+    ProblemError
+        No mapping of names to values.
+    """
+    pairs = given.items() if isinstance(given, Mapping) else given
+    if not isinstance(given, Mapping | tuple) or not pairs:
+        raise ProblemError(
+            f"{what}: {value_text(given)}: give a mapping of cell sets to {values}, such as "
+            f'{{"plate": {maker}(...), "weld": {maker}(...)}}.'
+        )
+    for name, each in pairs:
+        if not isinstance(name, str) or not is_value(each):
+            raise ProblemError(
+                f"{what}: {value_text(name)}: {value_text(each)}: give the name of a cell set, and "
+                f"{value}."
+            )
+    return tuple(pairs)
+
+
+def check_set_names(
+    given: Sequence[str], names: Sequence[str], what: str, values: str, value: str
+) -> None:
+    """Raise where values are for other cell sets than the materials of a problem have.
+
+    Parameters
+    ----------
+    given, names : sequence of str
+        Sets that have a value, and those of the materials.
+    what, values, value : str
+        As of `values_by_set`.
+
+    Raises
+    ------
+    ProblemError
+        A material without a value, or a value without a material.
+    """
+    if sorted(given) != sorted(names):
+        known = ", ".join(map(repr, names)) if names[0] else "one, without a name"
+        raise ProblemError(
+            f"{what}: there are {values} for {', '.join(map(repr, given))}, and the materials of "
+            f"the problem are {known}: give each of them {value}."
+        )
+
+
 __all__ = [
     "call_function",
+    "check_set_names",
     "entries",
     "flag",
     "number",
     "numbers",
     "one_of",
     "value_text",
+    "values_by_set",
     "whole_number",
     "whole_numbers",
 ]

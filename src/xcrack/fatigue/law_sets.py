@@ -1,13 +1,13 @@
 """Laws of growth by the materials that tips are in."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from xcrack.base.checks import value_text
+from xcrack.base.checks import check_set_names, values_by_set
 from xcrack.base.errors import ProblemError
 
 Names = NDArray[np.str_]
@@ -32,20 +32,11 @@ class LawSets:
     laws: Any
 
     def __post_init__(self) -> None:
-        given = self.laws
-        pairs = given.items() if isinstance(given, Mapping) else given
-        if not isinstance(given, Mapping | tuple) or not pairs:
-            raise ProblemError(
-                f"law: {value_text(given)}: give a mapping of cell sets to laws, such as "
-                '{"plate": paris(...), "weld": paris(...)}.'
-            )
-        for name, law in pairs:
-            if not isinstance(name, str) or not callable(law) or isinstance(law, LawSets):
-                raise ProblemError(
-                    f"law: {value_text(name)}: {value_text(law)}: give the name of a cell set, and "
-                    "a law such as paris(...)."
-                )
-        object.__setattr__(self, "laws", tuple(pairs))
+        pairs = values_by_set(
+            self.laws, "law", "laws", "paris", "a law such as paris(...)",
+            lambda law: callable(law) and not isinstance(law, LawSets),
+        )  # fmt: skip
+        object.__setattr__(self, "laws", pairs)
         ratios = {getattr(law, "ratio", None) for _, law in self.laws}
         if len(ratios) > 1:
             raise ProblemError(
@@ -72,12 +63,7 @@ class LawSets:
             A material without a law, or a law without a material.
         """
         given = [name for name, _ in self.laws]
-        if sorted(given) != sorted(names):
-            known = ", ".join(map(repr, names)) if names[0] else "one, without a name"
-            raise ProblemError(
-                f"law: there are laws for {', '.join(map(repr, given))}, and the materials of the "
-                f"problem are {known}: give each of them a law."
-            )
+        check_set_names(given, names, "law", "laws", "a law")
 
 
 __all__ = ["LawSets", "Names"]

@@ -1,6 +1,6 @@
 """Retardation after overloads: plastic zones, its models, and growth cycle by cycle with them."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated, Any
 
@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from xcrack.base.arguments import Number, Part
 from xcrack.base.arrays import Bools, Floats, Ints
-from xcrack.base.checks import numbers, value_text
+from xcrack.base.checks import check_set_names, numbers, values_by_set
 from xcrack.base.errors import ProblemError
 from xcrack.base.units import STRESS, TOUGHNESS
 from xcrack.fatigue.checks import evaluate_law
@@ -170,20 +170,11 @@ class RetardationSets:
     models: Any
 
     def __post_init__(self) -> None:
-        given = self.models
-        pairs = given.items() if isinstance(given, Mapping) else given
-        if not isinstance(given, Mapping | tuple) or not pairs:
-            raise ProblemError(
-                f"retardation: {value_text(given)}: give a mapping of cell sets to models, such as "
-                '{"plate": wheeler(...), "weld": wheeler(...)}.'
-            )
-        for name, model in pairs:
-            if not isinstance(name, str) or not isinstance(model, Retardation):
-                raise ProblemError(
-                    f"retardation: {value_text(name)}: {value_text(model)}: give the name of a "
-                    "cell set, and wheeler or willenborg."
-                )
-        object.__setattr__(self, "models", tuple(pairs))
+        pairs = values_by_set(
+            self.models, "retardation", "models", "wheeler", "wheeler or willenborg",
+            lambda model: isinstance(model, Retardation),
+        )  # fmt: skip
+        object.__setattr__(self, "models", pairs)
         if len({type(model) for _, model in self.models}) > 1:
             raise ProblemError(
                 "retardation: one material has wheeler, and one willenborg: an overload in front "
@@ -204,12 +195,7 @@ class RetardationSets:
             A material without a model, or a model without a material.
         """
         given = [name for name, _ in self.models]
-        if sorted(given) != sorted(names):
-            known = ", ".join(map(repr, names)) if names[0] else "one, without a name"
-            raise ProblemError(
-                f"retardation: there are models for {', '.join(map(repr, given))}, and the "
-                f"materials of the problem are {known}: give each of them one."
-            )
+        check_set_names(given, names, "retardation", "models", "one")
 
 
 # What growth cycle by cycle goes from, and what it gives.

@@ -1,6 +1,6 @@
 """What a body is made of: linear elastic materials."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, fields, replace
 from typing import Annotated, Any, ClassVar
 
@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from xcrack.base.arguments import Choice, Declared, Function, Number
 from xcrack.base.arrays import Floats, Ints, at
-from xcrack.base.checks import numbers, value_text
+from xcrack.base.checks import numbers, value_text, values_by_set
 from xcrack.base.errors import ProblemError
 from xcrack.base.units import PER_TEMPERATURE, STRESS, TOUGHNESS
 from xcrack.model.values import ScalarField, scalar_at
@@ -632,19 +632,11 @@ class MaterialSets(Material):
     materials: Any
 
     def __post_init__(self) -> None:
-        given = self.materials
-        pairs = given.items() if isinstance(given, Mapping) else given
-        if not isinstance(given, Mapping | tuple) or not pairs:
-            raise ProblemError(
-                f"material: {value_text(given)}: give a mapping of cell sets to materials, such as "
-                '{"plate": Isotropic(...), "weld": Isotropic(...)}.'
-            )
+        pairs = values_by_set(
+            self.materials, "material", "materials", "Isotropic",
+            "a material such as Isotropic(...)", lambda material: isinstance(material, Material),
+        )  # fmt: skip
         for name, material in pairs:
-            if not isinstance(name, str) or not isinstance(material, Material):
-                raise ProblemError(
-                    f"material: {value_text(name)}: {value_text(material)}: give the name of a "
-                    "cell set, and a material such as Isotropic(...)."
-                )
             if isinstance(material, MaterialSets):
                 raise ProblemError(
                     f"material: {value_text(name)} holds materials by set itself: give one mapping."
