@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import xcrack as xc
-from support.case_texts import STRIP, STRIP_GROWTH
+from support.case_texts import STRIP, STRIP_GROWTH, STRIP_PULL
 from xcrack.app import case, case_assessment, case_histories, case_values
 from xcrack.app.case_tables import Source, Table
 from xcrack.base.arguments import arguments_of
@@ -253,15 +253,6 @@ def written(folder, text):
     return path
 
 
-TAIL = """[[loads]]
-kind = "traction"
-where = "top"
-value = [0.0, "80 MPa"]
-[[loads]]
-kind = "traction"
-where = "bottom"
-value = [0.0, "-80 MPa"]
-"""
 LAW = STRIP_GROWTH.partition("cycle")[0]
 PULL = '{ kind = "traction", where = "top", value = [0, 80] }'
 
@@ -274,12 +265,12 @@ def test_histories_of_load_states(tmp_path):
     """States are factors, loads or lists of loads; of a cycle, a spectrum and a solve."""
     loads = lambda *values: [xc.traction("top", (0, value)) for value in values]  # noqa: E731
     growth = read(
-        tmp_path, f"{STRIP}{TAIL}{LAW}cycle = {{ states = [0.1, [{PULL}], 1.0] }}\nda = 1"
+        tmp_path, f"{STRIP}{STRIP_PULL}{LAW}cycle = {{ states = [0.1, [{PULL}], 1.0] }}\nda = 1"
     ).growth
     assert same(growth["cycle"].load_states[1][0], loads(80)[0])
     assert growth["cycle"].load_states[::2] == (0.1, 1.0)
     states = f'states = [0.0, {PULL}], sequence = [0, 1, 0, 1], unit = "day"'
-    text = f"{STRIP}{TAIL}{LAW}da = 1\nspectrum = {{ {states} }}"
+    text = f"{STRIP}{STRIP_PULL}{LAW}da = 1\nspectrum = {{ {states} }}"
     spectrum = read(tmp_path, text).growth["cycle"]
     assert (spectrum.unit, spectrum.sequence.tolist(), spectrum.states[0]) == (
         "day",
@@ -290,17 +281,16 @@ def test_histories_of_load_states(tmp_path):
     case_file = read(tmp_path, text)
     assert len(case_file.states) == 2
     assert case_file.solving == {"error": True}
-    rows = (
-        f"{STRIP}{TAIL}{LAW}da = 1\nspectrum = {{ rows = [[0, 1, 10], [0.2, 1, 100]], levels = 5 }}"
-    )
+    counted = "rows = [[0, 1, 10], [0.2, 1, 100]], levels = 5"
+    rows = f"{STRIP}{STRIP_PULL}{LAW}da = 1\nspectrum = {{ {counted} }}"
     assert read(tmp_path, rows).growth["cycle"].levels == 5
     twist = 'kind = "twist", mean = 0.4, seed = 3, flights = 2'
-    drawn = f"{STRIP}{TAIL}{LAW}da = 1\nspectrum = {{ {twist} }}"
+    drawn = f"{STRIP}{STRIP_PULL}{LAW}da = 1\nspectrum = {{ {twist} }}"
     assert same(read(tmp_path, drawn).growth["cycle"], xc.twist(mean=0.4, seed=3, flights=2))
 
 
 def test_options_of_growth_have_the_units_that_they_declare(tmp_path):
-    text = f"""{STRIP}{TAIL}{LAW}cycle = {{ min = 0, max = 1 }}
+    text = f"""{STRIP}{STRIP_PULL}{LAW}cycle = {{ min = 0, max = 1 }}
 da = "0.1 cm"
 threshold = "2 MPa*sqrt(m)"
 K_c = "50 MPa*sqrt(m)"
@@ -352,7 +342,7 @@ plane = "strain"
 
 
 def test_handbook_and_specimen(tmp_path):
-    text = f'{STRIP}{TAIL}[[handbook]]\nkind = "edge"\na = "6 mm"\nW = 20\nS = 80\n'
+    text = f'{STRIP}{STRIP_PULL}[[handbook]]\nkind = "edge"\na = "6 mm"\nW = 20\nS = 80\n'
     assert read(tmp_path, text).problem.handbook == (xc.handbook("edge", a=6.0, W=20.0, S=80.0),)
     deck = """[specimen]
 kind = "single_edge_tension"
@@ -390,7 +380,7 @@ points = [[1.5, 1.0], [1.5, 0.7]]
     assert same(problem.mesh.points, deck.mesh.points)
 
 
-ASSESSED = f"""{STRIP}{TAIL}{STRIP_GROWTH}[life]
+ASSESSED = f"""{STRIP}{STRIP_PULL}{STRIP_GROWTH}[life]
 samples = 500
 seed = 3
 unit = "flight"

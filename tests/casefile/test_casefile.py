@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import xcrack as xc
-from support.case_texts import STRIP, STRIP_GROWTH
+from support.case_texts import STRIP, STRIP_GROWTH, STRIP_PULL
 from xcrack.app.main import main
 from xcrack.app.sweep import values_of
 from xcrack.base.units import FORCE, LENGTH, STRESS, TOUGHNESS, Units
@@ -408,12 +408,4 @@ def test_sweep_of_solutions(tmp_path):
     assert rows["K_I in state 1"][1] == pytest.approx(rows["K_I in state 1"][0], rel=1e-12)
 
 
-SWEPT = f"""{STRIP}[[loads]]
-kind = "traction"
-where = "top"
-value = [0.0, "80 MPa"]
-[[loads]]
-kind = "traction"
-where = "bottom"
-value = [0.0, "-80 MPa"]
-{STRIP_GROWTH}"""
+SWEPT = STRIP + STRIP_PULL + STRIP_GROWTH

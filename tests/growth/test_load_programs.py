@@ -4,24 +4,11 @@ import numpy as np
 import pytest
 
 import xcrack as xc
+from support.strips import STRESS, by_formula, strip
 
-C, M, R, STRESS = 1e-12, 3.0, 0.1, 60.0
+C, M, R = 1e-12, 3.0, 0.1
 LAW, CYCLE = xc.paris(C, M), xc.Cycle(R, 1.0)
 ROUND_OFF = 1e-8  # K_II that a mesh has turns the path a little
-
-
-def strip(**choices):
-    mesh = xc.box((0.0, -30.0), (40.0, 30.0), (20, 31))
-    pull = [xc.traction("top", (0.0, STRESS)), xc.traction("bottom", (0.0, -STRESS))]
-    crack = xc.line_crack([(-1.0, 0.0), (6.0, 0.0)])
-    given = {"loads": pull} | choices
-    return xc.Problem(mesh, xc.Isotropic(210e3, 0.3, "strain"), [crack], **given)
-
-
-def by_formula(problem, states, reuse, bars):
-    """K of a small crack in a large body."""
-    K = STRESS * np.sqrt(np.pi * problem.stations.x[:, 0])
-    return xc.Response.of_K(problem, states, [float(s) * np.stack([K, 0 * K], 1) for s in states])
 
 
 def run(program, problem=None, law=LAW, cycle=CYCLE, path=None, **options):

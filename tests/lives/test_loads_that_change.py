@@ -4,25 +4,11 @@ import numpy as np
 import pytest
 
 import xcrack as xc
+from support.strips import STRESS, by_formula, strip
 
 ROUND_OFF = 1e-10
-C, M, R, STRESS = 1e-12, 3.0, 0.1, 60.0
+C, M, R = 1e-12, 3.0, 0.1
 LAW = xc.paris(C, M)
-
-
-def strip(**choices):
-    mesh = xc.box((0.0, -30.0), (40.0, 30.0), (20, 31))
-    pull = [xc.traction("top", (0.0, STRESS)), xc.traction("bottom", (0.0, -STRESS))]
-    crack = xc.line_crack([(-1.0, 0.0), (6.0, 0.0)])
-    given = {"loads": pull} | choices
-    return xc.Problem(mesh, xc.Isotropic(210e3, 0.3, "strain"), [crack], **given)
-
-
-def by_formula(problem, states, reuse, bars):
-    """K of a small crack in a large body."""
-    a = problem.stations.x[:, 0]
-    K = STRESS * np.sqrt(np.pi * a)
-    return xc.Response.of_K(problem, states, [float(s) * np.stack([K, 0 * K], 1) for s in states])
 
 
 def grown(da, count, **choices):

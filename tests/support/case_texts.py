@@ -24,3 +24,12 @@ cycle = { min = 0.1, max = 1.0 }
 da = 1.0
 max_steps = 2
 """
+STRIP_PULL = """[[loads]]
+kind = "traction"
+where = "top"
+value = [0.0, "80 MPa"]
+[[loads]]
+kind = "traction"
+where = "bottom"
+value = [0.0, "-80 MPa"]
+"""
