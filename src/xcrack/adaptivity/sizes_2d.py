@@ -93,11 +93,11 @@ def first_mesh(problem: Problem) -> Mesh:
 def growing_sizes(place: Floats, size: Floats, slope: float) -> Callable[[Floats], Floats]:
     """Sizes of cells at points that grow with the distance from places `(n, 2)` by a slope."""
 
-    def wanted(x: Floats) -> Floats:
+    def wanted_size(x: Floats) -> Floats:
         distance = np.linalg.norm(x[:, None] - place, axis=2)
         return np.asarray((size + slope * distance).min(axis=1))
 
-    return wanted
+    return wanted_size
 
 
 def tip_sizes(problem: Problem) -> tuple[Floats, Floats]:

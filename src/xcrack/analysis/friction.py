@@ -108,7 +108,7 @@ def _left_3d(model: System, rubbing: FrictionWork, along: Floats) -> SlipField:
 
 def _again_2d(model: System, c: int, tangents: Floats, before: SlipField) -> Floats:
     lips, points = model.lips[c], model.space.cracks[c].points
-    first = _first(before.points, points)
+    first = _first_point_number(before.points, points)
     line_length = np.linalg.norm(np.diff(before.points, axis=0), axis=1).sum()
     if _distance(before.points, points, first) > _OTHER * line_length:
         return np.zeros((len(lips), 1))
@@ -135,7 +135,7 @@ def _places(points: Floats, lips: LipPoints) -> Floats:
     return np.interp(arc_position(points, lips.x), ends, np.arange(len(points)))
 
 
-def _first(old: Floats, new: Floats) -> int:
+def _first_point_number(old: Floats, new: Floats) -> int:
     """Number of the new point that the first old one is.
 
     Cracks grow by points at their ends, and corrections move the last ones a little.
@@ -274,7 +274,7 @@ def _next_point(rows: FrictionRows, load: Floats, begin: SlipPoint, substeps: in
         end = t + step
         end = 1.0 if end > 1.0 - 1e-9 else end
         d = begin.d + end * (load - begin.d)
-        state = _solved(rows, d, place)
+        state = _friction_solution(rows, d, place)
         sets = max(sets, state.sets)
         closing = state.status.closed & _open_functions(rows, place)
         if closing.any() and step > shortest:
@@ -289,7 +289,7 @@ def _next_point(rows: FrictionRows, load: Floats, begin: SlipPoint, substeps: in
     return SlipPoint(place.d, place.lam, place.gap, place.status, dissipated, sets, tuple(between))
 
 
-def _solved(rows: FrictionRows, d: Floats, place: SlipPoint) -> FrictionState:
+def _friction_solution(rows: FrictionRows, d: Floats, place: SlipPoint) -> FrictionState:
     change = d.copy()
     change[rows.n :] -= place.gap[rows.n :]
     return _tractions(rows, change, place.status)

@@ -225,7 +225,7 @@ class Solution:
         -------
         (n, d) array, length
         """
-        cell, bary, sides, single = self._where(x, side)
+        cell, bary, sides, single = self._points_and_sides(x, side)
         u = self.at(cell, bary, sides)[0]
         return u[0] if single else u
 
@@ -242,7 +242,7 @@ class Solution:
         -------
         (n, d, d) array, stress
         """
-        cell, bary, sides, single = self._where(x, side)
+        cell, bary, sides, single = self._points_and_sides(x, side)
         sigma = self.stress_at(cell, bary, sides)
         return sigma[0] if single else sigma
 
@@ -305,7 +305,7 @@ class Solution:
             raise ProblemError("side must hold 1 or -1, for each crack the side of the point.")
         return cell, bary, side
 
-    def _where(self, x: ArrayLike, side: int) -> tuple[Ints, Floats, Ints, bool]:
+    def _points_and_sides(self, x: ArrayLike, side: int) -> tuple[Ints, Floats, Ints, bool]:
         points, single = self._points(x)
         if type(side) is bool or not isinstance(side, Real) or side not in (0, 1, -1):
             raise ProblemError(f"side = {value_text(side)}: give 1 (lip +), -1 (lip -) or 0.")

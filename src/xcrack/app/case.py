@@ -192,12 +192,12 @@ def _problem(root: Table) -> Problem:
     if body == "mesh":
         mesh = _mesh(table)
     elif body == "deck":
-        deck = values.called_with(_without(table, _MORE_OF_MESH), read_deck)
+        deck = values.called_with(_table_without(table, _MORE_OF_MESH), read_deck)
         deck = replace(deck, mesh=_changed_mesh(table, deck.mesh))
-        scene |= _beside(deck, scene)
+        scene |= _loads_with_deck(deck, scene)
     else:
         specimen = values.value_of_table(table, values.SPECIMENS)
-        scene |= _beside(specimen, scene)
+        scene |= _loads_with_deck(specimen, scene)
     if "material" not in scene and (body != "deck" or deck.material is None):
         root.refuse("", "the table [material] is missing: give it.")
     try:
@@ -210,20 +210,20 @@ def _problem(root: Table) -> Problem:
         (solving if chosen else root).wrap(error)
 
 
-def _beside(body: Any, scene: Mapping[str, Any]) -> dict[str, Any]:
+def _loads_with_deck(body: Any, scene: Mapping[str, Any]) -> dict[str, Any]:
     """Supports and loads of a deck or specimen, and behind them those of the file."""
     names = ("supports", "loads")
     return {name: [*getattr(body, name), *scene[name]] for name in names if name in scene}
 
 
-def _without(table: Table, names: tuple[str, ...]) -> Table:
+def _table_without(table: Table, names: tuple[str, ...]) -> Table:
     content = {name: value for name, value in table.content.items() if name not in names}
     return Table(table.source, table.key, content)
 
 
 def _mesh(table: Table) -> Mesh:
     """A mesh by the function that its kind names, and what is made of it."""
-    mesh = values.value_of_table(_without(table, _MORE_OF_MESH), values.MESHES)
+    mesh = values.value_of_table(_table_without(table, _MORE_OF_MESH), values.MESHES)
     return _changed_mesh(table, mesh)
 
 

@@ -137,7 +137,7 @@ def _run_case(path: str | PathLike[str], *, resumed: bool, overwrite: bool) -> A
         solutions = list(result.solved[-1].solutions) if result.solved else []
     _draw(case, solutions)
     report(result, case.folder / "report.html", title=case.title, units=case.units,
-           **_assessed(case, result))  # fmt: skip
+           **_assessment_of(case, result))  # fmt: skip
     return result
 
 
@@ -151,7 +151,7 @@ def solved_case(case: CaseFile) -> Solution | list[Solution]:
     return list(adaptation.solutions) if case.states is not None else adaptation.solution
 
 
-def _assessed(case: CaseFile, result: Any) -> dict[str, Any]:
+def _assessment_of(case: CaseFile, result: Any) -> dict[str, Any]:
     """What the file asks for beside a run: its spectrum, life, inspections and strength."""
     if case.growth is None:
         return {}
@@ -177,7 +177,7 @@ def growth_of_case(
 ) -> History:
     """The growth of a case, stored in a folder; gone on with where it has begun there."""
     given = {**(case.growth or {}), **options}
-    if resumed and _begun(folder):
+    if resumed and _has_begun(folder):
         law, criterion, cycle = (given.pop(name) for name in ("law", "criterion", "cycle"))
         return resume(folder, case.problem, law, criterion, cycle, given.pop("da", None),
                       keep_solutions=keep_solutions, **given)  # fmt: skip
@@ -185,7 +185,7 @@ def growth_of_case(
     return collect(steps, folder, overwrite=overwrite, keep_solutions=keep_solutions)
 
 
-def _begun(folder: Path) -> bool:
+def _has_begun(folder: Path) -> bool:
     with system_errors("a run cannot be read from", folder, error=ProblemError):
         return folder.is_dir() and any(folder.glob("step_*.npz"))
 

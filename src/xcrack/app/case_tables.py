@@ -94,15 +94,15 @@ class Table:
         Text stays text without a dimension; "free" in a list is None.
         """
         try:
-            return self._converted(self.content[name], dimension)
+            return self._in_file_units(self.content[name], dimension)
         except ProblemError as error:
             self.refuse(name, f"{error}{hint}")
 
-    def _converted(self, value: Any, dimension: Dimension | None, within: bool = False) -> Any:
+    def _in_file_units(self, value: Any, dimension: Dimension | None, within: bool = False) -> Any:
         if isinstance(value, list):
-            return [self._converted(item, dimension, True) for item in value]
+            return [self._in_file_units(item, dimension, True) for item in value]
         if isinstance(value, dict):
-            return {key: self._converted(item, dimension) for key, item in value.items()}
+            return {key: self._in_file_units(item, dimension) for key, item in value.items()}
         if value == FREE and within:
             return None
         if isinstance(value, str) and dimension is not None:

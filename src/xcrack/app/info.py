@@ -146,12 +146,12 @@ def _warm_kernels() -> float:
 
 def _scene(mesh: Mesh, crack: Crack, plane: str | None, order: int, sign: float) -> Problem:
     supports = [
-        displacement(side, lambda x: sign * 1e-3 * x * _last(x)) for side in ("top", "bottom")
+        displacement(side, lambda x: sign * 1e-3 * x * _last_entry(x)) for side in ("top", "bottom")
     ]
     return Problem(mesh, Isotropic(1.0, 0.3, plane), [crack], supports=supports, order=order)
 
 
-def _last(x: np.ndarray) -> np.ndarray:
+def _last_entry(x: np.ndarray) -> np.ndarray:
     return np.eye(x.shape[1])[-1]
 
 

@@ -117,7 +117,7 @@ def run_changed(file: str, text: str, folder: str, /, **changes: Any) -> dict[st
     case = read_case(file, changes)
     if case.growth is None:
         solved = solved_case(case)
-        return _largest([solved] if isinstance(solved, Solution) else list(solved))
+        return _largest_K([solved] if isinstance(solved, Solution) else list(solved))
     steps = Path(folder) / f"run_{key_of(changes)}" / STEPS
     history = growth_of_case(case, steps, resumed=True, keep_solutions=False, progress=False)
     return {
@@ -128,7 +128,7 @@ def run_changed(file: str, text: str, folder: str, /, **changes: Any) -> dict[st
     }
 
 
-def _largest(solutions: Sequence[Solution]) -> dict[str, float]:
+def _largest_K(solutions: Sequence[Solution]) -> dict[str, float]:
     """Largest K_I, and K_II and K_III by size, of each crack and state."""
     result = {}
     n = len(solutions[0].problem.cracks)

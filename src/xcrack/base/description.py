@@ -187,7 +187,7 @@ class Description:
         if wrapped is not None:
             value = wrapped
         if value is None or isinstance(value, Number | str | bytes | PurePath | Enum):
-            self.lines[name] = _shortened(repr(value))
+            self.lines[name] = _short_text(repr(value))
         elif isinstance(value, np.ndarray) and not value.dtype.hasobject:
             text = repr(value.tolist()) if value.size <= _FEW else ""
             content = np.ascontiguousarray(value)
@@ -325,7 +325,7 @@ def is_equal(value: Any, default: Any) -> bool:
     return value is default or bool(value == default)
 
 
-def _shortened(text: str) -> str:
+def _short_text(text: str) -> str:
     return text if len(text) <= _LONG else f"{text[:40]}… {_hash(text.encode())}"
 
 

@@ -119,7 +119,7 @@ def sketch(points: Floats, boundary: Ints, cracks: Sequence[Floats]) -> Markup:
         Segments of each crack.
     """
     view = _TOWARD[points.shape[1]]
-    outline = points[boundary] if points.shape[1] < 3 else _box(points)
+    outline = points[boundary] if points.shape[1] < 3 else _box_of(points)
     flat = [segments @ view.T for segments in (outline, *cracks) if len(segments)]
     every = np.concatenate([part.reshape(-1, 2) for part in flat])
     low, high = every.min(axis=0), every.max(axis=0)
@@ -148,7 +148,7 @@ def rim(points: Floats, faces: Ints) -> Floats:
     return points[unique[count == 1]]
 
 
-def _box(points: Floats) -> Floats:
+def _box_of(points: Floats) -> Floats:
     low, high = points.min(axis=0), points.max(axis=0)
     corner = np.stack(np.meshgrid(*np.stack([low, high], 1), indexing="ij"), -1).reshape(-1, 3)
     pairs = [(i, i | bit) for bit in (1, 2, 4) for i in range(8) if not i & bit]

@@ -135,10 +135,10 @@ def _stopped_in_holes(front: FrontChain, size: float, body: Body) -> FrontChain:
     width = (share[last] - share[first]) * np.linalg.norm(move, axis=1)
     comes_back &= width > _HOLE * size
     most = np.where(comes_back, (share[first] + share[last]) / 2, 1.0)
-    return _shortened(front, most, size)
+    return _short_ways(front, most, size)
 
 
-def _shortened(front: FrontChain, share: Floats, size: float) -> FrontChain:
+def _short_ways(front: FrontChain, share: Floats, size: float) -> FrontChain:
     """Ways cut to a share of their length; below a fiftieth of a size nothing is left of them."""
     if not (share < 1).any():
         return front
@@ -192,7 +192,7 @@ def _stopped_at_fronts(
             np.minimum.at(share[a], p[rows[hit]], part)
             meets.append((one.start[p[rows]] + other.start[q[k]])[hit] / 2)
     result = [
-        None if front is None else _shortened(front, part, size)
+        None if front is None else _short_ways(front, part, size)
         for front, part in zip(fronts, share)
     ]
     return result, np.concatenate(meets)
@@ -340,14 +340,14 @@ def _samples(path: Floats) -> tuple[Floats, Floats]:
     """Points along a path, and their arc lengths."""
     s = _arc(path)
     at = np.linspace(0.0, s[-1], 4 * _SAMPLES + 1)
-    return _along(path, at), at
+    return _point_on_path(path, at), at
 
 
 def _arc(path: Floats) -> Floats:
     return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))])
 
 
-def _along(path: Floats, at: Floats) -> Floats:
+def _point_on_path(path: Floats, at: Floats) -> Floats:
     s = _arc(path)
     return np.stack([np.interp(at, s, path[:, k]) for k in range(3)], axis=1)
 
@@ -359,7 +359,7 @@ def _cut(end: _FrontEnd, length: float, size: float) -> _FrontEnd:
         return end
     if length < _SHORT * size:
         return replace(end, path=end.path[:1])
-    return replace(end, path=_along(end.path, np.array([0.0, length])))
+    return replace(end, path=_point_on_path(end.path, np.array([0.0, length])))
 
 
 def _led_on(
@@ -416,7 +416,7 @@ def _way_across(
         outwards = start if first is not None else start[::-1]
         if len(end.path) > 1:
             s = _arc(np.concatenate([front.start[[end.base]], outwards]))
-            way = _along(end.path, s[1:] / s[-1] * _arc(end.path)[-1])
+            way = _point_on_path(end.path, s[1:] / s[-1] * _arc(end.path)[-1])
             return (way if first is not None else way[::-1]), none
         if end.inside:
             return _up_to_other_walls(start, front.stop[rays], body), none

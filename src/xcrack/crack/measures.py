@@ -343,11 +343,11 @@ def _zero_lines(piece: Floats, body: Body) -> Floats:
 
 def _front_points(crack: Crack, front: Ints, body: Body) -> Floats:
     """Points along a front inside the body."""
-    x = _dense(crack.points[front], body)
+    x = _dense_points(crack.points[front], body)
     return x[body.depth(x)[0] <= 0]
 
 
-def _dense(x: Floats, body: Body) -> Floats:
+def _dense_points(x: Floats, body: Body) -> Floats:
     side = np.diff(x, axis=0)
     length = np.linalg.norm(side, axis=1)
     size = body.depth((x[1:] + x[:-1]) / 2)[1]
@@ -360,7 +360,7 @@ def _dense(x: Floats, body: Body) -> Floats:
 def _ends(x: Floats, body: Body) -> list[Floats]:
     """Where an open front meets the boundary, or would if its end were prolonged."""
     closed = bool((x[0] == x[-1]).all())
-    points = _dense(x, body)
+    points = _dense_points(x, body)
     inside = body.depth(points)[0] < 0
     if not inside.any():
         return []

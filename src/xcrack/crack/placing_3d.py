@@ -276,7 +276,7 @@ def place_surface(crack: Crack, mesh: Mesh) -> Crack:
     """
     if crack.ends_on and crack.fronts is not None:
         return crack
-    placed, short = _placed(crack, Body.of(mesh))
+    placed, short = _placed_crack(crack, Body.of(mesh))
     if crack.fronts is None:
         for front in short:
             warn(
@@ -306,7 +306,7 @@ def short_fronts(crack: Crack, mesh: Mesh) -> list[ShortFront]:
     -------
     list of ShortFront
     """
-    return _placed(crack, Body.of(mesh))[1] if crack.fronts is None else []
+    return _placed_crack(crack, Body.of(mesh))[1] if crack.fronts is None else []
 
 
 def place_arm(cracks: Sequence[Crack], c: int, mesh: Mesh) -> Crack:
@@ -322,7 +322,7 @@ def place_arm(cracks: Sequence[Crack], c: int, mesh: Mesh) -> Crack:
     mesh : Mesh
     """
     crack = cracks[c]
-    placed = _placed(crack, body_of(cracks, c, Body.of(mesh)))[0]
+    placed = _placed_crack(crack, body_of(cracks, c, Body.of(mesh)))[0]
     return replace(placed, ends_on=crack.ends_on)
 
 
@@ -335,7 +335,7 @@ def place_arms(cracks: Sequence[Crack], mesh: Mesh) -> list[Crack]:
     return result
 
 
-def _placed(crack: Crack, body: Body) -> tuple[Crack, list[ShortFront]]:
+def _placed_crack(crack: Crack, body: Body) -> tuple[Crack, list[ShortFront]]:
     _check_inside(crack, body)
     points, faces = np.array(crack.points), np.array(crack.faces)
     first_time = crack.fronts is None
@@ -376,7 +376,7 @@ def _placed(crack: Crack, body: Body) -> tuple[Crack, list[ShortFront]]:
     if first_time or crack.ends_on:
         return placed, short
     joined = joined_fronts(placed, body)
-    return _placed(joined, body) if joined is not None else (placed, short)
+    return _placed_crack(joined, body) if joined is not None else (placed, short)
 
 
 def _check_inside(crack: Crack, body: Body) -> None:

@@ -51,7 +51,7 @@ class linear_closure(Closure):  # noqa: N801 - it is used as a function
 
     def __call__(self, R: ArrayLike) -> Floats:
         """Share of the range that opens the crack, in [0, 1]."""
-        ratio = _within("linear_closure", R, self.R_range)
+        ratio = _check_range("linear_closure", R, self.R_range)
         return np.asarray(np.clip(self.a + self.b * ratio, 0.0, 1.0))[()]
 
 
@@ -87,7 +87,7 @@ class schijve_closure(Closure):  # noqa: N801
 
     def __call__(self, R: ArrayLike) -> Floats:
         """Share of the range that opens the crack, in [0, 1]."""
-        ratio = _within("schijve_closure", R, (-1.0, 1.0))
+        ratio = _check_range("schijve_closure", R, (-1.0, 1.0))
         return np.asarray(np.clip(self.a + ratio * (self.b + ratio * self.c), 0.0, 1.0))[()]
 
 
@@ -158,7 +158,7 @@ class newman_closure(Closure):  # noqa: N801
         )[()]
 
 
-def _within(name: str, R: ArrayLike, bounds: Bounds) -> Floats:
+def _check_range(name: str, R: ArrayLike, bounds: Bounds) -> Floats:
     ratio = numbers(R, f"{name}: R")
     outside = (ratio < bounds[0]) | (ratio > bounds[1])
     if outside.any():

@@ -73,7 +73,7 @@ class load_over_size(LoadProgram):  # noqa: N801 - it is used as a function
 
     def factors(self, a: Floats, N: Floats, K_max: Floats) -> Floats:
         """Factors for sizes."""
-        return _positive(self.function, a, "load_over_size: the factor", "a")
+        return _positive_values(self.function, a, "load_over_size: the factor", "a")
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,7 +101,7 @@ class load_over_cycles(LoadProgram):  # noqa: N801
 
     def factors(self, a: Floats, N: Floats, K_max: Floats) -> Floats:
         """Factors for cycles."""
-        return _positive(self.function, N, "load_over_cycles: the factor", "N")
+        return _positive_values(self.function, N, "load_over_cycles: the factor", "N")
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,7 +120,7 @@ class K_over_size(LoadProgram):
 
     def factors(self, a: Floats, N: Floats, K_max: Floats) -> Floats:
         """Factors for sizes and K of the loads as they were given."""
-        return _over(_positive(self.function, a, "K_over_size: K", "a"), K_max)
+        return _values_over_K(_positive_values(self.function, a, "K_over_size: K", "a"), K_max)
 
 
 @dataclass(frozen=True)
@@ -155,10 +155,10 @@ class K_gradient(LoadProgram):
 
     def factors(self, a: Floats, N: Floats, K_max: Floats) -> Floats:
         """Factors for sizes and K of the loads as they were given."""
-        return _over(self.K * np.exp(self.gradient * (a - self.a0)), K_max)
+        return _values_over_K(self.K * np.exp(self.gradient * (a - self.a0)), K_max)
 
 
-def _positive(curve: Any, x: Floats, what: str, of: str) -> Floats:
+def _positive_values(curve: Any, x: Floats, what: str, of: str) -> Floats:
     """Values of a curve, one for each place.
 
     Raises
@@ -183,7 +183,7 @@ def _positive(curve: Any, x: Floats, what: str, of: str) -> Floats:
     return np.asarray(values)
 
 
-def _over(K: Floats, K_max: Floats) -> Floats:
+def _values_over_K(K: Floats, K_max: Floats) -> Floats:
     if not (np.asarray(K_max) > 0).all():
         raise ProblemError(
             "the loads are to give K, but open no crack: K is 0 under those of the problem."

@@ -122,7 +122,7 @@ def _in_ratio(value: Any, ratio: Ratio | None) -> Any:
 @cache
 def _presets() -> Mapping[str, Preset]:
     text = files("xcrack.fatigue").joinpath("presets.toml").read_text(encoding="utf-8")
-    return {name: _preset(name, entry) for name, entry in tomllib.loads(text).items()}
+    return {name: _law_of_entry(name, entry) for name, entry in tomllib.loads(text).items()}
 
 
 def law_of_constants(kind: str, entry: Mapping[str, Any], R_range: Bounds | None = None) -> Any:
@@ -137,7 +137,7 @@ def law_of_constants(kind: str, entry: Mapping[str, Any], R_range: Bounds | None
     return _LAWS[kind](**constants, R_range=R_range)
 
 
-def _preset(name: str, entry: Mapping[str, Any]) -> Preset:
+def _law_of_entry(name: str, entry: Mapping[str, Any]) -> Preset:
     bounds = tuple(entry["R_range"]) if "R_range" in entry else None
     texts = {key: entry[key] for key in ("units", "material", "environment", "source", "checked")}
     made = law_of_constants(entry["law"], entry, bounds)

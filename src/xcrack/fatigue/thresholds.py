@@ -141,7 +141,9 @@ class el_haddad(Threshold):  # noqa: N801
 
     def value(self, R: Floats, a: Floats | None, closure: Closure | None) -> Floats:
         """Threshold for R of a crack of the size a, stress √length."""
-        return np.asarray(self.long.value(R, None, closure) * short(a, self.a0, "el_haddad"))
+        return np.asarray(
+            self.long.value(R, None, closure) * short_crack_factor(a, self.a0, "el_haddad")
+        )
 
 
 class _OfNewman(Threshold):
@@ -205,10 +207,10 @@ class nasgro3_threshold(_OfNewman):  # noqa: N801
         """Threshold for R of a crack of the size a, stress √length."""
         assert isinstance(closure, newman_closure)
         inner = closure(R) / (1 - closure.A[0])
-        size = short(a, self.a0, "nasgro3_threshold")
+        size = short_crack_factor(a, self.a0, "nasgro3_threshold")
         with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
             value = np.asarray(self.dK0 * size / inner ** (1 + self.C_th * R))
-        return _finite("nasgro3_threshold", value, R)
+        return _check_finite("nasgro3_threshold", value, R)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -256,15 +258,15 @@ class nasgro4_threshold(_OfNewman):  # noqa: N801
         with np.errstate(over="ignore", divide="ignore"):
             by_range, open_at_0 = 1 / closure(R), 1 - closure.A[0]
         plus, minus = self.C_th_plus, self.C_th_minus
-        size = short(a, self.a0, "nasgro4_threshold")
+        size = short_crack_factor(a, self.a0, "nasgro4_threshold")
         with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
             above = by_range ** (1 + R * plus) / open_at_0 ** ((1 - R) * plus)
             below = by_range ** (1 + R * minus) / open_at_0 ** (plus - R * minus)
             value = np.asarray(self.dK1 * size * np.where(R >= 0, above, below))
-        return _finite("nasgro4_threshold", value, R)
+        return _check_finite("nasgro4_threshold", value, R)
 
 
-def _finite(name: str, value: Floats, ratio: Floats) -> Floats:
+def _check_finite(name: str, value: Floats, ratio: Floats) -> Floats:
     if not np.isfinite(value).all():
         raise ProblemError(
             f"{name}: for R down to {ratio.min():.6g} the threshold is no number: give R of real "
@@ -273,7 +275,7 @@ def _finite(name: str, value: Floats, ratio: Floats) -> Floats:
     return value
 
 
-def short(a: Floats | None, a0: float, name: str) -> Floats:
+def short_crack_factor(a: Floats | None, a0: float, name: str) -> Floats:
     """√(a / (a + a0)) of a crack of the size a; 1 where a0 is 0."""
     if not a0:
         return np.asarray(1.0)

@@ -127,9 +127,9 @@ class with_time(Constants):  # noqa: N801
         if not np.isfinite(high).all():
             raise ProblemError("with_time: R = 1 with a range, K_max is not known: give R < 1.")
         by_cycle = np.asarray(self.law(dK_eq, R, **wanted))
-        return np.asarray(by_cycle + self.period * self._mean(high, high - dK))[()]
+        return np.asarray(by_cycle + self.period * self._mean_rate(high, high - dK))[()]
 
-    def _mean(self, high: Floats, low: Floats) -> Floats:
+    def _mean_rate(self, high: Floats, low: Floats) -> Floats:
         """Mean of the rate over a period."""
         if self.wave == "hold":
             return np.asarray(self.rate(high))

@@ -260,7 +260,7 @@ def front_points(
         As a share of the cell's volume.
     """
     x = np.einsum("svb,sbd->svd", bary, space.mesh.points[space.mesh.cells[cell]])
-    r, size = radius_at(space, space.mesh.cells[cell], bary), _longest(x)
+    r, size = radius_at(space, space.mesh.cells[cell], bary), _longest_edges(x)
     touching, far = _on_front(bary, r, size)
     tiny = share < (1 - _SAME) * _TINY
     coarse = far & (tiny | (r.min(axis=1) > (1 + _SAME) * _FAR * size)) & (space.order == 1)
@@ -272,7 +272,7 @@ def front_points(
             (np.nonzero(coarse)[0], max(n - 2, 1)),
         )
     ]
-    return _gathered([*swept, *plain])
+    return _all_parts([*swept, *plain])
 
 
 def graded_points(
@@ -297,7 +297,7 @@ def graded_points(
     """
     nodes = space.mesh.cells[cell]
     x = np.einsum("svb,sbd->svd", bary, space.mesh.points[nodes])
-    r, size = radius_at(space, nodes, bary), _longest(x)
+    r, size = radius_at(space, nodes, bary), _longest_edges(x)
     touching, far = _on_front(bary, r, size)
     swept = _swept_points(touching, share, n)
     number = np.nonzero(far)[0]
@@ -311,17 +311,17 @@ def graded_points(
         number = np.concatenate([number[near], number[near]])
         share = np.concatenate([share[near], share[near]]) / 2
         bary, x = _halves(space, nodes[number[: len(number) // 2]], bary[near], x[near])
-        r, size = radius_at(space, nodes[number], bary), _longest(x)
+        r, size = radius_at(space, nodes[number], bary), _longest_edges(x)
     else:
         parts.append((number, bary, share))
     rule = simplex_rule(3, degree)
-    return _gathered([*swept, *(_rule_points(*part, rule) for part in parts)])
+    return _all_parts([*swept, *(_rule_points(*part, rule) for part in parts)])
 
 
 _Parts = tuple[Ints, Floats, Floats]  # sub-cell, vertices or places, share
 
 
-def _longest(x: Floats) -> Floats:
+def _longest_edges(x: Floats) -> Floats:
     """Longest edge of each tetrahedron `(s,)`."""
     i, j = local_edges(3).T
     return np.asarray(np.linalg.norm(x[:, i] - x[:, j], axis=2).max(axis=1))
@@ -356,7 +356,7 @@ def _rule_points(
     return np.repeat(number, len(rule[1])), place.reshape(-1, corner.shape[2]), weight.ravel()
 
 
-def _gathered(parts: list[_Parts]) -> _Parts:
+def _all_parts(parts: list[_Parts]) -> _Parts:
     a, b, c = (np.concatenate(p) for p in zip(*parts, strict=True))
     return a, b, c
 

@@ -79,7 +79,7 @@ def ligament_yields(rule: GrowthRule, step: Step) -> str:
     from memory);
     the zone of one tip fills what lies ahead of it.
     """
-    filled = _filled(rule, step)
+    filled = _filled_shares(rule, step)
     if not filled:
         return ""
     share, one = max(filled, key=lambda each: each[0])
@@ -101,7 +101,7 @@ def ligament_yields(rule: GrowthRule, step: Step) -> str:
     return f"ligament yield: {what}"
 
 
-def _filled(rule: GrowthRule, step: Step) -> list[tuple[float, Ligament]]:
+def _filled_shares(rule: GrowthRule, step: Step) -> list[tuple[float, Ligament]]:
     """Ligaments, and the share of each that plastic zones fill; none without a rule for them."""
     if rule.link_up is None or step.has_left:
         return []
@@ -277,7 +277,7 @@ def law_beyond(rule: GrowthRule, step: Step) -> float:
 
 def zones_beyond(rule: GrowthRule, step: Step) -> float:
     """Logarithm of the share of a ligament that plastic zones fill."""
-    share = max((share for share, _ in _filled(rule, step)), default=0.0)
+    share = max((share for share, _ in _filled_shares(rule, step)), default=0.0)
     return log(share) if share > 0 else -inf
 
 

@@ -115,7 +115,7 @@ def advance_of(step: Step, plan: Plan, rates: Rates) -> Floats:
 
 def begin(rule: GrowthRule, rates: Rates, identities: Identities) -> Corrected:
     """The first step of a run."""
-    return _settled(rule, rates, identities, 0.0, np.zeros(len(rates.stations)))
+    return _step_of_solve(rule, rates, identities, 0.0, np.zeros(len(rates.stations)))
 
 
 def begin_at(
@@ -128,17 +128,17 @@ def begin_at(
 ) -> Corrected:
     """A step before which there is nothing to follow."""
     del error, last
-    return _settled(rule, rates, identities, cycles, np.zeros(len(rates.stations)))
+    return _step_of_solve(rule, rates, identities, cycles, np.zeros(len(rates.stations)))
 
 
 def correct(rule: GrowthRule, last: Step, rates: Rates, identities: Identities) -> Corrected:
     """What the cracks after an advance mean for the cycles and for the next advance."""
     follow = _followed_2d if rates.problem.mesh.dim == 2 else _followed_3d
     since, waits = follow(rule, last, rates)
-    return _settled(rule, rates, identities, last.cycles + since, waits)
+    return _step_of_solve(rule, rates, identities, last.cycles + since, waits)
 
 
-def _settled(
+def _step_of_solve(
     rule: GrowthRule, rates: Rates, identities: Identities, cycles: float, waits: Floats
 ) -> Corrected:
     at, n = rates.stations, len(rates.stations)
@@ -177,7 +177,7 @@ def _followed_2d(rule: GrowthRule, last: Step, rates: Rates) -> tuple[float, Flo
     """
     stations, solves = solves_of(last)
     moved = np.concatenate([moved_places(last, c) for c in range(len(last.cracks))])
-    row = _matched(moved, rates.stations.x)
+    row = _rows_after(moved, rates.stations.x)
     there = row >= 0
     waits = np.zeros(len(rates.stations))
     waits[row[there]] = _rest(rule, last)[there]
@@ -190,13 +190,13 @@ def _followed_2d(rule: GrowthRule, last: Step, rates: Rates) -> tuple[float, Flo
         return float(da[j] / rate0[j]), waits
     near = interfaces_ahead(rule, stations.x, plan_of(last).move)
     if near is not None and da[j] > near.way[j]:
-        return _across(rule, last, rates, near, j, int(row[j])), waits
+        return _cycles_across(rule, last, rates, near, j, int(row[j])), waits
     c = int(stations.crack[j])
     a = last.sizes[c] * float(da[j] / da[stations.crack == c].sum())
     return float(cycles_between(a, a + da[j], rate0[j], rates.law_rate[row[j]])), waits
 
 
-def _across(
+def _cycles_across(
     rule: GrowthRule, last: Step, rates: Rates, near: InterfacesAhead, j: int, row: int
 ) -> float:
     """Cycles of a step in which the driving tip j has passed an interface; `row` is it behind."""
@@ -233,7 +233,7 @@ def _rest(rule: GrowthRule, last: Step) -> Floats:
     return np.where(plan.moves, 0.0, solves_of(last)[0].growth(_score(rule, last), plan.length))
 
 
-def _matched(moved: Floats, tips: Floats) -> Ints:
+def _rows_after(moved: Floats, tips: Floats) -> Ints:
     """Row of each tip after the step, -1 where it has left the body."""
     if not len(tips) or not len(moved):
         return np.full(len(moved), -1)

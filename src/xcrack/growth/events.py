@@ -123,10 +123,10 @@ def arriving(step: Step, problem: Problem) -> list[Arriving]:
         result = _arriving_fronts(scaled, plan.apart, placed, mesh)
     else:
         result = _arriving_fronts(step, plan.cracks, problem.placed, mesh)
-    return [_named(step, each) for each in result]
+    return [_with_identity(step, each) for each in result]
 
 
-def _named(step: Step, one: Arriving) -> Arriving:
+def _with_identity(step: Step, one: Arriving) -> Arriving:
     """The same with the identity of the end."""
     if step.identities is None:
         return one
@@ -165,10 +165,10 @@ def arrivals_of(
 
 def have_left(cracks: Sequence[Crack], placed: Sequence[Crack]) -> bool:
     """Whether tips, or whole fronts, have left the body."""
-    return any(_gone(*pair) for pair in zip(cracks, placed, strict=True))
+    return any(_tips_outside(*pair) for pair in zip(cracks, placed, strict=True))
 
 
-def _gone(advanced: Crack, placed: Crack) -> list[int]:
+def _tips_outside(advanced: Crack, placed: Crack) -> list[int]:
     """Numbers of the tips that have left the body; [0] where all fronts have."""
     if advanced.fronts is not None:
         return [0] if advanced.n_tips and not placed.n_tips else []
@@ -182,7 +182,7 @@ def _arriving_tips(
     result = []
     for c, pair in enumerate(zip(advanced, placed, strict=True)):
         start = _starts(last, advanced, c)
-        for j in _gone(*pair):
+        for j in _tips_outside(*pair):
             move = pair[0].points[(pair[0].tips or ())[j]] - start[j]
             way = float(np.linalg.norm(move))
             hit = exit_ahead(start[j], move / way, mesh) if way > 0 else None
@@ -232,7 +232,7 @@ def _arriving_fronts(
         start, move = last.sif[0][c].x, moved_places(last, c) - last.sif[0][c].x
         part_inside = _parts(start, move, body)
         x = start + np.minimum(part_inside, 1.0)[:, None] * move
-        if _gone(*pair):
+        if _tips_outside(*pair):
             result += [
                 Arriving(c, place, tuple(y.tolist()), name_at(y), way, part)
                 for place, y, way, part in _last_out(start, move, part_inside, body)

@@ -106,9 +106,9 @@ def predicted(front: FrontWaves | None, s: Floats, advance: Floats) -> Floats:
         return advance
 
     def change(even: Floats) -> Floats:
-        return _weighted(front, even, _phi_1(front.decay) - 1)
+        return _weighted_response(front, even, _phi_1(front.decay) - 1)
 
-    return _changed(front, s, advance, advance, change)
+    return _changed_advance(front, s, advance, advance, change)
 
 
 def corrected(front: FrontWaves | None, s: Floats, advance: Floats, later: Floats) -> Floats:
@@ -125,13 +125,13 @@ def corrected(front: FrontWaves | None, s: Floats, advance: Floats, later: Float
     def change(even: Floats) -> Floats:
         after = along_front(s, later, front.place, front.closed, front.length)
         phi_1, phi_2 = _phi_1(front.decay), _phi_2(front.decay)
-        first = _weighted(front, even, phi_1 - phi_2 * np.exp(-front.decay) - 0.5)
-        return first + _weighted(front, after, phi_2 - 0.5)
+        first = _weighted_response(front, even, phi_1 - phi_2 * np.exp(-front.decay) - 0.5)
+        return first + _weighted_response(front, after, phi_2 - 0.5)
 
-    return _changed(front, s, advance, mean, change)
+    return _changed_advance(front, s, advance, mean, change)
 
 
-def _changed(
+def _changed_advance(
     front: FrontWaves,
     s: Floats,
     advance: Floats,
@@ -144,7 +144,7 @@ def _changed(
     return np.asarray(np.maximum(plain + less, 0.0))
 
 
-def _weighted(front: FrontWaves, values: Floats, factor: Floats) -> Floats:
+def _weighted_response(front: FrontWaves, values: Floats, factor: Floats) -> Floats:
     """Value r E f Eᵀ (values/r), zero where nothing grows."""
     grows = front.root > 0
     scaled = np.where(grows, values / np.where(grows, front.root, 1.0), 0.0)
@@ -222,13 +222,13 @@ def without_noise(sif: SIF, angle: Floats, closed: Floats, length: Floats) -> Fl
         if np.sqrt((sif.K_II[own] ** 2).mean()) > _MIXED * np.sqrt((noise**2).mean()):
             continue
         error = 2 * noise / np.maximum(K_I, 0.3 * K_I.max())
-        result[own] = _filtered(
+        result[own] = _filtered_angle(
             sif.s[own], angle[own], error, bool(closed[number]), float(length[number])
         )
     return result
 
 
-def _filtered(s: Floats, angle: Floats, error: Floats, closed: bool, length: float) -> Floats:
+def _filtered_angle(s: Floats, angle: Floats, error: Floats, closed: bool, length: float) -> Floats:
     n = 2 * len(s)
     span = length if closed else float(s.max() - s.min())
     place = np.arange(n) * span / n if closed else s.min() + (np.arange(n) + 0.5) * span / n

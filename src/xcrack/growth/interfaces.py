@@ -223,12 +223,12 @@ def singularity_at_interface(own: Isotropic, other: Isotropic) -> float:
         other.mu * (own.kolosov + 1) + own.mu * (other.kolosov + 1)
     )
 
-    def above(order: float) -> bool:
+    def is_above(order: float) -> bool:
         right = 2 * (beta - alpha) / (1 + beta) * (1 - order) ** 2
         right += (alpha + beta**2) / (1 - beta**2)
         return bool(np.cos(np.pi * order) > right)
 
-    return sum(halved(above, 1.0)) / 2
+    return sum(halved(is_above, 1.0)) / 2
 
 
 # A step that ends before an interface, or passes.
@@ -289,7 +289,7 @@ def passage(
         solves = solves_in(passed)
         piece = stretch_of(rule, solves, start + total, most - total, zones)
         crosses = (goal > near.way) & ~passed
-        length, row = _first(piece, np.where(crosses, near.way, goal) - done)
+        length, row = _first_end(piece, np.where(crosses, near.way, goal) - done)
         if length < most - total:
             piece = stretch_of(rule, solves, start + total, length, zones)
         growth = piece.growth(frame, solves.angles(frame))
@@ -302,7 +302,7 @@ def passage(
     return Passage(total, Growth(move, done, cycles), cycles_at, zones)
 
 
-def _first(piece: Stretch, target: Floats) -> tuple[float, int]:
+def _first_end(piece: Stretch, target: Floats) -> tuple[float, int]:
     """Part of a piece of σ until the first end is where it should be, and which; -1 where none."""
     length, first = piece.length, -1
     for row in np.nonzero(piece.arcs()[0] >= target)[0].tolist():

@@ -104,7 +104,7 @@ def refined(
         new = sorted(set(factors) - set(solved))
         if not new:
             return handed_on
-        start = handed_on if not solved else _nearest(handed_on, solved, new)
+        start = handed_on if not solved else _with_nearest_sets(handed_on, solved, new)
         response = solve(states_of(spectrum, np.array(new)), start)
         for row, factor in enumerate(new):
             solved[factor] = LevelResponse(response, row)
@@ -120,7 +120,7 @@ def refined(
         wanted = np.nonzero(active)[0][: _MOST - len(levels)]
         middle = [0.5 * (levels[k] + levels[k + 1]) for k in wanted]
         handed_on = solve_at(middle)
-        matters = _matters(spectrum, solved, levels, wanted, middle, ends)
+        matters = _levels_that_matter(spectrum, solved, levels, wanted, middle, ends)
         bent = {m for m, off in zip(middle, matters) if off}
         levels = sorted([*levels, *middle])
         active = np.array([a in bent or b in bent for a, b in zip(levels, levels[1:])])
@@ -129,7 +129,7 @@ def refined(
         tuple(each.whole.states[each.row] for each in every),
         tuple(each.sif for each in every),
         tuple(each.whole.solutions[each.row] for each in every if each.whole.solutions),
-        replace(_nearest(handed_on, solved, levels), levels=tuple(levels)),
+        replace(_with_nearest_sets(handed_on, solved, levels), levels=tuple(levels)),
     )
 
 
@@ -140,7 +140,7 @@ def states_of(spectrum: Spectrum, factors: Floats) -> list[float | LoadLevel]:
     return [LoadLevel(float(factor), tuple(spectrum.steady)) for factor in factors]
 
 
-def _nearest(
+def _with_nearest_sets(
     reuse: SolverState, solved: dict[float, LevelResponse], factors: Sequence[float]
 ) -> SolverState:
     """The same with the closed sets of the factors that are nearest to some others."""
@@ -164,7 +164,7 @@ def _ends(spectrum: Spectrum, low: float, high: float) -> tuple[Floats, Ints, Fl
     return np.linspace(low, high, _POINTS), pairs.T, number
 
 
-def _matters(
+def _levels_that_matter(
     spectrum: Spectrum,
     solved: dict[float, LevelResponse],
     levels: Sequence[float],

@@ -40,7 +40,7 @@ class Progress:
         now = time.perf_counter()
         since = 0.0 if self._cycles is None else step.cycles - self._cycles
         line = _line(self.run, step)
-        left = _left(self.run, step, since, now - self._begin)
+        left = _time_left(self.run, step, since, now - self._begin)
         self._begin, self._cycles = now, step.cycles
         _LOG.info("%s%s", line, left)
         if not _is_wanted(self.run):
@@ -50,7 +50,7 @@ class Progress:
         if self._bar is None:
             print(line + left, file=sys.stderr)
         else:
-            self._bar.set_postfix_str(f"N {step.cycles:.6g}, dK_eq {_largest(step.dK_eq):.5g}")
+            self._bar.set_postfix_str(f"N {step.cycles:.6g}, dK_eq {_largest_part(step.dK_eq):.5g}")
             self._bar.update()
 
     def end(self, ended: str) -> None:
@@ -68,12 +68,13 @@ class Progress:
 def _line(run: GrowthRule, step: Step) -> str:
     places = f"{PLACE[run.problem.mesh.dim]}s"
     return (
-        f"step {step.index:4d}  N {step.cycles:12.6g}  largest dK_eq {_largest(step.dK_eq):10.5g}  "
-        f"da {_largest(step.da):9.4g}  {places} {step.n_tips}"
+        f"step {step.index:4d}  N {step.cycles:12.6g}  largest dK_eq "
+        f"{_largest_part(step.dK_eq):10.5g}  "
+        f"da {_largest_part(step.da):9.4g}  {places} {step.n_tips}"
     )
 
 
-def _largest(parts: Any) -> float:
+def _largest_part(parts: Any) -> float:
     return max((float(part.max(initial=0.0)) for part in parts), default=0.0)
 
 
@@ -86,7 +87,7 @@ def _new_bar(run: GrowthRule, step: Step) -> Any:
     return tqdm(total=run.max_steps, initial=step.index, unit="step", file=sys.stderr)
 
 
-def _left(run: GrowthRule, step: Step, cycles: float, seconds: float) -> str:
+def _time_left(run: GrowthRule, step: Step, cycles: float, seconds: float) -> str:
     """Time that is left if all steps take as long as this one; empty where nobody knows."""
     steps = [] if run.max_steps is None else [run.max_steps - 1.0 - step.index]
     if run.max_cycles is not None and cycles > 0:

@@ -187,7 +187,7 @@ def rates_of(
     )
     stations = solved_stations(response.sif[0])
     if response.solutions and any(problem.frictions):
-        still = _locked(problem, response, dK_eq)
+        still = _is_locked(problem, response, dK_eq)
         dK_eq, law_rate = np.where(still, 0.0, dK_eq), np.where(still, 0.0, law_rate)
     still = _at_rest(problem, response, dK_eq)
     dK_eq, law_rate = np.where(still, 0.0, dK_eq), np.where(still, 0.0, law_rate)
@@ -346,7 +346,7 @@ def _at_rest(problem: Problem, response: Response, dK_eq: Floats) -> Bools:
 # Ends that friction locks.
 
 
-def _locked(problem: Problem, response: Response, dK_eq: Floats) -> Bools:
+def _is_locked(problem: Problem, response: Response, dK_eq: Floats) -> Bools:
     """Stations beside which the faces stick in every state `(n,)`.
 
     K does not change there: what is left of its range is the error of quadrature, which a crack

@@ -257,7 +257,7 @@ def growth_steps(
                 _warn_of_ratio(rule, first)
                 _warn_of_left_out(rule, first)
                 is_torn = _warn_of_mode_III(rule, first)
-                first = _judged(rule, first)
+                first = _with_validity(rule, first)
             last = replace(first, warnings=tuple(messages))
             progress.step(last)
             yield last
@@ -281,14 +281,14 @@ def growth_steps(
                     del messages[:own]  # of a step that nobody has
                 else:
                     if cut is not last:
-                        next_step = _marked(next_step)
+                        next_step = _with_mark(next_step)
                     next_step, reuse, ended = _cut_at_end(
                         rule, cut, (next_step, reuse, ended), messages
                     )
-                    next_step = _judged(rule, next_step)
+                    next_step = _with_validity(rule, next_step)
             if other is not None:
                 reuse = reuse if other[0] is rule else run_state(last).reuse
-                rule, last = other[0], _planned(other[0], other[1] or last)
+                rule, last = other[0], _with_plan(other[0], other[1] or last)
                 continue
             last = replace(next_step, warnings=tuple(messages))
             progress.step(last)
@@ -318,7 +318,7 @@ def steps_to_go_on_from(rule: GrowthRule, done: Sequence[Step]) -> Sequence[Step
     return done
 
 
-def _marked(step: Step) -> Step:
+def _with_mark(step: Step) -> Step:
     """A step that is shorter than planned, for an end that comes."""
     return step if step.run is None else replace(step, run=replace(step.run, cut=True))
 
@@ -377,7 +377,7 @@ def _cut_at_end(
             at_high *= 0.5 if bound == "high" else 1.0
             bound = "high"
             continue
-        ending = _marked(step), reuse, ended
+        ending = _with_mark(step), reuse, ended
         high, at_high = length, beyond
         if beyond <= _AIM:
             break
@@ -423,7 +423,7 @@ def _cut_at_size(rule: GrowthRule, last: Step) -> Step:
 
 def _with_length(rule: GrowthRule, step: Step, length: float) -> Step:
     """A step with a shorter way ahead, of which the advance of its stations is a share."""
-    shorter = _planned(rule, replace(step, control=replace(step.control, length=length)))
+    shorter = _with_plan(rule, replace(step, control=replace(step.control, length=length)))
     plan, before = plan_of(shorter), plan_of(step)
     share = plan.largest / before.largest if before.largest > 0 else 1.0
     if rule.integrator == "euler":  # it recognises its stations by that, to round-off
@@ -446,7 +446,7 @@ def _warned_of_kink(rule: GrowthRule, step: Step) -> str:
     return kink
 
 
-def _judged(rule: GrowthRule, step: Step) -> Step:
+def _with_validity(rule: GrowthRule, step: Step) -> Step:
     """A step with how far elasticity holds at it; warns of what is beyond its limit."""
     if rule.scouts:
         return step
@@ -590,12 +590,12 @@ def _solved_step(
             rule.meshes,
         ),
     )
-    step = _planned(rule, step)
+    step = _with_plan(rule, step)
     da = integrator.advance_of(step, plan_of(step), rates)
     return replace(step, da=rates.split(da)), handed_on
 
 
-def _planned(rule: GrowthRule, step: Step) -> Step:
+def _with_plan(rule: GrowthRule, step: Step) -> Step:
     """A step with the plan of what comes after it."""
     plan = integrator_of(rule).predict(rule, step)
     step = replace(step, plan=plan)

@@ -178,7 +178,7 @@ def identities_after(
     for c, crack in enumerate(cracks):
         rows = np.nonzero(crack_now == c)[0]
         points = [[tip] for tip in crack.tips or ()] if crack.fronts is None else crack.fronts
-        own = _claimed(stations.end[rows], place[rows], [crack.points[p] for p in points])
+        own = _identities_at(stations.end[rows], place[rows], [crack.points[p] for p in points])
         word = "tip" if crack.fronts is None else "front"
         for k, end in enumerate(own):
             if end < 0:
@@ -188,7 +188,7 @@ def identities_after(
     return Identities(tuple(firsts), tuple(ends), tuple(names))
 
 
-def _claimed(end: Ints, place: Floats, points: Sequence[Floats]) -> list[int]:
+def _identities_at(end: Ints, place: Floats, points: Sequence[Floats]) -> list[int]:
     """Identity of each of some new ends, by their points; -1 for one that is new."""
     result = [-1] * len(points)
     if not len(end) or not len(points):

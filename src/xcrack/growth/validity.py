@@ -177,7 +177,7 @@ def validity(
         K = clipped_K(np.stack([row[c].K for row in sif])) if sif else np.zeros((0, 0, 2))
         if not K.size:
             continue
-        largest, angle = _largest(K, nu)
+        largest, angle = _largest_K_eq(K, nu)
         places_of_crack = sif[0][c]
         ahead = _directions(places_of_crack, angle)
         size = _size(crack, mesh)
@@ -214,7 +214,7 @@ def validity(
     return Validity(**numbers, state=state, places=places)
 
 
-def _largest(K: Floats, nu: float) -> tuple[Floats, Floats]:
+def _largest_K_eq(K: Floats, nu: float) -> tuple[Floats, Floats]:
     """Largest equivalent factor of the states `(f,)`, and the direction in that state."""
     angle = kink_angle(K)
     equivalent = equivalent_K(K, angle, nu)

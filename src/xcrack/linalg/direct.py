@@ -136,11 +136,11 @@ class DirectSystem:
         self.count.solves += 1 if f.ndim == 1 else f.shape[1]
         b = self._loads(f, u_imposed)
         if f.ndim == 1:
-            return self._expanded(self.apply_inverse(b), u_imposed)
+            return self._displacements_of(self.apply_inverse(b), u_imposed)
         first, scale = proportional_columns(b)
         alone = np.unique(first)
         y = self.apply_inverse(b if len(alone) == b.shape[1] else b[:, alone])
-        return self._expanded(y[:, np.searchsorted(alone, first)] * scale, u_imposed)
+        return self._displacements_of(y[:, np.searchsorted(alone, first)] * scale, u_imposed)
 
     def first_look(
         self, f: Floats, u_imposed: Floats, closed_before: bool
@@ -193,7 +193,7 @@ class DirectSystem:
             with one_blas_thread():
                 loaded[places] += Y @ lam
             self.count.solves += b.shape[1]
-            return self._expanded(factor.backward(loaded), u_imposed)
+            return self._displacements_of(factor.backward(loaded), u_imposed)
 
         return CondensedSystem(F, d, displacements)
 
@@ -241,7 +241,7 @@ class DirectSystem:
             f = f - times(self.matrix, u_imposed)
         return times_transposed(self.basis, f)
 
-    def _expanded(self, y: Floats, u_imposed: Floats | None) -> Floats:
+    def _displacements_of(self, y: Floats, u_imposed: Floats | None) -> Floats:
         """Displacements of coefficients in the solver's basis."""
         u = times(self.basis, y)
         u = u if u_imposed is None else u_imposed + u
@@ -310,7 +310,7 @@ def _checked_solution(factor: Factor, A: sp.csc_matrix, count: SolveCount) -> So
         if not fallback:
             x = factor.solve(b)
             some = slice(1) if sound and b.ndim > 1 else slice(None)
-            if _residual(A, x[..., some], b[..., some]) <= _LOST:
+            if _relative_residual(A, x[..., some], b[..., some]) <= _LOST:
                 sound.append(True)
                 return x
             count.factorisations += 1
@@ -320,7 +320,7 @@ def _checked_solution(factor: Factor, A: sp.csc_matrix, count: SolveCount) -> So
     return solve
 
 
-def _residual(A: sp.csc_matrix, x: Floats, b: Floats) -> float:
+def _relative_residual(A: sp.csc_matrix, x: Floats, b: Floats) -> float:
     """Largest residual of right-hand sides, relative to their size; A is symmetric."""
     from xcrack.linalg.kernels.sparse import residual
 
@@ -342,7 +342,7 @@ def _verified_solver(solver: Solver, A: sp.csc_matrix) -> Solve:
         )
         if not np.isfinite(x).all():
             return x  # a singular stiffness, which has its own error
-        share = _residual(A, x, b)
+        share = _relative_residual(A, x, b)
         if share > _WRONG:
             raise ConvergenceError(
                 f"the given solver leaves a residual of {share:.3g} of the right-hand side: what "

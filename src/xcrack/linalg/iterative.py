@@ -222,7 +222,7 @@ class IterativeSystem:
         """
         columns = f.reshape(len(f), -1)
         given = np.zeros_like(columns) if u_imposed is None else u_imposed.reshape(columns.shape)
-        b, known_of = _vectors(self._reduced(columns, given)), _vectors(given)
+        b, known_of = _vectors(self._loads_on_unknowns(columns, given)), _vectors(given)
         y: list[Floats] = [np.zeros_like(each) for each in b]
         if start is not None:
             y = _vectors(self.coordinates(start.reshape(columns.shape) - given))
@@ -259,7 +259,7 @@ class IterativeSystem:
         """
         del opened
         rows_in_basis = sp.csr_matrix(rows.N @ self.basis)
-        b = _vectors(self._reduced(f, u_imposed))
+        b = _vectors(self._loads_on_unknowns(f, u_imposed))
         gaps = _vectors(rows.N @ u_imposed)
         y = [np.zeros_like(each) for each in b]
         if latest is not None:
@@ -277,10 +277,10 @@ class IterativeSystem:
                     y[k], first = scale[k] * model.y, model.active
                 active = rows_in_basis @ y[k] + gaps[k] < 0 if first is None else first
                 conditions = rows_in_basis, gaps[k], rows.measure, rows.stiffness
-                runs.append(self._together(b[k], u_imposed[:, k], conditions, active, y[k]))
+                runs.append(self._solve_with_rows(b[k], u_imposed[:, k], conditions, active, y[k]))
             for k, state in zip(chosen, in_lockstep(self.operator, runs), strict=True):
                 solved[k] = state
-                self._counted(state.iterations)
+                self._count_steps(state.iterations)
         return [
             StateContact(s.pressure, s.gap, s.active, s.sets, u_imposed[:, k] + self.basis @ s.y)
             for k, s in sorted(solved.items())
@@ -303,7 +303,7 @@ class IterativeSystem:
         """With the levels of the mesh."""
         return replace(reuse, hierarchy=self.hierarchy)
 
-    def _reduced(self, f: Floats, u_imposed: Floats) -> Floats:
+    def _loads_on_unknowns(self, f: Floats, u_imposed: Floats) -> Floats:
         """Loads `(n_dof, k)` on the unknowns of the solver."""
         return np.asarray(self.basis.T @ (f - self.matrix @ u_imposed if u_imposed.any() else f))
 
@@ -316,16 +316,16 @@ class IterativeSystem:
         tolerance: float,
     ) -> None:
         """Put solutions of some states in the place of their guesses."""
-        runs = [self._apart(b[k], u_imposed[k], y[k], tolerance) for k in chosen]
+        runs = [self._solve_by_column(b[k], u_imposed[k], y[k], tolerance) for k in chosen]
         for k, (solved, steps) in zip(chosen, in_lockstep(self.operator, runs), strict=True):
             y[k] = solved
-            self._counted(steps)
+            self._count_steps(steps)
 
-    def _counted(self, steps: int) -> None:
+    def _count_steps(self, steps: int) -> None:
         self.count.solves += 1
         self.count.iterations += steps
 
-    def _apart(
+    def _solve_by_column(
         self, b: Floats, u_imposed: Floats, start: Floats, tolerance: float
     ) -> Iteration[tuple[Floats, int]]:
         y, steps = yield from conjugate_gradients_steps(self.operator, b, start, tolerance)
@@ -335,7 +335,7 @@ class IterativeSystem:
             steps += more
         return y, steps
 
-    def _together(
+    def _solve_with_rows(
         self,
         b: Floats,
         u_imposed: Floats,
@@ -383,11 +383,11 @@ class IterativeSystem:
             return self.within
         assert self.combined is not None
         assert self.back is not None
-        K = nearby_unknowns(_joined(self.matrix), self.combined, self.blocks)
+        K = nearby_unknowns(_joined_rows(self.matrix), self.combined, self.blocks)
         return sp.csr_matrix(self.back.T @ within_blocks(K, self.blocks) @ self.back)
 
 
-def _joined(K: sp.csr_matrix | Stiffness, rows: Bools | None = None) -> sp.csr_matrix:
+def _joined_rows(K: sp.csr_matrix | Stiffness, rows: Bools | None = None) -> sp.csr_matrix:
     return K.joined(rows) if isinstance(K, Stiffness) else K
 
 
@@ -423,7 +423,7 @@ def iterative_system(
     """
     if levels is None or not levels.fits(bulk, fixed):
         levels = hierarchy(bulk, fixed)
-    near_entries = _joined(K, rows)  # after the levels, whose making needs the most memory
+    near_entries = _joined_rows(K, rows)  # after the levels, whose making needs the most memory
     free = ~fixed
     d = space.dim
     plain = np.arange(len(levels.free))

@@ -223,10 +223,10 @@ class VCycle:
             (r / size if size > 0 else np.zeros_like(r)).astype(np.float32)
             for r, size in zip(residuals, sizes, strict=True)
         ]
-        results = in_fours(partial(self._down, 0), scaled)
+        results = in_fours(partial(self._solve_below, 0), scaled)
         return [z.astype(np.float64) * size for z, size in zip(results, sizes, strict=True)]
 
-    def _down(self, number: int, b: Any) -> Any:
+    def _solve_below(self, number: int, b: Any) -> Any:
         if number == len(self.levels):
             return _by_column(self.coarsest.__matmul__, b)
         level = self.levels[number]
@@ -234,7 +234,7 @@ class VCycle:
         d = _smooth(level, r, x)
         level.matrix.added(r, -1, d)
         n = level.prolong.shape[0]
-        coarse = self._down(number + 1, level.restrict.times(r[:n]))
+        coarse = self._solve_below(number + 1, level.restrict.times(r[:n]))
         correction = np.zeros_like(x)
         level.prolong.added(correction[:n], 1, coarse)
         x += correction
@@ -409,7 +409,7 @@ def _aggregation_levels(
         levels.append(_level(blocks, diagonal, largest, small))
         if A.shape[0] > 0.7 * small.shape[0]:
             break
-    return tuple(levels), _inverse(A.toarray(), scale)
+    return tuple(levels), _pseudo_inverse(A.toarray(), scale)
 
 
 def _coarse_matrix(A: sp.bsr_matrix, P: sp.bsr_matrix) -> sp.bsr_matrix:
@@ -537,7 +537,7 @@ def _stacked_rows(parts: list[sp.bsr_matrix]) -> sp.bsr_matrix:
     return sp.bsr_matrix((data, indices, offsets(counts)), shape=(rows, parts[0].shape[1]))
 
 
-def _inverse(A: Floats, scale: float) -> Any:
+def _pseudo_inverse(A: Floats, scale: float) -> Any:
     """Pseudo-inverse of a symmetric matrix, in single precision.
 
     A body that nothing holds may end in one aggregate, whose matrix is round-off of entries of

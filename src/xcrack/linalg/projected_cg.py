@@ -172,7 +172,7 @@ class _Plane:
         return self.solve(self.lifted.T @ r)
 
 
-def _plane(N: sp.csr_matrix, d: Floats, scale: Floats, diagonal: Floats) -> _Plane:
+def _search_plane(N: sp.csr_matrix, d: Floats, scale: Floats, diagonal: Floats) -> _Plane:
     rows = sp.csr_matrix(sp.diags(scale) @ N)
     lifted = sp.csr_matrix(sp.diags(1 / diagonal) @ rows.T)
     return _Plane(rows, scale * d, scale, lifted, _solver(sp.csc_matrix(rows @ lifted)))
@@ -250,11 +250,11 @@ class _Descent:
             more = self.plane.carried(r)
             r -= self.plane.rows.T @ more
             self.carried += more
-        self.r = _without(self.K.null, r)
+        self.r = _without_motions(self.K.null, r)
         self.norm = _norm(r)
 
 
-def _without(null: Floats, r: Floats) -> Floats:
+def _without_motions(null: Floats, r: Floats) -> Floats:
     """Take rigid motions off a vector, which is changed."""
     if null.shape[1]:
         r[: len(null)] -= null @ (null.T @ r[: len(null)])
@@ -313,7 +313,7 @@ def conjugate_gradients_steps(
             )
         yield from descent.step()
         steps += 1
-    return _without(K.null, descent.y), steps
+    return _without_motions(K.null, descent.y), steps
 
 
 def projected_solution(
@@ -411,7 +411,7 @@ class _Loop:
             yield from descent.begin()
             pressure, gap, new = yield from self._settle(descent, active, size, check)
             if np.array_equal(new, active):
-                y = _without(self.K.null, descent.y)
+                y = _without_motions(self.K.null, descent.y)
                 return self._result(y, pressure, gap, active)
             y = descent.y
             reached = max(self.tolerance, descent.norm / size)
@@ -443,12 +443,12 @@ class _Loop:
                 yield from descent.step()
                 self.steps += 1
                 fresh = False
-            pressure, gap, new = self._predicted(descent, active)
+            pressure, gap, new = self._predicted_set(descent, active)
             if not np.array_equal(new, active) or descent.norm <= self.tolerance * size:
                 return pressure, gap, new
             check = max(self.tolerance, 0.1 * min(check, descent.norm / size))
 
-    def _predicted(self, descent: _Descent, active: Bools) -> tuple[Floats, Floats, Bools]:
+    def _predicted_set(self, descent: _Descent, active: Bools) -> tuple[Floats, Floats, Bools]:
         pressure = np.zeros(len(active))
         pressure[active] = descent.pressure
         gap = self.N @ descent.y + self.d
@@ -463,7 +463,7 @@ class _Loop:
         if not active.any():
             return None
         rows = np.nonzero(active)[0]
-        return _plane(self.N[rows], self.d[rows], self.scale[rows], self.K.diagonal)
+        return _search_plane(self.N[rows], self.d[rows], self.scale[rows], self.K.diagonal)
 
     def _size(self) -> Iteration[float]:
         """Size of the load; where only gaps are imposed, of the forces that close them."""

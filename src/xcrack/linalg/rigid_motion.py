@@ -102,7 +102,7 @@ def balanced_loads(space: FunctionSpace, motion: Motion, f: Floats) -> tuple[Flo
     # Of unit translations and of rotations with a lever of the body's size.
     largest = 0.0
     for k, residual in enumerate(resultants.T / motion.size):
-        total = _total(space, f[:, k])
+        total = _total_force(space, f[:, k])
         if total == 0:
             continue
         share = float(np.abs(residual).max() / total)
@@ -119,7 +119,7 @@ def balanced_loads(space: FunctionSpace, motion: Motion, f: Floats) -> tuple[Flo
     return f - motion.modes @ resultants, largest
 
 
-def _total(space: FunctionSpace, f: Floats) -> float:
+def _total_force(space: FunctionSpace, f: Floats) -> float:
     """Sum of all forces; pressure on crack faces acts on the jumps of enriched functions alone."""
     by_function = f.reshape(-1, space.dim)
     size = np.sqrt(np.einsum("ni,ni->n", by_function, by_function))

@@ -357,7 +357,7 @@ def read_model(path: Path) -> AbaqusModel:
     MeshError
         As of `read_abaqus`.
     """
-    lines, instances, unused_parts = _assembled(keywords_of(path))
+    lines, instances, unused_parts = _assemble_parts(keywords_of(path))
     builder = _Builder(instances)
     for line, place in lines:
         builder.take(line, place)
@@ -374,7 +374,7 @@ def read_model(path: Path) -> AbaqusModel:
 Placing = Callable[[Floats], Floats] | None  # of points of an instance
 
 
-def _assembled(
+def _assemble_parts(
     keywords: Iterable[Keyword],
 ) -> tuple[list[tuple[DeckLine, Placing]], tuple[str, ...], tuple[str, ...]]:
     """Keywords, those of parts where their instances stand; instances; parts without one."""
@@ -659,7 +659,7 @@ class _SetTable:
             parts = [np.zeros(0, np.int64)]
             for number, entries in keyword.rows:
                 if "GENERATE" in keyword.options:
-                    parts.append(self._generated(line, number, entries))
+                    parts.append(self._generated_numbers(line, number, entries))
                 else:
                     parts += [self.members(entry, line, number) for entry in entries if entry]
             members = np.concatenate(parts).tolist()
@@ -674,7 +674,7 @@ class _SetTable:
     def members(self, entry: str, line: DeckLine, number: int | None) -> Ints:
         return _members(entry, line, number, self.numbers, self.named, self.what, self.instances)
 
-    def _generated(self, line: DeckLine, number: int, entries: list[str]) -> Ints:
+    def _generated_numbers(self, line: DeckLine, number: int, entries: list[str]) -> Ints:
         keyword = line.keyword
         if len(entries) < 2:
             keyword.refuse("GENERATE needs a first and a last number, and a step if not 1.", number)

@@ -302,7 +302,7 @@ def with_curves(mesh: Mesh, facets: Ints, nodes: Lattice) -> Mesh:
             if not conflicts[np.ix_(sides, sides)].any():
                 groups[name], free[sides] = sides, False
     facet_sets = {name: f for name, f in mesh.facet_sets.items() if name != "boundary"}
-    for sides in _apart(conflicts, np.nonzero(free)[0], np.bincount(side)):
+    for sides in _groups_without_conflict(conflicts, np.nonzero(free)[0], np.bincount(side)):
         number = 1
         while (name := _NAME.format(number)) in facet_sets:
             number += 1
@@ -387,7 +387,7 @@ def _meeting_sides(mesh: Mesh, facets: Ints, side: Ints) -> Bools:
     return result | result.T
 
 
-def _apart(conflicts: Bools, sides: Ints, sizes: Ints) -> list[Ints]:
+def _groups_without_conflict(conflicts: Bools, sides: Ints, sizes: Ints) -> list[Ints]:
     """Sides in groups without conflicts, the largest first."""
     groups: list[list[int]] = []
     for s in sides[np.argsort(-sizes[sides], kind="stable")].tolist():

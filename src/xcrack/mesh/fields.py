@@ -62,7 +62,7 @@ class Field:
         cell, bary = locate(self.mesh, x)
         outside = np.nonzero(cell < 0)[0]
         if len(outside):
-            cell[outside], bary[outside] = self._beside(x[outside])
+            cell[outside], bary[outside] = self._nearest_cells(x[outside])
         values = self.values[self.nodes[cell]]
         return np.asarray(np.einsum("qk,qk...->q...", self._shapes(bary), values))
 
@@ -77,7 +77,7 @@ class Field:
         i, j = np.array(_EDGES[k]).T
         return np.concatenate([bary * (2 * bary - 1), 4 * bary[:, i] * bary[:, j]], axis=1)
 
-    def _beside(self, x: Floats) -> tuple[Ints, Floats]:
+    def _nearest_cells(self, x: Floats) -> tuple[Ints, Floats]:
         """Nearest cells of points outside, and the places in them: curved sides are polygons."""
         mesh = self.mesh
         nearest = np.atleast_2d(mesh.cell_tree.query(x, k=min(_NEAR, len(mesh.cells)))[1])

@@ -152,7 +152,7 @@ def keywords_of(path: Path, outer: tuple[Path, ...] = ()) -> Iterator[Keyword]:
             pending = None
         elif pending is not None:  # the comma at its end was one too many
             if keyword is not None:
-                yield from _complete(keyword, (*outer, resolved_path))
+                yield from _complete_keyword(keyword, (*outer, resolved_path))
             keyword = _keyword(pending[1], path, pending[0])
             pending = None
         if not text.startswith("*"):
@@ -167,14 +167,14 @@ def keywords_of(path: Path, outer: tuple[Path, ...] = ()) -> Iterator[Keyword]:
             pending = (number, text)
             continue
         if keyword is not None:
-            yield from _complete(keyword, (*outer, resolved_path))
+            yield from _complete_keyword(keyword, (*outer, resolved_path))
         keyword = _keyword(text, path, number)
     if pending is not None:
         if keyword is not None:
-            yield from _complete(keyword, (*outer, resolved_path))
+            yield from _complete_keyword(keyword, (*outer, resolved_path))
         keyword = _keyword(pending[1].rstrip(","), path, pending[0])
     if keyword is not None:
-        yield from _complete(keyword, (*outer, resolved_path))
+        yield from _complete_keyword(keyword, (*outer, resolved_path))
 
 
 def _lines(path: Path) -> Sequence[str]:
@@ -193,7 +193,7 @@ def _keyword(text: str, path: Path, line: int) -> Keyword:
     return Keyword(name, options, [], path, line)
 
 
-def _complete(keyword: Keyword, outer: tuple[Path, ...]) -> Iterator[Keyword]:
+def _complete_keyword(keyword: Keyword, outer: tuple[Path, ...]) -> Iterator[Keyword]:
     """A keyword with the data of the file that it names, or the keywords of an included one."""
     given = keyword.options.get("INPUT", "")
     if not given:

@@ -66,7 +66,7 @@ class Mesh:
     curves: Curves = field(default_factory=dict, metadata={"changes_results": False})
 
     def __post_init__(self) -> None:
-        self._complete()
+        self._complete_arrays()
         check_on_curves(self.points, self.facet_sets, self.curves)
         facet = np.nonzero(self.facet_to_cell[:, 1] < 0)[0]
         owner = self.facet_to_cell[facet, 0]
@@ -74,7 +74,7 @@ class Mesh:
             warn(message)
         object.__setattr__(self, "_is_new", True)
 
-    def _complete(self) -> None:
+    def _complete_arrays(self) -> None:
         """Check what was given, and put read-only arrays in its place."""
         points, cells = checked_cells(self.points, self.cells)
         object.__setattr__(self, "points", frozen_copy(points))
@@ -410,7 +410,7 @@ def sound_mesh(
         ("curves", curves or {}),
     ):
         object.__setattr__(mesh, name, value)
-    mesh._complete()
+    mesh._complete_arrays()
     return mesh
 
 

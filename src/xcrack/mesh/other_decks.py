@@ -81,7 +81,7 @@ def read_ansys(path: Path) -> tuple[RawMesh, list[KeywordUse]]:
         elif name == "CMBLOCK":
             archive.take_component(number, entries)
         elif name == "ET" and len(entries) > 1:
-            archive.kinds[_whole(entries[0], path, number)] = _whole(
+            archive.kinds[_whole_entry(entries[0], path, number)] = _whole_entry(
                 re.sub(r"[A-Za-z]", "", entries[1]), path, number
             )
         elif name in ("N", "EN") and re.match(r"R\d", entries[0] if entries else ""):
@@ -131,7 +131,7 @@ class _Archive:
         for number, text in self._lines:
             if text.strip().startswith(("N,", "-1")):
                 return
-            label = _whole(text[: ends[1]], self.path, number)
+            label = _whole_entry(text[: ends[1]], self.path, number)
             cuts = list(zip(ends[n_whole:], ends[n_whole + 1 :], strict=False))[:3]
             entries = [text[a:b].strip() for a, b in cuts]
             try:
@@ -152,7 +152,7 @@ class _Archive:
             if text.strip() == "-1":
                 return
             pieces = [text[k : k + width] for k in range(0, len(text.rstrip()), width)]
-            row = [_whole(piece, self.path, number) for piece in pieces]
+            row = [_whole_entry(piece, self.path, number) for piece in pieces]
             if given:
                 given += row
             elif len(row) < _ENTRIES:
@@ -169,7 +169,7 @@ class _Archive:
         """A component: numbers of nodes or elements, a negative one closes a range."""
         if len(entries) < 3:
             _refuse(self.path, line, "CMBLOCK needs a name, NODE or ELEM, and a count.")
-        count = _whole(entries[2].split("!")[0], self.path, line)
+        count = _whole_entry(entries[2].split("!")[0], self.path, line)
         width = self._format(line)[0][0]
         members: list[int] = []
         n = 0
@@ -179,7 +179,7 @@ class _Archive:
             if not pieces:
                 _refuse(self.path, number, f"the component {entries[0]!r} is cut off.")
             for piece in pieces:
-                value = _whole(piece, self.path, number)
+                value = _whole_entry(piece, self.path, number)
                 members += range(members[-1] + 1, -value + 1) if value < 0 and members else [value]
                 n += 1
         self.components.append((entries[0], entries[1].upper(), members))
@@ -312,7 +312,7 @@ def _columns(text: str) -> list[str]:
     return [text[:8].strip(), *(text[k : k + width].strip() for k in range(8, len(text), width))]
 
 
-def _whole(text: str, path: Path, line: int) -> int:
+def _whole_entry(text: str, path: Path, line: int) -> int:
     try:
         return int(text)
     except ValueError:

@@ -273,11 +273,11 @@ def finer_at_arcs(
     if not spots:
         return size
 
-    def finer(x: float, y: float) -> float:
+    def finer_spacing(x: float, y: float) -> float:
         near = min(h + slope * hypot(x - a, y - b) for a, b, h in spots)
         return min(size(x, y), near)
 
-    return finer
+    return finer_spacing
 
 
 __all__ = [

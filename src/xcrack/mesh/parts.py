@@ -101,7 +101,7 @@ def chosen_facets(points: Floats, facets: Ints, where: Where, what: str) -> Ints
 def selector(where: Where, dim: int, what: str) -> Callable[[Floats], Bools]:
     """A function of points by a box or a user's function, checked."""
     if callable(where):
-        return lambda x: _asked(where, x, what)
+        return lambda x: _values_at(where, x, what)
     lower, upper = box_of(where, dim, what)
     ends = np.concatenate([lower, upper])
     reach = 1e-9 * np.abs(ends[np.isfinite(ends)]).max(initial=0.0)  # a box may be flat
@@ -138,7 +138,7 @@ def box_of(where: Any, dim: int, what: str) -> tuple[Floats, Floats]:
     return lower, upper
 
 
-def _asked(function: Callable[[Floats], Any], x: Floats, what: str) -> Bools:
+def _values_at(function: Callable[[Floats], Any], x: Floats, what: str) -> Bools:
     result = call_function(function, f"the choice of {what}", x.copy())
     try:
         inside = np.asarray(result)

@@ -268,7 +268,7 @@ def _plate(
         band / scale,
         transition / scale,
     )
-    scaled_sides = [_scaled(side, scale) for side in parts]
+    scaled_sides = [_scaled_side(side, scale) for side in parts]
     length = finer_at_arcs(length, scaled_sides, _FEWEST_HOLE_EDGES, _STEEPEST)
     scaled = [((x / scale, y / scale), r / scale) for (x, y), r in holes]
     with session() as gmsh:
@@ -281,12 +281,19 @@ def _plate(
     return _finish(points * scale, cells, facets, rims, parts, named_sets)
 
 
-def _scaled(side: Side, scale: float) -> Side:
-    def less(x: Point) -> Point:
+def _scaled_side(side: Side, scale: float) -> Side:
+    def shifted_point(x: Point) -> Point:
         return x[0] / scale, x[1] / scale
 
-    center = None if side.center is None else less(side.center)
-    return Side(less(side.start), less(side.end), center, side.turn, side.name, side.number)
+    center = None if side.center is None else shifted_point(side.center)
+    return Side(
+        shifted_point(side.start),
+        shifted_point(side.end),
+        center,
+        side.turn,
+        side.name,
+        side.number,
+    )
 
 
 def _draw(

@@ -183,11 +183,11 @@ def graded_sizes(places: Sequence[Floats], sizes: Sequence[Floats]) -> Callable[
             is_of_step = level == step
             trees.append((cKDTree(x[is_of_step]), float(size[is_of_step].min())))
 
-    def wanted(x: Floats) -> Floats:
+    def wanted_size(x: Floats) -> Floats:
         each = [h + _SLOPE * np.maximum(tree.query(x)[0] - _PLATEAU * h, 0) for tree, h in trees]
         return np.asarray(np.min(each, axis=0)) if each else np.full(len(x), np.inf)
 
-    return wanted
+    return wanted_size
 
 
 # Curves and surfaces that points are projected onto.

@@ -308,7 +308,7 @@ def refine(
         raise MeshError("refine: give cells or size, not both.")
     if size is not None:
         return _to_size(mesh, _checked_size(mesh, size), None)
-    return _split_all_edges(mesh) if cells is None else _some(mesh, np.asarray(cells))
+    return _split_all_edges(mesh) if cells is None else _cells_given(mesh, np.asarray(cells))
 
 
 def refine_to(mesh: Mesh, size_at: Floats, sweeps: int) -> Mesh:
@@ -330,7 +330,7 @@ def refine_to(mesh: Mesh, size_at: Floats, sweeps: int) -> Mesh:
     return _to_size(mesh, lambda centre, parent: size_at[parent], sweeps)
 
 
-def _some(mesh: Mesh, given: Ints) -> Mesh:
+def _cells_given(mesh: Mesh, given: Ints) -> Mesh:
     if given.size and (given.min() < 0 or given.max() >= len(mesh.cells)):
         raise MeshError(
             f"refine: cells names {int(given.min() if given.min() < 0 else given.max())}; the mesh "
@@ -455,7 +455,7 @@ def _finished_mesh(mesh: Mesh, simplex_set: Simplices) -> Mesh:
     order = np.argsort(simplex_set.parent, kind="stable")
     begin = np.searchsorted(simplex_set.parent[order], np.arange(len(mesh.cells) + 1))
 
-    def inside(members: Ints) -> Ints:
+    def members_inside(members: Ints) -> Ints:
         row, place = ranges(begin[members + 1] - begin[members])
         return order[begin[members][row] + place]
 
@@ -463,7 +463,7 @@ def _finished_mesh(mesh: Mesh, simplex_set: Simplices) -> Mesh:
         name: _parts(simplex_set, mesh.facet_numbers(facets))
         for name, facets in mesh.facet_sets.items()
     }
-    cells = {name: inside(members) for name, members in mesh.cell_sets.items()}
+    cells = {name: members_inside(members) for name, members in mesh.cell_sets.items()}
     return sound_mesh(simplex_set.points, simplex_set.cells, facets, cells, mesh.curves)
 
 

@@ -375,7 +375,7 @@ class _Scene:
         body = self.body
         numbers = body.nodes(rows)
         result: list[Support] = []
-        for where in self._where(numbers, name):
+        for where in self._set_and_points(numbers, name):
             if not values.any():
                 result += (
                     [fix(where, axis) for axis in axes] if len(axes) < body.dim else [fix(where)]
@@ -388,7 +388,7 @@ class _Scene:
             result.append(displacement(where, vector))
         return result
 
-    def _where(self, numbers: Ints, name: str) -> list[Any]:
+    def _set_and_points(self, numbers: Ints, name: str) -> list[Any]:
         """Facet set and points that nodes are."""
         body, mesh = self.body, self.body.mesh
         facets = body.facets_within(numbers)

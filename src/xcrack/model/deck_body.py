@@ -159,7 +159,7 @@ class DeckBody:
                 f"{model.path.name} has no triangles, quadrilaterals, tetrahedra, pyramids, prisms "
                 "or hexahedra of which a body could be made: export the elements too."
             )
-        self.dim, self.plane, self.thickness = model.dim, _plane(model), 1.0
+        self.dim, self.plane, self.thickness = model.dim, _plane_state(model), 1.0
         self.materials = _materials(model)
         self.sections = self._sections()
         facets = [
@@ -397,7 +397,7 @@ class DeckBody:
         return ""
 
 
-def _plane(model: AbaqusModel) -> str | None:
+def _plane_state(model: AbaqusModel) -> str | None:
     """State of a plane body by the types of its elements."""
     planes: dict[str, str] = {}
     for group in model.body_groups if model.dim == 2 else ():

@@ -435,7 +435,7 @@ class DeckState:
             label = row[1].upper()
             given = [keyword.number(entry, number, "a number", 0.0) for entry in row[2:]]
             value, numbers = factor * (given[0] if given else 0.0), tuple(given[1:])
-            elements, faces, label = self._loaded(line, number, row[0], label)
+            elements, faces, label = self._loaded_faces(line, number, row[0], label)
             by_number = keyword.name == "DLOAD" and row[0].rpartition(".")[2].isdigit()
             target = "" if by_number else row[0]
             what = keyword.place if by_number else target.casefold()
@@ -450,7 +450,9 @@ class DeckState:
             one.faces.append(faces)
             one.values.append(value)
 
-    def _loaded(self, line: DeckLine, number: int, name: str, label: str) -> tuple[Ints, Ints, str]:
+    def _loaded_faces(
+        self, line: DeckLine, number: int, name: str, label: str
+    ) -> tuple[Ints, Ints, str]:
         """Elements and faces that are loaded, and the kind of the load."""
         keyword = line.keyword
         if keyword.name == "DSLOAD":

@@ -263,7 +263,7 @@ class Elasticity:
                 "go like 1/√r, so there is no K. Let it end a cell before or behind; a crack along "
                 "the interface has a complex K, see interface_intensity."
             )
-        return self._isotropic(int(cells[0]), x)
+        return self._isotropic_at(int(cells[0]), x)
 
     def isotropic_at(self, x: Floats) -> Isotropic:
         """The isotropic material at a point `(d,)`.
@@ -273,9 +273,9 @@ class Elasticity:
         ProblemError
             It is not isotropic.
         """
-        return self._isotropic(int(cells_at(self.mesh, x[None])[0]), x)
+        return self._isotropic_at(int(cells_at(self.mesh, x[None])[0]), x)
 
-    def _isotropic(self, cell: int, x: Floats) -> Isotropic:
+    def _isotropic_at(self, cell: int, x: Floats) -> Isotropic:
         """The isotropic material at a point in a cell."""
         material = self.materials[int(self.number[cell]) if len(self.number) else 0]
         if not material.is_graded:
@@ -445,20 +445,20 @@ def _set_numbers(mesh: Mesh, names: list[str]) -> Ints:
         if len(twice):
             other = names[int(number[twice[0]])]
             raise ProblemError(
-                f"material: {len(twice)} cells, one at {_middle(mesh, twice[0])}, are in "
+                f"material: {len(twice)} cells, one at {_cell_middle(mesh, twice[0])}, are in "
                 f"{other!r} and in {name!r}: give each cell one material."
             )
         number[members] = k
     bare: Bools = number < 0
     if bare.any():
         raise ProblemError(
-            f"material: {int(bare.sum())} cells, one at {_middle(mesh, int(np.argmax(bare)))}, are "
-            f"in none of the sets {', '.join(map(repr, names))}: give every cell a material."
+            f"material: {int(bare.sum())} cells, one at "
+            f"{_cell_middle(mesh, int(np.argmax(bare)))}, are in none of the sets {', '.join(map(repr, names))}: give every cell a material."
         )
     return lock(number)
 
 
-def _middle(mesh: Mesh, cell: int) -> list[float]:
+def _cell_middle(mesh: Mesh, cell: int) -> list[float]:
     return at(mesh.points[mesh.cells[cell]].mean(axis=0))
 
 

@@ -87,7 +87,7 @@ class Place(Rule):
         """The name, or read-only points."""
         if isinstance(value, str):
             return value
-        shape = (None, None) if np.ndim(_plain(value)) == 2 else (None,)
+        shape = (None, None) if np.ndim(_as_array(value)) == 2 else (None,)
         try:
             return frozen_copy(numbers(value, what, shape, error=error))
         except error as cause:
@@ -103,14 +103,14 @@ class PointRows(Rule):
 
     def check(self, value: Any, what: str, error: Error) -> Any:
         """A read-only copy."""
-        shape = (None, None) if np.ndim(_plain(value)) == 2 else (None,)
+        shape = (None, None) if np.ndim(_as_array(value)) == 2 else (None,)
         rows = numbers(value, what, shape, error=error)
         if rows.shape[-1] not in (2, 3) or not len(rows):
             raise error(f"{what} = {value_text(value)}: give 2 or 3 numbers, or rows of them.")
         return frozen_copy(rows)
 
 
-def _plain(value: Any) -> Any:
+def _as_array(value: Any) -> Any:
     """A value as an array, where it is one: ragged lists and the like are looked at later."""
     try:
         return np.asarray(value)
@@ -146,7 +146,7 @@ def vector_at(value: Any, x: Floats, what: str, normal: Floats | None = None) ->
     if callable(value):
         two = normal is not None and _n_positional(value) >= 2
         arguments = (x, normal) if two else (x,)
-        result = _real(call_function(value, f"the value of {what}", *arguments), what)
+        result = _real_values(call_function(value, f"the value of {what}", *arguments), what)
     else:
         result = numbers(value, what)
     if result.shape == (d,):
@@ -169,7 +169,7 @@ def scalar_at(value: Any, x: Floats, what: str) -> Floats:
         Another shape, or values that are not finite.
     """
     if callable(value):
-        given = _real(call_function(value, f"the value of {what}", x), what)
+        given = _real_values(call_function(value, f"the value of {what}", x), what)
     else:
         given = numbers(value, what)
     if given.shape not in ((), (len(x),)):
@@ -192,7 +192,7 @@ def stress_at(value: Any, x: Floats, what: str) -> Floats:
     """
     d = x.shape[1]
     if callable(value):
-        result = _real(call_function(value, f"the value of {what}", x), what)
+        result = _real_values(call_function(value, f"the value of {what}", x), what)
     else:
         result = numbers(value, what)
     if result.shape not in ((d, d), (len(x), d, d)):
@@ -212,7 +212,7 @@ def stress_at(value: Any, x: Floats, what: str) -> Floats:
     return result
 
 
-def _real(result: Any, what: str) -> Floats:
+def _real_values(result: Any, what: str) -> Floats:
     """What a function returned: an array of real numbers; others are looked for later."""
     return numbers(result, f"{what}: the returned value", finite=False)
 

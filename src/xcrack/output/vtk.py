@@ -148,13 +148,13 @@ def _write_grid(body: Pieces, path: Path) -> None:
     grid.SetCells(_array(kind), _cells(blocks))
     at_points = {
         "displacement": np.pad(body.displacement, ((0, 0), (0, 3 - d))),
-        "stress": _six(body.stress),
+        "stress": _six_components(body.stress),
         "von_mises": von_mises(body.stress),
     }
     at_points |= {f"phi_{c}": phi for c, phi in enumerate(body.phi)}
     at_points |= {f"psi_{c}_{k}": v for c, psi in enumerate(body.psi) for k, v in enumerate(psi)}
     at_cells = {
-        "stress_center": _six(body.center_stress),
+        "stress_center": _six_components(body.center_stress),
         "von_mises_center": von_mises(body.center_stress),
         "enriched": body.enriched,
         "cell": body.cell,
@@ -210,21 +210,21 @@ def _write_lip_faces(solution: Solution, path: Path) -> None:
     lips = [lip_faces(solution, c) for c in range(len(solution.lips))]
     start = np.cumsum([0, *(len(each.points) for each in lips)])
 
-    def joined(name: str) -> np.ndarray:
+    def joined_values(name: str) -> np.ndarray:
         return np.concatenate([getattr(each, name) for each in lips])
 
-    at_points = {name: joined(name) for name in ("pressure", "gap", "normal")}
-    at_points["opening"] = joined("jump")
-    at_points |= {f"displacement_{name}": joined(name) for name in ("minus", "plus")}
+    at_points = {name: joined_values(name) for name in ("pressure", "gap", "normal")}
+    at_points["opening"] = joined_values("jump")
+    at_points |= {f"displacement_{name}": joined_values(name) for name in ("minus", "plus")}
     at_cells: dict[str, np.ndarray] = {
         "crack": np.repeat(np.arange(len(lips)), [len(each.area) for each in lips]),
-        "closed": (joined("closed") >= 0.5).astype(np.int8),
-        "closed_share": joined("closed"),
-        "pressure_mean": joined("mean_pressure"),
-        "gap_mean": joined("mean_gap"),
+        "closed": (joined_values("closed") >= 0.5).astype(np.int8),
+        "closed_share": joined_values("closed"),
+        "pressure_mean": joined_values("mean_pressure"),
+        "gap_mean": joined_values("mean_gap"),
     }
     data = _vtk("vtkCommonDataModel").vtkPolyData()
-    data.SetPoints(_points(joined("points")))
+    data.SetPoints(_points(joined_values("points")))
     faces = [each.triangles + begin for each, begin in zip(lips, start, strict=False)]
     data.SetPolys(_cells([np.concatenate(faces)]))
     _save(_vtk("vtkIOXML").vtkXMLPolyDataWriter(), data, at_points, at_cells, path)
@@ -285,7 +285,7 @@ def _vtk(part: str) -> Any:
     return require_package(f"vtkmodules.{part}", "write")
 
 
-def _six(stress: Floats) -> Floats:
+def _six_components(stress: Floats) -> Floats:
     """Components xx yy zz xy yz xz, the order in which ParaView names them."""
     return np.ascontiguousarray(stress[:, [0, 1, 2, 0, 1, 0], [0, 1, 2, 1, 2, 2]])
 

@@ -79,13 +79,13 @@ class assessment_line(Declared):  # noqa: N801 - it is used as a function
         mu = min(0.001 * self.E / self.sigma_y, 0.6)
         N = 0.3 * (1 - self.sigma_y / self.sigma_u)
 
-        def below(L: Floats) -> Floats:
+        def is_below(L: Floats) -> Floats:
             return np.asarray((0.3 + 0.7 * np.exp(-mu * L**6)) / np.sqrt(1 + L**2 / 2))
 
         beyond = 0.0
         if N > 0:
-            beyond = below(np.ones(1))[0] * np.maximum(L, 1.0) ** ((N - 1) / (2 * N))
-        inside = np.where(L <= 1, below(np.minimum(L, 1.0)), beyond)
+            beyond = is_below(np.ones(1))[0] * np.maximum(L, 1.0) ** ((N - 1) / (2 * N))
+        inside = np.where(L <= 1, is_below(np.minimum(L, 1.0)), beyond)
         return np.asarray(np.where(L < self.L_max, inside, 0.0))[()]
 
     def reserve(self, K_r: float, L_r: float) -> float:
@@ -106,14 +106,14 @@ class assessment_line(Declared):  # noqa: N801 - it is used as a function
         if K == 0:
             return most
 
-        def left(factor: float) -> float:
+        def cycles_left(factor: float) -> float:
             return (
                 float(self(np.asarray(min(factor * L, np.nextafter(self.L_max, 0))))) - factor * K
             )
 
-        if left(most) > 0:
+        if cycles_left(most) > 0:
             return most
-        return float(brentq(left, 0.0, most, xtol=1e-14 * most, rtol=1e-14))
+        return float(brentq(cycles_left, 0.0, most, xtol=1e-14 * most, rtol=1e-14))
 
 
 @check_arguments()

@@ -226,7 +226,7 @@ def submit_case(engine: Engine, parameters: dict[str, Any], case: Callable[..., 
     except (KeyboardInterrupt, SystemExit):
         raise
     except BrokenProcessPool as error:
-        raise WorkerDeathError(_died(parameters)) from error
+        raise WorkerDeathError(_row_of_death(parameters)) from error
     except Exception as error:
         raise ProblemError(
             f"campaign: the client did not take the case {parameters} "
@@ -282,7 +282,7 @@ def answer_of(engine: Engine, future: Any, parameters: dict[str, Any]) -> Any:
     except (KeyboardInterrupt, SystemExit):
         raise
     except BrokenProcessPool as error:
-        raise WorkerDeathError(_died(parameters)) from error
+        raise WorkerDeathError(_row_of_death(parameters)) from error
     except BaseException as error:  # futures of a client that is cancelled raise no Exception
         raise ProblemError(
             f"campaign: the client gave no answer for the case {parameters} "
@@ -301,7 +301,7 @@ def _await_answer(engine: Engine, future: Any) -> Any:
     return future.result()
 
 
-def _died(parameters: dict[str, Any]) -> str:
+def _row_of_death(parameters: dict[str, Any]) -> str:
     return (
         f"campaign: a worker died at or near the case {parameters} (killed, or out of memory). "
         "Finished cases are stored: call again to go on, with fewer workers if memory is short."
@@ -461,8 +461,9 @@ def campaign(
         first = study.failed[0]
         warn(
             f"campaign: {len(study.failed)} of {len(study.rows)} cases failed, the first of them "
-            f"{value_text(first['parameters'])} with {first['kind']}: {_short(first['error'])} "
-            "`failed` of the study has all; retry=True runs them again."
+            f"{value_text(first['parameters'])} with {first['kind']}: "
+            f"{_first_line(first['error'])} `failed` of the study has all; "
+            "retry=True runs them again."
         )
     return study
 
@@ -669,13 +670,13 @@ def _is_good_row(file: Path) -> bool:
 
 def _failures(rows: Iterable[Mapping[str, Any]]) -> str:
     """Errors of cases by their kind, the most frequent ones first; empty where there are none."""
-    count = Counter((row["kind"], _short(row["error"])) for row in rows)
+    count = Counter((row["kind"], _first_line(row["error"])) for row in rows)
     lines = [f"{n} failed with {kind}: {text}" for (kind, text), n in count.most_common(_SHOWN)]
     left = len(count) - len(lines)
     return "\n".join([*lines, *([f"and {left} other errors"] if left > 0 else [])])
 
 
-def _short(text: str) -> str:
+def _first_line(text: str) -> str:
     line = text.strip().partition("\n")[0]
     return line if len(line) <= _LINE else f"{line[:_LINE]} ..."
 

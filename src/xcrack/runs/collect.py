@@ -259,13 +259,13 @@ class Collector:
             try:
                 ended = self._take(steps)
             except KeyboardInterrupt:
-                ended = self._interrupted()
+                ended = self._interrupt()
             except Exception as error:
                 # Ctrl-C within a compiled kernel is the cause of a SystemError.
                 if not _is_interrupt(error):
                     self._attach(error)
                     raise
-                ended = self._interrupted()
+                ended = self._interrupt()
         history = self._history(ended)
         if self.store is not None:
             try:
@@ -280,7 +280,7 @@ class Collector:
     def _take(self, steps: Iterable[Step]) -> str:
         """Take steps, and return why they ended."""
         if self.taken and self._is_enough(self.taken[-1]):  # killed before it could write so
-            return self._stopped()
+            return self._stop()
         iterator = iter(steps)
         while True:
             try:
@@ -298,7 +298,7 @@ class Collector:
             if self.store is not None:
                 self.store.write(step)
             if self._is_enough(step):
-                return self._stopped()
+                return self._stop()
 
     def _is_enough(self, step: Step) -> bool:
         # Where no tip is left the run ends anyway, and functions of users look for K.
@@ -307,12 +307,12 @@ class Collector:
         enough = call_function(self.until, f"until, after step {step.index}", step)
         return flag(enough, "collect: what until returned")
 
-    def _interrupted(self) -> str:
+    def _interrupt(self) -> str:
         if not self.taken:
             raise KeyboardInterrupt
         return f"interrupted after step {self.taken[-1].index}"
 
-    def _stopped(self) -> str:
+    def _stop(self) -> str:
         return f"until was true at step {self.taken[-1].index}"
 
     def _attach(self, error: Exception) -> None:

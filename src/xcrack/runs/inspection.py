@@ -196,7 +196,7 @@ def growth_curve(
     lead = rows.drives
     a, step = rows.a[lead], rows.step[lead]
     N = np.concatenate([[0.0], np.cumsum(rows.cycles[step])]) + history.steps[0].cycles
-    return GrowthCurve(N, np.concatenate([a[:, 0], a[-1:, 1]]), _bounded(rows.rate[lead]))
+    return GrowthCurve(N, np.concatenate([a[:, 0], a[-1:, 1]]), _bounded_rates(rows.rate[lead]))
 
 
 _MEASURES = (
@@ -204,7 +204,7 @@ _MEASURES = (
 )
 
 
-def _bounded(rate: Floats) -> Floats:
+def _bounded_rates(rate: Floats) -> Floats:
     """Rates of steps; where the last one has no power law: a steep one, over the same cycles."""
     if np.isinf(rate[-1, 1]):
         rate = rate.copy()
@@ -241,7 +241,7 @@ def _measured_curve(history: History, measure: str, crack: int | None) -> Growth
         rate = np.repeat((grows / cycles)[:, None], 2, axis=1)
     if _settings(steps).get("retardation", "None") == "None":
         lead: DrivingForce = driving_forces(history.steps).lead
-        for n, ends, advance in zip(lead.step, _bounded(lead.rate), np.diff(lead.a).ravel()):
+        for n, ends, advance in zip(lead.step, _bounded_rates(lead.rate), np.diff(lead.a).ravel()):
             if n < len(rate) and advance > 0:
                 rate[n] = ends * grows[n] / advance
     if measure == "length":
@@ -312,16 +312,16 @@ def _line_of(
         return line
     last = max(n for n, step in enumerate(steps) if n == 0 or not step.has_left)
     rate = [float(of_crack.max(initial=0)) for of_crack in steps[last].law_rate]
-    line = [max(range(len(rate)), key=lambda c: (rate[c], _known(values[last][c])))]
+    line = [max(range(len(rate)), key=lambda c: (rate[c], _length_or_zero(values[last][c])))]
     for numbers_there, before in zip(after[:last][::-1], values[:last][::-1], strict=True):
         joined = [c for c, now in enumerate(numbers_there) if now == line[0]]
-        line.insert(0, max(joined, key=lambda c: _known(before[c])))
+        line.insert(0, max(joined, key=lambda c: _length_or_zero(before[c])))
     for numbers_there in after[last:]:
         line.append(numbers_there[line[-1]])
     return line
 
 
-def _known(value: float) -> float:
+def _length_or_zero(value: float) -> float:
     """A length to compare with; none is the least of all."""
     return value if np.isfinite(value) else -np.inf
 

@@ -42,7 +42,7 @@ def lock_folder(folder: Path) -> Iterator[Callable[[], None]]:
         Another process, or this one elsewhere, writes to the folder.
     """
     path = folder / NAME
-    owner = {**_this_process(), "token": secrets.token_hex(8), "taken": _now()}
+    owner = {**_this_process(), "token": secrets.token_hex(8), "taken": _time_now()}
     _take(path, owner)
 
     def check() -> None:
@@ -196,7 +196,7 @@ def _start_of_process(pid: Any) -> str | None:
     return listed.stdout.strip() or None
 
 
-def _now() -> str:
+def _time_now() -> str:
     return time.strftime("%Y-%m-%d %H:%M:%S")
 
 

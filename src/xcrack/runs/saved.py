@@ -201,13 +201,13 @@ def _content(result: Any) -> dict[str, Any]:
     first = solutions[0]
     return {
         "several": several,
-        "problem": _storable(first.problem),
+        "problem": _problem_for_file(first.problem),
         "reuse": first.reuse.without_matrices(),
         "states": [_state(solution) for solution in solutions],
     }
 
 
-def _storable(problem: Problem) -> Problem:
+def _problem_for_file(problem: Problem) -> Problem:
     """A problem whose functions are replaced by their names; curves of the user are left out."""
     curves = {k: c for k, c in problem.mesh.curves.items() if isinstance(c, Arc | CurvedFacets)}
     mesh = problem.mesh

@@ -317,15 +317,15 @@ def varied_law(law: Law, factors: Mapping[str, float]) -> Law:
     """
     result: Any = law
     for name, factor in factors.items():
-        result = _with(result, name.split("."), float(factor), name, law)
+        result = _law_with_factor(result, name.split("."), float(factor), name, law)
     return result  # type: ignore[no-any-return]
 
 
-def _with(part: Any, names: list[str], factor: float, whole_name: str, law: Law) -> Any:
+def _law_with_factor(part: Any, names: list[str], factor: float, whole_name: str, law: Law) -> Any:
     has = is_dataclass(part) and names[0] in {field.name for field in fields(part)}
     value = getattr(part, names[0]) if has else None
     if has and len(names) > 1:
-        inner = _with(value, names[1:], factor, whole_name, law)
+        inner = _law_with_factor(value, names[1:], factor, whole_name, law)
         return replace(part, **{names[0]: inner})
     if not has or isinstance(value, bool) or not isinstance(value, int | float):
         allowed: list[str] = []

@@ -133,9 +133,9 @@ def pack_cracks(prefix: str, cracks: Sequence[Crack]) -> Arrays:
         **({f"{prefix}_arms": np.array(arms, dtype=np.int64)} if arms else {}),
         f"{prefix}_points": np.concatenate([np.zeros((0, d)), *(c.points for c in cracks)]),
         f"{prefix}_point_count": _counts([c.points for c in cracks]),
-        f"{prefix}_faces": _whole(np.zeros((0, d)), *(c.faces for c in cracks)),
+        f"{prefix}_faces": _whole_numbers(np.zeros((0, d)), *(c.faces for c in cracks)),
         f"{prefix}_face_count": _counts([c.faces for c in cracks]),
-        f"{prefix}_ends": _whole(np.zeros(0), *(end for own in ends for end in own)),
+        f"{prefix}_ends": _whole_numbers(np.zeros(0), *(end for own in ends for end in own)),
         f"{prefix}_end_length": _counts([end for own in ends for end in own]),
         f"{prefix}_end_count": np.array(
             [len(own) if crack.placed else -1 for own, crack in zip(ends, cracks, strict=True)],
@@ -171,7 +171,7 @@ def _counts(parts: Sequence[Any]) -> Ints:
     return np.array([len(part) for part in parts], dtype=np.int64)
 
 
-def _whole(*parts: NDArray[Any]) -> Ints:
+def _whole_numbers(*parts: NDArray[Any]) -> Ints:
     return np.concatenate(parts).astype(np.int64)
 
 
@@ -350,7 +350,7 @@ def arrays_of(step: Step) -> Arrays:
         result["warnings"] = np.array(step.warnings, dtype=str)
     if step.identities is not None:
         result["identity_crack"] = np.array(step.identities.cracks, dtype=np.int64)
-        result["identity_end"] = _whole(np.zeros(0), *map(np.array, step.identities.ends))
+        result["identity_end"] = _whole_numbers(np.zeros(0), *map(np.array, step.identities.ends))
         result["identity_end_count"] = _counts(step.identities.ends)
         result["identity_name"] = np.array(step.identities.names, dtype=str)
     if step.validity is not None:

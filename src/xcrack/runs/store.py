@@ -117,17 +117,17 @@ def _encode(value: Any, arrays: list[NDArray[Any]], names: Mapping[type, str]) -
         arrays.append(array)
         return {"array": len(arrays) - 1, "scalar": isinstance(value, np.generic)}
 
-    def encoded(item: Any) -> Any:
+    def encode_item(item: Any) -> Any:
         return _encode(item, arrays, names)
 
     if isinstance(value, tuple | list):
         name = "tuple" if isinstance(value, tuple) else "list"
-        return {name: [encoded(item) for item in value]}
+        return {name: [encode_item(item) for item in value]}
     if isinstance(value, Mapping):
-        return {"dict": [[encoded(k), encoded(v)] for k, v in value.items()]}
+        return {"dict": [[encode_item(k), encode_item(v)] for k, v in value.items()]}
     kind = type(value)
     if kind in names:
-        content = {f.name: encoded(getattr(value, f.name)) for f in fields(value) if f.init}
+        content = {f.name: encode_item(getattr(value, f.name)) for f in fields(value) if f.init}
         return {"class": names[kind], "fields": content}
     raise ProblemError(
         f"a {kind.__module__}.{kind.__qualname__} cannot be stored; only numbers, strings, arrays, "
@@ -139,7 +139,7 @@ def _decode(tree: Any, arrays: Mapping[str, NDArray[Any]], classes: Classes, pat
     if not isinstance(tree, dict):
         return tree
 
-    def decoded(item: Any) -> Any:
+    def decode_item(item: Any) -> Any:
         return _decode(item, arrays, classes, path)
 
     if "array" in tree:
@@ -149,18 +149,18 @@ def _decode(tree: Any, arrays: Mapping[str, NDArray[Any]], classes: Classes, pat
         array.flags.writeable = False
         return array
     if "tuple" in tree:
-        return tuple(decoded(item) for item in tree["tuple"])
+        return tuple(decode_item(item) for item in tree["tuple"])
     if "list" in tree:
-        return [decoded(item) for item in tree["list"]]
+        return [decode_item(item) for item in tree["list"]]
     if "dict" in tree:
-        return {decoded(k): decoded(v) for k, v in tree["dict"]}
+        return {decode_item(k): decode_item(v) for k, v in tree["dict"]}
     name = tree["class"]
     if name not in classes:
         raise UnknownValueError(
             f"{path} holds a {name!r}, which this xcrack does not know: read it with the version "
             "that wrote it."
         )
-    values = {key: decoded(item) for key, item in tree["fields"].items()}
+    values = {key: decode_item(item) for key, item in tree["fields"].items()}
     make: Any = classes[name]
     fields_of_class = {f.name: f for f in fields(make) if f.init}
     needed = {n for n, f in fields_of_class.items() if f.default is f.default_factory is MISSING}

@@ -139,7 +139,7 @@ def initial_stresses(solutions: Sequence[Solution]) -> Callable[[Floats], Floats
     if not has_effect(solutions, "initial_stress"):
         return None
 
-    def initial(x: Floats) -> Floats:
+    def initial_strain(x: Floats) -> Floats:
         if solutions[0].problem.elasticity.is_uniform:
             return np.stack([s.initial_stress(x) for s in solutions], axis=-1)
         mesh = solutions[0].space.mesh
@@ -147,7 +147,7 @@ def initial_stresses(solutions: Sequence[Solution]) -> Callable[[Floats], Floats
         place = cell, barycentric(mesh, cell, x), x
         return np.stack([initial_stress_at(s, *place, True) for s in solutions], axis=-1)
 
-    return initial
+    return initial_strain
 
 
 def has_effect(solutions: Sequence[Solution], *effects: str) -> bool:

@@ -143,7 +143,9 @@ def front_materials(solution: Solution, t: int, curve: FrontCurve, size: float) 
 
     number = number_at(s)
     rows = np.nonzero(np.diff(number))[0]
-    changes = np.array([_between(number_at, s[k], s[k + 1], int(number[k])) for k in rows])
+    changes = np.array(
+        [_parameter_between(number_at, s[k], s[k + 1], int(number[k])) for k in rows]
+    )
     _refuse_interface(solution, curve, s, number, changes, size)
     own = number[np.append(rows, len(s) - 1)]
     if period is None:
@@ -161,7 +163,9 @@ def front_materials(solution: Solution, t: int, curve: FrontCurve, size: float) 
     return FrontMaterials(tuple(references), breaks, tuple(logarithms), period)
 
 
-def _between(number_at: Callable[[Floats], Ints], low: float, high: float, number: int) -> float:
+def _parameter_between(
+    number_at: Callable[[Floats], Ints], low: float, high: float, number: int
+) -> float:
     """Parameter at which the material of `low` ends."""
     for _ in range(_HALVINGS):
         middle = 0.5 * (low + high)

@@ -74,12 +74,12 @@ class HandbookK(ReferenceK):
         angles = numbers(phi, "handbook: phi")
         if ((angles < 0) | (angles > pi / 2)).any():
             raise ProblemError("handbook: phi: give angles from 0 to pi / 2, in rad.")
-        return self._along(angles)
+        return self._factors_along(angles)
 
     def _K(self) -> Any:
         raise NotImplementedError
 
-    def _along(self, phi: Floats) -> Floats:
+    def _factors_along(self, phi: Floats) -> Floats:
         raise NotImplementedError
 
     def _angle(self, sif: SIF) -> Floats:
@@ -102,7 +102,7 @@ class HandbookK(ReferenceK):
             )
         if self.dim == 2:
             return np.full(len(sif.K), self.K())
-        return self._along(self._angle(sif))
+        return self._factors_along(self._angle(sif))
 
     def ratio(self, sif: SIF) -> Floats:
         """Computed K_I over that of the handbook at each place `(f,)`.
@@ -430,7 +430,7 @@ class EmbeddedCrack(EllipticFront):
     accuracy = "0.1 %"
     holds = "far from all sides"
 
-    def _along(self, phi: Floats) -> Floats:
+    def _factors_along(self, phi: Floats) -> Floats:
         return self.S * np.sqrt(pi * self.a) * self._shape(phi)
 
     def _angle_on(self, x: Floats, frame: Floats) -> Floats:
@@ -473,7 +473,7 @@ class SurfaceCrack(EllipticFront):
         """Whether its numbers are within where it holds."""
         return self.a <= self.c and self.a < self.t and 4 * self.c < self.W
 
-    def _along(self, phi: Floats) -> Floats:
+    def _factors_along(self, phi: Floats) -> Floats:
         r, q, s = self.a / self.c, self.a / self.t, np.sin(phi)
         M_2 = -0.54 + 0.89 / (0.2 + r)
         M_3 = 0.5 - 1 / (0.65 + r) + 14 * (1 - r) ** 24
@@ -550,7 +550,7 @@ class CornerCrack(EllipticFront):
         """Whether its numbers are within where it holds."""
         return 0.2 <= self.a / self.c <= 1 and self.a < self.t and 2 * self.c < self.W
 
-    def _along(self, phi: Floats) -> Floats:
+    def _factors_along(self, phi: Floats) -> Floats:
         r, q = self.a / self.c, self.a / self.t
         M_2 = -0.44 + 1.06 / (0.3 + r)
         M_3 = -0.5 + 0.25 * r + 14.8 * (1 - r) ** 15
@@ -597,7 +597,7 @@ class CornerCrackAtHole(EllipticFront):
         fits = self.a < self.t and self.D + 2 * self.c < self.W / 2
         return fits and 0.2 <= self.a / self.c <= 2
 
-    def _along(self, phi: Floats) -> Floats:
+    def _factors_along(self, phi: Floats) -> Floats:
         r, q, D, W = self.a / self.c, self.a / self.t, self.D, self.W
         left, round_part = 1 - np.sin(phi), 1 + 0.1 * (1 - np.cos(phi)) ** 2
         thickness = 0.85 + 0.15 * q**0.25

@@ -399,7 +399,7 @@ def solve_front(
     if not len(rows):
         return K
     moments = _moments(curve, knots, lambda s: reading(knots, valid, curve, s))[rows]
-    K[:, :, rows] = _solved(
+    K[:, :, rows] = _K_of_integrals(
         moments, I[..., rows], tip_material, None if zero is None else zero[rows]
     )
     return K
@@ -447,12 +447,17 @@ def twice_as_wide(
         return reading(knots, np.isin(np.arange(len(knots)), tops), curve, s)
 
     own = None if zero is None else zero[tops]
-    K = _solved(share @ _moments(curve, knots, spline), I @ share.T, tip_material, own)
+    K = _K_of_integrals(share @ _moments(curve, knots, spline), I @ share.T, tip_material, own)
     result[:, :, rows] = np.einsum("sv,nkvm->nksm", spline(knots[rows]), K)
     return result
 
 
-def _solved(moments: Floats, I: Floats, tip_material: Isotropic, zero: Bools | None) -> Floats:  # noqa: E741
+def _K_of_integrals(
+    moments: Floats,
+    I: Floats,  # noqa: E741
+    tip_material: Isotropic,
+    zero: Bools | None,
+) -> Floats:
     """K `(n, k, v, 3)` of integrals `(n, k, 3, v)`; K_III is zero at some tops."""
     K = np.empty((*I.shape[:2], len(moments), 3))
     for mode, factor in enumerate(_factors(tip_material)):

@@ -192,9 +192,9 @@ class Bimaterial:
 def _tip(solution: Solution, t: int, length: float) -> tuple[tuple[float, ...], str]:
     """K_1, K_2, spread, G, epsilon and contact zone at one tip, and why K is nan."""
     tip = solution.space.tips[t]
-    body = _bimaterial(solution, t)
+    body = _materials_beside(solution, t)
     domain = domain_of(solution, t)
-    room = _straight(solution, t, domain.outer)
+    room = _straight_radius(solution, t, domain.outer)
     if room < domain.size:
         raise GeometryError(
             f"the crack that ends at {at(tip.x)} on an interface does not run along it for a cell: "
@@ -217,7 +217,7 @@ def _tip(solution: Solution, t: int, length: float) -> tuple[tuple[float, ...], 
     return (float(K[0, 0]), float(K[0, 1]), spread, G, body.epsilon, zone), reason
 
 
-def _bimaterial(solution: Solution, t: int) -> Bimaterial:
+def _materials_beside(solution: Solution, t: int) -> Bimaterial:
     """The materials on both sides of a tip."""
     mesh, elasticity = solution.space.mesh, solution.problem.elasticity
     tip, cells = solution.space.tips[t], tip_cells(solution, t)
@@ -237,7 +237,7 @@ def _bimaterial(solution: Solution, t: int) -> Bimaterial:
     return Bimaterial((materials[0].at_tip(), materials[1].at_tip()))
 
 
-def _straight(solution: Solution, t: int, outer: float) -> float:
+def _straight_radius(solution: Solution, t: int, outer: float) -> float:
     """Radius within which interface and crack are the straight line through the tip, length."""
     mesh, elasticity = solution.space.mesh, solution.problem.elasticity
     tip = solution.space.tips[t]

@@ -230,7 +230,7 @@ def integrals_of_sides(
         gradient,
     )
     reach, crack = float(radii.max()), space.tips[t].crack
-    loaded = _loaded(solutions, curve, reach) + _pressed(solutions, crack, curve, reach)
+    loaded = _loaded_points(solutions, curve, reach) + _face_points(solutions, crack, curve, reach)
     for points, normal, feet, traction in loaded:
         counts = before_junctions(space, crack, points.side)
         if not counts.all():
@@ -278,7 +278,7 @@ def _integrals(
     return total
 
 
-def _loaded(
+def _loaded_points(
     solutions: Sequence[Solution], curve: FrontCurve, reach: float
 ) -> list[tuple[Points, Floats, FootPoints, Floats]]:
     """Points on loaded facets within reach, with normals, feet and tractions of all states."""
@@ -302,7 +302,7 @@ def _loaded(
     return result
 
 
-def _pressed(
+def _face_points(
     solutions: Sequence[Solution], crack: int, curve: FrontCurve, reach: float
 ) -> list[tuple[Points, Floats, FootPoints, Floats]]:
     """Points on the faces of the cracks on which this one ends, with what acts there."""

@@ -283,14 +283,14 @@ class SIF:
 
     def __repr__(self) -> str:
         if self.K.shape[1] == 3:
-            return self._along()
+            return self._values_along()
         rows = ", ".join(
             f"({k[0]:.6g}, {k[1]:.6g}){' closed' if closed else ''}"
             for k, closed in zip(self.K, self.closed, strict=True)
         )
         return f"SIF(K = [{rows}]{self._bars()})"
 
-    def _along(self) -> str:
+    def _values_along(self) -> str:
         if not len(self.K):
             return "SIF(no front)"
         low, high = self.K.min(axis=0), self.K.max(axis=0)

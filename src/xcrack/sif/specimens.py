@@ -131,7 +131,9 @@ def compact_tension(
         along=[(0.0, 0.0), (0.95 * W, 0.0)], band=W / 20, transition=W / 2,
         sets={"front": [3], "back": [1]}, **_sizes(W, size, size_near),
     )  # fmt: skip
-    return _pulled(mesh, [(-1.001 * x, 0.0), (a, 0.0)], force, contact_angle, "compact", a, W)
+    return _pin_loaded_specimen(
+        mesh, [(-1.001 * x, 0.0), (a, 0.0)], force, contact_angle, "compact", a, W
+    )
 
 
 @check_arguments(ProblemError)
@@ -171,10 +173,12 @@ def disc_compact(
         along=[(0.0, 0.0), (0.95 * W, 0.0)], band=W / 20, transition=W / 2,
         sets={"front": [1], "rim": [0]}, **_sizes(W, size, size_near),
     )  # fmt: skip
-    return _pulled(mesh, [(-1.001 * x, 0.0), (a, 0.0)], force, contact_angle, "disc", a, W)
+    return _pin_loaded_specimen(
+        mesh, [(-1.001 * x, 0.0), (a, 0.0)], force, contact_angle, "disc", a, W
+    )
 
 
-def _pulled(
+def _pin_loaded_specimen(
     mesh: Mesh, points: Sequence[tuple[float, float]], force: float, contact_angle: float,
     kind: str, a: float, W: float,
 ) -> Specimen:  # fmt: skip

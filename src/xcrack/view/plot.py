@@ -131,7 +131,7 @@ def plot(
     XcrackError
         The renderer that was asked for is not installed.
     """
-    solution = _drawable(solution, field)
+    solution = _solution_to_draw(solution, field)
     field = one_of(field, "plot: field", _KNOWN[solution.space.dim])
     look = PlotStyle(
         warp=warp,
@@ -292,7 +292,7 @@ def crack_box(solution: Solution, cracks: list[int], zoom: float, warp: float = 
     return np.stack([middle - half, middle + half])
 
 
-def _drawable(given: Solution | Problem, field: str) -> Solution:
+def _solution_to_draw(given: Solution | Problem, field: str) -> Solution:
     """The solution, or that of a problem in which nothing acts, to draw its mesh and cracks."""
     if isinstance(given, Solution):
         return given

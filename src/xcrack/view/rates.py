@@ -63,7 +63,7 @@ def plot_rates(
     target = picture_path(file, "plot_rates")
     low, high = (k * 1e6 / system.K for k in _RANGE) if dK is None else _limits(dK)
     ranges = np.geomspace(low, high, 200)
-    curves = _curves(_named(laws, units), ranges, R, _LONG / system.length)
+    curves = _curves(_named_laws(laws, units), ranges, R, _LONG / system.length)
     figure = new_figure((8.0, 5.4), target is None, "plot_rates")
     axes = figure.add_subplot()
     for n, (name, rate) in enumerate(curves.items()):
@@ -85,7 +85,7 @@ def _limits(dK: Any) -> tuple[float, float]:
     return low, high
 
 
-def _named(laws: Any, units: str) -> dict[str, Any]:
+def _named_laws(laws: Any, units: str) -> dict[str, Any]:
     if isinstance(laws, Mapping):
         return {str(name): law for name, law in laws.items()}
     if not isinstance(laws, Sequence) or not all(isinstance(metal, Metal) for metal in laws):

@@ -140,13 +140,13 @@ def _value(value: Any) -> str:
         name = getattr(value, "__name__", getattr(value, "name", type(value).__name__))
         return f"function {name}"
     array = np.asarray(value, dtype=object)
-    return str(_short(array.tolist())) if array.ndim else display_text(value)
+    return str(_short_number(array.tolist())) if array.ndim else display_text(value)
 
 
-def _short(value: Any) -> Any:
+def _short_number(value: Any) -> Any:
     """Numbers without the digits that nobody reads."""
     if isinstance(value, list):
-        return [_short(each) for each in value]
+        return [_short_number(each) for each in value]
     return float(f"{value:.6g}") if isinstance(value, float) else value
 
 

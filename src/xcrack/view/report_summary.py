@@ -25,7 +25,7 @@ def summary(source: Source) -> Section:
     rows = [*_part(source), *_cracks(source), *_growth(source), *_margins(source),
             *_decisions(source)]  # fmt: skip
     count = source.warnings.total()
-    words = Markup(f'<a href="#warnings">{_counted(count, "warning")}</a>')
+    words = Markup(f'<a href="#warnings">{_count_of(count, "warning")}</a>')
     rows.append(("warnings", element("span", words, cls="bad" if count else "good")))
     parts: list[Any] = [table((), rows)]
     drawn = first_picture(source.history, source.solutions, source.sif)
@@ -38,7 +38,7 @@ def summary(source: Source) -> Section:
 Rows = Iterator[tuple[str, Any]]
 
 
-def _counted(n: int, word: str) -> str:
+def _count_of(n: int, word: str) -> str:
     return f"{n} {word}" if n == 1 else f"{n} {word}s"
 
 
@@ -106,14 +106,15 @@ def _growth(source: Source) -> Rows:
 def _settings(settings: Mapping[str, str], name: str) -> str:
     """A law or a load history in a line."""
     parts = [
-        f"{key.removeprefix(name + '.')} = {_short(setting_words(text).partition(', sha256')[0])}"
+        f"{key.removeprefix(name + '.')} = "
+        f"{_short_number(setting_words(text).partition(', sha256')[0])}"
         for key, text in settings.items()
         if key.startswith(f"{name}.") and text not in ("None", "()")
     ]
     return f"{settings.get(name, '')}({', '.join(parts)})"
 
 
-def _short(text: str) -> str:
+def _short_number(text: str) -> str:
     """A number without the digits that nobody reads."""
     try:
         return f"{float(text):.6g}"
@@ -133,26 +134,26 @@ def _margins(source: Source) -> Rows:
             for c, sif in enumerate(state):
                 if len(sif.K):
                     where = f", state {k}" if len(source.sif) > 1 else ""
-                    yield f"K of crack {c}{where}", _largest(sif, source)
+                    yield f"K of crack {c}{where}", _largest_K(sif, source)
         last = np.nan if source.validity is None else source.validity.K
     for known in () if source.problem is None or history is not None else source.problem.handbook:
         yield "beside a handbook", known.comparison(source.solutions[-1])
     K_c = source.toughness
     if K_c is not None and last > 0:
-        yield "margin of toughness", _judged(f"K_c / K = {K_c / last:.4g}", K_c > last)
+        yield "margin of toughness", _verdict(f"K_c / K = {K_c / last:.4g}", K_c > last)
     known_validity = source.validity
     if known_validity is None or np.isnan(known_validity.zone):
         yield "plastic zone, net section", "not judged: no yield stress is known"
         return
     worst = np.nanmax([known_validity.of_crack, known_validity.of_ligament])
     words = f"plastic zone {100 * worst:.3g} % of the crack or ligament"
-    yield "linear elasticity", _judged(words, worst <= ZONE)
+    yield "linear elasticity", _verdict(words, worst <= ZONE)
     if not np.isnan(known_validity.of_section):
         share = known_validity.of_section
-        yield "net section", _judged(f"{100 * share:.3g} % of the load that yields it", share < 1)
+        yield "net section", _verdict(f"{100 * share:.3g} % of the load that yields it", share < 1)
 
 
-def _largest(sif: SIF, source: Source) -> str:
+def _largest_K(sif: SIF, source: Source) -> str:
     """K of a tip or the largest of a front, with its bar."""
     names = ("K_I", "K_II", "K_III")
     j = int(np.argmax(np.linalg.norm(sif.K, axis=1)))
@@ -161,7 +162,7 @@ def _largest(sif: SIF, source: Source) -> str:
     return source.units.value(values, TOUGHNESS) + bar
 
 
-def _judged(words: str, is_good: bool) -> Markup:
+def _verdict(words: str, is_good: bool) -> Markup:
     return element("span", words, cls="good" if is_good else "bad")
 
 
@@ -173,14 +174,14 @@ def _decisions(source: Source) -> Rows:
         if "factor" in (strength.dtype.names or ()):
             least = strength["factor"]
         words = f"bears {least[-1]:.4g} times the largest load at the end"
-        yield "residual strength", _judged(words, least.min() >= 1)
+        yield "residual strength", _verdict(words, least.min() >= 1)
     if life is not None:
         early = life.percentile(100 * _FEW)
         yield "life with scatter", f"{100 * _FEW:g} % end before {early:.5g} {life.unit}s"
     if plan is not None:
         missed = "" if plan.missed is None else f"; all miss with chance {plan.missed:.3g}"
         yield "inspection", (f"first after {plan.first:.6g}, then every {plan.interval:.6g}: "
-                             f"{_counted(len(plan.at), 'look')}{missed}")  # fmt: skip
+                             f"{_count_of(len(plan.at), 'look')}{missed}")  # fmt: skip
 
 
 __all__ = ["summary"]

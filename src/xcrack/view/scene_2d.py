@@ -103,7 +103,9 @@ def scene(solution: Solution, field: str, warp: float, limits: tuple[float, floa
     if curved is not None:
         points, halves, of_half = _onto_curves(curved, points, edge[rim], facet[rim])
         rims = curved.bend(points[halves], of_half, given[halves])
-        points, given, triangles = _bent(curved, points, given, triangles, halves, of_half)
+        points, given, triangles = _curved_triangles(
+            curved, points, given, triangles, halves, of_half
+        )
     moved, values = points + warp * given[:, :2], given[:, 2]
     curve, rest = _curves(edge, moved), _curves(edge, points)[rim]
     outline = curve[rim]
@@ -145,7 +147,7 @@ def _onto_curves(
     return x, np.concatenate(halves), np.concatenate([facet[~has], facet[has], facet[has]])
 
 
-def _bent(
+def _curved_triangles(
     curved: CurvedSides, points: Floats, given: Floats, triangles: Ints, lines: Ints, facet: Ints
 ) -> tuple[Floats, Floats, Ints]:
     """Points, values and triangles, those beside a curved edge in parts that follow it."""

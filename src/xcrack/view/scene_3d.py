@@ -177,7 +177,7 @@ def space_scene(
         """Corners at rest, moved ones, and values there."""
         x, data = part.at(at_rest), part.at(given)
         if curved is not None:
-            x, data = _bent(curved, on, part, x, data)
+            x, data = _curved_parts(curved, on, part, x, data)
         return x, x + warp * data[..., :3], data[..., 3]
 
     _, corners, values = (np.concatenate(each) for each in zip(*map(placed, drawn)))
@@ -215,7 +215,7 @@ def space_scene(
     )
 
 
-def _bent(
+def _curved_parts(
     curved: CurvedSides, on: Faces, part: TriangleSoup, x: Floats, data: Floats
 ) -> tuple[Floats, Floats]:
     """Segments and triangles of a part that follow the curves on which they lie, or end."""
@@ -253,7 +253,7 @@ def crack_scene(
 ) -> SpaceScene:
     """Field on cracks, in a body that is seen through."""
     lips = [lip_faces(solution, c) for c in cracks]
-    corners = np.concatenate([_middle(each, warp)[each.triangles] for each in lips])
+    corners = np.concatenate([_middle_of_lips(each, warp)[each.triangles] for each in lips])
     values = np.concatenate([lip_values(each, field) for each in lips])
     coloured = np.concatenate([is_coloured(each, field) for each in lips])
     nothing = np.zeros((0, 3, 3))
@@ -275,7 +275,7 @@ def crack_scene(
         signed=low < 0 < high,
         touching=nothing if field == "pressure" else corners[~coloured],
         apart=corners[~coloured] if field == "pressure" else nothing,
-        rims=np.concatenate([_middle(each, warp)[each.mouth] for each in lips]),
+        rims=np.concatenate([_middle_of_lips(each, warp)[each.mouth] for each in lips]),
         cell_edges=edges_of(corners),
         toward=_viewing_direction(plane, view, lips),
     )
@@ -365,7 +365,7 @@ def is_coloured(lips: LipFaces, field: str) -> Bools:
     return np.asarray(lips.closed < _TOUCH) | (field == "sliding")
 
 
-def _middle(lips: LipFaces, warp: float) -> Floats:
+def _middle_of_lips(lips: LipFaces, warp: float) -> Floats:
     return np.asarray(lips.points + warp * (lips.minus + lips.plus) / 2)
 
 
@@ -374,7 +374,7 @@ def _front_lines(solution: Solution, warp: float, plane: Plane | None) -> Floats
     for c in range(len(solution.lips)):
         lips = lip_faces(solution, c)
         behind = segments_behind(lips.front, levels(lips.points, plane))
-        parts += [part.at(_middle(lips, warp)) for part in behind]
+        parts += [part.at(_middle_of_lips(lips, warp)) for part in behind]
     return np.concatenate(parts)
 
 

@@ -100,7 +100,7 @@ def _edges(mesh: Mesh) -> Floats:
 def _draw_loads(axes: Any, problem: Problem) -> None:
     mesh = problem.mesh
     for load in problem.loads:
-        rows = list(_arrows(load, mesh)) if isinstance(load, Load) else []
+        rows = list(_arrows_of(load, mesh)) if isinstance(load, Load) else []
         shown = [(x, v) for x, v in rows if np.linalg.norm(v) > 0]
         _entry(axes, mesh.dim, load.name, _LOAD, ">" if shown else "none")
         if not shown:
@@ -123,7 +123,7 @@ def _leaves(mesh: Mesh, x: Floats, v: Floats) -> np.ndarray:
     return np.einsum("kd,kd->k", v, x - middle) >= 0
 
 
-def _arrows(load: Load, mesh: Mesh) -> Iterator[tuple[Floats, Floats]]:
+def _arrows_of(load: Load, mesh: Mesh) -> Iterator[tuple[Floats, Floats]]:
     """Places and vectors of a load; of a small set one, its resultant."""
     if "point_force" in load.acts:
         points = np.concatenate([mesh.points, mesh.edge_middles])

@@ -9,7 +9,7 @@ from numba import types
 from numba.extending import get_cython_function_address, intrinsic
 
 
-def _external(module: str, name: str, count: int) -> Any:
+def _blas_function(module: str, name: str, count: int) -> Any:
     symbol = f"xcrack_{name}"
     address = get_cython_function_address(f"scipy.linalg.cython_{module}", name)
     if numba.config.DISABLE_JIT:  # kernels run as Python then, to be debugged and measured
@@ -18,14 +18,14 @@ def _external(module: str, name: str, count: int) -> Any:
     return types.ExternalFunction(symbol, types.void(*([types.uintp] * count)))
 
 
-dpotrf = _external("lapack", "dpotrf", 5)
-dgesv = _external("lapack", "dgesv", 8)
-dsyev = _external("lapack", "dsyev", 9)
-dtrsm = _external("blas", "dtrsm", 11)
-dsyrk = _external("blas", "dsyrk", 10)
-dgemm = _external("blas", "dgemm", 13)
-dtrsv = _external("blas", "dtrsv", 8)
-dgemv = _external("blas", "dgemv", 11)
+dpotrf = _blas_function("lapack", "dpotrf", 5)
+dgesv = _blas_function("lapack", "dgesv", 8)
+dsyev = _blas_function("lapack", "dsyev", 9)
+dtrsm = _blas_function("blas", "dtrsm", 11)
+dsyrk = _blas_function("blas", "dsyrk", 10)
+dgemm = _blas_function("blas", "dgemm", 13)
+dtrsv = _blas_function("blas", "dtrsv", 8)
+dgemv = _blas_function("blas", "dgemv", 11)
 
 
 @intrinsic

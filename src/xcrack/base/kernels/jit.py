@@ -171,7 +171,7 @@ def _cache_of(function: Callable[..., Any]) -> Any:
     try:
         return _Cache(function)
     except RuntimeError:  # no folder that numba knows of may be written to
-        folder = _instead()
+        folder = _temporary_cache()
     if folder is None:
         return caching.NullCache()
     numba.config.CACHE_DIR = str(folder)
@@ -179,7 +179,7 @@ def _cache_of(function: Callable[..., Any]) -> Any:
 
 
 @cache
-def _instead() -> Path | None:
+def _temporary_cache() -> Path | None:
     """A temporary folder, with one warning for all kernels."""
     folder = _own_folder()
     remedy = "Set NUMBA_CACHE_DIR to a folder that may be written to and stays."

@@ -37,12 +37,12 @@ def _rows_of(count: int) -> Any:
                 one = builder.insert_element(nothing, number, ir.IntType(32)(0))
                 return builder.shuffle_vector(one, nothing, first_lane)
 
-            def four(pointer: Any, number: Any) -> Any:
+            def load_four(pointer: Any, number: Any) -> Any:
                 first = builder.gep(pointer, [builder.mul(number, _SIZE(WIDTH))])
                 return builder.bitcast(first, vector.as_pointer())
 
-            def loaded(pointer: Any, number: Any) -> Any:
-                return builder.load(four(pointer, number), align=aligned)
+            def load_vector(pointer: Any, number: Any) -> Any:
+                return builder.load(load_four(pointer, number), align=aligned)
 
             sums = [cgutils.alloca_once(builder, vector) for _ in range(count)]
             for each in sums:
@@ -50,7 +50,7 @@ def _rows_of(count: int) -> Any:
             at = cgutils.alloca_once_value(builder, place)
             with cgutils.for_range_slice(builder, low, high, _SIZE(1)) as (k, _):
                 number = builder.zext(builder.load(builder.gep(column, [k])), _SIZE)
-                xk, p = loaded(x, number), builder.load(at)
+                xk, p = load_vector(x, number), builder.load(at)
                 for i, each in enumerate(sums):
                     row_pointer = builder.load(builder.gep(value, [builder.add(p, _SIZE(i))]))
                     term = builder.fmul(spread(row_pointer), xk)
@@ -59,8 +59,8 @@ def _rows_of(count: int) -> Any:
             for i, each in enumerate(sums):
                 number = builder.add(row, _SIZE(i))
                 term = builder.fmul(spread(scale), builder.load(each))
-                total = builder.fadd(loaded(y, number), term)
-                builder.store(total, four(out, number), align=aligned)
+                total = builder.fadd(load_vector(y, number), term)
+                builder.store(total, load_four(out, number), align=aligned)
             return context.get_dummy_value()
 
         given = columns, values, x, y, scale, out

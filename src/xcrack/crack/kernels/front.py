@@ -217,7 +217,7 @@ def _weight(r, radius):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _widest(radii, hat):  # type: ignore[no-untyped-def]
+def _largest_radius(radii, hat):  # type: ignore[no-untyped-def]
     """Largest radius of two hats."""
     largest = 0.0
     for side in range(2):
@@ -291,7 +291,7 @@ def front_terms(  # type: ignore[no-untyped-def]
     )
     for q in range(len(weight)):
         r, theta = polar[q, 0], polar[q, 1]
-        if r >= _widest(radii, hat[q]) or r <= 0.0:
+        if r >= _largest_radius(radii, hat[q]) or r <= 0.0:
             continue
         ch, sh = math.cos(0.5 * theta), math.sin(0.5 * theta)
         c, s = ch * ch - sh * sh, 2.0 * sh * ch
@@ -404,7 +404,7 @@ def surface_terms(  # type: ignore[no-untyped-def]
     g, sigma, m_out, t = np.empty((3, 3)), np.empty((3, 3)), np.empty(3), np.empty(3)
     for q in range(len(weight)):
         r = polar[q, 0]
-        if r >= _widest(radii, hat[q]) or r <= 0.0:
+        if r >= _largest_radius(radii, hat[q]) or r <= 0.0:
             continue
         for a in range(3):
             m_out[a] = 0.0

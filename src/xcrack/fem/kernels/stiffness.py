@@ -317,7 +317,7 @@ def _slot(indptr, indices, row, column):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _active(functions, n_standard, place):  # type: ignore[no-untyped-def]
+def _set_active_places(functions, n_standard, place):  # type: ignore[no-untyped-def]
     """Set the places of the functions of a cell; their number, and that of standard ones."""
     active, plain = 0, 0  # standard functions come first
     for a in range(len(functions)):
@@ -448,7 +448,7 @@ def add_stiffness(  # type: ignore[no-untyped-def]
         most = max(most, offsets[e + 1] - offsets[e])
     rows = np.empty(most * n * d)
     for e in range(m):
-        active, plain = _active(functions[e], n_standard, place)
+        active, plain = _set_active_places(functions[e], n_standard, place)
         begin, end = offsets[e], offsets[e + 1]
         least = 0.0
         for q in range(begin, end):
@@ -505,7 +505,7 @@ def add_products(  # type: ignore[no-untyped-def]
     m, n = functions.shape
     place = np.empty(n, np.int64)
     for e in range(m):
-        active, plain = _active(functions[e], n_standard, place)
+        active, plain = _set_active_places(functions[e], n_standard, place)
         block = products[e]
         _scatter(
             data, indptr, indices, functions[e], place, place, active, plain, block, lam, mu,

@@ -141,7 +141,7 @@ def locate_points(points, cells, gradient, grid, shape, x, tolerance):  # type: 
         number = _bin(0, begin, end, shape)
         for k in range(grid[2][number], grid[2][number + 1]):
             e = grid[3][k]
-            if not _inside(points, cells, gradient, e, x[q], tolerance, coordinates):
+            if not _is_inside(points, cells, gradient, e, x[q], tolerance, coordinates):
                 continue
             square = 0.0
             for j in range(d):
@@ -157,7 +157,7 @@ def locate_points(points, cells, gradient, grid, shape, x, tolerance):  # type: 
 
 
 @kernel
-def _inside(points, cells, gradient, e, x, tolerance, coordinates):  # type: ignore[no-untyped-def]
+def _is_inside(points, cells, gradient, e, x, tolerance, coordinates):  # type: ignore[no-untyped-def]
     """Whether a cell has a point, whose barycentric coordinates are set."""
     d, total, least = points.shape[1], 0.0, 1.0
     for i in range(1, d + 1):

@@ -88,7 +88,7 @@ def _along_edge(table, nodes, target, bary, first, second, work):  # type: ignor
 
 
 @kernel
-def _inside(table, nodes, target, bary, work):  # type: ignore[no-untyped-def]
+def _move_inside(table, nodes, target, bary, work):  # type: ignore[no-untyped-def]
     """Move `bary` to the nearest point of a surface piece, by Gauss and Newton.
 
     Returns the squared distance to it, inf where it would lie beyond an edge.
@@ -177,7 +177,7 @@ def nearest_on_pieces(x, near, offsets, piece, local, nodes, centre, radius):  #
                     bary[j] = start[count, j] = table[local[row], j] / 4.0
                 count += 1
                 if corners == 3 and _may_be_nearer(x[q], centre[f], radius[f], least):
-                    square = _inside(table, nodes[f], x[q], bary, work)
+                    square = _move_inside(table, nodes[f], x[q], bary, work)
                     if square < least:
                         least, owner[q] = square, f
                         foot[q] = work[0]

@@ -61,7 +61,7 @@ def _sides(phi, e, order):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _across(x, e, i, order, first, last):  # type: ignore[no-untyped-def]
+def _distance_sum(x, e, i, order, first, last):  # type: ignore[no-untyped-def]
     """Sum of the distances of vertex i to some vertices."""
     total = 0.0
     for m in range(first, last):
@@ -94,8 +94,8 @@ def _sort(phi, x, e, order, count):  # type: ignore[no-untyped-def]
                 elif x.shape[0] == 0:
                     break
                 else:
-                    short = _across(x, e, one, order, begin, end)
-                    long = _across(x, e, other, order, begin, end)
+                    short = _distance_sum(x, e, one, order, begin, end)
+                    long = _distance_sum(x, e, other, order, begin, end)
                     if short > (1.0 - _SAME) * long:
                         break
                 order[j] = other
